@@ -7,6 +7,7 @@
 #   BOKEHCAM=target/release/bokehcam benches/gpu.sh measures a binary as it is, without building or testing
 #   SIZES=1280x720 FRAMES=5 ADAPTER=llvmpipe benches/gpu.sh
 set -euo pipefail
+[[ "${1-}" != @(-h|--help) ]] || exec sed -n '2,/^set/{/^set/d;s/^# \{0,1\}//p}' "$0"
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
 sizes=${SIZES:-1920x1080,3840x2160}

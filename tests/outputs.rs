@@ -279,3 +279,42 @@ fn a_video_of_a_loaded_machine_is_as_long_as_the_take() {
         assert!((2.0..=3.1).contains(&duration_s), "{name}: {duration_s} s");
     }
 }
+
+#[test]
+fn what_a_killed_run_left_is_told_by_a_run_of_any_name() {
+    let home = Home::new();
+    home.record("self", 4, 0.05);
+    fs::create_dir(home.at("takes")).unwrap();
+    let parts = || {
+        let names = fs::read_dir(home.at("takes")).unwrap().map(|entry| entry.unwrap());
+        let parts = names.filter(|entry| entry.file_name().to_string_lossy().ends_with(".part"));
+        parts.map(|entry| entry.path()).collect::<Vec<_>>()
+    };
+    // In the place of the shell: the program itself is killed.
+    let args = format!("stream self {BLUR} --loop --pace realtime --to takes/a.y4m");
+    let mut killed = home.command("", &args).stderr(Stdio::null()).spawn().unwrap();
+    until("frames", || parts().iter().any(|part| part.metadata().is_ok_and(|part| part.len() > 10_000)));
+    let alive = parts().remove(0);
+    let said = |args: &str| {
+        let ran = home.run(args);
+        assert_eq!(ran.code, Some(0), "{ran:?}");
+        ran.said
+    };
+    let other = |name: &str| said(&format!("stream self {BLUR} --frames 1 --to takes/{name}"));
+    assert!(!other("b.y4m").contains("hidden"), "another run is writing it");
+    killed.kill().unwrap();
+    killed.wait().unwrap();
+
+    let left = fs::read(&alive).unwrap();
+    let name = format!("takes/{}", alive.file_name().unwrap().to_str().unwrap());
+    let told =
+        format!("warning: runs that were killed left hidden files: {name}; give those that you want another name");
+    assert_eq!(other("c.y4m").lines().filter(|line| line.starts_with(&told)).count(), 1);
+    let render = said("render self/rgb/000000.png --effect blur --out takes/d.png");
+    assert_eq!(render.lines().filter(|line| line.starts_with(&told)).count(), 1, "{render}");
+    assert_eq!(fs::read(&alive).unwrap(), left, "nothing is done with it unasked");
+
+    let same = other("a.y4m");
+    assert!(same.contains("is kept as takes/a.y4m.incomplete") && !same.contains("hidden"), "{same}");
+    assert_eq!((fs::read(home.at("takes/a.y4m.incomplete")).unwrap(), parts()), (left, Vec::new()));
+}

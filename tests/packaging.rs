@@ -100,6 +100,22 @@ fn completions_know_every_command_and_flag() {
     }
 }
 
+/// An installed program has no repository beside it.
+#[test]
+fn help_names_only_what_a_package_brings() {
+    let install = here("packaging/install");
+    assert!(
+        install.contains("for page in ../README.md ../docs/*.md; do put \"$page\" \"share/doc/bokehcam/${page#../}\"")
+    );
+    for (command, help) in commands() {
+        assert!(!help.contains("recordings/portrait") && !help.contains("recordings/stereo"), "{command:?}: {help}");
+        for (at, _) in help.match_indices("docs/") {
+            let name = help[at..].split(|c: char| c.is_whitespace() || "),;:".contains(c)).next().unwrap();
+            assert!(Path::new(env!("CARGO_MANIFEST_DIR")).join(name).is_file(), "{command:?}: {name}");
+        }
+    }
+}
+
 /// The value of a key in a file of lines such as `key=value`.
 fn value<'a>(file: &'a str, key: &str) -> &'a str {
     let found = file.lines().find_map(|line| line.strip_prefix(key)?.strip_prefix('='));
@@ -188,4 +204,102 @@ fn examples_and_the_unit_are_those_of_the_page_on_calls() {
     let unit = here("packaging/bokehcam.service");
     let stream = unit.lines().find_map(|line| line.strip_prefix("Environment=\"STREAM=")?.strip_suffix('"')).unwrap();
     assert!(page.contains(&format!("bokehcam stream {stream}\n")), "{stream}");
+}
+
+/// What the program says of these arguments, where no daemon runs and nothing is installed: its exit code, and the line.
+fn exit_code(args: &[&str]) -> (i32, String) {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("text.txt"), "text").unwrap();
+    let photo = concat!(env!("CARGO_MANIFEST_DIR"), "/recordings/portrait/rgb/000000.png");
+    fs::copy(photo, folder.path().join("photo.png")).unwrap();
+    let mut command = Command::new(env!("CARGO_BIN_EXE_bokehcam"));
+    for name in ["HOME", "XDG_RUNTIME_DIR", "XDG_CONFIG_HOME", "XDG_DATA_HOME", "PIPEWIRE_RUNTIME_DIR"] {
+        command.env(name, folder.path());
+    }
+    let output = command.args(args).current_dir(&folder).env_remove("PIPEWIRE_REMOTE").output().unwrap();
+    (output.status.code().unwrap(), String::from_utf8_lossy(&output.stderr).into_owned())
+}
+
+/// The unit tries again after what may be there later, and gives up where only other words would help.
+#[test]
+fn the_unit_gives_up_on_wrong_arguments_alone() {
+    let unit = here("packaging/bokehcam.service");
+    assert_eq!((value(&unit, "Restart"), value(&unit, "RestartPreventExitStatus")), ("on-failure", "2"));
+
+    let two_eyes = concat!(env!("CARGO_MANIFEST_DIR"), "/recordings/stereo");
+    let mut may_come = vec![
+        vec!["./folder/of/a/disk", "--to", "null"],
+        vec!["photo.png", "--depth", "./folder/of/a/disk", "--to", "null"],
+        vec![two_eyes, "--depth", "stereo", "--calib", "nothing.yml", "--to", "null"],
+    ];
+    if cfg!(feature = "camera") {
+        let by_id = "/dev/v4l/by-id/usb-Nobody_s_camera-video-index0";
+        let cameras =
+            ["4711", "4711,4712", "/dev/video4711", by_id, "usb-Nobody_s_camera-video-index0", "Nobody's camera"];
+        may_come.extend(cameras.map(|camera| vec![camera, "--to", "/dev/video10", "--on-demand"]));
+        may_come.push(vec!["photo.png", "--depth", "/dev/video4711", "--to", "null"]);
+        may_come.push(vec!["demo", "--to", "/dev/video4711"]);
+    }
+    if cfg!(all(feature = "camera", feature = "pipewire")) {
+        may_come.push(vec!["pipewire:Nobody's camera", "--to", "null"]);
+        may_come.push(vec!["demo", "--to", "pipewire"]);
+    }
+    if cfg!(feature = "networks") {
+        may_come.push(vec!["photo.png", "--depth", "matte", "--to", "null"]);
+    }
+    for args in may_come {
+        let (code, said) = exit_code(&[&["stream"], args.as_slice()].concat());
+        assert!(
+            code == 1 && said.lines().last().is_some_and(|line| line.starts_with("error: ")),
+            "{args:?}: {code}: {said}"
+        );
+    }
+    if cfg!(feature = "window") {
+        let (code, said) = exit_code(&["preview", "./folder/of/a/disk"]);
+        assert!(code == 1 && said.contains("./folder/of/a/disk: there is no such folder"), "{code}: {said}");
+    }
+
+    for args in [
+        &["demo"][..],
+        &["demo", "--to", "null", "--nosuch"],
+        &["demo", "--to", "null", "--rim", "7"],
+        &["demo", "--to", "null", "--preset", "nosuch"],
+        &["demo", "--to", "null", "--start", "3"],
+        &["text.txt", "--to", "null"],
+        &["pipewire:", "--to", "null"],
+    ] {
+        let (code, said) = exit_code(&[&["stream"], args].concat());
+        assert!(code == 2 && said.lines().count() == 1, "{args:?}: {code}: {said}");
+    }
+}
+
+/// What holds in the unit of a user's manager: nothing that makes namespaces, which not every user may.
+#[test]
+fn the_unit_is_confined_by_what_a_user_may_ask_for() {
+    let unit = here("packaging/bokehcam.service");
+    for (key, is) in [
+        ("NoNewPrivileges", "yes"),
+        ("LockPersonality", "yes"),
+        ("RestrictNamespaces", "yes"),
+        ("RestrictSUIDSGID", "yes"),
+        ("SystemCallArchitectures", "native"),
+        ("SystemCallFilter", "@system-service"),
+        ("SystemCallErrorNumber", "EPERM"),
+        ("UMask", "0077"),
+        ("LimitCORE", "0"),
+    ] {
+        assert_eq!(value(&unit, key), is, "{key}");
+    }
+    assert!(value(&unit, "MemoryMax").ends_with('G'));
+    assert!(
+        value(&unit, "RestrictAddressFamilies").split(' ').all(|family| ["AF_UNIX", "AF_NETLINK"].contains(&family))
+    );
+    let needs_namespaces =
+        ["Private", "Protect", "ReadWritePaths=", "ReadOnlyPaths=", "InaccessiblePaths=", "TemporaryFileSystem="];
+    // PipeWire is given real time, and drivers compile.
+    let would_break = ["MemoryDenyWriteExecute=", "RestrictRealtime="];
+    for line in unit.lines() {
+        let bad = needs_namespaces.iter().chain(&would_break).find(|begin| line.starts_with(*begin));
+        assert!(bad.is_none(), "{line}");
+    }
 }

@@ -43,3 +43,30 @@ fn setup_looks_for_the_library_that_the_build_needs() {
     let found = setup();
     assert!(found.status.success(), "{}", said(&found));
 }
+
+/// Asked for help, what builds or tests for long says what it would do, and does not begin.
+#[test]
+fn scripts_tell_what_they_do() {
+    let here = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let of_scripts = std::fs::read_dir(here.join("scripts")).unwrap().map(|entry| entry.unwrap().path());
+    let elsewhere =
+        ["gst/test", "python/test", "python/wheel", "benches/gpu.sh", "tests/vm/run", "tests/pipewire/session"];
+    let mut tried = 0;
+    for path in of_scripts.chain(elsewhere.map(|name| here.join(name))) {
+        let text = std::fs::read_to_string(&path).unwrap();
+        // What is run by others alone has a usage line.
+        let Some(first) = text.strip_prefix("#!/usr/bin/env bash\n# ").filter(|_| !path.ends_with("scripts/within"))
+        else {
+            continue;
+        };
+        let output = script("within").arg("20s").arg(&path).arg("--help").output().unwrap();
+        let help = String::from_utf8_lossy(&output.stdout);
+        assert!(output.status.success(), "{}: {}", path.display(), said(&output));
+        assert_eq!(help.lines().next(), first.lines().next(), "{}", path.display());
+        assert!(!help.contains("set -"), "{}: {help}", path.display());
+        tried += 1;
+    }
+    assert!(tried > 12, "{tried} scripts");
+    let refused = script("within").args(["20s", "scripts/test", "--nosuch"]).output().unwrap();
+    assert_eq!(refused.status.code(), Some(2), "{}", said(&refused));
+}

@@ -1,9 +1,11 @@
 //! Output files: what may be overwritten, and writing them whole or not at all.
 
+use std::collections::BTreeSet;
 use std::fs;
 use std::path::Path;
 
 use super::error::CliError;
+use super::log;
 use super::terminal::print;
 use crate::files::{place, whole};
 use crate::sink::Target;
@@ -54,6 +56,29 @@ pub fn make_folder_of(path: &Path) -> Result<(), CliError> {
     match path.parent().filter(|folder| !folder.as_os_str().is_empty()) {
         Some(folder) => fs::create_dir_all(folder).map_err(CliError::io(folder)),
         None => Ok(()),
+    }
+}
+
+/// Says what runs that were killed left hidden in the folders of `paths`. It is left to the user: where nodes share a
+/// folder and not its locks, a file that seems to be left behind may be one that another run is writing.
+pub fn tell_of_leftovers<'a>(paths: impl IntoIterator<Item = &'a Path>) {
+    let folder_of = |path: &'a Path| match path.parent() {
+        _ if path.is_dir() => path,
+        Some(folder) if !folder.as_os_str().is_empty() => folder,
+        _ => Path::new("."),
+    };
+    let folders: BTreeSet<&Path> = paths.into_iter().map(folder_of).collect();
+    for folder in folders {
+        let left = whole::all_left_behind(folder).unwrap_or_default();
+        let names: Vec<String> = left.iter().take(3).map(|(part, _)| part.display().to_string()).collect();
+        if !names.is_empty() {
+            let more = left.len() - names.len();
+            let more = if more == 0 { String::new() } else { format!(" and {more} more") };
+            log::warn(&format!(
+                "runs that were killed left hidden files: {}{more}; give those that you want another name, and remove the rest",
+                names.join(", ")
+            ));
+        }
     }
 }
 

@@ -92,7 +92,7 @@ impl System {
 
     /// Opens a source to be played for as long as the window is open, with depth whether or not the look needs it.
     fn open_source(&self, name: &str, with_plate: bool) -> Result<(Source, SourceName), String> {
-        let source_name = SourceName::from_str(name).map_err(|error| format!("{name}: {error}"))?;
+        let source_name = SourceName::from_str(name).map_err(|error| error.of(name).to_string())?;
         let mut options = self.options.clone();
         if with_plate {
             options.depth_choice = DepthChoice::OneCamera(plate());
@@ -176,7 +176,7 @@ impl Services for System {
     }
 
     fn check(&self, name: &str) -> Result<(), String> {
-        let source_name = SourceName::from_str(name).map_err(|error| format!("{name}: {error}"))?;
+        let source_name = SourceName::from_str(name).map_err(|error| error.of(name).to_string())?;
         match &source_name {
             SourceName::Folder(folder) => {
                 let reading = Reading { keep_going: true, ..Reading::default() };

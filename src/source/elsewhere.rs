@@ -63,7 +63,7 @@ fn open_depth_camera(name: &str, options: &options::Depth, clock: &Clock) -> Res
     match LiveDepth::open(name, units, registration, clock.clone()) {
         Ok(camera) => Ok(Box::new(camera)),
         // Probably a mistyped keyword or folder.
-        Err(error @ OpenError::Name(_)) => Err(SourceError::Usage(format!(
+        Err(error @ OpenError::Name(_)) => Err(SourceError::NotThere(format!(
             "--depth {name}: {error}; or use auto, recorded, stereo, none, matte, mono, plate or a folder with a recording"
         ))),
         Err(error) => Err(error.into()),
@@ -72,7 +72,7 @@ fn open_depth_camera(name: &str, options: &options::Depth, clock: &Clock) -> Res
 
 #[cfg(not(feature = "camera"))]
 fn open_depth_camera(name: &str, _: &options::Depth, _: &Clock) -> Result<Box<dyn DepthSource>, SourceError> {
-    Err(SourceError::Usage(format!(
+    Err(SourceError::NotThere(format!(
         "--depth {name}: there is no such folder, and this build leaves cameras out (feature `camera`)"
     )))
 }

@@ -15,6 +15,9 @@ pub enum SourceError {
     /// What is asked for does not make sense together.
     #[error("{0}")]
     Usage(String),
+    /// What is named is not here, and may come later: a camera that is not plugged in, a disk that is not mounted.
+    #[error("{0}")]
+    NotThere(String),
     /// The calibration of a depth camera cannot be used.
     #[error("{}:{line}: {what}", path.display())]
     Registration {
@@ -44,9 +47,19 @@ pub enum SourceError {
 }
 
 impl SourceError {
-    /// Whether the caller has to write something differently.
+    /// Whether the caller has to write something differently: the same words will not become right by themselves.
     pub fn is_wrong_argument(&self) -> bool {
         matches!(self, Self::Usage(_) | Self::Registration { .. })
+    }
+
+    /// The same, said of what is called `name`.
+    #[must_use]
+    pub fn of(self, name: &str) -> Self {
+        match self {
+            Self::Usage(what) => Self::Usage(format!("{name}: {what}")),
+            Self::NotThere(what) => Self::NotThere(format!("{name}: {what}")),
+            other => other,
+        }
     }
 
     pub(super) fn usage<T>(what: impl Into<String>) -> Result<T, Self> {

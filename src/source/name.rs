@@ -61,8 +61,8 @@ pub enum SourceName {
 }
 
 impl FromStr for SourceName {
-    type Err = String;
-    fn from_str(text: &str) -> Result<Self, String> {
+    type Err = SourceError;
+    fn from_str(text: &str) -> Result<Self, SourceError> {
         Self::from_os(text.as_ref())
     }
 }
@@ -100,23 +100,25 @@ fn sources() -> &'static str {
     }
 }
 
-/// The message for a path that is no folder, with a suggestion if a sibling has a similar name.
-fn no_folder(text: &str) -> String {
+/// There is no such folder; with a suggestion if a sibling has a similar name.
+fn no_folder(text: &str) -> SourceError {
     let hint =
         near::folder(Path::new(text)).map_or(String::new(), |near| format!(", did you mean {}?", near.display()));
-    format!("there is no such folder{hint}; use {}", sources())
+    SourceError::NotThere(format!("there is no such folder{hint}; use {}", sources()))
 }
 
 /// Parses the name of one camera, or of two as `LEFT,RIGHT`; the message of an error suggests similar names.
 #[cfg(feature = "camera")]
-fn parse_cameras(text: &str) -> Result<SourceName, String> {
+fn parse_cameras(text: &str) -> Result<SourceName, SourceError> {
     let named = |name: &str| {
         let node = crate::v4l2::node::resolve(name)?;
         Ok(Named { name: name.to_owned(), node })
     };
-    let refuse = |error: crate::v4l2::node::NodeError| match near::folder(Path::new(text)) {
-        Some(near) => Err(format!("{error}; or did you mean the folder {}? Use {}", near.display(), sources())),
-        None => Err(format!("{error}; use {}", sources())),
+    let refuse = |error: crate::v4l2::node::NodeError| {
+        Err(SourceError::NotThere(match near::folder(Path::new(text)) {
+            Some(near) => format!("{error}; or did you mean the folder {}? Use {}", near.display(), sources()),
+            None => format!("{error}; use {}", sources()),
+        }))
     };
     // First as one camera: its own name may contain commas, too.
     let not_one_camera = match named(text) {
@@ -130,7 +132,10 @@ fn parse_cameras(text: &str) -> Result<SourceName, String> {
         if let (Ok(left), Ok(right)) = (named(left), named(right)) {
             let same = |a: &Path, b: &Path| a.canonicalize().ok() == b.canonicalize().ok();
             if same(&left.node, &right.node) {
-                return Err(format!("the left and the right eye are one camera, {}", left.node.display()));
+                let what = format!("the left and the right eye are one camera, {}", left.node.display());
+                // By two names: the other one may be plugged in later.
+                let may_come = left.name != right.name;
+                return Err(if may_come { SourceError::NotThere(what) } else { SourceError::Usage(what) });
             }
             return Ok(SourceName::Cameras([left, right]));
         }
@@ -143,26 +148,25 @@ fn parse_cameras(text: &str) -> Result<SourceName, String> {
 }
 
 /// Parses what follows `pipewire:`; whether there is such a camera is seen when it is opened.
-fn parse_pipewire(name: &str) -> Result<SourceName, String> {
+fn parse_pipewire(name: &str) -> Result<SourceName, SourceError> {
     #[cfg(all(feature = "camera", feature = "pipewire"))]
     return match name.is_empty() {
-        true => Err("pipewire:NAME needs the name of a camera; `bokehcam devices` lists them".to_owned()),
+        true => SourceError::usage("pipewire:NAME needs the name of a camera; `bokehcam devices` lists them"),
         false => Ok(SourceName::PipeWire(name.to_owned())),
     };
     #[cfg(not(all(feature = "camera", feature = "pipewire")))]
-    return Err(format!(
+    return SourceError::usage(format!(
         "this build leaves PipeWire's cameras out (features `camera` and `pipewire`): {name} cannot be read"
     ));
 }
 
 #[cfg(not(feature = "camera"))]
-fn parse_cameras(text: &str) -> Result<SourceName, String> {
-    let what = if text.starts_with("/dev/") || text.parse::<u32>().is_ok() {
-        "this build leaves cameras out (feature `camera`)"
-    } else {
-        "there is no such folder, and this build leaves cameras out (feature `camera`)"
-    };
-    Err(format!("{what}: use {}", sources()))
+fn parse_cameras(text: &str) -> Result<SourceName, SourceError> {
+    let what = "this build leaves cameras out (feature `camera`)";
+    Err(match text.starts_with("/dev/") || text.parse::<u32>().is_ok() {
+        true => SourceError::Usage(format!("{what}: use {}", sources())),
+        false => SourceError::NotThere(format!("there is no such folder, and {what}: use {}", sources())),
+    })
 }
 
 #[cfg(feature = "camera")]
@@ -176,8 +180,8 @@ impl SourceName {
     /// Parses the name of a source. A folder's path need not be UTF-8.
     ///
     /// # Errors
-    /// It names no source: the message says what is accepted.
-    pub fn from_os(name: &OsStr) -> Result<Self, String> {
+    /// It names no source, or one that is not there now: the message says what is accepted.
+    pub fn from_os(name: &OsStr) -> Result<Self, SourceError> {
         let path = Path::new(name);
         match name.to_str() {
             Some(text) if text.starts_with(PIPEWIRE) => parse_pipewire(&text[PIPEWIRE.len()..]),
@@ -185,7 +189,7 @@ impl SourceName {
             Some(demo::NAME) => Ok(SourceName::Demo),
             _ if path.is_dir() => Ok(SourceName::Folder(path.to_owned())),
             _ if path.is_file() && photo::is_photo(path) => Ok(SourceName::Photo(path.to_owned())),
-            _ if path.is_file() => Err(format!("it is neither a folder nor a photo: use {}", sources())),
+            _ if path.is_file() => SourceError::usage(format!("it is neither a folder nor a photo: use {}", sources())),
             Some(text) if looks_like_a_path(text) => Err(no_folder(text)),
             Some(text) => parse_cameras(text),
             None => Err(no_folder(&path.display().to_string())),

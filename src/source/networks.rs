@@ -38,7 +38,7 @@ pub(super) fn open(chosen: &OneCamera, wanted: &Wanted) -> Result<Opened, Source
         None => Ok(None),
         Some(NetworkFile::At(file)) => Ok(Some(file.clone())),
         Some(NetworkFile::Installed) => best(task).map(Some).ok_or_else(|| {
-            SourceError::Usage(format!(
+            SourceError::NotThere(format!(
                 "--depth {task}: no network for it is installed; `bokehcam models` says which are known and where to get \
                  them, or name a file: --depth {task}:FILE.onnx",
                 task = task.name()

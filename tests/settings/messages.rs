@@ -38,10 +38,10 @@ fn numbers_below_zero_reach_the_option_that_they_are_for() {
 fn a_mistyped_folder_is_a_folder_and_the_right_one_is_named() {
     let home = Home::new().with_recording();
     let stream = |source: &str| home.run(&["stream", source, "--to", "null"]);
-    stream("./recordng").refused(2, &["there is no such folder, did you mean ./recording?"]);
-    stream("nowhere/at/all").refused(2, &["there is no such folder; use"]);
+    stream("./recordng").refused(1, &["there is no such folder, did you mean ./recording?"]);
+    stream("nowhere/at/all").refused(1, &["there is no such folder; use"]);
     if cfg!(feature = "camera") {
-        stream("recordng").refused(2, &["there is no camera 'recordng'", "did you mean the folder recording?"]);
+        stream("recordng").refused(1, &["there is no camera 'recordng'", "did you mean the folder recording?"]);
     }
 }
 

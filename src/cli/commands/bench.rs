@@ -43,7 +43,7 @@ Examples:
   bokehcam bench --sizes 1280x720 --quality draft,fast,balanced --threads 1,2,4
   bokehcam bench --sizes 1920x1080 --coc 10,20,40 --frames 100 --json > bench.jsonl
   bokehcam bench --chain
-  bokehcam bench --chain recordings/portrait --refine on --quality draft,balanced")]
+  bokehcam bench --chain demo --refine on --quality draft,balanced")]
 pub struct BenchCommand {
     /// Picture sizes
     #[arg(long, value_name = "WxH", value_delimiter = ',', default_value = "640x480,1280x720,1920x1080")]

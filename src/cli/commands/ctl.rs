@@ -23,7 +23,7 @@ Examples:
   bokehcam ctl snapshot --to me.png
 
 Off shows a still card in place of the picture, and the camera rests. The picture without blur is `set effect=none`.
-docs/ctl.md has recipes for keys and bars, and the protocol.")]
+docs/ctl.md (in a package /usr/share/doc/bokehcam/docs/ctl.md) has recipes for keys and bars, and the protocol.")]
 pub struct CtlCommand {
     /// Which run, where there are several: its --name, or as `bokehcam ctl` lists them
     #[arg(long, global = true, value_name = "NAME")]

@@ -30,7 +30,9 @@ use crate::cli::terminal::print;
 #[command(name = "bokehcam", version, arg_required_else_help = true, max_term_width = 110)]
 #[command(after_help = "\
 Examples:
-  bokehcam stream recordings/portrait --to out/
+  bokehcam preview
+  bokehcam stream 0 --to pipewire --on-demand
+  bokehcam stream demo --frames 90 --to out/
   bokehcam render photo.jpg --depth-map depth.png --out portrait.png
   bokehcam aperture --out kernels/
 

@@ -63,7 +63,7 @@ fn listed() -> String {
     text += &format!("\nlooked for in {}\n", folders.join(", "));
     match network::onnx_runtime_installed() {
         Ok(name) => text += &format!("run by {name}\n"),
-        Err(why) => text += &format!("run by what is built in; five times as fast with ONNX Runtime: {why}\n"),
+        Err(why) => text += &format!("run by what is built in; 1.5 to 3 times as fast with ONNX Runtime: {why}\n"),
     }
     text
 }

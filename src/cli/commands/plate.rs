@@ -8,7 +8,7 @@ use clap::Args;
 
 use crate::capture::{Camera, Captured, Shot};
 use crate::cli::error::CliError;
-use crate::cli::files::{make_folder_of, refuse_overwrite, refuse_source};
+use crate::cli::files::{make_folder_of, refuse_overwrite, refuse_source, tell_of_leftovers};
 use crate::cli::log;
 use crate::cli::options;
 use crate::cli::settings::layers::Given;
@@ -27,7 +27,7 @@ use crate::source::{DepthChoice, Kind, Options, Source, SourceName, one_camera};
 Examples:
   bokehcam plate /dev/video0 --to room.png
   bokehcam stream /dev/video0 --depth plate:room.png --to /dev/video10
-  bokehcam plate recordings/empty-room --to room.png
+  bokehcam plate somewhere/empty-room --to room.png
 
 Step out of the picture when you are told to, for some four seconds. The camera has to stand still from then on. Of a
 recording, each pixel is what it is most of the time.")]
@@ -82,6 +82,7 @@ pub fn run(command: &PlateCommand, global: &options::Global, given: &Given) -> R
         log::warn("a photo stands still: whoever is in it is in the plate, and is not found before it");
     }
     make_folder_of(to)?;
+    tell_of_leftovers([to.as_path()]);
     still::write_color(to, &plate, output.force)?;
     if !global.quiet {
         terminal::say(&format!("{}: written, for --depth plate:{0}", to.display()));

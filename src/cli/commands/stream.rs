@@ -13,7 +13,7 @@ use control::{Beat, Facts, Looks};
 use crate::cli::commands::preview;
 use crate::cli::controlled;
 use crate::cli::error::CliError;
-use crate::cli::files::{check_report, write_report};
+use crate::cli::files::{check_report, tell_of_leftovers, write_report};
 use crate::cli::focus;
 use crate::cli::options;
 use crate::cli::plausible;
@@ -41,10 +41,10 @@ Examples:
   bokehcam stream C920 --size 1920x1080 --fps 30 --control exposure_dynamic_framerate=0 --to /dev/video10
   bokehcam stream 0,2 --calib stereo.yml --to /dev/video10
   bokehcam stream /dev/video4 --side-by-side --rectified --to /dev/video10
-  bokehcam stream recordings/portrait --to out/
-  bokehcam stream recordings/portrait --to out.mp4 --aperture polygon:6 --focus 1.2
-  bokehcam stream recordings/portrait --to - --quiet --pace realtime | ffplay -
-  bokehcam stream recordings/portrait --loop --to /dev/video10 --out-size 1280x720
+  bokehcam stream demo --frames 90 --to out/
+  bokehcam stream demo --frames 90 --to out.mp4 --aperture polygon:6 --focus 1.2
+  bokehcam stream demo --to - --quiet --pace realtime | ffplay -
+  bokehcam stream somewhere/rgbd --loop --to /dev/video10 --out-size 1280x720
   bokehcam stream somewhere/rgbd --depth-scale 1000 --loop --frames 500 --to out.mkv
   bokehcam stream synthetic --frames 90 --pace realtime --to null --report report.json")]
 pub struct StreamCommand {
@@ -149,6 +149,8 @@ pub fn run(command: &StreamCommand, global: &options::Global, given: Given) -> R
     let backpressure = if pace == Pace::Realtime { Backpressure::DropOldest } else { Backpressure::Block };
     let closed = Arc::default();
     let sink = sinks::open(&command.to, &sink_options, backpressure, &closed)?;
+    // By now the outputs have what was left of them.
+    tell_of_leftovers(command.to.iter().filter(|target| !target.is_camera()).filter_map(Target::path));
 
     if let Some(networks) = source.networks.as_ref().filter(|_| !global.quiet) {
         terminal::say(&format!("depth by {networks}"));

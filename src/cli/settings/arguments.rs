@@ -1,5 +1,6 @@
 //! The command line before it is parsed, and the message where it cannot be.
 
+use std::error::Error as _;
 use std::ffi::{OsStr, OsString};
 use std::os::unix::ffi::{OsStrExt, OsStringExt};
 use std::process::ExitCode;
@@ -9,6 +10,7 @@ use clap::error::ErrorKind;
 use super::environment;
 use crate::cli::log;
 use crate::cli::options::LogFormat;
+use crate::source::SourceError;
 
 /// The arguments, with a number below zero made part of the option that it follows: `--focus -1` is `--focus=-1`, and
 /// not an option `-1`, so that the option can say what it accepts.
@@ -47,7 +49,8 @@ pub fn log_format(args: &[OsString]) -> LogFormat {
     }
 }
 
-/// Says what is wrong with the arguments; or shows the help that they ask for.
+/// Says what is wrong with the arguments; or shows the help that they ask for. Where they name what is not there now, the
+/// fault is the machine's, and the exit code is 1: the same arguments may be right later.
 pub fn refuse(error: &clap::Error, args: &[OsString]) -> ExitCode {
     match error.kind() {
         ErrorKind::DisplayHelp | ErrorKind::DisplayVersion => {
@@ -61,7 +64,8 @@ pub fn refuse(error: &clap::Error, args: &[OsString]) -> ExitCode {
         ErrorKind::InvalidUtf8 => log::error(&not_text(args)),
         _ => log::error(&environment::with_origin(&log::one_line(error), args)),
     }
-    ExitCode::from(2)
+    let names_a_source = error.source().and_then(|cause| cause.downcast_ref::<SourceError>());
+    if names_a_source.is_some_and(|error| !error.is_wrong_argument()) { ExitCode::FAILURE } else { ExitCode::from(2) }
 }
 
 fn not_text(args: &[OsString]) -> String {

@@ -9,7 +9,7 @@ use clap::{Args, value_parser};
 
 use crate::calibration::rectifier::Rectifier;
 use crate::cli::error::CliError;
-use crate::cli::files::{make_folder_of, refuse_overwrite, refuse_source};
+use crate::cli::files::{make_folder_of, refuse_overwrite, refuse_source, tell_of_leftovers};
 use crate::cli::log;
 use crate::cli::options;
 use crate::cli::plausible;
@@ -144,6 +144,7 @@ pub fn run(command: &DepthCommand, global: &options::Global) -> Result<(), CliEr
 
     let force = command.output.force;
     make_folder_of(&command.out)?;
+    tell_of_leftovers([command.out.as_path()]);
     match geometry.filter(|_| command.metres) {
         Some(Geometry { rig, .. }) => {
             let depth = disparity.depth(|px| rig.depth_m(px));

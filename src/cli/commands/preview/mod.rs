@@ -42,8 +42,8 @@ Examples:
   bokehcam preview                          the first camera there is, else the demonstration
   bokehcam preview 0 --mirror --to /dev/video10
   bokehcam preview 0,2 --calib stereo.yml
-  bokehcam preview recordings/portrait --preset cinematic
-  bokehcam preview recordings/portrait --split 0.5 --highlights 12
+  bokehcam preview somewhere/rgbd --preset cinematic
+  bokehcam preview demo --split 0.5 --highlights 12
   bokehcam preview demo --full-screen
 
 In the window, F1 shows all keys. Click to focus there, double-click to focus on the subject. What the window sets can be
@@ -101,7 +101,7 @@ pub fn show(
         return refuse("--on-demand: the window watches all the time; leave it out, or use `bokehcam stream`");
     }
     if !name.is_empty() {
-        let source = SourceName::from_str(name).map_err(|error| CliError::Usage(format!("{name}: {error}")))?;
+        let source = SourceName::from_str(name).map_err(|error| error.of(name))?;
         sinks::check(to, parts, &source)?;
         unused::warn_by_source(&given.settings, source.kind());
     }

@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 
 use crate::cli::error::CliError;
-use crate::cli::files::{make_folder_of, refuse_overwrite, refuse_source};
+use crate::cli::files::{make_folder_of, refuse_overwrite, refuse_source, tell_of_leftovers};
 use crate::cli::focus;
 use crate::cli::log;
 use crate::cli::options;
@@ -110,6 +110,7 @@ pub fn run(command: &RenderCommand, global: &options::Global, given: &Given) -> 
     command.warn(&look, &color, depth.as_ref(), given);
     let computing = command.computing.choice();
     make_folder_of(&command.out)?;
+    tell_of_leftovers([command.out.as_path()]);
     let (result, executor) = match &command.debug_dir {
         Some(dir) => debug::blurred(color, depth, &look, &computing, (dir, command.output.force))?,
         None => pipeline::still::blur(&look, color, depth, &computing)?,
