@@ -10,6 +10,7 @@ mod options;
 mod parse;
 #[doc(hidden)]
 pub mod parsers;
+mod report;
 mod screen;
 mod settings;
 mod sinks;

@@ -13,9 +13,9 @@ use control::{Beat, Facts, Looks};
 use crate::cli::commands::preview;
 use crate::cli::controlled;
 use crate::cli::error::CliError;
-use crate::cli::files::{check_report, write_report};
 use crate::cli::focus;
 use crate::cli::options;
+use crate::cli::report;
 use crate::cli::settings::layers::Given;
 use crate::cli::settings::look;
 use crate::cli::settings::unused;
@@ -92,7 +92,7 @@ pub fn run(command: &StreamCommand, global: &options::Global, given: Given) -> R
             command.name.as_ref(),
         );
     }
-    check_report(stream.report.as_deref(), output.force, &command.to)?;
+    report::check(stream.report.as_deref(), output.force, &command.to)?;
     if stream.pace == Some(Pace::Asap) && !command.source.devices().is_empty() {
         let what = "--pace asap: a camera gives its frames when it takes them; leave --pace out";
         return Err(CliError::Usage(what.to_string()));
@@ -142,7 +142,7 @@ pub fn run(command: &StreamCommand, global: &options::Global, given: Given) -> R
         stop: Arc::clone(&stop),
         ..sink::Options::new(info.size, info.period_ns)
     };
-    sinks::try_report(stream.report.as_deref())?;
+    report::try_out(stream.report.as_deref())?;
     let sink = sinks::open(&command.to, &sink_options)?;
 
     if let Some(networks) = source.networks.as_ref().filter(|_| !global.quiet) {
@@ -217,7 +217,7 @@ pub fn run(command: &StreamCommand, global: &options::Global, given: Given) -> R
         Ok(report) => (Box::new(report), Ok(())),
         Err(failed) => (failed.report, Err(failed.fault.into())),
     };
-    let written = stream.report.as_ref().map_or(Ok(()), |path| write_report(path, &report));
+    let written = stream.report.as_ref().map_or(Ok(()), |path| report::write(path, &report, output.force));
     if !global.quiet {
         terminal::say(&report.to_string());
     }
