@@ -2,6 +2,8 @@
 
 #[path = "outputs/home.rs"]
 mod home;
+#[path = "outputs/removed.rs"]
+mod removed;
 #[path = "outputs/reports.rs"]
 mod reports;
 

@@ -48,6 +48,7 @@ impl FromStr for Target {
             ("null", _) => Ok(Self::Null),
             ("-", _) => Ok(Self::Stdout),
             ("window", _) => Ok(Self::Window),
+            ("/dev/stdout" | "/dev/fd/1" | "/proc/self/fd/1", _) => Err(SinkError::NameOfStdout),
             (PIPEWIRE, _) => Ok(Self::PipeWire(None)),
             _ if let Some(label) = name.strip_prefix(PIPEWIRE).and_then(|rest| rest.strip_prefix(':')) => {
                 let is_label = !label.trim().is_empty() && !label.contains(char::is_control);
@@ -57,6 +58,7 @@ impl FromStr for Target {
             _ if name.ends_with('/') => Ok(Self::Folder(path)),
             (_, Some("y4m")) => Ok(Self::Y4m(path)),
             (_, Some("mp4" | "mkv" | "webm")) => Ok(Self::Video(path)),
+            (_, None) if path.exists() && !path.is_dir() => Err(SinkError::NoFolder { path }),
             (_, None) => Ok(Self::Folder(path)),
             _ if path.is_dir() => Ok(Self::Folder(path)),
             _ => Err(SinkError::Target { name: name.into() }),
