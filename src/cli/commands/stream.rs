@@ -124,6 +124,7 @@ pub fn run(command: &StreamCommand, global: &options::Global, given: Given) -> R
         focus::warn_of_focus(&look, info.size, map, source.depth_from == DepthFrom::Units);
     }
     let settings = look.settings(info.size, adaptive);
+    pipeline::check_room(info.size, info.frames)?;
     // What a change of the look needs runs on the same device.
     let mut executors = Executors::new(options.computing.clone());
     let bokeh = settings.map(|settings| executors.blur(&settings, info.size)).transpose()?;
