@@ -28,6 +28,8 @@ pub fn stop_flag() -> Result<Arc<AtomicBool>, CliError> {
         if already_stopping.swap(true, Ordering::Relaxed) {
             std::process::exit(INTERRUPTED);
         }
+        #[cfg(feature = "gpu")]
+        crate::compute::device::end_soon();
         say("stopping after the frames in hand; Ctrl-C again aborts");
     };
     ctrlc::set_handler(handler).map_err(|error| CliError::Signals(error.to_string()))?;
