@@ -33,6 +33,7 @@ use std::thread;
 
 pub use change::{Change, Changes, Executor};
 pub use coc::{CocMaker, Finish};
+pub use places::check_room;
 use places::{MOST_IN_FLIGHT, Places};
 use threads::{guard, join, spawn};
 

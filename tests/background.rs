@@ -8,8 +8,11 @@ use std::sync::LazyLock;
 use bokehcam::color::srgb_to_linear;
 use bokehcam::compute::thread_pool::ThreadPool;
 use bokehcam::depth::background::Background;
+use bokehcam::depth::focus::FocusRule;
 use bokehcam::frame::{ColorImage, DepthMap};
+use bokehcam::look::{CocAtInfinity, CocRule};
 use bokehcam::optics::DepthCoc;
+use bokehcam::pipeline::{CocMaker, Finish};
 use common::{color, depth, noise};
 
 const SIZE: (u32, u32) = (160, 96);
@@ -152,4 +155,24 @@ fn another_place_or_size_is_begun_anew() {
     seer.background.learn(&mut workers, (&small, &picture), &LENS, seer.time_ns);
     seer.background.reveal(&mut workers, &mut map, &picture, &LENS);
     assert!(map.matte.pixels.is_empty(), "a map of another size");
+}
+
+/// The outlines of such depth are slopes: what is behind them cannot be told from what is in front.
+#[test]
+fn of_smooth_depth_nothing_is_remembered() {
+    let (focus, lens) = (FocusRule::Metres(1.0), CocAtInfinity::Px(10.0));
+    let rule = CocRule::Depth { focus, lens, range_m: 0.0, max_coc_px: 20.0 };
+    for is_smooth in [false, true] {
+        let mut coc = CocMaker::new(rule, Finish::Keep);
+        coc.remember(true);
+        let mut hidden = 0;
+        for frame in 0..24 {
+            let person = if frame < 12 { BEFORE.person } else { BEFORE.person + STEP };
+            let (picture, mut map) = Shot { person, ..BEFORE }.taken();
+            map.is_smooth = is_smooth;
+            coc.make(&mut map, &picture, frame * PERIOD_NS);
+            hidden = map.matte.pixels.iter().filter(|pixel| pixel.share == 1.0).count();
+        }
+        assert_eq!(hidden > 0, !is_smooth, "{hidden} pixels hide something");
+    }
 }

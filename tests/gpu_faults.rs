@@ -348,3 +348,38 @@ fn a_run_ends_whole_and_says_in_one_line_what_happened() {
     assert_eq!(report["backend"], "gpu, then cpu");
     assert!(report["adapter"].as_str().unwrap().contains("; then cpu, "), "{report}");
 }
+
+/// A device in software counts as hung after a minute.
+#[test]
+#[ignore = "needs a Vulkan adapter (software will do)"]
+fn a_signal_ends_a_run_whose_device_hangs() {
+    let (layer, folder) = (layer(), tempfile::tempdir().unwrap());
+    let out = folder.path().join("out.y4m");
+    let recording = Path::new(env!("CARGO_MANIFEST_DIR")).join("recordings/portrait");
+    let mut command = Command::new(env!("CARGO_BIN_EXE_bokehcam"));
+    command.env("XDG_CONFIG_HOME", folder.path()).env_remove("RUST_LOG").arg("stream").arg(recording);
+    command.args(["--backend", "gpu", "--loop", "--to"]).arg(&out);
+    command.env("VK_LAYER_PATH", layer.path()).env("VK_INSTANCE_LAYERS", "VK_LAYER_bokehcam_faults");
+    let mut child = command.env("FAULT", "hang:20").stderr(std::process::Stdio::piped()).spawn().unwrap();
+    // Once no picture comes any more, it waits for the device.
+    let written = || {
+        let parts = fs::read_dir(folder.path()).unwrap().map(|entry| entry.unwrap());
+        parts
+            .filter(|entry| entry.path().extension().is_some_and(|e| e == "part"))
+            .map(|e| e.metadata().unwrap().len())
+            .sum()
+    };
+    let mut before: u64 = 0;
+    loop {
+        std::thread::sleep(Duration::from_secs(3));
+        let now = written();
+        if now > 0 && now == std::mem::replace(&mut before, now) {
+            break;
+        }
+    }
+    let asked = std::time::Instant::now();
+    rustix::process::kill_process(rustix::process::Pid::from_child(&child), rustix::process::Signal::TERM).unwrap();
+    assert!(child.wait().unwrap().success());
+    assert!(asked.elapsed() < Duration::from_secs(30), "{:?}", asked.elapsed());
+    assert!(fs::read(&out).unwrap().starts_with(b"YUV4MPEG2"));
+}

@@ -230,21 +230,25 @@ fn settings_are_a_file_of_a_sensible_size() {
     }
 }
 
-/// The blur takes many times what the picture takes.
+/// The blur takes many times what the picture takes, and a stream has several pictures under way.
 #[test]
 fn a_picture_that_is_larger_than_memory_is_refused() {
     let _alone = alone();
     let dir = TempDir::new().unwrap();
     save_wide(&dir.path().join("wide.png"), 5000, png::ColorType::Grayscale);
-    let line = format!(
-        "ulimit -v 1500000; exec '{}' render wide.png --effect blur --coc-at-infinity 2 --backend cpu --out out.png",
-        env!("CARGO_BIN_EXE_bokehcam")
-    );
-    let mut shell = Command::new("sh");
-    shell.args(["-c", &line]).env("XDG_CONFIG_HOME", dir.path()).current_dir(dir.path()).stdin(Stdio::null());
-    let output = shell.output().unwrap();
-    let stderr = String::from_utf8(output.stderr).unwrap();
-    assert_eq!((output.status.code(), stderr.lines().count()), (Some(1), 1), "{stderr}");
-    assert!(stderr.contains("5000x5000") && stderr.contains("MB are free"), "{stderr}");
-    assert!(!dir.path().join("out.png").exists());
+    let blur = "--effect blur --coc-at-infinity 2 --backend cpu";
+    for (limit_kb, size, command) in [
+        (1_500_000, "5000x5000", format!("render wide.png {blur} --out out.png")),
+        // More than the blur of a picture takes, and less than a stream of them.
+        (3_000_000, "5000x5000", format!("stream synthetic --size 5000x5000 {blur} --frames 1 --to out.y4m")),
+    ] {
+        let line = format!("ulimit -v {limit_kb}; exec '{}' {command}", env!("CARGO_BIN_EXE_bokehcam"));
+        let mut shell = Command::new("sh");
+        shell.args(["-c", &line]).env("XDG_CONFIG_HOME", dir.path()).current_dir(dir.path()).stdin(Stdio::null());
+        let output = shell.output().unwrap();
+        let stderr = String::from_utf8(output.stderr).unwrap();
+        assert_eq!((output.status.code(), stderr.lines().count()), (Some(1), 1), "{stderr}");
+        assert!(stderr.contains(size) && stderr.contains("MB are free"), "{stderr}");
+        assert!(!dir.path().join("out.png").exists() && !dir.path().join("out.y4m").exists());
+    }
 }

@@ -2,6 +2,10 @@
 
 #[path = "outputs/home.rs"]
 mod home;
+#[path = "outputs/removed.rs"]
+mod removed;
+#[path = "outputs/reports.rs"]
+mod reports;
 
 use std::fs;
 use std::io::{BufRead, BufReader};
@@ -28,7 +32,6 @@ fn a_source_is_never_a_target() {
         "stream self --to self/new/",
         "stream self --to self/clip.y4m",
         "stream self --to null --to other/../link/clip.mkv",
-        "stream self --to null --report self/rgb.txt --force",
         "render self/rgb/000000.png --effect blur --out self/rgb/000000.png --force",
         "render self/rgb/000000.png --effect blur --out link/rgb/000000.png --force",
         "render self/rgb/000000.png --depth-map self/depth/000000.png --out self/depth/000000.png --force",
@@ -41,17 +44,6 @@ fn a_source_is_never_a_target() {
     }
     let report = home.run(&format!("stream self {BLUR} --to other/new/ --report self/report.json -q"));
     assert_eq!(report.code, Some(0), "a report may lie beside what it is about: {report:?}");
-}
-
-#[test]
-fn a_report_and_a_sink_never_share_a_place() {
-    let home = Home::new();
-    home.record("self", 3, 0.1);
-    for (to, report) in [("x.y4m", "x.y4m"), ("x.y4m", "./self/../x.y4m"), ("x.mkv", "x.mkv")] {
-        home.run(&format!("stream self --to {to} --report {report}")).failed(2, "goes there, too");
-    }
-    home.run(&format!("stream self {BLUR} --to x.y4m --report nowhere/r.json")).failed(1, "nowhere/r.json");
-    assert!(!home.at("x.y4m").exists(), "it is known before the run");
 }
 
 #[test]
@@ -109,34 +101,6 @@ fn pictures_of_an_earlier_run_stay_until_the_new_are_whole() {
     fs::write(home.at("out/000003.png"), "mine").unwrap();
     home.run(&format!("stream self {BLUR} --to out/ --force")).failed(1, "000003.png was not written by bokehcam");
     assert_eq!(fs::read(home.at("out/000003.png")).unwrap(), b"mine");
-}
-
-#[test]
-fn a_report_that_fails_does_not_hide_why_the_run_ended() {
-    let home = Home::new();
-    home.record("self", 4, 0.5);
-    home.damage("self/rgb/000003.png");
-    fs::create_dir(home.at("reports")).unwrap();
-    let args = format!("stream self {BLUR} --pace realtime --to out/ --report reports/r.json");
-    let child = home.command("", &args).stderr(Stdio::piped()).spawn().unwrap();
-    until("a picture", || home.at("out/000000.png").exists());
-    fs::remove_dir_all(home.at("reports")).unwrap();
-    let ran = Ran::from(child.wait_with_output().unwrap());
-    ran.failed(1, "000003.png");
-    assert!(ran.said.contains("the report is not written"), "{}", ran.said);
-}
-
-#[test]
-fn a_folder_that_is_removed_ends_the_run() {
-    let home = Home::new();
-    home.record("self", 4, 0.05);
-    let args = format!("stream self {BLUR} --loop --pace realtime --to out/");
-    let child = home.command("", &args).stderr(Stdio::piped()).spawn().unwrap();
-    until("a picture", || home.at("out/000001.png").exists());
-    fs::rename(home.at("out"), home.at("away")).unwrap();
-    fs::remove_dir_all(home.at("away")).unwrap();
-    Ran::from(child.wait_with_output().unwrap()).failed(1, "out");
-    assert!(!home.at("out").exists());
 }
 
 #[test]

@@ -34,19 +34,25 @@ impl Settings {
         Self { far_max_px: clamped(self.far_max_px), near_max_px: clamped(self.near_max_px), ..self.clone() }
     }
 
+    /// Whether there is room for blurring pictures of `size` (width, height), and beside it for so many bytes a pixel.
+    ///
+    /// # Errors
+    /// [`BokehError::Memory`].
+    pub(crate) fn check_room(size: (u32, u32), beside_per_pixel: u64) -> Result<(), BokehError> {
+        let pixels = u64::from(size.0) * u64::from(size.1);
+        let needed = pixels * (BYTES_PER_PIXEL + beside_per_pixel);
+        match memory::free_bytes().filter(|&free| pixels > UNCHECKED_PIXELS && needed > free) {
+            Some(free) => Err(BokehError::Memory { size, needed_mb: needed >> 20, free_mb: free >> 20 }),
+            None => Ok(()),
+        }
+    }
+
     /// Whether pictures of `size` (width, height) can be blurred with these settings.
     ///
     /// # Errors
     /// [`BokehError::Memory`], [`BokehError::TooWide`].
     pub fn check(&self, size: (u32, u32)) -> Result<(), BokehError> {
-        let pixels = u64::from(size.0) * u64::from(size.1);
-        let needed = pixels * BYTES_PER_PIXEL;
-        if pixels > UNCHECKED_PIXELS
-            && let Some(free) = memory::free_bytes()
-            && needed > free
-        {
-            return Err(BokehError::Memory { size, needed_mb: needed >> 20, free_mb: free >> 20 });
-        }
+        Self::check_room(size, 0)?;
         let most_px = self.most_radius_px(size);
         // NaN is refused, too.
         let is_beyond = |radius_px: &f32| radius_px.partial_cmp(&most_px).is_none_or(|order| order.is_gt());

@@ -39,6 +39,13 @@ pub enum CliError {
         path: PathBuf,
         source: io::Error,
     },
+    /// The report of a run could not have its name.
+    #[error("{error}; the report is kept as {}", kept.display())]
+    ReportKept {
+        error: Box<CliError>,
+        /// The file.
+        kept: PathBuf,
+    },
     /// There is no window, or it failed.
     #[error(transparent)]
     #[cfg(feature = "window")]

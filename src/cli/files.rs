@@ -2,14 +2,12 @@
 
 use std::collections::BTreeSet;
 use std::fs;
+use std::io::ErrorKind;
 use std::path::Path;
 
 use super::error::CliError;
 use super::log;
-use super::terminal::print;
 use crate::files::{place, whole};
-use crate::sink::Target;
-use crate::stats::Report;
 
 /// Refuses to replace files, unless with `--force`.
 ///
@@ -40,12 +38,15 @@ pub fn refuse_source(what: &str, target: &Path, source: &Path) -> Result<(), Cli
     Err(CliError::Usage(format!("{what} {target}: {how} {source}, which is read; choose another place")))
 }
 
-/// Writes a file whole, in place of what is there.
+/// Writes a file whole; with `replace`, in place of what is there.
 ///
 /// # Errors
-/// [`CliError::Io`] when the folder cannot be written.
-pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), CliError> {
-    whole::write(path, bytes, true).map_err(CliError::io(path))
+/// [`CliError::Exists`] where something is there, without `replace`; [`CliError::Io`] when the folder cannot be written.
+pub fn write_whole(path: &Path, bytes: &[u8], replace: bool) -> Result<(), CliError> {
+    whole::write(path, bytes, replace).map_err(|error| match error.kind() {
+        ErrorKind::AlreadyExists => CliError::Exists(path.to_owned()),
+        _ => CliError::io(path)(error),
+    })
 }
 
 /// Makes the folder that `path` is to be in.
@@ -79,35 +80,5 @@ pub fn tell_of_leftovers<'a>(paths: impl IntoIterator<Item = &'a Path>) {
                 names.join(", ")
             ));
         }
-    }
-}
-
-/// The `--report` path that means standard output.
-const STDOUT: &str = "-";
-
-/// Checks before a run that its report may be written to `path`.
-///
-/// # Errors
-/// The file exists and may not be overwritten, or both the report and the frames go to standard output.
-pub fn check_report(path: Option<&Path>, force: bool, targets: &[Target]) -> Result<(), CliError> {
-    match path {
-        Some(path) if path != STDOUT => refuse_overwrite([path], force),
-        Some(_) if targets.contains(&Target::Stdout) => Err(CliError::Usage(
-            "--report - and --to -: standard output takes one of them; name a file for the other".to_string(),
-        )),
-        _ => Ok(()),
-    }
-}
-
-/// Writes the report of a run as JSON, to standard output where `path` is `-`.
-///
-/// # Errors
-/// As for [`write_whole`].
-pub fn write_report(path: &Path, report: &Report) -> Result<(), CliError> {
-    let mut json = Vec::new();
-    report.write_json(&mut json).map_err(CliError::io(path))?;
-    match path == STDOUT {
-        true => print(&json),
-        false => write_whole(path, &json),
     }
 }

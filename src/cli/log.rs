@@ -90,8 +90,32 @@ fn message(level: &str, text: &str) {
     screen().print(encoded(level, text).as_bytes());
 }
 
+/// Most characters of a line that are printed: names and values of others may be of any length.
+const MOST_CHARS: usize = 1000;
+/// Of a longer line, so many at its end.
+const LAST_CHARS: usize = 300;
+
+/// A text whose lines are at most [`MOST_CHARS`] long: of longer ones the start and the end, and how much is left out between.
+fn cut(text: &str) -> Cow<'_, str> {
+    // A character has a byte at least.
+    if text.split('\n').all(|line| line.len() <= MOST_CHARS) {
+        return text.into();
+    }
+    let cut = |line: &str| {
+        let chars = line.chars().count();
+        if chars <= MOST_CHARS {
+            return line.to_owned();
+        }
+        let place = |at: usize| line.char_indices().nth(at).map_or(line.len(), |(place, _)| place);
+        let (first, last) = (MOST_CHARS - LAST_CHARS, chars - LAST_CHARS);
+        format!("{} ... ({} characters) ... {}", &line[..place(first)], last - first, &line[place(last)..])
+    };
+    text.split('\n').map(cut).collect::<Vec<_>>().join("\n").into()
+}
+
 /// A message as it is printed, with its line end: as text, or as a JSON object in the logger's own form.
 fn encoded(level: &str, text: &str) -> String {
+    let text = &*cut(text);
     if !JSON.load(Ordering::Relaxed) {
         return format!("{}\n", printable(text, &['\n']));
     }
@@ -168,8 +192,18 @@ impl Write for LogLine {
 impl Drop for LogLine {
     fn drop(&mut self) {
         let text = String::from_utf8_lossy(&self.0);
+        if JSON.load(Ordering::Relaxed)
+            && let Ok(mut object) = serde_json::from_str::<serde_json::Value>(&text)
+        {
+            let fields = object["fields"].as_object_mut().into_iter().flat_map(|fields| fields.values_mut());
+            for value in fields {
+                value.as_str().map(|text| cut(text).into_owned()).into_iter().for_each(|text| *value = text.into());
+            }
+            return screen().print(format!("{object}\n").as_bytes());
+        }
+        let text = cut(text.trim_end_matches('\n'));
         // The logger's colours need the escape character; it has already escaped those in the texts it was given.
-        let line = printable(text.trim_end_matches('\n'), &['\x1b']);
+        let line = printable(&text, &['\x1b']);
         screen().print(format!("{line}\n").as_bytes());
     }
 }
@@ -199,6 +233,18 @@ pub fn one_line(error: &clap::Error) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn of_a_long_line_its_start_and_its_end_are_printed() {
+        assert!(matches!(cut(&"x".repeat(MOST_CHARS)), Cow::Borrowed(_)));
+        let name = "ä".repeat(50_000);
+        let text = format!("short\nrgb.txt:7: {name}.png is missing\n");
+        let lines: Vec<String> = cut(&text).lines().map(str::to_owned).collect();
+        assert_eq!((lines.len(), lines[0].as_str()), (2, "short"));
+        assert!(lines[1].starts_with("rgb.txt:7: ää") && lines[1].ends_with("ä.png is missing"), "{}", lines[1]);
+        assert!(lines[1].contains("ä ... (49026 characters) ... ä"), "{}", lines[1]);
+        assert!(lines[1].chars().count() < MOST_CHARS + 40 && text.ends_with('\n') && cut(&text).ends_with('\n'));
+    }
 
     #[test]
     fn what_a_terminal_would_obey_is_spelt_out() {

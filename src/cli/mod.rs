@@ -13,6 +13,7 @@ mod parse;
 #[doc(hidden)]
 pub mod parsers;
 mod plausible;
+mod report;
 mod screen;
 mod settings;
 mod sinks;

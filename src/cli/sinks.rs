@@ -1,21 +1,18 @@
 //! From `--to` to one sink.
 
-use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use super::error::CliError;
 use super::files::refuse_source;
 use super::options::Streaming;
-use crate::files::{place, whole};
 use crate::sink::{Backpressure, Options, Sink, Target, Tee};
 use crate::source::{DepthChoice, SourceName};
 
-/// Refuses sinks (and a report) that collide with each other or with what is read, and options that need other sinks.
+/// Refuses sinks that collide with each other or with what is read, and options that need other sinks.
 ///
 /// # Errors
-/// Two of them, or one and the report, write to one place; one writes to what is read; an option needs a virtual camera
-/// where there is none.
+/// Two of them write to one place; one writes to what is read; an option needs a virtual camera where there is none.
 pub fn check(targets: &[Target], parts: &Streaming, source: &SourceName) -> Result<(), CliError> {
     let usage = |text: String| Err(CliError::Usage(text));
     let Streaming { stream, blur, .. } = parts;
@@ -36,19 +33,6 @@ pub fn check(targets: &[Target], parts: &Streaming, source: &SourceName) -> Resu
             return usage(format!("--to {target}: this is the source itself; take a virtual camera of its own"));
         }
     }
-    if let Some(report) = &stream.report {
-        let is_report =
-            |target: &&Target| target.path().is_some_and(|path| place::resolved(path) == place::resolved(report));
-        if let Some(target) = targets.iter().find(is_report) {
-            return usage(format!("--report {}: --to {target} goes there, too; name another file", report.display()));
-        }
-        let is_json = report.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("json"));
-        // A report may lie in a recording's folder, but not replace one of its files, of which none is JSON.
-        let may_replace = !is_json && report.exists();
-        for read in source.folder().into_iter().chain(depth_folder).filter(|_| may_replace) {
-            refuse_source("--report", report, read)?;
-        }
-    }
     let has_camera = targets.iter().any(Target::is_camera);
     if stream.on_demand && !has_camera {
         return usage(
@@ -66,18 +50,6 @@ pub fn check(targets: &[Target], parts: &Streaming, source: &SourceName) -> Resu
             size.height,
             size.width + 1
         )),
-        _ => Ok(()),
-    }
-}
-
-/// Checks before a run that its report can be written.
-///
-/// # Errors
-/// Its folder cannot be written.
-pub fn try_report(path: Option<&Path>) -> Result<(), CliError> {
-    match path {
-        // With a part file beside it: opening the path itself would disturb the reader of a pipe.
-        Some(path) if path != "-" => whole::Part::create(path).map(drop).map_err(CliError::io(path)),
         _ => Ok(()),
     }
 }

@@ -31,6 +31,8 @@ pub fn stop_flag() -> Result<Arc<AtomicBool>, CliError> {
         // Nobody waits for a network that hangs.
         #[cfg(feature = "networks")]
         crate::network::apart::hurry();
+        #[cfg(feature = "gpu")]
+        crate::compute::device::end_soon();
         say("stopping after the frames in hand; Ctrl-C again aborts");
     };
     ctrlc::set_handler(handler).map_err(|error| CliError::Signals(error.to_string()))?;

@@ -3,16 +3,18 @@
 mod pass;
 mod picture;
 mod readback;
+mod wait;
 
 pub use pass::{Pass, Recorder, Stamps, UNIFORM_STRIDE, uniform_at, workgroups_2d};
 pub use picture::{DeviceFrame, DevicePicture};
 pub use readback::Readback;
+pub use wait::end_soon;
 
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
-use super::{GpuError, catch_panic};
+use super::GpuError;
 
 /// A compute shader: the name of its entry point and file, and its source.
 #[derive(Clone, Copy, Debug)]
@@ -253,50 +255,6 @@ impl Device {
             Some(error) => Err(GpuError::Failed(format!("{}: {error}", self.name))),
             None => Ok(done),
         }
-    }
-
-    /// Runs the callbacks of what the device has done. With `until`, first waits for that submission.
-    ///
-    /// # Errors
-    /// The device failed, or took too long.
-    pub fn poll(&self, until: Option<wgpu::SubmissionIndex>) -> Result<(), GpuError> {
-        self.check()?;
-        let poll = match until {
-            Some(_) => wgpu::PollType::Wait { submission_index: until, timeout: Some(self.patience) },
-            None => wgpu::PollType::Poll,
-        };
-        // A device that is lost meanwhile makes it panic.
-        match catch_panic(|| self.device.poll(poll)) {
-            Some(Ok(_)) => {}
-            Some(Err(wgpu::PollError::Timeout)) => self.give_up(),
-            Some(Err(error)) => note(&self.fault, error.to_string()),
-            None => note(&self.fault, "device lost".to_owned()),
-        }
-        self.check()
-    }
-
-    /// Waits until `done`, which a callback of finished work makes true.
-    ///
-    /// # Errors
-    /// As for [`Device::poll`].
-    pub fn wait_for(&self, done: impl Fn() -> bool) -> Result<(), GpuError> {
-        let began = Instant::now();
-        // The work is done: another thread that polls the device is about to run the callback.
-        while !done() {
-            self.check()?;
-            if began.elapsed() > self.patience {
-                self.give_up();
-            }
-            std::thread::yield_now();
-        }
-        Ok(())
-    }
-
-    /// Counts the device as hung.
-    fn give_up(&self) {
-        // Leaked: freeing them would wait for the device.
-        std::mem::forget((self.instance.clone(), self.device.clone(), self.queue.clone()));
-        note(&self.fault, format!("no answer for {:.0} s", self.patience.as_secs_f64()));
     }
 
     /// The first thing that went wrong on the device, if anything did.

@@ -2,12 +2,15 @@
 
 use std::io::{self, ErrorKind, Read, Write};
 use std::path::Path;
+use std::thread;
 use std::time::{Duration, Instant};
 
 use super::{Answer, ControlError, Name, Request, folder, socket};
 
 /// How long an answer may take: longer than any that a run gives itself.
 const PATIENCE: Duration = Duration::from_secs(5);
+/// How often one who cannot connect yet tries again.
+const TICK: Duration = Duration::from_millis(20);
 /// The longest answer.
 const MOST_ANSWER_BYTES: u64 = 1 << 20;
 
@@ -49,7 +52,14 @@ fn is_alive(folder: &Path, name: &Name) -> bool {
 
 /// Sends a request and reads what comes until the end.
 fn exchange(path: &Path, request: &Request) -> io::Result<Vec<u8>> {
-    let mut stream = socket::connect(path)?;
+    let until = Instant::now() + PATIENCE;
+    let mut stream = loop {
+        match socket::connect(path) {
+            // So many ask at once that it does not come to take them all up.
+            Err(error) if error.kind() == ErrorKind::WouldBlock && Instant::now() < until => thread::sleep(TICK),
+            connected => break connected?,
+        }
+    };
     stream.set_write_timeout(Some(PATIENCE))?;
     let mut line = serde_json::to_vec(request)?;
     line.push(b'\n');
@@ -58,7 +68,6 @@ fn exchange(path: &Path, request: &Request) -> io::Result<Vec<u8>> {
         Err(error) if error.kind() == ErrorKind::BrokenPipe => {}
         sent => sent?,
     }
-    let until = Instant::now() + PATIENCE;
     let (mut answer, mut some) = (Vec::new(), [0; 4096]);
     loop {
         let left = until.saturating_duration_since(Instant::now());
@@ -66,9 +75,13 @@ fn exchange(path: &Path, request: &Request) -> io::Result<Vec<u8>> {
             return Err(ErrorKind::TimedOut.into());
         }
         stream.set_read_timeout(Some(left))?;
-        match stream.read(&mut some)? {
-            0 => return Ok(answer),
-            read => answer.extend_from_slice(&some[..read]),
+        match stream.read(&mut some) {
+            Ok(0) => return Ok(answer),
+            Ok(read) => answer.extend_from_slice(&some[..read]),
+            // Answered and closed before the whole request was read: what came is the answer.
+            Err(error) if error.kind() == ErrorKind::ConnectionReset && !answer.is_empty() => return Ok(answer),
+            Err(error) if error.kind() == ErrorKind::Interrupted => {}
+            Err(error) => return Err(error),
         }
         if answer.len() as u64 > MOST_ANSWER_BYTES {
             return Err(io::Error::other("its answer is too long"));

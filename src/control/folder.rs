@@ -5,13 +5,19 @@ use std::io;
 use std::io::ErrorKind;
 use std::os::unix::fs::{DirBuilderExt, FileTypeExt, MetadataExt};
 use std::path::{Path, PathBuf};
+use std::thread;
+use std::time::{Duration, Instant};
 
 use rustix::fs::{FlockOperation, flock};
+use rustix::io::Errno;
 use rustix::process::geteuid;
 
 use super::{ControlError, Name, socket};
 use crate::files::trusted::absolute;
 
+/// How long the lock of the folder is waited for: runs hold it for a moment, while they begin.
+const LOCK_PATIENCE: Duration = Duration::from_secs(1);
+const TICK: Duration = Duration::from_millis(10);
 /// What the names of sockets end with.
 const ENDING: &str = ".sock";
 
@@ -53,7 +59,16 @@ pub(super) fn locked() -> Result<(PathBuf, File), ControlError> {
         _ => {}
     }
     let lock = File::open(&folder).map_err(refuse)?;
-    flock(&lock, FlockOperation::LockExclusive).map_err(|error| refuse(error.into()))?;
+    let until = Instant::now() + LOCK_PATIENCE;
+    while let Err(error) = flock(&lock, FlockOperation::NonBlockingLockExclusive) {
+        if error != Errno::WOULDBLOCK {
+            return Err(refuse(error.into()));
+        }
+        if Instant::now() >= until {
+            return Err(ControlError::NoFolder(format!("{} is locked by another program", folder.display())));
+        }
+        thread::sleep(TICK);
+    }
     // It may have been made by somebody else just now.
     path()?;
     Ok((folder.clone(), lock))

@@ -18,6 +18,8 @@ use super::{Answer, ControlError, MOST_REQUEST_BYTES, Name, Request, folder, soc
 pub const PATIENCE: Duration = Duration::from_secs(1);
 /// Who asks while so many do is told to come back.
 pub const MOST_CLIENTS: usize = 8;
+/// How long a request is waited for that will be refused.
+const HASTE: Duration = Duration::from_millis(10);
 /// How often one who waits for a request looks whether the run is over.
 const TICK: Duration = Duration::from_millis(50);
 
@@ -129,7 +131,7 @@ fn listen(listener: &UnixListener, handler: &Handler, over: &AtomicBool) {
                 }
             };
             let Some(seat) = Seat::take(&clients) else {
-                answer(&stream, &Answer::failed("too many ask at once: ask again"));
+                refuse(stream);
                 continue;
             };
             let serve = move || {
@@ -140,6 +142,15 @@ fn listen(listener: &UnixListener, handler: &Handler, over: &AtomicBool) {
             let _ = thread::Builder::new().name("control-client".into()).spawn_scoped(scope, serve);
         }
     });
+}
+
+/// Tells one for whom there is no place, after what was asked: who is closed on with a request unread may lose the answer.
+fn refuse(stream: UnixStream) {
+    let read = stream.set_read_timeout(Some(HASTE)).and_then(|()| (&stream).read(&mut [0; MOST_REQUEST_BYTES]));
+    if let Err(error) = read {
+        tracing::debug!("control: refused before it asked: {error}");
+    }
+    answer(&stream, &Answer::failed("too many ask at once: ask again"));
 }
 
 /// A place among the clients.

@@ -40,8 +40,8 @@ pub enum FolderError {
     /// Another program, or this one twice.
     #[error("the folder {} is being written by another run: choose another", path.display())]
     Busy { path: PathBuf },
-    /// It was removed while it was written.
-    #[error("the folder {} was removed meanwhile", path.display())]
+    /// It was removed or moved away while it was written.
+    #[error("the folder {} was removed or moved meanwhile", path.display())]
     Gone { path: PathBuf },
     #[error("cannot write {}: {cause}", path.display())]
     Write {
@@ -93,7 +93,15 @@ impl Folder {
     pub fn open(path: &Path, replace: bool, set: &Set) -> Result<Self, FolderError> {
         let path: PathBuf = path.components().collect();
         let write = || FolderError::write(&path);
-        fs::create_dir_all(&path).map_err(write())?;
+        fs::create_dir_all(&path).map_err(|error| {
+            // The system says of it that it exists, or that it is no folder, and not which of all on the way.
+            let in_the_way = path.ancestors().find(|part| part.exists() && !part.is_dir());
+            let no_folder = || io::Error::new(ErrorKind::NotADirectory, "it is no folder");
+            match in_the_way {
+                Some(part) => FolderError::write(part)(no_folder()),
+                None => FolderError::write(&path)(error),
+            }
+        })?;
         let lock = File::open(&path).map_err(write())?;
         if flock(&lock, FlockOperation::NonBlockingLockExclusive) == Err(rustix::io::Errno::WOULDBLOCK) {
             return Err(FolderError::Busy { path });
@@ -222,8 +230,14 @@ impl Folder {
     }
 
     fn check_there(&self) -> Result<(), FolderError> {
-        let state = self.lock.metadata().map_err(FolderError::write(&self.path))?;
-        if state.nlink() == 0 { Err(FolderError::Gone { path: self.path.clone() }) } else { Ok(()) }
+        let identity = |folder: fs::Metadata| (folder.dev(), folder.ino());
+        let opened = self.lock.metadata().map(identity).map_err(FolderError::write(&self.path))?;
+        // Another folder of that name is none of ours.
+        match fs::metadata(&self.path).map(identity) {
+            Err(error) if error.kind() != ErrorKind::NotFound => Err(FolderError::write(&self.path)(error)),
+            Ok(there) if there == opened => Ok(()),
+            _ => Err(FolderError::Gone { path: self.path.clone() }),
+        }
     }
 
     /// The folder that files are written into now.

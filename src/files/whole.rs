@@ -6,7 +6,9 @@
 use std::ffi::{OsStr, OsString};
 use std::fs::{self, File};
 use std::io::{self, ErrorKind, Write};
+use std::os::fd::AsRawFd;
 use std::os::unix::ffi::OsStrExt;
+use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, Ordering};
 
@@ -91,23 +93,61 @@ impl Part {
         Ok(())
     }
 
-    /// Keeps what is not whole as `NAME.incomplete`, or `NAME.incomplete.2` and on where that is taken; gives the name.
+    /// Whether somebody removed it, alone or with its folder. What was written can still be read here.
+    pub fn is_removed(&self) -> bool {
+        // Not every file system counts names.
+        self.file.metadata().is_ok_and(|file| file.nlink() == 0) && self.whereabouts().is_none()
+    }
+
+    /// Where the file is by now: whoever renamed its folder took it along.
+    fn whereabouts(&self) -> Option<PathBuf> {
+        let identity = |file: fs::Metadata| (file.dev(), file.ino());
+        let own = identity(self.file.metadata().ok()?);
+        let is_own = |path: &PathBuf| path.symlink_metadata().is_ok_and(|there| identity(there) == own);
+        let renamed = || fs::read_link(self.by_descriptor()).ok().filter(is_own);
+        Some(self.part.clone()).filter(is_own).or_else(renamed)
+    }
+
+    /// The name that the system gives to the open file.
+    fn by_descriptor(&self) -> String {
+        format!("/proc/self/fd/{}", self.file.as_raw_fd())
+    }
+
+    /// Keeps what is not whole as `NAME.incomplete`, or `NAME.incomplete.2` and on where that is taken, and gives where it is
+    /// then: its hidden name, if it cannot be renamed. One that was removed is copied to the nearest folder that is left.
     ///
     /// # Errors
-    /// What the system says. The part is then left where it is.
+    /// It was removed, and cannot be copied: it is lost.
     pub fn keep_incomplete(mut self) -> io::Result<PathBuf> {
         // From here on it is never removed, not even if it cannot be synced or renamed.
         self.open = false;
         let _ = self.file.sync_all();
-        keep_incomplete(&self.part, &self.path)
+        let Some(part) = self.whereabouts() else { return self.copy_incomplete() };
+        let path = match part == self.part {
+            true => self.path.clone(),
+            false => part.with_file_name(self.path.file_name().unwrap_or_default()),
+        };
+        Ok(keep_incomplete(&part, &path).unwrap_or(part))
+    }
+
+    /// Copies the file to the nearest folder that is left: the system gives no name back to a file that has lost its last one.
+    fn copy_incomplete(&self) -> io::Result<PathBuf> {
+        let (folder, name) = split(&self.path)?;
+        let folder = std::path::absolute(folder)?;
+        let left = folder.ancestors().find(|folder| folder.is_dir()).unwrap_or(Path::new("/"));
+        let copy = Self::create(&left.join(name))?;
+        // Before it, as it may take long.
+        tracing::warn!("{} was removed: what there is of it is copied to {}", self.path.display(), left.display());
+        io::copy(&mut File::open(self.by_descriptor())?, &mut copy.file())?;
+        copy.keep_incomplete()
     }
 }
 
 impl Drop for Part {
     fn drop(&mut self) {
-        if self.open {
+        if let Some(part) = self.open.then(|| self.whereabouts()).flatten() {
             // Nobody is left to tell that it cannot be removed.
-            let _ = fs::remove_file(&self.part);
+            let _ = fs::remove_file(part);
         }
     }
 }
@@ -236,81 +276,4 @@ fn name_of_part(part: &OsStr) -> Option<&OsStr> {
 }
 
 #[cfg(test)]
-mod tests {
-    use std::os::unix::fs::{PermissionsExt, symlink};
-
-    use super::*;
-
-    fn names(dir: &Path) -> Vec<String> {
-        let mut names: Vec<_> =
-            fs::read_dir(dir).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
-        names.sort();
-        names
-    }
-
-    #[test]
-    fn a_file_appears_whole_or_not_at_all() {
-        let dir = tempfile::tempdir().unwrap();
-        let path = dir.path().join("a.txt");
-        let part = Part::create(&path).unwrap();
-        part.file().write_all(b"one").unwrap();
-        assert!(!path.exists());
-        assert_eq!((bytes_so_far(&path), bytes_so_far(&dir.path().join("b.txt"))), (Some(3), None));
-        drop(part);
-        assert_eq!(bytes_so_far(&path), None);
-        assert_eq!(names(dir.path()), Vec::<String>::new());
-
-        write(&path, b"one", false).unwrap();
-        fs::set_permissions(&path, fs::Permissions::from_mode(0o600)).unwrap();
-        assert_eq!(write(&path, b"two", false).unwrap_err().kind(), ErrorKind::AlreadyExists);
-        assert_eq!(fs::read(&path).unwrap(), b"one");
-        write(&path, b"two", true).unwrap();
-        assert_eq!(fs::read(&path).unwrap(), b"two");
-        assert_eq!(fs::metadata(&path).unwrap().permissions().mode() & 0o777, 0o600);
-        assert_eq!(names(dir.path()), ["a.txt"]);
-    }
-
-    #[test]
-    fn two_writers_of_one_name_never_mix() {
-        let dir = tempfile::tempdir().unwrap();
-        let path = dir.path().join("a.y4m");
-        let (one, two) = (Part::create(&path).unwrap(), Part::create(&path).unwrap());
-        one.file().write_all(b"one").unwrap();
-        two.file().write_all(b"two").unwrap();
-        one.commit(false).unwrap();
-        assert_eq!(two.commit(false).unwrap_err().kind(), ErrorKind::AlreadyExists);
-        assert_eq!((names(dir.path()), fs::read(&path).unwrap()), (vec!["a.y4m".to_owned()], b"one".to_vec()));
-    }
-
-    #[test]
-    fn parts_left_behind_are_found_and_no_others() {
-        let dir = tempfile::tempdir().unwrap();
-        let path = dir.path().join("a.mkv");
-        let alive = Part::create(&path).unwrap();
-        let left = dir.path().join(".a.mkv.77-0.part");
-        let foreign = [".a.mkv.part", ".a.mkv.7.part", ".a.mkv.x-1.part", ".b.mkv.7-1.part", "a.mkv.7-1.part"];
-        fs::write(&left, "take").unwrap();
-        for name in foreign {
-            fs::write(dir.path().join(name), "").unwrap();
-        }
-        symlink(dir.path().join("b"), dir.path().join(".a.mkv.8-0.part")).unwrap();
-        assert_eq!(left_behind(&path).unwrap(), std::slice::from_ref(&left));
-        let kept = keep_incomplete(&left, &path).unwrap();
-        assert_eq!(kept, dir.path().join("a.mkv.incomplete"));
-        alive.file().write_all(b"more").unwrap();
-        assert_eq!(alive.keep_incomplete().unwrap(), dir.path().join("a.mkv.incomplete.2"));
-        assert_eq!(fs::read(dir.path().join("a.mkv.incomplete")).unwrap(), b"take");
-    }
-
-    #[test]
-    fn a_link_in_the_way_is_never_written_through() {
-        let dir = tempfile::tempdir().unwrap();
-        let victim = dir.path().join("victim");
-        fs::write(&victim, "mine").unwrap();
-        let path = dir.path().join("a.png");
-        symlink(&victim, &path).unwrap();
-        assert_eq!(write(&path, b"new", false).unwrap_err().kind(), ErrorKind::AlreadyExists);
-        write(&path, b"new", true).unwrap();
-        assert_eq!((fs::read(&victim).unwrap(), fs::read(&path).unwrap()), (b"mine".to_vec(), b"new".to_vec()));
-    }
-}
+mod tests;

@@ -1,5 +1,6 @@
 //! How many buffers a run has.
 
+use crate::bokeh::{BokehError, Settings};
 use crate::link::LOSSLESS_ITEMS;
 
 /// Room for buffers along the way, so that no stage waits for one that another has no need to give back.
@@ -12,6 +13,17 @@ pub(super) struct Places {
 
 /// Most frames that any executor has in hand.
 pub(super) const MOST_IN_FLIGHT: usize = 4;
+
+/// Whether there is room for a run over `frames` pictures of `size` (width, height): for blurring one, and for those under way.
+///
+/// # Errors
+/// [`BokehError::Memory`].
+pub fn check_room(size: (u32, u32), frames: Option<u64>) -> Result<(), BokehError> {
+    let places = Places { in_blur: MOST_IN_FLIGHT, viewed: false };
+    // Colours are there from the start, depth as it comes.
+    let depths = frames.map_or(places.depths() as u64, |frames| frames.min(places.depths() as u64));
+    Settings::check_room(size, 3 * (places.colors() + places.outs()) as u64 + 4 * depths)
+}
 
 impl Places {
     /// A link's items, and the one that it displaces or that waits for room.

@@ -1,7 +1,9 @@
 //! What every layout is read into: frames whose pictures are still on the disk.
 
+use std::collections::HashMap;
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
 
 use super::decode::DepthUnits;
 use super::error::RecordingError;
@@ -83,8 +85,50 @@ impl Folder {
     pub(super) fn locate(&self, source: &Source) -> Result<PathBuf, RecordingError> {
         let path = self.root.join(source.file(&self.dir)?);
         // A path that cannot be resolved cannot be read either, and reading says why.
-        let path = path.canonicalize().unwrap_or(path);
+        self.within(path.canonicalize().unwrap_or(path), source)
+    }
+
+    fn within(&self, path: PathBuf, source: &Source) -> Result<PathBuf, RecordingError> {
         if path.starts_with(&self.root) { Ok(path) } else { Err(source.error(&self.dir, PictureFault::Outside)) }
+    }
+}
+
+/// How many folders a [`Locator`] remembers.
+const MOST_FOLDERS: usize = 64;
+/// What takes longer is said to.
+const LONG: Duration = Duration::from_secs(2);
+
+/// Goes through the pictures of long lists: resolves their folders once, and says what takes long.
+pub(super) struct Locator<'a> {
+    folder: &'a Folder,
+    resolved: HashMap<PathBuf, PathBuf>,
+    began: Instant,
+    is_told: bool,
+}
+
+impl<'a> Locator<'a> {
+    pub(super) fn new(folder: &'a Folder) -> Self {
+        Self { folder, resolved: HashMap::new(), began: Instant::now(), is_told: false }
+    }
+
+    /// As [`Folder::locate`].
+    pub(super) fn locate(&mut self, source: &Source) -> Result<PathBuf, RecordingError> {
+        if !self.is_told && self.began.elapsed() > LONG {
+            self.is_told = true;
+            tracing::warn!(
+                "{}: its pictures are looked through for one to begin with; this takes long",
+                self.folder.dir.display()
+            );
+        }
+        let path = self.folder.root.join(source.file(&self.folder.dir)?);
+        let (Some(parent), Some(name)) = (path.parent(), path.file_name()) else { return self.folder.locate(source) };
+        if self.resolved.len() > MOST_FOLDERS {
+            self.resolved.clear();
+        }
+        let resolve = || parent.canonicalize().unwrap_or_else(|_| parent.to_owned());
+        let there = self.resolved.entry(parent.to_owned()).or_insert_with(resolve).join(name);
+        // The picture itself may be a link, too.
+        if there.is_symlink() { self.folder.locate(source) } else { self.folder.within(there, source) }
     }
 }
 

@@ -39,7 +39,7 @@ pub use fault::{GeometryFault, LineFault, PictureFault};
 use crate::calibration::StereoCalibration;
 use crate::frame::{ColorImage, DepthMap, GrayImage};
 use crate::optics::StereoRig;
-use contents::{DepthForm, Folder, Layout, Source};
+use contents::{DepthForm, Folder, Layout, Locator, Source};
 
 /// The layouts that are read, in the order in which they are looked for.
 const LAYOUTS: [Layout; 4] = [tum::LAYOUT, euroc::LAYOUT, kitti::LAYOUT, middlebury::LAYOUT];
@@ -298,11 +298,11 @@ fn looked_for() -> String {
 
 /// The size of the first colour picture that has a readable header; if none has, what is wrong with the first.
 fn first_size<'a>(folder: &Folder, colors: impl Iterator<Item = &'a Source>) -> Result<(u32, u32), RecordingError> {
-    let mut first_error = None;
+    let (mut first_error, mut locator) = (None, Locator::new(folder));
     // A list may name one unreadable file many times: it is opened once.
     let mut unreadable = HashSet::new();
     for source in colors {
-        let size = folder.locate(source).and_then(|path| {
+        let size = locator.locate(source).and_then(|path| {
             if unreadable.contains(&path) {
                 return Ok(None);
             }

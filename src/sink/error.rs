@@ -31,6 +31,12 @@ pub enum SinkError {
     /// A folder that is there, and may be meant or not.
     #[error("no sink '{name}': it is a folder; to write numbered PNG files into it, give {name}/ (with the slash)")]
     NoSlash { name: String },
+    /// Standard output has a name of its own.
+    #[error("y4m on standard output is called -")]
+    NameOfStdout,
+    /// A file that is no video.
+    #[error("{} is neither a folder nor a video: give DIR/, FILE.y4m, FILE.mp4, FILE.mkv or FILE.webm", path.display())]
+    NoFolder { path: PathBuf },
     #[error("{} exists; choose another name or overwrite it with --force", path.display())]
     Exists { path: PathBuf },
     /// The folder cannot be written.
@@ -43,6 +49,16 @@ pub enum SinkError {
         /// The file or folder.
         kept: PathBuf,
     },
+    /// It failed, and what it had could not be kept.
+    #[error("{error}; what there was until then is lost: {cause}")]
+    Lost {
+        error: Box<SinkError>,
+        /// Why it could not be kept.
+        cause: io::Error,
+    },
+    /// Somebody removed the file, or its folder.
+    #[error("{} was removed while it was written", path.display())]
+    Removed { path: PathBuf },
     /// A defect of this program.
     #[error("{sink}: panicked: {what}; please report this")]
     Panic { sink: String, what: String },

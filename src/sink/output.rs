@@ -55,6 +55,14 @@ impl Output {
         self.part.as_ref().map(Part::file).ok_or_else(|| ErrorKind::NotFound.into())
     }
 
+    /// Looks whether the file is still there: what is written to one that was removed is lost.
+    pub(super) fn check_there(&self) -> Result<(), SinkError> {
+        match self.part.as_ref().is_some_and(Part::is_removed) {
+            true => Err(SinkError::Removed { path: self.path.clone() }),
+            false => Ok(()),
+        }
+    }
+
     /// Goes on with a file that has the same frames in a better form.
     pub(super) fn replace(&mut self, part: Part) {
         // Dropping the old part removes it.
@@ -63,17 +71,18 @@ impl Output {
 
     /// Gives the finished file its name, or keeps it under another. One that was cut short replaces nothing.
     pub(super) fn complete(&mut self, ending: Ending) -> Result<(), SinkError> {
+        let there = self.check_there();
         let Some(mut part) = self.part.take() else { return Ok(()) };
+        if let Err(error) = there {
+            return Err(self.keep_if_frames(part, error));
+        }
         let replace = self.force && ending == Ending::Whole;
         let Err(cause) = part.try_commit(replace) else { return Ok(()) };
         let is_name_taken = cause.kind() == ErrorKind::AlreadyExists;
         // Only a recording that was cut short gets here with `force`: it is no error that the old one stays.
         if is_name_taken && self.force {
-            let (kept, path) = (keep(part), self.path.display());
-            tracing::warn!(
-                "{path} stays as it was: what was to replace it was cut short, and is kept as {}",
-                kept.display()
-            );
+            let (kept, path) = (kept(part), self.path.display());
+            tracing::warn!("{path} stays as it was: what was to replace it was cut short, and {kept}");
             return Ok(());
         }
         let path = self.path.clone();
@@ -101,23 +110,28 @@ impl Output {
         if !has_frames {
             return error;
         }
-        SinkError::Kept { error: Box::new(error), kept: keep(part) }
+        let error = Box::new(error);
+        match part.keep_incomplete() {
+            Ok(kept) => SinkError::Kept { error, kept },
+            Err(cause) => SinkError::Lost { error, cause },
+        }
     }
 }
 
 impl Drop for Output {
     fn drop(&mut self) {
         if let Some(part) = self.part.take().filter(|_| self.frames > 0) {
-            let kept = keep(part);
-            tracing::warn!("{}: what there is of it is kept as {}", self.path.display(), kept.display());
+            tracing::warn!("{}: what there is of it {}", self.path.display(), kept(part));
         }
     }
 }
 
-/// Renames the part to `NAME.incomplete`, and gives where it is then: its hidden name if that failed.
-fn keep(part: Part) -> PathBuf {
-    let hidden = part.part().to_owned();
-    part.keep_incomplete().unwrap_or(hidden)
+/// Keeps the part, and says where.
+fn kept(part: Part) -> String {
+    match part.keep_incomplete() {
+        Ok(kept) => format!("is kept as {}", kept.display()),
+        Err(cause) => format!("is lost: {cause}"),
+    }
 }
 
 /// Keeps what runs that were killed left of `path`; gives the new names.

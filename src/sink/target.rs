@@ -48,6 +48,7 @@ impl FromStr for Target {
             ("null", _) => Ok(Self::Null),
             ("-", _) => Ok(Self::Stdout),
             ("window", _) => Ok(Self::Window),
+            ("/dev/stdout" | "/dev/fd/1" | "/proc/self/fd/1", _) => Err(SinkError::NameOfStdout),
             (PIPEWIRE, _) => Ok(Self::PipeWire(None)),
             _ if let Some(label) = name.strip_prefix(PIPEWIRE).and_then(|rest| rest.strip_prefix(':')) => {
                 let is_label = !label.trim().is_empty() && !label.contains(char::is_control);
@@ -59,6 +60,7 @@ impl FromStr for Target {
             (_, Some("mp4" | "mkv" | "webm")) => Ok(Self::Video(path)),
             // Not a folder just because it is nothing else: a slip in the name of a camera would fill the disk.
             _ if path.is_dir() => Err(SinkError::NoSlash { name: name.into() }),
+            _ if path.exists() => Err(SinkError::NoFolder { path }),
             _ => Err(SinkError::Target { name: name.into(), near: near(name) }),
         }
     }

@@ -189,7 +189,7 @@ impl Y4mFile {
 
 impl Sink for Y4mFile {
     fn put(&mut self, frame: &ColorImage, time_ns: u64) -> Result<ControlFlow<()>, SinkError> {
-        match self.stream.write(frame, time_ns) {
+        match self.output.check_there().and_then(|()| self.stream.write(frame, time_ns)) {
             Ok(()) => {
                 self.output.frames += 1;
                 Ok(ControlFlow::Continue(()))

@@ -108,6 +108,65 @@ fn who_says_nothing_holds_nobody_up() {
 }
 
 #[test]
+fn who_asks_while_too_many_do_is_told_so_and_never_cut_off() {
+    let world = World::new();
+    let _stream = world.stream("stream", &["--to", "null"]);
+    until("somebody came while there was no room", || {
+        let _silent: Vec<UnixStream> = (0..8).map(|_| UnixStream::connect(world.socket("stream")).unwrap()).collect();
+        let ran: Vec<_> = (0..4).map(|_| world.ctl(&["status"])).collect();
+        let refused: Vec<&str> = ran.iter().filter(|ran| ran.code != 0).map(|ran| ran.stderr.as_str()).collect();
+        assert!(refused.iter().all(|said| said.contains("too many ask at once: ask again")), "{refused:?}");
+        !refused.is_empty()
+    });
+}
+
+#[test]
+fn each_of_two_hundred_at_once_gets_an_answer() {
+    let world = World::new();
+    let _stream = world.stream("stream", &["--to", "null"]);
+    let answers: Vec<String> = std::thread::scope(|scope| {
+        let ask = || world.tell("stream", b"{\"do\":\"toggle\"}\n");
+        let all: Vec<_> = (0..200).map(|_| scope.spawn(ask)).collect();
+        all.into_iter().map(|asked| asked.join().unwrap()).collect()
+    });
+    let refused = answers.iter().filter(|answer| answer.contains("too many ask at once")).count();
+    let done = answers.iter().filter(|answer| answer.starts_with('{') && !answer.contains("\"error\"")).count();
+    assert_eq!(refused + done, 200, "{answers:?}");
+    until("every answer was true", || world.status(&[])["on"] == (done % 2 == 0));
+    let told: Vec<_> = std::thread::scope(|scope| {
+        let all: Vec<_> = (0..40).map(|_| scope.spawn(|| world.ctl(&["toggle"]))).collect();
+        all.into_iter().map(|asked| asked.join().unwrap()).collect()
+    });
+    for ran in told {
+        assert!(ran.code == 0 || ran.stderr.contains("too many ask at once"), "{}", ran.stderr);
+    }
+}
+
+#[test]
+fn a_run_that_takes_up_nobody_is_said_to_hang() {
+    use std::os::unix::fs::DirBuilderExt;
+    let world = World::new();
+    std::fs::DirBuilder::new().mode(0o700).create(world.path("run/bokehcam")).unwrap();
+    let _nobody = std::os::unix::net::UnixListener::bind(world.socket("stream")).unwrap();
+    let said = world.ctl(&["status"]).refused(1);
+    assert!(said.contains("stream does not answer: it hangs, or is still beginning"), "{said}");
+}
+
+#[test]
+fn a_start_does_not_wait_for_a_lock_that_nobody_gives_back() {
+    let world = World::new();
+    world.run(&["stream", "demo", "--frames", "1", "--to", "null"]);
+    let folder = std::fs::File::open(world.path("run/bokehcam")).unwrap();
+    rustix::fs::flock(&folder, rustix::fs::FlockOperation::LockExclusive).unwrap();
+    let ran = world.run(&["stream", "demo", "--frames", "2", "--pace", "realtime", "--to", "null"]).done();
+    assert!(
+        ran.stderr.contains("`bokehcam ctl` cannot reach this stream") && ran.stderr.contains("is locked"),
+        "{}",
+        ran.stderr
+    );
+}
+
+#[test]
 fn a_run_that_ends_waits_for_no_client() {
     let world = World::new();
     let stream = world.stream("stream", &["--to", "null"]);

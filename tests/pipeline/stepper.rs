@@ -41,6 +41,8 @@ fn every_frame_is_that_of_a_run() {
         let kept = kept.lock().unwrap();
         assert_eq!(kept.len(), recording.len());
         let mut stepper = Stepper::new(&look, recording.size(), true, true, Computing::default()).unwrap();
+        // Who asks for it reads depth for nothing where no blur follows it.
+        assert_eq!(stepper.needs_depth(), look.effect.follows_depth(), "{:?}", look.effect);
         let mut scratch = Scratch::default();
         for (index, wanted) in kept.iter().enumerate() {
             let needs_depth = stepper.needs_depth();

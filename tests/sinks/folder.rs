@@ -76,6 +76,20 @@ fn a_failed_picture_leaves_no_partial_name() {
 }
 
 #[test]
+fn a_folder_that_is_moved_away_gets_no_more_pictures_and_another_of_its_name_none() {
+    let folder = tempfile::tempdir().unwrap();
+    let (out, away) = (folder.path().join("out"), folder.path().join("away"));
+    let mut sink = open(&out, &options((6, 4))).unwrap();
+    put_all(&mut *sink, &[picture(6, 4, 0)]);
+    fs::rename(&out, &away).unwrap();
+    fs::create_dir(&out).unwrap();
+    let error = sink.put(&picture(6, 4, 1), PERIOD_NS).unwrap_err();
+    assert!(error.to_string().contains("was removed or moved meanwhile"), "{error}");
+    sink.finish(Ending::Cut).unwrap();
+    assert_eq!((listing(&out).len(), listing(&away)), (0, vec![".bokehcam".to_owned(), "000000.png".to_owned()]));
+}
+
+#[test]
 fn a_folder_that_is_removed_is_an_error_and_not_made_anew() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("out");
@@ -83,6 +97,6 @@ fn a_folder_that_is_removed_is_an_error_and_not_made_anew() {
     put_all(&mut *sink, &[picture(6, 4, 0)]);
     fs::remove_dir_all(&out).unwrap();
     let error = sink.put(&picture(6, 4, 1), PERIOD_NS).unwrap_err();
-    assert!(error.to_string().contains("was removed meanwhile"), "{error}");
+    assert!(error.to_string().contains("was removed or moved meanwhile"), "{error}");
     assert!(!out.exists());
 }

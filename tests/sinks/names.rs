@@ -27,6 +27,14 @@ fn names_become_sinks() {
     ] {
         assert_eq!(name.parse::<Target>().unwrap(), target);
     }
+    for name in ["/dev/stdout", "/dev/fd/1"] {
+        assert!(name.parse::<Target>().unwrap_err().to_string().contains("standard output is called -"), "{name}");
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("hostname");
+    fs::write(&file, "").unwrap();
+    let error = file.to_str().unwrap().parse::<Target>().unwrap_err().to_string();
+    assert!(error.contains("hostname is no folder: name one, or a FILE.y4m"), "{error}");
     for name in ["", "clip.avi", "a.png"] {
         let error = name.parse::<Target>().unwrap_err().to_string();
         assert!(error.contains(&format!("'{name}'")) && error.contains("FILE.y4m"), "{error}");
@@ -81,5 +89,6 @@ fn a_place_that_cannot_be_written_is_named() {
     for name in ["file/clip.y4m", "file/out/"] {
         let error = open(&folder.path().join(name), &options((6, 4))).err().unwrap().to_string();
         assert!(error.starts_with("cannot write ") && error.contains("file"), "{error}");
+        assert_eq!(error.ends_with("/file: it is no folder"), name.ends_with('/'), "{error}");
     }
 }

@@ -40,7 +40,7 @@ pub fn run(command: &ManualCommand, mut table: Command) -> Result<(), CliError> 
     }
     refuse_overwrite(pages.iter().map(|(path, _)| path.as_path()), command.output.force)?;
     fs::create_dir_all(&command.out).map_err(CliError::io(&command.out))?;
-    pages.iter().try_for_each(|(path, page)| write_whole(path, page))
+    pages.iter().try_for_each(|(path, page)| write_whole(path, page, command.output.force))
 }
 
 /// Adds the file names and texts of the pages of a command, and of those below it that help lists.

@@ -13,10 +13,11 @@ use control::{Beat, Facts, Looks};
 use crate::cli::commands::preview;
 use crate::cli::controlled;
 use crate::cli::error::CliError;
-use crate::cli::files::{check_report, tell_of_leftovers, write_report};
+use crate::cli::files::tell_of_leftovers;
 use crate::cli::focus;
 use crate::cli::options;
 use crate::cli::plausible;
+use crate::cli::report;
 use crate::cli::settings::layers::Given;
 use crate::cli::settings::look;
 use crate::cli::settings::unused;
@@ -93,7 +94,7 @@ pub fn run(command: &StreamCommand, global: &options::Global, given: Given) -> R
             command.name.as_ref(),
         );
     }
-    check_report(stream.report.as_deref(), output.force, &command.to)?;
+    report::check(stream.report.as_deref(), output.force, &command.to)?;
     if stream.pace == Some(Pace::Asap) && !command.source.devices().is_empty() {
         let what = "--pace asap: a camera gives its frames when it takes them; leave --pace out";
         return Err(CliError::Usage(what.to_string()));
@@ -127,6 +128,7 @@ pub fn run(command: &StreamCommand, global: &options::Global, given: Given) -> R
         focus::warn_of_focus(&look, info.size, map, source.depth_from == DepthFrom::Units);
     }
     let settings = look.settings(info.size, adaptive);
+    pipeline::check_room(info.size, info.frames)?;
     // What a change of the look needs runs on the same device.
     let mut executors = Executors::new(options.computing.clone());
     let bokeh = settings.map(|settings| executors.blur(&settings, info.size)).transpose()?;
@@ -145,7 +147,7 @@ pub fn run(command: &StreamCommand, global: &options::Global, given: Given) -> R
         stop: Arc::clone(&stop),
         ..sink::Options::new(info.size, info.period_ns)
     };
-    sinks::try_report(stream.report.as_deref())?;
+    report::try_out(stream.report.as_deref())?;
     let backpressure = if pace == Pace::Realtime { Backpressure::DropOldest } else { Backpressure::Block };
     let closed = Arc::default();
     let sink = sinks::open(&command.to, &sink_options, backpressure, &closed)?;
@@ -225,7 +227,7 @@ pub fn run(command: &StreamCommand, global: &options::Global, given: Given) -> R
         Ok(report) => (Box::new(report), Ok(())),
         Err(failed) => (failed.report, Err(failed.fault.into())),
     };
-    let written = stream.report.as_ref().map_or(Ok(()), |path| write_report(path, &report));
+    let written = stream.report.as_ref().map_or(Ok(()), |path| report::write(path, &report, output.force));
     if !global.quiet {
         terminal::say(&report.to_string());
     }

@@ -76,7 +76,7 @@ pub fn edit(path: &Path, change: impl FnOnce(&mut DocumentMut) -> Option<()>) ->
     if let Some(folder) = path.parent() {
         fs::create_dir_all(folder).map_err(CliError::io(folder))?;
     }
-    write_whole(path, edited.as_bytes())
+    write_whole(path, edited.as_bytes(), true)
 }
 
 /// Follows the symbolic links at `path`. Unlike with `canonicalize`, nothing need be there at the end of them yet.

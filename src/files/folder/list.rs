@@ -112,3 +112,20 @@ fn lies_within(name: &str) -> bool {
         && is_plain(parts.next())
         && parts.next().is_none()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_name_leads_one_folder_down_at_most_and_never_up() {
+        for name in ["0.png", "rgb/0.png", "rgb.txt", "rgb/..0.png"] {
+            assert!(lies_within(name), "{name}");
+        }
+        let bad =
+            ["", ".", "..", ".hidden", "../0.png", "rgb/..", "rgb/../0.png", "rgb/../../0.png", "/0.png", "a/b/0.png"];
+        for name in bad {
+            assert!(!lies_within(name), "{name}");
+        }
+    }
+}

@@ -1,11 +1,11 @@
 //! Makes frames of the lists.
 
 use std::collections::{HashMap, HashSet};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use super::{ASSOCIATIONS, COLOR_LIST, DEPTH_LIST, list};
 use crate::recording::DepthUnit;
-use crate::recording::contents::{Contents, DepthForm, Folder, Listed, Source};
+use crate::recording::contents::{Contents, DepthForm, Folder, Listed, Locator, Source};
 use crate::recording::decode::{self, DepthUnits, Kind};
 use crate::recording::error::RecordingError;
 use crate::recording::list::{Entry, clear_unordered_times, refuse_faults};
@@ -102,9 +102,9 @@ fn is_color_first(folder: &Folder, pairs: &[[Entry; 2]]) -> Result<bool, Recordi
         }
     }
 
-    let mut kinds = HashMap::new();
+    let (mut kinds, mut locator) = (HashMap::new(), Locator::new(folder));
     for pair in pairs {
-        let [first, second] = pair.each_ref().map(|entry| cached_kind(folder, &entry.source, &mut kinds));
+        let [first, second] = pair.each_ref().map(|entry| cached_kind(&mut locator, &entry.source, &mut kinds));
         match (first, second) {
             (first, second) if first == second => {}
             (Some(Kind::Color), _) | (_, Some(Kind::Depth)) => return Ok(true),
@@ -121,7 +121,12 @@ fn is_color_first(folder: &Folder, pairs: &[[Entry; 2]]) -> Result<bool, Recordi
 }
 
 /// The kind of a picture, if it can be read. Each file is read once, and then found in `kinds`.
-fn cached_kind(folder: &Folder, source: &Source, kinds: &mut HashMap<PathBuf, Option<Kind>>) -> Option<Kind> {
-    let path = folder.locate(source).ok()?;
-    *kinds.entry(path).or_insert_with_key(|path| decode::header(path).ok().map(|(_, kind)| kind))
+fn cached_kind<'a>(
+    locator: &mut Locator,
+    source: &'a Source,
+    kinds: &mut HashMap<&'a Path, Option<Kind>>,
+) -> Option<Kind> {
+    let file = source.file.as_deref().ok()?;
+    let look = || decode::header(&locator.locate(source).ok()?).ok().map(|(_, kind)| kind);
+    *kinds.entry(file).or_insert_with(look)
 }

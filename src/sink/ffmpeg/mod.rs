@@ -117,6 +117,11 @@ impl Sink for Ffmpeg {
     fn put(&mut self, frame: &ColorImage, time_ns: u64) -> Result<ControlFlow<()>, SinkError> {
         check_size(self.size, frame.size())?;
         let Some(input) = &mut self.input else { return Ok(ControlFlow::Break(())) };
+        if let Err(error) = self.output.check_there() {
+            // It still completes the file, which can be copied; how it ended says nothing more.
+            let _ = self.end(false);
+            return Err(self.output.failed(error));
+        }
         let Err(cause) = input.write(frame, time_ns) else {
             self.output.frames += 1;
             return Ok(ControlFlow::Continue(()));
@@ -142,7 +147,8 @@ impl Sink for Ffmpeg {
             self.output.give_up();
             return Ok(());
         }
-        match self.end(false) {
+        let ended = self.end(false);
+        match self.output.check_there().and(ended) {
             Ok(()) => {
                 self.move_index_to_front();
                 self.output.complete(ending)

@@ -176,4 +176,22 @@ mod tests {
             depth("matte:").unwrap_err().contains("name a file") && depth("mono,mono").unwrap_err().contains("twice")
         );
     }
+
+    #[cfg(feature = "networks")]
+    #[test]
+    fn a_range_is_what_black_and_white_become() {
+        for (range, black, white) in [
+            (Range::Unit, 0.0, 1.0),
+            (Range::Signed, -1.0, 1.0),
+            (Range::Codes, 0.0, 255.0),
+            // Of red: (0 - 0.485) / 0.229 and (1 - 0.485) / 0.229.
+            (Range::Imagenet, -2.117_904, 2.248_908),
+        ] {
+            let Scaling { mean, divisor } = range.scaling();
+            for (code, expected) in [(0.0, black), (255.0, white)] {
+                let became: f32 = (code - mean[0]) / divisor[0];
+                assert!((became - expected).abs() < 1e-4, "{}: {code} became {became}", range.name());
+            }
+        }
+    }
 }

@@ -121,8 +121,8 @@ pub fn run(command: &ApertureCommand, global: &Global) -> Result<(), CliError> {
     for (analysis, path) in analyses.iter().zip(&outputs) {
         write_color(path, &sheet::draw(analysis), command.output.force)?;
     }
-    write_whole(&plot_path, plot.as_bytes())?;
-    write_whole(&table_path, &json)?;
+    write_whole(&plot_path, plot.as_bytes(), command.output.force)?;
+    write_whole(&table_path, &json, command.output.force)?;
     if !global.quiet {
         terminal::say(&format!("{} apertures analysed: {}", analyses.len(), table_path.display()));
     }

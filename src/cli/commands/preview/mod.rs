@@ -10,8 +10,8 @@ use clap::Args;
 
 use crate::cli::controlled::{self, refused};
 use crate::cli::error::CliError;
-use crate::cli::files::{check_report, write_report};
 use crate::cli::options::{Global, Streaming, Window};
+use crate::cli::report;
 use crate::cli::settings::changes;
 use crate::cli::settings::file;
 use crate::cli::settings::layers::Given;
@@ -91,7 +91,7 @@ pub fn show(
     called: Option<&Name>,
 ) -> Result<(), CliError> {
     let Streaming { frames, stream, output, computing, .. } = parts;
-    check_report(stream.report.as_deref(), output.force, to)?;
+    report::check(stream.report.as_deref(), output.force, to)?;
     let usage = |what: &str| CliError::Usage(what.to_string());
     let refuse = |what: &str| Err(usage(what));
     if stream.pace == Some(Pace::Asap) {
@@ -112,7 +112,7 @@ pub fn show(
         target => Ok(Output { name: target.to_string(), is_camera: target.is_camera() }),
     });
     let outputs = outputs.collect::<Result<Vec<_>, _>>()?;
-    sinks::try_report(stream.report.as_deref())?;
+    report::try_out(stream.report.as_deref())?;
     let look = look::look(&parts.blur, &computing.quality)?;
     // As if there were depth: what the source lacks is known only when it is open, and a window may open others.
     let look = source::fitting_look(&look, &parts.blur.depth, true)?;
@@ -175,7 +175,7 @@ pub fn show(
         stop,
     })?;
     let written = match (&stream.report, &ended.report) {
-        (Some(path), Some(report)) => write_report(path, report),
+        (Some(path), Some(report)) => report::write(path, report, output.force),
         _ => Ok(()),
     };
     if let Some(report) = ended.report.as_ref().filter(|_| !global.quiet) {

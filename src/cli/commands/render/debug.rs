@@ -233,7 +233,7 @@ impl DebugOutput {
         for (path, (_, picture)) in paths.iter().zip(&self.pictures) {
             still::write_color(path, picture, force)?;
         }
-        write_whole(&plan_path, &json)
+        write_whole(&plan_path, &json, force)
     }
 }
 
