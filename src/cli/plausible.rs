@@ -25,8 +25,9 @@ const LEAST_MM: f32 = 0.5;
 const FARTHEST: f32 = 0.98;
 /// Where all is nearer than this, in metres, a map has another unit than is assumed.
 const NEAR_M: f32 = 1.0;
-/// More of the picture than this, on all of its sides, is nobody who stands before a plate.
+/// What is before a plate in more of the picture than this, and has a longer outline for its size, is nobody who stands there.
 const MOST_BEFORE_PLATE: f32 = 0.2;
+const MOST_RAGGED: f32 = 16.0;
 
 /// Warns of eyes that stand far apart.
 pub fn warn_of_baseline(rig: Option<StereoRig>) {
@@ -65,7 +66,7 @@ pub fn warn_of_depth_scale(scale: Option<f32>) {
     if let Some(scale) = scale.filter(|scale| *scale < 1.0) {
         log::warn(&format!(
             "--depth-scale {scale} is units per metre; if a unit has {scale} m, there are {} to a metre",
-            1.0 / scale
+            (1.0 / scale).round()
         ));
     }
 }
@@ -199,18 +200,70 @@ fn odd_subject(map: &DepthMap, plate: Option<&Path>, image: Option<&Path>) -> Op
             "{plate}: nobody stands before it, and all is blurred; a plate shows the place without the person"
         )),
         None if near == 0 => Some("nobody was found in the picture, and all of it is blurred".to_owned()),
-        Some(plate) if near as f32 > MOST_BEFORE_PLATE * count as f32 => {
-            let mut sides = [(0..width).any(is_near), (count - width..count).any(is_near), false, false];
-            sides[2] = (0..count).step_by(width).any(is_near);
-            sides[3] = (width - 1..count).step_by(width).any(is_near);
-            (sides == [true; 4]).then(|| {
-                format!(
-                    "{plate}: {} % of the picture differs from it, on all sides, and stays sharp: it was taken from elsewhere; a \
-                     plate needs a camera that stands still, as on a tripod",
-                    100 * near / count
-                )
-            })
+        Some(plate) if near as f32 > MOST_BEFORE_PLATE * count as f32 && raggedness(map, is_near) > MOST_RAGGED => {
+            Some(format!(
+                "{plate}: {} % of the picture differs from it, in shreds, and stays sharp: it was taken from elsewhere; a plate \
+                 needs a camera that stands still, as on a tripod",
+                100 * near / count
+            ))
         }
         _ => None,
+    }
+}
+
+/// How long the outline of what is near is, in sides of a square as large: 4 of a square, 6 to 9 of a person.
+fn raggedness(map: &DepthMap, is_near: impl Fn(usize) -> bool) -> f32 {
+    // Hair would count in all pixels.
+    let (width, height) = (map.width as usize, map.height as usize);
+    let step = (width / 160).max(1);
+    let columns: Vec<usize> = (0..width).step_by(step).collect();
+    let (mut inside, mut outline) = (0, 0);
+    for y in (0..height).step_by(step) {
+        for &x in &columns {
+            let own = is_near(y * width + x);
+            let right = x + step < width && is_near(y * width + x + step) != own;
+            let below = y + step < height && is_near((y + step) * width + x) != own;
+            inside += usize::from(own);
+            outline += usize::from(right) + usize::from(below);
+        }
+    }
+    outline as f32 / (inside.max(1) as f32).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn map(near: impl Fn(f32, f32) -> bool) -> DepthMap {
+        let at = |k: u32| (k % 640, k / 640);
+        let metres = |k| if near(at(k).0 as f32, at(k).1 as f32) { DepthMap::SUBJECT_M } else { DepthMap::FAR_M };
+        DepthMap {
+            width: 640,
+            height: 360,
+            metres: (0..640 * 360).map(metres).collect(),
+            subject_m: Some(DepthMap::SUBJECT_M),
+            ..DepthMap::default()
+        }
+    }
+
+    #[test]
+    fn a_plate_from_elsewhere_leaves_shreds_and_a_person_has_an_outline() {
+        let plate = Some(Path::new("room.png"));
+        let person = |x: f32, y: f32| (x - 320.0).hypot(y - 130.0) < 90.0 || (y > 200.0 && (x - 320.0).abs() < 200.0);
+        assert_eq!(odd_subject(&map(person), plate, None), None);
+        let shreds = |x: f32, y: f32| person(x, y) || (x * 0.12).sin() * (y * 0.2).cos() > 0.5;
+        let said = odd_subject(&map(shreds), plate, None).unwrap();
+        assert!(said.starts_with("room.png: ") && said.contains("as on a tripod"), "{said}");
+        // What a network finds is not compared with a plate.
+        assert_eq!(odd_subject(&map(shreds), None, None), None);
+        assert!(odd_subject(&map(|_, _| false), None, None).unwrap().contains("nobody was found"));
+    }
+
+    #[test]
+    fn eyes_of_vehicles_are_usual_and_those_of_houses_are_not() {
+        let rig = |baseline_m, metric| StereoRig { focal_px: 700.0, baseline_m, doffs_px: 0.0, metric };
+        assert_eq!(far_apart(&rig(2.0, true)), None);
+        assert_eq!(far_apart(&rig(60.0, false)), None);
+        assert!(far_apart(&rig(63.5, true)).unwrap().contains("it is 0.0635 m"));
     }
 }

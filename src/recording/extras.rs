@@ -74,6 +74,7 @@ impl Extras {
 
     /// Keeps what of a packet still holds.
     fn take_xmp(&mut self, packet: Result<Vec<u8>, &'static str>) {
+        self.left_behind.extend(packet.iter().flat_map(|packet| xmp::lost(packet)));
         match packet.and_then(xmp::kept) {
             Ok(packet) => self.xmp = Some(packet),
             Err(lost) => self.left_behind.push(lost),

@@ -19,6 +19,16 @@ const ELSEWHERE: [&str; 8] =
 const THUMBNAILS: [&str; 2] = ["xmp:Thumbnails", "xmpGImg:image"];
 const ORIENTATION: &str = "tiff:Orientation";
 
+/// Attributes that speak of what is worth a word when it is lost, and the word.
+const WORTH_A_WORD: [(&str, &str); 2] =
+    [("xmpNote:HasExtendedXMP", "Extended XMP"), ("GDepth:Format", "the depth map in its XMP")];
+
+/// In words, what a packet has that its picture does not take along.
+pub(super) fn lost(packet: &[u8]) -> impl Iterator<Item = &'static str> {
+    let has = |name: &str| packet.windows(name.len()).any(|bytes| bytes == name.as_bytes());
+    WORTH_A_WORD.into_iter().filter(move |(name, _)| has(name)).map(|(_, word)| word)
+}
+
 /// The packet of a picture that stands upright and is alone in its file.
 ///
 /// # Errors
@@ -98,6 +108,11 @@ mod tests {
         assert_eq!(kept("", "<dc:title>GDepth: a poem = 'x'</dc:title>"), Ok(plain));
         let depth = " GDepth:Format=\"RangeInverse\"\n GDepth:Data = 'AAAA=='\txmpNote:HasExtendedXMP=\"1F\"";
         assert_eq!(kept(depth, ""), Ok(packet("", "")));
+        assert_eq!(
+            lost(packet(depth, "").as_bytes()).collect::<Vec<_>>(),
+            ["Extended XMP", "the depth map in its XMP"]
+        );
+        assert_eq!(lost(packet("", "").as_bytes()).count(), 0);
         // A value that never ends stays as it is.
         assert!(kept(" GDepth:Data=\"AAAA", "").unwrap().contains("GDepth:Data"));
         for elements in ["<GDepth:Data>AAAA</GDepth:Data>", "<xmp:Thumbnails/>", "<Container:Directory/>"] {
