@@ -3,4 +3,5 @@
 pub mod folder;
 pub mod input;
 pub mod place;
+pub mod trusted;
 pub mod whole;

@@ -1,15 +1,16 @@
 //! The folder of the sockets: the user's own, and nobody else's.
 
 use std::fs::{self, DirBuilder, File};
+use std::io;
 use std::io::ErrorKind;
 use std::os::unix::fs::{DirBuilderExt, FileTypeExt, MetadataExt};
 use std::path::{Path, PathBuf};
-use std::{env, io};
 
 use rustix::fs::{FlockOperation, flock};
 use rustix::process::geteuid;
 
 use super::{ControlError, Name, socket};
+use crate::files::trusted::absolute;
 
 /// What the names of sockets end with.
 const ENDING: &str = ".sock";
@@ -20,8 +21,8 @@ const ENDING: &str = ".sock";
 /// The user has no runtime folder, or it is not theirs alone.
 pub(super) fn path() -> Result<PathBuf, ControlError> {
     let refuse = |what: String| ControlError::NoFolder(what);
-    let runtime = env::var_os("XDG_RUNTIME_DIR").map(PathBuf::from).filter(|path| path.is_absolute());
-    let runtime = runtime.ok_or_else(|| refuse("there is no runtime folder: XDG_RUNTIME_DIR is not set".into()))?;
+    let runtime = absolute("XDG_RUNTIME_DIR")
+        .ok_or_else(|| refuse("there is no runtime folder: XDG_RUNTIME_DIR is not set".into()))?;
     if !runtime.is_dir() {
         return Err(refuse(format!("there is no runtime folder: XDG_RUNTIME_DIR is {}", runtime.display())));
     }

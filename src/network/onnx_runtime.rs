@@ -2,13 +2,15 @@
 
 use std::env;
 use std::path::{Path, PathBuf};
-use std::sync::OnceLock;
+use std::sync::{Arc, OnceLock};
 
-use ort::environment::Environment;
+use ort::environment::{Environment, EnvironmentBuilder};
+use ort::logging::LogLevel;
 use ort::session::{Session, SessionInputValue};
 use ort::value::{TensorRef, ValueType};
 
 use super::{Engine, Network, Port, Tensor, guarded, one_line};
+use crate::files::trusted;
 
 /// What its library is called, where the loader finds it.
 const NAMES: [&str; 2] = ["libonnxruntime.so.1", "libonnxruntime.so"];
@@ -29,36 +31,58 @@ fn open() -> Result<Environment, String> {
     let mut why = "not installed (Debian 13: apt install libonnxruntime1.21; anywhere: pip install onnxruntime, and \
                    ORT_DYLIB_PATH naming its capi/libonnxruntime.so.*)"
         .to_owned();
-    for path in candidates() {
-        let opened = ort::init_from(&path).map_err(one_line);
-        match opened.and_then(|builder| builder.with_telemetry(false).build().map_err(one_line)) {
+    for library in candidates()? {
+        let opened = place(&library).and_then(|place| ort::init_from(&place).map_err(one_line));
+        // Its own log goes to stderr raw, whatever is in a network's names; what fails is told by the call that fails.
+        let quiet = |builder: EnvironmentBuilder| {
+            let log =
+                |_, _: &str, _: &str, _: &str, message: &str| tracing::debug!("ONNX Runtime: {}", one_line(message));
+            let environment = builder.with_telemetry(false).with_logger(Arc::new(log)).build().map_err(one_line)?;
+            environment.set_log_level(LogLevel::Error);
+            Ok(environment)
+        };
+        match opened.and_then(quiet) {
             Ok(environment) => return Ok(environment),
             // A bare name that the loader does not know says nothing.
-            Err(error) if path.is_absolute() => why = error,
+            Err(error) if library.is_absolute() => why = error,
             Err(_) => {}
         }
     }
     Err(why)
 }
 
+/// What the loader is asked for: a bare name, which it looks for where the system's libraries are, or a file that is nobody
+/// else's.
+fn place(library: &Path) -> Result<PathBuf, String> {
+    if library.is_absolute() { trusted::code(library) } else { Ok(library.to_owned()) }
+}
+
 /// The libraries that may be tried, the user's choice alone where there is one.
-fn candidates() -> Vec<PathBuf> {
-    if let Some(chosen) = env::var_os("ORT_DYLIB_PATH") {
-        return vec![PathBuf::from(chosen)];
+///
+/// # Errors
+/// The user's choice depends on the folder that the program was started in.
+fn candidates() -> Result<Vec<PathBuf>, String> {
+    if let Some(chosen) = env::var_os("ORT_DYLIB_PATH").filter(|chosen| !chosen.is_empty()) {
+        let chosen = PathBuf::from(chosen);
+        let is_name = chosen.components().count() == 1 && chosen.file_name() == Some(chosen.as_os_str());
+        return match chosen.is_absolute() || is_name {
+            true => Ok(vec![chosen]),
+            false => Err(format!(
+                "ORT_DYLIB_PATH is {}, which means another file in every folder: name it from the root, as /usr/lib/...",
+                chosen.display()
+            )),
+        };
     }
     let mut found: Vec<PathBuf> = NAMES.iter().map(PathBuf::from).collect();
     // What pip installs for the user, or in the virtual environment that is active.
-    let roots = [
-        env::var_os("VIRTUAL_ENV").map(PathBuf::from),
-        env::var_os("HOME").map(|home| Path::new(&home).join(".local")),
-    ];
+    let roots = [trusted::absolute("VIRTUAL_ENV"), trusted::absolute("HOME").map(|home| home.join(".local"))];
     for python in roots.into_iter().flatten().flat_map(|root| entries(&root.join("lib"))) {
         let capi = python.join("site-packages/onnxruntime/capi");
         found.extend(entries(&capi).into_iter().filter(|file| {
             file.file_name().is_some_and(|name| name.to_string_lossy().starts_with("libonnxruntime.so"))
         }));
     }
-    found
+    Ok(found)
 }
 
 fn entries(folder: &Path) -> Vec<PathBuf> {

@@ -5,11 +5,11 @@ use std::path::PathBuf;
 
 use super::{Known, MOST_BYTES, Task};
 use crate::files::input;
+use crate::files::trusted::absolute;
 
 /// The folders, the user's own first: `bokehcam/models` in `$XDG_DATA_HOME` and in each of `$XDG_DATA_DIRS`.
 pub fn folders() -> Vec<PathBuf> {
-    let home = env::var_os("HOME").map(|home| PathBuf::from(home).join(".local/share"));
-    let own = env::var_os("XDG_DATA_HOME").map(PathBuf::from).filter(|path| path.is_absolute()).or(home);
+    let own = absolute("XDG_DATA_HOME").or_else(|| Some(absolute("HOME")?.join(".local/share")));
     let system = env::var_os("XDG_DATA_DIRS").filter(|dirs| !dirs.is_empty());
     let system = system.unwrap_or_else(|| "/usr/local/share:/usr/share".into());
     let system: Vec<PathBuf> = env::split_paths(&system).filter(|path| path.is_absolute()).collect();

@@ -6,6 +6,7 @@ use std::process::{Command, Stdio};
 use std::thread;
 
 use crate::files::input;
+use crate::files::trusted::absolute;
 
 /// The folders of snapshots and of recordings.
 #[derive(Clone, Debug, PartialEq)]
@@ -29,16 +30,14 @@ impl Folders {
     /// The user's own folders of pictures and videos, as the environment or `user-dirs.dirs` name them, or as they are
     /// usually called; where there is none, the current folder.
     pub fn of_user() -> Self {
-        let home = env::var_os("HOME").map(PathBuf::from);
-        let config = env::var_os("XDG_CONFIG_HOME").map(PathBuf::from).filter(|path| path.is_absolute());
-        let config = config.or_else(|| Some(home.as_ref()?.join(".config")));
+        let home = absolute("HOME");
+        let config = absolute("XDG_CONFIG_HOME").or_else(|| Some(home.as_ref()?.join(".config")));
         let named =
             config.and_then(|config| input::read_text(&config.join("user-dirs.dirs"), input::MOST_SETTINGS_BYTES).ok());
         let folder = |variable: &str, usual: &str| {
             let home = home.as_deref();
             let named = named.as_deref().zip(home).and_then(|(text, home)| named_in(text, variable, home));
-            let given = env::var_os(variable).map(PathBuf::from);
-            let all = [given, named, home.map(|home| home.join(usual))];
+            let all = [absolute(variable), named, home.map(|home| home.join(usual))];
             all.into_iter()
                 .flatten()
                 .find(|folder| folder.is_dir())

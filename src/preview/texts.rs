@@ -10,6 +10,7 @@ use std::fmt::Display;
 use std::path::{Path, PathBuf};
 
 use crate::files::input;
+use crate::files::trusted::absolute;
 
 /// Texts by their English.
 pub type Table = HashMap<String, String>;
@@ -84,10 +85,10 @@ fn read(path: &Path) -> Result<Table, String> {
 fn find(language: &str) -> Option<PathBuf> {
     let language = language.split(['.', '@']).next().filter(|name| is_name(name))?;
     let short = language.split('_').next().unwrap_or(language);
-    let home = std::env::var_os("HOME").map(|home| Path::new(&home).join(".local/share"));
-    let own = std::env::var_os("XDG_DATA_HOME").map(PathBuf::from).or(home);
+    let own = absolute("XDG_DATA_HOME").or_else(|| Some(absolute("HOME")?.join(".local/share")));
     let all = std::env::var_os("XDG_DATA_DIRS").unwrap_or_else(|| "/usr/local/share:/usr/share".into());
-    let folders: Vec<PathBuf> = own.into_iter().chain(std::env::split_paths(&all)).collect();
+    let system = std::env::split_paths(&all).filter(|path| path.is_absolute());
+    let folders: Vec<PathBuf> = own.into_iter().chain(system).collect();
     let named = |name: &str| {
         folders.iter().map(|folder| folder.join(format!("bokehcam/texts/{name}.toml"))).find(|path| path.is_file())
     };

@@ -9,6 +9,7 @@ use super::table::{Values, is_setting, nearest_setting, parse_flags};
 use crate::cli::error::CliError;
 use crate::cli::log::{one_line, printable};
 use crate::files::input;
+use crate::files::trusted::absolute;
 use crate::look::{self, SETTINGS, presets};
 #[cfg(feature = "window")]
 use crate::look::{Patch, presets::Preset};
@@ -192,7 +193,6 @@ pub fn state_folder() -> Option<PathBuf> {
 
 /// This program's folder in the one that the environment variable names, else in `usual` under the user's home.
 fn folder(variable: &str, usual: &str) -> Option<PathBuf> {
-    let absolute = |name| std::env::var_os(name).map(PathBuf::from).filter(|path| path.is_absolute());
     let folder = absolute(variable).or_else(|| Some(absolute("HOME")?.join(usual)))?;
     Some(folder.join("bokehcam"))
 }
