@@ -6,6 +6,8 @@ mod error;
 mod files;
 mod focus;
 mod log;
+#[cfg(feature = "networks")]
+mod networks_apart;
 mod options;
 mod parse;
 #[doc(hidden)]
@@ -24,6 +26,11 @@ use settings::{arguments, environment};
 
 /// Runs the program. What goes wrong becomes one line on stderr and an exit code: 1 at run time, 2 in the arguments.
 pub fn run(args: impl IntoIterator<Item = OsString>) -> ExitCode {
+    let args: Vec<OsString> = args.into_iter().collect();
+    #[cfg(feature = "networks")]
+    if networks_apart::is_asked_for(&args) {
+        return networks_apart::serve();
+    }
     let args = arguments::joined(args);
     log::tell_of_panics();
     log::write_as(arguments::log_format(&args));
@@ -47,6 +54,8 @@ fn run_to_end(args: &[OsString]) -> ExitCode {
         Err(Refusal::Arguments(error)) => return arguments::refuse(&error, args),
     };
     log::start(&cli.global);
+    #[cfg(feature = "networks")]
+    crate::network::apart::make_possible();
     environment::warn_of_unknown();
     match commands::perform(cli, &matches, &file, &layers) {
         Ok(()) => ExitCode::SUCCESS,

@@ -28,6 +28,9 @@ pub fn stop_flag() -> Result<Arc<AtomicBool>, CliError> {
         if already_stopping.swap(true, Ordering::Relaxed) {
             std::process::exit(INTERRUPTED);
         }
+        // Nobody waits for a network that hangs.
+        #[cfg(feature = "networks")]
+        crate::network::apart::hurry();
         say("stopping after the frames in hand; Ctrl-C again aborts");
     };
     ctrlc::set_handler(handler).map_err(|error| CliError::Signals(error.to_string()))?;

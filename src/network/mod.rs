@@ -1,8 +1,11 @@
 //! Neural networks in ONNX files of the user's own: read, run, and kept from doing harm.
 //!
 //! A file is run by ONNX Runtime where that is installed, and else by what is built in. It is not trusted: its size and
-//! those of all it takes and gives are bounded, and what fails in it, fails with a line of text.
+//! those of all it takes and gives are bounded, it may have no loops, and what fails in it, fails with a line of text. No
+//! runtime bounds the memory and the time of what it runs, so that a program may let networks that are not known run in a
+//! process of their own ([`apart`]).
 
+pub mod apart;
 mod built_in;
 mod known;
 mod onnx;
@@ -10,6 +13,8 @@ mod onnx_runtime;
 mod place;
 
 use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
 
 pub use known::{KNOWN, Known, Scaling, Task};
 pub use onnx_runtime::installed as onnx_runtime_installed;
@@ -37,7 +42,7 @@ named! {
 }
 
 /// What a network takes or gives.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Port {
     /// Its name in the file.
     pub name: String,
@@ -92,7 +97,11 @@ impl Network {
     /// # Errors
     /// What the runtime says.
     pub fn run(&mut self, inputs: &[Tensor], outputs: &mut Vec<Tensor>) -> Result<(), String> {
-        guarded(|| self.engine.run(inputs, outputs))
+        guarded(|| self.engine.run(inputs, outputs))?;
+        match outputs.iter().find(|output| output.values.len() > MOST_VALUES) {
+            Some(output) => Err(format!("it gave more than {MOST_VALUES} values: {:?}", output.shape)),
+            None => Ok(()),
+        }
     }
 }
 
@@ -131,21 +140,20 @@ pub struct Loaded {
 /// Loads the network in the file `path`.
 ///
 /// # Errors
-/// It cannot be read, is no ONNX file, needs what the runtime has not, or the runtime asked for is not there.
+/// It cannot be read, is no ONNX file, has loops, needs what the runtime has not, or the runtime asked for is not there.
 pub fn load(path: &Path, runtime: Runtime) -> Result<Loaded, NetworkError> {
     let bytes = input::read(path, MOST_BYTES).map_err(|source| NetworkError::Read { path: path.into(), source })?;
     let known = Known::of(&bytes);
     let refused = |why: String| NetworkError::Refused { path: path.into(), why };
-    let other = match runtime {
-        Runtime::BuiltIn => None,
-        Runtime::Auto => onnx_runtime::environment().ok(),
-        Runtime::OnnxRuntime => Some(onnx_runtime::environment().map_err(NetworkError::NoRuntime)?),
+    onnx::refuse_repeating(&bytes).map_err(refused)?;
+    let loaded = match apart::is_possible() && known.is_none() {
+        true => apart::load(&bytes, runtime),
+        false => load_here(bytes, runtime),
     };
-    let network = guarded(|| match other {
-        Some(environment) => onnx_runtime::OnnxRuntime::load(&environment, &bytes),
-        None => built_in::BuiltIn::load(bytes),
-    })
-    .map_err(refused)?;
+    let network = loaded.map_err(|failure| match failure {
+        Failure::NoRuntime(why) => NetworkError::NoRuntime(why),
+        Failure::Refused(why) => refused(why),
+    })?;
     for port in network.inputs.iter().chain(&network.outputs) {
         if port
             .shape
@@ -157,6 +165,29 @@ pub fn load(path: &Path, runtime: Runtime) -> Result<Loaded, NetworkError> {
         }
     }
     Ok(Loaded { network, known })
+}
+
+/// Why a runtime does not run a network.
+#[derive(Debug, Serialize, Deserialize)]
+enum Failure {
+    /// It is not there.
+    NoRuntime(String),
+    /// It cannot.
+    Refused(String),
+}
+
+/// Lets a runtime in this process load a network.
+fn load_here(bytes: Vec<u8>, runtime: Runtime) -> Result<Network, Failure> {
+    let other = match runtime {
+        Runtime::BuiltIn => None,
+        Runtime::Auto => onnx_runtime::environment().ok(),
+        Runtime::OnnxRuntime => Some(onnx_runtime::environment().map_err(Failure::NoRuntime)?),
+    };
+    guarded(|| match other {
+        Some(environment) => onnx_runtime::OnnxRuntime::load(&environment, &bytes),
+        None => built_in::BuiltIn::load(bytes),
+    })
+    .map_err(Failure::Refused)
 }
 
 /// Calls a runtime, whose panics are errors.

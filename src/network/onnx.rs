@@ -1,6 +1,7 @@
-//! A change to ONNX files that the built-in runtime needs: transposed convolutions without the attribute `output_shape`.
+//! What is looked at in ONNX files before a runtime reads them: nothing in them may run over and over, and the built-in
+//! runtime needs transposed convolutions without the attribute `output_shape`.
 //!
-//! Converters write it beside strides that say the same. Only its message is left out; where the sizes do not fit
+//! Converters write that one beside strides that say the same. Only its message is left out; where the sizes do not fit
 //! without it, the network fails when it runs.
 
 /// Tags of Protocol Buffers: the fields on the way to an attribute (onnx.proto: ModelProto.graph, GraphProto.node,
@@ -9,7 +10,84 @@ const PATH: [u64; 3] = [7, 1, 5];
 const NAME: u64 = 1;
 const LEFT_OUT: &[u8] = b"output_shape";
 
-/// The model without such attributes.
+/// Operators that run a part of the network as often as its data say, which may be for ever. No network for pictures needs
+/// one.
+const REPEATING: [&[u8]; 3] = [b"Loop", b"Scan", b"SequenceMap"];
+/// Branches within branches: a network has one or two, and each is a call within a call of a runtime.
+const DEEPEST: usize = 8;
+
+/// Parts of a model that may have nodes, and the fields of theirs that lead on (onnx.proto).
+#[derive(Clone, Copy)]
+enum Part {
+    Model,
+    Function,
+    Graph,
+    Node,
+    Attribute,
+}
+
+impl Part {
+    fn field(self, number: u64) -> Option<Part> {
+        match (self, number) {
+            (Part::Model, 7) | (Part::Attribute, 6 | 11) => Some(Part::Graph),
+            (Part::Model, 25) => Some(Part::Function),
+            (Part::Function, 7) | (Part::Graph, 1) => Some(Part::Node),
+            (Part::Node, 5) => Some(Part::Attribute),
+            _ => None,
+        }
+    }
+}
+
+/// Looks for what may run for ever, also in branches and in functions of the model's own.
+///
+/// # Errors
+/// There is such an operator; branches lie too deep in each other; or it is no ONNX file.
+pub fn refuse_repeating(model: &[u8]) -> Result<(), String> {
+    refuse_in(Part::Model, model, 0)
+}
+
+fn refuse_in(part: Part, message: &[u8], depth: usize) -> Result<(), String> {
+    if depth > DEEPEST {
+        return Err(format!("it has branches within branches, {DEEPEST} deep and more"));
+    }
+    let mut rest = message;
+    while !rest.is_empty() {
+        let (tag, content) = field(&mut rest).ok_or_else(no_onnx)?;
+        let Some(content) = content else { continue };
+        if let (Part::Node, 4) = (part, tag >> 3)
+            && let Some(name) = REPEATING.iter().find(|name| **name == content)
+        {
+            let name = String::from_utf8_lossy(name);
+            return Err(format!("it has the operator {name}, which may run for ever; export it without loops"));
+        }
+        if let Some(inner) = part.field(tag >> 3) {
+            refuse_in(inner, content, depth + usize::from(matches!(part, Part::Attribute)))?;
+        }
+    }
+    Ok(())
+}
+
+fn no_onnx() -> String {
+    "it is no ONNX file, or not whole".to_owned()
+}
+
+/// The next field of a message: its tag, and its content where it has a length. `None` where it ends too early.
+fn field<'a>(rest: &mut &'a [u8]) -> Option<(u64, Option<&'a [u8]>)> {
+    let tag = varint(rest)?;
+    let content = match tag & 7 {
+        0 => varint(rest).map(|_| None)?,
+        1 => rest.split_off(..8).map(|_| None)?,
+        2 => {
+            let length = usize::try_from(varint(rest)?).ok()?;
+            Some(rest.split_off(..length)?)
+        }
+        5 => rest.split_off(..4).map(|_| None)?,
+        _ => return None,
+    };
+    Some((tag, content))
+}
+
+/// The model without attributes that are called `output_shape`.
 ///
 /// # Errors
 /// It is no ONNX file.
@@ -18,7 +96,7 @@ pub fn without_output_shapes(model: Vec<u8>) -> Result<Vec<u8>, String> {
         return Ok(model);
     }
     let mut changed = Vec::with_capacity(model.len());
-    copy(&model, &PATH, &mut changed).ok_or("it is no ONNX file, or not whole")?;
+    copy(&model, &PATH, &mut changed).ok_or_else(no_onnx)?;
     Ok(changed)
 }
 
@@ -27,17 +105,7 @@ fn copy(message: &[u8], path: &[u64], to: &mut Vec<u8>) -> Option<()> {
     let mut rest = message;
     while !rest.is_empty() {
         let start = rest;
-        let tag = varint(&mut rest)?;
-        let content = match tag & 7 {
-            0 => varint(&mut rest).map(|_| None)?,
-            1 => rest.split_off(..8).map(|_| None)?,
-            2 => {
-                let length = usize::try_from(varint(&mut rest)?).ok()?;
-                Some(rest.split_off(..length)?)
-            }
-            5 => rest.split_off(..4).map(|_| None)?,
-            _ => return None,
-        };
+        let (tag, content) = field(&mut rest)?;
         match (content, path) {
             (Some(content), [next, further @ ..]) if *next == tag >> 3 => {
                 if further.is_empty() && is_left_out(content)? {
@@ -92,7 +160,7 @@ fn put_varint(mut value: u64, to: &mut Vec<u8>) {
 mod tests {
     use super::*;
 
-    fn field(number: u64, content: &[u8]) -> Vec<u8> {
+    fn with(number: u64, content: &[u8]) -> Vec<u8> {
         let mut bytes = Vec::new();
         put_varint(number << 3 | 2, &mut bytes);
         put_varint(content.len() as u64, &mut bytes);
@@ -101,10 +169,10 @@ mod tests {
     }
 
     fn model(attributes: &[&[u8]]) -> Vec<u8> {
-        let attributes: Vec<u8> = attributes.iter().flat_map(|name| field(5, &field(1, name))).collect();
-        let node = [field(4, b"ConvTranspose"), attributes].concat();
+        let attributes: Vec<u8> = attributes.iter().flat_map(|name| with(5, &with(1, name))).collect();
+        let node = [with(4, b"ConvTranspose"), attributes].concat();
         // A number before the graph, and a graph long enough for lengths of two bytes.
-        [vec![8, 9], field(7, &[field(1, &node), field(2, &[b'x'; 300])].concat())].concat()
+        [vec![8, 9], with(7, &[with(1, &node), with(2, &[b'x'; 300])].concat())].concat()
     }
 
     #[test]
@@ -113,6 +181,25 @@ mod tests {
         assert_eq!(without_output_shapes(with).unwrap(), model(&[b"strides", b"pads"]));
         let without = model(&[b"strides"]);
         assert_eq!(without_output_shapes(without.clone()).unwrap(), without);
+    }
+
+    #[test]
+    fn what_runs_over_and_over_is_found_wherever_it_is() {
+        let node = |operator: &[u8], attributes: &[u8]| with(1, &[with(4, operator), attributes.to_vec()].concat());
+        let branch = |inner: &[u8]| node(b"If", &with(5, &with(6, inner)));
+        for name in REPEATING {
+            let within = node(name, &[]);
+            let function = with(25, &with(7, &with(4, name)));
+            let models = [with(7, &within), with(7, &branch(&within)), [with(7, &branch(&[])), function].concat()];
+            for model in models {
+                assert!(refuse_repeating(&model).unwrap_err().contains("may run for ever"), "{model:?}");
+            }
+        }
+        // A name is no operator.
+        refuse_repeating(&with(7, &with(1, &[with(4, b"Conv"), with(3, b"Loop")].concat()))).unwrap();
+        let nested = |count: usize| (0..count).fold(Vec::new(), |inner, _| branch(&inner));
+        refuse_repeating(&with(7, &nested(DEEPEST))).unwrap();
+        refuse_repeating(&with(7, &nested(50))).unwrap_err();
     }
 
     #[test]

@@ -53,6 +53,44 @@ pub fn node(operator: &str, inputs: &[&str], output: &str, attributes: &[(&str, 
     [inputs, field(2, output.as_bytes()), field(4, operator.as_bytes()), attributes.collect()].concat()
 }
 
+/// A node with attributes of one integer each.
+pub fn node_with_numbers(operator: &str, inputs: &[&str], output: &str, attributes: &[(&str, u64)]) -> Vec<u8> {
+    let attributes = attributes
+        .iter()
+        .flat_map(|(name, value)| field(5, &[field(1, name.as_bytes()), number(3, *value), number(20, 2)].concat()));
+    [node(operator, inputs, output, &[]), attributes.collect()].concat()
+}
+
+/// A constant of 64-bit integers in a row.
+pub fn integers(name: &str, values: &[i64]) -> Vec<u8> {
+    let raw: Vec<u8> = values.iter().flat_map(|value| value.to_le_bytes()).collect();
+    [number(1, values.len() as u64), number(2, 7), field(8, name.as_bytes()), field(9, &raw)].concat()
+}
+
+/// A constant that is true.
+pub fn always(name: &str) -> Vec<u8> {
+    [number(2, 9), field(8, name.as_bytes()), field(9, &[1])].concat()
+}
+
+/// What gives `input` again after so many rounds that there is no end to them: as long as `condition` is true.
+pub fn endless_loop(condition: &str, input: &str, output: &str) -> Vec<u8> {
+    let value = |name: &str, kind: u64, shape: &[u8]| {
+        [field(1, name.as_bytes()), field(2, &field(1, &[number(1, kind), shape.to_vec()].concat()))].concat()
+    };
+    // The number of the round and the condition are scalars.
+    let scalar = field(2, &[]);
+    let nodes = [node("Identity", &["c"], "c2", &[]), node("Identity", &["x"], "x2", &[])];
+    let all = |number: u64, parts: &[Vec<u8>]| parts.iter().flat_map(|part| field(number, part)).collect::<Vec<u8>>();
+    let body = [
+        all(1, &nodes),
+        field(2, b"body"),
+        all(11, &[value("round", 7, &scalar), value("c", 9, &scalar), value("x", 1, &[])]),
+        all(12, &[value("c2", 9, &scalar), value("x2", 1, &[])]),
+    ];
+    let attribute = [field(1, b"body"), field(6, &body.concat()), number(20, 5)].concat();
+    [node("Loop", &["", condition, input], output, &[]), field(5, &attribute)].concat()
+}
+
 /// A convolution of single pixels.
 pub fn conv(inputs: &[&str], output: &str) -> Vec<u8> {
     let attributes: [(&str, &[u64]); 4] =

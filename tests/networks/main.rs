@@ -1,5 +1,6 @@
 //! Networks of the user's own: loaded, run, and kept from doing harm; and what depth they give one camera.
 
+mod hostile;
 #[path = "../common/onnx.rs"]
 mod onnx;
 mod plate;

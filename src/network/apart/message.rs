@@ -1,0 +1,90 @@
+//! What the two processes say to each other: a line of JSON with its length before it, and numbers behind it.
+
+use std::io::{self, ErrorKind, Read, Write};
+
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
+
+use crate::network::{Failure, MOST_VALUES, Port, Tensor};
+
+/// Most bytes of a line: names of ports and sizes are short.
+const MOST_BYTES: u32 = 1 << 20;
+
+/// What is asked of the process.
+#[derive(Debug, Serialize, Deserialize)]
+pub enum Request {
+    /// To load a network of so many bytes, which follow, by the runtime of this name.
+    Load { runtime: String, bytes: usize },
+    /// To run it on inputs of these sizes, whose values follow.
+    Run(Vec<Vec<usize>>),
+}
+
+/// What it answers.
+#[derive(Debug, Serialize, Deserialize)]
+pub enum Reply {
+    Loaded(Ports),
+    NotLoaded(Failure),
+    /// The outputs have these sizes; their values follow.
+    Ran(Vec<Vec<usize>>),
+    Failed(String),
+}
+
+/// What a network takes and gives, and what runs it.
+#[derive(Debug, Serialize, Deserialize)]
+pub struct Ports {
+    pub inputs: Vec<Port>,
+    pub outputs: Vec<Port>,
+    pub runtime: String,
+}
+
+pub fn send(to: &mut impl Write, message: &impl Serialize) -> io::Result<()> {
+    let line = serde_json::to_vec(message)?;
+    let length = u32::try_from(line.len()).ok().filter(|length| *length <= MOST_BYTES);
+    let length = length.ok_or_else(|| io::Error::new(ErrorKind::InvalidData, "it has too many ports or sizes"))?;
+    to.write_all(&length.to_le_bytes())?;
+    to.write_all(&line)
+}
+
+pub fn receive<T: DeserializeOwned>(from: &mut impl Read) -> io::Result<T> {
+    let mut length = [0; 4];
+    from.read_exact(&mut length)?;
+    let length = u32::from_le_bytes(length);
+    if length > MOST_BYTES {
+        return Err(io::Error::new(ErrorKind::InvalidData, "it says too much"));
+    }
+    let mut line = vec![0; length as usize];
+    from.read_exact(&mut line)?;
+    Ok(serde_json::from_slice(&line)?)
+}
+
+pub fn shapes(tensors: &[Tensor]) -> Vec<Vec<usize>> {
+    tensors.iter().map(|tensor| tensor.shape.clone()).collect()
+}
+
+pub fn send_values(to: &mut impl Write, tensors: &[Tensor], bytes: &mut Vec<u8>) -> io::Result<()> {
+    for tensor in tensors {
+        bytes.clear();
+        bytes.extend(tensor.values.iter().flat_map(|value| value.to_le_bytes()));
+        to.write_all(bytes)?;
+    }
+    Ok(())
+}
+
+/// Takes in the values of tensors of these sizes, none of which is larger than any may be.
+pub fn receive_values(
+    from: &mut impl Read,
+    shapes: Vec<Vec<usize>>,
+    tensors: &mut Vec<Tensor>,
+    bytes: &mut Vec<u8>,
+) -> io::Result<()> {
+    tensors.resize_with(shapes.len(), Tensor::default);
+    for (tensor, shape) in tensors.iter_mut().zip(shapes) {
+        let count = shape.iter().try_fold(1usize, |all, &side| all.checked_mul(side));
+        let count = count.filter(|count| *count <= MOST_VALUES);
+        let count = count.ok_or_else(|| io::Error::new(ErrorKind::InvalidData, "it has too many values"))?;
+        bytes.resize(4 * count, 0);
+        from.read_exact(bytes)?;
+        tensor.set(shape, bytes.as_chunks::<4>().0.iter().map(|value| f32::from_le_bytes(*value)));
+    }
+    Ok(())
+}
