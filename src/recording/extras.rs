@@ -6,6 +6,8 @@ use image::ImageDecoder;
 use image::codecs::jpeg::JpegDecoder;
 use image::metadata::Orientation;
 
+use super::xmp;
+
 /// Metadata of a picture, and what was lost when it was read.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Extras {
@@ -13,6 +15,8 @@ pub struct Extras {
     pub icc_profile: Option<Vec<u8>>,
     /// EXIF, from its TIFF header on.
     pub exif: Option<Vec<u8>>,
+    /// XMP packet, which holds rights and authors.
+    pub xmp: Option<String>,
     /// What the file had and 8-bit RGB cannot hold, in words.
     pub left_behind: Vec<&'static str>,
 }
@@ -28,6 +32,12 @@ impl Extras {
         let exif = info.exif_metadata.as_deref().map(<[u8]>::to_vec);
         let mut extras = Self { exif, ..Self::default() };
         extras.take_profile(info.icc_profile.as_deref().map(<[u8]>::to_vec));
+        if let Some(chunk) = info.utf8_text.iter().find(|chunk| chunk.keyword == xmp::PNG_KEYWORD) {
+            let mut chunk = chunk.clone();
+            // Of what is compressed, no more is unpacked than makes sense.
+            let packet = chunk.decompress_text_with_limit(xmp::MOST_BYTES).and_then(|()| chunk.get_text());
+            extras.take_xmp(packet.map(String::into_bytes).map_err(|_| "XMP that is damaged"));
+        }
         // Transparency is a channel of its own (2 or 4 samples), or else in a tRNS chunk.
         let alpha_is_in_trns = info.color_type == png::ColorType::Indexed || info.trns.is_some();
         if info.trns.is_some() || (!alpha_is_in_trns && info.color_type.samples().is_multiple_of(2)) {
@@ -44,6 +54,9 @@ impl Extras {
         let exif = decoder.exif_metadata().ok().flatten();
         let mut extras = Self { exif, ..Self::default() };
         extras.take_profile(decoder.icc_profile().ok().flatten());
+        if let Some(packet) = decoder.xmp_metadata().ok().flatten() {
+            extras.take_xmp(Ok(packet));
+        }
         extras
     }
 
@@ -56,6 +69,15 @@ impl Extras {
                 self.left_behind.push("a colour profile that is not of RGB");
             }
             profile => self.icc_profile = profile,
+        }
+    }
+
+    /// Keeps what of a packet still holds.
+    fn take_xmp(&mut self, packet: Result<Vec<u8>, &'static str>) {
+        self.left_behind.extend(packet.iter().flat_map(|packet| xmp::lost(packet)));
+        match packet.and_then(xmp::kept) {
+            Ok(packet) => self.xmp = Some(packet),
+            Err(lost) => self.left_behind.push(lost),
         }
     }
 
@@ -88,6 +110,10 @@ impl Extras {
         if self.icc_profile.as_ref().is_some_and(|profile| profile.len() > MOST_JPEG_ICC_BYTES) {
             self.icc_profile = None;
             self.left_behind.push("a colour profile larger than a JPEG holds");
+        }
+        if self.xmp.as_ref().is_some_and(|packet| packet.len() > xmp::MOST_JPEG_BYTES) {
+            self.xmp = None;
+            self.left_behind.push("XMP larger than a JPEG holds");
         }
         self
     }

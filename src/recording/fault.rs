@@ -152,6 +152,17 @@ pub enum PictureFault {
         /// Columns and rows of the colour pictures.
         color: (u32, u32),
     },
+    /// The same of a mask.
+    #[error(
+        "the mask is {}x{}, which does not cover a picture of {}x{}; export it at that size, or smaller with the same aspect",
+        found.0, found.1, color.0, color.1
+    )]
+    MaskSize {
+        /// Columns and rows of the mask.
+        found: (u32, u32),
+        /// Columns and rows of the picture.
+        color: (u32, u32),
+    },
     /// No picture can be written under this name.
     #[error("no format is known for this name; end it with {0}")]
     Extension(&'static str),

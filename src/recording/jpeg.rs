@@ -58,6 +58,18 @@ pub(super) fn header(file: &mut BufReader<impl Read + Seek>) -> Result<((u32, u3
     Err(PictureFault::Damaged(format!("more than {MAX_SEGMENTS} segments before its frame")))
 }
 
+/// Puts an application segment (APPn) of this content, of at most 65533 bytes, behind those that a whole JPEG begins with.
+pub(super) fn insert_application_segment(file: &mut Vec<u8>, number: u8, content: &[u8]) {
+    let mut at = 2;
+    // The file has to begin with JFIF, and EXIF comes before all else.
+    while let Some(&[0xFF, 0xE0 | 0xE1, high, low]) = file.get(at..).and_then(<[u8]>::first_chunk) {
+        at += 2 + usize::from(u16::from_be_bytes([high, low]));
+    }
+    let length = (content.len() + 2) as u16;
+    let [high, low] = length.to_be_bytes();
+    file.splice(at..at, [0xFF, 0xE0 | number, high, low].into_iter().chain(content.iter().copied()));
+}
+
 /// Whether following the segments of a JPEG leads to its end marker (EOI), which a file that was cut short lacks.
 pub(super) fn is_whole(bytes: &[u8]) -> bool {
     const START: u8 = 0xD8;

@@ -26,6 +26,7 @@ mod pfm;
 mod samples;
 mod timeline;
 mod unit;
+mod xmp;
 
 use std::collections::HashSet;
 use std::path::Path;

@@ -112,6 +112,17 @@ pub fn check_depth_size(path: &Path, depth: (u32, u32), color: (u32, u32)) -> Re
     }
 }
 
+/// The same of a mask.
+///
+/// # Errors
+/// As [`check_depth_size`].
+pub fn check_mask_size(path: &Path, mask: (u32, u32), color: (u32, u32)) -> Result<(), RecordingError> {
+    match depth_covers(mask, color) {
+        true => Ok(()),
+        false => Err(RecordingError::picture(path)(PictureFault::MaskSize { found: mask, color })),
+    }
+}
+
 /// A map turned as its file says.
 fn upright(map: DepthMap, orientation: Orientation) -> DepthMap {
     let DepthMap { width, height, metres, .. } = map;
@@ -194,8 +205,8 @@ pub fn write_color(path: &Path, image: &ColorImage, force: bool) -> Result<(), R
 pub fn write_photo(path: &Path, image: &ColorImage, extras: &Extras, force: bool) -> Result<(), RecordingError> {
     let mut file = Vec::new();
     let encoded = match photo_format(path)? {
-        PhotoFormat::Png => encode::photo_png(image, extras, &mut file),
-        PhotoFormat::Jpeg => encode::photo_jpeg(image, extras, &mut file),
+        PhotoFormat::Png => encode::photo_png(image, extras, &mut file).map_err(|error| error.to_string()),
+        PhotoFormat::Jpeg => encode::photo_jpeg(image, extras, &mut file).map_err(|error| error.to_string()),
     };
     write(path, encoded, &file, force)
 }

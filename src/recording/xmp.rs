@@ -1,0 +1,135 @@
+//! XMP packets, which hold rights, authors and titles: what of one still holds for a picture whose pixels have changed.
+//!
+//! Only the packet itself goes on. What it says of other parts of its file, which do not, is taken out: Extended XMP, depth
+//! maps (GDepth) and gain maps, and pictures of the picture.
+
+/// The keyword of a packet in a PNG.
+pub(super) const PNG_KEYWORD: &str = "XML:com.adobe.xmp";
+/// What a segment of a JPEG with a packet begins with.
+pub(super) const JPEG_NAME: &[u8] = b"http://ns.adobe.com/xap/1.0/\0";
+/// Most bytes of a packet that a JPEG holds: a segment has 65533.
+pub(super) const MOST_JPEG_BYTES: usize = 65_533 - JPEG_NAME.len();
+/// Most bytes of a packet that is looked at: most have a few thousand.
+pub(super) const MOST_BYTES: usize = 4 << 20;
+
+/// Prefixes of what is about other parts of the file.
+const ELSEWHERE: [&str; 8] =
+    ["xmpNote:", "GDepth:", "GImage:", "GAudio:", "GCamera:", "hdrgm:", "Container:", "HDRGainMap:"];
+/// Names of what shows the picture as it was.
+const THUMBNAILS: [&str; 2] = ["xmp:Thumbnails", "xmpGImg:image"];
+const ORIENTATION: &str = "tiff:Orientation";
+
+/// Attributes that speak of what is worth a word when it is lost, and the word.
+const WORTH_A_WORD: [(&str, &str); 2] =
+    [("xmpNote:HasExtendedXMP", "Extended XMP"), ("GDepth:Format", "the depth map in its XMP")];
+
+/// In words, what a packet has that its picture does not take along.
+pub(super) fn lost(packet: &[u8]) -> impl Iterator<Item = &'static str> {
+    let has = |name: &str| packet.windows(name.len()).any(|bytes| bytes == name.as_bytes());
+    WORTH_A_WORD.into_iter().filter(move |(name, _)| has(name)).map(|(_, word)| word)
+}
+
+/// The packet of a picture that stands upright and is alone in its file.
+///
+/// # Errors
+/// In words, what cannot be taken over.
+pub(super) fn kept(packet: Vec<u8>) -> Result<String, &'static str> {
+    let packet = String::from_utf8(packet).map_err(|_| "XMP that is not in UTF-8")?;
+    let packet = without_attributes(&packet, &ELSEWHERE);
+    let is_there = |name: &&str| packet.contains(&format!("<{name}"));
+    if ELSEWHERE.iter().chain(&THUMBNAILS).any(|name| is_there(&name)) || packet.contains(THUMBNAILS[1]) {
+        return Err("XMP that has other pictures");
+    }
+    Ok(upright(packet))
+}
+
+/// The packet without attributes whose names begin so. What declares their prefixes stays, and does no harm.
+fn without_attributes(packet: &str, prefixes: &[&str]) -> String {
+    let mut kept = String::with_capacity(packet.len());
+    let mut rest = packet;
+    while let Some(at) = rest.find(|c: char| c.is_ascii_whitespace()) {
+        let name = rest[at..].trim_ascii_start();
+        let is_one = prefixes.iter().any(|prefix| name.starts_with(prefix));
+        let space = rest.len() - name.len();
+        match is_one.then(|| attribute_bytes(name)).flatten() {
+            Some(bytes) => {
+                kept.push_str(&rest[..at]);
+                rest = &name[bytes..];
+            }
+            None => {
+                kept.push_str(&rest[..space]);
+                rest = name;
+            }
+        }
+    }
+    kept + rest
+}
+
+/// How long the attribute is that a text begins with: a name, `=`, and a value in quotes.
+fn attribute_bytes(text: &str) -> Option<usize> {
+    let (name, value) = text.split_once('=')?;
+    let is_name = |c: char| c.is_ascii_alphanumeric() || matches!(c, ':' | '_' | '-' | '.');
+    let quoted = value.trim_ascii_start();
+    let quote = quoted.chars().next().filter(|quote| matches!(quote, '"' | '\''))?;
+    let end = quoted[1..].find(quote)? + 2;
+    name.trim_ascii_end().chars().all(is_name).then_some(text.len() - quoted.len() + end)
+}
+
+/// The same, where the packet says how the picture was held.
+fn upright(mut packet: String) -> String {
+    let mut from = 0;
+    while let Some(found) = packet[from..].find(ORIENTATION) {
+        let after = from + found + ORIENTATION.len();
+        // As an attribute, `="6"`, or as an element, `>6<`.
+        let value = packet[after..].find(|c: char| !matches!(c, '=' | '"' | '\'' | '>' | ' '));
+        if let Some(at) = value.map(|value| after + value).filter(|&at| matches!(packet.as_bytes()[at], b'2'..=b'8')) {
+            packet.replace_range(at..=at, "1");
+        }
+        from = after;
+    }
+    packet
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn packet(attributes: &str, elements: &str) -> String {
+        format!(
+            "<x:xmpmeta><rdf:RDF><rdf:Description xmlns:GDepth=\"u\" dc:rights=\"Me &amp; \u{e4}\"{attributes}>{elements}\
+             </rdf:Description></rdf:RDF></x:xmpmeta>"
+        )
+    }
+
+    #[test]
+    fn rights_stay_and_what_is_about_other_parts_of_the_file_does_not() {
+        let kept = |attributes: &str, elements: &str| kept(packet(attributes, elements).into_bytes());
+        let plain = packet("", "<dc:title>GDepth: a poem = 'x'</dc:title>");
+        assert_eq!(kept("", "<dc:title>GDepth: a poem = 'x'</dc:title>"), Ok(plain));
+        let depth = " GDepth:Format=\"RangeInverse\"\n GDepth:Data = 'AAAA=='\txmpNote:HasExtendedXMP=\"1F\"";
+        assert_eq!(kept(depth, ""), Ok(packet("", "")));
+        assert_eq!(
+            lost(packet(depth, "").as_bytes()).collect::<Vec<_>>(),
+            ["Extended XMP", "the depth map in its XMP"]
+        );
+        assert_eq!(lost(packet("", "").as_bytes()).count(), 0);
+        // A value that never ends stays as it is.
+        assert!(kept(" GDepth:Data=\"AAAA", "").unwrap().contains("GDepth:Data"));
+        for elements in ["<GDepth:Data>AAAA</GDepth:Data>", "<xmp:Thumbnails/>", "<Container:Directory/>"] {
+            assert!(kept("", elements).is_err(), "{elements}");
+        }
+        assert!(super::kept(vec![0xff, 0xfe, b'<', 0]).is_err());
+    }
+
+    #[test]
+    fn the_picture_is_upright() {
+        for (held, upright) in [
+            (" tiff:Orientation=\"6\"", " tiff:Orientation=\"1\""),
+            ("<tiff:Orientation>8</tiff:Orientation>", "<tiff:Orientation>1</tiff:Orientation>"),
+            ("<tiff:Orientation>1</tiff:Orientation>", "<tiff:Orientation>1</tiff:Orientation>"),
+            (" tiff:Orientation", " tiff:Orientation"),
+        ] {
+            assert_eq!(kept(held.into()), Ok(upright.into()));
+        }
+    }
+}
