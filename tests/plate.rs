@@ -273,6 +273,15 @@ fn commands_take_plates_and_use_them() {
         assert!(came == Some(code) && said.contains(part) && !at("a.png").exists(), "{arguments:?}: {came:?} {said}");
         assert_eq!(said.trim().lines().count(), 1, "{said}");
     }
+    // Where nobody stands before it, that is said.
+    for (plate, expected) in [("me.png", "the plate is the picture itself"), ("copy.png", "nobody stands before it")] {
+        std::fs::copy(at("me.png"), at("copy.png")).unwrap();
+        let plate = format!("plate:{plate}");
+        let (code, said) = run(&["render", "me.png", "--depth", &plate, "--force", "--out", "b.png"]);
+        assert!(code == Some(0) && said.contains(expected) && said.matches("warning").count() == 1, "{said}");
+    }
+    let (code, said) = run(&["plate", "me.png", "--to", "photo.png"]);
+    assert!(code == Some(0) && said.contains("whoever is in it is in the plate"), "{said}");
     let (code, said) = run(&["plate", "synthetic", "--frames", "24", "--size", "160x120", "--to", "new/plate.png"]);
     assert!(code == Some(0) && said.contains("--depth plate:new/plate.png"), "{code:?} {said}");
     assert_eq!(still::read_color(&at("new/plate.png")).unwrap().size(), (160, 120));

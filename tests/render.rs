@@ -59,7 +59,9 @@ fn what_goes_with_a_picture_stays_with_it() {
     profile[16..20].copy_from_slice(b"RGB ");
     // One entry, the name of the camera.
     let exif = b"MM\0\x2a\0\0\0\x08\0\x01\x01\x10\0\x02\0\0\0\x04CAM\0\0\0\0\0".to_vec();
-    let extras = Extras { icc_profile: Some(profile), exif: Some(exif), ..Extras::default() };
+    let xmp =
+        "<x:xmpmeta xmlns:x=\"adobe:ns:meta/\"><rdf:Description dc:rights=\"Mine, \u{e4}\"/></x:xmpmeta>".to_owned();
+    let extras = Extras { icc_profile: Some(profile), exif: Some(exif), xmp: Some(xmp), ..Extras::default() };
     write_photo(&dir.path().join("in.jpg"), &ColorImage::new(40, 30), &extras, false).unwrap();
     for out in ["out.png", "out.jpg"] {
         let said = render(dir.path(), "in.jpg", out);
@@ -158,4 +160,99 @@ fn a_recording_may_have_relative_inverse_depth() {
         let (came, said) = stream(arguments);
         assert!(came == Some(code) && said.contains(part), "{arguments:?}: {came:?} {said}");
     }
+}
+
+/// What is valid and hardly meant is said in one line, and done.
+fn warned(dir: &Path, command: &[&str], arguments: &[&str], expected: &str) {
+    let (code, said) = bokehcam(dir, command, &[arguments, &["--force"]].concat());
+    let warnings: Vec<&str> = said.lines().filter(|line| line.contains("warning") || line.contains("WARN")).collect();
+    assert_eq!((code, warnings.len()), (Some(0), 1), "{arguments:?}: {said}");
+    assert!(warnings[0].contains(expected), "{arguments:?}: {said}");
+}
+
+#[test]
+fn pictures_in_the_wrong_place_are_said() {
+    let dir = TempDir::new().unwrap();
+    halves(dir.path());
+    for (name, code) in [("white.png", 255), ("black.png", 0), ("grey.png", 128)] {
+        image::GrayImage::from_pixel(16, 9, [code].into()).save(dir.path().join(name)).unwrap();
+    }
+    image::GrayImage::new(90, 160).save(dir.path().join("tall.png")).unwrap();
+    let units = |name: &str, at: fn(u32) -> u16| {
+        let map = ImageBuffer::<image::Luma<u16>, _>::from_fn(160, 96, |x, _| [at(x)].into());
+        map.save(dir.path().join(name)).unwrap();
+    };
+    units("unknown.png", |_| 0);
+    units("flat.png", |_| 5000);
+    units("mm.png", |x| if x < 80 { 1000 } else { 3000 });
+    for (option, file, expected) in [
+        ("--mask", "white.png", "white all over"),
+        ("--mask", "black.png", "black all over"),
+        ("--mask", "grey.png", "one grey all over"),
+        ("--mask", "in.png", "the picture itself, and no mask"),
+        ("--depth-map", "unknown.png", "no depth is known anywhere"),
+        ("--depth-map", "flat.png", "1.000 m away"),
+        ("--depth-map", "mm.png", "add --depth-scale 1000"),
+    ] {
+        warned(dir.path(), &["render"], &["in.png", option, file, "--refine", "off", "--out", "out.png"], expected);
+    }
+    for (map, expected) in [("in.png", "the picture itself, and no depth"), ("grey.png", "one value all over")] {
+        let inverse = ["in.png", "--depth-map", map, "--depth-unit", "inverse", "--refine", "off", "--out", "out.png"];
+        let (_, said) = run(dir.path(), &[&inverse[..], &["--force"]].concat());
+        assert!(said.contains(expected), "{said}");
+    }
+    let (code, said) = run(dir.path(), &["in.png", "--mask", "tall.png", "--out", "no.png"]);
+    assert!(code == Some(1) && said.contains("tall.png: the mask is 90x160"), "{said}");
+    // What is meant is not warned of.
+    let meant = ["in.png", "--depth-map", "mm.png", "--depth-scale", "1000", "--refine", "off", "--out", "meant.png"];
+    let (code, said) = run(dir.path(), &meant);
+    assert_eq!((code, said.lines().count()), (Some(0), 1), "{said}");
+}
+
+#[test]
+fn numbers_in_the_wrong_unit_are_said() {
+    let dir = TempDir::new().unwrap();
+    halves(dir.path());
+    let map = ImageBuffer::<image::Luma<u16>, _>::from_fn(160, 96, |x, _| [if x < 80 { 5000 } else { 15000 }].into());
+    map.save(dir.path().join("map.png")).unwrap();
+    let lens = |focal: &'static str, sensor: &'static str| {
+        ["--f-number", "2", "--focal-length", focal, "--sensor-width", sensor, "--focus", "1"]
+    };
+    for (numbers, expected) in [
+        (&lens("0.05", "36")[..], "if that is in metres, it is 50"),
+        (&lens("50", "0.036"), "if that is in metres, it is 36"),
+        (&lens("5000", "36"), "a lens of 5000 mm"),
+    ] {
+        let picture = ["in.png", "--depth-map", "map.png", "--refine", "off", "--out", "out.png"];
+        warned(dir.path(), &["render"], &[&picture[..], numbers].concat(), expected);
+    }
+    let (_, said) = run(
+        dir.path(),
+        &["in.png", "--depth-map", "map.png", "--depth-scale", "0.001", "--refine", "off", "--out", "s.png"],
+    );
+    assert!(said.contains("there are 1000 to a metre"), "{said}");
+}
+
+#[test]
+fn one_picture_for_both_eyes_and_eyes_far_apart_are_said() {
+    let dir = TempDir::new().unwrap();
+    let pair = Path::new(env!("CARGO_MANIFEST_DIR")).join("recordings/stereo");
+    let eye = |folder: &str| {
+        let mut files: Vec<_> =
+            std::fs::read_dir(pair.join(folder)).unwrap().map(|entry| entry.unwrap().path()).collect();
+        files.sort();
+        files[0].to_str().unwrap().to_owned()
+    };
+    let (left, right) = (eye("image_2"), eye("image_3"));
+    let out = ["--out", "d.pfm"];
+    warned(dir.path(), &["depth", &left, &left], &out, "left and right are one picture");
+    let apart = ["--focal-px", "700", "--baseline-m", "60", "--metres", "--out", "d.pfm"];
+    warned(
+        dir.path(),
+        &["depth", &left, &right],
+        &apart,
+        "60 m between the eyes; if that is in millimetres, it is 0.06 m",
+    );
+    let (code, said) = bokehcam(dir.path(), &["depth", &left, &right, "--force"], &out);
+    assert!(code == Some(0) && !said.contains("warning"), "{said}");
 }

@@ -61,7 +61,7 @@ impl Matcher {
             Some(verdict @ Verdict::RowsOff { .. }) => {
                 Some(format!("{verdict}, and the disparity is wrong; rectify it"))
             }
-            Some(Verdict::Swapped) => Some(Verdict::Swapped.to_string()),
+            Some(verdict @ (Verdict::Swapped | Verdict::Same)) => Some(verdict.to_string()),
             _ => None,
         };
         let shape = [disparity.height as usize, disparity.width as usize];

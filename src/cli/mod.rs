@@ -12,6 +12,7 @@ mod options;
 mod parse;
 #[doc(hidden)]
 pub mod parsers;
+mod plausible;
 mod screen;
 mod settings;
 mod sinks;

@@ -82,7 +82,7 @@ pub struct Source {
     pub networks: Option<String>,
     /// How far the plate is, where that makes the depth.
     pub guide: Option<Arc<Guide>>,
-    /// The first map of recorded depth, where a distance was given that it can be compared with.
+    /// The first map of recorded depth, where the look uses depth.
     pub first_depth: Option<DepthMap>,
 }
 
@@ -222,13 +222,12 @@ impl Wanted<'_> {
         self.look.is_none_or(|look| look.effect.follows_depth())
     }
 
-    /// The first depth map of a recording, to compare with a focus in metres; `None` where the look has no such focus.
-    /// A faulty map is no error here: it is reported when the frame is read.
+    /// The first depth map of a recording, to see what its numbers are; `None` where the look does not use depth. A faulty map
+    /// is no error here: it is reported when the frame is read.
     pub fn first_depth(&self, recording: &Recording) -> Option<DepthMap> {
-        let has_distance = self.look.is_some_and(|look| matches!(look.focus, FocusRule::Metres(_)));
         let mut map = DepthMap::default();
-        let is_compared = has_distance && recording.has_depth();
-        let read = is_compared.then(|| recording.read_depth(0, &mut Scratch::default(), &mut map))?;
+        let is_used = self.look.is_some_and(|look| look.effect.follows_depth()) && recording.has_depth();
+        let read = is_used.then(|| recording.read_depth(0, &mut Scratch::default(), &mut map))?;
         read.ok().map(|()| map)
     }
 

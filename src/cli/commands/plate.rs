@@ -9,6 +9,7 @@ use clap::Args;
 use crate::capture::{Camera, Captured, Shot};
 use crate::cli::error::CliError;
 use crate::cli::files::{make_folder_of, refuse_overwrite, refuse_source};
+use crate::cli::log;
 use crate::cli::options;
 use crate::cli::settings::layers::Given;
 use crate::cli::settings::unused;
@@ -18,7 +19,7 @@ use crate::depth::{DepthSource, Seen};
 use crate::frame::{ColorImage, DepthMap, GrayImage, Stamp};
 use crate::look::Effect;
 use crate::recording::still;
-use crate::source::{DepthChoice, Options, Source, SourceName, one_camera};
+use crate::source::{DepthChoice, Kind, Options, Source, SourceName, one_camera};
 
 /// Take a plate: a picture of what is behind you, for --depth plate:FILE
 #[derive(Args, Debug)]
@@ -77,6 +78,9 @@ pub fn run(command: &PlateCommand, global: &options::Global, given: &Given) -> R
         true => taken(&mut frames, name, global)?,
         false => usual(&mut frames)?,
     };
+    if name.kind() == Kind::Photo {
+        log::warn("a photo stands still: whoever is in it is in the plate, and is not found before it");
+    }
     make_folder_of(to)?;
     still::write_color(to, &plate, output.force)?;
     if !global.quiet {

@@ -16,6 +16,7 @@ use crate::cli::error::CliError;
 use crate::cli::files::{check_report, write_report};
 use crate::cli::focus;
 use crate::cli::options;
+use crate::cli::plausible;
 use crate::cli::settings::layers::Given;
 use crate::cli::settings::look;
 use crate::cli::settings::unused;
@@ -120,7 +121,9 @@ pub fn run(command: &StreamCommand, global: &options::Global, given: Given) -> R
         window: false,
     };
     unused::warn(&given.settings, &unused);
-    if let Some(map) = source.first_depth.as_ref() {
+    if !plausible::warn_of_source(&source, &look, &options)
+        && let Some(map) = source.first_depth.as_ref()
+    {
         focus::warn_of_focus(&look, info.size, map, source.depth_from == DepthFrom::Units);
     }
     let settings = look.settings(info.size, adaptive);

@@ -4,6 +4,7 @@
 //! A person is one surface, in focus by default. What is as near and joined to them, as what they hold, is theirs; other
 //! people, further away, are not. With a mask alone, all else is infinitely far.
 
+mod absence;
 mod aside;
 mod feed;
 mod held;
@@ -14,6 +15,7 @@ use std::path::Path;
 
 pub use feed::Hints;
 
+use absence::Absence;
 use feed::Feed;
 use held::Held;
 use person::Person;
@@ -37,6 +39,7 @@ pub struct SingleCamera {
     name: String,
     runtime: String,
     person: Option<Person>,
+    absence: Absence,
     relief: Option<Relief>,
     held: Held,
     spread: Spread,
@@ -82,6 +85,7 @@ impl SingleCamera {
             name: names.join(" and "),
             runtime: run_by,
             person,
+            absence: Absence::default(),
             relief,
             held: Held::default(),
             spread: Spread::default(),
@@ -171,8 +175,11 @@ impl DepthSource for SingleCamera {
     fn read(&mut self, Seen { stamp, color, .. }: Seen, map: &mut DepthMap) -> Result<(), DepthError> {
         self.begin(stamp.time_ns);
         self.look_for_persons(color);
-        let Self { name, person, relief, held, spread, matting, turn, .. } = self;
+        let Self { name, person, absence, relief, held, spread, matting, turn, .. } = self;
         let mask = person.as_ref().map(Person::mask);
+        if mask.is_some_and(|mask| absence.is_news(mask, stamp.time_ns)) {
+            tracing::warn!("{name}: nobody was found for {} s, and all is blurred", Absence::LONG_NS / 1_000_000_000);
+        }
         look_at_all(relief, (name, *turn), color, mask);
         if let (Some(mask), Some(relief)) = (mask, &relief) {
             held.join(mask, relief);

@@ -42,6 +42,8 @@ pub struct PairCheck {
     pub negative_share: f32,
     /// The largest disparity that some points have, in pixels; 0 where there are none.
     pub largest_px: f32,
+    /// Whether both pictures are one.
+    pub is_one: bool,
 }
 
 /// What a pair is.
@@ -56,6 +58,8 @@ pub enum Verdict {
     },
     /// Rows agree, and the left picture is that of the right eye.
     Swapped,
+    /// One picture was given for both eyes.
+    Same,
     /// Too little was found to tell.
     Unclear {
         /// Points found in both pictures.
@@ -66,9 +70,11 @@ pub enum Verdict {
 impl PairCheck {
     /// What this makes the pair.
     pub fn verdict(&self) -> Verdict {
-        let Self { matches, vertical_px, vertical_spread_px, negative_share, .. } = *self;
+        let Self { matches, vertical_px, vertical_spread_px, negative_share, is_one, .. } = *self;
         if matches < LEAST_MATCHES {
             Verdict::Unclear { matches }
+        } else if is_one {
+            Verdict::Same
         } else if vertical_px.abs() > MOST_OFF_PX || vertical_spread_px > MOST_SPREAD_PX {
             Verdict::RowsOff { px: vertical_px.abs() + vertical_spread_px }
         } else if negative_share > MOST_NEGATIVE {
@@ -85,6 +91,9 @@ impl fmt::Display for Verdict {
             Self::Rectified => write!(f, "the pair is rectified"),
             Self::RowsOff { px } => write!(f, "the pair is not rectified: rows are off by up to {px:.1} px"),
             Self::Swapped => write!(f, "left and right are exchanged: disparities are negative; exchange the pictures"),
+            Self::Same => {
+                write!(f, "left and right are one picture, so that nothing has a distance; give what the two eyes saw")
+            }
             Self::Unclear { matches } => write!(
                 f,
                 "too little texture to tell whether the pair is rectified: {matches} points were found in both \
@@ -119,7 +128,7 @@ pub fn check(left: &GrayImage, right: &GrayImage, disparities: u32) -> Result<Pa
             moved_px.extend(refined(left, right, (2 * x, 2 * y), (2 * dx, 2 * dy)));
         }
     }
-    Ok(summary(&moved_px))
+    Ok(PairCheck { is_one: left.luma == right.luma, ..summary(&moved_px) })
 }
 
 /// Statistics of the moves (across, down) of all matched points, from left to right picture.
@@ -145,5 +154,6 @@ fn summary(moved_px: &[(f32, f32)]) -> PairCheck {
         vertical_px,
         vertical_spread_px: quantile(&mut down_px, 0.6),
         negative_share: negative as f32 / moved_px.len() as f32,
+        is_one: false,
     }
 }

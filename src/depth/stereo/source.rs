@@ -135,7 +135,7 @@ fn log_check((source_name, calibrated): (&str, bool), verdict: Verdict) -> bool 
         Verdict::RowsOff { .. } => {
             tracing::warn!("{source_name}: {verdict}; rectify it with --calib FILE, and without --rectified");
         }
-        Verdict::Swapped => tracing::warn!("{source_name}: {verdict}"),
+        Verdict::Swapped | Verdict::Same => tracing::warn!("{source_name}: {verdict}"),
         Verdict::Unclear { .. } => {
             tracing::debug!("{source_name}: {verdict}");
             return false;

@@ -10,7 +10,9 @@ use clap::{Args, value_parser};
 use crate::calibration::rectifier::Rectifier;
 use crate::cli::error::CliError;
 use crate::cli::files::{make_folder_of, refuse_overwrite, refuse_source};
+use crate::cli::log;
 use crate::cli::options;
+use crate::cli::plausible;
 use crate::cli::terminal;
 use crate::compute::Backend;
 use crate::computing::Computing;
@@ -115,6 +117,7 @@ pub fn run(command: &DepthCommand, global: &options::Global) -> Result<(), CliEr
         rectifier.right(&std::mem::take(&mut right), &mut right);
         note("the pictures are rectified by the calibration: the result is that of the rectified left picture".into());
     }
+    plausible::warn_of_baseline(geometry.map(|geometry| geometry.rig));
     let left = luma_of(&color);
     let disparities = command.disparity_range(geometry.and_then(|geometry| geometry.disparities), size.0, &note)?;
     let (adapter, threads) = (command.adapter.clone(), command.threads);
@@ -135,6 +138,7 @@ pub fn run(command: &DepthCommand, global: &options::Global) -> Result<(), CliEr
             }
         )),
         verdict @ Verdict::Swapped => note(verdict.to_string()),
+        Verdict::Same => log::warn(&Verdict::Same.to_string()),
         Verdict::Rectified | Verdict::Unclear { .. } => {}
     }
 

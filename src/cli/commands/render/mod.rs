@@ -13,6 +13,7 @@ use crate::cli::files::{make_folder_of, refuse_overwrite, refuse_source};
 use crate::cli::focus;
 use crate::cli::log;
 use crate::cli::options;
+use crate::cli::plausible;
 use crate::cli::settings::layers::Given;
 use crate::cli::settings::look;
 use crate::cli::settings::unused;
@@ -104,6 +105,8 @@ pub fn run(command: &RenderCommand, global: &options::Global, given: &Given) -> 
     let look = look::look(&command.blur, &command.computing.quality)?;
     let (color, extras, depth) = read(command, &look)?;
     let look = source::fitting_look(&look, &command.blur.depth, depth.is_some())?;
+    plausible::warn_of_lens(&look);
+    plausible::warn_of_depth_scale(command.depth.depth_scale);
     command.warn(&look, &color, depth.as_ref(), given);
     let computing = command.computing.choice();
     make_folder_of(&command.out)?;
@@ -157,11 +160,26 @@ impl RenderCommand {
             Some(_) if self.depth_map.is_some() && !uses_depth => {
                 log::warn("--depth-map has no effect: the effect does not use depth");
             }
+            Some(Depth::Measured(map))
+                if self.depth_map.as_ref().is_some_and(|file| self.warn_of_map(file, map, color)) => {}
             Some(Depth::Measured(map) | Depth::Final(map)) => focus::warn_of_focus(look, color.size(), map, in_units),
             None => {}
         }
         if let (Some(Depth::Measured(map)), Some(file), true) = (depth, &self.depth_map, uses_depth) {
             say_of_misfit(&file.display(), look, map, color);
+        }
+    }
+}
+
+impl RenderCommand {
+    /// Warns of a depth map that cannot be meant; whether it did.
+    fn warn_of_map(&self, file: &Path, map: &DepthMap, color: &ColorImage) -> bool {
+        let is_scaled = still::map_format(file).is_ok_and(|format| format == MapFormat::Pfm);
+        match self.depth.depth_unit {
+            DepthUnit::Inverse => plausible::warn_of_inverse(&file.display(), map, color),
+            DepthUnit::Metres => {
+                plausible::warn_of_map(&file.display(), map, is_scaled || self.depth.depth_scale.is_some())
+            }
         }
     }
 }
@@ -240,12 +258,15 @@ fn made_depth(command: &RenderCommand, look: &Look, color: &ColorImage) -> Resul
         (Some(file), _) => {
             source::refuse_metres(look, "a mask tells")?;
             let (width, height, share) = still::read_grey(file)?;
-            still::check_depth_size(file, (width, height), color.size())?;
-            Ok(Some(Depth::Final(mask::depth_around(&Mask { width, height, share }, color))))
+            still::check_mask_size(file, (width, height), color.size())?;
+            let mask = Mask { width, height, share };
+            plausible::warn_of_mask(file, &mask, color);
+            Ok(Some(Depth::Final(mask::depth_around(&mask, color))))
         }
         (None, DepthChoice::OneCamera(chosen)) => {
             let options = source::Options { networks: command.networks.clone(), ..source::Options::default() };
             let map = source::one_camera::depth_of_picture(chosen, &options, look, color)?;
+            plausible::warn_of_subject(chosen, &map, command.image.as_deref());
             // Around a subject it has its matte already; else its outlines are soft, and are fitted to the picture.
             Ok(Some(if map.subject_m.is_some() { Depth::Final(map) } else { Depth::Measured(map) }))
         }
