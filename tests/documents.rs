@@ -250,7 +250,9 @@ fn help_of(follower: &Follower, command: &str) -> Vec<(String, Vec<String>)> {
     };
     let below = section("Commands:").filter_map(|line| line.split(' ').next()).filter(|name| *name != "help");
     let below = below.flat_map(|name| help_of(follower, &format!("{command} {name}")));
-    let examples = section("Example").map(|line| line.split_once("  ").map_or(line, |(code, _)| code).to_owned());
+    // What is beside a command may go on below it.
+    let examples = section("Example").filter(|line| line.starts_with("bokehcam "));
+    let examples = examples.map(|line| line.split_once("  ").map_or(line, |(code, _)| code).to_owned());
     [(command.to_owned(), examples.collect())].into_iter().chain(below).collect()
 }
 
