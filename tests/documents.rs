@@ -263,17 +263,19 @@ fn the_examples_of_help_are_right() {
     fs::remove_file(follower.path("recordings")).unwrap();
     let help = help_of(&follower, "bokehcam");
     assert!(help.len() > 12, "{} commands", help.len());
+    let mut faults = Vec::new();
     for (command, examples) in help {
         assert!(!examples.is_empty() || command.split(' ').count() > 2, "{command} has no examples");
         for example in examples {
-            // Of the program as a whole, each is run.
-            let done = match command == "bokehcam" {
+            // Of the program as a whole, each is run; what is saved is saved in a file that need not be there.
+            let done = match command == "bokehcam" || example.contains("config save") {
                 true => follower.follow(&example).map(drop),
                 false => follower.check(&example),
             };
-            assert_eq!(done, Ok(()), "{command}: {example}");
+            faults.extend(done.err().map(|said| format!("{command}: `{example}`: {said}")));
         }
     }
+    assert!(faults.is_empty(), "{}", faults.join("\n"));
 }
 
 #[test]
