@@ -31,7 +31,7 @@ fn refused(arguments: &[&str], code: i32, what: &str) {
 #[test]
 fn what_does_not_fit_a_window_costs_one_line_and_exit_code_2() {
     let portrait = "recordings/portrait";
-    refused(&["preview", "no/such/place"], 2, "no/such/place");
+    refused(&["preview", "no/such/place"], 1, "no/such/place");
     refused(&["preview", portrait, "--pace", "asap"], 2, "--pace asap");
     refused(&["preview", portrait, "--on-demand"], 2, "--on-demand");
     refused(&["preview", portrait, "--to", "null"], 2, "beside a window");

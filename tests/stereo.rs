@@ -255,8 +255,8 @@ fn a_calibration_that_cannot_be_read_is_named() {
 fn two_cameras_are_two_cameras() {
     let cases: &[(&[&str], i32, &str)] = &[
         (&["/dev/null,/dev/null", "--rectified"], 2, "one camera"),
-        (&["/dev/null,/dev/nothing", "--rectified"], 2, "/dev/nothing"),
-        (&["nowhere,elsewhere"], 2, "LEFT,RIGHT"),
+        (&["/dev/null,/dev/nothing", "--rectified"], 1, "/dev/nothing"),
+        (&["nowhere,elsewhere"], 1, "LEFT,RIGHT"),
         (&["/dev/null,/dev/zero", "--rectified", "--pace", "asap"], 2, "leave --pace out"),
         // Devices, but no cameras.
         (&["/dev/null,/dev/zero", "--rectified"], 1, "/dev/null: this is no camera"),

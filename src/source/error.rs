@@ -15,7 +15,8 @@ pub enum SourceError {
     /// What is asked for does not make sense together.
     #[error("{0}")]
     Usage(String),
-    /// What is named is not here, and may come later: a camera that is not plugged in, a disk that is not mounted.
+    /// What is named is not here (or more of it than one), which the machine decides and not the name: a camera that is not
+    /// plugged in, a disk that is not mounted, a network that is not installed.
     #[error("{0}")]
     NotThere(String),
     /// The calibration of a depth camera cannot be used.

@@ -54,7 +54,8 @@ fn a_camera_has_several_names() {
     let _machine = Machine::with("n_devs=2 node_types=0x1,0x1 vid_cap_nr=0,1", VERSIONS[0]);
     let refused = bokehcam("stream vivid --to null").output().unwrap();
     let said = String::from_utf8(refused.stderr).unwrap();
-    assert_eq!(refused.status.code(), Some(2), "{said}");
+    // Which cameras share a name is the machine's.
+    assert_eq!(refused.status.code(), Some(1), "{said}");
     assert!(said.lines().count() == 1 && said.contains("/dev/video0") && said.contains("/dev/video1"), "{said}");
 }
 

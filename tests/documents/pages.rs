@@ -1,8 +1,10 @@
 //! The commands that a page has.
 
 /// What a sentence leaves open, and what stands there when it is tried.
-const OPEN: [(&str, &str); 17] = [
+const OPEN: [(&str, &str); 18] = [
     ("bokehcam COMMAND", "bokehcam render"),
+    // Another than the one that runs.
+    ("bokehcam stream ... --name desk", "bokehcam stream demo --frames 1 --to null --name other"),
     ("bokehcam stream ...", "bokehcam stream demo --frames 1 --to null"),
     ("bokehcam render ...", "bokehcam render photo.jpg --depth-map depth.png --out any.png"),
     ("IMAGE", "photo.jpg"),

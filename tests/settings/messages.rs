@@ -78,7 +78,7 @@ fn with_json_every_line_is_an_object() {
     for (args, code) in [
         (&["render", "nowhere.png", "--out", "out.png"][..], 1),
         (&["render", "photo.png", "--out", "out.png", "--rim", "7"], 2),
-        (&["stream", "nowhere/", "--to", "null"], 2),
+        (&["stream", "nowhere/", "--to", "null"], 1),
     ] {
         let lines = json(args, code);
         assert_eq!((lines.len(), &lines[0]["level"]), (1, &"ERROR".into()), "{lines:?}");
