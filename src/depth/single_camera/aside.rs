@@ -90,8 +90,10 @@ mod tests {
         })
         .unwrap();
         assert_eq!(aside.take(false), Ok(None));
-        aside.give(21).unwrap();
-        assert_eq!(aside.take(true), Ok(Some(42)));
+        for task in [21, 4] {
+            aside.give(task).unwrap();
+            assert_eq!(aside.take(true), Ok(Some(2 * task)));
+        }
         aside.give(0).unwrap();
         assert!(aside.take(true).is_err());
         assert_eq!(aside.give(1), Err(1));
