@@ -197,7 +197,9 @@ impl Drop for LogLine {
         {
             let fields = object["fields"].as_object_mut().into_iter().flat_map(|fields| fields.values_mut());
             for value in fields {
-                value.as_str().map(|text| cut(text).into_owned()).into_iter().for_each(|text| *value = text.into());
+                if let Some(text) = value.as_str().map(|text| cut(text).into_owned()) {
+                    *value = text.into();
+                }
             }
             return screen().print(format!("{object}\n").as_bytes());
         }

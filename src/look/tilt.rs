@@ -60,3 +60,16 @@ impl Tilt {
         Ramp { normal, offset_px, half_band_px, slope: if reach_px > 0.0 { max_px / reach_px } else { 0.0 }, max_px }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn where_all_is_sharp_the_ramp_is_level() {
+        let ramp = |text: &str| text.parse::<Tilt>().unwrap().ramp((64, 48), 5.0);
+        assert_eq!(ramp("0.5:1:0").slope, 0.0);
+        // Half of the height on either side of a line is 5 px of blur.
+        assert_eq!(ramp("0.5:0:0").slope, 5.0 / 24.0);
+    }
+}

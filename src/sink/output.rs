@@ -121,7 +121,9 @@ impl Output {
 impl Drop for Output {
     fn drop(&mut self) {
         if let Some(part) = self.part.take().filter(|_| self.frames > 0) {
-            tracing::warn!("{}: what there is of it {}", self.path.display(), kept(part));
+            // Before the line, which may not be wanted: what it states would not be done then.
+            let kept = kept(part);
+            tracing::warn!("{}: what there is of it {kept}", self.path.display());
         }
     }
 }

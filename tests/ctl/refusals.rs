@@ -57,6 +57,15 @@ fn what_is_no_request_is_answered_so() {
         assert_eq!(value["usage"], true, "{answer}");
         assert!(value["error"].as_str().unwrap().contains(said), "{answer}");
     }
+    // The longest request, and one byte more.
+    let longest = |bytes: usize| {
+        let mut request = br#"{"do":"status"}"#.to_vec();
+        request.resize(bytes - 1, b' ');
+        request.push(b'\n');
+        world.tell("stream", &request)
+    };
+    assert!(longest(16_384).contains("\"status\""));
+    assert!(longest(16_385).contains("too long"));
     // An end without a line.
     let mut stream = UnixStream::connect(world.socket("stream")).unwrap();
     stream.write_all(b"{\"do\":\"off\"}").unwrap();

@@ -64,7 +64,23 @@ impl<T> Drop for Aside<T> {
 
 #[cfg(test)]
 mod tests {
+    use std::sync::atomic::{AtomicBool, Ordering};
+    use std::time::Duration;
+
     use super::*;
+
+    #[test]
+    fn whoever_lets_go_of_it_waits_for_what_is_under_way() {
+        static IS_DONE: AtomicBool = AtomicBool::new(false);
+        let work = |_: &mut ()| {
+            thread::sleep(Duration::from_millis(100));
+            IS_DONE.store(true, Ordering::Relaxed);
+        };
+        let aside = Aside::new("test", work).unwrap();
+        aside.give(()).unwrap();
+        drop(aside);
+        assert!(IS_DONE.load(Ordering::Relaxed));
+    }
 
     #[test]
     fn tasks_come_back_done_and_a_thread_that_died_is_told() {
@@ -74,8 +90,10 @@ mod tests {
         })
         .unwrap();
         assert_eq!(aside.take(false), Ok(None));
-        aside.give(21).unwrap();
-        assert_eq!(aside.take(true), Ok(Some(42)));
+        for task in [21, 4] {
+            aside.give(task).unwrap();
+            assert_eq!(aside.take(true), Ok(Some(2 * task)));
+        }
         aside.give(0).unwrap();
         assert!(aside.take(true).is_err());
         assert_eq!(aside.give(1), Err(1));
