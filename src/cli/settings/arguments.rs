@@ -1,12 +1,14 @@
 //! The command line before it is parsed, and the message where it cannot be.
 
 use std::ffi::{OsStr, OsString};
+use std::io;
 use std::os::unix::ffi::{OsStrExt, OsStringExt};
 use std::process::ExitCode;
 
 use clap::error::ErrorKind;
 
-use super::environment;
+use super::{environment, unknown};
+use crate::cli::error::CliError;
 use crate::cli::log;
 use crate::cli::options::LogFormat;
 
@@ -51,15 +53,23 @@ pub fn log_format(args: &[OsString]) -> LogFormat {
 pub fn refuse(error: &clap::Error, args: &[OsString]) -> ExitCode {
     match error.kind() {
         ErrorKind::DisplayHelp | ErrorKind::DisplayVersion => {
-            // A closed standard output is no reason to fail.
-            let _ = error.print();
-            return ExitCode::SUCCESS;
+            return match error.print() {
+                Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
+                    log::error(&CliError::io("standard output".as_ref())(error).to_string());
+                    ExitCode::FAILURE
+                }
+                // A closed standard output is no reason to fail.
+                _ => ExitCode::SUCCESS,
+            };
         }
         ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand => {
             let _ = error.print();
         }
         ErrorKind::InvalidUtf8 => log::error(&not_text(args)),
-        _ => log::error(&environment::with_origin(&log::one_line(error), args)),
+        _ => {
+            let what = unknown::said(error, args).unwrap_or_else(|| log::one_line(error));
+            log::error(&environment::with_origin(&what, args, true, None));
+        }
     }
     ExitCode::from(2)
 }
