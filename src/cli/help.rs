@@ -75,17 +75,27 @@ Where depth comes from:
   plate:FILE    a picture of what is behind the person
   defocus       how sharp the picture is where, which is magnified";
 
-/// What one picture has no time for.
-const QUALITY_OF_PICTURE: &str = "Quality level: changes fidelity, never the amount of blur";
+/// Settings of which less is to be said where there is but one picture.
+const OF_PICTURE: [(&str, &str); 4] = [
+    ("quality", "Quality level: changes fidelity, never the amount of blur"),
+    ("refine", "Whether depth is fitted to the picture: edges onto colour edges, less noise"),
+    ("threads", "Threads of the CPU backend [default: one per core]"),
+    ("depth-scale", "Units of a 16-bit depth picture per metre (TUM 5000, millimetres 1000) [default: 5000]"),
+];
 
 /// A command's help as it is where all of its options are shown.
 pub fn whole(command: Command) -> Command {
     command.mut_subcommand("render", |render| {
         render.mut_args(|arg| match arg.get_long() {
             Some(name) if OF_STREAMS.contains(&name) => arg.hide(true),
-            Some("depth") => arg.long_help(DEPTH_OF_PICTURE),
-            Some("quality") => arg.help(QUALITY_OF_PICTURE),
-            _ => arg,
+            Some("depth") => arg
+                .help("Where depth comes from: auto, matte, mono, plate:FILE, defocus or none")
+                .long_help(DEPTH_OF_PICTURE),
+            Some(name) => match OF_PICTURE.iter().find(|(of, _)| *of == name) {
+                Some((_, help)) => arg.help(*help),
+                None => arg,
+            },
+            None => arg,
         })
     })
 }
