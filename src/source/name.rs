@@ -193,8 +193,8 @@ impl SourceName {
             _ if path.is_dir() => Ok(SourceName::Folder(path.to_owned())),
             _ if path.is_file() && photo::is_photo(path) => Ok(SourceName::Photo(path.to_owned())),
             Some(text) if path.is_file() && is_video(path) => Err(format!(
-                "a video is read as pictures; ffmpeg makes them: mkdir -p clip/image_2 && ffmpeg -i '{text}' \
-                 clip/image_2/%06d.png; then the source is the folder clip"
+                "a video is read as pictures; ffmpeg makes a folder of them, which is the source then: mkdir -p clip/rgb && \
+                 ffmpeg -i '{text}' -r 25 clip/rgb/%06d.png && (cd clip && ls rgb/* | awk '{{print NR/25, $0}}' > rgb.txt)"
             )),
             _ if path.is_file() => Err(format!("it is neither a folder nor a photo: use {}", sources())),
             Some(text) if looks_like_a_path(text) => Err(no_folder(text)),
