@@ -239,7 +239,8 @@ pub fn run(run: Run) -> Result<Report, PipelineError> {
     // Without a blur nobody asks for depth.
     let look = if executor.is_some() { run.look } else { Look::plain(Effect::None) };
     let knows_background = source.as_ref().is_some_and(|source| source.knows_background());
-    let mut preparation = prepare::Preparation::new(&look, info.size, run.measured, knows_background, run.threads);
+    let mut preparation =
+        prepare::Preparation::new(&look, (info.size, info.frames), run.measured, knows_background, run.threads);
     preparation.beside(executor.as_deref());
     let (mut refined_by, mut matted_by) = (None, None);
     let depth = depth::Stage {

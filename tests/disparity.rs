@@ -241,7 +241,7 @@ fn what_does_not_fit_is_refused_in_one_line() {
         fs::write(desk.path("c.txt"), calib).unwrap();
         desk.assert_refused(&["--out", "d.pfm", "--calib", "c.txt"], 1, says);
     }
-    desk.assert_refused(&["--out", "d.pfm", "--calib", "none.txt"], 1, "none.txt: No such file");
+    desk.assert_refused(&["--out", "d.pfm", "--calib", "none.txt"], 1, "none.txt: there is no such file");
     desk.save("right.png", (160, 65), 0);
     desk.assert_refused(&["--out", "d.pfm"], 1, "the left picture is 160x64, and the right one 160x65");
     fs::remove_file(desk.path("right.png")).unwrap();

@@ -33,7 +33,7 @@ fn flags(help: &str) -> Vec<String> {
 fn commands() -> Vec<(Vec<String>, String)> {
     let (mut found, mut waiting) = (Vec::new(), vec![Vec::new()]);
     while let Some(command) = waiting.pop() {
-        let args: Vec<&str> = command.iter().map(String::as_str).chain(["--help"]).collect();
+        let args: Vec<&str> = command.iter().map(String::as_str).chain(["--help-all"]).collect();
         let help = printed(&args);
         for below in listed(&help, "Commands:").into_iter().filter(|name| name != "help") {
             waiting.push([command.as_slice(), &[below]].concat());

@@ -73,7 +73,7 @@ fn a_preset_goes_before_the_file_and_behind_the_environment() {
     let mine = dump(&[], &["--preset", "mine"]);
     assert_eq!(line(&mine, "rim"), "rim = 0.6 # preset");
     assert_eq!(line(&mine, "f-number"), "f-number = 2 # preset");
-    assert_eq!(line(&mine, "coc-at-infinity"), "# coc-at-infinity = # default", "the lens sets the file's aside");
+    assert_eq!(line(&mine, "blur"), "# blur = # default", "the lens sets the file's aside");
     assert_eq!(line(&mine, "preset"), "# preset = \"mine\" # flag");
     let by_name = [("BOKEHCAM_PRESET", "mine")];
     assert_eq!(line(&dump(&by_name, &[]), "rim"), "rim = 0.6 # preset");
@@ -83,7 +83,7 @@ fn a_preset_goes_before_the_file_and_behind_the_environment() {
     assert_eq!(line(&dump(&both, &["--rim", "0.8"]), "rim"), "rim = 0.8 # flag");
     let lens = dump(&[], &["--preset", "mine", "--coc-at-infinity", "5%"]);
     assert_eq!(line(&lens, "f-number"), "# f-number = # default", "a flag sets the preset's lens aside");
-    assert_eq!(line(&lens, "coc-at-infinity"), "coc-at-infinity = \"5%\" # flag");
+    assert_eq!(line(&lens, "blur"), "blur = \"5%\" # flag");
 
     let home = home_with(&format!("preset = \"mine\"\n{MINE}"));
     let dump = run(home.path(), &[], &["config", "dump"]).stdout;

@@ -40,7 +40,7 @@ const NO_NUMBER: f32 = -1.0;
 
 /// All properties in the order of their numbers.
 pub static PROPERTIES: LazyLock<Vec<Property>> = LazyLock::new(|| {
-    let numbers = NUMBERS.iter().filter_map(|(name, ..)| SETTINGS.iter().position(|setting| setting.name == *name));
+    let numbers = NUMBERS.iter().filter_map(|(name, ..)| SETTINGS.iter().position(|setting| called(setting) == *name));
     let own = [Property::DepthScale, Property::DepthInvalid, Property::Threads, Property::Qos, Property::Stats];
     (0..SETTINGS.len()).map(Property::Setting).chain(numbers.map(Property::Number)).chain(own).collect()
 });
@@ -49,15 +49,20 @@ pub static PROPERTIES: LazyLock<Vec<Property>> = LazyLock::new(|| {
 pub static PARAM_SPECS: LazyLock<Vec<glib::ParamSpec>> =
     LazyLock::new(|| PROPERTIES.iter().copied().map(param_spec).collect());
 
+/// The property of a setting. It has the setting's other name where there is one: pipelines are written with that.
+fn called(setting: &Setting) -> &'static str {
+    setting.alias().unwrap_or(setting.name)
+}
+
 fn param_spec(property: Property) -> glib::ParamSpec {
     match property {
         Property::Setting(place) => of_setting(&SETTINGS[place]),
         Property::Number(place) => {
             let setting = &SETTINGS[place];
-            let (_, name, unit, most) = NUMBERS.iter().find(|(name, ..)| *name == setting.name).expect("it has a row");
+            let (_, name, unit, most) = NUMBERS.iter().find(|(name, ..)| *name == called(setting)).expect("it has a row");
             let blurb = format!(
                 "The property {} as a number of {unit}, for controllers; {NO_NUMBER} where it is no such number",
-                setting.name
+                called(setting)
             );
             let nick = nick(name);
             let number = glib::ParamSpecFloat::builder(name).nick(&nick).blurb(&blurb);
@@ -98,13 +103,13 @@ fn param_spec(property: Property) -> glib::ParamSpec {
 }
 
 fn of_setting(setting: &Setting) -> glib::ParamSpec {
-    let (nick, blurb) = (nick(setting.name), as_properties(setting.help.trim()));
+    let (nick, blurb) = (nick(called(setting)), as_properties(setting.help.trim()));
     let choices = (setting.choices)();
     if !choices.is_empty() {
         let default = setting.default().and_then(|name| choices.iter().position(|choice| choice.0 == name));
         let type_ = enums::register(&format!("GstBokeh{}", nick.split(' ').map(capital).collect::<String>()), &choices);
         let flags = glib::ParamFlags::READWRITE | gst::PARAM_FLAG_CONTROLLABLE | gst::PARAM_FLAG_MUTABLE_PLAYING;
-        return enums::param_spec(setting.name, (&nick, &blurb), type_, default.unwrap_or(0), flags);
+        return enums::param_spec(called(setting), (&nick, &blurb), type_, default.unwrap_or(0), flags);
     }
     let default = setting.default();
     match (setting.range)() {
@@ -115,13 +120,13 @@ fn of_setting(setting: &Setting) -> glib::ParamSpec {
                 Some(_) => (*range.start(), blurb),
                 None => (0.0, format!("{blurb}; 0 is not set")),
             };
-            let number = glib::ParamSpecFloat::builder(setting.name).default_value(number.unwrap_or(0.0));
+            let number = glib::ParamSpecFloat::builder(called(setting)).default_value(number.unwrap_or(0.0));
             let number = number.nick(&nick).blurb(&blurb).minimum(low).maximum(*range.end());
             number.controllable().mutable_playing().build()
         }
         None => {
             let default = default.unwrap_or_else(|| AUTO.to_owned());
-            let text = glib::ParamSpecString::builder(setting.name).nick(&nick).blurb(&blurb);
+            let text = glib::ParamSpecString::builder(called(setting)).nick(&nick).blurb(&blurb);
             text.default_value(Some(default.as_str())).mutable_playing().build()
         }
     }
@@ -223,7 +228,7 @@ impl Values {
         if let Some(text) = &text
             && let Err(accepted) = setting.set(&mut Patch::default(), text)
         {
-            let fault = format!("{}={text}: {}", setting.name, as_properties(&accepted));
+            let fault = format!("{}={text}: {}", called(setting), as_properties(&accepted));
             self.faults[place] = Some(fault.clone());
             return Err(fault);
         }

@@ -40,7 +40,7 @@ def job(tmp_path):
         (["take", "--out", "out", "--cpus", "0"], "--cpus: 0: at least 1"),
         (["take", "--out", "out", "--cpus", "two"], "argument --cpus: invalid number value: 'two'"),
         (["take", "--out", "out", "--", "depth"], "depth: after -- come `stream` or `render`"),
-        (["take", "--out", "out", "--", "--bogus"], "unexpected argument '--bogus'"),
+        (["take", "--out", "out", "--", "--bogus"], "there is no option --bogus of `stream`"),
         (["take", "--out", "out", "--", "--rim", "thick"], "invalid value 'thick' for '--rim"),
         (["take", "--out", "out", "--", "stream", "take2"], "unexpected argument 'take2'"),
         (["take", "--out", "out", "--", "--to=b.mp4"], "--to: the farm sees to this itself"),

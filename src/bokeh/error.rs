@@ -18,7 +18,7 @@ pub enum BokehError {
     },
     /// The blur is wider than the pictures, or than the method bears.
     #[error(
-        "a blur radius of {radius_px} px is too large: {} at most {most_px} px; lower --max-coc or --coc-at-infinity",
+        "a blur radius of {radius_px} px is too large: {} at most {most_px} px; lower --max-coc or --blur",
         if *by_method { "--method gather bears".to_owned() } else { format!("for pictures of {}x{}, use", size.0, size.1) }
     )]
     TooWide {

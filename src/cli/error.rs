@@ -8,6 +8,7 @@ use crate::bokeh::BokehError;
 use crate::calibration::CalibrationError;
 use crate::capture::CaptureError;
 use crate::depth::DepthError;
+use crate::files::input;
 use crate::look::LookError;
 use crate::pipeline::Fault;
 use crate::recording::RecordingError;
@@ -33,7 +34,7 @@ pub enum CliError {
     #[error("{} exists: choose another name, or give --force to overwrite it", .0.display())]
     Exists(PathBuf),
     /// A file or folder cannot be read or written.
-    #[error("{}: {source}", path.display())]
+    #[error("{}: {}", path.display(), input::said(source))]
     Io {
         /// The file or folder.
         path: PathBuf,

@@ -3,19 +3,23 @@
 //! All of it goes through one [`Screen`].
 
 use std::borrow::Cow;
+use std::fmt;
 use std::io::{self, IsTerminal, Write};
-
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use clap::error::ContextKind;
 use serde_json::json;
+use tracing::{Event, Level, Subscriber};
 use tracing_subscriber::EnvFilter;
-use tracing_subscriber::fmt::MakeWriter;
-use tracing_subscriber::fmt::format::Writer;
+use tracing_subscriber::fmt::format::{Format, Writer};
 use tracing_subscriber::fmt::time::{FormatTime, SystemTime};
+use tracing_subscriber::fmt::{FmtContext, FormatEvent, FormatFields, MakeWriter};
+use tracing_subscriber::registry::LookupSpan;
 
 use super::options::{Global, LogFormat};
 use super::screen::Screen;
+
 /// How messages are written; text until [`start`] says otherwise.
 static JSON: AtomicBool = AtomicBool::new(false);
 static QUIET: AtomicBool = AtomicBool::new(false);
@@ -47,10 +51,11 @@ pub fn start(global: &Global) {
     let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new(level));
     let no_color = std::env::var_os("NO_COLOR").is_some_and(|value| !value.is_empty());
     let log = tracing_subscriber::fmt().with_env_filter(filter).with_writer(LogLines);
+    let full = tracing_subscriber::fmt::format();
     let log = log.with_ansi(io::stderr().is_terminal() && !no_color);
     // It fails if there is a logger already, as in tests; that one stays.
     let _ = match global.log_format {
-        LogFormat::Text => log.try_init(),
+        LogFormat::Text => log.event_format(ForPeople(full)).try_init(),
         LogFormat::Json => log.json().try_init(),
     };
 }
@@ -164,6 +169,28 @@ pub fn printable<'a>(text: &'a str, keep: &[char]) -> Cow<'a, str> {
     escaped.into()
 }
 
+/// Our own warnings and errors as messages are written; all else with its time and place.
+struct ForPeople(Format);
+
+impl<S, N> FormatEvent<S, N> for ForPeople
+where
+    S: Subscriber + for<'a> LookupSpan<'a>,
+    N: for<'a> FormatFields<'a> + 'static,
+{
+    fn format_event(&self, context: &FmtContext<'_, S, N>, mut to: Writer<'_>, event: &Event<'_>) -> fmt::Result {
+        let metadata = event.metadata();
+        let is_ours = metadata.target().starts_with(env!("CARGO_PKG_NAME"));
+        let name = match *metadata.level() {
+            Level::ERROR if is_ours => "error",
+            Level::WARN if is_ours => "warning",
+            _ => return self.0.format_event(context, to, event),
+        };
+        write!(to, "{name}: ")?;
+        context.field_format().format_fields(to.by_ref(), event)?;
+        writeln!(to)
+    }
+}
+
 /// Collects each event of the logger in one [`LogLine`].
 struct LogLines;
 
@@ -210,18 +237,20 @@ impl Drop for LogLine {
     }
 }
 
-/// clap's message of several paragraphs as one line, without its usage and help hints.
+/// clap's message of several paragraphs as one line, without its usage and help hints; without a tip, too, where all values
+/// are listed.
 pub fn one_line(error: &clap::Error) -> String {
     let text = error.render().to_string();
-    let lines = text
-        .lines()
-        .map(str::trim)
-        .filter(|line| !line.is_empty() && !line.starts_with("Usage:") && !line.starts_with("For more information"));
+    let is_hint = |line: &&str| {
+        let is_tip = line.starts_with("tip:") && error.get(ContextKind::ValidValue).is_some();
+        is_tip || line.starts_with("Usage:") || line.starts_with("For more information")
+    };
+    let lines = text.lines().map(str::trim).filter(|line| !line.is_empty() && !is_hint(line));
     let mut sentence = String::new();
     for line in lines {
         let separator = match sentence.chars().last() {
             None => "",
-            Some(':') => " ",
+            Some(':' | '.') => " ",
             // A list of possible values belongs to what is before it.
             Some(_) if line.starts_with('[') => " ",
             Some(_) => "; ",

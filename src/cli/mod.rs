@@ -5,6 +5,7 @@ mod controlled;
 mod error;
 mod files;
 mod focus;
+mod help;
 mod log;
 #[cfg(feature = "networks")]
 mod networks_apart;
@@ -24,6 +25,8 @@ use std::process::ExitCode;
 
 pub use error::CliError;
 use parse::{Parsed, Refusal};
+use settings::file::SettingsFile;
+use settings::layers::Layers;
 use settings::{arguments, environment};
 
 /// Runs the program. What goes wrong becomes one line on stderr and an exit code: 1 at run time, 2 in the arguments.
@@ -43,16 +46,13 @@ pub fn run(args: impl IntoIterator<Item = OsString>) -> ExitCode {
 
 /// Parses the arguments and runs the command; what it logs may still be waiting to be printed afterwards.
 fn run_to_end(args: &[OsString]) -> ExitCode {
-    let fail = |error: &CliError| {
-        log::error(&match error.is_wrong_argument() {
-            true => environment::with_origin(&error.to_string(), args),
-            false => error.to_string(),
-        });
+    let fail = |error: &CliError, from: Option<(&SettingsFile, &Layers)>| {
+        log::error(&environment::with_origin(&error.to_string(), args, error.is_wrong_argument(), from));
         error.exit_code()
     };
     let Parsed { cli, matches, file, layers } = match parse::parse(args) {
         Ok(parsed) => parsed,
-        Err(Refusal::Settings(error)) => return fail(&error),
+        Err(Refusal::Settings(error)) => return fail(&error, None),
         Err(Refusal::Arguments(error)) => return arguments::refuse(&error, args),
     };
     log::start(&cli.global);
@@ -63,7 +63,7 @@ fn run_to_end(args: &[OsString]) -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         // Whoever read our output has seen enough.
         Err(error) if error.is_broken_pipe() => ExitCode::SUCCESS,
-        Err(error) => fail(&error),
+        Err(error) => fail(&error, Some((&file, &layers))),
     }
 }
 

@@ -7,6 +7,7 @@ use clap::{ArgMatches, CommandFactory, FromArgMatches};
 
 use super::commands::Cli;
 use super::error::CliError;
+use super::help;
 use super::settings::file::SettingsFile;
 use super::settings::layers::Layers;
 use super::settings::{save, table};
@@ -33,7 +34,9 @@ pub struct Parsed {
 
 /// Parses arguments together with the environment, preset, snapshot and settings file that apply.
 pub fn parse(args: &[OsString]) -> Result<Parsed, Refusal> {
-    let command = table::with_environment(Cli::command());
+    let command = help::whole(table::with_environment(Cli::command()));
+    let wants_all = args.iter().take_while(|arg| *arg != "--").any(|arg| arg == help::ALL);
+    let command = if wants_all { command } else { help::first(command) };
     // Once without the settings file, to learn its name and the preset's; then again with their values as defaults.
     let given = command.clone().try_get_matches_from(args)?;
     let chosen = Cli::from_arg_matches(&given)?.global.config;

@@ -177,9 +177,10 @@ pub fn warn_of_source(source: &Source, look: &Look, options: &Options) -> bool {
     })
 }
 
-/// Warns where nobody was found in a picture, or what cannot be a person.
-pub fn warn_of_subject(chosen: &OneCamera, map: &DepthMap, image: Option<&Path>) {
-    let plate = chosen.plate.as_ref().and_then(|plate| match plate {
+/// Warns where nobody was found in a picture, or what cannot be a person. Without a choice it was the installed network that
+/// looked.
+pub fn warn_of_subject(chosen: Option<&OneCamera>, map: &DepthMap, image: Option<&Path>) {
+    let plate = chosen.and_then(|chosen| chosen.plate.as_ref()).and_then(|plate| match plate {
         PlateFile::At(file) => Some(file.as_path()),
         PlateFile::Taken => None,
     });
@@ -189,7 +190,7 @@ pub fn warn_of_subject(chosen: &OneCamera, map: &DepthMap, image: Option<&Path>)
 fn odd_subject(map: &DepthMap, plate: Option<&Path>, image: Option<&Path>) -> Option<String> {
     let subject_m = map.subject_m?;
     let is_near = |at: usize| map.metres[at] <= subject_m;
-    let (width, count) = (map.width as usize, map.metres.len());
+    let count = map.metres.len();
     let near = (0..count).filter(|&at| is_near(at)).count();
     let is_itself = plate.zip(image).is_some_and(|(plate, image)| place::overlap(plate, image));
     match plate.map(Path::display) {

@@ -1,11 +1,12 @@
 //! What the user sees while a command runs, and how it is ended.
 
 use std::cell::Cell;
+use std::fmt;
 use std::io::{self, IsTerminal, Write};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
 
 use super::error::CliError;
 use super::log;
@@ -13,6 +14,7 @@ pub use super::log::say;
 use super::options::Global;
 use super::screen::{Count, Screen};
 use crate::depth::plate::{Guide, Step};
+use crate::stats::Report;
 
 /// The first Ctrl-C (or a termination signal) sets the flag, so that the file in hand is finished; the second ends
 /// the program at once.
@@ -49,11 +51,16 @@ impl Progress {
             return Self(None);
         }
         let template = match frames {
-            Some(_) => "{wide_bar} {pos}/{len} frames, {per_sec}, {eta} left",
-            None => "{spinner} {pos} frames, {per_sec}, {elapsed}",
+            Some(_) => "{wide_bar} {pos}/{len} frames, {rate} a second, {eta} left",
+            None => "{spinner} {pos} frames, {rate} a second, {elapsed}",
         };
         let bar = ProgressBar::with_draw_target(frames, ProgressDrawTarget::stderr());
-        bar.set_style(ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar()));
+        let style = ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar());
+        let rate = |state: &ProgressState, to: &mut dyn fmt::Write| {
+            // Writing into memory cannot fail.
+            let _ = write!(to, "{:.1}", state.per_sec());
+        };
+        bar.set_style(style.with_key("rate", rate));
         let screen = log::screen();
         Self(Some((screen, screen.begin(bar))))
     }
@@ -97,6 +104,14 @@ impl Guidance {
         if !self.is_quiet && told != Some(news) && (told.is_some() || news != Step::Ready) {
             say(&step.to_string());
         }
+    }
+}
+
+/// Says how a run went, and what its stages took where more is to be told.
+pub fn say_report(report: &Report, global: &Global) {
+    let is_shown = |line: &&str| global.verbose > 0 || !line.contains(" ms: ");
+    if !global.quiet {
+        say(&report.to_string().lines().filter(is_shown).collect::<Vec<_>>().join("\n"));
     }
 }
 

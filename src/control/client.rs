@@ -14,13 +14,22 @@ const TICK: Duration = Duration::from_millis(20);
 /// The longest answer.
 const MOST_ANSWER_BYTES: u64 = 1 << 20;
 
+/// The names of all runs that listen, sorted.
+///
+/// # Errors
+/// The user has no folder for sockets.
+pub fn runs() -> Result<Vec<Name>, ControlError> {
+    let folder = folder::path()?;
+    Ok(folder::names(&folder).into_iter().filter(|name| is_alive(&folder, name)).collect())
+}
+
 /// Asks the run of this name, or the only one, and waits for its answer.
 ///
 /// # Errors
 /// There is no such run, there are several, or it does not answer.
 pub fn ask(name: Option<&Name>, request: &Request) -> Result<Answer, ControlError> {
     let folder = folder::path()?;
-    let there: Vec<Name> = folder::names(&folder).into_iter().filter(|name| is_alive(&folder, name)).collect();
+    let there = runs()?;
     let texts = |names: &[Name]| names.iter().map(Name::to_string).collect();
     let name = match (name, there.as_slice()) {
         (Some(name), there) if there.contains(name) => name,

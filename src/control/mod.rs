@@ -37,7 +37,7 @@ pub enum ControlError {
     #[error("several run: {}; choose one with --name", .0.join(", "))]
     Several(Vec<String>),
     /// No run is called so.
-    #[error("no run is called {name}: {}", if there.is_empty() { "nothing runs".into() } else { there.join(", ") })]
+    #[error("no run is called {name}: {}", if there.is_empty() { "nothing runs".into() } else { format!("there is {}", there.join(", ")) })]
     NoSuch { name: Name, there: Vec<String> },
     /// It did not answer in time, or not in the way that was expected.
     #[error("{name} does not answer: {why}")]

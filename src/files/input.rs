@@ -16,6 +16,18 @@ pub const MOST_CALIBRATION_BYTES: u64 = 1 << 20;
 /// Most bytes of a settings file: enough for every setting in a thousand presets.
 pub const MOST_SETTINGS_BYTES: u64 = 1 << 20;
 
+/// What is said of a file that is not there.
+pub const NO_FILE: &str = "there is no such file";
+
+/// What the system says, in the words of this program where these are shorter.
+pub fn said(error: &io::Error) -> String {
+    let text = error.to_string();
+    match error.kind() {
+        io::ErrorKind::NotFound if error.raw_os_error().is_some() => NO_FILE.to_owned(),
+        _ => text.split(" (os error").next().unwrap_or_default().to_owned(),
+    }
+}
+
 /// Opens a regular file for reading, links followed. Never waits, as opening a pipe would.
 ///
 /// # Errors

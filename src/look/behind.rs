@@ -1,7 +1,7 @@
 //! What stands behind the subject as it is written: its picture, if any, not yet read; and how far the picture follows.
 
 use std::fmt;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use std::sync::Arc;
 
@@ -27,10 +27,32 @@ impl FromStr for BehindName {
             None if text == "blur" => Some(Self::Known(Behind::Blur)),
             Some(("color", color)) => rgb(color).map(|rgb| Self::Known(Behind::Color(rgb))),
             Some(("image", file)) if !file.is_empty() => Some(Self::Image(file.into())),
+            None if let Some((_, rgb)) = COLORS.iter().find(|(name, _)| *name == text) => {
+                Some(Self::Known(Behind::Color(*rgb)))
+            }
+            None if text.starts_with('#') => rgb(text).map(|rgb| Self::Known(Behind::Color(rgb))),
+            // What can be nothing else.
+            _ if is_picture(text) => Some(Self::Image(text.into())),
             _ => None,
         }
         .ok_or_else(|| FORMS.to_string())
     }
+}
+
+/// Colours by name. Green is that of screens that are replaced.
+const COLORS: [(&str, [u8; 3]); 6] = [
+    ("black", [0; 3]),
+    ("white", [255; 3]),
+    ("grey", [128; 3]),
+    ("gray", [128; 3]),
+    ("green", [0, 177, 64]),
+    ("blue", [0, 71, 187]),
+];
+
+/// Whether a text is the name of a picture.
+fn is_picture(text: &str) -> bool {
+    let ending = Path::new(text).extension().and_then(|ending| ending.to_str()).unwrap_or_default();
+    ["png", "jpg", "jpeg"].iter().any(|known| ending.eq_ignore_ascii_case(known))
 }
 
 /// The colour `#RRGGBB`; the sign, which shells take for a comment, may be missing.
@@ -126,6 +148,10 @@ mod tests {
             assert_eq!(text.parse::<BehindName>().unwrap().to_string(), text);
         }
         assert_eq!("color:00B140".parse::<BehindName>(), "color:#00b140".parse());
+        for (short, whole) in [("#00ff00", "color:#00ff00"), ("green", "color:#00b140"), ("wall.JPG", "image:wall.JPG")]
+        {
+            assert_eq!(short.parse::<BehindName>(), whole.parse());
+        }
         for text in ["off", "1.5", "4"] {
             assert_eq!(text.parse::<Follow>().unwrap().to_string(), text);
         }
@@ -134,8 +160,20 @@ mod tests {
 
     #[test]
     fn wrong_values_say_what_is_accepted() {
-        for text in ["", "green", "color", "color:#12345", "color:#1234567", "color:+12345", "color:#gg0000", "image:"]
-        {
+        for text in [
+            "",
+            "greenish",
+            "color",
+            "#12345",
+            "wall",
+            ".png",
+            "file:wall",
+            "color:#12345",
+            "color:#1234567",
+            "color:+12345",
+            "color:#gg0000",
+            "image:",
+        ] {
             assert!(text.parse::<BehindName>().unwrap_err().contains("color:#RRGGBB"), "{text}");
         }
         for text in ["", "on", "0.5", "4.1", "nan", "-2"] {

@@ -1,6 +1,7 @@
 //! Changes of a look: settings by their names, applied to another look.
 
 use std::collections::BTreeMap;
+use std::path::PathBuf;
 
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 
@@ -78,6 +79,28 @@ impl Patch {
         let same: Vec<&Setting> = SETTINGS.iter().filter(is_same).collect();
         same.into_iter().for_each(|setting| (setting.clear)(&mut self));
         self
+    }
+
+    /// The files of pictures that it names and that are not read yet.
+    pub fn files_mut(&mut self) -> impl Iterator<Item = &mut PathBuf> {
+        let aperture = match &mut self.aperture {
+            Some(ApertureName::Image(file)) => Some(file),
+            _ => None,
+        };
+        let behind = match &mut self.behind {
+            Some(BehindName::Image(file)) => Some(file),
+            _ => None,
+        };
+        aperture.into_iter().chain(behind)
+    }
+
+    /// The settings of a look by all of their names, as those read them who ask a run how it is.
+    pub fn described(look: &Look) -> BTreeMap<String, String> {
+        let named = |(name, value): Value| {
+            let alias = setting(name).and_then(Setting::alias);
+            [Some(name), alias].into_iter().flatten().map(move |name| (name.to_owned(), value.clone()))
+        };
+        Self::of(look).values().into_iter().flat_map(named).collect()
     }
 
     /// Reads the pictures that it names, so that [`Patch::on`] need not.

@@ -105,9 +105,9 @@ settings! {
     focus: FocusRule = "focus" "WHERE" Blur FocusRule::from_str;
     /// Distances that are sharp as a whole, in metres: half of it on either side of the focal plane
     focus_range_m: f32 = "focus-range" "METRES" Blur not_negative, in 0.0..=f32::MAX;
-    /// Blur radius of a point at infinity: the strength of the blur, in pixels, or as a share of the height such as 3%
+    /// How strong the blur is: the radius of a point at infinity, in pixels, or as a share of the height such as 3%
     /// [default: auto, which is height / 45]
-    coc_at_infinity: Strength = "coc-at-infinity" "PX" Blur Strength::from_str, is computed;
+    coc_at_infinity: Strength = "blur" "PX" Blur Strength::from_str, is computed;
     /// The strength by a lens instead: its f-number, with --focal-length and --sensor-width
     f_number: f32 = "f-number" "N" Blur above_zero, in ABOVE_ZERO, is computed;
     /// Focal length of that lens, in millimetres
@@ -143,13 +143,21 @@ settings! {
 
 /// The setting of this name, if it is one of a look.
 pub fn setting(name: &str) -> Option<&'static Setting> {
+    let name = name_of(name);
     SETTINGS.iter().find(|setting| setting.name == name)
+}
+
+/// The name of a setting that is called by its name or by another one; any other text as it is.
+pub fn name_of(called: &str) -> &str {
+    ALIASES.iter().find(|(_, alias)| *alias == called).map_or(called, |(name, _)| name)
 }
 
 /// The settings of a lens, which replace the strength at infinity.
 const OF_A_LENS: [&str; 3] = ["f-number", "focal-length", "sensor-width"];
 /// The strength at infinity, which replaces the settings of a lens.
-const AT_INFINITY: &str = "coc-at-infinity";
+const AT_INFINITY: &str = "blur";
+/// Settings by another name that means the same wherever settings are written, and that name.
+const ALIASES: [(&str, &str); 1] = [(AT_INFINITY, "coc-at-infinity")];
 
 impl Setting {
     /// The names of the settings that cannot go with this one.
@@ -159,6 +167,11 @@ impl Setting {
             name if OF_A_LENS.contains(&name) => &[AT_INFINITY],
             _ => &[],
         }
+    }
+
+    /// Another name that it has.
+    pub fn alias(&self) -> Option<&'static str> {
+        ALIASES.iter().find(|(name, _)| *name == self.name).map(|(_, alias)| *alias)
     }
 
     /// Whether it sets how strong the blur is: at infinity or by a lens, of which one excludes the other.

@@ -34,7 +34,7 @@ impl FromStr for Strength {
 }
 
 impl fmt::Display for Strength {
-    /// As the setting `coc-at-infinity` has it; a lens has settings of its own.
+    /// As the setting `blur` has it; a lens has settings of its own.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Default => f.write_str("auto"),

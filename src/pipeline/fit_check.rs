@@ -7,7 +7,7 @@ use crate::frame::{ColorImage, DepthMap};
 
 /// One of so many frames is looked at, as neighbours are alike.
 const EVERY: u32 = 5;
-/// So many frames that agree decide.
+/// So many frames of a stream that agree decide.
 const DECISION: usize = 3;
 /// After so many frames without a decision there will be none.
 const LAST: u32 = 300;
@@ -22,14 +22,22 @@ pub enum Verdict {
 }
 
 /// Decides once.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub struct FitCheck {
+    /// So many frames that agree decide.
+    decision: usize,
     frames: u32,
     unrelated: usize,
     mendings: Vec<(Misfit, Mending)>,
 }
 
 impl FitCheck {
+    /// For a stream of so many frames, where that is known: a picture on its own decides alone.
+    pub fn of(frames: Option<u64>) -> Self {
+        let decision = if frames == Some(1) { 1 } else { DECISION };
+        Self { decision, frames: 0, unrelated: 0, mendings: Vec::new() }
+    }
+
     /// Takes the next frame, with its depth as it was measured; says so, once, when it is clear that it does not fit.
     pub fn look(&mut self, map: &DepthMap, color: &ColorImage) -> Option<Verdict> {
         if self.frames >= LAST {
@@ -48,9 +56,9 @@ impl FitCheck {
             None => {}
         }
         let verdict = match () {
-            () if self.unrelated == DECISION => Some(Verdict::Unrelated),
+            () if self.unrelated == self.decision => Some(Verdict::Unrelated),
             // The one that does the least.
-            () if self.mendings.len() == DECISION => self
+            () if self.mendings.len() == self.decision => self
                 .mendings
                 .iter()
                 .min_by_key(|(_, mending)| (mending.distance_px.abs(), mending.coarsest))

@@ -25,10 +25,17 @@ pub(super) struct Preparation {
 }
 
 impl Preparation {
-    /// For pictures of `size` pixels, as `look` says, on so many threads. Who `knows_background` needs not remember it.
-    pub fn new(look: &Look, size: (u32, u32), measured: bool, knows_background: bool, threads: usize) -> Self {
+    /// For pictures of `size` pixels, so many of them where that is known, as `look` says, on so many threads. Who
+    /// `knows_background` needs not remember it.
+    pub fn new(
+        look: &Look,
+        (size, frames): ((u32, u32), Option<u64>),
+        measured: bool,
+        knows_background: bool,
+        threads: usize,
+    ) -> Self {
         let coc = CocMaker::new(look.coc_rule(size), Finish::measured(look.refines(measured))).on_threads(threads);
-        let mut new = Self { size, measured, coc, staging: Staging::new(look), check: FitCheck::default() };
+        let mut new = Self { size, measured, coc, staging: Staging::new(look), check: FitCheck::of(frames) };
         new.coc.remember(remembers(look, knows_background));
         new
     }

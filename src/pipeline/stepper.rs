@@ -55,7 +55,7 @@ impl Stepper {
         let made_for = look.settings(size, adaptive);
         let executor = made_for.as_ref().map(|settings| executors.blur(settings, size)).transpose()?;
         let finest = finest_quality(executor.as_deref());
-        let mut preparation = Preparation::new(look, size, measured, false, threads);
+        let mut preparation = Preparation::new(look, (size, None), measured, false, threads);
         preparation.beside(executor.as_deref());
         Ok(Self {
             size,

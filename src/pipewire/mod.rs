@@ -11,6 +11,7 @@ pub mod graph;
 pub mod mode;
 pub mod node;
 mod param;
+mod quiet;
 pub mod reader;
 mod session;
 mod wake;

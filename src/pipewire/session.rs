@@ -33,6 +33,7 @@ impl Session {
     /// There is none.
     pub fn open() -> Result<Self, PipeWireError> {
         pipewire::init();
+        super::quiet::silence();
         let main_loop = MainLoopRc::new(None).map_err(PipeWireError::refused("a loop"))?;
         let context = ContextRc::new(&main_loop, None).map_err(PipeWireError::refused("a context"))?;
         let core = context.connect_rc(None).map_err(|_| PipeWireError::NoDaemon { socket: socket() })?;

@@ -7,7 +7,8 @@ use std::time::Duration;
 
 use super::session::CurrentRelease;
 use crate::control::{Answer, Claim, Request, Server, Status};
-use crate::look::Patch;
+use crate::look::{Look, Patch};
+use crate::preview::state::Running;
 
 /// How long the window, and who saves pictures, may take to answer.
 const PATIENCE: Duration = Duration::from_secs(3);
@@ -29,12 +30,17 @@ pub enum Wish {
 /// What a request means; an error is its answer.
 pub type Understand = dyn Fn(Request) -> Result<Wish, Answer> + Send + Sync;
 
+/// Whether a change of a look can be while this source runs, and what of it has no effect; an error is its answer.
+pub type Judge = dyn Fn(&Patch, &Look, &Running) -> Result<Option<String>, Answer>;
+
 /// The name of a preview, and what it understands.
 pub struct Control {
     /// Its name.
     pub claim: Claim,
     /// What requests mean: parsed as the command line is.
     pub understand: Box<Understand>,
+    /// Which changes of the look can be.
+    pub judge: Box<Judge>,
 }
 
 /// Somebody who waits for an answer.
@@ -55,7 +61,7 @@ impl Control {
         self,
         release: CurrentRelease,
         wake: impl Fn() + Send + Sync + 'static,
-    ) -> std::io::Result<(Server, Receiver<Asked>)> {
+    ) -> std::io::Result<(Server, Receiver<Asked>, Box<Judge>)> {
         let (ask, asked) = mpsc::channel();
         let understand = self.understand;
         let server = self.claim.serve(Arc::new(move |request| {
@@ -75,7 +81,7 @@ impl Control {
                 Err(_) => Answer::failed("the window does not answer in time"),
             }
         }))?;
-        Ok((server, asked))
+        Ok((server, asked, self.judge))
     }
 }
 

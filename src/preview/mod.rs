@@ -9,6 +9,7 @@ pub mod control;
 pub mod dialog;
 pub mod folders;
 pub mod keys;
+pub mod lent;
 pub mod meters;
 pub mod panel;
 pub mod present;

@@ -197,7 +197,7 @@ fn open_detected(path: &Path) -> Result<(File, Option<Format>), PictureFault> {
         b"\x89PNG\r\n\x1a\n" => Format::Png,
         [0xFF, 0xD8, 0xFF, ..] => Format::Jpeg,
         [b'P', b'f' | b'F', space, ..] if space.is_ascii_whitespace() => Format::Pfm,
-        _ if length < start.len() => return Err(PictureFault::Truncated),
+        _ if b"\x89PNG\r\n\x1a\n".starts_with(&start[..length]) => return Err(PictureFault::Truncated),
         _ => return Ok((file, None)),
     };
     Ok((file, Some(format)))

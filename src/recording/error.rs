@@ -116,7 +116,10 @@ pub enum RecordingError {
         tolerance_ns: u64,
     },
     /// A picture that a list names is missing or wrong.
-    #[error("{}:{line}: {}: {fault}", list.display(), file.display())]
+    #[error(
+        "{}:{line}: {}: {fault}{}", list.display(), file.display(),
+        if matches!(fault, PictureFault::Missing) { "; restore it, or remove its line" } else { "" }
+    )]
     Listed {
         list: PathBuf,
         /// Line number, from 1.

@@ -84,7 +84,7 @@ pub enum GeometryFault {
 #[derive(Debug, thiserror::Error)]
 pub enum PictureFault {
     /// There is no such file.
-    #[error("there is no such file; restore it, or remove what refers to it")]
+    #[error("{}", crate::files::input::NO_FILE)]
     Missing,
     /// A link leads out of the recording.
     #[error("a link leads outside the recording; put the file itself inside the folder")]
@@ -175,10 +175,12 @@ pub enum PictureFault {
     /// 256 steps, and no telling which end is near.
     #[error(
         "an 8-bit grey picture has too few steps for depth; export it with 16 bits: dark is near there, and 0 unknown. \
-         Where white is near (inverse depth, as networks and phones make it) turn it into depth first, 1 / value"
+         Where white is near (inverse depth, as networks and phones make it) --depth-unit inverse reads it"
     )]
     CoarseDepth,
     /// A picture that holds something else than depth.
-    #[error("{0} is not depth; export depth as a 16-bit grey PNG")]
+    #[error(
+        "{0} is not depth; export depth as a 16-bit grey PNG; inverse depth, where white is near, is read by --depth-unit inverse"
+    )]
     NotDepth(&'static str),
 }

@@ -64,7 +64,8 @@ fn open_depth_camera(name: &str, options: &options::Depth, clock: &Clock) -> Res
         Ok(camera) => Ok(Box::new(camera)),
         // Probably a mistyped keyword or folder.
         Err(error @ OpenError::Name(_)) => Err(SourceError::NotThere(format!(
-            "--depth {name}: {error}; or use auto, recorded, stereo, none, matte, mono, plate or a folder with a recording"
+            "--depth {name}: {}{error}; or use auto, recorded, stereo, none, matte, mono, plate or a folder with a recording",
+            DepthChoice::hint(name)
         ))),
         Err(error) => Err(error.into()),
     }

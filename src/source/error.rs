@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use crate::calibration::CalibrationError;
 use crate::capture::CaptureError;
 use crate::depth::DepthError;
+use crate::files::input;
 use crate::recording::RecordingError;
 
 /// Why a source cannot be opened.
@@ -28,7 +29,7 @@ pub enum SourceError {
         what: String,
     },
     /// A file cannot be read.
-    #[error("{}: {source}", path.display())]
+    #[error("{}: {}", path.display(), input::said(source))]
     Io { path: PathBuf, source: io::Error },
     #[error(transparent)]
     Capture(#[from] CaptureError),

@@ -143,7 +143,7 @@ pub fn check_focus(rig: &StereoRig, look: &Look) -> Result<(), SourceError> {
     let Some(needs) = look.needs_metres().filter(|_| !rig.metric) else { return Ok(()) };
     Err(SourceError::Usage(format!(
         "{needs} needs distances, and these two eyes tell none: give --calib FILE, or --focal-px and --baseline-m; \
-         --focus auto or X,Y and --coc-at-infinity need none"
+         --focus auto or X,Y and --blur need none"
     )))
 }
 

@@ -25,7 +25,7 @@ mod networks;
 pub mod one_camera;
 mod opened;
 pub mod options;
-mod photo;
+pub mod photo;
 #[cfg(feature = "camera")]
 pub mod registration;
 
@@ -50,9 +50,10 @@ use crate::optics::StereoRig;
 use crate::recording::{Options as Reading, Recording, Scratch};
 
 /// What depth comes from.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum DepthFrom {
     /// There is none, or it is not used.
+    #[default]
     Nothing,
     /// Numbers in units of their own, as 16-bit pictures and depth cameras have them.
     Units,

@@ -15,9 +15,10 @@ const SYNTHETIC: &str = "synthetic";
 const PIPEWIRE: &str = "pipewire:";
 
 /// What kind of source frames come from.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Kind {
     /// A camera, or two.
+    #[default]
     Camera,
     /// A folder with a recording.
     Recording,
@@ -70,6 +71,12 @@ impl FromStr for SourceName {
 /// Whether a text is meant as a path, and not as the name of a camera.
 fn looks_like_a_path(text: &str) -> bool {
     text.contains('/') && !text.starts_with("/dev/")
+}
+
+/// Whether a file is a video, by its name.
+fn is_video(path: &Path) -> bool {
+    let ending = path.extension().and_then(OsStr::to_str).unwrap_or_default().to_lowercase();
+    ["mp4", "mkv", "webm", "mov", "avi", "m4v", "y4m"].contains(&ending.as_str())
 }
 
 /// As it is written.
@@ -189,6 +196,10 @@ impl SourceName {
             Some(demo::NAME) => Ok(SourceName::Demo),
             _ if path.is_dir() => Ok(SourceName::Folder(path.to_owned())),
             _ if path.is_file() && photo::is_photo(path) => Ok(SourceName::Photo(path.to_owned())),
+            Some(text) if path.is_file() && is_video(path) => SourceError::usage(format!(
+                "a video is read as pictures; ffmpeg makes a folder of them, which is the source then: mkdir -p clip/rgb && \
+                 ffmpeg -i '{text}' -r 25 clip/rgb/%06d.png && (cd clip && ls rgb/* | awk '{{print NR/25, $0}}' > rgb.txt)"
+            )),
             _ if path.is_file() => SourceError::usage(format!("it is neither a folder nor a photo: use {}", sources())),
             Some(text) if looks_like_a_path(text) => Err(no_folder(text)),
             Some(text) => parse_cameras(text),

@@ -1,9 +1,15 @@
-//! Suggestions for mistyped folder names.
+//! Suggestions for mistyped names.
 
 use std::path::{Path, PathBuf};
 
 /// Least Jaro-Winkler similarity (0 to 1) of a name that is suggested: one or two slips in a word of usual length.
 const SIMILAR: f64 = 0.8;
+
+/// Of some words the one that is most like a text, if any is similar enough.
+pub fn word<'a>(text: &str, words: &[&'a str]) -> Option<&'a str> {
+    let rated = words.iter().map(|word| (strsim::jaro_winkler(&text.to_lowercase(), word), *word));
+    rated.filter(|(similarity, _)| *similarity >= SIMILAR).max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, word)| word)
+}
 
 /// The existing sibling of `path` that is a folder of the most similar name, if any is similar enough.
 pub fn folder(path: &Path) -> Option<PathBuf> {

@@ -20,7 +20,7 @@ pub fn refuse_metres(look: &Look, who: &str) -> Result<(), SourceError> {
     match look.needs_metres() {
         None => Ok(()),
         Some(needs) => SourceError::usage(format!(
-            "{needs} needs distances, and {who} only what is nearer than what: use --focus auto or X,Y, and --coc-at-infinity"
+            "{needs} needs distances, and {who} only what is nearer than what: use --focus auto or X,Y, and --blur"
         )),
     }
 }

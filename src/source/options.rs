@@ -72,7 +72,7 @@ pub struct Depth {
     pub depth_invalid: u16,
     /// What the numbers of depth pictures are: metres (as --depth-scale has them), or inverse (relative inverse depth, as
     /// networks and phones give it: 8 or 16 bits, PNG or JPEG, white is near)
-    #[arg(long, value_name = "UNIT", value_parser = names::parse::<DepthUnit>, default_value = "metres")]
+    #[arg(long, value_name = "UNIT", value_parser = depth_unit, default_value = "metres")]
     pub depth_unit: DepthUnit,
     /// White is far in pictures of inverse depth
     #[arg(long, value_name = "YES", num_args = 0..=1, require_equals = true, default_value_t = false,
@@ -178,6 +178,13 @@ impl DepthChoice {
     pub fn is_elsewhere(&self) -> bool {
         matches!(self, Self::Folder(_) | Self::Device(_) | Self::OneCamera(_) | Self::Defocus)
     }
+
+    /// The word that was meant by one that is none, if any is like it: a hint for a message.
+    pub fn hint(text: &str) -> String {
+        const WORDS: [&str; 8] = ["auto", "recorded", "stereo", "none", "matte", "mono", "plate", "defocus"];
+        let meant = super::near::word(text, &WORDS);
+        meant.map_or(String::new(), |word| format!("did you mean {word}? "))
+    }
 }
 
 impl FromStr for DepthChoice {
@@ -229,6 +236,14 @@ fn control(text: &str) -> Result<Setting, String> {
         .filter(|(name, _)| !name.is_empty())
         .ok_or_else(|| "use NAME=VALUE, such as exposure_dynamic_framerate=0".to_string())?;
     Ok((name.to_owned(), value.to_owned()))
+}
+
+fn depth_unit(text: &str) -> Result<DepthUnit, String> {
+    names::parse(text).map_err(|accepted| match text {
+        "mm" | "millimetres" | "millimeters" => format!("{accepted}; of millimetres, --depth-scale 1000 makes metres"),
+        "disparity" => format!("{accepted}; disparity that bokehcam wrote is read as it is"),
+        _ => accepted,
+    })
 }
 
 fn disparities(text: &str) -> Result<u32, String> {

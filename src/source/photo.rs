@@ -4,8 +4,10 @@ use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
-use super::{DepthChoice, DepthFrom, Options, SourceError};
-use crate::frame::{ColorImage, DepthMap};
+use super::{DepthChoice, DepthFrom, Options, Source, SourceError, SourceName};
+use crate::depth::Seen;
+use crate::frame::{ColorImage, DepthMap, Stamp};
+use crate::look::Look;
 use crate::optics::StereoRig;
 use crate::recording::{DepthUnit, snapshot, still, still::Map};
 
@@ -21,6 +23,51 @@ pub fn is_photo(path: &Path) -> bool {
     read.is_ok() && (first == *b"\x89PNG\r\n\x1a\n" || first.starts_with(&[0xff, 0xd8, 0xff]))
 }
 
+/// The picture that a photo stands for: of a snapshot, the one that it was made of.
+pub fn original(path: &Path) -> PathBuf {
+    let before = snapshot::sources(path).0;
+    if before.is_file() { before } else { path.to_owned() }
+}
+
+/// The depth of a photo.
+pub struct PhotoDepth {
+    /// As it was measured, or finished around a subject.
+    pub map: DepthMap,
+    /// What it comes from.
+    pub from: DepthFrom,
+    /// Whether refinement improves it.
+    pub measured: bool,
+    /// What gives it, in a few words.
+    pub by: String,
+}
+
+/// The depth that the photo at `path`, of the colours `color`, has where nothing else was said: as for [`Source::open`].
+///
+/// # Errors
+/// As for [`Source::open`].
+pub fn depth_of(
+    path: &Path,
+    color: &ColorImage,
+    options: &Options,
+    look: &Look,
+) -> Result<Option<PhotoDepth>, SourceError> {
+    let mut source = Source::open(&SourceName::Photo(path.to_owned()), options, Some(look))?;
+    let measured = source.is_measured();
+    let Source { depth: Some(depth), depth_from: from, networks, .. } = &mut source else { return Ok(None) };
+    let mut map = DepthMap::default();
+    depth.read(Seen { stamp: Stamp { index: 0, time_ns: 0, captured_ns: None }, color, right: None }, &mut map)?;
+    let beside = || depth_file(path).map(|file| format!("{}, beside it", file.display()));
+    let by = networks.take().or_else(beside).unwrap_or_default();
+    Ok(Some(PhotoDepth { map, from: *from, measured, by }))
+}
+
+/// The files that are read for a photo: what it stands for, and its depth beside it.
+pub fn files_of(path: &Path) -> impl Iterator<Item = PathBuf> {
+    let original = original(path);
+    let depth = depth_file(&original);
+    [original].into_iter().chain(depth)
+}
+
 /// A photo, its depth if there is any beside it, and what that depth is.
 pub(super) type Photo = (ColorImage, Option<DepthMap>, DepthFrom);
 
@@ -30,8 +77,7 @@ pub(super) type Photo = (ColorImage, Option<DepthMap>, DepthFrom);
 /// # Errors
 /// It cannot be read, or what is named as its depth cannot, or is of another size.
 pub(super) fn read(path: &Path, options: &Options) -> Result<Photo, SourceError> {
-    let before = snapshot::sources(path).0;
-    let path = if before.is_file() { &before } else { path };
+    let path = &original(path);
     let color = still::read_color(path)?;
     let is_wanted = matches!(options.depth_choice, DepthChoice::Auto | DepthChoice::Recorded);
     let Some(file) = depth_file(path).filter(|_| is_wanted) else { return Ok((color, None, DepthFrom::Nothing)) };

@@ -10,15 +10,37 @@ use crate::world::World;
 fn several_runs_are_told_apart_by_name() {
     let world = World::new();
     assert!(world.ctl(&["on"]).refused(1).contains("nothing runs that can be controlled"));
+    for list in [&[][..], &["list"]] {
+        let ran = world.ctl(list).done();
+        assert!(ran.stdout.is_empty() && ran.stderr.contains("nothing runs"), "{}", ran.stderr);
+    }
     let first = world.stream("stream", &["--to", "null"]);
     let second = world.stream("stream-2", &["--to", "null"]);
     let _third = world.stream("desk", &["--to", "null", "--name", "desk"]);
     let refused = world.ctl(&["off"]).refused(2);
     assert!(refused.contains("several run: desk, stream, stream-2; choose one with --name"), "{refused}");
     world.ctl(&["off", "--name", "stream-2"]).done();
+    for list in [&[][..], &["list"]] {
+        let listed = world.ctl(list).done().stdout;
+        let [desk, stream, second] = listed.lines().collect::<Vec<_>>()[..] else { panic!("{listed}") };
+        assert!(
+            desk.starts_with("desk ") && stream.starts_with("stream ") && second.starts_with("stream-2 "),
+            "{listed}"
+        );
+        assert!(
+            desk.contains(" on ") && second.contains(" off ") && desk.ends_with("recordings/portrait to null"),
+            "{listed}"
+        );
+    }
+    assert_eq!(world.ctl(&["--name", "desk"]).done().stdout.lines().count(), 1);
     let on = |name: &str| world.status(&["--name", name])["on"].clone();
     assert_eq!([on("desk"), on("stream"), on("stream-2")], [true, true, false]);
-    assert!(world.ctl(&["on", "--name", "sofa"]).refused(1).contains("no run is called sofa: desk, stream, stream-2"));
+    assert!(
+        world
+            .ctl(&["on", "--name", "sofa"])
+            .refused(1)
+            .contains("no run is called sofa: there is desk, stream, stream-2")
+    );
     let recording = concat!(env!("CARGO_MANIFEST_DIR"), "/recordings/portrait");
     let taken = world.run(&["stream", recording, "--to", "out/", "--frames", "3", "--name", "desk"]).refused(2);
     assert!(taken.contains("another run is called desk already: choose another --name"), "{taken}");

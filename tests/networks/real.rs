@@ -113,3 +113,25 @@ fn a_real_person_is_found_and_what_rests_rests() {
     eprintln!("overlap {overlap:.4}, flicker of wall and person {flicker:.3?}e-3, order of pairs {order:.4}");
     assert!(overlap >= 0.998 && flicker[0] <= 0.3 && order >= 0.99, "{overlap} {flicker:?} {order}");
 }
+
+/// A photo of a person is a portrait in every command, as soon as a network is installed.
+#[test]
+#[ignore = "needs BOKEHCAM_DATA, a folder with models and rgbd/person_turning"]
+fn a_photo_alone_has_the_depth_of_the_installed_network_in_every_command() {
+    let home = tempfile::TempDir::new().unwrap();
+    let path = |name: &str| home.path().join(name).to_str().unwrap().to_owned();
+    let done = |args: &[&str]| {
+        let ran = super::bokehcam(args, home.path());
+        let said = String::from_utf8_lossy(&ran.stderr).into_owned();
+        assert!(ran.status.success(), "{said}");
+        said
+    };
+    done(&["models", "add", model(Task::Matte).to_str().unwrap()]);
+    let (color, _) = Sequence::open().frame(0);
+    bokehcam::recording::still::write_color(&home.path().join("photo.png"), &color, false).unwrap();
+    let said = done(&["render", &path("photo.png"), "--out", &path("r.png"), "--backend", "cpu"]);
+    assert!(said.contains("depth by selfie-landscape") && !said.contains("warning"), "{said}");
+    done(&["stream", &path("photo.png"), "--to", &path("s/"), "--backend", "cpu"]);
+    let read = |name: &str| bokehcam::recording::still::read_color(&home.path().join(name)).unwrap();
+    assert!(read("r.png") == read("s/000000.png"));
+}

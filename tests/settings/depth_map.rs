@@ -55,7 +55,11 @@ fn a_picture_that_was_held_upright_needs_depth_that_was() {
 #[test]
 fn a_focus_that_nothing_is_near_is_told_with_the_distances_that_there_are() {
     let home = Home::new().with_photo();
-    let warned = |more: &[&str]| render(&home, &[&["--depth-map", "depth.png"], more].concat()).warning().to_owned();
+    let warned = |more: &[&str]| {
+        let ran = render(&home, &[&["--depth-map", "depth.png"], more].concat());
+        let of_focus = ran.done().lines().filter(|line| line.starts_with("warning: --focus"));
+        of_focus.collect::<String>()
+    };
     assert_eq!(warned(&["--focus", "1.5"]), "");
     let far = warned(&["--focus", "1.5", "--depth-scale", "100", "--coc-at-infinity", "4"]);
     assert!(far.contains("--focus 1.5: the depth lies from 2") && far.contains("beyond that"), "{far}");
@@ -75,6 +79,48 @@ fn a_recording_in_other_units_is_told_as_well() {
     };
     assert_eq!(stream("5000"), "");
     assert!(stream("50").contains("beyond that, and nothing is sharp; is --depth-scale that of this depth?"));
+}
+
+#[test]
+fn a_photo_has_the_depth_beside_it_in_every_command() {
+    let home = Home::new().with_photo();
+    let picture = |path: &str| still::read_color(&home.path(path)).unwrap();
+    for (name, map) in [("ph-depth.png", "depth.png"), ("ph.depth.pfm", "depth.pfm")] {
+        fs::copy(home.path("photo.png"), home.path("ph.png")).unwrap();
+        fs::copy(home.path(map), home.path(name)).unwrap();
+        for more in [&[][..], &["--refine", "off"], &["--refine", "on", "--focus", "0.6"], &["--effect", "blur"]] {
+            let render = ["render", "ph.png", "--out", "r.png", "--force", "--backend", "cpu"];
+            let ran = home.run(&[&render[..], more].concat());
+            assert_eq!(ran.warning(), "", "{name} {more:?}");
+            assert_eq!(
+                ran.stderr.contains(&format!("depth by {name}, beside it")),
+                more != ["--effect", "blur"],
+                "{}",
+                ran.stderr
+            );
+            let stream = ["stream", "ph.png", "--to", "s/", "--force", "--backend", "cpu"];
+            home.run(&[&stream[..], more].concat()).done();
+            assert!(picture("r.png") == picture("s/000000.png"), "{name} {more:?}");
+        }
+        // What is said goes before what is found.
+        let said = render_of(&home, &["--mask", "photo.png"]);
+        assert!(!said.stderr.contains("beside it"), "{}", said.stderr);
+        assert!(render_of(&home, &["--depth", "none"]).stderr.contains("written"));
+        render_of(&home, &["--out", name]).refused(2, &["which is read"]);
+        fs::remove_file(home.path(name)).unwrap();
+    }
+    // A snapshot stands for the picture that it was made of.
+    fs::rename(home.path("ph.png"), home.path("shot-color.png")).unwrap();
+    fs::copy(home.path("depth.pfm"), home.path("shot-depth.pfm")).unwrap();
+    still::write_color(&home.path("shot.png"), &bokehcam::frame::ColorImage::new(64, 48), false).unwrap();
+    home.run(&["render", "shot.png", "--out", "r.png", "--force", "--backend", "cpu"]).done();
+    home.run(&["stream", "shot.png", "--to", "s/", "--force", "--backend", "cpu"]).done();
+    assert!(picture("r.png") == picture("s/000000.png"));
+}
+
+fn render_of(home: &Home, more: &[&str]) -> super::program::Ran {
+    let out: &[&str] = if more.contains(&"--out") { &[] } else { &["--out", "r.png"] };
+    home.run(&[&["render", "ph.png", "--force", "--backend", "cpu"], out, more].concat())
 }
 
 #[test]

@@ -5,7 +5,9 @@
 mod calib;
 mod depth_map;
 mod environment;
+mod help;
 mod messages;
+mod names;
 mod program;
 mod radius;
 mod save;

@@ -112,6 +112,82 @@ fn nothing_that_a_terminal_would_obey_reaches_it() {
 }
 
 #[test]
+fn what_is_not_understood_is_answered_in_the_words_of_who_asked() {
+    let home = Home::new().with_photo();
+    fs::write(home.path("text.png"), "hello").unwrap();
+    fs::write(home.path("clip.mp4"), "video").unwrap();
+    let render = ["render", "photo.png", "--out", "o.png"];
+    for (args, code, said) in [
+        (
+            &["stream", "demo", "--to", "null", "--mask", "m.png"][..],
+            2,
+            "no option --mask of `stream`: it is for `render`",
+        ),
+        (
+            &["record", "demo", "--to", "r", "--keep-going"],
+            2,
+            "--keep-going of `record`: it is for `preview`, `stream`",
+        ),
+        (&["render", "photo.png", "--background", "w.jpg"], 2, "did you mean --behind?"),
+        (&["render", "photo.png", "--blurr", "3"], 2, "no option --blurr of `render`, did you mean --blur?"),
+        (&["render", "-dash.png", "--out", "o.png"], 2, "is ./-dash.png"),
+        (&["render", "photo.png", "depth.png", "--out", "o.png"], 2, "--depth-map FILE"),
+        (&["render", "photo.png", "--out", "o.png", "--backend", "cuda"], 2, "[possible values: auto, gpu, cpu]"),
+        (&["render", "photo.png", "--out", "o.png", "--depth", "mate"], 2, "did you mean matte?"),
+        (&["render", "photo.png", "--out", "o.png", "--depth-unit", "mm"], 2, "--depth-scale 1000"),
+        (&["render", "text.png", "--out", "o.png"], 1, "text.png: not a PNG or JPEG file"),
+        (&["render", "gone.png", "--out", "o.png"], 1, "gone.png: there is no such file"),
+        (&["config", "dump", "--config", "gone.toml"], 1, "gone.toml: there is no such file"),
+        (&["render", "photo.png", "--out", "o.png", "--depth-map", "photo.png"], 1, "--depth-unit inverse"),
+        (&["stream", "clip.mp4", "--to", "null"], 2, "ffmpeg -i 'clip.mp4'"),
+        (&["record", "demo", "--to", "rec.mp4"], 2, "a recording is a folder"),
+    ] {
+        let ran = home.run(args);
+        ran.refused(code, &[said]);
+        assert!(!ran.stderr.contains("tip:") && !ran.stderr.contains("os error"), "{}", ran.stderr);
+    }
+    for behind in ["green", "photo.png", "#00ff00"] {
+        home.run(
+            &[&render[..], &["--force", "--backend", "cpu", "--depth-map", "depth.png", "--behind", behind]].concat(),
+        )
+        .done();
+    }
+    assert!(!home.path("rec.mp4").exists());
+}
+
+/// A warning of the library's, and one of the command line's.
+#[test]
+fn all_warnings_look_alike() {
+    let home = Home::new().with_photo();
+    home.run(&["depth", "photo.png", "photo.png", "--max-disparity", "16", "--out", "d.pfm", "--backend", "cpu"])
+        .done();
+    let ran = home.run(&[
+        "render",
+        "photo.png",
+        "--depth-map",
+        "d.pfm",
+        "--out",
+        "o.png",
+        "--backend",
+        "cpu",
+        "--follow",
+        "2",
+    ]);
+    let warnings: Vec<&str> =
+        ran.done().lines().filter(|line| line.contains("without distances") || line.contains("--follow")).collect();
+    assert_eq!(warnings.len(), 2, "{}", ran.stderr);
+    assert!(warnings.iter().all(|line| line.starts_with("warning: ")), "{}", ran.stderr);
+}
+
+#[test]
+fn a_run_ends_with_one_line_and_with_its_times_where_they_are_wanted() {
+    let home = Home::new().with_recording();
+    let stream = ["stream", "recording", "--to", "null", "--backend", "cpu"];
+    assert_eq!(home.run(&stream).done().lines().count(), 1);
+    assert!(home.run(&[&stream[..], &["-v"]].concat()).done().contains("blur ms: p50"));
+}
+
+#[test]
 fn a_report_can_go_to_standard_output() {
     let home = Home::new();
     let args = ["stream", "synthetic", "--size", "32x24", "--frames", "2", "--effect", "none", "--report", "-", "--to"];

@@ -81,6 +81,10 @@ impl Home {
             }
         }
         command.env("XDG_CONFIG_HOME", self.0.path()).env_remove("RUST_LOG").env_remove("NO_COLOR");
+        command
+            .env("XDG_RUNTIME_DIR", self.0.path())
+            .env("XDG_DATA_HOME", self.0.path())
+            .env("XDG_DATA_DIRS", self.0.path());
         command.current_dir(self.0.path()).args(args).stdin(Stdio::null());
         command
     }

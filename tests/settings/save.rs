@@ -27,6 +27,31 @@ fn settings_are_saved_among_those_that_are_there() {
 }
 
 #[test]
+fn pictures_are_saved_by_their_whole_paths_and_those_in_the_file_count_from_it() {
+    let home = Home::new().with_photo();
+    home.run(&["config", "save", "--behind", "image:photo.png"]).done();
+    let whole = home.0.path().canonicalize().unwrap().join("photo.png");
+    let saved = text(&home.settings());
+    assert!(saved == format!("behind = \"image:{}\"\n", whole.display()) || saved.contains("/photo.png"), "{saved}");
+    assert!(saved.starts_with("behind = \"image:/"), "{saved}");
+
+    let home = Home::new().with_photo().with_settings("rim = 0.1\nbehind = \"image:wall.png\"\n");
+    let render = |home: &Home| {
+        home.run(&["render", "photo.png", "--depth-map", "depth.png", "--out", "out.png", "--backend", "cpu"])
+    };
+    let wall = home.path("bokehcam/wall.png");
+    render(&home).refused(1, &[wall.to_str().unwrap(), "there is no such file", "(behind in ", "config.toml)"]);
+    fs::copy(home.path("photo.png"), &wall).unwrap();
+    render(&home).done();
+    // A wrong value names its key, too, once it is known to be wrong.
+    let home = Home::new().with_photo().with_settings("effect = \"dof\"\n");
+    let ran = home.run(&["render", "photo.png", "--out", "out.png"]);
+    ran.refused(2, &["--effect dof needs depth", "(effect in ", "config.toml)"]);
+    let flag = home.run(&["render", "photo.png", "--out", "out.png", "--effect", "dof"]);
+    assert!(flag.code == 2 && !flag.stderr.contains("config.toml"), "{}", flag.stderr);
+}
+
+#[test]
 fn a_link_stays_a_link_even_one_to_nothing_yet() {
     let home = Home::new();
     fs::create_dir_all(home.path("bokehcam")).unwrap();

@@ -11,7 +11,15 @@ fn a_picture_without_depth_says_what_that_costs() {
     };
     for more in [&["--preset", "portrait"][..], &[]] {
         let ran = render(more);
-        assert!(ran.warning().contains("there is no depth, so a band of the picture stays sharp and the rest is blurred (tilt-shift): --depth-map"), "{more:?}");
+        let warning = ran.warning();
+        assert!(
+            warning.contains(
+                "there is no depth, so a band of the picture stays sharp and the rest is blurred (tilt-shift)"
+            )
+        );
+        for way in ["--depth matte", "--mask FILE", "--depth-map FILE", "NAME-depth.png"] {
+            assert!(warning.contains(way), "{more:?}: {warning}");
+        }
     }
     for (more, named) in [
         (&["--focus", "1.2"][..], "--focus 1.2"),
@@ -85,6 +93,6 @@ fn the_bench_says_what_it_has_no_use_for() {
     let bench = |more: &[&str]| Home::new().run(&[&args, more].concat());
     let ran = bench(&["--refine", "on", "--coc-at-infinity", "9"]);
     assert!(ran.warning().contains("--refine on (the scene's depth is exact)"), "{}", ran.stderr);
-    assert!(ran.warning().contains("--coc-at-infinity 9 (`bench` takes --coc)"), "{}", ran.stderr);
+    assert!(ran.warning().contains("--blur 9 (`bench` takes --coc)"), "{}", ran.stderr);
     bench(&["--depth", "stereo"]).refused(2, &["--depth is for `stream`"]);
 }

@@ -90,3 +90,27 @@ fn what_is_asked_from_outside_shows_here_and_what_is_done_here_shows_there() {
     assert!(ends_with_the_card(&ended.home.path().join("out.y4m")), "what was recorded ends with the card");
     assert!(!ended.home.path().join("run/bokehcam/preview.sock").exists());
 }
+
+#[test]
+#[ignore = "needs an X server"]
+fn what_others_change_is_judged_as_in_a_stream_and_is_not_remembered() {
+    let screen = Screen::new();
+    let mut program = Program::start(&screen, &[PORTRAIT, "--depth", "none", "--panel=false"]);
+    program.window().until("the first picture", is_photograph);
+    let said = |args: &[&str]| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_bokehcam"));
+        command.arg("ctl").args(args).env("XDG_RUNTIME_DIR", program.home().join("run")).current_dir(program.home());
+        let output = command.env("XDG_CONFIG_HOME", program.home().join("config")).output().unwrap();
+        (output.status.code().unwrap(), String::from_utf8(output.stderr).unwrap())
+    };
+    let (code, line) = said(&["set", "focus=1.0", "rim=0.7"]);
+    assert!(code == 0 && line.contains("warning: without effect here: --focus 1 (there is no depth)"), "{line}");
+    let (code, line) = said(&["set", "effect=dof"]);
+    assert!(code == 2 && line.contains("--effect dof follows depth, and this run has none"), "{line}");
+    assert_eq!(status(&program)["look"]["rim"], "0.7");
+    program.interrupt();
+    let ended = program.end();
+    ended.succeeded();
+    let remembered = fs::read_to_string(ended.home.path().join("state/bokehcam/window.toml")).unwrap();
+    assert!(remembered.contains("rim = \"0.2\""), "{remembered}");
+}

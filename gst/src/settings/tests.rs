@@ -1,7 +1,7 @@
 use super::*;
 
 fn place(name: &str) -> usize {
-    SETTINGS.iter().position(|setting| setting.name == name).unwrap()
+    SETTINGS.iter().position(|setting| super::called(setting) == name).unwrap()
 }
 
 #[test]

@@ -15,7 +15,7 @@ use crate::cli::options;
 use crate::cli::settings::layers::Given;
 use crate::cli::settings::look;
 use crate::cli::settings::unused;
-use crate::cli::terminal::print;
+use crate::cli::terminal::{Progress, print};
 use crate::compute::{Backend, thread_pool::cores};
 use crate::computing::Computing;
 use crate::frame::{ColorImage, DepthMap};
@@ -28,6 +28,10 @@ use crate::pipeline::still::{Depth, coc_and_depth};
 use crate::scene::{Scene, View};
 use crate::source::{self, DepthChoice, Size, SourceName};
 
+/// Frames that are measured where nobody says how many: as many as there is time for.
+const FRAMES: u32 = 20;
+const LEAST_FRAMES: usize = 5;
+const ENOUGH: Duration = Duration::from_secs(2);
 /// Frames before those that are measured: caches fill, and the processor's clock rises.
 const WARM_UP_FRAMES: usize = 2;
 
@@ -62,10 +66,9 @@ pub struct BenchCommand {
     /// What is in the picture
     #[arg(long, value_parser = options::named::<BenchScene>(), value_name = "WHICH", default_value_t = BenchScene::Sitter)]
     scene: BenchScene,
-    /// Frames to measure
-    #[arg(id = "benched_frames", long = "frames", value_name = "N", default_value_t = 20,
-          value_parser = value_parser!(u32).range(1..))]
-    frames: u32,
+    /// Frames to measure [default: 20, or fewer where these would take more than 2 s]
+    #[arg(id = "benched_frames", long = "frames", value_name = "N", value_parser = value_parser!(u32).range(1..))]
+    frames: Option<u32>,
     /// What runs the blur
     #[arg(long, value_parser = options::named::<Backend>(), value_name = "WHICH", default_value = "auto")]
     backend: Backend,
@@ -118,7 +121,7 @@ struct Measured {
 ///
 /// # Errors
 /// The options do not fit each other, there is no such executor, or it failed.
-pub fn run(command: &BenchCommand, given: &Given) -> Result<(), CliError> {
+pub fn run(command: &BenchCommand, global: &options::Global, given: &Given) -> Result<(), CliError> {
     if let Some(source) = &command.chain {
         return chain::run(command, source, given);
     }
@@ -145,6 +148,9 @@ pub fn run(command: &BenchCommand, given: &Given) -> Result<(), CliError> {
     if !command.json {
         print(b"size        coc px  quality    p50 ms   p95 ms   max ms     fps  executor\n")?;
     }
+    let combinations = command.sizes.len() * command.coc.len().max(1) * command.quality.len().max(1);
+    let combinations = (combinations * command.computings().len()) as u64;
+    let mut done = 0;
     let levels = if command.quality.is_empty() { &[Quality::default()][..] } else { &command.quality };
     for size in &command.sizes {
         let (color, depth) = synthetic_frame(command.scene, (size.width, size.height));
@@ -153,7 +159,15 @@ pub fn run(command: &BenchCommand, given: &Given) -> Result<(), CliError> {
         for &coc_px in radii_px {
             for &quality in levels {
                 for computing in command.computings() {
-                    let measured = measure(command, &look, (&color, &depth), coc_px, quality, &computing)?;
+                    // The bar goes before a row is printed where it was.
+                    let progress =
+                        Progress::new(Some(combinations * u64::from(command.frames.unwrap_or(FRAMES))), global);
+                    let before = done * u64::from(command.frames.unwrap_or(FRAMES));
+                    progress.delivered(before);
+                    let measured =
+                        measure(command, &look, (&color, &depth), (coc_px, quality), &computing, (&progress, before))?;
+                    drop(progress);
+                    done += 1;
                     print(measured.line(command.json, command.passes).as_bytes())?;
                 }
             }
@@ -173,14 +187,15 @@ impl BenchCommand {
     }
 }
 
-/// Measures one combination of settings: blurs the same picture `command.frames` times after a warm-up.
+/// Measures one combination of settings: blurs the same picture again and again after a warm-up. `progress` had counted
+/// `before` frames.
 fn measure(
     command: &BenchCommand,
     look: &Look,
     (color, depth): (&ColorImage, &DepthMap),
-    coc_px: f32,
-    quality: Quality,
+    (coc_px, quality): (f32, Quality),
     computing: &Computing,
+    (progress, before): (&Progress, u64),
 ) -> Result<Measured, CliError> {
     let look = Look { strength: Strength::AtInfinity(coc_px), quality: Some(quality), ..look.clone() };
     let size = color.size();
@@ -202,7 +217,13 @@ fn measure(
     }
     let mut times = Vec::new();
     let mut passes = BTreeMap::<_, Vec<Duration>>::new();
-    for _ in 0..command.frames {
+    let began = Instant::now();
+    for frame in 1..=command.frames.unwrap_or(FRAMES) {
+        let is_enough = command.frames.is_none() && times.len() >= LEAST_FRAMES && began.elapsed() > ENOUGH;
+        if is_enough {
+            break;
+        }
+        progress.delivered(before + u64::from(frame));
         let (time, in_passes) = buffers.time_frame(&mut *bokeh, coc)?;
         times.push(time);
         in_passes.iter().for_each(|(name, time)| passes.entry(name).or_default().push(time));
@@ -213,7 +234,7 @@ fn measure(
         coc_px,
         quality: quality.name(),
         executor: bokeh.describe(),
-        frames: command.frames,
+        frames: times.len() as u32,
         p50_ms: quantile_ms(&times, 0.5),
         p95_ms: quantile_ms(&times, 0.95),
         max_ms: quantile_ms(&times, 1.0),

@@ -8,14 +8,17 @@ use clap::{Args, Subcommand};
 use crate::cli::error::CliError;
 use crate::cli::log;
 use crate::cli::options::Global;
+use crate::cli::settings::paths::counted_from;
 use crate::cli::terminal::{print, say};
-use crate::control::client::ask;
+use crate::control::client::{ask, runs};
 use crate::control::{Answer, ControlError, Name, Request, Status};
+use crate::look::settings;
 
 /// Control a stream or a preview while it runs: off and on, another look, a picture
 #[derive(Args, Debug)]
 #[command(after_help = "\
 Examples:
+  bokehcam ctl                              what runs
   bokehcam ctl toggle
   bokehcam ctl preset dreamy
   bokehcam ctl set blur=3% focus=auto
@@ -25,15 +28,17 @@ Examples:
 Off shows a still card in place of the picture, and the camera rests. The picture without blur is `set effect=none`.
 docs/ctl.md (in a package /usr/share/doc/bokehcam/docs/ctl.md) has recipes for keys and bars, and the protocol.")]
 pub struct CtlCommand {
-    /// Which run, where there are several: its --name, or as `bokehcam ctl` lists them
+    /// Which run, where there are several: its --name, or as `bokehcam ctl list` has it
     #[arg(long, global = true, value_name = "NAME")]
     name: Option<Name>,
     #[command(subcommand)]
-    verb: Verb,
+    verb: Option<Verb>,
 }
 
 #[derive(Subcommand, Debug)]
 enum Verb {
+    /// List what runs: name, on or off, source and outputs; so does `ctl` alone
+    List,
     /// Show pictures again, as before
     On,
     /// Show a still card in place of the picture; the camera rests
@@ -48,7 +53,7 @@ enum Verb {
     },
     /// Change settings of the look: all of them, or none if one cannot be
     Set {
-        /// Settings as on the command line without the dashes; blur is coc-at-infinity
+        /// Settings as on the command line, without the dashes
         #[arg(id = "settings", value_name = "NAME=VALUE", required = true)]
         settings: Vec<String>,
     },
@@ -71,9 +76,12 @@ enum Verb {
 /// # Errors
 /// There is no such run, or several; or it refuses.
 pub fn run(command: CtlCommand, global: &Global) -> Result<(), CliError> {
-    let as_json = matches!(command.verb, Verb::Status { json: true });
-    let is_status = matches!(command.verb, Verb::Status { .. });
-    let request = match command.verb {
+    let CtlCommand { name, verb } = command;
+    let verb = verb.unwrap_or(Verb::List);
+    let as_json = matches!(verb, Verb::Status { json: true });
+    let is_status = matches!(verb, Verb::Status { .. });
+    let request = match verb {
+        Verb::List => return list(name.as_ref()),
         Verb::On => Request::On,
         Verb::Off => Request::Off,
         Verb::Toggle => Request::Toggle,
@@ -82,7 +90,7 @@ pub fn run(command: CtlCommand, global: &Global) -> Result<(), CliError> {
         Verb::Status { .. } => Request::Status,
         Verb::Snapshot { to } => Request::Snapshot { to: to.map(|to| absolute(&to)).transpose()? },
     };
-    match ask(command.name.as_ref(), &request)? {
+    match ask(name.as_ref(), &request)? {
         Answer::Done { status, note } => {
             note.iter().for_each(|note| log::warn(note));
             match (is_status, as_json) {
@@ -111,13 +119,34 @@ impl From<ControlError> for CliError {
     }
 }
 
+/// Says what runs, a line each.
+fn list(name: Option<&Name>) -> Result<(), CliError> {
+    let runs: Vec<Name> = runs()?.into_iter().filter(|run| name.is_none_or(|name| run == name)).collect();
+    if runs.is_empty() {
+        say("nothing runs: begin with `bokehcam stream` or `bokehcam preview`");
+    }
+    let line = |run: &Name| match ask(Some(run), &Request::Status) {
+        Ok(Answer::Done { status, .. }) => {
+            let Status { on, source, sinks, .. } = *status;
+            let source = if source.is_empty() { "no source" } else { &source };
+            format!("{run:<12} {:<4} {source} to {}\n", if on { "on" } else { "off" }, sinks.join(", "))
+        }
+        Ok(_) => format!("{run:<12} ?    it answers as another version does\n"),
+        Err(error) => format!("{run:<12} ?    {error}\n"),
+    };
+    print(runs.iter().map(line).collect::<String>().as_bytes())
+}
+
 /// A setting as the run understands it, which is in another folder.
 fn here(setting: String) -> Result<String, CliError> {
-    const IMAGE: &str = "aperture=image:";
-    match setting.strip_prefix(IMAGE) {
-        Some(file) if !file.is_empty() => Ok(format!("{IMAGE}{}", absolute(Path::new(file))?.display())),
-        _ => Ok(setting),
+    let Some((name, value)) = setting.split_once('=') else { return Ok(setting) };
+    let folder = std::env::current_dir().map_err(CliError::io(".".as_ref()))?;
+    let whole = counted_from(&folder, name, value);
+    if whole == value {
+        return Ok(setting);
     }
+    absolute(&folder)?;
+    Ok(format!("{name}={whole}"))
 }
 
 fn absolute(path: &Path) -> Result<PathBuf, CliError> {
@@ -147,7 +176,9 @@ fn lines(status: &Status) -> String {
     };
     let sinks = if sinks.is_empty() { "nowhere else".to_owned() } else { sinks.join(", ") };
     let quality = quality.as_ref().map_or("not blurred".to_owned(), |quality| format!("quality {quality}"));
-    let look: Vec<String> = look.iter().map(|(name, value)| format!("{name}={value}")).collect();
+    let is_alias = |name: &str| settings::name_of(name) != name;
+    let look = look.iter().filter(|(name, _)| !is_alias(name)).map(|(name, value)| format!("{name}={value}"));
+    let look: Vec<String> = look.collect();
     let whole_s = *uptime_s as u64;
     let (hours, minutes, seconds) = (whole_s / 3600, whole_s / 60 % 60, whole_s % 60);
     let mut text = format!("{name} is {}\n", state(status));

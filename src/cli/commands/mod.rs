@@ -2,6 +2,7 @@
 
 mod aperture;
 mod bench;
+mod completions;
 mod ctl;
 mod depth;
 mod devices;
@@ -19,6 +20,7 @@ mod stream;
 use clap::{ArgMatches, CommandFactory, Parser, Subcommand};
 
 use crate::cli::error::CliError;
+use crate::cli::help;
 use crate::cli::options;
 use crate::cli::settings::file::SettingsFile;
 use crate::cli::settings::layers::Layers;
@@ -119,17 +121,18 @@ pub fn perform(cli: Cli, matches: &ArgMatches, file: &SettingsFile, layers: &Lay
         Command::Record(command) => record::run(&command, &cli.global, &layers.given(matches)),
         Command::Plate(command) => plate::run(&command, &cli.global, &layers.given(matches)),
         Command::Aperture(command) => aperture::run(&command, &cli.global),
-        Command::Bench(command) => bench::run(&command, &layers.given(matches)),
-        Command::Devices(command) => devices::run(&command),
+        Command::Bench(command) => bench::run(&command, &cli.global, &layers.given(matches)),
+        Command::Devices(command) => devices::run(&command, &cli.global),
         Command::Doctor(command) => doctor::run(&command),
         #[cfg(feature = "networks")]
         Command::Models(command) => models::run(&command),
         Command::Completions { shell } => {
             let mut script = Vec::new();
-            clap_complete::generate(shell, &mut Cli::command(), "bokehcam", &mut script);
+            let mut table = completions::completed(help::whole(Cli::command()), file);
+            clap_complete::generate(shell, &mut table, "bokehcam", &mut script);
             print(&script)
         }
-        Command::Manual(command) => manual::run(&command, Cli::command()),
+        Command::Manual(command) => manual::run(&command, help::whole(Cli::command())),
         Command::Config(ConfigCommand::Dump { .. }) => {
             print(dump::as_toml(&layers.resolved(matches), &file.presets).as_bytes())
         }

@@ -25,11 +25,14 @@ pub struct ModelsCommand {
 
 #[derive(Subcommand, Debug)]
 enum What {
-    /// Check that a file is a network that is known, and copy it to where it is looked for
-    #[command(after_help = "Example:\n  bokehcam models add selfie_segmentation_landscape.onnx")]
+    /// List them, as does `models` alone
+    List,
+    /// Check that files are networks that are known, and copy them to where these are looked for
+    #[command(alias = "install", after_help = "Example:\n  bokehcam models add selfie_segmentation_landscape.onnx")]
     Add {
-        /// The file, .onnx
-        file: PathBuf,
+        /// The files, .onnx
+        #[arg(required = true, value_name = "FILE")]
+        files: Vec<PathBuf>,
     },
 }
 
@@ -39,8 +42,8 @@ enum What {
 /// The file is no network that is known, or cannot be copied.
 pub fn run(command: &ModelsCommand) -> Result<(), CliError> {
     match &command.what {
-        None => print(listed().as_bytes()),
-        Some(What::Add { file }) => add(file),
+        None | Some(What::List) => print(listed().as_bytes()),
+        Some(What::Add { files }) => files.iter().try_for_each(|file| add(file)),
     }
 }
 
@@ -69,6 +72,10 @@ fn listed() -> String {
 }
 
 fn add(file: &Path) -> Result<(), CliError> {
+    if file.to_str().is_some_and(|name| name.contains("://")) {
+        let what = "nothing is downloaded: get the file with your browser, then `bokehcam models add FILE`";
+        return Err(CliError::Usage(format!("{}: {what}", file.display())));
+    }
     let failed = |path: &Path| {
         let path = path.to_owned();
         move |source: io::Error| CliError::Io { path, source }

@@ -36,7 +36,7 @@ pub struct PlateCommand {
     #[arg(value_parser = options::source_name())]
     source: SourceName,
     /// Where the plate goes, .png or .jpg
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, alias = "out", value_name = "FILE")]
     to: PathBuf,
     #[command(flatten)]
     frames: options::Frames,

@@ -34,7 +34,7 @@ pub struct RecordCommand {
     #[arg(value_parser = options::source_name())]
     source: SourceName,
     /// Folder for the recording
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, alias = "out", value_name = "DIR")]
     to: PathBuf,
     #[command(flatten)]
     frames: options::Frames,
@@ -57,6 +57,14 @@ pub fn run(command: &RecordCommand, global: &options::Global, given: &Given) -> 
         stereo: command.stereo.clone(),
         ..Options::default()
     };
+    let ending = command.to.extension().and_then(|ending| ending.to_str()).unwrap_or_default();
+    if ["mp4", "mkv", "webm", "mov", "avi", "y4m"].contains(&ending) && !command.to.is_dir() {
+        let to = command.to.display();
+        return Err(CliError::Usage(format!(
+            "--to {to}: a recording is a folder of pictures; a video is made by `bokehcam stream {} --effect none --to FILE.mp4`",
+            command.source
+        )));
+    }
     if let Some(folder) = command.source.folder() {
         refuse_source("--to", &command.to, folder)?;
     }

@@ -228,9 +228,7 @@ pub fn run(command: &StreamCommand, global: &options::Global, given: Given) -> R
         Err(failed) => (failed.report, Err(failed.fault.into())),
     };
     let written = stream.report.as_ref().map_or(Ok(()), |path| report::write(path, &report, output.force));
-    if !global.quiet {
-        terminal::say(&report.to_string());
-    }
+    terminal::say_report(&report, global);
     match (ended, written) {
         // What ended the run is the error to tell.
         (Err(ended), Err(unwritten)) => {

@@ -61,6 +61,10 @@ fn option(setting: &'static Setting) -> Arg {
         .help(setting.help.trim_start())
         .help_heading(heading)
         .conflicts_with_all(excluded);
+    let arg = match setting.alias() {
+        Some(alias) => arg.alias(alias),
+        None => arg,
+    };
     let arg = match setting.default() {
         Some(default) => arg.default_value(default),
         None => arg,

@@ -15,6 +15,7 @@ pub use crate::source::options::{Depth, Frames, Networks, Stereo};
 pub use groups::{Every, Streaming};
 pub use look::{LookSettings, named};
 
+use crate::cli::help::DEPTH;
 use crate::compute::Backend;
 use crate::computing;
 use crate::look::Effect;
@@ -48,6 +49,9 @@ pub struct Global {
     /// How log lines are written to stderr; RUST_LOG chooses which
     #[arg(long, global = true, value_parser = named::<LogFormat>(), value_name = "FORMAT", default_value = "text")]
     pub log_format: LogFormat,
+    /// Show all options
+    #[arg(long, global = true, action = clap::ArgAction::HelpLong)]
+    help_all: Option<bool>,
     /// Settings file instead of $XDG_CONFIG_HOME/bokehcam/config.toml
     #[arg(long, global = true, value_name = "FILE", env = "BOKEHCAM_CONFIG", hide_env = true)]
     pub config: Option<PathBuf>,
@@ -61,12 +65,8 @@ pub struct Blur {
     /// settings file); other settings of the look go before it
     #[arg(long, value_name = "NAME")]
     pub preset: Option<String>,
-    /// Where depth comes from: auto (the source's, when the effect needs it: recorded, else from its two eyes), recorded
-    /// (the source's), stereo (from its two eyes), none, a folder with a recording whose depth is played in a loop, a depth
-    /// camera (/dev/videoN, N, or part of its name), networks that need one camera alone: matte[:FILE.onnx] (where a
-    /// person is), mono[:FILE.onnx] (how near all is), or matte,mono; without FILE, the best that is installed; or
-    /// plate[:FILE.png], a picture of what is behind you, taken at the start if there is no FILE (the camera stands still); of a photograph, defocus (its own, magnified)
-    #[arg(long, value_name = "FROM", default_value = "auto")]
+    /// Where depth comes from: auto, recorded, stereo, none, matte, mono, plate, a folder or a depth camera
+    #[arg(long, value_name = "FROM", default_value = "auto", long_help = DEPTH)]
     pub depth: DepthChoice,
     /// The look, but for its quality.
     #[command(flatten)]

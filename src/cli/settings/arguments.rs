@@ -2,12 +2,14 @@
 
 use std::error::Error as _;
 use std::ffi::{OsStr, OsString};
+use std::io;
 use std::os::unix::ffi::{OsStrExt, OsStringExt};
 use std::process::ExitCode;
 
 use clap::error::ErrorKind;
 
-use super::environment;
+use super::{environment, unknown};
+use crate::cli::error::CliError;
 use crate::cli::log;
 use crate::cli::options::LogFormat;
 use crate::source::SourceError;
@@ -54,15 +56,23 @@ pub fn log_format(args: &[OsString]) -> LogFormat {
 pub fn refuse(error: &clap::Error, args: &[OsString]) -> ExitCode {
     match error.kind() {
         ErrorKind::DisplayHelp | ErrorKind::DisplayVersion => {
-            // A closed standard output is no reason to fail.
-            let _ = error.print();
-            return ExitCode::SUCCESS;
+            return match error.print() {
+                Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
+                    log::error(&CliError::io("standard output".as_ref())(error).to_string());
+                    ExitCode::FAILURE
+                }
+                // A closed standard output is no reason to fail.
+                _ => ExitCode::SUCCESS,
+            };
         }
         ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand => {
             let _ = error.print();
         }
         ErrorKind::InvalidUtf8 => log::error(&not_text(args)),
-        _ => log::error(&environment::with_origin(&log::one_line(error), args)),
+        _ => {
+            let what = unknown::said(error, args).unwrap_or_else(|| log::one_line(error));
+            log::error(&environment::with_origin(&what, args, true, None));
+        }
     }
     let names_a_source = error.source().and_then(|cause| cause.downcast_ref::<SourceError>());
     if names_a_source.is_some_and(|error| !error.is_wrong_argument()) { ExitCode::FAILURE } else { ExitCode::from(2) }

@@ -6,13 +6,11 @@ use std::path::Path;
 use clap::{Args, Command};
 
 use super::file::SettingsFile;
+use super::table;
 use crate::cli::error::CliError;
 use crate::cli::log;
 use crate::cli::options::LookSettings;
-use crate::look::Patch;
-
-/// What the strength of the blur is called here, too.
-const SHORT: (&str, &str) = ("blur", "coc-at-infinity");
+use crate::look::{Patch, settings};
 
 /// The changes that settings make, each written `NAME=VALUE`.
 ///
@@ -24,14 +22,35 @@ pub fn patch(settings: &[String]) -> Result<Patch, CliError> {
         let pair = setting.split_once('=').filter(|(name, _)| !name.is_empty());
         let (name, value) = pair
             .ok_or_else(|| CliError::Usage(format!("'{setting}': write NAME=VALUE, such as blur=3% or focus=auto")))?;
-        Ok((if name == SHORT.0 { SHORT.1 } else { name }, value))
+        let name = name.trim_start_matches('-');
+        if settings::setting(name).is_none() {
+            Err(CliError::Usage(no_setting(name, value)))
+        } else {
+            Ok((name, value))
+        }
     });
     let pairs = pairs.collect::<Result<Vec<_>, CliError>>()?;
-    let command = Command::new("settings").disable_help_flag(true).no_binary_name(true);
-    let command = LookSettings::<true>::augment_args(LookSettings::<false>::augment_args(command));
+    let command = of_a_look();
     let flags = pairs.iter().map(|(name, value)| OsString::from(format!("--{name}={value}")));
     command.try_get_matches_from(flags).map_err(|error| CliError::Usage(log::one_line(&error)))?;
     loaded(Patch::parse(pairs))
+}
+
+fn of_a_look() -> Command {
+    let command = Command::new("settings").disable_help_flag(true).no_binary_name(true);
+    LookSettings::<true>::augment_args(LookSettings::<false>::augment_args(command))
+}
+
+/// Why a look has no setting of this name, and what to do.
+fn no_setting(name: &str, value: &str) -> String {
+    if name == "preset" {
+        return format!("a preset is taken by `bokehcam ctl preset {value}`");
+    }
+    if table::is_setting(name) {
+        return format!("'{name}' cannot be changed while it runs: only the look can");
+    }
+    let hint = table::nearest_in(of_a_look(), name).map_or(String::new(), |near| format!(", did you mean {near}?"));
+    format!("there is no setting '{name}' of the look{hint}")
 }
 
 /// The changes that a preset makes, built in or of the settings file, as that is now.
@@ -45,7 +64,7 @@ pub fn preset(chosen: Option<&Path>, name: &str) -> Result<Patch, CliError> {
 }
 
 fn loaded(patch: Result<Patch, (String, String)>) -> Result<Patch, CliError> {
-    let mut patch = patch.map_err(|(name, what)| CliError::Usage(format!("--{name}: {what}")))?;
+    let mut patch = patch.map_err(|(name, what)| CliError::Usage(format!("{name}: {what}")))?;
     patch.load()?;
     Ok(patch)
 }
@@ -63,13 +82,18 @@ mod tests {
     fn settings_are_those_of_the_command_line() {
         let values = changed(&["blur=3%", "focus=auto", "quality=fast"]).unwrap();
         let text = |value: &str| value.to_string();
-        assert_eq!(values, [("focus", text("auto")), ("coc-at-infinity", text("3%")), ("quality", text("fast"))]);
+        assert_eq!(values, [("focus", text("auto")), ("blur", text("3%")), ("quality", text("fast"))]);
         for (bad, said) in [
             (&["rim"][..], "write NAME=VALUE"),
             (&["=3"], "write NAME=VALUE"),
             (&["rim=2"], "invalid value '2' for '--rim <W>': use a number from 0 to 1"),
-            (&["rimm=1"], "similar argument exists: '--rim'"),
-            (&["mirror=true"], "unexpected argument '--mirror'"),
+            (&["rimm=1"], "there is no setting 'rimm' of the look, did you mean rim?"),
+            (&["blurr=3%"], "there is no setting 'blurr' of the look, did you mean blur?"),
+            (&["zzz=3"], "there is no setting 'zzz' of the look"),
+            (&["preset=dreamy"], "`bokehcam ctl preset dreamy`"),
+            (&["depth=matte"], "'depth' cannot be changed while it runs"),
+            (&["coc-at-infinity=3", "blur=3"], "cannot be used multiple times"),
+            (&["mirror=true"], "'mirror' cannot be changed while it runs"),
             (&["effect=big"], "possible values"),
             (&["blur=3%", "f-number=2"], "cannot be used with"),
             (&["rim=0.1", "rim=0.2"], "cannot be used multiple times"),

@@ -46,11 +46,10 @@ mod tests {
 
     #[test]
     fn commands_read_as_one_would_write_them() {
-        let flags =
-            [("rim", "0.1".to_string()), ("intensity", "-0.5".to_string()), ("coc-at-infinity", "3%".to_string())];
+        let flags = [("rim", "0.1".to_string()), ("intensity", "-0.5".to_string()), ("blur", "3%".to_string())];
         assert_eq!(
             equivalent("/dev/video0", &[], &flags, &[]),
-            "bokehcam preview /dev/video0 --rim 0.1 --intensity=-0.5 --coc-at-infinity 3%"
+            "bokehcam preview /dev/video0 --rim 0.1 --intensity=-0.5 --blur 3%"
         );
         let outputs = ["/dev/video10".to_string(), "-".to_string()];
         assert_eq!(

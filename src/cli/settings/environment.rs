@@ -3,15 +3,22 @@
 use std::ffi::OsString;
 use std::os::unix::ffi::OsStrExt;
 
-use super::table::{PREFIX, all_settings, nearest_setting, variable};
+use super::file::SettingsFile;
+use super::layers::Layers;
+use super::table::{PREFIX, all_settings, given_variable, nearest_setting, variable};
 use crate::cli::log;
+use crate::look::settings;
 
 /// Variables of this program that are no settings: the path of the settings file, and those of the tests.
 const NOT_SETTINGS: [&str; 6] = ["CONFIG", "DATA", "NO_VM", "PAIR", "SCREENSHOTS", "VM"];
 
 /// Warns of variables that begin with `BOKEHCAM_` and belong to no setting.
 pub fn warn_of_unknown() {
-    let known: Vec<String> = all_settings().get_arguments().filter_map(|arg| arg.get_long().map(variable)).collect();
+    let settings = all_settings();
+    let names = settings.get_arguments().flat_map(|arg| {
+        arg.get_long().into_iter().chain(arg.get_all_aliases().unwrap_or_default()).map(variable).collect::<Vec<_>>()
+    });
+    let known: Vec<String> = names.collect();
     let names = std::env::vars_os().map(|(name, _)| name.to_string_lossy().into_owned());
     let is_unknown = |name: &String| {
         let rest = name.strip_prefix(PREFIX);
@@ -30,12 +37,25 @@ fn described(name: &str) -> String {
     format!("{name}, which is no setting{hint}")
 }
 
-/// An error message, with those environment variables appended that set the options it names.
-pub fn with_origin(message: &str, args: &[OsString]) -> String {
+/// An error message, with what it is of appended where that is none of the arguments: environment variables that set the
+/// options it names, if these are wrong, and keys of the settings file.
+pub fn with_origin(
+    message: &str,
+    args: &[OsString],
+    are_wrong: bool,
+    file: Option<(&SettingsFile, &Layers)>,
+) -> String {
+    let message = &if are_wrong { with_variables(message, args) } else { message.to_owned() };
+    let options: Vec<&str> = options_in(message).filter(|_| are_wrong).collect();
+    let keys = file.map_or(Vec::new(), |(file, layers)| layers.behind(message, &options, file));
+    if keys.is_empty() { message.to_owned() } else { format!("{message} ({})", keys.join(", ")) }
+}
+
+fn with_variables(message: &str, args: &[OsString]) -> String {
     let mut variables: Vec<String> = options_in(message)
-        .filter(|name| !has_option(args, name))
+        .filter(|name| !called(name).any(|name| has_option(args, name)))
         .filter_map(|name| {
-            let variable = variable(name);
+            let variable = given_variable(name);
             let value = std::env::var_os(&variable).filter(|value| !value.is_empty())?;
             Some(format!("{variable}={}", value.to_string_lossy()))
         })
@@ -45,6 +65,12 @@ pub fn with_origin(message: &str, args: &[OsString]) -> String {
         true => message.to_owned(),
         false => format!("{message} (in the environment: {})", variables.join(", ")),
     }
+}
+
+/// All names of the setting that is called so.
+fn called(name: &str) -> impl Iterator<Item = &str> {
+    let alias = settings::setting(name).and_then(settings::Setting::alias);
+    [Some(settings::name_of(name)), alias].into_iter().flatten()
 }
 
 /// Whether the option `--name` is among the arguments.

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use toml::de::{DeTable, DeValue};
 
+use super::paths::counted_from;
 use super::table::{Values, is_setting, nearest_setting, parse_flags};
 use crate::cli::error::CliError;
 use crate::cli::log::{one_line, printable};
@@ -20,6 +21,8 @@ pub struct SettingsFile {
     pub values: Values,
     /// The settings of each preset in it.
     pub presets: BTreeMap<String, Values>,
+    /// The file itself; `None` where there is none.
+    pub path: Option<PathBuf>,
 }
 
 /// The table of the file that the presets are in.
@@ -54,16 +57,18 @@ impl SettingsFile {
         let keys = DeTable::parse(text).map_err(|error| {
             refuse((error.span().map_or(0, |span| span.start), error.message().replace('\n', ", ")))
         })?;
-        let mut file = Self::default();
+        let mut file = Self { path: Some(path.to_owned()), ..Self::default() };
+        let whole = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
+        let folder = whole.parent().unwrap_or(&whole);
         let (tables, settings): (Vec<_>, Vec<_>) = in_order(keys.get_ref()).partition(|entry| entry.name == PRESETS);
-        file.values = checked(settings, &is_setting).map_err(refuse)?;
+        file.values = checked(settings, &is_setting, folder).map_err(refuse)?;
         for presets in tables {
             let no_table = || refuse((presets.at, "presets are tables: write [presets.NAME]".to_string()));
             for entry in in_order(presets.value.as_table().ok_or_else(no_table)?) {
                 let settings = entry.value.as_table().ok_or_else(no_table)?;
                 check_name(entry.name).map_err(|what| refuse((entry.at, what)))?;
                 let of_a_look = |name: &str| look::settings::setting(name).is_some();
-                let values = checked(in_order(settings), &of_a_look).map_err(refuse)?;
+                let values = checked(in_order(settings), &of_a_look, folder).map_err(refuse)?;
                 file.presets.insert(entry.name.to_owned(), values);
             }
         }
@@ -142,11 +147,12 @@ fn in_order<'a>(table: &'a DeTable<'a>) -> impl Iterator<Item = Entry<'a>> {
     keys.into_iter().map(|(key, value)| Entry { name: key.get_ref(), at: key.span().start, value: value.get_ref() })
 }
 
-/// The values as text, each checked by the parser of its flag. An error is the byte offset of a key and what is wrong
-/// with it.
+/// The values as text, each checked by the parser of its flag, with relative paths counted from `folder`. An error is the
+/// byte offset of a key and what is wrong with it.
 fn checked<'a>(
     entries: impl IntoIterator<Item = Entry<'a>>,
     allowed: &dyn Fn(&str) -> bool,
+    folder: &Path,
 ) -> Result<Values, (usize, String)> {
     let mut values = Values::new();
     for Entry { name, at, value } in entries {
@@ -168,7 +174,10 @@ fn checked<'a>(
             DeValue::Float(number) => number.as_str().trim_start_matches('+').to_owned(),
             _ => return Err((at, format!("'{name}' must be a text, a number, true or false"))),
         };
-        values.insert(name.to_owned(), value);
+        let value = counted_from(folder, name, &value);
+        if values.insert(look::settings::name_of(name).to_owned(), value).is_some() {
+            return Err((at, format!("'{name}' is there already, by its other name: leave one of them out")));
+        }
         // With those before it, so that two settings that exclude each other are found, too.
         parse_flags(&values).map_err(|error| (at, one_line(&error)))?;
     }
@@ -215,7 +224,7 @@ mod tests {
         assert!(refusal("rim = [1]\n").contains("must be a text, a number"));
         assert!(refusal("[rim]\nx = 1\n").contains("must be a text, a number"));
         let both = refusal("coc-at-infinity = 10\nf-number = 2\n");
-        assert!(both.starts_with("c.toml:2: ") && both.contains("--coc-at-infinity"), "{both}");
+        assert!(both.starts_with("c.toml:2: ") && both.contains("--blur"), "{both}");
         let foreign = refusal("\"\\u001b[31mrim\\ri\" = 1\n");
         assert!(foreign.contains("no setting '\\u{1b}[31mrim\\ri';"), "{foreign}");
         for text in [unknown, value, both] {
@@ -248,6 +257,7 @@ mod tests {
             ("[presets.mine]\nmirror = true\n", 2, "is not about the look"),
             ("[presets.mine]\npreset = 'portrait'\n", 2, "is not about the look"),
             ("[presets.mine]\nf-number = 2\ncoc-at-infinity = 3\n", 3, "cannot be used with"),
+            ("blur = 3\ncoc-at-infinity = 3\n", 2, "is there already"),
             ("[presets.mine.rim]\nx = 1\n", 1, "must be a text, a number"),
             ("rim = 0.1\n[presets.portrait]\nrim = 0.2\n", 2, "is built in"),
             ("[presets.\" \"]\n", 1, "needs a name"),

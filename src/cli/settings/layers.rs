@@ -11,6 +11,7 @@ use clap::parser::{RawValues, ValueSource};
 use clap::{Arg, ArgMatches, Command};
 
 use super::file::SettingsFile;
+use super::paths::file_in;
 use super::table::{STATED_BY_WINDOW, Values, all_settings, excluded_by, on_settings, parse_flags};
 use crate::cli::error::CliError;
 use crate::cli::log::one_line;
@@ -145,6 +146,21 @@ impl Layers {
         taken.extend(free);
     }
 
+    /// The settings of the file and of presets that a message speaks of, each with where it stands: by their options, where
+    /// these are meant, and by the files that they name.
+    pub fn behind(&self, message: &str, options: &[&str], file: &SettingsFile) -> Vec<String> {
+        let spoken_of = |name: &str, value: &str| {
+            options.iter().any(|option| settings::name_of(option) == name)
+                || file_in(value).is_some_and(|file| message.contains(file))
+        };
+        let place = |(name, (value, origin)): (&String, &(String, &str))| {
+            let path = file.path.as_ref().filter(|_| ["file", "preset"].contains(origin) && spoken_of(name, value))?;
+            let of_preset = if *origin == "preset" { " of the preset" } else { "" };
+            Some(format!("{name}{of_preset} in {}", path.display()))
+        };
+        self.values.iter().filter_map(place).collect()
+    }
+
     /// The command with these values as defaults of its flags, and without the environment variables to ignore.
     pub fn as_defaults(&self, command: Command) -> Command {
         on_settings(command, &|arg, name| {
@@ -204,7 +220,8 @@ fn source_of(given: &ArgMatches, arg: &Arg) -> Option<ValueSource> {
 /// Reads the settings in a snapshot, and checks them as if they were flags.
 fn read_snapshot(path: &Path) -> Result<Values, CliError> {
     let refuse = |what: String| CliError::Usage(format!("--like {}: {what}", path.display()));
-    let values: Values = snapshot::settings(path)?.into_iter().collect();
+    let written = snapshot::settings(path)?.into_iter();
+    let values: Values = written.map(|(name, value)| (settings::name_of(&name).to_owned(), value)).collect();
     if let Some(unknown) = values.keys().find(|name| settings::setting(name).is_none()) {
         return Err(refuse(format!(
             "its setting '{unknown}' is none of a look: it is of another version, or was edited"

@@ -10,8 +10,10 @@ pub mod environment;
 pub mod file;
 pub mod layers;
 pub mod look;
+pub mod paths;
 #[cfg(feature = "window")]
 pub mod presets;
 pub mod save;
 pub mod table;
+mod unknown;
 pub mod unused;

@@ -5,9 +5,10 @@ use std::path::Path;
 use toml_edit::{DocumentMut, Item, Table, TableLike};
 
 use super::file::{PRESETS, check_name};
+use super::paths::counted_from;
 use super::save;
 use crate::cli::error::CliError;
-use crate::look::Value;
+use crate::look::{Value, settings as table};
 
 /// Saves settings ([`Patch::of`] a look, so that the preset depends on nothing else) as the preset `name` in the file
 /// at `path`, in place of one of that name. All else in the file stays as it is, and the file changes as a whole or
@@ -17,7 +18,9 @@ use crate::look::Value;
 /// The name cannot be one; the file is no settings file, or cannot be read or written.
 pub fn save(path: &Path, name: &str, settings: &[Value]) -> Result<(), CliError> {
     check_name(name).map_err(CliError::Usage)?;
-    save::edit(path, |document| with_preset(document, name, settings))
+    let here = std::env::current_dir().map_err(CliError::io(".".as_ref()))?;
+    let settings: Vec<Value> = settings.iter().map(|(name, value)| (*name, counted_from(&here, name, value))).collect();
+    save::edit(path, |document| with_preset(document, name, &settings))
 }
 
 /// Gives the user's preset `name` another name; its place, its settings and their comments stay as they were.
@@ -75,7 +78,8 @@ fn with_preset(document: &mut DocumentMut, name: &str, settings: &[Value]) -> Op
     }
     let preset: &mut dyn TableLike = presets.get_mut(name)?.as_table_like_mut()?;
     let old: Vec<String> = preset.iter().map(|(key, _)| key.to_owned()).collect();
-    old.iter().filter(|key| !settings.iter().any(|(name, _)| name == key)).for_each(|key| drop(preset.remove(key)));
+    let stays = |key: &&String| settings.iter().any(|(name, _)| *name == table::name_of(key));
+    old.iter().filter(|key| !stays(key)).for_each(|key| drop(preset.remove(key)));
     settings.iter().for_each(|(name, text)| save::set(preset, name, text));
     Some(())
 }
@@ -150,7 +154,7 @@ mod tests {
         save(&path, "Abend, \"warm\"", &Patch::of(&look).values()).unwrap();
         let saved = fs::read_to_string(&path).unwrap();
         assert!(saved.starts_with(text), "{saved}");
-        assert!(saved.contains("rim = 0.3\n") && saved.contains("coc-at-infinity = \"3.5%\"\n"), "{saved}");
+        assert!(saved.contains("rim = 0.3\n") && saved.contains("blur = \"3.5%\"\n"), "{saved}");
         let all = parsed(&saved).all_presets();
         let preset = all.iter().find(|preset| preset.name.starts_with("Abend")).unwrap();
         assert_eq!(preset.patch.on(&Look::plain(Effect::Blur)).unwrap(), look);

@@ -11,20 +11,24 @@ use toml_edit::{DocumentMut, Item, TableLike, Value};
 use super::dump::toml_number;
 use super::file::{self, SettingsFile};
 use super::layers::Setting;
+use super::paths::counted_from;
 use super::table::excluded_by;
 use crate::cli::error::CliError;
 use crate::cli::files::write_whole;
 use crate::cli::terminal;
 use crate::files::input;
+use crate::look::settings;
 
 /// `config save`: the settings given as flags, into the file that was chosen or the user's.
 ///
 /// # Errors
 /// No setting was given; the file is no settings file, or cannot be read or written.
 pub fn run(chosen: Option<&Path>, settings: &[Setting]) -> Result<(), CliError> {
+    let here = std::env::current_dir().map_err(CliError::io(".".as_ref()))?;
     let by_flag = settings.iter().filter(|setting| setting.origin == "flag");
-    let given: Vec<(String, String)> =
-        by_flag.filter_map(|setting| Some((setting.name.clone(), setting.value.clone()?))).collect();
+    let given: Vec<(String, String)> = by_flag
+        .filter_map(|Setting { name, value, .. }| Some((name.clone(), counted_from(&here, name, value.as_deref()?))))
+        .collect();
     let names: Vec<String> = given.iter().map(|(name, _)| name.clone()).collect();
     if names.is_empty() {
         let what = "there is nothing to save: give settings as flags, such as --rim 0.1";
@@ -35,7 +39,8 @@ pub fn run(chosen: Option<&Path>, settings: &[Setting]) -> Result<(), CliError> 
     let mut removed: Vec<String> = Vec::new();
     edit(&path, |document| {
         let table = document.as_table_mut();
-        removed = excluded.iter().filter(|name| table.remove(name).is_some()).cloned().collect();
+        let excluded = excluded.iter().map(|name| key_of(table, name).to_owned()).collect::<Vec<_>>();
+        removed = excluded.into_iter().filter(|name| table.remove(name).is_some()).collect();
         given.iter().for_each(|(name, value)| set(table, name, value));
         Some(())
     })?;
@@ -93,8 +98,15 @@ fn link_target(path: &Path) -> Result<PathBuf, CliError> {
     Err(CliError::io(path)(io::Error::new(io::ErrorKind::InvalidInput, "a loop of links")))
 }
 
+/// The key that a table has a setting by, which may be its other name.
+pub fn key_of<'a>(table: &dyn TableLike, name: &'a str) -> &'a str {
+    let alias = settings::setting(name).and_then(settings::Setting::alias);
+    alias.filter(|alias| table.contains_key(alias)).unwrap_or(name)
+}
+
 /// Sets a key. If it is there already, its place and the comments around its value stay.
-pub fn set(table: &mut dyn TableLike, key: &str, text: &str) {
+pub fn set(table: &mut dyn TableLike, name: &str, text: &str) {
+    let key = key_of(table, name);
     let mut value = toml_number(text).unwrap_or_else(|| Value::from(text));
     match table.get_mut(key).and_then(Item::as_value_mut) {
         Some(old) => {

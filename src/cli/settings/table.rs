@@ -8,6 +8,7 @@ use clap::error::{ContextKind, ErrorKind};
 use clap::{Arg, ArgMatches, Args, Command};
 
 use crate::cli::options::Every;
+use crate::look::settings;
 
 /// Settings by their flags without the dashes, each value as it would follow its flag.
 pub type Values = BTreeMap<String, String>;
@@ -26,9 +27,17 @@ pub fn variable(setting: &str) -> String {
     format!("{PREFIX}{}", setting.replace('-', "_").to_uppercase())
 }
 
+/// The variable that a setting has its value from: by its other name, if that alone is there.
+pub fn given_variable(setting: &str) -> String {
+    let is_there = |variable: &String| std::env::var_os(variable).is_some_and(|value| !value.is_empty());
+    let by_name = variable(setting);
+    let other = settings::setting(setting).and_then(settings::Setting::alias).map(variable).filter(is_there);
+    if is_there(&by_name) { by_name } else { other.unwrap_or(by_name) }
+}
+
 /// Gives every setting its environment variable.
 pub fn with_environment(command: Command) -> Command {
-    on_settings(command, &|arg, name| arg.env(variable(name)).hide_env(true))
+    on_settings(command, &|arg, name| arg.env(given_variable(name)).hide_env(true))
 }
 
 /// A command that has every setting and nothing else.
@@ -38,12 +47,17 @@ pub fn all_settings() -> Command {
 
 /// Whether there is a setting of this name.
 pub fn is_setting(name: &str) -> bool {
-    all_settings().get_arguments().any(|arg| arg.get_long() == Some(name))
+    all_settings().get_arguments().any(|arg| arg.get_long() == Some(settings::name_of(name)))
 }
 
 /// The setting whose name clap would suggest.
 pub fn nearest_setting(name: &str) -> Option<String> {
-    let error = all_settings().try_get_matches_from([format!("--{name}")]).err()?;
+    nearest_in(all_settings(), name)
+}
+
+/// The option of a command whose name clap would suggest.
+pub fn nearest_in(command: Command, name: &str) -> Option<String> {
+    let error = command.try_get_matches_from([format!("--{name}")]).err()?;
     let suggested = error.get(ContextKind::SuggestedArg)?;
     (error.kind() == ErrorKind::UnknownArgument).then(|| suggested.to_string().trim_start_matches('-').to_owned())
 }

@@ -3,7 +3,7 @@
 //! Given are those of flags, the environment and a preset; the settings file is meant for all runs.
 
 use super::layers::Setting;
-use super::table::{GIVEN_TO_WINDOW, STATED_BY_WINDOW, variable};
+use super::table::{GIVEN_TO_WINDOW, STATED_BY_WINDOW, given_variable};
 use crate::cli::log;
 use crate::look::{Effect, Value};
 use crate::source::{DepthFrom, Kind};
@@ -90,7 +90,7 @@ const NEEDS: &[(&[&str], Why)] = &[
         From::Source(_) => dof(run),
     }),
     (&["tilt"], |run| (run.effect != Effect::TiltShift).then_some("the effect is not tilt-shift")),
-    (&["coc-at-infinity", "f-number", "focal-length", "sensor-width"], |run| {
+    (&["blur", "f-number", "focal-length", "sensor-width"], |run| {
         if run.source == From::Bench { Some("`bench` takes --coc") } else { blur(run) }
     }),
     (&["max-coc", "aperture", "intensity", "rim", "rank", "highlights", "quality"], blur),
@@ -201,7 +201,7 @@ fn as_given(setting: &Setting) -> String {
     let value = value.as_deref().unwrap_or_default();
     match *origin {
         "flag" => format!("--{name} {value}"),
-        "environment" => format!("{}={value}", variable(name)),
+        "environment" => format!("{}={value}", given_variable(name)),
         origin => format!("{name} = {value} of the {origin}"),
     }
 }
@@ -209,11 +209,16 @@ fn as_given(setting: &Setting) -> String {
 /// Warns that tilt-shift replaces depth of field, as there is no depth. Not for those who chose to do without.
 pub fn warn_of_no_depth(source: From) {
     let fix = match source {
-        From::Picture => "--depth-map FILE gives its depth",
+        From::Picture => {
+            "--depth matte finds the person (a network: `bokehcam models`), --mask FILE says where it is, --depth-map FILE or a \
+             map NAME-depth.png beside NAME gives its depth"
+        }
         From::Source(Kind::Photo) => {
             "a map NAME-depth.png beside NAME gives its depth, or a network (`bokehcam models`)"
         }
-        From::Source(Kind::Recording) => "--depth FOLDER takes another recording's",
+        From::Source(Kind::Recording) => {
+            "--depth FOLDER takes another recording's, --depth matte finds the person (`bokehcam models`)"
+        }
         From::Source(Kind::Camera) => {
             "one camera alone gives a portrait by --depth plate (step aside once), or by a network (`bokehcam models`)"
         }

@@ -50,9 +50,9 @@ impl Live {
     ) -> Result<(Self, Source), String> {
         let Opened { name, source, has_depth, takes_plates, .. } = opened;
         let measured = source.is_measured();
-        let crate::source::Source { camera, depth, guide, .. } = source;
+        let crate::source::Source { camera, depth, guide, depth_from, .. } = source;
         let info = camera.info();
-        let is_photo = SourceName::from_str(&name).is_ok_and(|name| name.kind() == Kind::Photo);
+        let kind = SourceName::from_str(&name).map_or(Kind::default(), |name| name.kind());
         let look = start.look.for_source(has_depth);
         let made_for = look.settings(info.size, ADAPTIVE);
         let bokeh = made_for.as_ref().map(|made_for| start.services.executor(made_for, info.size)).transpose()?;
@@ -109,7 +109,8 @@ impl Live {
             period_ns: info.period_ns,
             has_depth,
             is_live: info.live,
-            is_photo,
+            kind,
+            depth_from,
             takes_plates,
             executor,
             budget_ns,

@@ -38,6 +38,7 @@ use crate::look::Look;
 use crate::look::presets::Preset;
 
 use crate::source::devices::Choice;
+use crate::source::{DepthFrom, Kind};
 
 /// The source as it is now.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -67,8 +68,10 @@ pub struct Running {
     pub has_depth: bool,
     /// Whether its frames come at their own pace, as a camera's do. Others can stand still.
     pub is_live: bool,
-    /// Whether it is a photo: one picture that stands still.
-    pub is_photo: bool,
+    /// What it is; a photo is one picture that stands still.
+    pub kind: Kind,
+    /// What its depth comes from.
+    pub depth_from: DepthFrom,
     /// Whether it is a camera that a plate can be taken with.
     pub takes_plates: bool,
     pub executor: String,
@@ -228,7 +231,7 @@ impl State {
 
     /// Whether the source is a photo.
     pub fn is_photo(&self) -> bool {
-        matches!(&self.source, Source::Running(running) if running.is_photo)
+        matches!(&self.source, Source::Running(running) if running.kind == Kind::Photo)
     }
 
     /// Whether the picture that is shown stays: it was frozen, is a photo's, or no others come.

@@ -5,6 +5,7 @@ use crate::knob::Knob;
 use crate::look::presets::Preset;
 use crate::look::{Effect, Look, Patch, Strength, Tilt};
 use crate::source::devices::Choice;
+use crate::source::{DepthFrom, Kind};
 
 /// A look as a person may have it.
 pub fn look() -> Look {
@@ -25,7 +26,8 @@ pub fn running(has_depth: bool) -> Source {
         period_ns: 33_333_333,
         has_depth,
         is_live: true,
-        is_photo: false,
+        kind: Kind::Camera,
+        depth_from: if has_depth { DepthFrom::Metres } else { DepthFrom::Nothing },
         takes_plates: !has_depth,
         executor: "cpu, 2 threads, AVX2".into(),
         budget_ns: 33_333_333,

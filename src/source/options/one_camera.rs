@@ -3,6 +3,7 @@
 // What options say is shown as it is written, brackets included.
 #![allow(rustdoc::broken_intra_doc_links)]
 
+use std::fmt;
 use std::path::PathBuf;
 
 use clap::Args;
@@ -106,6 +107,19 @@ impl OneCamera {
         kinds.into_iter().filter(|(_, is_there)| *is_there).map(|(kind, _)| kind).collect::<Vec<_>>().join(",")
     }
 
+    /// The files that it names.
+    pub fn files_mut(&mut self) -> impl Iterator<Item = &mut PathBuf> {
+        let plate = match &mut self.plate {
+            Some(PlateFile::At(file)) => Some(file),
+            _ => None,
+        };
+        let networks = [&mut self.matte, &mut self.mono].into_iter().filter_map(|network| match network {
+            Some(NetworkFile::At(file)) => Some(file),
+            _ => None,
+        });
+        plate.into_iter().chain(networks)
+    }
+
     /// Whether there is any network.
     pub fn has_networks(&self) -> bool {
         self.matte.is_some() || self.mono.is_some()
@@ -146,6 +160,26 @@ impl OneCamera {
             }
         }
         Some(Ok(chosen))
+    }
+}
+
+/// As `--depth` takes it.
+impl fmt::Display for OneCamera {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let network = |network: &Option<NetworkFile>| match network {
+            Some(NetworkFile::At(file)) => Some(Some(file.clone())),
+            Some(NetworkFile::Installed) => Some(None),
+            None => None,
+        };
+        let plate = self.plate.as_ref().map(|plate| match plate {
+            PlateFile::At(file) => Some(file.clone()),
+            PlateFile::Taken => None,
+        });
+        let kinds = [("plate", plate), ("matte", network(&self.matte)), ("mono", network(&self.mono))];
+        let parts = kinds.into_iter().filter_map(|(kind, file)| {
+            Some(file?.map_or_else(|| kind.to_owned(), |file| format!("{kind}:{}", file.display())))
+        });
+        f.write_str(&parts.collect::<Vec<_>>().join(","))
     }
 }
 

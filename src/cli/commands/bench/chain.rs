@@ -149,7 +149,8 @@ fn measure(
     given: Option<&Given>,
 ) -> Result<Chain, CliError> {
     let look = look::look(&command.blur, &options::LookSettings::default())?;
-    let frames = WARM_UP_FRAMES + u64::from(command.frames);
+    let wanted = command.frames.unwrap_or(super::FRAMES);
+    let frames = WARM_UP_FRAMES + u64::from(wanted);
     let options = source::Options {
         // The demonstration and the synthetic scene have no end of their own.
         frames: Frames {
@@ -206,7 +207,7 @@ fn measure(
     if notes.parts.is_empty() {
         return Err(CliError::Usage(format!("--chain: {name} has too few frames to measure")));
     }
-    Ok(Chain::of(info.name, size, executor, command.frames, notes.costs()))
+    Ok(Chain::of(info.name, size, executor, wanted, notes.costs()))
 }
 
 /// What a frame needs on its way.

@@ -48,7 +48,7 @@ pub struct DepthCommand {
     /// What the right eye saw
     right: PathBuf,
     /// Where the result goes: .pfm (float pixels, infinity = unknown) or .png (16 bits, 256 units per pixel, 0 = unknown)
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, alias = "to", value_name = "FILE")]
     out: PathBuf,
     /// Disparities that are tried, from 0, in pixels; rounded up to a multiple of 16 [default: the calibration's, else 64]
     // Ids of their own: the settings of the same names are about live sources.

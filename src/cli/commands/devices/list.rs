@@ -6,6 +6,7 @@ use serde::Serialize;
 
 use super::shared::{self, SharedCamera};
 use super::{CliError, DevicesCommand};
+use crate::cli::options::Global;
 use crate::cli::terminal;
 use crate::cli::terminal::print;
 use crate::v4l2::controls::{self, Control, Kind as ControlKind};
@@ -42,7 +43,7 @@ struct List {
 ///
 /// # Errors
 /// There is no such device.
-pub fn run(command: &DevicesCommand) -> Result<(), CliError> {
+pub fn run(command: &DevicesCommand, global: &Global) -> Result<(), CliError> {
     let list = match &command.device {
         None => List { pipewire: shared::all(), ..List::of(node::nodes(), false, command.controls) },
         Some(name) => match name.strip_prefix("pipewire:") {
@@ -55,7 +56,9 @@ pub fn run(command: &DevicesCommand) -> Result<(), CliError> {
         return print((serde_json::to_string_pretty(&list).unwrap_or_default() + "\n").as_bytes());
     }
     if list.to_string().is_empty() {
-        terminal::say("no camera and no virtual camera is here; `bokehcam doctor` says what to do");
+        if !global.quiet {
+            terminal::say("no camera and no virtual camera is here; `bokehcam doctor` says what to do");
+        }
         return Ok(());
     }
     print(list.to_string().as_bytes())

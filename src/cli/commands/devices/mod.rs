@@ -8,6 +8,7 @@ mod shared;
 use clap::Args;
 
 use crate::cli::error::CliError;
+use crate::cli::options::Global;
 
 /// List cameras and virtual cameras
 ///
@@ -36,12 +37,12 @@ pub struct DevicesCommand {
 ///
 /// # Errors
 /// There is no such device, or this program was built without cameras.
-pub fn run(command: &DevicesCommand) -> Result<(), CliError> {
+pub fn run(command: &DevicesCommand, global: &Global) -> Result<(), CliError> {
     #[cfg(feature = "camera")]
-    return list::run(command);
+    return list::run(command, global);
     #[cfg(not(feature = "camera"))]
     {
-        let _ = command;
+        let _ = (command, global);
         Err(CliError::NoCameras)
     }
 }

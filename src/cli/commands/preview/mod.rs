@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 use clap::Args;
 
-use crate::cli::controlled::{self, refused};
+use crate::cli::controlled::{self, Standing, changed, refused};
 use crate::cli::error::CliError;
 use crate::cli::options::{Global, Streaming, Window};
 use crate::cli::report;
@@ -19,19 +19,20 @@ use crate::cli::settings::look;
 use crate::cli::settings::unused;
 use crate::cli::sinks;
 use crate::cli::terminal;
-use crate::control::{Name, Request};
+use crate::compute::Backend;
+use crate::control::{Answer, Name, Request};
 use crate::link::demand::Demand;
-use crate::look::{Effect, Look};
+use crate::look::{Effect, Look, Patch};
 use crate::pipeline::Pace;
 use crate::preview::control::{Control, Wish};
 use crate::preview::folders::Folders;
 use crate::preview::session::Start;
-use crate::preview::state::{Output, State};
+use crate::preview::state::{Output, Running, State};
 use crate::preview::system::System;
 use crate::preview::texts;
 use crate::preview::window::{self, Memory, Preview};
 use crate::sink::Target;
-use crate::source::{self, SourceName};
+use crate::source::{self, DepthChoice, DepthFrom, SourceName};
 
 use store::FileStore;
 
@@ -138,9 +139,11 @@ pub fn show(
     }
     gone.into_iter().for_each(|line| state.note(line));
     let config = global.config.clone();
+    let cpu_only = computing.backend == Backend::Cpu;
     let control = controlled::claim(called, "preview")?.map(|claim| Control {
         claim,
         understand: Box::new(move |request| understand(request, config.as_deref()).map_err(|error| refused(&error))),
+        judge: Box::new(move |patch, look, running| judge(patch, look, running, cpu_only)),
     });
     let look = state.look.clone();
     let mut system = System::new(parts.source_options(), look.clone(), Box::new(store));
@@ -178,9 +181,7 @@ pub fn show(
         (Some(path), Some(report)) => report::write(path, report, output.force),
         _ => Ok(()),
     };
-    if let Some(report) = ended.report.as_ref().filter(|_| !global.quiet) {
-        terminal::say(&report.to_string());
-    }
+    ended.report.iter().for_each(|report| terminal::say_report(report, global));
     match ended.lost {
         Some(why) if ended.report.is_none() || close_at_end => Err(CliError::NoFrames(why)),
         _ => ended.unwritten.map_or(written, |why| Err(CliError::OutputFailed(why))),
@@ -198,6 +199,25 @@ fn understand(request: Request, config: Option<&Path>) -> Result<Wish, CliError>
         Request::Set { settings } => Wish::Look(changes::patch(&settings)?),
         Request::Snapshot { to } => Wish::Snapshot(to),
     })
+}
+
+/// Whether others can change the look so, and what of that has no effect.
+fn judge(patch: &Patch, look: &Look, running: &Running, cpu_only: bool) -> Result<Option<String>, Answer> {
+    let &Running { size, has_depth, kind, depth_from, .. } = running;
+    let unused = unused::Run {
+        source: unused::From::Source(kind),
+        depth: if has_depth { depth_from } else { DepthFrom::Nothing },
+        uses_depth: has_depth,
+        effect: look.effect,
+        lens: false,
+        realtime: true,
+        cpu_only,
+        compresses: false,
+        window: true,
+    };
+    // Depth that was declined is none of this source's.
+    let run = Standing { size, depth_choice: &DepthChoice::Auto, has_depth, adaptive: true, unused };
+    changed(patch, look, &run).map(|(_, note)| note).map_err(|error| refused(&error))
 }
 
 /// Shown where the look is not the usual one from the start.

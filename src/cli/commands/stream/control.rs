@@ -8,19 +8,20 @@ use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
 use crate::budget::Quality;
-use crate::cli::controlled::refused;
+use crate::cli::controlled::{Standing, changed, refused};
 use crate::cli::error::CliError;
+use crate::cli::files::make_folder_of;
 use crate::cli::log;
 use crate::cli::settings::{changes, unused};
 use crate::clock::Clock;
 use crate::computing::Executors;
 use crate::control::{Answer, Claim, Name, Request, Server, Status};
 use crate::link::demand::Demand;
-use crate::look::{Look, Patch, Strength};
+use crate::look::{Look, Patch};
 use crate::pipeline::{Changes, Progress};
 use crate::recording::still;
 use crate::sink::Release;
-use crate::source::{self, DepthChoice, DepthFrom};
+use crate::source::DepthChoice;
 use crate::stats::Pulse;
 
 /// How long a picture that is to be saved is waited for.
@@ -183,26 +184,10 @@ impl Controlled {
 
     /// Changes the look; gives back what of that has no effect.
     fn change(&self, patch: &Patch) -> Result<Option<String>, CliError> {
-        let Facts { has_depth, depth_choice, size, unused, .. } = &self.facts;
+        let &Facts { has_depth, ref depth_choice, size, unused, .. } = &self.facts;
         let mut stated = lock(&self.look);
-        if let Some(effect) = patch.effect.filter(|effect| effect.follows_depth() && !has_depth) {
-            return Err(CliError::Usage(format!(
-                "--effect {effect} follows depth, and this stream was begun without: use --effect blur or tilt-shift"
-            )));
-        }
-        let look = source::fitting_look(&patch.on(&stated)?, depth_choice, *has_depth)?;
-        if look.effect.follows_depth() {
-            match unused.depth {
-                DepthFrom::Networks | DepthFrom::Plate => source::refuse_metres(&look, "one camera knows")?,
-                DepthFrom::Relative => source::refuse_metres(&look, source::INVERSE_TELLS)?,
-                _ => {}
-            }
-        }
-        let is_lens = matches!(look.strength, Strength::Lens(_));
-        let run =
-            unused::Run { effect: look.effect, uses_depth: look.effect.follows_depth(), lens: is_lens, ..*unused };
-        let note = unused::note(&patch.values(), &run);
-        look.settings(*size, self.adaptive).map_or(Ok(()), |settings| settings.check(*size))?;
+        let run = Standing { size, depth_choice, has_depth, adaptive: self.adaptive, unused };
+        let (look, note) = changed(patch, &stated, &run)?;
         if look != *stated {
             // Nobody takes it where the stream has just ended.
             let _ = self.adopt.send(look.clone());
@@ -230,6 +215,7 @@ impl Controlled {
         let Some(picture) = release.picture(PATIENCE) else {
             return Ok(Answer::failed(format!("no picture came for {} s", PATIENCE.as_secs())));
         };
+        make_folder_of(&path)?;
         still::write_color(&path, &picture, false)?;
         Ok(Answer::Saved { saved: path })
     }
@@ -243,7 +229,7 @@ impl Controlled {
             watched: demand.as_ref().map(Demand::has_watchers),
             quality: beat.quality().map(|quality| quality.name().to_owned()),
             fps: round(beat.pulse.per_second(beat.clock.now_ns())),
-            look: Patch::of(&look).values().into_iter().map(|(name, value)| (name.to_owned(), value)).collect(),
+            look: Patch::described(&look),
             uptime_s: round(self.began.elapsed().as_secs_f64()),
             ..status.clone()
         }

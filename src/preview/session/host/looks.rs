@@ -61,7 +61,11 @@ impl Host {
         let Still { picture, color, depth, order, .. } = still;
         let snapshot = Snapshot { picture, color, depth: depth.as_ref(), settings: &settings };
         let saved = match order.as_ref().and_then(|order| order.to.as_deref()) {
-            Some(path) => write_color(path, picture, false).map(|()| path.to_owned()),
+            Some(path) => {
+                // If that fails, writing says why.
+                let _ = path.parent().map(std::fs::create_dir_all);
+                write_color(path, picture, false).map(|()| path.to_owned())
+            }
             None => snapshot::save(&self.start.folders.pictures, &folders::stem(), &snapshot),
         };
         let answer = match saved {

@@ -10,7 +10,8 @@ use winit::event_loop::{ActiveEventLoop, EventLoopProxy};
 use super::App;
 use crate::control::{Answer, Server, Status};
 use crate::look::{Look, Patch};
-use crate::preview::control::{Asked, Control, Wish};
+use crate::preview::control::{Asked, Control, Judge, Wish};
+use crate::preview::lent::Lent;
 use crate::preview::session::{CurrentRelease, StillOrder};
 use crate::preview::state::{Action, Source};
 use crate::preview::window::Call;
@@ -20,6 +21,9 @@ pub(super) struct Controlled {
     server: Server,
     asked: Receiver<Asked>,
     began: Instant,
+    judge: Box<Judge>,
+    /// What of the look is not the person's own.
+    lent: Lent,
     /// A snapshot that waits for its frame.
     order: Option<StillOrder>,
 }
@@ -28,8 +32,8 @@ impl Controlled {
     pub fn begin(control: Control, release: CurrentRelease, proxy: &EventLoopProxy<Call>) -> std::io::Result<Self> {
         let proxy = proxy.clone();
         // An event loop that is gone needs no waking.
-        let (server, asked) = control.begin(release, move || drop(proxy.send_event(Call::Control)))?;
-        Ok(Self { server, asked, began: Instant::now(), order: None })
+        let (server, asked, judge) = control.begin(release, move || drop(proxy.send_event(Call::Control)))?;
+        Ok(Self { server, asked, began: Instant::now(), judge, lent: Lent::default(), order: None })
     }
 
     /// The snapshot that was asked for from outside, for who saves it.
@@ -43,17 +47,21 @@ impl App {
     pub(super) fn listen(&mut self, events: &ActiveEventLoop) {
         while let Some(Asked { wish, answer }) = self.controlled.as_ref().and_then(|all| all.asked.try_recv().ok()) {
             let done = match wish {
-                Wish::Status => Ok(()),
+                Wish::Status => Ok(None),
                 Wish::On(on) => {
                     self.perform(Action::Off(!on), events);
-                    Ok(())
+                    Ok(None)
                 }
                 Wish::Toggle => {
                     self.perform(Action::Off(!self.state.off), events);
-                    Ok(())
+                    Ok(None)
                 }
-                Wish::Look(patch) => self.look_after(&patch).map(|look| {
+                Wish::Look(patch) => self.look_after(&patch).map(|(look, note)| {
+                    let before = self.state.chosen_look();
                     self.perform(Action::Look { look: Box::new(look), stroke: None }, events);
+                    let after = self.state.chosen_look();
+                    self.controlled.iter_mut().for_each(|all| all.lent.change(&before, &after));
+                    note
                 }),
                 Wish::Snapshot(to) => {
                     self.snapshot_for(to, answer);
@@ -61,23 +69,29 @@ impl App {
                 }
             };
             let told = match (done, self.status()) {
-                (Err(line), _) => Answer::usage(line),
-                (Ok(()), Some(status)) => Answer::Done { status: Box::new(status), note: None },
-                (Ok(()), None) => Answer::failed("the window is closed"),
+                (Err(answer), _) => answer,
+                (Ok(note), Some(status)) => Answer::Done { status: Box::new(status), note },
+                (Ok(_), None) => Answer::failed("the window is closed"),
             };
             // Whoever gave up waiting needs no answer.
             let _ = answer.try_send(told);
         }
     }
 
-    /// The look after a change, if it can be.
-    fn look_after(&self, patch: &Patch) -> Result<Look, String> {
-        let look = self.state.patched(patch)?;
-        if let Source::Running(running) = &self.state.source {
-            let settings = look.for_source(running.has_depth).settings(running.size, true);
-            settings.map_or(Ok(()), |settings| settings.check(running.size)).map_err(|error| error.to_string())?;
-        }
-        Ok(look)
+    /// The look after a change, if it can be, and what of the change has no effect.
+    fn look_after(&self, patch: &Patch) -> Result<(Look, Option<String>), Answer> {
+        let look = self.state.patched(patch).map_err(Answer::usage);
+        let note = match (&self.state.source, &self.controlled) {
+            (Source::Running(running), Some(all)) => (all.judge)(patch, &self.state.look, running)?,
+            _ => None,
+        };
+        Ok((look?, note))
+    }
+
+    /// The look to be remembered: without what others have lent it.
+    pub(super) fn own_look(&self) -> Look {
+        let look = self.state.chosen_look();
+        self.controlled.as_ref().map_or_else(|| look.clone(), |all| all.lent.without(&look))
     }
 
     /// Saves the frame that is shown for somebody who waits for that.
@@ -130,7 +144,7 @@ impl App {
             watched: Some(self.demand.has_watchers()),
             quality: self.view.as_ref().and_then(|view| Some(view.trace.quality?.name().to_owned())),
             fps: if is_moving { round(state.meters.summary().fps) } else { 0.0 },
-            look: Patch::of(&state.look).values().into_iter().map(|(name, value)| (name.to_owned(), value)).collect(),
+            look: Patch::described(&state.look),
             uptime_s: round(controlled.began.elapsed().as_secs_f64()),
         })
     }

@@ -303,7 +303,7 @@ impl ApplicationHandler<Call> for App {
         self.memory.size = self.gfx.as_ref().and_then(Gfx::size).or(self.memory.size);
         self.memory.habits = self.state.habits.clone();
         self.memory.set_source(&self.state.source_name);
-        self.memory.set_look(&self.state.chosen_look());
+        self.memory.set_look(&self.own_look());
         self.memory.write(path);
     }
 }
