@@ -189,7 +189,7 @@ pub fn warn_of_subject(chosen: &OneCamera, map: &DepthMap, image: Option<&Path>)
 fn odd_subject(map: &DepthMap, plate: Option<&Path>, image: Option<&Path>) -> Option<String> {
     let subject_m = map.subject_m?;
     let is_near = |at: usize| map.metres[at] <= subject_m;
-    let (width, count) = (map.width as usize, map.metres.len());
+    let count = map.metres.len();
     let near = (0..count).filter(|&at| is_near(at)).count();
     let is_itself = plate.zip(image).is_some_and(|(plate, image)| place::overlap(plate, image));
     match plate.map(Path::display) {
