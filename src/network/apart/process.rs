@@ -41,7 +41,10 @@ impl Process {
         // Ctrl-C is for this program, which then ends the other one in its own time. What a runtime says on stderr would go to
         // the terminal as it is.
         let command = command.process_group(0).stdin(OwnedFd::from(other)).stdout(Stdio::null()).stderr(Stdio::null());
-        Ok(Self { child: command.spawn()?, stream, outputs: 0, failed: None, buffer: Vec::new() })
+        let child = command.spawn()?;
+        // With its end of the socket kept here, too, its death would not be heard of.
+        command.stdin(Stdio::null());
+        Ok(Self { child, stream, outputs: 0, failed: None, buffer: Vec::new() })
     }
 
     pub fn load(mut self, content: &[u8], runtime: Runtime) -> Result<Network, Failure> {
