@@ -37,7 +37,7 @@ pub(super) fn kept(packet: Vec<u8>) -> Result<String, &'static str> {
     let packet = String::from_utf8(packet).map_err(|_| "XMP that is not in UTF-8")?;
     let packet = without_attributes(&packet, &ELSEWHERE);
     let is_there = |name: &&str| packet.contains(&format!("<{name}"));
-    if ELSEWHERE.iter().chain(&THUMBNAILS).any(|name| is_there(name)) || packet.contains(THUMBNAILS[1]) {
+    if ELSEWHERE.iter().chain(&THUMBNAILS).any(is_there) || packet.contains(THUMBNAILS[1]) {
         return Err("XMP that has other pictures");
     }
     Ok(upright(packet))
