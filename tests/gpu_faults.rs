@@ -1,6 +1,5 @@
 //! A GPU that is lost, hangs or has no more memory in the middle of a run: the CPU goes on, and no frame is missing.
-//! The faults come from a Vulkan layer (tests/gpu_faults/layer.c), which is compiled for it; a test under the layer runs
-//! in a process of its own.
+//! The faults come from a Vulkan layer (tests/gpu_faults/layer.c); a test under it runs in a process of its own.
 #![cfg(feature = "gpu")]
 #![allow(missing_docs)]
 
@@ -39,7 +38,6 @@ fn device() -> Device {
     Device::open(false, None).expect("a Vulkan adapter, software included")
 }
 
-/// The layer, ready to be loaded.
 fn layer() -> TempDir {
     let folder = tempfile::tempdir().unwrap();
     let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/gpu_faults/layer.c");
