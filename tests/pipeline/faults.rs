@@ -1,10 +1,11 @@
 //! How a run ends: by a fault, a panic, a reader that goes, or the stop flag.
 
 use std::fs;
+use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use bokehcam::pipeline::{Fault, Pace, run};
-use bokehcam::sink::{Ending, Options, Sink, Target, Tee};
+use bokehcam::sink::{Backpressure, Ending, Options, Sink, Target, Tee};
 
 use crate::fakes::*;
 use crate::setup::*;

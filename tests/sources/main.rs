@@ -94,7 +94,8 @@ fn a_photo_is_opened_with_the_depth_beside_it_and_follows_the_look() {
 
     // Other names, a snapshot, and what is no photo.
     let open = |path: &Path| {
-        let name: SourceName = path.display().to_string().parse()?;
+        let name: SourceName =
+            path.display().to_string().parse().map_err(|error: source::SourceError| error.to_string())?;
         source::Source::open(&name, &Options::default(), None).map_err(|error| error.to_string())
     };
     let other = folder.path().join("other.png");
