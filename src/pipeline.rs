@@ -56,7 +56,7 @@ use crate::link::pool::Pool;
 use crate::link::{self, Receiver, Sender};
 use crate::look::{Effect, Look};
 use crate::names::named;
-use crate::sink::{Ending, Sink};
+use crate::sink::{self, Ending, Sink};
 use crate::stats::{About, Cause, Report, Tally, Ticket, Timings};
 
 named! {
@@ -239,8 +239,8 @@ pub fn run(run: Run) -> Result<Report, PipelineError> {
     // Without a blur nobody asks for depth.
     let look = if executor.is_some() { run.look } else { Look::plain(Effect::None) };
     let knows_background = source.as_ref().is_some_and(|source| source.knows_background());
-    let mut preparation =
-        prepare::Preparation::new(&look, (info.size, info.frames), run.measured, knows_background, run.threads);
+    let pictures = (info.size, info.frames);
+    let mut preparation = prepare::Preparation::new(&look, pictures, run.measured, knows_background, run.threads);
     preparation.beside(executor.as_deref());
     let (mut refined_by, mut matted_by) = (None, None);
     let depth = depth::Stage {
@@ -310,8 +310,7 @@ pub fn run(run: Run) -> Result<Report, PipelineError> {
     // What came first is the cause.
     let ended = ended.and(finished);
     // Only now have they taken all that was under way.
-    about.outputs = outputs.iter().map(|count| count()).collect();
-    about.pipewire = nodes.iter().map(|count| count()).collect();
+    (about.outputs, about.pipewire) = (sink::read(&outputs), sink::read(&nodes));
     about.elapsed_ns = clock.now_ns() - began_ns;
     about.cpu_ns = clock::cpu_ns() - cpu_ns;
     let report = Report::new(tally.frames(), &timings, about);

@@ -167,6 +167,11 @@ pub trait Sink: Send {
 /// Counts what a sink did, also after that has ended.
 pub type Counter<T> = Arc<dyn Fn() -> T + Send + Sync>;
 
+/// What the counters say now.
+pub(crate) fn read<T>(counters: &[Counter<T>]) -> Vec<T> {
+    counters.iter().map(|count| count()).collect()
+}
+
 /// An output that may still show a picture in the place of the card.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Uncovered {

@@ -274,13 +274,9 @@ impl fmt::Display for Report {
             write!(f, "\ndepth: {} frames took over that of an earlier one, to save time", self.depth_held)?;
         }
         // Which of several took less than was delivered.
-        for output in self.outputs.iter().filter(|output| output.lost > 0) {
-            write!(f, "\n{output}")?;
-        }
-        for node in &self.pipewire {
-            write!(f, "\n{node}")?;
-        }
-        Ok(())
+        let mut lossy = self.outputs.iter().filter(|output| output.lost > 0);
+        lossy.try_for_each(|output| write!(f, "\n{output}"))?;
+        self.pipewire.iter().try_for_each(|node| write!(f, "\n{node}"))
     }
 }
 
