@@ -24,6 +24,9 @@ pub const VIRTUAL: &str = "/dev/video20";
 /// The versions of v4l2loopback that there are: without events, with, and with the present rules.
 pub const VERSIONS: [&str; 3] = ["0.12.7", "0.13.2", "0.15.0"];
 
+/// Where runs listen to `ctl`.
+const RUNTIME: &str = "/run/bokehcam-test";
+
 /// One camera with two inputs: 0 is a webcam, 1 is HDMI, whose signal gives the rate.
 const VIVID: &str = "n_devs=1 node_types=0x1 num_inputs=2 input_types=0xc vid_cap_nr=0";
 
@@ -49,6 +52,7 @@ impl Machine {
         assert!(std::env::var_os("BOKEHCAM_VM").is_some(), "not in the virtual machine: see tests/vm/run");
         // A test that failed leaves nothing behind that the next one does not load anew.
         let machine = Self { _alone: ALONE.lock().unwrap_or_else(|poisoned| poisoned.into_inner()) };
+        sh(&format!("mkdir -p -m 700 {RUNTIME}"));
         unload("vivid");
         sh(&format!("modprobe vivid {vivid}"));
         machine.loopback(version);
@@ -96,6 +100,7 @@ pub fn sh(line: &str) -> String {
 pub fn bokehcam(arguments: &str) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_bokehcam"));
     command.args(arguments.split_whitespace()).env("XDG_CONFIG_HOME", "/nowhere").stdin(Stdio::null());
+    command.env("XDG_RUNTIME_DIR", RUNTIME);
     command
 }
 

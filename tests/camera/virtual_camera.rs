@@ -11,8 +11,8 @@ use bokehcam::v4l2::FourCc;
 use bokehcam::v4l2::node::nodes;
 
 use super::machine::{
-    BARS, Beside, CAMERA, Lost, Machine, Stream, VERSIONS, VIRTUAL, distance_from, frame, frame_now, open, sh,
-    succeeded, until, wish,
+    BARS, Beside, CAMERA, Lost, Machine, Stream, VERSIONS, VIRTUAL, bokehcam, distance_from, frame, frame_now, open,
+    sh, succeeded, until, wish,
 };
 
 /// Through two conversions of colours.
@@ -204,6 +204,27 @@ fn readers_come_and_go() {
         assert!(frames["delivered"].as_u64().unwrap() > 0 && frames["dropped"]["corrupt"] == 0, "{frames}");
         assert_eq!(lost.corrupt, 0, "{lost:?}");
     }
+}
+
+#[test]
+#[ignore = "needs the camera VM (tests/vm/run)"]
+fn off_is_off_for_readers_while_nobody_reads_another_output() {
+    let machine = Machine::new();
+    machine.at_30_fps();
+    // Its standard output is a pipe that nobody reads.
+    let stream = Stream::show("0 --size 320x180 --fps 30 --effect none --to -");
+    let mut reader = open(VIRTUAL, wish((320, 180), 30.0, yuyv()));
+    let mut shows_bars = || distance_from(&frame(&mut reader).0, &BARS, MARGIN_PX) <= STEP;
+    until("the camera's picture", &mut shows_bars);
+    let off = bokehcam("ctl off").output().unwrap();
+    let said = String::from_utf8_lossy(&off.stderr);
+    assert!(off.status.success() && said.contains("standard output: busy"), "{said}");
+    // What was under way to the reader when the answer came.
+    until("the card", || !shows_bars());
+    assert!((0..20).all(|_| !shows_bars()), "a picture after the card");
+    assert!(bokehcam("ctl on").output().unwrap().status.success());
+    until("the camera's picture again", &mut shows_bars);
+    stream.report(true);
 }
 
 fn clone(command: &Command) -> Command {
