@@ -1,4 +1,4 @@
-//! Enumerations whose values have names: the same on the command line, in files and in the window.
+//! Enumerations whose values have names, the same on the command line, in files and in the window; and which name was meant.
 
 use std::fmt::Write;
 
@@ -31,6 +31,18 @@ pub fn parse<T: Named>(text: &str) -> Result<T, String> {
         }
         accepted
     })
+}
+
+/// Least Jaro-Winkler similarity (0 to 1) of a name that is suggested: one or two slips in a word of usual length.
+const SIMILAR: f64 = 0.8;
+
+/// The most similar of these names, if any is similar enough to have been meant.
+pub fn nearest<N: AsRef<str>>(name: &str, names: impl IntoIterator<Item = N>) -> Option<N> {
+    let name = name.to_lowercase();
+    let similarity = |other: &N| strsim::jaro_winkler(&name, &other.as_ref().to_lowercase());
+    let rated =
+        names.into_iter().map(|other| (similarity(&other), other)).filter(|(similarity, _)| *similarity >= SIMILAR);
+    rated.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, other)| other)
 }
 
 /// Makes an enumeration [`Named`]: `named! { pub enum Name default Value { /// help Value = "value", ... } }`.

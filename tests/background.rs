@@ -166,8 +166,8 @@ fn of_smooth_depth_nothing_is_remembered() {
         let mut coc = CocMaker::new(rule, Finish::Keep);
         coc.remember(true);
         let mut hidden = 0;
-        for frame in 0..24 {
-            let person = if frame < 12 { BEFORE.person } else { BEFORE.person + STEP };
+        for frame in 0..44 {
+            let person = if frame < 40 { BEFORE.person } else { BEFORE.person + STEP };
             let (picture, mut map) = Shot { person, ..BEFORE }.taken();
             map.is_smooth = is_smooth;
             coc.make(&mut map, &picture, frame * PERIOD_NS);

@@ -185,7 +185,7 @@ fn a_stream_says_once_how_its_depth_does_not_fit_and_mends_it() {
     assert_eq!(about(&stream("fits")), 0);
     assert_eq!(about(&stream("other")), 1);
     let pictures = |name: &str| {
-        let out = format!("{name}-out");
+        let out = format!("{name}-out/");
         let to = ["stream", name, "--to", &out, "--backend", "cpu", "--quality", "draft"];
         let said = bokehcam(dir.path(), &to);
         let of = |frame: &str| read_color(&dir.path().join(&out).join(frame)).unwrap();

@@ -58,7 +58,7 @@ const DOORS: [(&str, &[&str]); 30] = [
     ("sha2", &["network/known"]),
     ("skrifa", &["preview/panel/fonts"]),
     ("softbuffer", &["preview/present"]),
-    ("strsim", &["source", "v4l2"]),
+    ("strsim", &["names", "v4l2"]),
     ("toml_edit", &["cli"]),
     ("v4l", &["v4l2"]),
     (

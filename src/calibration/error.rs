@@ -4,12 +4,14 @@ use std::fmt;
 use std::io;
 use std::path::{Path, PathBuf};
 
+use crate::files::input::said;
+
 /// Why a calibration cannot be used.
 #[allow(missing_docs)] // The messages say what the fields are.
 #[derive(Debug, thiserror::Error)]
 pub enum CalibrationError {
     /// The file cannot be read.
-    #[error("cannot read the calibration {}: {source}", path.display())]
+    #[error("cannot read the calibration {}: {}", path.display(), said(source))]
     Io { path: PathBuf, source: io::Error },
     /// The file is none of those that are known.
     #[error(

@@ -176,7 +176,7 @@ mod tests {
         for name in ["rgb/1.png", "1.png", "./rgb/1.png", "rgb/..1.png"] {
             assert_eq!(inside(name), Ok(PathBuf::from(name)));
         }
-        for name in ["../1.png", "rgb/../../1.png", "/etc/passwd", "rgb/..", ".."] {
+        for name in ["../1.png", "rgb/../../1.png", "/somewhere/1.png", "rgb/..", ".."] {
             assert_eq!(inside(name), Err(LineFault::Outside(PathBuf::from(name))));
         }
         assert!(matches!(inside("rgb/\u{1b}[2J.png"), Err(LineFault::FileName(_))));

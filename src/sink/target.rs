@@ -12,6 +12,7 @@ use super::Loopback;
 use super::PipeWire;
 use super::{Ffmpeg, Null, Options, PngFolder, Sink, SinkError, Y4m, Y4mFile};
 use crate::files::{folder, place};
+use crate::names::nearest;
 
 /// How the name of a camera of PipeWire's begins.
 const PIPEWIRE: &str = "pipewire";
@@ -66,9 +67,6 @@ impl FromStr for Target {
     }
 }
 
-/// Least Jaro-Winkler similarity (0 to 1) of a name that is suggested: one or two slips in a word of usual length.
-const SIMILAR: f64 = 0.8;
-
 /// The sink that `name` may have been meant for.
 fn near(name: &str) -> Option<String> {
     let number = name.trim_start_matches("/dev/").trim_start_matches("video");
@@ -76,10 +74,7 @@ fn near(name: &str) -> Option<String> {
         return Some(format!("/dev/video{number}"));
     }
     let (word, label) = name.find(':').map_or((name, ""), |at| name.split_at(at));
-    let similar = |sink: &str| strsim::jaro_winkler(&word.to_lowercase(), sink);
-    let rated = [PIPEWIRE, "window", "null"].map(|sink| (similar(sink), sink)).into_iter();
-    let near = rated.filter(|(similar, _)| *similar >= SIMILAR).max_by(|a, b| a.0.total_cmp(&b.0));
-    near.map(|(_, sink)| format!("{sink}{label}"))
+    nearest(word, [PIPEWIRE, "window", "null"]).map(|sink| format!("{sink}{label}"))
 }
 
 /// Whether this is a character device, or the name of a video device that is not there yet.

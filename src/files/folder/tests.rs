@@ -113,12 +113,15 @@ fn foreign_files_are_refused_and_never_touched() {
     fs::write(other.join("3.png"), "mine").unwrap();
     fs::remove_file(path.join("1.png")).unwrap();
     fs::remove_dir(path.join("rgb")).unwrap();
-    fs::write(path.join(LIST), "0.png\n../other/3.png\n/etc/passwd\nrgb/3.png\n..\n.hidden\n\n").unwrap();
+    let elsewhere = other.join("4.png");
+    fs::write(&elsewhere, "mine").unwrap();
+    let names = format!("0.png\n../other/3.png\n{}\nrgb/3.png\n..\n.hidden\n\n", elsewhere.display());
+    fs::write(path.join(LIST), names).unwrap();
     symlink(&other, path.join("rgb")).unwrap();
     assert!(matches!(open(&path), Err(FolderError::Foreign { .. })), "it would be written through a link");
     let plain = Set { subfolders: &[], has: SET.has };
     assert_eq!(Folder::open(&path, true, &plain).unwrap().finish().unwrap(), 1);
-    assert_eq!(all(&other), ["3.png=mine"]);
+    assert_eq!(all(&other), ["3.png=mine", "4.png=mine"]);
 }
 
 #[test]

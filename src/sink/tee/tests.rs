@@ -1,4 +1,5 @@
 use std::io;
+use std::sync::atomic::AtomicUsize;
 use std::sync::mpsc::{self, Receiver, Sender};
 use std::thread;
 use std::time::Instant;
@@ -33,6 +34,8 @@ struct Fake {
     fails_at: usize,
     finish_fails: bool,
     taken: usize,
+    /// Counts the pictures that it was given, also those that it does not take yet.
+    given: Arc<AtomicUsize>,
 }
 
 fn fake(name: &'static str) -> (Fake, Receiver<String>) {
@@ -47,12 +50,14 @@ fn fake(name: &'static str) -> (Fake, Receiver<String>) {
         fails_at: never,
         finish_fails: false,
         taken: 0,
+        given: Arc::default(),
     };
     (fake, told)
 }
 
 impl Fake {
     fn wait(&self) {
+        self.given.fetch_add(1, Ordering::Relaxed);
         if let Some(may_take) = &self.may_take {
             // Once nobody holds it up any more it takes all.
             let _ = may_take.recv_timeout(HANG);
@@ -126,6 +131,7 @@ fn in_real_time_none_waits_for_another_and_each_counts_what_it_lost() {
     let (mut stalled, taken) = fake("stalled");
     let (may, may_take) = mpsc::channel();
     stalled.may_take = Some(may_take);
+    let given = Arc::clone(&stalled.given);
     let sinks = [stalled, Fake { is_live: true, ..camera }, file];
     let mut tee = tee(sinks, Backpressure::DropOldest, &Arc::default());
     assert_eq!((tee.describe().as_str(), tee.is_live()), ("stalled, camera, file", true));
@@ -133,6 +139,7 @@ fn in_real_time_none_waits_for_another_and_each_counts_what_it_lost() {
     for number in 0..50 {
         assert!(tee.put(&picture(number), number.into()).unwrap().is_continue());
         assert_eq!((next(&shown), next(&written)), (number.to_string(), number.to_string()));
+        until("it was given the first", || given.load(Ordering::Relaxed) == 1);
     }
     assert!(taken.try_recv().is_err(), "it has taken none yet");
     // Two of them, as all but the one that it had and the newest are gone.
