@@ -169,6 +169,35 @@ fn an_encoder_that_is_slow_to_begin_costs_no_frames() {
 }
 
 #[test]
+fn each_output_that_fails_says_what_is_kept_of_it() {
+    let home = Home::new();
+    home.record("self", 60, 0.1);
+    let ran = home.run_on_full_disk(100, &format!("stream self {BLUR} --to x.y4m --to z.y4m"));
+    assert_eq!(ran.code, Some(1), "{}", ran.said);
+    assert!(["x.y4m.incomplete", "z.y4m.incomplete"].iter().all(|kept| ran.said.contains(kept)), "{}", ran.said);
+}
+
+/// As `timeout` sends them, to a program and then to its group.
+#[test]
+fn two_signals_at_once_are_one_wish() {
+    let home = Home::new();
+    home.record("self", 4, 0.01);
+    let args = format!("stream self {BLUR} --loop --to x.y4m");
+    let child = home.command("", &args).stderr(Stdio::piped()).spawn().unwrap();
+    let is_begun = |file: fs::DirEntry| {
+        file.file_name().to_string_lossy().contains("x.y4m") && file.metadata().is_ok_and(|file| file.len() > 0)
+    };
+    until("a picture", || fs::read_dir(home.0.path()).unwrap().flatten().any(is_begun));
+    let pid = rustix::process::Pid::from_child(&child);
+    for signal in [rustix::process::Signal::TERM, rustix::process::Signal::INT] {
+        rustix::process::kill_process(pid, signal).unwrap();
+    }
+    let ended = child.wait_with_output().unwrap();
+    assert!(ended.status.success(), "{}", String::from_utf8_lossy(&ended.stderr));
+    assert!(home.at("x.y4m").exists());
+}
+
+#[test]
 fn an_encoder_that_hangs_does_not_keep_the_program() {
     let home = Home::new();
     home.record("self", 4, 0.01);

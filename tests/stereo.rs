@@ -133,7 +133,7 @@ fn a_pair_that_is_not_what_it_was_said_to_be_is_said_in_one_line() {
         let args = ["stream", path(&source), "--side-by-side", "--rectified", "--to", "null", "--backend", "cpu"];
         let ran = bokehcam(&args);
         assert_eq!(ran.code, 0, "{}", ran.stderr);
-        ran.stderr.lines().filter(|line| line.contains("WARN")).map(str::to_owned).collect::<Vec<_>>()
+        ran.stderr.lines().filter(|line| line.starts_with("warning: ")).map(str::to_owned).collect::<Vec<_>>()
     };
     assert_eq!(said(&|_, _| {}), Vec::<String>::new());
     // The right eye looks 5 rows lower.
@@ -211,7 +211,7 @@ fn what_does_not_fit_two_eyes_costs_one_line_and_exit_code_2() {
 fn near_things_beyond_the_range_are_found_or_said() {
     let out = tempfile::tempdir().unwrap();
     let stream = |name: &str, more: &[&str]| {
-        let (source, to) = (concat!(env!("CARGO_MANIFEST_DIR"), "/recordings/stereo"), out.path().join(name));
+        let (source, to) = (concat!(env!("CARGO_MANIFEST_DIR"), "/recordings/stereo"), out.path().join(name).join(""));
         let all = ["stream", source, "--depth", "stereo", "--frames", "2", "--backend", "cpu", "--to", path(&to)];
         let ran = bokehcam(&[&all, more].concat());
         assert_eq!(ran.code, 0, "{}", ran.stderr);

@@ -7,17 +7,26 @@ use std::path::Path;
 
 use super::error::CliError;
 use super::log;
+use crate::files::input::no_file_at;
 use crate::files::{place, whole};
 
 /// Refuses to replace files, unless with `--force`.
 ///
 /// # Errors
-/// [`CliError::Exists`] when one of `paths` exists and `force` is not given.
+/// [`CliError::Exists`] when one of `paths` exists and `force` is not given; [`CliError::Usage`] when it is no file.
 pub fn refuse_overwrite<'a>(paths: impl IntoIterator<Item = &'a Path>, force: bool) -> Result<(), CliError> {
-    match paths.into_iter().find(|path| !force && path.symlink_metadata().is_ok()) {
-        Some(path) => Err(CliError::Exists(path.to_owned())),
-        None => Ok(()),
+    for path in paths {
+        if let Some(what) = no_file_at(path) {
+            return Err(CliError::Usage(format!(
+                "{} is {what}, and is not replaced by a file; choose another name",
+                path.display()
+            )));
+        }
+        if !force && path.symlink_metadata().is_ok() {
+            return Err(CliError::Exists(path.to_owned()));
+        }
     }
+    Ok(())
 }
 
 /// Refuses to write over what is read, whatever links lead there.

@@ -6,6 +6,7 @@ use std::sync::atomic::AtomicBool;
 use super::error::CliError;
 use super::files::refuse_source;
 use super::options::Streaming;
+use crate::files::place;
 use crate::sink::{Backpressure, Options, Sink, Target, Tee};
 use crate::source::{DepthChoice, SourceName};
 
@@ -28,6 +29,13 @@ pub fn check(targets: &[Target], parts: &Streaming, source: &SourceName) -> Resu
         }
         if targets[..index].iter().any(|other| other.collides_with(target)) {
             return usage(format!("--to {target}: given twice; each sink needs a place of its own"));
+        }
+        let lies_in = |other: &Target| match (other, target.path()) {
+            (Target::Folder(folder), Some(path)) => place::resolved(path).starts_with(place::resolved(folder)),
+            _ => false,
+        };
+        if let Some(folder) = targets.iter().find(|other| *other != target && lies_in(other)) {
+            return usage(format!("--to {target}: the pictures of --to {folder} lie there; choose another place"));
         }
         if devices.iter().any(|device| target.is_device(device)) {
             return usage(format!("--to {target}: this is the source itself; take a virtual camera of its own"));

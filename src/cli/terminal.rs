@@ -5,6 +5,7 @@ use std::fmt;
 use std::io::{self, IsTerminal, Write};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
 
@@ -22,14 +23,21 @@ use crate::stats::Report;
 /// # Errors
 /// The system has no place for a signal handler.
 pub fn stop_flag() -> Result<Arc<AtomicBool>, CliError> {
+    /// Signals that come within so long of the first are no second ones.
+    const TOGETHER: Duration = Duration::from_millis(100);
     /// What shells expect of a program that SIGINT ended.
     const INTERRUPTED: i32 = 130;
     let stop = Arc::new(AtomicBool::new(false));
-    let already_stopping = Arc::clone(&stop);
+    let is_stopping = Arc::clone(&stop);
+    let mut first: Option<Instant> = None;
     let handler = move || {
-        if already_stopping.swap(true, Ordering::Relaxed) {
-            std::process::exit(INTERRUPTED);
+        match first {
+            // `timeout`, for one, signals a program and then its group: that is one wish.
+            Some(first) if first.elapsed() < TOGETHER => return,
+            Some(_) => std::process::exit(INTERRUPTED),
+            None => first = Some(Instant::now()),
         }
+        is_stopping.store(true, Ordering::Relaxed);
         // Nobody waits for a network that hangs.
         #[cfg(feature = "networks")]
         crate::network::apart::hurry();

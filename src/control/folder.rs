@@ -28,7 +28,7 @@ const ENDING: &str = ".sock";
 pub(super) fn path() -> Result<PathBuf, ControlError> {
     let refuse = |what: String| ControlError::NoFolder(what);
     let runtime = absolute("XDG_RUNTIME_DIR")
-        .ok_or_else(|| refuse("there is no runtime folder: XDG_RUNTIME_DIR is not set".into()))?;
+        .ok_or_else(|| refuse("there is no runtime folder: XDG_RUNTIME_DIR names no whole path".into()))?;
     if !runtime.is_dir() {
         return Err(refuse(format!("there is no runtime folder: XDG_RUNTIME_DIR is {}", runtime.display())));
     }

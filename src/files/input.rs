@@ -72,6 +72,11 @@ fn refuse_beyond(most_bytes: u64, bytes: u64) -> io::Result<()> {
     Err(io::Error::new(io::ErrorKind::FileTooLarge, what))
 }
 
+/// What is at a place where a file is to be written, where that is none and so is never replaced by one.
+pub fn no_file_at(path: &Path) -> Option<&'static str> {
+    unlike_file(path.metadata().ok()?.file_type())
+}
+
 /// The kind of a file that is no regular one, in words.
 fn unlike_file(kind: FileType) -> Option<&'static str> {
     match kind {

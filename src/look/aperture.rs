@@ -8,7 +8,7 @@ use std::sync::Arc;
 use super::number::number_in;
 use crate::bokeh::aperture::{Picture, Shape};
 use crate::recording::RecordingError;
-use crate::recording::still::read_grey;
+use crate::recording::still::read_aperture;
 
 /// An aperture as it is written: its picture, if any, not yet read.
 #[derive(Clone, Debug, PartialEq)]
@@ -93,7 +93,7 @@ impl ApertureName {
         Ok(match self {
             Self::Drawn(shape) => shape.clone(),
             Self::Image(file) => {
-                let (width, height, grey) = read_grey(file)?;
+                let (width, height, grey) = read_aperture(file)?;
                 Shape::Picture(Arc::new(Picture { file: Some(file.clone()), width, height, grey }))
             }
         })
@@ -111,6 +111,19 @@ mod tests {
         {
             assert_eq!(text.parse::<ApertureName>().unwrap().to_string(), text);
         }
+    }
+
+    #[test]
+    fn a_picture_that_lets_no_light_through_is_no_aperture() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("black.png");
+        let mut picture = crate::frame::ColorImage::new(5, 5);
+        crate::recording::still::write_color(&file, &picture, false).unwrap();
+        let error = ApertureName::Image(file.clone()).load().unwrap_err().to_string();
+        assert!(error.contains("black.png: it is black all over"), "{error}");
+        picture.rgb[36] = 200;
+        crate::recording::still::write_color(&file, &picture, true).unwrap();
+        assert!(ApertureName::Image(file).load().is_ok());
     }
 
     #[test]

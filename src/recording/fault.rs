@@ -86,6 +86,11 @@ pub enum PictureFault {
     /// There is no such file.
     #[error("{}", crate::files::input::NO_FILE)]
     Missing,
+    /// A picture of an aperture that is closed.
+    #[error(
+        "it is black all over, and an aperture lets light through where its picture is bright; give another picture"
+    )]
+    Dark,
     /// A link leads out of the recording.
     #[error("a link leads outside the recording; put the file itself inside the folder")]
     Outside,

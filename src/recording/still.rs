@@ -190,6 +190,17 @@ pub fn read_grey(path: &Path) -> Result<(u32, u32, Vec<f32>), RecordingError> {
     decode::grey(path).map_err(RecordingError::picture(path))
 }
 
+/// [`read_grey`] of the picture of an aperture.
+///
+/// # Errors
+/// As [`read_color`]; or it lets no light through.
+pub fn read_aperture(path: &Path) -> Result<(u32, u32, Vec<f32>), RecordingError> {
+    let picture = read_grey(path)?;
+    // A kernel of nothing would blur nothing.
+    let is_dark = picture.2.iter().all(|value| *value <= 0.0);
+    if is_dark { Err(RecordingError::picture(path)(PictureFault::Dark)) } else { Ok(picture) }
+}
+
 /// Writes a `.png`, `.jpg` or `.jpeg`.
 ///
 /// # Errors

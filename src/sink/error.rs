@@ -37,6 +37,12 @@ pub enum SinkError {
     /// A file that is no video.
     #[error("{} is neither a folder nor a video: give DIR/, FILE.y4m, FILE.mp4, FILE.mkv or FILE.webm", path.display())]
     NoFolder { path: PathBuf },
+    #[error("{} is {what}, and is not replaced by a file; choose another name{}", path.display(), if *what == "a pipe" { ", or write y4m into it by `--to - > PIPE`" } else { "" })]
+    NoFile {
+        path: PathBuf,
+        /// Such as a folder.
+        what: &'static str,
+    },
     #[error("{} exists; choose another name or overwrite it with --force", path.display())]
     Exists { path: PathBuf },
     /// The folder cannot be written.

@@ -5,6 +5,7 @@ use std::io::{self, ErrorKind};
 use std::path::{Path, PathBuf};
 
 use super::{Ending, SinkError};
+use crate::files::input::no_file_at;
 use crate::files::whole::{self, Part};
 
 /// A file under construction that holds frames. What has frames is never removed: where it cannot have its name, it is
@@ -23,6 +24,9 @@ impl Output {
     /// Prepares to write `path`; missing folders above it are made. What a run that was killed left of it is kept,
     /// which is logged.
     pub(super) fn create(path: &Path, force: bool) -> Result<Self, SinkError> {
+        if let Some(what) = no_file_at(path) {
+            return Err(SinkError::NoFile { path: path.to_owned(), what });
+        }
         if !force && path.symlink_metadata().is_ok() {
             return Err(SinkError::Exists { path: path.to_owned() });
         }

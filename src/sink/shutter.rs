@@ -51,6 +51,8 @@ const PATIENCE: Duration = Duration::from_secs(1);
 pub struct Release {
     closed: Arc<AtomicBool>,
     ask: Sender<Asked>,
+    /// The sink as one.
+    all: Uncovered,
 }
 
 /// What others want of a shutter, and where the answer goes. Who gave up waiting misses nothing.
@@ -59,16 +61,10 @@ enum Asked {
     Covered(SyncSender<Vec<Uncovered>>, Instant),
 }
 
-/// Outputs may still show a picture though they were to show the card.
+/// These outputs, which people see live, may still show a picture though they were to show the card.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum NotCovered {
-    /// These, which people see live.
-    #[error("no more pictures come, but {0} may still show the last one: it does not take the card")]
-    Live(String),
-    /// What gives the outputs their pictures waits for one of them.
-    #[error("no more pictures come, but the output takes nothing, and its reader may still show the last one")]
-    Unknown,
-}
+#[error("no more pictures come, but {0} may still show the last one: it does not take the card")]
+pub struct NotCovered(pub String);
 
 impl Shutter {
     /// A shutter before `sink`, for pictures of `size` pixels every `period`. It is closed while `closed` says so; `demand` is
@@ -84,6 +80,7 @@ impl Shutter {
         let mut still = ColorImage::new(size.0, size.1);
         card::draw(&mut still);
         let (ask, asked) = mpsc::channel();
+        let all = Uncovered { output: sink.describe(), is_live: sink.is_live() };
         let shutter = Self {
             sink,
             closed: Arc::clone(&closed),
@@ -100,7 +97,7 @@ impl Shutter {
             given_ns: 0,
             ahead_ns: 0,
         };
-        (shutter, Release { closed, ask })
+        (shutter, Release { closed, ask, all })
     }
 
     /// Whether it is closed. Once the card is there, the camera follows.
@@ -307,7 +304,8 @@ impl Release {
         let asked = self.ask.send(Asked::Covered(to, Instant::now() + PATIENCE));
         let uncovered = match asked.map(|()| take.recv_timeout(2 * PATIENCE)) {
             Ok(Ok(uncovered)) => uncovered,
-            Ok(Err(RecvTimeoutError::Timeout)) => return Err(NotCovered::Unknown),
+            // What gives the outputs their pictures waits for one of them.
+            Ok(Err(RecvTimeoutError::Timeout)) => vec![self.all.clone()],
             Ok(Err(RecvTimeoutError::Disconnected)) | Err(_) => Vec::new(),
         };
         let names = |is_live: bool| {
@@ -315,7 +313,7 @@ impl Release {
             names.collect::<Vec<_>>().join(", ")
         };
         match [names(true), names(false)] {
-            [live, _] if !live.is_empty() => Err(NotCovered::Live(live)),
+            [live, _] if !live.is_empty() => Err(NotCovered(live)),
             [_, others] if !others.is_empty() => Ok(Some(format!("{others}: busy, so the card comes there later"))),
             _ => Ok(None),
         }

@@ -69,6 +69,9 @@ impl FromStr for Target {
 
 /// The sink that `name` may have been meant for.
 fn near(name: &str) -> Option<String> {
+    if name.contains('/') && !name.starts_with("/dev/") {
+        return None;
+    }
     let number = name.trim_start_matches("/dev/").trim_start_matches("video");
     if !number.is_empty() && number.bytes().all(|digit| digit.is_ascii_digit()) {
         return Some(format!("/dev/video{number}"));

@@ -104,11 +104,13 @@ impl Tee {
         }
     }
 
-    /// Logs an error while other sinks go on, and keeps the first one for the end.
+    /// Logs an error, and keeps the first one for the end.
     fn note(&mut self, error: Option<SinkError>) {
         let Some(error) = error else { return };
         if !self.outputs.is_empty() {
-            tracing::error!("{error}; going on without it");
+            tracing::warn!("{error}; going on without it");
+        } else if self.failed.is_some() {
+            tracing::error!("{error}");
         }
         self.failed.get_or_insert(error);
     }
@@ -152,12 +154,16 @@ impl Sink for Tee {
         Ok(self.look()?.map_continue(|()| false))
     }
 
-    /// Completes them all, also after one could not be: the first error of all is told.
+    /// Completes them all, also after one could not be. The first error of all is returned, the others are logged: each says
+    /// what is kept of its output.
     fn finish(self: Box<Self>, ending: Ending) -> Result<(), SinkError> {
         let Self { mut outputs, failed, .. } = *self;
         outputs.iter_mut().for_each(|output| output.close(ending));
         let ended: Vec<_> = outputs.into_iter().map(|output| output.join().error()).collect();
-        failed.into_iter().chain(ended.into_iter().flatten()).next().map_or(Ok(()), Err)
+        let mut errors = failed.into_iter().chain(ended.into_iter().flatten());
+        let first = errors.next();
+        errors.for_each(|error| tracing::error!("{error}"));
+        first.map_or(Ok(()), Err)
     }
 
     fn describe(&self) -> String {

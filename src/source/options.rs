@@ -182,7 +182,7 @@ impl DepthChoice {
     /// The word that was meant by one that is none, if any is like it: a hint for a message.
     pub fn hint(text: &str) -> String {
         const WORDS: [&str; 8] = ["auto", "recorded", "stereo", "none", "matte", "mono", "plate", "defocus"];
-        let meant = crate::names::nearest(text, WORDS);
+        let meant = crate::names::nearest(text, WORDS).filter(|word| *word != text);
         meant.map_or(String::new(), |word| format!("did you mean {word}? "))
     }
 }

@@ -39,7 +39,7 @@ fn a_report_never_lies_among_the_pictures_of_an_output() {
             assert!(tree(home.0.path()) == before, "{report}");
         }
     }
-    let ran = home.run(&format!("stream self {BLUR} --to null --to out/sub --report out/r.json -q"));
+    let ran = home.run(&format!("stream self {BLUR} --to null --to out/sub/ --report out/r.json -q"));
     assert_eq!(ran.code, Some(0), "beside them is no harm: {ran:?}");
 }
 

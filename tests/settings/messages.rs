@@ -180,10 +180,14 @@ fn all_warnings_look_alike() {
 }
 
 #[test]
-fn a_run_ends_with_one_line_and_with_its_times_where_they_are_wanted() {
+fn a_run_says_where_it_goes_and_how_it_went_and_its_times_where_they_are_wanted() {
     let home = Home::new().with_recording();
     let stream = ["stream", "recording", "--to", "null", "--backend", "cpu"];
-    assert_eq!(home.run(&stream).done().lines().count(), 1);
+    let said: Vec<String> = home.run(&stream).done().lines().map(str::to_owned).collect();
+    assert!(
+        said.len() == 2 && said[0].ends_with("recording, to null") && said[1].contains("frames delivered"),
+        "{said:?}"
+    );
     assert!(home.run(&[&stream[..], &["-v"]].concat()).done().contains("blur ms: p50"));
 }
 

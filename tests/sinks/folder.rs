@@ -13,7 +13,7 @@ fn pictures_are_numbered_and_exact() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("made/out/");
     let frames: Vec<_> = (0..3).map(|frame| picture(17, 13, frame)).collect();
-    let mut sink = open(&out, &options((17, 13))).unwrap();
+    let mut sink = open(&out.join(""), &options((17, 13))).unwrap();
     put_all(&mut *sink, &frames);
     sink.finish(Ending::Whole).unwrap();
     assert_eq!(listing(&out), [".bokehcam", "000000.png", "000001.png", "000002.png"]);
@@ -26,28 +26,28 @@ fn pictures_are_numbered_and_exact() {
 fn a_folder_is_replaced_only_by_force_and_only_what_was_written_by_us() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("out");
-    let mut sink = open(&out, &options((6, 4))).unwrap();
+    let mut sink = open(&out.join(""), &options((6, 4))).unwrap();
     put_all(&mut *sink, &[0, 1, 2].map(|frame| picture(6, 4, frame)));
     sink.finish(Ending::Whole).unwrap();
     for name in ["7.png", "20240101.png", "notes.txt"] {
         fs::write(out.join(name), "mine").unwrap();
     }
-    let not_empty = open(&out, &options((6, 4))).err().unwrap();
+    let not_empty = open(&out.join(""), &options((6, 4))).err().unwrap();
     assert!(matches!(not_empty, SinkError::Folder(FolderError::NotEmpty { .. })), "{not_empty}");
     // A name that a frame may have, in a run of any number of frames.
-    let foreign = open(&out, &forced((6, 4))).err().unwrap();
+    let foreign = open(&out.join(""), &forced((6, 4))).err().unwrap();
     assert!(matches!(foreign, SinkError::Folder(FolderError::Foreign { .. })), "{foreign}");
     let two = Options { frames: Some(2), ..forced((6, 4)) };
 
     let old = fs::read(out.join("000000.png")).unwrap();
-    let mut sink = open(&out, &two).unwrap();
+    let mut sink = open(&out.join(""), &two).unwrap();
     put_all(&mut *sink, &[picture(6, 4, 5)]);
     assert_eq!(fs::read(out.join("000000.png")).unwrap(), old, "the old ones stay until the new are whole");
     sink.finish(Ending::Cut).unwrap();
     assert_eq!(fs::read(out.join("000000.png")).unwrap(), old);
     assert_eq!(listing(&folder.path().join("out.incomplete")), [".bokehcam", "000000.png"]);
 
-    let mut sink = open(&out, &two).unwrap();
+    let mut sink = open(&out.join(""), &two).unwrap();
     put_all(&mut *sink, &[picture(6, 4, 5), picture(6, 4, 6)]);
     sink.finish(Ending::Whole).unwrap();
     let expected = [".bokehcam", "000000.png", "000001.png", "20240101.png", "7.png", "notes.txt"];
@@ -62,7 +62,7 @@ fn a_failed_picture_leaves_no_partial_name() {
     let broken = ColorImage { width: 0, height: 4, rgb: Vec::new() };
     for (name, next, taken) in [("broken", &broken, false), ("taken", &picture(6, 4, 1), true)] {
         let out = folder.path().join(name);
-        let mut sink = open(&out, &options((6, 4))).unwrap();
+        let mut sink = open(&out.join(""), &options((6, 4))).unwrap();
         put_all(&mut *sink, &[picture(6, 4, 0)]);
         if taken {
             fs::create_dir(out.join("000001.png")).unwrap();
@@ -79,7 +79,7 @@ fn a_failed_picture_leaves_no_partial_name() {
 fn a_folder_that_is_moved_away_gets_no_more_pictures_and_another_of_its_name_none() {
     let folder = tempfile::tempdir().unwrap();
     let (out, away) = (folder.path().join("out"), folder.path().join("away"));
-    let mut sink = open(&out, &options((6, 4))).unwrap();
+    let mut sink = open(&out.join(""), &options((6, 4))).unwrap();
     put_all(&mut *sink, &[picture(6, 4, 0)]);
     fs::rename(&out, &away).unwrap();
     fs::create_dir(&out).unwrap();
@@ -93,7 +93,7 @@ fn a_folder_that_is_moved_away_gets_no_more_pictures_and_another_of_its_name_non
 fn a_folder_that_is_removed_is_an_error_and_not_made_anew() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("out");
-    let mut sink = open(&out, &options((6, 4))).unwrap();
+    let mut sink = open(&out.join(""), &options((6, 4))).unwrap();
     put_all(&mut *sink, &[picture(6, 4, 0)]);
     fs::remove_dir_all(&out).unwrap();
     let error = sink.put(&picture(6, 4, 1), PERIOD_NS).unwrap_err();

@@ -34,7 +34,7 @@ fn names_become_sinks() {
     let file = folder.path().join("hostname");
     fs::write(&file, "").unwrap();
     let error = file.to_str().unwrap().parse::<Target>().unwrap_err().to_string();
-    assert!(error.contains("hostname is no folder: name one, or a FILE.y4m"), "{error}");
+    assert!(error.contains("hostname is neither a folder nor a video: give DIR/, FILE.y4m"), "{error}");
     for name in ["", "clip.avi", "a.png"] {
         let error = name.parse::<Target>().unwrap_err().to_string();
         assert!(error.contains(&format!("'{name}'")) && error.contains("FILE.y4m"), "{error}");
@@ -90,5 +90,21 @@ fn a_place_that_cannot_be_written_is_named() {
         let error = open(&folder.path().join(name), &options((6, 4))).err().unwrap().to_string();
         assert!(error.starts_with("cannot write ") && error.contains("file"), "{error}");
         assert_eq!(error.ends_with("/file: it is no folder"), name.ends_with('/'), "{error}");
+    }
+}
+
+#[test]
+fn what_is_no_file_is_never_replaced_by_one() {
+    let folder = tempfile::tempdir().unwrap();
+    let (pipe, dir) = (folder.path().join("pipe.y4m"), folder.path().join("dir.y4m"));
+    rustix::fs::mkfifoat(rustix::fs::CWD, &pipe, rustix::fs::Mode::RUSR).unwrap();
+    fs::create_dir(&dir).unwrap();
+    for (path, what) in [(pipe, "is a pipe"), (dir, "is a folder")] {
+        let sink = Target::Y4m(path.clone());
+        for options in [options((6, 4)), crate::forced((6, 4))] {
+            let error = sink.open(&options).err().unwrap().to_string();
+            assert!(error.contains(what) && error.contains("not replaced"), "{error}");
+        }
+        assert!(!path.metadata().unwrap().is_file());
     }
 }

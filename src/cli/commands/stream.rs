@@ -157,7 +157,9 @@ pub fn run(command: &StreamCommand, global: &options::Global, given: Given) -> R
     if let Some(networks) = source.networks.as_ref().filter(|_| !global.quiet) {
         terminal::say(&format!("depth by {networks}"));
     }
-    if let Some(note) = command.source.note(&source).filter(|_| !global.quiet) {
+    // That a map would be taken is no news to who wants none.
+    let is_wanted = source.has_depth() || parts.blur.takes_whatever_depth();
+    if let Some(note) = command.source.note(&source).filter(|_| is_wanted && !global.quiet) {
         terminal::say(&note);
     }
     if !global.quiet {

@@ -128,7 +128,8 @@ pub fn check(left: &GrayImage, right: &GrayImage, disparities: u32) -> Result<Pa
             moved_px.extend(refined(left, right, (2 * x, 2 * y), (2 * dx, 2 * dy)));
         }
     }
-    Ok(PairCheck { is_one: left.luma == right.luma, ..summary(&moved_px) })
+    // Where nothing can be matched nothing is known of them either.
+    Ok(PairCheck { is_one: !moved_px.is_empty() && left.luma == right.luma, ..summary(&moved_px) })
 }
 
 /// Statistics of the moves (across, down) of all matched points, from left to right picture.

@@ -5,7 +5,7 @@ mod debug_pictures;
 mod input;
 
 use std::fmt::Display;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::Args;
 
@@ -193,7 +193,8 @@ impl RenderCommand {
                 log::warn("--depth-map has no effect: the effect does not use depth");
             }
             Some(Depth::Measured(map))
-                if self.depth_map.as_ref().is_some_and(|file| self.warn_of_map(file, map, color)) => {}
+                if self.depth_map.as_ref().is_some_and(|file| self.warn_of_map(&file.display(), map, color))
+                    || found.is_some_and(|found| found.measured && self.warn_of_map(&found.by, map, color)) => {}
             Some(Depth::Measured(map) | Depth::Final(map)) => focus::warn_of_focus(look, color.size(), map, in_units),
             None => {}
         }
@@ -207,13 +208,12 @@ impl RenderCommand {
 
 impl RenderCommand {
     /// Warns of a depth map that cannot be meant; whether it did.
-    fn warn_of_map(&self, file: &Path, map: &DepthMap, color: &ColorImage) -> bool {
-        let is_scaled = still::map_format(file).is_ok_and(|format| format == MapFormat::Pfm);
+    fn warn_of_map(&self, name: &dyn Display, map: &DepthMap, color: &ColorImage) -> bool {
+        let file = self.depth_map.as_deref();
+        let is_scaled = file.is_some_and(|file| still::map_format(file).is_ok_and(|format| format == MapFormat::Pfm));
         match self.depth.depth_unit {
-            DepthUnit::Inverse => plausible::warn_of_inverse(&file.display(), map, color),
-            DepthUnit::Metres => {
-                plausible::warn_of_map(&file.display(), map, is_scaled || self.depth.depth_scale.is_some())
-            }
+            DepthUnit::Inverse => plausible::warn_of_inverse(name, map, color),
+            DepthUnit::Metres => plausible::warn_of_map(name, map, is_scaled || self.depth.depth_scale.is_some()),
         }
     }
 }
