@@ -264,7 +264,10 @@ impl SourceName {
             DepthFrom::Networks | DepthFrom::Plate => "with depth that is made of it",
             _ => "with the depth beside it",
         };
-        Some(format!("{}: a photo, one frame that stands still, {depth}", path.display()))
+        Some(format!(
+            "{}: a photo, one frame that stands still, {depth}; its colour profile, EXIF and XMP are kept by `render` alone",
+            path.display()
+        ))
     }
 
     /// The device nodes of its cameras.
