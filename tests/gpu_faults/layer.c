@@ -78,18 +78,27 @@ static Result hang(uint64_t timeout_ns) {
     return TIMEOUT;
 }
 
+/* Who waits looks now and then: only waits that find the work done count, however many looks there were. */
+static Result waited(Result found, uint64_t timeout_ns) {
+    if (found == TIMEOUT)
+        return found;
+    if (strikes("wait"))
+        return lose();
+    return strikes("hang") ? hang(timeout_ns) : found;
+}
+
 static Result (*wait_semaphores)(void *, const void *, uint64_t);
 static Result our_wait_semaphores(void *device, const void *which, uint64_t timeout_ns) {
-    if (lost || strikes("wait"))
+    if (lost)
         return lose();
-    return strikes("hang") ? hang(timeout_ns) : wait_semaphores(device, which, timeout_ns);
+    return hangs ? hang(timeout_ns) : waited(wait_semaphores(device, which, timeout_ns), timeout_ns);
 }
 
 static Result (*wait_fences)(void *, uint32_t, const uint64_t *, uint32_t, uint64_t);
 static Result our_wait_fences(void *device, uint32_t count, const uint64_t *which, uint32_t all, uint64_t timeout_ns) {
-    if (lost || strikes("wait"))
+    if (lost)
         return lose();
-    return strikes("hang") ? hang(timeout_ns) : wait_fences(device, count, which, all, timeout_ns);
+    return hangs ? hang(timeout_ns) : waited(wait_fences(device, count, which, all, timeout_ns), timeout_ns);
 }
 
 static Result (*counter)(void *, uint64_t, uint64_t *);
