@@ -65,7 +65,8 @@ fn what_is_nothing_else_is_no_folder_and_what_was_meant_is_said() {
     let name = folder.path().to_str().unwrap().to_owned();
     let error = name.parse::<Target>().unwrap_err().to_string();
     assert!(error.contains("it is a folder") && error.contains(&format!("{name}/ (with")), "{error}");
-    let sink = open(&folder.path().join(""), &options((6, 4))).unwrap();
+    let mut sink = open(&folder.path().join(""), &options((6, 4))).unwrap();
+    crate::put_all(&mut *sink, &[crate::picture(6, 4, 0)]);
     sink.finish(Ending::Whole).unwrap();
     assert_eq!(name.parse::<Target>().unwrap(), Target::Folder(name.into()));
 }
