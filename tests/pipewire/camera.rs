@@ -243,7 +243,8 @@ fn off_is_off_for_readers_while_another_output_hangs() {
     let stat = std::fs::read_to_string(format!("/proc/{ffmpeg}/stat")).unwrap();
     assert!(stat.contains(" T "), "it still hangs: {stat}");
     assert!(signal("-CONT", &ffmpeg).success());
-    player.end();
+    // The card is no frame of the source: the node was given more than was delivered.
+    drop(player);
 }
 
 #[test]

@@ -161,7 +161,8 @@ fn a_camera_that_is_not_there_and_our_own_cost_one_line() {
     let said = run.refused();
     assert!(said.contains("there is no camera 'nobody' in PipeWire"), "{said}");
     assert_eq!(said.trim().lines().count(), 1, "{said}");
-    for (arguments, told) in [(["pipewire:", "null"], "needs the name"), (["pipewire:cam", "cam"], "no camera 'cam'")] {
+    for (arguments, told) in [(["pipewire:", "null"], "needs the name"), (["pipewire:cam", "cam/"], "no camera 'cam'")]
+    {
         let said = Run::start(&["stream", arguments[0], "--to", arguments[1]]).refused();
         assert!(said.contains(told), "{said}");
     }
