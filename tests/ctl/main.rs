@@ -8,6 +8,7 @@ mod world;
 
 use std::time::{Duration, Instant};
 
+use bokehcam::budget::Quality;
 use bokehcam::recording::still::read_color;
 use serde_json::json;
 use world::{Pictures, World, until};
@@ -72,7 +73,9 @@ fn presets_and_settings_change_the_blur_of_what_goes_out() {
     let status = world.status(&[]);
     let look = &status["look"];
     assert_eq!(json!([look["coc-at-infinity"], look["effect"]]), json!(["4%", "blur"]));
-    assert_eq!(status["quality"], "balanced");
+    // Which of them is up to the machine and what else it does.
+    let quality = status["quality"].as_str().expect("it is blurred");
+    assert!(Quality::ALL.iter().any(|level| level.name() == quality), "{quality}");
     world.ctl(&["set", "effect=none"]).done();
     assert!(detail(&pictures) > 1.2 * little);
     // What has no effect is said.
