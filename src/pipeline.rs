@@ -2,8 +2,7 @@
 //!
 //! Three named threads and the caller's, joined by three links; all end because their input ended. Stop is one flag
 //! that only capture reads: what is under way then drains, and the output is completed. A stage that fails drops both
-//! its ends, so that its neighbours end as well: quietly, since only the cause is an error. The output is completed
-//! then, too: its frames are whole.
+//! its ends, so that its neighbours end as well: quietly, since only the cause is an error; its output is completed.
 
 mod blur;
 mod capture;
@@ -307,9 +306,8 @@ pub fn run(run: Run) -> Result<Report, PipelineError> {
     let (outputs, nodes) = (sink.outputs(), sink.nodes());
     [about.refined_by, about.matted_by] = [refined_by, matted_by].map(|by| by.unwrap_or("none").into());
     let finished = guard("sink", &over, move || Ok(sink.finish(ending)?));
-    // What came first is the cause.
+    // What came first is the cause. Only now have the outputs taken all that was under way.
     let ended = ended.and(finished);
-    // Only now have they taken all that was under way.
     (about.outputs, about.pipewire) = (sink::read(&outputs), sink::read(&nodes));
     about.elapsed_ns = clock.now_ns() - began_ns;
     about.cpu_ns = clock::cpu_ns() - cpu_ns;

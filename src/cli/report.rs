@@ -36,13 +36,13 @@ pub fn check(path: Option<&Path>, force: bool, targets: &[Target]) -> Result<(),
     }
     refuse_overwrite([path], force)?;
     let is_json = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("json"));
-    match path.metadata() {
-        Ok(there) if !(is_json && there.is_file()) => usage(format!(
-            "--report {}: this exists and is no report; --force replaces files called .json alone, so choose another name",
-            path.display()
-        )),
-        _ => Ok(()),
+    if is_json || !path.exists() {
+        return Ok(());
     }
+    usage(format!(
+        "--report {}: this exists and is no report; --force replaces files called .json alone, so choose another name",
+        path.display()
+    ))
 }
 
 /// Checks before a run that its report can be written.
