@@ -25,7 +25,9 @@ const SIZE: (usize, usize) = (640, 360);
 /// Codes of 8 bits.
 const NEAR: u8 = 3;
 /// Nothing takes so long, a browser's first start on a busy machine neither.
-const PATIENCE: Duration = Duration::from_secs(300);
+const PATIENCE: Duration = Duration::from_secs(120);
+/// How often a browser is started.
+const STARTS: usize = 3;
 
 /// A program that is ended when this is dropped.
 struct Beside(Child);
@@ -99,27 +101,32 @@ impl Desktop {
         desktop
     }
 
-    /// What a page in the browser saw.
-    fn page(&self, browser: impl FnOnce(&Path, &str) -> Command) -> Value {
+    /// What a page in the browser saw. A browser that stays silent is started anew, as a person does it with one that hangs.
+    fn page(&self, browser: impl Fn(&Path, &str) -> Command) -> Value {
         let server = TcpListener::bind("127.0.0.1:0").unwrap();
         server.set_nonblocking(true).unwrap();
         let address = format!("http://localhost:{}/", server.local_addr().unwrap().port());
-        let profile = tempfile::tempdir().unwrap();
-        let mut command = browser(profile.path(), &address);
-        command.env("DISPLAY", &self.display).env("XDG_CURRENT_DESKTOP", "GTK").env("HOME", profile.path());
-        let _browser = Beside::start(&mut command);
-        let began = Instant::now();
-        while began.elapsed() < PATIENCE {
-            match server.accept() {
-                Ok((stream, _)) => {
-                    if let Some(seen) = answer(stream) {
-                        return seen;
-                    }
+        let mut stood = Vec::new();
+        for _ in 0..STARTS {
+            let profile = tempfile::tempdir().unwrap();
+            let mut command = browser(profile.path(), &address);
+            command.env("DISPLAY", &self.display).env("XDG_CURRENT_DESKTOP", "GTK").env("HOME", profile.path());
+            let _browser = Beside::start(&mut command);
+            stood.push("started".to_owned());
+            let began = Instant::now();
+            while began.elapsed() < PATIENCE {
+                match server.accept() {
+                    Ok((stream, _)) => match answer(stream) {
+                        Some(seen) if seen["stands"].is_string() => stood.push(seen["stands"].to_string()),
+                        Some(seen) => return seen,
+                        None => {}
+                    },
+                    Err(_) => std::thread::sleep(Duration::from_millis(20)),
                 }
-                Err(_) => std::thread::sleep(Duration::from_millis(20)),
             }
+            println!("silent: {stood:?}");
         }
-        panic!("the browser did not tell what it saw")
+        panic!("the browser did not tell what it saw: {stood:?}")
     }
 }
 
@@ -165,7 +172,7 @@ fn patches(folder: &Path) -> std::path::PathBuf {
 }
 
 /// Has a browser look at the camera.
-fn see(browser: impl FnOnce(&Path, &str) -> Command) {
+fn see(browser: impl Fn(&Path, &str) -> Command) {
     let recording = tempfile::tempdir().unwrap();
     let recording = patches(recording.path()).display().to_string();
     let arguments = ["stream", &recording, "--loop", "--effect", "none", "--pace", "realtime", "--on-demand"];
