@@ -1,15 +1,19 @@
-// Shared by every pass: the uniforms, whose fields equal those of the Rust structs of the same names, and the numbers
-// that are defined once, in Rust.
+// Shared by every pass: the uniforms, with the fields of the Rust structs of the same names, and the numbers that Rust defines.
 
 override CELL: u32;                 // bin pixels a side of a cell
 override SEGMENT: u32;              // bin pixels between two edges
 override ANY_COLOR: f32;            // no colour is brighter
 override COVERAGE_FLOOR: f32;       // less coverage than this has no colour of its own
 override FAR_WEIGHT: f32;           // weight of far cells in the local radius
-override OTHER_FROM: f32;           // what comes nearer is one surface with what is behind it up to this step of the CoC
-override OTHER_TO: f32;             // and another one from here on
+override OTHER_FROM: f32;           // what comes nearer is one surface with what is behind it up to this step of the CoC, and
+override OTHER_TO: f32;             // another one from here on
 override HIDING_SHARE: f32;         // a bin with this share of a nearer surface shows nothing of what that hides
 override HINDMOST_COVERAGE: f32;    // a bin counts wholly from here on when the hindmost is looked for
+override GRAIN: u32;                // pixels a side of a cell of the grid of silhouettes
+override MARGIN_PX: f32;            // that a silhouette's distances are larger by, as that grid is coarse
+override HAND_OVER: f32;            // half the width of the hand-over between two bins, as a share of the border's CoC
+override FADE: f32;                 // share of the square of a silhouette's reach, from where it is faded out
+override OWN_COVERAGE: f32;         // a surface with less than this does not fill a pixel
 override OCTAVES_FROM_PX: f32;      // from this radius on, nodes of the bank lie evenly in each octave
 override OCTAVE_SHIFT: u32;         // bits of a float below those that tell the node within its octave
 
@@ -47,6 +51,7 @@ struct Frame {
     extent: f32,                // of the aperture: the outermost point, in radii
     rows_apart: u32,            // pixels filtered at once: from one term's rows to the next one's
     yuyv: u32,                  // 1: the result is YUYV
+    front_px: f32,              // what has a CoC above this does not lie in front of the subject
 }
 
 // What a dispatch does: some bins, of one layer where it goes over the picture.

@@ -7,6 +7,7 @@
 @group(0) @binding(4) var<storage, read_write> result: array<u32>;
 @group(0) @binding(5) var<storage, read> active_tiles: array<u32>;
 @group(0) @binding(6) var<storage, read> shown: array<u32>;
+@group(0) @binding(7) var<storage, read> reached: array<vec4<f32>>;
 
 var<workgroup> codes: array<u32, LINE>;
 
@@ -31,47 +32,6 @@ fn sample_bin(k: u32, pixel: vec2<u32>) -> vec4<f32> {
     let share = at - vec2<f32>(first);
     return mix(mix(bin_at(k, first), bin_at(k, vec2(second.x, first.y)), share.x),
                mix(bin_at(k, vec2(first.x, second.y)), bin_at(k, second), share.x), share.y);
-}
-
-// Bins stacked front to back.
-struct Stack {
-    color: vec3<f32>,
-    open: f32,              // how much nothing has covered yet
-    hindmost: vec3<f32>,    // the colour of the hindmost bin that counts, and how far that is known
-    known: f32,
-}
-
-// A bin behind all there is covers what is still open.
-fn add(stack: Stack, layer: vec4<f32>) -> Stack {
-    let taken = min(layer.a, stack.open);
-    let own = layer.rgb * (1.0 / max(layer.a, 1.0e-6));
-    let counts = min(layer.a * (1.0 / HINDMOST_COVERAGE), 1.0);
-    return Stack(stack.color + own * taken, stack.open - taken,
-                 mix(stack.hindmost, own, counts), mix(stack.known, 1.0, counts));
-}
-
-// What is still open was hidden from the camera, and lies behind all else: it gets the colour of the hindmost.
-fn closed(stack: Stack) -> vec3<f32> {
-    return stack.color + stack.hindmost * (stack.open / max(stack.known, 1.0e-6));
-}
-
-fn layers(pixel: vec2<u32>) -> vec3<f32> {
-    var front = Stack(vec3(0.0), 1.0, vec3(0.0), 0.0);
-    var back = front;
-    for (var rest = shown[tile_of(pixel, frame.size.x, vec2(TILE))]; rest != 0u; rest &= rest - 1u) {
-        let k = firstTrailingBit(rest);
-        let layer = sample_bin(k, pixel);
-        if k < frame.near_bins {
-            front = add(front, layer);
-        } else {
-            back = add(back, layer);
-        }
-    }
-    if back.known > 1.0e-4 || front.known <= 0.0 {
-        return front.color + front.open * closed(back);
-    }
-    // Where nothing lies behind, what lies in front is all there is.
-    return closed(front);
 }
 
 fn chosen(pixel: vec2<u32>) -> vec3<f32> {

@@ -12,6 +12,7 @@
 @group(0) @binding(7) var<storage, read> nearest_px: array<f32>;
 @group(0) @binding(8) var<uniform> bins: array<Bin, MAX_BINS>;
 @group(0) @binding(9) var<storage, read_write> next: array<atomic<u32>>;
+@group(0) @binding(10) var<storage, read> reached: array<vec4<f32>>;
 
 // Pixels a side of a level's patch that reaches all that a tile needs of it, its neighbours included.
 const PATCH = 6u;
@@ -42,13 +43,15 @@ fn completed(number: u32, own: Known, pixel: vec2<u32>, tile: vec2<u32>) -> Know
     }
     let b = between(pixel, level_of(number + 1u).size) - corner_of(tile, number + 1u).xxyy;
     let at = (number + 1u) % 2u * PATCH * PATCH + vec4(b.xy, b.xy) + PATCH * vec4(b.zz, b.ww);
-    let near = plus(times(patches[at.x], 0.75), times(patches[at.y], 0.25));
-    let far = plus(times(patches[at.z], 0.75), times(patches[at.w], 0.25));
-    return pushed(own, plus(times(near, 0.75), times(far, 0.25)));
+    return pushed(own, array(patches[at.x], patches[at.y], patches[at.z], patches[at.w]));
 }
 
-// A pixel of the scene with what is known behind it.
-fn filled(value: vec2<u32>, behind: Known) -> vec2<u32> {
+// A pixel of the scene with what is known behind it, as far as a silhouette that reaches it uncovers that.
+fn filled(value: vec2<u32>, behind: Known, reach: vec4<f32>) -> vec2<u32> {
+    // Away from all silhouettes nothing behind can be seen.
+    if reach.z <= 0.0 {
+        return value;
+    }
     let own = scene_unpacked(value, frame.most_px);
     let unhidden = step_at(work.unhidden, own.w);
     // What a silhouette only touches keeps its own colour: it is seen, and filling would smear it. Where something near
@@ -57,7 +60,10 @@ fn filled(value: vec2<u32>, behind: Known) -> vec2<u32> {
         return value;
     }
     let hidden = (1.0 - unhidden) * other_surface(own.w, behind.value.w);
-    if hidden == 0.0 {
+    // Where it matters for what others see alone, it must not get among what is in front itself, nor half of it.
+    let focus_to_px = bins[min(frame.near_bins, frame.bins - 1u)].behind.x;
+    let is_kin = behind.value.w <= focus_to_px * (1.0 + HAND_OVER);
+    if hidden == 0.0 || reach.x <= 0.0 && (is_kin || hidden < 1.0) {
         return value;
     }
     let mixture = mix(own, vec4(behind.value.rgb, max(behind.value.w, work.nearest_px)), hidden);
@@ -102,7 +108,8 @@ fn fill(@builtin(global_invocation_id) id: vec3<u32>, @builtin(local_invocation_
         let at = 2u * id.xy + vec2(sub % 2u, sub / 2u);
         if all(at < frame.size) {
             let pixel = at.y * frame.size.x + at.x;
-            let value = filled(scene[pixel], hidden);
+            let cell = at.y / GRAIN * cells_of(frame.size).x + at.x / GRAIN;
+            let value = filled(scene[pixel], hidden, reached[cell]);
             behind[pixel] = value;
             range = union_of(range, vec2(scene_unpacked(value, frame.most_px).w));
         }

@@ -1,6 +1,7 @@
 // Pass unpack: 8-bit sRGB to linear light with highlights expanded; mixed pixels to two surfaces. Reads packed RGB bytes, and
 // of a depth map the signed CoC or metres; writes linear r, g, b and the CoC in pixels, and the range of CoC of every tile,
-// which shows no bins yet; lists the tiles of the bins of the foremost layer.
+// which shows no bins yet; lists the tiles of the bins of the foremost layer; marks the silhouettes, a cell of the grid each thread
+// and row (silhouettes.rs has why).
 
 @group(0) @binding(0) var<uniform> work: Work;
 @group(0) @binding(1) var<uniform> bins: array<Bin, MAX_BINS>;
@@ -12,11 +13,14 @@
 @group(0) @binding(7) var<storage, read_write> mixed: array<MixedPixel>;
 @group(0) @binding(8) var<storage, read_write> shown: array<u32>;
 @group(0) @binding(9) var<storage, read_write> next: array<atomic<u32>>;
+@group(0) @binding(10) var<storage, read_write> marks: array<vec4<f32>>;
 
-const ACROSS = 4u;          // pixels of a row that a thread does: three whole words
+const ACROSS = 4u;          // pixels of a row that a thread does: three whole words, and a cell's
 
 // Of each pixel of the tile: its place among the mixed ones, plus one.
 var<workgroup> places: array<u32, TILE * TILE>;
+// Of each thread: how far its silhouettes let show what lies behind, in pixels.
+var<workgroup> marked: array<vec4<f32>, TILE * TILE / ACROSS>;
 
 fn light_of(code: u32) -> f32 {
     let value = f32(code) * (1.0 / 255.0);
@@ -30,42 +34,6 @@ fn codes_at(at: u32) -> vec3<u32> {
     let words = vec2(color[at / 4u], color[min(at / 4u + 1u, arrayLength(&color) - 1u)]);
     let bytes = (words.x >> shift) | select(words.y << (32u - shift), 0u, shift == 0u);
     return vec3(bytes, bytes >> 8u, bytes >> 16u) & vec3(255u);
-}
-
-fn coc_of(x: u32, y: u32) -> f32 {
-    if frame.coc_kind == 0u {
-        return frame.coc.x;
-    }
-    if frame.coc_kind == 1u {
-        let distance_px = abs(frame.coc.x * f32(x) + frame.coc.y * f32(y) - frame.coc.z) - frame.coc.w;
-        return min(max(distance_px, 0.0) * frame.ramp.x, frame.ramp.y);
-    }
-    if all(frame.depth_size == frame.size) {
-        return radius_at(y * frame.size.x + x);
-    }
-    let column = min((2u * x + 1u) * frame.depth_size.x / (2u * frame.size.x), frame.depth_size.x - 1u);
-    let row = min((2u * y + 1u) * frame.depth_size.y / (2u * frame.size.y), frame.depth_size.y - 1u);
-    return radius_at(row * frame.depth_size.x + column);
-}
-
-fn radius_at(index: u32) -> f32 {
-    if frame.coc_kind == 3u {
-        return coc_of_depth(bitcast<f32>(radii[index]));
-    }
-    let roots = unpack2x16snorm(radii[index / 2u]);
-    let root = select(roots.x, roots.y, index % 2u == 1u);
-    return root * abs(root) * frame.most_px;
-}
-
-fn coc_of_depth(metres: f32) -> f32 {
-    // Unknown depth counts as infinitely far. The largest finite number stands in for infinity.
-    var inverse_m = 0.0;
-    if metres > 0.0 && metres < 3.0e38 {
-        inverse_m = 1.0 / metres;
-    }
-    // 1 within the sharp range, and what is nearer to 1 of both its ends without.
-    let ratio = max(frame.coc.y * inverse_m, min(frame.coc.z * inverse_m, 1.0));
-    return clamp(frame.coc.x * (1.0 - ratio), -frame.coc.w, frame.coc.w);
 }
 
 // Notes which pixels of a row of the tile are mixed.
@@ -110,6 +78,9 @@ fn unpack(@builtin(local_invocation_id) local: vec3<u32>, @builtin(local_invocat
         }
         workgroupBarrier();
     }
+    // A smaller map has steps that are no silhouettes: those between its own pixels.
+    let least_px = max(f32(frame.size.x) / f32(frame.depth_size.x), 1.0);
+    var mark = NO_SILHOUETTE;
     var range = NOTHING;
     for (var n = 0u; n < ACROSS && first.x + n < frame.size.x && first.y < frame.size.y; n++) {
         let pixel = first.y * frame.size.x + first.x + n;
@@ -119,19 +90,34 @@ fn unpack(@builtin(local_invocation_id) local: vec3<u32>, @builtin(local_invocat
             light *= frame.expansion / (frame.expansion - luminance(light));
         }
         var value = scene_packed(light, coc_of(first.x + n, first.y), frame.most_px);
+        if frame.compositing == 0u {
+            mark = max(mark, mark_at(first.x + n, first.y, least_px));
+        }
         if frame.mixed > 0u {
             let place = places[ACROSS * thread + n];
             if place > 0u {
                 value = take_apart(place - 1u, light);
-                range = union_of(range, vec2(near_surface(place - 1u).w));
+                let near_px = near_surface(place - 1u).w;
+                let far_px = scene_unpacked(value, frame.most_px).w;
+                range = union_of(range, vec2(near_px));
+                mark = max(mark, silhouette(near_px, far_px, least_px));
             }
         }
         scene[pixel] = value;
         // What the others read, rounding included.
         range = union_of(range, vec2(scene_unpacked(value, frame.most_px).w));
     }
+    marked[thread] = mark;
     range = range_of_tile(thread, TILE * TILE / ACROSS, range);
     put_binned(tile.xy, range, thread);
+    let cells = cells_of(frame.size);
+    let cell = first / GRAIN;
+    if frame.compositing == 0u && local.y % GRAIN == 0u && all(cell < cells) {
+        for (var row = 1u; row < GRAIN; row++) {
+            mark = max(mark, marked[thread + row * (TILE / ACROSS)]);
+        }
+        marks[cell.y * cells.x + cell.x] = mark;
+    }
     if thread == 0u {
         ranges[tile.y * tiles.x + tile.x] = range;
         shown[tile.y * tiles.x + tile.x] = 0u;

@@ -7,6 +7,8 @@
 #[path = "laws_random/cases.rs"]
 mod cases;
 mod common;
+#[path = "laws_random/slopes.rs"]
+mod slopes;
 
 use bokehcam::bokeh::aperture::Aperture;
 use bokehcam::bokeh::cpu::CpuBokeh;
@@ -19,6 +21,7 @@ use bokehcam::optics::CocKind;
 use bokehcam::optics::{CocField, DepthCoc};
 use cases::each_case;
 use common::{COC_KINDS, color, depth};
+use slopes::{SIZE as SLOPE, Slope};
 
 /// What blurs a sequence of frames.
 trait Blurs {
@@ -172,6 +175,56 @@ fn what_is_in_focus_stays_as_it_is() {
     });
 }
 
+/// A surface is opaque: away from its edge, the wall behind it may be black or white.
+fn nothing_shines_through_a_slope(make: Make) {
+    each_case(|random| {
+        let slope = Slope::new(random);
+        let most_px = slope.lens.max_coc_px;
+        let settings = Settings {
+            method: Method::Layered,
+            // What two terms of a picture overshoot is cut to the colours around, the wall's included.
+            rank: None,
+            far_max_px: most_px,
+            near_max_px: most_px,
+            ..random.settings(CocKind::Depth)
+        };
+        let mut executor = make(&settings, SLOPE);
+        let field = CocField::Depth(slope.lens);
+        let [black, white] =
+            [0, 255].map(|wall| executor.blur(settings.quality, &slope.image(wall), &slope.map, &field));
+        let (worst, at) = slope.differ(&black, &white);
+        let coc_px = slope.lens.coc_px(slope.map.metres[at]);
+        assert!(worst <= 1, "{worst} codes shine through at {at} (CoC {coc_px} px): {settings:?} {field:?}");
+    });
+}
+
+#[test]
+fn nothing_shines_through_a_slope_on_the_cpu() {
+    nothing_shines_through_a_slope(&|settings, size| cpu(settings, size, 2));
+}
+
+/// What is blurred in bins is as if every pixel gathered all around it with its own radius.
+fn a_slope_is_blurred_as_by_the_direct_gather(make: Make) {
+    each_case(|random| {
+        let slope = Slope::new(random);
+        let most_px = slope.lens.max_coc_px;
+        let settings = Settings { far_max_px: most_px, near_max_px: most_px, ..random.settings(CocKind::Depth) };
+        let layered = Settings { method: Method::Layered, highlights: 0.0, rank: None, ..settings };
+        let gather = Settings { method: Method::Gather, rank: Some(Rank::Full), ..layered.clone() };
+        let field = CocField::Depth(slope.lens);
+        let [blurred, gathered] = [&layered, &gather]
+            .map(|settings| make(settings, SLOPE).blur(settings.quality, &slope.image(255), &slope.map, &field));
+        let (worst, at) = slope.differ(&blurred, &gathered);
+        let coc_px = slope.lens.coc_px(slope.map.metres[at]);
+        assert!(worst <= 1, "{worst} codes off at {at} (CoC {coc_px} px): {layered:?} {field:?}");
+    });
+}
+
+#[test]
+fn a_slope_is_blurred_as_by_the_direct_gather_on_the_cpu() {
+    a_slope_is_blurred_as_by_the_direct_gather(&|settings, size| cpu(settings, size, 2));
+}
+
 #[cfg(feature = "gpu")]
 mod on_the_gpu {
     use super::*;
@@ -216,5 +269,11 @@ mod on_the_gpu {
     #[ignore = "needs a Vulkan adapter (software will do)"]
     fn a_blurred_point_does_not_shift_on_the_gpu() {
         a_blurred_point_does_not_shift(&gpu());
+    }
+
+    #[test]
+    #[ignore = "needs a Vulkan adapter (software will do)"]
+    fn nothing_shines_through_a_slope_on_the_gpu() {
+        nothing_shines_through_a_slope(&gpu());
     }
 }

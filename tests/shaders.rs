@@ -86,7 +86,8 @@ fn structs_have_the_same_layout_in_rust_and_wgsl() {
             even,
             extent,
             rows_apart,
-            yuyv
+            yuyv,
+            front_px
         }),
         layout!(Bin {
             size,

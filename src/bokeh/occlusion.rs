@@ -20,6 +20,54 @@ pub const OTHER_TO: f32 = 0.6;
 /// What has this many times the CoC of the near bins' border, or more, hides what is behind it.
 const HIDDEN_FROM: f32 = 1.5;
 
+/// Pixels a side of a cell of the grid that silhouettes are noted in.
+pub const GRAIN: usize = 4;
+/// What is noted of a silhouette: the distances of [`Silhouette`].
+pub const SHOWS: usize = 3;
+/// Pixels that a distance is larger by, as the grid is coarse and linear between its cells. No whole number: the executors, which
+/// round otherwise, are to agree where radii are whole ones.
+pub const MARGIN_PX: f32 = 2.0 * GRAIN as f32 + 0.3;
+/// What can be seen past a silhouette ends at its radius `r`; from where `r^2` less the squared distance is this share of `r^2`,
+/// it is faded out, so that nothing ends at once. Past a straight edge 5 % of the aperture see beyond it there.
+pub const FADE: f32 = 0.36;
+/// With less coverage than this, a surface does not fill a pixel.
+pub const OWN_COVERAGE: f32 = 0.05;
+
+/// A jump of the CoC between two neighbours: the edge of the nearer surface, and how far from it what lies behind matters, in
+/// pixels; -1 where not at all.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Silhouette {
+    /// So far anything farther can be seen through the aperture: the radius of the nearer surface.
+    pub shows_px: f32,
+    /// The same where what is farther does not lie in front of the subject.
+    pub shows_back_px: f32,
+    /// So far what is hidden can matter: what is seen is blurred itself.
+    pub uncovers_px: f32,
+}
+
+/// What has a CoC above this does not lie in front of the subject, for a layer in front begins at such a radius.
+#[inline(always)]
+pub fn front_px(near_from_px: f32) -> f32 {
+    -(1.0 + HAND_OVER) * near_from_px
+}
+
+impl Silhouette {
+    /// That between two pixels of these CoC, where it is one: a step of `least_px`, which is also more than a surface that goes
+    /// on would make ([`OTHER_FROM`]): coarse codes of depth are no silhouettes. From `near_from_px` on, a radius in front of the
+    /// focal plane is that of a layer in front.
+    #[inline(always)]
+    pub fn between(a_px: f32, b_px: f32, least_px: f32, near_from_px: f32) -> Option<Self> {
+        let (near_px, far_px) = (a_px.min(b_px), a_px.max(b_px));
+        let shows_px = near_px.abs() + MARGIN_PX;
+        let shows_back_px = if far_px > front_px(near_from_px) { shows_px } else { -1.0 };
+        (far_px - near_px >= least_px.max(OTHER_FROM * near_px.abs())).then_some(Self {
+            shows_px,
+            shows_back_px,
+            uncovers_px: shows_px + far_px.abs(),
+        })
+    }
+}
+
 impl Plan {
     /// The bins of each layer, front to back: near bins, in at most [`MOST_NEAR_LAYERS`] groups, and all others. What the
     /// layers in front hide is filled in for each: see [`Self::unhidden`].
@@ -34,6 +82,12 @@ impl Plan {
     /// below it.
     pub fn nearest_behind_px(&self, first: usize) -> f32 {
         first.checked_sub(1).map_or(f32::MIN, |front| self.bins[front].high_px * (1.0 - HAND_OVER))
+    }
+
+    /// The CoC above which no bin that holds anything of a surface in front begins: that of the far border of the bin in focus.
+    pub fn kin_to_px(&self) -> f32 {
+        let focus = self.bins.iter().position(|bin| !bin.near);
+        focus.map_or(f32::MAX, |focus| self.bins[focus].high_px * (1.0 + HAND_OVER))
     }
 
     /// How much of a pixel the layer of bins from `first` on takes as it is; the rest counts as hidden by the near bins

@@ -190,8 +190,13 @@ impl Plan {
         }
     }
 
+    /// The radius in front of the focal plane below which all belongs to the bin in focus.
+    pub fn near_from_px(&self) -> f32 {
+        self.rung.near_from_px.max(self.rung.near_from_share * self.max_px[0])
+    }
+
     fn lay_out_layers(&mut self) {
-        let near_from_px = self.rung.near_from_px.max(self.rung.near_from_share * self.max_px[0]);
+        let near_from_px = self.near_from_px();
         let sides = [false, true].into_iter().zip(&mut self.pieces);
         let inner_px = sides.map(|(near, pieces)| self.counts.pieces(near, &self.rung, near_from_px, pieces));
         self.focus_px = inner_px.fold(0.0, f32::max).min(self.max_px[0].max(self.max_px[1]));
@@ -238,6 +243,13 @@ impl Plan {
             let low_px = if piece.border_px > 0.0 { piece.border_px } else { f32::NEG_INFINITY };
             self.bins.push(bin((low_px, outer_px(far, k)), content, 1 + k));
         }
+    }
+
+    /// Where what lies in front of the subject ends: the CoC of the last near bin's border, and the slope of the hand-over; a
+    /// border that all lies behind without such bins.
+    pub fn near_to(&self) -> (f32, f32) {
+        let last = self.bins.iter().rposition(|bin| bin.near);
+        last.and_then(|last| self.border(last)).unwrap_or((-1e30, 1.0))
     }
 
     /// Whether truncation makes a bin's filters overshoot visibly. Small filters keep nearly all of their terms: even

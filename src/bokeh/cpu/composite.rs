@@ -1,20 +1,18 @@
 //! Pass `composite`: the blurred bins, front to back, become one picture; back to its pixels' kind.
-//!
-//! The pixels of one view tile the picture, so the coverages of two bins are disjoint, not independent: among the near
-//! bins, and among the others, a bin fills what is left. The near ones lie over the others; what stays open takes the
-//! colour of the hindmost.
 
 #![allow(clippy::needless_range_loop)] // Planes and columns index several arrays at once.
 
 use pulp::{Simd, WithSimd};
 
 use super::encode::{CHUNK, EncodeTable};
+use super::layers::Layers;
 use super::pixels::Sample;
 use super::rows::{PIECE, STRIP, STRIP_ROW, Slot};
+use super::silhouettes::Silhouettes;
 use super::tiles::{TILE_H, TILE_W, Tiles};
 use super::unpack::{Source, coc_row, compress};
 use crate::bokeh::ladder::Compositing;
-use crate::bokeh::plan::{Bin, HINDMOST_COVERAGE, MAX_BINS, Plan};
+use crate::bokeh::plan::{Bin, Plan};
 use crate::color::luminance;
 use crate::compute::aligned::Line;
 use crate::compute::simd::{fma, load, madd, prefetch, store};
@@ -25,6 +23,8 @@ pub struct Composite<'a, T> {
     pub slots: &'a [Slot],
     /// Tells which tiles stay as they are.
     pub tiles: &'a Tiles,
+    /// Tell where something behind can show.
+    pub silhouettes: &'a Silhouettes,
     /// The frame as it came, and its pixels.
     pub frame: &'a Source<'a>,
     pub pixels: &'a [T],
@@ -39,108 +39,6 @@ pub struct Composite<'a, T> {
     pub out: &'a mut [T],
 }
 
-/// Bins composited front to back at some pixels: each covers what is still open.
-#[derive(Clone, Copy)]
-struct Pile<S: Simd> {
-    color: [S::f32s; 3],
-    /// How much of each pixel nothing has covered yet.
-    open: S::f32s,
-    /// The colour of the hindmost bin that counts here, and how far that is known.
-    hindmost: [S::f32s; 3],
-    known: S::f32s,
-}
-
-impl<S: Simd> Pile<S> {
-    #[inline(always)]
-    fn new(simd: S) -> Self {
-        let (zero, one) = (simd.splat_f32s(0.0), simd.splat_f32s(1.0));
-        Self { color: [zero; 3], open: one, hindmost: [zero; 3], known: zero }
-    }
-
-    /// Adds a vector of a bin behind all others, premultiplied colour and coverage.
-    #[inline(always)]
-    fn add(&mut self, simd: S, planes: &[[f32; CHUNK]; 4], x: usize) {
-        let (zero, one) = (simd.splat_f32s(0.0), simd.splat_f32s(1.0));
-        let mut layer = [zero; 4];
-        for p in 0..4 {
-            layer[p] = load::<S>(&planes[p], x);
-        }
-        if simd.first_true_m32s(simd.greater_than_f32s(layer[3], zero)) == S::F32_LANES {
-            return;
-        }
-        let covered = simd.min_f32s(layer[3], self.open);
-        let inverse = simd.div_f32s(one, simd.max_f32s(layer[3], simd.splat_f32s(1e-6)));
-        let weight = simd.min_f32s(simd.mul_f32s(layer[3], simd.splat_f32s(1.0 / HINDMOST_COVERAGE)), one);
-        for p in 0..3 {
-            let straight = simd.mul_f32s(layer[p], inverse);
-            self.color[p] = fma(simd, straight, covered, self.color[p]);
-            self.hindmost[p] = fma(simd, simd.sub_f32s(straight, self.hindmost[p]), weight, self.hindmost[p]);
-        }
-        self.known = fma(simd, simd.sub_f32s(one, self.known), weight, self.known);
-        self.open = simd.sub_f32s(self.open, covered);
-    }
-
-    /// The colour, with what is still open in that of the hindmost bin: it was hidden from the camera behind all else.
-    #[inline(always)]
-    fn with_rest_filled(&self, simd: S) -> [S::f32s; 3] {
-        let scale = simd.div_f32s(self.open, simd.max_f32s(self.known, simd.splat_f32s(1e-6)));
-        let mut color = self.color;
-        for p in 0..3 {
-            color[p] = fma(simd, self.hindmost[p], scale, color[p]);
-        }
-        color
-    }
-}
-
-/// The layers of a chunk, front to back: what bins have there.
-pub struct Layers {
-    planes: Box<[Line<[[f32; CHUNK]; 4]>]>,
-    near: usize,
-    count: usize,
-}
-
-impl Layers {
-    /// Memory for all bins that there can be.
-    pub fn new() -> Self {
-        Self { planes: vec![Line([[0.0; CHUNK]; 4]); MAX_BINS].into(), near: 0, count: 0 }
-    }
-
-    /// Composites the layers, the near ones over the others, to linear light.
-    #[inline(always)]
-    fn flatten<S: Simd>(&self, simd: S, color: &mut Color) {
-        let (near, rest) = self.planes[..self.count].split_at(self.near);
-        let zero = simd.splat_f32s(0.0);
-        for x in (0..CHUNK).step_by(S::F32_LANES) {
-            let mut back = Pile::new(simd);
-            for planes in rest {
-                back.add(simd, &planes.0, x);
-            }
-            let mut light = back.with_rest_filled(simd);
-            if !near.is_empty() {
-                let mut front = Pile::new(simd);
-                for planes in near {
-                    front.add(simd, &planes.0, x);
-                }
-                // Where nothing lies behind, the near bins have to fill the pixel.
-                let has_back = simd.greater_than_f32s(back.known, simd.splat_f32s(1e-4));
-                let alone = front.with_rest_filled(simd);
-                let open = simd.select_f32s(has_back, front.open, zero);
-                for p in 0..3 {
-                    let ahead = simd.select_f32s(has_back, front.color[p], alone[p]);
-                    light[p] = fma(simd, light[p], open, ahead);
-                }
-            }
-            for p in 0..3 {
-                let light = simd.max_f32s(light[p], zero);
-                store::<S>(&mut color.0[p], x, light);
-            }
-        }
-    }
-}
-
-/// Linear light of a chunk.
-type Color = Line<[[f32; CHUNK]; 3]>;
-
 impl<T: Sample> WithSimd for Composite<'_, T> {
     type Output = ();
     #[inline(always)]
@@ -148,7 +46,7 @@ impl<T: Sample> WithSimd for Composite<'_, T> {
         let width = self.plan.width;
         let row_of_tiles = self.y0 / TILE_H * self.tiles.across;
         let out = std::mem::take(&mut self.out);
-        let mut color = Line([[0.0; CHUNK]; 3]);
+        let (mut color, mut coc_px) = (Line([[0.0; CHUNK]; 3]), [0.0; CHUNK]);
         for x0 in (0..width).step_by(CHUNK) {
             let take = CHUNK.min(width - x0);
             let tiles = row_of_tiles + x0 / TILE_W..row_of_tiles + (x0 + take).div_ceil(TILE_W);
@@ -165,7 +63,11 @@ impl<T: Sample> WithSimd for Composite<'_, T> {
                             row.copy_from_slice(&self.pixels[(y * width + x0) * 3..][..take * 3]);
                             continue;
                         }
-                        self.layers.flatten(simd, &mut color);
+                        let reaching = self.silhouettes.reaching(y, x0);
+                        if self.layers.count() > 1 {
+                            coc_row(self.frame, y, x0, &mut coc_px[..take]);
+                        }
+                        self.layers.flatten(simd, &reaching, &coc_px, &mut color);
                     }
                     Compositing::Select => self.select(simd, y, x0, take, &mut color.0),
                     Compositing::Gather => copy_gathered(self.gathered, width, y, x0, &mut color.0),
@@ -202,14 +104,13 @@ impl<T> Composite<'_, T> {
     #[inline(always)]
     fn read_layers<S: Simd>(&mut self, simd: S, y: usize, x0: usize, still: bool) -> bool {
         let (plan, layers) = (self.plan, &mut *self.layers);
-        (layers.near, layers.count) = (0, 0);
+        layers.clear(plan.near_to());
         for bin in &plan.bins {
-            if still && !bin.near && layers.count == 0 {
+            if still && !bin.near && layers.count() == 0 {
                 return false;
             }
-            if sample(simd, bin, &self.slots[bin.slot], y, x0, &mut layers.planes[layers.count].0) {
-                layers.count += 1;
-                layers.near += usize::from(bin.near);
+            if sample(simd, bin, &self.slots[bin.slot], y, x0, layers.next()) {
+                layers.keep(bin);
             }
         }
         true
@@ -218,7 +119,8 @@ impl<T> Composite<'_, T> {
     /// The colour of a chunk of `take` pixels, from the bins of each pixel's own CoC, by their share of it.
     #[inline(always)]
     fn select<S: Simd>(&mut self, simd: S, y: usize, x0: usize, take: usize, color: &mut [[f32; CHUNK]; 3]) {
-        let layer = &mut self.layers.planes[0].0;
+        self.layers.clear((-1.0, 1.0));
+        let layer = self.layers.next();
         let mut coc = [0.0; CHUNK];
         coc_row(self.frame, y, x0, &mut coc[..take]);
         *color = [[0.0; CHUNK]; 3];

@@ -12,9 +12,10 @@ use pulp::{Arch, Simd};
 
 use super::levels::{Base, Level, PLANES, Pull, Push};
 use super::rows::{PIECE, Rows};
+use super::silhouettes::Silhouettes;
 use super::unpack::Surfaces;
-use crate::bokeh::occlusion::other_surface;
-use crate::bokeh::plan::Share;
+use crate::bokeh::occlusion::{GRAIN, other_surface};
+use crate::bokeh::plan::{Plan, Share};
 use crate::compute::simd::{load, store};
 use crate::compute::thread_pool::{DisjointParts, ThreadPool};
 
@@ -52,8 +53,11 @@ pub struct HalfRows<'a> {
 #[derive(Clone, Copy)]
 pub struct Behind<'a> {
     level: &'a Level,
+    silhouettes: &'a Silhouettes,
     unhidden: Share,
     nearest_px: f32,
+    /// Bins whose CoC are all above this hold nothing of a surface in front.
+    kin_to_px: f32,
 }
 
 impl Pyramid {
@@ -79,8 +83,9 @@ impl Pyramid {
         Halves { width: self.levels[0].width, stride, rows }
     }
 
-    /// Fills what is hidden by all that is not `unhidden`, once the halves are laid.
-    pub fn fill(&mut self, unhidden: &Share, workers: &mut ThreadPool, arch: Arch) {
+    /// Fills what is hidden by all that is not `unhidden`, once the halves are laid. What has a CoC below `front_px` lies in
+    /// front of the subject.
+    pub fn fill(&mut self, unhidden: &Share, front_px: f32, workers: &mut ThreadPool, arch: Arch) {
         self.lay_base(unhidden, workers, arch);
         for k in 1..self.levels.len() {
             let (fine, coarse) = self.levels.split_at_mut(k);
@@ -88,7 +93,7 @@ impl Pyramid {
             let (width, stride, row_len) = (coarse.width, coarse.rows.stride, coarse.rows.row_len());
             let rows = DisjointParts::new(&mut coarse.rows.data, PART * row_len, &mut self.taken);
             workers.run(coarse.height.div_ceil(PART), &|part| {
-                arch.dispatch(Pull { fine, first: part * PART, rows: rows.part(part), stride, width });
+                arch.dispatch(Pull { fine, front_px, first: part * PART, rows: rows.part(part), stride, width });
             });
         }
         for k in (1..self.levels.len()).rev() {
@@ -97,14 +102,15 @@ impl Pyramid {
             let (width, stride, row_len) = (fine.width, fine.rows.stride, fine.rows.row_len());
             let rows = DisjointParts::new(&mut fine.rows.data, PART * row_len, &mut self.taken);
             workers.run(fine.height.div_ceil(PART), &|part| {
-                arch.dispatch(Push { coarse, first: part * PART, rows: rows.part(part), stride, width });
+                arch.dispatch(Push { coarse, front_px, first: part * PART, rows: rows.part(part), stride, width });
             });
         }
     }
 
-    /// What lies behind near objects, as far as a pixel is not `unhidden`; no CoC of it is below `nearest_px`.
-    pub fn behind(&self, unhidden: Share, nearest_px: f32) -> Behind<'_> {
-        Behind { level: &self.levels[0], unhidden, nearest_px }
+    /// What lies behind near objects, as the layer of bins from `first` on sees it, as far as a silhouette uncovers it.
+    pub fn behind<'a>(&'a self, silhouettes: &'a Silhouettes, plan: &Plan, first: usize) -> Behind<'a> {
+        let (unhidden, nearest_px) = (plan.unhidden(first), plan.nearest_behind_px(first));
+        Behind { level: &self.levels[0], silhouettes, unhidden, nearest_px, kin_to_px: plan.kin_to_px() }
     }
 
     /// The finest level: known is what nothing that hides touches, nor its neighbours.
@@ -166,7 +172,7 @@ impl Behind<'_> {
     /// Replaces what is hidden in a piece of row `y` that begins at column `x0` of the picture.
     #[inline(always)]
     pub fn put<S: Simd, const W: usize>(&self, simd: S, x0: isize, y: usize, width: usize, surfaces: &mut Surfaces<W>) {
-        let row = self.level.rows.row(y / 2);
+        let (row, [shows, uncovers]) = (self.level.rows.row(y / 2), self.silhouettes.row(y));
         for start in (0..W).step_by(PIECE) {
             let coc = &mut surfaces.back.0[3][start..start + PIECE];
             // What a silhouette only touches keeps its own colour: it is seen, and filling would smear it.
@@ -179,8 +185,21 @@ impl Behind<'_> {
             if !any {
                 continue;
             }
-            let mut fill = [[0.0; PIECE]; PLANES];
             let first = x0 + start as isize;
+            // Pieces begin where cells do. Away from all silhouettes nothing behind can be seen.
+            let cell = |x: usize| ((first + x as isize).max(0) as usize / GRAIN).min(uncovers.len() - 1);
+            // Where it matters for what others see alone, it must not get among what is in front itself, nor half of it.
+            let mut from_px = [f32::MAX; PIECE];
+            for (k, from_px) in from_px.as_chunks_mut::<GRAIN>().0.iter_mut().enumerate() {
+                let cell = cell(k * GRAIN);
+                if uncovers[cell] > 0.0 {
+                    from_px.fill(if shows[cell] > 0.0 { f32::MIN } else { self.kin_to_px });
+                }
+            }
+            if from_px == [f32::MAX; PIECE] {
+                continue;
+            }
+            let mut fill = [[0.0; PIECE]; PLANES];
             for (p, fill) in fill.iter_mut().enumerate() {
                 let plane = &row[p * self.level.rows.stride..];
                 if first >= 0 && first as usize + PIECE <= width {
@@ -199,6 +218,8 @@ impl Behind<'_> {
                 // Where something near touches every pixel nothing is known, and nothing lies behind.
                 let known = if fill[PLANES - 1][x] > KNOWN { hidden[x] } else { 0.0 };
                 hidden[x] = known * other_surface(coc[x], fill[3][x]);
+                let is_wanted = fill[3][x] > from_px[x] && (from_px[x] == f32::MIN || hidden[x] >= 1.0);
+                hidden[x] = if is_wanted { hidden[x] } else { 0.0 };
             }
             for x in 0..PIECE {
                 fill[3][x] = if fill[3][x] > self.nearest_px { fill[3][x] } else { self.nearest_px };

@@ -10,12 +10,15 @@ mod fill;
 mod filter;
 mod frames;
 mod gather;
+mod layers;
 mod levels;
+mod marking;
 mod pixels;
 mod probe;
 mod reach;
 mod rows;
 mod shelves;
+mod silhouettes;
 mod tent;
 mod tiles;
 mod unpack;
@@ -26,16 +29,18 @@ use std::sync::atomic::AtomicBool;
 use band::{Band, BandSums, Hidden, Layer, NONE};
 use blur::{Scratch, Strip};
 use gather::Gather;
+use marking::Marking;
 use pulp::Arch;
 use reach::Reach;
 use rows::Slot;
 use shelves::{BinShelves, StripShelves};
+use silhouettes::Silhouettes;
 use tiles::{BLOCK, Survey, TILE_H, Tiles};
 use unpack::Source;
 
 use super::Finished;
 use super::ladder::Compositing;
-use super::occlusion::MOST_LAYERS;
+use super::occlusion::{MOST_LAYERS, front_px};
 use super::plan::{CELL, MAX_BINS, Plan};
 use super::rung::SCALES;
 use crate::budget::Quality;
@@ -51,6 +56,7 @@ pub struct CpuBokeh {
     workers: ThreadPool,
     encode: encode::EncodeTable,
     tiles: Tiles,
+    silhouettes: Silhouettes,
     slots: Vec<Slot>,
     pyramid: Option<fill::Pyramid>,
     /// Per band and block, the first bin that waits for a fill.
@@ -69,7 +75,7 @@ struct Member {
     sums: BandSums,
     reach: Vec<f32>,
     blur: Scratch,
-    layers: composite::Layers,
+    layers: layers::Layers,
 }
 
 impl CpuBokeh {
@@ -86,7 +92,7 @@ impl CpuBokeh {
                 // The pass takes a grid and a row of it.
                 reach: Vec::with_capacity(slots.iter().map(|slot| slot.cells.data.len() * 2).max().unwrap_or(0)),
                 blur: Scratch::new(&plan),
-                layers: composite::Layers::new(),
+                layers: layers::Layers::new(),
             })
             .collect();
         let flags = |n: usize| (0..n).map(|_| AtomicBool::new(false)).collect();
@@ -94,6 +100,7 @@ impl CpuBokeh {
         Self {
             encode: encode::EncodeTable::new(),
             tiles: Tiles::new(width, height),
+            silhouettes: Silhouettes::new(width, height),
             pyramid: (plan.compositing == Compositing::Layers).then(|| fill::Pyramid::new(width, height)),
             waits: vec![NONE; width.div_ceil(BLOCK) * height.div_ceil(CELL)],
             arch: Arch::new(),
@@ -132,7 +139,8 @@ impl CpuBokeh {
         lap("bin")?;
         for layer in self.plan.layers().skip(1) {
             if let Some(pyramid) = &mut self.pyramid {
-                pyramid.fill(&self.plan.unhidden(layer.start), &mut self.workers, self.arch);
+                let front_px = front_px(self.plan.near_from_px());
+                pyramid.fill(&self.plan.unhidden(layer.start), front_px, &mut self.workers, self.arch);
             }
             lap("fill")?;
             self.bin(&frame, Some(layer));
@@ -158,10 +166,12 @@ impl CpuBokeh {
         let across = self.tiles.across;
         let layered = self.plan.compositing == Compositing::Layers;
         if layered {
+            let near_from_px = self.plan.near_from_px();
             // The split is a part of its own, beside those that survey a row of tiles each.
             let mut alone = [AtomicBool::new(false)];
             let plan = DisjointParts::new(std::slice::from_mut(&mut self.plan), 1, &mut alone);
             let ranges = DisjointParts::new(&mut self.tiles.ranges, across, &mut self.taken);
+            let marks = self.silhouettes.marks(TILE_H);
             let arch = self.arch;
             self.workers.run_with(&mut self.members, self.tiles.down + 1, &|member: &mut Member, part| {
                 let Some(row) = part.checked_sub(1) else {
@@ -171,7 +181,10 @@ impl CpuBokeh {
                     };
                 };
                 arch.dispatch(Survey { source: frame, row, ranges: ranges.part(row), coc: &mut member.coc });
+                let rows = row * TILE_H..((row + 1) * TILE_H).min(frame.size.1);
+                arch.dispatch(Marking { source: frame, rows, marks: marks.part(row), near_from_px });
             });
+            self.silhouettes.spread(&mut self.workers, arch);
         }
         self.tiles.settle(layered);
         // What lies in front may spread to any tile in focus, so bins are needed there, too.
@@ -215,7 +228,7 @@ impl CpuBokeh {
         let layers = &layers[..count];
         let (halves, filled) = match (&mut self.pyramid, layer) {
             (Some(pyramid), Some(Range { start: first, .. })) => {
-                (None, Some((first, pyramid.behind(plan.unhidden(first), plan.nearest_behind_px(first)))))
+                (None, Some((first, pyramid.behind(&self.silhouettes, plan, first))))
             }
             (Some(pyramid), None) if !layers.is_empty() => (Some(pyramid.halves(rows)), None),
             _ => (None, None),
@@ -292,7 +305,7 @@ impl CpuBokeh {
         let width = self.plan.width;
         let out = DisjointParts::new(out, TILE_H * width * 3, &mut self.taken);
         let gathered = self.gather.as_ref().map_or(&[][..], |gather| gather.result());
-        let (plan, slots, tiles) = (&self.plan, &self.slots, &self.tiles);
+        let (plan, slots, tiles, silhouettes) = (&self.plan, &self.slots, &self.tiles, &self.silhouettes);
         let (arch, encode) = (self.arch, &self.encode);
         self.workers.run_with(&mut self.members, plan.height.div_ceil(TILE_H), &|member: &mut Member, part| {
             let (y0, layers) = (part * TILE_H, &mut member.layers);
@@ -301,6 +314,7 @@ impl CpuBokeh {
                 plan,
                 slots,
                 tiles,
+                silhouettes,
                 frame,
                 pixels,
                 gathered,

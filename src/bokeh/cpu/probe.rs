@@ -67,7 +67,7 @@ impl CpuBokeh {
         let source = Source::new(&self.plan, Pixels::Srgb(&color.rgb), Radii::Field(coc, depth));
         let pyramid = self.pyramid.as_ref().filter(|_| filled && self.filled());
         let last = self.last_layer();
-        let behind = pyramid.map(|pyramid| pyramid.behind(self.plan.unhidden(last), self.plan.nearest_behind_px(last)));
+        let behind = pyramid.map(|pyramid| pyramid.behind(&self.silhouettes, &self.plan, last));
         let mut surfaces: Surfaces<SPAN> = Surfaces::new();
         let mut scene = Vec::with_capacity(width * height);
         for y in 0..height {

@@ -4,7 +4,7 @@ use super::layout::Capacity;
 use super::shaders::{Bin, Frame, LIST_HEAD};
 use crate::bokeh::bank::Bank;
 use crate::bokeh::ladder::Compositing;
-use crate::bokeh::occlusion::MOST_LAYERS;
+use crate::bokeh::occlusion::{GRAIN, MOST_LAYERS};
 use crate::bokeh::plan::{MAX_BINS, Plan};
 use crate::compute::device::{Device, UNIFORM_STRIDE};
 use crate::frame::{Matte, MixedPixel};
@@ -24,6 +24,10 @@ pub struct Buffers {
     pub mixed: wgpu::Buffer,
     /// Range of CoC of each tile of the picture.
     pub ranges: wgpu::Buffer,
+    /// Silhouettes: how far each cell's reach, what of that is left along rows, and all over.
+    pub marks: wgpu::Buffer,
+    pub along: wgpu::Buffer,
+    pub reached: wgpu::Buffer,
     /// The scene as a layer sees it, behind others.
     pub behind: wgpu::Buffer,
     /// The pictures of all bins.
@@ -102,6 +106,7 @@ impl Buffers {
         let layered = plan.compositing == Compositing::Layers;
         let pyramid_pixels = if layered { pyramid_pixels(width, height) } else { 1 };
         let (behind, tiles) = (if layered { width * height } else { 1 }, width.div_ceil(16) * height.div_ceil(16));
+        let grid = if layered { width.div_ceil(GRAIN) * height.div_ceil(GRAIN) } else { 1 };
         let mixed = if layered { Matte::most(width, height).max(1) } else { 1 };
         let (kernels, starts) = if plan.exact { kernels(&plan.bank) } else { (vec![0.0], vec![0]) };
         let work_bytes = work_count(plan) * UNIFORM_STRIDE as usize;
@@ -113,6 +118,9 @@ impl Buffers {
             scene: storage("scene", width * height * 2),
             mixed: storage("mixed", mixed * size_of::<MixedPixel>() / 4),
             ranges: storage("ranges", tiles * 2),
+            marks: storage("marks", grid * 4),
+            along: storage("along", grid * 4),
+            reached: storage("reached", grid * 4),
             behind: storage("behind", behind * 2),
             source: storage("source", capacity.pixels * 2),
             grid: storage("grid", capacity.cells * 8),

@@ -22,6 +22,7 @@ use readback::{CAPACITY, Ring, Sent};
 
 use super::bank::STEPS_PER_PX;
 use super::ladder::Compositing;
+use super::occlusion::front_px;
 use super::plan::Plan;
 use super::{Bokeh, BokehError, Finished, Job};
 use crate::compute::device::{Device, DeviceFrame, DevicePicture, Recorder};
@@ -129,7 +130,8 @@ impl GpuBokeh {
             steps_per_px: STEPS_PER_PX,
             mixed: plan.matte(job.depth.as_deref(), &job.coc).map_or(0, |matte| matte.pixels.len() as u32),
             yuyv: u32::from(job.yuyv.is_some()),
-            unused: [0; 3],
+            front_px: front_px(plan.near_from_px()),
+            unused: [0; 2],
         }
     }
 }

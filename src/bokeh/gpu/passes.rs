@@ -4,8 +4,9 @@ use std::ops::Range;
 
 use super::buffers::{Buffers, Filters, work_count};
 use super::layout::{self, Layout, tiles};
-use super::shaders::{self, Bin, EDGES_TILE, LINE, RESULT_TILE, ROWS_TILE, TAKING_TURNS, TILE, Work};
-use crate::bokeh::occlusion::MOST_LAYERS;
+use super::shaders::{self, Bin, EDGES_TILE, LINE, RESULT_TILE, ROWS_TILE, SMALL_TILE, TAKING_TURNS, TILE, Work};
+use crate::bokeh::ladder::Compositing;
+use crate::bokeh::occlusion::{GRAIN, MOST_LAYERS};
 use crate::bokeh::plan::{MAX_BINS, Plan};
 use crate::compute::device::{Device, Pass, Recorder, Shader, UNIFORM_STRIDE, uniform_at, workgroups_2d};
 
@@ -14,6 +15,7 @@ const ALL: usize = MOST_LAYERS;
 const FIRST_BATCH: usize = ALL + 1;
 /// What counts as one pass, where it is several.
 const FILL: &str = shaders::FILL.name;
+const SILHOUETTES: &str = shaders::UNPACK.name;
 
 /// The passes of a layer.
 struct Layer {
@@ -27,6 +29,8 @@ struct Layer {
 pub struct Passes {
     clear: Pass,
     unpack: Pass,
+    /// The silhouettes spread over their grid, along rows and down columns.
+    silhouettes: [Pass; 2],
     /// What may hide others.
     hide: Pass,
     layers: Vec<Layer>,
@@ -68,7 +72,8 @@ impl Maker<'_> {
 
 /// What `unpack` binds: the CoC of the depth map is in it, whose buffer may become another.
 fn unpack_bindings<'a>(b: &'a Buffers, radii: &'a wgpu::Buffer) -> impl Iterator<Item = wgpu::BufferBinding<'a>> {
-    let buffers = [&b.bins, &b.frame, &b.color, radii, &b.scene, &b.ranges, &b.mixed, &b.shown, &b.binned];
+    let read = [&b.bins, &b.frame, &b.color, radii];
+    let buffers = read.into_iter().chain([&b.scene, &b.ranges, &b.mixed, &b.shown, &b.binned, &b.marks]);
     std::iter::once(uniform_at::<Work>(&b.work, 0)).chain(buffers.map(wgpu::Buffer::as_entire_buffer_binding))
 }
 
@@ -91,6 +96,11 @@ impl Passes {
         let half = picture.map(|v| v.div_ceil(2));
 
         let hide = [&b.frame, &b.scene, &b.nearest_px, &b.ranges, &b.mixed];
+        let grid = over([plan.width, plan.height].map(|side| side.div_ceil(GRAIN) as u32), SMALL_TILE);
+        let silhouettes = [
+            maker.pass(shaders::SPREAD, &[], &[&b.frame, &b.marks, &b.along], grid).named(SILHOUETTES),
+            maker.pass(shaders::UNCOVER, &[], &[&b.frame, &b.along, &b.reached], grid).named(SILHOUETTES),
+        ];
         let hide = maker.pass(shaders::HIDE, &[], &hide, over(half, TILE)).named(FILL);
         let layers = (0..MOST_LAYERS).map(|index| {
             let fill = (index > 0).then(|| {
@@ -98,7 +108,9 @@ impl Passes {
                 let coarse = [&b.frame, &b.pyramid, &b.known];
                 let known = [&b.pyramid, &b.known];
                 let (seen, nearest) = ([&b.scene, &b.ranges, &b.behind], &b.nearest_px);
-                let filled = [&b.frame, known[0], known[1], seen[0], seen[1], seen[2], nearest, &b.bins, &b.binned];
+                let (lists, reached) = (&b.binned, &b.reached);
+                let filled =
+                    [&b.frame, known[0], known[1], seen[0], seen[1], seen[2], nearest, &b.bins, lists, reached];
                 let work = [uniform_at::<Work>(&b.work, index)];
                 [
                     // A thread takes four pixels of half the size, or of the picture.
@@ -133,7 +145,7 @@ impl Passes {
             let buffers = [&b.frame, starts, kernels, &b.scene, &b.banks[plan.bank_index].node_reach, &b.blurred];
             maker.pass(shaders::GATHER, &[], &buffers, over(picture, TILE))
         });
-        let composite = [&b.frame, &b.bins, &b.blurred, &b.scene, &b.result, &b.active, &b.shown];
+        let composite = [&b.frame, &b.bins, &b.blurred, &b.scene, &b.result, &b.active, &b.shown, &b.reached];
         let lines = workgroups_2d((plan.width * plan.height).div_ceil(LINE as usize) as u32);
         let clear = [&b.binned, &b.filtered, &b.active, &b.grid];
         let unpack =
@@ -142,6 +154,7 @@ impl Passes {
         Self {
             clear: maker.pass(shaders::CLEAR, &[], &clear, cleared),
             unpack,
+            silhouettes,
             hide,
             layers,
             gather,
@@ -194,6 +207,9 @@ impl Passes {
         if let Some(gather) = &self.gather {
             recorder.run(gather);
         } else {
+            if plan.compositing == Compositing::Layers {
+                self.silhouettes.iter().for_each(|pass| recorder.run(pass));
+            }
             for ((index, bins), layer) in plan.layers().enumerate().zip(&self.layers) {
                 if index == 1 {
                     recorder.run(&self.hide);

@@ -3,14 +3,20 @@
 use bytemuck::{Pod, Zeroable};
 
 use crate::bokeh::bank::{OCTAVE_SHIFT, OCTAVES_FROM_PX};
-use crate::bokeh::occlusion::{OTHER_FROM, OTHER_TO};
-use crate::bokeh::plan::{ANY_COLOR, CELL, COVERAGE_FLOOR, FAR_WEIGHT, HIDING_SHARE, HINDMOST_COVERAGE, SEGMENT};
+use crate::bokeh::occlusion::{FADE, GRAIN, MARGIN_PX, OTHER_FROM, OTHER_TO, OWN_COVERAGE};
+use crate::bokeh::plan::{
+    ANY_COLOR, CELL, COVERAGE_FLOOR, FAR_WEIGHT, HAND_OVER, HIDING_SHARE, HINDMOST_COVERAGE, SEGMENT,
+};
 use crate::compute::device::{Shader, shader};
 
 /// Nothing is listed.
 pub const CLEAR: Shader = shader!("common"; "clear", "list");
 /// 8-bit sRGB to linear light, with the CoC.
-pub const UNPACK: Shader = shader!("common"; "unpack", "range", "mixed", "list", "tiles", "next", "meet");
+pub const UNPACK: Shader =
+    shader!("common"; "unpack", "radii", "silhouette", "cells", "range", "mixed", "list", "tiles", "next", "meet");
+/// How far silhouettes reach along rows, and whether any reaches a cell.
+pub const SPREAD: Shader = shader!("common"; "spread", "cells");
+pub const UNCOVER: Shader = shader!("common"; "uncover", "cells");
 /// A bin's share of each pixel, and the coarse grid over it.
 pub const BIN: Shader = shader!("common"; "bin", "mixed", "tent", "list", "tiles", "todo", "next");
 /// Local radius and range of colours.
@@ -26,17 +32,20 @@ pub const PULL: Shader = shader!("common"; "pull", "pyramid", "base");
 /// The largest areas, and back.
 pub const COARSE: Shader = shader!("common"; "coarse", "pyramid");
 /// Back to the picture.
-pub const FILL: Shader = shader!("common"; "fill", "pyramid", "base", "range", "list", "tiles", "next", "meet");
-pub const COMPOSITE: Shader = shader!("common"; "composite", "list", "yuyv");
+pub const FILL: Shader =
+    shader!("common"; "fill", "pyramid", "base", "cells", "range", "list", "tiles", "next", "meet");
+pub const COMPOSITE: Shader = shader!("common"; "composite", "surfaces", "cells", "list", "yuyv");
 
-pub const ALL: [Shader; 12] =
-    [CLEAR, UNPACK, BIN, REACH, BLUR_ROWS, BLUR_COLUMNS, GATHER, HIDE, PULL, COARSE, FILL, COMPOSITE];
+pub const ALL: [Shader; 14] =
+    [CLEAR, UNPACK, SPREAD, UNCOVER, BIN, REACH, BLUR_ROWS, BLUR_COLUMNS, GATHER, HIDE, PULL, COARSE, FILL, COMPOSITE];
 
 /// Invocations of a workgroup in x and in y, for pictures and bins, and for what is smaller.
 pub const TILE: u32 = 16;
 pub const SMALL_TILE: u32 = 8;
 // `fill` makes a tile of the picture from a small one of half its size.
 const _: () = assert!(TILE == 2 * SMALL_TILE);
+// A thread of `unpack` does as many pixels of a row as a cell of the silhouettes' grid has.
+const _: () = assert!(GRAIN == 4);
 /// Invocations of a workgroup that goes along lines.
 pub const LINE: u32 = 256;
 /// Sides of edges that a workgroup does in `reach`, two an edge.
@@ -53,7 +62,7 @@ pub const LIST_HEAD: usize = 16;
 pub const SHARED_FROM: u32 = 4;
 
 /// The `override` constants of `common.wgsl`.
-pub const CONSTANTS: [(&str, f64); 19] = [
+pub const CONSTANTS: [(&str, f64); 24] = [
     ("CELL", CELL as f64),
     ("SEGMENT", SEGMENT as f64),
     ("ANY_COLOR", ANY_COLOR as f64),
@@ -63,6 +72,11 @@ pub const CONSTANTS: [(&str, f64); 19] = [
     ("OTHER_TO", OTHER_TO as f64),
     ("HIDING_SHARE", HIDING_SHARE as f64),
     ("HINDMOST_COVERAGE", HINDMOST_COVERAGE as f64),
+    ("GRAIN", GRAIN as f64),
+    ("MARGIN_PX", MARGIN_PX as f64),
+    ("HAND_OVER", HAND_OVER as f64),
+    ("FADE", FADE as f64),
+    ("OWN_COVERAGE", OWN_COVERAGE as f64),
     ("OCTAVES_FROM_PX", OCTAVES_FROM_PX as f64),
     ("OCTAVE_SHIFT", OCTAVE_SHIFT as f64),
     ("TILE", TILE as f64),
@@ -99,8 +113,9 @@ pub struct Frame {
     pub extent: f32,
     pub rows_apart: u32,
     pub yuyv: u32,
+    pub front_px: f32,
     /// As long as the uniform is.
-    pub unused: [u32; 3],
+    pub unused: [u32; 2],
 }
 
 /// `Bin` of `common.wgsl`.

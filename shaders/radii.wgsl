@@ -1,0 +1,37 @@
+// Shared by the passes that know the CoC of any pixel. Such a pass has `frame`, and the depth map as `radii`.
+
+fn coc_of(x: u32, y: u32) -> f32 {
+    if frame.coc_kind == 0u {
+        return frame.coc.x;
+    }
+    if frame.coc_kind == 1u {
+        let distance_px = abs(frame.coc.x * f32(x) + frame.coc.y * f32(y) - frame.coc.z) - frame.coc.w;
+        return min(max(distance_px, 0.0) * frame.ramp.x, frame.ramp.y);
+    }
+    if all(frame.depth_size == frame.size) {
+        return radius_at(y * frame.size.x + x);
+    }
+    let column = min((2u * x + 1u) * frame.depth_size.x / (2u * frame.size.x), frame.depth_size.x - 1u);
+    let row = min((2u * y + 1u) * frame.depth_size.y / (2u * frame.size.y), frame.depth_size.y - 1u);
+    return radius_at(row * frame.depth_size.x + column);
+}
+
+fn radius_at(index: u32) -> f32 {
+    if frame.coc_kind == 3u {
+        return coc_of_depth(bitcast<f32>(radii[index]));
+    }
+    let roots = unpack2x16snorm(radii[index / 2u]);
+    let root = select(roots.x, roots.y, index % 2u == 1u);
+    return root * abs(root) * frame.most_px;
+}
+
+fn coc_of_depth(metres: f32) -> f32 {
+    // Unknown depth counts as infinitely far. The largest finite number stands in for infinity.
+    var inverse_m = 0.0;
+    if metres > 0.0 && metres < 3.0e38 {
+        inverse_m = 1.0 / metres;
+    }
+    // 1 within the sharp range, and what is nearer to 1 of both its ends without.
+    let ratio = max(frame.coc.y * inverse_m, min(frame.coc.z * inverse_m, 1.0));
+    return clamp(frame.coc.x * (1.0 - ratio), -frame.coc.w, frame.coc.w);
+}

@@ -1,0 +1,20 @@
+// Pass uncover: what silhouettes reach each cell of their grid, down its columns after the rows: above 0 where one does.
+
+@group(0) @binding(0) var<uniform> frame: Frame;
+@group(0) @binding(1) var<storage, read> along: array<vec4<f32>>;
+@group(0) @binding(2) var<storage, read_write> reached: array<vec4<f32>>;
+
+@compute @workgroup_size(SMALL_TILE, SMALL_TILE)
+fn uncover(@builtin(global_invocation_id) id: vec3<u32>) {
+    let cells = cells_of(frame.size);
+    if any(id.xy >= cells) {
+        return;
+    }
+    let most = farthest();
+    var highest = vec4(-1.0);
+    for (var y = id.y - min(id.y, most); y <= min(id.y + most, cells.y - 1u); y++) {
+        let distance_px = f32((max(y, id.y) - min(y, id.y)) * GRAIN);
+        highest = max(highest, along[y * cells.x + id.x] - distance_px * distance_px);
+    }
+    reached[id.y * cells.x + id.x] = highest;
+}

@@ -1,0 +1,104 @@
+//! Finds the silhouettes of a frame: jumps of the CoC from one pixel to the next, and mixed pixels.
+
+use pulp::{Simd, WithSimd};
+
+use super::pixels::Radii;
+use super::silhouettes::NONE;
+use super::unpack::{Source, coc_row};
+use crate::bokeh::occlusion::{GRAIN, SHOWS, Silhouette};
+use crate::optics::{CocField, DepthCoc};
+
+/// Pixels that are looked at together.
+const CHUNK: usize = 64;
+/// What is not measured, or farther than this, counts as this far, in metres.
+const FAR_M: f32 = 1e6;
+
+/// Marks the silhouettes of some rows of the picture.
+pub struct Marking<'a> {
+    pub source: &'a Source<'a>,
+    /// The rows of the picture, and those of the grid over them.
+    pub rows: std::ops::Range<usize>,
+    pub marks: &'a mut [f32],
+    /// The radius from which on something in front is a layer of its own.
+    pub near_from_px: f32,
+}
+
+impl WithSimd for Marking<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        let (width, height) = self.source.size;
+        let across = width.div_ceil(GRAIN);
+        self.marks.fill(NONE);
+        // A smaller map has steps that are no silhouettes: those between its own pixels.
+        let (least_px, metres) = match self.source.coc {
+            Radii::Field(CocField::Depth(lens), Some(map)) => {
+                let least_px = (width as f32 / map.width.max(1) as f32).max(1.0);
+                (least_px, (map.size() == (width as u32, height as u32)).then_some((lens, &map.metres)))
+            }
+            _ => (1.0, None),
+        };
+        let (mut here, mut below) = ([0.0; CHUNK + 1], [0.0; CHUNK]);
+        for y in self.rows.clone() {
+            let next = (y + 1).min(height - 1);
+            let row = &mut self.marks[(y - self.rows.start) / GRAIN * SHOWS * across..][..SHOWS * across];
+            for x0 in (0..width).step_by(CHUNK) {
+                let take = CHUNK.min(width - x0);
+                let with_next = (take + 1).min(width - x0);
+                if let Some((lens, metres)) = metres {
+                    let (a, b) = (&metres[y * width + x0..][..with_next], &metres[next * width + x0..][..take]);
+                    if !jumps(lens, least_px, &a[..take], b) && !jumps(lens, least_px, &a[..with_next - 1], &a[1..]) {
+                        continue;
+                    }
+                }
+                coc_row(self.source, y, x0, &mut here[..with_next]);
+                coc_row(self.source, next, x0, &mut below[..take]);
+                for x in 0..take {
+                    let right = here[(x + 1).min(with_next - 1)];
+                    for other in [right, below[x]] {
+                        if (here[x] - other).abs() >= least_px {
+                            mark(row, across, x0 + x, Silhouette::between(here[x], other, least_px, self.near_from_px));
+                        }
+                    }
+                }
+            }
+        }
+        let (Some(matte), Radii::Field(CocField::Depth(lens), _)) = (self.source.matte, self.source.coc) else {
+            return;
+        };
+        for pixel in matte.within(self.rows.start * width..self.rows.end * width) {
+            let (x, y) = (pixel.at as usize % width, pixel.at as usize / width);
+            let (near_px, far_px) = (lens.coc_px(pixel.near_m), lens.coc_px(pixel.far_m));
+            let row = &mut self.marks[(y - self.rows.start) / GRAIN * SHOWS * across..][..SHOWS * across];
+            mark(row, across, x, Silhouette::between(near_px, far_px, least_px, self.near_from_px));
+        }
+    }
+}
+
+#[inline(always)]
+fn mark(row: &mut [f32], across: usize, x: usize, silhouette: Option<Silhouette>) {
+    let Some(silhouette) = silhouette else { return };
+    let reaches_px = [silhouette.shows_px, silhouette.shows_back_px, silhouette.uncovers_px];
+    for (plane, px) in row.chunks_exact_mut(across).zip(reaches_px) {
+        plane[x / GRAIN] = plane[x / GRAIN].max(px);
+    }
+}
+
+/// Whether the CoC may jump by `least_px` between any two of these, in metres. Without a division: the CoC is linear in
+/// 1/depth, but for the sharp range and its cuts, which make jumps smaller.
+#[inline(always)]
+fn jumps(lens: &DepthCoc, least_px: f32, a: &[f32], b: &[f32]) -> bool {
+    let (steep, far) = (lens.coc_at_infinity_px * lens.far_m(), |m: f32| if m > 0.0 && m < FAR_M { m } else { FAR_M });
+    let mut any = [false; 16];
+    let test = |a: f32, b: f32| {
+        let (a, b) = (far(a), far(b));
+        (a - b).abs() * steep >= 0.999 * least_px * a * b
+    };
+    let ((a, a_rest), (b, b_rest)) = (a.as_chunks::<16>(), b.as_chunks::<16>());
+    for (a, b) in a.iter().zip(b) {
+        for k in 0..16 {
+            any[k] |= test(a[k], b[k]);
+        }
+    }
+    any.contains(&true) || a_rest.iter().zip(b_rest).any(|(&a, &b)| test(a, b))
+}

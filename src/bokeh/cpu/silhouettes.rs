@@ -1,0 +1,161 @@
+//! Silhouettes: the places where the depth jumps, and how far from them what lies behind can show.
+//!
+//! A surface is opaque. Where the CoC changes by less than a pixel from pixel to pixel, all that a pixel sees through the
+//! aperture is that one surface: a ray at CoC `c` lies `|c|` from the pixel, so nothing farther than the radius at the
+//! silhouette can come from behind it. On a coarse grid, each jump marks how far that is; the marks spread over it.
+
+use std::sync::atomic::AtomicBool;
+
+use pulp::Arch;
+
+use crate::bokeh::occlusion::{GRAIN, SHOWS};
+use crate::compute::thread_pool::{DisjointParts, ThreadPool};
+
+/// No silhouette.
+pub const NONE: f32 = -1.0;
+/// Rows of the grid that are one part of the work.
+const PART: usize = 8;
+
+/// The grid over a picture: `[row][SHOWS][across]`.
+pub struct Silhouettes {
+    /// Columns and rows of the grid.
+    across: usize,
+    down: usize,
+    /// How far the silhouettes in a cell reach, in pixels; [`NONE`] without any.
+    marks: Vec<f32>,
+    /// The squares of the reaches less those of the distances, along a row: the largest of any silhouette.
+    along: Vec<f32>,
+    /// The same over rows and columns: above 0 where a silhouette reaches a cell.
+    reached: Vec<f32>,
+    taken: Vec<AtomicBool>,
+}
+
+impl Silhouettes {
+    /// Memory for pictures of `width` x `height` pixels.
+    pub fn new(width: usize, height: usize) -> Self {
+        let (across, down) = (width.div_ceil(GRAIN), height.div_ceil(GRAIN));
+        let cells = vec![NONE; across * SHOWS * down];
+        let taken = std::iter::repeat_with(|| AtomicBool::new(false)).take(down).collect();
+        Self { across, down, marks: cells.clone(), along: cells.clone(), reached: cells, taken }
+    }
+
+    /// The marks, to be made in parts of so many rows of the picture, whole rows of the grid.
+    pub fn marks(&mut self, rows: usize) -> DisjointParts<'_, f32> {
+        DisjointParts::new(&mut self.marks, rows / GRAIN * SHOWS * self.across, &mut self.taken)
+    }
+
+    /// Spreads the marks, along the rows and then down the columns.
+    pub fn spread(&mut self, workers: &mut ThreadPool, arch: Arch) {
+        let (across, row_len, down) = (self.across, self.across * SHOWS, self.down);
+        let marks = &self.marks;
+        let parts = DisjointParts::new(&mut self.along, PART * row_len, &mut self.taken);
+        workers.run(down.div_ceil(PART), &|part| {
+            let rows = parts.part(part);
+            let marks = &marks[part * PART * row_len..][..rows.len()];
+            arch.dispatch(|| {
+                for (out, marks) in rows.chunks_exact_mut(across).zip(marks.chunks_exact(across)) {
+                    spread_row(marks, out);
+                }
+            });
+        });
+        let along = &self.along;
+        let reach = cells_within(most(along));
+        let parts = DisjointParts::new(&mut self.reached, PART * row_len, &mut self.taken);
+        workers.run(down.div_ceil(PART), &|part| {
+            let rows = parts.part(part);
+            arch.dispatch(|| {
+                for (y, out) in (part * PART..).zip(rows.chunks_exact_mut(row_len)) {
+                    out.fill(NONE);
+                    for other in y.saturating_sub(reach)..(y + reach + 1).min(down) {
+                        let distance_px = (other.abs_diff(y) * GRAIN) as f32;
+                        keep_highest(out, &along[other * row_len..][..row_len], distance_px * distance_px);
+                    }
+                }
+            });
+        });
+    }
+
+    /// How far silhouettes reach some pixels of row `y` from column `x0` on, a multiple of the grain: the square of a reach less
+    /// that of the distance, linear between cells; of any silhouette, and of those before what is not in front. `None` where
+    /// none reaches any.
+    #[inline(always)]
+    pub fn reaching<const W: usize>(&self, y: usize, x0: usize) -> Option<[[f32; W]; 2]> {
+        let along = ((y as f32 + 0.5) / GRAIN as f32 - 0.5).max(0.0);
+        let above = (along as usize).min(self.down - 1);
+        let below = (above + 1).min(self.down - 1);
+        // One cell more on both sides.
+        let (first, cells) = (x0 / GRAIN, W / GRAIN + 2);
+        let mut lines = [[0.0; W]; 2];
+        let mut highest = NONE;
+        for (plane, line) in lines.iter_mut().enumerate() {
+            let row = |row: usize| &self.reached[(row * SHOWS + plane) * self.across..][..self.across];
+            let (above, below) = (row(above), row(below));
+            for (k, value) in line[..cells].iter_mut().enumerate() {
+                let x = (first + k).saturating_sub(1).min(self.across - 1);
+                *value = above[x] + along.fract() * (below[x] - above[x]);
+                highest = highest.max(*value);
+            }
+        }
+        (highest > 0.0).then(|| lines.map(|line| expanded(&line)))
+    }
+
+    /// The cells of row `y` of the picture: above 0 where something behind a silhouette can be seen, and where what a
+    /// silhouette hides matters.
+    #[inline(always)]
+    pub fn row(&self, y: usize) -> [&[f32]; 2] {
+        [0, SHOWS - 1].map(|plane| &self.reached[(y / GRAIN * SHOWS + plane) * self.across..][..self.across])
+    }
+}
+
+/// Values of cells, the first one before the first pixel's, as those of pixels: linear between their centres.
+#[inline(always)]
+fn expanded<const W: usize>(cells: &[f32; W]) -> [f32; W] {
+    let mut values = [0.0; W];
+    for (k, group) in values.as_chunks_mut::<GRAIN>().0.iter_mut().enumerate() {
+        let (before, here, after) = (cells[k], cells[k + 1], cells[k + 2]);
+        for (i, value) in group.iter_mut().enumerate() {
+            let offset = (i as f32 + 0.5) / GRAIN as f32 - 0.5;
+            let other = if offset < 0.0 { before } else { after };
+            *value = here + (other - here) * offset.abs();
+        }
+    }
+    values
+}
+
+fn most(values: &[f32]) -> f32 {
+    values.iter().fold(NONE, |most, &value| if value > most { value } else { most })
+}
+
+/// How many cells away something can be whose reach has this square, in pixels.
+fn cells_within(square: f32) -> usize {
+    if square < 0.0 { 0 } else { square.sqrt() as usize / GRAIN + 1 }
+}
+
+/// Spreads the marks of a row along it.
+#[inline(always)]
+fn spread_row(marks: &[f32], out: &mut [f32]) {
+    for (out, &px) in out.iter_mut().zip(marks) {
+        *out = if px > 0.0 { px * px } else { NONE };
+    }
+    let reach_px = most(marks);
+    if reach_px < 0.0 {
+        return;
+    }
+    for distance in 1..(cells_within(reach_px * reach_px) + 1).min(marks.len()) {
+        let (inner, distance_px) = (marks.len() - distance, (distance * GRAIN) as f32);
+        for (to, from) in [(0, distance), (distance, 0)] {
+            for (out, &px) in out[to..][..inner].iter_mut().zip(&marks[from..][..inner]) {
+                let square = if px > distance_px { px * px - distance_px * distance_px } else { NONE };
+                *out = if square > *out { square } else { *out };
+            }
+        }
+    }
+}
+
+#[inline(always)]
+fn keep_highest(out: &mut [f32], along: &[f32], distance_square: f32) {
+    for (out, &square) in out.iter_mut().zip(along) {
+        let left = square - distance_square;
+        *out = if left > *out { left } else { *out };
+    }
+}
