@@ -52,7 +52,8 @@ impl Parts {
                     is_open: at_side || y == 0 || (y + 1) * width == persons.len(),
                 });
                 // Those above that end before this one are past for all that follow, too.
-                above.start += runs[above.clone()].iter().take_while(|run| run.pixels.end + width <= pixels.start).count();
+                above.start +=
+                    runs[above.clone()].iter().take_while(|run| run.pixels.end + width <= pixels.start).count();
                 let beside = runs[above.clone()].iter().take_while(|run| run.pixels.start + width < pixels.end);
                 for run in beside.filter(|run| persons[run.pixels.start] == same[0]) {
                     part = join(parts, part, run.part);
@@ -120,9 +121,16 @@ mod tests {
         let left = (0..60).filter(|at| at % 10 < 5 && !persons[*at]).count() as u32;
         assert_eq!(
             found,
-            [(false, 1, 0, false), (false, background, left, true), (true, 4, 2, true), (true, 7, 7, false), (true, 8, 0, false)]
+            [
+                (false, 1, 0, false),
+                (false, background, left, true),
+                (true, 4, 2, true),
+                (true, 7, 7, false),
+                (true, 8, 0, false)
+            ]
         );
-        let covered: usize = parts.runs().map(|(pixels, part)| pixels.filter(|&at| persons[at] == part.is_person).count()).sum();
+        let covered: usize =
+            parts.runs().map(|(pixels, part)| pixels.filter(|&at| persons[at] == part.is_person).count()).sum();
         assert_eq!(covered, persons.len());
     }
 }
