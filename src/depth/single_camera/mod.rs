@@ -128,6 +128,7 @@ impl SingleCamera {
         self.last_ns = Some(time_ns);
         if apart {
             self.person.iter_mut().for_each(Person::forget);
+            self.held.forget();
         }
         let is_turn = |every: u64| apart || self.frames.is_multiple_of(every);
         let (for_persons, for_all) = match EVERY[self.effort] {

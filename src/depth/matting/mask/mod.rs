@@ -244,9 +244,7 @@ impl View<'_> {
                 }
             }
         }
-        let scale = 1.0 / total;
-        let [near, far] = sum;
-        (total > 0.0).then(|| [near.scaled(scale), far.scaled(scale)])
+        if total > 0.0 { Some(sum.map(|color| color.scaled(1.0 / total))) } else { None }
     }
 
     /// The cells, across or down, whose middles a pixel lies between: what is linear between them shows no cells.
