@@ -88,6 +88,18 @@ impl Color {
         let of_mean = outer(mean);
         Self { mean, covariance: std::array::from_fn(|k| squares[k] / weight - of_mean[k]) }
     }
+
+    /// Adds a weight of another, in a weighted sum.
+    #[inline(always)]
+    pub(super) fn add(&mut self, weight: f32, other: &Self) {
+        self.mean.iter_mut().zip(other.mean).for_each(|(sum, value)| *sum += weight * value);
+        self.covariance.iter_mut().zip(other.covariance).for_each(|(sum, value)| *sum += weight * value);
+    }
+
+    #[inline(always)]
+    pub(super) fn scaled(self, scale: f32) -> Self {
+        Self { mean: self.mean.map(|value| scale * value), covariance: self.covariance.map(|value| scale * value) }
+    }
 }
 
 /// The colours around a mixed pixel.

@@ -38,7 +38,7 @@ pub(super) struct Discriminant {
 }
 
 /// Numbers of [`Contrast::line`], and of [`Contrast::front`].
-pub(super) const LINE: usize = 4;
+pub(super) const LINE: usize = 5;
 pub(super) const FRONT: usize = 9;
 
 impl Discriminant {
@@ -66,10 +66,12 @@ impl Discriminant {
     }
 }
 
-/// As [`Discriminant::share`], by a [`Contrast::line`].
-#[inline(always)]
-pub(super) fn share_by([x, y, z, offset]: [f32; LINE], color: [f32; 3]) -> f32 {
-    dot([x, y, z], color) - offset
+impl From<[f32; LINE]> for Discriminant {
+    /// Of a [`Contrast::line`].
+    #[inline(always)]
+    fn from([x, y, z, offset, precision]: [f32; LINE]) -> Self {
+        Self { direction: [x, y, z], offset, precision }
+    }
 }
 
 impl Contrast {
@@ -89,11 +91,11 @@ impl Contrast {
         Self { surfaces, discriminant, inverse, of_far }
     }
 
-    /// What tells a colour's share, for [`share_by`]; what lies between two of them does so between their surfaces.
+    /// The numbers of a [`Discriminant`]; what lies between two of them does so between their surfaces.
     #[inline(always)]
     pub(super) fn line(&self) -> [f32; LINE] {
-        let Discriminant { direction: [x, y, z], offset, .. } = self.discriminant;
-        [x, y, z, offset]
+        let Discriminant { direction: [x, y, z], offset, precision } = self.discriminant;
+        [x, y, z, offset, precision]
     }
 
     /// The same before light that is known, for [`Discriminant::before`].
@@ -116,12 +118,6 @@ impl Contrast {
             Some(light) => Discriminant::before(self.front(), light),
             None => self.discriminant,
         }
-    }
-
-    /// See [`Discriminant`].
-    #[inline(always)]
-    pub(super) fn precision(&self) -> f32 {
-        self.discriminant.precision
     }
 
     /// Whether the far surface may have this light here.
@@ -148,26 +144,13 @@ impl Contrast {
         let [near, far] = self.surfaces;
         [near, Color { mean: light.unwrap_or(far.mean), ..far }]
     }
-
-    /// Colour of the near surface less that of the far one, for a pixel of which the near one has a share: the most likely
-    /// ones of those that add up to the pixel's `own` (Chuang et al. 2001, equation 9, with the pixel as exact). None is
-    /// darker than black, or brighter than white.
-    #[inline(always)]
-    pub(super) fn difference(&self, own: [f32; 3], share: f32) -> [f32; 3] {
-        let [near, far] = &self.surfaces;
-        difference(near, far, own, share)
-    }
-
-    /// The same where the light behind is known but for noise.
-    #[inline(always)]
-    pub(super) fn difference_before(&self, light: [f32; 3], own: [f32; 3], share: f32) -> [f32; 3] {
-        let [near, far] = &self.surfaces;
-        difference(near, &Color { mean: light, ..*far }, own, share)
-    }
 }
 
+/// Colour of the near surface less that of the far one, for a pixel of which the near one has a share: the most likely
+/// ones of those that add up to the pixel's `own` (Chuang et al. 2001, equation 9, with the pixel as exact). None is
+/// darker than black, or brighter than white.
 #[inline(always)]
-fn difference(near: &Color, far: &Color, own: [f32; 3], share: f32) -> [f32; 3] {
+pub(super) fn difference(near: &Color, far: &Color, own: [f32; 3], share: f32) -> [f32; 3] {
     let rest = 1.0 - share;
     let (mut spread, mut residual) = ([0.0; 6], [0.0; 3]);
     for k in 0..6 {
@@ -216,7 +199,7 @@ impl Parts {
         self.share[k] = share;
     }
 
-    /// [`Contrast::difference`] of all.
+    /// [`difference`] of all.
     #[inline(always)]
     pub fn differences(&self) -> [Lanes; 3] {
         let mut differences = [[0.0; LANES]; 3];

@@ -9,6 +9,8 @@ use crate::frame::Mask;
 const AS_NEAR: [f32; 2] = [0.85, 0.95];
 /// A person of whom less is as near as this is another one, further away.
 const OTHERS: f32 = 0.55;
+/// Who was another, or was not, in the frame before stays so by this much (hysteresis).
+const HYSTERESIS: f32 = 0.07;
 /// A part of the mask begins here.
 const PART: f32 = 0.5;
 
@@ -18,6 +20,8 @@ pub struct Held {
     mask: Mask,
     /// Of each pixel of the mask, how near it is.
     nearness: Vec<f32>,
+    /// Whether it was another's in the frame before.
+    others: Vec<bool>,
     /// Whether a pixel was seen to be part of what is looked at, and those that are yet to be looked around.
     seen: Vec<bool>,
     front: Vec<u32>,
@@ -27,6 +31,11 @@ impl Held {
     /// The mask of the subject and all that is theirs.
     pub fn mask(&self) -> &Mask {
         &self.mask
+    }
+
+    /// Forgets the frame before: the next one is another scene.
+    pub fn forget(&mut self) {
+        self.others.clear();
     }
 
     /// Joins a mask with what is as near, and takes others away.
@@ -42,8 +51,11 @@ impl Held {
 
     /// Parts of the mask that are mostly far away are other people's.
     fn take_others_away(&mut self) {
+        let count = self.mask.share.len();
         self.seen.clear();
-        self.seen.resize(self.mask.share.len(), false);
+        self.seen.resize(count, false);
+        let is_first = self.others.len() != count;
+        self.others.resize(count, false);
         for start in 0..self.mask.share.len() {
             if self.seen[start] || self.mask.share[start] < PART {
                 continue;
@@ -51,7 +63,15 @@ impl Held {
             self.front.clear();
             self.flood(start, |held, at| held.mask.share[at] >= PART);
             let near: f32 = self.front.iter().map(|&at| self.nearness[at as usize]).sum();
-            if near < OTHERS * self.front.len() as f32 {
+            let were_others = self.front.iter().filter(|&&at| self.others[at as usize]).count();
+            let least = match () {
+                () if is_first => OTHERS,
+                () if 2 * were_others > self.front.len() => OTHERS + HYSTERESIS,
+                () => OTHERS - HYSTERESIS,
+            };
+            let are_others = near < least * self.front.len() as f32;
+            self.front.iter().for_each(|&at| self.others[at as usize] = are_others);
+            if are_others {
                 // Their soft outlines go with them.
                 let part = std::mem::take(&mut self.front);
                 for &at in &part {
@@ -60,6 +80,7 @@ impl Held {
                 self.front = part;
             }
         }
+        self.others.iter_mut().zip(&self.seen).for_each(|(is_other, seen)| *is_other &= seen);
     }
 
     /// What is as near as the subject and joined to it, step by step.
@@ -153,6 +174,26 @@ mod tests {
     fn what_is_held_is_the_subjects_and_what_is_as_near_elsewhere_is_not() {
         let near = [((4, 14), 1.0), ((20, 24), 1.0)];
         assert_eq!(joined(&[(4, 10)], &near), columns(&[(4, 14)]));
+    }
+
+    #[test]
+    fn who_is_about_as_far_as_others_are_does_not_come_and_go() {
+        let persons = |at: usize| (4..10).contains(&(at % SIZE.0)) || (20..26).contains(&(at % SIZE.0));
+        let is_there = |held: &mut Held, nearness: f32| {
+            let share = (0..SIZE.0 * SIZE.1).map(|at| f32::from(u8::from(persons(at)))).collect();
+            held.mask = Mask { width: SIZE.0 as u32, height: SIZE.1 as u32, share };
+            held.nearness = (0..SIZE.0 * SIZE.1).map(|at| if at % SIZE.0 < 16 { 1.0 } else { nearness }).collect();
+            held.take_others_away();
+            held.mask.share[8 * SIZE.0 + 23] > 0.5
+        };
+        for first in [OTHERS - 0.02, OTHERS + 0.02] {
+            let mut held = Held::default();
+            let was = is_there(&mut held, first);
+            for trembling in [0.01, -0.01, 0.05, -0.05] {
+                assert_eq!(is_there(&mut held, OTHERS + trembling), was, "{first} {trembling}");
+            }
+            assert!(is_there(&mut held, 0.9) && !is_there(&mut held, 0.3));
+        }
     }
 
     #[test]

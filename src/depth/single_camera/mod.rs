@@ -6,8 +6,10 @@
 
 mod absence;
 mod aside;
+mod decision;
 mod feed;
 mod held;
+mod parts;
 mod person;
 mod relief;
 
@@ -112,7 +114,7 @@ impl SingleCamera {
         let failed = |why| DepthError::Network { name: name.clone(), why };
         let mut grey = ColorImage::new(64, 48);
         grey.rgb.fill(128);
-        person.as_mut().map_or(Ok(()), |person| person.look(&grey)).map_err(failed)?;
+        person.as_mut().map_or(Ok(()), |person| person.look(&grey, 0)).map_err(failed)?;
         relief.as_mut().map_or(Ok(()), |relief| relief.look(&grey, None)).map_err(failed)
     }
 
@@ -126,6 +128,7 @@ impl SingleCamera {
         self.last_ns = Some(time_ns);
         if apart {
             self.person.iter_mut().for_each(Person::forget);
+            self.held.forget();
         }
         let is_turn = |every: u64| apart || self.frames.is_multiple_of(every);
         let (for_persons, for_all) = match EVERY[self.effort] {
@@ -140,9 +143,9 @@ impl SingleCamera {
     }
 
     /// Lets the network for persons look, if it is its turn; one that fails is turned off.
-    fn look_for_persons(&mut self, color: &ColorImage) {
+    fn look_for_persons(&mut self, color: &ColorImage, time_ns: u64) {
         let is_turn = std::mem::take(&mut self.turn.persons);
-        if let Some(Err(why)) = self.person.as_mut().filter(|_| is_turn).map(|person| person.look(color)) {
+        if let Some(Err(why)) = self.person.as_mut().filter(|_| is_turn).map(|person| person.look(color, time_ns)) {
             tracing::error!("{}: the person's network is turned off, and all is blurred: {why}", self.name);
             self.person = None;
         }
@@ -174,7 +177,7 @@ struct Turn {
 impl DepthSource for SingleCamera {
     fn read(&mut self, Seen { stamp, color, .. }: Seen, map: &mut DepthMap) -> Result<(), DepthError> {
         self.begin(stamp.time_ns);
-        self.look_for_persons(color);
+        self.look_for_persons(color, stamp.time_ns);
         let Self { name, person, absence, relief, held, spread, matting, turn, .. } = self;
         let mask = person.as_ref().map(Person::mask);
         if mask.is_some_and(|mask| absence.is_news(mask, stamp.time_ns)) {
@@ -219,7 +222,7 @@ impl DepthSource for SingleCamera {
 impl Companion for SingleCamera {
     fn persons(&mut self, Seen { stamp, color, .. }: Seen) -> Option<&Mask> {
         self.begin(stamp.time_ns);
-        self.look_for_persons(color);
+        self.look_for_persons(color, stamp.time_ns);
         self.person.as_ref().map(Person::mask)
     }
 

@@ -1,5 +1,6 @@
 //! Where a person is: a network's mask, steady where it is undecided.
 
+use super::decision::Decision;
 use super::feed::{Answer, Feed};
 use crate::frame::{ColorImage, Mask};
 
@@ -9,6 +10,9 @@ const STEADINESS: f32 = 0.8;
 /// Finds persons, from frame to frame.
 pub struct Person {
     feed: Feed,
+    /// What the network says, steady where it is undecided.
+    steady: Mask,
+    decision: Decision,
     mask: Mask,
     /// Whether the numbers are those before the last step of a network: they were seen beyond 0 to 1.
     is_raw: bool,
@@ -17,12 +21,20 @@ pub struct Person {
 
 impl Person {
     pub fn new(feed: Feed) -> Self {
-        Self { feed, mask: Mask::default(), is_raw: false, seen: false }
+        Self {
+            feed,
+            steady: Mask::default(),
+            decision: Decision::default(),
+            mask: Mask::default(),
+            is_raw: false,
+            seen: false,
+        }
     }
 
     /// Forgets the frame before: the next one is another scene.
     pub fn forget(&mut self) {
         self.feed.forget();
+        self.decision.forget();
         self.seen = false;
     }
 
@@ -31,25 +43,26 @@ impl Person {
         &self.mask
     }
 
-    /// Finds the mask of a picture; undecided pixels are averaged with those of the one before, and decided ones not, so
+    /// Finds the mask of a picture, taken at this time; undecided pixels are averaged with those of the one before, and decided ones not, so
     /// that nothing lags (as MediaPipe has it).
     ///
     /// # Errors
     /// As for [`Feed::see`].
-    pub fn look(&mut self, color: &ColorImage) -> Result<(), String> {
+    pub fn look(&mut self, color: &ColorImage, time_ns: u64) -> Result<(), String> {
         let answer = self.feed.see(color)?;
         let pixels = answer.size.0 * answer.size.1;
         let beyond = |share: f32| !(-0.01..=1.01).contains(&share);
         self.is_raw |= (0..pixels).any(|pixel| beyond(answer.at(pixel, answer.channels - 1)));
         let size = (answer.size.0 as u32, answer.size.1 as u32);
-        let fresh = !self.seen || (self.mask.width, self.mask.height) != size;
-        self.mask.resize(size.0, size.1);
-        for (pixel, share) in self.mask.share.iter_mut().enumerate() {
+        let fresh = !self.seen || (self.steady.width, self.steady.height) != size;
+        self.steady.resize(size.0, size.1);
+        for (pixel, share) in self.steady.share.iter_mut().enumerate() {
             let new = share_of(&answer, pixel, self.is_raw);
             let keeps = if fresh { 0.0 } else { STEADINESS * uncertainty(new) };
             *share = new + (*share - new) * keeps;
         }
         self.seen = true;
+        self.decision.decide(&self.steady, time_ns, &mut self.mask);
         Ok(())
     }
 }

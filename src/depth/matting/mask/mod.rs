@@ -18,7 +18,8 @@ use crate::depth::tap::Tap;
 use crate::frame::{ColorImage, DepthMap, Mask, Matte, MixedPixel};
 
 use super::NEARLY_PURE;
-use super::contrast::{Contrast, Discriminant, share_by};
+use super::clusters::Color;
+use super::contrast::{Contrast, Discriminant, difference};
 use cells::{Cell, Kernel, REACH, Sums, View};
 use posterior::Posterior;
 
@@ -148,7 +149,7 @@ impl pulp::WithSimd for Finding<'_> {
                             }
                             map.metres[y * width..][xs].fill(DepthMap::SUBJECT_M);
                         }
-                        Cell::Band => view.take_apart(contrasts[cell].as_ref(), (xs, y), shares, map),
+                        Cell::Band => view.take_apart(contrasts, (xs, y), shares, map),
                     }
                 }
             }
@@ -170,9 +171,7 @@ impl View<'_> {
         shares: &mut [f32],
         front: &mut Vec<u32>,
     ) {
-        let own = contrasts[row * self.across + column].as_ref();
-        let slice = own.map(|own| posterior.slice(own.precision()));
-        let at = |row: usize, column: usize| contrasts[row * self.across + column].as_ref();
+        let at = |(row, column): (usize, usize)| contrasts[row * self.across + column].as_ref();
         for y in self.rows_of(row) {
             let (mask_at, down) = (self.shares_in(y), self.cells_around(y, self.down));
             let behind = self.backdrop.map(|backdrop| backdrop.row(y));
@@ -182,31 +181,38 @@ impl View<'_> {
                 // The same four cells are around all of them.
                 let Some(first) = xs.clone().next() else { continue };
                 let across = self.cells_around(first, self.across);
-                let corners = own.map(|own| {
-                    [
-                        (down.first, across.first),
-                        (down.second, across.first),
-                        (down.first, across.second),
-                        (down.second, across.second),
-                    ]
-                    .map(|(row, column)| at(row, column).unwrap_or(own))
-                });
+                let corners = [
+                    (down.first, across.first),
+                    (down.second, across.first),
+                    (down.first, across.second),
+                    (down.second, across.second),
+                ]
+                .map(at);
+                // Where a cell knows nothing of colours, they count the less the closer to it.
+                let any = at((row, column)).or_else(|| corners.into_iter().flatten().next());
                 // One or the other, as it is known what is behind.
-                let (unknown, known) = (corners.filter(|_| behind.is_none()), corners.filter(|_| behind.is_some()));
-                let lines = unknown.map(|corners| Sides::of(corners.map(Contrast::line), down.share));
-                let fronts = known.map(|corners| Sides::of(corners.map(Contrast::front), down.share));
+                let (unknown, known) = (any.filter(|_| behind.is_none()), any.filter(|_| behind.is_some()));
+                let line_of = |any: &Contrast, corner: Option<&Contrast>| match (corner.map(Contrast::line), any.line())
+                {
+                    (Some(line), _) => line,
+                    (None, [x, y, z, offset, _]) => [x, y, z, offset, 0.0],
+                };
+                let lines = unknown.map(|any| Sides::of(corners.map(|corner| line_of(any, corner)), down.share));
+                let front_of = |any, corner: Option<&Contrast>| corner.unwrap_or(any).front();
+                let fronts = known.map(|any| Sides::of(corners.map(|corner| front_of(any, corner)), down.share));
                 for x in xs {
                     let place = y * self.color.width as usize + x;
                     let (mask, light) = (mask_at(x), self.light_at(place));
                     let along = self.cells_around(x, self.across).share;
-                    let share = match (&behind, &lines, &fronts, &slice) {
-                        (None, Some(lines), _, Some(slice)) => slice.share(mask, share_by(lines.between(along), light)),
-                        // Where it is known what is behind, the surfaces differ in another way at every pixel.
-                        (Some(behind), _, Some(fronts), _) => {
-                            let own = Discriminant::before(fronts.between(along), behind(x));
-                            posterior.slice(own.precision).share(mask, own.share(light))
-                        }
-                        _ => mask,
+                    // Where it is known what is behind, the surfaces differ in another way at every pixel.
+                    let discriminant: Option<Discriminant> = match (&behind, &lines, &fronts) {
+                        (None, Some(lines), _) => Some(lines.between(along).into()),
+                        (Some(behind), _, Some(fronts)) => Some(Discriminant::before(fronts.between(along), behind(x))),
+                        _ => None,
+                    };
+                    let share = match discriminant {
+                        Some(own) => posterior.share(mask, own.share(light), own.precision),
+                        None => mask,
                     };
                     shares[place] = share;
                     if mask > NEAR_FROM && share > NEAR_FROM {
@@ -216,6 +222,29 @@ impl View<'_> {
                 }
             }
         }
+    }
+
+    /// The colours of both surfaces at a pixel, linear between those of the cells around it that have some; the far one has this
+    /// light where that is known.
+    #[inline(always)]
+    fn surfaces_at(
+        &self,
+        contrasts: &[Option<Contrast>],
+        (x, y): (usize, usize),
+        light: Option<[f32; 3]>,
+    ) -> Option<[Color; 2]> {
+        let (across, down) = (self.cells_around(x, self.across), self.cells_around(y, self.down));
+        let (mut sum, mut total) = ([Color::default(); 2], 0.0);
+        for (row, of_row) in [(down.first, 1.0 - down.share), (down.second, down.share)] {
+            for (column, of_column) in [(across.first, 1.0 - across.share), (across.second, across.share)] {
+                if let Some(contrast) = &contrasts[row * self.across + column] {
+                    let weight = of_row * of_column;
+                    total += weight;
+                    sum.iter_mut().zip(&contrast.before(light)).for_each(|(sum, color)| sum.add(weight, color));
+                }
+            }
+        }
+        if total > 0.0 { Some(sum.map(|color| color.scaled(1.0 / total))) } else { None }
     }
 
     /// The cells, across or down, whose middles a pixel lies between: what is linear between them shows no cells.
@@ -247,7 +276,7 @@ impl View<'_> {
     #[inline(always)]
     fn take_apart(
         &self,
-        contrast: Option<&Contrast>,
+        contrasts: &[Option<Contrast>],
         (xs, y): (Range<usize>, usize),
         shares: &[f32],
         map: &mut DepthMap,
@@ -269,11 +298,15 @@ impl View<'_> {
                 continue;
             }
             let own = self.light_at(at);
-            let (behind, difference) = match (backdrop.as_ref().map(|behind| behind(x)), contrast) {
-                (Some(light), _) if is_pure => (1.0, std::array::from_fn(|p| (own[p] - light[p]) / share)),
-                (Some(light), Some(contrast)) => (1.0, contrast.difference_before(light, own, share)),
-                (None, Some(contrast)) => (1.0 - share, contrast.difference(own, share)),
-                (_, None) => (1.0 - share, [0.0; 3]),
+            let (behind, difference) = match backdrop.as_ref().map(|behind| behind(x)) {
+                Some(light) if is_pure => (1.0, std::array::from_fn(|p| (own[p] - light[p]) / share)),
+                light => {
+                    let difference = match self.surfaces_at(contrasts, (x, y), light) {
+                        Some([near, far]) => difference(&near, &far, own, share),
+                        None => [0.0; 3],
+                    };
+                    (if light.is_some() { 1.0 } else { 1.0 - share }, difference)
+                }
             };
             let (at, near_m) = (at as u32, DepthMap::SUBJECT_M);
             map.matte.pixels.push(MixedPixel { at, near_m, far_m, share, behind, difference });

@@ -22,9 +22,6 @@ const PRECISIONS: usize = 11;
 #[derive(Debug)]
 pub struct Posterior(Vec<f32>);
 
-/// That of one precision.
-pub struct Slice<'a>(&'a [f32]);
-
 impl Posterior {
     pub fn new() -> Self {
         let mut table = Vec::with_capacity(PRECISIONS * MASKS * PLACES);
@@ -36,23 +33,17 @@ impl Posterior {
         Self(table)
     }
 
-    /// The shares at this precision, the reciprocal variance of the place of a colour.
-    pub fn slice(&self, precision: f32) -> Slice<'_> {
+    /// The share where the mask has `mask`, 0 to 1, and the colour lies at `place`: 0 for the far surface's, 1 for the near
+    /// one's, with `precision`, the reciprocal variance of that.
+    #[inline(always)]
+    pub fn share(&self, mask: f32, place: f32, precision: f32) -> f32 {
         // The exponent of a float is its binary logarithm, rounded down.
         let exponent = (std::f32::consts::SQRT_2 * precision.max(1.0)).to_bits() >> (f32::MANTISSA_DIGITS - 1);
-        let k = (exponent as usize - 127).min(PRECISIONS - 1);
-        Slice(&self.0[k * MASKS * PLACES..][..MASKS * PLACES])
-    }
-}
-
-impl Slice<'_> {
-    /// The share where the mask has `mask`, 0 to 1, and the colour lies at `place`: 0 for the far surface's, 1 for the near
-    /// one's.
-    pub fn share(&self, mask: f32, place: f32) -> f32 {
+        let slice = (exponent as usize - 127).min(PRECISIONS - 1);
         let row = (mask * (MASKS - 1) as f32 + 0.5) as usize;
         let at = ((place - LEAST) * (1.0 / STEP)).clamp(0.0, (PLACES - 1) as f32 - 1e-3);
         let (first, along) = (at as usize, at.fract());
-        let row = &self.0[row.min(MASKS - 1) * PLACES..][..PLACES];
+        let row = &self.0[(slice * MASKS + row.min(MASKS - 1)) * PLACES..][..PLACES];
         row[first] + (row[first + 1] - row[first]) * along
     }
 }
@@ -88,20 +79,20 @@ mod tests {
     #[test]
     fn colours_decide_where_they_can_and_the_mask_where_they_cannot() {
         let posterior = Posterior::new();
-        let sharp = posterior.slice(1000.0);
+        let sharp = |mask: f32, place: f32| posterior.share(mask, place, 1000.0);
         for mask in [0.1, 0.5, 0.9] {
             for share in [0.0, 0.25, 0.5, 0.75, 1.0] {
                 // A pure pixel may be a spot of another colour: that stays possible.
-                assert!((sharp.share(mask, share) - share).abs() < 0.15, "{mask} {share}");
+                assert!((sharp(mask, share) - share).abs() < 0.15, "{mask} {share}");
             }
         }
-        let blunt = posterior.slice(1.0);
-        assert!(blunt.share(0.1, 0.5) < 0.3 && blunt.share(0.9, 0.5) > 0.7);
+        let blunt = |mask: f32, place: f32| posterior.share(mask, place, 1.0);
+        assert!(blunt(0.1, 0.5) < 0.3 && blunt(0.9, 0.5) > 0.7);
         for mask in 0..10 {
             for place in 0..20 {
                 let (mask, place) = (mask as f32 / 10.0, LEAST + place as f32 * 0.08);
-                let share = sharp.share(mask, place);
-                assert!((0.0..=1.0).contains(&share) && sharp.share(mask + 0.1, place) >= share - 1e-6);
+                let share = sharp(mask, place);
+                assert!((0.0..=1.0).contains(&share) && sharp(mask + 0.1, place) >= share - 1e-6);
             }
         }
     }
