@@ -1,5 +1,5 @@
 // Shared by the passes that need level 0 of the pyramid: colour and CoC as far as neither the pixel nor a neighbour is hidden
-// by what lies in front of the layer. Such a pass has `work`, `frame`, `scene` and `nearest_px`.
+// by what lies in front of the layer. Such a pass has `work`, `frame`, `scene`, `mixed` and `nearest_px`.
 
 fn base(pixel: vec2<u32>) -> Known {
     let size = finest();
@@ -15,7 +15,15 @@ fn base(pixel: vec2<u32>) -> Known {
     var sum = vec4(0.0);
     for (var sub = 0u; sub < 4u; sub++) {
         let at = min(2u * pixel + vec2(sub % 2u, sub / 2u), frame.size - 1u);
-        sum += 0.25 * scene_unpacked(scene[at.y * frame.size.x + at.x], frame.most_px);
+        let index = at.y * frame.size.x + at.x;
+        var seen = scene_unpacked(scene[index], frame.most_px);
+        // What is known behind a subject does not lie before it: the pixel is what it shows.
+        if is_mixed(scene[index]) {
+            let k = first_mixed(index);
+            let near = near_surface(k);
+            seen = vec4(mix(seen.rgb, near.rgb, mixed[k].share), select(seen.w, near.w, mixed[k].share > 0.5));
+        }
+        sum += 0.25 * seen;
     }
     return Known(sum * knows, knows);
 }

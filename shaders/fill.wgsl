@@ -13,6 +13,7 @@
 @group(0) @binding(8) var<uniform> bins: array<Bin, MAX_BINS>;
 @group(0) @binding(9) var<storage, read_write> next: array<atomic<u32>>;
 @group(0) @binding(10) var<storage, read> reached: array<vec4<f32>>;
+@group(0) @binding(11) var<storage, read> mixed: array<MixedPixel>;
 
 // Pixels a side of a level's patch that reaches all that a tile needs of it, its neighbours included.
 const PATCH = 6u;

@@ -6,6 +6,7 @@
 @group(0) @binding(3) var<storage, read> nearest_px: array<f32>;
 @group(0) @binding(4) var<storage, read_write> pyramid: array<vec4<f32>>;
 @group(0) @binding(5) var<storage, read_write> known: array<f32>;
+@group(0) @binding(6) var<storage, read> mixed: array<MixedPixel>;
 
 // The tile's pixels of the level that was made last, a multiple of TILE apart by rows.
 var<workgroup> tile: array<Known, TILE * TILE>;

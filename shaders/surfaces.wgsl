@@ -36,9 +36,11 @@ fn reaching(pixel: vec2<u32>) -> vec2<f32> {
                mix(reached[b.y * cells.x + a.x].xy, reached[b.y * cells.x + b.x].xy, share.x), share.y);
 }
 
-// How far a bin can hold some of the surface at a pixel, whose CoC changes by less than a pixel a pixel.
+// How far a bin can hold some of the surface at a pixel, whose CoC changes by less than a pixel a pixel. In front, what is
+// nearer is blurred more, and so reaches farther.
 fn kinship(k: u32, coc_px: f32) -> f32 {
-    let step = max(bins[k].front.x - coc_px, coc_px - bins[k].behind.x) / (abs(coc_px) + 1.0);
+    let scale = 1.0 / (abs(coc_px) + 1.0);
+    let step = max((bins[k].front.x - coc_px) * scale, (coc_px - bins[k].behind.x) * scale - clamp(-coc_px, 0.0, 0.5));
     return clamp(2.0 - 2.0 * step, 0.0, 1.0);
 }
 

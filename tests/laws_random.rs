@@ -182,8 +182,11 @@ fn nothing_shines_through_a_slope(make: Make) {
         let most_px = slope.lens.max_coc_px;
         let settings = Settings {
             method: Method::Layered,
-            // What two terms of a picture overshoot is cut to the colours around, the wall's included.
+            // What few terms of a ring or a picture overshoot is cut to the colours around, the wall's included.
+            aperture: Aperture { shape: random.blades(), intensity: 2.0 * random.share() - 1.0 },
             rank: None,
+            // With two bins behind the focal plane, a slope there shares one with the wall.
+            quality: random.of(if slope.is_in_front { &Quality::ALL } else { &Quality::ALL[2..] }),
             far_max_px: most_px,
             near_max_px: most_px,
             ..random.settings(CocKind::Depth)
@@ -201,28 +204,6 @@ fn nothing_shines_through_a_slope(make: Make) {
 #[test]
 fn nothing_shines_through_a_slope_on_the_cpu() {
     nothing_shines_through_a_slope(&|settings, size| cpu(settings, size, 2));
-}
-
-/// What is blurred in bins is as if every pixel gathered all around it with its own radius.
-fn a_slope_is_blurred_as_by_the_direct_gather(make: Make) {
-    each_case(|random| {
-        let slope = Slope::new(random);
-        let most_px = slope.lens.max_coc_px;
-        let settings = Settings { far_max_px: most_px, near_max_px: most_px, ..random.settings(CocKind::Depth) };
-        let layered = Settings { method: Method::Layered, highlights: 0.0, rank: None, ..settings };
-        let gather = Settings { method: Method::Gather, rank: Some(Rank::Full), ..layered.clone() };
-        let field = CocField::Depth(slope.lens);
-        let [blurred, gathered] = [&layered, &gather]
-            .map(|settings| make(settings, SLOPE).blur(settings.quality, &slope.image(255), &slope.map, &field));
-        let (worst, at) = slope.differ(&blurred, &gathered);
-        let coc_px = slope.lens.coc_px(slope.map.metres[at]);
-        assert!(worst <= 1, "{worst} codes off at {at} (CoC {coc_px} px): {layered:?} {field:?}");
-    });
-}
-
-#[test]
-fn a_slope_is_blurred_as_by_the_direct_gather_on_the_cpu() {
-    a_slope_is_blurred_as_by_the_direct_gather(&|settings, size| cpu(settings, size, 2));
 }
 
 #[cfg(feature = "gpu")]

@@ -8,7 +8,7 @@ use bokehcam::bokeh::cpu::CpuBokeh;
 use bokehcam::bokeh::plan::Plan;
 use bokehcam::budget::Quality;
 use bokehcam::color::srgb_to_linear;
-use bokehcam::frame::{ColorImage, DepthMap};
+use bokehcam::frame::{ColorImage, DepthMap, MixedPixel};
 use bokehcam::optics::{CocField, CocKind, DepthCoc};
 use common::{color, depth, settings};
 
@@ -84,6 +84,41 @@ fn behind_a_near_thing_lies_what_is_just_behind_it() {
             // Red and green are all there is, and together they are whole.
             let whole = red / srgb_to_linear(220.0 / 255.0) + green / srgb_to_linear(150.0 / 255.0);
             assert!((whole - 1.0).abs() < 0.06, "{quality}: {whole} at {x}, {y}");
+        }
+    }
+}
+
+/// A subject in focus before a wall that is known behind it (a plate, the memory of the background), and something blurred
+/// before the subject: through its rim shows the subject.
+#[test]
+fn a_near_thing_before_the_subject_shows_the_subject_and_not_the_wall_behind_it() {
+    let near_m = 2.2;
+    let is_near = |x: u32, y: u32| (140..180).contains(&x) && (80..120).contains(&y);
+    let image = color(SIZE.0, SIZE.1, |x, y| if is_near(x, y) { [60; 3] } else { [200, 90, 60] });
+    let mut map = depth(SIZE.0, SIZE.1, |x, y| if is_near(x, y) { near_m } else { 10.0 });
+    let alone = blur(Quality::Balanced, &image, &map);
+    let subject = light(&image, 0, 0);
+    let wall = [0.02, 0.7, 0.9];
+    let known = (0..SIZE.1).flat_map(|y| (0..SIZE.0).map(move |x| (x, y))).filter(|&(x, y)| {
+        // All around the near thing, but no more than a picture has room for.
+        !is_near(x, y) && (110..210).contains(&x) && (60..140).contains(&y)
+    });
+    map.matte.pixels = known
+        .map(|(x, y)| MixedPixel {
+            at: y * SIZE.0 + x,
+            near_m: 10.0,
+            far_m: 1e6,
+            share: 1.0,
+            behind: 1.0,
+            difference: [0, 1, 2].map(|p| subject[p] - wall[p]),
+        })
+        .collect();
+    let with_wall = blur(Quality::Balanced, &image, &map);
+    for y in 64..136 {
+        for x in 114..206 {
+            let [a, b] = [&alone, &with_wall].map(|out| light(out, x, y));
+            let off = (0..3).map(|p| (a[p] - b[p]).abs()).fold(0.0, f32::max);
+            assert!(off < 0.03, "({x}, {y}): {a:?} without a wall, {b:?} with one");
         }
     }
 }

@@ -167,7 +167,7 @@ fn wide_radii_agree() {
 #[ignore = "needs a Vulkan adapter (software will do)"]
 fn a_range_of_focus_agrees() {
     let (width, height) = (97, 71);
-    let (image, slope) = (noise(width, height), depth(width, height, |x, y| 0.3 + 0.021 * (x + y / 8) as f32));
+    let (image, slope) = (noise(width, height), depth(width, height, |x, y| 0.3 + 0.02 * (x + y / 7) as f32));
     for (focus_m, range_m) in [(1.0, 0.3), (1.1, 1.0), (0.7, 9.0)] {
         let lens = DepthCoc { coc_at_infinity_px: 12.0, focus_m, range_m, max_coc_px: 18.0 };
         for (name, map) in [("slope", &slope), ("three depths", &three_depths(width, height))] {

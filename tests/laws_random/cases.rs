@@ -71,6 +71,18 @@ impl Random {
         (width as u32 + 1, height as u32 + 1)
     }
 
+    /// The aperture of a lens: its blades, or a disc.
+    pub fn blades(&mut self) -> Shape {
+        match self.below(2) {
+            0 => Shape::Disc,
+            _ => Shape::Polygon {
+                blades: 3 + self.below(14) as u32,
+                rotation_deg: 360.0 * self.share(),
+                curvature: self.share(),
+            },
+        }
+    }
+
     /// Any aperture; `even` ones look the same turned by 180 degrees.
     pub fn shape(&mut self, even: bool) -> Shape {
         let corners = if even { 4 + 2 * self.below(7) as u32 } else { 3 + self.below(14) as u32 };

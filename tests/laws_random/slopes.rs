@@ -14,6 +14,8 @@ const BESIDE_PX: f32 = 17.0;
 pub struct Slope {
     pub lens: DepthCoc,
     pub map: DepthMap,
+    /// Whether all of it lies in front of the focal plane.
+    pub is_in_front: bool,
     /// Whether the surface is all that a pixel can see.
     pub alone: Vec<bool>,
     /// Dark, with a texture, where the surface is.
@@ -61,6 +63,7 @@ impl Slope {
         Self {
             lens,
             map,
+            is_in_front: farthest_px < 0.0,
             alone: pixels().map(|(x, y)| !sees_wall(x, y)).collect(),
             texture: texture.collect(),
             is_wall: pixels().map(|(x, y)| is_wall(x, y)).collect(),

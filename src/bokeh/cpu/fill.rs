@@ -139,7 +139,16 @@ impl HalfRows<'_> {
         let (row, odd) = ((y - self.first) / 2, y % 2 == 1);
         let first = x0 / 2;
         let count = (columns.len() / 2).min(self.width - first);
-        let pairs = |p: usize| surfaces.back.0[p][columns.start..].as_chunks::<2>().0.iter().take(count);
+        let shown;
+        let seen = match surfaces.mixed {
+            // What is known behind a subject does not lie before it: a pixel is what it shows.
+            true => {
+                shown = surfaces.shown();
+                &shown
+            }
+            false => &surfaces.back,
+        };
+        let pairs = |p: usize| seen.0[p][columns.start..].as_chunks::<2>().0.iter().take(count);
         // A last row without a partner stands for two.
         let share = if !odd && y + 1 == self.height { 0.5 } else { 0.25 };
         let planes = &mut self.rows[row * PLANES * self.stride..][..PLANES * self.stride];

@@ -10,6 +10,7 @@
 use pulp::Simd;
 
 use super::encode::CHUNK;
+use super::silhouettes::Reaching;
 use crate::bokeh::occlusion::{FADE, MARGIN_PX, OWN_COVERAGE};
 use crate::bokeh::plan::{Bin, HINDMOST_COVERAGE, MAX_BINS};
 use crate::compute::aligned::Line;
@@ -93,66 +94,71 @@ impl Layers {
         Self { planes, ranges_px: [(0.0, 0.0); MAX_BINS], near: 0, count: 0, near_to_px: -1.0, near_slope: 1.0 }
     }
 
-    /// Composites the layers to linear light, at pixels of such CoC that silhouettes reach so far
-    /// ([`Silhouettes::reaching`](super::silhouettes::Silhouettes::reaching)).
+    /// Composites the layers to linear light, at pixels of such CoC that silhouettes reach so far.
     #[inline(always)]
     pub fn flatten<S: Simd>(
         &self,
         simd: S,
-        reaching: &Option<[[f32; CHUNK]; 2]>,
+        reaching: &Option<Reaching>,
         coc_px: &[f32; CHUNK],
         color: &mut Line<[[f32; CHUNK]; 3]>,
     ) {
+        let zero = simd.splat_f32s(0.0);
         for x in (0..CHUNK).step_by(S::F32_LANES) {
-            let light = self.light(simd, reaching, coc_px, x);
+            let light = match reaching.as_ref().and_then(|reaching| reaching.pixels(x, S::F32_LANES)) {
+                Some(squares) => self.beside_silhouettes(simd, &squares, load::<S>(coc_px, x), x),
+                None => self.away(simd, load::<S>(coc_px, x), x),
+            };
             for p in 0..3 {
-                store::<S>(&mut color.0[p], x, simd.max_f32s(light[p], simd.splat_f32s(0.0)));
+                store::<S>(&mut color.0[p], x, simd.max_f32s(light[p], zero));
             }
         }
     }
 
+    /// Away from all silhouettes: a pixel's own surface.
     #[inline(always)]
-    fn light<S: Simd>(
+    fn away<S: Simd>(&self, simd: S, coc_px: S::f32s, x: usize) -> [S::f32s; 3] {
+        let (mut light, is_thin) = self.own_surface(simd, coc_px, x);
+        if simd.first_true_m32s(is_thin) < S::F32_LANES {
+            let all = self.all_surfaces(simd, simd.splat_f32s(1.0), x);
+            for p in 0..3 {
+                light[p] = simd.select_f32s(is_thin, all[p], light[p]);
+            }
+        }
+        light
+    }
+
+    /// Where silhouettes reach, so far as these squares say: all surfaces, faded out to a pixel's own.
+    #[inline(always)]
+    fn beside_silhouettes<S: Simd, const N: usize>(
         &self,
         simd: S,
-        reaching: &Option<[[f32; CHUNK]; 2]>,
-        coc_px: &[f32; CHUNK],
+        squares: &[[f32; N]; 2],
+        coc_px: S::f32s,
         x: usize,
     ) -> [S::f32s; 3] {
         let (zero, one) = (simd.splat_f32s(0.0), simd.splat_f32s(1.0));
-        let coc = load::<S>(coc_px, x);
-        let (own, open_yet) = self.own_surface(simd, coc, x);
-        // Where a surface does not fill its pixel, all there is has to.
-        let is_thin = simd.greater_than_or_equal_f32s(open_yet, simd.splat_f32s(1.0 - OWN_COVERAGE));
-        let Some([any, back]) = reaching else {
-            if simd.first_true_m32s(is_thin) == S::F32_LANES {
-                return own;
-            }
-            let all = self.all_surfaces(simd, one, x);
-            let mut light = own;
-            for p in 0..3 {
-                light[p] = simd.select_f32s(is_thin, all[p], own[p]);
-            }
-            return light;
-        };
         // That of the silhouettes of the pixel's own surface, where it is a near one.
-        let reach = simd.add_f32s(simd.max_f32s(simd.neg_f32s(coc), zero), simd.splat_f32s(MARGIN_PX));
+        let reach = simd.add_f32s(simd.max_f32s(simd.neg_f32s(coc_px), zero), simd.splat_f32s(MARGIN_PX));
         let scale = simd.div_f32s(one, simd.mul_f32s(simd.mul_f32s(reach, reach), simd.splat_f32s(FADE)));
         let mut shows = [zero; 2];
-        for (shows, squares) in shows.iter_mut().zip([any, back]) {
-            *shows = simd.mul_f32s(load::<S>(squares, x), scale);
+        for (shows, squares) in shows.iter_mut().zip(squares) {
+            *shows = simd.mul_f32s(load::<S>(squares, 0), scale);
             *shows = simd.min_f32s(simd.max_f32s(*shows, zero), one);
         }
         // What is not in front itself has all behind what is.
-        let lies_back =
-            simd.mul_f32s(simd.sub_f32s(coc, simd.splat_f32s(self.near_to_px)), simd.splat_f32s(self.near_slope));
-        let lies_back = simd.min_f32s(simd.max_f32s(simd.add_f32s(lies_back, simd.splat_f32s(0.5)), zero), one);
-        let back_shows = simd.select_f32s(is_thin, one, simd.max_f32s(shows[1], lies_back));
-        let all = self.all_surfaces(simd, back_shows, x);
+        let lies_back = simd.sub_f32s(coc_px, simd.splat_f32s(self.near_to_px));
+        let lies_back = fma(simd, lies_back, simd.splat_f32s(self.near_slope), simd.splat_f32s(0.5));
+        let lies_back = simd.min_f32s(simd.max_f32s(lies_back, zero), one);
+        let back_shows = simd.max_f32s(shows[1], lies_back);
+        if simd.first_true_m32s(simd.less_than_f32s(shows[0], one)) == S::F32_LANES {
+            return self.all_surfaces(simd, back_shows, x);
+        }
+        let (own, is_thin) = self.own_surface(simd, coc_px, x);
+        let mut light = self.all_surfaces(simd, simd.select_f32s(is_thin, one, back_shows), x);
         let shows = simd.select_f32s(is_thin, one, shows[0]);
-        let mut light = own;
         for p in 0..3 {
-            light[p] = fma(simd, simd.sub_f32s(all[p], own[p]), shows, own[p]);
+            light[p] = fma(simd, simd.sub_f32s(light[p], own[p]), shows, own[p]);
         }
         light
     }
@@ -212,19 +218,21 @@ impl Layers {
         light
     }
 
-    /// What the layers have of surfaces of about this CoC, as if nothing else were there, and how much of the pixels that
-    /// leaves open.
+    /// What the layers have of surfaces of about this CoC, as if nothing else were there, and where that does not fill a
+    /// pixel.
     #[inline(always)]
-    fn own_surface<S: Simd>(&self, simd: S, coc_px: S::f32s, x: usize) -> ([S::f32s; 3], S::f32s) {
+    fn own_surface<S: Simd>(&self, simd: S, coc_px: S::f32s, x: usize) -> ([S::f32s; 3], S::m32s) {
         let (zero, one, two) = (simd.splat_f32s(0.0), simd.splat_f32s(1.0), simd.splat_f32s(2.0));
         let mut pile = Pile::new(simd);
         let inverse = simd.div_f32s(one, simd.add_f32s(simd.abs_f32s(coc_px), one));
+        let slack = simd.min_f32s(simd.max_f32s(simd.neg_f32s(coc_px), zero), simd.splat_f32s(0.5));
         for (planes, &(low_px, high_px)) in self.planes[..self.count].iter().zip(&self.ranges_px) {
             let mut layer = layer(simd, planes, x);
             if self.count > 1 {
-                let before = simd.sub_f32s(simd.splat_f32s(low_px), coc_px);
-                let beyond = simd.sub_f32s(coc_px, simd.splat_f32s(high_px));
-                let step = simd.mul_f32s(simd.max_f32s(before, beyond), inverse);
+                // In front, what is nearer is blurred more, and so reaches farther.
+                let farther = simd.mul_f32s(simd.sub_f32s(simd.splat_f32s(low_px), coc_px), inverse);
+                let nearer = simd.mul_f32s(simd.sub_f32s(coc_px, simd.splat_f32s(high_px)), inverse);
+                let step = simd.max_f32s(farther, simd.sub_f32s(nearer, slack));
                 let weight = simd.sub_f32s(two, simd.mul_f32s(two, step));
                 let weight = simd.min_f32s(simd.max_f32s(weight, zero), one);
                 for plane in &mut layer {
@@ -238,6 +246,6 @@ impl Layers {
         for plane in &mut pile.color {
             *plane = simd.mul_f32s(*plane, inverse);
         }
-        (pile.color, pile.open)
+        (pile.color, simd.less_than_f32s(covered, simd.splat_f32s(OWN_COVERAGE)))
     }
 }

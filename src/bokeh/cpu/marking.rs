@@ -5,7 +5,7 @@ use pulp::{Simd, WithSimd};
 use super::pixels::Radii;
 use super::silhouettes::NONE;
 use super::unpack::{Source, coc_row};
-use crate::bokeh::occlusion::{GRAIN, SHOWS, Silhouette};
+use crate::bokeh::occlusion::{GRAIN, OTHER_FROM, SHOWS, Silhouette};
 use crate::optics::{CocField, DepthCoc};
 
 /// Pixels that are looked at together.
@@ -53,12 +53,19 @@ impl WithSimd for Marking<'_> {
                 }
                 coc_row(self.source, y, x0, &mut here[..with_next]);
                 coc_row(self.source, next, x0, &mut below[..take]);
+                let last_px = here[with_next - 1];
+                here[with_next..].fill(last_px);
+                let mut beyond_px = [f32::MIN; CHUNK];
                 for x in 0..take {
-                    let right = here[(x + 1).min(with_next - 1)];
-                    for other in [right, below[x]] {
-                        if (here[x] - other).abs() >= least_px {
-                            mark(row, across, x0 + x, Silhouette::between(here[x], other, least_px, self.near_from_px));
-                        }
+                    let [right_px, down_px] = [here[x + 1], below[x]].map(|px| beyond(here[x], px, least_px));
+                    beyond_px[x] = if right_px > down_px { right_px } else { down_px };
+                }
+                if highest(&beyond_px) < 0.0 {
+                    continue;
+                }
+                for x in (0..take).filter(|&x| beyond_px[x] >= 0.0) {
+                    for other in [here[x + 1], below[x]] {
+                        mark(row, across, x0 + x, Silhouette::between(here[x], other, least_px, self.near_from_px));
                     }
                 }
             }
@@ -84,21 +91,42 @@ fn mark(row: &mut [f32], across: usize, x: usize, silhouette: Option<Silhouette>
     }
 }
 
+/// By how much a step between two CoC is larger than that of a surface that goes on: see [`Silhouette::between`].
+#[inline(always)]
+fn beyond(a_px: f32, b_px: f32, least_px: f32) -> f32 {
+    let (near_px, far_px) = if a_px < b_px { (a_px, b_px) } else { (b_px, a_px) };
+    let most_px = OTHER_FROM * near_px.abs();
+    far_px - near_px - if most_px > least_px { most_px } else { least_px }
+}
+
+/// The highest of some values, a multiple of 16 of them.
+#[inline(always)]
+fn highest(values: &[f32]) -> f32 {
+    let mut highest = [f32::MIN; 16];
+    for values in values.as_chunks::<16>().0 {
+        for k in 0..16 {
+            highest[k] = if values[k] > highest[k] { values[k] } else { highest[k] };
+        }
+    }
+    highest.into_iter().fold(f32::MIN, f32::max)
+}
+
 /// Whether the CoC may jump by `least_px` between any two of these, in metres. Without a division: the CoC is linear in
 /// 1/depth, but for the sharp range and its cuts, which make jumps smaller.
 #[inline(always)]
 fn jumps(lens: &DepthCoc, least_px: f32, a: &[f32], b: &[f32]) -> bool {
     let (steep, far) = (lens.coc_at_infinity_px * lens.far_m(), |m: f32| if m > 0.0 && m < FAR_M { m } else { FAR_M });
-    let mut any = [false; 16];
-    let test = |a: f32, b: f32| {
+    let excess = |a: f32, b: f32| {
         let (a, b) = (far(a), far(b));
-        (a - b).abs() * steep >= 0.999 * least_px * a * b
+        (a - b).abs() * steep - 0.999 * least_px * a * b
     };
+    let mut most = [f32::MIN; 16];
     let ((a, a_rest), (b, b_rest)) = (a.as_chunks::<16>(), b.as_chunks::<16>());
     for (a, b) in a.iter().zip(b) {
         for k in 0..16 {
-            any[k] |= test(a[k], b[k]);
+            let excess = excess(a[k], b[k]);
+            most[k] = if excess > most[k] { excess } else { most[k] };
         }
     }
-    any.contains(&true) || a_rest.iter().zip(b_rest).any(|(&a, &b)| test(a, b))
+    highest(&most) >= 0.0 || a_rest.iter().zip(b_rest).any(|(&a, &b)| excess(a, b) >= 0.0)
 }

@@ -8,6 +8,7 @@ use std::sync::atomic::AtomicBool;
 
 use pulp::Arch;
 
+use super::encode::CHUNK;
 use crate::bokeh::occlusion::{GRAIN, SHOWS};
 use crate::compute::thread_pool::{DisjointParts, ThreadPool};
 
@@ -75,28 +76,32 @@ impl Silhouettes {
         });
     }
 
-    /// How far silhouettes reach some pixels of row `y` from column `x0` on, a multiple of the grain: the square of a reach less
-    /// that of the distance, linear between cells; of any silhouette, and of those before what is not in front. `None` where
-    /// none reaches any.
+    /// How far silhouettes reach some pixels of row `y` from column `x0` on, a multiple of the grain: of any silhouette, and of
+    /// those before what is not in front. `None` where none reaches any.
     #[inline(always)]
-    pub fn reaching<const W: usize>(&self, y: usize, x0: usize) -> Option<[[f32; W]; 2]> {
+    pub fn reaching(&self, y: usize, x0: usize) -> Option<Reaching> {
         let along = ((y as f32 + 0.5) / GRAIN as f32 - 0.5).max(0.0);
         let above = (along as usize).min(self.down - 1);
         let below = (above + 1).min(self.down - 1);
-        // One cell more on both sides.
-        let (first, cells) = (x0 / GRAIN, W / GRAIN + 2);
-        let mut lines = [[0.0; W]; 2];
+        let mut reaching = Reaching([[0.0; CELLS]; 2]);
         let mut highest = NONE;
-        for (plane, line) in lines.iter_mut().enumerate() {
+        for (plane, line) in reaching.0.iter_mut().enumerate() {
             let row = |row: usize| &self.reached[(row * SHOWS + plane) * self.across..][..self.across];
-            let (above, below) = (row(above), row(below));
-            for (k, value) in line[..cells].iter_mut().enumerate() {
-                let x = (first + k).saturating_sub(1).min(self.across - 1);
-                *value = above[x] + along.fract() * (below[x] - above[x]);
-                highest = highest.max(*value);
+            let (above, below, first) = (row(above), row(below), x0 / GRAIN);
+            if first > 0 && first + CELLS <= self.across {
+                let (above, below) = (&above[first - 1..][..CELLS], &below[first - 1..][..CELLS]);
+                for k in 0..CELLS {
+                    line[k] = above[k] + along.fract() * (below[k] - above[k]);
+                }
+            } else {
+                for (k, value) in line.iter_mut().enumerate() {
+                    let x = (first + k).saturating_sub(1).min(self.across - 1);
+                    *value = above[x] + along.fract() * (below[x] - above[x]);
+                }
             }
+            highest = if plane == 0 { most(line) } else { highest };
         }
-        (highest > 0.0).then(|| lines.map(|line| expanded(&line)))
+        (highest > 0.0).then_some(reaching)
     }
 
     /// The cells of row `y` of the picture: above 0 where something behind a silhouette can be seen, and where what a
@@ -107,19 +112,37 @@ impl Silhouettes {
     }
 }
 
-/// Values of cells, the first one before the first pixel's, as those of pixels: linear between their centres.
-#[inline(always)]
-fn expanded<const W: usize>(cells: &[f32; W]) -> [f32; W] {
-    let mut values = [0.0; W];
-    for (k, group) in values.as_chunks_mut::<GRAIN>().0.iter_mut().enumerate() {
-        let (before, here, after) = (cells[k], cells[k + 1], cells[k + 2]);
-        for (i, value) in group.iter_mut().enumerate() {
-            let offset = (i as f32 + 0.5) / GRAIN as f32 - 0.5;
-            let other = if offset < 0.0 { before } else { after };
-            *value = here + (other - here) * offset.abs();
+/// Cells of a chunk, and one more on both sides.
+const CELLS: usize = CHUNK / GRAIN + 2;
+/// Pixels of the widest vector.
+const WIDEST: usize = 16;
+
+/// The squares of the reaches of silhouettes less those of their distances, by the cells of a chunk: see
+/// [`Silhouettes::reaching`].
+pub struct Reaching([[f32; CELLS]; 2]);
+
+impl Reaching {
+    /// Those of some pixels from column `x` of the chunk on, linear between the middles of cells; `None` where none reaches
+    /// any.
+    #[inline(always)]
+    pub fn pixels(&self, x: usize, count: usize) -> Option<[[f32; WIDEST]; 2]> {
+        let cells = &self.0[0][x / GRAIN..][..count / GRAIN + 2];
+        if cells.iter().all(|&square| square <= 0.0) {
+            return None;
         }
+        let mut pixels = [[0.0; WIDEST]; 2];
+        for (pixels, line) in pixels.iter_mut().zip(&self.0) {
+            let line = &line[x / GRAIN..];
+            for (k, group) in pixels[..count].as_chunks_mut::<GRAIN>().0.iter_mut().enumerate() {
+                let (before, here, after) = (line[k], line[k + 1], line[k + 2]);
+                for (i, value) in group.iter_mut().enumerate() {
+                    let offset = (i as f32 + 0.5) / GRAIN as f32 - 0.5;
+                    *value = here + (if offset < 0.0 { before } else { after } - here) * offset.abs();
+                }
+            }
+        }
+        Some(pixels)
     }
-    values
 }
 
 fn most(values: &[f32]) -> f32 {

@@ -77,6 +77,20 @@ impl<const W: usize> Surfaces<W> {
         Self { back, front, share: Line([0.0; W]), behind: Line([1.0; W]), mixed: false }
     }
 
+    /// What pixels show, both surfaces together, with the CoC of the one that has more of it.
+    #[inline(always)]
+    pub fn shown(&self) -> Piece<W> {
+        let mut shown = self.back;
+        for (p, plane) in shown.0.iter_mut().enumerate() {
+            for (x, value) in plane.iter_mut().enumerate() {
+                let (front, share) = (self.front.0[p][x], self.share.0[x]);
+                let of_front = if p < 3 { share } else { f32::from(u8::from(share > 0.5)) };
+                *value += of_front * (front - *value);
+            }
+        }
+        shown
+    }
+
     /// A pixel with both its surfaces: linear r, g, b, and the CoC of the nearer one.
     pub fn pixel(&self, x: usize) -> [f32; 4] {
         let back = self.back.0.each_ref().map(|plane| plane[x]);

@@ -104,13 +104,15 @@ impl Passes {
         let hide = maker.pass(shaders::HIDE, &[], &hide, over(half, TILE)).named(FILL);
         let layers = (0..MOST_LAYERS).map(|index| {
             let fill = (index > 0).then(|| {
-                let pulled = [&b.frame, &b.scene, &b.nearest_px, &b.pyramid, &b.known];
+                let pulled = [&b.frame, &b.scene, &b.nearest_px, &b.pyramid, &b.known, &b.mixed];
                 let coarse = [&b.frame, &b.pyramid, &b.known];
                 let known = [&b.pyramid, &b.known];
                 let (seen, nearest) = ([&b.scene, &b.ranges, &b.behind], &b.nearest_px);
-                let (lists, reached) = (&b.binned, &b.reached);
-                let filled =
-                    [&b.frame, known[0], known[1], seen[0], seen[1], seen[2], nearest, &b.bins, lists, reached];
+                let (lists, reached) = (&b.binned, [&b.reached, &b.mixed]);
+                let filled = [
+                    &b.frame, known[0], known[1], seen[0], seen[1], seen[2], nearest, &b.bins, lists, reached[0],
+                    reached[1],
+                ];
                 let work = [uniform_at::<Work>(&b.work, index)];
                 [
                     // A thread takes four pixels of half the size, or of the picture.

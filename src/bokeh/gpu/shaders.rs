@@ -28,12 +28,12 @@ pub const GATHER: Shader = shader!("common"; "gather");
 /// The nearest surface.
 pub const HIDE: Shader = shader!("common"; "hide", "mixed");
 /// What is known behind a layer, at half size and over ever larger areas.
-pub const PULL: Shader = shader!("common"; "pull", "pyramid", "base");
+pub const PULL: Shader = shader!("common"; "pull", "pyramid", "base", "mixed");
 /// The largest areas, and back.
 pub const COARSE: Shader = shader!("common"; "coarse", "pyramid");
 /// Back to the picture.
 pub const FILL: Shader =
-    shader!("common"; "fill", "pyramid", "base", "cells", "range", "list", "tiles", "next", "meet");
+    shader!("common"; "fill", "pyramid", "base", "mixed", "cells", "range", "list", "tiles", "next", "meet");
 pub const COMPOSITE: Shader = shader!("common"; "composite", "surfaces", "cells", "list", "yuyv");
 
 pub const ALL: [Shader; 14] =
