@@ -11,18 +11,16 @@ fn at(level: Level, pixel: vec2<u32>) -> Known {
 }
 
 fn pull(fine: Level, coarse: Level, pixel: vec2<u32>) {
-    var four: array<Known, 4>;
+    var sum = Known(vec4(0.0), 0.0);
     for (var sub = 0u; sub < 4u; sub++) {
         let below = 2u * pixel + vec2(sub % 2u, sub / 2u);
-        four[sub] = Known(vec4(0.0), 0.0);
         if all(below < fine.size) {
-            four[sub] = at(fine, below);
+            sum = plus(sum, at(fine, below));
         }
     }
     let index = index_of(coarse, pixel);
-    let own = pulled(four);
-    pyramid[index] = own.value;
-    known[index] = own.known;
+    pyramid[index] = pulled(sum).value;
+    known[index] = pulled(sum).known;
 }
 
 fn push(fine: Level, coarse: Level, pixel: vec2<u32>) {
@@ -31,9 +29,10 @@ fn push(fine: Level, coarse: Level, pixel: vec2<u32>) {
         return;
     }
     let b = between(pixel, coarse.size);
+    let near = plus(times(at(coarse, b.xz), 0.75), times(at(coarse, b.yz), 0.25));
+    let far = plus(times(at(coarse, b.xw), 0.75), times(at(coarse, b.yw), 0.25));
     let index = index_of(fine, pixel);
-    let around = array(at(coarse, b.xz), at(coarse, b.yz), at(coarse, b.xw), at(coarse, b.yw));
-    let all = pushed(own, around);
+    let all = pushed(own, plus(times(near, 0.75), times(far, 0.25)));
     pyramid[index] = all.value;
     known[index] = all.known;
 }

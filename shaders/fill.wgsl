@@ -44,7 +44,9 @@ fn completed(number: u32, own: Known, pixel: vec2<u32>, tile: vec2<u32>) -> Know
     }
     let b = between(pixel, level_of(number + 1u).size) - corner_of(tile, number + 1u).xxyy;
     let at = (number + 1u) % 2u * PATCH * PATCH + vec4(b.xy, b.xy) + PATCH * vec4(b.zz, b.ww);
-    return pushed(own, array(patches[at.x], patches[at.y], patches[at.z], patches[at.w]));
+    let near = plus(times(patches[at.x], 0.75), times(patches[at.y], 0.25));
+    let far = plus(times(patches[at.z], 0.75), times(patches[at.w], 0.25));
+    return pushed(own, plus(times(near, 0.75), times(far, 0.25)));
 }
 
 // A pixel of the scene with what is known behind it, as far as a silhouette that reaches it uncovers that.
@@ -63,8 +65,10 @@ fn filled(value: vec2<u32>, behind: Known, reach: vec4<f32>) -> vec2<u32> {
     let hidden = (1.0 - unhidden) * other_surface(own.w, behind.value.w);
     // Where it matters for what others see alone, it must not get among what is in front itself, nor half of it.
     let focus_to_px = bins[min(frame.near_bins, frame.bins - 1u)].behind.x;
-    let is_kin = behind.value.w <= focus_to_px * (1.0 + HAND_OVER);
-    if hidden == 0.0 || reach.x <= 0.0 && (is_kin || hidden < 1.0) {
+    let px = behind.value.w;
+    let is_kin = px <= focus_to_px * (1.0 + HAND_OVER);
+    let is_wanted = select(reach.x > 0.0 || hidden >= 1.0, max(reach.x, 0.0) > px * px, is_kin);
+    if hidden == 0.0 || !is_wanted {
         return value;
     }
     let mixture = mix(own, vec4(behind.value.rgb, max(behind.value.w, work.nearest_px)), hidden);

@@ -22,19 +22,18 @@ fn pull(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(local_invocation_i
         @builtin(local_invocation_index) thread: u32) {
     // Four pixels of level 0 a thread.
     var pixel = workgroup.xy * TILE + local.xy;
-    var four: array<Known, 4>;
+    var sum = Known(vec4(0.0), 0.0);
     for (var sub = 0u; sub < 4u; sub++) {
         let at = 2u * pixel + vec2(sub % 2u, sub / 2u);
-        four[sub] = Known(vec4(0.0), 0.0);
         if all(at < finest()) {
-            four[sub] = base(at);
+            sum = plus(sum, base(at));
         }
     }
     var level = level_of(1u);
     var more = !is_coarsest(finest());
     var side = TILE;
     for (var k = 1u; k <= BY_TILES; k++) {
-        let own = pulled(four);
+        let own = pulled(sum);
         if more && all(local.xy < vec2(side)) && all(pixel < level.size) {
             lay(level, pixel, own);
         }
@@ -46,6 +45,6 @@ fn pull(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(local_invocation_i
         side /= 2u;
         pixel = workgroup.xy * side + local.xy;
         let first = (2u * local.y * TILE + 2u * local.x) % (TILE * TILE - TILE);
-        four = array(tile[first], tile[first + 1u], tile[first + TILE], tile[first + TILE + 1u]);
+        sum = plus(plus(tile[first], tile[first + 1u]), plus(tile[first + TILE], tile[first + TILE + 1u]));
     }
 }

@@ -48,40 +48,14 @@ fn times(a: Known, factor: f32) -> Known {
     return Known(a.value * factor, a.known * factor);
 }
 
-// The sum of four pixels: of those in front of the subject or of the others, whichever are better known, and in a tie those in
-// front. Means of both would be a colour and a CoC that is in neither.
-fn one_side(four: array<Known, 4>) -> Known {
-    var sides = array<Known, 2>(Known(vec4(0.0), 0.0), Known(vec4(0.0), 0.0));
-    var all = four;
-    for (var k = 0u; k < 4u; k++) {
-        if all[k].value.w < frame.front_px * all[k].known {
-            sides[0] = plus(sides[0], all[k]);
-        } else {
-            sides[1] = plus(sides[1], all[k]);
-        }
-    }
-    if sides[0].known > 0.99 * sides[1].known {
-        return sides[0];
-    }
-    return sides[1];
-}
-
-// Four pixels as one of the coarser level: their mean where more than one is known.
-fn pulled(four: array<Known, 4>) -> Known {
-    let sum = one_side(four);
+// The sum of four pixels as one of the coarser level: their mean where more than one is known.
+fn pulled(sum: Known) -> Known {
     return times(sum, 1.0 / max(sum.known, 1.0));
 }
 
-// What a pixel does not know, from the four of the coarser level around it: the one that covers it, the neighbours across and
-// down, and the one across from both.
-fn pushed(own: Known, around: array<Known, 4>) -> Known {
-    var weighed = around;
-    weighed[0] = times(around[0], 9.0 / 16.0);
-    weighed[1] = times(around[1], 3.0 / 16.0);
-    weighed[2] = times(around[2], 3.0 / 16.0);
-    weighed[3] = times(around[3], 1.0 / 16.0);
-    let sum = one_side(weighed);
-    return plus(own, times(sum, (1.0 - own.known) / max(sum.known, 1.0e-6)));
+// What a pixel does not know, from those of the coarser level around it.
+fn pushed(own: Known, around: Known) -> Known {
+    return plus(own, times(around, (1.0 - own.known) / max(around.known, 1.0e-6)));
 }
 
 // The other coarse pixel that a fine one lies between, along one axis.

