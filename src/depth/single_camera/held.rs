@@ -131,8 +131,9 @@ impl Held {
         for y in y.saturating_sub(REACH)..(y + REACH + 1).min(height) {
             for x in x.saturating_sub(REACH)..(x + REACH + 1).min(width) {
                 // Not those of a subject beside them.
-                if self.nearness[y * width + x] < OTHERS {
-                    self.mask.share[y * width + x] = 0.0;
+                let at = y * width + x;
+                if self.others[at] || self.nearness[at] < OTHERS {
+                    self.mask.share[at] = 0.0;
                 }
             }
         }
