@@ -84,6 +84,13 @@ impl Plan {
         first.checked_sub(1).map_or(f32::MIN, |front| self.bins[front].high_px * (1.0 - HAND_OVER))
     }
 
+    /// Where what lies in front of the subject ends: the CoC of the last near bin's border, and the slope of the hand-over; a
+    /// border that all lies behind without such bins.
+    pub fn near_to(&self) -> (f32, f32) {
+        let last = self.bins.iter().rposition(|bin| bin.near);
+        last.and_then(|last| self.border(last)).unwrap_or((-1e30, 1.0))
+    }
+
     /// The CoC above which no bin that holds anything of a surface in front begins: that of the far border of the bin in focus.
     pub fn kin_to_px(&self) -> f32 {
         let focus = self.bins.iter().position(|bin| !bin.near);

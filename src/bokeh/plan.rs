@@ -245,13 +245,6 @@ impl Plan {
         }
     }
 
-    /// Where what lies in front of the subject ends: the CoC of the last near bin's border, and the slope of the hand-over; a
-    /// border that all lies behind without such bins.
-    pub fn near_to(&self) -> (f32, f32) {
-        let last = self.bins.iter().rposition(|bin| bin.near);
-        last.and_then(|last| self.border(last)).unwrap_or((-1e30, 1.0))
-    }
-
     /// Whether truncation makes a bin's filters overshoot visibly. Small filters keep nearly all of their terms: even
     /// ones have `reach + 1`, others `2 reach + 1`.
     pub fn has_lobes(&self, bin: &Bin) -> bool {
