@@ -51,6 +51,13 @@ pub fn front_px(near_from_px: f32) -> f32 {
     -(1.0 + HAND_OVER) * near_from_px
 }
 
+/// By how much a step to what is farther is larger than a surface that goes on would make ([`OTHER_FROM`]), and than `least_px`.
+#[inline(always)]
+pub fn beyond_px(near_px: f32, far_px: f32, least_px: f32) -> f32 {
+    let most_px = OTHER_FROM * near_px.abs();
+    far_px - near_px - if most_px > least_px { most_px } else { least_px }
+}
+
 impl Silhouette {
     /// That between two pixels of these CoC, where it is one: a step of `least_px`, which is also more than a surface that goes
     /// on would make ([`OTHER_FROM`]): coarse codes of depth are no silhouettes. From `near_from_px` on, a radius in front of the
@@ -60,7 +67,7 @@ impl Silhouette {
         let (near_px, far_px) = (a_px.min(b_px), a_px.max(b_px));
         let shows_px = near_px.abs() + MARGIN_PX;
         let shows_back_px = if far_px > front_px(near_from_px) { shows_px } else { -1.0 };
-        (far_px - near_px >= least_px.max(OTHER_FROM * near_px.abs())).then_some(Self {
+        (beyond_px(near_px, far_px, least_px) >= 0.0).then_some(Self {
             shows_px,
             shows_back_px,
             uncovers_px: shows_px + far_px.abs(),

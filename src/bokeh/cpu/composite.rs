@@ -46,6 +46,7 @@ impl<T: Sample> WithSimd for Composite<'_, T> {
         let width = self.plan.width;
         let row_of_tiles = self.y0 / TILE_H * self.tiles.across;
         let out = std::mem::take(&mut self.out);
+        self.layers.begin(self.plan.near_to());
         let (mut color, mut coc_px) = (Line([[0.0; CHUNK]; 3]), [0.0; CHUNK]);
         for x0 in (0..width).step_by(CHUNK) {
             let take = CHUNK.min(width - x0);
@@ -104,7 +105,7 @@ impl<T> Composite<'_, T> {
     #[inline(always)]
     fn read_layers<S: Simd>(&mut self, simd: S, y: usize, x0: usize, still: bool) -> bool {
         let (plan, layers) = (self.plan, &mut *self.layers);
-        layers.clear(plan.near_to());
+        layers.clear();
         for bin in &plan.bins {
             if still && !bin.near && layers.count() == 0 {
                 return false;
@@ -119,7 +120,7 @@ impl<T> Composite<'_, T> {
     /// The colour of a chunk of `take` pixels, from the bins of each pixel's own CoC, by their share of it.
     #[inline(always)]
     fn select<S: Simd>(&mut self, simd: S, y: usize, x0: usize, take: usize, color: &mut [[f32; CHUNK]; 3]) {
-        self.layers.clear((-1.0, 1.0));
+        self.layers.clear();
         let layer = self.layers.next();
         let mut coc = [0.0; CHUNK];
         coc_row(self.frame, y, x0, &mut coc[..take]);

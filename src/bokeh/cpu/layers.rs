@@ -163,11 +163,15 @@ impl Layers {
         light
     }
 
-    /// No layers yet, of a frame whose near bins end at `near_to`: the CoC, and the slope of the hand-over.
-    #[inline(always)]
-    pub fn clear(&mut self, near_to: (f32, f32)) {
-        (self.near, self.count) = (0, 0);
+    /// Begins a frame whose near bins end at `near_to`: the CoC, and the slope of the hand-over.
+    pub fn begin(&mut self, near_to: (f32, f32)) {
         (self.near_to_px, self.near_slope) = near_to;
+    }
+
+    /// No layers yet, at other pixels.
+    #[inline(always)]
+    pub fn clear(&mut self) {
+        (self.near, self.count) = (0, 0);
     }
 
     /// Memory for the next layer.

@@ -5,7 +5,7 @@ use pulp::{Simd, WithSimd};
 use super::pixels::Radii;
 use super::silhouettes::NONE;
 use super::unpack::{Source, coc_row};
-use crate::bokeh::occlusion::{GRAIN, OTHER_FROM, SHOWS, Silhouette};
+use crate::bokeh::occlusion::{self, GRAIN, SHOWS, Silhouette};
 use crate::optics::{CocField, DepthCoc};
 
 /// Pixels that are looked at together.
@@ -57,7 +57,10 @@ impl WithSimd for Marking<'_> {
                 here[with_next..].fill(last_px);
                 let mut beyond_px = [f32::MIN; CHUNK];
                 for x in 0..take {
-                    let [right_px, down_px] = [here[x + 1], below[x]].map(|px| beyond(here[x], px, least_px));
+                    let [right_px, down_px] = [here[x + 1], below[x]].map(|px| {
+                        let (near_px, far_px) = if here[x] < px { (here[x], px) } else { (px, here[x]) };
+                        occlusion::beyond_px(near_px, far_px, least_px)
+                    });
                     beyond_px[x] = if right_px > down_px { right_px } else { down_px };
                 }
                 if highest(&beyond_px) < 0.0 {
@@ -89,14 +92,6 @@ fn mark(row: &mut [f32], across: usize, x: usize, silhouette: Option<Silhouette>
     for (plane, px) in row.chunks_exact_mut(across).zip(reaches_px) {
         plane[x / GRAIN] = plane[x / GRAIN].max(px);
     }
-}
-
-/// By how much a step between two CoC is larger than that of a surface that goes on: see [`Silhouette::between`].
-#[inline(always)]
-fn beyond(a_px: f32, b_px: f32, least_px: f32) -> f32 {
-    let (near_px, far_px) = if a_px < b_px { (a_px, b_px) } else { (b_px, a_px) };
-    let most_px = OTHER_FROM * near_px.abs();
-    far_px - near_px - if most_px > least_px { most_px } else { least_px }
 }
 
 /// The highest of some values, a multiple of 16 of them.

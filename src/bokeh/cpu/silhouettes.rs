@@ -84,7 +84,6 @@ impl Silhouettes {
         let above = (along as usize).min(self.down - 1);
         let below = (above + 1).min(self.down - 1);
         let mut reaching = Reaching([[0.0; CELLS]; 2]);
-        let mut highest = NONE;
         for (plane, line) in reaching.0.iter_mut().enumerate() {
             let row = |row: usize| &self.reached[(row * SHOWS + plane) * self.across..][..self.across];
             let (above, below, first) = (row(above), row(below), x0 / GRAIN);
@@ -99,9 +98,8 @@ impl Silhouettes {
                     *value = above[x] + along.fract() * (below[x] - above[x]);
                 }
             }
-            highest = if plane == 0 { most(line) } else { highest };
         }
-        (highest > 0.0).then_some(reaching)
+        (most(&reaching.0[0]) > 0.0).then_some(reaching)
     }
 
     /// The cells of row `y` of the picture: above 0 where something behind a silhouette can be seen, and where what a
