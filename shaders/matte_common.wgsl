@@ -29,7 +29,6 @@ override QUANTISATION: f32;
 override MOST_DEVIATION: f32;
 override MOST_CERTAINTY: f32;
 override OUTLIER: f32;
-override AT_CORNER: f32;
 override LEAST: f32;
 override LEAST_OFF_LINE: f32;
 override FIRST_MIXED: f32;      // the first guess of the prior, and its bounds
@@ -48,10 +47,11 @@ const CELL = 8u;
 const WORD = 32u;
 const BLOCK = 256u;
 
-// Places in `counts`: edges, 0 where there are too many; the next entry; for each step, of which the first is that
+// Places in `counts`: edges, 0 where there are too many; the next entry; all edges; for each step, of which the first is that
 // of edges, pixels that were claimed for it, and its cells; before each block of words, the bits that are set.
 const EDGES = 0u;
 const NEXT = 1u;
+const FOUND_EDGES = 2u;
 const CLAIMED = 4u;
 const LISTED = 24u;
 const TOTALS = 64u;
@@ -71,6 +71,8 @@ const MIXED = 64u;
 const WIDE = 128u;      // it is part of something that is wide
 const SEEN = 256u;      // traced, it shows something near, or is part of the outline of something wide
 const GROWN = 512u;     // such an outline, found in this or the last of the steps with even numbers; the next bit, with odd ones
+const OUTLINE = 2048u;  // times the row of `SHARES` that its sides and corners have; the last is of pixels beyond edges
+const BEYOND = 6u;
 const STEP = 65536u;    // times the step in which it was traced
 
 // A pixel that may be mixed.

@@ -3,6 +3,18 @@
 // Shares are tried in steps of an eighth.
 const STEPS = 8u;
 
+// By how many sides and corners of an entry are of its own surface: how likely each share of it is, from a half to all of it.
+const OUTLINES = array(vec2(2u, 2u), vec2(2u, 3u), vec2(3u, 2u), vec2(3u, 3u), vec2(4u, 3u));
+const SHARES = array(
+    array(0.2, 0.2, 0.2, 0.2, 0.2),
+    array(0.227, 0.358, 0.254, 0.133, 0.029),
+    array(0.058, 0.095, 0.177, 0.365, 0.305),
+    array(0.029, 0.083, 0.137, 0.218, 0.533),
+    array(0.140, 0.140, 0.140, 0.146, 0.434),
+    array(0.100, 0.100, 0.100, 0.100, 0.600),
+    array(0.060, 0.060, 0.060, 0.060, 0.760),
+);
+
 // What the colour of an entry says of it, whose answer was found.
 fn compare(k: u32, labels: u32) {
     let at = entries[k].at;
@@ -28,24 +40,25 @@ fn compare(k: u32, labels: u32) {
     let is_near = (labels & NEAR) != 0u;
     // What is no mixture of both has a colour of its own, as lone hair beside a face.
     let fits = max(exp(-min(off_line, 80.0)), LEAST_OFF_LINE);
-    var low = vec2(0.0);
-    var middle = vec2(0.0);
-    var high = vec2(0.0);
+    let outline = labels / OUTLINE % 8u;
+    var every = vec2(0.0);
+    var sided = vec2(0.0);
     var pure = 0.0;
     for (var step = 0u; step <= STEPS; step++) {
         let tried = f32(step) / f32(STEPS);
         let off = tried - clamp(share, -0.3, 1.3);
         let likelihood = fits * max(exp(-min(0.5 * d.certainty * off * off, 80.0)), LEAST);
         let both = vec2(likelihood, likelihood * tried);
-        low += select(vec2(0.0), both, step < STEPS / 2u);
-        middle += select(vec2(0.0), both, step == STEPS / 2u);
-        high += select(vec2(0.0), both, step > STEPS / 2u);
-        pure = select(pure, likelihood, step == select(0u, STEPS, is_near));
+        // Of its own surface; what is less than a half is no share of it.
+        let own = select(STEPS - step, step, is_near);
+        let likely = select(0.0, SHARES[outline][max(own, STEPS / 2u) - STEPS / 2u], own >= STEPS / 2u);
+        every += both;
+        sided += likely * both;
+        pure = select(pure, likelihood, own == STEPS);
     }
     // No pixel of a surface whose light is known is like none of it.
     let outlier = select(OUTLIER, 0.0, is_behind && !is_near);
-    let every = (low + middle + high) / f32(STEPS + 1u);
-    let sided = (select(low, high, is_near) + middle) / f32(STEPS / 2u + 1u);
+    every /= f32(STEPS + 1u);
     entries[k].clean = max(pure, outlier / sqrt(d.certainty));
     entries[k].sided = select(sided, every, (labels & THIN) != 0u);
     entries[k].every = every;

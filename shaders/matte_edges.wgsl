@@ -24,17 +24,21 @@ fn beside(pixel: vec2<u32>, right: u32, down: u32) -> f32 {
 fn labels_of(pixel: vec2<u32>, surfaces: vec2<f32>) -> u32 {
     let middle = 0.5 * (surfaces.x + surfaces.y);
     let is_near = beside(pixel, 1u, 1u) > middle;
-    var alike = 0u;
+    var alike = vec2(0u);           // corners, itself among them, and sides
     var borders = false;
     for (var k = 0u; k < 9u; k++) {
         let is_alike = (beside(pixel, k % 3u, k / 3u) > middle) == is_near;
         let is_there = all(pixel + vec2(k % 3u, k / 3u) - 1u < frame.size);
-        alike += select(0u, 1u, is_alike && is_there);
+        alike[k % 2u] += select(0u, 1u, is_alike && is_there);
         borders = borders || (k % 2u == 1u && !is_alike);
     }
     // Itself, and two neighbours in a row.
-    let is_thin = is_near && alike <= 3u;
-    return select(0u, NEAR, is_near) | select(0u, BORDERS, borders) | select(0u, THIN, is_thin);
+    let is_thin = is_near && alike.x + alike.y <= 3u;
+    var outline = 0u;
+    for (var k = 0u; k < 5u; k++) {
+        outline = select(outline, k + 1u, all(alike == vec2(OUTLINES[k].y + 1u, OUTLINES[k].x)));
+    }
+    return select(0u, NEAR, is_near) | select(0u, BORDERS, borders) | select(0u, THIN, is_thin) | OUTLINE * outline;
 }
 
 fn enter_edges(cell: vec2<u32>, thread: u32) {
@@ -52,6 +56,9 @@ fn enter_edges(cell: vec2<u32>, thread: u32) {
             let inverse = beside(pixel, k % 3u, k / 3u);
             surfaces = vec2(max(surfaces.x, inverse), min(surfaces.y, inverse));
         }
+        // The surface that is seen beside a nearer one is its own, even where a third one is farther.
+        let own = beside(pixel, 1u, 1u);
+        surfaces.y = select(surfaces.y, own, surfaces.x - own > frame.jump);
         labels = labels_of(pixel, surfaces);
         entry = counts[TOTALS + word / BLOCK] + words[word].y + countOneBits(words[word].x & (bit - 1u));
     }

@@ -9,13 +9,13 @@
 @compute @workgroup_size(LANES)
 fn matte_expect(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) thread: u32) {
     let prior = prior_after(turn.at, thread);
+    let weights = weights_of(prior);
     var own = vec4(0.0);
     for (var k = group.x * LANES + thread; k < min(counts[EDGES], frame.most); k += LANES * LANES) {
         let labels = atomicLoad(&entries[k].flags);
         if (labels & LONE) != 0u {
             continue;
         }
-        let weights = weights_of(prior, labels);
         let sided = weights.y * entries[k].sided.x;
         let wrong = weights.z * entries[k].every.x;
         let total = weights.x * entries[k].clean + sided + wrong;

@@ -1,5 +1,5 @@
 // Pass matte_total, one workgroup: how many bits are set before each block, and in all: at first of edges, then of mixed
-// pixels, whose number goes before their list, too.
+// pixels, whose number goes before their list, too, and that of the edges.
 
 @group(0) @binding(1) var<storage, read_write> counts: array<u32>;
 @group(0) @binding(2) var<storage, read_write> mixed: array<vec4<u32>>;     // two for the number, and two a pixel
@@ -18,11 +18,12 @@ fn matte_total(@builtin(local_invocation_index) thread: u32) {
     if thread == BLOCK - 1u {
         let all = before + own;
         if AGAIN == 0u {
-            // Noise: so many edges no picture has.
+            // Noise: so many edges no picture has. Of a larger jump there are fewer.
+            counts[FOUND_EDGES] = all;
             counts[EDGES] = select(all, 0u, all > frame.most);
             counts[NEXT] = counts[EDGES];
         } else {
-            mixed[0] = vec4(all, 0u, 0u, 0u);
+            mixed[0] = vec4(all, counts[FOUND_EDGES], 0u, 0u);
         }
     }
     for (var k = begin; k < end; k++) {

@@ -64,7 +64,8 @@ fn matte_trace(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups)
             let parent = atomicLoad(&places[other.y * frame.size.x + other.x]) & ~ENTERED;
             surfaces = vec2(entries[parent].near, entries[parent].far);
         }
-        if enter(cell, cells[number].answered, count, thread, is_chosen, entry, at, surfaces, STEP * turn.at) {
+        if enter(cell, cells[number].answered, count, thread, is_chosen, entry, at, surfaces,
+                 OUTLINE * BEYOND + STEP * turn.at) {
             let share = share_at(entry, prior, 0u);
             entries[entry].share = share;
             if share >= TRACED_FROM {

@@ -173,6 +173,27 @@ fn what_cannot_have_a_matte_has_none() {
     }
 }
 
+#[test]
+fn of_more_edges_than_a_picture_has_those_of_the_largest_jumps_stay() {
+    // Steps of 0.1 in 1/m between all columns, and one of more than 0.5.
+    let inverse = |x: u32| if x < SIZE.0 / 2 { 1.0 } else { 0.2 } + 0.1 * (x % 2) as f32;
+    let mut map = depth(SIZE.0, SIZE.1, |x, _| inverse(x).recip());
+    let picture = color(SIZE.0, SIZE.1, |x, _| {
+        if x < SIZE.0 / 2 {
+            [200, 60, 40]
+        } else if x > SIZE.0 / 2 {
+            [30, 60, 90]
+        } else {
+            [110, 60, 66]
+        }
+    });
+    Matting::default().find(&mut map, &picture, JUMP);
+    assert!(map.matte.pixels.len() >= SIZE.1 as usize, "{}", map.matte.pixels.len());
+    for pixel in &map.matte.pixels {
+        assert!(place(pixel).0.abs_diff(SIZE.0 / 2) < 3, "{pixel:?}");
+    }
+}
+
 fn blur(map: &DepthMap, picture: &ColorImage, field: &CocField, quality: Quality) -> ColorImage {
     let settings = bokehcam::bokeh::Settings { quality, ..settings(CocKind::Depth) };
     let mut out = ColorImage::default();

@@ -47,6 +47,8 @@ const NEARLY_PURE: f32 = 0.98;
 
 /// So many pixels away from an edge, at most.
 const MOST_STEPS: usize = 16;
+/// Where there are too many edges, only those of a jump twice as large are looked at, and so on, so many times.
+const MOST_DOUBLINGS: usize = 8;
 /// Fewer pixels are not worth another thread.
 const LEAST_PIXELS: usize = 256;
 
@@ -69,6 +71,8 @@ pub struct Matting {
     traced: Vec<u64>,
     /// The next map and its picture.
     on_device: Option<DeviceFrame>,
+    /// Whether it was said that there are too many edges.
+    is_noise_said: bool,
     /// Finds them in the processor's place, as long as the device does not fail.
     #[cfg(feature = "gpu")]
     gpu: UntilFault<gpu::GpuMatting>,
@@ -148,6 +152,7 @@ impl Default for Matting {
             order: Vec::new(),
             traced: Vec::new(),
             on_device: None,
+            is_noise_said: false,
             #[cfg(feature = "gpu")]
             gpu: UntilFault::default(),
         }
@@ -184,7 +189,8 @@ impl Matting {
     }
 
     /// Finds the mixed pixels of a map as large as its picture, beside jumps of inverse depth of more than `jump`, in 1/m.
-    /// Of another size, or where `jump` is not finite, or with more edges than [`Matte::most`], it has none.
+    /// Of another size, or where `jump` is not finite, it has none; with more edges than [`Matte::most`] it has those beside the
+    /// largest jumps.
     pub fn find(&mut self, map: &mut DepthMap, color: &ColorImage, jump: f32) {
         self.find_before(&mut ThreadPool::new("matte", 1), (map, color), jump, None);
     }
@@ -205,20 +211,40 @@ impl Matting {
         }
         #[cfg(not(feature = "gpu"))]
         let _ = on_device;
+        let most = Matte::most(map.width as usize, map.height as usize);
+        let asked = jump;
+        let jumps = || std::iter::successors(Some(asked), |jump| Some(2.0 * jump)).take(MOST_DOUBLINGS);
+        let is_noise_said = &mut self.is_noise_said;
+        let mut say = |jump: f32| {
+            if jump > asked && !std::mem::replace(is_noise_said, true) {
+                tracing::warn!(
+                    "the depth has jumps nearly everywhere: outlines are taken apart only where it jumps most"
+                );
+            }
+        };
         #[cfg(feature = "gpu")]
-        if self.gpu.did("finds mattes", |gpu| gpu.find((map, color), on_device, jump, behind)) {
+        if self.gpu.did("finds mattes", |gpu| {
+            for jump in jumps() {
+                if gpu.find((map, color), on_device.clone(), jump, behind)? <= most {
+                    say(jump);
+                    break;
+                }
+            }
+            Ok(())
+        }) {
             return;
         }
         map.matte.pixels.clear();
         let Self { arch, light, at_edge, survey, edges, pixels, clusters, evidence, wide, order, traced, .. } = self;
         let arch = *arch;
-        survey.find((arch, workers), map, jump, (at_edge, edges));
         let size = (map.width as usize, map.height as usize);
-        let most = Matte::most(size.0, size.1);
-        if edges.len() > most {
-            // Noise: so many edges no picture has.
-            return;
-        }
+        let fits = |jump: &f32| {
+            survey.find((arch, workers), map, *jump, (at_edge, edges));
+            edges.len() <= most
+        };
+        // Noise has more edges than any picture has: those beside the largest jumps are what counts.
+        let Some(jump) = jumps().find(fits) else { return };
+        say(jump);
         clusters.clear(size);
         pixels.clear();
         pixels.extend(edges.iter().map(|edge| Pixel::new(*edge, clusters.ask(jump, edge))));

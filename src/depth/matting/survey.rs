@@ -118,6 +118,9 @@ impl WithSimd for FindEdges<'_> {
                 for place in places(*word) {
                     let [x, y] = [(begin + place) as u32, y as u32];
                     let mut edge = EdgePixel { x, y, near: near[place], far: far[place], labels: Labels::default() };
+                    let own = three[1][place + 1];
+                    // The surface that is seen beside a nearer one is its own, even where a third one is farther.
+                    edge.far = if edge.near - own > jump { own } else { edge.far };
                     edge.labels = labels(&edge, &three, place + 1, (width, height));
                     edges.push(edge);
                 }
@@ -204,16 +207,16 @@ fn labels(edge: &EdgePixel, rows: &[[f32; WIDE]; 3], at: usize, (width, height):
     let is_near = rows[1][at] > middle;
     // No branches; what is beyond the picture is no neighbour.
     let (columns, lines) = ([x > 0, true, x + 1 < width], [y > 0, true, y + 1 < height]);
-    let (mut borders, mut alike) = (false, 0);
-    for (row, is_line) in rows.iter().zip(lines) {
-        for (inverse, is_column) in row[at - 1..][..3].iter().zip(columns) {
-            let is_alike = (*inverse > middle) == is_near;
-            alike += u32::from(is_alike & is_line & is_column);
+    let (mut borders, mut sides, mut alike) = (false, 0, 0);
+    for (k, (row, is_line)) in rows.iter().zip(lines).enumerate() {
+        for (j, (inverse, is_column)) in row[at - 1..][..3].iter().zip(columns).enumerate() {
+            let (is_side, is_alike) = ((k + j) % 2 == 1, (*inverse > middle) == is_near);
+            let counts = u32::from(is_alike & is_line & is_column);
+            alike += counts;
+            sides += if is_side { counts } else { 0 };
+            borders |= is_side & !is_alike;
         }
     }
-    for inverse in [rows[0][at], rows[2][at], rows[1][at - 1], rows[1][at + 1]] {
-        borders |= (inverse > middle) != is_near;
-    }
-    // Itself, and two neighbours in a row.
-    Labels { is_near, borders, is_thin: is_near && alike <= 3 }
+    // Less the pixel itself.
+    Labels::new(is_near, borders, sides, alike - sides - 1)
 }

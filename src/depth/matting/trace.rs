@@ -12,7 +12,7 @@ use crate::depth::bits::{Bits, places};
 use crate::frame::DepthMap;
 
 /// Neighbours of a pixel with this share are looked at, too, where the map has no edge.
-pub const TRACED_FROM: f32 = 0.15;
+pub const TRACED_FROM: f32 = 0.1;
 
 /// Follows thin things, such as hair, to where the depth map has nothing of them: from pixels that show something near though
 /// the map has none there, to neighbours that do so, too (hysteresis, as edges are traced).
@@ -55,7 +55,7 @@ impl WithSimd for Trace<'_> {
                     }
                     at_edge.set(x, y);
                     marked += 1;
-                    let next = EdgePixel { x: x as u32, y: y as u32, labels: Labels::default(), ..edge };
+                    let next = EdgePixel { x: x as u32, y: y as u32, labels: Labels::BEYOND, ..edge };
                     let asked = clusters.asked();
                     let answer = clusters.ask(jump, &next);
                     if answer as usize == asked {

@@ -75,7 +75,8 @@ impl GpuMatting {
     }
 
     /// Finds the mixed pixels of a map as large as its picture, as [`super::Matting::find_before`] does. What is `on_device` is
-    /// that map and picture; where another device has them, they go up.
+    /// that map and picture; where another device has them, they go up. How many edges there are; with more than
+    /// [`Matte::most`], none of them was looked at.
     ///
     /// # Errors
     /// The device failed, or has no room; the map has no mixed pixels.
@@ -85,7 +86,7 @@ impl GpuMatting {
         on_device: Option<DeviceFrame>,
         jump: f32,
         behind: Option<&Behind>,
-    ) -> Result<(), GpuError> {
+    ) -> Result<usize, GpuError> {
         let Self { device, lights, work } = self;
         device.check()?;
         if work.as_ref().is_none_or(|work| work.size != map.size()) {
@@ -93,7 +94,7 @@ impl GpuMatting {
             *work = None;
             *work = Some(Work::new(device, map.size())?);
         }
-        let Some(work) = work else { return Ok(()) };
+        let Some(work) = work else { return Ok(0) };
         if let Some(behind) = behind {
             for (code, lights) in lights.iter_mut().enumerate() {
                 (0..3).for_each(|p| lights[1 + p] = behind.light[p][code]);
@@ -118,7 +119,7 @@ impl Work {
         (map, color, on_device): (&mut DepthMap, &ColorImage, Option<DeviceFrame>),
         jump: f32,
         behind: Option<&Behind>,
-    ) -> Result<(), GpuError> {
+    ) -> Result<usize, GpuError> {
         let (b, Extent { pixels, most, .. }) = (&self.buffers, Extent::new(self.size));
         let (known, other) = behind.map_or((0, 0.0), |behind| (behind.known.into(), behind.other));
         let frame = Frame { size: [self.size.0, self.size.1], most: most as u32, known, jump, other };
@@ -144,33 +145,34 @@ impl Work {
             .iter()
             .for_each(|buffer| recorder.encoder.clear_buffer(buffer, 0, None));
         self.passes.record(&mut recorder);
-        let found = fetch(&mut self.buffers, device, recorder, map, self.expected.min(most))?;
+        let [found, edges] = fetch(&mut self.buffers, device, recorder, map, self.expected.min(most))?;
         if found > map.matte.pixels.len() {
             fetch(&mut self.buffers, device, Recorder::new(device, None), map, found)?;
         }
         self.expected = found + found / 4 + 256;
-        Ok(())
+        Ok(edges)
     }
 }
 
-/// Takes the mixed pixels, up to so many, once what is recorded has run; how many there are.
+/// Takes the mixed pixels, up to so many, once what is recorded has run; how many there are, and how many edges.
 fn fetch(
     b: &mut Buffers,
     device: &Device,
     recorder: Recorder,
     map: &mut DepthMap,
     most: usize,
-) -> Result<usize, GpuError> {
+) -> Result<[usize; 2], GpuError> {
     const EACH: usize = size_of::<MixedPixel>();
     recorder.fetch(device, &mut b.readback, (&b.mixed, ((1 + most) * EACH) as u64), |bytes| {
         // Their number is where one more would be.
         let (head, bytes) = bytes.split_at(EACH);
-        let found = u32::from_le_bytes([head[0], head[1], head[2], head[3]]) as usize;
+        let [found, edges] =
+            [0, 4].map(|at| u32::from_le_bytes([head[at], head[at + 1], head[at + 2], head[at + 3]]) as usize);
         let pixels = &mut map.matte.pixels;
         pixels.resize(found.min(most), MixedPixel::default());
         let out: &mut [u8] = bytemuck::cast_slice_mut(pixels);
         let length = out.len();
         out.copy_from_slice(&bytes[..length]);
-        found
+        [found, edges]
     })
 }

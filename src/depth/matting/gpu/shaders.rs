@@ -6,9 +6,7 @@ use super::super::clusters::{
     AT_EDGE_WEIGHT, CELL_PX, CLOSE_PX, CLOSE_WEIGHT, FRINGE_PIXELS, FRINGE_SHARE, FRINGE_SHARES, HALF_PX, REACHES_CELLS,
 };
 use super::super::contrast::{MOST_DEVIATION, MOST_PRECISION, QUANTISATION, SHRINKAGE};
-use super::super::share::{
-    AT_CORNER, LEAST, LEAST_OFF_LINE, OUTLIER, PRIOR, PRIOR_FLOOR, PRIOR_MOST, PRIOR_ROUNDS, STEPS,
-};
+use super::super::share::{LEAST, LEAST_OFF_LINE, OUTLIER, PRIOR, PRIOR_FLOOR, PRIOR_MOST, PRIOR_ROUNDS, STEPS};
 use super::super::trace::TRACED_FROM;
 use super::super::{MOST_STEPS, NEARLY_PURE};
 use crate::compute::device::{Shader, shader};
@@ -60,7 +58,7 @@ pub fn turns(count: usize) -> u32 {
 const _: () = assert!(CELL_PX == 8 && CLOSE_PX == 3 && STEPS == 9 && MOST_STEPS < 20);
 
 /// The `override` constants of `matte_common.wgsl`; `again` for the second run of a pass.
-pub fn constants(again: bool) -> [(&'static str, f64); 32] {
+pub fn constants(again: bool) -> [(&'static str, f64); 31] {
     [
         ("AGAIN", u8::from(again).into()),
         ("LEAST_BITS", DepthMap::LEAST_M.to_bits().into()),
@@ -81,7 +79,6 @@ pub fn constants(again: bool) -> [(&'static str, f64); 32] {
         ("MOST_DEVIATION", MOST_DEVIATION.into()),
         ("MOST_CERTAINTY", MOST_PRECISION.into()),
         ("OUTLIER", OUTLIER.into()),
-        ("AT_CORNER", AT_CORNER.into()),
         ("LEAST", LEAST.into()),
         ("LEAST_OFF_LINE", LEAST_OFF_LINE.into()),
         ("FIRST_MIXED", PRIOR.mixed.into()),
