@@ -143,7 +143,10 @@ fn mattes_agree_whatever_the_noise() {
     let count = |noise| same(&device, &format!("{noise}"), ONE_IN, &[scene((200, 150), 2, noise)]);
     let counts = [0.0, 0.01, 0.05, 0.1, 0.14, 0.3, 1.5].map(count);
     assert!(counts[3] > 2 * counts[0], "more edges, more to mix: {counts:?}");
-    assert!(counts[5..] == [0; 2], "more edges than a picture has: {counts:?}");
+    assert!(
+        counts[5..].iter().all(|count| *count > counts[0]),
+        "more edges than a picture has: the largest stay, {counts:?}"
+    );
 }
 
 #[test]
