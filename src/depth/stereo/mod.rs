@@ -10,6 +10,7 @@ mod color_similarity;
 pub mod cpu;
 pub mod executor;
 mod executors;
+mod fattening;
 pub mod fixed;
 mod gaps;
 #[cfg(feature = "gpu")]

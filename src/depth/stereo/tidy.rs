@@ -1,5 +1,6 @@
 //! Post-processing: turns what an executor found into a disparity for every pixel. The left border and empty rows are
-//! filled, and the median of 3x3 pixels removes what outliers are left.
+//! filled, near things lose the rim that they are too fat by, and the median of 3x3 pixels removes what
+//! outliers are left.
 
 use std::sync::atomic::AtomicBool;
 
@@ -7,6 +8,7 @@ use pulp::{Arch, WithSimd};
 
 use super::border::Border;
 use super::color_similarity::{ColorSimilarity, Colors};
+use super::fattening::Fattening;
 use super::fixed::{FILLED, ONE};
 use super::gaps;
 use crate::compute::thread_pool::{DisjointParts, ThreadPool};
@@ -16,6 +18,9 @@ pub struct Tidy {
     width: usize,
     border: Border,
     similarity: ColorSimilarity,
+    fattening: Fattening,
+    /// The median of the filled map.
+    smooth: Vec<u16>,
     /// A flag for each row, with which [`DisjointParts`] hands it to one thread only.
     taken: Vec<AtomicBool>,
     arch: Arch,
@@ -28,6 +33,8 @@ impl Tidy {
             width,
             border: Border::new((width, height)),
             similarity: ColorSimilarity::default(),
+            fattening: Fattening::new((width, height)),
+            smooth: vec![0; width * height],
             taken: std::iter::repeat_with(AtomicBool::default).take(height).collect(),
             arch: Arch::new(),
         }
@@ -42,7 +49,7 @@ impl Tidy {
         workers: &mut ThreadPool,
         px: &mut [f32],
     ) {
-        let Self { width, border, similarity, taken, arch, .. } = self;
+        let Self { width, border, similarity, fattening, smooth, taken, arch } = self;
         let (width, arch) = (*width, *arch);
         border.fill(map, luma, width);
         if let Some(colors) = colors {
@@ -53,28 +60,43 @@ impl Tidy {
             gaps::fill_row(&mut row[..=first], 0);
         }
         gaps::fill_empty_rows(map, width);
-        let map = &*map;
-        let height = map.len() / width;
-        let out = DisjointParts::new(px, width, taken);
-        workers.run(height, &|y| {
-            let row = |y: usize| &map[y * width..(y + 1) * width];
-            let rows = [row(y.saturating_sub(1)), row(y), row((y + 1).min(height - 1))];
-            arch.dispatch(Median { rows, out: out.part(y) });
-        });
+        // What is by chance has no outline: the median comes first, and again where pixels were decided one by one.
+        median_map(map, width, (workers, arch), taken, smooth, |fixed| fixed);
+        fattening.correct(smooth, map, luma, colors, workers);
+        median_map(map, width, (workers, arch), taken, px, to_px);
     }
 }
 
-/// The median of three rows and columns; beyond the border the outermost pixels repeat.
-struct Median<'a> {
-    rows: [&'a [u16]; 3],
-    out: &'a mut [f32],
+/// Writes the median of 3x3 of each pixel of `map` to `out`, by way of `to`.
+fn median_map<T: Send>(
+    map: &[u16],
+    width: usize,
+    (workers, arch): (&mut ThreadPool, Arch),
+    taken: &mut [AtomicBool],
+    out: &mut [T],
+    to: impl Fn(u16) -> T + Copy + Sync,
+) {
+    let height = map.len() / width;
+    let out = DisjointParts::new(out, width, taken);
+    workers.run(height, &|y| {
+        let row = |y: usize| &map[y * width..(y + 1) * width];
+        let rows = [row(y.saturating_sub(1)), row(y), row((y + 1).min(height - 1))];
+        arch.dispatch(Median { rows, out: out.part(y), to });
+    });
 }
 
-impl WithSimd for Median<'_> {
+/// The median of three rows and columns; beyond the border the outermost pixels repeat.
+struct Median<'a, T, F> {
+    rows: [&'a [u16]; 3],
+    out: &'a mut [T],
+    to: F,
+}
+
+impl<T, F: Fn(u16) -> T> WithSimd for Median<'_, T, F> {
     type Output = ();
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, _: S) {
-        let Self { rows: [above, here, below], out } = self;
+        let Self { rows: [above, here, below], out, to } = self;
         let width = out.len();
         let at = |x: usize| {
             let (before, after) = (x.saturating_sub(1), (x + 1).min(width - 1));
@@ -82,7 +104,7 @@ impl WithSimd for Median<'_> {
             for (k, row) in [above, here, below].into_iter().enumerate() {
                 (nine[3 * k], nine[3 * k + 1], nine[3 * k + 2]) = (row[before], row[x], row[after]);
             }
-            median_px(nine)
+            to(median_known(nine))
         };
         (out[0], out[width - 1]) = (at(0), at(width - 1));
         if width < 3 {
@@ -92,7 +114,7 @@ impl WithSimd for Median<'_> {
         let inner = width - 2;
         let (above, here, below) = (columns(above, inner), columns(here, inner), columns(below, inner));
         for (x, out) in out[1..=inner].iter_mut().enumerate() {
-            *out = median_px([
+            *out = to(median_known([
                 above[0][x],
                 above[1][x],
                 above[2][x],
@@ -102,7 +124,7 @@ impl WithSimd for Median<'_> {
                 below[0][x],
                 below[1][x],
                 below[2][x],
-            ]);
+            ]));
         }
     }
 }
@@ -113,14 +135,10 @@ fn columns(row: &[u16], length: usize) -> [&[u16]; 3] {
     [&row[..length], &row[1..=length], &row[2..length + 2]]
 }
 
-/// The median of nine disparities, filled in or not, in pixels.
+/// The median of nine disparities, filled in or not.
 #[inline(always)]
-fn median_px(nine: [u16; 9]) -> f32 {
-    let mut plain = nine;
-    for d in &mut plain {
-        *d &= !FILLED;
-    }
-    to_px(median(plain))
+fn median_known(nine: [u16; 9]) -> u16 {
+    median(nine.map(|d| d & !FILLED))
 }
 
 /// Pixels from fixed point, above 0: 0 would mean unknown, and a disparity of 0 is known.

@@ -1,0 +1,84 @@
+//! The picture whose colours say where surfaces end, channel by channel.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use crate::compute::thread_pool::{DisjointParts, ThreadPool};
+use crate::depth::stereo::color_similarity::Colors;
+
+/// Memory for the channels of a picture.
+pub struct Guide {
+    /// `[row][channel][column]`.
+    channels: Vec<u8>,
+    pixels: usize,
+}
+
+/// A picture of the size of a map.
+#[derive(Clone, Copy)]
+pub struct Channels<'a> {
+    /// `[row][channel][column]`.
+    values: &'a [u8],
+    width: usize,
+    /// Rows have three channels, or one.
+    pub is_color: bool,
+}
+
+impl Guide {
+    /// For maps of so many pixels.
+    pub fn new(pixels: usize) -> Self {
+        Self { channels: Vec::with_capacity(3 * pixels), pixels }
+    }
+
+    /// The channels of `colors`, or `luma` where there are none or all are alike.
+    pub fn of<'a>(
+        &'a mut self,
+        luma: &'a [u8],
+        colors: Option<Colors>,
+        width: usize,
+        workers: &mut ThreadPool,
+        taken: &mut [AtomicBool],
+    ) -> Channels<'a> {
+        let grey = Channels { values: luma, width, is_color: false };
+        let Some(Colors { image, every }) = colors else { return grey };
+        self.channels.resize(3 * self.pixels, 0);
+        let is_color = AtomicBool::new(false);
+        let rows = DisjointParts::new(&mut self.channels, 3 * width, taken);
+        workers.run(self.pixels / width, &|y| {
+            let row = &image.rgb[3 * image.width as usize * every * y..];
+            let [red, green, blue] = split(rows.part(y), width);
+            let mut differ = 0;
+            let mut take = |x: usize, pixel: &[u8]| {
+                (red[x], green[x], blue[x]) = (pixel[0], pixel[1], pixel[2]);
+                differ |= (pixel[0] ^ pixel[1]) | (pixel[1] ^ pixel[2]);
+            };
+            // Steps of a known length are a third of the time.
+            if every == 1 {
+                row[..3 * width].as_chunks::<3>().0.iter().enumerate().for_each(|(x, pixel)| take(x, pixel));
+            } else {
+                row.chunks(3 * every).take(width).enumerate().for_each(|(x, pixel)| take(x, pixel));
+            }
+            if differ != 0 {
+                is_color.store(true, Ordering::Relaxed);
+            }
+        });
+        if is_color.into_inner() { Channels { values: &self.channels, width, is_color: true } } else { grey }
+    }
+}
+
+fn split(row: &mut [u8], width: usize) -> [&mut [u8]; 3] {
+    let (red, others) = row.split_at_mut(width);
+    let (green, blue) = others.split_at_mut(width);
+    [red, green, &mut blue[..width]]
+}
+
+impl<'a> Channels<'a> {
+    /// The channels of row `y`: red, green and blue, or three times the brightness.
+    #[inline(always)]
+    pub fn row(&self, y: usize) -> [&'a [u8]; 3] {
+        let Self { values, width, .. } = *self;
+        if self.is_color {
+            [0, 1, 2].map(|channel| &values[(3 * y + channel) * width..][..width])
+        } else {
+            [&values[y * width..][..width]; 3]
+        }
+    }
+}
