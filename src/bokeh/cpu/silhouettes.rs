@@ -6,6 +6,7 @@
 
 #![allow(clippy::needless_range_loop)] // Lanes index two arrays at once.
 
+use std::ops::Range;
 use std::sync::atomic::AtomicBool;
 
 use pulp::Arch;
@@ -89,6 +90,18 @@ impl Silhouettes {
                 }
             });
         });
+    }
+
+    /// Whether a silhouette may reach any pixel of a chunk of some rows, from column `x0` on: without, [`Self::reaching`] is `None`
+    /// in all of them.
+    #[inline(always)]
+    pub fn may_reach(&self, rows: Range<usize>, x0: usize) -> bool {
+        let mut rows = (rows.start / GRAIN).saturating_sub(1)..(rows.end.div_ceil(GRAIN) + 1).min(self.down);
+        let columns = (x0 / GRAIN).saturating_sub(1)..((x0 + CHUNK) / GRAIN + 1).min(self.across);
+        rows.any(|row| {
+            let line = &self.reached[row * SHOWS * self.across..][..self.across];
+            line[columns.clone()].iter().any(|&square| square > 0.0)
+        })
     }
 
     /// How far silhouettes reach some pixels of row `y` from column `x0` on, a multiple of the grain: of any silhouette, and of
