@@ -47,13 +47,17 @@ impl<T: Sample> WithSimd for Composite<'_, T> {
         let row_of_tiles = self.y0 / TILE_H * self.tiles.across;
         let out = std::mem::take(&mut self.out);
         self.layers.begin(self.plan.near_to());
+        let layered = self.plan.compositing == Compositing::Layers;
         let (mut color, mut coc_px) = (Line([[0.0; CHUNK]; 3]), [0.0; CHUNK]);
         for x0 in (0..width).step_by(CHUNK) {
             let take = CHUNK.min(width - x0);
             let tiles = row_of_tiles + x0 / TILE_W..row_of_tiles + (x0 + take).div_ceil(TILE_W);
+            let ranges = &self.tiles.ranges[tiles.clone()];
             let still = self.tiles.still[tiles].iter().all(|&still| still);
+            let rows = self.y0..self.y0 + (out.len() / (width * 3)).max(1);
+            let may_reach = layered && self.silhouettes.may_reach(rows.clone(), x0);
             if x0 + CHUNK < width {
-                self.prefetch(x0 + CHUNK, (out.len() / (width * 3)).max(1));
+                self.prefetch(x0 + CHUNK, rows.len());
             }
             for (dy, row) in out.chunks_exact_mut(width * 3).enumerate() {
                 let y = self.y0 + dy;
@@ -64,11 +68,12 @@ impl<T: Sample> WithSimd for Composite<'_, T> {
                             row.copy_from_slice(&self.pixels[(y * width + x0) * 3..][..take * 3]);
                             continue;
                         }
-                        let reaching = self.silhouettes.reaching(y, x0);
-                        if self.layers.count() > 1 {
+                        let reaching = if may_reach { self.silhouettes.reaching(y, x0) } else { None };
+                        let of_one_surface = reaching.is_none() && self.layers.are_of_one_surface(ranges);
+                        if !of_one_surface {
                             coc_row(self.frame, y, x0, &mut coc_px[..take]);
                         }
-                        self.layers.flatten(simd, &reaching, &coc_px, &mut color);
+                        self.layers.flatten(simd, &reaching, &coc_px, of_one_surface, &mut color);
                     }
                     Compositing::Select => self.select(simd, y, x0, take, &mut color.0),
                     Compositing::Gather => copy_gathered(self.gathered, width, y, x0, &mut color.0),

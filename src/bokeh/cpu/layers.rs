@@ -16,6 +16,10 @@ use crate::bokeh::plan::{Bin, HINDMOST_COVERAGE, MAX_BINS};
 use crate::compute::aligned::Line;
 use crate::compute::simd::{fma, load, store};
 
+/// Bins less than this step away are of a pixel's own surface: a little less than where they begin to count less, so that rounding
+/// does not matter.
+const ONE_SURFACE: f32 = 0.49;
+
 /// Bins composited front to back at some pixels: each covers what is still open.
 #[derive(Clone, Copy)]
 struct Pile<S: Simd> {
@@ -94,20 +98,22 @@ impl Layers {
         Self { planes, ranges_px: [(0.0, 0.0); MAX_BINS], near: 0, count: 0, near_to_px: -1.0, near_slope: 1.0 }
     }
 
-    /// Composites the layers to linear light, at pixels of such CoC that silhouettes reach so far.
+    /// Composites the layers to linear light, at pixels of such CoC that silhouettes reach so far. Where all are
+    /// `of_one_surface`, away from silhouettes, no CoC is needed.
     #[inline(always)]
     pub fn flatten<S: Simd>(
         &self,
         simd: S,
         reaching: &Option<Reaching>,
         coc_px: &[f32; CHUNK],
+        of_one_surface: bool,
         color: &mut Line<[[f32; CHUNK]; 3]>,
     ) {
         let zero = simd.splat_f32s(0.0);
         for x in (0..CHUNK).step_by(S::F32_LANES) {
             let light = match reaching.as_ref().and_then(|reaching| reaching.pixels(x, S::F32_LANES)) {
                 Some(squares) => self.beside_silhouettes(simd, &squares, load::<S>(coc_px, x), x),
-                None => self.away(simd, load::<S>(coc_px, x), x),
+                None => self.away(simd, load::<S>(coc_px, x), of_one_surface, x),
             };
             for p in 0..3 {
                 store::<S>(&mut color.0[p], x, simd.max_f32s(light[p], zero));
@@ -117,8 +123,8 @@ impl Layers {
 
     /// Away from all silhouettes: a pixel's own surface.
     #[inline(always)]
-    fn away<S: Simd>(&self, simd: S, coc_px: S::f32s, x: usize) -> [S::f32s; 3] {
-        let (mut light, is_thin) = self.own_surface(simd, coc_px, x);
+    fn away<S: Simd>(&self, simd: S, coc_px: S::f32s, of_one_surface: bool, x: usize) -> [S::f32s; 3] {
+        let (mut light, is_thin) = self.own_surface(simd, coc_px, of_one_surface, x);
         if simd.first_true_m32s(is_thin) < S::F32_LANES {
             let all = self.all_surfaces(simd, simd.splat_f32s(1.0), x);
             for p in 0..3 {
@@ -154,7 +160,7 @@ impl Layers {
         if simd.first_true_m32s(simd.less_than_f32s(shows[0], one)) == S::F32_LANES {
             return self.all_surfaces(simd, back_shows, x);
         }
-        let (own, is_thin) = self.own_surface(simd, coc_px, x);
+        let (own, is_thin) = self.own_surface(simd, coc_px, self.count < 2, x);
         let mut light = self.all_surfaces(simd, simd.select_f32s(is_thin, one, back_shows), x);
         let shows = simd.select_f32s(is_thin, one, shows[0]);
         for p in 0..3 {
@@ -193,6 +199,27 @@ impl Layers {
         self.count
     }
 
+    /// Whether every layer counts fully as the surface of each pixel whose CoC is in one of these ranges.
+    #[inline(always)]
+    pub fn are_of_one_surface(&self, ranges_px: &[(f32, f32)]) -> bool {
+        if self.count < 2 {
+            return true;
+        }
+        let (mut low_px, mut high_px) = ranges_px[0];
+        for range in ranges_px {
+            (low_px, high_px) = (low_px.min(range.0), high_px.max(range.1));
+        }
+        // Steps grow away from a layer's CoC, without turns on either side of the focal plane.
+        let turns_px = [low_px, high_px, low_px.max(0.0).min(high_px)];
+        let mut most = 0.0_f32;
+        for &(from_px, to_px) in &self.ranges_px[..self.count] {
+            for px in turns_px {
+                most = most.max((from_px - px).max(px - to_px) / (px.abs() + 1.0));
+            }
+        }
+        most < ONE_SURFACE
+    }
+
     /// The near layers over the others, as far as these show (0 to 1); else the near ones have to fill the pixel.
     #[inline(always)]
     fn all_surfaces<S: Simd>(&self, simd: S, back_shows: S::f32s, x: usize) -> [S::f32s; 3] {
@@ -222,17 +249,23 @@ impl Layers {
         light
     }
 
-    /// What the layers have of surfaces of about this CoC, as if nothing else were there, and where that does not fill a
-    /// pixel.
+    /// What the layers have of surfaces of about this CoC, or all of them where they are `of_one_surface`, as if nothing else were
+    /// there, and where that does not fill a pixel.
     #[inline(always)]
-    fn own_surface<S: Simd>(&self, simd: S, coc_px: S::f32s, x: usize) -> ([S::f32s; 3], S::m32s) {
+    fn own_surface<S: Simd>(
+        &self,
+        simd: S,
+        coc_px: S::f32s,
+        of_one_surface: bool,
+        x: usize,
+    ) -> ([S::f32s; 3], S::m32s) {
         let (zero, one, two) = (simd.splat_f32s(0.0), simd.splat_f32s(1.0), simd.splat_f32s(2.0));
         let mut pile = Pile::new(simd);
         let inverse = simd.div_f32s(one, simd.add_f32s(simd.abs_f32s(coc_px), one));
         let slack = simd.min_f32s(simd.max_f32s(simd.neg_f32s(coc_px), zero), simd.splat_f32s(0.5));
         for (planes, &(low_px, high_px)) in self.planes[..self.count].iter().zip(&self.ranges_px) {
             let mut layer = layer(simd, planes, x);
-            if self.count > 1 {
+            if !of_one_surface {
                 // In front, what is nearer is blurred more, and so reaches farther.
                 let farther = simd.mul_f32s(simd.sub_f32s(simd.splat_f32s(low_px), coc_px), inverse);
                 let nearer = simd.mul_f32s(simd.sub_f32s(coc_px, simd.splat_f32s(high_px)), inverse);

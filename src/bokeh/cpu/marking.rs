@@ -3,19 +3,22 @@
 use pulp::{Simd, WithSimd};
 
 use super::pixels::Radii;
-use super::silhouettes::NONE;
+use super::silhouettes::{NONE, highest};
+use super::tiles::TILE_W;
 use super::unpack::{Source, coc_row};
 use crate::bokeh::occlusion::{self, GRAIN, SHOWS, Silhouette};
 use crate::optics::{CocField, DepthCoc};
 
-/// Pixels that are looked at together.
-const CHUNK: usize = 64;
+/// Pixels that are looked at together: a row of a tile.
+const CHUNK: usize = TILE_W;
 /// What is not measured, or farther than this, counts as this far, in metres.
 const FAR_M: f32 = 1e6;
 
-/// Marks the silhouettes of some rows of the picture.
+/// Marks the silhouettes of a row of tiles.
 pub struct Marking<'a> {
     pub source: &'a Source<'a>,
+    /// The CoC in each of the tiles.
+    pub ranges: &'a [(f32, f32)],
     /// The rows of the picture, and those of the grid over them.
     pub rows: std::ops::Range<usize>,
     pub marks: &'a mut [f32],
@@ -45,6 +48,10 @@ impl WithSimd for Marking<'_> {
             for x0 in (0..width).step_by(CHUNK) {
                 let take = CHUNK.min(width - x0);
                 let with_next = (take + 1).min(width - x0);
+                // Within a tile, and to the next one, nothing jumps by more than what they range over.
+                if next < self.rows.end && span_px(&self.ranges[x0 / TILE_W..]) < least_px {
+                    continue;
+                }
                 if let Some((lens, metres)) = metres {
                     let (a, b) = (&metres[y * width + x0..][..with_next], &metres[next * width + x0..][..take]);
                     if !jumps(lens, least_px, &a[..take], b) && !jumps(lens, least_px, &a[..with_next - 1], &a[1..]) {
@@ -85,6 +92,14 @@ impl WithSimd for Marking<'_> {
     }
 }
 
+/// How far the CoC of the first two of some tiles lie apart at most.
+#[inline(always)]
+fn span_px(ranges: &[(f32, f32)]) -> f32 {
+    let (low_px, high_px) = ranges[0];
+    let (next_low_px, next_high_px) = ranges[1.min(ranges.len() - 1)];
+    high_px.max(next_high_px) - low_px.min(next_low_px)
+}
+
 #[inline(always)]
 fn mark(row: &mut [f32], across: usize, x: usize, silhouette: Option<Silhouette>) {
     let Some(silhouette) = silhouette else { return };
@@ -92,18 +107,6 @@ fn mark(row: &mut [f32], across: usize, x: usize, silhouette: Option<Silhouette>
     for (plane, px) in row.chunks_exact_mut(across).zip(reaches_px) {
         plane[x / GRAIN] = plane[x / GRAIN].max(px);
     }
-}
-
-/// The highest of some values, a multiple of 16 of them.
-#[inline(always)]
-fn highest(values: &[f32]) -> f32 {
-    let mut highest = [f32::MIN; 16];
-    for values in values.as_chunks::<16>().0 {
-        for k in 0..16 {
-            highest[k] = if values[k] > highest[k] { values[k] } else { highest[k] };
-        }
-    }
-    highest.into_iter().fold(f32::MIN, f32::max)
 }
 
 /// Whether the CoC may jump by `least_px` between any two of these, in metres. Without a division: the CoC is linear in

@@ -179,9 +179,10 @@ impl CpuBokeh {
                         Radii::Each(coc_px) => plan.part(0)[0].split_radii(coc_px),
                     };
                 };
-                arch.dispatch(Survey { source: frame, row, ranges: ranges.part(row), coc: &mut member.coc });
+                let ranges = ranges.part(row);
+                arch.dispatch(Survey { source: frame, row, ranges: &mut *ranges, coc: &mut member.coc });
                 let rows = row * TILE_H..((row + 1) * TILE_H).min(frame.size.1);
-                arch.dispatch(Marking { source: frame, rows, marks: marks.part(row), near_from_px });
+                arch.dispatch(Marking { source: frame, ranges, rows, marks: marks.part(row), near_from_px });
             });
             self.silhouettes.spread(&mut self.workers, arch);
         }

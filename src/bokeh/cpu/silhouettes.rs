@@ -4,6 +4,9 @@
 //! aperture is that one surface: a ray at CoC `c` lies `|c|` from the pixel, so nothing farther than the radius at the
 //! silhouette can come from behind it. On a coarse grid, each jump marks how far that is; the marks spread over it.
 
+#![allow(clippy::needless_range_loop)] // Lanes index two arrays at once.
+
+use std::ops::Range;
 use std::sync::atomic::AtomicBool;
 
 use pulp::Arch;
@@ -26,6 +29,8 @@ pub struct Silhouettes {
     marks: Vec<f32>,
     /// The squares of the reaches less those of the distances, along a row: the largest of any silhouette.
     along: Vec<f32>,
+    /// The largest along each line, `[row][SHOWS]`.
+    tops: Vec<f32>,
     /// The same over rows and columns: above 0 where a silhouette reaches a cell.
     reached: Vec<f32>,
     taken: Vec<AtomicBool>,
@@ -37,7 +42,8 @@ impl Silhouettes {
         let (across, down) = (width.div_ceil(GRAIN), height.div_ceil(GRAIN));
         let cells = vec![NONE; across * SHOWS * down];
         let taken = std::iter::repeat_with(|| AtomicBool::new(false)).take(down).collect();
-        Self { across, down, marks: cells.clone(), along: cells.clone(), reached: cells, taken }
+        let tops = vec![NONE; SHOWS * down];
+        Self { across, down, marks: cells.clone(), along: cells.clone(), tops, reached: cells, taken }
     }
 
     /// The marks, to be made in parts of so many rows of the picture, whole rows of the grid.
@@ -59,21 +65,43 @@ impl Silhouettes {
                 }
             });
         });
-        let along = &self.along;
-        let reach = cells_within(most(along));
+        arch.dispatch(|| {
+            for (top, line) in self.tops.iter_mut().zip(self.along.chunks_exact(across)) {
+                *top = highest(line);
+            }
+        });
+        let (along, tops) = (&self.along, &self.tops);
+        let reach = cells_within(highest(tops));
         let parts = DisjointParts::new(&mut self.reached, PART * row_len, &mut self.taken);
         workers.run(down.div_ceil(PART), &|part| {
             let rows = parts.part(part);
             arch.dispatch(|| {
-                for (y, out) in (part * PART..).zip(rows.chunks_exact_mut(row_len)) {
+                for (line, out) in (part * PART * SHOWS..).zip(rows.chunks_exact_mut(across)) {
+                    let (y, plane) = (line / SHOWS, line % SHOWS);
                     out.fill(NONE);
                     for other in y.saturating_sub(reach)..(y + reach + 1).min(down) {
-                        let distance_px = (other.abs_diff(y) * GRAIN) as f32;
-                        keep_highest(out, &along[other * row_len..][..row_len], distance_px * distance_px);
+                        let (from, distance_px) = (other * SHOWS + plane, (other.abs_diff(y) * GRAIN) as f32);
+                        let distance_square = distance_px * distance_px;
+                        // Most lines hold no silhouette, or none that reaches so far.
+                        if tops[from] - distance_square > NONE {
+                            keep_highest(out, &along[from * across..][..across], distance_square);
+                        }
                     }
                 }
             });
         });
+    }
+
+    /// Whether a silhouette may reach any pixel of a chunk of some rows, from column `x0` on: without, [`Self::reaching`] is `None`
+    /// in all of them.
+    #[inline(always)]
+    pub fn may_reach(&self, rows: Range<usize>, x0: usize) -> bool {
+        let mut rows = (rows.start / GRAIN).saturating_sub(1)..(rows.end.div_ceil(GRAIN) + 1).min(self.down);
+        let columns = (x0 / GRAIN).saturating_sub(1)..((x0 + CHUNK) / GRAIN + 1).min(self.across);
+        rows.any(|row| {
+            let line = &self.reached[row * SHOWS * self.across..][..self.across];
+            line[columns.clone()].iter().any(|&square| square > 0.0)
+        })
     }
 
     /// How far silhouettes reach some pixels of row `y` from column `x0` on, a multiple of the grain: of any silhouette, and of
@@ -99,7 +127,7 @@ impl Silhouettes {
                 }
             }
         }
-        (most(&reaching.0[0]) > 0.0).then_some(reaching)
+        (highest(&reaching.0[0]) > 0.0).then_some(reaching)
     }
 
     /// The cells of row `y` of the picture: above 0 where something behind a silhouette can be seen, and where what a
@@ -143,8 +171,17 @@ impl Reaching {
     }
 }
 
-fn most(values: &[f32]) -> f32 {
-    values.iter().fold(NONE, |most, &value| if value > most { value } else { most })
+/// The highest of some values.
+#[inline(always)]
+pub fn highest(values: &[f32]) -> f32 {
+    let mut highest = [f32::MIN; 16];
+    let (vectors, rest) = values.as_chunks::<16>();
+    for values in vectors {
+        for k in 0..16 {
+            highest[k] = if values[k] > highest[k] { values[k] } else { highest[k] };
+        }
+    }
+    rest.iter().copied().chain(highest).fold(f32::MIN, f32::max)
 }
 
 /// How many cells away something can be whose reach has this square, in pixels.
@@ -152,23 +189,17 @@ fn cells_within(square: f32) -> usize {
     if square < 0.0 { 0 } else { square.sqrt() as usize / GRAIN + 1 }
 }
 
-/// Spreads the marks of a row along it.
+/// Spreads the marks of a row along it: there are few.
 #[inline(always)]
 fn spread_row(marks: &[f32], out: &mut [f32]) {
-    for (out, &px) in out.iter_mut().zip(marks) {
-        *out = if px > 0.0 { px * px } else { NONE };
-    }
-    let reach_px = most(marks);
-    if reach_px < 0.0 {
-        return;
-    }
-    for distance in 1..(cells_within(reach_px * reach_px) + 1).min(marks.len()) {
-        let (inner, distance_px) = (marks.len() - distance, (distance * GRAIN) as f32);
-        for (to, from) in [(0, distance), (distance, 0)] {
-            for (out, &px) in out[to..][..inner].iter_mut().zip(&marks[from..][..inner]) {
-                let square = if px > distance_px { px * px - distance_px * distance_px } else { NONE };
-                *out = if square > *out { square } else { *out };
-            }
+    out.fill(NONE);
+    for (x, &px) in marks.iter().enumerate().filter(|&(_, &px)| px > 0.0) {
+        let reach = cells_within(px * px);
+        let first = x.saturating_sub(reach);
+        for (to, out) in (first..).zip(&mut out[first..(x + reach + 1).min(marks.len())]) {
+            let distance_px = (to.abs_diff(x) * GRAIN) as f32;
+            let square = if px > distance_px { px * px - distance_px * distance_px } else { NONE };
+            *out = if square > *out { square } else { *out };
         }
     }
 }
