@@ -232,6 +232,7 @@ impl CocMaker {
                 }
             }
             done(if matches!(self.finisher, Finisher::Refine(_)) { "refine" } else { "fill" });
+            self.cover(map, color, &field);
             self.find_matte(map, color, &field);
             done("matte");
         }
@@ -262,6 +263,14 @@ impl CocMaker {
                 Some(background) => background.find_matte(matting, workers, (map, color), lens),
                 None => matting.find_before(workers, (map, color), jump, None),
             }
+        }
+    }
+
+    /// Looks at what stands before what is remembered, before that is used.
+    fn cover(&mut self, map: &DepthMap, color: &ColorImage, field: &CocField) {
+        let Self { background, workers, .. } = self;
+        if let (CocField::Depth(lens), Some(background), false) = (field, background, map.is_smooth) {
+            background.cover(workers, (map, color), lens);
         }
     }
 
