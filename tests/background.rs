@@ -3,6 +3,7 @@
 
 mod common;
 
+use std::ops::Range;
 use std::sync::LazyLock;
 
 use bokehcam::color::srgb_to_linear;
@@ -23,12 +24,23 @@ const PERSON: [u8; 3] = [200, 90, 60];
 const WIDE: u32 = 50;
 const STEP: u32 = 20;
 
-/// A person before a wall that is `brightness` times as bright as at first, both `shift` columns further right.
+/// A person before a wall that is `brightness` times as bright as at first, both `shift` columns further right; and, behind the
+/// person, a thing.
 struct Shot {
     person: u32,
     shift: u32,
     brightness: f32,
+    thing: Option<Thing>,
 }
+
+/// Something green, from the row [`THING_ROW`] down.
+struct Thing {
+    columns: Range<u32>,
+    metres: f32,
+}
+
+const THING_ROW: u32 = 64;
+const GREEN: [u8; 3] = [20, 160, 40];
 
 impl Shot {
     fn wall(&self, x: u32, y: u32) -> [u8; 3] {
@@ -39,6 +51,11 @@ impl Shot {
         [60 + code / 3, 80 + code / 4, 100 + code / 5].map(|code| (f32::from(code) * self.brightness) as u8)
     }
 
+    /// How far the thing is, where there is one.
+    fn thing_m(&self, x: u32, y: u32) -> Option<f32> {
+        self.thing.as_ref().filter(|thing| y >= THING_ROW && thing.columns.contains(&x)).map(|thing| thing.metres)
+    }
+
     fn is_person(&self, x: u32, y: u32) -> bool {
         y >= 20 && (self.person..self.person + WIDE).contains(&x)
     }
@@ -46,12 +63,17 @@ impl Shot {
     fn taken(&self) -> (ColorImage, DepthMap) {
         let wall: Vec<[u8; 3]> = (0..SIZE.0 * SIZE.1).map(|at| self.wall(at % SIZE.0, at / SIZE.0)).collect();
         let person = PERSON.map(|code| (f32::from(code) * self.brightness) as u8);
-        let of = |x: u32, y: u32| if self.is_person(x, y) { person } else { wall[(y * SIZE.0 + x) as usize] };
-        (color(SIZE.0, SIZE.1, of), depth(SIZE.0, SIZE.1, |x, y| if self.is_person(x, y) { 1.0 } else { 4.0 }))
+        let color_of = |x: u32, y: u32| match () {
+            () if self.is_person(x, y) => person,
+            () if self.thing_m(x, y).is_some() => GREEN,
+            () => wall[(y * SIZE.0 + x) as usize],
+        };
+        let depth_of = |x: u32, y: u32| if self.is_person(x, y) { 1.0 } else { self.thing_m(x, y).unwrap_or(4.0) };
+        (color(SIZE.0, SIZE.1, color_of), depth(SIZE.0, SIZE.1, depth_of))
     }
 }
 
-const BEFORE: Shot = Shot { person: 40, shift: 0, brightness: 1.0 };
+const BEFORE: Shot = Shot { person: 40, shift: 0, brightness: 1.0, thing: None };
 
 struct Seer {
     background: Background,
@@ -69,6 +91,7 @@ impl Seer {
         let mut last = map.clone();
         for _ in 0..frames {
             let mut workers = ThreadPool::new("background", 2);
+            self.background.cover(&mut workers, (&map, &picture), &LENS);
             self.background.learn(&mut workers, (&map, &picture), &LENS, self.time_ns);
             last.clone_from(&map);
             self.background.reveal(&mut workers, &mut last, &picture, &LENS);
@@ -115,6 +138,44 @@ fn another_exposure_makes_what_is_hidden_another_one_too() {
     let after = Shot { person: BEFORE.person + STEP, brightness: 0.85, ..BEFORE };
     let (off, count) = off(&seer.see(&after, 20), &after);
     assert!(off < 0.015 && count > 1000, "{off}, {count}");
+}
+
+/// How many pixels of the person have something known behind them, above the rows that a thing is close to and where it is.
+fn known_above_and_beside(map: &DepthMap, columns: Range<u32>) -> [usize; 2] {
+    let count = |rows: Range<u32>| {
+        let is_within = |at: u32| rows.contains(&(at / SIZE.0)) && columns.contains(&(at % SIZE.0));
+        map.matte.pixels.iter().filter(|pixel| is_within(pixel.at)).count()
+    };
+    [count(20..THING_ROW - 32), count(THING_ROW..SIZE.1)]
+}
+
+#[test]
+fn behind_who_steps_before_a_thing_is_not_the_wall_that_it_hides() {
+    let mut seer = Seer::new();
+    seer.see(&BEFORE, 40);
+    let thing = || Some(Thing { columns: 120..150, metres: 2.0 });
+    let hidden = seer.see(&Shot { thing: thing(), ..BEFORE }, 12);
+    assert!(known_above_and_beside(&hidden, 120..150)[1] > 800, "the wall is behind the thing");
+    // At once, in the first frame; and the wall does not show where the thing goes on, either.
+    let after = seer.see(&Shot { person: 90, thing: thing(), ..BEFORE }, 1);
+    let [above, beside] = known_above_and_beside(&after, 120..140);
+    assert!(above > 150 && beside == 0, "{above} pixels before the wall, and {beside} before the thing");
+    assert_eq!(known_above_and_beside(&after, 140..150), [0, 0]);
+}
+
+#[test]
+fn what_is_seen_beside_somebody_tells_of_what_is_behind_them() {
+    for metres in [2.0, 4.0] {
+        let mut seer = Seer::new();
+        seer.see(&BEFORE, 40);
+        let before = Shot { person: BEFORE.person + STEP, ..BEFORE };
+        let [above, beside] = known_above_and_beside(&seer.see(&before, 4), 90..110);
+        assert!(above > 150 && beside > 400, "{above}, {beside}");
+        // Half of the thing is behind the person: where it is, the wall is not, or looks otherwise.
+        let after = Shot { thing: Some(Thing { columns: 100..150, metres }), ..before };
+        let [above, beside] = known_above_and_beside(&seer.see(&after, 8), 94..110);
+        assert!(above > 100 && beside == 0, "{metres} m: {above} pixels before the wall, {beside} before the thing");
+    }
 }
 
 #[test]

@@ -137,6 +137,7 @@ impl CocMaker {
     /// Finishes maps with no memory of those before.
     fn renew(&mut self, finish: Finish) {
         let uses_depth = matches!(self.rule, CocRule::Depth { .. });
+        self.matting.take_from(None);
         self.finisher = Finisher::new(finish, self.mending, self.device.as_ref().filter(|_| uses_depth));
     }
 
@@ -147,6 +148,13 @@ impl CocMaker {
             self.renew(Finish::Refine);
         }
         refines
+    }
+
+    /// Finishes maps so from now on.
+    pub fn finish_by(&mut self, finish: Finish) {
+        if self.finisher.finish() != finish {
+            self.renew(finish);
+        }
     }
 
     /// Remembers from now on, or no more, what lies behind things.
@@ -172,9 +180,7 @@ impl CocMaker {
         match (std::mem::replace(&mut self.rule, rule), rule) {
             (CocRule::Depth { .. }, CocRule::Depth { focus, .. }) => {
                 self.focus.follow(focus);
-                if self.finisher.finish() != finish {
-                    self.renew(finish);
-                }
+                self.finish_by(finish);
             }
             _ => {
                 self.focus = Focus::new(focus_of(rule));
@@ -226,6 +232,7 @@ impl CocMaker {
                 }
             }
             done(if matches!(self.finisher, Finisher::Refine(_)) { "refine" } else { "fill" });
+            self.cover(map, color, &field);
             self.find_matte(map, color, &field);
             done("matte");
         }
@@ -256,6 +263,14 @@ impl CocMaker {
                 Some(background) => background.find_matte(matting, workers, (map, color), lens),
                 None => matting.find_before(workers, (map, color), jump, None),
             }
+        }
+    }
+
+    /// Looks at what stands before what is remembered, before that is used.
+    fn cover(&mut self, map: &DepthMap, color: &ColorImage, field: &CocField) {
+        let Self { background, workers, .. } = self;
+        if let (CocField::Depth(lens), Some(background), false) = (field, background, map.is_smooth) {
+            background.cover(workers, (map, color), lens);
         }
     }
 

@@ -29,13 +29,19 @@ pub struct FitCheck {
     frames: u32,
     unrelated: usize,
     mendings: Vec<(Misfit, Mending)>,
+    meets: bool,
 }
 
 impl FitCheck {
     /// For a stream of so many frames, where that is known: a picture on its own decides alone.
     pub fn of(frames: Option<u64>) -> Self {
         let decision = if frames == Some(1) { 1 } else { DECISION };
-        Self { decision, frames: 0, unrelated: 0, mendings: Vec::new() }
+        Self { decision, frames: 0, unrelated: 0, mendings: Vec::new(), meets: false }
+    }
+
+    /// Whether a frame was seen whose outlines of depth and colour meet.
+    pub fn meets(&self) -> bool {
+        self.meets
     }
 
     /// Takes the next frame, with its depth as it was measured; says so, once, when it is clear that it does not fit.
@@ -52,7 +58,7 @@ impl FitCheck {
         match misfit.and_then(|misfit| Some((misfit, misfit.mending(map, color)?))) {
             Some(mending) => self.mendings.push(mending),
             None if misfit.is_some() => self.unrelated += 1,
-            None if outlines == Agreement::Meets => self.frames = LAST,
+            None if outlines == Agreement::Meets => (self.frames, self.meets) = (LAST, true),
             None => {}
         }
         let verdict = match () {

@@ -2,9 +2,12 @@
 //!
 //! Whoever moves in front of a room uncovers some of it and covers it again: around their outline, where blur shows what is
 //! hidden, it was mostly seen a moment ago. Per pixel, the farthest surface that lasted is kept, colour and depth; it is
-//! known while it is seen or was seen often enough, and fades while it is hidden. All is forgotten when the camera moves.
+//! known while it is seen or was seen often enough, and fades while it is hidden. What is not behind a thing any more, as
+//! something else was put between, is forgotten at once; and all is when the camera moves.
 
 mod cells;
+mod cover;
+mod doubt;
 mod learning;
 mod reveal;
 
@@ -20,6 +23,7 @@ use super::bits::Bits;
 use super::matting::{Behind, FROM_PX, Matting};
 use super::reduced::{MOST, Reducer, block_px, reduced_size};
 use cells::Cells;
+use doubt::Witness;
 
 /// Surfaces are another where the CoC differs by so many pixels.
 const OTHER_PX: f32 = 2.0 * FROM_PX;
@@ -45,6 +49,8 @@ pub struct Background {
     rgb: Vec<u8>,
     inverse: Vec<f32>,
     rounds: Vec<u8>,
+    /// Inverse depth of what hides it, in 1/m; 0 where nothing does.
+    cover: Vec<f32>,
     /// A number that these three have for themselves ([`Behind::revision`]).
     revision: u64,
     frame: usize,
@@ -55,6 +61,10 @@ pub struct Background {
     reduced: Vec<[f32; 3]>,
     has: Vec<bool>,
     hidden: Vec<bool>,
+    /// Whether it is seen, and looks otherwise than remembered.
+    unlike: Vec<bool>,
+    /// What is seen beside the outlines in each cell.
+    witnesses: Vec<Witness>,
     reducer: Reducer,
     now: Vec<[f32; 3]>,
     aligner: Aligner,
@@ -78,6 +88,7 @@ impl Default for Background {
             rgb: Vec::new(),
             inverse: Vec::new(),
             rounds: Vec::new(),
+            cover: Vec::new(),
             revision: 0,
             frame: 0,
             time_ns: 0,
@@ -85,6 +96,8 @@ impl Default for Background {
             reduced: Vec::new(),
             has: Vec::new(),
             hidden: Vec::new(),
+            unlike: Vec::new(),
+            witnesses: Vec::new(),
             reducer: Reducer::default(),
             now: Vec::new(),
             aligner: Aligner::default(),
@@ -131,6 +144,8 @@ impl Background {
             return;
         }
         self.learn_rows(workers, (map, color), other);
+        self.doubt(map, color, other);
+        self.renew(map, color, other);
     }
 
     /// Finds the matte of a picture by `matting`, before what is known to lie behind.
@@ -165,6 +180,8 @@ impl Background {
         self.inverse.resize(count, 0.0);
         self.rounds.clear();
         self.rounds.resize(count, 0);
+        self.cover.clear();
+        self.cover.resize(count, 0.0);
         self.reduced.clear();
         self.gain = [1.0; 3];
         self.revise();
@@ -187,6 +204,7 @@ impl Background {
             has.clear();
             has.resize(now.len(), false);
             hidden.resize(now.len(), false);
+            self.unlike.resize(now.len(), false);
             self.aligner.forget();
         }
         let middle = |at: usize, count: usize| (at * block_px + block_px / 2).min(count - 1);
@@ -213,10 +231,11 @@ impl Background {
             codes.iter_mut().zip(0..=255).for_each(|(code, now)| *code = self.reducer.without_gain(now, gain));
         }
         let mut counts = [0usize; 2];
-        for ((now, then), _) in now.iter().zip(&*reduced).zip(&*hidden).filter(|(_, hidden)| !**hidden) {
+        for (((now, then), hidden), unlike) in now.iter().zip(&*reduced).zip(&*hidden).zip(&mut self.unlike) {
             let is_unlike =
                 (0..3).any(|p| then[p] * self.gain[p] < MOST && (now[p] - then[p] * self.gain[p]).abs() > UNLIKE);
-            counts[usize::from(is_unlike)] += 1;
+            *unlike = is_unlike & !hidden;
+            counts[usize::from(is_unlike)] += usize::from(!hidden);
         }
         let [x, y] = alignment.shift.map(|shift| shift * block_px as f32);
         x.hypot(y) <= MOVED_PX && counts[1] as f32 <= UNLIKE_SHARE * (counts[0] + counts[1]) as f32

@@ -7,9 +7,11 @@
 //! *Accuracy and resolution of Kinect depth data*, 2012).
 
 mod align;
+mod exactness;
 #[cfg(feature = "gpu")]
 #[doc(hidden)]
 pub mod gpu;
+mod noise;
 mod outlines;
 mod planes;
 mod smooth;
@@ -22,9 +24,11 @@ use std::sync::Arc;
 
 use pulp::Arch;
 
+pub use self::exactness::Exactness;
 pub use self::outlines::Outlines;
 
 use self::align::Aligner;
+use self::noise::NoiseMeter;
 use self::smooth::{Smoother, over};
 use self::temporal::{Limits, TemporalFilter};
 use self::upsample::Upsampler;
@@ -74,6 +78,7 @@ pub struct Refiner {
     unknown: Vec<bool>,
     /// Distance in focus over the depth.
     inverse: Vec<f32>,
+    meter: NoiseMeter,
     smoother: Smoother,
     aligner: Aligner,
     temporal: TemporalFilter,
@@ -213,17 +218,18 @@ impl Refiner {
         if !map.metres.first().is_some_and(|&z_m| DepthMap::is_known(z_m)) {
             return self.temporal.forget();
         }
-        let Self { arch, unknown, inverse, filler, smoother, outlines, aligner, temporal, focus, .. } = self;
+        let Self { arch, unknown, inverse, filler, meter, smoother, outlines, aligner, temporal, focus, .. } = self;
         let (arch, width, focus_m) = (*arch, map.width as usize, focus.0);
+        let size = (width, map.height as usize);
         unknown.clear();
         unknown.resize(map.metres.len(), false);
         filler.holes().iter().for_each(|hole| unknown[hole.of_row(width)].fill(true));
-        let measured_noise = smoother.noise(|at| focus_m / map.metres[at], unknown, width);
+        let measured_noise = meter.noise(|at| focus_m / map.metres[at], |at| unknown[at], size);
         smoother.smooth((arch, workers), (&map.metres, focus_m), inverse, width, measured_noise);
         if is_good {
             filler.take(map);
         }
-        let noise = smoother.noise(|at| inverse[at], unknown, width);
+        let noise = meter.noise(|at| inverse[at], |at| unknown[at], size);
         let jump = JUMP.max(JUMP_SIGMAS * noise);
         outlines.shift(inverse, unknown, width, distance_px, jump);
         aligner.align((arch, workers), inverse, unknown, &color.rgb, width, jump);

@@ -1,4 +1,4 @@
-//! Spatial denoising (edge-preserving): noise of smooth surfaces, how much there is, and less of it.
+//! Spatial denoising (edge-preserving): less noise of smooth surfaces.
 //!
 //! The sigma filter (Lee, *Digital image smoothing and the sigma filter*, 1983) along rows and then along columns, with
 //! taps in symmetric pairs: a pair counts only if both its ends belong to the surface. A slanted plane then stays
@@ -8,6 +8,7 @@ use std::ops::Range;
 
 use pulp::{Arch, WithSimd};
 
+use super::noise::NO_NOISE;
 use crate::compute::bands::Bands;
 use crate::compute::thread_pool::ThreadPool;
 
@@ -16,21 +17,10 @@ use crate::compute::thread_pool::ThreadPool;
 pub const PAIRS_PX: [usize; 4] = [2, 4, 6, 8];
 /// Depths within this many standard deviations belong to one surface.
 pub const SAME_SURFACE: f32 = 3.5;
-/// Distance in pixels between the three depths that tell noise from slope, above the length over which it correlates.
-pub const LAG_PX: usize = 6;
-/// Rows and columns sampled for the noise, at most.
-pub const LOOKS: usize = 96;
-/// Share of the differences that lie on smooth surfaces, whatever else the picture holds, and the quantile of `|x|`
-/// there of a normal distribution in standard deviations.
-pub const SMOOTH_SHARE: f32 = 0.35;
-pub const SMOOTH_QUANTILE: f32 = 0.4538;
-/// Noise below this is none: it is 1/20 px of CoC with a strong blur.
-pub const NO_NOISE: f32 = 5e-4;
 
 /// Reduces the noise of maps of inverse depth; owns the memory for it.
 #[derive(Debug, Default)]
 pub struct Smoother {
-    differences: Vec<f32>,
     /// Of every thread.
     lines: Vec<Lines>,
 }
@@ -54,31 +44,6 @@ impl Lines {
 }
 
 impl Smoother {
-    /// The noise of a map of so many columns, as a standard deviation: a low quantile of second differences, which slanted
-    /// planes do not raise, and edges only where they are everywhere. Unknown depths are left out. `inverse` gives the inverse
-    /// depth of a pixel.
-    pub fn noise(&mut self, inverse: impl Fn(usize) -> f32, unknown: &[bool], width: usize) -> f32 {
-        self.differences.clear();
-        let height = unknown.len().checked_div(width).unwrap_or(0);
-        for y in (0..height).step_by(height.div_ceil(LOOKS).max(1)) {
-            let row = y * width;
-            for x in (LAG_PX..width.saturating_sub(LAG_PX)).step_by(width.div_ceil(LOOKS).max(1)) {
-                let three = [x - LAG_PX, x, x + LAG_PX].map(|x| row + x);
-                if three.iter().all(|&at| !unknown[at]) {
-                    let [before, here, after] = three.map(&inverse);
-                    self.differences.push((before - 2.0 * here + after).abs());
-                }
-            }
-        }
-        if self.differences.is_empty() {
-            return 0.0;
-        }
-        let at = (self.differences.len() as f32 * SMOOTH_SHARE) as usize;
-        let quantile = *self.differences.select_nth_unstable_by(at, f32::total_cmp).1;
-        // The difference has 1 + 4 + 1 times the variance of a depth.
-        quantile / SMOOTH_QUANTILE / 6.0_f32.sqrt()
-    }
-
     /// Makes inverse depth, `focus_m` over `metres`, whose noise has the standard deviation `noise`, averaged within its
     /// surfaces.
     pub fn smooth(

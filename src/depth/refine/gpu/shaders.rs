@@ -3,8 +3,9 @@
 use bytemuck::{Pod, Zeroable};
 
 use super::super::align::{BAND_PX, EDGE_SHARE, MADE_UP, ROUNDS, UNSURE};
+use super::super::noise::{self, LAG_PX, NO_NOISE, SMOOTH_QUANTILE, SMOOTH_SHARE};
 use super::super::planes::LANES;
-use super::super::smooth::{self, LAG_PX, NO_NOISE, PAIRS_PX, SMOOTH_QUANTILE, SMOOTH_SHARE};
+use super::super::smooth::{self, PAIRS_PX};
 use super::super::temporal::{self, HOLD, LONGEST, MOVED, MOVED_BOUNDS};
 use super::super::votes::{JUMP_SHARE, LOYALTY, LOYALTY_WITHOUT_CONTRAST, QUARTER_T, UNLIKE, Weights};
 use super::super::{CHANGE_SIGMAS, JUMP, JUMP_SIGMAS, LEAST_CHANGE, upsample};
@@ -50,7 +51,7 @@ pub const COUNTS: usize = 1 + ROUNDS * (WAVES + 2);
 /// Numbers in `measures`.
 pub const MEASURES: usize = 4;
 /// Samples, at most.
-pub const SAMPLES: usize = if smooth::LOOKS > temporal::LOOKS { smooth::LOOKS.pow(2) } else { temporal::LOOKS.pow(2) };
+pub const SAMPLES: usize = if noise::LOOKS > temporal::LOOKS { noise::LOOKS.pow(2) } else { temporal::LOOKS.pow(2) };
 /// The mark of those that were asked in the first round.
 pub const ASKED: u32 = 8;
 
@@ -72,7 +73,7 @@ pub fn constants(again: bool) -> [(&'static str, f64); 36] {
         ("PREFERENCE", PREFERENCE.into()),
         ("FOLLOW", FOLLOW.into()),
         ("LAG_PX", LAG_PX as f64),
-        ("NOISE_LOOKS", smooth::LOOKS as f64),
+        ("NOISE_LOOKS", noise::LOOKS as f64),
         ("SMOOTH_SHARE", SMOOTH_SHARE.into()),
         ("SMOOTH_QUANTILE", SMOOTH_QUANTILE.into()),
         ("NO_NOISE", NO_NOISE.into()),
