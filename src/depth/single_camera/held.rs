@@ -1,12 +1,11 @@
 //! What belongs to a subject: what is as near and joined to it, such as a mug that is held; and what does not: others, who
 //! are further away.
 
+use super::belongings::Belongings;
 use super::relief::Relief;
 use crate::depth::tap::nearest;
 use crate::frame::Mask;
 
-/// From here on, what is no person is as near as the subject.
-const AS_NEAR: [f32; 2] = [0.85, 0.95];
 /// A person of whom less is as near as this is another one, further away.
 const OTHERS: f32 = 0.55;
 /// Who was another, or was not, in the frame before stays so by this much (hysteresis).
@@ -25,6 +24,7 @@ pub struct Held {
     /// Whether a pixel was seen to be part of what is looked at, and those that are yet to be looked around.
     seen: Vec<bool>,
     front: Vec<u32>,
+    belongings: Belongings,
 }
 
 impl Held {
@@ -36,6 +36,7 @@ impl Held {
     /// Forgets the frame before: the next one is another scene.
     pub fn forget(&mut self) {
         self.others.clear();
+        self.belongings.forget();
     }
 
     /// Joins a mask with what is as near, and takes others away.
@@ -46,7 +47,7 @@ impl Held {
         self.nearness.clear();
         self.nearness.extend((0..width * height).map(near));
         self.take_others_away();
-        self.add_what_is_held();
+        self.belongings.add(&mut self.mask.share, &self.nearness, width, PART);
     }
 
     /// Parts of the mask that are mostly far away are other people's.
@@ -81,23 +82,6 @@ impl Held {
             }
         }
         self.others.iter_mut().zip(&self.seen).for_each(|(is_other, seen)| *is_other &= seen);
-    }
-
-    /// What is as near as the subject and joined to it, step by step.
-    fn add_what_is_held(&mut self) {
-        let [from, to] = AS_NEAR;
-        self.seen.fill(false);
-        self.front.clear();
-        for start in 0..self.mask.share.len() {
-            if !self.seen[start] && self.mask.share[start] > 0.9 {
-                self.flood(start, |held, at| held.mask.share[at] > PART || held.nearness[at] > from);
-            }
-        }
-        for &at in &self.front {
-            let at = at as usize;
-            let near = ((self.nearness[at] - from) / (to - from)).clamp(0.0, 1.0);
-            self.mask.share[at] = self.mask.share[at].max(near);
-        }
     }
 
     /// Adds to `front` what is connected to `start` and belongs to it.
@@ -163,7 +147,7 @@ mod tests {
             ..Held::default()
         };
         held.take_others_away();
-        held.add_what_is_held();
+        held.belongings.add(&mut held.mask.share, &held.nearness, SIZE.0, PART);
         held.mask.share[8 * SIZE.0..][..SIZE.0].iter().map(|share| *share > 0.5).collect()
     }
 
@@ -173,8 +157,8 @@ mod tests {
 
     #[test]
     fn what_is_held_is_the_subjects_and_what_is_as_near_elsewhere_is_not() {
-        let near = [((4, 14), 1.0), ((20, 24), 1.0)];
-        assert_eq!(joined(&[(4, 10)], &near), columns(&[(4, 14)]));
+        let near = [((4, 18), 1.0), ((24, 28), 1.0)];
+        assert_eq!(joined(&[(4, 10)], &near), columns(&[(4, 18)]));
     }
 
     #[test]

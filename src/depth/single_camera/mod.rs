@@ -6,6 +6,7 @@
 
 mod absence;
 mod aside;
+mod belongings;
 mod decision;
 mod feed;
 mod held;
