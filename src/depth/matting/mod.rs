@@ -217,7 +217,7 @@ impl Matting {
         let is_noise_said = &mut self.is_noise_said;
         let mut say = |jump: f32| {
             if jump > asked && !std::mem::replace(is_noise_said, true) {
-                tracing::warn!(
+                tracing::info!(
                     "the depth has jumps nearly everywhere: outlines are taken apart only where it jumps most"
                 );
             }

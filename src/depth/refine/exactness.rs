@@ -179,7 +179,7 @@ mod tests {
     fn frame(number: u32, damage: Damage) -> (ColorImage, DepthMap) {
         let (mut color, mut map) = (ColorImage::new(SIZE.0, SIZE.1), DepthMap::new(SIZE.0, SIZE.1));
         for at in 0..SIZE.0 * SIZE.1 {
-            let is_near = at % SIZE.0 % 9 == 0 || at / SIZE.0 > 60;
+            let is_near = (at % SIZE.0).is_multiple_of(9) || at / SIZE.0 > 60;
             color.rgb[3 * at as usize..][..3].fill(if is_near { 60 } else { 180 });
             map.metres[at as usize] = damage(at, number, if is_near { 1.0 } else { 3.0 });
         }
@@ -192,7 +192,7 @@ mod tests {
     }
 
     const EXACT: Damage = |_, _, z_m| z_m;
-    const HOLES: Damage = |at, _, z_m| if at % 50 == 0 { 0.0 } else { z_m };
+    const HOLES: Damage = |at, _, z_m| if at.is_multiple_of(50) { 0.0 } else { z_m };
     const NOISE: Damage = |at, _, z_m| z_m * (1.0 + 0.02 * noise(at, 0));
     const RESTLESS: Damage = |at, frame, z_m| if at % 13 == frame % 2 { z_m * 1.01 } else { z_m };
 
