@@ -137,6 +137,7 @@ impl CocMaker {
     /// Finishes maps with no memory of those before.
     fn renew(&mut self, finish: Finish) {
         let uses_depth = matches!(self.rule, CocRule::Depth { .. });
+        // What the finisher of before left on the device is not of the next map.
         self.matting.take_from(None);
         self.finisher = Finisher::new(finish, self.mending, self.device.as_ref().filter(|_| uses_depth));
     }

@@ -108,7 +108,7 @@ impl Exactness {
         for y in (0..height).step_by(height.div_ceil(LOOKS)) {
             for at in (y * width..(y + 1) * width).step_by(width.div_ceil(LOOKS)) {
                 let rgb = [0, 1, 2].map(|p| color.rgb[3 * at + p]);
-                self.now.push(Look { rgb, inverse: known_inverse(map.metres[at]) });
+                self.now.push(Look { rgb, inverse: DepthMap::inverse_of(map.metres[at]) });
             }
         }
     }
@@ -116,7 +116,7 @@ impl Exactness {
     /// Lets a frame count, whose depth does not rest in this share of the pixels whose colours do.
     fn decide(&mut self, map: &DepthMap, restless: f32) {
         let size = (map.width as usize, map.height as usize);
-        let inverse = |at: usize| known_inverse(map.metres[at]);
+        let inverse = |at: usize| DepthMap::inverse_of(map.metres[at]);
         let noise = self.meter.noise(inverse, |at| inverse(at) == 0.0, size);
         let known = self.sorted.len();
         let Some(median) = middle(&mut self.sorted) else { return };
@@ -154,10 +154,6 @@ fn restless(now: &[Look], before: &[Look], (changes, sorted): (&mut Vec<f32>, &m
     }
     let is_enough = resting as f32 >= LEAST_RESTING * now.len() as f32;
     is_enough.then(|| restless as f32 / resting as f32)
-}
-
-fn known_inverse(z_m: f32) -> f32 {
-    if DepthMap::is_known(z_m) { DepthMap::inverse_of(z_m) } else { 0.0 }
 }
 
 /// The median; changes the order.
