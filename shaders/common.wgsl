@@ -14,6 +14,11 @@ override MARGIN_PX: f32;            // that a silhouette's distances are larger 
 override HAND_OVER: f32;            // half the width of the hand-over between two bins, as a share of the border's CoC
 override FADE: f32;                 // share of the square of a silhouette's reach, from where it is faded out
 override OWN_COVERAGE: f32;         // a surface with less than this does not fill a pixel
+override STEPS_ACROSS: u32;         // of the directions in which what hides is looked past, four bits each, 8 more than they are
+override STEPS_DOWN: u32;
+override MOST_STEPS: u32;           // that are taken
+override HALF_ALIKE_PX: f32;        // so far apart, two CoC are half alike
+override ONE_ENDED: f32;            // a line with one end counts as one of so many times its length
 override OCTAVES_FROM_PX: f32;      // from this radius on, nodes of the bank lie evenly in each octave
 override OCTAVE_SHIFT: u32;         // bits of a float below those that tell the node within its octave
 
@@ -118,17 +123,6 @@ fn step_at(border: vec2<f32>, coc_px: f32) -> f32 {
 // How much of a pixel a bin takes.
 fn share_at(front: vec2<f32>, behind: vec2<f32>, coc_px: f32) -> f32 {
     return step_at(front, coc_px) - step_at(behind, coc_px);
-}
-
-// The node of the bank nearest to a radius.
-fn node_at(radius_px: f32, steps_per_px: f32, nodes: u32) -> u32 {
-    var node = u32(radius_px * steps_per_px + 0.5);
-    if radius_px >= OCTAVES_FROM_PX {
-        // The bits of a float are linear within each octave.
-        let above = bitcast<u32>(radius_px) - bitcast<u32>(OCTAVES_FROM_PX) + (1u << (OCTAVE_SHIFT - 1u));
-        node = u32(OCTAVES_FROM_PX * steps_per_px) + (above >> OCTAVE_SHIFT);
-    }
-    return min(node, nodes - 1u);
 }
 
 // A pixel of the scene: light, and CoC as a signed square root, whose steps are fine where bins hand over. Light is never

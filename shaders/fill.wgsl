@@ -95,6 +95,9 @@ fn fill(@builtin(global_invocation_id) id: vec3<u32>, @builtin(local_invocation_
             let pixel = min(corner_of(tile, number) + vec2(thread % PATCH, thread / PATCH), level.size - 1u);
             let at = index_of(level, pixel);
             var own = Known(pyramid[at], known[at]);
+            if number == 1u && own.known == 0.0 {
+                own = Known(pyramid[directional_at() + at], known[directional_at() + at]);
+            }
             if number < coarsest {
                 own = completed(number, own, pixel, tile);
             }

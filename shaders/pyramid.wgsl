@@ -40,6 +40,15 @@ fn index_of(level: Level, pixel: vec2<u32>) -> u32 {
     return level.at + pixel.y * level.size.x + pixel.x;
 }
 
+// Where what `directional` finds for level 1 begins: behind all levels.
+fn directional_at() -> u32 {
+    var level = level_of(1u);
+    while !is_coarsest(level.size) {
+        level = coarser(level);
+    }
+    return level.at + 1u;
+}
+
 fn plus(a: Known, b: Known) -> Known {
     return Known(a.value + b.value, a.known + b.known);
 }

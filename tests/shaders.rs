@@ -43,7 +43,7 @@ fn every_file_is_a_pass_or_shared_and_short() {
     for entry in std::fs::read_dir(folder).expect("the folder of shaders") {
         let path = entry.expect("an entry").path();
         let name = path.file_stem().and_then(|s| s.to_str()).unwrap_or_default().to_owned();
-        let shared = "base cells common filter list meet mixed next pyramid radii range show silhouette surfaces tent tiles todo work \
+        let shared = "base cells common filter list meet mixed next node pyramid radii range show silhouette surfaces tent tiles todo work \
              yuyv stereo_common stereo_line \
              stereo_path stereo_root stereo_row stereo_touch refine_common refine_ends refine_lanes refine_select \
              refine_window matte_common matte_behind matte_claim matte_compare matte_contrast matte_enter matte_light \

@@ -6,7 +6,7 @@ mod factors;
 use std::sync::Arc;
 
 use super::bank::Bank;
-use super::rung::{LADDER, MOST_FULL_RADIUS_PX, MOST_RADIUS_PX, Rung, SCALES};
+use super::rung::{LADDER, MOST_FULL_RADIUS_PX, Rung, SCALES};
 use super::{Rank, Settings};
 use crate::budget::Quality;
 use crate::optics::CocKind;
@@ -59,7 +59,7 @@ impl Ladder {
                 _ if compositing == Compositing::Gather => max_px,
                 _ if settings.rank == Some(Rank::Full) => max_px.min((max_px / coarsest).max(MOST_FULL_RADIUS_PX)),
                 CocKind::Uniform => max_px / rung.even_scale(max_px) as f32,
-                _ => max_px.min((max_px / coarsest).max(MOST_RADIUS_PX)),
+                _ => max_px.min((max_px / coarsest).max(rung.most_radius_px)),
             };
             let bank = bank_keys.iter().position(|&key| key == (rank, bank_px)).unwrap_or_else(|| {
                 bank_keys.push((rank, bank_px));

@@ -4,8 +4,6 @@ use crate::budget::Quality;
 
 /// Pixels of the picture that a bin pixel may cover, each way.
 pub const SCALES: [usize; 4] = [1, 2, 4, 8];
-/// A bin is reduced until no radius has more bin pixels than this: the cost of a filter does not grow with the blur.
-pub const MOST_RADIUS_PX: f32 = 14.0;
 /// With every term that an aperture has, a bin stays at full scale up to this radius: what its filters take in memory
 /// does not grow with the blur.
 pub const MOST_FULL_RADIUS_PX: f32 = 128.0;
@@ -29,6 +27,8 @@ pub struct Rung {
     pub near_from_share: f32,
     /// Smallest radius in a bin, in pixels of the picture, from which it is filtered at each of [`SCALES`].
     pub scale_from_px: [f32; SCALES.len()],
+    /// A bin is reduced until no radius has more bin pixels than this: the cost of a filter does not grow with the blur.
+    pub most_radius_px: f32,
     /// Separable terms where one radius holds for the whole picture: more, as every pixel shows the missing ones there.
     pub even_rank: u32,
     /// Where one radius holds for the whole picture, it is reduced until that has no more bin pixels than this.
@@ -44,6 +44,7 @@ pub const LADDER: [Rung; Quality::ALL.len()] = {
         near_from_px: 2.5,
         near_from_share: 0.07,
         scale_from_px: [0.0, 3.0, 8.0, 20.0],
+        most_radius_px: 14.0,
         even_rank: 3,
         even_radius_px: 9.0,
     };
@@ -76,7 +77,8 @@ pub const LADDER: [Rung; Quality::ALL.len()] = {
             bins_per_side: 6,
             near_from_px: FOCUS_BORDER_PX,
             near_from_share: 0.0,
-            scale_from_px: [0.0, 8.0, 32.0, 80.0],
+            scale_from_px: [0.0, 16.0, 48.0, 96.0],
+            most_radius_px: 28.0,
             even_rank: 6,
             even_radius_px: 96.0,
         },
@@ -109,7 +111,7 @@ impl Rung {
     /// or a coarser one that keeps the large ones cheap.
     pub fn scale(&self, low_px: f32, high_px: f32) -> usize {
         let fits = SCALES.into_iter().zip(self.scale_from_px).rev().find(|&(_, from_px)| low_px >= from_px);
-        fits.map_or(1, |(scale, _)| scale).max(scale_within(high_px, MOST_RADIUS_PX))
+        fits.map_or(1, |(scale, _)| scale).max(scale_within(high_px, self.most_radius_px))
     }
 
     /// The scale for a picture that is blurred by one radius all over.

@@ -1,6 +1,6 @@
 //! Pass `fill`, the inpainting of disocclusions: what near objects hide is filled in from around them, colour and CoC,
 //! before the bins behind are taken. Pull-push: averages over ever larger areas, of known pixels only, flow back into
-//! the holes. Every layer is filled for itself, from what does not lie in front of it: behind a head are the trees that
+//! the holes, but where lines through a hole tell which surface goes on behind it. Every layer is filled for itself, from what does not lie in front of it: behind a head are the trees that
 //! stand behind it, and behind both the sky.
 
 #![allow(clippy::needless_range_loop)] // Planes and columns index several arrays at once.
@@ -10,6 +10,7 @@ use std::sync::atomic::AtomicBool;
 
 use pulp::{Arch, Simd};
 
+use super::directional::Directional;
 use super::levels::{Base, Level, PLANES, Pull, Push};
 use super::rows::{PIECE, Rows};
 use super::silhouettes::Silhouettes;
@@ -29,6 +30,8 @@ pub struct Pyramid {
     /// The picture at half size.
     halves: Rows<PLANES>,
     levels: Vec<Level>,
+    /// For the level above the finest.
+    directional: Directional,
     /// Which parts are handed out, as many as there can be.
     taken: Vec<AtomicBool>,
 }
@@ -73,7 +76,9 @@ impl Pyramid {
             (w, h) = (w.div_ceil(2), h.div_ceil(2));
         }
         let taken = (0..height).map(|_| AtomicBool::new(false)).collect();
-        Self { halves: Rows::new(levels[0].width, levels[0].height, 0), levels, taken }
+        let outlined = &levels[1.min(levels.len() - 1)];
+        let directional = Directional::new(outlined.width, outlined.height);
+        Self { halves: Rows::new(levels[0].width, levels[0].height, 0), levels, directional, taken }
     }
 
     /// The picture at half size, to be laid in bands of `rows` rows of the picture.
@@ -94,6 +99,9 @@ impl Pyramid {
             workers.run(coarse.height.div_ceil(PART), &|part| {
                 arch.dispatch(Pull { fine, first: part * PART, rows: rows.part(part), stride, width });
             });
+        }
+        if let Some(level) = self.levels.get_mut(1) {
+            self.directional.fill(level, workers, arch);
         }
         for k in (1..self.levels.len()).rev() {
             let (fine, coarse) = self.levels.split_at_mut(k);

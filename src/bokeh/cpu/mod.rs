@@ -5,6 +5,7 @@ mod bin;
 mod blur;
 mod cell_sums;
 mod composite;
+mod directional;
 mod encode;
 mod fill;
 mod filter;

@@ -48,7 +48,7 @@ pub struct Buffers {
     pub result: wgpu::Buffer,
     /// CoC of the nearest surface, at half size.
     pub nearest_px: wgpu::Buffer,
-    /// All levels of the pyramid.
+    /// All levels of the pyramid, and what is found along lines.
     pub pyramid: wgpu::Buffer,
     /// How much each of its pixels knows.
     pub known: wgpu::Buffer,
@@ -170,12 +170,13 @@ fn pad_to_fours(taps: &[f32], terms: usize) -> Vec<[f32; 4]> {
     taps.chunks(terms).flat_map(|tap| tap.chunks(4).map(padded)).collect()
 }
 
-/// The pixels of all levels of the pyramid that are kept, from a quarter of the size of a picture to one pixel.
+/// The pixels of all levels of the pyramid that are kept, from a quarter of the size of a picture to one pixel, and what is found
+/// along lines for the first of them.
 fn pyramid_pixels(width: usize, height: usize) -> usize {
     let halved = |size: &[usize; 2]| size.map(|side| side.div_ceil(2));
     let finest = [width, height].map(|side| side.div_ceil(4));
     let levels = std::iter::successors(Some(finest), |level| (*level != [1, 1]).then(|| halved(level)));
-    levels.map(|[across, down]| across * down).sum()
+    levels.chain([finest]).map(|[across, down]| across * down).sum()
 }
 
 /// Every node's kernel, one after the other, and where each starts.

@@ -1,5 +1,5 @@
 //! The GPU executor: wgpu compute passes, one WGSL file each under `shaders/`, with the names of the passes in
-//! [`super::plan`]; where one is several dispatches (`fill`: hide, pull, coarse, fill), each has a file.
+//! [`super::plan`]; where one is several dispatches (`fill`: hide, pull, coarse, directional, fill), each has a file.
 
 mod buffers;
 mod layout;

@@ -19,9 +19,9 @@ const SILHOUETTES: &str = shaders::UNPACK.name;
 
 /// The passes of a layer.
 struct Layer {
-    /// What is known behind those in front of it, up and down a pyramid, and the scene with that filled in; the foremost
-    /// has the scene as it is.
-    fill: Option<[Pass; 3]>,
+    /// What is known behind those in front of it, up and down a pyramid and along lines, and the scene with that filled in;
+    /// the foremost has the scene as it is.
+    fill: Option<[Pass; 4]>,
     bin: Pass,
 }
 
@@ -93,7 +93,7 @@ impl Passes {
     pub fn new(device: &Device, plan: &Plan, b: &Buffers, radii: &wgpu::Buffer) -> Self {
         let maker = Maker { device, buffers: b };
         let picture = [plan.width as u32, plan.height as u32];
-        let half = picture.map(|v| v.div_ceil(2));
+        let [half, quarter] = [2, 4].map(|scale| picture.map(|side| side.div_ceil(scale)));
 
         let hide = [&b.frame, &b.scene, &b.nearest_px, &b.ranges, &b.mixed];
         let grid = over([plan.width, plan.height].map(|side| side.div_ceil(GRAIN) as u32), SMALL_TILE);
@@ -118,6 +118,7 @@ impl Passes {
                     // A thread takes four pixels of half the size, or of the picture.
                     maker.pass(shaders::PULL, &work, &pulled, over(half, 2 * TILE)).named(FILL),
                     maker.pass(shaders::COARSE, &[], &coarse, [1; 3]).named(FILL),
+                    maker.pass(shaders::DIRECTIONAL, &[], &coarse, over(quarter, SMALL_TILE)).named(FILL),
                     maker.pass(shaders::FILL, &work, &filled, over(picture, TILE)),
                 ]
             });

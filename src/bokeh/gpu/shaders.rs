@@ -3,7 +3,9 @@
 use bytemuck::{Pod, Zeroable};
 
 use crate::bokeh::bank::{OCTAVE_SHIFT, OCTAVES_FROM_PX};
-use crate::bokeh::occlusion::{FADE, GRAIN, MARGIN_PX, OTHER_FROM, OTHER_TO, OWN_COVERAGE};
+use crate::bokeh::occlusion::{
+    DIRECTIONS, FADE, GRAIN, HALF_ALIKE_PX, MARGIN_PX, MOST_STEPS, ONE_ENDED, OTHER_FROM, OTHER_TO, OWN_COVERAGE,
+};
 use crate::bokeh::plan::{
     ANY_COLOR, CELL, COVERAGE_FLOOR, FAR_WEIGHT, HAND_OVER, HIDING_SHARE, HINDMOST_COVERAGE, SEGMENT,
 };
@@ -21,23 +23,40 @@ pub const UNCOVER: Shader = shader!("common"; "uncover", "cells");
 pub const BIN: Shader = shader!("common"; "bin", "mixed", "tent", "list", "tiles", "todo", "next");
 /// Local radius and range of colours.
 pub const REACH: Shader = shader!("common"; "reach", "work");
-pub const BLUR_ROWS: Shader = shader!("common"; "blur_rows", "filter", "list", "tiles", "todo", "next");
-pub const BLUR_COLUMNS: Shader = shader!("common"; "blur_columns", "filter", "show", "list", "tiles", "todo");
+pub const BLUR_ROWS: Shader = shader!("common"; "blur_rows", "filter", "node", "list", "tiles", "todo", "next");
+pub const BLUR_COLUMNS: Shader = shader!("common"; "blur_columns", "filter", "node", "show", "list", "tiles", "todo");
 /// The exact two-dimensional gather.
-pub const GATHER: Shader = shader!("common"; "gather");
+pub const GATHER: Shader = shader!("common"; "gather", "node");
 /// The nearest surface.
 pub const HIDE: Shader = shader!("common"; "hide", "mixed");
 /// What is known behind a layer, at half size and over ever larger areas.
 pub const PULL: Shader = shader!("common"; "pull", "pyramid", "base", "mixed");
 /// The largest areas, and back.
 pub const COARSE: Shader = shader!("common"; "coarse", "pyramid");
+/// What lines past what hides agree on.
+pub const DIRECTIONAL: Shader = shader!("common"; "directional", "pyramid");
 /// Back to the picture.
 pub const FILL: Shader =
     shader!("common"; "fill", "pyramid", "base", "mixed", "cells", "range", "list", "tiles", "next", "meet");
 pub const COMPOSITE: Shader = shader!("common"; "composite", "surfaces", "cells", "list", "yuyv");
 
-pub const ALL: [Shader; 14] =
-    [CLEAR, UNPACK, SPREAD, UNCOVER, BIN, REACH, BLUR_ROWS, BLUR_COLUMNS, GATHER, HIDE, PULL, COARSE, FILL, COMPOSITE];
+pub const ALL: [Shader; 15] = [
+    CLEAR,
+    UNPACK,
+    SPREAD,
+    UNCOVER,
+    BIN,
+    REACH,
+    BLUR_ROWS,
+    BLUR_COLUMNS,
+    GATHER,
+    HIDE,
+    PULL,
+    COARSE,
+    DIRECTIONAL,
+    FILL,
+    COMPOSITE,
+];
 
 /// Invocations of a workgroup in x and in y, for pictures and bins, and for what is smaller.
 pub const TILE: u32 = 16;
@@ -61,8 +80,20 @@ pub const LIST_HEAD: usize = 16;
 /// The scale of a bin from which on a pixel of it has so many taps that four threads share them, two each way.
 pub const SHARED_FROM: u32 = 4;
 
+/// Steps of [`DIRECTIONS`] across (0) or down (1), four bits each, 8 more than they are.
+const fn steps(axis: usize) -> f64 {
+    let (mut packed, mut d) = (0u32, 0);
+    while d < DIRECTIONS.len() {
+        let (across, down) = DIRECTIONS[d];
+        let step = if axis == 0 { across } else { down };
+        packed |= ((step + 8) as u32) << (4 * d);
+        d += 1;
+    }
+    packed as f64
+}
+
 /// The `override` constants of `common.wgsl`.
-pub const CONSTANTS: [(&str, f64); 24] = [
+pub const CONSTANTS: [(&str, f64); 29] = [
     ("CELL", CELL as f64),
     ("SEGMENT", SEGMENT as f64),
     ("ANY_COLOR", ANY_COLOR as f64),
@@ -77,6 +108,11 @@ pub const CONSTANTS: [(&str, f64); 24] = [
     ("HAND_OVER", HAND_OVER as f64),
     ("FADE", FADE as f64),
     ("OWN_COVERAGE", OWN_COVERAGE as f64),
+    ("STEPS_ACROSS", steps(0)),
+    ("STEPS_DOWN", steps(1)),
+    ("MOST_STEPS", MOST_STEPS as f64),
+    ("HALF_ALIKE_PX", HALF_ALIKE_PX as f64),
+    ("ONE_ENDED", ONE_ENDED as f64),
     ("OCTAVES_FROM_PX", OCTAVES_FROM_PX as f64),
     ("OCTAVE_SHIFT", OCTAVE_SHIFT as f64),
     ("TILE", TILE as f64),

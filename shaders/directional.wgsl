@@ -1,0 +1,90 @@
+// Pass directional, of push-pull inpainting: outlines run on behind what hides them. Reads level 1 of the pyramid; writes what
+// the lines through its hidden pixels agree on, behind all levels. See `DIRECTIONS` in src/bokeh/occlusion.rs.
+
+@group(0) @binding(0) var<uniform> frame: Frame;
+@group(0) @binding(1) var<storage, read_write> pyramid: array<vec4<f32>>;
+@group(0) @binding(2) var<storage, read_write> known: array<f32>;
+
+const LINES = 8u;
+
+struct End {
+    value: vec4<f32>,
+    steps: f32,         // to it; 0 where there is none
+}
+
+// A line through a hidden pixel: what is there, by its ends, and how much it counts.
+struct Line {
+    value: vec4<f32>,
+    weight: f32,
+}
+
+fn likeness(a_px: f32, b_px: f32) -> f32 {
+    let apart = (a_px - b_px) / HALF_ALIKE_PX;
+    return 1.0 / (1.0 + apart * apart);
+}
+
+fn end_of(level: Level, pixel: vec2<u32>, step: vec2<i32>) -> End {
+    var at = vec2<i32>(pixel) + step;
+    for (var steps = 1u; steps <= MOST_STEPS && all(at >= vec2(0)) && all(at < vec2<i32>(level.size)); steps++) {
+        let index = index_of(level, vec2<u32>(at));
+        if known[index] > 0.0 {
+            return End(pyramid[index] / max(known[index], 1.0e-6), f32(steps));
+        }
+        at += step;
+    }
+    return End(vec4(0.0), 0.0);
+}
+
+fn line_through(level: Level, pixel: vec2<u32>, direction: u32) -> Line {
+    let step = vec2<i32>((vec2(STEPS_ACROSS, STEPS_DOWN) >> vec2(4u * direction)) & vec2(15u)) - 8;
+    let a = end_of(level, pixel, -step);
+    let b = end_of(level, pixel, step);
+    let length = sqrt(f32(step.x * step.x + step.y * step.y));
+    let sum = a.steps + b.steps;
+    if sum == 0.0 {
+        return Line(vec4(0.0), 0.0);
+    }
+    if a.steps == 0.0 || b.steps == 0.0 {
+        return Line(select(a.value, b.value, a.steps == 0.0), 1.0 / (ONE_ENDED * length * sum));
+    }
+    let alike = likeness(a.value.w, b.value.w);
+    return Line(mix(a.value, b.value, a.steps / sum), alike * alike / (length * sum));
+}
+
+@compute @workgroup_size(SMALL_TILE, SMALL_TILE)
+fn directional(@builtin(global_invocation_id) id: vec3<u32>) {
+    let level = level_of(1u);
+    if any(id.xy >= level.size) {
+        return;
+    }
+    let index = index_of(level, id.xy);
+    let found = directional_at() + index;
+    known[found] = 0.0;
+    if known[index] > 0.0 {
+        return;
+    }
+    var lines: array<Line, LINES>;
+    for (var d = 0u; d < LINES; d++) {
+        lines[d] = line_through(level, id.xy, d);
+    }
+    // How many agree with each line counts four times over: a mean of two surfaces is neither.
+    var scores: array<f32, LINES>;
+    var most = 1.0e-30;
+    for (var d = 0u; d < LINES; d++) {
+        var score = 0.0;
+        for (var e = 0u; e < LINES; e++) {
+            score += lines[e].weight * likeness(lines[d].value.w, lines[e].value.w);
+        }
+        scores[d] = score;
+        most = max(most, score);
+    }
+    var sum = Known(vec4(0.0), 0.0);
+    for (var d = 0u; d < LINES; d++) {
+        let agreed = scores[d] * scores[d] / (most * most);
+        sum = plus(sum, times(Known(lines[d].value, 1.0), lines[d].weight * agreed * agreed));
+    }
+    if sum.known > 0.0 {
+        pyramid[found] = sum.value / sum.known;
+        known[found] = 1.0;
+    }
+}

@@ -1,0 +1,310 @@
+//! Directional interpolation, a part of the pass `fill`: outlines run on behind what hides them ([`DIRECTIONS`]). A quarter of
+//! the picture's size is fine enough for it.
+
+#![allow(clippy::needless_range_loop)] // Planes and directions index several arrays at once.
+
+use pulp::{Arch, Simd, WithSimd};
+
+use super::levels::{Level, PLANES};
+use crate::bokeh::occlusion::{DIRECTIONS, MOST_STEPS, ONE_ENDED, likeness};
+use crate::compute::thread_pool::{MOST_ITEMS, ThreadPool};
+
+/// Columns beside a row of steps, so that a step sideways stays in it.
+const PAD: usize = 2;
+/// Ways to look: each direction, and back.
+const WAYS: usize = 2 * DIRECTIONS.len();
+/// Steps, where there is no end that way: they saturate there.
+const NONE: u8 = u8::MAX;
+const _: () = assert!(MOST_STEPS == NONE - 1);
+
+/// What a level knows, and how far that is from each pixel that knows nothing.
+pub struct Directional {
+    width: usize,
+    height: usize,
+    /// Light and CoC of the pixels that know something.
+    ends: Vec<[f32; 4]>,
+    /// [`NONE`] where nothing is known, and beside the picture, else 0.
+    open: Vec<u8>,
+    /// A plane like `open` for each way: steps to the next pixel that knows something.
+    steps: Vec<u8>,
+}
+
+impl Directional {
+    /// Memory for a level of `width` x `height`.
+    pub fn new(width: usize, height: usize) -> Self {
+        let padded = (width + 2 * PAD) * height;
+        Self {
+            width,
+            height,
+            ends: vec![[0.0; 4]; width * height],
+            open: vec![NONE; padded],
+            steps: vec![NONE; WAYS * padded],
+        }
+    }
+
+    /// Fills those pixels of a level that know nothing, as far as they see any that do.
+    pub fn fill(&mut self, level: &mut Level, workers: &mut ThreadPool, arch: Arch) {
+        let (width, stride) = (self.width, self.stride());
+        let each = self.height.div_ceil(MOST_ITEMS);
+        let rows = self.ends.chunks_mut(each * width).zip(self.open.chunks_mut(each * stride));
+        workers.run_each(rows.enumerate(), &|(part, (ends, open))| {
+            arch.dispatch(Survey { level, first: part * each, ends, open });
+        });
+        let open = &self.open;
+        workers.run_each(self.steps.chunks_mut(open.len()).enumerate(), &|(way, steps)| {
+            arch.dispatch(Walk { way, open, stride, steps });
+        });
+        let (seen, level_stride) = (&*self, level.rows.stride);
+        let each_len = each * level.rows.row_len();
+        workers.run_each(level.rows.data.chunks_mut(each_len).enumerate(), &|(part, rows)| {
+            arch.dispatch(Vote { seen, first: part * each, rows, stride: level_stride });
+        });
+    }
+
+    fn stride(&self) -> usize {
+        self.width + 2 * PAD
+    }
+}
+
+/// The step of a way, across and down.
+#[inline(always)]
+fn step_of(way: usize) -> (isize, isize) {
+    let (across, down) = DIRECTIONS[way / 2];
+    let sign = if way.is_multiple_of(2) { -1 } else { 1 };
+    (sign * across as isize, sign * down as isize)
+}
+
+/// What some rows of the level know, from row `first` on.
+struct Survey<'a> {
+    level: &'a Level,
+    first: usize,
+    ends: &'a mut [[f32; 4]],
+    open: &'a mut [u8],
+}
+
+impl WithSimd for Survey<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        let (width, stride) = (self.level.width, self.level.rows.stride);
+        let rows = self.ends.chunks_exact_mut(width).zip(self.open.chunks_exact_mut(width + 2 * PAD));
+        for (y, (ends, open)) in (self.first..).zip(rows) {
+            let row = self.level.rows.row(y);
+            let known = &row[(PLANES - 1) * stride..][..width];
+            for (open, known) in open[PAD..][..width].iter_mut().zip(known) {
+                *open = if *known > 0.0 { 0 } else { NONE };
+            }
+            for (x, end) in ends.iter_mut().enumerate() {
+                let scale = 1.0 / known[x].max(1e-6);
+                *end = std::array::from_fn(|p| row[p * stride + x] * scale);
+            }
+        }
+    }
+}
+
+/// The steps of a way, from those of the pixel that is one step on.
+struct Walk<'a> {
+    way: usize,
+    open: &'a [u8],
+    stride: usize,
+    steps: &'a mut [u8],
+}
+
+impl WithSimd for Walk<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        let Self { way, open, stride, steps } = self;
+        let ((across, down), height) = (step_of(way), open.len() / stride);
+        let columns = PAD..stride - PAD;
+        let next = (PAD as isize + across) as usize;
+        for k in 0..height {
+            // Rows in the order in which the one that is a step on comes first.
+            let y = if down > 0 { height - 1 - k } else { k };
+            let open = &open[y * stride..][..stride];
+            let (before, rest) = steps.split_at_mut(y * stride);
+            let (row, after) = rest.split_at_mut(stride);
+            match down {
+                0 => {
+                    for x in 0..stride - 2 * PAD {
+                        let x = if across > 0 { stride - 1 - PAD - x } else { PAD + x };
+                        row[x] = open[x] & row[(x as isize + across) as usize].saturating_add(1);
+                    }
+                }
+                // Outside the picture there is no end.
+                _ if y as isize + down < 0 || y as isize + down >= height as isize => {
+                    row[columns.clone()].copy_from_slice(&open[columns.clone()]);
+                }
+                _ => {
+                    let there = match down > 0 {
+                        true => &after[(down as usize - 1) * stride..][..stride],
+                        false => &before[before.len() - down.unsigned_abs() * stride..][..stride],
+                    };
+                    let there = &there[next..][..columns.len()];
+                    for ((row, open), there) in row[columns.clone()].iter_mut().zip(&open[columns.clone()]).zip(there) {
+                        *row = open & there.saturating_add(1);
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// What the lines through the open pixels of some rows agree on.
+struct Vote<'a> {
+    seen: &'a Directional,
+    first: usize,
+    rows: &'a mut [f32],
+    stride: usize,
+}
+
+impl WithSimd for Vote<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        let (seen, stride) = (self.seen, self.stride);
+        let padded = seen.stride();
+        for (y, row) in (self.first..).zip(self.rows.chunks_exact_mut(stride * PLANES)) {
+            let open = &seen.open[y * padded + PAD..][..seen.width];
+            for x in (0..seen.width).filter(|&x| open[x] == NONE) {
+                if let Some(value) = seen.between(x, y) {
+                    for (p, value) in value.into_iter().chain([1.0]).enumerate() {
+                        row[p * stride + x] = value;
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Of a line through a pixel: its two ends (where it has one, twice that), how much of the second there is, and its weight.
+#[derive(Clone, Copy, Default)]
+struct Line {
+    ends: [usize; 2],
+    second: f32,
+    weight: f32,
+}
+
+impl Directional {
+    /// Light and CoC of an open pixel.
+    #[inline(always)]
+    fn between(&self, x: usize, y: usize) -> Option<[f32; 4]> {
+        let (stride, plane) = (self.stride(), self.open.len());
+        let (mut lines, mut coc_px) = ([Line::default(); DIRECTIONS.len()], [0.0f32; DIRECTIONS.len()]);
+        for (d, &(across, down)) in DIRECTIONS.iter().enumerate() {
+            let ends = [2 * d, 2 * d + 1].map(|way| {
+                let steps = self.steps[way * plane + y * stride + PAD + x];
+                let (across, down) = step_of(way);
+                let at = |from: usize, step: isize| (from as isize + isize::from(steps) * step) as usize;
+                (steps < NONE).then(|| (at(y, down) * self.width + at(x, across), f32::from(steps)))
+            });
+            let length = ((across * across + down * down) as f32).sqrt();
+            lines[d] = match ends {
+                [Some((a, to_a)), Some((b, to_b))] => {
+                    let likeness = likeness(self.ends[a][3], self.ends[b][3]);
+                    let sum = to_a + to_b;
+                    Line { ends: [a, b], second: to_a / sum, weight: likeness * likeness / (length * sum) }
+                }
+                [Some((a, to_a)), None] | [None, Some((a, to_a))] => {
+                    Line { ends: [a, a], second: 0.0, weight: 1.0 / (ONE_ENDED * length * to_a) }
+                }
+                [None, None] => Line::default(),
+            };
+            let [a, b] = lines[d].ends.map(|end| self.ends[end][3]);
+            coc_px[d] = a + (b - a) * lines[d].second;
+        }
+        // How many agree with each line counts four times over: a mean of two surfaces is neither.
+        let mut scores = [0.0f32; DIRECTIONS.len()];
+        for d in 0..DIRECTIONS.len() {
+            for e in 0..DIRECTIONS.len() {
+                scores[d] += lines[e].weight * likeness(coc_px[d], coc_px[e]);
+            }
+        }
+        let most = scores.iter().fold(0.0f32, |most, &score| most.max(score));
+        let (mut sum, mut total) = ([0.0f32; 4], 0.0);
+        for (line, score) in lines.iter().zip(scores) {
+            let agreed = (score / most.max(1e-30)).powi(2);
+            let weight = line.weight * agreed * agreed;
+            total += weight;
+            let [a, b] = line.ends.map(|end| self.ends[end]);
+            for p in 0..4 {
+                sum[p] += weight * (a[p] + (b[p] - a[p]) * line.second);
+            }
+        }
+        (total > 0.0).then(|| sum.map(|sum| sum / total))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::rows::Rows;
+    use super::*;
+
+    const WIDTH: usize = 64;
+    const HEIGHT: usize = 48;
+    const NEAR_PX: f32 = 0.0;
+    const FAR_PX: f32 = 12.0;
+
+    /// Two surfaces with a straight outline between them, and a bar across that hides them.
+    fn level(nearer: impl Fn(usize, usize) -> bool, hidden: impl Fn(usize, usize) -> bool) -> Level {
+        let mut rows = Rows::<PLANES>::new(WIDTH, HEIGHT, 0);
+        let (stride, row_len) = (rows.stride, rows.row_len());
+        for (y, row) in rows.data.chunks_exact_mut(row_len).enumerate() {
+            for x in (0..WIDTH).filter(|&x| !hidden(x, y)) {
+                let (light, coc_px) = if nearer(x, y) { (0.8, NEAR_PX) } else { (0.1, FAR_PX) };
+                for (p, value) in [light, light, light, coc_px, 1.0].into_iter().enumerate() {
+                    row[p * stride + x] = value;
+                }
+            }
+        }
+        Level { width: WIDTH, height: HEIGHT, rows }
+    }
+
+    fn at(level: &Level, p: usize, x: usize, y: usize) -> f32 {
+        level.rows.row(y)[p * level.rows.stride + x]
+    }
+
+    #[test]
+    fn straight_outlines_run_on_behind_a_bar() {
+        let mut directional = Directional::new(WIDTH, HEIGHT);
+        let mut workers = ThreadPool::new("fill", 2);
+        for degrees in (0..180).step_by(15) {
+            let (sin, cos) = f32::to_radians(degrees as f32).sin_cos();
+            let (middle_x, middle_y) = (WIDTH as f32 / 2.0, HEIGHT as f32 / 2.0);
+            let outline_px = |x: usize, y: usize| (x as f32 + 0.5 - middle_x) * cos + (y as f32 + 0.5 - middle_y) * sin;
+            // The bar crosses the outline at right angles, or as the outline lies nearer to.
+            let hidden = |x: usize, y: usize| match cos.abs() < sin.abs() {
+                true => (28..36).contains(&x),
+                false => (20..28).contains(&y),
+            };
+            let mut level = level(|x, y| outline_px(x, y) < 0.0, hidden);
+            directional.fill(&mut level, &mut workers, Arch::new());
+            let pixels = (0..HEIGHT).flat_map(|y| (0..WIDTH).map(move |x| (x, y))).filter(|&(x, y)| hidden(x, y));
+            let mut wrong = 0;
+            for (x, y) in pixels {
+                assert_eq!(at(&level, PLANES - 1, x, y), 1.0, "{degrees}: ({x}, {y}) sees what is known");
+                let truth_px = if outline_px(x, y) < 0.0 { NEAR_PX } else { FAR_PX };
+                wrong += usize::from((at(&level, 3, x, y) - truth_px).abs() > 1.0);
+            }
+            // Beside the outline lines disagree: one pixel each way, on average, of the eight that it is hidden for.
+            assert!(wrong <= 16, "{degrees} degrees: {wrong} pixels are of the other surface or of neither");
+        }
+    }
+
+    #[test]
+    fn what_is_known_stays_and_what_nothing_is_seen_from_stays_open() {
+        let mut workers = ThreadPool::new("fill", 2);
+        let mut directional = Directional::new(WIDTH, HEIGHT);
+        let mut seen = level(|x, _| x < 32, |x, y| x == 40 && y == 20);
+        directional.fill(&mut seen, &mut workers, Arch::new());
+        let before = level(|x, _| x < 32, |_, _| false);
+        for p in 0..PLANES {
+            let same =
+                (0..HEIGHT).all(|y| (0..WIDTH).all(|x| (at(&seen, p, x, y) - at(&before, p, x, y)).abs() < 1e-6));
+            assert!(same, "plane {p}");
+        }
+        let mut unseen = level(|_, _| true, |_, _| true);
+        directional.fill(&mut unseen, &mut workers, Arch::new());
+        assert!((0..HEIGHT).all(|y| (0..WIDTH).all(|x| at(&unseen, PLANES - 1, x, y) == 0.0)));
+    }
+}
