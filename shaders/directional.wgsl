@@ -4,6 +4,7 @@
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<storage, read_write> pyramid: array<vec4<f32>>;
 @group(0) @binding(2) var<storage, read_write> known: array<f32>;
+@group(0) @binding(3) var<storage, read> reached: array<vec4<f32>>;
 
 const LINES = 8u;
 
@@ -16,6 +17,7 @@ struct End {
 struct Line {
     value: vec4<f32>,
     weight: f32,
+    span_px: vec2<f32>,     // least and most CoC of its ends
 }
 
 fn likeness(a_px: f32, b_px: f32) -> f32 {
@@ -42,13 +44,15 @@ fn line_through(level: Level, pixel: vec2<u32>, direction: u32) -> Line {
     let length = sqrt(f32(step.x * step.x + step.y * step.y));
     let sum = a.steps + b.steps;
     if sum == 0.0 {
-        return Line(vec4(0.0), 0.0);
+        return Line(vec4(0.0), 0.0, vec2(1.0e30, -1.0e30));
     }
     if a.steps == 0.0 || b.steps == 0.0 {
-        return Line(select(a.value, b.value, a.steps == 0.0), 1.0 / (ONE_ENDED * length * sum));
+        let value = select(a.value, b.value, a.steps == 0.0);
+        return Line(value, 1.0 / (ONE_ENDED * length * sum), vec2(value.w));
     }
     let alike = likeness(a.value.w, b.value.w);
-    return Line(mix(a.value, b.value, a.steps / sum), alike * alike / (length * sum));
+    let span_px = vec2(min(a.value.w, b.value.w), max(a.value.w, b.value.w));
+    return Line(mix(a.value, b.value, a.steps / sum), alike * alike / (length * sum), span_px);
 }
 
 @compute @workgroup_size(SMALL_TILE, SMALL_TILE)
@@ -60,12 +64,19 @@ fn directional(@builtin(global_invocation_id) id: vec3<u32>) {
     let index = index_of(level, id.xy);
     let found = directional_at() + index;
     known[found] = 0.0;
-    if known[index] > 0.0 {
+    // Its pixels are the cells of the silhouettes' grid.
+    if known[index] > 0.0 || reached[id.y * level.size.x + id.x].x <= 0.0 {
         return;
     }
     var lines: array<Line, LINES>;
+    var span_px = vec2(1.0e30, -1.0e30);
     for (var d = 0u; d < LINES; d++) {
         lines[d] = line_through(level, id.xy, d);
+        span_px = vec2(min(span_px.x, lines[d].span_px.x), max(span_px.y, lines[d].span_px.y));
+    }
+    // Of one surface a mean of all around is as good.
+    if span_px.y - span_px.x < ONE_SURFACE_PX {
+        return;
     }
     // How many agree with each line counts four times over: a mean of two surfaces is neither.
     var scores: array<f32, LINES>;

@@ -67,6 +67,8 @@ pub const DIRECTIONS: [(i32, i32); 8] = [(1, 0), (2, 1), (1, 1), (1, 2), (0, 1),
 pub const MOST_STEPS: u8 = 254;
 /// Where CoC are this far apart, two surfaces are half alike.
 pub const HALF_ALIKE_PX: f32 = 2.0;
+/// Where all that is seen from a pixel has CoC less apart than this, it is one surface, of which a mean of all around is as good.
+pub const ONE_SURFACE_PX: f32 = 1.0;
 /// A line with one end counts as one with two alike ends would that is so many times as long.
 pub const ONE_ENDED: f32 = 4.0;
 

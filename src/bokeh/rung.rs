@@ -72,7 +72,7 @@ pub const LADDER: [Rung; Quality::ALL.len()] = {
             ..fast
         },
         Rung {
-            cost: 1.93,
+            cost: 2.2,
             rank: 4,
             bins_per_side: 6,
             near_from_px: FOCUS_BORDER_PX,

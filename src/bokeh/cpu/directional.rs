@@ -3,16 +3,21 @@
 
 #![allow(clippy::needless_range_loop)] // Planes and directions index several arrays at once.
 
+use std::f32::consts::SQRT_2;
+
 use pulp::{Arch, Simd, WithSimd};
 
 use super::levels::{Level, PLANES};
-use crate::bokeh::occlusion::{DIRECTIONS, MOST_STEPS, ONE_ENDED, likeness};
+use super::silhouettes::Silhouettes;
+use crate::bokeh::occlusion::{DIRECTIONS, GRAIN, MOST_STEPS, ONE_ENDED, ONE_SURFACE_PX, likeness};
 use crate::compute::thread_pool::{MOST_ITEMS, ThreadPool};
 
 /// Columns beside a row of steps, so that a step sideways stays in it.
 const PAD: usize = 2;
 /// Ways to look: each direction, and back.
 const WAYS: usize = 2 * DIRECTIONS.len();
+/// Pixels of the picture a side of one of the level, which is a cell of the silhouettes' grid.
+const PIXEL: usize = GRAIN;
 /// Steps, where there is no end that way: they saturate there.
 const NONE: u8 = u8::MAX;
 const _: () = assert!(MOST_STEPS == NONE - 1);
@@ -42,8 +47,8 @@ impl Directional {
         }
     }
 
-    /// Fills those pixels of a level that know nothing, as far as they see any that do.
-    pub fn fill(&mut self, level: &mut Level, workers: &mut ThreadPool, arch: Arch) {
+    /// Fills those pixels of a level that know nothing, as far as they see any that do, where silhouettes uncover them.
+    pub fn fill(&mut self, level: &mut Level, silhouettes: &Silhouettes, workers: &mut ThreadPool, arch: Arch) {
         let (width, stride) = (self.width, self.stride());
         let each = self.height.div_ceil(MOST_ITEMS);
         let rows = self.ends.chunks_mut(each * width).zip(self.open.chunks_mut(each * stride));
@@ -57,7 +62,7 @@ impl Directional {
         let (seen, level_stride) = (&*self, level.rows.stride);
         let each_len = each * level.rows.row_len();
         workers.run_each(level.rows.data.chunks_mut(each_len).enumerate(), &|(part, rows)| {
-            arch.dispatch(Vote { seen, first: part * each, rows, stride: level_stride });
+            arch.dispatch(Vote { seen, silhouettes, first: part * each, rows, stride: level_stride });
         });
     }
 
@@ -65,6 +70,10 @@ impl Directional {
         self.width + 2 * PAD
     }
 }
+
+/// Lengths of a step in each direction.
+const LENGTHS: Lines = [1.0, SQRT_5, SQRT_2, SQRT_5, 1.0, SQRT_5, SQRT_2, SQRT_5];
+const SQRT_5: f32 = 2.236_068;
 
 /// The step of a way, across and down.
 #[inline(always)]
@@ -153,6 +162,7 @@ impl WithSimd for Walk<'_> {
 /// What the lines through the open pixels of some rows agree on.
 struct Vote<'a> {
     seen: &'a Directional,
+    silhouettes: &'a Silhouettes,
     first: usize,
     rows: &'a mut [f32],
     stride: usize,
@@ -166,7 +176,8 @@ impl WithSimd for Vote<'_> {
         let padded = seen.stride();
         for (y, row) in (self.first..).zip(self.rows.chunks_exact_mut(stride * PLANES)) {
             let open = &seen.open[y * padded + PAD..][..seen.width];
-            for x in (0..seen.width).filter(|&x| open[x] == NONE) {
+            let [shows, _] = self.silhouettes.row(y * PIXEL);
+            for x in (0..seen.width).filter(|&x| open[x] == NONE && shows[x] > 0.0) {
                 if let Some(value) = seen.between(x, y) {
                     for (p, value) in value.into_iter().chain([1.0]).enumerate() {
                         row[p * stride + x] = value;
@@ -177,61 +188,73 @@ impl WithSimd for Vote<'_> {
     }
 }
 
-/// Of a line through a pixel: its two ends (where it has one, twice that), how much of the second there is, and its weight.
-#[derive(Clone, Copy, Default)]
-struct Line {
-    ends: [usize; 2],
-    second: f32,
-    weight: f32,
-}
+/// A value for each direction.
+type Lines = [f32; DIRECTIONS.len()];
 
 impl Directional {
-    /// Light and CoC of an open pixel.
+    /// Light and CoC of an open pixel; `None` where one surface alone is seen from it, or none.
     #[inline(always)]
     fn between(&self, x: usize, y: usize) -> Option<[f32; 4]> {
         let (stride, plane) = (self.stride(), self.open.len());
-        let (mut lines, mut coc_px) = ([Line::default(); DIRECTIONS.len()], [0.0f32; DIRECTIONS.len()]);
-        for (d, &(across, down)) in DIRECTIONS.iter().enumerate() {
-            let ends = [2 * d, 2 * d + 1].map(|way| {
-                let steps = self.steps[way * plane + y * stride + PAD + x];
-                let (across, down) = step_of(way);
-                let at = |from: usize, step: isize| (from as isize + isize::from(steps) * step) as usize;
-                (steps < NONE).then(|| (at(y, down) * self.width + at(x, across), f32::from(steps)))
-            });
-            let length = ((across * across + down * down) as f32).sqrt();
-            lines[d] = match ends {
-                [Some((a, to_a)), Some((b, to_b))] => {
-                    let likeness = likeness(self.ends[a][3], self.ends[b][3]);
-                    let sum = to_a + to_b;
-                    Line { ends: [a, b], second: to_a / sum, weight: likeness * likeness / (length * sum) }
-                }
-                [Some((a, to_a)), None] | [None, Some((a, to_a))] => {
-                    Line { ends: [a, a], second: 0.0, weight: 1.0 / (ONE_ENDED * length * to_a) }
-                }
-                [None, None] => Line::default(),
-            };
-            let [a, b] = lines[d].ends.map(|end| self.ends[end][3]);
-            coc_px[d] = a + (b - a) * lines[d].second;
+        let at = y * stride + PAD + x;
+        let (mut ends, mut steps, mut coc_px) =
+            ([[0; DIRECTIONS.len()]; 2], [[0.0; DIRECTIONS.len()]; 2], [Lines::default(); 2]);
+        for way in 0..WAYS {
+            let (d, side, (across, down)) = (way / 2, way % 2, step_of(way));
+            let count = self.steps[way * plane + at];
+            // Where there is no end, any pixel will do, as it does not count.
+            let count_on = if count < NONE { isize::from(count) } else { 0 };
+            let end = (y as isize + count_on * down) as usize * self.width + (x as isize + count_on * across) as usize;
+            (ends[side][d], steps[side][d], coc_px[side][d]) = (end, f32::from(count), self.ends[end][3]);
+        }
+        let seen_px = steps.as_flattened().iter().zip(coc_px.as_flattened());
+        let seen_px = seen_px.filter(|&(&steps, _)| steps <= f32::from(MOST_STEPS)).map(|(_, &px)| px);
+        let (least_px, most_px) = seen_px.fold((f32::MAX, f32::MIN), |(least, most), px| (least.min(px), most.max(px)));
+        if most_px - least_px < ONE_SURFACE_PX {
+            return None;
+        }
+        let (mut weights, mut second, mut line_px) = (Lines::default(), Lines::default(), Lines::default());
+        for d in 0..DIRECTIONS.len() {
+            let ([to_a, to_b], [a_px, b_px]) = (steps.map(|steps| steps[d]), coc_px.map(|coc_px| coc_px[d]));
+            let (has_a, has_b) = (to_a <= f32::from(MOST_STEPS), to_b <= f32::from(MOST_STEPS));
+            let alike = likeness(a_px, b_px);
+            let (to_a, to_b) = (if has_a { to_a } else { 0.0 }, if has_b { to_b } else { 0.0 });
+            let sum = to_a + to_b;
+            let weight = if has_a && has_b { alike * alike } else { 1.0 / ONE_ENDED };
+            weights[d] = if has_a || has_b { weight / (LENGTHS[d] * sum) } else { 0.0 };
+            let share = if has_b { to_a / sum } else { 0.0 };
+            second[d] = if has_a { share } else { 1.0 };
+            line_px[d] = a_px + (b_px - a_px) * second[d];
         }
         // How many agree with each line counts four times over: a mean of two surfaces is neither.
-        let mut scores = [0.0f32; DIRECTIONS.len()];
+        let mut scores = Lines::default();
+        for e in 0..DIRECTIONS.len() {
+            for d in 0..DIRECTIONS.len() {
+                scores[d] += weights[e] * likeness(line_px[d], line_px[e]);
+            }
+        }
+        let most = scores.iter().fold(1e-30f32, |most, &score| most.max(score));
+        let mut total = 0.0;
         for d in 0..DIRECTIONS.len() {
-            for e in 0..DIRECTIONS.len() {
-                scores[d] += lines[e].weight * likeness(coc_px[d], coc_px[e]);
+            let agreed = scores[d] * scores[d] / (most * most);
+            weights[d] *= agreed * agreed;
+            total += weights[d];
+        }
+        if total <= 0.0 {
+            return None;
+        }
+        let mut sum = [0.0f32; 4];
+        for d in 0..DIRECTIONS.len() {
+            let weight = weights[d] / total;
+            let shares = [weight * (1.0 - second[d]), weight * second[d]];
+            for (ends, share) in ends.iter().zip(shares) {
+                let end = &self.ends[ends[d]];
+                for p in 0..4 {
+                    sum[p] += share * end[p];
+                }
             }
         }
-        let most = scores.iter().fold(0.0f32, |most, &score| most.max(score));
-        let (mut sum, mut total) = ([0.0f32; 4], 0.0);
-        for (line, score) in lines.iter().zip(scores) {
-            let agreed = (score / most.max(1e-30)).powi(2);
-            let weight = line.weight * agreed * agreed;
-            total += weight;
-            let [a, b] = line.ends.map(|end| self.ends[end]);
-            for p in 0..4 {
-                sum[p] += weight * (a[p] + (b[p] - a[p]) * line.second);
-            }
-        }
-        (total > 0.0).then(|| sum.map(|sum| sum / total))
+        Some(sum)
     }
 }
 
@@ -260,6 +283,15 @@ mod tests {
         Level { width: WIDTH, height: HEIGHT, rows }
     }
 
+    /// Silhouettes that uncover every pixel.
+    fn everywhere() -> Silhouettes {
+        let mut silhouettes = Silhouettes::new(PIXEL * WIDTH, PIXEL * HEIGHT);
+        let marks = silhouettes.marks(PIXEL * HEIGHT);
+        marks.part(0).fill(1e3);
+        silhouettes.spread(&mut ThreadPool::new("spread", 1), Arch::new());
+        silhouettes
+    }
+
     fn at(level: &Level, p: usize, x: usize, y: usize) -> f32 {
         level.rows.row(y)[p * level.rows.stride + x]
     }
@@ -278,7 +310,7 @@ mod tests {
                 false => (20..28).contains(&y),
             };
             let mut level = level(|x, y| outline_px(x, y) < 0.0, hidden);
-            directional.fill(&mut level, &mut workers, Arch::new());
+            directional.fill(&mut level, &everywhere(), &mut workers, Arch::new());
             let pixels = (0..HEIGHT).flat_map(|y| (0..WIDTH).map(move |x| (x, y))).filter(|&(x, y)| hidden(x, y));
             let mut wrong = 0;
             for (x, y) in pixels {
@@ -296,7 +328,7 @@ mod tests {
         let mut workers = ThreadPool::new("fill", 2);
         let mut directional = Directional::new(WIDTH, HEIGHT);
         let mut seen = level(|x, _| x < 32, |x, y| x == 40 && y == 20);
-        directional.fill(&mut seen, &mut workers, Arch::new());
+        directional.fill(&mut seen, &everywhere(), &mut workers, Arch::new());
         let before = level(|x, _| x < 32, |_, _| false);
         for p in 0..PLANES {
             let same =
@@ -304,7 +336,7 @@ mod tests {
             assert!(same, "plane {p}");
         }
         let mut unseen = level(|_, _| true, |_, _| true);
-        directional.fill(&mut unseen, &mut workers, Arch::new());
+        directional.fill(&mut unseen, &everywhere(), &mut workers, Arch::new());
         assert!((0..HEIGHT).all(|y| (0..WIDTH).all(|x| at(&unseen, PLANES - 1, x, y) == 0.0)));
     }
 }

@@ -89,7 +89,7 @@ impl Pyramid {
     }
 
     /// Fills what is hidden by all that is not `unhidden`, once the halves are laid.
-    pub fn fill(&mut self, unhidden: &Share, workers: &mut ThreadPool, arch: Arch) {
+    pub fn fill(&mut self, unhidden: &Share, silhouettes: &Silhouettes, workers: &mut ThreadPool, arch: Arch) {
         self.lay_base(unhidden, workers, arch);
         for k in 1..self.levels.len() {
             let (fine, coarse) = self.levels.split_at_mut(k);
@@ -101,7 +101,7 @@ impl Pyramid {
             });
         }
         if let Some(level) = self.levels.get_mut(1) {
-            self.directional.fill(level, workers, arch);
+            self.directional.fill(level, silhouettes, workers, arch);
         }
         for k in (1..self.levels.len()).rev() {
             let (fine, coarse) = self.levels.split_at_mut(k);

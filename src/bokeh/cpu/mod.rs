@@ -140,7 +140,7 @@ impl CpuBokeh {
         lap("bin")?;
         for layer in self.plan.layers().skip(1) {
             if let Some(pyramid) = &mut self.pyramid {
-                pyramid.fill(&self.plan.unhidden(layer.start), &mut self.workers, self.arch);
+                pyramid.fill(&self.plan.unhidden(layer.start), &self.silhouettes, &mut self.workers, self.arch);
             }
             lap("fill")?;
             self.bin(&frame, Some(layer));

@@ -106,6 +106,7 @@ impl Passes {
             let fill = (index > 0).then(|| {
                 let pulled = [&b.frame, &b.scene, &b.nearest_px, &b.pyramid, &b.known, &b.mixed];
                 let coarse = [&b.frame, &b.pyramid, &b.known];
+                let lines = [&b.frame, &b.pyramid, &b.known, &b.reached];
                 let known = [&b.pyramid, &b.known];
                 let (seen, nearest) = ([&b.scene, &b.ranges, &b.behind], &b.nearest_px);
                 let (lists, reached) = (&b.binned, [&b.reached, &b.mixed]);
@@ -118,7 +119,7 @@ impl Passes {
                     // A thread takes four pixels of half the size, or of the picture.
                     maker.pass(shaders::PULL, &work, &pulled, over(half, 2 * TILE)).named(FILL),
                     maker.pass(shaders::COARSE, &[], &coarse, [1; 3]).named(FILL),
-                    maker.pass(shaders::DIRECTIONAL, &[], &coarse, over(quarter, SMALL_TILE)).named(FILL),
+                    maker.pass(shaders::DIRECTIONAL, &[], &lines, over(quarter, SMALL_TILE)).named(FILL),
                     maker.pass(shaders::FILL, &work, &filled, over(picture, TILE)),
                 ]
             });
