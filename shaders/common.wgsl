@@ -19,6 +19,7 @@ override STEPS_DOWN: u32;
 override MOST_STEPS: u32;           // that are taken
 override HALF_ALIKE_PX: f32;        // so far apart, two CoC are half alike
 override ONE_SURFACE_PX: f32;       // what is less apart than this is one surface
+override TRUSTED_STEPS: f32;        // as long lines are trusted wholly
 override ONE_ENDED: f32;            // a line with one end counts as one of so many times its length
 override OCTAVES_FROM_PX: f32;      // from this radius on, nodes of the bank lie evenly in each octave
 override OCTAVE_SHIFT: u32;         // bits of a float below those that tell the node within its octave

@@ -17,6 +17,7 @@ struct End {
 struct Line {
     value: vec4<f32>,
     weight: f32,
+    steps: f32,             // its length; 0 where it has no end
     span_px: vec2<f32>,     // least and most CoC of its ends
 }
 
@@ -44,15 +45,15 @@ fn line_through(level: Level, pixel: vec2<u32>, direction: u32) -> Line {
     let length = sqrt(f32(step.x * step.x + step.y * step.y));
     let sum = a.steps + b.steps;
     if sum == 0.0 {
-        return Line(vec4(0.0), 0.0, vec2(1.0e30, -1.0e30));
+        return Line(vec4(0.0), 0.0, 0.0, vec2(1.0e30, -1.0e30));
     }
     if a.steps == 0.0 || b.steps == 0.0 {
         let value = select(a.value, b.value, a.steps == 0.0);
-        return Line(value, 1.0 / (ONE_ENDED * length * sum), vec2(value.w));
+        return Line(value, 1.0 / (ONE_ENDED * length * sum), ONE_ENDED * length * sum, vec2(value.w));
     }
     let alike = likeness(a.value.w, b.value.w);
     let span_px = vec2(min(a.value.w, b.value.w), max(a.value.w, b.value.w));
-    return Line(mix(a.value, b.value, a.steps / sum), alike * alike / (length * sum), span_px);
+    return Line(mix(a.value, b.value, a.steps / sum), alike * alike / (length * sum), length * sum, span_px);
 }
 
 @compute @workgroup_size(SMALL_TILE, SMALL_TILE)
@@ -70,8 +71,10 @@ fn directional(@builtin(global_invocation_id) id: vec3<u32>) {
     }
     var lines: array<Line, LINES>;
     var span_px = vec2(1.0e30, -1.0e30);
+    var shortest = 1.0e30;
     for (var d = 0u; d < LINES; d++) {
         lines[d] = line_through(level, id.xy, d);
+        shortest = min(shortest, select(1.0e30, lines[d].steps, lines[d].steps > 0.0));
         span_px = vec2(min(span_px.x, lines[d].span_px.x), max(span_px.y, lines[d].span_px.y));
     }
     // Of one surface a mean of all around is as good.
@@ -95,7 +98,8 @@ fn directional(@builtin(global_invocation_id) id: vec3<u32>) {
         sum = plus(sum, times(Known(lines[d].value, 1.0), lines[d].weight * agreed * agreed));
     }
     if sum.known > 0.0 {
-        pyramid[found] = sum.value / sum.known;
-        known[found] = 1.0;
+        let trust = clamp(2.0 - shortest / TRUSTED_STEPS, 0.0, 1.0);
+        pyramid[found] = trust * sum.value / sum.known;
+        known[found] = trust;
     }
 }

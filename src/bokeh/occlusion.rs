@@ -69,6 +69,9 @@ pub const MOST_STEPS: u8 = 254;
 pub const HALF_ALIKE_PX: f32 = 2.0;
 /// Where all that is seen from a pixel has CoC less apart than this, it is one surface, of which a mean of all around is as good.
 pub const ONE_SURFACE_PX: f32 = 1.0;
+/// Up to so many steps from end to end a line is trusted wholly, and from twice as many on not at all: deep within something
+/// large, lines from far away cross one another, and a mean of all around has no edges of its own.
+pub const TRUSTED_STEPS: f32 = 12.0;
 /// A line with one end counts as one with two alike ends would that is so many times as long.
 pub const ONE_ENDED: f32 = 4.0;
 

@@ -9,7 +9,7 @@ use pulp::{Arch, Simd, WithSimd};
 
 use super::levels::{Level, PLANES};
 use super::silhouettes::Silhouettes;
-use crate::bokeh::occlusion::{DIRECTIONS, GRAIN, MOST_STEPS, ONE_ENDED, ONE_SURFACE_PX, likeness};
+use crate::bokeh::occlusion::{DIRECTIONS, GRAIN, MOST_STEPS, ONE_ENDED, ONE_SURFACE_PX, TRUSTED_STEPS, likeness};
 use crate::compute::thread_pool::{MOST_ITEMS, ThreadPool};
 
 /// Columns beside a row of steps, so that a step sideways stays in it.
@@ -179,7 +179,7 @@ impl WithSimd for Vote<'_> {
             let [shows, _] = self.silhouettes.row(y * PIXEL);
             for x in (0..seen.width).filter(|&x| open[x] == NONE && shows[x] > 0.0) {
                 if let Some(value) = seen.between(x, y) {
-                    for (p, value) in value.into_iter().chain([1.0]).enumerate() {
+                    for (p, value) in value.into_iter().enumerate() {
                         row[p * stride + x] = value;
                     }
                 }
@@ -192,9 +192,10 @@ impl WithSimd for Vote<'_> {
 type Lines = [f32; DIRECTIONS.len()];
 
 impl Directional {
-    /// Light and CoC of an open pixel; `None` where one surface alone is seen from it, or none.
+    /// Light and CoC of an open pixel times how far they are trusted, and that; `None` where one surface alone is seen from it, or
+    /// nothing near enough.
     #[inline(always)]
-    fn between(&self, x: usize, y: usize) -> Option<[f32; 4]> {
+    fn between(&self, x: usize, y: usize) -> Option<[f32; PLANES]> {
         let (stride, plane) = (self.stride(), self.open.len());
         let at = y * stride + PAD + x;
         let (mut ends, mut steps, mut coc_px) =
@@ -214,17 +215,24 @@ impl Directional {
             return None;
         }
         let (mut weights, mut second, mut line_px) = (Lines::default(), Lines::default(), Lines::default());
+        let mut shortest = f32::MAX;
         for d in 0..DIRECTIONS.len() {
             let ([to_a, to_b], [a_px, b_px]) = (steps.map(|steps| steps[d]), coc_px.map(|coc_px| coc_px[d]));
             let (has_a, has_b) = (to_a <= f32::from(MOST_STEPS), to_b <= f32::from(MOST_STEPS));
             let alike = likeness(a_px, b_px);
             let (to_a, to_b) = (if has_a { to_a } else { 0.0 }, if has_b { to_b } else { 0.0 });
             let sum = to_a + to_b;
-            let weight = if has_a && has_b { alike * alike } else { 1.0 / ONE_ENDED };
-            weights[d] = if has_a || has_b { weight / (LENGTHS[d] * sum) } else { 0.0 };
+            let length = LENGTHS[d] * sum * if has_a && has_b { 1.0 } else { ONE_ENDED };
+            let agreement = if has_a && has_b { alike * alike } else { 1.0 };
+            weights[d] = if length > 0.0 { agreement / length } else { 0.0 };
+            shortest = if length > 0.0 { shortest.min(length) } else { shortest };
             let share = if has_b { to_a / sum } else { 0.0 };
             second[d] = if has_a { share } else { 1.0 };
             line_px[d] = a_px + (b_px - a_px) * second[d];
+        }
+        let trust = (2.0 - shortest / TRUSTED_STEPS).clamp(0.0, 1.0);
+        if trust <= 0.0 {
+            return None;
         }
         // How many agree with each line counts four times over: a mean of two surfaces is neither.
         let mut scores = Lines::default();
@@ -243,9 +251,9 @@ impl Directional {
         if total <= 0.0 {
             return None;
         }
-        let mut sum = [0.0f32; 4];
+        let mut sum = [0.0, 0.0, 0.0, 0.0, trust];
         for d in 0..DIRECTIONS.len() {
-            let weight = weights[d] / total;
+            let weight = trust * weights[d] / total;
             let shares = [weight * (1.0 - second[d]), weight * second[d]];
             for (ends, share) in ends.iter().zip(shares) {
                 let end = &self.ends[ends[d]];

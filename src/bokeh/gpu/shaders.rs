@@ -5,7 +5,7 @@ use bytemuck::{Pod, Zeroable};
 use crate::bokeh::bank::{OCTAVE_SHIFT, OCTAVES_FROM_PX};
 use crate::bokeh::occlusion::{
     DIRECTIONS, FADE, GRAIN, HALF_ALIKE_PX, MARGIN_PX, MOST_STEPS, ONE_ENDED, ONE_SURFACE_PX, OTHER_FROM, OTHER_TO,
-    OWN_COVERAGE,
+    OWN_COVERAGE, TRUSTED_STEPS,
 };
 use crate::bokeh::plan::{
     ANY_COLOR, CELL, COVERAGE_FLOOR, FAR_WEIGHT, HAND_OVER, HIDING_SHARE, HINDMOST_COVERAGE, SEGMENT,
@@ -94,7 +94,7 @@ const fn steps(axis: usize) -> f64 {
 }
 
 /// The `override` constants of `common.wgsl`.
-pub const CONSTANTS: [(&str, f64); 30] = [
+pub const CONSTANTS: [(&str, f64); 31] = [
     ("CELL", CELL as f64),
     ("SEGMENT", SEGMENT as f64),
     ("ANY_COLOR", ANY_COLOR as f64),
@@ -114,6 +114,7 @@ pub const CONSTANTS: [(&str, f64); 30] = [
     ("MOST_STEPS", MOST_STEPS as f64),
     ("HALF_ALIKE_PX", HALF_ALIKE_PX as f64),
     ("ONE_SURFACE_PX", ONE_SURFACE_PX as f64),
+    ("TRUSTED_STEPS", TRUSTED_STEPS as f64),
     ("ONE_ENDED", ONE_ENDED as f64),
     ("OCTAVES_FROM_PX", OCTAVES_FROM_PX as f64),
     ("OCTAVE_SHIFT", OCTAVE_SHIFT as f64),
