@@ -9,6 +9,7 @@ pub mod background;
 pub mod beside;
 mod bits;
 pub mod defocus;
+mod dilation;
 pub mod fill;
 pub mod focus;
 pub mod follow;

@@ -1,6 +1,7 @@
 //! What stands before the plate: pixels that differ from it, less what is only lit otherwise, joined to parts.
 
 use crate::depth::alignment::Alignment;
+use crate::depth::dilation::dilate;
 use crate::depth::reduced::MOST;
 use crate::depth::tap::nearest;
 use crate::frame::Mask;
@@ -78,25 +79,6 @@ fn differences(now: &[f32], own: &[f32], beside: [&[f32]; 2], gain: &[f32], off:
     }
 }
 
-/// Whether any of the flags up to so many columns or rows away is set.
-fn dilate(flags: &[bool], (width, height): (usize, usize), reach: usize, wide: &mut Vec<bool>) {
-    wide.clear();
-    wide.resize(flags.len(), false);
-    for (at, _) in flags.iter().enumerate().filter(|(_, flag)| **flag) {
-        let (x, y) = (at % width, at / width);
-        // Inner pixels add nothing to what their neighbours do.
-        let is_inner = x > 0 && x + 1 < width && y > 0 && y + 1 < height;
-        if is_inner && [at - 1, at + 1, at - width, at + width].iter().all(|&beside| flags[beside]) {
-            wide[at] = true;
-            continue;
-        }
-        let columns = x.saturating_sub(reach)..(x + reach + 1).min(width);
-        for y in y.saturating_sub(reach)..(y + reach + 1).min(height) {
-            wide[y * width..][columns.clone()].fill(true);
-        }
-    }
-}
-
 /// Finds what stands before a plate; owns the memory for it.
 #[derive(Debug, Default)]
 pub struct Subject {
@@ -109,6 +91,8 @@ pub struct Subject {
     seen: Vec<bool>,
     front: Vec<u32>,
     sample: Vec<f32>,
+    /// A line of flags.
+    flags: Vec<bool>,
     /// Whether a pixel of a mask of persons is one, or close to one.
     near: Vec<bool>,
     /// Whether a pixel is of something before the plate.
@@ -259,7 +243,8 @@ impl Subject {
         self.seen.clear();
         self.seen.extend(persons.share.iter().map(|share| *share > PERSON));
         let mut near = std::mem::take(&mut self.near);
-        dilate(&self.seen, of_mask, (CLOSE * of_mask.0 as f32).ceil() as usize, &mut near);
+        near.clone_from(&self.seen);
+        dilate(&mut near, &mut self.flags, of_mask.0, (CLOSE * of_mask.0 as f32).ceil() as usize);
         let place = |at: u32| nearest(at as usize, size, of_mask);
         let mut kept = 0;
         for part in &mut self.parts {

@@ -4,6 +4,7 @@
 //! hysteresis; a part counts that reaches beyond the rim of the person; and it joins after some frames, as a whole.
 
 use super::parts::Parts;
+use crate::depth::dilation::dilate;
 
 /// What is no person is as near as the subject from here on, where it was theirs in the frame before, and where it was not.
 const AS_NEAR: [f32; 2] = [0.83, 0.92];
@@ -54,7 +55,7 @@ impl Belongings {
         self.decide(width);
         // Their soft outline is inside where a thing goes on.
         self.beyond.clone_from(&self.held);
-        widen(&mut self.beyond, &mut self.line, width, SEAM_PX);
+        dilate(&mut self.beyond, &mut self.line, width, SEAM_PX);
         for (share, (beyond, person)) in shares.iter_mut().zip(self.beyond.iter().zip(&self.persons)) {
             *share = if *beyond & *person { 1.0 } else { *share };
         }
@@ -69,7 +70,7 @@ impl Belongings {
         persons.clear();
         persons.extend(shares.iter().map(|&share| share > part));
         rim.clone_from(persons);
-        widen(rim, line, width, RIM_PX);
+        dilate(rim, line, width, RIM_PX);
         may_be.clear();
         let as_near = |(&near, &held): (&f32, &bool)| near > AS_NEAR[usize::from(!held)];
         may_be.extend(nearness.iter().zip(&*held).zip(&*persons).map(|(pixel, &person)| as_near(pixel) && !person));
@@ -100,7 +101,7 @@ impl Belongings {
         }
         beyond.clear();
         beyond.extend((0..shares.len()).map(|at| may_be[at] && !rim[at] && (joined[at] || held[at])));
-        widen(beyond, line, width, RIM_PX);
+        dilate(beyond, line, width, RIM_PX);
         for at in 0..shares.len() {
             joined[at] &= may_be[at] && beyond[at];
         }
@@ -123,25 +124,6 @@ impl Belongings {
             }
         }
     }
-}
-
-/// Marks all within so many pixels of what is marked, row by row and column by column.
-fn widen(plane: &mut [bool], line: &mut Vec<bool>, width: usize, reach_px: usize) {
-    let height = plane.len() / width.max(1);
-    let mut along = |first: usize, step: usize, count: usize| {
-        line.clear();
-        line.extend((0..count).map(|k| plane[first + k * step]));
-        for back in [false, true] {
-            let mut left = 0;
-            for k in (0..count).map(|k| if back { count - 1 - k } else { k }) {
-                left = if line[k] { reach_px + 1 } else { left };
-                plane[first + k * step] |= left > 0;
-                left = left.saturating_sub(1);
-            }
-        }
-    };
-    (0..height).for_each(|y| along(y * width, 1, width));
-    (0..width).for_each(|x| along(x, width, height));
 }
 
 #[cfg(test)]
@@ -209,14 +191,5 @@ mod tests {
     fn the_rim_of_a_person_is_not_what_they_hold() {
         // The network's outlines are fat.
         assert_eq!(Scene::new().sees(20 + RIM_PX, 1.0), columns(20));
-    }
-
-    #[test]
-    fn marks_are_widened_by_so_many_pixels_each_way() {
-        let mut plane = vec![false; 11 * 9];
-        plane[4 * 11 + 5] = true;
-        widen(&mut plane, &mut Vec::new(), 11, 2);
-        let marked = |at: usize| (at % 11).abs_diff(5) <= 2 && (at / 11).abs_diff(4) <= 2;
-        assert!((0..99).all(|at| plane[at] == marked(at)));
     }
 }

@@ -1,0 +1,34 @@
+//! Dilation of flags, such as those of a mask.
+
+/// Marks all within so many pixels of what is marked, row by row and column by column.
+pub fn dilate(plane: &mut [bool], line: &mut Vec<bool>, width: usize, reach_px: usize) {
+    let height = plane.len() / width.max(1);
+    let mut along = |first: usize, step: usize, count: usize| {
+        line.clear();
+        line.extend((0..count).map(|k| plane[first + k * step]));
+        for back in [false, true] {
+            let mut left = 0;
+            for k in (0..count).map(|k| if back { count - 1 - k } else { k }) {
+                left = if line[k] { reach_px + 1 } else { left };
+                plane[first + k * step] |= left > 0;
+                left = left.saturating_sub(1);
+            }
+        }
+    };
+    (0..height).for_each(|y| along(y * width, 1, width));
+    (0..width).for_each(|x| along(x, width, height));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn marks_are_widened_by_so_many_pixels_each_way() {
+        let mut plane = vec![false; 11 * 9];
+        plane[4 * 11 + 5] = true;
+        dilate(&mut plane, &mut Vec::new(), 11, 2);
+        let marked = |at: usize| (at % 11).abs_diff(5) <= 2 && (at / 11).abs_diff(4) <= 2;
+        assert!((0..99).all(|at| plane[at] == marked(at)));
+    }
+}
