@@ -11,6 +11,7 @@ mod known;
 mod onnx;
 mod onnx_runtime;
 mod place;
+mod tflite;
 
 use std::path::{Path, PathBuf};
 
@@ -145,7 +146,9 @@ pub fn load(path: &Path, runtime: Runtime) -> Result<Loaded, NetworkError> {
     let bytes = input::read(path, MOST_BYTES).map_err(|source| NetworkError::Read { path: path.into(), source })?;
     let known = Known::of(&bytes);
     let refused = |why: String| NetworkError::Refused { path: path.into(), why };
-    onnx::refuse_repeating(&bytes).map_err(refused)?;
+    if !tflite::is_tflite(&bytes) {
+        onnx::refuse_repeating(&bytes).map_err(refused)?;
+    }
     let loaded = match apart::is_possible() && known.is_none() {
         true => apart::load(&bytes, runtime),
         false => load_here(bytes, runtime),
@@ -178,6 +181,9 @@ enum Failure {
 
 /// Lets a runtime in this process load a network.
 fn load_here(bytes: Vec<u8>, runtime: Runtime) -> Result<Network, Failure> {
+    if tflite::is_tflite(&bytes) {
+        return guarded(|| tflite::Tflite::load(&bytes)).map_err(Failure::Refused);
+    }
     let other = match runtime {
         Runtime::BuiltIn => None,
         Runtime::Auto => onnx_runtime::environment().ok(),
