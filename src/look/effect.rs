@@ -5,7 +5,7 @@ use crate::names::named;
 named! {
     /// What the blur follows.
     pub enum Effect default Auto {
-        /// dof with depth, else tilt-shift
+        /// dof with depth, else blur
         Auto = "auto",
         /// The radius follows depth
         Dof = "dof",

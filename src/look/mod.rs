@@ -114,11 +114,11 @@ impl Look {
         Self { effect, ..Self::default() }
     }
 
-    /// The look as far as a source with depth or without allows it: without, depth of field is a sharp band and blur
-    /// that grows away from it.
+    /// The look as far as a source with depth or without allows it: without, nobody knows what to keep sharp, and all is
+    /// blurred alike.
     pub fn for_source(&self, has_depth: bool) -> Self {
         let effect = match self.effect {
-            effect if effect.follows_depth() && !has_depth => Effect::TiltShift,
+            effect if effect.follows_depth() && !has_depth => Effect::Blur,
             effect => effect,
         };
         Self { effect, ..self.clone() }
@@ -151,7 +151,7 @@ impl Look {
             CocField::Depth(lens) => FocusRule::Metres(lens.focus_m),
             CocField::Uniform { .. } | CocField::Ramp(_) => self.focus,
         };
-        // Not `auto`, which becomes tilt-shift where the depth is missing.
+        // Not `auto`, which blurs all alike where the depth is missing.
         let effect = if self.effect.follows_depth() { Effect::Dof } else { self.effect };
         Self { effect, focus, quality: quality.or(self.quality), ..self.clone() }
     }

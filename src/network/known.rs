@@ -37,8 +37,8 @@ impl Scaling {
 /// A network that is recognised.
 #[derive(Debug)]
 pub struct Known {
-    /// What it is called here.
-    pub name: &'static str,
+    /// What it is called here, and its file where it is installed.
+    pub file: &'static str,
     /// What it finds.
     pub task: Task,
     /// SHA-256 of its file, in hexadecimal.
@@ -55,10 +55,20 @@ pub struct Known {
     pub bgr: bool,
 }
 
-/// The best of each task first.
-pub static KNOWN: [Known; 6] = [
+/// The best of each task first; of those that are alike, the one that takes the least time.
+pub static KNOWN: [Known; 7] = [
     Known {
-        name: "selfie-landscape",
+        file: "selfie-landscape.tflite",
+        task: Task::Matte,
+        sha256: "4aafe6223bb8dac6fac8ca8ed56852870a33051ef3f6238822d282a109962894",
+        bytes: 249_792,
+        license: "Apache-2.0 (MediaPipe Selfie Segmentation)",
+        address: "https://cdn.jsdelivr.net/npm/@mediapipe/selfie_segmentation@0.1.1675465747/selfie_segmentation_landscape.tflite",
+        scaling: Scaling::UNIT,
+        bgr: false,
+    },
+    Known {
+        file: "selfie-landscape.onnx",
         task: Task::Matte,
         sha256: "b580fea1ee4a608472e07e4c2a21af1771d9022bb444e34b7f83719483cb5026",
         bytes: 453_831,
@@ -68,7 +78,7 @@ pub static KNOWN: [Known; 6] = [
         bgr: false,
     },
     Known {
-        name: "selfie",
+        file: "selfie.onnx",
         task: Task::Matte,
         sha256: "1511ab5564cb0ae179cba9bcad6ad931003ccc71656f11fd270967023678c6a5",
         bytes: 447_596,
@@ -78,7 +88,7 @@ pub static KNOWN: [Known; 6] = [
         bgr: false,
     },
     Known {
-        name: "selfie-planes",
+        file: "selfie-planes.onnx",
         task: Task::Matte,
         sha256: "3241ac4ad8aa35bdaf33946776db29f7c283a413aa0b0dacb9483594b4531aad",
         bytes: 462_352,
@@ -88,7 +98,7 @@ pub static KNOWN: [Known; 6] = [
         bgr: false,
     },
     Known {
-        name: "selfie-int8",
+        file: "selfie-int8.onnx",
         task: Task::Matte,
         sha256: "9bc3d56b0b1397acbdafb631ab5c7bf14a889c00fbe2018e36503c65a2b65983",
         bytes: 223_977,
@@ -98,7 +108,7 @@ pub static KNOWN: [Known; 6] = [
         bgr: false,
     },
     Known {
-        name: "sinet",
+        file: "sinet.onnx",
         task: Task::Matte,
         sha256: "17a75acc69747e443717dfaef152ee3c4615f2d81b0269f7c0224c47584af46a",
         bytes: 395_434,
@@ -112,7 +122,7 @@ pub static KNOWN: [Known; 6] = [
         bgr: true,
     },
     Known {
-        name: "tcmonodepth-small",
+        file: "tcmonodepth-small.onnx",
         task: Task::Mono,
         sha256: "902b886beaebd3f68deb40bab2fd636a0c112c1ef1cbdd15fa26e5c55b389b4d",
         bytes: 790_459,
@@ -138,9 +148,11 @@ impl Known {
         KNOWN.iter().any(|known| known.bytes == bytes)
     }
 
-    /// The file name that it is installed under.
-    pub fn file_name(&self) -> String {
-        format!("{}.onnx", self.name)
+    /// The first that is called this, with or without the ending of its file.
+    pub fn named(name: &str) -> Option<&'static Self> {
+        KNOWN
+            .iter()
+            .find(|known| known.file == name || known.file.split_once('.').is_some_and(|(stem, _)| stem == name))
     }
 }
 

@@ -1,6 +1,7 @@
-//! Neural networks in ONNX files of the user's own: read, run, and kept from doing harm.
+//! Neural networks in files, TFLite's and ONNX's: read, run, and kept from doing harm.
 //!
-//! A file is run by ONNX Runtime where that is installed, and else by what is built in. It is not trusted: its size and
+//! What finds persons in the least time, and comes with the packages, is a TFLite file, which is run by code of our own
+//! ([`tflite`]). An ONNX file is run by ONNX Runtime where that is installed, and else by a library. No file is trusted: its size and
 //! those of all it takes and gives are bounded, it may have no loops, and what fails in it, fails with a line of text. No
 //! runtime bounds the memory and the time of what it runs, so that a program may let networks that are not known run in a
 //! process of their own ([`apart`]).
@@ -182,7 +183,12 @@ enum Failure {
 /// Lets a runtime in this process load a network.
 fn load_here(bytes: Vec<u8>, runtime: Runtime) -> Result<Network, Failure> {
     if tflite::is_tflite(&bytes) {
-        return guarded(|| tflite::Tflite::load(&bytes)).map_err(Failure::Refused);
+        return match runtime {
+            Runtime::OnnxRuntime => {
+                Err(Failure::Refused("a .tflite is run by what is built in: leave --network-runtime out".to_owned()))
+            }
+            _ => guarded(|| tflite::Tflite::load(&bytes)).map_err(Failure::Refused),
+        };
     }
     let other = match runtime {
         Runtime::BuiltIn => None,

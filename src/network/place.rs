@@ -7,13 +7,21 @@ use super::{Known, MOST_BYTES, Task};
 use crate::files::input;
 use crate::files::trusted::absolute;
 
-/// The folders, the user's own first: `bokehcam/models` in `$XDG_DATA_HOME` and in each of `$XDG_DATA_DIRS`.
+/// The folders, the user's own first: `bokehcam/models` in `$XDG_DATA_HOME`, in `share` beside the folder of the program, as
+/// it was unpacked or installed, and in each of `$XDG_DATA_DIRS`.
 pub fn folders() -> Vec<PathBuf> {
     let own = absolute("XDG_DATA_HOME").or_else(|| Some(absolute("HOME")?.join(".local/share")));
     let system = env::var_os("XDG_DATA_DIRS").filter(|dirs| !dirs.is_empty());
     let system = system.unwrap_or_else(|| "/usr/local/share:/usr/share".into());
-    let system: Vec<PathBuf> = env::split_paths(&system).filter(|path| path.is_absolute()).collect();
-    own.into_iter().chain(system).map(|folder| folder.join("bokehcam/models")).collect()
+    let beside = env::current_exe().ok().and_then(|program| Some(program.parent()?.parent()?.join("share")));
+    let system = beside.into_iter().chain(env::split_paths(&system)).filter(|path| path.is_absolute());
+    let mut folders = Vec::new();
+    for folder in own.into_iter().chain(system).map(|folder| folder.join("bokehcam/models")) {
+        if !folders.contains(&folder) {
+            folders.push(folder);
+        }
+    }
+    folders
 }
 
 /// The known networks that are installed, with their files: the best of each task first.
@@ -25,7 +33,7 @@ pub fn installed() -> Vec<(&'static Known, PathBuf)> {
         files
     });
     let may_be_known = |file: &PathBuf| {
-        let is_network = file.extension().is_some_and(|extension| extension == "onnx");
+        let is_network = file.extension().is_some_and(|extension| extension == "onnx" || extension == "tflite");
         is_network && file.metadata().is_ok_and(|metadata| Known::any_has(metadata.len()))
     };
     let mut found: Vec<(&'static Known, PathBuf)> = files

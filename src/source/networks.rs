@@ -39,8 +39,8 @@ pub(super) fn open(chosen: &OneCamera, wanted: &Wanted) -> Result<Opened, Source
         Some(NetworkFile::At(file)) => Ok(Some(file.clone())),
         Some(NetworkFile::Installed) => best(task).map(Some).ok_or_else(|| {
             SourceError::NotThere(format!(
-                "--depth {task}: no network for it is installed; `bokehcam models` says which are known and where to get \
-                 them, or name a file: --depth {task}:FILE.onnx",
+                "--depth {task}: no network for it is installed: `bokehcam models get {known}`, or name a file: --depth {task}:FILE",
+                known = crate::network::KNOWN.iter().find(|known| known.task == task).map_or("", |known| known.file),
                 task = task.name()
             ))
         }),
@@ -74,10 +74,10 @@ pub fn installed() -> OneCamera {
     OneCamera::default()
 }
 
-/// Gives a camera or a photo that has no depth that of the installed networks, if there are any and nothing else is asked for.
+/// Gives a camera, a photo or a recording that has no depth that of the installed networks, if there are any and nothing else is asked for.
 #[cfg(feature = "networks")]
 pub(super) fn for_lone_camera(source: Source, name: &SourceName, wanted: &Wanted) -> Source {
-    let is_one = matches!(name.kind(), Kind::Camera | Kind::Photo);
+    let is_one = matches!(name.kind(), Kind::Camera | Kind::Photo | Kind::Recording);
     let is_lone = is_one && !source.has_depth() && wanted.options.depth_choice == DepthChoice::Auto;
     let needs_metres = wanted.look.is_some_and(|look| look.needs_metres().is_some());
     // A source that is recorded has no look: what it shows is kept, and not what can be made of it at any time.

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use bokehcam::depth::single_camera::{Hints, SingleCamera};
 use bokehcam::frame::{ColorImage, DepthMap};
-use bokehcam::network::{KNOWN, Known, Runtime, Task};
+use bokehcam::network::{KNOWN, Known, Runtime, Task, Tensor};
 use bokehcam::recording::{Options, Recording, Scratch};
 
 use super::read;
@@ -31,14 +31,15 @@ fn data() -> PathBuf {
     PathBuf::from(std::env::var_os("BOKEHCAM_DATA").expect("BOKEHCAM_DATA names the folder of the data"))
 }
 
-/// The file of the best known network for a task.
+/// The file of the best known network for a task that is in the data.
 pub fn model(task: Task) -> PathBuf {
-    let known = KNOWN.iter().find(|known| known.task == task).unwrap();
-    let files = fs::read_dir(data().join("models")).unwrap().flatten().map(|entry| entry.path());
-    files
-        .into_iter()
-        .find(|file| Known::of(&fs::read(file).unwrap()).is_some_and(|found| found.name == known.name))
-        .unwrap()
+    let files: Vec<PathBuf> =
+        fs::read_dir(data().join("models")).unwrap().flatten().map(|entry| entry.path()).collect();
+    let of = |known: &'static Known| {
+        let is_it = |file: &&PathBuf| Known::of(&fs::read(file).unwrap()).is_some_and(|found| found.file == known.file);
+        files.iter().find(is_it).cloned()
+    };
+    KNOWN.iter().filter(|known| known.task == task).find_map(of).unwrap()
 }
 
 /// A person who turns, as colours and depth.
@@ -134,4 +135,34 @@ fn a_photo_alone_has_the_depth_of_the_installed_network_in_every_command() {
     done(&["stream", &path("photo.png"), "--to", &path("s/"), "--backend", "cpu"]);
     let read = |name: &str| bokehcam::recording::still::read_color(&home.path().join(name)).unwrap();
     assert!(read("r.png") == read("s/000000.png"));
+}
+
+/// What the package brings runs by itself, and finds what the library finds in the ONNX file of the same weights.
+#[test]
+#[ignore = "needs the network for persons, as `scripts/setup models` brings it, and BOKEHCAM_DATA"]
+fn the_mask_of_what_the_package_brings_is_that_of_the_library() {
+    let shipped = std::env::var_os("BOKEHCAM_MODELS").expect("BOKEHCAM_MODELS names the folder of the network");
+    let shipped = PathBuf::from(shipped).join(KNOWN[0].file);
+    let load = |file: &Path| bokehcam::network::load(file, Runtime::BuiltIn).unwrap().network;
+    let (mut ours, mut library) = (load(&shipped), load(&model(Task::Matte)));
+    assert_ne!(ours.runtime, library.runtime);
+    let shape = [1, 144, 256, 3];
+    assert_eq!(ours.inputs[0].shape, shape.map(Some));
+    let sequence = Sequence::open();
+    let (mut masks, mut largest) = ([Vec::new(), Vec::new()], 0.0f32);
+    for index in (0..sequence.len()).step_by(4) {
+        let (color, _) = sequence.frame(index);
+        let at = |k: usize| {
+            (k / 3 / 256 * color.height as usize / 144) * color.width as usize
+                + k / 3 % 256 * color.width as usize / 256
+        };
+        let values = (0..144 * 256 * 3).map(|k| f32::from(color.rgb[3 * at(k) + k % 3]) / 255.0).collect();
+        let input = [Tensor { shape: shape.to_vec(), values }];
+        ours.run(&input, &mut masks[0]).unwrap();
+        library.run(&input, &mut masks[1]).unwrap();
+        let [ours, library] = [&masks[0][0].values, &masks[1][0].values];
+        assert!(ours.len() == library.len() && ours.iter().any(|&share| share > 0.99));
+        largest = ours.iter().zip(library).map(|(a, b)| (a - b).abs()).fold(largest, f32::max);
+    }
+    assert!(largest < 1e-3, "{largest}");
 }

@@ -12,12 +12,9 @@ fn a_picture_without_depth_says_what_that_costs() {
     for more in [&["--preset", "portrait"][..], &[]] {
         let ran = render(more);
         let warning = ran.warning();
-        assert!(
-            warning.contains(
-                "there is no depth, so a band of the picture stays sharp and the rest is blurred (tilt-shift)"
-            )
-        );
-        for way in ["--depth matte", "--mask FILE", "--depth-map FILE", "NAME-depth.png"] {
+        assert!(warning.contains("there is no depth, so all is blurred"), "{more:?}: {warning}");
+        for way in ["`bokehcam models get`", "--effect tilt-shift", "--mask FILE", "--depth-map FILE", "NAME-depth.png"]
+        {
             assert!(warning.contains(way), "{more:?}: {warning}");
         }
     }
@@ -75,7 +72,7 @@ fn recordings_say_what_they_have_no_use_for() {
 
     let home = Home::new().with_colours();
     let ran = home.run(&["stream", "colours", "--to", "null", "--backend", "cpu"]);
-    assert!(ran.warning().contains("there is no depth, so a band of the picture stays sharp"), "{}", ran.stderr);
+    assert!(ran.warning().contains("there is no depth, so all is blurred"), "{}", ran.stderr);
 }
 
 #[test]

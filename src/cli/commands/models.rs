@@ -1,7 +1,8 @@
 //! `models`: the networks that are known, and those that are installed.
 
-use std::io;
+use std::io::{self, Read};
 use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
 
 use clap::{Args, Subcommand};
 
@@ -15,9 +16,10 @@ use crate::network::{self, KNOWN, Known};
 #[command(after_help = "\
 Examples:
   bokehcam models                                            which are known, which are installed, where to get them
-  bokehcam models add selfie_segmentation_landscape.onnx     checks the file and installs it for this user
+  bokehcam models get                                        the one that finds persons, by curl or wget
+  bokehcam models add selfie_segmentation_landscape.tflite   checks a file that is here, and installs it for this user
 
-Nothing is downloaded: get a file with your browser, then add it.")]
+Nothing but `get` goes to the network, and that shows the command before it runs it.")]
 pub struct ModelsCommand {
     #[command(subcommand)]
     what: Option<What>,
@@ -28,11 +30,17 @@ enum What {
     /// List them, as does `models` alone
     List,
     /// Check that files are networks that are known, and copy them to where these are looked for
-    #[command(alias = "install", after_help = "Example:\n  bokehcam models add selfie_segmentation_landscape.onnx")]
+    #[command(alias = "install", after_help = "Example:\n  bokehcam models add selfie_segmentation_landscape.tflite")]
     Add {
-        /// The files, .onnx
+        /// The files, .tflite or .onnx
         #[arg(required = true, value_name = "FILE")]
         files: Vec<PathBuf>,
+    },
+    /// Fetch a known network by curl or wget, check that it is what it should be, and install it for this user
+    #[command(alias = "fetch", after_help = "Example:\n  bokehcam models get tcmonodepth-small")]
+    Get {
+        /// Which [default: the one that finds persons in the least time]
+        name: Option<String>,
     },
 }
 
@@ -44,6 +52,7 @@ pub fn run(command: &ModelsCommand) -> Result<(), CliError> {
     match &command.what {
         None | Some(What::List) => print(listed().as_bytes()),
         Some(What::Add { files }) => files.iter().try_for_each(|file| add(file)),
+        Some(What::Get { name }) => get(name.as_deref()),
     }
 }
 
@@ -52,11 +61,11 @@ fn listed() -> String {
     let mut text = String::from("known networks, the best of each task first:\n");
     for known in &KNOWN {
         let place = installed.iter().find(|(other, _)| std::ptr::eq(*other, known));
-        let place = place.map_or("not installed".to_owned(), |(_, file)| file.display().to_string());
-        let Known { name, task, license, address, sha256, bytes, .. } = known;
+        let place = place.map_or("not installed".to_owned(), |(_, at)| at.display().to_string());
+        let Known { file, task, license, address, sha256, bytes, .. } = known;
         let kilobytes = bytes.div_ceil(1000);
         text += &format!(
-            "\n{name}\n  for      --depth {task}: {}\n  here     {place}\n  licence  {license}\n  get      {address}\n  file     \
+            "\n{file}\n  for      --depth {task}: {}\n  here     {place}\n  licence  {license}\n  get      {address}\n  file     \
              {kilobytes} kB, SHA-256 {sha256}\n",
             crate::names::Named::help(*task).to_lowercase(),
             task = task.name(),
@@ -65,30 +74,38 @@ fn listed() -> String {
     let folders: Vec<String> = network::folders().iter().map(|folder| folder.display().to_string()).collect();
     text += &format!("\nlooked for in {}\n", folders.join(", "));
     match network::onnx_runtime_installed() {
-        Ok(name) => text += &format!("run by {name}\n"),
-        Err(why) => text += &format!("run by what is built in; 1.5 to 3 times as fast with ONNX Runtime: {why}\n"),
+        Ok(name) => text += &format!(".tflite is run by what is built in, .onnx by {name}\n"),
+        Err(why) => {
+            text += &format!(".onnx is run by what is built in, and 1.5 to 3 times as fast with ONNX Runtime: {why}\n")
+        }
     }
     text
 }
 
 fn add(file: &Path) -> Result<(), CliError> {
     if file.to_str().is_some_and(|name| name.contains("://")) {
-        let what = "nothing is downloaded: get the file with your browser, then `bokehcam models add FILE`";
+        let what = "this is no file that is here: `bokehcam models get NAME` fetches a known network";
         return Err(CliError::Usage(format!("{}: {what}", file.display())));
     }
-    let failed = |path: &Path| {
-        let path = path.to_owned();
-        move |source: io::Error| CliError::Io { path, source }
-    };
     let bytes = input::read(file, network::MOST_BYTES).map_err(failed(file))?;
     let known = Known::of(&bytes).ok_or_else(|| {
         let what = "it is none of the networks that are known (`bokehcam models` lists them), or not whole: one of your own is \
                     used from where it is, by --depth matte:FILE or mono:FILE";
         failed(file)(io::Error::new(io::ErrorKind::InvalidData, what))
     })?;
+    install(known, &bytes)
+}
+
+fn failed(path: &Path) -> impl FnOnce(io::Error) -> CliError {
+    let path = path.to_owned();
+    move |source| CliError::Io { path, source }
+}
+
+/// Writes a network to where those of this user are; what is there already stays.
+fn install(known: &Known, bytes: &[u8]) -> Result<(), CliError> {
     let no_home = || CliError::Usage("there is no home folder to install it in: set HOME or XDG_DATA_HOME".to_owned());
     let folder = network::folders().into_iter().next().ok_or_else(no_home)?;
-    let target = folder.join(known.file_name());
+    let target = folder.join(known.file);
     std::fs::create_dir_all(&folder).map_err(failed(&folder))?;
     match input::read(&target, network::MOST_BYTES) {
         Ok(there) if there == bytes => {}
@@ -97,10 +114,66 @@ fn add(file: &Path) -> Result<(), CliError> {
             return Err(failed(&target)(io::Error::new(io::ErrorKind::AlreadyExists, what)));
         }
         Err(error) if error.kind() == io::ErrorKind::NotFound => {
-            whole::write(&target, &bytes, false).map_err(failed(&target))?;
+            whole::write(&target, bytes, false).map_err(failed(&target))?;
         }
         Err(error) => return Err(failed(&target)(error)),
     }
-    say(&format!("{}: installed as {}, for --depth {}", known.name, target.display(), known.task.name()));
+    say(&format!("{}: installed as {}, for --depth {}", known.file, target.display(), known.task.name()));
     Ok(())
+}
+
+/// Fetches a known network and installs it.
+fn get(name: Option<&str>) -> Result<(), CliError> {
+    let none = |name: &str| {
+        let names: Vec<&str> = KNOWN.iter().map(|known| known.file).collect();
+        CliError::Usage(format!("there is no network {name:?}: use one of {}", names.join(", ")))
+    };
+    let known = name.map_or(Ok(&KNOWN[0]), |name| Known::named(name).ok_or_else(|| none(name)))?;
+    if let Some((_, file)) = network::installed().iter().find(|(other, _)| std::ptr::eq(*other, known)) {
+        say(&format!("{}: installed already, as {}", known.file, file.display()));
+        return Ok(());
+    }
+    let bytes = fetched(known)?;
+    let is_whole = Known::of(&bytes).is_some_and(|came| std::ptr::eq(came, known));
+    if !is_whole {
+        let what =
+            format!("what came is not {}, and is not kept: {} bytes of {}", known.file, bytes.len(), known.bytes);
+        return Err(failed(Path::new(known.address))(io::Error::new(io::ErrorKind::InvalidData, what)));
+    }
+    install(known, &bytes)
+}
+
+/// What is at a network's address, and one byte more than it should be at most.
+fn fetched(known: &Known) -> Result<Vec<u8>, CliError> {
+    const CLIENTS: [(&str, &[&str]); 2] = [
+        ("curl", &["--fail", "--location", "--silent", "--show-error", "--proto", "=https", "--max-time", "300"]),
+        ("wget", &["--https-only", "--no-verbose", "--timeout=60", "--output-document=-"]),
+    ];
+    let address = || failed(Path::new(known.address));
+    for (client, options) in CLIENTS {
+        say(&format!("{client} {} {}", options.join(" "), known.address));
+        let mut command = Command::new(client);
+        command.args(options).arg(known.address).stdin(Stdio::null()).stdout(Stdio::piped());
+        let mut child = match command.spawn() {
+            Err(error) if error.kind() == io::ErrorKind::NotFound => {
+                say(&format!("{client} is not installed"));
+                continue;
+            }
+            child => child.map_err(address())?,
+        };
+        let mut bytes = Vec::new();
+        let read = child.stdout.take().map_or(Ok(0), |out| out.take(known.bytes + 1).read_to_end(&mut bytes));
+        let status = child.wait().map_err(address())?;
+        read.map_err(address())?;
+        // One that is stopped in the middle of too much has failed, too: what came tells more.
+        return match bytes.len() as u64 <= known.bytes && !status.success() {
+            true => Err(address()(io::Error::other(format!("{client} failed ({status})")))),
+            false => Ok(bytes),
+        };
+    }
+    let what = format!(
+        "neither curl nor wget is installed: get {} by a browser, then `bokehcam models add FILE`",
+        known.address
+    );
+    Err(CliError::Usage(what))
 }

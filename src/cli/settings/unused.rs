@@ -206,27 +206,25 @@ fn as_given(setting: &Setting) -> String {
     }
 }
 
-/// Warns that tilt-shift replaces depth of field, as there is no depth. Not for those who chose to do without.
+/// Warns that all is blurred alike, as there is no depth. Not for those who chose to do without.
 pub fn warn_of_no_depth(source: From) {
     let fix = match source {
         From::Picture => {
-            "--depth matte finds the person (a network: `bokehcam models`), --mask FILE says where it is, --depth-map FILE or a \
-             map NAME-depth.png beside NAME gives its depth"
+            "`bokehcam models get` brings what finds the person, --mask FILE says where it is, --depth-map FILE or a map \
+             NAME-depth.png beside NAME gives its depth"
         }
         From::Source(Kind::Photo) => {
-            "a map NAME-depth.png beside NAME gives its depth, or a network (`bokehcam models`)"
+            "`bokehcam models get` brings what finds the person, a map NAME-depth.png beside NAME gives its depth"
         }
         From::Source(Kind::Recording) => {
-            "--depth FOLDER takes another recording's, --depth matte finds the person (`bokehcam models`)"
+            "`bokehcam models get` brings what finds the person, --depth FOLDER takes another recording's"
         }
         From::Source(Kind::Camera) => {
-            "one camera alone gives a portrait by --depth plate (step aside once), or by a network (`bokehcam models`)"
+            "`bokehcam models get` brings what finds the person, or --depth plate (step aside once)"
         }
         From::Source(_) | From::Bench => "--depth NAME takes a depth camera's",
     };
-    log::warn(&format!(
-        "{NO_DEPTH}, so a band of the picture stays sharp and the rest is blurred (tilt-shift): {fix}, --effect blur blurs it all"
-    ));
+    log::warn(&format!("{NO_DEPTH}, so all is blurred: {fix}; --effect tilt-shift keeps a band sharp"));
 }
 
 #[cfg(test)]

@@ -75,9 +75,9 @@ impl SingleCamera {
             let failed = |why: String| DepthError::Network { name: name.clone(), why };
             let loaded = network::load(path, runtime)?;
             if let Some(known) = loaded.known.filter(|known| known.task != task) {
-                return Err(failed(format!("this is {}, a network for --depth {}", known.name, known.task.name())));
+                return Err(failed(format!("this is {}, a network for --depth {}", known.file, known.task.name())));
             }
-            names.push(loaded.known.map_or_else(|| name.clone(), |known| known.name.to_owned()));
+            names.push(loaded.known.map_or_else(|| name.clone(), |known| known.file.to_owned()));
             run_by = loaded.network.runtime.clone();
             Feed::new(loaded, task, hints).map_err(failed)
         };

@@ -13,8 +13,8 @@ use pulp::Arch;
 
 pub use model::is_tflite;
 
-use self::kernels::{Depthwise, Each, Enlarge, Mean, PADDED, Pointwise, under_filter};
-use self::model::Model;
+use self::kernels::{Depthwise, Each, Enlarge, Logistic, Mean, Pointwise, under_filter};
+use self::model::{Activation, Model};
 use self::plan::{Plan, Step, Work};
 use super::{Engine, Network, Port, Tensor};
 
@@ -27,17 +27,25 @@ pub struct Tflite {
 }
 
 impl Tflite {
+    /// Reads a file.
+    ///
+    /// # Errors
+    /// It is cut or no TFLite file, or has what none of the operators here is.
     pub fn load(bytes: &[u8]) -> Result<Network, String> {
         let model = Model::read(bytes)?;
-        let plan = Plan::new(&model)?;
         let port = |tensor: usize| {
             let tensor = &model.tensors[tensor];
             vec![Port { name: tensor.name.clone(), shape: tensor.shape.iter().map(|&side| Some(side)).collect() }]
         };
-        let slots = plan.slots.iter().map(|&values| vec![0.0; values]).collect();
-        let engine = Box::new(Self { scratch: vec![0.0; plan.scratch], slots, plan, arch: Arch::new() });
         let (inputs, outputs) = (port(model.input), port(model.output));
-        Ok(Network { engine, inputs, outputs, runtime: "the built-in runtime for TFLite".to_owned() })
+        let engine = Box::new(Self::of(&model)?);
+        Ok(Network { engine, inputs, outputs, runtime: "what is built in for TFLite".to_owned() })
+    }
+
+    fn of(model: &Model) -> Result<Self, String> {
+        let plan = Plan::new(model)?;
+        let slots = plan.slots.iter().map(|&values| vec![0.0; values]).collect();
+        Ok(Self { scratch: vec![0.0; plan.scratch], slots, plan, arch: Arch::new() })
     }
 }
 
@@ -56,102 +64,70 @@ impl Engine for Tflite {
         }
         let (slot, size) = self.plan.output;
         outputs.resize_with(1, Tensor::default);
-        let pixels = self.slots[slot][..size.len()].chunks_exact(size.stride);
-        let values = pixels.flat_map(|pixel| &pixel[..size.channels]).copied();
-        outputs[0].set([1, size.rows, size.columns, size.channels], values);
+        let picture = &self.slots[slot][..size.len()];
+        let shape = [1, size.rows, size.columns, size.channels];
+        if size.lanes == size.channels {
+            outputs[0].set(shape, picture.iter().copied());
+        } else {
+            let at =
+                |pixel, channel: usize| channel / size.lanes * size.plane() + pixel * size.lanes + channel % size.lanes;
+            let places = (0..size.pixels()).flat_map(|pixel| (0..size.channels).map(move |channel| at(pixel, channel)));
+            outputs[0].set(shape, places.map(|place| picture[place]));
+        }
         Ok(())
     }
 }
 
 impl Step {
     fn run(&self, slots: &[Vec<f32>], out: &mut [f32], scratch: &mut [f32], arch: Arch) {
-        let (size, activation, stride) = (self.size, self.activation, self.result.stride);
+        let (size, result, activation) = (self.size, self.result, self.activation);
         let input = &slots[self.input][..size.len()];
-        let row_len = self.result.columns * stride;
+        let (pixels, plane) = (size.pixels(), result.plane());
         let seen = |slot: &Option<usize>| slot.map(|slot| &slots[slot][..size.len()]);
         match &self.work {
-            Work::Pointwise { weights, bias, depth, under: None } => {
-                let (weights, bias, depth, apart) = (&weights[..], &bias[..], *depth, size.stride);
-                arch.dispatch(Pointwise { input, apart, depth, weights, bias, activation, out, stride });
+            Work::Pointwise { weights, bias, under: None } => {
+                arch.dispatch(Pointwise { input, pixels, weights, bias, activation, out, plane });
             }
-            Work::Pointwise { weights, bias, depth, under: Some(axes) } => {
-                let (weights, bias, depth) = (&weights[..], &bias[..], *depth);
-                let under = &mut scratch[..self.result.columns * depth];
-                for (row, out) in out.chunks_exact_mut(row_len).enumerate() {
-                    under_filter(input, &size, axes, row, under);
-                    arch.dispatch(Pointwise {
-                        input: under, apart: depth, depth, weights, bias, activation, out, stride,
-                    });
+            Work::Pointwise { weights, bias, under: Some((axes, under)) } => {
+                let (pixels, row_len) = (under.pixels(), under.plane());
+                let input_row = &mut scratch[..under.len()];
+                input_row.fill(0.0);
+                for row in 0..result.rows {
+                    under_filter(input, &size, axes, row, under, input_row);
+                    let out = &mut out[row * row_len..];
+                    arch.dispatch(Pointwise { input: input_row, pixels, weights, bias, activation, out, plane });
                 }
             }
-            Work::Depthwise { weights, bias, axes } => {
-                let (axes, columns) = (*axes, self.result.columns);
-                arch.dispatch(Depthwise { input, size, axes, weights, bias, activation, out, columns });
+            Work::Depthwise { weights, bias, axes, lines } => {
+                let (axes, lines) = (*axes, &mut scratch[..*lines]);
+                arch.dispatch(Depthwise { input, size, axes, weights, bias, activation, out, result, lines });
             }
             Work::Doubling { weights, bias } => {
-                let four = &mut scratch[..size.columns * PADDED];
-                let rows = input.chunks_exact(size.columns * size.stride);
-                for (input, out) in rows.zip(out.chunks_exact_mut(2 * row_len)) {
-                    let (depth, apart) = (size.channels, size.stride);
-                    arch.dispatch(Pointwise {
-                        input, apart, depth, weights, bias, activation, out: four, stride: PADDED,
-                    });
-                    for (down, out) in out.chunks_exact_mut(row_len).enumerate() {
-                        for (pair, four) in out.as_chunks_mut::<2>().0.iter_mut().zip(four.chunks_exact(PADDED)) {
-                            pair.copy_from_slice(&four[2 * down..][..2]);
-                        }
+                let (lanes, sums) = (size.lanes, &mut scratch[..pixels * bias.len()]);
+                arch.dispatch(Pointwise { input, pixels, weights, bias, activation, out: sums, plane: size.plane() });
+                for (y, out) in out.chunks_exact_mut(result.columns).enumerate() {
+                    let (row, down) = (y / 2 * size.columns, y % 2);
+                    for (x, out) in out.iter_mut().enumerate() {
+                        let four = 2 * down + x % 2;
+                        *out = sums[four / lanes * size.plane() + (row + x / 2) * lanes + four % lanes];
                     }
                 }
             }
             Work::Each { gate, b } => {
-                let gate = gate.map(|slot| &slots[slot][..stride]);
-                arch.dispatch(Each { a: input, gate, b: seen(b), activation, out, stride });
+                let gate = gate.map(|slot| &slots[slot][..]);
+                arch.dispatch(Each { a: input, gate, b: seen(b), activation, out, plane });
             }
-            Work::Mean { b } => arch.dispatch(Mean { a: input, b: seen(b), out }),
+            Work::Mean { b } => arch.dispatch(Mean { a: input, b: seen(b), out, plane: size.plane() }),
             Work::Enlarge => {
-                let row = &mut scratch[..size.columns * size.stride];
+                let row = &mut scratch[..size.columns * size.lanes];
                 arch.dispatch(Enlarge { input, size, row, out });
             }
+        }
+        if activation == Activation::Logistic {
+            arch.dispatch(Logistic { values: out });
         }
     }
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    #[ignore = "needs BOKEHCAM_TFLITE"]
-    fn proto() {
-        let bytes = std::fs::read(std::env::var("BOKEHCAM_TFLITE").unwrap()).unwrap();
-        let mut ours = Tflite::load(&bytes).unwrap();
-        println!("{:?} {:?}", ours.inputs, ours.outputs);
-        let onnx = std::fs::read(std::env::var("BOKEHCAM_ONNX").unwrap()).unwrap();
-        let mut theirs = super::super::built_in::BuiltIn::load(onnx).unwrap();
-        println!("{:?} {:?}", theirs.inputs, theirs.outputs);
-        let mut seed = 1u32;
-        let values: Vec<f32> = (0..144 * 256 * 3)
-            .map(|k| {
-                seed = seed.wrapping_mul(1664525).wrapping_add(1013904223);
-                ((k / 768) as f32 / 144.0 * 0.7 + (seed >> 8) as f32 / (1 << 24) as f32 * 0.3).min(1.0)
-            })
-            .collect();
-        let input = [Tensor { shape: vec![1, 144, 256, 3], values }];
-        let (mut a, mut b) = (Vec::new(), Vec::new());
-        ours.run(&input, &mut a).unwrap();
-        theirs.run(&input, &mut b).unwrap();
-        println!("{:?} {:?}", a[0].shape, b[0].shape);
-        let most = a[0].values.iter().zip(&b[0].values).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
-        println!("most {most} of {:?}", b[0].values.iter().fold((9f32, 0f32), |(l, h), &v| (l.min(v), h.max(v))));
-        for (name, network) in [("ours", &mut ours), ("theirs", &mut theirs)] {
-            let mut out = Vec::new();
-            let mut best = f64::MAX;
-            for _ in 0..60 {
-                let from = std::time::Instant::now();
-                network.run(&input, &mut out).unwrap();
-                best = best.min(from.elapsed().as_secs_f64());
-            }
-            println!("{name} {:.3} ms", best * 1e3);
-        }
-    }
-}
+mod tests;

@@ -6,7 +6,7 @@ use super::table::{CUT, Table};
 use crate::network::MOST_VALUES;
 
 /// Values of all tensors together, at most: a network for one picture at a time has a few millions.
-const MOST_IN_ALL: usize = 16 * MOST_VALUES;
+pub const MOST_IN_ALL: usize = 16 * MOST_VALUES;
 /// Tensors and operators, at most.
 const MOST_PARTS: usize = 2000;
 
@@ -107,7 +107,11 @@ impl Model {
             let Some((kind, activation)) = kind(code, &step)? else {
                 // Constants in 16 bits become some in 32.
                 let [from] = inputs[..] else { return Err(CUT.to_owned()) };
-                tensors[output].constant = tensors[from].constant.take();
+                let values = tensors[from].constant.take().unwrap_or_default();
+                if values.len() != tensors[output].shape.iter().product::<usize>() {
+                    return Err(CUT.to_owned());
+                }
+                tensors[output].constant = Some(values);
                 continue;
             };
             operators.push(Operator { kind, activation, inputs, output });

@@ -2,19 +2,37 @@
 
 use pulp::Arch;
 
-use super::kernels::{Axis, Lanes, PADDED, Size, axes};
-use super::model::{Activation, Kind, Model, Operator, Tensor};
+use super::kernels::{Axis, Lanes, Size, axes};
+use super::model::{Activation, Kind, MOST_IN_ALL, Model, Operator, Tensor};
 
 /// What a step does.
 pub enum Work {
-    /// Sums over channels, of the pixels themselves or of those under a filter.
-    Pointwise { weights: Vec<f32>, bias: Vec<f32>, depth: usize, under: Option<[Axis; 2]> },
-    Depthwise { weights: Vec<f32>, bias: Vec<f32>, axes: [Axis; 2] },
+    /// Sums over channels, of the pixels themselves or of a row of what is under a filter.
+    Pointwise {
+        weights: Vec<f32>,
+        bias: Vec<f32>,
+        under: Option<([Axis; 2], Size)>,
+    },
+    /// Sums over the pixels under a filter; and how many values its lines have.
+    Depthwise {
+        weights: Vec<f32>,
+        bias: Vec<f32>,
+        axes: [Axis; 2],
+        lines: usize,
+    },
     /// Each pixel becomes four, of one channel: the sums are `[pixel][down][across]`.
-    Doubling { weights: Vec<f32>, bias: Vec<f32> },
+    Doubling {
+        weights: Vec<f32>,
+        bias: Vec<f32>,
+    },
     /// Of two and a gate, which of them are there.
-    Each { gate: Option<usize>, b: Option<usize> },
-    Mean { b: Option<usize> },
+    Each {
+        gate: Option<usize>,
+        b: Option<usize>,
+    },
+    Mean {
+        b: Option<usize>,
+    },
     Enlarge,
 }
 
@@ -56,18 +74,14 @@ struct Planner<'a> {
     plan: Plan,
 }
 
-fn size_of(tensor: &Tensor, stride: impl Fn(usize) -> usize) -> Result<Size, String> {
+fn size_of(tensor: &Tensor, lanes: impl Fn(usize) -> usize) -> Result<Size, String> {
     let [1, rows, columns, channels] = tensor.shape[..] else {
         return Err(format!("{:?} is no picture: {:?}", tensor.name, tensor.shape));
     };
     if rows * columns * channels == 0 {
         return Err(format!("{:?} is empty: {:?}", tensor.name, tensor.shape));
     }
-    Ok(Size { rows, columns, channels, stride: stride(channels) })
-}
-
-fn padded(channels: usize) -> usize {
-    channels.next_multiple_of(PADDED)
+    Ok(Size { rows, columns, channels, lanes: lanes(channels) })
 }
 
 impl Plan {
@@ -141,6 +155,7 @@ impl Planner<'_> {
     fn constant(&self, tensor: usize, shape: &[Option<usize>]) -> Result<(&[f32], &[usize]), String> {
         let tensor = &self.model.tensors[tensor];
         let fits = tensor.shape.len() == shape.len()
+            && !tensor.shape.contains(&0)
             && tensor.shape.iter().zip(shape).all(|(side, wanted)| wanted.is_none_or(|wanted| wanted == *side));
         match &tensor.constant {
             Some(values) if fits => Ok((values, &tensor.shape)),
@@ -151,20 +166,36 @@ impl Planner<'_> {
     fn bias(&self, tensor: usize, channels: usize) -> Result<Vec<f32>, String> {
         let (values, _) = self.constant(tensor, &[Some(channels)])?;
         let mut bias = values.to_vec();
-        bias.resize(padded(channels), 0.0);
+        bias.resize(self.padded(channels), 0.0);
         Ok(bias)
+    }
+
+    /// Channels in whole vectors.
+    fn padded(&self, channels: usize) -> usize {
+        channels.next_multiple_of(self.lanes)
     }
 
     /// Weights `[out][depth]` as [`super::kernels::Pointwise`] takes them.
     fn packed(&self, weights: &[f32], depth: usize) -> Vec<f32> {
-        let (out, lanes) = (weights.len() / depth, self.lanes);
-        let mut packed = vec![0.0; padded(out) * depth];
+        let (out, all, lanes) = (weights.len() / depth, self.padded(depth), self.lanes);
+        let mut packed = vec![0.0; self.padded(out) * all];
         for (channel, weights) in weights.chunks_exact(depth).enumerate() {
             for (k, weight) in weights.iter().enumerate() {
-                packed[(channel / lanes * depth + k) * lanes + channel % lanes] = *weight;
+                packed[(channel / lanes * all + k) * lanes + channel % lanes] = *weight;
             }
         }
         packed
+    }
+
+    /// Sees to it that there is so much memory for a step's own use.
+    fn scratch(&mut self, values: usize) -> Result<(), String> {
+        self.plan.scratch = self.plan.scratch.max(values);
+        self.check_memory()
+    }
+
+    fn check_memory(&self) -> Result<(), String> {
+        let values = self.plan.slots.iter().chain([&self.plan.scratch]).sum::<usize>();
+        if values > MOST_IN_ALL { Err(format!("it takes memory for more than {MOST_IN_ALL} values")) } else { Ok(()) }
     }
 
     fn add(&mut self, operator: &Operator) -> Result<(), String> {
@@ -172,62 +203,65 @@ impl Planner<'_> {
         let wrong = || format!("an operator cannot make {:?}: {:?}", tensor.name, tensor.shape);
         let [first, others @ ..] = &operator.inputs[..] else { return Err(wrong()) };
         let (input, size) = self.picture(*first)?;
-        let one_plane = operator.kind == Kind::Doubling;
-        let result = size_of(tensor, |channels| if one_plane { 1 } else { padded(channels) })?;
-        let like_input = Size { rows: result.rows, columns: result.columns, ..size };
-        let all = |channels: usize| Size { rows: result.rows, columns: result.columns, channels, stride: result.stride };
+        let lanes = self.lanes;
+        let result = size_of(tensor, |_| if operator.kind == Kind::Doubling { 1 } else { lanes })?;
+        let in_vectors = size.lanes == lanes;
+        let made = |[rows, columns]: [usize; 2], channels: usize| Size { rows, columns, channels, ..result };
+        let like_input = Size { lanes: result.lanes, ..size };
         let (work, made) = match (operator.kind, others) {
             (Kind::Convolution(steps), &[weights, bias]) => {
                 let (weights, shape) = self.constant(weights, &[None, None, None, Some(size.channels)])?;
                 let ([out, down, across], bias) = ([shape[0], shape[1], shape[2]], self.bias(bias, shape[0])?);
-                let (axes, [rows, columns]) = axes(&size, [down, across], &steps).ok_or_else(wrong)?;
+                let (axes, sides) = axes(&size, [down, across], &steps).ok_or_else(wrong)?;
                 let depth = down * across * size.channels;
-                let alone = [down, across, steps.down, steps.across] == [1; 4];
                 let weights = self.packed(weights, depth);
+                let alone = in_vectors && [down, across, steps.down, steps.across] == [1; 4];
+                let row = Size { rows: 1, columns: sides[1], channels: depth, lanes };
                 if !alone {
-                    self.plan.scratch = self.plan.scratch.max(columns * depth);
+                    self.scratch(row.len())?;
                 }
-                let made = Size { rows, columns, ..all(out) };
-                (Work::Pointwise { weights, bias, depth, under: (!alone).then_some(axes) }, made)
+                (Work::Pointwise { weights, bias, under: (!alone).then_some((axes, row)) }, made(sides, out))
             }
-            (Kind::Depthwise(steps), &[weights, bias]) => {
+            (Kind::Depthwise(steps), &[weights, bias]) if in_vectors && steps.across <= 2 => {
                 let (weights, shape) = self.constant(weights, &[Some(1), None, None, Some(size.channels)])?;
-                let (axes, [rows, columns]) = axes(&size, [shape[1], shape[2]], &steps).ok_or_else(wrong)?;
-                let mut spread = vec![0.0; shape[1] * shape[2] * padded(size.channels)];
-                let taps = spread.chunks_exact_mut(padded(size.channels)).zip(weights.chunks_exact(size.channels));
-                taps.for_each(|(spread, weights)| spread[..size.channels].copy_from_slice(weights));
-                if size.stride != padded(size.channels) {
-                    return Err(wrong());
+                let taps = shape[1] * shape[2];
+                let (axes, sides) = axes(&size, [shape[1], shape[2]], &steps).ok_or_else(wrong)?;
+                let mut spread = vec![0.0; taps * self.padded(size.channels)];
+                for (tap, weights) in weights.chunks_exact(size.channels).enumerate() {
+                    for (channel, weight) in weights.iter().enumerate() {
+                        spread[(channel / lanes * taps + tap) * lanes + channel % lanes] = *weight;
+                    }
                 }
                 let bias = self.bias(bias, size.channels)?;
-                (Work::Depthwise { weights: spread, bias, axes }, Size { rows, columns, ..all(size.channels) })
+                let lines = axes[0].taps * axes[1].line(size.columns, sides[1]) * lanes;
+                self.scratch(lines)?;
+                (Work::Depthwise { weights: spread, bias, axes, lines }, made(sides, size.channels))
             }
-            (Kind::Doubling, &[weights, bias]) => {
+            (Kind::Doubling, &[weights, bias]) if in_vectors => {
                 let (weights, _) = self.constant(weights, &[Some(1), Some(2), Some(2), Some(size.channels)])?;
                 let (bias, _) = self.constant(bias, &[Some(1)])?;
                 let (mut four, weights) = (vec![bias[0]; 4], self.packed(weights, size.channels));
-                four.resize(PADDED, 0.0);
-                self.plan.scratch = self.plan.scratch.max(size.columns * PADDED);
-                let made = Size { rows: 2 * size.rows, columns: 2 * size.columns, ..all(1) };
-                (Work::Doubling { weights, bias: four }, made)
+                four.resize(self.padded(4), 0.0);
+                self.scratch(size.pixels() * four.len())?;
+                (Work::Doubling { weights, bias: four }, made([2 * size.rows, 2 * size.columns], 1))
             }
-            (Kind::Activation(_), []) => (Work::Each { gate: None, b: None }, like_input),
-            (Kind::Scale, &[gate, ref b @ ..]) => {
+            (Kind::Activation(_), []) if in_vectors => (Work::Each { gate: None, b: None }, like_input),
+            (Kind::Scale, &[gate, ref b @ ..]) if in_vectors => {
                 let ((gate, gate_size), b) = (self.picture(gate)?, b.first().map(|&b| self.picture(b)).transpose()?);
-                let is_gate = gate_size.pixels() == 1 && gate_size.stride == size.stride;
+                let is_gate = gate_size == Size { rows: 1, columns: 1, ..size };
                 if !is_gate || b.is_some_and(|(_, b)| b != size) {
                     return Err(wrong());
                 }
                 (Work::Each { gate: Some(gate), b: b.map(|(slot, _)| slot) }, like_input)
             }
-            (Kind::Sum, &[b]) => {
+            (Kind::Sum, &[b]) if in_vectors => {
                 let (b, b_size) = self.picture(b)?;
                 if b_size != size {
                     return Err(wrong());
                 }
                 (Work::Each { gate: None, b: Some(b) }, like_input)
             }
-            (Kind::Mean, others) => {
+            (Kind::Mean, others) if in_vectors => {
                 // The axes, or the other of a sum, which has axes of its own no more.
                 let b = others.iter().find_map(|&other| self.picture(other).ok());
                 if b.is_some_and(|(_, b)| b != size) {
@@ -235,9 +269,9 @@ impl Planner<'_> {
                 }
                 (Work::Mean { b: b.map(|(slot, _)| slot) }, Size { rows: 1, columns: 1, ..size })
             }
-            (Kind::Enlarge, _) => {
-                self.plan.scratch = self.plan.scratch.max(size.columns * size.stride);
-                (Work::Enlarge, Size { rows: 2 * size.rows, columns: 2 * size.columns, ..size })
+            (Kind::Enlarge, _) if in_vectors => {
+                self.scratch(size.columns * lanes)?;
+                (Work::Enlarge, made([2 * size.rows, 2 * size.columns], size.channels))
             }
             _ => return Err(wrong()),
         };
@@ -249,6 +283,7 @@ impl Planner<'_> {
             _ => operator.activation,
         };
         let output = self.slot(result.len());
+        self.check_memory()?;
         self.plan.steps.push(Step { work, activation, input, size, output, result });
         for &tensor in &operator.inputs {
             self.let_go(tensor);

@@ -42,10 +42,10 @@ impl State {
             self.note(self.no_depth());
         }
         let look = match &self.source {
-            // An effect that was replaced by tilt-shift for want of depth comes back, unless another was chosen since.
+            // An effect that was replaced by an even blur for want of depth comes back, unless another was chosen since.
             Source::Running(running) if running.has_depth && self.fitted => {
                 self.fitted = false;
-                let still_fitted = self.look.effect == Effect::TiltShift;
+                let still_fitted = self.look.effect == Effect::Blur;
                 Look { effect: if still_fitted { Effect::Auto } else { self.look.effect }, ..self.look.clone() }
             }
             _ => self.fitting(self.look.clone()),
@@ -58,7 +58,7 @@ impl State {
 
     /// The look to be kept for the next time: as it was chosen, whatever this source has not.
     pub fn chosen_look(&self) -> Look {
-        let is_fitted = self.fitted && self.look.effect == Effect::TiltShift;
+        let is_fitted = self.fitted && self.look.effect == Effect::Blur;
         Look { effect: if is_fitted { Effect::Auto } else { self.look.effect }, ..self.look.clone() }
     }
 

@@ -129,25 +129,27 @@ fn a_photo_is_told_what_gives_it_depth() {
 #[test]
 fn what_needs_depth_says_so_where_there_is_none() {
     let mut state = state();
-    // What follows depth becomes tilt-shift, and the session is told.
-    let toy = Look { effect: Effect::TiltShift, ..look() };
-    assert_eq!(state.hear(Update::Source(running(false))), Some(Request::Look(Box::new(toy.clone()))));
+    // What follows depth blurs all alike, and the session is told.
+    let even = Look { effect: Effect::Blur, ..look() };
+    assert_eq!(state.hear(Update::Source(running(false))), Some(Request::Look(Box::new(even.clone()))));
     for action in [Action::Preset("cinematic".into()), Action::Show(Shown::Depth)] {
         let before = state.notes.last().map(|note| note.number);
         assert_eq!(state.apply(action), []);
         let said = state.notes.last().unwrap();
         assert!(Some(said.number) > before && said.text == NO_DEPTH, "{said:?}");
     }
-    assert_eq!((state.shown, &state.look), (Shown::Picture, &toy));
+    assert_eq!((state.shown, &state.look), (Shown::Picture, &even));
     assert_eq!(state.apply(Action::Reset), [], "nor does the first look follow any");
-    assert_eq!(state.apply(Action::Preset("miniature".into())).len(), 1);
-    assert_eq!(state.look.effect, Effect::TiltShift);
     // It follows depth again where there is some; a view of it goes back to the picture when the next source has none.
     state.hear(Update::Source(running(true)));
     assert_eq!(state.look.effect, Effect::Auto);
     state.apply(Action::Show(Shown::Depth));
     state.hear(Update::Source(running(false)));
     assert_eq!(state.shown, Shown::Picture);
+    // One that was chosen since stays.
+    assert_eq!(state.apply(Action::Preset("miniature".into())).len(), 1);
+    state.hear(Update::Source(running(true)));
+    assert_eq!(state.look.effect, Effect::TiltShift);
 }
 
 #[test]
@@ -340,8 +342,8 @@ fn a_source_without_depth_changes_no_look_for_the_next_time() {
     let chosen = state.look.clone();
     assert_eq!(chosen.effect, Effect::Auto);
     state.hear(Update::Source(running(false)));
-    assert_eq!((state.look.effect, state.chosen_look()), (Effect::TiltShift, chosen));
-    let tilted = Look { effect: Effect::Blur, ..state.look.clone() };
+    assert_eq!((state.look.effect, state.chosen_look()), (Effect::Blur, chosen));
+    let tilted = Look { effect: Effect::TiltShift, ..state.look.clone() };
     state.apply(Action::Look { look: Box::new(tilted.clone()), stroke: None });
     assert_eq!(state.chosen_look(), tilted, "that was chosen");
 }

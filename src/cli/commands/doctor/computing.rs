@@ -26,19 +26,21 @@ pub fn findings() -> Vec<Finding> {
 fn check_networks() -> Vec<Finding> {
     use crate::network::{self, Task};
     let installed = network::installed();
-    let names: Vec<&str> = installed.iter().map(|(known, _)| known.name).collect();
+    let names: Vec<&str> = installed.iter().map(|(known, _)| known.file).collect();
     let persons = installed.iter().any(|(known, _)| known.task == Task::Matte);
     let of_networks = match persons {
         true => Finding::good(NETWORKS, format!("one camera alone gives a portrait: {}", names.join(", "))),
         false => Finding::note(
             NETWORKS,
             "none that finds persons, so one camera alone gives no portrait",
-            "`bokehcam models` says which is known and where to get it (450 kB); --depth plate needs none",
+            "`bokehcam models get` brings one (250 kB); --depth plate needs none",
         ),
     };
     let of_runtime = match network::onnx_runtime_installed() {
         Ok(name) => Finding::good(NETWORKS, format!("run by {name}")),
-        Err(why) => Finding::note(NETWORKS, "run by what is built in; ONNX Runtime is 1.5 to 3 times as fast", why),
+        Err(why) => {
+            Finding::note(NETWORKS, "networks of your own are run by what is built in; ONNX Runtime is faster", why)
+        }
     };
     vec![of_networks, of_runtime]
 }

@@ -27,8 +27,8 @@ fn refusal(flags: &[&str], has_depth: bool) -> String {
 #[test]
 fn the_effect_follows_what_the_source_has() {
     assert!(resolve(&[], true).unwrap().effect.follows_depth());
-    assert_eq!(resolve(&[], false).unwrap().effect, Effect::TiltShift);
-    assert_eq!(resolve(&["--depth=none"], true).unwrap().effect, Effect::TiltShift);
+    assert_eq!(resolve(&[], false).unwrap().effect, Effect::Blur);
+    assert_eq!(resolve(&["--depth=none"], true).unwrap().effect, Effect::Blur);
     assert!(resolve(&["--effect=none"], true).unwrap().settings(SIZE, false).is_none());
     assert!(refusal(&["--effect=dof"], false).contains("the source has none"));
     assert!(refusal(&["--effect=dof", "--depth=none"], true).contains("--depth none"));

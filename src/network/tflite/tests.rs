@@ -1,0 +1,240 @@
+use super::model::{Activation, Kind, Model, Operator, Steps, Tensor as Part};
+use super::*;
+
+mod file;
+mod reference;
+
+use file::{Value, table_file};
+use reference::reference;
+
+/// Numbers of no pattern between -1 and 1.
+fn noise(seed: &mut u32, count: usize) -> Vec<f32> {
+    let mut next = || {
+        *seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        (*seed >> 8) as f32 / (1 << 23) as f32 - 1.0
+    };
+    (0..count).map(|_| next()).collect()
+}
+
+/// Puts a network together, operator by operator.
+struct Builder {
+    model: Model,
+    seed: u32,
+}
+
+impl Builder {
+    fn new(shape: [usize; 4]) -> Self {
+        let input = Part { name: "input".into(), shape: shape.to_vec(), constant: None };
+        Self { model: Model { tensors: vec![input], operators: Vec::new(), input: 0, output: 0 }, seed: 1 }
+    }
+
+    fn shape(&self) -> [usize; 4] {
+        self.model.tensors[self.model.output].shape[..].try_into().expect("a picture")
+    }
+
+    fn constant(&mut self, shape: &[usize]) -> usize {
+        let values = noise(&mut self.seed, shape.iter().product());
+        self.model.tensors.push(Part { name: "c".into(), shape: shape.to_vec(), constant: Some(values) });
+        self.model.tensors.len() - 1
+    }
+
+    /// An operator on these tensors that makes a picture of this shape; what it makes.
+    fn add(&mut self, kind: Kind, activation: Activation, inputs: &[usize], shape: [usize; 4]) -> usize {
+        let Model { tensors, operators, output, .. } = &mut self.model;
+        tensors.push(Part { name: "p".into(), shape: shape.to_vec(), constant: None });
+        *output = tensors.len() - 1;
+        operators.push(Operator { kind, activation, inputs: inputs.to_vec(), output: *output });
+        *output
+    }
+
+    fn filter(&mut self, out: Option<usize>, taps: [usize; 2], steps: Steps, activation: Activation) -> usize {
+        let [_, rows, columns, channels] = self.shape();
+        let count = |pixels: usize, taps: usize, step: usize| match steps.beyond {
+            true => pixels.div_ceil(step),
+            false => (pixels - taps) / step + 1,
+        };
+        let sides = [count(rows, taps[0], steps.down), count(columns, taps[1], steps.across)];
+        let (kind, shape) = match out {
+            Some(out) => (Kind::Convolution(steps), [out, taps[0], taps[1], channels]),
+            None => (Kind::Depthwise(steps), [1, taps[0], taps[1], channels]),
+        };
+        let out = out.unwrap_or(channels);
+        let inputs = [self.model.output, self.constant(&shape), self.constant(&[out])];
+        self.add(kind, activation, &inputs, [1, sides[0], sides[1], out])
+    }
+
+    fn check(mut self) {
+        let shape = self.model.tensors[0].shape.clone();
+        let values = noise(&mut self.seed, shape.iter().product());
+        let wanted = reference(&self.model, &values);
+        let mut outputs = Vec::new();
+        let mut network = Tflite::of(&self.model).unwrap();
+        // Twice: what is left of the first must not be seen in the second.
+        for _ in 0..2 {
+            network.run(&[Tensor { shape: shape.clone(), values: values.clone() }], &mut outputs).unwrap();
+        }
+        assert_eq!(outputs[0].shape, self.model.tensors[self.model.output].shape);
+        let largest = wanted.iter().fold(1.0f32, |most, value| most.max(value.abs()));
+        for (at, (made, wanted)) in outputs[0].values.iter().zip(&wanted).enumerate() {
+            assert!((made - wanted).abs() < 1e-5 * largest, "{at}: {made}, not {wanted}");
+        }
+        assert_eq!(outputs[0].values.len(), wanted.len());
+    }
+}
+
+const ONE: Steps = Steps { down: 1, across: 1, beyond: true };
+const TWO: Steps = Steps { down: 2, across: 2, beyond: true };
+const FIRST: (Option<usize>, [usize; 2], Steps) = (Some(21), [3, 3], TWO);
+
+/// A network that has begun as those for pictures do.
+fn begun(rows: usize, columns: usize) -> Builder {
+    let mut net = Builder::new([1, rows, columns, 3]);
+    net.filter(FIRST.0, FIRST.1, FIRST.2, Activation::HardSwish);
+    net
+}
+
+#[test]
+fn a_filter_is_the_sum_of_what_lies_under_it() {
+    let within = Steps { beyond: false, ..ONE };
+    let skewed = Steps { down: 3, across: 2, beyond: true };
+    for (taps, steps) in [([3, 3], TWO), ([1, 1], ONE), ([5, 2], skewed), ([3, 4], within), ([1, 1], TWO)] {
+        for (rows, columns) in [(13, 29), (8, 24), (5, 4)] {
+            let mut net = Builder::new([1, rows, columns, 3]);
+            net.filter(Some(19), taps, steps, Activation::Relu);
+            net.check();
+        }
+    }
+}
+
+#[test]
+fn sums_over_channels_of_any_number_and_filters_of_each() {
+    for (channels, taps, steps) in
+        [(1, [3, 3], ONE), (24, [5, 5], TWO), (88, [3, 3], TWO), (7, [5, 3], Steps { beyond: false, ..ONE })]
+    {
+        let mut net = begun(14, 50);
+        net.filter(Some(channels), [1, 1], ONE, Activation::HardSwish);
+        net.filter(None, taps, steps, Activation::Relu);
+        net.filter(Some(5), [3, 3], ONE, Activation::None);
+        net.check();
+    }
+}
+
+#[test]
+fn gates_sums_means_and_enlargements() {
+    let mut net = begun(12, 40);
+    let trunk = net.model.output;
+    let [_, rows, columns, channels] = net.shape();
+    net.add(Kind::Mean, Activation::None, &[trunk], [1, 1, 1, channels]);
+    net.filter(Some(4), [1, 1], ONE, Activation::Relu);
+    let squeezed = net.filter(Some(channels), [1, 1], ONE, Activation::None);
+    let gate = net.add(Kind::Activation(Activation::Logistic), Activation::None, &[squeezed], [1, 1, 1, channels]);
+    let gated = net.add(Kind::Scale, Activation::None, &[trunk, gate], [1, rows, columns, channels]);
+    let sum = net.add(Kind::Sum, Activation::Relu, &[gated, trunk], [1, rows, columns, channels]);
+    let both = net.add(Kind::Sum, Activation::None, &[sum, trunk], [1, rows, columns, channels]);
+    net.add(Kind::Mean, Activation::None, &[both], [1, 1, 1, channels]);
+    let second = net.filter(Some(channels), [1, 1], ONE, Activation::Logistic);
+    let scaled = net.add(Kind::Scale, Activation::None, &[sum, second], [1, rows, columns, channels]);
+    let wide = net.add(Kind::Enlarge, Activation::None, &[scaled], [1, 2 * rows, 2 * columns, channels]);
+    let (weights, bias) = (net.constant(&[1, 2, 2, channels]), net.constant(&[1]));
+    let mask = net.add(Kind::Doubling, Activation::None, &[wide, weights, bias], [1, 4 * rows, 4 * columns, 1]);
+    net.add(Kind::Activation(Activation::Logistic), Activation::None, &[mask], [1, 4 * rows, 4 * columns, 1]);
+    net.check();
+}
+
+#[test]
+fn what_does_not_fit_together_is_refused() {
+    let refused = |change: fn(&mut Model)| {
+        let mut net = begun(12, 40);
+        net.filter(None, [3, 3], ONE, Activation::None);
+        change(&mut net.model);
+        Tflite::of(&net.model).err().expect("refused")
+    };
+    refused(|model| model.tensors[model.output].shape[1] += 1);
+    refused(|model| model.tensors[model.output].shape.truncate(3));
+    refused(|model| model.tensors[0].shape[3] = 4);
+    refused(|model| model.operators.reverse());
+    refused(|model| model.operators[1].inputs.truncate(1));
+    refused(|model| model.operators[1].kind = Kind::Depthwise(Steps { across: 3, ..ONE }));
+    refused(|model| model.operators[0].kind = Kind::Sum);
+    // Sizes that would take more memory than any network does.
+    refused(|model| {
+        model.tensors[0].shape = vec![1, 1 << 20, 1 << 20, 3];
+        let operator = model.operators[0].clone();
+        model.tensors[operator.output].shape = vec![1, 1 << 19, 1 << 19, 21];
+        model.operators.truncate(1);
+        model.output = operator.output;
+    });
+}
+
+/// A network in a file: a filter whose weights have 16 bits, and a logistic function.
+fn small_file() -> Vec<u8> {
+    use Value::{Byte, Bytes, Int, Ints, Table, Tables};
+    let weights: Vec<u8> = [1.0f32, -0.5, 0.25, 2.0, 0.0, 1.0]
+        .iter()
+        .flat_map(|&value| half::f16::from_f32(value).to_le_bytes())
+        .collect();
+    let bias: Vec<u8> = [0.5f32, -0.5].iter().flat_map(|value| value.to_le_bytes()).collect();
+    let tensor = |shape: &[i32], kind: i8, buffer: i32, name: &str| {
+        vec![(0, Ints(shape.to_vec())), (1, Byte(kind)), (2, Int(buffer)), (3, Bytes(name.into()))]
+    };
+    let tensors = vec![
+        tensor(&[1, 2, 4, 3], 0, 0, "picture"),
+        tensor(&[2, 1, 1, 3], 1, 1, "half"),
+        tensor(&[2, 1, 1, 3], 0, 0, "weights"),
+        tensor(&[2], 0, 2, "bias"),
+        tensor(&[1, 2, 4, 2], 0, 0, "sum"),
+        tensor(&[1, 2, 4, 2], 0, 0, "mask"),
+    ];
+    let operator = |code: i32, inputs: &[i32], output: i32, options: Vec<(usize, Value)>| {
+        vec![(0, Int(code)), (1, Ints(inputs.to_vec())), (2, Ints(vec![output])), (4, Table(options))]
+    };
+    let operators = vec![
+        operator(0, &[1], 2, vec![]),
+        operator(1, &[0, 2, 3], 4, vec![(0, Byte(0)), (1, Int(1)), (2, Int(1))]),
+        operator(2, &[4], 5, vec![]),
+    ];
+    let code = |code: i8| vec![(0, Byte(code)), (3, Int(i32::from(code)))];
+    let graph = vec![(0, Tables(tensors)), (1, Ints(vec![0])), (2, Ints(vec![5])), (3, Tables(operators))];
+    table_file(&[
+        (0, Int(3)),
+        (1, Tables(vec![code(6), code(3), code(14)])),
+        (2, Tables(vec![graph])),
+        (4, Tables(vec![vec![], vec![(0, Bytes(weights))], vec![(0, Bytes(bias))]])),
+    ])
+}
+
+#[test]
+fn a_file_is_read_and_run() {
+    let mut network = Tflite::load(&small_file()).unwrap();
+    assert_eq!(network.inputs[0].name, "picture");
+    assert_eq!(network.outputs[0].shape, [1, 2, 4, 2].map(Some));
+    let values: Vec<f32> = (0..24).map(|k| k as f32 / 24.0).collect();
+    let mut outputs = Vec::new();
+    network.run(&[Tensor { shape: vec![1, 2, 4, 3], values: values.clone() }], &mut outputs).unwrap();
+    let logistic = |x: f32| 1.0 / (1.0 + (-x).exp());
+    for (pixel, made) in values.chunks(3).zip(outputs[0].values.chunks(2)) {
+        let wanted = [pixel[0] - 0.5 * pixel[1] + 0.25 * pixel[2] + 0.5, 2.0 * pixel[0] + pixel[2] - 0.5].map(logistic);
+        assert!(made.iter().zip(wanted).all(|(made, wanted)| (made - wanted).abs() < 1e-6), "{made:?} {wanted:?}");
+    }
+    let other = Tensor { shape: vec![1, 4, 2, 3], values };
+    assert!(network.run(&[other], &mut outputs).is_err());
+}
+
+#[test]
+fn files_that_are_cut_or_damaged_are_refused_in_words_or_run() {
+    let whole = small_file();
+    assert!(is_tflite(&whole));
+    for length in 0..whole.len() - 1 {
+        let _ = Tflite::load(&whole[..length]).err().map(|why| assert!(!why.is_empty()));
+    }
+    let input = [Tensor { shape: vec![1, 2, 4, 3], values: vec![0.5; 24] }];
+    for at in 0..whole.len() {
+        for value in [0, 1, 3, 0x7f, 0x80, 0xff, whole[at] ^ 4, whole[at].wrapping_add(1)] {
+            let mut damaged = whole.clone();
+            damaged[at] = value;
+            if let Ok(mut network) = Tflite::load(&damaged) {
+                let _ = network.engine.run(&input, &mut Vec::new());
+            }
+        }
+    }
+}
