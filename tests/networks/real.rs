@@ -141,7 +141,7 @@ fn a_photo_alone_has_the_depth_of_the_installed_network_in_every_command() {
 #[test]
 #[ignore = "needs the network for persons, as `scripts/setup models` brings it, and BOKEHCAM_DATA"]
 fn the_mask_of_what_the_package_brings_is_that_of_the_library() {
-    let shipped = std::env::var_os("BOKEHCAM_MODELS").expect("BOKEHCAM_MODELS names the folder of the network");
+    let shipped = std::env::var_os("TEST_MODELS").expect("TEST_MODELS names the folder of the network");
     let shipped = PathBuf::from(shipped).join(KNOWN[0].file);
     let load = |file: &Path| bokehcam::network::load(file, Runtime::BuiltIn).unwrap().network;
     let (mut ours, mut library) = (load(&shipped), load(&model(Task::Matte)));

@@ -152,6 +152,7 @@ fn fetched(known: &Known) -> Result<Vec<u8>, CliError> {
     let address = || failed(Path::new(known.address));
     for (client, options) in CLIENTS {
         say(&format!("{client} {} {}", options.join(" "), known.address));
+        say(&format!("{client} {} {}", options.join(" "), known.address));
         let mut command = Command::new(client);
         command.args(options).arg(known.address).stdin(Stdio::null()).stdout(Stdio::piped());
         let mut child = match command.spawn() {
