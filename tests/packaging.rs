@@ -184,7 +184,7 @@ fn packages_ask_for_every_library_that_is_loaded() {
         .filter(|line| !line.starts_with('#'))
         .map(|line| {
             let columns: Vec<&str> = line.split_whitespace().collect();
-            assert!(columns.len() == 3 && ["recommends", "suggests"].contains(&columns[2]), "{line}");
+            assert!(columns.len() == 3 && ["depends", "suggests"].contains(&columns[2]), "{line}");
             columns[0]
         })
         .collect();
