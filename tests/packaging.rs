@@ -229,7 +229,9 @@ fn networks_are_given_to_others_with_their_licence() {
         fs::create_dir_all(to.parent().unwrap()).unwrap();
         fs::copy(Path::new(env!("CARGO_MANIFEST_DIR")).join(path), to).unwrap();
     };
-    ["packaging/install", "packaging/licences.py", "README.md", "CHANGELOG.md", "LICENSE-MIT"].map(copy);
+    for path in ["packaging/install", "packaging/licences.py", "README.md", "CHANGELOG.md", "LICENSE-MIT"] {
+        copy(path);
+    }
     for name in ["bokehcam.desktop", "bokehcam.svg", "bokehcam.service", "io.github.bokehcam.bokehcam.metainfo.xml"] {
         copy(&format!("packaging/{name}"));
     }
