@@ -70,3 +70,22 @@ fn scripts_tell_what_they_do() {
     let refused = script("within").args(["20s", "scripts/test", "--nosuch"]).output().unwrap();
     assert_eq!(refused.status.code(), Some(2), "{}", said(&refused));
 }
+
+/// What is released has one version, and an output is not made of another.
+#[test]
+fn a_release_has_the_version_of_the_source() {
+    let release = |args: &[&str]| script("within").args(["20s", "scripts/release"]).args(args).output().unwrap();
+    for (args, code, named) in [
+        (&["99.0.0"][..], 1, "Cargo.toml has version"),
+        (&[], 2, "usage: scripts/release"),
+        (&["--nosuch"], 2, "there is no '--nosuch'"),
+    ] {
+        let refused = release(args);
+        assert_eq!(refused.status.code(), Some(code), "{args:?}: {}", said(&refused));
+        assert!(said(&refused).contains(named) && said(&refused).lines().count() == 1, "{args:?}: {}", said(&refused));
+    }
+    for manifest in ["python/Cargo.toml", "gst/Cargo.toml"] {
+        let text = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join(manifest)).unwrap();
+        assert!(text.contains(concat!("\nversion = \"", env!("CARGO_PKG_VERSION"), "\"\n")), "{manifest}");
+    }
+}

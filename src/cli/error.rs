@@ -33,6 +33,10 @@ pub enum CliError {
     /// Something would be overwritten.
     #[error("{} exists: choose another name, or give --force to overwrite it", .0.display())]
     Exists(PathBuf),
+    /// Something would be overwritten that never is.
+    #[error("{} exists, and stays as it is: choose another name", .0.display())]
+    #[cfg(feature = "camera")]
+    Stays(PathBuf),
     /// A file or folder cannot be read or written.
     #[error("{}: {}", path.display(), input::said(source))]
     Io {

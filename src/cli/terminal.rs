@@ -73,6 +73,11 @@ impl Progress {
         Self(Some((screen, screen.begin(bar))))
     }
 
+    /// None.
+    pub fn silent() -> Self {
+        Self(None)
+    }
+
     /// Sets how many frames are delivered.
     pub fn delivered(&self, frames: u64) {
         self.0.iter().for_each(|(_, count)| count.set(frames));

@@ -55,6 +55,12 @@ fn instance() -> wgpu::Instance {
     INSTANCE.get_or_init(make).clone()
 }
 
+/// Name, kind and driver of every adapter there is, software included.
+pub fn adapters() -> Vec<String> {
+    let adapters = pollster::block_on(instance().enumerate_adapters(wgpu::Backends::VULKAN));
+    adapters.iter().map(|adapter| describe(&adapter.get_info())).collect()
+}
+
 /// A device and its queue.
 pub struct Device {
     /// What it was found by; surfaces of windows are made by it, too.

@@ -35,6 +35,9 @@ const ENOUGH: Duration = Duration::from_secs(2);
 /// Frames before those that are measured: caches fill, and the processor's clock rises.
 const WARM_UP_FRAMES: usize = 2;
 
+/// Above the rows of the table.
+const HEADING: &str = "size        coc px  quality    p50 ms   p95 ms   max ms     fps  executor\n";
+
 /// Measure the blur on this machine, without reading or writing files
 ///
 /// Blurs one frame of the synthetic scene again and again, one at a time, for every combination of the lists given.
@@ -146,7 +149,7 @@ pub fn run(command: &BenchCommand, global: &options::Global, given: &Given) -> R
         },
     );
     if !command.json {
-        print(b"size        coc px  quality    p50 ms   p95 ms   max ms     fps  executor\n")?;
+        print(HEADING.as_bytes())?;
     }
     let combinations = command.sizes.len() * command.coc.len().max(1) * command.quality.len().max(1);
     let combinations = (combinations * command.computings().len()) as u64;
@@ -164,8 +167,14 @@ pub fn run(command: &BenchCommand, global: &options::Global, given: &Given) -> R
                         Progress::new(Some(combinations * u64::from(command.frames.unwrap_or(FRAMES))), global);
                     let before = done * u64::from(command.frames.unwrap_or(FRAMES));
                     progress.delivered(before);
-                    let measured =
-                        measure(command, &look, (&color, &depth), (coc_px, quality), &computing, (&progress, before))?;
+                    let measured = measure(
+                        command.frames,
+                        &look,
+                        (&color, &depth),
+                        (coc_px, quality),
+                        &computing,
+                        (&progress, before),
+                    )?;
                     drop(progress);
                     done += 1;
                     print(measured.line(command.json, command.passes).as_bytes())?;
@@ -174,6 +183,29 @@ pub fn run(command: &BenchCommand, global: &options::Global, given: &Given) -> R
         }
     }
     Ok(())
+}
+
+/// The table of one size at the default quality, for what `--backend auto` takes and for the CPU: some seconds of work.
+pub fn short() -> String {
+    const SIZE: (u32, u32) = (1280, 720);
+    let frame = synthetic_frame(BenchScene::Sitter, SIZE);
+    let coc_px = SIZE.1 as f32 * COC_AT_INFINITY_PER_HEIGHT;
+    let blur = (coc_px, Quality::default());
+    let mut table = HEADING.to_owned();
+    for backend in [Backend::Auto, Backend::Cpu] {
+        let (computing, progress) = (Computing { backend, ..Computing::default() }, Progress::silent());
+        match measure(None, &Look::default(), (&frame.0, &frame.1), blur, &computing, (&progress, 0)) {
+            Ok(measured) => {
+                table += &measured.line(false, false);
+                // The second would be the same again.
+                if measured.executor.starts_with(Backend::Cpu.name()) {
+                    break;
+                }
+            }
+            Err(error) => table += &format!("{}: {error}\n", backend.name()),
+        }
+    }
+    table
 }
 
 impl BenchCommand {
@@ -190,7 +222,7 @@ impl BenchCommand {
 /// Measures one combination of settings: blurs the same picture again and again after a warm-up. `progress` had counted
 /// `before` frames.
 fn measure(
-    command: &BenchCommand,
+    frames: Option<u32>,
     look: &Look,
     (color, depth): (&ColorImage, &DepthMap),
     (coc_px, quality): (f32, Quality),
@@ -218,8 +250,8 @@ fn measure(
     let mut times = Vec::new();
     let mut passes = BTreeMap::<_, Vec<Duration>>::new();
     let began = Instant::now();
-    for frame in 1..=command.frames.unwrap_or(FRAMES) {
-        let is_enough = command.frames.is_none() && times.len() >= LEAST_FRAMES && began.elapsed() > ENOUGH;
+    for frame in 1..=frames.unwrap_or(FRAMES) {
+        let is_enough = frames.is_none() && times.len() >= LEAST_FRAMES && began.elapsed() > ENOUGH;
         if is_enough {
             break;
         }

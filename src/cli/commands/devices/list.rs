@@ -64,6 +64,14 @@ pub fn run(command: &DevicesCommand, global: &Global) -> Result<(), CliError> {
     print(list.to_string().as_bytes())
 }
 
+/// See [`super::formats`].
+pub fn formats(nodes: &[Node]) -> String {
+    let nodes = nodes.iter().map(|node| Node { links: Vec::new(), ..node.clone() });
+    let list = List { pipewire: shared::all(), ..List::of(nodes.collect(), false, false) };
+    let listed = list.to_string();
+    if listed.is_empty() { "none".to_owned() } else { listed }
+}
+
 /// The node that `name` means (see [`node::resolve`]), else all whose card's name contains it: these may be nodes that
 /// give no pictures.
 fn find(name: &str) -> Result<Vec<Node>, CliError> {

@@ -9,6 +9,8 @@ use clap::Args;
 
 use crate::cli::error::CliError;
 use crate::cli::options::Global;
+#[cfg(feature = "camera")]
+use crate::v4l2::node::Node;
 
 /// List cameras and virtual cameras
 ///
@@ -31,6 +33,13 @@ pub struct DevicesCommand {
     /// As JSON
     #[arg(long)]
     json: bool,
+}
+
+/// Cameras, and what may be some, with their formats, as the command lists them; without links, in whose names serial
+/// numbers are.
+#[cfg(feature = "camera")]
+pub fn formats(nodes: &[Node]) -> String {
+    list::formats(nodes)
 }
 
 /// Runs the command.

@@ -57,7 +57,8 @@ fn check_blur() -> Finding {
         Ok(Some(bokeh)) => {
             let name = bokeh.describe();
             if bokeh.backend() == Backend::Cpu && cfg!(feature = "gpu") {
-                let fix = "install a Vulkan driver if there is a GPU; `bokehcam bench` tells how fast the CPU is";
+                let fix = "install a Vulkan driver if there is a GPU (`sudo apt install mesa-vulkan-drivers`, or that of its \
+                           maker); `bokehcam bench` tells how fast the CPU is";
                 Finding::note(BLUR, format!("no hardware GPU that can be used: {name}"), fix)
             } else {
                 Finding::good(BLUR, name)
@@ -76,6 +77,10 @@ fn check_ffmpeg() -> Finding {
             let line = String::from_utf8_lossy(line);
             Finding::good(PROGRAMS, line.split(" Copyright").next().unwrap_or_default().to_owned())
         }
-        None => Finding::note(PROGRAMS, "ffmpeg is not installed", "install it to write .mp4, .mkv and .webm"),
+        None => Finding::note(
+            PROGRAMS,
+            "ffmpeg is not installed",
+            "`sudo apt install ffmpeg`, to write .mp4, .mkv and .webm",
+        ),
     }
 }

@@ -1,0 +1,62 @@
+# bokehcam for Nix: `pkgs.callPackage ./package.nix { }`, what flake.nix does. The version is that of Cargo.toml, and crates
+# are those of Cargo.lock.
+{ lib
+, rustPlatform
+, pkg-config
+, python3
+, patchelf
+, pipewire
+, dbus
+, libxkbcommon
+, vulkan-loader
+, wayland
+, xorg
+}:
+
+let
+  manifest = (lib.importTOML ../../Cargo.toml).package;
+
+  # What packaging/libraries names: loaded while it runs, where Nix has no common folder for it.
+  loaded = [
+    dbus
+    libxkbcommon
+    vulkan-loader
+    wayland
+    xorg.libX11
+    xorg.libxcb
+    xorg.libXcursor
+    xorg.libXi
+  ];
+in
+rustPlatform.buildRustPackage {
+  pname = manifest.name;
+  inherit (manifest) version;
+
+  src = lib.cleanSource ../..;
+  cargoLock.lockFile = ../../Cargo.lock;
+
+  nativeBuildInputs = [ pkg-config python3 patchelf rustPlatform.bindgenHook ];
+  buildInputs = [ pipewire ];
+
+  # They take an hour, and want cameras, an X server and PipeWire.
+  doCheck = false;
+
+  installPhase = ''
+    runHook preInstall
+    patchShebangs packaging
+    packaging/install target/*/release/bokehcam "$out" /
+    substituteInPlace "$out/lib/systemd/user/bokehcam.service" --replace-fail '=/bin/' "=$out/bin/"
+    runHook postInstall
+  '';
+
+  postFixup = ''
+    patchelf --add-rpath ${lib.makeLibraryPath loaded} "$out/bin/bokehcam"
+  '';
+
+  meta = {
+    inherit (manifest) description;
+    license = with lib.licenses; [ mit asl20 ];
+    mainProgram = manifest.name;
+    platforms = lib.platforms.linux;
+  };
+}
