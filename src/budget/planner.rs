@@ -11,7 +11,7 @@ const BLUR: usize = 1;
 const MOST_FRAMES: usize = 3;
 /// What a plan lacks of the finest one. First of all come depth for every frame and the usual blur. With less time depth is
 /// made with less effort, then the blur is a level lower, then frames share depth, where they may: else there are fewer frames, and
-/// the blur is as low as it gets before that. Nothing is given up where something that
+/// the blur is as low as makes a difference before that. Nothing is given up where something that
 /// weighs less would do, and all that there is time for is taken.
 const LESS_EFFORT: f64 = 2.0;
 const SHARED: [f64; MOST_FRAMES] = [0.0, 6.0, 10.0];
@@ -31,6 +31,8 @@ const OWN_DEPTH: f64 = 0.5;
 /// Frames share depth where one that takes it over takes no more than the first share of the time of one that makes its own, and
 /// then up to the second: what moves depth and finds a new matte may cost nearly as much.
 const WORTH_SHARING: [f64; 2] = [0.65, 0.8];
+/// The blur is lowered for depth that does not keep up where the cheapest one saves more than this share of its time.
+const WORTH_SAVING: f64 = 0.05;
 /// Frames whose ages are remembered: three seconds at 30 fps.
 const AGES: usize = 90;
 /// The first frames are old, as all that makes them is made then.
@@ -202,11 +204,14 @@ impl Planner {
             let frames = frames.min(most_frames);
             // Or nothing is to be saved by that.
             let (is_cheapest, is_shared) = (rung == 0, frames > 1 || most_frames == 1);
+            let saved_ns = usual_ns[BLUR] * (1.0 - least_blur[rung]);
             let share_ns = (depth_ns + (frames - 1) as f64 * held_ns) / frames as f64;
             let depth_keeps_up = match shares {
                 true => share_ns <= MOST_DEPTH * frame_ns || frames == most_frames,
-                // Each frame has its own, however many that leaves: not before the blur has left it all the time there is.
-                false => usual_ns[DEPTH] <= MOST_DEPTH * frame_ns || is_cheapest,
+                // Each frame has its own, however many that leaves: not before the blur has left it what time makes a difference.
+                false => {
+                    usual_ns[DEPTH] <= MOST_DEPTH * frame_ns || saved_ns <= share * WORTH_SAVING * usual_ns[DEPTH]
+                }
             };
             let keeps_up = depth_keeps_up && (blur_ns <= budget_ns || is_cheapest);
             // Bad luck rarely comes together.
@@ -214,7 +219,6 @@ impl Planner {
                 (old_ns - age_ns).powi(2) + (depth_ns - usual_ns[DEPTH]).powi(2) + (blur_ns - usual_ns[BLUR]).powi(2);
             let ready_ns = age_ns + usual_ns[DEPTH] + usual_ns[BLUR] + luck.sqrt();
             // It would be dropped, and with a cheaper blur it would not, though luck were as bad.
-            let saved_ns = usual_ns[BLUR] * (1.0 - least_blur[rung]);
             let soonest_ns = age_ns + share * (ready_ns - saved_ns - age_ns);
             let is_lost = ready_ns > late_ns && soonest_ns <= late_ns;
             let is_in_time = ready_ns <= DEADLINE_SHARE * late_ns;
