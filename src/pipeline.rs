@@ -232,8 +232,8 @@ pub fn run(run: Run) -> Result<Report, PipelineError> {
         clock: &clock,
         times: decode,
     };
-    let efforts = source.as_ref().map_or(&[1.0][..], |source| source.efforts());
-    let picker = quality::Picker::new((quality, finest), run.budget_ns, live_ns, efforts);
+    let choices = source.as_ref().map_or((&[1.0][..], true), |source| (source.efforts(), source.may_be_shared()));
+    let picker = quality::Picker::new((quality, finest), run.budget_ns, live_ns, choices);
     let order = rate::Order::new(picker.plan());
     // Without a blur nobody asks for depth.
     let look = if executor.is_some() { run.look } else { Look::plain(Effect::None) };

@@ -10,7 +10,8 @@ const BLUR: usize = 1;
 /// The most frames that share a depth map.
 const MOST_FRAMES: usize = 3;
 /// What a plan lacks of the finest one. First of all come depth for every frame and the usual blur. With less time depth is
-/// made with less effort, then the blur is a level lower, then frames share depth. Nothing is given up where something that
+/// made with less effort, then the blur is a level lower, then frames share depth, where they may: else there are fewer frames, and
+/// the blur is as low as makes a difference before that. Nothing is given up where something that
 /// weighs less would do, and all that there is time for is taken.
 const LESS_EFFORT: f64 = 2.0;
 const SHARED: [f64; MOST_FRAMES] = [0.0, 6.0, 10.0];
@@ -30,6 +31,8 @@ const OWN_DEPTH: f64 = 0.5;
 /// Frames share depth where one that takes it over takes no more than the first share of the time of one that makes its own, and
 /// then up to the second: what moves depth and finds a new matte may cost nearly as much.
 const WORTH_SHARING: [f64; 2] = [0.65, 0.8];
+/// The blur is lowered for depth that does not keep up where the cheapest one saves more than this share of its time.
+const WORTH_SAVING: f64 = 0.05;
 /// Frames whose ages are remembered: three seconds at 30 fps.
 const AGES: usize = 90;
 /// The first frames are old, as all that makes them is made then.
@@ -76,26 +79,28 @@ pub struct Planner {
     /// How long frames took that made their own depth, and those whose depth was taken over.
     own: Window<AGES>,
     held: Window<AGES>,
-    /// The most frames of a plan that are taken at their word: one where it saves nothing to share depth.
+    /// The most frames of a plan that are taken at their word: one where it saves nothing to share depth; and whether it may
+    /// be shared at all.
     most_frames: usize,
+    shares: bool,
     begun: usize,
 }
 
 impl Planner {
     /// The blur of a frame may take `budget_ns` at most. In real time, where frames come every `period_ns`, they have to be
     /// ready two periods after their capture as well; else depth is made as well as can be. `efforts` are the costs of depth,
-    /// the finest, 1, at the end, and `rungs` those of the blur; of these, `usual` is what there should be, and `start` the
-    /// first.
+    /// the finest, 1, at the end, and frames may share it or not; `rungs` are the costs of the blur; of these, `usual` is what
+    /// there should be, and `start` the first.
     ///
     /// # Panics
     /// Costs are none, too many, not positive or not ascending.
     pub fn new(
         (budget_ns, period_ns): (u64, Option<u64>),
-        efforts: &[f64],
+        (efforts, shares): (&[f64], bool),
         rungs: &[f64],
         [usual, start]: [usize; 2],
     ) -> Self {
-        let most_frames = if period_ns.is_some() { MOST_FRAMES } else { 1 };
+        let most_frames = if period_ns.is_some() && shares { MOST_FRAMES } else { 1 };
         let least_effort = if period_ns.is_some() { 0 } else { efforts.len() - 1 };
         let mut plans = Vec::new();
         for rung in 0..rungs.len() {
@@ -122,14 +127,16 @@ impl Planner {
             ages: Window::default(),
             own: Window::default(),
             held: Window::default(),
-            most_frames: MOST_FRAMES,
+            most_frames,
+            shares,
             begun: 0,
         }
     }
 
     /// The same for another blur. What was learnt of the time that its rungs take holds no more.
     pub fn with_blur(&self, rungs: &[f64], [usual, start]: [usize; 2]) -> Self {
-        let mut planner = Self::new((self.budget_ns, self.period_ns), &self.efforts, rungs, [usual, start]);
+        let mut planner =
+            Self::new((self.budget_ns, self.period_ns), (&self.efforts, self.shares), rungs, [usual, start]);
         let now = Plan { rung: start, ..self.plan() };
         planner.governor = governor(&self.efforts, rungs, &planner.plans, now);
         planner.governor.learn_as(DEPTH, &self.governor);
@@ -180,7 +187,7 @@ impl Planner {
     }
 
     fn choose(&mut self) {
-        let Self { governor, plans, least_blur, budget_ns, period_ns, ages, own, held, most_frames, .. } = self;
+        let Self { governor, plans, least_blur, budget_ns, period_ns, ages, own, held, most_frames, shares, .. } = self;
         let budget_ns = *budget_ns as f64;
         let Some(period_ns) = period_ns.map(|period_ns| period_ns as f64) else {
             return governor.choose(|_, times| times.high_ns[BLUR] <= budget_ns);
@@ -189,23 +196,30 @@ impl Planner {
         let frame_ns = budget_ns.min(period_ns);
         let (old_ns, age_ns, held_ns) = (ages.percentile(AGES, 0.95), ages.median(AGES), held.median(AGES));
         let worth = WORTH_SHARING[usize::from(*most_frames > 1)];
-        *most_frames = if held_ns <= worth * own.median(AGES) { MOST_FRAMES } else { 1 };
-        let most_frames = *most_frames;
+        *most_frames = if *shares && held_ns <= worth * own.median(AGES) { MOST_FRAMES } else { 1 };
+        let (most_frames, shares) = (*most_frames, *shares);
         let late_ns = DEADLINE_PERIODS as f64 * period_ns;
         governor.choose(|plan, Times { high_ns: [depth_ns, blur_ns], usual_ns, share }| {
             let Plan { frames, rung, .. } = plans[plan];
             let frames = frames.min(most_frames);
             // Or nothing is to be saved by that.
             let (is_cheapest, is_shared) = (rung == 0, frames > 1 || most_frames == 1);
+            let saved_ns = usual_ns[BLUR] * (1.0 - least_blur[rung]);
             let share_ns = (depth_ns + (frames - 1) as f64 * held_ns) / frames as f64;
-            let keeps_up =
-                (share_ns <= MOST_DEPTH * frame_ns || frames == most_frames) && (blur_ns <= budget_ns || is_cheapest);
+            let depth_keeps_up = match shares {
+                true => share_ns <= MOST_DEPTH * frame_ns || frames == most_frames,
+                // Each frame has its own, however many that leaves: not before the blur has left it what time makes a difference.
+                false => {
+                    usual_ns[DEPTH] <= MOST_DEPTH * frame_ns || saved_ns <= share * WORTH_SAVING * usual_ns[DEPTH]
+                }
+            };
+            let keeps_up = depth_keeps_up && (blur_ns <= budget_ns || is_cheapest);
             // Bad luck rarely comes together.
             let luck =
                 (old_ns - age_ns).powi(2) + (depth_ns - usual_ns[DEPTH]).powi(2) + (blur_ns - usual_ns[BLUR]).powi(2);
             let ready_ns = age_ns + usual_ns[DEPTH] + usual_ns[BLUR] + luck.sqrt();
-            // It would be dropped, and with a cheaper blur it would not.
-            let soonest_ns = age_ns + share * (usual_ns[DEPTH] + usual_ns[BLUR] * least_blur[rung]);
+            // It would be dropped, and with a cheaper blur it would not, though luck were as bad.
+            let soonest_ns = age_ns + share * (ready_ns - saved_ns - age_ns);
             let is_lost = ready_ns > late_ns && soonest_ns <= late_ns;
             let is_in_time = ready_ns <= DEADLINE_SHARE * late_ns;
             let has_less =

@@ -60,6 +60,12 @@ pub trait DepthSource: Send {
         let _ = effort;
     }
 
+    /// Whether later frames may be given its maps, moved with the picture. Not those whose outlines are a mask's: that is one of
+    /// its frame alone, and what moves before all else is who it is of.
+    fn may_be_shared(&self) -> bool {
+        true
+    }
+
     /// Whether its maps have all that is behind the nearer surface, so that nothing need be remembered.
     fn knows_background(&self) -> bool {
         false

@@ -214,10 +214,12 @@ mod tests {
 
     #[test]
     fn wrong_values_say_what_is_accepted() {
-        for text in ["0", "-1", "inf", "0.5", "far", "0.5,1.1", "0.5,", "1,1,1"] {
+        for text in ["0", "-1", "inf", "0.5", "far", "0.5,1.1", "0.5,", "1,1,1", "track:", "track:0.5", "track:2,0"] {
             let accepted = text.parse::<FocusRule>();
             assert_eq!(accepted.is_ok(), text == "0.5", "{text}: {accepted:?}");
         }
+        let track = FocusRule::Track { x: 0.25, y: 1.0 };
+        assert_eq!((track.to_string().parse(), track.to_string().as_str()), (Ok(track), "track:0.25,1"));
         for text in ["0", "17", "all"] {
             assert!(text.parse::<Rank>().unwrap_err().contains("1 to 16"), "{text}");
         }

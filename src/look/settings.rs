@@ -101,7 +101,7 @@ settings! {
     effect: Effect = "effect" "WHAT" Blur Effect::from_str, one of names_of::<Effect>();
     /// How dof is composited
     method: Method = "method" "HOW" Blur Method::from_str, one of names_of::<Method>();
-    /// Distance of the focal plane: METRES, auto, or X,Y as fractions of width and height
+    /// Distance of the focal plane: METRES, auto, X,Y as fractions of width and height, or track:X,Y, what is there at first
     focus: FocusRule = "focus" "WHERE" Blur FocusRule::from_str;
     /// Distances that are sharp as a whole, in metres: half of it on either side of the focal plane
     focus_range_m: f32 = "focus-range" "METRES" Blur not_negative, in 0.0..=f32::MAX;

@@ -5,12 +5,14 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::blur::Blurred;
 use super::playout::Playout;
-use super::{Ended, Frame, Progress, View};
+use super::{Ended, Frame, Progress, Trace, View};
 use crate::bokeh::Picture;
+use crate::budget::Quality;
 use crate::clock::Clock;
 use crate::frame::ColorImage;
 use crate::frame::crop::Cropper;
 use crate::link::{self, Received, Receiver, Sender};
+use crate::optics::CocField;
 use crate::sink::{Sink, SinkError};
 use crate::stats::{Cause, Histogram, Tally, Ticket};
 
@@ -96,6 +98,7 @@ impl Stage<'_> {
                 self.times.frame.add(now_ns - last_ns);
             }
             let captured_ns = ticket.captured_ns;
+            note(stamp.index, &frame.coc, &trace);
             // What the sink does not keep is delivered once the viewer took it.
             let kept = was_given && self.sink.keeps();
             let (done, open) = if self.view.is_none() || kept { (Some(ticket), None) } else { (None, Some(ticket)) };
@@ -162,6 +165,16 @@ impl Stage<'_> {
             None => from.recv().map_or(Received::Ended, Received::Item),
         }
     }
+}
+
+/// Tells of a frame that went out, to who asks for that.
+fn note(index: usize, coc: &CocField, trace: &Trace) {
+    let ms = |ns: u64| ns as f64 / 1e6;
+    let focus_m = if let CocField::Depth(lens) = coc { Some(lens.focus_m) } else { None };
+    let quality = trace.quality.map(Quality::name);
+    let (depth_ms, blur_ms, age_ms, depth_held) =
+        (ms(trace.depth_ns), ms(trace.blur_ns), ms(trace.age_ns), trace.depth_held);
+    tracing::trace!(index, focus_m, quality, depth_held, depth_ms, blur_ms, age_ms, "frame");
 }
 
 /// Flips a picture left to right.

@@ -13,16 +13,16 @@ pub(super) struct Picker {
 
 impl Picker {
     /// The blur of a frame may take `budget_ns`; where frames come every `period_ns` in real time, there is a deadline, too,
-    /// and depth is made as there is time, with `efforts` of these costs. No frame is blurred more finely than `finest` unless
+    /// and depth is made as there is time, with efforts of these costs, and shared by frames only where it may be. No frame is blurred more finely than `finest` unless
     /// that was asked for.
     pub(super) fn new(
         (rule, finest): (QualityRule, Quality),
         budget_ns: u64,
         period_ns: Option<u64>,
-        efforts: &[f64],
+        depth: (&[f64], bool),
     ) -> Self {
         let (rungs, costs, places) = Self::ladder(rule, finest);
-        Self { rungs, planner: Planner::new((budget_ns, period_ns), efforts, costs, places) }
+        Self { rungs, planner: Planner::new((budget_ns, period_ns), depth, costs, places) }
     }
 
     /// The same under another rule, for another executor. What was learnt of the time that rungs take holds no more.
@@ -141,7 +141,7 @@ mod tests {
 
     /// Blurs frames that take 4 ms at the usual quality; returns the last quality.
     fn blurred(rule: QualityRule, finest: Quality) -> Quality {
-        let mut picker = Picker::new((rule, finest), 30 * MS, Some(30 * MS), &[1.0]);
+        let mut picker = Picker::new((rule, finest), 30 * MS, Some(30 * MS), (&[1.0], true));
         for frame in 0..200 {
             let quality = picker.quality();
             picker.note(quality, (COSTS[quality as usize] * 4.0 * MS as f64) as u64, frame * 30 * MS);
@@ -159,7 +159,7 @@ mod tests {
     #[test]
     fn another_executor_begins_anew_and_depth_goes_on() {
         let auto = QualityRule::Auto(Quality::Balanced);
-        let mut picker = Picker::new((auto, Quality::Balanced), 30 * MS, Some(30 * MS), &[1.0]);
+        let mut picker = Picker::new((auto, Quality::Balanced), 30 * MS, Some(30 * MS), (&[1.0], true));
         for frame in 0..100 {
             let at_ns = frame * 30 * MS;
             picker.note_depth(DepthTimes { effort: Some(0), took_ns: 40 * MS, age_ns: 3 * MS, at_ns });

@@ -65,7 +65,7 @@ impl Stepper {
             executor,
             made_for,
             // Until a time is allowed there is enough.
-            picker: Picker::new((look.quality_rule(adaptive), finest), u64::MAX, None, &[1.0]),
+            picker: Picker::new((look.quality_rule(adaptive), finest), u64::MAX, None, (&[1.0], false)),
             is_timed: false,
             clock: Clock::system(),
             color: ColorImage::new(size.0, size.1),

@@ -120,6 +120,25 @@ fn what_is_seen_aside_is_what_is_seen_at_once() {
     assert!(is_there, "the thread never told");
 }
 
+/// However little time there is, nobody wears the outlines of a frame before.
+#[test]
+fn each_frame_has_a_mask_of_its_own_at_every_effort() {
+    let folder = TempDir::new().unwrap();
+    let person = written(&folder, "matte.onnx", &matte(32, 24, WEIGHTS, 0.0));
+    let depth = written(&folder, "mono.onnx", &matte(32, 24, [-1.0, 0.0, 1.0], 0.0));
+    let open =
+        |mono: Option<&Path>| SingleCamera::open(Some(&person), mono, &Hints::default(), Runtime::BuiltIn).unwrap();
+    let (mut finest, mut least) = (open(None), open(None));
+    least.set_effort(0);
+    for frame in 0..8u64 {
+        let (color, _) = disc(320, 240, (80.0 + 20.0 * frame as f32, 118.0), 60.0);
+        assert!(read(&mut least, &color, frame) == read(&mut finest, &color, frame), "frame {frame}");
+    }
+    assert!(!least.may_be_shared() && !open(Some(&*depth)).may_be_shared());
+    let alone = SingleCamera::open(None, Some(&depth), &Hints::default(), Runtime::BuiltIn).unwrap();
+    assert!(alone.may_be_shared(), "what is near and far is no mask");
+}
+
 #[test]
 fn what_a_network_is_shown_may_lie_any_way_and_be_of_any_size() {
     let folder = TempDir::new().unwrap();

@@ -8,7 +8,7 @@ const EFFORTS: [f64; 2] = [0.5, 1.0];
 const BALANCED: usize = 2;
 
 fn planner(efforts: &[f64]) -> Planner {
-    Planner::new((PERIOD_NS, Some(PERIOD_NS)), efforts, &RUNGS, [BALANCED, BALANCED])
+    Planner::new((PERIOD_NS, Some(PERIOD_NS)), (efforts, true), &RUNGS, [BALANCED, BALANCED])
 }
 
 /// Plays frames of a machine where depth at full effort and the usual blur take so long, in milliseconds; returns the plans.
@@ -107,7 +107,7 @@ fn all_the_time_there_is_is_taken_and_no_more() {
 
 #[test]
 fn without_a_pace_depth_is_as_good_as_it_gets() {
-    let mut planner = Planner::new((PERIOD_NS, None), &EFFORTS, &RUNGS, [BALANCED, BALANCED]);
+    let mut planner = Planner::new((PERIOD_NS, None), (&EFFORTS, true), &RUNGS, [BALANCED, BALANCED]);
     let plans = play(&mut planner, (500.0, 60.0), 100);
     assert!(plans.iter().all(|plan| plan.frames == 1 && plan.effort == 1));
     assert_eq!(plans[99].rung, 0);
@@ -115,7 +115,7 @@ fn without_a_pace_depth_is_as_good_as_it_gets() {
 
 #[test]
 fn a_gpu_takes_a_finer_blur_while_depth_is_shared() {
-    let mut planner = Planner::new((PERIOD_NS, Some(PERIOD_NS)), &[1.0], &[0.7, 1.0, 2.0], [1, 1]);
+    let mut planner = Planner::new((PERIOD_NS, Some(PERIOD_NS)), (&[1.0], true), &[0.7, 1.0, 2.0], [1, 1]);
     let plan = play(&mut planner, (45.0, 3.0), 300)[299];
     assert_eq!((plan.frames, plan.rung), (2, 2));
 }
@@ -141,5 +141,49 @@ fn depth_is_shared_only_where_that_saves_something_and_costs_the_blur_nothing_wh
             assert!(plans[300..].windows(2).all(|pair| pair[0].frames == pair[1].frames), "it stays so");
             assert!(shares || plans[599].rung == BALANCED, "{depth_ms} ms: {:?}", plans[599]);
         }
+    }
+}
+
+/// Plays a machine whose depth takes so long, and longer in one frame of eight; the shares of frames at the usual blur, and of
+/// those that were given depth of another, once it has settled.
+fn played_with_spikes(planner: &mut Planner, (depth_ms, spike_ms, blur_ms): (u64, u64, f64)) -> [f64; 2] {
+    let (mut usual, mut shared) = (0, 0);
+    for frame in 0..1200 {
+        let (plan, at_ns) = (planner.plan(), frame * PERIOD_NS);
+        let took_ns = MS * if frame % 8 == 0 { spike_ms } else { depth_ms };
+        planner.note_depth(DepthTimes { effort: Some(plan.effort), took_ns, age_ns: 5 * MS, at_ns });
+        let blur_ns = (blur_ms * MS as f64 * RUNGS[plan.rung]) as u64;
+        planner.note_blur(Sample { rung: plan.rung, took_ns: blur_ns, at_ns });
+        if frame >= 300 {
+            usual += usize::from(plan.rung == BALANCED);
+            shared += usize::from(plan.frames > 1);
+        }
+    }
+    [usual, shared].map(|frames| frames as f64 / 900.0)
+}
+
+/// What others do on the machine makes one depth of eight late: no level of the blur makes that good.
+#[test]
+fn spikes_of_depth_do_not_lower_a_blur_that_has_time() {
+    for (shares, efforts) in [(false, &[1.0][..]), (true, &[1.0]), (true, &EFFORTS)] {
+        for spike_ms in [20, 40, 60, 90] {
+            let start = [BALANCED, BALANCED];
+            let mut planner = Planner::new((PERIOD_NS, Some(PERIOD_NS)), (efforts, shares), &RUNGS, start);
+            let [usual, shared] = played_with_spikes(&mut planner, (20, spike_ms, 11.0));
+            assert!(usual > 0.9, "{shares} {efforts:?} {spike_ms}: the usual blur for {usual:.2} of the frames");
+            assert!(shares || shared == 0.0);
+        }
+    }
+}
+
+/// A mask is of its frame: there are fewer frames then, and before that the blur gives up what makes a difference.
+#[test]
+fn depth_that_may_not_be_shared_never_is_and_the_blur_gives_way_first() {
+    for (depth_ms, rung) in [(20.0, BALANCED), (26.0, BALANCED), (31.0, 1), (60.0, BALANCED), (200.0, BALANCED)] {
+        let start = [BALANCED, BALANCED];
+        let mut planner = Planner::new((PERIOD_NS, Some(PERIOD_NS)), (&[1.0], false), &RUNGS, start);
+        let plans = play(&mut planner, (depth_ms, 9.0), 600);
+        assert!(plans.iter().all(|plan| plan.frames == 1), "{depth_ms} ms");
+        assert_eq!(plans[599].rung, rung, "{depth_ms} ms");
     }
 }

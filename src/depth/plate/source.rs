@@ -228,6 +228,10 @@ impl DepthSource for PlateDepth {
         self.companion.as_ref().map_or(&[1.0], |companion| companion.efforts())
     }
 
+    fn may_be_shared(&self) -> bool {
+        false
+    }
+
     fn set_effort(&mut self, effort: usize) {
         self.companion.iter_mut().for_each(|companion| companion.set_effort(effort));
     }

@@ -32,8 +32,13 @@ use crate::compute::thread_pool::cores;
 use crate::frame::{ColorImage, DepthMap, Mask};
 use crate::network::{self, Runtime, Task};
 
-/// Of so many frames, persons are looked for in one, and all else is looked at in one, by effort: a room hardly moves.
-const EVERY: [(u64, u64); 3] = [(2, 8), (1, 4), (1, 2)];
+/// Of so many frames, what is beside persons is looked at in one, by effort: a room hardly moves. Persons are looked for in each:
+/// their outlines are those of one frame.
+const EVERY: [u64; 3] = [8, 4, 2];
+/// The same where no persons are looked for.
+const EVERY_ALONE: [u64; 3] = [2, 1, 1];
+/// What that costs.
+const EFFORTS: [f64; EVERY.len()] = [0.5, 0.8, 1.0];
 /// Between two frames further apart than this, the first is no guide to the second.
 const APART_NS: u64 = 500_000_000;
 
@@ -131,20 +136,17 @@ impl SingleCamera {
             self.person.iter_mut().for_each(Person::forget);
             self.held.forget();
         }
-        let is_turn = |every: u64| apart || self.frames.is_multiple_of(every);
-        let (for_persons, for_all) = match EVERY[self.effort] {
-            // Alone, it is what outlines come from.
-            (persons, _) if !self.has_subject => (persons, persons),
-            every => every,
-        };
+        // Alone, it is what outlines come from.
+        let every = if self.has_subject { EVERY } else { EVERY_ALONE }[self.effort];
         // A room hardly moves; a picture after a break is another one. Outlines are those of their frame.
         let aside = self.is_live && self.has_subject && !apart && cores() > 1;
-        self.turn = Turn { persons: is_turn(for_persons), all: is_turn(for_all), aside };
+        self.turn = Turn { persons: true, all: apart || self.frames.is_multiple_of(every), aside };
         self.frames += 1;
     }
 
     /// Lets the network for persons look, if it is its turn; one that fails is turned off.
     fn look_for_persons(&mut self, color: &ColorImage, time_ns: u64) {
+        // Nobody looks at one picture twice.
         let is_turn = std::mem::take(&mut self.turn.persons);
         if let Some(Err(why)) = self.person.as_mut().filter(|_| is_turn).map(|person| person.look(color, time_ns)) {
             tracing::error!("{}: the person's network is turned off, and all is blurred: {why}", self.name);
@@ -206,7 +208,12 @@ impl DepthSource for SingleCamera {
     }
 
     fn efforts(&self) -> &'static [f64] {
-        &[0.5, 0.8, 1.0]
+        // Without what is beside persons, there is nothing to save.
+        if self.relief.is_some() { &EFFORTS } else { &EFFORTS[EFFORTS.len() - 1..] }
+    }
+
+    fn may_be_shared(&self) -> bool {
+        !self.has_subject
     }
 
     fn set_effort(&mut self, effort: usize) {

@@ -4,8 +4,9 @@ use super::decision::Decision;
 use super::feed::{Answer, Feed};
 use crate::frame::{ColorImage, Mask};
 
-/// How far an undecided pixel stays what it was in the frame before.
+/// How far an undecided pixel stays what it was in the frame before; less where frames in between are missing.
 const STEADINESS: f32 = 0.8;
+const FRAME_NS: f32 = 1e9 / 30.0;
 
 /// Finds persons, from frame to frame.
 pub struct Person {
@@ -16,7 +17,8 @@ pub struct Person {
     mask: Mask,
     /// Whether the numbers are those before the last step of a network: they were seen beyond 0 to 1.
     is_raw: bool,
-    seen: bool,
+    /// When the picture before was taken.
+    seen_ns: Option<u64>,
 }
 
 impl Person {
@@ -27,7 +29,7 @@ impl Person {
             decision: Decision::default(),
             mask: Mask::default(),
             is_raw: false,
-            seen: false,
+            seen_ns: None,
         }
     }
 
@@ -35,7 +37,7 @@ impl Person {
     pub fn forget(&mut self) {
         self.feed.forget();
         self.decision.forget();
-        self.seen = false;
+        self.seen_ns = None;
     }
 
     /// The mask of the last picture.
@@ -54,17 +56,23 @@ impl Person {
         let beyond = |share: f32| !(-0.01..=1.01).contains(&share);
         self.is_raw |= (0..pixels).any(|pixel| beyond(answer.at(pixel, answer.channels - 1)));
         let size = (answer.size.0 as u32, answer.size.1 as u32);
-        let fresh = !self.seen || (self.steady.width, self.steady.height) != size;
+        let before_ns = self.seen_ns.filter(|_| (self.steady.width, self.steady.height) == size);
+        let steadiness = before_ns.map_or(0.0, |before_ns| steadiness(time_ns.abs_diff(before_ns)));
         self.steady.resize(size.0, size.1);
         for (pixel, share) in self.steady.share.iter_mut().enumerate() {
             let new = share_of(&answer, pixel, self.is_raw);
-            let keeps = if fresh { 0.0 } else { STEADINESS * uncertainty(new) };
+            let keeps = steadiness * uncertainty(new);
             *share = new + (*share - new) * keeps;
         }
-        self.seen = true;
+        self.seen_ns = Some(time_ns);
         self.decision.decide(&self.steady, time_ns, &mut self.mask);
         Ok(())
     }
+}
+
+/// How far an undecided pixel stays what it was so long ago: who moves is elsewhere by then.
+fn steadiness(gap_ns: u64) -> f32 {
+    STEADINESS.powf((gap_ns as f32 / FRAME_NS).max(1.0))
 }
 
 /// The share of a person: of two channels, the second is theirs.
@@ -90,6 +98,13 @@ fn uncertainty(share: f32) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_was_seen_long_ago_says_little() {
+        assert!((steadiness(33_333_333) - 0.8).abs() < 1e-4 && steadiness(0) == 0.8, "nothing lags at a camera's pace");
+        assert!((steadiness(66_666_666) - 0.64).abs() < 1e-4, "as if the missing one had been seen");
+        assert!(steadiness(400_000_000) < 0.07);
+    }
 
     #[test]
     fn uncertainty_is_that_of_a_coin() {

@@ -59,7 +59,7 @@ impl Gestures {
         }
     }
 
-    /// Focuses where one clicked, or moves the band of tilt-shift there; a double click follows the subject again.
+    /// Focuses where one clicked, or moves the band of tilt-shift there; a double click follows what is there.
     fn click(&mut self, response: &Response, state: &State, place: &Place, actions: &mut Vec<Action>) {
         let Some(at) = response.interact_pointer_pos().filter(|_| response.clicked()) else { return };
         let mut look = state.look.clone();
@@ -68,8 +68,8 @@ impl Gestures {
             look.tilt.center_y = marks::center_through(&look.tilt, place.size, [x, y]);
         // A double click soon after another click counts as a third.
         } else if response.double_clicked() || response.triple_clicked() {
-            look.focus = FocusRule::Auto;
-            self.ring = None;
+            look.focus = tweak::track(x, y);
+            self.ring = Some(([x, y], response.ctx.input(|input| input.time)));
         } else {
             look.focus = tweak::point(x, y);
             self.ring = Some(([x, y], response.ctx.input(|input| input.time)));

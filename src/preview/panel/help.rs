@@ -11,7 +11,7 @@ use crate::preview::texts::tr;
 
 const GESTURES: [(&str, &str); 9] = [
     ("Click", "focus there"),
-    ("Double-click", "focus on the subject"),
+    ("Double-click", "focus on that, and follow it"),
     ("Wheel", "less blur, more blur"),
     ("Ctrl+Wheel, pinch", "larger, smaller: pixels as they are"),
     ("Drag", "move the enlarged picture"),

@@ -104,13 +104,18 @@ pub fn move_focus(look: &mut Look, dx: f32, dy: f32) {
             FocusRule::Metres(short(metres.clamp(*DISTANCES_M.start(), *DISTANCES_M.end())))
         }
         FocusRule::Auto => point(0.5 + dx, 0.5 + dy),
-        FocusRule::Point { x, y } => point(x + dx, y + dy),
+        FocusRule::Point { x, y } | FocusRule::Track { x, y } => point(x + dx, y + dy),
     };
 }
 
 /// The focus at a place of the picture, or the nearest one in it.
 pub fn point(x: f32, y: f32) -> FocusRule {
     FocusRule::Point { x: short(x.clamp(0.0, 1.0)), y: short(y.clamp(0.0, 1.0)) }
+}
+
+/// The focus on what is at a place of the picture, or the nearest one in it, wherever it goes.
+pub fn track(x: f32, y: f32) -> FocusRule {
+    FocusRule::Track { x: short(x.clamp(0.0, 1.0)), y: short(y.clamp(0.0, 1.0)) }
 }
 
 /// A number with four digits that count, as one would write it: finer nobody sees, and commands stay short.

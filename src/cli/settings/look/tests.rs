@@ -114,6 +114,7 @@ fn looks(picture: &std::path::Path) -> Vec<Look> {
         add(&|look| look.aperture.intensity = -number);
         add(&|look| look.focus = FocusRule::Metres(number.max(DepthMap::LEAST_M)));
         add(&|look| look.focus = FocusRule::Point { x: number, y: 1.0 - number });
+        add(&|look| look.focus = FocusRule::Track { x: 1.0 - number, y: number });
         add(&|look| look.strength = Strength::Percent(number));
         add(&|look| look.tilt = Tilt { center_y: number, band: 0.0, angle_deg: -360.0 * number });
         add(&|look| look.aperture.shape = Shape::Ring { inner: number });

@@ -14,7 +14,7 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
     let now_m = sheet.state.distance_m();
     let (is_point, metres) = match focus {
         FocusRule::Metres(metres) => (false, metres),
-        FocusRule::Point { .. } => (true, now_m),
+        FocusRule::Point { .. } | FocusRule::Track { .. } => (true, now_m),
         FocusRule::Auto => (false, now_m),
     };
     let point = if is_point { focus } else { FocusRule::Point { x: 0.5, y: 0.5 } };
@@ -23,8 +23,8 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
         _ => FocusRule::Metres((now_m * 100.0).round() / 100.0),
     };
     let rules = [
-        ("Subject", "Follows the nearest large subject. Double-click on the picture does the same", FocusRule::Auto),
-        ("Point", "What is at a point of the picture. Click on the picture to choose it", point),
+        ("Subject", "Follows a person, or the nearest large subject", FocusRule::Auto),
+        ("Point", "What is at a point of the picture: click there. Double-click on something to follow it", point),
         ("Distance", "A distance in metres", distance),
     ];
     sheet.choose(ui, "Focus on", &rules, focus, |look, rule| look.focus = rule);
@@ -37,6 +37,6 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
     let how = Number::new("Focal range", hint, half_m, 2).unit("±", " m");
     sheet.number(ui, &how, sheet.look.focus_range_m / 2.0, |look, half_m| look.focus_range_m = half_m * 2.0);
     if is_point {
-        remark(ui, "Click on the picture to focus elsewhere; double-click to focus on the subject.");
+        remark(ui, "Click on the picture to focus elsewhere; double-click on something to follow it.");
     }
 }

@@ -8,6 +8,7 @@ use winit::event_loop::ActiveEventLoop;
 use super::App;
 use super::seek::Seeking;
 use crate::link::Receiver;
+use crate::pipeline::View;
 use crate::preview::session::SessionEvent;
 use crate::preview::state::Source;
 
@@ -62,9 +63,10 @@ impl App {
                 changed = true;
             }
         }
-        // A frozen frame has to be in memory, to be saved: frames are replaced until one is.
+        // A frozen frame has to be in memory, to be saved, and have depth of its own: frames are replaced until one is.
         let stays = self.state.frozen || self.state.settled;
-        let stays = stays && self.view.as_ref().is_some_and(|view| view.picture.memory().is_some());
+        let may_stay = |view: &View| view.picture.memory().is_some() && !view.trace.depth_held;
+        let stays = stays && self.view.as_ref().is_some_and(may_stay);
         if let Some(view) = newest.filter(|view| !stays || self.seeking.is_answer(view)) {
             self.note_place(&view);
             self.learn_from(&view);

@@ -112,7 +112,8 @@ impl App {
             (true, false) => Place::Device,
             (true, true) => Place::Both,
         });
-        self.wanted.want_own_depth(self.snapshot_due);
+        // What one looks at for long, or keeps, has depth of its own.
+        self.wanted.want_own_depth(self.snapshot_due || self.state.frozen);
     }
 
     /// Saves the frame that is shown. If it is only on the GPU, was blurred between two looks so that no settings could repeat

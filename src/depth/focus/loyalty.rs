@@ -1,0 +1,121 @@
+//! Which of the subjects that are found from map to map is meant: the lens stays with one while others come and go.
+
+/// Two distances this close together, in dioptres, are of one subject; and how fast it may move, in dioptres a second.
+const SAME: f32 = 0.12;
+const SPEED: f32 = 2.0;
+/// Time in which it moves, at most: after a longer gap nobody knows which of two is the one of before.
+const LONGEST_S: f32 = 0.1;
+/// Another subject is turned to once it was there for so long, and in so many maps one after the other: neither who passes by is
+/// meant, nor what a single map shows.
+const PATIENCE_NS: u64 = 400_000_000;
+const LEAST_MAPS: u32 = 3;
+
+/// How far a subject may have moved between two times, in dioptres.
+pub fn tolerance(from_ns: u64, to_ns: u64) -> f32 {
+    let elapsed_s = to_ns.saturating_sub(from_ns) as f32 / 1e9;
+    SAME + SPEED * elapsed_s.min(LONGEST_S)
+}
+
+/// Stays with a subject.
+#[derive(Debug, Default)]
+pub struct Loyalty {
+    subject: Option<Seen>,
+    /// Another one, since the subject was last found.
+    rival: Option<Seen>,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Seen {
+    dioptres: f32,
+    time_ns: u64,
+    /// When it cannot have been there yet, and in how many maps it was found.
+    since_ns: u64,
+    maps: u32,
+}
+
+impl Seen {
+    fn is_same(&self, dioptres: f32, time_ns: u64) -> bool {
+        (dioptres - self.dioptres).abs() <= tolerance(self.time_ns, time_ns)
+    }
+
+    fn again(self, dioptres: f32, time_ns: u64) -> Self {
+        Self { dioptres, time_ns, maps: self.maps.saturating_add(1), ..self }
+    }
+}
+
+impl Loyalty {
+    /// The distance to focus on, in dioptres, where a map has the subject that would be chosen without a memory at `found`.
+    /// `stays` tells where something still is near a distance.
+    pub fn choose(&mut self, found: f32, stays: impl Fn(f32) -> Option<f32>, time_ns: u64) -> f32 {
+        let new = |since_ns| Seen { dioptres: found, time_ns, since_ns, maps: 1 };
+        let Some(subject) = self.subject else {
+            self.subject = Some(new(time_ns));
+            return found;
+        };
+        if subject.is_same(found, time_ns) {
+            (self.subject, self.rival) = (Some(subject.again(found, time_ns)), None);
+            return found;
+        }
+        let rival = self.rival.filter(|rival| rival.is_same(found, time_ns));
+        let rival = rival.map_or_else(|| new(subject.time_ns), |rival| rival.again(found, time_ns));
+        let has_stayed = rival.maps >= LEAST_MAPS && time_ns.saturating_sub(rival.since_ns) >= PATIENCE_NS;
+        // The first maps may be bad as well.
+        let outvotes = subject.maps < LEAST_MAPS && rival.maps > subject.maps;
+        if has_stayed || outvotes {
+            (self.subject, self.rival) = (Some(rival), None);
+            return found;
+        }
+        self.rival = Some(rival);
+        let dioptres = stays(subject.dioptres).filter(|&dioptres| subject.is_same(dioptres, time_ns));
+        // Time in which it was not seen is none in which it could move unseen.
+        let now = Seen { dioptres: dioptres.unwrap_or(subject.dioptres), time_ns, ..subject };
+        self.subject = Some(now);
+        now.dioptres
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const MS: u64 = 1_000_000;
+
+    /// The distances chosen where these are found, one map every `step_ms`; all of them are there all the time.
+    fn chosen(found: &[f32], step_ms: u64) -> Vec<f32> {
+        let mut loyalty = Loyalty::default();
+        let mut choose = |(map, &found): (u64, &f32)| loyalty.choose(found, Some, map * step_ms * MS);
+        (0..).zip(found).map(&mut choose).collect()
+    }
+
+    #[test]
+    fn one_bad_map_moves_nothing_however_rare_maps_are() {
+        for step_ms in [10, 33, 83, 500, 2000] {
+            let mut found = [0.8; 12];
+            for bad in 3..11 {
+                found[bad] = 1.9;
+                assert_eq!(chosen(&found, step_ms), [0.8; 12], "{step_ms} ms, map {bad}");
+                found[bad] = 0.8;
+            }
+        }
+    }
+
+    #[test]
+    fn a_bad_first_map_is_outvoted_by_those_after_it() {
+        assert_eq!(chosen(&[1.9, 0.8, 0.8, 0.8], 500), [1.9, 1.9, 0.8, 0.8]);
+    }
+
+    #[test]
+    fn who_stays_is_turned_to_after_some_time_and_some_maps() {
+        let found: Vec<f32> = [0.8; 5].into_iter().chain([1.9; 40]).collect();
+        let turned = |step_ms| chosen(&found, step_ms).iter().position(|&dioptres| dioptres == 1.9).unwrap() as u64;
+        assert_eq!((turned(10) - 4) * 10, 400);
+        assert_eq!((turned(40) - 4) * 40, 400);
+        assert_eq!(turned(1000) - 4, 3, "three maps");
+    }
+
+    #[test]
+    fn one_who_moves_is_followed() {
+        let found: Vec<f32> = (0..60).map(|map| 0.5 + 0.03 * map as f32).collect();
+        assert_eq!(chosen(&found, 33), found);
+    }
+}
