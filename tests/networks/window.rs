@@ -35,7 +35,7 @@ fn the_window_says_in_one_line_why_a_network_cannot_be_used_and_goes_on() {
         let depth_choice: DepthChoice = format!("matte:{}", file.display()).parse().unwrap();
         let options = Options { depth_choice, ..Options::default() };
         let mut system = System::new(options, Look::default(), Box::new(NoStore));
-        match system.open(recording, false) {
+        match system.open(recording, None) {
             Ok(opened) => assert!(file.ends_with("good.onnx") && opened.source.has_depth(), "{}", file.display()),
             Err(line) => {
                 let name = file.file_name().unwrap().to_str().unwrap();

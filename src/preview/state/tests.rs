@@ -1,7 +1,8 @@
 use super::apply::{NO_DEPTH, NO_DEPTH_OF_PHOTO, NO_PLATE};
 use super::sample::{blurred, look, running, state};
 use super::*;
-use crate::look::{Effect, Look, Strength};
+use crate::depth::focus::FocusRule;
+use crate::look::{Effect, Look, Patch, Strength};
 
 fn set(state: &mut State, radius_px: f32, stroke: Option<&'static str>) -> Vec<Request> {
     state.apply(Action::Look { look: Box::new(blurred(radius_px)), stroke })
@@ -129,8 +130,8 @@ fn a_photo_is_told_what_gives_it_depth() {
 #[test]
 fn what_needs_depth_says_so_where_there_is_none() {
     let mut state = state();
-    // What follows depth becomes tilt-shift, and the session is told.
-    let toy = Look { effect: Effect::TiltShift, ..look() };
+    // A portrait becomes the picture as it is, and the session is told.
+    let toy = Look { effect: Effect::None, ..look() };
     assert_eq!(state.hear(Update::Source(running(false))), Some(Request::Look(Box::new(toy.clone()))));
     for action in [Action::Preset("cinematic".into()), Action::Show(Shown::Depth)] {
         let before = state.notes.last().map(|note| note.number);
@@ -313,10 +314,10 @@ fn arrows_move_what_is_sharp() {
 #[test]
 fn a_plate_is_offered_where_a_camera_has_no_depth_and_its_end_is_told_once() {
     let mut state = state();
-    assert_eq!(state.takes_plates(), [false; 2]);
+    assert!(!state.takes_plates() && !state.offers_depth());
     assert_eq!((state.apply(Action::TakePlate), &state.notes.last().unwrap().text[..]), (vec![], NO_PLATE));
     state.hear(Update::Source(running(false)));
-    assert_eq!(state.takes_plates(), [true; 2]);
+    assert!(state.takes_plates() && state.offers_depth());
     state.apply(Action::DeclinePlate);
     assert!(state.declined_plate);
     assert_eq!(state.apply(Action::TakePlate), [Request::TakePlate]);
@@ -340,8 +341,39 @@ fn a_source_without_depth_changes_no_look_for_the_next_time() {
     let chosen = state.look.clone();
     assert_eq!(chosen.effect, Effect::Auto);
     state.hear(Update::Source(running(false)));
-    assert_eq!((state.look.effect, state.chosen_look()), (Effect::TiltShift, chosen));
+    assert_eq!((state.look.effect, state.chosen_look()), (Effect::None, chosen));
     let tilted = Look { effect: Effect::Blur, ..state.look.clone() };
     state.apply(Action::Look { look: Box::new(tilted.clone()), stroke: None });
     assert_eq!(state.chosen_look(), tilted, "that was chosen");
+}
+
+#[test]
+fn where_depth_is_relative_no_look_has_metres() {
+    let mut state = state();
+    let lens = Strength::Lens(tweak::LENS);
+    state.look = Look { focus: FocusRule::Metres(2.5), strength: lens, focus_range_m: 0.4, ..look() };
+    state.hear(Update::Camera(Camera { is_relative: true, ..Camera::default() }));
+    let told = state.hear(Update::Source(running(true)));
+    assert!(matches!(told, Some(Request::Look(look)) if look.needs_metres().is_none()), "{:?}", state.look);
+    assert_eq!(state.look.needs_metres(), None);
+    assert!(state.notes.iter().any(|note| note.text.contains("in metres")), "and it is said");
+    // Nothing brings them back, and keys that mean metres blur by amount.
+    let before = tweak::amount(&state.look, 720).unwrap();
+    let mut more = state.look.clone();
+    tweak::f_number_by(&mut more, 0.5, 1.0, (1280, 720));
+    state.apply(Action::Look { look: Box::new(more), stroke: None });
+    assert!(state.look.needs_metres().is_none() && tweak::amount(&state.look, 720).unwrap() > 1.5 * before);
+    assert!(state.patched(&Patch { focus: Some(FocusRule::Metres(2.0)), ..Patch::default() }).is_err());
+}
+
+#[test]
+fn an_amount_is_the_same_after_a_way_by_the_lens() {
+    let size = (1280, 720);
+    let mut look = Look::default();
+    for focus_m in [0.7, 1.24, 3.0] {
+        look.strength = Strength::Lens(tweak::lens_of(&look, focus_m, size));
+        let Strength::Lens(lens) = look.strength else { unreachable!() };
+        look.strength = tweak::strength_of(tweak::amount_of(lens, focus_m, size));
+        assert_eq!(look, Look::default(), "focused at {focus_m} m");
+    }
 }

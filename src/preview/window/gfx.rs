@@ -63,14 +63,17 @@ impl Gfx {
         Ok(Self { window, input, presenter })
     }
 
-    /// Where a picture of `size` lies in the window: centred, as large as fits or enlarged, and then which part of it is seen.
-    pub fn area(&self, size: (u32, u32), zoom: Zoom, mirror: bool) -> (Area, Option<Part>) {
+    /// Where a picture of `size` lies in the window, in the `room` at its top left that the panel leaves: centred, as large as fits
+    /// or enlarged, and then which part of it is seen.
+    pub fn area(&self, size: (u32, u32), room: (u32, u32), zoom: Zoom, mirror: bool) -> (Area, Option<Part>) {
         let PhysicalSize { width, height } = self.window.inner_size();
+        // Until the controls are laid out for a new size, the room is of the size before.
+        let room = (room.0.min(width), room.1.min(height));
         if zoom.factor == 0 {
-            return (fitted(size, (width, height)), None);
+            return (fitted(size, room), None);
         }
         let [x, y] = zoom.center;
-        let (area, part) = enlarged(size, (width, height), zoom.factor, [if mirror { 1.0 - x } else { x }, y]);
+        let (area, part) = enlarged(size, room, zoom.factor, [if mirror { 1.0 - x } else { x }, y]);
         (area, Some(part))
     }
 

@@ -112,9 +112,9 @@ fn arrows_choose_among_options_as_in_any_group() {
     window.press(Key::ArrowLeft, Modifiers::NONE);
     assert!(matches!(window.state.look.focus, FocusRule::Point { .. }));
     // Presets and apertures are such groups, too.
-    window.tab_to("Portrait");
-    assert_eq!(window.press(Key::ArrowRight, Modifiers::NONE), [Action::Preset("cinematic".into())]);
+    window.tab_to("Cinematic");
     assert_eq!(window.press(Key::ArrowRight, Modifiers::NONE), [Action::Preset("dreamy".into())]);
+    assert_eq!(window.press(Key::ArrowRight, Modifiers::NONE), [Action::Preset("product".into())]);
 }
 
 #[test]
@@ -153,6 +153,7 @@ fn a_name_is_typed_whatever_way_it_is_asked_for_and_presses_no_keys() {
                 window.press(Key::Tab, Modifiers::NONE);
                 window.press(Key::Enter, Modifiers::NONE);
                 (window.state.panel, window.state.help) = (true, false);
+                window.state.apply(Action::Section("More", true));
                 window.wait(0.1);
                 window.ctx.text_edit_focused()
             };
@@ -189,7 +190,7 @@ fn what_is_written_is_always_seen_with_its_time() {
     window.pass(vec![Event::PointerMoved(pos2(310.0, 300.0))]);
     window.wait(0.5);
     let (panel, badge) = (window.panel.sheet.rect().unwrap(), window.place_of("Recording 2:02").unwrap());
-    assert!(badge.x < panel.left(), "{badge} is under {panel}");
+    assert!(badge.x < panel.left() && badge.y > 0.0, "{badge} is under {panel}");
     window.state.outputs.clear();
     window.wait(0.1);
     assert!(!window.texts().iter().any(|text| text.starts_with("Recording ")));
@@ -217,8 +218,11 @@ fn is_seen(window: &Window) -> bool {
 }
 
 #[test]
-fn the_panel_hides_itself_and_comes_back() {
+fn in_full_screen_the_panel_hides_itself_and_comes_back() {
     let mut window = Window::new();
+    window.wait(20.0);
+    assert!(is_seen(&window), "in a window it stands beside the picture");
+    window.state.full_screen = true;
     window.pass(vec![Event::PointerMoved(pos2(300.0, 300.0))]);
     assert!(is_seen(&window));
     window.wait(5.0);
@@ -242,7 +246,7 @@ fn the_panel_hides_itself_and_comes_back() {
     window.wait(20.0);
     assert!(is_seen(&window));
     let mut window = Window::new();
-    window.panel.stays = true;
+    (window.panel.stays, window.state.full_screen) = (true, true);
     window.wait(20.0);
     assert!(is_seen(&window), "a screen reader looks for it");
 }

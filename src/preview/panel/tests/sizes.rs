@@ -63,7 +63,7 @@ type Shown<'a> = (&'a dyn Fn(&mut State), &'a [&'a str]);
 #[test]
 fn the_largest_text_in_a_small_window_cuts_nothing_off() {
     let shown: [Shown; 3] = [
-        (&|_| {}, &["Look", "Source"]),
+        (&|_| {}, &["Portrait", "Blur"]),
         (&|state| state.help = true, &["Keys and gestures", "Single keys", "Ask before closing", "1 – 9"]),
         (
             &|state| state.closing = true,
@@ -142,9 +142,8 @@ fn where_a_control_is_scrolled_out_of_sight_it_gives_no_hint() {
     let mut window = Window::of(sample::state(), (1280, 500));
     window.pass(vec![egui::Event::PointerMoved(super::on_panel())]);
     window.wait(0.5);
-    // What is scrolled begins under the line of the source.
-    let boxes = window.boxes();
-    let top = boxes.iter().find(|(shown, _)| shown.starts_with("Desk camera, ")).expect("the line").1.bottom() + 6.0;
+    // What is scrolled begins under the panel's margin.
+    let top = window.panel.sheet.rect().unwrap().top() + crate::preview::panel::theme::PAD;
     let scroll = |window: &mut Window, by: f32| {
         window.pass(vec![super::scrolled(egui::MouseWheelUnit::Point, by, egui::Modifiers::NONE)]);
         window.wait(0.8);
