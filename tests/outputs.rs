@@ -239,7 +239,8 @@ fn a_video_on_a_full_disk_is_an_error_and_kept() {
     let home = Home::new();
     home.record("self", 200, 0.1);
     for name in ["x.mp4", "x.mkv", "x.webm"] {
-        home.run_on_full_disk(200, &format!("stream self {BLUR} --to {name}")).failed(1, &name.replace('.', ".incomplete."));
+        home.run_on_full_disk(200, &format!("stream self {BLUR} --to {name}"))
+            .failed(1, &name.replace('.', ".incomplete."));
         assert!(!home.at(name).exists());
         let probe = Command::new("ffprobe")
             .args(["-v", "quiet", "-count_frames", "-of", "csv=p=0", "-show_entries", "stream=nb_read_frames"])

@@ -11,15 +11,13 @@ use super::state::{Camera, Way};
 use crate::bokeh::{self, Bokeh};
 use crate::capture::demo;
 use crate::computing::Executors;
-use crate::knob::Knob;
 use crate::depth::focus::FocusRule;
+use crate::knob::Knob;
 use crate::look::{Effect, Look, Strength};
 use crate::recording::{Options as Reading, Recording};
 use crate::sink::{self, Sink, Target};
 use crate::source::devices::{self, Choice};
-use crate::source::{
-    self, DepthChoice, Kind, OneCamera, Options, Size, Source, SourceName, modes,
-};
+use crate::source::{self, DepthChoice, Kind, OneCamera, Options, Size, Source, SourceName, modes};
 
 /// Shown when there is no camera, and the demonstration takes its place.
 const NO_CAMERA: &str = "No camera was found.";
@@ -124,13 +122,16 @@ impl System {
     /// How depth is made this way; what the command line said of depth from elsewhere is the source's own.
     fn choice(&self, way: Way) -> DepthChoice {
         match (way, &self.options.depth_choice) {
-            (Way::Measured, choice @ (DepthChoice::Folder(_) | DepthChoice::Device(_) | DepthChoice::Auto)) => choice.clone(),
+            (Way::Measured, choice @ (DepthChoice::Folder(_) | DepthChoice::Device(_) | DepthChoice::Auto)) => {
+                choice.clone()
+            }
             (Way::Person, DepthChoice::OneCamera(OneCamera { plate: None, matte: Some(file), .. })) => {
                 DepthChoice::OneCamera(OneCamera { matte: Some(file.clone()), ..OneCamera::default() })
             }
-            (Way::PersonAndDistance, choice @ DepthChoice::OneCamera(OneCamera { mono: Some(_), matte: Some(_), .. })) => {
-                choice.clone()
-            }
+            (
+                Way::PersonAndDistance,
+                choice @ DepthChoice::OneCamera(OneCamera { mono: Some(_), matte: Some(_), .. }),
+            ) => choice.clone(),
             _ => way.choice(),
         }
     }
@@ -166,7 +167,6 @@ impl System {
     }
 }
 
-
 impl Services for System {
     fn sources(&mut self) -> Vec<Choice> {
         let mut sources = devices::cameras();
@@ -194,8 +194,7 @@ impl Services for System {
             return Err(NO_NETWORK.to_owned());
         }
         // A recording is opened twice without harm; a camera is used already.
-        let is_file = SourceName::from_str(name)
-            .is_ok_and(|name| matches!(name.kind(), Kind::Recording | Kind::Photo));
+        let is_file = SourceName::from_str(name).is_ok_and(|name| matches!(name.kind(), Kind::Recording | Kind::Photo));
         if is_file { self.open_source(name, Some(way)).map(drop) } else { Ok(()) }
     }
 

@@ -54,9 +54,8 @@ pub fn chosen(language: Option<&str>) -> Result<Option<Table>, String> {
     let Some(name) = language else {
         let Some(language) = usual_language() else { return Ok(None) };
         // Nobody asked for this one: the window is in English then.
-        let own = find(&language).and_then(|path| {
-            read(&path).map_err(|line| tracing::warn!("{line}; the window is in English")).ok()
-        });
+        let own = find(&language)
+            .and_then(|path| read(&path).map_err(|line| tracing::warn!("{line}; the window is in English")).ok());
         return Ok(own.or_else(|| built_in(&language)));
     };
     if ["en", "C", "POSIX"].contains(&name) {

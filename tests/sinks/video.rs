@@ -228,7 +228,9 @@ fn an_ffmpeg_that_hangs_ends_with_the_run() {
             error
         };
         assert!(error.to_string().contains("it hung"), "{error}");
-        assert!(listing(folder.path()).iter().all(|name| name.starts_with("clip.incomplete") && name.ends_with(".mp4")));
+        assert!(
+            listing(folder.path()).iter().all(|name| name.starts_with("clip.incomplete") && name.ends_with(".mp4"))
+        );
     }
 }
 

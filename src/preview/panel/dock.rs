@@ -9,6 +9,8 @@ pub const CELL: f32 = 30.0;
 pub const CELL_GAP: f32 = 6.0;
 /// The least width of a control of the first screen, in any language.
 const LEAST_CELL: f32 = 196.0;
+/// The line around the panel.
+pub const LINE: f32 = 1.0;
 /// The controls of the first screen stand in so many cells.
 pub const CELLS: usize = 7;
 /// Beside the picture it is read as a list, and stays where it is when the window grows: it stands there unless the picture would
@@ -33,7 +35,8 @@ impl Dock {
             let room = dock.room.size();
             (room.x / size.0.max(1) as f32).min(room.y / size.1.max(1) as f32)
         };
-        if scale(&right) >= BESIDE * scale(&bottom) { right } else { bottom }
+        let is_wide = right.panel.width() >= LEAST_CELL + 2.0 * PAD;
+        if is_wide && scale(&right) >= BESIDE * scale(&bottom) { right } else { bottom }
     }
 
     fn beside(window: Rect) -> Self {
@@ -47,7 +50,7 @@ impl Dock {
         let inner = window.width() - 2.0 * (GAP + PAD);
         let columns = (((inner + CELL_GAP) / (LEAST_CELL + CELL_GAP)) as usize).clamp(1, 4);
         let rows = CELLS.div_ceil(columns) as f32;
-        let least = rows * (CELL + CELL_GAP) - CELL_GAP + 2.0 * PAD;
+        let least = rows * (CELL + CELL_GAP) - CELL_GAP + 2.0 * (PAD + LINE) + 2.0;
         let most = window.height() * if more { 0.6 } else { 0.5 } - GAP;
         let height = if more { most } else { least.min(most) }.max(0.0);
         let top = window.bottom() - GAP - height;

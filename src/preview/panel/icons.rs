@@ -37,13 +37,15 @@ pub enum Icon {
 pub fn button(ui: &mut Ui, icon: Icon, hint: &str, enabled: bool) -> bool {
     let colors = Colors::here(ui);
     // What can no longer be done keeps the focus, from which the next control is reached.
-    let keeps_focus = ui.memory(|memory| memory.has_focus(ui.next_auto_id()));
+    let id = ui.scope_id().with(hint);
+    let keeps_focus = ui.memory(|memory| memory.has_focus(id));
     let sense = match (enabled, keeps_focus) {
         (true, _) => Sense::click(),
         (false, true) => Sense::focusable_noninteractive(),
         (false, false) => Sense::hover(),
     };
-    let (rect, response) = ui.allocate_exact_size(Vec2::splat(SIDE), sense);
+    let (rect, _) = ui.allocate_exact_size(Vec2::splat(SIDE), Sense::hover());
+    let response = ui.interact(rect, id, sense);
     response.widget_info(|| WidgetInfo::labeled(Role::Button, enabled, tr(hint)));
     if enabled && response.hovered() {
         ui.painter().rect_filled(rect, CornerRadius::same(7), colors.hover);

@@ -19,8 +19,10 @@ const FADES_S: f64 = 0.4;
 /// The most notes that are shown at once.
 const MOST: usize = 3;
 /// What the source is when it is no camera and no recording.
-const DEMONSTRATION: [&str; 2] =
-    ["This is a demonstration", "No camera is in use. Choose one under “Camera”; `bokehcam doctor` says why there is none."];
+const DEMONSTRATION: [&str; 2] = [
+    "This is a demonstration",
+    "No camera is in use. Choose one under “Camera”; `bokehcam doctor` says why there is none.",
+];
 
 /// When notes were first shown.
 #[derive(Default)]

@@ -3,8 +3,8 @@
 use std::ops::RangeInclusive;
 
 use egui::{
-    Align, Align2, ComboBox, Context, CornerRadius, DragValue, EventFilter, FontId, Id, Key, Label, Layout, Rect, Response,
-    RichText, Role, Sense, Slider, SliderClamping, Stroke, StrokeKind, TextStyle, Ui, Vec2, WidgetInfo, pos2,
+    Align, Align2, ComboBox, Context, CornerRadius, DragValue, EventFilter, FontId, Id, Key, Label, Layout, Rect,
+    Response, RichText, Role, Sense, Slider, SliderClamping, Stroke, StrokeKind, TextStyle, Ui, Vec2, WidgetInfo, pos2,
 };
 
 use super::theme::{Colors, ROW, medium};
@@ -266,7 +266,8 @@ pub fn switch(ui: &mut Ui, label: &str, hint: &str, on: bool) -> bool {
     let colors = Colors::here(ui);
     let label = tr(label);
     let font = TextStyle::Body.resolve(ui.style());
-    let text = ui.painter().layout(label.to_owned(), font, ui.visuals().text_color(), (ui.available_width() - 42.0).max(10.0));
+    let text =
+        ui.painter().layout(label.to_owned(), font, ui.visuals().text_color(), (ui.available_width() - 42.0).max(10.0));
     let size = Vec2::new(ui.available_width(), text.size().y.max(24.0));
     let (rect, response) = ui.allocate_exact_size(size, Sense::click());
     response.widget_info(|| WidgetInfo::selected(Role::Switch, ui.is_enabled(), on, label));

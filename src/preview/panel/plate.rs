@@ -3,6 +3,7 @@
 use egui::{ProgressBar, RichText};
 
 use super::cards::{Stack, words};
+use super::dock::room;
 use super::parts::button;
 use super::state::{Action, State};
 use super::theme::medium;
@@ -17,10 +18,13 @@ pub fn offer(stack: &mut Stack, state: &State, actions: &mut Vec<Action>) {
         return;
     }
     let network = ("Find me by a small network", "It tells a person from what is behind", Action::FindMe);
-    let plate = ("Show me the empty room", "Step out for four seconds; the camera has to stand still (T)", Action::TakePlate);
+    let plate =
+        ("Show me the empty room", "Step out for four seconds; the camera has to stand still (T)", Action::TakePlate);
     let plate = Some(plate).filter(|_| state.takes_plates());
     let buttons = [network].into_iter().chain(plate).chain([("Not now", "Esc", Action::DeclinePlate)]);
-    let why = "Who is near is not known here, so nothing is blurred.";
+    // A small picture is not covered by words.
+    let is_small = room(stack.ctx).height() < 360.0;
+    let why = if is_small { "" } else { "Who is near is not known here, so nothing is blurred." };
     stack.ask("plate offer", WIDTH, ["A portrait from this picture alone", why], buttons, actions);
 }
 

@@ -3,7 +3,7 @@
 use egui::{Area, Context, Id, Order, Rect, ScrollArea, Ui, Vec2, vec2};
 
 use super::cards;
-use super::dock::Dock;
+use super::dock::{Dock, LINE};
 use super::icons::{self, Icon};
 use super::parts::end_of;
 use super::sections::{self, Editing, Sheet, Thumbs, first};
@@ -45,15 +45,22 @@ impl Memory {
     }
 
     /// Draws the panel where it stands; what does not fit is scrolled.
-    pub fn show(&mut self, ctx: &Context, state: &State, dock: Option<Dock>, size: (u32, u32), actions: &mut Vec<Action>) {
+    pub fn show(
+        &mut self,
+        ctx: &Context,
+        state: &State,
+        dock: Option<Dock>,
+        size: (u32, u32),
+        actions: &mut Vec<Action>,
+    ) {
         self.rect = dock.map(|dock| dock.panel);
         let Some(Dock { panel, columns, .. }) = dock else { return };
         let area = Area::new(id()).fixed_pos(panel.min).order(Order::Middle).constrain(false).fade_in(false);
         let drawn = area.show(ctx, |ui| {
             let colors = Colors::here(ui);
-            ui.set_max_size(panel.size());
+            ui.set_max_size(panel.size().max(Vec2::splat(1.0)));
             theme::card(&colors).show(ui, |ui| {
-                let inner = panel.size() - Vec2::splat(2.0 * PAD);
+                let inner = (panel.size() - Vec2::splat(2.0 * (PAD + LINE))).max(Vec2::splat(1.0));
                 ui.set_width(inner.x);
                 let more = state.shows_more();
                 let scroll = ScrollArea::vertical().max_height(inner.y.max(20.0)).auto_shrink([false, true]);

@@ -26,7 +26,13 @@ pub struct Habits {
 
 impl Default for Habits {
     fn default() -> Self {
-        Self { text_scale: 1.0, single_keys: true, ask_before_closing: true, keep_sources: false, sections: BTreeMap::new() }
+        Self {
+            text_scale: 1.0,
+            single_keys: true,
+            ask_before_closing: true,
+            keep_sources: false,
+            sections: BTreeMap::new(),
+        }
     }
 }
 

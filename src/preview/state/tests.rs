@@ -1,8 +1,7 @@
 use super::apply::{NO_DEPTH, NO_DEPTH_OF_PHOTO, NO_PLATE};
 use super::sample::{blurred, look, running, state};
 use super::*;
-use crate::depth::focus::FocusRule;
-use crate::look::{Effect, Look, Patch, Strength};
+use crate::look::{Effect, Look, Strength};
 
 fn set(state: &mut State, radius_px: f32, stroke: Option<&'static str>) -> Vec<Request> {
     state.apply(Action::Look { look: Box::new(blurred(radius_px)), stroke })
@@ -143,7 +142,12 @@ fn what_needs_depth_says_so_where_there_is_none() {
     assert_eq!(state.apply(Action::Reset), [], "nor does the first look follow any");
     assert_eq!(state.apply(Action::Preset("miniature".into())).len(), 1);
     assert_eq!(state.look.effect, Effect::TiltShift);
+    state.hear(Update::Source(running(true)));
+    assert_eq!(state.look.effect, Effect::TiltShift, "that was chosen");
     // It follows depth again where there is some; a view of it goes back to the picture when the next source has none.
+    state.apply(Action::Portrait(true));
+    state.hear(Update::Source(running(false)));
+    assert_eq!(state.look.effect, Effect::None);
     state.hear(Update::Source(running(true)));
     assert_eq!(state.look.effect, Effect::Auto);
     state.apply(Action::Show(Shown::Depth));
@@ -292,7 +296,6 @@ fn numbers_are_as_one_would_write_them() {
 
 #[test]
 fn arrows_move_what_is_sharp() {
-    use crate::depth::focus::FocusRule;
     let mut look = look();
     tweak::move_focus(&mut look, 0.02, 0.0);
     assert_eq!(look.focus, FocusRule::Point { x: 0.52, y: 0.5 });
@@ -345,35 +348,4 @@ fn a_source_without_depth_changes_no_look_for_the_next_time() {
     let tilted = Look { effect: Effect::Blur, ..state.look.clone() };
     state.apply(Action::Look { look: Box::new(tilted.clone()), stroke: None });
     assert_eq!(state.chosen_look(), tilted, "that was chosen");
-}
-
-#[test]
-fn where_depth_is_relative_no_look_has_metres() {
-    let mut state = state();
-    let lens = Strength::Lens(tweak::LENS);
-    state.look = Look { focus: FocusRule::Metres(2.5), strength: lens, focus_range_m: 0.4, ..look() };
-    state.hear(Update::Camera(Camera { is_relative: true, ..Camera::default() }));
-    let told = state.hear(Update::Source(running(true)));
-    assert!(matches!(told, Some(Request::Look(look)) if look.needs_metres().is_none()), "{:?}", state.look);
-    assert_eq!(state.look.needs_metres(), None);
-    assert!(state.notes.iter().any(|note| note.text.contains("in metres")), "and it is said");
-    // Nothing brings them back, and keys that mean metres blur by amount.
-    let before = tweak::amount(&state.look, 720).unwrap();
-    let mut more = state.look.clone();
-    tweak::f_number_by(&mut more, 0.5, 1.0, (1280, 720));
-    state.apply(Action::Look { look: Box::new(more), stroke: None });
-    assert!(state.look.needs_metres().is_none() && tweak::amount(&state.look, 720).unwrap() > 1.5 * before);
-    assert!(state.patched(&Patch { focus: Some(FocusRule::Metres(2.0)), ..Patch::default() }).is_err());
-}
-
-#[test]
-fn an_amount_is_the_same_after_a_way_by_the_lens() {
-    let size = (1280, 720);
-    let mut look = Look::default();
-    for focus_m in [0.7, 1.24, 3.0] {
-        look.strength = Strength::Lens(tweak::lens_of(&look, focus_m, size));
-        let Strength::Lens(lens) = look.strength else { unreachable!() };
-        look.strength = tweak::strength_of(tweak::amount_of(lens, focus_m, size));
-        assert_eq!(look, Look::default(), "focused at {focus_m} m");
-    }
 }

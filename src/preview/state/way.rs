@@ -28,9 +28,10 @@ impl Way {
             Self::PersonAndDistance => {
                 DepthChoice::OneCamera(OneCamera { matte: installed.clone(), mono: installed, ..OneCamera::default() })
             }
-            Self::Plate => {
-                DepthChoice::OneCamera(OneCamera { plate: Some(PlateFile::Taken), ..crate::source::installed_networks() })
-            }
+            Self::Plate => DepthChoice::OneCamera(OneCamera {
+                plate: Some(PlateFile::Taken),
+                ..crate::source::installed_networks()
+            }),
         }
     }
 

@@ -24,7 +24,11 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
         _ => FocusRule::Metres((now_m * 100.0).round() / 100.0),
     };
     let rules = [
-        ("Subject", "Follows the person, else what is nearest. Double-click on the picture does the same", FocusRule::Auto),
+        (
+            "Subject",
+            "Follows the person, else what is nearest. Double-click on the picture does the same",
+            FocusRule::Auto,
+        ),
         ("Point", "What is at a point of the picture. Click on the picture to choose it", point),
         ("Distance", "A distance in metres", distance),
     ];

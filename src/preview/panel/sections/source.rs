@@ -27,14 +27,23 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
             let (width, height) = running.size;
             let rate = 1e9 / running.period_ns.max(1) as f64;
             let depth = tr(if running.has_depth { "with depth" } else { "without depth" });
-            remark(ui, &match state.is_photo() {
-                true => format!("{width} × {height}, {depth}"),
-                false => format!("{width} × {height}, {rate:.0} fps, {depth}"),
-            });
+            remark(
+                ui,
+                &match state.is_photo() {
+                    true => format!("{width} × {height}, {depth}"),
+                    false => format!("{width} × {height}, {rate:.0} fps, {depth}"),
+                },
+            );
             let ways: Vec<_> = WAYS.into_iter().filter(|(.., way)| running.ways.contains(way)).collect();
             if ways.len() > 1 || running.way.is_none() && !ways.is_empty() {
                 ui.label(tr("Depth from"));
-                let chosen = choose(ui, "Depth from", &ways.iter().map(|way| (way.0, way.1, Some(way.2))).collect::<Vec<_>>(), running.way, |_| true);
+                let chosen = choose(
+                    ui,
+                    "Depth from",
+                    &ways.iter().map(|way| (way.0, way.1, Some(way.2))).collect::<Vec<_>>(),
+                    running.way,
+                    |_| true,
+                );
                 if let Some(way) = chosen.flatten().filter(|way| Some(*way) != running.way) {
                     sheet.act(Action::DepthBy(way));
                 }

@@ -12,7 +12,8 @@ use crate::preview::state::{Output, Source, State, Way};
 use crate::preview::texts;
 
 /// Sizes of windows, and of pictures.
-const WINDOWS: [(u32, u32); 7] = [(1280, 720), (1920, 1200), (800, 600), (640, 480), (500, 700), (480, 320), (360, 640)];
+const WINDOWS: [(u32, u32); 7] =
+    [(1280, 720), (1920, 1200), (800, 600), (640, 480), (500, 700), (480, 320), (360, 640)];
 
 fn first() -> State {
     let mut state = sample::state();
@@ -170,11 +171,17 @@ fn in_german_nothing_is_cut_off_at_any_size() {
             let found = controls(&mut window);
             assert!(found.len() > if more { 20 } else { 6 }, "{size:?}: {found:?}");
             for (role, name, at) in found {
-                assert!(panel.left() <= at.left() && at.right() <= panel.right(), "{size:?}: {role:?} {name} at {at} in {panel}");
+                assert!(
+                    panel.left() <= at.left() && at.right() <= panel.right(),
+                    "{size:?}: {role:?} {name} at {at} in {panel}"
+                );
             }
             let inside = |at: &Rect| panel.intersects(*at);
             for (text, at) in window.boxes().into_iter().filter(|(_, at)| inside(at)) {
-                assert!(at.left() >= panel.left() && at.right() <= panel.right() + 0.5, "{size:?}: {text} at {at} in {panel}");
+                assert!(
+                    at.left() >= panel.left() && at.right() <= panel.right() + 0.5,
+                    "{size:?}: {text} at {at} in {panel}"
+                );
             }
         }
     }

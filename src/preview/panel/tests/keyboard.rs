@@ -77,6 +77,10 @@ fn a_control_in_focus_is_worked_by_the_keyboard() {
         (state.panel, state.help, state.habits) = (before.panel, before.help, before.habits);
         (state.history, state.look) = (before.history, before.look);
         window.pass(Vec::new());
+        // What closed the panel took the focus with it.
+        if window.ctx.memory(|memory| memory.focused().is_none()) {
+            focused.into_iter().for_each(|id| window.ctx.memory_mut(|memory| memory.request_focus(id)));
+        }
     }
     assert!(done.iter().any(|action| matches!(action, Action::Preset(_))), "{done:?}");
     assert!(done.iter().any(|action| matches!(action, Action::Look { .. })), "{done:?}");
@@ -151,10 +155,15 @@ fn a_name_is_typed_whatever_way_it_is_asked_for_and_presses_no_keys() {
         if by_keyboard {
             let is_asked = |_: &usize| {
                 window.press(Key::Tab, Modifiers::NONE);
+                let focused = window.ctx.memory(|memory| memory.focused());
                 window.press(Key::Enter, Modifiers::NONE);
                 (window.state.panel, window.state.help) = (true, false);
                 window.state.apply(Action::Section("More", true));
                 window.wait(0.1);
+                // What closed the panel took the focus with it.
+                if window.ctx.memory(|memory| memory.focused().is_none()) {
+                    focused.into_iter().for_each(|id| window.ctx.memory_mut(|memory| memory.request_focus(id)));
+                }
                 window.ctx.text_edit_focused()
             };
             (0..60).find(is_asked).expect("a field to type a name in");

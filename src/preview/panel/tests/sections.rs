@@ -15,8 +15,8 @@ fn what_is_needed_first_is_on_top_and_experts_parts_are_folded() {
     let mut window = Window::of(sample::state(), (1280, 2000));
     window.pass(vec![egui::Event::PointerMoved(super::on_panel())]);
     let y = |window: &mut Window, text: &str| window.place_of(text).map(|at| at.y);
-    let [blur, save, focus, source, record] =
-        ["Use in calls", "Save as…", "Focus", "Source", "Record and call"].map(|text| y(&mut window, text).expect(text));
+    let [blur, save, focus, source, record] = ["Use in calls", "Save as…", "Focus", "Source", "Record and call"]
+        .map(|text| y(&mut window, text).expect(text));
     assert!(blur < save && save < focus && focus < source && source < record);
     for inner in ["Blur radius", "Layers", "Quality"] {
         assert!(window.place_of(inner).is_none(), "{inner}");

@@ -78,7 +78,8 @@ fn the_largest_text_in_a_small_window_cuts_nothing_off() {
         let mut window = Window::of(state, (500, 400));
         window.wait(0.5);
         let whole = window.ctx.content_rect();
-        assert!(whole.contains_rect(window.panel.sheet.rect().expect("the panel")), "{whole}");
+        let panel = window.panel.sheet.rect().expect("the panel");
+        assert!(whole.contains_rect(panel), "{panel} in {whole}");
         let boxes = window.boxes();
         for text in texts {
             let at = boxes.iter().find(|(shown, _)| shown == text).unwrap_or_else(|| panic!("{text}: {boxes:?}")).1;
@@ -162,7 +163,7 @@ fn where_a_control_is_scrolled_out_of_sight_it_gives_no_hint() {
     for (y, hints) in [(top + 8.0, true), (top - 5.0, false)] {
         window.pass(vec![egui::Event::PointerMoved(egui::pos2(at.x, y))]);
         window.wait(2.0);
-        let is_seen = window.texts().iter().any(|text| text.starts_with("Follows the nearest"));
+        let is_seen = window.texts().iter().any(|text| text.starts_with("Follows the person"));
         assert_eq!(is_seen, hints, "at {y}, where it begins at {top}");
     }
 }

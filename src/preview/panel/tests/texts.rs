@@ -24,7 +24,7 @@ fn windows() -> Vec<Window> {
         &|state| (state.look.focus, state.look.strength) = (tweak::point(0.5, 0.5), Strength::Percent(0.0)),
         &|state| {
             state.look.strength = Strength::Lens(tweak::LENS);
-                        state.look.aperture.shape = crate::bokeh::aperture::Shape::Ring { inner: 0.5 };
+            state.look.aperture.shape = crate::bokeh::aperture::Shape::Ring { inner: 0.5 };
         },
         &|state| {
             state.look.aperture.shape =
@@ -123,8 +123,17 @@ fn the_table_has_all_texts_and_no_others() {
 #[test]
 fn all_that_is_drawn_is_translated() {
     // What is a name, an error's reason or a number is the same in every language.
-    let names =
-        ["Desk camera", "portrait", "clip.mp4", "bokehcam", "cpu, 2", "gone", "Manual Mode", "Aperture Priority"];
+    let names = [
+        "Desk camera",
+        "portrait",
+        "clip.mp4",
+        "bokehcam",
+        "kept",
+        "cpu, 2",
+        "gone",
+        "Manual Mode",
+        "Aperture Priority",
+    ];
     let english = table::english();
     texts::speak(english.into_keys().map(|text| (text.clone(), format!("«{text}»"))).collect());
     let presets: Vec<String> = sample::state().presets.iter().map(|preset| preset.name.to_lowercase()).collect();

@@ -7,8 +7,8 @@ use winit::window::Fullscreen;
 
 use super::{App, control};
 use crate::compute::Place;
-use crate::pipeline::Trace;
 use crate::frame::ColorImage;
+use crate::pipeline::Trace;
 use crate::preview::panel::{self, Canvas};
 use crate::preview::present::{Area, Controls, Drawing, Image};
 use crate::preview::session::Still;
