@@ -1,6 +1,7 @@
 use super::apply::{NO_DEPTH, NO_DEPTH_OF_PHOTO, NO_PLATE};
 use super::sample::{blurred, look, running, state};
 use super::*;
+use crate::depth::focus::FocusRule;
 use crate::look::{Effect, Look, Strength};
 
 fn set(state: &mut State, radius_px: f32, stroke: Option<&'static str>) -> Vec<Request> {
@@ -85,7 +86,7 @@ fn presets_are_looks_by_name() {
     assert_eq!((effects.len(), radius_px(&state)), (1, 30.0));
     assert_eq!(state.preset_in_use(), Some(1));
     // Where it is focused is no part of what a preset is.
-    state.look.focus = crate::depth::focus::FocusRule::Metres(3.0);
+    state.look.focus = FocusRule::Metres(3.0);
     assert_eq!(state.preset_in_use(), Some(1));
     assert_eq!(state.apply(Action::Preset("nothing".into())), []);
     assert!(state.notes.last().unwrap().text.contains("nothing"));
