@@ -100,6 +100,7 @@ impl Panel {
             theme::install(&ctx);
             self.active_s = ctx.input(|input| input.time);
         }
+        ctx.accesskit_node_builder(egui::accesskit_root_id(), |node| node.set_label("bokehcam"));
         let first = actions.len();
         self.set_text_scale(&ctx, state.habits.text_scale, actions);
         let size = if canvas.size.1 > 0 { canvas.size } else { (1280, 720) };

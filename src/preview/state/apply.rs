@@ -1,6 +1,7 @@
 //! How actions change the state.
 
-use super::{Action, Output, Request, Shown, Source, State, Way, fitted};
+use super::{Action, Output, Request, Shown, Source, State, Way};
+use crate::depth::focus::FocusRule;
 use crate::look::{Effect, Look, Patch, Strength};
 
 /// Shown when a look or a view needs depth and there is none: what to do.
@@ -200,9 +201,13 @@ impl State {
             return Err(self.no_depth().to_owned());
         }
         let look = patch.on(&self.look).map_err(|error| error.to_string())?;
-        let known = self.known();
-        let needs_metres = |look: &Look| look.effect.follows_depth() && look.needs_metres().is_some();
-        match needs_metres(&look) && !needs_metres(&fitted(&look, known)) && known.is_relative {
+        let is_lens = |look: &Look| matches!(look.strength, Strength::Lens(_));
+        let asks = matches!(patch.focus, Some(FocusRule::Metres(_)))
+            || patch.focus_range_m.is_some_and(|range_m| range_m > 0.0)
+            || is_lens(&look) && !is_lens(&self.look);
+        // Of a whole look, such as a preset, what needs metres is left out.
+        let is_one_change = patch.effect.is_none();
+        match self.known().is_relative && look.effect.follows_depth() && is_one_change && asks {
             true => Err(NO_METRES.to_owned()),
             false => Ok(look),
         }

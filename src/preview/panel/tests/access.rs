@@ -88,4 +88,6 @@ fn values_and_states_are_told() {
     assert_eq!(tree.find(Role::RadioButton, "Heart").toggled(), Some(Toggled::False));
     assert!(tree.find(Role::Button, "Redo (Ctrl+Shift+Z)").is_disabled(), "nothing to redo");
     assert!(!tree.find(Role::Button, "Record").is_disabled());
+    assert_eq!(tree.find(Role::DisclosureTriangle, "Focus").is_expanded(), Some(true));
+    assert!(tree.0.iter().any(|(_, node)| node.role() == Role::Window && node.label() == Some("bokehcam")), "a name");
 }
