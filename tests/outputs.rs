@@ -59,7 +59,7 @@ fn what_was_good_before_a_fault_is_there() {
     let before = tree(&home.at("out"));
     home.run(&format!("stream self {BLUR} --to x.y4m --to out/ --force -q")).failed(1, "000005.png");
     assert!(tree(&home.at("out")) == before);
-    assert_eq!((frames(&home.at("x.y4m.incomplete")), pngs(&home.at("out.incomplete"))), (5, 5));
+    assert_eq!((frames(&home.at("x.incomplete.y4m")), pngs(&home.at("out.incomplete"))), (5, 5));
 }
 
 #[test]
@@ -67,8 +67,8 @@ fn on_a_full_disk_the_whole_frames_are_kept_and_other_sinks_go_on() {
     let home = Home::new();
     home.record("self", 60, 0.1);
     let frame_bytes = 6 + 64 * 48 * 3 / 2;
-    home.run_on_full_disk(100, &format!("stream self {BLUR} --to x.y4m --to out/")).failed(1, "x.y4m.incomplete");
-    let kept = fs::read(home.at("x.y4m.incomplete")).unwrap();
+    home.run_on_full_disk(100, &format!("stream self {BLUR} --to x.y4m --to out/")).failed(1, "x.incomplete.y4m");
+    let kept = fs::read(home.at("x.incomplete.y4m")).unwrap();
     let header = kept.iter().position(|byte| *byte == b'\n').unwrap() + 1;
     assert!((kept.len() - header).is_multiple_of(frame_bytes), "no half picture");
     assert_eq!((kept.len() - header) / frame_bytes, (102_400 - header) / frame_bytes);
@@ -129,7 +129,7 @@ fn an_encoder_that_says_all_is_well_is_not_believed() {
     let home = Home::new();
     home.record("self", 9, 0.1);
     for (script, what) in [
-        ("cat > /dev/null; head -c 500 /dev/zero > \"$out\"", "x.mp4.incomplete"),
+        ("cat > /dev/null; head -c 500 /dev/zero > \"$out\"", "x.incomplete.mp4"),
         ("cat > /dev/null", "is missing"),
         ("head -c 20000 > /dev/null; echo half > \"$out\"; exit 3", "exit status: 3"),
         (
@@ -174,7 +174,7 @@ fn each_output_that_fails_says_what_is_kept_of_it() {
     home.record("self", 60, 0.1);
     let ran = home.run_on_full_disk(100, &format!("stream self {BLUR} --to x.y4m --to z.y4m"));
     assert_eq!(ran.code, Some(1), "{}", ran.said);
-    assert!(["x.y4m.incomplete", "z.y4m.incomplete"].iter().all(|kept| ran.said.contains(kept)), "{}", ran.said);
+    assert!(["x.incomplete.y4m", "z.incomplete.y4m"].iter().all(|kept| ran.said.contains(kept)), "{}", ran.said);
 }
 
 /// As `timeout` sends them, to a program and then to its group.
@@ -209,7 +209,7 @@ fn an_encoder_that_hangs_does_not_keep_the_program() {
         until("a picture", || home.at("out").exists() && pngs(&home.at("out")) > 3);
         let ran = terminate(child);
         ran.failed(1, "it hung, and was killed");
-        assert!(ran.said.contains("x.mkv.incomplete"), "{}", ran.said);
+        assert!(ran.said.contains("x.incomplete.mkv"), "{}", ran.said);
         fs::remove_dir_all(home.at("out")).unwrap();
     }
 }
@@ -239,11 +239,12 @@ fn a_video_on_a_full_disk_is_an_error_and_kept() {
     let home = Home::new();
     home.record("self", 200, 0.1);
     for name in ["x.mp4", "x.mkv", "x.webm"] {
-        home.run_on_full_disk(200, &format!("stream self {BLUR} --to {name}")).failed(1, &format!("{name}.incomplete"));
+        home.run_on_full_disk(200, &format!("stream self {BLUR} --to {name}"))
+            .failed(1, &name.replace('.', ".incomplete."));
         assert!(!home.at(name).exists());
         let probe = Command::new("ffprobe")
             .args(["-v", "quiet", "-count_frames", "-of", "csv=p=0", "-show_entries", "stream=nb_read_frames"])
-            .arg(home.at(&format!("{name}.incomplete")))
+            .arg(home.at(&name.replace('.', ".incomplete.")))
             .output()
             .unwrap();
         let frames: u32 = String::from_utf8(probe.stdout).unwrap().trim().trim_end_matches(',').parse().unwrap();
@@ -308,6 +309,6 @@ fn what_a_killed_run_left_is_told_by_a_run_of_any_name() {
     assert_eq!(fs::read(&alive).unwrap(), left, "nothing is done with it unasked");
 
     let same = other("a.y4m");
-    assert!(same.contains("is kept as takes/a.y4m.incomplete") && !same.contains("hidden"), "{same}");
-    assert_eq!((fs::read(home.at("takes/a.y4m.incomplete")).unwrap(), parts()), (left, Vec::new()));
+    assert!(same.contains("is kept as takes/a.incomplete.y4m") && !same.contains("hidden"), "{same}");
+    assert_eq!((fs::read(home.at("takes/a.incomplete.y4m")).unwrap(), parts()), (left, Vec::new()));
 }

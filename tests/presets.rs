@@ -186,7 +186,7 @@ fn a_snapshot_is_repeated_to_the_bit_whatever_the_settings_around() {
         let (picture, field) = blurred(look, &color, &map, 1.123_456_7, quality);
         let settings = Patch::of(&look.of_frame(&field, Some(quality))).values();
         let depth = matches!(field, CocField::Depth(_)).then_some(&map);
-        let shot = Snapshot { picture: &picture, color: &color, depth, settings: &settings };
+        let shot = Snapshot { picture: &picture, sources: Some((&color, depth)), settings: &settings };
         let path = snapshot::save(&shots, name, &shot).unwrap();
         assert_eq!(read_color(&path).unwrap(), picture);
         let out = path.with_extension("again.png");
@@ -226,7 +226,7 @@ fn a_snapshots_settings_can_be_given_to_another_picture() {
     let look = Look::plain(Effect::Blur);
     let (picture, field) = blurred(&look, &color, &map, 1.0, Quality::Balanced);
     let settings = Patch::of(&look.of_frame(&field, None)).values();
-    let shot = Snapshot { picture: &picture, color: &color, depth: None, settings: &settings };
+    let shot = Snapshot { picture: &picture, sources: Some((&color, None)), settings: &settings };
     let like = snapshot::save(home.path(), "x", &shot).unwrap();
     let other = home.path().join("other.png");
     write_color(&other, &three_depths_as_picture(), false).unwrap();
@@ -247,7 +247,7 @@ fn a_snapshot_that_cannot_be_repeated_costs_one_line() {
     let at = |name: &str| home.path().join(name);
     let (color, map) = (noise(24, 18), three_depths(24, 18));
     let save = |name: &str, settings: &[(&'static str, String)]| {
-        let shot = Snapshot { picture: &color, color: &color, depth: Some(&map), settings };
+        let shot = Snapshot { picture: &color, sources: Some((&color, Some(&map))), settings };
         snapshot::save(home.path(), name, &shot).unwrap();
     };
     write_color(&at("plain.png"), &color, false).unwrap();
@@ -289,7 +289,7 @@ fn a_snapshot_that_cannot_be_repeated_costs_one_line() {
 fn a_snapshot_is_whole_or_not_there() {
     let home = home_with("");
     let color = noise(8, 6);
-    let shot = Snapshot { picture: &color, color: &color, depth: None, settings: &[] };
+    let shot = Snapshot { picture: &color, sources: Some((&color, None)), settings: &[] };
     for (dir, stem, shot) in [
         (home.path().join("a"), "../x", shot),
         (home.path().join("a"), "", shot),

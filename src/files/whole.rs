@@ -113,8 +113,8 @@ impl Part {
         format!("/proc/self/fd/{}", self.file.as_raw_fd())
     }
 
-    /// Keeps what is not whole as `NAME.incomplete`, or `NAME.incomplete.2` and on where that is taken, and gives where it is
-    /// then: its hidden name, if it cannot be renamed. One that was removed is copied to the nearest folder that is left.
+    /// Keeps what is not whole by the name that [`keep_incomplete`] gives it, and tells where it is then: by its hidden name, if
+    /// it cannot be renamed. One that was removed is copied to the nearest folder that is left.
     ///
     /// # Errors
     /// It was removed, and cannot be copied: it is lost.
@@ -180,15 +180,23 @@ pub fn rename(from: &Path, to: &Path, replace: bool) -> io::Result<()> {
     }
 }
 
-/// Renames what was begun as `part` to `NAME.incomplete`, or `NAME.incomplete.2` and on where that is taken.
+/// Renames what was begun as `part` to `NAME.incomplete.mp4` (or whatever its ending is: a player opens it then), to
+/// `NAME.incomplete` without one, or to `NAME.incomplete.2.mp4` and on where that is taken.
 ///
 /// # Errors
 /// What the system says.
 pub fn keep_incomplete(part: &Path, path: &Path) -> io::Result<PathBuf> {
+    // A folder's name has no ending, whatever dots are in it.
+    let ending = path.extension().filter(|_| !part.is_dir());
+    let stem = if ending.is_some() { path.file_stem() } else { path.file_name() };
     for number in 1.. {
-        let mut kept = path.as_os_str().to_owned();
+        let mut kept = stem.unwrap_or_default().to_owned();
         kept.push(if number == 1 { ".incomplete".into() } else { format!(".incomplete.{number}") });
-        let kept = PathBuf::from(kept);
+        if let Some(ending) = ending {
+            kept.push(".");
+            kept.push(ending);
+        }
+        let kept = path.with_file_name(kept);
         match rename(part, &kept, false) {
             Err(error) if error.kind() == ErrorKind::AlreadyExists => {}
             renamed => return renamed.map(|()| kept),

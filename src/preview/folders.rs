@@ -81,6 +81,19 @@ pub fn is_video(name: &str) -> bool {
     is_date && (number.is_empty() || number.strip_prefix('-').is_some_and(is_number))
 }
 
+/// A path as one says it: from the home on, where it is there.
+pub fn shown(path: &Path) -> String {
+    match absolute("HOME").and_then(|home| path.strip_prefix(home).ok().map(Path::to_owned)) {
+        Some(inside) => format!("~/{}", inside.display()),
+        None => path.display().to_string(),
+    }
+}
+
+/// What is written at a place, as one says it: a virtual camera by its name, a file from the home on.
+pub fn shown_output(name: &str) -> String {
+    if name.starts_with('/') { shown(Path::new(name)) } else { name.to_owned() }
+}
+
 /// The folder that a file is in, whole; `None` where there is no such file.
 pub fn folder_of(file: &Path) -> Option<PathBuf> {
     let folder = file.canonicalize().ok().filter(|file| file.is_file())?;

@@ -99,6 +99,12 @@ fn step_back(state: &State) -> Option<Action> {
         Some(Action::SelfTimer(false))
     } else if state.help {
         Some(Action::Help(false))
+    } else if state.trouble.is_some() {
+        Some(Action::Dismiss)
+    } else if state.offers_depth() && !state.bare {
+        Some(Action::DeclinePlate)
+    } else if state.is_demonstration() && !state.knows_demonstration && !state.bare {
+        Some(Action::KnowDemonstration)
     } else if state.bare {
         Some(Action::Bare(false))
     } else if state.full_screen {
@@ -215,8 +221,8 @@ pub const GROUPS: [Group; 5] = [
             ),
             once(&[key(Key::M)], "M", "mirror the window", |state, _| Some(Action::Mirror(!state.mirror))),
             once(&[key(Key::D)], "D", "show depth", |state, _| show(state, Shown::Depth)),
-            once(&[key(Key::C)], "C", "show the circle of confusion", |state, _| show(state, Shown::Coc)),
-            once(&[key(Key::N)], "N", "show the bins", |state, _| show(state, Shown::Bins)),
+            once(&[key(Key::C)], "C", "show the blur radius", |state, _| show(state, Shown::Coc)),
+            once(&[key(Key::N)], "N", "show the layers of the blur", |state, _| show(state, Shown::Bins)),
         ],
     },
     Group {
@@ -315,7 +321,9 @@ pub fn action(event: &Event, state: &State, context: Context, focused: bool) -> 
     if !state.habits.single_keys && is_single(binding.chords[chord]) {
         return None;
     }
-    if focused && is_for_controls(binding.chords[chord]) {
+    // A question goes at once, though one of its buttons has the focus.
+    let closes = state.closing && *key == Key::Escape;
+    if focused && is_for_controls(binding.chords[chord]) && !closes {
         return None;
     }
     (binding.make)(state, Context { chord, ..context }).filter(|action| is_uncovered(action, state))

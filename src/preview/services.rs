@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-use super::state::Camera;
+use super::state::{Camera, Way};
 use crate::bokeh::{self, Bokeh};
 use crate::knob::Knob;
 use crate::look::{Look, presets::Preset};
@@ -35,8 +35,9 @@ pub struct Opened {
     pub source: Source,
     /// Whether its depth is used: it has some, and that was not declined.
     pub has_depth: bool,
-    /// Whether it is a camera that a plate can be taken with.
-    pub takes_plates: bool,
+    /// The ways to depth that it has, and the one that is used.
+    pub ways: Vec<Way>,
+    pub way: Option<Way>,
     /// Lines for the person: what was assumed, what is missing and where to get it.
     pub notes: Vec<String>,
     /// The camera's controls, such as exposure, if it has any.
@@ -53,12 +54,21 @@ pub trait Services: Send {
     /// The virtual cameras that can be written to now.
     fn virtual_cameras(&mut self) -> Vec<Choice>;
 
-    /// Opens a source; an empty name is the first camera there is, else the demonstration. With a plate, that is taken
-    /// at the start, and makes the depth.
+    /// Opens a source; an empty name is the first camera there is, else the demonstration. Its depth is made this `way`, `None`
+    /// for the usual one; a plate is taken at the start.
     ///
     /// # Errors
     /// It cannot be opened.
-    fn open(&mut self, name: &str, with_plate: bool) -> Result<Opened, String>;
+    fn open(&mut self, name: &str, way: Option<Way>) -> Result<Opened, String>;
+
+    /// Whether the source of this name can have depth this way now.
+    ///
+    /// # Errors
+    /// It cannot: one line, what to do.
+    fn can(&mut self, name: &str, way: Way) -> Result<(), String> {
+        let _ = (name, way);
+        Ok(())
+    }
 
     /// Whether other devices came, or some went, since this was asked last.
     fn devices_changed(&mut self) -> bool {

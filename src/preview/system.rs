@@ -7,26 +7,24 @@ use std::sync::atomic::AtomicBool;
 
 use super::dialog;
 use super::services::{Browse, Opened, Pick, Services, SettingsStore, Switch};
-use super::state::Camera;
+use super::state::{Camera, Way};
 use crate::bokeh::{self, Bokeh};
 use crate::capture::demo;
 use crate::computing::Executors;
+use crate::depth::focus::FocusRule;
 use crate::knob::Knob;
-use crate::look::{Effect, Look};
+use crate::look::{Effect, Look, Strength};
 use crate::recording::{Options as Reading, Recording};
 use crate::sink::{self, Sink, Target};
 use crate::source::devices::{self, Choice};
-use crate::source::{
-    self, DepthChoice, DepthFrom, Kind, OneCamera, Options, PlateFile, Size, Source, SourceName, modes,
-};
+use crate::source::{self, DepthChoice, Kind, OneCamera, Options, Size, Source, SourceName, modes};
 
 /// Shown when there is no camera, and the demonstration takes its place.
 const NO_CAMERA: &str = "No camera was found.";
 /// Shown with the synthetic scene.
 const RENDERED: &str = "This scene is rendered while it plays, as fast as the machine can; `demo` plays smoothly.";
-/// Shown where a camera gives no depth, so that a portrait never comes.
-const NO_DEPTH: &str = "This camera has no depth, so a band of the picture stays sharp. A plate gives it a portrait (T), and \
-                        so does a free network (`bokehcam models`).";
+/// Shown where no network is installed.
+const NO_NETWORK: &str = "There is no network yet: `bokehcam models get` gets one, then this finds you.";
 /// Shown where the command line declines the depth that there is.
 const DECLINED: &str = "This source has depth, and --depth none declines it: leave that out for blur by depth.";
 
@@ -54,8 +52,10 @@ pub struct System {
     turned: BTreeMap<String, i64>,
     /// The camera that was opened last, where it has knobs.
     camera: Option<String>,
-    /// Whether a plate was asked for in the window.
-    with_plate: bool,
+    /// The way to depth that was chosen in the window.
+    way: Option<Way>,
+    /// The source that was opened last by its usual way, and its own ways to depth.
+    own_ways: (String, Vec<Way>),
 }
 
 impl System {
@@ -73,15 +73,20 @@ impl System {
             nodes: (devices::nodes(), false),
             turned: BTreeMap::new(),
             camera: None,
-            with_plate: false,
+            way: None,
+            own_ways: Default::default(),
         }
     }
 
     /// What is known of the camera that was opened, if it is one alone.
-    fn facts_of(&self, source: &Source) -> Camera {
-        let is_relative = matches!(source.depth_from, DepthFrom::Relative | DepthFrom::Networks | DepthFrom::Plate);
-        let Some(camera) = &self.camera else { return Camera { is_relative, ..Camera::default() } };
-        let is_lone = matches!(source.depth_from, DepthFrom::Nothing | DepthFrom::Networks | DepthFrom::Plate);
+    fn facts_of(&self, source: &Source, name: &SourceName) -> Camera {
+        let is_relative = source.depth_from.is_relative();
+        let is_lone = source.depth_from.is_of_pictures();
+        let Some(camera) = &self.camera else {
+            // What only PipeWire has is a laptop's own.
+            let faces_user = is_lone && name.kind() == Kind::Camera;
+            return Camera { is_relative, faces_user, ..Camera::default() };
+        };
         let is_pair = self.options.stereo.side_by_side;
         Camera {
             modes: modes::modes(camera),
@@ -91,32 +96,81 @@ impl System {
     }
 
     /// Opens a source to be played for as long as the window is open, with depth whether or not the look needs it.
-    fn open_source(&self, name: &str, with_plate: bool) -> Result<(Source, SourceName), String> {
+    fn open_source(&self, name: &str, way: Option<Way>) -> Result<(Source, SourceName), String> {
         let source_name = SourceName::from_str(name).map_err(|error| error.of(name).to_string())?;
         let mut options = self.options.clone();
-        if with_plate {
-            options.depth_choice = DepthChoice::OneCamera(plate());
+        if let Some(way) = way {
+            options.depth_choice = self.choice(way);
         }
         // The others have no end.
         options.frames.repeat &= matches!(source_name.kind(), Kind::Recording | Kind::Photo);
         if let Some((_, size, fps)) = self.mode.as_ref().filter(|(camera, ..)| camera == name) {
             (options.frames.size, options.frames.fps) = (Some(*size), Some(*fps));
         }
-        // The window may switch to an effect that needs depth later.
-        let look = Look { effect: Effect::Auto, ..self.look.clone() };
+        // The window may switch to an effect that needs depth later, and does without metres where there are none.
+        let look = Look {
+            effect: Effect::Auto,
+            focus: FocusRule::Auto,
+            focus_range_m: 0.0,
+            strength: Strength::Default,
+            ..self.look.clone()
+        };
         let source = Source::open(&source_name, &options, Some(&look)).map_err(|error| error.to_string())?;
         Ok((source, source_name))
     }
-}
 
-/// A plate that is taken at the start, and the networks that are installed.
-fn plate() -> OneCamera {
-    OneCamera { plate: Some(PlateFile::Taken), ..source::installed_networks() }
+    /// How depth is made this way; what the command line said of depth from elsewhere is the source's own.
+    fn choice(&self, way: Way) -> DepthChoice {
+        match (way, &self.options.depth_choice) {
+            (Way::Measured, choice @ (DepthChoice::Folder(_) | DepthChoice::Device(_) | DepthChoice::Auto)) => {
+                choice.clone()
+            }
+            (Way::Person, DepthChoice::OneCamera(OneCamera { plate: None, matte: Some(file), .. })) => {
+                DepthChoice::OneCamera(OneCamera { matte: Some(file.clone()), ..OneCamera::default() })
+            }
+            (
+                Way::PersonAndDistance,
+                choice @ DepthChoice::OneCamera(OneCamera { mono: Some(_), matte: Some(_), .. }),
+            ) => choice.clone(),
+            _ => way.choice(),
+        }
+    }
+
+    /// The ways to depth of a source that was opened by `way`, the usual ones first.
+    fn ways(&mut self, source: &Source, name: &SourceName, way: Option<Way>) -> Vec<Way> {
+        let called = name.to_string();
+        if way.is_none() || self.own_ways.0 != called {
+            let mut own = Vec::new();
+            match name {
+                SourceName::Folder(folder) => {
+                    let recording = Recording::open(folder, &Reading { keep_going: true, ..Reading::default() }).ok();
+                    let has = |own: &mut Vec<Way>, is: bool, way: Way| own.extend(is.then_some(way));
+                    has(&mut own, recording.as_ref().is_some_and(Recording::has_depth), Way::Measured);
+                    has(&mut own, recording.is_some_and(|recording| recording.pair().is_some()), Way::Stereo);
+                }
+                _ => own.extend(
+                    Way::of(source.depth_from, &OneCamera::default(), false)
+                        .filter(|way| matches!(way, Way::Measured | Way::Stereo)),
+                ),
+            }
+            self.own_ways = (called, own);
+        }
+        let mut ways = self.own_ways.1.clone();
+        if matches!(name.kind(), Kind::Camera | Kind::Recording | Kind::Photo) {
+            let installed = source::installed_networks();
+            ways.extend(installed.matte.is_some().then_some(Way::Person));
+            ways.extend((installed.matte.is_some() && installed.mono.is_some()).then_some(Way::PersonAndDistance));
+        }
+        let is_alone = name.kind() == Kind::Camera && self.own_ways.1.is_empty();
+        ways.extend(is_alone.then_some(Way::Plate));
+        ways
+    }
 }
 
 impl Services for System {
     fn sources(&mut self) -> Vec<Choice> {
         let mut sources = devices::cameras();
+        sources.extend(devices::shared_cameras());
         let is_other =
             |choice: &&Choice| choice.name != demo::NAME && !sources.iter().any(|camera| camera.name == choice.name);
         let opened: Vec<Choice> = self.opened.iter().filter(is_other).cloned().collect();
@@ -129,11 +183,26 @@ impl Services for System {
         devices::virtual_cameras()
     }
 
-    fn open(&mut self, name: &str, with_plate: bool) -> Result<Opened, String> {
+    fn can(&mut self, name: &str, way: Way) -> Result<(), String> {
+        let installed = source::installed_networks();
+        let lacks = match way {
+            Way::Person => installed.matte.is_none(),
+            Way::PersonAndDistance => installed.matte.is_none() || installed.mono.is_none(),
+            Way::Measured | Way::Stereo | Way::Plate => false,
+        };
+        if lacks {
+            return Err(NO_NETWORK.to_owned());
+        }
+        // A recording is opened twice without harm; a camera is used already.
+        let is_file = SourceName::from_str(name).is_ok_and(|name| matches!(name.kind(), Kind::Recording | Kind::Photo));
+        if is_file { self.open_source(name, Some(way)).map(drop) } else { Ok(()) }
+    }
+
+    fn open(&mut self, name: &str, way: Option<Way>) -> Result<Opened, String> {
         let mut notes = Vec::new();
-        let first_camera = devices::cameras().into_iter().next();
+        let first_camera = || devices::cameras().into_iter().chain(devices::shared_cameras()).next();
         let name = match name {
-            "" => first_camera.map_or_else(
+            "" => first_camera().map_or_else(
                 || {
                     notes.push(NO_CAMERA.to_owned());
                     demo::NAME.to_owned()
@@ -142,14 +211,13 @@ impl Services for System {
             ),
             name => name.to_owned(),
         };
-        let (source, source_name) = self.open_source(&name, with_plate)?;
+        let (source, source_name) = self.open_source(&name, way)?;
         notes.extend(source.networks.iter().map(|networks| format!("Depth by {networks}.")));
         match source_name.kind() {
-            Kind::Camera if !source.has_depth() => notes.push(NO_DEPTH.to_owned()),
             Kind::Synthetic => notes.push(RENDERED.to_owned()),
             _ => {}
         }
-        let is_declined = self.options.depth_choice == DepthChoice::None && !with_plate;
+        let is_declined = self.options.depth_choice == DepthChoice::None && way.is_none();
         if is_declined && source.has_depth() {
             notes.push(DECLINED.to_owned());
         }
@@ -160,11 +228,17 @@ impl Services for System {
         self.opened.insert(0, Choice::of(&name));
         self.camera = devices::camera_of(&source_name);
         let controls = self.camera.as_deref().map(devices::knobs).unwrap_or_default();
-        self.with_plate = with_plate;
-        let is_replaceable = matches!(source.depth_from, DepthFrom::Nothing | DepthFrom::Networks | DepthFrom::Plate);
-        let camera = self.facts_of(&source);
-        let takes_plates = self.camera.is_some() && is_replaceable;
-        Ok(Opened { name, source, has_depth, takes_plates, notes, controls, camera })
+        self.way = way;
+        let camera = self.facts_of(&source, &source_name);
+        let mut ways = self.ways(&source, &source_name, way);
+        let networks = match &self.options.depth_choice {
+            DepthChoice::OneCamera(chosen) if chosen.has_networks() => chosen.clone(),
+            _ => source::installed_networks(),
+        };
+        let usual = || Way::of(source.depth_from, &networks, source.guide.is_some());
+        let way = way.or_else(usual).filter(|_| has_depth);
+        ways.extend(way.filter(|way| !ways.contains(way)));
+        Ok(Opened { name, source, has_depth, ways, way, notes, controls, camera })
     }
 
     fn devices_changed(&mut self) -> bool {
@@ -233,8 +307,8 @@ impl Services for System {
             switches.push(("size".into(), format!("{}x{}", size.width, size.height)));
             switches.push(("fps".into(), format!("{}", (fps * 1000.0).round() / 1000.0)));
         }
-        if self.with_plate {
-            switches.push(("depth".into(), plate().kinds()));
+        if let Some(way) = self.way {
+            switches.push(("depth".into(), way.flag()));
         }
         self.settings.command(look, source, outputs, &switches)
     }

@@ -1,7 +1,7 @@
 //! The window's texts: in English, as they are where they are used, or as a translation has them.
 //!
 //! `texts.toml` beside this file is the table of all of them. A translation is that file with the right sides filled in: it
-//! is found by the language of the environment or by `--language`. What the program says elsewhere, such as why a
+//! is found by the language of the environment or by `--language`. German comes with the program, in `texts/de.toml`. What the program says elsewhere, such as why a
 //! file cannot be read, is in English.
 
 use std::cell::Cell;
@@ -52,11 +52,11 @@ pub fn tr_with(english: &str, values: &[&dyn Display]) -> String {
 /// There is no translation into the language that was chosen, or it cannot be read: one line.
 pub fn chosen(language: Option<&str>) -> Result<Option<Table>, String> {
     let Some(name) = language else {
-        let path = usual_language().and_then(|language| find(&language));
+        let Some(language) = usual_language() else { return Ok(None) };
         // Nobody asked for this one: the window is in English then.
-        return Ok(
-            path.and_then(|path| read(&path).map_err(|line| tracing::warn!("{line}; the window is in English")).ok())
-        );
+        let own = find(&language)
+            .and_then(|path| read(&path).map_err(|line| tracing::warn!("{line}; the window is in English")).ok());
+        return Ok(own.or_else(|| built_in(&language)));
     };
     if ["en", "C", "POSIX"].contains(&name) {
         return Ok(None);
@@ -67,7 +67,21 @@ pub fn chosen(language: Option<&str>) -> Result<Option<Table>, String> {
             "there is no translation '{name}': put one at ~/.local/share/bokehcam/texts/{name}.toml, or name a file"
         )
     };
-    is_file.or_else(|| find(name)).ok_or_else(none).and_then(|path| read(&path)).map(Some)
+    match is_file.or_else(|| find(name)) {
+        Some(path) => read(&path).map(Some),
+        None => built_in(name).ok_or_else(none).map(Some),
+    }
+}
+
+/// The translation into a language, such as `de_AT.UTF-8` or `de`, that comes with the program. A file of the person's has
+/// precedence.
+pub fn built_in(language: &str) -> Option<Table> {
+    let short = language.split(['.', '@', '_']).next()?;
+    let text = match short {
+        "de" => include_str!("texts/de.toml"),
+        _ => return None,
+    };
+    toml::from_str(text).ok()
 }
 
 /// Reads a translation.

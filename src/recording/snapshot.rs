@@ -1,4 +1,4 @@
-//! Snapshots: a blurred picture with its settings inside, and beside it the files that it was made from.
+//! Snapshots: a blurred picture with its settings inside, and beside it, where that is wanted, the files that it was made from.
 //!
 //! `NAME.png` holds the settings as a text (keyword [`KEYWORD`]) of lines `--flag=value`. `NAME-color.png` is the
 //! picture before the blur, `NAME-depth.pfm` its depth as the blur had it, in metres.
@@ -22,10 +22,8 @@ pub const KEYWORD: &str = "bokehcam";
 pub struct Snapshot<'a> {
     /// The picture after the blur.
     pub picture: &'a ColorImage,
-    /// The picture before the blur.
-    pub color: &'a ColorImage,
-    /// Its depth, if the blur had any.
-    pub depth: Option<&'a DepthMap>,
+    /// What it was made from, where that is to be kept: the picture before the blur, and its depth, if the blur had any.
+    pub sources: Option<(&'a ColorImage, Option<&'a DepthMap>)>,
     /// The settings, by their flags without the dashes.
     pub settings: &'a [(&'static str, String)],
 }
@@ -64,15 +62,14 @@ fn write(path: &Path, snapshot: &Snapshot, png: &[u8]) -> Result<(), RecordingEr
     if let Some(taken) = [path, &color, &depth].into_iter().find(|path| path.symlink_metadata().is_ok()) {
         return Err(RecordingError::Exists { path: taken.to_owned() });
     }
-    write_color(&color, snapshot.color, false)?;
     // Only these are removed on failure: another process may write files of the same names.
-    let mut written_files = vec![&color];
-    let depth_written = snapshot.depth.map_or(Ok(()), |map| {
-        write_depth(&depth, map, 1.0, false)?;
-        written_files.push(&depth);
-        Ok(())
+    let mut written_files = Vec::new();
+    let sources_written = snapshot.sources.map_or(Ok(()), |(before, map)| {
+        write_color(&color, before, false)?;
+        written_files.push(&color);
+        map.map_or(Ok(()), |map| write_depth(&depth, map, 1.0, false).map(|()| written_files.push(&depth)))
     });
-    let written = depth_written.and_then(|()| {
+    let written = sources_written.and_then(|()| {
         whole::write(path, png, false).map_err(|error| match error.kind() {
             ErrorKind::AlreadyExists => RecordingError::Exists { path: path.to_owned() },
             _ => RecordingError::io("write", path)(error),

@@ -79,6 +79,9 @@ pub enum SinkError {
         /// What the system said.
         cause: io::Error,
     },
+    /// There is no room left for it.
+    #[error("the disk is full (No space left on device): {} ends early", path.display())]
+    Full { path: PathBuf },
     /// A frame of another size than the stream's.
     #[error("the stream is {} x {} pixels, and a frame has {} x {}", made_for.0, made_for.1, got.0, got.1)]
     Size {
@@ -139,6 +142,9 @@ pub enum SinkError {
 impl SinkError {
     /// Puts the path to a system error.
     pub(super) fn write(path: &Path) -> impl FnOnce(io::Error) -> Self {
-        |cause| Self::Write { path: path.to_owned(), cause }
+        |cause| match cause.kind() {
+            io::ErrorKind::StorageFull => Self::Full { path: path.to_owned() },
+            _ => Self::Write { path: path.to_owned(), cause },
+        }
     }
 }

@@ -4,7 +4,7 @@
 //! exists is overwritten unless that was asked for, and then only by what is whole. What has frames and cannot have its
 //! name is kept as `NAME.incomplete`.
 
-mod card;
+pub(crate) mod card;
 mod error;
 mod ffmpeg;
 #[cfg(feature = "camera")]

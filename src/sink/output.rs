@@ -148,7 +148,7 @@ fn recover(path: &Path) -> Result<Vec<PathBuf>, SinkError> {
     kept.filter_map(Result::transpose).collect::<Result<_, _>>().map_err(SinkError::write(path))
 }
 
-/// Renames a part that was left behind to `path` with `.incomplete`, and gives that name; removes an empty one.
+/// Renames a part that was left behind to that of `path` with `.incomplete` in it, and gives that name; removes an empty one.
 fn keep_or_remove(part: &Path, path: &Path) -> io::Result<Option<PathBuf>> {
     let done = match part.metadata().map(|part| part.len()) {
         Ok(0) => fs::remove_file(part).map(|()| None),
@@ -162,7 +162,7 @@ fn keep_or_remove(part: &Path, path: &Path) -> io::Result<Option<PathBuf>> {
     }
 }
 
-/// Keeps the videos that killed runs left unfinished in a folder, each as `NAME.incomplete`; gives the new names.
+/// Keeps the videos that killed runs left unfinished in a folder, each as `NAME.incomplete.mp4`; gives the new names.
 /// Videos whose `NAME` does not satisfy `is_ours` are left alone, and so is what cannot be renamed.
 pub fn recover_all(folder: &Path, is_ours: impl Fn(&str) -> bool) -> Vec<PathBuf> {
     let left = whole::all_left_behind(folder).unwrap_or_default().into_iter();

@@ -42,6 +42,24 @@ pub fn cameras() -> Vec<Choice> {
     return Vec::new();
 }
 
+/// Cameras that only PipeWire has: none of this program's own, and none that [`cameras`] lists.
+pub fn shared_cameras() -> Vec<Choice> {
+    #[cfg(feature = "pipewire")]
+    {
+        let graph = crate::pipewire::graph::Graph::look().unwrap_or_default();
+        let is_other = |source: &crate::pipewire::graph::Source| {
+            source.is_camera && !source.is_ours() && !source.name.starts_with("v4l2_")
+        };
+        let choice = |source: crate::pipewire::graph::Source| Choice {
+            name: format!("pipewire:{}", source.name),
+            label: source.label,
+        };
+        graph.sources.into_iter().filter(is_other).map(choice).collect()
+    }
+    #[cfg(not(feature = "pipewire"))]
+    Vec::new()
+}
+
 /// Virtual cameras that could be written to.
 pub fn virtual_cameras() -> Vec<Choice> {
     #[cfg(feature = "camera")]

@@ -69,6 +69,18 @@ pub enum DepthFrom {
     Plate,
 }
 
+impl DepthFrom {
+    /// Whether it tells only what is nearer, and nothing in metres.
+    pub fn is_relative(self) -> bool {
+        matches!(self, Self::Relative | Self::Networks | Self::Plate)
+    }
+
+    /// Whether another way to depth may take its place: it is none, or made of the pictures alone.
+    pub fn is_of_pictures(self) -> bool {
+        matches!(self, Self::Nothing | Self::Networks | Self::Plate)
+    }
+}
+
 /// An opened source.
 pub struct Source {
     /// Gives the frames.

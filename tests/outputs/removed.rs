@@ -45,7 +45,7 @@ fn an_output_that_is_removed_is_told_of_while_the_others_go_on_and_what_there_is
             false => fs::remove_file(part(&home.at("d")).unwrap()).unwrap(),
         }
         let told = line_with(&mut stderr, "was removed while it was written");
-        let kept = home.at(if whole_folder { "" } else { "d" }).join(format!("{name}.incomplete"));
+        let kept = home.at(if whole_folder { "" } else { "d" }).join(name.replace('.', ".incomplete."));
         let kept_at = format!("kept as {}", kept.canonicalize().unwrap().display());
         assert!(told.contains(&kept_at) && told.contains("going on without it"), "{told}");
         assert_eq!(home.at("d").exists(), !whole_folder, "it is not made anew");
@@ -72,8 +72,8 @@ fn an_output_whose_folder_is_moved_is_kept_where_it_is() {
     fs::create_dir(home.at("d")).unwrap();
     assert_eq!(terminate(child).code, Some(1));
     let told = line_with(&mut stderr, "error: ");
-    assert!(told.contains("e/x.y4m.incomplete"), "{told}");
-    assert!(frames(&home.at("e/x.y4m.incomplete")) > 0);
+    assert!(told.contains("e/x.incomplete.y4m"), "{told}");
+    assert!(frames(&home.at("e/x.incomplete.y4m")) > 0);
     assert_eq!(fs::read_dir(home.at("e")).unwrap().count(), 1, "nothing hidden is left");
     assert_eq!(fs::read_dir(home.at("d")).unwrap().count(), 0);
 }
@@ -103,7 +103,7 @@ fn a_video_that_is_removed_can_be_played_up_to_there() {
         assert_eq!(terminate(child).code, Some(1));
         let probe = std::process::Command::new("ffprobe")
             .args(["-v", "error", "-count_frames", "-of", "csv=p=0", "-show_entries", "stream=nb_read_frames"])
-            .arg(home.at(&format!("{name}.incomplete")))
+            .arg(home.at(&name.replace('.', ".incomplete.")))
             .output()
             .unwrap();
         let frames = String::from_utf8(probe.stdout).unwrap();

@@ -77,9 +77,9 @@ fn what_came_to_the_name_of_a_report_during_the_run_stays() {
         let ran = terminate(child);
         let there = fs::read(home.at("r.json")).unwrap();
         if force.is_empty() {
-            ran.failed(1, "r.json exists: choose another name, or give --force to overwrite it; the report is kept as r.json.incomplete");
+            ran.failed(1, "r.json exists: choose another name, or give --force to overwrite it; the report is kept as r.incomplete.json");
             assert_eq!(there, b"precious");
-            assert!(report(&fs::read(home.at("r.json.incomplete")).unwrap())["frames"]["delivered"].as_u64() > Some(1));
+            assert!(report(&fs::read(home.at("r.incomplete.json")).unwrap())["frames"]["delivered"].as_u64() > Some(1));
         } else {
             assert_eq!(ran.code, Some(0), "{}", ran.said);
             assert!(report(&there)["frames"]["delivered"].as_u64() > Some(1));

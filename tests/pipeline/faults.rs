@@ -148,7 +148,7 @@ fn a_failed_run_replaces_nothing() {
     let sink = Target::Y4m(name.clone()).open(&options).unwrap();
     assert!(run(simple(Box::new(failing), sink, &stop, Pace::Asap)).is_err());
     assert_eq!(fs::read(&name).unwrap(), b"old");
-    assert!(fs::metadata(folder.path().join("clip.y4m.incomplete")).unwrap().len() > 0);
+    assert!(fs::metadata(folder.path().join("clip.incomplete.y4m")).unwrap().len() > 0);
 
     let sink = Target::Y4m(name.clone()).open(&options).unwrap();
     run(simple(Box::new(fake_camera(9)), sink, &stop, Pace::Asap)).unwrap();

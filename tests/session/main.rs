@@ -165,9 +165,9 @@ fn a_recording_that_was_broken_off_is_found_at_the_next_start() {
     std::fs::write(at(".holiday.mp4.77-0.part"), "mine").unwrap();
     let mut watched = Watched::begin_in("32", folder.path());
     watched
-        .until("it is told", |told| matches!(told, Update::Note(line) if line.contains("bokehcam-3.mp4.incomplete")));
+        .until("it is told", |told| matches!(told, Update::Note(line) if line.contains("bokehcam-3.incomplete.mp4")));
     watched.heard.session.close();
-    assert_eq!(std::fs::read(at("bokehcam-3.mp4.incomplete")).unwrap(), b"take");
-    assert_eq!(std::fs::read(at("bokehcam 2026-11-23 21-14-05.mp4.incomplete")).unwrap(), b"another take");
+    assert_eq!(std::fs::read(at("bokehcam-3.incomplete.mp4")).unwrap(), b"take");
+    assert_eq!(std::fs::read(at("bokehcam 2026-11-23 21-14-05.incomplete.mp4")).unwrap(), b"another take");
     assert_eq!(std::fs::read(at(".holiday.mp4.77-0.part")).unwrap(), b"mine");
 }

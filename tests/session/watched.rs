@@ -16,7 +16,7 @@ use bokehcam::look::{Look, Patch};
 use bokehcam::optics::CocField;
 use bokehcam::pipeline::View;
 use bokehcam::preview::services::{Opened, Services, SettingsStore, Switch};
-use bokehcam::preview::state::{Camera, Source, Update};
+use bokehcam::preview::state::{Camera, Source, Update, Way};
 use bokehcam::sink::{Ending, Sink, SinkError};
 use bokehcam::source::{self, devices::Choice};
 
@@ -70,7 +70,8 @@ impl Services for Small {
     fn virtual_cameras(&mut self) -> Vec<Choice> {
         Vec::new()
     }
-    fn open(&mut self, name: &str, with_plate: bool) -> Result<Opened, String> {
+    fn open(&mut self, name: &str, way: Option<Way>) -> Result<Opened, String> {
+        let with_plate = way == Some(Way::Plate);
         let width =
             name.split(' ').next().and_then(|width| width.parse().ok()).ok_or(format!("no such source: {name}"))?;
         let frames = name.ends_with("no more").then_some(2);
@@ -85,7 +86,7 @@ impl Services for Small {
             source.depth = Some(Box::new(plate));
         }
         let has_depth = source.has_depth();
-        Ok(Opened { name, source, has_depth, takes_plates: true, notes, controls, camera: Camera::default() })
+        Ok(Opened { name, source, has_depth, ways: vec![Way::Plate], way, notes, controls, camera: Camera::default() })
     }
     fn turn(&mut self, _: &str, _: i64) -> Result<Vec<Knob>, String> {
         Err("it has no controls".into())

@@ -204,7 +204,7 @@ fn what_a_killed_ffmpeg_had_written_can_be_played() {
         sink.finish(Ending::Cut).unwrap();
         let SinkError::Kept { error, kept } = &error else { panic!("{error}") };
         assert!(error.to_string().contains("SIGKILL"), "{error}");
-        assert_eq!(listing(folder.path()), [format!("clip.{extension}.incomplete")]);
+        assert_eq!(listing(folder.path()), [format!("clip.incomplete.{extension}")]);
         let frames: u32 = probe(kept, "stream=nb_read_frames").trim_end_matches(',').parse().unwrap();
         assert!(frames > 25, "{extension}: {frames} frames are left");
     }
@@ -228,7 +228,9 @@ fn an_ffmpeg_that_hangs_ends_with_the_run() {
             error
         };
         assert!(error.to_string().contains("it hung"), "{error}");
-        assert!(listing(folder.path()).iter().all(|name| name.starts_with("clip.mp4.incomplete")));
+        assert!(
+            listing(folder.path()).iter().all(|name| name.starts_with("clip.incomplete") && name.ends_with(".mp4"))
+        );
     }
 }
 
@@ -242,6 +244,6 @@ fn a_video_that_was_cut_short_replaces_nothing() {
     put_all(&mut *sink, &[flat(64, 48, [90; 3]), flat(64, 48, [99; 3])]);
     sink.finish(Ending::Cut).unwrap();
     assert_eq!(fs::read(&name).unwrap(), b"old");
-    let kept = folder.path().join("clip.mp4.incomplete");
+    let kept = folder.path().join("clip.incomplete.mp4");
     assert_eq!(times(&kept), (vec![0, 40], 80));
 }

@@ -16,8 +16,8 @@ fn a_file_appears_only_when_it_is_whole() {
     put_all(&mut *given_up, &frames);
     assert!(!name.exists());
     drop(given_up);
-    assert_eq!(listing(name.parent().unwrap()), ["clip.y4m.incomplete"], "frames are kept");
-    fs::remove_file(folder.path().join("made/clip.y4m.incomplete")).unwrap();
+    assert_eq!(listing(name.parent().unwrap()), ["clip.incomplete.y4m"], "frames are kept");
+    fs::remove_file(folder.path().join("made/clip.incomplete.y4m")).unwrap();
     drop(open(&name, &options((6, 4))).unwrap());
     assert!(listing(name.parent().unwrap()).is_empty(), "nothing is left of nothing");
 
@@ -47,14 +47,14 @@ fn what_appeared_meanwhile_is_not_overwritten_and_the_frames_are_kept() {
     assert!(matches!(**error, SinkError::Exists { .. }), "{error}");
     assert_eq!(fs::read(&name).unwrap(), b"mine");
     assert!(fs::read(kept).unwrap().starts_with(b"YUV4MPEG2"));
-    assert_eq!(listing(folder.path()), ["clip.y4m", "clip.y4m.incomplete"]);
+    assert_eq!(listing(folder.path()), ["clip.y4m", "clip.incomplete.y4m"]);
 }
 
 #[test]
 fn what_was_cut_short_replaces_nothing() {
     let folder = tempfile::tempdir().unwrap();
     let name = folder.path().join("clip.y4m");
-    for (there, expected) in [(false, vec!["clip.y4m"]), (true, vec!["clip.y4m", "clip.y4m.incomplete"])] {
+    for (there, expected) in [(false, vec!["clip.y4m"]), (true, vec!["clip.y4m", "clip.incomplete.y4m"])] {
         if there {
             fs::write(&name, "old").unwrap();
         }
@@ -83,7 +83,7 @@ fn two_that_write_one_file_never_mix() {
         bytes.split(|byte| *byte == b'\n').filter(|part| part.len() > 24 && part.starts_with(&[luma; 24])).count()
     };
     assert_eq!([has("clip.y4m", 16), has("clip.y4m", 235)], [3, 0]);
-    assert_eq!([has("clip.y4m.incomplete", 16), has("clip.y4m.incomplete", 235)], [0, 3]);
+    assert_eq!([has("clip.incomplete.y4m", 16), has("clip.incomplete.y4m", 235)], [0, 3]);
 }
 
 #[test]
@@ -114,6 +114,6 @@ fn what_a_killed_run_left_is_kept_under_a_name_that_shows() {
     let mut sink = open(&at("clip.y4m"), &options((6, 4))).unwrap();
     put_all(&mut *sink, &[picture(6, 4, 0)]);
     sink.finish(Ending::Whole).unwrap();
-    assert_eq!(listing(folder.path()), ["clip.y4m", "clip.y4m.incomplete"]);
-    assert_eq!(fs::read(at("clip.y4m.incomplete")).unwrap(), b"take");
+    assert_eq!(listing(folder.path()), ["clip.y4m", "clip.incomplete.y4m"]);
+    assert_eq!(fs::read(at("clip.incomplete.y4m")).unwrap(), b"take");
 }

@@ -11,7 +11,7 @@ use bokehcam::frame::{ColorImage, DepthMap};
 use bokehcam::knob::Knob;
 use bokehcam::look::Look;
 use bokehcam::preview::services::{Opened, Services, SettingsStore, Switch};
-use bokehcam::preview::state::Camera;
+use bokehcam::preview::state::{Camera, Way};
 use bokehcam::preview::system::System;
 use bokehcam::recording::tum::{Writer, WriterOptions};
 use bokehcam::sink::Sink;
@@ -54,7 +54,7 @@ impl Services for Plug {
     fn virtual_cameras(&mut self) -> Vec<Choice> {
         Vec::new()
     }
-    fn open(&mut self, name: &str, with_plate: bool) -> Result<Opened, String> {
+    fn open(&mut self, name: &str, way: Option<Way>) -> Result<Opened, String> {
         match (name, self.is_in.load(Ordering::SeqCst)) {
             (CAMERA, false) => Err("no such camera".into()),
             (CAMERA, true) => {
@@ -66,9 +66,9 @@ impl Services for Plug {
                     vec![Mode { size: (64, 48), fps: vec![30.0] }, Mode { size: (32, 24), fps: vec![60.0, 30.0] }];
                 let camera = Camera { modes, faces_user: true, is_relative: false };
                 let (notes, controls) = (Vec::new(), Vec::new());
-                Ok(Opened { name, source, has_depth, takes_plates: false, notes, controls, camera })
+                Ok(Opened { name, source, has_depth, ways: Vec::new(), way, notes, controls, camera })
             }
-            _ => self.system.open(name, with_plate),
+            _ => self.system.open(name, way),
         }
     }
     fn devices_changed(&mut self) -> bool {

@@ -179,12 +179,13 @@ fn colour(image: &ColorImage) -> f64 {
 
 #[test]
 #[ignore = "needs an X server"]
-fn a_camera_alone_is_shown_as_tilt_shift_and_a_lost_one_in_grey_until_it_is_back() {
+fn a_band_alone_is_sharp_and_a_lost_camera_is_shown_in_grey_until_it_is_back() {
     let screen = Screen::new();
     let folder = tempfile::tempdir().unwrap();
     without_depth(folder.path());
     let name = folder.path().to_str().unwrap();
-    let mut program = Program::start(&screen, &[name, "--panel=false", "--coc-at-infinity", "5%"]);
+    let mut program =
+        Program::start(&screen, &[name, "--panel=false", "--effect", "tilt-shift", "--coc-at-infinity", "5%"]);
     let window = program.window();
     let shown = window.until("the first picture", is_photograph);
     const TOP: Place = ((0.5, 0.1), (0.8, 0.15));

@@ -116,9 +116,12 @@ impl Layers {
                 && !STATED_BY_WINDOW.contains(&name)
         };
         let resolved = self.resolved(matches);
-        let is_behind = |setting: &&Setting| {
-            settings::setting(&setting.name).is_some() && !["flag", "default"].contains(&setting.origin)
-        };
+        // A preset that a flag names is none of the next command.
+        let by_flag = leaf(matches).try_get_one::<String>("preset").ok().flatten().is_some()
+            && leaf(matches).value_source("preset") == Some(ValueSource::CommandLine);
+        let not_behind = ["flag", "default", if by_flag { "preset" } else { "flag" }];
+        let is_behind =
+            |setting: &&Setting| settings::setting(&setting.name).is_some() && !not_behind.contains(&setting.origin);
         let mut behind: Vec<String> = resolved.iter().filter(is_behind).map(|setting| setting.name.clone()).collect();
         let of_strength = |name: &str| settings::setting(name).is_some_and(settings::Setting::is_strength);
         // They exclude each other: whichever the look has now must be stated to override the one that is behind.

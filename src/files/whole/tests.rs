@@ -57,10 +57,10 @@ fn parts_left_behind_are_found_and_no_others() {
     symlink(dir.path().join("b"), dir.path().join(".a.mkv.8-0.part")).unwrap();
     assert_eq!(left_behind(&path).unwrap(), std::slice::from_ref(&left));
     let kept = keep_incomplete(&left, &path).unwrap();
-    assert_eq!(kept, dir.path().join("a.mkv.incomplete"));
+    assert_eq!(kept, dir.path().join("a.incomplete.mkv"));
     alive.file().write_all(b"more").unwrap();
-    assert_eq!(alive.keep_incomplete().unwrap(), dir.path().join("a.mkv.incomplete.2"));
-    assert_eq!(fs::read(dir.path().join("a.mkv.incomplete")).unwrap(), b"take");
+    assert_eq!(alive.keep_incomplete().unwrap(), dir.path().join("a.incomplete.2.mkv"));
+    assert_eq!(fs::read(dir.path().join("a.incomplete.mkv")).unwrap(), b"take");
 }
 
 #[test]

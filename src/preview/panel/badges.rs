@@ -3,8 +3,9 @@
 
 use std::time::Duration;
 
-use egui::{Align2, Color32, Context, Id, LayerId, Order, Rect, vec2};
+use egui::{Align2, Color32, Context, Id, LayerId, Order, vec2};
 
+use super::dock::room;
 use super::icons;
 use super::marks::label;
 use super::state::State;
@@ -26,8 +27,8 @@ pub struct Badges {
 const UNNOTICED_S: f64 = 0.06;
 
 impl Badges {
-    /// Draws them at the top right, or to the left of the panel.
-    pub fn show(&mut self, ctx: &Context, state: &State, panel: Option<Rect>) {
+    /// Draws them at the top right of the picture.
+    pub fn show(&mut self, ctx: &Context, state: &State) {
         let now_s = ctx.input(|input| input.time);
         let text = |name: &str, is_on: bool, since_s: &mut Option<f64>| {
             *since_s = is_on.then(|| since_s.unwrap_or(now_s));
@@ -56,8 +57,7 @@ impl Badges {
         let painter = ctx.layer_painter(LayerId::new(Order::Middle, Id::unique("badges")));
         // Beside the panel, or the button that brings it back.
         let beside = if state.panel || state.bare { 0.0 } else { icons::SIDE + 14.0 };
-        let right = panel.map_or(ctx.content_rect().right() - beside, |panel| panel.left());
-        let mut corner = egui::pos2(right, ctx.content_rect().top()) + vec2(-GAP, GAP);
+        let mut corner = room(ctx).right_top() + vec2(-GAP - beside, GAP);
         for (text, color) in all.into_iter().filter_map(|(text, color)| Some((text?, color))) {
             corner.y += label(&painter, corner, Align2::RIGHT_TOP, &text, Some(color)).height() + 6.0;
         }

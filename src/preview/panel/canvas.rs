@@ -8,6 +8,7 @@ use super::state::{Action, Shown, State, tweak};
 use crate::depth::focus::FocusRule;
 use crate::look::Effect;
 use crate::look::Look;
+use crate::preview::texts::tr;
 
 /// How long the ring at a click is shown, in seconds.
 pub const RING_S: f64 = 0.9;
@@ -35,7 +36,7 @@ impl Gestures {
     pub fn show(&mut self, ui: &mut Ui, state: &State, place: Place, waking: bool, actions: &mut Vec<Action>) {
         // No stop for the Tab key: the arrow keys do what a click does.
         let response = ui.interact(place.seen, Id::unique("picture"), Sense::CLICK | Sense::DRAG);
-        response.widget_info(|| WidgetInfo::labeled(Role::Canvas, true, "Picture: a click focuses there"));
+        response.widget_info(|| WidgetInfo::labeled(Role::Canvas, true, tr("Picture: a click focuses there")));
         let line = split_line(ui, state, &place);
         let is_tilt = state.look.effect == Effect::TiltShift && state.shown == Shown::Picture && !state.bare;
         let on_line = line.as_ref().is_some_and(|line| line.hovered() || line.dragged());
@@ -122,7 +123,13 @@ impl Gestures {
             marks::part(&painter, place, &part);
         }
         if let Some(at) = state.split {
-            marks::split(&painter, place, at, line_held);
+            let after = match state.shown {
+                Shown::Picture => "After",
+                Shown::Depth => "Depth",
+                Shown::Coc => "Blur radius",
+                Shown::Bins => "Layers",
+            };
+            marks::split(&painter, place, at, line_held, after);
         }
         if is_tilt {
             let pointer = ui.input(|input| input.pointer.hover_pos());

@@ -1,7 +1,8 @@
 //! Cards over the picture, with words and buttons.
 
-use egui::{Align2, Area, Context, Id, Label, Margin, Order, Rect, RichText, Ui, vec2};
+use egui::{Align2, Area, Context, Id, Label, Margin, Order, Rect, RichText, Ui, pos2};
 
+use super::dock::room;
 use super::parts::button;
 use super::state::Action;
 use super::theme::{Colors, GAP, card, medium};
@@ -17,16 +18,10 @@ pub fn show(
 ) -> Rect {
     let drawn = area.fade_in(false).show(ctx, |ui| {
         let colors = Colors::here(ui);
-        ui.set_max_width((ctx.content_rect().width() - 2.0 * GAP).min(width).max(60.0));
+        ui.set_max_width((room(ctx).width() - 2.0 * GAP).min(width).max(60.0));
         card(&colors).inner_margin(margin).show(ui, |ui| content(ui, &colors));
     });
     drawn.response.rect
-}
-
-/// Draws a card in the middle of the window, over all others.
-pub fn in_middle(ctx: &Context, id: &str, width: f32, content: impl FnOnce(&mut Ui, &Colors)) {
-    let area = Area::new(Id::unique(id)).anchor(Align2::CENTER_CENTER, vec2(0.0, 0.0)).order(Order::Foreground);
-    show(ctx, area, width, Margin::symmetric(18, 14), content);
 }
 
 pub fn title(ui: &mut Ui, text: &str) {
@@ -40,18 +35,18 @@ pub fn words(ui: &mut Ui, colors: &Colors, text: &str) {
     }
 }
 
-/// Cards that are drawn one above the other, in the window's middle.
+/// Cards that are drawn one above the other at the bottom of the picture, clear of faces.
 pub struct Stack<'a> {
     pub ctx: &'a Context,
-    /// Points from the bottom of the window to the next card.
+    /// Points from the bottom of the picture's room to the next card.
     pub bottom: f32,
 }
 
 impl Stack<'_> {
-    /// Adds a card without controls.
-    pub fn tell(&mut self, id: Id, order: Order, width: f32, opacity: f32, text: &str) {
-        let area = Area::new(id).order(order).interactable(false);
-        self.add(area, width, Margin::symmetric(14, if order == Order::Middle { 6 } else { 9 }), |ui, colors| {
+    /// Adds a card without controls. A click on it is not one on the picture below.
+    pub fn tell(&mut self, id: Id, width: f32, opacity: f32, text: &str) {
+        let area = Area::new(id).order(Order::Foreground);
+        self.add(area, width, Margin::symmetric(14, 9), |ui, colors| {
             ui.set_opacity(opacity);
             words(ui, colors, text);
         });
@@ -71,7 +66,7 @@ impl Stack<'_> {
             title(ui, heading);
             words(ui, colors, why);
             ui.add_space(2.0);
-            ui.horizontal(|ui| {
+            ui.horizontal_wrapped(|ui| {
                 for (text, hint, action) in buttons {
                     if button(ui, text, hint) {
                         actions.push(action);
@@ -81,8 +76,15 @@ impl Stack<'_> {
         });
     }
 
+    /// Adds a card with what `content` draws.
+    pub fn card(&mut self, id: &str, width: f32, content: impl FnOnce(&mut Ui, &Colors)) {
+        self.add(Area::new(Id::unique(id)).order(Order::Foreground), width, Margin::symmetric(18, 10), content);
+    }
+
     fn add(&mut self, area: Area, width: f32, margin: impl Into<Margin>, content: impl FnOnce(&mut Ui, &Colors)) {
-        let area = area.anchor(Align2::CENTER_BOTTOM, vec2(0.0, -self.bottom));
+        let room = room(self.ctx);
+        let at = pos2(room.center().x, room.bottom() - self.bottom);
+        let area = area.pivot(Align2::CENTER_BOTTOM).fixed_pos(at);
         self.bottom += show(self.ctx, area, width, margin, content).height() + 6.0;
     }
 }

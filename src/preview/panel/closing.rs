@@ -19,7 +19,7 @@ pub fn show(ctx: &Context, state: &State, actions: &mut Vec<Action>) {
     let asked = Modal::new(Id::unique("closing")).frame(card(&colors)).show(ctx, |ui| {
         ui.set_max_width((ctx.content_rect().width() - 2.0 * (GAP + PAD)).clamp(60.0, 340.0));
         title(ui, "Stop recording and close?");
-        words(ui, &colors, "The recording is completed first: what is in it so far is kept.");
+        words(ui, &colors, "The video so far is saved.");
         let mut never = ctx.data(|data| data.get_temp(ticked)).unwrap_or(false);
         ui.add_space(2.0);
         ui.horizontal_wrapped(|ui| {

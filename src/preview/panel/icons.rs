@@ -36,8 +36,16 @@ pub enum Icon {
 /// Draws an icon button. Whether it was clicked.
 pub fn button(ui: &mut Ui, icon: Icon, hint: &str, enabled: bool) -> bool {
     let colors = Colors::here(ui);
-    let sense = if enabled { Sense::click() } else { Sense::hover() };
-    let (rect, response) = ui.allocate_exact_size(Vec2::splat(SIDE), sense);
+    // What can no longer be done keeps the focus, from which the next control is reached.
+    let id = ui.scope_id().with(hint);
+    let keeps_focus = ui.memory(|memory| memory.has_focus(id));
+    let sense = match (enabled, keeps_focus) {
+        (true, _) => Sense::click(),
+        (false, true) => Sense::focusable_noninteractive(),
+        (false, false) => Sense::hover(),
+    };
+    let (rect, _) = ui.allocate_exact_size(Vec2::splat(SIDE), Sense::hover());
+    let response = ui.interact(rect, id, sense);
     response.widget_info(|| WidgetInfo::labeled(Role::Button, enabled, tr(hint)));
     if enabled && response.hovered() {
         ui.painter().rect_filled(rect, CornerRadius::same(7), colors.hover);
@@ -111,6 +119,15 @@ fn arc(painter: &Painter, center: Pos2, radius: f32, turns: [f32; 2], stroke: St
         center + Vec2::angled(turn * TAU) * radius
     });
     painter.add(Shape::line(points.collect(), stroke));
+}
+
+/// A camera that takes a picture.
+pub fn camera(painter: &Painter, center: Pos2, color: Color32) {
+    let stroke = Stroke::new(1.5, color);
+    let body = Rect::from_center_size(center + vec2(0.0, 1.0), vec2(18.0, 12.0));
+    painter.rect_stroke(body, CornerRadius::same(3), stroke, StrokeKind::Middle);
+    painter.circle_stroke(body.center(), 3.2, stroke);
+    painter.line_segment([center + vec2(-3.0, -7.0), center + vec2(3.0, -7.0)], stroke);
 }
 
 /// A dot, as on a recorder's button; a square, to stop, while it records.

@@ -35,7 +35,7 @@ impl Cache {
             (self.summary, self.at_s) = (state.meters.summary(), now_s);
         }
         ctx.request_repaint_after(Duration::from_millis(200));
-        let window = ctx.content_rect();
+        let window = super::dock::room(ctx);
         let area = Area::new(Id::unique("instruments")).fixed_pos(window.min + vec2(GAP, GAP)).order(Order::Middle);
         cards::show(ctx, area.interactable(false), WIDTH, PAD, |ui, _| {
             ui.set_width(ui.available_width());

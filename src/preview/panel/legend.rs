@@ -16,7 +16,7 @@ const CELLS: usize = 64;
 /// Draws the legend of what is shown, at the left, `above` points from the bottom, unless the window is too small for it.
 pub fn show(ui: &Ui, state: &State, above: f32) {
     let Some(legend) = state.legend else { return };
-    let window = ui.ctx().content_rect();
+    let window = super::dock::room(ui.ctx());
     if window.width() < WIDTH * 1.2 || window.height() < 120.0 {
         return;
     }
@@ -41,15 +41,16 @@ pub fn show(ui: &Ui, state: &State, above: f32) {
     let bar = Rect::from_min_size(inner.min + vec2(0.0, 22.0), vec2(inner.width(), BAR));
     match legend {
         Legend::Depth { near_m, far_m } => {
-            title("Depth in metres");
+            title(if state.known().is_relative { "Depth: far to near" } else { "Depth in metres" });
             ramp(painter, bar, |share| perceptual()[(share * 255.0) as usize]);
-            for metres in nice_depths(near_m, far_m) {
+            let in_metres = !state.known().is_relative;
+            for metres in nice_depths(near_m, far_m).into_iter().filter(|_| in_metres) {
                 let x = bar.left() + depth_share(metres, near_m, far_m).clamp(0.0, 1.0) * bar.width();
                 tick(painter, &colors, bar, x, &meters_label(metres));
             }
         }
         Legend::Coc { most_px } => {
-            title("Circle of confusion: radius in pixels");
+            title("Blur radius in pixels");
             ramp(painter, bar, |share| diverging(2.0 * share - 1.0));
             hatch(painter, Rect::from_min_max(bar.min, bar.center_bottom()));
             let most = format!("{most_px:.0}");
@@ -60,7 +61,7 @@ pub fn show(ui: &Ui, state: &State, above: f32) {
             }
         }
         Legend::Bins { count, high_px } => {
-            title("Bins, front to back: circle of confusion");
+            title("Layers, front to back: blur radius");
             for index in 0..count {
                 let (column, row) = (index / rows.max(1), index % rows.max(1));
                 let at = inner.min + vec2(inner.width() / 2.0 * column as f32, 24.0 + 20.0 * row as f32);

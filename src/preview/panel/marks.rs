@@ -77,7 +77,7 @@ pub fn part(painter: &Painter, place: &Place, part: &Crop) {
 }
 
 /// The line between before (left) and after.
-pub fn split(painter: &Painter, place: &Place, at: f32, held: bool) {
+pub fn split(painter: &Painter, place: &Place, at: f32, held: bool, after: &str) {
     let x = place.rect.left() + at * place.rect.width();
     let rect = place.seen;
     line(painter, [pos2(x, rect.top()), pos2(x, rect.bottom())], if held { 3.0 } else { 2.0 });
@@ -89,7 +89,7 @@ pub fn split(painter: &Painter, place: &Place, at: f32, held: bool) {
         painter.add(Shape::line(points, Stroke::new(1.8, Color32::from_gray(40))));
     }
     label(painter, pos2(x - 12.0, rect.top() + 14.0), Align2::RIGHT_TOP, tr("Before"), None);
-    label(painter, pos2(x + 12.0, rect.top() + 14.0), Align2::LEFT_TOP, tr("After"), None);
+    label(painter, pos2(x + 12.0, rect.top() + 14.0), Align2::LEFT_TOP, tr(after), None);
 }
 
 /// Words on the picture, on a dark field, after a dot if it has a colour. Where they are.

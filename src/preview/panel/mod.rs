@@ -4,6 +4,7 @@ mod badges;
 mod canvas;
 mod cards;
 mod closing;
+mod dock;
 mod fonts;
 mod help;
 mod icons;
@@ -23,6 +24,7 @@ mod theme;
 mod timer;
 mod transport;
 
+pub use dock::room_px;
 pub use fonts::SystemFonts;
 pub use theme::install as dress;
 
@@ -34,9 +36,10 @@ use super::present::{Area, Part};
 use super::state::{Action, State};
 use super::{keys, meters, state, views};
 use canvas::Gestures;
+use dock::Dock;
 use place::Place;
 
-/// After this many seconds without pointer or keyboard the panel hides.
+/// After this many seconds without pointer or keyboard the panel hides, in full screen.
 const HIDES_AFTER_S: f64 = 4.0;
 /// Points that the controls need: text is no larger than leaves them so many.
 const LEAST_SIZE: Vec2 = Vec2::new(320.0, 200.0);
@@ -97,11 +100,13 @@ impl Panel {
             theme::install(&ctx);
             self.active_s = ctx.input(|input| input.time);
         }
+        ctx.accesskit_node_builder(egui::accesskit_root_id(), |node| node.set_label("bokehcam"));
         let first = actions.len();
         self.set_text_scale(&ctx, state.habits.text_scale, actions);
         let size = if canvas.size.1 > 0 { canvas.size } else { (1280, 720) };
         self.read_keys(ui, state, size, actions);
         let place = Place::new(canvas, ctx.pixels_per_point(), state.mirror);
+        let window = ctx.content_rect();
         let awake = self.is_awake(ui, state.panel && !state.bare, place.is_none());
         self.probed = None;
         if let Some(place) = place {
@@ -115,25 +120,25 @@ impl Panel {
             probe::show(&ctx, state);
         }
         let mut bottom = 0.0;
+        let in_use = awake || self.stays || self.sheet.is_in_use(&ctx);
+        let is_shown = !state.bare && state.panel && (in_use || !state.full_screen);
+        let dock = is_shown.then(|| Dock::of(window, size, state.shows_more()));
+        dock::set_room(&ctx, dock.map_or(window, |dock| dock.room));
+        self.sheet.show(&ctx, state, dock, size, actions);
         if !state.bare {
-            let in_use = awake || self.stays || self.sheet.is_in_use(&ctx);
-            self.sheet.show(&ctx, state, state.panel && in_use, size, actions);
             if awake && !state.panel {
                 sheet::way_back(&ctx, actions);
             }
-            if in_use {
-                bottom = self.transport.show(&ctx, state, self.sheet.rect(), actions);
+            if in_use || dock.is_some() {
+                bottom = self.transport.show(&ctx, state, actions);
             }
             legend::show(ui, state, bottom);
             if state.instruments {
                 self.instruments.show(&ctx, state);
             }
         }
-        let panel = self.sheet.rect().filter(|_| !state.bare);
-        self.badges.show(&ctx, state, panel);
-        plate::show(&ctx, state, actions);
-        self.timer.show(&ctx, state, actions);
-        self.notes.show(&ctx, state, bottom, actions);
+        self.badges.show(&ctx, state);
+        self.notes.show(&ctx, state, (bottom, &mut self.timer), actions);
         closing::show(&ctx, state, actions);
         if state.help {
             help::show(&ctx, state, actions);

@@ -2,12 +2,13 @@
 
 use std::time::Duration;
 
-use egui::{Context, Id, Order};
+use egui::{Context, Id};
 
 use super::cards::Stack;
 use super::plate;
 use super::state::{Action, Source, State};
 use super::theme::GAP;
+use super::timer::Timer;
 use crate::preview::texts::tr_with;
 
 /// A note is shown for this long, plus some time per letter to read it.
@@ -18,7 +19,10 @@ const FADES_S: f64 = 0.4;
 /// The most notes that are shown at once.
 const MOST: usize = 3;
 /// What the source is when it is no camera and no recording.
-const DEMONSTRATION: &str = "A demonstration, no camera: bokehcam devices lists them, bokehcam doctor helps.";
+const DEMONSTRATION: [&str; 2] = [
+    "This is a demonstration",
+    "No camera is in use. Choose one under “Camera”; `bokehcam doctor` says why there is none.",
+];
 
 /// When notes were first shown.
 #[derive(Default)]
@@ -30,14 +34,23 @@ pub struct Ages {
 impl Ages {
     /// Draws, upwards from `bottom` points above the bottom of the window: the banner, the
     /// failure of an output, and the notes.
-    pub fn show(&mut self, ctx: &Context, state: &State, bottom: f32, actions: &mut Vec<Action>) {
+    pub fn show(
+        &mut self,
+        ctx: &Context,
+        state: &State,
+        (bottom, timer): (f32, &mut Timer),
+        actions: &mut Vec<Action>,
+    ) {
         let mut stack = Stack { ctx, bottom: bottom + GAP };
-        if state.is_demonstration() && !state.bare {
-            stack.tell(Id::unique("demonstration"), Order::Middle, 620.0, 1.0, DEMONSTRATION);
+        timer.show(&mut stack, state, actions);
+        plate::show(&mut stack, state, actions);
+        if state.is_demonstration() && !state.bare && !state.knows_demonstration {
+            stack.ask("demonstration", 460.0, DEMONSTRATION, [("OK", "Esc", Action::KnowDemonstration)], actions);
         }
         banner(&mut stack, state, actions);
         if let Some(why) = &state.trouble {
-            stack.ask("trouble", 460.0, ["An output failed", why], [("I see", "", Action::Dismiss)], actions);
+            let [title, why] = trouble(why);
+            stack.ask("trouble", 460.0, [title, why], [("OK", "Esc", Action::Dismiss)], actions);
         }
         plate::offer(&mut stack, state, actions);
         let now_s = ctx.input(|input| input.time);
@@ -66,9 +79,16 @@ impl Ages {
             ctx.request_repaint_after(Duration::from_secs_f64(next_s + 0.005));
         }
         for (&(text, opacity), place) in shown.iter().rev().take(MOST).zip(0..) {
-            stack.tell(Id::unique(("note", place)), Order::Foreground, 460.0, opacity, text);
+            stack.tell(Id::unique(("note", place)), 460.0, opacity, text);
         }
     }
+}
+
+/// What is said of an output that failed: a title, and what became of it.
+fn trouble(why: &str) -> [&str; 2] {
+    let is_full = why.contains("No space left on device");
+    let kept = why.split_once("; ").map_or(why, |(_, kept)| kept);
+    if is_full { ["The disk is full: the recording has ended", kept] } else { ["What was written has ended", why] }
 }
 
 /// Draws why the source gives no frames and a button to try again, clear of the picture's middle.

@@ -3,12 +3,15 @@
 use std::ops::RangeInclusive;
 
 use egui::{
-    Align, Align2, ComboBox, Context, CornerRadius, DragValue, EventFilter, FontId, Id, Key, Layout, Rect, Response,
-    RichText, Role, Sense, Slider, SliderClamping, Stroke, StrokeKind, TextStyle, Ui, Vec2, WidgetInfo, pos2,
+    Align, Align2, ComboBox, Context, CornerRadius, DragValue, EventFilter, FontId, Id, Key, Label, Layout, Rect,
+    Response, RichText, Role, Sense, Slider, SliderClamping, Stroke, StrokeKind, TextStyle, Ui, Vec2, WidgetInfo, pos2,
 };
 
 use super::theme::{Colors, ROW, medium};
 use crate::preview::texts::{tr, tr_with};
+
+/// Room for a number beside its name.
+const NUMBER_WIDTH: f32 = 70.0;
 
 /// A control for a number.
 #[derive(Clone)]
@@ -71,7 +74,13 @@ pub fn number(ui: &mut Ui, how: &Number, value: &mut f32) -> bool {
     ui.scope(|ui| {
         ui.spacing_mut().item_spacing.y = 0.0;
         let name = ui.horizontal(|ui| {
-            let name = ui.label(label).hint(hint);
+            // The number stays whole; a long name goes on in a second line.
+            let most = (ui.available_width() - NUMBER_WIDTH).max(20.0);
+            let name = ui.scope(|ui| {
+                ui.set_max_width(most);
+                ui.add(Label::new(label).wrap())
+            });
+            let name = name.inner.hint(hint);
             ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
                 ui.spacing_mut().button_padding = Vec2::new(5.0, 1.0);
                 ui.spacing_mut().interact_size = Vec2::new(24.0, 20.0);
@@ -105,7 +114,7 @@ pub fn number(ui: &mut Ui, how: &Number, value: &mut f32) -> bool {
             });
             name
         });
-        ui.spacing_mut().slider_width = ui.available_width();
+        ui.spacing_mut().slider_width = ui.available_width().max(10.0);
         ui.spacing_mut().interact_size.y = 20.0;
         // A logarithmic slider that begins at 0 has to begin its decades somewhere.
         let least = if ratios { f64::from(*range.start()).max(1e-3) } else { 0.0 };
@@ -156,14 +165,22 @@ pub fn choose<T: PartialEq + Copy>(
 ) -> Option<T> {
     let colors = Colors::here(ui);
     let what = tr(what);
-    let (rect, _) = ui.allocate_exact_size(Vec2::new(ui.available_width(), ROW), Sense::hover());
+    let font = |chosen: bool| FontId::new(12.5, if chosen { medium() } else { egui::FontFamily::Proportional });
+    let width_of = |name: &str| ui.painter().layout_no_wrap(tr(name).to_owned(), font(true), colors.text).size().x;
+    let widest = options.iter().map(|(name, ..)| width_of(name)).fold(0.0, f32::max) + 12.0;
+    // As many side by side as are whole in this language.
+    let whole = (1..=options.len()).rev().find(|columns| ui.available_width() / *columns as f32 >= widest);
+    let columns = options.len().div_ceil(options.len().div_ceil(whole.unwrap_or(1).max(1)).max(1)).max(1);
+    let rows = options.len().div_ceil(columns);
+    let (rect, _) = ui.allocate_exact_size(Vec2::new(ui.available_width(), ROW * rows as f32), Sense::hover());
     ui.painter().rect_filled(rect, CornerRadius::same(7), colors.field);
-    let cell_width = rect.width() / options.len().max(1) as f32;
+    let cell_width = rect.width() / columns as f32;
     let mut group = Group::default();
     for (index, &(name, hint, option)) in options.iter().enumerate() {
         let name = tr(name);
-        let left = rect.left() + cell_width * index as f32;
-        let cell = Rect::from_min_size(pos2(left, rect.top()), Vec2::new(cell_width, ROW));
+        let (row, column) = (index / columns, index % columns);
+        let corner = pos2(rect.left() + cell_width * column as f32, rect.top() + ROW * row as f32);
+        let cell = Rect::from_min_size(corner, Vec2::new(cell_width, ROW));
         let (is_chosen, is_possible) = (option == chosen, can(option));
         let sense = if is_possible { Sense::click() } else { Sense::hover() };
         let response = ui.interact(cell, ui.scope_id().with((what, index)), sense);
@@ -175,9 +192,9 @@ pub fn choose<T: PartialEq + Copy>(
             ui.painter().rect_filled(inner, CornerRadius::same(6), colors.fill(is_chosen, is_hovered));
         }
         let text = colors.on_fill(is_chosen, is_possible);
-        let family = if is_chosen { medium() } else { egui::FontFamily::Proportional };
-        let font = FontId::new(12.5, family);
-        ui.painter().with_clip_rect(cell).text(inner.center(), Align2::CENTER_CENTER, name, font, text);
+        let name = ui.painter().layout(name.to_owned(), font(is_chosen), text, cell_width);
+        let at = Align2::CENTER_CENTER.anchor_size(inner.center(), name.size()).min;
+        ui.painter().with_clip_rect(cell).galley(at, name, text);
         group.add(response.hint(hint), option);
     }
     group.chosen(ui)
@@ -236,7 +253,11 @@ pub fn list<'a, T: PartialEq>(
             }
         }
     });
-    called(&menu.response, what, Role::ComboBox);
+    menu.response.widget_info(|| {
+        let mut info = WidgetInfo::labeled(Role::ComboBox, menu.response.enabled(), tr(what));
+        info.current_text_value = Some(shown.to_owned());
+        info
+    });
     picked
 }
 
@@ -244,7 +265,11 @@ pub fn list<'a, T: PartialEq>(
 pub fn switch(ui: &mut Ui, label: &str, hint: &str, on: bool) -> bool {
     let colors = Colors::here(ui);
     let label = tr(label);
-    let (rect, response) = ui.allocate_exact_size(Vec2::new(ui.available_width(), 24.0), Sense::click());
+    let font = TextStyle::Body.resolve(ui.style());
+    let text =
+        ui.painter().layout(label.to_owned(), font, ui.visuals().text_color(), (ui.available_width() - 42.0).max(10.0));
+    let size = Vec2::new(ui.available_width(), text.size().y.max(24.0));
+    let (rect, response) = ui.allocate_exact_size(size, Sense::click());
     response.widget_info(|| WidgetInfo::selected(Role::Switch, ui.is_enabled(), on, label));
     let track = Rect::from_center_size(pos2(rect.right() - 17.0, rect.center().y), Vec2::new(32.0, 18.0));
     let painter = ui.painter();
@@ -252,8 +277,8 @@ pub fn switch(ui: &mut Ui, label: &str, hint: &str, on: bool) -> bool {
     painter.rect_stroke(track, CornerRadius::same(9), Stroke::new(1.0, colors.line), StrokeKind::Inside);
     let x = if on { track.right() - 9.0 } else { track.left() + 9.0 };
     painter.circle_filled(pos2(x, track.center().y), 6.5, if on { colors.on_accent } else { colors.weak });
-    let font = TextStyle::Body.resolve(ui.style());
-    painter.text(rect.left_center(), Align2::LEFT_CENTER, label, font, ui.visuals().text_color());
+    let at = Align2::LEFT_CENTER.anchor_size(rect.left_center(), text.size()).min;
+    painter.galley(at, text, ui.visuals().text_color());
     response.hint(hint).clicked()
 }
 
@@ -275,7 +300,8 @@ pub fn remark(ui: &mut Ui, text: &str) {
 
 /// A path, of which the end says which file it is: a long one is cut at its beginning.
 pub fn path(ui: &mut Ui, path: &str) {
-    ui.scope(|ui| remark(ui, &end_of(path, 38))).response.on_hover_text(path);
+    let shown = crate::preview::folders::shown_output(path);
+    ui.scope(|ui| remark(ui, &end_of(&shown, 38))).response.on_hover_text(path);
 }
 
 /// The last of at most so many signs of a text, after dots if there are more.

@@ -18,7 +18,7 @@ pub struct Place {
 
 /// Pixels of the window along a side of one of a picture's, where all of the picture is seen as large as fits.
 pub fn fit(ctx: &Context, (width, height): (u32, u32)) -> f32 {
-    let window = ctx.content_rect().size() * ctx.pixels_per_point();
+    let window = super::dock::room(ctx).size() * ctx.pixels_per_point();
     (window.x / width.max(1) as f32).min(window.y / height.max(1) as f32)
 }
 

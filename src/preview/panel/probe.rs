@@ -30,7 +30,7 @@ pub fn show(ctx: &Context, state: &State) {
     let painter = ctx.layer_painter(LayerId::new(Order::Middle, Id::unique("probe")));
     let text = text(probe, state.camera.is_relative);
     // Right and below, unless that is outside.
-    let window = ctx.content_rect();
+    let window = super::dock::room(ctx);
     let (x, dx) = if at.x + 240.0 < window.right() { (Align::Min, 16.0) } else { (Align::Max, -12.0) };
     let (y, dy) = if at.y + 50.0 < window.bottom() { (Align::Min, 20.0) } else { (Align::Max, -12.0) };
     label(&painter, at + vec2(dx, dy), Align2([x, y]), &text, None);

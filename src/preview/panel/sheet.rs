@@ -1,13 +1,14 @@
-//! The panel itself: a sheet at the right side, over the picture, that slides away.
+//! The panel itself: what everybody needs, and more on a wish.
 
-use egui::{Area, Context, Id, Order, Rect, ScrollArea, Ui, pos2, vec2};
+use egui::{Area, Context, Id, Order, Rect, ScrollArea, Ui, Vec2, vec2};
 
 use super::cards;
+use super::dock::{Dock, LINE};
 use super::icons::{self, Icon};
 use super::parts::end_of;
-use super::sections::{self, Editing, Sheet, Thumbs};
+use super::sections::{self, Editing, Sheet, Thumbs, first};
 use super::state::{Action, Source, State};
-use super::theme::{self, Colors, GAP, PAD, WIDTH};
+use super::theme::{self, Colors, GAP, PAD};
 use crate::preview::texts::{tr, tr_with};
 
 /// What the panel remembers.
@@ -43,35 +44,47 @@ impl Memory {
         self.rect
     }
 
-    /// Draws the panel, sliding in or out from the right; what does not fit is scrolled.
-    pub fn show(&mut self, ctx: &Context, state: &State, shown: bool, size: (u32, u32), actions: &mut Vec<Action>) {
-        let openness = ctx.animate_bool_with_time(id().with("open"), shown, 0.16);
-        if openness == 0.0 {
-            self.rect = None;
-            return;
-        }
-        let window = ctx.content_rect();
-        let width = WIDTH.min(window.width() - 2.0 * GAP).max(60.0);
-        let slide = (1.0 - openness) * (1.0 - openness) * (width + 2.0 * GAP);
-        let corner = pos2(window.right() - GAP - width + slide, window.top() + GAP);
-        let most_height = (window.height() - 2.0 * GAP).max(40.0);
-        let area = Area::new(id()).fixed_pos(corner).order(Order::Middle).constrain(false).fade_in(false);
+    /// Draws the panel where it stands; what does not fit is scrolled.
+    pub fn show(
+        &mut self,
+        ctx: &Context,
+        state: &State,
+        dock: Option<Dock>,
+        size: (u32, u32),
+        actions: &mut Vec<Action>,
+    ) {
+        self.rect = dock.map(|dock| dock.panel);
+        let Some(Dock { panel, columns, .. }) = dock else { return };
+        let area = Area::new(id()).fixed_pos(panel.min).order(Order::Middle).constrain(false).fade_in(false);
         let drawn = area.show(ctx, |ui| {
             let colors = Colors::here(ui);
-            ui.set_max_height(most_height);
+            ui.set_max_size(panel.size().max(Vec2::splat(1.0)));
             theme::card(&colors).show(ui, |ui| {
-                ui.set_width(width - 2.0 * PAD);
-                header(ui, state, actions);
-                status(ui, state);
-                let height = most_height - 2.0 * PAD - ui.min_rect().height() - ui.spacing().item_spacing.y;
-                let scroll = ScrollArea::vertical().max_height(height.max(20.0)).auto_shrink([false, true]);
-                scroll.show(ui, |ui| self.body(ui, state, size, actions));
+                let inner = (panel.size() - Vec2::splat(2.0 * (PAD + LINE))).max(Vec2::splat(1.0));
+                ui.set_width(inner.x);
+                let more = state.shows_more();
+                let scroll = ScrollArea::vertical().max_height(inner.y.max(20.0)).auto_shrink([false, true]);
+                scroll.show(ui, |ui| {
+                    let mut sheet = Sheet { state, look: state.look.clone(), stroke: None, size, actions };
+                    first::show(ui, &mut sheet, columns);
+                    if more {
+                        header(ui, state, sheet.actions);
+                        status(ui, state);
+                        ui.spacing_mut().combo_width = ui.available_width();
+                        sections::show(ui, &mut sheet, &mut self.editing, &mut self.thumbs);
+                    }
+                    self.follow_focus(ui);
+                    let Sheet { look, stroke, .. } = sheet;
+                    if stroke.is_some() && look != state.look {
+                        actions.push(Action::Look { look: Box::new(look), stroke });
+                    }
+                });
             });
         });
-        if shown && matches!(state.source, Source::Running(_)) && !state.stands_still() {
+        if matches!(state.source, Source::Running(_)) && state.shows_more() && !state.stands_still() {
             ctx.request_repaint_after_secs(STATUS_PERIOD_S);
         }
-        self.rect = shown.then_some(drawn.response.rect);
+        self.rect = Some(drawn.response.rect);
     }
 
     /// Scrolls to the control that the focus moved to, if that is out of sight.
@@ -85,18 +98,6 @@ impl Memory {
             ui.scroll_to_rect(response.rect.expand(8.0), None);
         }
         self.focused = focused;
-    }
-
-    /// Draws the sections, and turns what they changed of the look into an action.
-    fn body(&mut self, ui: &mut Ui, state: &State, size: (u32, u32), actions: &mut Vec<Action>) {
-        ui.spacing_mut().combo_width = ui.available_width();
-        let mut sheet = Sheet { state, look: state.look.clone(), stroke: None, size, actions };
-        sections::show(ui, &mut sheet, &mut self.editing, &mut self.thumbs);
-        self.follow_focus(ui);
-        let Sheet { look, stroke, .. } = sheet;
-        if stroke.is_some() && look != state.look {
-            actions.push(Action::Look { look: Box::new(look), stroke });
-        }
     }
 }
 
@@ -120,9 +121,9 @@ fn status(ui: &mut Ui, state: &State) {
     let mut parts: Vec<String> = Vec::new();
     if let Source::Running(running) = &state.source {
         // What comes after it has to be seen, too.
-        parts.push(end_of(&running.label, 24));
+        parts.push(end_of(&running.label, 34));
     }
-    let focused = state.look.effect.follows_depth();
+    let focused = state.look.effect.follows_depth() && !state.known().is_relative;
     if let Some(metres) = state.focus_m.filter(|metres| focused && metres.is_finite()) {
         parts.push(tr_with("focused at {} m", &[&format!("{metres:.2}")]));
     }
@@ -136,11 +137,10 @@ fn status(ui: &mut Ui, state: &State) {
     ui.add(egui::Label::new(text).truncate());
 }
 
-/// The title, and buttons for undo, redo, reset, help and closing the panel.
+/// Buttons for undo, redo, reset, help and hiding the panel.
 fn header(ui: &mut Ui, state: &State, actions: &mut Vec<Action>) {
     ui.horizontal(|ui| {
         ui.spacing_mut().item_spacing.x = 2.0;
-        ui.heading(tr("Look"));
         let (undo, redo) = state.history.can();
         let buttons = [
             (Icon::Undo, "Undo (Ctrl+Z)", undo, Action::Undo),
@@ -149,8 +149,6 @@ fn header(ui: &mut Ui, state: &State, actions: &mut Vec<Action>) {
             (Icon::Help, "Keys (F1)", true, Action::Help(!state.help)),
             (Icon::Close, "Hide the panel (P)", true, Action::Panel(false)),
         ];
-        let room = buttons.len() as f32 * (icons::SIDE + ui.spacing().item_spacing.x);
-        ui.add_space((ui.available_width() - room).max(0.0));
         for (icon, hint, enabled, action) in buttons {
             if icons::button(ui, icon, hint, enabled) {
                 actions.push(action);

@@ -2,6 +2,7 @@
 
 mod access;
 mod covers;
+mod first;
 mod fonts;
 mod gestures;
 mod keyboard;

@@ -1,8 +1,8 @@
-//! The self-timer: the seconds until a snapshot, counted in the middle of the window.
+//! The self-timer: the seconds until a snapshot, counted below the face of who poses.
 
-use egui::{Context, RichText};
+use egui::RichText;
 
-use super::cards;
+use super::cards::Stack;
 use super::state::{Action, State};
 use super::theme::medium;
 
@@ -17,7 +17,8 @@ pub struct Timer {
 
 impl Timer {
     /// Draws the seconds that are left, and asks for the snapshot when none is.
-    pub fn show(&mut self, ctx: &Context, state: &State, actions: &mut Vec<Action>) {
+    pub fn show(&mut self, stack: &mut Stack, state: &State, actions: &mut Vec<Action>) {
+        let ctx = stack.ctx;
         let now_s = ctx.input(|input| input.time);
         self.due_s = state.self_timer.then(|| self.due_s.unwrap_or(now_s + DELAY_S));
         let Some(left_s) = self.due_s.map(|due_s| due_s - now_s) else { return };
@@ -27,8 +28,8 @@ impl Timer {
             return;
         }
         ctx.request_repaint_after_secs((left_s.fract() + 0.005) as f32);
-        cards::in_middle(ctx, "self-timer", 200.0, |ui, _| {
-            ui.label(RichText::new(left_s.ceil().to_string()).family(medium()).size(72.0));
+        stack.card("self-timer", 200.0, |ui, _| {
+            ui.label(RichText::new(left_s.ceil().to_string()).family(medium()).size(40.0));
         });
     }
 }

@@ -1,8 +1,9 @@
 //! The bar under a recording: pause, step and a line to drag.
 
-use egui::{Area, Context, Id, Margin, Order, Rect, Slider, pos2};
+use egui::{Area, Context, Id, Margin, Order, Slider, pos2};
 
 use super::cards;
+use super::dock::room;
 use super::icons::{self, Icon};
 use super::state::{Action, Source, State};
 use super::theme::GAP;
@@ -23,17 +24,16 @@ pub struct Bar {
 }
 
 impl Bar {
-    /// Draws the bar at the window's bottom, left of the panel, where the source is a recording. Its height, with the gap above.
-    pub fn show(&mut self, ctx: &Context, state: &State, panel: Option<Rect>, actions: &mut Vec<Action>) -> f32 {
+    /// Draws the bar at the bottom of the picture's room, where the source is a recording. Its height, with the gap above.
+    pub fn show(&mut self, ctx: &Context, state: &State, actions: &mut Vec<Action>) -> f32 {
         let running = matches!(state.source, Source::Running(_));
         let Some(transport) = state.transport.filter(|_| running) else { return 0.0 };
-        let window = ctx.content_rect();
-        let right = panel.map_or(window.right(), |panel| panel.left());
-        let (left, width) = (window.left() + GAP, right - window.left() - 2.0 * GAP);
+        let room = room(ctx);
+        let (left, width) = (room.left() + GAP, room.width() - 2.0 * GAP);
         if width < TOO_NARROW {
             return 0.0;
         }
-        let corner = pos2(left, window.bottom() - GAP - HEIGHT);
+        let corner = pos2(left, room.bottom() - GAP - HEIGHT);
         let area = Area::new(Id::unique("transport")).fixed_pos(corner).order(Order::Middle);
         cards::show(ctx, area, width, Margin::symmetric(8, 4), |ui, _| {
             ui.set_width(width - 16.0);

@@ -11,7 +11,7 @@ mod split;
 
 use std::sync::Arc;
 
-pub use part::{Part, enlarged};
+pub use part::{Part, enlarged, fitted};
 pub use split::Split;
 use winit::window::Window;
 

@@ -26,6 +26,25 @@ pub fn enlarged(size: (u32, u32), window: (u32, u32), factor: u32, center: [f32;
     (Area { x, y, width, height }, Part { factor, at: (left, above) })
 }
 
+/// The largest area with the aspect ratio of `size` within a `window`, or the room at its top left, centred.
+pub fn fitted(size: (u32, u32), window: (u32, u32)) -> Area {
+    let [width, height, all_width, all_height] = [size.0, size.1, window.0, window.1].map(u64::from);
+    if width == 0 || height == 0 || all_width == 0 || all_height == 0 {
+        return Area::default();
+    }
+    // Whichever side limits; the other is rounded to whole pixels.
+    let fills_width = all_width * height <= all_height * width;
+    let (fit_width, fit_height) = match fills_width {
+        true => (all_width, (all_width * height + width / 2) / width),
+        false => ((all_height * width + height / 2) / height, all_height),
+    };
+    let (fit_width, fit_height) = (fit_width.clamp(1, all_width), fit_height.clamp(1, all_height));
+    // All four are at most the window's sides.
+    let px = |side: u64| u32::try_from(side).unwrap_or(u32::MAX);
+    let (x, y) = (px((all_width - fit_width) / 2), px((all_height - fit_height) / 2));
+    Area { x, y, width: px(fit_width), height: px(fit_height) }
+}
+
 impl Part {
     /// Fills `line` (RGB) with the columns `from` of row `y` of the enlarged picture, which is `width` pixels wide before that.
     pub fn row(self, rgb: &[u8], width: u32, y: usize, from: std::ops::Range<usize>, line: &mut [u8]) {
@@ -51,5 +70,16 @@ mod tests {
         assert_eq!(seen(4, [1.0, 1.0]), (area(0, 0, 160, 120), Part { factor: 4, at: (240, 80) }));
         assert_eq!(seen(4, [f32::NAN, -3.0]).1.at, (0, 0));
         assert_eq!(enlarged((100, 50), (0, 0), 2, [0.5; 2]).0, area(0, 0, 0, 0));
+    }
+
+    #[test]
+    fn the_picture_is_as_large_as_it_fits_and_keeps_its_shape() {
+        let area = |x, y, width, height| Area { x, y, width, height };
+        assert_eq!(fitted((640, 360), (1280, 720)), area(0, 0, 1280, 720));
+        assert_eq!(fitted((640, 480), (1280, 720)), area(160, 0, 960, 720));
+        assert_eq!(fitted((640, 360), (300, 720)), area(0, 275, 300, 169));
+        assert_eq!(fitted((1, 5000), (300, 200)), area(149, 0, 1, 200));
+        assert_eq!(fitted((640, 360), (0, 720)), Area::default());
+        assert_eq!(fitted((0, 0), (300, 200)), Area::default());
     }
 }

@@ -14,7 +14,7 @@ use crate::look::Look;
 use crate::pipeline::PipelineError;
 use crate::preview::folders;
 use crate::preview::services::Switch;
-use crate::preview::state::{Output, Request, Source, Update};
+use crate::preview::state::{Output, Request, Source, Update, Way};
 use crate::sink;
 use crate::sink::switch::{Fate, Notice};
 use crate::stats::Report;
@@ -23,8 +23,8 @@ use crate::stats::Report;
 pub(super) struct Host {
     /// As it began; look, source and outputs are those of now.
     start: Start,
-    /// Whether a plate makes its depth, by a wish of the window's.
-    with_plate: bool,
+    /// The way that its depth is made, by a wish of the window's.
+    way: Option<Way>,
     /// Held while something is written: then the source does not rest.
     watch: Option<Watch>,
     news: News,
@@ -48,7 +48,7 @@ impl Host {
     pub fn new(start: Start, news: News, orders: mpsc::Sender<Order>) -> Self {
         Self {
             start,
-            with_plate: false,
+            way: None,
             watch: None,
             news,
             orders,
@@ -111,7 +111,7 @@ impl Host {
     /// Rescues recordings of an earlier preview that was killed.
     fn recover(&self) {
         for kept in self.start.folders.all().flat_map(|folder| sink::recover_all(folder, folders::is_video)) {
-            self.news.note(format!("An earlier recording was broken off: it is kept as {}", kept.display()));
+            self.news.note(format!("An earlier recording was broken off: it is kept as {}", folders::shown(&kept)));
         }
     }
 
@@ -119,20 +119,17 @@ impl Host {
     fn carry_out(&mut self, request: Request) {
         match request {
             Request::Open(name) => {
-                // A plate is of one camera.
-                self.with_plate &= self.start.source == name;
+                // A way is of one source.
+                self.way = self.way.filter(|_| self.start.source == name);
                 self.start.source = name;
                 self.stop();
                 self.open();
             }
             Request::TakePlate => match self.live.as_ref().and_then(|live| live.guide.as_ref()) {
                 Some(guide) => guide.take_again(),
-                None => {
-                    self.with_plate = true;
-                    self.stop();
-                    self.open();
-                }
+                None => self.make_depth_by(Way::Plate),
             },
+            Request::DepthBy(way) => self.make_depth_by(way),
             Request::Begin(output) => {
                 self.write_to(output);
                 self.tell_outputs();
@@ -170,6 +167,16 @@ impl Host {
         }
     }
 
+    /// Opens the source again with depth made another way, if it can be.
+    fn make_depth_by(&mut self, way: Way) {
+        if let Err(line) = self.start.services.can(&self.start.source, way) {
+            return self.news.note(line);
+        }
+        self.way = Some(way);
+        self.stop();
+        self.open();
+    }
+
     /// Tells what became of a change of the presets, and which there are now.
     fn tell_presets(&mut self, changed: Result<(), String>, done: &str) {
         self.news.note(changed.map_or_else(|line| line, |()| done.to_owned()));
@@ -196,7 +203,7 @@ impl Host {
     /// Opens the source and starts a run of it.
     fn open(&mut self) {
         self.news.tell(Update::Source(Source::Opening));
-        let opened = match self.start.services.open(&self.start.source, self.with_plate) {
+        let opened = match self.start.services.open(&self.start.source, self.way) {
             Ok(opened) => opened,
             Err(line) => return self.without_source(Source::Lost(line)),
         };
@@ -271,9 +278,15 @@ impl Host {
     /// Takes note of what became of an output of the run of this number.
     fn on_output(&mut self, run: u64, Notice { member, fate }: &Notice) {
         match fate {
-            Fate::Began => self.news.note(format!("Writing to {member}")),
+            Fate::Began => {
+                let is_camera = self.start.outputs.iter().any(|output| output.is_camera && output.name == *member);
+                self.news.note(match is_camera {
+                    true => format!("Calls have this picture now, as the camera of {member}"),
+                    false => format!("Recording to {}", folders::shown_output(member)),
+                });
+            }
             Fate::Completed { frames } => {
-                self.news.note(format!("Complete: {member}, {frames} frames"));
+                self.news.note(format!("Complete: {}, {frames} frames", folders::shown_output(member)));
                 self.news.kept(Path::new(member));
             }
             Fate::Failed { why, .. } => {

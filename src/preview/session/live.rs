@@ -7,7 +7,7 @@ use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
 use super::super::services::{Opened, Services};
-use super::super::state::{Output, Running, Source};
+use super::super::state::{Known, Output, Running, Source, fitted};
 use super::{News, SessionEvent, Start};
 use crate::clock::Clock;
 use crate::depth::plate::Guide;
@@ -24,7 +24,7 @@ use crate::stats::Report;
 pub(super) struct Live {
     pub size: (u32, u32),
     pub period_ns: u64,
-    has_depth: bool,
+    known: Known,
     changes: Changes,
     board: Switchboard,
     pub stop: Arc<AtomicBool>,
@@ -48,12 +48,13 @@ impl Live {
         wrote: impl Fn(Notice) + Send + Sync + 'static,
         ended: impl FnOnce(Result<Report, PipelineError>) + Send + 'static,
     ) -> Result<(Self, Source), String> {
-        let Opened { name, source, has_depth, takes_plates, .. } = opened;
+        let Opened { name, source, has_depth, ways, way, camera: facts, .. } = opened;
         let measured = source.is_measured();
         let crate::source::Source { camera, depth, guide, depth_from, .. } = source;
         let info = camera.info();
         let kind = SourceName::from_str(&name).map_or(Kind::default(), |name| name.kind());
-        let look = start.look.for_source(has_depth);
+        let known = Known { has_depth, is_relative: facts.is_relative, size: info.size };
+        let look = fitted(&start.look, known);
         let made_for = look.settings(info.size, ADAPTIVE);
         let bokeh = made_for.as_ref().map(|made_for| start.services.executor(made_for, info.size)).transpose()?;
         let executor = bokeh.as_ref().map_or_else(|| "no blur".into(), |bokeh| bokeh.describe());
@@ -111,17 +112,18 @@ impl Live {
             is_live: info.live,
             kind,
             depth_from,
-            takes_plates,
+            ways,
+            way,
             executor,
             budget_ns,
         });
-        let live = Self { size: info.size, period_ns: info.period_ns, has_depth, changes, board, stop, guide, thread };
+        let live = Self { size: info.size, period_ns: info.period_ns, known, changes, board, stop, guide, thread };
         Ok((live, source))
     }
 
     /// The look as far as the source allows it.
     pub(super) fn effective(&self, look: &Look) -> Look {
-        look.for_source(self.has_depth)
+        fitted(look, self.known)
     }
 
     /// Blurs with this look from now on; its frames carry this number.

@@ -94,6 +94,8 @@ pub struct Still {
     pub change: u64,
     /// The rung that it was blurred at.
     pub quality: Option<Quality>,
+    /// Whether what it was made from is saved beside it.
+    pub with_sources: bool,
     /// Who asked for it from outside.
     pub order: Option<StillOrder>,
 }

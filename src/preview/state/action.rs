@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use super::{Camera, Output, Shown, Source};
+use super::{Camera, Output, Shown, Source, Way};
 use crate::depth::backdrop::Behind;
 use crate::knob::Knob;
 use crate::look::Look;
@@ -93,8 +93,14 @@ pub enum Action {
     Control(String, i64),
     /// Takes a plate: a picture of what is behind the person, who is told when to step aside.
     TakePlate,
-    /// Takes no plate now.
+    /// Finds the person by a network.
+    FindMe,
+    /// Takes no way to depth now.
     DeclinePlate,
+    /// Blurs what is not in focus, or nothing.
+    Portrait(bool),
+    /// Makes depth another way.
+    DepthBy(Way),
     /// Looks again which sources and virtual cameras there are.
     Refresh,
     /// Puts the equivalent command on the clipboard.
@@ -105,6 +111,10 @@ pub enum Action {
     StayOpen,
     /// What went wrong is known.
     Dismiss,
+    /// That this is a demonstration is known.
+    KnowDemonstration,
+    /// Snapshots are saved with what is needed to make them again, or alone.
+    KeepSources(bool),
 }
 
 /// What others have to do after an action.
@@ -115,7 +125,7 @@ pub enum Request {
     SavePreset(String, Box<Look>),
     RenamePreset(String, String),
     DeletePreset(String),
-    /// Save the frame that is shown.
+    /// Save the frame that is shown, with all that is needed to make it again or alone.
     Snapshot,
     /// Show a folder.
     OpenFolder(PathBuf),
@@ -131,6 +141,8 @@ pub enum Request {
     Control(String, i64),
     /// Take a plate, and use it.
     TakePlate,
+    /// Make depth this way from now on.
+    DepthBy(Way),
     /// Show the frame at this place of the recording.
     Seek(usize),
     /// Look which sources and virtual cameras there are.

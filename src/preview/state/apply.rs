@@ -1,24 +1,29 @@
 //! How actions change the state.
 
-use super::{Action, Output, Request, Shown, Source, State};
+use super::{Action, Output, Request, Shown, Source, State, Way};
+use crate::depth::focus::FocusRule;
 use crate::look::{Effect, Look, Patch, Strength};
 
 /// Shown when a look or a view needs depth and there is none: what to do.
-pub const NO_DEPTH: &str =
-    "This source has no depth. A second camera beside it, a depth camera or a recording with depth gives it.";
+pub const NO_DEPTH: &str = "Who is near is not known here: a small network or a picture of the empty room tells.";
 /// The same for a photo.
 pub const NO_DEPTH_OF_PHOTO: &str =
-    "This photo has no depth. A network gives it (`bokehcam models`), or a depth map beside it: NAME-depth.png.";
+    "This photo has no depth. A network gives it (`bokehcam models get`), or a depth map beside it: NAME-depth.png.";
+/// The same where it was declined on the command line.
+pub const DECLINED: &str = "This source has depth that `--depth none` declines. “Depth from” under More uses it.";
 /// Shown when depth is to be viewed while it is not computed.
-pub const NOT_FOLLOWED: &str = "Depth is made only while the blur follows it: choose Depth as the effect first.";
+pub const NOT_FOLLOWED: &str = "Depth is made only while the blur follows it: switch Portrait on first.";
+/// Shown when what the blur is made of is to be viewed while there is none.
+pub const NOT_BLURRED: &str = "Nothing is blurred: there is nothing to show of it.";
 /// Shown when a plate is to be taken of what is no camera.
-pub const NO_PLATE: &str =
-    "A plate is a picture of what is behind you, taken with a camera that stands still: choose one first.";
+pub const NO_PLATE: &str = "Open a camera first: a plate needs one that stands still.";
+/// Shown when a look needs metres that relative depth has not.
+pub const NO_METRES: &str = "Nothing is known in metres here: the subject is in focus, and blur is given as an amount.";
 /// Shown when the picture is frozen while something is written.
 pub const GOES_ON: &str =
     "Only this window is frozen. What is recorded or sent goes on live, and in every look that you choose here.";
 /// Shown when there is no virtual camera.
-pub const NO_VIRTUAL_CAMERA: &str = "There is no virtual camera yet: `bokehcam doctor` says how to make one.";
+pub const NO_VIRTUAL_CAMERA: &str = "No camera for calls is set up yet: `bokehcam doctor` says how.";
 
 impl State {
     /// Applies an action; gives back what the window or the session has to do for it.
@@ -47,6 +52,7 @@ impl State {
             Action::DeletePreset(name) => return vec![Request::DeletePreset(name)],
             Action::Show(Shown::Depth) if !self.may_have_depth() => self.note(self.no_depth()),
             Action::Show(Shown::Depth) if !self.look.effect.follows_depth() => self.note(NOT_FOLLOWED),
+            Action::Show(Shown::Coc | Shown::Bins) if self.look.effect == Effect::None => self.note(NOT_BLURRED),
             Action::Show(shown) => self.shown = shown,
             Action::Split(at) => self.split = at.filter(|at| at.is_finite()).map(|at| at.clamp(0.0, 1.0)),
             Action::Mirror(on) => (self.mirror, self.mirror_chosen) = (on, true),
@@ -82,17 +88,22 @@ impl State {
             Action::Mode(size, fps) => return self.set_mode(size, fps),
             Action::Retry => return self.open(self.source_name.clone()),
             Action::Control(name, value) => return self.set_control(name, value),
-            Action::TakePlate if self.takes_plates()[0] => {
+            Action::TakePlate if self.takes_plates() => {
                 self.declined_plate = false;
                 return vec![Request::TakePlate];
             }
             Action::TakePlate => self.note(NO_PLATE),
             Action::DeclinePlate => self.declined_plate = true,
+            Action::FindMe => return vec![Request::DepthBy(Way::Person)],
+            Action::DepthBy(way) => return vec![Request::DepthBy(way)],
+            Action::Portrait(on) => return self.set_portrait(on),
             Action::Refresh => return vec![Request::Refresh],
             Action::CopyCommand => return vec![Request::CopyCommand],
             Action::Close => return self.close(),
             Action::StayOpen => self.closing = false,
             Action::Dismiss => self.trouble = None,
+            Action::KnowDemonstration => self.knows_demonstration = true,
+            Action::KeepSources(on) => self.habits.keep_sources = on,
         }
         Vec::new()
     }
@@ -114,7 +125,22 @@ impl State {
 
     /// What to do where depth is needed and there is none.
     pub fn no_depth(&self) -> &'static str {
-        if self.is_photo() { NO_DEPTH_OF_PHOTO } else { NO_DEPTH }
+        match (self.is_photo(), self.declines_own()) {
+            (_, true) => DECLINED,
+            (true, false) => NO_DEPTH_OF_PHOTO,
+            (false, false) => NO_DEPTH,
+        }
+    }
+
+    /// Blurs what is not in focus, or nothing. Without depth, the ways to it are offered.
+    fn set_portrait(&mut self, on: bool) -> Vec<Request> {
+        if on && !self.may_have_depth() {
+            self.declined_plate = false;
+            self.note(self.no_depth());
+            return Vec::new();
+        }
+        let effect = if on { Effect::Auto } else { Effect::None };
+        self.set_look(Look { effect, ..self.look.clone() }, None)
     }
 
     /// Changes the look as far as the source allows it; the one before can be undone.
@@ -140,6 +166,9 @@ impl State {
             if self.shown == Shown::Depth {
                 self.shown = Shown::Picture;
             }
+        }
+        if look.effect == Effect::None && matches!(self.shown, Shown::Coc | Shown::Bins) {
+            self.shown = Shown::Picture;
         }
         self.look = look;
         vec![Request::Look(Box::new(self.look.clone()))]
@@ -171,7 +200,17 @@ impl State {
         if patch.effect.is_some_and(Effect::follows_depth) && !self.may_have_depth() {
             return Err(self.no_depth().to_owned());
         }
-        patch.on(&self.look).map_err(|error| error.to_string())
+        let look = patch.on(&self.look).map_err(|error| error.to_string())?;
+        let is_lens = |look: &Look| matches!(look.strength, Strength::Lens(_));
+        let asks = matches!(patch.focus, Some(FocusRule::Metres(_)))
+            || patch.focus_range_m.is_some_and(|range_m| range_m > 0.0)
+            || is_lens(&look) && !is_lens(&self.look);
+        // Of a whole look, such as a preset, what needs metres is left out.
+        let is_one_change = patch.effect.is_none();
+        match self.known().is_relative && look.effect.follows_depth() && is_one_change && asks {
+            true => Err(NO_METRES.to_owned()),
+            false => Ok(look),
+        }
     }
 
     fn record(&mut self, on: bool) -> Vec<Request> {

@@ -18,13 +18,21 @@ pub struct Habits {
     pub single_keys: bool,
     /// Whether closing asks first while something is recorded.
     pub ask_before_closing: bool,
+    /// Whether snapshots are saved with what is needed to make them again.
+    pub keep_sources: bool,
     /// Sections of the panel that were opened or folded, by name.
     pub sections: BTreeMap<String, bool>,
 }
 
 impl Default for Habits {
     fn default() -> Self {
-        Self { text_scale: 1.0, single_keys: true, ask_before_closing: true, sections: BTreeMap::new() }
+        Self {
+            text_scale: 1.0,
+            single_keys: true,
+            ask_before_closing: true,
+            keep_sources: false,
+            sections: BTreeMap::new(),
+        }
     }
 }
 

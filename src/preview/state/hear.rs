@@ -1,6 +1,7 @@
 //! How the session's updates change the state.
 
-use super::{Request, Shown, Source, State, Update};
+use super::apply::NO_METRES;
+use super::{Request, Shown, Source, State, Update, fitted};
 use crate::look::{Effect, Look};
 
 impl State {
@@ -41,15 +42,19 @@ impl State {
             self.shown = Shown::Picture;
             self.note(self.no_depth());
         }
-        let look = match &self.source {
-            // An effect that was replaced by an even blur for want of depth comes back, unless another was chosen since.
+        let chosen = match &self.source {
+            // A portrait that was given up for want of depth comes back, unless another effect was chosen since.
             Source::Running(running) if running.has_depth && self.fitted => {
                 self.fitted = false;
                 let still_fitted = self.look.effect == Effect::Blur;
                 Look { effect: if still_fitted { Effect::Auto } else { self.look.effect }, ..self.look.clone() }
             }
-            _ => self.fitting(self.look.clone()),
+            _ => self.look.clone(),
         };
+        if self.known().is_relative && self.may_have_depth() && chosen.needs_metres().is_some() {
+            self.note(NO_METRES);
+        }
+        let look = self.fitting(chosen);
         (look != self.look).then(|| {
             self.look = look;
             Request::Look(Box::new(self.look.clone()))
@@ -64,8 +69,8 @@ impl State {
 
     /// A look as far as the source allows it; remembers if that changed its effect.
     pub(super) fn fitting(&mut self, look: Look) -> Look {
-        let fitted = look.for_source(self.may_have_depth());
-        self.fitted |= fitted.effect != look.effect;
-        fitted
+        let fitting = fitted(&look, self.known());
+        self.fitted |= fitting.effect != look.effect;
+        fitting
     }
 }

@@ -5,6 +5,7 @@
 mod action;
 mod apply;
 mod camera;
+mod fitting;
 mod habits;
 mod hear;
 mod history;
@@ -15,6 +16,7 @@ mod switches;
 mod tests;
 mod transport;
 pub mod tweak;
+mod way;
 mod zoom;
 
 use std::path::PathBuf;
@@ -22,9 +24,11 @@ use std::path::PathBuf;
 pub use action::{Action, Request, Update};
 pub use apply::NO_VIRTUAL_CAMERA;
 pub use camera::Camera;
+pub use fitting::{Known, fitted};
 pub use habits::{Habits, TEXT_SCALES};
 pub use history::History;
 pub use transport::Transport;
+pub use way::Way;
 pub use zoom::Zoom;
 
 use super::meters::Meters;
@@ -72,8 +76,9 @@ pub struct Running {
     pub kind: Kind,
     /// What its depth comes from.
     pub depth_from: DepthFrom,
-    /// Whether it is a camera that a plate can be taken with.
-    pub takes_plates: bool,
+    /// The ways to depth that it has, and the one that is used.
+    pub ways: Vec<Way>,
+    pub way: Option<Way>,
     pub executor: String,
     /// Time that a frame's blur may take.
     pub budget_ns: u64,
@@ -165,8 +170,10 @@ pub struct State {
     pub notes: Vec<Note>,
     /// How far the plate is, where that makes the depth.
     pub plate: Option<Step>,
-    /// Whether the person wants no plate.
+    /// Whether the person wants no other way to depth.
     pub declined_plate: bool,
+    /// Whether the person knows that this is a demonstration.
+    pub knows_demonstration: bool,
     /// Whether the person is asked if the window shall close although something is recorded.
     pub closing: bool,
     /// What of the window goes on from run to run.
@@ -221,12 +228,56 @@ impl State {
         matches!(&self.source, Source::Running(running) if running.name == demo::NAME)
     }
 
-    /// Whether a plate can be taken, and whether that is the way to a portrait.
-    pub fn takes_plates(&self) -> [bool; 2] {
+    /// The ways to depth that the source has.
+    pub fn ways(&self) -> &[Way] {
         match &self.source {
-            Source::Running(running) => [running.takes_plates, running.takes_plates && !running.has_depth],
-            Source::Opening | Source::Lost(_) | Source::Ended => [false; 2],
+            Source::Running(running) => &running.ways,
+            Source::Opening | Source::Lost(_) | Source::Ended => &[],
         }
+    }
+
+    /// Whether a plate can be taken.
+    pub fn takes_plates(&self) -> bool {
+        self.ways().contains(&Way::Plate)
+    }
+
+    /// Whether nothing is known of depth, and the person is offered ways to it.
+    pub fn offers_depth(&self) -> bool {
+        let is_plain = matches!(&self.source, Source::Running(running) if !running.has_depth);
+        is_plain && !self.declines_own() && !self.declined_plate && self.plate.is_none()
+    }
+
+    /// Whether the source has depth of its own that was declined.
+    fn declines_own(&self) -> bool {
+        !self.may_have_depth() && self.ways().iter().any(|way| matches!(way, Way::Measured | Way::Stereo))
+    }
+
+    /// What the source is called, in short; empty where that is not known.
+    pub fn title(&self) -> &str {
+        let listed = self.sources.iter().find(|choice| choice.name == self.source_name);
+        let name = match (listed, &self.source) {
+            (Some(choice), _) => choice.label.as_str(),
+            // After its name, a camera tells its mode.
+            (None, Source::Running(running)) => running.label.split(", ").next().unwrap_or_default(),
+            (None, _) => self.source_name.as_str(),
+        };
+        let name = name.split(" (/dev/").next().unwrap_or(name);
+        name.trim_end_matches('/').rsplit('/').next().unwrap_or(name)
+    }
+
+    /// Whether the panel shows all there is.
+    pub fn shows_more(&self) -> bool {
+        self.habits.sections.get("More").copied().unwrap_or(false)
+    }
+
+    /// What is known of depth.
+    pub fn known(&self) -> Known {
+        let size = match &self.source {
+            Source::Running(running) => running.size,
+            _ => (1280, 720),
+        };
+        let is_relative = self.camera.is_relative && matches!(self.source, Source::Running(_));
+        Known { has_depth: self.may_have_depth(), is_relative, size }
     }
 
     /// Whether the source is a photo.

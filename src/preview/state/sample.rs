@@ -1,6 +1,6 @@
 //! A state to try things on.
 
-use super::{Running, Source, State};
+use super::{Running, Source, State, Way};
 use crate::knob::Knob;
 use crate::look::presets::Preset;
 use crate::look::{Effect, Look, Patch, Strength, Tilt};
@@ -28,7 +28,8 @@ pub fn running(has_depth: bool) -> Source {
         is_live: true,
         kind: Kind::Camera,
         depth_from: if has_depth { DepthFrom::Metres } else { DepthFrom::Nothing },
-        takes_plates: !has_depth,
+        ways: if has_depth { vec![Way::Measured] } else { vec![Way::Plate] },
+        way: has_depth.then_some(Way::Measured),
         executor: "cpu, 2 threads, AVX2".into(),
         budget_ns: 33_333_333,
     })
@@ -60,6 +61,8 @@ pub fn state() -> State {
         active: true,
     };
     let menu = vec![(1, "Manual Mode".to_owned()), (3, "Aperture Priority Mode".to_owned())];
+    // What is behind More is seen.
+    state.habits.sections.insert("More".into(), true);
     state.controls = vec![
         control("brightness", 10, (-64, 64, 1)),
         Knob { switch: true, ..control("white_balance_automatic", 1, (0, 1, 1)) },

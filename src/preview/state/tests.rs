@@ -1,6 +1,7 @@
 use super::apply::{NO_DEPTH, NO_DEPTH_OF_PHOTO, NO_PLATE};
 use super::sample::{blurred, look, running, state};
 use super::*;
+use crate::depth::focus::FocusRule;
 use crate::look::{Effect, Look, Strength};
 
 fn set(state: &mut State, radius_px: f32, stroke: Option<&'static str>) -> Vec<Request> {
@@ -85,7 +86,7 @@ fn presets_are_looks_by_name() {
     assert_eq!((effects.len(), radius_px(&state)), (1, 30.0));
     assert_eq!(state.preset_in_use(), Some(1));
     // Where it is focused is no part of what a preset is.
-    state.look.focus = crate::depth::focus::FocusRule::Metres(3.0);
+    state.look.focus = FocusRule::Metres(3.0);
     assert_eq!(state.preset_in_use(), Some(1));
     assert_eq!(state.apply(Action::Preset("nothing".into())), []);
     assert!(state.notes.last().unwrap().text.contains("nothing"));
@@ -140,16 +141,19 @@ fn what_needs_depth_says_so_where_there_is_none() {
     }
     assert_eq!((state.shown, &state.look), (Shown::Picture, &even));
     assert_eq!(state.apply(Action::Reset), [], "nor does the first look follow any");
+    assert_eq!(state.apply(Action::Preset("miniature".into())).len(), 1);
+    assert_eq!(state.look.effect, Effect::TiltShift);
+    state.hear(Update::Source(running(true)));
+    assert_eq!(state.look.effect, Effect::TiltShift, "that was chosen");
     // It follows depth again where there is some; a view of it goes back to the picture when the next source has none.
+    state.apply(Action::Portrait(true));
+    state.hear(Update::Source(running(false)));
+    assert_eq!(state.look.effect, Effect::Blur);
     state.hear(Update::Source(running(true)));
     assert_eq!(state.look.effect, Effect::Auto);
     state.apply(Action::Show(Shown::Depth));
     state.hear(Update::Source(running(false)));
     assert_eq!(state.shown, Shown::Picture);
-    // One that was chosen since stays.
-    assert_eq!(state.apply(Action::Preset("miniature".into())).len(), 1);
-    state.hear(Update::Source(running(true)));
-    assert_eq!(state.look.effect, Effect::TiltShift);
 }
 
 #[test]
@@ -293,7 +297,6 @@ fn numbers_are_as_one_would_write_them() {
 
 #[test]
 fn arrows_move_what_is_sharp() {
-    use crate::depth::focus::FocusRule;
     let mut look = look();
     tweak::move_focus(&mut look, 0.02, 0.0);
     assert_eq!(look.focus, FocusRule::Point { x: 0.52, y: 0.5 });
@@ -315,10 +318,10 @@ fn arrows_move_what_is_sharp() {
 #[test]
 fn a_plate_is_offered_where_a_camera_has_no_depth_and_its_end_is_told_once() {
     let mut state = state();
-    assert_eq!(state.takes_plates(), [false; 2]);
+    assert!(!state.takes_plates() && !state.offers_depth());
     assert_eq!((state.apply(Action::TakePlate), &state.notes.last().unwrap().text[..]), (vec![], NO_PLATE));
     state.hear(Update::Source(running(false)));
-    assert_eq!(state.takes_plates(), [true; 2]);
+    assert!(state.takes_plates() && state.offers_depth());
     state.apply(Action::DeclinePlate);
     assert!(state.declined_plate);
     assert_eq!(state.apply(Action::TakePlate), [Request::TakePlate]);

@@ -54,6 +54,38 @@ pub fn amount_of(lens: Lens, focus_m: f32, (width, height): (u32, u32)) -> f32 {
     lens.coc_at_infinity_px(focus_m, width) / height.max(1) as f32
 }
 
+/// How strong the blur of a look is, as a share of the height, whichever way it is given.
+pub fn share_of(look: &Look, focus_m: f32, size: (u32, u32)) -> f32 {
+    match look.strength {
+        Strength::Lens(lens) => amount_of(lens, focus_m, size),
+        _ => amount(look, size.1).unwrap_or_default(),
+    }
+}
+
+/// Makes the blur of a look so strong, a share of the height, the way it is given: a lens is stopped up or down.
+pub fn set_share(look: &mut Look, share: f32, focus_m: f32, size: (u32, u32)) {
+    look.strength = match look.strength {
+        Strength::Lens(lens) => {
+            let factor = amount_of(lens, focus_m, size) / share.max(1e-4);
+            Strength::Lens(stopped(lens, if factor.is_finite() { factor } else { 1.0 }))
+        }
+        _ => Strength::Percent(percent(share)),
+    };
+}
+
+/// A share as a percentage, to a hundredth: finer nobody sees.
+fn percent(share: f32) -> f32 {
+    (share * 1e4).round() / 1e2
+}
+
+/// The strength without a lens that blurs by this share: the usual one where it is as good as that.
+pub fn strength_of(share: f32) -> Strength {
+    match percent(share) {
+        usual if (usual - percent(COC_AT_INFINITY_PER_HEIGHT)).abs() < 0.011 => Strength::Default,
+        other => Strength::Percent(other.min(MAX_COC_PER_HEIGHT * 100.0)),
+    }
+}
+
 /// The lens of a look, or the one that blurs as much while focused at `focus_m`, as far as there is one.
 pub fn lens_of(look: &Look, focus_m: f32, size: (u32, u32)) -> Lens {
     match (look.strength, amount(look, size.1)) {

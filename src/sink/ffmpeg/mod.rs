@@ -100,7 +100,10 @@ const LOSSES: [&str; 5] =
 fn check_outcome(ended: io::Result<Ended>, path: &Path, part: &Path, container: Container) -> Result<(), SinkError> {
     let Ended { status, said } = ended.map_err(SinkError::write(path))?;
     let path = path.to_owned();
-    let failed = |status: &str| SinkError::Ffmpeg { path: path.clone(), status: status.into(), said: said.clone() };
+    let failed = |status: &str| match said.contains("No space left on device") {
+        true => SinkError::Full { path: path.clone() },
+        false => SinkError::Ffmpeg { path: path.clone(), status: status.into(), said: said.clone() },
+    };
     match status {
         None => return Err(failed("it hung, and was killed")),
         Some(status) if !status.success() => return Err(failed(&status.to_string())),

@@ -12,7 +12,7 @@ use crate::cli::settings::table::GIVEN_TO_WINDOW;
 use crate::cli::terminal::print;
 use crate::look::Value;
 use crate::look::presets::Preset;
-use crate::look::{Look, Patch};
+use crate::look::{Effect, Look, Patch};
 use crate::preview::services::{SettingsStore, Switch};
 
 /// The settings file, and what the command line gave.
@@ -24,6 +24,19 @@ pub(super) struct FileStore {
 }
 
 impl FileStore {
+    /// The preset that makes this look, wherever that is focused, in a command without anything else: nothing that is stated
+    /// elsewhere comes between.
+    fn preset_of(&self, look: &Look) -> Option<Preset> {
+        if !self.given.behind.is_empty() || self.given.switches.iter().any(|(name, _)| name == "like") {
+            return None;
+        }
+        let all = SettingsFile::load(self.chosen.as_deref()).unwrap_or_default().all_presets();
+        all.into_iter().find(|preset| {
+            let made = preset.patch.on(&Look::default());
+            preset.patch.focus.is_none() && made.is_ok_and(|made| Look { focus: look.focus, ..made } == *look)
+        })
+    }
+
     /// Changes the file that presets are saved in.
     fn change(&self, change: impl FnOnce(&Path) -> Result<(), CliError>) -> Result<(), String> {
         let file = save::file_to_save(self.chosen.as_deref());
@@ -61,10 +74,22 @@ impl SettingsStore for FileStore {
         // The window's own switches override those of the command line; controls of the camera come last.
         let at = switches.iter().position(|(name, _)| name == "control").unwrap_or(switches.len());
         switches.splice(at..at, given);
+        let preset = self.preset_of(look);
         let changed = Patch::of(look).beside(&Patch::of(&Look::default())).values();
         // A default is left out, unless another layer (see `Given::behind`) would set the value instead.
         let is_stated = |value: &Value| changed.contains(value) || self.given.behind.iter().any(|name| name == value.0);
-        let flags: Vec<Value> = Patch::of(look).values().into_iter().filter(is_stated).collect();
+        let has_effect = |value: &Value| value.0 != "tilt" || look.effect == Effect::TiltShift;
+        let all = Patch::of(look).values().into_iter();
+        let flags: Vec<Value> = match preset {
+            None => all.filter(is_stated).filter(has_effect).collect(),
+            Some(Preset { name, patch, .. }) => {
+                switches.retain(|(name, _)| name != "fresh");
+                let by_preset: Vec<&str> = patch.values().into_iter().map(|(name, _)| name).collect();
+                let is_own = |value: &Value| changed.contains(value) && !by_preset.contains(&value.0);
+                let is_own = |value: &Value| value.0 == "focus" && is_own(value);
+                [("preset", name)].into_iter().chain(all.filter(is_own)).collect()
+            }
+        };
         let command = command_line::equivalent(source, outputs, &flags, &switches);
         // A closed standard output is no reason to fail.
         let _ = print(format!("{command}\n").as_bytes());
@@ -75,6 +100,26 @@ impl SettingsStore for FileStore {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::depth::focus::FocusRule;
+    use crate::look::Tilt;
+
+    #[test]
+    fn a_look_of_a_preset_is_named_and_what_has_no_effect_is_left_out() {
+        let store = FileStore { chosen: None, given: Given::default() };
+        let presets = SettingsFile::default().all_presets();
+        for preset in &presets {
+            let made = preset.patch.on(&Look::default()).unwrap();
+            let focus = FocusRule::Point { x: 0.25, y: 0.5 };
+            let fresh = [("fresh".to_owned(), "true".to_owned())];
+            let command = store.command(&Look { focus, ..made.clone() }, "demo", &[], &fresh);
+            assert!(command.contains("--preset") && command.contains("--focus 0.25,0.5"), "{command}");
+            assert!(!command.contains("--fresh") && !command.contains("--effect"), "{command}");
+            let other = Look { rim: 0.77, tilt: Tilt { band: 0.3, ..made.tilt }, ..made };
+            let command = store.command(&other, "demo", &[], &[]);
+            assert!(command.contains("--rim 0.77") && !command.contains("--preset"), "{command}");
+            assert_eq!(command.contains("--tilt"), other.effect == Effect::TiltShift, "{command}");
+        }
+    }
 
     #[test]
     fn a_command_has_what_was_given_to_a_window_only_where_there_is_one() {

@@ -45,12 +45,12 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet, thumbs: &mut Thumbs) {
     }
     let hint = "-1: soap bubbles; 1: bright in the middle, soft at the rim";
     let (intensity, rim, highlights) = (sheet.look.aperture.intensity, sheet.look.rim, sheet.look.highlights);
-    let how = Number::new("Intensity", hint, -1.0..=1.0, 2);
+    let how = Number::new("Bubble to soft", hint, -1.0..=1.0, 2);
     sheet.number(ui, &how, intensity, |look, intensity| look.aperture.intensity = intensity);
-    let how = Number::new("Soft rim", "As a share of the radius", 0.0..=1.0, 2);
+    let how = Number::new("Soft edge", "As a share of the radius", 0.0..=1.0, 2);
     sheet.number(ui, &how, rim, |look, rim| look.rim = rim);
     let hint = "How much brighter lights are than white; 0 is off";
-    let how = Number::new("Highlights", hint, 0.0..=50.0, 1).unit("", "×");
+    let how = Number::new("Brighter lights", hint, 0.0..=50.0, 1).unit("", "×");
     sheet.number(ui, &how, highlights, |look, highlights| look.highlights = highlights);
 }
 
@@ -67,8 +67,8 @@ fn shape_row(ui: &mut Ui, sheet: &mut Sheet, thumbs: &mut Thumbs) {
     let chosen = index_of(&sheet.look.aperture.shape);
     let no_drag = !ui.input(|input| input.pointer.any_down());
     let mut shapes = Group::default();
-    ui.horizontal(|ui| {
-        ui.spacing_mut().item_spacing.x = 4.0;
+    ui.horizontal_wrapped(|ui| {
+        ui.spacing_mut().item_spacing = Vec2::splat(4.0);
         for (index, name) in SHAPES.into_iter().enumerate() {
             let Some(shape) = shape_at(index, &sheet.look) else { continue };
             let (rect, response) = ui.allocate_exact_size(Vec2::splat(SIDE), Sense::click());

@@ -5,20 +5,20 @@ use egui::{Role, Ui, WidgetInfo};
 use super::Sheet;
 use crate::depth::backdrop::Behind;
 use crate::look::Follow;
-use crate::preview::panel::parts::{Hinted, Number, choose, path, remark, switch};
+use crate::preview::panel::parts::{Hinted, Number, list, path, remark, switch};
 use crate::preview::services::Browse;
 use crate::preview::state::Action;
-use crate::preview::texts::tr;
+use crate::preview::texts::{tr, tr_with};
 
 #[derive(Clone, Copy, PartialEq)]
 enum Kind {
-    Room,
+    Blurred,
     Color,
     Picture,
 }
 
 const KINDS: [(&str, &str, Kind); 3] = [
-    ("Room", "The room, blurred", Kind::Room),
+    ("Blurred", "The room, blurred", Kind::Blurred),
     ("Colour", "One colour, for a page of your own, or for programs that put something in its place", Kind::Color),
     ("Picture", "A picture of yours, as large as the frame", Kind::Picture),
 ];
@@ -29,10 +29,10 @@ const ZOOM: f32 = 1.5;
 /// Below, there is none.
 const LEAST_ZOOM: f32 = 1.1;
 
-/// What is behind, and whether the picture follows.
-pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
+/// A list of what may be behind.
+pub fn kinds(ui: &mut Ui, sheet: &mut Sheet) {
     let kind = match sheet.look.behind {
-        Behind::Blur => Kind::Room,
+        Behind::Blur => Kind::Blurred,
         Behind::Color(_) => Kind::Color,
         Behind::Picture(_) => Kind::Picture,
     };
@@ -40,15 +40,24 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
         Behind::Picture(picture) => Some(Behind::Picture(picture.clone())),
         _ => None,
     };
-    if let Some(chosen) = choose(ui, "Behind the subject", &KINDS, kind, |_| true).filter(|chosen| *chosen != kind) {
+    let shown = KINDS.iter().find(|(.., of)| *of == kind).map_or("", |(name, ..)| tr(name));
+    let shown = tr_with("Background: {}", &[&shown]);
+    let all = KINDS.map(|(name, hint, kind)| (tr(name).to_owned(), hint, kind));
+    let enabled = sheet.follows_depth();
+    let chosen = ui.add_enabled_ui(enabled, |ui| list(ui, "Background", &shown, all, &kind)).inner;
+    if let Some(chosen) = chosen {
         match (chosen, named) {
-            (Kind::Room, _) => sheet.look.behind = Behind::Blur,
+            (Kind::Blurred, _) => sheet.look.behind = Behind::Blur,
             (Kind::Color, _) => sheet.look.behind = Behind::Color(GREEN),
             (Kind::Picture, Some(named)) => sheet.look.behind = named,
             (Kind::Picture, None) => sheet.act(Action::Browse(Browse::Behind)),
         }
         sheet.changed(true, "behind");
     }
+}
+
+/// More of what is behind, and whether the picture follows.
+pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
     match sheet.look.behind.clone() {
         Behind::Blur => {}
         Behind::Picture(picture) => {

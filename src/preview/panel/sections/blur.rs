@@ -5,8 +5,8 @@ use egui::Ui;
 use super::Sheet;
 use crate::look::{MAX_COC_PER_HEIGHT, Strength};
 use crate::optics::Lens;
-use crate::preview::panel::parts::{Number, choose, remark, switch};
-use crate::preview::state::tweak::{F_NUMBERS, LENS, amount, amount_of, f_number_of, lens_of, short};
+use crate::preview::panel::parts::{Number, choose, remark};
+use crate::preview::state::tweak::{F_NUMBERS, LENS, amount, amount_of, f_number_of, lens_of, strength_of};
 use crate::preview::texts::tr_with;
 
 /// Whether it is by the numbers of a lens.
@@ -19,14 +19,13 @@ const WAYS: [(&str, &str, bool); 2] = [
 pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
     let follows_depth = sheet.follows_depth();
     let by_lens = matches!(sheet.look.strength, Strength::Lens(_));
-    if follows_depth || by_lens {
+    if (follows_depth || by_lens) && !sheet.is_relative() {
         let chosen = choose(ui, "Blur by", &WAYS, by_lens, |by_lens| !by_lens || follows_depth);
         let focus_m = sheet.state.distance_m();
         match (chosen, sheet.look.strength) {
             (Some(true), _) => sheet.look.strength = Strength::Lens(lens_of(&sheet.look, focus_m, sheet.size)),
             (Some(false), Strength::Lens(lens)) => {
-                let share = amount_of(lens, focus_m, sheet.size);
-                sheet.look.strength = Strength::Percent(short(100.0 * share.min(MAX_COC_PER_HEIGHT)));
+                sheet.look.strength = strength_of(amount_of(lens, focus_m, sheet.size));
             }
             _ => {}
         }
@@ -44,7 +43,7 @@ fn by_amount(ui: &mut Ui, sheet: &mut Sheet) {
     let hint = "Radius of a far light, as a share of the picture's height. The wheel over the picture does the same";
     let how = Number::new("Amount of blur", hint, 0.0..=MAX_COC_PER_HEIGHT * 100.0, 1).unit("", " %");
     sheet.number(ui, &how, share * 100.0, |look, percent| look.strength = Strength::Percent(percent));
-    if sheet.follows_depth() && sheet.state.focus_m.is_some() {
+    if sheet.follows_depth() && sheet.state.focus_m.is_some() && !sheet.is_relative() {
         remark(ui, &like_lens(sheet));
     }
 }
@@ -73,20 +72,4 @@ fn lens_numbers(ui: &mut Ui, sheet: &mut Sheet, lens: Lens) {
     sheet.number(ui, &how, lens.sensor_width_mm, |look, sensor_width_mm| {
         look.strength = Strength::Lens(Lens { sensor_width_mm, ..lens });
     });
-}
-
-/// The largest radius, where the person sets one: without any, near objects would blur without bound.
-pub fn limit(ui: &mut Ui, sheet: &mut Sheet) {
-    let height_px = sheet.size.1 as f32;
-    let has_limit = sheet.look.max_coc_px.is_some();
-    if switch(ui, "Own limit", "Largest blur of anything, near or far; otherwise 6 % of the height", has_limit) {
-        sheet.look.max_coc_px = (!has_limit).then(|| (MAX_COC_PER_HEIGHT * height_px).round());
-        sheet.changed(true, "own limit");
-    }
-    if let Some(limit_px) = sheet.look.max_coc_px {
-        let how =
-            Number::new("Largest blur", "Radius, as a share of the picture's height", 0.0..=15.0, 1).unit("", " %");
-        let percent = limit_px / height_px * 100.0;
-        sheet.number(ui, &how, percent, |look, percent| look.max_coc_px = Some(percent / 100.0 * height_px));
-    }
 }

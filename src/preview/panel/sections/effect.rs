@@ -8,10 +8,10 @@ use crate::preview::panel::parts::{Number, choose, remark};
 use crate::preview::state::Source;
 
 const EFFECTS: [(&str, &str, Effect); 4] = [
-    ("Depth", "The farther from the focal plane, the more blur", Effect::Auto),
-    ("Tilt-shift", "A sharp band, and blur that grows away from it", Effect::TiltShift),
-    ("Even", "The same blur everywhere", Effect::Blur),
-    ("Off", "The picture as it is", Effect::None),
+    ("Portrait", "The farther from who is in focus, the more blur", Effect::Auto),
+    ("Sharp band", "A sharp band, and blur that grows away from it", Effect::TiltShift),
+    ("Whole picture", "The same blur everywhere", Effect::Blur),
+    ("No blur", "The picture as it is", Effect::None),
 ];
 
 /// The effect, and the band of tilt-shift.
@@ -28,7 +28,7 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
     if sheet.look.effect == Effect::TiltShift {
         let Tilt { center_y, band, angle_deg } = sheet.look.tilt;
         let share = |label, hint| Number::new(label, hint, 0.0..=100.0, 0).unit("", " %");
-        let how = share("Sharp band", "Its middle, from the top of the picture");
+        let how = share("Middle of the band", "Its middle, from the top of the picture");
         sheet.number(ui, &how, center_y * 100.0, |look, percent| look.tilt.center_y = percent / 100.0);
         let how = share("Width of the band", "As a share of the height");
         sheet.number(ui, &how, band * 100.0, |look, percent| look.tilt.band = percent / 100.0);

@@ -141,7 +141,7 @@ fn rename(ui: &mut Ui, sheet: &mut Sheet, editing: &mut Editing, old: String) ->
 fn delete(ui: &mut Ui, sheet: &mut Sheet, name: String) -> Doing {
     ui.label(tr_with("Delete “{}” for good?", &[&name]));
     let (delete, keep) =
-        ui.horizontal(|ui| (ui.button(tr("Delete it")).clicked(), ui.button(tr("Keep it")).clicked())).inner;
+        ui.horizontal_wrapped(|ui| (ui.button(tr("Delete it")).clicked(), ui.button(tr("Keep it")).clicked())).inner;
     if delete {
         sheet.act(Action::DeletePreset(name));
     } else if !keep && !sheet.gives_up(ui) {
@@ -152,8 +152,9 @@ fn delete(ui: &mut Ui, sheet: &mut Sheet, name: String) -> Doing {
 
 /// A field for a name and buttons. Whether the name holds or is given up, once one of them is so.
 fn named(ui: &mut Ui, editing: &mut Editing, verb: &str, (by_enter, gives_up): (bool, bool)) -> Option<bool> {
-    ui.horizontal(|ui| {
-        let edit = TextEdit::singleline(&mut editing.name).hint_text(tr("name")).desired_width(140.0).char_limit(40);
+    ui.horizontal_wrapped(|ui| {
+        let width = ui.available_width().min(140.0);
+        let edit = TextEdit::singleline(&mut editing.name).hint_text(tr("name")).desired_width(width).char_limit(40);
         let edit = ui.add(edit);
         called(&edit, "Name of the preset", Role::TextInput);
         if std::mem::take(&mut editing.ask_focus) {

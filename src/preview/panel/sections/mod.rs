@@ -4,6 +4,7 @@ mod aperture;
 mod backdrop;
 mod blur;
 mod effect;
+pub mod first;
 mod focus;
 mod looks;
 mod output;
@@ -92,15 +93,18 @@ impl Sheet<'_> {
         self.state.may_have_depth()
     }
 
+    /// Whether nothing of depth is known in metres.
+    fn is_relative(&self) -> bool {
+        self.state.known().is_relative
+    }
+
     fn follows_depth(&self) -> bool {
         self.look.effect.follows_depth()
     }
 }
 
-/// Draws the sections that the look and the source call for: what pictures come from and go to, the look, the window.
+/// Draws the sections that the look and the source call for: the look, what pictures come from and go to, the window.
 pub fn show(ui: &mut Ui, sheet: &mut Sheet, editing: &mut Editing, thumbs: &mut Thumbs) {
-    part(ui, sheet, "Source", true, source::show);
-    part(ui, sheet, "Record and call", true, output::show);
     ui.add_space(4.0);
     looks::show(ui, sheet, editing);
     ui.add_space(2.0);
@@ -114,18 +118,20 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet, editing: &mut Editing, thumbs: &mut 
         part(ui, sheet, "Aperture", true, |ui, sheet| aperture::show(ui, sheet, thumbs));
     }
     if sheet.follows_depth() {
-        part(ui, sheet, "Backdrop", false, backdrop::show);
+        part(ui, sheet, "Background", false, backdrop::show);
     }
+    part(ui, sheet, "Source", true, source::show);
+    part(ui, sheet, "Record and call", true, output::show);
     part(ui, sheet, "View", true, view::show);
     if !sheet.state.controls.is_empty() {
-        part(ui, sheet, "Camera", false, source::controls);
+        part(ui, sheet, "Controls of the camera", false, source::controls);
     }
     part(ui, sheet, "For experts", false, |ui, sheet| {
         view::internals(ui, sheet);
         if blurs {
-            blur::limit(ui, sheet);
             quality::show(ui, sheet);
         }
+        source::executor(ui, sheet);
     });
 }
 

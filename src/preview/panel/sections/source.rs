@@ -4,52 +4,70 @@ use egui::Ui;
 
 use super::Sheet;
 use crate::knob::Knob;
-use crate::preview::panel::parts::{Number, list, number, remark, switch};
+use crate::preview::panel::parts::{Number, choose, list, number, remark, switch};
 use crate::preview::services::Browse;
-use crate::preview::state::{Action, Source};
+use crate::preview::state::{Action, Source, Way};
 use crate::preview::texts::{tr, tr_with};
 
-/// The source, and others to choose.
+/// The ways to depth, with a hint.
+const WAYS: [(&str, &str, Way); 5] = [
+    ("Measured", "By a depth camera, or as it was recorded", Way::Measured),
+    ("Two eyes", "What two cameras side by side see", Way::Stereo),
+    ("Person", "A network finds who is in the picture", Way::Person),
+    ("Person and distance", "That, and another one tells how far the rest is", Way::PersonAndDistance),
+    ("Empty room", "A picture of the room without you: step out for four seconds (T)", Way::Plate),
+];
+
+/// What is known of the source, where its depth comes from, and ways to open others.
 pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
     let state = sheet.state;
-    let current = state.sources.iter().find(|choice| choice.name == state.source_name);
-    let label = match (current, &state.source) {
-        (Some(choice), _) => choice.label.as_str(),
-        (None, Source::Running(running)) => running.label.as_str(),
-        (None, _) if state.source_name.is_empty() => tr("the first camera"),
-        (None, _) => state.source_name.as_str(),
-    };
-    let sources = state.sources.iter().map(|choice| (choice.label.clone(), &choice.name[..], &choice.name[..]));
-    if let Some(name) = list(ui, "Source", label, sources, &&state.source_name[..]) {
-        sheet.act(Action::Open(name.to_owned()));
-    }
     match &state.source {
         Source::Opening => remark(ui, "Opening…"),
         Source::Running(running) => {
             let (width, height) = running.size;
             let rate = 1e9 / running.period_ns.max(1) as f64;
             let depth = tr(if running.has_depth { "with depth" } else { "without depth" });
-            remark(ui, &format!("{width} × {height}, {rate:.0} fps, {depth}"));
-            remark(ui, &running.executor);
+            remark(
+                ui,
+                &match state.is_photo() {
+                    true => format!("{width} × {height}, {depth}"),
+                    false => format!("{width} × {height}, {rate:.0} fps, {depth}"),
+                },
+            );
+            let ways: Vec<_> = WAYS.into_iter().filter(|(.., way)| running.ways.contains(way)).collect();
+            if ways.len() > 1 || running.way.is_none() && !ways.is_empty() {
+                ui.label(tr("Depth from"));
+                let chosen = choose(
+                    ui,
+                    "Depth from",
+                    &ways.iter().map(|way| (way.0, way.1, Some(way.2))).collect::<Vec<_>>(),
+                    running.way,
+                    |_| true,
+                );
+                if let Some(way) = chosen.flatten().filter(|way| Some(*way) != running.way) {
+                    sheet.act(Action::DepthBy(way));
+                }
+            }
         }
         Source::Lost(why) => remark(ui, &tr_with("Lost: {}", &[why])),
         Source::Ended => remark(ui, "It came to its end."),
     }
     modes(ui, sheet);
     let hint = "It can also be dropped on the window";
-    ui.horizontal(|ui| {
+    ui.horizontal_wrapped(|ui| {
         sheet.button(ui, "Open folder…", hint, Action::Browse(Browse::Folder));
         sheet.button(ui, "Open photo…", hint, Action::Browse(Browse::Photo));
+        if state.plate.is_some() {
+            let hint = "A picture of what is behind you, without you; the camera has to stand still (T)";
+            sheet.button(ui, "Take another plate", hint, Action::TakePlate);
+        }
     });
-    ui.horizontal(|ui| {
-        sheet.button(ui, "Look for others", "Look again which cameras there are (F5)", Action::Refresh);
-        sheet.button(ui, "Open again", "Close the source and open it anew", Action::Retry);
-    });
-    if state.takes_plates()[0] {
-        let text = if state.plate.is_some() { "Take another plate" } else { "Take a plate" };
-        let hint =
-            "A picture of what is behind you gives a portrait without any network; the camera has to stand still (T)";
-        sheet.button(ui, text, hint, Action::TakePlate);
+}
+
+/// What blurs.
+pub fn executor(ui: &mut Ui, sheet: &Sheet) {
+    if let Source::Running(running) = &sheet.state.source {
+        remark(ui, &running.executor);
     }
 }
 

@@ -13,17 +13,8 @@ const VIEWS: Views = [
     ("Depth", "Distance in colours: light is near (D)", Shown::Depth),
 ];
 const INTERNALS: Views = [
-    ("CoC", "Circle of confusion: white is sharp, hatched is in front (C)", Shown::Coc),
-    ("Bins", "The layers that are blurred on their own (N)", Shown::Bins),
-];
-
-const ZOOM_HINT: &str = "Pixels of the window for one of the picture (X, +, -)";
-const ZOOMS: [(&str, &str, u32); 5] = [
-    ("Fit", ZOOM_HINT, 0),
-    ("100 %", ZOOM_HINT, 1),
-    ("200 %", ZOOM_HINT, 2),
-    ("400 %", ZOOM_HINT, 4),
-    ("800 %", ZOOM_HINT, 8),
+    ("Blur radius", "Circle of confusion: white is sharp, hatched is in front (C)", Shown::Coc),
+    ("Layers", "The layers that are blurred on their own (N)", Shown::Bins),
 ];
 
 /// Draws views to choose from; one that is shown already is left for the picture.
@@ -44,9 +35,6 @@ pub fn internals(ui: &mut Ui, sheet: &mut Sheet) {
 pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
     let state = sheet.state;
     choose_view(ui, sheet, "Show", VIEWS);
-    if let Some(factor) = choose(ui, "Size", &ZOOMS, state.zoom.factor, |_| true) {
-        sheet.act(Action::Zoom(factor, None));
-    }
     let hint = "Like a mirror; what is recorded or sent on is not (M)";
     sheet.switch(ui, "Mirror", hint, state.mirror, Action::Mirror);
     if state.mirror {

@@ -13,7 +13,7 @@ struct Tree(Vec<(NodeId, Node)>);
 impl Tree {
     fn of(state: State) -> Self {
         let mut window = Window::of(state, (1280, 4000));
-        for folded in ["For experts", "Camera", "Save as…"] {
+        for folded in ["For experts", "Controls of the camera", "Save as…"] {
             if let Some(at) = window.place_of(folded) {
                 window.click(at);
                 window.wait(0.4);
@@ -67,7 +67,8 @@ fn every_control_has_a_name() {
             counted += 1;
         }
         tree.find(Role::TextInput, "Name of the preset");
-        tree.find(Role::ComboBox, "Level");
+        let quality = tree.find(Role::ComboBox, "Quality");
+        assert_eq!(quality.value(), Some("Auto: as the time allows"));
         tree.find(Role::ComboBox, "Auto exposure");
         assert!(counted > 40, "only {counted}");
     }
@@ -78,7 +79,7 @@ fn values_and_states_are_told() {
     let mut state = sample::state();
     (state.look.rim, state.mirror) = (0.25, true);
     let tree = Tree::of(state);
-    let rim = tree.find(Role::Slider, "Soft rim");
+    let rim = tree.find(Role::Slider, "Soft edge");
     assert!((rim.numeric_value().unwrap() - 0.25).abs() < 1e-6);
     assert_eq!((rim.min_numeric_value(), rim.max_numeric_value()), (Some(0.0), Some(1.0)));
     assert_eq!(tree.find(Role::Switch, "Mirror").toggled(), Some(Toggled::True));
@@ -87,4 +88,6 @@ fn values_and_states_are_told() {
     assert_eq!(tree.find(Role::RadioButton, "Heart").toggled(), Some(Toggled::False));
     assert!(tree.find(Role::Button, "Redo (Ctrl+Shift+Z)").is_disabled(), "nothing to redo");
     assert!(!tree.find(Role::Button, "Record").is_disabled());
+    assert_eq!(tree.find(Role::DisclosureTriangle, "Focus").is_expanded(), Some(true));
+    assert!(tree.0.iter().any(|(_, node)| node.role() == Role::Window && node.label() == Some("bokehcam")), "a name");
 }

@@ -32,6 +32,11 @@ fn closing_asks_once_while_something_is_recorded() {
     window.state.closing = true;
     window.press(Key::Escape, Modifiers::NONE);
     assert!(!window.state.closing && window.state.panel);
+    window.state.closing = true;
+    window.wait(0.5);
+    window.press(Key::Tab, Modifiers::NONE);
+    window.press(Key::Escape, Modifiers::NONE);
+    assert!(!window.state.closing, "once is enough, whatever has the focus");
     window.press(Key::Q, Modifiers::NONE);
     window.wait(0.2);
     assert_eq!(window.state.apply(Action::Close), [crate::preview::state::Request::Close], "asked once");

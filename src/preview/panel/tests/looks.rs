@@ -62,9 +62,11 @@ impl Seen {
 
     fn save(&mut self, name: &str) {
         (0..30).for_each(|_| self.pass(Vec::new()));
-        let area = self.window.canvas.area;
-        let mut image = backdrop((area.width, area.height));
-        let mut pixels = vec![0; (area.width * area.height) as usize];
+        let whole = self.window.canvas.area;
+        let room = crate::preview::panel::room_px(&self.window.ctx);
+        let area = crate::preview::present::fitted((1280, 720), room);
+        let image = backdrop((area.width, area.height));
+        let mut pixels = vec![0; (whole.width * whole.height) as usize];
         let drawing = Drawing {
             area,
             part: None,
@@ -75,6 +77,7 @@ impl Seen {
             background: [0; 3],
         };
         self.painter.paint(&mut pixels, &drawing);
+        let mut image = ColorImage::new(whole.width, whole.height);
         image.rgb = pixels.iter().flat_map(|pixel| pixel.to_be_bytes().into_iter().skip(1)).collect();
         write_color(&std::env::temp_dir().join(format!("panel-{name}.png")), &image, true).unwrap();
     }
@@ -87,6 +90,23 @@ fn pictures() {
     let shot = |name: &str, theme: Theme, change: &dyn Fn(&mut State)| Seen::new(theme, size, change).save(name);
     shot("dark", Theme::Dark, &|_| {});
     shot("light", Theme::Light, &|_| {});
+    // The first screen, and more, in sizes of windows and languages.
+    for (language, table) in [("en", None), ("de", crate::preview::texts::built_in("de"))] {
+        table.into_iter().for_each(crate::preview::texts::speak);
+        for size in [(1280, 720), (500, 700), (480, 320)] {
+            for (theme, called) in [(Theme::Dark, "dark"), (Theme::Light, "light")] {
+                for more in [false, true] {
+                    let mut seen = Seen::new(theme, size, |state| {
+                        state.apply(Action::Section("More", more));
+                        state.note("Saved ~/Pictures/bokehcam 2026-11-23 21-14-05.png");
+                    });
+                    let (width, height) = size;
+                    seen.save(&format!("{language}-{width}x{height}-{called}{}", if more { "-more" } else { "" }));
+                }
+            }
+        }
+    }
+    crate::preview::texts::speak(crate::preview::texts::Table::new());
     shot("instruments", Theme::Dark, &|state| {
         state.instruments = true;
         state.meters.fill_for_looks();

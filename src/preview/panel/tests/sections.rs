@@ -13,11 +13,12 @@ use crate::preview::state::{Request, Shown, Source, State, Update};
 #[test]
 fn what_is_needed_first_is_on_top_and_experts_parts_are_folded() {
     let mut window = Window::of(sample::state(), (1280, 2000));
+    window.pass(vec![egui::Event::PointerMoved(super::on_panel())]);
     let y = |window: &mut Window, text: &str| window.place_of(text).map(|at| at.y);
-    let [source, record, save, focus] =
-        ["Source", "Record and call", "Save as…", "Focus"].map(|text| y(&mut window, text).expect(text));
-    assert!(source < record && record < save && save < focus);
-    for inner in ["CoC", "Bins", "Terms of the aperture", "Method", "Own limit"] {
+    let [blur, save, focus, source, record] = ["Use in calls", "Save as…", "Focus", "Source", "Record and call"]
+        .map(|text| y(&mut window, text).expect(text));
+    assert!(blur < save && save < focus && focus < source && source < record);
+    for inner in ["Blur radius", "Layers", "Quality"] {
         assert!(window.place_of(inner).is_none(), "{inner}");
     }
     window.state.apply(Action::Section("For experts", true));
@@ -25,11 +26,11 @@ fn what_is_needed_first_is_on_top_and_experts_parts_are_folded() {
         window.state.apply(Action::Section(folded, false));
     }
     window.wait(0.5);
-    for inner in ["CoC", "Bins", "Terms of the aperture", "Method", "Own limit", "Instruments"] {
+    for inner in ["Blur radius", "Layers", "Quality", "Instruments", "cpu, 2 threads, AVX2"] {
         assert!(window.place_of(inner).is_some(), "{inner}");
     }
-    assert_eq!(window.click_on("CoC"), [Action::Show(Shown::Coc)]);
-    assert_eq!(window.click_on("CoC"), [Action::Show(Shown::Picture)]);
+    assert_eq!(window.click_on("Blur radius"), [Action::Show(Shown::Coc)]);
+    assert_eq!(window.click_on("Blur radius"), [Action::Show(Shown::Picture)]);
     assert_eq!(window.click_on("View"), [Action::Section("View", true)]);
     window.wait(0.5);
     assert!(window.place_of("Mirror").is_some());
@@ -38,13 +39,21 @@ fn what_is_needed_first_is_on_top_and_experts_parts_are_folded() {
 #[test]
 fn what_is_behind_is_a_colour_or_a_picture_that_is_asked_for() {
     let mut window = Window::of(sample::state(), (1280, 2000));
-    window.state.apply(Action::Section("Backdrop", true));
+    window.state.apply(Action::Section("Background", true));
     window.wait(0.5);
-    // The aperture's own is a thumbnail; the view's is further down.
-    let picture = window.places().into_iter().find(|(text, _)| text == "Picture").unwrap().1;
-    assert_eq!(window.click(picture), [Action::Browse(Browse::Behind)]);
+    let choose = |window: &mut Window, kind: &str| {
+        let list = window.places().into_iter().find(|(text, _)| text.starts_with("Background: ")).unwrap().1;
+        window.click(list);
+        window.wait(0.2);
+        // The list lies over all else, and is drawn last.
+        let at = window.places().into_iter().rev().find(|(text, _)| text == kind).unwrap().1;
+        let done = window.click(at);
+        window.wait(0.2);
+        done
+    };
+    assert_eq!(choose(&mut window, "Picture"), [Action::Browse(Browse::Behind)]);
     assert_eq!(window.state.look, sample::look(), "nothing changes until there is one");
-    window.click_on("Colour");
+    choose(&mut window, "Colour");
     assert!(matches!(window.state.look.behind, Behind::Color(_)));
     let wall = Behind::Picture(Arc::new(BehindPicture { file: Some("wall.jpg".into()), image: ColorImage::new(2, 2) }));
     assert!(
@@ -72,16 +81,17 @@ fn a_button_brings_the_panel_back() {
 fn its_first_seconds_count_from_the_first_picture() {
     let mut state = State::new(sample::look(), "slow".into());
     state.source = Source::Opening;
+    state.full_screen = true;
     let mut window = Window::of(state, (1280, 720));
     let canvas = std::mem::take(&mut window.canvas.area);
     window.wait(20.0);
-    assert!(window.place_of("Record and call").is_some());
+    assert!(window.place_of("Use in calls").is_some());
     window.canvas.area = canvas;
     window.state.source = sample::running(true);
     window.wait(3.5);
-    assert!(window.place_of("Record and call").is_some());
+    assert!(window.place_of("Use in calls").is_some());
     window.wait(1.5);
-    assert!(window.place_of("Record and call").is_none());
+    assert!(window.place_of("Use in calls").is_none());
 }
 
 /// The rectangles that are drawn with a stroke as wide as the ring's.

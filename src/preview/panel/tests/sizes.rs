@@ -63,7 +63,7 @@ type Shown<'a> = (&'a dyn Fn(&mut State), &'a [&'a str]);
 #[test]
 fn the_largest_text_in_a_small_window_cuts_nothing_off() {
     let shown: [Shown; 3] = [
-        (&|_| {}, &["Look", "Source"]),
+        (&|_| {}, &["Portrait", "Blur"]),
         (&|state| state.help = true, &["Keys and gestures", "Single keys", "Ask before closing", "1 – 9"]),
         (
             &|state| state.closing = true,
@@ -78,7 +78,8 @@ fn the_largest_text_in_a_small_window_cuts_nothing_off() {
         let mut window = Window::of(state, (500, 400));
         window.wait(0.5);
         let whole = window.ctx.content_rect();
-        assert!(whole.contains_rect(window.panel.sheet.rect().expect("the panel")), "{whole}");
+        let panel = window.panel.sheet.rect().expect("the panel");
+        assert!(whole.contains_rect(panel), "{panel} in {whole}");
         let boxes = window.boxes();
         for text in texts {
             let at = boxes.iter().find(|(shown, _)| shown == text).unwrap_or_else(|| panic!("{text}: {boxes:?}")).1;
@@ -142,9 +143,8 @@ fn where_a_control_is_scrolled_out_of_sight_it_gives_no_hint() {
     let mut window = Window::of(sample::state(), (1280, 500));
     window.pass(vec![egui::Event::PointerMoved(super::on_panel())]);
     window.wait(0.5);
-    // What is scrolled begins under the line of the source.
-    let boxes = window.boxes();
-    let top = boxes.iter().find(|(shown, _)| shown.starts_with("Desk camera, ")).expect("the line").1.bottom() + 6.0;
+    // What is scrolled begins under the panel's margin.
+    let top = window.panel.sheet.rect().unwrap().top() + crate::preview::panel::theme::PAD;
     let scroll = |window: &mut Window, by: f32| {
         window.pass(vec![super::scrolled(egui::MouseWheelUnit::Point, by, egui::Modifiers::NONE)]);
         window.wait(0.8);
@@ -163,7 +163,7 @@ fn where_a_control_is_scrolled_out_of_sight_it_gives_no_hint() {
     for (y, hints) in [(top + 8.0, true), (top - 5.0, false)] {
         window.pass(vec![egui::Event::PointerMoved(egui::pos2(at.x, y))]);
         window.wait(2.0);
-        let is_seen = window.texts().iter().any(|text| text.starts_with("Follows the nearest"));
+        let is_seen = window.texts().iter().any(|text| text.starts_with("Follows the person"));
         assert_eq!(is_seen, hints, "at {y}, where it begins at {top}");
     }
 }

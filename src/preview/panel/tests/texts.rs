@@ -7,13 +7,13 @@ use crate::depth::backdrop::Behind;
 use crate::depth::plate::Step;
 use crate::look::{Effect, Follow, Strength};
 use crate::preview::keys::GROUPS;
-use crate::preview::state::{Action, Output, Source, State, Transport, tweak};
+use crate::preview::state::{Action, Output, Source, State, Transport, Way, tweak};
 use crate::preview::texts::{self, tests as table};
 use crate::preview::views::Legend;
 
 /// Windows that together show about all that can be shown.
 fn windows() -> Vec<Window> {
-    let changes: [&dyn Fn(&mut State); 15] = [
+    let changes: [&dyn Fn(&mut State); 17] = [
         &|_| {},
         &|state| {
             state.transport = Some(Transport { place: 3, frames: 24, time_ns: 1, length_ns: 9 });
@@ -24,7 +24,6 @@ fn windows() -> Vec<Window> {
         &|state| (state.look.focus, state.look.strength) = (tweak::point(0.5, 0.5), Strength::Percent(0.0)),
         &|state| {
             state.look.strength = Strength::Lens(tweak::LENS);
-            state.look.max_coc_px = Some(30.0);
             state.look.aperture.shape = crate::bokeh::aperture::Shape::Ring { inner: 0.5 };
         },
         &|state| {
@@ -36,6 +35,18 @@ fn windows() -> Vec<Window> {
             (state.look.behind, state.look.follow) = (Behind::Color([1, 2, 3]), Follow::to(2.0));
         },
         &|state| state.help = true,
+        &|state| {
+            let Source::Running(running) = &mut state.source else { return };
+            running.ways = vec![Way::Measured, Way::Stereo, Way::Person, Way::PersonAndDistance, Way::Plate];
+            (state.camera.is_relative, state.look.focus_range_m) = (true, 0.5);
+            state.legend = Some(Legend::Depth { near_m: 0.5, far_m: 5.0 });
+        },
+        &|state| {
+            let Source::Running(running) = &mut state.source else { return };
+            running.name = "demo".into();
+            (state.look.focus_range_m, state.trouble) = (0.5, Some("No space left on device: x; kept".into()));
+            state.apply(Action::Section("More", false));
+        },
         &|state| {
             (state.closing, state.frozen, state.instruments) = (true, true, true);
             state.meters.fill_for_looks();
@@ -59,7 +70,7 @@ fn windows() -> Vec<Window> {
     for change in changes {
         let mut state = sample::state();
         state.outputs = vec![Output { name: "clip.mp4".into(), is_camera: false }];
-        for section in ["Camera", "For experts", "Backdrop"] {
+        for section in ["Controls of the camera", "For experts", "Background"] {
             state.apply(Action::Section(section, true));
         }
         change(&mut state);
@@ -112,8 +123,17 @@ fn the_table_has_all_texts_and_no_others() {
 #[test]
 fn all_that_is_drawn_is_translated() {
     // What is a name, an error's reason or a number is the same in every language.
-    let names =
-        ["Desk camera", "portrait", "clip.mp4", "bokehcam", "cpu, 2", "gone", "Manual Mode", "Aperture Priority"];
+    let names = [
+        "Desk camera",
+        "portrait",
+        "clip.mp4",
+        "bokehcam",
+        "kept",
+        "cpu, 2",
+        "gone",
+        "Manual Mode",
+        "Aperture Priority",
+    ];
     let english = table::english();
     texts::speak(english.into_keys().map(|text| (text.clone(), format!("«{text}»"))).collect());
     let presets: Vec<String> = sample::state().presets.iter().map(|preset| preset.name.to_lowercase()).collect();

@@ -43,7 +43,7 @@ fn a_look_that_takes_a_while_is_said_to_be_worked_on() {
 fn the_folder_is_offered_once_something_is_in_it() {
     let mut window = Window::of(super::sample::state(), (1280, 3000));
     window.pass(vec![egui::Event::PointerMoved(super::on_panel())]);
-    assert!(window.texts().contains(&"Snapshot".to_owned()) && !window.texts().contains(&"Open folder".to_owned()));
+    assert!(window.texts().contains(&"Timer".to_owned()) && !window.texts().contains(&"Open folder".to_owned()));
     let folder = std::path::PathBuf::from("/home/me/Bilder");
     window.state.hear(crate::preview::state::Update::Kept(folder.clone()));
     window.wait(0.2);

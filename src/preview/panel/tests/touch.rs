@@ -34,6 +34,7 @@ fn focused(actions: &[Action]) -> Vec<FocusRule> {
 #[test]
 fn a_tap_focuses_unless_it_wakes_the_panel() {
     let mut window = Window::new();
+    window.state.full_screen = true;
     let at = pos2(320.0, 180.0);
     assert_eq!(focused(&tap(&mut window, at)), [FocusRule::Point { x: 0.25, y: 0.25 }]);
     // The panel has gone: the first tap brings it back, and only the next one focuses.

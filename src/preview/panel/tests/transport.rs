@@ -25,6 +25,9 @@ fn a_recording_has_a_bar_that_goes_with_the_panel_and_a_camera_has_none() {
     assert!(window.place_of(time).is_none());
     window.state.bare = false;
     window.wait(5.0);
+    assert!(window.place_of(time).is_some(), "beside the panel it stays");
+    window.state.full_screen = true;
+    window.wait(5.0);
     assert!(window.place_of(time).is_none(), "it hides");
     let mut camera = of_a_recording();
     camera.state.transport = None;
@@ -33,7 +36,7 @@ fn a_recording_has_a_bar_that_goes_with_the_panel_and_a_camera_has_none() {
 
 #[test]
 fn in_a_small_window_the_bar_makes_room_for_the_panel() {
-    for width in [400, 500, 640, 800] {
+    for width in [150, 400, 500, 640, 800] {
         let mut state = super::sample::state();
         state.transport = Some(TRANSPORT);
         let mut window = Window::of(state, (width, 420));
@@ -41,7 +44,7 @@ fn in_a_small_window_the_bar_makes_room_for_the_panel() {
         let panel = window.panel.sheet.rect().unwrap();
         let bar = window.ctx.memory(|memory| memory.area_rect(egui::Id::unique("transport")));
         assert!(bar.is_none_or(|bar| !bar.intersects(panel)), "{width}: {bar:?} over {panel}");
-        assert_eq!(bar.is_some(), width >= 640, "{width}: {bar:?} beside {panel}");
+        assert_eq!(bar.is_some(), width >= 400, "{width}: {bar:?} and {panel}");
     }
 }
 

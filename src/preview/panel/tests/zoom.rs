@@ -46,6 +46,7 @@ fn a_key_shows_the_pixels_under_the_pointer_and_all_of_the_picture_again() {
 #[test]
 fn a_small_picture_is_never_made_smaller_by_a_key() {
     let mut window = Window::new();
+    window.press(Key::P, Modifiers::NONE);
     // All of it is seen at 4.2 pixels of the window for one of its own.
     window.canvas.size = (300, 170);
     window.pass(vec![Event::PointerMoved(pos2(320.0, 180.0))]);

@@ -58,8 +58,9 @@ impl Host {
         let its_look = self.looks.iter().rev().find(|(number, _)| *number <= still.change);
         let look = its_look.map_or(&self.start.look, |(_, look)| look);
         let settings = Patch::of(&look.of_frame(&still.coc, still.quality)).values();
-        let Still { picture, color, depth, order, .. } = still;
-        let snapshot = Snapshot { picture, color, depth: depth.as_ref(), settings: &settings };
+        let Still { picture, color, depth, order, with_sources, .. } = still;
+        let sources = with_sources.then_some((color, depth.as_ref()));
+        let snapshot = Snapshot { picture, sources, settings: &settings };
         let saved = match order.as_ref().and_then(|order| order.to.as_deref()) {
             Some(path) => {
                 // If that fails, writing says why.
@@ -70,7 +71,7 @@ impl Host {
         };
         let answer = match saved {
             Ok(path) => {
-                self.news.note(format!("Saved {}", path.display()));
+                self.news.note(format!("Saved {}", folders::shown(&path)));
                 self.news.kept(&path);
                 Answer::Saved { saved: path }
             }

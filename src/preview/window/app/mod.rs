@@ -32,7 +32,7 @@ use crate::pipeline::{View, Wanted};
 use crate::preview::meters::Totals;
 use crate::preview::panel::{Panel, SystemFonts};
 use crate::preview::session::{Closed, Session, Wake};
-use crate::preview::state::{Action, Shown, Source, State};
+use crate::preview::state::{Action, Shown, Source, State, fitted};
 use crate::preview::views::Views;
 use crate::stats::WindowUse;
 
@@ -74,6 +74,8 @@ pub(super) struct App {
     /// What frames are blurred with, once the present look has reached them.
     settings: Option<bokeh::Settings>,
     blank: ColorImage,
+    /// What others see while it is off.
+    card: ColorImage,
     clock: Clock,
     /// When the last frame came, or its source was opened.
     heard_at: Instant,
@@ -149,6 +151,7 @@ impl App {
             demand,
             settings: None,
             blank: ColorImage::new(16, 9),
+            card: ColorImage::new(0, 0),
             clock,
             heard_at: Instant::now(),
             layout_at: Some(Instant::now()),
@@ -189,14 +192,14 @@ impl App {
     }
 
     fn set_title(&self) {
-        if let (Some(gfx), Source::Running(running)) = (&self.gfx, &self.state.source) {
-            gfx.window.set_title(&format!("{} - bokehcam", running.label));
+        if let (Some(gfx), Source::Running(_)) = (&self.gfx, &self.state.source) {
+            gfx.window.set_title(&format!("{} - bokehcam", self.state.title()));
         }
     }
 
     fn update_settings(&mut self) {
         self.settings = match &self.state.source {
-            Source::Running(running) => self.state.look.for_source(running.has_depth).settings(running.size, true),
+            Source::Running(running) => fitted(&self.state.look, self.state.known()).settings(running.size, true),
             _ => None,
         };
     }

@@ -7,12 +7,14 @@ use winit::window::Fullscreen;
 
 use super::{App, control};
 use crate::compute::Place;
+use crate::frame::ColorImage;
 use crate::pipeline::Trace;
-use crate::preview::panel::Canvas;
+use crate::preview::panel::{self, Canvas};
 use crate::preview::present::{Area, Controls, Drawing, Image};
 use crate::preview::session::Still;
 use crate::preview::state::{Action, Request, Source, State};
 use crate::preview::views::Probe;
+use crate::sink::card;
 
 /// Shown when there is nothing to save.
 const NO_PICTURE: &str = "There is no picture to save.";
@@ -46,12 +48,13 @@ impl App {
     pub(super) fn lay_out(&mut self, events: &ActiveEventLoop) {
         let size = self.picture_size();
         let Some(gfx) = &mut self.gfx else { return };
-        let (area, part) = gfx.area(size, self.state.zoom, self.state.mirror);
+        let room = panel::room_px(&self.ctx);
+        let (area, part) = gfx.area(size, room, self.state.zoom, self.state.mirror);
         let canvas = Canvas { area, size, part };
         let input = gfx.input.take_egui_input(&gfx.window);
         let mut actions = Vec::new();
-        let (panel, state) = (&mut self.panel, &self.state);
-        let output = self.ctx.run_ui(input, |ui| panel.show(ui, state, canvas, &mut actions));
+        let (controls, state) = (&mut self.panel, &self.state);
+        let output = self.ctx.run_ui(input, |ui| controls.show(ui, state, canvas, &mut actions));
         gfx.input.handle_platform_output(&gfx.window, output.platform_output);
         let primitives = self.ctx.tessellate(output.shapes, output.pixels_per_point);
         let pixels_per_point = output.pixels_per_point;
@@ -61,6 +64,11 @@ impl App {
         self.layout_at = self.laid_out.checked_add(wait);
         let probe = self.panel.probed.and_then(|at| Some(Probe::of(self.view.as_ref()?, at)));
         if std::mem::replace(&mut self.state.probe, probe) != probe {
+            self.layout_at = Some(self.laid_out);
+            gfx.window.request_redraw();
+        }
+        // The picture makes room for the panel, and what is drawn over the picture goes along.
+        if panel::room_px(&self.ctx) != room {
             self.layout_at = Some(self.laid_out);
             gfx.window.request_redraw();
         }
@@ -136,6 +144,7 @@ impl App {
             coc: view.coc,
             change: view.trace.change,
             quality: view.trace.quality,
+            with_sources: self.state.habits.keep_sources,
             order: self.controlled.as_mut().and_then(control::Controlled::take_order),
         });
     }
@@ -154,15 +163,21 @@ impl App {
         let false_colors = self.state.legend.map(|_| self.false_colors.image());
         let State { mirror, split, source, .. } = &self.state;
         let view = self.view.as_ref();
-        let in_memory = view.and_then(|view| view.picture.memory()).unwrap_or(&self.blank);
+        // Off, the person sees what others see.
+        if self.state.off && self.card.size() != size {
+            self.card = ColorImage::new(size.0, size.1);
+            card::draw(&mut self.card);
+        }
+        let none = if self.state.off { &self.card } else { &self.blank };
+        let in_memory = view.and_then(|view| view.picture.memory()).unwrap_or(none);
         let on_device = view.and_then(|view| view.picture.device()).filter(|there| gfx.presenter.takes(there));
         let picture = on_device.map_or(Image::Memory(in_memory), Image::Device);
         // Where nothing was blurred, before and after are the same.
         let before = view.map(|view| view.color.as_deref().unwrap_or(in_memory));
         let background = if self.ctx.theme() == egui::Theme::Dark { [18, 18, 20] } else { [232, 232, 236] };
-        let (area, part) = gfx.area(size, self.state.zoom, *mirror);
+        let (area, part) = gfx.area(size, panel::room_px(&self.ctx), self.state.zoom, *mirror);
         let drawing = Drawing {
-            area: if self.view.is_some() { area } else { Area::default() },
+            area: if self.view.is_some() || self.state.off { area } else { Area::default() },
             part,
             picture: false_colors.map_or(picture, Image::Memory),
             before: before.zip(*split),

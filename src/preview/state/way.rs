@@ -1,0 +1,59 @@
+//! Where depth comes from, as a person chooses it.
+
+use crate::source::{DepthChoice, DepthFrom, NetworkFile, OneCamera, PlateFile};
+
+/// A way to depth.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Way {
+    /// The source's own: a depth camera's, or recorded.
+    Measured,
+    /// Two eyes.
+    Stereo,
+    /// A network that finds people.
+    Person,
+    /// That, and one that tells how far everything is.
+    PersonAndDistance,
+    /// A picture of what is behind, taken now.
+    Plate,
+}
+
+impl Way {
+    /// As `--depth` takes it, for the network that is installed.
+    pub fn choice(self) -> DepthChoice {
+        let installed = Some(NetworkFile::Installed);
+        match self {
+            Self::Measured => DepthChoice::Recorded,
+            Self::Stereo => DepthChoice::Stereo,
+            Self::Person => DepthChoice::OneCamera(OneCamera { matte: installed, ..OneCamera::default() }),
+            Self::PersonAndDistance => {
+                DepthChoice::OneCamera(OneCamera { matte: installed.clone(), mono: installed, ..OneCamera::default() })
+            }
+            Self::Plate => DepthChoice::OneCamera(OneCamera {
+                plate: Some(PlateFile::Taken),
+                ..crate::source::installed_networks()
+            }),
+        }
+    }
+
+    /// What `--depth` calls it.
+    pub fn flag(self) -> String {
+        match self.choice() {
+            DepthChoice::Stereo => "stereo".to_owned(),
+            DepthChoice::OneCamera(chosen) => chosen.kinds(),
+            _ => "recorded".to_owned(),
+        }
+    }
+
+    /// The way by which a source got its depth, with a plate or without; `None` where it has none.
+    pub fn of(depth_from: DepthFrom, networks: &OneCamera, has_plate: bool) -> Option<Self> {
+        match depth_from {
+            DepthFrom::Nothing => None,
+            DepthFrom::Units | DepthFrom::Metres | DepthFrom::Relative => Some(Self::Measured),
+            DepthFrom::Eyes => Some(Self::Stereo),
+            _ if has_plate => Some(Self::Plate),
+            DepthFrom::Networks if networks.mono.is_some() => Some(Self::PersonAndDistance),
+            DepthFrom::Networks => Some(Self::Person),
+            DepthFrom::Plate => Some(Self::Plate),
+        }
+    }
+}
