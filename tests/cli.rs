@@ -6,6 +6,8 @@ use std::process::{Command, Output, Stdio};
 
 #[path = "cli/commands.rs"]
 mod commands;
+#[path = "cli/service.rs"]
+mod service;
 
 /// The program in an empty world: no settings of whoever runs the tests reach it.
 fn bokehcam(home: &Path, args: &[&str]) -> Command {
@@ -47,9 +49,10 @@ fn dumped(dump: &str, name: &str) -> (String, String) {
     (value.to_string(), origin.to_string())
 }
 
-const COMMANDS: [&[&str]; 14] = [
+const COMMANDS: [&[&str]; 15] = [
     &["stream"],
     &["ctl"],
+    &["service"],
     &["render"],
     &["depth"],
     &["record"],

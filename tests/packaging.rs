@@ -292,6 +292,7 @@ fn exit_code(args: &[&str]) -> (i32, String) {
 fn the_unit_gives_up_on_wrong_arguments_alone() {
     let unit = here("packaging/bokehcam.service");
     assert_eq!((value(&unit, "Restart"), value(&unit, "RestartPreventExitStatus")), ("on-failure", "2"));
+    assert_eq!(value(&unit, "StartLimitIntervalSec"), "0", "it is to be tried for as long as it takes");
 
     let two_eyes = concat!(env!("CARGO_MANIFEST_DIR"), "/recordings/stereo");
     let mut may_come = vec![

@@ -10,8 +10,8 @@ use crate::frame::fit::Fit;
 use crate::frame::{ColorImage, Stamp};
 use crate::link::pool::{Pool, Pooled};
 use crate::link::{self, Received, Receiver, Sender};
-use crate::pipewire::mode::{Mode, Offer};
-use crate::pipewire::reader::{Agreed, Frame, Reader, Take};
+use crate::pipewire::mode::{Agreed, Mode, Offer};
+use crate::pipewire::reader::{Frame, Reader, Take};
 use crate::stats::Cause;
 use crate::v4l2::live::Wish;
 use crate::v4l2::live::negotiate::{self, Wire};
@@ -47,11 +47,12 @@ struct Picture {
 
 impl PipeWireCamera {
     /// Opens the camera that `name` means, in the mode next to `wish`, and starts it. It ends after so many frames, those
-    /// that were lost not included; with `None` never.
+    /// that were lost not included; with `None` never. With `filters`, its pictures go to those who asked for this camera,
+    /// and come while there are any.
     ///
     /// # Errors
     /// There is none, or it cannot be used.
-    pub fn open(name: &str, wish: Wish, frames: Option<u64>) -> Result<Self, CaptureError> {
+    pub fn open(name: &str, filters: bool, wish: Wish, frames: Option<u64>) -> Result<Self, CaptureError> {
         let (to, from) = link::live();
         let taker = Taker {
             wish,
@@ -65,7 +66,7 @@ impl PipeWireCamera {
             losses: Losses::default(),
             complained: false,
         };
-        let (reader, camera, agreed) = Reader::new(name, taker)?;
+        let (reader, camera, agreed) = Reader::new(name, filters, taker)?;
         let interval = Interval { numerator: agreed.rate.1, denominator: agreed.rate.0 };
         let ((width, height), fourcc) = (agreed.size, FourCc(agreed.fourcc));
         let info = SourceInfo {

@@ -69,6 +69,9 @@ pub enum CliError {
     /// A run does not do what it was asked for.
     #[error("{0}")]
     Control(String),
+    /// The service cannot be switched.
+    #[error("{0}")]
+    Service(String),
     /// A diagram cannot be drawn.
     #[error("the diagram cannot be drawn: {0}")]
     Diagram(String),

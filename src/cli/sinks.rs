@@ -41,6 +41,16 @@ pub fn check(targets: &[Target], parts: &Streaming, source: &SourceName) -> Resu
             return usage(format!("--to {target}: this is the source itself; take a virtual camera of its own"));
         }
     }
+    if targets.contains(&Target::Filter) {
+        if source.shared().is_none() {
+            return usage(format!(
+                "--to filter: {source} is not a camera as PipeWire has it; `bokehcam devices` names it so, as pipewire:NAME"
+            ));
+        }
+        if targets.contains(&Target::Window) {
+            return usage("--to filter: not beside a window, which keeps the camera going".to_string());
+        }
+    }
     let has_camera = targets.iter().any(Target::is_camera);
     if stream.on_demand && !has_camera {
         return usage(

@@ -13,11 +13,12 @@ pub struct Header {
     pub sequence: u64,
 }
 
-/// Has `fill` write a frame of `frame_bytes` bytes into a free buffer of `stream`, with `stride` bytes from row to row,
-/// and hands it to the readers. Returns whether there was one: readers may hold them all.
+/// Has `fill` write a frame of `frame_bytes` bytes at most into a free buffer of `stream`, with `stride` bytes from row to
+/// row (0 where it has no rows), and hands it to the readers. `fill` returns how many bytes there are, with the header.
+/// Returns whether there was a buffer: readers may hold them all.
 ///
 /// Only for the thread of the stream's loop.
-pub fn give(stream: &Stream, frame_bytes: usize, stride: i32, fill: impl FnOnce(&mut [u8]) -> Header) -> bool {
+pub fn give(stream: &Stream, frame_bytes: usize, stride: i32, fill: impl FnOnce(&mut [u8]) -> (usize, Header)) -> bool {
     // SAFETY: the buffer, if it is not null, and all that it points to belong to this program from here to
     // `queue_raw_buffer`: buffers are removed by the stream's loop alone, which is busy with this call. PipeWire has
     // mapped `maxsize` bytes at `data` (flag MAP_BUFFERS) or left `data` null, and `chunk` and the header lie in memory
@@ -33,10 +34,10 @@ pub fn give(stream: &Stream, frame_bytes: usize, stride: i32, fill: impl FnOnce(
         let data = if (*buffer).n_datas == 0 { std::ptr::null_mut() } else { (*buffer).datas };
         let has_room = !data.is_null() && !(*data).data.is_null() && (*data).maxsize as usize >= frame_bytes;
         if has_room {
-            let header = fill(slice::from_raw_parts_mut((*data).data.cast::<u8>(), frame_bytes));
+            let (used, header) = fill(slice::from_raw_parts_mut((*data).data.cast::<u8>(), frame_bytes));
             let chunk = (*data).chunk;
             (*chunk).offset = 0;
-            (*chunk).size = frame_bytes as u32;
+            (*chunk).size = used.min(frame_bytes) as u32;
             (*chunk).stride = stride;
             (*chunk).flags = 0;
             let size = size_of::<sys::spa_meta_header>();

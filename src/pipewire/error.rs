@@ -25,6 +25,11 @@ pub enum PipeWireError {
     /// A part of more than one name.
     #[error("'{name}' may be any of these cameras of PipeWire's: {}; say which", found.join(", "))]
     Ambiguous { name: String, found: Vec<String> },
+    /// The session manager is an old one, or another.
+    #[error(
+        "this session's manager gives no filter to who asks for a camera: it takes WirePlumber 0.5 or later (Debian 13, Fedora          40); --to pipewire is a camera of its own, which any can give"
+    )]
+    NoFilters,
     /// A loop.
     #[error("pipewire:{name} is what this program gives itself; take another camera")]
     Own { name: String },

@@ -52,6 +52,8 @@ pub struct Graph {
     pub names: Vec<String>,
     /// Programs that are connected, by their own names.
     pub clients: Vec<String>,
+    /// Whether the session manager gives a filter to who asks for the camera that it is for.
+    pub has_filters: bool,
 }
 
 impl Graph {
@@ -69,6 +71,18 @@ impl Graph {
     /// As for [`Graph::look`].
     pub fn look_closely() -> Result<Self, PipeWireError> {
         Self::of(&Session::open()?, |_| true)
+    }
+
+    /// The camera that `name` means, with its modes, for a filter to stand in for.
+    ///
+    /// # Errors
+    /// There is none, there are several, or the session manager knows no filters.
+    pub fn filterable(name: &str) -> Result<Camera, PipeWireError> {
+        let session = Session::open()?;
+        if !Self::of(&session, |_| false)?.has_filters {
+            return Err(PipeWireError::NoFilters);
+        }
+        Self::camera(&session, name, false)
     }
 
     /// The camera that `name` means, with its modes; with `exactly`, what programs remember it by has to be the same.
@@ -149,6 +163,7 @@ struct Found {
     sources: Vec<Told>,
     names: Vec<String>,
     clients: Vec<Client>,
+    has_filters: bool,
 }
 
 /// A video node.
@@ -197,6 +212,10 @@ impl Found {
                 self.sources.push(Told { source, client, formats: Rc::default(), _asked: None });
                 true
             }
+            ObjectType::Metadata => {
+                self.has_filters |= properties.get("metadata.name") == Some("filters");
+                false
+            }
             _ => false,
         }
     }
@@ -215,12 +234,13 @@ impl Found {
     }
 
     fn graph(self) -> Graph {
-        let Self { sources, names, clients } = self;
+        let Self { sources, names, clients, has_filters } = self;
         let process = |id: Option<u32>| clients.iter().find(|client| Some(client.id) == id)?.process;
         let sources = sources.into_iter().map(|Told { source, client, formats, .. }| {
             let modes = formats.borrow().iter().flat_map(|pod| mode::read(pod)).collect();
             Source { process: process(client), modes, ..source }
         });
-        Graph { sources: sources.collect(), names, clients: clients.iter().map(|client| client.name.clone()).collect() }
+        let clients = clients.iter().map(|client| client.name.clone()).collect();
+        Graph { sources: sources.collect(), names, clients, has_filters }
     }
 }

@@ -18,6 +18,11 @@ mod wake;
 
 pub use error::PipeWireError;
 
+/// The group of the nodes that this program filters a camera with: what is in it is not given the filter itself.
+fn group() -> String {
+    format!("bokehcam-{}", std::process::id())
+}
+
 /// Whether there is a socket where the daemon of this session is looked for.
 pub fn is_there() -> bool {
     std::path::Path::new(&session::socket()).exists()

@@ -63,6 +63,37 @@ pub struct Mode {
     pub rates: Offer<(u32, u32)>,
 }
 
+/// What pictures are like.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Agreed {
+    pub fourcc: FourCc,
+    /// Columns and rows.
+    pub size: (u32, u32),
+    /// Pictures per second, as a fraction, > 0.
+    pub rate: (u32, u32),
+}
+
+impl Agreed {
+    /// The mode that offers this and nothing else.
+    pub fn mode(&self) -> Mode {
+        let Self { fourcc, size, rate } = *self;
+        Mode { fourcc, sizes: Offer::These(vec![size]), rates: Offer::These(vec![rate]) }
+    }
+}
+
+/// What two sides have agreed on; `None` where that is not known here.
+pub(super) fn agreed(format: &[u8]) -> Option<Agreed> {
+    read(format).into_iter().find_map(|Mode { fourcc, sizes, rates }| {
+        let Offer::These(sizes) = sizes else { return None };
+        let rate = match rates {
+            // A rate of 0 is one that varies.
+            Offer::These(rates) => rates.first().copied().filter(|(num, denom)| *num > 0 && *denom > 0),
+            _ => None,
+        };
+        Some(Agreed { fourcc, size: *sizes.first()?, rate: rate.unwrap_or((30, 1)) })
+    })
+}
+
 /// The modes in one entry of a camera's list: none where its formats are not known here.
 pub(super) fn read(pod: &[u8]) -> Vec<Mode> {
     let Ok((_, Value::Object(object))) = PodDeserializer::deserialize_any_from(pod) else { return Vec::new() };
@@ -136,10 +167,20 @@ mod tests {
     #[test]
     fn what_is_written_is_read() {
         for (fourcc, _) in FORMATS {
-            let pod = param::format(fourcc, (1280, 720), (30_000, 1001));
-            let mode =
-                Mode { fourcc, sizes: Offer::These(vec![(1280, 720)]), rates: Offer::These(vec![(30_000, 1001)]) };
-            assert_eq!(read(&pod), [mode]);
+            let one = Agreed { fourcc, size: (1280, 720), rate: (30_000, 1001) };
+            let pod = param::format(&one);
+            assert_eq!((read(&pod), agreed(&pod)), (vec![one.mode()], Some(one)));
+            let several = Mode {
+                fourcc,
+                sizes: Offer::These(vec![(640, 480), (1280, 720)]),
+                rates: Offer::Range { min: (0, 1), max: (60, 1) },
+            };
+            assert_eq!(read(&param::offer(&several, &one)), [several]);
+            let silent = Mode { fourcc, sizes: Offer::Unknown, rates: Offer::Unknown };
+            assert_eq!(
+                (read(&param::offer(&silent, &one)), agreed(&param::offer(&silent, &one))),
+                (vec![silent], None)
+            );
         }
     }
 

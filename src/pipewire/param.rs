@@ -3,20 +3,24 @@
 use pipewire::spa::param::ParamType;
 use pipewire::spa::param::format::{FormatProperties, MediaSubtype, MediaType};
 use pipewire::spa::pod::serialize::PodSerializer;
-use pipewire::spa::pod::{ChoiceValue, Object, Property, Value};
+use pipewire::spa::pod::{CanonicalFixedSizedPod, ChoiceValue, Object, Property, Value};
 use pipewire::spa::sys;
 use pipewire::spa::utils::{Choice, ChoiceEnum, ChoiceFlags, Fraction, Id, Rectangle, SpaTypes};
 
-use super::mode::{self, FourCc};
+use super::mode::{self, Agreed, Mode, Offer};
 
 /// Buffers that are asked for, fewest to most: as many as readers may hold at once.
 const BUFFERS: (i32, i32, i32) = (4, 2, 16);
 
-/// One picture format with one size and one rate (pictures per second as a fraction): browsers and OBS list no camera
-/// that leaves one of them open.
-pub fn format(fourcc: FourCc, (width, height): (u32, u32), (num, denom): (u32, u32)) -> Vec<u8> {
+/// One picture format with one size and one rate: browsers and OBS list no camera that leaves one of them open.
+pub fn format(agreed: &Agreed) -> Vec<u8> {
+    offer(&agreed.mode(), agreed)
+}
+
+/// A mode, of which `best` is to be taken where the other side has no wish.
+pub fn offer(mode: &Mode, best: &Agreed) -> Vec<u8> {
     let id = |key: FormatProperties, value: u32| Property::new(key.as_raw(), Value::Id(Id(value)));
-    let raw = mode::video_format(fourcc);
+    let raw = mode::video_format(mode.fourcc);
     let subtype = if raw.is_some() { MediaSubtype::Raw } else { MediaSubtype::Mjpg };
     object(
         SpaTypes::ObjectParamFormat,
@@ -25,13 +29,51 @@ pub fn format(fourcc: FourCc, (width, height): (u32, u32), (num, denom): (u32, u
             Some(id(FormatProperties::MediaType, MediaType::Video.as_raw())),
             Some(id(FormatProperties::MediaSubtype, subtype.as_raw())),
             raw.map(|format| id(FormatProperties::VideoFormat, format.as_raw())),
-            Some(Property::new(FormatProperties::VideoSize.as_raw(), Value::Rectangle(Rectangle { width, height }))),
-            Some(Property::new(FormatProperties::VideoFramerate.as_raw(), Value::Fraction(Fraction { num, denom }))),
+            values(&mode.sizes, best.size, |(width, height)| Rectangle { width, height })
+                .map(|sizes| one_or(sizes, Value::Rectangle, ChoiceValue::Rectangle))
+                .map(|sizes| Property::new(FormatProperties::VideoSize.as_raw(), sizes)),
+            values(&mode.rates, best.rate, |(num, denom)| Fraction { num, denom })
+                .map(|rates| one_or(rates, Value::Fraction, ChoiceValue::Fraction))
+                .map(|rates| Property::new(FormatProperties::VideoFramerate.as_raw(), rates)),
         ]
         .into_iter()
         .flatten()
         .collect(),
     )
+}
+
+/// What is offered, in PipeWire's notation: a single value as [`ChoiceEnum::None`].
+fn values<T: CanonicalFixedSizedPod>(
+    offer: &Offer<(u32, u32)>,
+    best: (u32, u32),
+    value: impl Fn((u32, u32)) -> T,
+) -> Option<ChoiceEnum<T>> {
+    match offer {
+        Offer::Unknown => None,
+        Offer::These(all) => match all[..] {
+            [] => None,
+            [only] => Some(ChoiceEnum::None(value(only))),
+            [first, ..] => Some(ChoiceEnum::Enum {
+                default: value(if all.contains(&best) { best } else { first }),
+                alternatives: all.iter().map(|one| value(*one)).collect(),
+            }),
+        },
+        Offer::Range { min, max } => {
+            Some(ChoiceEnum::Range { default: value(best), min: value(*min), max: value(*max) })
+        }
+    }
+}
+
+/// A value by itself, or a choice.
+fn one_or<T: CanonicalFixedSizedPod>(
+    values: ChoiceEnum<T>,
+    one: impl Fn(T) -> Value,
+    several: impl Fn(Choice<T>) -> ChoiceValue,
+) -> Value {
+    match values {
+        ChoiceEnum::None(value) => one(value),
+        values => Value::Choice(several(Choice(ChoiceFlags::empty(), values))),
+    }
 }
 
 /// Buffers in memory, as the other side lays them out.

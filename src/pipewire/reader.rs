@@ -19,7 +19,7 @@ use pipewire::stream::{Stream, StreamFlags, StreamRc, StreamState};
 
 use super::PipeWireError;
 use super::graph::{Camera, Graph};
-use super::mode::{self, FourCc, Mode, Offer};
+use super::mode::{self, Agreed, Mode};
 use super::param;
 use super::session::Session;
 use super::wake::Waker;
@@ -38,16 +38,6 @@ const LEAST_SILENCE_NS: u64 = 1_000_000_000;
 const OLDEST_NS: u64 = 10_000_000_000;
 /// A gap in a camera's numbers that is longer is no loss, but another count.
 const MOST_MISSED: u64 = 1000;
-
-/// What pictures are like.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Agreed {
-    pub fourcc: FourCc,
-    /// Columns and rows.
-    pub size: (u32, u32),
-    /// Pictures per second, as a fraction, > 0.
-    pub rate: (u32, u32),
-}
 
 /// A picture in PipeWire's memory.
 pub struct Frame<'a> {
@@ -91,11 +81,12 @@ type Ready = mpsc::Sender<Result<(Camera, Agreed), PipeWireError>>;
 
 impl Reader {
     /// Begins to read from the camera that `name` means: what programs remember it by, what people see, or a part of
-    /// one of them.
+    /// one of them. With `filters`, its pictures go to those who asked for this camera, by a node of this program's that
+    /// stands in for it: then they come while that has readers.
     ///
     /// # Errors
     /// There is no daemon, no such camera, or it offers nothing that can be used.
-    pub fn new(name: &str, take: impl Take) -> Result<(Self, Camera, Agreed), PipeWireError> {
+    pub fn new(name: &str, filters: bool, take: impl Take) -> Result<(Self, Camera, Agreed), PipeWireError> {
         let waker = Waker::new().map_err(PipeWireError::Thread)?;
         let (stop, is_wanted) = (Arc::new(AtomicBool::new(false)), Arc::new(AtomicBool::new(true)));
         let (ready, is_ready) = mpsc::channel();
@@ -108,6 +99,7 @@ impl Reader {
             last_ns: Cell::new(0),
             sequence: Cell::new(None),
             is_away: Cell::new(None),
+            filters,
         };
         let (bell, end, wanted, meant) = (waker.clone(), Arc::clone(&stop), Arc::clone(&is_wanted), name.to_owned());
         let run = move || Rc::new(listener).run(&meant, &bell, [&end, &wanted]);
@@ -149,6 +141,8 @@ struct Listener {
     sequence: Cell<Option<u64>>,
     /// Since when there are no pictures, if that was said.
     is_away: Cell<Option<u64>>,
+    /// Whether the pictures go to those who asked for the camera.
+    filters: bool,
 }
 
 impl Listener {
@@ -158,7 +152,11 @@ impl Listener {
                 waker.wait(LONG);
                 continue;
             }
+            let is_first = self.ready.borrow().is_some();
             let ended = self.serve(meant, waker, [stop, wanted]);
+            if self.filters && is_first && self.ready.borrow().is_none() {
+                continue;
+            }
             if stop.load(Ordering::Acquire) || !wanted.load(Ordering::Acquire) {
                 continue;
             }
@@ -195,12 +193,20 @@ impl Listener {
         let camera = Graph::camera(&session, known.as_deref().unwrap_or(meant), known.is_some())?;
         let refused = |why| PipeWireError::NoMode { name: camera.name.clone(), why };
         let asked = self.take.borrow_mut().choose(&camera.modes).map_err(refused)?;
-        let about = properties! {
+        // A camera tells its format to those alone who keep it going.
+        let is_passive = self.filters && self.ready.borrow().is_none();
+        let mut about = properties! {
             *pipewire::keys::MEDIA_TYPE => "Video",
             *pipewire::keys::MEDIA_CATEGORY => "Capture",
             *pipewire::keys::MEDIA_ROLE => "Camera",
             "target.object" => camera.serial.as_str(),
         };
+        if self.filters {
+            about.insert("node.link-group", super::group());
+        }
+        if is_passive {
+            about.insert("node.passive", "in");
+        }
         let stream =
             StreamRc::new(session.core.clone(), "bokehcam", about).map_err(PipeWireError::refused("a stream"))?;
         self.camera.replace(Some(camera));
@@ -210,8 +216,10 @@ impl Listener {
         let _listener = stream
             .add_local_listener::<()>()
             .state_changed(move |_, (), old, state| {
-                let has_gone = matches!(state, StreamState::Error(_) | StreamState::Unconnected)
-                    || (old, &state) == (StreamState::Streaming, &StreamState::Paused);
+                let rests = (old, &state) == (StreamState::Streaming, &StreamState::Paused);
+                // One that is passive rests while nobody reads.
+                let has_gone =
+                    matches!(state, StreamState::Error(_) | StreamState::Unconnected) || rests && !is_passive;
                 ended.set(ended.get() || has_gone);
             })
             .param_changed(move |stream, (), id, format| {
@@ -222,7 +230,7 @@ impl Listener {
             .process(move |stream, ()| pictures.take(stream))
             .register()
             .map_err(PipeWireError::refused("to be listened to"))?;
-        let format = param::format(asked.fourcc, asked.size, asked.rate);
+        let format = param::format(&asked);
         let mut formats: Vec<&Pod> = Pod::from_bytes(&format).into_iter().collect();
         let flags = StreamFlags::AUTOCONNECT | StreamFlags::DONT_RECONNECT | StreamFlags::MAP_BUFFERS;
         stream.connect(Direction::Input, None, flags, &mut formats).map_err(PipeWireError::refused("a reader"))?;
@@ -232,6 +240,17 @@ impl Listener {
         self.last_ns.set(self.clock.now_ns());
         self.sequence.set(None);
         while !stop.load(Ordering::Acquire) && wanted.load(Ordering::Acquire) {
+            if self.filters && !is_passive && self.ready.borrow().is_none() {
+                break;
+            }
+            if is_passive && stream.state() != StreamState::Streaming {
+                session.serve(Some(LONG));
+                self.last_ns.set(self.clock.now_ns());
+                if session.is_lost() || has_ended.get() {
+                    break;
+                }
+                continue;
+            }
             let until_ns = self.last_ns.get() + self.longest_silence_ns();
             session.serve(Some(Duration::from_nanos(until_ns.saturating_sub(self.clock.now_ns()))));
             if session.is_lost() || has_ended.get() || self.clock.now_ns() >= until_ns.max(self.last_ns.get()) {
@@ -250,16 +269,9 @@ impl Listener {
 
     /// The camera says what its pictures are like.
     fn agree(&self, stream: &Stream, format: &[u8]) {
-        let agreed = mode::read(format).into_iter().find_map(|Mode { fourcc, sizes, rates }| match (sizes, rates) {
-            (Offer::These(sizes), Offer::These(rates)) => {
-                // A rate of 0 is one that varies.
-                let rate = *rates.first().filter(|(num, denom)| *num > 0 && *denom > 0).unwrap_or(&(30, 1));
-                Some(Agreed { fourcc, size: *sizes.first()?, rate })
-            }
-            (Offer::These(sizes), _) => Some(Agreed { fourcc, size: *sizes.first()?, rate: (30, 1) }),
-            _ => None,
-        });
-        let Some(agreed) = agreed else { return tracing::warn!("{}: its pictures cannot be read", self.name()) };
+        let Some(agreed) = mode::agreed(format) else {
+            return tracing::warn!("{}: its pictures cannot be read", self.name());
+        };
         self.agreed.set(Some(agreed));
         self.take.borrow_mut().begin(&agreed);
         let pods = [param::any_buffers(), param::header()];

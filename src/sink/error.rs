@@ -133,6 +133,9 @@ pub enum SinkError {
         "pipewire:NAME needs a name that people can read, such as pipewire:'My camera'; without one, it is pipewire"
     )]
     NoLabel,
+    /// A filter without the camera that it is for.
+    #[error("--to filter is for a stream of a camera that PipeWire has: bokehcam stream pipewire:NAME --to filter")]
+    Filter,
     /// Built without virtual cameras.
     #[cfg(not(feature = "camera"))]
     #[error("{}: this program was built without cameras; build it with the feature camera", path.display())]

@@ -215,6 +215,8 @@ pub struct Options {
     pub threads: Option<usize>,
     /// Notice by a virtual camera whether somebody watches.
     pub demand: Option<Demand>,
+    /// For a filter: what the camera of PipeWire's is called, or a part of that, whose readers it gives its pictures to.
+    pub stands_for: Option<String>,
     /// Once set, the run is to end: nobody is waited for any more who does nothing.
     pub stop: Arc<AtomicBool>,
 }
@@ -223,7 +225,17 @@ impl Options {
     /// Nothing that exists is overwritten, nobody is told of readers, and nothing stops the run.
     pub fn new(size: (u32, u32), period_ns: u64) -> Self {
         let stop = Arc::default();
-        Self { size, period_ns, frames: None, force: false, out_size: None, threads: None, demand: None, stop }
+        Self {
+            size,
+            period_ns,
+            frames: None,
+            force: false,
+            out_size: None,
+            threads: None,
+            demand: None,
+            stands_for: None,
+            stop,
+        }
     }
 }
 

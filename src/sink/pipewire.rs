@@ -1,22 +1,29 @@
-//! A virtual camera of PipeWire's: what call programs of the session list as a camera, without a kernel module.
+//! A virtual camera of PipeWire's: what call programs of the session list as a camera, without a kernel module; or a filter,
+//! which programs are given that ask for a real one.
 //!
-//! Pictures go to the node's thread as YUYV, by a slot in which the newest wins, and are copied there to the readers'
-//! memory. While nobody watches they stay here. The node shows a still card until the first one comes, and again once
-//! nobody watches.
+//! Pictures go to the node's thread in the format that readers take, by a slot in which the newest wins, and are copied there
+//! to the readers' memory. While nobody watches they stay here. The node shows a still card until the first one comes, and
+//! again once nobody watches.
+
+mod encoder;
 
 use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::Duration;
 
+use encoder::{Encoder, Format, writable};
+
 use super::rate::frame_rate;
-use super::{Counter, Options, Sink, SinkError, card, check_size, yuyv};
-use crate::frame::fit::Fit;
+use super::{Counter, Options, Sink, SinkError, card, check_size};
 use crate::frame::{ColorImage, YuyvImage};
 use crate::link::demand::{Demand, Watch};
 use crate::link::pool::{Pool, Pooled};
 use crate::link::{self, Receiver, Sender};
-use crate::pipewire::node::{Node, Settings, Show};
+use crate::pipewire::PipeWireError;
+use crate::pipewire::graph::Graph;
+use crate::pipewire::mode::{Agreed, Mode};
+use crate::pipewire::node::{Drawn, Memory, Node, Settings, Show};
 use crate::stats::NodeUse;
 
 /// What a camera is called that was given no name.
@@ -30,22 +37,28 @@ const PICTURES: usize = 4;
 /// A camera that is given to PipeWire.
 pub struct PipeWire {
     node: Node,
-    label: String,
+    about: String,
+    /// Of the pictures of the run.
     size: (u32, u32),
     to: Sender<Frame>,
-    pictures: Pool<YuyvImage>,
-    /// Whether the pictures of the run have its size.
-    wants_yuyv: bool,
-    encoder: yuyv::Encoder,
-    fit: Fit,
-    fitted: ColorImage,
+    pictures: Pool<Picture>,
+    /// What readers have agreed on, packed.
+    format: Arc<AtomicU64>,
+    /// For what was agreed on when the last picture came.
+    encoder: Encoder,
     is_watched: Arc<AtomicBool>,
     captured_ns: u64,
 }
 
+/// A picture in the format of readers.
+struct Picture {
+    format: Format,
+    bytes: Vec<u8>,
+}
+
 /// A picture on its way to the node.
 struct Frame {
-    picture: Pooled<YuyvImage>,
+    picture: Pooled<Picture>,
     /// By the system's monotonic clock.
     captured_ns: u64,
 }
@@ -57,48 +70,77 @@ impl PipeWire {
     /// # Errors
     /// PipeWire cannot be reached, or refuses.
     pub fn open(label: Option<&str>, options: &Options) -> Result<Self, SinkError> {
+        let label = label.unwrap_or(NAME);
+        let camera = Self::new(label, (node_name(label), None), |best| vec![best.mode()], options)?;
+        let (width, height) = camera.encoder.format().size();
+        let about = format!("PipeWire camera {} ({label}), YUY2 {width}x{height}", camera.node.name());
+        Ok(Self { about, ..camera })
+    }
+
+    /// Gives everybody who asks for the camera that the options [name](Options::stands_for) the pictures of this sink, in the
+    /// formats of that camera.
+    ///
+    /// # Errors
+    /// As for [`PipeWire::open`]; there is no such camera, or the session manager knows no filters.
+    pub fn filter(options: &Options) -> Result<Self, SinkError> {
+        let meant = options.stands_for.as_deref().ok_or(SinkError::Filter)?;
+        let camera = Graph::filterable(meant)?;
+        let modes = writable(&camera.modes);
+        if modes.is_empty() {
+            let why = "it gives pictures of no format that can be written".to_owned();
+            return Err(PipeWireError::NoMode { name: camera.name, why }.into());
+        }
+        let label = format!("{}, blurred", camera.label);
+        let name = (format!("{NAME}.{}", camera.name), Some(camera.name.clone()));
+        let filter = Self::new(&label, name, |_| modes, options)?;
+        let about = format!("everybody who asks for pipewire:{} ({})", camera.name, camera.label);
+        Ok(Self { about, ..filter })
+    }
+
+    /// A node of this name, perhaps one that stands for a camera, with the modes that `modes` makes of its own best one.
+    fn new(
+        label: &str,
+        (name, stands_for): (String, Option<String>),
+        modes: impl FnOnce(&Agreed) -> Vec<Mode>,
+        options: &Options,
+    ) -> Result<Self, SinkError> {
         let (width, height) = options.out_size.unwrap_or(options.size);
         // Two pixels share their colour, and readers halve the height as well.
         let size = ((width & !1).max(2), (height & !1).max(2));
         let (rate, scale) = frame_rate(options.period_ns);
         let saturated = |number: u64| u32::try_from(number).unwrap_or(u32::MAX);
-        let label = label.unwrap_or(NAME).to_owned();
+        let best = Agreed { fourcc: *b"YUYV", size, rate: (saturated(rate), saturated(scale)) };
         let settings = Settings {
-            name: node_name(&label),
-            label: label.clone(),
-            size,
-            rate: (saturated(rate), saturated(scale)),
+            name,
+            label: label.to_owned(),
+            modes: modes(&best),
+            best,
+            stands_for,
             hold: (2 * Duration::from_nanos(options.period_ns)).clamp(HOLD.0, HOLD.1),
         };
         let (to, from) = link::live();
-        let is_watched = Arc::new(AtomicBool::new(false));
-        let (mut fitted, encoder) = (ColorImage::new(size.0, size.1), yuyv::Encoder::new());
-        card::draw(&mut fitted);
-        let blank = || YuyvImage::new(size.0, size.1);
-        let mut card = blank();
-        encoder.encode(&fitted, &mut card.bytes);
-        let screen = Screen {
+        let (is_watched, format) = (Arc::new(AtomicBool::new(false)), Arc::new(AtomicU64::default()));
+        let mut screen = Screen {
             from,
             frame: None,
             is_new: false,
-            card,
+            card: Picture { format: Format::from(&best), bytes: Vec::new() },
+            format: Arc::clone(&format),
             demand: options.demand.clone(),
             watch: None,
             is_watched: Arc::clone(&is_watched),
         };
-        Ok(Self {
-            node: Node::new(settings, screen)?,
-            label,
-            size,
-            to,
-            pictures: Pool::new(PICTURES, blank),
-            wants_yuyv: size == options.size,
-            encoder,
-            fit: Fit::default(),
-            fitted,
-            is_watched,
-            captured_ns: 0,
-        })
+        screen.begin(&best);
+        let encoder = Encoder::new(Format::from(&best)).ok_or(SinkError::Yuyv)?;
+        let (first, bytes) = (encoder.format(), encoder.memory().bytes);
+        let node = Node::new(settings, screen)?;
+        let pictures = Pool::new(PICTURES, || Picture { format: first, bytes: vec![0; bytes] });
+        let about = String::new();
+        Ok(Self { node, about, size: options.size, to, pictures, format, encoder, is_watched, captured_ns: 0 })
+    }
+
+    fn agreed(&self) -> Format {
+        Format::unpacked(self.format.load(Ordering::Relaxed))
     }
 }
 
@@ -115,7 +157,7 @@ fn node_name(label: &str) -> String {
 
 impl PipeWire {
     /// Sends the node a picture, which `make` makes where it is for somebody.
-    fn send(&mut self, make: impl FnOnce(&mut Self, &mut YuyvImage)) -> ControlFlow<()> {
+    fn send(&mut self, make: impl FnOnce(&mut Self, &mut Picture)) -> ControlFlow<()> {
         if !self.is_watched.load(Ordering::Relaxed) {
             count(&self.node.counts().unwatched, 1);
             return ControlFlow::Continue(());
@@ -141,18 +183,29 @@ impl Sink for PipeWire {
     }
 
     fn put(&mut self, frame: &ColorImage, _: u64) -> Result<ControlFlow<()>, SinkError> {
+        let format = self.agreed();
+        if self.encoder.format() != format
+            && let Some(encoder) = Encoder::new(format)
+        {
+            self.encoder = encoder;
+        }
         Ok(self.send(|camera, picture| {
-            camera.encoder.encode(camera.fit.fitted(frame, &mut camera.fitted), &mut picture.bytes);
+            picture.format = camera.encoder.format();
+            camera.encoder.encode(frame, &mut picture.bytes);
         }))
     }
 
     fn wants_yuyv(&mut self) -> bool {
-        self.wants_yuyv
+        self.agreed().is_yuyv(self.size)
     }
 
     fn put_yuyv(&mut self, frame: &mut YuyvImage, _: u64) -> Result<ControlFlow<()>, SinkError> {
         check_size(self.size, frame.size())?;
-        Ok(self.send(|_, picture| std::mem::swap(picture, frame)))
+        Ok(self.send(|camera, picture| {
+            // What readers have agreed on meanwhile comes with the next one.
+            picture.format = Format::yuyv(camera.size);
+            std::mem::swap(&mut picture.bytes, &mut frame.bytes);
+        }))
     }
 
     fn is_live(&self) -> bool {
@@ -174,8 +227,7 @@ impl Sink for PipeWire {
     }
 
     fn describe(&self) -> String {
-        let (width, height) = self.size;
-        format!("PipeWire camera {} ({}), YUY2 {width}x{height}", self.node.name(), self.label)
+        self.about.clone()
     }
 }
 
@@ -186,8 +238,10 @@ struct Screen {
     frame: Option<Frame>,
     /// Whether that was not drawn yet.
     is_new: bool,
-    /// Shown while there is none.
-    card: YuyvImage,
+    /// Shown while there is none, as agreed.
+    card: Picture,
+    /// Tells what was agreed on.
+    format: Arc<AtomicU64>,
     demand: Option<Demand>,
     watch: Option<Watch>,
     is_watched: Arc<AtomicBool>,
@@ -202,11 +256,25 @@ impl Show for Screen {
         true
     }
 
-    fn draw(&mut self, bytes: &mut [u8]) -> Option<u64> {
-        let picture = self.frame.as_ref().map_or(&self.card, |frame| &frame.picture);
-        bytes.copy_from_slice(&picture.bytes);
+    fn begin(&mut self, agreed: &Agreed) -> Memory {
+        let Some(mut encoder) = Encoder::new(Format::from(agreed)) else { return Memory::default() };
+        let mut card = ColorImage::new(agreed.size.0, agreed.size.1);
+        card::draw(&mut card);
+        self.card.format = encoder.format();
+        encoder.encode(&card, &mut self.card.bytes);
+        self.format.store(encoder.format().packed(), Ordering::Relaxed);
+        encoder.memory()
+    }
+
+    fn draw(&mut self, bytes: &mut [u8]) -> Drawn {
+        let agreed = self.card.format;
+        let fits = |frame: &&Frame| frame.picture.format == agreed && frame.picture.bytes.len() <= bytes.len();
+        let frame = self.frame.as_ref().filter(fits);
+        let picture = frame.map_or(&self.card, |frame| &frame.picture);
+        let used = picture.bytes.len().min(bytes.len());
+        bytes[..used].copy_from_slice(&picture.bytes[..used]);
         let is_new = std::mem::take(&mut self.is_new);
-        self.frame.as_ref().filter(|_| is_new).map(|frame| frame.captured_ns)
+        Drawn { bytes: used, captured_ns: frame.filter(|_| is_new).map(|frame| frame.captured_ns) }
     }
 
     fn watched(&mut self, is_watched: bool) {

@@ -16,6 +16,7 @@ use crate::names::nearest;
 
 /// How the name of a camera of PipeWire's begins.
 const PIPEWIRE: &str = "pipewire";
+const FILTER: &str = "filter";
 
 /// A sink as named on the command line (`--to`).
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -32,6 +33,8 @@ pub enum Target {
     Device(PathBuf),
     /// `pipewire` or `pipewire:NAME`: a camera of PipeWire's, with the name that people see.
     PipeWire(Option<String>),
+    /// `filter`: given to all who ask for the camera that is the source.
+    Filter,
     /// `window`: seen on the screen.
     Window,
     /// `DIR/`, or an existing folder that we wrote: numbered PNG files.
@@ -49,6 +52,7 @@ impl FromStr for Target {
             ("null", _) => Ok(Self::Null),
             ("-", _) => Ok(Self::Stdout),
             ("window", _) => Ok(Self::Window),
+            (FILTER, _) => Ok(Self::Filter),
             ("/dev/stdout" | "/dev/fd/1" | "/proc/self/fd/1", _) => Err(SinkError::NameOfStdout),
             (PIPEWIRE, _) => Ok(Self::PipeWire(None)),
             _ if let Some(label) = name.strip_prefix(PIPEWIRE).and_then(|rest| rest.strip_prefix(':')) => {
@@ -77,7 +81,7 @@ fn near(name: &str) -> Option<String> {
         return Some(format!("/dev/video{number}"));
     }
     let (word, label) = name.find(':').map_or((name, ""), |at| name.split_at(at));
-    nearest(word, [PIPEWIRE, "window", "null"]).map(|sink| format!("{sink}{label}"))
+    nearest(word, [PIPEWIRE, FILTER, "window", "null"]).map(|sink| format!("{sink}{label}"))
 }
 
 /// Whether this is a character device, or the name of a video device that is not there yet.
@@ -93,6 +97,7 @@ impl fmt::Display for Target {
             Self::Null => f.write_str("null"),
             Self::Stdout => f.write_str("-"),
             Self::Window => f.write_str("window"),
+            Self::Filter => f.write_str(FILTER),
             Self::PipeWire(None) => f.write_str(PIPEWIRE),
             Self::PipeWire(Some(label)) => write!(f, "{PIPEWIRE}:{label}"),
             Self::Y4m(path) | Self::Video(path) | Self::Device(path) | Self::Folder(path) => path.display().fmt(f),
@@ -118,8 +123,10 @@ impl Target {
             Self::Device(path) => return Err(SinkError::NoCamera { path: path.clone() }),
             #[cfg(feature = "pipewire")]
             Self::PipeWire(label) => Box::new(PipeWire::open(label.as_deref(), options)?),
+            #[cfg(feature = "pipewire")]
+            Self::Filter => Box::new(PipeWire::filter(options)?),
             #[cfg(not(feature = "pipewire"))]
-            Self::PipeWire(_) => return Err(SinkError::NoPipeWire),
+            Self::PipeWire(_) | Self::Filter => return Err(SinkError::NoPipeWire),
             Self::Window => return Err(SinkError::Window),
             Self::Folder(path) => Box::new(PngFolder::create(path, options)?),
         })
@@ -132,14 +139,14 @@ impl Target {
 
     /// Whether this is a virtual camera.
     pub fn is_camera(&self) -> bool {
-        matches!(self, Self::Device(_) | Self::PipeWire(_))
+        matches!(self, Self::Device(_) | Self::PipeWire(_) | Self::Filter)
     }
 
     /// Whether both write to the same place.
     pub fn collides_with(&self, other: &Self) -> bool {
         match (self, other) {
             (Self::Null, Self::Null) => false,
-            (Self::Stdout, Self::Stdout) | (Self::Window, Self::Window) => true,
+            (Self::Stdout, Self::Stdout) | (Self::Window, Self::Window) | (Self::Filter, Self::Filter) => true,
             (Self::PipeWire(own), Self::PipeWire(others)) => own == others,
             _ => match (self.path(), other.path()) {
                 (Some(own), Some(others)) => same_place(own, others),
@@ -156,7 +163,7 @@ impl Target {
     /// The file, folder or device that this writes to, if it is one.
     pub fn path(&self) -> Option<&Path> {
         match self {
-            Self::Null | Self::Stdout | Self::Window | Self::PipeWire(_) => None,
+            Self::Null | Self::Stdout | Self::Window | Self::Filter | Self::PipeWire(_) => None,
             Self::Y4m(path) | Self::Video(path) | Self::Device(path) | Self::Folder(path) => Some(path),
         }
     }

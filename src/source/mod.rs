@@ -116,6 +116,8 @@ pub struct Options {
     pub computing: Computing,
     /// Faulty lines in a recording's frame lists become frames that fail, instead of an error on opening.
     pub keep_going: bool,
+    /// The pictures of a camera of PipeWire's go to those who asked for that camera, and come while there are any.
+    pub filters: bool,
 }
 
 /// What the caller of [`Source::open`] asked for.

@@ -207,6 +207,15 @@ impl SourceName {
         }
     }
 
+    /// What a camera of PipeWire's is called there, or a part of that.
+    pub fn shared(&self) -> Option<&str> {
+        match self {
+            #[cfg(all(feature = "camera", feature = "pipewire"))]
+            Self::PipeWire(name) => Some(name),
+            _ => None,
+        }
+    }
+
     /// What it is.
     pub fn kind(&self) -> Kind {
         match self {

@@ -117,7 +117,12 @@ impl Opened {
                     );
                     return SourceError::usage(what);
                 }
-                Ok(without_depth(Box::new(PipeWireCamera::open(name, wish(frames), frames.frames)?)))
+                Ok(without_depth(Box::new(PipeWireCamera::open(
+                    name,
+                    wanted.options.filters,
+                    wish(frames),
+                    frames.frames,
+                )?)))
             }
             #[cfg(feature = "camera")]
             SourceName::Cameras([left, right]) => {

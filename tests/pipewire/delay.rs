@@ -8,8 +8,8 @@ use std::time::Duration;
 
 use bokehcam::clock::Clock;
 use bokehcam::frame::ColorImage;
-use bokehcam::pipewire::mode::{Mode, Offer};
-use bokehcam::pipewire::reader::{Agreed, Frame, Reader, Take};
+use bokehcam::pipewire::mode::{Agreed, Mode, Offer};
+use bokehcam::pipewire::reader::{Frame, Reader, Take};
 use bokehcam::sink::{Options, PipeWire, Sink};
 
 use super::session::{folder, until};
@@ -45,7 +45,7 @@ impl Take for Stopwatch {
 fn the_other_program() {
     let Ok(camera) = std::env::var("CAMERA_TO_TIME") else { return };
     let (to, from) = mpsc::channel();
-    let (_reader, ..) = Reader::new(&camera, Stopwatch(to)).unwrap();
+    let (_reader, ..) = Reader::new(&camera, false, Stopwatch(to)).unwrap();
     // It is ended once it has told of enough.
     from.iter().for_each(|(captured_ns, delay_ns)| println!("\n{captured_ns} {delay_ns}"));
 }

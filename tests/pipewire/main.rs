@@ -9,6 +9,8 @@
 mod browsers;
 mod camera;
 mod delay;
+#[cfg(feature = "camera")]
+mod filter;
 mod readers;
 mod session;
 #[cfg(feature = "camera")]

@@ -15,6 +15,7 @@ mod plate;
 mod preview;
 mod record;
 mod render;
+mod service;
 mod stream;
 
 use clap::{ArgMatches, CommandFactory, Parser, Subcommand};
@@ -56,6 +57,7 @@ pub enum Command {
     Render(Box<render::RenderCommand>),
     Depth(Box<depth::DepthCommand>),
     Ctl(ctl::CtlCommand),
+    Service(service::ServiceCommand),
     Record(Box<record::RecordCommand>),
     Plate(Box<plate::PlateCommand>),
     Aperture(aperture::ApertureCommand),
@@ -118,6 +120,7 @@ pub fn perform(cli: Cli, matches: &ArgMatches, file: &SettingsFile, layers: &Lay
         Command::Render(command) => render::run(&command, &cli.global, &layers.given(matches)),
         Command::Depth(command) => depth::run(&command, &cli.global),
         Command::Ctl(command) => ctl::run(command, &cli.global),
+        Command::Service(command) => service::run(&command),
         Command::Record(command) => record::run(&command, &cli.global, &layers.given(matches)),
         Command::Plate(command) => plate::run(&command, &cli.global, &layers.given(matches)),
         Command::Aperture(command) => aperture::run(&command, &cli.global),

@@ -31,7 +31,7 @@ use crate::link::demand::Demand;
 use crate::look::Strength;
 use crate::pipeline::{self, Changes, Pace, Run};
 use crate::sink::{self, Backpressure, Shutter, Target};
-use crate::source::{DepthChoice, DepthFrom, Source, SourceName};
+use crate::source::{self, DepthChoice, DepthFrom, Source, SourceName};
 
 /// Blur a camera, a recording, the demonstration or the synthetic scene, frame by frame
 #[derive(Args, Debug)]
@@ -39,6 +39,7 @@ use crate::source::{DepthChoice, DepthFrom, Source, SourceName};
 Examples:
   bokehcam stream /dev/video0 --to /dev/video10
   bokehcam stream 0 --to pipewire --on-demand
+  bokehcam stream pipewire:C920 --to filter
   bokehcam stream C920 --size 1920x1080 --fps 30 --control exposure_dynamic_framerate=0 --to /dev/video10
   bokehcam stream 0,2 --calib stereo.yml --to /dev/video10
   bokehcam stream /dev/video4 --side-by-side --rectified --to /dev/video10
@@ -67,11 +68,13 @@ pub struct StreamCommand {
 }
 
 #[cfg(feature = "window")]
-const TO: &str = "pipewire, pipewire:NAME or /dev/videoN (virtual camera), window, DIR/ (numbered PNG), FILE.y4m, - (y4m on \
-                  standard output), FILE.mp4, .mkv or .webm (ffmpeg), or null; may be given more than once";
+const TO: &str = "pipewire, pipewire:NAME or /dev/videoN (virtual camera), filter (all who ask for the source, pipewire:NAME), \
+                  window, DIR/ (numbered PNG), FILE.y4m, - (y4m on standard output), FILE.mp4, .mkv or .webm (ffmpeg), or \
+                  null; may be given more than once";
 #[cfg(not(feature = "window"))]
-const TO: &str = "pipewire, pipewire:NAME or /dev/videoN (virtual camera), DIR/ (numbered PNG), FILE.y4m, - (y4m on \
-                  standard output), FILE.mp4, .mkv or .webm (ffmpeg), or null; may be given more than once";
+const TO: &str = "pipewire, pipewire:NAME or /dev/videoN (virtual camera), filter (all who ask for the source, pipewire:NAME), \
+                  DIR/ (numbered PNG), FILE.y4m, - (y4m on standard output), FILE.mp4, .mkv or .webm (ffmpeg), or null; may \
+                  be given more than once";
 
 /// Runs the command; `given` is for warnings and for the window. The report is written whenever the pipeline ran,
 /// however it ended.
@@ -101,7 +104,10 @@ pub fn run(command: &StreamCommand, global: &options::Global, given: Given) -> R
     }
     let claim = controlled::claim(command.name.as_ref(), "stream")?;
     let look = look::look(&parts.blur, &parts.computing.quality)?;
-    let options = parts.source_options();
+    // Others have the camera while it is open, so that it opens with them alone.
+    let filters = command.to.contains(&Target::Filter);
+    let on_demand = stream.on_demand || filters;
+    let options = source::Options { filters, ..parts.source_options() };
     let source = Source::open(&command.source, &options, Some(&look))?;
     let info = source.camera.info();
     let measured = source.is_measured();
@@ -135,8 +141,8 @@ pub fn run(command: &StreamCommand, global: &options::Global, given: Given) -> R
     // Outputs are opened last, so that none is begun where the run cannot start.
     let demand = Demand::new();
     // Where nobody notices who watches, somebody may at any time.
-    let _watch = (!stream.on_demand).then(|| demand.watch());
-    let noticed = stream.on_demand.then(|| demand.clone());
+    let _watch = (!on_demand).then(|| demand.watch());
+    let noticed = on_demand.then(|| demand.clone());
     let stop = terminal::stop_flag()?;
     let sink_options = sink::Options {
         frames: info.frames,
@@ -144,6 +150,7 @@ pub fn run(command: &StreamCommand, global: &options::Global, given: Given) -> R
         out_size: stream.out_size.map(|size| (size.width, size.height)),
         threads: options.computing.threads,
         demand: noticed.clone(),
+        stands_for: command.source.shared().map(str::to_owned),
         stop: Arc::clone(&stop),
         ..sink::Options::new(info.size, info.period_ns)
     };

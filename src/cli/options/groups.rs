@@ -47,6 +47,7 @@ impl Streaming {
             depth_choice: self.blur.depth.clone(),
             computing: self.computing.choice(),
             keep_going: self.stream.keep_going,
+            filters: false,
         }
     }
 }

@@ -1,8 +1,11 @@
 //! A camera that this program gives: a node that others read from.
 //!
-//! One format, so that no reader asks for another one; this program drives the graph, so that readers get a picture when
-//! there is one. A node with readers is `Streaming`, which is the only state in which anybody watches: whether it drives
-//! tells nothing, as that stays so until the session manager suspends it, five seconds after the last reader.
+//! A camera of its own has one format, so that no reader asks for another one. It drives the graph, so that readers get a
+//! picture when there is one. A node with readers is `Streaming`, which is the only state in which anybody watches: whether it
+//! drives tells nothing, as that stays so until the session manager suspends it, five seconds after the last reader.
+//!
+//! A *filter* stands in for a camera: WirePlumber, from 0.5 on, gives it to everybody who asks for that camera, but for those
+//! who are in one group with it. It offers what the camera offers, and the camera drives both.
 
 mod provider;
 
@@ -13,6 +16,7 @@ use std::time::Duration;
 
 use self::provider::Provider;
 use super::PipeWireError;
+use super::mode::{Agreed, Mode};
 use super::wake::Waker;
 
 /// How long the daemon may take to have the node in its graph.
@@ -25,23 +29,31 @@ pub struct Settings {
     pub name: String,
     /// The name that people see.
     pub label: String,
-    /// Columns, an even number, and rows.
-    pub size: (u32, u32),
-    /// Pictures per second, as a fraction.
-    pub rate: (u32, u32),
+    /// What readers may choose from.
+    pub modes: Vec<Mode>,
+    /// What they are given where they have no wish.
+    pub best: Agreed,
+    /// The name of the camera whose readers are given this one.
+    pub stands_for: Option<String>,
     /// The longest time that a reader is left without a picture: then the last one is given again.
     pub hold: Duration,
 }
 
-impl Settings {
-    /// Bytes of a row of pixels, two each.
-    fn stride(&self) -> i32 {
-        2 * self.size.0 as i32
-    }
+/// Memory of a picture.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Memory {
+    /// Bytes, at most.
+    pub bytes: usize,
+    /// From row to row; 0 where it has no rows.
+    pub stride: usize,
+}
 
-    fn frame_bytes(&self) -> usize {
-        2 * self.size.0 as usize * self.size.1 as usize
-    }
+/// A picture that was written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Drawn {
+    pub bytes: usize,
+    /// When it was captured, by the system's monotonic clock, or `None` where it was shown before, or is none of a camera's.
+    pub captured_ns: Option<u64>,
 }
 
 /// What a node shows. Everything is called on the node's thread.
@@ -49,9 +61,11 @@ pub trait Show: Send + 'static {
     /// Takes over what is new; returns whether there is something to be shown now.
     fn update(&mut self) -> bool;
 
-    /// Writes the picture that is to be shown into `frame`, as YUYV; returns when it was captured, by the system's
-    /// monotonic clock, or `None` where it was shown before, or is none of a camera's.
-    fn draw(&mut self, frame: &mut [u8]) -> Option<u64>;
+    /// What pictures are to be like from now on, of what was offered; returns the memory that each takes.
+    fn begin(&mut self, agreed: &Agreed) -> Memory;
+
+    /// Writes the picture that is to be shown into `frame`, as agreed.
+    fn draw(&mut self, frame: &mut [u8]) -> Drawn;
 
     /// Somebody watches from now on, or nobody.
     fn watched(&mut self, is_watched: bool);

@@ -13,14 +13,14 @@ use pipewire::spa::support::system::IoFlags;
 use pipewire::spa::utils::Direction;
 use pipewire::stream::{StreamFlags, StreamRc, StreamState};
 
-use super::{Counts, Settings, Show};
+use super::{Counts, Drawn, Memory, Settings, Show};
 use crate::clock::Clock;
 use crate::pipewire::PipeWireError;
 use crate::pipewire::buffer::{self, Header};
 use crate::pipewire::graph::Graph;
-use crate::pipewire::param;
 use crate::pipewire::session::Session;
 use crate::pipewire::wake::Waker;
+use crate::pipewire::{mode, param};
 
 /// How long a node still counts as watched after its last reader left: call programs close and open cameras repeatedly.
 const LINGER_NS: u64 = 500_000_000;
@@ -45,6 +45,8 @@ pub(super) struct Provider {
     /// When the picture that was given last was captured, as readers were told, and when it was given.
     last: Cell<Option<(u64, u64)>>,
     sequence: Cell<u64>,
+    /// Of each picture, as agreed.
+    memory: Cell<Memory>,
 }
 
 /// A picture that is to be given.
@@ -70,6 +72,7 @@ impl Provider {
             since_ns: Cell::new(0),
             last: Cell::new(None),
             sequence: Cell::new(0),
+            memory: Cell::default(),
             settings,
         }
     }
@@ -136,13 +139,18 @@ impl Provider {
         ready: &mut Option<&Ready>,
     ) -> Result<(), PipeWireError> {
         let session = Session::open()?;
-        let Settings { name, label, size, rate, .. } = &self.settings;
-        let about = properties! {
+        let Settings { name, label, modes, best, stands_for, .. } = &self.settings;
+        let mut about = properties! {
             *pipewire::keys::MEDIA_CLASS => "Video/Source",
             *pipewire::keys::MEDIA_ROLE => "Camera",
             *pipewire::keys::NODE_NAME => name.as_str(),
             *pipewire::keys::NODE_DESCRIPTION => label.as_str(),
         };
+        if let Some(camera) = stands_for {
+            about.insert("node.link-group", crate::pipewire::group());
+            about.insert("filter.smart", "true");
+            about.insert("filter.smart.target", serde_json::json!({ "node.name": camera }).to_string());
+        }
         let stream = StreamRc::new(session.core.clone(), name, about).map_err(PipeWireError::refused("a stream"))?;
         let failure = Rc::new(RefCell::new(None));
         let [states, formats, pictures] = std::array::from_fn(|_| Rc::clone(self));
@@ -157,16 +165,18 @@ impl Provider {
             })
             .param_changed(move |stream, (), id, format| {
                 // Without a format, the node is suspended, and asked again before the next reader.
-                if id == ParamType::Format.as_raw() && format.is_some() {
-                    formats.offer_buffers(stream);
+                if let Some(format) = format.filter(|_| id == ParamType::Format.as_raw()) {
+                    formats.agree(stream, format.as_bytes());
                 }
             })
             .process(move |stream, ()| pictures.give(stream))
             .register()
             .map_err(PipeWireError::refused("to be listened to"))?;
-        let format = param::format(*b"YUYV", *size, *rate);
-        let mut formats: Vec<&Pod> = Pod::from_bytes(&format).into_iter().collect();
-        let flags = StreamFlags::DRIVER | StreamFlags::MAP_BUFFERS;
+        let formats: Vec<Vec<u8>> = modes.iter().map(|mode| param::offer(mode, best)).collect();
+        let mut formats: Vec<&Pod> = formats.iter().filter_map(|format| Pod::from_bytes(format)).collect();
+        // The pace of a filter is that of the camera, which drives them both.
+        let drives = if stands_for.is_none() { StreamFlags::DRIVER } else { StreamFlags::empty() };
+        let flags = drives | StreamFlags::MAP_BUFFERS;
         stream.connect(Direction::Output, None, flags, &mut formats).map_err(PipeWireError::refused("a node"))?;
 
         let (provider, bell, woken) = (Rc::clone(self), waker.clone(), stream.clone());
@@ -232,8 +242,12 @@ impl Provider {
         }
     }
 
-    fn offer_buffers(&self, stream: &pipewire::stream::Stream) {
-        let pods = [param::buffers(self.settings.frame_bytes() as i32, self.settings.stride()), param::header()];
+    /// A reader says what its pictures are to be like.
+    fn agree(&self, stream: &pipewire::stream::Stream, format: &[u8]) {
+        let Some(agreed) = mode::agreed(format) else { return };
+        let memory = self.show.borrow_mut().begin(&agreed);
+        self.memory.set(memory);
+        let pods = [param::buffers(memory.bytes as i32, memory.stride as i32), param::header()];
         let mut pods: Vec<&Pod> = pods.iter().filter_map(|pod| Pod::from_bytes(pod)).collect();
         if let Err(error) = stream.update_params(&mut pods) {
             tracing::warn!("{}: PipeWire refused the buffers: {error}", self.settings.name);
@@ -266,9 +280,10 @@ impl Provider {
     /// Gives the picture that is due.
     fn give(&self, stream: &pipewire::stream::Stream) {
         let Some(due) = self.due.take() else { return };
-        let is_given = buffer::give(stream, self.settings.frame_bytes(), self.settings.stride(), |frame| {
-            let captured_ns = self.show.borrow_mut().draw(frame);
-            self.header(captured_ns)
+        let Memory { bytes, stride } = self.memory.get();
+        let is_given = buffer::give(stream, bytes, stride as i32, |frame| {
+            let Drawn { bytes, captured_ns } = self.show.borrow_mut().draw(frame);
+            (bytes, self.header(captured_ns))
         });
         match (due, is_given) {
             (Due::New, true) => count(&self.counts.shown, true),

@@ -1,0 +1,215 @@
+//! Pictures in the formats that readers of a camera may ask for.
+
+use image::ExtendedColorType;
+use image::codecs::jpeg::JpegEncoder;
+
+use crate::frame::ColorImage;
+use crate::frame::fit::Fit;
+use crate::layout::{Family, FourCc, Layout};
+use crate::pipewire::mode::{Agreed, Mode, Offer};
+use crate::pipewire::node::Memory;
+use crate::sink::{raw, yuyv};
+
+/// As cameras compress, or finer.
+const JPEG_QUALITY: u8 = 90;
+/// What a picture of noise takes as JPEG at most, and its head.
+const JPEG_BYTES_PER_PX: usize = 3;
+const JPEG_HEAD_BYTES: usize = 4096;
+/// The widest and highest pictures that are made where a camera leaves it open.
+const MAX_SIDE_PX: u32 = 4096;
+
+/// Encodes pictures of any size into one format of one size.
+pub(super) struct Encoder {
+    format: Format,
+    layout: Layout,
+    how: How,
+    fit: Fit,
+    fitted: ColorImage,
+}
+
+enum How {
+    Yuyv(yuyv::Encoder),
+    Raw(Box<raw::Encoder>),
+    Jpeg,
+}
+
+/// A format with a size.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Format {
+    fourcc: [u8; 4],
+    size: (u32, u32),
+}
+
+impl From<&Agreed> for Format {
+    fn from(agreed: &Agreed) -> Self {
+        Self { fourcc: agreed.fourcc, size: agreed.size }
+    }
+}
+
+impl Format {
+    /// In one number, which threads hand each other without a lock. Sides have 16 bits: there are no longer ones.
+    pub fn packed(self) -> u64 {
+        let (width, height) = self.size;
+        u64::from(u32::from_le_bytes(self.fourcc)) << 32 | u64::from(width as u16) << 16 | u64::from(height as u16)
+    }
+
+    pub fn unpacked(packed: u64) -> Self {
+        let side = |shift: u32| u32::from((packed >> shift) as u16);
+        Self { fourcc: ((packed >> 32) as u32).to_le_bytes(), size: (side(16), side(0)) }
+    }
+
+    /// Whether a picture of that size is in this format once it is YUYV.
+    pub fn is_yuyv(self, size: (u32, u32)) -> bool {
+        self.fourcc == *b"YUYV" && self.size == size
+    }
+
+    pub fn yuyv(size: (u32, u32)) -> Self {
+        Self { fourcc: *b"YUYV", size }
+    }
+
+    pub fn size(self) -> (u32, u32) {
+        self.size
+    }
+
+    fn layout(self) -> Option<Layout> {
+        Layout::packed(FourCc(self.fourcc), self.size.0, self.size.1).ok()
+    }
+}
+
+impl Encoder {
+    /// `None` for a format that is not written.
+    pub fn new(format: Format) -> Option<Self> {
+        let layout = format.layout()?;
+        let how = match layout.family() {
+            Family::Jpeg => How::Jpeg,
+            // Two pixels share their colour.
+            _ if format.is_yuyv(format.size) && format.size.0.is_multiple_of(2) => How::Yuyv(yuyv::Encoder::new()),
+            _ => How::Raw(Box::new(raw::Encoder::new(&layout)?)),
+        };
+        let fitted = ColorImage::new(format.size.0, format.size.1);
+        Some(Self { format, layout, how, fit: Fit::default(), fitted })
+    }
+
+    pub fn format(&self) -> Format {
+        self.format
+    }
+
+    /// What a picture takes.
+    pub fn memory(&self) -> Memory {
+        let (width, height) = self.format.size;
+        match self.how {
+            How::Jpeg => {
+                Memory { bytes: JPEG_HEAD_BYTES + JPEG_BYTES_PER_PX * width as usize * height as usize, stride: 0 }
+            }
+            _ => Memory {
+                bytes: self.layout.needed_bytes(0),
+                stride: self.layout.planes().first().map_or(0, |plane| plane.stride_bytes),
+            },
+        }
+    }
+
+    /// Writes a picture, fitted into the size, in the place of what `bytes` holds.
+    pub fn encode(&mut self, picture: &ColorImage, bytes: &mut Vec<u8>) {
+        let needed = self.memory().bytes;
+        let picture = self.fit.fitted(picture, &mut self.fitted);
+        match &mut self.how {
+            How::Yuyv(encoder) => {
+                bytes.resize(needed, 0);
+                encoder.encode(picture, bytes);
+            }
+            How::Raw(encoder) => {
+                bytes.resize(needed, 0);
+                encoder.encode(picture, &mut [bytes]);
+            }
+            How::Jpeg => {
+                bytes.clear();
+                let mut encoder = JpegEncoder::new_with_quality(&mut *bytes, JPEG_QUALITY);
+                let done = encoder.encode(&picture.rgb, picture.width, picture.height, ExtendedColorType::Rgb8);
+                if let Err(error) = done {
+                    tracing::debug!("a picture could not be compressed: {error}");
+                    bytes.clear();
+                }
+            }
+        }
+    }
+}
+
+/// Those of a camera's modes that pictures can be given in, with sizes within bounds.
+pub(super) fn writable(modes: &[Mode]) -> Vec<Mode> {
+    let is_written = |mode: &&Mode| Encoder::new(Format { fourcc: mode.fourcc, size: (16, 16) }).is_some();
+    let within = |(width, height): (u32, u32)| width.max(height) <= MAX_SIDE_PX && width.min(height) > 0;
+    let bounded = |mode: &Mode| {
+        let sizes = match &mode.sizes {
+            Offer::These(sizes) => Offer::These(sizes.iter().copied().filter(|size| within(*size)).collect()),
+            Offer::Range { min, max } => Offer::Range {
+                min: (min.0.max(16), min.1.max(16)),
+                max: (max.0.min(MAX_SIDE_PX), max.1.min(MAX_SIDE_PX)),
+            },
+            Offer::Unknown => Offer::Range { min: (16, 16), max: (MAX_SIDE_PX, MAX_SIDE_PX) },
+        };
+        Mode { sizes, ..mode.clone() }
+    };
+    modes.iter().filter(is_written).map(bounded).filter(|mode| mode.sizes != Offer::These(Vec::new())).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::capture::pixels::Decoder;
+
+    const FORMATS: [&[u8; 4]; 10] =
+        [b"YUYV", b"UYVY", b"YVYU", b"NV12", b"NV21", b"YU12", b"YV12", b"RGB3", b"BGR3", b"MJPG"];
+
+    /// Every format that a reader of a camera may ask for comes out as the picture that went in.
+    #[test]
+    fn what_readers_decode_is_the_picture() {
+        let mut picture = ColorImage::new(64, 48);
+        for (at, pixel) in picture.rgb.as_chunks_mut::<3>().0.iter_mut().enumerate() {
+            let (x, y) = (at % 64, at / 64);
+            *pixel = [(4 * x) as u8, (5 * y) as u8, 128];
+        }
+        for fourcc in FORMATS {
+            for size in [(64, 48), (128, 96)] {
+                let mut encoder = Encoder::new(Format { fourcc: *fourcc, size }).unwrap();
+                let mut bytes = vec![7; 3];
+                encoder.encode(&picture, &mut bytes);
+                assert!((1..=encoder.memory().bytes).contains(&bytes.len()), "{}", FourCc(*fourcc));
+                let layout = Layout::strided(FourCc(*fourcc), size.0, size.1, encoder.memory().stride).unwrap();
+                let mut decoded = ColorImage::default();
+                Decoder::new(&layout).unwrap().decode(&[&bytes], &mut decoded).unwrap();
+                assert_eq!(decoded.size(), size);
+                for (x, y) in [(5, 5), (40, 9), (60, 44)] {
+                    let at = |image: &ColorImage, by: u32| {
+                        let at = 3 * (y * by * image.width + x * by) as usize;
+                        [0, 1, 2].map(|channel| i32::from(image.rgb[at + channel]))
+                    };
+                    let (one, other) = (at(&picture, 1), at(&decoded, size.0 / 64));
+                    let far = one.iter().zip(other).map(|(one, other)| (one - other).abs()).max().unwrap();
+                    assert!(far <= 9, "{} {size:?} at {x},{y}: {one:?} became {other:?}", FourCc(*fourcc));
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_format_is_one_number() {
+        let format = Format { fourcc: *b"MJPG", size: (3840, 2160) };
+        assert_eq!(Format::unpacked(format.packed()), format);
+    }
+
+    #[test]
+    fn only_what_can_be_written_is_offered() {
+        let mode = |fourcc: &[u8; 4], sizes| Mode { fourcc: *fourcc, sizes, rates: Offer::Unknown };
+        let offered = writable(&[
+            mode(b"GREY", Offer::These(vec![(640, 480)])),
+            mode(b"MJPG", Offer::These(vec![(640, 480), (10_000, 8)])),
+            mode(b"NV12", Offer::Range { min: (1, 1), max: (1 << 31, 1 << 31) }),
+            mode(b"YUYV", Offer::These(vec![(10_000, 8)])),
+        ]);
+        let expected = [
+            mode(b"MJPG", Offer::These(vec![(640, 480)])),
+            mode(b"NV12", Offer::Range { min: (16, 16), max: (4096, 4096) }),
+        ];
+        assert_eq!(offered, expected);
+    }
+}
