@@ -213,9 +213,8 @@ impl Services for System {
         };
         let (source, source_name) = self.open_source(&name, way)?;
         notes.extend(source.networks.iter().map(|networks| format!("Depth by {networks}.")));
-        match source_name.kind() {
-            Kind::Synthetic => notes.push(RENDERED.to_owned()),
-            _ => {}
+        if source_name.kind() == Kind::Synthetic {
+            notes.push(RENDERED.to_owned());
         }
         let is_declined = self.options.depth_choice == DepthChoice::None && way.is_none();
         if is_declined && source.has_depth() {
