@@ -209,9 +209,7 @@ impl Planner {
             let depth_keeps_up = match shares {
                 true => share_ns <= MOST_DEPTH * frame_ns || frames == most_frames,
                 // Each frame has its own, however many that leaves: not before the blur has left it what time makes a difference.
-                false => {
-                    usual_ns[DEPTH] <= MOST_DEPTH * frame_ns || saved_ns <= share * WORTH_SAVING * usual_ns[DEPTH]
-                }
+                false => usual_ns[DEPTH] <= MOST_DEPTH * frame_ns || saved_ns <= share * WORTH_SAVING * usual_ns[DEPTH],
             };
             let keeps_up = depth_keeps_up && (blur_ns <= budget_ns || is_cheapest);
             // Bad luck rarely comes together.
