@@ -15,7 +15,7 @@ use std::process::{Child, Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
 /// What is another program's, or builds: a part of the command, and why it is left out.
-const LEFT_OUT: [(&str, &str); 16] = [
+const LEFT_OUT: [(&str, &str); 19] = [
     ("sudo ", "needs root"),
     ("systemctl ", "needs a session, and starts something in it"),
     ("journalctl ", "needs a session"),
@@ -31,6 +31,9 @@ const LEFT_OUT: [(&str, &str); 16] = [
     ("UNIX-CONNECT", "needs socat"),
     ("gsettings", "needs GNOME"),
     ("org.gnome", "needs GNOME"),
+    ("gdbus ", "needs a session's message bus"),
+    ("gnome-shell", "needs GNOME"),
+    ("gnome-extensions", "needs GNOME"),
     ("git clone", "needs a network"),
 ];
 

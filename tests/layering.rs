@@ -73,7 +73,7 @@ const DOORS: [(&str, &[&str]); 30] = [
         ],
     ),
     ("winit", &["preview/present", "preview/window"]),
-    ("zbus", &["preview/window"]),
+    ("zbus", &["control/bus", "preview/window"]),
     ("zune_jpeg", &["capture"]),
 ];
 

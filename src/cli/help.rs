@@ -40,7 +40,7 @@ const ALSO: [(&str, &[&str]); 5] = [
 ];
 /// Options of single commands that are no settings, or that settings are of less use to, and not on their first page.
 const LESS: [(&str, &[&str]); 6] = [
-    ("stream", &["name"]),
+    ("stream", &["name", "tray"]),
     ("preview", &["name", "loop", "frames", "on-demand"]),
     ("render", &["debug-dir"]),
     ("bench", &["preset", "depth", "effect", "focus", "blur", "behind", "follow", "aperture", "highlights"]),

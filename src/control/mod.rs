@@ -4,6 +4,8 @@
 //! `$XDG_RUNTIME_DIR/bokehcam/NAME.sock` ([`claim`]); [`client`] asks. Threads of its own serve it: nothing here waits for
 //! a frame, and no frame waits for anything here.
 
+#[cfg(feature = "desktop")]
+pub mod bus;
 pub mod client;
 mod folder;
 mod name;

@@ -1,6 +1,8 @@
 //! `bokehcam ctl` against streams that run: what goes out changes, nobody else is listened to, and nobody holds it up.
 #![allow(missing_docs)]
 
+#[cfg(feature = "desktop")]
+mod bus;
 mod outputs;
 mod refusals;
 mod runs;

@@ -1,5 +1,7 @@
 //! This program in the place of a camera that others ask for: WirePlumber gives it to them from 0.5 on.
 
+use std::process::Command;
+
 use bokehcam::frame::ColorImage;
 
 use super::readers::GStreamer;
@@ -25,9 +27,18 @@ fn off(frame: &[u8], of: &[Vec<u8>]) -> f64 {
     of.iter().map(off).fold(f64::INFINITY, f64::min)
 }
 
-/// Whether the session manager knows filters.
+/// Whether the session manager is of those that know filters; then waits until it has begun to.
 fn has_filters() -> bool {
-    graph().iter().any(|object| object["props"]["metadata.name"] == "filters")
+    let told = Command::new("wireplumber").arg("--version").output().unwrap().stdout;
+    let told = String::from_utf8(told).unwrap();
+    let version = told.split_whitespace().last().unwrap();
+    let [major, minor] = [0, 1].map(|at| version.split('.').nth(at).unwrap().parse::<u32>().unwrap());
+    let knows = (major, minor) >= (0, 5);
+    if knows {
+        let is_there = || graph().iter().any(|object| object["props"]["metadata.name"] == "filters");
+        until("the manager's filters", || is_there().then_some(()));
+    }
+    knows
 }
 
 /// Who asks for a camera by its own name has the pictures of the filter; nobody else has the camera open, and it rests while
@@ -35,10 +46,11 @@ fn has_filters() -> bool {
 #[test]
 #[ignore = "needs PipeWire"]
 fn who_asks_for_the_camera_is_given_the_filter() {
+    let knows_filters = has_filters();
     let camera = Player::start("cam", &["--to", "pipewire:cam"]);
     let arguments = ["stream", "pipewire:cam", "--to", "filter", "--effect", "none", "--mirror"];
     let filter = Run::start(&arguments);
-    if !has_filters() {
+    if !knows_filters {
         let said = filter.refused();
         assert!(said.contains("it takes WirePlumber 0.5 or later"), "{said}");
         return;
@@ -70,7 +82,6 @@ fn who_asks_for_the_camera_is_given_the_filter() {
 
 #[test]
 fn a_filter_is_for_a_camera_as_pipewire_has_it() {
-    use std::process::Command;
     for arguments in [&["demo", "--to", "filter"][..], &["pipewire:cam", "--to", "filter", "--to", "filter"]] {
         let ran = Command::new(env!("CARGO_BIN_EXE_bokehcam")).arg("stream").args(arguments).output().unwrap();
         let said = String::from_utf8(ran.stderr).unwrap();

@@ -18,6 +18,7 @@ use crate::cli::focus;
 use crate::cli::options;
 use crate::cli::plausible;
 use crate::cli::report;
+use crate::cli::settings::file::SettingsFile;
 use crate::cli::settings::layers::Given;
 use crate::cli::settings::look;
 use crate::cli::settings::unused;
@@ -60,6 +61,9 @@ pub struct StreamCommand {
     /// What `bokehcam ctl` knows this run by [default: stream, or stream-2 and so on]
     #[arg(long, value_name = "NAME")]
     name: Option<Name>,
+    /// Show an icon in the desktop's tray that switches off and on, and listen on the session's message bus
+    #[arg(long)]
+    tray: bool,
     #[command(flatten)]
     parts: options::Streaming,
     #[cfg(feature = "window")]
@@ -205,7 +209,9 @@ pub fn run(command: &StreamCommand, global: &options::Global, given: Given) -> R
         beat: Arc::clone(&beat),
     };
     let looks = Looks { look: look.clone(), adaptive, changes, executors };
-    let server = claim.ok().map(|claim| control::serve(claim, facts, looks)).transpose()?;
+    let tray = command.tray.then(|| SettingsFile::load(global.config.as_deref())).transpose()?;
+    let tray = tray.map(|file| file.preset_names());
+    let server = claim.ok().map(|claim| control::serve(claim, facts, looks, tray)).transpose()?;
     let ended = pipeline::run(Run {
         camera: source.camera,
         depth: source.depth,

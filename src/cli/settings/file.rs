@@ -88,6 +88,12 @@ impl SettingsFile {
         values.map(owned).or_else(|| self.presets.get(name).cloned())
     }
 
+    /// The names of all presets, those in this file last.
+    pub fn preset_names(&self) -> Vec<String> {
+        let built_in = presets::built_in().map(|preset| preset.name.to_owned());
+        built_in.chain(self.presets.keys().cloned()).collect()
+    }
+
     /// All presets, those in this file last. One that cannot be used, such as one whose aperture is a picture that is
     /// gone, is left out with a warning.
     #[cfg(feature = "window")]

@@ -15,7 +15,9 @@ use crate::cli::log;
 use crate::cli::settings::{changes, unused};
 use crate::clock::Clock;
 use crate::computing::Executors;
-use crate::control::{Answer, Claim, Name, Request, Server, Status};
+#[cfg(feature = "desktop")]
+use crate::control::bus;
+use crate::control::{Answer, Claim, Handler, Name, Request, Server, Status};
 use crate::link::demand::Demand;
 use crate::look::{Look, Patch};
 use crate::pipeline::{Changes, Progress};
@@ -57,6 +59,9 @@ pub(super) struct Looks {
 
 /// A stream that answers until this is dropped.
 pub(super) struct Served {
+    /// Gone first: others on the bus ask no more.
+    #[cfg(feature = "desktop")]
+    bus: Option<bus::Bus>,
     server: Option<Server>,
     /// Makes executors, which takes longer than anybody should wait for an answer.
     looks: Option<JoinHandle<()>>,
@@ -64,6 +69,8 @@ pub(super) struct Served {
 
 impl Drop for Served {
     fn drop(&mut self) {
+        #[cfg(feature = "desktop")]
+        drop(self.bus.take());
         // With it goes the sender that the thread waits for.
         drop(self.server.take());
         // A panic was printed.
@@ -110,11 +117,17 @@ impl Beat {
     }
 }
 
-/// Answers those who ask from now on; `facts` are of the name that the stream has.
+/// Answers those who ask from now on; `facts` are of the name that the stream has. With names of presets to show, it is on
+/// the session's message bus as well, and in the tray.
 ///
 /// # Errors
 /// The system gives no thread.
-pub(super) fn serve(claim: Claim, facts: impl FnOnce(&Name) -> Facts, looks: Looks) -> Result<Served, CliError> {
+pub(super) fn serve(
+    claim: Claim,
+    facts: impl FnOnce(&Name) -> Facts,
+    looks: Looks,
+    tray: Option<Vec<String>>,
+) -> Result<Served, CliError> {
     let no_thread = |error| CliError::io("a thread that answers `bokehcam ctl`".as_ref())(error);
     let (facts, adaptive, look) = (facts(claim.name()), looks.adaptive, Arc::new(Mutex::new(looks.look.clone())));
     let (adopt, asked) = mpsc::channel();
@@ -122,8 +135,27 @@ pub(super) fn serve(claim: Claim, facts: impl FnOnce(&Name) -> Facts, looks: Loo
     let follow = move || follow(looks, size, &asked, &stated);
     let looks = thread::Builder::new().name("looks".into()).spawn(follow).map_err(no_thread)?;
     let controlled = Controlled { facts, began: Instant::now(), adaptive, look, adopt };
-    let server = claim.serve(Arc::new(move |request| controlled.answer(request))).map_err(no_thread)?;
-    Ok(Served { server: Some(server), looks: Some(looks) })
+    let handler: Arc<Handler> = Arc::new(move |request| controlled.answer(request));
+    #[cfg(feature = "desktop")]
+    let (bus, handler) = match tray.map(|presets| bus::serve(Arc::clone(&handler), presets)) {
+        Some(Ok((bus, handler))) => (Some(bus), handler),
+        Some(Err(why)) => {
+            tracing::warn!("--tray: {why}");
+            (None, handler)
+        }
+        None => (None, handler),
+    };
+    #[cfg(not(feature = "desktop"))]
+    if tray.is_some() {
+        tracing::warn!("--tray: this program was built without it; build it with the feature desktop");
+    }
+    let server = claim.serve(handler).map_err(no_thread)?;
+    Ok(Served {
+        #[cfg(feature = "desktop")]
+        bus,
+        server: Some(server),
+        looks: Some(looks),
+    })
 }
 
 /// Adopts the looks that are asked for, until nobody can any more.
