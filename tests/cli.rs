@@ -6,6 +6,9 @@ use std::process::{Command, Output, Stdio};
 
 #[path = "cli/commands.rs"]
 mod commands;
+#[cfg(feature = "camera")]
+#[path = "cli/report.rs"]
+mod report;
 
 /// The program in an empty world: no settings of whoever runs the tests reach it.
 fn bokehcam(home: &Path, args: &[&str]) -> Command {
