@@ -6,6 +6,9 @@ use std::process::{Command, Output, Stdio};
 
 #[path = "cli/commands.rs"]
 mod commands;
+#[cfg(feature = "camera")]
+#[path = "cli/report.rs"]
+mod report;
 #[path = "cli/service.rs"]
 mod service;
 

@@ -6,12 +6,6 @@ use pulp::{Simd, WithSimd};
 use super::model::{Activation, Steps};
 use crate::compute::simd::{fma, load};
 
-/// Pixels of which sums are made at once for one block, and for each of two: what 16 registers hold.
-const AT_ONCE: usize = 12;
-const AT_ONCE_OF_TWO: usize = AT_ONCE / 2;
-/// Results of a row that a filter makes at once.
-const ALONG: usize = 8;
-
 /// A picture's size, and how it is in memory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Size {
@@ -59,7 +53,7 @@ impl Axis {
     }
 
     /// The taps of a result that lie in the picture, and the pixel under the first of them.
-    fn inside(&self, at: usize, pixels: usize) -> (std::ops::Range<usize>, usize) {
+    pub fn inside(&self, at: usize, pixels: usize) -> (std::ops::Range<usize>, usize) {
         let first = at * self.step;
         let from = self.before.saturating_sub(first);
         let to = (pixels + self.before).saturating_sub(first).min(self.taps);
@@ -81,17 +75,17 @@ pub fn axes(size: &Size, [down, across]: [usize; 2], steps: &Steps) -> Option<([
 
 /// Values as vectors: all of them, as every picture has whole ones.
 #[inline(always)]
-fn vectors<S: Simd>(values: &[f32]) -> &[S::f32s] {
+pub fn vectors<S: Simd>(values: &[f32]) -> &[S::f32s] {
     S::as_simd_f32s(values).0
 }
 
 #[inline(always)]
-fn vectors_mut<S: Simd>(values: &mut [f32]) -> &mut [S::f32s] {
+pub fn vectors_mut<S: Simd>(values: &mut [f32]) -> &mut [S::f32s] {
     S::as_mut_simd_f32s(values).0
 }
 
 #[inline(always)]
-fn activated<S: Simd>(simd: S, activation: Activation, sum: S::f32s) -> S::f32s {
+pub fn activated<S: Simd>(simd: S, activation: Activation, sum: S::f32s) -> S::f32s {
     let zero = simd.splat_f32s(0.0);
     match activation {
         // Few are logistic but those of the mask: a pass of its own does them.
@@ -132,78 +126,6 @@ fn exp(x: f32) -> f32 {
     f32::from_bits(series.to_bits().wrapping_add(whole.to_bits() << 23))
 }
 
-/// Sums over the channels of each pixel.
-pub struct Pointwise<'a> {
-    /// `[block][pixel][lane]`.
-    pub input: &'a [f32],
-    pub pixels: usize,
-    /// `[block of the result][channel][lane]`.
-    pub weights: &'a [f32],
-    /// `[channel of the result]`.
-    pub bias: &'a [f32],
-    pub activation: Activation,
-    /// `[block][plane]`, of which the first pixels are made.
-    pub out: &'a mut [f32],
-    /// Values from block to block of the result.
-    pub plane: usize,
-}
-
-impl WithSimd for Pointwise<'_> {
-    type Output = ();
-    #[inline(always)]
-    fn with_simd<S: Simd>(mut self, simd: S) {
-        let blocks = self.bias.len() / S::F32_LANES;
-        for block in (0..blocks / 2).map(|pair| 2 * pair) {
-            self.all::<S, AT_ONCE_OF_TWO, 2>(simd, block);
-        }
-        if !blocks.is_multiple_of(2) {
-            self.all::<S, AT_ONCE, 1>(simd, blocks - 1);
-        }
-    }
-}
-
-impl Pointwise<'_> {
-    #[inline(always)]
-    fn all<S: Simd, const N: usize, const M: usize>(&mut self, simd: S, block: usize) {
-        let whole = self.pixels / N * N;
-        for first in (0..whole).step_by(N) {
-            self.sums::<S, N, M>(simd, block, first);
-        }
-        for first in whole..self.pixels {
-            self.sums::<S, 1, M>(simd, block, first);
-        }
-    }
-
-    /// `N` pixels of `M` blocks.
-    #[inline(always)]
-    fn sums<S: Simd, const N: usize, const M: usize>(&mut self, simd: S, block: usize, first: usize) {
-        let (plane, depth) = (self.pixels * S::F32_LANES, self.input.len() / self.pixels);
-        let weights: [&[S::f32s]; M] =
-            std::array::from_fn(|m| &vectors::<S>(self.weights)[(block + m) * depth..][..depth]);
-        let bias: [S::f32s; M] = std::array::from_fn(|m| vectors::<S>(self.bias)[block + m]);
-        let mut sums = [bias; N];
-        for (part, input) in self.input.chunks_exact(plane).enumerate() {
-            let pixels = &input[first * S::F32_LANES..][..N * S::F32_LANES];
-            let weights = weights.map(|weights| &weights[part * S::F32_LANES..][..S::F32_LANES]);
-            for lane in 0..S::F32_LANES {
-                for (n, sums) in sums.iter_mut().enumerate() {
-                    let value = simd.splat_f32s(pixels[n * S::F32_LANES + lane]);
-                    for (sum, weights) in sums.iter_mut().zip(weights) {
-                        *sum = fma(simd, value, weights[lane], *sum);
-                    }
-                }
-            }
-        }
-        for m in 0..M {
-            let out = &mut self.out[(block + m) * self.plane + first * S::F32_LANES..][..N * S::F32_LANES];
-            let out = vectors_mut::<S>(out);
-            for n in 0..N {
-                out[n] = activated(simd, self.activation, sums[n][m]);
-            }
-        }
-    }
-}
-
 /// How many channels a vector has.
 pub struct Lanes;
 
@@ -212,119 +134,6 @@ impl WithSimd for Lanes {
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) -> usize {
         S::F32_LANES
-    }
-}
-
-/// What lies under the filter of each result of a row, as channels of a picture of one row: the filter then is one over channels.
-/// `out` has zeros where nothing is ever written.
-pub fn under_filter(input: &[f32], size: &Size, [down, across]: &[Axis; 2], row: usize, made: &Size, out: &mut [f32]) {
-    let (rows, first_row) = down.inside(row, size.rows);
-    let taps = (0..down.taps).flat_map(|tap| (0..across.taps).map(move |column| (tap, column)));
-    for (place, (tap, column)) in taps.enumerate() {
-        // The results that have this tap in the picture.
-        let from = across.before.saturating_sub(column).div_ceil(across.step);
-        let to = (size.columns + across.before).saturating_sub(column).div_ceil(across.step).min(made.columns);
-        for channel in 0..size.channels {
-            let (depth, lane) = (place * size.channels + channel, channel % size.lanes);
-            let block = &mut out[depth / made.lanes * made.plane()..][..made.plane()];
-            let pixels = block.chunks_exact_mut(made.lanes).take(to).skip(from).map(|out| &mut out[depth % made.lanes]);
-            if !rows.contains(&tap) {
-                pixels.for_each(|out| *out = 0.0);
-            } else if from < to {
-                let line =
-                    channel / size.lanes * size.plane() + (first_row + tap - rows.start) * size.columns * size.lanes;
-                let line = &input[line..][..size.columns * size.lanes];
-                let line = &line[(from * across.step + column - across.before) * size.lanes..];
-                pixels.zip(line.chunks(across.step * size.lanes)).for_each(|(out, input)| *out = input[lane]);
-            }
-        }
-    }
-}
-
-/// A filter for each channel, at steps of 1 or 2 along a row: `weights` are `[block][tap][lane]`.
-pub struct Depthwise<'a> {
-    pub input: &'a [f32],
-    pub size: Size,
-    pub axes: [Axis; 2],
-    pub weights: &'a [f32],
-    pub bias: &'a [f32],
-    pub activation: Activation,
-    pub out: &'a mut [f32],
-    pub result: Size,
-    /// As many lines as the filter has, with what lies beyond their ends.
-    pub lines: &'a mut [f32],
-}
-
-impl WithSimd for Depthwise<'_> {
-    type Output = ();
-    #[inline(always)]
-    fn with_simd<S: Simd>(self, simd: S) {
-        match self.axes[1].step {
-            1 => self.along::<S, 1>(simd),
-            _ => self.along::<S, 2>(simd),
-        }
-    }
-}
-
-impl Depthwise<'_> {
-    #[inline(always)]
-    fn along<S: Simd, const STEP: usize>(self, simd: S) {
-        let Self { input, size, axes: [down, across], weights, bias, activation, out, result, lines } = self;
-        let line = lines.len() / down.taps;
-        let (row_len, taps) = (size.columns * S::F32_LANES, across.taps * S::F32_LANES);
-        lines.fill(0.0);
-        let blocks = input.chunks_exact(size.plane()).zip(out.chunks_exact_mut(result.plane())).enumerate();
-        for (block, (input, out)) in blocks {
-            let weights = &weights[block * down.taps * taps..][..down.taps * taps];
-            let bias = load::<S>(bias, block * S::F32_LANES);
-            let mut rows = input.chunks_exact(row_len).enumerate();
-            for (y, out) in out.chunks_exact_mut(result.columns * S::F32_LANES).enumerate() {
-                let (inside, first_row) = down.inside(y, size.rows);
-                let last = first_row + inside.len();
-                let next = rows.by_ref();
-                while next.len() > size.rows - last {
-                    let (row, values) = next.next().expect("as many as are left");
-                    lines[row % down.taps * line + across.before * S::F32_LANES..][..row_len].copy_from_slice(values);
-                }
-                let lines: &[f32] = lines;
-                let under = (first_row..)
-                    .zip(inside)
-                    .map(|(row, tap)| (&lines[row % down.taps * line..][..line], &weights[tap * taps..][..taps]));
-                let out = vectors_mut::<S>(out);
-                let whole = result.columns / ALONG * ALONG;
-                for first in (0..whole).step_by(ALONG) {
-                    filtered::<S, STEP, ALONG>(simd, under.clone(), bias, activation, first, out);
-                }
-                for first in whole..result.columns {
-                    filtered::<S, STEP, 1>(simd, under.clone(), bias, activation, first, out);
-                }
-            }
-        }
-    }
-}
-
-/// `N` results of a row, of lines and the taps on them.
-#[inline(always)]
-fn filtered<'a, S: Simd, const STEP: usize, const N: usize>(
-    simd: S,
-    under: impl Iterator<Item = (&'a [f32], &'a [f32])>,
-    bias: S::f32s,
-    activation: Activation,
-    first: usize,
-    out: &mut [S::f32s],
-) {
-    let mut sums = [bias; N];
-    for (line, weights) in under {
-        let line = &vectors::<S>(line)[first * STEP..];
-        for (tap, weight) in vectors::<S>(weights).iter().enumerate() {
-            let pixels = &line[tap..][..(N - 1) * STEP + 1];
-            for (n, sum) in sums.iter_mut().enumerate() {
-                *sum = fma(simd, pixels[n * STEP], *weight, *sum);
-            }
-        }
-    }
-    for (out, sum) in out[first..][..N].iter_mut().zip(sums) {
-        *out = activated(simd, activation, sum);
     }
 }
 

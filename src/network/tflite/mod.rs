@@ -2,6 +2,7 @@
 //! of operators ([`model::Kind`]), run on one thread with the machine's vectors. Weights are packed once; the memory of pictures
 //! between the operators is shared as soon as it is free.
 
+mod filters;
 mod kernels;
 mod model;
 mod plan;
@@ -13,7 +14,8 @@ use pulp::Arch;
 
 pub use model::is_tflite;
 
-use self::kernels::{Depthwise, Each, Enlarge, Logistic, Mean, Pointwise, under_filter};
+use self::filters::{Depthwise, Pointwise, under_filter};
+use self::kernels::{Each, Enlarge, Logistic, Mean};
 use self::model::{Activation, Model};
 use self::plan::{Plan, Step, Work};
 use super::{Engine, Network, Port, Tensor};

@@ -2,7 +2,7 @@
 
 use super::tweak;
 use crate::depth::focus::FocusRule;
-use crate::look::{Effect, Look, Strength};
+use crate::look::{Look, Strength};
 
 /// What a source knows of depth.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,0 +1,42 @@
+//! The report of a machine for others.
+
+use super::*;
+
+/// Who is named in what doctor looks at is not named in its report.
+#[test]
+fn a_report_names_no_user_and_no_machine() {
+    let home = tempfile::Builder::new().prefix("planted-user").tempdir().unwrap();
+    let user = home.path().file_name().unwrap().to_str().unwrap();
+    let host = fs::read_to_string("/proc/sys/kernel/hostname").unwrap();
+    // The session's kind is printed as it is found.
+    let planted = format!("x11 {} {user} {} /home/somebody/x", home.path().display(), host.trim());
+    let file = home.path().join("report.md");
+    let report = |args: &[&str]| {
+        let mut command = bokehcam(home.path(), args);
+        command.env("HOME", home.path()).env("USER", user).env("XDG_SESSION_TYPE", &planted).current_dir(home.path());
+        Ran::from(command.output().unwrap())
+    };
+    assert!(report(&["doctor"]).stdout.contains(&planted), "it is not where it would be told");
+
+    let written = report(&["doctor", "--report", "report.md"]);
+    assert_eq!(written.code, 0, "{}", written.stderr);
+    assert!(written.stderr.contains("report.md"), "{}", written.stderr);
+    assert_eq!(fs::read_to_string(&file).unwrap(), written.stdout);
+    assert!(written.stdout.contains("session x11 ~ (user)"), "{}", written.stdout);
+    for name in [home.path().to_str().unwrap(), user, "somebody"] {
+        assert!(!written.stdout.contains(name), "{name}: {}", written.stdout);
+    }
+    // A machine that is called as its distribution is keeps that name.
+    let is_common = ["localhost", "linux", "debian", "ubuntu", "fedora"].contains(&host.trim());
+    let is_told = written.stdout.split_whitespace().any(|word| word == host.trim());
+    assert!(is_common || !is_told, "{}", written.stdout);
+    for part in ["### Machine", "### Cameras", "### What doctor found", "### Time of the blur\n\n```text\nsize "] {
+        assert!(written.stdout.contains(part), "{part}: {}", written.stdout);
+    }
+
+    fs::write(&file, "mine").unwrap();
+    let refused = report(&["doctor", "--report", "report.md"]);
+    assert_eq!((refused.code, refused.stdout.as_str()), (1, ""), "{}", refused.stderr);
+    assert!(refused.stderr.contains("report.md exists") && !refused.stderr.contains("--force"), "{}", refused.stderr);
+    assert_eq!(fs::read(&file).unwrap(), b"mine");
+}
