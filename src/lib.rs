@@ -39,7 +39,7 @@
 //! nanoseconds of a monotonic clock; blurring happens in linear light.
 //!
 //! `unsafe` is allowed in `compute/thread_pool.rs` and its `relay`, for a prefetch in `compute/simd.rs`, in `link/slot.rs`,
-//! `link/pool.rs`, `pipewire/buffer.rs`, `pipewire/quiet.rs` and under `v4l2`, where each block carries its argument (and in `link/bell.rs` under Miri
+//! `link/pool.rs`, `pipewire/buffer.rs`, `pipewire/quiet.rs`, `pipewire/session.rs` and under `v4l2`, where each block carries its argument (and in `link/bell.rs` under Miri
 //! alone). `scripts/prove-link` runs what can be proved of it.
 
 pub mod bokeh;

@@ -54,6 +54,11 @@ impl Session {
                 }
             })
             .register();
+        // SAFETY: it is left when this is dropped, on the same thread, as nothing here is `Send`.
+        #[allow(unsafe_code)]
+        unsafe {
+            main_loop.loop_().enter();
+        }
         Ok(Self { _listener: listener, is_lost, answered, core, _context: context, main_loop })
     }
 
@@ -83,6 +88,18 @@ impl Session {
     /// Whether all was done that was asked for before this question.
     pub fn has_answered(&self, question: i32) -> bool {
         self.answered.get() == Some(question)
+    }
+}
+
+/// From its making on, the loop belongs to this thread, also between two calls of [`Session::serve`]: PipeWire's own thread
+/// runs callbacks of a loop that belongs to nobody by itself, beside those of this one.
+impl Drop for Session {
+    fn drop(&mut self) {
+        // SAFETY: it was entered by `open`, on the same thread.
+        #[allow(unsafe_code)]
+        unsafe {
+            self.main_loop.loop_().leave();
+        }
     }
 }
 
