@@ -165,9 +165,9 @@ fn model(data: &Path, task: Task) -> Result<PathBuf, Box<dyn std::error::Error>>
     let folder = data.join("models");
     let mut files: Vec<_> = fs::read_dir(&folder)?.flatten().map(|entry| entry.path()).collect();
     files.sort();
-    let known = |file: &PathBuf| fs::read(file).ok().and_then(|bytes| Known::of(&bytes)).map(|known| known.name);
+    let known = |file: &PathBuf| fs::read(file).ok().and_then(|bytes| Known::of(&bytes)).map(|known| known.file);
     let wanted = KNOWN.iter().filter(|known| known.task == task);
-    let mut found = wanted.filter_map(|wanted| files.iter().find(|file| known(file) == Some(wanted.name)));
+    let mut found = wanted.filter_map(|wanted| files.iter().find(|file| known(file) == Some(wanted.file)));
     Ok(found
         .next()
         .ok_or_else(|| format!("{}: no known network for --depth {}", folder.display(), task.name()))?

@@ -168,11 +168,12 @@ fn plate(staged: &Staged) -> ColorImage {
 fn model(task: Task) -> Option<PathBuf> {
     let data = std::env::var_os("BOKEHCAM_DATA").map(PathBuf::from);
     let files = data.and_then(|data| fs::read_dir(data.join("models")).ok()).into_iter().flatten().flatten();
-    let known = network::KNOWN.iter().find(|known| known.task == task)?;
-    let is_it = |file: &PathBuf| {
-        fs::read(file).is_ok_and(|bytes| Known::of(&bytes).is_some_and(|found| found.name == known.name))
+    let files: Vec<PathBuf> = files.map(|entry| entry.path()).collect();
+    let is = |file: &PathBuf, known: &Known| {
+        fs::read(file).is_ok_and(|bytes| Known::of(&bytes).is_some_and(|found| found.file == known.file))
     };
-    files.map(|entry| entry.path()).find(is_it).or_else(|| network::best(task))
+    let mut known = network::KNOWN.iter().filter(|known| known.task == task);
+    known.find_map(|known| files.iter().find(|file| is(file, known)).cloned()).or_else(|| network::best(task))
 }
 
 fn outcome(staged: &Staged, source: &'static str, depth: DepthMap) -> Result<Outcome, BokehError> {

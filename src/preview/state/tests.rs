@@ -343,10 +343,8 @@ fn a_plate_is_offered_where_a_camera_has_no_depth_and_its_end_is_told_once() {
 fn a_source_without_depth_changes_no_look_for_the_next_time() {
     let mut state = state();
     let chosen = state.look.clone();
-    assert_eq!(chosen.effect, Effect::Auto);
     state.hear(Update::Source(running(false)));
-    assert_eq!((state.look.effect, state.chosen_look()), (Effect::Blur, chosen));
-    let tilted = Look { effect: Effect::TiltShift, ..state.look.clone() };
-    state.apply(Action::Look { look: Box::new(tilted.clone()), stroke: None });
-    assert_eq!(state.chosen_look(), tilted, "that was chosen");
+    assert_eq!((chosen.effect, state.look.effect, state.chosen_look()), (Effect::Auto, Effect::Blur, chosen));
+    state.apply(Action::Preset("miniature".into()));
+    assert_eq!(state.chosen_look().effect, Effect::TiltShift, "that was chosen");
 }
