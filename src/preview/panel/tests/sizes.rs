@@ -163,7 +163,7 @@ fn where_a_control_is_scrolled_out_of_sight_it_gives_no_hint() {
     for (y, hints) in [(top + 8.0, true), (top - 5.0, false)] {
         window.pass(vec![egui::Event::PointerMoved(egui::pos2(at.x, y))]);
         window.wait(2.0);
-        let is_seen = window.texts().iter().any(|text| text.starts_with("Follows the person"));
+        let is_seen = window.texts().iter().any(|text| text.starts_with("Follows a person"));
         assert_eq!(is_seen, hints, "at {y}, where it begins at {top}");
     }
 }
