@@ -170,12 +170,14 @@ mod tests {
             let one = Agreed { fourcc, size: (1280, 720), rate: (30_000, 1001) };
             let pod = param::format(&one);
             assert_eq!((read(&pod), agreed(&pod)), (vec![one.mode()], Some(one)));
-            let several = Mode {
+            let several = |sizes: [(u32, u32); 2]| Mode {
                 fourcc,
-                sizes: Offer::These(vec![(640, 480), (1280, 720)]),
+                sizes: Offer::These(sizes.to_vec()),
                 rates: Offer::Range { min: (0, 1), max: (60, 1) },
             };
-            assert_eq!(read(&param::offer(&several, &one)), [several]);
+            // What is preferred comes first.
+            let [small, large] = [(640, 480), one.size];
+            assert_eq!(read(&param::offer(&several([small, large]), &one)), [several([large, small])]);
             let silent = Mode { fourcc, sizes: Offer::Unknown, rates: Offer::Unknown };
             assert_eq!(
                 (read(&param::offer(&silent, &one)), agreed(&param::offer(&silent, &one))),
