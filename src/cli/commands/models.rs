@@ -152,7 +152,6 @@ fn fetched(known: &Known) -> Result<Vec<u8>, CliError> {
     let address = || failed(Path::new(known.address));
     for (client, options) in CLIENTS {
         say(&format!("{client} {} {}", options.join(" "), known.address));
-        say(&format!("{client} {} {}", options.join(" "), known.address));
         let mut command = Command::new(client);
         command.args(options).arg(known.address).stdin(Stdio::null()).stdout(Stdio::piped());
         let mut child = match command.spawn() {
@@ -168,7 +167,9 @@ fn fetched(known: &Known) -> Result<Vec<u8>, CliError> {
         read.map_err(address())?;
         // One that is stopped in the middle of too much has failed, too: what came tells more.
         return match bytes.len() as u64 <= known.bytes && !status.success() {
-            true => Err(address()(io::Error::other(format!("{client} failed ({status})")))),
+            true => Err(address()(io::Error::other(format!(
+                "{client} failed ({status}): `bokehcam models add FILE` takes what a browser fetched"
+            )))),
             false => Ok(bytes),
         };
     }
