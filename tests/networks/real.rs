@@ -137,14 +137,34 @@ fn a_photo_alone_has_the_depth_of_the_installed_network_in_every_command() {
     assert!(read("r.png") == read("s/000000.png"));
 }
 
+fn shipped() -> PathBuf {
+    let folder = std::env::var_os("TEST_MODELS").expect("TEST_MODELS names the folder of the network");
+    PathBuf::from(folder).join(KNOWN[0].file)
+}
+
+fn load(file: &Path) -> bokehcam::network::Network {
+    bokehcam::network::load(file, Runtime::BuiltIn).unwrap().network
+}
+
+#[test]
+#[ignore = "needs the network for persons, as `scripts/setup models` brings it"]
+fn what_the_package_brings_is_installed_and_sees_nobody_in_a_grey_wall() {
+    let home = tempfile::TempDir::new().unwrap();
+    let ran = super::bokehcam(&["models", "add", shipped().to_str().unwrap()], home.path());
+    assert!(ran.status.success(), "{}", String::from_utf8_lossy(&ran.stderr));
+    let mut network = load(&home.path().join("bokehcam/models").join(KNOWN[0].file));
+    let shape = vec![1, 144, 256, 3];
+    let mut mask = Vec::new();
+    network.run(&[Tensor { values: vec![0.5; 144 * 256 * 3], shape }], &mut mask).unwrap();
+    assert_eq!(mask[0].shape, [1, 144, 256, 1]);
+    assert!(mask[0].values.iter().all(|share| (0.0..0.5).contains(share)));
+}
+
 /// What the package brings runs by itself, and finds what the library finds in the ONNX file of the same weights.
 #[test]
-#[ignore = "needs the network for persons, as `scripts/setup models` brings it, and BOKEHCAM_DATA"]
+#[ignore = "needs BOKEHCAM_DATA and the network for persons, as `scripts/setup models` brings it"]
 fn the_mask_of_what_the_package_brings_is_that_of_the_library() {
-    let shipped = std::env::var_os("TEST_MODELS").expect("TEST_MODELS names the folder of the network");
-    let shipped = PathBuf::from(shipped).join(KNOWN[0].file);
-    let load = |file: &Path| bokehcam::network::load(file, Runtime::BuiltIn).unwrap().network;
-    let (mut ours, mut library) = (load(&shipped), load(&model(Task::Matte)));
+    let (mut ours, mut library) = (load(&shipped()), load(&model(Task::Matte)));
     assert_ne!(ours.runtime, library.runtime);
     let shape = [1, 144, 256, 3];
     assert_eq!(ours.inputs[0].shape, shape.map(Some));
