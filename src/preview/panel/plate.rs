@@ -24,7 +24,7 @@ pub fn offer(stack: &mut Stack, state: &State, actions: &mut Vec<Action>) {
     let buttons = [network].into_iter().chain(plate).chain([("Not now", "Esc", Action::DeclinePlate)]);
     // A small picture is not covered by words.
     let is_small = room(stack.ctx).height() < 360.0;
-    let why = if is_small { "" } else { "Who is near is not known here, so nothing is blurred." };
+    let why = if is_small { "" } else { "Who is near is not known here, so all is blurred." };
     stack.ask("plate offer", WIDTH, ["A portrait from this picture alone", why], buttons, actions);
 }
 
