@@ -47,14 +47,14 @@ fn what_appeared_meanwhile_is_not_overwritten_and_the_frames_are_kept() {
     assert!(matches!(**error, SinkError::Exists { .. }), "{error}");
     assert_eq!(fs::read(&name).unwrap(), b"mine");
     assert!(fs::read(kept).unwrap().starts_with(b"YUV4MPEG2"));
-    assert_eq!(listing(folder.path()), ["clip.y4m", "clip.incomplete.y4m"]);
+    assert_eq!(listing(folder.path()), ["clip.incomplete.y4m", "clip.y4m"]);
 }
 
 #[test]
 fn what_was_cut_short_replaces_nothing() {
     let folder = tempfile::tempdir().unwrap();
     let name = folder.path().join("clip.y4m");
-    for (there, expected) in [(false, vec!["clip.y4m"]), (true, vec!["clip.y4m", "clip.incomplete.y4m"])] {
+    for (there, expected) in [(false, vec!["clip.y4m"]), (true, vec!["clip.incomplete.y4m", "clip.y4m"])] {
         if there {
             fs::write(&name, "old").unwrap();
         }
@@ -114,6 +114,6 @@ fn what_a_killed_run_left_is_kept_under_a_name_that_shows() {
     let mut sink = open(&at("clip.y4m"), &options((6, 4))).unwrap();
     put_all(&mut *sink, &[picture(6, 4, 0)]);
     sink.finish(Ending::Whole).unwrap();
-    assert_eq!(listing(folder.path()), ["clip.y4m", "clip.incomplete.y4m"]);
+    assert_eq!(listing(folder.path()), ["clip.incomplete.y4m", "clip.y4m"]);
     assert_eq!(fs::read(at("clip.incomplete.y4m")).unwrap(), b"take");
 }
