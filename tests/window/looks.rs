@@ -40,7 +40,7 @@ fn detail(image: &ColorImage, ((x, y), (width, height)): Place) -> f64 {
 
 #[test]
 #[ignore = "needs an X server"]
-fn a_click_focuses_there_and_a_double_click_on_the_subject_again() {
+fn a_click_focuses_there_and_a_double_click_follows_what_was_clicked() {
     let screen = Screen::new();
     let (program, window) = start(&screen, &[]);
     let before = window.until("the face is sharp", |image| detail(image, FACE) > 1.3 * detail(image, LEAVES));
@@ -48,7 +48,7 @@ fn a_click_focuses_there_and_a_double_click_on_the_subject_again() {
     window.until("the leaves are sharp and the face is not", |image| {
         detail(image, LEAVES) > 1.5 * detail(&before, LEAVES) && detail(image, FACE) < 0.9 * detail(&before, FACE)
     });
-    window.click((0.9, 0.3), 2);
+    window.click(FACE.0, 2);
     window.until("the face is sharp again", |image| {
         detail(image, FACE) > 0.95 * detail(&before, FACE) && detail(image, LEAVES) < 1.1 * detail(&before, LEAVES)
     });
