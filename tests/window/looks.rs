@@ -91,7 +91,16 @@ fn the_line_between_before_and_after_is_dragged() {
 #[ignore = "needs an X server"]
 fn a_snapshot_is_repeated_by_render_and_a_copied_command_runs() {
     let screen = Screen::new();
-    let (program, window) = start(&screen, &["-vv", "--backend", "cpu"]);
+    // Somebody who keeps what a snapshot was made of.
+    let home = tempfile::tempdir().unwrap();
+    let state = home.path().join("state/bokehcam");
+    fs::create_dir_all(&state).unwrap();
+    fs::write(state.join("window.toml"), "[habits]\nkeep-sources = true\n").unwrap();
+    let arguments: Vec<&str> =
+        [PORTRAIT].iter().chain(&ONE_FRAME).chain(&["-vv", "--backend", "cpu"]).copied().collect();
+    let mut program = Program::start_at(&screen, home, &arguments);
+    let window = program.window();
+    window.until("the first picture", is_photograph);
     window.key(&[], u32::from('2'));
     until("its executor", PATIENCE, || program.said().contains("an executor was made"));
     // And a frame of it.
