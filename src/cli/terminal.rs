@@ -74,6 +74,7 @@ impl Progress {
     }
 
     /// None.
+    #[cfg(feature = "camera")]
     pub fn silent() -> Self {
         Self(None)
     }

@@ -186,6 +186,7 @@ pub fn run(command: &BenchCommand, global: &options::Global, given: &Given) -> R
 }
 
 /// The table of one size at the default quality, for what `--backend auto` takes and for the CPU: some seconds of work.
+#[cfg(feature = "camera")]
 pub fn short() -> String {
     const SIZE: (u32, u32) = (1280, 720);
     let frame = synthetic_frame(BenchScene::Sitter, SIZE);
