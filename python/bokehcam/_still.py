@@ -49,7 +49,7 @@ def render(
     Args:
         image: ``(H, W, 3)`` or ``(N, H, W, 3)``, ``uint8`` sRGB or ``float32`` linear light.
         depth_m: ``(h, w)`` or ``(N, h, w)``, float32 metres, 0 or not finite = unknown; of the picture's size, or smaller with
-            the same aspect. Without, the effects are ``blur`` and ``tilt-shift`` (the default then).
+            the same aspect. Without, the effects are ``blur`` (the default then) and ``tilt-shift``.
         threads: Threads to work on; all cores unless given.
         out: Where the result goes, as for :func:`bokehcam.blur`.
         effect, method, ...: The settings of the command line, with ``_`` for ``-`` and the same values, ranges and defaults:
