@@ -1,7 +1,7 @@
 //! Neural networks in files, TFLite's and ONNX's: read, run, and kept from doing harm.
 //!
 //! What finds persons in the least time, and comes with the packages, is a TFLite file, which is run by code of our own
-//! ([`tflite`]). An ONNX file is run by ONNX Runtime where that is installed, and else by a library. No file is trusted: its size and
+//! (`tflite`). An ONNX file is run by ONNX Runtime where that is installed, and else by a library. No file is trusted: its size and
 //! those of all it takes and gives are bounded, it may have no loops, and what fails in it, fails with a line of text. No
 //! runtime bounds the memory and the time of what it runs, so that a program may let networks that are not known run in a
 //! process of their own ([`apart`]).
