@@ -142,7 +142,7 @@ impl Source {
     pub fn open(name: &SourceName, options: &Options, look: Option<&Look>) -> Result<Self, SourceError> {
         let wanted = Wanted { options, look };
         let source = Self::open_with_own_depth(name, &wanted)?;
-        let source = networks::for_lone_camera(source, name, &wanted);
+        let source = networks::for_lone_camera(source, &wanted);
         elsewhere::with_external_depth(source, name, &wanted, &Clock::system())
     }
 

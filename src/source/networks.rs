@@ -1,11 +1,11 @@
 //! Depth from one camera by networks: those that the user names, or those that are installed.
 
-use super::{OneCamera, Source, SourceError, SourceName, Wanted};
+use super::{OneCamera, Source, SourceError, Wanted};
 use crate::depth::plate::Companion;
 use crate::look::Look;
 
 #[cfg(feature = "networks")]
-use super::{DepthChoice, DepthFrom, Kind, NetworkFile};
+use super::{DepthChoice, DepthFrom, NetworkFile};
 #[cfg(feature = "networks")]
 use crate::depth::DepthSource;
 
@@ -74,11 +74,10 @@ pub fn installed() -> OneCamera {
     OneCamera::default()
 }
 
-/// Gives a camera, a photo or a recording that has no depth that of the installed networks, if there are any and nothing else is asked for.
+/// Gives a source that has no depth that of the installed networks, if there are any and nothing else is asked for.
 #[cfg(feature = "networks")]
-pub(super) fn for_lone_camera(source: Source, name: &SourceName, wanted: &Wanted) -> Source {
-    let is_one = matches!(name.kind(), Kind::Camera | Kind::Photo | Kind::Recording);
-    let is_lone = is_one && !source.has_depth() && wanted.options.depth_choice == DepthChoice::Auto;
+pub(super) fn for_lone_camera(source: Source, wanted: &Wanted) -> Source {
+    let is_lone = !source.has_depth() && wanted.options.depth_choice == DepthChoice::Auto;
     let needs_metres = wanted.look.is_some_and(|look| look.needs_metres().is_some());
     // A source that is recorded has no look: what it shows is kept, and not what can be made of it at any time.
     if !is_lone || needs_metres || !wanted.look.is_some_and(|look| look.effect.follows_depth()) {
@@ -107,6 +106,6 @@ pub(super) fn open(_: &OneCamera, _: &Wanted) -> Result<Opened, SourceError> {
 }
 
 #[cfg(not(feature = "networks"))]
-pub(super) fn for_lone_camera(source: Source, _: &SourceName, _: &Wanted) -> Source {
+pub(super) fn for_lone_camera(source: Source, _: &Wanted) -> Source {
     source
 }
