@@ -6,7 +6,6 @@
 
 mod common;
 
-use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant;
@@ -16,7 +15,7 @@ use bokehcam::depth::plate::{Companion, PlateDepth};
 use bokehcam::depth::single_camera::{Hints, SingleCamera};
 use bokehcam::depth::{DepthSource, Seen};
 use bokehcam::frame::{ColorImage, DepthMap, Stamp};
-use bokehcam::network::{KNOWN, Known, Runtime, Task};
+use bokehcam::network::{Runtime, Task, best_in};
 use bokehcam::recording::{self, Recording, Scratch};
 use clap::Parser;
 use image::imageops::{FilterType, resize};
@@ -163,13 +162,6 @@ fn enlarged(color: &ColorImage, (width, height): (u32, u32)) -> ColorImage {
 /// The file of the first known network for a task that is there.
 fn model(data: &Path, task: Task) -> Result<PathBuf, Box<dyn std::error::Error>> {
     let folder = data.join("models");
-    let mut files: Vec<_> = fs::read_dir(&folder)?.flatten().map(|entry| entry.path()).collect();
-    files.sort();
-    let known = |file: &PathBuf| fs::read(file).ok().and_then(|bytes| Known::of(&bytes)).map(|known| known.file);
-    let wanted = KNOWN.iter().filter(|known| known.task == task);
-    let mut found = wanted.filter_map(|wanted| files.iter().find(|file| known(file) == Some(wanted.file)));
-    Ok(found
-        .next()
-        .ok_or_else(|| format!("{}: no known network for --depth {}", folder.display(), task.name()))?
-        .clone())
+    best_in(vec![folder.clone()], task)
+        .ok_or_else(|| format!("{}: no known network for --depth {}", folder.display(), task.name()).into())
 }

@@ -4,7 +4,6 @@
 //! Networks are those in the folder `models` of `BOKEHCAM_DATA`, else those that are installed; without any, the plate is
 //! measured alone. The plate is the median of noisy pictures of the same room without the person.
 
-use std::fs;
 use std::path::PathBuf;
 
 use bokehcam::bokeh::BokehError;
@@ -15,7 +14,7 @@ use bokehcam::depth::plate::{Capture, Companion, PlateDepth, Taken};
 use bokehcam::depth::single_camera::{Hints, SingleCamera};
 use bokehcam::depth::{DepthSource, Seen};
 use bokehcam::frame::{ColorImage, DepthMap, Mask, Stamp};
-use bokehcam::network::{self, Known, Runtime, Task};
+use bokehcam::network::{self, Runtime, Task};
 use bokehcam::scene::{Scene, Situation, ThinLens, View};
 use serde::Serialize;
 
@@ -167,13 +166,7 @@ fn plate(staged: &Staged) -> ColorImage {
 /// A known network for a task.
 fn model(task: Task) -> Option<PathBuf> {
     let data = std::env::var_os("BOKEHCAM_DATA").map(PathBuf::from);
-    let files = data.and_then(|data| fs::read_dir(data.join("models")).ok()).into_iter().flatten().flatten();
-    let files: Vec<PathBuf> = files.map(|entry| entry.path()).collect();
-    let is = |file: &PathBuf, known: &Known| {
-        fs::read(file).is_ok_and(|bytes| Known::of(&bytes).is_some_and(|found| found.file == known.file))
-    };
-    let mut known = network::KNOWN.iter().filter(|known| known.task == task);
-    known.find_map(|known| files.iter().find(|file| is(file, known)).cloned()).or_else(|| network::best(task))
+    data.and_then(|data| network::best_in(vec![data.join("models")], task)).or_else(|| network::best(task))
 }
 
 fn outcome(staged: &Staged, source: &'static str, depth: DepthMap) -> Result<Outcome, BokehError> {

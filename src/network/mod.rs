@@ -20,7 +20,7 @@ use serde::{Deserialize, Serialize};
 
 pub use known::{KNOWN, Known, Scaling, Task};
 pub use onnx_runtime::installed as onnx_runtime_installed;
-pub use place::{best, folders, installed};
+pub use place::{best, best_in, folders, installed};
 
 use crate::compute::catch_panic;
 use crate::files::input;

@@ -26,7 +26,12 @@ pub fn folders() -> Vec<PathBuf> {
 
 /// The known networks that are installed, with their files: the best of each task first.
 pub fn installed() -> Vec<(&'static Known, PathBuf)> {
-    let files = folders().into_iter().flat_map(|folder| {
+    known_in(folders())
+}
+
+/// The known networks in these folders, with their files: the best of each task first.
+fn known_in(folders: Vec<PathBuf>) -> Vec<(&'static Known, PathBuf)> {
+    let files = folders.into_iter().flat_map(|folder| {
         let mut files: Vec<PathBuf> =
             std::fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path()).collect();
         files.sort();
@@ -48,5 +53,10 @@ pub fn installed() -> Vec<(&'static Known, PathBuf)> {
 
 /// The best installed network of a task.
 pub fn best(task: Task) -> Option<PathBuf> {
-    installed().into_iter().find(|(known, _)| known.task == task).map(|(_, file)| file)
+    best_in(folders(), task)
+}
+
+/// The best known network of a task in these folders.
+pub fn best_in(folders: Vec<PathBuf>, task: Task) -> Option<PathBuf> {
+    known_in(folders).into_iter().find(|(known, _)| known.task == task).map(|(_, file)| file)
 }

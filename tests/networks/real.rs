@@ -1,11 +1,10 @@
 //! What the open networks find in a real sequence, beside what a depth sensor saw.
 
-use std::fs;
 use std::path::{Path, PathBuf};
 
 use bokehcam::depth::single_camera::{Hints, SingleCamera};
 use bokehcam::frame::{ColorImage, DepthMap};
-use bokehcam::network::{KNOWN, Known, Runtime, Task, Tensor};
+use bokehcam::network::{KNOWN, Runtime, Task, Tensor, best_in};
 use bokehcam::recording::{Options, Recording, Scratch};
 
 use super::read;
@@ -33,13 +32,7 @@ fn data() -> PathBuf {
 
 /// The file of the best known network for a task that is in the data.
 pub fn model(task: Task) -> PathBuf {
-    let files: Vec<PathBuf> =
-        fs::read_dir(data().join("models")).unwrap().flatten().map(|entry| entry.path()).collect();
-    let of = |known: &'static Known| {
-        let is_it = |file: &&PathBuf| Known::of(&fs::read(file).unwrap()).is_some_and(|found| found.file == known.file);
-        files.iter().find(is_it).cloned()
-    };
-    KNOWN.iter().filter(|known| known.task == task).find_map(of).unwrap()
+    best_in(vec![data().join("models")], task).unwrap()
 }
 
 /// A person who turns, as colours and depth.
