@@ -104,10 +104,15 @@ impl Panel {
         let first = actions.len();
         self.set_text_scale(&ctx, state.habits.text_scale, actions);
         let size = if canvas.size.1 > 0 { canvas.size } else { (1280, 720) };
-        self.read_keys(ui, state, size, actions);
         let place = Place::new(canvas, ctx.pixels_per_point(), state.mirror);
         let window = ctx.content_rect();
         let awake = self.is_awake(ui, state.panel && !state.bare, place.is_none());
+        let in_use = awake || self.stays || self.sheet.is_in_use(&ctx);
+        let is_shown = !state.bare && state.panel && (in_use || !state.full_screen);
+        let dock = is_shown.then(|| Dock::of(window, size, state.shows_more()));
+        // Before keys and gestures are read: what they zoom by is the window as it is now.
+        dock::set_room(&ctx, dock.map_or(window, |dock| dock.room));
+        self.read_keys(ui, state, size, actions);
         self.probed = None;
         if let Some(place) = place {
             self.gestures.show(ui, state, place, self.waking, actions);
@@ -120,10 +125,6 @@ impl Panel {
             probe::show(&ctx, state);
         }
         let mut bottom = 0.0;
-        let in_use = awake || self.stays || self.sheet.is_in_use(&ctx);
-        let is_shown = !state.bare && state.panel && (in_use || !state.full_screen);
-        let dock = is_shown.then(|| Dock::of(window, size, state.shows_more()));
-        dock::set_room(&ctx, dock.map_or(window, |dock| dock.room));
         self.sheet.show(&ctx, state, dock, size, actions);
         if !state.bare {
             if awake && !state.panel {

@@ -44,6 +44,16 @@ fn a_key_shows_the_pixels_under_the_pointer_and_all_of_the_picture_again() {
 }
 
 #[test]
+fn a_key_pressed_as_the_window_gets_smaller_counts_with_the_window_as_it_is_then() {
+    let mut window = Window::new();
+    window.press(Key::P, Modifiers::NONE);
+    window.canvas.size = (640, 360);
+    window.size = egui::vec2(600.0, 400.0);
+    window.pass(vec![super::pressed(Key::X, Modifiers::NONE, true)]);
+    assert_eq!(window.state.zoom.factor, 1);
+}
+
+#[test]
 fn a_small_picture_is_never_made_smaller_by_a_key() {
     let mut window = Window::new();
     window.press(Key::P, Modifiers::NONE);
