@@ -1,5 +1,6 @@
 //! A shutter before a sink: while it is closed, the sink is given the still card, and nothing of the pictures.
 
+use std::cell::OnceCell;
 use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -28,7 +29,9 @@ pub struct Shutter {
     rests: bool,
     /// Whether the sink was given the card last.
     shows_card: bool,
-    card: ColorImage,
+    size: (u32, u32),
+    /// Made once it is wanted: who is never off needs no memory for it.
+    card: OnceCell<ColorImage>,
     period: Duration,
     clock: Clock,
     /// The time of the last picture, as the sink was told it.
@@ -77,8 +80,6 @@ impl Shutter {
         clock: Clock,
         closed: Arc<AtomicBool>,
     ) -> (Self, Release) {
-        let mut still = ColorImage::new(size.0, size.1);
-        card::draw(&mut still);
         let (ask, asked) = mpsc::channel();
         let all = Uncovered { output: sink.describe(), is_live: sink.is_live() };
         let shutter = Self {
@@ -90,7 +91,8 @@ impl Shutter {
             demand,
             rests: false,
             shows_card: false,
-            card: still,
+            size,
+            card: OnceCell::new(),
             period,
             clock,
             last_ns: None,
@@ -159,7 +161,12 @@ impl Shutter {
     /// Gives the sink the card.
     fn give_card(&mut self, time_ns: u64) -> Result<ControlFlow<()>, SinkError> {
         self.note(time_ns, true);
-        let given = self.sink.cover(&self.card, time_ns);
+        let card = self.card.get_or_init(|| {
+            let mut card = ColorImage::new(self.size.0, self.size.1);
+            card::draw(&mut card);
+            card
+        });
+        let given = self.sink.cover(card, time_ns);
         self.is_closed();
         self.hear();
         given
