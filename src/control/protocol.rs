@@ -30,6 +30,11 @@ pub enum Request {
     },
     /// Change nothing.
     Status,
+    /// Make depth another way.
+    Depth {
+        /// The way, as behind `--depth`.
+        from: String,
+    },
     /// Save the next picture.
     Snapshot {
         /// The file, which must not exist; a name of the run's own choice where none is said.
@@ -93,6 +98,9 @@ pub struct Status {
     pub size: Option<(u32, u32)>,
     /// Where pictures go, as on the command line.
     pub sinks: Vec<String>,
+    /// Where depth comes from, as behind `--depth`; `None` where there is none, or it cannot be changed.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub depth: Option<String>,
     /// Whether anybody watches; `None` where that is not noticed.
     pub watched: Option<bool>,
     /// The rung that frames are blurred at; `None` where nothing is blurred.
@@ -115,6 +123,7 @@ mod tests {
             (r#"{"do":"off"}"#, Request::Off),
             (r#"{"do":"preset","name":"dreamy"}"#, Request::Preset { name: "dreamy".into() }),
             (r#"{"do":"set","settings":["rim=0.1"]}"#, Request::Set { settings: vec!["rim=0.1".into()] }),
+            (r#"{"do":"depth","from":"matte"}"#, Request::Depth { from: "matte".into() }),
             (r#"{"do":"snapshot"}"#, Request::Snapshot { to: None }),
             (r#"{"do":"snapshot","to":"/tmp/x.png"}"#, Request::Snapshot { to: Some("/tmp/x.png".into()) }),
         ] {

@@ -8,7 +8,7 @@ use std::time::Duration;
 use super::session::CurrentRelease;
 use crate::control::{Answer, Claim, Request, Server, Status};
 use crate::look::{Look, Patch};
-use crate::preview::state::Running;
+use crate::preview::state::{Running, Way};
 
 /// How long the window, and who saves pictures, may take to answer.
 const PATIENCE: Duration = Duration::from_secs(3);
@@ -23,6 +23,8 @@ pub enum Wish {
     Toggle,
     /// Another look.
     Look(Patch),
+    /// Depth made another way.
+    Depth(Way),
     /// A snapshot, in this file or where they usually go.
     Snapshot(Option<PathBuf>),
 }

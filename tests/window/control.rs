@@ -9,7 +9,7 @@ use bokehcam::recording::still::read_color;
 use serde_json::Value;
 
 use super::picture::{distance, is_photograph};
-use super::program::{PORTRAIT, Program};
+use super::program::{PORTRAIT, Program, STEREO};
 use super::screen::{Screen, until};
 use super::window::PATIENCE;
 
@@ -113,4 +113,22 @@ fn what_others_change_is_judged_as_in_a_stream_and_is_not_remembered() {
     ended.succeeded();
     let remembered = fs::read_to_string(ended.home.path().join("state/bokehcam/window.toml")).unwrap();
     assert!(remembered.contains("rim = \"0.2\""), "{remembered}");
+}
+
+#[test]
+#[ignore = "needs an X server"]
+fn where_depth_comes_from_is_changed_from_outside() {
+    let screen = Screen::new();
+    let mut program = Program::start(&screen, &[STEREO, "--panel=false"]);
+    let window = program.window();
+    window.until("the first picture", is_photograph);
+    assert_eq!(status(&program)["depth"], "recorded");
+    assert_eq!(ctl(&program, &["depth", "stereo"]).0, 0);
+    until("two eyes", PATIENCE, || status(&program)["depth"] == "stereo");
+    window.until("it goes on", is_photograph);
+    let (code, said) = ctl(&program, &["depth", "plate"]);
+    assert!(code == 2 && said.contains("use recorded, stereo"), "{said}");
+    let (code, said) = ctl(&program, &["depth", "sonar"]);
+    assert!(code == 2 && said.contains("'sonar'") && said.contains("matte,mono"), "{said}");
+    assert_eq!(status(&program)["depth"], "stereo");
 }

@@ -22,6 +22,7 @@ Examples:
   bokehcam ctl toggle
   bokehcam ctl preset dreamy
   bokehcam ctl set blur=3% focus=auto
+  bokehcam ctl depth matte
   bokehcam ctl --name stream-2 status --json
   bokehcam ctl snapshot --to me.png
 
@@ -57,6 +58,12 @@ enum Verb {
         #[arg(id = "settings", value_name = "NAME=VALUE", required = true)]
         settings: Vec<String>,
     },
+    /// Make depth another way, in a window: recorded, stereo, matte, matte,mono or plate, as the source has it
+    Depth {
+        /// The way, as behind --depth
+        #[arg(id = "way", value_name = "WAY")]
+        from: String,
+    },
     /// Say how it is
     Status {
         /// As a line of JSON
@@ -87,6 +94,7 @@ pub fn run(command: CtlCommand, global: &Global) -> Result<(), CliError> {
         Verb::Toggle => Request::Toggle,
         Verb::Preset { preset } => Request::Preset { name: preset },
         Verb::Set { settings } => Request::Set { settings: settings.into_iter().map(here).collect::<Result<_, _>>()? },
+        Verb::Depth { from } => Request::Depth { from },
         Verb::Status { .. } => Request::Status,
         Verb::Snapshot { to } => Request::Snapshot { to: to.map(|to| absolute(&to)).transpose()? },
     };

@@ -236,6 +236,11 @@ impl State {
         }
     }
 
+    /// The one by which it has its depth.
+    pub fn way(&self) -> Option<Way> {
+        if let Source::Running(running) = &self.source { running.way } else { None }
+    }
+
     /// Whether a plate can be taken.
     pub fn takes_plates(&self) -> bool {
         self.ways().contains(&Way::Plate)

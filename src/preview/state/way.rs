@@ -1,5 +1,8 @@
 //! Where depth comes from, as a person chooses it.
 
+use std::fmt;
+use std::str::FromStr;
+
 use crate::source::{DepthChoice, DepthFrom, NetworkFile, OneCamera, PlateFile};
 
 /// A way to depth.
@@ -35,12 +38,20 @@ impl Way {
         }
     }
 
-    /// What `--depth` calls it.
+    /// All of them, and what `--depth` calls each.
+    const NAMES: [(Self, &'static str); 5] = [
+        (Self::Measured, "recorded"),
+        (Self::Stereo, "stereo"),
+        (Self::Person, "matte"),
+        (Self::PersonAndDistance, "matte,mono"),
+        (Self::Plate, "plate"),
+    ];
+
+    /// What `--depth` calls it, with the networks that a plate is completed by.
     pub fn flag(self) -> String {
         match self.choice() {
-            DepthChoice::Stereo => "stereo".to_owned(),
             DepthChoice::OneCamera(chosen) => chosen.kinds(),
-            _ => "recorded".to_owned(),
+            _ => self.to_string(),
         }
     }
 
@@ -55,5 +66,23 @@ impl Way {
             DepthFrom::Networks => Some(Self::Person),
             DepthFrom::Plate => Some(Self::Plate),
         }
+    }
+}
+
+impl fmt::Display for Way {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let name = Self::NAMES.iter().find(|(way, _)| way == self).map_or("", |(_, name)| name);
+        f.write_str(name)
+    }
+}
+
+impl FromStr for Way {
+    type Err = String;
+    fn from_str(text: &str) -> Result<Self, String> {
+        let way = Self::NAMES.iter().find(|(_, name)| *name == text).map(|(way, _)| *way);
+        way.ok_or_else(|| {
+            let names = Self::NAMES.map(|(_, name)| name).join(", ");
+            format!("there is no depth by '{text}': use one of {names}")
+        })
     }
 }

@@ -197,6 +197,7 @@ fn understand(request: Request, config: Option<&Path>) -> Result<Wish, CliError>
         Request::Toggle => Wish::Toggle,
         Request::Preset { name } => Wish::Look(changes::preset(config, &name)?),
         Request::Set { settings } => Wish::Look(changes::patch(&settings)?),
+        Request::Depth { from } => Wish::Depth(from.parse().map_err(CliError::Usage)?),
         Request::Snapshot { to } => Wish::Snapshot(to),
     })
 }

@@ -206,6 +206,9 @@ impl Controlled {
                 changes::preset(self.facts.config.as_deref(), &name).and_then(|patch| self.change(&patch))
             }
             Request::Set { settings } => changes::patch(&settings).and_then(|patch| self.change(&patch)),
+            Request::Depth { from } => Err(CliError::Usage(format!(
+                "a stream keeps the depth that it began with: begin it anew with --depth {from}, or use a preview"
+            ))),
             Request::Snapshot { to } => return self.save(to).unwrap_or_else(|error| refused(&error)),
         };
         match done {

@@ -13,7 +13,7 @@ use crate::look::{Look, Patch};
 use crate::preview::control::{Asked, Control, Judge, Wish};
 use crate::preview::lent::Lent;
 use crate::preview::session::{CurrentRelease, StillOrder};
-use crate::preview::state::{Action, Source};
+use crate::preview::state::{Action, Source, Way};
 use crate::preview::window::Call;
 
 /// Listens to those who ask, until it is dropped.
@@ -63,6 +63,10 @@ impl App {
                     self.controlled.iter_mut().for_each(|all| all.lent.change(&before, &after));
                     note
                 }),
+                Wish::Depth(way) => self.can_make_depth_by(way).map(|()| {
+                    self.perform(Action::DepthBy(way), events);
+                    None
+                }),
                 Wish::Snapshot(to) => {
                     self.snapshot_for(to, answer);
                     continue;
@@ -86,6 +90,19 @@ impl App {
             _ => None,
         };
         Ok((look?, note))
+    }
+
+    /// Refuses a way to depth that the source has not; the answer names those that it has.
+    fn can_make_depth_by(&self, way: Way) -> Result<(), Answer> {
+        let ways = self.state.ways();
+        if ways.contains(&way) {
+            return Ok(());
+        }
+        let there = match ways {
+            [] => "it has none".to_owned(),
+            ways => format!("use {}", ways.iter().map(Way::to_string).collect::<Vec<_>>().join(", ")),
+        };
+        Err(Answer::usage(format!("this source has no depth by {way}: {there}")))
     }
 
     /// The look to be remembered: without what others have lent it.
@@ -140,6 +157,7 @@ impl App {
             on: !state.off,
             source: state.source_name.clone(),
             size,
+            depth: self.state.way().map(|way| way.to_string()),
             sinks: ["window".to_owned()].into_iter().chain(outputs).collect(),
             watched: Some(self.demand.has_watchers()),
             quality: self.view.as_ref().and_then(|view| Some(view.trace.quality?.name().to_owned())),
