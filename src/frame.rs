@@ -189,6 +189,8 @@ pub struct DepthMap {
     /// The distance of the subject that the map was made around, in metres, such as a person whom a mask shows. Such a map
     /// has its matte and no holes; what is in focus by default is the subject.
     pub subject_m: Option<f32>,
+    /// The distance of a person in a map that was measured, in metres, as far as that is known: in focus by default.
+    pub person_m: Option<f32>,
     /// Whether its outlines are slopes of several pixels, as a coarse network's are: no pixel shows two surfaces then.
     pub is_smooth: bool,
 }

@@ -71,6 +71,11 @@ pub trait DepthSource: Send {
         false
     }
 
+    /// Whether the lens is focused on whom it finds, from the next map on; where it is not, nobody need be found.
+    fn look_for_persons(&mut self, on: bool) {
+        let _ = on;
+    }
+
     /// Another scene comes, as somebody went back or forth in the source: its own time is ahead of media time by so many
     /// nanoseconds from now on.
     fn jump(&mut self, ahead_ns: i64) {

@@ -96,6 +96,11 @@ impl CocMaker {
         }
     }
 
+    /// Whether the lens is focused on a subject that is found.
+    pub fn focuses_on_subject(&self) -> bool {
+        matches!(self.rule, CocRule::Depth { focus: FocusRule::Auto, .. })
+    }
+
     /// The same on so many threads, the caller's included: what is made is the same to the bit.
     pub fn on_threads(self, threads: usize) -> Self {
         Self { workers: ThreadPool::new("depth", threads), ..self }

@@ -96,6 +96,7 @@ impl Stage<'_> {
                     swap = Some(Arc::new(Swap::new(number, executor, look.quality_rule(self.adaptive))));
                 }
             }
+            self.source.iter_mut().for_each(|source| source.look_for_persons(preparation.focuses_on_subject()));
             if std::mem::replace(&mut seek, trace.seek) != trace.seek {
                 preparation.forget();
                 self.rate.iter_mut().for_each(Rate::forget);

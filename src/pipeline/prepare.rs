@@ -92,6 +92,11 @@ impl Preparation {
         self.coc.forget();
     }
 
+    /// Whether the lens is focused on a subject that is found ([`CocMaker::focuses_on_subject`]).
+    pub fn focuses_on_subject(&self) -> bool {
+        self.coc.focuses_on_subject()
+    }
+
     /// The CoC of every frame, where that needs no depth.
     pub fn fixed(&self) -> Option<CocField> {
         self.coc.fixed()

@@ -213,6 +213,7 @@ impl Services for System {
         };
         let (source, source_name) = self.open_source(&name, way)?;
         notes.extend(source.networks.iter().map(|networks| format!("Depth by {networks}.")));
+        notes.extend(source.persons.iter().map(|persons| format!("Focus on persons by {persons}.")));
         if source_name.kind() == Kind::Synthetic {
             notes.push(RENDERED.to_owned());
         }

@@ -31,7 +31,7 @@ pub mod registration;
 
 pub use error::SourceError;
 pub use name::{Kind, SourceName};
-pub use networks::{installed as installed_networks, refuse_metres};
+pub use networks::{find_person, installed as installed_networks, refuse_metres};
 use opened::Opened;
 pub use options::{DepthChoice, Frames, NetworkFile, OneCamera, PlateFile, Size};
 
@@ -93,6 +93,8 @@ pub struct Source {
     pub depth_from: DepthFrom,
     /// What makes the depth, where networks do.
     pub networks: Option<String>,
+    /// What finds the person to focus on, where the depth is measured.
+    pub persons: Option<String>,
     /// How far the plate is, where that makes the depth.
     pub guide: Option<Arc<Guide>>,
     /// The first map of recorded depth, where the look uses depth.
@@ -143,14 +145,15 @@ impl Source {
         let wanted = Wanted { options, look };
         let source = Self::open_with_own_depth(name, &wanted)?;
         let source = networks::for_lone_camera(source, &wanted);
-        elsewhere::with_external_depth(source, name, &wanted, &Clock::system())
+        let source = elsewhere::with_external_depth(source, name, &wanted, &Clock::system())?;
+        Ok(networks::for_focus(source, &wanted))
     }
 
     /// A source from a camera that the caller has opened; `depth` gives depth in metres for its frames.
     pub fn of(camera: Box<dyn Camera>, depth: Option<Box<dyn DepthSource>>) -> Self {
         let has_depth = depth.is_some() || camera.info().brings == Brings::Depth;
         let depth_from = if has_depth { DepthFrom::Metres } else { DepthFrom::Nothing };
-        Self { camera, depth, rig: None, depth_from, networks: None, guide: None, first_depth: None }
+        Self { camera, depth, rig: None, depth_from, networks: None, persons: None, guide: None, first_depth: None }
     }
 
     /// Opens a source with the depth it has by itself: recorded, exact, or matched from its two eyes. Depth from

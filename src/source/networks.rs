@@ -1,13 +1,14 @@
 //! Depth from one camera by networks: those that the user names, or those that are installed.
 
-use super::{OneCamera, Source, SourceError, Wanted};
+use super::{OneCamera, Options, Source, SourceError, Wanted};
+use crate::depth::focus::{FocusRule, OnPersons, Persons};
 use crate::depth::plate::Companion;
+use crate::depth::{DepthSource, Seen};
+use crate::frame::{ColorImage, DepthMap, Stamp};
 use crate::look::Look;
 
 #[cfg(feature = "networks")]
 use super::{DepthChoice, DepthFrom, NetworkFile};
-#[cfg(feature = "networks")]
-use crate::depth::DepthSource;
 
 /// Networks at work, and what they are in a few words.
 type Opened = (Box<dyn Companion>, String);
@@ -97,6 +98,44 @@ pub(super) fn for_lone_camera(source: Source, wanted: &Wanted) -> Source {
             tracing::warn!("{error}; going on without it");
             source
         }
+    }
+}
+
+/// What finds the person to focus on, and what that is in a few words; `None` where no network for that is installed.
+#[cfg(feature = "networks")]
+fn persons(wanted: &Wanted) -> Option<(Persons, String)> {
+    let finder = OneCamera { mono: None, ..installed() };
+    finder.matte.as_ref()?;
+    let opened = open(&finder, wanted);
+    let told = opened.inspect_err(|error| tracing::warn!("{error}; the focus goes by distance alone"));
+    told.ok().map(|(finder, about)| (Persons::new(finder), about))
+}
+
+#[cfg(not(feature = "networks"))]
+fn persons(_: &Wanted) -> Option<(Persons, String)> {
+    None
+}
+
+/// Lets the installed network find the person to focus on in depth that was measured, where there is one.
+pub(super) fn for_focus(mut source: Source, wanted: &Wanted) -> Source {
+    let is_used = wanted.look.is_some_and(|look| look.effect.follows_depth()) && !source.depth_from.is_of_pictures();
+    if source.depth.is_some()
+        && is_used
+        && let Some((persons, about)) = persons(wanted)
+    {
+        let on_persons = |depth| Box::new(OnPersons::new(depth, persons)) as Box<dyn DepthSource>;
+        source.depth = source.depth.map(on_persons);
+        source.persons = Some(about);
+    }
+    source
+}
+
+/// The same for the map of one picture that comes from a file.
+pub fn find_person(options: &Options, look: &Look, color: &ColorImage, map: &mut DepthMap) {
+    let is_used = look.effect.follows_depth() && look.focus == FocusRule::Auto;
+    if is_used && let Some((mut persons, _)) = persons(&Wanted { options, look: Some(look) }) {
+        let stamp = Stamp { index: 0, time_ns: 0, captured_ns: None };
+        persons.mark(Seen { stamp, color, right: None }, map);
     }
 }
 

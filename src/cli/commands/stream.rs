@@ -28,6 +28,7 @@ use crate::clock::Clock;
 use crate::compute::Backend;
 use crate::computing::Executors;
 use crate::control::{Name, Status};
+use crate::depth::focus::FocusRule;
 use crate::link::demand::Demand;
 use crate::look::Strength;
 use crate::pipeline::{self, Changes, Pace, Run};
@@ -167,6 +168,10 @@ pub fn run(command: &StreamCommand, global: &options::Global, given: Given) -> R
 
     if let Some(networks) = source.networks.as_ref().filter(|_| !global.quiet) {
         terminal::say(&format!("depth by {networks}"));
+    }
+    let is_found = look.effect.follows_depth() && look.focus == FocusRule::Auto;
+    if let Some(persons) = source.persons.as_ref().filter(|_| is_found && !global.quiet) {
+        terminal::say(&format!("focus on persons by {persons}"));
     }
     // That a map would be taken is no news to who wants none.
     let is_wanted = source.has_depth() || parts.blur.takes_whatever_depth();

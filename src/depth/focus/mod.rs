@@ -4,6 +4,7 @@
 //! The focus moves like a lens, in dioptres (1/m): it eases towards its target and does not follow small changes.
 
 mod loyalty;
+mod persons;
 mod subject;
 mod track;
 
@@ -11,6 +12,7 @@ use std::fmt;
 use std::str::FromStr;
 
 use loyalty::Loyalty;
+pub use persons::{OnPersons, Persons};
 use subject::Subject;
 use track::Track;
 
@@ -21,7 +23,7 @@ use crate::frame::DepthMap;
 pub enum FocusRule {
     /// A distance in metres, > 0.
     Metres(f32),
-    /// Whom a mask shows; without one the nearest subject that is large enough to be meant.
+    /// Whom a mask shows; where there is nobody, or no mask, the nearest subject that is large enough to be meant.
     Auto,
     /// A point, as fractions of width and height (0 to 1).
     Point {
@@ -120,7 +122,8 @@ impl Focus {
             FocusRule::Auto if map.subject_m.is_some() => map.subject_m,
             FocusRule::Auto => {
                 let Self { subject, loyalty, .. } = self;
-                let found = subject.find(map);
+                let nearest = subject.find(map);
+                let found = map.person_m.map(f32::recip).or(nearest);
                 found.map(|found| 1.0 / loyalty.choose(found, |dioptres| subject.stays(dioptres), time_ns))
             }
             FocusRule::Track { x, y } => {

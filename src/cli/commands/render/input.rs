@@ -68,8 +68,10 @@ pub(super) fn read(command: &RenderCommand, look: &Look) -> Result<Input, CliErr
             (color, extras, given.or(depth))
         }
     };
-    if let (Some(Depth::Measured(map)), Some(file)) = (&depth, &command.depth_map) {
+    let mut depth = depth;
+    if let (Some(Depth::Measured(map)), Some(file)) = (&mut depth, &command.depth_map) {
         still::check_depth_size(file, map.size(), color.size())?;
+        source::find_person(&command.source_options(), look, &color, map);
     }
     let made = made_depth(command, look, &color)?;
     Ok(Input { color, extras, depth: made.or(depth), found })

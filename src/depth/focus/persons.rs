@@ -1,0 +1,203 @@
+//! Measured depth in which a person is the subject, whatever else is near: a network says where persons are.
+
+use super::subject::Subject;
+use crate::depth::plate::Companion;
+use crate::depth::{DepthError, DepthSource, Seen};
+use crate::frame::{ColorImage, DepthMap, Mask};
+
+/// A person is looked for so often, in nanoseconds of media time: the depth between is that of whoever is there by then.
+const EVERY_NS: u64 = 200_000_000;
+/// Share of the picture that is somebody's, at least: less is a face on a poster, or a mistake.
+const LEAST_SHARE: f32 = 0.01;
+/// Where a mask is this sure, no room is seen beside a person.
+const SURE: f32 = 0.9;
+
+/// Finds how far persons are in maps.
+pub struct Persons {
+    finder: Box<dyn Companion>,
+    last_ns: Option<u64>,
+    /// The depth of persons alone, in the mask's pixels: 0 elsewhere.
+    theirs: DepthMap,
+    /// The pixels of the mask that are theirs; none while there is nobody.
+    places: Vec<u32>,
+    subject: Subject,
+}
+
+impl Persons {
+    /// Those whom `finder` finds in the pictures.
+    pub fn new(finder: Box<dyn Companion>) -> Self {
+        let (theirs, subject) = (DepthMap::default(), Subject::default());
+        Self { finder, last_ns: None, theirs, places: Vec::new(), subject }
+    }
+
+    /// Gives the map of the frame `seen` the distance of the person in it ([`DepthMap::person_m`]).
+    pub fn mark(&mut self, seen: Seen, map: &mut DepthMap) {
+        self.look(seen);
+        map.person_m = self.distance_m(map);
+    }
+
+    fn look(&mut self, seen: Seen) {
+        let time_ns = seen.stamp.time_ns;
+        if self.last_ns.is_some_and(|last_ns| time_ns.abs_diff(last_ns) < EVERY_NS) {
+            return;
+        }
+        self.last_ns = Some(time_ns);
+        self.places.clear();
+        let Some(Mask { width, height, share }) = self.finder.persons(seen) else { return };
+        self.places.extend((0..).zip(share).filter(|(_, share)| **share >= SURE).map(|(at, _)| at));
+        if (self.places.len() as f32) < LEAST_SHARE * share.len() as f32 {
+            self.places.clear();
+        }
+        self.theirs.resize(*width, *height);
+        self.theirs.metres.fill(0.0);
+    }
+
+    /// How far they are in a map: the nearest who is large, or else the largest, in metres.
+    fn distance_m(&mut self, map: &DepthMap) -> Option<f32> {
+        let Self { theirs, places, subject, .. } = self;
+        let (columns, rows) = (theirs.width as usize, theirs.height as usize);
+        let within = |at: usize, of: usize, size: u32| (2 * at + 1) * size as usize / (2 * of);
+        for &mut at in places.iter_mut() {
+            let (x, y) = (at as usize % columns, at as usize / columns);
+            let (x, y) = (within(x, columns, map.width), within(y, rows, map.height));
+            theirs.metres[at as usize] = map.metres[y * map.width as usize + x];
+        }
+        let found = if places.is_empty() { None } else { subject.find(theirs) };
+        found.map(f32::recip)
+    }
+}
+
+/// A source of depth whose maps have the distance of the person.
+pub struct OnPersons {
+    depth: Box<dyn DepthSource>,
+    persons: Persons,
+    is_wanted: bool,
+}
+
+impl OnPersons {
+    /// The maps of `depth`, and in them the `persons`.
+    pub fn new(depth: Box<dyn DepthSource>, persons: Persons) -> Self {
+        Self { depth, persons, is_wanted: true }
+    }
+}
+
+impl DepthSource for OnPersons {
+    fn rectify(&mut self, color: &mut ColorImage) {
+        self.depth.rectify(color);
+    }
+
+    fn read(&mut self, seen: Seen, map: &mut DepthMap) -> Result<(), DepthError> {
+        self.depth.read(seen, map)?;
+        map.person_m = None;
+        if self.is_wanted {
+            self.persons.mark(seen, map);
+        }
+        Ok(())
+    }
+
+    fn efforts(&self) -> &'static [f64] {
+        self.depth.efforts()
+    }
+
+    fn set_effort(&mut self, effort: usize) {
+        self.depth.set_effort(effort);
+    }
+
+    fn may_be_shared(&self) -> bool {
+        self.depth.may_be_shared()
+    }
+
+    fn knows_background(&self) -> bool {
+        self.depth.knows_background()
+    }
+
+    fn look_for_persons(&mut self, on: bool) {
+        self.is_wanted = on;
+    }
+
+    fn jump(&mut self, ahead_ns: i64) {
+        self.persons.last_ns = None;
+        self.persons.finder.jump(ahead_ns);
+        self.depth.jump(ahead_ns);
+    }
+
+    fn rest(&mut self) {
+        self.depth.rest();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::depth::focus::{Focus, FocusRule};
+    use crate::frame::Stamp;
+
+    /// A room at 4 m, a shelf of a third of the picture in its middle at 0.8 m, and somebody at its left at 1.6 m.
+    struct Room {
+        looks: u32,
+        mask: Mask,
+    }
+
+    const SIZE: (u32, u32) = (96, 60);
+
+    impl Room {
+        fn new(person: bool) -> Self {
+            let mut mask = Mask::default();
+            mask.resize(24, 12);
+            for (at, share) in mask.share.iter_mut().enumerate() {
+                *share = if person && at % 24 < 6 { 1.0 } else { 0.3 };
+            }
+            Self { looks: 0, mask }
+        }
+    }
+
+    impl DepthSource for Room {
+        fn read(&mut self, seen: Seen, map: &mut DepthMap) -> Result<(), DepthError> {
+            map.resize(SIZE.0, SIZE.1);
+            for (at, metres) in map.metres.iter_mut().enumerate() {
+                *metres = match at as u32 % SIZE.0 {
+                    // Who comes nearer, by 1 mm a frame.
+                    0..24 => 1.6 - 0.001 * seen.stamp.index as f32,
+                    32..64 => 0.8,
+                    _ => 4.0,
+                };
+            }
+            Ok(())
+        }
+    }
+
+    impl Companion for Room {
+        fn persons(&mut self, _: Seen) -> Option<&Mask> {
+            self.looks += 1;
+            assert!(self.looks < 20, "not with every frame");
+            Some(&self.mask)
+        }
+
+        fn measure_behind(&mut self, _: &ColorImage, _: &Mask, _: &mut DepthMap) {
+            unreachable!("depth is measured")
+        }
+    }
+
+    /// Where the lens is after two seconds, with somebody there or not.
+    fn focus_m(person: bool, is_wanted: bool) -> f32 {
+        let mut source = OnPersons::new(Box::new(Room::new(person)), Persons::new(Box::new(Room::new(person))));
+        source.look_for_persons(is_wanted);
+        let (mut map, mut focus, color) =
+            (DepthMap::default(), Focus::new(FocusRule::Auto), ColorImage::new(SIZE.0, SIZE.1));
+        let focused = (0..60).map(|index| {
+            let time_ns = index as u64 * 33_000_000;
+            let seen = Seen { stamp: Stamp { index, time_ns, captured_ns: None }, color: &color, right: None };
+            source.read(seen, &mut map).unwrap();
+            focus.focus_m(&map, time_ns)
+        });
+        focused.last().unwrap()
+    }
+
+    #[test]
+    fn a_person_is_the_subject_although_something_large_is_nearer_in_the_middle() {
+        let (person_m, shelf_m) = (focus_m(true, true), focus_m(false, true));
+        assert!((person_m - 1.54).abs() < 0.05, "{person_m}: followed between two looks");
+        assert!((shelf_m - 0.8).abs() < 0.02, "{shelf_m}: what is near and large, where nobody is");
+        assert_eq!(focus_m(true, false), shelf_m);
+    }
+}
