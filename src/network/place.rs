@@ -4,19 +4,16 @@ use std::env;
 use std::path::PathBuf;
 
 use super::{Known, MOST_BYTES, Task};
-use crate::files::input;
-use crate::files::trusted::absolute;
+use crate::files::{data, input};
 
 /// The folders, the user's own first: `bokehcam/models` in `$XDG_DATA_HOME`, in `share` beside the folder of the program, as
 /// it was unpacked or installed, and in each of `$XDG_DATA_DIRS`.
 pub fn folders() -> Vec<PathBuf> {
-    let own = absolute("XDG_DATA_HOME").or_else(|| Some(absolute("HOME")?.join(".local/share")));
-    let system = env::var_os("XDG_DATA_DIRS").filter(|dirs| !dirs.is_empty());
-    let system = system.unwrap_or_else(|| "/usr/local/share:/usr/share".into());
     let beside = env::current_exe().ok().and_then(|program| Some(program.parent()?.parent()?.join("share")));
-    let system = beside.into_iter().chain(env::split_paths(&system)).filter(|path| path.is_absolute());
     let mut folders = Vec::new();
-    for folder in own.into_iter().chain(system).map(|folder| folder.join("bokehcam/models")) {
+    for folder in
+        data::own().into_iter().chain(beside).chain(data::system()).map(|folder| folder.join("bokehcam/models"))
+    {
         if !folders.contains(&folder) {
             folders.push(folder);
         }

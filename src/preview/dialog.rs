@@ -51,9 +51,8 @@ fn has_portal() -> bool {
     let is_there =
         |name: &str, file: &str| std::env::var_os(name).is_some_and(|dir| PathBuf::from(dir).join(file).exists());
     let has_bus = std::env::var_os("DBUS_SESSION_BUS_ADDRESS").is_some() || is_there("XDG_RUNTIME_DIR", "bus");
-    let dirs = std::env::var("XDG_DATA_DIRS").unwrap_or_else(|_| "/usr/local/share:/usr/share".into());
     let service = "dbus-1/services/org.freedesktop.portal.Desktop.service";
-    has_bus && dirs.split(':').any(|dir| Path::new(dir).join(service).exists())
+    has_bus && data::own().into_iter().chain(data::system()).any(|folder| folder.join(service).exists())
 }
 
 fn has_zenity() -> bool {

@@ -9,8 +9,7 @@ use std::collections::HashMap;
 use std::fmt::Display;
 use std::path::{Path, PathBuf};
 
-use crate::files::input;
-use crate::files::trusted::absolute;
+use crate::files::{data, input};
 
 /// Texts by their English.
 pub type Table = HashMap<String, String>;
@@ -99,10 +98,7 @@ fn read(path: &Path) -> Result<Table, String> {
 fn find(language: &str) -> Option<PathBuf> {
     let language = language.split(['.', '@']).next().filter(|name| is_name(name))?;
     let short = language.split('_').next().unwrap_or(language);
-    let own = absolute("XDG_DATA_HOME").or_else(|| Some(absolute("HOME")?.join(".local/share")));
-    let all = std::env::var_os("XDG_DATA_DIRS").unwrap_or_else(|| "/usr/local/share:/usr/share".into());
-    let system = std::env::split_paths(&all).filter(|path| path.is_absolute());
-    let folders: Vec<PathBuf> = own.into_iter().chain(system).collect();
+    let folders: Vec<PathBuf> = data::own().into_iter().chain(data::system()).collect();
     let named = |name: &str| {
         folders.iter().map(|folder| folder.join(format!("bokehcam/texts/{name}.toml"))).find(|path| path.is_file())
     };
