@@ -44,6 +44,48 @@ pub fn tr_with(english: &str, values: &[&dyn Display]) -> String {
     text
 }
 
+/// A sentence in the language that is spoken: where the table has it, as it is or with values in its places `{}` or `{name}`,
+/// which then are in those of the translation. Names and reasons of errors are in no table, and stay.
+pub fn translated(sentence: &str) -> String {
+    let table = TABLE.get().into_iter().flatten();
+    // What has values says most itself where it is longest.
+    let said = table.filter(|(_, text)| !text.is_empty()).filter_map(|(english, text)| match english == sentence {
+        true => Some((usize::MAX, text.clone())),
+        false => Some((english.len(), filled(text, &values_in(english, sentence)?))),
+    });
+    said.max_by_key(|(length, _)| *length).map_or_else(|| sentence.to_owned(), |(_, text)| text)
+}
+
+/// The places of a text with values, and what follows each of them.
+fn places(text: &str) -> impl Iterator<Item = (&str, &str)> {
+    text.split('{').skip(1).filter_map(|part| part.split_once('}'))
+}
+
+/// What a sentence has in the places of a text; `None` where that is another one. Such a text begins with words of its own.
+fn values_in<'a>(text: &'a str, sentence: &'a str) -> Option<Vec<(&'a str, &'a str)>> {
+    let (before, _) = text.split_once('{').filter(|(before, _)| before.contains(' '))?;
+    let mut rest = sentence.strip_prefix(before)?;
+    let count = places(text).count();
+    let mut values = Vec::new();
+    for (index, (name, after)) in places(text).enumerate() {
+        let end = if index + 1 == count { rest.len().checked_sub(after.len())? } else { rest.find(after)? };
+        let (value, from) = (rest.get(..end)?, rest.get(end..)?);
+        rest = from.strip_prefix(after)?;
+        values.push((name, value));
+    }
+    rest.is_empty().then_some(values)
+}
+
+/// A translation with values in its places: by their names, or in order where they have none.
+fn filled(text: &str, values: &[(&str, &str)]) -> String {
+    let mut filled = text.split('{').next().unwrap_or_default().to_owned();
+    for (index, (name, after)) in places(text).enumerate() {
+        let named = values.iter().find(|(other, _)| !name.is_empty() && *other == name).or(values.get(index));
+        filled.extend([named.map_or("", |(_, value)| value), after]);
+    }
+    filled
+}
+
 /// The table to speak by: of the language that was chosen, or of a file; else of the environment's language. `None` is
 /// English.
 ///
@@ -150,6 +192,32 @@ pub mod tests {
         assert_eq!([tr("Mirror"), tr("Depth"), tr("Focus")], ["Spiegel", "Depth", "Focus"]);
         assert_eq!(tr_with("{} of {}", &[&2, &"3"]), "von 2 3");
         assert_eq!(tr_with("{} m", &[]), " m");
+    }
+
+    #[test]
+    fn sentences_with_values_are_translated_and_those_of_others_stay() {
+        speak(
+            [
+                ("Saved {}", "{} ist gesichert"),
+                ("Saved as preset '{name}'", "Als Vorlage „{name}“ gesichert"),
+                ("Preset '{name}' is called '{new}' now", "„{new}“ hieß „{name}“"),
+                ("{} of {}", "von {} {}"),
+                ("No source.", "Keine Quelle."),
+            ]
+            .map(|(a, b)| (a.into(), b.into()))
+            .into(),
+        );
+        for (english, german) in [
+            ("Saved ~/x y.png", "~/x y.png ist gesichert"),
+            ("Saved as preset 'dusk'", "Als Vorlage „dusk“ gesichert"),
+            ("Preset 'a' is called 'b' now", "„b“ hieß „a“"),
+            ("No source.", "Keine Quelle."),
+            ("x.png: no such file of yours", "x.png: no such file of yours"),
+            ("Preset 'a' is called 'b' no", "Preset 'a' is called 'b' no"),
+            ("", ""),
+        ] {
+            assert_eq!(translated(english), german);
+        }
     }
 
     #[test]

@@ -32,6 +32,7 @@ pub use way::Way;
 pub use zoom::Zoom;
 
 use super::meters::Meters;
+use super::texts::translated;
 pub use super::views::Shown;
 use super::views::{Legend, Probe};
 use crate::capture::demo;
@@ -202,9 +203,9 @@ impl State {
         Self { first_look: look.clone(), look, source_name, panel: true, ..Self::default() }
     }
 
-    /// Adds a line for the person.
+    /// Adds a line for the person, in the language that is spoken.
     pub fn note(&mut self, text: impl Into<String>) {
-        let text = text.into();
+        let text = translated(&text.into());
         // Said once more, it is shown anew, and once.
         self.notes.retain(|note| note.text != text);
         self.noted += 1;

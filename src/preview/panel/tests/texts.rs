@@ -121,6 +121,22 @@ fn the_table_has_all_texts_and_no_others() {
 }
 
 #[test]
+fn what_is_said_while_it_runs_is_in_the_table_too() {
+    let sources = sources(&Path::new(env!("CARGO_MANIFEST_DIR")).join("src/preview"));
+    let english = table::english();
+    let literal = |after: &str| {
+        let text = after.trim_start().strip_prefix('"')?.split('"').next()?.to_owned();
+        (text.contains(' ') && text.starts_with(char::is_uppercase)).then_some(text)
+    };
+    let following = |before: &str| sources.split(before).skip(1).filter_map(literal).collect::<Vec<_>>();
+    let constants = following(": &str =").into_iter().filter(|text| text.ends_with('.'));
+    let said: Vec<String> = constants.chain(following("note(format!(")).chain(following("note(")).collect();
+    assert!(said.len() > 20, "{said:?}");
+    let missing: Vec<&String> = said.iter().filter(|text| !english.contains_key(*text)).collect();
+    assert!(missing.is_empty(), "texts.toml has not: {missing:#?}");
+}
+
+#[test]
 fn all_that_is_drawn_is_translated() {
     // What is a name, an error's reason or a number is the same in every language.
     let names = [
