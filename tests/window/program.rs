@@ -21,8 +21,6 @@ pub struct Program<'a> {
 
 /// The recording that comes with the project.
 pub const PORTRAIT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/recordings/portrait");
-/// Another one, with two eyes and the depth of one of them.
-pub const STEREO: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/recordings/stereo");
 
 impl<'a> Program<'a> {
     /// Starts it with these arguments, as somebody who has never used it.
