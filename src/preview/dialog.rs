@@ -6,6 +6,7 @@ use std::time::{Duration, Instant};
 use rfd::FileDialog;
 
 use super::services::Browse;
+use crate::files::data;
 
 /// Shown where there is no dialog.
 const NO_DIALOG: &str = "This desktop has no file dialog (neither a portal nor zenity): drop a folder or a photo on the window, \
