@@ -68,8 +68,8 @@ impl Subject {
         if self.total == 0.0 {
             return None;
         }
-        let bodies: [Cell; CELLS] = std::array::from_fn(|cell| self.body(cell));
-        let is_peak = |&cell: &usize| Self::window(cell).all(|c| bodies[c].weight <= bodies[cell].weight);
+        let bodies = self.bodies();
+        let is_peak = |cell: &usize| is_peak(&bodies, *cell);
         let is_large = |&cell: &usize| bodies[cell].weight >= LARGE * self.total;
         let large = |below: usize| (0..below).rev().filter(is_peak).filter(is_large);
         // What is farthest is the background: it makes nothing before it small.
@@ -86,6 +86,19 @@ impl Subject {
         let nearest = large(CELLS).find(|cell| !is_beside(cell));
         let largest = || (0..CELLS).max_by(|&a, &b| bodies[a].weight.total_cmp(&bodies[b].weight));
         nearest.or_else(largest).map(|cell| bodies[cell].dioptres())
+    }
+
+    /// Distance of the largest body in dioptres, or of the nearest one that is half as large; `None` without any known depth.
+    pub fn largest(&mut self, map: &DepthMap) -> Option<f32> {
+        self.weigh(map);
+        let bodies = self.bodies();
+        let most = bodies.iter().map(|body| body.weight).fold(f32::MIN_POSITIVE, f32::max);
+        let is_large = |cell: &usize| is_peak(&bodies, *cell) && bodies[*cell].weight >= 0.5 * most;
+        (0..CELLS).rev().find(is_large).map(|cell| bodies[cell].dioptres())
+    }
+
+    fn bodies(&self) -> [Cell; CELLS] {
+        std::array::from_fn(|cell| self.body(cell))
     }
 
     /// Where something is left, near this distance, of a subject that was large enough, in the map that was looked at last.
@@ -134,6 +147,10 @@ impl Subject {
         }
         self.total = if known > 0.0 { known.max(LEAST_KNOWN * all) } else { 0.0 };
     }
+}
+
+fn is_peak(bodies: &[Cell; CELLS], cell: usize) -> bool {
+    Subject::window(cell).all(|other| bodies[other].weight <= bodies[cell].weight)
 }
 
 /// Where a pixel is, from -1 to 1.
