@@ -262,7 +262,10 @@ fn no_member_waits_for_another() {
     complete.send(()).unwrap();
     let outputs = switch.outputs();
     switch.finish(Ending::Whole).unwrap();
-    assert_eq!(*stuck.lock().unwrap(), [0, 19]);
-    assert_eq!((outputs[0]().frames, outputs[0]().lost), (2, 18));
-    assert_eq!(all(&told), [began("camera"), completed("camera", 20), began("stalled"), completed("stalled", 2)]);
+    // The one that its thread came upon first, and the newest.
+    let taken = stuck.lock().unwrap().clone();
+    let count = taken.len() as u64;
+    assert!(taken.last() == Some(&19) && count <= 2, "{taken:?}");
+    assert_eq!((outputs[0]().frames, outputs[0]().lost), (count, 20 - count));
+    assert_eq!(all(&told), [began("camera"), completed("camera", 20), began("stalled"), completed("stalled", count)]);
 }
