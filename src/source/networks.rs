@@ -1,6 +1,6 @@
 //! Depth from one camera by networks: those that the user names, or those that are installed.
 
-use super::{OneCamera, Options, Source, SourceError, Wanted};
+use super::{DepthFrom, OneCamera, Options, Source, SourceError, Wanted};
 use crate::depth::focus::{FocusRule, OnPersons, Persons};
 use crate::depth::plate::Companion;
 use crate::depth::{DepthSource, Seen};
@@ -8,7 +8,7 @@ use crate::frame::{ColorImage, DepthMap, Stamp};
 use crate::look::Look;
 
 #[cfg(feature = "networks")]
-use super::{DepthChoice, DepthFrom, NetworkFile};
+use super::{DepthChoice, NetworkFile};
 
 /// Networks at work, and what they are in a few words.
 type Opened = (Box<dyn Companion>, String);
@@ -123,7 +123,8 @@ pub(super) fn for_focus(mut source: Source, wanted: &Wanted) -> Source {
         && is_used
         && let Some((persons, about)) = persons(wanted)
     {
-        let on_persons = |depth| Box::new(OnPersons::new(depth, persons)) as Box<dyn DepthSource>;
+        let is_matched = source.depth_from == DepthFrom::Eyes;
+        let on_persons = |depth| Box::new(OnPersons::new(depth, persons, is_matched)) as Box<dyn DepthSource>;
         source.depth = source.depth.map(on_persons);
         source.persons = Some(about);
     }

@@ -15,6 +15,11 @@ const SURE: f32 = 0.9;
 /// and what stands before them.
 const HEAD: f32 = 1.0 / 6.0;
 
+/// What is so much farther than who it is part of was matched wrongly, as a knitted pullover is with itself.
+const TOO_FAR: f32 = 1.25;
+/// Outlines of masks are this uncertain, in pixels of theirs.
+const OUTLINE: usize = 2;
+
 /// Finds how far persons are in maps.
 pub struct Persons {
     finder: Box<dyn Companion>,
@@ -23,6 +28,8 @@ pub struct Persons {
     theirs: DepthMap,
     /// The pixels of the mask that are their heads and shoulders; none while there is nobody.
     places: Vec<u32>,
+    /// Whether pixels of the mask are theirs, outlines left out.
+    inside: Vec<bool>,
     subject: Subject,
 }
 
@@ -30,21 +37,39 @@ impl Persons {
     /// Those whom `finder` finds in the pictures.
     pub fn new(finder: Box<dyn Companion>) -> Self {
         let (theirs, subject) = (DepthMap::default(), Subject::default());
-        Self { finder, last_ns: None, theirs, places: Vec::new(), subject }
+        Self { finder, last_ns: None, theirs, places: Vec::new(), inside: Vec::new(), subject }
     }
 
     /// Gives the map of the frame `seen` the distance of the person in it ([`DepthMap::person_m`]).
     pub fn mark(&mut self, seen: Seen, map: &mut DepthMap) {
-        self.look(seen);
+        let time_ns = seen.stamp.time_ns;
+        if self.last_ns.is_none_or(|last_ns| time_ns.abs_diff(last_ns) >= EVERY_NS) {
+            self.last_ns = Some(time_ns);
+            self.look(seen);
+        }
         map.person_m = self.distance_m(map);
     }
 
-    fn look(&mut self, seen: Seen) {
-        let time_ns = seen.stamp.time_ns;
-        if self.last_ns.is_some_and(|last_ns| time_ns.abs_diff(last_ns) < EVERY_NS) {
-            return;
+    /// The same for a map that was matched, which has holes in persons: what is far behind a person, or not known, within their outlines
+    /// in this very frame, gets their distance.
+    pub fn mend(&mut self, seen: Seen, map: &mut DepthMap) {
+        self.look(seen);
+        map.person_m = self.distance_m(map);
+        let Some(person_m) = map.person_m else { return };
+        let (columns, rows) = (self.theirs.width as usize, self.theirs.height as usize);
+        let (width, height) = (map.width as usize, map.height as usize);
+        for (y, row) in map.metres.chunks_exact_mut(width.max(1)).enumerate() {
+            let inside = &self.inside[y * rows / height * columns..][..columns];
+            for (x, metres) in row.iter_mut().enumerate() {
+                let is_wrong = !DepthMap::is_known(*metres) || *metres > TOO_FAR * person_m;
+                if is_wrong && inside[x * columns / width] {
+                    *metres = person_m;
+                }
+            }
         }
-        self.last_ns = Some(time_ns);
+    }
+
+    fn look(&mut self, seen: Seen) {
         self.places.clear();
         let Some(Mask { width, height, share }) = self.finder.persons(seen) else { return };
         let (columns, rows) = (*width as usize, *height as usize);
@@ -54,6 +79,13 @@ impl Persons {
             let theirs = theirs.take(head).take_while(|&at| share[at] >= SURE);
             self.places.extend(theirs.map(|at| at as u32));
         }
+        let is_theirs = |x: usize, y: usize| {
+            let around = (y.saturating_sub(OUTLINE)..=y + OUTLINE).filter(|&y| y < rows);
+            let row = x.saturating_sub(OUTLINE)..(x + OUTLINE + 1).min(columns);
+            around.flat_map(|y| &share[y * columns..][row.clone()]).all(|share| *share >= SURE)
+        };
+        self.inside.clear();
+        self.inside.extend((0..columns * rows).map(|at| is_theirs(at % columns, at / columns)));
         if (self.places.len() as f32) < LEAST_SHARE * share.len() as f32 {
             self.places.clear();
         }
@@ -81,12 +113,13 @@ pub struct OnPersons {
     depth: Box<dyn DepthSource>,
     persons: Persons,
     is_wanted: bool,
+    is_matched: bool,
 }
 
 impl OnPersons {
-    /// The maps of `depth`, and in them the `persons`.
-    pub fn new(depth: Box<dyn DepthSource>, persons: Persons) -> Self {
-        Self { depth, persons, is_wanted: true }
+    /// The maps of `depth`, and in them the `persons`; of maps that were matched, their holes are mended ([`Persons::mend`]).
+    pub fn new(depth: Box<dyn DepthSource>, persons: Persons, is_matched: bool) -> Self {
+        Self { depth, persons, is_wanted: true, is_matched }
     }
 }
 
@@ -98,7 +131,9 @@ impl DepthSource for OnPersons {
     fn read(&mut self, seen: Seen, map: &mut DepthMap) -> Result<(), DepthError> {
         self.depth.read(seen, map)?;
         map.person_m = None;
-        if self.is_wanted {
+        if self.is_matched {
+            self.persons.mend(seen, map);
+        } else if self.is_wanted {
             self.persons.mark(seen, map);
         }
         Ok(())
@@ -192,7 +227,7 @@ mod tests {
 
     /// Where the lens is after two seconds, with somebody there or not.
     fn focus_m(person: bool, is_wanted: bool) -> f32 {
-        let mut source = OnPersons::new(Box::new(Room::new(person)), Persons::new(Box::new(Room::new(person))));
+        let mut source = OnPersons::new(Box::new(Room::new(person)), Persons::new(Box::new(Room::new(person))), false);
         source.look_for_persons(is_wanted);
         let (mut map, mut focus, color) =
             (DepthMap::default(), Focus::new(FocusRule::Auto), ColorImage::new(SIZE.0, SIZE.1));
@@ -211,5 +246,42 @@ mod tests {
         assert!((person_m - 1.54).abs() < 0.05, "{person_m}: followed between two looks");
         assert!((shelf_m - 0.8).abs() < 0.02, "{shelf_m}: what is near and large, where nobody is");
         assert_eq!(focus_m(true, false), shelf_m);
+    }
+
+    #[test]
+    fn what_is_matched_far_behind_a_person_is_theirs_within_their_outlines() {
+        struct Holes(Room);
+        impl DepthSource for Holes {
+            fn read(&mut self, seen: Seen, map: &mut DepthMap) -> Result<(), DepthError> {
+                self.0.read(seen, map)?;
+                for (at, metres) in map.metres.iter_mut().enumerate() {
+                    let (x, y) = (at as u32 % SIZE.0, at as u32 / SIZE.0);
+                    match (x, y) {
+                        (8..14, 20..30) => *metres = 3.5,
+                        (14..16, 20..30) => *metres = 0.0,
+                        // Nearer, and without.
+                        (2..6, 30..36) => *metres = 0.4,
+                        (70..80, 20..30) => *metres = 0.0,
+                        _ => {}
+                    }
+                }
+                Ok(())
+            }
+        }
+        let (color, mut map) = (ColorImage::new(SIZE.0, SIZE.1), DepthMap::default());
+        let seen = Seen { stamp: Stamp { index: 0, time_ns: 0, captured_ns: None }, color: &color, right: None };
+        let mut source =
+            OnPersons::new(Box::new(Holes(Room::new(true))), Persons::new(Box::new(Room::new(true))), true);
+        source.read(seen, &mut map).unwrap();
+        let at = |x: u32, y: u32| map.metres[(y * SIZE.0 + x) as usize];
+        assert!((at(10, 25) - 1.6).abs() < 0.05 && (at(15, 25) - 1.6).abs() < 0.05, "{} {}", at(10, 25), at(15, 25));
+        assert_eq!([at(4, 33), at(75, 25), at(90, 5), at(34, 5)], [0.4, 0.0, 4.0, 4.0]);
+        source.persons = Persons::new(Box::new(Room::new(false)));
+        source.read(seen, &mut map).unwrap();
+        assert_eq!(
+            [map.metres[(25 * SIZE.0 + 10) as usize], map.metres[(25 * SIZE.0 + 15) as usize]],
+            [3.5, 0.0],
+            "nobody"
+        );
     }
 }
