@@ -199,6 +199,8 @@ impl Listener {
             *pipewire::keys::MEDIA_TYPE => "Video",
             *pipewire::keys::MEDIA_CATEGORY => "Capture",
             *pipewire::keys::MEDIA_ROLE => "Camera",
+            // The name `bokehcam` is that of a camera that others look for.
+            *pipewire::keys::NODE_NAME => "bokehcam-reader",
             "target.object" => camera.serial.as_str(),
         };
         if self.filters {
