@@ -101,6 +101,8 @@ fn step_back(state: &State) -> Option<Action> {
         Some(Action::Help(false))
     } else if state.trouble.is_some() {
         Some(Action::Dismiss)
+    } else if let Some(way) = state.way_without_plate() {
+        Some(Action::DepthBy(way))
     } else if state.offers_depth() && !state.bare {
         Some(Action::DeclinePlate)
     } else if state.is_demonstration() && !state.knows_demonstration && !state.bare {

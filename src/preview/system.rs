@@ -212,8 +212,12 @@ impl Services for System {
             name => name.to_owned(),
         };
         let (source, source_name) = self.open_source(&name, way)?;
-        notes.extend(source.networks.iter().map(|networks| format!("Depth by {networks}.")));
-        notes.extend(source.persons.iter().map(|persons| format!("Focus on persons by {persons}.")));
+        // Networks that nobody asked for are no news to a person who sees what they do.
+        let is_asked = matches!(self.options.depth_choice, DepthChoice::OneCamera(_)) || way.is_some();
+        notes.extend(source.networks.iter().filter(|_| is_asked).map(|networks| format!("Depth by {networks}.")));
+        for by in source.networks.iter().chain(&source.persons) {
+            tracing::info!("{name}: persons by {by}");
+        }
         if source_name.kind() == Kind::Synthetic {
             notes.push(RENDERED.to_owned());
         }

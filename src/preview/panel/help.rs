@@ -46,8 +46,10 @@ pub fn show(ctx: &Context, state: &State, actions: &mut Vec<Action>) {
         if switch(ui, "Single keys", hint, state.habits.single_keys) {
             actions.push(Action::SingleKeys(!state.habits.single_keys));
         }
-        let (asks, hint) =
-            (state.habits.ask_before_closing, "While something is recorded, closing the window asks first");
+        let (asks, hint) = (
+            state.habits.ask_before_closing,
+            "While something is recorded or used in calls, closing the window asks first",
+        );
         if switch(ui, "Ask before closing", hint, asks) {
             actions.push(Action::AskBeforeClosing(!asks));
         }

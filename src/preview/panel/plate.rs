@@ -58,5 +58,8 @@ pub fn show(stack: &mut Stack, state: &State, actions: &mut Vec<Action>) {
         if step == Step::Unlike && button(ui, "Take another plate", "T") {
             actions.push(Action::TakePlate);
         }
+        if let Some(way) = state.way_without_plate().filter(|_| button(ui, "Find me without it", "Esc")) {
+            actions.push(Action::DepthBy(way));
+        }
     });
 }

@@ -15,8 +15,8 @@ use crate::pipeline::PipelineError;
 use crate::preview::folders;
 use crate::preview::services::Switch;
 use crate::preview::state::{Output, Request, Source, Update, Way};
-use crate::sink;
 use crate::sink::switch::{Fate, Notice};
+use crate::sink::{self, Target};
 use crate::stats::Report;
 
 /// The session, on its own thread.
@@ -278,13 +278,12 @@ impl Host {
     /// Takes note of what became of an output of the run of this number.
     fn on_output(&mut self, run: u64, Notice { member, fate }: &Notice) {
         match fate {
-            Fate::Began => {
-                let is_camera = self.start.outputs.iter().any(|output| output.is_camera && output.name == *member);
-                self.news.note(match is_camera {
-                    true => format!("Calls have this picture now, as the camera of {member}"),
-                    false => format!("Recording to {}", folders::shown_output(member)),
-                });
-            }
+            Fate::Began => self.news.note(match camera_of(member) {
+                Some(camera) => format!("Calls have this picture now: choose the camera {camera}"),
+                None => format!("Recording to {}", folders::shown_output(member)),
+            }),
+            // What calls were shown is in no file.
+            Fate::Completed { .. } if camera_of(member).is_some() => {}
             Fate::Completed { frames } => {
                 self.news.note(format!("Complete: {}, {frames} frames", folders::shown_output(member)));
                 self.news.kept(Path::new(member));
@@ -325,4 +324,13 @@ impl Host {
     fn stop(&mut self) {
         self.report = self.live.take().and_then(Live::stop).or_else(|| self.report.take());
     }
+}
+
+/// What calls call an output, where it is a camera.
+fn camera_of(output: &str) -> Option<String> {
+    let target: Target = output.parse().ok().filter(Target::is_camera)?;
+    Some(match target {
+        Target::PipeWire(label) => label.unwrap_or_else(|| "bokehcam".to_owned()),
+        other => other.to_string(),
+    })
 }

@@ -108,9 +108,9 @@ impl State {
         Vec::new()
     }
 
-    /// Closes the window; asks first, but only once, where something is recorded.
+    /// Closes the window; asks first, but only once, where something is recorded or calls may have the picture.
     fn close(&mut self) -> Vec<Request> {
-        let asks = self.habits.ask_before_closing && self.recording().is_some() && !self.closing;
+        let asks = self.habits.ask_before_closing && !self.outputs.is_empty() && !self.closing;
         self.closing = asks;
         if asks { Vec::new() } else { vec![Request::Close] }
     }

@@ -16,7 +16,7 @@ pub struct Habits {
     pub text_scale: f32,
     /// Whether keys without Ctrl do something: letters, digits and signs.
     pub single_keys: bool,
-    /// Whether closing asks first while something is recorded.
+    /// Whether closing asks first while something is recorded, or calls may have the picture.
     pub ask_before_closing: bool,
     /// Whether snapshots are saved with what is needed to make them again.
     pub keep_sources: bool,

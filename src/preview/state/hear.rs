@@ -21,7 +21,7 @@ impl State {
                 self.outputs = outputs;
                 self.recorded_bytes = self.recorded_bytes.filter(|_| self.recording().is_some());
                 // Nothing is lost any more.
-                self.closing &= self.recording().is_some();
+                self.closing &= !self.outputs.is_empty();
             }
             Update::Recorded(bytes) => self.recorded_bytes = Some(bytes),
             Update::Kept(folder) => self.kept_in = Some(folder),

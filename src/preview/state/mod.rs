@@ -247,6 +247,12 @@ impl State {
         self.ways().contains(&Way::Plate)
     }
 
+    /// What finds the person while there is no plate yet, or it is of another picture.
+    pub fn way_without_plate(&self) -> Option<Way> {
+        let lacks_plate = self.plate.is_some_and(|step| step != Step::Ready);
+        Some(Way::Person).filter(|way| lacks_plate && self.ways().contains(way))
+    }
+
     /// Whether nothing is known of depth, and the person is offered ways to it.
     pub fn offers_depth(&self) -> bool {
         let is_plain = matches!(&self.source, Source::Running(running) if !running.has_depth);

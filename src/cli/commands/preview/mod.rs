@@ -47,8 +47,8 @@ Examples:
   bokehcam preview demo --split 0.5 --highlights 12
   bokehcam preview demo --full-screen
 
-In the window, F1 shows all keys. Click to focus there, double-click on something to follow it. What the window sets can be
-copied as a command (K). A recording is played in a loop.")]
+In the window, F1 shows all keys. Click to focus there, double-click on something to follow it. K copies what is set as a command.
+A recording is played in a loop.")]
 pub struct PreviewCommand {
     /// A camera (/dev/videoN, N, a name under /dev/v4l/by-id, or part of what it is called), two of them as LEFT,RIGHT, a
     /// camera of PipeWire's (pipewire:NAME), a folder with a recording, a photo (PNG or JPEG), `demo` (the demonstration) or

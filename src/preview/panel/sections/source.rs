@@ -26,7 +26,11 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
         Source::Running(running) => {
             let (width, height) = running.size;
             let rate = 1e9 / running.period_ns.max(1) as f64;
-            let depth = tr(if running.has_depth { "with depth" } else { "without depth" });
+            let depth = tr(match running.way {
+                _ if !running.has_depth => "without depth",
+                Some(Way::Person) => "the person by a network",
+                _ => "with depth",
+            });
             remark(
                 ui,
                 &match state.is_photo() {

@@ -3,8 +3,9 @@
 use egui::{Event, Key, Modifiers, pos2};
 
 use super::{Action, Window, pressed, sample};
+use crate::depth::plate::Step;
 use crate::preview::keys::GROUPS;
-use crate::preview::state::{Output, State};
+use crate::preview::state::{Output, Source, State, Way};
 
 fn recording() -> State {
     let mut state = sample::state();
@@ -40,6 +41,36 @@ fn closing_asks_once_while_something_is_recorded() {
     window.press(Key::Q, Modifiers::NONE);
     window.wait(0.2);
     assert_eq!(window.state.apply(Action::Close), [crate::preview::state::Request::Close], "asked once");
+}
+
+#[test]
+fn closing_asks_where_calls_may_have_the_picture() {
+    let mut state = sample::state();
+    state.outputs = vec![Output { name: "pipewire".into(), is_camera: true }];
+    let mut window = Window::of(state, (1280, 720));
+    window.press(Key::Q, Modifiers::NONE);
+    window.wait(0.2);
+    assert!(window.state.closing && window.place_of("Take the picture out of calls and close?").is_some());
+    window.click_on("Stay");
+    assert!(!window.state.closing && window.state.outputs.len() == 1);
+    window.press(Key::Q, Modifiers::NONE);
+    window.wait(0.2);
+    assert!(window.click_on("Close").contains(&Action::Close));
+}
+
+#[test]
+fn esc_leaves_a_plate_that_is_not_there_yet() {
+    let mut state = sample::state();
+    state.source = sample::running(false);
+    let Source::Running(running) = &mut state.source else { unreachable!("it runs") };
+    running.ways = vec![Way::Person, Way::Plate];
+    state.plate = Some(Step::Restless);
+    let mut window = Window::of(state, (1280, 720));
+    assert!(window.place_of("Find me without it").is_some());
+    assert!(window.press(Key::Escape, Modifiers::NONE).contains(&Action::DepthBy(Way::Person)));
+    assert!(window.state.panel, "the panel stays");
+    window.state.plate = Some(Step::Ready);
+    assert!(window.press(Key::Escape, Modifiers::NONE).contains(&Action::Panel(false)));
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! What comes from the session: news, and frames.
 
 use std::sync::atomic::Ordering;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use winit::event_loop::ActiveEventLoop;
 
@@ -11,6 +11,9 @@ use crate::link::Receiver;
 use crate::pipeline::View;
 use crate::preview::session::SessionEvent;
 use crate::preview::state::Source;
+
+/// Where a recording is, is shown anew so often while it plays.
+const BAR_EVERY: Duration = Duration::from_millis(250);
 
 impl App {
     /// Handles what the session sent, and takes the newest frame.
@@ -69,6 +72,9 @@ impl App {
         let stays = stays && self.view.as_ref().is_some_and(may_stay);
         if let Some(view) = newest.filter(|view| !stays || self.seeking.is_answer(view)) {
             self.note_place(&view);
+            if self.state.transport.is_some() && self.laid_out.elapsed() > BAR_EVERY {
+                self.layout_at = Some(Instant::now());
+            }
             self.learn_from(&view);
             let is_whole = view.picture.memory().is_some() && !view.trace.between && !view.trace.depth_held;
             // A number of frames that was asked for is shown.
