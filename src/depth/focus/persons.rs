@@ -17,6 +17,8 @@ const HEAD: f32 = 1.0 / 6.0;
 
 /// What is so much farther than who it is part of was matched wrongly, as a knitted pullover is with itself.
 const TOO_FAR: f32 = 1.25;
+/// Share of a row within an outline that has their distance, at least: masks of persons have other things as well.
+const THEIRS: f32 = 0.4;
 /// Outlines of masks are this uncertain, in pixels of theirs.
 const OUTLINE: usize = 2;
 
@@ -51,7 +53,7 @@ impl Persons {
     }
 
     /// The same for a map that was matched, which has holes in persons: what is far behind a person, or not known, within their outlines
-    /// in this very frame, gets their distance.
+    /// in this very frame, gets their distance where enough beside it has.
     pub fn mend(&mut self, seen: Seen, map: &mut DepthMap) {
         self.look(seen);
         map.person_m = self.distance_m(map);
@@ -60,11 +62,20 @@ impl Persons {
         let (width, height) = (map.width as usize, map.height as usize);
         for (y, row) in map.metres.chunks_exact_mut(width.max(1)).enumerate() {
             let inside = &self.inside[y * rows / height * columns..][..columns];
-            for (x, metres) in row.iter_mut().enumerate() {
-                let is_wrong = !DepthMap::is_known(*metres) || *metres > TOO_FAR * person_m;
-                if is_wrong && inside[x * columns / width] {
-                    *metres = person_m;
+            let is_theirs = |metres: f32| metres >= person_m / TOO_FAR && metres <= person_m * TOO_FAR;
+            let mut from = 0;
+            while from < width {
+                let is_inside = |x: usize| inside[x * columns / width];
+                let run = (from..width).take_while(|&x| is_inside(x) == is_inside(from)).count();
+                let pixels = &mut row[from..from + run];
+                let theirs = pixels.iter().filter(|&&metres| is_theirs(metres)).count();
+                if is_inside(from) && theirs as f32 >= THEIRS * run as f32 {
+                    let wrong = pixels
+                        .iter_mut()
+                        .filter(|metres| !DepthMap::is_known(**metres) || **metres > TOO_FAR * person_m);
+                    wrong.for_each(|metres| *metres = person_m);
                 }
+                from += run;
             }
         }
     }
@@ -76,7 +87,7 @@ impl Persons {
         let head = (HEAD * rows as f32).ceil() as usize;
         for x in 0..columns {
             let theirs = (0..rows).map(|y| y * columns + x).skip_while(|&at| share[at] < SURE);
-            let theirs = theirs.take(head).take_while(|&at| share[at] >= SURE);
+            let theirs = theirs.take(head).filter(|&at| share[at] >= SURE);
             self.places.extend(theirs.map(|at| at as u32));
         }
         let is_theirs = |x: usize, y: usize| {
