@@ -1,6 +1,5 @@
 //! Measured depth in which a person is the subject, whatever else is near: a network says where persons are.
 
-use super::subject::Subject;
 use crate::depth::plate::Companion;
 use crate::depth::{DepthError, DepthSource, Seen};
 use crate::frame::{ColorImage, DepthMap, Mask};
@@ -14,7 +13,8 @@ const SURE: f32 = 0.9;
 /// So much of the height, from the top of each column of a mask, is head and shoulders: below, masks of persons have what they hold,
 /// and what stands before them.
 const HEAD: f32 = 1.0 / 6.0;
-
+/// A head and shoulders are within so many dioptres: a quarter of a metre at one.
+const BODY: f32 = 0.25;
 /// What is so much farther than who it is part of was matched wrongly, as a knitted pullover is with itself.
 const TOO_FAR: f32 = 1.25;
 /// Share of a row within an outline that has their distance, at least: masks of persons have other things as well.
@@ -26,20 +26,20 @@ const OUTLINE: usize = 2;
 pub struct Persons {
     finder: Box<dyn Companion>,
     last_ns: Option<u64>,
-    /// The depth of these pixels alone: 0 elsewhere.
-    theirs: DepthMap,
+    /// Columns and rows of the mask.
+    size: (usize, usize),
     /// The pixels of the mask that are their heads and shoulders; none while there is nobody.
     places: Vec<u32>,
     /// Whether pixels of the mask are theirs, outlines left out.
     inside: Vec<bool>,
-    subject: Subject,
+    dioptres: Vec<f32>,
 }
 
 impl Persons {
     /// Those whom `finder` finds in the pictures.
     pub fn new(finder: Box<dyn Companion>) -> Self {
-        let (theirs, subject) = (DepthMap::default(), Subject::default());
-        Self { finder, last_ns: None, theirs, places: Vec::new(), inside: Vec::new(), subject }
+        let (places, inside) = (Vec::new(), Vec::new());
+        Self { finder, last_ns: None, size: (0, 0), places, inside, dioptres: Vec::new() }
     }
 
     /// Gives the map of the frame `seen` the distance of the person in it ([`DepthMap::person_m`]).
@@ -58,7 +58,7 @@ impl Persons {
         self.look(seen);
         map.person_m = self.distance_m(map);
         let Some(person_m) = map.person_m else { return };
-        let (columns, rows) = (self.theirs.width as usize, self.theirs.height as usize);
+        let (columns, rows) = self.size;
         let (width, height) = (map.width as usize, map.height as usize);
         for (y, row) in map.metres.chunks_exact_mut(width.max(1)).enumerate() {
             let inside = &self.inside[y * rows / height * columns..][..columns];
@@ -84,6 +84,7 @@ impl Persons {
         self.places.clear();
         let Some(Mask { width, height, share }) = self.finder.persons(seen) else { return };
         let (columns, rows) = (*width as usize, *height as usize);
+        self.size = (columns, rows);
         let head = (HEAD * rows as f32).ceil() as usize;
         for x in 0..columns {
             let theirs = (0..rows).map(|y| y * columns + x).skip_while(|&at| share[at] < SURE);
@@ -100,22 +101,29 @@ impl Persons {
         if (self.places.len() as f32) < LEAST_SHARE * share.len() as f32 {
             self.places.clear();
         }
-        self.theirs.resize(*width, *height);
-        self.theirs.metres.fill(0.0);
     }
 
-    /// How far they are in a map, in metres: the largest of them, or a nearer one of half the size.
+    /// How far most of their heads and shoulders are in a map, in metres; who is nearest has most.
     fn distance_m(&mut self, map: &DepthMap) -> Option<f32> {
-        let Self { theirs, places, subject, .. } = self;
-        let (columns, rows) = (theirs.width as usize, theirs.height as usize);
+        let Self { size: (columns, rows), places, dioptres, .. } = self;
         let within = |at: usize, of: usize, size: u32| (2 * at + 1) * size as usize / (2 * of);
-        for &mut at in places.iter_mut() {
-            let (x, y) = (at as usize % columns, at as usize / columns);
-            let (x, y) = (within(x, columns, map.width), within(y, rows, map.height));
-            theirs.metres[at as usize] = map.metres[y * map.width as usize + x];
+        let metres = places.iter().map(|&at| {
+            let (x, y) = (at as usize % *columns, at as usize / *columns);
+            map.metres[within(y, *rows, map.height) * map.width as usize + within(x, *columns, map.width)]
+        });
+        dioptres.clear();
+        dioptres.extend(metres.filter(|&metres| DepthMap::is_known(metres)).map(f32::recip));
+        dioptres.sort_unstable_by(f32::total_cmp);
+        let (mut from, mut most) = (0, 0..0);
+        for to in 1..=dioptres.len() {
+            while dioptres[to - 1] - dioptres[from] > BODY {
+                from += 1;
+            }
+            if to - from > most.len() {
+                most = from..to;
+            }
         }
-        let found = if places.is_empty() { None } else { subject.largest(theirs) };
-        found.map(f32::recip)
+        (!most.is_empty()).then(|| 1.0 / dioptres[most.start + most.len() / 2])
     }
 }
 

@@ -88,15 +88,6 @@ impl Subject {
         nearest.or_else(largest).map(|cell| bodies[cell].dioptres())
     }
 
-    /// Distance of the largest body in dioptres, or of the nearest one that is half as large; `None` without any known depth.
-    pub fn largest(&mut self, map: &DepthMap) -> Option<f32> {
-        self.weigh(map);
-        let bodies = self.bodies();
-        let most = bodies.iter().map(|body| body.weight).fold(f32::MIN_POSITIVE, f32::max);
-        let is_large = |cell: &usize| is_peak(&bodies, *cell) && bodies[*cell].weight >= 0.5 * most;
-        (0..CELLS).rev().find(is_large).map(|cell| bodies[cell].dioptres())
-    }
-
     fn bodies(&self) -> [Cell; CELLS] {
         std::array::from_fn(|cell| self.body(cell))
     }
