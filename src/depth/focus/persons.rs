@@ -1,5 +1,6 @@
 //! Measured depth in which a person is the subject, whatever else is near: a network says where persons are.
 
+use crate::depth::dilation::dilate;
 use crate::depth::plate::Companion;
 use crate::depth::{DepthError, DepthSource, Seen};
 use crate::frame::{ColorImage, DepthMap, Mask};
@@ -20,7 +21,7 @@ const TOO_FAR: f32 = 1.25;
 /// Share of a row within an outline that has their distance, at least: masks of persons have other things as well.
 const THEIRS: f32 = 0.4;
 /// Outlines of masks are this uncertain, in pixels of theirs.
-const OUTLINE: usize = 2;
+const OUTLINE_PX: usize = 2;
 
 /// Finds how far persons are in maps.
 pub struct Persons {
@@ -30,16 +31,17 @@ pub struct Persons {
     size: (usize, usize),
     /// The pixels of the mask that are their heads and shoulders; none while there is nobody.
     places: Vec<u32>,
-    /// Whether pixels of the mask are theirs, outlines left out.
-    inside: Vec<bool>,
+    /// Where the mask is not sure; for mending, with the outlines.
+    outside: Vec<bool>,
+    line: Vec<bool>,
     dioptres: Vec<f32>,
 }
 
 impl Persons {
     /// Those whom `finder` finds in the pictures.
     pub fn new(finder: Box<dyn Companion>) -> Self {
-        let (places, inside) = (Vec::new(), Vec::new());
-        Self { finder, last_ns: None, size: (0, 0), places, inside, dioptres: Vec::new() }
+        let (places, outside, line) = (Vec::new(), Vec::new(), Vec::new());
+        Self { finder, last_ns: None, size: (0, 0), places, outside, line, dioptres: Vec::new() }
     }
 
     /// Gives the map of the frame `seen` the distance of the person in it ([`DepthMap::person_m`]).
@@ -59,13 +61,14 @@ impl Persons {
         map.person_m = self.distance_m(map);
         let Some(person_m) = map.person_m else { return };
         let (columns, rows) = self.size;
+        dilate(&mut self.outside, &mut self.line, columns, OUTLINE_PX);
         let (width, height) = (map.width as usize, map.height as usize);
         for (y, row) in map.metres.chunks_exact_mut(width.max(1)).enumerate() {
-            let inside = &self.inside[y * rows / height * columns..][..columns];
+            let outside = &self.outside[y * rows / height * columns..][..columns];
             let is_theirs = |metres: f32| metres >= person_m / TOO_FAR && metres <= person_m * TOO_FAR;
             let mut from = 0;
             while from < width {
-                let is_inside = |x: usize| inside[x * columns / width];
+                let is_inside = |x: usize| !outside[x * columns / width];
                 let run = (from..width).take_while(|&x| is_inside(x) == is_inside(from)).count();
                 let pixels = &mut row[from..from + run];
                 let theirs = pixels.iter().filter(|&&metres| is_theirs(metres)).count();
@@ -91,13 +94,8 @@ impl Persons {
             let theirs = theirs.take(head).filter(|&at| share[at] >= SURE);
             self.places.extend(theirs.map(|at| at as u32));
         }
-        let is_theirs = |x: usize, y: usize| {
-            let around = (y.saturating_sub(OUTLINE)..=y + OUTLINE).filter(|&y| y < rows);
-            let row = x.saturating_sub(OUTLINE)..(x + OUTLINE + 1).min(columns);
-            around.flat_map(|y| &share[y * columns..][row.clone()]).all(|share| *share >= SURE)
-        };
-        self.inside.clear();
-        self.inside.extend((0..columns * rows).map(|at| is_theirs(at % columns, at / columns)));
+        self.outside.clear();
+        self.outside.extend(share.iter().map(|&share| share < SURE));
         if (self.places.len() as f32) < LEAST_SHARE * share.len() as f32 {
             self.places.clear();
         }
