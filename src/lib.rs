@@ -22,14 +22,12 @@
 //!
 //! | layer | modules |
 //! |---|---|
-//! | 10 | `cli`: arguments to options, one function per command |
-//! | 9 | `preview`: the window |
 //! | 8 | [`source`]: cameras, recordings and their depth, by name |
 //! | 7 | [`pipeline`]: the one place that knows all stages |
 //! | 6 | [`computing`]: CPU or GPU, for blur and matching |
 //! | 5 | [`look`]: everything about the blur, for pictures of any size |
 //! | 4 | [`capture`], [`depth`], [`bokeh`], [`sink`] |
-//! | 3 | `link`, [`budget`], [`network`], [`stats`], [`recording`], `scene`, `v4l2`, `pipewire`, `control` |
+//! | 3 | `link`, [`budget`], [`network`], [`stats`], [`recording`], `v4l2`, `pipewire`, `control` |
 //! | 2 | `compute`, [`calibration`], [`layout`] |
 //! | 1 | [`color`], [`frame`], [`optics`], [`clock`], [`knob`], `files` |
 //! | 0 | `names` |
@@ -46,8 +44,6 @@ pub mod bokeh;
 pub mod budget;
 pub mod calibration;
 pub mod capture;
-#[doc(hidden)]
-pub mod cli;
 pub mod clock;
 pub mod color;
 #[doc(hidden)]
@@ -64,7 +60,8 @@ pub mod layout;
 #[doc(hidden)]
 pub mod link;
 pub mod look;
-mod names;
+#[doc(hidden)]
+pub mod names;
 #[cfg(feature = "networks")]
 pub mod network;
 pub mod optics;
@@ -72,12 +69,7 @@ pub mod pipeline;
 #[cfg(feature = "pipewire")]
 #[doc(hidden)]
 pub mod pipewire;
-#[cfg(feature = "window")]
-#[doc(hidden)]
-pub mod preview;
 pub mod recording;
-#[doc(hidden)]
-pub mod scene;
 pub mod sink;
 pub mod source;
 pub mod stats;

@@ -46,6 +46,8 @@ pub fn nearest<N: AsRef<str>>(name: &str, names: impl IntoIterator<Item = N>) ->
 }
 
 /// Makes an enumeration [`Named`]: `named! { pub enum Name default Value { /// help Value = "value", ... } }`.
+#[doc(hidden)]
+#[macro_export]
 macro_rules! named {
     ($(#[$meta:meta])* $vis:vis enum $name:ident default $default:ident {
         $($(#[doc = $help:literal])+ $value:ident = $text:literal),+ $(,)?
@@ -96,7 +98,7 @@ macro_rules! named {
         }
     };
 }
-pub(crate) use named;
+pub use named;
 
 #[cfg(test)]
 mod tests {

@@ -1,8 +1,8 @@
-//! The project's own scene as a camera, with exact depth.
+//! The source `synthetic`: a camera that is rendered, which a program may bring along; this library has none.
 
-use super::{Brings, Camera, CaptureError, Captured, Shot, SourceInfo};
-use crate::frame::Stamp;
-use crate::scene::{Scene, View};
+use std::sync::OnceLock;
+
+use super::{Camera, CaptureError};
 
 /// What the synthetic camera makes.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -17,70 +17,24 @@ pub struct Format {
     pub threads: usize,
 }
 
-/// Renders a moving portrait, each frame when it is asked for.
-pub struct Synthetic {
-    scene: Scene,
-    view: View,
-    format: Format,
-    position: u64,
+/// Makes a camera of a format.
+///
+/// # Errors
+/// No camera has such pictures.
+pub type Make = fn(Format) -> Result<Box<dyn Camera>, CaptureError>;
+
+static MAKE: OnceLock<Make> = OnceLock::new();
+
+/// From now on, `synthetic` is a camera that `make` makes. Only the first call counts.
+pub fn bring(make: Make) {
+    // Who comes later brings the same.
+    let _ = MAKE.set(make);
 }
 
-/// One ray per pixel: a camera has to keep pace.
-const SAMPLES_PER_PIXEL: u32 = 1;
-/// Pictures beyond this are no camera's.
-const MAX_SIDE_PX: u32 = 8192;
-
-impl Synthetic {
-    /// A camera of the given format.
-    ///
-    /// # Errors
-    /// The size is 0 or beyond 8192 pixels, or the rate is not a usable number.
-    pub fn new(format: Format) -> Result<Self, CaptureError> {
-        let Format { size: (width, height), fps, .. } = format;
-        let sides = 1..=MAX_SIDE_PX;
-        if !sides.contains(&width) || !sides.contains(&height) || !(0.001..=1000.0).contains(&fps) {
-            return Err(CaptureError::Format { width, height, fps });
-        }
-        Ok(Self { scene: Scene::portrait(), view: View::new(width, height), format, position: 0 })
-    }
-
-    fn time_ns(&self, position: u64) -> u64 {
-        (position as f64 / self.format.fps * 1e9).round() as u64
-    }
-
-    fn at_end(&self) -> bool {
-        self.format.frames.is_some_and(|frames| self.position >= frames)
-    }
-}
-
-impl Camera for Synthetic {
-    fn info(&self) -> SourceInfo {
-        SourceInfo {
-            name: "synthetic".into(),
-            size: self.format.size,
-            period_ns: self.time_ns(1),
-            frames: self.format.frames,
-            live: false,
-            brings: Brings::Depth,
-        }
-    }
-
-    fn next(&mut self, shot: Shot) -> Result<Captured, CaptureError> {
-        if self.at_end() {
-            return Ok(Captured::End);
-        }
-        let (time_s, threads) = (self.position as f64 / self.format.fps, self.format.threads.max(1));
-        self.scene.render_pinhole(&self.view, time_s, SAMPLES_PER_PIXEL, threads, shot.color, shot.depth);
-        let stamp = Stamp { index: self.position as usize, time_ns: self.time_ns(self.position), captured_ns: None };
-        self.position += 1;
-        Ok(Captured::Frame(stamp))
-    }
-
-    fn skip(&mut self, until_ns: u64) -> u64 {
-        let from = self.position;
-        while !self.at_end() && self.time_ns(self.position) < until_ns {
-            self.position += 1;
-        }
-        self.position - from
-    }
+/// The synthetic camera of a format.
+///
+/// # Errors
+/// The program brought none, or it has no such pictures.
+pub fn open(format: Format) -> Result<Box<dyn Camera>, CaptureError> {
+    MAKE.get().ok_or(CaptureError::NoSynthetic)?(format)
 }

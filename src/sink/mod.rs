@@ -4,7 +4,8 @@
 //! exists is overwritten unless that was asked for, and then only by what is whole. What has frames and cannot have its
 //! name is kept as `NAME.incomplete`.
 
-pub(crate) mod card;
+#[doc(hidden)]
+pub mod card;
 mod error;
 mod ffmpeg;
 #[cfg(feature = "camera")]

@@ -11,7 +11,7 @@ use crate::capture::photo::Photo;
 #[cfg(all(feature = "camera", feature = "pipewire"))]
 use crate::capture::pipewire::PipeWireCamera;
 use crate::capture::replay::{Part, Replay};
-use crate::capture::synthetic::{Format, Synthetic};
+use crate::capture::synthetic::{self, Format};
 #[cfg(feature = "camera")]
 use crate::capture::two_eyes::TwoEyes;
 #[cfg(feature = "camera")]
@@ -62,8 +62,8 @@ impl Opened {
             SourceName::Synthetic => {
                 let size = frames.size.map_or(SYNTHETIC_SIZE, |size| (size.width, size.height));
                 let fps = frames.fps.unwrap_or(SYNTHETIC_FPS);
-                let camera = Synthetic::new(Format { size, fps, frames: frames.frames, threads: cores() })?;
-                Ok(without_depth(Box::new(camera)))
+                let format = Format { size, fps, frames: frames.frames, threads: cores() };
+                Ok(without_depth(synthetic::open(format)?))
             }
             SourceName::Demo => Ok(without_depth(Box::new(Demo::new(frames.frames)?))),
             SourceName::Folder(folder) => {

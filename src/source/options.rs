@@ -8,10 +8,14 @@ mod one_camera;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
+#[cfg(feature = "clap")]
 use clap::Args;
+#[cfg(feature = "clap")]
 use clap::builder::{BoolishValueParser, RangedI64ValueParser};
 
+#[cfg(feature = "clap")]
 use crate::depth::stereo::Settings;
+#[cfg(feature = "clap")]
 use crate::look::number::{above_zero, within};
 use crate::names;
 #[cfg(feature = "camera")]
@@ -27,62 +31,64 @@ pub const DEPTH_SCALE: f32 = 5000.0;
 const LIVE_DEPTH_SCALE: f32 = 1000.0;
 
 /// Which frames of which source.
-#[derive(Args, Clone, Debug, Default)]
-#[command(next_help_heading = "Source")]
+#[derive(Clone, Debug, Default)]
+#[cfg_attr(feature = "clap", derive(Args))]
+#[cfg_attr(feature = "clap", command(next_help_heading = "Source"))]
 pub struct Frames {
     /// Start this many seconds after the first frame
-    #[arg(long, value_name = "SECONDS", value_parser = seconds)]
+    #[cfg_attr(feature = "clap", arg(long, value_name = "SECONDS", value_parser = seconds))]
     pub start: Option<f64>,
     /// End this many seconds after the first frame
-    #[arg(long, value_name = "SECONDS", value_parser = seconds)]
+    #[cfg_attr(feature = "clap", arg(long, value_name = "SECONDS", value_parser = seconds))]
     pub end: Option<f64>,
     /// Begin again at the end; only with --frames or Ctrl-C does it end
-    #[arg(long = "loop", value_name = "YES", num_args = 0..=1, require_equals = true, default_value_t = false,
+    #[cfg_attr(feature = "clap", arg(long = "loop", value_name = "YES", num_args = 0..=1, require_equals = true, default_value_t = false,
           default_missing_value = "true", value_parser = BoolishValueParser::new(), hide_default_value = true,
-          hide_possible_values = true)]
+          hide_possible_values = true))]
     pub repeat: bool,
     /// Stop after this many frames
-    #[arg(long, value_name = "N", value_parser = RangedI64ValueParser::<u64>::new().range(1..))]
+    #[cfg_attr(feature = "clap", arg(long, value_name = "N", value_parser = RangedI64ValueParser::<u64>::new().range(1..)))]
     pub frames: Option<u64>,
     /// Picture size; of a camera, the nearest that it has [default: 1280x720 of a camera, 640x480 of `synthetic`; `demo` has its own]
-    #[arg(long, value_name = "WxH")]
+    #[cfg_attr(feature = "clap", arg(long, value_name = "WxH"))]
     pub size: Option<Size>,
     /// Frames per second; of a camera, the nearest that it has [default: 30]
-    #[arg(long, value_name = "RATE", value_parser = rate)]
+    #[cfg_attr(feature = "clap", arg(long, value_name = "RATE", value_parser = rate))]
     pub fps: Option<f64>,
     /// Pixel format of a camera, such as MJPG, YUYV or NV12 [default: what its cable carries best]
     #[cfg(feature = "camera")]
-    #[arg(long, value_name = "FOURCC")]
+    #[cfg_attr(feature = "clap", arg(long, value_name = "FOURCC"))]
     pub format: Option<FourCc>,
     /// Set a camera's control; may be given more than once, or as a list with commas
     #[cfg(feature = "camera")]
-    #[arg(long, value_name = "NAME=VALUE", value_delimiter = ',', value_parser = control)]
+    #[cfg_attr(feature = "clap", arg(long, value_name = "NAME=VALUE", value_delimiter = ',', value_parser = control))]
     pub control: Vec<Setting>,
 }
 
 /// How depth pictures are read.
-#[derive(Args, Clone, Debug, Default)]
-#[command(next_help_heading = "Depth")]
+#[derive(Clone, Debug, Default)]
+#[cfg_attr(feature = "clap", derive(Args))]
+#[cfg_attr(feature = "clap", command(next_help_heading = "Depth"))]
 pub struct Depth {
     /// Units of a 16-bit depth picture per metre (TUM 5000, millimetres 1000) [default: 5000; 1000 from a camera]
-    #[arg(long, value_name = "UNITS", value_parser = above_zero)]
+    #[cfg_attr(feature = "clap", arg(long, value_name = "UNITS", value_parser = above_zero))]
     pub depth_scale: Option<f32>,
     /// Value of a depth picture that means unknown
-    #[arg(long, value_name = "VALUE", default_value = "0")]
+    #[cfg_attr(feature = "clap", arg(long, value_name = "VALUE", default_value = "0"))]
     pub depth_invalid: u16,
     /// What the numbers of depth pictures are: metres (as --depth-scale has them), or inverse (relative inverse depth, as
     /// networks and phones give it: 8 or 16 bits, PNG or JPEG, white is near)
-    #[arg(long, value_name = "UNIT", value_parser = depth_unit, default_value = "metres")]
+    #[cfg_attr(feature = "clap", arg(long, value_name = "UNIT", value_parser = depth_unit, default_value = "metres"))]
     pub depth_unit: DepthUnit,
     /// White is far in pictures of inverse depth
-    #[arg(long, value_name = "YES", num_args = 0..=1, require_equals = true, default_value_t = false,
+    #[cfg_attr(feature = "clap", arg(long, value_name = "YES", num_args = 0..=1, require_equals = true, default_value_t = false,
           default_missing_value = "true", value_parser = BoolishValueParser::new(), hide_default_value = true,
-          hide_possible_values = true)]
+          hide_possible_values = true))]
     pub depth_invert: bool,
     /// How a depth camera stands beside the colour camera: TOML with the tables [depth] and [color] (width, height, fx,
     /// fy, cx, cy, in pixels) and [depth-to-color] (rotation: 9 numbers row by row; translation_m: 3 numbers)
     /// [default: both see the same]
-    #[arg(long, value_name = "FILE.toml")]
+    #[cfg_attr(feature = "clap", arg(long, value_name = "FILE.toml"))]
     pub depth_calibration: Option<PathBuf>,
 }
 
@@ -119,35 +125,36 @@ impl Depth {
 }
 
 /// Depth from two eyes.
-#[derive(Args, Clone, Debug, Default)]
-#[command(next_help_heading = "Two eyes")]
+#[derive(Clone, Debug, Default)]
+#[cfg_attr(feature = "clap", derive(Args))]
+#[cfg_attr(feature = "clap", command(next_help_heading = "Two eyes"))]
 pub struct Stereo {
     /// Each picture of the source shows both eyes beside each other: the left half is the left eye's
-    #[arg(long, value_name = "YES", num_args = 0..=1, require_equals = true, default_value_t = false,
+    #[cfg_attr(feature = "clap", arg(long, value_name = "YES", num_args = 0..=1, require_equals = true, default_value_t = false,
           default_missing_value = "true", value_parser = BoolishValueParser::new(), hide_default_value = true,
-          hide_possible_values = true)]
+          hide_possible_values = true))]
     pub side_by_side: bool,
     /// The pictures are a rectified pair already: the same point is in the same row
-    #[arg(long, value_name = "YES", num_args = 0..=1, require_equals = true, default_value_t = false,
+    #[cfg_attr(feature = "clap", arg(long, value_name = "YES", num_args = 0..=1, require_equals = true, default_value_t = false,
           default_missing_value = "true", value_parser = BoolishValueParser::new(), hide_default_value = true,
-          hide_possible_values = true)]
+          hide_possible_values = true))]
     pub rectified: bool,
     /// Calibration of the two eyes; may be given more than once, or as a list with commas, for one in two files
-    #[arg(long, value_name = "FILE", value_delimiter = ',')]
+    #[cfg_attr(feature = "clap", arg(long, value_name = "FILE", value_delimiter = ','))]
     pub calib: Vec<PathBuf>,
     /// Disparities that are tried, in pixels: a multiple of 16 up to 256 [default: the recording's, else a tenth of the
     /// width]
-    #[arg(long, value_name = "PX", value_parser = disparities)]
+    #[cfg_attr(feature = "clap", arg(long, value_name = "PX", value_parser = disparities))]
     pub max_disparity: Option<u32>,
     /// Focal length of a rectified pair, in pixels, with --baseline-m
-    #[arg(long, value_name = "PX", value_parser = above_zero, conflicts_with = "calib")]
+    #[cfg_attr(feature = "clap", arg(long, value_name = "PX", value_parser = above_zero, conflicts_with = "calib"))]
     pub focal_px: Option<f32>,
     /// Distance of its eyes, in metres
-    #[arg(long, value_name = "M", value_parser = above_zero, conflicts_with = "calib")]
+    #[cfg_attr(feature = "clap", arg(long, value_name = "M", value_parser = above_zero, conflicts_with = "calib"))]
     pub baseline_m: Option<f32>,
     /// Column of its right principal point less that of the left, in pixels [default: 0]
-    #[arg(long, value_name = "PX", value_parser = within(-10_000.0..=10_000.0),
-          conflicts_with = "calib")]
+    #[cfg_attr(feature = "clap", arg(long, value_name = "PX", value_parser = within(-10_000.0..=10_000.0),
+          conflicts_with = "calib"))]
     pub doffs_px: Option<f32>,
 }
 
@@ -229,7 +236,7 @@ impl FromStr for Size {
 }
 
 /// Parses `NAME=VALUE`; whether the camera has such a control is only known once it is open.
-#[cfg(feature = "camera")]
+#[cfg(all(feature = "camera", feature = "clap"))]
 fn control(text: &str) -> Result<Setting, String> {
     let parts = text.split_once('=').map(|(name, value)| (name.trim(), value.trim()));
     let (name, value) = parts
@@ -238,6 +245,7 @@ fn control(text: &str) -> Result<Setting, String> {
     Ok((name.to_owned(), value.to_owned()))
 }
 
+#[cfg(feature = "clap")]
 fn depth_unit(text: &str) -> Result<DepthUnit, String> {
     names::parse(text).map_err(|accepted| match text {
         "mm" | "millimetres" | "millimeters" => format!("{accepted}; of millimetres, --depth-scale 1000 makes metres"),
@@ -246,12 +254,14 @@ fn depth_unit(text: &str) -> Result<DepthUnit, String> {
     })
 }
 
+#[cfg(feature = "clap")]
 fn disparities(text: &str) -> Result<u32, String> {
     const MOST: u32 = Settings::MOST_DISPARITIES;
     let good = |disparities: &u32| (16..=MOST).contains(disparities) && disparities.is_multiple_of(16);
     text.parse().ok().filter(good).ok_or_else(|| format!("use a multiple of 16 from 16 to {MOST}"))
 }
 
+#[cfg(feature = "clap")]
 fn rate(text: &str) -> Result<f64, String> {
     text.parse()
         .ok()

@@ -6,6 +6,7 @@
 use std::fmt;
 use std::path::PathBuf;
 
+#[cfg(feature = "clap")]
 use clap::Args;
 
 #[cfg(feature = "networks")]
@@ -14,21 +15,22 @@ use crate::names;
 use crate::network::{Runtime, Scaling};
 
 /// Networks that make depth from the pictures of one camera.
-#[derive(Args, Clone, Debug, Default)]
-#[command(next_help_heading = "Networks")]
+#[derive(Clone, Debug, Default)]
+#[cfg_attr(feature = "clap", derive(Args))]
+#[cfg_attr(feature = "clap", command(next_help_heading = "Networks"))]
 pub struct Networks {
     /// What runs networks [default: auto]
     #[cfg(feature = "networks")]
-    #[arg(long, value_name = "WHICH", value_parser = names::parse::<Runtime>)]
+    #[cfg_attr(feature = "clap", arg(long, value_name = "WHICH", value_parser = names::parse::<Runtime>))]
     pub network_runtime: Option<Runtime>,
     /// What a network that is not known takes for black and white: unit (0 to 1), signed (-1 to 1), codes (0 to 255) or
     /// imagenet (the mean and deviation of that collection) [default: unit for a matte, imagenet for depth]
     #[cfg(feature = "networks")]
-    #[arg(long, value_name = "RANGE", value_parser = names::parse::<Range>)]
+    #[cfg_attr(feature = "clap", arg(long, value_name = "RANGE", value_parser = names::parse::<Range>))]
     pub network_range: Option<Range>,
     /// The order of its colours: rgb or bgr [default: rgb]
     #[cfg(feature = "networks")]
-    #[arg(long, value_name = "ORDER", value_parser = names::parse::<Order>)]
+    #[cfg_attr(feature = "clap", arg(long, value_name = "ORDER", value_parser = names::parse::<Order>))]
     pub network_order: Option<Order>,
 }
 

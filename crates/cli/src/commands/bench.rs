@@ -1,0 +1,326 @@
+//! `bench`: how fast the blur is on this machine, and the whole chain of a stream.
+
+mod chain;
+mod picture;
+
+use std::collections::BTreeMap;
+use std::time::{Duration, Instant};
+
+use clap::{Args, value_parser};
+use serde::Serialize;
+
+use bokehcam::bokeh::{Bokeh, BokehError, Job, PassTimes};
+use bokehcam::budget::Quality;
+use crate::error::CliError;
+use crate::options;
+use crate::settings::layers::Given;
+use crate::settings::look;
+use crate::settings::unused;
+use crate::terminal::{Progress, print};
+use bokehcam::compute::Backend;
+use bokehcam::computing::Computing;
+use bokehcam::frame::{ColorImage, DepthMap};
+use bokehcam::link::pool::Pool;
+use bokehcam::look::number::within;
+use bokehcam::look::{COC_AT_INFINITY_PER_HEIGHT, Look, MOST_RADIUS_PX, Strength};
+use bokehcam::optics::CocField;
+use bokehcam::pipeline::still::{Depth, coc_and_depth};
+use bokehcam::source::{self, DepthChoice, Size, SourceName};
+
+/// Frames that are measured where nobody says how many: as many as there is time for.
+const FRAMES: u32 = 20;
+const LEAST_FRAMES: usize = 5;
+const ENOUGH: Duration = Duration::from_secs(2);
+/// Frames before those that are measured: caches fill, and the processor's clock rises.
+const WARM_UP_FRAMES: usize = 2;
+
+/// Above the rows of the table.
+const HEADING: &str = "size        coc px  quality    p50 ms   p95 ms   max ms     fps  executor\n";
+
+/// Measure the blur on this machine, without reading or writing files
+///
+/// Blurs one picture again and again, one at a time, for every combination of the lists given.
+/// The time is that of one frame, in milliseconds, from handing it over until it is back.
+/// With --chain: the frames of a source go through all that a stream does, one at a time, and each stage is measured.
+#[derive(Args, Debug)]
+#[command(after_help = "\
+Examples:
+  bokehcam bench
+  bokehcam bench --sizes 1280x720 --quality draft,fast,balanced --threads 1,2,4
+  bokehcam bench --sizes 1920x1080 --coc 10,20,40 --frames 100 --json > bench.jsonl
+  bokehcam bench --chain
+  bokehcam bench --chain demo --refine on --quality draft,balanced")]
+pub struct BenchCommand {
+    /// Picture sizes
+    #[arg(long, value_name = "WxH", value_delimiter = ',', default_value = "640x480,1280x720,1920x1080")]
+    sizes: Vec<Size>,
+    /// Blur radii at infinity, in pixels [default: height / 45]
+    #[arg(long, value_name = "PX", value_delimiter = ',', value_parser = within(0.0..=MOST_RADIUS_PX))]
+    coc: Vec<f32>,
+    /// Quality levels [default: balanced; with --chain all]
+    #[arg(id = "benched_quality", long = "quality", value_name = "LEVELS", value_delimiter = ',',
+          value_parser = options::named::<Quality>())]
+    quality: Vec<Quality>,
+    /// Numbers of threads of the CPU backend [default: one per core]
+    #[arg(id = "benched_threads", long = "threads", value_name = "N", value_delimiter = ',',
+          value_parser = value_parser!(u16).range(1..=1024))]
+    threads: Vec<u16>,
+    /// What is in the picture
+    #[cfg(feature = "lab")]
+    #[arg(long, value_parser = options::named::<picture::Scene>(), value_name = "WHICH", default_value_t)]
+    scene: picture::Scene,
+    /// Frames to measure [default: 20, or fewer where these would take more than 2 s]
+    #[arg(id = "benched_frames", long = "frames", value_name = "N", value_parser = value_parser!(u32).range(1..))]
+    frames: Option<u32>,
+    /// What runs the blur
+    #[arg(long, value_parser = options::named::<Backend>(), value_name = "WHICH", default_value = "auto")]
+    backend: Backend,
+    /// Part of the name of the GPU to take
+    #[arg(long, value_name = "NAME")]
+    adapter: Option<String>,
+    /// One JSON object a line, instead of a table
+    #[arg(long)]
+    json: bool,
+    /// Also the median of each pass, in milliseconds
+    #[arg(long)]
+    passes: bool,
+    /// Measure all that a stream does instead: reading, depth, blur at each quality, and writing for a virtual camera; from a
+    /// recording, a photo, `demo` or `synthetic`
+    #[arg(long, value_name = "SOURCE", num_args = 0..=1, default_missing_value = "demo", value_parser = options::source_name(),
+          conflicts_with_all = if cfg!(feature = "lab") { &["sizes", "coc", "passes", "scene"][..] } else { &["sizes", "coc", "passes"] })]
+    chain: Option<SourceName>,
+    #[command(flatten)]
+    depth: options::Depth,
+    #[command(flatten)]
+    blur: options::Blur,
+}
+
+/// One line of the result.
+#[derive(Serialize)]
+struct Measured {
+    size_px: (u32, u32),
+    coc_px: f32,
+    quality: &'static str,
+    executor: String,
+    frames: u32,
+    p50_ms: f64,
+    p95_ms: f64,
+    max_ms: f64,
+    frames_per_s: f64,
+    passes_ms: BTreeMap<&'static str, f64>,
+}
+
+/// Runs the command; each line is printed as soon as it is measured.
+///
+/// # Errors
+/// The options do not fit each other, there is no such executor, or it failed.
+pub fn run(command: &BenchCommand, global: &options::Global, given: &Given) -> Result<(), CliError> {
+    if let Some(source) = &command.chain {
+        return chain::run(command, source, given);
+    }
+    if command.blur.depth.is_elsewhere() || command.blur.depth == DepthChoice::Stereo {
+        let what = "--depth is for `stream`: the scene that is measured has its own depth; leave it out, or use none";
+        return Err(CliError::Usage(what.to_string()));
+    }
+    let look = look::look(&command.blur, &options::LookSettings::default())?;
+    let look = source::fitting_look(&Look { strength: Strength::Default, ..look }, &command.blur.depth, true)?;
+    unused::warn(
+        &given.settings,
+        &unused::Run {
+            source: unused::From::Bench,
+            depth: source::DepthFrom::Metres,
+            uses_depth: true,
+            effect: look.effect,
+            lens: false,
+            realtime: false,
+            cpu_only: command.backend == Backend::Cpu,
+            compresses: false,
+            window: false,
+        },
+    );
+    if !command.json {
+        print(HEADING.as_bytes())?;
+    }
+    let combinations = command.sizes.len() * command.coc.len().max(1) * command.quality.len().max(1);
+    let combinations = (combinations * command.computings().len()) as u64;
+    let mut done = 0;
+    let levels = if command.quality.is_empty() { &[Quality::default()][..] } else { &command.quality };
+    for size in &command.sizes {
+        #[cfg(feature = "lab")]
+        let scene = command.scene;
+        #[cfg(not(feature = "lab"))]
+        let scene = picture::Scene::default();
+        let (color, depth) = picture::of(scene, (size.width, size.height))?;
+        let default_coc_px = [size.height as f32 * COC_AT_INFINITY_PER_HEIGHT];
+        let radii_px = if command.coc.is_empty() { &default_coc_px[..] } else { &command.coc };
+        for &coc_px in radii_px {
+            for &quality in levels {
+                for computing in command.computings() {
+                    // The bar goes before a row is printed where it was.
+                    let progress =
+                        Progress::new(Some(combinations * u64::from(command.frames.unwrap_or(FRAMES))), global);
+                    let before = done * u64::from(command.frames.unwrap_or(FRAMES));
+                    progress.delivered(before);
+                    let measured = measure(
+                        command.frames,
+                        &look,
+                        (&color, &depth),
+                        (coc_px, quality),
+                        &computing,
+                        (&progress, before),
+                    )?;
+                    drop(progress);
+                    done += 1;
+                    print(measured.line(command.json, command.passes).as_bytes())?;
+                }
+            }
+        }
+    }
+    Ok(())
+}
+
+/// The table of one size at the default quality, for what `--backend auto` takes and for the CPU: some seconds of work.
+#[cfg(feature = "camera")]
+pub fn short() -> String {
+    const SIZE: (u32, u32) = (1280, 720);
+    let frame = match picture::of(picture::Scene::default(), SIZE) {
+        Ok(frame) => frame,
+        Err(error) => return format!("{error}\n"),
+    };
+    let coc_px = SIZE.1 as f32 * COC_AT_INFINITY_PER_HEIGHT;
+    let blur = (coc_px, Quality::default());
+    let mut table = HEADING.to_owned();
+    for backend in [Backend::Auto, Backend::Cpu] {
+        let (computing, progress) = (Computing { backend, ..Computing::default() }, Progress::silent());
+        match measure(None, &Look::default(), (&frame.0, &frame.1), blur, &computing, (&progress, 0)) {
+            Ok(measured) => {
+                table += &measured.line(false, false);
+                // The second would be the same again.
+                if measured.executor.starts_with(Backend::Cpu.name()) {
+                    break;
+                }
+            }
+            Err(error) => table += &format!("{}: {error}\n", backend.name()),
+        }
+    }
+    table
+}
+
+impl BenchCommand {
+    /// What runs the blur, for each number of threads that was asked for.
+    fn computings(&self) -> Vec<Computing> {
+        let of = |threads| Computing { backend: self.backend, adapter: self.adapter.clone(), threads };
+        match &self.threads[..] {
+            [] => vec![of(None)],
+            list => list.iter().map(|&threads| of(Some(usize::from(threads)))).collect(),
+        }
+    }
+}
+
+/// Measures one combination of settings: blurs the same picture again and again after a warm-up. `progress` had counted
+/// `before` frames.
+fn measure(
+    frames: Option<u32>,
+    look: &Look,
+    (color, depth): (&ColorImage, &DepthMap),
+    (coc_px, quality): (f32, Quality),
+    computing: &Computing,
+    (progress, before): (&Progress, u64),
+) -> Result<Measured, CliError> {
+    let look = Look { strength: Strength::AtInfinity(coc_px), quality: Some(quality), ..look.clone() };
+    let size = color.size();
+    let Some(settings) = look.settings(size, false) else {
+        return Err(CliError::Usage(
+            "--effect none leaves nothing to measure: use dof, tilt-shift or blur".to_string(),
+        ));
+    };
+    let mut color = color.clone();
+    let (coc, depth) = coc_and_depth(&look, &mut color, Some(Depth::Measured(depth.clone())))?;
+    let mut bokeh = computing.blur(&settings, size)?;
+    let buffers = Buffers {
+        colors: Pool::new(bokeh.capacity(), || color.clone()),
+        depths: depth.map(|depth| Pool::new(bokeh.capacity(), || depth.clone())),
+        results: Pool::new(bokeh.capacity(), || ColorImage::new(size.0, size.1)),
+    };
+    for _ in 0..WARM_UP_FRAMES {
+        buffers.time_frame(&mut *bokeh, coc)?;
+    }
+    let mut times = Vec::new();
+    let mut passes = BTreeMap::<_, Vec<Duration>>::new();
+    let began = Instant::now();
+    for frame in 1..=frames.unwrap_or(FRAMES) {
+        let is_enough = frames.is_none() && times.len() >= LEAST_FRAMES && began.elapsed() > ENOUGH;
+        if is_enough {
+            break;
+        }
+        progress.delivered(before + u64::from(frame));
+        let (time, in_passes) = buffers.time_frame(&mut *bokeh, coc)?;
+        times.push(time);
+        in_passes.iter().for_each(|(name, time)| passes.entry(name).or_default().push(time));
+    }
+    times.sort_unstable();
+    Ok(Measured {
+        size_px: size,
+        coc_px,
+        quality: quality.name(),
+        executor: bokeh.describe(),
+        frames: times.len() as u32,
+        p50_ms: quantile_ms(&times, 0.5),
+        p95_ms: quantile_ms(&times, 0.95),
+        max_ms: quantile_ms(&times, 1.0),
+        frames_per_s: times.len() as f64 / times.iter().sum::<Duration>().as_secs_f64(),
+        passes_ms: passes
+            .into_iter()
+            .map(|(name, mut times)| {
+                times.sort_unstable();
+                (name, quantile_ms(&times, 0.5))
+            })
+            .collect(),
+    })
+}
+
+/// The quantile `share` (0 to 1) of sorted times, in milliseconds.
+fn quantile_ms(sorted: &[Duration], share: f64) -> f64 {
+    sorted[((sorted.len() - 1) as f64 * share).round() as usize].as_secs_f64() * 1e3
+}
+
+/// Copies of one frame, as many as the executor holds at a time, so that no copying is measured.
+struct Buffers {
+    colors: Pool<ColorImage>,
+    depths: Option<Pool<DepthMap>>,
+    results: Pool<ColorImage>,
+}
+
+impl Buffers {
+    /// Blurs the frame once: the time from handing it over until it is back, and the times of its passes.
+    fn time_frame(&self, bokeh: &mut dyn Bokeh, coc: CocField) -> Result<(Duration, PassTimes), CliError> {
+        let (color, depth) = (self.colors.take(), self.depths.as_ref().map(Pool::take));
+        let job = Job { out: self.results.take(), ..Job::new(color, depth, coc) };
+        let began = Instant::now();
+        bokeh.submit(job)?;
+        let finished = bokeh.collect(true)?;
+        let time = began.elapsed();
+        finished.map(|finished| (time, finished.times)).ok_or(BokehError::Lost.into())
+    }
+}
+
+impl Measured {
+    /// The result as one JSON object, or as a row of the table with its passes (if asked for) in a second line.
+    fn line(&self, json: bool, passes: bool) -> String {
+        if json {
+            // Numbers and texts always have a form in JSON.
+            return serde_json::to_string(self).unwrap_or_default() + "\n";
+        }
+        let Self { size_px: (width, height), coc_px, quality, executor, p50_ms, p95_ms, max_ms, frames_per_s, .. } =
+            self;
+        let passes: String = if passes {
+            self.passes_ms.iter().map(|(name, ms)| format!("    {name} {ms:.2}")).collect::<String>() + "\n"
+        } else {
+            String::new()
+        };
+        format!(
+            "{:<10} {coc_px:>7.1}  {quality:<9} {p50_ms:>7.2}  {p95_ms:>7.2}  {max_ms:>7.2} {frames_per_s:>7.1}  {executor}\n{passes}",
+            format!("{width}x{height}")
+        )
+    }
+}

@@ -1,0 +1,347 @@
+//! `bench --chain`: what a frame of a stream costs on this machine, stage by stage, and which quality that affords.
+
+use std::fmt::Write;
+
+use serde::Serialize;
+
+use super::BenchCommand;
+use bokehcam::bokeh::{Bokeh, BokehError, Job};
+use bokehcam::budget::Quality;
+use bokehcam::capture::{Captured, Shot};
+use crate::error::CliError;
+use crate::options;
+use crate::settings::layers::Given;
+use crate::settings::look;
+use crate::settings::unused;
+use crate::terminal::print;
+use bokehcam::clock::{Clock, cpu_ns};
+use bokehcam::compute::{Backend, thread_pool::cores};
+use bokehcam::computing::{Computing, Executors};
+use bokehcam::depth::Seen;
+use bokehcam::frame::{ColorImage, DepthMap, GrayImage, Stamp};
+use bokehcam::link::pool::Pooled;
+use bokehcam::look::{BackgroundMemory, Look, Strength};
+use bokehcam::pipeline::{CocMaker, Finish};
+use bokehcam::sink::yuyv::Encoder;
+use bokehcam::source::{self, DepthFrom, Frames, Kind, Source, SourceName};
+
+/// Frames before those that are measured: caches fill, and what lies behind begins to be known.
+const WARM_UP_FRAMES: u64 = 8;
+/// Frame rates that are asked for.
+const RATES: [u32; 2] = [30, 60];
+
+/// Processor time of all threads, and wall time, in milliseconds: medians of a frame.
+#[derive(Clone, Copy, Default, Serialize)]
+struct Cost {
+    cpu_ms: f64,
+    wall_ms: f64,
+}
+
+/// A stage, or a part of one.
+#[derive(Serialize)]
+struct Stage {
+    name: &'static str,
+    /// Stages run beside each other on frames that follow each other; the parts of a stage do not.
+    thread: &'static str,
+    #[serde(flatten)]
+    cost: Cost,
+}
+
+/// What a level of quality costs.
+#[derive(Serialize)]
+struct Level {
+    quality: &'static str,
+    blur: Cost,
+    /// Processor time of the whole chain.
+    cpu_ms: f64,
+    /// Frames a second, as far as the slowest thread and all cores together go.
+    frames_per_s: f64,
+}
+
+/// What was measured of a source.
+#[derive(Serialize)]
+struct Chain {
+    source: String,
+    size_px: (u32, u32),
+    executor: String,
+    cores: usize,
+    frames: u32,
+    stages: Vec<Stage>,
+    levels: Vec<Level>,
+    /// For each of some frame rates, the finest level that keeps it.
+    affords: Vec<(u32, Option<&'static str>)>,
+}
+
+/// Measures the chain from `name`, for every number of threads that was asked for.
+///
+/// # Errors
+/// The source cannot be read or is a camera, or a stage failed.
+pub(super) fn run(command: &BenchCommand, name: &SourceName, given: &Given) -> Result<(), CliError> {
+    if !name.devices().is_empty() || matches!(name.kind(), Kind::Camera) {
+        let what =
+            "--chain: a camera gives frames when it takes them; use a recording of it (bokehcam record), or demo";
+        return Err(CliError::Usage(what.to_string()));
+    }
+    for (k, computing) in command.computings().into_iter().enumerate() {
+        let chain = measure(command, name, computing, (k == 0).then_some(given))?;
+        // Numbers and texts always have a form in JSON.
+        let text = if command.json { serde_json::to_string(&chain).unwrap_or_default() + "\n" } else { chain.table() };
+        print(text.as_bytes())?;
+    }
+    Ok(())
+}
+
+/// Where a frame's parts are noted while it goes through the chain.
+struct Notes {
+    clock: Clock,
+    since: [u64; 2],
+    parts: Vec<Part>,
+    measures: bool,
+}
+
+/// The times of a part in each frame, in nanoseconds.
+struct Part {
+    name: &'static str,
+    thread: &'static str,
+    cpu_ns: Vec<u64>,
+    wall_ns: Vec<u64>,
+}
+
+impl Notes {
+    fn now(&self) -> [u64; 2] {
+        [cpu_ns(), self.clock.now_ns()]
+    }
+
+    /// What was done since the last note, or since [`Notes::begin`], was `name`.
+    fn note(&mut self, name: &'static str, thread: &'static str) {
+        let [cpu_ns, wall_ns] = self.now();
+        if self.measures {
+            let place = self.parts.iter().position(|part| part.name == name).unwrap_or_else(|| {
+                self.parts.push(Part { name, thread, cpu_ns: Vec::new(), wall_ns: Vec::new() });
+                self.parts.len() - 1
+            });
+            let [cpu_before_ns, wall_before_ns] = self.since;
+            self.parts[place].cpu_ns.push(cpu_ns - cpu_before_ns);
+            self.parts[place].wall_ns.push(wall_ns - wall_before_ns);
+        }
+        self.begin();
+    }
+
+    fn begin(&mut self) {
+        self.since = self.now();
+    }
+
+    fn costs(&mut self) -> Vec<Stage> {
+        let median_ms = |times_ns: &mut Vec<u64>| {
+            times_ns.sort_unstable();
+            times_ns[times_ns.len() / 2] as f64 / 1e6
+        };
+        let cost =
+            |part: &mut Part| Cost { cpu_ms: median_ms(&mut part.cpu_ns), wall_ms: median_ms(&mut part.wall_ns) };
+        self.parts.iter_mut().map(|part| Stage { name: part.name, thread: part.thread, cost: cost(part) }).collect()
+    }
+}
+
+fn measure(
+    command: &BenchCommand,
+    name: &SourceName,
+    computing: Computing,
+    given: Option<&Given>,
+) -> Result<Chain, CliError> {
+    let look = look::look(&command.blur, &options::LookSettings::default())?;
+    let wanted = command.frames.unwrap_or(super::FRAMES);
+    let frames = WARM_UP_FRAMES + u64::from(wanted);
+    let options = source::Options {
+        // The demonstration and the synthetic scene have no end of their own.
+        frames: Frames {
+            repeat: !matches!(name.kind(), Kind::Demo | Kind::Synthetic),
+            frames: Some(frames),
+            ..Frames::default()
+        },
+        depth: command.depth.clone(),
+        depth_choice: command.blur.depth.clone(),
+        computing: computing.clone(),
+        ..source::Options::default()
+    };
+    let mut source = Source::open(name, &options, Some(&look))?;
+    let look = source.fitting_look(&look, &options)?;
+    if let Some(given) = given {
+        warn(command, name, &source, &look, given);
+    }
+    let info = source.camera.info();
+    let size = info.size;
+    let levels = if command.quality.is_empty() { &Quality::ALL[..] } else { &command.quality };
+    let mut on_one_device = Executors::new(computing.clone());
+    let mut executors: Vec<(Quality, Box<dyn Bokeh>)> = Vec::new();
+    for &quality in levels {
+        let look = Look { quality: Some(quality), ..look.clone() };
+        let Some(settings) = look.settings(size, false) else {
+            let what = "--effect none leaves nothing to measure: use dof, tilt-shift or blur";
+            return Err(CliError::Usage(what.to_string()));
+        };
+        executors.push((quality, on_one_device.blur(&settings, size)?));
+    }
+    let executor = executors.first().map(|(_, executor)| executor.describe()).unwrap_or_default();
+
+    let measured = source.is_measured();
+    let coc = CocMaker::new(look.coc_rule(size), Finish::measured(look.refines(measured)));
+    let mut coc = coc.on_threads(computing.threads());
+    coc.compute_on(executors.first().and_then(|(_, executor)| executor.device()));
+    let is_known = source.depth.as_ref().is_some_and(|source| source.knows_background());
+    coc.remember(look.background_memory == BackgroundMemory::On && !is_known);
+    let mut notes = Notes { clock: Clock::system(), since: [0; 2], parts: Vec::new(), measures: false };
+    let mut buffers = Buffers {
+        color: Pooled::detached(ColorImage::new(size.0, size.1)),
+        depth: Pooled::detached(DepthMap::default()),
+        right: GrayImage::default(),
+        out: Pooled::detached(ColorImage::new(size.0, size.1)),
+        encoder: Encoder::new(),
+        yuyv: vec![0; size.0 as usize * size.1 as usize / 2 * 4],
+    };
+    for frame in 0..frames {
+        notes.measures = frame >= WARM_UP_FRAMES;
+        if !buffers.frame(&mut source, &mut coc, &mut executors, &mut notes)? {
+            break;
+        }
+    }
+    if notes.parts.is_empty() {
+        return Err(CliError::Usage(format!("--chain: {name} has too few frames to measure")));
+    }
+    Ok(Chain::of(info.name, size, executor, wanted, notes.costs()))
+}
+
+/// What a frame needs on its way.
+struct Buffers {
+    color: Pooled<ColorImage>,
+    depth: Pooled<DepthMap>,
+    right: GrayImage,
+    out: Pooled<ColorImage>,
+    encoder: Encoder,
+    yuyv: Vec<u8>,
+}
+
+impl Buffers {
+    /// Takes a frame through the chain, its blur at every level; `false` when there are no more.
+    fn frame(
+        &mut self,
+        source: &mut Source,
+        coc: &mut CocMaker,
+        executors: &mut [(Quality, Box<dyn Bokeh>)],
+        notes: &mut Notes,
+    ) -> Result<bool, CliError> {
+        notes.begin();
+        let shot = Shot { color: &mut self.color, depth: &mut self.depth, right: &mut self.right };
+        let stamp = match source.camera.next(shot)? {
+            Captured::Frame(stamp) => stamp,
+            Captured::Corrupt(error) => return Err(error.into()),
+            Captured::End => return Ok(false),
+            Captured::Lost(..) | Captured::Waiting => return Ok(true),
+        };
+        notes.note("decode", "capture");
+        let field = match coc.fixed() {
+            Some(field) => field,
+            None => {
+                if source.depth.is_some() {
+                    self.read_depth(source, stamp)?;
+                    notes.note("read depth", "depth");
+                }
+                coc.make_noting(&mut self.depth, &self.color, stamp.time_ns, |part| notes.note(part, "depth"))
+            }
+        };
+        for (quality, executor) in executors {
+            let taken =
+                |buffer: &mut Pooled<ColorImage>| std::mem::replace(buffer, Pooled::detached(ColorImage::default()));
+            let (color, out) = (taken(&mut self.color), taken(&mut self.out));
+            let depth = std::mem::replace(&mut self.depth, Pooled::detached(DepthMap::default()));
+            let depth = coc.fixed().is_none().then_some(depth);
+            notes.begin();
+            executor.submit(Job { quality: *quality, out, ..Job::new(color, depth, field) })?;
+            let finished = executor.collect(true)?.ok_or(BokehError::Lost)?;
+            notes.note(quality.name(), "blur");
+            self.color = finished.color;
+            self.depth = finished.depth.unwrap_or(Pooled::detached(DepthMap::default()));
+            self.out = finished.picture.into_memory().ok_or(BokehError::Lost)?;
+        }
+        notes.begin();
+        self.encoder.encode(&self.out, &mut self.yuyv);
+        notes.note("encode", "sink");
+        Ok(true)
+    }
+
+    fn read_depth(&mut self, source: &mut Source, stamp: Stamp) -> Result<(), CliError> {
+        let Some(depth) = &mut source.depth else { return Ok(()) };
+        depth.rectify(&mut self.color);
+        let right = Some(&self.right).filter(|right| right.width > 0);
+        depth.read(Seen { stamp, color: &self.color, right }, &mut self.depth)?;
+        Ok(())
+    }
+}
+
+impl Chain {
+    fn of(source: String, size_px: (u32, u32), executor: String, frames: u32, mut stages: Vec<Stage>) -> Self {
+        let (blurs, rest) = stages.drain(..).partition::<Vec<_>, _>(|stage| stage.thread == "blur");
+        let cores = cores();
+        let cpu_ms: f64 = rest.iter().map(|stage| stage.cost.cpu_ms).sum();
+        let of_thread = |thread: &str| -> f64 {
+            rest.iter().filter(|stage| stage.thread == thread).map(|stage| stage.cost.wall_ms).sum()
+        };
+        let slowest_ms = ["capture", "depth", "sink"].into_iter().map(of_thread).fold(0.0, f64::max);
+        let level = |stage: &Stage| {
+            let (blur, cpu_ms) = (stage.cost, cpu_ms + stage.cost.cpu_ms);
+            let period_ms = slowest_ms.max(blur.wall_ms).max(cpu_ms / cores as f64);
+            Level { quality: stage.name, blur, cpu_ms, frames_per_s: 1e3 / period_ms }
+        };
+        let levels: Vec<Level> = blurs.iter().map(level).collect();
+        let finest = |rate: u32| levels.iter().rev().find(|level| level.frames_per_s >= f64::from(rate));
+        let affords = RATES.map(|rate| (rate, finest(rate).map(|level| level.quality))).to_vec();
+        Self { source, size_px, executor, cores, frames, stages: rest, levels, affords }
+    }
+
+    fn table(&self) -> String {
+        let Self { source, size_px: (width, height), executor, cores, frames, stages, levels, affords } = self;
+        let mut text = format!("{source}, {width}x{height}, {frames} frames; {executor}; {cores} cores\n\n");
+        text += "thread    stage           processor ms   wall ms\n";
+        for Stage { name, thread, cost } in stages.iter().filter(|stage| stage.thread != "sink") {
+            let _ = writeln!(text, "{thread:<9} {name:<16} {:>11.2} {:>9.2}", cost.cpu_ms, cost.wall_ms);
+        }
+        for Level { quality, blur, .. } in levels {
+            let name = format!("blur, {quality}");
+            let _ = writeln!(text, "{:<9} {name:<16} {:>11.2} {:>9.2}", "blur", blur.cpu_ms, blur.wall_ms);
+        }
+        for Stage { name, thread, cost } in stages.iter().filter(|stage| stage.thread == "sink") {
+            let _ = writeln!(text, "{thread:<9} {name:<16} {:>11.2} {:>9.2}", cost.cpu_ms, cost.wall_ms);
+        }
+        text += "\nquality   processor ms   frames/s   of one core at 30/s\n";
+        for Level { quality, cpu_ms, frames_per_s, .. } in levels {
+            let share = format!("{:.0} %", 3.0 * cpu_ms);
+            let _ = writeln!(text, "{quality:<9} {cpu_ms:>12.2} {frames_per_s:>10.1} {share:>21}");
+        }
+        text.push('\n');
+        for (rate, level) in affords {
+            let _ = match level {
+                Some(level) => writeln!(text, "{rate} frames a second: --quality {level}"),
+                None => {
+                    writeln!(text, "{rate} frames a second: not at any of these; try smaller pictures, or --refine off")
+                }
+            };
+        }
+        text
+    }
+}
+
+fn warn(command: &BenchCommand, name: &SourceName, source: &Source, look: &Look, given: &Given) {
+    unused::warn(
+        &given.settings,
+        &unused::Run {
+            source: unused::From::Source(name.kind()),
+            depth: if source.has_depth() { source.depth_from } else { DepthFrom::Nothing },
+            uses_depth: look.effect.follows_depth(),
+            effect: look.effect,
+            lens: matches!(look.strength, Strength::Lens(_)),
+            realtime: false,
+            cpu_only: command.backend == Backend::Cpu,
+            compresses: false,
+            window: false,
+        },
+    );
+}

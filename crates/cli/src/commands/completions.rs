@@ -1,0 +1,51 @@
+//! `completions`: what shells complete, made of the table that the command line is parsed by.
+
+use std::any::TypeId;
+use std::path::PathBuf;
+
+use clap::builder::PossibleValuesParser;
+use clap::{Arg, Command, ValueHint};
+
+use crate::settings::file::SettingsFile;
+use bokehcam::look::presets;
+use bokehcam::sink::Target;
+use bokehcam::source::SourceName;
+
+/// What is completed of options whose values are more than a few names.
+const VALUES: [(&str, &[&str]); 4] = [
+    ("depth", &["auto", "recorded", "stereo", "none", "matte", "mono", "plate", "matte,mono", "defocus"]),
+    ("aperture", &["disc", "ring:", "polygon:", "heart", "star:", "image:"]),
+    ("behind", &["blur", "color:", "image:"]),
+    ("focus", &["auto"]),
+];
+
+/// The command with what is completed of its options: names where there are any, and files where one is wanted alone.
+pub fn completed(command: Command, file: &SettingsFile) -> Command {
+    let names: Vec<String> =
+        presets::built_in().map(|preset| preset.name).chain(file.presets.keys().cloned()).collect();
+    below(command, &names)
+}
+
+fn below(command: Command, presets: &[String]) -> Command {
+    let command = command.mut_args(|arg| {
+        let option = arg.get_long().unwrap_or(arg.get_id().as_str()).to_owned();
+        let values = VALUES.iter().find(|(name, _)| *name == option).map(|(_, values)| *values);
+        match values {
+            _ if option == "preset" || option == "look" => {
+                arg.value_parser(PossibleValuesParser::new(presets.to_vec()))
+            }
+            Some(values) => arg.value_parser(PossibleValuesParser::new(values.iter().copied())),
+            None if takes_file(&arg) || !arg.get_action().takes_values() => arg,
+            None => arg.value_hint(ValueHint::Other),
+        }
+    });
+    command.mut_subcommands(|below| self::below(below, presets))
+}
+
+/// Whether a value may be a file or a folder.
+fn takes_file(arg: &Arg) -> bool {
+    let kind = arg.get_value_parser().type_id();
+    let has_names = !arg.get_possible_values().is_empty();
+    let files = [TypeId::of::<PathBuf>(), TypeId::of::<Target>(), TypeId::of::<SourceName>()];
+    has_names || files.iter().any(|file| kind == *file) || arg.get_id() == "source" || arg.get_id() == "language"
+}

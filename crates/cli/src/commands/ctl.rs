@@ -1,0 +1,201 @@
+//! `ctl`: asks a stream or a preview that runs for something.
+
+use std::fmt::Write;
+use std::path::{self, Path, PathBuf};
+
+use clap::{Args, Subcommand};
+
+use crate::error::CliError;
+use crate::log;
+use crate::options::Global;
+use crate::settings::paths::counted_from;
+use crate::terminal::{print, say};
+use bokehcam::control::client::{ask, runs};
+use bokehcam::control::{Answer, ControlError, Name, Request, Status};
+use bokehcam::look::settings;
+
+/// Control a stream or a preview while it runs: off and on, another look, a picture
+#[derive(Args, Debug)]
+#[command(after_help = "\
+Examples:
+  bokehcam ctl                              what runs
+  bokehcam ctl toggle
+  bokehcam ctl preset dreamy
+  bokehcam ctl set blur=3% focus=auto
+  bokehcam ctl depth matte
+  bokehcam ctl --name stream-2 status --json
+  bokehcam ctl snapshot --to me.png
+
+Off shows a still card in place of the picture, and the camera rests. The picture without blur is `set effect=none`.
+docs/ctl.md (in a package /usr/share/doc/bokehcam/docs/ctl.md) has recipes for keys and bars, and the protocol.")]
+pub struct CtlCommand {
+    /// Which run, where there are several: its --name, or as `bokehcam ctl list` has it
+    #[arg(long, global = true, value_name = "NAME")]
+    name: Option<Name>,
+    #[command(subcommand)]
+    verb: Option<Verb>,
+}
+
+#[derive(Subcommand, Debug)]
+enum Verb {
+    /// List what runs: name, on or off, source and outputs; so does `ctl` alone
+    List,
+    /// Show pictures again, as before
+    On,
+    /// Show a still card in place of the picture; the camera rests
+    Off,
+    /// Off if it is on, else on
+    Toggle,
+    /// Take the look of a preset, built in or your own
+    Preset {
+        /// Its name
+        #[arg(id = "look", value_name = "PRESET")]
+        preset: String,
+    },
+    /// Change settings of the look: all of them, or none if one cannot be
+    Set {
+        /// Settings as on the command line, without the dashes
+        #[arg(id = "settings", value_name = "NAME=VALUE", required = true)]
+        settings: Vec<String>,
+    },
+    /// Make depth another way, in a window: recorded, stereo, matte, matte,mono or plate, as the source has it
+    Depth {
+        /// The way, as behind --depth
+        #[arg(id = "way", value_name = "WAY")]
+        from: String,
+    },
+    /// Say how it is
+    Status {
+        /// As a line of JSON
+        #[arg(long)]
+        json: bool,
+    },
+    /// Save the next picture
+    Snapshot {
+        /// The file (PNG or JPEG), which must not exist [default: by date, in your folder of pictures]
+        #[arg(id = "file", long = "to", value_name = "FILE")]
+        to: Option<PathBuf>,
+    },
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// There is no such run, or several; or it refuses.
+pub fn run(command: CtlCommand, global: &Global) -> Result<(), CliError> {
+    let CtlCommand { name, verb } = command;
+    let verb = verb.unwrap_or(Verb::List);
+    let as_json = matches!(verb, Verb::Status { json: true });
+    let is_status = matches!(verb, Verb::Status { .. });
+    let request = match verb {
+        Verb::List => return list(name.as_ref()),
+        Verb::On => Request::On,
+        Verb::Off => Request::Off,
+        Verb::Toggle => Request::Toggle,
+        Verb::Preset { preset } => Request::Preset { name: preset },
+        Verb::Set { settings } => Request::Set { settings: settings.into_iter().map(here).collect::<Result<_, _>>()? },
+        Verb::Depth { from } => Request::Depth { from },
+        Verb::Status { .. } => Request::Status,
+        Verb::Snapshot { to } => Request::Snapshot { to: to.map(|to| absolute(&to)).transpose()? },
+    };
+    match ask(name.as_ref(), &request)? {
+        Answer::Done { status, note } => {
+            note.iter().for_each(|note| log::warn(note));
+            match (is_status, as_json) {
+                (_, true) => print(format!("{}\n", json(&status)?).as_bytes()),
+                (true, false) => print(lines(&status).as_bytes()),
+                // A key has no terminal: this is for people.
+                (false, false) if global.quiet => Ok(()),
+                (false, false) => {
+                    say(&format!("{} is {}", status.name, state(&status)));
+                    Ok(())
+                }
+            }
+        }
+        Answer::Saved { saved } => print(format!("{}\n", saved.display()).as_bytes()),
+        Answer::Refused { error, usage: true } => Err(CliError::Usage(error)),
+        Answer::Refused { error, usage: false } => Err(CliError::Control(error)),
+    }
+}
+
+impl From<ControlError> for CliError {
+    fn from(error: ControlError) -> Self {
+        match error {
+            ControlError::Several(_) => Self::Usage(error.to_string()),
+            error => Self::Control(error.to_string()),
+        }
+    }
+}
+
+/// Says what runs, a line each.
+fn list(name: Option<&Name>) -> Result<(), CliError> {
+    let runs: Vec<Name> = runs()?.into_iter().filter(|run| name.is_none_or(|name| run == name)).collect();
+    if runs.is_empty() {
+        say("nothing runs: begin with `bokehcam stream` or `bokehcam preview`");
+    }
+    let line = |run: &Name| match ask(Some(run), &Request::Status) {
+        Ok(Answer::Done { status, .. }) => {
+            let Status { on, source, sinks, .. } = *status;
+            let source = if source.is_empty() { "no source" } else { &source };
+            format!("{run:<12} {:<4} {source} to {}\n", if on { "on" } else { "off" }, sinks.join(", "))
+        }
+        Ok(_) => format!("{run:<12} ?    it answers as another version does\n"),
+        Err(error) => format!("{run:<12} ?    {error}\n"),
+    };
+    print(runs.iter().map(line).collect::<String>().as_bytes())
+}
+
+/// A setting as the run understands it, which is in another folder.
+fn here(setting: String) -> Result<String, CliError> {
+    let Some((name, value)) = setting.split_once('=') else { return Ok(setting) };
+    let folder = std::env::current_dir().map_err(CliError::io(".".as_ref()))?;
+    let whole = counted_from(&folder, name, value);
+    if whole == value {
+        return Ok(setting);
+    }
+    absolute(&folder)?;
+    Ok(format!("{name}={whole}"))
+}
+
+fn absolute(path: &Path) -> Result<PathBuf, CliError> {
+    let whole = path::absolute(path).map_err(CliError::io(path))?;
+    match whole.to_str() {
+        Some(_) => Ok(whole),
+        None => Err(CliError::Usage(format!("{}: use a name that is text in UTF-8", whole.display()))),
+    }
+}
+
+fn json(status: &Status) -> Result<String, CliError> {
+    serde_json::to_string(status).map_err(|error| CliError::Control(error.to_string()))
+}
+
+fn state(status: &Status) -> &'static str {
+    if status.on { "on" } else { "off: a still card is shown in place of the picture" }
+}
+
+/// The status for people.
+fn lines(status: &Status) -> String {
+    let Status { name, pid, command, source, size, sinks, watched, quality, fps, look, uptime_s, .. } = status;
+    let size = size.map_or_else(String::new, |(width, height)| format!(", {width}x{height}"));
+    let watched = match watched {
+        Some(true) => "; watched",
+        Some(false) => "; nobody watches",
+        None => "",
+    };
+    let sinks = if sinks.is_empty() { "nowhere else".to_owned() } else { sinks.join(", ") };
+    let quality = quality.as_ref().map_or("not blurred".to_owned(), |quality| format!("quality {quality}"));
+    let is_alias = |name: &str| settings::name_of(name) != name;
+    let look = look.iter().filter(|(name, _)| !is_alias(name)).map(|(name, value)| format!("{name}={value}"));
+    let look: Vec<String> = look.collect();
+    let whole_s = *uptime_s as u64;
+    let (hours, minutes, seconds) = (whole_s / 3600, whole_s / 60 % 60, whole_s % 60);
+    let mut text = format!("{name} is {}\n", state(status));
+    // Writing to a String cannot fail.
+    let _ = write!(
+        text,
+        "  run      {command}, process {pid}, since {hours}:{minutes:02}:{seconds:02}\n  source   {source}{size}\n  \
+         to       {sinks}{watched}\n  frames   {fps:.1} a second, {quality}\n  look     {}\n",
+        look.join(" ")
+    );
+    text
+}

@@ -1,0 +1,277 @@
+//! `depth`: the disparity of one stereo pair, or its depth.
+
+mod preview;
+
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use clap::{Args, value_parser};
+
+use bokehcam::calibration::rectifier::Rectifier;
+use crate::error::CliError;
+use crate::files::{make_folder_of, refuse_overwrite, refuse_source, tell_of_leftovers};
+use crate::log;
+use crate::options;
+use crate::plausible;
+use crate::terminal;
+use bokehcam::compute::Backend;
+use bokehcam::computing::Computing;
+use bokehcam::depth::DepthError;
+use bokehcam::depth::stereo::check::{Verdict, check};
+use bokehcam::depth::stereo::{Effort, MatchError, Pair, Settings};
+use bokehcam::frame::{ColorImage, DepthMap, DisparityMap, GrayImage};
+use bokehcam::look::number::{above_zero, within};
+use bokehcam::optics::StereoRig;
+use bokehcam::recording::geometry::Geometry;
+use bokehcam::recording::still::{self, MapFormat};
+use bokehcam::source::calib::{self, Eyes};
+use bokehcam::source::options::DEPTH_SCALE;
+
+use preview::preview;
+
+/// Disparities that are tried where neither the user nor the calibration says how many.
+const DEFAULT_DISPARITIES: u32 = 64;
+
+/// Find the disparity of a rectified stereo pair, or its depth
+///
+/// The disparity belongs to the left picture: its pixel x is seen at x - disparity in the right one. Both pictures are
+/// rectified (the same point is in the same row), or the calibration tells how to rectify them first.
+#[derive(Args, Debug)]
+#[command(after_help = "\
+Examples:
+  bokehcam depth im0.png im1.png --calib calib.txt --out disparity.pfm --preview disparity.png
+  bokehcam depth left.png right.png --max-disparity 128 --out disparity.png
+  bokehcam depth left.png right.png --focal-px 707 --baseline-m 0.54 --metres --out depth.pfm")]
+pub struct DepthCommand {
+    /// What the left eye saw, PNG or JPEG
+    left: PathBuf,
+    /// What the right eye saw
+    right: PathBuf,
+    /// Where the result goes: .pfm (float pixels, infinity = unknown) or .png (16 bits, 256 units per pixel, 0 = unknown)
+    #[arg(long, alias = "to", value_name = "FILE")]
+    out: PathBuf,
+    /// Disparities that are tried, from 0, in pixels; rounded up to a multiple of 16 [default: the calibration's, else 64]
+    // Ids of their own: the settings of the same names are about live sources.
+    #[arg(id = "pair_max_disparity", long = "max-disparity", value_name = "PX",
+          value_parser = value_parser!(u32).range(1..=i64::from(Settings::MOST_DISPARITIES)))]
+    max_disparity: Option<u32>,
+    /// Calibration of the two eyes: OpenCV's, Kalibr's or EuRoC's, by which the pictures are rectified first, or the
+    /// calib.txt of a rectified pair from Middlebury, ETH3D or KITTI; may be given more than once, or as a list with
+    /// commas, for one in two files
+    #[arg(id = "pair_calib", long = "calib", value_name = "FILE", value_delimiter = ',')]
+    calib: Vec<PathBuf>,
+    /// Focal length in pixels, with --baseline-m
+    #[arg(id = "pair_focal_px", long = "focal-px", value_name = "PX", value_parser = above_zero,
+          conflicts_with = "pair_calib", requires = "pair_baseline_m")]
+    focal_px: Option<f32>,
+    /// Distance of the eyes in metres, with --focal-px
+    #[arg(id = "pair_baseline_m", long = "baseline-m", value_name = "M", value_parser = above_zero,
+          conflicts_with = "pair_calib", requires = "pair_focal_px")]
+    baseline_m: Option<f32>,
+    /// Column of the right principal point less that of the left, in pixels [default: 0]
+    #[arg(id = "pair_doffs_px", long = "doffs-px", value_name = "PX", value_parser = within(-10_000.0..=10_000.0),
+          conflicts_with = "pair_calib", requires = "pair_focal_px")]
+    doffs_px: Option<f32>,
+    /// Write depth in metres instead: .pfm, or .png of 5000 units per metre (TUM); 0 = unknown
+    #[arg(long)]
+    metres: bool,
+    /// Write the disparity as a picture, too: near is red, far is blue, unknown is black
+    #[arg(long, value_name = "FILE.png")]
+    preview: Option<PathBuf>,
+    /// How much is done for it
+    #[arg(long, value_parser = options::named::<Effort>(), value_name = "HOW", default_value = "full")]
+    effort: Effort,
+    /// What runs it
+    #[arg(long, value_parser = options::named::<Backend>(), value_name = "WHICH", default_value = "auto", help_heading = "Computing")]
+    backend: Backend,
+    /// Part of the name of the GPU to take
+    #[arg(long, value_name = "NAME", help_heading = "Computing")]
+    adapter: Option<String>,
+    /// Threads of the CPU backend [default: one per core]
+    #[arg(long, value_name = "N", help_heading = "Computing", value_parser = options::threads())]
+    threads: Option<usize>,
+    #[command(flatten)]
+    output: options::Output,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// A file cannot be read or written, the pictures are no pair, the options do not fit them, or there is no such GPU.
+pub fn run(command: &DepthCommand, global: &options::Global) -> Result<(), CliError> {
+    command.check()?;
+    let note = |text: String| {
+        if !global.quiet {
+            terminal::say(&format!("note: {text}"));
+        }
+    };
+    let mut color = still::read_color(&command.left)?;
+    let mut right = luma_of(&still::read_color(&command.right)?);
+    let size = color.size();
+    if right.size() != size {
+        return Err(DepthError::from(MatchError::Sizes { left: size, right: right.size() }).into());
+    }
+    let (geometry, rectifier) = command.geometry(size, &note)?;
+    if let Some(rectifier) = &rectifier {
+        rectifier.left(&std::mem::take(&mut color), &mut color);
+        rectifier.right(&std::mem::take(&mut right), &mut right);
+        note("the pictures are rectified by the calibration: the result is that of the rectified left picture".into());
+    }
+    plausible::warn_of_baseline(geometry.map(|geometry| geometry.rig));
+    let left = luma_of(&color);
+    let disparities = command.disparity_range(geometry.and_then(|geometry| geometry.disparities), size.0, &note)?;
+    let (adapter, threads) = (command.adapter.clone(), command.threads);
+    let computing = Computing { backend: command.backend, adapter, threads };
+    let mut matcher = computing.matcher(disparities, command.effort, size)?;
+    let mut disparity = DisparityMap::default();
+    let start = Instant::now();
+    let pair = Pair { left: &left, color: Some(&color), right: &right };
+    matcher.disparity(pair, &mut disparity).map_err(DepthError::from)?;
+    let took_ms = start.elapsed().as_secs_f64() * 1e3;
+
+    match check(&left, &right, disparities).map_err(DepthError::from)?.verdict() {
+        verdict @ Verdict::RowsOff { .. } => note(format!(
+            "{verdict}, and the disparity is wrong; {}",
+            match rectifier {
+                Some(_) => "the calibration is not that of these cameras as they stood: calibrate them again",
+                None => "rectify it with the --calib FILE of raw cameras",
+            }
+        )),
+        verdict @ Verdict::Swapped => note(verdict.to_string()),
+        Verdict::Same => log::warn(&Verdict::Same.to_string()),
+        Verdict::Rectified | Verdict::Unclear { .. } => {}
+    }
+
+    let force = command.output.force;
+    make_folder_of(&command.out)?;
+    tell_of_leftovers([command.out.as_path()]);
+    match geometry.filter(|_| command.metres) {
+        Some(Geometry { rig, .. }) => {
+            let depth = disparity.depth(|px| rig.depth_m(px));
+            note_what_is_too_far(&command.out, &depth, &note)?;
+            still::write_depth(&command.out, &depth, DEPTH_SCALE, force)?;
+        }
+        None => {
+            let rig = geometry.map(|geometry| geometry.rig);
+            still::write_disparity(&command.out, &disparity, rig, force)?;
+        }
+    }
+    if let Some(file) = &command.preview {
+        make_folder_of(file)?;
+        still::write_color(file, &preview(&disparity), force)?;
+    }
+    if !global.quiet {
+        let (width, height) = size;
+        terminal::say(&format!(
+            "{}: written ({width}x{height}, {disparities} disparities, {took_ms:.1} ms, {})",
+            command.out.display(),
+            matcher.describe()
+        ));
+    }
+    Ok(())
+}
+
+impl DepthCommand {
+    /// Refuses options and files that cannot go together, before any picture is read.
+    fn check(&self) -> Result<(), CliError> {
+        let usage = |text: &str| Err(CliError::Usage(text.to_string()));
+        if self.metres && self.calib.is_empty() && self.focal_px.is_none() {
+            return usage("--metres needs the geometry of the eyes: give --calib FILE, or --focal-px and --baseline-m");
+        }
+        if still::map_format(&self.out).is_err() {
+            return usage("--out FILE ends with .pfm or .png");
+        }
+        let is_png = |file: &PathBuf| file.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("png"));
+        if !self.preview.as_ref().is_none_or(is_png) {
+            return usage("--preview FILE.png ends with .png");
+        }
+        if self.preview.as_ref() == Some(&self.out) {
+            return usage("--preview and --out name one file; each needs its own");
+        }
+        for read in [&self.left, &self.right].into_iter().chain(&self.calib) {
+            refuse_source("--out", &self.out, read)?;
+            self.preview.as_ref().map_or(Ok(()), |preview| refuse_source("--preview", preview, read))?;
+        }
+        refuse_overwrite([self.out.as_path()].into_iter().chain(self.preview.as_deref()), self.output.force)
+    }
+
+    /// The stereo geometry for pictures of `size`, where options or calibration give it, and the rectifier that raw
+    /// pictures need.
+    fn geometry(
+        &self,
+        size: (u32, u32),
+        note: &dyn Fn(String),
+    ) -> Result<(Option<Geometry>, Option<Rectifier>), CliError> {
+        let of_rig = |rig| Geometry { rig, size: None, disparities: None };
+        if self.calib.is_empty() {
+            let doffs_px = self.doffs_px.unwrap_or(0.0);
+            let rig = |(focal_px, baseline_m)| StereoRig { focal_px, baseline_m, doffs_px, metric: true };
+            return Ok((self.focal_px.zip(self.baseline_m).map(rig).map(of_rig), None));
+        }
+        match calib::read(&self.calib, &self.left, size)? {
+            Eyes::Rectified { geometry, made_for } => {
+                if let Some((width, height)) = made_for.filter(|&made_for| made_for != size) {
+                    let file = self.calib[0].display();
+                    note(format!("{file} is for pictures of {width}x{height}: scaled to {}x{}", size.0, size.1));
+                }
+                Ok((Some(geometry), None))
+            }
+            Eyes::Raw(calibration) => {
+                let rectifier = Rectifier::new(&calibration, size)?;
+                calibration.notes(size).into_iter().for_each(note);
+                Ok((Some(of_rig(rectifier.rig())), Some(rectifier)))
+            }
+        }
+    }
+
+    /// How many disparities are searched in pictures `width` px wide: those of `--max-disparity`, else those that the
+    /// calibration has `stated`, else [`DEFAULT_DISPARITIES`]; at most as many as fit. The matcher needs a multiple
+    /// of 16.
+    fn disparity_range(&self, stated: Option<u32>, width: u32, note: &dyn Fn(String)) -> Result<u32, CliError> {
+        // A disparity is less than the width.
+        let limit = (width.saturating_sub(1) / 16 * 16).min(Settings::MOST_DISPARITIES);
+        if limit == 0 {
+            return Err(CliError::Usage(format!("the pictures are {width} px wide, and matching needs 17 or more")));
+        }
+        if let Some(asked) = self.max_disparity {
+            let rounded = asked.next_multiple_of(16);
+            if rounded > limit {
+                return Err(CliError::Usage(format!(
+                    "--max-disparity {asked} does not fit pictures {width} px wide: use at most {limit}"
+                )));
+            }
+            if rounded != asked {
+                note(format!("--max-disparity {asked} is rounded up to {rounded}, a multiple of 16"));
+            }
+            return Ok(rounded);
+        }
+        let (wanted, whose) = match stated {
+            Some(stated) => (stated, "the calibration's"),
+            None => (DEFAULT_DISPARITIES, "assumed: --max-disparity says how many"),
+        };
+        let tried = wanted.min(limit);
+        if tried < wanted {
+            note(format!("{wanted} disparities ({whose}), and at most {limit} can be tried: what is nearer is missed"));
+        } else {
+            note(format!("{tried} disparities ({whose})"));
+        }
+        Ok(tried)
+    }
+}
+
+fn luma_of(color: &ColorImage) -> GrayImage {
+    let mut luma = GrayImage::default();
+    luma.set_luma_of(color);
+    luma
+}
+
+/// Notes how many percent of the pixels are farther than a 16-bit PNG can hold.
+fn note_what_is_too_far(out: &Path, depth: &DepthMap, note: &dyn Fn(String)) -> Result<(), CliError> {
+    let limit_m = f32::from(u16::MAX) / DEPTH_SCALE;
+    let beyond = depth.metres.iter().filter(|&&metres| metres > limit_m).count();
+    if still::map_format(out)? == MapFormat::Png && beyond > 0 {
+        let percent = 100.0 * beyond as f32 / depth.metres.len() as f32;
+        note(format!("{percent:.1} % lies beyond {limit_m:.1} m, which a .png cannot hold: unknown there; a .pfm can"));
+    }
+    Ok(())
+}

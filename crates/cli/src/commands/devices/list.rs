@@ -1,0 +1,230 @@
+//! The list of devices, for people and for programs.
+
+use std::fmt::Write as _;
+
+use serde::Serialize;
+
+use super::shared::{self, SharedCamera};
+use super::{CliError, DevicesCommand};
+use crate::options::Global;
+use crate::terminal;
+use crate::terminal::print;
+use bokehcam::v4l2::controls::{self, Control, Kind as ControlKind};
+use bokehcam::v4l2::holders::{Holder, holders};
+use bokehcam::v4l2::modes::{FormatModes, modes};
+use bokehcam::v4l2::node::{self, Kind, Node};
+use bokehcam::v4l2::{Device, controls::Value};
+
+/// What is shown of a device.
+#[derive(Serialize)]
+struct DeviceInfo {
+    #[serde(flatten)]
+    node: Node,
+    holders: Vec<Holder>,
+    formats: Vec<FormatModes>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    controls: Option<Vec<Control>>,
+}
+
+/// All devices shown, in groups.
+#[derive(Default, Serialize)]
+struct List {
+    cameras: Vec<DeviceInfo>,
+    virtual_cameras: Vec<DeviceInfo>,
+    /// Cameras of PipeWire's; among them may be those above.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pipewire: Vec<SharedCamera>,
+    /// Neither of both: shown only when asked for by name.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    others: Vec<DeviceInfo>,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// There is no such device.
+pub fn run(command: &DevicesCommand, global: &Global) -> Result<(), CliError> {
+    let list = match &command.device {
+        None => List { pipewire: shared::all(), ..List::of(node::nodes(), false, command.controls) },
+        Some(name) => match name.strip_prefix("pipewire:") {
+            Some(name) => List { pipewire: shared::named(name)?, ..List::default() },
+            None => List::of(find(name)?, true, command.controls),
+        },
+    };
+    if command.json {
+        // Numbers and texts always have a form in JSON.
+        return print((serde_json::to_string_pretty(&list).unwrap_or_default() + "\n").as_bytes());
+    }
+    if list.to_string().is_empty() {
+        if !global.quiet {
+            terminal::say("no camera and no virtual camera is here; `bokehcam doctor` says what to do");
+        }
+        return Ok(());
+    }
+    print(list.to_string().as_bytes())
+}
+
+/// See [`super::formats`].
+pub fn formats(nodes: &[Node]) -> String {
+    let nodes = nodes.iter().map(|node| Node { links: Vec::new(), ..node.clone() });
+    let list = List { pipewire: shared::all(), ..List::of(nodes.collect(), false, false) };
+    let listed = list.to_string();
+    if listed.is_empty() { "none".to_owned() } else { listed }
+}
+
+/// The node that `name` means (see [`node::resolve`]), else all whose card's name contains it: these may be nodes that
+/// give no pictures.
+fn find(name: &str) -> Result<Vec<Node>, CliError> {
+    let nodes = node::nodes();
+    let path = match node::resolve(name) {
+        Ok(path) => path,
+        Err(error) => {
+            let wanted = name.to_lowercase();
+            let by_card = |node: &Node| !name.is_empty() && node.card.to_lowercase().contains(&wanted);
+            let found: Vec<Node> = nodes.into_iter().filter(by_card).collect();
+            return if found.is_empty() { Err(error.into()) } else { Ok(found) };
+        }
+    };
+    // Nodes are listed by their own paths, and this may be a link.
+    let real_path = path.canonicalize().unwrap_or_else(|_| path.clone());
+    let found: Vec<Node> = nodes.into_iter().filter(|node| node.path == real_path).collect();
+    if found.is_empty() { Err(CliError::NotVideo(path)) } else { Ok(found) }
+}
+
+impl List {
+    /// Sorts nodes into groups; `asked_for` by name are even those that are no cameras.
+    fn of(nodes: Vec<Node>, asked_for: bool, with_controls: bool) -> Self {
+        let mut list = Self::default();
+        for node in nodes {
+            let group = match node.kind {
+                Kind::Capture => &mut list.cameras,
+                Kind::Virtual => &mut list.virtual_cameras,
+                // It may be a camera: this user cannot know.
+                _ if node.denied => &mut list.cameras,
+                _ if asked_for => &mut list.others,
+                _ => continue,
+            };
+            group.push(DeviceInfo::of(node, with_controls));
+        }
+        list
+    }
+}
+
+impl DeviceInfo {
+    fn of(node: Node, with_controls: bool) -> Self {
+        // Before this program opens it and is one of them.
+        let holders = holders(&node.path);
+        let device = Device::open(&node.path).ok();
+        let formats = device.as_ref().and_then(|device| modes(device).ok()).unwrap_or_default();
+        let controls =
+            with_controls.then(|| device.and_then(|device| controls::list(&device).ok()).unwrap_or_default());
+        Self { node, holders, formats, controls }
+    }
+}
+
+impl std::fmt::Display for List {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let groups = [("cameras", &self.cameras), ("virtual cameras", &self.virtual_cameras), ("others", &self.others)];
+        let mut first = true;
+        for (heading, group) in groups.iter().filter(|(_, group)| !group.is_empty()) {
+            writeln!(f, "{}{heading}", if first { "" } else { "\n" })?;
+            first = false;
+            for device in *group {
+                f.write_str(&device.lines())?;
+            }
+        }
+        if !self.pipewire.is_empty() {
+            writeln!(f, "{}cameras of PipeWire", if first { "" } else { "\n" })?;
+        }
+        self.pipewire.iter().try_for_each(|camera| f.write_str(&camera.lines()))
+    }
+}
+
+impl DeviceInfo {
+    /// The device for people: a line of names, then indented its problem, links, state, holders, formats and controls.
+    fn lines(&self) -> String {
+        let Self { node, holders, formats, controls } = self;
+        let mut out = String::new();
+        let card = if node.card.is_empty() { "no name" } else { &node.card };
+        let mut attachment = vec![node.driver.clone(), node.bus.clone()];
+        attachment.extend(node.usb.as_ref().map(|usb| format!("USB {}, {} Mbit/s", usb.id, usb.mbit_per_s)));
+        attachment.retain(|part| !part.is_empty());
+        // Writing to a string does not fail.
+        let _ = writeln!(out, "  {}  {card}  ({})", node.path.display(), attachment.join(", "));
+        let mut line = |text: String| {
+            let _ = writeln!(out, "    {text}");
+        };
+        if let Some(problem) = &node.problem {
+            line(format!("cannot be opened: {problem}"));
+        }
+        for link in &node.links {
+            line(link.display().to_string());
+        }
+        if node.kind == Kind::Virtual {
+            line(state(node).to_owned());
+        }
+        if !holders.is_empty() {
+            let names: Vec<_> = holders.iter().map(ToString::to_string).collect();
+            line(format!("opened by {}", names.join(", ")));
+        }
+        let (readable, others): (Vec<_>, Vec<_>) = formats.iter().partition(|format| format.fourcc.content().is_some());
+        let width = readable.iter().map(|format| format.fourcc.to_string().len()).max().unwrap_or_default();
+        for format in readable {
+            line(format!("{:width$}  {}", format.fourcc.to_string(), format.sizes));
+        }
+        if !others.is_empty() {
+            let names: Vec<_> = others.iter().map(|format| format.fourcc.to_string()).collect();
+            line(format!("also {}, which cannot be read here", names.join(" ")));
+        }
+        for control in controls.iter().flatten() {
+            line(control_line(control));
+        }
+        out
+    }
+}
+
+/// The state of a virtual camera, told by its capabilities: with `exclusive_caps=1` these change with its first writer.
+fn state(node: &Node) -> &'static str {
+    match (node.captures, node.outputs) {
+        (true, true) => "can be written to and read from",
+        (false, true) => "can be written to",
+        (true, false) => "is being written to",
+        (false, false) => "is in a state that takes neither writers nor readers: reload the module v4l2loopback",
+    }
+}
+
+/// A control as `name=value  (accepted values), flags`.
+fn control_line(control: &Control) -> String {
+    let Control { name, value, minimum, maximum, step, default, items, .. } = control;
+    let mut line = name.clone();
+    if let Some(value) = value {
+        let _ = match (control.kind, value) {
+            (ControlKind::Bitmask, Value::Number(bits)) => write!(line, "={bits:#x}"),
+            _ => write!(line, "={value}"),
+        };
+    }
+    let accepted = match control.kind {
+        ControlKind::Integer | ControlKind::Integer64 if *step > 1 => {
+            format!("{minimum} to {maximum} in steps of {step}, default {default}")
+        }
+        ControlKind::Integer | ControlKind::Integer64 => format!("{minimum} to {maximum}, default {default}"),
+        ControlKind::Boolean => format!("0 or 1, default {default}"),
+        ControlKind::Menu | ControlKind::IntegerMenu => {
+            let items: Vec<_> = items.iter().map(|item| format!("{}: {}", item.index, item.name)).collect();
+            format!("{}; default {default}", items.join(", "))
+        }
+        ControlKind::Button => "button".to_owned(),
+        ControlKind::String => format!("text of {minimum} to {maximum} bytes"),
+        ControlKind::Bitmask => format!("bits of {maximum:#x}"),
+        ControlKind::Compound => "a table".to_owned(),
+    };
+    let _ = write!(line, "  ({accepted})");
+    for (is_set, word) in
+        [(control.read_only, "read-only"), (control.inactive, "inactive"), (control.grabbed, "not while streaming")]
+    {
+        if is_set {
+            let _ = write!(line, ", {word}");
+        }
+    }
+    line
+}

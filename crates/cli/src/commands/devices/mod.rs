@@ -1,0 +1,57 @@
+//! `devices`: which cameras there are, and what they can do.
+
+#[cfg(feature = "camera")]
+mod list;
+#[cfg(feature = "camera")]
+mod shared;
+
+use clap::Args;
+
+use crate::error::CliError;
+use crate::options::Global;
+#[cfg(feature = "camera")]
+use bokehcam::v4l2::node::Node;
+
+/// List cameras and virtual cameras
+///
+/// Cameras with their formats, sizes and rates, and who has them open; virtual cameras and cameras of PipeWire's apart. Nodes that give no
+/// pictures, such as those for metadata, are left out.
+#[derive(Args, Debug)]
+#[command(after_help = "\
+Examples:
+  bokehcam devices
+  bokehcam devices --controls brio
+  bokehcam devices --json /dev/video0")]
+#[cfg_attr(not(feature = "camera"), allow(dead_code))]
+pub struct DevicesCommand {
+    /// One device only: its path, number, by-id name, or a part of its card's name; pipewire:NAME for a camera of PipeWire's
+    #[arg(value_name = "DEVICE")]
+    device: Option<String>,
+    /// Also the settings that the device itself has, such as exposure
+    #[arg(long)]
+    controls: bool,
+    /// As JSON
+    #[arg(long)]
+    json: bool,
+}
+
+/// Cameras, and what may be some, with their formats, as the command lists them; without links, in whose names serial
+/// numbers are.
+#[cfg(feature = "camera")]
+pub fn formats(nodes: &[Node]) -> String {
+    list::formats(nodes)
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// There is no such device, or this program was built without cameras.
+pub fn run(command: &DevicesCommand, global: &Global) -> Result<(), CliError> {
+    #[cfg(feature = "camera")]
+    return list::run(command, global);
+    #[cfg(not(feature = "camera"))]
+    {
+        let _ = (command, global);
+        Err(CliError::NoCameras)
+    }
+}

@@ -1,0 +1,124 @@
+//! Cameras: connection, formats, who has them, and what makes them slow.
+
+use super::finding::Finding;
+use super::system::System;
+use bokehcam::layout::Content;
+use bokehcam::v4l2::controls::{self, LOW_LIGHT, Value};
+use bokehcam::v4l2::holders::holders;
+use bokehcam::v4l2::modes::{FormatModes, Interval, Rates, SizeModes, Sizes, modes};
+use bokehcam::v4l2::node::{Kind, Node};
+use bokehcam::v4l2::{Device, controls::Control};
+
+pub const ABOUT: &str = "camera";
+
+/// The rate of USB 2 (high speed).
+const USB2_MBIT_PER_S: f32 = 480.0;
+
+/// Drivers of sensors that give raw data, which only libcamera makes pictures of.
+const RAW_DRIVERS: [&str; 4] = ["isys", "intel-ipu6-isys", "intel-ipu7-isys", "ipu3-cio2"];
+
+/// Checks the cameras, and the nodes that could be cameras.
+pub fn findings(nodes: &[Node], system: &System) -> Vec<Finding> {
+    let (raw, cameras): (Vec<&Node>, Vec<&Node>) = nodes
+        .iter()
+        .filter(|node| node.kind == Kind::Capture)
+        .partition(|node| RAW_DRIVERS.contains(&node.driver.as_str()));
+    let mut findings: Vec<Finding> = cameras.iter().flat_map(|node| check_camera(node)).collect();
+    for node in nodes.iter().filter(|node| node.denied && node.kind == Kind::Other) {
+        findings.push(denied(ABOUT, node));
+    }
+    if let Some(node) = raw.first() {
+        let found = format!("{} nodes such as {node} give raw sensor data, which only libcamera can use", raw.len());
+        findings.push(Finding::note(ABOUT, found, "connect a USB camera"));
+    }
+    if cameras.is_empty() {
+        let fix = match &system.sandbox {
+            Some(sandbox) => format!("let this {sandbox} have the camera's node, such as /dev/video0"),
+            None => "connect a camera; if it is connected, `lsusb` and `sudo dmesg` tell what became of it".to_owned(),
+        };
+        findings.push(Finding::missing(ABOUT, "there is none", fix));
+    }
+    findings
+}
+
+/// A node that this user may not open.
+pub fn denied(about: &'static str, node: &Node) -> Finding {
+    let fix = "run `sudo usermod -aG video \"$USER\"`, then log out and in again";
+    Finding::missing(about, format!("{node}: this user may not open it"), fix)
+}
+
+/// Checks one camera: whether it opens, its best mode, its USB connection, who else has it open, its rate in the dark.
+fn check_camera(node: &Node) -> Vec<Finding> {
+    // Before this program opens it and is one of them.
+    let holders = holders(&node.path);
+    let device = match Device::open(&node.path) {
+        Ok(device) => device,
+        Err(error) => {
+            return vec![Finding::missing(ABOUT, format!("{node}: {error}"), "unplug it and plug it in again")];
+        }
+    };
+    let modes = modes(&device).unwrap_or_default();
+    let mut findings = vec![Finding::good(ABOUT, format!("{node}: {}", best_mode(&modes)))];
+    if let Some(usb) = &node.usb {
+        let mbit_per_s = usb.mbit_per_s;
+        findings.push(if mbit_per_s < USB2_MBIT_PER_S {
+            let found = format!("{node}: its USB connection carries only {mbit_per_s} Mbit/s");
+            Finding::note(ABOUT, found, "use another socket or cable, and no hub")
+        } else if mbit_per_s == USB2_MBIT_PER_S && !modes.iter().any(|format| format.fourcc.to_string() == "MJPG") {
+            let found = format!("{node}: on USB 2 and without MJPG, which is too slow for 1280x720 at 30 fps");
+            Finding::note(ABOUT, found, "use a USB 3 socket, or --size 640x480")
+        } else {
+            Finding::good(ABOUT, format!("{node}: USB at {mbit_per_s} Mbit/s"))
+        });
+    }
+    if !holders.is_empty() {
+        let names: Vec<_> = holders.iter().map(ToString::to_string).collect();
+        let found = format!("{node}: opened by {}", names.join(", "));
+        findings.push(Finding::note(ABOUT, found, "only one program can take pictures: end the others if it is busy"));
+    }
+    findings.extend(low_light(node, &controls::list(&device).unwrap_or_default()));
+    findings
+}
+
+/// Notes that the camera lowers its frame rate in the dark, so as to expose longer, if it is set to do so.
+fn low_light(node: &Node, controls: &[Control]) -> Option<Finding> {
+    let control = controls::find(controls, LOW_LIGHT)?;
+    (control.value == Some(Value::Number(1)) && !control.inactive).then(|| {
+        let found = format!("{node}: may give half its rate in low light ({}=1)", control.name);
+        Finding::note(ABOUT, found, format!("give --control {}=0, or more light", control.name))
+    })
+}
+
+/// Describes the largest mode that moves smoothly, else the fastest one.
+fn best_mode(modes: &[FormatModes]) -> String {
+    /// From this rate on motion looks smooth; it takes in the 25 and 29.97 fps of some cameras.
+    const SMOOTH_FPS: f64 = 24.0;
+    let readable = modes.iter().filter(|format| format.fourcc.content() == Some(Content::Color));
+    let all = readable.flat_map(|format| sizes(&format.sizes).into_iter().map(move |size| (format, size)));
+    let rank = |(_, (size_px, fastest)): &(&FormatModes, ((u32, u32), Option<Interval>))| {
+        let fps = fastest.map_or(0.0, Interval::fps);
+        let pixels = u64::from(size_px.0) * u64::from(size_px.1);
+        if fps >= SMOOTH_FPS { (1, pixels, fps as u64) } else { (0, fps as u64, pixels) }
+    };
+    match all.max_by_key(rank) {
+        None => "has no format that can be read here".to_owned(),
+        Some((format, ((width, height), fastest))) => {
+            let rate = fastest.map_or_else(String::new, |fastest| format!(" at {fastest} fps"));
+            format!("up to {width}x{height}{rate} ({})", format.fourcc)
+        }
+    }
+}
+
+/// Each size with its shortest frame interval, where that is known; of a range of sizes only the largest.
+fn sizes(sizes: &Sizes) -> Vec<((u32, u32), Option<Interval>)> {
+    let fastest = |rates: &Rates| match rates {
+        Rates::Unknown => None,
+        Rates::Discrete(intervals) => intervals.first().copied(),
+        Rates::Range { shortest, .. } => Some(*shortest),
+    };
+    match sizes {
+        Sizes::Unknown => Vec::new(),
+        Sizes::Discrete(sizes) => sizes.iter().map(|SizeModes { size_px, rates }| (*size_px, fastest(rates))).collect(),
+        Sizes::Range { max_px, rates, .. } => vec![(*max_px, fastest(rates))],
+    }
+}

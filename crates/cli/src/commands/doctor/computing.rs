@@ -1,0 +1,86 @@
+//! What computes the blur, and programs that this one uses.
+
+use std::process::{Command, Stdio};
+
+use super::finding::Finding;
+use bokehcam::compute::Backend;
+use bokehcam::computing::Computing;
+use bokehcam::look::{Effect, Look};
+
+const BLUR: &str = "blur";
+#[cfg(feature = "networks")]
+const NETWORKS: &str = "networks";
+const PROGRAMS: &str = "programs";
+
+/// Checks what runs the blur, and whether other programs are installed.
+pub fn findings() -> Vec<Finding> {
+    let mut findings = vec![check_blur()];
+    #[cfg(feature = "networks")]
+    findings.extend(check_networks());
+    findings.push(check_ffmpeg());
+    findings
+}
+
+/// Whether one camera alone gives a portrait, and how fast its network is run.
+#[cfg(feature = "networks")]
+fn check_networks() -> Vec<Finding> {
+    use bokehcam::network::{self, Task};
+    let installed = network::installed();
+    let names: Vec<&str> = installed.iter().map(|(known, _)| known.file).collect();
+    let persons = installed.iter().any(|(known, _)| known.task == Task::Matte);
+    let of_networks = match persons {
+        true => Finding::good(NETWORKS, format!("one camera alone gives a portrait: {}", names.join(", "))),
+        false => Finding::note(
+            NETWORKS,
+            "none that finds persons, so one camera alone gives no portrait",
+            "`bokehcam models get` brings one (250 kB); --depth plate needs none",
+        ),
+    };
+    let of_runtime = match network::onnx_runtime_installed() {
+        Ok(name) => Finding::good(NETWORKS, format!("run by {name}")),
+        Err(why) => {
+            Finding::note(NETWORKS, "networks of your own are run by what is built in; ONNX Runtime is faster", why)
+        }
+    };
+    vec![of_networks, of_runtime]
+}
+
+/// Which executor `--backend auto` chooses here.
+fn check_blur() -> Finding {
+    /// Any size will do.
+    const SIZE: (u32, u32) = (64, 64);
+    let settings = Look::plain(Effect::Blur).settings(SIZE, false);
+    let computing = Computing::default();
+    match settings.as_ref().map(|settings| computing.blur(settings, SIZE)).transpose() {
+        Err(error) => Finding::note(BLUR, error.to_string(), "report this"),
+        Ok(None) => Finding::note(BLUR, "nothing is blurred".to_string(), "report this"),
+        Ok(Some(bokeh)) => {
+            let name = bokeh.describe();
+            if bokeh.backend() == Backend::Cpu && cfg!(feature = "gpu") {
+                let fix = "install a Vulkan driver if there is a GPU (`sudo apt install mesa-vulkan-drivers`, or that of its \
+                           maker); `bokehcam bench` tells how fast the CPU is";
+                Finding::note(BLUR, format!("no hardware GPU that can be used: {name}"), fix)
+            } else {
+                Finding::good(BLUR, name)
+            }
+        }
+    }
+}
+
+/// The version of ffmpeg, if it is installed.
+fn check_ffmpeg() -> Finding {
+    let output = Command::new("ffmpeg").arg("-version").stdin(Stdio::null()).stderr(Stdio::null()).output();
+    let text = output.ok().filter(|output| output.status.success()).map(|output| output.stdout);
+    let first_line = text.as_deref().and_then(|text| text.split(|byte| *byte == b'\n').next());
+    match first_line {
+        Some(line) => {
+            let line = String::from_utf8_lossy(line);
+            Finding::good(PROGRAMS, line.split(" Copyright").next().unwrap_or_default().to_owned())
+        }
+        None => Finding::note(
+            PROGRAMS,
+            "ffmpeg is not installed",
+            "`sudo apt install ffmpeg`, to write .mp4, .mkv and .webm",
+        ),
+    }
+}

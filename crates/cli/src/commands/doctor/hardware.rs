@@ -1,0 +1,85 @@
+//! The machine's parts, by names that all of its model have.
+
+use std::fs;
+use std::path::Path;
+
+use bokehcam::compute::thread_pool::cores;
+
+/// What the machine, its processor, its memory and its graphics are called, a line each.
+pub fn lines() -> Vec<String> {
+    let read = |path: &str| fs::read_to_string(path).unwrap_or_default().trim_matches(['\0', '\n', ' ']).to_owned();
+    let told = ["sys_vendor", "product_name"].map(|name| read(&format!("/sys/class/dmi/id/{name}"))).join(" ");
+    let model = if told.trim().is_empty() { read("/proc/device-tree/model") } else { told };
+    let processors = read("/proc/cpuinfo");
+    let processor = value(&processors, "model name").unwrap_or(std::env::consts::ARCH);
+    let memory_kib = value(&read("/proc/meminfo"), "MemTotal").and_then(|text| text.split(' ').next()?.parse().ok());
+    let memory = memory_kib.map_or("unknown".to_owned(), |kib: u64| format!("{:.1} GiB", kib as f64 / 1_048_576.0));
+    let mut lines = vec![
+        format!("machine: {}", if model.trim().is_empty() { "unknown" } else { model.trim() }),
+        format!("processor: {processor}, {} threads", cores()),
+        format!("memory: {memory}"),
+    ];
+    lines.extend(graphics(Path::new("/sys/class/drm")).into_iter().map(|card| format!("graphics: {card}")));
+    let nvidia = read("/sys/module/nvidia/version");
+    if !nvidia.is_empty() {
+        lines.push(format!("graphics: kernel module nvidia {nvidia}"));
+    }
+    lines.extend(vulkan().into_iter().map(|adapter| format!("Vulkan: {adapter}")));
+    lines
+}
+
+/// The value of the first line such as `key : value`.
+fn value<'a>(text: &'a str, key: &str) -> Option<&'a str> {
+    let of_line = |line: &'a str| line.strip_prefix(key)?.trim_start().strip_prefix(':').map(str::trim);
+    text.lines().find_map(of_line)
+}
+
+/// Driver, and number of the vendor and the model, of each graphics card that the kernel knows.
+fn graphics(class: &Path) -> Vec<String> {
+    let entries = fs::read_dir(class).into_iter().flatten().flatten();
+    let mut names: Vec<String> = entries.filter_map(|entry| entry.file_name().into_string().ok()).collect();
+    // Beside cards there are their connectors, such as card0-DP-1.
+    names.retain(|name| name.strip_prefix("card").is_some_and(|number| number.bytes().all(|b| b.is_ascii_digit())));
+    names.sort();
+    let card = |name: &String| {
+        let told = fs::read_to_string(class.join(name).join("device/uevent")).ok()?;
+        let of = |key: &str| told.lines().find_map(|line| line.strip_prefix(key)).unwrap_or("unknown");
+        Some(format!("driver {}, PCI {}", of("DRIVER="), of("PCI_ID=")))
+    };
+    names.iter().filter_map(card).collect()
+}
+
+#[cfg(feature = "gpu")]
+fn vulkan() -> Vec<String> {
+    let adapters = bokehcam::compute::device::adapters();
+    if adapters.is_empty() { vec!["no adapter, or no loader (libvulkan.so.1)".to_owned()] } else { adapters }
+}
+
+#[cfg(not(feature = "gpu"))]
+fn vulkan() -> Vec<String> {
+    vec!["this program was built without it".to_owned()]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn cards_have_a_driver_and_connectors_are_none() {
+        let class = tempfile::tempdir().unwrap();
+        for (name, told) in
+            [("card1", "DRIVER=i915\nPCI_ID=8086:9A49\n"), ("card1-DP-1", ""), ("renderD128", "DRIVER=i915\n")]
+        {
+            fs::create_dir_all(class.path().join(name).join("device")).unwrap();
+            fs::write(class.path().join(name).join("device/uevent"), told).unwrap();
+        }
+        assert_eq!(graphics(class.path()), ["driver i915, PCI 8086:9A49"]);
+        assert_eq!(graphics(&class.path().join("none")), Vec::<String>::new());
+    }
+
+    #[test]
+    fn a_key_is_a_whole_word() {
+        let text = "model\t\t: 85\nmodel name\t: A Processor @ 2 GHz: fast\n";
+        assert_eq!((value(text, "model name"), value(text, "Serial")), (Some("A Processor @ 2 GHz: fast"), None));
+    }
+}

@@ -1,0 +1,131 @@
+//! The virtual camera: the module v4l2loopback, its options, its nodes.
+
+use std::fs;
+use std::path::Path;
+
+use super::cameras::denied;
+use super::finding::Finding;
+use super::system::System;
+use bokehcam::v4l2::holders::holders;
+use bokehcam::v4l2::loopback::{self, modprobe};
+use bokehcam::v4l2::node::{Kind, Node};
+
+pub const ABOUT: &str = "virtual camera";
+
+const LOADED: &str = "/sys/module/v4l2loopback";
+
+/// The command that loads the module so that browsers list its camera.
+fn load_command() -> String {
+    modprobe("/dev/video10".as_ref())
+}
+
+/// PipeWire asks for this many buffers, and refuses a node that has fewer.
+const PIPEWIRE_BUFFERS: u32 = 16;
+
+/// Checks the module v4l2loopback and each of its nodes.
+pub fn findings(nodes: &[Node], system: &System) -> Vec<Finding> {
+    let nodes: Vec<&Node> = nodes.iter().filter(|node| node.kind == Kind::Virtual).collect();
+    let loaded = Path::new(LOADED).exists();
+    if !loaded && nodes.is_empty() {
+        return vec![not_loaded(system)];
+    }
+    let mut findings = vec![Finding::good(ABOUT, format!("module v4l2loopback {} is loaded", version()))];
+    if nodes.is_empty() {
+        findings.push(Finding::missing(ABOUT, "the module has no device here", load_command()));
+    }
+    findings.extend(nodes.iter().map(|node| check_node(node)));
+    findings.extend(check_buffers(system));
+    findings
+}
+
+/// Says how to install or load the module.
+fn not_loaded(system: &System) -> Finding {
+    if !installed(&system.kernel) {
+        let fix = format!(
+            "install it (`sudo apt install v4l2loopback-dkms`, `dnf install akmod-v4l2loopback` of RPM Fusion, \
+             `pacman -S v4l2loopback-dkms`, with the kernel's headers), then `{}`",
+            load_command()
+        );
+        return Finding::missing(
+            ABOUT,
+            format!("module v4l2loopback is not installed for Linux {}", system.kernel),
+            fix,
+        );
+    }
+    let fix = if system.secure_boot == Some(true) {
+        format!(
+            "`{}`; if that says \"Key was rejected\": Secure Boot is on, enrol the key that the module is \
+                 signed with (`sudo mokutil --import`), or switch Secure Boot off",
+            load_command()
+        )
+    } else {
+        format!("`{}`", load_command())
+    };
+    Finding::missing(ABOUT, "module v4l2loopback is installed and not loaded", fix)
+}
+
+/// Whether the kernel's list of modules has v4l2loopback, wherever the distribution keeps that list.
+fn installed(kernel: &str) -> bool {
+    ["/lib/modules", "/usr/lib/modules", "/run/booted-system/kernel-modules/lib/modules"].iter().any(|folder| {
+        let list = fs::read_to_string(Path::new(folder).join(kernel).join("modules.dep"));
+        list.is_ok_and(|list| list.lines().any(|line| line.split(".ko").next().is_some_and(is_loopback)))
+    })
+}
+
+fn is_loopback(path: &str) -> bool {
+    path.rsplit('/').next() == Some("v4l2loopback")
+}
+
+/// The version of the loaded module; those before 0.13 do not tell it.
+fn version() -> String {
+    let told = fs::read_to_string(Path::new(LOADED).join("version"));
+    told.map_or_else(|_| "(before 0.13, or of unknown version)".into(), |version| version.trim().to_owned())
+}
+
+/// Whether a node can be written to now, told by its capabilities: with `exclusive_caps=1` it is an output until it has
+/// a writer, and a capture device from then on.
+fn check_node(node: &Node) -> Finding {
+    if node.denied {
+        return denied(ABOUT, node);
+    }
+    let holders: Vec<_> = holders(&node.path).iter().map(ToString::to_string).collect();
+    let by = if holders.is_empty() { "nobody this user can see".to_owned() } else { holders.join(", ") };
+    match (node.captures, node.outputs) {
+        (false, true) => Finding::good(ABOUT, format!("{node}: free; opened by {by}")),
+        (true, true) => {
+            let found = format!("{node}: free, but made without exclusive_caps=1: browsers will not list it");
+            Finding::note(ABOUT, found, load_command())
+        }
+        (true, false) => {
+            let found = format!("{node}: in use, opened by {by}");
+            Finding::note(ABOUT, found, "end what writes to it, or use another node")
+        }
+        (false, false) => {
+            let found = format!("{node}: a program left it in a state that takes neither writers nor readers");
+            Finding::missing(ABOUT, found, load_command())
+        }
+    }
+}
+
+/// Notes that the module has too few buffers for PipeWire, where PipeWire is running.
+fn check_buffers(system: &System) -> Option<Finding> {
+    let buffers = loopback::buffers()?;
+    let fix = "load the module with max_buffers=16 if programs that get their cameras from PipeWire do not list it";
+    (system.pipewire && buffers < PIPEWIRE_BUFFERS).then(|| {
+        let found = format!("max_buffers={buffers}: fine for programs that open the node, too few for PipeWire");
+        Finding::note(ABOUT, found, fix)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_list_of_modules_names_the_module_in_any_folder_and_compression() {
+        for line in ["updates/dkms/v4l2loopback.ko: kernel/x.ko", "extra/v4l2loopback/v4l2loopback.ko.xz:"] {
+            assert!(line.split(".ko").next().is_some_and(is_loopback), "{line}");
+        }
+        assert!(!is_loopback("kernel/drivers/v4l2loopback-other"));
+    }
+}

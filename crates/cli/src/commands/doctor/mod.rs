@@ -1,0 +1,67 @@
+//! `doctor`: what this machine has and lacks for a camera in, a virtual camera out.
+
+#[cfg(feature = "camera")]
+mod cameras;
+#[cfg(feature = "camera")]
+mod computing;
+#[cfg(feature = "camera")]
+mod finding;
+#[cfg(feature = "camera")]
+mod findings;
+#[cfg(feature = "camera")]
+mod hardware;
+#[cfg(feature = "camera")]
+mod loopback;
+#[cfg(all(feature = "camera", feature = "pipewire"))]
+mod pipewire_camera;
+#[cfg(feature = "camera")]
+mod private;
+#[cfg(feature = "camera")]
+mod report;
+#[cfg(feature = "camera")]
+mod system;
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+use crate::error::CliError;
+
+/// Check this machine: cameras, virtual camera, permissions, GPU, programs
+///
+/// Every finding comes with what to do about it. Good to have in a request for help. The exit code is 0 when there are
+/// a camera and a way to give others one (the module v4l2loopback, or PipeWire), else 1; with --report it is 0 when there is
+/// a report.
+#[derive(Args, Debug)]
+#[command(after_help = "\
+Examples:
+  bokehcam doctor
+  bokehcam doctor --json > doctor.json
+  bokehcam doctor --report machine.md")]
+#[cfg_attr(not(feature = "camera"), allow(dead_code))]
+pub struct DoctorCommand {
+    /// As JSON
+    #[arg(long)]
+    json: bool,
+    /// Print a report of this machine to give to others, and write it to FILE; without names of users and machines,
+    /// without serial numbers and pictures
+    #[arg(long, value_name = "FILE", num_args = 0..=1, conflicts_with = "json")]
+    report: Option<Option<PathBuf>>,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// Something essential is missing, or this program was built without cameras.
+pub fn run(command: &DoctorCommand) -> Result<(), CliError> {
+    #[cfg(feature = "camera")]
+    match &command.report {
+        Some(file) => report::run(file.as_deref()),
+        None => findings::run(command.json),
+    }
+    #[cfg(not(feature = "camera"))]
+    {
+        let _ = command;
+        Err(CliError::NoCameras)
+    }
+}

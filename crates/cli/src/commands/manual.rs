@@ -1,0 +1,94 @@
+//! `manual`: the manual pages, made of the table that the command line is parsed by.
+
+use std::fs;
+use std::io;
+use std::path::PathBuf;
+
+use clap::{Args, Command};
+use clap_mangen::Man;
+use clap_mangen::roff::{Roff, bold, roman};
+
+use crate::error::CliError;
+use crate::files::{refuse_overwrite, write_whole};
+use crate::options::Output;
+
+/// Write the manual pages of all commands into a folder, as packages install them
+#[derive(Args, Debug)]
+#[command(after_help = "\
+Example:
+  bokehcam manual --out ~/.local/share/man/man1")]
+pub struct ManualCommand {
+    /// Folder for the pages
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+    #[command(flatten)]
+    output: Output,
+}
+
+/// Runs the command for the program that `table` describes.
+///
+/// # Errors
+/// A page exists and may not be overwritten, or the folder cannot be written.
+pub fn run(command: &ManualCommand, mut table: Command) -> Result<(), CliError> {
+    // `help` has nothing of its own to say.
+    table = table.disable_help_subcommand(true);
+    table.build();
+    let mut pages = Vec::new();
+    add(&table, table.get_name(), &mut pages).map_err(CliError::io(&command.out))?;
+    for (name, _) in &mut pages {
+        *name = command.out.join(&*name);
+    }
+    refuse_overwrite(pages.iter().map(|(path, _)| path.as_path()), command.output.force)?;
+    fs::create_dir_all(&command.out).map_err(CliError::io(&command.out))?;
+    pages.iter().try_for_each(|(path, page)| write_whole(path, page, command.output.force))
+}
+
+/// Adds the file names and texts of the pages of a command, and of those below it that help lists.
+fn add(command: &Command, program: &str, pages: &mut Vec<(PathBuf, Vec<u8>)>) -> io::Result<()> {
+    let below = || command.get_subcommands().filter(|below| !below.is_hide_set());
+    below().try_for_each(|below| add(below, program, pages))?;
+    // A command with settings has more options than anybody reads in a line.
+    let usage = command.clone().render_usage().to_string();
+    let page = Man::new(command.clone().override_usage(usage.trim_start_matches("Usage:").trim().to_owned()))
+        // A build has no date. None at all would be left out, and what follows taken for it.
+        .date(" ")
+        .source(format!("{program} {}", env!("CARGO_PKG_VERSION")))
+        .manual("User Commands");
+    let mut text = Vec::new();
+    page.render_title(&mut text)?;
+    page.render_name_section(&mut text)?;
+    page.render_synopsis_section(&mut text)?;
+    page.render_description_section(&mut text)?;
+    page.render_options_section(&mut text)?;
+    if below().next().is_some() {
+        page.render_subcommands_section(&mut text)?;
+    }
+    let mut rest = after_help(&command.get_after_help().map(ToString::to_string).unwrap_or_default());
+    if command.get_name() != program {
+        rest.control("SH", ["SEE ALSO"]).text([bold(program), roman("(1)")]);
+    }
+    rest.to_writer(&mut text)?;
+    pages.push((page.get_filename().into(), text));
+    Ok(())
+}
+
+/// The examples as they are written, line by line, and what else is said after the options.
+fn after_help(text: &str) -> Roff {
+    let mut page = Roff::new();
+    let mut lines = text.lines().peekable();
+    while let Some(line) = lines.next() {
+        if line.starts_with("Example") {
+            page.control("SH", ["EXAMPLES"]).control("nf", []);
+            while let Some(example) = lines.next_if(|line| line.starts_with(' ')) {
+                page.text([roman(example.trim())]);
+            }
+            page.control("fi", []);
+            if lines.peek().is_some() {
+                page.control("SH", ["NOTES"]);
+            }
+        } else if !line.is_empty() {
+            page.text([roman(line)]);
+        }
+    }
+    page
+}

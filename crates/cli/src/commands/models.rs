@@ -1,0 +1,181 @@
+//! `models`: the networks that are known, and those that are installed.
+
+use std::io::{self, Read};
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+use clap::{Args, Subcommand};
+
+use crate::error::CliError;
+use crate::terminal::{print, say};
+use bokehcam::files::{input, whole};
+use bokehcam::network::{self, KNOWN, Known};
+
+/// List the networks that give one camera depth, and install them
+#[derive(Args, Debug)]
+#[command(after_help = "\
+Examples:
+  bokehcam models                                            which are known, which are installed, where to get them
+  bokehcam models get                                        the one that finds persons, by curl or wget
+  bokehcam models add selfie_segmentation_landscape.tflite   checks a file that is here, and installs it for this user
+
+Nothing but `get` goes to the network, and that shows the command before it runs it.")]
+pub struct ModelsCommand {
+    #[command(subcommand)]
+    what: Option<What>,
+}
+
+#[derive(Subcommand, Debug)]
+enum What {
+    /// List them, as does `models` alone
+    List,
+    /// Check that files are networks that are known, and copy them to where these are looked for
+    #[command(alias = "install", after_help = "Example:\n  bokehcam models add selfie_segmentation_landscape.tflite")]
+    Add {
+        /// The files, .tflite or .onnx
+        #[arg(required = true, value_name = "FILE")]
+        files: Vec<PathBuf>,
+    },
+    /// Fetch a known network by curl or wget, check that it is what it should be, and install it for this user
+    #[command(alias = "fetch", after_help = "Example:\n  bokehcam models get tcmonodepth-small")]
+    Get {
+        /// Which [default: the one that finds persons in the least time]
+        name: Option<String>,
+    },
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// The file is no network that is known, or cannot be copied.
+pub fn run(command: &ModelsCommand) -> Result<(), CliError> {
+    match &command.what {
+        None | Some(What::List) => print(listed().as_bytes()),
+        Some(What::Add { files }) => files.iter().try_for_each(|file| add(file)),
+        Some(What::Get { name }) => get(name.as_deref()),
+    }
+}
+
+fn listed() -> String {
+    let installed = network::installed();
+    let mut text = String::from("known networks, the best of each task first:\n");
+    for known in &KNOWN {
+        let place = installed.iter().find(|(other, _)| std::ptr::eq(*other, known));
+        let place = place.map_or("not installed".to_owned(), |(_, at)| at.display().to_string());
+        let Known { file, task, license, address, sha256, bytes, .. } = known;
+        let kilobytes = bytes.div_ceil(1000);
+        text += &format!(
+            "\n{file}\n  for      --depth {task}: {}\n  here     {place}\n  licence  {license}\n  get      {address}\n  file     \
+             {kilobytes} kB, SHA-256 {sha256}\n",
+            bokehcam::names::Named::help(*task).to_lowercase(),
+            task = task.name(),
+        );
+    }
+    let folders: Vec<String> = network::folders().iter().map(|folder| folder.display().to_string()).collect();
+    text += &format!("\nlooked for in {}\n", folders.join(", "));
+    match network::onnx_runtime_installed() {
+        Ok(name) => text += &format!(".tflite is run by what is built in, .onnx by {name}\n"),
+        Err(why) => {
+            text += &format!(".onnx is run by what is built in, and 1.5 to 3 times as fast with ONNX Runtime: {why}\n")
+        }
+    }
+    text
+}
+
+fn add(file: &Path) -> Result<(), CliError> {
+    if file.to_str().is_some_and(|name| name.contains("://")) {
+        let what = "this is no file that is here: `bokehcam models get NAME` fetches a known network";
+        return Err(CliError::Usage(format!("{}: {what}", file.display())));
+    }
+    let bytes = input::read(file, network::MOST_BYTES).map_err(failed(file))?;
+    let known = Known::of(&bytes).ok_or_else(|| {
+        let what = "it is none of the networks that are known (`bokehcam models` lists them), or not whole: one of your own is \
+                    used from where it is, by --depth matte:FILE or mono:FILE";
+        failed(file)(io::Error::new(io::ErrorKind::InvalidData, what))
+    })?;
+    install(known, &bytes)
+}
+
+fn failed(path: &Path) -> impl FnOnce(io::Error) -> CliError {
+    let path = path.to_owned();
+    move |source| CliError::Io { path, source }
+}
+
+/// Writes a network to where those of this user are; what is there already stays.
+fn install(known: &Known, bytes: &[u8]) -> Result<(), CliError> {
+    let no_home = || CliError::Usage("there is no home folder to install it in: set HOME or XDG_DATA_HOME".to_owned());
+    let folder = network::folders().into_iter().next().ok_or_else(no_home)?;
+    let target = folder.join(known.file);
+    std::fs::create_dir_all(&folder).map_err(failed(&folder))?;
+    match input::read(&target, network::MOST_BYTES) {
+        Ok(there) if there == bytes => {}
+        Ok(_) => {
+            let what = "another file is there under this name: move it away";
+            return Err(failed(&target)(io::Error::new(io::ErrorKind::AlreadyExists, what)));
+        }
+        Err(error) if error.kind() == io::ErrorKind::NotFound => {
+            whole::write(&target, bytes, false).map_err(failed(&target))?;
+        }
+        Err(error) => return Err(failed(&target)(error)),
+    }
+    say(&format!("{}: installed as {}, for --depth {}", known.file, target.display(), known.task.name()));
+    Ok(())
+}
+
+/// Fetches a known network and installs it.
+fn get(name: Option<&str>) -> Result<(), CliError> {
+    let none = |name: &str| {
+        let names: Vec<&str> = KNOWN.iter().map(|known| known.file).collect();
+        CliError::Usage(format!("there is no network {name:?}: use one of {}", names.join(", ")))
+    };
+    let known = name.map_or(Ok(&KNOWN[0]), |name| Known::named(name).ok_or_else(|| none(name)))?;
+    if let Some((_, file)) = network::installed().iter().find(|(other, _)| std::ptr::eq(*other, known)) {
+        say(&format!("{}: installed already, as {}", known.file, file.display()));
+        return Ok(());
+    }
+    let bytes = fetched(known)?;
+    let is_whole = Known::of(&bytes).is_some_and(|came| std::ptr::eq(came, known));
+    if !is_whole {
+        let what =
+            format!("what came is not {}, and is not kept: {} bytes of {}", known.file, bytes.len(), known.bytes);
+        return Err(failed(Path::new(known.address))(io::Error::new(io::ErrorKind::InvalidData, what)));
+    }
+    install(known, &bytes)
+}
+
+/// What is at a network's address, and one byte more than it should be at most.
+fn fetched(known: &Known) -> Result<Vec<u8>, CliError> {
+    const CLIENTS: [(&str, &[&str]); 2] = [
+        ("curl", &["--fail", "--location", "--silent", "--show-error", "--proto", "=https", "--max-time", "300"]),
+        ("wget", &["--https-only", "--no-verbose", "--timeout=60", "--output-document=-"]),
+    ];
+    let address = || failed(Path::new(known.address));
+    for (client, options) in CLIENTS {
+        say(&format!("{client} {} {}", options.join(" "), known.address));
+        let mut command = Command::new(client);
+        command.args(options).arg(known.address).stdin(Stdio::null()).stdout(Stdio::piped());
+        let mut child = match command.spawn() {
+            Err(error) if error.kind() == io::ErrorKind::NotFound => {
+                say(&format!("{client} is not installed"));
+                continue;
+            }
+            child => child.map_err(address())?,
+        };
+        let mut bytes = Vec::new();
+        let read = child.stdout.take().map_or(Ok(0), |out| out.take(known.bytes + 1).read_to_end(&mut bytes));
+        let status = child.wait().map_err(address())?;
+        read.map_err(address())?;
+        // One that is stopped in the middle of too much has failed, too: what came tells more.
+        return match bytes.len() as u64 <= known.bytes && !status.success() {
+            true => Err(address()(io::Error::other(format!(
+                "{client} failed ({status}): `bokehcam models add FILE` takes what a browser fetched"
+            )))),
+            false => Ok(bytes),
+        };
+    }
+    let what = format!(
+        "neither curl nor wget is installed: get {} by a browser, then `bokehcam models add FILE`",
+        known.address
+    );
+    Err(CliError::Usage(what))
+}

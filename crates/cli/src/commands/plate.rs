@@ -1,0 +1,150 @@
+//! `plate`: a picture of what is behind you.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use clap::Args;
+
+use bokehcam::capture::{Camera, Captured, Shot};
+use crate::error::CliError;
+use crate::files::{make_folder_of, refuse_overwrite, refuse_source, tell_of_leftovers};
+use crate::log;
+use crate::options;
+use crate::settings::layers::Given;
+use crate::settings::unused;
+use crate::terminal::{self, Guidance};
+use bokehcam::depth::plate::{Capture, Step, Taken};
+use bokehcam::depth::{DepthSource, Seen};
+use bokehcam::frame::{ColorImage, DepthMap, GrayImage, Stamp};
+use bokehcam::look::Effect;
+use bokehcam::recording::still;
+use bokehcam::source::{DepthChoice, Kind, Options, Source, SourceName, one_camera};
+
+/// Take a plate: a picture of what is behind you, for --depth plate:FILE
+#[derive(Args, Debug)]
+#[command(after_help = "\
+Examples:
+  bokehcam plate /dev/video0 --to room.png
+  bokehcam stream /dev/video0 --depth plate:room.png --to /dev/video10
+  bokehcam plate somewhere/empty-room --to room.png
+
+Step out of the picture when you are told to, for some four seconds. The camera has to stand still from then on. Of a
+recording, each pixel is what it is most of the time.")]
+pub struct PlateCommand {
+    /// A camera, or a folder with a recording
+    #[arg(value_parser = options::source_name())]
+    source: SourceName,
+    /// Where the plate goes, .png or .jpg
+    #[arg(long, alias = "out", value_name = "FILE")]
+    to: PathBuf,
+    #[command(flatten)]
+    frames: options::Frames,
+    #[command(flatten)]
+    output: options::Output,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// The source cannot be read, the picture never comes to rest, or the plate exists (without `--force`) or cannot be
+/// written.
+pub fn run(command: &PlateCommand, global: &options::Global, given: &Given) -> Result<(), CliError> {
+    let PlateCommand { source: name, to, frames, output } = command;
+    refuse_overwrite([to.as_path()], output.force)?;
+    if let Some(folder) = name.folder() {
+        refuse_source("--to", to, folder)?;
+    }
+    still::photo_format(to)?;
+    let options = Options { frames: frames.clone(), depth_choice: DepthChoice::None, ..Options::default() };
+    let Source { camera, depth_from, .. } = Source::open(name, &options, None)?;
+    unused::warn(
+        &given.settings,
+        &unused::Run {
+            source: unused::From::Source(name.kind()),
+            depth: depth_from,
+            uses_depth: false,
+            effect: Effect::None,
+            lens: false,
+            realtime: camera.info().live,
+            cpu_only: false,
+            compresses: false,
+            window: false,
+        },
+    );
+    let stop = terminal::stop_flag()?;
+    let mut frames = Frames { camera, stop, color: ColorImage::default() };
+    let plate = match frames.camera.info().live {
+        true => taken(&mut frames, name, global)?,
+        false => usual(&mut frames)?,
+    };
+    if name.kind() == Kind::Photo {
+        log::warn("a photo stands still: whoever is in it is in the plate, and is not found before it");
+    }
+    make_folder_of(to)?;
+    tell_of_leftovers([to.as_path()]);
+    still::write_color(to, &plate, output.force)?;
+    if !global.quiet {
+        terminal::say(&format!("{}: written, for --depth plate:{0}", to.display()));
+    }
+    Ok(())
+}
+
+/// The frames of a source, one after the other.
+struct Frames {
+    camera: Box<dyn Camera>,
+    stop: Arc<AtomicBool>,
+    color: ColorImage,
+}
+
+impl Frames {
+    /// Reads the next frame; `None` at the end, or once the user ends it.
+    fn next(&mut self) -> Result<Option<Stamp>, CliError> {
+        let (mut depth, mut right) = (DepthMap::default(), GrayImage::default());
+        while !self.stop.load(Ordering::Relaxed) {
+            match self.camera.next(Shot { color: &mut self.color, depth: &mut depth, right: &mut right })? {
+                Captured::Frame(stamp) => return Ok(Some(stamp)),
+                Captured::Corrupt(error) => return Err(error.into()),
+                Captured::Lost(..) | Captured::Waiting => {}
+                Captured::End => break,
+            }
+        }
+        Ok(None)
+    }
+}
+
+/// The plate of a camera, with a countdown for the person before it.
+fn taken(frames: &mut Frames, name: &SourceName, global: &options::Global) -> Result<ColorImage, CliError> {
+    let (mut source, guide) = one_camera::taking(name);
+    let guidance = Guidance::new(Some(guide), global);
+    let mut map = DepthMap::default();
+    while let Some(stamp) = frames.next()? {
+        source.read(Seen { stamp, color: &frames.color, right: None }, &mut map)?;
+        guidance.tell();
+        match (source.plate(), guidance.step()) {
+            (Some(plate), _) => return Ok(plate.clone()),
+            (None, Some(step @ Step::Restless)) => return Err(CliError::NoPlate(step.to_string())),
+            (None, _) => {}
+        }
+    }
+    Err(CliError::NoPlate("it ended before the plate was taken".to_owned()))
+}
+
+/// The plate of a recording: of some frames all over it, what each pixel mostly is.
+fn usual(frames: &mut Frames) -> Result<ColorImage, CliError> {
+    let count = frames.camera.info().frames.unwrap_or(1);
+    let every = (count / Capture::PICTURES as u64).max(1);
+    let (mut capture, mut index) = (Capture::default(), 0);
+    while frames.next()?.is_some() {
+        if index % every == 0
+            && let Taken::Whole(plate) = capture.add_any(&frames.color)
+        {
+            return Ok(plate);
+        }
+        index += 1;
+    }
+    match index {
+        0 => Err(CliError::NoPlate("there is no frame".to_owned())),
+        _ => Ok(capture.finish()),
+    }
+}

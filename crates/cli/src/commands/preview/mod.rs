@@ -1,0 +1,240 @@
+//! `preview`: a window that shows a source in portrait mode, live.
+
+mod store;
+
+use std::path::Path;
+use std::str::FromStr;
+use std::sync::Arc;
+
+use clap::Args;
+
+use crate::controlled::{self, Standing, changed, refused};
+use crate::error::CliError;
+use crate::options::{Global, Streaming, Window};
+use crate::report;
+use crate::settings::changes;
+use crate::settings::file;
+use crate::settings::layers::Given;
+use crate::settings::look;
+use crate::settings::unused;
+use crate::sinks;
+use crate::terminal;
+use bokehcam::compute::Backend;
+use bokehcam::control::{Answer, Name, Request};
+use bokehcam::link::demand::Demand;
+use bokehcam::look::{Effect, Look, Patch};
+use bokehcam::pipeline::Pace;
+use bokehcam_window::control::{Control, Wish};
+use bokehcam_window::folders::Folders;
+use bokehcam_window::session::Start;
+use bokehcam_window::state::{Output, Running, State};
+use bokehcam_window::system::System;
+use bokehcam_window::texts;
+use bokehcam_window::window::{self, Memory, Preview};
+use bokehcam::sink::Target;
+use bokehcam::source::{self, DepthChoice, DepthFrom, SourceName};
+
+use store::FileStore;
+
+/// Show a camera, a recording or the demonstration in portrait mode, live, and find a look
+#[derive(Args, Debug)]
+#[command(after_help = "\
+Examples:
+  bokehcam preview                          the first camera there is, else the demonstration
+  bokehcam preview 0 --mirror --to /dev/video10
+  bokehcam preview 0,2 --calib stereo.yml
+  bokehcam preview somewhere/rgbd --preset cinematic
+  bokehcam preview demo --split 0.5 --highlights 12
+  bokehcam preview demo --full-screen
+
+In the window, F1 shows all keys. Click to focus there, double-click on something to follow it. K copies what is set as a command.
+A recording is played in a loop.")]
+pub struct PreviewCommand {
+    /// A camera (/dev/videoN, N, a name under /dev/v4l/by-id, or part of what it is called), two of them as LEFT,RIGHT, a
+    /// camera of PipeWire's (pipewire:NAME), a folder with a recording, a photo (PNG or JPEG), `demo` (the demonstration) or
+    /// `synthetic` (rendered while it plays) [default: the first camera there is, else `demo`]
+    source: Option<String>,
+    /// Also write to pipewire, pipewire:NAME or /dev/videoN (virtual camera), DIR/ (numbered PNG), FILE.y4m, FILE.mp4, .mkv or
+    /// .webm from the start; may be given more than once
+    #[arg(long, value_name = "SINK")]
+    to: Vec<Target>,
+    /// What `bokehcam ctl` knows this run by [default: preview, or preview-2 and so on]
+    #[arg(long, value_name = "NAME")]
+    name: Option<Name>,
+    #[command(flatten)]
+    window: Window,
+    #[command(flatten)]
+    parts: Streaming,
+}
+
+/// Runs the command; `given` is for warnings and for the commands that the window composes.
+///
+/// # Errors
+/// The options do not fit each other, there is no display, or there never was a frame.
+pub fn run(command: &PreviewCommand, global: &Global, given: Given) -> Result<(), CliError> {
+    let mut parts = command.parts.clone();
+    // Finding a look takes longer than most recordings last.
+    parts.frames.repeat = true;
+    let source = command.source.as_deref().unwrap_or_default();
+    show(source, &command.to, &command.window, &parts, (global, given), command.name.as_ref())
+}
+
+/// Shows a source in a window, and writes it to `to`. `called` is what it is called by those who control it.
+///
+/// # Errors
+/// As for [`run`].
+pub fn show(
+    name: &str,
+    to: &[Target],
+    window: &Window,
+    parts: &Streaming,
+    (global, given): (&Global, Given),
+    called: Option<&Name>,
+) -> Result<(), CliError> {
+    let Streaming { frames, stream, output, computing, .. } = parts;
+    report::check(stream.report.as_deref(), output.force, to)?;
+    let usage = |what: &str| CliError::Usage(what.to_string());
+    let refuse = |what: &str| Err(usage(what));
+    if stream.pace == Some(Pace::Asap) {
+        return refuse("--pace asap: a window shows frames in their own time; leave --pace out");
+    }
+    if stream.on_demand {
+        return refuse("--on-demand: the window watches all the time; leave it out, or use `bokehcam stream`");
+    }
+    if !name.is_empty() {
+        let source = SourceName::from_str(name).map_err(|error| error.of(name))?;
+        sinks::check(to, parts, &source)?;
+        unused::warn_by_source(&given.settings, source.kind());
+    }
+    let outputs = to.iter().map(|target| match target {
+        Target::Null | Target::Stdout | Target::Window => {
+            Err(usage("--to: beside a window, use a virtual camera, a folder or a file"))
+        }
+        target => Ok(Output { name: target.to_string(), is_camera: target.is_camera() }),
+    });
+    let outputs = outputs.collect::<Result<Vec<_>, _>>()?;
+    report::try_out(stream.report.as_deref())?;
+    let look = look::look(&parts.blur, &computing.quality)?;
+    // As if there were depth: what the source lacks is known only when it is open, and a window may open others.
+    let look = source::fitting_look(&look, &parts.blur.depth, true)?;
+    let effect = if look.effect.follows_depth() { Effect::Auto } else { look.effect };
+    let look = Look { effect, ..look };
+    let memory_file = file::state_folder().map(|folder| folder.join("window.toml"));
+    // What begins afresh leaves alone what was there.
+    let memory_file = memory_file.filter(|_| !window.fresh);
+    let memory = memory_file.as_deref().and_then(Memory::read).unwrap_or_default();
+    let mut gone = Vec::new();
+    let before = Some(&memory).filter(|_| !given.has_look()).and_then(|memory| memory.look(|line| gone.push(line)));
+    let before = before.filter(|before| *before != look);
+    let source = if name.is_empty() { memory.source().unwrap_or_default() } else { name.to_owned() };
+    let texts =
+        texts::chosen(window.language.as_deref()).map_err(|line| CliError::Usage(format!("--language: {line}")))?;
+    texts.into_iter().for_each(texts::speak);
+    let mirror_chosen = given.stated.iter().any(|name| name == "mirror");
+    let store = FileStore { chosen: global.config.clone(), given };
+    let mut state = first_state(look, &source, window, stream.mirror, &memory);
+    if let Some(before) = before {
+        state.look = before;
+        state.note(AS_IT_WAS);
+    }
+    gone.into_iter().for_each(|line| state.note(line));
+    let config = global.config.clone();
+    let cpu_only = computing.backend == Backend::Cpu;
+    let control = controlled::claim(called, "preview")?.map(|claim| Control {
+        claim,
+        understand: Box::new(move |request| understand(request, config.as_deref()).map_err(|error| refused(&error))),
+        judge: Box::new(move |patch, look, running| judge(patch, look, running, cpu_only)),
+    });
+    let look = state.look.clone();
+    let mut system = System::new(parts.source_options(), look.clone(), Box::new(store));
+    let device = system.executors.device()?;
+    system.out_size = stream.out_size.map(|size| (size.width, size.height));
+    system.force = output.force;
+    state.mirror_chosen = mirror_chosen;
+    let close_at_end = frames.frames.is_some() || !frames.repeat;
+    let stop = terminal::stop_flag()?;
+    let ended = window::show(Preview {
+        state,
+        session: Start {
+            services: Box::new(system),
+            look,
+            source,
+            outputs,
+            keep_going: stream.keep_going,
+            budget_ns: stream.budget_ms.map(|ms| (f64::from(ms) * 1e6) as u64),
+            threads: computing.choice().threads(),
+            wanted: Arc::default(),
+            demand: Demand::default(),
+            off: Arc::default(),
+            release: Arc::default(),
+            folders: window.save_to.clone().map_or_else(Folders::of_user, Folders::at),
+        },
+        theme: window.theme,
+        device,
+        close_at_end,
+        memory,
+        memory_file,
+        control,
+        stop,
+    })?;
+    let written = match (&stream.report, &ended.report) {
+        (Some(path), Some(report)) => report::write(path, report, output.force),
+        _ => Ok(()),
+    };
+    ended.report.iter().for_each(|report| terminal::say_report(report, global));
+    match ended.lost {
+        Some(why) if ended.report.is_none() || close_at_end => Err(CliError::NoFrames(why)),
+        _ => ended.unwritten.map_or(written, |why| Err(CliError::OutputFailed(why))),
+    }
+}
+
+/// What is asked of the window by others.
+fn understand(request: Request, config: Option<&Path>) -> Result<Wish, CliError> {
+    Ok(match request {
+        Request::Status => Wish::Status,
+        Request::On => Wish::On(true),
+        Request::Off => Wish::On(false),
+        Request::Toggle => Wish::Toggle,
+        Request::Preset { name } => Wish::Look(changes::preset(config, &name)?),
+        Request::Set { settings } => Wish::Look(changes::patch(&settings)?),
+        Request::Depth { from } => Wish::Depth(from.parse().map_err(CliError::Usage)?),
+        Request::Snapshot { to } => Wish::Snapshot(to),
+    })
+}
+
+/// Whether others can change the look so, and what of that has no effect.
+fn judge(patch: &Patch, look: &Look, running: &Running, cpu_only: bool) -> Result<Option<String>, Answer> {
+    let &Running { size, has_depth, kind, depth_from, .. } = running;
+    let unused = unused::Run {
+        source: unused::From::Source(kind),
+        depth: if has_depth { depth_from } else { DepthFrom::Nothing },
+        uses_depth: has_depth,
+        effect: look.effect,
+        lens: false,
+        realtime: true,
+        cpu_only,
+        compresses: false,
+        window: true,
+    };
+    // Depth that was declined is none of this source's.
+    let run = Standing { size, depth_choice: &DepthChoice::Auto, has_depth, adaptive: true, unused };
+    changed(patch, look, &run).map(|(_, note)| note).map_err(|error| refused(&error))
+}
+
+/// Shown where the look is not the usual one from the start.
+const AS_IT_WAS: &str = "This is the look that you left. R goes back to the usual one.";
+
+/// What the window shows first.
+fn first_state(look: Look, source: &str, window: &Window, mirror: bool, memory: &Memory) -> State {
+    let mut state = State::new(look, source.to_owned());
+    state.shown = window.show;
+    state.split = window.split;
+    state.mirror = mirror;
+    state.full_screen = window.full_screen;
+    state.instruments = window.instruments;
+    state.panel = window.panel;
+    state.habits = memory.habits.clone();
+    window.text_scale.into_iter().for_each(|scale| state.habits.set_text_scale(scale));
+    state.habits.single_keys = window.single_keys.unwrap_or(state.habits.single_keys);
+    state
+}

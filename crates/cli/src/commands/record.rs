@@ -1,0 +1,218 @@
+//! `record`: a source as a recording.
+
+use std::path::{Path, PathBuf};
+use std::sync::atomic::Ordering;
+
+use clap::Args;
+
+use bokehcam::capture::{Brings, Captured, Shot};
+use crate::error::CliError;
+use crate::files::refuse_source;
+use crate::options;
+use crate::settings::layers::Given;
+use crate::settings::unused;
+use crate::terminal;
+use bokehcam::depth::Seen;
+use bokehcam::frame::{ColorImage, DepthMap, GrayImage};
+use bokehcam::look::Effect;
+use bokehcam::recording::tum::{Writer, WriterOptions, Written};
+use bokehcam::source::{Options, Source, SourceName};
+
+/// Record a source in the TUM RGB-D layout
+///
+/// Writes rgb/, depth/ (16-bit PNG, 5000 units per metre, 0 unknown; of two eyes, matched) and their lists. The lists appear when the
+/// recording is whole; Ctrl-C ends that of a camera whole. With --force, the files that an earlier recording in the folder has in
+/// its lists go once the new one is whole, and no others; one that is cut short is kept beside as DIR.incomplete.
+#[derive(Args, Debug)]
+#[command(after_help = "\
+Examples:
+  bokehcam record /dev/video0 --size 640x480 --frames 300 --to recordings/me
+  bokehcam record synthetic --frames 90 --size 320x240 --to recordings/mine
+  bokehcam record somewhere/rgbd --depth-scale 1000 --start 2 --end 5 --to excerpt")]
+pub struct RecordCommand {
+    /// A camera, two cameras LEFT,RIGHT, a folder with a recording, `demo` or `synthetic`
+    #[arg(value_parser = options::source_name())]
+    source: SourceName,
+    /// Folder for the recording
+    #[arg(long, alias = "out", value_name = "DIR")]
+    to: PathBuf,
+    #[command(flatten)]
+    frames: options::Frames,
+    #[command(flatten)]
+    depth: options::Depth,
+    #[command(flatten)]
+    stereo: options::Stereo,
+    #[command(flatten)]
+    output: options::Output,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// The source cannot be read, or the recording exists (without `--force`) or cannot be written.
+pub fn run(command: &RecordCommand, global: &options::Global, given: &Given) -> Result<(), CliError> {
+    let options = Options {
+        frames: command.frames.clone(),
+        depth: command.depth.clone(),
+        stereo: command.stereo.clone(),
+        ..Options::default()
+    };
+    let ending = command.to.extension().and_then(|ending| ending.to_str()).unwrap_or_default();
+    if ["mp4", "mkv", "webm", "mov", "avi", "y4m"].contains(&ending) && !command.to.is_dir() {
+        let to = command.to.display();
+        return Err(CliError::Usage(format!(
+            "--to {to}: a recording is a folder of pictures; a video is made by `bokehcam stream {} --effect none --to FILE.mp4`",
+            command.source
+        )));
+    }
+    if let Some(folder) = command.source.folder() {
+        refuse_source("--to", &command.to, folder)?;
+    }
+    let Source { mut camera, depth: mut source, rig, depth_from, .. } = Source::open(&command.source, &options, None)?;
+    unused::warn(
+        &given.settings,
+        &unused::Run {
+            source: unused::From::Source(command.source.kind()),
+            depth: depth_from,
+            uses_depth: true,
+            effect: Effect::None,
+            lens: false,
+            realtime: true,
+            cpu_only: false,
+            compresses: false,
+            window: false,
+        },
+    );
+    if rig.is_some_and(|rig| !rig.metric) {
+        tracing::warn!("the distance of the two eyes is not known: the metres of this depth are those of assumed eyes");
+    }
+    let info = camera.info();
+    let options = WriterOptions { overwrite: command.output.force, ..WriterOptions::default() };
+    let mut writer = Writer::create(&command.to, &options)?;
+    let stop = terminal::stop_flag()?;
+    let progress = terminal::Progress::new(info.frames, global);
+    let (mut color, mut depth, mut right) = (ColorImage::default(), DepthMap::default(), GrayImage::default());
+    let (mut lost, mut is_doubted) = (0, rig.is_some());
+    let mut take = || -> Result<bool, CliError> {
+        while !stop.load(Ordering::Relaxed) {
+            let stamp = match camera.next(Shot { color: &mut color, depth: &mut depth, right: &mut right })? {
+                Captured::Frame(stamp) => stamp,
+                Captured::Corrupt(error) => return Err(error.into()),
+                Captured::Lost(count, _) => {
+                    lost += count;
+                    continue;
+                }
+                Captured::Waiting => continue,
+                Captured::End => return Ok(true),
+            };
+            if let Some(source) = &mut source {
+                source.rectify(&mut color);
+                let right = (info.brings == Brings::RightEye).then_some(&right);
+                source.read(Seen { stamp, color: &color, right }, &mut depth)?;
+            }
+            let has_depth = source.is_some() || info.brings == Brings::Depth;
+            if let Some(doubt) = doubt(&depth, writer.max_depth_m()).filter(|_| has_depth && !is_doubted) {
+                is_doubted = true;
+                tracing::warn!(
+                    "frame {}: {doubt}; is --depth-scale, the units of a metre, that of the source?",
+                    stamp.index
+                );
+            }
+            writer.add(stamp.time_ns, &color, has_depth.then_some(&depth))?;
+            progress.delivered(writer.frames() as u64);
+        }
+        // A camera has no end of its own.
+        Ok(info.live || info.frames.is_none())
+    };
+    let taken = take();
+    drop(progress);
+    if lost > 0 {
+        tracing::warn!("{lost} frames came and went before they could be written");
+    }
+    match taken {
+        Ok(true) => {
+            let max_depth_m = writer.max_depth_m();
+            let written = writer.finish()?;
+            say_what_is_too_far(&written, max_depth_m);
+            if !global.quiet {
+                let gone = match written.replaced {
+                    0 => String::new(),
+                    files => format!(", in place of {files} files of an earlier recording"),
+                };
+                let (dir, frames) = (written.dir.display(), written.frames);
+                terminal::say(&format!("{dir}: {frames} frames recorded from {}{gone}", info.name));
+            }
+            Ok(())
+        }
+        Ok(false) => keep(writer, &command.to),
+        Err(fault) => {
+            if writer.frames() > 0
+                && let Err(error) = keep(writer, &command.to)
+            {
+                tracing::warn!("{error}");
+            }
+            Err(fault)
+        }
+    }
+}
+
+/// Keeps what there is of a recording that did not come to its end, and says where.
+fn keep(writer: Writer, to: &Path) -> Result<(), CliError> {
+    let written = writer.cut()?;
+    let frames = written.frames;
+    if written.dir == to {
+        tracing::warn!("{}: cut short; the {frames} frames until then can be read", to.display());
+    } else {
+        let (old, kept) = (to.display(), written.dir.display());
+        tracing::warn!("{old}: as it was; the new recording was cut short, and its {frames} frames are in {kept}");
+    }
+    Ok(())
+}
+
+/// Nearer than this is no scene that depth cameras see.
+const NEAR_M: f32 = 0.05;
+
+/// What makes all the depth of a frame unlikely, where a recording holds at most `max_depth_m`.
+fn doubt(depth: &DepthMap, max_depth_m: f32) -> Option<String> {
+    let known = depth.metres.iter().copied().filter(|&metres| DepthMap::is_known(metres));
+    let (least_m, largest_m) = known.fold((f32::INFINITY, 0.0_f32), |(a, b), metres| (a.min(metres), b.max(metres)));
+    if largest_m == 0.0 {
+        None
+    } else if least_m > max_depth_m {
+        Some(format!("all depth is {least_m:.1} m away or more, and a recording holds up to {max_depth_m:.1} m"))
+    } else if largest_m < NEAR_M {
+        Some(format!("all depth is nearer than {:.1} mm", largest_m * 1e3))
+    } else {
+        None
+    }
+}
+
+/// Says how much of the depth was lost.
+fn say_what_is_too_far(written: &Written, max_depth_m: f32) {
+    if written.too_far > 0 {
+        let percent = 100.0 * written.too_far as f64 / written.depths as f64;
+        tracing::warn!(
+            "{percent:.1} % of the depth lies beyond {max_depth_m:.1} m, more than a recording holds: it is unknown there"
+        );
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn depth_that_no_camera_sees_is_doubted() {
+        let said = |metres: &[f32]| {
+            doubt(
+                &DepthMap { width: metres.len() as u32, height: 1, metres: metres.into(), ..DepthMap::default() },
+                13.1,
+            )
+        };
+        assert_eq!(said(&[0.0, 1.0, 40.0]), None);
+        assert_eq!(said(&[0.0, f32::NAN]), None);
+        assert_eq!(said(&[0.02, 0.06]), None);
+        assert!(said(&[0.0, 20.0, 1000.0]).unwrap().contains("20.0 m away or more"));
+        assert!(said(&[0.0, 0.001, 0.0034]).unwrap().contains("nearer than 3.4 mm"));
+    }
+}

@@ -1,0 +1,275 @@
+//! `render --debug-dir`: every intermediate result of a blur as a picture, and its plan in numbers.
+
+use std::fs;
+use std::io;
+use std::path::Path;
+
+use serde::Serialize;
+
+use super::debug_pictures::{coc, grey, light};
+use bokehcam::bokeh::cpu::CpuBokeh;
+use bokehcam::bokeh::ladder::Compositing;
+use bokehcam::bokeh::plan::{Bin, Plan};
+use bokehcam::bokeh::{Bokeh, Probe};
+use crate::error::CliError;
+use crate::files::{refuse_overwrite, write_whole};
+use bokehcam::compute::Backend;
+use bokehcam::computing::Computing;
+use bokehcam::frame::{ColorImage, DepthMap};
+use bokehcam::look::Look;
+use bokehcam::optics::CocField;
+use bokehcam::pipeline::still::{Depth, coc_and_depth};
+use bokehcam::recording::still;
+
+/// The file of numbers, which is always written, even where nothing is blurred.
+pub const PLAN: &str = "plan.json";
+
+/// How the picture was blurred.
+#[derive(Serialize)]
+struct PlanFile {
+    /// Columns and rows of the picture.
+    size: (u32, u32),
+    executor: String,
+    /// `layers`, `select`, `gather` or `none`.
+    compositing: &'static str,
+    /// Separable terms of the filters.
+    rank: usize,
+    /// Distance of the focal plane in metres, and the radius at infinity, where the blur follows depth.
+    focus_m: Option<f32>,
+    coc_at_infinity_px: Option<f32>,
+    /// Lowest and highest CoC of the picture.
+    coc_px: Option<Range>,
+    /// The CoC whose colour is full in the pictures of CoC.
+    coc_full_color_px: f32,
+    /// Whether what near objects hide was filled in.
+    filled: bool,
+    /// Share of the picture in tiles where nothing behind is blurred.
+    still_share: f32,
+    bins: Vec<BinEntry>,
+    /// What was written beside this file.
+    files: Vec<String>,
+}
+
+/// One bin. A border that is `null` is open.
+#[derive(Serialize)]
+struct BinEntry {
+    index: usize,
+    /// Borders of the CoC, in pixels of the picture.
+    low_px: Option<f32>,
+    high_px: Option<f32>,
+    /// Pixels of the picture that a bin pixel covers, each way.
+    scale: usize,
+    width: usize,
+    height: usize,
+    /// Largest radius of its filters, in bin pixels: white in the picture of the radius.
+    max_radius_px: f32,
+    near: bool,
+    /// Which of the executor's buffers it uses.
+    slot: usize,
+    /// Whether anything was in it; if not, its passes were left out.
+    present: bool,
+    /// The pixels that are in this bin by more than half: their share of the picture, their ranges of CoC and depth.
+    picture_share: f32,
+    content_coc_px: Option<Range>,
+    content_depth_m: Option<Range>,
+}
+
+/// Lowest and highest value.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+struct Range(f32, f32);
+
+impl Range {
+    fn of(values: impl Iterator<Item = f32>) -> Option<Self> {
+        values.fold(None, |range, value| {
+            let Range(low, high) = range.unwrap_or(Range(value, value));
+            Some(Range(low.min(value), high.max(value)))
+        })
+    }
+}
+
+/// Blurs a picture on the CPU and writes every intermediate result into the folder `dir`; with `force`, files of the
+/// same names are overwritten. Returns the blurred picture and a description of the executor.
+///
+/// # Errors
+/// As without a folder; the folder or a file in it cannot be written, or exists and may not be overwritten.
+pub fn blurred(
+    mut color: ColorImage,
+    depth: Option<Depth>,
+    look: &Look,
+    computing: &Computing,
+    (dir, force): (&Path, bool),
+) -> Result<(ColorImage, String), CliError> {
+    let size = color.size();
+    let mut output = DebugOutput { pictures: Vec::new(), plan: PlanFile::of(size) };
+    let mut result = ColorImage::default();
+    match look.settings(size, false) {
+        None => result = color,
+        Some(settings) => {
+            if computing.backend == Backend::Gpu || computing.adapter.is_some() {
+                let text = "--debug-dir looks into the CPU executor: leave --backend gpu and --adapter out";
+                return Err(CliError::Usage(text.to_string()));
+            }
+            settings.check(size)?;
+            let mut bokeh = CpuBokeh::new(Plan::new(&settings, size.0, size.1), computing.threads);
+            let (coc, depth) = coc_and_depth(look, &mut color, depth)?;
+            bokeh.blur(&color, depth.as_ref(), &coc, &mut result)?;
+            output.collect(&bokeh, &color, depth.as_ref(), &coc);
+        }
+    }
+    output.write(dir, force)?;
+    Ok((result, output.plan.executor))
+}
+
+/// The pictures, by file name, and the numbers that are to be written.
+struct DebugOutput {
+    pictures: Vec<(String, ColorImage)>,
+    plan: PlanFile,
+}
+
+impl PlanFile {
+    /// The plan of a picture that is not blurred.
+    fn of(size: (u32, u32)) -> Self {
+        Self {
+            size,
+            executor: "not blurred".to_string(),
+            compositing: "none",
+            rank: 0,
+            focus_m: None,
+            coc_at_infinity_px: None,
+            coc_px: None,
+            coc_full_color_px: 0.0,
+            filled: false,
+            still_share: 0.0,
+            bins: Vec::new(),
+            files: Vec::new(),
+        }
+    }
+}
+
+impl DebugOutput {
+    /// Collects everything about the frame that an executor has just blurred.
+    fn collect(&mut self, bokeh: &CpuBokeh, color: &ColorImage, depth: Option<&DepthMap>, field: &CocField) {
+        let (plan, width) = (bokeh.plan(), color.width as usize);
+        let position = |k: usize| (k % width, k / width);
+        let scene = bokeh.scene(color, depth, field, false);
+        let coc_px: Vec<f32> = scene.iter().map(|pixel| pixel[3]).collect();
+        let range = Range::of(coc_px.iter().copied());
+        let full_px = range.map_or(0.0, |Range(low, high)| high.max(-low));
+        let still = (0..scene.len()).map(|k| f32::from(u8::from(bokeh.is_still(position(k)))));
+        let still_share = still.clone().sum::<f32>() / scene.len().max(1) as f32;
+        let lens = match field {
+            CocField::Depth(lens) => Some(lens),
+            _ => None,
+        };
+        self.plan = PlanFile {
+            executor: bokeh.describe(),
+            compositing: match plan.compositing {
+                Compositing::Layers => "layers",
+                Compositing::Select => "select",
+                Compositing::Gather => "gather",
+            },
+            rank: plan.bank.terms,
+            focus_m: lens.map(|lens| lens.focus_m),
+            coc_at_infinity_px: lens.map(|lens| lens.coc_at_infinity_px),
+            coc_px: range,
+            coc_full_color_px: full_px,
+            filled: bokeh.filled(),
+            still_share,
+            ..PlanFile::of(color.size())
+        };
+        self.add("coc", coc(width, coc_px.iter().copied(), full_px));
+        if plan.compositing == Compositing::Layers {
+            self.add("still", grey(width, still, 1.0));
+        }
+        if bokeh.filled() {
+            let mut behind = bokeh.scene(color, depth, field, true);
+            self.add("behind_coc", coc(width, behind.iter().map(|pixel| pixel[3]), full_px));
+            // From CoC to full coverage, as `light` takes it.
+            behind.iter_mut().for_each(|pixel| pixel[3] = 1.0);
+            self.add("behind", light(width, &behind, plan.expansion, 1));
+            self.add("hidden", grey(width, coc_px.iter().map(|&coc_px| bokeh.hidden(coc_px)), 1.0));
+        }
+        for (k, bin) in plan.bins.iter().enumerate() {
+            self.collect_bin(bokeh, k, bin);
+            self.plan.bins.push(bin_entry(bokeh, (k, bin), &coc_px, depth, field));
+        }
+    }
+
+    /// Collects the pictures of bin `k` before and after its filters, and of its filter radii.
+    fn collect_bin(&mut self, bokeh: &CpuBokeh, k: usize, bin: &Bin) {
+        let plan = bokeh.plan();
+        let mut show = |name: &str, pixels: &[[f32; 4]]| {
+            let coverage = pixels.iter().map(|pixel| pixel[3]);
+            let picture = light(bin.width, pixels, plan.expansion, bin.scale);
+            self.add(&format!("{name}_{k}"), picture);
+            let name = if name == "bin" { "coverage" } else { "blur_coverage" };
+            self.add(&format!("{name}_{k}"), grey(bin.width, coverage, 1.0));
+        };
+        show("bin", &bokeh.probe(Probe::Bin(k)));
+        // A gather blurs straight into the picture, without a filtered bin.
+        if plan.compositing != Compositing::Gather {
+            show("blur", &bokeh.probe(Probe::Blur(k)));
+            let radius = grey(bin.width, bokeh.radius_px(k).into_iter(), bin.max_radius_px);
+            self.add(&format!("radius_{k}"), radius);
+        }
+    }
+
+    fn add(&mut self, name: &str, picture: ColorImage) {
+        self.pictures.push((format!("{name}.png"), picture));
+    }
+
+    /// Writes everything, or nothing where something would be overwritten unasked.
+    fn write(&mut self, dir: &Path, force: bool) -> Result<(), CliError> {
+        self.plan.files = self.pictures.iter().map(|(name, _)| name.clone()).collect();
+        let paths: Vec<_> = self.plan.files.iter().map(|name| dir.join(name)).collect();
+        let plan_path = dir.join(PLAN);
+        let json = serde_json::to_vec_pretty(&self.plan).map_err(|error| CliError::io(&plan_path)(error.into()))?;
+        refuse_overwrite(paths.iter().chain([&plan_path]).map(|path| path.as_path()), force)?;
+        let not_a_folder = |error| match dir.exists() && !dir.is_dir() {
+            true => io::Error::new(io::ErrorKind::NotADirectory, "not a folder; name one for --debug-dir"),
+            false => error,
+        };
+        fs::create_dir_all(dir).map_err(not_a_folder).map_err(CliError::io(dir))?;
+        for (path, (_, picture)) in paths.iter().zip(&self.pictures) {
+            still::write_color(path, picture, force)?;
+        }
+        write_whole(&plan_path, &json, force)
+    }
+}
+
+/// The statistics of bin `k` for `plan.json`.
+fn bin_entry(
+    bokeh: &CpuBokeh,
+    (k, bin): (usize, &Bin),
+    coc_px: &[f32],
+    depth: Option<&DepthMap>,
+    field: &CocField,
+) -> BinEntry {
+    let share = bokeh.plan().share(k);
+    // The only bin of the gather has every pixel; elsewhere a pixel belongs to the bin that has most of it.
+    let belongs = |coc_px: f32| bokeh.plan().compositing == Compositing::Gather || share.at(coc_px) > 0.5;
+    let content = || coc_px.iter().copied().filter(|&coc_px| belongs(coc_px));
+    let depth_m = match (field, depth) {
+        (CocField::Depth(lens), Some(map)) => {
+            let known = map.metres.iter().copied().filter(|&metres| DepthMap::is_known(metres));
+            Range::of(known.filter(|&metres| belongs(lens.coc_px(metres))))
+        }
+        _ => None,
+    };
+    let border = |at_px: f32| at_px.is_finite().then_some(at_px);
+    BinEntry {
+        index: k,
+        low_px: border(bin.low_px),
+        high_px: border(bin.high_px),
+        scale: bin.scale,
+        width: bin.width,
+        height: bin.height,
+        max_radius_px: bin.max_radius_px,
+        near: bin.near,
+        slot: bin.slot,
+        present: bokeh.is_present(k),
+        picture_share: content().count() as f32 / coc_px.len().max(1) as f32,
+        content_coc_px: Range::of(content()),
+        content_depth_m: depth_m,
+    }
+}

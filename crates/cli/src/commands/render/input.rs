@@ -1,0 +1,164 @@
+//! What `render` blurs: the picture, and the depth that was given, is made, or is found.
+
+use std::path::Path;
+
+use super::RenderCommand;
+use crate::error::CliError;
+use crate::options;
+use crate::plausible;
+use bokehcam::depth::defocus;
+use bokehcam::depth::matting::mask;
+use bokehcam::frame::{ColorImage, DepthMap, Mask};
+use bokehcam::look::Look;
+use bokehcam::optics::StereoRig;
+use bokehcam::pipeline::still::Depth;
+use bokehcam::recording::still::{self, MapFormat};
+use bokehcam::recording::{Extras, snapshot};
+use bokehcam::source::options::DepthUnit;
+use bokehcam::source::photo::{self, PhotoDepth};
+use bokehcam::source::{self, DepthChoice, DepthFrom};
+
+/// What is blurred.
+pub(super) struct Input {
+    pub color: ColorImage,
+    pub extras: Extras,
+    pub depth: Option<Depth>,
+    /// What the depth is, where nobody said and it was found.
+    pub found: Option<Found>,
+}
+
+/// Depth that a photo has without anybody's saying so.
+pub(super) struct Found {
+    pub from: DepthFrom,
+    pub measured: bool,
+    pub by: String,
+}
+
+/// Reads the picture, its metadata, and its depth if there is any. What the command does not name comes from the files
+/// of the snapshot of `--like`, whose depth was refined before and is not refined again.
+pub(super) fn read(command: &RenderCommand, look: &Look) -> Result<Input, CliError> {
+    let sources = command.like.as_ref().map(|like| snapshot::sources(like));
+    let given =
+        command.depth_map.as_deref().map(|file| read_depth(file, command, look)).transpose()?.map(Depth::Measured);
+    let mut found = None;
+    let (color, extras, depth) = match (&command.image, sources) {
+        (None, Some((color, depth))) => {
+            let is_used = given.is_none() && depth.exists();
+            let kept = is_used.then(|| read_depth(&depth, command, look)).transpose()?.map(Depth::Final);
+            let (color, extras) = still::read_photo(&color)?;
+            (color, extras, given.or(kept))
+        }
+        (image, _) => {
+            // clap requires an image without `--like`.
+            let image = image.as_deref().unwrap_or(Path::new(""));
+            let is_open = given.is_none() && command.mask.is_none();
+            let is_open = is_open && matches!(command.blur.depth, DepthChoice::Auto | DepthChoice::Recorded);
+            let image = if is_open { photo::original(image) } else { image.to_owned() };
+            let (color, extras) = still::read_photo(&image)?;
+            let is_wanted = is_open && look.effect.follows_depth();
+            let depth =
+                if is_wanted { photo::depth_of(&image, &color, &command.source_options(), look)? } else { None };
+            let depth = depth.map(|PhotoDepth { map, from, measured, by }| {
+                if from == DepthFrom::Networks {
+                    plausible::warn_of_subject(None, &map, None);
+                }
+                found = Some(Found { from, measured, by });
+                if map.subject_m.is_some() { Depth::Final(map) } else { Depth::Measured(map) }
+            });
+            (color, extras, given.or(depth))
+        }
+    };
+    let mut depth = depth;
+    if let (Some(Depth::Measured(map)), Some(file)) = (&mut depth, &command.depth_map) {
+        still::check_depth_size(file, map.size(), color.size())?;
+        source::find_person(&command.source_options(), look, &color, map);
+    }
+    let made = made_depth(command, look, &color)?;
+    Ok(Input { color, extras, depth: made.or(depth), found })
+}
+
+/// The depth that is made for the picture: from a mask, or by networks; `None` where nothing of that is asked for.
+fn made_depth(command: &RenderCommand, look: &Look, color: &ColorImage) -> Result<Option<Depth>, CliError> {
+    let is_given = command.depth_map.is_some() || command.mask.is_some();
+    match (&command.mask, &command.blur.depth) {
+        (_, DepthChoice::OneCamera(_) | DepthChoice::Defocus) if is_given => {
+            let what = "--depth matte, mono, plate and defocus make the depth: leave --depth-map and --mask out";
+            Err(CliError::Usage(what.to_string()))
+        }
+        (Some(file), _) => {
+            source::refuse_metres(look, "a mask tells")?;
+            let (width, height, share) = still::read_grey(file)?;
+            still::check_mask_size(file, (width, height), color.size())?;
+            let mask = Mask { width, height, share };
+            plausible::warn_of_mask(file, &mask, color);
+            Ok(Some(Depth::Final(mask::depth_around(&mask, color))))
+        }
+        (None, DepthChoice::OneCamera(chosen)) => {
+            let map = source::one_camera::depth_of_picture(chosen, &command.source_options(), look, color)?;
+            plausible::warn_of_subject(Some(chosen), &map, command.image.as_deref());
+            // Around a subject it has its matte already; else its outlines are soft, and are fitted to the picture.
+            Ok(Some(if map.subject_m.is_some() { Depth::Final(map) } else { Depth::Measured(map) }))
+        }
+        (None, DepthChoice::Defocus) => {
+            source::refuse_metres(look, "defocus tells")?;
+            defocus::depth(color).map(Depth::Final).map(Some).ok_or_else(|| {
+                let what = "--depth defocus: the picture is equally sharp all over, or has hardly any edges, so that nothing can be \
+                            told of its depth; --depth mono or --effect blur needs no such difference";
+                CliError::Usage(what.to_string())
+            })
+        }
+        _ => Ok(None),
+    }
+}
+
+/// Reads relative inverse depth as distances in units of the nearest one.
+fn read_inverse_depth(file: &Path, invert: bool) -> Result<DepthMap, CliError> {
+    let (width, height, mut nearness) = match still::map_format(file) {
+        Ok(MapFormat::Pfm) => match still::read_map(file, None, None)? {
+            still::Map::Depth(map) => (map.width, map.height, map.metres),
+            still::Map::Disparity(map, _) => (map.width, map.height, map.px),
+        },
+        _ => still::read_grey(file)?,
+    };
+    let known = nearness.iter().copied().filter(|value| value.is_finite());
+    let (low, high) = known.fold((f32::MAX, f32::MIN), |(low, high), value| (low.min(value), high.max(value)));
+    let scale = 1.0 / (high - low).max(f32::MIN_POSITIVE);
+    for value in &mut nearness {
+        let near = (*value - low) * scale;
+        let near = if invert { 1.0 - near } else { near };
+        *value = if near.is_finite() { DepthMap::relative_m(near) } else { 0.0 };
+    }
+    Ok(DepthMap { width, height, metres: nearness, ..DepthMap::default() })
+}
+
+/// Reads depth in metres from a file of depth or disparity. Disparity without stereo geometry gives depth of unknown
+/// scale, which is an error where the look needs real metres.
+fn read_depth(file: &Path, command: &RenderCommand, look: &Look) -> Result<DepthMap, CliError> {
+    let name = file.display();
+    if command.depth.depth_unit == DepthUnit::Inverse {
+        source::refuse_metres(look, source::INVERSE_TELLS)?;
+        return read_inverse_depth(file, command.depth.depth_invert);
+    }
+    let options::Depth { depth_scale, depth_invalid, .. } = command.depth;
+    let (map, rig) = match still::read_map(file, depth_scale, Some(depth_invalid))? {
+        still::Map::Depth(map) => return Ok(map),
+        still::Map::Disparity(map, rig) => (map, rig),
+    };
+    if depth_scale.is_some() {
+        tracing::warn!("{name}: holds disparity, to which --depth-scale does not apply");
+    }
+    let rig = match (rig, look.needs_metres()) {
+        (Some(rig), _) => rig,
+        (None, None) => {
+            tracing::warn!("{name}: holds disparity without distances: what is near and far is known, and not how far");
+            StereoRig::assumed(map.width)
+        }
+        (None, Some(needs)) => {
+            return Err(CliError::Usage(format!(
+                "{needs} needs distances, and {name} holds disparity without any: write it with `depth --metres`; --focus \
+                 auto or X,Y and --blur need none"
+            )));
+        }
+    };
+    Ok(map.depth(|px| rig.depth_m(px)))
+}

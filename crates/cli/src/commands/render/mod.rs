@@ -1,0 +1,257 @@
+//! `render`: one still picture.
+
+mod debug;
+mod debug_pictures;
+mod input;
+
+use std::fmt::Display;
+use std::path::PathBuf;
+
+use clap::Args;
+
+use input::{Found, Input, read};
+
+use crate::error::CliError;
+use crate::files::{make_folder_of, refuse_overwrite, refuse_source, tell_of_leftovers};
+use crate::focus;
+use crate::log;
+use crate::options;
+use crate::plausible;
+use crate::settings::layers::Given;
+use crate::settings::look;
+use crate::settings::unused;
+use crate::settings::unused::From;
+use crate::terminal;
+use bokehcam::compute::Backend;
+use bokehcam::depth::agreement::Agreement;
+use bokehcam::depth::misfit::Misfit;
+use bokehcam::files::place;
+use bokehcam::frame::{ColorImage, DepthMap};
+use bokehcam::look::{ApertureName, Look, Refine, Strength};
+use bokehcam::pipeline::{self, still::Depth};
+use bokehcam::recording::snapshot;
+use bokehcam::recording::still::{self, MapFormat, PhotoFormat};
+use bokehcam::source::options::DepthUnit;
+use bokehcam::source::photo;
+use bokehcam::source::{self, DepthChoice, DepthFrom, OneCamera, PlateFile};
+
+/// Blur one still picture
+#[derive(Args, Debug)]
+#[command(after_help = "\
+Examples:
+  bokehcam render photo.jpg --depth-map depth.png --out portrait.png
+  bokehcam render photo.jpg --depth-map depth.pfm --focus 0.5,0.4 --aperture polygon:6 --out portrait.png
+  bokehcam render photo.jpg --depth matte --out portrait.png
+  bokehcam render photo.jpg --mask person.png --out portrait.png
+  bokehcam render photo.jpg --depth-map midas.png --depth-unit inverse --out portrait.png
+  bokehcam render photo.jpg --effect tilt-shift --tilt 0.6:0.1:10 --out small-world.png
+  bokehcam render photo.jpg --effect blur --blur 12 --aperture heart --out hearts.png
+  bokehcam render photo.jpg --depth-map depth.png --out portrait.png --debug-dir within/
+  bokehcam render photo.jpg --depth-map depth.png --preset cinematic --out film.png
+  bokehcam render --like snapshot.png --rim 0.1 --out another.png")]
+pub struct RenderCommand {
+    /// The picture, PNG or JPEG [default: the one that the snapshot of --like was made of]
+    #[arg(required_unless_present = "like")]
+    image: Option<PathBuf>,
+    /// Its depth: 16-bit grey PNG, or PFM in metres; or disparity that `depth` wrote
+    #[arg(long, value_name = "FILE")]
+    depth_map: Option<PathBuf>,
+    /// A mask of the subject, PNG or JPEG, of any size: white is the subject, which stays sharp
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["depth_map", "like"])]
+    mask: Option<PathBuf>,
+    /// Take the settings of a snapshot of the preview; flags go before them. Without IMAGE, its NAME-color.png and, without
+    /// --depth-map, its NAME-depth.pfm are blurred, which gives the same picture again
+    #[arg(long, value_name = "NAME.png")]
+    like: Option<PathBuf>,
+    /// Where the result goes, .png or .jpg
+    #[arg(long, alias = "to", value_name = "FILE")]
+    out: PathBuf,
+    /// Write every intermediate of the blur into this folder: the CoC, each bin before and after its filters, what
+    /// near objects hide, as PNG, and plan.json (CPU executor)
+    #[arg(long, value_name = "DIR")]
+    debug_dir: Option<PathBuf>,
+    #[command(flatten)]
+    blur: options::Blur,
+    #[command(flatten)]
+    depth: options::Depth,
+    #[command(flatten)]
+    networks: options::Networks,
+    #[command(flatten)]
+    computing: options::Computing,
+    #[command(flatten)]
+    output: options::Output,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// A picture cannot be read or written, the options do not fit it, or the blur failed.
+pub fn run(command: &RenderCommand, global: &options::Global, given: &Given) -> Result<(), CliError> {
+    let plan_file = command.debug_dir.as_ref().map(|dir| dir.join(debug::PLAN));
+    refuse_overwrite([command.out.as_path()].into_iter().chain(plan_file.as_deref()), command.output.force)?;
+    let sources = sources(command);
+    for source in &sources {
+        refuse_source("--out", &command.out, source)?;
+        // The files in that folder have fixed names, of which the source may have one.
+        if let Some(dir) = command.debug_dir.as_ref().filter(|_| command.output.force)
+            && source.parent().is_some_and(|folder| place::resolved(folder) == place::resolved(dir))
+        {
+            refuse_source("--debug-dir", dir, source)?;
+        }
+    }
+    let elsewhere = match &command.blur.depth {
+        DepthChoice::Folder(folder) => Some(folder.display().to_string()),
+        DepthChoice::Device(name) => Some(name.clone()),
+        DepthChoice::Stereo => Some("stereo".to_owned()),
+        _ => None,
+    };
+    if let Some(name) = elsewhere {
+        return Err(CliError::Usage(format!(
+            "--depth {name}: {}a folder, two eyes or a depth camera are for `stream`; a picture's depth is given by --depth-map \
+             FILE, or made by --depth matte",
+            DepthChoice::hint(&name)
+        )));
+    }
+    let look = look::look(&command.blur, &command.computing.quality)?;
+    let Input { color, extras, depth, found } = read(command, &look)?;
+    let look = source::fitting_look(&look, &command.blur.depth, depth.is_some())?;
+    plausible::warn_of_lens(&look);
+    plausible::warn_of_depth_scale(command.depth.depth_scale);
+    command.warn(&look, &color, (depth.as_ref(), found.as_ref()), given);
+    // As a stream of it does.
+    let look = match &found {
+        Some(found) if look.refine == Refine::Auto => {
+            Look { refine: if found.measured { Refine::On } else { Refine::Off }, ..look }
+        }
+        _ => look,
+    };
+    let computing = command.computing.choice();
+    make_folder_of(&command.out)?;
+    tell_of_leftovers([command.out.as_path()]);
+    let (result, executor) = match &command.debug_dir {
+        Some(dir) => debug::blurred(color, depth, &look, &computing, (dir, command.output.force))?,
+        None => pipeline::still::blur(&look, color, depth, &computing)?,
+    };
+    // The thumbnail in the photo's metadata would show what the blur hides.
+    let mut extras = extras.without_thumbnail();
+    if still::photo_format(&command.out)? == PhotoFormat::Jpeg {
+        extras = extras.for_jpeg();
+    }
+    still::write_photo(&command.out, &result, &extras, command.output.force)?;
+    if !global.quiet {
+        if !extras.left_behind.is_empty() {
+            log::note(&format!("not in {}: {}", command.out.display(), extras.left_behind.join(", ")));
+        }
+        found.iter().for_each(|found| terminal::say(&format!("depth by {}", found.by)));
+        terminal::say(&format!("{}: written ({executor})", command.out.display()));
+    }
+    Ok(())
+}
+
+impl RenderCommand {
+    /// How the picture's depth is found, if at all.
+    fn source_options(&self) -> source::Options {
+        source::Options {
+            // A depth camera's.
+            depth: options::Depth { depth_calibration: None, ..self.depth.clone() },
+            networks: self.networks.clone(),
+            depth_choice: self.blur.depth.clone(),
+            computing: self.computing.choice(),
+            ..source::Options::default()
+        }
+    }
+
+    /// Warns of settings without effect, and of a focus outside the depth of the picture.
+    fn warn(&self, look: &Look, color: &ColorImage, (depth, found): (Option<&Depth>, Option<&Found>), given: &Given) {
+        let in_units = |file: &PathBuf| still::map_format(file).is_ok_and(|format| format == MapFormat::Png);
+        let in_units = self.depth_map.as_ref().is_some_and(in_units);
+        let is_inverse = self.depth_map.is_some() && self.depth.depth_unit == DepthUnit::Inverse;
+        let uses_depth = look.effect.follows_depth();
+        unused::warn(
+            &given.settings,
+            &unused::Run {
+                source: From::Picture,
+                depth: match (depth, found) {
+                    (None, _) => DepthFrom::Nothing,
+                    (_, Some(found)) => found.from,
+                    (Some(Depth::Measured(_)), _) if is_inverse => DepthFrom::Relative,
+                    (Some(Depth::Measured(_)), _) if in_units => DepthFrom::Units,
+                    (Some(_), _) => DepthFrom::Metres,
+                },
+                uses_depth,
+                effect: look.effect,
+                lens: matches!(look.strength, Strength::Lens(_)),
+                realtime: false,
+                cpu_only: self.computing.backend == Backend::Cpu,
+                compresses: false,
+                window: false,
+            },
+        );
+        match depth {
+            None if self.blur.takes_whatever_depth() => unused::warn_of_no_depth(From::Picture),
+            Some(_) if self.depth_map.is_some() && !uses_depth => {
+                log::warn("--depth-map has no effect: the effect does not use depth");
+            }
+            Some(Depth::Measured(map))
+                if self.depth_map.as_ref().is_some_and(|file| self.warn_of_map(&file.display(), map, color))
+                    || found.is_some_and(|found| found.measured && self.warn_of_map(&found.by, map, color)) => {}
+            Some(Depth::Measured(map) | Depth::Final(map)) => focus::warn_of_focus(look, color.size(), map, in_units),
+            None => {}
+        }
+        let of_file = self.depth_map.as_ref().map(|file| file.display().to_string());
+        let file = of_file.or_else(|| found.filter(|found| found.measured).map(|found| found.by.clone()));
+        if let (Some(Depth::Measured(map)), Some(file), true) = (depth, file, uses_depth) {
+            say_of_misfit(&file, look, map, color);
+        }
+    }
+}
+
+impl RenderCommand {
+    /// Warns of a depth map that cannot be meant; whether it did.
+    fn warn_of_map(&self, name: &dyn Display, map: &DepthMap, color: &ColorImage) -> bool {
+        let file = self.depth_map.as_deref();
+        let is_scaled = file.is_some_and(|file| still::map_format(file).is_ok_and(|format| format == MapFormat::Pfm));
+        match self.depth.depth_unit {
+            DepthUnit::Inverse => plausible::warn_of_inverse(name, map, color),
+            DepthUnit::Metres => plausible::warn_of_map(name, map, is_scaled || self.depth.depth_scale.is_some()),
+        }
+    }
+}
+
+/// Says how a depth map does not fit its picture, and what is done about it.
+fn say_of_misfit(file: &dyn Display, look: &Look, map: &DepthMap, color: &ColorImage) {
+    let Some(misfit) = Misfit::of(map, color) else { return };
+    if misfit.outlines == Agreement::Unrelated {
+        log::warn(&format!(
+            "{file}: nowhere do its outlines meet those of the picture: it may be the depth of another one, or of a camera beside \
+             it that is not registered to the colours"
+        ));
+    } else if look.refine == Refine::Auto {
+        log::note(&format!("{file}: refined, as {misfit}; --refine off takes it as it is"));
+    }
+}
+
+/// All files that are read, which the outputs must not replace.
+fn sources(command: &RenderCommand) -> Vec<PathBuf> {
+    let of_snapshot = command.like.iter().flat_map(|like| {
+        let (color, depth) = snapshot::sources(like);
+        [like.clone(), color, depth]
+    });
+    let aperture = match &command.blur.look.0.aperture {
+        Some(ApertureName::Image(file)) => Some(file),
+        _ => None,
+    };
+    let plate = match &command.blur.depth {
+        DepthChoice::OneCamera(OneCamera { plate: Some(PlateFile::At(file)), .. }) => Some(file),
+        _ => None,
+    };
+    [&command.image, &command.depth_map, &command.mask]
+        .into_iter()
+        .flatten()
+        .chain(plate)
+        .chain(aperture)
+        .cloned()
+        .chain(command.image.iter().flat_map(|image| photo::files_of(image)))
+        .chain(of_snapshot)
+        .collect()
+}

@@ -1,0 +1,177 @@
+//! `service`: the camera for calls with every session, by one switch.
+
+mod manager;
+
+use std::path::{Path, PathBuf};
+use std::thread;
+use std::time::Duration;
+
+use clap::{Args, Subcommand};
+
+use manager::{self as systemd, State, Unit};
+
+use crate::error::CliError;
+use crate::files::{make_folder_of, write_whole};
+use crate::log;
+use crate::settings::file;
+use crate::terminal::{print, say};
+use bokehcam::files::input;
+use bokehcam::files::trusted::absolute;
+
+/// Have the camera for calls start with your session, or not
+#[derive(Args, Debug)]
+#[command(after_help = "\
+Examples:
+  bokehcam service on
+  bokehcam service off
+  bokehcam service status
+
+What it streams is one line in ~/.config/bokehcam/stream.conf, such as
+  STREAM=\"C920 --to pipewire --on-demand --preset cinematic\"
+`on` takes it the next time that it starts: `systemctl --user restart bokehcam`. The look comes from your settings file.")]
+pub struct ServiceCommand {
+    #[command(subcommand)]
+    what: Option<What>,
+}
+
+#[derive(Clone, Copy, Debug, Subcommand)]
+enum What {
+    /// Start it now, and with every session from now on
+    On,
+    /// End it now, and start it no more
+    Off,
+    /// Say how it is; so does `service` alone
+    Status,
+}
+
+/// The unit as packages bring it, and the program in it.
+const UNIT: &str = include_str!("../../../../packaging/bokehcam.service");
+const PROGRAM: &str = "/usr/bin/bokehcam";
+/// The longest file of settings that is read.
+const MOST_BYTES: u64 = 64 * 1024;
+/// A stream that cannot start has said so after that.
+const SETTLING: Duration = Duration::from_secs(1);
+
+/// Runs the command.
+///
+/// # Errors
+/// There is no user session of systemd's, the unit cannot be written, or systemd refuses.
+pub fn run(command: &ServiceCommand) -> Result<(), CliError> {
+    match command.what.unwrap_or(What::Status) {
+        What::On => {
+            on(Unit::ask()?)?;
+            thread::sleep(SETTLING);
+            say_how(&Unit::ask()?)
+        }
+        What::Off => off(&Unit::ask()?),
+        What::Status => say_how(&Unit::ask()?),
+    }
+}
+
+fn on(mut unit: Unit) -> Result<(), CliError> {
+    if unit.state == State::Missing {
+        let path = own_unit()?;
+        if path.symlink_metadata().is_err() {
+            write_unit(&path)?;
+            say(&format!("wrote {}, as no package has brought the unit", path.display()));
+        }
+        systemd::tell(&["daemon-reload"])?;
+        unit = Unit::ask()?;
+        if unit.state == State::Missing {
+            let what = "systemd does not take it as a unit: remove it, and `bokehcam service on` writes another";
+            return Err(CliError::Service(format!("{}: {what}", path.display())));
+        }
+    }
+    if let Some(program) = unit.program.as_ref().filter(|program| !program.exists()) {
+        return Err(CliError::Service(format!(
+            "{} starts {}, which is not there: correct or remove it, then `bokehcam service on`",
+            unit.file.display(),
+            program.display()
+        )));
+    }
+    systemd::tell(&["enable", "--now", systemd::NAME])
+}
+
+fn off(unit: &Unit) -> Result<(), CliError> {
+    if unit.state == State::Missing {
+        say("it is off: there is no unit bokehcam.service");
+        return Ok(());
+    }
+    systemd::tell(&["disable", "--now", systemd::NAME])?;
+    say("it is off, and stays off");
+    Ok(())
+}
+
+/// Says how the service is, and where its settings are.
+fn say_how(unit: &Unit) -> Result<(), CliError> {
+    if unit.state == State::Missing {
+        return print(b"off: there is no unit bokehcam.service yet; `bokehcam service on` writes and starts one\n");
+    }
+    let last = || systemd::last_line().map_or_else(String::new, |line| format!("\n  says      {line}"));
+    let is = match unit.state {
+        State::Missing | State::Stopped => "does not run".to_owned(),
+        State::Runs => "runs".to_owned(),
+        State::Waits => format!("tries again every five seconds{}", last()),
+        State::Failed => format!("gave up{}", last()),
+    };
+    let is_on = if unit.is_enabled { "on" } else { "off" };
+    let (streams, from) = streams(&unit.streams)?;
+    print(
+        format!("{is_on}: it {is}\n  streams   {streams}\n  settings  {from}\n  unit      {}\n", unit.file.display())
+            .as_bytes(),
+    )?;
+    if unit.is_enabled && !systemd::has_graphical_session()? {
+        let what = "this desktop does not tell systemd that it has begun (graphical-session.target), so the service does not \
+                    start by itself: have the desktop run `systemctl --user start bokehcam` at its start";
+        log::warn(what);
+    }
+    Ok(())
+}
+
+/// What is streamed, and where that is said: in the user's file, or by the unit's own `usual`.
+fn streams(usual: &str) -> Result<(String, String), CliError> {
+    let no_home =
+        || CliError::Service("there is no folder of settings: neither XDG_CONFIG_HOME nor HOME is a whole path".into());
+    let path = file::user_file().ok_or_else(no_home)?.with_file_name("stream.conf");
+    let text = match input::read_text(&path, MOST_BYTES) {
+        Ok(text) => text,
+        Err(_) if path.symlink_metadata().is_err() => String::new(),
+        Err(error) => return Err(CliError::io(&path)(error)),
+    };
+    // The last one holds, as systemd reads it.
+    let stated = text.lines().filter_map(|line| line.trim().strip_prefix("STREAM=")).next_back();
+    Ok(match stated {
+        Some(stated) => (stated.trim_matches(['"', '\'']).to_owned(), path.display().to_string()),
+        None => (usual.to_owned(), format!("{} would have others: STREAM=\"...\"", path.display())),
+    })
+}
+
+/// Where the user's own unit is.
+fn own_unit() -> Result<PathBuf, CliError> {
+    let config = absolute("XDG_CONFIG_HOME").or_else(|| Some(absolute("HOME")?.join(".config")));
+    let no_folder =
+        || CliError::Service("there is no folder for units: neither XDG_CONFIG_HOME nor HOME is a whole path".into());
+    Ok(config.ok_or_else(no_folder)?.join("systemd/user").join(systemd::NAME))
+}
+
+/// Writes the unit with this very program in it.
+fn write_unit(path: &Path) -> Result<(), CliError> {
+    let program = std::env::current_exe().map_err(CliError::io("this program".as_ref()))?;
+    let name = program
+        .to_str()
+        .ok_or_else(|| CliError::Usage(format!("{}: systemd takes names in UTF-8 alone", program.display())))?;
+    let quoted = name.replace('\\', "\\\\").replace('"', "\\\"").replace('%', "%%");
+    make_folder_of(path)?;
+    let unit = UNIT.replace(&format!("ExecStart={PROGRAM} "), &format!("ExecStart=\"{quoted}\" "));
+    write_whole(path, unit.as_bytes(), false)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_unit_starts_one_program() {
+        assert_eq!(UNIT.matches(&format!("ExecStart={PROGRAM} ")).count(), 1);
+    }
+}

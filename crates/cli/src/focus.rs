@@ -1,0 +1,72 @@
+//! Whether a focus in metres and a depth map speak of the same distances.
+
+use super::log;
+use bokehcam::depth::focus::FocusRule;
+use bokehcam::frame::DepthMap;
+use bokehcam::look::{CocRule, Look};
+use bokehcam::optics::{CocField, DepthCoc};
+
+/// So much of a map on one side of the focal plane, and blurred, is all of it: the rest is noise.
+const NEARLY_ALL: f32 = 0.99;
+/// What has a smaller radius is sharp, in pixels.
+const SHARP_PX: f32 = 1.0;
+
+/// Warns of a focus in metres that nothing in `map` is near, and of a map that knows no distance; `in_units` says that
+/// `--depth-scale` makes metres of it. The picture has `size` pixels.
+pub fn warn_of_focus(look: &Look, size: (u32, u32), map: &DepthMap, in_units: bool) {
+    let (FocusRule::Metres(focus_m), CocRule::Depth { lens, range_m, max_coc_px, .. }) =
+        (look.focus, look.coc_rule(size))
+    else {
+        return;
+    };
+    if let CocField::Depth(coc) = lens.field((focus_m, range_m), size.0, max_coc_px)
+        && let Some(why) = out_of_focus(&coc, map)
+    {
+        let scale = if in_units { "; is --depth-scale that of this depth?" } else { "" };
+        log::warn(&format!("--focus {focus_m}: {why}{scale}"));
+    }
+}
+
+/// Why nothing is sharp, where that is so.
+fn out_of_focus(coc: &DepthCoc, map: &DepthMap) -> Option<String> {
+    let mut known: Vec<f32> = map.metres.iter().copied().filter(|&metres| DepthMap::is_known(metres)).collect();
+    if known.is_empty() {
+        return Some("no depth is known anywhere".to_string());
+    }
+    let share = |is_there: &dyn Fn(f32) -> bool| {
+        known.iter().filter(|&&metres| is_there(coc.coc_px(metres))).count() as f32 / known.len() as f32
+    };
+    let side = match (share(&|coc_px| coc_px > SHARP_PX), share(&|coc_px| coc_px < -SHARP_PX)) {
+        (behind, _) if behind >= NEARLY_ALL => "beyond",
+        (_, before) if before >= NEARLY_ALL => "before",
+        _ => return None,
+    };
+    let mut at = |share: f32| {
+        let index = (share * (known.len() - 1) as f32).round() as usize;
+        *known.select_nth_unstable_by(index, f32::total_cmp).1
+    };
+    let (nearest_m, farthest_m) = (at(1.0 - NEARLY_ALL), at(NEARLY_ALL));
+    Some(format!(
+        "the depth lies from {nearest_m:.3} to {farthest_m:.3} m, all of it {side} that, and nothing is sharp"
+    ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn depth_on_one_side_of_the_focus_is_found_and_a_little_noise_does_not_hide_it() {
+        let coc = DepthCoc { coc_at_infinity_px: 16.0, focus_m: 1.5, range_m: 0.0, max_coc_px: 40.0 };
+        let map = |metres: Vec<f32>| DepthMap { width: metres.len() as u32, height: 1, metres, ..DepthMap::default() };
+        let metres = |scale: f32| (0..1000).map(|k| (0.5 + k as f32 * 0.004) * scale).collect::<Vec<f32>>();
+        assert_eq!(out_of_focus(&coc, &map(metres(1.0))), None);
+        let far = out_of_focus(&coc, &map(metres(5.0))).unwrap();
+        assert!(far.contains("from 2.7") && far.contains("beyond"), "{far}");
+        let mut noisy = metres(5.0);
+        noisy[..5].fill(1.5);
+        assert!(out_of_focus(&coc, &map(noisy)).is_some());
+        assert!(out_of_focus(&coc, &map(metres(0.2))).unwrap().contains("before"));
+        assert!(out_of_focus(&coc, &map(vec![0.0; 9])).unwrap().contains("no depth is known"));
+    }
+}

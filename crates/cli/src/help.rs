@@ -1,0 +1,195 @@
+//! The pages of help: the first has the options that most people need, and `--help-all` shows all.
+
+use clap::{Arg, Command, Id};
+
+use super::settings::table::{GIVEN_TO_WINDOW, STATED_BY_WINDOW, all_settings};
+
+/// The option that shows all of them.
+pub const ALL: &str = "--help-all";
+
+/// The settings on the first page of a command that has them. A window's are on that of a window alone.
+const FIRST: [&str; 20] = [
+    "size",
+    "fps",
+    "loop",
+    "frames",
+    "preset",
+    "depth",
+    "effect",
+    "focus",
+    "blur",
+    "behind",
+    "follow",
+    "aperture",
+    "highlights",
+    "side-by-side",
+    "calib",
+    "quality",
+    "on-demand",
+    "mirror",
+    "force",
+    "full-screen",
+];
+/// Others that single commands have there.
+const ALSO: [(&str, &[&str]); 5] = [
+    ("preview", &["split", "instruments", "fresh"]),
+    ("render", &["depth-unit", "depth-scale", "tilt"]),
+    ("record", &["start", "end", "depth-scale"]),
+    ("dump", &["backend", "threads"]),
+    ("save", &["backend", "threads"]),
+];
+/// Options of single commands that are no settings, or that settings are of less use to, and not on their first page.
+const LESS: [(&str, &[&str]); 6] = [
+    ("stream", &["name", "tray"]),
+    ("preview", &["name", "loop", "frames", "on-demand"]),
+    ("render", &["debug-dir"]),
+    ("bench", &["preset", "depth", "effect", "focus", "blur", "behind", "follow", "aperture", "highlights"]),
+    ("plate", &["loop", "frames"]),
+    ("bokehcam", &["log-format", "config"]),
+];
+/// What a picture on its own has no use for.
+const OF_STREAMS: [&str; 3] = ["follow", "background-memory", "depth-calibration"];
+
+/// Where depth comes from, for streams.
+pub const DEPTH: &str = "\
+Where depth comes from:
+  auto          the source's own; a lone camera's or photo's from an installed network
+  recorded      the source's own
+  stereo        its two eyes
+  none          nowhere: for the effects that need none
+  matte[:FILE]  a network that finds the person: FILE.onnx, or the best that is installed
+  mono[:FILE]   a network that tells near from far; matte,mono is both together
+  plate[:FILE]  a picture of what is behind you, taken at the start if there is no FILE
+                (the camera stands still)
+  FOLDER        a recording, whose depth is played in a loop
+  CAMERA        a depth camera: /dev/videoN, N, or part of its name";
+
+/// The same for a picture on its own.
+const DEPTH_OF_PICTURE: &str = "\
+Where depth comes from:
+  auto          NAME-depth.png or .pfm beside the picture NAME, else an installed network
+  recorded      the file beside it alone
+  none          nowhere: for the effects that need none
+  matte[:FILE]  a network that finds the person: FILE.onnx, or the best that is installed
+  mono[:FILE]   a network that tells near from far; matte,mono is both together
+  plate:FILE    a picture of what is behind the person
+  defocus       how sharp the picture is where, which is magnified";
+
+/// Settings of which less is to be said where there is but one picture.
+const OF_PICTURE: [(&str, &str); 4] = [
+    ("quality", "Quality level: changes fidelity, never the amount of blur"),
+    ("refine", "Whether depth is fitted to the picture: edges onto colour edges, less noise"),
+    ("threads", "Threads of the CPU backend [default: one per core]"),
+    ("depth-scale", "Units of a 16-bit depth picture per metre (TUM 5000, millimetres 1000) [default: 5000]"),
+];
+
+/// A command's help as it is where all of its options are shown.
+pub fn whole(command: Command) -> Command {
+    command.mut_subcommand("render", |render| {
+        render.mut_args(|arg| match arg.get_long() {
+            Some(name) if OF_STREAMS.contains(&name) => arg.hide(true),
+            Some("depth") => arg
+                .help("Where depth comes from: auto, matte, mono, plate:FILE, defocus or none")
+                .long_help(DEPTH_OF_PICTURE),
+            Some(name) => match OF_PICTURE.iter().find(|(of, _)| *of == name) {
+                Some((_, help)) => arg.help(*help),
+                None => arg,
+            },
+            None => arg,
+        })
+    })
+}
+
+/// The same with the options hidden that are not on the first pages.
+pub fn first(command: Command) -> Command {
+    let settings = all_settings();
+    let ids: Vec<&Id> = settings.get_arguments().map(Arg::get_id).collect();
+    page(command, &ids)
+}
+
+fn page(command: Command, settings: &[&Id]) -> Command {
+    let name = command.get_name().to_owned();
+    let listed = |table: &[(&str, &[&str])], option: &str| {
+        table.iter().any(|(command, options)| *command == name && options.contains(&option))
+    };
+    let is_windows = |option: &str| STATED_BY_WINDOW.contains(&option) || GIVEN_TO_WINDOW.contains(&option);
+    let is_first = |option: &str| FIRST.contains(&option) && (name == "preview" || !is_windows(option));
+    let is_more = |arg: &Arg| {
+        let option = arg.get_long().unwrap_or_default();
+        let is_listed = !settings.contains(&arg.get_id()) || is_first(option) || listed(&ALSO, option);
+        !arg.is_hide_set() && (!is_listed || listed(&LESS, option))
+    };
+    let more = command.get_arguments().filter(|arg| is_more(arg)).count();
+    let command = command.mut_args(|arg| if is_more(&arg) { arg.hide(true) } else { arg });
+    let rest = command.get_after_help().map(ToString::to_string).unwrap_or_default();
+    let command = if more == 0 { command } else { command.after_help(format!("{more} more options: {ALL}\n\n{rest}")) };
+    command.mut_subcommands(|below| page(below, settings))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::commands::Cli;
+    use clap::CommandFactory;
+
+    fn shown(command: &Command) -> Vec<String> {
+        let shown = command.get_arguments().filter(|arg| !arg.is_hide_set());
+        shown.filter_map(|arg| arg.get_long().map(str::to_owned)).collect()
+    }
+
+    /// The built command `path`, on its first page and whole.
+    fn pages(path: &[&str]) -> [Command; 2] {
+        [first(whole(Cli::command())), whole(Cli::command())].map(|mut command| {
+            command.build();
+            path.iter().fold(command, |command, name| command.find_subcommand(name).unwrap().clone())
+        })
+    }
+
+    #[test]
+    fn first_pages_are_short_and_nothing_is_missing_on_the_last() {
+        for path in [
+            &["stream"][..],
+            &["preview"],
+            &["render"],
+            &["bench"],
+            &["record"],
+            &["plate"],
+            &["depth"],
+            &["config", "dump"],
+            &["config", "save"],
+            &["ctl", "on"],
+        ] {
+            if path[0] == "preview" && !cfg!(feature = "window") {
+                continue;
+            }
+            let [few, all] = pages(path);
+            let (few, all) = (shown(&few), shown(&all));
+            assert!(few.len() <= 25, "{path:?}: {} of {}: {few:?}", few.len(), all.len());
+            assert!(few.iter().all(|option| all.contains(option)), "{path:?}");
+            let command = pages(path)[1].clone();
+            let useless = |option: &str| path == ["render"] && OF_STREAMS.contains(&option);
+            for option in command.get_arguments().filter_map(Arg::get_long) {
+                assert!(all.iter().any(|shown| shown == option) || useless(option), "{path:?}: {option}");
+            }
+        }
+        assert!(shown(&pages(&["ctl", "on"])[0]).len() <= 5);
+    }
+
+    #[test]
+    fn every_option_of_the_tables_is_there() {
+        for (name, options) in ALSO.iter().chain(&LESS) {
+            let path: &[&str] = match *name {
+                "bokehcam" => &[],
+                "dump" | "save" => &["config", name],
+                _ => &[name],
+            };
+            if path == ["preview"] && !cfg!(feature = "window") {
+                continue;
+            }
+            let [_, whole] = pages(path);
+            for option in *options {
+                assert!(whole.get_arguments().any(|arg| arg.get_long() == Some(option)), "{name}: {option}");
+            }
+        }
+    }
+}

@@ -1,0 +1,84 @@
+//! The command line: arguments to options, and one function per command.
+
+#![allow(missing_docs)]
+
+mod commands;
+mod controlled;
+mod error;
+mod files;
+mod focus;
+mod help;
+mod log;
+#[cfg(feature = "networks")]
+mod networks_apart;
+mod options;
+mod parse;
+#[doc(hidden)]
+pub mod parsers;
+mod plausible;
+mod report;
+mod screen;
+mod settings;
+mod sinks;
+mod terminal;
+
+use std::ffi::OsString;
+use std::process::ExitCode;
+
+pub use error::CliError;
+use parse::{Parsed, Refusal};
+use settings::file::SettingsFile;
+use settings::layers::Layers;
+use settings::{arguments, environment};
+
+/// Runs the program. What goes wrong becomes one line on stderr and an exit code: 1 at run time, 2 in the arguments.
+pub fn run(args: impl IntoIterator<Item = OsString>) -> ExitCode {
+    let args: Vec<OsString> = args.into_iter().collect();
+    #[cfg(feature = "networks")]
+    if networks_apart::is_asked_for(&args) {
+        return networks_apart::serve();
+    }
+    let args = arguments::joined(args);
+    #[cfg(feature = "lab")]
+    bokehcam::capture::synthetic::bring(|format| Ok(Box::new(bokehcam_lab::synthetic::Synthetic::new(format)?)));
+    log::tell_of_panics();
+    log::write_as(arguments::log_format(&args));
+    let code = run_to_end(&args);
+    log::flush();
+    code
+}
+
+/// Parses the arguments and runs the command; what it logs may still be waiting to be printed afterwards.
+fn run_to_end(args: &[OsString]) -> ExitCode {
+    let fail = |error: &CliError, from: Option<(&SettingsFile, &Layers)>| {
+        log::error(&environment::with_origin(&error.to_string(), args, error.is_wrong_argument(), from));
+        error.exit_code()
+    };
+    let Parsed { cli, matches, file, layers } = match parse::parse(args) {
+        Ok(parsed) => parsed,
+        Err(Refusal::Settings(error)) => return fail(&error, None),
+        Err(Refusal::Arguments(error)) => return arguments::refuse(&error, args),
+    };
+    log::start(&cli.global);
+    #[cfg(feature = "networks")]
+    bokehcam::network::apart::make_possible();
+    environment::warn_of_unknown();
+    match commands::perform(cli, &matches, &file, &layers) {
+        Ok(()) => ExitCode::SUCCESS,
+        // Whoever read our output has seen enough.
+        Err(error) if error.is_broken_pipe() => ExitCode::SUCCESS,
+        Err(error) => fail(&error, Some((&file, &layers))),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::CommandFactory;
+
+    use super::*;
+
+    #[test]
+    fn the_definition_is_consistent() {
+        settings::table::with_environment(commands::Cli::command()).debug_assert();
+    }
+}

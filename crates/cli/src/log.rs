@@ -1,0 +1,286 @@
+//! Everything that goes to stderr: log lines, messages, errors; as text, or as one JSON object a line.
+//!
+//! All of it goes through one [`Screen`].
+
+use std::borrow::Cow;
+use std::fmt;
+use std::io::{self, IsTerminal, Write};
+use std::sync::OnceLock;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use clap::error::ContextKind;
+use serde_json::json;
+use tracing::{Event, Level, Subscriber};
+use tracing_subscriber::EnvFilter;
+use tracing_subscriber::fmt::format::{Format, Writer};
+use tracing_subscriber::fmt::time::{FormatTime, SystemTime};
+use tracing_subscriber::fmt::{FmtContext, FormatEvent, FormatFields, MakeWriter};
+use tracing_subscriber::registry::LookupSpan;
+
+use super::options::{Global, LogFormat};
+use super::screen::Screen;
+
+/// How messages are written; text until [`start`] says otherwise.
+static JSON: AtomicBool = AtomicBool::new(false);
+static QUIET: AtomicBool = AtomicBool::new(false);
+
+/// The only writer to stderr, shared by all threads.
+pub fn screen() -> &'static Screen {
+    static SCREEN: OnceLock<Screen> = OnceLock::new();
+    let lost = |lines: u64| encoded("WARN", &format!("{lines} lines are missing: the terminal took none for too long"));
+    SCREEN.get_or_init(|| Screen::new(io::stderr(), lost))
+}
+
+/// Chooses how messages are written: also for what is wrong before the arguments are understood.
+pub fn write_as(format: LogFormat) {
+    JSON.store(format == LogFormat::Json, Ordering::Relaxed);
+}
+
+/// Installs the logger. Its level comes from `RUST_LOG`, else from `-v` or `-q`, else it is that of warnings.
+pub fn start(global: &Global) {
+    write_as(global.log_format);
+    QUIET.store(global.quiet, Ordering::Relaxed);
+    let level = match (global.quiet, global.verbose) {
+        (true, _) => "error",
+        // Warnings of other crates are rarely of use to the user. sctk_adwaita, which draws window frames, even logs
+        // errors wherever no desktop portal answers.
+        (_, 0) => "bokehcam=warn,sctk_adwaita=off,error",
+        (_, 1) => "bokehcam=info,warn",
+        (_, _) => "bokehcam=debug,info",
+    };
+    let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new(level));
+    let no_color = std::env::var_os("NO_COLOR").is_some_and(|value| !value.is_empty());
+    let log = tracing_subscriber::fmt().with_env_filter(filter).with_writer(LogLines);
+    let full = tracing_subscriber::fmt::format();
+    let log = log.with_ansi(io::stderr().is_terminal() && !no_color);
+    // It fails if there is a logger already, as in tests; that one stays.
+    let _ = match global.log_format {
+        LogFormat::Text => log.event_format(ForPeople(full)).try_init(),
+        LogFormat::Json => log.json().try_init(),
+    };
+}
+
+/// A message of one or more lines.
+pub fn say(text: &str) {
+    message("INFO", text);
+}
+
+/// A warning, unless `--quiet` is given.
+pub fn warn(what: &str) {
+    remark("WARN", "warning", what);
+}
+
+/// What is done that was not asked for, unless `--quiet` is given.
+pub fn note(what: &str) {
+    remark("INFO", "note", what);
+}
+
+fn remark(level: &str, name: &str, what: &str) {
+    match JSON.load(Ordering::Relaxed) {
+        _ if QUIET.load(Ordering::Relaxed) => {}
+        true => message(level, what),
+        false => message(level, &format!("{name}: {}", printable(what, &[]))),
+    }
+}
+
+/// What went wrong, in one line.
+pub fn error(what: &str) {
+    match JSON.load(Ordering::Relaxed) {
+        true => message("ERROR", what),
+        false => message("ERROR", &format!("error: {}", printable(what, &[]))),
+    }
+}
+
+fn message(level: &str, text: &str) {
+    screen().print(encoded(level, text).as_bytes());
+}
+
+/// Most characters of a line that are printed: names and values of others may be of any length.
+const MOST_CHARS: usize = 1000;
+/// Of a longer line, so many at its end.
+const LAST_CHARS: usize = 300;
+
+/// A text whose lines are at most [`MOST_CHARS`] long: of longer ones the start and the end, and how much is left out between.
+fn cut(text: &str) -> Cow<'_, str> {
+    // A character has a byte at least.
+    if text.split('\n').all(|line| line.len() <= MOST_CHARS) {
+        return text.into();
+    }
+    let cut = |line: &str| {
+        let chars = line.chars().count();
+        if chars <= MOST_CHARS {
+            return line.to_owned();
+        }
+        let place = |at: usize| line.char_indices().nth(at).map_or(line.len(), |(place, _)| place);
+        let (first, last) = (MOST_CHARS - LAST_CHARS, chars - LAST_CHARS);
+        format!("{} ... ({} characters) ... {}", &line[..place(first)], last - first, &line[place(last)..])
+    };
+    text.split('\n').map(cut).collect::<Vec<_>>().join("\n").into()
+}
+
+/// A message as it is printed, with its line end: as text, or as a JSON object in the logger's own form.
+fn encoded(level: &str, text: &str) -> String {
+    let text = &*cut(text);
+    if !JSON.load(Ordering::Relaxed) {
+        return format!("{}\n", printable(text, &['\n']));
+    }
+    let mut timestamp = String::new();
+    // It fails only without a clock: then the time stays empty.
+    let _ = SystemTime.format_time(&mut Writer::new(&mut timestamp));
+    let object = json!({"timestamp": timestamp, "level": level, "fields": {"message": text}, "target": "bokehcam"});
+    format!("{object}\n")
+}
+
+/// Waits until everything that was said is written, but not for a terminal that takes nothing.
+pub fn flush() {
+    screen().flush();
+}
+
+/// Makes panics go through [`screen`], too: a thread that panics must neither wait for the terminal nor keep others
+/// waiting for it.
+pub fn tell_of_panics() {
+    std::panic::set_hook(Box::new(|panic| {
+        // It is caught, and becomes an error that is reported elsewhere.
+        if bokehcam::compute::is_catching_panics() {
+            return;
+        }
+        let thread = std::thread::current();
+        let backtrace = std::backtrace::Backtrace::capture();
+        let text = format!("thread '{}' {panic}", thread.name().unwrap_or("unnamed"));
+        match backtrace.status() {
+            std::backtrace::BacktraceStatus::Captured => message("ERROR", &format!("{text}\n{backtrace}")),
+            _ => message("ERROR", &text),
+        }
+    }));
+}
+
+/// Escapes, as in Rust source, control characters and those that change the direction of writing, except `keep`: names
+/// of files and devices may hold anything, and a terminal obeys what it is sent.
+pub fn printable<'a>(text: &'a str, keep: &[char]) -> Cow<'a, str> {
+    let is_bidi = |c: char| matches!(c, '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}');
+    let risky = |c: char| (c.is_control() || is_bidi(c) || matches!(c, '\u{2028}' | '\u{2029}')) && !keep.contains(&c);
+    if !text.contains(risky) {
+        return text.into();
+    }
+    let mut escaped = String::with_capacity(text.len() + 8);
+    for c in text.chars() {
+        if risky(c) { escaped.extend(c.escape_default()) } else { escaped.push(c) }
+    }
+    escaped.into()
+}
+
+/// Our own warnings and errors as messages are written; all else with its time and place.
+struct ForPeople(Format);
+
+impl<S, N> FormatEvent<S, N> for ForPeople
+where
+    S: Subscriber + for<'a> LookupSpan<'a>,
+    N: for<'a> FormatFields<'a> + 'static,
+{
+    fn format_event(&self, context: &FmtContext<'_, S, N>, mut to: Writer<'_>, event: &Event<'_>) -> fmt::Result {
+        let metadata = event.metadata();
+        let is_ours = metadata.target().starts_with("bokehcam");
+        let name = match *metadata.level() {
+            Level::ERROR if is_ours => "error",
+            Level::WARN if is_ours => "warning",
+            _ => return self.0.format_event(context, to, event),
+        };
+        write!(to, "{name}: ")?;
+        context.field_format().format_fields(to.by_ref(), event)?;
+        writeln!(to)
+    }
+}
+
+/// Collects each event of the logger in one [`LogLine`].
+struct LogLines;
+
+/// The text of one event, printed as a whole when it is dropped.
+struct LogLine(Vec<u8>);
+
+impl MakeWriter<'_> for LogLines {
+    type Writer = LogLine;
+
+    fn make_writer(&self) -> LogLine {
+        LogLine(Vec::new())
+    }
+}
+
+impl Write for LogLine {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.0.extend_from_slice(bytes);
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+impl Drop for LogLine {
+    fn drop(&mut self) {
+        let text = String::from_utf8_lossy(&self.0);
+        if JSON.load(Ordering::Relaxed)
+            && let Ok(mut object) = serde_json::from_str::<serde_json::Value>(&text)
+        {
+            let fields = object["fields"].as_object_mut().into_iter().flat_map(|fields| fields.values_mut());
+            for value in fields {
+                if let Some(text) = value.as_str().map(|text| cut(text).into_owned()) {
+                    *value = text.into();
+                }
+            }
+            return screen().print(format!("{object}\n").as_bytes());
+        }
+        let text = cut(text.trim_end_matches('\n'));
+        // The logger's colours need the escape character; it has already escaped those in the texts it was given.
+        let line = printable(&text, &['\x1b']);
+        screen().print(format!("{line}\n").as_bytes());
+    }
+}
+
+/// clap's message of several paragraphs as one line, without its usage and help hints; without a tip, too, where all values
+/// are listed.
+pub fn one_line(error: &clap::Error) -> String {
+    let text = error.render().to_string();
+    let is_hint = |line: &&str| {
+        let is_tip = line.starts_with("tip:") && error.get(ContextKind::ValidValue).is_some();
+        is_tip || line.starts_with("Usage:") || line.starts_with("For more information")
+    };
+    let lines = text.lines().map(str::trim).filter(|line| !line.is_empty() && !is_hint(line));
+    let mut sentence = String::new();
+    for line in lines {
+        let separator = match sentence.chars().last() {
+            None => "",
+            Some(':' | '.') => " ",
+            // A list of possible values belongs to what is before it.
+            Some(_) if line.starts_with('[') => " ",
+            Some(_) => "; ",
+        };
+        sentence.push_str(separator);
+        sentence.push_str(line.strip_prefix("error: ").unwrap_or(line));
+    }
+    sentence
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn of_a_long_line_its_start_and_its_end_are_printed() {
+        assert!(matches!(cut(&"x".repeat(MOST_CHARS)), Cow::Borrowed(_)));
+        let name = "ä".repeat(50_000);
+        let text = format!("short\nrgb.txt:7: {name}.png is missing\n");
+        let lines: Vec<String> = cut(&text).lines().map(str::to_owned).collect();
+        assert_eq!((lines.len(), lines[0].as_str()), (2, "short"));
+        assert!(lines[1].starts_with("rgb.txt:7: ää") && lines[1].ends_with("ä.png is missing"), "{}", lines[1]);
+        assert!(lines[1].contains("ä ... (49026 characters) ... ä"), "{}", lines[1]);
+        assert!(lines[1].chars().count() < MOST_CHARS + 40 && text.ends_with('\n') && cut(&text).ends_with('\n'));
+    }
+
+    #[test]
+    fn what_a_terminal_would_obey_is_spelt_out() {
+        assert_eq!(printable("a\x1b[2Jb\u{9b}31m\r\u{202e}\n", &['\n']), "a\\u{1b}[2Jb\\u{9b}31m\\r\\u{202e}\n");
+        assert_eq!(printable("ä 木\n", &[]), "ä 木\\n");
+        assert!(matches!(printable("plain ünïcode", &[]), Cow::Borrowed(_)));
+    }
+}

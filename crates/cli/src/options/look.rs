@@ -1,0 +1,84 @@
+//! The settings of a look, by their table, as options of commands.
+
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+use clap::{Arg, ArgMatches, Args, Command, FromArgMatches};
+
+use bokehcam::look::settings::{Group, Setting};
+use bokehcam::look::{Patch, SETTINGS};
+use bokehcam::names::Named;
+
+/// Settings of a look: with `QUALITY` how finely it is computed, else all others.
+#[derive(Clone, Debug, Default)]
+pub struct LookSettings<const QUALITY: bool>(pub Patch);
+
+impl<const QUALITY: bool> LookSettings<QUALITY> {
+    fn settings() -> impl Iterator<Item = &'static Setting> {
+        SETTINGS.iter().filter(|setting| (setting.group == Group::Computing) == QUALITY)
+    }
+}
+
+impl<const QUALITY: bool> Args for LookSettings<QUALITY> {
+    fn augment_args(command: Command) -> Command {
+        command.args(Self::settings().map(option))
+    }
+
+    fn augment_args_for_update(command: Command) -> Command {
+        Self::augment_args(command)
+    }
+}
+
+impl<const QUALITY: bool> FromArgMatches for LookSettings<QUALITY> {
+    fn from_arg_matches(matches: &ArgMatches) -> Result<Self, clap::Error> {
+        let mut found = Self::default();
+        found.update_from_arg_matches(matches)?;
+        Ok(found)
+    }
+
+    fn update_from_arg_matches(&mut self, matches: &ArgMatches) -> Result<(), clap::Error> {
+        for setting in Self::settings() {
+            if let Some(text) = matches.get_one::<String>(setting.id) {
+                setting
+                    .set(&mut self.0, text)
+                    .map_err(|what| clap::Error::raw(clap::error::ErrorKind::InvalidValue, what))?;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// The command-line option of a look's setting; its value stays text, and is only checked here.
+fn option(setting: &'static Setting) -> Arg {
+    let heading = match setting.group {
+        Group::Blur => "Blur",
+        Group::Aperture => "Aperture",
+        Group::Computing => "Computing",
+    };
+    let excluded = SETTINGS.iter().filter(|other| setting.excludes().contains(&other.name)).map(|other| other.id);
+    let choices = (setting.choices)();
+    let arg = Arg::new(setting.id)
+        .long(setting.name)
+        .value_name(setting.value)
+        .help(setting.help.trim_start())
+        .help_heading(heading)
+        .conflicts_with_all(excluded);
+    let arg = match setting.alias() {
+        Some(alias) => arg.alias(alias),
+        None => arg,
+    };
+    let arg = match setting.default() {
+        Some(default) => arg.default_value(default),
+        None => arg,
+    };
+    match choices.is_empty() {
+        true => arg.value_parser(move |text: &str| setting.set(&mut Patch::default(), text).map(|()| text.to_string())),
+        false => arg.value_parser(PossibleValuesParser::new(
+            choices.into_iter().map(|(name, help)| PossibleValue::new(name).help(help)),
+        )),
+    }
+}
+
+/// A parser of values that have names.
+pub fn named<T: Named + Send + Sync>() -> impl TypedValueParser<Value = T> {
+    let values = T::VALUES.iter().map(|value| PossibleValue::new(value.name()).help(value.help()));
+    PossibleValuesParser::new(values).try_map(|name| bokehcam::names::parse::<T>(&name))
+}

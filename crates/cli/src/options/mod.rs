@@ -1,0 +1,162 @@
+//! The options that commands share, in groups: what can be written on the command line, in the environment or in
+//! the settings file, before it means anything.
+
+mod groups;
+mod look;
+#[cfg(feature = "window")]
+mod window;
+
+use std::path::PathBuf;
+
+use clap::Args;
+use clap::builder::{BoolishValueParser, OsStringValueParser, RangedI64ValueParser, TypedValueParser};
+
+pub use bokehcam::source::options::{Depth, Frames, Networks, Stereo};
+pub use groups::{Every, Streaming};
+pub use look::{LookSettings, named};
+
+use crate::help::DEPTH;
+use bokehcam::compute::Backend;
+use bokehcam::computing;
+use bokehcam::look::Effect;
+use bokehcam::look::number::above_zero;
+use bokehcam::names;
+use bokehcam::pipeline::Pace;
+use bokehcam::source::{DepthChoice, Size, SourceName};
+#[cfg(feature = "window")]
+pub use window::Window;
+
+names::named! {
+    /// How log lines are written.
+    pub enum LogFormat default Text {
+        /// For people
+        Text = "text",
+        /// One JSON object a line
+        Json = "json",
+    }
+}
+
+/// Options of every command.
+#[derive(Args, Debug)]
+#[command(next_help_heading = "Everywhere")]
+pub struct Global {
+    /// Tell more; twice for details
+    #[arg(short, long, global = true, action = clap::ArgAction::Count, conflicts_with = "quiet")]
+    pub verbose: u8,
+    /// Tell only what went wrong
+    #[arg(short, long, global = true)]
+    pub quiet: bool,
+    /// How log lines are written to stderr; RUST_LOG chooses which
+    #[arg(long, global = true, value_parser = named::<LogFormat>(), value_name = "FORMAT", default_value = "text")]
+    pub log_format: LogFormat,
+    /// Show all options
+    #[arg(long, global = true, action = clap::ArgAction::HelpLong)]
+    help_all: Option<bool>,
+    /// Settings file instead of $XDG_CONFIG_HOME/bokehcam/config.toml
+    #[arg(long, global = true, value_name = "FILE", env = "BOKEHCAM_CONFIG", hide_env = true)]
+    pub config: Option<PathBuf>,
+}
+
+/// What the blur does.
+#[derive(Args, Clone, Debug)]
+#[command(next_help_heading = "Blur")]
+pub struct Blur {
+    /// A look by name: portrait, cinematic, dreamy, product, miniature, or one of your own ([presets.NAME] in the
+    /// settings file); other settings of the look go before it
+    #[arg(long, value_name = "NAME")]
+    pub preset: Option<String>,
+    /// Where depth comes from: auto, recorded, stereo, none, matte, mono, plate, a folder or a depth camera
+    #[arg(long, value_name = "FROM", default_value = "auto", long_help = DEPTH)]
+    pub depth: DepthChoice,
+    /// The look, but for its quality.
+    #[command(flatten)]
+    pub look: LookSettings<false>,
+}
+
+impl Blur {
+    /// Whether depth is optional: used if the source has any, else left out without an error.
+    pub fn takes_whatever_depth(&self) -> bool {
+        self.look.0.effect == Some(Effect::Auto) && self.depth == DepthChoice::Auto
+    }
+}
+
+/// How finely and on what the blur is computed.
+#[derive(Args, Clone, Debug)]
+#[command(next_help_heading = "Computing")]
+pub struct Computing {
+    /// The quality of the look.
+    #[command(flatten)]
+    pub quality: LookSettings<true>,
+    /// What runs the blur
+    #[arg(long, value_parser = named::<Backend>(), value_name = "WHICH", default_value = "auto")]
+    pub backend: Backend,
+    /// Part of the name of the GPU to take
+    #[arg(long, value_name = "NAME")]
+    pub adapter: Option<String>,
+    /// Threads of the CPU backend, and of a video's encoder [default: one per core]
+    #[arg(long, value_name = "N", value_parser = threads())]
+    pub threads: Option<usize>,
+}
+
+impl Computing {
+    /// The same options for executors.
+    pub fn choice(&self) -> computing::Computing {
+        let Self { backend, adapter, threads, .. } = self.clone();
+        computing::Computing { backend, adapter, threads }
+    }
+}
+
+/// How a stream runs.
+#[derive(Args, Clone, Debug)]
+#[command(next_help_heading = "Stream")]
+pub struct Stream {
+    /// Time that the blur of one frame may take, in milliseconds [default: the frame period]
+    #[arg(long, value_name = "MS", value_parser = above_zero)]
+    pub budget_ms: Option<f32>,
+    /// Whether frames come when they are due, or as fast as they can be written [default: realtime from a camera or
+    /// into a virtual one, else asap]
+    #[arg(long, value_parser = named::<Pace>(), value_name = "HOW")]
+    pub pace: Option<Pace>,
+    /// Picture size of a virtual camera; pictures of another size are fitted into it [default: the source's]
+    #[arg(long, value_name = "WxH")]
+    pub out_size: Option<Size>,
+    /// Close the source's camera while nobody watches the virtual one
+    #[arg(long, value_name = "YES", num_args = 0..=1, require_equals = true, default_value_t = false,
+          default_missing_value = "true", value_parser = BoolishValueParser::new(), hide_default_value = true,
+          hide_possible_values = true)]
+    pub on_demand: bool,
+    /// Mirror the picture, as a mirror does
+    #[arg(long, value_name = "YES", num_args = 0..=1, require_equals = true, default_value_t = false,
+          default_missing_value = "true", value_parser = BoolishValueParser::new(), hide_default_value = true,
+          hide_possible_values = true)]
+    pub mirror: bool,
+    /// Count frames that fail and go on, instead of ending
+    #[arg(long, value_name = "YES", num_args = 0..=1, require_equals = true, default_value_t = false,
+          default_missing_value = "true", value_parser = BoolishValueParser::new(), hide_default_value = true,
+          hide_possible_values = true)]
+    pub keep_going: bool,
+    /// Write what happened to every frame, and how long it took, to this JSON file; - is standard output
+    #[arg(long, value_name = "FILE.json")]
+    pub report: Option<PathBuf>,
+}
+
+/// What may be overwritten.
+#[derive(Args, Clone, Debug)]
+#[command(next_help_heading = "Output")]
+pub struct Output {
+    /// Overwrite what exists, once what replaces it is whole; of a folder, only files that bokehcam wrote
+    #[arg(long, value_name = "YES", num_args = 0..=1, require_equals = true, default_value_t = false,
+          default_missing_value = "true", value_parser = BoolishValueParser::new(), hide_default_value = true,
+          hide_possible_values = true)]
+    pub force: bool,
+}
+
+/// A parser of sources. A folder's name need not be text.
+pub fn source_name() -> impl TypedValueParser<Value = SourceName> {
+    OsStringValueParser::new().try_map(|name| SourceName::from_os(&name))
+}
+
+/// A parser of numbers of threads.
+pub fn threads() -> impl TypedValueParser<Value = usize> {
+    RangedI64ValueParser::<u64>::new().range(1..=1024).map(|threads| threads as usize)
+}

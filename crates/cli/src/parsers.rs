@@ -1,0 +1,47 @@
+//! Entry points for the fuzz targets: parse what users write, without running a command.
+
+use std::ffi::OsString;
+use std::path::Path;
+
+use super::CliError;
+use super::commands::{Command, ConfigCommand};
+use super::log::{one_line, printable};
+use super::parse::{Refusal, parse};
+use super::settings::arguments::joined;
+use super::settings::dump;
+use super::settings::file::SettingsFile;
+
+/// Parses a command line. For `config dump` returns what that would print, for other commands an empty text.
+///
+/// # Errors
+/// The command line is refused: the message that would be printed.
+pub fn arguments(args: &[OsString]) -> Result<String, String> {
+    let parsed = parse(&joined(args.iter().cloned())).map_err(|refusal| {
+        let message = match refusal {
+            Refusal::Arguments(error) => one_line(&error),
+            Refusal::Settings(error) => error.to_string(),
+        };
+        printable(&message, &[]).into_owned()
+    })?;
+    Ok(match parsed.cli.command {
+        Command::Config(ConfigCommand::Dump { .. }) => {
+            dump::as_toml(&parsed.layers.resolved(&parsed.matches), &parsed.file.presets)
+        }
+        _ => String::new(),
+    })
+}
+
+/// Parses the text of a settings file, and looks up each preset in it.
+///
+/// # Errors
+/// It is no settings file.
+pub fn settings(path: &Path, text: &str) -> Result<(), CliError> {
+    let file = SettingsFile::parse(path, text)?;
+    for name in file.presets.keys() {
+        assert!(file.preset(name).is_some(), "the preset {name:?} is there and is not found");
+    }
+    Ok(())
+}
+
+#[cfg(feature = "camera")]
+pub use bokehcam::source::registration::parse as depth_calibration;

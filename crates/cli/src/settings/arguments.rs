@@ -1,0 +1,108 @@
+//! The command line before it is parsed, and the message where it cannot be.
+
+use std::error::Error as _;
+use std::ffi::{OsStr, OsString};
+use std::io;
+use std::os::unix::ffi::{OsStrExt, OsStringExt};
+use std::process::ExitCode;
+
+use clap::error::ErrorKind;
+
+use super::{environment, unknown};
+use crate::error::CliError;
+use crate::log;
+use crate::options::LogFormat;
+use bokehcam::source::SourceError;
+
+/// The arguments, with a number below zero made part of the option that it follows: `--focus -1` is `--focus=-1`, and
+/// not an option `-1`, so that the option can say what it accepts.
+pub fn joined(args: impl IntoIterator<Item = OsString>) -> Vec<OsString> {
+    let mut joined: Vec<OsString> = Vec::new();
+    // Until `--`: what follows that is never an option.
+    let mut are_options = true;
+    for arg in args {
+        let is_number = matches!(arg.as_bytes(), [b'-', b'0'..=b'9' | b'.', ..]);
+        match joined.last_mut() {
+            Some(last) if are_options && is_number && is_open_option(last) => {
+                last.push("=");
+                last.push(arg);
+            }
+            _ => {
+                are_options &= arg != "--";
+                joined.push(arg);
+            }
+        }
+    }
+    joined
+}
+
+/// Whether this is `--name`, without a value.
+fn is_open_option(arg: &OsStr) -> bool {
+    let bytes = arg.as_bytes();
+    bytes.len() > 2 && bytes.starts_with(b"--") && !bytes.contains(&b'=')
+}
+
+/// How messages are to be written, as far as that can be told of arguments that may be wrong.
+pub fn log_format(args: &[OsString]) -> LogFormat {
+    let after = |pair: &[OsString]| pair[0] == "--log-format" && pair[1] == "json";
+    match args.iter().any(|arg| arg == "--log-format=json") || args.windows(2).any(after) {
+        true => LogFormat::Json,
+        false => LogFormat::Text,
+    }
+}
+
+/// Says what is wrong with the arguments; or shows the help that they ask for. Where they name what is not there now, the
+/// fault is the machine's, and the exit code is 1: the same arguments may be right later.
+pub fn refuse(error: &clap::Error, args: &[OsString]) -> ExitCode {
+    match error.kind() {
+        ErrorKind::DisplayHelp | ErrorKind::DisplayVersion => {
+            return match error.print() {
+                Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
+                    log::error(&CliError::io("standard output".as_ref())(error).to_string());
+                    ExitCode::FAILURE
+                }
+                // A closed standard output is no reason to fail.
+                _ => ExitCode::SUCCESS,
+            };
+        }
+        ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand => {
+            let _ = error.print();
+        }
+        ErrorKind::InvalidUtf8 => log::error(&not_text(args)),
+        _ => {
+            let what = unknown::said(error, args).unwrap_or_else(|| log::one_line(error));
+            log::error(&environment::with_origin(&what, args, true, None));
+        }
+    }
+    let names_a_source = error.source().and_then(|cause| cause.downcast_ref::<SourceError>());
+    if names_a_source.is_some_and(|error| !error.is_wrong_argument()) { ExitCode::FAILURE } else { ExitCode::from(2) }
+}
+
+fn not_text(args: &[OsString]) -> String {
+    let escaped = |arg: &OsString| arg.clone().into_vec().escape_ascii().to_string();
+    let which = args.iter().find(|arg| arg.to_str().is_none()).map(escaped);
+    format!("'{}' is no text in UTF-8: rename it, or name a link to it", which.unwrap_or_default())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn args(words: &[&str]) -> Vec<OsString> {
+        words.iter().map(OsString::from).collect()
+    }
+
+    #[test]
+    fn numbers_below_zero_belong_to_the_option_before_them() {
+        for (given, expected) in [
+            (&["--focus", "-1"][..], &["--focus=-1"][..]),
+            (&["--focus", "-.5,0.2", "x"], &["--focus=-.5,0.2", "x"]),
+            (&["--focus=1", "-1"], &["--focus=1", "-1"]),
+            (&["a", "-1", "-v"], &["a", "-1", "-v"]),
+            (&["--", "-1"], &["--", "-1"]),
+            (&["--out", "--", "--x", "-1"], &["--out", "--", "--x", "-1"]),
+        ] {
+            assert_eq!(joined(args(given)), args(expected));
+        }
+    }
+}

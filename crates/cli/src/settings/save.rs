@@ -1,0 +1,174 @@
+//! Writing the settings file: what is new goes in, all else in it stays as it was, comments and order included.
+
+use std::fs::{self, File};
+use std::io;
+use std::os::fd::AsFd;
+use std::os::unix::fs::MetadataExt;
+use std::path::{Path, PathBuf};
+
+use toml_edit::{DocumentMut, Item, TableLike, Value};
+
+use super::dump::toml_number;
+use super::file::{self, SettingsFile};
+use super::layers::Setting;
+use super::paths::counted_from;
+use super::table::excluded_by;
+use crate::error::CliError;
+use crate::files::write_whole;
+use crate::terminal;
+use bokehcam::files::input;
+use bokehcam::look::settings;
+
+/// `config save`: the settings given as flags, into the file that was chosen or the user's.
+///
+/// # Errors
+/// No setting was given; the file is no settings file, or cannot be read or written.
+pub fn run(chosen: Option<&Path>, settings: &[Setting]) -> Result<(), CliError> {
+    let here = std::env::current_dir().map_err(CliError::io(".".as_ref()))?;
+    let by_flag = settings.iter().filter(|setting| setting.origin == "flag");
+    let given: Vec<(String, String)> = by_flag
+        .filter_map(|Setting { name, value, .. }| Some((name.clone(), counted_from(&here, name, value.as_deref()?))))
+        .collect();
+    let names: Vec<String> = given.iter().map(|(name, _)| name.clone()).collect();
+    if names.is_empty() {
+        let what = "there is nothing to save: give settings as flags, such as --rim 0.1";
+        return Err(CliError::Usage(what.to_string()));
+    }
+    let path = file_to_save(chosen)?;
+    let excluded = excluded_by(&names);
+    let mut removed: Vec<String> = Vec::new();
+    edit(&path, |document| {
+        let table = document.as_table_mut();
+        let excluded = excluded.iter().map(|name| key_of(table, name).to_owned()).collect::<Vec<_>>();
+        removed = excluded.into_iter().filter(|name| table.remove(name).is_some()).collect();
+        given.iter().for_each(|(name, value)| set(table, name, value));
+        Some(())
+    })?;
+    let without = if removed.is_empty() { String::new() } else { format!("; {} set aside", removed.join(", ")) };
+    terminal::say(&format!("{}: saved {}{without}", path.display(), names.join(", ")));
+    Ok(())
+}
+
+/// The file that settings and presets are saved in: the one that was chosen, else the user's.
+///
+/// # Errors
+/// None was chosen, and there is no home.
+pub fn file_to_save(chosen: Option<&Path>) -> Result<PathBuf, CliError> {
+    let nowhere =
+        || CliError::Usage("there is no home to keep settings in: name a file with --config FILE".to_string());
+    chosen.map(Path::to_owned).or_else(file::user_file).ok_or_else(nowhere)
+}
+
+/// Changes the settings file at `path`, as a whole or not at all; it and its folder are made where they are missing.
+///
+/// # Errors
+/// It is no settings file, before or after, or cannot be read or written; `change` has no place in it.
+pub fn edit(path: &Path, change: impl FnOnce(&mut DocumentMut) -> Option<()>) -> Result<(), CliError> {
+    // A symbolic link, as into a repository of settings, is written through and not replaced.
+    let path = &link_target(path)?;
+    let text = match input::read_text(path, input::MOST_SETTINGS_BYTES) {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => String::new(),
+        read => read.map_err(CliError::io(path))?,
+    };
+    SettingsFile::parse(path, &text)?;
+    let no_place =
+        || CliError::Settings { path: path.clone(), line: 1, what: "nothing can be added to it".to_string() };
+    let mut document: DocumentMut = text.parse().map_err(|_| no_place())?;
+    change(&mut document).ok_or_else(no_place)?;
+    let edited = document.to_string();
+    // What cannot be read back is not written.
+    SettingsFile::parse(path, &edited)?;
+    if let Some(folder) = path.parent() {
+        fs::create_dir_all(folder).map_err(CliError::io(folder))?;
+    }
+    write_whole(path, edited.as_bytes(), true)
+}
+
+/// Follows the symbolic links at `path`. Unlike with `canonicalize`, nothing need be there at the end of them yet.
+fn link_target(path: &Path) -> Result<PathBuf, CliError> {
+    /// As many as Linux follows.
+    const MOST_LINKS: usize = 40;
+    let mut target = path.to_owned();
+    for _ in 0..MOST_LINKS {
+        match fs::read_link(&target) {
+            Ok(to) => target = target.parent().unwrap_or(Path::new("")).join(to),
+            Err(_) => return Ok(target),
+        }
+    }
+    Err(CliError::io(path)(io::Error::new(io::ErrorKind::InvalidInput, "a loop of links")))
+}
+
+/// The key that a table has a setting by, which may be its other name.
+pub fn key_of<'a>(table: &dyn TableLike, name: &'a str) -> &'a str {
+    let alias = settings::setting(name).and_then(settings::Setting::alias);
+    alias.filter(|alias| table.contains_key(alias)).unwrap_or(name)
+}
+
+/// Sets a key. If it is there already, its place and the comments around its value stay.
+pub fn set(table: &mut dyn TableLike, name: &str, text: &str) {
+    let key = key_of(table, name);
+    let mut value = toml_number(text).unwrap_or_else(|| Value::from(text));
+    match table.get_mut(key).and_then(Item::as_value_mut) {
+        Some(old) => {
+            *value.decor_mut() = old.decor().clone();
+            *old = value;
+        }
+        None => drop(table.insert(key, Item::Value(value))),
+    }
+}
+
+/// Refuses to print into the very file that is about to be read: the shell has emptied it by then.
+///
+/// # Errors
+/// Standard output is the settings file.
+pub fn refuse_redirect(chosen: Option<&Path>) -> Result<(), CliError> {
+    let Some(path) = chosen.map(Path::to_owned).or_else(file::user_file) else { return Ok(()) };
+    let stdout = io::stdout().as_fd().try_clone_to_owned().and_then(|stdout| File::from(stdout).metadata());
+    let (Ok(stdout), Ok(file)) = (stdout, fs::metadata(&path)) else { return Ok(()) };
+    if stdout.is_file() && (stdout.dev(), stdout.ino()) == (file.dev(), file.ino()) {
+        return Err(CliError::Usage(format!(
+            "{}: this is the settings file that was to be read, and the redirection `>` has emptied it: use `bokehcam \
+             config save` to change it",
+            path.display()
+        )));
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_value_goes_in_where_it_was_and_all_else_stays() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("deep/config.toml");
+        edit(&path, |document| {
+            set(document.as_table_mut(), "rim", "0.5");
+            Some(())
+        })
+        .unwrap();
+        assert_eq!(fs::read_to_string(&path).unwrap(), "rim = 0.5\n");
+        let text = "# mine\nrim   = 0.9 # wide\n\n[presets.old] # dear\nrim = 0.8\n";
+        fs::write(&path, text).unwrap();
+        edit(&path, |document| {
+            set(document.as_table_mut(), "rim", "0.1");
+            set(document.as_table_mut(), "aperture", "heart");
+            Some(())
+        })
+        .unwrap();
+        let edited = fs::read_to_string(&path).unwrap();
+        assert_eq!(edited, "# mine\nrim   = 0.1 # wide\naperture = \"heart\"\n\n[presets.old] # dear\nrim = 0.8\n");
+    }
+
+    #[test]
+    fn links_are_followed_to_files_that_are_not_there_yet() {
+        let folder = tempfile::tempdir().unwrap();
+        let (link, real) = (folder.path().join("link.toml"), folder.path().join("dot/real.toml"));
+        std::os::unix::fs::symlink("dot/real.toml", &link).unwrap();
+        assert_eq!(link_target(&link).unwrap(), real);
+        let looped = folder.path().join("loop");
+        std::os::unix::fs::symlink("loop", &looped).unwrap();
+        assert!(link_target(&looped).is_err());
+    }
+}

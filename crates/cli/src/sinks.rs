@@ -1,0 +1,94 @@
+//! From `--to` to one sink.
+
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
+use super::error::CliError;
+use super::files::refuse_source;
+use super::options::Streaming;
+use bokehcam::files::place;
+use bokehcam::sink::{Backpressure, Options, Sink, Target, Tee};
+use bokehcam::source::{DepthChoice, SourceName};
+
+/// Refuses sinks that collide with each other or with what is read, and options that need other sinks.
+///
+/// # Errors
+/// Two of them write to one place; one writes to what is read; an option needs a virtual camera where there is none.
+pub fn check(targets: &[Target], parts: &Streaming, source: &SourceName) -> Result<(), CliError> {
+    let usage = |text: String| Err(CliError::Usage(text));
+    let Streaming { stream, blur, .. } = parts;
+    let devices = source.devices();
+    let depth_folder = match &blur.depth {
+        DepthChoice::Folder(folder) => Some(folder.as_path()),
+        _ => None,
+    };
+    for (index, target) in targets.iter().enumerate() {
+        for read in source.folder().into_iter().chain(depth_folder) {
+            let path = target.path().filter(|_| !target.is_camera());
+            path.map_or(Ok(()), |path| refuse_source("--to", path, read))?;
+        }
+        if targets[..index].iter().any(|other| other.collides_with(target)) {
+            return usage(format!("--to {target}: given twice; each sink needs a place of its own"));
+        }
+        let lies_in = |other: &Target| match (other, target.path()) {
+            (Target::Folder(folder), Some(path)) => place::resolved(path).starts_with(place::resolved(folder)),
+            _ => false,
+        };
+        if let Some(folder) = targets.iter().find(|other| *other != target && lies_in(other)) {
+            return usage(format!("--to {target}: the pictures of --to {folder} lie there; choose another place"));
+        }
+        if devices.iter().any(|device| target.is_device(device)) {
+            return usage(format!("--to {target}: this is the source itself; take a virtual camera of its own"));
+        }
+    }
+    if targets.contains(&Target::Filter) {
+        if source.shared().is_none() {
+            return usage(format!(
+                "--to filter: {source} is not a camera as PipeWire has it; `bokehcam devices` names it so, as pipewire:NAME"
+            ));
+        }
+        if targets.contains(&Target::Window) {
+            return usage("--to filter: not beside a window, which keeps the camera going".to_string());
+        }
+    }
+    let has_camera = targets.iter().any(Target::is_camera);
+    if stream.on_demand && !has_camera {
+        return usage(
+            "--on-demand needs a virtual camera, to be told who watches: add --to pipewire or --to /dev/videoN"
+                .to_string(),
+        );
+    }
+    match stream.out_size {
+        Some(_) if !has_camera => {
+            usage("--out-size is for a virtual camera: add --to pipewire or --to /dev/videoN".to_string())
+        }
+        Some(size) if !size.width.is_multiple_of(2) => usage(format!(
+            "--out-size {}x{}: a virtual camera needs an even width, such as {}",
+            size.width,
+            size.height,
+            size.width + 1
+        )),
+        _ => Ok(()),
+    }
+}
+
+/// Opens all sinks as one. With [`Backpressure::Block`] all files get every frame, unless `closed` says that pictures are
+/// kept away.
+///
+/// # Errors
+/// One cannot be opened; the others are then given up.
+pub fn open(
+    targets: &[Target],
+    options: &Options,
+    backpressure: Backpressure,
+    closed: &Arc<AtomicBool>,
+) -> Result<Box<dyn Sink>, CliError> {
+    let mut sinks = targets.iter().map(|target| target.open(options)).collect::<Result<Vec<_>, _>>()?;
+    Ok(match sinks.pop() {
+        Some(only) if sinks.is_empty() => only,
+        last => {
+            sinks.extend(last);
+            Box::new(Tee::new(sinks, backpressure, Arc::clone(closed))?)
+        }
+    })
+}

@@ -1,0 +1,9 @@
+//! What a rank costs in shape, for any aperture (after McGraw's figures 3 to 5).
+
+mod analysis;
+mod plot;
+mod sheet;
+
+pub use analysis::{Analysis, Approximation, RankErrors};
+pub use plot::error_by_rank;
+pub use sheet::draw;

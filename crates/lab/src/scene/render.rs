@@ -1,0 +1,246 @@
+//! Pictures of a scene: through a pinhole, and through a thin lens.
+
+use std::sync::{Mutex, PoisonError};
+
+use glam::{DVec2, Vec2, Vec3};
+
+use super::ray::Ray;
+use super::{Moment, Scene};
+use bokehcam::color::encode_srgb;
+use bokehcam::frame::{ColorImage, DepthMap, Mask};
+
+/// A camera: picture size, focal length, and which eye of a rectified pair.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct View {
+    /// Columns.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// Focal length in pixels, for this width.
+    pub focal_px: f32,
+    /// Where the eye is along `x`: 0 for the left (or only) one, the baseline in metres for the right one.
+    pub eye_offset_m: f32,
+}
+
+impl View {
+    /// The view that the portrait was composed for: the focal length equals the picture's width (53 degrees).
+    pub fn new(width: u32, height: u32) -> Self {
+        Self { width, height, focal_px: width as f32, eye_offset_m: 0.0 }
+    }
+
+    /// The same camera moved to the right by `baseline_m`.
+    pub fn right_eye(self, baseline_m: f32) -> Self {
+        Self { eye_offset_m: self.eye_offset_m + baseline_m, ..self }
+    }
+
+    /// Column and row of the optical axis; pixel centres are at whole numbers.
+    pub fn principal_point_px(&self) -> Vec2 {
+        0.5 * Vec2::new(self.width as f32 - 1.0, self.height as f32 - 1.0)
+    }
+
+    /// Where the ray of the picture position `p_px` meets the plane at unit depth, seen from the eye.
+    fn slope(&self, p_px: Vec2) -> Vec2 {
+        let q = (p_px - self.principal_point_px()) / self.focal_px;
+        Vec2::new(q.x, -q.y)
+    }
+
+    fn eye(&self) -> Vec3 {
+        self.eye_offset_m * Vec3::X
+    }
+
+    fn pinhole_ray(&self, p_px: Vec2) -> Ray {
+        Ray::new(self.eye(), self.slope(p_px).extend(1.0))
+    }
+
+    /// The ray that leaves the lens at `lens_m` (right and up of its middle) and meets the pinhole's ray at the
+    /// focal plane.
+    fn lens_ray(&self, p_px: Vec2, lens_m: Vec2, focus_m: f32) -> Ray {
+        let direction = self.slope(p_px) - lens_m / focus_m;
+        Ray::new(self.eye() + lens_m.extend(0.0), direction.extend(1.0))
+    }
+}
+
+/// A thin lens: a point at depth `z` becomes the aperture's picture, of radius `c = coc_at_infinity_px (1 -
+/// focus_m / z)` px, upright behind the focal plane (`c > 0`) and turned by 180 degrees in front of it.
+#[derive(Clone, Copy, Debug)]
+pub struct ThinLens<'a> {
+    /// CoC radius of a point at infinity, in pixels of the view.
+    pub coc_at_infinity_px: f32,
+    /// Depth of the focal plane, in metres, > 0.
+    pub focus_m: f32,
+    /// Lens points `u` in the unit disc (x right, y down), evenly spread over the opening, one per ray: pixel `p`
+    /// sees depth `z` at `p + c(z) u`. A blur is smooth when its disc has no more pixels than there are points.
+    pub aperture: &'a [DVec2],
+}
+
+/// Linear light: `height` x `width`, row-major, 1 = white, not limited.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LinearImage {
+    /// Columns.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// `height * width` radiances (R, G, B), >= 0.
+    pub rgb: Vec<Vec3>,
+}
+
+impl LinearImage {
+    fn black(view: &View) -> Self {
+        let (width, height) = (view.width, view.height);
+        Self { width, height, rgb: vec![Vec3::ZERO; width as usize * height as usize] }
+    }
+
+    /// The picture as 8-bit sRGB; what is brighter than white is white.
+    pub fn to_srgb(&self) -> ColorImage {
+        let mut image = ColorImage::new(self.width, self.height);
+        for (bytes, light) in image.rgb.chunks_exact_mut(3).zip(&self.rgb) {
+            bytes.copy_from_slice(&light.to_array().map(encode_srgb));
+        }
+        image
+    }
+}
+
+/// One picture through a lens, twice.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LensPicture {
+    /// Every ray cut to white before the rays are averaged: the blur that can be known from the 8-bit picture.
+    pub clipped: LinearImage,
+    /// The rays as bright as they are: what a real lens does.
+    pub hdr: LinearImage,
+}
+
+/// Where in its pixel ray `k` goes, in -0.5..0.5; ray 0 goes through the centre.
+fn pinhole_jitter(k: u32) -> Vec2 {
+    // The plane's most even additive sequence (after M. Roberts' R2).
+    additive_sequence(k, 0.754_877_666_246_692_8, 0.569_840_290_998_053_3)
+}
+
+/// As [`pinhole_jitter`], with steps that share no rhythm with the lens points of the same number.
+fn lens_jitter(k: u32) -> Vec2 {
+    additive_sequence(k, std::f64::consts::SQRT_2, 1.732_050_807_568_877_2)
+}
+
+/// Point `k` of an additive sequence (of multiples of the steps modulo 1), in -0.5..0.5.
+fn additive_sequence(k: u32, step_x: f64, step_y: f64) -> Vec2 {
+    let wrap = |step: f64| ((f64::from(k) * step + 0.5).fract() - 0.5) as f32;
+    Vec2::new(wrap(step_x), wrap(step_y))
+}
+
+impl Scene {
+    /// The picture through a pinhole, `samples_per_pixel` (>= 1) rays to a pixel, each cut to white, averaged in
+    /// linear light; and the exact depth of every pixel centre (0 where there is nothing). Both are resized to the
+    /// view. The result does not depend on `threads` (>= 1).
+    pub fn render_pinhole(
+        &self,
+        view: &View,
+        time_s: f64,
+        samples_per_pixel: u32,
+        threads: usize,
+        color: &mut ColorImage,
+        depth: &mut DepthMap,
+    ) {
+        color.resize(view.width, view.height);
+        depth.resize(view.width, view.height);
+        if view.width == 0 || view.height == 0 {
+            return;
+        }
+        let moment = self.at(time_s);
+        let jitter: Vec<Vec2> = (0..samples_per_pixel.max(1)).map(pinhole_jitter).collect();
+        let width = view.width as usize;
+        let rows = color.rgb.chunks_exact_mut(3 * width).zip(depth.metres.chunks_exact_mut(width)).enumerate();
+        for_each_parallel(rows, threads, |(row, (bytes, metres))| {
+            for (column, (bytes, metres)) in bytes.chunks_exact_mut(3).zip(metres).enumerate() {
+                let (light, depth_m) = moment.pinhole_pixel(view, Vec2::new(column as f32, row as f32), &jitter);
+                bytes.copy_from_slice(&light.to_array().map(encode_srgb));
+                *metres = depth_m;
+            }
+        });
+    }
+
+    /// How much of each pixel the person covers, 0 to 1, of as many rays as [`Self::render_pinhole`] takes.
+    pub fn render_coverage(&self, view: &View, time_s: f64, samples_per_pixel: u32, threads: usize) -> Mask {
+        let mut mask = Mask::default();
+        mask.resize(view.width, view.height);
+        if view.width == 0 || view.height == 0 {
+            return mask;
+        }
+        let moment = self.at(time_s);
+        let jitter: Vec<Vec2> = (0..samples_per_pixel.max(1)).map(pinhole_jitter).collect();
+        let rows = mask.share.chunks_exact_mut(view.width as usize).enumerate();
+        for_each_parallel(rows, threads, |(row, shares)| {
+            for (column, share) in shares.iter_mut().enumerate() {
+                let centre = Vec2::new(column as f32, row as f32);
+                let is_subject = |offset: &&Vec2| {
+                    let hit = moment.intersect(&view.pinhole_ray(centre + **offset));
+                    hit.is_some_and(|hit| self.parts[hit.part].is_subject)
+                };
+                *share = jitter.iter().filter(is_subject).count() as f32 / jitter.len() as f32;
+            }
+        });
+        mask
+    }
+
+    /// The picture through a thin lens, one ray per point of the aperture to each pixel, averaged in linear light
+    /// over the pixel and the lens. The result does not depend on `threads`; an aperture without points gives black.
+    pub fn render_thin_lens(&self, view: &View, time_s: f64, lens: &ThinLens, threads: usize) -> LensPicture {
+        let mut picture = LensPicture { clipped: LinearImage::black(view), hdr: LinearImage::black(view) };
+        if lens.aperture.is_empty() || view.width == 0 {
+            return picture;
+        }
+        // A ray from the side -u of the lens is off by focal_px * radius_m * (1 / focus_m - 1 / z) u px at depth z:
+        // by c(z) u.
+        let radius_m = lens.coc_at_infinity_px * lens.focus_m / view.focal_px;
+        let moment = self.at(time_s);
+        let samples: Vec<(Vec2, Vec2)> = (0..)
+            .zip(lens.aperture)
+            .map(|(k, u)| (lens_jitter(k), radius_m * Vec2::new(-u.x as f32, u.y as f32)))
+            .collect();
+        let width = view.width as usize;
+        let rows = picture.clipped.rgb.chunks_exact_mut(width).zip(picture.hdr.rgb.chunks_exact_mut(width));
+        for_each_parallel(rows.enumerate(), threads, |(row, (clipped, hdr))| {
+            for (column, (clipped, hdr)) in clipped.iter_mut().zip(hdr).enumerate() {
+                let centre = Vec2::new(column as f32, row as f32);
+                for (jitter, lens_m) in &samples {
+                    let (light, _) = moment.look(&view.lens_ray(centre + *jitter, *lens_m, lens.focus_m));
+                    *clipped += light.min(Vec3::ONE);
+                    *hdr += light;
+                }
+                *clipped /= samples.len() as f32;
+                *hdr /= samples.len() as f32;
+            }
+        });
+        picture
+    }
+}
+
+impl Moment<'_> {
+    /// The mean of the pixel's rays, each cut to white, and the depth along the first one, through the centre.
+    fn pinhole_pixel(&self, view: &View, centre: Vec2, jitter: &[Vec2]) -> (Vec3, f32) {
+        let (mut sum, mut depth_m) = (Vec3::ZERO, 0.0);
+        for (k, offset) in jitter.iter().enumerate() {
+            let (light, z_m) = self.look(&view.pinhole_ray(centre + *offset));
+            sum += light.min(Vec3::ONE);
+            if k == 0 {
+                depth_m = z_m;
+            }
+        }
+        (sum / jitter.len() as f32, depth_m)
+    }
+}
+
+/// Does `work` for every item on `threads` threads, of which the caller's is one.
+fn for_each_parallel<T: Send>(items: impl Iterator<Item = T> + Send, threads: usize, work: impl Fn(T) + Sync) {
+    let items = Mutex::new(items);
+    let run = || {
+        // The block releases the lock before the work begins.
+        while let Some(item) = { items.lock().unwrap_or_else(PoisonError::into_inner).next() } {
+            work(item);
+        }
+    };
+    std::thread::scope(|scope| {
+        for _ in 1..threads {
+            scope.spawn(run);
+        }
+        run();
+    });
+}

@@ -1,0 +1,65 @@
+//! Bare scenes whose pictures are known by calculation: what a lens is measured with.
+
+use glam::Vec3;
+
+use super::Scene;
+use super::light::Ambient;
+use super::noise;
+use super::part::{Material, Part, Spot, Surface};
+use super::shape::{Shape, whole};
+
+/// A small ball of light.
+#[derive(Clone, Copy, Debug)]
+pub struct PointLight {
+    /// Middle, in metres (x right, y up, z away from the camera).
+    pub centre_m: Vec3,
+    /// Radius, in metres.
+    pub radius_m: f32,
+    /// Linear radiance, 1 = white.
+    pub radiance: Vec3,
+}
+
+impl Scene {
+    /// Balls of light in the dark, which stay where they are.
+    pub fn lights(lights: &[PointLight]) -> Scene {
+        let mut part = Part::still();
+        for light in lights {
+            let shape = Shape::Sphere { centre: light.centre_m, radius: light.radius_m };
+            part.add(shape, Material::new(glow, light.radiance));
+        }
+        dark_scene(part, lights.first().map_or(1.0, |light| light.centre_m.z))
+    }
+
+    /// A mottled wall that faces the camera, shines by itself, and fills every view narrower than 120 degrees.
+    pub fn wall(depth_m: f32) -> Scene {
+        let mut part = Part::still();
+        let size_m = 2.0 * depth_m;
+        let shape =
+            Shape::Quad { centre: depth_m * Vec3::Z, right: size_m * Vec3::X, up: size_m * Vec3::Y, cut: whole };
+        part.add(shape, Material::new(mottle, Vec3::ONE));
+        dark_scene(part, depth_m)
+    }
+}
+
+/// A scene of one part without lights: what is seen shines by itself.
+fn dark_scene(part: Part, focus_m: f32) -> Scene {
+    Scene {
+        parts: vec![part.built()],
+        lights: Vec::new(),
+        ambient: Ambient { above: Vec3::ZERO, below: Vec3::ZERO },
+        background: Vec3::ZERO,
+        focus_m,
+        period_s: 1.0,
+    }
+}
+
+fn glow(spot: &Spot) -> Surface {
+    Surface { emission: spot.tint, ..Surface::matt(spot, Vec3::ZERO) }
+}
+
+fn mottle(spot: &Spot) -> Surface {
+    // By direction, so that the mottles have the same size in the picture at every depth.
+    let p = 25.0 * spot.p / spot.p.z.max(1e-3);
+    let radiance = Vec3::new(noise::fractal(p, 3), noise::fractal(p + 7.0, 3), noise::fractal(p + 13.0, 3));
+    Surface { emission: 0.1 + 0.8 * radiance, ..Surface::matt(spot, Vec3::ZERO) }
+}

@@ -1,0 +1,186 @@
+//! Where the window's files go, and what they are called.
+
+use std::env;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::thread;
+
+use bokehcam::files::input;
+use bokehcam::files::trusted::absolute;
+
+/// The folders of snapshots and of recordings.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Folders {
+    pub pictures: PathBuf,
+    pub videos: PathBuf,
+}
+
+/// What all names begin with, and what those of recordings end with.
+const NAME: &str = "bokehcam";
+const VIDEO: &str = ".mp4";
+/// The date and the time of day in between.
+const TIME: &str = "%Y-%m-%d %H-%M-%S";
+
+impl Folders {
+    /// One folder for all.
+    pub fn at(folder: PathBuf) -> Self {
+        Self { pictures: folder.clone(), videos: folder }
+    }
+
+    /// The user's own folders of pictures and videos, as the environment or `user-dirs.dirs` name them, or as they are
+    /// usually called; where there is none, the current folder.
+    pub fn of_user() -> Self {
+        let home = absolute("HOME");
+        let config = absolute("XDG_CONFIG_HOME").or_else(|| Some(home.as_ref()?.join(".config")));
+        let named =
+            config.and_then(|config| input::read_text(&config.join("user-dirs.dirs"), input::MOST_SETTINGS_BYTES).ok());
+        let folder = |variable: &str, usual: &str| {
+            let home = home.as_deref();
+            let named = named.as_deref().zip(home).and_then(|(text, home)| named_in(text, variable, home));
+            let all = [absolute(variable), named, home.map(|home| home.join(usual))];
+            all.into_iter()
+                .flatten()
+                .find(|folder| folder.is_dir())
+                .or_else(|| env::current_dir().ok())
+                .unwrap_or_default()
+        };
+        Self { pictures: folder("XDG_PICTURES_DIR", "Pictures"), videos: folder("XDG_VIDEOS_DIR", "Videos") }
+    }
+
+    /// Both, each once: earlier versions put recordings beside snapshots.
+    pub fn all(&self) -> impl Iterator<Item = &Path> {
+        let pictures = Some(self.pictures.as_path()).filter(|pictures| *pictures != self.videos);
+        [self.videos.as_path()].into_iter().chain(pictures)
+    }
+
+    /// A path for a recording that is begun now: neither does it exist nor is it `taken`.
+    pub fn free_video(&self, taken: impl Fn(&Path) -> bool) -> PathBuf {
+        let stem = stem();
+        let path = |number: u32| match number {
+            1 => self.videos.join(format!("{stem}{VIDEO}")),
+            _ => self.videos.join(format!("{stem}-{number}{VIDEO}")),
+        };
+        (1..u32::MAX).map(path).find(|path| !path.exists() && !taken(path)).unwrap_or_else(|| path(u32::MAX))
+    }
+}
+
+/// The name of a file that is made now, without its ending: with the date and the time of day here.
+pub fn stem() -> String {
+    jiff::ZonedDateTime::now().strftime(&format!("{NAME} {TIME}")).to_string()
+}
+
+/// Whether a recording without a name of its own is called so, now or by earlier versions: `bokehcam-7.mp4`.
+pub fn is_video(name: &str) -> bool {
+    let Some(rest) = name.strip_prefix(NAME).and_then(|rest| rest.strip_suffix(VIDEO)) else { return false };
+    let is_number = |text: &str| !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_digit());
+    if let Some(number) = rest.strip_prefix('-') {
+        return is_number(number);
+    }
+    let Some((date, number)) = rest.split_at_checked(" 0000-00-00 00-00-00".len()) else { return false };
+    let is_date = jiff::civil::DateTime::strptime(format!(" {TIME}"), date).is_ok();
+    is_date && (number.is_empty() || number.strip_prefix('-').is_some_and(is_number))
+}
+
+/// A path as one says it: from the home on, where it is there.
+pub fn shown(path: &Path) -> String {
+    match absolute("HOME").and_then(|home| path.strip_prefix(home).ok().map(Path::to_owned)) {
+        Some(inside) => format!("~/{}", inside.display()),
+        None => path.display().to_string(),
+    }
+}
+
+/// What is written at a place, as one says it: a virtual camera by its name, a file from the home on.
+pub fn shown_output(name: &str) -> String {
+    if name.starts_with('/') { shown(Path::new(name)) } else { name.to_owned() }
+}
+
+/// The folder that a file is in, whole; `None` where there is no such file.
+pub fn folder_of(file: &Path) -> Option<PathBuf> {
+    let folder = file.canonicalize().ok().filter(|file| file.is_file())?;
+    folder.parent().map(Path::to_owned)
+}
+
+/// Shows a folder in the desktop's file manager, and waits for neither; `failed` is told, on another thread, why not.
+pub fn open(folder: PathBuf, failed: impl Fn(String) + Send + 'static) {
+    let run = move || {
+        let mut command = Command::new("xdg-open");
+        command.arg(&folder).stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
+        let why = match command.status() {
+            Ok(status) if status.success() => return,
+            Ok(status) => format!("xdg-open: {status}"),
+            Err(error) => format!("xdg-open: {error}"),
+        };
+        failed(format!("{} cannot be shown: {why}", folder.display()));
+    };
+    // Without a thread there is nobody to tell.
+    let _ = thread::Builder::new().name("folder".into()).spawn(run);
+}
+
+/// The folder that `user-dirs.dirs` names: a line of `VARIABLE="$HOME/path"` or `VARIABLE="/path"`. The home itself stands
+/// for none.
+fn named_in(text: &str, variable: &str, home: &Path) -> Option<PathBuf> {
+    let value = text
+        .lines()
+        .rev()
+        .find_map(|line| line.trim().strip_prefix(variable)?.strip_prefix("=\"")?.strip_suffix('"'))?;
+    let mut plain = String::new();
+    let mut signs = value.chars();
+    while let Some(sign) = signs.next() {
+        // A backslash stands before a sign that means something in a shell.
+        plain.extend(if sign == '\\' { signs.next() } else { Some(sign) });
+    }
+    match plain.strip_prefix("$HOME/") {
+        Some(inside) => Some(home.join(inside)).filter(|_| !inside.is_empty()),
+        None => Some(PathBuf::from(plain)).filter(|path| path.is_absolute() && path != home),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_users_folders_are_read_as_they_are_written() {
+        let text = "# made by xdg-user-dirs-update\nXDG_PICTURES_DIR=\"$HOME/Bilder\"\nXDG_VIDEOS_DIR=\"/data/My \\\"films\\\"\"\n\
+                    XDG_MUSIC_DIR=\"$HOME/\"\nXDG_DESKTOP_DIR=Desktop\n";
+        let named = |variable| named_in(text, variable, Path::new("/home/me"));
+        assert_eq!(named("XDG_PICTURES_DIR"), Some("/home/me/Bilder".into()));
+        assert_eq!(named("XDG_VIDEOS_DIR"), Some("/data/My \"films\"".into()));
+        for none in ["XDG_MUSIC_DIR", "XDG_DESKTOP_DIR", "XDG_PICTURES", "XDG_TEMPLATES_DIR"] {
+            assert_eq!(named(none), None, "{none}");
+        }
+    }
+
+    #[test]
+    fn names_have_the_date_and_are_known_again() {
+        assert!(is_video(&format!("{}.mp4", stem())), "{}", stem());
+        for ours in ["bokehcam 2026-11-23 21-14-05.mp4", "bokehcam 2026-11-23 21-14-05-2.mp4", "bokehcam-12.mp4"] {
+            assert!(is_video(ours), "{ours}");
+        }
+        for others in [
+            "holiday.mp4",
+            "bokehcam-mine.mp4",
+            "bokehcam notes.mp4",
+            "bokehcam 2026-11-23 21-14-05é.mp4",
+            "bokehcam 2026-11-23 21-14-05.png",
+            "bokehcam-.mp4",
+            "bokehcam.mp4",
+        ] {
+            assert!(!is_video(others), "{others}");
+        }
+    }
+
+    #[test]
+    fn a_name_that_is_taken_gets_a_number() {
+        let folder = tempfile::tempdir().unwrap();
+        let folders = Folders::at(folder.path().to_owned());
+        let taken = std::cell::RefCell::new(Vec::<PathBuf>::new());
+        for _ in 0..3 {
+            let path = folders.free_video(|path| taken.borrow().iter().any(|taken| taken == path));
+            std::fs::write(&path, "").unwrap();
+            let next = folders.free_video(|path| taken.borrow().iter().any(|taken| taken == path));
+            assert!(path != next && is_video(next.file_name().unwrap().to_str().unwrap()), "{next:?}");
+            taken.borrow_mut().push(next);
+        }
+    }
+}

@@ -1,0 +1,335 @@
+//! Key bindings: one table, which the help shows and the panel acts by.
+
+use egui::{Event, Key, Modifiers};
+
+use super::state::{Action, Shown, Source, State, tweak};
+use bokehcam::depth::focus::FocusRule;
+use bokehcam::look::Look;
+
+/// Keys to press together.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Chord {
+    pub key: Key,
+    /// Whether Ctrl is held.
+    pub ctrl: bool,
+    /// Whether Shift is held. Counts only for letters: some keyboards need it for other signs.
+    pub shift: bool,
+}
+
+/// What a key does.
+pub struct Binding {
+    /// Any of these triggers it.
+    pub chords: &'static [Chord],
+    /// What the help calls them.
+    pub keys: &'static str,
+    pub does: &'static str,
+    /// Whether it repeats while the key is held.
+    pub repeats: bool,
+    make: fn(&State, Context) -> Option<Action>,
+}
+
+/// Bindings of one kind.
+pub struct Group {
+    /// What they are about.
+    pub name: &'static str,
+    pub bindings: &'static [Binding],
+}
+
+/// What is known when a key is pressed, besides the state.
+#[derive(Clone, Copy, Debug)]
+pub struct Context {
+    /// Columns and rows of the picture; some blur is a share of them.
+    pub size: (u32, u32),
+    /// Pixels of the window along a side of one of the picture's, where all of it is seen.
+    pub fit: f32,
+    /// Index of the pressed chord in [`Binding::chords`].
+    pub chord: usize,
+}
+
+const fn key(key: Key) -> Chord {
+    Chord { key, ctrl: false, shift: false }
+}
+
+const fn ctrl(key: Key) -> Chord {
+    Chord { key, ctrl: true, shift: false }
+}
+
+const fn shift(key: Key) -> Chord {
+    Chord { key, ctrl: false, shift: true }
+}
+
+const fn ctrl_shift(key: Key) -> Chord {
+    Chord { key, ctrl: true, shift: true }
+}
+
+type Make = fn(&State, Context) -> Option<Action>;
+
+/// A binding that acts once per press.
+const fn once(chords: &'static [Chord], keys: &'static str, does: &'static str, make: Make) -> Binding {
+    Binding { chords, keys, does, repeats: false, make }
+}
+
+/// A binding that repeats while the key is held.
+const fn held(chords: &'static [Chord], keys: &'static str, does: &'static str, make: Make) -> Binding {
+    Binding { chords, keys, does, repeats: true, make }
+}
+
+/// Changes the look; `None` if that leaves it as it is. Changes of one `stroke` are undone together.
+fn look(state: &State, stroke: &'static str, change: impl FnOnce(&mut Look)) -> Option<Action> {
+    let mut look = state.look.clone();
+    change(&mut look);
+    (look != state.look).then(|| Action::Look { look: Box::new(look), stroke: Some(stroke) })
+}
+
+/// Toggles between a view and the picture.
+fn show(state: &State, shown: Shown) -> Option<Action> {
+    Some(Action::Show(if state.shown == shown { Shown::Picture } else { shown }))
+}
+
+/// The direction of a pair of opposite keys: -1 for the first chord, 1 for the second.
+fn way(context: Context) -> f32 {
+    if context.chord.is_multiple_of(2) { -1.0 } else { 1.0 }
+}
+
+/// What Esc closes, one thing at a time.
+fn step_back(state: &State) -> Option<Action> {
+    if state.closing {
+        Some(Action::StayOpen)
+    } else if state.self_timer {
+        Some(Action::SelfTimer(false))
+    } else if state.help {
+        Some(Action::Help(false))
+    } else if state.trouble.is_some() {
+        Some(Action::Dismiss)
+    } else if let Some(way) = state.way_without_plate() {
+        Some(Action::DepthBy(way))
+    } else if state.offers_depth() && !state.bare {
+        Some(Action::DeclinePlate)
+    } else if state.is_demonstration() && !state.knows_demonstration && !state.bare {
+        Some(Action::KnowDemonstration)
+    } else if state.bare {
+        Some(Action::Bare(false))
+    } else if state.full_screen {
+        Some(Action::FullScreen(false))
+    } else if state.panel {
+        Some(Action::Panel(false))
+    } else {
+        None
+    }
+}
+
+/// A step of focus by the arrow keys, as a fraction of the picture.
+const STEP: f32 = 0.02;
+/// A step of the amount of blur, or of the f-number: a third of a stop.
+const THIRD_STOP: f32 = 1.122;
+/// A step of the focal range, in metres.
+const RANGE_STEP_M: f32 = 0.05;
+/// A step of the size of text.
+const TEXT_STEP: f32 = 1.1;
+
+pub const GROUPS: [Group; 5] = [
+    Group {
+        name: "Look",
+        bindings: &[
+            once(
+                &[
+                    key(Key::Num1),
+                    key(Key::Num2),
+                    key(Key::Num3),
+                    key(Key::Num4),
+                    key(Key::Num5),
+                    key(Key::Num6),
+                    key(Key::Num7),
+                    key(Key::Num8),
+                    key(Key::Num9),
+                ],
+                "1 – 9",
+                "the preset of that number",
+                |state, context| state.presets.get(context.chord).map(|preset| Action::Preset(preset.name.clone())),
+            ),
+            held(&[key(Key::OpenBracket), key(Key::CloseBracket)], "[  ]", "less blur, more blur", |state, context| {
+                let factor = THIRD_STOP.powf(way(context));
+                look(state, "key blur", |look| tweak::blur_by(look, factor, context.size.1))
+            }),
+            held(
+                &[key(Key::Semicolon), key(Key::Quote)],
+                ";  '",
+                "smaller f-number, larger f-number",
+                |state, context| {
+                    let factor = THIRD_STOP.powf(way(context));
+                    look(state, "key f-number", |look| {
+                        tweak::f_number_by(look, factor, state.distance_m(), context.size)
+                    })
+                },
+            ),
+            held(&[key(Key::Comma), key(Key::Period)], ",  .", "less in focus, more in focus", |state, context| {
+                look(state, "key focal range", |look| tweak::focus_range_by(look, RANGE_STEP_M * way(context)))
+            }),
+            held(&[ctrl(Key::Z)], "Ctrl+Z", "undo", |_, _| Some(Action::Undo)),
+            held(&[ctrl_shift(Key::Z), ctrl(Key::Y)], "Ctrl+Shift+Z", "redo", |_, _| Some(Action::Redo)),
+            once(&[key(Key::R)], "R", "back to the usual look", |_, _| Some(Action::Reset)),
+        ],
+    },
+    Group {
+        name: "Focus",
+        bindings: &[
+            once(&[key(Key::T)], "T", "take a plate of what is behind you", |_, _| Some(Action::TakePlate)),
+            once(&[key(Key::A)], "A", "focus on the subject", |state, _| {
+                look(state, "key auto", |look| look.focus = FocusRule::Auto)
+            }),
+            held(
+                &[key(Key::ArrowLeft), key(Key::ArrowRight)],
+                "Left, Right",
+                "move the point of focus, turn the sharp band",
+                |state, context| {
+                    let to_the_right = if state.mirror { -way(context) } else { way(context) };
+                    look(state, "key arrows", |look| tweak::move_focus(look, STEP * to_the_right, 0.0))
+                },
+            ),
+            held(
+                &[key(Key::ArrowUp), key(Key::ArrowDown)],
+                "Up, Down",
+                "move the point of focus, move the sharp band",
+                |state, context| look(state, "key arrows", |look| tweak::move_focus(look, 0.0, STEP * way(context))),
+            ),
+        ],
+    },
+    Group {
+        name: "View",
+        bindings: &[
+            once(&[key(Key::B)], "B", "before and after, side by side", |state, _| {
+                Some(Action::Split(if state.split.is_some() { None } else { Some(0.5) }))
+            }),
+            once(&[key(Key::Z)], "Z", "freeze the picture, pause a recording", |state, _| {
+                Some(Action::Freeze(!state.frozen))
+            }),
+            held(
+                &[key(Key::PageUp), key(Key::PageDown)],
+                "PageUp, PageDown",
+                "of a recording: stop, one frame back or on",
+                |state, context| state.transport.map(|_| Action::Step(way(context) as i32)),
+            ),
+            once(&[key(Key::Home)], "Home", "the recording's first frame", |state, _| {
+                state.transport.map(|_| Action::Seek(0))
+            }),
+            once(&[key(Key::X)], "X", "pixels as they are (100 %), all of the picture", |state, context| {
+                Some(Action::Zoom(if state.zoom.factor == 0 { state.zoom.stepped(1, context.fit) } else { 0 }, None))
+            }),
+            once(
+                &[key(Key::Minus), key(Key::Plus), key(Key::Minus), key(Key::Equals)],
+                "Minus, Plus",
+                "smaller, larger: 100, 200, 400, 800 %",
+                |state, context| Some(Action::Zoom(state.zoom.stepped(way(context) as i32, context.fit), None)),
+            ),
+            once(&[key(Key::M)], "M", "mirror the window", |state, _| Some(Action::Mirror(!state.mirror))),
+            once(&[key(Key::D)], "D", "show depth", |state, _| show(state, Shown::Depth)),
+            once(&[key(Key::C)], "C", "show the blur radius", |state, _| show(state, Shown::Coc)),
+            once(&[key(Key::N)], "N", "show the layers of the blur", |state, _| show(state, Shown::Bins)),
+        ],
+    },
+    Group {
+        name: "Keep",
+        bindings: &[
+            once(&[key(Key::S)], "S", "save a snapshot", |_, _| Some(Action::Snapshot)),
+            once(&[shift(Key::S)], "Shift+S", "save one in three seconds", |state, _| {
+                Some(Action::SelfTimer(!state.self_timer))
+            }),
+            once(&[key(Key::V)], "V", "start or stop a recording", |state, _| {
+                Some(Action::Record(state.recording().is_none()))
+            }),
+            once(&[key(Key::O)], "O", "start or stop the virtual camera", |state, _| {
+                let first = || state.virtual_cameras.first().map(|choice| choice.name.clone());
+                Some(Action::VirtualCamera(if state.virtual_camera().is_some() { None } else { first() }))
+            }),
+            once(&[key(Key::K)], "K", "copy as a command", |_, _| Some(Action::CopyCommand)),
+            once(&[key(Key::F5)], "F5", "open the source again, look for new ones", |state, _| {
+                let lost = matches!(state.source, Source::Lost(_) | Source::Ended);
+                Some(if lost { Action::Retry } else { Action::Refresh })
+            }),
+        ],
+    },
+    Group {
+        name: "Window",
+        bindings: &[
+            once(&[key(Key::P), key(Key::Space)], "P, Space", "the panel", |state, _| {
+                Some(Action::Panel(!state.panel))
+            }),
+            once(&[key(Key::I)], "I", "the instruments", |state, _| Some(Action::Instruments(!state.instruments))),
+            once(&[key(Key::H)], "H", "nothing but the picture", |state, _| Some(Action::Bare(!state.bare))),
+            once(&[key(Key::F), key(Key::F11)], "F, F11", "full screen", |state, _| {
+                Some(Action::FullScreen(!state.full_screen))
+            }),
+            // Minus twice, because `way` goes by pairs; without Shift, Plus is Equals on many keyboards.
+            held(
+                &[ctrl(Key::Minus), ctrl(Key::Plus), ctrl(Key::Minus), ctrl(Key::Equals)],
+                "Ctrl+−  Ctrl++",
+                "smaller text, larger text",
+                |state, context| Some(Action::TextScale(state.habits.text_scale * TEXT_STEP.powf(way(context)))),
+            ),
+            once(&[ctrl(Key::Num0)], "Ctrl+0", "text as usual", |_, _| Some(Action::TextScale(1.0))),
+            once(&[key(Key::F1), key(Key::Questionmark)], "F1, ?", "these keys", |state, _| {
+                Some(Action::Help(!state.help))
+            }),
+            once(&[key(Key::Escape)], "Esc", "close what is open, leave full screen", |state, _| step_back(state)),
+            once(&[key(Key::Q), ctrl(Key::Q), ctrl(Key::W)], "Q, Ctrl+Q", "close the window", |_, _| {
+                Some(Action::Close)
+            }),
+        ],
+    },
+];
+
+/// Whether the control that has the focus uses this key itself.
+fn is_for_controls(chord: Chord) -> bool {
+    let keys = [Key::ArrowLeft, Key::ArrowRight, Key::ArrowUp, Key::ArrowDown, Key::Space, Key::Escape];
+    !chord.ctrl && keys.contains(&chord.key)
+}
+
+/// Whether an action may come of a key: under the help and the question, nothing is changed unseen.
+fn is_uncovered(action: &Action, state: &State) -> bool {
+    match action {
+        Action::Close | Action::StayOpen => true,
+        Action::Help(_) | Action::FullScreen(_) | Action::TextScale(_) => !state.closing,
+        _ => !state.help && !state.closing,
+    }
+}
+
+/// Whether the key is a letter, a digit or a sign on its own, which some programs for people who speak press by mistake.
+fn is_single(chord: Chord) -> bool {
+    !chord.ctrl && chord.key.symbol_or_name().len() == 1
+}
+
+/// Whether the key is a letter. Only then do Shift and Alt matter: other signs may need them on some keyboards.
+fn is_letter(key: Key) -> bool {
+    key.name().len() == 1 && key.name().chars().all(|c| c.is_ascii_alphabetic())
+}
+
+impl Chord {
+    /// Whether this chord was pressed.
+    fn is(self, pressed: Key, modifiers: Modifiers) -> bool {
+        let shift = !is_letter(self.key) || self.shift == modifiers.shift;
+        self.key == pressed && self.ctrl == modifiers.ctrl && shift && (!modifiers.alt || !is_letter(self.key))
+    }
+}
+
+/// The action that is bound to the key in `event`, if any. While a control is `focused`, it keeps some keys to itself.
+pub fn action(event: &Event, state: &State, context: Context, focused: bool) -> Option<Action> {
+    let Event::Key { key, pressed: true, repeat, modifiers, .. } = event else { return None };
+    let bindings = GROUPS.iter().flat_map(|group| group.bindings);
+    let found = bindings.filter(|binding| binding.repeats || !repeat).find_map(|binding| {
+        let chord = binding.chords.iter().position(|chord| chord.is(*key, *modifiers))?;
+        Some((binding, chord))
+    });
+    let (binding, chord) = found?;
+    if !state.habits.single_keys && is_single(binding.chords[chord]) {
+        return None;
+    }
+    // A question goes at once, though one of its buttons has the focus.
+    let closes = state.closing && *key == Key::Escape;
+    if focused && is_for_controls(binding.chords[chord]) && !closes {
+        return None;
+    }
+    (binding.make)(state, Context { chord, ..context }).filter(|action| is_uncovered(action, state))
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,302 @@
+//! What the instruments show: the last frames, how long they took, and what became of the others.
+
+use std::collections::VecDeque;
+
+use bokehcam::budget::{Quality, Window};
+use bokehcam::pipeline::{Trace, View};
+use bokehcam::stats::{Frames, Histogram};
+
+/// Frames that the instruments look back on.
+pub const FRAMES: usize = 240;
+/// A nanosecond in milliseconds.
+const MS: f64 = 1e-6;
+/// Weight of a new frame in the moving means of the stages, which single frames shall not make jump.
+const EASE: f64 = 0.08;
+
+/// One frame, for the graph.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Bar {
+    /// Time of its blur, in milliseconds.
+    pub blur_ms: f32,
+    /// From the presented frame before to this one, in milliseconds.
+    pub interval_ms: f32,
+    /// The rung it was blurred at; `None` where it was not.
+    pub quality: Option<Quality>,
+}
+
+/// The last frames, and totals of all.
+#[derive(Clone, Debug, Default)]
+pub struct Meters {
+    /// The last [`FRAMES`], the oldest first.
+    bars: VecDeque<Bar>,
+    latency_ms: Window<FRAMES>,
+    reaction_ms: Window<FRAMES>,
+    /// Mean times of the last frames.
+    pub stages: Stages,
+    /// What became of the source's frames.
+    pub frames: Frames,
+    /// When the last frame was presented, and when the preview started.
+    last_ns: Option<u64>,
+    begun_ns: Option<u64>,
+    /// What was presented in all.
+    pub totals: Totals,
+}
+
+/// Moving means of the stages' times, in milliseconds.
+#[derive(Clone, Debug, Default)]
+pub struct Stages {
+    pub decode_ms: f64,
+    pub depth_ms: f64,
+    pub blur_ms: f64,
+    /// Waits between the stages, the way to the screen included.
+    pub between_ms: f64,
+    pub playout_ms: f64,
+    pub present_ms: f64,
+    /// Share of the frames with depth of their own.
+    own_depth: f64,
+    /// The blur's passes, by name.
+    pub passes: Vec<(&'static str, f64)>,
+}
+
+impl Stages {
+    /// Every how many frames depth is made.
+    pub fn depth_every(&self) -> u32 {
+        if self.own_depth > 0.0 { self.own_depth.recip().round() as u32 } else { 1 }
+    }
+}
+
+/// What was presented in all.
+#[derive(Clone, Debug, Default)]
+pub struct Totals {
+    pub presented: u64,
+    /// From the start of the preview to the first frame, in nanoseconds.
+    pub first_frame_ns: Option<u64>,
+    /// From capture to the end of presenting.
+    pub latency: Histogram,
+    /// From an input to the picture that shows what it did.
+    pub reaction: Histogram,
+    pub present: Histogram,
+}
+
+/// The instruments' numbers: over the last [`FRAMES`] frames.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Summary {
+    /// Frames presented a second.
+    pub fps: f64,
+    /// Median and 99th percentile from capture to presented, in milliseconds.
+    pub latency_ms: [f64; 2],
+    /// Median and 99th percentile from input to picture, in milliseconds.
+    pub reaction_ms: [f64; 2],
+}
+
+impl Meters {
+    /// The preview started at `now_ns`: the time to the first frame counts from here.
+    pub fn begin(&mut self, now_ns: u64) {
+        self.begun_ns.get_or_insert(now_ns);
+    }
+
+    /// Forgets the last frames, for another source. Totals stay.
+    pub fn restart(&mut self) {
+        let (begun_ns, totals) = (self.begun_ns, std::mem::take(&mut self.totals));
+        *self = Self { begun_ns, totals, ..Self::default() };
+    }
+
+    /// Counts a frame that was presented at `now_ns` of the run's clock, which took `present_ns`. Allocates nothing.
+    pub fn presented(&mut self, view: &View, now_ns: u64, present_ns: u64) {
+        let latency_ns = now_ns.saturating_sub(view.captured_ns);
+        self.count(&view.trace, now_ns, latency_ns, present_ns);
+        self.frames = view.frames;
+    }
+
+    /// Adds a presented frame to the totals, the graph and the means.
+    fn count(&mut self, trace: &Trace, now_ns: u64, latency_ns: u64, present_ns: u64) {
+        self.totals.presented += 1;
+        self.totals.latency.add(latency_ns);
+        self.totals.present.add(present_ns);
+        if let (None, Some(begun_ns)) = (self.totals.first_frame_ns, self.begun_ns) {
+            self.totals.first_frame_ns = Some(now_ns.saturating_sub(begun_ns));
+        }
+        let interval_ms = self.last_ns.replace(now_ns).map(|last_ns| now_ns.saturating_sub(last_ns) as f64 * MS);
+        self.latency_ms.push(latency_ns as f64 * MS);
+        self.stages.add(trace, (latency_ns, present_ns), self.bars.is_empty());
+        if self.bars.len() == FRAMES {
+            self.bars.pop_front();
+        }
+        // All at once, and never again.
+        self.bars.reserve(FRAMES - self.bars.len());
+        self.bars.push_back(Bar {
+            blur_ms: (trace.blur_ns as f64 * MS) as f32,
+            interval_ms: interval_ms.unwrap_or_default() as f32,
+            quality: trace.quality,
+        });
+    }
+
+    /// Counts an input whose effect was on the screen this much later.
+    pub fn reacted(&mut self, after_ns: u64) {
+        self.totals.reaction.add(after_ns);
+        self.reaction_ms.push(after_ns as f64 * MS);
+    }
+
+    /// Fills the meters with a plausible run, for pictures of the instruments.
+    #[cfg(test)]
+    pub fn fill_for_looks(&mut self) {
+        let rungs = [Quality::Balanced, Quality::High, Quality::Fast, Quality::Balanced];
+        for k in 0..300u64 {
+            let mut passes = bokehcam::bokeh::PassTimes::new();
+            for (name, us) in [("bin", 3100), ("fill", 800), ("reach", 450), ("blur", 9400), ("composite", 3600)] {
+                passes.add(name, std::time::Duration::from_micros(us));
+            }
+            let wave = 4.0 * (k as f64 / 9.0).sin() + 3.0 * (k as f64 / 2.3).sin();
+            let blur_ms = 20.0 + wave + if k % 97 == 3 { 22.0 } else { 0.0 };
+            let quality = Some(rungs[(k / 80) as usize % rungs.len()]);
+            let trace = Trace {
+                decode_ns: 4_100_000,
+                depth_ns: 6_300_000,
+                blur_ns: (blur_ms * 1e6) as u64,
+                passes,
+                quality,
+                depth_held: k % 2 == 1,
+                between_ns: 3_000_000,
+                playout_ns: 4_000_000,
+                ..Trace::default()
+            };
+            self.count(&trace, k * 33_400_000, 41_000_000 + k * 20_000, 1_900_000);
+        }
+        self.reacted(24_000_000);
+        self.frames.captured = 300;
+        self.frames.dropped.late = 2;
+        self.frames.dropped.evicted = 5;
+        self.frames.dropped.driver = 112;
+        self.frames.dropped.unpaired = 31;
+    }
+
+    /// The last frames, the oldest first.
+    pub fn bars(&self) -> impl ExactSizeIterator<Item = &Bar> {
+        self.bars.iter()
+    }
+
+    /// The numbers of the last frames. To be called a few times a second, as it sorts.
+    pub fn summary(&self) -> Summary {
+        let spread = |window: &Window<FRAMES>| [0.5, 0.99].map(|p| window.percentile(FRAMES, p));
+        // The first frame has no interval.
+        let intervals = self.bars().map(|bar| f64::from(bar.interval_ms)).filter(|&ms| ms > 0.0);
+        let (count, sum_ms) = intervals.fold((0.0, 0.0), |(count, sum), ms| (count + 1.0, sum + ms));
+        Summary {
+            fps: if sum_ms > 0.0 { 1000.0 * count / sum_ms } else { 0.0 },
+            latency_ms: spread(&self.latency_ms),
+            reaction_ms: spread(&self.reaction_ms),
+        }
+    }
+}
+
+impl Stages {
+    /// Moves the means towards the times of a frame; the first frame sets them.
+    fn add(&mut self, trace: &Trace, (latency_ns, present_ns): (u64, u64), first: bool) {
+        let weight = if first { 1.0 } else { EASE };
+        let ease = |mean_ms: &mut f64, ns: u64| *mean_ms += (ns as f64 * MS - *mean_ms) * weight;
+        let to_screen_ns = latency_ns.saturating_sub(trace.age_ns + present_ns);
+        ease(&mut self.between_ms, trace.between_ns + to_screen_ns);
+        ease(&mut self.playout_ms, trace.playout_ns);
+        self.own_depth += (f64::from(u8::from(!trace.depth_held)) - self.own_depth) * weight;
+        ease(&mut self.decode_ms, trace.decode_ns);
+        ease(&mut self.depth_ms, trace.depth_ns);
+        ease(&mut self.blur_ms, trace.blur_ns);
+        ease(&mut self.present_ms, present_ns);
+        for (name, time) in trace.passes.iter() {
+            let ms = time.as_secs_f64() * 1e3;
+            match self.passes.iter_mut().find(|pass| pass.0 == name) {
+                Some(pass) => pass.1 += (ms - pass.1) * weight,
+                None => self.passes.push((name, ms)),
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const PERIOD_NS: u64 = 40_000_000;
+
+    fn ran(frames: u64) -> Meters {
+        let mut meters = Meters::default();
+        meters.begin(1_000);
+        for k in 0..frames {
+            let trace = Trace { blur_ns: 1_000_000 * k, quality: Some(Quality::Fast), ..Trace::default() };
+            meters.count(&trace, 1_000 + (k + 1) * PERIOD_NS, 5_000_000 + k * 1_000, 2_000_000);
+        }
+        meters
+    }
+
+    #[test]
+    fn the_last_frames_are_held_oldest_first() {
+        for frames in [0, 1, 7, FRAMES as u64, 3 * FRAMES as u64 + 5] {
+            let meters = ran(frames);
+            let held = frames.min(FRAMES as u64);
+            let blurs: Vec<f32> = meters.bars().map(|bar| bar.blur_ms).collect();
+            assert_eq!(blurs.len() as u64, held);
+            assert!(blurs.iter().zip(frames - held..).all(|(&ms, k)| (ms - k as f32).abs() < 1e-3), "{blurs:?}");
+        }
+    }
+
+    #[test]
+    fn rates_and_percentiles_are_those_of_the_frames() {
+        let meters = ran(100);
+        let summary = meters.summary();
+        assert!((summary.fps - 25.0).abs() < 1e-3, "{summary:?}");
+        assert!((summary.latency_ms[0] - 5.049).abs() < 2e-3 && (summary.latency_ms[1] - 5.098).abs() < 2e-3);
+        assert_eq!(summary.reaction_ms, [0.0; 2]);
+        let totals = meters.totals;
+        assert_eq!((totals.presented, totals.first_frame_ns), (100, Some(PERIOD_NS)));
+        assert_eq!(Meters::default().summary(), Summary::default());
+    }
+
+    #[test]
+    fn another_source_begins_anew_but_totals_go_on() {
+        let mut meters = ran(10);
+        meters.reacted(9_000_000);
+        meters.restart();
+        assert_eq!((meters.bars().len(), meters.summary()), (0, Summary::default()));
+        assert_eq!((meters.totals.presented, meters.totals.reaction.samples()), (10, 1));
+        meters.count(&Trace::default(), 10 * PERIOD_NS, 1, 1);
+        assert_eq!(meters.totals.first_frame_ns, Some(PERIOD_NS), "the first frame is the first of all");
+    }
+
+    #[test]
+    fn stages_follow_the_frames() {
+        let mut meters = ran(400);
+        assert!((meters.stages.present_ms - 2.0).abs() < 1e-9);
+        let mut passes = bokehcam::bokeh::PassTimes::new();
+        passes.add("blur", std::time::Duration::from_millis(7));
+        meters.count(&Trace { passes, ..Trace::default() }, 1, 1, 1);
+        assert_eq!(meters.stages.passes, [("blur", 7.0)]);
+    }
+
+    #[test]
+    fn the_stages_and_waits_make_up_the_latency_and_depth_counts_as_often_as_it_is_made() {
+        for every in 1..=3 {
+            let mut meters = Meters::default();
+            for k in 0..200 {
+                let depth_ns = if k % every == 0 { 30_000_000 } else { 1_000_000 };
+                let trace = Trace {
+                    depth_ns,
+                    age_ns: depth_ns + 20_000_000,
+                    depth_held: k % every > 0,
+                    blur_ns: 9_000_000,
+                    between_ns: 4_000_000,
+                    playout_ns: 7_000_000,
+                    ..Trace::default()
+                };
+                // 3 ms from the pipeline to the window, and 2 in it.
+                meters.count(&trace, k * PERIOD_NS, trace.age_ns + 5_000_000, 2_000_000);
+            }
+            let stages = meters.stages;
+            let parts = [stages.depth_ms, stages.blur_ms, stages.between_ms, stages.playout_ms, stages.present_ms];
+            let depth_ms = 1.0 + 29.0 / every as f64;
+            assert!((stages.between_ms - 7.0).abs() < 1e-6, "{stages:?}");
+            let sum_ms = parts.iter().sum::<f64>();
+            assert!((sum_ms - (depth_ms + 25.0)).abs() < 1.5, "{every}: {sum_ms}");
+            assert_eq!(u64::from(stages.depth_every()), every);
+        }
+    }
+}

@@ -1,0 +1,90 @@
+//! Cards over the picture, with words and buttons.
+
+use egui::{Align2, Area, Context, Id, Label, Margin, Order, Rect, RichText, Ui, pos2};
+
+use super::dock::room;
+use super::parts::button;
+use super::state::Action;
+use super::theme::{Colors, GAP, card, medium};
+use crate::texts::tr;
+
+/// Draws a card where `area` says, no wider than `width` points nor than the window. Its rectangle.
+pub fn show(
+    ctx: &Context,
+    area: Area,
+    width: f32,
+    margin: impl Into<Margin>,
+    content: impl FnOnce(&mut Ui, &Colors),
+) -> Rect {
+    let drawn = area.fade_in(false).show(ctx, |ui| {
+        let colors = Colors::here(ui);
+        ui.set_max_width((room(ctx).width() - 2.0 * GAP).min(width).max(60.0));
+        card(&colors).inner_margin(margin).show(ui, |ui| content(ui, &colors));
+    });
+    drawn.response.rect
+}
+
+pub fn title(ui: &mut Ui, text: &str) {
+    ui.label(RichText::new(tr(text)).family(medium()).size(16.0));
+}
+
+/// A text of as many lines as it needs; none if it is empty.
+pub fn words(ui: &mut Ui, colors: &Colors, text: &str) {
+    if !text.is_empty() {
+        ui.add(Label::new(RichText::new(tr(text)).color(colors.text)).wrap());
+    }
+}
+
+/// Cards that are drawn one above the other at the bottom of the picture, clear of faces.
+pub struct Stack<'a> {
+    pub ctx: &'a Context,
+    /// Points from the bottom of the picture's room to the next card.
+    pub bottom: f32,
+}
+
+impl Stack<'_> {
+    /// Adds a card without controls. A click on it is not one on the picture below.
+    pub fn tell(&mut self, id: Id, width: f32, opacity: f32, text: &str) {
+        let area = Area::new(id).order(Order::Foreground);
+        self.add(area, width, Margin::symmetric(14, 9), |ui, colors| {
+            ui.set_opacity(opacity);
+            words(ui, colors, text);
+        });
+    }
+
+    /// Adds a card with buttons: what each is called, its hint, and what it does.
+    pub fn ask(
+        &mut self,
+        id: &str,
+        width: f32,
+        [heading, why]: [&str; 2],
+        buttons: impl IntoIterator<Item = (&'static str, &'static str, Action)>,
+        actions: &mut Vec<Action>,
+    ) {
+        let area = Area::new(Id::unique(id)).order(Order::Middle);
+        self.add(area, width, 14, |ui, colors| {
+            title(ui, heading);
+            words(ui, colors, why);
+            ui.add_space(2.0);
+            ui.horizontal_wrapped(|ui| {
+                for (text, hint, action) in buttons {
+                    if button(ui, text, hint) {
+                        actions.push(action);
+                    }
+                }
+            });
+        });
+    }
+
+    /// Adds a card with what `content` draws.
+    pub fn card(&mut self, id: &str, width: f32, content: impl FnOnce(&mut Ui, &Colors)) {
+        self.add(Area::new(Id::unique(id)).order(Order::Foreground), width, Margin::symmetric(18, 10), content);
+    }
+
+    fn add(&mut self, area: Area, width: f32, margin: impl Into<Margin>, content: impl FnOnce(&mut Ui, &Colors)) {
+        let room = room(self.ctx);
+        let at = pos2(room.center().x, room.bottom() - self.bottom);
+        let area = area.pivot(Align2::CENTER_BOTTOM).fixed_pos(at);
+        self.bottom += show(self.ctx, area, width, margin, content).height() + 6.0;
+    }
+}

@@ -1,0 +1,107 @@
+//! The help on keys and gestures.
+
+use egui::{Context, Grid, Id, Key, Label, Modal, RichText, ScrollArea, Ui, vec2};
+
+use super::icons::{self, Icon};
+use super::keys::{GROUPS, Group};
+use super::parts::switch;
+use super::state::{Action, State};
+use super::theme::{Colors, GAP, PAD, card, medium};
+use crate::texts::tr;
+
+const GESTURES: [(&str, &str); 9] = [
+    ("Click", "focus there"),
+    ("Double-click", "focus on that, and follow it"),
+    ("Wheel", "less blur, more blur"),
+    ("Ctrl+Wheel, pinch", "larger, smaller: pixels as they are"),
+    ("Drag", "move the enlarged picture"),
+    ("Alt", "depth and blur under the pointer"),
+    ("Drag the line", "move the split between before and after"),
+    ("Drag the marks", "move, widen and turn the band of tilt-shift"),
+    ("Tab", "from control to control; Space and the arrow keys change it"),
+];
+
+/// Points that an arrow key scrolls.
+const LINE: f32 = 40.0;
+
+/// Draws the help over everything, in two columns where the window is wide. Enter or a click beside it closes it; the arrow
+/// and page keys scroll it.
+pub fn show(ctx: &Context, state: &State, actions: &mut Vec<Action>) {
+    let window = ctx.content_rect();
+    let columns = if window.width() > 720.0 { 2 } else { 1 };
+    let width = if columns == 2 { 660.0 } else { (window.width() - 2.0 * (GAP + PAD)).clamp(60.0, 340.0) };
+    let frame = card(&Colors::of(ctx.theme()));
+    let drawn = Modal::new(Id::unique("help")).frame(frame).show(ctx, |ui| {
+        ui.set_width(width);
+        ui.set_max_height((window.height() - 2.0 * (GAP + PAD)).max(20.0));
+        ui.horizontal(|ui| {
+            ui.heading(tr("Keys and gestures"));
+            ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
+                if icons::button(ui, Icon::Close, "Close (Esc)", true) {
+                    actions.push(Action::Help(false));
+                }
+            });
+        });
+        let hint = "Off, letters, digits and signs do nothing: for who speaks to the computer";
+        if switch(ui, "Single keys", hint, state.habits.single_keys) {
+            actions.push(Action::SingleKeys(!state.habits.single_keys));
+        }
+        let (asks, hint) = (
+            state.habits.ask_before_closing,
+            "While something is recorded or used in calls, closing the window asks first",
+        );
+        if switch(ui, "Ask before closing", hint, asks) {
+            actions.push(Action::AskBeforeClosing(!asks));
+        }
+        let height = (window.height() - 2.0 * (GAP + PAD) - 100.0).max(20.0);
+        ScrollArea::vertical().max_height(height).show(ui, |ui| {
+            ui.scroll_with_delta(vec2(0.0, scrolled(ui, height)));
+            let gestures = |ui: &mut Ui| table(ui, "On the picture", GESTURES.into_iter());
+            if columns == 2 {
+                ui.columns_const(|[left, right]| {
+                    GROUPS[..3].iter().for_each(|group| keys(left, group));
+                    GROUPS[3..].iter().for_each(|group| keys(right, group));
+                    gestures(right);
+                });
+            } else {
+                GROUPS.iter().for_each(|group| keys(ui, group));
+                gestures(ui);
+            }
+        });
+    });
+    if drawn.backdrop_response.clicked() || ctx.input(|input| input.key_pressed(Key::Enter)) {
+        actions.push(Action::Help(false));
+    }
+}
+
+/// How far the keys that were pressed scroll, in points: a page is `height`.
+fn scrolled(ui: &Ui, height: f32) -> f32 {
+    let steps = [
+        (Key::ArrowUp, LINE),
+        (Key::ArrowDown, -LINE),
+        (Key::PageUp, height),
+        (Key::PageDown, -height),
+        (Key::Home, f32::MAX),
+        (Key::End, f32::MIN),
+    ];
+    ui.input(|input| steps.iter().filter(|(key, _)| input.key_pressed(*key)).map(|(_, by)| by).sum())
+}
+
+fn keys(ui: &mut Ui, group: &Group) {
+    table(ui, group.name, group.bindings.iter().map(|binding| (binding.keys, binding.does)));
+}
+
+/// A titled table of keys or gestures and what they do.
+fn table<'a>(ui: &mut Ui, name: &str, rows: impl Iterator<Item = (&'a str, &'a str)>) {
+    let colors = Colors::here(ui);
+    ui.spacing_mut().interact_size.y = 17.0;
+    ui.add_space(8.0);
+    ui.label(RichText::new(tr(name)).family(medium()).color(colors.accent));
+    Grid::new(name).num_columns(2).spacing(vec2(12.0, 4.0)).min_col_width(104.0).show(ui, |ui| {
+        for (keys, does) in rows {
+            ui.label(RichText::new(tr(keys)).family(medium()));
+            ui.add(Label::new(RichText::new(tr(does)).color(colors.weak)).wrap());
+            ui.end_row();
+        }
+    });
+}

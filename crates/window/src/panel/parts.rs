@@ -1,0 +1,326 @@
+//! The controls that the sections are made of.
+
+use std::ops::RangeInclusive;
+
+use egui::{
+    Align, Align2, ComboBox, Context, CornerRadius, DragValue, EventFilter, FontId, Id, Key, Label, Layout, Rect,
+    Response, RichText, Role, Sense, Slider, SliderClamping, Stroke, StrokeKind, TextStyle, Ui, Vec2, WidgetInfo, pos2,
+};
+
+use super::theme::{Colors, ROW, medium};
+use crate::texts::{tr, tr_with};
+
+/// Room for a number beside its name.
+const NUMBER_WIDTH: f32 = 70.0;
+
+/// A control for a number.
+#[derive(Clone)]
+pub struct Number<'a> {
+    label: &'a str,
+    /// What it does, shown while the pointer rests on it.
+    hint: &'a str,
+    range: RangeInclusive<f32>,
+    /// Digits after the point.
+    digits: usize,
+    /// Whether the slider is logarithmic.
+    ratios: bool,
+    /// Before and after the number.
+    around: [&'a str; 2],
+}
+
+impl<'a> Number<'a> {
+    /// A number of this range, without a unit, on a linear slider.
+    pub fn new(label: &'a str, hint: &'a str, range: RangeInclusive<f32>, digits: usize) -> Self {
+        Self { label, hint, range, digits, ratios: false, around: ["", ""] }
+    }
+
+    /// The same with a unit, before and after it.
+    pub fn unit(self, before: &'a str, after: &'a str) -> Self {
+        Self { around: [before, after], ..self }
+    }
+
+    /// The same on a logarithmic slider.
+    pub fn ratios(self) -> Self {
+        Self { ratios: true, ..self }
+    }
+
+    pub fn label(&self) -> &'a str {
+        self.label
+    }
+}
+
+/// Controls with a hint, shown while the pointer rests on them.
+pub trait Hinted {
+    /// Shows a text of the table, unless it is empty; not where the control is scrolled out of sight, though egui takes it to
+    /// be there.
+    fn hint(self, text: &str) -> Self;
+}
+
+impl Hinted for Response {
+    fn hint(self, text: &str) -> Self {
+        let is_out_of_sight = |at| self.rect.contains(at) && !self.interact_rect.contains(at);
+        match text.is_empty() || self.ctx.pointer_latest_pos().is_some_and(is_out_of_sight) {
+            true => self,
+            false => self.on_hover_text(tr(text)),
+        }
+    }
+}
+
+/// Draws a name, a number to drag or type, and a slider under them. Whether the number was changed.
+pub fn number(ui: &mut Ui, how: &Number, value: &mut f32) -> bool {
+    let Number { label, hint, ref range, digits, ratios, around: [before, after] } = *how;
+    let label = tr(label);
+    let mut changed = false;
+    ui.scope(|ui| {
+        ui.spacing_mut().item_spacing.y = 0.0;
+        let name = ui.horizontal(|ui| {
+            // The number stays whole; a long name goes on in a second line.
+            let most = (ui.available_width() - NUMBER_WIDTH).max(20.0);
+            let name = ui.scope(|ui| {
+                ui.set_max_width(most);
+                ui.add(Label::new(label).wrap())
+            });
+            let name = name.inner.hint(hint);
+            ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+                ui.spacing_mut().button_padding = Vec2::new(5.0, 1.0);
+                ui.spacing_mut().interact_size = Vec2::new(24.0, 20.0);
+                // Dragging over 300 points, the panel's width, covers the range.
+                let per_point = (range.end() - range.start()) / 300.0;
+                // What was chosen elsewhere may lie outside; it stays until somebody moves it.
+                let mut typed = *value;
+                let drag = DragValue::new(&mut typed).range(range.clone()).clamp_existing_to_range(false);
+                let drag = drag
+                    .speed(per_point)
+                    .update_while_editing(false)
+                    .max_decimals(digits)
+                    .min_decimals(digits)
+                    .prefix(before)
+                    .suffix(after);
+                // Many write 1,5.
+                let (ctx, shown) = (ui.ctx().clone(), f64::from(*value));
+                let drag = drag.custom_parser(|text| {
+                    let number: f64 = text.trim().replace(',', ".").parse().ok()?;
+                    // On its way through the panel, Tab leaves behind what was there.
+                    if (number - shown).abs() > 0.1f64.powi(digits as i32) {
+                        say_range(&ctx, how, number);
+                    }
+                    Some(number)
+                });
+                let is_other = ui.add(drag).labelled_by(name.id).hint(hint).changed();
+                // The keyboard's way through the panel leaves behind the number as it is shown, rounded.
+                if is_other && (typed - *value).abs() > 0.501 * 0.1f32.powi(digits as i32) {
+                    (*value, changed) = (typed, true);
+                }
+            });
+            name
+        });
+        ui.spacing_mut().slider_width = ui.available_width().max(10.0);
+        ui.spacing_mut().interact_size.y = 20.0;
+        // A logarithmic slider that begins at 0 has to begin its decades somewhere.
+        let least = if ratios { f64::from(*range.start()).max(1e-3) } else { 0.0 };
+        let mut slid = *value;
+        let slider = Slider::new(&mut slid, range.clone()).clamping(SliderClamping::Edits).show_value(false);
+        let slider = ui.add(slider.logarithmic(ratios).smallest_positive(least)).labelled_by(name.inner.id);
+        if slider.hint(hint).changed() {
+            // A digit more than is shown.
+            let steps = 10f32.powi(digits as i32 + 1);
+            (*value, changed) = ((slid * steps).round() / steps, true);
+        }
+    });
+    changed
+}
+
+/// Where a line for the person waits for the end of the pass.
+fn said() -> Id {
+    Id::unique("said by a control")
+}
+
+/// Says what becomes of a number that was typed, if it cannot be.
+fn say_range(ctx: &Context, how: &Number, number: f64) {
+    let Number { label, ref range, digits, around: [before, after], .. } = *how;
+    // As it is shown: half a step beyond is the end itself.
+    let half = 0.5 * 0.1f64.powi(digits as i32);
+    let (least, most) = (f64::from(*range.start()), f64::from(*range.end()));
+    if number < least - half || number > most + half {
+        let taken = if number < least { least } else { most };
+        let [least, most, taken] = [least, most, taken].map(|number| format!("{before}{number:.digits$}{after}"));
+        let line = tr_with("{} goes from {} to {}: {} was taken.", &[&tr(label), &least, &most, &taken]);
+        ctx.data_mut(|data| data.insert_temp(said(), line));
+    }
+}
+
+/// The line that a control had for the person in this pass.
+pub fn take_said(ctx: &Context) -> Option<String> {
+    ctx.data_mut(|data| data.remove_temp(said()))
+}
+
+/// Draws options side by side, each with a name, a hint and what it stands for; `can` says which may be chosen. The one that
+/// was clicked, or chosen by the arrow keys.
+pub fn choose<T: PartialEq + Copy>(
+    ui: &mut Ui,
+    what: &str,
+    options: &[(&str, &str, T)],
+    chosen: T,
+    can: impl Fn(T) -> bool,
+) -> Option<T> {
+    let colors = Colors::here(ui);
+    let what = tr(what);
+    let font = |chosen: bool| FontId::new(12.5, if chosen { medium() } else { egui::FontFamily::Proportional });
+    let width_of = |name: &str| ui.painter().layout_no_wrap(tr(name).to_owned(), font(true), colors.text).size().x;
+    let widest = options.iter().map(|(name, ..)| width_of(name)).fold(0.0, f32::max) + 12.0;
+    // As many side by side as are whole in this language.
+    let whole = (1..=options.len()).rev().find(|columns| ui.available_width() / *columns as f32 >= widest);
+    let columns = options.len().div_ceil(options.len().div_ceil(whole.unwrap_or(1).max(1)).max(1)).max(1);
+    let rows = options.len().div_ceil(columns);
+    let (rect, _) = ui.allocate_exact_size(Vec2::new(ui.available_width(), ROW * rows as f32), Sense::hover());
+    ui.painter().rect_filled(rect, CornerRadius::same(7), colors.field);
+    let cell_width = rect.width() / columns as f32;
+    let mut group = Group::default();
+    for (index, &(name, hint, option)) in options.iter().enumerate() {
+        let name = tr(name);
+        let (row, column) = (index / columns, index % columns);
+        let corner = pos2(rect.left() + cell_width * column as f32, rect.top() + ROW * row as f32);
+        let cell = Rect::from_min_size(corner, Vec2::new(cell_width, ROW));
+        let (is_chosen, is_possible) = (option == chosen, can(option));
+        let sense = if is_possible { Sense::click() } else { Sense::hover() };
+        let response = ui.interact(cell, ui.scope_id().with((what, index)), sense);
+        response
+            .widget_info(|| WidgetInfo::selected(Role::RadioButton, is_possible, is_chosen, format!("{what}: {name}")));
+        let inner = cell.shrink(2.0);
+        let is_hovered = is_possible && response.hovered();
+        if is_chosen || is_hovered {
+            ui.painter().rect_filled(inner, CornerRadius::same(6), colors.fill(is_chosen, is_hovered));
+        }
+        let text = colors.on_fill(is_chosen, is_possible);
+        let name = ui.painter().layout(name.to_owned(), font(is_chosen), text, cell_width);
+        let at = Align2::CENTER_CENTER.anchor_size(inner.center(), name.size()).min;
+        ui.painter().with_clip_rect(cell).galley(at, name, text);
+        group.add(response.hint(hint), option);
+    }
+    group.chosen(ui)
+}
+
+/// Controls of which one is chosen: by a click, or by an arrow key that goes on to it from its neighbour.
+pub struct Group<T>(Vec<(Response, T)>);
+
+impl<T> Default for Group<T> {
+    fn default() -> Self {
+        Self(Vec::new())
+    }
+}
+
+impl<T> Group<T> {
+    /// Adds the next control; those that can only be hovered are never chosen.
+    pub fn add(&mut self, control: Response, option: T) {
+        if control.sense.senses_click() {
+            self.0.push((control, option));
+        }
+    }
+
+    /// What was chosen in this pass, if anything.
+    pub fn chosen(mut self, ui: &Ui) -> Option<T> {
+        let focused = self.0.iter().position(|(control, _)| control.has_focus());
+        let by_arrow = focused.and_then(|at| {
+            let arrows = EventFilter { horizontal_arrows: true, ..EventFilter::default() };
+            ui.memory_mut(|memory| memory.set_focus_lock_filter(self.0[at].0.id, arrows));
+            let pressed = |key| ui.input(|input| input.key_pressed(key));
+            match (pressed(Key::ArrowLeft), pressed(Key::ArrowRight)) {
+                (true, false) => at.checked_sub(1),
+                (false, true) => Some(at + 1).filter(|next| *next < self.0.len()),
+                _ => None,
+            }
+        });
+        by_arrow.into_iter().for_each(|next| self.0[next].0.request_focus());
+        let chosen = by_arrow.or_else(|| self.0.iter().position(|(control, _)| control.clicked()));
+        chosen.map(|index| self.0.swap_remove(index).1)
+    }
+}
+
+/// Draws a list that opens, of names, each with a hint (or none) and what it stands for. Another one that was chosen.
+pub fn list<'a, T: PartialEq>(
+    ui: &mut Ui,
+    what: &str,
+    shown: &str,
+    options: impl IntoIterator<Item = (String, &'a str, T)>,
+    chosen: &T,
+) -> Option<T> {
+    let mut picked = None;
+    let menu = ComboBox::from_id_salt(what).selected_text(shown).truncate().show_ui(ui, |ui| {
+        for (name, hint, option) in options {
+            let is_chosen = option == *chosen;
+            if ui.selectable_label(is_chosen, name).hint(hint).clicked() && !is_chosen {
+                picked = Some(option);
+            }
+        }
+    });
+    menu.response.widget_info(|| {
+        let mut info = WidgetInfo::labeled(Role::ComboBox, menu.response.enabled(), tr(what));
+        info.current_text_value = Some(shown.to_owned());
+        info
+    });
+    picked
+}
+
+/// Draws a name and a switch. Whether it was clicked.
+pub fn switch(ui: &mut Ui, label: &str, hint: &str, on: bool) -> bool {
+    let colors = Colors::here(ui);
+    let label = tr(label);
+    let font = TextStyle::Body.resolve(ui.style());
+    let text =
+        ui.painter().layout(label.to_owned(), font, ui.visuals().text_color(), (ui.available_width() - 42.0).max(10.0));
+    let size = Vec2::new(ui.available_width(), text.size().y.max(24.0));
+    let (rect, response) = ui.allocate_exact_size(size, Sense::click());
+    response.widget_info(|| WidgetInfo::selected(Role::Switch, ui.is_enabled(), on, label));
+    let track = Rect::from_center_size(pos2(rect.right() - 17.0, rect.center().y), Vec2::new(32.0, 18.0));
+    let painter = ui.painter();
+    painter.rect_filled(track, CornerRadius::same(9), colors.fill(on, response.hovered()));
+    painter.rect_stroke(track, CornerRadius::same(9), Stroke::new(1.0, colors.line), StrokeKind::Inside);
+    let x = if on { track.right() - 9.0 } else { track.left() + 9.0 };
+    painter.circle_filled(pos2(x, track.center().y), 6.5, if on { colors.on_accent } else { colors.weak });
+    let at = Align2::LEFT_CENTER.anchor_size(rect.left_center(), text.size()).min;
+    painter.galley(at, text, ui.visuals().text_color());
+    response.hint(hint).clicked()
+}
+
+/// Draws a button. Whether it was clicked.
+pub fn button(ui: &mut Ui, text: &str, hint: &str) -> bool {
+    ui.button(tr(text)).hint(hint).clicked()
+}
+
+/// Tells a screen reader what a list or a field is called.
+pub fn called(control: &Response, name: &str, role: Role) {
+    control.widget_info(|| WidgetInfo::labeled(role, control.enabled(), tr(name)));
+}
+
+/// A line of explanation.
+pub fn remark(ui: &mut Ui, text: &str) {
+    let colors = Colors::here(ui);
+    ui.label(RichText::new(tr(text)).text_style(TextStyle::Small).color(colors.weak));
+}
+
+/// A path, of which the end says which file it is: a long one is cut at its beginning.
+pub fn path(ui: &mut Ui, path: &str) {
+    let shown = crate::folders::shown_output(path);
+    ui.scope(|ui| remark(ui, &end_of(&shown, 38))).response.on_hover_text(path);
+}
+
+/// The last of at most so many signs of a text, after dots if there are more.
+pub fn end_of(text: &str, most: usize) -> String {
+    match text.chars().count().checked_sub(most) {
+        None | Some(0) => text.to_owned(),
+        Some(over) => ['…'].into_iter().chain(text.chars().skip(over + 1)).collect(),
+    }
+}
+
+/// Draws a part of the panel, unless it is folded. Whether its title was clicked.
+pub fn section(ui: &mut Ui, name: &str, open: bool, body: impl FnOnce(&mut Ui)) -> bool {
+    let colors = Colors::here(ui);
+    ui.add_space(4.0);
+    let title = RichText::new(tr(name)).family(medium()).size(13.5).color(colors.text);
+    let header = egui::CollapsingHeader::new(title).id_salt(name).open(Some(open));
+    let folded = header.show_unindented(ui, |ui| {
+        ui.add_space(2.0);
+        body(ui);
+    });
+    folded.header_response.clicked()
+}

@@ -1,0 +1,65 @@
+//! The plate: the offer to take one, and what to do while it is taken.
+
+use egui::{ProgressBar, RichText};
+
+use super::cards::{Stack, words};
+use super::dock::room;
+use super::parts::button;
+use super::state::{Action, State};
+use super::theme::medium;
+use bokehcam::depth::plate::Step;
+use crate::texts::tr;
+
+const WIDTH: f32 = 420.0;
+
+/// Draws the ways to a portrait, where nothing is known of depth.
+pub fn offer(stack: &mut Stack, state: &State, actions: &mut Vec<Action>) {
+    if !state.offers_depth() || state.bare {
+        return;
+    }
+    let network = ("Find me by a small network", "It tells a person from what is behind", Action::FindMe);
+    let plate =
+        ("Show me the empty room", "Step out for four seconds; the camera has to stand still (T)", Action::TakePlate);
+    let plate = Some(plate).filter(|_| state.takes_plates());
+    let buttons = [network].into_iter().chain(plate).chain([("Not now", "Esc", Action::DeclinePlate)]);
+    // A small picture is not covered by words.
+    let is_small = room(stack.ctx).height() < 360.0;
+    let why = if is_small { "" } else { "Who is near is not known here, so all is blurred." };
+    stack.ask("plate offer", WIDTH, ["A portrait from this picture alone", why], buttons, actions);
+}
+
+/// Draws what the person has to do for the plate now.
+pub fn show(stack: &mut Stack, state: &State, actions: &mut Vec<Action>) {
+    let Some(step) = state.plate.filter(|step| *step != Step::Ready) else { return };
+    let (title, why) = match step {
+        Step::StepOut(_) => ("Step out of the picture", ""),
+        Step::Taking(_) => ("Stay out", "What is behind you is being learned."),
+        Step::Moves => ("Something moves", "Stay out of the picture, and let the camera stand still."),
+        Step::Restless => {
+            ("No plate so far", "Something keeps moving: let the camera stand on something firm, and step out.")
+        }
+        _ => (
+            "Another picture",
+            "The camera was moved, or the light has changed: nobody can be told from what is behind, so all is blurred.",
+        ),
+    };
+    stack.card("plate", WIDTH, |ui, colors| {
+        ui.label(RichText::new(tr(title)).family(medium()).size(22.0));
+        match step {
+            Step::StepOut(seconds) => {
+                ui.label(RichText::new(seconds.to_string()).family(medium()).size(40.0));
+            }
+            Step::Taking(percent) => {
+                ui.add(ProgressBar::new(percent as f32 / 100.0).desired_width(ui.available_width().min(WIDTH / 2.0)));
+            }
+            _ => {}
+        }
+        words(ui, colors, why);
+        if step == Step::Unlike && button(ui, "Take another plate", "T") {
+            actions.push(Action::TakePlate);
+        }
+        if let Some(way) = state.way_without_plate().filter(|_| button(ui, "Find me without it", "Esc")) {
+            actions.push(Action::DepthBy(way));
+        }
+    });
+}

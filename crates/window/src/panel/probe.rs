@@ -1,0 +1,49 @@
+//! What is under the pointer: its depth and its blur.
+
+use egui::{Align, Align2, Context, Id, LayerId, Order, Ui, vec2};
+
+use super::marks::label;
+use super::place::Place;
+use super::state::{Shown, State};
+use bokehcam::frame::DepthMap;
+use crate::texts::{tr, tr_with};
+use crate::views::Probe;
+
+/// While the pointer rests, frames go on: what is said of them is renewed this often, in seconds.
+const PERIOD_S: f32 = 0.2;
+
+/// The place under the pointer, as fractions of the picture, where somebody wants to know of it: while instruments or a view
+/// other than the picture are shown, or Alt is held.
+pub fn place(ui: &Ui, state: &State, place: &Place) -> Option<[f32; 2]> {
+    let (at, alt) = ui.input(|input| (input.pointer.hover_pos(), input.modifiers.alt));
+    let is_wanted = alt || !state.bare && (state.instruments || state.shown != Shown::Picture);
+    let at = at.filter(|at| is_wanted && place.seen.contains(*at))?;
+    // Not through the panel.
+    let layer = ui.ctx().layer_id_at(at);
+    (layer.is_none() || layer == Some(ui.layer_id())).then(|| place.fractions(at))
+}
+
+/// Draws what is known there beside the pointer.
+pub fn show(ctx: &Context, state: &State) {
+    ctx.request_repaint_after_secs(PERIOD_S);
+    let Some((probe, at)) = state.probe.zip(ctx.pointer_latest_pos()) else { return };
+    let painter = ctx.layer_painter(LayerId::new(Order::Middle, Id::unique("probe")));
+    let text = text(probe, state.camera.is_relative);
+    // Right and below, unless that is outside.
+    let window = super::dock::room(ctx);
+    let (x, dx) = if at.x + 240.0 < window.right() { (Align::Min, 16.0) } else { (Align::Max, -12.0) };
+    let (y, dy) = if at.y + 50.0 < window.bottom() { (Align::Min, 20.0) } else { (Align::Max, -12.0) };
+    label(&painter, at + vec2(dx, dy), Align2([x, y]), &text, None);
+}
+
+/// Relative distances are in units of the nearest one, and have no metres.
+fn text(probe: Probe, is_relative: bool) -> String {
+    let depth = match (probe.depth_m, is_relative) {
+        (None, _) => tr("no depth").to_owned(),
+        (Some(far), true) if far >= 0.99 * DepthMap::FAR_M => tr("far").to_owned(),
+        (Some(near), true) => tr_with("{} × the nearest", &[&format!("{near:.2}")]),
+        (Some(metres), false) if metres >= 100.0 => format!("{metres:.0} m"),
+        (Some(metres), false) => format!("{metres:.2} m"),
+    };
+    tr_with("{}, CoC {} px", &[&depth, &format!("{:+.1}", probe.coc_px)]).replace('-', "−")
+}

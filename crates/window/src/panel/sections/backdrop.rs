@@ -1,0 +1,89 @@
+//! What is behind the subject, and whether the picture follows it.
+
+use egui::{Role, Ui, WidgetInfo};
+
+use super::Sheet;
+use bokehcam::depth::backdrop::Behind;
+use bokehcam::look::Follow;
+use crate::panel::parts::{Hinted, Number, list, path, remark, switch};
+use crate::services::Browse;
+use crate::state::Action;
+use crate::texts::{tr, tr_with};
+
+#[derive(Clone, Copy, PartialEq)]
+enum Kind {
+    Blurred,
+    Color,
+    Picture,
+}
+
+const KINDS: [(&str, &str, Kind); 3] = [
+    ("Blurred", "The room, blurred", Kind::Blurred),
+    ("Colour", "One colour, for a page of your own, or for programs that put something in its place", Kind::Color),
+    ("Picture", "A picture of yours, as large as the frame", Kind::Picture),
+];
+/// The green of screens that are replaced later.
+const GREEN: [u8; 3] = [0, 177, 64];
+/// Room to move, and little loss of detail.
+const ZOOM: f32 = 1.5;
+/// Below, there is none.
+const LEAST_ZOOM: f32 = 1.1;
+
+/// A list of what may be behind.
+pub fn kinds(ui: &mut Ui, sheet: &mut Sheet) {
+    let kind = match sheet.look.behind {
+        Behind::Blur => Kind::Blurred,
+        Behind::Color(_) => Kind::Color,
+        Behind::Picture(_) => Kind::Picture,
+    };
+    let named = match &sheet.state.first_look.behind {
+        Behind::Picture(picture) => Some(Behind::Picture(picture.clone())),
+        _ => None,
+    };
+    let shown = KINDS.iter().find(|(.., of)| *of == kind).map_or("", |(name, ..)| tr(name));
+    let shown = tr_with("Background: {}", &[&shown]);
+    let all = KINDS.map(|(name, hint, kind)| (tr(name).to_owned(), hint, kind));
+    let enabled = sheet.follows_depth();
+    let chosen = ui.add_enabled_ui(enabled, |ui| list(ui, "Background", &shown, all, &kind)).inner;
+    if let Some(chosen) = chosen {
+        match (chosen, named) {
+            (Kind::Blurred, _) => sheet.look.behind = Behind::Blur,
+            (Kind::Color, _) => sheet.look.behind = Behind::Color(GREEN),
+            (Kind::Picture, Some(named)) => sheet.look.behind = named,
+            (Kind::Picture, None) => sheet.act(Action::Browse(Browse::Behind)),
+        }
+        sheet.changed(true, "behind");
+    }
+}
+
+/// More of what is behind, and whether the picture follows.
+pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
+    match sheet.look.behind.clone() {
+        Behind::Blur => {}
+        Behind::Picture(picture) => {
+            picture.file.iter().for_each(|file| path(ui, &file.display().to_string()));
+            sheet.button(ui, "Choose picture…", "Another picture of yours", Action::Browse(Browse::Behind));
+        }
+        Behind::Color(mut color) => drop(ui.horizontal(|ui| {
+            ui.label(tr("Colour"));
+            let picker = ui.color_edit_button_srgb(&mut color);
+            picker.widget_info(|| WidgetInfo::labeled(Role::ColorWell, true, tr("Colour")));
+            if picker.hint("Another colour").changed() {
+                sheet.look.behind = Behind::Color(color);
+                sheet.changed(true, "colour behind");
+            }
+        })),
+    }
+    let zoom = sheet.look.follow.zoom();
+    let hint = "What goes out is a part of the picture, with the subject in its middle";
+    if switch(ui, "Follow the subject", hint, zoom.is_some()) {
+        sheet.look.follow = if zoom.is_some() { Follow::OFF } else { Follow::to(ZOOM) };
+        sheet.changed(true, "follow");
+    }
+    if let Some(zoom) = zoom {
+        let how =
+            Number::new("Largest zoom", "So much larger the subject becomes, at most", LEAST_ZOOM..=Follow::MOST, 1);
+        sheet.number(ui, &how.unit("", "×"), zoom, |look, zoom| look.follow = Follow::to(zoom));
+        remark(ui, "In what goes out, within the dashed line; this window shows the whole picture.");
+    }
+}

@@ -1,0 +1,38 @@
+//! The effect: what the blur follows.
+
+use egui::Ui;
+
+use super::Sheet;
+use bokehcam::look::{Effect, Tilt};
+use crate::panel::parts::{Number, choose, remark};
+use crate::state::Source;
+
+const EFFECTS: [(&str, &str, Effect); 4] = [
+    ("Portrait", "The farther from who is in focus, the more blur", Effect::Auto),
+    ("Sharp band", "A sharp band, and blur that grows away from it", Effect::TiltShift),
+    ("Whole picture", "The same blur everywhere", Effect::Blur),
+    ("No blur", "The picture as it is", Effect::None),
+];
+
+/// The effect, and the band of tilt-shift.
+pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
+    let chosen = EFFECTS.iter().find(|effect| effect.2 == sheet.look.effect).map_or(Effect::Auto, |effect| effect.2);
+    let has_depth = sheet.has_depth();
+    if let Some(effect) = choose(ui, "Effect", &EFFECTS, chosen, |effect| has_depth || effect != Effect::Auto) {
+        sheet.look.effect = effect;
+        sheet.stroke = Some("effect");
+    }
+    if !has_depth && matches!(sheet.state.source, Source::Running(_)) {
+        remark(ui, sheet.state.no_depth());
+    }
+    if sheet.look.effect == Effect::TiltShift {
+        let Tilt { center_y, band, angle_deg } = sheet.look.tilt;
+        let share = |label, hint| Number::new(label, hint, 0.0..=100.0, 0).unit("", " %");
+        let how = share("Middle of the band", "Its middle, from the top of the picture");
+        sheet.number(ui, &how, center_y * 100.0, |look, percent| look.tilt.center_y = percent / 100.0);
+        let how = share("Width of the band", "As a share of the height");
+        sheet.number(ui, &how, band * 100.0, |look, percent| look.tilt.band = percent / 100.0);
+        let how = Number::new("Angle", "The turn of the band, clockwise", -90.0..=90.0, 0).unit("", "°");
+        sheet.number(ui, &how, angle_deg, |look, angle_deg| look.tilt.angle_deg = angle_deg);
+    }
+}

@@ -1,0 +1,137 @@
+//! What everybody needs: the camera, the portrait, how strong it is, what is behind, what is kept and where it goes.
+
+use egui::{Align, Button, Layout, Role, Sense, Slider, TextStyle, Ui, Vec2, WidgetInfo, WidgetText, vec2};
+
+use super::{Sheet, backdrop};
+use bokehcam::look::{Effect, MAX_COC_PER_HEIGHT};
+use crate::panel::dock::{CELL, CELL_GAP, CELLS};
+use crate::panel::parts::{Hinted, list, switch};
+use crate::panel::{icons, theme::Colors};
+use crate::state::{Action, tweak};
+use crate::texts::{tr, tr_with};
+
+/// The section that all else is in.
+pub const MORE: &str = "More";
+
+/// Draws them in so many columns.
+pub fn show(ui: &mut Ui, sheet: &mut Sheet, columns: usize) {
+    let width = ((ui.available_width() - CELL_GAP * (columns - 1) as f32) / columns as f32).max(20.0);
+    let cells: [fn(&mut Ui, &mut Sheet); CELLS] = [camera, portrait, blur, backdrop::kinds, keep, calls, more];
+    ui.scope(|ui| {
+        ui.spacing_mut().item_spacing = Vec2::splat(CELL_GAP);
+        for row in cells.chunks(columns) {
+            ui.horizontal(|ui| {
+                for cell in row {
+                    ui.allocate_ui_with_layout(vec2(width, CELL), Layout::left_to_right(Align::Center), |ui| {
+                        ui.set_min_size(vec2(width, CELL));
+                        ui.set_max_width(width);
+                        ui.spacing_mut().combo_width = width;
+                        ui.spacing_mut().interact_size.y = CELL;
+                        cell(ui, sheet);
+                    });
+                }
+            });
+        }
+    });
+}
+
+/// The source, and others to choose.
+fn camera(ui: &mut Ui, sheet: &mut Sheet) {
+    let state = sheet.state;
+    let shown = match state.title() {
+        "" => tr("the first camera"),
+        title => title,
+    };
+    let sources = state.sources.iter().map(|choice| (choice.label.clone(), &choice.name[..], &choice.name[..]));
+    if let Some(name) = list(ui, "Camera", shown, sources, &&state.source_name[..]) {
+        sheet.act(Action::Open(name.to_owned()));
+    }
+}
+
+/// Whether what is not in focus is blurred.
+fn portrait(ui: &mut Ui, sheet: &mut Sheet) {
+    let on = sheet.follows_depth() && sheet.has_depth();
+    let hint = "The farther from who is in focus, the more blur";
+    if switch(ui, "Portrait", hint, on) {
+        sheet.act(Action::Portrait(!on));
+    }
+}
+
+/// How strong the blur is.
+fn blur(ui: &mut Ui, sheet: &mut Sheet) {
+    let focus_m = sheet.state.distance_m();
+    let share = tweak::share_of(&sheet.look, focus_m, sheet.size);
+    let enabled = sheet.look.effect != Effect::None;
+    ui.add_enabled_ui(enabled, |ui| {
+        let name = ui.label(tr("Blur"));
+        ui.spacing_mut().slider_width = ui.available_width().max(10.0);
+        ui.spacing_mut().interact_size.y = 20.0;
+        let most = MAX_COC_PER_HEIGHT * 100.0;
+        let mut percent = (share * 100.0).min(most);
+        let slider = ui.add(Slider::new(&mut percent, 0.0..=most).show_value(false)).labelled_by(name.id);
+        if slider.hint("How much what is out of focus is blurred. The wheel over the picture does the same").changed() {
+            tweak::set_share(&mut sheet.look, percent / 100.0, focus_m, sheet.size);
+            sheet.changed(true, "Amount of blur");
+        }
+    });
+}
+
+/// A video, or a picture.
+fn keep(ui: &mut Ui, sheet: &mut Sheet) {
+    let recording = sheet.state.recording().is_some();
+    let snapshot = icons::SIDE + 18.0;
+    let record = vec2((ui.available_width() - snapshot - CELL_GAP).max(10.0), CELL);
+    if record_button(ui, recording, record) {
+        sheet.act(Action::Record(!recording));
+    }
+    let (rect, response) = ui.allocate_exact_size(vec2(snapshot, CELL), Sense::click());
+    response.widget_info(|| WidgetInfo::labeled(Role::Button, true, tr("Snapshot")));
+    let colors = Colors::here(ui);
+    ui.painter().rect_filled(rect, 8, colors.fill(false, response.hovered()));
+    icons::camera(ui.painter(), rect.center(), colors.text);
+    if response.hint("Snapshot: save this picture (S)").clicked() {
+        sheet.act(Action::Snapshot);
+    }
+}
+
+/// Draws the button that starts and stops a recording. Whether it was clicked.
+fn record_button(ui: &mut Ui, on: bool, size: Vec2) -> bool {
+    let colors = Colors::here(ui);
+    let (rect, response) = ui.allocate_exact_size(size, Sense::click());
+    let text = tr(if on { "Stop recording" } else { "Record" });
+    response.widget_info(|| WidgetInfo::selected(Role::Button, true, on, text));
+    ui.painter().rect_filled(rect, 8, colors.fill(false, response.hovered()));
+    if on {
+        ui.painter().rect_stroke(rect, 8, egui::Stroke::new(1.5, colors.alarm), egui::StrokeKind::Inside);
+    }
+    let text = WidgetText::from(text).color(colors.text);
+    let room = (rect.width() - 40.0).max(10.0);
+    let name = text.into_galley(ui, Some(egui::TextWrapMode::Truncate), room, TextStyle::Button);
+    let left = rect.center().x - (name.size().x + 22.0) / 2.0;
+    icons::record(ui.painter(), egui::pos2(left + 7.0, rect.center().y), on, colors.alarm);
+    ui.painter().galley(egui::pos2(left + 22.0, rect.center().y - name.size().y / 2.0), name, colors.text);
+    response.hint("A video beside the window, until you stop it (V)").clicked()
+}
+
+/// Whether calls have the picture.
+fn calls(ui: &mut Ui, sheet: &mut Sheet) {
+    let state = sheet.state;
+    let current = state.virtual_camera();
+    let hint = "Other programs see this picture as a camera's (O)";
+    if switch(ui, "Use in calls", hint, current.is_some()) {
+        let first = state.virtual_cameras.first().map(|camera| camera.name.clone());
+        sheet.act(Action::VirtualCamera(if current.is_some() { None } else { first }));
+    }
+}
+
+/// Whether all else is shown.
+fn more(ui: &mut Ui, sheet: &mut Sheet) {
+    let open = sheet.state.shows_more();
+    let text = tr_with(if open { "{} Less" } else { "{} More" }, &[&if open { "−" } else { "+" }]);
+    let button = Button::new(text).truncate().min_size(vec2(ui.available_width(), CELL));
+    let button = ui.add(button).hint("All other settings");
+    button.widget_info(|| WidgetInfo::selected(Role::Button, true, open, tr(MORE)));
+    if button.clicked() {
+        sheet.act(Action::Section(MORE, !open));
+    }
+}

@@ -1,0 +1,52 @@
+//! The focus: distance of the focal plane, and depth of the focal range.
+
+use egui::Ui;
+
+use super::Sheet;
+use bokehcam::depth::focus::FocusRule;
+use crate::panel::parts::{Number, remark};
+use crate::state::tweak::{DISTANCES_M, FOCUS_RANGES_M};
+use crate::texts::tr_with;
+
+/// The rule of focus, its distance, and the focal range.
+pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
+    let focus = sheet.look.focus;
+    // Without depth in the frame yet, something to start from.
+    let now_m = sheet.state.distance_m();
+    let (is_point, metres) = match focus {
+        FocusRule::Metres(metres) => (false, metres),
+        FocusRule::Point { .. } | FocusRule::Track { .. } => (true, now_m),
+        FocusRule::Auto => (false, now_m),
+    };
+    let point = if is_point { focus } else { FocusRule::Point { x: 0.5, y: 0.5 } };
+    let distance = match focus {
+        FocusRule::Metres(_) => focus,
+        _ => FocusRule::Metres((now_m * 100.0).round() / 100.0),
+    };
+    let rules = [
+        ("Subject", "Follows a person, or the nearest large subject", FocusRule::Auto),
+        ("Point", "What is at a point of the picture: click there. Double-click on something to follow it", point),
+        ("Distance", "A distance in metres", distance),
+    ];
+    let in_metres = !sheet.is_relative();
+    let rules = if in_metres { &rules[..] } else { &rules[..2] };
+    sheet.choose(ui, "Focus on", rules, focus, |look, rule| look.focus = rule);
+    if in_metres {
+        let hint = "Distance of what is sharpest. Move it to focus at a distance of your own";
+        let how = Number::new("Distance", hint, DISTANCES_M, 2).unit("", " m").ratios();
+        sheet.number(ui, &how, metres, |look, metres| look.focus = FocusRule::Metres(metres));
+        // Shown as half of it on either side of the focal plane.
+        let half_m = *FOCUS_RANGES_M.start() / 2.0..=*FOCUS_RANGES_M.end() / 2.0;
+        let hint = "What stays as sharp as the focal plane, in front of it and behind";
+        let how = Number::new("Depth of what is sharp", hint, half_m, 2).unit("±", " m");
+        sheet.number(ui, &how, sheet.look.focus_range_m / 2.0, |look, half_m| look.focus_range_m = half_m * 2.0);
+        let half_m = sheet.look.focus_range_m / 2.0;
+        if half_m > 0.0 {
+            let [from, to] = [(metres - half_m).max(0.0), metres + half_m].map(|metres| format!("{metres:.2}"));
+            remark(ui, &tr_with("Sharp from {} m to {} m", &[&from, &to]));
+        }
+    }
+    if is_point {
+        remark(ui, "Click on the picture to focus elsewhere; double-click on something to follow it.");
+    }
+}

@@ -1,0 +1,48 @@
+//! Where pictures go besides the window.
+
+use egui::Ui;
+
+use super::Sheet;
+use crate::panel::parts::{Hinted, list, path, remark};
+use crate::state::{Action, NO_VIRTUAL_CAMERA};
+use crate::texts::tr;
+
+/// The self-timer, the camera off, what is kept with a snapshot, the command, and which virtual camera.
+pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
+    let state = sheet.state;
+    if let Some(output) = state.recording().filter(|output| !output.name.is_empty()) {
+        path(ui, &output.name);
+    }
+    sheet.switch(ui, "Timer", "A snapshot in three seconds (Shift+S)", state.self_timer, Action::SelfTimer);
+    let hint = "No picture leaves this program, and the camera rests: others see a still card";
+    sheet.switch(ui, "Camera off", hint, state.off, Action::Off);
+    let hint = "Beside each picture, the one before the blur and its depth: `render --like` makes it again";
+    sheet.switch(ui, "Snapshots to make again", hint, state.habits.keep_sources, Action::KeepSources);
+    ui.horizontal_wrapped(|ui| {
+        let hint = "The command line that does the same, to the clipboard (K)";
+        sheet.button(ui, "Copy command", hint, Action::CopyCommand);
+        if let Some(folder) = &state.kept_in {
+            let open = ui.button(tr("Open folder")).on_hover_text(folder.display().to_string());
+            if open.clicked() {
+                sheet.act(Action::OpenFolder);
+            }
+        }
+    });
+    ui.label(tr("Camera for calls")).hint("Other programs see the picture as a camera's (O)");
+    if state.virtual_cameras.is_empty() {
+        remark(ui, NO_VIRTUAL_CAMERA);
+        return;
+    }
+    let current = state.virtual_camera().map(|output| output.name.as_str());
+    let off = (tr("Off").to_owned(), "", None);
+    let cameras =
+        state.virtual_cameras.iter().map(|camera| (camera.label.clone(), &camera.name[..], Some(&camera.name[..])));
+    let all: Vec<_> = [off].into_iter().chain(cameras).collect();
+    let shown = all
+        .iter()
+        .find(|camera| camera.2 == current)
+        .map_or_else(|| current.unwrap_or_default().to_owned(), |camera| camera.0.clone());
+    if let Some(camera) = list(ui, "Camera for calls", &shown, all, &current) {
+        sheet.act(Action::VirtualCamera(camera.map(str::to_owned)));
+    }
+}

@@ -1,0 +1,23 @@
+//! The quality of the blur.
+
+use egui::Ui;
+
+use super::Sheet;
+use bokehcam::budget::Quality;
+use crate::panel::parts::list;
+use crate::texts::tr;
+
+/// How good it is, and how long that may take.
+pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
+    let name = |quality: Option<Quality>| match quality {
+        None => tr("Auto: as the time allows").to_owned(),
+        Some(quality) => quality.to_string(),
+    };
+    ui.label(tr("Quality"));
+    let quality = sheet.look.quality;
+    let levels = [None].into_iter().chain(Quality::ALL.map(Some)).map(|level| (name(level), "", level));
+    if let Some(quality) = list(ui, "Quality", &name(quality), levels, &quality) {
+        sheet.look.quality = quality;
+        sheet.changed(true, "quality");
+    }
+}

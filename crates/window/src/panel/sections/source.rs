@@ -1,0 +1,145 @@
+//! The source, and the camera's controls.
+
+use egui::Ui;
+
+use super::Sheet;
+use bokehcam::knob::Knob;
+use crate::panel::parts::{Number, choose, list, number, remark, switch};
+use crate::services::Browse;
+use crate::state::{Action, Source, Way};
+use crate::texts::{tr, tr_with};
+
+/// The ways to depth, with a hint.
+const WAYS: [(&str, &str, Way); 5] = [
+    ("Measured", "By a depth camera, or as it was recorded", Way::Measured),
+    ("Two eyes", "What two cameras side by side see", Way::Stereo),
+    ("Person", "A network finds who is in the picture", Way::Person),
+    ("Person and distance", "That, and another one tells how far the rest is", Way::PersonAndDistance),
+    ("Empty room", "A picture of the room without you: step out for four seconds (T)", Way::Plate),
+];
+
+/// What is known of the source, where its depth comes from, and ways to open others.
+pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
+    let state = sheet.state;
+    match &state.source {
+        Source::Opening => remark(ui, "Opening…"),
+        Source::Running(running) => {
+            let (width, height) = running.size;
+            let rate = 1e9 / running.period_ns.max(1) as f64;
+            let depth = tr(match running.way {
+                _ if !running.has_depth => "without depth",
+                Some(Way::Person) => "the person by a network",
+                _ => "with depth",
+            });
+            remark(
+                ui,
+                &match state.is_photo() {
+                    true => format!("{width} × {height}, {depth}"),
+                    false => format!("{width} × {height}, {rate:.0} fps, {depth}"),
+                },
+            );
+            let ways: Vec<_> = WAYS.into_iter().filter(|(.., way)| running.ways.contains(way)).collect();
+            if ways.len() > 1 || running.way.is_none() && !ways.is_empty() {
+                ui.label(tr("Depth from"));
+                let chosen = choose(
+                    ui,
+                    "Depth from",
+                    &ways.iter().map(|way| (way.0, way.1, Some(way.2))).collect::<Vec<_>>(),
+                    running.way,
+                    |_| true,
+                );
+                if let Some(way) = chosen.flatten().filter(|way| Some(*way) != running.way) {
+                    sheet.act(Action::DepthBy(way));
+                }
+            }
+        }
+        Source::Lost(why) => remark(ui, &tr_with("Lost: {}", &[why])),
+        Source::Ended => remark(ui, "It came to its end."),
+    }
+    modes(ui, sheet);
+    let hint = "It can also be dropped on the window";
+    ui.horizontal_wrapped(|ui| {
+        sheet.button(ui, "Open folder…", hint, Action::Browse(Browse::Folder));
+        sheet.button(ui, "Open photo…", hint, Action::Browse(Browse::Photo));
+        if state.plate.is_some() {
+            let hint = "A picture of what is behind you, without you; the camera has to stand still (T)";
+            sheet.button(ui, "Take another plate", hint, Action::TakePlate);
+        }
+    });
+}
+
+/// What blurs.
+pub fn executor(ui: &mut Ui, sheet: &Sheet) {
+    if let Source::Running(running) = &sheet.state.source {
+        remark(ui, &running.executor);
+    }
+}
+
+/// The camera's sizes and rates.
+fn modes(ui: &mut Ui, sheet: &mut Sheet) {
+    let (state, Source::Running(running)) = (sheet.state, &sheet.state.source) else { return };
+    let Some(mode) = state.camera.modes.iter().find(|mode| mode.size == running.size) else { return };
+    let now_fps = 1e9 / running.period_ns.max(1) as f64;
+    let off_by = |fps: &f64| (fps - now_fps).abs();
+    let nearest = |all: &[f64]| all.iter().copied().min_by(|a, b| off_by(a).total_cmp(&off_by(b)));
+    let size_text = |(width, height): (u32, u32)| format!("{width} × {height}");
+    let fps_text = |fps: f64| format!("{} fps", (fps * 100.0).round() / 100.0);
+    let sizes = state.camera.modes.iter().map(|mode| (size_text(mode.size), "", mode.size));
+    let rates = mode.fps.iter().map(|&fps| (fps_text(fps), "", fps));
+    let rate = nearest(&mode.fps).filter(|fps| off_by(fps) < 0.1).unwrap_or(now_fps);
+    let [size, rate] = ui
+        .horizontal(|ui| {
+            ui.spacing_mut().combo_width = (ui.available_width() - 6.0) / 2.0;
+            let size = list(ui, "Size", &size_text(mode.size), sizes, &mode.size);
+            let size = size.and_then(|size| state.camera.modes.iter().find(|mode| mode.size == size));
+            let size = size.map(|mode| (mode.size, nearest(&mode.fps).unwrap_or(now_fps)));
+            [size, list(ui, "Frame rate", &fps_text(now_fps), rates, &rate).map(|fps| (mode.size, fps))]
+        })
+        .inner;
+    if let Some((size, fps)) = size.or(rate) {
+        sheet.act(Action::Mode(size, fps));
+    }
+}
+
+/// The camera's own controls.
+pub fn controls(ui: &mut Ui, sheet: &mut Sheet) {
+    let state = sheet.state;
+    for control in &state.controls {
+        let value = ui.add_enabled_ui(control.active, |ui| knob(ui, control)).inner;
+        if let Some(value) = value {
+            sheet.act(Action::Control(control.name.clone(), value));
+        }
+    }
+}
+
+/// Draws a control of the camera: a switch, a menu or a number. Its new value, if it was changed.
+fn knob(ui: &mut Ui, control: &Knob) -> Option<i64> {
+    let label = title(&control.name);
+    let hint = format!("--control {}={}", control.name, control.value);
+    if control.switch {
+        return switch(ui, &label, &hint, control.value != 0).then_some(i64::from(control.value == 0));
+    }
+    if !control.menu.is_empty() {
+        let chosen = control.menu.iter().find(|(value, _)| *value == control.value);
+        let text = chosen.map_or("?", |(_, name)| name.as_str());
+        ui.label(&label);
+        let options = control.menu.iter().map(|(value, name)| (name.clone(), "", *value));
+        return list(ui, &label, text, options, &control.value);
+    }
+    let (least, most, step) = control.range;
+    let mut value = control.value as f32;
+    let range = least as f32..=(most.max(least)) as f32;
+    if !number(ui, &Number::new(&label, &hint, range, 0), &mut value) {
+        return None;
+    }
+    // The driver takes only whole steps from the least value.
+    let steps = ((f64::from(value) - least as f64) / step.max(1) as f64).round() as i64;
+    let value = least.saturating_add(steps.saturating_mul(step.max(1)));
+    (value != control.value).then_some(value)
+}
+
+/// `exposure_auto_priority` as a person would write it.
+fn title(name: &str) -> String {
+    let mut letters = name.chars().map(|c| if c == '_' { ' ' } else { c });
+    letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
+}

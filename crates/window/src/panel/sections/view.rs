@@ -1,0 +1,58 @@
+//! What of a frame is shown.
+
+use egui::Ui;
+
+use super::Sheet;
+use crate::panel::parts::{Number, choose, number, remark};
+use crate::state::{Action, Shown};
+
+type Views = [(&'static str, &'static str, Shown); 2];
+
+const VIEWS: Views = [
+    ("Picture", "The blurred picture", Shown::Picture),
+    ("Depth", "Distance in colours: light is near (D)", Shown::Depth),
+];
+const INTERNALS: Views = [
+    ("Blur radius", "Circle of confusion: white is sharp, hatched is in front (C)", Shown::Coc),
+    ("Layers", "The layers that are blurred on their own (N)", Shown::Bins),
+];
+
+/// Draws views to choose from; one that is shown already is left for the picture.
+fn choose_view(ui: &mut Ui, sheet: &mut Sheet, what: &str, views: Views) {
+    let (now, has_depth) = (sheet.state.shown, sheet.has_depth());
+    if let Some(shown) = choose(ui, what, &views, now, |shown| has_depth || shown != Shown::Depth) {
+        sheet.act(Action::Show(if shown == now { Shown::Picture } else { shown }));
+    }
+}
+
+/// What the blur is made of, and the instruments.
+pub fn internals(ui: &mut Ui, sheet: &mut Sheet) {
+    choose_view(ui, sheet, "Show of the blur", INTERNALS);
+    sheet.switch(ui, "Instruments", "Times, rates and drops (I)", sheet.state.instruments, Action::Instruments);
+}
+
+/// The view, and how it is shown.
+pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
+    let state = sheet.state;
+    choose_view(ui, sheet, "Show", VIEWS);
+    let hint = "Like a mirror; what is recorded or sent on is not (M)";
+    sheet.switch(ui, "Mirror", hint, state.mirror, Action::Mirror);
+    if state.mirror {
+        remark(ui, "In this window alone: what goes out is not mirrored.");
+    }
+    let (freeze, hint) = match state.can_pause() {
+        true => ("Pause", "The recording stands still, and looks can be tried on its picture (Z)"),
+        false => ("Freeze", "Keep this picture, and try looks on it (Z)"),
+    };
+    sheet.switch(ui, freeze, hint, state.frozen, Action::Freeze);
+    let hint = "The picture before the blur, left of a line to drag (B)";
+    sheet.switch(ui, "Before and after", hint, state.split.is_some(), |on| Action::Split(on.then_some(0.5)));
+    if let Some(at) = state.split {
+        let hint = "From the left; it can also be dragged on the picture";
+        let mut percent = at * 100.0;
+        if number(ui, &Number::new("Line at", hint, 0.0..=100.0, 0).unit("", " %"), &mut percent) {
+            sheet.act(Action::Split(Some(percent / 100.0)));
+        }
+    }
+    sheet.switch(ui, "Full screen", "F or F11", state.full_screen, Action::FullScreen);
+}

@@ -1,0 +1,231 @@
+//! Pictures of the window in several states, to look at, and contrasts, to compute.
+
+use std::path::Path;
+
+use egui::{Color32, Event, Key, Modifiers, Theme, pos2};
+
+use super::{Window, button, pressed, scrolled};
+use bokehcam::depth::plate::Step;
+use bokehcam::frame::ColorImage;
+use bokehcam::look::Effect;
+use crate::panel::theme::{Colors, rung};
+use crate::present::soft::Painter;
+use crate::present::{Controls, Drawing, Image};
+use crate::state::{Action, Source, State, Transport, sample};
+use crate::views::Legend;
+use bokehcam::recording::still::{read_color, write_color};
+
+/// The picture as large as the window.
+fn backdrop((width, height): (u32, u32)) -> ColorImage {
+    let recorded = Path::new(env!("CARGO_MANIFEST_DIR")).join("recordings/portrait/rgb/000000.png");
+    let source = read_color(&recorded).unwrap();
+    let mut image = ColorImage::new(width, height);
+    for y in 0..height {
+        for x in 0..width {
+            let from = |at: u32, of: u32, to: u32| (at * to / of) as usize;
+            // As much of it as has the window's shape.
+            let rows = (source.width * height / width).min(source.height);
+            let row = from(y, height, rows) + (source.height - rows) as usize / 2;
+            let pixel = (row * source.width as usize + from(x, width, source.width)) * 3;
+            let to = (y as usize * width as usize + x as usize) * 3;
+            image.rgb[to..to + 3].copy_from_slice(&source.rgb[pixel..pixel + 3]);
+        }
+    }
+    image
+}
+
+/// A window, and what draws it from its first pass on.
+struct Seen {
+    window: Window,
+    painter: Painter,
+}
+
+impl Seen {
+    fn new(theme: Theme, size: (u32, u32), change: impl FnOnce(&mut State)) -> Self {
+        let mut state = sample::state();
+        change(&mut state);
+        let window = Window::unseen(state, size);
+        window.ctx.set_theme(theme);
+        let mut painter = Painter::new();
+        painter.resize(size);
+        let mut seen = Self { window, painter };
+        (0..3).for_each(|_| seen.pass(Vec::new()));
+        seen
+    }
+
+    fn pass(&mut self, events: Vec<Event>) {
+        let (_, output) = self.window.pass_with_output(events);
+        let (textures, pixels_per_point) = (output.textures_delta, output.pixels_per_point);
+        let primitives = self.window.ctx.tessellate(output.shapes, pixels_per_point);
+        self.painter.set_controls(Controls { primitives, textures, pixels_per_point });
+    }
+
+    fn save(&mut self, name: &str) {
+        (0..30).for_each(|_| self.pass(Vec::new()));
+        let whole = self.window.canvas.area;
+        let room = crate::panel::room_px(&self.window.ctx);
+        let area = crate::present::fitted((1280, 720), room);
+        let image = backdrop((area.width, area.height));
+        let mut pixels = vec![0; (whole.width * whole.height) as usize];
+        let drawing = Drawing {
+            area,
+            part: None,
+            picture: Image::Memory(&image),
+            before: None,
+            mirror: false,
+            stale: false,
+            background: [0; 3],
+        };
+        self.painter.paint(&mut pixels, &drawing);
+        let mut image = ColorImage::new(whole.width, whole.height);
+        image.rgb = pixels.iter().flat_map(|pixel| pixel.to_be_bytes().into_iter().skip(1)).collect();
+        write_color(&std::env::temp_dir().join(format!("panel-{name}.png")), &image, true).unwrap();
+    }
+}
+
+#[test]
+#[ignore = "writes pictures to look at"]
+fn pictures() {
+    let size = (1280, 720);
+    let shot = |name: &str, theme: Theme, change: &dyn Fn(&mut State)| Seen::new(theme, size, change).save(name);
+    shot("dark", Theme::Dark, &|_| {});
+    shot("light", Theme::Light, &|_| {});
+    // The first screen, and more, in sizes of windows and languages.
+    for (language, table) in [("en", None), ("de", crate::texts::built_in("de"))] {
+        table.into_iter().for_each(crate::texts::speak);
+        for size in [(1280, 720), (500, 700), (480, 320)] {
+            for (theme, called) in [(Theme::Dark, "dark"), (Theme::Light, "light")] {
+                for more in [false, true] {
+                    let mut seen = Seen::new(theme, size, |state| {
+                        state.apply(Action::Section("More", more));
+                        state.note("Saved ~/Pictures/bokehcam 2026-11-23 21-14-05.png");
+                    });
+                    let (width, height) = size;
+                    seen.save(&format!("{language}-{width}x{height}-{called}{}", if more { "-more" } else { "" }));
+                }
+            }
+        }
+    }
+    crate::texts::speak(crate::texts::Table::new());
+    shot("instruments", Theme::Dark, &|state| {
+        state.instruments = true;
+        state.meters.fill_for_looks();
+        state.split = Some(0.4);
+        state.note("Saved snapshot-0001.png");
+    });
+    shot("tilt", Theme::Dark, &|state| {
+        state.look.effect = Effect::TiltShift;
+        state.look.tilt.angle_deg = -12.0;
+        state.source = sample::running(false);
+    });
+    shot("badges", Theme::Dark, &|state| {
+        state.panel = false;
+        state.frozen = true;
+        state.apply(Action::Record(true));
+        state.apply(Action::VirtualCamera(Some("/dev/video9".into())));
+    });
+    // From the offer to the portrait.
+    for (name, step) in [("offer", None), ("step-out", Some(Step::StepOut(3))), ("taking", Some(Step::Taking(60)))] {
+        shot(&format!("plate-{name}"), Theme::Dark, &|state| {
+            (state.source, state.plate, state.panel) = (sample::running(false), step, false);
+        });
+    }
+    shot("large", Theme::Dark, &|state| {
+        state.habits.text_scale = 1.8;
+        state.look.strength = bokehcam::look::Strength::Lens(crate::state::tweak::LENS);
+    });
+    shot("help", Theme::Dark, &|state| state.help = true);
+    shot("help-light", Theme::Light, &|state| state.help = true);
+    shot("lost", Theme::Light, &|state| {
+        state.source = Source::Lost("the camera was unplugged (/dev/video0)".into());
+    });
+    for (name, theme) in [("recording", Theme::Dark), ("recording-light", Theme::Light)] {
+        shot(name, theme, &|state| {
+            let (length_ns, time_ns) = (61_500_000_000, 23_456_000_000);
+            state.transport = Some(Transport { place: 280, frames: 738, time_ns, length_ns });
+            state.legend = Some(Legend::Depth { near_m: 0.9, far_m: 5.2 });
+            state.note("holiday.jpg: a photo, one frame that stands still, with the depth beside it");
+        });
+    }
+    shot("depth", Theme::Dark, &|state| {
+        state.legend = Some(Legend::Depth { near_m: 0.9, far_m: 5.2 });
+        state.panel = false;
+    });
+    shot("coc", Theme::Light, &|state| {
+        state.legend = Some(Legend::Coc { most_px: 43.0 });
+        state.panel = false;
+    });
+    shot("bins", Theme::Dark, &|state| {
+        let mut high_px = [f32::INFINITY; crate::views::MOST_BINS];
+        high_px[..4].copy_from_slice(&[-9.0, -2.5, 2.0, 11.5]);
+        state.legend = Some(Legend::Bins { count: 5, high_px });
+        state.instruments = true;
+        state.meters.fill_for_looks();
+    });
+    let mut seen = Seen::new(Theme::Dark, size, |state| {
+        state.look.aperture.shape =
+            bokehcam::bokeh::aperture::Shape::Polygon { blades: 6, rotation_deg: 10.0, curvature: 0.2 };
+    });
+    seen.pass(vec![Event::PointerMoved(pos2(1120.0, 400.0))]);
+    for part in 1..=3 {
+        (0..40).for_each(|_| seen.pass(vec![scrolled(egui::MouseWheelUnit::Point, -12.0, Modifiers::NONE)]));
+        seen.save(&format!("scrolled-{part}"));
+    }
+    for down in [true, false].repeat(20) {
+        seen.pass(vec![pressed(Key::Tab, Modifiers::NONE, down)]);
+    }
+    seen.save("focused");
+    let at = pos2(300.0, 300.0);
+    [Event::PointerMoved(at), button(at, true), button(at, false)].into_iter().for_each(|event| seen.pass(vec![event]));
+    seen.save("clicked");
+}
+
+/// Relative luminance (WCAG 2) of an sRGB colour, 0 to 255.
+fn luminance(color: [f32; 3]) -> f32 {
+    let [r, g, b] = color.map(|channel| {
+        let value = channel / 255.0;
+        if value <= 0.04045 { value / 12.92 } else { ((value + 0.055) / 1.055).powf(2.4) }
+    });
+    0.2126 * r + 0.7152 * g + 0.0722 * b
+}
+
+fn contrast(text: [f32; 3], behind: [f32; 3]) -> f32 {
+    let (a, b) = (luminance(text), luminance(behind));
+    (a.max(b) + 0.05) / (a.min(b) + 0.05)
+}
+
+/// A colour over a grey picture, as it comes out.
+fn over(color: Color32, grey: u8) -> [f32; 3] {
+    let [r, g, b, a] = color.to_array().map(f32::from);
+    [r, g, b].map(|channel| channel + f32::from(grey) * (1.0 - a / 255.0))
+}
+
+#[test]
+fn text_can_be_read_over_any_picture() {
+    let solid = |color: Color32| over(color, 0);
+    for theme in [Theme::Dark, Theme::Light] {
+        let colors = Colors::of(theme);
+        for picture in [0, 60, 128, 200, 255] {
+            let card = over(colors.card, picture);
+            let texts =
+                [("text", colors.text), ("weak", colors.weak), ("accent", colors.accent), ("alarm", colors.alarm)];
+            for (name, text) in texts {
+                let contrast = contrast(solid(text), card);
+                assert!(contrast >= 4.5, "{theme:?} {name} over {picture}: {contrast}");
+            }
+            for quality in [None].into_iter().chain(bokehcam::budget::Quality::ALL.map(Some)) {
+                let contrast = contrast(solid(rung(quality, theme).0), card);
+                assert!(contrast >= 4.5, "{theme:?} {quality:?} over {picture}: {contrast}");
+            }
+        }
+        for (name, text, behind) in [
+            ("text on controls", colors.text, colors.field),
+            ("text on hovered ones", colors.text, colors.hover),
+            ("weak text on controls", colors.weak, colors.field),
+            ("text on what is chosen", colors.on_accent, colors.accent),
+        ] {
+            let contrast = contrast(solid(text), solid(behind));
+            assert!(contrast >= 4.5, "{theme:?} {name}: {contrast}");
+        }
+    }
+}

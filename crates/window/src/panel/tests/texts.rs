@@ -1,0 +1,172 @@
+//! The table of texts: complete, without what is not there, and used for all that is drawn.
+
+use std::path::Path;
+
+use super::{Window, sample};
+use bokehcam::depth::backdrop::Behind;
+use bokehcam::depth::plate::Step;
+use bokehcam::look::{Effect, Follow, Strength};
+use crate::keys::GROUPS;
+use crate::state::{Action, Output, Source, State, Transport, Way, tweak};
+use crate::texts::{self, tests as table};
+use crate::views::Legend;
+
+/// Windows that together show about all that can be shown.
+fn windows() -> Vec<Window> {
+    let changes: [&dyn Fn(&mut State); 17] = [
+        &|_| {},
+        &|state| {
+            state.transport = Some(Transport { place: 3, frames: 24, time_ns: 1, length_ns: 9 });
+            (state.self_timer, state.kept_in, state.frozen) = (true, Some("gone".into()), true);
+            (state.mirror, state.between) = (true, true);
+        },
+        &|state| state.look.effect = Effect::TiltShift,
+        &|state| (state.look.focus, state.look.strength) = (tweak::point(0.5, 0.5), Strength::Percent(0.0)),
+        &|state| {
+            state.look.strength = Strength::Lens(tweak::LENS);
+            state.look.aperture.shape = bokehcam::bokeh::aperture::Shape::Ring { inner: 0.5 };
+        },
+        &|state| {
+            state.look.aperture.shape =
+                bokehcam::bokeh::aperture::Shape::Polygon { blades: 6, rotation_deg: 0.0, curvature: 0.1 };
+            state.split = Some(0.5);
+        },
+        &|state| {
+            (state.look.behind, state.look.follow) = (Behind::Color([1, 2, 3]), Follow::to(2.0));
+        },
+        &|state| state.help = true,
+        &|state| {
+            let Source::Running(running) = &mut state.source else { return };
+            running.ways = vec![Way::Measured, Way::Stereo, Way::Person, Way::PersonAndDistance, Way::Plate];
+            (state.camera.is_relative, state.look.focus_range_m) = (true, 0.5);
+            state.legend = Some(Legend::Depth { near_m: 0.5, far_m: 5.0 });
+        },
+        &|state| {
+            let Source::Running(running) = &mut state.source else { return };
+            running.name = "demo".into();
+            (state.look.focus_range_m, state.trouble) = (0.5, Some("No space left on device: x; kept".into()));
+            state.apply(Action::Section("More", false));
+        },
+        &|state| {
+            (state.closing, state.frozen, state.instruments) = (true, true, true);
+            state.meters.fill_for_looks();
+        },
+        &|state| {
+            (state.source, state.legend) = (sample::running(false), Some(Legend::Depth { near_m: 0.5, far_m: 5.0 }))
+        },
+        &|state| {
+            (state.source, state.plate) = (sample::running(false), Some(Step::Unlike));
+            state.legend = Some(Legend::Coc { most_px: 9.0 });
+        },
+        &|state| (state.source, state.plate) = (sample::running(false), Some(Step::StepOut(3))),
+        &|state| {
+            state.source = Source::Lost("gone".into());
+            state.legend = Some(Legend::Bins { count: 2, high_px: [2.0; crate::views::MOST_BINS] });
+        },
+        &|state| (state.source, state.trouble) = (Source::Ended, Some("gone".into())),
+        &|state| (state.source, state.virtual_cameras) = (Source::Opening, Vec::new()),
+    ];
+    let mut windows = Vec::new();
+    for change in changes {
+        let mut state = sample::state();
+        state.outputs = vec![Output { name: "clip.mp4".into(), is_camera: false }];
+        for section in ["Controls of the camera", "For experts", "Background"] {
+            state.apply(Action::Section(section, true));
+        }
+        change(&mut state);
+        windows.push(Window::of(state, (1280, 2400)));
+    }
+    windows
+}
+
+/// The window's own code, each literal in one line.
+fn sources(folder: &Path) -> String {
+    let mut all = String::new();
+    for entry in std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()) {
+        let name = entry.file_name().unwrap().to_string_lossy().into_owned();
+        if entry.is_dir() && name != "tests" {
+            all += &sources(&entry);
+        } else if name.ends_with(".rs") && name != "tests.rs" {
+            all += &std::fs::read_to_string(entry).unwrap();
+        }
+    }
+    let lines: Vec<&str> = all.split("\\\n").collect();
+    lines[1..].iter().fold(lines[0].to_owned(), |all, line| all + line.trim_start())
+}
+
+#[test]
+fn the_table_has_all_texts_and_no_others() {
+    let sources = sources(&Path::new(env!("CARGO_MANIFEST_DIR")).join("src/preview"));
+    let is_written = |text: &str| sources.contains(&format!("\"{}\"", text.replace('"', "\\\"")));
+    for mut window in windows() {
+        window.wait(0.3);
+        for act in ["Save as…", "Edit…", "Delete"] {
+            if let Some(at) = window.place_of(act) {
+                window.click(at);
+                window.wait(0.1);
+            }
+        }
+    }
+    for (does, keys) in GROUPS.iter().flat_map(|group| group.bindings).map(|binding| (binding.does, binding.keys)) {
+        texts::tr(does);
+        texts::tr(keys);
+    }
+    let english = table::english();
+    let missing: Vec<String> =
+        table::seen().into_iter().filter(|text| is_written(text) && !english.contains_key(text)).collect();
+    let lines: Vec<String> = missing.iter().map(|text| format!("{text:?} = \"\"")).collect();
+    assert!(missing.is_empty(), "texts.toml has not:\n{}", lines.join("\n"));
+    let gone: Vec<&String> = english.keys().filter(|text| !is_written(text)).collect();
+    assert!(gone.is_empty(), "texts.toml has what is nowhere: {gone:#?}");
+}
+
+#[test]
+fn what_is_said_while_it_runs_is_in_the_table_too() {
+    let sources = sources(&Path::new(env!("CARGO_MANIFEST_DIR")).join("src/preview"));
+    let english = table::english();
+    let literal = |after: &str| {
+        let text = after.trim_start().strip_prefix('"')?.split('"').next()?.to_owned();
+        (text.contains(' ') && text.starts_with(char::is_uppercase)).then_some(text)
+    };
+    let following = |before: &str| sources.split(before).skip(1).filter_map(literal).collect::<Vec<_>>();
+    let constants = following(": &str =").into_iter().filter(|text| text.ends_with('.'));
+    let said: Vec<String> = constants.chain(following("note(format!(")).chain(following("note(")).collect();
+    assert!(said.len() > 20, "{said:?}");
+    let missing: Vec<&String> = said.iter().filter(|text| !english.contains_key(*text)).collect();
+    assert!(missing.is_empty(), "texts.toml has not: {missing:#?}");
+}
+
+#[test]
+fn all_that_is_drawn_is_translated() {
+    // What is a name, an error's reason or a number is the same in every language.
+    let names = [
+        "Desk camera",
+        "portrait",
+        "clip.mp4",
+        "bokehcam",
+        "kept",
+        "cpu, 2",
+        "gone",
+        "Manual Mode",
+        "Aperture Priority",
+    ];
+    let english = table::english();
+    texts::speak(english.into_keys().map(|text| (text.clone(), format!("«{text}»"))).collect());
+    let presets: Vec<String> = sample::state().presets.iter().map(|preset| preset.name.to_lowercase()).collect();
+    let controls = ["Brightness", "White balance", "Auto exposure", "Exposure time"];
+    let levels = ["draft", "fast", "balanced", "high", "best", "auto", "full"];
+    let units = ["ms", "fps", "px", "mm", "kB", "MB"];
+    for mut window in windows() {
+        window.wait(0.3);
+        for text in window.texts() {
+            let has_word =
+                text.split(|c: char| !c.is_alphabetic()).any(|word| word.len() > 1 && !units.contains(&word));
+            // The blur's passes are called as in the report.
+            let is_name = text.starts_with("     ")
+                || names.iter().chain(&controls).any(|name| text.contains(name))
+                || presets.contains(&text.to_lowercase())
+                || levels.iter().any(|level| text.contains(level));
+            assert!(text.contains('«') || !has_word || is_name, "{text}");
+        }
+    }
+}

@@ -1,0 +1,176 @@
+//! An enlarged picture: by keys, wheel and fingers, dragged, clicked; and what is said of the pixel under the pointer.
+
+use egui::{Event, Key, Modifiers, Pos2, pos2};
+
+use super::super::super::state::{Action, Shown, Zoom};
+use super::{Window, button, close, point, scrolled};
+use crate::present::enlarged;
+use crate::views::Probe;
+
+/// Puts the picture where the window puts it.
+fn place(window: &mut Window) {
+    let Zoom { factor, center: [x, y] } = window.state.zoom;
+    let center = [if window.state.mirror { 1.0 - x } else { x }, y];
+    let (size, picture) = ((window.size.x as u32, window.size.y as u32), window.canvas.size);
+    let (area, part) = enlarged(picture, size, factor, center);
+    (window.canvas.area, window.canvas.part) = (area, Some(part));
+    window.pass(Vec::new());
+}
+
+/// A window at 400 % around a point right of and above the middle.
+fn enlarged_window(mirror: bool) -> Window {
+    let mut window = Window::new();
+    window.state.mirror = mirror;
+    window.state.panel = false;
+    window.state.zoom = Zoom { factor: 4, center: [0.6, 0.3] };
+    place(&mut window);
+    window.wait(1.0);
+    window
+}
+
+#[test]
+fn a_key_shows_the_pixels_under_the_pointer_and_all_of_the_picture_again() {
+    let mut window = Window::new();
+    window.pass(vec![Event::PointerMoved(pos2(320.0, 180.0))]);
+    window.press(Key::X, Modifiers::NONE);
+    assert!(window.state.zoom.factor == 1 && close(window.state.zoom.center, [0.25, 0.25]), "{:?}", window.state.zoom);
+    window.press(Key::Plus, Modifiers::NONE);
+    window.press(Key::Equals, Modifiers::NONE);
+    assert_eq!(window.state.zoom.factor, 4);
+    window.press(Key::Minus, Modifiers::NONE);
+    assert_eq!(window.state.zoom.factor, 2);
+    window.press(Key::X, Modifiers::NONE);
+    assert_eq!(window.state.zoom.factor, 0);
+}
+
+#[test]
+fn a_key_pressed_as_the_window_gets_smaller_counts_with_the_window_as_it_is_then() {
+    let mut window = Window::new();
+    window.press(Key::P, Modifiers::NONE);
+    window.canvas.size = (640, 360);
+    window.size = egui::vec2(600.0, 400.0);
+    window.pass(vec![super::pressed(Key::X, Modifiers::NONE, true)]);
+    assert_eq!(window.state.zoom.factor, 1);
+}
+
+#[test]
+fn a_small_picture_is_never_made_smaller_by_a_key() {
+    let mut window = Window::new();
+    window.press(Key::P, Modifiers::NONE);
+    // All of it is seen at 4.2 pixels of the window for one of its own.
+    window.canvas.size = (300, 170);
+    window.pass(vec![Event::PointerMoved(pos2(320.0, 180.0))]);
+    for key in [Key::X, Key::Plus] {
+        window.press(key, Modifiers::NONE);
+        assert_eq!(window.state.zoom.factor, 8, "{key:?}");
+        window.press(if key == Key::X { key } else { Key::Minus }, Modifiers::NONE);
+        assert_eq!(window.state.zoom.factor, 0, "all of it again");
+    }
+    // What was chosen in the panel goes on from there.
+    window.state.zoom.factor = 2;
+    window.press(Key::Plus, Modifiers::NONE);
+    assert_eq!(window.state.zoom.factor, 8);
+}
+
+#[test]
+fn a_click_focuses_on_what_is_seen_there() {
+    for mirror in [false, true] {
+        let mut window = enlarged_window(mirror);
+        // The middle of the window, and a hundred pixels of it to the right: 25 of the picture.
+        assert!(close(point(&window.click(pos2(640.0, 360.0))), [0.6, 0.3]));
+        window.wait(1.0);
+        let right = 25.0 / 1280.0 * if mirror { -1.0 } else { 1.0 };
+        assert!(close(point(&window.click(pos2(740.0, 360.0))), [0.6 + right, 0.3]), "mirror {mirror}");
+    }
+}
+
+#[test]
+fn dragging_moves_it_and_no_further_than_its_edges() {
+    for mirror in [false, true] {
+        let mut window = enlarged_window(mirror);
+        let actions = window.drag(pos2(640.0, 360.0), pos2(540.0, 320.0));
+        assert!(!actions.iter().any(|action| matches!(action, Action::Look { .. })), "{actions:?}");
+        let Some(Action::Pan(_)) = actions.iter().find(|action| matches!(action, Action::Pan(_))) else {
+            panic!("{actions:?}")
+        };
+        // The panel is told where the picture is once a pass: here it stays where it was.
+        let step = window.state.zoom.center[0] - 0.6;
+        assert!((step > 0.0) != mirror && step.abs() < 0.03, "{step}");
+        window.state.zoom.center = [9.0, -9.0];
+        place(&mut window);
+        window.drag(pos2(640.0, 360.0), pos2(630.0, 368.0));
+        let [x, y] = window.state.zoom.center;
+        assert!((0.8..=0.9).contains(&x) && (0.1..=0.2).contains(&y), "{:?}", window.state.zoom);
+    }
+    let mut all = Window::new();
+    let actions = all.drag(pos2(640.0, 360.0), pos2(540.0, 320.0));
+    assert!(!actions.iter().any(|action| matches!(action, Action::Pan(_))), "where all is seen nothing moves");
+}
+
+#[test]
+fn the_wheel_with_ctrl_and_two_fingers_enlarge_around_the_pointer() {
+    let mut window = Window::new();
+    window.state.panel = false;
+    let at = pos2(960.0, 180.0);
+    window.pass(vec![Event::PointerMoved(at)]);
+    let look = window.state.look.clone();
+    window.pass(vec![Event::Zoom(1.3)]);
+    assert!(window.state.zoom.factor == 1 && close(window.state.zoom.center, [0.75, 0.25]), "{:?}", window.state.zoom);
+    let ctrl = Modifiers::CTRL | Modifiers::COMMAND;
+    window.pass(vec![scrolled(egui::MouseWheelUnit::Line, 2.0, ctrl)]);
+    window.wait(0.5);
+    assert!(window.state.zoom.factor > 1, "{:?}", window.state.zoom);
+    assert_eq!(window.state.look, look, "the blur is the wheel's alone");
+    for _ in 0..9 {
+        window.pass(vec![Event::Zoom(0.7)]);
+    }
+    assert_eq!(window.state.zoom.factor, 0);
+}
+
+#[test]
+fn the_split_line_is_where_the_picture_is_split() {
+    let mut window = enlarged_window(false);
+    window.state.split = Some(0.61);
+    window.wait(0.1);
+    // 0.01 of 1280 pixels right of the middle, each four wide.
+    let line = 640.0 + 0.01 * 1280.0 * 4.0;
+    let actions = window.drag(pos2(line, 300.0), pos2(line + 128.0, 300.0));
+    assert!(!actions.iter().any(|action| matches!(action, Action::Pan(_))), "{actions:?}");
+    assert!((window.state.split.unwrap() - 0.635).abs() < 2e-3, "{:?}", window.state.split);
+    // Out of sight it cannot be grabbed.
+    window.state.split = Some(0.1);
+    window.wait(0.1);
+    window.pass(vec![Event::PointerMoved(pos2(2.0, 300.0))]);
+    window.pass(vec![button(pos2(2.0, 300.0), true)]);
+    window.pass(vec![button(pos2(2.0, 300.0), false)]);
+    assert_eq!(window.state.split, Some(0.1));
+}
+
+#[test]
+fn depth_and_blur_under_the_pointer_are_shown_where_one_looks_into_them() {
+    let mut window = Window::new();
+    window.state.panel = false;
+    let at: Pos2 = pos2(320.0, 180.0);
+    window.pass(vec![Event::PointerMoved(at)]);
+    assert_eq!(window.panel.probed, None, "nothing disturbs the picture");
+    window.state.probe = Some(Probe { depth_m: Some(1.234), coc_px: 4.2 });
+    window.state.shown = Shown::Depth;
+    window.pass(Vec::new());
+    assert!(close(window.panel.probed.unwrap(), [0.25, 0.25]));
+    window.state.mirror = true;
+    window.pass(Vec::new());
+    assert!(close(window.panel.probed.unwrap(), [0.75, 0.25]));
+    let label = window.place_of("1.23 m, CoC +4.2 px").expect("what is there");
+    assert!(label.distance(at) < 150.0, "{label:?}");
+    window.state.probe = Some(Probe { depth_m: None, coc_px: -2.0 });
+    assert!(window.place_of("no depth, CoC −2.0 px").is_some());
+    window.state.camera.is_relative = true;
+    window.state.probe = Some(Probe { depth_m: Some(1.7), coc_px: 0.0 });
+    assert!(window.place_of("1.70 × the nearest, CoC +0.0 px").is_some(), "{:?}", window.texts());
+    // At the edge the label stays inside.
+    window.pass(vec![Event::PointerMoved(pos2(1275.0, 715.0))]);
+    let label = window.place_of("1.70 × the nearest, CoC +0.0 px").unwrap();
+    assert!(label.x < 1240.0 && label.y < 705.0, "{label:?}");
+    window.pass(vec![Event::PointerGone]);
+    assert!(window.place_of("1.70 × the nearest, CoC +0.0 px").is_none());
+}

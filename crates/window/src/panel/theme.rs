@@ -1,0 +1,251 @@
+//! Colours, fonts and sizes of the controls, for a light and a dark theme.
+
+use std::sync::Arc;
+
+use egui::style::{HandleShape, ScrollStyle, Selection, WidgetVisuals};
+use egui::{
+    Color32, Context, CornerRadius, FontData, FontDefinitions, FontFamily, FontId, Margin, Shadow, Stroke, StrokeKind,
+    Style, TextStyle, Theme, Vec2, Visuals,
+};
+
+use bokehcam::budget::Quality;
+
+/// Width of the panel, in points.
+pub const WIDTH: f32 = 300.0;
+/// Distance of panel and cards from the window's border.
+pub const GAP: f32 = 10.0;
+/// Margin inside of them.
+pub const PAD: f32 = 14.0;
+/// Height of a control that is clicked.
+pub const ROW: f32 = 26.0;
+
+/// Colours of a theme. Text on `card` or `field` has a contrast of 4.5 or more, whatever the picture below.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Colors {
+    /// Behind text: the panel, hardly translucent.
+    pub card: Color32,
+    /// Behind the text of a control.
+    pub field: Color32,
+    /// The same, while the pointer is over the control.
+    pub hover: Color32,
+    pub text: Color32,
+    /// Text that is less important.
+    pub weak: Color32,
+    /// What is chosen, and lines that mean something.
+    pub accent: Color32,
+    /// Text on `accent`.
+    pub on_accent: Color32,
+    pub line: Color32,
+    /// What went wrong, and recording.
+    pub alarm: Color32,
+}
+
+const DARK: Colors = Colors {
+    card: Color32::from_rgba_unmultiplied_const(22, 23, 27, 234),
+    field: Color32::from_rgb(52, 54, 61),
+    hover: Color32::from_rgb(68, 71, 79),
+    text: Color32::from_rgb(240, 240, 242),
+    weak: Color32::from_rgb(182, 185, 192),
+    accent: Color32::from_rgb(255, 190, 92),
+    on_accent: Color32::from_rgb(38, 24, 4),
+    line: Color32::from_rgb(74, 77, 86),
+    alarm: Color32::from_rgb(255, 122, 110),
+};
+
+const LIGHT: Colors = Colors {
+    card: Color32::from_rgba_unmultiplied_const(250, 250, 251, 242),
+    field: Color32::from_rgb(228, 229, 233),
+    hover: Color32::from_rgb(213, 215, 221),
+    text: Color32::from_rgb(26, 27, 31),
+    weak: Color32::from_rgb(80, 84, 92),
+    accent: Color32::from_rgb(152, 76, 0),
+    on_accent: Color32::from_rgb(255, 255, 255),
+    line: Color32::from_rgb(196, 199, 206),
+    alarm: Color32::from_rgb(178, 24, 24),
+};
+
+/// On the picture itself, in both themes: light lines with a dark border stand out on any picture.
+pub const ON_PICTURE: Color32 = Color32::from_rgb(255, 255, 255);
+pub const SHADE: Color32 = Color32::from_rgba_premultiplied(0, 0, 0, 150);
+
+impl Colors {
+    /// The colours of a theme.
+    pub fn of(theme: Theme) -> Self {
+        match theme {
+            Theme::Dark => DARK,
+            Theme::Light => LIGHT,
+        }
+    }
+
+    /// Behind a control that is chosen, or under the pointer.
+    pub fn fill(&self, chosen: bool, hovered: bool) -> Color32 {
+        match (chosen, hovered) {
+            (true, _) => self.accent,
+            (false, true) => self.hover,
+            (false, false) => self.field,
+        }
+    }
+
+    /// Text there; weak where it cannot be chosen.
+    pub fn on_fill(&self, chosen: bool, possible: bool) -> Color32 {
+        match (chosen, possible) {
+            (true, _) => self.on_accent,
+            (false, true) => self.text,
+            (false, false) => self.weak.gamma_multiply(0.6),
+        }
+    }
+
+    /// The colours of the theme that is in use.
+    pub fn here(ui: &egui::Ui) -> Self {
+        Self::of(if ui.visuals().dark_mode { Theme::Dark } else { Theme::Light })
+    }
+}
+
+/// The colour of a rung, and a letter for those who cannot tell the colours apart.
+pub fn rung(quality: Option<Quality>, theme: Theme) -> (Color32, &'static str) {
+    let pick = |on_dark: [u8; 3], on_light: [u8; 3]| {
+        let [r, g, b] = if theme == Theme::Light { on_light } else { on_dark };
+        Color32::from_rgb(r, g, b)
+    };
+    match quality {
+        None => (pick([150, 153, 160], [96, 100, 108]), "–"),
+        Some(Quality::Draft) => (pick([255, 122, 110], [180, 44, 36]), "D"),
+        Some(Quality::Fast) => (pick([255, 190, 92], [150, 82, 0]), "F"),
+        Some(Quality::Balanced) => (pick([126, 200, 140], [30, 108, 52]), "B"),
+        Some(Quality::High) => (pick([110, 180, 250], [20, 100, 180]), "H"),
+        Some(Quality::Best) => (pick([200, 160, 255], [110, 60, 170]), "X"),
+    }
+}
+
+/// The font family of headings and of what is chosen.
+pub fn medium() -> FontFamily {
+    FontFamily::Name("medium".into())
+}
+
+/// Installs fonts and styles; to be called once, before the first pass that draws.
+pub fn install(ctx: &Context) {
+    ctx.set_fonts(fonts());
+    for theme in [Theme::Dark, Theme::Light] {
+        ctx.set_style_of(theme, style(theme));
+    }
+    // Our own keys change the text's size.
+    ctx.options_mut(|options| options.zoom_with_keyboard = false);
+}
+
+/// The two fonts that come with the program, in place of egui's.
+fn fonts() -> FontDefinitions {
+    let mut fonts = FontDefinitions::empty();
+    let files: [(&str, &[u8]); 2] = [
+        ("regular", include_bytes!("../fonts/Roboto-Regular.ttf")),
+        ("medium", include_bytes!("../fonts/Roboto-Medium.ttf")),
+    ];
+    for (name, file) in files {
+        fonts.font_data.insert(name.to_owned(), Arc::new(FontData::from_static(file)));
+    }
+    for (family, name) in
+        [(FontFamily::Proportional, "regular"), (FontFamily::Monospace, "regular"), (medium(), "medium")]
+    {
+        fonts.families.insert(family, vec![name.to_owned()]);
+    }
+    fonts
+}
+
+/// Text sizes and spacing.
+fn style(theme: Theme) -> Style {
+    let colors = Colors::of(theme);
+    let mut style = Style { visuals: visuals(theme, &colors), animation_time: 0.12, ..Style::default() };
+    style.text_styles = [
+        (TextStyle::Heading, FontId::new(16.0, medium())),
+        (TextStyle::Body, FontId::new(13.5, FontFamily::Proportional)),
+        (TextStyle::Button, FontId::new(13.0, FontFamily::Proportional)),
+        (TextStyle::Small, FontId::new(12.0, FontFamily::Proportional)),
+        (TextStyle::Monospace, FontId::new(13.0, FontFamily::Monospace)),
+    ]
+    .into();
+    let spacing = &mut style.spacing;
+    spacing.item_spacing = Vec2::new(6.0, 6.0);
+    spacing.button_padding = Vec2::new(9.0, 5.0);
+    spacing.interact_size = Vec2::new(32.0, ROW);
+    spacing.slider_rail_height = 4.0;
+    spacing.icon_width = 16.0;
+    spacing.combo_width = WIDTH - 2.0 * PAD;
+    spacing.menu_margin = Margin::same(6);
+    spacing.window_margin = Margin::same(PAD as i8);
+    spacing.scroll = ScrollStyle {
+        bar_width: 6.0,
+        floating_width: 4.0,
+        // Nothing lies under it.
+        floating_allocated_width: 10.0,
+        ..ScrollStyle::floating()
+    };
+    style.interaction.selectable_labels = false;
+    style
+}
+
+/// Colours and shapes of egui's own widgets.
+fn visuals(theme: Theme, colors: &Colors) -> Visuals {
+    let mut visuals = if theme == Theme::Dark { Visuals::dark() } else { Visuals::light() };
+    let radius = CornerRadius::same(7);
+    let widget = |fill: Color32, border: Stroke, text: Color32| WidgetVisuals {
+        bg_fill: fill,
+        weak_bg_fill: fill,
+        bg_stroke: border,
+        corner_radius: radius,
+        fg_stroke: Stroke::new(1.0, text),
+        expansion: 0.0,
+    };
+    visuals.widgets.noninteractive = widget(colors.card, Stroke::new(1.0, colors.line), colors.text);
+    visuals.widgets.inactive = widget(colors.field, Stroke::NONE, colors.text);
+    visuals.widgets.hovered = widget(colors.hover, Stroke::NONE, colors.text);
+    visuals.widgets.active = widget(colors.hover, Stroke::NONE, colors.text);
+    visuals.widgets.open = widget(colors.hover, Stroke::NONE, colors.text);
+    visuals.selection = Selection { bg_fill: colors.accent, stroke: Stroke::new(1.0, colors.on_accent) };
+    visuals.weak_text_color = Some(colors.weak);
+    visuals.hyperlink_color = colors.accent;
+    visuals.error_fg_color = colors.alarm;
+    visuals.warn_fg_color = colors.accent;
+    visuals.extreme_bg_color = colors.field;
+    visuals.faint_bg_color = colors.field;
+    visuals.panel_fill = colors.card;
+    visuals.window_fill = opaque(colors.card);
+    visuals.window_stroke = Stroke::new(1.0, colors.line);
+    visuals.window_corner_radius = CornerRadius::same(12);
+    visuals.menu_corner_radius = CornerRadius::same(9);
+    // Soft shadows are many triangles, and the CPU may have to draw them.
+    (visuals.window_shadow, visuals.popup_shadow) = (Shadow::NONE, Shadow::NONE);
+    visuals.slider_trailing_fill = true;
+    visuals.handle_shape = HandleShape::Circle;
+    visuals.disabled_alpha = 0.5;
+    visuals
+}
+
+/// The same colour, fully opaque.
+pub fn opaque(color: Color32) -> Color32 {
+    let [r, g, b, _] = color.to_srgba_unmultiplied();
+    Color32::from_rgb(r, g, b)
+}
+
+/// The frame of panel and cards.
+pub fn card(colors: &Colors) -> egui::Frame {
+    egui::Frame::new()
+        .fill(colors.card)
+        .stroke(Stroke::new(1.0, colors.line))
+        .corner_radius(CornerRadius::same(12))
+        .inner_margin(Margin::same(PAD as i8))
+}
+
+/// Draws a ring around the control that has the keyboard focus, as far as it is in sight.
+pub fn focus_ring(ctx: &Context) {
+    let focused = ctx.memory(|memory| memory.focused()).and_then(|id| ctx.read_response(id));
+    if let Some(response) = focused.filter(|response| response.sense.interactive()) {
+        let colors = Colors::of(ctx.theme());
+        let seen = response.interact_rect.expand(3.0);
+        let painter = ctx.layer_painter(response.layer_id).with_clip_rect(seen);
+        painter.rect_stroke(
+            response.rect.expand(1.0),
+            CornerRadius::same(8),
+            Stroke::new(2.0, colors.text),
+            StrokeKind::Outside,
+        );
+    }
+}

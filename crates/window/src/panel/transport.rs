@@ -1,0 +1,89 @@
+//! The bar under a recording: pause, step and a line to drag.
+
+use egui::{Area, Context, Id, Margin, Order, Slider, pos2};
+
+use super::cards;
+use super::dock::room;
+use super::icons::{self, Icon};
+use super::state::{Action, Source, State};
+use super::theme::GAP;
+use crate::texts::tr_with;
+
+const HEIGHT: f32 = 44.0;
+/// Less room shows the line alone, without the time.
+const LEAST_WIDTH: f32 = 330.0;
+
+/// With less there is no line to drag: the bar is there again once the panel is closed.
+const TOO_NARROW: f32 = 200.0;
+
+/// What the bar remembers.
+#[derive(Debug, Default)]
+pub struct Bar {
+    /// Whether the recording plays on once the line is let go.
+    plays_on: bool,
+}
+
+impl Bar {
+    /// Draws the bar at the bottom of the picture's room, where the source is a recording. Its height, with the gap above.
+    pub fn show(&mut self, ctx: &Context, state: &State, actions: &mut Vec<Action>) -> f32 {
+        let running = matches!(state.source, Source::Running(_));
+        let Some(transport) = state.transport.filter(|_| running) else { return 0.0 };
+        let room = room(ctx);
+        let (left, width) = (room.left() + GAP, room.width() - 2.0 * GAP);
+        if width < TOO_NARROW {
+            return 0.0;
+        }
+        let corner = pos2(left, room.bottom() - GAP - HEIGHT);
+        let area = Area::new(Id::unique("transport")).fixed_pos(corner).order(Order::Middle);
+        cards::show(ctx, area, width, Margin::symmetric(8, 4), |ui, _| {
+            ui.set_width(width - 16.0);
+            ui.set_height(HEIGHT - 8.0);
+            ui.horizontal_centered(|ui| {
+                ui.spacing_mut().item_spacing.x = 4.0;
+                let (play, hint) = match (state.frozen, state.can_pause()) {
+                    (true, _) => (Icon::Play, "Play (Z)"),
+                    (false, true) => (Icon::Pause, "Pause (Z)"),
+                    (false, false) => (Icon::Pause, "Freeze the window; what is written goes on (Z)"),
+                };
+                let buttons = [
+                    (Icon::Back, "One frame back (Page Up)", Action::Step(-1)),
+                    (play, hint, Action::Freeze(!state.frozen)),
+                    (Icon::Forward, "One frame on (Page Down)", Action::Step(1)),
+                ];
+                for (icon, hint, action) in buttons {
+                    if icons::button(ui, icon, hint, true) {
+                        actions.push(action);
+                    }
+                }
+                let times = format!("{} / {}", clock(transport.time_ns), clock(transport.length_ns));
+                let frame = tr_with("Frame {} of {}", &[&(transport.place + 1), &transport.frames]);
+                let shows_time = width >= LEAST_WIDTH;
+                let text = egui::RichText::new(if shows_time { &times } else { "" }).monospace().size(12.5);
+                let label = ui.label(text).on_hover_text(&frame);
+                ui.spacing_mut().slider_width = (ui.available_width() - 6.0).max(20.0);
+                let mut place = transport.place;
+                let line = Slider::new(&mut place, 0..=transport.frames.saturating_sub(1)).show_value(false);
+                let line = ui.add(line).labelled_by(label.id);
+                let is_moved = line.changed();
+                if line.drag_started() && !state.frozen && state.can_pause() {
+                    self.plays_on = true;
+                    actions.push(Action::Freeze(true));
+                }
+                if is_moved {
+                    actions.push(Action::Seek(place));
+                }
+                if line.drag_stopped() && std::mem::take(&mut self.plays_on) {
+                    actions.push(Action::Freeze(false));
+                }
+                line.on_hover_text_at_pointer(&frame);
+            });
+        });
+        HEIGHT + 6.0
+    }
+}
+
+/// Minutes, seconds and hundredths.
+fn clock(ns: u64) -> String {
+    let hundredths = ns / 10_000_000;
+    format!("{}:{:02}.{:02}", hundredths / 6000, hundredths / 100 % 60, hundredths % 100)
+}

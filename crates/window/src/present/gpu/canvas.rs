@@ -1,0 +1,201 @@
+//! Draws the picture and the controls to a texture: everything but the way to the screen.
+
+use std::sync::Arc;
+
+use bytemuck::{Pod, Zeroable};
+
+use super::controls::Overlay;
+use bokehcam::compute::device::{Device, Shader};
+use bokehcam::frame::ColorImage;
+use crate::present::{Controls, Drawing, Image, Tone};
+
+/// The picture in its area, and the background.
+pub const PRESENT: Shader = Shader { name: "present", source: include_str!("present.wgsl") };
+
+/// Bind groups that are kept, one for each pair of buffers seen.
+const MOST_BOUND: usize = 16;
+
+/// `Window` of `present.wgsl`, where each field is explained.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[allow(missing_docs)]
+pub struct Window {
+    pub area: [u32; 4],
+    pub size: [u32; 2],
+    pub split: u32,
+    pub mirror: u32,
+    pub stale: [f32; 4],
+    pub divider: [u32; 4],
+    pub part: [u32; 4],
+    pub stripes: [[f32; 4]; 3],
+    pub background: [f32; 4],
+}
+
+/// Draws to textures of one format.
+pub struct Canvas {
+    device: Arc<Device>,
+    /// Whether the target takes what the shader writes as linear light and encodes it itself.
+    linear: bool,
+    pipeline: wgpu::RenderPipeline,
+    window: wgpu::Buffer,
+    /// Pictures from memory go here: the picture, and the one before the blur.
+    uploads: [wgpu::Buffer; 2],
+    bound: Vec<Bound>,
+    overlay: Overlay,
+}
+
+/// A bind group and the pictures that it binds.
+struct Bound {
+    pictures: [wgpu::Buffer; 2],
+    bindings: wgpu::BindGroup,
+}
+
+impl Canvas {
+    /// A canvas for textures of `format`.
+    pub fn new(device: Arc<Device>, format: wgpu::TextureFormat) -> Self {
+        let module = device.device.create_shader_module(wgpu::ShaderModuleDescriptor {
+            label: Some(PRESENT.name),
+            source: wgpu::ShaderSource::Wgsl(PRESENT.source.into()),
+        });
+        let pipeline = device.device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+            label: Some(PRESENT.name),
+            layout: None,
+            vertex: wgpu::VertexState {
+                module: &module,
+                entry_point: Some("corner"),
+                buffers: &[],
+                compilation_options: wgpu::PipelineCompilationOptions::default(),
+            },
+            primitive: wgpu::PrimitiveState::default(),
+            depth_stencil: None,
+            multisample: wgpu::MultisampleState::default(),
+            fragment: Some(wgpu::FragmentState {
+                module: &module,
+                entry_point: Some(PRESENT.name),
+                targets: &[Some(format.into())],
+                compilation_options: wgpu::PipelineCompilationOptions::default(),
+            }),
+            multiview_mask: None,
+            cache: None,
+        });
+        use wgpu::BufferUsages as Usage;
+        let window = device.buffer("window", size_of::<Window>(), Usage::UNIFORM | Usage::COPY_DST);
+        let uploads = [upload_buffer(&device, 0), upload_buffer(&device, 0)];
+        let overlay = Overlay::new(&device, format);
+        Self { device, linear: format.is_srgb(), pipeline, window, uploads, bound: Vec::new(), overlay }
+    }
+
+    /// Controls to paint from now on.
+    pub fn set_controls(&mut self, controls: Controls) {
+        self.overlay.set(&self.device, controls);
+    }
+
+    /// Draws picture and controls to the whole of `target`, which has `size` pixels.
+    pub fn draw(&mut self, target: &wgpu::TextureView, size: (u32, u32), drawing: &Drawing) {
+        let split = drawing.split();
+        let picture = match drawing.picture {
+            Image::Memory(picture) => self.upload(0, picture),
+            Image::Device(picture) if picture.is_on(&self.device) => picture.buffer().clone(),
+            // Not shown, but something has to be bound.
+            Image::Device(_) => self.uploads[0].clone(),
+        };
+        let before = split.map(|(before, _)| self.upload(1, before));
+        let pictures = [picture, before.unwrap_or_else(|| self.uploads[1].clone())];
+        let window = self.window_uniform(drawing);
+        self.device.queue.write_buffer(&self.window, 0, bytemuck::bytes_of(&window));
+        let bound = self.bind_group_index(pictures);
+
+        let mut encoder = self.device.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        let mut submitted = self.overlay.upload(&self.device, &mut encoder, size);
+        {
+            let mut pass = encoder
+                .begin_render_pass(&wgpu::RenderPassDescriptor {
+                    label: Some(PRESENT.name),
+                    color_attachments: &[Some(wgpu::RenderPassColorAttachment {
+                        view: target,
+                        depth_slice: None,
+                        resolve_target: None,
+                        ops: wgpu::Operations {
+                            load: wgpu::LoadOp::Clear(wgpu::Color::BLACK),
+                            store: wgpu::StoreOp::Store,
+                        },
+                    })],
+                    depth_stencil_attachment: None,
+                    timestamp_writes: None,
+                    occlusion_query_set: None,
+                    multiview_mask: None,
+                })
+                .forget_lifetime();
+            pass.set_pipeline(&self.pipeline);
+            pass.set_bind_group(0, &self.bound[bound].bindings, &[]);
+            pass.draw(0..3, 0..1);
+            self.overlay.draw(&mut pass);
+        }
+        submitted.push(encoder.finish());
+        self.device.queue.submit(submitted);
+    }
+
+    /// The shader's parameters for a drawing.
+    fn window_uniform(&self, drawing: &Drawing) -> Window {
+        let color = |[r, g, b]: [u8; 3], w: f32| [f32::from(r) / 255.0, f32::from(g) / 255.0, f32::from(b) / 255.0, w];
+        let flag = |on: bool| f32::from(u8::from(on));
+        let area = drawing.area;
+        let (width, height) = drawing.picture.size();
+        // Neither a picture without pixels nor one of another device is drawn.
+        let shown = match drawing.picture {
+            Image::Memory(picture) => !picture.rgb.is_empty(),
+            Image::Device(picture) => picture.is_on(&self.device),
+        };
+        let [red, green, blue] = Tone::STALE_WEIGHTS.map(|weight| weight as f32 / (1 << Tone::STALE_BITS) as f32);
+        let mut window = Window {
+            area: if shown { [area.x, area.y, area.width, area.height] } else { [0; 4] },
+            size: [width, height],
+            part: drawing.part.map_or([0; 4], |part| [part.at.0, part.at.1, part.factor, 0]),
+            mirror: u32::from(drawing.mirror),
+            stale: [red, green, blue, flag(drawing.stale)],
+            background: color(drawing.background, flag(self.linear)),
+            ..Window::default()
+        };
+        if let Some((_, split)) = drawing.split() {
+            window.split = split.at as u32;
+            for (k, (columns, stripe)) in split.divider().into_iter().enumerate() {
+                window.divider[k] = columns.start as u32;
+                window.divider[k + 1] = columns.end as u32;
+                window.stripes[k] = color(stripe, 0.0);
+            }
+        }
+        window
+    }
+
+    /// Uploads a picture to `uploads[k]`, which grows where it is too small.
+    fn upload(&mut self, k: usize, picture: &ColorImage) -> wgpu::Buffer {
+        if (self.uploads[k].size() as usize) < picture.rgb.len() {
+            self.uploads[k] = upload_buffer(&self.device, picture.rgb.len());
+        }
+        self.device.upload(&self.uploads[k], 0, &picture.rgb);
+        self.uploads[k].clone()
+    }
+
+    /// The index in `bound` of the bind group of these buffers, made if it is not there yet. Valid until the next call,
+    /// which may empty a full list.
+    fn bind_group_index(&mut self, pictures: [wgpu::Buffer; 2]) -> usize {
+        if let Some(bound) = self.bound.iter().position(|bound| bound.pictures == pictures) {
+            return bound;
+        }
+        // Bind groups keep their buffers alive, even of pictures that are gone.
+        if self.bound.len() >= MOST_BOUND {
+            self.bound.clear();
+        }
+        let buffers = [&self.window, &pictures[0], &pictures[1]].map(|buffer| buffer.as_entire_buffer_binding());
+        let bindings = self.device.bound(&self.pipeline.get_bind_group_layout(0), buffers.into_iter());
+        self.bound.push(Bound { pictures, bindings });
+        self.bound.len() - 1
+    }
+}
+
+/// A buffer for a picture of so many bytes.
+fn upload_buffer(device: &Device, bytes: usize) -> wgpu::Buffer {
+    use wgpu::BufferUsages as Usage;
+    // The shader reads whole words, also for the last pixel.
+    device.buffer("picture to present", bytes.next_multiple_of(4) + 16, Usage::STORAGE | Usage::COPY_DST)
+}

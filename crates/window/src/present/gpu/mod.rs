@@ -1,0 +1,151 @@
+//! Presents with the GPU, on the device that blurs.
+
+mod canvas;
+mod controls;
+
+use std::sync::Arc;
+
+pub use canvas::{Canvas, PRESENT, Window as WindowUniform};
+use winit::window::Window;
+
+use super::{Controls, Drawing, PresentError, Presenter};
+use bokehcam::compute::device::{Device, DevicePicture};
+
+/// Presents with a GPU.
+pub struct Gpu {
+    device: Arc<Device>,
+    window: Arc<Window>,
+    /// `None` only while it is dropped.
+    surface: Option<wgpu::Surface<'static>>,
+    config: wgpu::SurfaceConfiguration,
+    /// Whether the surface is configured; a window without pixels has none.
+    configured: bool,
+    canvas: Canvas,
+}
+
+impl Gpu {
+    /// A presenter for this window.
+    ///
+    /// # Errors
+    /// The device cannot draw to it.
+    pub fn new(window: Arc<Window>, device: Arc<Device>) -> Result<Self, PresentError> {
+        let surface = new_surface(&window, &device)?;
+        let capabilities = surface.get_capabilities(&device.adapter);
+        // Pictures and controls are sRGB-encoded already: the surface should not encode them again.
+        let plain = |format: &wgpu::TextureFormat| {
+            matches!(format, wgpu::TextureFormat::Bgra8Unorm | wgpu::TextureFormat::Rgba8Unorm)
+        };
+        let format = capabilities.formats.iter().copied().find(plain).or_else(|| capabilities.formats.first().copied());
+        let Some(format) = format else {
+            return Err(PresentError(format!("{} has no pixel format for it", device.name)));
+        };
+        let has_mailbox = capabilities.present_modes.contains(&wgpu::PresentMode::Mailbox);
+        let config = wgpu::SurfaceConfiguration {
+            usage: wgpu::TextureUsages::RENDER_ATTACHMENT,
+            format,
+            color_space: wgpu::SurfaceColorSpace::default(),
+            width: 0,
+            height: 0,
+            present_mode: if has_mailbox { wgpu::PresentMode::Mailbox } else { wgpu::PresentMode::Fifo },
+            desired_maximum_frame_latency: 1,
+            alpha_mode: wgpu::CompositeAlphaMode::Auto,
+            view_formats: Vec::new(),
+        };
+        // A refusal here must not be taken for a failure of the device, which goes on blurring while the CPU draws.
+        let made = device.attempt(|| {
+            let canvas = Canvas::new(Arc::clone(&device), format);
+            let size = window.inner_size();
+            let surface = Some(surface);
+            let mut gpu = Self { device: Arc::clone(&device), window, surface, config, configured: false, canvas };
+            gpu.resize((size.width, size.height));
+            gpu
+        });
+        made.map_err(fault)
+    }
+
+    /// Fits the surface to `config`; a window without pixels leaves it as it is.
+    fn configure(&mut self) {
+        self.configured = self.config.width > 0 && self.config.height > 0;
+        if let Some(surface) = self.surface.as_ref().filter(|_| self.configured) {
+            surface.configure(&self.device.device, &self.config);
+        }
+    }
+
+    /// The next texture to draw to; `None` while nothing of the window is visible.
+    fn next_texture(&mut self) -> Result<Option<wgpu::SurfaceTexture>, PresentError> {
+        use wgpu::CurrentSurfaceTexture as Current;
+        // The second time after the surface was configured or made anew.
+        for _ in 0..2 {
+            let Some(surface) = &self.surface else { return Ok(None) };
+            match surface.get_current_texture() {
+                Current::Success(texture) | Current::Suboptimal(texture) => return Ok(Some(texture)),
+                Current::Timeout | Current::Occluded => return Ok(None),
+                Current::Outdated => self.configure(),
+                Current::Lost => {
+                    self.device.check().map_err(fault)?;
+                    self.surface = Some(new_surface(&self.window, &self.device)?);
+                    self.configure();
+                }
+                Current::Validation => self.device.check().map_err(fault)?,
+            }
+        }
+        Ok(None)
+    }
+}
+
+fn fault(error: impl std::fmt::Display) -> PresentError {
+    PresentError(error.to_string())
+}
+
+impl Drop for Gpu {
+    fn drop(&mut self) {
+        // To free the surface of a device that hangs would block forever: it is leaked.
+        if self.device.check().is_err() {
+            std::mem::forget(self.surface.take());
+        }
+    }
+}
+
+fn new_surface(window: &Arc<Window>, device: &Device) -> Result<wgpu::Surface<'static>, PresentError> {
+    let surface = device.instance.create_surface(Arc::clone(window)).map_err(fault)?;
+    if !device.adapter.is_surface_supported(&surface) {
+        return Err(PresentError(format!("{} cannot draw to windows of this display", device.name)));
+    }
+    Ok(surface)
+}
+
+impl Presenter for Gpu {
+    fn resize(&mut self, (width, height): (u32, u32)) {
+        if (self.config.width, self.config.height) == (width, height) && self.configured {
+            return;
+        }
+        let max_side = self.device.device.limits().max_texture_dimension_2d;
+        (self.config.width, self.config.height) = (width.min(max_side), height.min(max_side));
+        self.configure();
+    }
+
+    fn set_controls(&mut self, controls: Controls) {
+        self.canvas.set_controls(controls);
+    }
+
+    fn present(&mut self, drawing: &Drawing) -> Result<(), PresentError> {
+        self.device.check().map_err(fault)?;
+        if !self.configured {
+            return Ok(());
+        }
+        let Some(texture) = self.next_texture()? else { return Ok(()) };
+        let view = texture.texture.create_view(&wgpu::TextureViewDescriptor::default());
+        self.canvas.draw(&view, (self.config.width, self.config.height), drawing);
+        self.window.pre_present_notify();
+        self.device.queue.present(texture);
+        self.device.check().map_err(fault)
+    }
+
+    fn has_device(&self) -> bool {
+        true
+    }
+
+    fn takes(&self, picture: &DevicePicture) -> bool {
+        picture.is_on(&self.device)
+    }
+}

@@ -1,0 +1,135 @@
+//! How the window's content gets onto the screen: two presenters that show the same.
+//!
+//! `gpu` draws with the device that blurs, so that a picture blurred there need not be read back; `soft` draws on the
+//! CPU into memory shared with the display server, where there is no GPU.
+
+mod fallback;
+pub mod gpu;
+mod part;
+pub mod soft;
+mod split;
+
+use std::sync::Arc;
+
+pub use part::{Part, enlarged, fitted};
+pub use split::Split;
+use winit::window::Window;
+
+use bokehcam::compute::device::{Device, DevicePicture};
+use bokehcam::frame::ColorImage;
+
+/// A rectangle of the window, in pixels.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Area {
+    /// Columns from the left; the area lies within the window.
+    pub x: u32,
+    /// Rows from the top.
+    pub y: u32,
+    pub width: u32,
+    pub height: u32,
+}
+
+/// A picture, in memory or on a GPU.
+#[derive(Clone, Copy, Debug)]
+pub enum Image<'a> {
+    Memory(&'a ColorImage),
+    /// On a GPU; only a presenter that [takes](Presenter::takes) it can show it.
+    Device(&'a DevicePicture),
+}
+
+impl Image<'_> {
+    pub fn size(&self) -> (u32, u32) {
+        match self {
+            Self::Memory(picture) => picture.size(),
+            Self::Device(picture) => picture.size(),
+        }
+    }
+}
+
+/// What is drawn under the controls.
+#[derive(Clone, Copy, Debug)]
+pub struct Drawing<'a> {
+    /// Where the picture goes, scaled to fill it; the rest of the window is the background.
+    pub area: Area,
+    /// The part of the enlarged picture that fills the area instead: its pixels as they are.
+    pub part: Option<Part>,
+    pub picture: Image<'a>,
+    /// A picture of the same size to show instead, left of this fraction of the picture's width as it is shown.
+    pub before: Option<(&'a ColorImage, f32)>,
+    /// Whether pictures are flipped left to right; the split is not.
+    pub mirror: bool,
+    /// Whether pictures are shown grey and dim, because no new ones come.
+    pub stale: bool,
+    /// Colour of the rest of the window, sRGB.
+    pub background: [u8; 3],
+}
+
+/// The look of a stale picture, grey and dim: each channel is `(r * R + g * G + b * B) / 2^BITS`.
+pub struct Tone;
+
+impl Tone {
+    /// Weights of red, green and blue: luma (BT.601) times 0.6.
+    pub const STALE_WEIGHTS: [u32; 3] = [11_757, 23_082, 4_483];
+    /// Fractional bits of the weights.
+    pub const STALE_BITS: u32 = 16;
+}
+
+/// Controls that changed, as egui gives them.
+#[derive(Clone)]
+pub struct Controls {
+    pub primitives: Vec<egui::ClippedPrimitive>,
+    /// Textures to set before and to free after.
+    pub textures: egui::TexturesDelta,
+    /// Pixels of the window per point of the controls.
+    pub pixels_per_point: f32,
+}
+
+/// Shows pictures and controls in a window.
+pub trait Presenter {
+    /// The window has another size, in pixels; one without pixels shows nothing.
+    fn resize(&mut self, size: (u32, u32));
+
+    /// Controls to paint from now on.
+    fn set_controls(&mut self, controls: Controls);
+
+    /// Shows the drawing with the controls on it.
+    ///
+    /// # Errors
+    /// The window cannot be drawn to any more.
+    fn present(&mut self, drawing: &Drawing) -> Result<(), PresentError>;
+
+    /// Whether it can show this picture straight from the GPU; otherwise it needs it in memory.
+    fn takes(&self, picture: &DevicePicture) -> bool {
+        let _ = picture;
+        false
+    }
+
+    /// Whether it draws with a GPU, so that blurred pictures may stay there.
+    fn has_device(&self) -> bool {
+        false
+    }
+}
+
+/// The window cannot be drawn to.
+#[derive(Debug, thiserror::Error)]
+#[error("cannot draw to the window: {0}")]
+pub struct PresentError(pub String);
+
+/// A presenter for `window`: with the GPU where there is a `device`; on the CPU without one, where it cannot draw to
+/// the window, and from the moment it fails.
+///
+/// # Errors
+/// Neither can draw to it.
+pub fn create(window: Arc<Window>, device: Option<Arc<Device>>) -> Result<Box<dyn Presenter>, PresentError> {
+    if let Some(device) = device {
+        match gpu::Gpu::new(Arc::clone(&window), device) {
+            Ok(gpu) => return Ok(Box::new(fallback::Fallback::new(Box::new(gpu), |painter| soft(window, painter)))),
+            Err(error) => tracing::info!("drawing on the CPU: {error}"),
+        }
+    }
+    soft(window, soft::Painter::new())
+}
+
+fn soft(window: Arc<Window>, painter: soft::Painter) -> Result<Box<dyn Presenter>, PresentError> {
+    Ok(Box::new(soft::Soft::new(window, painter)?))
+}

@@ -1,0 +1,191 @@
+//! The controls as a picture of their own: painted when they change, blended over every frame.
+
+use std::ops::Range;
+
+use egui::TextureId;
+use egui::epaint::{ClippedPrimitive, Mesh, Primitive, Vertex};
+use pulp::{Arch, Simd, WithSimd};
+
+use super::blend::over;
+use super::texture::{Texture, Textures};
+use super::triangle::{self, Clip, Corner};
+use crate::present::Controls;
+
+/// Most cells that a row is divided into: one bit each.
+const CELLS: usize = u64::BITS as usize;
+/// Fewest columns of a cell.
+const LEAST_CELL_PX: usize = 16;
+
+/// The controls over a window.
+#[derive(Debug, Default)]
+pub struct Overlay {
+    size: (usize, usize),
+    /// Premultiplied, `0xAARRGGBB`.
+    pixels: Vec<u32>,
+    /// Columns of a cell.
+    cell_px: usize,
+    /// For each row, a bit per cell, the leftmost lowest: 0 where all `pixels` of the cell are 0.
+    cells: Vec<u64>,
+    textures: Textures,
+    primitives: Vec<ClippedPrimitive>,
+    pixels_per_point: f32,
+    /// Textures to free when these controls are replaced.
+    freed: Vec<TextureId>,
+    /// Whether `pixels` has yet to be painted with these controls.
+    outdated: bool,
+}
+
+impl Overlay {
+    /// Changes the size, in pixels.
+    pub fn resize(&mut self, size: (usize, usize)) {
+        if self.size == size {
+            return;
+        }
+        self.size = size;
+        self.cell_px = size.0.div_ceil(CELLS).max(LEAST_CELL_PX);
+        self.pixels.clear();
+        self.pixels.resize(size.0 * size.1, 0);
+        self.cells.clear();
+        self.cells.resize(size.1, 0);
+        self.outdated = true;
+    }
+
+    /// Replaces the controls, from the next [`Overlay::paint`] on.
+    pub fn set(&mut self, controls: Controls) {
+        let Controls { primitives, mut textures, pixels_per_point } = controls;
+        // Only the controls so far still needed these.
+        self.freed.drain(..).for_each(|id| drop(self.textures.0.remove(&id)));
+        self.textures.set(&textures);
+        self.freed.extend(&textures.free);
+        textures.clear();
+        (self.primitives, self.pixels_per_point, self.outdated) = (primitives, pixels_per_point, true);
+    }
+
+    /// Paints the controls into `pixels`, if they or the size changed.
+    pub fn paint(&mut self) {
+        if !std::mem::take(&mut self.outdated) {
+            return;
+        }
+        let width = self.size.0;
+        // Only what was painted before has to be cleared.
+        for (row, cells) in self.pixels.chunks_exact_mut(width.max(1)).zip(&mut self.cells) {
+            for columns in runs(std::mem::take(cells), self.cell_px, width) {
+                row[columns].fill(0);
+            }
+        }
+        let primitives = std::mem::take(&mut self.primitives);
+        for ClippedPrimitive { clip_rect, primitive } in &primitives {
+            // Callbacks draw with a GPU; no control of ours has one.
+            if let Primitive::Mesh(mesh) = primitive {
+                let clip = self.clip_px(*clip_rect);
+                self.fill_mesh(mesh, clip);
+            }
+        }
+        self.primitives = primitives;
+    }
+
+    /// A clip rectangle in points as whole pixels within the window.
+    fn clip_px(&self, rect: egui::Rect) -> Clip {
+        let at = |points: f32, most: usize| (points * self.pixels_per_point).round().clamp(0.0, most as f32) as usize;
+        let (width, height) = self.size;
+        let (left, top) = (at(rect.min.x, width), at(rect.min.y, height));
+        Clip { left, top, right: at(rect.max.x, width).max(left), bottom: at(rect.max.y, height).max(top) }
+    }
+
+    fn fill_mesh(&mut self, mesh: &Mesh, clip: Clip) {
+        let Self { textures, pixels, cells, cell_px, size, .. } = self;
+        let Some(texture) = textures.0.get(&mesh.texture_id) else { return };
+        let (width, cell_px) = (size.0, *cell_px);
+        for corners in mesh.indices.as_chunks::<3>().0 {
+            let Some(corners) = corners_of(mesh, *corners, self.pixels_per_point) else { continue };
+            fill_triangle(corners, clip, texture, width, cell_px, pixels, cells);
+        }
+    }
+
+    /// Blends the controls over the row `y`.
+    pub fn blend(&self, arch: Arch, y: usize, row: &mut [u32]) {
+        let Some(&cells) = self.cells.get(y) else { return };
+        let from = &self.pixels[y * self.size.0..][..self.size.0];
+        for run in runs(cells, self.cell_px, self.size.0) {
+            arch.dispatch(Blend { from: &from[run.clone()], to: &mut row[run] });
+        }
+    }
+}
+
+/// The corners of a triangle from its indices into the mesh; `None` if one of them is out of range.
+fn corners_of(mesh: &Mesh, corners: [u32; 3], pixels_per_point: f32) -> Option<[Corner; 3]> {
+    let corner = |index: u32| {
+        let &Vertex { pos, uv, color } = mesh.vertices.get(index as usize)?;
+        let at = [pos.x * pixels_per_point, pos.y * pixels_per_point];
+        Some(Corner { at, uv: [uv.x, uv.y], color: color.to_array() })
+    };
+    let [a, b, c] = corners.map(corner);
+    Some([a?, b?, c?])
+}
+
+/// Fills a triangle in `pixels`, rows of `width`, and sets the bits of all `cells` that it touches.
+fn fill_triangle(
+    corners: [Corner; 3],
+    clip: Clip,
+    texture: &Texture,
+    width: usize,
+    cell_px: usize,
+    pixels: &mut [u32],
+    cells: &mut [u64],
+) {
+    triangle::fill(corners, clip, texture, |y, columns, paint| {
+        let (first, last) = (columns.start / cell_px, (columns.end - 1) / cell_px);
+        // The bits `first..=last`.
+        cells[y] |= (u64::MAX >> (CELLS - 1 - (last - first))) << first;
+        paint(&mut pixels[y * width..][columns]);
+    });
+}
+
+/// The runs of set bits of a row's `cells`, as ranges of its `width` columns.
+fn runs(mut cells: u64, cell_px: usize, width: usize) -> impl Iterator<Item = Range<usize>> {
+    // Cells that were shifted out of `cells` so far.
+    let mut passed = 0;
+    std::iter::from_fn(move || {
+        if cells == 0 {
+            return None;
+        }
+        let skipped = cells.trailing_zeros() as usize;
+        cells >>= skipped;
+        let count = cells.trailing_ones() as usize;
+        // In two shifts, because a shift by all 64 bits would overflow.
+        cells = cells >> (count - 1) >> 1;
+        let first = passed + skipped;
+        passed = first + count;
+        Some((first * cell_px).min(width)..(passed * cell_px).min(width))
+    })
+}
+
+/// Blends one run of the controls over the picture's pixels.
+struct Blend<'a> {
+    from: &'a [u32],
+    to: &'a mut [u32],
+}
+
+impl WithSimd for Blend<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        for (to, &from) in self.to.iter_mut().zip(self.from) {
+            // The window's pixels have no alpha.
+            *to = over(from, *to) & 0x00ff_ffff;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn runs_are_the_cells_that_are_set() {
+        let all = |cells, width| runs(cells, 10, width).map(|run| (run.start, run.end)).collect::<Vec<_>>();
+        assert!(all(0, 100).is_empty());
+        assert_eq!(all(u64::MAX, 640), [(0, 640)]);
+        assert_eq!(all(1 << 63 | 0b1011, 635), [(0, 20), (30, 40), (630, 635)]);
+    }
+}

@@ -1,0 +1,126 @@
+//! The picture as pixels of the window, row by row.
+
+use std::ops::Range;
+
+use pulp::{Arch, Simd, WithSimd};
+
+use bokehcam::frame::ColorImage;
+use bokehcam::frame::scale::Scale;
+use crate::present::{Area, Drawing, Tone};
+
+/// Paints pictures into an area, scaled where they have another size; keeps the scaling weights from frame to frame.
+#[derive(Debug, Default)]
+pub struct Scaler {
+    scale: Scale,
+}
+
+/// Memory for one thread.
+#[derive(Debug, Default)]
+pub struct Scratch {
+    /// For [`Scale::row`].
+    row: Vec<u16>,
+    /// A scaled row, RGB.
+    line: Vec<u8>,
+}
+
+impl Scaler {
+    /// Prepares for pictures of this size in this area; neither may be without pixels.
+    pub fn adapt(&mut self, picture: &ColorImage, area: Area) {
+        let [from, to] =
+            [picture.size(), (area.width, area.height)].map(|(width, height)| (width as usize, height as usize));
+        if from != to {
+            self.scale.adapt(from, to);
+        }
+    }
+
+    /// Paints row `y` of the area into `row`, which is shorter where the window cuts the area off: the picture before
+    /// the blur left of the split, `picture` right of it, and the divider.
+    pub fn paint_row(
+        &self,
+        arch: Arch,
+        (drawing, picture): (&Drawing, &ColorImage),
+        y: usize,
+        scratch: &mut Scratch,
+        row: &mut [u32],
+    ) {
+        let mut paint_columns = |picture: &ColorImage, columns: Range<usize>, row: &mut [u32]| {
+            let columns = columns.start..columns.end.min(row.len());
+            let Some(row) = row.get_mut(columns.clone()).filter(|row| !row.is_empty()) else { return };
+            let width = drawing.area.width as usize;
+            // Of how many columns the area shows those from which on.
+            let (whole, first) =
+                drawing.part.map_or((width, 0), |part| ((part.factor * picture.width) as usize, part.at.0 as usize));
+            let (start, end) = (first + columns.start, first + columns.end);
+            // Mirrored, columns come from the other side, and are reversed below.
+            let from = if drawing.mirror { whole - end..whole - start } else { start..end };
+            let rgb = if let Some(part) = drawing.part {
+                scratch.line.resize(3 * from.len(), 0);
+                part.row(&picture.rgb, picture.width, part.at.1 as usize + y, from, &mut scratch.line);
+                &scratch.line[..]
+            } else if picture.size() == (drawing.area.width, drawing.area.height) {
+                &picture.rgb[3 * (y * width + from.start)..3 * (y * width + from.end)]
+            } else {
+                scratch.line.resize(3 * from.len(), 0);
+                self.scale.row(&picture.rgb, y, from, &mut scratch.row, &mut scratch.line);
+                &scratch.line[..]
+            };
+            arch.dispatch(Expand { rgb, row });
+            if drawing.mirror {
+                row.reverse();
+            }
+        };
+        let width = drawing.area.width as usize;
+        let Some((before, split)) = drawing.split() else {
+            paint_columns(picture, 0..width, row);
+            return self.dim_if_stale(arch, drawing, row);
+        };
+        paint_columns(before, 0..split.at, row);
+        paint_columns(picture, split.at..width, row);
+        self.dim_if_stale(arch, drawing, row);
+        for (columns, [r, g, b]) in split.divider() {
+            let columns = columns.start.min(row.len())..columns.end.min(row.len());
+            row[columns].fill(u32::from_be_bytes([0, r, g, b]));
+        }
+    }
+
+    fn dim_if_stale(&self, arch: Arch, drawing: &Drawing, row: &mut [u32]) {
+        if drawing.stale {
+            arch.dispatch(Stale { row });
+        }
+    }
+}
+
+/// Packed bytes to words, `0x00RRGGBB`.
+struct Expand<'a> {
+    rgb: &'a [u8],
+    row: &'a mut [u32],
+}
+
+impl WithSimd for Expand<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        for (pixel, &[r, g, b]) in self.row.iter_mut().zip(self.rgb.as_chunks::<3>().0) {
+            *pixel = u32::from_be_bytes([0, r, g, b]);
+        }
+    }
+}
+
+/// Makes pixels grey and dim, as [`Tone`] says.
+struct Stale<'a> {
+    row: &'a mut [u32],
+}
+
+impl WithSimd for Stale<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        for pixel in self.row {
+            let [r, g, b] = [*pixel >> 16 & 0xff, *pixel >> 8 & 0xff, *pixel & 0xff];
+            let [red, green, blue] = Tone::STALE_WEIGHTS;
+            // The sum is rounded, and the last factor copies it to all three channels.
+            *pixel =
+                ((red * r + green * g + blue * b + (1 << (Tone::STALE_BITS - 1))) >> Tone::STALE_BITS) * 0x0001_0101;
+        }
+    }
+}

@@ -1,0 +1,86 @@
+//! The looks of a session: those to come, and those that frames on the screen are of.
+
+use super::super::{SessionEvent, Still, held};
+use super::Host;
+use bokehcam::control::Answer;
+use bokehcam::look::{Look, Patch};
+use crate::folders;
+use bokehcam::recording::snapshot::{self, Snapshot};
+use bokehcam::recording::still::write_color;
+
+/// Looks that are kept for snapshots: frames that come are of one of the last few.
+const KEPT_LOOKS: usize = 512;
+
+impl Host {
+    /// Blurs with another look from now on, and remembers it by its number for snapshots.
+    pub(super) fn adopt(&mut self, look: Look) {
+        self.start.look = look;
+        let number = self.looks.back().map_or(0, |(last, _)| last + 1);
+        self.looks.push_back((number, self.effective_look()));
+        if self.looks.len() > KEPT_LOOKS {
+            self.looks.pop_front();
+        }
+        // What is on the screen comes first.
+        self.blur_held();
+        if let Some(live) = &mut self.live
+            && let Err(line) = live.adopt(&self.start.look, number, &mut *self.start.services)
+        {
+            self.news.note(line);
+        }
+    }
+
+    /// The look as far as the source allows it.
+    pub(super) fn effective_look(&self) -> Look {
+        self.live.as_ref().map_or_else(|| self.start.look.clone(), |live| live.effective(&self.start.look))
+    }
+
+    /// Keeps the frame that stays from now on, or lets it go.
+    pub(super) fn hold(&mut self, held: Option<held::Held>) {
+        let is_behind = held.as_ref().is_some_and(|held| held.is_behind);
+        self.held = held.map(|held| held::HeldBlur::new(held, self.start.look.focus));
+        if is_behind {
+            self.blur_held();
+        }
+    }
+
+    /// Blurs the frame that stays as the last look says.
+    fn blur_held(&mut self) {
+        if let (Some(held), Some((number, look))) = (&mut self.held, self.looks.back()) {
+            match held.blur(look, *number, &mut *self.start.services) {
+                Ok(blurred) => self.news.send(SessionEvent::Blurred(Box::new(blurred))),
+                Err(line) => self.news.note(line),
+            }
+        }
+    }
+
+    /// Saves a snapshot with the settings that repeat it: those of the look that its frame was blurred with.
+    pub(super) fn save(&self, still: &Still) {
+        let its_look = self.looks.iter().rev().find(|(number, _)| *number <= still.change);
+        let look = its_look.map_or(&self.start.look, |(_, look)| look);
+        let settings = Patch::of(&look.of_frame(&still.coc, still.quality)).values();
+        let Still { picture, color, depth, order, with_sources, .. } = still;
+        let sources = with_sources.then_some((color, depth.as_ref()));
+        let snapshot = Snapshot { picture, sources, settings: &settings };
+        let saved = match order.as_ref().and_then(|order| order.to.as_deref()) {
+            Some(path) => {
+                // If that fails, writing says why.
+                let _ = path.parent().map(std::fs::create_dir_all);
+                write_color(path, picture, false).map(|()| path.to_owned())
+            }
+            None => snapshot::save(&self.start.folders.pictures, &folders::stem(), &snapshot),
+        };
+        let answer = match saved {
+            Ok(path) => {
+                self.news.note(format!("Saved {}", folders::shown(&path)));
+                self.news.kept(&path);
+                Answer::Saved { saved: path }
+            }
+            Err(error) => {
+                self.news.note(error.to_string());
+                Answer::failed(error.to_string())
+            }
+        };
+        // Who gave up waiting sees the note.
+        order.iter().for_each(|order| drop(order.answer.try_send(answer.clone())));
+    }
+}

@@ -1,0 +1,164 @@
+//! One run of the pipeline.
+
+use std::str::FromStr;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, PoisonError};
+use std::thread::{self, JoinHandle};
+use std::time::{Duration, Instant};
+
+use super::super::services::{Opened, Services};
+use super::super::state::{Known, Output, Running, Source, fitted};
+use super::{News, SessionEvent, Start};
+use bokehcam::clock::Clock;
+use bokehcam::depth::plate::Guide;
+use bokehcam::link;
+use bokehcam::look::Look;
+use bokehcam::pipeline::{self, Changes, Pace, PipelineError, Run};
+use bokehcam::sink::Sink;
+use bokehcam::sink::switch::Notice;
+use bokehcam::sink::{Shutter, Switch, Switchboard};
+use bokehcam::source::{Kind, SourceName};
+use bokehcam::stats::Report;
+
+/// A run, and the channels into it.
+pub(super) struct Live {
+    pub size: (u32, u32),
+    pub period_ns: u64,
+    known: Known,
+    changes: Changes,
+    board: Switchboard,
+    pub stop: Arc<AtomicBool>,
+    /// How far the plate is, where that makes the depth.
+    pub guide: Option<Arc<Guide>>,
+    thread: JoinHandle<Option<Report>>,
+}
+
+/// The window's pictures come in real time.
+const ADAPTIVE: bool = true;
+
+impl Live {
+    /// Starts a run. `wrote` is called with what becomes of its outputs, `ended` once with how it ended.
+    ///
+    /// # Errors
+    /// The executor cannot be made, or the system gives no thread: one line.
+    pub(super) fn begin(
+        opened: Opened,
+        start: &mut Start,
+        news: &News,
+        wrote: impl Fn(Notice) + Send + Sync + 'static,
+        ended: impl FnOnce(Result<Report, PipelineError>) + Send + 'static,
+    ) -> Result<(Self, Source), String> {
+        let Opened { name, source, has_depth, ways, way, camera: facts, .. } = opened;
+        let measured = source.is_measured();
+        let bokehcam::source::Source { camera, depth, guide, depth_from, .. } = source;
+        let info = camera.info();
+        let kind = SourceName::from_str(&name).map_or(Kind::default(), |name| name.kind());
+        let known = Known { has_depth, is_relative: facts.is_relative, size: info.size };
+        let look = fitted(&start.look, known);
+        let made_for = look.settings(info.size, ADAPTIVE);
+        let bokeh = made_for.as_ref().map(|made_for| start.services.executor(made_for, info.size)).transpose()?;
+        let executor = bokeh.as_ref().map_or_else(|| "no blur".into(), |bokeh| bokeh.describe());
+        let (budget_ns, threads) = (start.budget_ns.unwrap_or(info.period_ns), start.threads);
+        let (switch, board) = Switch::new("window", wrote);
+        let period = Duration::from_nanos(info.period_ns);
+        let (demand, off) = (start.demand.clone(), Arc::clone(&start.off));
+        let (sink, release) = Shutter::new(Box::new(switch), info.size, period, demand, Clock::system(), off);
+        *start.release.lock().unwrap_or_else(PoisonError::into_inner) = Some(release);
+        let (changes, to_come) = Changes::new(look.clone(), info.size, ADAPTIVE);
+        let (view, views) = link::live();
+        let stop = Arc::new(AtomicBool::new(false));
+        let (stopped, wake, keep_going) = (Arc::clone(&stop), Arc::clone(&news.wake), start.keep_going);
+        let (wanted, demand) = (Arc::clone(&start.wanted), start.demand.clone());
+        news.send(SessionEvent::Views(views, guide.clone(), camera.seeker()));
+        let run = move || {
+            pipeline::run(Run {
+                camera,
+                depth,
+                bokeh,
+                look,
+                adaptive: ADAPTIVE,
+                measured,
+                threads,
+                changes: Some(to_come),
+                sink: Box::new(sink),
+                pace: Pace::Realtime,
+                budget_ns,
+                keep_going,
+                demand: Some(demand),
+                mirror: false,
+                wanted: Some(wanted),
+                view: Some(view),
+                clock: Clock::system(),
+                stop: &stopped,
+                progress: &|_| wake(),
+            })
+        };
+        let thread = thread::Builder::new().name("pipeline".into()).spawn(move || {
+            let result = run();
+            let report = match &result {
+                Ok(report) => report.clone(),
+                Err(failed) => (*failed.report).clone(),
+            };
+            ended(result);
+            Some(report)
+        });
+        let thread = thread.map_err(|error| format!("cannot start the pipeline's thread: {error}"))?;
+        let source = Source::Running(Running {
+            name,
+            label: info.name,
+            size: info.size,
+            period_ns: info.period_ns,
+            has_depth,
+            is_live: info.live,
+            kind,
+            depth_from,
+            ways,
+            way,
+            executor,
+            budget_ns,
+        });
+        let live = Self { size: info.size, period_ns: info.period_ns, known, changes, board, stop, guide, thread };
+        Ok((live, source))
+    }
+
+    /// The look as far as the source allows it.
+    pub(super) fn effective(&self, look: &Look) -> Look {
+        fitted(look, self.known)
+    }
+
+    /// Blurs with this look from now on; its frames carry this number.
+    ///
+    /// # Errors
+    /// Its executor cannot be made: one line. The one before goes on.
+    pub(super) fn adopt(&mut self, look: &Look, number: u64, services: &mut dyn Services) -> Result<(), String> {
+        let (look, size) = (self.effective(look), self.size);
+        self.changes.adopt(look, number, |settings| {
+            let began = Instant::now();
+            let bokeh = services.executor(settings, size)?;
+            tracing::debug!("an executor was made in {:?}", began.elapsed());
+            Ok(bokeh)
+        })
+    }
+
+    /// Adds a sink to the run.
+    pub(super) fn write_to(&self, output: &Output, sink: Box<dyn Sink>) {
+        // A run that has ended gives the sink up, and tells so by `wrote`.
+        let _ = self.board.add(&output.name, sink);
+    }
+
+    /// Takes an output out of the run, which completes it.
+    pub(super) fn end(&self, output: &Output) {
+        self.board.remove(&output.name);
+    }
+
+    /// Ends the run and waits for it; gives back its report.
+    pub(super) fn stop(self) -> Option<Report> {
+        self.stop.store(true, Ordering::Relaxed);
+        self.join()
+    }
+
+    /// Waits for a run that has ended or was told to.
+    pub(super) fn join(self) -> Option<Report> {
+        self.thread.join().ok().flatten()
+    }
+}

@@ -1,0 +1,68 @@
+//! What the window knows of a camera besides its controls, and what a person chooses of it.
+
+use super::{Request, Source, State};
+use bokehcam::source::modes::Mode;
+
+/// The source that runs: what a camera offers, and what is true of its depth.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Camera {
+    /// Its sizes and rates, the largest first.
+    pub modes: Vec<Mode>,
+    /// Whether it faces the person, who expects a mirror.
+    pub faces_user: bool,
+    /// Whether distances are only relative, without metres; of any source.
+    pub is_relative: bool,
+}
+
+impl State {
+    /// Takes another camera. Unless somebody chose otherwise, one that faces the person is a mirror, and all else is not.
+    pub(super) fn set_camera(&mut self, camera: Camera) {
+        if !self.mirror_chosen {
+            self.mirror = camera.faces_user;
+        }
+        self.camera = camera;
+    }
+
+    /// Asks for other pictures of the camera.
+    pub(super) fn set_mode(&mut self, size: (u32, u32), fps: f64) -> Vec<Request> {
+        self.source = Source::Opening;
+        (self.frozen, self.focus_m) = (false, None);
+        vec![Request::Mode(size, fps)]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::state::{Action, Update, sample};
+
+    fn mirror_of(state: &State) -> Option<String> {
+        state.switches().into_iter().find(|(name, _)| name == "mirror").map(|(_, value)| value)
+    }
+
+    #[test]
+    fn what_faces_the_person_is_a_mirror_unless_they_say_otherwise() {
+        let camera = |faces_user| Update::Camera(Camera { faces_user, ..Camera::default() });
+        let mut state = sample::state();
+        for faces_user in [true, false, true] {
+            state.hear(camera(faces_user));
+            assert_eq!((state.mirror, mirror_of(&state)), (faces_user, None), "the command has the same default");
+        }
+        state.apply(Action::Mirror(false));
+        assert_eq!(mirror_of(&state).as_deref(), Some("false"));
+        for faces_user in [true, false] {
+            state.hear(camera(faces_user));
+            assert!(!state.mirror, "as was said");
+        }
+        state.apply(Action::Mirror(true));
+        assert_eq!(mirror_of(&state).as_deref(), Some("true"));
+    }
+
+    #[test]
+    fn what_can_be_a_source_is_opened_and_other_pictures_of_a_camera_are_asked_for() {
+        let mut state = sample::state();
+        assert_eq!(state.hear(Update::Offered("photo.jpg".into())), Some(Request::Open("photo.jpg".into())));
+        assert_eq!((state.source_name.as_str(), &state.source), ("photo.jpg", &Source::Opening));
+        assert_eq!(state.apply(Action::Mode((640, 480), 30.0)), [Request::Mode((640, 480), 30.0)]);
+    }
+}

@@ -1,0 +1,76 @@
+//! How the session's updates change the state.
+
+use super::apply::NO_METRES;
+use super::{Request, Shown, Source, State, Update, fitted};
+use bokehcam::look::{Effect, Look};
+
+impl State {
+    /// Applies an update of the session; gives back the request for another look where a new source needs one.
+    pub fn hear(&mut self, update: Update) -> Option<Request> {
+        match update {
+            Update::Source(source) => return self.set_source(source),
+            Update::Choices { sources, virtual_cameras } => {
+                (self.sources, self.virtual_cameras) = (sources, virtual_cameras);
+            }
+            Update::Presets(presets) => self.presets = presets,
+            Update::Controls(controls) => self.controls = controls,
+            Update::Camera(camera) => self.set_camera(camera),
+            Update::Offered(name) => return self.open(name).pop(),
+            Update::Behind(behind) => return self.set_look(Look { behind, ..self.look.clone() }, None).pop(),
+            Update::Outputs(outputs) => {
+                self.outputs = outputs;
+                self.recorded_bytes = self.recorded_bytes.filter(|_| self.recording().is_some());
+                // Nothing is lost any more.
+                self.closing &= !self.outputs.is_empty();
+            }
+            Update::Recorded(bytes) => self.recorded_bytes = Some(bytes),
+            Update::Kept(folder) => self.kept_in = Some(folder),
+            Update::Note(text) => self.note(text),
+            Update::Trouble(text) => self.trouble = Some(text),
+        }
+        None
+    }
+
+    /// Takes another source, and fits the view and the look to it.
+    fn set_source(&mut self, source: Source) -> Option<Request> {
+        if let Source::Running(running) = &source {
+            self.meters.restart();
+            self.source_name.clone_from(&running.name);
+        }
+        self.source = source;
+        if self.shown == Shown::Depth && !self.may_have_depth() {
+            self.shown = Shown::Picture;
+            self.note(self.no_depth());
+        }
+        let chosen = match &self.source {
+            // A portrait that was given up for want of depth comes back, unless another effect was chosen since.
+            Source::Running(running) if running.has_depth && self.fitted => {
+                self.fitted = false;
+                let still_fitted = self.look.effect == Effect::Blur;
+                Look { effect: if still_fitted { Effect::Auto } else { self.look.effect }, ..self.look.clone() }
+            }
+            _ => self.look.clone(),
+        };
+        if self.known().is_relative && self.may_have_depth() && chosen.needs_metres().is_some() {
+            self.note(NO_METRES);
+        }
+        let look = self.fitting(chosen);
+        (look != self.look).then(|| {
+            self.look = look;
+            Request::Look(Box::new(self.look.clone()))
+        })
+    }
+
+    /// The look to be kept for the next time: as it was chosen, whatever this source has not.
+    pub fn chosen_look(&self) -> Look {
+        let is_fitted = self.fitted && self.look.effect == Effect::Blur;
+        Look { effect: if is_fitted { Effect::Auto } else { self.look.effect }, ..self.look.clone() }
+    }
+
+    /// A look as far as the source allows it; remembers if that changed its effect.
+    pub(super) fn fitting(&mut self, look: Look) -> Look {
+        let fitting = fitted(&look, self.known());
+        self.fitted |= fitting.effect != look.effect;
+        fitting
+    }
+}

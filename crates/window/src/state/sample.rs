@@ -1,0 +1,73 @@
+//! A state to try things on.
+
+use super::{Running, Source, State, Way};
+use bokehcam::knob::Knob;
+use bokehcam::look::presets::Preset;
+use bokehcam::look::{Effect, Look, Patch, Strength, Tilt};
+use bokehcam::source::devices::Choice;
+use bokehcam::source::{DepthFrom, Kind};
+
+/// A look as a person may have it.
+pub fn look() -> Look {
+    Look { tilt: Tilt { center_y: 0.5, band: 0.15, angle_deg: 0.0 }, highlights: 8.0, ..Look::default() }
+}
+
+/// Another look than [`look`], by how strong it is.
+pub fn blurred(radius_px: f32) -> Look {
+    Look { strength: Strength::AtInfinity(radius_px), ..look() }
+}
+
+/// A source whose frames come.
+pub fn running(has_depth: bool) -> Source {
+    Source::Running(Running {
+        name: "portrait".into(),
+        label: "Desk camera".into(),
+        size: (1280, 720),
+        period_ns: 33_333_333,
+        has_depth,
+        is_live: true,
+        kind: Kind::Camera,
+        depth_from: if has_depth { DepthFrom::Metres } else { DepthFrom::Nothing },
+        ways: if has_depth { vec![Way::Measured] } else { vec![Way::Plate] },
+        way: has_depth.then_some(Way::Measured),
+        executor: "cpu, 2 threads, AVX2".into(),
+        budget_ns: 33_333_333,
+    })
+}
+
+/// A window that shows a running source with depth, and has everything to choose from.
+pub fn state() -> State {
+    let mut state = State::new(look(), "portrait".into());
+    state.source = running(true);
+    state.focus_m = Some(1.24);
+    let choice = |name: &str, label: &str| Choice { name: name.into(), label: label.into() };
+    state.sources = vec![choice("portrait", "Recording: portrait"), choice("/dev/video0", "Desk camera")];
+    state.virtual_cameras = vec![choice("/dev/video9", "bokehcam (/dev/video9)")];
+    let preset = |name: &str, look: Look, own: bool| Preset { name: name.into(), patch: Patch::of(&look), own };
+    state.presets = vec![
+        preset("portrait", look(), false),
+        preset("cinematic", blurred(30.0), false),
+        preset("dreamy", Look { highlights: 20.0, ..blurred(40.0) }, false),
+        preset("product", Look { focus_range_m: 0.2, ..blurred(12.0) }, false),
+        preset("miniature", Look { effect: Effect::TiltShift, ..blurred(14.0) }, false),
+        preset("my desk", blurred(21.0), true),
+    ];
+    let control = |name: &str, value: i64, range: (i64, i64, i64)| Knob {
+        name: name.into(),
+        value,
+        range,
+        menu: Vec::new(),
+        switch: false,
+        active: true,
+    };
+    let menu = vec![(1, "Manual Mode".to_owned()), (3, "Aperture Priority Mode".to_owned())];
+    // What is behind More is seen.
+    state.habits.sections.insert("More".into(), true);
+    state.controls = vec![
+        control("brightness", 10, (-64, 64, 1)),
+        Knob { switch: true, ..control("white_balance_automatic", 1, (0, 1, 1)) },
+        Knob { menu, ..control("auto_exposure", 3, (0, 3, 1)) },
+        Knob { active: false, ..control("exposure_time_absolute", 157, (1, 5000, 1)) },
+    ];
+    state
+}

@@ -1,0 +1,26 @@
+//! What the window shows, as options of the command line.
+
+use super::{Shown, State};
+use bokehcam::look::Look;
+use crate::services::Switch;
+
+impl State {
+    /// The options that reproduce the window, besides those of the look; defaults are left out.
+    pub fn switches(&self) -> Vec<Switch> {
+        let shown = Some(self.shown).filter(|shown| *shown != Shown::default());
+        let yes = |on: bool| on.then(|| "true".to_owned());
+        let switches = [
+            ("show", shown.map(|shown| shown.to_string())),
+            ("split", self.split.map(|at| format!("{at:.3}"))),
+            ("mirror", (self.mirror != self.camera.faces_user).then(|| self.mirror.to_string())),
+            ("full-screen", yes(self.full_screen)),
+            ("instruments", yes(self.instruments)),
+            ("panel", (!self.panel).then(|| "false".to_owned())),
+            // A look without any setting would be the one that is remembered.
+            ("fresh", yes(self.look == Look::default())),
+            ("single-keys", (!self.habits.single_keys).then(|| "false".to_owned())),
+            ("text-scale", (self.habits.text_scale != 1.0).then(|| format!("{:.2}", self.habits.text_scale))),
+        ];
+        switches.into_iter().filter_map(|(name, value)| Some((name.to_owned(), value?))).collect()
+    }
+}

@@ -1,0 +1,323 @@
+//! [`Services`] by the operating system: real cameras, files and GPUs.
+
+use std::collections::BTreeMap;
+use std::str::FromStr;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
+use super::dialog;
+use super::services::{Browse, Opened, Pick, Services, SettingsStore, Switch};
+use super::state::{Camera, Way};
+use bokehcam::bokeh::{self, Bokeh};
+use bokehcam::capture::demo;
+use bokehcam::computing::Executors;
+use bokehcam::depth::focus::FocusRule;
+use bokehcam::knob::Knob;
+use bokehcam::look::{Effect, Look, Strength};
+use bokehcam::recording::{Options as Reading, Recording};
+use bokehcam::sink::{self, Sink, Target};
+use bokehcam::source::devices::{self, Choice};
+use bokehcam::source::{self, DepthChoice, Kind, OneCamera, Options, Size, Source, SourceName, modes};
+
+/// Shown when there is no camera, and the demonstration takes its place.
+const NO_CAMERA: &str = "No camera was found.";
+/// Shown with the synthetic scene.
+const RENDERED: &str = "This scene is rendered while it plays, as fast as the machine can; `demo` plays smoothly.";
+/// Shown where no network is installed.
+const NO_NETWORK: &str = "There is no network yet: `bokehcam models get` gets one, then this finds you.";
+/// Shown where the command line declines the depth that there is.
+const DECLINED: &str = "This source has depth, and --depth none declines it: leave that out for blur by depth.";
+
+/// Opens everything as the command line would.
+pub struct System {
+    /// How sources are opened.
+    pub options: Options,
+    /// The look at the start.
+    pub look: Look,
+    /// Makes what blurs.
+    pub executors: Executors,
+    /// Width and height of virtual cameras; `None`: those of the frames.
+    pub out_size: Option<(u32, u32)>,
+    /// Overwrite what exists.
+    pub force: bool,
+    /// Where settings are kept.
+    pub settings: Box<dyn SettingsStore>,
+    /// The sources that were opened, the last one first: they stay on the list, even if they are no cameras.
+    opened: Vec<Choice>,
+    /// The camera of which other pictures were chosen, and which.
+    mode: Option<(String, Size, f64)>,
+    /// The device nodes as they were last, and whether they were others before that.
+    nodes: (Vec<String>, bool),
+    /// Values of the camera's knobs that were turned, by name.
+    turned: BTreeMap<String, i64>,
+    /// The camera that was opened last, where it has knobs.
+    camera: Option<String>,
+    /// The way to depth that was chosen in the window.
+    way: Option<Way>,
+    /// The source that was opened last by its usual way, and its own ways to depth.
+    own_ways: (String, Vec<Way>),
+}
+
+impl System {
+    /// A system that overwrites nothing; nothing is open yet.
+    pub fn new(options: Options, look: Look, settings: Box<dyn SettingsStore>) -> Self {
+        Self {
+            executors: Executors::new(options.computing.clone()),
+            options,
+            look,
+            out_size: None,
+            force: false,
+            settings,
+            opened: Vec::new(),
+            mode: None,
+            nodes: (devices::nodes(), false),
+            turned: BTreeMap::new(),
+            camera: None,
+            way: None,
+            own_ways: Default::default(),
+        }
+    }
+
+    /// What is known of the camera that was opened, if it is one alone.
+    fn facts_of(&self, source: &Source, name: &SourceName) -> Camera {
+        let is_relative = source.depth_from.is_relative();
+        let is_lone = source.depth_from.is_of_pictures();
+        let Some(camera) = &self.camera else {
+            // What only PipeWire has is a laptop's own.
+            let faces_user = is_lone && name.kind() == Kind::Camera;
+            return Camera { is_relative, faces_user, ..Camera::default() };
+        };
+        let is_pair = self.options.stereo.side_by_side;
+        Camera {
+            modes: modes::modes(camera),
+            faces_user: is_lone && !is_pair && modes::faces_user(camera),
+            is_relative,
+        }
+    }
+
+    /// Opens a source to be played for as long as the window is open, with depth whether or not the look needs it.
+    fn open_source(&self, name: &str, way: Option<Way>) -> Result<(Source, SourceName), String> {
+        let source_name = SourceName::from_str(name).map_err(|error| error.of(name).to_string())?;
+        let mut options = self.options.clone();
+        if let Some(way) = way {
+            options.depth_choice = self.choice(way);
+        }
+        // The others have no end.
+        options.frames.repeat &= matches!(source_name.kind(), Kind::Recording | Kind::Photo);
+        if let Some((_, size, fps)) = self.mode.as_ref().filter(|(camera, ..)| camera == name) {
+            (options.frames.size, options.frames.fps) = (Some(*size), Some(*fps));
+        }
+        // The window may switch to an effect that needs depth later, and does without metres where there are none.
+        let look = Look {
+            effect: Effect::Auto,
+            focus: FocusRule::Auto,
+            focus_range_m: 0.0,
+            strength: Strength::Default,
+            ..self.look.clone()
+        };
+        let source = Source::open(&source_name, &options, Some(&look)).map_err(|error| error.to_string())?;
+        Ok((source, source_name))
+    }
+
+    /// How depth is made this way; what the command line said of depth from elsewhere is the source's own.
+    fn choice(&self, way: Way) -> DepthChoice {
+        match (way, &self.options.depth_choice) {
+            (Way::Measured, choice @ (DepthChoice::Folder(_) | DepthChoice::Device(_) | DepthChoice::Auto)) => {
+                choice.clone()
+            }
+            (Way::Person, DepthChoice::OneCamera(OneCamera { plate: None, matte: Some(file), .. })) => {
+                DepthChoice::OneCamera(OneCamera { matte: Some(file.clone()), ..OneCamera::default() })
+            }
+            (
+                Way::PersonAndDistance,
+                choice @ DepthChoice::OneCamera(OneCamera { mono: Some(_), matte: Some(_), .. }),
+            ) => choice.clone(),
+            _ => way.choice(),
+        }
+    }
+
+    /// The ways to depth of a source that was opened by `way`, the usual ones first.
+    fn ways(&mut self, source: &Source, name: &SourceName, way: Option<Way>) -> Vec<Way> {
+        let called = name.to_string();
+        if way.is_none() || self.own_ways.0 != called {
+            let mut own = Vec::new();
+            match name {
+                SourceName::Folder(folder) => {
+                    let recording = Recording::open(folder, &Reading { keep_going: true, ..Reading::default() }).ok();
+                    let has = |own: &mut Vec<Way>, is: bool, way: Way| own.extend(is.then_some(way));
+                    has(&mut own, recording.as_ref().is_some_and(Recording::has_depth), Way::Measured);
+                    has(&mut own, recording.is_some_and(|recording| recording.pair().is_some()), Way::Stereo);
+                }
+                _ => own.extend(
+                    Way::of(source.depth_from, &OneCamera::default(), false)
+                        .filter(|way| matches!(way, Way::Measured | Way::Stereo)),
+                ),
+            }
+            self.own_ways = (called, own);
+        }
+        let mut ways = self.own_ways.1.clone();
+        if matches!(name.kind(), Kind::Camera | Kind::Recording | Kind::Photo) {
+            let installed = source::installed_networks();
+            ways.extend(installed.matte.is_some().then_some(Way::Person));
+            ways.extend((installed.matte.is_some() && installed.mono.is_some()).then_some(Way::PersonAndDistance));
+        }
+        let is_alone = name.kind() == Kind::Camera && self.own_ways.1.is_empty();
+        ways.extend(is_alone.then_some(Way::Plate));
+        ways
+    }
+}
+
+impl Services for System {
+    fn sources(&mut self) -> Vec<Choice> {
+        let mut sources = devices::cameras();
+        sources.extend(devices::shared_cameras());
+        let is_other =
+            |choice: &&Choice| choice.name != demo::NAME && !sources.iter().any(|camera| camera.name == choice.name);
+        let opened: Vec<Choice> = self.opened.iter().filter(is_other).cloned().collect();
+        sources.extend(opened);
+        sources.push(Choice { name: demo::NAME.into(), label: "Demonstration".into() });
+        sources
+    }
+
+    fn virtual_cameras(&mut self) -> Vec<Choice> {
+        devices::virtual_cameras()
+    }
+
+    fn can(&mut self, name: &str, way: Way) -> Result<(), String> {
+        let installed = source::installed_networks();
+        let lacks = match way {
+            Way::Person => installed.matte.is_none(),
+            Way::PersonAndDistance => installed.matte.is_none() || installed.mono.is_none(),
+            Way::Measured | Way::Stereo | Way::Plate => false,
+        };
+        if lacks {
+            return Err(NO_NETWORK.to_owned());
+        }
+        // A recording is opened twice without harm; a camera is used already.
+        let is_file = SourceName::from_str(name).is_ok_and(|name| matches!(name.kind(), Kind::Recording | Kind::Photo));
+        if is_file { self.open_source(name, Some(way)).map(drop) } else { Ok(()) }
+    }
+
+    fn open(&mut self, name: &str, way: Option<Way>) -> Result<Opened, String> {
+        let mut notes = Vec::new();
+        let first_camera = || devices::cameras().into_iter().chain(devices::shared_cameras()).next();
+        let name = match name {
+            "" => first_camera().map_or_else(
+                || {
+                    notes.push(NO_CAMERA.to_owned());
+                    demo::NAME.to_owned()
+                },
+                |camera| camera.name,
+            ),
+            name => name.to_owned(),
+        };
+        let (source, source_name) = self.open_source(&name, way)?;
+        // Networks that nobody asked for are no news to a person who sees what they do.
+        let is_asked = matches!(self.options.depth_choice, DepthChoice::OneCamera(_)) || way.is_some();
+        notes.extend(source.networks.iter().filter(|_| is_asked).map(|networks| format!("Depth by {networks}.")));
+        for by in source.networks.iter().chain(&source.persons) {
+            tracing::info!("{name}: persons by {by}");
+        }
+        if source_name.kind() == Kind::Synthetic {
+            notes.push(RENDERED.to_owned());
+        }
+        let is_declined = self.options.depth_choice == DepthChoice::None && way.is_none();
+        if is_declined && source.has_depth() {
+            notes.push(DECLINED.to_owned());
+        }
+        let has_depth = source.has_depth() && !is_declined;
+        self.turned.clear();
+        notes.extend(source_name.note(&source));
+        self.opened.retain(|choice| choice.name != name);
+        self.opened.insert(0, Choice::of(&name));
+        self.camera = devices::camera_of(&source_name);
+        let controls = self.camera.as_deref().map(devices::knobs).unwrap_or_default();
+        self.way = way;
+        let camera = self.facts_of(&source, &source_name);
+        let mut ways = self.ways(&source, &source_name, way);
+        let networks = match &self.options.depth_choice {
+            DepthChoice::OneCamera(chosen) if chosen.has_networks() => chosen.clone(),
+            _ => source::installed_networks(),
+        };
+        let usual = || Way::of(source.depth_from, &networks, source.guide.is_some());
+        let way = way.or_else(usual).filter(|_| has_depth);
+        ways.extend(way.filter(|way| !ways.contains(way)));
+        Ok(Opened { name, source, has_depth, ways, way, notes, controls, camera })
+    }
+
+    fn devices_changed(&mut self) -> bool {
+        let nodes = devices::nodes();
+        let differ = nodes != self.nodes.0;
+        // Once more a moment later: a node is there before everybody may open it.
+        let again = std::mem::replace(&mut self.nodes, (nodes, differ)).1;
+        differ || again
+    }
+
+    fn check(&self, name: &str) -> Result<(), String> {
+        let source_name = SourceName::from_str(name).map_err(|error| error.of(name).to_string())?;
+        match &source_name {
+            SourceName::Folder(folder) => {
+                let reading = Reading { keep_going: true, ..Reading::default() };
+                Recording::open(folder, &reading).map(drop).map_err(|error| error.to_string())
+            }
+            _ => Ok(()),
+        }
+    }
+
+    fn browse(&self, what: Browse) -> Pick {
+        Box::new(move || dialog::pick(what))
+    }
+
+    fn choose_mode(&mut self, name: &str, (width, height): (u32, u32), fps: f64) {
+        self.mode = Some((name.to_owned(), Size { width, height }, fps));
+    }
+
+    fn turn(&mut self, knob: &str, value: i64) -> Result<Vec<Knob>, String> {
+        let Some(camera) = &self.camera else { return Err("this source has no controls".to_owned()) };
+        let controls = devices::turn(camera, knob, value)?;
+        self.turned.insert(knob.to_owned(), value);
+        Ok(controls)
+    }
+
+    fn executor(&mut self, settings: &bokeh::Settings, size: (u32, u32)) -> Result<Box<dyn Bokeh>, String> {
+        self.executors.blur(settings, size).map_err(|error| error.to_string())
+    }
+
+    fn output(
+        &mut self,
+        name: &str,
+        size: (u32, u32),
+        period_ns: u64,
+        stop: &Arc<AtomicBool>,
+    ) -> Result<Box<dyn Sink>, String> {
+        let (force, out_size, threads, stop) =
+            (self.force, self.out_size, self.options.computing.threads, Arc::clone(stop));
+        let options = sink::Options { force, out_size, threads, stop, ..sink::Options::new(size, period_ns) };
+        let target = Target::from_str(name).map_err(|error| error.to_string())?;
+        target.open(&options).map_err(|error| error.to_string())
+    }
+
+    fn command(&self, look: &Look, source: &str, outputs: &[String], switches: &[Switch]) -> String {
+        let mut switches = match outputs {
+            [] => switches.to_vec(),
+            // A command that writes to outputs has no window to set options of.
+            _ => Vec::new(),
+        };
+        if !self.turned.is_empty() {
+            let controls: Vec<String> = self.turned.iter().map(|(name, value)| format!("{name}={value}")).collect();
+            switches.push(("control".into(), controls.join(",")));
+        }
+        if let Some((_, size, fps)) = self.mode.as_ref().filter(|(camera, ..)| camera == source) {
+            switches.push(("size".into(), format!("{}x{}", size.width, size.height)));
+            switches.push(("fps".into(), format!("{}", (fps * 1000.0).round() / 1000.0)));
+        }
+        if let Some(way) = self.way {
+            switches.push(("depth".into(), way.flag()));
+        }
+        self.settings.command(look, source, outputs, &switches)
+    }
+
+    fn settings(&mut self) -> &mut dyn SettingsStore {
+        &mut *self.settings
+    }
+}

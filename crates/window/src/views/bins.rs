@@ -1,0 +1,65 @@
+//! The bins view: in which depth bin each pixel is blurred.
+
+use super::Legend;
+use super::colors::BINS;
+use super::sample::Field;
+use bokehcam::bokeh::aperture::Aperture;
+use bokehcam::bokeh::plan::{MAX_BINS, Plan};
+use bokehcam::bokeh::{Rank, Settings};
+use bokehcam::budget::Quality;
+use bokehcam::frame::{ColorImage, DepthMap};
+use bokehcam::optics::CocField;
+
+/// The most bins that there can be.
+pub const MOST: usize = MAX_BINS;
+
+/// Splits frames into bins as the blur did. Keeps its plan as long as settings and size stay the same.
+#[derive(Default)]
+pub struct Bins {
+    /// The plan, and the settings and the size that it was made for.
+    made: Option<(Settings, (u32, u32), Plan)>,
+}
+
+impl Bins {
+    /// A plan with the bins of this frame. It is made anew only if what decides their borders changed.
+    pub fn split(
+        &mut self,
+        settings: &Settings,
+        size: (u32, u32),
+        level: Option<Quality>,
+        depth: Option<&DepthMap>,
+        coc: &CocField,
+    ) -> &Plan {
+        let is_current = |(planned, planned_size, _): &(Settings, (u32, u32), Plan)| {
+            let kind = |settings: &Settings| (settings.coc, settings.method);
+            let radii_px = |settings: &Settings| [settings.far_max_px, settings.near_max_px];
+            kind(planned) == kind(settings) && radii_px(planned) == radii_px(settings) && *planned_size == size
+        };
+        self.made = self.made.take().filter(is_current);
+        let (.., plan) = self.made.get_or_insert_with(|| {
+            // The bins' borders do not depend on the kernels; these take the least time to make.
+            let aperture = Aperture::default();
+            let cheap = Settings { aperture, rank: Some(Rank::Terms(1)), adaptive: true, ..settings.clone() };
+            let plan = Plan::new(&cheap, size.0, size.1);
+            (cheap, size, plan)
+        });
+        plan.set_quality(level.unwrap_or(settings.quality));
+        plan.split(depth, coc);
+        plan
+    }
+}
+
+/// Colours each pixel by the bin of `plan` that its CoC falls in. `columns` are those of [`Field::new`].
+pub fn draw(field: &Field, columns: &[u32], plan: &Plan, image: &mut ColorImage) -> Legend {
+    let mut high_px = [f32::INFINITY; MOST];
+    let count = plan.bins.len().min(MOST);
+    for (high_px, bin) in high_px.iter_mut().zip(&plan.bins) {
+        *high_px = bin.high_px;
+    }
+    let borders = &high_px[..count.saturating_sub(1)];
+    let (rows, row_bytes) = (image.height, image.width as usize * 3);
+    for (y, row) in (0..).zip(image.rgb.chunks_exact_mut(row_bytes.max(1))) {
+        field.row(y, rows, columns, row, |_, coc_px| BINS[borders.iter().filter(|&&border| coc_px >= border).count()]);
+    }
+    Legend::Bins { count, high_px }
+}

@@ -1,0 +1,103 @@
+//! Views of what a picture was blurred by: depth, circle of confusion and bins, in false colours with a legend.
+
+mod bins;
+mod colors;
+mod depth;
+mod probe;
+mod radius;
+mod sample;
+#[cfg(test)]
+mod tests;
+
+pub use bins::MOST as MOST_BINS;
+pub use colors::{BINS as BIN_COLORS, diverging, perceptual};
+pub use depth::share_of as depth_share;
+pub use probe::Probe;
+
+use bokehcam::bokeh::Settings;
+use bokehcam::frame::ColorImage;
+use bokehcam::names::named;
+use bokehcam::pipeline::View;
+
+named! {
+    /// What of a frame is shown.
+    pub enum Shown default Picture {
+        /// The picture
+        Picture = "picture",
+        /// Its depth, in colours
+        Depth = "depth",
+        /// Its circle of confusion
+        Coc = "coc",
+        /// The bins that it is split into
+        Bins = "bins",
+    }
+}
+
+/// What the colours of a view mean.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Legend {
+    /// Depth: [`perceptual`] colours, linear in dioptres, light is near.
+    Depth {
+        /// Distance of the lightest colour, in metres; nearer is no lighter.
+        near_m: f32,
+        /// Distance of the darkest colour, in metres.
+        far_m: f32,
+    },
+    /// Circle of confusion: [`diverging`] colours, hatched in front.
+    Coc {
+        /// Radius of the darkest colours, in front and behind, in pixels.
+        most_px: f32,
+    },
+    /// Bins, front to back, by [`BIN_COLORS`].
+    Bins {
+        /// How many there are.
+        count: usize,
+        /// Signed CoC at which each ends, in pixels; infinite for the last.
+        high_px: [f32; MOST_BINS],
+    },
+}
+
+/// Draws views. Keeps their memory, and the range of the depth colours, which is eased from frame to frame.
+#[derive(Default)]
+pub struct Views {
+    image: ColorImage,
+    legend: Option<Legend>,
+    depth: depth::Range,
+    /// The depth map's column for each column of the picture.
+    columns: Vec<u32>,
+    bins: bins::Bins,
+}
+
+impl Views {
+    /// Draws the view `shown` of this frame, as large as its picture; `None` for the picture itself and for what the
+    /// frame lacks. `settings` are those that it was blurred with. Allocates only for another size or other bins.
+    pub fn draw(&mut self, shown: Shown, view: &View, settings: Option<&Settings>) -> Option<&ColorImage> {
+        self.legend = None;
+        let size = view.picture.size();
+        let depth = view.depth.as_deref();
+        let field = sample::Field::new(&view.coc, depth, size, &mut self.columns);
+        let (image, columns) = (&mut self.image, &self.columns[..]);
+        image.resize(size.0, size.1);
+        self.legend = match shown {
+            Shown::Picture => None,
+            Shown::Depth => depth.map(|depth| depth::draw(depth, columns, &mut self.depth, image)),
+            Shown::Coc => field.map(|field| radius::draw(&field, columns, settings, image)),
+            Shown::Bins => {
+                let level = view.trace.quality;
+                let plan = settings.map(|settings| self.bins.split(settings, size, level, depth, &view.coc));
+                field.zip(plan).map(|(field, plan)| bins::draw(&field, columns, plan, image))
+            }
+        };
+        self.legend.map(|_| &self.image)
+    }
+
+    /// The view that was drawn last.
+    pub fn image(&self) -> &ColorImage {
+        &self.image
+    }
+
+    /// What the colours of the view that was drawn last mean.
+    pub fn legend(&self) -> Option<Legend> {
+        self.legend
+    }
+}

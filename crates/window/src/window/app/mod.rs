@@ -1,0 +1,312 @@
+//! The window's events.
+
+mod calls;
+mod control;
+mod drop;
+mod hold;
+mod receive;
+mod seek;
+mod show;
+
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use winit::application::ApplicationHandler;
+use winit::event::{TouchPhase, WindowEvent};
+use winit::event_loop::{ActiveEventLoop, ControlFlow, EventLoopProxy};
+use winit::window::WindowId;
+
+use super::gfx::Gfx;
+use super::memory::Memory;
+use super::{Call, Ended, Preview, WindowError};
+use bokehcam::bokeh;
+use bokehcam::clock::Clock;
+use bokehcam::compute::device::Device;
+use bokehcam::depth::plate::Guide;
+use bokehcam::frame::ColorImage;
+use bokehcam::link::Receiver;
+use bokehcam::link::demand::{Demand, Watch};
+use bokehcam::pipeline::{View, Wanted};
+use crate::meters::Totals;
+use crate::panel::{Panel, SystemFonts};
+use crate::session::{Closed, Session, Wake};
+use crate::state::{Action, Shown, Source, State, fitted};
+use crate::views::Views;
+use bokehcam::stats::WindowUse;
+
+/// While frames come, instruments are laid out anew this often.
+const INSTRUMENTS_PERIOD: Duration = Duration::from_millis(200);
+/// The stop flag is polled at least this often.
+const STOP_POLL: Duration = Duration::from_millis(250);
+
+pub(super) struct App {
+    state: State,
+    wanted: Arc<Wanted>,
+    /// Whether a snapshot waits for the next frame that can be saved.
+    snapshot_due: bool,
+    panel: Panel,
+    ctx: egui::Context,
+    fonts: SystemFonts,
+    proxy: EventLoopProxy<Call>,
+    gfx: Option<Gfx>,
+    device: Option<Arc<Device>>,
+    session: Session,
+    /// Whether a wake-up is already on its way, so that a busy session does not fill the event queue.
+    wake_pending: Arc<AtomicBool>,
+    frames: Option<Receiver<View>>,
+    /// How far the plate is, where that makes the depth.
+    guide: Option<Arc<Guide>>,
+    seeking: seek::Seeking,
+    view: Option<View>,
+    /// Whether `view` was not on the screen yet.
+    view_is_new: bool,
+    false_colors: Views,
+    /// The view that `false_colors` drew last, if the frame is still the same.
+    drawn: Option<Shown>,
+    /// The number of the frame that the session blurs anew, and of all of them so far.
+    held: Option<u64>,
+    holds: u64,
+    /// While it is held, the source does not rest.
+    watch: Option<Watch>,
+    demand: Demand,
+    /// What frames are blurred with, once the present look has reached them.
+    settings: Option<bokeh::Settings>,
+    blank: ColorImage,
+    /// What others see while it is off.
+    card: ColorImage,
+    clock: Clock,
+    /// When the last frame came, or its source was opened.
+    heard_at: Instant,
+    /// When controls are to be laid out next, and when they were last.
+    layout_at: Option<Instant>,
+    laid_out: Instant,
+    /// The oldest input whose effect is not on the screen yet.
+    input_at: Option<Instant>,
+    /// Whether something was dropped on the window just now: files of one drop come one after the other.
+    has_dropped: bool,
+    /// Whether the window is hidden completely, and whether it has no pixels.
+    covered: bool,
+    /// Since when nobody can see it.
+    hidden_at: Option<Instant>,
+    empty: bool,
+    /// What is remembered of the window, and where.
+    memory: Memory,
+    memory_file: Option<PathBuf>,
+    close_at_end: bool,
+    /// Those who ask from outside, if they can.
+    controlled: Option<control::Controlled>,
+    /// Whether outputs have the still card: for who hands pictures to them.
+    off: Arc<AtomicBool>,
+    stop: Arc<AtomicBool>,
+    failed: Option<WindowError>,
+}
+
+impl App {
+    /// Starts the session at once, so that the source opens while the window does.
+    pub fn new(preview: Preview, proxy: EventLoopProxy<Call>) -> Result<Self, WindowError> {
+        let Preview { mut state, session, theme, device, close_at_end, memory, memory_file, control, stop } = preview;
+        let wake_pending = Arc::new(AtomicBool::new(false));
+        let pending = Arc::clone(&wake_pending);
+        // An event loop that is gone needs no waking.
+        let to_wake = proxy.clone();
+        let wake: Wake = Arc::new(move || {
+            if !pending.swap(true, Ordering::AcqRel) {
+                let _ = to_wake.send_event(Call::Session);
+            }
+        });
+        let control = control.inspect_err(|why| tracing::warn!("{why}")).ok();
+        let controlled =
+            control.map(|control| control::Controlled::begin(control, Arc::clone(&session.release), &proxy));
+        let controlled = controlled.transpose()?;
+        let off = Arc::clone(&session.off);
+        let (wanted, demand) = (Arc::clone(&session.wanted), session.demand.clone());
+        let clock = Clock::system();
+        state.meters.begin(clock.now_ns());
+        let ctx = egui::Context::default();
+        let fonts = calls::follow(&ctx, theme, &proxy);
+        Ok(Self {
+            state,
+            wanted,
+            snapshot_due: false,
+            panel: Panel::default(),
+            ctx,
+            fonts,
+            proxy,
+            gfx: None,
+            device,
+            session: Session::begin(session, wake)?,
+            wake_pending,
+            frames: None,
+            guide: None,
+            seeking: seek::Seeking::default(),
+            view: None,
+            view_is_new: false,
+            false_colors: Views::default(),
+            drawn: None,
+            held: None,
+            holds: 0,
+            watch: Some(demand.watch()),
+            demand,
+            settings: None,
+            blank: ColorImage::new(16, 9),
+            card: ColorImage::new(0, 0),
+            clock,
+            heard_at: Instant::now(),
+            layout_at: Some(Instant::now()),
+            laid_out: Instant::now(),
+            input_at: None,
+            has_dropped: false,
+            covered: false,
+            hidden_at: None,
+            empty: false,
+            memory,
+            memory_file,
+            close_at_end,
+            controlled,
+            off,
+            stop,
+            failed: None,
+        })
+    }
+
+    /// Closes the window, then the session, and adds what was shown to the report.
+    pub fn end(self) -> Result<Ended, WindowError> {
+        let Self { gfx, view, frames, session, state, failed, controlled, .. } = self;
+        // Nobody can ask any more.
+        drop(controlled);
+        // The window goes at once; outputs may take a while to be completed.
+        drop((gfx, view));
+        let Closed { mut report, failed: unwritten } = session.close();
+        // Only now: without a receiver, the last frames would be counted neither as delivered nor as dropped.
+        drop(frames);
+        if let Some(report) = &mut report {
+            report.window = Some(window_use(&state));
+        }
+        let lost = match state.source {
+            Source::Lost(why) => Some(why),
+            _ => None,
+        };
+        failed.map_or(Ok(Ended { report, lost, unwritten }), Err)
+    }
+
+    fn set_title(&self) {
+        if let (Some(gfx), Source::Running(_)) = (&self.gfx, &self.state.source) {
+            gfx.window.set_title(&format!("{} - bokehcam", self.state.title()));
+        }
+    }
+
+    fn update_settings(&mut self) {
+        self.settings = match &self.state.source {
+            Source::Running(running) => fitted(&self.state.look, self.state.known()).settings(running.size, true),
+            _ => None,
+        };
+    }
+
+    fn on_input(&mut self) {
+        let now = Instant::now();
+        if !self.is_hidden() {
+            self.input_at.get_or_insert(now);
+        }
+        self.layout_at = Some(now);
+        self.ask_for_redraw();
+    }
+}
+
+fn window_use(state: &State) -> WindowUse {
+    let Totals { presented, first_frame_ns, latency, reaction, present } = &state.meters.totals;
+    WindowUse::new(*presented, *first_frame_ns, [latency, reaction, present])
+}
+
+impl ApplicationHandler<Call> for App {
+    fn resumed(&mut self, events: &ActiveEventLoop) {
+        if self.gfx.is_some() {
+            return;
+        }
+        match Gfx::open(events, &self.ctx, self.memory.size, self.state.full_screen, self.device.clone()) {
+            Ok(mut gfx) => {
+                gfx.input.init_accesskit(events, &gfx.window, self.proxy.clone());
+                self.gfx = Some(gfx);
+                self.update_wanted();
+            }
+            Err(error) => {
+                self.failed = Some(error);
+                return events.exit();
+            }
+        }
+        self.receive(events);
+        self.ask_for_redraw();
+    }
+
+    fn user_event(&mut self, events: &ActiveEventLoop, call: Call) {
+        self.answer(call, events);
+    }
+
+    fn window_event(&mut self, events: &ActiveEventLoop, _: WindowId, event: WindowEvent) {
+        let Some(gfx) = &mut self.gfx else { return };
+        match &event {
+            WindowEvent::RedrawRequested => {
+                let due = self.state.instruments && self.view_is_new && self.laid_out.elapsed() >= INSTRUMENTS_PERIOD;
+                if due || self.layout_at.is_some_and(|at| at <= Instant::now()) {
+                    self.lay_out(events);
+                }
+                return self.draw(events);
+            }
+            WindowEvent::CloseRequested => {
+                self.perform(Action::Close, events);
+                return self.on_input();
+            }
+            WindowEvent::DroppedFile(path) => return self.on_drop(path),
+            WindowEvent::Occluded(hidden) => {
+                self.covered = *hidden;
+                // Waiting while nobody can see the window is no latency.
+                self.input_at = None;
+                return self.ask_for_redraw();
+            }
+            WindowEvent::Resized(size) => {
+                gfx.presenter.resize((size.width, size.height));
+                self.empty = size.width == 0 || size.height == 0;
+                self.memory.size = gfx.size().or(self.memory.size);
+            }
+            _ => {}
+        }
+        if gfx.input.on_window_event(&gfx.window, &event).repaint {
+            self.on_input();
+        }
+        // egui takes a press to be where the pointer is when controls are laid out: before it moves on.
+        let is_press = match &event {
+            WindowEvent::Touch(touch) => touch.phase != TouchPhase::Moved,
+            other => matches!(other, WindowEvent::MouseInput { .. }),
+        };
+        if is_press {
+            self.lay_out(events);
+        }
+    }
+
+    fn about_to_wait(&mut self, events: &ActiveEventLoop) {
+        self.has_dropped = false;
+        if self.stop.load(Ordering::Relaxed) {
+            return events.exit();
+        }
+        self.watch();
+        self.check_silence();
+        let now = Instant::now();
+        if self.layout_at.is_some_and(|at| at <= now) {
+            self.ask_for_redraw();
+        }
+        // A layout that is due needs no timer: it waits for its redraw, which the display may hold back.
+        let layout_at = self.layout_at.filter(|at| !self.is_hidden() && *at > now);
+        let layout_at = layout_at.map_or(now + STOP_POLL, |at| at.min(now + STOP_POLL));
+        events.set_control_flow(ControlFlow::WaitUntil(layout_at));
+    }
+
+    fn exiting(&mut self, _: &ActiveEventLoop) {
+        let Some(path) = &self.memory_file else { return };
+        self.memory.size = self.gfx.as_ref().and_then(Gfx::size).or(self.memory.size);
+        self.memory.habits = self.state.habits.clone();
+        self.memory.set_source(&self.state.source_name);
+        self.memory.set_look(&self.own_look());
+        self.memory.write(path);
+    }
+}

@@ -1,0 +1,207 @@
+//! Drawing the window: the controls are laid out, what the person did with them is carried out, and the frame is shown.
+
+use std::time::{Duration, Instant};
+
+use winit::event_loop::ActiveEventLoop;
+use winit::window::Fullscreen;
+
+use super::{App, control};
+use bokehcam::compute::Place;
+use bokehcam::frame::ColorImage;
+use bokehcam::pipeline::Trace;
+use crate::panel::{self, Canvas};
+use crate::present::{Area, Controls, Drawing, Image};
+use crate::session::Still;
+use crate::state::{Action, Request, Source, State};
+use crate::views::Probe;
+use bokehcam::sink::card;
+
+/// Shown when there is nothing to save.
+const NO_PICTURE: &str = "There is no picture to save.";
+
+/// Shown when another presenter took over.
+const GPU_FAILED: &str = "The GPU failed: the CPU takes over, more slowly.";
+
+/// The picture's size until the source tells it.
+const USUAL_SIZE: (u32, u32) = (1280, 720);
+
+impl App {
+    pub(super) fn ask_for_redraw(&self) {
+        if let Some(gfx) = self.gfx.as_ref().filter(|_| !self.is_hidden()) {
+            gfx.window.request_redraw();
+        }
+    }
+
+    pub(super) fn is_hidden(&self) -> bool {
+        self.covered || self.empty
+    }
+
+    pub(super) fn picture_size(&self) -> (u32, u32) {
+        match (&self.view, &self.state.source) {
+            (Some(view), _) => view.picture.size(),
+            (None, Source::Running(running)) => running.size,
+            (None, _) => USUAL_SIZE,
+        }
+    }
+
+    /// Lays out the controls and carries out what the person did with them.
+    pub(super) fn lay_out(&mut self, events: &ActiveEventLoop) {
+        let size = self.picture_size();
+        let Some(gfx) = &mut self.gfx else { return };
+        let room = panel::room_px(&self.ctx);
+        let (area, part) = gfx.area(size, room, self.state.zoom, self.state.mirror);
+        let canvas = Canvas { area, size, part };
+        let input = gfx.input.take_egui_input(&gfx.window);
+        let mut actions = Vec::new();
+        let (controls, state) = (&mut self.panel, &self.state);
+        let output = self.ctx.run_ui(input, |ui| controls.show(ui, state, canvas, &mut actions));
+        gfx.input.handle_platform_output(&gfx.window, output.platform_output);
+        let primitives = self.ctx.tessellate(output.shapes, output.pixels_per_point);
+        let pixels_per_point = output.pixels_per_point;
+        gfx.presenter.set_controls(Controls { primitives, textures: output.textures_delta, pixels_per_point });
+        self.laid_out = Instant::now();
+        let wait = output.viewport_output.get(&egui::ViewportId::ROOT).map_or(Duration::MAX, |root| root.repaint_delay);
+        self.layout_at = self.laid_out.checked_add(wait);
+        let probe = self.panel.probed.and_then(|at| Some(Probe::of(self.view.as_ref()?, at)));
+        if std::mem::replace(&mut self.state.probe, probe) != probe {
+            self.layout_at = Some(self.laid_out);
+            gfx.window.request_redraw();
+        }
+        // The picture makes room for the panel, and what is drawn over the picture goes along.
+        if panel::room_px(&self.ctx) != room {
+            self.layout_at = Some(self.laid_out);
+            gfx.window.request_redraw();
+        }
+        if !actions.is_empty() {
+            // Another layout right away shows what they changed.
+            self.layout_at = Some(self.laid_out);
+            actions.into_iter().for_each(|action| self.perform(action, events));
+            self.ask_for_redraw();
+        }
+    }
+
+    /// Applies an action to the state; what this thread cannot do itself goes to the session.
+    pub(super) fn perform(&mut self, action: Action, events: &ActiveEventLoop) {
+        for request in self.state.apply(action) {
+            match request {
+                Request::Snapshot => self.snapshot(),
+                Request::CopyCommand => self.session.copy(self.state.switches()),
+                Request::FullScreen(on) => {
+                    if let Some(gfx) = &self.gfx {
+                        gfx.window.set_fullscreen(on.then_some(Fullscreen::Borderless(None)));
+                    }
+                }
+                Request::Seek(place) => self.seek(place),
+                Request::Off(off) => self.switch_off(off),
+                Request::Close => events.exit(),
+                Request::Look(look) => {
+                    // Before the look, so that nobody tries it on a photo's picture without depth.
+                    self.state.settled &= !self.view.as_ref().is_some_and(|view| self.lacks_depth(view, &look));
+                    self.hold();
+                    self.session.order(Request::Look(look));
+                    self.update_settings();
+                }
+                other => self.session.order(other),
+            }
+        }
+        self.update_wanted();
+        self.hold();
+        self.watch();
+    }
+
+    /// Tells the pipeline where pictures are needed from now on. They are read back from the GPU only where something
+    /// other than drawing uses them.
+    pub(super) fn update_wanted(&self) {
+        let drawn_on_gpu = self.gfx.as_ref().is_some_and(|gfx| gfx.presenter.has_device());
+        let used_in_memory =
+            self.state.frozen || self.state.is_photo() || self.snapshot_due || !self.state.outputs.is_empty();
+        self.wanted.set(match (drawn_on_gpu, used_in_memory) {
+            (false, _) => Place::Memory,
+            (true, false) => Place::Device,
+            (true, true) => Place::Both,
+        });
+        // What one looks at for long, or keeps, has depth of its own.
+        self.wanted.want_own_depth(self.snapshot_due || self.state.frozen);
+    }
+
+    /// Saves the frame that is shown. If it is only on the GPU, was blurred between two looks so that no settings could repeat
+    /// it, or has the depth of an earlier frame, the next frame that has none of that is saved instead.
+    pub(super) fn snapshot(&mut self) {
+        let Some(view) = &self.view else { return self.state.note(NO_PICTURE) };
+        let is_running = matches!(self.state.source, Source::Running(_));
+        if view.picture.memory().is_none() && !is_running {
+            return self.state.note(NO_PICTURE);
+        }
+        let Trace { between, depth_held, .. } = view.trace;
+        let is_frozen = self.state.keeps_picture() && view.picture.memory().is_some();
+        self.snapshot_due = view.picture.memory().is_none() || is_running && (between || depth_held && !is_frozen);
+        self.update_wanted();
+        let Some(picture) = view.picture.memory().filter(|_| !self.snapshot_due) else { return };
+        self.session.save(Still {
+            picture: picture.clone(),
+            color: view.color.as_deref().unwrap_or(picture).clone(),
+            depth: view.depth.as_ref().map(|depth| (**depth).clone()),
+            coc: view.coc,
+            change: view.trace.change,
+            quality: view.trace.quality,
+            with_sources: self.state.habits.keep_sources,
+            order: self.controlled.as_mut().and_then(control::Controlled::take_order),
+        });
+    }
+
+    /// Shows the frame, or the view of it that is chosen, under the controls as they were laid out last.
+    pub(super) fn draw(&mut self, events: &ActiveEventLoop) {
+        let size = self.picture_size();
+        let hidden = self.is_hidden();
+        let Some(gfx) = self.gfx.as_mut().filter(|_| !hidden) else { return };
+        let shown = self.state.shown;
+        if let Some(view) = self.view.as_ref().filter(|_| self.view_is_new || self.drawn != Some(shown)) {
+            self.false_colors.draw(shown, view, self.settings.as_ref());
+            self.drawn = Some(shown);
+            self.state.legend = self.false_colors.legend();
+        }
+        let false_colors = self.state.legend.map(|_| self.false_colors.image());
+        let State { mirror, split, source, .. } = &self.state;
+        let view = self.view.as_ref();
+        // Off, the person sees what others see.
+        if self.state.off && self.card.size() != size {
+            self.card = ColorImage::new(size.0, size.1);
+            card::draw(&mut self.card);
+        }
+        let none = if self.state.off { &self.card } else { &self.blank };
+        let in_memory = view.and_then(|view| view.picture.memory()).unwrap_or(none);
+        let on_device = view.and_then(|view| view.picture.device()).filter(|there| gfx.presenter.takes(there));
+        let picture = on_device.map_or(Image::Memory(in_memory), Image::Device);
+        // Where nothing was blurred, before and after are the same.
+        let before = view.map(|view| view.color.as_deref().unwrap_or(in_memory));
+        let background = if self.ctx.theme() == egui::Theme::Dark { [18, 18, 20] } else { [232, 232, 236] };
+        let (area, part) = gfx.area(size, panel::room_px(&self.ctx), self.state.zoom, *mirror);
+        let drawing = Drawing {
+            area: if self.view.is_some() || self.state.off { area } else { Area::default() },
+            part,
+            picture: false_colors.map_or(picture, Image::Memory),
+            before: before.zip(*split),
+            mirror: *mirror,
+            stale: self.state.silent_s.is_some() || !matches!(source, Source::Running(_) | Source::Opening),
+            background,
+        };
+        let began_ns = self.clock.now_ns();
+        let drawn_on_gpu = gfx.presenter.has_device();
+        if let Err(error) = gfx.presenter.present(&drawing) {
+            self.failed = Some(error.into());
+            return events.exit();
+        }
+        if drawn_on_gpu && !gfx.presenter.has_device() {
+            self.update_wanted();
+            self.state.note(GPU_FAILED);
+        }
+        let now_ns = self.clock.now_ns();
+        // A frame counts once, however often it is drawn.
+        if let Some(view) = self.view.as_ref().filter(|_| std::mem::take(&mut self.view_is_new)) {
+            self.state.meters.presented(view, now_ns, now_ns - began_ns);
+        }
+        if let Some(input_at) = self.input_at.take() {
+            self.state.meters.reacted(input_at.elapsed().as_nanos() as u64);
+        }
+    }
+}

@@ -1,0 +1,146 @@
+//! What is remembered from one preview to the next: how large the window was, and how the person had it.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::Path;
+use std::str::FromStr;
+
+use serde::{Deserialize, Serialize};
+
+use bokehcam::files::{input, whole};
+use bokehcam::look::{Look, Patch};
+use crate::state::Habits;
+use bokehcam::recording::RecordingError;
+use bokehcam::source::SourceName;
+
+/// What a preview ended with.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, rename_all = "kebab-case")]
+pub struct Memory {
+    /// What the source is called on the command line.
+    pub source: Option<String>,
+    /// How the person had the window.
+    pub habits: Habits,
+    /// The settings of the look, by name.
+    pub look: BTreeMap<String, String>,
+    /// The window's size, if it is known.
+    pub size: Option<Size>,
+}
+
+/// A window's size in points.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Size {
+    /// Columns.
+    pub width: f64,
+    /// Rows.
+    pub height: f64,
+    /// Whether it filled the screen beside the desktop's bars.
+    #[serde(default)]
+    pub maximized: bool,
+}
+
+/// A side beyond these is taken for a mistake.
+const LEAST: f64 = 200.0;
+const MOST: f64 = 16_384.0;
+
+impl Memory {
+    /// What the file remembers; `None` if it is missing or not sensible, without an error, as it is no setting.
+    pub fn read(path: &Path) -> Option<Self> {
+        let memory: Self = toml::from_str(&input::read_text(path, input::MOST_SETTINGS_BYTES).ok()?).ok()?;
+        let sides = LEAST..=MOST;
+        let size = memory.size.filter(|size| sides.contains(&size.width) && sides.contains(&size.height));
+        Some(Self { size, habits: memory.habits.checked(), ..memory })
+    }
+
+    /// The source, if it is still there.
+    pub fn source(&self) -> Option<String> {
+        let is_there = |name: &&String| {
+            SourceName::from_str(name).is_ok_and(|name| name.devices().iter().all(|node| node.exists()))
+        };
+        self.source.as_ref().filter(is_there).cloned()
+    }
+
+    /// Remembers a source, by a name that holds wherever the next preview is started.
+    pub fn set_source(&mut self, name: &str) {
+        self.source = Some(anywhere(name)).filter(|name| !name.is_empty());
+    }
+
+    /// The look, without pictures that cannot be read any more, of which `gone` is told; `None` where none is remembered, or
+    /// one that cannot be any more.
+    pub fn look(&self, mut gone: impl FnMut(String)) -> Option<Look> {
+        let settings = self.look.iter().map(|(name, value)| (name.as_str(), value.as_str()));
+        let mut patch = Patch::parse(settings).ok().filter(|_| !self.look.is_empty())?;
+        let mut is_gone = |read: Result<(), RecordingError>| read.map_err(|error| gone(error.to_string())).is_err();
+        patch.behind = patch.behind.filter(|name| !is_gone(name.load().map(drop)));
+        patch.aperture = patch.aperture.filter(|name| !is_gone(name.load().map(drop)));
+        patch.on(&Look::default()).ok()
+    }
+
+    /// Remembers a look.
+    pub fn set_look(&mut self, look: &Look) {
+        let kept = |value: String| match value.strip_prefix("image:") {
+            Some(file) => format!("image:{}", anywhere(file)),
+            None => value,
+        };
+        let values = Patch::of(look).values().into_iter();
+        self.look = values.map(|(name, value)| (name.to_owned(), kept(value))).collect();
+    }
+
+    /// Writes the file, whole or not at all. If that fails, the next window is as if it were the first.
+    pub fn write(&self, path: &Path) {
+        let Ok(text) = toml::to_string(self) else { return };
+        let folder = path.parent().map_or(Ok(()), fs::create_dir_all);
+        let written = folder.and_then(|()| whole::write(path, text.as_bytes(), true));
+        if let Err(error) = written {
+            tracing::info!("the window is not remembered: {}: {error}", path.display());
+        }
+    }
+}
+
+/// A name that holds wherever the next preview is started: of a file or folder that is here, its whole path.
+fn anywhere(name: &str) -> String {
+    let is_here = Path::new(name).is_relative() && Path::new(name).exists();
+    let absolute = std::path::absolute(name).ok().filter(|_| is_here);
+    absolute.map_or_else(|| name.to_owned(), |path| path.display().to_string())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_written_is_read_and_nonsense_is_nothing() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("deep/window.toml");
+        assert_eq!(Memory::read(&path), None);
+        let look = Look { rim: 0.3, highlights: 4.0, ..Look::default() };
+        let mut habits = Habits { text_scale: 1.5, single_keys: false, ..Habits::default() };
+        habits.sections.insert("For experts".into(), true);
+        let size = Some(Size { width: 1280.0, height: 720.5, maximized: true });
+        let mut memory = Memory { source: Some("0".into()), habits, size, ..Memory::default() };
+        let never = |line: String| panic!("{line}");
+        assert_eq!(memory.look(never), None);
+        memory.set_look(&look);
+        memory.write(&path);
+        let read = Memory::read(&path).unwrap();
+        assert_eq!((read.look(never), &read), (Some(look.clone()), &memory));
+        for text in ["width", "[size]\nwidth = 3\n", "[habits]\ntext-scale = \"big\"\n"] {
+            fs::write(&path, text).unwrap();
+            assert_eq!(Memory::read(&path), None, "{text}");
+        }
+        // What cannot be is left out, and the rest holds.
+        fs::write(
+            &path,
+            "source = \"1\"\n[habits]\ntext-scale = 1e9\n[size]\nwidth = nan\nheight = 7\n[look]\nrim = \"9\"\n",
+        )
+        .unwrap();
+        let read = Memory::read(&path).unwrap();
+        assert_eq!((read.source.as_deref(), read.size, read.look(never)), (Some("1"), None, None));
+        assert_eq!(read.habits.text_scale, 3.0);
+        assert_eq!(fs::read_dir(path.parent().unwrap()).unwrap().count(), 1, "nothing is left beside it");
+        memory.look.insert("behind".into(), "image:/no/such/wall.jpg".into());
+        let mut gone = Vec::new();
+        assert_eq!(memory.look(|line| gone.push(line)), Some(look), "without the picture that is gone");
+        assert!(gone.len() == 1 && gone[0].contains("/no/such/wall.jpg"), "{gone:?}");
+    }
+}
