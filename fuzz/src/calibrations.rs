@@ -1,8 +1,8 @@
 //! Calibrations of two cameras, and of a depth camera beside a colour camera.
 
 use bokehcam::calibration::{self, rectifier::Rectifier};
-use bokehcam::cli::parsers;
 use bokehcam::frame::{ColorImage, DepthMap, GrayImage};
+use bokehcam_cli::parsers;
 
 use super::input::{assert_one_line, files, place, put};
 

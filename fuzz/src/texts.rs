@@ -3,7 +3,7 @@
 use std::ffi::OsString;
 use std::os::unix::ffi::OsStringExt;
 
-use bokehcam::cli::parsers;
+use bokehcam_cli::parsers;
 
 use super::input::assert_one_line;
 

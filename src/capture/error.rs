@@ -33,7 +33,9 @@ pub enum CaptureError {
     #[error("a synthetic camera cannot make {width} x {height} pixels at {fps} frames per second")]
     Format { width: u32, height: u32, fps: f64 },
     /// The program has no synthetic camera.
-    #[error("synthetic: this program was built without that scene; build it with the feature lab, or take `demo`, a recording of it")]
+    #[error(
+        "synthetic: this program was built without that scene; build it with the feature lab, or take `demo`, a recording of it"
+    )]
     NoSynthetic,
     /// The demonstration, which is in the program, cannot be decoded.
     #[error("demo: it cannot be decoded: {0}")]

@@ -11,10 +11,10 @@ use bokehcam::link::Receiver;
 use bokehcam::link::demand::{Demand, Watch};
 use bokehcam::look::{Look, Strength};
 use bokehcam::pipeline::View;
-use bokehcam::preview::folders::Folders;
-use bokehcam::preview::services::Services;
-use bokehcam::preview::session::{Blurred, Session, SessionEvent, Start};
-use bokehcam::preview::state::Update;
+use bokehcam_window::folders::Folders;
+use bokehcam_window::services::Services;
+use bokehcam_window::session::{Blurred, Session, SessionEvent, Start};
+use bokehcam_window::state::Update;
 
 pub const PATIENCE: Duration = Duration::from_secs(120);
 

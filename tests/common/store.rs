@@ -1,7 +1,7 @@
 //! A settings file that is none.
 
 use bokehcam::look::{Look, presets::Preset};
-use bokehcam::preview::services::{SettingsStore, Switch};
+use bokehcam_window::services::{SettingsStore, Switch};
 
 /// Has no presets, and takes none; a command is its source.
 pub struct NoStore;

@@ -3,16 +3,20 @@
 mod accounting;
 mod changes;
 mod clocked;
+#[path = "../common/mod.rs"]
+mod common;
 mod fakes;
 mod fallback;
 mod faults;
 mod frames;
+mod handover;
 mod live;
 #[path = "../common/planes.rs"]
 mod planes;
 mod replay;
 mod seek;
 mod setup;
+mod staging;
 mod stepper;
 mod stereo;
 mod yuyv;

@@ -7,7 +7,7 @@ use std::sync::atomic::AtomicBool;
 
 use bokehcam::capture::demo::{self, Demo};
 use bokehcam::capture::replay::{Part, Replay};
-use bokehcam::capture::synthetic::{Format, Synthetic};
+use bokehcam::capture::synthetic::Format;
 use bokehcam::capture::{Brings, Camera, CaptureError, Captured, Shot};
 use bokehcam::depth::beside::Beside;
 use bokehcam::depth::recorded::Recorded;
@@ -16,8 +16,9 @@ use bokehcam::frame::{ColorImage, DepthMap, GrayImage, Stamp};
 use bokehcam::pipeline::{Pace, Run, run};
 use bokehcam::recording::tum::{Writer, WriterOptions};
 use bokehcam::recording::{Options, Recording};
-use bokehcam::scene::{Scene, View};
 use bokehcam::sink::{Sink, Target};
+use bokehcam_lab::scene::{Scene, View};
+use bokehcam_lab::synthetic::Synthetic;
 
 use crate::fakes::*;
 use crate::setup::*;

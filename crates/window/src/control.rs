@@ -6,9 +6,9 @@ use std::sync::{Arc, PoisonError};
 use std::time::Duration;
 
 use super::session::CurrentRelease;
+use crate::state::{Running, Way};
 use bokehcam::control::{Answer, Claim, Request, Server, Status};
 use bokehcam::look::{Look, Patch};
-use crate::state::{Running, Way};
 
 /// How long the window, and who saves pictures, may take to answer.
 const PATIENCE: Duration = Duration::from_secs(3);

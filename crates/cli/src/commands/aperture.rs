@@ -6,11 +6,11 @@ use std::path::{Path, PathBuf};
 use clap::{Args, value_parser};
 use serde::Serialize;
 
-use bokehcam::bokeh::aperture::Aperture;
 use crate::error::CliError;
 use crate::files::{refuse_overwrite, refuse_source, write_whole};
 use crate::options::{Global, Output};
 use crate::terminal;
+use bokehcam::bokeh::aperture::Aperture;
 use bokehcam::look::ApertureName;
 use bokehcam::look::number::within;
 use bokehcam::recording::still::write_color;

@@ -9,14 +9,14 @@ use std::time::{Duration, Instant};
 use clap::{Args, value_parser};
 use serde::Serialize;
 
-use bokehcam::bokeh::{Bokeh, BokehError, Job, PassTimes};
-use bokehcam::budget::Quality;
 use crate::error::CliError;
 use crate::options;
 use crate::settings::layers::Given;
 use crate::settings::look;
 use crate::settings::unused;
 use crate::terminal::{Progress, print};
+use bokehcam::bokeh::{Bokeh, BokehError, Job, PassTimes};
+use bokehcam::budget::Quality;
 use bokehcam::compute::Backend;
 use bokehcam::computing::Computing;
 use bokehcam::frame::{ColorImage, DepthMap};

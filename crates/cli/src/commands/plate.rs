@@ -6,7 +6,6 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use clap::Args;
 
-use bokehcam::capture::{Camera, Captured, Shot};
 use crate::error::CliError;
 use crate::files::{make_folder_of, refuse_overwrite, refuse_source, tell_of_leftovers};
 use crate::log;
@@ -14,6 +13,7 @@ use crate::options;
 use crate::settings::layers::Given;
 use crate::settings::unused;
 use crate::terminal::{self, Guidance};
+use bokehcam::capture::{Camera, Captured, Shot};
 use bokehcam::depth::plate::{Capture, Step, Taken};
 use bokehcam::depth::{DepthSource, Seen};
 use bokehcam::frame::{ColorImage, DepthMap, GrayImage, Stamp};

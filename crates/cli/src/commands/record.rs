@@ -5,13 +5,13 @@ use std::sync::atomic::Ordering;
 
 use clap::Args;
 
-use bokehcam::capture::{Brings, Captured, Shot};
 use crate::error::CliError;
 use crate::files::refuse_source;
 use crate::options;
 use crate::settings::layers::Given;
 use crate::settings::unused;
 use crate::terminal;
+use bokehcam::capture::{Brings, Captured, Shot};
 use bokehcam::depth::Seen;
 use bokehcam::frame::{ColorImage, DepthMap, GrayImage};
 use bokehcam::look::Effect;

@@ -18,18 +18,23 @@ pub struct Analysis {
     pub kernel: Vec<f64>,
     /// The largest tap: what the errors are relative to.
     pub plateau: f64,
+    /// One for each rank that was asked for.
     pub approximations: Vec<Approximation>,
     /// `sqrt(sum_{i>r} sigma_i^2 / sum sigma_i^2)` for r = 1, 2, ...
     pub truncation_errors: Vec<f64>,
+    /// Singular values, the largest first.
     pub sigma: Vec<f64>,
+    /// Singular values that are more than rounding.
     pub numerical_rank: usize,
 }
 
 /// A kernel from its first terms, scaled to unit sum again.
 pub struct Approximation {
+    /// Terms of the sum.
     pub rank: usize,
     /// `size * size` taps, row-major, their sum 1.
     pub taps: Vec<f64>,
+    /// How far it is from the kernel.
     pub errors: RankErrors,
 }
 

@@ -5,10 +5,10 @@ use egui::{Id, Rect, Response, Role, Sense, Ui, WidgetInfo};
 use super::marks::{self, Tilting};
 use super::place::{Place, fit};
 use super::state::{Action, Shown, State, tweak};
+use crate::texts::tr;
 use bokehcam::depth::focus::FocusRule;
 use bokehcam::look::Effect;
 use bokehcam::look::Look;
-use crate::texts::tr;
 
 /// How long the ring at a click is shown, in seconds.
 pub const RING_S: f64 = 0.9;

@@ -11,8 +11,8 @@ use super::cards;
 use super::meters::{FRAMES, Summary};
 use super::state::{Source, State};
 use super::theme::{Colors, GAP, PAD, medium, rung};
-use bokehcam::budget::Quality;
 use crate::texts::{tr, tr_with};
+use bokehcam::budget::Quality;
 
 const WIDTH: f32 = 286.0;
 /// Height of the graph.

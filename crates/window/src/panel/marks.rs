@@ -7,9 +7,9 @@ use egui::{Align2, Color32, CornerRadius, FontId, Painter, Pos2, Rect, Shape, St
 use super::place::Place;
 use super::state::tweak::turned;
 use super::theme::{ON_PICTURE, SHADE, medium};
+use crate::texts::tr;
 use bokehcam::frame::crop::Crop;
 use bokehcam::look::Tilt;
-use crate::texts::tr;
 
 /// A mark can be grabbed this near to it, in points.
 const HOLD: f32 = 16.0;

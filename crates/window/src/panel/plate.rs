@@ -7,8 +7,8 @@ use super::dock::room;
 use super::parts::button;
 use super::state::{Action, State};
 use super::theme::medium;
-use bokehcam::depth::plate::Step;
 use crate::texts::tr;
+use bokehcam::depth::plate::Step;
 
 const WIDTH: f32 = 420.0;
 

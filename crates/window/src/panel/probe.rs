@@ -5,9 +5,9 @@ use egui::{Align, Align2, Context, Id, LayerId, Order, Ui, vec2};
 use super::marks::label;
 use super::place::Place;
 use super::state::{Shown, State};
-use bokehcam::frame::DepthMap;
 use crate::texts::{tr, tr_with};
 use crate::views::Probe;
+use bokehcam::frame::DepthMap;
 
 /// While the pointer rests, frames go on: what is said of them is renewed this often, in seconds.
 const PERIOD_S: f32 = 0.2;

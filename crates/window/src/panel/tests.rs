@@ -22,9 +22,9 @@ use egui::{Event, FullOutput, Key, Modifiers, MouseWheelUnit, PointerButton, Pos
 
 use super::super::state::{Action, State, sample};
 use super::{Canvas, Panel};
+use crate::present::Area;
 use bokehcam::depth::focus::FocusRule;
 use bokehcam::look::Look;
-use crate::present::Area;
 
 /// A window of the controls alone.
 struct Window {

@@ -64,8 +64,8 @@ mod tests {
     use egui::{Pos2, Rect, TextureId, TextureOptions};
 
     use super::*;
-    use bokehcam::frame;
     use crate::present::{Area, Image};
+    use bokehcam::frame;
 
     const SIZE: (u32, u32) = (64, 48);
     const PIXELS: usize = (SIZE.0 * SIZE.1) as usize;

@@ -9,12 +9,12 @@ use std::sync::mpsc;
 
 use super::live::Live;
 use super::{Closed, News, Order, SessionEvent, Start, held};
-use bokehcam::link::demand::Watch;
-use bokehcam::look::Look;
-use bokehcam::pipeline::PipelineError;
 use crate::folders;
 use crate::services::Switch;
 use crate::state::{Output, Request, Source, Update, Way};
+use bokehcam::link::demand::Watch;
+use bokehcam::look::Look;
+use bokehcam::pipeline::PipelineError;
 use bokehcam::sink::switch::{Fate, Notice};
 use bokehcam::sink::{self, Target};
 use bokehcam::stats::Report;

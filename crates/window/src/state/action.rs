@@ -3,11 +3,11 @@
 use std::path::PathBuf;
 
 use super::{Camera, Output, Shown, Source, Way};
+use crate::services::Browse;
 use bokehcam::depth::backdrop::Behind;
 use bokehcam::knob::Knob;
 use bokehcam::look::Look;
 use bokehcam::look::presets::Preset;
-use crate::services::Browse;
 use bokehcam::source::devices::Choice;
 
 /// What a person can do. Every control and key is one of these.

@@ -1,8 +1,8 @@
 //! What the window shows, as options of the command line.
 
 use super::{Shown, State};
-use bokehcam::look::Look;
 use crate::services::Switch;
+use bokehcam::look::Look;
 
 impl State {
     /// The options that reproduce the window, besides those of the look; defaults are left out.

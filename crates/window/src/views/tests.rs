@@ -1,4 +1,5 @@
 use super::*;
+use crate::state::sample;
 use bokehcam::bokeh::Picture;
 use bokehcam::bokeh::plan::Plan;
 use bokehcam::budget::Quality;
@@ -6,7 +7,6 @@ use bokehcam::frame::{DepthMap, Stamp};
 use bokehcam::link::pool::Pool;
 use bokehcam::optics::{CocField, DepthCoc, Ramp};
 use bokehcam::pipeline::Trace;
-use crate::state::sample;
 use bokehcam::stats::Frames;
 
 const LENS: DepthCoc = DepthCoc { coc_at_infinity_px: 16.0, focus_m: 2.0, range_m: 0.0, max_coc_px: 43.0 };

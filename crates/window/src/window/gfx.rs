@@ -8,9 +8,9 @@ use winit::window::{Fullscreen, Window};
 
 use super::WindowError;
 use super::memory::Size;
-use bokehcam::compute::device::Device;
 use crate::present::{self, Area, Part, Presenter, enlarged, fitted};
 use crate::state::Zoom;
+use bokehcam::compute::device::Device;
 
 /// The window, egui's input from it, and its presenter.
 pub(super) struct Gfx {

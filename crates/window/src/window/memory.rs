@@ -7,9 +7,9 @@ use std::str::FromStr;
 
 use serde::{Deserialize, Serialize};
 
+use crate::state::Habits;
 use bokehcam::files::{input, whole};
 use bokehcam::look::{Look, Patch};
-use crate::state::Habits;
 use bokehcam::recording::RecordingError;
 use bokehcam::source::SourceName;
 

@@ -5,15 +5,15 @@ use std::fmt::Write;
 use serde::Serialize;
 
 use super::BenchCommand;
-use bokehcam::bokeh::{Bokeh, BokehError, Job};
-use bokehcam::budget::Quality;
-use bokehcam::capture::{Captured, Shot};
 use crate::error::CliError;
 use crate::options;
 use crate::settings::layers::Given;
 use crate::settings::look;
 use crate::settings::unused;
 use crate::terminal::print;
+use bokehcam::bokeh::{Bokeh, BokehError, Job};
+use bokehcam::budget::Quality;
+use bokehcam::capture::{Captured, Shot};
 use bokehcam::clock::{Clock, cpu_ns};
 use bokehcam::compute::{Backend, thread_pool::cores};
 use bokehcam::computing::{Computing, Executors};

@@ -50,7 +50,11 @@ pub fn of(scene: Scene, size: (u32, u32)) -> Result<(ColorImage, DepthMap), CliE
 pub fn of(_: Scene, (width, height): (u32, u32)) -> Result<(ColorImage, DepthMap), CliError> {
     use bokehcam::capture::{Camera, Shot, demo::Demo};
     let (mut of_demo, mut depth_of_demo) = (ColorImage::default(), DepthMap::default());
-    Demo::new(Some(1))?.next(Shot { color: &mut of_demo, depth: &mut depth_of_demo, right: &mut Default::default() })?;
+    Demo::new(Some(1))?.next(Shot {
+        color: &mut of_demo,
+        depth: &mut depth_of_demo,
+        right: &mut Default::default(),
+    })?;
     let (mut color, mut depth) = (ColorImage::new(width, height), DepthMap::new(width, height));
     let from = of_demo.size();
     let pixels = color.rgb.chunks_exact_mut(3).zip(&mut depth.metres);

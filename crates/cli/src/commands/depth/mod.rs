@@ -7,13 +7,13 @@ use std::time::Instant;
 
 use clap::{Args, value_parser};
 
-use bokehcam::calibration::rectifier::Rectifier;
 use crate::error::CliError;
 use crate::files::{make_folder_of, refuse_overwrite, refuse_source, tell_of_leftovers};
 use crate::log;
 use crate::options;
 use crate::plausible;
 use crate::terminal;
+use bokehcam::calibration::rectifier::Rectifier;
 use bokehcam::compute::Backend;
 use bokehcam::computing::Computing;
 use bokehcam::depth::DepthError;

@@ -24,6 +24,8 @@ use bokehcam::control::{Answer, Name, Request};
 use bokehcam::link::demand::Demand;
 use bokehcam::look::{Effect, Look, Patch};
 use bokehcam::pipeline::Pace;
+use bokehcam::sink::Target;
+use bokehcam::source::{self, DepthChoice, DepthFrom, SourceName};
 use bokehcam_window::control::{Control, Wish};
 use bokehcam_window::folders::Folders;
 use bokehcam_window::session::Start;
@@ -31,8 +33,6 @@ use bokehcam_window::state::{Output, Running, State};
 use bokehcam_window::system::System;
 use bokehcam_window::texts;
 use bokehcam_window::window::{self, Memory, Preview};
-use bokehcam::sink::Target;
-use bokehcam::source::{self, DepthChoice, DepthFrom, SourceName};
 
 use store::FileStore;
 

@@ -7,12 +7,12 @@ use std::path::Path;
 use serde::Serialize;
 
 use super::debug_pictures::{coc, grey, light};
+use crate::error::CliError;
+use crate::files::{refuse_overwrite, write_whole};
 use bokehcam::bokeh::cpu::CpuBokeh;
 use bokehcam::bokeh::ladder::Compositing;
 use bokehcam::bokeh::plan::{Bin, Plan};
 use bokehcam::bokeh::{Bokeh, Probe};
-use crate::error::CliError;
-use crate::files::{refuse_overwrite, write_whole};
 use bokehcam::compute::Backend;
 use bokehcam::computing::Computing;
 use bokehcam::frame::{ColorImage, DepthMap};

@@ -7,12 +7,12 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
-use bokehcam::budget::Quality;
 use crate::controlled::{Standing, changed, refused};
 use crate::error::CliError;
 use crate::files::make_folder_of;
 use crate::log;
 use crate::settings::{changes, unused};
+use bokehcam::budget::Quality;
 use bokehcam::clock::Clock;
 use bokehcam::computing::Executors;
 #[cfg(feature = "desktop")]

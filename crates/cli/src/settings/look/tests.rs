@@ -155,8 +155,12 @@ fn looks(picture: &std::path::Path) -> Vec<Look> {
 fn the_flags_of_a_look_give_the_look() {
     let folder = tempfile::tempdir().unwrap();
     let picture = folder.path().join("a cat's, odd: name.png");
-    bokehcam::recording::still::write_color(&picture, &ColorImage { rgb: vec![200; 18], ..ColorImage::new(3, 2) }, false)
-        .unwrap();
+    bokehcam::recording::still::write_color(
+        &picture,
+        &ColorImage { rgb: vec![200; 18], ..ColorImage::new(3, 2) },
+        false,
+    )
+    .unwrap();
     let written = |patch: &Patch| -> Vec<String> {
         patch.values().iter().map(|(name, value)| format!("--{name}={value}")).collect()
     };

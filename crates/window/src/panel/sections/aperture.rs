@@ -6,10 +6,10 @@ use egui::{
 use egui::{Role, WidgetInfo, pos2};
 
 use super::Sheet;
-use bokehcam::bokeh::aperture::{Aperture, Shape};
 use crate::panel::parts::{Group, Hinted, Number, number};
 use crate::panel::theme::Colors;
 use crate::texts::tr;
+use bokehcam::bokeh::aperture::{Aperture, Shape};
 
 /// Pixels along a side of a thumbnail's picture, which is smoothed where it is shown larger.
 const CELLS: usize = 56;

@@ -3,12 +3,12 @@
 use egui::{Role, Ui, WidgetInfo};
 
 use super::Sheet;
-use bokehcam::depth::backdrop::Behind;
-use bokehcam::look::Follow;
 use crate::panel::parts::{Hinted, Number, list, path, remark, switch};
 use crate::services::Browse;
 use crate::state::Action;
 use crate::texts::{tr, tr_with};
+use bokehcam::depth::backdrop::Behind;
+use bokehcam::look::Follow;
 
 #[derive(Clone, Copy, PartialEq)]
 enum Kind {

@@ -3,11 +3,11 @@
 use egui::Ui;
 
 use super::Sheet;
-use bokehcam::look::{MAX_COC_PER_HEIGHT, Strength};
-use bokehcam::optics::Lens;
 use crate::panel::parts::{Number, choose, remark};
 use crate::state::tweak::{F_NUMBERS, LENS, amount, amount_of, f_number_of, lens_of, strength_of};
 use crate::texts::tr_with;
+use bokehcam::look::{MAX_COC_PER_HEIGHT, Strength};
+use bokehcam::optics::Lens;
 
 /// Whether it is by the numbers of a lens.
 const WAYS: [(&str, &str, bool); 2] = [

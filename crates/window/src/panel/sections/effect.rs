@@ -3,9 +3,9 @@
 use egui::Ui;
 
 use super::Sheet;
-use bokehcam::look::{Effect, Tilt};
 use crate::panel::parts::{Number, choose, remark};
 use crate::state::Source;
+use bokehcam::look::{Effect, Tilt};
 
 const EFFECTS: [(&str, &str, Effect); 4] = [
     ("Portrait", "The farther from who is in focus, the more blur", Effect::Auto),

@@ -3,12 +3,12 @@
 use egui::{Align, Button, Layout, Role, Sense, Slider, TextStyle, Ui, Vec2, WidgetInfo, WidgetText, vec2};
 
 use super::{Sheet, backdrop};
-use bokehcam::look::{Effect, MAX_COC_PER_HEIGHT};
 use crate::panel::dock::{CELL, CELL_GAP, CELLS};
 use crate::panel::parts::{Hinted, list, switch};
 use crate::panel::{icons, theme::Colors};
 use crate::state::{Action, tweak};
 use crate::texts::{tr, tr_with};
+use bokehcam::look::{Effect, MAX_COC_PER_HEIGHT};
 
 /// The section that all else is in.
 pub const MORE: &str = "More";

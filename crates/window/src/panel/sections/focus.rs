@@ -3,10 +3,10 @@
 use egui::Ui;
 
 use super::Sheet;
-use bokehcam::depth::focus::FocusRule;
 use crate::panel::parts::{Number, remark};
 use crate::state::tweak::{DISTANCES_M, FOCUS_RANGES_M};
 use crate::texts::tr_with;
+use bokehcam::depth::focus::FocusRule;
 
 /// The rule of focus, its distance, and the focal range.
 pub fn show(ui: &mut Ui, sheet: &mut Sheet) {

@@ -6,12 +6,12 @@ use egui::{
 };
 
 use super::Sheet;
-use bokehcam::look::Effect;
-use bokehcam::look::presets::Preset;
 use crate::panel::parts::{Group, Hinted, button, called, remark};
 use crate::panel::theme::{Colors, medium};
 use crate::state::Action;
 use crate::texts::{tr, tr_with};
+use bokehcam::look::Effect;
+use bokehcam::look::presets::Preset;
 
 /// What is being done with presets.
 #[derive(Debug, Default, PartialEq)]

@@ -3,9 +3,9 @@
 use egui::Ui;
 
 use super::Sheet;
-use bokehcam::budget::Quality;
 use crate::panel::parts::list;
 use crate::texts::tr;
+use bokehcam::budget::Quality;
 
 /// How good it is, and how long that may take.
 pub fn show(ui: &mut Ui, sheet: &mut Sheet) {

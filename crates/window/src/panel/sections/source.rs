@@ -3,11 +3,11 @@
 use egui::Ui;
 
 use super::Sheet;
-use bokehcam::knob::Knob;
 use crate::panel::parts::{Number, choose, list, number, remark, switch};
 use crate::services::Browse;
 use crate::state::{Action, Source, Way};
 use crate::texts::{tr, tr_with};
+use bokehcam::knob::Knob;
 
 /// The ways to depth, with a hint.
 const WAYS: [(&str, &str, Way); 5] = [

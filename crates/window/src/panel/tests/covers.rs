@@ -3,9 +3,9 @@
 use egui::{Event, Key, Modifiers, pos2};
 
 use super::{Action, Window, pressed, sample};
-use bokehcam::depth::plate::Step;
 use crate::keys::GROUPS;
 use crate::state::{Output, Source, State, Way};
+use bokehcam::depth::plate::Step;
 
 fn recording() -> State {
     let mut state = sample::state();

@@ -6,10 +6,10 @@ use egui::accesskit::{Action as Told, Node, NodeId};
 use egui::{Key, Modifiers, Rect, Role, pos2};
 
 use super::{Action, Window, sample};
-use bokehcam::look::Effect;
 use crate::panel::dock::{Dock, room};
 use crate::state::{Output, Source, State, Way};
 use crate::texts;
+use bokehcam::look::Effect;
 
 /// Sizes of windows, and of pictures.
 const WINDOWS: [(u32, u32); 7] =

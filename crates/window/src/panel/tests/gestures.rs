@@ -3,9 +3,9 @@
 use egui::{Event, Modifiers, Pos2, pos2};
 
 use super::{Action, Window, close, last_look, on_panel, point, sample, scrolled};
+use crate::present::Area;
 use bokehcam::depth::focus::FocusRule;
 use bokehcam::look::Effect;
-use crate::present::Area;
 
 #[test]
 fn a_click_focuses_there() {

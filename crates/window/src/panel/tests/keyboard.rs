@@ -5,11 +5,11 @@ use std::collections::HashSet;
 use egui::{Event, Key, Modifiers, pos2};
 
 use super::{Action, Window, on_panel, pressed};
+use crate::keys::GROUPS;
+use crate::state::{Output, Source, Transport};
 use bokehcam::depth::focus::FocusRule;
 use bokehcam::look::Strength;
 use bokehcam::optics::Lens;
-use crate::keys::GROUPS;
-use crate::state::{Output, Source, Transport};
 
 #[test]
 fn every_key_reaches_the_window() {

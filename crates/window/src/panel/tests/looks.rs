@@ -5,14 +5,14 @@ use std::path::Path;
 use egui::{Color32, Event, Key, Modifiers, Theme, pos2};
 
 use super::{Window, button, pressed, scrolled};
-use bokehcam::depth::plate::Step;
-use bokehcam::frame::ColorImage;
-use bokehcam::look::Effect;
 use crate::panel::theme::{Colors, rung};
 use crate::present::soft::Painter;
 use crate::present::{Controls, Drawing, Image};
 use crate::state::{Action, Source, State, Transport, sample};
 use crate::views::Legend;
+use bokehcam::depth::plate::Step;
+use bokehcam::frame::ColorImage;
+use bokehcam::look::Effect;
 use bokehcam::recording::still::{read_color, write_color};
 
 /// The picture as large as the window.

@@ -5,10 +5,10 @@ use std::sync::Arc;
 use egui::{Key, Modifiers, pos2};
 
 use super::{Action, Window, sample};
-use bokehcam::depth::backdrop::{Behind, BehindPicture};
-use bokehcam::frame::ColorImage;
 use crate::services::Browse;
 use crate::state::{Request, Shown, Source, State, Update};
+use bokehcam::depth::backdrop::{Behind, BehindPicture};
+use bokehcam::frame::ColorImage;
 
 #[test]
 fn what_is_needed_first_is_on_top_and_experts_parts_are_folded() {

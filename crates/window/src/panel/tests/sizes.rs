@@ -3,9 +3,9 @@
 use egui::Rect;
 
 use super::{Window, sample};
-use bokehcam::look::Effect;
 use crate::state::{self, Output, Source, State};
 use crate::views::Legend;
+use bokehcam::look::Effect;
 
 fn states() -> Vec<State> {
     let base = sample::state();

@@ -3,13 +3,13 @@
 use std::path::Path;
 
 use super::{Window, sample};
-use bokehcam::depth::backdrop::Behind;
-use bokehcam::depth::plate::Step;
-use bokehcam::look::{Effect, Follow, Strength};
 use crate::keys::GROUPS;
 use crate::state::{Action, Output, Source, State, Transport, Way, tweak};
 use crate::texts::{self, tests as table};
 use crate::views::Legend;
+use bokehcam::depth::backdrop::Behind;
+use bokehcam::depth::plate::Step;
+use bokehcam::look::{Effect, Follow, Strength};
 
 /// Windows that together show about all that can be shown.
 fn windows() -> Vec<Window> {

@@ -5,9 +5,9 @@ use std::sync::Arc;
 use bytemuck::{Pod, Zeroable};
 
 use super::controls::Overlay;
+use crate::present::{Controls, Drawing, Image, Tone};
 use bokehcam::compute::device::{Device, Shader};
 use bokehcam::frame::ColorImage;
-use crate::present::{Controls, Drawing, Image, Tone};
 
 /// The picture in its area, and the background.
 pub const PRESENT: Shader = Shader { name: "present", source: include_str!("present.wgsl") };

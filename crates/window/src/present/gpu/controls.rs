@@ -4,8 +4,8 @@ use egui::TextureId;
 use egui::epaint::ClippedPrimitive;
 use egui_wgpu::{Renderer, RendererOptions, ScreenDescriptor};
 
-use bokehcam::compute::device::Device;
 use crate::present::Controls;
+use bokehcam::compute::device::Device;
 
 /// The controls over a window.
 pub struct Overlay {

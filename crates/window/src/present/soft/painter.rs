@@ -6,9 +6,9 @@ use pulp::Arch;
 
 use super::controls::Overlay;
 use super::picture::{Scaler, Scratch};
+use crate::present::{Area, Controls, Drawing, Image};
 use bokehcam::compute::thread_pool::{self, DisjointParts, ThreadPool};
 use bokehcam::frame::ColorImage;
-use crate::present::{Area, Controls, Drawing, Image};
 
 /// Rows that one thread paints at a time.
 const BAND: usize = 16;

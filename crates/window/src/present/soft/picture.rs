@@ -4,9 +4,9 @@ use std::ops::Range;
 
 use pulp::{Arch, Simd, WithSimd};
 
+use crate::present::{Area, Drawing, Tone};
 use bokehcam::frame::ColorImage;
 use bokehcam::frame::scale::Scale;
-use crate::present::{Area, Drawing, Tone};
 
 /// Paints pictures into an area, scaled where they have another size; keeps the scaling weights from frame to frame.
 #[derive(Debug, Default)]

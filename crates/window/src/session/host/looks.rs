@@ -2,9 +2,9 @@
 
 use super::super::{SessionEvent, Still, held};
 use super::Host;
+use crate::folders;
 use bokehcam::control::Answer;
 use bokehcam::look::{Look, Patch};
-use crate::folders;
 use bokehcam::recording::snapshot::{self, Snapshot};
 use bokehcam::recording::still::write_color;
 

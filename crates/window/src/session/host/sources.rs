@@ -4,11 +4,11 @@ use std::sync::mpsc;
 use std::time::Duration;
 
 use super::Host;
-use bokehcam::files::whole;
-use bokehcam::look::BehindName;
 use crate::services::Browse;
 use crate::session::Order;
 use crate::state::{Request, Update};
+use bokehcam::files::whole;
+use bokehcam::look::BehindName;
 
 /// So often, at most, it is seen which devices there are, and how large a recording is.
 const LOOK_PERIOD: Duration = Duration::from_secs(1);

@@ -7,9 +7,9 @@ use winit::event_loop::{ActiveEventLoop, EventLoopProxy};
 
 use super::App;
 use super::hold::focus_m;
-use bokehcam::pipeline::View;
 use crate::panel::SystemFonts;
 use crate::window::{Call, ThemeChoice, desktop};
+use bokehcam::pipeline::View;
 
 /// Gives the controls their colours and the system's fonts, now and as soon as others are known. An event loop that is
 /// gone need not know them.

@@ -8,13 +8,13 @@ use std::time::Instant;
 use winit::event_loop::{ActiveEventLoop, EventLoopProxy};
 
 use super::App;
-use bokehcam::control::{Answer, Server, Status};
-use bokehcam::look::{Look, Patch};
 use crate::control::{Asked, Control, Judge, Wish};
 use crate::lent::Lent;
 use crate::session::{CurrentRelease, StillOrder};
 use crate::state::{Action, Source, Way};
 use crate::window::Call;
+use bokehcam::control::{Answer, Server, Status};
+use bokehcam::look::{Look, Patch};
 
 /// Listens to those who ask, until it is dropped.
 pub(super) struct Controlled {

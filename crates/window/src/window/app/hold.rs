@@ -3,13 +3,13 @@
 use std::time::{Duration, Instant};
 
 use super::App;
+use crate::session::{Blurred, Held};
+use crate::state::Source;
 use bokehcam::bokeh::Picture;
 use bokehcam::link::pool::Pooled;
 use bokehcam::look::Look;
 use bokehcam::optics::CocField;
 use bokehcam::pipeline::View;
-use crate::session::{Blurred, Held};
-use crate::state::Source;
 
 /// A window that was hidden for less than this is only passed by.
 const REST_AFTER: Duration = Duration::from_secs(2);

@@ -21,6 +21,11 @@ use winit::window::WindowId;
 use super::gfx::Gfx;
 use super::memory::Memory;
 use super::{Call, Ended, Preview, WindowError};
+use crate::meters::Totals;
+use crate::panel::{Panel, SystemFonts};
+use crate::session::{Closed, Session, Wake};
+use crate::state::{Action, Shown, Source, State, fitted};
+use crate::views::Views;
 use bokehcam::bokeh;
 use bokehcam::clock::Clock;
 use bokehcam::compute::device::Device;
@@ -29,11 +34,6 @@ use bokehcam::frame::ColorImage;
 use bokehcam::link::Receiver;
 use bokehcam::link::demand::{Demand, Watch};
 use bokehcam::pipeline::{View, Wanted};
-use crate::meters::Totals;
-use crate::panel::{Panel, SystemFonts};
-use crate::session::{Closed, Session, Wake};
-use crate::state::{Action, Shown, Source, State, fitted};
-use crate::views::Views;
 use bokehcam::stats::WindowUse;
 
 /// While frames come, instruments are laid out anew this often.

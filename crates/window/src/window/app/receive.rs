@@ -7,10 +7,10 @@ use winit::event_loop::ActiveEventLoop;
 
 use super::App;
 use super::seek::Seeking;
-use bokehcam::link::Receiver;
-use bokehcam::pipeline::View;
 use crate::session::SessionEvent;
 use crate::state::Source;
+use bokehcam::link::Receiver;
+use bokehcam::pipeline::View;
 
 /// Where a recording is, is shown anew so often while it plays.
 const BAR_EVERY: Duration = Duration::from_millis(250);

@@ -3,9 +3,9 @@
 use std::sync::Arc;
 
 use super::App;
+use crate::state::Transport;
 use bokehcam::capture::Seeker;
 use bokehcam::pipeline::View;
-use crate::state::Transport;
 
 /// What the window knows of wishes for frames.
 #[derive(Default)]

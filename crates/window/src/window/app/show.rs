@@ -6,14 +6,14 @@ use winit::event_loop::ActiveEventLoop;
 use winit::window::Fullscreen;
 
 use super::{App, control};
-use bokehcam::compute::Place;
-use bokehcam::frame::ColorImage;
-use bokehcam::pipeline::Trace;
 use crate::panel::{self, Canvas};
 use crate::present::{Area, Controls, Drawing, Image};
 use crate::session::Still;
 use crate::state::{Action, Request, Source, State};
 use crate::views::Probe;
+use bokehcam::compute::Place;
+use bokehcam::frame::ColorImage;
+use bokehcam::pipeline::Trace;
 use bokehcam::sink::card;
 
 /// Shown when there is nothing to save.

@@ -1,0 +1,166 @@
+//! The one switch, before a `systemctl` that only notes what it is told.
+
+use std::fs;
+use std::os::unix::fs::PermissionsExt;
+use std::path::{Path, PathBuf};
+
+use super::{Ran, bokehcam};
+
+/// Knows a unit by its file, whether it is enabled, and how it is; files in its folder hold all that.
+const SYSTEMCTL: &str = r#"#!/bin/sh
+here=$(dirname "$0")
+echo "$*" >>"$here/told"
+[ "$1" = --user ] && [ -e "$here/session" ] || { echo "Failed to connect to bus: No medium found" >&2; exit 1; }
+own="$XDG_CONFIG_HOME/systemd/user/bokehcam.service"
+case "$2" in
+show)
+    case "$4" in graphical-session.target) echo "ActiveState=$(cat "$here/desktop")"; exit 0 ;; esac
+    [ -e "$here/loaded" ] || { echo LoadState=not-found; exit 0; }
+    echo LoadState=$(cat "$here/loaded")
+    echo ActiveState=$(cat "$here/active" 2>/dev/null || echo inactive)
+    echo UnitFileState=$(cat "$here/enabled" 2>/dev/null || echo disabled)
+    echo "FragmentPath=$own"
+    program=$(sed -n 's/^ExecStart="\{0,1\}\([^ "]*\).*/\1/p' "$own")
+    echo "ExecStart={ path=$program ; argv[]=$program stream \$STREAM ; ignore_errors=no }"
+    echo 'Environment="STREAM=0 --to /dev/video10 --on-demand"' ;;
+daemon-reload) grep -q '^ExecStart=' "$own" && echo loaded >"$here/loaded"; exit 0 ;;
+enable) echo enabled >"$here/enabled"; cp "$here/becomes" "$here/active" ;;
+disable) rm -f "$here/enabled" "$here/active" ;;
+esac
+"#;
+
+struct Session {
+    home: tempfile::TempDir,
+}
+
+impl Session {
+    /// A session in which what is started becomes `becomes`.
+    fn new(becomes: &str) -> Self {
+        let session = Self { home: tempfile::tempdir().unwrap() };
+        fs::create_dir(session.home.path().join("bin")).unwrap();
+        session.program("systemctl", SYSTEMCTL);
+        session.program("journalctl", "#!/bin/sh\necho 'error: 0: no such camera'\n");
+        for (name, text) in [("session", ""), ("desktop", "active"), ("becomes", becomes), ("told", "")] {
+            fs::write(session.at(name), text).unwrap();
+        }
+        session
+    }
+
+    fn program(&self, name: &str, text: &str) {
+        fs::write(self.at(name), text).unwrap();
+        fs::set_permissions(self.at(name), fs::Permissions::from_mode(0o755)).unwrap();
+    }
+
+    fn at(&self, name: &str) -> PathBuf {
+        self.home.path().join("bin").join(name)
+    }
+
+    fn unit(&self) -> PathBuf {
+        self.home.path().join("systemd/user/bokehcam.service")
+    }
+
+    fn put_unit(&self, text: &str) {
+        fs::create_dir_all(self.unit().parent().unwrap()).unwrap();
+        fs::write(self.unit(), text).unwrap();
+    }
+
+    fn service(&self, what: &str) -> Ran {
+        let path = format!("{}:/usr/bin:/bin", self.at("").display());
+        bokehcam(self.home.path(), &["service", what]).env("PATH", path).output().unwrap().into()
+    }
+
+    /// What systemd was told to change.
+    fn told(&self) -> Vec<String> {
+        let told = fs::read_to_string(self.at("told")).unwrap();
+        told.lines().filter(|line| !line.starts_with("--user show ")).map(str::to_owned).collect()
+    }
+}
+
+#[test]
+fn one_word_starts_it_with_every_session_and_one_ends_that() {
+    let session = Session::new("active");
+    let off = session.service("status");
+    assert!(off.code == 0 && off.stdout.starts_with("off: there is no unit"), "{}{}", off.stdout, off.stderr);
+    assert!(session.told().is_empty(), "status changes nothing: {:?}", session.told());
+
+    let on = session.service("on");
+    assert_eq!(
+        (on.code, session.told()),
+        (0, vec!["--user daemon-reload".into(), "--user enable --now bokehcam.service".into()])
+    );
+    assert!(on.stdout.starts_with("on: it runs\n  streams   0 --to /dev/video10 --on-demand\n"), "{}", on.stdout);
+    assert!(on.stdout.contains("bokehcam/stream.conf"), "{}", on.stdout);
+    // What was written is the package's unit with this program in it.
+    let packaged =
+        fs::read_to_string(Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("packaging/bokehcam.service"))
+            .unwrap();
+    let start = format!("ExecStart=\"{}\" stream", env!("CARGO_BIN_EXE_bokehcam"));
+    assert_eq!(
+        fs::read_to_string(session.unit()).unwrap(),
+        packaged.replace("ExecStart=/usr/bin/bokehcam stream", &start)
+    );
+
+    fs::create_dir_all(session.home.path().join("bokehcam")).unwrap();
+    let conf = session.home.path().join("bokehcam/stream.conf");
+    fs::write(&conf, "# mine\nSTREAM=\"C920 --to pipewire --on-demand\"\n").unwrap();
+    let status = session.service("status");
+    let named = format!("  streams   C920 --to pipewire --on-demand\n  settings  {}\n", conf.display());
+    assert!(status.stdout.contains(&named), "{}", status.stdout);
+
+    let off = session.service("off");
+    assert_eq!((off.code, session.told().last().unwrap().as_str()), (0, "--user disable --now bokehcam.service"));
+    assert!(session.service("status").stdout.starts_with("off: it does not run\n"));
+}
+
+#[test]
+fn a_unit_that_is_there_is_left_as_it_is() {
+    let session = Session::new("active");
+    let own = "[Service]\nExecStart=/bin/sh -c true\n";
+    session.put_unit(own);
+    let on = session.service("on");
+    assert_eq!((on.code, fs::read_to_string(session.unit()).unwrap().as_str()), (0, own), "{}", on.stderr);
+
+    let session = Session::new("active");
+    session.put_unit("nothing\n");
+    let on = session.service("on");
+    assert!(on.code == 1 && on.stderr.contains("does not take it as a unit"), "{}", on.stderr);
+    assert_eq!(fs::read_to_string(session.unit()).unwrap(), "nothing\n");
+    assert_eq!(session.told(), ["--user daemon-reload"]);
+
+    // Of a program that has moved.
+    let session = Session::new("active");
+    session.put_unit("[Service]\nExecStart=/gone/bokehcam stream $STREAM\n");
+    fs::write(session.at("loaded"), "loaded").unwrap();
+    let on = session.service("on");
+    assert!(on.code == 1 && on.stderr.contains("starts /gone/bokehcam, which is not there"), "{}", on.stderr);
+    assert!(session.told().is_empty());
+}
+
+#[test]
+fn what_keeps_it_from_running_is_said_in_plain_words() {
+    let session = Session::new("activating");
+    let on = session.service("on");
+    let waits = "on: it tries again every five seconds\n  says      error: 0: no such camera\n";
+    assert!(on.code == 0 && on.stdout.starts_with(waits), "{}{}", on.stdout, on.stderr);
+    fs::write(session.at("active"), "failed").unwrap();
+    fs::write(session.at("desktop"), "inactive").unwrap();
+    let status = session.service("status");
+    assert!(status.stdout.starts_with("on: it gave up\n  says      error: "), "{}", status.stdout);
+    assert!(status.stderr.contains("graphical-session.target"), "{}", status.stderr);
+    fs::write(session.at("loaded"), "masked").unwrap();
+    let masked = session.service("on");
+    assert!(masked.code == 1 && masked.stderr.contains("systemctl --user unmask bokehcam"), "{}", masked.stderr);
+
+    let none = Session::new("active");
+    fs::remove_file(none.at("session")).unwrap();
+    for what in ["on", "off", "status"] {
+        let ran = none.service(what);
+        assert!(ran.code == 1 && ran.stderr.lines().count() == 1, "{}", ran.stderr);
+        assert!(ran.stderr.contains("no session of systemd's (Failed to connect to bus"), "{}", ran.stderr);
+    }
+    fs::remove_file(none.at("systemctl")).unwrap();
+    let path = none.at("");
+    let ran: Ran = bokehcam(none.home.path(), &["service", "on"]).env("PATH", path).output().unwrap().into();
+    assert!(ran.code == 1 && ran.stderr.contains("there is no systemd here"), "{}", ran.stderr);
+    assert!(!none.unit().exists(), "a unit that nobody reads");
+}

@@ -1,0 +1,202 @@
+//! `bokehcam ctl` against streams that run: what goes out changes, nobody else is listened to, and nobody holds it up.
+#![allow(missing_docs)]
+
+#[cfg(feature = "desktop")]
+mod bus;
+mod outputs;
+mod refusals;
+mod runs;
+mod world;
+
+use std::time::{Duration, Instant};
+
+use bokehcam::budget::Quality;
+use bokehcam::recording::still::read_color;
+use serde_json::json;
+use world::{Pictures, World, until};
+
+#[test]
+fn off_shows_the_card_and_nothing_else_until_it_is_on_again() {
+    let world = World::new();
+    let mut stream = world.stream("stream", &["--to", "-", "--effect", "blur"]);
+    let pictures = stream.watch();
+    pictures.wait_for("the person", |picture| !picture.is_card());
+    assert_eq!(world.status(&[])["on"], true);
+
+    assert!(world.ctl(&["off"]).done().stderr.contains("stream is off"));
+    pictures.wait_for("the card", |picture| picture.is_card());
+    let covered = pictures.cards().len();
+    assert_eq!(world.status(&[])["on"], false);
+    // It goes on, though the camera rests: no frames, and yet pictures.
+    until("no frames come any more", || world.status(&[])["fps"] == 0.0);
+    let still = pictures.cards().len();
+    until("a viewer goes on to be given pictures", || pictures.cards().len() > still + 10);
+    assert_eq!(world.status(&[])["fps"], 0.0);
+    assert!(pictures.cards()[covered..].iter().all(|(_, is_card)| *is_card), "nothing of the person is shown");
+    // Another look changes nothing about that; twice off is off.
+    world.ctl(&["set", "effect=none"]).done();
+    world.ctl(&["off"]).done();
+    std::thread::sleep(Duration::from_millis(500));
+    assert!(pictures.cards()[covered..].iter().all(|(_, is_card)| *is_card));
+
+    world.ctl(&["on"]).done();
+    pictures.wait_for("the person again", |picture| !picture.is_card());
+    world.ctl(&["toggle"]).done();
+    pictures.wait_for("the card again", |picture| picture.is_card());
+    assert!(world.ctl(&["toggle"]).done().stderr.contains("stream is on"));
+    pictures.wait_for("the person at last", |picture| !picture.is_card());
+    assert_eq!(stream.interrupt(), 0);
+}
+
+/// The mean detail of the next pictures: of a loop that all of them see.
+fn detail(pictures: &Pictures) -> f64 {
+    let (mut sum, mut count) = (0.0, 0);
+    pictures.wait_for("a second of them", |picture| {
+        (sum, count) = (sum + picture.detail(), count + 1);
+        count > 12
+    });
+    sum / f64::from(count)
+}
+
+#[test]
+fn presets_and_settings_change_the_blur_of_what_goes_out() {
+    let world = World::new();
+    let settings = "[presets.\"my own\"]\neffect = \"blur\"\ncoc-at-infinity = \"4%\"\n";
+    std::fs::write(world.path("config/bokehcam/config.toml"), settings).unwrap();
+    let mut stream = world.stream("stream", &["--to", "-", "--effect", "none"]);
+    let pictures = stream.watch();
+    let sharp = detail(&pictures);
+    world.ctl(&["set", "effect=blur", "blur=1%"]).done();
+    let little = detail(&pictures);
+    world.ctl(&["preset", "my own"]).done();
+    let much = detail(&pictures);
+    println!("detail {sharp:.2} without blur, {little:.2} with little, {much:.2} with much");
+    assert!(sharp > 1.2 * little && little > 1.2 * much);
+    let status = world.status(&[]);
+    let look = &status["look"];
+    assert_eq!(json!([look["coc-at-infinity"], look["effect"]]), json!(["4%", "blur"]));
+    // Which of them is up to the machine and what else it does.
+    let quality = status["quality"].as_str().expect("it is blurred");
+    assert!(Quality::ALL.iter().any(|level| level.name() == quality), "{quality}");
+    world.ctl(&["set", "effect=none"]).done();
+    assert!(detail(&pictures) > 1.2 * little);
+    // What has no effect is said.
+    let ran = world.ctl(&["set", "tilt=0.5"]).done();
+    assert!(ran.stderr.starts_with("warning: without effect here: --tilt 0.5"), "{}", ran.stderr);
+}
+
+#[test]
+fn what_follows_depth_is_refused_where_there_is_none() {
+    let world = World::new();
+    let _stream = world.stream("stream", &["--to", "null", "--effect", "tilt-shift", "--depth", "none"]);
+    let refused = world.ctl(&["preset", "dreamy"]).refused(2);
+    assert!(refused.contains("--effect auto follows depth") && refused.contains("tilt-shift"), "{refused}");
+    assert_eq!(world.status(&[])["look"]["rim"], "0.2", "nothing of it is done");
+    world.ctl(&["preset", "miniature"]).done();
+}
+
+#[test]
+fn depth_is_followed_in_any_look() {
+    let world = World::new();
+    let mut stream = world.stream("stream", &["--to", "-", "--coc-at-infinity", "0"]);
+    let pictures = stream.watch();
+    let sharp = detail(&pictures);
+    world.ctl(&["preset", "dreamy"]).done();
+    let dreamy = detail(&pictures);
+    assert!(sharp > 1.2 * dreamy, "{sharp} {dreamy}");
+    for args in [&["set", "f-number=2", "focal-length=50", "sensor-width=36"][..], &["set", "blur=2%", "focus=0.5,0.5"]]
+    {
+        world.ctl(args).done();
+    }
+    let look = &world.status(&[])["look"];
+    assert_eq!(json!([look["coc-at-infinity"], look["focus"], look["f-number"]]), json!(["2%", "0.5,0.5", null]));
+}
+
+#[test]
+fn the_status_says_how_it_is() {
+    let world = World::new();
+    let began = Instant::now();
+    let stream = world.stream("desk", &["--to", "null", "--to", "out.y4m", "--name", "desk"]);
+    let answers = Instant::now();
+    let recording = concat!(env!("CARGO_MANIFEST_DIR"), "/../../recordings/portrait");
+    // There is a rate once two frames have come.
+    until("frames come", || world.status(&[])["fps"] != 0.0);
+    let least_s = answers.elapsed().as_secs_f64();
+    let status = world.status(&[]);
+    let most_s = began.elapsed().as_secs_f64();
+    let told = json!({
+        "name": "desk", "pid": stream.0.id(), "command": "stream", "on": true, "source": recording, "size": [640, 360],
+        "sinks": ["null", "out.y4m"], "watched": null,
+    });
+    for (name, value) in told.as_object().unwrap() {
+        assert_eq!(status[name], *value, "{name}");
+    }
+    let fps = status["fps"].as_f64().unwrap();
+    // How many of the recording's twelve there is time for is the machine's affair.
+    assert!(fps > 0.0 && fps < 40.0, "{fps}");
+    let uptime_s = status["uptime_s"].as_f64().unwrap();
+    assert!((least_s - 0.1..most_s + 0.1).contains(&uptime_s), "{uptime_s} of {least_s} to {most_s}");
+    assert_eq!(status["look"]["effect"], "auto");
+    let text = world.ctl(&["status"]).done().stdout;
+    for part in ["desk is on\n", "640x360", "null, out.y4m", "a second, quality", "rim=0.2"] {
+        assert!(text.contains(part), "{text}");
+    }
+}
+
+#[test]
+fn a_picture_is_saved_where_it_was_asked_for() {
+    let world = World::new();
+    let _stream = world.stream("stream", &["--to", "null", "--effect", "blur"]);
+    let saved = world.ctl(&["snapshot", "--to", "me.png"]).done().stdout;
+    assert_eq!(saved.trim_end(), world.path("here/me.png").to_str().unwrap());
+    let picture = read_color(&world.path("here/me.png")).unwrap();
+    assert_eq!(picture.size(), (640, 360));
+    assert!(picture.rgb.iter().any(|&value| value > 100), "not the card");
+    let before = std::fs::read(world.path("here/me.png")).unwrap();
+    assert!(world.ctl(&["snapshot", "--to", "me.png"]).refused(1).contains("me.png exists: choose another name"));
+    assert_eq!(std::fs::read(world.path("here/me.png")).unwrap(), before);
+    assert!(world.ctl(&["snapshot", "--to", "me.txt"]).refused(1).contains("me.txt"));
+    if cfg!(feature = "window") {
+        let by_date = world.ctl(&["snapshot"]).done().stdout;
+        assert!(by_date.starts_with(world.path("pictures/bokehcam ").to_str().unwrap()), "{by_date}");
+    }
+    world.ctl(&["off"]).done();
+    assert!(world.ctl(&["snapshot", "--to", "no.png"]).refused(1).contains("it is off"));
+    assert!(!world.path("here/no.png").exists());
+}
+
+#[test]
+fn it_reacts_at_once() {
+    let world = World::new();
+    let mut stream = world.stream("stream", &["--to", "-", "--effect", "blur"]);
+    let pictures = stream.watch();
+    let (mut answers, mut commands, mut cards) = (Vec::new(), Vec::new(), Vec::new());
+    for _ in 0..10 {
+        pictures.wait_for("the person", |picture| !picture.is_card());
+        let began = Instant::now();
+        world.ctl(&["off"]).done();
+        commands.push(began.elapsed());
+        let card = pictures.wait_for("the card", |picture| picture.is_card());
+        cards.push(card.at.saturating_duration_since(began));
+        let began = Instant::now();
+        let answer = world.tell("stream", b"{\"do\":\"set\",\"settings\":[\"blur=3%\",\"rim=0.3\"]}\n");
+        answers.push(began.elapsed());
+        assert!(answer.contains("\"status\""), "{answer}");
+        world.tell("stream", b"{\"do\":\"on\"}\n");
+    }
+    let looks = (0..10).map(|_| {
+        world.tell("stream", b"{\"do\":\"set\",\"settings\":[\"blur=0.5%\"]}\n");
+        pictures.wait_for("little blur", |picture| picture.detail() > 2.0);
+        let began = Instant::now();
+        world.tell("stream", b"{\"do\":\"set\",\"settings\":[\"blur=8%\"]}\n");
+        pictures.wait_for("much blur", |picture| picture.detail() < 1.2).at.saturating_duration_since(began)
+    });
+    let looks = looks.collect();
+    let all = [("an answer", answers), ("the command", commands), ("to the card", cards), ("to another look", looks)];
+    for (what, mut times) in all {
+        times.sort();
+        println!("{what}: median {:.1?}, longest {:.1?}", times[5], times[9]);
+        // What waits out somebody's patience does so each time, and a busy machine now and then.
+        assert!(times[0] < Duration::from_secs(1), "{what}: {times:?}");
+    }
+}

@@ -1,0 +1,222 @@
+//! What is refused: nothing is changed by it, and nothing else waits for it.
+
+use std::io::Write;
+use std::os::unix::net::UnixStream;
+use std::time::{Duration, Instant};
+
+use super::world::{HANG, World, answer, until};
+
+#[test]
+fn a_setting_that_cannot_be_changes_none() {
+    let world = World::new();
+    let _stream = world.stream("stream", &["--to", "null"]);
+    let before = world.status(&[])["look"].clone();
+    for (args, said) in [
+        (&["set", "rim=0.5", "highlights=-1"][..], "invalid value '-1' for '--highlights <M>'"),
+        (&["set", "rim=0.5", "rimm=1"], "there is no setting 'rimm' of the look, did you mean rim?"),
+        (&["set", "rim=0.5", "blurr=3%"], "there is no setting 'blurr' of the look, did you mean blur?"),
+        (&["set", "rim=0.5", "out-size=1x1"], "'out-size' cannot be changed while it runs"),
+        (&["set", "depth=matte"], "'depth' cannot be changed while it runs"),
+        (&["set", "preset=dreamy"], "`bokehcam ctl preset dreamy`"),
+        (&["set", "--blur", "3%"], "written without dashes, such as `bokehcam ctl set blur=3%`"),
+        (&["set", "rim=0.5", "behind=image:no.png"], "here/no.png"),
+        (&["set", "rim=0.5", "f-number=2"], "a lens needs all of"),
+        (&["set", "blur=3%", "f-number=2"], "cannot be used with"),
+        (&["set", "rim=0.5", "blur=90000"], "use pixels from 0 to 20000"),
+        (&["set", "rim=0.5", "blur=19000"], "a blur radius of 19000 px is too large"),
+        (&["set", "rim=0.5", "aperture=image:no.png"], "here/no.png"),
+        (&["set", "rim"], "write NAME=VALUE"),
+        (&["preset", "nice"], "there is no preset 'nice': use portrait"),
+    ] {
+        let ran = world.ctl(args);
+        let code = if said.contains("no.png") { 1 } else { 2 };
+        let refused = ran.refused(code);
+        assert!(refused.contains(said), "{args:?}: {refused}");
+        assert_eq!(world.status(&[])["look"], before, "{args:?}");
+    }
+    // The same words as those of the command line.
+    let flag = world.run(&["stream", "demo", "--to", "null", "--rim", "2"]).refused(2);
+    assert_eq!(world.ctl(&["set", "rim=2"]).refused(2), flag);
+    for args in [&["dance"][..], &["set"], &["status", "--name", "../x"]] {
+        assert_eq!(world.ctl(args).code, 2, "{args:?}");
+    }
+}
+
+#[test]
+fn what_is_no_request_is_answered_so() {
+    let world = World::new();
+    let _stream = world.stream("stream", &["--to", "null"]);
+    for (request, said) in [
+        (&b"on\n"[..], "this is no request"),
+        (b"{\"do\":\"dance\"}\n", "unknown variant `dance`"),
+        (b"{\"do\":\"set\",\"settings\":[\"rim=0.1\"],\"force\":true}\n", "unknown field `force`"),
+        (b"{\"do\":\"set\",\"settings\":{}}\n", "this is no request"),
+        (b"\xff\xfe\n", "this is no request"),
+        (b"\n", "this is no request"),
+        (b"{\"do\":\"snapshot\",\"to\":\"x.png\"}\n", "say the whole path"),
+        (&[b' '; 20_000], "too long: 16384 bytes"),
+        (&[b"{\"do\":\"preset\",\"name\":\"".as_slice(), &[b'x'; 60_000], b"\"}\n"].concat(), "too long"),
+    ] {
+        let answer = world.tell("stream", request);
+        let value: serde_json::Value = serde_json::from_str(&answer).unwrap_or_else(|_| panic!("{answer:?}"));
+        assert_eq!(value["usage"], true, "{answer}");
+        assert!(value["error"].as_str().unwrap().contains(said), "{answer}");
+    }
+    // The longest request, and one byte more.
+    let longest = |bytes: usize| {
+        let mut request = br#"{"do":"status"}"#.to_vec();
+        request.resize(bytes - 1, b' ');
+        request.push(b'\n');
+        world.tell("stream", &request)
+    };
+    assert!(longest(16_384).contains("\"status\""));
+    assert!(longest(16_385).contains("too long"));
+    // An end without a line.
+    let mut stream = UnixStream::connect(world.socket("stream")).unwrap();
+    stream.write_all(b"{\"do\":\"off\"}").unwrap();
+    stream.shutdown(std::net::Shutdown::Write).unwrap();
+    assert!(answer(&stream).contains("the request has no end"));
+    assert_eq!(world.status(&[])["on"], true);
+}
+
+#[test]
+fn who_says_nothing_holds_nobody_up() {
+    let world = World::new();
+    let _stream = world.stream("stream", &["--to", "null"]);
+    let connect = || UnixStream::connect(world.socket("stream")).unwrap();
+    // Each of them has a second, so that one after the other would take six. One of the eight places may be held for a
+    // moment by somebody of before, and a busy machine may need another try.
+    until("six say nothing, and a seventh is served all the same", || {
+        let began = Instant::now();
+        let silent: Vec<UnixStream> = (0..6).map(|_| connect()).collect();
+        let served = world.tell("stream", b"{\"do\":\"status\"}\n");
+        let took = began.elapsed();
+        assert!(served.contains("\"on\":true"), "{served}");
+        for stream in &silent {
+            assert!(answer(stream).contains("did not come within 1 s"));
+        }
+        took < Duration::from_secs(1)
+    });
+    // More than there is room for are told so at once, and served once there is: for those who come when the first ones have
+    // had their second, there is room again.
+    until("most are told at once that there is no room", || {
+        let silent: Vec<UnixStream> = (0..20).map(|_| connect()).collect();
+        let answers: Vec<String> = silent.iter().map(answer).collect();
+        let refused = answers.iter().filter(|answer| answer.contains("too many ask at once")).count();
+        let late = answers.iter().filter(|answer| answer.contains("did not come within 1 s")).count();
+        assert_eq!(refused + late, 20, "{answers:?}");
+        refused >= 12 && late >= 7
+    });
+    assert_eq!(world.status(&[])["on"], true);
+    // A request in pieces comes in time, or does not.
+    let mut slow = connect();
+    let began = Instant::now();
+    for byte in b"{\"do\":\"off\"}            " {
+        std::thread::sleep(Duration::from_millis(100));
+        if slow.write_all(&[*byte]).is_err() {
+            break;
+        }
+    }
+    assert!(answer(&slow).contains("did not come within 1 s") && began.elapsed() >= Duration::from_secs(1));
+    assert_eq!(world.status(&[])["on"], true);
+}
+
+#[test]
+fn who_asks_while_too_many_do_is_told_so_and_never_cut_off() {
+    let world = World::new();
+    let _stream = world.stream("stream", &["--to", "null"]);
+    until("somebody came while there was no room", || {
+        let _silent: Vec<UnixStream> = (0..8).map(|_| UnixStream::connect(world.socket("stream")).unwrap()).collect();
+        let ran: Vec<_> = (0..4).map(|_| world.ctl(&["status"])).collect();
+        let refused: Vec<&str> = ran.iter().filter(|ran| ran.code != 0).map(|ran| ran.stderr.as_str()).collect();
+        assert!(refused.iter().all(|said| said.contains("too many ask at once: ask again")), "{refused:?}");
+        !refused.is_empty()
+    });
+}
+
+#[test]
+fn each_of_two_hundred_at_once_gets_an_answer() {
+    let world = World::new();
+    let _stream = world.stream("stream", &["--to", "null"]);
+    let answers: Vec<String> = std::thread::scope(|scope| {
+        let ask = || world.tell("stream", b"{\"do\":\"toggle\"}\n");
+        let all: Vec<_> = (0..200).map(|_| scope.spawn(ask)).collect();
+        all.into_iter().map(|asked| asked.join().unwrap()).collect()
+    });
+    let refused = answers.iter().filter(|answer| answer.contains("too many ask at once")).count();
+    let done = answers.iter().filter(|answer| answer.starts_with('{') && !answer.contains("\"error\"")).count();
+    assert_eq!(refused + done, 200, "{answers:?}");
+    until("every answer was true", || world.status(&[])["on"] == (done % 2 == 0));
+    let told: Vec<_> = std::thread::scope(|scope| {
+        let all: Vec<_> = (0..40).map(|_| scope.spawn(|| world.ctl(&["toggle"]))).collect();
+        all.into_iter().map(|asked| asked.join().unwrap()).collect()
+    });
+    for ran in told {
+        assert!(ran.code == 0 || ran.stderr.contains("too many ask at once"), "{}", ran.stderr);
+    }
+}
+
+#[test]
+fn a_run_that_takes_up_nobody_is_said_to_hang() {
+    use std::os::unix::fs::DirBuilderExt;
+    let world = World::new();
+    std::fs::DirBuilder::new().mode(0o700).create(world.path("run/bokehcam")).unwrap();
+    let _nobody = std::os::unix::net::UnixListener::bind(world.socket("stream")).unwrap();
+    let said = world.ctl(&["status"]).refused(1);
+    assert!(said.contains("stream does not answer: it hangs, or is still beginning"), "{said}");
+}
+
+#[test]
+fn a_start_does_not_wait_for_a_lock_that_nobody_gives_back() {
+    let world = World::new();
+    world.run(&["stream", "demo", "--frames", "1", "--to", "null"]);
+    let folder = std::fs::File::open(world.path("run/bokehcam")).unwrap();
+    rustix::fs::flock(&folder, rustix::fs::FlockOperation::LockExclusive).unwrap();
+    let ran = world.run(&["stream", "demo", "--frames", "2", "--pace", "realtime", "--to", "null"]).done();
+    assert!(
+        ran.stderr.contains("`bokehcam ctl` cannot reach this stream") && ran.stderr.contains("is locked"),
+        "{}",
+        ran.stderr
+    );
+}
+
+#[test]
+fn a_run_that_ends_waits_for_no_client() {
+    let world = World::new();
+    let stream = world.stream("stream", &["--to", "null"]);
+    let _silent: Vec<UnixStream> = (0..4).map(|_| UnixStream::connect(world.socket("stream")).unwrap()).collect();
+    let began = Instant::now();
+    assert_eq!(stream.interrupt(), 0);
+    assert!(began.elapsed() < HANG, "{:?}", began.elapsed());
+    assert!(!world.socket("stream").exists());
+}
+
+#[test]
+#[ignore = "needs root: only root can be somebody else"]
+fn another_user_is_refused_even_where_the_folder_is_open() {
+    use std::fs::{Permissions, set_permissions};
+    use std::os::unix::fs::PermissionsExt;
+    let world = World::new();
+    let _stream = world.stream("stream", &["--to", "null"]);
+    let nobody = rustix::process::Uid::from_raw(65534);
+    let socket = world.socket("stream");
+    // The identity of one thread alone changes.
+    let ask = move || {
+        std::thread::spawn(move || {
+            rustix::thread::set_thread_res_uid(nobody, nobody, nobody).unwrap();
+            let mut stream = UnixStream::connect(&socket)?;
+            let _ = stream.write_all(b"{\"do\":\"off\"}\n");
+            Ok::<String, std::io::Error>(answer(&stream))
+        })
+        .join()
+        .unwrap()
+    };
+    let denied = ask.clone()().unwrap_err();
+    assert_eq!(denied.kind(), std::io::ErrorKind::PermissionDenied, "the folder keeps others out");
+    for (path, mode) in [("", 0o755), ("run", 0o755), ("run/bokehcam", 0o755), ("run/bokehcam/stream.sock", 0o777)] {
+        set_permissions(world.path(path), Permissions::from_mode(mode)).unwrap();
+    }
+    assert!(ask().unwrap().contains("this run is another user's"));
+    set_permissions(world.path("run/bokehcam"), Permissions::from_mode(0o700)).unwrap();
+    assert_eq!(world.status(&[])["on"], true);
+}

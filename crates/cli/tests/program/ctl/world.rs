@@ -1,0 +1,230 @@
+//! A user with a runtime folder and settings of their own, streams that run there, and what comes out of them.
+
+use std::fs;
+use std::io::{BufRead, BufReader, Read, Write};
+use std::os::unix::fs::PermissionsExt;
+use std::os::unix::net::UnixStream;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::sync::{Arc, Mutex};
+use std::thread;
+use std::time::{Duration, Instant};
+
+/// Nothing here takes so long: against a hang.
+pub const HANG: Duration = Duration::from_secs(60);
+
+/// Waits until something is so.
+#[track_caller]
+pub fn until(what: &str, mut is: impl FnMut() -> bool) {
+    let began = Instant::now();
+    while !is() {
+        assert!(began.elapsed() < HANG, "never: {what}");
+        thread::sleep(Duration::from_millis(20));
+    }
+}
+
+pub struct Ran {
+    pub code: i32,
+    pub stdout: String,
+    pub stderr: String,
+}
+
+impl Ran {
+    pub fn done(self) -> Self {
+        assert_eq!(self.code, 0, "{}", self.stderr);
+        self
+    }
+
+    /// The one line that it was refused with.
+    pub fn refused(self, code: i32) -> String {
+        assert_eq!((self.code, self.stderr.lines().count()), (code, 1), "{}{}", self.stdout, self.stderr);
+        self.stderr
+    }
+}
+
+pub struct World(tempfile::TempDir);
+
+impl World {
+    pub fn new() -> Self {
+        let world = Self(tempfile::tempdir().unwrap());
+        for folder in ["run", "config/bokehcam", "pictures", "here"] {
+            fs::create_dir_all(world.path(folder)).unwrap();
+        }
+        fs::set_permissions(world.path("run"), fs::Permissions::from_mode(0o700)).unwrap();
+        world
+    }
+
+    pub fn path(&self, name: &str) -> PathBuf {
+        self.0.path().join(name)
+    }
+
+    pub fn socket(&self, name: &str) -> PathBuf {
+        self.path("run/bokehcam").join(format!("{name}.sock"))
+    }
+
+    pub fn bokehcam(&self, args: &[&str]) -> Command {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_bokehcam"));
+        for (name, _) in std::env::vars_os() {
+            if name.to_string_lossy().starts_with("BOKEHCAM_") {
+                command.env_remove(name);
+            }
+        }
+        command.env("XDG_RUNTIME_DIR", self.path("run")).env("XDG_CONFIG_HOME", self.path("config"));
+        command.env("XDG_PICTURES_DIR", self.path("pictures")).env_remove("RUST_LOG");
+        command.args(args).current_dir(self.path("here")).stdin(Stdio::null());
+        command
+    }
+
+    pub fn run(&self, args: &[&str]) -> Ran {
+        let output = self.bokehcam(args).output().unwrap();
+        Ran {
+            code: output.status.code().expect("ended by itself"),
+            stdout: String::from_utf8(output.stdout).unwrap(),
+            stderr: String::from_utf8(output.stderr).unwrap(),
+        }
+    }
+
+    pub fn ctl(&self, args: &[&str]) -> Ran {
+        self.run(&[&["ctl"], args].concat())
+    }
+
+    pub fn status(&self, args: &[&str]) -> serde_json::Value {
+        let ran = self.ctl(&[&["status", "--json"], args].concat()).done();
+        assert_eq!(ran.stdout.lines().count(), 1, "{}", ran.stdout);
+        serde_json::from_str(&ran.stdout).unwrap()
+    }
+
+    /// What a run answers to these bytes, sent as they are; the connection stays open from this side.
+    pub fn tell(&self, name: &str, request: &[u8]) -> String {
+        let mut stream = UnixStream::connect(self.socket(name)).unwrap();
+        // Refused before all was sent.
+        let _ = stream.write_all(request);
+        answer(&stream)
+    }
+
+    /// A looped recording in real time, with these arguments, once it answers.
+    pub fn stream(&self, name: &str, args: &[&str]) -> Running {
+        let recording = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("recordings/portrait");
+        let first = ["stream", recording.to_str().unwrap(), "--loop", "--pace", "realtime", "--quiet"];
+        let child = self.bokehcam(&[&first, args].concat()).stdout(Stdio::piped()).spawn().unwrap();
+        let running = Running(child);
+        let began = Instant::now();
+        while self.ctl(&["status", "--name", name]).code != 0 {
+            assert!(began.elapsed() < HANG, "{name} does not answer");
+            thread::sleep(Duration::from_millis(20));
+        }
+        running
+    }
+}
+
+pub fn answer(stream: &UnixStream) -> String {
+    let mut line = String::new();
+    stream.set_read_timeout(Some(HANG)).unwrap();
+    BufReader::new(stream).read_line(&mut line).unwrap();
+    line
+}
+
+/// A run; dropped, it is killed.
+pub struct Running(pub Child);
+
+impl Running {
+    /// Ends it as Ctrl-C does; gives back its exit code.
+    pub fn interrupt(mut self) -> i32 {
+        let pid = rustix::process::Pid::from_child(&self.0);
+        rustix::process::kill_process(pid, rustix::process::Signal::INT).unwrap();
+        self.0.wait().unwrap().code().unwrap()
+    }
+
+    /// What it writes to its standard output.
+    pub fn watch(&mut self) -> Pictures {
+        Pictures::of(self.0.stdout.take().unwrap())
+    }
+}
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+/// The brightness of a picture, 16 to 235.
+#[derive(Clone)]
+pub struct Picture {
+    pub width: usize,
+    pub luma: Vec<u8>,
+    pub at: Instant,
+}
+
+impl Picture {
+    /// Whether it is the still card: dark, from the top to the bottom and nothing else at its sides.
+    pub fn is_card(&self) -> bool {
+        let rows: Vec<&[u8]> = self.luma.chunks_exact(self.width).collect();
+        let (first, last) = (rows[0][0], rows[rows.len() - 1][0]);
+        let is_even = |row: &&[u8]| row[..self.width / 8].iter().all(|&value| value.abs_diff(row[0]) <= 1);
+        first.abs_diff(57) <= 3 && last.abs_diff(38) <= 3 && rows.iter().all(is_even)
+    }
+
+    /// How much its rows vary from pixel to pixel: blur takes it away.
+    pub fn detail(&self) -> f64 {
+        let pairs = self.luma.windows(2).map(|pair| f64::from(pair[0].abs_diff(pair[1])));
+        pairs.sum::<f64>() / self.luma.len() as f64
+    }
+}
+
+/// The pictures of a y4m stream, of which the last is kept, and for each whether it was the card.
+#[derive(Clone)]
+pub struct Pictures(Arc<Mutex<Seen>>);
+
+type Seen = (Vec<(Instant, bool)>, Option<Picture>);
+
+impl Pictures {
+    pub fn of(from: impl Read + Send + 'static) -> Self {
+        let pictures = Self(Arc::default());
+        let seen = pictures.clone();
+        thread::spawn(move || seen.read(from));
+        pictures
+    }
+
+    fn read(&self, from: impl Read) {
+        let mut from = BufReader::new(from);
+        let mut header = String::new();
+        from.read_line(&mut header).unwrap();
+        let number = |letter: char| {
+            let part = header.split(' ').find(|part| part.starts_with(letter) && part.len() < 6).unwrap();
+            part[1..].parse::<usize>().unwrap()
+        };
+        let (width, height) = (number('W'), number('H'));
+        let mut frame = vec![0; width * height + 2 * width.div_ceil(2) * height.div_ceil(2)];
+        let mut line = String::new();
+        while from.read_line(&mut line).is_ok_and(|read| read > 0) && from.read_exact(&mut frame).is_ok() {
+            assert_eq!(line, "FRAME\n");
+            line.clear();
+            let picture = Picture { width, luma: frame[..width * height].to_vec(), at: Instant::now() };
+            let mut seen = self.0.lock().unwrap();
+            seen.0.push((picture.at, picture.is_card()));
+            seen.1 = Some(picture);
+        }
+    }
+
+    /// For each picture so far when it came, and whether it was the card.
+    pub fn cards(&self) -> Vec<(Instant, bool)> {
+        self.0.lock().unwrap().0.clone()
+    }
+
+    /// The first picture from now on that is like this.
+    pub fn wait_for(&self, what: &str, mut is_it: impl FnMut(&Picture) -> bool) -> Picture {
+        let began = Instant::now();
+        let mut last = None;
+        loop {
+            let picture = self.0.lock().unwrap().1.clone().filter(|picture| picture.at >= began);
+            if let Some(picture) = picture.filter(|picture| last.replace(picture.at) != Some(picture.at))
+                && is_it(&picture)
+            {
+                return picture;
+            }
+            assert!(began.elapsed() < HANG, "no picture: {what}");
+            thread::sleep(Duration::from_millis(2));
+        }
+    }
+}

@@ -1,0 +1,300 @@
+//! The commands of README.md and docs/, those in blocks and those within sentences, one after the other as somebody
+//! follows them, each page in a fresh folder.
+#![allow(missing_docs)]
+
+#[allow(dead_code)] // Of the networks that it makes, one is wanted here.
+use crate::onnx;
+mod pages;
+
+use std::fs;
+use std::os::unix::fs::{PermissionsExt, symlink};
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Output, Stdio};
+use std::time::{Duration, Instant};
+
+/// What is another program's, or builds: a part of the command, and why it is left out.
+const LEFT_OUT: [(&str, &str); 19] = [
+    ("sudo ", "needs root"),
+    ("systemctl ", "needs a session, and starts something in it"),
+    ("journalctl ", "needs a session"),
+    ("gst-", "needs GStreamer: gst/test follows it"),
+    ("GST_PLUGIN_PATH", "needs GStreamer"),
+    ("cargo ", "builds"),
+    ("pip install", "needs a network"),
+    ("scripts/", "builds everything, or needs pictures of a chessboard"),
+    ("python/", "builds everything, and needs a network"),
+    ("bokehcam.farm", "needs Ray"),
+    ("parallel --joblog", "needs GNU parallel"),
+    ("sbatch ", "needs Slurm"),
+    ("UNIX-CONNECT", "needs socat"),
+    ("gsettings", "needs GNOME"),
+    ("org.gnome", "needs GNOME"),
+    ("gdbus ", "needs a session's message bus"),
+    ("gnome-shell", "needs GNOME"),
+    ("gnome-extensions", "needs GNOME"),
+    ("git clone", "needs a network"),
+];
+
+/// What of this program a test cannot run: a part of the command, and why. Its arguments are checked all the same.
+const ONLY_CHECKED: [(&str, &str); 11] = [
+    ("bokehcam models add", "needs a file from elsewhere"),
+    ("bokehcam models get", "needs a network"),
+    ("bokehcam plate", "needs a camera"),
+    ("bokehcam preview", "needs a screen"),
+    ("bokehcam ctl depth", "needs a preview, which needs a screen"),
+    ("/dev/video", "needs a camera"),
+    ("pipewire", "needs PipeWire's daemons"),
+    ("bokehcam service", "needs a session, and starts something in it"),
+    ("bokehcam devices", "says what this machine has"),
+    ("bokehcam doctor", "judges this machine"),
+    ("bokehcam bench", "measures this machine, for minutes"),
+];
+
+/// A file of settings that is not there: who names it has all other arguments read, and is then refused.
+const NO_SETTINGS: &str = "no-settings.toml";
+
+/// A page that is being followed: a folder as its owner has it, with the repository's recordings, and pictures by the
+/// names that the pages use.
+struct Follower {
+    folder: tempfile::TempDir,
+    /// What `bokehcam ctl` speaks to.
+    running: Option<Child>,
+}
+
+impl Drop for Follower {
+    fn drop(&mut self) {
+        if let Some(mut running) = self.running.take() {
+            let _ = running.kill();
+            let _ = running.wait();
+        }
+    }
+}
+
+impl Follower {
+    fn new() -> Self {
+        let follower = Self { folder: tempfile::tempdir().unwrap(), running: None };
+        let repository = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."));
+        symlink(repository.join("recordings"), follower.path("recordings")).unwrap();
+        let copy = |from: &str, to: &str| {
+            fs::copy(repository.join("recordings").join(from), follower.path(to)).unwrap();
+        };
+        for left in ["left.png", "im0.png"] {
+            copy("stereo/image_2/000000.png", left);
+        }
+        for right in ["right.png", "im1.png"] {
+            copy("stereo/image_3/000000.png", right);
+        }
+        let calibration = "cam0=[640 0 319.5; 0 640 179.5; 0 0 1]\ncam1=[640 0 319.5; 0 640 179.5; 0 0 1]\ndoffs=0\n\
+                           baseline=60\nwidth=640\nheight=360\nndisp=96\n";
+        fs::write(follower.path("calib.txt"), calibration).unwrap();
+        for color in ["photo.jpg", "NAME-color.png"] {
+            copy("portrait/rgb/000000.png", color);
+        }
+        copy("portrait/depth/000000.png", "depth.png");
+        let mut snapshot = png::Encoder::new(fs::File::create(follower.path("NAME.png")).unwrap(), 1, 1);
+        snapshot.add_itxt_chunk("bokehcam".to_string(), "--effect=blur\n--rim=0.5\n".to_string()).unwrap();
+        snapshot.write_header().unwrap().write_image_data(&[0]).unwrap();
+        // What is light is the person, or near.
+        fs::write(follower.path("small.onnx"), onnx::matte(64, 36, [4.0, 4.0, 4.0], -6.0)).unwrap();
+
+        for folder in ["programs", "home", "session"] {
+            fs::create_dir(follower.path(folder)).unwrap();
+        }
+        fs::set_permissions(follower.path("session"), PermissionsExt::from_mode(0o700)).unwrap();
+        symlink(env!("CARGO_BIN_EXE_bokehcam"), follower.path("programs/bokehcam")).unwrap();
+        fs::write(follower.path("programs/ffplay"), "#!/bin/sh\nexec cat >/dev/null\n").unwrap();
+        fs::set_permissions(follower.path("programs/ffplay"), PermissionsExt::from_mode(0o755)).unwrap();
+        follower
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    fn shell(&self, command: &str) -> Command {
+        let mut shell = Command::new("bash");
+        for (name, _) in std::env::vars_os() {
+            let text = name.to_string_lossy();
+            if ["BOKEHCAM_", "XDG_", "RUST_LOG"].iter().any(|begin| text.starts_with(begin)) {
+                shell.env_remove(name);
+            }
+        }
+        shell.args(["-o", "pipefail", "-c", command]).current_dir(&self.folder).stdin(Stdio::null());
+        let path = format!("{}:{}", self.path("programs").display(), std::env::var("PATH").unwrap());
+        shell.env("PATH", path).env("HOME", self.path("home")).env("XDG_RUNTIME_DIR", self.path("session"));
+        // As wide as help becomes.
+        shell.env("COLUMNS", "110");
+        shell
+    }
+
+    fn output(&self, command: &str) -> Output {
+        self.shell(command).output().unwrap()
+    }
+
+    /// Has something run that `bokehcam ctl` can speak to.
+    fn start_a_stream(&mut self) {
+        if self.running.is_some() {
+            return;
+        }
+        let stream = "exec bokehcam --quiet stream demo --pace realtime --to null --name desk";
+        self.running = Some(self.shell(stream).spawn().unwrap());
+        let began = Instant::now();
+        while !self.output("bokehcam ctl status").status.success() {
+            assert!(began.elapsed() < Duration::from_secs(60), "the stream does not answer");
+            std::thread::sleep(Duration::from_millis(50));
+        }
+    }
+
+    /// Whether the program takes the arguments of a command that cannot be run; what is no source here has another's place.
+    fn check(&self, command: &str) -> Result<(), String> {
+        let command = command.split(['>', '|']).next().unwrap_or_default().trim_end();
+        let mut words: Vec<&str> = command.split(' ').collect();
+        if let [_, "stream" | "preview" | "plate" | "record", source, ..] = &mut words[..] {
+            let elsewhere = ["/dev/", "pipewire:", "C920", "somewhere/"];
+            let is_number = source.starts_with(|first: char| first.is_ascii_digit());
+            if is_number || elsewhere.iter().any(|begin| source.starts_with(begin)) {
+                *source = "demo";
+            }
+        }
+        let ran = self.output(&format!("{} --config {NO_SETTINGS}", words.join(" ")));
+        let said = String::from_utf8_lossy(&ran.stderr);
+        match ran.status.code() == Some(1) && said.contains(NO_SETTINGS) {
+            true => Ok(()),
+            false => Err(said.into_owned()),
+        }
+    }
+
+    /// Runs a command, or checks its arguments; gives whether it ran.
+    fn follow(&mut self, command: &str) -> Result<bool, String> {
+        // Those that are known are found by their content, which is not here.
+        let command = ["matte", "mono"].iter().fold(command.to_owned(), |command, task| {
+            let of_our_own = format!("{task}:small.onnx");
+            command.split(' ').map(|word| named(word, task, &of_our_own)).collect::<Vec<_>>().join(" ")
+        });
+        let has_ffmpeg = || self.output("ffmpeg -version").status.success();
+        let only_checked = match command.contains(".mp4") && !has_ffmpeg() {
+            true => Some("needs ffmpeg"),
+            false => ONLY_CHECKED.iter().find(|(part, _)| command.contains(part)).map(|(_, why)| *why),
+        };
+        if let Some(why) = only_checked.filter(|_| !command.ends_with(" --help")) {
+            println!("only checked, {why}: {command}");
+            return self.check(&command).map(|()| false);
+        }
+        if command.contains("bokehcam ctl") {
+            self.start_a_stream();
+        }
+        let ran = self.output(&command);
+        match ran.status.success() {
+            true => println!("ran: {command}"),
+            false => return Err(format!("{}: {}", ran.status, String::from_utf8_lossy(&ran.stderr))),
+        }
+        Ok(true)
+    }
+}
+
+/// A word of a list such as `plate,matte`, with a file for the network of a task.
+fn named(word: &str, task: &str, file: &str) -> String {
+    let parts: Vec<&str> = word.split(',').map(|part| if part == task { file } else { part }).collect();
+    parts.join(",")
+}
+
+/// Follows a page; at least `least` of its commands run, so that none is left out by mistake.
+fn follow(page: &str, least: usize) {
+    let repository = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."));
+    let text = fs::read_to_string(repository.join(page)).unwrap();
+    let mut follower = Follower::new();
+    let mut done: Vec<String> = Vec::new();
+    let (mut ran, mut faults) = (0, Vec::new());
+    for command in pages::commands(&text) {
+        // What is named again is not done again.
+        if done.contains(&command) {
+            continue;
+        }
+        let left_out = LEFT_OUT.iter().find(|(part, _)| command.contains(part));
+        match left_out {
+            Some((_, why)) => {
+                println!("left out, {why}: {command}");
+                let program = command.split(' ').next().unwrap_or_default();
+                if program.contains('/') && !program.contains('=') && !repository.join(program).is_file() {
+                    faults.push(format!("`{command}`: there is no {program}"));
+                }
+            }
+            None => match follower.follow(&command) {
+                Ok(true) => ran += 1,
+                Ok(false) => {}
+                Err(said) => faults.push(format!("`{command}`: {said}")),
+            },
+        }
+        done.push(command);
+    }
+    assert!(faults.is_empty(), "{page}:\n{}", faults.join("\n"));
+    assert!(ran >= least, "{page}: {ran} commands ran, where {least} can");
+}
+
+#[test]
+fn arguments_are_checked_without_what_they_need() {
+    let follower = Follower::new();
+    assert_eq!(follower.check("bokehcam stream 0,2 --calib any.yml --to /dev/video10"), Ok(()));
+    for (wrong, said) in [
+        ("bokehcam stream 0 --on-demand", "--to"),
+        ("bokehcam preview --nosuch", "--nosuch"),
+        ("bokehcam bench --quality nosuch", "nosuch"),
+    ] {
+        assert!(follower.check(wrong).unwrap_err().contains(said), "{wrong}");
+    }
+}
+
+/// What the help of a command lists of the commands below it, such as `config dump`, and its examples.
+fn help_of(follower: &Follower, command: &str) -> Vec<(String, Vec<String>)> {
+    let output = follower.output(&format!("{command} --help"));
+    let help = String::from_utf8(output.stdout).unwrap();
+    let section = |begins: &'static str| {
+        let lines = help.lines().skip_while(move |line| !line.starts_with(begins)).skip(1);
+        lines.take_while(|line| line.starts_with("  ")).filter(|line| !line.starts_with("   ")).map(str::trim)
+    };
+    let below = section("Commands:").filter_map(|line| line.split(' ').next()).filter(|name| *name != "help");
+    let below = below.flat_map(|name| help_of(follower, &format!("{command} {name}")));
+    // What is beside a command may go on below it.
+    let examples = section("Example").filter(|line| line.starts_with("bokehcam "));
+    let examples = examples.map(|line| line.split_once("  ").map_or(line, |(code, _)| code).to_owned());
+    [(command.to_owned(), examples.collect())].into_iter().chain(below).collect()
+}
+
+/// With nothing beside the program, as where it is installed.
+#[test]
+fn the_examples_of_help_are_right() {
+    let mut follower = Follower::new();
+    fs::remove_file(follower.path("recordings")).unwrap();
+    let help = help_of(&follower, "bokehcam");
+    assert!(help.len() > 12, "{} commands", help.len());
+    let mut faults = Vec::new();
+    for (command, examples) in help {
+        assert!(!examples.is_empty() || command.split(' ').count() > 2, "{command} has no examples");
+        for example in examples {
+            // Of the program as a whole, each is run; what is saved is saved in a file that need not be there.
+            let done = match command == "bokehcam" || example.contains("config save") {
+                true => follower.follow(&example).map(drop),
+                false => follower.check(&example),
+            };
+            faults.extend(done.err().map(|said| format!("{command}: `{example}`: {said}")));
+        }
+    }
+    assert!(faults.is_empty(), "{}", faults.join("\n"));
+}
+
+#[test]
+fn the_readme_can_be_followed_line_by_line() {
+    follow("README.md", 12);
+}
+
+#[test]
+fn the_pages_can_be_followed_line_by_line() {
+    let least = [("algorithm.md", 1), ("settings.md", 5), ("stereo.md", 2), ("ctl.md", 6)];
+    for page in fs::read_dir(Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("docs")).unwrap() {
+        let name = page.unwrap().file_name().into_string().unwrap();
+        if name.ends_with(".md") {
+            let least = least.iter().find(|(page, _)| *page == name).map_or(0, |(_, least)| *least);
+            follow(&format!("docs/{name}"), least);
+        }
+    }
+}

@@ -1,0 +1,38 @@
+//! The program, started as a user starts it.
+#![allow(missing_docs)]
+
+#[path = "../../../../tests/common/mod.rs"]
+mod common;
+#[path = "../../../../tests/common/onnx.rs"]
+mod onnx;
+#[path = "../../../../tests/common/planes.rs"]
+mod planes;
+#[path = "../../../../tests/common/store.rs"]
+mod store;
+
+mod cli;
+mod ctl;
+#[cfg(feature = "lab")]
+mod debug_dir;
+#[cfg(feature = "gpu")]
+mod depth_on_gpu;
+mod disparity;
+mod documents;
+mod fit;
+#[cfg(feature = "camera")]
+mod fuzz;
+#[cfg(feature = "gpu")]
+mod gpu_faults;
+#[cfg(feature = "networks")]
+mod networks;
+mod outputs;
+mod packaging;
+mod plate;
+mod presets;
+#[cfg(feature = "window")]
+mod preview;
+mod record;
+mod render;
+mod settings;
+mod stereo;
+mod terminal;

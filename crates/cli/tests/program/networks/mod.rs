@@ -1,0 +1,320 @@
+//! Networks of the user's own: loaded, run, and kept from doing harm; and what depth they give one camera.
+
+mod hostile;
+mod installed;
+use crate::onnx;
+mod plate;
+mod real;
+#[cfg(feature = "window")]
+mod window;
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+use std::time::Duration;
+
+use bokehcam::depth::single_camera::{Hints, SingleCamera};
+use bokehcam::depth::{DepthSource, Seen};
+use bokehcam::frame::{ColorImage, DepthMap, Stamp};
+use bokehcam::network::{self, Runtime, Tensor};
+use onnx::{Side, constant, conv, matte, model, node, port};
+use tempfile::TempDir;
+
+/// Red is the person, and blue is not: codes of 255 and 0 leave no doubt.
+const WEIGHTS: [f32; 3] = [12.0, 0.0, -12.0];
+
+fn written(folder: &TempDir, name: &str, bytes: &[u8]) -> PathBuf {
+    let path = folder.path().join(name);
+    fs::write(&path, bytes).unwrap();
+    path
+}
+
+fn camera(file: &Path, runtime: Runtime) -> SingleCamera {
+    SingleCamera::open(Some(file), None, &Hints::default(), runtime).unwrap()
+}
+
+fn read(camera: &mut dyn DepthSource, color: &ColorImage, frame: u64) -> DepthMap {
+    let mut map = DepthMap::default();
+    let stamp = Stamp { index: frame as usize, time_ns: frame * 33_000_000, captured_ns: None };
+    camera.read(Seen { stamp, color, right: None }, &mut map).unwrap();
+    map
+}
+
+/// A red disc before blue, each pixel the mean of what it shows.
+fn disc(width: u32, height: u32, (x, y): (f32, f32), radius_px: f32) -> (ColorImage, Vec<f32>) {
+    let mut color = ColorImage::new(width, height);
+    let mut shares = Vec::new();
+    for at in 0..width * height {
+        let inside = (0..64).filter(|sub| {
+            let (sub_x, sub_y) = ((sub % 8) as f32 / 8.0 + 1.0 / 16.0, (sub / 8) as f32 / 8.0 + 1.0 / 16.0);
+            let off = ((at % width) as f32 + sub_x - x, (at / width) as f32 + sub_y - y);
+            off.0.hypot(off.1) < radius_px
+        });
+        let share = inside.count() as f32 / 64.0;
+        let code = |share: f32| (bokehcam::color::linear_to_srgb(0.05 + 0.9 * share) * 255.0).round() as u8;
+        color.rgb[3 * at as usize..][..3].copy_from_slice(&[code(share), 60, code(1.0 - share)]);
+        shares.push(share);
+    }
+    (color, shares)
+}
+
+#[test]
+fn a_network_gives_what_its_layers_say() {
+    let folder = TempDir::new().unwrap();
+    let file = written(&folder, "sum.onnx", &matte(8, 4, [1.0, 2.0, -3.0], 0.25));
+    let mut network = network::load(&file, Runtime::BuiltIn).unwrap().network;
+    let values: Vec<f32> = (0..96).map(|k| k as f32 / 96.0).collect();
+    let mut outputs = Vec::new();
+    network.run(&[Tensor { shape: vec![1, 3, 4, 8], values: values.clone() }], &mut outputs).unwrap();
+    assert_eq!(outputs[0].shape, [1, 1, 4, 8]);
+    for at in 0..32 {
+        let sum = values[at] + 2.0 * values[32 + at] - 3.0 * values[64 + at] + 0.25;
+        let exact = 1.0 / (1.0 + (-sum).exp());
+        assert!((outputs[0].values[at] - exact).abs() < 1e-5, "{at}");
+    }
+}
+
+#[test]
+fn a_coarse_mask_becomes_the_share_of_every_pixel() {
+    let folder = TempDir::new().unwrap();
+    // A tenth of the picture's size.
+    let file = written(&folder, "matte.onnx", &matte(32, 24, WEIGHTS, 0.0));
+    let (color, shares) = disc(320, 240, (163.0, 118.0), 70.0);
+    let map = read(&mut camera(&file, Runtime::BuiltIn), &color, 0);
+    assert_eq!(map.subject_m, Some(1.0));
+    let mut found: Vec<f32> = map.metres.iter().map(|&metres| f32::from(u8::from(metres <= 1.0))).collect();
+    for pixel in &map.matte.pixels {
+        found[pixel.at as usize] = pixel.share;
+    }
+    let mixed = |share: &f32| *share > 0.02 && *share < 0.98;
+    let error: f32 = found.iter().zip(&shares).map(|(found, share)| (found - share).abs()).sum();
+    let count = shares.iter().filter(|share| mixed(share)).count() as f32;
+    assert!(error / count < 0.03, "mean error over {count} mixed pixels: {}", error / count);
+    // Both colours together are the pixel: with the surfaces' own, each is pure.
+    for pixel in &map.matte.pixels {
+        let red = pixel.difference[0];
+        assert!((0.7..1.0).contains(&red), "{pixel:?}");
+    }
+}
+
+/// Live, a network for depth may take longer than a frame: what it saw is told some frames later, and is the same.
+#[test]
+fn what_is_seen_aside_is_what_is_seen_at_once() {
+    let folder = TempDir::new().unwrap();
+    let person = written(&folder, "matte.onnx", &matte(32, 24, WEIGHTS, 0.0));
+    // Blue is nearer than red.
+    let depth = written(&folder, "mono.onnx", &matte(32, 24, [-1.0, 0.0, 1.0], 0.0));
+    let open = || SingleCamera::open(Some(&person), Some(&depth), &Hints::default(), Runtime::BuiltIn).unwrap();
+    let [(first, _), (second, _)] = [100.0, 220.0].map(|x| disc(320, 240, (x, 118.0), 60.0));
+    let (mut at_once, mut live) = (open(), open());
+    let finest = live.efforts().len() - 1;
+    live.set_effort(finest);
+    assert!(read(&mut live, &first, 0) == read(&mut at_once, &first, 0), "the first one has its own depth");
+    // By then undecided pixels have settled.
+    let expected = (1..200).map(|frame| read(&mut at_once, &second, frame)).last();
+    let is_there = (1..2000).any(|frame| {
+        std::thread::sleep(Duration::from_millis(1));
+        Some(read(&mut live, &second, frame)) == expected
+    });
+    assert!(is_there, "the thread never told");
+}
+
+/// However little time there is, nobody wears the outlines of a frame before.
+#[test]
+fn each_frame_has_a_mask_of_its_own_at_every_effort() {
+    let folder = TempDir::new().unwrap();
+    let person = written(&folder, "matte.onnx", &matte(32, 24, WEIGHTS, 0.0));
+    let depth = written(&folder, "mono.onnx", &matte(32, 24, [-1.0, 0.0, 1.0], 0.0));
+    let open =
+        |mono: Option<&Path>| SingleCamera::open(Some(&person), mono, &Hints::default(), Runtime::BuiltIn).unwrap();
+    let (mut finest, mut least) = (open(None), open(None));
+    least.set_effort(0);
+    for frame in 0..8u64 {
+        let (color, _) = disc(320, 240, (80.0 + 20.0 * frame as f32, 118.0), 60.0);
+        assert!(read(&mut least, &color, frame) == read(&mut finest, &color, frame), "frame {frame}");
+    }
+    assert!(!least.may_be_shared() && !open(Some(&*depth)).may_be_shared());
+    let alone = SingleCamera::open(None, Some(&depth), &Hints::default(), Runtime::BuiltIn).unwrap();
+    assert!(alone.may_be_shared(), "what is near and far is no mask");
+}
+
+#[test]
+fn what_a_network_is_shown_may_lie_any_way_and_be_of_any_size() {
+    let folder = TempDir::new().unwrap();
+    let (color, _) = disc(64, 48, (32.0, 24.0), 15.0);
+    let planes = matte(16, 12, WEIGHTS, 0.0);
+    // Colours beside each other: a product by place, and a sum over them.
+    let beside = |channels| [Side::Is(1), Side::Is(12), Side::Is(16), Side::Is(channels)];
+    let beside = model(
+        &[port("picture", &beside(3))],
+        &[constant("w", &[3, 1], &WEIGHTS)],
+        &[node("MatMul", &["picture", "w"], "sum", &[]), node("Sigmoid", &["sum"], "out", &[])],
+        &[port("out", &beside(1))],
+    );
+    let any = |channels| [Side::Any("n"), Side::Is(channels), Side::Any("h"), Side::Any("w")];
+    let any_size = model(
+        &[port("picture", &any(3))],
+        &[constant("w", &[1, 3, 1, 1], &WEIGHTS)],
+        &[conv(&["picture", "w"], "sum"), node("Sigmoid", &["sum"], "out", &[])],
+        &[port("out", &any(1))],
+    );
+    // Numbers before the last step, and two of them: what is no person, and what is.
+    let two = model(
+        &[port("picture", &any(3))],
+        &[constant("w", &[2, 3, 1, 1], &[-6.0, 0.0, 6.0, 6.0, 0.0, -6.0])],
+        &[conv(&["picture", "w"], "out")],
+        &[port("out", &any(2))],
+    );
+    for (name, bytes) in [("planes", planes), ("beside", beside), ("any size", any_size), ("two", two)] {
+        let map = read(&mut camera(&written(&folder, "m.onnx", &bytes), Runtime::BuiltIn), &color, 0);
+        assert_eq!((map.metres[24 * 64 + 32], map.metres[0]), (1.0, 1000.0), "{name}");
+    }
+}
+
+#[test]
+fn a_network_with_a_memory_gets_back_what_it_gave() {
+    let folder = TempDir::new().unwrap();
+    let sides = |channels| [Side::Is(1), Side::Is(channels), Side::Is(4), Side::Is(4)];
+    // It adds up what it sees, and is sure from half on.
+    let recurrent = model(
+        &[port("src", &sides(3)), port("r1i", &sides(1))],
+        &[
+            constant("w", &[1, 3, 1, 1], &[0.1, 0.0, 0.0]),
+            constant("slope", &[1], &[200.0]),
+            constant("half", &[1], &[-110.0]),
+        ],
+        &[
+            conv(&["src", "w"], "seen"),
+            node("Add", &["seen", "r1i"], "r1o", &[]),
+            node("Mul", &["r1o", "slope"], "steep", &[]),
+            node("Add", &["steep", "half"], "shifted", &[]),
+            node("Sigmoid", &["shifted"], "pha", &[]),
+        ],
+        &[port("pha", &sides(1)), port("r1o", &sides(1))],
+    );
+    let mut red = ColorImage::new(16, 16);
+    red.rgb.chunks_mut(3).for_each(|pixel| pixel[0] = 255);
+    let mut camera = camera(&written(&folder, "r.onnx", &recurrent), Runtime::BuiltIn);
+    // Five tenths are not yet half, six are.
+    let near: Vec<bool> = (0..7).map(|frame| read(&mut camera, &red, frame).metres[0] <= 1.0).collect();
+    assert_eq!(near.iter().position(|near| *near), Some(5), "{near:?}");
+    // Another scene, long after: it begins anew.
+    assert!(read(&mut camera, &red, 1000).metres[0] > 1.0);
+}
+
+fn bokehcam(arguments: &[&str], data: &Path) -> Output {
+    let program = Command::new(env!("CARGO_BIN_EXE_bokehcam"))
+        .args(arguments)
+        .env("XDG_DATA_HOME", data)
+        .env("XDG_DATA_DIRS", data)
+        .env("XDG_CONFIG_HOME", data)
+        .output();
+    program.unwrap()
+}
+
+#[test]
+fn a_bad_file_is_refused_in_one_line() {
+    let folder = TempDir::new().unwrap();
+    let good = matte(8, 4, WEIGHTS, 0.0);
+    let sides = |channels, side| [Side::Is(1), Side::Is(channels), Side::Is(side), Side::Is(side)];
+    let plain = |input: &[Side], output: &[Side]| {
+        let nodes = [node("Identity", &["in"], "out", &[])];
+        model(&[port("in", input)], &[], &nodes, &[port("out", output)])
+    };
+    let zero = model(
+        &[port("in", &sides(3, 8))],
+        &[constant("w", &[1, 3, 1, 1], &[0.0; 3])],
+        &[conv(&["in", "w"], "zero"), node("Div", &["zero", "zero"], "out", &[])],
+        &[port("out", &sides(1, 8))],
+    );
+    let unknown =
+        model(&[port("in", &sides(3, 8))], &[], &[node("Magic", &["in"], "out", &[])], &[port("out", &sides(1, 8))]);
+    let cases: [(&str, Vec<u8>, &str); 8] = [
+        ("cut", good[..good.len() / 2].to_vec(), "no network that can be run here"),
+        ("empty", Vec::new(), "no network that can be run here"),
+        ("text", b"not a network at all".to_vec(), "no network that can be run here"),
+        ("grey", plain(&sides(1, 8), &sides(1, 8)), "three channels"),
+        ("three", plain(&sides(3, 8), &sides(3, 8)), "its answer is no picture"),
+        ("huge", plain(&sides(3, 8192), &sides(1, 8192)), "more than"),
+        ("nan", zero, "no number"),
+        ("unknown", unknown, "Magic"),
+    ];
+    for (name, bytes, expected) in &cases {
+        let file = written(&folder, &format!("{name}.onnx"), bytes);
+        let choice = format!("matte:{}", file.display());
+        let ran = bokehcam(
+            &[
+                "stream",
+                "recordings/portrait",
+                "--depth",
+                &choice,
+                "--network-runtime",
+                "built-in",
+                "--frames",
+                "1",
+                "--to",
+                "null",
+            ],
+            folder.path(),
+        );
+        let said = String::from_utf8_lossy(&ran.stderr);
+        assert_eq!(ran.status.code(), Some(1), "{name}: {said}");
+        assert_eq!(said.lines().count(), 1, "{name}: {said}");
+        assert!(said.contains(expected) && said.contains(name), "{name}: {said}");
+    }
+    let missing =
+        bokehcam(&["stream", "recordings/portrait", "--depth", "matte:nowhere.onnx", "--to", "null"], folder.path());
+    assert_eq!(missing.status.code(), Some(1));
+    assert!(String::from_utf8_lossy(&missing.stderr).contains("nowhere.onnx: No such file"));
+    let none = bokehcam(&["stream", "recordings/portrait", "--depth", "matte", "--to", "null"], folder.path());
+    assert_eq!(none.status.code(), Some(1));
+    assert!(String::from_utf8_lossy(&none.stderr).contains("`bokehcam models get"));
+}
+
+#[test]
+fn without_onnx_runtime_what_is_built_in_is_used_and_what_was_asked_for_is_missed() {
+    let folder = TempDir::new().unwrap();
+    let file = written(&folder, "m.onnx", &matte(8, 4, WEIGHTS, 0.0));
+    // A library that is none.
+    let library = written(&folder, "libonnxruntime.so", b"nothing");
+    let choice = format!("matte:{}", file.display());
+    let run = |runtime: &str| {
+        Command::new(env!("CARGO_BIN_EXE_bokehcam"))
+            .args([
+                "stream",
+                "recordings/portrait",
+                "--frames",
+                "2",
+                "--depth",
+                &choice,
+                "--network-runtime",
+                runtime,
+                "--to",
+                "null",
+            ])
+            .env("ORT_DYLIB_PATH", &library)
+            .env("XDG_CONFIG_HOME", folder.path())
+            .output()
+            .unwrap()
+    };
+    let (auto, asked) = (run("auto"), run("onnx-runtime"));
+    let said = String::from_utf8_lossy(&auto.stderr);
+    assert!(auto.status.success() && said.contains("run by the built-in runtime"), "{said}");
+    let said = String::from_utf8_lossy(&asked.stderr);
+    assert_eq!(asked.status.code(), Some(1), "{said}");
+    assert!(said.contains("ONNX Runtime") && said.lines().count() == 1, "{said}");
+}
+
+#[test]
+fn relative_depth_refuses_metres() {
+    let folder = TempDir::new().unwrap();
+    let file = written(&folder, "m.onnx", &matte(8, 4, WEIGHTS, 0.0));
+    let choice = format!("matte:{}", file.display());
+    let ran = bokehcam(
+        &["stream", "recordings/portrait", "--depth", &choice, "--focus", "1.2", "--frames", "1", "--to", "null"],
+        folder.path(),
+    );
+    let said = String::from_utf8_lossy(&ran.stderr);
+    assert_eq!(ran.status.code(), Some(2), "{said}");
+    assert!(said.contains("--focus 1.2 needs distances"), "{said}");
+}

@@ -1,0 +1,68 @@
+//! Networks that the window is given.
+
+use std::fs;
+
+use bokehcam::look::Look;
+use bokehcam::source::{DepthChoice, Options};
+use bokehcam_window::services::Services;
+use bokehcam_window::state::Way;
+use bokehcam_window::system::System;
+use tempfile::TempDir;
+
+use crate::store;
+
+use super::onnx::{Side, matte, model, node, port};
+use super::{WEIGHTS, written};
+use store::NoStore;
+
+#[test]
+fn the_window_says_in_one_line_why_a_network_cannot_be_used_and_goes_on() {
+    let folder = TempDir::new().unwrap();
+    let good = matte(32, 24, WEIGHTS, 0.0);
+    let huge = folder.path().join("huge.onnx");
+    fs::File::create(&huge).unwrap().set_len(1 << 40).unwrap();
+    let line = [port("in", &[Side::Is(7)])];
+    let shapeless = model(&line, &[], &[node("Relu", &["in"], "out", &[])], &[port("out", &[Side::Is(7)])]);
+    let files = [
+        folder.path().join("missing.onnx"),
+        written(&folder, "cut.onnx", &good[..good.len() / 2]),
+        written(&folder, "shapeless.onnx", &shapeless),
+        huge,
+        written(&folder, "good.onnx", &good),
+    ];
+    let recording = concat!(env!("CARGO_MANIFEST_DIR"), "/../../recordings/portrait");
+    for file in files {
+        let depth_choice: DepthChoice = format!("matte:{}", file.display()).parse().unwrap();
+        let options = Options { depth_choice, ..Options::default() };
+        let mut system = System::new(options, Look::default(), Box::new(NoStore));
+        match system.open(recording, None) {
+            Ok(opened) => assert!(file.ends_with("good.onnx") && opened.source.has_depth(), "{}", file.display()),
+            Err(line) => {
+                let name = file.file_name().unwrap().to_str().unwrap();
+                assert!(line.contains(name) && !line.contains('\n') && name != "good.onnx", "{line}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_source_has_the_ways_to_depth_that_it_brings_and_the_command_names_the_one_that_was_chosen() {
+    let at = |name: &str| format!("{}/recordings/{name}", concat!(env!("CARGO_MANIFEST_DIR"), "/../.."));
+    let mut system = System::new(Options::default(), Look::default(), Box::new(NoStore));
+    for (name, usual) in [("portrait", Way::Measured), ("stereo", Way::Stereo)] {
+        let opened = system.open(&at(name), None).unwrap();
+        assert_eq!((opened.way, opened.ways.first(), opened.has_depth), (Some(usual), Some(&usual), true), "{name}");
+        assert!(!opened.ways.contains(&Way::Plate), "nobody in a recording steps aside");
+        assert!(!opened.camera.is_relative);
+        // By its own name it is the same.
+        let again = system.open(&at(name), Some(usual)).unwrap();
+        assert_eq!((again.way, &again.ways), (Some(usual), &opened.ways), "{name}");
+    }
+    let none = system.can(&at("portrait"), Way::PersonAndDistance);
+    let is_installed = system.open(&at("portrait"), None).unwrap().ways.contains(&Way::PersonAndDistance);
+    assert_eq!(none.is_ok(), is_installed);
+    assert!(is_installed || none.unwrap_err().contains("`bokehcam models get`"));
+    assert!(system.can(&at("portrait"), Way::Stereo).is_err(), "it has one eye");
+    let flags = [Way::Measured, Way::Stereo, Way::Person, Way::PersonAndDistance].map(Way::flag);
+    assert_eq!(flags, ["recorded", "stereo", "matte", "matte,mono"]);
+}

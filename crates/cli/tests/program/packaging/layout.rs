@@ -1,0 +1,70 @@
+//! What packages are called, and what lies in them.
+
+use super::*;
+
+/// `cargo binstall` looks for the archive, and the program in it, by names of its own.
+#[test]
+fn binstall_finds_the_archive_that_is_made() {
+    let manifest: toml::Table = here("Cargo.toml").parse().unwrap();
+    let binstall = &manifest["package"]["metadata"]["binstall"];
+    let filled = |key: &str| {
+        let mut text = binstall[key].as_str().unwrap().to_owned();
+        for (name, value) in [
+            ("name", "bokehcam"),
+            ("bin", "bokehcam"),
+            ("version", "$version"),
+            ("target", "$host"),
+            ("binary-ext", ""),
+        ] {
+            text = text.replace(&format!("{{ {name} }}"), value);
+        }
+        text
+    };
+    let package = here("scripts/package");
+    assert!(package.contains("name=\"bokehcam-$version-$host\"") && package.contains("\"$out/$name.tar.gz\""));
+    assert_eq!(filled("pkg-url"), "{ repo }/releases/download/v$version/bokehcam-$version-$host.tar.gz");
+    assert_eq!(filled("bin-dir"), "bokehcam-$version-$host/bin/bokehcam");
+    assert_eq!(binstall["pkg-fmt"].as_str(), Some("tgz"));
+}
+
+/// A package has the networks that are in the build tree, and none without its licence.
+#[test]
+fn networks_are_given_to_others_with_their_licence() {
+    let tree = tempfile::tempdir().unwrap();
+    let copy = |path: &str| {
+        let to = tree.path().join(path);
+        fs::create_dir_all(to.parent().unwrap()).unwrap();
+        fs::copy(Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join(path), to).unwrap();
+    };
+    for path in ["packaging/install", "packaging/licences.py", "README.md", "CHANGELOG.md", "LICENSE-MIT"] {
+        copy(path);
+    }
+    for name in ["bokehcam.desktop", "bokehcam.svg", "bokehcam.service", "io.github.bokehcam.bokehcam.metainfo.xml"] {
+        copy(&format!("packaging/{name}"));
+    }
+    copy("packaging/examples/udev.rules");
+    copy("docs/call.md");
+    // Its own is asked of cargo, and is not what this is about.
+    fs::write(tree.path().join("packaging/licences.py"), "#!/bin/sh\necho licences\n").unwrap();
+    let models = tree.path().join("target/models");
+    fs::create_dir_all(&models).unwrap();
+    fs::write(models.join("person.tflite"), "network").unwrap();
+    let install = || {
+        let mut command = Command::new(tree.path().join("packaging/install"));
+        command.arg(env!("CARGO_BIN_EXE_bokehcam")).arg(tree.path().join("root")).arg("/usr/local");
+        command.env_remove("CARGO_TARGET_DIR").output().unwrap()
+    };
+    let refused = install();
+    let said = String::from_utf8_lossy(&refused.stderr).into_owned();
+    assert!(refused.status.code() == Some(1) && said.contains("person.licence.txt"), "{said}");
+
+    fs::write(models.join("person.licence.txt"), "Apache-2.0").unwrap();
+    let done = install();
+    assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
+    let share = tree.path().join("root/usr/local/share");
+    assert_eq!(fs::read(share.join("bokehcam/models/person.tflite")).unwrap(), b"network");
+    assert_eq!(fs::read(share.join("licenses/bokehcam/person.licence.txt")).unwrap(), b"Apache-2.0");
+    // Where it lies, it is found.
+    let unit = fs::read_to_string(tree.path().join("root/usr/local/lib/systemd/user/bokehcam.service")).unwrap();
+    assert!(unit.contains("ExecStart=/usr/local/bin/bokehcam "), "{unit}");
+}

@@ -1,0 +1,258 @@
+//! The command `render` on pictures as cameras and programs write them.
+#![allow(missing_docs)]
+
+use std::path::Path;
+use std::process::{Command, Stdio};
+
+use bokehcam::frame::ColorImage;
+use bokehcam::recording::Extras;
+use bokehcam::recording::still::{read_photo, write_photo};
+use image::{ImageBuffer, Rgba};
+use tempfile::TempDir;
+
+/// Runs a command with these arguments in `dir`; gives the exit code, and what was said.
+fn bokehcam(dir: &Path, command: &[&str], arguments: &[&str]) -> (Option<i32>, String) {
+    let mut program = Command::new(env!("CARGO_BIN_EXE_bokehcam"));
+    program.env_clear().env("XDG_CONFIG_HOME", dir).current_dir(dir).stdin(Stdio::null());
+    let output = program.args(command).args(arguments).args(["--backend", "cpu"]).output().unwrap();
+    (output.status.code(), String::from_utf8(output.stderr).unwrap())
+}
+
+/// Runs `render`.
+fn run(dir: &Path, arguments: &[&str]) -> (Option<i32>, String) {
+    bokehcam(dir, &["render"], arguments)
+}
+
+/// Blurs `image` in `dir`; gives what was said.
+fn render(dir: &Path, image: &str, out: &str) -> String {
+    let (code, said) = run(dir, &[image, "--effect", "blur", "--coc-at-infinity", "3", "--out", out]);
+    assert_eq!(code, Some(0), "{said}");
+    said
+}
+
+/// Checks of 8 by 8 pixels, light on the left half and dark on the right.
+fn halves(dir: &Path) -> ColorImage {
+    let mut picture = ColorImage::new(160, 96);
+    for (k, pixel) in picture.rgb.chunks_exact_mut(3).enumerate() {
+        let (x, y) = (k % 160, k / 160);
+        let check = if (x / 8 + y / 8) % 2 == 0 { 60 } else { 0 };
+        let code = if x < 80 { 180 + check } else { 20 + check };
+        pixel.fill(code as u8);
+    }
+    write_photo(&dir.join("in.png"), &picture, &Extras::default(), false).unwrap();
+    picture
+}
+
+/// The mean difference of two pictures in some columns, in codes.
+fn difference(a: &ColorImage, b: &ColorImage, columns: std::ops::Range<usize>) -> f32 {
+    let width = a.width as usize;
+    let bytes = (0..a.rgb.len()).filter(|byte| columns.contains(&(byte / 3 % width)));
+    let (sum, count) =
+        bytes.fold((0.0, 0.0), |(sum, count), k| (sum + f32::from(a.rgb[k].abs_diff(b.rgb[k])), count + 1.0));
+    sum / count
+}
+
+#[test]
+fn what_goes_with_a_picture_stays_with_it() {
+    let dir = TempDir::new().unwrap();
+    let mut profile = vec![7; 200];
+    profile[16..20].copy_from_slice(b"RGB ");
+    // One entry, the name of the camera.
+    let exif = b"MM\0\x2a\0\0\0\x08\0\x01\x01\x10\0\x02\0\0\0\x04CAM\0\0\0\0\0".to_vec();
+    let xmp =
+        "<x:xmpmeta xmlns:x=\"adobe:ns:meta/\"><rdf:Description dc:rights=\"Mine, \u{e4}\"/></x:xmpmeta>".to_owned();
+    let extras = Extras { icc_profile: Some(profile), exif: Some(exif), xmp: Some(xmp), ..Extras::default() };
+    write_photo(&dir.path().join("in.jpg"), &ColorImage::new(40, 30), &extras, false).unwrap();
+    for out in ["out.png", "out.jpg"] {
+        let said = render(dir.path(), "in.jpg", out);
+        assert_eq!(said.lines().count(), 1, "{said}");
+        assert_eq!(read_photo(&dir.path().join(out)).unwrap().1, extras, "{out}");
+    }
+}
+
+#[test]
+fn what_does_not_fit_is_said_once() {
+    let dir = TempDir::new().unwrap();
+    ImageBuffer::<Rgba<u16>, _>::from_pixel(40, 30, [1, 2, 3, 4].into()).save(dir.path().join("in.png")).unwrap();
+    let said = render(dir.path(), "in.png", "out.png");
+    assert_eq!(said.lines().count(), 2, "{said}");
+    assert!(said.starts_with("note: not in out.png: transparency, 16 bits a channel\n"), "{said}");
+}
+
+#[test]
+fn a_mask_says_what_stays_sharp_in_any_size() {
+    let dir = TempDir::new().unwrap();
+    let picture = halves(dir.path());
+    // A twentieth of the picture's size, and its first column and a half white.
+    let mask = image::GrayImage::from_fn(10, 6, |x, _| [if x < 5 { 255 } else { 0 }].into());
+    mask.save(dir.path().join("mask.png")).unwrap();
+    let (code, said) = run(dir.path(), &["in.png", "--mask", "mask.png", "--coc-at-infinity", "8", "--out", "out.png"]);
+    assert_eq!((code, said.lines().count()), (Some(0), 1), "{said}");
+    let out = read_photo(&dir.path().join("out.png")).unwrap().0;
+    assert_eq!(difference(&picture, &out, 0..70), 0.0, "the subject is not touched");
+    assert!(difference(&picture, &out, 90..160) > 10.0);
+    // The outline lies where the colours have it, though the mask is coarse.
+    assert!(difference(&picture, &out, 76..80) < 2.0, "{}", difference(&picture, &out, 76..80));
+    for (arguments, expected) in [
+        (vec!["in.png", "--mask", "mask.png", "--focus", "2", "--out", "no.png"], "--focus 2 needs distances"),
+        (
+            vec!["in.png", "--mask", "mask.png", "--depth", "matte", "--out", "no.png"],
+            "leave --depth-map and --mask out",
+        ),
+    ] {
+        let (code, said) = run(dir.path(), &arguments);
+        assert_eq!(code, Some(2), "{said}");
+        assert!(said.contains(expected), "{said}");
+    }
+}
+
+#[test]
+fn relative_inverse_depth_has_white_near_or_far() {
+    let dir = TempDir::new().unwrap();
+    let picture = halves(dir.path());
+    let near_left = image::GrayImage::from_fn(160, 96, |x, _| [if x < 80 { 200 } else { 40 }].into());
+    near_left.save(dir.path().join("near.png")).unwrap();
+    let mut far_left = near_left;
+    far_left.pixels_mut().for_each(|pixel| pixel.0[0] = 240 - pixel.0[0]);
+    far_left.save(dir.path().join("far.png")).unwrap();
+    let blur = |map: &str, out: &str, more: &[&str]| {
+        let arguments =
+            [&["in.png", "--depth-map", map, "--depth-unit", "inverse", "--focus", "0.2,0.5", "--out", out], more]
+                .concat();
+        let (code, said) = run(dir.path(), &arguments);
+        assert_eq!(code, Some(0), "{said}");
+        read_photo(&dir.path().join(out)).unwrap().0
+    };
+    let (near, inverted) = (blur("near.png", "a.png", &[]), blur("far.png", "b.png", &["--depth-invert"]));
+    assert_eq!(near, inverted);
+    assert_eq!(difference(&picture, &near, 0..70), 0.0);
+    assert!(difference(&picture, &near, 90..160) > 5.0);
+    let (code, said) = run(dir.path(), &["in.png", "--depth-map", "near.png", "--out", "no.png"]);
+    assert_eq!(code, Some(1), "8 bits are too few for metres: {said}");
+}
+
+#[test]
+fn a_recording_may_have_relative_inverse_depth() {
+    let dir = TempDir::new().unwrap();
+    let picture = halves(dir.path());
+    let at = |name: &str| dir.path().join(name);
+    std::fs::create_dir_all(at("rec/rgb")).unwrap();
+    std::fs::rename(at("in.png"), at("rec/rgb/0.png")).unwrap();
+    std::fs::create_dir(at("rec/depth")).unwrap();
+    // As networks' pictures are: 8 bits, here of colours that are grey.
+    let near_left = image::RgbImage::from_fn(160, 96, |x, _| [if x < 80 { 250 } else { 20 }; 3].into());
+    near_left.save(at("rec/depth/0.png")).unwrap();
+    std::fs::write(at("rec/rgb.txt"), "0 rgb/0.png\n").unwrap();
+    std::fs::write(at("rec/depth.txt"), "0 depth/0.png\n").unwrap();
+    let stream = |more: &[&str]| bokehcam(dir.path(), &["stream", "rec", "--to", "out/", "--force"], more);
+    let (code, said) = stream(&["--depth-unit", "inverse", "--focus", "0.2,0.5", "--coc-at-infinity", "8"]);
+    assert_eq!(code, Some(0), "{said}");
+    let mut written = std::fs::read_dir(at("out")).unwrap().map(|entry| entry.unwrap().path());
+    let first = written.find(|path| path.extension().is_some_and(|extension| extension == "png"));
+    let blurred = read_photo(&first.unwrap()).unwrap().0;
+    assert!(difference(&picture, &blurred, 0..66) < 0.1 && difference(&picture, &blurred, 94..160) > 5.0);
+    for (arguments, code, part) in [
+        (&["--depth-unit", "inverse", "--focus", "1.2"][..], 2, "inverse depth without a scale"),
+        (&["--depth-unit", "inverse", "--depth-scale", "1000", "--quiet"], 0, ""),
+        (&["--depth-unit", "inverse", "--depth-scale", "1000"], 0, "relative depth has no scale"),
+        (&["--depth-invert"], 1, "depth.txt:1"),
+    ] {
+        let (came, said) = stream(arguments);
+        assert!(came == Some(code) && said.contains(part), "{arguments:?}: {came:?} {said}");
+    }
+}
+
+/// What is valid and hardly meant is said in one line, and done.
+fn warned(dir: &Path, command: &[&str], arguments: &[&str], expected: &str) {
+    let (code, said) = bokehcam(dir, command, &[arguments, &["--force"]].concat());
+    let warnings: Vec<&str> = said.lines().filter(|line| line.contains("warning") || line.contains("WARN")).collect();
+    assert_eq!((code, warnings.len()), (Some(0), 1), "{arguments:?}: {said}");
+    assert!(warnings[0].contains(expected), "{arguments:?}: {said}");
+}
+
+#[test]
+fn pictures_in_the_wrong_place_are_said() {
+    let dir = TempDir::new().unwrap();
+    halves(dir.path());
+    for (name, code) in [("white.png", 255), ("black.png", 0), ("grey.png", 128)] {
+        image::GrayImage::from_pixel(16, 9, [code].into()).save(dir.path().join(name)).unwrap();
+    }
+    image::GrayImage::new(90, 160).save(dir.path().join("tall.png")).unwrap();
+    let units = |name: &str, at: fn(u32) -> u16| {
+        let map = ImageBuffer::<image::Luma<u16>, _>::from_fn(160, 96, |x, _| [at(x)].into());
+        map.save(dir.path().join(name)).unwrap();
+    };
+    units("unknown.png", |_| 0);
+    units("flat.png", |_| 5000);
+    units("mm.png", |x| if x < 80 { 1000 } else { 3000 });
+    for (option, file, expected) in [
+        ("--mask", "white.png", "white all over"),
+        ("--mask", "black.png", "black all over"),
+        ("--mask", "grey.png", "one grey all over"),
+        ("--mask", "in.png", "the picture itself, and no mask"),
+        ("--depth-map", "unknown.png", "no depth is known anywhere"),
+        ("--depth-map", "flat.png", "1.000 m away"),
+        ("--depth-map", "mm.png", "add --depth-scale 1000"),
+    ] {
+        warned(dir.path(), &["render"], &["in.png", option, file, "--refine", "off", "--out", "out.png"], expected);
+    }
+    for (map, expected) in [("in.png", "the picture itself, and no depth"), ("grey.png", "one value all over")] {
+        let inverse = ["in.png", "--depth-map", map, "--depth-unit", "inverse", "--refine", "off", "--out", "out.png"];
+        let (_, said) = run(dir.path(), &[&inverse[..], &["--force"]].concat());
+        assert!(said.contains(expected), "{said}");
+    }
+    let (code, said) = run(dir.path(), &["in.png", "--mask", "tall.png", "--out", "no.png"]);
+    assert!(code == Some(1) && said.contains("tall.png: the mask is 90x160"), "{said}");
+    // What is meant is not warned of.
+    let meant = ["in.png", "--depth-map", "mm.png", "--depth-scale", "1000", "--refine", "off", "--out", "meant.png"];
+    let (code, said) = run(dir.path(), &meant);
+    assert_eq!((code, said.lines().count()), (Some(0), 1), "{said}");
+}
+
+#[test]
+fn numbers_in_the_wrong_unit_are_said() {
+    let dir = TempDir::new().unwrap();
+    halves(dir.path());
+    let map = ImageBuffer::<image::Luma<u16>, _>::from_fn(160, 96, |x, _| [if x < 80 { 5000 } else { 15000 }].into());
+    map.save(dir.path().join("map.png")).unwrap();
+    let lens = |focal: &'static str, sensor: &'static str| {
+        ["--f-number", "2", "--focal-length", focal, "--sensor-width", sensor, "--focus", "1"]
+    };
+    for (numbers, expected) in [
+        (&lens("0.05", "36")[..], "if that is in metres, it is 50"),
+        (&lens("50", "0.036"), "if that is in metres, it is 36"),
+        (&lens("5000", "36"), "a lens of 5000 mm"),
+    ] {
+        let picture = ["in.png", "--depth-map", "map.png", "--refine", "off", "--out", "out.png"];
+        warned(dir.path(), &["render"], &[&picture[..], numbers].concat(), expected);
+    }
+    let (_, said) = run(
+        dir.path(),
+        &["in.png", "--depth-map", "map.png", "--depth-scale", "0.001", "--refine", "off", "--out", "s.png"],
+    );
+    assert!(said.contains("there are 1000 to a metre"), "{said}");
+}
+
+#[test]
+fn one_picture_for_both_eyes_and_eyes_far_apart_are_said() {
+    let dir = TempDir::new().unwrap();
+    let pair = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("recordings/stereo");
+    let eye = |folder: &str| {
+        let mut files: Vec<_> =
+            std::fs::read_dir(pair.join(folder)).unwrap().map(|entry| entry.unwrap().path()).collect();
+        files.sort();
+        files[0].to_str().unwrap().to_owned()
+    };
+    let (left, right) = (eye("image_2"), eye("image_3"));
+    let out = ["--out", "d.pfm"];
+    warned(dir.path(), &["depth", &left, &left], &out, "left and right are one picture");
+    let apart = ["--focal-px", "700", "--baseline-m", "60", "--metres", "--out", "d.pfm"];
+    warned(
+        dir.path(),
+        &["depth", &left, &right],
+        &apart,
+        "60 m between the eyes; if that is in millimetres, it is 0.06 m",
+    );
+    let (code, said) = bokehcam(dir.path(), &["depth", &left, &right, "--force"], &out);
+    assert!(code == Some(0) && !said.contains("warning"), "{said}");
+}

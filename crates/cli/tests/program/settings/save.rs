@@ -1,0 +1,98 @@
+//! `config save`, and the redirect that empties what it reads.
+
+use std::fs::{self, File};
+use std::os::unix::fs::symlink;
+
+use super::program::{Home, Ran, text};
+
+#[test]
+fn settings_are_saved_among_those_that_are_there() {
+    let home = Home::new();
+    let saved = home.run(&["config", "save", "--rim", "0.1", "--aperture", "polygon:6"]);
+    assert_eq!(saved.done(), format!("{}: saved aperture, rim\n", home.settings().display()));
+    assert_eq!(text(&home.settings()), "aperture = \"polygon:6\"\nrim = 0.1\n");
+
+    let before = "# mine\nrim = 0.4 # wide\ncoc-at-infinity = 7\n\n[presets.mine]\nrim = 0.6\n";
+    let home = Home::new().with_settings(before);
+    home.run(&["config", "save", "--rim", "0.2"]).done();
+    assert_eq!(text(&home.settings()), before.replace("rim = 0.4", "rim = 0.2"));
+    let lens = ["config", "save", "--f-number", "2", "--focal-length", "50", "--sensor-width", "36"];
+    assert!(home.run(&lens).done().contains("coc-at-infinity set aside"));
+    let after = text(&home.settings());
+    assert!(!after.contains("coc-at-infinity") && after.contains("f-number = 2\n"), "{after}");
+    home.run(&["config", "save", "--preset", "mine", "--force"]).done();
+    let dump = home.run(&["config", "dump"]);
+    assert!(dump.stdout.contains("\nforce = true # file\n") && dump.stdout.contains("rim = 0.6 # preset"));
+    assert_eq!(fs::read_dir(home.path("bokehcam")).unwrap().count(), 1, "no leftovers");
+}
+
+#[test]
+fn pictures_are_saved_by_their_whole_paths_and_those_in_the_file_count_from_it() {
+    let home = Home::new().with_photo();
+    home.run(&["config", "save", "--behind", "image:photo.png"]).done();
+    let whole = home.0.path().canonicalize().unwrap().join("photo.png");
+    let saved = text(&home.settings());
+    assert!(saved == format!("behind = \"image:{}\"\n", whole.display()) || saved.contains("/photo.png"), "{saved}");
+    assert!(saved.starts_with("behind = \"image:/"), "{saved}");
+
+    let home = Home::new().with_photo().with_settings("rim = 0.1\nbehind = \"image:wall.png\"\n");
+    let render = |home: &Home| {
+        home.run(&["render", "photo.png", "--depth-map", "depth.png", "--out", "out.png", "--backend", "cpu"])
+    };
+    let wall = home.path("bokehcam/wall.png");
+    render(&home).refused(1, &[wall.to_str().unwrap(), "there is no such file", "(behind in ", "config.toml)"]);
+    fs::copy(home.path("photo.png"), &wall).unwrap();
+    render(&home).done();
+    // A wrong value names its key, too, once it is known to be wrong.
+    let home = Home::new().with_photo().with_settings("effect = \"dof\"\n");
+    let ran = home.run(&["render", "photo.png", "--out", "out.png"]);
+    ran.refused(2, &["--effect dof needs depth", "(effect in ", "config.toml)"]);
+    let flag = home.run(&["render", "photo.png", "--out", "out.png", "--effect", "dof"]);
+    assert!(flag.code == 2 && !flag.stderr.contains("config.toml"), "{}", flag.stderr);
+}
+
+#[test]
+fn a_link_stays_a_link_even_one_to_nothing_yet() {
+    let home = Home::new();
+    fs::create_dir_all(home.path("bokehcam")).unwrap();
+    symlink("../dotfiles/bokehcam.toml", home.settings()).unwrap();
+    home.run(&["config", "save", "--rim", "0.1"]).done();
+    home.run(&["config", "save", "--rank", "3"]).done();
+    assert!(home.settings().symlink_metadata().unwrap().is_symlink());
+    assert_eq!(text(&home.path("dotfiles/bokehcam.toml")), "rim = 0.1\nrank = 3\n");
+    home.run(&["--config", "another.toml", "config", "save", "--rim", "0.3"]).done();
+    assert_eq!(text(&home.path("another.toml")), "rim = 0.3\n");
+}
+
+#[test]
+fn what_cannot_be_saved_changes_nothing() {
+    let home = Home::new().with_settings("rim = 0.4\n");
+    home.run(&["config", "save"]).refused(2, &["nothing to save", "--rim 0.1"]);
+    home.run(&["config", "save", "--rim", "7"]).refused(2, &["from 0 to 1"]);
+    home.run(&["config", "save", "--preset", "gone"]).refused(2, &["no preset 'gone'"]);
+    assert_eq!(text(&home.settings()), "rim = 0.4\n");
+    let home = Home::new().with_settings("rim = \n");
+    home.run(&["config", "save", "--rim", "0.1"]).refused(2, &["config.toml:1: "]);
+    assert_eq!(text(&home.settings()), "rim = \n");
+}
+
+#[test]
+fn a_dump_onto_the_file_that_it_reads_is_told() {
+    let home = Home::new().with_settings("rim = 0.4\n");
+    let onto = |path: &str| -> Ran {
+        let file = File::create(home.path(path)).unwrap();
+        home.command(&["config", "dump"]).stdout(file).output().unwrap().into()
+    };
+    onto("bokehcam/config.toml").refused(2, &["config.toml: this is the settings file", "`bokehcam config save`"]);
+    assert_eq!(onto("elsewhere.toml").done(), "");
+}
+
+#[test]
+fn no_document_shows_a_redirect_onto_the_settings() {
+    let root = std::path::Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."));
+    let files = fs::read_dir(root.join("docs")).unwrap().map(|entry| entry.unwrap().path());
+    for path in files.chain([root.join("README.md")]).filter(|path| path.extension().is_some_and(|e| e == "md")) {
+        let shown = text(&path);
+        assert!(!shown.lines().any(|line| line.contains("> ~/.config")), "{}", path.display());
+    }
+}

@@ -1,0 +1,178 @@
+//! Standard error: nobody waits for a terminal that takes nothing, and lines and the bar keep apart.
+#![allow(unsafe_code)]
+
+use std::fs::{self, File, OpenOptions};
+use std::io::{BufRead, BufReader, ErrorKind, Read, Write};
+use std::os::fd::{AsFd, OwnedFd};
+use std::os::unix::fs::OpenOptionsExt;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, ExitStatus, Stdio};
+use std::thread;
+use std::time::{Duration, Instant};
+
+use rustix::fs::OFlags;
+use rustix::ioctl::{Getter, Setter, ioctl, opcode};
+use rustix::process::{Pid, Signal, kill_process};
+
+/// What takes longer hangs.
+const HANG: Duration = Duration::from_secs(60);
+
+fn portrait() -> PathBuf {
+    Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("recordings/portrait")
+}
+
+fn bokehcam(args: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_bokehcam"));
+    command.env("XDG_CONFIG_HOME", "/nonexistent").env_remove("RUST_LOG").args(args).stdin(Stdio::null());
+    command
+}
+
+/// A terminal: its screen, from which can be read what is printed, and its name for programs.
+fn terminal() -> (File, PathBuf) {
+    const UNLOCK: u32 = opcode::write::<i32>(b'T', 0x31);
+    const NUMBER: u32 = opcode::read::<u32>(b'T', 0x30);
+    let screen = OpenOptions::new().read(true).write(true).open("/dev/ptmx").unwrap();
+    // SAFETY: TIOCSPTLCK reads an int, and TIOCGPTN writes an unsigned one (ioctl_tty(2)).
+    let number = unsafe {
+        ioctl(&screen, Setter::<UNLOCK, i32>::new(0)).unwrap();
+        ioctl(&screen, Getter::<NUMBER, u32>::new()).unwrap()
+    };
+    (screen, PathBuf::from(format!("/dev/pts/{number}")))
+}
+
+fn open_terminal(name: &Path) -> File {
+    let no_controlling = OFlags::NOCTTY.bits() as i32;
+    OpenOptions::new().read(true).write(true).custom_flags(no_controlling).open(name).unwrap()
+}
+
+/// Writes until nothing more is taken.
+fn fill(name: &Path) {
+    let flags = (OFlags::NOCTTY | OFlags::NONBLOCK).bits() as i32;
+    let mut terminal = OpenOptions::new().write(true).custom_flags(flags).open(name).unwrap();
+    // The kernel makes room once more, in its own time.
+    while fill_up(&mut terminal) > 0 {
+        thread::sleep(Duration::from_millis(100));
+    }
+}
+
+fn fill_up(mut file: impl Write) -> usize {
+    let mut written = 0;
+    for size in [4096, 1] {
+        let blanks = vec![b' '; size];
+        loop {
+            match file.write(&blanks) {
+                Ok(bytes) => written += bytes,
+                Err(error) if error.kind() == ErrorKind::WouldBlock => break,
+                Err(error) => panic!("{error}"),
+            }
+        }
+    }
+    written
+}
+
+/// Waits for the end; ends what hangs.
+fn ended(child: &mut Child) -> Option<ExitStatus> {
+    let began = Instant::now();
+    while began.elapsed() < HANG {
+        if let Some(status) = child.try_wait().unwrap() {
+            return Some(status);
+        }
+        thread::sleep(Duration::from_millis(5));
+    }
+    child.kill().unwrap();
+    child.wait().unwrap();
+    None
+}
+
+/// Counts the frames of a y4m stream of 320 x 240 pixels as they come.
+fn frames(stream: impl Read + Send + 'static) -> std::sync::mpsc::Receiver<()> {
+    let (told, frames) = std::sync::mpsc::channel();
+    thread::spawn(move || {
+        let mut stream = BufReader::new(stream);
+        let mut header = String::new();
+        stream.read_line(&mut header).unwrap();
+        let number = |sign: char| {
+            let field = header.split(' ').find_map(|field| field.strip_prefix(sign)).unwrap();
+            field.trim().parse::<usize>().unwrap()
+        };
+        let (width, height) = (number('W'), number('H'));
+        let mut frame = vec![0; "FRAME\n".len() + width * height + 2 * width.div_ceil(2) * height.div_ceil(2)];
+        while stream.read_exact(&mut frame).is_ok() && told.send(()).is_ok() {}
+    });
+    frames
+}
+
+#[test]
+fn a_terminal_that_is_not_read_stops_no_frame_and_no_end() {
+    let (_screen, name) = terminal();
+    let slave = open_terminal(&name);
+    fill(&name);
+    let source = portrait();
+    let args =
+        ["stream", source.to_str().unwrap(), "--loop", "--effect", "none", "--pace", "realtime", "--to", "-", "-vv"];
+    let mut child = bokehcam(&args).stdout(Stdio::piped()).stderr(slave).spawn().unwrap();
+    let frames = frames(child.stdout.take().unwrap());
+    for frame in 0..30 {
+        if frames.recv_timeout(HANG).is_err() {
+            child.kill().unwrap();
+            panic!("frame {frame} does not come");
+        }
+    }
+    kill_process(Pid::from_child(&child), Signal::TERM).unwrap();
+    let status = ended(&mut child).expect("a termination signal ends it");
+    assert!(status.success(), "{status}");
+}
+
+#[test]
+fn a_reader_of_errors_that_stands_still_stops_no_end() {
+    let (_reader, writer): (OwnedFd, OwnedFd) = rustix::pipe::pipe().unwrap();
+    let flags = rustix::fs::fcntl_getfl(&writer).unwrap();
+    rustix::fs::fcntl_setfl(&writer, flags | OFlags::NONBLOCK).unwrap();
+    fill_up(File::from(writer.try_clone().unwrap()));
+    rustix::fs::fcntl_setfl(writer.as_fd(), flags).unwrap();
+    let mut child = bokehcam(&["stream", "/no/such/folder", "--to", "null"]).stderr(writer).spawn().unwrap();
+    let status = ended(&mut child).expect("nobody waits for the reader");
+    assert!(matches!(status.code(), Some(1 | 2)), "{status}");
+}
+
+#[test]
+fn a_warning_has_a_line_of_its_own_beside_the_bar() {
+    let folder = tempfile::tempdir().unwrap();
+    let own = folder.path();
+    for part in ["rgb", "depth"] {
+        fs::create_dir(own.join(part)).unwrap();
+        for picture in fs::read_dir(portrait().join(part)).unwrap().flatten() {
+            fs::copy(picture.path(), own.join(part).join(picture.file_name())).unwrap();
+        }
+    }
+    for list in fs::read_dir(portrait()).unwrap().flatten().filter(|entry| entry.path().is_file()) {
+        fs::copy(list.path(), own.join(list.file_name())).unwrap();
+    }
+    // Late enough for the bar to be there; and all of them, as some are passed over on a machine that is late.
+    for picture in fs::read_dir(own.join("rgb")).unwrap().flatten().filter(|entry| *entry.file_name() >= *"000012.png")
+    {
+        fs::write(picture.path(), "no picture").unwrap();
+    }
+
+    let (mut screen, name) = terminal();
+    let slave = open_terminal(&name);
+    let args =
+        ["stream", own.to_str().unwrap(), "--effect", "none", "--pace", "realtime", "--to", "null", "--keep-going"];
+    let mut child = bokehcam(&args).stdout(Stdio::null()).stderr(slave).spawn().unwrap();
+    let reader = thread::spawn(move || {
+        let mut told = Vec::new();
+        // Reading fails once the program has closed the terminal.
+        let _ = screen.read_to_end(&mut told);
+        String::from_utf8_lossy(&told).into_owned()
+    });
+    assert!(ended(&mut child).is_some_and(|status| status.success()));
+    let told = reader.join().unwrap();
+    assert!(told.contains(" frames, "), "a bar: {told:?}");
+    let warning = told.find("going on without such frames").unwrap_or_else(|| panic!("{told:?}"));
+    // What stands on its line before the word it begins with.
+    let line = told[..warning].rsplit('\n').next().unwrap();
+    let shown = line.rsplit("\x1b[2K").next().unwrap();
+    assert!(!shown.contains(" frames, "), "{line:?}");
+    let shown = shown.trim_start_matches('\r');
+    assert!(shown.starts_with("warning: "), "{shown:?}");
+}

@@ -1,0 +1,128 @@
+//! The machines that the governor is measured on, and what is claimed of it there.
+
+use super::load::{Numbers, WEATHER, Weather};
+use super::play::{Score, play};
+use super::rivals::{Ours, Picker, Pid};
+
+/// Time for one frame, in units of the load.
+pub const BUDGET: f64 = 5.0;
+/// Share of the frames that may be over the budget.
+const MOST_MISSES: f64 = 0.015;
+/// Changes of rung a minute.
+const MOST_SWITCHES: f64 = 6.0;
+
+/// A machine, how well its costs are known, and within how many frames a step of the load is settled.
+#[derive(Clone, Copy)]
+pub struct Case {
+    /// For people.
+    pub name: &'static str,
+    rungs: usize,
+    weather: Weather,
+    misjudged: f64,
+    /// 95 of 100 rises.
+    rise_frames: usize,
+    /// Half of the falls: going up waits for 30 good frames on purpose, and for longer where that was taken back.
+    fall_frames: usize,
+}
+
+/// All machines.
+pub fn cases() -> [Case; 5] {
+    let plain = Case {
+        name: "7 rungs, costs known",
+        rungs: 7,
+        weather: WEATHER,
+        misjudged: 1.0,
+        rise_frames: 15,
+        fall_frames: 60,
+    };
+    let sudden = Weather { step_frames: 300, ..WEATHER };
+    let rough = Weather { noise: 0.15, spikes: (0.01, 5.0), ..WEATHER };
+    [
+        plain,
+        Case { name: "5 rungs, costs known", rungs: 5, ..plain },
+        Case { name: "7 rungs, costs off by up to 1.4", misjudged: 1.4, ..plain },
+        Case { name: "5 rungs, a step every 10 s", rungs: 5, weather: sudden, ..plain },
+        Case { name: "7 rungs, noise of 15 %, spikes of 5 times", weather: rough, rise_frames: 130, ..plain },
+    ]
+}
+
+/// What the governor reached, and the quality of the PID where it misses as many frames; `None` where it never misses
+/// so few.
+pub struct Outcome {
+    /// The governor's.
+    pub ours: Score,
+    /// The PID's, by headroom.
+    pub pids: Vec<(f64, Score)>,
+    /// Of the PID.
+    pub equal: Option<f64>,
+}
+
+impl Case {
+    /// The true costs of its rungs: 1 to 8, in equal ratios.
+    pub fn costs(&self) -> Vec<f64> {
+        (0..self.rungs).map(|rung| 8f64.powf(rung as f64 / (self.rungs - 1) as f64)).collect()
+    }
+
+    /// Plays seeds of so many minutes by a rule, which is made of the costs as they are known.
+    pub fn play(
+        &self,
+        seeds: std::ops::RangeInclusive<u64>,
+        minutes: u32,
+        make: impl Fn(&[f64]) -> Box<dyn Picker>,
+    ) -> Score {
+        let (mut score, costs) = (Score::default(), self.costs());
+        for seed in seeds {
+            let known = misjudged(&costs, self.misjudged, seed);
+            play(&mut *make(&known), &costs, BUDGET, &self.weather, minutes as usize * 1800, seed, &mut score);
+        }
+        score
+    }
+
+    /// Plays the governor and the PID.
+    pub fn measure(&self, seeds: std::ops::RangeInclusive<u64>, minutes: u32) -> Outcome {
+        let ours = self.play(seeds.clone(), minutes, |known| Box::new(Ours::new(known, BUDGET)));
+        let pid = |room: f64| self.play(seeds.clone(), minutes, move |known| Box::new(Pid::new(known, BUDGET, room)));
+        let pids: Vec<(f64, Score)> = (1..=12).map(|k| f64::from(k) * 0.05).map(|room| (room, pid(room))).collect();
+        let equal = at_equal_misses(&pids, ours.misses());
+        Outcome { ours, pids, equal }
+    }
+
+    /// The claims that an outcome breaks.
+    pub fn broken(&self, Outcome { ours, equal, .. }: &Outcome) -> Vec<String> {
+        let settled = [("rise", false, 0.95, self.rise_frames), ("fall", true, 0.5, self.fall_frames)];
+        let claims = [
+            (ours.misses() <= MOST_MISSES, format!("{:.2} % misses", 100.0 * ours.misses())),
+            (
+                ours.switches_per_minute() <= MOST_SWITCHES,
+                format!("{:.1} switches a minute", ours.switches_per_minute()),
+            ),
+            (
+                equal.is_none_or(|equal| ours.quality() > equal),
+                format!("quality {:.4}, the PID {equal:?}", ours.quality()),
+            ),
+        ];
+        let settled = settled.map(|(step, fell, share, most)| {
+            let frames = ours.settled(fell, share);
+            (frames <= most, format!("{frames} frames to settle after a {step}"))
+        });
+        claims.into_iter().chain(settled).filter(|claim| !claim.0).map(|claim| claim.1).collect()
+    }
+}
+
+/// The ladder with every cost but the first off by up to `most` times, either way, and still ascending.
+fn misjudged(costs: &[f64], most: f64, seed: u64) -> Vec<f64> {
+    let mut numbers = Numbers::new(seed ^ 0x5eed);
+    let mut wrong: Vec<f64> = costs.iter().map(|cost| cost * most.powf(2.0 * numbers.even() - 1.0)).collect();
+    for k in 1..wrong.len() {
+        wrong[k] = wrong[k].max(wrong[k - 1] * 1.01);
+    }
+    wrong
+}
+
+/// The quality of the PID at this share of misses, between its two nearest headrooms.
+fn at_equal_misses(pids: &[(f64, Score)], misses: f64) -> Option<f64> {
+    pids.windows(2).find_map(|pair| {
+        let [(a, qa), (b, qb)] = [0, 1].map(|k| (pair[k].1.misses(), pair[k].1.quality()));
+        (b <= misses && misses <= a).then(|| qb + (qa - qb) * if a > b { (misses - b) / (a - b) } else { 0.0 })
+    })
+}

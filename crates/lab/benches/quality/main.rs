@@ -1,0 +1,294 @@
+//! `cargo bench --bench quality -- [OPTIONS]`: how near the blur comes to a real lens, beside other methods.
+//!
+//! | file | what |
+//! |---|---|
+//! | `scenes`, `texture` | scenes made by code |
+//! | `lens`, `truth` | the exact renderer, and its pictures kept between runs |
+//! | `damage` | depth maps as sensors give them |
+//! | `methods`, `rivals`, `masks`, `situations` | what is compared |
+//! | `metrics`, `flip`, `highlight` | how it is measured |
+//! | `report`, `markdown`, `sheet` | what comes out |
+//!
+//! Every method gets the same 8-bit picture and the same depth map. `tests/quality.rs` holds the laws of all this.
+
+#[path = "../common/mod.rs"]
+mod common;
+mod damage;
+mod flip;
+mod highlight;
+mod lens;
+mod markdown;
+mod masks;
+mod methods;
+mod metrics;
+mod options;
+mod picture;
+mod report;
+mod rivals;
+mod scenes;
+mod sheet;
+mod situations;
+mod texture;
+mod truth;
+
+use std::error::Error;
+use std::fs;
+use std::path::Path;
+use std::process::ExitCode;
+
+use bokehcam::budget::Quality;
+use bokehcam::frame::{ColorImage, DepthMap};
+
+use damage::Damage;
+use methods::{Blurrer, Method, Shot};
+use options::{Options, Part};
+use report::{Flicker, Highlight, Record, Results};
+use scenes::{KINDS, Kind};
+use truth::{Views, views};
+
+/// Scenes whose depth is damaged, too.
+const DAMAGED: [&str; 3] = ["hair", "fence", "depths"];
+/// Scenes that are portraits, with nothing in front of the subject.
+const MASKED: [&str; 3] = ["slant", "hair", "pentagon"];
+/// The scene that is looked at for flicker, and for how many frames.
+const STATIC: &str = "depths";
+const STATIC_FRAMES: u64 = 8;
+/// What moves is watched for so many frames; then every so many count, of so many in all.
+const PLAYED: usize = 60;
+const PLAYED_STEP: usize = 10;
+const PLAYED_FRAMES: usize = 6;
+/// Seed of all damage.
+const SEED: u64 = 1;
+/// Where truths are kept.
+const CACHE: &str = concat!(env!("CARGO_TARGET_TMPDIR"), "/quality");
+
+type Outcome<T> = Result<T, Box<dyn Error>>;
+
+fn main() -> ExitCode {
+    let options: Options = match common::options() {
+        Ok(options) => options,
+        Err(code) => return code,
+    };
+    if options.list {
+        KINDS.iter().for_each(|kind| println!("{:16} {}", kind.name, kind.what));
+        Method::all().into_iter().for_each(|method| println!("{method}"));
+        return ExitCode::SUCCESS;
+    }
+    if !options.bench {
+        println!("nothing measured: run it by `cargo bench --bench quality`");
+        return ExitCode::SUCCESS;
+    }
+    match run(&options) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn run(options: &Options) -> Outcome<()> {
+    let mut results = Results::default();
+    say(options, Record::HEAD.to_owned(), None::<&Record>)?;
+    for kind in KINDS.iter().filter(|kind| options.wants(kind.name)) {
+        let frames = if kind.moves { usize::from(options.frames) } else { 1 };
+        let shots =
+            (0..frames).map(|frame| views(&(kind.at)(frame), &format!("{}-{frame}", kind.name), Path::new(CACHE)));
+        let shots = shots.collect::<Result<Vec<_>, _>>()?;
+        if options.parts.contains(&Part::Moving) && kind.moves {
+            moving(options, kind, &mut results)?;
+        }
+        if options.parts.contains(&Part::Exact) {
+            scene(options, kind, None, &shots, &mut results)?;
+        }
+        if options.parts.contains(&Part::Damaged) && DAMAGED.contains(&kind.name) {
+            for damage in Damage::KINDS {
+                let shots: Vec<Views> = shots.iter().map(|views| damaged(views, damage, SEED)).collect();
+                scene(options, kind, Some(damage), &shots, &mut results)?;
+            }
+        }
+        if options.parts.contains(&Part::Masks) && MASKED.contains(&kind.name) {
+            let portraits = masks::measure(kind.name, &(kind.at)(0), &shots[0])?;
+            say(options, masks::Portrait::HEAD.to_owned(), None::<&Record>)?;
+            for portrait in &portraits {
+                say(options, portrait.line(), Some(portrait))?;
+            }
+            results.portraits.extend(portraits);
+        }
+        if options.parts.contains(&Part::Flicker) && kind.name == STATIC {
+            flicker(options, &shots[0], &mut results)?;
+        }
+    }
+    if options.parts.contains(&Part::Highlight) {
+        lone_light(options, &mut results)?;
+    }
+    if options.parts.contains(&Part::Situations) {
+        say(options, situations::Outcome::HEAD.to_owned(), None::<&Record>)?;
+        let mut told = Ok(());
+        situations::measure(|outcome| {
+            let line = say(options, outcome.line(), Some(&outcome));
+            told = std::mem::replace(&mut told, Ok(())).and(line);
+            results.situations.push(outcome);
+        })?;
+        told?;
+    }
+    if options.markdown {
+        print!("{}", markdown::markdown(&results));
+    }
+    Ok(())
+}
+
+/// Shows what has just been measured.
+fn say(options: &Options, line: String, record: Option<&impl serde::Serialize>) -> Outcome<()> {
+    match record {
+        Some(record) if options.json => println!("{}", serde_json::to_string(record)?),
+        None if options.json => {}
+        _ if options.markdown => eprintln!("{line}"),
+        _ => println!("{line}"),
+    }
+    Ok(())
+}
+
+/// Measures every method on a scene's frames; the mean over frames counts.
+fn scene(
+    options: &Options,
+    kind: &Kind,
+    damage: Option<Damage>,
+    frames: &[Views],
+    results: &mut Results,
+) -> Outcome<()> {
+    let mut pictures = Vec::new();
+    let bands: Vec<_> = frames.iter().map(|views| metrics::edge_band(&views.coc_px)).collect();
+    for method in options.methods() {
+        let mut blurrer = Blurrer::new(method, &frames[0].shot)?;
+        let mut records = Vec::new();
+        for (views, band) in frames.iter().zip(&bands) {
+            let picture = blurrer.blur(&views.shot)?;
+            let truth = &views.truth;
+            records.push(Record::of((kind.name, damage.map(Damage::name)), method, &picture, truth, band));
+            pictures.push((method, picture));
+        }
+        if let Some(record) = Record::mean(&records.iter().collect::<Vec<_>>()) {
+            say(options, record.line(), Some(&record))?;
+            results.records.push(record);
+        }
+    }
+    let Some(out) = &options.out else { return Ok(()) };
+    let case = (kind.name, damage.map(Damage::name));
+    let folder = case.1.map_or(kind.name.to_owned(), |damage| format!("{}-{damage}", kind.name));
+    let rival = results.best_rival(case).map_or(Method::None, |rival| rival.method);
+    show(options, rival, &out.join(folder), frames, &pictures)
+}
+
+/// Measures what memory is worth where something moves: of a sequence, some later frames count.
+fn moving(options: &Options, kind: &Kind, results: &mut Results) -> Outcome<()> {
+    let counts = |frame: usize| frame >= PLAYED && (frame - PLAYED).is_multiple_of(PLAYED_STEP);
+    let methods = [Method::Layered(Quality::default()), Method::Remembered];
+    let mut records = methods.map(|_| Vec::new());
+    let mut blurrers: Vec<Blurrer> = Vec::new();
+    for frame in 0..=PLAYED + PLAYED_STEP * (PLAYED_FRAMES - 1) {
+        let scene = (kind.at)(frame);
+        let views = match counts(frame) {
+            true => views(&scene, &format!("{}-{frame}", kind.name), Path::new(CACHE))?,
+            false => truth::without_truth(&scene),
+        };
+        if blurrers.is_empty() {
+            blurrers = methods.map(|method| Blurrer::new(method, &views.shot)).into_iter().collect::<Result<_, _>>()?;
+        }
+        if !counts(frame) {
+            blurrers.iter_mut().for_each(|blurrer| blurrer.watch(&views.shot));
+            continue;
+        }
+        let band = metrics::edge_band(&views.coc_px);
+        for (k, method) in methods.into_iter().enumerate() {
+            let picture = blurrers[k].blur(&views.shot)?;
+            if let Some(out) = &options.out {
+                fs::create_dir_all(out)?;
+                sheet::write(&out.join(format!("{}-{frame}-{method}.png", kind.name)), &picture)?;
+                sheet::write(&out.join(format!("{}-{frame}-truth.png", kind.name)), &views.truth)?;
+            }
+            records[k].push(Record::of((kind.name, Some("moving")), method, &picture, &views.truth, &band));
+        }
+    }
+    for records in &records {
+        if let Some(record) = Record::mean(&records.iter().collect::<Vec<_>>()) {
+            say(options, record.line(), Some(&record))?;
+            results.moving.push(record);
+        }
+    }
+    Ok(())
+}
+
+/// Writes a scene's first frame, and the crops of every frame.
+fn show(
+    options: &Options,
+    rival: Method,
+    out: &Path,
+    frames: &[Views],
+    pictures: &[(Method, ColorImage)],
+) -> Outcome<()> {
+    fs::create_dir_all(out)?;
+    sheet::write(&out.join("image.png"), &frames[0].shot.image)?;
+    sheet::write(&out.join("truth.png"), &frames[0].truth)?;
+    for pictures in pictures.chunks(frames.len()) {
+        sheet::write(&out.join(format!("{}.png", pictures[0].0)), &pictures[0].1)?;
+    }
+    let of = |method, frame: usize| {
+        let all = pictures.iter().filter(|picture| picture.0 == method);
+        all.map(|picture| &picture.1).nth(frame).unwrap_or(&frames[frame].shot.image)
+    };
+    let ours = options.shown().unwrap_or(Method::None);
+    let crop = |frame: usize| sheet::crops(of(ours, frame), &frames[frame].truth, of(rival, frame));
+    let crops: Vec<ColorImage> = (0..frames.len()).map(crop).collect();
+    Ok(sheet::write(&out.join(format!("crops-{ours}-truth-{rival}.png")), &sheet::stacked(&crops))?)
+}
+
+/// The same views with a damaged depth map.
+fn damaged(views: &Views, damage: Damage, seed: u64) -> Views {
+    let (coc_px, known) = damage.apply(&views.coc_px, seed);
+    let mut depth: DepthMap = truth::depth(&coc_px, views.shot.lens.coc_at_infinity_px);
+    depth.metres.iter_mut().zip(&known.data).filter(|(_, known)| !**known).for_each(|(z_m, _)| *z_m = 0.0);
+    Views { shot: Shot { depth, ..views.shot.clone() }, coc_px: views.coc_px.clone(), truth: views.truth.clone() }
+}
+
+fn flicker(options: &Options, views: &Views, results: &mut Results) -> Outcome<()> {
+    let band = metrics::edge_band(&views.coc_px);
+    for method in options.methods() {
+        let mut blurrer = Blurrer::new(method, &views.shot)?;
+        let frame = |seed| blurrer.blur(&damaged(views, Damage::Noise, SEED + seed).shot);
+        let frames = (0..STATIC_FRAMES).map(frame).collect::<Result<Vec<_>, _>>()?;
+        // The outline is in the picture as in the map: a camera's has noise.
+        let mut blurrer = Blurrer::new(method, &views.shot)?;
+        let noisy = |seed| {
+            let shot = damaged(views, Damage::Noise, SEED + seed).shot;
+            blurrer.blur(&Shot { image: masks::with_noise(&shot.image, masks::NOISE_CODES, seed), ..shot })
+        };
+        let noisy = (0..STATIC_FRAMES).map(noisy).collect::<Result<Vec<_>, _>>()?;
+        let flicker = Flicker {
+            method: method.name(),
+            flicker_codes: metrics::flicker(&frames, |at| metrics::is_blurred(&views.coc_px, at)),
+            outline_codes: metrics::flicker(&noisy, |at| band.data[at]),
+        };
+        say(options, flicker.line(), Some(&flicker))?;
+        results.flicker.push(flicker);
+    }
+    Ok(())
+}
+
+fn lone_light(options: &Options, results: &mut Results) -> Outcome<()> {
+    let views = views(&highlight::scene(), "highlight", Path::new(CACHE))?;
+    let truth = Highlight { method: None, profile: highlight::profile(&views.truth) };
+    say(options, truth.line(), Some(&truth))?;
+    results.highlights.push(truth);
+    for method in options.methods().into_iter().filter(|method| *method != Method::None) {
+        let picture = Blurrer::new(method, &views.shot)?.blur(&views.shot)?;
+        let highlight = Highlight { method: Some(method.name()), profile: highlight::profile(&picture) };
+        say(options, highlight.line(), Some(&highlight))?;
+        results.highlights.push(highlight);
+        if let Some(out) = &options.out {
+            fs::create_dir_all(out.join("highlight"))?;
+            sheet::write(&out.join(format!("highlight/{method}.png")), &picture)?;
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,211 @@
+//! `cargo bench --bench soak -- [OPTIONS] [FOLDER]`: a recording as a live camera, for as long as one likes, and whether
+//! its pictures come out evenly, in time, and no later in the end than in the beginning.
+//!
+//! | file | what |
+//! |---|---|
+//! | `stages` | the camera, the executor that may be slowed down, the sink that stamps |
+//! | `loader` | the other process |
+//! | `verdict` | what is measured, and against what |
+//! | `footprint` | what the process holds |
+
+#[path = "../common/mod.rs"]
+mod common;
+mod footprint;
+mod loader;
+mod stages;
+mod verdict;
+
+use std::error::Error;
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
+use bokehcam::bokeh::Backend;
+use bokehcam::budget::Quality;
+use bokehcam::clock::Clock;
+use bokehcam::compute::thread_pool::cores;
+use bokehcam::computing::Computing;
+use bokehcam::depth::DepthSource;
+use bokehcam::depth::recorded::Recorded;
+use bokehcam::look::number::OrAuto;
+use bokehcam::look::{Effect, Look, Refine, Strength};
+use bokehcam::pipeline::{self, Pace, Run};
+use bokehcam::recording::{Options as Reading, Recording};
+use bokehcam::stats::Report;
+use clap::Parser;
+
+use footprint::Footprint;
+use loader::Loader;
+use stages::{Looped, PERIOD_NS, Slowed, Stamping, Stamps};
+use verdict::verdict;
+
+/// A recording as a live camera of 30 frames a second, blurred in real time
+///
+/// Prints how evenly and how old the pictures come out, what was dropped, and at which quality they were made; the exit
+/// code tells whether all criteria are met.
+#[derive(Parser, Debug)]
+#[command(
+    name = "soak",
+    bin_name = "cargo bench --bench soak --",
+    after_help = "\
+Examples:
+  cargo bench --bench soak -- --minutes 10 --loader
+  cargo bench --bench soak -- --minutes 2 --slow 3
+  cargo bench --bench soak -- --starts 1000 --minutes 90
+  cargo bench --bench soak -- --minutes 1 --quality balanced somewhere/rgbd"
+)]
+struct Options {
+    /// A folder with a recording that has depth
+    #[arg(default_value = concat!(env!("CARGO_MANIFEST_DIR"), "/../../recordings/portrait"))]
+    folder: PathBuf,
+    /// How long to run
+    #[arg(long, value_name = "M", default_value_t = 1.0)]
+    minutes: f64,
+    /// Before that, start and stop so many times, and tell what the process holds then
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    starts: u32,
+    /// Let the blur take this many times as long, busy all the while
+    #[arg(long, value_name = "FACTOR", default_value_t = 1.0)]
+    slow: f64,
+    /// Let another process keep one core busy for 10 s of every 20
+    #[arg(long)]
+    loader: bool,
+    /// auto, or a quality level for all frames
+    #[arg(long, value_name = "LEVEL", default_value = "auto")]
+    quality: OrAuto<Quality>,
+    /// Time that the blur of one frame may take, in milliseconds [default: the frame period]
+    #[arg(long, value_name = "MS")]
+    budget_ms: Option<f64>,
+    /// CoC radius at infinity, in pixels [default: height / 45]
+    #[arg(long, value_name = "PX")]
+    coc_at_infinity: Option<f32>,
+    /// Units of a depth picture per metre
+    #[arg(long, value_name = "UNITS", default_value_t = 5000.0)]
+    depth_scale: f32,
+    /// Only fill holes of the depth
+    #[arg(long)]
+    no_refine: bool,
+    /// Blur on a GPU, if there is a hardware one
+    #[arg(long)]
+    gpu: bool,
+    /// Also write the time of every picture, in milliseconds since the camera began, and its age, to this file
+    #[arg(long, value_name = "FILE.csv")]
+    series: Option<PathBuf>,
+    /// Given by `cargo bench`
+    #[arg(long, hide = true)]
+    bench: bool,
+}
+
+fn main() -> ExitCode {
+    if std::env::args().nth(1).as_deref() == Some(loader::ARGUMENT) {
+        loader::load();
+    }
+    let options: Options = match common::options() {
+        Ok(options) => options,
+        Err(code) => return code,
+    };
+    if !options.bench {
+        println!("nothing measured: run it by `cargo bench --bench soak`");
+        return ExitCode::SUCCESS;
+    }
+    match run(&options) {
+        Ok(true) => ExitCode::SUCCESS,
+        Ok(false) => ExitCode::FAILURE,
+        Err(error) => {
+            eprintln!("error: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+/// Runs it; tells whether the criteria are met.
+fn run(options: &Options) -> Result<bool, Box<dyn Error>> {
+    let begun = options.starts == 0 || starts(options)?;
+    let frames = (options.minutes * 60e9 / PERIOD_NS as f64).round().max(2.0) as u64;
+    let loader = options.loader.then(Loader::start).transpose()?;
+    let (report, shown) = replay(options, frames)?;
+    drop(loader);
+    if let Some(path) = &options.series {
+        let line = |&(at_ns, age_ns): &(u64, u64)| format!("{:.3},{:.3}\n", at_ns as f64 / 1e6, age_ns as f64 / 1e6);
+        std::fs::write(path, shown.iter().map(line).collect::<String>())?;
+    }
+    println!(
+        "{}, {:.1} minutes{}{}",
+        report.source,
+        options.minutes,
+        if options.loader { ", one core busy for 10 s of every 20" } else { "" },
+        if options.slow > 1.0 { format!(", blur {} times slower", options.slow) } else { String::new() }
+    );
+    println!("{report}\n");
+    Ok(verdict(&shown, &report) && begun)
+}
+
+/// Starts and stops; tells whether the process holds no more in the end than after a tenth of it.
+fn starts(options: &Options) -> Result<bool, Box<dyn Error>> {
+    const FRAMES: u64 = 4;
+    let (mut warm, mut frames) = (Footprint::now()?, 0);
+    for start in 0..options.starts {
+        frames += replay(options, FRAMES)?.0.frames.captured;
+        if start == options.starts / 10 {
+            warm = Footprint::now()?;
+        }
+    }
+    let end = Footprint::now()?;
+    let flat = end.is_as_flat_as(&warm);
+    println!(
+        "{} starts and stops, {frames} frames: {warm}, in the end {end}: {}\n",
+        options.starts,
+        verdict::word(flat)
+    );
+    Ok(flat)
+}
+
+/// When each frame came out, and how old, in nanoseconds.
+type Deliveries = Vec<(u64, u64)>;
+
+/// Frames of the recording in real time.
+fn replay(options: &Options, frames: u64) -> Result<(Report, Deliveries), Box<dyn Error>> {
+    let name = options.folder.display().to_string();
+    let reading = Reading { depth_scale: options.depth_scale, ..Reading::default() };
+    let recording = Arc::new(Recording::open(&options.folder, &reading)?);
+    let size = recording.size();
+    let height = size.1 as f32;
+    let coc_px = options.coc_at_infinity.unwrap_or(height / 45.0);
+    let max_coc_px = coc_px.max(height * 0.06);
+    let look = Look {
+        strength: Strength::AtInfinity(coc_px),
+        max_coc_px: Some(max_coc_px),
+        refine: if options.no_refine { Refine::Off } else { Refine::On },
+        quality: options.quality.chosen(),
+        ..Look::plain(Effect::Dof)
+    };
+    let settings = look.settings(size, true).ok_or("there is no blur")?;
+    let backend = if options.gpu { Backend::Auto } else { Backend::Cpu };
+    let executor = Computing { backend, ..Computing::default() }.blur(&settings, size)?;
+    let clock = Clock::system();
+    let stamps = Stamps::with_room_for(frames as usize);
+    let stop = AtomicBool::new(false);
+    let report = pipeline::run(Run {
+        depth: Some(Box::new(Recorded::new(Arc::clone(&recording), &name)?) as Box<dyn DepthSource>),
+        camera: Box::new(Looped::new(recording, &name, frames, clock.clone(), stamps.clone())),
+        bokeh: Some(Box::new(Slowed::new(executor, options.slow))),
+        look,
+        adaptive: true,
+        measured: true,
+        threads: cores(),
+        changes: None,
+        sink: Box::new(Stamping::new(clock.clone(), stamps.clone())),
+        pace: Pace::Realtime,
+        budget_ns: options.budget_ms.map_or(PERIOD_NS, |ms| (ms * 1e6) as u64),
+        keep_going: false,
+        demand: None,
+        mirror: false,
+        wanted: None,
+        view: None,
+        clock,
+        stop: &stop,
+        progress: &|_| {},
+    })?;
+    Ok((report, stamps.take()))
+}

@@ -1,0 +1,171 @@
+//! Recordings of two eyes, rectified and in memory.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use bokehcam::calibration::{self, rectifier::Rectifier};
+use bokehcam::frame::{ColorImage, DisparityMap, GrayImage};
+use bokehcam::optics::StereoRig;
+
+use super::Outcome;
+use super::quality::picture::Plane;
+use super::quality::sheet;
+use super::quality::texture::Dice;
+
+/// One moment.
+pub struct Frame {
+    /// Media time.
+    pub time_ns: u64,
+    /// What the left eye sees.
+    pub left: ColorImage,
+    /// What the right eye sees.
+    pub right: ColorImage,
+    /// The true disparity of the left picture in pixels, where it is known.
+    pub truth: Option<Plane<f32>>,
+}
+
+/// A recording.
+pub struct Sequence {
+    /// For the tables.
+    pub name: &'static str,
+    /// Its geometry.
+    pub rig: StereoRig,
+    /// The range that holds it.
+    pub disparities: u32,
+    /// In the order of time.
+    pub frames: Vec<Frame>,
+}
+
+impl Frame {
+    /// Both eyes in grey, as matchers take them.
+    pub fn gray(&self) -> [GrayImage; 2] {
+        [&self.left, &self.right].map(|color| {
+            let mut gray = GrayImage::default();
+            gray.set_luma_of(color);
+            gray
+        })
+    }
+
+    /// Puts normal noise on both eyes, another one for every seed.
+    pub fn add_noise(&mut self, codes: f32, seed: u64) {
+        let mut dice = Dice::new(seed);
+        for code in self.left.rgb.iter_mut().chain(&mut self.right.rgb) {
+            *code = (f32::from(*code) + codes * dice.normal()).round().clamp(0.0, 255.0) as u8;
+        }
+    }
+}
+
+/// A file of the source tree's recordings.
+pub fn recordings(path: &str) -> PathBuf {
+    Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("recordings").join(path)
+}
+
+/// The project's own recording, `recordings/stereo`: 640x360, 12 frames a second, disparities of 3 to 85 px, with truth.
+///
+/// # Errors
+/// It is not there.
+pub fn bundled() -> Outcome<Sequence> {
+    const PERIOD_NS: u64 = 83_333_333;
+    let folder = recordings("stereo");
+    let frames = numbered(&folder.join("image_2"))?.into_iter().enumerate().map(|(index, name)| {
+        let truth = disparity_file(&folder.join("disp").join(&name))?;
+        Ok(Frame {
+            time_ns: index as u64 * PERIOD_NS,
+            left: read(&folder.join("image_2").join(&name))?,
+            right: read(&folder.join("image_3").join(&name))?,
+            truth: Some(truth),
+        })
+    });
+    let rig = StereoRig { focal_px: 640.0, baseline_m: 0.06, doffs_px: 0.0, metric: true };
+    Ok(Sequence { name: "portrait", rig, disparities: 96, frames: frames.collect::<Outcome<_>>()? })
+}
+
+/// 20 pairs of KITTI's from a driving car, at 10 Hz, if they are there.
+///
+/// # Errors
+/// A picture cannot be read.
+pub fn kitti(data: &Path) -> Outcome<Option<Sequence>> {
+    const PERIOD_NS: u64 = 100_000_000;
+    let folder = data.join("stereo_seq/KITTI_sequence_1");
+    if !folder.is_dir() {
+        return Ok(None);
+    }
+    let names = numbered(&folder.join("image_l"))?;
+    let frames = names.into_iter().enumerate().map(|(index, name)| {
+        let eye = |eye: &str| read(&folder.join(eye).join(&name));
+        Ok(Frame { time_ns: index as u64 * PERIOD_NS, left: eye("image_l")?, right: eye("image_r")?, truth: None })
+    });
+    let rig = StereoRig { focal_px: 707.0912, baseline_m: 0.5372, doffs_px: 0.0, metric: true };
+    Ok(Some(Sequence { name: "kitti", rig, disparities: 128, frames: frames.collect::<Outcome<_>>()? }))
+}
+
+/// 6 pairs of EuRoC's, at 20 Hz, almost still, rectified by their calibration, if they are there.
+///
+/// # Errors
+/// A picture or the calibration cannot be read.
+pub fn euroc(data: &Path) -> Outcome<Option<Sequence>> {
+    const PERIOD_NS: u64 = 50_000_000;
+    let folder = data.join("stereo_seq/MicroEurocDataset/mav0");
+    if !folder.is_dir() {
+        return Ok(None);
+    }
+    let sensors = ["cam0", "cam1"].map(|eye| folder.join(eye).join("sensor.yaml"));
+    let calibration = calibration::load(&[&sensors[0], &sensors[1]])?;
+    let names = numbered(&folder.join("cam0/data"))?;
+    let first = names.first().ok_or_else(|| format!("{}: no pictures", folder.display()))?;
+    let rectifier = Rectifier::new(&calibration, read(&folder.join("cam0/data").join(first))?.size())?;
+    let frames = names.iter().enumerate().map(|(index, name)| {
+        let [left, right] = [0, 1].map(|eye: usize| {
+            let mut rectified = ColorImage::default();
+            let taken = read(&folder.join(["cam0/data", "cam1/data"][eye]).join(name))?;
+            rectifier.maps()[eye].color(&taken, &mut rectified);
+            Outcome::Ok(rectified)
+        });
+        Ok(Frame { time_ns: index as u64 * PERIOD_NS, left: left?, right: right?, truth: None })
+    });
+    let frames = frames.collect::<Outcome<_>>()?;
+    Ok(Some(Sequence { name: "euroc", rig: rectifier.rig(), disparities: 96, frames }))
+}
+
+/// A disparity map in a PFM file: what is not finite is unknown, and becomes 0.
+///
+/// # Errors
+/// There is none, or it is something else.
+pub fn pfm(path: &Path) -> Outcome<DisparityMap> {
+    let wrong = || format!("{}: not a little-endian PFM of one channel", path.display());
+    let bytes = fs::read(path).map_err(|error| format!("{}: {error}", path.display()))?;
+    let header: Vec<_> = bytes.splitn(4, |&byte| byte == b'\n').collect();
+    let [b"Pf", size, scale, data] = header[..] else { return Err(wrong().into()) };
+    let sides: Vec<u32> =
+        std::str::from_utf8(size)?.split_whitespace().map(str::parse).collect::<Result<_, _>>().map_err(|_| wrong())?;
+    let [width, height] = sides[..] else { return Err(wrong().into()) };
+    if !scale.starts_with(b"-") || data.len() != 4 * width as usize * height as usize || data.is_empty() {
+        return Err(wrong().into());
+    }
+    // The lowest row comes first.
+    let rows = data.chunks_exact(4 * width as usize).rev();
+    let values = rows.flat_map(|row| row.as_chunks::<4>().0).map(|&bytes| f32::from_le_bytes(bytes));
+    let px = values.map(|px| if px.is_finite() { px.max(0.0) } else { 0.0 }).collect();
+    Ok(DisparityMap { width, height, px })
+}
+
+fn read(path: &Path) -> Outcome<ColorImage> {
+    sheet::read(path).ok_or_else(|| format!("{}: no picture that can be read", path.display()).into())
+}
+
+/// A disparity map of 16-bit grey, pixels times 256.
+fn disparity_file(path: &Path) -> Outcome<Plane<f32>> {
+    let map = image::open(path).map_err(|error| format!("{}: {error}", path.display()))?.into_luma16();
+    let (width, height) = (map.width() as usize, map.height() as usize);
+    Ok(Plane { width, height, data: map.iter().map(|&units| f32::from(units) / 256.0).collect() })
+}
+
+/// Names of the files in a folder, sorted.
+fn numbered(folder: &Path) -> Outcome<Vec<String>> {
+    let entries = fs::read_dir(folder).map_err(|error| format!("{}: {error}", folder.display()))?;
+    let mut names = entries
+        .map(|entry| Ok(entry?.file_name().to_string_lossy().into_owned()))
+        .collect::<Result<Vec<_>, std::io::Error>>()?;
+    names.sort();
+    Ok(names)
+}

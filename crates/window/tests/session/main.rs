@@ -1,0 +1,179 @@
+//! What goes on behind the preview's window: sources, looks and outputs come and go while frames go on.
+#![allow(missing_docs)]
+
+#[path = "../../../../tests/common/mod.rs"]
+mod common;
+#[path = "../../../../tests/common/heard.rs"]
+mod heard;
+mod held;
+mod present;
+mod shader;
+mod sources;
+#[path = "../../../../tests/common/store.rs"]
+mod store;
+mod watched;
+
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+use std::time::{Duration, Instant};
+
+use bokehcam::depth::plate::Step;
+use bokehcam::frame::DepthMap;
+use bokehcam::look::{Effect, Look, Strength};
+use bokehcam::optics::CocField;
+use bokehcam_window::folders::is_video;
+use bokehcam_window::state::{Output, Request, Source, Update};
+
+use heard::{PATIENCE, look};
+use watched::{Watched, is_running, radius_px};
+
+#[test]
+fn a_look_takes_effect_while_frames_go_on() {
+    let mut watched = Watched::begin("32");
+    watched.until("it runs", |told| is_running(told, 32));
+    watched.until("the note", |told| *told == Update::Note("a note".into()) || matches!(told, Update::Outputs(_)));
+    let first = watched.frame("a frame", |view| radius_px(view) == 2.0);
+    assert!(first.picture.memory().is_some() && first.color.is_some() && first.depth.is_some());
+    let made = watched.executors.load(Ordering::SeqCst);
+
+    let stronger = Look { strength: Strength::AtInfinity(5.0), ..look() };
+    watched.session.order(Request::Look(Box::new(stronger.clone())));
+    watched.frame("more blur", |view| radius_px(view) == 5.0);
+    let near = Look { focus: bokehcam::depth::focus::FocusRule::Metres(0.7), ..stronger };
+    watched.session.order(Request::Look(Box::new(near.clone())));
+    watched.frame("another focus", |view| matches!(view.coc, CocField::Depth(coc) if (coc.focus_m - 0.7).abs() < 0.02));
+    assert!(watched.executors.load(Ordering::SeqCst) <= made + 1, "another focus needs no other executor");
+
+    let even = Look { effect: Effect::Blur, ..near.clone() };
+    watched.session.order(Request::Look(Box::new(even)));
+    watched.frame("an even blur", |view| radius_px(view) == -5.0);
+    watched.session.order(Request::Look(Box::new(Look { effect: Effect::None, ..near })));
+    watched.frame("no blur", |view| view.color.is_none());
+    let report = watched.heard.session.close().report.unwrap();
+    assert!(report.frames.balance(), "{:?}", report.frames);
+}
+
+#[test]
+fn sources_come_and_go_and_one_that_is_lost_can_be_tried_again() {
+    let mut watched = Watched::begin("nothing");
+    watched.until("why", |told| *told == Update::Source(Source::Lost("no such source: nothing".into())));
+    watched.session.order(Request::Begin(Output { name: "film".into(), is_camera: false }));
+    watched.until("nothing to write", |told| matches!(told, Update::Note(line) if line.contains("no source")));
+    watched.session.order(Request::Open("32".into()));
+    watched.until("it runs", |told| is_running(told, 32));
+    watched.frame("a frame", |view| view.picture.size().0 == 32);
+    watched.session.order(Request::Open("48".into()));
+    watched.until("the other runs", |told| is_running(told, 48));
+    watched.frame("a frame of the other", |view| view.picture.size().0 == 48);
+    watched.session.order(Request::Open("24 then no more".into()));
+    watched.until("its end", |told| *told == Update::Source(Source::Ended));
+    watched.session.order(Request::Open("24 then no more".into()));
+    watched.until("it runs again", |told| is_running(told, 24));
+    watched.until("and ends", |told| *told == Update::Source(Source::Ended));
+    let report = watched.heard.session.close().report.unwrap();
+    assert!(report.frames.balance() && report.frames.captured == 2, "{:?}", report.frames);
+}
+
+#[test]
+fn a_plate_is_taken_where_there_was_no_depth_and_again_without_a_new_run() {
+    let mut watched = Watched::begin("32");
+    watched.until("it runs", |told| is_running(told, 32));
+    assert!(watched.guide.is_none());
+    watched.session.order(Request::TakePlate);
+    watched.until("it runs again", |told| is_running(told, 32));
+    let guide = watched.guide.clone().expect("how far the plate is");
+    watched.frame("all is far until there is a plate", |view| {
+        view.depth.as_ref().is_some_and(|depth| depth.metres.iter().all(|&metres| metres == DepthMap::FAR_M))
+    });
+    assert!(matches!(guide.step(), Step::StepOut(1..=3)), "{:?}", guide.step());
+    watched.frame("the countdown is over", |_| !matches!(guide.step(), Step::StepOut(_)));
+    watched.session.order(Request::TakePlate);
+    watched.frame("the countdown has begun again", |_| matches!(guide.step(), Step::StepOut(_)));
+    assert!(!watched.told.iter().any(|told| is_running(told, 32)), "no new run");
+    // Another source has no plate, and neither has this one when it is opened afterwards.
+    for width in [48, 32] {
+        watched.session.order(Request::Open(width.to_string()));
+        watched.until("it runs", |told| is_running(told, width));
+        assert!(watched.guide.is_none());
+    }
+    assert!(watched.heard.session.close().report.unwrap().frames.balance());
+}
+
+#[test]
+fn outputs_are_begun_and_completed_and_one_that_cannot_be_is_told() {
+    let mut watched = Watched::begin("32");
+    watched.until("it runs", |told| is_running(told, 32));
+    let output = |name: &str, is_camera| Output { name: name.into(), is_camera };
+    watched.session.order(Request::Begin(output("full", false)));
+    watched.until("why not", |told| *told == Update::Note("the disk is full".into()));
+    watched.until("none is written", |told| *told == Update::Outputs(Vec::new()));
+    watched.session.order(Request::Begin(output("film", false)));
+    watched.session.order(Request::Begin(output("camera", true)));
+    watched.until("two", |told| *told == Update::Outputs(vec![output("film", false), output("camera", true)]));
+    watched.session.copy(vec![("split".into(), "0.5".into())]);
+    watched.until("the command", |told| matches!(told, Update::Note(line) if line.starts_with("Copied: show 32")));
+    watched.hear();
+    // The film is there already: the command makes another one.
+    let (copied, end) = (watched.copied.clone().unwrap(), r#"", "camera"] [("split", "0.5")]"#);
+    let film = copied.strip_prefix("show 32 [\"").and_then(|rest| rest.strip_suffix(end));
+    assert!(film.is_some_and(|film| is_video(film.rsplit('/').next().unwrap())), "{copied}");
+    let has = |watched: &Watched, line: &str| watched.written.lock().unwrap().iter().any(|written| written == line);
+    let began = Instant::now();
+    while !has(&watched, "film 32") || !has(&watched, "camera 32") {
+        assert!(began.elapsed() < PATIENCE);
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    watched.session.order(Request::End(output("film", false)));
+    watched
+        .until("the film is complete", |told| matches!(told, Update::Note(line) if line.starts_with("Complete: film")));
+    // A recording ends with its source, and a virtual camera goes on with the next one.
+    watched.session.order(Request::Open("48".into()));
+    watched.until("the other runs", |told| is_running(told, 48));
+    watched.until("one", |told| *told == Update::Outputs(vec![output("camera", true)]));
+    while !has(&watched, "camera 48") {
+        assert!(began.elapsed() < 2 * PATIENCE);
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    let written = Arc::clone(&watched.written);
+    watched.heard.session.close().report.unwrap();
+    let complete = written.lock().unwrap().iter().filter(|line| *line == "camera complete").count();
+    assert_eq!(complete, 2, "once for each source");
+}
+
+#[test]
+fn an_output_that_fails_is_told_for_good_and_is_not_forgotten_at_the_end() {
+    for (name, why) in [("fills up", "full now"), ("no end", "full at the end")] {
+        let mut watched = Watched::begin("32");
+        watched.until("it runs", |told| is_running(told, 32));
+        watched.session.order(Request::Begin(Output { name: name.into(), is_camera: false }));
+        if name == "fills up" {
+            watched.until("why", |told| matches!(told, Update::Trouble(line) if line.contains(why)));
+            watched.until("none is written", |told| *told == Update::Outputs(Vec::new()));
+        } else {
+            watched.until("it is written", |told| matches!(told, Update::Outputs(outputs) if outputs.len() == 1));
+            watched.frame("a frame", |_| true);
+        }
+        let closed = watched.heard.session.close();
+        assert!(closed.failed.as_ref().is_some_and(|line| line.contains(why)), "{closed:?}");
+        assert!(closed.report.unwrap().frames.balance());
+    }
+    let mut watched = Watched::begin("32");
+    watched.until("it runs", |told| is_running(told, 32));
+    assert_eq!(watched.heard.session.close().failed, None);
+}
+
+#[test]
+fn a_recording_that_was_broken_off_is_found_at_the_next_start() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    std::fs::write(at(".bokehcam-3.mp4.77-0.part"), "take").unwrap();
+    std::fs::write(at(".bokehcam 2026-11-23 21-14-05.mp4.77-1.part"), "another take").unwrap();
+    std::fs::write(at(".holiday.mp4.77-0.part"), "mine").unwrap();
+    let mut watched = Watched::begin_in("32", folder.path());
+    watched
+        .until("it is told", |told| matches!(told, Update::Note(line) if line.contains("bokehcam-3.incomplete.mp4")));
+    watched.heard.session.close();
+    assert_eq!(std::fs::read(at("bokehcam-3.incomplete.mp4")).unwrap(), b"take");
+    assert_eq!(std::fs::read(at("bokehcam 2026-11-23 21-14-05.incomplete.mp4")).unwrap(), b"another take");
+    assert_eq!(std::fs::read(at(".holiday.mp4.77-0.part")).unwrap(), b"mine");
+}

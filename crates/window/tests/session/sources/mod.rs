@@ -1,0 +1,180 @@
+//! Sources behind the preview's window: back and forth in a recording, photos, what is offered, and devices that come and go.
+#![allow(missing_docs)]
+
+use crate::heard;
+mod plug;
+use crate::store;
+
+use std::path::Path;
+use std::sync::atomic::Ordering;
+
+use bokehcam::frame::{ColorImage, DepthMap};
+use bokehcam::look::{Look, Strength};
+use bokehcam::recording::{snapshot, still};
+use bokehcam::source::{self, Options, SourceName};
+use bokehcam_window::state::{Output, Request, Source, Update};
+
+use plug::*;
+
+#[test]
+fn a_recording_is_sought_in_while_it_plays_and_what_is_written_stays_whole() {
+    let (recording, folder) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    record(recording.path());
+    let mut watched = Watched::begin(&recording.path().display().to_string(), folder.path());
+    watched.frame("a frame", |_| true);
+    let seeker = watched.seeker.clone().expect("a recording is gone back and forth in");
+    assert_eq!((seeker.frames(), seeker.length_ns()), (FRAMES, FRAMES as u64 * 40_000_000));
+    let film = folder.path().join("film.y4m");
+    let output = Output { name: film.display().to_string(), is_camera: false };
+    watched.session.order(Request::Begin(output.clone()));
+    let mut last_ns = 0;
+    for place in [8, 3, 11, 0, 11] {
+        let number = seeker.go_to(place);
+        let asked = watched.frame("the frame that was asked for", |view| view.trace.asked && view.trace.seek == number);
+        assert_eq!(seeker.place_of(asked.stamp), place);
+        let rgb = asked.picture.memory().unwrap().rgb[0];
+        assert!(rgb.abs_diff(20 * place as u8) <= 1, "{rgb} of frame {place}");
+        let metres = asked.depth.as_ref().unwrap().metres[5];
+        // Refined, but of no other frame.
+        assert!((metres - 2.0 - 0.1 * place as f32).abs() < 0.02, "{metres} m of frame {place}");
+        assert!(asked.stamp.time_ns > last_ns, "media time goes on");
+        drop(asked);
+        let after = watched.frame("those after it", |view| !view.trace.asked && view.trace.seek == number);
+        last_ns = after.stamp.time_ns;
+        assert!((seeker.place_of(after.stamp) + FRAMES - place) % FRAMES <= 6, "{:?}", after.stamp);
+    }
+    watched.session.order(Request::End(output));
+    let closed = watched.heard.session.close();
+    assert_eq!(closed.failed, None);
+    assert!(closed.report.unwrap().frames.balance());
+    assert!(film.metadata().unwrap().len() > 48 * 32 * 3 / 2, "the film is there");
+}
+
+#[test]
+fn what_never_ends_has_no_places() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut watched = Watched::begin("synthetic", folder.path());
+    watched.frame("a frame", |_| true);
+    assert!(watched.seeker.is_none());
+    watched.heard.session.close();
+}
+
+fn is_running(told: &Update) -> bool {
+    matches!(told, Update::Source(Source::Running(_)))
+}
+
+#[test]
+fn a_photo_is_opened_with_the_depth_beside_it_and_follows_the_look() {
+    let folder = tempfile::tempdir().unwrap();
+    let (mut color, mut depth) = (ColorImage::new(40, 30), DepthMap::new(40, 30));
+    for (at, pixel) in color.rgb.chunks_exact_mut(3).enumerate() {
+        pixel.fill(if at % 40 < 20 { 40 } else { 200 });
+        depth.metres[at] = if at % 40 < 20 { 1.0 } else { 4.0 };
+    }
+    let photo = folder.path().join("holiday.jpg");
+    still::write_color(&photo, &color, false).unwrap();
+    still::write_depth(&folder.path().join("holiday-depth.png"), &depth, 1000.0, false).unwrap();
+    let name = photo.display().to_string();
+    let mut watched = Watched::begin(&name, folder.path());
+    watched.until("what it is", |told| matches!(told, Update::Note(line) if line.contains("a photo, one frame") && line.contains("depth beside it")));
+    let Update::Source(Source::Running(running)) = watched.until("it runs", is_running) else { unreachable!() };
+    assert!(running.size == (40, 30) && running.has_depth);
+    let first = watched.frame("a frame", |_| true);
+    let map = first.depth.as_ref().unwrap();
+    assert!((map.metres[15 * 40 + 5] - 1.0).abs() < 0.05 && (map.metres[15 * 40 + 35] - 4.0).abs() < 0.2);
+    let change = first.trace.change;
+    drop(first);
+    let stronger = Look { strength: Strength::AtInfinity(5.0), ..Look::default() };
+    watched.session.order(Request::Look(Box::new(stronger)));
+    watched.frame("another look", |view| view.trace.change > change && !view.trace.between);
+    assert!(watched.heard.session.close().report.unwrap().frames.balance());
+
+    // Other names, a snapshot, and what is no photo.
+    let open = |path: &Path| {
+        let name: SourceName =
+            path.display().to_string().parse().map_err(|error: source::SourceError| error.to_string())?;
+        source::Source::open(&name, &Options::default(), None).map_err(|error| error.to_string())
+    };
+    let other = folder.path().join("other.png");
+    still::write_color(&other, &color, false).unwrap();
+    assert!(!open(&other).unwrap().has_depth());
+    std::fs::rename(folder.path().join("holiday-depth.png"), folder.path().join("other.depth.png")).unwrap();
+    assert!(open(&other).unwrap().has_depth());
+    let kept =
+        snapshot::Snapshot { picture: &ColorImage::new(40, 30), sources: Some((&color, Some(&depth))), settings: &[] };
+    let kept = snapshot::save(folder.path(), "kept", &kept).unwrap();
+    let mut opened = open(&kept).unwrap();
+    assert!(opened.has_depth());
+    let (mut into, mut no_depth, mut right) = Default::default();
+    let shot = bokehcam::capture::Shot { color: &mut into, depth: &mut no_depth, right: &mut right };
+    opened.camera.next(shot).unwrap();
+    assert!(into == color, "the picture before the blur");
+    still::write_depth(&folder.path().join("kept-2-depth.pfm"), &DepthMap::new(80, 30), 1000.0, true).unwrap();
+    let small = folder.path().join("kept-2.png");
+    still::write_color(&small, &color, false).unwrap();
+    let error = open(&small).err().unwrap();
+    assert!(error.contains("kept-2-depth.pfm") && !error.contains('\n'), "{error}");
+    let text = folder.path().join("text.png");
+    std::fs::write(&text, "no picture").unwrap();
+    let error = open(&text).err().unwrap();
+    assert!(error.contains("neither a folder nor a photo"), "{error}");
+}
+
+#[test]
+fn what_is_offered_is_opened_only_if_it_can_be_and_stays_on_the_list() {
+    let (recording, empty) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    record(recording.path());
+    let mut watched = Watched::begin("synthetic", empty.path());
+    watched.until("it runs", is_running);
+    let name = recording.path().display().to_string();
+    for nothing in [empty.path().display().to_string(), format!("{name}/missing"), format!("{name}/rgb.txt")] {
+        watched.session.order(Request::Offer(nothing.clone()));
+        watched.until("why not", |told| matches!(told, Update::Note(line) if line.contains(&nothing)));
+    }
+    watched.frame("what ran goes on", |view| view.picture.size().0 == 640);
+    assert!(!watched.told.iter().any(|told| matches!(told, Update::Source(_))));
+    watched.session.order(Request::Offer(name.clone()));
+    watched.until("it is good", |told| *told == Update::Offered(name.clone()));
+    // As the window does then.
+    watched.session.order(Request::Open(name.clone()));
+    let listed = |told: &Update, first: &str| match told {
+        Update::Choices { sources, .. } => sources.first().is_some_and(|choice| choice.name == first),
+        _ => false,
+    };
+    watched.until("it is listed", |told| listed(told, &name));
+    watched.until("it runs", is_running);
+    let again = recording.path().join(".").display().to_string();
+    watched.session.order(Request::Open(again.clone()));
+    watched.until("the last one is first", |told| listed(told, &again));
+    watched.session.order(Request::Open("synthetic".into()));
+    let told = watched.until("both stay", |told| matches!(told, Update::Choices { .. }));
+    let Update::Choices { sources, .. } = told else { unreachable!() };
+    let names: Vec<&str> =
+        sources.iter().map(|choice| choice.name.as_str()).filter(|name| !name.starts_with("/dev/")).collect();
+    assert_eq!(names, ["synthetic", again.as_str(), name.as_str(), "demo"]);
+    watched.heard.session.close();
+}
+
+#[test]
+fn a_camera_that_comes_is_offered_and_opened_where_it_was_missing_and_its_pictures_are_chosen() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut watched = Watched::begin(CAMERA, folder.path());
+    watched.until("it is not there", |told| matches!(told, Update::Source(Source::Lost(_))));
+    watched.is_in.store(true, Ordering::SeqCst);
+    let has_it = |told: &Update| match told {
+        Update::Choices { sources, .. } => sources.iter().any(|choice| choice.name == CAMERA),
+        _ => false,
+    };
+    // As long as a test has patience: nobody has to ask for it.
+    watched.until("it is offered", has_it);
+    watched.until("its sizes", |told| matches!(told, Update::Camera(camera) if camera.modes.len() == 2));
+    watched.until("it runs", is_running);
+    watched.frame("a frame", |view| view.picture.size() == (64, 48));
+    watched.session.order(Request::Mode((32, 24), 60.0));
+    let Update::Source(Source::Running(running)) = watched.until("it runs", is_running) else { unreachable!() };
+    assert_eq!((running.size, running.period_ns), ((32, 24), 16_666_667));
+    watched.frame("a frame of the other size", |view| view.picture.size() == (32, 24));
+    watched.is_in.store(false, Ordering::SeqCst);
+    watched.until("it has gone", |told| matches!(told, Update::Choices { .. }) && !has_it(told));
+    watched.heard.session.close();
+}

@@ -1,0 +1,136 @@
+//! A session on the system, with a camera that can be plugged in.
+
+use std::ops::{Deref, DerefMut};
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use bokehcam::bokeh::{self, Bokeh};
+use bokehcam::capture::synthetic::Format;
+use bokehcam::frame::{ColorImage, DepthMap};
+use bokehcam::knob::Knob;
+use bokehcam::look::Look;
+use bokehcam::recording::tum::{Writer, WriterOptions};
+use bokehcam::sink::Sink;
+use bokehcam::source::devices::Choice;
+use bokehcam::source::modes::Mode;
+use bokehcam::source::{self, Frames, Options};
+use bokehcam_lab::synthetic::Synthetic;
+use bokehcam_window::services::{Opened, Services, SettingsStore, Switch};
+use bokehcam_window::state::{Camera, Way};
+use bokehcam_window::system::System;
+
+use super::heard::{Heard, look};
+use super::store::NoStore;
+
+pub const FRAMES: usize = 12;
+
+/// Frames as bright as twenty times their number, each 2 m away and a decimetre more than the one before.
+pub fn record(dir: &Path) {
+    let mut writer = Writer::create(dir, &WriterOptions { depth_scale: 5000.0, overwrite: false }).unwrap();
+    for frame in 0..FRAMES {
+        let (mut color, mut depth) = (ColorImage::new(48, 32), DepthMap::new(48, 32));
+        color.rgb.fill(20 * frame as u8);
+        depth.metres.fill(2.0 + 0.1 * frame as f32);
+        writer.add(frame as u64 * 40_000_000, &color, Some(&depth)).unwrap();
+    }
+    writer.finish().unwrap();
+}
+
+/// The system, with a camera that can be plugged in, and a note of the pictures that are chosen of it.
+pub struct Plug {
+    system: System,
+    is_in: Arc<AtomicBool>,
+    was_in: bool,
+    mode: Option<((u32, u32), f64)>,
+}
+
+pub const CAMERA: &str = "/dev/video-test";
+
+impl Services for Plug {
+    fn sources(&mut self) -> Vec<Choice> {
+        let camera = self.was_in.then(|| Choice { name: CAMERA.into(), label: "A camera".into() });
+        camera.into_iter().chain(self.system.sources()).collect()
+    }
+    fn virtual_cameras(&mut self) -> Vec<Choice> {
+        Vec::new()
+    }
+    fn open(&mut self, name: &str, way: Option<Way>) -> Result<Opened, String> {
+        match (name, self.is_in.load(Ordering::SeqCst)) {
+            (CAMERA, false) => Err("no such camera".into()),
+            (CAMERA, true) => {
+                let ((width, height), fps) = self.mode.unwrap_or(((64, 48), 30.0));
+                let format = Format { size: (width, height), fps, frames: None, threads: 1 };
+                let source = source::Source::of(Box::new(Synthetic::new(format).unwrap()), None);
+                let (name, has_depth) = (name.into(), source.has_depth());
+                let modes =
+                    vec![Mode { size: (64, 48), fps: vec![30.0] }, Mode { size: (32, 24), fps: vec![60.0, 30.0] }];
+                let camera = Camera { modes, faces_user: true, is_relative: false };
+                let (notes, controls) = (Vec::new(), Vec::new());
+                Ok(Opened { name, source, has_depth, ways: Vec::new(), way, notes, controls, camera })
+            }
+            _ => self.system.open(name, way),
+        }
+    }
+    fn devices_changed(&mut self) -> bool {
+        let is_in = self.is_in.load(Ordering::SeqCst);
+        std::mem::replace(&mut self.was_in, is_in) != is_in
+    }
+    fn choose_mode(&mut self, name: &str, size: (u32, u32), fps: f64) {
+        assert_eq!(name, CAMERA);
+        self.mode = Some((size, fps));
+    }
+    fn check(&self, name: &str) -> Result<(), String> {
+        self.system.check(name)
+    }
+    fn turn(&mut self, knob: &str, value: i64) -> Result<Vec<Knob>, String> {
+        self.system.turn(knob, value)
+    }
+    fn executor(&mut self, settings: &bokeh::Settings, size: (u32, u32)) -> Result<Box<dyn Bokeh>, String> {
+        self.system.executor(settings, size)
+    }
+    fn output(
+        &mut self,
+        name: &str,
+        size: (u32, u32),
+        ns: u64,
+        stop: &Arc<AtomicBool>,
+    ) -> Result<Box<dyn Sink>, String> {
+        self.system.output(name, size, ns, stop)
+    }
+    fn command(&self, look: &Look, source: &str, outputs: &[String], switches: &[Switch]) -> String {
+        self.system.command(look, source, outputs, switches)
+    }
+    fn settings(&mut self) -> &mut dyn SettingsStore {
+        self.system.settings()
+    }
+}
+
+/// A session on them.
+pub struct Watched {
+    pub heard: Heard,
+    pub is_in: Arc<AtomicBool>,
+}
+
+impl Watched {
+    pub fn begin(source: &str, folder: &Path) -> Self {
+        let options = Options { frames: Frames { repeat: true, ..Frames::default() }, ..Options::default() };
+        let system = System::new(options, look(), Box::new(NoStore));
+        let is_in = Arc::<AtomicBool>::default();
+        let plug = Plug { system, is_in: Arc::clone(&is_in), was_in: false, mode: None };
+        Self { heard: Heard::begin(Box::new(plug), source, folder), is_in }
+    }
+}
+
+impl Deref for Watched {
+    type Target = Heard;
+    fn deref(&self) -> &Heard {
+        &self.heard
+    }
+}
+
+impl DerefMut for Watched {
+    fn deref_mut(&mut self) -> &mut Heard {
+        &mut self.heard
+    }
+}

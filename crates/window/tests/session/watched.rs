@@ -1,0 +1,177 @@
+//! A session as the window has it, on sources and outputs of the tests' own.
+
+use std::ops::{ControlFlow, Deref, DerefMut};
+use std::path::Path;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex};
+
+use bokehcam::bokeh::{self, Bokeh};
+use bokehcam::capture::synthetic::Format;
+use bokehcam::capture::{Brings, Camera as Capture, CaptureError, Captured, Shot, SourceInfo};
+use bokehcam::depth::plate::PlateDepth;
+use bokehcam::frame::ColorImage;
+use bokehcam::knob::Knob;
+use bokehcam::look::presets::Preset;
+use bokehcam::look::{Look, Patch};
+use bokehcam::optics::CocField;
+use bokehcam::pipeline::View;
+use bokehcam::sink::{Ending, Sink, SinkError};
+use bokehcam::source::{self, devices::Choice};
+use bokehcam_lab::synthetic::Synthetic;
+use bokehcam_window::services::{Opened, Services, SettingsStore, Switch};
+use bokehcam_window::state::{Camera, Source, Update, Way};
+
+use super::heard::Heard;
+
+/// Opens small synthetic scenes: the name is their width, `24 then no more` has two frames, and `nothing` is not there.
+struct Small {
+    executors: Arc<AtomicUsize>,
+    written: Arc<Mutex<Vec<String>>>,
+    settings: NoSettings,
+}
+
+struct Film(Arc<Mutex<Vec<String>>>, String);
+
+impl Sink for Film {
+    fn put(&mut self, frame: &ColorImage, _: u64) -> Result<ControlFlow<()>, SinkError> {
+        if self.1 == "fills up" {
+            return Err(SinkError::Exists { path: "the disk is full now".into() });
+        }
+        self.0.lock().unwrap().push(format!("{} {}", self.1, frame.width));
+        Ok(ControlFlow::Continue(()))
+    }
+    fn finish(self: Box<Self>, _: Ending) -> Result<(), SinkError> {
+        if self.1 == "no end" {
+            return Err(SinkError::Exists { path: "the disk is full at the end".into() });
+        }
+        self.0.lock().unwrap().push(format!("{} complete", self.1));
+        Ok(())
+    }
+    fn describe(&self) -> String {
+        self.1.clone()
+    }
+}
+
+/// A camera that does not know its depth.
+struct Plain(Synthetic);
+
+impl Capture for Plain {
+    fn info(&self) -> SourceInfo {
+        SourceInfo { brings: Brings::Color, ..self.0.info() }
+    }
+    fn next(&mut self, shot: Shot) -> Result<Captured, CaptureError> {
+        self.0.next(shot)
+    }
+}
+
+impl Services for Small {
+    fn sources(&mut self) -> Vec<Choice> {
+        vec![Choice { name: "32".into(), label: "A scene".into() }]
+    }
+    fn virtual_cameras(&mut self) -> Vec<Choice> {
+        Vec::new()
+    }
+    fn open(&mut self, name: &str, way: Option<Way>) -> Result<Opened, String> {
+        let with_plate = way == Some(Way::Plate);
+        let width =
+            name.split(' ').next().and_then(|width| width.parse().ok()).ok_or(format!("no such source: {name}"))?;
+        let frames = name.ends_with("no more").then_some(2);
+        let format = Format { size: (width, 18), fps: 60.0, frames, threads: 1 };
+        let scene = Synthetic::new(format).map_err(|error| error.to_string())?;
+        let camera: Box<dyn Capture> = if with_plate { Box::new(Plain(scene)) } else { Box::new(scene) };
+        let (name, notes, controls) = (name.to_owned(), vec!["a note".to_owned()], Vec::new());
+        let mut source = source::Source::of(camera, None);
+        if with_plate {
+            let plate = PlateDepth::new(None, None, None);
+            source.guide = Some(plate.guide());
+            source.depth = Some(Box::new(plate));
+        }
+        let has_depth = source.has_depth();
+        Ok(Opened { name, source, has_depth, ways: vec![Way::Plate], way, notes, controls, camera: Camera::default() })
+    }
+    fn turn(&mut self, _: &str, _: i64) -> Result<Vec<Knob>, String> {
+        Err("it has no controls".into())
+    }
+    fn executor(&mut self, settings: &bokeh::Settings, size: (u32, u32)) -> Result<Box<dyn Bokeh>, String> {
+        self.executors.fetch_add(1, Ordering::SeqCst);
+        bokeh::create(settings, size, None, Some(1)).map_err(|error| error.to_string())
+    }
+    fn output(&mut self, name: &str, _: (u32, u32), _: u64, _: &Arc<AtomicBool>) -> Result<Box<dyn Sink>, String> {
+        if name == "full" {
+            Err("the disk is full".into())
+        } else {
+            Ok(Box::new(Film(Arc::clone(&self.written), name.into())))
+        }
+    }
+    fn command(&self, look: &Look, source: &str, outputs: &[String], switches: &[Switch]) -> String {
+        self.settings.command(look, source, outputs, switches)
+    }
+    fn settings(&mut self) -> &mut dyn SettingsStore {
+        &mut self.settings
+    }
+}
+
+/// Settings that hold nothing: of presets there is one.
+struct NoSettings;
+
+impl SettingsStore for NoSettings {
+    fn presets(&mut self) -> Vec<Preset> {
+        vec![Preset { name: "same".into(), patch: Patch::default(), own: false }]
+    }
+    fn save_preset(&mut self, name: &str, _: &Look) -> Result<(), String> {
+        if name.is_empty() { Err("no name".into()) } else { Ok(()) }
+    }
+    fn rename_preset(&mut self, _: &str, _: &str) -> Result<(), String> {
+        Err("none of that name".into())
+    }
+    fn delete_preset(&mut self, _: &str) -> Result<(), String> {
+        Err("none of that name".into())
+    }
+    fn command(&self, _: &Look, source: &str, outputs: &[String], switches: &[Switch]) -> String {
+        format!("show {source} {outputs:?} {switches:?}")
+    }
+}
+
+/// A session on these services.
+pub struct Watched {
+    pub heard: Heard,
+    pub executors: Arc<AtomicUsize>,
+    pub written: Arc<Mutex<Vec<String>>>,
+}
+
+impl Watched {
+    pub fn begin(source: &str) -> Self {
+        Self::begin_in(source, &std::env::temp_dir())
+    }
+
+    pub fn begin_in(source: &str, folder: &Path) -> Self {
+        let small = Small { executors: Arc::default(), written: Arc::default(), settings: NoSettings };
+        let (executors, written) = (Arc::clone(&small.executors), Arc::clone(&small.written));
+        Self { heard: Heard::begin(Box::new(small), source, folder), executors, written }
+    }
+}
+
+impl Deref for Watched {
+    type Target = Heard;
+    fn deref(&self) -> &Heard {
+        &self.heard
+    }
+}
+
+impl DerefMut for Watched {
+    fn deref_mut(&mut self) -> &mut Heard {
+        &mut self.heard
+    }
+}
+
+pub fn is_running(told: &Update, width: u32) -> bool {
+    matches!(told, Update::Source(Source::Running(running)) if running.size.0 == width)
+}
+
+pub fn radius_px(view: &View) -> f32 {
+    match view.coc {
+        CocField::Depth(coc) => coc.coc_at_infinity_px,
+        CocField::Uniform { radius_px } => -radius_px,
+        CocField::Ramp(_) => f32::NAN,
+    }
+}

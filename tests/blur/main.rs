@@ -1,0 +1,15 @@
+//! What the blur promises: laws, on the processor and on a GPU.
+#![allow(missing_docs)]
+
+#[path = "../common/mod.rs"]
+mod common;
+
+mod ladder;
+mod laws;
+mod laws_random;
+mod occlusion;
+mod parity;
+mod shaders;
+mod shared_frame;
+mod slices;
+mod yuyv;

@@ -1,0 +1,100 @@
+//! What refinement has on a device, the blur takes from there.
+#![cfg(feature = "gpu")]
+#![allow(missing_docs)]
+
+use crate::common;
+
+use std::sync::Arc;
+
+use bokehcam::bokeh::gpu::GpuBokeh;
+use bokehcam::bokeh::plan::Plan;
+use bokehcam::bokeh::{Bokeh, Job};
+use bokehcam::compute::{Device, DeviceFrame};
+use bokehcam::depth::refine::Refiner;
+use bokehcam::frame::{ColorImage, DepthMap};
+use bokehcam::link::pool::Pooled;
+use bokehcam::optics::CocKind;
+use common::{coc, color, noise, settings, three_depths};
+
+/// What the device works out from metres may be rounded otherwise: divisions of hardware are exact to some units only.
+const CODES: u8 = 1;
+
+fn blurred(
+    gpu: &mut GpuBokeh,
+    color: &ColorImage,
+    map: &DepthMap,
+    on_device: Option<Pooled<DeviceFrame>>,
+) -> ColorImage {
+    let (given, map) = (Pooled::detached(color.clone()), Pooled::detached(map.clone()));
+    let job = Job::new(given, Some(map), coc(CocKind::Depth, color.height));
+    gpu.submit(Job { on_device, ..job }).expect("room for a frame");
+    let finished = gpu.collect(true).expect("the GPU blurs").expect("a frame comes back");
+    finished.picture.memory().expect("in memory").clone()
+}
+
+/// Most that two pictures are apart.
+fn codes_apart(a: &ColorImage, b: &ColorImage) -> u8 {
+    assert_eq!(a.size(), b.size());
+    a.rgb.iter().zip(&b.rgb).map(|(a, b)| a.abs_diff(*b)).max().unwrap_or_default()
+}
+
+/// A frame that is on the executor's device is taken from there, and one of another size or device is not: told by another
+/// picture and other depths there.
+#[test]
+#[ignore = "needs a Vulkan adapter (software will do)"]
+fn a_frame_on_the_device_need_not_go_up() {
+    let (width, height) = (97, 71);
+    let plan = Plan::new(&settings(CocKind::Depth), width, height);
+    let device = || Arc::new(Device::open(false, None).expect("a Vulkan adapter, software included"));
+    let (own, other) = (device(), device());
+    let mut gpu = GpuBokeh::on(&plan, Arc::clone(&own)).expect("room for the picture");
+    let given = (color(width, height, |x, y| [x as u8, 200, y as u8]), three_depths(width, height));
+    let mut there = (noise(width, height), three_depths(width, height));
+    there.1.metres.reverse();
+    // What has no number is infinitely far, there as well.
+    there.1.metres[5 * width as usize..][..4].copy_from_slice(&[0.0, -1.0, f32::NAN, f32::INFINITY]);
+    let mut made = |(color, map): &(ColorImage, DepthMap), on_device: Option<(&Device, (u32, u32))>| {
+        let on_device = on_device.map(|(device, size)| {
+            let (frame, pixels) = (DeviceFrame::new(device, size), (size.0 * size.1) as usize);
+            device.upload(&frame.rgb, 0, &there.0.rgb[..3 * pixels]);
+            device.upload(&frame.metres, 0, bytemuck::cast_slice(&there.1.metres[..pixels]));
+            Pooled::detached(frame)
+        });
+        blurred(&mut gpu, color, map, on_device)
+    };
+    let [of_given, of_there] = [made(&given, None), made(&there, None)];
+    assert!(codes_apart(&of_given, &of_there) > 50);
+    let apart = codes_apart(&made(&given, Some((&own, (width, height)))), &of_there);
+    assert!(apart <= CODES, "{apart}");
+    assert!(made(&given, Some((&own, (width, height - 1)))) == of_given, "it has another size");
+    assert!(made(&given, Some((&other, (width, height)))) == of_given, "it is on another device");
+    // A map of another size is not the one there.
+    let mut small = given.1.clone();
+    small.resize(width / 2, height / 2);
+    small.metres.fill(2.0);
+    let expected = made(&(there.0.clone(), small.clone()), None);
+    assert!(made(&(given.0, small), Some((&own, (width, height)))) == expected);
+}
+
+#[test]
+#[ignore = "needs a Vulkan adapter (software will do)"]
+fn a_refined_frame_is_given_once() {
+    let device = Arc::new(Device::open(false, None).expect("a Vulkan adapter, software included"));
+    let (width, height) = (97, 71);
+    let plan = Plan::new(&settings(CocKind::Depth), width, height);
+    let mut gpu = GpuBokeh::on(&plan, Arc::clone(&device)).expect("room for the picture");
+    let mut refiner = Refiner::new().on(Some(&device));
+    assert!(refiner.take_copy().is_none());
+    // More frames than there are copies, all of which come home.
+    for frame in 0..9 {
+        let color = color(width, height, |x, y| [(x * 3 + frame * 20) as u8, (y * 2) as u8, frame as u8]);
+        let mut map = three_depths(width, height);
+        refiner.refine(&mut map, &color, u64::from(frame) * 33_000_000);
+        let copy = refiner.take_copy();
+        assert!(copy.is_some() && refiner.take_copy().is_none(), "frame {frame}");
+        let expected = blurred(&mut gpu, &color, &map, None);
+        let apart = codes_apart(&blurred(&mut gpu, &color, &map, copy), &expected);
+        assert!(apart <= CODES, "frame {frame}: {apart}");
+    }
+    assert_eq!(refiner.backends(), "gpu");
+}

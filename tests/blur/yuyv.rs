@@ -1,0 +1,60 @@
+//! The GPU executor gives cameras what they take: YUYV.
+#![cfg(feature = "gpu")]
+#![allow(missing_docs)]
+
+use crate::common;
+
+use bokehcam::bokeh::cpu::CpuBokeh;
+use bokehcam::bokeh::gpu::GpuBokeh;
+use bokehcam::bokeh::plan::Plan;
+use bokehcam::bokeh::{Bokeh, Job};
+use bokehcam::compute::Place;
+use bokehcam::frame::YuyvImage;
+use bokehcam::link::pool::Pooled;
+use bokehcam::optics::CocKind;
+use bokehcam::sink::yuyv;
+use common::{coc, noise, settings, three_depths};
+
+/// Where YUYV is as good, the result is that of its picture, to the bit; and the picture where it is not, or cannot be.
+#[test]
+#[ignore = "needs a Vulkan adapter (software will do)"]
+fn yuyv_is_the_picture_encoded() {
+    for (width, height, is_even) in
+        [(64, 48, true), (130, 7, true), (258, 3, true), (2, 1, true), (97, 71, false), (1, 1, false)]
+    {
+        let field = coc(CocKind::Depth, height);
+        let plan = Plan::new(&settings(CocKind::Depth), width, height);
+        let mut gpu = GpuBokeh::new(&plan, false, None).expect("a Vulkan adapter, software included");
+        let mut cpu = CpuBokeh::new(plan, Some(1));
+        let (image, map) = (noise(width, height), three_depths(width, height));
+        let job = |place, yuyv: bool| Job {
+            place,
+            yuyv: yuyv.then(|| Pooled::detached(YuyvImage::default())),
+            ..Job::new(Pooled::detached(image.clone()), Some(Pooled::detached(map.clone())), field)
+        };
+        let made = |bokeh: &mut dyn Bokeh, job: Job| {
+            bokeh.submit(job).expect("room for a frame");
+            bokeh.collect(true).expect("a frame").expect("one is in flight").picture
+        };
+        let expected = made(&mut gpu, job(Place::Memory, false)).memory().expect("in memory").clone();
+        let mut bytes = vec![0; 2 * (width * height) as usize];
+        if is_even {
+            yuyv::Encoder::new().encode(&expected, &mut bytes);
+        }
+        // Twice, and with other pictures between them.
+        for _ in 0..2 {
+            let mut picture = made(&mut gpu, job(Place::Memory, true));
+            assert_eq!(picture.yuyv_mut().is_some(), is_even);
+            assert_eq!((picture.size(), picture.memory().is_some()), ((width, height), !is_even));
+            if let Some(yuyv) = picture.yuyv_mut() {
+                assert_eq!(yuyv.size(), (width, height));
+                assert!(yuyv.bytes == bytes, "{width} x {height}");
+            }
+            for picture in [made(&mut gpu, job(Place::Both, true)), made(&mut gpu, job(Place::Memory, false))] {
+                assert!(picture.memory() == Some(&expected), "{width} x {height}");
+            }
+        }
+        let mut picture = made(&mut cpu, job(Place::Memory, true));
+        assert!(picture.memory().is_some() && picture.yuyv_mut().is_none(), "the CPU makes pictures");
+    }
+}

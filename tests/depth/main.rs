@@ -1,0 +1,20 @@
+//! What depth and its mattes promise, on the processor and on a GPU.
+#![allow(missing_docs)]
+
+#[path = "../common/mod.rs"]
+mod common;
+#[path = "../common/on_gpu.rs"]
+mod on_gpu;
+
+mod background;
+mod calibration;
+mod depth;
+mod matcher;
+mod matte_gpu;
+mod matting;
+mod pair_check;
+mod rectify_gpu;
+mod refine;
+mod refine_gpu;
+mod stereo_gpu;
+mod stereo_tidying;

@@ -1,0 +1,9 @@
+//! Files that are read and written, and what holds for the source itself.
+#![allow(missing_docs)]
+
+mod examples;
+mod layering;
+mod licences;
+mod recording;
+mod scripts;
+mod sinks;
