@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""Prints the licences of all that is built into bokehcam: the crates of the default features, and the fonts; with an
-argument, `python` or `gst`, of all that is built into what is made there. Each text stands once, below those that it is for.
+"""Prints the licences of all that is built into bokehcam as packages bring it: its crates, and the fonts; with an argument,
+`python` or `gst`, of all that is built into what is made there. Each text stands once, below those that it is for.
 Needs cargo, which fetches what a build has left out: metadata takes crates of tests, too."""
 
 import json
@@ -9,25 +9,25 @@ import subprocess
 import sys
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
-FOLDER = ROOT.joinpath(*sys.argv[1:2])
+MADE = (sys.argv[1:] or ["program"])[0]
+# What is built, as cargo is told it.
+PACKAGES = {
+    "program": ["bokehcam-cli", "--no-default-features", "--features=packaged"],
+    "python": ["bokehcam-python"],
+    "gst": ["gst-plugin-bokehcam"],
+}
 TEXTS = ("license", "licence", "copying", "notice", "unlicense")
 
 
 def built_in():
-    """Packages that the program is linked with, by name."""
-    version = subprocess.run(["cargo", "-vV"], check=True, capture_output=True, text=True).stdout
-    host = next(line.split()[1] for line in version.splitlines() if line.startswith("host:"))
-    command = ["cargo", "metadata", "--format-version=1", "--locked", "--filter-platform", host]
-    metadata = json.loads(subprocess.run(command, check=True, capture_output=True, text=True, cwd=FOLDER).stdout)
-    nodes = {node["id"]: node for node in metadata["resolve"]["nodes"]}
-    found, waiting = set(), [metadata["resolve"]["root"]]
-    while waiting:
-        for dependency in nodes[waiting.pop()]["deps"]:
-            normal = any(kind["kind"] is None for kind in dependency["dep_kinds"])
-            if normal and dependency["pkg"] not in found:
-                found.add(dependency["pkg"])
-                waiting.append(dependency["pkg"])
-    packages = [package for package in metadata["packages"] if package["id"] in found]
+    """Packages of others that it is linked with, by name."""
+    def cargo(*arguments):
+        return subprocess.run(["cargo", *arguments], check=True, capture_output=True, text=True, cwd=ROOT).stdout
+
+    tree = cargo("tree", "--locked", "--edges=normal,no-proc-macro", "--prefix=none", "--format={p}", "--package", *PACKAGES[MADE])
+    linked = {tuple(line.split()[:2]) for line in tree.splitlines() if line}
+    metadata = json.loads(cargo("metadata", "--format-version=1", "--locked"))
+    packages = [package for package in metadata["packages"] if package["source"] and (package["name"], "v" + package["version"]) in linked]
     return sorted(packages, key=lambda package: (package["name"], package["version"]))
 
 
@@ -48,9 +48,9 @@ def main():
             without.append(f"{name}: {package['license']}, by {', '.join(package['authors']) or 'its authors'}")
         for text in found:
             by_text.setdefault(text, []).append(name)
-    if FOLDER == ROOT:
+    if MADE == "program":
         print("Roboto Regular and Medium: Apache-2.0")
-        for text in texts(ROOT / "src/preview/fonts"):
+        for text in texts(ROOT / "crates/window/src/fonts"):
             by_text.setdefault(text, []).append("Roboto")
     if without:
         print("\nThese bring no text of their own:\n" + "\n".join(without))

@@ -14,7 +14,8 @@
 }:
 
 let
-  manifest = (lib.importTOML ../../Cargo.toml).package;
+  manifest = (lib.importTOML ../../Cargo.toml).workspace.package;
+  description = (lib.importTOML ../../crates/cli/Cargo.toml).package.description;
 
   # What packaging/libraries names: loaded while it runs, where Nix has no common folder for it.
   loaded = [
@@ -29,11 +30,14 @@ let
   ];
 in
 rustPlatform.buildRustPackage {
-  pname = manifest.name;
+  pname = "bokehcam";
   inherit (manifest) version;
 
   src = lib.cleanSource ../..;
   cargoLock.lockFile = ../../Cargo.lock;
+  cargoBuildFlags = [ "-p" "bokehcam-cli" ];
+  buildNoDefaultFeatures = true;
+  buildFeatures = [ "packaged" ];
 
   nativeBuildInputs = [ pkg-config python3 patchelf rustPlatform.bindgenHook ];
   buildInputs = [ pipewire ];
@@ -54,9 +58,9 @@ rustPlatform.buildRustPackage {
   '';
 
   meta = {
-    inherit (manifest) description;
+    inherit description;
     license = with lib.licenses; [ mit asl20 ];
-    mainProgram = manifest.name;
+    mainProgram = "bokehcam";
     platforms = lib.platforms.linux;
   };
 }

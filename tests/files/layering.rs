@@ -3,38 +3,38 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Modules of the crate by layer, the lowest first.
-const LAYERS: [&[&str]; 12] = [
+/// Modules of the library by layer, the lowest first, then the crates above it.
+const LAYERS: [&[&str]; 11] = [
     &["names"],
     &["color", "frame", "optics", "clock", "files", "knob"],
     &["compute", "calibration", "layout"],
-    &["link", "budget", "network", "stats", "recording", "scene", "v4l2", "pipewire", "control"],
+    &["link", "budget", "network", "stats", "recording", "v4l2", "pipewire", "control"],
     &["capture", "depth", "bokeh", "sink"],
     &["look"],
     &["computing"],
     &["pipeline"],
     &["source"],
-    &["preview"],
+    // Crates of their own, under `crates/`.
+    &["lab", "window"],
     &["cli"],
-    &["main"],
 ];
 
-/// Crates, and the only places under `src/` that may name them.
+/// Crates of others, and the only places that may name them: modules of the library, or folders of a crate above it.
 const DOORS: [(&str, &[&str]); 30] = [
     ("clap", &["cli", "source/options"]),
     ("clap_complete", &["cli"]),
     ("clap_mangen", &["cli"]),
     ("crossbeam_channel", &["link"]),
     ("ctrlc", &["cli"]),
-    ("egui", &["preview"]),
-    ("egui_wgpu", &["preview/present"]),
-    ("egui_winit", &["preview/window"]),
+    ("egui", &["window"]),
+    ("egui_wgpu", &["window/present"]),
+    ("egui_winit", &["window/window"]),
     ("image", &["capture/demo", "recording", "sink"]),
     ("indicatif", &["cli"]),
-    ("jiff", &["preview/folders"]),
+    ("jiff", &["window/folders"]),
     ("ort", &["network/onnx_runtime"]),
     ("pipewire", &["pipewire"]),
-    ("plotters", &["cli"]),
+    ("plotters", &["lab"]),
     ("png", &["recording", "sink"]),
     (
         "rustix",
@@ -51,13 +51,13 @@ const DOORS: [(&str, &[&str]); 30] = [
             "v4l2",
         ],
     ),
-    ("rfd", &["preview/dialog"]),
+    ("rfd", &["window/dialog"]),
     ("rten", &["network/built_in"]),
     ("rten_tensor", &["network/built_in"]),
     ("saphyr_parser", &["calibration"]),
     ("sha2", &["network/known"]),
-    ("skrifa", &["preview/panel/fonts"]),
-    ("softbuffer", &["preview/present"]),
+    ("skrifa", &["window/panel/fonts"]),
+    ("softbuffer", &["window/present"]),
     ("strsim", &["names", "v4l2"]),
     ("toml_edit", &["cli"]),
     ("v4l", &["v4l2"]),
@@ -69,19 +69,22 @@ const DOORS: [(&str, &[&str]); 30] = [
             "depth/matting/gpu",
             "depth/refine/gpu",
             "depth/stereo/gpu",
-            "preview/present",
+            "window/present",
         ],
     ),
-    ("winit", &["preview/present", "preview/window"]),
-    ("zbus", &["control/bus", "preview/window"]),
+    ("winit", &["window/present", "window/window"]),
+    ("zbus", &["control/bus", "window/window"]),
     ("zune_jpeg", &["capture"]),
 ];
+
+/// Crates of the workspace above the library.
+const CRATES: [&str; 3] = ["cli", "lab", "window"];
 
 fn layer(module: &str) -> Option<usize> {
     LAYERS.iter().position(|modules| modules.contains(&module))
 }
 
-/// What is wrong in the source file `path` (relative to `src/`), one line each.
+/// What is wrong in the source file `path` (relative to `src/`, or the name of a crate and relative to its `src/`), one line each.
 fn violations(path: &str, source: &str) -> Vec<String> {
     let module = path.split(['/', '.']).next().unwrap_or_default();
     let mut found = Vec::new();
@@ -92,21 +95,22 @@ fn violations(path: &str, source: &str) -> Vec<String> {
     let source = source.split("#[cfg(test)]\nmod tests {").next().unwrap_or_default();
     for (number, line) in (1..).zip(source.lines()) {
         let code = line.split("//").next().unwrap_or_default();
-        for root in ["crate::", "bokehcam::"] {
-            for used in after(code, root).flat_map(names) {
-                match layer(&used) {
-                    _ if used == module => {}
-                    Some(other) if other < own => {}
-                    Some(_) => found.push(format!("src/{path}:{number}: {module} may not import {used}")),
-                    None => {}
-                }
+        let of_library = ["crate::", "bokehcam::"].into_iter().skip(usize::from(CRATES.contains(&module)));
+        let libraries = CRATES.iter().filter(|above| code.contains(&format!("bokehcam_{above}::"))).map(|above| (*above).to_owned());
+        let used = of_library.flat_map(|root| after(code, root)).flat_map(names).chain(libraries);
+        for used in used {
+            match layer(&used) {
+                _ if used == module => {}
+                Some(other) if other < own => {}
+                Some(_) => found.push(format!("{path}:{number}: {module} may not import {used}")),
+                None => {}
             }
         }
         for (door, homes) in DOORS {
             let named = after(code, &format!("{door}::")).next().is_some() || code.contains(&format!("use {door};"));
             if named && !homes.iter().any(|home| path == format!("{home}.rs") || path.starts_with(&format!("{home}/")))
             {
-                found.push(format!("src/{path}:{number}: {door} belongs to {homes:?}"));
+                found.push(format!("{path}:{number}: {door} belongs to {homes:?}"));
             }
         }
     }
@@ -149,16 +153,17 @@ fn sources(folder: &Path) -> Vec<PathBuf> {
 
 #[test]
 fn imports_go_down_and_crates_have_one_door() {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
-    let files = sources(&root);
-    assert!(files.len() > 20, "the scan found only {} files", files.len());
-    let found: Vec<String> = files
-        .iter()
-        .flat_map(|file| {
-            let path = file.strip_prefix(&root).unwrap().to_str().unwrap();
-            violations(path, &fs::read_to_string(file).unwrap())
-        })
-        .collect();
+    let top = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let crates = CRATES.map(|name| (format!("{name}/"), top.join("crates").join(name).join("src")));
+    let mut found = Vec::new();
+    for (name, root) in crates.into_iter().chain([(String::new(), top.join("src"))]) {
+        let files = sources(&root);
+        assert!(files.len() > 20, "the scan found only {} files in {}", files.len(), root.display());
+        for file in files {
+            let path = format!("{name}{}", file.strip_prefix(&root).unwrap().to_str().unwrap());
+            found.extend(violations(&path, &fs::read_to_string(file).unwrap()));
+        }
+    }
     assert!(found.is_empty(), "\n{}", found.join("\n"));
 }
 
@@ -172,6 +177,7 @@ fn the_scan_finds_what_it_should() {
         ("pipeline.rs", "use crossbeam_channel::bounded;"),
         ("bokeh/cpu/mod.rs", "fn f() { wgpu::Instance::default(); }"),
         ("cli/commands/render/mod.rs", "use image;"),
+        ("window/lib.rs", "use bokehcam_cli::run;"),
         ("frame.rs", "#[cfg(test)]\nmod tests;\nuse crate::link::pool::Pool;"),
         ("attic.rs", ""),
     ];
@@ -183,6 +189,7 @@ fn the_scan_finds_what_it_should() {
         ("bokeh/gpu/device.rs", "use wgpu::Device; use crate::bokeh::plan;"),
         ("sink/png.rs", "use image::ImageEncoder; // crate::cli would be wrong"),
         ("frame.rs", "#[cfg(test)]\nmod tests { use crate::pipeline::run; }"),
+        ("cli/main.rs", "use bokehcam_window::window; use crate::source;"),
         ("optics.rs", "let my_image::x = super::image();"),
     ];
     for (path, source) in good {

@@ -50,7 +50,7 @@ fn scripts_tell_what_they_do() {
     let here = Path::new(env!("CARGO_MANIFEST_DIR"));
     let of_scripts = std::fs::read_dir(here.join("scripts")).unwrap().map(|entry| entry.unwrap().path());
     let elsewhere =
-        ["gst/test", "python/test", "python/wheel", "benches/gpu.sh", "tests/vm/run", "tests/pipewire/session"];
+        ["gst/test", "python/test", "python/wheel", "crates/lab/benches/gpu.sh", "tests/vm/run", "crates/cli/tests/pipewire/session"];
     let mut tried = 0;
     for path in of_scripts.chain(elsewhere.map(|name| here.join(name))) {
         let text = std::fs::read_to_string(&path).unwrap();
@@ -83,9 +83,5 @@ fn a_release_has_the_version_of_the_source() {
         let refused = release(args);
         assert_eq!(refused.status.code(), Some(code), "{args:?}: {}", said(&refused));
         assert!(said(&refused).contains(named) && said(&refused).lines().count() == 1, "{args:?}: {}", said(&refused));
-    }
-    for manifest in ["python/Cargo.toml", "gst/Cargo.toml"] {
-        let text = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join(manifest)).unwrap();
-        assert!(text.contains(concat!("\nversion = \"", env!("CARGO_PKG_VERSION"), "\"\n")), "{manifest}");
     }
 }

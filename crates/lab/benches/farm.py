@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 """How a farm scales on this machine, from one node of one core to two, and what a task costs beside its frames.
 
-    benches/farm.py --runs 5
-    benches/farm.py --runs 5 --wait 3
+    crates/lab/benches/farm.py --runs 5
+    crates/lab/benches/farm.py --runs 5 --wait 3
 
 Needs Ray (pip install 'bokehcam[ray]') and the program, built here or named by BOKEHCAM. Each run does the same work on one
 node and on two, in turn; each node's processes stay on a core of their own. With other work on the machine only the ratio means
@@ -20,7 +20,7 @@ import tempfile
 import time
 from pathlib import Path
 
-REPOSITORY = Path(__file__).resolve().parents[1]
+REPOSITORY = Path(__file__).resolve().parents[3]
 sys.path[:0] = [str(REPOSITORY / "python" / "tests"), str(REPOSITORY / "python")]
 
 from farm_fixtures import PROGRAM, Cluster, farm, recording  # noqa: E402

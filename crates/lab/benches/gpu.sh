@@ -3,27 +3,26 @@
 #
 # Prints one table a size: each pass's time by the device's own timestamps, their sum, and that of a whole frame.
 #
-#   benches/gpu.sh                                  builds, tests and measures
-#   BOKEHCAM=target/release/bokehcam benches/gpu.sh measures a binary as it is, without building or testing
-#   SIZES=1280x720 FRAMES=5 ADAPTER=llvmpipe benches/gpu.sh
+#   crates/lab/benches/gpu.sh                                  builds, tests and measures
+#   BOKEHCAM=target/release/bokehcam crates/lab/benches/gpu.sh measures a binary as it is, without building or testing
+#   SIZES=1280x720 FRAMES=5 ADAPTER=llvmpipe crates/lab/benches/gpu.sh
 set -euo pipefail
 [[ "${1-}" != @(-h|--help) ]] || exec sed -n '2,/^set/{/^set/d;s/^# \{0,1\}//p}' "$0"
-cd "$(dirname "${BASH_SOURCE[0]}")/.."
+cd "$(dirname "${BASH_SOURCE[0]}")/../../.."
 
 sizes=${SIZES:-1920x1080,3840x2160}
 frames=${FRAMES:-30}
 if [[ -z "${BOKEHCAM:-}" ]]; then
     cargo build --release --locked
-    parity=(--test parity --test yuyv --test shared_frame --test stereo_gpu --test stereo_tidying --test rectify_gpu)
-    parity+=(--test refine_gpu --test matte_gpu)
-    cargo test --release --locked "${parity[@]}" -- --include-ignored
+    cargo test --release --locked --features gpu --test blur -- --include-ignored parity:: yuyv:: shared_frame::
+    cargo test --release --locked --features gpu --test depth -- --include-ignored gpu:: stereo_tidying::
     # Depth from two eyes: each pass by the device's own timestamps, then whole pairs.
     for pair in 640x480x64 1280x720x128; do
-        BOKEHCAM_PAIR=$pair cargo test --release --locked --test stereo_gpu -- --ignored --nocapture the_passes
+        BOKEHCAM_PAIR=$pair cargo test --release --locked --test depth -- --ignored --nocapture stereo_gpu::the_passes
     done
     # Refinement of depth and mattes, in the same way.
     for size in ${sizes//,/ }; do
-        BOKEHCAM_SIZE=$size cargo test --release --locked --test refine_gpu --test matte_gpu -- --ignored --nocapture the_passes
+        BOKEHCAM_SIZE=$size cargo test --release --locked --test depth -- --ignored --nocapture refine_gpu::the_passes matte_gpu::the_passes
     done
     cargo bench --locked --bench stereo -- times --gpu "${ADAPTER:-}" --size 640x480,1280x720 --disparities 64,128
     BOKEHCAM=${CARGO_TARGET_DIR:-target}/release/bokehcam

@@ -27,7 +27,7 @@ a mask or a right truth), of those in the leftmost columns that the range takes 
 import argparse, csv, json, os, subprocess, sys, tempfile, time
 import cv2, numpy as np
 
-ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
+ROOT = os.path.abspath(os.path.join(os.path.dirname(__file__), "..", "..", ".."))
 RECORDING = os.path.join(ROOT, 'recordings', 'stereo')
 RECORDING_RANGE = 96
 LIMITS = 1, 2, 4

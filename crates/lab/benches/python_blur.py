@@ -4,7 +4,7 @@
 Needs the package (`python/test` builds it into target/bindings/wheels) and its group `bench`: BlurGenerator, albumentations,
 opencv-python-headless.
 
-  python benches/python_blur.py [--size 1280x720] [--seeds 2,5] [--radii 8,16] [--rounds 5] [--samples 96]
+  python crates/lab/benches/python_blur.py [--size 1280x720] [--seeds 2,5] [--radii 8,16] [--rounds 5] [--samples 96]
 
 Two questions. One radius everywhere: the truth is the picture under an exact disc, area-sampled, in linear light. A radius
 for every pixel: the truth is `thin_lens_scene`, an exact thin lens over layers, which shows what things hide. Peers without

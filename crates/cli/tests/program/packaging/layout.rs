@@ -5,12 +5,12 @@ use super::*;
 /// `cargo binstall` looks for the archive, and the program in it, by names of its own.
 #[test]
 fn binstall_finds_the_archive_that_is_made() {
-    let manifest: toml::Table = here("Cargo.toml").parse().unwrap();
+    let manifest: toml::Table = here("crates/cli/Cargo.toml").parse().unwrap();
     let binstall = &manifest["package"]["metadata"]["binstall"];
     let filled = |key: &str| {
         let mut text = binstall[key].as_str().unwrap().to_owned();
         for (name, value) in [
-            ("name", "bokehcam"),
+            ("name", "bokehcam-cli"),
             ("bin", "bokehcam"),
             ("version", "$version"),
             ("target", "$host"),
