@@ -63,14 +63,7 @@ const DOORS: [(&str, &[&str]); 30] = [
     ("v4l", &["v4l2"]),
     (
         "wgpu",
-        &[
-            "bokeh/gpu",
-            "compute/device",
-            "depth/matting/gpu",
-            "depth/refine/gpu",
-            "depth/stereo/gpu",
-            "window/present",
-        ],
+        &["bokeh/gpu", "compute/device", "depth/matting/gpu", "depth/refine/gpu", "depth/stereo/gpu", "window/present"],
     ),
     ("winit", &["window/present", "window/window"]),
     ("zbus", &["control/bus", "window/window"]),
@@ -96,7 +89,10 @@ fn violations(path: &str, source: &str) -> Vec<String> {
     for (number, line) in (1..).zip(source.lines()) {
         let code = line.split("//").next().unwrap_or_default();
         let of_library = ["crate::", "bokehcam::"].into_iter().skip(usize::from(CRATES.contains(&module)));
-        let libraries = CRATES.iter().filter(|above| code.contains(&format!("bokehcam_{above}::"))).map(|above| (*above).to_owned());
+        let libraries = CRATES
+            .iter()
+            .filter(|above| code.contains(&format!("bokehcam_{above}::")))
+            .map(|above| (*above).to_owned());
         let used = of_library.flat_map(|root| after(code, root)).flat_map(names).chain(libraries);
         for used in used {
             match layer(&used) {

@@ -49,8 +49,14 @@ fn setup_looks_for_the_library_that_the_build_needs() {
 fn scripts_tell_what_they_do() {
     let here = Path::new(env!("CARGO_MANIFEST_DIR"));
     let of_scripts = std::fs::read_dir(here.join("scripts")).unwrap().map(|entry| entry.unwrap().path());
-    let elsewhere =
-        ["gst/test", "python/test", "python/wheel", "crates/lab/benches/gpu.sh", "tests/vm/run", "crates/cli/tests/pipewire/session"];
+    let elsewhere = [
+        "gst/test",
+        "python/test",
+        "python/wheel",
+        "crates/lab/benches/gpu.sh",
+        "tests/vm/run",
+        "crates/cli/tests/pipewire/session",
+    ];
     let mut tried = 0;
     for path in of_scripts.chain(elsewhere.map(|name| here.join(name))) {
         let text = std::fs::read_to_string(&path).unwrap();

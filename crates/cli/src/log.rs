@@ -11,10 +11,11 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use clap::error::ContextKind;
 use serde_json::json;
 use tracing::{Event, Level, Subscriber};
-use tracing_subscriber::EnvFilter;
+use tracing_subscriber::filter::Targets;
 use tracing_subscriber::fmt::format::{Format, Writer};
 use tracing_subscriber::fmt::time::{FormatTime, SystemTime};
 use tracing_subscriber::fmt::{FmtContext, FormatEvent, FormatFields, MakeWriter};
+use tracing_subscriber::prelude::*;
 use tracing_subscriber::registry::LookupSpan;
 
 use super::options::{Global, LogFormat};
@@ -48,15 +49,18 @@ pub fn start(global: &Global) {
         (_, 1) => "bokehcam=info,warn",
         (_, _) => "bokehcam=debug,info",
     };
-    let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new(level));
+    let asked_for = std::env::var("RUST_LOG").ok().filter(|text| !text.is_empty());
+    let filter: Targets =
+        asked_for.and_then(|text| text.parse().ok()).or_else(|| level.parse().ok()).unwrap_or_default();
     let no_color = std::env::var_os("NO_COLOR").is_some_and(|value| !value.is_empty());
-    let log = tracing_subscriber::fmt().with_env_filter(filter).with_writer(LogLines);
+    let log = tracing_subscriber::fmt::layer().with_writer(LogLines);
     let full = tracing_subscriber::fmt::format();
     let log = log.with_ansi(io::stderr().is_terminal() && !no_color);
+    let all = tracing_subscriber::registry();
     // It fails if there is a logger already, as in tests; that one stays.
     let _ = match global.log_format {
-        LogFormat::Text => log.event_format(ForPeople(full)).try_init(),
-        LogFormat::Json => log.json().try_init(),
+        LogFormat::Text => all.with(log.event_format(ForPeople(full)).with_filter(filter)).try_init(),
+        LogFormat::Json => all.with(log.json().with_filter(filter)).try_init(),
     };
 }
 
