@@ -40,7 +40,7 @@ pub fn run(args: impl IntoIterator<Item = OsString>) -> ExitCode {
     }
     let args = arguments::joined(args);
     #[cfg(feature = "lab")]
-    bokehcam::capture::synthetic::bring(|format| Ok(Box::new(bokehcam_lab::synthetic::Synthetic::new(format)?)));
+    bokehcam_lab::synthetic::bring();
     log::tell_of_panics();
     log::write_as(arguments::log_format(&args));
     let code = run_to_end(&args);

@@ -1,6 +1,6 @@
 //! The project's own scene as a camera, with exact depth.
 
-use bokehcam::capture::synthetic::Format;
+use bokehcam::capture::synthetic::{self, Format};
 use bokehcam::capture::{Brings, Camera, CaptureError, Captured, Shot, SourceInfo};
 use bokehcam::frame::Stamp;
 
@@ -40,6 +40,11 @@ impl Synthetic {
     fn at_end(&self) -> bool {
         self.format.frames.is_some_and(|frames| self.position >= frames)
     }
+}
+
+/// From now on, the source `synthetic` is this camera.
+pub fn bring() {
+    synthetic::bring(|format| Ok(Box::new(Synthetic::new(format)?)));
 }
 
 impl Camera for Synthetic {

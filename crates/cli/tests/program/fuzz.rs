@@ -76,7 +76,7 @@ fn mutation(seed: &[u8], other: &[u8], numbers: &mut Numbers) -> Vec<u8> {
 /// Runs a target over its seeds and their mutations; the input at which it panics is named, and kept for looking at.
 fn holds(name: &str) {
     let (_, target) = promises::TARGETS.into_iter().find(|target| target.0 == name).unwrap();
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("fuzz/seeds").join(name);
+    let folder = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../fuzz/seeds")).join(name);
     let mut seeds: Vec<_> = fs::read_dir(&folder).unwrap().map(|entry| entry.unwrap().path()).collect();
     seeds.sort();
     assert!(!seeds.is_empty(), "{} is empty", folder.display());

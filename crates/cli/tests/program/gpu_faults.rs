@@ -39,7 +39,7 @@ fn device() -> Device {
 
 fn layer() -> TempDir {
     let folder = tempfile::tempdir().unwrap();
-    let source = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("tests/gpu_faults/layer.c");
+    let source = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/program/gpu_faults/layer.c"));
     let library = folder.path().join("layer.so");
     let mut compiler = Command::new("cc");
     compiler.args(["-shared", "-fPIC", "-O1", "-o"]).arg(&library).arg(source);

@@ -138,7 +138,7 @@ fn desktops_find_the_program_its_icon_and_its_version() {
     );
     // What a running window calls itself leads back to this file.
     let class = format!("const CLASS: &str = \"{}\";", value(&entry, "StartupWMClass"));
-    assert!(here("src/preview/window/gfx.rs").contains(&class), "{class}");
+    assert!(here("crates/window/src/window/gfx.rs").contains(&class), "{class}");
 
     let id = "io.github.bokehcam.bokehcam";
     let metainfo = here(&format!("packaging/{id}.metainfo.xml"));

@@ -26,12 +26,13 @@ fn network(constants: &[Vec<u8>], nodes: &[Vec<u8>]) -> Vec<u8> {
     model(&[port("in", &sides(3))], constants, nodes, &[port("out", &sides(1))])
 }
 
+const PORTRAIT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../recordings/portrait");
+
 /// What a run of two frames says, and how it ends.
 fn streamed(folder: &TempDir, name: &str, bytes: &[u8], more: &[&str]) -> Output {
     let file = written(folder, name, bytes);
     let choice = format!("matte:{}", file.display());
-    let arguments =
-        ["stream", "recordings/portrait", "--depth", &choice, "--network-runtime", "built-in", "--to", "null"];
+    let arguments = ["stream", PORTRAIT, "--depth", &choice, "--network-runtime", "built-in", "--to", "null"];
     bokehcam(&[&arguments[..], more].concat(), folder.path())
 }
 
@@ -114,7 +115,7 @@ fn wait_until<T>(what: &str, mut is_there: impl FnMut() -> Option<T>) -> T {
 fn endless(folder: &TempDir) -> (Child, Pid) {
     let file = written(folder, "good.onnx", &matte(16, 12, WEIGHTS, 0.0));
     let mut command = Command::new(env!("CARGO_BIN_EXE_bokehcam"));
-    command.args(["stream", "recordings/portrait", "--loop", "--pace", "realtime", "--network-runtime", "built-in"]);
+    command.args(["stream", PORTRAIT, "--loop", "--pace", "realtime", "--network-runtime", "built-in"]);
     command.arg("--depth").arg(format!("matte:{}", file.display())).arg("--to").arg(folder.path().join("out.y4m"));
     let program = command.env("XDG_CONFIG_HOME", folder.path()).stderr(Stdio::piped()).spawn().unwrap();
     let worker = wait_until("the network's process", || children(&program).first().copied());

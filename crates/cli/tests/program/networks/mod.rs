@@ -205,6 +205,7 @@ fn a_network_with_a_memory_gets_back_what_it_gave() {
 fn bokehcam(arguments: &[&str], data: &Path) -> Output {
     let program = Command::new(env!("CARGO_BIN_EXE_bokehcam"))
         .args(arguments)
+        .current_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."))
         .env("XDG_DATA_HOME", data)
         .env("XDG_DATA_DIRS", data)
         .env("XDG_CONFIG_HOME", data)

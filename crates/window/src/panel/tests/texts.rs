@@ -96,7 +96,7 @@ fn sources(folder: &Path) -> String {
 
 #[test]
 fn the_table_has_all_texts_and_no_others() {
-    let sources = sources(&Path::new(env!("CARGO_MANIFEST_DIR")).join("src/preview"));
+    let sources = sources(&Path::new(env!("CARGO_MANIFEST_DIR")).join("src"));
     let is_written = |text: &str| sources.contains(&format!("\"{}\"", text.replace('"', "\\\"")));
     for mut window in windows() {
         window.wait(0.3);
@@ -122,7 +122,7 @@ fn the_table_has_all_texts_and_no_others() {
 
 #[test]
 fn what_is_said_while_it_runs_is_in_the_table_too() {
-    let sources = sources(&Path::new(env!("CARGO_MANIFEST_DIR")).join("src/preview"));
+    let sources = sources(&Path::new(env!("CARGO_MANIFEST_DIR")).join("src"));
     let english = table::english();
     let literal = |after: &str| {
         let text = after.trim_start().strip_prefix('"')?.split('"').next()?.to_owned();
