@@ -7,7 +7,6 @@
 
 pub mod control;
 pub mod dialog;
-pub mod folders;
 pub mod keys;
 pub mod lent;
 pub mod meters;

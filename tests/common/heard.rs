@@ -7,11 +7,11 @@ use std::time::{Duration, Instant};
 
 use bokehcam::capture::Seeker;
 use bokehcam::depth::plate::Guide;
+use bokehcam::files::user_folders::Folders;
 use bokehcam::link::Receiver;
 use bokehcam::link::demand::{Demand, Watch};
 use bokehcam::look::{Look, Strength};
 use bokehcam::pipeline::View;
-use bokehcam::preview::folders::Folders;
 use bokehcam::preview::services::Services;
 use bokehcam::preview::session::{Blurred, Session, SessionEvent, Start};
 use bokehcam::preview::state::Update;

@@ -9,10 +9,10 @@ use std::sync::mpsc;
 
 use super::live::Live;
 use super::{Closed, News, Order, SessionEvent, Start, held};
+use crate::files::user_folders as folders;
 use crate::link::demand::Watch;
 use crate::look::Look;
 use crate::pipeline::PipelineError;
-use crate::preview::folders;
 use crate::preview::services::Switch;
 use crate::preview::state::{Output, Request, Source, Update, Way};
 use crate::sink::switch::{Fate, Notice};

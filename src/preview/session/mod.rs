@@ -15,13 +15,13 @@ use std::time::{Duration, Instant};
 pub use held::{Blurred, Held};
 use host::Host;
 
-use super::folders::{self, Folders};
 use super::services::{Services, Switch};
 use super::state::{Output, Request, Update};
 use crate::budget::Quality;
 use crate::capture::Seeker;
 use crate::control::Answer;
 use crate::depth::plate::Guide;
+use crate::files::user_folders::{self as folders, Folders};
 use crate::frame::{ColorImage, DepthMap};
 use crate::link::Receiver;
 use crate::link::demand::Demand;

@@ -3,8 +3,8 @@
 use super::super::{SessionEvent, Still, held};
 use super::Host;
 use crate::control::Answer;
+use crate::files::user_folders as folders;
 use crate::look::{Look, Patch};
-use crate::preview::folders;
 use crate::recording::snapshot::{self, Snapshot};
 use crate::recording::still::write_color;
 
