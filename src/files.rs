@@ -5,4 +5,5 @@ pub mod folder;
 pub mod input;
 pub mod place;
 pub mod trusted;
+pub mod user_folders;
 pub mod whole;

@@ -4,6 +4,7 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 
 use super::{Bokeh, BokehError, Finished, Job};
+use crate::compute::backed::Backed;
 use crate::compute::{Backend, Device, GpuError};
 
 /// Makes the executor to go over to.
@@ -12,11 +13,7 @@ pub type Makes = Box<dyn FnOnce() -> Box<dyn Bokeh> + Send>;
 /// Runs one executor until its GPU fails, then another. No frame is lost: those in flight at the failure are blurred
 /// again by the other one.
 pub struct Fallback {
-    current: Box<dyn Bokeh>,
-    /// Makes the other executor; `None` once that runs.
-    other: Option<Makes>,
-    /// The error of the first executor, once it has failed.
-    failure: Option<String>,
+    executor: Backed<Box<dyn Bokeh>, Makes>,
     /// Frames that no executor has yet, oldest first: after a failure there may be more than the other one takes.
     waiting: VecDeque<Job>,
 }
@@ -24,29 +21,29 @@ pub struct Fallback {
 impl Fallback {
     /// Runs `first`, and what `other` makes once `first` fails.
     pub fn new(first: Box<dyn Bokeh>, other: Makes) -> Self {
-        Self { current: first, other: Some(other), failure: None, waiting: VecDeque::new() }
+        Self { executor: Backed::new(first, other), waiting: VecDeque::new() }
     }
 
     /// Goes over to the other executor, or returns the error where that has happened already.
     fn switch_over(&mut self, error: GpuError) -> Result<(), BokehError> {
-        let Some(other) = self.other.take() else { return Err(error.into()) };
-        tracing::warn!("{error}; the CPU blurs from here on");
-        let mut waiting: VecDeque<Job> = std::iter::from_fn(|| self.current.take_back()).collect();
-        waiting.append(&mut self.waiting);
-        self.waiting = waiting;
-        self.failure = Some(format!("{error}"));
-        // Drops the first executor, and with it its GPU memory, before the other one allocates its own.
-        self.current = Box::new(Placeholder);
-        self.current = other();
-        Ok(())
+        let Self { executor, waiting } = self;
+        let make = |first: &mut Box<dyn Bokeh>, other: Makes| {
+            let mut all: VecDeque<Job> = std::iter::from_fn(|| first.take_back()).collect();
+            all.append(waiting);
+            *waiting = all;
+            // Drops the first executor, and with it its GPU memory, before the other one allocates its own.
+            *first = Box::new(Placeholder);
+            Ok(other())
+        };
+        Ok(executor.fall_back(error, "blurs", make)?)
     }
 
     /// Submits waiting frames while the executor has room.
     fn submit_waiting(&mut self) -> Result<(), BokehError> {
-        while self.current.in_flight() < self.current.capacity()
+        while self.executor.worker().in_flight() < self.executor.worker().capacity()
             && let Some(job) = self.waiting.pop_front()
         {
-            match self.current.submit(job) {
+            match self.executor.worker_mut().submit(job) {
                 Err(BokehError::Gpu(error)) => self.switch_over(error)?,
                 done => done?,
             }
@@ -65,7 +62,7 @@ impl Bokeh for Fallback {
         // After a failure, the next turn submits its frames to the other executor.
         loop {
             self.submit_waiting()?;
-            match self.current.collect(wait) {
+            match self.executor.worker_mut().collect(wait) {
                 Err(BokehError::Gpu(error)) => self.switch_over(error)?,
                 done => return done,
             }
@@ -73,36 +70,36 @@ impl Bokeh for Fallback {
     }
 
     fn take_back(&mut self) -> Option<Job> {
-        self.current.take_back().or_else(|| self.waiting.pop_front())
+        self.executor.worker_mut().take_back().or_else(|| self.waiting.pop_front())
     }
 
     fn in_flight(&self) -> usize {
-        self.current.in_flight() + self.waiting.len()
+        self.executor.worker().in_flight() + self.waiting.len()
     }
 
     fn capacity(&self) -> usize {
-        self.current.capacity()
+        self.executor.worker().capacity()
     }
 
     fn backend(&self) -> Backend {
-        self.current.backend()
+        self.executor.worker().backend()
     }
 
     fn device(&self) -> Option<Arc<Device>> {
-        self.current.device()
+        self.executor.worker().device()
     }
 
     fn backends(&self) -> &'static str {
-        match &self.failure {
+        match self.executor.failure() {
             Some(_) => "gpu, then cpu",
-            None => self.current.backends(),
+            None => self.executor.worker().backends(),
         }
     }
 
     fn describe(&self) -> String {
-        match &self.failure {
-            Some(failure) => format!("{failure}; then {}", self.current.describe()),
-            None => self.current.describe(),
+        match self.executor.failure() {
+            Some(failure) => format!("{failure}; then {}", self.executor.worker().describe()),
+            None => self.executor.worker().describe(),
         }
     }
 }

@@ -3,13 +3,16 @@
 mod pass;
 mod picture;
 mod readback;
+mod trial;
 mod wait;
 
 pub use pass::{Pass, Recorder, Stamps, UNIFORM_STRIDE, uniform_at, workgroups_2d};
 pub use picture::{DeviceFrame, DevicePicture};
 pub use readback::Readback;
+pub use trial::Trial;
 pub use wait::end_soon;
 
+use std::any::TypeId;
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use std::time::Duration;
@@ -73,11 +76,8 @@ pub struct Device {
     pub name: String,
     /// Whether passes can be timed.
     pub timestamps: bool,
-    /// What the trial of this device found wrong, once that is over.
-    pub trial: OnceLock<Option<String>>,
-    /// Whether it refines depth, and finds mattes, as the processor does, once that was tried.
-    pub refining: OnceLock<bool>,
-    pub matting: OnceLock<bool>,
+    /// What trials of it found, by the type of what was tried.
+    faults: Mutex<HashMap<TypeId, Option<GpuError>>>,
     /// Those made so far, by the names of their shaders and the bits of their constants.
     pipelines: Mutex<HashMap<(&'static str, Vec<u64>), wgpu::ComputePipeline>>,
     patience: Duration,
@@ -135,22 +135,8 @@ impl Device {
         // Dropping the device calls this, too; then nobody is left to read the fault.
         device.set_device_lost_callback(move |_, message| on_loss(format!("device lost: {message}")));
         let patience = if infos[best].device_type == wgpu::DeviceType::Cpu { PATIENCE_WITH_SOFTWARE } else { PATIENCE };
-        let [refining, matting] = [OnceLock::new(), OnceLock::new()];
-        let (trial, pipelines) = (OnceLock::new(), Mutex::default());
-        Ok(Self {
-            instance,
-            adapter,
-            device,
-            queue,
-            name,
-            timestamps,
-            trial,
-            refining,
-            matting,
-            pipelines,
-            patience,
-            fault,
-        })
+        let (faults, pipelines) = (Mutex::default(), Mutex::default());
+        Ok(Self { instance, adapter, device, queue, name, timestamps, faults, pipelines, patience, fault })
     }
 
     /// The same device, which may take so long before it counts as hung.

@@ -1,6 +1,7 @@
 //! What the executors run on: a thread pool ([`thread_pool`]), vector instructions ([`simd`]), and a GPU ([`device`]).
 
 pub mod aligned;
+pub mod backed;
 pub mod bands;
 #[cfg(feature = "gpu")]
 pub mod device;
@@ -8,8 +9,6 @@ pub mod memory;
 pub mod pass_times;
 pub mod simd;
 pub mod thread_pool;
-#[cfg(feature = "gpu")]
-pub mod until_fault;
 
 use std::cell::Cell;
 use std::panic::{AssertUnwindSafe, catch_unwind};

@@ -2,12 +2,11 @@
 //! whole.
 //!
 //! The list [`LIST`] in the folder says which files were written by us, one name a line: others are never touched. Into
-//! an empty folder files are written directly, each whole. Otherwise they go into a hidden folder within, [`PART`],
-//! which is renamed once all are whole, and then swapped with the old files. A swap that is interrupted is completed
-//! when the folder is opened next. While it is open the folder is locked.
+//! an empty folder files are written directly, each whole. Otherwise they go into a hidden folder within, [`PART`], and
+//! are renamed once all are whole. While it is open the folder is locked.
 
 mod list;
-mod swap;
+mod replace;
 
 use std::fs::{self, File};
 use std::io::{self, ErrorKind};
@@ -18,15 +17,13 @@ use rustix::fs::{FlockOperation, flock, syncfs};
 
 use self::list::List;
 pub use self::list::adopt;
-use self::swap::{keep, make_subfolder, recover, refuse_foreign, swap};
-use super::whole::{self, Part};
+use self::replace::{keep, make_subfolder, recover, refuse_foreign, replace};
+use super::whole::Part;
 
 /// What the list of our own files is called.
 pub const LIST: &str = ".bokehcam";
 /// Where files wait that will replace others.
 pub const PART: &str = ".bokehcam.part";
-/// What [`PART`] is renamed to once all of its files are whole.
-const WHOLE: &str = ".bokehcam.whole";
 
 /// Why a folder cannot be written.
 #[derive(Debug, thiserror::Error)]
@@ -171,8 +168,8 @@ impl Folder {
     /// Ends a complete set of files: they replace those on the list of an earlier run, whose number is given.
     ///
     /// # Errors
-    /// Something foreign has appeared, which stays, and what was written is kept as `NAME.incomplete`; or the files
-    /// could not be moved, which is then done when the folder is opened again.
+    /// Something foreign has appeared, which stays, and what was written is kept as `NAME.incomplete`, as is what could not be
+    /// moved.
     pub fn finish(mut self) -> Result<u64, FolderError> {
         self.check_there()?;
         self.sync()?;
@@ -181,22 +178,11 @@ impl Folder {
             self.remove_empty_list();
             return Ok(0);
         };
-        // A new file may replace nothing but what the old list has.
-        let checked = list::read(&part).and_then(|new| {
-            let old = list::read(&self.path)?;
-            new.iter().filter(|name| !old.contains(name)).try_for_each(|name| {
-                let path = self.path.join(name);
-                if path.symlink_metadata().is_ok() { Err(FolderError::Foreign { path }) } else { Ok(()) }
-            })
-        });
-        if let Err(error) = checked {
+        let replaced = replace(&part, &self.path);
+        if replaced.is_err() {
             keep(&part, &self.path)?;
-            return Err(error);
         }
-        let whole = self.path.join(WHOLE);
-        // From here on the new files are the ones that count.
-        whole::rename(&part, &whole, false).map_err(FolderError::write(&whole))?;
-        swap(&self.path)
+        replaced
     }
 
     /// Ends an incomplete set of files: what was there stays, and the new files are kept as `NAME.incomplete`, whose

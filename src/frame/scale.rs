@@ -207,3 +207,13 @@ impl Axis {
         }
     }
 }
+
+/// The means of 2x2 values of two rows, rounded, into a row of half as many; an odd last column is left out.
+#[inline(always)]
+pub fn halve_rows(upper: &[u8], lower: &[u8], half: &mut [u8]) {
+    let pairs = upper.as_chunks::<2>().0.iter().zip(lower.as_chunks::<2>().0);
+    for (half, (upper, lower)) in half.iter_mut().zip(pairs) {
+        let sum = upper.iter().chain(lower).map(|&value| u16::from(value)).sum::<u16>();
+        *half = ((sum + 2) / 4) as u8;
+    }
+}

@@ -44,7 +44,7 @@ pub use output_thread::Backpressure;
 pub use pipe::Pipe;
 pub use png::PngFolder;
 pub use shutter::{NotCovered, Release, Shutter};
-pub use switch::{Switch, Switchboard};
+pub use switch::Switchboard;
 pub use target::Target;
 pub use tee::Tee;
 pub use y4m::{Y4m, Y4mFile};

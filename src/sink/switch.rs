@@ -1,34 +1,15 @@
-//! Sinks that come and go while frames go on.
+//! Adds and removes the sinks of a [`Tee`] while frames go on, and tells what becomes of them.
 
-use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::sync::mpsc::{self, Receiver, Sender};
-use std::time::Duration;
 
-use super::output_thread::{Backpressure, Outcome, OutputThread, Pictures};
-use super::{Counter, Ending, Sink, SinkError, Uncovered};
-use crate::frame::ColorImage;
-use crate::stats::{NodeUse, OutputUse};
+use super::Sink;
+#[cfg(doc)]
+use super::Tee;
+use super::output_thread::{Backpressure, Outcome, OutputThread};
 
-/// A sink of members that others add and remove by its [`Switchboard`], each with a thread of its own, so that none waits
-/// for another. One that fails, or whose reader has gone, is taken out, and the others go on.
-///
-/// What people recorded
-/// is theirs however the run ends: without [`Sink::finish`], the members are completed when this is dropped.
-pub struct Switch {
-    name: String,
-    /// With the names that they were added by.
-    members: Vec<(String, OutputThread)>,
-    asked: Receiver<Asked>,
-    /// Those that are being completed.
-    ending: Vec<OutputThread>,
-    pictures: Pictures,
-    captured_ns: u64,
-    frames: Vec<Counter<OutputUse>>,
-}
-
-/// Adds members to a [`Switch`] and removes them, from any thread. Both come about with the next frame, or after a
-/// tenth of a second where there are none.
+/// Adds members to a [`Tee`] and removes them, from any thread. Both come about with the next frame, or soon after where there
+/// are none.
 #[derive(Clone)]
 pub struct Switchboard {
     to: Sender<Asked>,
@@ -63,169 +44,37 @@ pub enum Fate {
     },
 }
 
-/// There is no switch any more.
+/// There is no run any more.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("the pictures have ended")]
 pub struct Over;
 
 type Tell = Arc<dyn Fn(Notice) + Send + Sync>;
 
-enum Asked {
+/// What a switchboard asks of its tee.
+pub(super) enum Asked {
     Add(Joining),
     Remove(String),
 }
 
-/// How often requests are looked for while there are no pictures.
-const TICK: Duration = Duration::from_millis(100);
-
-impl Switch {
-    /// A switch without members, and its handle. `name` is for the report. `tell` is called for each step in a member's
-    /// life, among others on the thread that frames are on: it must be quick.
-    pub fn new(name: &str, tell: impl Fn(Notice) + Send + Sync + 'static) -> (Self, Switchboard) {
-        let (to, asked) = mpsc::channel();
-        let switch = Self {
-            name: name.into(),
-            members: Vec::new(),
-            asked,
-            ending: Vec::new(),
-            pictures: Pictures::default(),
-            captured_ns: 0,
-            frames: Vec::new(),
-        };
-        (switch, Switchboard { to, tell: Arc::new(tell) })
-    }
-
-    /// Adds and removes members as was asked by a [`Switchboard`] since the last call, and forgets those that have ended.
-    fn take_orders(&mut self) {
-        while let Ok(asked) = self.asked.try_recv() {
-            let name = match &asked {
-                Asked::Add(member) => &member.life.name,
-                Asked::Remove(name) => name,
-            };
-            if let Some(at) = self.members.iter().position(|(member, _)| member == name) {
-                self.take_out(at, Ending::Whole);
-            }
-            if let Asked::Add(Joining { sink, life }) = asked {
-                self.add(sink, life);
-            }
+impl Asked {
+    /// The member that it is about.
+    pub fn name(&self) -> &str {
+        match self {
+            Self::Add(member) => &member.life.name,
+            Self::Remove(name) => name,
         }
-        self.members.retain_mut(|(_, output)| output.outcome().is_none());
-    }
-
-    fn add(&mut self, sink: Box<dyn Sink>, life: Life) {
-        let name = life.name.clone();
-        life.tell(Fate::Began);
-        // If no thread can be started, sink and life are dropped, which tells that the member was given up.
-        let started =
-            OutputThread::start(sink, Backpressure::DropOldest, |frames, outcome| life.ended(frames, outcome));
-        if let Ok(output) = started {
-            self.frames.push(output.counter());
-            self.members.push((name, output));
-        }
-    }
-
-    /// Gives a picture to each member.
-    fn give(&mut self, frame: &ColorImage, time_ns: u64, is_card: bool) {
-        self.take_orders();
-        if self.members.is_empty() {
-            return;
-        }
-        let picture = self.pictures.share(frame, time_ns, self.captured_ns, is_card);
-        for (_, output) in &mut self.members {
-            // It never waits.
-            output.send(Arc::clone(&picture), Duration::ZERO);
-        }
-    }
-
-    /// Completes a member, on its thread.
-    fn take_out(&mut self, at: usize, ending: Ending) {
-        let (_, mut output) = self.members.remove(at);
-        output.close(ending);
-        self.ending.push(output);
-    }
-
-    /// Takes out all members, and waits until they are completed, which they are in parallel.
-    fn end(&mut self, ending: Ending) -> Result<(), SinkError> {
-        self.take_orders();
-        while !self.members.is_empty() {
-            self.take_out(0, ending);
-        }
-        let ended: Vec<_> = self.ending.drain(..).map(OutputThread::join).collect();
-        // One that failed while it ran was told, and is its own affair.
-        let errors = ended.into_iter().filter_map(|outcome| match outcome {
-            Outcome::Ended(ended) => ended.err(),
-            Outcome::Failed(_) => None,
-        });
-        errors.into_iter().next().map_or(Ok(()), Err)
-    }
-}
-
-impl Sink for Switch {
-    fn put(&mut self, frame: &ColorImage, time_ns: u64) -> Result<ControlFlow<()>, SinkError> {
-        self.give(frame, time_ns, false);
-        Ok(ControlFlow::Continue(()))
-    }
-
-    fn cover(&mut self, card: &ColorImage, time_ns: u64) -> Result<ControlFlow<()>, SinkError> {
-        self.give(card, time_ns, true);
-        Ok(ControlFlow::Continue(()))
-    }
-
-    fn captured(&mut self, captured_ns: u64) {
-        self.captured_ns = captured_ns;
-    }
-
-    fn uncovered(&self) -> Vec<Uncovered> {
-        self.members.iter().filter_map(|(_, output)| output.uncovered()).collect()
-    }
-
-    /// Of the members that there are now.
-    fn nodes(&self) -> Vec<Counter<NodeUse>> {
-        self.members.iter().flat_map(|(_, output)| output.nodes()).cloned().collect()
-    }
-
-    /// Of all members that there were.
-    fn outputs(&self) -> Vec<Counter<OutputUse>> {
-        self.frames.clone()
-    }
-
-    /// Requests must be seen. The members repeat their pictures themselves.
-    fn hold(&self) -> Option<Duration> {
-        Some(TICK)
-    }
-
-    fn repeat(&mut self) -> Result<ControlFlow<(), bool>, SinkError> {
-        self.take_orders();
-        Ok(ControlFlow::Continue(false))
-    }
-
-    fn pass_by(&mut self) {
-        self.take_orders();
-    }
-
-    fn keeps(&self) -> bool {
-        !self.members.is_empty()
-    }
-
-    /// Completes all members and waits for those that were taken out; the first error in that is returned, after all
-    /// were told.
-    fn finish(mut self: Box<Self>, ending: Ending) -> Result<(), SinkError> {
-        self.end(ending)
-    }
-
-    fn describe(&self) -> String {
-        self.name.clone()
-    }
-}
-
-impl Drop for Switch {
-    fn drop(&mut self) {
-        // The errors were told.
-        let _ = self.end(Ending::Cut);
     }
 }
 
 impl Switchboard {
+    /// A handle, and where its requests come out. `tell` is called for each step in a member's life, among others on the thread
+    /// that frames are on: it must be quick.
+    pub(super) fn new(tell: impl Fn(Notice) + Send + Sync + 'static) -> (Self, Receiver<Asked>) {
+        let (to, asked) = mpsc::channel();
+        (Self { to, tell: Arc::new(tell) }, asked)
+    }
+
     /// Adds a sink. A member that has this name already is completed first.
     ///
     /// # Errors
@@ -243,9 +92,18 @@ impl Switchboard {
 }
 
 /// A sink on its way in. Dropped in this order: given up, then told.
-struct Joining {
+pub(super) struct Joining {
     sink: Box<dyn Sink>,
     life: Life,
+}
+
+impl Joining {
+    /// Starts its thread; `None` where the system gives none, and it is told that the member was given up.
+    pub fn start(self) -> Option<OutputThread> {
+        let Self { sink, life } = self;
+        life.tell(Fate::Began);
+        OutputThread::start(sink, Backpressure::DropOldest, |frames, outcome| life.ended(frames, outcome)).ok()
+    }
 }
 
 /// Tells what becomes of a member, in any case.
@@ -278,6 +136,3 @@ impl Drop for Life {
         }
     }
 }
-
-#[cfg(test)]
-mod tests;

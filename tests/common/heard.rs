@@ -7,11 +7,11 @@ use std::time::{Duration, Instant};
 
 use bokehcam::capture::Seeker;
 use bokehcam::depth::plate::Guide;
+use bokehcam::files::user_folders::Folders;
 use bokehcam::link::Receiver;
 use bokehcam::link::demand::{Demand, Watch};
 use bokehcam::look::{Look, Strength};
 use bokehcam::pipeline::View;
-use bokehcam_window::folders::Folders;
 use bokehcam_window::services::Services;
 use bokehcam_window::session::{Blurred, Session, SessionEvent, Start};
 use bokehcam_window::state::Update;

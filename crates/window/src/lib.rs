@@ -10,7 +10,6 @@
 
 pub mod control;
 pub mod dialog;
-pub mod folders;
 pub mod keys;
 pub mod lent;
 pub mod meters;

@@ -1,4 +1,4 @@
-//! Whether a device blurs as the CPU does: drivers have faults, and none is to be found out by whoever is looked at.
+//! Whether a device blurs as the CPU does.
 
 use std::sync::Arc;
 
@@ -9,16 +9,15 @@ use crate::bokeh::plan::Plan;
 use crate::bokeh::{Bokeh, BokehError, Job, Method, Settings};
 use crate::budget::Quality;
 use crate::compute::GpuError;
-use crate::compute::device::Device;
+use crate::compute::device::{Device, Trial};
 use crate::frame::{ColorImage, DepthMap};
 use crate::link::pool::Pooled;
 use crate::optics::{CocField, CocKind, DepthCoc};
 
 const WIDTH: u32 = 96;
 const HEIGHT: u32 = 64;
-const VALUES: usize = (3 * WIDTH * HEIGHT) as usize;
 const RADIUS_PX: f32 = 12.0;
-/// A value that differs by more is wrong; one in a hundred may be, as roundings fall either way.
+/// A value that differs by more is wrong.
 const CODES: u8 = 4;
 
 /// Blurs a small picture of noise at three distances on `device` and on the CPU, once for each device.
@@ -26,25 +25,16 @@ const CODES: u8 = 4;
 /// # Errors
 /// The device failed, or makes another picture of it.
 pub fn try_out(device: &Arc<Device>) -> Result<(), BokehError> {
-    if device.trial.get().is_none() {
-        let wrong = differing(device)?;
-        let fault = (wrong > VALUES / 100).then(|| {
-            format!(
-                "{}: {wrong} of the {VALUES} values of a trial picture are wrong: its driver may have a fault \
-                 (--backend cpu does without it)",
-                device.name
-            )
-        });
-        let _ = device.trial.set(fault);
-    }
-    match device.trial.get() {
-        Some(Some(fault)) => Err(GpuError::Failed(fault.clone()).into()),
-        _ => Ok(()),
+    match device.fault_of::<GpuBokeh, BokehError>(|| Ok(trial(device)?.fault(device)))? {
+        Some(GpuError::Failed(fault)) => {
+            Err(GpuError::Failed(format!("{fault} (--backend cpu does without it)")).into())
+        }
+        Some(fault) => Err(fault.into()),
+        None => Ok(()),
     }
 }
 
-/// How many values of the picture differ.
-fn differing(device: &Arc<Device>) -> Result<usize, BokehError> {
+fn trial(device: &Arc<Device>) -> Result<Trial, BokehError> {
     let settings = Settings {
         coc: CocKind::Depth,
         method: Method::Layered,
@@ -73,5 +63,6 @@ fn differing(device: &Arc<Device>) -> Result<usize, BokehError> {
     gpu.submit(Job::new(Pooled::detached(color), Some(Pooled::detached(depth)), coc))?;
     let finished = gpu.collect(true)?.ok_or(BokehError::Lost)?;
     let made = finished.picture.memory().ok_or(BokehError::Lost)?;
-    Ok(made.rgb.iter().zip(&expected.rgb).filter(|(a, b)| a.abs_diff(**b) > CODES).count())
+    let wrong = made.rgb.iter().zip(&expected.rgb).filter(|(a, b)| a.abs_diff(**b) > CODES).count();
+    Ok(Trial { wrong, all: expected.rgb.len(), one_in: 100, results: "values of a trial picture" })
 }

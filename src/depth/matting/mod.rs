@@ -24,10 +24,10 @@ use std::sync::Arc;
 use pulp::Arch;
 
 use crate::color::light_of_codes;
+#[cfg(feature = "gpu")]
+use crate::compute::backed::Backed;
 use crate::compute::bands;
 use crate::compute::thread_pool::ThreadPool;
-#[cfg(feature = "gpu")]
-use crate::compute::until_fault::UntilFault;
 use crate::compute::{Device, DeviceFrame};
 use crate::frame::{ColorImage, DepthMap, Matte, MixedPixel};
 
@@ -75,7 +75,7 @@ pub struct Matting {
     is_noise_said: bool,
     /// Finds them in the processor's place, as long as the device does not fail.
     #[cfg(feature = "gpu")]
-    gpu: UntilFault<gpu::GpuMatting>,
+    gpu: Backed<Option<gpu::GpuMatting>>,
 }
 
 /// A pixel beside a jump of depth.
@@ -154,7 +154,7 @@ impl Default for Matting {
             on_device: None,
             is_noise_said: false,
             #[cfg(feature = "gpu")]
-            gpu: UntilFault::default(),
+            gpu: Backed::default(),
         }
     }
 }
@@ -166,7 +166,7 @@ impl Matting {
     pub fn on(self, device: Option<&Arc<Device>>) -> Self {
         #[cfg(feature = "gpu")]
         {
-            Self { gpu: UntilFault::new(device.and_then(gpu::GpuMatting::tried)), ..self }
+            Self { gpu: Backed::tried(device, "finds mattes", gpu::trial, gpu::GpuMatting::new), ..self }
         }
         #[cfg(not(feature = "gpu"))]
         {

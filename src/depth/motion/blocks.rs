@@ -2,6 +2,7 @@
 
 use crate::depth::reduced::block_px;
 use crate::frame::ColorImage;
+use crate::frame::scale::halve_rows;
 
 use super::Vector;
 
@@ -175,11 +176,7 @@ fn reduce(color: &ColorImage, levels: &mut [Level; LEVELS], sums: &mut Vec<u16>)
         to.luma.resize(to.width * to.height, 0);
         for (row, luma) in to.luma.chunks_exact_mut(to.width).enumerate() {
             let line = |row: usize| &from.luma[row.min(from.height - 1) * from.width..][..from.width];
-            let (above, below) = (line(2 * row), line(2 * row + 1));
-            let pairs = above.as_chunks::<2>().0.iter().zip(below.as_chunks::<2>().0);
-            for (luma, (&[a, b], &[c, d])) in luma.iter_mut().zip(pairs) {
-                *luma = ((u16::from(a) + u16::from(b) + u16::from(c) + u16::from(d) + 2) / 4) as u8;
-            }
+            halve_rows(line(2 * row), line(2 * row + 1), luma);
         }
     }
 }

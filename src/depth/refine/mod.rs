@@ -33,9 +33,9 @@ use self::smooth::{Smoother, over};
 use self::temporal::{Limits, TemporalFilter};
 use self::upsample::Upsampler;
 use super::fill::Filler;
-use crate::compute::thread_pool::ThreadPool;
 #[cfg(feature = "gpu")]
-use crate::compute::until_fault::UntilFault;
+use crate::compute::backed::Backed;
+use crate::compute::thread_pool::ThreadPool;
 use crate::compute::{Device, DeviceFrame};
 use crate::frame::fit::Fit;
 use crate::frame::{ColorImage, DepthMap};
@@ -90,7 +90,7 @@ pub struct Refiner {
     fit: Fit,
     /// Refines in the processor's place, as long as the device does not fail.
     #[cfg(feature = "gpu")]
-    gpu: UntilFault<gpu::GpuRefiner>,
+    gpu: Backed<Option<gpu::GpuRefiner>>,
 }
 
 /// The distance in focus, in metres. Inverse depth is this over the depth, so that equal steps of it blur equally.
@@ -122,7 +122,7 @@ impl Refiner {
         #[cfg(feature = "gpu")]
         {
             let device = device.filter(|_| self.mending == Mending::default());
-            Self { gpu: UntilFault::new(device.and_then(gpu::GpuRefiner::tried)), ..self }
+            Self { gpu: Backed::tried(device, "refines", gpu::trial, gpu::GpuRefiner::new), ..self }
         }
         #[cfg(not(feature = "gpu"))]
         {
@@ -142,7 +142,7 @@ impl Refiner {
     /// The map that was refined last, and its picture, where a device has refined it, until it refines the next.
     pub fn on_device(&self) -> Option<DeviceFrame> {
         #[cfg(feature = "gpu")]
-        return self.gpu.worker()?.refined();
+        return self.gpu.worker().as_ref()?.refined();
         #[cfg(not(feature = "gpu"))]
         None
     }
@@ -150,7 +150,7 @@ impl Refiner {
     /// A copy of that, which stays as it is, once for each.
     pub fn take_copy(&mut self) -> Option<Pooled<DeviceFrame>> {
         #[cfg(feature = "gpu")]
-        return self.gpu.worker_mut()?.take_copy();
+        return self.gpu.worker_mut().as_mut()?.take_copy();
         #[cfg(not(feature = "gpu"))]
         None
     }
@@ -161,7 +161,7 @@ impl Refiner {
         self.temporal.forget();
         self.focus = Focus::default();
         #[cfg(feature = "gpu")]
-        self.gpu.worker_mut().into_iter().for_each(gpu::GpuRefiner::forget);
+        self.gpu.worker_mut().iter_mut().for_each(gpu::GpuRefiner::forget);
     }
 
     /// What is in focus from the next frame on, in metres: for a street, a step of depth counts less than for a desk. A

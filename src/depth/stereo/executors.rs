@@ -8,6 +8,8 @@ use super::executor::Executor;
 #[cfg(feature = "gpu")]
 use super::gpu::GpuExecutor;
 #[cfg(feature = "gpu")]
+use crate::compute::backed::Backed;
+#[cfg(feature = "gpu")]
 use crate::compute::device::Device;
 #[cfg(feature = "gpu")]
 use crate::compute::thread_pool::ThreadPool;
@@ -67,9 +69,8 @@ impl Executors {
             match GpuExecutor::new(device, size, disparities, island) {
                 Ok(gpu) => {
                     let threads = self.threads;
-                    let cpu =
-                        move || Box::new(CpuExecutor::new(size, disparities, island, threads)) as Box<dyn Executor>;
-                    return Ok(Box::new(Fallback::new(Box::new(gpu), cpu)));
+                    let cpu: Makes = Box::new(move || Box::new(CpuExecutor::new(size, disparities, island, threads)));
+                    return Ok(Box::new(Backed::new(Box::new(gpu) as Box<dyn Executor>, cpu)));
                 }
                 Err(error) if *is_required => return Err(error),
                 Err(error) => tracing::info!("matching on the CPU: {error}"),
@@ -79,46 +80,22 @@ impl Executors {
     }
 }
 
-/// The executor on the GPU, replaced by one on the CPU at its first fault.
+/// What makes the executor on the CPU.
 #[cfg(feature = "gpu")]
-struct Fallback {
-    now: Box<dyn Executor>,
-    /// Makes the replacement; `None` once it was needed.
-    other: Option<MakesExecutor>,
-}
+type Makes = Box<dyn FnOnce() -> Box<dyn Executor> + Send>;
 
 #[cfg(feature = "gpu")]
-type MakesExecutor = Box<dyn FnOnce() -> Box<dyn Executor> + Send>;
-
-#[cfg(feature = "gpu")]
-impl Fallback {
-    fn new(first: Box<dyn Executor>, other: impl FnOnce() -> Box<dyn Executor> + Send + 'static) -> Self {
-        Self { now: first, other: Some(Box::new(other)) }
-    }
-}
-
-#[cfg(feature = "gpu")]
-impl Executor for Fallback {
+impl Executor for Backed<Box<dyn Executor>, Makes> {
     fn describe(&self) -> String {
-        self.now.describe()
+        self.worker().describe()
     }
 
     fn device(&self) -> Option<Arc<Device>> {
-        self.now.device()
+        self.worker().device()
     }
 
     fn disparities(&mut self, eyes: [&[u8]; 2], workers: &mut ThreadPool, out: &mut [u16]) -> Result<(), GpuError> {
-        match (self.now.disparities(eyes, workers, out), self.other.take()) {
-            (Err(error), Some(other)) => {
-                tracing::warn!("{error}; the CPU matches from here on");
-                // This pair is matched anew, so that none is lost; what the last one made likely is gone with the GPU.
-                self.now = other();
-                self.now.disparities(eyes, workers, out)
-            }
-            (found, other) => {
-                self.other = other;
-                found
-            }
-        }
+        // At the fault a pair is matched anew, so that none is lost; what the last one made likely is gone with the GPU.
+        self.run("matches", |executor| executor.disparities(eyes, workers, out), |_, make| Ok(make()))
     }
 }

@@ -1,6 +1,7 @@
 //! Half the columns and rows: pictures down, and disparities up again.
 
 use crate::frame::GrayImage;
+use crate::frame::scale::halve_rows;
 
 /// Columns and rows of half a picture.
 pub fn size((width, height): (usize, usize)) -> (usize, usize) {
@@ -14,11 +15,7 @@ pub fn shrink(from: &GrayImage, into: &mut GrayImage) {
     for (y, out) in into.luma.chunks_exact_mut(width.div_ceil(2)).enumerate() {
         let upper = &from.luma[2 * y * width..][..width];
         let lower = &from.luma[(2 * y + 1).min(height - 1) * width..][..width];
-        let pairs = upper.as_chunks::<2>().0.iter().zip(lower.as_chunks::<2>().0);
-        for (out, (upper, lower)) in out.iter_mut().zip(pairs) {
-            let sum = upper.iter().chain(lower).map(|&luma| u16::from(luma)).sum::<u16>();
-            *out = ((sum + 2) / 4) as u8;
-        }
+        halve_rows(upper, lower, out);
         if width % 2 == 1 {
             out[width / 2] = (u16::from(upper[width - 1]) + u16::from(lower[width - 1])).div_ceil(2) as u8;
         }

@@ -9,14 +9,14 @@ use crate::calibration::rectifier::Rectifier;
 #[cfg(feature = "gpu")]
 use crate::compute::Device;
 #[cfg(feature = "gpu")]
-use crate::compute::until_fault::UntilFault;
+use crate::compute::backed::Backed;
 use crate::frame::{ColorImage, GrayImage};
 
 /// Rectifies the pictures of both eyes; the same to the bit wherever it does.
 pub(super) struct PairRectifier {
     rectifier: Rectifier,
     #[cfg(feature = "gpu")]
-    gpu: UntilFault<GpuRectifier>,
+    gpu: Backed<Option<GpuRectifier>>,
 }
 
 impl PairRectifier {
@@ -25,7 +25,7 @@ impl PairRectifier {
         Self {
             rectifier,
             #[cfg(feature = "gpu")]
-            gpu: UntilFault::default(),
+            gpu: Backed::default(),
         }
     }
 
@@ -39,7 +39,7 @@ impl PairRectifier {
                 None
             }
         });
-        Self { gpu: UntilFault::new(gpu), ..self }
+        Self { gpu: Backed::new(gpu, ()), ..self }
     }
 
     /// The left picture, rectified, into `into`.

@@ -44,8 +44,11 @@ pub enum From {
 /// Why a setting has no effect in a run; `None` where it has one.
 type Why = fn(&Run) -> Option<&'static str>;
 
-/// What settings need to have an effect. The first two rows depend on the source alone: `warn_by_source` takes these.
-const NEEDS: &[(&[&str], Why)] = &[
+/// Settings, and what they need to have an effect.
+type Need = (&'static [&'static str], Why);
+
+/// What settings need of the source alone.
+const NEEDS_OF_SOURCE: &[Need] = &[
     (&["size", "fps"], |run| match run.source {
         From::Source(Kind::Recording) => Some("a recording has its own"),
         From::Source(Kind::Demo) => Some("the demonstration has its own"),
@@ -53,6 +56,10 @@ const NEEDS: &[(&[&str], Why)] = &[
         _ => None,
     }),
     (&["format", "control"], |run| (run.source != From::Source(Kind::Camera)).then_some("the source is no camera")),
+];
+
+/// What other settings need.
+const NEEDS: &[Need] = &[
     (&["depth-scale", "depth-invalid"], |run| match run.depth {
         DepthFrom::Nothing => Some(NO_DEPTH),
         DepthFrom::Metres | DepthFrom::Eyes => Some("this depth is in metres already"),
@@ -94,7 +101,8 @@ const NEEDS: &[(&[&str], Why)] = &[
         if run.source == From::Bench { Some("`bench` takes --coc") } else { blur(run) }
     }),
     (&["max-coc", "aperture", "intensity", "rim", "rank", "highlights", "quality"], blur),
-    (&["backend", "adapter"], computed),
+    (&["backend"], computed),
+    (&["adapter"], |run| computed(run).or(run.cpu_only.then_some("--backend cpu takes no GPU"))),
     (&["threads"], |run| computed(run).filter(|_| !run.compresses)),
     (&["budget-ms"], |run| match run.realtime {
         true => blur(run),
@@ -164,17 +172,18 @@ pub fn warn_by_source(given: &[Setting], source: Kind) {
         compresses: false,
         window: true,
     };
-    let of_source = NEEDS[..2].iter().flat_map(|(names, _)| *names);
-    let names: Vec<&str> = of_source.copied().collect();
-    let of_source = |(setting, _): &(&Setting, &str)| names.contains(&setting.name.as_str());
-    line_of(unused(given, &run).into_iter().filter(of_source).collect()).iter().for_each(|line| log::warn(line));
+    line_of(without(NEEDS_OF_SOURCE, given, &run)).iter().for_each(|line| log::warn(line));
 }
 
 fn unused<'a>(given: &'a [Setting], run: &Run) -> Vec<(&'a Setting, &'static str)> {
+    without(&[NEEDS_OF_SOURCE, NEEDS].concat(), given, run)
+}
+
+/// Those of the settings that miss what they need, and why.
+fn without<'a>(needs: &[Need], given: &'a [Setting], run: &Run) -> Vec<(&'a Setting, &'static str)> {
     let why = |setting: &Setting| {
-        let need = NEEDS.iter().find(|(names, _)| names.contains(&setting.name.as_str()));
-        let no_gpu = (setting.name == "adapter" && run.cpu_only).then_some("--backend cpu takes no GPU");
-        need.and_then(|(_, why)| why(run)).or(no_gpu)
+        let (_, why) = needs.iter().find(|(names, _)| names.contains(&setting.name.as_str()))?;
+        why(run)
     };
     given.iter().filter_map(|setting| Some((setting, why(setting)?))).collect()
 }
@@ -250,7 +259,8 @@ mod tests {
 
     #[test]
     fn every_name_in_the_table_is_a_setting_and_there_once() {
-        let mut names: Vec<&str> = NEEDS.iter().flat_map(|(names, _)| *names).copied().collect();
+        let mut names: Vec<&str> =
+            [NEEDS_OF_SOURCE, NEEDS].concat().iter().flat_map(|(names, _)| *names).copied().collect();
         let all = all_settings();
         let is_camera = |name: &&str| ["format", "control"].contains(name);
         let is_setting = |name: &&str| all.get_arguments().any(|arg| arg.get_long() == Some(name));

@@ -300,7 +300,7 @@ pub fn remark(ui: &mut Ui, text: &str) {
 
 /// A path, of which the end says which file it is: a long one is cut at its beginning.
 pub fn path(ui: &mut Ui, path: &str) {
-    let shown = crate::folders::shown_output(path);
+    let shown = bokehcam::files::user_folders::shown_output(path);
     ui.scope(|ui| remark(ui, &end_of(&shown, 38))).response.on_hover_text(path);
 }
 

@@ -3,55 +3,51 @@
 use super::soft::Painter;
 use super::{Controls, Drawing, PresentError, Presenter};
 use bokehcam::compute::DevicePicture;
+use bokehcam::compute::backed::Backed;
 
 /// Presents with a GPU, and from its first error on with another presenter.
 pub struct Fallback<Other> {
-    active: Box<dyn Presenter>,
-    /// What makes the other presenter, and a painter for it that is kept up to date with the controls. Taken when used.
-    other: Option<(Other, Painter)>,
+    /// With what makes the other presenter, and a painter for it that is kept up to date with the controls.
+    presenter: Backed<Box<dyn Presenter>, (Other, Painter)>,
     size: (u32, u32),
 }
 
 impl<Other: FnOnce(Painter) -> Result<Box<dyn Presenter>, PresentError>> Fallback<Other> {
     /// Presents with `first`, and with what `other` makes once `first` fails.
     pub fn new(first: Box<dyn Presenter>, other: Other) -> Self {
-        Self { active: first, other: Some((other, Painter::new())), size: (0, 0) }
+        Self { presenter: Backed::new(first, (other, Painter::new())), size: (0, 0) }
     }
 }
 
 impl<Other: FnOnce(Painter) -> Result<Box<dyn Presenter>, PresentError>> Presenter for Fallback<Other> {
     fn resize(&mut self, size: (u32, u32)) {
         self.size = size;
-        self.active.resize(size);
+        self.presenter.worker_mut().resize(size);
     }
 
     fn set_controls(&mut self, controls: Controls) {
-        if let Some((_, painter)) = &mut self.other {
+        if let Some((_, painter)) = self.presenter.spare_mut() {
             painter.set_controls(controls.clone());
         }
-        self.active.set_controls(controls);
+        self.presenter.worker_mut().set_controls(controls);
     }
 
     fn present(&mut self, drawing: &Drawing) -> Result<(), PresentError> {
-        let presented = self.active.present(drawing);
-        // Only the first error is answered by another presenter; later ones are the caller's.
-        let Some((error, (other, painter))) =
-            presented.as_ref().err().and_then(|error| Some((error, self.other.take()?)))
-        else {
-            return presented;
+        let Self { presenter, size } = self;
+        let make = |_: &mut _, (other, painter): (Other, Painter)| {
+            let mut soft = other(painter)?;
+            soft.resize(*size);
+            Ok(soft)
         };
-        tracing::warn!("{error}; the CPU draws from here on");
-        self.active = other(painter)?;
-        self.active.resize(self.size);
-        self.active.present(drawing)
+        presenter.run("draws", |presenter| presenter.present(drawing), make)
     }
 
     fn takes(&self, picture: &DevicePicture) -> bool {
-        self.active.takes(picture)
+        self.presenter.worker().takes(picture)
     }
 
     fn has_device(&self) -> bool {
-        self.active.has_device()
+        self.presenter.worker().has_device()
     }
 }
 

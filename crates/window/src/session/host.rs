@@ -9,9 +9,9 @@ use std::sync::mpsc;
 
 use super::live::Live;
 use super::{Closed, News, Order, SessionEvent, Start, held};
-use crate::folders;
 use crate::services::Switch;
 use crate::state::{Output, Request, Source, Update, Way};
+use bokehcam::files::user_folders as folders;
 use bokehcam::link::demand::Watch;
 use bokehcam::look::Look;
 use bokehcam::pipeline::PipelineError;

@@ -16,7 +16,7 @@ use bokehcam::look::Look;
 use bokehcam::pipeline::{self, Changes, Pace, PipelineError, Run};
 use bokehcam::sink::Sink;
 use bokehcam::sink::switch::Notice;
-use bokehcam::sink::{Shutter, Switch, Switchboard};
+use bokehcam::sink::{Shutter, Switchboard, Tee};
 use bokehcam::source::{Kind, SourceName};
 use bokehcam::stats::Report;
 
@@ -59,7 +59,7 @@ impl Live {
         let bokeh = made_for.as_ref().map(|made_for| start.services.executor(made_for, info.size)).transpose()?;
         let executor = bokeh.as_ref().map_or_else(|| "no blur".into(), |bokeh| bokeh.describe());
         let (budget_ns, threads) = (start.budget_ns.unwrap_or(info.period_ns), start.threads);
-        let (switch, board) = Switch::new("window", wrote);
+        let (switch, board) = Tee::switched("window", wrote);
         let period = Duration::from_nanos(info.period_ns);
         let (demand, off) = (start.demand.clone(), Arc::clone(&start.off));
         let (sink, release) = Shutter::new(Box::new(switch), info.size, period, demand, Clock::system(), off);

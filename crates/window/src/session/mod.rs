@@ -15,13 +15,13 @@ use std::time::{Duration, Instant};
 pub use held::{Blurred, Held};
 use host::Host;
 
-use super::folders::{self, Folders};
 use super::services::{Services, Switch};
 use super::state::{Output, Request, Update};
 use bokehcam::budget::Quality;
 use bokehcam::capture::Seeker;
 use bokehcam::control::Answer;
 use bokehcam::depth::plate::Guide;
+use bokehcam::files::user_folders::{self as folders, Folders};
 use bokehcam::frame::{ColorImage, DepthMap};
 use bokehcam::link::Receiver;
 use bokehcam::link::demand::Demand;

@@ -18,10 +18,10 @@ use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
 use bokehcam::depth::plate::Step;
+use bokehcam::files::user_folders::is_video;
 use bokehcam::frame::DepthMap;
 use bokehcam::look::{Effect, Look, Strength};
 use bokehcam::optics::CocField;
-use bokehcam_window::folders::is_video;
 use bokehcam_window::state::{Output, Request, Source, Update};
 
 use heard::{PATIENCE, look};

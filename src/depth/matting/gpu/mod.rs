@@ -15,6 +15,8 @@ mod trial;
 use std::fmt;
 use std::sync::Arc;
 
+pub use trial::trial;
+
 use buffers::{Buffers, Extent, known_at};
 use passes::Passes;
 use shaders::Frame;
@@ -61,12 +63,6 @@ impl GpuMatting {
         let of_codes = light_of_codes();
         let lights = Box::new(std::array::from_fn(|code| [of_codes[code], 0.0, 0.0, 0.0]));
         Self { device: Arc::clone(device), lights, work: None }
-    }
-
-    /// On a device; `None` where that has failed, or finds other mattes than the processor, which is tried once for each device
-    /// and said then.
-    pub fn tried(device: &Arc<Device>) -> Option<Self> {
-        trial::is_passed(device).then(|| Self::new(device))
     }
 
     /// The time of each pass over the last frame; of none where the device has no timestamps.

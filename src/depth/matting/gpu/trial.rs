@@ -1,43 +1,25 @@
-//! Whether a device finds mattes as the processor does: drivers have faults, and none is to be found out by whoever is looked at.
+//! Whether a device finds mattes as the processor does.
 
 use std::sync::Arc;
 
 use super::super::Matting;
 use super::GpuMatting;
 use crate::compute::GpuError;
-use crate::compute::device::Device;
+use crate::compute::device::{Device, Trial};
 use crate::compute::thread_pool::ThreadPool;
 use crate::depth::matting::Behind;
 use crate::frame::{ColorImage, DepthMap, MixedPixel};
 
 const SIZE: (u32, u32) = (96, 64);
 const JUMP: f32 = 0.05;
-/// A share that differs by more is wrong; one mixed pixel in fifty may be, or be there on one side only, as roundings fall either
-/// way.
+/// A share that differs by more is wrong, as is a mixed pixel on one side only.
 const SHARE: f32 = 0.01;
-const ONE_IN: usize = 50;
 
-/// Whether the device is sound: finds the mattes of two small pictures there and on the processor, once for each device, and says
-/// what is wrong. A device that has failed is not; who had it has said so.
-pub fn is_passed(device: &Arc<Device>) -> bool {
-    device.check().is_ok() && *device.matting.get_or_init(|| try_out(device))
-}
-
-fn try_out(device: &Arc<Device>) -> bool {
-    match differing(device) {
-        Ok((wrong, all)) if wrong * ONE_IN <= all => return true,
-        Ok((wrong, all)) => tracing::warn!(
-            "GPU: {}: {wrong} of the {all} mixed pixels of a trial are wrong: its driver may have a fault; the CPU finds \
-             mattes",
-            device.name
-        ),
-        Err(error) => tracing::warn!("{error}; the CPU finds mattes"),
-    }
-    false
-}
-
-/// How many mixed pixels differ, and how many there are.
-fn differing(device: &Arc<Device>) -> Result<(usize, usize), GpuError> {
+/// Finds the mattes of two small pictures on the device and on the processor.
+///
+/// # Errors
+/// The device failed.
+pub fn trial(device: &Arc<Device>) -> Result<Trial, GpuError> {
     let (mut cpu, mut gpu) = (Matting::default(), GpuMatting::new(device));
     let mut workers = ThreadPool::new("matte", 1);
     let (color, map) = scene();
@@ -61,7 +43,7 @@ fn differing(device: &Arc<Device>) -> Result<(usize, usize), GpuError> {
         wrong += if is_sorted { expected.len().max(made.len()) - same.count() } else { expected.len() + 1 };
         all += expected.len();
     }
-    Ok((wrong, all))
+    Ok(Trial { wrong, all, one_in: 50, results: "mixed pixels of a trial" })
 }
 
 /// Somebody with a soft outline before a wall, whose hair the map has in part.

@@ -14,6 +14,8 @@ mod trial;
 use std::fmt;
 use std::sync::Arc;
 
+pub use trial::trial;
+
 use buffers::Buffers;
 use passes::Passes;
 use shaders::Frame;
@@ -70,12 +72,6 @@ impl GpuRefiner {
     /// On a device, whether it does it right or not.
     pub fn new(device: &Arc<Device>) -> Self {
         Self { device: Arc::clone(device), work: None }
-    }
-
-    /// On a device; `None` where that has failed, or refines otherwise than the processor, which is tried once for each device
-    /// and said then.
-    pub fn tried(device: &Arc<Device>) -> Option<Self> {
-        trial::is_passed(device).then(|| Self::new(device))
     }
 
     /// Forgets all frames.

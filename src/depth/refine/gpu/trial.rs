@@ -1,41 +1,25 @@
-//! Whether a device refines as the processor does: drivers have faults, and none is to be found out by whoever is looked at.
+//! Whether a device refines as the processor does.
 
 use std::sync::Arc;
 
 use super::super::Refiner;
 use super::GpuRefiner;
 use crate::compute::GpuError;
-use crate::compute::device::Device;
+use crate::compute::device::{Device, Trial};
 use crate::frame::{ColorImage, DepthMap};
 
 const SIZE: (u32, u32) = (96, 64);
 const MAP_SIZE: (u32, u32) = (60, 40);
 const FRAMES: u32 = 3;
 const FRAME_NS: u64 = 33_000_000;
-/// A depth that differs by a larger share is wrong; one in a hundred may be, as roundings fall either way.
+/// A depth that differs by a larger share is wrong.
 const SHARE: f32 = 1e-3;
-const DEPTHS: usize = (SIZE.0 * SIZE.1 * FRAMES) as usize;
 
-/// Whether the device is sound: refines a few small frames there and on the processor, once for each device, and says what is
-/// wrong. A device that has failed is not; who had it has said so.
-pub fn is_passed(device: &Arc<Device>) -> bool {
-    device.check().is_ok() && *device.refining.get_or_init(|| try_out(device))
-}
-
-fn try_out(device: &Arc<Device>) -> bool {
-    match differing(device) {
-        Ok(wrong) if wrong <= DEPTHS / 100 => return true,
-        Ok(wrong) => tracing::warn!(
-            "GPU: {}: {wrong} of the {DEPTHS} depths of a trial are wrong: its driver may have a fault; the CPU refines",
-            device.name
-        ),
-        Err(error) => tracing::warn!("{error}; the CPU refines"),
-    }
-    false
-}
-
-/// How many depths differ.
-fn differing(device: &Arc<Device>) -> Result<usize, GpuError> {
+/// Refines a few small frames on the device and on the processor.
+///
+/// # Errors
+/// The device failed.
+pub fn trial(device: &Arc<Device>) -> Result<Trial, GpuError> {
     let (mut cpu, mut gpu) = (Refiner::new(), GpuRefiner::new(device));
     let mut wrong = 0;
     for frame in 0..FRAMES {
@@ -48,7 +32,8 @@ fn differing(device: &Arc<Device>) -> Result<usize, GpuError> {
         let is_same = |(a, b): &(&f32, &f32)| (*a - *b).abs() <= SHARE * *b;
         wrong += expected.metres.len() - made.metres.iter().zip(&expected.metres).filter(is_same).count();
     }
-    Ok(wrong)
+    let all = (SIZE.0 * SIZE.1 * FRAMES) as usize;
+    Ok(Trial { wrong, all, one_in: 100, results: "depths of a trial" })
 }
 
 /// Somebody before a wall, with noise and a shadow, whose outline in the map is off.

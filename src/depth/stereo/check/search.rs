@@ -3,6 +3,7 @@
 use pulp::{Simd, WithSimd};
 
 use crate::frame::GrayImage;
+use crate::frame::scale::halve_rows;
 
 /// Rows above and below that are searched, in pixels of half resolution.
 const ROWS: i32 = 12;
@@ -27,17 +28,13 @@ const SAME_PEAK: i32 = 3;
 
 /// A picture of half as many columns and rows.
 pub(super) fn halved(image: &GrayImage) -> GrayImage {
-    let (width, height) = (image.width / 2, image.height / 2);
-    let mut half = GrayImage { width, height, luma: Vec::with_capacity(width as usize * height as usize) };
-    let stride = image.width as usize;
-    for rows in image.luma.chunks_exact(2 * stride.max(1)) {
-        let (upper, lower) = rows.split_at(stride);
-        for (a, b) in upper.as_chunks::<2>().0.iter().zip(lower.as_chunks::<2>().0) {
-            let sum: u16 = [a[0], a[1], b[0], b[1]].map(u16::from).iter().sum();
-            half.luma.push(((sum + 2) / 4) as u8);
-        }
+    let (width, height, stride) = (image.width / 2, image.height / 2, image.width as usize);
+    let mut luma = vec![0; width as usize * height as usize];
+    let rows = image.luma.chunks_exact(2 * stride.max(1)).map(|rows| rows.split_at(stride));
+    for (half, (upper, lower)) in luma.chunks_exact_mut(width.max(1) as usize).zip(rows) {
+        halve_rows(upper, lower, half);
     }
-    half
+    GrayImage { width, height, luma }
 }
 
 /// The most distinctive point of each cell, if it is distinctive at all, away from the border.

@@ -18,6 +18,7 @@ use bokehcam::computing::Executors;
 #[cfg(feature = "desktop")]
 use bokehcam::control::bus;
 use bokehcam::control::{Answer, Claim, Handler, Name, Request, Server, Status};
+use bokehcam::files::user_folders::Folders;
 use bokehcam::link::demand::Demand;
 use bokehcam::look::{Look, Patch};
 use bokehcam::pipeline::{Changes, Progress};
@@ -234,10 +235,7 @@ impl Controlled {
     /// Saves the next picture.
     fn save(&self, to: Option<PathBuf>) -> Result<Answer, CliError> {
         let Facts { release, demand, .. } = &self.facts;
-        let path = match to {
-            Some(path) => path,
-            None => free_name()?,
-        };
+        let path = to.unwrap_or_else(|| Folders::of_user().free_picture());
         if !path.is_absolute() {
             return Err(CliError::Usage(format!("{}: say the whole path", path.display())));
         }
@@ -269,23 +267,4 @@ impl Controlled {
             ..status.clone()
         }
     }
-}
-
-/// A name for a picture in the user's folder of pictures.
-#[cfg(feature = "window")]
-fn free_name() -> Result<PathBuf, CliError> {
-    use bokehcam_window::folders::{Folders, stem};
-    let (folder, stem) = (Folders::of_user().pictures, stem());
-    let path = |number: u32| match number {
-        1 => folder.join(format!("{stem}.png")),
-        number => folder.join(format!("{stem}-{number}.png")),
-    };
-    let is_free = |path: &PathBuf| path.symlink_metadata().is_err();
-    (1..1000).map(path).find(is_free).ok_or_else(|| CliError::Exists(path(1)))
-}
-
-/// This program knows no folder of pictures.
-#[cfg(not(feature = "window"))]
-fn free_name() -> Result<PathBuf, CliError> {
-    Err(CliError::Usage("say where: snapshot --to FILE.png".into()))
 }

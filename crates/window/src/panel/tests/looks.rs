@@ -18,7 +18,7 @@ use bokehcam::recording::still::{read_color, write_color};
 /// The picture as large as the window.
 fn backdrop((width, height): (u32, u32)) -> ColorImage {
     let recorded = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../recordings/portrait/rgb/000000.png"));
-    let source = read_color(&recorded).unwrap();
+    let source = read_color(recorded).unwrap();
     let mut image = ColorImage::new(width, height);
     for y in 0..height {
         for x in 0..width {

@@ -2,8 +2,8 @@
 
 use super::super::{SessionEvent, Still, held};
 use super::Host;
-use crate::folders;
 use bokehcam::control::Answer;
+use bokehcam::files::user_folders as folders;
 use bokehcam::look::{Look, Patch};
 use bokehcam::recording::snapshot::{self, Snapshot};
 use bokehcam::recording::still::write_color;

@@ -1,12 +1,12 @@
-//! Where the window's files go, and what they are called.
+//! Where snapshots and recordings go that were given no name, and what they are called.
 
 use std::env;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::thread;
 
-use bokehcam::files::input;
-use bokehcam::files::trusted::absolute;
+use super::input;
+use super::trusted::absolute;
 
 /// The folders of snapshots and of recordings.
 #[derive(Clone, Debug, PartialEq)]
@@ -15,8 +15,9 @@ pub struct Folders {
     pub videos: PathBuf,
 }
 
-/// What all names begin with, and what those of recordings end with.
+/// What all names begin with, and what those of pictures and recordings end with.
 const NAME: &str = "bokehcam";
+const PICTURE: &str = ".png";
 const VIDEO: &str = ".mp4";
 /// The date and the time of day in between.
 const TIME: &str = "%Y-%m-%d %H-%M-%S";
@@ -55,13 +56,24 @@ impl Folders {
 
     /// A path for a recording that is begun now: neither does it exist nor is it `taken`.
     pub fn free_video(&self, taken: impl Fn(&Path) -> bool) -> PathBuf {
-        let stem = stem();
-        let path = |number: u32| match number {
-            1 => self.videos.join(format!("{stem}{VIDEO}")),
-            _ => self.videos.join(format!("{stem}-{number}{VIDEO}")),
-        };
-        (1..u32::MAX).map(path).find(|path| !path.exists() && !taken(path)).unwrap_or_else(|| path(u32::MAX))
+        free(&self.videos, VIDEO, taken)
     }
+
+    /// A path for a picture that is taken now and does not exist.
+    pub fn free_picture(&self) -> PathBuf {
+        free(&self.pictures, PICTURE, |_| false)
+    }
+}
+
+/// A path of now in the folder, with this ending: nothing is there, not even a link, nor is it `taken`.
+fn free(folder: &Path, ending: &str, taken: impl Fn(&Path) -> bool) -> PathBuf {
+    let stem = stem();
+    let path = |number: u32| match number {
+        1 => folder.join(format!("{stem}{ending}")),
+        _ => folder.join(format!("{stem}-{number}{ending}")),
+    };
+    let is_free = |path: &PathBuf| path.symlink_metadata().is_err() && !taken(path);
+    (1..u32::MAX).map(path).find(is_free).unwrap_or_else(|| path(u32::MAX))
 }
 
 /// The name of a file that is made now, without its ending: with the date and the time of day here.

@@ -1,8 +1,12 @@
+//! A tee whose members come and go.
+
 use std::io;
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::AtomicU64;
+use std::sync::mpsc;
 use std::thread;
 use std::time::Instant;
 
+use super::super::switch::{Fate, Over};
 use super::*;
 
 /// Nothing here takes so long: against a hang.
@@ -63,24 +67,24 @@ impl Sink for Fake {
     }
 }
 
-fn switch() -> (Box<Switch>, Switchboard, Receiver<Notice>) {
+fn switch() -> (Box<Tee>, Switchboard, Receiver<Notice>) {
     let (to, told) = mpsc::channel();
-    let (switch, board) = Switch::new("window", move |what| drop(to.send(what)));
+    let (switch, board) = Tee::switched("window", move |what| drop(to.send(what)));
     (Box::new(switch), board, told)
 }
 
 /// Gives frames, each once the members are through with the one before.
-fn put(switch: &mut Switch, numbers: std::ops::Range<u8>) {
+fn put(switch: &mut Tee, numbers: std::ops::Range<u8>) {
     let frames = |count: &Counter<OutputUse>| count().frames + count().lost;
     for number in numbers {
         switch.take_orders();
-        let counts: Vec<_> = switch.members.iter().map(|(_, output)| output.counter()).collect();
+        let counts: Vec<_> = switch.outputs.iter().map(|(_, output)| output.counter()).collect();
         let before: Vec<_> = counts.iter().map(frames).collect();
         let mut frame = ColorImage::new(2, 2);
         frame.rgb.fill(number);
         assert!(switch.put(&frame, number.into()).unwrap().is_continue());
         let began = Instant::now();
-        let is_busy = |at: usize| frames(&counts[at]) == before[at] && !switch.members[at].1.has_ended();
+        let is_busy = |at: usize| frames(&counts[at]) == before[at] && !switch.outputs[at].1.has_ended();
         while (0..counts.len()).any(is_busy) {
             assert!(began.elapsed() < HANG);
             thread::sleep(Duration::from_millis(1));
@@ -139,7 +143,7 @@ fn a_member_that_fails_or_whose_reader_goes_is_taken_out_and_the_others_go_on() 
     board.add("c", Box::new(Fake { leaves_at: Some(2), ..Fake::default() })).unwrap();
     put(&mut switch, 0..5);
     switch.take_orders();
-    assert_eq!(switch.members.len(), 1);
+    assert_eq!(switch.outputs.len(), 1);
     // A member that failed while it ran is its own affair, not the run's.
     switch.finish(Ending::Whole).unwrap();
     assert_eq!(*got.lock().unwrap(), [0, 1, 2, 3, 4]);
@@ -207,7 +211,7 @@ fn a_name_that_is_taken_goes_to_the_newer_member() {
         board.add("a", Box::new(Fake::default())).unwrap();
         put(&mut switch, 0..2);
     }
-    assert_eq!(switch.members.len(), 1);
+    assert_eq!(switch.outputs.len(), 1);
     switch.finish(Ending::Whole).unwrap();
     let told: Vec<_> = all(&told).into_iter().filter(|told| *told == completed("a", 2)).collect();
     assert_eq!(told.len(), 2);

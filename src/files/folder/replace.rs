@@ -1,10 +1,10 @@
-//! How one set of files takes the place of another, and how interrupted runs are recovered.
+//! How one set of files takes the place of another, and what becomes of that of an interrupted run.
 
 use std::fs;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
-use super::{FolderError, LIST, PART, Set, WHOLE, list};
+use super::{FolderError, LIST, PART, Set, list};
 use crate::files::whole;
 
 /// Fails if the folder has a file of the set that is not on its list: somebody else wrote it.
@@ -29,12 +29,9 @@ pub(super) fn refuse_foreign(path: &Path, set: &Set) -> Result<(), FolderError> 
     Ok(())
 }
 
-/// Recovers from a run that was killed: completes its swap, keeps what it left in [`PART`] as `NAME.incomplete`, and
-/// removes files that it was writing.
+/// Recovers from a run that was killed: keeps what it left in [`PART`] as `NAME.incomplete`, and removes files that it was
+/// writing.
 pub(super) fn recover(path: &Path, set: &Set) -> Result<(), FolderError> {
-    if is_folder(&path.join(WHOLE)) {
-        swap(path)?;
-    }
     let part = path.join(PART);
     if is_folder(&part) {
         if list::read(&part)?.is_empty() {
@@ -58,37 +55,35 @@ pub(super) fn recover(path: &Path, set: &Set) -> Result<(), FolderError> {
     Ok(())
 }
 
-/// Removes the files on the old list, the last ones first, moves those in [`WHOLE`] to their places, and gives the
-/// number of files removed. An interrupted swap is completed by calling it again.
-pub(super) fn swap(path: &Path) -> Result<u64, FolderError> {
-    let whole = path.join(WHOLE);
-    let (old, new) = (list::read(path)?, list::read(&whole)?);
-    let mut gone = 0;
-    for name in old.iter().rev() {
-        // By a swap that was interrupted: this is the new file already.
-        let is_moved = new.contains(name) && !whole.join(name).exists();
-        let file = path.join(name);
-        if is_moved || !is_file(path, name) {
-            continue;
-        }
-        fs::remove_file(&file).map_err(FolderError::write(&file))?;
-        gone += 1;
+/// Puts the files of `part`, all of which are whole, into the folder `path`, each in the place of the old one of its name, and
+/// removes what else is on the old list; the number of old files. Nothing is replaced but what that list has.
+pub(super) fn replace(part: &Path, path: &Path) -> Result<u64, FolderError> {
+    let (old, new) = (list::read(path)?, list::read(part)?);
+    let is_foreign = |name: &&String| !old.contains(name) && path.join(name).symlink_metadata().is_ok();
+    if let Some(name) = new.iter().find(is_foreign) {
+        return Err(FolderError::Foreign { path: path.join(name) });
     }
+    // Whatever happens from here on, all of them are ours.
+    list::adopt(path, new.iter().cloned())?;
+    let is_old = |name: &String| old.contains(name) && is_file(path, name);
+    let gone = old.iter().filter(|name| is_old(name)).count() as u64;
     for name in new.iter() {
-        let (from, to) = (whole.join(name), path.join(name));
+        let to = path.join(name);
         if let Some((subfolder, _)) = name.rsplit_once('/') {
             make_subfolder(&path.join(subfolder))?;
         }
-        match whole::rename(&from, &to, false) {
-            // Moved before.
-            Err(error) if error.kind() == ErrorKind::NotFound => {}
-            Err(error) if error.kind() == ErrorKind::AlreadyExists => return Err(FolderError::Foreign { path: to }),
-            renamed => renamed.map_err(FolderError::write(&to))?,
-        }
+        whole::rename(&part.join(name), &to, is_old(name)).map_err(|error| match error.kind() {
+            ErrorKind::AlreadyExists => FolderError::Foreign { path: to.clone() },
+            _ => FolderError::write(&to)(error),
+        })?;
+    }
+    for name in old.iter().filter(|name| !new.contains(name) && is_file(path, name)) {
+        let file = path.join(name);
+        fs::remove_file(&file).map_err(FolderError::write(&file))?;
     }
     let list = path.join(LIST);
-    whole::rename(&whole.join(LIST), &list, true).map_err(FolderError::write(&list))?;
-    fs::remove_dir_all(&whole).map_err(FolderError::write(&whole))?;
+    whole::rename(&part.join(LIST), &list, true).map_err(FolderError::write(&list))?;
+    fs::remove_dir_all(part).map_err(FolderError::write(part))?;
     for name in old.iter().filter_map(|name| Some(name.rsplit_once('/')?.0)) {
         // Succeeds once the subfolder is empty.
         let _ = fs::remove_dir(path.join(name));
