@@ -22,10 +22,11 @@
 //!
 //! | layer | modules |
 //! |---|---|
-//! | 10 | `cli`: arguments to options, one function per command |
-//! | 9 | `preview`: the window |
-//! | 8 | [`source`]: cameras, recordings and their depth, by name |
-//! | 7 | [`pipeline`]: the one place that knows all stages |
+//! | 11 | `cli`: arguments to options, one function per command |
+//! | 10 | `preview`: the window |
+//! | 9 | [`source`]: cameras, recordings and their depth, by name |
+//! | 8 | [`pipeline`]: the one place that knows all stages |
+//! | 7 | [`engine`]: colour and depth in, blurred picture out |
 //! | 6 | [`computing`]: CPU or GPU, for blur and matching |
 //! | 5 | [`look`]: everything about the blur, for pictures of any size |
 //! | 4 | [`capture`], [`depth`], [`bokeh`], [`sink`] |
@@ -56,6 +57,7 @@ pub mod computing;
 #[doc(hidden)]
 pub mod control;
 pub mod depth;
+pub mod engine;
 #[doc(hidden)]
 pub mod files;
 pub mod frame;

@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Modules of the crate by layer, the lowest first.
-const LAYERS: [&[&str]; 12] = [
+const LAYERS: [&[&str]; 13] = [
     &["names"],
     &["color", "frame", "optics", "clock", "files", "knob"],
     &["compute", "calibration", "layout"],
@@ -12,6 +12,7 @@ const LAYERS: [&[&str]; 12] = [
     &["capture", "depth", "bokeh", "sink"],
     &["look"],
     &["computing"],
+    &["engine"],
     &["pipeline"],
     &["source"],
     &["preview"],

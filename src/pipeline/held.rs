@@ -175,8 +175,8 @@ mod tests {
     fn what_moved_blurs_a_real_motion_more_like_its_own_depth() {
         use crate::computing::Computing;
         use crate::depth::focus::FocusRule;
+        use crate::engine::still::{Depth, blur};
         use crate::look::{Effect, Look, Strength};
-        use crate::pipeline::still::{Depth, blur};
         use crate::recording::still::{read_color, read_depth};
 
         let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("recordings/portrait");

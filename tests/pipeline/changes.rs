@@ -264,7 +264,7 @@ fn frames_between_two_looks_are_known() {
             .unwrap();
             looking.join().unwrap()
         });
-        assert!(!seen.is_empty() && seen.iter().all(|view| view.trace.between == between));
+        assert!(!seen.is_empty() && seen.iter().all(|view| view.is_between == between));
     }
 }
 

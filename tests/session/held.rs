@@ -5,11 +5,11 @@ use std::time::{Duration, Instant};
 use bokehcam::computing::Computing;
 use bokehcam::depth::backdrop::Behind;
 use bokehcam::depth::focus::FocusRule;
+use bokehcam::engine::still::{self, Depth};
 use bokehcam::frame::ColorImage;
 use bokehcam::look::{Effect, Look, Strength};
 use bokehcam::optics::CocField;
 use bokehcam::pipeline::View;
-use bokehcam::pipeline::still::{self, Depth};
 use bokehcam::preview::session::{Blurred, Held};
 use bokehcam::preview::state::{Output, Request, Update};
 

@@ -3,7 +3,7 @@
 use std::time::Instant;
 
 use bokehcam::look::{Effect, Look};
-use bokehcam::pipeline::Stepper;
+use bokehcam::engine::Stepper;
 use bokehcam::recording::depth_covers;
 use bokehcam::source::{DepthChoice, fitting_look};
 use gst::subclass::prelude::*;

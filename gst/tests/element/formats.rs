@@ -5,7 +5,7 @@ use bokehcam::color::Matrix;
 use bokehcam::frame::ColorImage;
 use bokehcam::layout::{FourCc, Layout, Plane, Range, Transfer};
 use bokehcam::look::{Effect, Look};
-use bokehcam::pipeline::Stepper;
+use bokehcam::engine::Stepper;
 use bokehcam::sink::raw::Encoder;
 use gst::prelude::*;
 use gst_video::VideoInfo;

@@ -18,13 +18,13 @@ use crate::cli::settings::unused;
 use crate::cli::terminal::{Progress, print};
 use crate::compute::{Backend, thread_pool::cores};
 use crate::computing::Computing;
+use crate::engine::still::{Depth, coc_and_depth};
 use crate::frame::{ColorImage, DepthMap};
 use crate::link::pool::Pool;
 use crate::look::number::within;
 use crate::look::{COC_AT_INFINITY_PER_HEIGHT, Look, MOST_RADIUS_PX, Strength};
 use crate::names::named;
 use crate::optics::CocField;
-use crate::pipeline::still::{Depth, coc_and_depth};
 use crate::scene::{Scene, View};
 use crate::source::{self, DepthChoice, Size, SourceName};
 

@@ -1,13 +1,14 @@
 //! A picture that stays on the screen, blurred anew with every look.
 
 use super::super::services::Services;
-use crate::bokeh::{self, Bokeh, BokehError};
+use crate::bokeh::BokehError;
 use crate::budget::Quality;
 use crate::depth::focus::FocusRule;
+use crate::engine::still::{self, Depth};
+use crate::engine::{Blur, Images};
 use crate::frame::{ColorImage, DepthMap};
 use crate::look::Look;
 use crate::optics::CocField;
-use crate::pipeline::still::{self, Depth};
 
 /// A frame that stays.
 pub struct Held {
@@ -42,7 +43,7 @@ pub(super) struct HeldBlur {
     held: Held,
     /// The rule of focus at first: while it stays, so does the distance.
     focus: FocusRule,
-    executor: Option<(bokeh::Settings, Box<dyn Bokeh>)>,
+    again: Blur,
 }
 
 /// Shown when a look needs depth that the frame has not.
@@ -51,7 +52,7 @@ const NO_DEPTH: &str = "The picture that stays was taken without depth: let the 
 impl HeldBlur {
     /// Nothing is blurred yet; `focus` is the rule of the look that it was blurred in.
     pub fn new(held: Held, focus: FocusRule) -> Self {
-        Self { held, focus, executor: None }
+        Self { held, focus, again: Blur::default() }
     }
 
     /// The frame in this look, which is that of the change of this number.
@@ -61,31 +62,24 @@ impl HeldBlur {
     pub fn blur(&mut self, look: &Look, change: u64, services: &mut dyn Services) -> Result<Blurred, String> {
         let Held { number, color, depth, coc, .. } = &self.held;
         let fixed = if look.focus == self.focus { look.of_frame(coc, None) } else { look.clone() };
-        let Some(settings) = fixed.settings(color.size(), false) else {
+        if fixed.coc_kind().is_none() {
             let (picture, depth) = (color.clone(), depth.clone());
             return Ok(Blurred { number: *number, picture, depth, coc: *coc, change, quality: None });
-        };
+        }
         let plain = |error: BokehError| match error {
             BokehError::NoDepth => NO_DEPTH.to_owned(),
             error => error.to_string(),
         };
-        let mut color = color.clone();
+        let (mut color, size) = (color.clone(), color.size());
         let (coc, staged) = still::coc_and_depth(&fixed, &mut color, depth.clone().map(Depth::Final)).map_err(plain)?;
         let depth = depth.clone().filter(|_| staged.is_some());
-        if self.executor.as_ref().is_none_or(|(made_for, _)| *made_for != settings) {
-            let executor = services.executor(&settings, color.size())?;
-            self.executor = Some((settings.clone(), executor));
+        self.again.follow(&fixed, (size, false), |settings| services.executor(settings, size))?;
+        let mut images = Images { color, depth: staged, ..Images::default() };
+        let quality = self.again.quality();
+        if let Err(error) = self.again.blur(&mut images, coc) {
+            self.again = Blur::default();
+            return Err(plain(error));
         }
-        let Some((_, executor)) = &mut self.executor else { return Err(BokehError::Lost.to_string()) };
-        let blurred = still::blur_with(&mut **executor, settings.quality, color, staged, coc);
-        match blurred {
-            Ok(picture) => {
-                Ok(Blurred { number: *number, picture, depth, coc, change, quality: Some(settings.quality) })
-            }
-            Err(error) => {
-                self.executor = None;
-                Err(plain(error))
-            }
-        }
+        Ok(Blurred { number: *number, picture: images.blurred, depth, coc, change, quality })
     }
 }

@@ -13,7 +13,7 @@ use crate::clock::Clock;
 use crate::depth::plate::Guide;
 use crate::link;
 use crate::look::Look;
-use crate::pipeline::{self, Changes, Pace, PipelineError, Run};
+use crate::pipeline::{self, Blurring, Changes, Pace, PipelineError, Run};
 use crate::sink::Sink;
 use crate::sink::switch::Notice;
 use crate::sink::{Shutter, Switch, Switchboard};
@@ -49,48 +49,36 @@ impl Live {
         ended: impl FnOnce(Result<Report, PipelineError>) + Send + 'static,
     ) -> Result<(Self, Source), String> {
         let Opened { name, source, has_depth, ways, way, camera: facts, .. } = opened;
-        let measured = source.is_measured();
-        let crate::source::Source { camera, depth, guide, depth_from, .. } = source;
-        let info = camera.info();
+        let (info, seeker) = (source.camera.info(), source.camera.seeker());
+        let (guide, depth_from) = (source.guide.clone(), source.depth_from);
         let kind = SourceName::from_str(&name).map_or(Kind::default(), |name| name.kind());
         let known = Known { has_depth, is_relative: facts.is_relative, size: info.size };
         let look = fitted(&start.look, known);
-        let made_for = look.settings(info.size, ADAPTIVE);
-        let bokeh = made_for.as_ref().map(|made_for| start.services.executor(made_for, info.size)).transpose()?;
-        let executor = bokeh.as_ref().map_or_else(|| "no blur".into(), |bokeh| bokeh.describe());
+        let (blurring, changes) =
+            Blurring::begin(look, (info.size, ADAPTIVE), |settings| start.services.executor(settings, info.size))?;
+        let executor = blurring.bokeh.as_ref().map_or_else(|| "no blur".into(), |bokeh| bokeh.describe());
         let (budget_ns, threads) = (start.budget_ns.unwrap_or(info.period_ns), start.threads);
         let (switch, board) = Switch::new("window", wrote);
         let period = Duration::from_nanos(info.period_ns);
         let (demand, off) = (start.demand.clone(), Arc::clone(&start.off));
         let (sink, release) = Shutter::new(Box::new(switch), info.size, period, demand, Clock::system(), off);
         *start.release.lock().unwrap_or_else(PoisonError::into_inner) = Some(release);
-        let (changes, to_come) = Changes::new(look.clone(), info.size, ADAPTIVE);
         let (view, views) = link::live();
         let stop = Arc::new(AtomicBool::new(false));
         let (stopped, wake, keep_going) = (Arc::clone(&stop), Arc::clone(&news.wake), start.keep_going);
         let (wanted, demand) = (Arc::clone(&start.wanted), start.demand.clone());
-        news.send(SessionEvent::Views(views, guide.clone(), camera.seeker()));
+        news.send(SessionEvent::Views(views, guide.clone(), seeker));
         let run = move || {
             pipeline::run(Run {
-                camera,
-                depth,
-                bokeh,
-                look,
-                adaptive: ADAPTIVE,
-                measured,
                 threads,
-                changes: Some(to_come),
-                sink: Box::new(sink),
                 pace: Pace::Realtime,
                 budget_ns,
                 keep_going,
                 demand: Some(demand),
-                mirror: false,
                 wanted: Some(wanted),
                 view: Some(view),
-                clock: Clock::system(),
-                stop: &stopped,
                 progress: &|_| wake(),
+                ..source.into_run(blurring, Box::new(sink), &stopped)
             })
         };
         let thread = thread::Builder::new().name("pipeline".into()).spawn(move || {

@@ -2,12 +2,11 @@ use super::*;
 use crate::bokeh::Picture;
 use crate::bokeh::plan::Plan;
 use crate::budget::Quality;
-use crate::frame::{DepthMap, Stamp};
+use crate::frame::DepthMap;
 use crate::link::pool::Pool;
 use crate::optics::{CocField, DepthCoc, Ramp};
 use crate::pipeline::Trace;
 use crate::preview::state::sample;
-use crate::stats::Frames;
 
 const LENS: DepthCoc = DepthCoc { coc_at_infinity_px: 16.0, focus_m: 2.0, range_m: 0.0, max_coc_px: 43.0 };
 
@@ -22,14 +21,9 @@ fn view(size: (u32, u32), map: (u32, u32), coc: CocField) -> View {
         depth
     });
     View {
-        picture: Picture::in_memory(pictures.take()),
-        color: None,
         depth: Some(maps.take()),
-        coc,
-        stamp: Stamp { index: 0, time_ns: 0, captured_ns: None },
-        captured_ns: 0,
         trace: Trace { quality: Some(Quality::Balanced), ..Trace::default() },
-        frames: Frames::default(),
+        ..View::of(Picture::in_memory(pictures.take()), coc)
     }
 }
 

@@ -18,10 +18,10 @@ use crate::clock::{Clock, cpu_ns};
 use crate::compute::{Backend, thread_pool::cores};
 use crate::computing::{Computing, Executors};
 use crate::depth::Seen;
+use crate::engine::{CocMaker, Finish};
 use crate::frame::{ColorImage, DepthMap, GrayImage, Stamp};
 use crate::link::pool::Pooled;
 use crate::look::{BackgroundMemory, Look, Strength};
-use crate::pipeline::{CocMaker, Finish};
 use crate::sink::yuyv::Encoder;
 use crate::source::{self, DepthFrom, Frames, Kind, Source, SourceName};
 

@@ -15,10 +15,10 @@ use crate::cli::error::CliError;
 use crate::cli::files::{refuse_overwrite, write_whole};
 use crate::compute::Backend;
 use crate::computing::Computing;
+use crate::engine::still::{Depth, coc_and_depth};
 use crate::frame::{ColorImage, DepthMap};
 use crate::look::Look;
 use crate::optics::CocField;
-use crate::pipeline::still::{Depth, coc_and_depth};
 use crate::recording::still;
 
 /// The file of numbers, which is always written, even where nothing is blurred.

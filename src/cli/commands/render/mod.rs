@@ -25,10 +25,10 @@ use crate::cli::terminal;
 use crate::compute::Backend;
 use crate::depth::agreement::Agreement;
 use crate::depth::misfit::Misfit;
+use crate::engine::{self, still::Depth};
 use crate::files::place;
 use crate::frame::{ColorImage, DepthMap};
 use crate::look::{ApertureName, Look, Refine, Strength};
-use crate::pipeline::{self, still::Depth};
 use crate::recording::snapshot;
 use crate::recording::still::{self, MapFormat, PhotoFormat};
 use crate::source::options::DepthUnit;
@@ -130,7 +130,7 @@ pub fn run(command: &RenderCommand, global: &options::Global, given: &Given) -> 
     tell_of_leftovers([command.out.as_path()]);
     let (result, executor) = match &command.debug_dir {
         Some(dir) => debug::blurred(color, depth, &look, &computing, (dir, command.output.force))?,
-        None => pipeline::still::blur(&look, color, depth, &computing)?,
+        None => engine::still::blur(&look, color, depth, &computing)?,
     };
     // The thumbnail in the photo's metadata would show what the blur hides.
     let mut extras = extras.without_thumbnail();

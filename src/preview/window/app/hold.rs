@@ -41,7 +41,7 @@ impl App {
             depth,
             coc: view.coc,
             // A photo was blurred as well as the time between frames allows.
-            is_behind: view.trace.between || self.snapshot_due || self.state.settled,
+            is_behind: view.is_between || self.snapshot_due || self.state.settled,
         }));
     }
 
@@ -59,7 +59,7 @@ impl App {
         }
         view.picture = Picture::in_memory(Pooled::detached(picture));
         view.depth = depth.map(Pooled::detached);
-        (view.coc, view.trace.change, view.trace.between, view.trace.quality) = (coc, change, false, quality);
+        (view.coc, view.change, view.is_between, view.trace.quality) = (coc, change, false, quality);
         (self.state.focus_m, self.state.between) = (focus_m(&coc), false);
         self.drawn = None;
         if self.snapshot_due {

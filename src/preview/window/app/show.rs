@@ -8,7 +8,6 @@ use winit::window::Fullscreen;
 use super::{App, control};
 use crate::compute::Place;
 use crate::frame::ColorImage;
-use crate::pipeline::Trace;
 use crate::preview::panel::{self, Canvas};
 use crate::preview::present::{Area, Controls, Drawing, Image};
 use crate::preview::session::Still;
@@ -132,7 +131,7 @@ impl App {
         if view.picture.memory().is_none() && !is_running {
             return self.state.note(NO_PICTURE);
         }
-        let Trace { between, depth_held, .. } = view.trace;
+        let (between, depth_held) = (view.is_between, view.trace.depth_held);
         let is_frozen = self.state.keeps_picture() && view.picture.memory().is_some();
         self.snapshot_due = view.picture.memory().is_none() || is_running && (between || depth_held && !is_frozen);
         self.update_wanted();
@@ -142,7 +141,7 @@ impl App {
             color: view.color.as_deref().unwrap_or(picture).clone(),
             depth: view.depth.as_ref().map(|depth| (**depth).clone()),
             coc: view.coc,
-            change: view.trace.change,
+            change: view.change,
             quality: view.trace.quality,
             with_sources: self.state.habits.keep_sources,
             order: self.controlled.as_mut().and_then(control::Controlled::take_order),
