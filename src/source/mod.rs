@@ -46,7 +46,7 @@ use crate::depth::DepthSource;
 use crate::depth::focus::FocusRule;
 use crate::depth::plate::Guide;
 use crate::frame::DepthMap;
-use crate::look::{Effect, Look, Strength};
+use crate::look::{Effect, Known, Look, Strength};
 use crate::optics::StereoRig;
 use crate::pipeline::{Blurring, Run};
 use crate::recording::{Options as Reading, Recording, Scratch};
@@ -298,7 +298,7 @@ pub fn fitting_look(look: &Look, depth: &DepthChoice, has_depth: bool) -> Result
     if *depth == DepthChoice::Recorded && !has_depth {
         return SourceError::usage("--depth recorded: the source has no depth");
     }
-    let look = look.for_source(uses_depth);
+    let look = look.for_source(Known { has_depth: uses_depth, ..Known::default() });
     let has_distance = look.effect.follows_depth() || matches!(look.focus, FocusRule::Metres(_));
     if matches!(look.strength, Strength::Lens(_)) && !has_distance {
         return SourceError::usage(

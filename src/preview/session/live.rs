@@ -7,12 +7,12 @@ use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
 use super::super::services::{Opened, Services};
-use super::super::state::{Known, Output, Running, Source, fitted};
+use super::super::state::{Output, Running, Source};
 use super::{News, SessionEvent, Start};
 use crate::clock::Clock;
 use crate::depth::plate::Guide;
 use crate::link;
-use crate::look::Look;
+use crate::look::{Known, Look};
 use crate::pipeline::{self, Blurring, Changes, Pace, PipelineError, Run};
 use crate::sink::Sink;
 use crate::sink::switch::Notice;
@@ -53,7 +53,7 @@ impl Live {
         let (guide, depth_from) = (source.guide.clone(), source.depth_from);
         let kind = SourceName::from_str(&name).map_or(Kind::default(), |name| name.kind());
         let known = Known { has_depth, is_relative: facts.is_relative, size: info.size };
-        let look = fitted(&start.look, known);
+        let look = start.look.for_source(known);
         let (blurring, changes) =
             Blurring::begin(look, (info.size, ADAPTIVE), |settings| start.services.executor(settings, info.size))?;
         let executor = blurring.bokeh.as_ref().map_or_else(|| "no blur".into(), |bokeh| bokeh.describe());
@@ -111,15 +111,15 @@ impl Live {
 
     /// The look as far as the source allows it.
     pub(super) fn effective(&self, look: &Look) -> Look {
-        fitted(look, self.known)
+        look.for_source(self.known)
     }
 
-    /// Blurs with this look from now on; its frames carry this number.
+    /// Blurs with this look from now on, which the source [allows](Self::effective); its frames carry this number.
     ///
     /// # Errors
     /// Its executor cannot be made: one line. The one before goes on.
-    pub(super) fn adopt(&mut self, look: &Look, number: u64, services: &mut dyn Services) -> Result<(), String> {
-        let (look, size) = (self.effective(look), self.size);
+    pub(super) fn adopt(&mut self, look: Look, number: u64, services: &mut dyn Services) -> Result<(), String> {
+        let size = self.size;
         self.changes.adopt(look, number, |settings| {
             let began = Instant::now();
             let bokeh = services.executor(settings, size)?;

@@ -6,7 +6,7 @@ use super::Sheet;
 use crate::look::{MAX_COC_PER_HEIGHT, Strength};
 use crate::optics::Lens;
 use crate::preview::panel::parts::{Number, choose, remark};
-use crate::preview::state::tweak::{F_NUMBERS, LENS, amount, amount_of, f_number_of, lens_of, strength_of};
+use crate::preview::state::tweak::{F_NUMBERS, LENS, amount, amount_of, f_number_of, lens_of};
 use crate::preview::texts::tr_with;
 
 /// Whether it is by the numbers of a lens.
@@ -25,7 +25,7 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
         match (chosen, sheet.look.strength) {
             (Some(true), _) => sheet.look.strength = Strength::Lens(lens_of(&sheet.look, focus_m, sheet.size)),
             (Some(false), Strength::Lens(lens)) => {
-                sheet.look.strength = strength_of(amount_of(lens, focus_m, sheet.size));
+                sheet.look.strength = Strength::of_share(amount_of(lens, focus_m, sheet.size));
             }
             _ => {}
         }

@@ -16,14 +16,15 @@ impl Host {
     pub(super) fn adopt(&mut self, look: Look) {
         self.start.look = look;
         let number = self.looks.back().map_or(0, |(last, _)| last + 1);
-        self.looks.push_back((number, self.effective_look()));
+        let look = self.effective_look();
+        self.looks.push_back((number, look.clone()));
         if self.looks.len() > KEPT_LOOKS {
             self.looks.pop_front();
         }
         // What is on the screen comes first.
         self.blur_held();
         if let Some(live) = &mut self.live
-            && let Err(line) = live.adopt(&self.start.look, number, &mut *self.start.services)
+            && let Err(line) = live.adopt(look, number, &mut *self.start.services)
         {
             self.news.note(line);
         }

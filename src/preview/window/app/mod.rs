@@ -32,7 +32,7 @@ use crate::pipeline::{View, Wanted};
 use crate::preview::meters::Totals;
 use crate::preview::panel::{Panel, SystemFonts};
 use crate::preview::session::{Closed, Session, Wake};
-use crate::preview::state::{Action, Shown, Source, State, fitted};
+use crate::preview::state::{Action, Shown, Source, State};
 use crate::preview::views::Views;
 use crate::stats::WindowUse;
 
@@ -199,7 +199,7 @@ impl App {
 
     fn update_settings(&mut self) {
         self.settings = match &self.state.source {
-            Source::Running(running) => fitted(&self.state.look, self.state.known()).settings(running.size, true),
+            Source::Running(running) => self.state.look.settings(running.size, true),
             _ => None,
         };
     }
