@@ -21,12 +21,10 @@ use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-use bokehcam::bokeh::Backend;
+use bokehcam::bokeh::{Backend, Bokeh, BokehError};
 use bokehcam::budget::Quality;
 use bokehcam::clock::Clock;
-use bokehcam::compute::thread_pool::cores;
 use bokehcam::computing::Computing;
-use bokehcam::depth::DepthSource;
 use bokehcam::depth::recorded::Recorded;
 use bokehcam::look::number::OrAuto;
 use bokehcam::look::{Effect, Look, Refine, Strength};

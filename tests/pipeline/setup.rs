@@ -6,7 +6,6 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use bokehcam::budget::Quality;
 use bokehcam::capture::{Brings, Camera};
-use bokehcam::clock::Clock;
 use bokehcam::depth::focus::FocusRule;
 use bokehcam::look::{Effect, Look, Strength};
 use bokehcam::pipeline::{Blurring, Pace, PipelineError, Progress, Run, run};

@@ -5,12 +5,13 @@ use std::time::{Duration, Instant};
 use winit::event_loop::ActiveEventLoop;
 use winit::window::Fullscreen;
 
+use super::hold::still;
 use super::{App, control};
 use crate::compute::Place;
 use crate::frame::ColorImage;
 use crate::preview::panel::{self, Canvas};
 use crate::preview::present::{Area, Controls, Drawing, Image};
-use crate::preview::session::Still;
+use crate::preview::session::Saving;
 use crate::preview::state::{Action, Request, Source, State};
 use crate::preview::views::Probe;
 use crate::sink::card;
@@ -135,17 +136,9 @@ impl App {
         let is_frozen = self.state.keeps_picture() && view.picture.memory().is_some();
         self.snapshot_due = view.picture.memory().is_none() || is_running && (between || depth_held && !is_frozen);
         self.update_wanted();
-        let Some(picture) = view.picture.memory().filter(|_| !self.snapshot_due) else { return };
-        self.session.save(Still {
-            picture: picture.clone(),
-            color: view.color.as_deref().unwrap_or(picture).clone(),
-            depth: view.depth.as_ref().map(|depth| (**depth).clone()),
-            coc: view.coc,
-            change: view.change,
-            quality: view.trace.quality,
-            with_sources: self.state.habits.keep_sources,
-            order: self.controlled.as_mut().and_then(control::Controlled::take_order),
-        });
+        let Some(still) = still(view, 0).filter(|_| !self.snapshot_due) else { return };
+        let order = self.controlled.as_mut().and_then(control::Controlled::take_order);
+        self.session.save(still, Saving { with_sources: self.state.habits.keep_sources, order });
     }
 
     /// Shows the frame, or the view of it that is chosen, under the controls as they were laid out last.
