@@ -9,7 +9,7 @@ use std::time::Duration;
 
 use clap::Args;
 
-use control::{Beat, Facts, Looks};
+use control::{Beat, Facts, Looks, Served};
 
 use crate::capture::SourceInfo;
 #[cfg(feature = "window")]
@@ -35,7 +35,7 @@ use crate::depth::focus::FocusRule;
 use crate::link::demand::Demand;
 use crate::look::{Look, Strength};
 use crate::pipeline::{self, Blurring, Pace, PipelineError, Run};
-use crate::sink::{self, Backpressure, Shutter, Sink, Target};
+use crate::sink::{self, Backpressure, Release, Shutter, Sink, Target};
 use crate::source::{self, DepthChoice, DepthFrom, Source, SourceName};
 use crate::stats::Report;
 
@@ -171,15 +171,28 @@ impl StreamCommand {
         self.to.contains(&Target::Filter)
     }
 
-    /// Opens the outputs.
+    /// Opens the outputs. `noticed` notices who watches, and they end once `stop` is set; `closed` keeps pictures from them.
     fn outputs(
         &self,
-        options: &sink::Options,
-        pace: Pace,
+        opened: &Opened,
+        noticed: Option<&Demand>,
+        stop: &Arc<AtomicBool>,
         closed: &Arc<AtomicBool>,
     ) -> Result<Box<dyn Sink>, CliError> {
-        let backpressure = if pace == Pace::Realtime { Backpressure::DropOldest } else { Backpressure::Block };
-        let sink = sinks::open(&self.to, options, backpressure, closed)?;
+        let options::Streaming { stream, output, .. } = &self.parts;
+        let Opened { info, options, pace, .. } = opened;
+        let sink_options = sink::Options {
+            frames: info.frames,
+            force: output.force,
+            out_size: stream.out_size.map(|size| (size.width, size.height)),
+            threads: options.computing.threads,
+            demand: noticed.cloned(),
+            stands_for: self.source.shared().map(str::to_owned),
+            stop: Arc::clone(stop),
+            ..sink::Options::new(info.size, info.period_ns)
+        };
+        let backpressure = if *pace == Pace::Realtime { Backpressure::DropOldest } else { Backpressure::Block };
+        let sink = sinks::open(&self.to, &sink_options, backpressure, closed)?;
         // By now the outputs have what was left of them.
         tell_of_leftovers(self.to.iter().filter(|target| !target.is_camera()).filter_map(Target::path));
         Ok(sink)
@@ -206,17 +219,47 @@ impl StreamCommand {
         }
     }
 
-    /// What is known of the run from its start, for those who control it by this name.
-    fn status(&self, name: &Name, size: (u32, u32)) -> Status {
-        Status {
-            name: name.to_string(),
-            pid: std::process::id(),
-            command: "stream".into(),
-            source: self.source.to_string(),
-            size: Some(size),
-            sinks: self.to.iter().map(Target::to_string).collect(),
-            ..Status::default()
-        }
+    /// Answers those who control the run, if it could be claimed; says why not, where somebody may want to.
+    fn serve(
+        &self,
+        claim: Result<Claim, String>,
+        opened: &Opened,
+        (demand, release, beat): (Option<Demand>, Release, Arc<Beat>),
+        looks: Looks,
+        config: Option<&Path>,
+    ) -> Result<Option<Served>, CliError> {
+        let Opened { source, options, info, unused, .. } = opened;
+        let claim = match claim {
+            Ok(claim) => claim,
+            Err(why) => {
+                let is_live = info.live || self.to.iter().any(Target::is_live);
+                if is_live || looks.adaptive || self.name.is_some() {
+                    tracing::warn!("{why}");
+                }
+                return Ok(None);
+            }
+        };
+        let facts = |name: &Name| Facts {
+            status: Status {
+                name: name.to_string(),
+                pid: std::process::id(),
+                command: "stream".into(),
+                source: self.source.to_string(),
+                size: Some(info.size),
+                sinks: self.to.iter().map(Target::to_string).collect(),
+                ..Status::default()
+            },
+            size: info.size,
+            depth_choice: options.depth_choice.clone(),
+            has_depth: source.has_depth() && options.depth_choice != DepthChoice::None,
+            unused: *unused,
+            config: config.map(Path::to_owned),
+            demand,
+            release,
+            beat,
+        };
+        let tray = self.tray.then(|| SettingsFile::load(config)).transpose()?;
+        control::serve(claim, facts, looks, tray.map(|file| file.preset_names())).map(Some)
     }
 }
 
@@ -228,9 +271,9 @@ fn stream_opened(
     claim: Result<Claim, String>,
 ) -> Result<(), CliError> {
     let options::Streaming { stream, output, .. } = &command.parts;
-    let (info, adaptive, pace) = (opened.info.clone(), opened.is_adaptive(), opened.pace);
-    let computing = &opened.options.computing;
+    let (info, computing) = (opened.info.clone(), opened.options.computing.clone());
     pipeline::check_room(info.size, info.frames)?;
+    let adaptive = opened.is_adaptive();
     // What a change of the look needs runs on the same device.
     let mut executors = Executors::new(computing.clone());
     let make = |settings: &_| executors.blur(settings, info.size);
@@ -242,48 +285,22 @@ fn stream_opened(
     let _watch = (!on_demand).then(|| demand.watch());
     let noticed = on_demand.then(|| demand.clone());
     let stop = terminal::stop_flag()?;
-    let sink_options = sink::Options {
-        frames: info.frames,
-        force: output.force,
-        out_size: stream.out_size.map(|size| (size.width, size.height)),
-        threads: computing.threads,
-        demand: noticed.clone(),
-        stands_for: command.source.shared().map(str::to_owned),
-        stop: Arc::clone(&stop),
-        ..sink::Options::new(info.size, info.period_ns)
-    };
     report::try_out(stream.report.as_deref())?;
     let closed = Arc::default();
-    let sink = command.outputs(&sink_options, pace, &closed)?;
+    let sink = command.outputs(&opened, noticed.as_ref(), &stop, &closed)?;
     command.announce(&opened, &sink.describe(), global.quiet);
     let guidance = terminal::Guidance::new(opened.source.guide.clone(), global);
     let bar = terminal::Progress::new(info.frames, global);
     let period = Duration::from_nanos(info.period_ns);
     let (sink, release) = Shutter::new(sink, info.size, period, demand.clone(), Clock::system(), closed);
-    let is_live = info.live || command.to.iter().any(Target::is_live);
-    if let Some(why) = claim.as_ref().err().filter(|_| is_live || adaptive || command.name.is_some()) {
-        tracing::warn!("{why}");
-    }
     let beat = Arc::new(Beat::default());
-    let facts = |name: &Name| Facts {
-        status: command.status(name, info.size),
-        size: info.size,
-        depth_choice: opened.options.depth_choice.clone(),
-        has_depth: opened.source.has_depth() && opened.options.depth_choice != DepthChoice::None,
-        unused: opened.unused,
-        config: global.config.clone(),
-        demand: noticed,
-        release,
-        beat: Arc::clone(&beat),
-    };
     let looks = Looks { look: opened.look.clone(), adaptive, changes, executors };
-    let tray = command.tray.then(|| SettingsFile::load(global.config.as_deref())).transpose()?;
-    let tray = tray.map(|file| file.preset_names());
-    let server = claim.ok().map(|claim| control::serve(claim, facts, looks, tray)).transpose()?;
-    let threads = computing.threads();
+    let for_others = (noticed, release, Arc::clone(&beat));
+    let server = command.serve(claim, &opened, for_others, looks, global.config.as_deref())?;
+    let pace = opened.pace;
     let run = opened.source.into_run(blurring, Box::new(sink), &stop);
     let ended = pipeline::run(Run {
-        threads,
+        threads: computing.threads(),
         changes: run.changes.filter(|_| server.is_some()),
         pace,
         budget_ns: stream.budget_ms.map_or(info.period_ns, |ms| (f64::from(ms) * 1e6) as u64),
