@@ -1,7 +1,7 @@
 #![allow(missing_docs)]
 use bokehcam::computing::Computing;
+use bokehcam::engine::still::{self, Depth};
 use bokehcam::look::Look;
-use bokehcam::pipeline::still::{self, Depth};
 use bokehcam::recording::still::{read_color, read_depth, write_color};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {

@@ -22,8 +22,9 @@
 //!
 //! | layer | modules |
 //! |---|---|
-//! | 8 | [`source`]: cameras, recordings and their depth, by name |
-//! | 7 | [`pipeline`]: the one place that knows all stages |
+//! | 9 | [`source`]: cameras, recordings and their depth, by name |
+//! | 8 | [`pipeline`]: the one place that knows all stages |
+//! | 7 | [`engine`]: colour and depth in, blurred picture out |
 //! | 6 | [`computing`]: CPU or GPU, for blur and matching |
 //! | 5 | [`look`]: everything about the blur, for pictures of any size |
 //! | 4 | [`capture`], [`depth`], [`bokeh`], [`sink`] |
@@ -52,6 +53,7 @@ pub mod computing;
 #[doc(hidden)]
 pub mod control;
 pub mod depth;
+pub mod engine;
 #[doc(hidden)]
 pub mod files;
 pub mod frame;

@@ -16,31 +16,58 @@ pub use report::{About, QualityUse, Report, Spread, StageMs, StagesMs, Versions,
 pub use rungs::RungCounts;
 pub use tally::{Cause, Dropped, Frames, Tally, Ticket};
 
-/// What the stages measure while they run; each stage fills its own fields.
+/// What the stages measure while they run; each stage fills a part of its own.
 #[derive(Clone, Debug, Default)]
 pub struct Timings {
     /// Reading and decoding a picture, waits excluded.
     pub decode: Histogram,
+    /// Of depth.
+    pub depth: DepthTimings,
+    /// Of the blur.
+    pub blur: BlurTimings,
+    /// Of delivery.
+    pub sink: SinkTimings,
+}
+
+/// What is measured of depth.
+#[derive(Clone, Debug, Default)]
+pub struct DepthTimings {
     /// Reading depth, focusing and filling holes.
-    pub depth: Histogram,
+    pub took: Histogram,
     /// Frames that took over the depth of the one before, to save time.
     pub held: u64,
+    /// What refined it: `cpu`, `gpu` or `gpu, then cpu`.
+    pub refined_by: Option<&'static str>,
+    /// What found mattes, as that.
+    pub matted_by: Option<&'static str>,
+}
+
+/// What is measured of the blur.
+#[derive(Clone, Debug, Default)]
+pub struct BlurTimings {
     /// The blur of a frame: the sum of its passes, or the wall time where an executor times none.
-    pub blur: Histogram,
+    pub took: Histogram,
     /// The blur's passes.
     pub passes: PassHistograms,
+    /// Frames blurred at each rung of the quality ladder.
+    pub rungs: RungCounts,
+    /// Frames whose blur took longer than the budget.
+    pub misses: u64,
+    /// On what it ran, `cpu`, `gpu`, `gpu, then cpu` or `none`, and how that describes itself.
+    pub by: [String; 2],
+}
+
+/// What is measured of delivery.
+#[derive(Clone, Debug, Default)]
+pub struct SinkTimings {
     /// Writing or showing a picture.
-    pub sink: Histogram,
+    pub took: Histogram,
     /// Waits of finished pictures for their turn, in real time.
     pub playout: Histogram,
     /// From capture to delivery.
     pub latency: Histogram,
     /// From one delivery to the next.
     pub frame: Histogram,
-    /// Frames blurred at each rung of the quality ladder.
-    pub rungs: RungCounts,
-    /// Frames whose blur took longer than the budget.
-    pub misses: u64,
     /// Pictures that were shown again because no new one came.
     pub repeats: u64,
 }

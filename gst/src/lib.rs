@@ -2,7 +2,7 @@
 //!
 //! `bokeh` is the element, `settings` its properties, made of the library's table of settings (`enums` makes the types of those
 //! that have names), `pictures` and `maps` go between GStreamer's memory and the library's. What is done to a frame is
-//! [`bokehcam::pipeline::Stepper`].
+//! [`bokehcam::engine::Stepper`].
 //!
 //! `unsafe` is allowed in `enums.rs`, where each block carries its argument.
 

@@ -5,8 +5,8 @@ use std::sync::Mutex;
 
 use bokehcam::bokeh::slices::{Radii, SliceBlur};
 use bokehcam::depth::backdrop::Behind;
+use bokehcam::engine::still::{Depth, coc_and_depth};
 use bokehcam::look::{Look, Refine};
-use bokehcam::pipeline::still::{Depth, coc_and_depth};
 use bokehcam::recording::still::check_depth_size;
 use bokehcam::source::{DepthChoice, fitting_look};
 use numpy::{PyArray2, PyArrayMethods, PyReadonlyArrayDyn, ToPyArray};

@@ -7,6 +7,7 @@ mod aperture;
 mod behind;
 mod coc;
 mod effect;
+mod known;
 pub mod number;
 mod patch;
 pub mod presets;
@@ -18,6 +19,7 @@ pub use aperture::ApertureName;
 pub use behind::{BehindName, Follow};
 pub use coc::{CocAtInfinity, CocRule};
 pub use effect::{BackgroundMemory, Effect, Refine};
+pub use known::Known;
 pub use patch::{LookError, Value};
 pub use settings::{Patch, SETTINGS};
 pub use strength::Strength;
@@ -112,16 +114,6 @@ impl Look {
     /// The default look with another effect.
     pub fn plain(effect: Effect) -> Self {
         Self { effect, ..Self::default() }
-    }
-
-    /// The look as far as a source with depth or without allows it: without, nobody knows what to keep sharp, and all is
-    /// blurred alike.
-    pub fn for_source(&self, has_depth: bool) -> Self {
-        let effect = match self.effect {
-            effect if effect.follows_depth() && !has_depth => Effect::Blur,
-            effect => effect,
-        };
-        Self { effect, ..self.clone() }
     }
 
     /// Which kind of CoC frames have; none when they pass through.

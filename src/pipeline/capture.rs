@@ -2,15 +2,15 @@
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use super::frame::Frame;
 use super::pacer::Pacer;
-use super::{Ended, Frame, Trace, hand_on};
+use super::{Ended, Shared, Trace};
 use crate::capture::{self, Brings, Camera, Captured, PATIENCE};
-use crate::clock::Clock;
 use crate::frame::{ColorImage, DepthMap, GrayImage};
 use crate::link::Sender;
 use crate::link::demand::Demand;
-use crate::link::pool::{Pool, Pooled};
-use crate::stats::{Cause, Histogram, Tally};
+use crate::link::pool::Pooled;
+use crate::stats::{Cause, Histogram};
 
 /// A picture, and what the camera brought with it.
 pub(super) struct Shot {
@@ -23,25 +23,33 @@ pub(super) struct Shot {
 }
 
 pub(super) struct Stage<'a> {
-    pub camera: Box<dyn Camera>,
-    pub pacer: Pacer,
-    pub brings: Brings,
-    pub keep_going: bool,
+    camera: Box<dyn Camera>,
+    pacer: Pacer,
     /// `None` captures whether anybody watches or not.
-    pub demand: Option<Demand>,
+    demand: Option<Demand>,
     /// The user's stop, and the end of any stage.
-    pub stop: [&'a AtomicBool; 2],
-    pub colors: &'a Pool<ColorImage>,
-    pub depths: &'a Pool<DepthMap>,
-    pub rights: &'a Pool<GrayImage>,
-    pub tally: &'a Tally,
-    pub clock: &'a Clock,
-    pub times: &'a mut Histogram,
+    stop: [&'a AtomicBool; 2],
+    shared: &'a Shared,
+    times: &'a mut Histogram,
 }
 
-impl Stage<'_> {
+impl<'a> Stage<'a> {
+    pub(super) fn new(
+        camera: Box<dyn Camera>,
+        demand: Option<Demand>,
+        stop: &'a AtomicBool,
+        shared: &'a Shared,
+        times: &'a mut Histogram,
+    ) -> Self {
+        let Shared { clock, info, live_ns, over, .. } = shared;
+        let pacer = Pacer::new(clock.clone(), live_ns.is_some() && !info.live, info.period_ns);
+        Self { camera, pacer, demand, stop: [stop, over], shared, times }
+    }
+
     /// Captures until the camera ends, a stop is set, or nobody takes the frames.
     pub(super) fn run(mut self, mut to: Sender<Frame<Shot>>) -> Ended {
+        let Shared { clock, tally, pools, info, keep_going, .. } = self.shared;
+        let brings = info.brings;
         let stopped = || self.stop.iter().any(|stop| stop.load(Ordering::Relaxed));
         // For a camera that brings neither: they stay empty.
         let (mut no_depth, mut no_right) = (DepthMap::default(), GrayImage::default());
@@ -58,24 +66,24 @@ impl Stage<'_> {
                 self.pacer.sought();
             } else if let Some(demand) = self.demand.as_ref().filter(|demand| !demand.is_watched()) {
                 self.camera.rest();
-                let rest_began_ns = self.clock.now_ns();
+                let rest_began_ns = clock.now_ns();
                 demand.wait(PATIENCE);
-                self.pacer.rested(self.clock.now_ns() - rest_began_ns);
+                self.pacer.rested(clock.now_ns() - rest_began_ns);
                 continue;
             }
-            self.tally.lost(self.pacer.skip(&mut *self.camera), Cause::Driver);
-            let mut color = self.colors.take();
-            let mut depth = (self.brings == Brings::Depth).then(|| self.depths.take());
-            let mut right = (self.brings == Brings::RightEye).then(|| self.rights.take());
+            tally.lost(self.pacer.skip(&mut *self.camera), Cause::Driver);
+            let mut color = pools.colors.take();
+            let mut depth = (brings == Brings::Depth).then(|| pools.depths.take());
+            let mut right = (brings == Brings::RightEye).then(|| pools.rights.take());
             let shot = capture::Shot {
                 color: &mut color,
                 depth: depth.as_deref_mut().unwrap_or(&mut no_depth),
                 right: right.as_deref_mut().unwrap_or(&mut no_right),
             };
-            let began_ns = self.clock.now_ns();
+            let began_ns = clock.now_ns();
             match self.camera.next(shot)? {
                 Captured::Frame(stamp) => {
-                    let read_ns = (self.clock.now_ns() - began_ns).saturating_sub(self.camera.waited_ns());
+                    let read_ns = (clock.now_ns() - began_ns).saturating_sub(self.camera.waited_ns());
                     self.times.add(read_ns);
                     // A live camera stamps its frames; stored ones are captured when they are due.
                     let has_wish = || seeker.as_ref().is_some_and(|seeker| seeker.wish_after(seek).is_some());
@@ -83,21 +91,29 @@ impl Stage<'_> {
                         Some(captured_ns) => captured_ns,
                         None => self.pacer.wait(stamp.time_ns, read_ns, || stopped() || has_wish()),
                     };
-                    let ticket = self.tally.captured(captured_ns);
-                    let since_ns = self.clock.now_ns();
+                    let ticket = tally.captured(captured_ns);
+                    let since_ns = clock.now_ns();
                     // A live camera's frame waited for its turn to be read; a stored one was read before it was captured.
                     let decode_ns = if stamp.captured_ns.is_some() { read_ns } else { 0 };
                     let between_ns = since_ns.saturating_sub(captured_ns).saturating_sub(decode_ns);
-                    let trace =
-                        Trace { decode_ns: read_ns, between_ns, seek, asked: wish.is_some(), ..Trace::default() };
-                    let frame = Frame { ticket, stamp, trace, since_ns, item: Shot { color, depth, right, ahead_ns } };
-                    if !hand_on(&mut to, frame, self.tally) {
+                    let frame = Frame {
+                        ticket,
+                        stamp,
+                        seek,
+                        is_wished: wish.is_some(),
+                        change: 0,
+                        is_between: false,
+                        trace: Trace { decode_ns: read_ns, between_ns, ..Trace::default() },
+                        since_ns,
+                        item: Shot { color, depth, right, ahead_ns },
+                    };
+                    if !frame.hand_on(&mut to, tally) {
                         break;
                     }
                 }
                 Captured::Corrupt(error) => {
-                    self.tally.lost(1, Cause::Corrupt);
-                    if !self.keep_going {
+                    tally.lost(1, Cause::Corrupt);
+                    if !keep_going {
                         return Err(error.into());
                     }
                     if !complained {
@@ -105,7 +121,7 @@ impl Stage<'_> {
                         complained = true;
                     }
                 }
-                Captured::Lost(count, cause) => self.tally.lost(count, cause),
+                Captured::Lost(count, cause) => tally.lost(count, cause),
                 Captured::Waiting => {}
                 Captured::End => break,
             }

@@ -7,7 +7,7 @@ use crate::look::{Look, QualityRule};
 
 /// Another blur, from the next frame on. Every frame has the CoC and the executor of one and the same change.
 pub struct Change {
-    /// What its frames are known by ([`super::Trace::change`]); those before any change have 0.
+    /// What its frames are known by ([`super::View::change`]); those before any change have 0.
     pub number: u64,
     /// How frames are blurred.
     pub look: Look,
@@ -20,7 +20,7 @@ pub enum Executor {
     /// What did before.
     Keep,
     /// What did before, until that of the look comes with the next change: such frames have the CoC of one look and the
-    /// kernels of another ([`super::Trace::between`]).
+    /// kernels of another ([`super::View::is_between`]).
     Meanwhile,
     /// This one; `None` passes frames through.
     To(Option<Box<dyn Bokeh>>),

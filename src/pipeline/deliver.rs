@@ -1,131 +1,154 @@
 //! Last stage, on the caller's thread: hands pictures to the sink.
 
 use std::ops::ControlFlow;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::Ordering;
 
 use super::blur::Blurred;
+use super::frame::Frame;
 use super::playout::Playout;
-use super::{Ended, Frame, Progress, Trace, View};
+use super::{Ended, Progress, Shared, Trace, View};
 use crate::bokeh::Picture;
 use crate::budget::Quality;
-use crate::clock::Clock;
 use crate::frame::ColorImage;
 use crate::frame::crop::Cropper;
 use crate::link::{self, Received, Receiver, Sender};
 use crate::optics::CocField;
 use crate::sink::{Sink, SinkError};
-use crate::stats::{Cause, Histogram, Tally, Ticket};
+use crate::stats::{Cause, SinkTimings, Ticket};
 
 pub(super) struct Stage<'a> {
-    pub sink: &'a mut dyn Sink,
+    sink: &'a mut dyn Sink,
     /// A viewer that is sent every frame as well.
-    pub view: Option<Sender<View>>,
-    pub mirror: bool,
-    /// Told before each frame whether pictures may be YUYV: where the sink wants that, and nobody else gets them.
-    pub wants_yuyv: &'a AtomicBool,
-    /// Frames to be captured in all, where that is known.
-    pub total: Option<u64>,
-    pub progress: &'a dyn Fn(Progress),
-    pub tally: &'a Tally,
-    pub clock: &'a Clock,
+    view: Option<Sender<View>>,
+    mirror: bool,
+    progress: &'a dyn Fn(Progress),
     /// When pictures are due; `None` shows them as they come.
-    pub playout: Option<Playout>,
-    pub times: Times<'a>,
-    pub cropper: Cropper,
+    playout: Option<Playout>,
+    shared: &'a Shared,
+    times: &'a mut SinkTimings,
+    cropper: Cropper,
     /// The part of the picture that goes out.
-    pub cropped: ColorImage,
+    cropped: ColorImage,
 }
 
-pub(super) struct Times<'a> {
-    pub sink: &'a mut Histogram,
-    /// Waits of finished pictures for their turn.
-    pub playout: &'a mut Histogram,
-    /// From capture to delivery.
-    pub latency: &'a mut Histogram,
-    /// From one delivery to the next.
-    pub frame: &'a mut Histogram,
-    /// Pictures shown again, as no new one came.
-    pub repeats: &'a mut u64,
-}
+impl<'a> Stage<'a> {
+    pub(super) fn new(
+        sink: &'a mut dyn Sink,
+        (view, progress): (Option<Sender<View>>, &'a dyn Fn(Progress)),
+        mirror: bool,
+        shared: &'a Shared,
+        times: &'a mut SinkTimings,
+    ) -> Self {
+        let playout = shared.live_ns.map(Playout::new);
+        let (cropper, cropped) = (Cropper::default(), ColorImage::default());
+        Self { sink, view, mirror, progress, playout, shared, times, cropper, cropped }
+    }
 
-impl Stage<'_> {
     /// Delivers frames until they end, the sink wants no more, or the viewer is gone.
     pub(super) fn run(mut self, mut from: Receiver<Frame<Blurred>>) -> Ended {
+        let Shared { clock, tally, .. } = self.shared;
         let mut last_ns = None;
         // Ticket of the frame that was sent to the viewer last, where that decides whether it was delivered.
         let mut at_viewer = None;
         loop {
             let wants_yuyv = self.view.is_none() && !self.mirror && self.sink.wants_yuyv();
-            self.wants_yuyv.store(wants_yuyv, Ordering::Relaxed);
-            let Frame { ticket, stamp, mut trace, since_ns, item: mut frame } = match self.next(&mut from) {
+            self.shared.wants_yuyv.store(wants_yuyv, Ordering::Relaxed);
+            let mut frame = match self.next(&mut from) {
                 Received::Item(frame) => frame,
                 Received::Nothing => match self.sink.repeat()? {
                     ControlFlow::Continue(shown) => {
-                        *self.times.repeats += u64::from(shown);
+                        self.times.repeats += u64::from(shown);
                         continue;
                     }
                     ControlFlow::Break(()) => break,
                 },
                 Received::Ended => break,
             };
-            let part = trace.part.zip(frame.picture.memory());
-            let is_cropped = part.map(|(part, whole)| self.cropper.crop(whole, &part, &mut self.cropped)).is_some();
-            if self.mirror {
-                let out = if is_cropped { Some(&mut self.cropped) } else { frame.picture.memory_mut() };
-                out.map(mirror);
-            }
-            let ready_ns = self.clock.now_ns();
-            trace.between_ns += ready_ns.saturating_sub(since_ns);
+            let is_cropped = self.crop_and_mirror(&mut frame.item);
+            let (mut frame, mut blurred) = frame.taken_up(clock.now_ns());
+            let captured_ns = frame.ticket.captured_ns;
             if let Some(playout) = &mut self.playout {
-                self.clock.sleep_until_ns(playout.due_ns(ticket.captured_ns, ready_ns));
-                trace.playout_ns = self.clock.now_ns() - ready_ns;
-                self.times.playout.add(trace.playout_ns);
+                clock.sleep_until_ns(playout.due_ns(captured_ns, frame.since_ns));
+                frame.trace.playout_ns = clock.now_ns() - frame.since_ns;
+                self.times.playout.add(frame.trace.playout_ns);
             }
-            let began_ns = ready_ns + trace.playout_ns;
-            trace.age_ns = began_ns.saturating_sub(ticket.captured_ns);
-            let was_given = match self.give(&mut frame.picture, is_cropped, ticket.captured_ns, stamp.time_ns) {
+            let began_ns = frame.since_ns + frame.trace.playout_ns;
+            frame.trace.age_ns = began_ns.saturating_sub(captured_ns);
+            let was_given = match self.give(&mut blurred.picture, is_cropped, captured_ns, frame.stamp.time_ns) {
                 Ok(ControlFlow::Continue(was_given)) => was_given,
                 Ok(ControlFlow::Break(())) => break,
                 Err(error) => {
-                    self.tally.dropped(ticket, Cause::Failed);
+                    tally.dropped(frame.ticket, Cause::Failed);
                     return Err(error.into());
                 }
             };
-            let now_ns = self.clock.now_ns();
-            self.times.sink.add(now_ns - began_ns);
-            self.times.latency.add(now_ns.saturating_sub(ticket.captured_ns));
+            let now_ns = clock.now_ns();
+            self.times.took.add(now_ns - began_ns);
+            self.times.latency.add(now_ns.saturating_sub(captured_ns));
             if let Some(last_ns) = last_ns.replace(now_ns) {
                 self.times.frame.add(now_ns - last_ns);
             }
-            let captured_ns = ticket.captured_ns;
-            note(stamp.index, &frame.coc, &trace);
+            note(frame.stamp.index, &blurred.coc, &frame.trace);
+            let quality = frame.trace.quality;
             // What the sink does not keep is delivered once the viewer took it.
             let kept = was_given && self.sink.keeps();
+            let Frame { ticket, stamp, seek, is_wished, change, is_between, trace, .. } = frame;
             let (done, open) = if self.view.is_none() || kept { (Some(ticket), None) } else { (None, Some(ticket)) };
-            done.into_iter().for_each(|ticket| self.tally.delivered(ticket));
+            done.into_iter().for_each(|ticket| tally.delivered(ticket));
             if let Some(view) = &mut self.view {
-                let Blurred { picture, color, depth, coc } = frame;
-                let frames = self.tally.frames();
-                let item = View { picture, color, depth, coc, stamp, captured_ns, trace, frames };
-                match view.send(item) {
+                let Blurred { picture, color, depth, coc, part } = blurred;
+                let frames = tally.frames();
+                let view_of = View {
+                    picture,
+                    color,
+                    depth,
+                    coc,
+                    stamp,
+                    captured_ns,
+                    part,
+                    change,
+                    is_between,
+                    seek,
+                    is_wished,
+                    trace,
+                    frames,
+                };
+                match view.send(view_of) {
                     // A displaced frame is the one before, which the viewer did not take.
                     Ok(displaced) => self.count_viewed(displaced.is_none(), std::mem::replace(&mut at_viewer, open)),
                     // Nobody knows the fate of this frame, nor of the one before: they stay in flight.
                     Err(link::Abandoned) => return Ok(()),
                 }
             }
-            let frames = self.tally.frames();
-            (self.progress)(Progress {
-                captured: frames.captured,
-                delivered: frames.delivered,
-                dropped: frames.dropped.total(),
-                total: self.total,
-                quality: trace.quality,
-            });
+            self.tell(quality);
         }
         // The viewer still takes the last one.
         self.count_viewed(true, at_viewer);
         Ok(())
+    }
+
+    /// Tells how far the run is, whose last frame had this quality.
+    fn tell(&self, quality: Option<Quality>) {
+        let Shared { tally, info, .. } = self.shared;
+        let frames = tally.frames();
+        (self.progress)(Progress {
+            captured: frames.captured,
+            delivered: frames.delivered,
+            dropped: frames.dropped.total(),
+            total: info.frames,
+            quality,
+        });
+    }
+
+    /// Cuts out the part that goes out, and flips what goes out; whether a part was cut out.
+    fn crop_and_mirror(&mut self, Blurred { picture, part, .. }: &mut Blurred) -> bool {
+        let whole = part.zip(picture.memory());
+        let is_cropped = whole.map(|(part, whole)| self.cropper.crop(whole, &part, &mut self.cropped)).is_some();
+        if self.mirror {
+            let out = if is_cropped { Some(&mut self.cropped) } else { picture.memory_mut() };
+            out.map(mirror);
+        }
+        is_cropped
     }
 
     /// Gives the sink a picture, where that is in memory; `Continue` says whether it was.
@@ -152,8 +175,8 @@ impl Stage<'_> {
     /// Counts a frame whose delivery was up to the viewer: delivered if that took it, else evicted.
     fn count_viewed(&self, taken: bool, ticket: Option<Ticket>) {
         match ticket {
-            Some(ticket) if taken => self.tally.delivered(ticket),
-            Some(ticket) => self.tally.dropped(ticket, Cause::Evicted),
+            Some(ticket) if taken => self.shared.tally.delivered(ticket),
+            Some(ticket) => self.shared.tally.dropped(ticket, Cause::Evicted),
             None => {}
         }
     }

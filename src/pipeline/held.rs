@@ -7,7 +7,7 @@ use crate::optics::CocField;
 
 /// A map that later frames are given, moved as their pictures have. Around a subject it has a matte of its own: what is
 /// behind stays as it was, and the nearer surface's colours follow those of each frame.
-pub(super) struct Held {
+pub(super) struct HeldMap {
     /// Its mixed pixels have the light of the farther surface in place of the difference.
     map: DepthMap,
     light: Box<[f32; 256]>,
@@ -19,7 +19,7 @@ const LEAST_SHARE: f32 = 0.05;
 /// Surfaces move apart from each other whose CoC differs by so many pixels.
 const APART_PX: f32 = 1.0;
 
-impl Held {
+impl HeldMap {
     pub fn new() -> Self {
         Self { map: DepthMap::default(), light: light_of_codes(), motion: Motion::default() }
     }
@@ -128,7 +128,7 @@ mod tests {
     #[test]
     fn a_map_and_its_matte_move_with_the_picture() {
         let (then, now) = (person(0), person(6));
-        let mut held = Held::new();
+        let mut held = HeldMap::new();
         held.keep(&then.1, &then.0, &FIELD);
         let mut given = DepthMap::default();
         held.give(&mut given, &now.0);
@@ -152,7 +152,7 @@ mod tests {
         };
         let mut map = DepthMap { subject_m: Some(1.0), ..DepthMap::new(3, 1) };
         map.matte.pixels = vec![pixel(0, 1.0, 1.0), pixel(1, 0.5, 1.0)];
-        let mut held = Held::new();
+        let mut held = HeldMap::new();
         held.keep(&map, &color, &FIELD);
         let mut given = DepthMap::default();
         held.give(&mut given, &color);
@@ -175,8 +175,8 @@ mod tests {
     fn what_moved_blurs_a_real_motion_more_like_its_own_depth() {
         use crate::computing::Computing;
         use crate::depth::focus::FocusRule;
+        use crate::engine::still::{Depth, blur};
         use crate::look::{Effect, Look, Strength};
-        use crate::pipeline::still::{Depth, blur};
         use crate::recording::still::{read_color, read_depth};
 
         let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("recordings/portrait");
@@ -194,7 +194,7 @@ mod tests {
         let (mut off, mut counts) = ([[0.0; 2]; 2], [0.0; 2]);
         for k in [1, 7, 13, 19] {
             let (then, now) = (frame(k - 1), frame(k));
-            let mut held = Held::new();
+            let mut held = HeldMap::new();
             held.keep(&then.1, &then.0, &CocField::Depth(lens));
             let mut moved = DepthMap::default();
             held.give(&mut moved, &now.0);

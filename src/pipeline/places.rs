@@ -1,7 +1,39 @@
-//! How many buffers a run has.
+//! The buffers of a run, and how many there are.
 
 use crate::bokeh::{BokehError, Settings};
+use crate::capture::Brings;
+use crate::engine::Taken;
+use crate::frame::{ColorImage, DepthMap, GrayImage, YuyvImage};
 use crate::link::LOSSLESS_ITEMS;
+use crate::link::pool::Pool;
+
+/// The buffers: they are made once, and come back when they are dropped.
+pub(super) struct Pools {
+    pub colors: Pool<ColorImage>,
+    pub depths: Pool<DepthMap>,
+    /// The right eye's pictures.
+    pub rights: Pool<GrayImage>,
+    /// Frames as they were taken, where something else stands behind the subject.
+    pub taken: Pool<Taken>,
+    /// Blurred pictures.
+    pub outs: Pool<ColorImage>,
+    pub yuyvs: Pool<YuyvImage>,
+}
+
+impl Pools {
+    /// For pictures of `size` pixels.
+    pub fn new(places: &Places, size: (u32, u32), brings: Brings) -> Self {
+        let picture = || ColorImage::new(size.0, size.1);
+        Self {
+            colors: Pool::new(places.colors(), picture),
+            depths: Pool::new(places.depths(), DepthMap::default),
+            rights: Pool::new(if brings == Brings::RightEye { places.rights() } else { 0 }, GrayImage::default),
+            taken: Pool::new(places.taken(), Taken::default),
+            outs: Pool::new(places.outs(), picture),
+            yuyvs: Pool::new(places.outs(), YuyvImage::default),
+        }
+    }
+}
 
 /// Room for buffers along the way, so that no stage waits for one that another has no need to give back.
 pub(super) struct Places {

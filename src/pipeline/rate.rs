@@ -2,7 +2,7 @@
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use super::held::Held;
+use super::held::HeldMap;
 use crate::budget::Plan;
 use crate::frame::{ColorImage, DepthMap};
 use crate::optics::CocField;
@@ -39,12 +39,12 @@ pub(super) struct Rate<'a> {
     /// The CoC of the last depth, while later frames may share both.
     last: Option<CocField>,
     /// The depth that goes with it.
-    held: Held,
+    held: HeldMap,
 }
 
 impl<'a> Rate<'a> {
     pub(super) fn new(order: &'a Order) -> Self {
-        Self { order, age: 0, last: None, held: Held::new() }
+        Self { order, age: 0, last: None, held: HeldMap::new() }
     }
 
     /// The effort for the next depth.

@@ -37,10 +37,41 @@ pub struct View {
     pub stamp: Stamp,
     /// When it was captured, on the run's clock.
     pub captured_ns: u64,
+    /// The part of it that goes out; `None` is all.
+    pub part: Option<Crop>,
+    /// The number of the last change before it; 0 where there was none.
+    pub change: u64,
+    /// Whether it was blurred by the executor of the look before, as its own was still being made.
+    pub is_between: bool,
+    /// The number of the last wish of a [`Seeker`](crate::capture::Seeker) before it; 0 where there was none.
+    pub seek: u64,
+    /// Whether it is the frame of that wish: it is shown however late it is.
+    pub is_wished: bool,
     /// What it took.
     pub trace: Trace,
     /// The counts of the run up to this frame.
     pub frames: Frames,
+}
+
+impl View {
+    /// A picture that was blurred so, of which nothing else is known.
+    pub fn of(picture: Picture, coc: CocField) -> Self {
+        Self {
+            picture,
+            color: None,
+            depth: None,
+            coc,
+            stamp: Stamp { index: 0, time_ns: 0, captured_ns: None },
+            captured_ns: 0,
+            part: None,
+            change: 0,
+            is_between: false,
+            seek: 0,
+            is_wished: false,
+            trace: Trace::default(),
+            frames: Frames::default(),
+        }
+    }
 }
 
 /// What a frame took on its way, in nanoseconds.
@@ -62,16 +93,6 @@ pub struct Trace {
     pub age_ns: u64,
     /// The blur's passes.
     pub passes: PassTimes,
-    /// The number of the last change before it; 0 where there was none.
-    pub change: u64,
-    /// Whether it was blurred by the executor of the look before, as its own was still being made.
-    pub between: bool,
     /// The rung it was blurred at.
     pub quality: Option<Quality>,
-    /// The number of the last wish of a [`Seeker`](crate::capture::Seeker) before it; 0 where there was none.
-    pub seek: u64,
-    /// The part of it that goes out; `None` is all.
-    pub part: Option<Crop>,
-    /// Whether it is the frame of that wish: it is shown however late it is.
-    pub asked: bool,
 }

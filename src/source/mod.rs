@@ -36,6 +36,7 @@ use opened::Opened;
 pub use options::{DepthChoice, Frames, NetworkFile, OneCamera, PlateFile, Size};
 
 use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 
 use crate::capture::side_by_side::SideBySide;
 use crate::capture::{Brings, Camera, CaptureError};
@@ -45,9 +46,11 @@ use crate::depth::DepthSource;
 use crate::depth::focus::FocusRule;
 use crate::depth::plate::Guide;
 use crate::frame::DepthMap;
-use crate::look::{Effect, Look, Strength};
+use crate::look::{Effect, Known, Look, Strength};
 use crate::optics::StereoRig;
+use crate::pipeline::{Blurring, Run};
 use crate::recording::{Options as Reading, Recording, Scratch};
+use crate::sink::Sink;
 
 /// What depth comes from.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -220,6 +223,12 @@ impl Source {
         let is_made = matches!(self.depth_from, DepthFrom::Networks | DepthFrom::Plate);
         self.depth.is_some() && !is_made && (self.rig.is_none() || REFINES_STEREO)
     }
+
+    /// A run of its frames ([`Run::of`]), which are blurred so, into `sink`, as fast as it goes. `stop` ends the run.
+    pub fn into_run(self, blurring: Blurring, sink: Box<dyn Sink>, stop: &AtomicBool) -> Run<'_> {
+        let measured = self.is_measured();
+        Run { measured, ..Run::of(self.camera, self.depth, blurring, sink, stop) }
+    }
 }
 
 impl Wanted<'_> {
@@ -289,7 +298,7 @@ pub fn fitting_look(look: &Look, depth: &DepthChoice, has_depth: bool) -> Result
     if *depth == DepthChoice::Recorded && !has_depth {
         return SourceError::usage("--depth recorded: the source has no depth");
     }
-    let look = look.for_source(uses_depth);
+    let look = look.for_source(Known { has_depth: uses_depth, ..Known::default() });
     let has_distance = look.effect.follows_depth() || matches!(look.focus, FocusRule::Metres(_));
     if matches!(look.strength, Strength::Lens(_)) && !has_distance {
         return SourceError::usage(

@@ -10,14 +10,6 @@ use super::{Frames, Histogram, NodeUse, OutputUse, Timings};
 /// What a run was made of, after all defaults were resolved.
 #[derive(Clone, Debug, Default)]
 pub struct About {
-    /// `cpu`, `gpu` or `none`.
-    pub backend: String,
-    /// What executed the blur.
-    pub adapter: String,
-    /// What refined their depth, as `backend`.
-    pub refined_by: String,
-    /// What found their mattes, as `backend`.
-    pub matted_by: String,
     /// Where the frames came from.
     pub source: String,
     /// Where they went.
@@ -169,27 +161,29 @@ impl Report {
             }
         };
         stage("decode".into(), &timings.decode);
-        stage("depth".into(), &timings.depth);
-        stage("blur".into(), &timings.blur);
-        for (name, times) in timings.passes.iter() {
+        stage("depth".into(), &timings.depth.took);
+        stage("blur".into(), &timings.blur.took);
+        for (name, times) in timings.blur.passes.iter() {
             stage(format!("blur.{name}"), times);
         }
-        stage("playout".into(), &timings.playout);
-        stage("sink".into(), &timings.sink);
+        stage("playout".into(), &timings.sink.playout);
+        stage("sink".into(), &timings.sink.took);
+        let [backend, adapter] = timings.blur.by.clone();
+        let by = |by: Option<&str>| by.unwrap_or("none").to_owned();
         Self {
             frames,
-            latency_ms: Spread::of(&timings.latency),
-            frame_ms: Spread::of(&timings.frame),
+            latency_ms: Spread::of(&timings.sink.latency),
+            frame_ms: Spread::of(&timings.sink.frame),
             stages_ms: StagesMs(stages),
-            quality: timings.rungs.shares(),
+            quality: timings.blur.rungs.shares(),
             budget_ms: ms(about.budget_ns),
-            misses: timings.misses,
-            depth_held: timings.held,
-            repeats: timings.repeats + about.outputs.iter().map(|output| output.repeats).sum::<u64>(),
-            backend: about.backend,
-            adapter: about.adapter,
-            refined_by: about.refined_by,
-            matted_by: about.matted_by,
+            misses: timings.blur.misses,
+            depth_held: timings.depth.held,
+            repeats: timings.sink.repeats + about.outputs.iter().map(|output| output.repeats).sum::<u64>(),
+            backend,
+            adapter,
+            refined_by: by(timings.depth.refined_by),
+            matted_by: by(timings.depth.matted_by),
             source: about.source,
             sink: about.sink,
             elapsed_s: ms(about.elapsed_ns) / 1000.0,
@@ -291,13 +285,13 @@ mod tests {
         for frame in 0..10u64 {
             let ticket = tally.captured(frame);
             timings.decode.add(2_000_000);
-            timings.blur.add(12_000_000);
-            timings.passes.add("rows", 7_000_000);
-            timings.latency.add(30_000_000 + frame);
+            timings.blur.took.add(12_000_000);
+            timings.blur.passes.add("rows", 7_000_000);
+            timings.sink.latency.add(30_000_000 + frame);
             tally.delivered(ticket);
         }
         for rung in ["fast", "balanced", "balanced", "balanced"] {
-            timings.rungs.add(rung);
+            timings.blur.rungs.add(rung);
         }
         tally.lost(3, Cause::Late);
         let about = About { budget_ns: 33_333_333, elapsed_ns: 500_000_000, cpu_ns: 250_000_000, ..About::default() };
@@ -343,7 +337,7 @@ mod tests {
         empty.write_json(&mut text).unwrap();
         let json: serde_json::Value = serde_json::from_slice(&text).unwrap();
         assert_eq!((&json["quality"], json["latency_ms"].is_null()), (&serde_json::json!({ "switches": 0 }), true));
-        timings.latency.add(5_000_000);
+        timings.sink.latency.add(5_000_000);
         let latency_ms = Report::new(Frames::default(), &timings, About::default()).latency_ms;
         assert_eq!(latency_ms, Some(Spread { p50: 5.0, p95: 5.0, p99: 5.0, max: 5.0 }));
     }

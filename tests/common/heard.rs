@@ -13,7 +13,7 @@ use bokehcam::link::demand::{Demand, Watch};
 use bokehcam::look::{Look, Strength};
 use bokehcam::pipeline::View;
 use bokehcam_window::services::Services;
-use bokehcam_window::session::{Blurred, Session, SessionEvent, Start};
+use bokehcam_window::session::{Session, SessionEvent, Start, Still};
 use bokehcam_window::state::Update;
 
 pub const PATIENCE: Duration = Duration::from_secs(120);
@@ -30,7 +30,7 @@ pub struct Heard {
     pub told: Vec<Update>,
     pub copied: Option<String>,
     /// The frames that stay, in other looks.
-    pub blurred: Vec<Blurred>,
+    pub blurred: Vec<Still>,
     /// Somebody watches while it is held.
     pub watch: Option<Watch>,
     pub demand: Demand,

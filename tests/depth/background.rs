@@ -10,10 +10,10 @@ use bokehcam::color::srgb_to_linear;
 use bokehcam::compute::thread_pool::ThreadPool;
 use bokehcam::depth::background::Background;
 use bokehcam::depth::focus::FocusRule;
+use bokehcam::engine::{CocMaker, Finish};
 use bokehcam::frame::{ColorImage, DepthMap};
 use bokehcam::look::{CocAtInfinity, CocRule};
 use bokehcam::optics::DepthCoc;
-use bokehcam::pipeline::{CocMaker, Finish};
 use common::{color, depth, noise};
 
 const SIZE: (u32, u32) = (160, 96);

@@ -4,9 +4,9 @@ use std::path::Path;
 
 use bokehcam::depth::focus::FocusRule;
 use bokehcam::depth::refine::Refiner;
+use bokehcam::engine::{CocMaker, Finish};
 use bokehcam::frame::{ColorImage, DepthMap};
 use bokehcam::look::{CocAtInfinity, CocRule};
-use bokehcam::pipeline::{CocMaker, Finish};
 use bokehcam::recording::{Options, Recording, Scratch};
 
 const WALL_M: f32 = 3.0;

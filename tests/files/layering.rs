@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Modules of the library by layer, the lowest first, then the crates above it.
-const LAYERS: [&[&str]; 11] = [
+const LAYERS: [&[&str]; 12] = [
     &["names"],
     &["color", "frame", "optics", "clock", "files", "knob"],
     &["compute", "calibration", "layout"],
@@ -12,6 +12,7 @@ const LAYERS: [&[&str]; 11] = [
     &["capture", "depth", "bokeh", "sink"],
     &["look"],
     &["computing"],
+    &["engine"],
     &["pipeline"],
     &["source"],
     // Crates of their own, under `crates/`.

@@ -182,8 +182,8 @@ fn the_first_change_is_known_by_its_number_and_frames_without_one_by_none() {
             looking.join().unwrap()
         });
         assert!(!seen.is_empty());
-        for View { picture, trace, .. } in seen {
-            assert_eq!((picture.memory().unwrap().rgb[0], trace.change), (radius_px as u8, number));
+        for View { picture, change, .. } in seen {
+            assert_eq!((picture.memory().unwrap().rgb[0], change), (radius_px as u8, number));
         }
     }
 }
@@ -264,7 +264,7 @@ fn frames_between_two_looks_are_known() {
             .unwrap();
             looking.join().unwrap()
         });
-        assert!(!seen.is_empty() && seen.iter().all(|view| view.trace.between == between));
+        assert!(!seen.is_empty() && seen.iter().all(|view| view.is_between == between));
     }
 }
 

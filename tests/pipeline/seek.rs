@@ -163,7 +163,7 @@ fn while_nobody_watches_each_wish_brings_its_one_frame_with_its_depth() {
             assert!(began.elapsed() < Duration::from_secs(60), "frame {place} never came");
             std::thread::sleep(Duration::from_millis(1));
         };
-        assert_eq!((view.stamp.index, view.trace.seek, view.trace.asked), (place, number, true));
+        assert_eq!((view.stamp.index, view.seek, view.is_wished), (place, number, true));
         assert_eq!(usize::from(view.color.as_ref().unwrap().rgb[0]), place);
         let depth = view.depth.as_ref().unwrap();
         assert!(depth.metres.iter().all(|&m| (m - 1.0 - 0.1 * place as f32).abs() < 1e-3));
@@ -183,7 +183,7 @@ fn while_nobody_watches_each_wish_brings_its_one_frame_with_its_depth() {
         let began = Instant::now();
         while began.elapsed() < Duration::from_secs(60) {
             if let Some(view) = views.try_recv() {
-                return assert!(view.stamp.index < 9 && view.trace.seek == 4 && !view.trace.asked, "{:?}", view.stamp);
+                return assert!(view.stamp.index < 9 && view.seek == 4 && !view.is_wished, "{:?}", view.stamp);
             }
         }
         panic!("it never went on");

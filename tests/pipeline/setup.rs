@@ -6,10 +6,9 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use bokehcam::budget::Quality;
 use bokehcam::capture::{Brings, Camera};
-use bokehcam::clock::Clock;
 use bokehcam::depth::focus::FocusRule;
 use bokehcam::look::{Effect, Look, Strength};
-use bokehcam::pipeline::{Pace, PipelineError, Progress, Run, run};
+use bokehcam::pipeline::{Blurring, Pace, PipelineError, Progress, Run, run};
 use bokehcam::sink::Sink;
 use bokehcam::stats::Report;
 
@@ -80,42 +79,34 @@ impl Setup {
         let received = Received::default();
         let stop = AtomicBool::new(false);
         let last = Cell::new(None::<Progress>);
+        let camera = FakeCamera {
+            frames: self.frames,
+            next: 0,
+            corrupt_every: self.corrupt_every,
+            brings: self.brings,
+            trouble: self.camera,
+        };
+        let depth = self.depth.map(|trouble| Box::new(FakeDepth(trouble)) as _);
+        let bokeh = self.bokeh.map(|bokeh| Box::new(bokeh) as _);
+        let blurring = Blurring { look: self.look, bokeh, adaptive: false, changes: None };
+        let sink = FakeSink {
+            received: received.clone(),
+            trouble: self.sink,
+            closes_at: self.closes_at,
+            finish_fails: self.finish_fails,
+        };
         let result = run(Run {
-            camera: Box::new(FakeCamera {
-                frames: self.frames,
-                next: 0,
-                corrupt_every: self.corrupt_every,
-                brings: self.brings,
-                trouble: self.camera,
-            }),
-            depth: self.depth.map(|trouble| Box::new(FakeDepth(trouble)) as _),
-            bokeh: self.bokeh.map(|bokeh| Box::new(bokeh) as _),
             threads: 2,
-            look: self.look,
-            adaptive: false,
-            measured: false,
-            changes: None,
-            sink: Box::new(FakeSink {
-                received: received.clone(),
-                trouble: self.sink,
-                closes_at: self.closes_at,
-                finish_fails: self.finish_fails,
-            }),
             pace: self.pace,
             budget_ns: 500_000,
             keep_going: self.keep_going,
-            demand: None,
-            mirror: false,
-            wanted: None,
-            view: None,
-            clock: Clock::system(),
-            stop: &stop,
             progress: &|progress| {
                 last.set(Some(progress));
                 if progress.delivered >= self.stop_after {
                     stop.store(true, Ordering::Relaxed);
                 }
             },
+            ..Run::of(Box::new(camera), depth, blurring, Box::new(sink), &stop)
         });
         let report = match &result {
             Ok(report) => report,

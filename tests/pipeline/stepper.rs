@@ -6,9 +6,10 @@ use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex};
 
 use bokehcam::computing::Computing;
+use bokehcam::engine::Stepper;
 use bokehcam::frame::ColorImage;
 use bokehcam::look::{Effect, Look};
-use bokehcam::pipeline::{self, Run, Stepper};
+use bokehcam::pipeline::{self, Run};
 use bokehcam::recording::{Options, Recording, Scratch};
 use bokehcam::sink::{Sink, SinkError};
 use bokehcam::source::{self, Source};

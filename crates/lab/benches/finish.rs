@@ -12,9 +12,9 @@ use std::process::ExitCode;
 
 use bokehcam::clock::cpu_ns;
 use bokehcam::depth::focus::FocusRule;
+use bokehcam::engine::{CocMaker, Finish};
 use bokehcam::frame::{ColorImage, DepthMap};
 use bokehcam::look::{CocAtInfinity, CocRule};
-use bokehcam::pipeline::{CocMaker, Finish};
 use bokehcam::recording::{Options as Reading, Recording, Scratch};
 use clap::Parser;
 

@@ -2,8 +2,8 @@
 
 use std::time::Instant;
 
+use bokehcam::engine::Stepper;
 use bokehcam::look::{Effect, Look};
-use bokehcam::pipeline::Stepper;
 use bokehcam::recording::depth_covers;
 use bokehcam::source::{DepthChoice, fitting_look};
 use gst::subclass::prelude::*;

@@ -2,10 +2,10 @@
 
 use bokehcam::capture::pixels::Decoder;
 use bokehcam::color::Matrix;
+use bokehcam::engine::Stepper;
 use bokehcam::frame::ColorImage;
 use bokehcam::layout::{FourCc, Layout, Plane, Range, Transfer};
 use bokehcam::look::{Effect, Look};
-use bokehcam::pipeline::Stepper;
 use bokehcam::sink::raw::Encoder;
 use gst::prelude::*;
 use gst_video::VideoInfo;

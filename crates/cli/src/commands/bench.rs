@@ -19,12 +19,12 @@ use bokehcam::bokeh::{Bokeh, BokehError, Job, PassTimes};
 use bokehcam::budget::Quality;
 use bokehcam::compute::Backend;
 use bokehcam::computing::Computing;
+use bokehcam::engine::still::{Depth, coc_and_depth};
 use bokehcam::frame::{ColorImage, DepthMap};
 use bokehcam::link::pool::Pool;
 use bokehcam::look::number::within;
 use bokehcam::look::{COC_AT_INFINITY_PER_HEIGHT, Look, MOST_RADIUS_PX, Strength};
 use bokehcam::optics::CocField;
-use bokehcam::pipeline::still::{Depth, coc_and_depth};
 use bokehcam::source::{self, DepthChoice, Size, SourceName};
 
 /// Frames that are measured where nobody says how many: as many as there is time for.

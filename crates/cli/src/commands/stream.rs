@@ -2,12 +2,14 @@
 
 mod control;
 
+use std::path::Path;
 use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
 use clap::Args;
 
-use control::{Beat, Facts, Looks};
+use control::{Beat, Facts, Looks, Served};
 
 #[cfg(feature = "window")]
 use crate::commands::preview;
@@ -24,16 +26,18 @@ use crate::settings::look;
 use crate::settings::unused;
 use crate::sinks;
 use crate::terminal;
+use bokehcam::capture::SourceInfo;
 use bokehcam::clock::Clock;
 use bokehcam::compute::Backend;
 use bokehcam::computing::Executors;
-use bokehcam::control::{Name, Status};
+use bokehcam::control::{Claim, Name, Status};
 use bokehcam::depth::focus::FocusRule;
 use bokehcam::link::demand::Demand;
-use bokehcam::look::Strength;
-use bokehcam::pipeline::{self, Changes, Pace, Run};
-use bokehcam::sink::{self, Backpressure, Shutter, Target};
+use bokehcam::look::{Look, Strength};
+use bokehcam::pipeline::{self, Blurring, Pace, PipelineError, Run};
+use bokehcam::sink::{self, Backpressure, Release, Shutter, Sink, Target};
 use bokehcam::source::{self, DepthChoice, DepthFrom, Source, SourceName};
+use bokehcam::stats::Report;
 
 /// Blur a camera, a recording, the demonstration or the synthetic scene, frame by frame
 #[derive(Args, Debug)]
@@ -88,7 +92,6 @@ const TO: &str = "pipewire, pipewire:NAME or /dev/videoN (virtual camera), filte
 /// The options do not fit the source, something would be overwritten, or a stage of the pipeline failed.
 pub fn run(command: &StreamCommand, global: &options::Global, given: Given) -> Result<(), CliError> {
     let StreamCommand { parts, .. } = command;
-    let options::Streaming { stream, output, .. } = parts;
     sinks::check(&command.to, parts, &command.source)?;
     #[cfg(feature = "window")]
     if command.to.contains(&Target::Window) {
@@ -102,152 +105,234 @@ pub fn run(command: &StreamCommand, global: &options::Global, given: Given) -> R
             command.name.as_ref(),
         );
     }
+    let options::Streaming { stream, output, .. } = parts;
     report::check(stream.report.as_deref(), output.force, &command.to)?;
     if stream.pace == Some(Pace::Asap) && !command.source.devices().is_empty() {
         let what = "--pace asap: a camera gives its frames when it takes them; leave --pace out";
         return Err(CliError::Usage(what.to_string()));
     }
     let claim = controlled::claim(command.name.as_ref(), "stream")?;
-    let look = look::look(&parts.blur, &parts.computing.quality)?;
-    // Others have the camera while it is open, so that it opens with them alone.
-    let filters = command.to.contains(&Target::Filter);
-    let on_demand = stream.on_demand || filters;
-    let options = source::Options { filters, ..parts.source_options() };
-    let source = Source::open(&command.source, &options, Some(&look))?;
-    let info = source.camera.info();
-    let measured = source.is_measured();
-    let has_depth = source.has_depth() && options.depth_choice != DepthChoice::None;
-    let is_live = info.live || command.to.iter().any(Target::is_live);
-    let pace = stream.pace.unwrap_or(if is_live { Pace::Realtime } else { Pace::Asap });
-    let look = source.fitting_look(&look, &options)?;
-    let adaptive = pace == Pace::Realtime;
-    let unused = unused::Run {
-        source: unused::From::Source(command.source.kind()),
-        depth: source.depth_from,
-        uses_depth: look.effect.follows_depth(),
-        effect: look.effect,
-        lens: matches!(look.strength, Strength::Lens(_)),
-        realtime: adaptive,
-        cpu_only: parts.computing.backend == Backend::Cpu,
-        compresses: command.to.iter().any(|target| matches!(target, Target::Video(_))),
-        window: false,
-    };
-    unused::warn(&given.settings, &unused);
-    if !plausible::warn_of_source(&source, &look, &options)
-        && let Some(map) = source.first_depth.as_ref()
-    {
-        focus::warn_of_focus(&look, info.size, map, source.depth_from == DepthFrom::Units);
+    let opened = Opened::open(command, &given)?;
+    stream_opened(command, global, opened, claim)
+}
+
+/// A source that was opened, and what it decides.
+struct Opened {
+    source: Source,
+    options: source::Options,
+    info: SourceInfo,
+    /// The look, as the source allows it.
+    look: Look,
+    pace: Pace,
+    /// What the warnings about settings to no effect go by.
+    unused: unused::Run,
+}
+
+impl Opened {
+    /// Opens the source, and warns of settings that have no effect on it.
+    fn open(command: &StreamCommand, given: &Given) -> Result<Self, CliError> {
+        let StreamCommand { parts, to, .. } = command;
+        let look = look::look(&parts.blur, &parts.computing.quality)?;
+        let options = source::Options { filters: command.filters(), ..parts.source_options() };
+        let source = Source::open(&command.source, &options, Some(&look))?;
+        let info = source.camera.info();
+        let is_live = info.live || to.iter().any(Target::is_live);
+        let pace = parts.stream.pace.unwrap_or(if is_live { Pace::Realtime } else { Pace::Asap });
+        let look = source.fitting_look(&look, &options)?;
+        let unused = unused::Run {
+            source: unused::From::Source(command.source.kind()),
+            depth: source.depth_from,
+            uses_depth: look.effect.follows_depth(),
+            effect: look.effect,
+            lens: matches!(look.strength, Strength::Lens(_)),
+            realtime: pace == Pace::Realtime,
+            cpu_only: parts.computing.backend == Backend::Cpu,
+            compresses: to.iter().any(|target| matches!(target, Target::Video(_))),
+            window: false,
+        };
+        unused::warn(&given.settings, &unused);
+        if !plausible::warn_of_source(&source, &look, &options)
+            && let Some(map) = source.first_depth.as_ref()
+        {
+            focus::warn_of_focus(&look, info.size, map, source.depth_from == DepthFrom::Units);
+        }
+        Ok(Self { source, options, info, look, pace, unused })
     }
-    let settings = look.settings(info.size, adaptive);
+
+    /// Whether the quality may follow the time there is.
+    fn is_adaptive(&self) -> bool {
+        self.pace == Pace::Realtime
+    }
+}
+
+impl StreamCommand {
+    /// Whether others have the camera while it is open, so that it opens with them alone.
+    fn filters(&self) -> bool {
+        self.to.contains(&Target::Filter)
+    }
+
+    /// Opens the outputs. `noticed` notices who watches, and they end once `stop` is set; `closed` keeps pictures from them.
+    fn outputs(
+        &self,
+        opened: &Opened,
+        noticed: Option<&Demand>,
+        stop: &Arc<AtomicBool>,
+        closed: &Arc<AtomicBool>,
+    ) -> Result<Box<dyn Sink>, CliError> {
+        let options::Streaming { stream, output, .. } = &self.parts;
+        let Opened { info, options, pace, .. } = opened;
+        let sink_options = sink::Options {
+            frames: info.frames,
+            force: output.force,
+            out_size: stream.out_size.map(|size| (size.width, size.height)),
+            threads: options.computing.threads,
+            demand: noticed.cloned(),
+            stands_for: self.source.shared().map(str::to_owned),
+            stop: Arc::clone(stop),
+            ..sink::Options::new(info.size, info.period_ns)
+        };
+        let backpressure = if *pace == Pace::Realtime { Backpressure::DropOldest } else { Backpressure::Block };
+        let sink = sinks::open(&self.to, &sink_options, backpressure, closed)?;
+        // By now the outputs have what was left of them.
+        tell_of_leftovers(self.to.iter().filter(|target| !target.is_camera()).filter_map(Target::path));
+        Ok(sink)
+    }
+
+    /// Says where the frames come from, with which depth, and where they go.
+    fn announce(&self, Opened { source, info, look, .. }: &Opened, to: &str, quiet: bool) {
+        let say = |line: &str| (!quiet).then(|| terminal::say(line));
+        if let Some(networks) = &source.networks {
+            say(&format!("depth by {networks}"));
+        }
+        let is_found = look.effect.follows_depth() && look.focus == FocusRule::Auto;
+        if let Some(persons) = source.persons.as_ref().filter(|_| is_found) {
+            say(&format!("focus on persons by {persons}"));
+        }
+        let takes_whatever = self.parts.blur.takes_whatever_depth();
+        // That a map would be taken is no news to who wants none.
+        if let Some(note) = self.source.note(source).filter(|_| source.has_depth() || takes_whatever) {
+            say(&note);
+        }
+        say(&format!("{}, to {to}{}", info.name, if info.live { "; Ctrl-C ends" } else { "" }));
+        if takes_whatever && !source.has_depth() {
+            unused::warn_of_no_depth(unused::From::Source(self.source.kind()));
+        }
+    }
+
+    /// Answers those who control the run, if it could be claimed; says why not, where somebody may want to.
+    fn serve(
+        &self,
+        claim: Result<Claim, String>,
+        opened: &Opened,
+        (demand, release, beat): (Option<Demand>, Release, Arc<Beat>),
+        looks: Looks,
+        config: Option<&Path>,
+    ) -> Result<Option<Served>, CliError> {
+        let Opened { source, options, info, unused, .. } = opened;
+        let claim = match claim {
+            Ok(claim) => claim,
+            Err(why) => {
+                let is_live = info.live || self.to.iter().any(Target::is_live);
+                if is_live || looks.adaptive || self.name.is_some() {
+                    tracing::warn!("{why}");
+                }
+                return Ok(None);
+            }
+        };
+        let facts = |name: &Name| Facts {
+            status: Status {
+                name: name.to_string(),
+                pid: std::process::id(),
+                command: "stream".into(),
+                source: self.source.to_string(),
+                size: Some(info.size),
+                sinks: self.to.iter().map(Target::to_string).collect(),
+                ..Status::default()
+            },
+            size: info.size,
+            depth_choice: options.depth_choice.clone(),
+            has_depth: source.has_depth() && options.depth_choice != DepthChoice::None,
+            unused: *unused,
+            config: config.map(Path::to_owned),
+            demand,
+            release,
+            beat,
+        };
+        let tray = self.tray.then(|| SettingsFile::load(config)).transpose()?;
+        control::serve(claim, facts, looks, tray.map(|file| file.preset_names())).map(Some)
+    }
+}
+
+/// Runs the opened source into the outputs, while those who know its name control it.
+fn stream_opened(
+    command: &StreamCommand,
+    global: &options::Global,
+    opened: Opened,
+    claim: Result<Claim, String>,
+) -> Result<(), CliError> {
+    let options::Streaming { stream, output, .. } = &command.parts;
+    let (info, computing) = (opened.info.clone(), opened.options.computing.clone());
     pipeline::check_room(info.size, info.frames)?;
+    let adaptive = opened.is_adaptive();
     // What a change of the look needs runs on the same device.
-    let mut executors = Executors::new(options.computing.clone());
-    let bokeh = settings.map(|settings| executors.blur(&settings, info.size)).transpose()?;
+    let mut executors = Executors::new(computing.clone());
+    let make = |settings: &_| executors.blur(settings, info.size);
+    let (blurring, changes) = Blurring::begin(opened.look.clone(), (info.size, adaptive), make)?;
     // Outputs are opened last, so that none is begun where the run cannot start.
     let demand = Demand::new();
+    let on_demand = stream.on_demand || command.filters();
     // Where nobody notices who watches, somebody may at any time.
     let _watch = (!on_demand).then(|| demand.watch());
     let noticed = on_demand.then(|| demand.clone());
     let stop = terminal::stop_flag()?;
-    let sink_options = sink::Options {
-        frames: info.frames,
-        force: output.force,
-        out_size: stream.out_size.map(|size| (size.width, size.height)),
-        threads: options.computing.threads,
-        demand: noticed.clone(),
-        stands_for: command.source.shared().map(str::to_owned),
-        stop: Arc::clone(&stop),
-        ..sink::Options::new(info.size, info.period_ns)
-    };
     report::try_out(stream.report.as_deref())?;
-    let backpressure = if pace == Pace::Realtime { Backpressure::DropOldest } else { Backpressure::Block };
     let closed = Arc::default();
-    let sink = sinks::open(&command.to, &sink_options, backpressure, &closed)?;
-    // By now the outputs have what was left of them.
-    tell_of_leftovers(command.to.iter().filter(|target| !target.is_camera()).filter_map(Target::path));
-
-    if let Some(networks) = source.networks.as_ref().filter(|_| !global.quiet) {
-        terminal::say(&format!("depth by {networks}"));
-    }
-    let is_found = look.effect.follows_depth() && look.focus == FocusRule::Auto;
-    if let Some(persons) = source.persons.as_ref().filter(|_| is_found && !global.quiet) {
-        terminal::say(&format!("focus on persons by {persons}"));
-    }
-    // That a map would be taken is no news to who wants none.
-    let is_wanted = source.has_depth() || parts.blur.takes_whatever_depth();
-    if let Some(note) = command.source.note(&source).filter(|_| is_wanted && !global.quiet) {
-        terminal::say(&note);
-    }
-    if !global.quiet {
-        let ends = if info.live { "; Ctrl-C ends" } else { "" };
-        terminal::say(&format!("{}, to {}{ends}", info.name, sink.describe()));
-    }
-    if parts.blur.takes_whatever_depth() && !source.has_depth() {
-        unused::warn_of_no_depth(unused::From::Source(command.source.kind()));
-    }
-    let guidance = terminal::Guidance::new(source.guide, global);
+    let sink = command.outputs(&opened, noticed.as_ref(), &stop, &closed)?;
+    command.announce(&opened, &sink.describe(), global.quiet);
+    let guidance = terminal::Guidance::new(opened.source.guide.clone(), global);
     let bar = terminal::Progress::new(info.frames, global);
     let period = Duration::from_nanos(info.period_ns);
     let (sink, release) = Shutter::new(sink, info.size, period, demand.clone(), Clock::system(), closed);
-    let (changes, to_come) = Changes::new(look.clone(), info.size, adaptive);
-    if let Some(why) = claim.as_ref().err().filter(|_| is_live || adaptive || command.name.is_some()) {
-        tracing::warn!("{why}");
-    }
     let beat = Arc::new(Beat::default());
-    let facts = |name: &Name| Facts {
-        status: Status {
-            name: name.to_string(),
-            pid: std::process::id(),
-            command: "stream".into(),
-            source: command.source.to_string(),
-            size: Some(info.size),
-            sinks: command.to.iter().map(Target::to_string).collect(),
-            ..Status::default()
-        },
-        size: info.size,
-        depth_choice: options.depth_choice.clone(),
-        has_depth,
-        unused,
-        config: global.config.clone(),
-        demand: noticed,
-        release,
-        beat: Arc::clone(&beat),
-    };
-    let looks = Looks { look: look.clone(), adaptive, changes, executors };
-    let tray = command.tray.then(|| SettingsFile::load(global.config.as_deref())).transpose()?;
-    let tray = tray.map(|file| file.preset_names());
-    let server = claim.ok().map(|claim| control::serve(claim, facts, looks, tray)).transpose()?;
+    let looks = Looks { look: opened.look.clone(), adaptive, changes, executors };
+    let for_others = (noticed, release, Arc::clone(&beat));
+    let server = command.serve(claim, &opened, for_others, looks, global.config.as_deref())?;
+    let pace = opened.pace;
+    let run = opened.source.into_run(blurring, Box::new(sink), &stop);
     let ended = pipeline::run(Run {
-        camera: source.camera,
-        depth: source.depth,
-        bokeh,
-        look,
-        adaptive,
-        measured,
-        threads: options.computing.threads(),
-        changes: server.is_some().then_some(to_come),
-        sink: Box::new(sink),
+        threads: computing.threads(),
+        changes: run.changes.filter(|_| server.is_some()),
         pace,
         budget_ns: stream.budget_ms.map_or(info.period_ns, |ms| (f64::from(ms) * 1e6) as u64),
         keep_going: stream.keep_going,
         demand: Some(demand),
         mirror: stream.mirror,
-        wanted: None,
-        view: None,
-        clock: Clock::system(),
-        stop: &stop,
         progress: &|progress| {
             bar.delivered(progress.delivered);
             beat.note(&progress);
             guidance.tell();
         },
+        ..run
     });
     drop((server, bar));
+    close(ended, stream.report.as_deref(), output.force, global)
+}
+
+/// Writes the report and says what it says.
+///
+/// # Errors
+/// The run failed, or its report cannot be written.
+fn close(
+    ended: Result<Report, PipelineError>,
+    path: Option<&Path>,
+    force: bool,
+    global: &options::Global,
+) -> Result<(), CliError> {
     let (report, ended) = match ended {
         Ok(report) => (Box::new(report), Ok(())),
         Err(failed) => (failed.report, Err(failed.fault.into())),
     };
-    let written = stream.report.as_ref().map_or(Ok(()), |path| report::write(path, &report, output.force));
+    let written = path.map_or(Ok(()), |path| report::write(path, &report, force));
     terminal::say_report(&report, global);
     match (ended, written) {
         // What ended the run is the error to tell.

@@ -5,9 +5,9 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 
 use bokehcam::depth::agreement::Agreement;
+use bokehcam::engine::still::{Depth, coc_and_depth};
 use bokehcam::frame::{ColorImage, DepthMap};
 use bokehcam::look::{Look, Refine};
-use bokehcam::pipeline::still::{Depth, coc_and_depth};
 use bokehcam::recording::still::{read_color, read_depth, write_color, write_depth};
 use tempfile::TempDir;
 

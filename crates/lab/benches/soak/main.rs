@@ -21,16 +21,14 @@ use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-use bokehcam::bokeh::Backend;
+use bokehcam::bokeh::{Backend, Bokeh, BokehError};
 use bokehcam::budget::Quality;
 use bokehcam::clock::Clock;
-use bokehcam::compute::thread_pool::cores;
 use bokehcam::computing::Computing;
-use bokehcam::depth::DepthSource;
 use bokehcam::depth::recorded::Recorded;
 use bokehcam::look::number::OrAuto;
 use bokehcam::look::{Effect, Look, Refine, Strength};
-use bokehcam::pipeline::{self, Pace, Run};
+use bokehcam::pipeline::{self, Blurring, Pace, Run};
 use bokehcam::recording::{Options as Reading, Recording};
 use bokehcam::stats::Report;
 use clap::Parser;
@@ -180,32 +178,25 @@ fn replay(options: &Options, frames: u64) -> Result<(Report, Deliveries), Box<dy
         quality: options.quality.chosen(),
         ..Look::plain(Effect::Dof)
     };
-    let settings = look.settings(size, true).ok_or("there is no blur")?;
     let backend = if options.gpu { Backend::Auto } else { Backend::Cpu };
-    let executor = Computing { backend, ..Computing::default() }.blur(&settings, size)?;
+    let computing = Computing { backend, ..Computing::default() };
+    let make = |settings: &_| -> Result<Box<dyn Bokeh>, BokehError> {
+        Ok(Box::new(Slowed::new(computing.blur(settings, size)?, options.slow)))
+    };
+    let (blurring, _) = Blurring::begin(look, (size, true), make)?;
     let clock = Clock::system();
     let stamps = Stamps::with_room_for(frames as usize);
     let stop = AtomicBool::new(false);
+    let depth = Box::new(Recorded::new(Arc::clone(&recording), &name)?);
+    let camera = Box::new(Looped::new(recording, &name, frames, clock.clone(), stamps.clone()));
+    let sink = Box::new(Stamping::new(clock.clone(), stamps.clone()));
     let report = pipeline::run(Run {
-        depth: Some(Box::new(Recorded::new(Arc::clone(&recording), &name)?) as Box<dyn DepthSource>),
-        camera: Box::new(Looped::new(recording, &name, frames, clock.clone(), stamps.clone())),
-        bokeh: Some(Box::new(Slowed::new(executor, options.slow))),
-        look,
-        adaptive: true,
         measured: true,
-        threads: cores(),
         changes: None,
-        sink: Box::new(Stamping::new(clock.clone(), stamps.clone())),
         pace: Pace::Realtime,
         budget_ns: options.budget_ms.map_or(PERIOD_NS, |ms| (ms * 1e6) as u64),
-        keep_going: false,
-        demand: None,
-        mirror: false,
-        wanted: None,
-        view: None,
         clock,
-        stop: &stop,
-        progress: &|_| {},
+        ..Run::of(camera, Some(depth), blurring, sink, &stop)
     })?;
     Ok((report, stamps.take()))
 }

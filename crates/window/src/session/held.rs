@@ -1,48 +1,35 @@
 //! A picture that stays on the screen, blurred anew with every look.
 
 use super::super::services::Services;
-use bokehcam::bokeh::{self, Bokeh, BokehError};
+use bokehcam::bokeh::BokehError;
 use bokehcam::budget::Quality;
 use bokehcam::depth::focus::FocusRule;
-use bokehcam::frame::{ColorImage, DepthMap};
+use bokehcam::engine::still::{self, Depth};
+use bokehcam::engine::{Blur, Images};
 use bokehcam::look::Look;
 use bokehcam::optics::CocField;
-use bokehcam::pipeline::still::{self, Depth};
 
 /// A frame that stays.
-pub struct Held {
-    /// Different for each frame that stayed.
+#[derive(Clone, Debug)]
+pub struct Still {
+    /// Different for each frame that stayed; the same in another look.
     pub number: u64,
-    /// As it was taken.
-    pub color: ColorImage,
-    /// Its depth, holes filled.
-    pub depth: Option<DepthMap>,
+    /// As it was taken, its depth with holes filled where its look follows depth, and what became of it.
+    pub images: Images,
     /// The radius of every pixel.
     pub coc: CocField,
-    /// Whether it waits for the look that was chosen before it stayed.
-    pub is_behind: bool,
-}
-
-/// The frame in another look.
-#[derive(Debug)]
-pub struct Blurred {
-    /// Of [`Held::number`].
-    pub number: u64,
-    pub picture: ColorImage,
-    /// Its depth, where the look follows depth.
-    pub depth: Option<DepthMap>,
-    pub coc: CocField,
-    /// The number of the change of look.
+    /// The number of the change of look that it is of.
     pub change: u64,
+    /// The rung that it was blurred at.
     pub quality: Option<Quality>,
 }
 
 /// Blurs the frame that stays.
 pub(super) struct HeldBlur {
-    held: Held,
+    held: Still,
     /// The rule of focus at first: while it stays, so does the distance.
     focus: FocusRule,
-    executor: Option<(bokeh::Settings, Box<dyn Bokeh>)>,
+    again: Blur,
 }
 
 /// Shown when a look needs depth that the frame has not.
@@ -50,42 +37,35 @@ const NO_DEPTH: &str = "The picture that stays was taken without depth: let the 
 
 impl HeldBlur {
     /// Nothing is blurred yet; `focus` is the rule of the look that it was blurred in.
-    pub fn new(held: Held, focus: FocusRule) -> Self {
-        Self { held, focus, executor: None }
+    pub fn new(held: Still, focus: FocusRule) -> Self {
+        Self { held, focus, again: Blur::default() }
     }
 
     /// The frame in this look, which is that of the change of this number.
     ///
     /// # Errors
     /// The look needs depth that the frame has not, or the executor cannot be made or fails: one line.
-    pub fn blur(&mut self, look: &Look, change: u64, services: &mut dyn Services) -> Result<Blurred, String> {
-        let Held { number, color, depth, coc, .. } = &self.held;
+    pub fn blur(&mut self, look: &Look, change: u64, services: &mut dyn Services) -> Result<Still, String> {
+        let Still { number, images, coc, .. } = &self.held;
         let fixed = if look.focus == self.focus { look.of_frame(coc, None) } else { look.clone() };
-        let Some(settings) = fixed.settings(color.size(), false) else {
-            let (picture, depth) = (color.clone(), depth.clone());
-            return Ok(Blurred { number: *number, picture, depth, coc: *coc, change, quality: None });
-        };
+        let size = images.color.size();
         let plain = |error: BokehError| match error {
             BokehError::NoDepth => NO_DEPTH.to_owned(),
             error => error.to_string(),
         };
-        let mut color = color.clone();
-        let (coc, staged) = still::coc_and_depth(&fixed, &mut color, depth.clone().map(Depth::Final)).map_err(plain)?;
-        let depth = depth.clone().filter(|_| staged.is_some());
-        if self.executor.as_ref().is_none_or(|(made_for, _)| *made_for != settings) {
-            let executor = services.executor(&settings, color.size())?;
-            self.executor = Some((settings.clone(), executor));
+        let (mut made, mut coc) = (images.clone(), *coc);
+        if fixed.coc_kind().is_some() {
+            let depth = made.depth.take().map(Depth::Final);
+            (coc, made.depth) = still::coc_and_depth(&fixed, &mut made.color, depth).map_err(plain)?;
         }
-        let Some((_, executor)) = &mut self.executor else { return Err(BokehError::Lost.to_string()) };
-        let blurred = still::blur_with(&mut **executor, settings.quality, color, staged, coc);
-        match blurred {
-            Ok(picture) => {
-                Ok(Blurred { number: *number, picture, depth, coc, change, quality: Some(settings.quality) })
-            }
-            Err(error) => {
-                self.executor = None;
-                Err(plain(error))
-            }
+        self.again.follow(&fixed, (size, false), |settings| services.executor(settings, size))?;
+        if let Err(error) = self.again.blur(&mut made, coc) {
+            self.again = Blur::default();
+            return Err(plain(error));
         }
+        // What stands behind the subject is no part of the frame as it was taken.
+        let depth = images.depth.clone().filter(|_| made.depth.is_some());
+        let images = Images { color: images.color.clone(), depth, blurred: made.blurred };
+        Ok(Still { number: *number, images, coc, change, quality: self.again.quality() })
     }
 }

@@ -85,8 +85,9 @@ impl Host {
                         self.adopt(*look);
                     }
                     Order::Do(request) => self.carry_out(request),
-                    Order::Save(still) => self.save(&still),
-                    Order::Hold(held) => self.hold(held.map(|held| *held)),
+                    Order::Save(still, saving) => self.save(&still, &saving),
+                    Order::Hold(still, is_behind) => self.hold(*still, is_behind),
+                    Order::LetGo => self.held = None,
                     Order::Copy(switches) => self.copy(&switches),
                     Order::Wrote(run, notice) => self.on_output(run, &notice),
                     Order::Ended(run, ended) => self.on_run_end(run, *ended),

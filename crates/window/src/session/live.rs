@@ -7,13 +7,13 @@ use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
 use super::super::services::{Opened, Services};
-use super::super::state::{Known, Output, Running, Source, fitted};
+use super::super::state::{Output, Running, Source};
 use super::{News, SessionEvent, Start};
 use bokehcam::clock::Clock;
 use bokehcam::depth::plate::Guide;
 use bokehcam::link;
-use bokehcam::look::Look;
-use bokehcam::pipeline::{self, Changes, Pace, PipelineError, Run};
+use bokehcam::look::{Known, Look};
+use bokehcam::pipeline::{self, Blurring, Changes, Pace, PipelineError, Run};
 use bokehcam::sink::Sink;
 use bokehcam::sink::switch::Notice;
 use bokehcam::sink::{Shutter, Switchboard, Tee};
@@ -49,48 +49,36 @@ impl Live {
         ended: impl FnOnce(Result<Report, PipelineError>) + Send + 'static,
     ) -> Result<(Self, Source), String> {
         let Opened { name, source, has_depth, ways, way, camera: facts, .. } = opened;
-        let measured = source.is_measured();
-        let bokehcam::source::Source { camera, depth, guide, depth_from, .. } = source;
-        let info = camera.info();
+        let (info, seeker) = (source.camera.info(), source.camera.seeker());
+        let (guide, depth_from) = (source.guide.clone(), source.depth_from);
         let kind = SourceName::from_str(&name).map_or(Kind::default(), |name| name.kind());
         let known = Known { has_depth, is_relative: facts.is_relative, size: info.size };
-        let look = fitted(&start.look, known);
-        let made_for = look.settings(info.size, ADAPTIVE);
-        let bokeh = made_for.as_ref().map(|made_for| start.services.executor(made_for, info.size)).transpose()?;
-        let executor = bokeh.as_ref().map_or_else(|| "no blur".into(), |bokeh| bokeh.describe());
+        let look = start.look.for_source(known);
+        let (blurring, changes) =
+            Blurring::begin(look, (info.size, ADAPTIVE), |settings| start.services.executor(settings, info.size))?;
+        let executor = blurring.bokeh.as_ref().map_or_else(|| "no blur".into(), |bokeh| bokeh.describe());
         let (budget_ns, threads) = (start.budget_ns.unwrap_or(info.period_ns), start.threads);
         let (switch, board) = Tee::switched("window", wrote);
         let period = Duration::from_nanos(info.period_ns);
         let (demand, off) = (start.demand.clone(), Arc::clone(&start.off));
         let (sink, release) = Shutter::new(Box::new(switch), info.size, period, demand, Clock::system(), off);
         *start.release.lock().unwrap_or_else(PoisonError::into_inner) = Some(release);
-        let (changes, to_come) = Changes::new(look.clone(), info.size, ADAPTIVE);
         let (view, views) = link::live();
         let stop = Arc::new(AtomicBool::new(false));
         let (stopped, wake, keep_going) = (Arc::clone(&stop), Arc::clone(&news.wake), start.keep_going);
         let (wanted, demand) = (Arc::clone(&start.wanted), start.demand.clone());
-        news.send(SessionEvent::Views(views, guide.clone(), camera.seeker()));
+        news.send(SessionEvent::Views(views, guide.clone(), seeker));
         let run = move || {
             pipeline::run(Run {
-                camera,
-                depth,
-                bokeh,
-                look,
-                adaptive: ADAPTIVE,
-                measured,
                 threads,
-                changes: Some(to_come),
-                sink: Box::new(sink),
                 pace: Pace::Realtime,
                 budget_ns,
                 keep_going,
                 demand: Some(demand),
-                mirror: false,
                 wanted: Some(wanted),
                 view: Some(view),
-                clock: Clock::system(),
-                stop: &stopped,
                 progress: &|_| wake(),
+                ..source.into_run(blurring, Box::new(sink), &stopped)
             })
         };
         let thread = thread::Builder::new().name("pipeline".into()).spawn(move || {
@@ -123,15 +111,15 @@ impl Live {
 
     /// The look as far as the source allows it.
     pub(super) fn effective(&self, look: &Look) -> Look {
-        fitted(look, self.known)
+        look.for_source(self.known)
     }
 
-    /// Blurs with this look from now on; its frames carry this number.
+    /// Blurs with this look from now on, which the source [allows](Self::effective); its frames carry this number.
     ///
     /// # Errors
     /// Its executor cannot be made: one line. The one before goes on.
-    pub(super) fn adopt(&mut self, look: &Look, number: u64, services: &mut dyn Services) -> Result<(), String> {
-        let (look, size) = (self.effective(look), self.size);
+    pub(super) fn adopt(&mut self, look: Look, number: u64, services: &mut dyn Services) -> Result<(), String> {
+        let size = self.size;
         self.changes.adopt(look, number, |settings| {
             let began = Instant::now();
             let bokeh = services.executor(settings, size)?;

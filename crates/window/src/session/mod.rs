@@ -12,21 +12,18 @@ use std::sync::{Arc, Mutex};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
-pub use held::{Blurred, Held};
+pub use held::Still;
 use host::Host;
 
 use super::services::{Services, Switch};
 use super::state::{Output, Request, Update};
-use bokehcam::budget::Quality;
 use bokehcam::capture::Seeker;
 use bokehcam::control::Answer;
 use bokehcam::depth::plate::Guide;
 use bokehcam::files::user_folders::{self as folders, Folders};
-use bokehcam::frame::{ColorImage, DepthMap};
 use bokehcam::link::Receiver;
 use bokehcam::link::demand::Demand;
 use bokehcam::look::Look;
-use bokehcam::optics::CocField;
 use bokehcam::pipeline::{PipelineError, View, Wanted};
 use bokehcam::sink::Release;
 use bokehcam::sink::switch::Notice;
@@ -77,23 +74,11 @@ pub enum SessionEvent {
     /// A text for the clipboard.
     Copy(String),
     /// The frame that stays, in another look.
-    Blurred(Box<Blurred>),
+    Blurred(Box<Still>),
 }
 
-/// A frame to be saved.
-pub struct Still {
-    /// After the blur.
-    pub picture: ColorImage,
-    /// As it was taken.
-    pub color: ColorImage,
-    /// Its depth, holes filled.
-    pub depth: Option<DepthMap>,
-    /// The radius of every pixel.
-    pub coc: CocField,
-    /// The number of the change of look that it is of.
-    pub change: u64,
-    /// The rung that it was blurred at.
-    pub quality: Option<Quality>,
+/// How a frame is saved.
+pub struct Saving {
     /// Whether what it was made from is saved beside it.
     pub with_sources: bool,
     /// Who asked for it from outside.
@@ -119,8 +104,9 @@ pub struct Closed {
 /// What a session is to do.
 enum Order {
     Do(Request),
-    Save(Box<Still>),
-    Hold(Option<Box<Held>>),
+    Save(Box<Still>, Saving),
+    Hold(Box<Still>, bool),
+    LetGo,
     Copy(Vec<Switch>),
     /// What became of an output of the run of this number.
     Wrote(u64, Notice),
@@ -156,13 +142,20 @@ impl Session {
         let _ = self.orders.send(Order::Do(request));
     }
 
-    pub fn save(&self, still: Still) {
-        let _ = self.orders.send(Order::Save(Box::new(still)));
+    /// Asks for a frame to be saved.
+    pub fn save(&self, still: Still, saving: Saving) {
+        let _ = self.orders.send(Order::Save(Box::new(still), saving));
     }
 
-    /// This frame stays: it is to be blurred anew with every look, until there is none.
-    pub fn hold(&self, held: Option<Held>) {
-        let _ = self.orders.send(Order::Hold(held.map(Box::new)));
+    /// This frame stays: it is to be blurred anew with every look, until it is [let go](Self::let_go); at once if it `is_behind`,
+    /// as it still waits for the look that was chosen before it stayed.
+    pub fn hold(&self, still: Still, is_behind: bool) {
+        let _ = self.orders.send(Order::Hold(Box::new(still), is_behind));
+    }
+
+    /// No frame stays any more.
+    pub fn let_go(&self) {
+        let _ = self.orders.send(Order::LetGo);
     }
 
     /// Asks for the equivalent command, for the clipboard; `switches` are the window's options.

@@ -1,45 +1,40 @@
-//! A look as far as a source allows it.
+//! The look as far as the source allows it.
 
-use super::tweak;
-use bokehcam::depth::focus::FocusRule;
-use bokehcam::look::{Look, Strength};
+use super::{Source, State};
+use bokehcam::look::{Effect, Known, Look};
 
-/// What a source knows of depth.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Known {
-    /// Whether it has any.
-    pub has_depth: bool,
-    /// Whether that is relative: nothing of it is known in metres.
-    pub is_relative: bool,
-    /// Width and height of its pictures.
-    pub size: (u32, u32),
-}
-
-/// The look as far as a source allows it. With relative depth there are no metres:
-/// the subject is in focus in place of a distance, and a lens blurs as much by amount.
-pub fn fitted(look: &Look, known: Known) -> Look {
-    let mut look = look.for_source(known.has_depth);
-    if known.has_depth && known.is_relative {
-        if let Strength::Lens(lens) = look.strength {
-            look.strength = tweak::strength_of(tweak::amount_of(lens, NEAREST_M, known.size));
-        }
-        if matches!(look.focus, FocusRule::Metres(_)) {
-            look.focus = FocusRule::Auto;
-        }
-        look.focus_range_m = 0.0;
+impl State {
+    /// What is known of depth.
+    pub fn known(&self) -> Known {
+        let size = match &self.source {
+            Source::Running(running) => running.size,
+            _ => (1280, 720),
+        };
+        let is_relative = self.camera.is_relative && matches!(self.source, Source::Running(_));
+        Known { has_depth: self.may_have_depth(), is_relative, size }
     }
-    look
-}
 
-/// Where relative depth puts what is nearest.
-const NEAREST_M: f32 = 1.0;
+    /// The look to be kept for the next time: as it was chosen, whatever this source has not.
+    pub fn chosen_look(&self) -> Look {
+        let is_fitted = self.fitted && self.look.effect == Effect::Blur;
+        Look { effect: if is_fitted { Effect::Auto } else { self.look.effect }, ..self.look.clone() }
+    }
+
+    /// A look as far as the source allows it; remembers if that changed its effect.
+    pub(super) fn fitting(&mut self, look: Look) -> Look {
+        let fitting = look.for_source(self.known());
+        self.fitted |= fitting.effect != look.effect;
+        fitting
+    }
+}
 
 #[cfg(test)]
 mod tests {
     use super::super::sample::{look, running, state};
-    use super::super::{Action, Camera, Request, Update};
+    use super::super::{Action, Camera, Request, Update, tweak};
     use super::*;
-    use bokehcam::look::Patch;
+    use bokehcam::depth::focus::FocusRule;
+    use bokehcam::look::{Patch, Strength};
 
     #[test]
     fn where_depth_is_relative_no_look_has_metres() {
@@ -67,7 +62,7 @@ mod tests {
         for focus_m in [0.7, 1.24, 3.0] {
             look.strength = Strength::Lens(tweak::lens_of(&look, focus_m, size));
             let Strength::Lens(lens) = look.strength else { unreachable!() };
-            look.strength = tweak::strength_of(tweak::amount_of(lens, focus_m, size));
+            look.strength = Strength::of_share(tweak::amount_of(lens, focus_m, size));
             assert_eq!(look, Look::default(), "focused at {focus_m} m");
         }
     }

@@ -1,8 +1,8 @@
 //! How the session's updates change the state.
 
 use super::apply::NO_METRES;
-use super::{Request, Shown, Source, State, Update, fitted};
-use bokehcam::look::{Effect, Look};
+use super::{Request, Shown, Source, State, Update};
+use bokehcam::look::Look;
 
 impl State {
     /// Applies an update of the session; gives back the request for another look where a new source needs one.
@@ -44,10 +44,10 @@ impl State {
         }
         let chosen = match &self.source {
             // A portrait that was given up for want of depth comes back, unless another effect was chosen since.
-            Source::Running(running) if running.has_depth && self.fitted => {
+            Source::Running(running) if running.has_depth => {
+                let chosen = self.chosen_look();
                 self.fitted = false;
-                let still_fitted = self.look.effect == Effect::Blur;
-                Look { effect: if still_fitted { Effect::Auto } else { self.look.effect }, ..self.look.clone() }
+                chosen
             }
             _ => self.look.clone(),
         };
@@ -59,18 +59,5 @@ impl State {
             self.look = look;
             Request::Look(Box::new(self.look.clone()))
         })
-    }
-
-    /// The look to be kept for the next time: as it was chosen, whatever this source has not.
-    pub fn chosen_look(&self) -> Look {
-        let is_fitted = self.fitted && self.look.effect == Effect::Blur;
-        Look { effect: if is_fitted { Effect::Auto } else { self.look.effect }, ..self.look.clone() }
-    }
-
-    /// A look as far as the source allows it; remembers if that changed its effect.
-    pub(super) fn fitting(&mut self, look: Look) -> Look {
-        let fitting = fitted(&look, self.known());
-        self.fitted |= fitting.effect != look.effect;
-        fitting
     }
 }

@@ -24,7 +24,6 @@ use std::path::PathBuf;
 pub use action::{Action, Request, Update};
 pub use apply::NO_VIRTUAL_CAMERA;
 pub use camera::Camera;
-pub use fitting::{Known, fitted};
 pub use habits::{Habits, TEXT_SCALES};
 pub use history::History;
 pub use transport::Transport;
@@ -280,16 +279,6 @@ impl State {
     /// Whether the panel shows all there is.
     pub fn shows_more(&self) -> bool {
         self.habits.sections.get("More").copied().unwrap_or(false)
-    }
-
-    /// What is known of depth.
-    pub fn known(&self) -> Known {
-        let size = match &self.source {
-            Source::Running(running) => running.size,
-            _ => (1280, 720),
-        };
-        let is_relative = self.camera.is_relative && matches!(self.source, Source::Running(_));
-        Known { has_depth: self.may_have_depth(), is_relative, size }
     }
 
     /// Whether the source is a photo.

@@ -78,14 +78,6 @@ fn percent(share: f32) -> f32 {
     (share * 1e4).round() / 1e2
 }
 
-/// The strength without a lens that blurs by this share: the usual one where it is as good as that.
-pub fn strength_of(share: f32) -> Strength {
-    match percent(share) {
-        usual if (usual - percent(COC_AT_INFINITY_PER_HEIGHT)).abs() < 0.011 => Strength::Default,
-        other => Strength::Percent(other.min(MAX_COC_PER_HEIGHT * 100.0)),
-    }
-}
-
 /// The lens of a look, or the one that blurs as much while focused at `focus_m`, as far as there is one.
 pub fn lens_of(look: &Look, focus_m: f32, size: (u32, u32)) -> Lens {
     match (look.strength, amount(look, size.1)) {

@@ -3,11 +3,10 @@ use crate::state::sample;
 use bokehcam::bokeh::Picture;
 use bokehcam::bokeh::plan::Plan;
 use bokehcam::budget::Quality;
-use bokehcam::frame::{DepthMap, Stamp};
+use bokehcam::frame::DepthMap;
 use bokehcam::link::pool::Pool;
 use bokehcam::optics::{CocField, DepthCoc, Ramp};
 use bokehcam::pipeline::Trace;
-use bokehcam::stats::Frames;
 
 const LENS: DepthCoc = DepthCoc { coc_at_infinity_px: 16.0, focus_m: 2.0, range_m: 0.0, max_coc_px: 43.0 };
 
@@ -22,14 +21,9 @@ fn view(size: (u32, u32), map: (u32, u32), coc: CocField) -> View {
         depth
     });
     View {
-        picture: Picture::in_memory(pictures.take()),
-        color: None,
         depth: Some(maps.take()),
-        coc,
-        stamp: Stamp { index: 0, time_ns: 0, captured_ns: None },
-        captured_ns: 0,
         trace: Trace { quality: Some(Quality::Balanced), ..Trace::default() },
-        frames: Frames::default(),
+        ..View::of(Picture::in_memory(pictures.take()), coc)
     }
 }
 

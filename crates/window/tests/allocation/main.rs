@@ -70,7 +70,6 @@ fn window() {
     use bokehcam::bokeh::Picture;
     use bokehcam::optics::{CocField, DepthCoc};
     use bokehcam::pipeline::{Trace, View};
-    use bokehcam::stats::Frames;
     use bokehcam_window::meters::Meters;
     use bokehcam_window::present::{Area, Drawing, Image, soft::Painter};
     use bokehcam_window::state::Shown;
@@ -79,14 +78,10 @@ fn window() {
     let (picture, depth) = (noise(160, 90), three_depths(160, 90));
     let lens = DepthCoc { coc_at_infinity_px: 6.0, focus_m: 1.5, range_m: 0.0, max_coc_px: 12.0 };
     let view = View {
-        picture: Picture::in_memory(Pooled::detached(picture.clone())),
-        color: Some(Pooled::detached(picture)),
+        color: Some(Pooled::detached(picture.clone())),
         depth: Some(Pooled::detached(depth)),
-        coc: CocField::Depth(lens),
-        stamp: Stamp { index: 0, time_ns: 0, captured_ns: None },
-        captured_ns: 0,
         trace: Trace { quality: Some(Quality::Fast), ..Trace::default() },
-        frames: Frames::default(),
+        ..View::of(Picture::in_memory(Pooled::detached(picture)), CocField::Depth(lens))
     };
     let settings = settings(COC_KINDS[2]);
     let (mut views, mut meters) = (Views::default(), Meters::default());

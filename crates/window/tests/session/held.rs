@@ -5,12 +5,13 @@ use std::time::{Duration, Instant};
 use bokehcam::computing::Computing;
 use bokehcam::depth::backdrop::Behind;
 use bokehcam::depth::focus::FocusRule;
+use bokehcam::engine::Images;
+use bokehcam::engine::still::{self as engine_still, Depth};
 use bokehcam::frame::ColorImage;
 use bokehcam::look::{Effect, Look, Strength};
 use bokehcam::optics::CocField;
 use bokehcam::pipeline::View;
-use bokehcam::pipeline::still::{self, Depth};
-use bokehcam_window::session::{Blurred, Held};
+use bokehcam_window::session::Still;
 use bokehcam_window::state::{Output, Request, Update};
 
 use super::heard::{PATIENCE, look};
@@ -28,17 +29,16 @@ fn holding(source: &str) -> (Watched, View) {
 }
 
 fn hold(watched: &Watched, view: &View) {
-    watched.session.hold(Some(Held {
-        number: 7,
-        color: view.color.as_deref().unwrap().clone(),
-        depth: view.depth.as_deref().cloned(),
-        coc: view.coc,
-        is_behind: false,
-    }));
+    let (color, depth) = (view.color.as_deref().unwrap().clone(), view.depth.as_deref().cloned());
+    watched.session.hold(still(7, Images { color, depth, ..Images::default() }, view.coc), false);
+}
+
+fn still(number: u64, images: Images, coc: CocField) -> Still {
+    Still { number, images, coc, change: 0, quality: None }
 }
 
 /// The frame in another look.
-fn in_look(watched: &mut Watched, look: &Look) -> Blurred {
+fn in_look(watched: &mut Watched, look: &Look) -> Still {
     watched.session.order(Request::Look(Box::new(look.clone())));
     let began = Instant::now();
     loop {
@@ -71,13 +71,13 @@ fn a_frame_that_stays_is_blurred_as_each_look_says() {
         let focus = if wanted.focus == look().focus { FocusRule::Metres(coc.focus_m) } else { wanted.focus };
         let depth = view.depth.as_deref().cloned().map(Depth::Final);
         let same = Look { focus, ..wanted.clone() };
-        let (picture, _) = still::blur(&same, color.clone(), depth, &Computing::default()).unwrap();
-        assert_eq!(blurred.picture.rgb, picture.rgb, "{wanted:?}");
-        assert_ne!(blurred.picture.rgb, view.picture.memory().unwrap().rgb);
+        let (picture, _) = engine_still::blur(&same, color.clone(), depth, &Computing::default()).unwrap();
+        assert_eq!(blurred.images.blurred.rgb, picture.rgb, "{wanted:?}");
+        assert_ne!(blurred.images.blurred.rgb, view.picture.memory().unwrap().rgb);
     }
     let plain = in_look(&mut watched, &Look { effect: Effect::None, ..look() });
-    assert_eq!((plain.picture.rgb, plain.quality), (color.rgb.clone(), None));
-    watched.session.hold(None);
+    assert_eq!((plain.images.blurred.rgb, plain.quality), (color.rgb.clone(), None));
+    watched.session.let_go();
     watched.session.order(Request::Look(Box::new(look())));
     watched.frame("the next frames come in the look", |view| matches!(view.coc, CocField::Depth(_)));
     assert!(watched.blurred.is_empty());
@@ -92,17 +92,18 @@ fn what_stood_behind_a_frame_that_stays_is_taken_away_again() {
     let view = watched.frame("a green one", |view| is_green(view.picture.memory().unwrap()));
     assert!(!is_green(view.color.as_deref().unwrap()), "the picture as the camera gave it");
     hold(&watched, &view);
-    assert!(!is_green(&in_look(&mut watched, &look()).picture));
+    assert!(!is_green(&in_look(&mut watched, &look()).images.blurred));
     let other = [200, 0, 99];
     let blurred = in_look(&mut watched, &Look { behind: Behind::Color(other), ..look() });
-    assert!(blurred.picture.rgb.as_chunks().0.contains(&other) && !is_green(&blurred.picture));
+    assert!(blurred.images.blurred.rgb.as_chunks().0.contains(&other) && !is_green(&blurred.images.blurred));
 }
 
 #[test]
 fn a_frame_without_depth_says_so_when_depth_is_needed() {
     let (mut watched, view) = holding("32");
     let color = view.color.as_deref().unwrap().clone();
-    watched.session.hold(Some(Held { number: 8, color, depth: None, coc: view.coc, is_behind: false }));
+    let images = Images { color, ..Images::default() };
+    watched.session.hold(still(8, images, view.coc), false);
     watched.session.order(Request::Look(Box::new(Look { strength: Strength::AtInfinity(3.0), ..look() })));
     watched.until("why not", |told| matches!(told, Update::Note(line) if line.contains("without depth")));
     let even = in_look(&mut watched, &Look { effect: Effect::Blur, ..look() });
@@ -114,7 +115,7 @@ fn the_last_frame_of_a_source_that_ended_follows_the_look() {
     let (mut watched, _) = holding("32 no more");
     watched.until("its end", |told| matches!(told, Update::Source(bokehcam_window::state::Source::Ended)));
     let blurred = in_look(&mut watched, &Look { strength: Strength::AtInfinity(4.0), ..look() });
-    assert!(blurred.depth.is_some());
+    assert!(blurred.images.depth.is_some());
 }
 
 #[test]

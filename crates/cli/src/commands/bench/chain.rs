@@ -18,10 +18,10 @@ use bokehcam::clock::{Clock, cpu_ns};
 use bokehcam::compute::{Backend, thread_pool::cores};
 use bokehcam::computing::{Computing, Executors};
 use bokehcam::depth::Seen;
+use bokehcam::engine::{CocMaker, Finish};
 use bokehcam::frame::{ColorImage, DepthMap, GrayImage, Stamp};
 use bokehcam::link::pool::Pooled;
 use bokehcam::look::{BackgroundMemory, Look, Strength};
-use bokehcam::pipeline::{CocMaker, Finish};
 use bokehcam::sink::yuyv::Encoder;
 use bokehcam::source::{self, DepthFrom, Frames, Kind, Source, SourceName};
 

@@ -15,10 +15,10 @@ use bokehcam::bokeh::plan::{Bin, Plan};
 use bokehcam::bokeh::{Bokeh, Probe};
 use bokehcam::compute::Backend;
 use bokehcam::computing::Computing;
+use bokehcam::engine::still::{Depth, coc_and_depth};
 use bokehcam::frame::{ColorImage, DepthMap};
 use bokehcam::look::Look;
 use bokehcam::optics::CocField;
-use bokehcam::pipeline::still::{Depth, coc_and_depth};
 use bokehcam::recording::still;
 
 /// The file of numbers, which is always written, even where nothing is blurred.

@@ -25,10 +25,10 @@ use crate::terminal;
 use bokehcam::compute::Backend;
 use bokehcam::depth::agreement::Agreement;
 use bokehcam::depth::misfit::Misfit;
+use bokehcam::engine::{self, still::Depth};
 use bokehcam::files::place;
 use bokehcam::frame::{ColorImage, DepthMap};
 use bokehcam::look::{ApertureName, Look, Refine, Strength};
-use bokehcam::pipeline::{self, still::Depth};
 use bokehcam::recording::snapshot;
 use bokehcam::recording::still::{self, MapFormat, PhotoFormat};
 use bokehcam::source::options::DepthUnit;
@@ -130,7 +130,7 @@ pub fn run(command: &RenderCommand, global: &options::Global, given: &Given) -> 
     tell_of_leftovers([command.out.as_path()]);
     let (result, executor) = match &command.debug_dir {
         Some(dir) => debug::blurred(color, depth, &look, &computing, (dir, command.output.force))?,
-        None => pipeline::still::blur(&look, color, depth, &computing)?,
+        None => engine::still::blur(&look, color, depth, &computing)?,
     };
     // The thumbnail in the photo's metadata would show what the blur hides.
     let mut extras = extras.without_thumbnail();

@@ -4,7 +4,7 @@ use egui::Ui;
 
 use super::Sheet;
 use crate::panel::parts::{Number, choose, remark};
-use crate::state::tweak::{F_NUMBERS, LENS, amount, amount_of, f_number_of, lens_of, strength_of};
+use crate::state::tweak::{F_NUMBERS, LENS, amount, amount_of, f_number_of, lens_of};
 use crate::texts::tr_with;
 use bokehcam::look::{MAX_COC_PER_HEIGHT, Strength};
 use bokehcam::optics::Lens;
@@ -25,7 +25,7 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
         match (chosen, sheet.look.strength) {
             (Some(true), _) => sheet.look.strength = Strength::Lens(lens_of(&sheet.look, focus_m, sheet.size)),
             (Some(false), Strength::Lens(lens)) => {
-                sheet.look.strength = strength_of(amount_of(lens, focus_m, sheet.size));
+                sheet.look.strength = Strength::of_share(amount_of(lens, focus_m, sheet.size));
             }
             _ => {}
         }

@@ -1,8 +1,9 @@
 //! The looks of a session: those to come, and those that frames on the screen are of.
 
-use super::super::{SessionEvent, Still, held};
+use super::super::{Saving, SessionEvent, Still, held};
 use super::Host;
 use bokehcam::control::Answer;
+use bokehcam::engine::Images;
 use bokehcam::files::user_folders as folders;
 use bokehcam::look::{Look, Patch};
 use bokehcam::recording::snapshot::{self, Snapshot};
@@ -16,14 +17,15 @@ impl Host {
     pub(super) fn adopt(&mut self, look: Look) {
         self.start.look = look;
         let number = self.looks.back().map_or(0, |(last, _)| last + 1);
-        self.looks.push_back((number, self.effective_look()));
+        let look = self.effective_look();
+        self.looks.push_back((number, look.clone()));
         if self.looks.len() > KEPT_LOOKS {
             self.looks.pop_front();
         }
         // What is on the screen comes first.
         self.blur_held();
         if let Some(live) = &mut self.live
-            && let Err(line) = live.adopt(&self.start.look, number, &mut *self.start.services)
+            && let Err(line) = live.adopt(look, number, &mut *self.start.services)
         {
             self.news.note(line);
         }
@@ -34,10 +36,9 @@ impl Host {
         self.live.as_ref().map_or_else(|| self.start.look.clone(), |live| live.effective(&self.start.look))
     }
 
-    /// Keeps the frame that stays from now on, or lets it go.
-    pub(super) fn hold(&mut self, held: Option<held::Held>) {
-        let is_behind = held.as_ref().is_some_and(|held| held.is_behind);
-        self.held = held.map(|held| held::HeldBlur::new(held, self.start.look.focus));
+    /// Keeps the frame that stays from now on.
+    pub(super) fn hold(&mut self, still: Still, is_behind: bool) {
+        self.held = Some(held::HeldBlur::new(still, self.start.look.focus));
         if is_behind {
             self.blur_held();
         }
@@ -54,11 +55,11 @@ impl Host {
     }
 
     /// Saves a snapshot with the settings that repeat it: those of the look that its frame was blurred with.
-    pub(super) fn save(&self, still: &Still) {
+    pub(super) fn save(&self, still: &Still, Saving { with_sources, order }: &Saving) {
         let its_look = self.looks.iter().rev().find(|(number, _)| *number <= still.change);
         let look = its_look.map_or(&self.start.look, |(_, look)| look);
         let settings = Patch::of(&look.of_frame(&still.coc, still.quality)).values();
-        let Still { picture, color, depth, order, with_sources, .. } = still;
+        let Images { color, depth, blurred: picture } = &still.images;
         let sources = with_sources.then_some((color, depth.as_ref()));
         let snapshot = Snapshot { picture, sources, settings: &settings };
         let saved = match order.as_ref().and_then(|order| order.to.as_deref()) {

@@ -30,7 +30,7 @@ impl App {
     /// Takes note of what the controls show of a frame.
     pub(super) fn learn_from(&mut self, view: &View) {
         self.state.focus_m = focus_m(&view.coc);
-        let (between, part) = (view.trace.between, view.trace.part);
+        let (between, part) = (view.is_between, view.part);
         if (self.state.between, self.state.part) != (between, part) {
             (self.state.between, self.state.part) = (between, part);
             self.layout_at = Some(Instant::now());

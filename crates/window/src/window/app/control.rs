@@ -135,7 +135,7 @@ impl App {
         self.heard_at = Instant::now();
         if off {
             (self.view, self.held, self.snapshot_due) = (None, None, false);
-            self.session.hold(None);
+            self.session.let_go();
         }
     }
 

@@ -3,9 +3,10 @@
 use std::time::{Duration, Instant};
 
 use super::App;
-use crate::session::{Blurred, Held};
+use crate::session::Still;
 use crate::state::Source;
 use bokehcam::bokeh::Picture;
+use bokehcam::engine::Images;
 use bokehcam::link::pool::Pooled;
 use bokehcam::look::Look;
 use bokehcam::optics::CocField;
@@ -22,27 +23,21 @@ impl App {
     pub(super) fn hold(&mut self) {
         if !self.state.keeps_picture() {
             if self.held.take().is_some() {
-                self.session.hold(None);
+                self.session.let_go();
             }
             return;
         }
-        let Some(view) = self.view.as_mut().filter(|_| self.held.is_none()) else { return };
+        let Some(view) = self.view.as_ref().filter(|_| self.held.is_none()) else { return };
         // Frames that are only on the GPU are replaced until one is not, while they come.
-        let Some(picture) = view.color.as_deref().or(view.picture.memory()) else { return };
         if view.picture.memory().is_none() && matches!(self.state.source, Source::Running(_)) {
             return;
         }
-        self.holds += 1;
-        self.held = Some(self.holds);
-        let (color, depth) = (picture.clone(), view.depth.as_deref().cloned());
-        self.session.hold(Some(Held {
-            number: self.holds,
-            color,
-            depth,
-            coc: view.coc,
-            // A photo was blurred as well as the time between frames allows.
-            is_behind: view.trace.between || self.snapshot_due || self.state.settled,
-        }));
+        let Some(still) = still(view, self.holds + 1) else { return };
+        self.holds = still.number;
+        self.held = Some(still.number);
+        // A photo was blurred as well as the time between frames allows.
+        let is_behind = view.is_between || self.snapshot_due || self.state.settled;
+        self.session.hold(still, is_behind);
     }
 
     /// Whether a frame was made without the depth that a look follows, and others would have it.
@@ -51,15 +46,15 @@ impl App {
     }
 
     /// Shows the picture that stays in another look; whether it is still the one that stays.
-    pub(super) fn show_again(&mut self, blurred: Blurred) -> bool {
-        let Blurred { number, picture, depth, coc, change, quality } = blurred;
+    pub(super) fn show_again(&mut self, still: Still) -> bool {
+        let Still { number, images: Images { depth, blurred, .. }, coc, change, quality } = still;
         let Some(view) = self.view.as_mut().filter(|_| self.held == Some(number)) else { return false };
         if view.color.is_none() {
             view.color = view.picture.memory().cloned().map(Pooled::detached);
         }
-        view.picture = Picture::in_memory(Pooled::detached(picture));
+        view.picture = Picture::in_memory(Pooled::detached(blurred));
         view.depth = depth.map(Pooled::detached);
-        (view.coc, view.trace.change, view.trace.between, view.trace.quality) = (coc, change, false, quality);
+        (view.coc, view.change, view.is_between, view.trace.quality) = (coc, change, false, quality);
         (self.state.focus_m, self.state.between) = (focus_m(&coc), false);
         self.drawn = None;
         if self.snapshot_due {
@@ -98,6 +93,14 @@ impl App {
             (None, false) | (Some(_), true) => {}
         }
     }
+}
+
+/// A frame as data, to be known by this number; `None` where it is only on a device.
+pub(super) fn still(view: &View, number: u64) -> Option<Still> {
+    let blurred = view.picture.memory();
+    let color = view.color.as_deref().or(blurred)?.clone();
+    let images = Images { color, depth: view.depth.as_deref().cloned(), blurred: blurred.cloned().unwrap_or_default() };
+    Some(Still { number, images, coc: view.coc, change: view.change, quality: view.trace.quality })
 }
 
 /// Distance of the focal plane of a frame, where its blur follows depth.

@@ -24,7 +24,7 @@ use super::{Call, Ended, Preview, WindowError};
 use crate::meters::Totals;
 use crate::panel::{Panel, SystemFonts};
 use crate::session::{Closed, Session, Wake};
-use crate::state::{Action, Shown, Source, State, fitted};
+use crate::state::{Action, Shown, Source, State};
 use crate::views::Views;
 use bokehcam::bokeh;
 use bokehcam::clock::Clock;
@@ -199,7 +199,7 @@ impl App {
 
     fn update_settings(&mut self) {
         self.settings = match &self.state.source {
-            Source::Running(running) => fitted(&self.state.look, self.state.known()).settings(running.size, true),
+            Source::Running(running) => self.state.look.settings(running.size, true),
             _ => None,
         };
     }

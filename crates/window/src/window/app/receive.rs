@@ -76,7 +76,7 @@ impl App {
                 self.layout_at = Some(Instant::now());
             }
             self.learn_from(&view);
-            let is_whole = view.picture.memory().is_some() && !view.trace.between && !view.trace.depth_held;
+            let is_whole = view.picture.memory().is_some() && !view.is_between && !view.trace.depth_held;
             // A number of frames that was asked for is shown.
             let may_settle = self.state.is_photo() && !self.close_at_end;
             self.state.settled = may_settle && is_whole && !self.lacks_depth(&view, &self.state.look);

@@ -24,7 +24,7 @@ impl Seeking {
 
     /// Whether a frame answers a wish that no frame before it did: it is shown though the picture is frozen.
     pub fn is_answer(&self, view: &View) -> bool {
-        view.trace.seek > self.answered
+        view.seek > self.answered
     }
 }
 
@@ -38,7 +38,7 @@ impl App {
 
     /// Takes note of where the frame is that is shown now.
     pub(super) fn note_place(&mut self, view: &View) {
-        self.seeking.answered = view.trace.seek;
+        self.seeking.answered = view.seek;
         let is_behind = self.seeking.answered < self.seeking.asked;
         if let Some(seeker) = self.seeking.seeker.as_ref().filter(|_| !is_behind) {
             self.tell_place(seeker.place_of(view.stamp));

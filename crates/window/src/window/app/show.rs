@@ -5,15 +5,15 @@ use std::time::{Duration, Instant};
 use winit::event_loop::ActiveEventLoop;
 use winit::window::Fullscreen;
 
+use super::hold::still;
 use super::{App, control};
 use crate::panel::{self, Canvas};
 use crate::present::{Area, Controls, Drawing, Image};
-use crate::session::Still;
+use crate::session::Saving;
 use crate::state::{Action, Request, Source, State};
 use crate::views::Probe;
 use bokehcam::compute::Place;
 use bokehcam::frame::ColorImage;
-use bokehcam::pipeline::Trace;
 use bokehcam::sink::card;
 
 /// Shown when there is nothing to save.
@@ -132,21 +132,13 @@ impl App {
         if view.picture.memory().is_none() && !is_running {
             return self.state.note(NO_PICTURE);
         }
-        let Trace { between, depth_held, .. } = view.trace;
+        let (between, depth_held) = (view.is_between, view.trace.depth_held);
         let is_frozen = self.state.keeps_picture() && view.picture.memory().is_some();
         self.snapshot_due = view.picture.memory().is_none() || is_running && (between || depth_held && !is_frozen);
         self.update_wanted();
-        let Some(picture) = view.picture.memory().filter(|_| !self.snapshot_due) else { return };
-        self.session.save(Still {
-            picture: picture.clone(),
-            color: view.color.as_deref().unwrap_or(picture).clone(),
-            depth: view.depth.as_ref().map(|depth| (**depth).clone()),
-            coc: view.coc,
-            change: view.trace.change,
-            quality: view.trace.quality,
-            with_sources: self.state.habits.keep_sources,
-            order: self.controlled.as_mut().and_then(control::Controlled::take_order),
-        });
+        let Some(still) = still(view, 0).filter(|_| !self.snapshot_due) else { return };
+        let order = self.controlled.as_mut().and_then(control::Controlled::take_order);
+        self.session.save(still, Saving { with_sources: self.state.habits.keep_sources, order });
     }
 
     /// Shows the frame, or the view of it that is chosen, under the controls as they were laid out last.

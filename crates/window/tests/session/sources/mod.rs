@@ -30,7 +30,7 @@ fn a_recording_is_sought_in_while_it_plays_and_what_is_written_stays_whole() {
     let mut last_ns = 0;
     for place in [8, 3, 11, 0, 11] {
         let number = seeker.go_to(place);
-        let asked = watched.frame("the frame that was asked for", |view| view.trace.asked && view.trace.seek == number);
+        let asked = watched.frame("the frame that was asked for", |view| view.is_wished && view.seek == number);
         assert_eq!(seeker.place_of(asked.stamp), place);
         let rgb = asked.picture.memory().unwrap().rgb[0];
         assert!(rgb.abs_diff(20 * place as u8) <= 1, "{rgb} of frame {place}");
@@ -39,7 +39,7 @@ fn a_recording_is_sought_in_while_it_plays_and_what_is_written_stays_whole() {
         assert!((metres - 2.0 - 0.1 * place as f32).abs() < 0.02, "{metres} m of frame {place}");
         assert!(asked.stamp.time_ns > last_ns, "media time goes on");
         drop(asked);
-        let after = watched.frame("those after it", |view| !view.trace.asked && view.trace.seek == number);
+        let after = watched.frame("those after it", |view| !view.is_wished && view.seek == number);
         last_ns = after.stamp.time_ns;
         assert!((seeker.place_of(after.stamp) + FRAMES - place) % FRAMES <= 6, "{:?}", after.stamp);
     }
@@ -83,11 +83,11 @@ fn a_photo_is_opened_with_the_depth_beside_it_and_follows_the_look() {
     let first = watched.frame("a frame", |_| true);
     let map = first.depth.as_ref().unwrap();
     assert!((map.metres[15 * 40 + 5] - 1.0).abs() < 0.05 && (map.metres[15 * 40 + 35] - 4.0).abs() < 0.2);
-    let change = first.trace.change;
+    let change = first.change;
     drop(first);
     let stronger = Look { strength: Strength::AtInfinity(5.0), ..Look::default() };
     watched.session.order(Request::Look(Box::new(stronger)));
-    watched.frame("another look", |view| view.trace.change > change && !view.trace.between);
+    watched.frame("another look", |view| view.change > change && !view.is_between);
     assert!(watched.heard.session.close().report.unwrap().frames.balance());
 
     // Other names, a snapshot, and what is no photo.

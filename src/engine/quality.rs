@@ -1,7 +1,8 @@
-//! Which frames are blurred, and how finely: what there is time for.
+//! How finely frames are blurred: what there is time for.
 
+use super::Time;
 use crate::bokeh::rung::COSTS;
-use crate::budget::{DEADLINE_PERIODS, DepthTimes, Plan, Planner, Quality, Sample};
+use crate::budget::{DepthTimes, Plan, Planner, Quality, Sample};
 use crate::look::QualityRule;
 
 /// Picks the quality of each frame, and how depth is made, by the time there is.
@@ -12,17 +13,12 @@ pub(super) struct Picker {
 }
 
 impl Picker {
-    /// The blur of a frame may take `budget_ns`; where frames come every `period_ns` in real time, there is a deadline, too,
-    /// and depth is made as there is time, with efforts of these costs, and shared by frames only where it may be. No frame is blurred more finely than `finest` unless
-    /// that was asked for.
-    pub(super) fn new(
-        (rule, finest): (QualityRule, Quality),
-        budget_ns: u64,
-        period_ns: Option<u64>,
-        depth: (&[f64], bool),
-    ) -> Self {
+    /// No frame is blurred more finely than `finest` unless that was asked for; in real time, depth is made as there is time,
+    /// and shared by frames only where it may be.
+    pub(super) fn new((rule, finest): (QualityRule, Quality), time: Time) -> Self {
+        let Time { budget_ns, period_ns, efforts, shares_depth } = time;
         let (rungs, costs, places) = Self::ladder(rule, finest);
-        Self { rungs, planner: Planner::new((budget_ns, period_ns), depth, costs, places) }
+        Self { rungs, planner: Planner::new((budget_ns, period_ns), (efforts, shares_depth), costs, places) }
     }
 
     /// The same under another rule, for another executor. What was learnt of the time that rungs take holds no more.
@@ -81,67 +77,16 @@ impl Picker {
     }
 }
 
-/// When a frame is not worth blurring: it would be delivered later than two periods after its capture, and there is a
-/// newer one already or soon. But rather ten pictures a second, old as they are, than none.
-pub(super) struct LateRule {
-    period_ns: u64,
-    /// When a frame was last found not to be late.
-    last_passed_ns: Option<u64>,
-}
-
-/// After this time without a blurred frame, even a late one is blurred.
-const STARVED_NS: u64 = 100_000_000;
-
-impl LateRule {
-    pub(super) fn new(period_ns: u64) -> Self {
-        Self { period_ns, last_passed_ns: None }
-    }
-
-    /// Whether not to blur a frame that was captured at `captured_ns` and whose blur is expected to take `expected_ns`.
-    /// A frame that is not late is taken to be blurred.
-    pub(super) fn is_late(&mut self, captured_ns: u64, now_ns: u64, expected_ns: u64) -> bool {
-        let age_ns = now_ns.saturating_sub(captured_ns);
-        // Younger than a period, it is the newest there is.
-        let late = age_ns > self.period_ns && age_ns + expected_ns > DEADLINE_PERIODS * self.period_ns;
-        let starved = self.last_passed_ns.is_none_or(|last_ns| now_ns.saturating_sub(last_ns) >= STARVED_NS);
-        if late && !starved {
-            return true;
-        }
-        self.last_passed_ns = Some(now_ns);
-        false
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     const MS: u64 = 1_000_000;
-
-    #[test]
-    fn old_frames_are_late_but_pictures_never_stop() {
-        let mut rule = LateRule::new(33 * MS);
-        assert!(!rule.is_late(0, 500 * MS, 0), "the first frame always passes");
-        assert!(!rule.is_late(450 * MS, 510 * MS, 0));
-        assert!(rule.is_late(440 * MS, 520 * MS, 0));
-        assert!(rule.is_late(440 * MS, 609 * MS, 0));
-        assert!(!rule.is_late(440 * MS, 610 * MS, 0), "nothing passed for 100 ms");
-        assert!(rule.is_late(450 * MS, 611 * MS, 0));
-        assert!(!rule.is_late(900 * MS, 800 * MS, 0), "a frame from the future is not old");
-    }
-
-    #[test]
-    fn a_frame_that_cannot_make_it_is_not_begun_unless_it_is_the_newest() {
-        let mut rule = LateRule::new(33 * MS);
-        assert!(!rule.is_late(0, 10 * MS, 20 * MS));
-        assert!(rule.is_late(0, 40 * MS, 30 * MS), "70 ms after capture is too late");
-        assert!(!rule.is_late(0, 40 * MS, 20 * MS));
-        assert!(!rule.is_late(40 * MS, 50 * MS, 400 * MS), "however slow the blur, the newest frame is blurred");
-    }
+    const TIME: Time = Time { budget_ns: 30 * MS, period_ns: Some(30 * MS), efforts: &[1.0], shares_depth: true };
 
     /// Blurs frames that take 4 ms at the usual quality; returns the last quality.
     fn blurred(rule: QualityRule, finest: Quality) -> Quality {
-        let mut picker = Picker::new((rule, finest), 30 * MS, Some(30 * MS), (&[1.0], true));
+        let mut picker = Picker::new((rule, finest), TIME);
         for frame in 0..200 {
             let quality = picker.quality();
             picker.note(quality, (COSTS[quality as usize] * 4.0 * MS as f64) as u64, frame * 30 * MS);
@@ -159,7 +104,7 @@ mod tests {
     #[test]
     fn another_executor_begins_anew_and_depth_goes_on() {
         let auto = QualityRule::Auto(Quality::Balanced);
-        let mut picker = Picker::new((auto, Quality::Balanced), 30 * MS, Some(30 * MS), (&[1.0], true));
+        let mut picker = Picker::new((auto, Quality::Balanced), TIME);
         for frame in 0..100 {
             let at_ns = frame * 30 * MS;
             picker.note_depth(DepthTimes { effort: Some(0), took_ns: 40 * MS, age_ns: 3 * MS, at_ns });

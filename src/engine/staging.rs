@@ -9,7 +9,7 @@ use crate::optics::CocField;
 
 /// A picture and its depth as they were before something else stood behind the subject.
 #[derive(Default)]
-pub(super) struct Taken {
+pub(crate) struct Taken {
     color: ColorImage,
     map: DepthMap,
 }

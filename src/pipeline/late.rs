@@ -1,0 +1,62 @@
+//! Which frames are not blurred, as they would come too late.
+
+use crate::budget::DEADLINE_PERIODS;
+
+/// When a frame is not worth blurring: it would be delivered later than two periods after its capture, and there is a
+/// newer one already or soon. But rather ten pictures a second, old as they are, than none.
+pub(super) struct LateRule {
+    period_ns: u64,
+    /// When a frame was last found not to be late.
+    last_passed_ns: Option<u64>,
+}
+
+/// After this time without a blurred frame, even a late one is blurred.
+const STARVED_NS: u64 = 100_000_000;
+
+impl LateRule {
+    pub(super) fn new(period_ns: u64) -> Self {
+        Self { period_ns, last_passed_ns: None }
+    }
+
+    /// Whether not to blur a frame that was captured at `captured_ns` and whose blur is expected to take `expected_ns`.
+    /// A frame that is not late is taken to be blurred.
+    pub(super) fn is_late(&mut self, captured_ns: u64, now_ns: u64, expected_ns: u64) -> bool {
+        let age_ns = now_ns.saturating_sub(captured_ns);
+        // Younger than a period, it is the newest there is.
+        let late = age_ns > self.period_ns && age_ns + expected_ns > DEADLINE_PERIODS * self.period_ns;
+        let starved = self.last_passed_ns.is_none_or(|last_ns| now_ns.saturating_sub(last_ns) >= STARVED_NS);
+        if late && !starved {
+            return true;
+        }
+        self.last_passed_ns = Some(now_ns);
+        false
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const MS: u64 = 1_000_000;
+
+    #[test]
+    fn old_frames_are_late_but_pictures_never_stop() {
+        let mut rule = LateRule::new(33 * MS);
+        assert!(!rule.is_late(0, 500 * MS, 0), "the first frame always passes");
+        assert!(!rule.is_late(450 * MS, 510 * MS, 0));
+        assert!(rule.is_late(440 * MS, 520 * MS, 0));
+        assert!(rule.is_late(440 * MS, 609 * MS, 0));
+        assert!(!rule.is_late(440 * MS, 610 * MS, 0), "nothing passed for 100 ms");
+        assert!(rule.is_late(450 * MS, 611 * MS, 0));
+        assert!(!rule.is_late(900 * MS, 800 * MS, 0), "a frame from the future is not old");
+    }
+
+    #[test]
+    fn a_frame_that_cannot_make_it_is_not_begun_unless_it_is_the_newest() {
+        let mut rule = LateRule::new(33 * MS);
+        assert!(!rule.is_late(0, 10 * MS, 20 * MS));
+        assert!(rule.is_late(0, 40 * MS, 30 * MS), "70 ms after capture is too late");
+        assert!(!rule.is_late(0, 40 * MS, 20 * MS));
+        assert!(!rule.is_late(40 * MS, 50 * MS, 400 * MS), "however slow the blur, the newest frame is blurred");
+    }
+}
