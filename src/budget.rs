@@ -8,6 +8,7 @@ mod window;
 
 pub use governor::{Governor, Times};
 pub use load::{MAX_RUNGS, Sample};
+#[cfg(feature = "files")]
 pub(crate) use planner::DEADLINE_PERIODS;
 pub use planner::{DepthTimes, Plan, Planner};
 pub use quality::Quality;

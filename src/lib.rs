@@ -44,16 +44,19 @@
 pub mod bokeh;
 pub mod budget;
 pub mod calibration;
+#[cfg(feature = "files")]
 pub mod capture;
 pub mod clock;
 pub mod color;
 #[doc(hidden)]
 pub mod compute;
 pub mod computing;
+#[cfg(feature = "files")]
 #[doc(hidden)]
 pub mod control;
 pub mod depth;
 pub mod engine;
+#[cfg(feature = "files")]
 #[doc(hidden)]
 pub mod files;
 pub mod frame;
@@ -67,13 +70,18 @@ pub mod names;
 #[cfg(feature = "networks")]
 pub mod network;
 pub mod optics;
+#[cfg(feature = "files")]
 pub mod pipeline;
 #[cfg(feature = "pipewire")]
 #[doc(hidden)]
 pub mod pipewire;
+#[cfg(feature = "files")]
 pub mod recording;
+#[cfg(feature = "files")]
 pub mod sink;
+#[cfg(feature = "files")]
 pub mod source;
+#[cfg(feature = "files")]
 pub mod stats;
 #[cfg(feature = "camera")]
 #[doc(hidden)]

@@ -1,9 +1,11 @@
 //! What can be wrong with a calibration: what, where, and what to do about it, in one line.
 
 use std::fmt;
+#[cfg(feature = "files")]
 use std::io;
 use std::path::{Path, PathBuf};
 
+#[cfg(feature = "files")]
 use crate::files::input::said;
 
 /// Why a calibration cannot be used.
@@ -11,6 +13,7 @@ use crate::files::input::said;
 #[derive(Debug, thiserror::Error)]
 pub enum CalibrationError {
     /// The file cannot be read.
+    #[cfg(feature = "files")]
     #[error("cannot read the calibration {}: {}", path.display(), said(source))]
     Io { path: PathBuf, source: io::Error },
     /// The file is none of those that are known.

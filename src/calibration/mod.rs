@@ -3,17 +3,23 @@
 //!
 //! [`load`] reads a [`StereoCalibration`]; [`rectifier::Rectifier`] makes its pictures a rectified pair.
 
+#[cfg(feature = "files")]
 mod entries;
 mod error;
+#[cfg(feature = "files")]
 pub mod euroc;
+#[cfg(feature = "files")]
 mod kalibr;
 pub mod lens;
 pub mod map;
+#[cfg(feature = "files")]
 mod opencv;
 pub mod rectification;
 pub mod rectifier;
+#[cfg(feature = "files")]
 mod yaml;
 
+#[cfg(feature = "files")]
 use std::path::{Path, PathBuf};
 
 use glam::{DMat3, DQuat, DVec2, DVec3};
@@ -67,6 +73,7 @@ const SAME_ASPECT: f64 = 0.01;
 ///
 /// # Errors
 /// A file cannot be read, is none of these, has a key missing, or numbers that cannot be.
+#[cfg(feature = "files")]
 pub fn load(paths: &[&Path]) -> Result<StereoCalibration, CalibrationError> {
     if !(1..=2).contains(&paths.len()) {
         return Err(CalibrationError::Files(paths.len()));
@@ -91,6 +98,7 @@ pub fn load(paths: &[&Path]) -> Result<StereoCalibration, CalibrationError> {
     opencv::from_files(&files)
 }
 
+#[cfg(feature = "files")]
 /// The file beside `path` with `extrinsic` for `intrinsic` in its name, or the other way round, if there is one.
 fn companion(path: &Path) -> Option<PathBuf> {
     let name = path.file_name()?.to_str()?;

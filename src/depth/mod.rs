@@ -6,6 +6,7 @@ pub mod agreement;
 mod alignment;
 pub mod backdrop;
 pub mod background;
+#[cfg(feature = "files")]
 pub mod beside;
 mod bits;
 pub mod defocus;
@@ -21,6 +22,7 @@ pub mod matting;
 pub mod misfit;
 pub mod motion;
 pub mod plate;
+#[cfg(feature = "files")]
 pub mod recorded;
 mod reduced;
 pub mod refine;
@@ -31,6 +33,7 @@ pub mod stereo;
 mod tap;
 
 use crate::frame::{ColorImage, DepthMap, GrayImage, Stamp};
+#[cfg(feature = "files")]
 use crate::recording::RecordingError;
 
 /// Gives each frame its depth.
@@ -101,6 +104,7 @@ pub struct Seen<'a> {
 #[derive(Debug, thiserror::Error)]
 pub enum DepthError {
     /// The recording's depth picture cannot be read.
+    #[cfg(feature = "files")]
     #[error(transparent)]
     Recording(#[from] RecordingError),
     /// A depth camera has given no map yet. Later frames may have one.

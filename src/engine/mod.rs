@@ -4,6 +4,9 @@
 //! their matte, and the subject is staged. A [`Blur`] blurs it, as finely as there is time for. In a run each of both has a thread
 //! of its own; a [`Stepper`] has both on its caller's, for frame after frame, and [`still`] for a picture on its own.
 
+// What the threads of a run alone ask of it.
+#![cfg_attr(not(feature = "files"), allow(dead_code, unused_imports))]
+
 mod blur;
 mod coc;
 mod fit_check;

@@ -1,11 +1,10 @@
-//! What stands behind the subject as it is written: its picture, if any, not yet read; and how far the picture follows.
+//! What stands behind the subject as it is written: its picture, if any, not yet read.
 
 use std::fmt;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use std::sync::Arc;
 
-use super::number::number_in;
 use crate::depth::backdrop::{Behind, BehindPicture};
 use crate::recording::RecordingError;
 use crate::recording::still::read_color;
@@ -100,46 +99,9 @@ impl BehindName {
     }
 }
 
-/// How much larger the picture may become to keep the subject in its middle: 1, which is off, to [`Follow::MOST`].
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Follow(f32);
-
-impl Follow {
-    /// It stays as it is.
-    pub const OFF: Self = Self(1.0);
-    /// Beyond this there is little left of a camera's pixels.
-    pub const MOST: f32 = 4.0;
-
-    /// Off from 1 down, and no more than [`Follow::MOST`].
-    pub fn to(zoom: f32) -> Self {
-        Self(if zoom > 1.0 { zoom.min(Self::MOST) } else { 1.0 })
-    }
-
-    /// How much larger the picture may become; `None` where it stays as it is.
-    pub fn zoom(self) -> Option<f32> {
-        (self != Self::OFF).then_some(self.0)
-    }
-}
-
-impl FromStr for Follow {
-    type Err = String;
-    fn from_str(text: &str) -> Result<Self, String> {
-        let zoom = if text == "off" { Some(1.0) } else { number_in(text, 1.0, Self::MOST) };
-        zoom.map(Self::to).ok_or_else(|| format!("use off, or the largest zoom: a number from 1 to {}", Self::MOST))
-    }
-}
-
-impl fmt::Display for Follow {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self.zoom() {
-            Some(zoom) => write!(f, "{zoom}"),
-            None => f.write_str("off"),
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
+    use super::super::Follow;
     use super::*;
 
     #[test]

@@ -3,24 +3,35 @@
 //! A [`Look`] is data: it is read and written by the table of [`settings`], and a [`Patch`] changes some of it. For
 //! pictures of one size it becomes the executor's [`bokeh::Settings`] and a [`CocRule`].
 
+#[cfg(feature = "files")]
 mod aperture;
+#[cfg(feature = "files")]
 mod behind;
 mod coc;
 mod effect;
+mod follow;
 mod known;
 pub mod number;
+#[cfg(feature = "files")]
 mod patch;
+#[cfg(feature = "files")]
 pub mod presets;
+#[cfg(feature = "files")]
 pub mod settings;
 mod strength;
 mod tilt;
 
+#[cfg(feature = "files")]
 pub use aperture::ApertureName;
-pub use behind::{BehindName, Follow};
+#[cfg(feature = "files")]
+pub use behind::BehindName;
 pub use coc::{CocAtInfinity, CocRule};
 pub use effect::{BackgroundMemory, Effect, Refine};
+pub use follow::Follow;
 pub use known::Known;
+#[cfg(feature = "files")]
 pub use patch::{LookError, Value};
+#[cfg(feature = "files")]
 pub use settings::{Patch, SETTINGS};
 pub use strength::Strength;
 pub use tilt::Tilt;

@@ -1,0 +1,44 @@
+//! How far the picture follows the subject.
+
+use std::fmt;
+use std::str::FromStr;
+
+use super::number::number_in;
+
+/// How much larger the picture may become to keep the subject in its middle: 1, which is off, to [`Follow::MOST`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Follow(f32);
+
+impl Follow {
+    /// It stays as it is.
+    pub const OFF: Self = Self(1.0);
+    /// Beyond this there is little left of a camera's pixels.
+    pub const MOST: f32 = 4.0;
+
+    /// Off from 1 down, and no more than [`Follow::MOST`].
+    pub fn to(zoom: f32) -> Self {
+        Self(if zoom > 1.0 { zoom.min(Self::MOST) } else { 1.0 })
+    }
+
+    /// How much larger the picture may become; `None` where it stays as it is.
+    pub fn zoom(self) -> Option<f32> {
+        (self != Self::OFF).then_some(self.0)
+    }
+}
+
+impl FromStr for Follow {
+    type Err = String;
+    fn from_str(text: &str) -> Result<Self, String> {
+        let zoom = if text == "off" { Some(1.0) } else { number_in(text, 1.0, Self::MOST) };
+        zoom.map(Self::to).ok_or_else(|| format!("use off, or the largest zoom: a number from 1 to {}", Self::MOST))
+    }
+}
+
+impl fmt::Display for Follow {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.zoom() {
+            Some(zoom) => write!(f, "{zoom}"),
+            None => f.write_str("off"),
+        }
+    }
+}
