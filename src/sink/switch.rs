@@ -136,6 +136,3 @@ impl Drop for Life {
         }
     }
 }
-
-#[cfg(test)]
-mod tests;

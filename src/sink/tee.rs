@@ -270,4 +270,6 @@ impl Drop for Tee {
 }
 
 #[cfg(test)]
+mod switched;
+#[cfg(test)]
 mod tests;

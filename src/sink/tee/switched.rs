@@ -1,9 +1,13 @@
+//! Sinks that come and go.
+
 use std::io;
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::AtomicU64;
+use std::sync::mpsc;
 use std::thread;
 use std::time::Instant;
 
 use super::*;
+use crate::sink::switch::{Fate, Over};
 
 /// Nothing here takes so long: against a hang.
 const HANG: Duration = Duration::from_secs(120);
