@@ -3,7 +3,10 @@
 use std::collections::HashSet;
 use std::fs::{self, File};
 use std::io::{ErrorKind, Write};
+use std::os::unix::fs::OpenOptionsExt;
 use std::path::{Component, Path, PathBuf};
+
+use rustix::fs::OFlags;
 
 use super::{FolderError, LIST};
 use crate::files::{input, whole};
@@ -27,6 +30,20 @@ impl List {
         };
         let file = removed.and_then(|()| File::create_new(&path)).map_err(FolderError::write(&path))?;
         Ok(Self { path, file, bytes: 0, len: 0 })
+    }
+
+    /// Adds to the list of `folder`, which is made where it is missing. Never through a link.
+    pub(super) fn open(folder: &Path) -> Result<Self, FolderError> {
+        let path = folder.join(LIST);
+        let mut options = File::options();
+        options.append(true).create(true).custom_flags(OFlags::NOFOLLOW.bits() as i32);
+        let opened = options.open(&path).and_then(|mut file| {
+            // Its last line may have no end.
+            file.write_all(b"\n")?;
+            Ok((file.metadata()?.len(), file))
+        });
+        let (bytes, file) = opened.map_err(FolderError::write(&path))?;
+        Ok(Self { path, file, bytes, len: 0 })
     }
 
     pub(super) fn len(&self) -> u64 {

@@ -4,7 +4,8 @@ use std::fs;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
-use super::{FolderError, LIST, PART, Set, list};
+use super::list::{self, List};
+use super::{FolderError, LIST, PART, Set};
 use crate::files::whole;
 
 /// Fails if the folder has a file of the set that is not on its list: somebody else wrote it.
@@ -63,8 +64,8 @@ pub(super) fn replace(part: &Path, path: &Path) -> Result<u64, FolderError> {
     if let Some(name) = new.iter().find(is_foreign) {
         return Err(FolderError::Foreign { path: path.join(name) });
     }
-    // Whatever happens from here on, all of them are ours.
-    list::adopt(path, new.iter().cloned())?;
+    // Whatever happens from here on, those that were moved are ours, and no other is.
+    let mut ours = List::open(path)?;
     let is_old = |name: &String| old.contains(name) && is_file(path, name);
     let gone = old.iter().filter(|name| is_old(name)).count() as u64;
     for name in new.iter() {
@@ -76,6 +77,7 @@ pub(super) fn replace(part: &Path, path: &Path) -> Result<u64, FolderError> {
             ErrorKind::AlreadyExists => FolderError::Foreign { path: to.clone() },
             _ => FolderError::write(&to)(error),
         })?;
+        ours.add(name)?;
     }
     for name in old.iter().filter(|name| !new.contains(name) && is_file(path, name)) {
         let file = path.join(name);

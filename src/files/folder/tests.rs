@@ -161,13 +161,13 @@ fn what_a_killed_run_left_is_kept_or_done_with() {
     leave(PART, &[], "");
     drop(open(&path).unwrap());
     assert!(!dir.path().join("out.incomplete.2").exists());
-    // Killed while it renamed: one file was there already, and all are ours.
-    fs::write(path.join("0.png"), "new").unwrap();
-    adopt(&path, ["2.png".to_owned()]).unwrap();
-    leave(PART, &["2.png"], "0.png\n2.png\n");
+    // Killed while it moved its files: two of three are there already, and ours.
+    ["0.png", "2.png"].iter().for_each(|name| fs::write(path.join(name), "new").unwrap());
+    list::List::open(&path).unwrap().add("2.png").unwrap();
+    leave(PART, &["3.png"], "0.png\n2.png\n3.png\n");
     drop(open(&path).unwrap());
-    assert_eq!(all(&path), [".mine.77-0.part=half", "0.png=new", "1.png=old"]);
-    assert_eq!(all(&dir.path().join("out.incomplete.2")), ["2.png=new"]);
+    assert_eq!(all(&path), [".mine.77-0.part=half", "0.png=new", "1.png=old", "2.png=new"]);
+    assert_eq!(all(&dir.path().join("out.incomplete.2")), ["3.png=new"]);
     write(&path, &[("2.png", "newer")]);
     assert_eq!(all(&path), [".mine.77-0.part=half", "2.png=newer"]);
 }

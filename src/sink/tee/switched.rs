@@ -1,4 +1,4 @@
-//! A tee whose members come and go.
+//! Sinks that come and go.
 
 use std::io;
 use std::sync::atomic::AtomicU64;
@@ -6,8 +6,8 @@ use std::sync::mpsc;
 use std::thread;
 use std::time::Instant;
 
-use super::super::switch::{Fate, Over};
 use super::*;
+use crate::sink::switch::{Fate, Over};
 
 /// Nothing here takes so long: against a hang.
 const HANG: Duration = Duration::from_secs(120);
