@@ -81,7 +81,7 @@ impl Shared {
             keep_going: run.keep_going,
             is_viewed,
             wanted: run.wanted.clone(),
-            order: rate::Order::new(blur.plan()),
+            order: rate::Order::new(blur.picker.plan()),
             wants_yuyv: AtomicBool::new(false),
             over: AtomicBool::new(false),
         }

@@ -4,7 +4,7 @@ use std::mem;
 
 use super::quality::Picker;
 use crate::bokeh::{Bokeh, BokehError, Finished, Job, Settings};
-use crate::budget::{DepthTimes, Plan, Quality};
+use crate::budget::Quality;
 use crate::compute::Backend;
 use crate::frame::{ColorImage, DepthMap};
 use crate::link::pool::Pooled;
@@ -49,7 +49,8 @@ pub struct Blur {
     /// What the executor has run on, when that was looked at last.
     backends: Option<&'static str>,
     rule: QualityRule,
-    picker: Picker,
+    /// Picks the quality of the next frame, by the time that those before took.
+    pub(crate) picker: Picker,
 }
 
 impl Default for Blur {
@@ -125,36 +126,6 @@ impl Blur {
     /// Frames that may be in hand at once, one at least.
     pub(crate) fn capacity(&self) -> usize {
         self.executor.as_ref().map_or(1, |executor| executor.capacity().max(1))
-    }
-
-    /// What there is time for.
-    pub(crate) fn plan(&self) -> Plan {
-        self.picker.plan()
-    }
-
-    /// How long the blur of the next frame is likely to take, in nanoseconds; 0 before anything is known.
-    pub(crate) fn expected_ns(&self) -> u64 {
-        self.picker.expected_ns()
-    }
-
-    /// A blur may take so long from now on, in nanoseconds.
-    pub(crate) fn allow(&mut self, budget_ns: u64) {
-        self.picker.allow(budget_ns);
-    }
-
-    /// The depth of a frame took so long.
-    pub(crate) fn note_depth(&mut self, times: DepthTimes) {
-        self.picker.note_depth(times);
-    }
-
-    /// A frame came too late.
-    pub(crate) fn note_late(&mut self) {
-        self.picker.note_late();
-    }
-
-    /// A frame of this quality took so long to blur, and was done at `at_ns`.
-    pub(crate) fn note(&mut self, quality: Quality, took_ns: u64, at_ns: u64) {
-        self.picker.note(quality, took_ns, at_ns);
     }
 
     /// [`Bokeh::submit`].

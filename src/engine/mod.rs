@@ -1,6 +1,6 @@
 //! Colour and depth in, blurred picture out: all that is done to a frame, whoever asks for it.
 //!
-//! A [`Preparation`] makes a frame ready: what its depth lacks is filled in or refined, the lens is focused, mixed pixels get
+//! A `Preparation` makes a frame ready: what its depth lacks is filled in or refined, the lens is focused, mixed pixels get
 //! their matte, and the subject is staged. A [`Blur`] blurs it, as finely as there is time for. In a run each of both has a thread
 //! of its own; a [`Stepper`] has both on its caller's, for frame after frame, and [`still`] for a picture on its own.
 

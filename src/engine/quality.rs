@@ -6,7 +6,7 @@ use crate::budget::{DepthTimes, Plan, Planner, Quality, Sample};
 use crate::look::QualityRule;
 
 /// Picks the quality of each frame, and how depth is made, by the time there is.
-pub(super) struct Picker {
+pub(crate) struct Picker {
     /// The rungs to pick from, cheapest first.
     rungs: &'static [Quality],
     planner: Planner,
@@ -40,37 +40,37 @@ impl Picker {
     }
 
     /// A blur may take so long from now on.
-    pub(super) fn allow(&mut self, budget_ns: u64) {
+    pub fn allow(&mut self, budget_ns: u64) {
         self.planner.allow(budget_ns);
     }
 
     /// What the next frame gets.
-    pub(super) fn plan(&self) -> Plan {
+    pub fn plan(&self) -> Plan {
         self.planner.plan()
     }
 
     /// The quality of the next frame.
-    pub(super) fn quality(&self) -> Quality {
+    pub fn quality(&self) -> Quality {
         self.rungs[self.plan().rung]
     }
 
     /// How long the blur of the next frame is likely to take; 0 before anything is known.
-    pub(super) fn expected_ns(&self) -> u64 {
+    pub fn expected_ns(&self) -> u64 {
         self.planner.expected_blur_ns().unwrap_or(0)
     }
 
     /// The depth of a frame took so long.
-    pub(super) fn note_depth(&mut self, times: DepthTimes) {
+    pub fn note_depth(&mut self, times: DepthTimes) {
         self.planner.note_depth(times);
     }
 
     /// A frame came too late.
-    pub(super) fn note_late(&mut self) {
+    pub fn note_late(&mut self) {
         self.planner.note_late();
     }
 
     /// A frame of this quality took so long to blur, and was done at `at_ns`.
-    pub(super) fn note(&mut self, quality: Quality, took_ns: u64, at_ns: u64) {
+    pub fn note(&mut self, quality: Quality, took_ns: u64, at_ns: u64) {
         if let Some(rung) = self.rungs.iter().position(|&rung| rung == quality) {
             self.planner.note_blur(Sample { rung, took_ns, at_ns });
         }

@@ -81,12 +81,12 @@ impl Stepper {
     /// A blur may take so long from now on, in nanoseconds.
     pub fn allow(&mut self, budget_ns: u64) {
         self.is_timed = true;
-        self.engine.blur.allow(budget_ns);
+        self.engine.blur.picker.allow(budget_ns);
     }
 
     /// How long the blur of the next frame is likely to take, in nanoseconds; 0 before anything is known.
     pub fn expected_ns(&self) -> u64 {
-        self.engine.blur.expected_ns()
+        self.engine.blur.picker.expected_ns()
     }
 
     /// The quality of the next frame; `None` where nothing is blurred.
@@ -117,7 +117,7 @@ impl Stepper {
         blur.blur(images, coc)?;
         if self.is_timed {
             let now_ns = self.clock.now_ns();
-            blur.note(quality, now_ns - began_ns, now_ns);
+            blur.picker.note(quality, now_ns - began_ns, now_ns);
         }
         blur.has_moved();
         Ok(match part {

@@ -140,13 +140,13 @@ impl<'a> Stage<'a> {
     fn submit(&mut self, frame: Frame<Ready>) -> Result<bool, Fault> {
         let Shared { clock, tally, pools, order, wants_yuyv, .. } = self.shared;
         let (mut frame, Ready { color, depth, coc, staged, times, .. }) = frame.taken_up(clock.now_ns());
-        times.into_iter().for_each(|times| self.blur.note_depth(times));
+        times.into_iter().for_each(|times| self.blur.picker.note_depth(times));
         // The frame waits for those that are under way.
-        let expected_ns = self.blur.expected_ns() * (self.in_hand.len() as u64 + 1);
+        let expected_ns = self.blur.picker.expected_ns() * (self.in_hand.len() as u64 + 1);
         if self.is_late(&frame, expected_ns) {
             tally.dropped(frame.ticket, Cause::Late);
-            self.blur.note_late();
-            order.set(self.blur.plan());
+            self.blur.picker.note_late();
+            order.set(self.blur.picker.plan());
             return Ok(false);
         }
         let Staged { part, taken, on_device } = staged;
@@ -217,8 +217,8 @@ impl<'a> Stage<'a> {
         self.times.misses += u64::from(blur_ns > self.budget_ns);
         // Where frames overlap, wall time says nothing of a single one.
         let took_ns = if self.blur.capacity() > 1 { in_passes_ns } else { blur_ns };
-        self.blur.note(quality, took_ns, done.since_ns);
-        self.shared.order.set(self.blur.plan());
+        self.blur.picker.note(quality, took_ns, done.since_ns);
+        self.shared.order.set(self.blur.picker.plan());
         blur_ns
     }
 }
