@@ -31,7 +31,7 @@ const DOORS: [(&str, &[&str]); 30] = [
     ("egui_winit", &["preview/window"]),
     ("image", &["capture/demo", "recording", "sink"]),
     ("indicatif", &["cli"]),
-    ("jiff", &["preview/folders"]),
+    ("jiff", &["files/user_folders"]),
     ("ort", &["network/onnx_runtime"]),
     ("pipewire", &["pipewire"]),
     ("plotters", &["cli"]),
