@@ -293,6 +293,7 @@ fn without_onnx_runtime_what_is_built_in_is_used_and_what_was_asked_for_is_misse
                 "--to",
                 "null",
             ])
+            .current_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."))
             .env("ORT_DYLIB_PATH", &library)
             .env("XDG_CONFIG_HOME", folder.path())
             .output()
