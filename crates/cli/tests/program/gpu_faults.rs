@@ -67,7 +67,8 @@ fn under(layer: &TempDir, fault: &str, command: &mut Command) -> Output {
 /// Runs a test of this file in a process of its own, under the layer; gives back what it told.
 fn test_under(layer: &TempDir, fault: &str, test: &str) -> String {
     let mut command = Command::new(std::env::current_exe().unwrap());
-    let output = under(layer, fault, command.args(["--ignored", "--exact", &format!("gpu_faults::{test}"), "--nocapture"]));
+    let output =
+        under(layer, fault, command.args(["--ignored", "--exact", &format!("gpu_faults::{test}"), "--nocapture"]));
     let told = String::from_utf8_lossy(&output.stdout).into_owned() + &String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success(), "{fault}: {told}");
     told
