@@ -53,7 +53,6 @@ fn a_recording_is_sought_in_while_it_plays_and_what_is_written_stays_whole() {
 #[test]
 fn what_never_ends_has_no_places() {
     let folder = tempfile::tempdir().unwrap();
-    bokehcam_lab::synthetic::bring();
     let mut watched = Watched::begin("synthetic", folder.path());
     watched.frame("a frame", |_| true);
     assert!(watched.seeker.is_none());

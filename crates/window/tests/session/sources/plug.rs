@@ -114,6 +114,7 @@ pub struct Watched {
 
 impl Watched {
     pub fn begin(source: &str, folder: &Path) -> Self {
+        bokehcam_lab::synthetic::bring();
         let options = Options { frames: Frames { repeat: true, ..Frames::default() }, ..Options::default() };
         let system = System::new(options, look(), Box::new(NoStore));
         let is_in = Arc::<AtomicBool>::default();
