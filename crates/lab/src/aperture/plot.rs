@@ -21,7 +21,7 @@ const COLORS: [RGBColor; 7] = [
 /// The diagram: truncation error in percent, on a logarithmic axis, over the number of separable terms.
 ///
 /// # Errors
-/// [`CliError::Diagram`] when the drawing library refuses.
+/// The drawing library refuses.
 pub fn error_by_rank(analyses: &[Analysis], size_px: u16, rim: f32) -> Result<String, String> {
     let mut svg = String::new();
     let area = SVGBackend::with_string(&mut svg, SIZE_PX).into_drawing_area();
