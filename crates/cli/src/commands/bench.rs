@@ -66,7 +66,6 @@ pub struct BenchCommand {
           value_parser = value_parser!(u16).range(1..=1024))]
     threads: Vec<u16>,
     /// What is in the picture
-    #[cfg(feature = "lab")]
     #[arg(long, value_parser = options::named::<picture::Scene>(), value_name = "WHICH", default_value_t)]
     scene: picture::Scene,
     /// Frames to measure [default: 20, or fewer where these would take more than 2 s]
@@ -87,7 +86,7 @@ pub struct BenchCommand {
     /// Measure all that a stream does instead: reading, depth, blur at each quality, and writing for a virtual camera; from a
     /// recording, a photo, `demo` or `synthetic`
     #[arg(long, value_name = "SOURCE", num_args = 0..=1, default_missing_value = "demo", value_parser = options::source_name(),
-          conflicts_with_all = if cfg!(feature = "lab") { &["sizes", "coc", "passes", "scene"][..] } else { &["sizes", "coc", "passes"] })]
+          conflicts_with_all = ["sizes", "coc", "scene", "passes"])]
     chain: Option<SourceName>,
     #[command(flatten)]
     depth: options::Depth,
@@ -146,11 +145,7 @@ pub fn run(command: &BenchCommand, global: &options::Global, given: &Given) -> R
     let mut done = 0;
     let levels = if command.quality.is_empty() { &[Quality::default()][..] } else { &command.quality };
     for size in &command.sizes {
-        #[cfg(feature = "lab")]
-        let scene = command.scene;
-        #[cfg(not(feature = "lab"))]
-        let scene = picture::Scene::default();
-        let (color, depth) = picture::of(scene, (size.width, size.height))?;
+        let (color, depth) = picture::of(command.scene, (size.width, size.height))?;
         let default_coc_px = [size.height as f32 * COC_AT_INFINITY_PER_HEIGHT];
         let radii_px = if command.coc.is_empty() { &default_coc_px[..] } else { &command.coc };
         for &coc_px in radii_px {
