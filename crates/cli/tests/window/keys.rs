@@ -114,8 +114,9 @@ fn what_is_seen_follows_the_keys_and_comes_back() {
     let window = program.window();
     window.until("the first picture", is_photograph);
     let mut last = None;
-    let before = window.until("the notes of the start are gone", |image| {
-        thread::sleep(Duration::from_secs(3));
+    let before = window.until("the notes and the controls of the start are gone", |image| {
+        // Longer than controls stay, or two looks in a row would show them.
+        thread::sleep(Duration::from_secs(6));
         let same = last.as_ref().is_some_and(|last| distance(last, image) < 0.01);
         last = Some(image.clone());
         same
