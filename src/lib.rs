@@ -22,6 +22,7 @@
 //!
 //! | layer | modules |
 //! |---|---|
+//! | 10 | `controller`: what is asked of a run while it goes on |
 //! | 9 | [`source`]: cameras, recordings and their depth, by name |
 //! | 8 | [`pipeline`]: the one place that knows all stages |
 //! | 7 | [`engine`]: colour and depth in, blurred picture out |
@@ -54,6 +55,9 @@ pub mod computing;
 #[cfg(feature = "files")]
 #[doc(hidden)]
 pub mod control;
+#[cfg(feature = "files")]
+#[doc(hidden)]
+pub mod controller;
 pub mod depth;
 pub mod engine;
 #[cfg(feature = "files")]

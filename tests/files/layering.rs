@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Modules of the library by layer, the lowest first, then the crates above it.
-const LAYERS: [&[&str]; 12] = [
+const LAYERS: [&[&str]; 13] = [
     &["names"],
     &["color", "frame", "optics", "clock", "files", "knob"],
     &["compute", "calibration", "layout"],
@@ -15,6 +15,7 @@ const LAYERS: [&[&str]; 12] = [
     &["engine"],
     &["pipeline"],
     &["source"],
+    &["controller"],
     // Crates of their own, under `crates/`.
     &["lab", "window"],
     &["cli"],

@@ -1,10 +1,13 @@
 //! What `stream` and `preview` have in common for those who control them.
 
+use std::path::PathBuf;
+
 use crate::error::CliError;
-use crate::settings::unused;
+use crate::settings::{changes, unused};
 use bokehcam::control::{self, Answer, Claim, ControlError, Name};
+use bokehcam::controller::{Facts, Rules};
 use bokehcam::look::{Look, Patch, Strength};
-use bokehcam::source::{self, DepthChoice, DepthFrom};
+use bokehcam::source::{self, DepthFrom};
 
 /// Takes a name for a run. Without a folder for sockets the run goes on, and the inner error is the line that says so,
 /// once nothing else is in its way.
@@ -28,38 +31,59 @@ pub fn refused(error: &CliError) -> Answer {
     }
 }
 
-/// What of a run decides which looks it can have.
-pub struct Standing<'a> {
-    /// Columns and rows of its pictures.
-    pub size: (u32, u32),
-    pub depth_choice: &'a DepthChoice,
-    /// Whether its frames have depth.
-    pub has_depth: bool,
-    /// Whether the quality may follow the time there is.
-    pub adaptive: bool,
-    /// What the warnings about settings to no effect go by, but for what the look itself decides.
+/// Requests and looks as the command line has them.
+pub struct AsCommandLine {
+    /// The settings file, where one was chosen.
+    pub config: Option<PathBuf>,
+    /// What the warnings about settings to no effect go by, but for what source and look decide.
     pub unused: unused::Run,
+}
+
+impl Rules for AsCommandLine {
+    fn settings(&self, settings: &[String]) -> Result<Patch, Answer> {
+        changes::patch(settings).map_err(|error| refused(&error))
+    }
+
+    fn preset(&self, name: &str) -> Result<Patch, Answer> {
+        changes::preset(self.config.as_deref(), name).map_err(|error| refused(&error))
+    }
+
+    fn changed(&self, patch: &Patch, look: &Look, facts: &Facts) -> Result<(Look, Option<String>), Answer> {
+        changed(patch, look, facts, self.unused).map_err(|error| refused(&error))
+    }
 }
 
 /// The look of a run after a change, and what of the change has no effect.
 ///
 /// # Errors
 /// The run cannot have such a look.
-pub fn changed(patch: &Patch, look: &Look, run: &Standing) -> Result<(Look, Option<String>), CliError> {
-    if let Some(effect) = patch.effect.filter(|effect| effect.follows_depth() && !run.has_depth) {
+fn changed(
+    patch: &Patch,
+    look: &Look,
+    facts: &Facts,
+    command: unused::Run,
+) -> Result<(Look, Option<String>), CliError> {
+    if let Some(effect) = patch.effect.filter(|effect| effect.follows_depth() && !facts.has_depth) {
         return Err(CliError::Usage(format!(
             "--effect {effect} follows depth, and this run has none: use --effect blur or tilt-shift"
         )));
     }
-    let look = source::fitting_look(&patch.on(look)?, run.depth_choice, run.has_depth)?;
+    let look = source::fitting_look(&patch.on(look)?, &facts.depth_choice, facts.has_depth)?;
     let uses_depth = look.effect.follows_depth();
-    match run.unused.depth {
+    match facts.depth_from {
         DepthFrom::Networks | DepthFrom::Plate if uses_depth => source::refuse_metres(&look, "one camera knows")?,
         DepthFrom::Relative if uses_depth => source::refuse_metres(&look, source::INVERSE_TELLS)?,
         _ => {}
     }
-    let lens = matches!(look.strength, Strength::Lens(_));
-    let note = unused::note(&patch.values(), &unused::Run { effect: look.effect, uses_depth, lens, ..run.unused });
-    look.settings(run.size, run.adaptive).map_or(Ok(()), |settings| settings.check(run.size))?;
+    let run = unused::Run {
+        source: unused::From::Source(facts.kind),
+        depth: if facts.has_depth { facts.depth_from } else { DepthFrom::Nothing },
+        uses_depth,
+        effect: look.effect,
+        lens: matches!(look.strength, Strength::Lens(_)),
+        ..command
+    };
+    let note = unused::note(&patch.values(), &run);
+    look.settings(facts.size, command.realtime).map_or(Ok(()), |settings| settings.check(facts.size))?;
     Ok((look, note))
 }

@@ -8,7 +8,6 @@
 // For the program alone: what its names do not say, comments do.
 #![allow(missing_docs)]
 
-pub mod control;
 pub mod dialog;
 pub mod keys;
 pub mod lent;

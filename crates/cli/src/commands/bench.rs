@@ -130,11 +130,8 @@ pub fn run(command: &BenchCommand, global: &options::Global, given: &Given) -> R
             depth: source::DepthFrom::Metres,
             uses_depth: true,
             effect: look.effect,
-            lens: false,
-            realtime: false,
             cpu_only: command.backend == Backend::Cpu,
-            compresses: false,
-            window: false,
+            ..unused::Run::default()
         },
     );
     if !command.json {

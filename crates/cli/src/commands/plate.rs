@@ -63,13 +63,8 @@ pub fn run(command: &PlateCommand, global: &options::Global, given: &Given) -> R
         &unused::Run {
             source: unused::From::Source(name.kind()),
             depth: depth_from,
-            uses_depth: false,
-            effect: Effect::None,
-            lens: false,
             realtime: camera.info().live,
-            cpu_only: false,
-            compresses: false,
-            window: false,
+            ..unused::Run::default()
         },
     );
     let stop = terminal::stop_flag()?;

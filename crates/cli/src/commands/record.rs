@@ -75,12 +75,8 @@ pub fn run(command: &RecordCommand, global: &options::Global, given: &Given) -> 
             source: unused::From::Source(command.source.kind()),
             depth: depth_from,
             uses_depth: true,
-            effect: Effect::None,
-            lens: false,
             realtime: true,
-            cpu_only: false,
-            compresses: false,
-            window: false,
+            ..unused::Run::default()
         },
     );
     if rig.is_some_and(|rig| !rig.metric) {

@@ -9,11 +9,11 @@ use std::time::Duration;
 
 use clap::Args;
 
-use control::{Beat, Facts, Looks, Served};
+use control::{Beat, Looks, Running, Served};
 
 #[cfg(feature = "window")]
 use crate::commands::preview;
-use crate::controlled;
+use crate::controlled::{self, AsCommandLine};
 use crate::error::CliError;
 use crate::files::tell_of_leftovers;
 use crate::focus;
@@ -31,6 +31,7 @@ use bokehcam::clock::Clock;
 use bokehcam::compute::Backend;
 use bokehcam::computing::Executors;
 use bokehcam::control::{Claim, Name, Status};
+use bokehcam::controller::Facts;
 use bokehcam::depth::focus::FocusRule;
 use bokehcam::link::demand::Demand;
 use bokehcam::look::{Look, Strength};
@@ -233,33 +234,33 @@ impl StreamCommand {
             Ok(claim) => claim,
             Err(why) => {
                 let is_live = info.live || self.to.iter().any(Target::is_live);
-                if is_live || looks.adaptive || self.name.is_some() {
+                if is_live || opened.is_adaptive() || self.name.is_some() {
                     tracing::warn!("{why}");
                 }
                 return Ok(None);
             }
         };
-        let facts = |name: &Name| Facts {
+        let run = Running {
             status: Status {
-                name: name.to_string(),
-                pid: std::process::id(),
-                command: "stream".into(),
                 source: self.source.to_string(),
                 size: Some(info.size),
                 sinks: self.to.iter().map(Target::to_string).collect(),
                 ..Status::default()
             },
-            size: info.size,
-            depth_choice: options.depth_choice.clone(),
-            has_depth: source.has_depth() && options.depth_choice != DepthChoice::None,
-            unused: *unused,
-            config: config.map(Path::to_owned),
+            facts: Facts {
+                kind: self.source.kind(),
+                size: info.size,
+                has_depth: source.has_depth() && options.depth_choice != DepthChoice::None,
+                depth_from: source.depth_from,
+                depth_choice: options.depth_choice.clone(),
+            },
             demand,
             release,
             beat,
         };
+        let rules = AsCommandLine { config: config.map(Path::to_owned), unused: *unused };
         let tray = self.tray.then(|| SettingsFile::load(config)).transpose()?;
-        control::serve(claim, facts, looks, tray.map(|file| file.preset_names())).map(Some)
+        control::serve(claim, run, looks, rules, tray.map(|file| file.preset_names())).map(Some)
     }
 }
 
@@ -294,7 +295,7 @@ fn stream_opened(
     let period = Duration::from_nanos(info.period_ns);
     let (sink, release) = Shutter::new(sink, info.size, period, demand.clone(), Clock::system(), closed);
     let beat = Arc::new(Beat::default());
-    let looks = Looks { look: opened.look.clone(), adaptive, changes, executors };
+    let looks = Looks { look: opened.look.clone(), changes, executors };
     let for_others = (noticed, release, Arc::clone(&beat));
     let server = command.serve(claim, &opened, for_others, looks, global.config.as_deref())?;
     let pace = opened.pace;

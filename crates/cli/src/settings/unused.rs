@@ -31,6 +31,23 @@ pub struct Run {
     pub window: bool,
 }
 
+impl Default for Run {
+    /// A picture that is not blurred.
+    fn default() -> Self {
+        Self {
+            source: From::Picture,
+            depth: DepthFrom::Nothing,
+            uses_depth: false,
+            effect: Effect::None,
+            lens: false,
+            realtime: false,
+            cpu_only: false,
+            compresses: false,
+            window: false,
+        }
+    }
+}
+
 /// What frames come from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum From {
@@ -161,17 +178,7 @@ pub fn note(changed: &[Value], run: &Run) -> Option<String> {
 /// Warns of the given settings that have no effect with this kind of source; all else can be changed in the window.
 #[cfg(feature = "window")]
 pub fn warn_by_source(given: &[Setting], source: Kind) {
-    let run = Run {
-        source: From::Source(source),
-        depth: DepthFrom::Nothing,
-        uses_depth: false,
-        effect: Effect::None,
-        lens: false,
-        realtime: true,
-        cpu_only: false,
-        compresses: false,
-        window: true,
-    };
+    let run = Run { source: From::Source(source), realtime: true, window: true, ..Run::default() };
     line_of(without(NEEDS_OF_SOURCE, given, &run)).iter().for_each(|line| log::warn(line));
 }
 

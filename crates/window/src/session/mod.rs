@@ -89,7 +89,7 @@ pub struct Saving {
 pub struct StillOrder {
     /// The file; `None` is where snapshots usually go.
     pub to: Option<PathBuf>,
-    pub answer: SyncSender<Answer>,
+    pub answer: SyncSender<Result<PathBuf, Answer>>,
 }
 
 /// What is left of a session.

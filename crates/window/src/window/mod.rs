@@ -18,10 +18,11 @@ use winit::event_loop::EventLoop;
 use app::App;
 pub use memory::{Memory, Size};
 
-use super::control::Control;
 use super::session;
 use super::state::State;
 use bokehcam::compute::device::Device;
+use bokehcam::control::Claim;
+use bokehcam::controller::Rules;
 use bokehcam::stats::Report;
 
 bokehcam::names::named! {
@@ -55,6 +56,12 @@ impl From<accesskit_winit::Event> for Call {
     fn from(event: accesskit_winit::Event) -> Self {
         Self::Access(event)
     }
+}
+
+/// The name that others control a preview by, and what they are understood and allowed to.
+pub struct Control {
+    pub claim: Claim,
+    pub rules: Arc<dyn Rules>,
 }
 
 /// What a preview begins with.

@@ -2,17 +2,15 @@
 
 mod store;
 
-use std::path::Path;
 use std::str::FromStr;
 use std::sync::Arc;
 
 use clap::Args;
 
-use crate::controlled::{self, Standing, changed, refused};
+use crate::controlled::{self, AsCommandLine};
 use crate::error::CliError;
 use crate::options::{Global, Streaming, Window};
 use crate::report;
-use crate::settings::changes;
 use crate::settings::file;
 use crate::settings::layers::Given;
 use crate::settings::look;
@@ -20,19 +18,18 @@ use crate::settings::unused;
 use crate::sinks;
 use crate::terminal;
 use bokehcam::compute::Backend;
-use bokehcam::control::{Answer, Name, Request};
+use bokehcam::control::Name;
 use bokehcam::files::user_folders::Folders;
 use bokehcam::link::demand::Demand;
-use bokehcam::look::{Effect, Look, Patch};
+use bokehcam::look::{Effect, Look};
 use bokehcam::pipeline::Pace;
 use bokehcam::sink::Target;
-use bokehcam::source::{self, DepthChoice, DepthFrom, SourceName};
-use bokehcam_window::control::{Control, Wish};
+use bokehcam::source::{self, SourceName};
 use bokehcam_window::session::Start;
-use bokehcam_window::state::{Output, Running, State};
+use bokehcam_window::state::{Output, State};
 use bokehcam_window::system::System;
 use bokehcam_window::texts;
-use bokehcam_window::window::{self, Memory, Preview};
+use bokehcam_window::window::{self, Control, Memory, Preview};
 
 use store::FileStore;
 
@@ -138,13 +135,16 @@ pub fn show(
         state.note(AS_IT_WAS);
     }
     gone.into_iter().for_each(|line| state.note(line));
-    let config = global.config.clone();
-    let cpu_only = computing.backend == Backend::Cpu;
-    let control = controlled::claim(called, "preview")?.map(|claim| Control {
-        claim,
-        understand: Box::new(move |request| understand(request, config.as_deref()).map_err(|error| refused(&error))),
-        judge: Box::new(move |patch, look, running| judge(patch, look, running, cpu_only)),
-    });
+    let rules = AsCommandLine {
+        config: global.config.clone(),
+        unused: unused::Run {
+            cpu_only: computing.backend == Backend::Cpu,
+            realtime: true,
+            window: true,
+            ..unused::Run::default()
+        },
+    };
+    let control = controlled::claim(called, "preview")?.map(|claim| Control { claim, rules: Arc::new(rules) });
     let look = state.look.clone();
     let mut system = System::new(parts.source_options(), look.clone(), Box::new(store));
     let device = system.executors.device()?;
@@ -186,39 +186,6 @@ pub fn show(
         Some(why) if ended.report.is_none() || close_at_end => Err(CliError::NoFrames(why)),
         _ => ended.unwritten.map_or(written, |why| Err(CliError::OutputFailed(why))),
     }
-}
-
-/// What is asked of the window by others.
-fn understand(request: Request, config: Option<&Path>) -> Result<Wish, CliError> {
-    Ok(match request {
-        Request::Status => Wish::Status,
-        Request::On => Wish::On(true),
-        Request::Off => Wish::On(false),
-        Request::Toggle => Wish::Toggle,
-        Request::Preset { name } => Wish::Look(changes::preset(config, &name)?),
-        Request::Set { settings } => Wish::Look(changes::patch(&settings)?),
-        Request::Depth { from } => Wish::Depth(from.parse().map_err(CliError::Usage)?),
-        Request::Snapshot { to } => Wish::Snapshot(to),
-    })
-}
-
-/// Whether others can change the look so, and what of that has no effect.
-fn judge(patch: &Patch, look: &Look, running: &Running, cpu_only: bool) -> Result<Option<String>, Answer> {
-    let &Running { size, has_depth, kind, depth_from, .. } = running;
-    let unused = unused::Run {
-        source: unused::From::Source(kind),
-        depth: if has_depth { depth_from } else { DepthFrom::Nothing },
-        uses_depth: has_depth,
-        effect: look.effect,
-        lens: false,
-        realtime: true,
-        cpu_only,
-        compresses: false,
-        window: true,
-    };
-    // Depth that was declined is none of this source's.
-    let run = Standing { size, depth_choice: &DepthChoice::Auto, has_depth, adaptive: true, unused };
-    changed(patch, look, &run).map(|(_, note)| note).map_err(|error| refused(&error))
 }
 
 /// Shown where the look is not the usual one from the start.

@@ -1,59 +1,37 @@
 //! A stream, as others control it.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU8, Ordering};
 use std::sync::mpsc::{self, Receiver, Sender};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::{self, JoinHandle};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
-use crate::controlled::{Standing, changed, refused};
+use crate::controlled::{AsCommandLine, refused};
 use crate::error::CliError;
 use crate::files::make_folder_of;
 use crate::log;
-use crate::settings::{changes, unused};
 use bokehcam::budget::Quality;
 use bokehcam::clock::Clock;
 use bokehcam::computing::Executors;
 #[cfg(feature = "desktop")]
 use bokehcam::control::bus;
-use bokehcam::control::{Answer, Claim, Handler, Name, Request, Server, Status};
+use bokehcam::control::{Answer, Claim, Server, Status};
+use bokehcam::controller::{Controlled, Controller, Facts, Rules};
 use bokehcam::files::user_folders::Folders;
 use bokehcam::link::demand::Demand;
 use bokehcam::look::{Look, Patch};
 use bokehcam::pipeline::{Changes, Progress};
 use bokehcam::recording::still;
 use bokehcam::sink::Release;
-use bokehcam::source::DepthChoice;
 use bokehcam::stats::Pulse;
 
 /// How long a picture that is to be saved is waited for.
 const PATIENCE: Duration = Duration::from_secs(2);
 
-/// What is known of a run from its start.
-pub(super) struct Facts {
-    /// Its status; what changes is filled in when somebody asks.
-    pub status: Status,
-    /// Columns and rows of its pictures.
-    pub size: (u32, u32),
-    pub depth_choice: DepthChoice,
-    /// Whether its frames have depth.
-    pub has_depth: bool,
-    /// What the warnings about settings to no effect go by.
-    pub unused: unused::Run,
-    /// The settings file, where one was chosen.
-    pub config: Option<PathBuf>,
-    /// Whether somebody watches, where that is noticed.
-    pub demand: Option<Demand>,
-    /// Keeps pictures away, and takes one.
-    pub release: Release,
-    pub beat: Arc<Beat>,
-}
-
 /// The look at the start, and how it is changed.
 pub(super) struct Looks {
     pub look: Look,
-    pub adaptive: bool,
     pub changes: Changes,
     pub executors: Executors,
 }
@@ -79,11 +57,21 @@ impl Drop for Served {
     }
 }
 
-/// What answers.
-struct Controlled {
-    facts: Facts,
-    began: Instant,
-    adaptive: bool,
+/// A stream as those see it who control it.
+pub(super) struct Running {
+    /// What does not change.
+    pub status: Status,
+    pub facts: Facts,
+    /// Whether somebody watches, where that is noticed.
+    pub demand: Option<Demand>,
+    /// Keeps pictures away, and takes one.
+    pub release: Release,
+    pub beat: Arc<Beat>,
+}
+
+/// A stream and its look.
+struct Stream {
+    run: Running,
     /// The look that was asked for last. Locked by those who ask and by who makes executors, never on a frame's way.
     look: Arc<Mutex<Look>>,
     /// Where it goes to be adopted.
@@ -118,25 +106,25 @@ impl Beat {
     }
 }
 
-/// Answers those who ask from now on; `facts` are of the name that the stream has. With names of presets to show, it is on
-/// the session's message bus as well, and in the tray.
+/// Answers those who ask from now on, as the rules say. With names of presets to show, it is on the session's message bus as
+/// well, and in the tray.
 ///
 /// # Errors
 /// The system gives no thread.
 pub(super) fn serve(
     claim: Claim,
-    facts: impl FnOnce(&Name) -> Facts,
+    run: Running,
     looks: Looks,
+    rules: AsCommandLine,
     tray: Option<Vec<String>>,
 ) -> Result<Served, CliError> {
     let no_thread = |error| CliError::io("a thread that answers `bokehcam ctl`".as_ref())(error);
-    let (facts, adaptive, look) = (facts(claim.name()), looks.adaptive, Arc::new(Mutex::new(looks.look.clone())));
+    let look = Arc::new(Mutex::new(looks.look.clone()));
     let (adopt, asked) = mpsc::channel();
-    let (size, stated) = (facts.size, Arc::clone(&look));
+    let (size, stated) = (run.facts.size, Arc::clone(&look));
     let follow = move || follow(looks, size, &asked, &stated);
     let looks = thread::Builder::new().name("looks".into()).spawn(follow).map_err(no_thread)?;
-    let controlled = Controlled { facts, began: Instant::now(), adaptive, look, adopt };
-    let handler: Arc<Handler> = Arc::new(move |request| controlled.answer(request));
+    let handler = Controller::begin(claim.name().clone(), "stream", Arc::new(rules), Stream { run, look, adopt });
     #[cfg(feature = "desktop")]
     let (bus, handler) = match tray.map(|presets| bus::serve(Arc::clone(&handler), presets)) {
         Some(Ok((bus, handler))) => (Some(bus), handler),
@@ -185,45 +173,33 @@ fn lock(look: &Mutex<Look>) -> MutexGuard<'_, Look> {
     look.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-impl Controlled {
-    /// Does what is asked for.
-    fn answer(&self, request: Request) -> Answer {
-        let release = &self.facts.release;
-        let done = match request {
-            Request::Status => Ok(None),
-            Request::On | Request::Off | Request::Toggle => {
-                let closes = match request {
-                    Request::Toggle => !release.is_closed(),
-                    request => request == Request::Off,
-                };
-                release.close(closes);
-                if closes {
-                    release.wait_covered().map_err(|error| CliError::Control(error.to_string()))
-                } else {
-                    Ok(None)
-                }
-            }
-            Request::Preset { name } => {
-                changes::preset(self.facts.config.as_deref(), &name).and_then(|patch| self.change(&patch))
-            }
-            Request::Set { settings } => changes::patch(&settings).and_then(|patch| self.change(&patch)),
-            Request::Depth { from } => Err(CliError::Usage(format!(
-                "a stream keeps the depth that it began with: begin it anew with --depth {from}, or use a preview"
-            ))),
-            Request::Snapshot { to } => return self.save(to).unwrap_or_else(|error| refused(&error)),
-        };
-        match done {
-            Ok(note) => Answer::Done { status: Box::new(self.status()), note },
-            Err(error) => refused(&error),
-        }
+impl Controlled for Stream {
+    fn status(&self) -> Result<Status, Answer> {
+        let Running { status, demand, release, beat, .. } = &self.run;
+        Ok(Status {
+            on: !release.is_closed(),
+            watched: demand.as_ref().map(Demand::has_watchers),
+            quality: beat.quality().map(|quality| quality.name().to_owned()),
+            fps: beat.pulse.per_second(beat.clock.now_ns()),
+            look: Patch::described(&lock(&self.look)),
+            ..status.clone()
+        })
     }
 
-    /// Changes the look; gives back what of that has no effect.
-    fn change(&self, patch: &Patch) -> Result<Option<String>, CliError> {
-        let &Facts { has_depth, ref depth_choice, size, unused, .. } = &self.facts;
+    fn switch(&self, on: Option<bool>) -> Result<bool, Answer> {
+        let release = &self.run.release;
+        let on = on.unwrap_or_else(|| release.is_closed());
+        release.close(!on);
+        Ok(on)
+    }
+
+    fn release(&self) -> Option<Release> {
+        Some(self.run.release.clone())
+    }
+
+    fn change(&self, patch: Patch, rules: &Arc<dyn Rules>) -> Result<Option<String>, Answer> {
         let mut stated = lock(&self.look);
-        let run = Standing { size, depth_choice, has_depth, adaptive: self.adaptive, unused };
-        let (look, note) = changed(patch, &stated, &run)?;
+        let (look, note) = rules.changed(&patch, &stated, &self.run.facts)?;
         if look != *stated {
             // Nobody takes it where the stream has just ended.
             let _ = self.adopt.send(look.clone());
@@ -232,39 +208,24 @@ impl Controlled {
         Ok(note)
     }
 
-    /// Saves the next picture.
-    fn save(&self, to: Option<PathBuf>) -> Result<Answer, CliError> {
-        let Facts { release, demand, .. } = &self.facts;
-        let path = to.unwrap_or_else(|| Folders::of_user().free_picture());
-        if !path.is_absolute() {
-            return Err(CliError::Usage(format!("{}: say the whole path", path.display())));
-        }
-        if release.is_closed() {
-            return Ok(Answer::failed("it is off: there is no picture"));
-        }
-        if demand.as_ref().is_some_and(|demand| !demand.is_watched()) {
-            return Ok(Answer::failed("nobody watches, so the camera is closed: there is no picture"));
-        }
-        let Some(picture) = release.picture(PATIENCE) else {
-            return Ok(Answer::failed(format!("no picture came for {} s", PATIENCE.as_secs())));
-        };
-        make_folder_of(&path)?;
-        still::write_color(&path, &picture, false)?;
-        Ok(Answer::Saved { saved: path })
+    fn make_depth_by(&self, way: &str) -> Result<(), Answer> {
+        Err(Answer::usage(format!(
+            "a stream keeps the depth that it began with: begin it anew with --depth {way}, or use a preview"
+        )))
     }
 
-    fn status(&self) -> Status {
-        let Facts { status, demand, release, beat, .. } = &self.facts;
-        let look = lock(&self.look).clone();
-        let round = |value: f64| (value * 10.0).round() / 10.0;
-        Status {
-            on: !release.is_closed(),
-            watched: demand.as_ref().map(Demand::has_watchers),
-            quality: beat.quality().map(|quality| quality.name().to_owned()),
-            fps: round(beat.pulse.per_second(beat.clock.now_ns())),
-            look: Patch::described(&look),
-            uptime_s: round(self.began.elapsed().as_secs_f64()),
-            ..status.clone()
+    fn save(&self, to: Option<&Path>) -> Result<PathBuf, Answer> {
+        if self.run.demand.as_ref().is_some_and(|demand| !demand.is_watched()) {
+            return Err(Answer::failed("nobody watches, so the camera is closed: there is no picture"));
         }
+        let picture = self.run.release.picture(PATIENCE);
+        let picture =
+            picture.ok_or_else(|| Answer::failed(format!("no picture came for {} s", PATIENCE.as_secs())))?;
+        let path = to.map_or_else(|| Folders::of_user().free_picture(), Path::to_owned);
+        let write = || -> Result<(), CliError> {
+            make_folder_of(&path)?;
+            Ok(still::write_color(&path, &picture, false)?)
+        };
+        write().map(|()| path.clone()).map_err(|error| refused(&error))
     }
 }

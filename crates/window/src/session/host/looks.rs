@@ -74,11 +74,11 @@ impl Host {
             Ok(path) => {
                 self.news.note(format!("Saved {}", folders::shown(&path)));
                 self.news.kept(&path);
-                Answer::Saved { saved: path }
+                Ok(path)
             }
             Err(error) => {
                 self.news.note(error.to_string());
-                Answer::failed(error.to_string())
+                Err(Answer::failed(error.to_string()))
             }
         };
         // Who gave up waiting sees the note.

@@ -1,39 +1,58 @@
-//! What others ask of the window from outside.
+//! What others ask of the window from outside: its own thread does it, as if the person had done it here.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
-use std::sync::mpsc::{Receiver, SyncSender};
-use std::time::Instant;
+use std::sync::mpsc::{self, Receiver, Sender, SyncSender};
+use std::sync::{Arc, PoisonError};
+use std::time::{Duration, Instant};
 
 use winit::event_loop::{ActiveEventLoop, EventLoopProxy};
 
 use super::App;
-use crate::control::{Asked, Control, Judge, Wish};
 use crate::lent::Lent;
 use crate::session::{CurrentRelease, StillOrder};
-use crate::state::{Action, Source, Way};
-use crate::window::Call;
+use crate::state::{Action, Running, Source, Way};
+use crate::window::{Call, Control};
 use bokehcam::control::{Answer, Server, Status};
+use bokehcam::controller::{Controlled, Controller, Facts, Rules};
 use bokehcam::look::{Look, Patch};
+use bokehcam::sink::Release;
+use bokehcam::source::DepthChoice;
+
+/// How long the window, and who saves pictures, may take to answer.
+const PATIENCE: Duration = Duration::from_secs(3);
+
+/// Something that the window's thread is to do for somebody else.
+type Errand = Box<dyn FnOnce(&mut App, &ActiveEventLoop) + Send>;
+
+/// The window as those see it who control it.
+struct Remote {
+    errands: Sender<Errand>,
+    proxy: EventLoopProxy<Call>,
+    release: CurrentRelease,
+}
 
 /// Listens to those who ask, until it is dropped.
-pub(super) struct Controlled {
-    server: Server,
-    asked: Receiver<Asked>,
-    began: Instant,
-    judge: Box<Judge>,
+pub(super) struct Served {
+    /// Gone first, so that nobody waits for what is not done any more.
+    errands: Receiver<Errand>,
+    _server: Server,
     /// What of the look is not the person's own.
     lent: Lent,
     /// A snapshot that waits for its frame.
     order: Option<StillOrder>,
 }
 
-impl Controlled {
-    pub fn begin(control: Control, release: CurrentRelease, proxy: &EventLoopProxy<Call>) -> std::io::Result<Self> {
-        let proxy = proxy.clone();
-        // An event loop that is gone needs no waking.
-        let (server, asked, judge) = control.begin(release, move || drop(proxy.send_event(Call::Control)))?;
-        Ok(Self { server, asked, began: Instant::now(), judge, lent: Lent::default(), order: None })
+impl Served {
+    pub fn begin(
+        Control { claim, rules }: Control,
+        release: CurrentRelease,
+        proxy: &EventLoopProxy<Call>,
+    ) -> std::io::Result<Self> {
+        let (to, errands) = mpsc::channel();
+        let remote = Remote { errands: to, proxy: proxy.clone(), release };
+        let handler = Controller::begin(claim.name().clone(), "preview", rules, remote);
+        Ok(Self { errands, _server: claim.serve(handler)?, lent: Lent::default(), order: None })
     }
 
     /// The snapshot that was asked for from outside, for who saves it.
@@ -42,54 +61,91 @@ impl Controlled {
     }
 }
 
+impl Remote {
+    /// Has the window's thread do this.
+    fn ask<T: Send + 'static>(
+        &self,
+        what: impl FnOnce(&mut App, &ActiveEventLoop) -> T + Send + 'static,
+    ) -> Result<T, Answer> {
+        let (to, done) = mpsc::sync_channel(1);
+        // Whoever gave up waiting needs no answer.
+        let errand: Errand = Box::new(move |app, events| drop(to.try_send(what(app, events))));
+        self.errands.send(errand).map_err(|_| Answer::failed("the window is closed"))?;
+        // An event loop that is gone needs no waking.
+        let _ = self.proxy.send_event(Call::Control);
+        taken(&done)
+    }
+}
+
+/// What somebody else gives, in time.
+fn taken<T>(from: &Receiver<T>) -> Result<T, Answer> {
+    from.recv_timeout(PATIENCE).map_err(|_| Answer::failed("the window does not answer in time"))
+}
+
+impl Controlled for Remote {
+    fn status(&self) -> Result<Status, Answer> {
+        self.ask(|app, _| app.status())
+    }
+
+    fn switch(&self, on: Option<bool>) -> Result<bool, Answer> {
+        self.ask(move |app, events| {
+            let on = on.unwrap_or(app.state.off);
+            app.perform(Action::Off(!on), events);
+            on
+        })
+    }
+
+    fn release(&self) -> Option<Release> {
+        self.release.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+
+    fn change(&self, patch: Patch, rules: &Arc<dyn Rules>) -> Result<Option<String>, Answer> {
+        let rules = Arc::clone(rules);
+        self.ask(move |app, events| app.change(&patch, &*rules, events))?
+    }
+
+    fn make_depth_by(&self, way: &str) -> Result<(), Answer> {
+        let way = way.parse().map_err(Answer::usage)?;
+        self.ask(move |app, events| {
+            app.can_make_depth_by(way)?;
+            app.perform(Action::DepthBy(way), events);
+            Ok(())
+        })?
+    }
+
+    fn save(&self, to: Option<&Path>) -> Result<PathBuf, Answer> {
+        let to = to.map(Path::to_owned);
+        let (answer, saved) = mpsc::sync_channel(1);
+        self.ask(move |app, _| app.snapshot_for(to, answer))??;
+        taken(&saved)?
+    }
+}
+
 impl App {
-    /// Does what others ask for, as if the person had done it here.
+    /// Does what others ask for.
     pub(super) fn listen(&mut self, events: &ActiveEventLoop) {
-        while let Some(Asked { wish, answer }) = self.controlled.as_ref().and_then(|all| all.asked.try_recv().ok()) {
-            let done = match wish {
-                Wish::Status => Ok(None),
-                Wish::On(on) => {
-                    self.perform(Action::Off(!on), events);
-                    Ok(None)
-                }
-                Wish::Toggle => {
-                    self.perform(Action::Off(!self.state.off), events);
-                    Ok(None)
-                }
-                Wish::Look(patch) => self.look_after(&patch).map(|(look, note)| {
-                    let before = self.state.chosen_look();
-                    self.perform(Action::Look { look: Box::new(look), stroke: None }, events);
-                    let after = self.state.chosen_look();
-                    self.controlled.iter_mut().for_each(|all| all.lent.change(&before, &after));
-                    note
-                }),
-                Wish::Depth(way) => self.can_make_depth_by(way).map(|()| {
-                    self.perform(Action::DepthBy(way), events);
-                    None
-                }),
-                Wish::Snapshot(to) => {
-                    self.snapshot_for(to, answer);
-                    continue;
-                }
-            };
-            let told = match (done, self.status()) {
-                (Err(answer), _) => answer,
-                (Ok(note), Some(status)) => Answer::Done { status: Box::new(status), note },
-                (Ok(_), None) => Answer::failed("the window is closed"),
-            };
-            // Whoever gave up waiting needs no answer.
-            let _ = answer.try_send(told);
+        while let Some(errand) = self.served.as_ref().and_then(|served| served.errands.try_recv().ok()) {
+            errand(self, events);
         }
     }
 
-    /// The look after a change, if it can be, and what of the change has no effect.
-    fn look_after(&self, patch: &Patch) -> Result<(Look, Option<String>), Answer> {
-        let look = self.state.patched(patch).map_err(Answer::usage);
-        let note = match (&self.state.source, &self.controlled) {
-            (Source::Running(running), Some(all)) => (all.judge)(patch, &self.state.look, running)?,
+    /// Changes the look for others, who lend it; gives back what of the change has no effect.
+    fn change(
+        &mut self,
+        patch: &Patch,
+        rules: &dyn Rules,
+        events: &ActiveEventLoop,
+    ) -> Result<Option<String>, Answer> {
+        let note = match &self.state.source {
+            Source::Running(running) => rules.changed(patch, &self.state.look, &facts(running))?.1,
             _ => None,
         };
-        Ok((look?, note))
+        let look = self.state.patched(patch).map_err(Answer::usage)?;
+        let before = self.state.chosen_look();
+        self.perform(Action::Look { look: Box::new(look), stroke: None }, events);
+        let after = self.state.chosen_look();
+        self.served.iter_mut().for_each(|served| served.lent.change(&before, &after));
+        Ok(note)
     }
 
     /// Refuses a way to depth that the source has not; the answer names those that it has.
@@ -108,25 +164,23 @@ impl App {
     /// The look to be remembered: without what others have lent it.
     pub(super) fn own_look(&self) -> Look {
         let look = self.state.chosen_look();
-        self.controlled.as_ref().map_or_else(|| look.clone(), |all| all.lent.without(&look))
+        self.served.as_ref().map_or_else(|| look.clone(), |served| served.lent.without(&look))
     }
 
     /// Saves the frame that is shown for somebody who waits for that.
-    fn snapshot_for(&mut self, to: Option<PathBuf>, answer: SyncSender<Answer>) {
-        let refused = match (&self.view, &to) {
-            _ if self.state.off => Some("it is off: there is no picture"),
-            (None, _) => Some("there is no picture yet"),
-            (_, Some(path)) if !path.is_absolute() => Some("say the whole path of the file"),
-            _ => None,
-        };
-        match (refused, &mut self.controlled) {
-            (Some(why), _) => drop(answer.try_send(Answer::failed(why))),
-            (None, Some(controlled)) => {
-                controlled.order = Some(StillOrder { to, answer });
-                self.snapshot();
-            }
-            (None, None) => {}
+    fn snapshot_for(
+        &mut self,
+        to: Option<PathBuf>,
+        answer: SyncSender<Result<PathBuf, Answer>>,
+    ) -> Result<(), Answer> {
+        if self.view.is_none() {
+            return Err(Answer::failed("there is no picture yet"));
         }
+        if let Some(served) = &mut self.served {
+            served.order = Some(StillOrder { to, answer });
+            self.snapshot();
+        }
+        Ok(())
     }
 
     /// Lets no picture pass, to the screen neither, or lets them again.
@@ -139,8 +193,7 @@ impl App {
         }
     }
 
-    fn status(&self) -> Option<Status> {
-        let controlled = self.controlled.as_ref()?;
+    fn status(&self) -> Status {
         let state = &self.state;
         let size = match &state.source {
             Source::Running(running) => Some(running.size),
@@ -149,21 +202,22 @@ impl App {
         let outputs = state.outputs.iter().map(|output| output.name.clone());
         let is_moving =
             size.is_some() && !state.off && !state.frozen && state.silent_s.is_none() && self.watch.is_some();
-        let round = |value: f64| (value * 10.0).round() / 10.0;
-        Some(Status {
-            name: controlled.server.name().to_string(),
-            pid: std::process::id(),
-            command: "preview".into(),
+        Status {
             on: !state.off,
             source: state.source_name.clone(),
             size,
-            depth: self.state.way().map(|way| way.to_string()),
+            depth: state.way().map(|way| way.to_string()),
             sinks: ["window".to_owned()].into_iter().chain(outputs).collect(),
             watched: Some(self.demand.has_watchers()),
             quality: self.view.as_ref().and_then(|view| Some(view.trace.quality?.name().to_owned())),
-            fps: if is_moving { round(state.meters.summary().fps) } else { 0.0 },
+            fps: if is_moving { state.meters.summary().fps } else { 0.0 },
             look: Patch::described(&state.look),
-            uptime_s: round(controlled.began.elapsed().as_secs_f64()),
-        })
+            ..Status::default()
+        }
     }
+}
+
+/// What decides which looks a source can have. Depth that was declined is none of it.
+fn facts(&Running { kind, size, has_depth, depth_from, .. }: &Running) -> Facts {
+    Facts { kind, size, has_depth, depth_from, depth_choice: DepthChoice::Auto }
 }

@@ -96,7 +96,7 @@ pub(super) struct App {
     memory_file: Option<PathBuf>,
     close_at_end: bool,
     /// Those who ask from outside, if they can.
-    controlled: Option<control::Controlled>,
+    served: Option<control::Served>,
     /// Whether outputs have the still card: for who hands pictures to them.
     off: Arc<AtomicBool>,
     stop: Arc<AtomicBool>,
@@ -117,9 +117,8 @@ impl App {
             }
         });
         let control = control.inspect_err(|why| tracing::warn!("{why}")).ok();
-        let controlled =
-            control.map(|control| control::Controlled::begin(control, Arc::clone(&session.release), &proxy));
-        let controlled = controlled.transpose()?;
+        let served = control.map(|control| control::Served::begin(control, Arc::clone(&session.release), &proxy));
+        let served = served.transpose()?;
         let off = Arc::clone(&session.off);
         let (wanted, demand) = (Arc::clone(&session.wanted), session.demand.clone());
         let clock = Clock::system();
@@ -164,7 +163,7 @@ impl App {
             memory,
             memory_file,
             close_at_end,
-            controlled,
+            served,
             off,
             stop,
             failed: None,
@@ -173,9 +172,9 @@ impl App {
 
     /// Closes the window, then the session, and adds what was shown to the report.
     pub fn end(self) -> Result<Ended, WindowError> {
-        let Self { gfx, view, frames, session, state, failed, controlled, .. } = self;
+        let Self { gfx, view, frames, session, state, failed, served, .. } = self;
         // Nobody can ask any more.
-        drop(controlled);
+        drop(served);
         // The window goes at once; outputs may take a while to be completed.
         drop((gfx, view));
         let Closed { mut report, failed: unwritten } = session.close();

@@ -137,7 +137,7 @@ impl App {
         self.snapshot_due = view.picture.memory().is_none() || is_running && (between || depth_held && !is_frozen);
         self.update_wanted();
         let Some(still) = still(view, 0).filter(|_| !self.snapshot_due) else { return };
-        let order = self.controlled.as_mut().and_then(control::Controlled::take_order);
+        let order = self.served.as_mut().and_then(control::Served::take_order);
         self.session.save(still, Saving { with_sources: self.state.habits.keep_sources, order });
     }
 
