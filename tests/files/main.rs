@@ -7,3 +7,4 @@ mod licences;
 mod recording;
 mod scripts;
 mod sinks;
+mod style;
