@@ -1,4 +1,4 @@
-//! How well a few separable kernels make up an aperture (McGraw 2015, eq. 1 and 2).
+//! Errors of apertures approximated by a few separable kernels (McGraw 2015, eq. 1 and 2).
 use bokehcam::bokeh::aperture::{Aperture, Shape};
 use bokehcam::bokeh::low_rank::Decomposition;
 

@@ -1,4 +1,4 @@
-//! Disparity of a rectified stereo pair.
+//! Computes the disparity of a rectified stereo pair.
 use bokehcam::computing::Computing;
 use bokehcam::depth::stereo::{Effort, Pair};
 use bokehcam::frame::{DisparityMap, GrayImage};

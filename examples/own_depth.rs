@@ -1,4 +1,4 @@
-//! Depth of one's own in the pipeline: here the middle of the picture is near.
+//! Uses a custom depth source in the pipeline: here the middle of the picture is near.
 use std::sync::atomic::AtomicBool;
 
 use bokehcam::depth::{DepthError, DepthSource, Seen};

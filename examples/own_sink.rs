@@ -1,4 +1,4 @@
-//! A recording, blurred, into a sink of one's own.
+//! Blurs a recording into a custom sink.
 use std::ops::ControlFlow;
 use std::sync::atomic::AtomicBool;
 

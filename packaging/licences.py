@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
-"""Prints the licences of all that is built into bokehcam as packages bring it: its crates, and the fonts; with an argument,
-`python` or `gst`, of all that is built into what is made there. Each text stands once, below those that it is for.
-Needs cargo, which fetches what a build has left out: metadata takes crates of tests, too."""
+"""Prints the licences of all crates and fonts built into the packaged bokehcam, or with the argument `python` or `gst` into
+the Python package or the GStreamer plugin. Each text is printed once, below the names of its crates.
+Needs cargo, which fetches crates that the build did not need: the metadata includes those of tests."""
 
 import json
 import pathlib
@@ -10,7 +10,7 @@ import sys
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 MADE = (sys.argv[1:] or ["program"])[0]
-# What is built, as cargo is told it.
+# Arguments for cargo, by product.
 PACKAGES = {
     "program": ["bokehcam-cli", "--no-default-features", "--features=packaged"],
     "python": ["bokehcam-python"],
@@ -20,7 +20,7 @@ TEXTS = ("license", "licence", "copying", "notice", "unlicense")
 
 
 def built_in():
-    """Packages of others that it is linked with, by name."""
+    """Returns the linked third-party packages, by name."""
     def cargo(*arguments):
         return subprocess.run(["cargo", *arguments], check=True, capture_output=True, text=True, cwd=ROOT).stdout
 

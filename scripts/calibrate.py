@@ -16,7 +16,7 @@ import sys
 import cv2
 import numpy as np
 
-FEWEST_PAIRS = 8
+MIN_PAIRS = 8
 
 
 def arguments():
@@ -74,15 +74,15 @@ def main():
             if picture.shape[::-1] != size:
                 sys.exit(f"{name}: {picture.shape[1]}x{picture.shape[0]}, and the first one was {size[0]}x{size[1]}")
         points = [corners(picture, args.board) for picture in pictures]
-        if any(eye is None for eye in points):
+        if any(found is None for found in points):
             print(f"left out, as the board was not found in both: {name}", file=sys.stderr)
         else:
             seen.append(points)
-    if len(seen) < FEWEST_PAIRS:
-        sys.exit(f"the board was found in {len(seen)} pairs, and {FEWEST_PAIRS} are needed: take more, and check --corners")
+    if len(seen) < MIN_PAIRS:
+        sys.exit(f"the board was found in {len(seen)} pairs, and {MIN_PAIRS} are needed: take more, and check --corners")
 
     boards = [square] * len(seen)
-    left, right = [[points[eye] for points in seen] for eye in (0, 1)]
+    left, right = [[points[camera] for points in seen] for camera in (0, 1)]
     rms_left, m1, d1, _, _ = cv2.calibrateCamera(boards, left, size, None, None)
     rms_right, m2, d2, _, _ = cv2.calibrateCamera(boards, right, size, None, None)
     rms, m1, d1, m2, d2, r, t, _, _ = cv2.stereoCalibrate(
@@ -90,8 +90,8 @@ def main():
     )
     r1, r2, p1, p2 = cv2.stereoRectify(m1, d1, m2, d2, size, r, t)[:4]
     level = [
-        cv2.undistortPoints(np.concatenate(eye), m, d, R=turn, P=p)[:, 0, 1]
-        for eye, m, d, turn, p in ((left, m1, d1, r1, p1), (right, m2, d2, r2, p2))
+        cv2.undistortPoints(np.concatenate(points), m, d, R=turn, P=p)[:, 0, 1]
+        for points, m, d, turn, p in ((left, m1, d1, r1, p1), (right, m2, d2, r2, p2))
     ]
     print(
         f"{len(seen)} pairs of {size[0]}x{size[1]}; RMS of left {rms_left:.3f}, right {rms_right:.3f}, both {rms:.3f} px; "

@@ -1,5 +1,6 @@
-// Shared by the passes that need level 0 of the pyramid: colour and CoC as far as neither the pixel nor a neighbour is hidden
-// by what lies in front of the layer. Such a pass has `work`, `frame`, `scene`, `mixed` and `nearest_px`.
+// Shared by passes that need level 0 of the pyramid: colour and CoC, known only if neither the pixel nor a neighbour is
+// occluded by something in front of the layer. Such a pass binds `work`, `frame`, `scene`, `mixed` and `nearest_px`.
+// twin: src/bokeh/cpu/levels.rs (`Base`)
 
 fn base(pixel: vec2<u32>) -> Known {
     let size = finest();
@@ -17,7 +18,7 @@ fn base(pixel: vec2<u32>) -> Known {
         let at = min(2u * pixel + vec2(sub % 2u, sub / 2u), frame.size - 1u);
         let index = at.y * frame.size.x + at.x;
         var seen = scene_unpacked(scene[index], frame.most_px);
-        // What is known behind a subject does not lie before it: the pixel is what it shows.
+        // A mixed pixel counts as the composite it shows: its farther surface is not in front of the subject.
         if is_mixed(scene[index]) {
             let k = first_mixed(index);
             let near = near_surface(k);

@@ -1,7 +1,8 @@
-// Pass bin: a bin's share of each pixel, premultiplied and averaged down to the bin's scale, and the coarse grid over
-// it. Reads the scene as the layer of the bins sees it; writes premultiplied r, g, b and coverage where there is any, and per
-// cell of CELL x CELL bin pixels two vectors: coverage, coverage times |CoC|, lowest red and green; lowest blue, highest red,
-// green and blue.
+// Pass bin: the weighted pixels of a bin, premultiplied and averaged down to its scale, and the coarse grid over it.
+// Reads the scene as the layer of the bins sees it; writes premultiplied r, g, b and coverage where there is any, and
+// per cell of CELL x CELL bin pixels two vectors: coverage, coverage times |CoC|, lowest red and green; lowest blue,
+// highest red, green and blue.
+// twin: src/bokeh/cpu/bin.rs
 
 @group(0) @binding(0) var<uniform> work: Work;
 @group(0) @binding(1) var<uniform> bins: array<Bin, MAX_BINS>;
@@ -17,7 +18,7 @@
 
 const HUGE: f32 = 3.0e38;
 
-// What some pixels hold: their coverage and that times |CoC|, their lowest and highest colour.
+// Statistics of some pixels: coverage, coverage times |CoC|, lowest and highest colour.
 struct Cell {
     sums: vec2<f32>,
     low: vec3<f32>,
@@ -25,23 +26,23 @@ struct Cell {
 }
 
 var<workgroup> pixels: array<Pixel, TILE * TILE>;
-// The rows of the tile's cells.
+// Row sums of the tile's cells.
 var<workgroup> rows: array<Cell, TILE * TILE / CELL>;
-// Whether any pixel has a share: the tile may meet the bin in its range of CoC alone.
+// Whether any pixel has coverage: the tile was listed by its CoC range alone.
 var<workgroup> some: atomic<u32>;
 
 fn list_at(k: u32) -> u32 {
     return bins[k].binned_at;
 }
 
-// Lists the tiles of rows that some columns of the bin, and rows of it, reach.
-fn put_filtered(k: u32, corner: vec2<u32>, side: u32, thread: u32) {
+// Lists the row tiles whose filters reach a square of the bin at `corner`.
+fn list_filtered(k: u32, corner: vec2<u32>, side: u32, thread: u32) {
     let first = vec2(corner.x - min(corner.x, bins[k].reach), corner.y) / rows_tile();
     let end = min(corner + side - 1u + vec2(bins[k].reach, 0u), bins[k].size - 1u) / rows_tile();
     let count = end - first + 1u;
     for (var n = thread; n < count.x * count.y; n += TILE * TILE) {
         let tile = first + vec2(n % count.x, n / count.x);
-        put(k, bins[k].filtered_at, tile.y * filtered_across(k) + tile.x);
+        list_tile(k, bins[k].filtered_at, tile.y * filtered_across(k) + tile.x);
     }
 }
 
@@ -68,6 +69,7 @@ fn bin_tile(k: u32, tile: u32, local: vec2<u32>, thread: u32) {
     if all(averaging < bins[k].size) {
         own = averaged(k, averaging, local % step, step);
     }
+    // Four threads share a pixel: adds up their partial averages.
     if step > 1u {
         pixels[thread] = own;
         workgroupBarrier();
@@ -88,13 +90,13 @@ fn bin_tile(k: u32, tile: u32, local: vec2<u32>, thread: u32) {
             source[bins[k].pixels_at + pixel.y * bins[k].size.x + pixel.x] = value;
         }
     }
-    // The cells of a tile that holds nothing stay as they were cleared.
+    // The cells of an empty tile keep their cleared values.
     if workgroupUniformLoad(&some) == 0u {
         return;
     }
-    put_filtered(k, corner, side, thread);
+    list_filtered(k, corner, side, thread);
     if thread < cells * cells * CELL {
-        // A row of a cell. Neighbouring threads begin with other pixels, as memory has banks.
+        // A row of a cell. Neighbouring threads start at different pixels to avoid bank conflicts.
         let first = (thread / (cells * CELL) * CELL + thread % CELL) * side + thread / CELL % cells * CELL;
         var row = nothing;
         for (var j = 0u; j < CELL; j++) {

@@ -1,6 +1,7 @@
-// Pass blur_columns: the vertical low-rank filters, terms summed; truncation leaves lobes, so the result is kept in
-// the range of the colours in reach. Writes premultiplied colour and coverage where there is any, and per tile of the
-// picture which bins it shows.
+// Pass blur_columns: the vertical low-rank filters (McGraw, eq. 2), summed over terms. Truncation overshoots, so the
+// result is clamped to the range of the colours within the filter support. Writes premultiplied colour and coverage
+// where there is any, and per tile of the picture which bins have content there.
+// twin: src/bokeh/cpu/filter.rs
 
 @group(0) @binding(0) var<uniform> work: Work;
 @group(0) @binding(1) var<uniform> bins: array<Bin, MAX_BINS>;
@@ -14,12 +15,12 @@
 @group(0) @binding(9) var<storage, read> todo: array<u32>;
 @group(0) @binding(10) var<storage, read_write> shown: array<atomic<u32>>;
 
-// Rows that are held at a time, of four terms; most filters need no more for a whole tile.
+// Rows loaded at a time, of four terms; most filters need no more for a whole tile.
 const CHUNK = 62u;
 
-// Of a term, the pixels of all rows.
+// Pixels of all rows, per term.
 var<workgroup> values: array<vec2<u32>, 4 * CHUNK * RESULT_TILE_X>;
-// Of the first tiles of rows that a tile's taps reach: whether anything is there. Most filters reach no more.
+// Whether each of the first row tiles in the support of a tile has content. Most filters need no more tiles.
 const NOTED = 24u;
 var<workgroup> noted: array<bool, NOTED>;
 
@@ -31,7 +32,7 @@ fn is_filtered(k: u32, pixel: vec2<u32>) -> bool {
     return filtered[HEAD + bins[k].filtered_at + tile_of(pixel, bins[k].size.x, rows_tile())] == 1u;
 }
 
-// The same for the column of such tiles that a tile's taps reach from tile `first` on.
+// Cached `is_filtered` for the column of row tiles within the support, from tile `first` on.
 fn is_noted(k: u32, pixel: vec2<u32>, first: u32) -> bool {
     let tile = pixel.y / ROWS_TILE_Y - first;
     if tile < NOTED {
@@ -40,7 +41,7 @@ fn is_noted(k: u32, pixel: vec2<u32>, first: u32) -> bool {
     return is_filtered(k, pixel);
 }
 
-// The pixels at `a` and at `b`, each once, times the taps of their term: summed over all terms.
+// Weighted sum over all terms of the pixels at `a` and `b`.
 fn both(weights: vec4<f32>, a: u32, b: u32) -> vec4<f32> {
     let apart = CHUNK * RESULT_TILE_X;
     var sum = weights.x * (unpacked(values[a]) + unpacked(values[b]));
@@ -50,7 +51,7 @@ fn both(weights: vec4<f32>, a: u32, b: u32) -> vec4<f32> {
     return sum;
 }
 
-// The result of a pixel, once all terms are there.
+// Stores the result of a pixel, and clamps it after the last group of terms.
 fn finish(k: u32, pixel: vec2<u32>, corner: Corner, own: vec4<f32>) {
     var sum = own;
     let at = bins[k].pixels_at + pixel.y * bins[k].size.x + pixel.x;
@@ -108,7 +109,7 @@ fn filter_columns(k: u32, number: u32, local: vec2<u32>, thread: u32) {
             }
         }
         workgroupBarrier();
-        // The pixel itself is in row `own`; taps that lie in other chunks have their turn then.
+        // The pixel itself is in row `own` of this chunk; taps in other chunks are added in their iterations.
         let own = i32(pixel.y) - first - at;
         let line = own * i32(RESULT_TILE_X) + i32(local.x);
         let apart = i32(RESULT_TILE_X);

@@ -1,5 +1,6 @@
-// Pass blur_rows: the horizontal low-rank filters of some bins, four terms at a time.
-// Reads premultiplied colour and coverage; writes one such picture per term, and per tile whether anything is there.
+// Pass blur_rows: the horizontal low-rank filters of some bins (McGraw, eq. 2), four terms at a time. Reads
+// premultiplied colour and coverage; writes one such picture per term, and lists the result tiles to compute.
+// twin: src/bokeh/cpu/filter.rs
 
 @group(0) @binding(0) var<uniform> work: Work;
 @group(0) @binding(1) var<uniform> bins: array<Bin, MAX_BINS>;
@@ -13,11 +14,11 @@
 @group(0) @binding(9) var<storage, read> todo: array<u32>;
 @group(0) @binding(10) var<storage, read_write> next: array<atomic<u32>>;
 
-// Columns that are held at a time; most filters need no more for a whole tile.
+// Columns loaded at a time; most filters need no more for a whole tile.
 const CHUNK = 128u;
 
 var<workgroup> values: array<vec2<u32>, CHUNK * ROWS_TILE_Y>;
-// Of the first cells that a tile's taps reach: whether anything is there. Most filters reach no more.
+// Whether each of the first cells in the support of a tile has content. Most filters need no more cells.
 const NOTED = 24u;
 var<workgroup> noted: array<bool, NOTED>;
 
@@ -25,14 +26,14 @@ fn list_at(k: u32) -> u32 {
     return bins[k].filtered_at;
 }
 
-// Lists the tiles of the result that a tile of rows reaches.
-fn put_active(k: u32, corner: vec2<u32>, thread: u32) {
+// Lists the result tiles that depend on a row tile.
+fn list_active(k: u32, corner: vec2<u32>, thread: u32) {
     let first = vec2(corner.x, corner.y - min(corner.y, bins[k].reach)) / result_tile();
     let end = min(corner + rows_tile() - 1u + vec2(0u, bins[k].reach), bins[k].size - 1u) / result_tile();
     let count = end - first + 1u;
     for (var n = thread; n < count.x * count.y; n += ROWS_TILE_X * ROWS_TILE_Y) {
         let tile = first + vec2(n % count.x, n / count.x);
-        put(k, bins[k].active_at, tile.y * active_across(k) + tile.x);
+        list_tile(k, bins[k].active_at, tile.y * active_across(k) + tile.x);
     }
 }
 
@@ -41,7 +42,7 @@ fn is_covered(k: u32, pixel: vec2<u32>) -> bool {
     return grid[2u * (bins[k].cells_at + cell.y * bins[k].cells.x + cell.x)].x > 0.0;
 }
 
-// The same for the row of cells of a tile, whose taps reach from cell `first` on.
+// Cached `is_covered` for the row of cells within the support, from cell `first` on.
 fn is_noted(k: u32, pixel: vec2<u32>, first: u32) -> bool {
     let cell = pixel.x / CELL - first;
     if cell < NOTED {
@@ -50,7 +51,7 @@ fn is_noted(k: u32, pixel: vec2<u32>, first: u32) -> bool {
     return is_covered(k, pixel);
 }
 
-// The sums of a pixel, one for each of four terms.
+// Sums of a pixel, one for each of four terms.
 struct Sums {
     a: vec4<f32>,
     b: vec4<f32>,
@@ -67,7 +68,7 @@ fn filter_rows(k: u32, tile: u32, local: vec2<u32>, thread: u32) {
     let size = bins[k].size;
     let across = filtered_across(k);
     let corner_pixel = vec2(tile % across, tile / across) * rows_tile();
-    put_active(k, corner_pixel, thread);
+    list_active(k, corner_pixel, thread);
     let pixel = corner_pixel + local;
     let reach = i32(bins[k].reach);
     let first = i32(corner_pixel.x) - reach;
@@ -98,7 +99,7 @@ fn filter_rows(k: u32, tile: u32, local: vec2<u32>, thread: u32) {
             values[n] = value;
         }
         workgroupBarrier();
-        // The pixel itself is value `own`; taps that lie in other chunks have their turn then.
+        // The pixel itself is value `own` of this chunk; taps in other chunks are added in their iterations.
         let own = i32(pixel.x) - first - at;
         let line = i32(local.y * CHUNK) + own;
         if mirrored {

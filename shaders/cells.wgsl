@@ -1,11 +1,11 @@
-// Shared by the passes that know the grid of silhouettes.
+// Shared by passes that use the grid of silhouettes.
 
-// Its columns and rows.
+// Columns and rows of the grid.
 fn cells_of(size: vec2<u32>) -> vec2<u32> {
     return (size + GRAIN - 1u) / GRAIN;
 }
 
-// How many cells away the farthest silhouette can reach one.
-fn farthest() -> u32 {
+// Largest radius of any silhouette, in cells.
+fn max_radius_cells() -> u32 {
     return u32(2.0 * frame.most_px + MARGIN_PX) / GRAIN + 1u;
 }

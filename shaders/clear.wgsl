@@ -1,4 +1,4 @@
-// Pass clear: no tile is listed, and no cell covered.
+// Pass clear: empties the tile lists and the coarse grid.
 
 @group(0) @binding(0) var<storage, read_write> binned: array<u32>;
 @group(0) @binding(1) var<storage, read_write> filtered: array<u32>;

@@ -1,5 +1,6 @@
-// Pass coarse, of push-pull inpainting: the levels of the pyramid that are too small to share, up to the coarsest and back,
-// known pixels only.
+// Pass coarse, of pull-push inpainting (Gortler et al., The Lumigraph, 1996): the levels of the pyramid that are too
+// small for several workgroups, pulled up to the coarsest level and pushed back, known pixels only.
+// twin: src/bokeh/cpu/levels.rs
 
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<storage, read_write> pyramid: array<vec4<f32>>;

@@ -1,30 +1,30 @@
-// Shared by every pass: the uniforms, with the fields of the Rust structs of the same names, and the numbers that Rust defines.
+// Shared by every pass: the uniforms, mirrored by Rust structs of the same names, and the constants set by Rust.
 
-override CELL: u32;                 // bin pixels a side of a cell
+override CELL: u32;                 // side of a cell in bin pixels
 override SEGMENT: u32;              // bin pixels between two edges
-override ANY_COLOR: f32;            // no colour is brighter
-override COVERAGE_FLOOR: f32;       // less coverage than this has no colour of its own
-override FAR_WEIGHT: f32;           // weight of far cells in the local radius
-override OTHER_FROM: f32;           // what comes nearer is one surface with what is behind it up to this step of the CoC, and
-override OTHER_TO: f32;             // another one from here on
-override HIDING_SHARE: f32;         // a bin with this share of a nearer surface shows nothing of what that hides
-override HINDMOST_COVERAGE: f32;    // a bin counts wholly from here on when the hindmost is looked for
-override GRAIN: u32;                // pixels a side of a cell of the grid of silhouettes
-override MARGIN_PX: f32;            // that a silhouette's distances are larger by, as that grid is coarse
-override HAND_OVER: f32;            // half the width of the hand-over between two bins, as a share of the border's CoC
-override FADE: f32;                 // share of the square of a silhouette's reach, from where it is faded out
-override OWN_COVERAGE: f32;         // a surface with less than this does not fill a pixel
-override STEPS_ACROSS: u32;         // of the directions in which what hides is looked past, four bits each, 8 more than they are
+override ANY_COLOR: f32;            // larger than any colour
+override COVERAGE_FLOOR: f32;       // a bin pixel with less coverage has no colour of its own
+override FAR_WEIGHT: f32;           // smallest weight of a cell in the local radius
+override OTHER_FROM: f32;           // relative CoC step of a near pixel: below this, the same surface is behind it,
+override OTHER_TO: f32;             // from this on, a different one
+override HIDING_WEIGHT: f32;         // a bin with this weight of a nearer surface hides the farther one
+override HINDMOST_COVERAGE: f32;    // coverage from which a bin fully counts as the hindmost
+override GRAIN: u32;                // side of a cell of the silhouettes' grid in pixels
+override MARGIN_PX: f32;            // added to silhouette distances, because that grid is coarse
+override HAND_OVER: f32;            // half the width of a cross-fade of bins, relative to the border's CoC
+override FADE: f32;                 // fraction of a silhouette's squared radius over which it fades out
+override OWN_COVERAGE: f32;         // a surface with less coverage does not fill a pixel
+override STEPS_ACROSS: u32;         // directions of inpainting, four bits each, offset by 8
 override STEPS_DOWN: u32;
-override MOST_STEPS: u32;           // that are taken
-override HALF_ALIKE_PX: f32;        // so far apart, two CoC are half alike
-override ONE_SURFACE_PX: f32;       // what is less apart than this is one surface
-override TRUSTED_STEPS: f32;        // as long lines are trusted wholly
-override ONE_ENDED: f32;            // a line with one end counts as one of so many times its length
-override OCTAVES_FROM_PX: f32;      // from this radius on, nodes of the bank lie evenly in each octave
-override OCTAVE_SHIFT: u32;         // bits of a float below those that tell the node within its octave
+override MAX_STEPS: u32;           // longest search along a direction
+override HALF_ALIKE_PX: f32;        // CoC difference of likeness 0.5
+override ONE_SURFACE_PX: f32;       // smaller CoC ranges are one surface
+override TRUSTED_STEPS: f32;        // lines up to this length are fully trusted
+override ONE_ENDED: f32;            // length factor of a line with one end
+override OCTAVES_FROM_PX: f32;      // from this radius on, nodes are linear within each octave
+override OCTAVE_SHIFT: u32;         // right shift of a float that leaves its node in the octave
 
-// What a workgroup does, in pixels or whatever the pass goes over: squares, lines, tiles of a bin's rows and of its result.
+// Workgroup sizes, in pixels or elements of the pass: squares, lines, row tiles and result tiles of a bin.
 override TILE: u32;
 override SMALL_TILE: u32;
 override LINE: u32;
@@ -32,10 +32,10 @@ override ROWS_TILE_X: u32;
 override ROWS_TILE_Y: u32;
 override RESULT_TILE_X: u32;
 override RESULT_TILE_Y: u32;
-override SHARED_FROM: u32;          // scale of a bin from which on four threads of bin share a pixel
+override SHARED_FROM: u32;          // scale from which four threads of pass bin share a pixel
 
 const MAX_BINS = 13;
-const MIXED = 0x8000u;      // of a pixel of the scene: see scene_packed
+const MIXED = 0x8000u;      // flag of a scene pixel: see scene_packed
 
 // One frame.
 struct Frame {
@@ -44,32 +44,32 @@ struct Frame {
     coc_kind: u32,              // 0 uniform, 1 ramp, 2 depth as CoC, 3 depth in metres
     compositing: u32,           // 0 layers, 1 select, 2 gather
     bins: u32,
-    near_bins: u32,             // they come first
-    reach: u32,                 // of the bank
+    near_bins: u32,             // the first bins
+    reach: u32,                 // half-width of the bank
     nodes: u32,
-    groups: u32,                // of four terms each
-    most_px: f32,               // no |CoC| is above this
-    coc: vec4<f32>,             // uniform: radius; ramp: normal, offset, half band; depth: c_inf, sharp from and to, max
+    groups: u32,                // groups of four terms
+    most_px: f32,               // upper bound of |CoC|
+    coc: vec4<f32>,             // uniform: radius; ramp: normal, offset, half band; depth: c_inf, sharp range, max
     ramp: vec2<f32>,            // slope, max
-    expansion: f32,             // 0: highlights stay as they are
-    steps_per_px: f32,          // nodes of the bank per pixel of radius, below OCTAVES_FROM_PX
-    mixed: u32,                 // pixels that show two surfaces
-    even: u32,                  // 1: taps at -j and j are equal
-    extent: f32,                // of the aperture: the outermost point, in radii
-    rows_apart: u32,            // pixels filtered at once: from one term's rows to the next one's
+    expansion: f32,             // highlight expansion 1 + 1/M; 0: off
+    steps_per_px: f32,          // nodes per pixel of radius, below OCTAVES_FROM_PX
+    mixed: u32,                 // number of mixed pixels
+    even: u32,                  // 1: symmetric kernel, taps at -j and j are equal
+    extent: f32,                // distance of the aperture's outermost point, in radii
+    rows_apart: u32,            // pixels of a batch: stride between the rows of two terms
     yuyv: u32,                  // 1: the result is YUYV
-    front_px: f32,              // what has a CoC above this does not lie in front of the subject
+    front_px: f32,              // above this CoC nothing is in front of the subject
 }
 
-// What a dispatch does: some bins, of one layer where it goes over the picture.
+// Parameters of a dispatch: some bins, of one layer if it goes over the picture.
 struct Work {
-    first: u32,                 // bin
-    count: u32,                 // of bins
-    group: u32,                 // of four terms: which
-    terms: u32,                 // how many of them are there
-    last: u32,                  // 1: the sum is complete
-    nearest_px: f32,            // of the layer: no filled CoC is below this
-    unhidden: vec2<f32>,        // of the layer: what counts as not lying in front of it: CoC of the step, slope
+    first: u32,                 // first bin
+    count: u32,                 // number of bins
+    group: u32,                 // index of the group of four terms
+    terms: u32,                 // terms in the group
+    last: u32,                  // 1: last group, the sum is complete
+    nearest_px: f32,            // lower bound of inpainted CoC in the layer
+    unhidden: vec2<f32>,        // weight of a pixel's own content in the layer: CoC of the step, slope
 }
 
 // One bin. Offsets are in elements of the buffers that all bins share.
@@ -77,23 +77,23 @@ struct Bin {
     size: vec2<u32>,            // columns, rows
     cells: vec2<u32>,
     scale: u32,
-    edges: u32,                 // across
+    edges: u32,                 // segment edges across
     turned: u32,
-    whole: u32,                 // 1: takes every pixel, whatever its CoC
+    whole: u32,                 // 1: weight 1 for every pixel
     front: vec2<f32>,           // border to the bin in front: CoC, slope
     behind: vec2<f32>,
     max_radius_px: f32,
     sigma_cells: f32,
     reach_cells: u32,
-    pixels_at: u32,             // of its pixels
-    rows_at: u32,               // of its pixels among those filtered at once
+    pixels_at: u32,             // offset of its pixels
+    rows_at: u32,               // offset of its pixels in the batch
     edges_at: u32,
     cells_at: u32,
-    binned_at: u32,             // of the flags of its tiles in bin
+    binned_at: u32,             // offset of its tiles in pass bin
     reach: u32,                 // outermost tap of any pixel
-    filtered_at: u32,           // of the flags of its tiles of rows
-    active_at: u32,             // of the flags of its tiles of the result
-    has_lobes: u32,             // 1: its results are kept in the range of the colours around
+    filtered_at: u32,           // offset of its row tiles
+    active_at: u32,             // offset of its result tiles
+    has_lobes: u32,             // 1: results are clamped to the range of nearby colours
 }
 
 fn rows_tile() -> vec2<u32> {
@@ -104,12 +104,12 @@ fn result_tile() -> vec2<u32> {
     return vec2(RESULT_TILE_X, RESULT_TILE_Y);
 }
 
-// A tile that a pixel lies in, row by row.
+// Index of the tile that contains a pixel, row by row.
 fn tile_of(pixel: vec2<u32>, width: u32, tile: vec2<u32>) -> u32 {
     return pixel.y / tile.y * ((width + tile.x - 1u) / tile.x) + pixel.x / tile.x;
 }
 
-// Four values in half the memory: what is moved is what the passes cost.
+// Packs four values as half floats: the passes are limited by memory bandwidth.
 fn packed(value: vec4<f32>) -> vec2<u32> {
     return vec2(pack2x16float(value.xy), pack2x16float(value.zw));
 }
@@ -122,13 +122,13 @@ fn step_at(border: vec2<f32>, coc_px: f32) -> f32 {
     return clamp((coc_px - border.x) * border.y + 0.5, 0.0, 1.0);
 }
 
-// How much of a pixel a bin takes.
-fn share_at(front: vec2<f32>, behind: vec2<f32>, coc_px: f32) -> f32 {
+// Weight of a pixel in a bin. twin: src/bokeh/share.rs
+fn bin_weight(front: vec2<f32>, behind: vec2<f32>, coc_px: f32) -> f32 {
     return step_at(front, coc_px) - step_at(behind, coc_px);
 }
 
-// A pixel of the scene: light, and CoC as a signed square root, whose steps are fine where bins hand over. Light is never
-// negative: the sign of blue says that this is the farther of two surfaces of a mixed pixel.
+// Packs a pixel of the scene: light, and CoC as a signed square root, which is finest where bins cross-fade. Light is
+// never negative, so the sign of blue marks the farther surface of a mixed pixel.
 fn scene_packed(light: vec3<f32>, coc_px: f32, most_px: f32) -> vec2<u32> {
     let root = sign(coc_px) * sqrt(abs(coc_px) / most_px);
     let blue = pack2x16float(vec2(light.b, 0.0)) & ~MIXED & 0xffffu;
@@ -140,7 +140,7 @@ fn scene_unpacked(value: vec2<u32>, most_px: f32) -> vec4<f32> {
     return vec4(unpack2x16float(value.x), unpack2x16float(value.y & ~MIXED).x, root * abs(root) * most_px);
 }
 
-// Highlights: all channels share a factor of the luminance, so that the hue stays.
+// Luminance; all channels share the highlight factor, which preserves the hue.
 fn luminance(light: vec3<f32>) -> f32 {
     return dot(light, vec3(0.2126, 0.7152, 0.0722));
 }

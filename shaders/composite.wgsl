@@ -1,4 +1,5 @@
-// Pass composite: the blurred bins, front to back as disjoint coverage, become one picture of packed 8-bit sRGB, or YUYV of that.
+// Pass composite: combines the blurred bins, front to back as disjoint coverage, into packed 8-bit sRGB or YUYV.
+// twin: src/bokeh/cpu/composite.rs
 
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<uniform> bins: array<Bin, MAX_BINS>;
@@ -11,7 +12,7 @@
 
 var<workgroup> codes: array<u32, LINE>;
 
-// A pixel of a bin; nothing was written where nothing is.
+// A pixel of a bin; tiles without content were not written.
 fn bin_at(k: u32, pixel: vec2<u32>) -> vec4<f32> {
     if active_tiles[HEAD + bins[k].active_at + tile_of(pixel, bins[k].size.x, result_tile())] == 0u {
         return vec4(0.0);
@@ -19,7 +20,7 @@ fn bin_at(k: u32, pixel: vec2<u32>) -> vec4<f32> {
     return unpacked(blurred[bins[k].pixels_at + pixel.y * bins[k].size.x + pixel.x]);
 }
 
-// A bin at the scale of the picture.
+// A bin at the picture's scale, bilinear.
 fn sample_bin(k: u32, pixel: vec2<u32>) -> vec4<f32> {
     if bins[k].scale == 1u {
         return bin_at(k, pixel);
@@ -29,19 +30,19 @@ fn sample_bin(k: u32, pixel: vec2<u32>) -> vec4<f32> {
     let at = clamp(along, vec2(0.0), vec2<f32>(limit));
     let first = vec2<u32>(at);
     let second = min(first + 1u, limit);
-    let share = at - vec2<f32>(first);
-    return mix(mix(bin_at(k, first), bin_at(k, vec2(second.x, first.y)), share.x),
-               mix(bin_at(k, vec2(first.x, second.y)), bin_at(k, second), share.x), share.y);
+    let fraction = at - vec2<f32>(first);
+    return mix(mix(bin_at(k, first), bin_at(k, vec2(second.x, first.y)), fraction.x),
+               mix(bin_at(k, vec2(first.x, second.y)), bin_at(k, second), fraction.x), fraction.y);
 }
 
-fn chosen(pixel: vec2<u32>) -> vec3<f32> {
+fn selected_color(pixel: vec2<u32>) -> vec3<f32> {
     let coc_px = scene_unpacked(scene[pixel.y * frame.size.x + pixel.x], frame.most_px).w;
     var color = vec3(0.0);
     for (var k = 0u; k < frame.bins; k++) {
-        let share = share_at(bins[k].front, bins[k].behind, coc_px);
-        if share > 0.0 {
+        let weight = bin_weight(bins[k].front, bins[k].behind, coc_px);
+        if weight > 0.0 {
             let layer = sample_bin(k, pixel);
-            color += layer.rgb * (share / max(layer.a, 1.0e-6));
+            color += layer.rgb * (weight / max(layer.a, 1.0e-6));
         }
     }
     return color;
@@ -53,14 +54,14 @@ fn code_of(light: f32) -> u32 {
     return u32(code * 255.0 + 0.5);
 }
 
-// Red in the lowest byte, then green and blue.
+// Packed sRGB: red in the lowest byte, then green and blue.
 fn codes_of(index: u32) -> u32 {
     let pixel = vec2(index % frame.size.x, index / frame.size.x);
     var color: vec3<f32>;
     if frame.compositing == 0u {
         color = layers(pixel);
     } else if frame.compositing == 1u {
-        color = chosen(pixel);
+        color = selected_color(pixel);
     } else {
         color = unpacked(blurred[index]).rgb;
     }
@@ -70,7 +71,7 @@ fn codes_of(index: u32) -> u32 {
     return code_of(color.r) | (code_of(color.g) << 8u) | (code_of(color.b) << 16u);
 }
 
-// A pixel each; four of them are three words, or two of them one.
+// One pixel per thread; four pixels are packed to three words, or two to one word of YUYV.
 @compute @workgroup_size(LINE)
 fn composite(@builtin(workgroup_id) line: vec3<u32>, @builtin(num_workgroups) lines: vec3<u32>,
              @builtin(local_invocation_index) thread: u32) {
@@ -86,7 +87,7 @@ fn composite(@builtin(workgroup_id) line: vec3<u32>, @builtin(num_workgroups) li
         }
         return;
     }
-    // A word has the last bytes of a pixel, `word % 3` done, and the first ones of the next.
+    // A word has the last bytes of a pixel, without its first `word % 3`, and the first bytes of the next.
     let word = 3u * first / 4u + thread;
     let pixel = 4u * (thread / 3u) + thread % 3u;
     if 4u * thread < 3u * LINE && word < (pixels + 3u) / 4u * 3u {

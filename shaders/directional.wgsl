@@ -1,5 +1,6 @@
-// Pass directional, of push-pull inpainting: outlines run on behind what hides them. Reads level 1 of the pyramid; writes what
-// the lines through its hidden pixels agree on, behind all levels. See `DIRECTIONS` in src/bokeh/occlusion.rs.
+// Pass directional, of the inpainting: continues outlines behind an occluder (after Bertalmio et al., Image Inpainting,
+// 2000). Reads level 1 of the pyramid; writes the agreement of the lines through its hidden pixels behind all levels.
+// twin: src/bokeh/cpu/directional.rs; see `DIRECTIONS` in src/bokeh/occlusion.rs
 
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<storage, read_write> pyramid: array<vec4<f32>>;
@@ -10,15 +11,15 @@ const LINES = 8u;
 
 struct End {
     value: vec4<f32>,
-    steps: f32,         // to it; 0 where there is none
+    steps: f32,         // distance in steps; 0 without an end
 }
 
-// A line through a hidden pixel: what is there, by its ends, and how much it counts.
+// A line through a hidden pixel: the value predicted from its ends, and its weight.
 struct Line {
     value: vec4<f32>,
     weight: f32,
-    steps: f32,             // its length; 0 where it has no end
-    span_px: vec2<f32>,     // least and most CoC of its ends
+    steps: f32,             // its length; 0 without ends
+    span_px: vec2<f32>,     // lowest and highest CoC of its ends
 }
 
 fn likeness(a_px: f32, b_px: f32) -> f32 {
@@ -28,7 +29,7 @@ fn likeness(a_px: f32, b_px: f32) -> f32 {
 
 fn end_of(level: Level, pixel: vec2<u32>, step: vec2<i32>) -> End {
     var at = vec2<i32>(pixel) + step;
-    for (var steps = 1u; steps <= MOST_STEPS && all(at >= vec2(0)) && all(at < vec2<i32>(level.size)); steps++) {
+    for (var steps = 1u; steps <= MAX_STEPS && all(at >= vec2(0)) && all(at < vec2<i32>(level.size)); steps++) {
         let index = index_of(level, vec2<u32>(at));
         if known[index] > 0.0 {
             return End(pyramid[index] / max(known[index], 1.0e-6), f32(steps));
@@ -65,7 +66,7 @@ fn directional(@builtin(global_invocation_id) id: vec3<u32>) {
     let index = index_of(level, id.xy);
     let found = directional_at() + index;
     known[found] = 0.0;
-    // Its pixels are the cells of the silhouettes' grid.
+    // Pixels of level 1 are the cells of the silhouettes' grid.
     if known[index] > 0.0 || reached[id.y * level.size.x + id.x].x <= 0.0 {
         return;
     }
@@ -77,24 +78,24 @@ fn directional(@builtin(global_invocation_id) id: vec3<u32>) {
         shortest = min(shortest, select(1.0e30, lines[d].steps, lines[d].steps > 0.0));
         span_px = vec2(min(span_px.x, lines[d].span_px.x), max(span_px.y, lines[d].span_px.y));
     }
-    // Of one surface a mean of all around is as good.
+    // For a single surface, pull-push averaging is as good.
     if span_px.y - span_px.x < ONE_SURFACE_PX {
         return;
     }
-    // How many agree with each line counts four times over: a mean of two surfaces is neither.
+    // Agreement of a line with the others counts to the fourth power: a mean of two surfaces would be neither.
     var scores: array<f32, LINES>;
-    var most = 1.0e-30;
+    var best = 1.0e-30;
     for (var d = 0u; d < LINES; d++) {
         var score = 0.0;
         for (var e = 0u; e < LINES; e++) {
             score += lines[e].weight * likeness(lines[d].value.w, lines[e].value.w);
         }
         scores[d] = score;
-        most = max(most, score);
+        best = max(best, score);
     }
     var sum = Known(vec4(0.0), 0.0);
     for (var d = 0u; d < LINES; d++) {
-        let agreed = scores[d] * scores[d] / (most * most);
+        let agreed = scores[d] * scores[d] / (best * best);
         sum = plus(sum, times(Known(lines[d].value, 1.0), lines[d].weight * agreed * agreed));
     }
     if sum.known > 0.0 {

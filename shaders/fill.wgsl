@@ -1,6 +1,7 @@
-// Pass fill, the inpainting of disocclusions: the scene as a layer sees it, where what lies in front of the layer has become
-// what lies behind that. Reads the scene, and pushes the pyramid down to it; writes the scene of the layer in those tiles
-// where something is hidden, and lists the tiles of its bins.
+// Pass fill, the inpainting of disocclusions: the scene as a layer sees it, with the layers in front of it replaced by
+// the background. Reads the scene and pushes the pyramid down to it (pull-push); writes the scene of the layer in tiles
+// with hidden pixels, and lists the tiles of its bins.
+// twin: src/bokeh/cpu/fill.rs
 
 @group(0) @binding(0) var<uniform> work: Work;
 @group(0) @binding(1) var<uniform> frame: Frame;
@@ -15,20 +16,20 @@
 @group(0) @binding(10) var<storage, read> reached: array<vec4<f32>>;
 @group(0) @binding(11) var<storage, read> mixed: array<MixedPixel>;
 
-// Pixels a side of a level's patch that reaches all that a tile needs of it, its neighbours included.
+// Side of the patch of a level that a tile depends on, its neighbours included, in pixels.
 const PATCH = 6u;
 
-// The patches of a level, which the finer one is pushed from, and of that: they take turns.
+// Patches of the coarser and the finer level, used alternately.
 var<workgroup> patches: array<Known, 2u * PATCH * PATCH>;
 
-// How far what is filled in behind a pixel is another surface, told by their CoC: what comes nearer, such as the ground, hides
-// its own continuation, which looks like it.
+// How likely the inpainted background is a different surface, by CoC: a surface that comes nearer, such as the ground,
+// hides its own continuation, which looks like it.
 fn other_surface(own_px: f32, hidden: f32) -> f32 {
     let step = (own_px - hidden) / min(own_px, -1.0e-3);
     return clamp((step - OTHER_FROM) / (OTHER_TO - OTHER_FROM), 0.0, 1.0);
 }
 
-// The first pixel of a tile's patch of a level; of level 0, of the tile.
+// First pixel of a tile's patch in a level; in level 0, of the tile.
 fn corner_of(tile: vec2<u32>, level: u32) -> vec2<u32> {
     var corner = tile * SMALL_TILE;
     for (var k = 0u; k < level; k++) {
@@ -37,7 +38,7 @@ fn corner_of(tile: vec2<u32>, level: u32) -> vec2<u32> {
     return corner;
 }
 
-// A pixel of a level, with what it does not know from the patch of the coarser one.
+// Completes a pixel of a level from the patch of the coarser one.
 fn completed(number: u32, own: Known, pixel: vec2<u32>, tile: vec2<u32>) -> Known {
     if own.known >= 1.0 {
         return own;
@@ -49,25 +50,26 @@ fn completed(number: u32, own: Known, pixel: vec2<u32>, tile: vec2<u32>) -> Know
     return pushed(own, plus(times(near, 0.75), times(far, 0.25)));
 }
 
-// A pixel of the scene with what is known behind it, as far as a silhouette that reaches it uncovers that.
+// Replaces a pixel of the scene by the known background, if a silhouette uncovers it.
 fn filled(value: vec2<u32>, behind: Known, reach: vec4<f32>) -> vec2<u32> {
-    // Away from all silhouettes nothing behind can be seen.
+    // Away from all silhouettes the background is not visible.
     if reach.z <= 0.0 {
         return value;
     }
     let own = scene_unpacked(value, frame.most_px);
     let unhidden = step_at(work.unhidden, own.w);
-    // What a silhouette only touches keeps its own colour: it is seen, and filling would smear it. Where something near
-    // touches every pixel nothing is known, and nothing lies behind.
+    // A pixel that a silhouette only touches keeps its colour: it is visible, and inpainting would smear it. If
+    // something near touches every pixel, nothing is known, and there is no background.
     if unhidden == 1.0 || behind.known <= 0.5 {
         return value;
     }
     let hidden = (1.0 - unhidden) * other_surface(own.w, behind.value.w);
-    // Where it matters for what others see alone, it must not get among what is in front itself, nor half of it.
-    let focus_to_px = bins[min(frame.near_bins, frame.bins - 1u)].behind.x;
+    // Where the background matters only for the blur of others, it must not mix with the surface in front, not even by
+    // half.
+    let focus_end_px = bins[min(frame.near_bins, frame.bins - 1u)].behind.x;
     let px = behind.value.w;
-    let is_kin = px <= focus_to_px * (1.0 + HAND_OVER);
-    let is_wanted = select(reach.x > 0.0 || hidden >= 1.0, max(reach.x, 0.0) > px * px, is_kin);
+    let may_mix_with_front = px <= focus_end_px * (1.0 + HAND_OVER);
+    let is_wanted = select(reach.x > 0.0 || hidden >= 1.0, max(reach.x, 0.0) > px * px, may_mix_with_front);
     if hidden == 0.0 || !is_wanted {
         return value;
     }
@@ -75,14 +77,14 @@ fn filled(value: vec2<u32>, behind: Known, reach: vec4<f32>) -> vec2<u32> {
     return scene_packed(mixture.rgb, mixture.w, frame.most_px) | vec2(0u, value.y & MIXED);
 }
 
-// Four pixels a thread.
+// Four pixels per thread.
 @compute @workgroup_size(SMALL_TILE, SMALL_TILE)
 fn fill(@builtin(global_invocation_id) id: vec3<u32>, @builtin(local_invocation_index) thread: u32,
         @builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgroups) workgroups: vec3<u32>) {
     let tile = workgroup.xy;
     let index = tile.y * workgroups.x + tile.x;
     if step_at(work.unhidden, ranges[index].x) == 1.0 {
-        put_binned(tile, ranges[index], thread);
+        list_binned(tile, ranges[index], thread);
         return;
     }
     var coarsest = 0u;
@@ -110,7 +112,7 @@ fn fill(@builtin(global_invocation_id) id: vec3<u32>, @builtin(local_invocation_
     if coarsest > 0u {
         hidden = completed(0u, hidden, half, tile);
     }
-    // What is there counts, too: the nearer surface of a mixed pixel stays where it is.
+    // Includes the original range: the nearer surface of a mixed pixel stays.
     var range = ranges[index];
     for (var sub = 0u; sub < 4u; sub++) {
         let at = 2u * id.xy + vec2(sub % 2u, sub / 2u);
@@ -122,5 +124,5 @@ fn fill(@builtin(global_invocation_id) id: vec3<u32>, @builtin(local_invocation_
             range = union_of(range, vec2(scene_unpacked(value, frame.most_px).w));
         }
     }
-    put_binned(tile, range_of_tile(thread, SMALL_TILE * SMALL_TILE, range), thread);
+    list_binned(tile, range_of_tile(thread, SMALL_TILE * SMALL_TILE, range), thread);
 }

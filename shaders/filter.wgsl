@@ -1,17 +1,18 @@
 // Shared by the two filter passes: the taps at a pixel, linear between the edges of its segment.
+// twin: src/bokeh/cpu/filter.rs (`Taps`)
 
-// Where a pixel lies among the edges: between two of them, between two rows of cells.
+// Position of a pixel among the edges: between two of them, and between two rows of cells.
 struct Corner {
-    above: u32,     // first of the two vectors of the left edge, in the row of cells above
+    above: u32,     // index of the left edge's first vector in the row of cells above
     below: u32,
     down: f32,      // 0 in the row above, 1 in the row below
     along: f32,     // 0 at the left edge, 1 at the right
 }
 
 struct Taps {
-    left: i32,      // tap 0 at the left edge
+    left: i32,      // table index of tap 0 at the left edge
     right: i32,
-    step: i32,      // from one tap to the next
+    step: i32,      // table step from one tap to the next
     reach: i32,
 }
 
@@ -24,12 +25,12 @@ fn corner_of(k: u32, pixel: vec2<u32>) -> Corner {
                   (f32(pixel.x % SEGMENT) + 0.5) / f32(SEGMENT));
 }
 
-// One of the vectors of the edge on the left (0, 1) or on the right (2, 3) of a pixel.
+// A vector of the left edge (0, 1) or right edge (2, 3) of a pixel's segment.
 fn edge_at(corner: Corner, index: u32) -> vec4<f32> {
     return mix(edges[corner.above + index], edges[corner.below + index], corner.down);
 }
 
-// The outermost tap of a node.
+// Outermost tap of a node.
 fn reach_of(node: u32) -> i32 {
     let first = u32(OCTAVES_FROM_PX * frame.steps_per_px);
     var radius_px = f32(node) / frame.steps_per_px;
@@ -43,7 +44,7 @@ fn taps_at(k: u32, pixel: vec2<u32>, corner: Corner) -> Taps {
     var radii = vec2(edge_at(corner, 0u).x, edge_at(corner, 2u).x);
     var turned = bins[k].turned == 1u;
     if frame.compositing == 2u {
-        // A gather's only bin has the picture's scale; every pixel has a radius of its own.
+        // The only bin of a gather has the picture's scale; every pixel has a radius of its own.
         let coc_px = scene_unpacked(scene[pixel.y * frame.size.x + pixel.x], frame.most_px).w;
         radii = vec2(abs(coc_px));
         turned = coc_px < 0.0;
@@ -52,16 +53,16 @@ fn taps_at(k: u32, pixel: vec2<u32>, corner: Corner) -> Taps {
     let right = node_at(radii.y, frame.steps_per_px, frame.nodes);
     let origin = (vec2(left, right) * (2u * frame.reach + 1u) + frame.reach) * frame.groups + work.group;
     let step = select(i32(frame.groups), -i32(frame.groups), turned);
-    // No tap of a bin lies farther out, however the device rounds.
+    // Clamped to the bin's outermost tap, however the device rounds.
     return Taps(i32(origin.x), i32(origin.y), step, min(reach_of(max(left, right)), i32(bins[k].reach)));
 }
 
-// Tap `j`, four terms.
+// Tap `j` of four terms.
 fn tap_at(taps: Taps, along: f32, j: i32) -> vec4<f32> {
     return mix(bank[u32(taps.left + j * taps.step)], bank[u32(taps.right + j * taps.step)], along);
 }
 
-// Whether taps at -j and j, which are equal, can be taken together: where all of a line's `length` pixels are at hand.
+// Whether the equal taps at -j and j can share a multiplication: all `length` pixels of a line must be loaded.
 fn is_mirrored(length: i32, held: u32) -> bool {
     return frame.even == 1u && length <= i32(held);
 }

@@ -1,4 +1,5 @@
 // Pass gather: the exact two-dimensional gather, every pixel with the full kernel of its own radius. For comparison.
+// twin: src/bokeh/cpu/gather.rs (`Exact`)
 
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<storage, read> kernel_starts: array<u32>;
@@ -16,7 +17,7 @@ fn gather(@builtin(global_invocation_id) id: vec3<u32>) {
     let coc_px = scene_unpacked(scene[pixel], frame.most_px).w;
     let node = node_at(abs(coc_px), frame.steps_per_px, frame.nodes);
     let reach = i32(node_reach[node]);
-    // In front of the focal plane the aperture is turned.
+    // In front of the focal plane the aperture is rotated by 180 degrees.
     let sign = select(1, -1, coc_px < 0.0);
     var tap = kernel_starts[node];
     var sum = vec3(0.0);

@@ -1,5 +1,6 @@
-// Pass hide, what may hide others: at half size, the CoC of the nearest surface. Reads the scene only where a tile has
-// anything in front of the focal plane; else nothing there hides anything, and 0 stands for that.
+// Pass hide: CoC of the nearest surface at half size, the possible occluders. Reads the scene only in tiles with
+// anything in front of the focal plane; elsewhere nothing occludes, and the result is 0.
+// twin: src/bokeh/cpu/fill.rs (`HalfRows`)
 
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<storage, read> scene: array<vec2<u32>>;
@@ -20,7 +21,7 @@ fn hide(@builtin(global_invocation_id) id: vec3<u32>) {
         let pixel = at.y * frame.size.x + at.x;
         let value = scene[pixel];
         nearest = min(nearest, scene_unpacked(value, frame.most_px).w);
-        // What something near covers in part is not known either.
+        // A pixel that a near surface covers partly is not known either.
         if is_mixed(value) {
             nearest = min(nearest, near_surface(first_mixed(pixel)).w);
         }

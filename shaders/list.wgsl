@@ -1,5 +1,5 @@
-// Shared by the passes that do listed tiles of bins. A list has the number of tiles of each bin, then a flag for each tile
-// that there is, 1 if it is listed, and then the listed tiles of each bin, as many places as there are flags.
+// Shared by passes over listed tiles of bins. Layout of a list: the number of listed tiles per bin, a flag per tile (1
+// if listed), then the listed tiles of each bin, with one place per flag.
 
 const HEAD = 16u;
 

@@ -1,5 +1,6 @@
-// Shared by the passes that ask what lies behind a pixel. Such a pass has what is remembered of each as `known`: sRGB, 3 bytes a
-// pixel; for how many rounds it was seen, a byte; bits of its inverse depth.
+// Included by passes that read the remembered background. They bind it as `known`: sRGB, 3 bytes a pixel; then for each
+// pixel the number of rounds in which it was seen, a byte; then its inverse depth, as the bits of a float.
+// twin: src/depth/matting/behind.rs
 
 fn rounds_at() -> u32 {
     return (3u * frame.size.x * frame.size.y + 3u) / 4u;
@@ -9,7 +10,7 @@ fn inverse_at() -> u32 {
     return rounds_at() + (frame.size.x * frame.size.y + 3u) / 4u;
 }
 
-// Whether the light behind a pixel is known, whose nearer surface has this inverse depth.
+// Whether the background behind a pixel is known, for a nearer surface at inverse depth `near`.
 fn is_known_behind(at: u32, near: f32) -> bool {
     if frame.known == 0u {
         return false;
@@ -18,7 +19,7 @@ fn is_known_behind(at: u32, near: f32) -> bool {
     return rounds >= frame.known && near - bitcast<f32>(known[inverse_at() + at]) > frame.other;
 }
 
-// That light, as the camera exposes now.
+// The remembered light behind a pixel, at the camera's current exposure.
 fn light_behind(at: u32) -> vec3<f32> {
     let word = 3u * at / 4u;
     let codes = codes_of(known[word], known[min(word + 1u, arrayLength(&known) - 1u)], 3u * at);

@@ -1,21 +1,22 @@
-// Shared by the passes that trace: from entries that show something near though the map has none there, to their neighbours that
-// may do so, too. Such a pass has `metres`, `places`, `cells` and `counts`.
+// Included by the tracing passes: hysteresis as in edge tracing (Canny), from entries with some alpha, though the map
+// is far there, to their neighbours. The passes bind `metres`, `places`, `cells` and `counts`.
+// twin: src/depth/matting/trace.rs
 
 const ALL_DIRECTIONS = (1u << DIRECTIONS) - 1u;
 
-// What claims a pixel for a step, of the bits in `places`, is moved by so many.
+// Bit position of a step's claims in `places`: even and odd steps alternate.
 fn shift_of(step: u32) -> u32 {
     return DIRECTIONS * (step % 2u);
 }
 
-// Claims the neighbours of a pixel for the next step, where they are as far as its far surface. Those of this step, and those
-// that have an entry, are taken.
+// Claims the neighbours of a pixel for the next step, if they are as far as its far surface. Skips those of this step,
+// and those that already have an entry.
 fn claim(at: u32, far: f32, step: u32) {
     let pixel = vec2(at % frame.size.x, at / frame.size.x);
     let taken = ENTERED | (ALL_DIRECTIONS << shift_of(step));
     let next = shift_of(step + 1u);
     for (var k = 0u; k < DIRECTIONS; k++) {
-        // Beyond the first column and row it is larger than any.
+        // At the first column or row, the subtraction wraps, so that the check below fails.
         let other = pixel + vec2(k % 3u, k / 3u) - 1u;
         if k == DIRECTIONS / 2u || any(other >= frame.size) {
             continue;
@@ -24,7 +25,7 @@ fn claim(at: u32, far: f32, step: u32) {
         if (atomicLoad(&places[place]) & taken) != 0u || abs(inverse_of(metres[place]) - far) > frame.jump {
             continue;
         }
-        // Seen from there, the directions are the other way round.
+        // Seen from the neighbour, the direction is the opposite one.
         let before = atomicOr(&places[place], 1u << (next + DIRECTIONS - 1u - k));
         if (before & (ALL_DIRECTIONS << next)) == 0u {
             atomicAdd(&counts[CLAIMED + step + 1u], 1u);

@@ -1,29 +1,31 @@
-// Pass matte_clusters: the clusters of each cell, of its near and its far surface, and of what the near one has at edges.
+// Pass matte_clusters: colour clusters of each cell: mean and covariance of its near and its far surface, and of the
+// near surface's edge pixels (fringe). Weighted sums in one workgroup per cell.
+// twin: src/depth/matting/clusters/cell.rs
 
 @group(0) @binding(1) var<uniform> lights: array<vec4<f32>, 256>;
 @group(0) @binding(2) var<storage, read> metres: array<u32>;
 @group(0) @binding(3) var<storage, read> rgb: array<u32>;
 @group(0) @binding(4) var<storage, read> words: array<vec2<u32>>;
-// Twelve of each cell, four of each cluster: weight and sums of red, green, blue; of rr, rg, rb, gg; of gb, bb, and then the
-// mean column and row; the mean inverse depth. The sums are weighted.
+// Twelve vectors a cell, four a cluster: weight and sums of r, g, b; of rr, rg, rb, gg; of gb, bb, and the mean column
+// and row; the mean inverse depth. The sums are weighted.
 @group(0) @binding(5) var<storage, read_write> clusters: array<vec4<f32>>;
 
 const PIXELS = CELL * CELL;
-// Beside an edge the map may be wrong.
+// The map may be wrong this close to an edge.
 const CLOSE_PX = 3u;
 const ROWS = CELL + 2u * CLOSE_PX;
 const INFINITE = 0x7f800000u;
 
-// For each pixel: 1, red, green, blue, column, row, inverse depth; and its weights in the three clusters.
+// For each pixel: 1, red, green, blue, column, row, inverse depth; and its weight in each of the three clusters.
 var<workgroup> values: array<array<f32, 7>, PIXELS>;
 var<workgroup> weights: array<array<f32, 3>, PIXELS>;
 var<workgroup> edges: array<u32, ROWS>;
-// Of the pure pixels and of all: bits of the largest inverse depth, and of the least.
+// Bits of the largest and the smallest inverse depth, of the pure pixels and of all.
 var<workgroup> largest: array<atomic<u32>, 2>;
 var<workgroup> least: array<atomic<u32>, 2>;
 var<workgroup> sums: array<f32, 39>;
 
-// The bits of edges of a row, from `CLOSE_PX` columns before a cell on.
+// Edge bits of a row of a cell, with `CLOSE_PX` columns on both sides.
 fn edges_from(left: u32, y: u32) -> u32 {
     let k = y * words_across() + left / WORD;
     let shift = left % WORD;
@@ -81,13 +83,14 @@ fn matte_clusters(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invoca
         atomicMin(&least[0], value);
     }
     workgroupBarrier();
+    // One surface if its range is small, or else split at the middle, by pure pixels if there are any.
     let pure_ends = vec2(atomicLoad(&least[0]), atomicLoad(&largest[0]));
     let all_ends = vec2(atomicLoad(&least[1]), atomicLoad(&largest[1]));
     let ends = bitcast<vec2<f32>>(select(all_ends, pure_ends, pure_ends.x <= pure_ends.y));
     let is_one = ends.y - ends.x <= frame.jump;
     let is_far = !is_one && inverse <= 0.5 * (ends.x + ends.y);
     let off = abs(inverse - select(ends.y, ends.x, is_far));
-    // Every other pixel, as on a chessboard, tells enough.
+    // Every other pixel, as on a chessboard, suffices.
     let counts = is_there && (local.x + local.y) % 2u == 0u && off <= select(1.0, 2.0, is_one) * frame.jump;
     let weight = select(0.0, select(select(1.0, CLOSE_WEIGHT, is_close), AT_EDGE_WEIGHT, is_edge), counts);
     let wide = bitcast<vec2<f32>>(all_ends);
@@ -96,7 +99,7 @@ fn matte_clusters(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invoca
     weights[thread] = array<f32, 3>(select(weight, 0.0, is_far), select(0.0, weight, is_far), select(0.0, 1.0, is_fringe));
     workgroupBarrier();
     if thread < 39u {
-        // Two of the values are multiplied for each sum.
+        // Each sum is over the product of two of the values.
         var first = array<u32, 13>(0u, 0u, 0u, 0u, 1u, 1u, 1u, 2u, 2u, 3u, 0u, 0u, 0u);
         var second = array<u32, 13>(0u, 1u, 2u, 3u, 1u, 2u, 3u, 2u, 3u, 3u, 4u, 5u, 6u);
         let one = first[thread % 13u];

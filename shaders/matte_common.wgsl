@@ -1,54 +1,56 @@
-// Shared by every pass of the matte: the frame, and the numbers that are defined once, in Rust.
+// Included by every matting pass: the frame's uniforms, and the constants that Rust defines.
+// twin: src/depth/matting
 
 struct Frame {
-    size: vec2<u32>,        // of the picture, in pixels
-    most: u32,              // entries, at most; where there are more edges, there is no matte
-    known: u32,             // what lies behind is known where it was seen for so many rounds; 0 where nothing is
-    jump: f32,              // inverse depths of one surface differ by no more, in 1/m
-    other: f32,             // what is known lies behind by more than this, in 1/m
+    size: vec2<u32>,        // picture size, in pixels
+    most: u32,              // maximum number of entries; with more edges there is no matte
+    known: u32,             // rounds from which on the background is known; 0: no background
+    jump: f32,              // depth discontinuity: a larger step of inverse depth, in 1/m, separates two surfaces
+    other: f32,             // minimum step of inverse depth from a surface to the background behind it, in 1/m
 }
 
 @group(0) @binding(0) var<uniform> frame: Frame;
 
 override AGAIN: u32;            // 1 in the second run of a pass that runs twice
-override LEAST_BITS: u32;       // of the least depth that is known, and of the largest
-override MOST_BITS: u32;
-override AT_EDGE_WEIGHT: f32;   // of pixels of a cluster
+override MIN_DEPTH_BITS: u32;   // bits of the smallest and the largest valid depth
+override MAX_DEPTH_BITS: u32;
+override AT_EDGE_WEIGHT: f32;   // weights of pixels in a cluster
 override CLOSE_WEIGHT: f32;
-override REACH: u32;            // cells in every direction that are looked at, and if that is not enough
-override REACH_FURTHER: u32;
-override REACH_FARTHEST: u32;
+override RADIUS: u32;           // search radii in cells: the next one if a surface has no pixels
+override RADIUS_FURTHER: u32;
+override RADIUS_FARTHEST: u32;
 override HALF_PX: f32;
-override FRINGE_FEW: f32;       // pixels of the fringe that tell nothing, and that tell all
+override FRINGE_FEW: f32;       // weight of the fringe from which it starts to count, and from which it counts fully
 override FRINGE_ENOUGH: f32;
-override FRINGE_SHARE: f32;
-override FRINGE_OTHER: f32;     // shares
+override FRINGE_ALPHA: f32;
+override FRINGE_OTHER: f32;     // alpha of a fringe of another colour, and of the same one
 override FRINGE_SAME: f32;
 override SHRINKAGE: f32;
 override QUANTISATION: f32;
-override MOST_DEVIATION: f32;
-override MOST_CERTAINTY: f32;
+override MAX_DEVIATION: f32;
+override MAX_CERTAINTY: f32;
 override OUTLIER: f32;
-override LEAST: f32;
-override LEAST_OFF_LINE: f32;
-override FIRST_MIXED: f32;      // the first guess of the prior, and its bounds
+override MIN_LIKELIHOOD: f32;
+override MIN_OFF_LINE: f32;
+override FIRST_MIXED: f32;      // initial value of the prior, and its bounds
 override FIRST_WRONG: f32;
-override PRIOR_FLOOR: f32;
-override MOST_MIXED: f32;
-override MOST_WRONG: f32;
+override PRIOR_MIN: f32;
+override MAX_MIXED: f32;
+override MAX_WRONG: f32;
 override PRIOR_ROUNDS: u32;
-override TINY: f32;             // less is no likelihood
+override TINY: f32;             // smaller likelihoods are zero
 override NEARLY_PURE: f32;
 override TRACED_FROM: f32;
 override STEPS_TRACED: u32;
 
-// Pixels a side of a cell, of a word of bits, which are all of one row, and words of a block.
+// Side of a cell in pixels; pixels in a word of bits, all of one row; words in a block.
 const CELL = 8u;
 const WORD = 32u;
 const BLOCK = 256u;
 
-// Places in `counts`: edges, 0 where there are too many; the next entry; all edges; for each step, of which the first is that
-// of edges, pixels that were claimed for it, and its cells; before each block of words, the bits that are set.
+// Indices into `counts`: number of edges, 0 if there are too many; the next free entry; number of all edges found; per
+// step, the first being that of the edges, the number of claimed pixels, and of listed cells; the set bits before each
+// block of words.
 const EDGES = 0u;
 const NEXT = 1u;
 const FOUND_EDGES = 2u;
@@ -56,47 +58,49 @@ const CLAIMED = 4u;
 const LISTED = 24u;
 const TOTALS = 64u;
 
-// A pixel in `places` has an entry, whose place are the other bits; before that, it has the directions of those that claim it.
+// A word of `places`: if `ENTERED` is set, the other bits are the pixel's entry; before that, they are the directions
+// it was claimed from.
 const ENTERED = 0x80000000u;
 const DIRECTIONS = 9u;
 
-// What is known of an entry, in `flags`.
-const NEAR = 1u;        // the map says it is of the near surface
-const BORDERS = 2u;     // it borders the other one
+// Bits of `flags` of an entry.
+const NEAR = 1u;        // the map assigns it to the near surface
+const BORDERS = 2u;     // it shares a side with the other surface
 const THIN = 4u;        // it is part of something thin
-const FOUND = 8u;       // of an answer: both surfaces have pixels
-const LONE = 16u;       // its surfaces have none
-const BEHIND = 32u;     // what is behind it is known
+const FOUND = 8u;       // of a model: both surfaces have pixels
+const LONE = 16u;       // its model lacks pixels of a surface
+const BEHIND = 32u;     // the background behind it is known
 const MIXED = 64u;
-const WIDE = 128u;      // it is part of something that is wide
-const SEEN = 256u;      // traced, it shows something near, or is part of the outline of something wide
-const GROWN = 512u;     // such an outline, found in this or the last of the steps with even numbers; the next bit, with odd ones
-const OUTLINE = 2048u;  // times the row of `SHARES` that its sides and corners have; the last is of pixels beyond edges
+const WIDE = 128u;      // it is part of something wide
+const SEEN = 256u;      // a traced pixel with some alpha, or part of the outline of something wide
+const GROWN = 512u;     // outline of something wide, found in this or the last even step; the next bit, in an odd step
+const OUTLINE = 2048u;  // times the row of `ALPHA_PRIORS`; the last row is for pixels beyond edges
 const BEYOND = 6u;
 const STEP = 65536u;    // times the step in which it was traced
 
 // A pixel that may be mixed.
 struct Entry {
-    at: u32,                // row times columns plus column
-    near: f32,              // inverse depth of both surfaces, in 1/m
+    at: u32,                // row * columns + column
+    near: f32,              // inverse depths of both surfaces, in 1/m
     far: f32,
-    answer: u32,            // the entry whose answer it shares: the colours of both surfaces are at twice its place
+    model: u32,             // the entry whose colour model it shares; both colours are at twice that index
     flags: atomic<u32>,
-    share: f32,             // of the near surface
-    clean: f32,             // likelihoods: of a pure pixel, as the map says
-    sided: vec2<f32>,       // the mean over shares of the map's side, and of the same times the share
-    every: vec2<f32>,       // the same over all shares
+    alpha: f32,             // coverage by the near surface, 0 to 1
+    clean: f32,             // likelihood of a pure pixel, as the map says
+    sided: vec2<f32>,       // mean of the likelihood over alphas on the map's side, and of likelihood times alpha
+    every: vec2<f32>,       // the same over all alphas
 }
 
 struct Cell {
-    answered: u32,          // the place of its last answer plus one
-    listed: atomic<u32>,    // the last step that it is listed for
-    list: vec2<u32>,        // not of this cell: a place of the list of cells of even, and of that of odd steps
+    latest_model: u32,      // index of its latest model's entry plus one; 0: none
+    listed: atomic<u32>,    // the last step for which it was listed
+    list: vec2<u32>,        // unrelated to this cell: an item of the cell lists of even and of odd steps
 }
 
-// Inverse depth, in 1/m, of the bits of metres; 0 where it is unknown.
+// Inverse depth, in 1/m, of the bits of a distance in metres; 0 if the distance is unknown.
 fn inverse_of(bits: u32) -> f32 {
-    return select(0.0, 1.0 / bitcast<f32>(clamp(bits, LEAST_BITS, MOST_BITS)), bits >= LEAST_BITS && bits <= MOST_BITS);
+    let is_known = bits >= MIN_DEPTH_BITS && bits <= MAX_DEPTH_BITS;
+    return select(0.0, 1.0 / bitcast<f32>(clamp(bits, MIN_DEPTH_BITS, MAX_DEPTH_BITS)), is_known);
 }
 
 fn words_across() -> u32 {

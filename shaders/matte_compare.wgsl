@@ -1,11 +1,13 @@
-// Shared by the passes that compare entries with the surfaces around them. Such a pass has `entries` and `colors`.
+// Included by passes that evaluate entries against their colour models. They bind `entries` and `colors`.
+// twin: src/depth/matting/share.rs and passes.rs
 
-// Shares are tried in steps of an eighth.
+// Alpha is sampled in steps of an eighth.
 const STEPS = 8u;
 
-// By how many sides and corners of an entry are of its own surface: how likely each share of it is, from a half to all of it.
+// Numbers of sides and corners that belong to the entry's own surface, and for each the prior probability of the own
+// surface's coverage, from one half to 1.
 const OUTLINES = array(vec2(2u, 2u), vec2(2u, 3u), vec2(3u, 2u), vec2(3u, 3u), vec2(4u, 3u));
-const SHARES = array(
+const ALPHA_PRIORS = array(
     array(0.2, 0.2, 0.2, 0.2, 0.2),
     array(0.227, 0.358, 0.254, 0.133, 0.029),
     array(0.058, 0.095, 0.177, 0.365, 0.305),
@@ -15,15 +17,15 @@ const SHARES = array(
     array(0.060, 0.060, 0.060, 0.060, 0.760),
 );
 
-// What the colour of an entry says of it, whose answer was found.
+// Computes the likelihoods of an entry's colour, whose model has both surfaces.
 fn compare(k: u32, labels: u32) {
     let at = entries[k].at;
-    let near = colors[2u * entries[k].answer];
-    let far = colors[2u * entries[k].answer + 1u];
+    let near = colors[2u * entries[k].model];
+    let far = colors[2u * entries[k].model + 1u];
     let own = light_at(at);
     let spread = spread_of(near, far);
     var before = far.mean;
-    // What is remembered of a surface that looks otherwise here is not of that surface.
+    // A remembered colour unlike the far surface here is of another surface.
     var is_behind = is_known_behind(at, entries[k].near);
     if is_behind {
         let light = light_behind(at);
@@ -31,32 +33,32 @@ fn compare(k: u32, labels: u32) {
         before = select(far.mean, light, is_behind);
     }
     let d = discriminant_of(near.mean, spread, before);
-    let share = share_of(d, own);
+    let alpha = alpha_of(d, own);
     var off_line = 0.0;
     if is_behind {
-        let off = own - before - clamp(share, 0.0, 1.0) * (near.mean - before);
+        let off = own - before - clamp(alpha, 0.0, 1.0) * (near.mean - before);
         off_line = dot(off, times(spread, off));
     }
     let is_near = (labels & NEAR) != 0u;
-    // What is no mixture of both has a colour of its own, as lone hair beside a face.
-    let fits = max(exp(-min(off_line, 80.0)), LEAST_OFF_LINE);
+    // A colour off the line between both surfaces is no mixture of them, such as a lone hair beside a face.
+    let fits = max(exp(-min(off_line, 80.0)), MIN_OFF_LINE);
     let outline = labels / OUTLINE % 8u;
     var every = vec2(0.0);
     var sided = vec2(0.0);
     var pure = 0.0;
     for (var step = 0u; step <= STEPS; step++) {
         let tried = f32(step) / f32(STEPS);
-        let off = tried - clamp(share, -0.3, 1.3);
-        let likelihood = fits * max(exp(-min(0.5 * d.certainty * off * off, 80.0)), LEAST);
+        let off = tried - clamp(alpha, -0.3, 1.3);
+        let likelihood = fits * max(exp(-min(0.5 * d.certainty * off * off, 80.0)), MIN_LIKELIHOOD);
         let both = vec2(likelihood, likelihood * tried);
-        // Of its own surface; what is less than a half is no share of it.
+        // Coverage by its own surface; below one half, it is not on the map's side.
         let own = select(STEPS - step, step, is_near);
-        let likely = select(0.0, SHARES[outline][max(own, STEPS / 2u) - STEPS / 2u], own >= STEPS / 2u);
+        let likely = select(0.0, ALPHA_PRIORS[outline][max(own, STEPS / 2u) - STEPS / 2u], own >= STEPS / 2u);
         every += both;
         sided += likely * both;
         pure = select(pure, likelihood, own == STEPS);
     }
-    // No pixel of a surface whose light is known is like none of it.
+    // If the background is known, a far pixel is no outlier.
     let outlier = select(OUTLIER, 0.0, is_behind && !is_near);
     every /= f32(STEPS + 1u);
     entries[k].clean = max(pure, outlier / sqrt(d.certainty));

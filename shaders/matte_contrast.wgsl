@@ -1,6 +1,8 @@
-// Shared by the passes that compare colours: symmetric matrices, and how the colours of two surfaces differ.
+// Included by passes that compare colours: symmetric 3 x 3 matrices, and Fisher's linear discriminant between two
+// surfaces.
+// twin: src/depth/matting/contrast.rs and symmetric.rs
 
-// The upper triangle of a matrix: xx, xy, xz; yy, yz, zz.
+// A symmetric matrix: xx, xy, xz; yy, yz, zz.
 struct Symmetric {
     row: vec3<f32>,
     rest: vec3<f32>,
@@ -18,7 +20,7 @@ fn times(m: Symmetric, v: vec3<f32>) -> vec3<f32> {
     return vec3(dot(m.row, v), dot(middle, v), dot(vec3(m.row.z, m.rest.yz), v));
 }
 
-// The inverse, by the adjugate; of a matrix that has none, zeros.
+// Inverse by the adjugate; zeros for a singular matrix.
 fn inverted(m: Symmetric) -> Symmetric {
     let row = vec3(
         m.rest.x * m.rest.z - m.rest.y * m.rest.y,
@@ -35,19 +37,19 @@ fn inverted(m: Symmetric) -> Symmetric {
     return Symmetric(scale * row, scale * rest);
 }
 
-// A covariance of few pixels, a share of it kept, with what goes evenly into all directions.
+// Regularised covariance: `kept` of it, plus an isotropic part, since covariances of few pixels are too narrow.
 fn widened(m: Symmetric, kept: f32) -> Symmetric {
     let floor = SHRINKAGE / 3.0 * (m.row.x + m.rest.x + m.rest.z) + QUANTISATION;
     return Symmetric(kept * m.row + vec3(floor, 0.0, 0.0), kept * m.rest + vec3(floor, 0.0, floor));
 }
 
-// The inverse of what both surfaces' colours vary by.
+// Inverse of the within-class scatter, the sum of both covariances.
 fn spread_of(near: Color, far: Color) -> Symmetric {
     return inverted(widened(Symmetric(near.row + far.row, near.rest + far.rest), 1.0 - SHRINKAGE));
 }
 
-// A colour's product with `direction`, less `offset`, is the share of the near surface; `certainty` is the reciprocal variance
-// of that over the pixels of one surface.
+// Alpha is the dot product of a colour and `direction`, less `offset`; `certainty` is the reciprocal variance of that
+// within one surface.
 struct Discriminant {
     direction: vec3<f32>,
     offset: f32,
@@ -59,15 +61,15 @@ fn discriminant_of(near: vec3<f32>, spread: Symmetric, far: vec3<f32>) -> Discri
     let product = times(spread, difference);
     let contrast = max(dot(product, difference), 1e-9);
     let direction = product / contrast;
-    return Discriminant(direction, dot(direction, far), min(2.0 * contrast, MOST_CERTAINTY));
+    return Discriminant(direction, dot(direction, far), min(2.0 * contrast, MAX_CERTAINTY));
 }
 
-fn share_of(d: Discriminant, light: vec3<f32>) -> f32 {
+fn alpha_of(d: Discriminant, light: vec3<f32>) -> f32 {
     return dot(d.direction, light) - d.offset;
 }
 
-// Whether the far surface may have this light.
+// Whether the light is plausible for the far surface, by its Mahalanobis distance.
 fn is_like(far: Color, light: vec3<f32>) -> bool {
     let off = light - far.mean;
-    return dot(off, times(inverted(widened(Symmetric(far.row, far.rest), 1.0)), off)) < MOST_DEVIATION * MOST_DEVIATION;
+    return dot(off, times(inverted(widened(Symmetric(far.row, far.rest), 1.0)), off)) < MAX_DEVIATION * MAX_DEVIATION;
 }

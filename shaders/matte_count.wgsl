@@ -1,4 +1,4 @@
-// Pass matte_count: how many bits are set before each word of its block, and in the block.
+// Pass matte_count: number of set bits before each word of its block, and in the block (prefix sum).
 
 @group(0) @binding(1) var<storage, read_write> words: array<vec2<u32>>;
 @group(0) @binding(2) var<storage, read_write> counts: array<u32>;

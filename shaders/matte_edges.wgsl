@@ -1,5 +1,6 @@
-// Pass matte_edges: the pixels at edges are entered, row by row, with what the map says of them, and compared with the colours of
-// both surfaces around. Workgroups take turns with the cells.
+// Pass matte_edges: creates the entries of edge pixels, row by row, with the labels of the map, and evaluates them
+// against the colours of both surfaces around. Workgroups loop over the listed cells.
+// twin: src/depth/matting/survey.rs and clusters/answers.rs
 
 @group(0) @binding(1) var<uniform> lights: array<vec4<f32>, 256>;
 @group(0) @binding(2) var<storage, read> metres: array<u32>;
@@ -13,18 +14,17 @@
 @group(0) @binding(10) var<storage, read_write> entries: array<Entry>;
 @group(0) @binding(11) var<storage, read_write> colors: array<Color>;
 
-// The inverse depth of the pixel that is so many to the right and down, less one each; what is beyond the picture is as its
-// last column and row.
+// Inverse depth of the pixel (`right` - 1, `down` - 1) away; the border is replicated.
 fn beside(pixel: vec2<u32>, right: u32, down: u32) -> f32 {
     let at = min(max(pixel + vec2(right, down), vec2(1u)) - 1u, frame.size - 1u);
     return inverse_of(metres[at.y * frame.size.x + at.x]);
 }
 
-// What the map says of a pixel between two surfaces.
+// Labels of a pixel between two surfaces, from the map.
 fn labels_of(pixel: vec2<u32>, surfaces: vec2<f32>) -> u32 {
     let middle = 0.5 * (surfaces.x + surfaces.y);
     let is_near = beside(pixel, 1u, 1u) > middle;
-    var alike = vec2(0u);           // corners, itself among them, and sides
+    var alike = vec2(0u);           // corners including the pixel itself, and sides
     var borders = false;
     for (var k = 0u; k < 9u; k++) {
         let is_alike = (beside(pixel, k % 3u, k / 3u) > middle) == is_near;
@@ -32,7 +32,7 @@ fn labels_of(pixel: vec2<u32>, surfaces: vec2<f32>) -> u32 {
         alike[k % 2u] += select(0u, 1u, is_alike && is_there);
         borders = borders || (k % 2u == 1u && !is_alike);
     }
-    // Itself, and two neighbours in a row.
+    // The pixel itself, and two neighbours at most.
     let is_thin = is_near && alike.x + alike.y <= 3u;
     var outline = 0u;
     for (var k = 0u; k < 5u; k++) {
@@ -56,7 +56,7 @@ fn enter_edges(cell: vec2<u32>, thread: u32) {
             let inverse = beside(pixel, k % 3u, k / 3u);
             surfaces = vec2(max(surfaces.x, inverse), min(surfaces.y, inverse));
         }
-        // The surface that is seen beside a nearer one is its own, even where a third one is farther.
+        // If this pixel is the farther one, its own surface is the far one, even beside a third one behind it.
         let own = beside(pixel, 1u, 1u);
         surfaces.y = select(surfaces.y, own, surfaces.x - own > frame.jump);
         labels = labels_of(pixel, surfaces);

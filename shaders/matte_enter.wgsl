@@ -1,15 +1,16 @@
-// Shared by the passes that enter pixels of a cell, which is a workgroup: what these ask is the same for all of them that lie
-// between the same surfaces. Such a pass has `cells`, `places`, `entries` and `colors`.
+// Included by passes that create the entries of a cell, one workgroup a cell: entries of one cell between the same
+// surfaces share one colour model. The passes bind `cells`, `places`, `entries` and `colors`.
+// twin: src/depth/matting/clusters/answers.rs
 
 const PIXELS = CELL * CELL;
 
-// Which pixels are entered, as bits; their entries, inverse depths of their surfaces, and answers, in the order of the cell.
+// The chosen pixels of the cell, as bits; and in their order: entries, inverse depths of both surfaces, models.
 var<workgroup> chosen: array<atomic<u32>, 2>;
 var<workgroup> own_entries: array<u32, PIXELS>;
 var<workgroup> ends: array<vec2<f32>, PIXELS>;
-var<workgroup> answers: array<u32, PIXELS>;
+var<workgroup> models: array<u32, PIXELS>;
 
-// How many pixels are entered, of which each thread chooses its own, or not.
+// Number of chosen pixels; every thread calls it for its own pixel.
 fn choose(thread: u32, is_chosen: bool) -> u32 {
     if thread < 2u {
         atomicStore(&chosen[thread], 0u);
@@ -22,15 +23,15 @@ fn choose(thread: u32, is_chosen: bool) -> u32 {
     return countOneBits(workgroupUniformLoad(&chosen[0])) + countOneBits(workgroupUniformLoad(&chosen[1]));
 }
 
-// How many pixels are entered before that of a thread.
+// Number of chosen pixels before that of a thread.
 fn chosen_before(thread: u32) -> u32 {
     let before = countOneBits(atomicLoad(&chosen[thread / WORD]) & ((1u << (thread % WORD)) - 1u));
     return before + select(0u, countOneBits(atomicLoad(&chosen[0])), thread >= WORD);
 }
 
-// Gives so many pixels of a cell their answers, by its last one, if there is any.
-fn ask(cell: u32, answered: u32, count: u32) {
-    var last = answered;
+// Assigns the chosen pixels of a cell to models: to the latest one if its surfaces are as far, or else to a new one.
+fn assign_models(cell: u32, latest_model: u32, count: u32) {
+    var last = latest_model;
     var surfaces = vec2(0.0);
     if last > 0u {
         surfaces = vec2(entries[last - 1u].near, entries[last - 1u].far);
@@ -40,14 +41,14 @@ fn ask(cell: u32, answered: u32, count: u32) {
             last = own_entries[k] + 1u;
             surfaces = ends[k];
         }
-        answers[k] = last - 1u;
+        models[k] = last - 1u;
     }
-    cells[cell].answered = last;
+    cells[cell].latest_model = last;
 }
 
-// Enters so many pixels of a cell; every thread calls it. What a thread has of its own, it has where it chose it: the entry,
-// the pixel, its surfaces, and its labels. Whether both surfaces have any pixels.
-fn enter(cell: vec2<u32>, answered: u32, count: u32, thread: u32,
+// Creates the entries of the chosen pixels of a cell; every thread calls it, with the entry, the pixel, its surfaces
+// and its labels if it is chosen. Returns whether both surfaces have pixels nearby.
+fn enter(cell: vec2<u32>, latest_model: u32, count: u32, thread: u32,
          is_chosen: bool, entry: u32, at: u32, surfaces: vec2<f32>, labels: u32) -> bool {
     let rank = chosen_before(thread);
     if is_chosen {
@@ -56,20 +57,20 @@ fn enter(cell: vec2<u32>, answered: u32, count: u32, thread: u32,
     }
     workgroupBarrier();
     if thread == 0u {
-        ask(cell.y * cells_across() + cell.x, answered, count);
+        assign_models(cell.y * cells_across() + cell.x, latest_model, count);
     }
     workgroupBarrier();
-    var answer = 0u;
+    var model = 0u;
     if is_chosen {
-        answer = answers[rank];
+        model = models[rank];
         entries[entry].at = at;
         entries[entry].near = surfaces.x;
         entries[entry].far = surfaces.y;
-        entries[entry].answer = answer;
-        entries[entry].share = 0.0;
+        entries[entry].model = model;
+        entries[entry].alpha = 0.0;
         atomicStore(&places[at], ENTERED | entry);
         var flags = labels;
-        if answer == entry && find_colors(cell, surfaces.x, surfaces.y, answer) {
+        if model == entry && find_colors(cell, surfaces.x, surfaces.y, model) {
             flags |= FOUND;
         }
         atomicStore(&entries[entry].flags, flags);
@@ -78,7 +79,7 @@ fn enter(cell: vec2<u32>, answered: u32, count: u32, thread: u32,
     if !is_chosen {
         return false;
     }
-    if (atomicLoad(&entries[answer].flags) & FOUND) == 0u {
+    if (atomicLoad(&entries[model].flags) & FOUND) == 0u {
         atomicOr(&entries[entry].flags, LONE);
         return false;
     }

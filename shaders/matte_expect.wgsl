@@ -1,5 +1,6 @@
-// Pass matte_expect: a round of expectation maximisation over the entries at edges, 64 workgroups: from what was likely after the
-// rounds before, how many are mixed, and how often the map errs.
+// Pass matte_expect: an iteration of expectation maximisation over the entries at edges, 64 workgroups: re-estimates
+// the probabilities of a mixed pixel and of a wrong map from the previous ones.
+// twin: `Prior::estimate` in src/depth/matting/share.rs
 
 @group(0) @binding(1) var<uniform> turn: Turn;
 @group(0) @binding(2) var<storage, read> counts: array<u32>;
@@ -19,10 +20,10 @@ fn matte_expect(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocati
         let sided = weights.y * entries[k].sided.x;
         let wrong = weights.z * entries[k].every.x;
         let total = weights.x * entries[k].clean + sided + wrong;
-        let is_told = select(0.0, 1.0, total > TINY);
+        let is_valid = select(0.0, 1.0, total > TINY);
         let borders = select(0.0, 1.0, (labels & BORDERS) != 0u);
-        let scale = is_told / max(total, TINY);
-        own += vec4(borders * sided * scale, borders * is_told, wrong * scale, is_told);
+        let scale = is_valid / max(total, TINY);
+        own += vec4(borders * sided * scale, borders * is_valid, wrong * scale, is_valid);
     }
     let total = total_of(own, thread);
     if thread == 0u {

@@ -1,7 +1,7 @@
-// Shared by the passes that look at colours. Such a pass has `lights`, for each code its linear light, and that of a code that
-// is remembered in each channel; and the picture as `rgb`, 3 bytes a pixel.
+// Included by passes that read colours. They bind `lights`: for each code its linear light, and that of a remembered
+// code in each channel; and the picture as `rgb`, 3 bytes a pixel.
 
-// The bytes from one on that a pixel has, of words that have 4 each, and more.
+// Extracts three bytes from byte offset `byte` on, of the `word` that contains it and the `next` one.
 fn codes_of(word: u32, next: u32, byte: u32) -> vec3<u32> {
     let first = 8u * (byte % 4u);
     let bits = (word >> first) | select(0u, next << ((32u - first) % 32u), first > 8u);

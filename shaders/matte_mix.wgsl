@@ -1,5 +1,7 @@
-// Pass matte_mix: the mixed pixels, row by row, as `MixedPixel` in Rust has them, with the colour of the near surface less that of
-// the far one: the most likely ones of those that add up to the pixel's own (Chuang et al. 2001, equation 9).
+// Pass matte_mix: writes the mixed pixels, row by row, as `MixedPixel` in Rust, with the near colour minus the far
+// colour: the most likely pair that adds up to the pixel's own colour (Chuang et al. 2001, equation 9, without the
+// noise term).
+// twin: `difference` in src/depth/matting/contrast.rs
 
 @group(0) @binding(1) var<uniform> lights: array<vec4<f32>, 256>;
 @group(0) @binding(2) var<storage, read> rgb: array<u32>;
@@ -10,20 +12,20 @@
 @group(0) @binding(7) var<storage, read_write> entries: array<Entry>;
 @group(0) @binding(8) var<storage, read_write> mixed: array<vec4<u32>>;
 
-// Bits of what is infinitely far, in metres.
+// Bits of an infinite distance.
 const INFINITE = 0x7f800000u;
 
-fn difference_of(near: Color, far: Color, own: vec3<f32>, share: f32) -> vec3<f32> {
-    let rest = 1.0 - share;
-    let of_both = vec2(share * share, rest * rest);
+fn difference_of(near: Color, far: Color, own: vec3<f32>, alpha: f32) -> vec3<f32> {
+    let rest = 1.0 - alpha;
+    let of_both = vec2(alpha * alpha, rest * rest);
     let spread = Symmetric(of_both.x * near.row + of_both.y * far.row, of_both.x * near.rest + of_both.y * far.rest);
-    let step = times(inverted(widened(spread, 1.0)), own - share * near.mean - rest * far.mean);
+    let step = times(inverted(widened(spread, 1.0)), own - alpha * near.mean - rest * far.mean);
     let of_near = times(Symmetric(near.row, near.rest), step);
     let of_far = times(Symmetric(far.row, far.rest), step);
-    let difference = near.mean + share * of_near - far.mean - rest * of_far;
-    // None is darker than black, or brighter than white.
+    let difference = near.mean + alpha * of_near - far.mean - rest * of_far;
+    // Clamped so that neither colour is darker than black or brighter than white.
     let up = max(rest, 1e-3);
-    let down = max(share, 1e-3);
+    let down = max(alpha, 1e-3);
     let most = min((1.0 - own) / up, own / down);
     let least = -min(own / up, (1.0 - own) / down);
     return min(max(difference, min(least, vec3(0.0))), max(most, vec3(0.0)));
@@ -41,19 +43,19 @@ fn matte_mix(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgrou
             continue;
         }
         let at = entries[k].at;
-        let share = entries[k].share;
-        var far = colors[2u * entries[k].answer + 1u];
+        let alpha = entries[k].alpha;
+        var far = colors[2u * entries[k].model + 1u];
         let is_behind = (flags & BEHIND) != 0u;
         if is_behind {
             far.mean = light_behind(at);
         }
-        let difference = difference_of(colors[2u * entries[k].answer], far, light_at(at), share);
+        let difference = difference_of(colors[2u * entries[k].model], far, light_at(at), alpha);
         let word = at / frame.size.x * words_across() + at % frame.size.x / WORD;
         let before = countOneBits(words[word].x & ((1u << (at % frame.size.x % WORD)) - 1u));
         let place = counts[TOTALS + word / BLOCK] + words[word].y + before;
-        let behind = select(1.0 - share, 1.0, is_behind);
+        let behind = select(1.0 - alpha, 1.0, is_behind);
         mixed[2u * place + 2u] =
-            vec4(at, metres_of(entries[k].near), metres_of(entries[k].far), bitcast<u32>(share));
+            vec4(at, metres_of(entries[k].near), metres_of(entries[k].far), bitcast<u32>(alpha));
         mixed[2u * place + 3u] = bitcast<vec4<u32>>(vec4(behind, difference));
     }
 }

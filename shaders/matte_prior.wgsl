@@ -1,12 +1,13 @@
-// Shared by the passes that know how likely entries are mixed at all, and how often the map errs. Such a pass has `partials`: for
-// each round, of each of 64 workgroups, the likelihoods of what is mixed, the number of what borders another surface, the
-// likelihoods of what is wrong, and the number of all.
+// Included by passes that use the prior: the probability of a mixed pixel, and of a wrong map. They bind `partials`:
+// per round and workgroup, of 64: sum of the posteriors of mixed pixels, number of pixels that border another surface,
+// sum of the posteriors of wrong labels, number of all pixels.
+// twin: `Prior` in src/depth/matting/share.rs
 
 const LANES = 64u;
 
 var<workgroup> totals: array<vec4<f32>, LANES>;
 
-// The sum over all threads of a workgroup, always in the same order.
+// Sum over all threads of a workgroup, in a fixed order.
 fn total_of(own: vec4<f32>, thread: u32) -> vec4<f32> {
     totals[thread] = own;
     workgroupBarrier();
@@ -21,10 +22,10 @@ fn total_of(own: vec4<f32>, thread: u32) -> vec4<f32> {
     return total;
 }
 
-// What is likely after so many rounds.
+// The prior after `round` rounds.
 fn prior_after(round: u32, thread: u32) -> vec2<f32> {
     let total = total_of(partials[(max(round, 1u) - 1u) * LANES + thread], thread);
-    let mixed = clamp(total.x / max(total.y, 1.0), PRIOR_FLOOR, MOST_MIXED);
-    let wrong = clamp(total.z / max(total.w, 1.0), PRIOR_FLOOR, MOST_WRONG);
+    let mixed = clamp(total.x / max(total.y, 1.0), PRIOR_MIN, MAX_MIXED);
+    let wrong = clamp(total.z / max(total.w, 1.0), PRIOR_MIN, MAX_WRONG);
     return select(vec2(FIRST_MIXED, FIRST_WRONG), vec2(mixed, wrong), round > 0u);
 }

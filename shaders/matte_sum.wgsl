@@ -1,8 +1,8 @@
-// Shared by the passes that count: sums over the threads of a workgroup of a block.
+// Included by counting passes: prefix sums over a workgroup (Hillis and Steele 1986).
 
 var<workgroup> sums: array<u32, BLOCK>;
 
-// The sum of the numbers of all threads before this one.
+// Exclusive prefix sum: the sum of `own` of all threads before this one.
 fn sum_before(own: u32, thread: u32) -> u32 {
     sums[thread] = own;
     workgroupBarrier();

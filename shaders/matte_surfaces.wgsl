@@ -1,6 +1,7 @@
-// Shared by the passes that find the colours around entries. Such a pass has the `clusters`, and `colors`, two of each answer.
+// Included by passes that fit colour models. They bind `clusters`, and `colors`, two a model.
+// twin: src/depth/matting/clusters/answers.rs
 
-// Sums of clusters, as these have them.
+// Sums of clusters, in the layout of `clusters`.
 struct Sums {
     a: vec4<f32>,
     b: vec4<f32>,
@@ -16,33 +17,34 @@ fn plus(s: Sums, weight: f32, k: u32) -> Sums {
     return Sums(s.a + weight * clusters[k], s.b + weight * clusters[k + 1u], s.c + weight * clusters[k + 2u].xy);
 }
 
-// What of the near surface is at edges has other colours than where it is pure, as hair beside a face: then those count.
+// If the near surface looks different at edges, such as hair beside a face, its fringe replaces its colour in part.
 fn with_fringe(near: Color, far: Color, sums: Sums) -> Color {
     let counts = clamp((sums.a.x - FRINGE_FEW) / (FRINGE_ENOUGH - FRINGE_FEW), 0.0, 1.0);
     if counts <= 0.0 {
         return near;
     }
     let fringe = color_of(sums);
-    let share = share_of(discriminant_of(near.mean, spread_of(near, far), far.mean), fringe.mean);
-    let other = counts * clamp((FRINGE_SAME - share) / (FRINGE_SAME - FRINGE_OTHER), 0.0, 1.0);
+    let alpha = alpha_of(discriminant_of(near.mean, spread_of(near, far), far.mean), fringe.mean);
+    let other = counts * clamp((FRINGE_SAME - alpha) / (FRINGE_SAME - FRINGE_OTHER), 0.0, 1.0);
     if other <= 0.0 {
         return near;
     }
-    let own = clamp(far.mean + (fringe.mean - far.mean) / FRINGE_SHARE, vec3(0.0), vec3(1.0));
+    let own = clamp(far.mean + (fringe.mean - far.mean) / FRINGE_ALPHA, vec3(0.0), vec3(1.0));
     return Color(mix(near.mean, own, other), mix(near.row, fringe.row, other), mix(near.rest, fringe.rest, other));
 }
 
-// Finds the colours of both surfaces around a cell, for the answer of an entry with these inverse depths; whether both have any.
-fn find_colors(cell: vec2<u32>, near: f32, far: f32, answer: u32) -> bool {
-    // A surface's inverse depth may change on the way, but by less than would make it the other one.
+// Computes the colours of both surfaces around a cell, for a model with these inverse depths. Returns whether both have
+// pixels.
+fn find_colors(cell: vec2<u32>, near: f32, far: f32, model: u32) -> bool {
+    // A surface's inverse depth may vary around, but not as far as to the other surface.
     let tolerance = max(2.0 * frame.jump, 0.25 * (near - far));
     let across = cells_across();
     let last = vec2(across, (frame.size.y + CELL - 1u) / CELL) - 1u;
     let middle = vec2<f32>(cell * CELL) + 0.5 * f32(CELL - 1u);
     for (var turn = 0u; turn < 3u; turn++) {
-        let reach = select(select(REACH_FARTHEST, REACH_FURTHER, turn == 1u), REACH, turn == 0u);
-        let from_cell = cell - min(cell, vec2(reach));
-        let to_cell = min(cell + reach, last);
+        let radius = select(select(RADIUS_FARTHEST, RADIUS_FURTHER, turn == 1u), RADIUS, turn == 0u);
+        let from_cell = cell - min(cell, vec2(radius));
+        let to_cell = min(cell + radius, last);
         var of_near = Sums();
         var of_far = Sums();
         var of_fringe = Sums();
@@ -68,8 +70,8 @@ fn find_colors(cell: vec2<u32>, near: f32, far: f32, answer: u32) -> bool {
         }
         if of_near.a.x > 0.0 && of_far.a.x > 0.0 {
             let color = color_of(of_far);
-            colors[2u * answer] = with_fringe(color_of(of_near), color, of_fringe);
-            colors[2u * answer + 1u] = color;
+            colors[2u * model] = with_fringe(color_of(of_near), color, of_fringe);
+            colors[2u * model + 1u] = color;
             return true;
         }
     }

@@ -1,12 +1,13 @@
-// Pass matte_survey: which pixels differ in inverse depth by a jump from one of their neighbours, as bits, and which cells have
-// any.
+// Pass matte_survey: edge detection: pixels beside a depth discontinuity, as bits, and the list of cells that contain
+// one.
+// twin: src/depth/matting/survey.rs
 
 @group(0) @binding(1) var<storage, read> metres: array<u32>;
 @group(0) @binding(2) var<storage, read_write> words: array<vec2<u32>>;     // bits, and how many are set before
 @group(0) @binding(3) var<storage, read_write> counts: array<atomic<u32>>;
 @group(0) @binding(4) var<storage, read_write> cells: array<Cell>;
 
-// Pixels of a workgroup, and with those beside them.
+// Rows of a workgroup, and its size with a border of one pixel.
 const ROWS = 8u;
 const WIDE_PX = WORD + 2u;
 const TALL_PX = ROWS + 2u;

@@ -1,8 +1,8 @@
-// Pass matte_total, one workgroup: how many bits are set before each block, and in all: at first of edges, then of mixed
-// pixels, whose number goes before their list, too, and that of the edges.
+// Pass matte_total, one workgroup: number of set bits before each block, and in all. In the first run the bits are
+// edges; in the second, mixed pixels: their number, and that of the edges, is written before the list of mixed pixels.
 
 @group(0) @binding(1) var<storage, read_write> counts: array<u32>;
-@group(0) @binding(2) var<storage, read_write> mixed: array<vec4<u32>>;     // two for the number, and two a pixel
+@group(0) @binding(2) var<storage, read_write> mixed: array<vec4<u32>>;     // two for the counts, and two a pixel
 
 @compute @workgroup_size(BLOCK)
 fn matte_total(@builtin(local_invocation_index) thread: u32) {
@@ -18,7 +18,7 @@ fn matte_total(@builtin(local_invocation_index) thread: u32) {
     if thread == BLOCK - 1u {
         let all = before + own;
         if AGAIN == 0u {
-            // Noise: so many edges no picture has. Of a larger jump there are fewer.
+            // Only noise has more edges; the caller retries with a larger depth step.
             counts[FOUND_EDGES] = all;
             counts[EDGES] = select(all, 0u, all > frame.most);
             counts[NEXT] = counts[EDGES];

@@ -1,7 +1,9 @@
-// Pass matte_trace: a step beyond the edges. The pixels that were claimed for it are entered between the surfaces of the first that
-// claimed them, and compared; those that show something near claim theirs for the next. Workgroups take turns with the cells.
+// Pass matte_trace: one step beyond the edges. Creates entries for the claimed pixels, between the surfaces of the
+// first pixel that claimed them, and evaluates them; those with some alpha claim their neighbours for the next step.
+// Workgroups loop over the listed cells.
+// twin: src/depth/matting/trace.rs
 
-@group(0) @binding(1) var<uniform> turn: Turn;      // from 1 on
+@group(0) @binding(1) var<uniform> turn: Turn;      // the step, from 1
 @group(0) @binding(2) var<uniform> lights: array<vec4<f32>, 256>;
 @group(0) @binding(3) var<storage, read> metres: array<u32>;
 @group(0) @binding(4) var<storage, read> rgb: array<u32>;
@@ -18,7 +20,7 @@ var<workgroup> listed: u32;
 var<workgroup> own_cell: u32;
 var<workgroup> first: u32;
 
-// The number of cells that are listed for this step: none where it has more pixels than there is room for.
+// Number of cells listed for this step; 0 if there is no room for its pixels.
 fn cells_to_do() -> u32 {
     var all = atomicLoad(&counts[EDGES]);
     for (var step = 1u; step <= turn.at; step++) {
@@ -64,11 +66,11 @@ fn matte_trace(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups)
             let parent = atomicLoad(&places[other.y * frame.size.x + other.x]) & ~ENTERED;
             surfaces = vec2(entries[parent].near, entries[parent].far);
         }
-        if enter(cell, cells[number].answered, count, thread, is_chosen, entry, at, surfaces,
+        if enter(cell, cells[number].latest_model, count, thread, is_chosen, entry, at, surfaces,
                  OUTLINE * BEYOND + STEP * turn.at) {
-            let share = share_at(entry, prior, 0u);
-            entries[entry].share = share;
-            if share >= TRACED_FROM {
+            let alpha = alpha_at(entry, prior, 0u);
+            entries[entry].alpha = alpha;
+            if alpha >= TRACED_FROM {
                 atomicOr(&entries[entry].flags, SEEN);
                 if turn.at < STEPS_TRACED {
                     claim(at, surfaces.y, turn.at);

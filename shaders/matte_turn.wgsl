@@ -1,5 +1,5 @@
-// Shared by the passes that run several times.
+// Included by passes that run several times.
 
 struct Turn {
-    at: u32,        // which time it is
+    at: u32,        // index of the run
 }

@@ -1,4 +1,5 @@
-// Pass matte_weigh: the entries at edges get their shares, and claim the first pixels to trace.
+// Pass matte_weigh: computes alpha of the entries at edges, which claim the first pixels to trace.
+// twin: `Weigh` in src/depth/matting/passes.rs
 
 @group(0) @binding(1) var<storage, read> metres: array<u32>;
 @group(0) @binding(2) var<storage, read> partials: array<vec4<f32>>;
@@ -17,9 +18,9 @@ fn matte_weigh(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups)
         if (labels & LONE) != 0u {
             continue;
         }
-        let share = share_at(k, prior, labels);
-        entries[k].share = share;
-        if (labels & NEAR) == 0u && share >= TRACED_FROM {
+        let alpha = alpha_at(k, prior, labels);
+        entries[k].alpha = alpha;
+        if (labels & NEAR) == 0u && alpha >= TRACED_FROM {
             claim(entries[k].at, entries[k].far, 0u);
         }
     }

@@ -1,5 +1,6 @@
-// Pass matte_wide, once for each step: what was traced in it and is part of something wide is none, as a hair nowhere fills a square
-// of three pixels. The outline of what is wide is part of it, and counts as seen from the next step on.
+// Pass matte_wide, once per step: discards traced pixels of wide regions, since a hair never fills a square of three
+// pixels. The outline of a wide region belongs to it, and counts as seen from the next step on.
+// twin: `Wide` in src/depth/matting/trace.rs
 
 @group(0) @binding(1) var<uniform> turn: Turn;
 @group(0) @binding(2) var<storage, read_write> counts: array<atomic<u32>>;
@@ -8,7 +9,7 @@
 
 const NONE = 0xffffffffu;
 
-// The entry of a pixel that was traced and can be told, or `NONE`.
+// The entry of a traced pixel with a usable model, or `NONE`.
 fn traced_at(pixel: vec2<u32>, edges: u32) -> u32 {
     let place = atomicLoad(&places[pixel.y * frame.size.x + pixel.x]);
     let entry = place & ~ENTERED;

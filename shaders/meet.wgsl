@@ -1,7 +1,7 @@
-// Shared by the passes that know the range of CoC of a tile of the picture: they list the tiles of those bins of `work` that
-// are made of it, in `next`. Four threads a bin: a tile of the picture has a share in as many of a bin's, at most.
+// Shared by passes that know the CoC range of a tile of the picture: they list, in `next`, the tiles of those bins of
+// `work` that depend on it. Four threads per bin: a tile of the picture contributes to at most four tiles of a bin.
 
-fn put_binned(tile: vec2<u32>, range: vec2<f32>, thread: u32) {
+fn list_binned(tile: vec2<u32>, range: vec2<f32>, thread: u32) {
     let k = work.first + thread / 4u;
     if k >= work.first + work.count {
         return;
@@ -10,7 +10,7 @@ fn put_binned(tile: vec2<u32>, range: vec2<f32>, thread: u32) {
     if !meets && bins[k].whole == 0u {
         return;
     }
-    // Pixels of the bin whose taps reach the tile: see tent.wgsl.
+    // Pixels of the bin whose tent includes the tile: see tent.wgsl.
     let scale = bins[k].scale;
     let corner = tile * TILE / scale;
     let before = select(vec2(0u), min(corner, vec2(1u)), scale > 1u);
@@ -18,6 +18,6 @@ fn put_binned(tile: vec2<u32>, range: vec2<f32>, thread: u32) {
     let side = TILE / sharing(k);
     let at = (corner - before) / side + vec2(thread % 2u, thread / 2u % 2u);
     if all(at <= min(end, bins[k].size - 1u) / side) {
-        put(k, bins[k].binned_at, at.y * binned_across(k) + at.x);
+        list_tile(k, bins[k].binned_at, at.y * binned_across(k) + at.x);
     }
 }

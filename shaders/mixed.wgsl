@@ -1,17 +1,18 @@
-// Shared by the passes that take mixed pixels apart. Such a pass has the list of them as `mixed`, by ascending `at`.
+// Shared by passes that separate mixed pixels. Such a pass binds their list as `mixed`, by ascending `at`.
+// twin: src/frame/matte.rs (`MixedPixel`)
 
 struct MixedPixel {
-    at: u32,            // pixel: row times columns plus column
-    near: u32,          // as uploaded, metres of the nearer and the farther surface; after unpack, the nearer one as a
-    far: u32,           // pixel of the scene. The farther one is in the scene.
-    share: f32,         // how much of the pixel the nearer surface covers
-    behind: f32,        // how much of it is known of the farther surface
-    red: f32,           // colour of the nearer surface less that of the farther one
+    at: u32,            // pixel index: row times columns plus column
+    near: u32,          // uploaded: metres of the nearer and the farther surface; after unpack: the nearer
+    far: u32,           // surface as a scene pixel (the farther one is in the scene)
+    share: f32,         // alpha of the nearer surface
+    behind: f32,        // known fraction of the farther surface
+    red: f32,           // colour of the nearer surface minus that of the farther one
     green: f32,
     blue: f32,
 }
 
-// The first mixed pixel that is not before a pixel.
+// Index of the first mixed pixel at or after a pixel (binary search).
 fn first_mixed(pixel: u32) -> u32 {
     var first = 0u;
     var end = frame.mixed;

@@ -1,4 +1,5 @@
-// Pass pull, of push-pull inpainting: those levels of the pyramid that a tile of level 0 can make.
+// Pass pull, of pull-push inpainting: the levels of the pyramid that a workgroup can compute from its tile of level 0.
+// twin: src/bokeh/cpu/levels.rs (`Pull`)
 
 @group(0) @binding(0) var<uniform> work: Work;
 @group(0) @binding(1) var<uniform> frame: Frame;
@@ -8,10 +9,10 @@
 @group(0) @binding(5) var<storage, read_write> known: array<f32>;
 @group(0) @binding(6) var<storage, read> mixed: array<MixedPixel>;
 
-// The tile's pixels of the level that was made last, a multiple of TILE apart by rows.
+// The tile's pixels of the last level; rows are TILE apart.
 var<workgroup> tile: array<Known, TILE * TILE>;
 
-fn lay(level: Level, pixel: vec2<u32>, own: Known) {
+fn store_known(level: Level, pixel: vec2<u32>, own: Known) {
     let index = index_of(level, pixel);
     pyramid[index] = own.value;
     known[index] = own.known;
@@ -20,7 +21,7 @@ fn lay(level: Level, pixel: vec2<u32>, own: Known) {
 @compute @workgroup_size(TILE, TILE)
 fn pull(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(local_invocation_id) local: vec3<u32>,
         @builtin(local_invocation_index) thread: u32) {
-    // Four pixels of level 0 a thread.
+    // Each thread sums four pixels of level 0.
     var pixel = workgroup.xy * TILE + local.xy;
     var sum = Known(vec4(0.0), 0.0);
     for (var sub = 0u; sub < 4u; sub++) {
@@ -35,11 +36,12 @@ fn pull(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(local_invocation_i
     for (var k = 1u; k <= BY_TILES; k++) {
         let own = pulled(sum);
         if more && all(local.xy < vec2(side)) && all(pixel < level.size) {
-            lay(level, pixel, own);
+            store_known(level, pixel, own);
         }
         more = more && !is_coarsest(level.size);
         level = coarser(level);
         workgroupBarrier();
+        // The next level is computed from this one in shared memory.
         tile[thread] = own;
         workgroupBarrier();
         side /= 2u;

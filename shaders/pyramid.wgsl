@@ -1,12 +1,14 @@
-// Shared by the passes of push-pull inpainting, over a pyramid from half the size of the picture (level 0) to one pixel. Of
-// each pixel it has light and CoC times how far they are known, and that. Level 0 is not kept: it is soon made anew.
+// Shared by the passes of pull-push inpainting (Gortler et al., The Lumigraph, 1996), over a pyramid from half the size
+// of the picture (level 0) to one pixel. A pixel stores light and CoC times the known weight, and that weight. Level 0
+// is recomputed instead of stored.
+// twin: src/bokeh/cpu/levels.rs
 
-// So many levels above level 0 are done tile by tile, and all others by one workgroup.
+// Levels above level 0 that are computed tile by tile; one workgroup does all others.
 const BY_TILES = 5u;
 
 struct Level {
     size: vec2<u32>,
-    at: u32,            // of its pixels among those of all levels
+    at: u32,            // offset of its pixels among those of all levels
 }
 
 struct Known {
@@ -23,7 +25,7 @@ fn coarser(level: Level) -> Level {
     return Level((level.size + 1u) / 2u, level.at + level.size.x * level.size.y);
 }
 
-// A level from 1 on.
+// A level, from 1 on.
 fn level_of(number: u32) -> Level {
     var level = Level((finest() + 1u) / 2u, 0u);
     for (var k = 1u; k < number; k++) {
@@ -40,7 +42,7 @@ fn index_of(level: Level, pixel: vec2<u32>) -> u32 {
     return level.at + pixel.y * level.size.x + pixel.x;
 }
 
-// Where what `directional` finds for level 1 begins: behind all levels.
+// Offset of the result of `directional` for level 1: behind all levels.
 fn directional_at() -> u32 {
     var level = level_of(1u);
     while !is_coarsest(level.size) {
@@ -57,23 +59,23 @@ fn times(a: Known, factor: f32) -> Known {
     return Known(a.value * factor, a.known * factor);
 }
 
-// The sum of four pixels as one of the coarser level: their mean where more than one is known.
+// Pull: combines four pixels into one of the coarser level, divided by the known weight if that is above 1.
 fn pulled(sum: Known) -> Known {
     return times(sum, 1.0 / max(sum.known, 1.0));
 }
 
-// What a pixel does not know, from those of the coarser level around it.
+// Push: fills the unknown part of a pixel from the coarser level.
 fn pushed(own: Known, around: Known) -> Known {
     return plus(own, times(around, (1.0 - own.known) / max(around.known, 1.0e-6)));
 }
 
-// The other coarse pixel that a fine one lies between, along one axis.
+// The coarse neighbour that a fine pixel is interpolated with, along one axis.
 fn neighbour(at: u32, limit: u32) -> u32 {
     let half = at / 2u;
     return select(min(half + 1u, limit - 1u), half - min(half, 1u), at % 2u == 0u);
 }
 
-// The four coarse pixels that a fine one lies between: columns of the nearer and the farther, rows likewise.
+// The four coarse pixels for bilinear interpolation: near and far column, near and far row.
 fn between(pixel: vec2<u32>, coarse: vec2<u32>) -> vec4<u32> {
     return vec4(pixel.x / 2u, neighbour(pixel.x, coarse.x), pixel.y / 2u, neighbour(pixel.y, coarse.y));
 }

@@ -1,4 +1,5 @@
-// Shared by the passes that know the CoC of any pixel. Such a pass has `frame`, and the depth map as `radii`.
+// Shared by passes that compute the CoC of any pixel. Such a pass binds `frame`, and the depth map as `radii`.
+// twin: src/optics.rs
 
 fn coc_of(x: u32, y: u32) -> f32 {
     if frame.coc_kind == 0u {
@@ -26,12 +27,12 @@ fn radius_at(index: u32) -> f32 {
 }
 
 fn coc_of_depth(metres: f32) -> f32 {
-    // Unknown depth counts as infinitely far. The largest finite number stands in for infinity.
+    // Unknown depth counts as infinite. The largest finite number stands in for infinity.
     var inverse_m = 0.0;
     if metres > 0.0 && metres < 3.0e38 {
         inverse_m = 1.0 / metres;
     }
-    // 1 within the sharp range, and what is nearer to 1 of both its ends without.
+    // 1 within the sharp range; outside, the end of the range whose ratio is nearer to 1.
     let ratio = max(frame.coc.y * inverse_m, min(frame.coc.z * inverse_m, 1.0));
     return clamp(frame.coc.x * (1.0 - ratio), -frame.coc.w, frame.coc.w);
 }

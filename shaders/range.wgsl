@@ -1,5 +1,4 @@
-// Shared by the passes that note the range of CoC of every tile of the picture, so that later ones can leave out what
-// is not there.
+// Shared by passes that compute the CoC range of every tile of the picture, so that later passes can skip tiles.
 
 const HUGE: f32 = 3.0e38;
 const NOTHING = vec2(HUGE, -HUGE);
@@ -10,8 +9,7 @@ fn union_of(a: vec2<f32>, b: vec2<f32>) -> vec2<f32> {
     return vec2(min(a.x, b.x), max(a.y, b.y));
 }
 
-// The lowest and highest value of a tile, of which each of some threads has seen `own`. In two steps: atomics on
-// one word would be done one thread at a time.
+// The range over a tile, given the range of each thread. In two steps: atomics on one word would be serialised.
 fn range_of_tile(thread: u32, threads: u32, own: vec2<f32>) -> vec2<f32> {
     seen[thread] = own;
     workgroupBarrier();

@@ -1,5 +1,6 @@
-// Pass reach, a dilation of radii: what the filters can reach from each edge of a segment, in the middle of each row of
-// cells. Two vectors: radius in bin pixels and lowest colour; highest colour.
+// Pass reach, a dilation of radii: mean radius and colour range within the filter support, at each segment edge, in the
+// middle of each row of cells. Two vectors: radius in bin pixels and lowest colour; highest colour.
+// twin: src/bokeh/cpu/reach.rs
 
 @group(0) @binding(0) var<uniform> work: Work;
 @group(0) @binding(1) var<uniform> bins: array<Bin, MAX_BINS>;
@@ -8,7 +9,7 @@
 
 const HUGE: f32 = 3.0e38;
 
-// What is around the cells on both sides of each edge.
+// The neighbourhoods of the cells on both sides of each edge.
 var<workgroup> sides: array<Around, TILE * SMALL_TILE>;
 
 struct Around {
@@ -59,12 +60,12 @@ fn around(k: u32, cell: vec2<u32>) -> Around {
     if bins[k].has_lobes == 0u {
         return Around(bin_radius_px(k, coc_px), vec3(-ANY_COLOR), vec3(ANY_COLOR));
     }
-    // Where nothing is in reach there is nothing to keep in range.
+    // Without content in the support there is no range to clamp to.
     let some = low.r < HUGE;
     return Around(bin_radius_px(k, coc_px), select(vec3(0.0), low, some), select(vec3(0.0), high, some));
 }
 
-// Two threads an edge: one for the cell on its left, and one for that on its right.
+// Two threads per edge: one for the cell on its left, one for the cell on its right.
 @compute @workgroup_size(TILE, SMALL_TILE)
 fn reach(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgroups) workgroups: vec3<u32>,
          @builtin(local_invocation_id) local: vec3<u32>, @builtin(local_invocation_index) thread: u32) {

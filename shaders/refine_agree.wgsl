@@ -1,4 +1,5 @@
-// Pass refine_agree: what two of three neighbours claim, across the lines that claims were made along, is the near side's.
+// Pass refine_agree: accepts claims for the near side that two of three neighbours across the claiming lines share.
+// twin: `accept_claims` in src/depth/guided_fill.rs
 
 @group(0) @binding(1) var<storage, read> claims: array<f32>;
 @group(0) @binding(2) var<storage, read_write> flags: array<u32>;

@@ -1,5 +1,6 @@
-// Pass refine_band: what lies near the two sides of a jump, and what each pixel votes for until the next time. Begins the list
-// of pixels to ask: at first with those at edges, then with those that moved in the round before.
+// Pass refine_band: finds depth edges, and the band around them in which depths may be wrong; packs the votes. Begins
+// the worklist: pixels at edges in the first round, then those that moved in the last round.
+// twin: src/depth/refine/align.rs
 
 @group(0) @binding(1) var<storage, read> measures: array<f32>;
 @group(0) @binding(2) var<storage, read> inverse: array<f32>;
@@ -10,8 +11,8 @@
 @group(0) @binding(7) var<storage, read_write> counts: array<atomic<u32>>;
 
 const TILE = 16u;
-const REST_PX = 3u;             // so far beside an edge the band goes
-const EDGES = TILE + 2u * REST_PX;
+const SIDE_PX = 3u;             // width of the band beside an edge pixel
+const EDGES = TILE + 2u * SIDE_PX;
 const DEPTHS = EDGES + 2u;
 
 var<workgroup> depths: array<f32, DEPTHS * DEPTHS>;
@@ -24,25 +25,25 @@ fn refine_band(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocatio
     let corner = vec2<i32>(group.xy * TILE);
     let size = vec2<i32>(frame.size);
     for (var n = thread; n < DEPTHS * DEPTHS; n += TILE * TILE) {
-        let offset = vec2<i32>(vec2(n % DEPTHS, n / DEPTHS)) - i32(REST_PX + 1u);
+        let offset = vec2<i32>(vec2(n % DEPTHS, n / DEPTHS)) - i32(SIDE_PX + 1u);
         let at = vec2<u32>(clamp(corner + offset, vec2(0), size - 1));
         depths[n] = inverse[at.y * frame.size.x + at.x];
     }
     workgroupBarrier();
-    let jump = measures[STEP];
+    let depth_step = measures[STEP];
     for (var n = thread; n < EDGES * EDGES; n += TILE * TILE) {
         let offset = vec2(n % EDGES, n / EDGES);
-        let at = corner + vec2<i32>(offset) - i32(REST_PX);
+        let at = corner + vec2<i32>(offset) - i32(SIDE_PX);
         let place = (offset.y + 1u) * DEPTHS + offset.x + 1u;
         let here = depths[place];
         let around = vec4(depths[place - 1u], depths[place + 1u], depths[place - DEPTHS], depths[place + DEPTHS]);
-        let is_edge = any(abs(vec4(here) - around) > vec4(EDGE_SHARE * jump_at(jump, here)));
+        let is_edge = any(abs(vec4(here) - around) > vec4(EDGE_FRACTION * depth_step_at(depth_step, here)));
         edges[n] = select(0u, 1u, is_edge && all(at >= vec2(0)) && all(at < size));
     }
     workgroupBarrier();
     for (var n = thread; n < EDGES * TILE; n += TILE * TILE) {
         var any_edge = 0u;
-        for (var px = 0u; px <= 2u * REST_PX; px++) {
+        for (var px = 0u; px <= 2u * SIDE_PX; px++) {
             any_edge |= edges[n / TILE * EDGES + n % TILE + px];
         }
         along[n] = any_edge;
@@ -52,21 +53,21 @@ fn refine_band(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocatio
         return;
     }
     var in_band = 0u;
-    for (var px = 0u; px <= 2u * REST_PX; px++) {
+    for (var px = 0u; px <= 2u * SIDE_PX; px++) {
         in_band |= along[(local.y + px) * TILE + local.x];
     }
     let k = id.y * frame.size.x + id.x;
     let before = flags[k];
-    let is_edge = edges[(local.y + REST_PX) * EDGES + local.x + REST_PX] == 1u;
-    let is_asked = select(is_edge, in_band == 1u && (before & MOVED_NOW) != 0u, DOWN == 1u);
-    // A pixel leaves the band when it is to be asked, so that it is asked once.
-    var now = (before & (UNKNOWN | ASKED)) | select(0u, BAND, in_band == 1u && !is_asked);
-    now |= select(0u, ASKED, is_asked && DOWN == 0u);
+    let is_edge = edges[(local.y + SIDE_PX) * EDGES + local.x + SIDE_PX] == 1u;
+    let is_listed = select(is_edge, in_band == 1u && (before & MOVED_NOW) != 0u, DOWN == 1u);
+    // A pixel leaves the band when it joins the worklist, so that it is processed once.
+    var now = (before & (UNKNOWN | PROCESSED)) | select(0u, BAND, in_band == 1u && !is_listed);
+    now |= select(0u, PROCESSED, is_listed && DOWN == 0u);
     flags[k] = now;
     let confidence = select(in_band, 2u, (before & UNKNOWN) != 0u);
-    votes[k] = vec2(bitcast<u32>(depths[(local.y + REST_PX + 1u) * DEPTHS + local.x + REST_PX + 1u]),
+    votes[k] = vec2(bitcast<u32>(depths[(local.y + SIDE_PX + 1u) * DEPTHS + local.x + SIDE_PX + 1u]),
                     colors[k] | (confidence << 24u));
-    if is_asked {
+    if is_listed {
         front[atomicAdd(&counts[1u + DOWN * (WAVES + 2u)], 1u)] = k;
     }
 }

@@ -1,5 +1,6 @@
-// Pass refine_beside: of each hole, the farther one of the nearest known depths to its left and right; 0 where there is
-// none. A workgroup does a row, and each of its threads some pixels of it.
+// Pass refine_beside: for each hole, the farther one of the nearest known depths to its left and right; 0 without any.
+// A workgroup processes a row, and each thread a segment of it.
+// twin: `FillPass` in src/depth/fill.rs
 
 @group(0) @binding(1) var<storage, read> counts: array<u32>;    // first, whether any hole is left
 @group(0) @binding(2) var<storage, read> metres: array<f32>;
@@ -7,7 +8,7 @@
 
 const THREADS = 256u;
 
-// The first and the last known depth of each part; 0 where there is none.
+// The first and the last known depth of each segment; 0 without any.
 var<workgroup> firsts: array<f32, THREADS>;
 var<workgroup> lasts: array<f32, THREADS>;
 
@@ -25,6 +26,7 @@ fn refine_beside(@builtin(workgroup_id) row: vec3<u32>, @builtin(local_invocatio
     lasts[thread] = ends.y;
     workgroupBarrier();
     var nearest = 0.0;
+    // Forwards from the last known depth of the earlier segments, then backwards from the later ones.
     for (var part = thread; part > 0u && nearest == 0.0; part--) {
         nearest = lasts[part - 1u];
     }

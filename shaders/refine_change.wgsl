@@ -1,5 +1,6 @@
-// Pass refine_change: how much the colours around each pixel changed since the frame before, summed up over 3x3 pixels; the
-// outermost ones count twice.
+// Pass refine_change: the colour change around each pixel since the last frame, summed over 3x3 pixels; the border
+// repeats.
+// twin: `Change` in src/depth/refine/temporal.rs
 
 @group(0) @binding(1) var<storage, read> colors: array<u32>;
 @group(0) @binding(2) var<storage, read> before: array<u32>;
@@ -12,7 +13,7 @@ fn refine_change(@builtin(global_invocation_id) id: vec3<u32>) {
     }
     var sum = 0u;
     for (var n = 0u; n < 9u; n++) {
-        // From one on, so that nothing is below 0.
+        // Offset by one, so that coordinates stay unsigned.
         let at = clamp(id.xy + vec2(n % 3u, n / 3u), vec2(1u), frame.size) - 1u;
         let k = at.y * frame.size.x + at.x;
         let now = vec4<i32>(unpack4xU8(colors[k]));

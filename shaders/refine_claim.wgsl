@@ -1,5 +1,6 @@
-// Pass refine_claim: at the first pixel of each hole along a row, then of what is left of it down a column: claims pixels for
-// the nearer one of both sides as long as they have its colour rather than the other's.
+// Pass refine_claim: guided hole filling along a row, then down a column for the rest, by the thread at the first pixel
+// of each hole: claims pixels for the nearer side as long as their colour is closer to it than to the other side.
+// twin: `claim_run` in src/depth/guided_fill.rs
 
 @group(0) @binding(1) var<storage, read> flags: array<u32>;
 @group(0) @binding(2) var<storage, read> metres: array<f32>;
@@ -10,7 +11,7 @@ fn is_hole(k: u32) -> bool {
     return (flags[k] & HOLE) != 0u;
 }
 
-// The mean colour of so many pixels.
+// Returns the mean colour of `count` pixels.
 fn mean_color(start: u32, step: u32, count: u32) -> vec3<f32> {
     var sum = vec3(0.0);
     for (var n = 0u; n < count; n++) {
@@ -31,7 +32,7 @@ fn refine_claim(@builtin(global_invocation_id) id: vec3<u32>) {
     if place == 0u || !is_hole(start) || is_hole(start - step) {
         return;
     }
-    // One pixel more than is looked at tells that it is too long.
+    // Counts one pixel more than the limit, to detect holes that are too long.
     var count = 1u;
     while count <= frame.longest && place + count < length && is_hole(start + count * step) {
         count++;

@@ -1,7 +1,7 @@
-// Shared by the passes whose threads have a part of a line each, and look for the nearest known depths in it. Such a pass has
+// Included by the passes whose threads process segments of a line and search the nearest known depths. They bind
 // `metres`.
 
-// The first and the last known depth of so many pixels, `step` apart; 0 where there is none.
+// Returns the first and the last known depth of `count` pixels, `step` apart; 0 without any.
 fn known_ends(start: u32, count: u32, step: u32) -> vec2<f32> {
     var ends = vec2(0.0);
     for (var n = 0u; n < count; n++) {

@@ -1,6 +1,7 @@
-// Pass refine_fill: each hole takes the farthest of the nearest known depths above and below, and of those beside. A
-// workgroup does 16 columns, and each of its threads a strip of one. Notes where a hole is left, whose row and column have
-// no known depth: then both passes run again.
+// Pass refine_fill: each hole takes the farthest of the nearest known depths above, below and beside it. A workgroup
+// processes 16 columns, and each thread a strip of one. Sets a flag if a hole is left, whose row and column have no
+// known depth: then both passes run again.
+// twin: `FillPass` in src/depth/fill.rs
 
 @group(0) @binding(1) var<storage, read_write> counts: array<atomic<u32>>;
 @group(0) @binding(2) var<storage, read_write> metres: array<f32>;
@@ -9,7 +10,7 @@
 const COLUMNS = 16u;
 const STRIPS = 16u;
 
-// The first and the last known depth of each strip; 0 where there is none.
+// The first and the last known depth of each strip; 0 without any.
 var<workgroup> firsts: array<f32, COLUMNS * STRIPS>;
 var<workgroup> lasts: array<f32, COLUMNS * STRIPS>;
 var<workgroup> is_full: u32;
@@ -30,7 +31,7 @@ fn refine_fill(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocatio
     let x = group.x * COLUMNS + local.x;
     let each = (height + STRIPS - 1u) / STRIPS;
     let start = min(local.y * each, height);
-    // Beyond the last column there is nothing.
+    // Threads beyond the last column have an empty strip.
     let end = select(start, min((local.y + 1u) * each, height), x < width);
     let ends = known_ends(start * width + x, end - start, width);
     firsts[thread] = ends.x;

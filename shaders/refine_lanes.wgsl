@@ -1,12 +1,12 @@
-// Shared by the pass whose threads do a pixel together, `LANES` each: sums and ends of what they have.
+// Included by the pass with `LANES` threads per pixel: reductions over them.
 
 const LANES = 16u;
 
-// What each thread adds up for its pixel, and its least and largest depths.
+// Sums of each thread for its pixel, and its smallest and largest depths.
 var<workgroup> sums: array<vec4<f32>, PIXELS * LANES>;
 var<workgroup> ends: array<vec2<f32>, PIXELS * LANES>;
 
-// Halves added to halves, as vector code on the processor does it.
+// Adds halves to halves, in the order of the CPU's vector code.
 fn sum_of(first: u32) -> vec4<f32> {
     var four: array<vec4<f32>, 4>;
     for (var n = 0u; n < 4u; n++) {

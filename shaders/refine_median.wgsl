@@ -1,5 +1,6 @@
-// Pass refine_median, in one workgroup: the median change of colour, over a grid of samples, and with it the change up to
-// which a pixel rests.
+// Pass refine_median, in one workgroup: the median colour change over a grid of samples, and from it the largest change
+// of a static pixel.
+// twin: `median_change` in src/depth/refine/temporal.rs
 
 @group(0) @binding(1) var<storage, read> change: array<u32>;
 @group(0) @binding(2) var<storage, read_write> samples: array<u32>;
@@ -7,14 +8,14 @@
 
 @compute @workgroup_size(THREADS)
 fn refine_median(@builtin(local_invocation_index) thread: u32) {
-    let step = (frame.size + CHANGE_LOOKS - 1u) / CHANGE_LOOKS;
-    let looks = (frame.size + step - 1u) / step;
-    let length = looks.x * looks.y;
+    let step = (frame.size + CHANGE_GRID - 1u) / CHANGE_GRID;
+    let grid = (frame.size + step - 1u) / step;
+    let length = grid.x * grid.y;
     for (var n = thread; n < length; n += THREADS) {
-        samples[n] = change[n / looks.x * step.y * frame.size.x + n % looks.x * step.x];
+        samples[n] = change[n / grid.x * step.y * frame.size.x + n % grid.x * step.x];
     }
     let median = f32(sample_of_rank(length / 2u, length, thread)) / 9.0;
     if thread == 0u {
-        measures[CHANGED] = clamp(MOVED * median, MOVED_LEAST, MOVED_MOST);
+        measures[CHANGED] = clamp(MOVED * median, MOVED_MIN, MOVED_MAX);
     }
 }

@@ -1,9 +1,11 @@
-// Pass refine_prepare: the map of depth, brought to the picture's size, and what is unknown of it; the picture, a word a
-// pixel. Nothing is claimed yet.
+// Pass refine_prepare: resamples the depth map to the picture's size and flags unknown pixels; packs the picture, a
+// word per pixel. Clears the claims.
+// twin: src/depth/refine/upsample.rs
 
 @group(0) @binding(1) var<storage, read> map: array<u32>;               // bits of metres
 @group(0) @binding(2) var<storage, read> taps: array<vec2<u32>>;        // of columns, then of rows: the first of two
-                                                                        // samples, and the bits of the share of the second
+                                                                        // samples, and the bits of the second one's
+                                                                        // weight
 @group(0) @binding(3) var<storage, read> rgb: array<u32>;               // bytes
 @group(0) @binding(4) var<storage, read_write> colors: array<u32>;
 @group(0) @binding(5) var<storage, read_write> flags: array<u32>;
@@ -12,10 +14,10 @@
 @group(0) @binding(8) var<storage, read_write> column_claims: array<f32>;
 
 fn known(bits: vec4<u32>) -> vec4<bool> {
-    return (bits >= vec4(LEAST_BITS)) & (bits <= vec4(MOST_BITS));
+    return (bits >= vec4(MIN_BITS)) & (bits <= vec4(MAX_BITS));
 }
 
-// The depth at a pixel, or 0.
+// Returns the depth at a pixel, or 0.
 fn depth_at(pixel: vec2<u32>) -> f32 {
     let column = taps[pixel.x];
     let row = taps[frame.size.x + pixel.y];
@@ -42,7 +44,7 @@ fn depth_at(pixel: vec2<u32>) -> f32 {
 fn color_at(k: u32) -> u32 {
     let at = 3u * k;
     let shift = 8u * (at % 4u);
-    // What a word lacks is in the next one; the last pixel of the picture may end with the last word.
+    // The rest of the pixel is in the next word; the last pixel of the picture may end with the last word.
     let next = rgb[min(at / 4u + 1u, arrayLength(&rgb) - 1u)];
     return ((rgb[at / 4u] >> shift) | select(next << (32u - shift), 0u, shift == 0u)) & 0xffffffu;
 }

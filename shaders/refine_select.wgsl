@@ -1,13 +1,13 @@
-// Shared by the passes that find a quantile, in one workgroup. Such a pass has `samples`: each thread writes and reads those
-// whose number is its own, and so on in steps of `THREADS`. Their values are bits of numbers that are not negative; `NONE`
-// is no sample.
+// Included by the passes that find a quantile, in one workgroup. They bind `samples`, which thread `t` accesses at `t`
+// and in steps of `THREADS` from there. Values are the bits of non-negative floats, which sort like integers; `NONE` is
+// no sample.
 
 const THREADS = 256u;
 const NONE = 0xffffffffu;
 
 var<workgroup> found: atomic<u32>;
 
-// How many of so many samples are below a value.
+// Counts the samples below a value, of `length`.
 fn count_below(value: u32, length: u32, thread: u32) -> u32 {
     if thread == 0u {
         atomicStore(&found, 0u);
@@ -21,7 +21,7 @@ fn count_below(value: u32, length: u32, thread: u32) -> u32 {
     return workgroupUniformLoad(&found);
 }
 
-// The sample that so many others are below, or as large: the largest value with no more samples below it, bit by bit.
+// Returns the sample of a rank by radix selection: the largest value with at most `rank` samples below it, bit by bit.
 fn sample_of_rank(rank: u32, length: u32, thread: u32) -> u32 {
     var value = 0u;
     for (var bit = 31u; bit > 0u; bit--) {

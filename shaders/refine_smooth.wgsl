@@ -1,4 +1,5 @@
-// Pass refine_smooth: the sigma filter, along rows of what depth in metres is inversely, and then down columns.
+// Pass refine_smooth: the sigma filter (Lee 1983) on inverse depth, first along rows from metres, then down columns.
+// twin: src/depth/refine/smooth.rs
 
 @group(0) @binding(1) var<storage, read> measures: array<f32>;
 @group(0) @binding(2) var<storage, read> map: array<f32>;

@@ -1,10 +1,11 @@
-// Pass refine_steady: what is left between two surfaces takes the one whose colour is more like its own; then the temporal
-// filter moves the mean of each pixel towards its inverse depth, and gives it out in metres.
+// Pass refine_steady: snaps pixels between two surfaces to the one with the more similar colour; then the temporal
+// filter moves the mean of each pixel towards its inverse depth, and outputs it in metres.
+// twin: `snap_to_surfaces` in src/depth/refine/align.rs, `Average` in src/depth/refine/temporal.rs
 
 struct Remembered {
-    mean: f32,      // inverse depth as it was given out
-    count: f32,     // frames in it
-    held: u32,      // frames for which a jump was held back
+    mean: f32,      // filtered inverse depth
+    count: f32,     // number of frames in it
+    held: u32,      // frames for which a step was held back
 }
 
 @group(0) @binding(1) var<storage, read> measures: array<f32>;
@@ -20,12 +21,12 @@ struct Remembered {
 fn is_between(here: f32, a: u32, b: u32) -> bool {
     let low = min(inverse[a], inverse[b]);
     let high = max(inverse[a], inverse[b]);
-    let jump = measures[STEP];
-    return here - low > jump_at(jump, here) && high - here > jump_at(jump, high);
+    let depth_step = measures[STEP];
+    return here - low > depth_step_at(depth_step, here) && high - here > depth_step_at(depth_step, high);
 }
 
-// The depth of a pixel that was asked. Its neighbours are as the votes have left them, whatever they decide.
-fn decided(pixel: vec2<u32>, k: u32) -> f32 {
+// Returns the depth of a processed pixel. Its neighbours are those after the votes, whatever they become here.
+fn snapped(pixel: vec2<u32>, k: u32) -> f32 {
     let here = inverse[k];
     for (var n = 0u; n < 2u; n++) {
         let axis = 1u - n;
@@ -40,20 +41,20 @@ fn decided(pixel: vec2<u32>, k: u32) -> f32 {
     return here;
 }
 
-fn steadied(now: f32, old: Remembered, changed: f32) -> Remembered {
-    // From 1 up to the bound to 0 at twice the bound: the weight of the past.
-    let rest = saturate(2.0 - changed / 9.0 / measures[CHANGED]);
+fn filtered(now: f32, old: Remembered, changed: f32) -> Remembered {
+    // Weight of the past: 1 up to the bound, falling to 0 at twice the bound.
+    let past_weight = saturate(2.0 - changed / 9.0 / measures[CHANGED]);
     let step = now - old.mean;
-    let noise_share = saturate(abs(step) / measures[STILL]);
-    if abs(step) > 2.0 * measures[STEP] && rest >= 1.0 && old.held < HOLD {
+    let noise_ratio = saturate(abs(step) / measures[STILL]);
+    if abs(step) > 2.0 * measures[STEP] && past_weight >= 1.0 && old.held < HOLD_FRAMES {
         return Remembered(old.mean, old.count, old.held + 1u);
     }
-    let frames = old.count * rest;
-    // The nearer to the limit, the less it is noise: the share of the new depth grows to 1 there, smoothly.
-    let squared = noise_share * noise_share;
-    let share = 1.0 / (frames + 1.0);
-    let count = select(min(frames + 1.0, LONGEST), 1.0, noise_share >= 1.0);
-    return Remembered(old.mean + (share + (1.0 - share) * squared * squared) * step, count, 0u);
+    let frames = old.count * past_weight;
+    // The closer to the limit, the less likely it is noise: the weight of the new depth grows smoothly to 1 there.
+    let squared = noise_ratio * noise_ratio;
+    let alpha = 1.0 / (frames + 1.0);
+    let count = select(min(frames + 1.0, MAX_FRAMES), 1.0, noise_ratio >= 1.0);
+    return Remembered(old.mean + (alpha + (1.0 - alpha) * squared * squared) * step, count, 0u);
 }
 
 @compute @workgroup_size(64, 4)
@@ -63,14 +64,14 @@ fn refine_steady(@builtin(global_invocation_id) id: vec3<u32>) {
     }
     let k = id.y * frame.size.x + id.x;
     var now = inverse[k];
-    if (flags[k] & ASKED) != 0u {
-        now = decided(id.xy, k);
+    if (flags[k] & PROCESSED) != 0u {
+        now = snapped(id.xy, k);
     }
     var next = Remembered(now, 1.0, 0u);
     if frame.fresh == 0u {
         var old = memory[k];
         old.mean *= frame.times;
-        next = steadied(now, old, f32(change[k]));
+        next = filtered(now, old, f32(change[k]));
     }
     memory[k] = next;
     before[k] = colors[k];

@@ -1,38 +1,39 @@
-// Pass refine_vote: the next pixels of the list are told their surface, by the votes of the window around each. Those that
-// turn out to lie on another surface put their neighbours in the band on the list. 16 threads do a pixel, each a column of
-// its window. Workgroups take turns with the pixels of a wave; in the last run, one goes on until nobody puts any more.
+// Pass refine_vote: finds the surface of the next pixels of the worklist by the votes around each. Pixels that change
+// append their neighbours in the band. 16 threads process a pixel, each a column of its window. Workgroups share a
+// wave; in the last run, a single one goes on until the worklist is empty.
+// twin: `vote` in src/depth/refine/align.rs, src/depth/refine/votes.rs
 
 struct Wave {
-    first: u32,     // where the numbers of pixels of all waves of the round begin in `counts`
-    at: u32,        // where that of this one is; the next one's is after it
-    marks: u32,     // what those are marked with that are put on the list
+    first: u32,     // index in `counts` of the length of the round's first wave
+    at: u32,        // index of this wave's length; the next one's follows
+    marks: u32,     // flag for the pixels that are appended to the worklist
 }
 
 @group(0) @binding(1) var<uniform> wave: Wave;
 @group(0) @binding(2) var<storage, read> measures: array<f32>;
-@group(0) @binding(3) var<storage, read> nearby: array<f32>;            // weights of votes by distance, row by row
-@group(0) @binding(4) var<storage, read> votes: array<vec2<u32>>;       // as `refine_band` has left them
+@group(0) @binding(3) var<storage, read> nearby: array<f32>;            // spatial weights of votes, row by row
+@group(0) @binding(4) var<storage, read> votes: array<vec2<u32>>;       // as packed by `refine_band`
 @group(0) @binding(5) var<storage, read_write> inverse: array<f32>;
 @group(0) @binding(6) var<storage, read_write> flags: array<atomic<u32>>;
 @group(0) @binding(7) var<storage, read_write> front: array<u32>;
 @group(0) @binding(8) var<storage, read_write> counts: array<atomic<u32>>;
 
-// The range of votes is halved until it is one surface; no range of depths takes so many turns.
-const MOST_TURNS = 64u;
+// The range of votes is halved until it is one surface, which takes fewer iterations for any range of depths.
+const MAX_ITERATIONS = 64u;
 
 var<workgroup> begin: u32;
 var<workgroup> count: u32;
 var<workgroup> more: atomic<u32>;
 
-// Puts a neighbour on the list of the next wave.
-fn put(k: u32, next: u32) {
+// Appends a neighbour to the next wave.
+fn append(k: u32, next: u32) {
     if (atomicAnd(&flags[k], ~BAND) & BAND) != 0u {
         atomicOr(&flags[k], wave.marks);
         front[next + atomicAdd(&counts[wave.at + 1u], 1u)] = k;
     }
 }
 
-fn ask(k: u32, is_asked: bool, next: u32, thread: u32) {
+fn process_pixel(k: u32, is_listed: bool, next: u32, thread: u32) {
     let lane = thread % LANES;
     let first = thread - lane;
     let x = k % frame.size.x;
@@ -47,12 +48,12 @@ fn ask(k: u32, is_asked: bool, next: u32, thread: u32) {
     var high = ends_of(first).y;
     let share = totals.y / totals.x;
     let fourth = share * share * share * share;
-    let loyalty = LOYALTY + CONTRAST_LOYALTY * fourth * fourth;
+    let hysteresis = HYSTERESIS + LOW_CONTRAST_HYSTERESIS * fourth * fourth;
     let current = bitcast<f32>(center.x);
     var mean = current;
     var is_split = true;
-    for (var turn = 0u; turn < MOST_TURNS; turn++) {
-        is_split = is_split && high - low > jump_at(measures[STEP], high);
+    for (var iteration = 0u; iteration < MAX_ITERATIONS; iteration++) {
+        is_split = is_split && high - low > depth_step_at(measures[STEP], high);
         if thread == 0u {
             atomicStore(&more, 0u);
         }
@@ -64,7 +65,7 @@ fn ask(k: u32, is_asked: bool, next: u32, thread: u32) {
             break;
         }
         let middle = 0.5 * (low + high);
-        // Weights of the near and of the far half, and these times the depths; the votes nearest to the middle.
+        // Weights of the near and of the far half, and their products with the depths; the votes next to the middle.
         var halves = vec4(0.0);
         var inner = vec2(high, low);
         for (var row = 0u; row < ROWS; row++) {
@@ -80,21 +81,21 @@ fn ask(k: u32, is_asked: bool, next: u32, thread: u32) {
         workgroupBarrier();
         let all = sum_of(first);
         let middles = ends_of(first);
-        let near = all.x * select(1.0, loyalty, current > middle && current <= high);
-        let far = all.y * select(1.0, loyalty, current <= middle && current >= low);
+        let near = all.x * select(1.0, hysteresis, current > middle && current <= high);
+        let far = all.y * select(1.0, hysteresis, current <= middle && current >= low);
         if is_split {
             let is_near = near > far;
             let changed = select(vec2(low, middles.y), vec2(middles.x, high), is_near);
             mean = select(all.w / all.y, all.z / all.x, is_near);
-            // Rounding may leave nothing to split.
+            // Rounding may leave an unchanged range.
             is_split = any(changed != vec2(low, high));
             low = changed.x;
             high = changed.y;
         }
     }
-    let slack = 0.5 * jump_at(measures[STEP], current);
+    let slack = 0.5 * depth_step_at(measures[STEP], current);
     let is_on_it = current >= low - slack && current <= high + slack && abs(current - mean) < slack;
-    if !is_asked || is_on_it || mean == current {
+    if !is_listed || is_on_it || mean == current {
         return;
     }
     if lane == 0u {
@@ -103,13 +104,13 @@ fn ask(k: u32, is_asked: bool, next: u32, thread: u32) {
     }
     let last = frame.size - 1u;
     if lane == 1u && x > 0u {
-        put(k - 1u, next);
+        append(k - 1u, next);
     } else if lane == 2u && x < last.x {
-        put(k + 1u, next);
+        append(k + 1u, next);
     } else if lane == 3u && y > 0u {
-        put(k - frame.size.x, next);
+        append(k - frame.size.x, next);
     } else if lane == 4u && y < last.y {
-        put(k + frame.size.x, next);
+        append(k + frame.size.x, next);
     }
 }
 
@@ -129,13 +130,13 @@ fn refine_vote(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups)
     loop {
         for (var first = start + group.x * PIXELS; first < end; first += groups.x * PIXELS) {
             let number = first + thread / LANES;
-            ask(front[min(number, end - 1u)], number < end, next, thread);
+            process_pixel(front[min(number, end - 1u)], number < end, next, thread);
             workgroupBarrier();
         }
         if DOWN == 0u {
             break;
         }
-        // Each pixel is put once, so that there is an end.
+        // Ends, because each pixel is appended once.
         storageBarrier();
         if thread == 0u {
             count = next + atomicLoad(&counts[wave.at + 1u]);

@@ -1,29 +1,30 @@
-// Shared by the pass that asks windows: the votes of a column of one. Such a pass has `votes` and `nearby`.
+// Included by the pass that evaluates windows: the votes of one column. It binds `votes` and `nearby`.
+// twin: src/depth/refine/votes.rs
 
 const ROWS = 9u;
-const REACH_PX = 12;
+const RADIUS_PX = 12;
 const STEP_PX = 2;
 const ROW_STEP_PX = 3;
 
 struct Column {
-    depth: array<f32, ROWS>,    // inverse depths voted for
+    depth: array<f32, ROWS>,    // inverse depths of the votes
     weight: array<f32, ROWS>,
-    total: vec2<f32>,           // of the weights, without colour and with it
-    range: vec2<f32>,           // least and largest inverse depth that has a vote
+    total: vec2<f32>,           // sums of the weights, without colour and with it
+    range: vec2<f32>,           // smallest and largest inverse depth that has a vote
 }
 
 fn confidence_of(word: u32) -> f32 {
-    return select(select(1.0, UNSURE, (word >> 24u) == 1u), MADE_UP, (word >> 24u) == 2u);
+    return select(select(1.0, UNCERTAIN, (word >> 24u) == 1u), FILLED, (word >> 24u) == 2u);
 }
 
-// Column number `lane` of the window around a pixel of a colour.
+// Computes column number `lane` of the window around a pixel of this colour.
 fn column_of(pixel: vec2<u32>, color: vec3<f32>, lane: u32) -> Column {
     var own: Column;
     own.total = vec2(0.0);
     own.range = vec2(3.0e38, 0.0);
-    let x = i32(pixel.x) - REACH_PX + i32(lane) * STEP_PX;
+    let x = i32(pixel.x) - RADIUS_PX + i32(lane) * STEP_PX;
     for (var row = 0u; row < ROWS; row++) {
-        let y = i32(pixel.y) - REACH_PX + i32(row) * ROW_STEP_PX;
+        let y = i32(pixel.y) - RADIUS_PX + i32(row) * ROW_STEP_PX;
         own.weight[row] = 0.0;
         own.depth[row] = 0.0;
         if x < 0 || x >= i32(frame.size.x) || y < 0 || y >= i32(frame.size.y) {
@@ -31,10 +32,10 @@ fn column_of(pixel: vec2<u32>, color: vec3<f32>, lane: u32) -> Column {
         }
         let vote = votes[u32(y) * frame.size.x + u32(x)];
         let off = color_of(vote.y) - color;
-        var alike = max(1.0 - dot(off, off) * QUARTER_T, 0.0);
-        alike *= alike;
+        var similarity = max(1.0 - dot(off, off) * QUARTER_T, 0.0);
+        similarity *= similarity;
         let without_color = confidence_of(vote.y) * nearby[row * LANES + lane];
-        let weight = without_color * (alike * alike + UNLIKE);
+        let weight = without_color * (similarity * similarity + MIN_SIMILARITY);
         let v = bitcast<f32>(vote.x);
         own.total += vec2(without_color, weight);
         own.weight[row] = weight;

@@ -1,7 +1,7 @@
-// Shared by the passes that make the result of a bin. Such a pass has `bins`, `frame` and, for each tile of the picture, the bits
-// of the bins that it shows, `shown`.
+// Shared by passes that write the result of a bin. Such a pass binds `bins`, `frame` and `shown`: per tile of the
+// picture a bit mask of the bins with content there.
 
-// Notes that the tiles of the picture over a tile of the bin, and next to it, show the bin.
+// Marks the bin in the tiles of the picture that a tile of the bin overlaps or touches.
 fn show(k: u32, tile: vec2<u32>, thread: u32) {
     let across = (frame.size + TILE - 1u) / TILE;
     let corner = tile * result_tile() * bins[k].scale;

@@ -1,5 +1,6 @@
-// Pass spread: silhouettes spread along the rows of their grid. Of each distance that is noted of them, a cell gets the largest
-// square less that of how far away it is. See silhouettes.rs.
+// Pass spread: dilates the silhouettes along the rows of their grid, the maximum of distance^2 minus the squared
+// offset.
+// twin: src/bokeh/cpu/silhouettes.rs
 
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<storage, read> marks: array<vec4<f32>>;
@@ -11,9 +12,9 @@ fn spread(@builtin(global_invocation_id) id: vec3<u32>) {
     if any(id.xy >= cells) {
         return;
     }
-    let most = farthest();
+    let radius = max_radius_cells();
     var highest = vec4(-1.0);
-    for (var x = id.x - min(id.x, most); x <= min(id.x + most, cells.x - 1u); x++) {
+    for (var x = id.x - min(id.x, radius); x <= min(id.x + radius, cells.x - 1u); x++) {
         let mark = marks[id.y * cells.x + x];
         let distance_px = f32((max(x, id.x) - min(x, id.x)) * GRAIN);
         highest = max(highest, select(vec4(-1.0), mark * mark - distance_px * distance_px, mark > vec4(distance_px)));

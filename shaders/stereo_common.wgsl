@@ -1,21 +1,21 @@
-// Shared by every pass of the matcher: the size of the work and the numbers that are defined once, in Rust.
+// Included by every pass of the matcher: the size of the work and the constants that Rust defines.
 
-override WIDTH: u32;        // of both pictures
+override WIDTH: u32;        // columns of both pictures
 override HEIGHT: u32;
-override WORDS: u32;        // of four disparities each
+override WORDS: u32;        // four disparities per word
 override OUTSIDE: u32;      // cost of a partner beyond the border
-override BONUS: u32;        // what a likely disparity costs less
-override SLOPE: u32;        // penalty for a disparity that differs by one
-override AGREE: u32;        // left and right may differ by this much
+override BONUS: u32;        // reduction of the cost of a likely disparity
+override P1: u32;           // penalty P1 for a disparity that differs by one
+override AGREE: u32;        // largest difference of left and right disparity
 override ONE: u32;          // one pixel in fixed point
-override UNKNOWN: u32;      // no disparity
+override UNKNOWN: u32;      // an unknown disparity
 override FILLED: u32;       // the bit of a disparity that was filled in
-override NOISE: u32;        // sum of changes of 3x3 pixels that are none
-override STEP: u32;         // neighbours of an island differ by no more
-override ISLAND: u32;       // islands of up to so many pixels are dropped
-override BACK: u32;         // of a path along a row: 1 from the right, after the one from the left
+override NOISE: u32;        // largest change of 3x3 pixels that counts as noise
+override STEP: u32;         // largest difference of neighbours in an island
+override ISLAND: u32;       // largest number of pixels of a removed island
+override BACK: u32;         // 1 for the path along rows from the right, which is the second
 
-// Where the sums of all paths lie, for threads side by side: `[row][word][column]`.
+// Returns the index of a total: `[row][word][column]`, so that neighbouring threads read neighbouring words.
 fn total_at(x: u32, y: u32, word: u32) -> u32 {
     return (y * WORDS + word) * WIDTH + x;
 }

@@ -1,13 +1,15 @@
-// Pass stereo_cost: what it costs to say that a pixel has a disparity: an eighth of the sum of the bits in which the
-// census of both eyes differs, over 3x3 pixels, and less for what is likely. A workgroup goes along a strip of a row.
+// Pass stereo_cost: the matching cost, an eighth of the Hamming distance of the census codes summed over 3x3 pixels,
+// less a bonus for likely disparities. A workgroup processes a strip of a row.
+// twin: src/depth/stereo/cpu/cost.rs
 
 @group(0) @binding(0) var<storage, read> census: array<u32>;        // left, then right
-@group(0) @binding(1) var<storage, read> likely: array<u32>;        // one more than a disparity, or 0
-@group(0) @binding(2) var<storage, read_write> costs: array<u32>;   // four a word, `[row][column][word]`
+@group(0) @binding(1) var<storage, read> likely: array<u32>;        // one more than the likely disparity, or 0
+@group(0) @binding(2) var<storage, read_write> costs: array<u32>;   // four per word, `[row][column][word]`
 
 const STRIP = 16u;
 
-// The bits that differ at four disparities of a column, summed over three rows. The outermost columns and rows repeat.
+// Returns the Hamming distances at four disparities of a column, summed over three rows. The outermost columns and rows
+// repeat.
 fn column_at(x: i32, y: u32, word: u32) -> vec4<u32> {
     let column = u32(clamp(x, 0, i32(WIDTH) - 1));
     let disparities = 4u * word + vec4(0u, 1u, 2u, 3u);
@@ -23,8 +25,8 @@ fn column_at(x: i32, y: u32, word: u32) -> vec4<u32> {
     return sum;
 }
 
-// The costs at a pixel, where that disparity and those beside it are favoured which is likely.
-fn favour(pixel: u32, word: u32, cost: vec4<u32>) -> vec4<u32> {
+// Lowers the costs at a pixel for the likely disparity and those one above and below it.
+fn apply_prior(pixel: u32, word: u32, cost: vec4<u32>) -> vec4<u32> {
     let one_more = vec4(likely[pixel]);
     let here = 4u * word + vec4(1u, 2u, 3u, 4u);
     let near = (max(here, one_more) - min(here, one_more) <= vec4(1u)) & (one_more > vec4(0u));
@@ -41,7 +43,7 @@ fn stereo_cost(@builtin(workgroup_id) strip: vec3<u32>, @builtin(local_invocatio
         let after = column_at(i32(x) + 1, y, word);
         let pixel = y * WIDTH + x;
         let cost = (before + here + after + 4u) >> vec4(3u);
-        costs[pixel * WORDS + word] = pack4xU8(favour(pixel, word, cost));
+        costs[pixel * WORDS + word] = pack4xU8(apply_prior(pixel, word, cost));
         before = here;
         here = after;
     }

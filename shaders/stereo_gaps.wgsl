@@ -1,12 +1,13 @@
-// Pass stereo_gaps: drops small islands, and fills the gaps of each row with the farther one of the disparities left and
-// right of them. What is left of the first known pixel stays unknown.
+// Pass stereo_gaps: removes small islands, and fills the gaps of each row with the farther one of the disparities left
+// and right of them. Pixels left of the first known one stay unknown.
+// twin: src/depth/stereo/gaps.rs
 
 @group(0) @binding(0) var<storage, read> labels: array<u32>;
 @group(0) @binding(1) var<storage, read> sizes: array<u32>;
-@group(0) @binding(2) var<storage, read_write> map: array<u32>;     // without islands afterwards: for the next pair
+@group(0) @binding(2) var<storage, read_write> map: array<u32>;     // without islands afterwards, for the next pair
 @group(0) @binding(3) var<storage, read_write> filled: array<u32>;
 
-// The first and the last known disparity of an invocation's columns.
+// The first and the last known disparity of each invocation's columns.
 var<workgroup> firsts: array<u32, INVOCATIONS>;
 var<workgroup> lasts: array<u32, INVOCATIONS>;
 
@@ -17,7 +18,7 @@ fn stereo_gaps(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(local_invoc
     var right = UNKNOWN;
     for (var at = columns.x; at < columns.y; at++) {
         var disparity = map[at];
-        // From the pixel to the first one of its run, and from there to the root.
+        // The label of a pixel is the first one of its run, whose label is the root.
         if sizes[labels[labels[at]]] <= ISLAND {
             disparity = UNKNOWN;
             map[at] = UNKNOWN;

@@ -1,7 +1,8 @@
-// Pass stereo_join: islands are joined from row to row.
+// Pass stereo_join: joins islands from row to row.
+// twin: src/depth/stereo/cpu/speckle.rs
 
-// Makes one island of those of two runs. The label of a root becomes that of the other root; where somebody else was
-// quicker, what it has become is joined, too. The larger of both falls with every turn.
+// Joins the islands of two runs: the label of one root becomes the other root. If another invocation changed that label
+// first, its value is joined, too. The larger of both roots decreases in every iteration.
 fn join(one: u32, other: u32) {
     var a = root_of(one);
     var b = root_of(other);
@@ -20,19 +21,19 @@ fn join(one: u32, other: u32) {
 @compute @workgroup_size(LINE)
 fn stereo_join(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgroups) workgroups: vec3<u32>,
                @builtin(local_invocation_index) thread: u32) {
-    let pixel = line_at(workgroup, workgroups, thread);
+    let pixel = linear_index(workgroup, workgroups, thread);
     if pixel < WIDTH || pixel >= WIDTH * HEIGHT {
         return;
     }
     let above = pixel - WIDTH;
-    if !touch(map[pixel], map[above]) {
+    if !is_connected(map[pixel], map[above]) {
         return;
     }
-    // Where both runs come from the left and touch there, too, somebody further left joins them.
-    if pixel % WIDTH > 0u && touch(map[pixel - 1u], map[above - 1u])
-        && touch(map[pixel - 1u], map[pixel]) && touch(map[above - 1u], map[above]) {
+    // If both runs also touch one column further left, that invocation joins them.
+    if pixel % WIDTH > 0u && is_connected(map[pixel - 1u], map[above - 1u])
+        && is_connected(map[pixel - 1u], map[pixel]) && is_connected(map[above - 1u], map[above]) {
         return;
     }
-    // The label of a run's first pixel is that of another run of the island, which will do.
+    // The label of a run's first pixel may be another run of the island, which does as well.
     join(atomicLoad(&labels[pixel]), atomicLoad(&labels[above]));
 }

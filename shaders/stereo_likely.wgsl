@@ -1,9 +1,10 @@
-// Pass stereo_likely: one more than the whole disparity that a pixel had in the last pair, where the picture around it
-// has not changed since; else 0.
+// Pass stereo_likely: one more than the pixel's disparity in the last pair, in whole pixels, where the picture around
+// it has not changed since; else 0.
+// twin: src/depth/stereo/cpu/prior.rs
 
-@group(0) @binding(0) var<storage, read> luma: array<u32>;      // of the left eye first
-@group(0) @binding(1) var<storage, read> last: array<u32>;      // the same of the last pair
-@group(0) @binding(2) var<storage, read> map: array<u32>;       // of the last pair
+@group(0) @binding(0) var<storage, read> luma: array<u32>;      // left picture first
+@group(0) @binding(1) var<storage, read> last: array<u32>;      // left picture of the last pair
+@group(0) @binding(2) var<storage, read> map: array<u32>;       // disparities of the last pair
 @group(0) @binding(3) var<storage, read_write> likely: array<u32>;
 
 fn change_at(x: u32, y: u32) -> u32 {
@@ -12,7 +13,7 @@ fn change_at(x: u32, y: u32) -> u32 {
     return difference((luma[at / 4u] >> shift) & 255u, (last[at / 4u] >> shift) & 255u);
 }
 
-// The sum over 3x3 pixels; beyond the border the outermost ones repeat.
+// Returns the sum over 3x3 pixels; beyond the border the outermost ones repeat.
 fn change_around(x: u32, y: u32) -> u32 {
     let columns = vec3(max(x, 1u) - 1u, x, min(x + 1u, WIDTH - 1u));
     var sum = 0u;
@@ -26,7 +27,7 @@ fn change_around(x: u32, y: u32) -> u32 {
 @compute @workgroup_size(LINE)
 fn stereo_likely(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgroups) workgroups: vec3<u32>,
                  @builtin(local_invocation_index) thread: u32) {
-    let pixel = line_at(workgroup, workgroups, thread);
+    let pixel = linear_index(workgroup, workgroups, thread);
     if pixel >= WIDTH * HEIGHT {
         return;
     }

@@ -1,4 +1,4 @@
-// Pass stereo_pack: two pixels a word, as the CPU takes them.
+// Pass stereo_pack: packs two pixels per word, the layout of the CPU's map.
 
 @group(0) @binding(0) var<storage, read> filled: array<u32>;
 @group(0) @binding(1) var<storage, read_write> words: array<u32>;
@@ -6,7 +6,7 @@
 @compute @workgroup_size(LINE)
 fn stereo_pack(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgroups) workgroups: vec3<u32>,
                @builtin(local_invocation_index) thread: u32) {
-    let word = line_at(workgroup, workgroups, thread);
+    let word = linear_index(workgroup, workgroups, thread);
     let pixel = 2u * word;
     if pixel >= WIDTH * HEIGHT {
         return;

@@ -1,16 +1,17 @@
-// Shared by the passes that go along paths: a workgroup goes along one, with four disparities in each invocation. Such
-// a pass says which pixel a step comes to (`pixel_at`; steps beyond the end stay on the last one), which penalty holds
-// there (`penalty_at`), what the paths before have left there (`sum_at`), and where to leave the new sum (`leave`).
+// Included by the passes of semi-global aggregation (Hirschmüller, PAMI 2008): one workgroup per path, four disparities
+// per invocation. Such a pass defines the pixel of a step (`pixel_at`; steps beyond the end stay on the last one), its
+// penalty P2 (`penalty_at`), the sum of the earlier paths (`sum_at`), and the storage of the new sum (`store_sum`).
+// twin: src/depth/stereo/cpu/path.rs
 
-const MOST_WORDS = 64u;
-const NEVER_LEAST = 0xffffffffu;
+const MAX_WORDS = 64u;
+const PADDING = 0xffffffffu;
 
-// The values at a pixel, between words that are never the least; those of the next pixel go beside them.
-var<workgroup> states: array<array<u32, MOST_WORDS + 2u>, 2>;
-// The least of the values at a pixel; the other two are of the pixels before and after.
+// The values at a pixel, between padding that is never the minimum; two buffers, for the current and the next pixel.
+var<workgroup> states: array<array<u32, MAX_WORDS + 2u>, 2>;
+// The minimum of the values at a pixel; the other two belong to the previous and the next pixel.
 var<workgroup> least: array<atomic<u32>, 3>;
 
-// What is known of the next four pixels of a path: fetched while it goes along those before.
+// Inputs of the next four pixels of a path, prefetched while the previous four are processed.
 struct Ahead {
     costs: vec4<u32>,
     sums: vec4<u32>,
@@ -33,52 +34,52 @@ fn fetch(line: u32, step: u32, word: u32) -> Ahead {
 fn prepare(word: u32) {
     if word == 0u {
         for (var side = 0u; side < 2u; side++) {
-            states[side][0] = NEVER_LEAST;
-            states[side][WORDS + 1u] = NEVER_LEAST;
+            states[side][0] = PADDING;
+            states[side][WORDS + 1u] = PADDING;
         }
-        atomicStore(&least[0], NEVER_LEAST);
+        atomicStore(&least[0], PADDING);
     }
     workgroupBarrier();
 }
 
-// From the values at a pixel to those at the next one, whose number is `step`. Two memories for the values and three
-// for the least of them make one barrier enough.
-fn go(step: u32, word: u32, values: vec4<u32>, cost: vec4<u32>, penalty: u32) -> vec4<u32> {
+// Computes the values at the next pixel, number `step`, from those at the current one. Two buffers for the values and
+// three for their minimum make one barrier sufficient.
+fn advance(step: u32, word: u32, values: vec4<u32>, cost: vec4<u32>, penalty: u32) -> vec4<u32> {
     let side = step % 2u;
     states[side][word + 1u] = pack4xU8(values);
     atomicMin(&least[step % 3u], least_of(values));
     if word == 0u {
-        atomicStore(&least[(step + 1u) % 3u], NEVER_LEAST);
+        atomicStore(&least[(step + 1u) % 3u], PADDING);
     }
     workgroupBarrier();
     let last = atomicLoad(&least[step % 3u]);
     let lower = vec4(states[side][word] >> 24u, values.xyz);
     let upper = vec4(values.yzw, states[side][word + 2u] & 255u);
-    let near = min(lower, upper) + SLOPE;
+    let near = min(lower, upper) + P1;
     return min(min(values, near), vec4(last + penalty)) - last + cost;
 }
 
-// Goes one step, and leaves the sum with half of the values there.
-fn leave_after(
+// Advances one step, and stores the sum plus half of the values.
+fn advance_and_store(
     line: u32, step: u32, word: u32, values: vec4<u32>, cost: u32, sum: u32, penalty: u32,
 ) -> vec4<u32> {
-    let next = go(step, word, values, unpack4xU8(cost), penalty);
-    // No byte runs over: three halves are at most 129.
-    leave(line, step, word, sum + pack4xU8(next >> vec4(1u)));
+    let next = advance(step, word, values, unpack4xU8(cost), penalty);
+    // No byte overflows: three halves are at most 129.
+    store_sum(line, step, word, sum + pack4xU8(next >> vec4(1u)));
     return next;
 }
 
-fn walk(line: u32, length: u32, word: u32) {
+fn trace_path(line: u32, length: u32, word: u32) {
     prepare(word);
-    // From nothing, the first step comes to the costs.
+    // From zeros, the first step yields the costs.
     var values = vec4(0u);
     var ahead = fetch(line, 0u, word);
     for (var step = 0u; step < length; step += 4u) {
         let now = ahead;
         ahead = fetch(line, step + 4u, word);
-        values = leave_after(line, step, word, values, now.costs.x, now.sums.x, now.penalties.x);
-        values = leave_after(line, step + 1u, word, values, now.costs.y, now.sums.y, now.penalties.y);
-        values = leave_after(line, step + 2u, word, values, now.costs.z, now.sums.z, now.penalties.z);
-        values = leave_after(line, step + 3u, word, values, now.costs.w, now.sums.w, now.penalties.w);
+        values = advance_and_store(line, step, word, values, now.costs.x, now.sums.x, now.penalties.x);
+        values = advance_and_store(line, step + 1u, word, values, now.costs.y, now.sums.y, now.penalties.y);
+        values = advance_and_store(line, step + 2u, word, values, now.costs.z, now.sums.z, now.penalties.z);
+        values = advance_and_store(line, step + 3u, word, values, now.costs.w, now.sums.w, now.penalties.w);
     }
 }

@@ -1,11 +1,12 @@
-// Pass stereo_rectify: each byte of a picture comes from four others, in the fixed point of src/calibration/map.rs.
+// Pass stereo_rectify: each byte is interpolated bilinearly from four others, in fixed point.
+// twin: src/calibration/map.rs
 
-override BYTES: u32;        // of the picture
-override STRIDE: u32;       // bytes of a row
-override CHANNELS: u32;     // bytes of a pixel
+override BYTES: u32;        // bytes of the picture
+override STRIDE: u32;       // bytes per row
+override CHANNELS: u32;     // bytes per pixel
 override ONE: u32;          // one in fixed point
 override DOWN_SHIFT: u32;   // where the second fraction begins
-override NOWHERE: u32;      // the fractions of a pixel that sees nothing
+override NOWHERE: u32;      // the fractions of a pixel outside the source
 
 @group(0) @binding(0) var<storage, read> starts: array<u32>;
 @group(0) @binding(1) var<storage, read> fractions: array<u32>;
@@ -35,7 +36,7 @@ fn rectified_at(byte: u32) -> u32 {
 @compute @workgroup_size(LINE)
 fn stereo_rectify(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgroups) workgroups: vec3<u32>,
                   @builtin(local_invocation_index) thread: u32) {
-    let word = line_at(workgroup, workgroups, thread);
+    let word = linear_index(workgroup, workgroups, thread);
     if 4u * word >= BYTES {
         return;
     }

@@ -1,11 +1,11 @@
-// Shared by the passes that go from run to run of an island. The label of a run's first pixel is the first pixel of a run
-// of the same island, further up or left or its own; that of the other pixels is the run's first one. Labels only ever
-// become lower, and whoever reads one meanwhile stays within the island: so nobody waits, and every loop ends.
+// Included by the passes that follow runs of an island. The label of a run's first pixel is the first pixel of a run of
+// the same island, further up or left or its own; that of the other pixels is the run's first one. Labels only ever
+// decrease, and a label read meanwhile stays within the island: so no invocation waits, and every loop ends.
 
 @group(0) @binding(0) var<storage, read> map: array<u32>;
 @group(0) @binding(1) var<storage, read_write> labels: array<atomic<u32>>;
 
-// The first pixel of a run that no label leads on from; shortens the way there for the next time.
+// Returns the root: the first pixel of the run at the end of the chain of labels; shortens the chain.
 fn root_of(run: u32) -> u32 {
     var at = run;
     var label = atomicLoad(&labels[at]);

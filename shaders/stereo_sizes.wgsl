@@ -1,27 +1,28 @@
-// Pass stereo_sizes: how many pixels each island has, at its root; beyond ISLAND some may be missing. From here on the
+// Pass stereo_sizes: counts the pixels of each island at its root; counts beyond ISLAND may be too low. Afterwards the
 // label of a run's first pixel is its island's root.
+// twin: src/depth/stereo/cpu/speckle.rs
 
 @group(0) @binding(2) var<storage, read_write> sizes: array<atomic<u32>>;
 
 @compute @workgroup_size(LINE)
 fn stereo_sizes(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgroups) workgroups: vec3<u32>,
                 @builtin(local_invocation_index) thread: u32) {
-    let pixel = line_at(workgroup, workgroups, thread);
+    let pixel = linear_index(workgroup, workgroups, thread);
     if pixel >= WIDTH * HEIGHT || map[pixel] == UNKNOWN {
         return;
     }
     let x = pixel % WIDTH;
-    // The last pixel of a run counts them.
-    if x + 1u < WIDTH && touch(map[pixel], map[pixel + 1u]) {
+    // The last pixel of a run adds its length.
+    if x + 1u < WIDTH && is_connected(map[pixel], map[pixel + 1u]) {
         return;
     }
     var first = pixel;
-    if x > 0u && touch(map[pixel - 1u], map[pixel]) {
+    if x > 0u && is_connected(map[pixel - 1u], map[pixel]) {
         first = atomicLoad(&labels[pixel]);
     }
     let root = root_of(first);
     atomicMin(&labels[first], root);
-    // Large islands have many runs: no use in counting on.
+    // Islands beyond the limit need no further counting.
     if atomicLoad(&sizes[root]) <= ISLAND {
         atomicAdd(&sizes[root], pixel - first + 1u);
     }

@@ -1,5 +1,5 @@
-// Shared by the passes that find islands: whether two neighbours are of one.
+// Included by the passes that find islands: whether two neighbours belong to one.
 
-fn touch(a: u32, b: u32) -> bool {
+fn is_connected(a: u32, b: u32) -> bool {
     return a != UNKNOWN && b != UNKNOWN && difference(a, b) <= STEP;
 }

@@ -1,5 +1,5 @@
-// Pass stereo_winners, with the left-right consistency check: of each pixel, the disparity that costs least, in fixed
-// point, if the right eye agrees.
+// Pass stereo_winners: winner takes all with the left-right consistency check, in fixed point.
+// twin: src/depth/stereo/cpu/winner.rs
 
 @group(0) @binding(0) var<storage, read> totals: array<u32>;
 @group(0) @binding(1) var<storage, read_write> map: array<u32>;
@@ -8,7 +8,7 @@ fn total(x: u32, y: u32, disparity: u32) -> u32 {
     return (totals[total_at(x, y, disparity / 4u)] >> (8u * (disparity % 4u))) & 255u;
 }
 
-// The disparity that the left eye takes. With the disparity as its low byte, the lowest of equal sums is the least.
+// Returns the winner of a left pixel. With the disparity in the low byte, the lowest of equal sums wins.
 fn left_at(x: u32, y: u32) -> u32 {
     var best = vec4(0xffffffffu);
     for (var word = 0u; word < WORDS; word++) {
@@ -18,7 +18,7 @@ fn left_at(x: u32, y: u32) -> u32 {
     return least_of(best) & 255u;
 }
 
-// The disparity that the right eye takes: of all left pixels that may see the same.
+// Returns the winner of a right pixel, over all left pixels that may be its partner.
 fn right_at(x: u32, y: u32) -> u32 {
     var best = 0xffffffffu;
     for (var disparity = 0u; disparity < min(4u * WORDS, WIDTH - x); disparity++) {
@@ -27,8 +27,8 @@ fn right_at(x: u32, y: u32) -> u32 {
     return best & 255u;
 }
 
-// Where two lines of one slope meet, between the disparities beside `disparity`.
-fn between(x: u32, y: u32, disparity: u32) -> u32 {
+// Refines to subpixel accuracy by equiangular line fitting through the sums at `disparity` and beside it.
+fn subpixel_disparity(x: u32, y: u32, disparity: u32) -> u32 {
     let whole = disparity * ONE;
     if disparity == 0u || disparity + 1u >= 4u * WORDS {
         return whole;
@@ -47,13 +47,13 @@ fn winner_at(x: u32, y: u32) -> u32 {
     if disparity > x || difference(right_at(x - disparity, y), disparity) > AGREE {
         return UNKNOWN;
     }
-    return between(x, y, disparity);
+    return subpixel_disparity(x, y, disparity);
 }
 
 @compute @workgroup_size(LINE)
 fn stereo_winners(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgroups) workgroups: vec3<u32>,
                   @builtin(local_invocation_index) thread: u32) {
-    let pixel = line_at(workgroup, workgroups, thread);
+    let pixel = linear_index(workgroup, workgroups, thread);
     if pixel < WIDTH * HEIGHT {
         map[pixel] = winner_at(pixel % WIDTH, pixel / WIDTH);
     }

@@ -1,23 +1,24 @@
-// Shared by what brings the scene to the scale of a bin. Such a pass has `work`, `bins`, `frame`,
-// `scene`, `behind`, `ranges` and `mixed`.
+// Shared by passes that average the scene down to the scale of a bin with a tent filter. Such a pass binds `work`,
+// `bins`, `frame`, `scene`, `behind`, `ranges` and `mixed`.
+// twin: src/bokeh/cpu/tent.rs
 
-// A value, and coverage times |CoC|.
+// Premultiplied colour and coverage, and coverage times |CoC|.
 struct Pixel {
     value: vec4<f32>,
     coc: f32,
 }
 
-// A bin's share of a surface.
-fn taken(k: u32, surface: vec4<f32>, weight: f32) -> Pixel {
-    let share = weight * select(share_at(bins[k].front, bins[k].behind, surface.w), 1.0, bins[k].whole == 1u);
-    return Pixel(share * vec4(surface.rgb, 1.0), share * abs(surface.w));
+// A surface times its weight in a bin.
+fn weighted(k: u32, surface: vec4<f32>, weight: f32) -> Pixel {
+    let total = weight * select(bin_weight(bins[k].front, bins[k].behind, surface.w), 1.0, bins[k].whole == 1u);
+    return Pixel(total * vec4(surface.rgb, 1.0), total * abs(surface.w));
 }
 
 fn plus(a: Pixel, b: Pixel) -> Pixel {
     return Pixel(a.value + b.value, a.coc + b.coc);
 }
 
-// A pixel of the scene as the layer sees it. Only tiles that hide something from it were filled.
+// A pixel of the scene as the layer sees it. Only tiles with hidden pixels were inpainted.
 fn seen(pixel: vec2<u32>, at: u32) -> vec2<u32> {
     let nearest_px = ranges[tile_of(pixel, frame.size.x, vec2(TILE))].x;
     if step_at(work.unhidden, nearest_px) < 1.0 {
@@ -26,33 +27,33 @@ fn seen(pixel: vec2<u32>, at: u32) -> vec2<u32> {
     return scene[at];
 }
 
-// A bin's share of a pixel of the scene.
-fn taken_at(k: u32, pixel: vec2<u32>, weight: f32) -> Pixel {
+// A pixel of the scene times its weight in a bin.
+fn weighted_at(k: u32, pixel: vec2<u32>, weight: f32) -> Pixel {
     let at = pixel.y * frame.size.x + pixel.x;
     let value = seen(pixel, at);
     let surface = scene_unpacked(value, frame.most_px);
     if !is_mixed(value) {
-        return taken(k, surface, weight);
+        return weighted(k, surface, weight);
     }
     let place = first_mixed(at);
     let near = near_surface(place);
-    // Where the nearer surface lies in front of the layer, behind it is the farther one.
+    // If the nearer surface is in front of the layer, the farther one is behind it.
     let before = step_at(work.unhidden, near.w);
-    let share = mixed[place].share * before;
+    let alpha = mixed[place].share * before;
     let known = 1.0 - (1.0 - mixed[place].behind) * before;
-    let front = taken(k, near, 1.0);
-    // What is known of the farther surface without being seen is shown by bins that take none of the nearer one.
-    let behind = known - (known + share - 1.0) * min(front.value.a / HIDING_SHARE, 1.0);
-    return plus(taken(k, surface, weight * behind), Pixel(weight * share * front.value, weight * share * front.coc));
+    let front = weighted(k, near, 1.0);
+    // Parts of the farther surface that are known but not visible count only in bins without the nearer one.
+    let behind = known - (known + alpha - 1.0) * min(front.value.a / HIDING_WEIGHT, 1.0);
+    return plus(weighted(k, surface, weight * behind), Pixel(weight * alpha * front.value, weight * alpha * front.coc));
 }
 
-// Every `step`th tap of a pixel of the bin, each way, from `first` on.
+// Average over every `step`th tap of a bin pixel and axis, from `first` on.
 fn averaged(k: u32, pixel: vec2<u32>, first: vec2<u32>, step: u32) -> Pixel {
     let scale = bins[k].scale;
     if scale == 1u {
-        return taken_at(k, pixel, 1.0);
+        return weighted_at(k, pixel, 1.0);
     }
-    // A tent of twice the scale, so that reducing a picture keeps its centroid.
+    // A tent of twice the scale, which preserves the centroid.
     let inverse = 1.0 / f32(scale);
     var sum = Pixel(vec4(0.0), 0.0);
     for (var j = first.y; j < 2u * scale; j += step) {
@@ -61,7 +62,7 @@ fn averaged(k: u32, pixel: vec2<u32>, first: vec2<u32>, step: u32) -> Pixel {
         for (var i = first.x; i < 2u * scale; i += step) {
             let x = u32(clamp(i32(pixel.x * scale + i) - i32(scale / 2u), 0, i32(frame.size.x) - 1));
             let weight_x = (1.0 - abs((f32(i) + 0.5) * inverse - 1.0)) * inverse;
-            sum = plus(sum, taken_at(k, vec2(x, y), weight_x * weight_y));
+            sum = plus(sum, weighted_at(k, vec2(x, y), weight_x * weight_y));
         }
     }
     return sum;

@@ -1,6 +1,6 @@
-// Shared by the passes that know the tiles of a bin, from left to right. Such a pass has the uniform `bins`.
+// Shared by passes that index the tiles of a bin, row by row. Such a pass binds the uniform `bins`.
 
-// How many threads a side share a pixel of a bin in pass bin.
+// Threads per axis that share a pixel of a bin in pass bin.
 fn sharing(k: u32) -> u32 {
     return select(1u, 2u, bins[k].scale >= SHARED_FROM);
 }

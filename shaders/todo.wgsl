@@ -1,12 +1,13 @@
-// Shared by the passes that do the tiles of a list: `todo`, the list, and `work`, its bins. So many workgroups take turns.
+// Shared by passes over the tiles of a list. Such a pass binds the list `todo`, and `work` for its bins; its workgroups
+// loop over the tiles.
 
 struct Place {
     bin: u32,
     tile: u32,
-    some: bool,     // false past the last one
+    some: bool,     // false past the last tile
 }
 
-// A tile of some bins; those of bin k are at `list_at(k)` among all.
+// Tile `number` of the bins of `work`; those of bin k begin at offset `list_at(k)`.
 fn place_of(number: u32) -> Place {
     var left = number;
     for (var k = work.first; k < work.first + work.count; k++) {

@@ -1,4 +1,5 @@
-// Pass uncover: what silhouettes reach each cell of their grid, down its columns after the rows: above 0 where one does.
+// Pass uncover: dilates the silhouettes down the columns of their grid, after the rows: above 0 within their radius.
+// twin: src/bokeh/cpu/silhouettes.rs
 
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<storage, read> along: array<vec4<f32>>;
@@ -10,9 +11,9 @@ fn uncover(@builtin(global_invocation_id) id: vec3<u32>) {
     if any(id.xy >= cells) {
         return;
     }
-    let most = farthest();
+    let radius = max_radius_cells();
     var highest = vec4(-1.0);
-    for (var y = id.y - min(id.y, most); y <= min(id.y + most, cells.y - 1u); y++) {
+    for (var y = id.y - min(id.y, radius); y <= min(id.y + radius, cells.y - 1u); y++) {
         let distance_px = f32((max(y, id.y) - min(y, id.y)) * GRAIN);
         highest = max(highest, along[y * cells.x + id.x] - distance_px * distance_px);
     }

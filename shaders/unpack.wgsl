@@ -1,13 +1,14 @@
-// Pass unpack: 8-bit sRGB to linear light with highlights expanded; mixed pixels to two surfaces. Reads packed RGB bytes, and
-// of a depth map the signed CoC or metres; writes linear r, g, b and the CoC in pixels, and the range of CoC of every tile,
-// which shows no bins yet; lists the tiles of the bins of the foremost layer; marks the silhouettes, a cell of the grid each thread
-// and row (silhouettes.rs has why).
+// Pass unpack: 8-bit sRGB to linear light with highlights expanded; separates mixed pixels into two surfaces. Reads
+// packed RGB bytes, and the signed CoC or metres of a depth map. Writes linear r, g, b and the CoC in pixels, and the
+// CoC range of every tile; clears `shown`; lists the tiles of the foremost layer's bins; marks the silhouettes, one row
+// of a grid cell per thread.
+// twin: src/bokeh/cpu/unpack.rs, src/bokeh/cpu/marking.rs
 
 @group(0) @binding(0) var<uniform> work: Work;
 @group(0) @binding(1) var<uniform> bins: array<Bin, MAX_BINS>;
 @group(0) @binding(2) var<uniform> frame: Frame;
 @group(0) @binding(3) var<storage, read> color: array<u32>;
-@group(0) @binding(4) var<storage, read> radii: array<u32>;      // two CoC a word, as in scene_packed; or metres
+@group(0) @binding(4) var<storage, read> radii: array<u32>;      // two CoC per word, as in scene_packed; or metres
 @group(0) @binding(5) var<storage, read_write> scene: array<vec2<u32>>;
 @group(0) @binding(6) var<storage, read_write> ranges: array<vec2<f32>>;
 @group(0) @binding(7) var<storage, read_write> mixed: array<MixedPixel>;
@@ -15,28 +16,28 @@
 @group(0) @binding(9) var<storage, read_write> next: array<atomic<u32>>;
 @group(0) @binding(10) var<storage, read_write> marks: array<vec4<f32>>;
 
-const ACROSS = 4u;          // pixels of a row that a thread does: three whole words, and a cell's
+const PIXELS_PER_THREAD = 4u;          // pixels of a row per thread: three whole words, and the side of a cell
 
-// Of each pixel of the tile: its place among the mixed ones, plus one.
+// Per pixel of the tile: its index among the mixed ones, plus one.
 var<workgroup> places: array<u32, TILE * TILE>;
-// Of each thread: how far its silhouettes let show what lies behind, in pixels.
-var<workgroup> marked: array<vec4<f32>, TILE * TILE / ACROSS>;
+// Per thread: silhouette distances, in pixels.
+var<workgroup> marked: array<vec4<f32>, TILE * TILE / PIXELS_PER_THREAD>;
 
 fn light_of(code: u32) -> f32 {
     let value = f32(code) * (1.0 / 255.0);
     return select(pow(value * (1.0 / 1.055) + 0.055 / 1.055, 2.4), value * (1.0 / 12.92), value <= 0.04045);
 }
 
-// Bytes of three, from byte `at` on.
+// Three bytes, from byte `at` on.
 fn codes_at(at: u32) -> vec3<u32> {
     let shift = 8u * (at % 4u);
-    // What a word lacks is in the next one; the last pixel of the picture may end with the last word.
+    // The rest is in the next word; the last pixel of the picture may end with the last word.
     let words = vec2(color[at / 4u], color[min(at / 4u + 1u, arrayLength(&color) - 1u)]);
     let bytes = (words.x >> shift) | select(words.y << (32u - shift), 0u, shift == 0u);
     return vec3(bytes, bytes >> 8u, bytes >> 16u) & vec3(255u);
 }
 
-// Notes which pixels of a row of the tile are mixed.
+// Finds the mixed pixels of a row of the tile.
 fn find_mixed(first: vec2<u32>, row: u32) {
     let start = (first.y + row) * frame.size.x + first.x;
     let end = start + min(TILE, frame.size.x - first.x);
@@ -46,15 +47,15 @@ fn find_mixed(first: vec2<u32>, row: u32) {
 }
 
 // Writes the nearer surface of a mixed pixel, and returns the farther one.
-fn take_apart(k: u32, light: vec3<f32>) -> vec2<u32> {
+fn separate_surfaces(k: u32, light: vec3<f32>) -> vec2<u32> {
     let own = mixed[k];
-    // Both colours are as bright as the pixel's highlights are made: their sum stays the pixel.
+    // Both colours get the highlight factor of the pixel, so that they composite to it again.
     var factor = 1.0;
     if frame.expansion > 0.0 {
         factor = (frame.expansion + luminance(light)) / frame.expansion;
     }
     let difference = factor * vec3(own.red, own.green, own.blue);
-    // Depth may be that of another frame, with other colours: no light is below 0.
+    // Depth may be that of another frame with other colours: light is clamped to 0.
     let near_light = max(light + (1.0 - own.share) * difference, vec3(0.0));
     let far_light = max(light - own.share * difference, vec3(0.0));
     let near = scene_packed(near_light, coc_of_depth(bitcast<f32>(own.near)), frame.most_px);
@@ -64,13 +65,13 @@ fn take_apart(k: u32, light: vec3<f32>) -> vec2<u32> {
     return vec2(far.x, far.y | MIXED);
 }
 
-@compute @workgroup_size(TILE / ACROSS, TILE)
+@compute @workgroup_size(TILE / PIXELS_PER_THREAD, TILE)
 fn unpack(@builtin(local_invocation_id) local: vec3<u32>, @builtin(local_invocation_index) thread: u32,
           @builtin(workgroup_id) tile: vec3<u32>, @builtin(num_workgroups) tiles: vec3<u32>) {
-    let first = tile.xy * TILE + vec2(ACROSS * local.x, local.y);
+    let first = tile.xy * TILE + vec2(PIXELS_PER_THREAD * local.x, local.y);
     if frame.mixed > 0u {
-        for (var n = 0u; n < ACROSS; n++) {
-            places[ACROSS * thread + n] = 0u;
+        for (var n = 0u; n < PIXELS_PER_THREAD; n++) {
+            places[PIXELS_PER_THREAD * thread + n] = 0u;
         }
         workgroupBarrier();
         if local.x == 0u && first.y < frame.size.y {
@@ -78,11 +79,11 @@ fn unpack(@builtin(local_invocation_id) local: vec3<u32>, @builtin(local_invocat
         }
         workgroupBarrier();
     }
-    // A smaller map has steps that are no silhouettes: those between its own pixels.
-    let least_px = max(f32(frame.size.x) / f32(frame.depth_size.x), 1.0);
+    // A smaller map has steps between its own pixels that are no silhouettes.
+    let min_step_px = max(f32(frame.size.x) / f32(frame.depth_size.x), 1.0);
     var mark = NO_SILHOUETTE;
     var range = NOTHING;
-    for (var n = 0u; n < ACROSS && first.x + n < frame.size.x && first.y < frame.size.y; n++) {
+    for (var n = 0u; n < PIXELS_PER_THREAD && first.x + n < frame.size.x && first.y < frame.size.y; n++) {
         let pixel = first.y * frame.size.x + first.x + n;
         let codes = codes_at(3u * pixel);
         var light = vec3(light_of(codes.x), light_of(codes.y), light_of(codes.z));
@@ -91,30 +92,30 @@ fn unpack(@builtin(local_invocation_id) local: vec3<u32>, @builtin(local_invocat
         }
         var value = scene_packed(light, coc_of(first.x + n, first.y), frame.most_px);
         if frame.compositing == 0u {
-            mark = max(mark, mark_at(first.x + n, first.y, least_px));
+            mark = max(mark, mark_at(first.x + n, first.y, min_step_px));
         }
         if frame.mixed > 0u {
-            let place = places[ACROSS * thread + n];
+            let place = places[PIXELS_PER_THREAD * thread + n];
             if place > 0u {
-                value = take_apart(place - 1u, light);
+                value = separate_surfaces(place - 1u, light);
                 let near_px = near_surface(place - 1u).w;
                 let far_px = scene_unpacked(value, frame.most_px).w;
                 range = union_of(range, vec2(near_px));
-                mark = max(mark, silhouette(near_px, far_px, least_px));
+                mark = max(mark, silhouette(near_px, far_px, min_step_px));
             }
         }
         scene[pixel] = value;
-        // What the others read, rounding included.
+        // The value that other passes read, rounding included.
         range = union_of(range, vec2(scene_unpacked(value, frame.most_px).w));
     }
     marked[thread] = mark;
-    range = range_of_tile(thread, TILE * TILE / ACROSS, range);
-    put_binned(tile.xy, range, thread);
+    range = range_of_tile(thread, TILE * TILE / PIXELS_PER_THREAD, range);
+    list_binned(tile.xy, range, thread);
     let cells = cells_of(frame.size);
     let cell = first / GRAIN;
     if frame.compositing == 0u && local.y % GRAIN == 0u && all(cell < cells) {
         for (var row = 1u; row < GRAIN; row++) {
-            mark = max(mark, marked[thread + row * (TILE / ACROSS)]);
+            mark = max(mark, marked[thread + row * (TILE / PIXELS_PER_THREAD)]);
         }
         marks[cell.y * cells.x + cell.x] = mark;
     }

@@ -1,5 +1,5 @@
-// Shared by the passes that do all of several bins at once: which part of which bin a workgroup does. Such a pass has the
-// uniforms `work` and `bins`, and says in `extent_of` what of a bin is divided into tiles.
+// Shared by passes over several bins at once: the bin and tile of a workgroup. Such a pass binds `work` and `bins`, and
+// defines `extent_of`, the size of a bin to divide into tiles.
 
 struct Place {
     bin: u32,

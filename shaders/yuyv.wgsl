@@ -1,17 +1,17 @@
-// YUYV of BT.601 in limited range, as src/sink/yuyv.rs makes it of a picture, to the bit.
+// YUYV of BT.601 in limited range, bit-exact to src/sink/yuyv.rs.
 
-// Red is in the lowest byte, then green and blue.
+// Channels of packed sRGB: red in the lowest byte, then green and blue.
 fn channels(codes: u32) -> vec3<i32> {
     return vec3<i32>(vec3(codes, codes >> 8u, codes >> 16u) & vec3(255u));
 }
 
-// The weighted sum of some channels in limited range.
+// Weighted sum of channels in limited range.
 fn weighed(weights: vec3<i32>, rgb: vec3<i32>, zero: i32) -> u32 {
     let product = weights * rgb;
     return u32(((product.x + product.y + product.z + 128) >> 8u) + zero);
 }
 
-// Two pixels, which share their colour.
+// Packs two pixels, which share their chroma.
 fn yuyv_of(left: u32, right: u32) -> u32 {
     let a = channels(left);
     let b = channels(right);

@@ -1,4 +1,5 @@
-//! The time budget: the quality ladder, and what picks its rung and how depth is made, by the time there is.
+//! The time budget: the quality levels, and the governor and planner that choose the level and the depth effort to fit
+//! it.
 
 mod governor;
 mod load;

@@ -1,4 +1,4 @@
-//! Time: real, or set by a test.
+//! Clocks: real, or set by a test.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -16,36 +16,36 @@ enum Kind {
     Manual(Arc<AtomicU64>),
 }
 
-/// Processor time that this program has used so far, all of its threads together, in nanoseconds.
+/// Returns the CPU time that this process has used so far, all of its threads together, in nanoseconds.
 pub fn cpu_ns() -> u64 {
     let used = clock_gettime(ClockId::ProcessCPUTime);
     used.tv_sec.unsigned_abs() * 1_000_000_000 + used.tv_nsec.unsigned_abs()
 }
 
 impl Clock {
-    /// The system's monotonic clock (`CLOCK_MONOTONIC`), by which drivers stamp a camera's frames, too.
+    /// Returns the system's monotonic clock (`CLOCK_MONOTONIC`), which drivers also use for a camera's timestamps.
     pub fn system() -> Self {
         Self(Kind::System)
     }
 
-    /// A clock that stands at 0 and moves only by [`Clock::advance_ns`] and by being slept on.
+    /// Creates a clock that starts at 0 and moves only by [`Clock::advance_ns`] and by sleeping on it.
     pub fn manual() -> Self {
         Self(Kind::Manual(Arc::default()))
     }
 
-    /// The time now.
+    /// Returns the current time in nanoseconds.
     pub fn now_ns(&self) -> u64 {
         match &self.0 {
             Kind::System => {
                 let now = clock_gettime(ClockId::Monotonic);
-                // It starts at 0 with the system: neither part is negative.
+                // It starts at 0 at boot: neither part is negative.
                 now.tv_sec.unsigned_abs() * 1_000_000_000 + now.tv_nsec.unsigned_abs()
             }
             Kind::Manual(now_ns) => now_ns.load(Ordering::SeqCst),
         }
     }
 
-    /// Returns at `until_ns` or, if that has passed, at once. A manual clock jumps there.
+    /// Sleeps until `until_ns`; returns at once if that has passed. A manual clock jumps there.
     pub fn sleep_until_ns(&self, until_ns: u64) {
         match &self.0 {
             Kind::System => {
@@ -60,7 +60,7 @@ impl Clock {
         }
     }
 
-    /// Moves a manual clock on; the system's clock cannot be moved and ignores it.
+    /// Advances a manual clock; has no effect on the system's clock.
     pub fn advance_ns(&self, by_ns: u64) {
         if let Kind::Manual(now_ns) = &self.0 {
             now_ns.fetch_add(by_ns, Ordering::SeqCst);

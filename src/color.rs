@@ -1,35 +1,35 @@
-//! Colour: the curve of sRGB, luminance, and the weights of luma.
+//! Colour: sRGB transfer function, luminance, and luma weights.
 
-/// Linear light of an sRGB code value in [0, 1] (IEC 61966-2-1).
+/// Converts an sRGB code value in [0, 1] to linear light (IEC 61966-2-1).
 pub fn srgb_to_linear(code: f32) -> f32 {
     if code <= 0.04045 { code / 12.92 } else { ((code + 0.055) / 1.055).powf(2.4) }
 }
 
-/// The linear light of every 8-bit code.
+/// Returns a table of the linear light of every 8-bit code.
 pub fn light_of_codes() -> Box<[f32; 256]> {
     Box::new(std::array::from_fn(|code| srgb_to_linear(code as f32 / 255.0)))
 }
 
-/// sRGB code value in [0, 1] of linear light.
+/// Converts linear light to an sRGB code value in [0, 1].
 pub fn linear_to_srgb(light: f32) -> f32 {
     if light <= 0.003_130_8 { light * 12.92 } else { 1.055 * light.powf(1.0 / 2.4) - 0.055 }
 }
 
-/// 8-bit sRGB of linear light, 1 = white; cut to 0..1 first.
+/// Converts linear light, 1 = white, to 8-bit sRGB; clamps to 0..1 first.
 pub fn encode_srgb(light: f32) -> u8 {
     (linear_to_srgb(light.clamp(0.0, 1.0)) * 255.0 + 0.5) as u8
 }
 
-/// Luminance of linear light (Rec. 709 weights).
+/// Returns the luminance of linear light (Rec. 709 weights).
 #[inline(always)]
 pub fn luminance(r: f32, g: f32, b: f32) -> f32 {
     0.2126 * r + 0.7152 * g + 0.0722 * b
 }
 
-/// Which weights make luma of red, green and blue.
+/// Standard that defines the luma weights of red, green and blue.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Matrix {
-    /// Standard definition, JPEG, and what cameras give that do not say.
+    /// Standard definition, JPEG, and cameras that do not declare a matrix.
     #[default]
     Bt601,
     /// High definition.
@@ -39,12 +39,12 @@ pub enum Matrix {
 }
 
 impl Matrix {
-    /// What players assume of a picture that does not say: BT.709 from 720 rows on.
+    /// Returns the matrix that players assume if none is declared: BT.709 from 720 rows on.
     pub fn for_height(height: u32) -> Self {
         if height >= 720 { Self::Bt709 } else { Self::Bt601 }
     }
 
-    /// Luma weights of red, green and blue.
+    /// Returns the luma weights of red, green and blue.
     pub fn weights(self) -> [f64; 3] {
         let (red, blue) = match self {
             Self::Bt601 => (0.299, 0.114),

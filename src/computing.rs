@@ -1,4 +1,4 @@
-//! Which processor does the work: one choice for the blur and for stereo matching.
+//! Choice of the processor: one setting for the blur and for stereo matching.
 
 use std::sync::Arc;
 
@@ -8,35 +8,35 @@ use crate::compute::{Device, GpuError};
 use crate::depth::DepthError;
 use crate::depth::stereo::{self, Matcher};
 
-/// What blurs and matches: backend, GPU and threads, as they were chosen.
+/// Backend, GPU and threads for blur and stereo matching.
 #[derive(Clone, Debug, Default)]
 pub struct Computing {
-    /// Where it runs.
+    /// Backend to use.
     pub backend: Backend,
-    /// Part of the name of the GPU to take.
+    /// Part of the name of the GPU to use.
     pub adapter: Option<String>,
-    /// Threads of the CPU executor, and of those that finish depth; all cores when `None`.
+    /// Threads of the CPU executor and of depth post-processing; all cores when `None`.
     pub threads: Option<usize>,
 }
 
 impl Computing {
-    /// Threads for what the CPU does.
+    /// Returns the number of CPU threads.
     pub fn threads(&self) -> usize {
         self.threads.unwrap_or_else(cores)
     }
 
-    /// An executor for pictures of `size` pixels.
+    /// Creates an executor for pictures of `size` pixels.
     ///
     /// # Errors
-    /// There is no such GPU, or the picture is larger than memory.
+    /// The requested GPU is missing, or the picture needs more memory than is free.
     pub fn blur(&self, settings: &bokeh::Settings, size: (u32, u32)) -> Result<Box<dyn Bokeh>, BokehError> {
         Executors::new(self.clone()).blur(settings, size)
     }
 
-    /// A stereo matcher for pairs of `size` pixels that tries so many `disparities`.
+    /// Creates a stereo matcher for pairs of `size` pixels with `disparities` disparities.
     ///
     /// # Errors
-    /// There is no such GPU.
+    /// The requested GPU is missing.
     pub fn matcher(
         &self,
         disparities: u32,
@@ -48,29 +48,29 @@ impl Computing {
     }
 }
 
-/// Makes one executor after the other, on one device.
+/// Creates executors one after the other on the same device.
 pub struct Executors {
     computing: Computing,
-    /// The GPU, if there is one; it is opened when it is first asked for.
+    /// The GPU, if there is one; opened at the first use.
     device: Option<Option<Arc<Device>>>,
 }
 
 impl Executors {
-    /// As `computing` says.
+    /// Creates executors with these settings.
     pub fn new(computing: Computing) -> Self {
         Self { computing, device: None }
     }
 
-    /// Whether it has to be a GPU.
+    /// Whether a GPU is required.
     fn needs_gpu(&self) -> bool {
         let Computing { backend, adapter, .. } = &self.computing;
         *backend == Backend::Gpu || (*backend == Backend::Auto && adapter.is_some())
     }
 
-    /// The GPU to blur and draw with; `None` where the CPU does.
+    /// Returns the GPU to blur and draw with; `None` if the CPU does both.
     ///
     /// # Errors
-    /// A GPU was asked for and there is none that fits.
+    /// A GPU is required and none fits.
     #[doc(hidden)]
     pub fn device(&mut self) -> Result<Option<Arc<Device>>, BokehError> {
         if let Some(device) = &self.device {
@@ -91,10 +91,10 @@ impl Executors {
         Ok(self.device.insert(device).clone())
     }
 
-    /// An executor for pictures of `size` pixels.
+    /// Creates an executor for pictures of `size` pixels.
     ///
     /// # Errors
-    /// As for [`Computing::blur`].
+    /// Fails like [`Computing::blur`].
     pub fn blur(&mut self, settings: &bokeh::Settings, size: (u32, u32)) -> Result<Box<dyn Bokeh>, BokehError> {
         let threads = self.computing.threads;
         // A device that failed does not recover.

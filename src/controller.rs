@@ -1,4 +1,4 @@
-//! What is asked of a run is answered here, whatever kind of run it is and whoever asks ([`crate::control`] is how).
+//! Answers requests to a run of any kind, from any client; [`crate::control`] transports them.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -9,54 +9,54 @@ use crate::look::{Look, Patch};
 use crate::sink::Release;
 use crate::source::{DepthChoice, DepthFrom, Kind};
 
-/// What requests mean, and which looks a run can have: as its command line has it. What is refused is the answer.
+/// Interprets requests according to the run's command line. A refusal is returned as the answer.
 #[allow(clippy::missing_errors_doc)]
 pub trait Rules: Send + Sync {
-    /// The changes that settings make, each written `NAME=VALUE`.
+    /// Parses settings, each written `NAME=VALUE`, into changes.
     fn settings(&self, settings: &[String]) -> Result<Patch, Answer>;
 
-    /// The changes that a preset makes, as it is now.
+    /// Returns the current changes of a preset.
     fn preset(&self, name: &str) -> Result<Patch, Answer>;
 
-    /// The look of a run after a change, and one line on what of the change has no effect.
+    /// Returns the look after a change, and one line on the parts of the change without effect.
     fn changed(&self, patch: &Patch, look: &Look, facts: &Facts) -> Result<(Look, Option<String>), Answer>;
 }
 
-/// What of a source decides which looks a run of it can have.
+/// The facts of a source that decide which looks are possible.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Facts {
     pub kind: Kind,
-    /// Columns and rows of its pictures.
+    /// Width and height of its pictures, in pixels.
     pub size: (u32, u32),
-    /// Whether its frames have depth, and where that comes from.
+    /// Whether its frames have depth; `depth_from` says from where.
     pub has_depth: bool,
     pub depth_from: DepthFrom,
     pub depth_choice: DepthChoice,
 }
 
-/// A run that can be controlled. It is asked on several threads at once; what it refuses is the answer.
+/// A run that can be controlled, from several threads at once. A refusal is returned as the answer.
 #[allow(clippy::missing_errors_doc)]
 pub trait Controlled: Send + Sync {
-    /// How it is, but for its name, process, command and age.
+    /// Returns the status, except for name, process, command and age.
     fn status(&self) -> Result<Status, Answer>;
 
-    /// Shows pictures, or the still card in their place; `None` is the other of both. Returns whether there are pictures now.
+    /// Shows pictures, or the still card in their place; `None` toggles. Returns whether pictures are shown now.
     fn switch(&self, on: Option<bool>) -> Result<bool, Answer>;
 
-    /// What keeps pictures from its outputs, while it has some.
+    /// Returns the release that holds pictures back from the outputs, while there are outputs.
     fn release(&self) -> Option<Release>;
 
-    /// Changes the look, as far as the rules allow it; returns their line.
+    /// Changes the look as far as the rules allow; returns their note.
     fn change(&self, patch: Patch, rules: &Arc<dyn Rules>) -> Result<Option<String>, Answer>;
 
-    /// Makes depth another way.
+    /// Switches to another source of depth.
     fn make_depth_by(&self, way: &str) -> Result<(), Answer>;
 
-    /// Saves the next picture in this file, which is not there yet, or by date; returns the file.
+    /// Saves the next picture in `to`, which must not exist, or in a file named by date; returns the file.
     fn save(&self, to: Option<&Path>) -> Result<PathBuf, Answer>;
 }
 
-/// Answers for a run.
+/// Answers requests to a run.
 pub struct Controller<R> {
     name: Name,
     command: &'static str,
@@ -66,7 +66,7 @@ pub struct Controller<R> {
 }
 
 impl<R: Controlled + 'static> Controller<R> {
-    /// What answers for a run of this name that begins now.
+    /// Creates the handler for a run with this name that starts now.
     pub fn begin(name: Name, command: &'static str, rules: Arc<dyn Rules>, run: R) -> Arc<Handler> {
         let controller = Self { name, command, began: Instant::now(), rules, run };
         Arc::new(move |request| controller.answer(request).unwrap_or_else(|refused| refused))
@@ -87,7 +87,8 @@ impl<R: Controlled + 'static> Controller<R> {
         Ok(Answer::Done { status: Box::new(self.status()?), note })
     }
 
-    /// Off, every output that somebody may watch has the card once this returns.
+    /// Switches pictures on or off. After switching off, returns only once every output that may have viewers shows the
+    /// card.
     fn switch(&self, on: Option<bool>) -> Result<Option<String>, Answer> {
         match (self.run.switch(on)?, self.run.release()) {
             (false, Some(release)) => release.wait_covered().map_err(|error| Answer::failed(error.to_string())),

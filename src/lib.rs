@@ -6,25 +6,25 @@
 #![doc = include_str!("../examples/blur_a_picture.rs")]
 //! ```
 //!
-//! A stream goes one straight way, and only empty buffers come back:
+//! A stream flows in one direction; only empty buffers return:
 //!
 //! ```text
 //! capture ──> depth ──> bokeh ──> sink
 //!    colour     + depth    blurred   file, stream, window
 //! ```
 //!
-//! [`source`] opens cameras and recordings by name, [`look`] says how they shall look, [`pipeline`] runs them into a
-//! [`sink`]. `examples/` has a program for each: a picture, a stereo pair, a stream into a sink of one's own, a depth source
-//! of one's own, the low-rank kernels of an aperture.
+//! [`source`] opens cameras and recordings by name, [`look`] sets the appearance, and [`pipeline`] runs them into a
+//! [`sink`]. `examples/` has a program for each: a picture, a stereo pair, a stream into a custom sink, a custom depth
+//! source, and the low-rank kernels of an aperture.
 //!
-//! The map of the house; imports go down only, and siblings do not know each other. What is hidden here is no part of
-//! the interface and may change with every version; `docs/developers.md` walks through all rooms.
+//! Modules by layer: imports go down only, and modules of a layer do not import each other. Hidden modules are not part
+//! of the public interface and may change with every version; `docs/developers.md` describes them.
 //!
 //! | layer | modules |
 //! |---|---|
-//! | 10 | `controller`: what is asked of a run while it goes on |
+//! | 10 | `controller`: commands to a running stream |
 //! | 9 | [`source`]: cameras, recordings and their depth, by name |
-//! | 8 | [`pipeline`]: the one place that knows all stages |
+//! | 8 | [`pipeline`]: connects all stages |
 //! | 7 | [`engine`]: colour and depth in, blurred picture out |
 //! | 6 | [`computing`]: CPU or GPU, for blur and matching |
 //! | 5 | [`look`]: everything about the blur, for pictures of any size |
@@ -34,13 +34,14 @@
 //! | 1 | [`color`], [`frame`], [`optics`], [`clock`], [`knob`], `files` |
 //! | 0 | `names` |
 //!
-//! Words: a *circle of confusion* (CoC) is a **signed radius in pixels** of the input picture, positive behind
-//! the focal plane; *disparity* is in pixels of the rectified left picture; depth is in metres; time is in
-//! nanoseconds of a monotonic clock; blurring happens in linear light.
+//! Conventions: a *circle of confusion* (CoC) is a **signed radius in pixels** of the input picture, positive behind
+//! the focal plane; *disparity* is in pixels of the rectified left picture; depth is in metres; time is in nanoseconds
+//! of a monotonic clock; blurring happens in linear light.
 //!
-//! `unsafe` is allowed in `compute/thread_pool.rs` and its `relay`, for a prefetch in `compute/simd.rs`, in `link/slot.rs`,
-//! `link/pool.rs`, `pipewire/buffer.rs`, `pipewire/quiet.rs`, `pipewire/session.rs` and under `v4l2`, where each block carries its argument (and in `link/bell.rs` under Miri
-//! alone). `scripts/prove-link` runs what can be proved of it.
+//! `unsafe` is allowed in `compute/thread_pool.rs` and its `relay`, for a prefetch in `compute/simd.rs`, in
+//! `link/slot.rs`, `link/pool.rs`, `pipewire/buffer.rs`, `pipewire/quiet.rs`, `pipewire/session.rs` and under `v4l2`,
+//! where each block has its safety argument (and in `link/bell.rs` under Miri alone). `scripts/prove-link` checks it
+//! with loom, Miri and ThreadSanitizer.
 
 pub mod bokeh;
 pub mod budget;

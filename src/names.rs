@@ -1,4 +1,5 @@
-//! Enumerations whose values have names, the same on the command line, in files and in the window; and which name was meant.
+//! Enumerations whose values have the same names on the command line, in files and in the window; and suggestions for
+//! misspelt names.
 
 use std::fmt::Write;
 
@@ -9,14 +10,14 @@ pub trait Named: Copy + PartialEq + 'static {
 
     fn name(self) -> &'static str;
 
-    /// What the value does, in a line.
+    /// Returns a one-line description of the value.
     fn help(self) -> &'static str;
 }
 
 /// Parses the name of a value.
 ///
 /// # Errors
-/// No value has this name: the message lists the names that are accepted.
+/// No value has this name; the message lists the accepted names.
 pub fn parse<T: Named>(text: &str) -> Result<T, String> {
     T::VALUES.iter().copied().find(|value| value.name() == text).ok_or_else(|| {
         let mut accepted = String::from("use ");
@@ -33,10 +34,10 @@ pub fn parse<T: Named>(text: &str) -> Result<T, String> {
     })
 }
 
-/// Least Jaro-Winkler similarity (0 to 1) of a name that is suggested: one or two slips in a word of usual length.
+/// Smallest Jaro-Winkler similarity (0 to 1) of a suggestion: one or two typos in a word of usual length.
 const SIMILAR: f64 = 0.8;
 
-/// The most similar of these names, if any is similar enough to have been meant.
+/// Returns the most similar of these names, if any is similar enough to be meant.
 pub fn nearest<N: AsRef<str>>(name: &str, names: impl IntoIterator<Item = N>) -> Option<N> {
     let name = name.to_lowercase();
     let similarity = |other: &N| strsim::jaro_winkler(&name, &other.as_ref().to_lowercase());
@@ -45,7 +46,7 @@ pub fn nearest<N: AsRef<str>>(name: &str, names: impl IntoIterator<Item = N>) ->
     rated.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, other)| other)
 }
 
-/// Makes an enumeration [`Named`]: `named! { pub enum Name default Value { /// help Value = "value", ... } }`.
+/// Implements [`Named`] for an enumeration: `named! { pub enum Name default Value { /// help Value = "value", ... } }`.
 #[doc(hidden)]
 #[macro_export]
 macro_rules! named {

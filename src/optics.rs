@@ -1,11 +1,11 @@
-//! The lens: from depth to the circle of confusion.
+//! Lens optics: from depth to the circle of confusion.
 //!
-//! A thin lens of focal length `f` and f-number `N`, focused at `z_f`, images a point at depth `z` as a disc of
-//! signed radius `c(z) = c_inf (1 - z_f / z)`, where `c_inf = f^2 / (2 N (z_f - f))` divided by the pixel pitch
-//! is the radius at infinity. A range of distances around `z_f` may be sharp as a whole: the radius then grows from its
-//! nearer end.
+//! A thin lens of focal length `f` and f-number `N`, focused at `z_f`, images a point at depth `z` as a disc of signed
+//! radius `c(z) = c_inf (1 - z_f / z)`, where `c_inf = f^2 / (2 N (z_f - f))` divided by the pixel pitch is the radius
+//! at infinity. Optionally a range of distances around `z_f` is sharp; the radius then grows from the nearer end of the
+//! range.
 
-/// A camera lens in the terms on its barrel.
+/// A camera lens, described by the numbers on its barrel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Lens {
     /// Focal length in millimetres, > 0.
@@ -17,8 +17,8 @@ pub struct Lens {
 }
 
 impl Lens {
-    /// CoC radius in pixels of a point at infinity when focused at `focus_m` on a picture `width_px` wide.
-    /// A focus at or inside the focal length, where no image forms, is taken as just outside it.
+    /// Returns the CoC radius in pixels of a point at infinity when focused at `focus_m` on a picture `width_px` wide.
+    /// A focus at or inside the focal length, where no image forms, is moved just outside it.
     pub fn coc_at_infinity_px(&self, focus_m: f32, width_px: u32) -> f32 {
         let focus_mm = (focus_m * 1000.0).max(self.focal_length_mm * 1.01);
         let radius_mm =
@@ -27,44 +27,45 @@ impl Lens {
     }
 }
 
-/// Two parallel eyes of one focal length: from disparity to depth, `z = f B / (d + doffs)`.
+/// A rectified stereo pair of cameras: from disparity to depth, `z = f B / (d + doffs)`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StereoRig {
     /// Focal length of the rectified pictures in pixels, > 0.
     pub focal_px: f32,
-    /// Distance of the eyes in metres, > 0.
+    /// Distance between the two cameras in metres, > 0.
     pub baseline_m: f32,
-    /// Column of the right principal point less that of the left, in pixels: the disparity of infinity is its negative.
+    /// Column of the right principal point minus that of the left, in pixels: the disparity at infinity is its
+    /// negative.
     pub doffs_px: f32,
-    /// Whether the numbers are those of the cameras. Otherwise they are [`StereoRig::assumed`], and so are distances:
-    /// the blur, whose CoC is affine in the disparity, is none the worse for it.
+    /// True if the numbers are those of the cameras. Otherwise they are [`StereoRig::assumed`], and so are distances;
+    /// the blur is equally good, because its CoC is affine in the disparity.
     pub metric: bool,
 }
 
 impl StereoRig {
-    /// Eyes 60 mm apart that see 53 degrees, of which nothing is known.
+    /// Returns a default rig for unknown cameras: baseline 60 mm, field of view 53 degrees.
     pub fn assumed(width_px: u32) -> Self {
         Self { focal_px: width_px as f32, baseline_m: 0.06, doffs_px: 0.0, metric: false }
     }
 
-    /// Depth in metres of a point with this disparity; infinite at or beyond infinity.
+    /// Returns the depth in metres of a point with this disparity; infinite at or beyond infinity.
     #[inline(always)]
     pub fn depth_m(&self, disparity_px: f32) -> f32 {
         let above_px = disparity_px + self.doffs_px;
         if above_px > 0.0 { self.focal_px * self.baseline_m / above_px } else { f32::INFINITY }
     }
 
-    /// Disparity in pixels of a point at this depth, > 0 metres.
+    /// Returns the disparity in pixels of a point at this depth, > 0 metres.
     #[inline(always)]
     pub fn disparity_px(&self, depth_m: f32) -> f32 {
         self.focal_px * self.baseline_m / depth_m - self.doffs_px
     }
 }
 
-/// The signed CoC radius of every pixel of a frame, as a rule that any executor can evaluate.
+/// Signed CoC radius of every pixel of a frame, as a rule that any executor can evaluate.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum CocField {
-    /// The same radius everywhere (effect `blur`).
+    /// Uniform radius (effect `blur`).
     Uniform {
         /// Radius in pixels, >= 0.
         radius_px: f32,
@@ -75,7 +76,7 @@ pub enum CocField {
     Depth(DepthCoc),
 }
 
-/// A kind of [`CocField`].
+/// Kind of a [`CocField`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum CocKind {
     /// [`CocField::Uniform`].
@@ -102,7 +103,7 @@ pub struct Ramp {
 }
 
 impl Ramp {
-    /// CoC radius in pixels at the pixel centre (`x_px`, `y_px`).
+    /// Returns the CoC radius in pixels at the pixel centre (`x_px`, `y_px`).
     #[inline(always)]
     pub fn coc_px(&self, x_px: f32, y_px: f32) -> f32 {
         let distance_px = (self.normal.x * x_px + self.normal.y * y_px - self.offset_px).abs() - self.half_band_px;
@@ -117,36 +118,36 @@ pub struct DepthCoc {
     pub coc_at_infinity_px: f32,
     /// Distance of the focal plane, in metres, > 0.
     pub focus_m: f32,
-    /// All within half of this to either side of the focal plane is sharp, in metres, >= 0.
+    /// Width of the sharp range, centred on the focal plane, in metres, >= 0.
     pub range_m: f32,
-    /// `|c|` is cut here, in pixels: near points would otherwise grow without bound.
+    /// Largest `|c|`, in pixels: near points would otherwise grow without bound.
     pub max_coc_px: f32,
 }
 
 impl DepthCoc {
-    /// Distance at which what is sharp begins, in metres, > 0: at least a tenth of the focal plane's.
+    /// Returns the near end of the sharp range, in metres, > 0: at least a tenth of the focal distance.
     #[inline(always)]
     pub fn near_m(&self) -> f32 {
         (self.focus_m - 0.5 * self.range_m).max(0.1 * self.focus_m)
     }
 
-    /// Distance at which what is sharp ends, in metres.
+    /// Returns the far end of the sharp range, in metres.
     #[inline(always)]
     pub fn far_m(&self) -> f32 {
         self.focus_m + 0.5 * self.range_m
     }
 
-    /// The step of inverse depth, in 1/m, that changes the CoC by `px`; infinite where nothing is blurred.
+    /// Returns the step of inverse depth, in 1/m, that changes the CoC by `px`; infinite if nothing is blurred.
     pub fn inverse_depth_of_px(&self, px: f32) -> f32 {
         px / (self.coc_at_infinity_px * self.focus_m)
     }
 
-    /// Signed CoC radius in pixels of a point at `depth_m`; unknown depth counts as infinitely far, so that what
-    /// nobody measured is blurred rather than shown.
+    /// Returns the signed CoC radius in pixels of a point at `depth_m`. Unknown depth counts as infinite, so that
+    /// unmeasured pixels are blurred rather than shown.
     #[inline(always)]
     pub fn coc_px(&self, depth_m: f32) -> f32 {
         let inverse_m = if depth_m > 0.0 { 1.0 / depth_m } else { 0.0 };
-        // 1 within the range, and what is nearer to 1 of both its ends without.
+        // 1 within the sharp range; outside, the end of the range whose ratio is nearer to 1.
         let (near, far) = (self.near_m() * inverse_m, self.far_m() * inverse_m);
         let far = if far < 1.0 { far } else { 1.0 };
         let ratio = if near > far { near } else { far };
@@ -173,7 +174,7 @@ mod tests {
         assert_eq!(coc.coc_px(1e-6), -40.0);
     }
 
-    /// Distances from 0.1 mm to 10 km, evenly in their logarithm.
+    /// Distances from 0.1 mm to 10 km, logarithmically spaced.
     fn distances_m() -> impl Iterator<Item = f32> {
         (0..8000).map(|step| 1e-4 * 10f32.powf(step as f32 * 1e-3))
     }
@@ -201,7 +202,7 @@ mod tests {
             for depth_m in distances_m() {
                 let coc_px = coc.coc_px(depth_m);
                 assert!(coc_px >= before_px, "the radius falls at {depth_m} m");
-                // One step is 0.23 % of the distance, which is worth no more than that of the slope there.
+                // One step is 0.23 % of the distance, and changes the CoC by no more than that times the slope.
                 assert!(coc_px - before_px < 40.0 * 0.0024 + 16.0 * 0.0024, "the radius jumps at {depth_m} m");
                 match depth_m {
                     _ if depth_m < 0.9999 * near_m => assert!(coc_px < 0.0),

@@ -1,36 +1,36 @@
-//! Calibrations of two cameras, and of a depth camera beside a colour camera.
+//! Targets for stereo calibrations, and for calibrations of a depth camera next to a colour camera.
 
 use bokehcam::calibration::{self, rectifier::Rectifier};
 use bokehcam::frame::{ColorImage, DepthMap, GrayImage};
 use bokehcam_cli::parsers;
 
-use super::input::{assert_one_line, files, place, put};
+use super::input::{assert_one_line, file_path, split_files, write_file};
 
-/// OpenCV, Kalibr and EuRoC, in one or two files, up to rectified pictures.
+/// Reads OpenCV, Kalibr and EuRoC calibrations from one or two files, and rectifies pictures with them.
 pub fn calibration(data: &[u8]) {
     let (one, two) = ("intrinsics.yml", "other.yml");
-    let read = match files(data).as_slice() {
-        [only] => calibration::load(&[&put(one, only)]),
-        [left, right, ..] => calibration::load(&[&put(one, left), &put(two, right)]),
+    let read = match split_files(data).as_slice() {
+        [only] => calibration::load(&[&write_file(one, only)]),
+        [left, right, ..] => calibration::load(&[&write_file(one, left), &write_file(two, right)]),
         [] => return,
     };
     let rig = match read {
         Ok(rig) => rig,
         Err(error) => return assert_one_line(error),
     };
-    assert!(!place("extrinsics.yml").exists());
+    assert!(!file_path("extrinsics.yml").exists());
     let _ = (rig.baseline_m(), rig.is_swapped(), rig.exchanged());
     let own = rig.eyes[0].size.unwrap_or((32, 24));
     for size in [(32, 24), (2, 2), (16, 16), (own.0.min(64), own.1.min(64))] {
         let _ = rig.notes(size);
         match Rectifier::new(&rig, size) {
-            Ok(rectifier) => rectifies(&rectifier, size),
+            Ok(rectifier) => check_rectifier(&rectifier, size),
             Err(error) => assert_one_line(error),
         }
     }
 }
 
-fn rectifies(rectifier: &Rectifier, (width, height): (u32, u32)) {
+fn check_rectifier(rectifier: &Rectifier, (width, height): (u32, u32)) {
     let rig = rectifier.rig();
     assert!(rig.focal_px.is_finite() && rig.focal_px > 0.0, "{rig:?}");
     assert!(rig.baseline_m.is_finite() && rig.baseline_m > 0.0, "{rig:?}");
@@ -48,7 +48,7 @@ fn rectifies(rectifier: &Rectifier, (width, height): (u32, u32)) {
     assert_eq!(rectified.luma.len(), grey.luma.len());
 }
 
-/// The TOML file, and depth that is registered by it.
+/// Reads a TOML file, and registers depth by it.
 pub fn depth_calibration(data: &[u8]) {
     let Ok(text) = std::str::from_utf8(data) else { return };
     let mut registration = match parsers::depth_calibration("calibration.toml".as_ref(), text) {

@@ -1,4 +1,4 @@
-//! What cameras give: formats that drivers describe, raw pixels, and Motion-JPEG.
+//! Targets for camera input: format descriptions of drivers, raw pixels, and Motion-JPEG.
 
 use bokehcam::capture::pixels::Decoder;
 use bokehcam::frame::ColorImage;
@@ -7,10 +7,10 @@ use v4l::v4l_sys as sys;
 
 use super::input::{Numbers, assert_one_line};
 
-/// Most bytes of a raw picture that is tried.
-const MOST_BYTES: usize = 1 << 22;
+/// Maximum size of a raw picture to decode, in bytes.
+const MAX_BYTES: usize = 1 << 22;
 
-/// A Motion-JPEG picture: mended and decoded.
+/// Repairs and decodes a Motion-JPEG picture.
 pub fn mjpeg(data: &[u8]) {
     let (width, height) = jpeg_size(data).unwrap_or((64, 48));
     let layout = Layout::packed(FourCc::MJPG, width, height).unwrap();
@@ -22,7 +22,7 @@ pub fn mjpeg(data: &[u8]) {
     }
 }
 
-/// The size that a JPEG's first frame header states, if it is a small one.
+/// Returns the size in a JPEG's first frame header, if it is at most 512 x 512.
 fn jpeg_size(data: &[u8]) -> Option<(u32, u32)> {
     let at = data.windows(2).position(|pair| pair[0] == 0xff && matches!(pair[1], 0xc0..=0xc2))?;
     let &[h1, h0, w1, w0] = data.get(at + 5..at + 9)?.first_chunk()?;
@@ -30,16 +30,16 @@ fn jpeg_size(data: &[u8]) -> Option<(u32, u32)> {
     Some(size).filter(|size| (1..=512).contains(&size.0) && (1..=512).contains(&size.1))
 }
 
-/// A format as a driver may describe it, and a picture in it that may be cut short.
+/// Decodes a possibly truncated picture in a format as a driver could describe it.
 pub fn raw_pixels(data: &[u8]) {
     let mut numbers = Numbers(data);
-    let format = format(&mut numbers);
+    let format = build_format(&mut numbers);
     let layout = match Layout::from_format(&format) {
         Ok(layout) => layout,
         Err(error) => return assert_one_line(error),
     };
     let needed: Vec<usize> = (0..layout.planes().len()).map(|plane| layout.needed_bytes(plane)).collect();
-    if needed.iter().sum::<usize>() > MOST_BYTES {
+    if needed.iter().sum::<usize>() > MAX_BYTES {
         return;
     }
     let Ok(mut decoder) = Decoder::new(&layout) else { return };
@@ -49,6 +49,7 @@ pub fn raw_pixels(data: &[u8]) {
         .iter()
         .zip(cuts)
         .map(|(&needed, cut)| {
+            // Exact, one byte short, too long, or an arbitrary short buffer.
             let length = match cut % 4 {
                 0 => needed,
                 1 => needed - 1,
@@ -73,8 +74,8 @@ pub fn raw_pixels(data: &[u8]) {
     assert!(decoder.decode(&planes[1..], &mut picture).is_err(), "a plane lacks, and the picture is accepted");
 }
 
-/// The kernel's structure, with any numbers in it.
-fn format(numbers: &mut Numbers) -> sys::v4l2_format {
+/// Builds the kernel's structure from arbitrary numbers.
+fn build_format(numbers: &mut Numbers) -> sys::v4l2_format {
     let [multi, code, field, quantization, transfer, encoding, planes, large] = std::array::from_fn(|_| numbers.u8());
     let codes: Vec<FourCc> = FourCc::supported().collect();
     let fourcc = codes[code as usize % codes.len()].to_u32();
@@ -83,7 +84,7 @@ fn format(numbers: &mut Numbers) -> sys::v4l2_format {
     let colorspace = numbers.u8().into();
     let strides: [u32; 3] = std::array::from_fn(|_| numbers.u32());
     let sizes: [u32; 3] = std::array::from_fn(|_| numbers.u32());
-    // SAFETY: plain numbers; all zeros is a value of it.
+    // SAFETY: plain numbers; all zeros are a valid value.
     #[allow(unsafe_code)]
     let mut format: sys::v4l2_format = unsafe { std::mem::zeroed() };
     if multi & 1 == 1 {

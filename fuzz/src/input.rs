@@ -1,13 +1,13 @@
-//! From the bytes of an input to numbers and files, and what holds for every message.
+//! Conversion of fuzz input to numbers and files, and the check of messages.
 
 use std::path::{Path, PathBuf};
 
 use tempfile::TempDir;
 
-/// What is between the files of an input that stands for several: no text has it.
-const BETWEEN_FILES: [u8; 2] = [0xff, 0xfe];
+/// Separator of the files in one input; never valid UTF-8.
+const FILE_SEPARATOR: [u8; 2] = [0xff, 0xfe];
 
-/// Numbers from the front of an input, little endian; zeros once it has ended.
+/// Reads little-endian numbers from the start of an input; zeros after its end.
 pub struct Numbers<'a>(pub &'a [u8]);
 
 impl Numbers<'_> {
@@ -32,12 +32,12 @@ impl Numbers<'_> {
     }
 }
 
-/// The files that an input stands for, at least one.
-pub fn files(mut data: &[u8]) -> Vec<&[u8]> {
+/// Splits an input into its files, at least one.
+pub fn split_files(mut data: &[u8]) -> Vec<&[u8]> {
     let mut files = Vec::new();
-    while let Some(at) = data.windows(2).position(|pair| pair == BETWEEN_FILES) {
+    while let Some(at) = data.windows(2).position(|pair| pair == FILE_SEPARATOR) {
         files.push(&data[..at]);
-        data = &data[at + BETWEEN_FILES.len()..];
+        data = &data[at + FILE_SEPARATOR.len()..];
     }
     files.push(data);
     files
@@ -47,14 +47,14 @@ thread_local! {
     static FOLDER: TempDir = TempDir::new().expect("a folder for temporary files");
 }
 
-/// Where this thread's file of this name is.
-pub fn place(name: &str) -> PathBuf {
+/// Returns the path of this thread's file `name`.
+pub fn file_path(name: &str) -> PathBuf {
     FOLDER.with(|folder| folder.path().join(name))
 }
 
-/// Puts a file in its place; where the name has folders, they are made.
-pub fn put(name: &str, bytes: &[u8]) -> PathBuf {
-    let path = place(name);
+/// Writes a file, and creates the folders in its name.
+pub fn write_file(name: &str, bytes: &[u8]) -> PathBuf {
+    let path = file_path(name);
     let write = |path: &Path| std::fs::write(path, bytes);
     if write(&path).is_err() {
         std::fs::create_dir_all(path.parent().unwrap()).and_then(|()| write(&path)).expect("room for temporary files");
@@ -62,7 +62,7 @@ pub fn put(name: &str, bytes: &[u8]) -> PathBuf {
     path
 }
 
-/// A message is one line of a length that people read.
+/// Asserts that a message is one line of readable length.
 pub fn assert_one_line(message: impl ToString) {
     let message = message.to_string();
     assert!(!message.contains(['\n', '\r']), "more than one line: {message:?}");

@@ -1,8 +1,8 @@
-//! One function per parser of bytes that others wrote: files, pictures of cameras, command lines. Whatever the bytes are,
-//! it neither panics nor hangs, what it accepts keeps the parser's promises, and what it refuses it refuses in one line.
+//! One function per parser of untrusted bytes: files, pictures of cameras, command lines. For any input, a parser must
+//! neither panic nor hang, accepted input must keep its guarantees, and an error must be one line.
 //!
-//! libFuzzer calls these functions (`scripts/fuzz`), and so does a plain test over the seeds and mutations of them
-//! (`tests/fuzz.rs`, which includes this file).
+//! libFuzzer (`scripts/fuzz`) calls these functions, and so does a plain test with the seeds and mutations of them
+//! (`crates/cli/tests/program/fuzz.rs`, which includes this file).
 
 mod calibrations;
 mod camera;
@@ -17,10 +17,10 @@ pub use pictures::{pfm, picture, snapshot};
 pub use recordings::recording;
 pub use texts::{command_line, settings};
 
-/// A target: takes any bytes, and panics where a promise is broken.
+/// A fuzz target: accepts any bytes, and panics on a broken guarantee.
 pub type Target = fn(&[u8]);
 
-/// Every target by its name, which is also that of its folder of seeds.
+/// Every target with its name, which is also that of its folder of seeds.
 pub const TARGETS: [(&str, Target); 10] = [
     ("calibration", calibration),
     ("command_line", command_line),

@@ -1,4 +1,4 @@
-//! Pictures, depth maps and disparities in files, and snapshots.
+//! Targets for pictures, depth maps, disparities and snapshots in files.
 
 use std::path::Path;
 
@@ -6,25 +6,25 @@ use bokehcam::frame::{ColorImage, DepthMap, DisparityMap};
 use bokehcam::recording::still::{self, Map};
 use bokehcam::recording::{Extras, snapshot as snapshots};
 
-use super::input::{assert_one_line, place, put};
+use super::input::{assert_one_line, file_path, write_file};
 
-/// Larger pictures are not written again: it takes long.
-const MOST_WRITTEN_BYTES: usize = 1 << 16;
+/// Maximum size of pictures to write back, which is slow.
+const MAX_WRITTEN_BYTES: usize = 1 << 16;
 
-/// PNG and JPEG, as each command reads them.
+/// Reads a PNG or JPEG in each way that the commands do.
 pub fn picture(data: &[u8]) {
-    let path = put("picture.png", data);
+    let path = write_file("picture.png", data);
     match still::read_photo(&path) {
         Ok((image, extras)) => {
             assert!(image.width > 0 && image.height > 0);
             assert_eq!(image.rgb.len(), image.width as usize * image.height as usize * 3);
-            if image.rgb.len() < MOST_WRITTEN_BYTES {
-                is_written_whole(&image, extras);
+            if image.rgb.len() < MAX_WRITTEN_BYTES {
+                check_roundtrip(&image, extras);
             }
         }
         Err(error) => assert_one_line(error),
     }
-    maps(&path);
+    check_maps(&path);
     match still::read_grey(&path) {
         Ok((width, height, grey)) => {
             assert_eq!(grey.len(), width as usize * height as usize);
@@ -37,14 +37,14 @@ pub fn picture(data: &[u8]) {
     }
 }
 
-/// PFM, as depth and as disparity.
+/// Reads a PFM as depth and as disparity.
 pub fn pfm(data: &[u8]) {
-    let path = put("map.pfm", data);
-    maps(&path);
+    let path = write_file("map.pfm", data);
+    check_maps(&path);
 }
 
-/// A file as depth and as disparity.
-fn maps(path: &Path) {
+/// Reads a file as depth and as disparity.
+fn check_maps(path: &Path) {
     for depth_scale in [None, Some(1000.0)] {
         match still::read_map(path, depth_scale, Some(7)) {
             Ok(Map::Depth(depth)) => assert_depth(&depth),
@@ -62,11 +62,11 @@ fn maps(path: &Path) {
     }
 }
 
-/// A picture and what goes with it, written as the program writes it, are read again.
-fn is_written_whole(image: &ColorImage, extras: Extras) {
+/// Checks that a picture and its metadata survive writing and reading.
+fn check_roundtrip(image: &ColorImage, extras: Extras) {
     let extras = extras.without_thumbnail();
     for (name, extras) in [("again.png", extras.clone()), ("again.jpg", extras.for_jpeg())] {
-        let path = place(name);
+        let path = file_path(name);
         still::write_photo(&path, image, &extras, true).expect("a picture that was read can be written");
         let (again, with) = still::read_photo(&path).expect("a picture that was written can be read");
         assert_eq!((again.width, again.height), (image.width, image.height), "{name}");
@@ -75,10 +75,10 @@ fn is_written_whole(image: &ColorImage, extras: Extras) {
     }
 }
 
-/// The settings in a snapshot: as a text that the input is, and as one that `--like` takes over.
+/// Reads the settings of a snapshot from a text chunk with the input, and parses them like `--like`.
 pub fn snapshot(data: &[u8]) {
     let Ok(text) = std::str::from_utf8(data) else { return };
-    let path = put("snapshot.png", &png_with(text));
+    let path = write_file("snapshot.png", &png_with_text(text));
     match snapshots::settings(&path) {
         Ok(settings) => {
             assert!(settings.iter().all(|(_, value)| !value.contains('\n')), "{settings:?}");
@@ -93,7 +93,7 @@ pub fn snapshot(data: &[u8]) {
     }
 }
 
-fn png_with(text: &str) -> Vec<u8> {
+fn png_with_text(text: &str) -> Vec<u8> {
     let mut bytes = Vec::new();
     let mut encoder = png::Encoder::new(&mut bytes, 1, 1);
     encoder.set_color(png::ColorType::Rgb);

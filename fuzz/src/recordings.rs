@@ -1,13 +1,13 @@
-//! The lists and calibrations of recordings, in folders with pictures.
+//! Target for the frame lists and calibrations of recordings.
 
 use std::cell::Cell;
 
 use bokehcam::frame::{ColorImage, DepthMap, GrayImage};
 use bokehcam::recording::{DepthUnit, Options, Recording, Scratch, still};
 
-use super::input::{assert_one_line, files, place, put};
+use super::input::{assert_one_line, file_path, split_files, write_file};
 
-/// A layout: its folder, and the files in it that the input gives.
+/// Layouts: the folder, and the files in it that come from the input.
 const LAYOUTS: [(&str, &[&str]); 5] = [
     ("tum", &["rgb.txt", "depth.txt"]),
     ("pairs", &["associations.txt", "rgb.txt"]),
@@ -20,19 +20,19 @@ thread_local! {
     static READY: Cell<bool> = const { Cell::new(false) };
 }
 
-/// A recording: the first byte chooses the layout, the second one the options, then come the files.
+/// Opens a recording: the first byte selects the layout, the second one the options; the files follow.
 pub fn recording(data: &[u8]) {
     let Some((&[layout, flags], rest)) = data.split_first_chunk() else { return };
     if !READY.replace(true) {
         make_pictures();
     }
     let (folder, names) = LAYOUTS[layout as usize % LAYOUTS.len()];
-    let given = files(rest);
+    let given = split_files(rest);
     for (at, name) in names.iter().enumerate() {
         let name = format!("{folder}/{name}");
         match given.get(at) {
-            Some(bytes) if at == 0 || !bytes.is_empty() => drop(put(&name, bytes)),
-            _ => drop(std::fs::remove_file(place(&name))),
+            Some(bytes) if at == 0 || !bytes.is_empty() => drop(write_file(&name, bytes)),
+            _ => drop(std::fs::remove_file(file_path(&name))),
         }
     }
     let options = Options {
@@ -46,13 +46,13 @@ pub fn recording(data: &[u8]) {
         },
         depth_invalid: (flags & 8 != 0).then_some(65535),
     };
-    match Recording::open(&place(folder), &options) {
-        Ok(recording) => reads(&recording),
+    match Recording::open(&file_path(folder), &options) {
+        Ok(recording) => check_recording(&recording),
         Err(error) => assert_one_line(error),
     }
 }
 
-fn reads(recording: &Recording) {
+fn check_recording(recording: &Recording) {
     assert!(!recording.is_empty() && recording.period_ns() > 0);
     let times: Vec<u64> = (0..recording.len()).map(|index| recording.time_ns(index)).collect();
     assert!(times.is_sorted_by(|one, next| one < next), "times do not increase: {times:?}");
@@ -80,23 +80,23 @@ fn make_pictures() {
     color.rgb.iter_mut().enumerate().for_each(|(at, byte)| *byte = (at * 5) as u8);
     let mut depth = DepthMap::new(8, 6);
     depth.metres.iter_mut().enumerate().for_each(|(at, metres)| *metres = at as f32 * 0.1);
-    let [color_file, depth_file] = [place("color.png"), place("depth.png")];
+    let [color_file, depth_file] = [file_path("color.png"), file_path("depth.png")];
     still::write_color(&color_file, &color, true).unwrap();
     still::write_depth(&depth_file, &depth, 5000.0, true).unwrap();
     let [color, depth] = [color_file, depth_file].map(|path| std::fs::read(path).unwrap());
     for frame in 0..4 {
         for list in ["tum", "pairs"] {
-            put(&format!("{list}/rgb/{frame}.png"), &color);
-            put(&format!("{list}/depth/{frame}.png"), &depth);
+            write_file(&format!("{list}/rgb/{frame}.png"), &color);
+            write_file(&format!("{list}/depth/{frame}.png"), &depth);
         }
         for eye in ["image_2", "image_3"] {
-            put(&format!("kitti/{eye}/{frame:06}.png"), &color);
+            write_file(&format!("kitti/{eye}/{frame:06}.png"), &color);
         }
         for eye in ["cam0", "cam1"] {
-            put(&format!("euroc/mav0/{eye}/data/140363657976355555{frame}.png"), &color);
+            write_file(&format!("euroc/mav0/{eye}/data/140363657976355555{frame}.png"), &color);
         }
     }
     for eye in ["im0.png", "im1.png"] {
-        put(&format!("middlebury/{eye}"), &color);
+        write_file(&format!("middlebury/{eye}"), &color);
     }
 }

@@ -7,7 +7,7 @@ use gst::glib;
 use gst::prelude::*;
 
 glib::wrapper! {
-    /// The element.
+    /// The GObject class of the element.
     pub struct Bokeh(ObjectSubclass<imp::Imp>) @extends gst_base::Aggregator, gst::Element, gst::Object;
 }
 

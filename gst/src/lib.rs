@@ -1,8 +1,8 @@
-//! GStreamer plugin `bokehcam`: the element `bokeh` blurs the background of video, by depth where it is given some.
+//! GStreamer plugin `bokehcam`: the element `bokeh` blurs the background of video, by depth if it gets any.
 //!
-//! `bokeh` is the element, `settings` its properties, made of the library's table of settings (`enums` makes the types of those
-//! that have names), `pictures` and `maps` go between GStreamer's memory and the library's. What is done to a frame is
-//! [`bokehcam::engine::Stepper`].
+//! `bokeh` is the element, `settings` its properties, generated from the library's table of settings (`enums` creates
+//! the types of those with named values); `pictures` and `maps` convert between GStreamer's memory and the library's.
+//! [`bokehcam::engine::Stepper`] processes a frame.
 //!
 //! `unsafe` is allowed in `enums.rs`, where each block carries its argument.
 

@@ -1,12 +1,12 @@
-//! Depth in GStreamer's memory, and which map belongs to which picture.
+//! Depth maps in GStreamer's memory, and their assignment to pictures.
 
 use bokehcam::frame::DepthMap;
 use bokehcam::layout::MAX_SIDE_PX;
 use gst::prelude::*;
 use gst_base::prelude::*;
 
-/// What the pad `depth` takes. `GRAY_F32LE` comes with GStreamer 1.30; a program of one's own can give it to any version, as
-/// none looks into it.
+/// Returns the caps of the pad `depth`. `GRAY_F32LE` exists since GStreamer 1.30; an application can send it in any
+/// version, as no other element inspects it.
 pub fn caps() -> gst::Caps {
     let sides = gst::IntRange::new(1, MAX_SIDE_PX as i32);
     gst::Caps::builder("video/x-raw")
@@ -17,7 +17,7 @@ pub fn caps() -> gst::Caps {
         .build()
 }
 
-/// How numbers become metres.
+/// Conversion of stored numbers to metres.
 #[derive(Clone, Copy, Debug)]
 pub struct Units {
     pub per_m: f32,
@@ -30,19 +30,19 @@ enum Kind {
     Metres,
 }
 
-/// The maps of one format and size.
+/// Format of a stream of maps.
 #[derive(Clone, Copy, Debug)]
 pub struct MapFormat {
     kind: Kind,
-    /// Columns and rows.
+    /// Width and height, in pixels.
     pub size: (u32, u32),
-    /// Time from map to map, where it is always the same.
+    /// Frame period, if constant.
     period: Option<gst::ClockTime>,
 }
 
 impl MapFormat {
-    /// Of these caps; `None` where they are none of [`caps`].
-    pub fn of(caps: &gst::CapsRef) -> Option<Self> {
+    /// Parses caps; returns `None` if they do not match [`caps`].
+    pub fn from_caps(caps: &gst::CapsRef) -> Option<Self> {
         let fields = caps.structure(0)?;
         let side = |name: &str| fields.get::<i32>(name).ok().and_then(|side| u32::try_from(side).ok());
         let kind = match fields.get::<&str>("format").ok()? {
@@ -56,16 +56,16 @@ impl MapFormat {
         Some(Self { kind, size: (side("width")?, side("height")?), period })
     }
 
-    /// Decodes a map (resized to fit).
+    /// Decodes a map into `map`, resized to fit.
     ///
     /// # Errors
-    /// The memory does not hold one.
+    /// Fails if the memory is too small.
     fn read(&self, buffer: &gst::BufferRef, units: Units, map: &mut DepthMap) -> Result<(), String> {
         let (width, height) = (self.size.0 as usize, self.size.1 as usize);
         let row_bytes = width * if matches!(self.kind, Kind::Metres) { 4 } else { 2 };
         let (offset, stride) = match buffer.meta::<gst_video::VideoMeta>() {
             Some(meta) => (meta.offset()[0], usize::try_from(meta.stride()[0]).unwrap_or(0)),
-            // As GStreamer has it by default.
+            // GStreamer's default stride.
             None => (0, row_bytes.next_multiple_of(4)),
         };
         let memory = buffer.map_readable().map_err(|error| error.to_string())?;
@@ -81,7 +81,7 @@ impl MapFormat {
             Kind::Metres => {
                 for (row, metres) in rows {
                     for (metres, bytes) in metres.iter_mut().zip(row.as_chunks().0) {
-                        *metres = known(f32::from_le_bytes(*bytes));
+                        *metres = known_or_zero(f32::from_le_bytes(*bytes));
                     }
                 }
             }
@@ -98,48 +98,48 @@ fn read_units<'a>(
     for (row, metres) in rows {
         for (metres, bytes) in metres.iter_mut().zip(row.as_chunks().0) {
             let value = number(*bytes);
-            // As recordings are read, to the bit.
-            *metres = if value == invalid { 0.0 } else { known(f32::from(value) / per_m) };
+            // Bit-identical to the reader of recordings.
+            *metres = if value == invalid { 0.0 } else { known_or_zero(f32::from(value) / per_m) };
         }
     }
 }
 
-fn known(metres: f32) -> f32 {
+fn known_or_zero(metres: f32) -> f32 {
     if DepthMap::is_known(metres) { metres } else { 0.0 }
 }
 
-/// What there is for a picture.
+/// State of the depth map for a picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Found {
-    /// A map; whether it is another one than for the picture before.
+    /// A map; `is_new` if it differs from the previous picture's.
     Map { is_new: bool },
-    /// None, and none was there before.
+    /// No map, now or before.
     Nothing,
-    /// It may still come.
+    /// The map may still arrive.
     Wait,
 }
 
-/// The maps that come through a pad.
+/// Maps received through a pad.
 #[derive(Debug, Default)]
 pub struct Maps {
-    /// As the caps have it.
+    /// Format from the pad's caps.
     pub format: Option<MapFormat>,
-    /// The map that holds.
+    /// The current map.
     last: Option<(gst::Buffer, MapFormat)>,
-    /// Whether no picture had it yet.
+    /// Whether no picture has used it yet.
     is_new: bool,
 }
 
-/// When a buffer is due, on the running time of its pad.
+/// Returns the running time of a buffer on its pad.
 pub fn running_time(pad: &gst_base::AggregatorPad, buffer: &gst::BufferRef) -> Option<gst::ClockTime> {
     pad.segment().downcast_ref::<gst::ClockTime>()?.to_running_time(buffer.pts())
 }
 
 impl Maps {
-    /// Finds the map of a picture that is due at `due`: the newest that is not due later, or half a `period` at most; where there
-    /// is none yet, the first. It holds until the next one does. A map stays in its pad while it may hold for the next picture,
-    /// so that nobody waits for one that is not needed. Without times, each picture takes a map. Once nobody waits any more
-    /// (`is_late`), what was there before is as good as it gets.
+    /// Finds the map of a picture due at `due`: the newest one due at most half a `period` later, or the first one if
+    /// there is no earlier. It stays current until the next one is due. A map stays queued in its pad while it may also
+    /// serve the next picture, so that no picture waits for a map it does not need. Without timestamps, each picture
+    /// uses one map. After the deadline (`is_late`), the previous map is used.
     pub fn find(
         &mut self,
         pad: &gst_base::AggregatorPad,
@@ -150,7 +150,7 @@ impl Maps {
         loop {
             let (Some(buffer), Some(format)) = (pad.peek_buffer(), self.format) else {
                 return match &self.last {
-                    Some(_) if is_late || pad.is_eos() => self.found(),
+                    Some(_) if is_late || pad.is_eos() => self.current(),
                     None if is_late || pad.is_eos() => Found::Nothing,
                     _ => Found::Wait,
                 };
@@ -158,46 +158,46 @@ impl Maps {
             let times = running_time(pad, &buffer).zip(due.map(|due| due + period / 2));
             let Some((begins, due)) = times else {
                 pad.drop_buffer();
-                self.take(buffer, format);
-                return self.found();
+                self.set_current(buffer, format);
+                return self.current();
             };
             if begins >= due && self.last.is_some() {
-                return self.found();
+                return self.current();
             }
             let ends = buffer.duration().or(format.period).map(|duration| begins + duration);
-            self.take(buffer, format);
+            self.set_current(buffer, format);
             if begins >= due || ends.is_some_and(|ends| ends >= due) {
-                return self.found();
+                return self.current();
             }
             pad.drop_buffer();
         }
     }
 
-    fn take(&mut self, buffer: gst::Buffer, format: MapFormat) {
+    fn set_current(&mut self, buffer: gst::Buffer, format: MapFormat) {
         self.is_new |= self.last.as_ref().is_none_or(|(last, _)| last.as_ptr() != buffer.as_ptr());
         self.last = Some((buffer, format));
     }
 
-    fn found(&mut self) -> Found {
+    fn current(&mut self) -> Found {
         Found::Map { is_new: std::mem::take(&mut self.is_new) }
     }
 
-    /// Columns and rows of the map that holds.
+    /// Returns width and height of the current map.
     pub fn size(&self) -> Option<(u32, u32)> {
         self.last.as_ref().map(|(_, format)| format.size)
     }
 
-    /// Decodes the map that holds.
+    /// Decodes the current map.
     ///
     /// # Errors
-    /// There is none, or it is cut short.
+    /// Fails without a current map, or if it is truncated.
     pub fn read(&self, units: Units, map: &mut DepthMap) -> Result<(), String> {
         let (buffer, format) = self.last.as_ref().ok_or("there is no depth map")?;
         format.read(buffer, units, map)
     }
 
-    /// Another scene comes.
-    pub fn forget(&mut self) {
+    /// Discards the maps, for a seek or a new scene.
+    pub fn reset(&mut self) {
         (self.last, self.is_new) = (None, false);
     }
 }

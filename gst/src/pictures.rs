@@ -1,4 +1,4 @@
-//! Pictures in GStreamer's memory: from their formats to sRGB and back, by the library's conversions.
+//! Conversion of pictures in GStreamer's memory to sRGB and back, by the library.
 
 use bokehcam::capture::pixels::Decoder;
 use bokehcam::color::Matrix;
@@ -8,7 +8,7 @@ use bokehcam::sink::raw::Encoder;
 use gst_video::prelude::*;
 use gst_video::{VideoColorMatrix, VideoColorRange, VideoFormat, VideoFrameRef, VideoInfo};
 
-/// What the element takes and gives.
+/// Returns the caps of the pads `sink` and `src`.
 pub fn caps() -> gst::Caps {
     let sides = 1..=MAX_SIDE_PX as i32;
     let mut caps = gst_video::VideoCapsBuilder::new()
@@ -16,14 +16,14 @@ pub fn caps() -> gst::Caps {
         .width_range(sides.clone())
         .height_range(sides.clone())
         .build();
-    // Half a pair of pixels is stored in more than one way.
+    // YUY2 needs an even width: half a pixel pair has no unique layout.
     let mut paired = gst_video::VideoCapsBuilder::new().format(VideoFormat::Yuy2).height_range(sides).build();
     paired.make_mut().set("width", gst::IntRange::with_step(2, MAX_SIDE_PX as i32, 2));
     caps.make_mut().append(paired);
     caps
 }
 
-/// The pictures of one format and size.
+/// Converter for pictures of one format and size.
 #[derive(Debug)]
 pub struct Pictures {
     caps: gst::Caps,
@@ -33,36 +33,36 @@ pub struct Pictures {
 }
 
 impl Pictures {
-    /// Of these caps.
+    /// Creates a converter for these caps.
     ///
     /// # Errors
-    /// They are none of [`caps`].
+    /// Fails if they do not match [`caps`].
     pub fn new(caps: gst::Caps) -> Result<Self, String> {
         let info = VideoInfo::from_caps(&caps).map_err(|error| error.to_string())?;
         Ok(Self { caps, info, decoder: None, encoder: None })
     }
 
-    /// As they are.
+    /// Returns the caps.
     pub fn caps(&self) -> gst::Caps {
         self.caps.clone()
     }
 
-    /// Columns and rows.
+    /// Returns width and height, in pixels.
     pub fn size(&self) -> (u32, u32) {
         (self.info.width(), self.info.height())
     }
 
-    /// Time from picture to picture, where it is always the same.
+    /// Returns the frame period, if constant.
     pub fn period(&self) -> Option<gst::ClockTime> {
-        // 0/1 is a rate that varies.
+        // 0/1 is a variable rate.
         let fps = Some(self.info.fps()).filter(|fps| fps.numer() > 0)?;
         gst::ClockTime::SECOND.mul_div_round(fps.denom() as u64, fps.numer() as u64)
     }
 
-    /// Decodes a picture. Allocates nothing while their rows lie as in the one before.
+    /// Decodes a picture. Allocates nothing while the row strides stay the same.
     ///
     /// # Errors
-    /// The memory does not hold one.
+    /// Fails if the memory is too small.
     pub fn read(&mut self, buffer: &gst::BufferRef, into: &mut ColorImage) -> Result<(), String> {
         let frame = VideoFrameRef::from_buffer_ref_readable(buffer, &self.info).map_err(|error| error.to_string())?;
         if self.info.format() == VideoFormat::Rgbx {
@@ -85,10 +85,10 @@ impl Pictures {
         decoder.decode(&planes[..layout.planes().len()], into).map_err(|error| error.to_string())
     }
 
-    /// Encodes a picture, as [`Pictures::read`] decodes it.
+    /// Encodes a picture, the inverse of [`Pictures::read`].
     ///
     /// # Errors
-    /// The memory has no room for one.
+    /// Fails if the memory is too small.
     pub fn write(&mut self, picture: &ColorImage, buffer: &mut gst::BufferRef) -> Result<(), String> {
         let mut frame =
             VideoFrameRef::from_buffer_ref_writable(buffer, &self.info).map_err(|error| error.to_string())?;
@@ -117,12 +117,12 @@ impl Pictures {
     }
 }
 
-/// How the library calls a picture with these bytes from row to row of each plane.
+/// Returns the library's layout of a picture with these row strides, in bytes, for each plane.
 fn layout(info: &VideoInfo, strides: &[i32]) -> Result<Layout, String> {
     let fourcc = match info.format() {
         VideoFormat::Rgb => FourCc::RGB3,
         VideoFormat::Yuy2 => FourCc::YUYV,
-        // With memory of its own for each plane: GStreamer says where it is.
+        // The multi-planar variants: GStreamer gives each plane's memory.
         VideoFormat::Nv12 => FourCc(*b"NM12"),
         VideoFormat::I420 => FourCc(*b"YM12"),
         other => return Err(format!("there is no way to read {other}")),
@@ -134,7 +134,7 @@ fn layout(info: &VideoInfo, strides: &[i32]) -> Result<Layout, String> {
         .map_err(|error| error.to_string())
 }
 
-/// What the caps' colorimetry says. Curves are not converted: the numbers of all are shown as they are.
+/// Reads the caps' colorimetry. Transfer curves are not converted: all values are displayed as they are.
 fn colors(info: &VideoInfo) -> Colors {
     let colorimetry = info.colorimetry();
     let matrix = match colorimetry.matrix() {
@@ -152,39 +152,40 @@ fn colors(info: &VideoInfo) -> Colors {
     (matrix, range, Transfer::Display)
 }
 
-/// Where pictures go: into the pool that downstream offers, or one of our own.
+/// Chooses the buffer pool of the output: downstream's, or a new one.
 ///
 /// # Errors
-/// There is no pool for such pictures.
+/// Fails if no pool supports the pictures.
 pub fn decide_pool(query: &mut gst::query::Allocation) -> Result<(), String> {
     let caps = query.get_owned().0.ok_or("downstream asks for buffers without a format")?;
     let info = VideoInfo::from_caps(&caps).map_err(|error| error.to_string())?;
     let takes_meta = query.find_allocation_meta::<gst_video::VideoMeta>().is_some();
-    let configure = |pool: &gst::BufferPool, size: u32, least: u32, most: u32| {
+    let configure = |pool: &gst::BufferPool, size: u32, min: u32, max: u32| {
         let mut config = pool.config();
-        config.set_params(Some(&caps), size, least, most);
+        config.set_params(Some(&caps), size, min, max);
         if takes_meta {
             config.add_option(gst_video::BUFFER_POOL_OPTION_VIDEO_META);
         }
         pool.set_config(config)
     };
     let offered = query.allocation_pools().next();
-    let (size, least, most) = offered.as_ref().map_or((0, 0, 0), |&(_, size, least, most)| (size, least, most));
+    let (size, min, max) = offered.as_ref().map_or((0, 0, 0), |&(_, size, min, max)| (size, min, max));
     let size = size.max(info.size() as u32);
     let is_first = offered.is_none();
-    let theirs = offered.and_then(|(pool, ..)| pool).filter(|pool| configure(pool, size, least, most).is_ok());
+    // Downstream's pool may reject the configuration.
+    let theirs = offered.and_then(|(pool, ..)| pool).filter(|pool| configure(pool, size, min, max).is_ok());
     let pool = match theirs {
         Some(pool) => pool,
         None => {
             let own = gst_video::VideoBufferPool::new().upcast();
-            configure(&own, size, least, most).map_err(|error| error.to_string())?;
+            configure(&own, size, min, max).map_err(|error| error.to_string())?;
             own
         }
     };
     if is_first {
-        query.add_allocation_pool(Some(&pool), size, least, most);
+        query.add_allocation_pool(Some(&pool), size, min, max);
     } else {
-        query.set_nth_allocation_pool(0, Some(&pool), size, least, most);
+        query.set_nth_allocation_pool(0, Some(&pool), size, min, max);
     }
     Ok(())
 }

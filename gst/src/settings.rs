@@ -1,4 +1,4 @@
-//! The element's properties: those of the library's table of settings, and a few of its own.
+//! The element's properties: the library's table of settings, and a few of its own.
 
 use std::sync::LazyLock;
 
@@ -11,62 +11,64 @@ use gst::prelude::*;
 
 use crate::enums;
 
-/// What a property is.
+/// A property of the element.
 #[derive(Clone, Copy, Debug)]
 pub enum Property {
-    /// A setting of the table, by its place.
+    /// A setting of the table, by its index.
     Setting(usize),
-    /// The number that is such a setting's value, where it is one: controllers have numbers only.
+    /// The numeric value of a setting that also has other forms: controllers animate numbers only.
     Number(usize),
     /// Units of a depth map per metre.
     DepthScale,
-    /// A number of depth maps that means unknown.
+    /// Value of a depth map that means unknown.
     DepthInvalid,
-    /// Threads that blur.
+    /// Number of threads for the blur.
     Threads,
-    /// Whether to do less when the pipeline is late.
+    /// Whether to reduce quality and drop pictures when the pipeline is late.
     Qos,
-    /// What became of pictures and maps.
+    /// Statistics of pictures and maps.
     Stats,
 }
 
-/// Settings that are numbers among other things, with the property that has their number, its unit, and its largest.
+/// Settings with numeric and other forms: name, property of the number, its unit, and its maximum.
 const NUMBERS: [(&str, &str, &str, f32); 2] = [
     ("focus", "focus-m", "metres", DepthMap::MOST_M),
     ("coc-at-infinity", "coc-at-infinity-px", "pixels", MOST_RADIUS_PX),
 ];
-/// What such a property has where the setting is no number.
+/// Value of a number property while the setting is not a number.
 const NO_NUMBER: f32 = -1.0;
 
-/// All properties in the order of their numbers.
+/// All properties; GObject's id of a property is its index plus 1.
 pub static PROPERTIES: LazyLock<Vec<Property>> = LazyLock::new(|| {
-    let numbers = NUMBERS.iter().filter_map(|(name, ..)| SETTINGS.iter().position(|setting| called(setting) == *name));
+    let find = |name: &str| SETTINGS.iter().position(|setting| property_name(setting) == name);
+    let numbers = NUMBERS.iter().filter_map(|(name, ..)| find(name));
     let own = [Property::DepthScale, Property::DepthInvalid, Property::Threads, Property::Qos, Property::Stats];
     (0..SETTINGS.len()).map(Property::Setting).chain(numbers.map(Property::Number)).chain(own).collect()
 });
 
-/// How GObject knows them.
+/// Their GObject specifications.
 pub static PARAM_SPECS: LazyLock<Vec<glib::ParamSpec>> =
     LazyLock::new(|| PROPERTIES.iter().copied().map(param_spec).collect());
 
-/// The property of a setting. It has the setting's other name where there is one: pipelines are written with that.
-fn called(setting: &Setting) -> &'static str {
+/// Returns the property name of a setting: its alias if it has one, which existing pipelines use.
+fn property_name(setting: &Setting) -> &'static str {
     setting.alias().unwrap_or(setting.name)
 }
 
 fn param_spec(property: Property) -> glib::ParamSpec {
     match property {
-        Property::Setting(place) => of_setting(&SETTINGS[place]),
+        Property::Setting(place) => setting_spec(&SETTINGS[place]),
         Property::Number(place) => {
             let setting = &SETTINGS[place];
-            let (_, name, unit, most) = NUMBERS.iter().find(|(name, ..)| *name == called(setting)).expect("it has a row");
+            let row = NUMBERS.iter().find(|(name, ..)| *name == property_name(setting));
+            let (_, name, unit, max) = row.expect("it has a row");
             let blurb = format!(
                 "The property {} as a number of {unit}, for controllers; {NO_NUMBER} where it is no such number",
-                called(setting)
+                property_name(setting)
             );
             let nick = nick(name);
             let number = glib::ParamSpecFloat::builder(name).nick(&nick).blurb(&blurb);
-            number.minimum(NO_NUMBER).maximum(*most).default_value(NO_NUMBER).controllable().mutable_playing().build()
+            number.minimum(NO_NUMBER).maximum(*max).default_value(NO_NUMBER).controllable().mutable_playing().build()
         }
         Property::DepthScale => glib::ParamSpecFloat::builder("depth-scale")
             .nick("Depth scale")
@@ -102,65 +104,66 @@ fn param_spec(property: Property) -> glib::ParamSpec {
     }
 }
 
-fn of_setting(setting: &Setting) -> glib::ParamSpec {
-    let (nick, blurb) = (nick(called(setting)), as_properties(setting.help.trim()));
+fn setting_spec(setting: &Setting) -> glib::ParamSpec {
+    let (nick, blurb) = (nick(property_name(setting)), as_properties(setting.help.trim()));
     let choices = (setting.choices)();
     if !choices.is_empty() {
         let default = setting.default().and_then(|name| choices.iter().position(|choice| choice.0 == name));
-        let type_ = enums::register(&format!("GstBokeh{}", nick.split(' ').map(capital).collect::<String>()), &choices);
+        let type_name = format!("GstBokeh{}", nick.split(' ').map(capitalise).collect::<String>());
+        let type_ = enums::register(&type_name, &choices);
         let flags = glib::ParamFlags::READWRITE | gst::PARAM_FLAG_CONTROLLABLE | gst::PARAM_FLAG_MUTABLE_PLAYING;
-        return enums::param_spec(called(setting), (&nick, &blurb), type_, default.unwrap_or(0), flags);
+        return enums::param_spec(property_name(setting), (&nick, &blurb), type_, default.unwrap_or(0), flags);
     }
     let default = setting.default();
     match (setting.range)() {
         Some(range) => {
             let number = default.and_then(|text| text.parse().ok());
-            // A number without a default is 0 as long as it is not set.
-            let (low, blurb) = match number {
+            // A number without a default is 0 while unset.
+            let (min, blurb) = match number {
                 Some(_) => (*range.start(), blurb),
                 None => (0.0, format!("{blurb}; 0 is not set")),
             };
-            let number = glib::ParamSpecFloat::builder(called(setting)).default_value(number.unwrap_or(0.0));
-            let number = number.nick(&nick).blurb(&blurb).minimum(low).maximum(*range.end());
+            let number = glib::ParamSpecFloat::builder(property_name(setting)).default_value(number.unwrap_or(0.0));
+            let number = number.nick(&nick).blurb(&blurb).minimum(min).maximum(*range.end());
             number.controllable().mutable_playing().build()
         }
         None => {
             let default = default.unwrap_or_else(|| AUTO.to_owned());
-            let text = glib::ParamSpecString::builder(called(setting)).nick(&nick).blurb(&blurb);
+            let text = glib::ParamSpecString::builder(property_name(setting)).nick(&nick).blurb(&blurb);
             text.default_value(Some(default.as_str())).mutable_playing().build()
         }
     }
 }
 
-/// The value of settings without a default that take text.
+/// Value of unset text settings without a default.
 const AUTO: &str = "auto";
 
 fn nick(name: &str) -> String {
-    capital(&name.replace('-', " "))
+    capitalise(&name.replace('-', " "))
 }
 
-fn capital(word: &str) -> String {
+fn capitalise(word: &str) -> String {
     let mut letters = word.chars();
     letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
 }
 
-/// Text that speaks of flags, as one of properties. Flags in parentheses are none.
+/// Converts a text about flags to one about properties, without flags in parentheses.
 pub fn as_properties(text: &str) -> String {
     text.replace(" (--budget-ms)", "").replace("--", "")
 }
 
-/// The values of all properties.
+/// Values of all properties.
 #[derive(Clone, Debug)]
 pub struct Values {
-    /// Of each setting, what was set and is possible.
+    /// Valid value of each setting, if set.
     texts: [Option<String>; SETTINGS.len()],
-    /// Of each setting, what was set and is not possible.
+    /// Error message of each setting with an invalid value.
     faults: [Option<String>; SETTINGS.len()],
     pub depth_scale: f32,
     pub depth_invalid: u16,
     pub threads: u32,
     pub qos: bool,
-    /// Counts changes of the settings.
+    /// Number of changes of the settings.
     pub version: u64,
 }
 
@@ -175,7 +178,7 @@ impl Values {
     /// Sets a property.
     ///
     /// # Errors
-    /// It has no such value: what is accepted.
+    /// Returns the accepted values if `value` is invalid.
     pub fn set(&mut self, property: Property, value: &glib::Value) -> Result<(), String> {
         const TYPE: &str = "GObject checks types";
         match property {
@@ -184,7 +187,7 @@ impl Values {
                 let text = if let Some((_, choice)) = glib::EnumValue::from_value(value) {
                     Some(choice.nick().to_owned())
                 } else if let Ok(number) = value.get::<f32>() {
-                    // Not set is 0 where that is no value.
+                    // 0 means unset if it is not a valid value.
                     Some(number.to_string()).filter(|_| number != 0.0 || setting.default().is_some())
                 } else {
                     value.get::<Option<String>>().expect(TYPE)
@@ -214,12 +217,12 @@ impl Values {
                 self.qos = value.get().expect(TYPE);
                 Ok(())
             }
-            // GObject lets nobody write it.
+            // GObject rejects writes to it.
             Property::Stats => Ok(()),
         }
     }
 
-    /// Sets a setting, or takes it back.
+    /// Sets or resets a setting.
     fn set_text(&mut self, place: usize, text: Option<String>) -> Result<(), String> {
         let setting = &SETTINGS[place];
         if self.texts[place] == text && self.faults[place].is_none() {
@@ -228,7 +231,7 @@ impl Values {
         if let Some(text) = &text
             && let Err(accepted) = setting.set(&mut Patch::default(), text)
         {
-            let fault = format!("{}={text}: {}", called(setting), as_properties(&accepted));
+            let fault = format!("{}={text}: {}", property_name(setting), as_properties(&accepted));
             self.faults[place] = Some(fault.clone());
             return Err(fault);
         }
@@ -244,7 +247,7 @@ impl Values {
         Ok(())
     }
 
-    /// The value of a property that [`PARAM_SPECS`] describes by `spec`; none of one that is not kept here.
+    /// Returns the value of a property with the specification `spec` in [`PARAM_SPECS`]; `None` for the statistics.
     pub fn get(&self, property: Property, spec: &glib::ParamSpec) -> Option<glib::Value> {
         Some(match property {
             Property::Setting(place) => {
@@ -271,15 +274,15 @@ impl Values {
         self.texts[place].as_ref().and_then(|text| text.parse().ok()).unwrap_or(NO_NUMBER)
     }
 
-    /// What was set and is not possible.
+    /// Returns the first error message of an invalid value.
     pub fn fault(&self) -> Option<&str> {
         self.faults.iter().flatten().next().map(String::as_str)
     }
 
-    /// The look that they make; pictures that `before` has are not read again.
+    /// Returns the look of the values; pictures in `before` are not loaded again.
     ///
     /// # Errors
-    /// A lens misses a number, or a picture cannot be read.
+    /// Fails if a lens lacks a number, or a picture cannot be read.
     pub fn look(&self, before: &Look) -> Result<Look, String> {
         let by_lens = SETTINGS
             .iter()
@@ -299,7 +302,7 @@ impl Values {
         patch.on(before).map_err(|error| as_properties(&error.to_string()))
     }
 
-    /// What blurs.
+    /// Returns the executor options.
     pub fn computing(&self) -> Computing {
         Computing { threads: Some(self.threads as usize).filter(|&threads| threads > 0), ..Computing::default() }
     }

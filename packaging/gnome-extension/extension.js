@@ -1,5 +1,5 @@
-// A toggle in GNOME's quick settings: off shows the still card, the menu has the presets. It speaks to
-// io.github.bokehcam.bokehcam on the session's message bus, and is hidden while that is not there.
+// A toggle in GNOME's quick settings: off shows the still card, and the menu lists the presets. It calls
+// io.github.bokehcam.bokehcam on the session's message bus, and is hidden while that name has no owner.
 import Gio from 'gi://Gio';
 import GObject from 'gi://GObject';
 

@@ -1,4 +1,4 @@
-# bokehcam for Nix: `pkgs.callPackage ./package.nix { }`, what flake.nix does. The version is that of Cargo.toml, and crates
+# bokehcam for Nix: `pkgs.callPackage ./package.nix { }`, as in flake.nix. The version is that of Cargo.toml, and crates
 # are those of Cargo.lock.
 { lib
 , rustPlatform
@@ -17,7 +17,7 @@ let
   manifest = (lib.importTOML ../../Cargo.toml).workspace.package;
   description = (lib.importTOML ../../crates/cli/Cargo.toml).package.description;
 
-  # What packaging/libraries names: loaded while it runs, where Nix has no common folder for it.
+  # The libraries of packaging/libraries: loaded at run time, as Nix has no common folder for them.
   loaded = [
     dbus
     libxkbcommon
@@ -42,7 +42,7 @@ rustPlatform.buildRustPackage {
   nativeBuildInputs = [ pkg-config python3 patchelf rustPlatform.bindgenHook ];
   buildInputs = [ pipewire ];
 
-  # They take an hour, and want cameras, an X server and PipeWire.
+  # The tests take an hour, and need cameras, an X server and PipeWire.
   doCheck = false;
 
   installPhase = ''

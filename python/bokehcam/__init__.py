@@ -54,12 +54,12 @@ __all__ = [
     "write_image",
 ]
 
-# The native half comes last: what others wrap has the same name there.
+# The native half comes last: wrapped functions have the same names there.
 _MODULES = ("_aperture", "_blur", "_coc", "_depth", "_files", "_recording", "_scene", "_still", "_core")
 
 
 def __getattr__(name: str) -> Any:
-    """Imports what needs the native half once it is asked for: a farm runs without it."""
+    """Imports modules with the native half on first use: a farm runs without it."""
     if name in __all__:
         for module in _MODULES:
             found = vars(import_module(f".{module}", __name__))

@@ -1,4 +1,4 @@
-"""Lens openings."""
+"""Apertures."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy.typing as npt
 from . import _core
 from ._arrays import as_array, shape_of
 
-#: Half of the default width of a soft rim lies outside of the outline.
+#: Default width of the soft rim, as a fraction of the radius; half of it lies outside of the outline.
 RIM = 0.2
 
 
@@ -25,7 +25,7 @@ class LowRank:
     rows: npt.NDArray[np.float64]
     #: ``(size,)`` float64: all singular values of the kernel, descending.
     singular_values: npt.NDArray[np.float64]
-    #: Frobenius norm of what is missing, relative to the kernel's.
+    #: Frobenius norm of the residual, relative to the kernel's.
     relative_error: float
 
     def kernel(self) -> npt.NDArray[np.float64]:
@@ -34,7 +34,7 @@ class LowRank:
 
 
 class Aperture:
-    """A lens opening, drawn as a highlight far behind the focal plane shows it (x right, y down).
+    """An aperture, drawn as a highlight far behind the focal plane shows it (x right, y down).
 
     Made by :func:`aperture`, :func:`disc`, :func:`ring`, :func:`polygon`, :func:`star` and :func:`heart`.
     """
@@ -63,8 +63,8 @@ class Aperture:
     def kernel(self, size: int = 65) -> npt.NDArray[np.float64]:
         """The kernel, antialiased: ``(size, size)`` float64, all >= 0, sum 1.
 
-        The rim's outer half belongs to it, so it is that of the CoC radius ``size / (2 + rim)`` pixels. That of what is in
-        front of the focal plane is turned by 180 degrees.
+        It includes the rim's outer half, so its CoC radius is ``size / (2 + rim)`` pixels. In front of the focal plane
+        the kernel is rotated by 180 degrees.
         """
         return self._core.kernel(_within("size", size, 1, 1025))
 
@@ -86,16 +86,16 @@ class Aperture:
         return f"aperture({shape}, rim={self.rim:g}, intensity={self.intensity:g})"
 
 
-def _within(name: str, value: int, least: int, most: int) -> int:
+def _within(name: str, value: int, low: int, high: int) -> int:
     if not isinstance(value, (int, np.integer)) or isinstance(value, bool):
         raise TypeError(f"{name}: {type(value).__name__}, wanted an int")
-    if not least <= value <= most:
-        raise ValueError(f"{name}: {value}, wanted {least} to {most}")
+    if not low <= value <= high:
+        raise ValueError(f"{name}: {value}, wanted {low} to {high}")
     return int(value)
 
 
 def aperture(shape: Union[str, Any] = "disc", *, rim: float = RIM, intensity: float = 0.0) -> Aperture:
-    """A lens opening.
+    """Creates an aperture.
 
     Args:
         shape: ``disc``, ``ring:INNER``, ``polygon:N[:ROTATION_DEG[:CURVATURE]]``, ``heart``, ``star:N`` or ``image:FILE``, as

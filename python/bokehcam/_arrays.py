@@ -1,4 +1,4 @@
-"""Arrays as the native half takes them, and what is wrong with those that it cannot."""
+"""Checks and conversion of arrays for the native half."""
 
 from __future__ import annotations
 
@@ -56,25 +56,25 @@ def image(value: Any, name: str = "image", size: Optional[tuple[int, int]] = Non
 
 
 def pictures(images: Image, name: str = "image") -> Iterator[Image]:
-    """The pictures of :func:`image` one by one, contiguous: a large batch is not copied as a whole."""
+    """Yields the pictures of :func:`image` one by one, contiguous: a large batch is not copied as a whole."""
     for k, picture in enumerate(images if images.ndim == 4 else images[None]):
         picture = np.ascontiguousarray(picture)
         if picture.dtype == np.float32:
-            refuse_odd(picture, f"{name}[{k}]" if images.ndim == 4 else name)
+            check_finite(picture, f"{name}[{k}]" if images.ndim == 4 else name)
         yield picture
 
 
-def refuse_odd(array: npt.NDArray[np.float32], name: str) -> tuple[float, float]:
-    """The least and the largest number of a contiguous array; NaN or infinity would spread over all around it."""
-    odd, low, high = _core.survey(array)
-    if odd is not None:
-        place = tuple(int(i) for i in np.unravel_index(odd, array.shape))
+def check_finite(array: npt.NDArray[np.float32], name: str) -> tuple[float, float]:
+    """Returns minimum and maximum of a contiguous array; refuses NaN and infinity, which a blur would spread."""
+    fault, low, high = _core.survey(array)
+    if fault is not None:
+        place = tuple(int(i) for i in np.unravel_index(fault, array.shape))
         raise ValueError(f"{name}: {array[place]} at {place}, wanted finite numbers")
     return low, high
 
 
 def plane(value: Any, name: str, of: tuple[int, ...]) -> npt.NDArray[np.float32]:
-    """One number for each pixel of pictures of the shape ``of``: ``float32``, contiguous."""
+    """Converts to one number per pixel of pictures of the shape ``of``: ``float32``, contiguous."""
     array = as_array(value, name)
     if array.dtype.kind not in "fiu":
         raise TypeError(f"{name}: dtype {array.dtype}, wanted float32")
@@ -84,7 +84,7 @@ def plane(value: Any, name: str, of: tuple[int, ...]) -> npt.NDArray[np.float32]
 
 
 def result(out: Any, like: Image) -> Image:
-    """The array for a result: ``out`` if that fits, else a new one."""
+    """Returns the array for a result: ``out`` after checks, or a new one."""
     if out is None:
         return np.empty(like.shape, like.dtype)
     if not isinstance(out, np.ndarray):

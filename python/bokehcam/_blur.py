@@ -33,7 +33,7 @@ def blur(
     threads: Optional[int] = None,
     out: Optional[Image] = None,
 ) -> Image:
-    """Blurs every pixel by its own radius, with layers kept apart: near things do not take colour from what is behind.
+    """Blurs every pixel by its own radius, with layers kept apart: near objects take no colour from the background.
 
     Args:
         image: ``(H, W, 3)`` or a batch ``(N, H, W, 3)``; ``uint8`` is sRGB, ``float32`` linear light (1 = white, more is
@@ -57,7 +57,7 @@ def blur(
         The blurred picture, of the shape and dtype of ``image``.
 
     Raises:
-        ValueError: Shapes that do not fit (both are said), numbers that are not finite or out of range, a radius beyond
+        ValueError: Shapes that do not fit (both are named), numbers that are not finite or out of range, a radius beyond
             ``max_coc_px`` or larger than the picture's diagonal, not enough memory.
         TypeError: Another dtype, or an array on a GPU.
     """
@@ -83,7 +83,7 @@ def blur(
 
 
 class Renderer:
-    """Blurs pictures of one size; what it needs is made once, and nothing is allocated from picture to picture.
+    """Blurs pictures of one size; filters and buffers are created once, and nothing is allocated per picture.
 
     ``renderer(image, coc, out=out)`` is :func:`blur` with the same arguments, to the bit. Python threads that call one
     renderer at once take turns; it can be pickled, and used after ``os.fork``.
@@ -129,8 +129,8 @@ class Renderer:
         self.max_coc_px = (float(np.float32(near)), float(np.float32(far)))
         self._layers: Optional[_core.Blur] = None
         self._uniform: Optional[tuple[float, _core.Blur]] = None
-        # What is wrong with the settings is said now; most pictures are blurred by a map.
-        self._of_map()
+        # Reports wrong settings now; most pictures are blurred by a map.
+        self._map_executor()
 
     def __call__(self, image: Any, coc: Coc, out: Optional[Image] = None) -> Image:
         """The blurred picture, or batch: see :func:`blur`."""
@@ -141,30 +141,30 @@ class Renderer:
         if image.dtype == np.float32 and self.highlights:
             raise ValueError("highlights: is for uint8 pictures, which are clipped at white; float32 has its own: use 0")
         if isinstance(coc, float):
-            executor, radii = self._of_radius(coc), None
+            executor, radii = self._uniform_executor(coc), None
         else:
             radii, low, high = coc
-            self._refuse_beyond(low, high)
-            executor = self._of_map()
+            self._check_range(low, high)
+            executor = self._map_executor()
         result = _arrays.result(out, image)
         places = result if image.ndim == 4 else result[None]
         for k, picture in enumerate(_arrays.pictures(image)):
             executor.blur(picture, radii if radii is None or radii.ndim == 2 else radii[k], places[k])
         return result
 
-    def _refuse_beyond(self, low: float, high: float) -> None:
+    def _check_range(self, low: float, high: float) -> None:
         near, far = self.max_coc_px
         if -low > near or high > far:
             raise ValueError(
                 f"coc: from {low:g} to {high:g} px, wanted {-near:g} to {far:g}; give max_coc_px=, or cut it with np.clip"
             )
 
-    def _of_map(self) -> _core.Blur:
+    def _map_executor(self) -> _core.Blur:
         if self._layers is None:
             self._layers = self._executor(self.max_coc_px, False)
         return self._layers
 
-    def _of_radius(self, radius_px: float) -> _core.Blur:
+    def _uniform_executor(self, radius_px: float) -> _core.Blur:
         if self._uniform is None or self._uniform[0] != radius_px:
             self._uniform = (radius_px, self._executor((0.0, radius_px), True))
         return self._uniform[1]
@@ -201,7 +201,7 @@ def check_threads(threads: Optional[int]) -> Optional[int]:
     return threads
 
 
-#: The radii of pictures, the least and the largest; or one radius for all.
+#: The radii of pictures, their minimum and maximum; or one radius for all.
 _Radii = Union[float, tuple[npt.NDArray[np.float32], float, float]]
 
 
@@ -214,4 +214,4 @@ def _radii(coc: Coc, image: Image) -> _Radii:
     array = _arrays.as_array(coc, "coc")
     is_shared = image.ndim == 4 and array.ndim == 2
     radii = _arrays.plane(array, "coc", image.shape[1:3] if is_shared else image.shape[:-1])
-    return (radii, *_arrays.refuse_odd(radii, "coc"))
+    return (radii, *_arrays.check_finite(radii, "coc"))

@@ -1,4 +1,4 @@
-"""From depth and disparity to the circle of confusion (CoC)."""
+"""The circle of confusion (CoC) from depth and disparity."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ def coc_from_depth(
     """The thin lens: ``coc = at_infinity_px * (1 - focus_m / depth_m)``, as the command line has it, to the bit.
 
     Args:
-        depth_m: ``(H, W)`` or ``(N, H, W)``, float32: depth in metres along the optical axis. What is 0 or not finite is
-            unknown and counts as infinitely far, so that what nobody measured is blurred.
+        depth_m: ``(H, W)`` or ``(N, H, W)``, float32: depth in metres along the optical axis. Values that are 0 or not finite
+            are unknown and count as infinitely far, so that unmeasured pixels are blurred.
         focus_m: Distance of the focal plane in metres, > 0.
         at_infinity_px: CoC radius of a point at infinity, in pixels, >= 0; a 45th of the height unless given.
-        f_number, focal_length_mm, sensor_width_mm: The same by a lens: all three, without ``at_infinity_px``.
+        f_number, focal_length_mm, sensor_width_mm: The strength by a lens: all three, without ``at_infinity_px``.
         focus_range_m: All within half of this to either side of the focal plane is sharp, in metres.
         max_coc_px: The radius is cut here; at 0.06 of the height unless given, or at ``at_infinity_px`` if that is more.
 
@@ -37,8 +37,8 @@ def coc_from_depth(
         ``coc`` of the shape of ``depth_m``, float32: signed radii in pixels, positive behind the focal plane.
 
     Raises:
-        ValueError: Another number of dimensions, a number out of its range, a lens that is not known by all of its numbers.
-        TypeError: A dtype that is none of numbers.
+        ValueError: Another number of dimensions, a number out of its range, a lens with missing numbers.
+        TypeError: A dtype that is not numeric.
     """
     depth = as_array(depth_m, "depth_m")
     if depth.dtype.kind not in "fiu":
@@ -65,11 +65,11 @@ def coc_from_disparity(
     """``coc = k * (focus - disparity)``: no distance needs to be known.
 
     Args:
-        disparity: float32 of any shape, in any unit: pixels of a stereo pair, or inverse depth from 0 to 1. It is large where
-            things are near. What is not finite is unknown and counts as infinitely far (0).
+        disparity: float32 of any shape, in any unit: pixels of a stereo pair, or inverse depth from 0 to 1. It is large for
+            near objects. Values that are not finite are unknown and count as infinitely far (0).
         focus: The disparity that is in focus, in the same unit (``disp_focus`` of BokehMe).
-        k: CoC radius in pixels that one unit of disparity makes, >= 0 (``K`` of BokehMe, whose sign is the other one). Of two
-            eyes: aperture / (2 * baseline).
+        k: CoC radius in pixels that one unit of disparity makes, >= 0 (``K`` of BokehMe, whose sign is opposite). For
+            stereo: aperture / (2 * baseline).
         max_coc_px: The radius is cut here, in pixels; nowhere unless given.
 
     Returns:
@@ -77,7 +77,7 @@ def coc_from_disparity(
 
     Raises:
         ValueError: A number out of its range.
-        TypeError: A dtype that is none of numbers.
+        TypeError: A dtype that is not numeric.
     """
     array = as_array(disparity, "disparity")
     if array.dtype.kind not in "fiu":
@@ -91,8 +91,8 @@ def coc_from_disparity(
     np.subtract(np.float32(focus), array, out=array)
     array *= np.float32(k)
     if max_coc_px is not None:
-        most = _positive("max_coc_px", max_coc_px)
-        np.clip(array, -most, most, out=array)
+        limit = _positive("max_coc_px", max_coc_px)
+        np.clip(array, -limit, limit, out=array)
     return array
 
 

@@ -1,4 +1,4 @@
-"""Depth from two eyes, and depth fitted to its picture."""
+"""Depth from stereo, and refinement of depth by its picture."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from . import _arrays, _core
 from ._blur import check_threads
 from ._still import as_texts, maps
 
-#: Disparities are tried in multiples of this, up to the most.
-STEP, MOST = 16, 256
+#: Step and maximum of the number of disparities.
+STEP, MAX_DISPARITIES = 16, 256
 
 
 def match(
@@ -30,33 +30,33 @@ def match(
     """The disparity of rectified pairs (the same point is in the same row), as ``bokehcam depth`` finds it, to the bit.
 
     Args:
-        left: What the left eye saw: ``(H, W, 3)`` or ``(N, H, W, 3)``, ``uint8`` sRGB or ``float32`` linear light, which is
+        left: The left camera's picture: ``(H, W, 3)`` or ``(N, H, W, 3)``, ``uint8`` sRGB or ``float32`` linear light, which is
             matched as 8-bit sRGB; or luma ``(H, W)``, ``uint8``.
-        right: What the right eye saw, of the same shape.
+        right: The right camera's picture, of the same shape.
         max_disparity: Disparities that are tried, from 0, in pixels; rounded up to a multiple of 16, at most 256 and less than
             the width.
         effort: ``full``, or ``fast``: half the columns and rows.
         threads: Threads to work on; all cores unless given.
-        sequence: Whether the pairs of a batch follow each other in time: what was found in one then helps the next, and the
+        sequence: Whether the pairs of a batch follow each other in time: each result then guides the next, and the
             results are steadier. Otherwise each is matched by itself.
-        check: Warns (``RuntimeWarning``) where the first pair looks as if it were not rectified, or its eyes were swapped.
+        check: Warns (``RuntimeWarning``) if the first pair appears unrectified or swapped.
 
     Returns:
-        ``(H, W)`` or ``(N, H, W)``, float32: pixels of the left picture; its column ``x`` is seen by the right eye in column
+        ``(H, W)`` or ``(N, H, W)``, float32: pixels of the left picture; its column ``x`` is the right camera's column
         ``x - disparity``. 0 is unknown. With a focal length in pixels and a baseline in metres, depth in metres is
         ``focal_px * baseline_m / disparity``.
 
     Raises:
-        ValueError: Shapes that do not fit (both are said), a number out of its range.
+        ValueError: Shapes that do not fit (both are named), a number out of its range.
         TypeError: Another dtype, or an array on a GPU.
     """
-    eyes = [_eye(left, "left"), _eye(right, "right")]
-    shapes = [_arrays.shape_of(eye) for eye in eyes]
+    views = [_stereo_image(left, "left"), _stereo_image(right, "right")]
+    shapes = [_arrays.shape_of(picture) for picture in views]
     if shapes[0] != shapes[1]:
         raise ValueError(f"right: shape {shapes[1]}, wanted {shapes[0]}, as left has")
-    array = eyes[0]
+    array = views[0]
     height, width = array.shape[-3:-1] if array.ndim > 2 else array.shape
-    limit = min((width - 1) // STEP * STEP, MOST)
+    limit = min((width - 1) // STEP * STEP, MAX_DISPARITIES)
     if limit < STEP:
         raise ValueError(f"left: {width} px wide, and matching needs {STEP + 1} or more")
     disparities = -(-max_disparity // STEP) * STEP
@@ -64,33 +64,33 @@ def match(
         raise ValueError(f"max_disparity: {max_disparity}, wanted 1 to {limit} for pictures {width} px wide")
     out = np.empty((len(array) if array.ndim == 4 else 1, height, width), np.float32)
     matcher: Optional[_core.Matcher] = None
-    pairs = zip(_pictures(eyes[0], "left"), _pictures(eyes[1], "right"))
-    for k, (of_left, of_right) in enumerate(pairs):
+    pairs = zip(_pictures(views[0], "left"), _pictures(views[1], "right"))
+    for k, (left_picture, right_picture) in enumerate(pairs):
         if matcher is None or not sequence:
             matcher = _core.Matcher((width, height), disparities, effort, check_threads(threads))
-        out[k], odd = matcher.disparity(of_left, of_right, check and k == 0)
-        if odd is not None:
-            warnings.warn(odd, RuntimeWarning, stacklevel=2)
+        out[k], warning = matcher.disparity(left_picture, right_picture, check and k == 0)
+        if warning is not None:
+            warnings.warn(warning, RuntimeWarning, stacklevel=2)
     return out if array.ndim == 4 else out[0]
 
 
 def refine(
     depth_m: Any, image: Any, *, focus: Union[float, str, tuple[float, float]] = "auto"
 ) -> npt.NDArray[np.float32]:
-    """Measured depth made fit for a blur: as large as its picture, without holes, calm, its edges on those of the colours.
+    """Refines measured depth for a blur: upsampled to the picture, without holes and noise, its edges aligned to colour edges.
 
     Args:
         depth_m: ``(h, w)`` or ``(N, h, w)``, float32 metres, 0 or not finite = unknown; of the picture's size, or smaller with
             the same aspect.
-        image: ``(H, W, 3)`` or ``(N, H, W, 3)``, ``uint8`` sRGB or ``float32`` linear light, which is looked at as 8-bit sRGB.
-        focus: What will be in focus: metres, ``"auto"`` or a point ``(x, y)`` as fractions of width and height. Steps of depth
-            count as much as they change the blur, so that it matters which.
+        image: ``(H, W, 3)`` or ``(N, H, W, 3)``, ``uint8`` sRGB or ``float32`` linear light, which is converted to 8-bit sRGB.
+        focus: The focus: metres, ``"auto"`` or a point ``(x, y)`` as fractions of width and height. It matters because depth
+            steps are weighted by their effect on the blur.
 
     Returns:
         ``(H, W)`` or ``(N, H, W)``, float32 metres, each map refined by itself. 0 everywhere where no depth was known.
 
     Raises:
-        ValueError: Shapes that do not fit (both are said), or a focus that is none.
+        ValueError: Shapes that do not fit (both are named), or an invalid focus.
         TypeError: Another dtype, or an array on a GPU.
     """
     array = _arrays.image(image)
@@ -104,12 +104,12 @@ def refine(
     return out
 
 
-def _pictures(eye: npt.NDArray[Any], name: str) -> Iterator[npt.NDArray[Any]]:
-    """Luma has no batches."""
-    return iter([eye]) if eye.ndim == 2 else _arrays.pictures(eye, name)
+def _pictures(images: npt.NDArray[Any], name: str) -> Iterator[npt.NDArray[Any]]:
+    """Yields the pictures; luma has no batches."""
+    return iter([images]) if images.ndim == 2 else _arrays.pictures(images, name)
 
 
-def _eye(value: Any, name: str) -> npt.NDArray[Any]:
+def _stereo_image(value: Any, name: str) -> npt.NDArray[Any]:
     array = _arrays.as_array(value, name)
     if array.ndim == 2 and array.dtype == np.uint8 and 0 not in array.shape:
         return np.ascontiguousarray(array)

@@ -1,4 +1,4 @@
-"""Single pictures as files, read and written as the program does."""
+"""Files of single pictures, read and written like the program's."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def write_image(path: Path, image: Any, *, overwrite: bool = False) -> None:
 
     Raises:
         OSError: The file is there already (unless ``overwrite``), or cannot be written; the message names it.
-        ValueError, TypeError: What is no picture.
+        ValueError, TypeError: The array is not a picture.
     """
     array = _arrays.image(image)
     if array.ndim != 3:

@@ -17,22 +17,22 @@ from . import _core
 class Frame:
     """A frame of a recording."""
 
-    #: Its number, from 0.
+    #: Index, from 0.
     index: int
     #: Nanoseconds after the first frame; strictly increasing.
     time_ns: int
-    #: ``(H, W, 3)`` uint8 sRGB; of two eyes the left one's.
+    #: ``(H, W, 3)`` uint8 sRGB; in stereo, the left camera's.
     color: npt.NDArray[np.uint8]
-    #: ``(h, w)`` float32 metres, 0 = unknown, at most as large as the picture; None where the recording has no depth.
+    #: ``(h, w)`` float32 metres, 0 = unknown, at most as large as the picture; None if the recording has no depth.
     depth: Optional[npt.NDArray[np.float32]]
-    #: ``(H, W)`` uint8 luma of the right eye; None where the recording has one eye.
+    #: ``(H, W)`` uint8 luma of the right camera; None if the recording is not stereo.
     right: Optional[npt.NDArray[np.uint8]]
 
 
 class Recording(Sequence[Frame]):
-    """A folder in the layout of TUM RGB-D, KITTI, EuRoC/ASL or Middlebury, recognised by what is in it.
+    """A folder in the layout of TUM RGB-D, KITTI, EuRoC/ASL or Middlebury, recognised by its contents.
 
-    Frames are read when they are asked for, one by one, into new arrays.
+    Frames are read on access, one by one, into new arrays.
 
     >>> for frame in bokehcam.Recording("recordings/portrait"):
     ...     frame.color, frame.depth, frame.time_ns
@@ -46,7 +46,7 @@ class Recording(Sequence[Frame]):
     Raises:
         OSError: The folder is no recording, or something in it cannot be read; the message names it. Reading a frame may
             raise it, too.
-        ValueError: ``depth_scale`` is no number > 0.
+        ValueError: ``depth_scale`` is not > 0.
     """
 
     def __init__(
@@ -83,12 +83,12 @@ class Recording(Sequence[Frame]):
 
     @property
     def has_right(self) -> bool:
-        """Whether its frames have the picture of a right eye."""
+        """Whether its frames have a right camera's picture."""
         return self._core.has_right()
 
     @property
     def disparities(self) -> Optional[int]:
-        """How many disparities to search, where it says so."""
+        """Number of disparities to search, if the recording states it."""
         return self._core.disparities()
 
     def __len__(self) -> int:

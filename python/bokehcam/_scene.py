@@ -1,9 +1,9 @@
-"""Layered scenes through an exact thin lens: the truth that a blur is measured by.
+"""Layered scenes through an exact thin lens: ground truth for a blur.
 
 For a plane the inverse depth, and with it the CoC ``C``, is affine in picture coordinates. The ray through pixel ``p`` and the
 lens point ``u`` (unit disc) meets the plane at ``q = p + C(q) u``, so that ``C(q) = C(p) / (1 - grad(C) . u)``: a closed form
-(Potmesil and Chakravarty 1981 for the CoC; Cook, Porter and Carpenter 1984 for sampling the lens). What things hide is there,
-and is seen through the lens past their edges.
+(Potmesil and Chakravarty 1981 for the CoC; Cook, Porter and Carpenter 1984 for sampling the lens). Hidden surfaces exist,
+and the lens sees them past the edges of objects.
 """
 
 from __future__ import annotations
@@ -22,15 +22,15 @@ _F32 = npt.NDArray[np.float32]
 
 @dataclass(frozen=True)
 class Scene:
-    """A scene as a pinhole and as a thin lens sees it. All arrays are float32."""
+    """A scene through a pinhole and through a thin lens. All arrays are float32."""
 
     #: ``(H, W, 3)`` linear light: the pinhole picture, whose outlines are antialiased.
     image: _F32
-    #: ``(H, W)`` metres, of what covers a pixel by half or more.
+    #: ``(H, W)`` metres, of the surface that covers half of the pixel or more.
     depth_m: _F32
     #: ``(H, W)`` signed CoC radii in pixels, positive behind the focal plane: those of ``depth_m``.
     coc: _F32
-    #: ``(H, W, 3)`` linear light: what the lens sees.
+    #: ``(H, W, 3)`` linear light: the thin lens's picture.
     truth: _F32
     #: Distance of the focal plane, in metres.
     focus_m: float
@@ -67,7 +67,7 @@ def to_linear(srgb: npt.ArrayLike) -> _F32:
 
 
 def psnr(a: npt.ArrayLike, b: npt.ArrayLike) -> float:
-    """Peak signal-to-noise ratio of two 8-bit pictures of one shape, in dB; infinite where they are equal."""
+    """Peak signal-to-noise ratio of two 8-bit pictures of one shape, in dB; infinite if they are equal."""
     first, second = np.asarray(a, np.float64), np.asarray(b, np.float64)
     if first.shape != second.shape:
         raise ValueError(f"shapes {first.shape} and {second.shape} differ")
@@ -83,17 +83,17 @@ def thin_lens_scene(
     aperture: Union[str, Aperture] = "disc",
     samples: int = 256,
 ) -> Scene:
-    """A scene with its truth: a lit room, things in it, a bust in focus, and now and then something in front of it.
+    """Creates a scene and its ground truth: a lit room, things in it, a bust in focus, and sometimes an object in front of it.
 
     Args:
-        seed: Which scene; the same gives the same to the bit.
+        seed: Seed of the scene; deterministic to the bit.
         size: ``(width, height)`` in pixels.
         at_infinity_px: CoC radius of a point at infinity, in pixels; a 25th of the height unless given.
         aperture: The opening of the lens, with a hard rim.
         samples: Rays per pixel, each through another point of the lens.
 
     Raises:
-        ValueError: A number out of its range, or an aperture that is none.
+        ValueError: A number out of its range, or an invalid aperture.
     """
     width, height = size
     if width < 16 or height < 16 or samples < 1:
@@ -104,7 +104,7 @@ def thin_lens_scene(
     rng = np.random.default_rng(seed)
     opening = aperture if isinstance(aperture, Aperture) else make_aperture(aperture)
     focus_m = rng.uniform(0.9, 1.1)
-    # The background leans away upwards: its inverse depth falls with the row.
+    # The background is tilted: its inverse depth decreases with the row.
     far_m, lean = rng.uniform(3, 8), rng.uniform(0, 0.6)
     room = _Room(_texture(rng, size, rng.choice(["lights", "checks", "plain"])), far_m, lean, focus_m, largest_px)
     layers = [_Layer(_texture(rng, size, "stripes"), _blobs(rng, size, 5), rng.uniform(1.6, 2.6))]
@@ -130,11 +130,11 @@ def thin_lens_scene(
     for layer in layers:
         depth_m[layer.cover >= 0.5] = layer.metres
     depth_m = depth_m.astype(np.float32)
-    most_px = 2 * largest_px + 1
+    max_coc_px = 2 * largest_px + 1
     return Scene(
         image=seen_from(np.zeros(2)).astype(np.float32),
         depth_m=depth_m,
-        coc=coc_from_depth(depth_m, focus_m, at_infinity_px=largest_px, max_coc_px=most_px),
+        coc=coc_from_depth(depth_m, focus_m, at_infinity_px=largest_px, max_coc_px=max_coc_px),
         truth=(total / len(points)).astype(np.float32),
         focus_m=focus_m,
         at_infinity_px=largest_px,
@@ -165,7 +165,7 @@ class _Layer:
 
 
 class _Room:
-    """An opaque plane that leans: its CoC is affine in the row."""
+    """An opaque tilted plane: its CoC is affine in the row."""
 
     def __init__(self, color: _F32, metres: float, lean: float, focus_m: float, at_infinity_px: float):
         height = color.shape[0]
@@ -189,14 +189,14 @@ class _Room:
 
 
 def _between(place: npt.NDArray[np.float64], count: int) -> tuple[npt.NDArray[np.intp], _F32]:
-    """The samples before some places, and how far on they are; the first and the last go on for ever."""
+    """Returns the sample before each position and the fraction to the next; the ends are extended."""
     place = np.clip(place, 0, count - 1)
     before = place.astype(np.intp)
     return before, (place - before).astype(np.float32)
 
 
 def _spread(grid: _F32, count: int, axis: int) -> _F32:
-    """A grid made larger along an axis, linearly."""
+    """Upsamples a grid linearly along an axis."""
     before, along = _between(np.linspace(0, grid.shape[axis] - 1, count), grid.shape[axis])
     first = np.take(grid, before, axis)
     second = np.take(grid, np.minimum(before + 1, grid.shape[axis] - 1), axis)
@@ -230,7 +230,7 @@ def _texture(rng: np.random.Generator, size: tuple[int, int], kind: str) -> _F32
 
 
 def _disc(x: npt.ArrayLike, y: npt.ArrayLike, cx: float, cy: float, rx: float, ry: float) -> _F32:
-    """How far an ellipse covers each pixel, with edges of one pixel."""
+    """Returns the coverage of each pixel by an ellipse, with edges of one pixel."""
     distance = np.hypot((np.asarray(x) - cx) / rx, (np.asarray(y) - cy) / ry)
     cover: _F32 = np.clip((1 - distance) * min(rx, ry) + 0.5, 0, 1).astype(np.float32)
     return cover

@@ -1,4 +1,4 @@
-"""Pictures with depth, blurred as the command ``bokehcam render`` blurs them."""
+"""Pictures with depth, blurred like the command ``bokehcam render``."""
 
 from __future__ import annotations
 
@@ -43,8 +43,8 @@ def render(
 ) -> Image:
     """Blurs pictures with measured depth as ``bokehcam render --depth-map`` does, to the bit.
 
-    Unlike :func:`bokehcam.blur` it takes depth as it comes, with holes and noise: it finds the focus, fits depth to the
-    picture where it does not fit, fills holes, and takes apart the pixels of outlines, which show two surfaces.
+    Unlike :func:`bokehcam.blur` it accepts raw depth with holes and noise: it finds the focus, aligns depth edges to the
+    picture, fills holes, and separates the mixed pixels of outlines, which show two surfaces.
 
     Args:
         image: ``(H, W, 3)`` or ``(N, H, W, 3)``, ``uint8`` sRGB or ``float32`` linear light.
@@ -56,13 +56,13 @@ def render(
             ``focus=1.5`` (metres), ``"auto"`` or ``(0.5, 0.4)`` (a point of the picture); ``coc_at_infinity=20`` (pixels) or
             ``"3%"``; ``max_coc`` in pixels; ``focal_length`` and ``sensor_width`` in millimetres; ``focus_range`` in metres.
 
-    Depth is fitted to ``float32`` pictures by their 8-bit sRGB, and blurs them as they are.
+    For ``float32`` pictures, depth is refined by their 8-bit sRGB, and the blur uses the original values.
 
     Returns:
         The blurred picture, of the shape and dtype of ``image``.
 
     Raises:
-        ValueError: Shapes that do not fit (both are said), a setting out of its range, settings that do not go together.
+        ValueError: Shapes that do not fit (both are named), a setting out of its range, settings that exclude each other.
         TypeError: Another dtype, or an array on a GPU.
     """
     settings: dict[str, Any] = dict(
@@ -104,7 +104,7 @@ def render(
 
 
 def maps(name: str, value: Any, image: Image) -> npt.NDArray[np.float32]:
-    """One map for each of some pictures, of any size."""
+    """Converts depth maps of any size, one for each picture."""
     array = _arrays.as_array(value, name)
     if array.dtype.kind not in "fiu":
         raise TypeError(f"{name}: dtype {array.dtype}, wanted float32")
@@ -116,7 +116,7 @@ def maps(name: str, value: Any, image: Image) -> npt.NDArray[np.float32]:
 
 
 def as_texts(settings: dict[str, Any]) -> list[tuple[str, str]]:
-    """Settings that are given, as the command line has them."""
+    """Formats the settings that are not None like those of the command line."""
 
     def text(value: Any) -> str:
         if isinstance(value, (tuple, list)):

@@ -1,4 +1,4 @@
-"""The blur as a step of other people's Ray Data pipelines.
+"""The blur as a step of Ray Data pipelines.
 
 ::
 
@@ -29,14 +29,14 @@ import bokehcam
 
 __all__ = ["Blur"]
 
-# Sizes of pictures that a worker keeps renderers for.
-MOST_RENDERERS = 4
+# Maximum number of renderers that a worker keeps, one per picture size.
+MAX_RENDERERS = 4
 
 
-@lru_cache(maxsize=MOST_RENDERERS)
+@lru_cache(maxsize=MAX_RENDERERS)
 def renderer(size: tuple[int, int], settings: bytes) -> bokehcam.Renderer:
-    """The worker's renderer for pictures of `size` (width, height). Its other settings are pickled: what a worker gets anew
-    with each task is then seen to be the same."""
+    """Returns the worker's renderer for pictures of `size` (width, height). The other settings are pickled, so that equal
+    settings of different tasks share a cached renderer."""
     return bokehcam.Renderer(size, **pickle.loads(settings))
 
 
@@ -45,12 +45,12 @@ class Blur:
     focal plane.
 
     Args:
-        coc: how much is blurred: the name of a column with maps, each ``(H, W)`` float32; or a function of a row (a
+        coc: the circles of confusion: the name of a column with maps, each ``(H, W)`` float32; or a function of a row (a
             dictionary of its values) that gives such a map; or a number >= 0, for all pixels alike.
         image: the column with the pictures, each ``(H, W, 3)`` uint8 (sRGB) or float32 (linear), of one size or of several.
         out: the column for the results; other columns stay as they are.
         threads: threads of a picture; one by default, as Ray starts a worker for each CPU.
-        settings: what else :class:`bokehcam.Renderer` takes: ``aperture``, ``quality``, ``max_coc_px`` and others.
+        settings: other arguments of :class:`bokehcam.Renderer`: ``aperture``, ``quality``, ``max_coc_px`` and others.
 
     Raises:
         KeyError: a batch has no such column.
@@ -67,7 +67,7 @@ class Blur:
         **settings: Any,
     ):
         self.coc, self.image, self.out = coc, image, out
-        # A setting that there is not is found here, not on a node.
+        # Unknown settings fail here, not on a node.
         inspect.signature(bokehcam.Renderer).bind((1, 1), **settings)
         self.settings = pickle.dumps({"threads": threads, **settings})
 

@@ -1,4 +1,4 @@
-//! Lens openings.
+//! Apertures.
 
 use std::sync::Arc;
 
@@ -9,19 +9,19 @@ use pyo3::prelude::*;
 
 use crate::errors;
 
-/// A lens opening, with its soft rim.
+/// An aperture with its soft rim.
 #[pyclass(frozen, module = "bokehcam._core")]
 pub struct Aperture {
     pub shape: aperture::Aperture,
     pub rim: f32,
 }
 
-/// Columns `(rank, size)`, rows `(rank, size)`, singular values `(size,)` and the relative error.
+/// Column vectors `(rank, size)`, row vectors `(rank, size)`, singular values `(size,)` and the relative error.
 type LowRank<'py> = (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<f64>>, Bound<'py, PyArray1<f64>>, f64);
 
 #[pymethods]
 impl Aperture {
-    /// By settings named as on the command line, or with the outline of a grey `picture`, 0 to 1.
+    /// Creates an aperture from settings named like the flags, or from the outline of a grey `picture`, 0 to 1.
     #[new]
     fn new(settings: Vec<(String, String)>, picture: Option<PyReadonlyArray2<'_, f32>>) -> PyResult<Self> {
         let look = errors::look(&settings)?;
@@ -34,28 +34,29 @@ impl Aperture {
         Ok(Self { shape, rim: look.rim })
     }
 
-    /// The mask of `size` x `size` cells, which sums to 1.
+    /// Returns the mask of `size` x `size` cells, normalised to sum 1.
     fn kernel<'py>(&self, py: Python<'py>, size: usize) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        let mask = py.detach(|| normalised(&self.shape.mask(size, self.rim)));
+        let mask = py.detach(|| normalise(&self.shape.mask(size, self.rim)));
         mask.values.to_pyarray(py).reshape([size, size])
     }
 
-    /// About `count` points of the opening `(n, 2)` in units of its radius, evenly spread; the rim is taken as hard.
+    /// Returns about `count` evenly spread points of the aperture `(n, 2)`, in units of its radius, without the soft
+    /// rim.
     fn points<'py>(&self, py: Python<'py>, count: usize) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let points = py.detach(|| aperture::lens_points(&self.shape, count));
         let values: Vec<f64> = points.iter().flat_map(|point| [point.x, point.y]).collect();
         values.to_pyarray(py).reshape([points.len(), 2])
     }
 
-    /// The first `rank` terms of the mask's singular value decomposition.
+    /// Returns the first `rank` terms of the mask's singular value decomposition.
     fn low_rank<'py>(&self, py: Python<'py>, rank: usize, size: usize) -> PyResult<LowRank<'py>> {
-        let terms = py.detach(|| Decomposition::of(&normalised(&self.shape.mask(size, self.rim))));
+        let terms = py.detach(|| Decomposition::of(&normalise(&self.shape.mask(size, self.rim))));
         let scaled = |vectors: &[f64]| -> Vec<f64> {
-            let of_term = |(term, vector): (usize, &[f64])| -> Vec<f64> {
+            let scale_term = |(term, vector): (usize, &[f64])| -> Vec<f64> {
                 let weight = terms.sigma[term].sqrt();
                 vector.iter().map(|value| value * weight).collect()
             };
-            vectors.chunks(size).take(rank).enumerate().flat_map(of_term).collect()
+            vectors.chunks(size).take(rank).enumerate().flat_map(scale_term).collect()
         };
         let array = |values: Vec<f64>| values.to_pyarray(py).reshape([rank, size]);
         let (columns, rows) = (array(scaled(&terms.u))?, array(scaled(&terms.v))?);
@@ -63,7 +64,7 @@ impl Aperture {
     }
 }
 
-fn normalised(mask: &aperture::Mask) -> aperture::Mask {
+fn normalise(mask: &aperture::Mask) -> aperture::Mask {
     let sum: f64 = mask.values.iter().sum();
     aperture::Mask { values: mask.values.iter().map(|value| value / sum).collect(), ..*mask }
 }

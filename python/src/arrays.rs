@@ -1,10 +1,10 @@
-//! Arrays as slices.
+//! Access to NumPy arrays as slices.
 
 use numpy::{Element, PyArrayMethods, PyReadonlyArrayDyn, PyReadwriteArrayDyn};
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 
-/// An array that is read, of 8-bit sRGB or linear light.
+/// Input and output arrays of a picture, of 8-bit sRGB or linear light.
 pub enum Image<'py> {
     /// 8-bit sRGB.
     Srgb(PyReadonlyArrayDyn<'py, u8>, PyReadwriteArrayDyn<'py, u8>),
@@ -13,11 +13,11 @@ pub enum Image<'py> {
 }
 
 impl<'py> Image<'py> {
-    /// A picture, and the array of the same kind that its result goes to.
+    /// Borrows a picture, and the output array of the same type.
     ///
     /// # Errors
-    /// They are of another kind, or not of one.
-    pub fn of(image: &Bound<'py, PyAny>, out: &Bound<'py, PyAny>) -> PyResult<Self> {
+    /// Fails if the types differ or are unsupported.
+    pub fn from_arrays(image: &Bound<'py, PyAny>, out: &Bound<'py, PyAny>) -> PyResult<Self> {
         if let (Ok(image), Ok(out)) = (read(image), write(out)) {
             return Ok(Self::Srgb(image, out));
         }
@@ -28,40 +28,41 @@ impl<'py> Image<'py> {
     }
 }
 
-/// An array that is read.
+/// Borrows an array for reading.
 ///
 /// # Errors
-/// It has another type.
+/// Fails if it has another type.
 pub fn read<'py, T: Element>(array: &Bound<'py, PyAny>) -> PyResult<PyReadonlyArrayDyn<'py, T>> {
     Ok(array.cast::<numpy::PyArrayDyn<T>>()?.try_readonly()?)
 }
 
-/// An array that is written.
+/// Borrows an array for writing.
 ///
 /// # Errors
-/// It has another type, is read-only or in use.
+/// Fails if it has another type, is read-only or is borrowed.
 pub fn write<'py, T: Element>(array: &Bound<'py, PyAny>) -> PyResult<PyReadwriteArrayDyn<'py, T>> {
     Ok(array.cast::<numpy::PyArrayDyn<T>>()?.try_readwrite()?)
 }
 
-/// The index of the first number that is not finite, and the least and the largest of an array; both 0 of an empty one.
+/// Returns the index of the first number that is not finite, and the minimum and maximum; both are 0 for an empty
+/// array.
 #[pyfunction]
 pub fn survey(py: Python<'_>, array: PyReadonlyArrayDyn<'_, f32>) -> PyResult<(Option<usize>, f32, f32)> {
     let values = array.as_slice()?;
     py.detach(|| {
-        let (mut low, mut high, mut odd) = ([f32::INFINITY; LANES], [f32::NEG_INFINITY; LANES], [0.0f32; LANES]);
+        let (mut low, mut high, mut faults) = ([f32::INFINITY; LANES], [f32::NEG_INFINITY; LANES], [0.0f32; LANES]);
         let (vectors, rest) = values.as_chunks::<LANES>();
-        // Comparisons instead of `min`, and a product that is not 0 where a factor is not finite: vector code.
+        // Vectorisable: comparisons instead of `min`, and a product that is NaN for any factor that is not finite.
         let mut add = |values: &[f32]| {
             for (k, &value) in values.iter().enumerate() {
                 low[k] = if value < low[k] { value } else { low[k] };
                 high[k] = if value > high[k] { value } else { high[k] };
-                odd[k] += value * 0.0;
+                faults[k] += value * 0.0;
             }
         };
         vectors.iter().for_each(|vector| add(vector));
         add(rest);
-        if odd.iter().sum::<f32>() != 0.0 {
+        if faults.iter().sum::<f32>() != 0.0 {
             return Ok((values.iter().position(|value| !value.is_finite()), 0.0, 0.0));
         }
         let (low, high) =
@@ -70,5 +71,5 @@ pub fn survey(py: Python<'_>, array: PyReadonlyArrayDyn<'_, f32>) -> PyResult<(O
     })
 }
 
-/// Numbers that are looked at side by side.
+/// Number of values per vector.
 const LANES: usize = 16;

@@ -1,4 +1,4 @@
-//! Blurring by the radius of every pixel.
+//! Blur by a CoC radius per pixel.
 
 use std::ops::ControlFlow;
 use std::sync::{Mutex, PoisonError};
@@ -14,18 +14,18 @@ use crate::arrays::Image;
 use crate::errors;
 use crate::signals::Signals;
 
-/// An executor for pictures of one size. Threads that call it at once take turns.
+/// An executor for pictures of one size. Concurrent calls are serialised.
 #[pyclass(frozen, module = "bokehcam._core")]
 pub struct Blur {
-    /// The same radius everywhere, unless each pixel has its own.
+    /// Uniform radius in pixels; `None` if each pixel has its own.
     radius_px: Option<f32>,
     executor: Mutex<SliceBlur>,
 }
 
 #[pymethods]
 impl Blur {
-    /// For pictures of `size` (width, height) and radii of at most `max_px` in front of and behind the focal plane; or for
-    /// one radius everywhere, which then is the latter.
+    /// Creates an executor for pictures of `size` (width, height) and radii up to `max_px` (in front of the focal
+    /// plane, behind it), or with `uniform` for one radius everywhere, the second of `max_px`.
     #[new]
     #[pyo3(signature = (size, max_px, uniform, settings, aperture, threads))]
     fn new(
@@ -46,7 +46,7 @@ impl Blur {
         Ok(Self { radius_px: uniform.then_some(max_px.1), executor: Mutex::new(executor) })
     }
 
-    /// Blurs `image` (height, width, 3) into `out`, by the radii `coc` (height, width) unless there is one for all.
+    /// Blurs `image` (height, width, 3) into `out`, by the radii `coc` (height, width) unless the radius is uniform.
     fn blur(
         &self,
         py: Python<'_>,
@@ -59,14 +59,14 @@ impl Blur {
             Some(coc) => Radii::Each(coc.as_slice()?),
             None => Radii::Field(&field, None),
         };
-        match Image::of(image, out)? {
+        match Image::from_arrays(image, out)? {
             Image::Srgb(image, mut out) => blur(py, &self.executor, image.as_slice()?, coc, out.as_slice_mut()?),
             Image::Linear(image, mut out) => blur(py, &self.executor, image.as_slice()?, coc, out.as_slice_mut()?),
         }
     }
 }
 
-/// Blurs without Python's lock, until done or a signal comes.
+/// Blurs without holding Python's GIL, until done or a signal arrives.
 pub fn blur<T: Sample>(
     py: Python<'_>,
     executor: &Mutex<SliceBlur>,
@@ -76,9 +76,9 @@ pub fn blur<T: Sample>(
 ) -> PyResult<()> {
     py.detach(|| {
         let mut signals = Signals::new();
-        // A panic leaves nothing behind that the next frame reads: `blur` begins with the frame.
+        // A panic leaves no state for the next frame: `blur` starts afresh.
         let mut executor = executor.lock().unwrap_or_else(PoisonError::into_inner);
-        match executor.blur(pixels, coc, out, || signals.go_on()).map_err(errors::value)? {
+        match executor.blur(pixels, coc, out, || signals.poll()).map_err(errors::value)? {
             ControlFlow::Continue(()) => Ok(()),
             ControlFlow::Break(()) => signals.raise(),
         }

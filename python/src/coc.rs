@@ -1,4 +1,4 @@
-//! Depth to circles of confusion.
+//! Circles of confusion from depth.
 
 use bokehcam::look::CocRule;
 use bokehcam::optics::CocField;
@@ -7,8 +7,8 @@ use pyo3::prelude::*;
 
 use crate::errors;
 
-/// Writes the signed CoC radius in pixels of each of `depth` in metres to `out`, by the settings for a picture of `size`
-/// (width, height), focused at `focus_m`.
+/// Writes the signed CoC radius in pixels for each value of `depth` (metres) to `out`, by the settings for a picture of
+/// `size` (width, height), focused at `focus_m`.
 #[pyfunction]
 pub fn coc_from_depth(
     py: Python<'_>,

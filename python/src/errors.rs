@@ -1,4 +1,4 @@
-//! What is wrong, in Python's terms.
+//! Errors as Python exceptions.
 
 use std::fmt::Display;
 
@@ -7,17 +7,17 @@ use bokehcam::look::{Look, Patch};
 use pyo3::PyErr;
 use pyo3::exceptions::{PyOSError, PyValueError};
 
-/// An error of the library as a `ValueError`. Its messages name flags of the command line; here these are arguments.
+/// Converts a library error to a `ValueError`. Its messages name command-line flags, which are arguments here.
 pub fn value(error: impl Display) -> PyErr {
     PyValueError::new_err(as_arguments(&error.to_string()))
 }
 
-/// An error of files as an `OSError`.
+/// Converts a file error to an `OSError`.
 pub fn os(error: impl Display) -> PyErr {
     PyOSError::new_err(as_arguments(&error.to_string()))
 }
 
-/// `--max-coc` as `max_coc`.
+/// Replaces flags such as `--max-coc` by arguments such as `max_coc`.
 fn as_arguments(text: &str) -> String {
     let mut parts = text.split("--");
     let mut out = parts.next().unwrap_or_default().to_string();
@@ -29,7 +29,7 @@ fn as_arguments(text: &str) -> String {
     out
 }
 
-/// The default look with some settings, by the names that the command line has for them.
+/// Returns the default look with some settings, named like the flags.
 pub fn look(settings: &[(String, String)]) -> Result<Look, PyErr> {
     let pairs = settings.iter().map(|(name, text)| (name.as_str(), text.as_str()));
     for (name, _) in settings {

@@ -1,4 +1,4 @@
-//! Single pictures as files.
+//! Reading and writing of single pictures.
 
 use std::path::PathBuf;
 
@@ -9,14 +9,14 @@ use pyo3::prelude::*;
 
 use crate::{errors, pictures};
 
-/// A PNG or JPEG, upright.
+/// Reads a PNG or JPEG, rotated upright.
 #[pyfunction]
 pub fn read_image(py: Python<'_>, path: PathBuf) -> PyResult<Bound<'_, PyArray3<u8>>> {
     let ColorImage { width, height, rgb } = py.detach(|| still::read_color(&path)).map_err(errors::os)?;
     PyArray1::from_vec(py, rgb).reshape([height as usize, width as usize, 3])
 }
 
-/// A depth map in metres, 0 = unknown.
+/// Reads a depth map in metres, 0 = unknown.
 #[pyfunction]
 pub fn read_depth(
     py: Python<'_>,
@@ -29,7 +29,7 @@ pub fn read_depth(
     PyArray1::from_vec(py, metres).reshape([height as usize, width as usize])
 }
 
-/// Writes a picture; replaces a file only where it may.
+/// Writes a picture; replaces an existing file only with `overwrite`.
 #[pyfunction]
 pub fn write_image(py: Python<'_>, path: PathBuf, image: &Bound<'_, PyAny>, overwrite: bool) -> PyResult<()> {
     let color = pictures::color(image)?;

@@ -1,5 +1,5 @@
-//! The native half of the Python package `bokehcam`: what its Python half hands over is checked for kind and shape
-//! there, and comes as contiguous arrays. Docstrings for users are in the Python half.
+//! Native half of the Python package `bokehcam`: the Python half checks the type and shape of arguments, and passes
+//! contiguous arrays. User docstrings are in the Python half.
 
 mod aperture;
 mod arrays;

@@ -1,4 +1,4 @@
-//! Arrays as the library's own pictures, where it keeps them.
+//! Conversion of arrays to the library's pictures.
 
 use bokehcam::color::encode_srgb;
 use bokehcam::frame::{ColorImage, DepthMap, GrayImage};
@@ -8,15 +8,15 @@ use pyo3::prelude::*;
 
 use crate::arrays;
 
-/// Columns and rows of an array (rows, columns, ...).
+/// Returns width and height of an array (rows, columns, ...).
 pub fn size_of(shape: &[usize]) -> (u32, u32) {
     (shape[1] as u32, shape[0] as u32)
 }
 
-/// A picture as 8-bit sRGB: a copy, or linear light rounded to it.
+/// Converts a picture to 8-bit sRGB: a copy, or linear light rounded to it.
 ///
 /// # Errors
-/// It is of another kind.
+/// Fails if its type is unsupported.
 pub fn color(image: &Bound<'_, PyAny>) -> PyResult<ColorImage> {
     if let Ok(image) = arrays::read::<u8>(image) {
         let (width, height) = size_of(image.shape());
@@ -27,11 +27,11 @@ pub fn color(image: &Bound<'_, PyAny>) -> PyResult<ColorImage> {
     Ok(ColorImage { width, height, rgb: image.py().detach(|| light.iter().map(|&light| encode_srgb(light)).collect()) })
 }
 
-/// A picture for matching, and its colours if it has any.
+/// Converts a picture to luma for stereo matching, and to colour if it has any.
 ///
 /// # Errors
-/// It is of another kind.
-pub fn eye(image: &Bound<'_, PyAny>) -> PyResult<(GrayImage, Option<ColorImage>)> {
+/// Fails if its type is unsupported.
+pub fn stereo_image(image: &Bound<'_, PyAny>) -> PyResult<(GrayImage, Option<ColorImage>)> {
     let mut gray = GrayImage::default();
     if let Ok(image) = arrays::read::<u8>(image)
         && image.ndim() == 2
@@ -45,10 +45,10 @@ pub fn eye(image: &Bound<'_, PyAny>) -> PyResult<(GrayImage, Option<ColorImage>)
     Ok((gray, Some(color)))
 }
 
-/// A depth map of an array (rows, columns) in metres.
+/// Converts an array (rows, columns) in metres to a depth map.
 ///
 /// # Errors
-/// It is not contiguous, or not of two dimensions.
+/// Fails if it is not contiguous, or not two-dimensional.
 pub fn depth(metres: &PyReadonlyArrayDyn<'_, f32>) -> PyResult<DepthMap> {
     if metres.ndim() != 2 {
         return Err(PyTypeError::new_err("depth has rows and columns"));

@@ -1,4 +1,4 @@
-//! Recordings, frame by frame.
+//! Recordings as random-access frames.
 
 use std::path::PathBuf;
 
@@ -13,7 +13,7 @@ use crate::errors;
 #[pyclass(frozen, module = "bokehcam._core")]
 pub struct Recording(recording::Recording);
 
-/// Colour (height, width, 3), depth in metres and the right eye's luma (height, width), where there are such.
+/// Colour (height, width, 3), depth in metres and the right camera's luma (height, width), if available.
 type Frame<'py> = (Bound<'py, PyArray3<u8>>, Option<Bound<'py, PyArray2<f32>>>, Option<Bound<'py, PyArray2<u8>>>);
 
 #[pymethods]
@@ -58,7 +58,7 @@ impl Recording {
         self.0.disparities()
     }
 
-    /// Time of a frame that there is.
+    /// Returns the time of a frame; panics if the index is out of range.
     fn time_ns(&self, index: usize) -> u64 {
         self.0.time_ns(index)
     }

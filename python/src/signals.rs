@@ -1,4 +1,4 @@
-//! Ctrl-C while the work goes on without Python's lock.
+//! Python signals (Ctrl-C) during native work without the GIL.
 
 use std::ops::ControlFlow;
 use std::sync::mpsc::{self, RecvTimeoutError};
@@ -7,48 +7,48 @@ use std::time::{Duration, Instant};
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 
-/// So long nobody minds to wait: short work never takes the lock in between.
+/// Time between two checks, in which short work never takes the GIL.
 const PERIOD: Duration = Duration::from_millis(100);
 
-/// Asks Python now and then whether a signal has come.
+/// Polls Python for signals at intervals.
 pub struct Signals {
-    asked: Instant,
+    checked: Instant,
     error: Option<PyErr>,
 }
 
 impl Signals {
-    /// Nothing has come yet.
+    /// Creates a poller without a signal.
     pub fn new() -> Self {
-        Self { asked: Instant::now(), error: None }
+        Self { checked: Instant::now(), error: None }
     }
 
-    /// Whether the work goes on.
-    pub fn go_on(&mut self) -> ControlFlow<()> {
-        if self.error.is_none() && self.asked.elapsed() > PERIOD {
+    /// Returns `Break` once a signal handler has raised an exception.
+    pub fn poll(&mut self) -> ControlFlow<()> {
+        if self.error.is_none() && self.checked.elapsed() > PERIOD {
             self.error = Python::attach(|py| py.check_signals()).err();
-            self.asked = Instant::now();
+            self.checked = Instant::now();
         }
         if self.error.is_some() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     }
 
-    /// What a signal's handler has raised.
+    /// Returns the exception of a signal handler, if any.
     ///
     /// # Errors
-    /// That.
+    /// Returns the exception itself.
     pub fn raise(self) -> PyResult<()> {
         self.error.map_or(Ok(()), Err)
     }
 }
 
-/// Does work that cannot be stopped, and owns all it uses, on a thread of its own. A signal ends the waiting, not the work,
+/// Runs work that cannot be interrupted, and owns its data, on a separate thread. A signal ends the wait, not the work,
 /// whose result is then dropped.
 ///
 /// # Errors
-/// What a signal's handler has raised; the work panicked, or there is no thread to be had.
+/// Returns the exception of a signal handler, or fails if the work panics or no thread can be created.
 pub fn wait_for<T: Send + 'static>(py: Python<'_>, work: impl FnOnce() -> T + Send + 'static) -> PyResult<T> {
     py.detach(|| {
         let (done, result) = mpsc::sync_channel(1);
-        // Nobody listens any more after a signal.
+        // After a signal, the receiver is gone.
         let run = move || drop(done.send(work()));
         std::thread::Builder::new().name("bokehcam".into()).spawn(run)?;
         loop {

@@ -1,4 +1,4 @@
-//! The disparity of rectified pairs.
+//! Disparity of rectified pairs.
 
 use std::sync::Mutex;
 
@@ -18,13 +18,13 @@ use crate::{errors, pictures};
 #[pyclass(frozen, module = "bokehcam._core")]
 pub struct Matcher {
     disparities: u32,
-    /// None while a pair is matched, and after one that was given up.
+    /// `None` while a pair is matched, and after an interrupted match.
     matching: Mutex<Option<Box<dyn Matching>>>,
 }
 
 #[pymethods]
 impl Matcher {
-    /// For pictures of `size` (width, height), a multiple of 16 `disparities` from 0 on.
+    /// Creates a matcher for pictures of `size` (width, height) and a multiple of 16 `disparities`, starting at 0.
     #[new]
     fn new(py: Python<'_>, size: (u32, u32), disparities: u32, effort: &str, threads: Option<usize>) -> PyResult<Self> {
         let effort: Effort = effort.parse().map_err(|what| errors::value(format!("effort: {what}")))?;
@@ -33,8 +33,8 @@ impl Matcher {
         Ok(Self { disparities, matching: Mutex::new(Some(matching)) })
     }
 
-    /// The disparity in pixels (height, width) of `left`, 0 = unknown; and what is odd about the pair, if it is to be checked
-    /// and anything is.
+    /// Returns the disparity in pixels (height, width) of `left`, 0 = unknown, and with `checks` a warning about a
+    /// suspicious pair, if any.
     fn disparity<'py>(
         &self,
         py: Python<'py>,
@@ -42,7 +42,7 @@ impl Matcher {
         right: &Bound<'py, PyAny>,
         checks: bool,
     ) -> PyResult<(Bound<'py, PyArray2<f32>>, Option<String>)> {
-        let ((left, color), (right, _)) = (pictures::eye(left)?, pictures::eye(right)?);
+        let ((left, color), (right, _)) = (pictures::stereo_image(left)?, pictures::stereo_image(right)?);
         let busy = || PyRuntimeError::new_err("the matcher is at work for another thread");
         let mut matching = self.matching.lock().map_err(errors::value)?.take().ok_or_else(busy)?;
         let disparities = self.disparities;
@@ -57,7 +57,7 @@ impl Matcher {
         })?;
         *self.matching.lock().map_err(errors::value)? = Some(matching);
         let (disparity, verdict) = found.map_err(errors::value)?;
-        let odd = match verdict {
+        let warning = match verdict {
             Some(verdict @ Verdict::RowsOff { .. }) => {
                 Some(format!("{verdict}, and the disparity is wrong; rectify it"))
             }
@@ -65,6 +65,6 @@ impl Matcher {
             _ => None,
         };
         let shape = [disparity.height as usize, disparity.width as usize];
-        Ok((disparity.px.to_pyarray(py).reshape(shape)?, odd))
+        Ok((disparity.px.to_pyarray(py).reshape(shape)?, warning))
     }
 }

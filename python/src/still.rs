@@ -1,4 +1,4 @@
-//! Pictures with depth, blurred as the command `render` blurs them.
+//! Still pictures with depth, blurred like the command `render`.
 
 use std::path::Path;
 use std::sync::Mutex;
@@ -18,17 +18,18 @@ use crate::blur::blur;
 use crate::signals::wait_for;
 use crate::{errors, pictures};
 
-/// A look for pictures of one size, with what blurs them.
+/// A look for pictures of one size, and its executor.
 #[pyclass(frozen, module = "bokehcam._core")]
 pub struct Still {
     look: Look,
-    /// None where pictures pass through.
+    /// `None` if pictures pass unchanged.
     executor: Option<Mutex<SliceBlur>>,
 }
 
 #[pymethods]
 impl Still {
-    /// For pictures of `size` (width, height), with depth or without; `aperture` replaces the settings' one.
+    /// Creates a renderer for pictures of `size` (width, height), with depth or without; `aperture` replaces that of
+    /// the settings.
     #[new]
     fn new(
         py: Python<'_>,
@@ -48,7 +49,7 @@ impl Still {
         Ok(Self { look, executor })
     }
 
-    /// Blurs `image` (height, width, 3), whose `depth` in metres has holes and noise, into `out`.
+    /// Blurs `image` (height, width, 3) into `out`; its `depth` in metres may have holes and noise.
     fn render(
         &self,
         py: Python<'_>,
@@ -57,13 +58,13 @@ impl Still {
         out: &Bound<'_, PyAny>,
     ) -> PyResult<()> {
         let Some(executor) = &self.executor else {
-            match Image::of(image, out)? {
+            match Image::from_arrays(image, out)? {
                 Image::Srgb(image, mut out) => out.as_slice_mut()?.copy_from_slice(image.as_slice()?),
                 Image::Linear(image, mut out) => out.as_slice_mut()?.copy_from_slice(image.as_slice()?),
             }
             return Ok(());
         };
-        let arrays = Image::of(image, out)?;
+        let arrays = Image::from_arrays(image, out)?;
         if matches!(arrays, Image::Linear(..)) && self.look.behind != Behind::Blur {
             return Err(errors::value("behind: what is put behind the subject is 8-bit sRGB: give a uint8 image"));
         }
@@ -83,14 +84,14 @@ impl Still {
         let (field, map) = made.map_err(errors::value)?;
         let radii = Radii::Field(&field, map.as_ref());
         match arrays {
-            // What is behind the subject may have been put into the picture.
+            // The virtual background may have been put into the picture.
             Image::Srgb(_, mut out) => blur(py, executor, &color.rgb, radii, out.as_slice_mut()?),
             Image::Linear(image, mut out) => blur(py, executor, image.as_slice()?, radii, out.as_slice_mut()?),
         }
     }
 }
 
-/// Depth in metres (height, width) fitted to its picture, with what is in focus by the settings.
+/// Refines depth in metres (height, width) by its picture, with the focus of the settings.
 #[pyfunction]
 pub fn refine<'py>(
     py: Python<'py>,

@@ -1,4 +1,4 @@
-"""What the tests stand on: the repository's recordings, the built program, and a scene with its truth."""
+"""Fixtures: the repository's recordings, the built program, and a scene with its truth."""
 
 import os
 import signal
@@ -14,7 +14,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 from farm_fixtures import Cluster  # noqa: E402
 
-# A job in the background of a script is started deaf to Ctrl-C, and so would be what tests interrupt.
+# Background jobs of a script ignore Ctrl-C, and the tests' child processes would, too.
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
 REPOSITORY = Path(__file__).resolve().parents[2]
@@ -38,13 +38,13 @@ def portrait(recordings):
 
 @pytest.fixture(scope="session")
 def scene():
-    """One that has something in front of what is in focus."""
+    """A scene with an object in front of the focal plane."""
     return bc.thin_lens_scene(5, (192, 108), samples=96)
 
 
 @pytest.fixture(scope="session")
 def program(tmp_path_factory):
-    """Runs the built `bokehcam` in a folder of its own, without settings of the user's."""
+    """Runs the built `bokehcam` in a separate folder, without the user's settings."""
     path = os.environ.get("BOKEHCAM_PROGRAM")
     if not path:
         pytest.skip("BOKEHCAM_PROGRAM does not name the program (python/test does)")
@@ -63,7 +63,7 @@ def program(tmp_path_factory):
 
 @pytest.fixture(scope="session")
 def cluster():
-    """Two nodes of Ray's on this machine, with a core each."""
+    """Two Ray nodes on this machine, with one core each."""
     made = Cluster()
     try:
         made.add()

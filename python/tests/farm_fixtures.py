@@ -1,4 +1,4 @@
-"""What the tests of the farm stand on: the program, recordings that differ, and a cluster of two nodes with a core each."""
+"""Fixtures of the farm's tests: the program, different recordings, and a cluster of two nodes with one core each."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ import pytest
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 PORTRAIT = REPOSITORY / "recordings" / "portrait"
-# With autofocus and memory each frame depends on those before, as is usual.
+# With autofocus and background memory, each frame depends on the previous ones.
 FRAMES = 36
 FLAGS = ["--loop", "--frames", str(FRAMES), "--quality", "draft"]
 FORMAT = ["--format", "y4m"]
-PATIENCE_S = 60.0
+TIMEOUT_S = 60.0
 TOKEN = secrets.token_hex(32)
 
 
@@ -56,14 +56,14 @@ def recording(folder: Path, first: int) -> Path:
 
 
 def environment() -> dict[str, str]:
-    """That of the tests, without settings of whoever runs them."""
+    """Returns the environment of the tests, without the user's settings."""
     others = {name: value for name, value in os.environ.items() if not name.startswith(("BOKEHCAM", "RAY_"))}
     return {
         **others,
         "BOKEHCAM": str(PROGRAM),
         "PYTHONPATH": str(Path(bokehcam.__file__).parents[1]),
         "XDG_CONFIG_HOME": "/nonexistent",
-        # Only these tests may join their clusters; and Ray makes no token in the user's home.
+        # Only these tests may join their clusters, and Ray creates no token in the user's home.
         "RAY_AUTH_MODE": "token",
         "RAY_AUTH_TOKEN": TOKEN,
     }
@@ -74,7 +74,7 @@ def farm_command(*arguments: str | Path) -> list[str]:
 
 
 def farm(*arguments: str | Path, expect: int = 0, **changes: str) -> str:
-    """Runs a farm to its end; what it says."""
+    """Runs a farm to its end; returns its messages."""
     run = subprocess.run(
         farm_command(*arguments),
         env={**environment(), **changes},
@@ -89,7 +89,7 @@ def farm(*arguments: str | Path, expect: int = 0, **changes: str) -> str:
 
 
 def alone(source: Path, out: Path, flags: list[str], threads: int = 2) -> bytes:
-    """What the program makes of a recording without a farm."""
+    """Returns the program's result of a recording without a farm."""
     command = [
         str(PROGRAM),
         "-q",
@@ -108,16 +108,16 @@ def alone(source: Path, out: Path, flags: list[str], threads: int = 2) -> bytes:
 
 
 def until(condition: Callable[[], object], what: str):
-    """Waits for something, and gives it."""
-    for _ in range(int(PATIENCE_S / 0.02)):
+    """Waits for a true value, and returns it."""
+    for _ in range(int(TIMEOUT_S / 0.02)):
         if found := condition():
             return found
         time.sleep(0.02)
-    raise AssertionError(f"not within {PATIENCE_S:.0f} s: {what}")
+    raise AssertionError(f"not within {TIMEOUT_S:.0f} s: {what}")
 
 
 def parent_of(process: int) -> int:
-    """The parent of a process; 0 where it is gone."""
+    """Returns the parent of a process; 0 if it has ended."""
     try:
         return int(Path(f"/proc/{process}/stat").read_text().rsplit(")", 1)[1].split()[1])
     except (OSError, IndexError):
@@ -125,7 +125,7 @@ def parent_of(process: int) -> int:
 
 
 def is_alive(process: int) -> bool:
-    """Whether a process runs; one that nobody has waited for does not."""
+    """Whether a process runs; zombies do not."""
     try:
         return Path(f"/proc/{process}/stat").read_text().rsplit(")", 1)[1].split()[0] not in "ZX"
     except OSError:
@@ -133,7 +133,7 @@ def is_alive(process: int) -> bool:
 
 
 def children_at_work(out: Path) -> list[int]:
-    """Processes of the program in mid-recording: they are writing a file for the folder `out`."""
+    """Finds processes of the program that are writing a file for the folder `out`."""
     found = []
     for entry in Path("/proc").iterdir():
         try:
@@ -141,7 +141,7 @@ def children_at_work(out: Path) -> list[int]:
         except OSError:
             continue
         to = command[command.index(b"--to") + 1] if b"--to" in command else b""
-        # Before that it is still on its way to being the program.
+        # Before that, the process has not executed the program yet.
         if to.startswith(os.fsencode(out)) and command[0] == os.fsencode(PROGRAM) and parts(Path(os.fsdecode(to))):
             found.append(int(entry.name))
     return found
@@ -165,7 +165,7 @@ class Cluster:
     """Ray on this machine, of nodes with one core each, which are processes that can be killed."""
 
     def __init__(self):
-        # A short path: sockets are made in it.
+        # A short path, for sockets.
         self.folder = tempfile.mkdtemp(prefix="farm-", dir="/tmp")
         self.address = f"127.0.0.1:{free_port()}"
         self.nodes: list[subprocess.Popen] = []
@@ -198,7 +198,7 @@ class Cluster:
 
     @staticmethod
     def raylet_of(node: int) -> int:
-        """The process of a node that starts workers."""
+        """Returns the process of a node that starts workers."""
         for entry in Path("/proc").iterdir():
             if entry.name.isdigit() and parent_of(int(entry.name)) == node:
                 try:
@@ -209,7 +209,7 @@ class Cluster:
         return 0
 
     def kill_last(self) -> None:
-        """The last node dies as if it had lost its power."""
+        """Kills the last node, as a power failure would."""
         os.kill(self.raylets[-1], signal.SIGKILL)
 
     def stop(self) -> None:
@@ -223,7 +223,7 @@ class Cluster:
 
 
 def descendants(process: int) -> list[int]:
-    """The children of a process, theirs, and so on."""
+    """Returns all descendants of a process."""
     children = [int(entry.name) for entry in Path("/proc").iterdir() if entry.name.isdigit()]
     children = [child for child in children if parent_of(child) == process]
     return children + [deeper for child in children for deeper in descendants(child)]

@@ -1,4 +1,4 @@
-"""Kernels and what few terms make of them."""
+"""Kernels and their low-rank approximations."""
 
 import pickle
 

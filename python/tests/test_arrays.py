@@ -1,4 +1,4 @@
-"""What is taken, and what is said of what is not."""
+"""Accepted arrays, and errors for the others."""
 
 import numpy as np
 import pytest
@@ -19,7 +19,7 @@ def coc():
 
 
 class OnlyDlpack:
-    """An array of another library's, which knows nothing of numpy."""
+    """An array of another library, without numpy support."""
 
     def __init__(self, array, device=1):
         self.array, self.device = array, device
@@ -53,7 +53,7 @@ def test_others_arrays_are_taken(image, coc):
     np.testing.assert_array_equal(bc.blur(OnlyDlpack(image), OnlyDlpack(coc)), expected)
     np.testing.assert_array_equal(bc.blur(image, coc.tolist()), expected)
     np.testing.assert_array_equal(bc.blur(image, coc.astype(np.float64)), expected)
-    # Neither contiguous nor in the usual order.
+    # Neither contiguous nor in C order.
     wide = np.zeros((HEIGHT, 2 * WIDTH, 3), np.uint8)
     wide[:, ::2] = image
     np.testing.assert_array_equal(bc.blur(wide[:, ::2], np.asfortranarray(coc)), expected)

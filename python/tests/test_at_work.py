@@ -27,7 +27,7 @@ def frame(seed=0):
 
 
 def test_other_python_threads_run_while_it_blurs():
-    """If the lock were held, the other thread would not count between the start of a picture and its end."""
+    """With the GIL held, the other thread could not count during a picture."""
     image, coc = frame()
     renderer = bc.Renderer(SIZE, quality="best", threads=1)
     counts, stop = [0], threading.Event()
@@ -39,7 +39,7 @@ def test_other_python_threads_run_while_it_blurs():
     other = threading.Thread(target=count)
     other.start()
     try:
-        executor, out = renderer._of_map(), np.empty_like(image)
+        executor, out = renderer._map_executor(), np.empty_like(image)
         before = counts[0]
         executor.blur(image, coc, out)
         during = counts[0] - before
@@ -77,7 +77,7 @@ def test_a_renderer_can_be_pickled():
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="there is no fork")
 @pytest.mark.filterwarnings("ignore:.*fork.*:DeprecationWarning")
 def test_a_renderer_works_in_a_forked_process():
-    """As loaders of data fork their workers: threads do not come along."""
+    """Data loaders fork their workers; threads are not copied."""
     image, coc = frame()
     renderer = bc.Renderer(SIZE, threads=3)
     expected = renderer(image, coc)
@@ -108,14 +108,14 @@ LONG = {
 
 @pytest.mark.parametrize("what", LONG)
 def test_ctrl_c_ends_long_calls(what):
-    """Each would take half a minute or more."""
+    """Each call would take half a minute or more."""
     text = "import numpy as np, bokehcam as bc, sys\n" + textwrap.dedent(LONG[what]) + textwrap.dedent("""
         print("begins", flush=True)
         try:
             work()
         except KeyboardInterrupt:
             print("interrupted", flush=True)
-            # What was interrupted is not in the way of what follows.
+            # An interrupted call must not affect later ones.
             bc.blur(np.zeros((8, 8, 3), np.uint8), 2.0)
             print("goes on", flush=True)
     """)
@@ -138,7 +138,7 @@ def test_a_renderer_is_whole_after_ctrl_c():
     image, coc = frame()
     renderer = bc.Renderer(SIZE, method="gather", rank="full", max_coc_px=100, threads=1)
     wide = np.full(SIZE[::-1], 90, np.float32)
-    # A small picture takes part of a second a row here, so that the alarm comes in the middle of one.
+    # Each row of a small picture takes a fraction of a second here, so that the alarm arrives in the middle of one.
     previous = signal.signal(signal.SIGALRM, lambda *_: (_ for _ in ()).throw(TimeoutError("alarm")))
     try:
         signal.setitimer(signal.ITIMER_REAL, 0.5)
@@ -191,7 +191,7 @@ for dtype in (np.uint8, np.float32):
 
 
 def test_a_renderer_allocates_nothing_from_picture_to_picture(tmp_path):
-    """Counted by a library that stands before malloc; objects of Python's own are smaller than what is counted."""
+    """Allocations are counted by a preloaded malloc; Python's own objects are below its threshold."""
     compiler = shutil.which("cc")
     if compiler is None or not sys.platform.startswith("linux"):
         pytest.skip("counting takes a C compiler and glibc")

@@ -1,4 +1,4 @@
-"""What holds of every blur."""
+"""Properties of every blur."""
 
 import numpy as np
 import pytest
@@ -35,11 +35,11 @@ def test_what_is_in_focus_stays_to_the_bit():
 
 
 def test_linear_light_is_not_rounded_to_codes(scene):
-    """The 8-bit result is that of the float one, rounded; and the float one has what 8 bits cannot."""
+    """The 8-bit result is the rounded float one, and the float one keeps values that 8 bits cannot."""
     codes = scene.image_srgb
     light = bc.blur(bc.to_linear(codes), scene.coc)
     assert np.abs(bc.to_srgb(light).astype(int) - bc.blur(codes, scene.coc)).max() <= 1
-    # A slope so flat that it is a few codes: its blur is as smooth as it is.
+    # A ramp of only a few codes must stay smooth when blurred.
     flat = np.broadcast_to(np.linspace(0.2, 0.21, 120, dtype=np.float32)[:, None], (72, 120, 3)).copy()
     blurred = bc.blur(flat, np.full((72, 120), 5, np.float32), quality="best")
     assert len(np.unique(bc.to_srgb(flat))) < 6
@@ -98,7 +98,7 @@ def test_it_comes_close_to_the_lens_and_closer_than_the_plain_form(scene):
     assert by_method["layered"] > 33 and by_method["layered"] > by_method["gather"] + 1.5, by_method
     light = bc.blur(scene.image, scene.coc, aperture=opening)
     assert abs(bc.psnr(bc.to_srgb(light), scene.truth_srgb) - by_method["layered"]) < 0.3
-    # The sign is that of the lens: the other one is much further from the truth.
+    # The sign matches the lens: the opposite one is much further from the truth.
     assert bc.psnr(bc.blur(scene.image_srgb, -scene.coc, aperture=opening), scene.truth_srgb) < by_method["layered"] - 2
 
 

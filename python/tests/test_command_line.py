@@ -1,4 +1,4 @@
-"""The same pictures as those of the program, to the bit, on the bundled recordings."""
+"""Bit-identical pictures to the program's, on the bundled recordings."""
 
 import json
 
@@ -62,7 +62,7 @@ def test_one_radius_is_the_effect_blur(program, recordings, portrait, tmp_path):
     {"f_number": 2, "focal_length_mm": 50, "sensor_width_mm": 36, "focus_range_m": 0.2},
 ])
 def test_a_map_of_radii_is_depth_without_outlines(program, recordings, portrait, tmp_path, lens):
-    """Where no pixel shows two surfaces and nothing is unknown, the program does nothing but what `blur` does."""
+    """Without mixed and unknown pixels, the program does the same as `blur`."""
     slope = np.linspace(0.9, 4, 640 * 360, dtype=np.float32).reshape(360, 640)
     write_pfm(tmp_path / "depth.pfm", slope)
     color = recordings / "portrait" / "rgb" / "000000.png"
@@ -73,7 +73,7 @@ def test_a_map_of_radii_is_depth_without_outlines(program, recordings, portrait,
             "--out", tmp_path / "out.png", *flags(settings))
     coc = bc.coc_from_depth(slope, 1.5, **lens)
     assert coc.min() < -1 and coc.max() > 1
-    # The program makes its filters for what can be behind the focal plane, and in front of it.
+    # The program creates filters for the possible radii behind and in front of the focal plane.
     most_px = np.float32(360) * np.float32(0.06)
     behind_px = lens.get("at_infinity_px") or 2500 / (2 * 2 * (1500 - 50)) * 640 / 36
     ours = bc.blur(portrait.color, coc, max_coc_px=(most_px, min(behind_px, most_px)))

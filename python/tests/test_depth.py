@@ -1,4 +1,4 @@
-"""Depth and disparity, and the radii that they make."""
+"""Depth and disparity, and their CoC radii."""
 
 import warnings
 
@@ -13,7 +13,7 @@ def test_the_thin_lens():
     coc = bc.coc_from_depth(depth, 2.0, at_infinity_px=10, max_coc_px=30)
     np.testing.assert_allclose(coc, [[-10, 0, 5, 10], [10, 10, 10, -30]], rtol=1e-6)
     assert coc.dtype == np.float32 and bc.coc_from_depth(np.ones((2, 3, 4)), 1.0).shape == (2, 3, 4)
-    # By default as the command line: a 45th of the height at infinity, cut at 0.06 of it.
+    # Defaults of the command line: a 45th of the height at infinity, limited to 0.06 of the height.
     by_height = bc.coc_from_depth(np.full((90, 10), np.inf), 1.0), bc.coc_from_depth(np.full((90, 10), 1e-3), 1.0)
     assert by_height[0][0, 0] == pytest.approx(2) and by_height[1][0, 0] == pytest.approx(-5.4)
     # 50 mm f/2 at 2 m on a 36 mm wide sensor of 1920 px: 2500 / (4 * 1950) mm = 17.09 px.
@@ -43,7 +43,7 @@ def test_lenses_that_are_none_are_refused(call, error, says):
 def test_disparity_is_the_lens_without_distances():
     rng = np.random.default_rng(1)
     disparity = rng.uniform(1, 60, (20, 30)).astype(np.float32)
-    # Depth is 1 / disparity up to a unit: a lens of k times the disparity in focus at infinity.
+    # Depth is 1 / disparity up to a unit: equals a lens with k times the focused disparity at infinity.
     coc = bc.coc_from_disparity(disparity, 20, 0.7)
     by_depth = bc.coc_from_depth(1 / disparity, 1 / 20, at_infinity_px=14, max_coc_px=100)
     np.testing.assert_allclose(coc, by_depth, atol=1e-4)

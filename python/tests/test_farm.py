@@ -1,4 +1,4 @@
-"""A farm without a cluster: what is found before anything starts, and the law that a result appears once and whole."""
+"""A farm without a cluster: errors before the start, and results that appear exactly once and complete."""
 
 from __future__ import annotations
 
@@ -139,7 +139,7 @@ def test_results_without_their_whole_report_are_not_finished(job, take):
         file.write(b"more")
     with pytest.raises(plan.UsageError, match="has changed since"):
         plan.to_do(job, [unit])
-    # A report alone is that of an attempt that came no further.
+    # A report without a result belongs to an attempt that stopped in between.
     output.unlink()
     assert plan.to_do(job, [unit]) == [unit]
     assert work.make(job, unit, job.program).cause == ""
@@ -225,7 +225,7 @@ def test_threads_change_no_byte(take, tmp_path):
 
 @needs_ray
 def test_pictures_in_shards_with_their_depth_maps(tmp_path):
-    """On a cluster of its own that it starts and ends."""
+    """Runs on its own cluster, which it starts and ends."""
     pictures, depths, out = tmp_path / "pictures", tmp_path / "depths", tmp_path / "out"
     for folder in (pictures, depths):
         folder.mkdir()
@@ -266,7 +266,7 @@ def test_pictures_in_shards_with_their_depth_maps(tmp_path):
 
 @needs_ray
 def test_flags_that_the_program_refuses_for_all_end_the_farm(cluster, tmp_path):
-    """What only the program can judge: a lens without its focal length."""
+    """Only the program can reject this: a lens without its focal length."""
     takes = [recording(tmp_path / f"take{k}", k) for k in range(4)]
     said = farm(*takes, "--out", tmp_path / "out", "--address", cluster.address, "--", "--f-number", "1.8", expect=2)
     assert "error: the program refused the first " in said and "focal" in said, said

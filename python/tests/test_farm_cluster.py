@@ -1,4 +1,4 @@
-"""A farm on two nodes with a core each, whose workers, nodes and driver are killed in mid-recording."""
+"""A farm on two nodes with one core each; workers, nodes and driver are killed in mid-recording."""
 
 from __future__ import annotations
 
@@ -41,13 +41,13 @@ def sources(tmp_path_factory) -> list[Path]:
 
 @pytest.fixture(scope="module")
 def expected(sources, tmp_path_factory) -> dict[str, bytes]:
-    """What the program makes of them without Ray."""
+    """Returns the program's results without Ray."""
     folder = tmp_path_factory.mktemp("alone")
     return {f"{source.name}.y4m": alone(source, folder / f"{source.name}.y4m", FLAGS) for source in sources}
 
 
 def check(out: Path, expected: dict[str, bytes]) -> None:
-    """Every result once, to the byte, with its report, and nothing else."""
+    """Checks that every result exists once, identical to the byte, with its report, and nothing else."""
     assert len(set(expected.values())) == len(expected), "recordings that are alike show no mix-up"
     assert sorted(os.listdir(out)) == sorted([*expected, "reports", ".bokehcam-farm"])
     assert sorted(os.listdir(out / "reports")) == sorted(f"{name}.json" for name in expected)
@@ -85,10 +85,10 @@ def test_a_worker_and_a_child_are_killed(cluster, sources, expected, tmp_path):
     child = until(lambda: children_at_work(out), "a recording that is being made")[0]
     os.kill(parent_of(child), signal.SIGKILL)
     until(lambda: not is_alive(child), "the death of the program with its worker")
-    # What asks the program to end early is not heard: a recording that was cut short would pass for a whole one.
+    # Signals to end early are blocked: a truncated recording would pass for a complete one.
     other = until(lambda: [process for process in children_at_work(out) if process != child], "another recording")[0]
     os.kill(other, signal.SIGTERM)
-    # The program alone, without its worker.
+    # Kills the program, not its worker.
     third = until(lambda: [process for process in children_at_work(out) if process not in (child, other)], "a third recording")[
         0
     ]
@@ -106,7 +106,7 @@ def test_a_node_is_killed(cluster, sources, expected, tmp_path):
     def on_last() -> list[int]:
         children = children_at_work(out)
         last = [child for child in children if parent_of(parent_of(child)) == cluster.raylets[-1]]
-        # The first node stays at its recording, or it may have made all of them before the second one begins.
+        # The first node is paused, or it could finish all recordings before the second one starts.
         for child in {*children} - {*last} - stopped:
             with suppress(ProcessLookupError):
                 os.kill(child, signal.SIGSTOP)

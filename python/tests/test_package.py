@@ -1,4 +1,4 @@
-"""The package as it is installed, and its documents."""
+"""The installed package and its documentation."""
 
 import ast
 import inspect
@@ -59,7 +59,7 @@ def test_the_stubs_are_those_of_the_native_half():
 
 @pytest.mark.parametrize("page", ["README.md", "docs/python.md"])
 def test_the_examples_of_the_documents_run(repository, tmp_path, monkeypatch, page):
-    """All of a page's Python, one block after the other, in a folder that has the recordings."""
+    """Runs a page's Python blocks in order, in a folder with the recordings."""
     monkeypatch.chdir(tmp_path)
     os.symlink(repository / "recordings", tmp_path / "recordings")
     blocks = re.findall(r"^```python\n(.*?)^```", (repository / page).read_text(), re.M | re.S)

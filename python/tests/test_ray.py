@@ -1,4 +1,4 @@
-"""The blur as a step of a Ray Data pipeline: the same pictures as without, by renderers that are used again."""
+"""The blur as a step of a Ray Data pipeline: the same pictures as without Ray, by cached renderers."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def test_a_worker_has_one_renderer_for_a_size_and_settings():
     steps.renderer.cache_clear()
     step = steps.Blur(2.0, aperture=bc.heart())
     for _ in range(3):
-        # As a worker gets it, anew with each task.
+        # As a worker receives it, pickled with each task.
         pickle.loads(pickle.dumps(step))({"image": pictures(2)})
     assert steps.renderer.cache_info().misses == 1 and steps.renderer.cache_info().hits == 5
 

@@ -1,4 +1,4 @@
-"""The truth holds by itself."""
+"""Consistency of the ground truth."""
 
 import numpy as np
 import pytest
@@ -22,7 +22,7 @@ def test_radii_are_those_of_the_depth(scene):
     by_formula = scene.at_infinity_px * (1 - scene.focus_m / scene.depth_m)
     np.testing.assert_allclose(scene.coc, by_formula, atol=1e-4)
     assert scene.coc.min() < -1 and scene.coc.max() > 2
-    # What is in focus is as sharp as in the pinhole picture, away from what lies in front of it.
+    # Surfaces in focus are as sharp as in the pinhole picture, except near objects in front of them.
     sharp = np.abs(scene.coc) < 0.05
     assert 0.1 < sharp.mean() < 0.9
 

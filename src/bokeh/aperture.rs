@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 use outline::Outline;
 
-/// A lens opening, drawn as a far highlight shows it (x right, y down), inside the unit disc.
+/// A lens opening inside the unit disc, drawn as a far highlight shows it (x right, y down).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Aperture {
     /// The outline.
@@ -43,14 +43,14 @@ pub enum Shape {
         /// Number of points, 3 to 16.
         points: u32,
     },
-    /// A greyscale picture, its larger side spanning the disc's diameter.
+    /// A greyscale picture; its larger side spans the disc's diameter.
     Picture(Arc<Picture>),
 }
 
 /// A greyscale picture used as an aperture.
 #[derive(Debug, PartialEq)]
 pub struct Picture {
-    /// Where it was read from, if that is known.
+    /// File it was read from, if known.
     pub file: Option<PathBuf>,
     /// Columns.
     pub width: u32,
@@ -60,12 +60,12 @@ pub struct Picture {
     pub grey: Vec<f32>,
 }
 
-/// A square mask of transmittances, at least one of them > 0.
+/// A square mask of transmittances, at least one of them above 0.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Mask {
     /// Columns and rows.
     pub size: usize,
-    /// Half the side of the square, in aperture radii: a soft rim reaches beyond 1.
+    /// Half the side of the square, in aperture radii: a soft rim extends beyond 1.
     pub extent: f64,
     /// `size * size` values >= 0, row-major, y down.
     pub values: Vec<f64>,
@@ -81,14 +81,14 @@ impl Default for Aperture {
 }
 
 impl Aperture {
-    /// The antialiased mask of `size` x `size` cells, whose rim falls linearly over `rim` (0 to 1) of the radius,
-    /// half of it inside and half outside the outline.
+    /// Returns the antialiased mask of `size` x `size` cells. Its rim falls linearly over `rim` (0 to 1) of the radius,
+    /// half inside and half outside the outline.
     pub fn mask(&self, size: usize, rim: f32) -> Mask {
         let rim = f64::from(rim).clamp(0.0, 1.0);
         let extent = 1.0 + rim / 2.0;
         let cell = 2.0 * extent / size as f64;
         let sub = cell / SUPERSAMPLING as f64;
-        let outline = Outline::of(&self.shape);
+        let outline = Outline::new(&self.shape);
         let mut values = vec![0.0; size * size];
         for (index, value) in values.iter_mut().enumerate() {
             let (left, top) = ((index % size) as f64 * cell - extent, (index / size) as f64 * cell - extent);
@@ -100,19 +100,20 @@ impl Aperture {
             *value /= (SUPERSAMPLING * SUPERSAMPLING) as f64;
         }
         if values.iter().all(|&v| v <= 0.0) {
-            // A black picture or a vanishing ring lets no light through; a pinhole is its nearest useful meaning.
+            // A black picture or a vanishing ring transmits no light; a pinhole is the nearest useful aperture.
             values[size / 2 * size + size / 2] = 1.0;
         }
         Mask { size, extent, values }
     }
 
-    /// Transmittance, 0 to 1, at a point in units of the aperture's radius, with a soft edge of width `rim`.
+    /// Returns the transmittance, 0 to 1, at a point in units of the aperture's radius, with a soft edge of width
+    /// `rim`.
     fn transmittance(&self, outline: &Outline, x: f64, y: f64, rim: f64) -> f64 {
         let radius = (x * x + y * y).sqrt();
         if let Shape::Picture(picture) = &self.shape {
             return picture.sample(x, y, rim) * self.radial_intensity(radius.min(1.0));
         }
-        // Most points are clear of the rim whatever their direction.
+        // Most points are clear of the rim in every direction.
         let [least, most] = outline.range;
         if radius > most + rim / 2.0 {
             return 0.0;
@@ -133,7 +134,8 @@ impl Aperture {
         value
     }
 
-    /// Radial intensity at `t` = 0 (centre) to 1 (outline). Even a full soap bubble keeps 15 % in its centre.
+    /// Returns the radial intensity at `t` = 0 (centre) to 1 (outline). Even a full soap bubble keeps 15 % in its
+    /// centre.
     fn radial_intensity(&self, t: f64) -> f64 {
         let strength = f64::from(self.intensity).clamp(-1.0, 1.0);
         if strength >= 0.0 { 1.0 - strength * t * t } else { 1.0 + strength * (1.0 - t.powi(4)) * 0.85 }
@@ -141,8 +143,8 @@ impl Aperture {
 }
 
 impl Picture {
-    /// Transmittance at a point in units of the aperture's radius: the mean over a square of side `rim`, which softens
-    /// the picture. It is black all around.
+    /// Returns the transmittance at a point in units of the aperture's radius: the mean over a square of side `rim`,
+    /// which softens the picture. Outside the picture it is 0.
     fn sample(&self, x: f64, y: f64, rim: f64) -> f64 {
         const TAPS: i32 = 3;
         let half_px = f64::from(self.width.max(self.height)) / 2.0;
@@ -159,7 +161,7 @@ impl Picture {
     }
 }
 
-/// 1 inside `edge`, 0 outside, linear over `rim` around it.
+/// Returns 1 inside `edge`, 0 outside, linear over `rim` around it.
 fn ramp(radius: f64, edge: f64, rim: f64) -> f64 {
     if rim <= 0.0 { f64::from(u8::from(radius <= edge)) } else { ((edge - radius) / rim + 0.5).clamp(0.0, 1.0) }
 }
@@ -174,18 +176,18 @@ impl Mask {
         (cells().all(|(x, y)| same(at(x, y), at(n - 1 - x, y))), cells().all(|(x, y)| same(at(x, y), at(x, n - 1 - y))))
     }
 
-    /// Sum of all values.
+    /// Returns the sum of all values.
     pub fn sum(&self) -> f64 {
         self.values.iter().sum()
     }
 }
 
-/// Points of the aperture for a ray tracer: about `count` lens positions `u` in the unit disc, evenly spread over the
-/// shape (Vogel's spiral, those outside left out). A pixel `p` sees depth `z` at `p + c(z) u`, so that a far highlight
-/// shows the shape upright.
+/// Returns points of the aperture for a ray tracer: about `count` lens positions `u` in the unit disc, evenly spread
+/// over the shape (Vogel's spiral without the points outside). A pixel `p` sees depth `z` at `p + c(z) u`, so that a
+/// far highlight shows the shape upright.
 pub fn lens_points(aperture: &Aperture, count: usize) -> Vec<glam::DVec2> {
     let golden_angle = PI * (3.0 - 5f64.sqrt());
-    let outline = Outline::of(&aperture.shape);
+    let outline = Outline::new(&aperture.shape);
     let open = |p: &glam::DVec2| aperture.transmittance(&outline, p.x, p.y, 0.0) > 0.5;
     let spiral = |n: usize| {
         (0..n).map(move |k| {
@@ -193,9 +195,9 @@ pub fn lens_points(aperture: &Aperture, count: usize) -> Vec<glam::DVec2> {
             glam::DVec2::from_angle((k as f64 * golden_angle) % TAU) * radius
         })
     };
-    // The open share of the disc: the spiral has to be so much denser for `count` points to be left.
-    let share = spiral(4096).filter(open).count().max(1) as f64 / 4096.0;
-    spiral((count as f64 / share).round() as usize).filter(open).map(|p| -p).collect()
+    // Fraction of the disc that is open: the spiral must be denser by its inverse to leave `count` points.
+    let open_fraction = spiral(4096).filter(open).count().max(1) as f64 / 4096.0;
+    spiral((count as f64 / open_fraction).round() as usize).filter(open).map(|p| -p).collect()
 }
 
 #[cfg(test)]

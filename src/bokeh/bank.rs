@@ -1,63 +1,66 @@
-//! The separable kernels: one bank of 1-D filters for every radius.
+//! The filter bank: separable 1-D kernels for every radius.
 //!
-//! The singular functions of an aperture scale with the radius, so a filter tap is the integral of one of them over
-//! a pixel: a difference of two readings of its cumulative table. That makes fractional radii exact and continuous.
+//! The singular functions of an aperture scale with the radius, so a filter tap is the integral of one of them over a
+//! pixel: a difference of two values of its cumulative table. Fractional radii are therefore exact and continuous.
 
 use super::Rank;
 use super::aperture::Mask;
 use super::low_rank::Decomposition;
 
-/// Filters are tabulated at every `1 / STEPS_PER_PX` of a pixel of radius, up to twice [`OCTAVES_FROM_PX`].
+/// Nodes per pixel of radius, up to twice [`OCTAVES_FROM_PX`].
 pub const STEPS_PER_PX: f32 = 16.0;
 
-/// From this radius on every octave has equally many nodes, so that a step is the same share of the radius: the table's
-/// size grows with the largest radius, and not with its square. A power of two.
+/// From this radius on, every octave has the same number of nodes, so that a step is a constant fraction of the radius:
+/// the table grows linearly with the largest radius, not with its square. A power of two.
 pub const OCTAVES_FROM_PX: f32 = 16.0;
 
-/// Nodes of an octave: the step of [`STEPS_PER_PX`] goes on in the first one.
+/// Nodes of an octave; the first octave continues the step of [`STEPS_PER_PX`].
 const NODES_PER_OCTAVE: usize = (OCTAVES_FROM_PX * STEPS_PER_PX) as usize;
-/// Bits of a float below those that tell the node within its octave.
+/// Right shift that leaves the bits of a float that give the node within its octave.
 pub const OCTAVE_SHIFT: u32 = f32::MANTISSA_DIGITS - 1 - NODES_PER_OCTAVE.ilog2();
 
-/// Cells a side of the mask that a bank is made from.
+/// Side of the mask that a bank is made from, in cells.
 pub const MASK_CELLS: usize = 128;
 
 /// The separable filters of one aperture, for radii from 0 to a maximum.
 ///
-/// The filter of node `k` has the radius [`node_radius_px`]; `out(p) = sum_t sum_j vertical_t(j) sum_i horizontal_t(i)
-/// in(p + (i, j))`, and its taps sum to 1 at every node.
+/// The filter of node `k` has the radius [`node_radius_px`];
+/// `out(p) = sum_t sum_j vertical_t(j) sum_i horizontal_t(i) in(p + (i, j))` (McGraw, *Fast Bokeh Effects Using
+/// Low-Rank Linear Filters*, eq. 2), and its taps sum to 1 at every node.
 #[derive(Clone, Debug)]
 pub struct Bank {
+    /// Number of separable terms.
     pub terms: usize,
-    /// Taps reach from `-reach` to `reach` at the largest radius.
+    /// Half-width at the largest radius: taps go from `-reach` to `reach`.
     pub reach: usize,
+    /// Number of tabulated radii.
     pub nodes: usize,
-    /// Whether every profile is even, so that taps at `-j` and `j` are equal.
-    pub even: bool,
-    /// Outermost point of the aperture, in radii.
+    /// True if every profile is symmetric, so that taps at `-j` and `j` are equal.
+    pub is_symmetric: bool,
+    /// Distance of the aperture's outermost point from the centre, in radii.
     pub extent: f64,
-    /// Outermost tap of each node.
+    /// Half-width of each node: its outermost tap.
     pub node_reach: Vec<u32>,
-    /// Horizontal taps, `[node][reach + j][term]`, as they are for content behind the focal plane.
+    /// Horizontal taps, `[node][reach + j][term]`, for content behind the focal plane.
     pub horizontal: Vec<f32>,
-    /// Vertical taps, laid out alike, singular values and normalisation included.
+    /// Vertical taps in the same layout, with singular values and normalisation included.
     pub vertical: Vec<f32>,
 }
 
 impl Bank {
-    /// The bank of a mask for radii up to `max_radius_px`.
+    /// Creates the bank of a mask for radii up to `max_radius_px`.
     pub fn new(mask: &Mask, rank: Rank, max_radius_px: f32) -> Self {
         Self::of(&Decomposition::of(mask), mask, rank, max_radius_px)
     }
 
-    /// As [`Bank::new`], with the decomposition of `mask` at hand.
+    /// Same as [`Bank::new`], given the decomposition of `mask`.
     pub fn of(svd: &Decomposition, mask: &Mask, rank: Rank, max_radius_px: f32) -> Self {
         let terms = match rank {
             Rank::Terms(n) => (n as usize).clamp(1, svd.numerical_rank()),
             Rank::Full => svd.numerical_rank(),
         };
         let n = svd.size;
-        // A tap at +j gathers what lies at +j, which draws the aperture turned; reversed profiles draw it upright.
+        // Gathering with a tap at +j draws the aperture rotated by 180 degrees; reversed profiles draw it upright.
         let cumulate = |profile: &[f64]| -> Vec<f64> {
             std::iter::once(0.0)
                 .chain(profile.iter().rev().scan(0.0, |sum, x| {
@@ -68,7 +71,7 @@ impl Bank {
         };
         let across: Vec<_> = (0..terms).map(|t| cumulate(&svd.v[t * n..][..n])).collect();
         let mut down: Vec<_> = (0..terms).map(|t| cumulate(&svd.u[t * n..][..n])).collect();
-        // The vertical taps have the singular values, and what makes all taps sum to 1.
+        // The vertical taps include the singular values and the normalisation of all taps to sum 1.
         let total: f64 = (0..terms).map(|t| svd.sigma[t] * across[t][n] * down[t][n]).sum();
         for (t, profile) in down.iter_mut().enumerate() {
             profile.iter_mut().for_each(|x| *x *= svd.sigma[t] / total);
@@ -82,14 +85,14 @@ impl Bank {
             terms,
             reach,
             nodes,
-            even: symmetry == (true, true),
+            is_symmetric: symmetry == (true, true),
             extent: mask.extent,
             node_reach: (0..nodes).map(|k| reach_at(k) as u32).collect(),
             horizontal: Vec::with_capacity(nodes * (2 * reach + 1) * terms),
             vertical: Vec::with_capacity(nodes * (2 * reach + 1) * terms),
         };
         for node in 0..nodes {
-            // At radius 0, tap 0 takes the whole profile.
+            // At radius 0, tap 0 covers the whole profile.
             let radius_px = (f64::from(node_radius_px(node)) * mask.extent).max(1e-6);
             for j in -(reach as i64)..=reach as i64 {
                 let (left, right) = ((j as f64 - 0.5) / radius_px, (j as f64 + 0.5) / radius_px);
@@ -102,25 +105,25 @@ impl Bank {
         bank
     }
 
-    /// Index of the first term of tap `j` of `node` in [`Bank::horizontal`] and [`Bank::vertical`].
+    /// Returns the index of the first term of tap `j` of `node` in [`Bank::horizontal`] and [`Bank::vertical`].
     #[inline(always)]
     pub fn tap(&self, node: usize, j: isize) -> usize {
         (node * (2 * self.reach + 1) + (self.reach as isize + j) as usize) * self.terms
     }
 
-    /// The largest radius tabulated, in pixels.
+    /// Returns the largest tabulated radius, in pixels.
     pub fn max_radius_px(&self) -> f32 {
         node_radius_px(self.nodes - 1)
     }
 
-    /// The node nearest to a radius.
+    /// Returns the node nearest to a radius in pixels.
     #[inline(always)]
     pub fn node(&self, radius_px: f32) -> usize {
         nearest_node(radius_px).min(self.nodes - 1)
     }
 
-    /// The 2-D kernel of a node: `(2 r + 1)^2` taps with `r = node_reach[node]`, row-major; `turned` is the aperture
-    /// as content in front of the focal plane shows it.
+    /// Returns the 2-D kernel of a node: `(2 r + 1)^2` taps with `r = node_reach[node]`, row-major. With `turned`, the
+    /// aperture is rotated by 180 degrees, as content in front of the focal plane shows it.
     pub fn kernel(&self, node: usize, turned: bool) -> Vec<f32> {
         let reach = self.node_reach[node] as isize;
         let sign = if turned { -1 } else { 1 };
@@ -134,7 +137,7 @@ impl Bank {
     }
 }
 
-/// The radius of a node, in pixels.
+/// Returns the radius of a node, in pixels.
 pub fn node_radius_px(node: usize) -> f32 {
     match node.checked_sub(NODES_PER_OCTAVE) {
         None => node as f32 / STEPS_PER_PX,
@@ -142,7 +145,7 @@ pub fn node_radius_px(node: usize) -> f32 {
     }
 }
 
-/// The node nearest to a radius, in pixels, >= 0. The bits of a float are linear within each octave.
+/// Returns the node nearest to a radius >= 0 in pixels. The bits of a float are linear within each octave.
 #[inline(always)]
 fn nearest_node(radius_px: f32) -> usize {
     if radius_px < OCTAVES_FROM_PX {
@@ -152,19 +155,19 @@ fn nearest_node(radius_px: f32) -> usize {
     NODES_PER_OCTAVE + (above >> OCTAVE_SHIFT) as usize
 }
 
-/// How many nodes reach a radius.
+/// Returns the number of nodes needed to cover a radius.
 fn nodes_up_to(radius_px: f32) -> usize {
     let node = nearest_node(radius_px);
     node + 1 + usize::from(node_radius_px(node) < radius_px)
 }
 
-/// The cumulative profile at `x` in [-1, 1], linear between its nodes, constant outside.
+/// Returns the cumulative profile at `x` in [-1, 1], linear between its nodes, constant outside.
 fn cumulative_at(cumulative: &[f64], x: f64) -> f64 {
     let last = cumulative.len() - 1;
     let at = ((x + 1.0) * 0.5 * last as f64).clamp(0.0, last as f64);
     let index = (at as usize).min(last - 1);
-    let share = at - index as f64;
-    cumulative[index] * (1.0 - share) + cumulative[index + 1] * share
+    let fraction = at - index as f64;
+    cumulative[index] * (1.0 - fraction) + cumulative[index + 1] * fraction
 }
 
 #[cfg(test)]
@@ -197,7 +200,7 @@ mod tests {
             let radius_px = node as f64 / f64::from(STEPS_PER_PX) * mask.extent;
             let reach = bank.node_reach[node] as i64;
             let side = 2 * reach + 1;
-            // The share of the mask's light that falls on each pixel, summed over the mask's cells.
+            // Fraction of the mask's light that falls on each pixel, summed over the mask's cells.
             let mut direct = vec![0.0; (side * side) as usize];
             let (cell, sum) = (2.0 * radius_px / mask.size as f64, mask.sum());
             let overlap = |index: usize| {
@@ -207,11 +210,11 @@ mod tests {
                 [(border - 0.5, first), (border + 0.5, 1.0 - first)]
             };
             for (k, value) in mask.values.iter().enumerate() {
-                for (y, share_y) in overlap(k / mask.size) {
-                    for (x, share_x) in overlap(k % mask.size) {
+                for (y, fraction_y) in overlap(k / mask.size) {
+                    for (x, fraction_x) in overlap(k % mask.size) {
                         let (x, y) = (x as i64 + reach, y as i64 + reach);
-                        if share_x * share_y > 0.0 {
-                            direct[(y * side + x) as usize] += value / sum * share_x * share_y;
+                        if fraction_x * fraction_y > 0.0 {
+                            direct[(y * side + x) as usize] += value / sum * fraction_x * fraction_y;
                         }
                     }
                 }
@@ -242,7 +245,7 @@ mod tests {
         }
     }
 
-    /// What a table takes grows with the radius.
+    /// The table's size grows linearly with the radius.
     #[test]
     fn a_table_of_a_wide_blur_is_no_more_than_in_proportion() {
         let taps = |radius_px| {
@@ -268,7 +271,7 @@ mod tests {
             };
             let radius_px = node as f64 / f64::from(STEPS_PER_PX);
             assert!(moment(1).abs() < 1e-4);
-            // A disc of radius R has variance R^2 / 4 an axis; pixels add 1 / 12, the rim and the rank a little.
+            // A disc of radius R has variance R^2 / 4 per axis; pixels add 1 / 12, the rim and the rank a little.
             assert!((moment(2) / (radius_px * radius_px / 4.0 + 1.0 / 12.0) - 1.0).abs() < 0.05, "{node}");
         }
     }
@@ -279,7 +282,7 @@ mod tests {
         let node = 160;
         let (reach, side) = (bank.node_reach[node] as usize, 2 * bank.node_reach[node] as usize + 1);
         let upper = |kernel: &[f32]| kernel[..reach * side].iter().sum::<f32>();
-        // A kernel that gathers draws a point turned by 180 degrees: for an upright heart its weight is below.
+        // A kernel that gathers draws a point rotated by 180 degrees: for an upright heart its weight is below.
         assert!(upper(&bank.kernel(node, false)) < 0.45);
         assert!(upper(&bank.kernel(node, true)) > 0.55);
     }

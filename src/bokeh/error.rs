@@ -1,4 +1,4 @@
-//! What goes wrong in a blur.
+//! Errors of the blur.
 
 use crate::compute::GpuError;
 
@@ -8,7 +8,7 @@ pub enum BokehError {
     /// The effect needs a depth map and the frame has none.
     #[error("the effect dof needs depth, and the frame has none")]
     NoDepth,
-    /// The picture has another size than the executor was made for.
+    /// The size of the picture differs from that of the executor.
     #[error("the executor was made for {made_for:?} pixels, the frame has {got:?}")]
     Size {
         /// Width and height the executor was made for.
@@ -16,7 +16,7 @@ pub enum BokehError {
         /// Width and height of the frame.
         got: (u32, u32),
     },
-    /// The blur is wider than the pictures, or than the method bears.
+    /// The blur is wider than the picture, or than the method supports.
     #[error(
         "a blur radius of {radius_px} px is too large: {} at most {most_px} px; lower --max-coc or --blur",
         if *by_method { "--method gather bears".to_owned() } else { format!("for pictures of {}x{}, use", size.0, size.1) }
@@ -28,10 +28,10 @@ pub enum BokehError {
         most_px: f32,
         /// Width and height of the pictures.
         size: (u32, u32),
-        /// Whether the method is what sets the limit.
+        /// True if the method sets the limit.
         by_method: bool,
     },
-    /// A picture needs more memory than there is.
+    /// A picture needs more memory than is free.
     #[error(
         "a picture of {}x{} pixels takes about {needed_mb} MB to blur, and {free_mb} MB are free: make it smaller, or close \
          other programs",
@@ -40,23 +40,23 @@ pub enum BokehError {
     Memory {
         /// Width and height in pixels.
         size: (u32, u32),
-        /// What the blur is estimated to take.
+        /// Estimated memory of the blur.
         needed_mb: u64,
-        /// What this process can still take.
+        /// Memory that this process can still allocate.
         free_mb: u64,
     },
-    /// Slices have other lengths than a picture's.
+    /// The lengths of slices do not match the picture.
     #[error("slices of {lengths:?} values for pixels, result and radii are not those of a picture of {size:?}")]
     Lengths {
         /// Width and height in pixels.
         size: (u32, u32),
-        /// Of the pixels, the result and the radii.
+        /// Lengths of the pixels, the result and the radii.
         lengths: [usize; 3],
     },
-    /// The executor took a picture and gave none back.
+    /// The executor accepted a picture and returned no result.
     #[error("the blur gave no picture back: please report this")]
     Lost,
-    /// No GPU, or it refused or was lost.
+    /// There is no GPU, or it refused or was lost.
     #[error(transparent)]
     Gpu(#[from] GpuError),
 }

@@ -1,4 +1,4 @@
-//! Goes over to another executor (the CPU) when the GPU fails, from the oldest frame in flight on.
+//! Switches to another executor (the CPU) when the GPU fails, from the oldest frame in flight on.
 
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -7,24 +7,24 @@ use super::{Bokeh, BokehError, Finished, Job};
 use crate::compute::backed::Backed;
 use crate::compute::{Backend, Device, GpuError};
 
-/// Makes the executor to go over to.
+/// Makes the fallback executor.
 pub type Makes = Box<dyn FnOnce() -> Box<dyn Bokeh> + Send>;
 
-/// Runs one executor until its GPU fails, then another. No frame is lost: those in flight at the failure are blurred
-/// again by the other one.
+/// Runs one executor until its GPU fails, then another. No frame is lost: the frames in flight at the failure are
+/// blurred again by the other executor.
 pub struct Fallback {
     executor: Backed<Box<dyn Bokeh>, Makes>,
-    /// Frames that no executor has yet, oldest first: after a failure there may be more than the other one takes.
+    /// Frames not yet submitted, oldest first: after a failure there may be more than the fallback accepts.
     waiting: VecDeque<Job>,
 }
 
 impl Fallback {
-    /// Runs `first`, and what `other` makes once `first` fails.
+    /// Creates an executor that runs `first`, and the result of `other` once `first` fails.
     pub fn new(first: Box<dyn Bokeh>, other: Makes) -> Self {
         Self { executor: Backed::new(first, other), waiting: VecDeque::new() }
     }
 
-    /// Goes over to the other executor, or returns the error where that has happened already.
+    /// Switches to the other executor, or returns the error if that has happened already.
     fn switch_over(&mut self, error: GpuError) -> Result<(), BokehError> {
         let Self { executor, waiting } = self;
         let make = |first: &mut Box<dyn Bokeh>, other: Makes| {
@@ -59,7 +59,7 @@ impl Bokeh for Fallback {
     }
 
     fn collect(&mut self, wait: bool) -> Result<Option<Finished>, BokehError> {
-        // After a failure, the next turn submits its frames to the other executor.
+        // After a failure, the next iteration submits the frames to the other executor.
         loop {
             self.submit_waiting()?;
             match self.executor.worker_mut().collect(wait) {
@@ -104,7 +104,7 @@ impl Bokeh for Fallback {
     }
 }
 
-/// Stands in for the executor while the first one is dropped and the other one made.
+/// Placeholder while the first executor is dropped and the other one is made.
 struct Placeholder;
 
 impl Bokeh for Placeholder {
@@ -143,7 +143,8 @@ mod tests {
     use crate::link::pool::Pool;
     use crate::optics::CocField;
 
-    /// Writes its mark into the pictures; fails at the step `fails_at`, where submitting and collecting are steps.
+    /// Test executor that writes its mark into the pictures; fails at step `fails_at`, where submitting and collecting
+    /// are steps.
     struct Marks {
         mark: u8,
         capacity: usize,
@@ -214,7 +215,7 @@ mod tests {
     fn every_frame_is_blurred_once_and_in_order_wherever_the_gpu_fails() {
         const FRAMES: u64 = 10;
         for fails_at in 1..=2 * FRAMES as u32 + 1 {
-            // As many as may be out at once, and no more.
+            // No more buffers than may be out at once.
             let pool = Pool::new(2 * 4, || ColorImage::new(2, 2));
             let other = Box::new(|| Box::new(Marks::new(2, 1, u32::MAX)) as Box<dyn Bokeh>);
             let mut bokeh = Fallback::new(Box::new(Marks::new(1, 3, fails_at)), other);

@@ -1,32 +1,34 @@
-//! How wide a blur may be, and how large a picture.
+//! Limits of the blur radius and of the picture size.
 
 use super::{BokehError, Method, Rank, Settings};
 use crate::compute::memory;
 use crate::optics::CocKind;
 
 /// Largest radius of [`Method::Gather`], in pixels: it filters at full scale.
-const MOST_GATHERED_PX: f32 = 512.0;
-/// The same with [`Rank::Full`], when it gathers in two dimensions: kernels grow with the square of the radius.
-const MOST_EXACT_PX: f32 = 128.0;
-/// What preparing and blurring a picture takes at most, at the finest quality with refined depth
-/// (`docs/reliability.md` has the measurements).
+const MAX_GATHERED_PX: f32 = 512.0;
+/// Largest radius of [`Method::Gather`] with [`Rank::Full`], in pixels: it gathers in two dimensions, with kernels that
+/// grow with the square of the radius.
+const MAX_EXACT_PX: f32 = 128.0;
+/// Peak memory per pixel of preparing and blurring a picture, at the finest quality with refined depth (measured:
+/// `docs/reliability.md`).
 const BYTES_PER_PIXEL: u64 = 90;
-/// Pictures of up to so many pixels are not checked: the estimate leaves out what does not grow with the picture.
+/// Pictures of at most this many pixels are not checked: the estimate leaves out memory that does not grow with the
+/// picture.
 const UNCHECKED_PIXELS: u64 = 16 << 20;
 
 impl Settings {
-    /// The largest CoC radius that makes a difference to pictures of `size` (width, height), in pixels: their diagonal,
-    /// or the method's limit where that is lower.
+    /// Returns the largest CoC radius that makes a difference to pictures of `size` (width, height), in pixels: their
+    /// diagonal, or the method's limit if that is lower.
     pub fn most_radius_px(&self, size: (u32, u32)) -> f32 {
         let diagonal_px = (size.0 as f32).hypot(size.1 as f32).ceil();
         diagonal_px.min(match (self.coc, self.method, self.rank) {
-            (CocKind::Depth, Method::Gather, Some(Rank::Full)) => MOST_EXACT_PX,
-            (CocKind::Depth, Method::Gather, _) => MOST_GATHERED_PX,
+            (CocKind::Depth, Method::Gather, Some(Rank::Full)) => MAX_EXACT_PX,
+            (CocKind::Depth, Method::Gather, _) => MAX_GATHERED_PX,
             _ => f32::INFINITY,
         })
     }
 
-    /// These settings, with radii clamped to [`Settings::most_radius_px`].
+    /// Returns these settings with radii clamped to [`Settings::most_radius_px`].
     pub(super) fn within(&self, size: (u32, u32)) -> Self {
         let most_px = self.most_radius_px(size);
         // `max` turns NaN into 0.
@@ -34,7 +36,8 @@ impl Settings {
         Self { far_max_px: clamped(self.far_max_px), near_max_px: clamped(self.near_max_px), ..self.clone() }
     }
 
-    /// Whether there is room for blurring pictures of `size` (width, height), and beside it for so many bytes a pixel.
+    /// Checks that there is memory for blurring pictures of `size` (width, height), plus `beside_per_pixel` bytes per
+    /// pixel.
     ///
     /// # Errors
     /// [`BokehError::Memory`].
@@ -47,14 +50,14 @@ impl Settings {
         }
     }
 
-    /// Whether pictures of `size` (width, height) can be blurred with these settings.
+    /// Checks that pictures of `size` (width, height) can be blurred with these settings.
     ///
     /// # Errors
     /// [`BokehError::Memory`], [`BokehError::TooWide`].
     pub fn check(&self, size: (u32, u32)) -> Result<(), BokehError> {
         Self::check_room(size, 0)?;
         let most_px = self.most_radius_px(size);
-        // NaN is refused, too.
+        // NaN is refused as well.
         let is_beyond = |radius_px: &f32| radius_px.partial_cmp(&most_px).is_none_or(|order| order.is_gt());
         let Some(radius_px) = [self.far_max_px, self.near_max_px].into_iter().find(is_beyond) else { return Ok(()) };
         let by_method = (self.coc, self.method) == (CocKind::Depth, Method::Gather);

@@ -18,28 +18,29 @@ pub struct Decomposition {
     pub v: Vec<f64>,
 }
 
-/// Two columns count as orthogonal below this cosine.
+/// Columns whose cosine is below this count as orthogonal.
 const ORTHOGONAL: f64 = 1e-13;
-/// Only a safeguard: Jacobi rotations converge quadratically, in far fewer sweeps.
+/// Safeguard only: Jacobi rotations converge quadratically, in far fewer sweeps.
 const MAX_SWEEPS: usize = 40;
-/// Singular values below this share of the largest are rounding noise: they count as 0, and so do their vectors.
+/// Singular values below this fraction of the largest are rounding noise and are set to 0, with their vectors.
 const NOISE: f64 = 1e-15;
 
 impl Decomposition {
-    /// Decomposes a mask by one-sided Jacobi rotations (Hestenes): accurate to rounding, and short. A mirrored half is
-    /// left out, and stands for two: a mask of even rows has even singular vectors.
+    /// Decomposes a mask by one-sided Jacobi rotations (Hestenes): short, and accurate to rounding. Along a
+    /// mirror-symmetric axis only half of the mask is decomposed, each value with double weight: a symmetric mask has
+    /// symmetric singular vectors.
     pub fn of(mask: &Mask) -> Self {
         let n = mask.size;
         let fold = |mirrored: bool| if mirrored { n.div_ceil(2) } else { n };
         let (across, down) = mask.symmetry();
         let (columns, rows) = (fold(across), fold(down));
-        // What a row or column weighs, so that lengths stay as they are: the one in the middle stands for itself.
+        // Weight sqrt(2) of mirrored rows and columns keeps the norms; the middle one has no mirror image.
         let weight = |k: usize, mirrored: bool| if mirrored && 2 * k + 1 != n { 2f64.sqrt() } else { 1.0 };
         let at = |column: usize, row: usize| mask.values[row * n + column] * weight(column, across) * weight(row, down);
         // Row i of `work` is column i of the mask; rotating rows against each other makes them orthogonal.
         let folded: Vec<f64> = (0..columns * rows).map(|k| at(k / rows, k % rows)).collect();
         let mut work = folded.clone();
-        // Rows this small are rounding noise (a singular value of 0), and would be rotated against each other forever.
+        // Rows this small are rounding noise (singular value 0); rotating them against each other would never end.
         let floor = dot(&work, &work) * 1e-30;
         for _ in 0..MAX_SWEEPS {
             let mut rotated = false;
@@ -75,7 +76,7 @@ impl Decomposition {
         result
     }
 
-    /// The sum of the first `rank` terms: `size * size` values, row-major, not renormalised.
+    /// Returns the sum of the first `rank` terms: `size * size` values, row-major, not renormalised.
     pub fn approximation(&self, rank: usize) -> Vec<f64> {
         let n = self.size;
         let mut sum = vec![0.0; n * n];
@@ -88,20 +89,20 @@ impl Decomposition {
         sum
     }
 
-    /// Relative Frobenius error of the first `rank` terms: `sqrt(sum_{i>rank} sigma_i^2 / sum sigma_i^2)`.
+    /// Returns the relative Frobenius error of the first `rank` terms: `sqrt(sum_{i>rank} sigma_i^2 / sum sigma_i^2)`.
     pub fn relative_error(&self, rank: usize) -> f64 {
         let square = |s: &[f64]| s.iter().map(|x| x * x).sum::<f64>();
         (square(&self.sigma[rank.min(self.size)..]) / square(&self.sigma)).sqrt()
     }
 
-    /// How many terms matter, at least 1: filters are `f32`, in whose rounding smaller singular values drown.
+    /// Returns the number of terms above the rounding of the `f32` filters, at least 1.
     pub fn numerical_rank(&self) -> usize {
         self.sigma.iter().take_while(|&&s| s > 1e-7 * self.sigma[0]).count().max(1)
     }
 }
 
-/// Rotates rows `i < j` of `work`, which have `n` values each, so that they become orthogonal. False where they already
-/// are, or where their dot product is at most `floor`.
+/// Rotates rows `i < j` of `work` (`n` values each) to be orthogonal (Jacobi rotation). Returns false if they already
+/// are, or if their dot product is at most `floor`.
 fn orthogonalise(work: &mut [f64], n: usize, i: usize, j: usize, floor: f64) -> bool {
     let (head, tail) = work.split_at_mut(j * n);
     let (a, b) = (&mut head[i * n..][..n], &mut tail[..n]);
@@ -109,7 +110,7 @@ fn orthogonalise(work: &mut [f64], n: usize, i: usize, j: usize, floor: f64) -> 
     if ab * ab <= ORTHOGONAL * ORTHOGONAL * aa * bb || ab * ab <= floor * floor {
         return false;
     }
-    // The smaller root of t^2 + 2 zeta t - 1 = 0: a turn of at most 45 degrees, for which the sweeps converge.
+    // Smaller root of t^2 + 2 zeta t - 1 = 0: the angle is at most 45 degrees, for which the sweeps converge.
     let zeta = (bb - aa) / (2.0 * ab);
     let tangent = zeta.signum() / (zeta.abs() + (1.0 + zeta * zeta).sqrt());
     let cosine = 1.0 / (1.0 + tangent * tangent).sqrt();
@@ -120,7 +121,7 @@ fn orthogonalise(work: &mut [f64], n: usize, i: usize, j: usize, floor: f64) -> 
     true
 }
 
-/// The dot product, in several sums at once: one alone would wait for itself.
+/// Dot product with several accumulators, which hides the latency of the additions.
 fn dot(a: &[f64], b: &[f64]) -> f64 {
     const SUMS: usize = 8;
     let ((a, a_rest), (b, b_rest)) = (a.as_chunks::<SUMS>(), b.as_chunks::<SUMS>());

@@ -60,7 +60,7 @@ named! {
 pub enum Rank {
     /// The first `n` terms of the singular value decomposition, 1 to 16.
     Terms(u32),
-    /// Every term that the aperture's picture has.
+    /// All terms of the aperture.
     Full,
 }
 
@@ -84,58 +84,58 @@ impl fmt::Display for Rank {
     }
 }
 
-/// Everything about the blur that stays the same from frame to frame.
+/// Settings of the blur that stay the same from frame to frame.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Settings {
-    /// What kind of CoC frames have.
+    /// Kind of CoC field of all frames.
     pub coc: CocKind,
-    /// Compositing where it follows depth.
+    /// Compositing method if the blur follows depth.
     pub method: Method,
     /// Shape of the aperture.
     pub aperture: aperture::Aperture,
     /// Width of the soft rim, as a fraction of the radius, 0 to 1.
     pub rim: f32,
-    /// Separable terms; `None` takes the quality level's.
+    /// Number of separable terms; `None` uses that of the quality level.
     pub rank: Option<Rank>,
-    /// Highlight recovery `M`: clipped white is taken as `M` times as bright; 0 switches it off.
+    /// Highlight recovery `M`: clipped white counts as `M` times as bright; 0 switches it off.
     pub highlights: f32,
-    /// Rung of the quality ladder.
+    /// Quality level of the blur.
     pub quality: Quality,
-    /// Whether each frame may choose its own rung ([`Job::quality`]): the executor is then made for all of them.
+    /// True if each frame may choose its own quality level ([`Job::quality`]): the executor then allocates for all
+    /// levels.
     pub adaptive: bool,
     /// Largest CoC radius behind the focal plane, in pixels.
     pub far_max_px: f32,
-    /// Largest CoC radius in front of the focal plane, in pixels (0 when nothing can be there).
+    /// Largest CoC radius in front of the focal plane, in pixels; 0 if nothing can be there.
     pub near_max_px: f32,
 }
 
 /// One frame to blur. The executor owns the buffers until the frame is [`Finished`].
 pub struct Job {
-    /// Chosen by the caller; comes back in [`Finished`].
+    /// Chosen by the caller; returned in [`Finished`].
     pub ticket: u64,
-    /// The picture.
+    /// Picture to blur.
     pub color: Pooled<ColorImage>,
-    /// Its depth; needed when `coc` is [`CocField::Depth`].
+    /// Depth map of the picture; needed if `coc` is [`CocField::Depth`].
     pub depth: Option<Pooled<DepthMap>>,
-    /// The radius of every pixel.
+    /// CoC radius of every pixel.
     pub coc: CocField,
-    /// The rung of the quality ladder; ignored unless the settings are [`adaptive`](Settings::adaptive).
+    /// Quality level; ignored unless the settings are [`adaptive`](Settings::adaptive).
     pub quality: Quality,
-    /// Where the result is wanted.
+    /// Where the result is needed.
     pub place: Place,
     /// Buffer for the result in memory; resized to the picture's size.
     pub out: Pooled<ColorImage>,
-    /// A buffer for the result as YUYV, where that is as good: an executor that makes it as easily fills this one in the
-    /// place of `out`. Not for results on the device.
+    /// YUYV buffer for the result, if the caller accepts YUYV: an executor that produces YUYV at no extra cost fills
+    /// this buffer instead of `out`. Not for results on the device.
     pub yuyv: Option<Pooled<YuyvImage>>,
-    /// The picture and its depth once more, where they are in the memory of the executor's device already, so that they need
-    /// not go up.
+    /// The picture and its depth in the memory of the executor's device, if they are there already; saves the upload.
     #[doc(hidden)]
     pub on_device: Option<Pooled<DeviceFrame>>,
 }
 
 impl Job {
-    /// A frame with ticket 0, to be blurred at the default quality into memory of its own.
+    /// Creates a job with ticket 0 and the default quality, whose result goes to a buffer of its own in memory.
     pub fn new(color: Pooled<ColorImage>, depth: Option<Pooled<DepthMap>>, coc: CocField) -> Self {
         let (quality, place, out) = (Quality::default(), Place::Memory, Pooled::detached(ColorImage::default()));
         Self { ticket: 0, color, depth, coc, quality, place, out, yuyv: None, on_device: None }
@@ -144,36 +144,36 @@ impl Job {
 
 /// A blurred frame.
 pub struct Finished {
-    /// The job's ticket.
+    /// Ticket of the job.
     pub ticket: u64,
-    /// The result, at [`Job::place`]; in memory where the CPU made it, or the GPU had no picture to leave it in.
+    /// Result, at [`Job::place`]; in memory if the CPU made it or the GPU had no free picture.
     pub picture: Picture,
-    /// The job's picture.
+    /// Picture of the job.
     pub color: Pooled<ColorImage>,
-    /// The job's depth.
+    /// Depth map of the job.
     pub depth: Option<Pooled<DepthMap>>,
     /// Time per pass.
     pub times: PassTimes,
 }
 
-/// Which intermediate result of the last frame to read, as vectors of four values.
+/// Selects an intermediate result of the last frame, read as vectors of four values.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Probe {
     /// After `bin`, per pixel of a bin: premultiplied r, g, b and coverage.
     Bin(usize),
-    /// After `reach`, two vectors per row of cells and edge of a segment: radius in bin pixels and lowest r, g, b;
-    /// highest r, g, b and an unused value.
+    /// After `reach`, two vectors per row of cells and segment edge: radius in bin pixels and lowest r, g, b; highest
+    /// r, g, b and an unused value.
     Reach(usize),
     /// After `blur`, per pixel of a bin: premultiplied r, g, b and coverage.
     Blur(usize),
 }
 
-/// The executor for pictures of `size` (width, height), on a GPU or on the CPU; `threads` is for the CPU, all cores when
-/// `None`.
+/// Creates an executor for pictures of `size` (width, height) on a GPU or on the CPU. `threads` is for the CPU; `None`
+/// uses all cores.
 ///
 /// # Errors
-/// The blur is too wide ([`Settings::check`]); the GPU is too small for such pictures, failed, or blurs otherwise than the
-/// CPU. A GPU that fails later is no error: the CPU takes over.
+/// The blur is too wide ([`Settings::check`]); the GPU is too small for these pictures, failed, or its results differ
+/// from those of the CPU. A later GPU failure is no error: the CPU takes over.
 pub fn create(
     settings: &Settings,
     size: (u32, u32),
@@ -191,8 +191,8 @@ pub fn create(
     Ok(Box::new(cpu::CpuBokeh::new(plan, threads)))
 }
 
-/// The executor on a GPU that blurs as the CPU does, with the CPU to take over: its buffers are allocated only when the
-/// GPU fails.
+/// Creates a GPU executor after checking its results against the CPU's. The fallback to the CPU allocates its buffers
+/// only when the GPU fails.
 #[cfg(feature = "gpu")]
 fn gpu_with_fallback(
     plan: &plan::Plan,
@@ -206,7 +206,7 @@ fn gpu_with_fallback(
     Ok(Box::new(fallback::Fallback::new(Box::new(gpu), Box::new(cpu))))
 }
 
-/// An executor of the plan.
+/// Executes a plan.
 ///
 /// Frames come out in the order they went in. `submit` may be called while [`Bokeh::in_flight`] is below
 /// [`Bokeh::capacity`].
@@ -214,40 +214,41 @@ pub trait Bokeh: Send {
     /// Starts one frame.
     ///
     /// # Errors
-    /// The frame does not fit the plan, or the device failed; it is then gone, unless [`Bokeh::take_back`] returns it.
+    /// The frame does not fit the plan, or the device failed. The frame is then lost, unless [`Bokeh::take_back`]
+    /// returns it.
     fn submit(&mut self, job: Job) -> Result<(), BokehError>;
 
-    /// After an error, takes back the oldest frame in flight, or the one just refused, as it was submitted: another
-    /// executor can blur it. `None` when there is no such frame (any more).
+    /// After an error, returns the oldest frame in flight, or the frame just refused, as it was submitted, so that
+    /// another executor can blur it. Returns `None` if no frame is left.
     fn take_back(&mut self) -> Option<Job> {
         None
     }
 
-    /// The oldest finished frame, if there is one; with `wait`, blocks until there is (or nothing is in flight).
+    /// Returns the oldest finished frame, if any. With `wait`, blocks until one is finished or nothing is in flight.
     ///
     /// # Errors
     /// The device failed.
     fn collect(&mut self, wait: bool) -> Result<Option<Finished>, BokehError>;
 
-    /// Frames submitted and not yet collected.
+    /// Returns the number of frames submitted and not yet collected.
     fn in_flight(&self) -> usize;
 
-    /// Frames that may be in flight at once.
+    /// Returns the largest number of frames in flight.
     fn capacity(&self) -> usize;
 
-    /// What runs it: [`Backend::Gpu`] or [`Backend::Cpu`].
+    /// Returns the backend that runs it: [`Backend::Gpu`] or [`Backend::Cpu`].
     fn backend(&self) -> Backend;
 
-    /// What ran it, for the report: `cpu`, `gpu`, or `gpu, then cpu`.
+    /// Returns the backends used so far, for the report: `cpu`, `gpu`, or `gpu, then cpu`.
     fn backends(&self) -> &'static str {
         self.backend().name()
     }
 
-    /// The GPU that it runs on, for what else there is to do of its frames.
+    /// Returns the GPU it runs on, so that later stages can process its results there.
     fn device(&self) -> Option<Arc<Device>> {
         None
     }
 
-    /// One line for the report, such as `cpu, 2 threads, AVX-512` or the adapter's name.
+    /// Describes the executor in one line for the report, such as `cpu, 2 threads, AVX-512` or the adapter's name.
     fn describe(&self) -> String;
 }

@@ -1,81 +1,84 @@
-//! What near bins hide from those behind them: layers of bins, and what each has to have filled in.
+//! Occlusion: layers of bins, and the inpainting each layer needs.
 //!
-//! Light from behind a near thing passes its blurred rim, so every layer needs what the layers in front of it hide. Where
-//! one surface goes through several layers, as the ground does, nothing is hidden but its own continuation, which the
-//! bins share without a fill.
+//! The blurred rim of a near object is semi-transparent, so every layer needs the background that the layers in front
+//! of it occlude. Where one surface spans several layers, as the ground does, it occludes only its own continuation,
+//! which the bins share without inpainting.
 
 use std::ops::Range;
 
-use super::plan::{HAND_OVER, Plan, Share};
+use super::plan::{BinWeight, HAND_OVER, Plan};
 
-/// Into so many layers near bins are divided: each is filled for itself, which takes time.
-const MOST_NEAR_LAYERS: usize = 2;
-/// Those, and that of all other bins.
-pub const MOST_LAYERS: usize = MOST_NEAR_LAYERS + 1;
+/// Largest number of layers of near bins; each is inpainted separately, which takes time.
+const MAX_NEAR_LAYERS: usize = 2;
+/// Largest number of layers: the near ones and the layer of all other bins.
+pub const MAX_LAYERS: usize = MAX_NEAR_LAYERS + 1;
 
-/// A step of the CoC to what lies behind, as a share of a near pixel's own, at which that begins to be another surface, and
-/// at which it is one.
+/// CoC step to the surface behind, as a fraction of a near pixel's own CoC: below `OTHER_FROM` it is the same surface,
+/// from `OTHER_TO` on a different one.
 pub const OTHER_FROM: f32 = 0.35;
 pub const OTHER_TO: f32 = 0.6;
-/// What has this many times the CoC of the near bins' border, or more, hides what is behind it.
+/// A pixel whose CoC is at least this many times that of the near bins' border is replaced entirely.
 const HIDDEN_FROM: f32 = 1.5;
 
-/// Pixels a side of a cell of the grid that silhouettes are noted in.
+/// Side of a cell of the grid of silhouettes, in pixels.
 pub const GRAIN: usize = 4;
-/// What is noted of a silhouette: the distances of [`Silhouette`].
+/// Number of distances stored per cell: the fields of [`Silhouette`].
 pub const SHOWS: usize = 3;
-/// Pixels that a distance is larger by, as the grid is coarse and linear between its cells. No whole number: the executors, which
-/// round otherwise, are to agree where radii are whole ones.
+/// Margin added to each distance, in pixels, because the grid is coarse and interpolated linearly. Not a whole number,
+/// so that both executors, which round differently, agree at whole radii.
 pub const MARGIN_PX: f32 = 2.0 * GRAIN as f32 + 0.3;
-/// What can be seen past a silhouette ends at its radius `r`; from where `r^2` less the squared distance is this share of `r^2`,
-/// it is faded out, so that nothing ends at once. Past a straight edge 5 % of the aperture see beyond it there.
+/// Past a silhouette, the background is visible within its radius `r`. It fades out where `r^2` minus the squared
+/// distance is below this fraction of `r^2`, which avoids a hard edge. At that distance 5 % of the aperture sees past a
+/// straight edge.
 pub const FADE: f32 = 0.36;
-/// With less coverage than this, a surface does not fill a pixel.
+/// A surface with less coverage than this does not fill a pixel.
 pub const OWN_COVERAGE: f32 = 0.05;
 
-/// A jump of the CoC between two neighbours: the edge of the nearer surface, and how far from it what lies behind matters, in
-/// pixels; -1 where not at all.
+/// An occlusion boundary: a CoC discontinuity between two neighbouring pixels. It bounds the nearer surface; its
+/// distances say how far from it the background matters, in pixels, -1 if not at all.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Silhouette {
-    /// So far anything farther can be seen through the aperture: the radius of the nearer surface.
+    /// Distance up to which anything farther is visible through the aperture: the radius of the nearer surface.
     pub shows_px: f32,
-    /// The same where what is farther does not lie in front of the subject.
+    /// Same distance if the farther surface is not in front of the subject, else -1.
     pub shows_back_px: f32,
-    /// So far what is hidden can matter: what is seen is blurred itself.
+    /// Distance up to which the hidden background matters: visible background is itself blurred.
     pub uncovers_px: f32,
 }
 
-/// What has a CoC above this does not lie in front of the subject, for a layer in front begins at such a radius.
+/// Returns the CoC above which a pixel is not in front of the subject: layers in front begin at this radius.
 #[inline(always)]
 pub fn front_px(near_from_px: f32) -> f32 {
     -(1.0 + HAND_OVER) * near_from_px
 }
 
-/// By how much a step to what is farther is larger than a surface that goes on would make ([`OTHER_FROM`]), and than `least_px`.
+/// Returns by how much the step to a farther CoC exceeds the step within a continuous surface ([`OTHER_FROM`]) and
+/// `min_step_px`.
 #[inline(always)]
-pub fn beyond_px(near_px: f32, far_px: f32, least_px: f32) -> f32 {
-    let most_px = OTHER_FROM * near_px.abs();
-    far_px - near_px - if most_px > least_px { most_px } else { least_px }
+pub fn excess_step_px(near_px: f32, far_px: f32, min_step_px: f32) -> f32 {
+    let surface_step_px = OTHER_FROM * near_px.abs();
+    far_px - near_px - if surface_step_px > min_step_px { surface_step_px } else { min_step_px }
 }
 
-/// Directions in which what hides is looked past, as steps across and down (the other side of each is looked at, too). What is
-/// known at both ends of a line through a hidden pixel, and alike, tells what is in between: so straight outlines run on behind
-/// what hides them, where a mean of all around would end them there. After the idea that inpainting carries on isophotes
-/// (Bertalmio et al., *Image Inpainting*, SIGGRAPH 2000, section 3), with surfaces told apart by their CoC.
+/// Directions of directional inpainting, as steps across and down; each line is searched both ways. If both ends of a
+/// line through a hidden pixel have similar CoC, they predict the pixel between them. Straight outlines therefore
+/// continue behind an occluder, where an average of the surroundings would end them. After the continuation of
+/// isophotes in Bertalmio et al., *Image Inpainting*, SIGGRAPH 2000, section 3, with surfaces distinguished by their
+/// CoC.
 pub const DIRECTIONS: [(i32, i32); 8] = [(1, 0), (2, 1), (1, 1), (1, 2), (0, 1), (-1, 2), (-1, 1), (-2, 1)];
-/// Farther than this many steps nobody looks.
-pub const MOST_STEPS: u8 = 254;
-/// Where CoC are this far apart, two surfaces are half alike.
+/// Longest search along a line, in steps.
+pub const MAX_STEPS: u8 = 254;
+/// CoC difference at which [`likeness`] is 0.5.
 pub const HALF_ALIKE_PX: f32 = 2.0;
-/// Where all that is seen from a pixel has CoC less apart than this, it is one surface, of which a mean of all around is as good.
+/// CoC range below which all ends seen from a pixel belong to one surface; pull-push averaging is then as good.
 pub const ONE_SURFACE_PX: f32 = 1.0;
-/// Up to so many steps from end to end a line is trusted wholly, and from twice as many on not at all: deep within something
-/// large, lines from far away cross one another, and a mean of all around has no edges of its own.
+/// Line length, in steps from end to end, up to which a line is fully trusted; the trust is 0 from twice this length
+/// on. Deep inside a large hole lines from far away intersect, and pull-push averaging has no such edges.
 pub const TRUSTED_STEPS: f32 = 12.0;
-/// A line with one end counts as one with two alike ends would that is so many times as long.
+/// A line with one end counts like one with two similar ends that is this many times as long.
 pub const ONE_ENDED: f32 = 4.0;
 
-/// How alike two surfaces are by their CoC: 1 where they are the same, 0 where they are far apart.
+/// Returns the similarity of two surfaces by CoC, `1 / (1 + d^2)`: 1 if equal, towards 0 far apart.
 #[inline(always)]
 pub fn likeness(a_px: f32, b_px: f32) -> f32 {
     let apart = (a_px - b_px) * (1.0 / HALF_ALIKE_PX);
@@ -83,15 +86,15 @@ pub fn likeness(a_px: f32, b_px: f32) -> f32 {
 }
 
 impl Silhouette {
-    /// That between two pixels of these CoC, where it is one: a step of `least_px`, which is also more than a surface that goes
-    /// on would make ([`OTHER_FROM`]): coarse codes of depth are no silhouettes. From `near_from_px` on, a radius in front of the
-    /// focal plane is that of a layer in front.
+    /// Returns the silhouette between two pixels with these CoC, if their step is at least `min_step_px` and larger
+    /// than that of a continuous surface ([`OTHER_FROM`]): quantisation of depth is no silhouette. In front of the
+    /// focal plane, layers in front begin at the radius `near_from_px`.
     #[inline(always)]
-    pub fn between(a_px: f32, b_px: f32, least_px: f32, near_from_px: f32) -> Option<Self> {
+    pub fn between(a_px: f32, b_px: f32, min_step_px: f32, near_from_px: f32) -> Option<Self> {
         let (near_px, far_px) = (a_px.min(b_px), a_px.max(b_px));
         let shows_px = near_px.abs() + MARGIN_PX;
         let shows_back_px = if far_px > front_px(near_from_px) { shows_px } else { -1.0 };
-        (beyond_px(near_px, far_px, least_px) >= 0.0).then_some(Self {
+        (excess_step_px(near_px, far_px, min_step_px) >= 0.0).then_some(Self {
             shows_px,
             shows_back_px,
             uncovers_px: shows_px + far_px.abs(),
@@ -100,47 +103,48 @@ impl Silhouette {
 }
 
 impl Plan {
-    /// The bins of each layer, front to back: near bins, in at most [`MOST_NEAR_LAYERS`] groups, and all others. What the
-    /// layers in front hide is filled in for each: see [`Self::unhidden`].
+    /// Returns the bins of each layer, front to back: near bins in at most [`MAX_NEAR_LAYERS`] groups, then all
+    /// others. Each layer is inpainted where the layers in front occlude it: see [`Self::unhidden`].
     pub fn layers(&self) -> impl Iterator<Item = Range<usize>> + use<> {
         let (near, all) = (self.bins.iter().filter(|bin| bin.near).count(), self.bins.len());
-        let groups = near.min(MOST_NEAR_LAYERS);
+        let groups = near.min(MAX_NEAR_LAYERS);
         let in_front = (0..groups).map(move |k| k * near / groups..(k + 1) * near / groups);
         in_front.chain(std::iter::once(near..all))
     }
 
-    /// The signed CoC, <= 0, from which on the bins before `first` take no share: what is filled in behind them is not
-    /// below it.
+    /// Returns the signed CoC (<= 0) above which the bins before `first` have weight 0: inpainted CoC are clamped to
+    /// it.
     pub fn nearest_behind_px(&self, first: usize) -> f32 {
         first.checked_sub(1).map_or(f32::MIN, |front| self.bins[front].high_px * (1.0 - HAND_OVER))
     }
 
-    /// Where what lies in front of the subject ends: the CoC of the last near bin's border, and the slope of the hand-over; a
-    /// border that all lies behind without such bins.
-    pub fn near_to(&self) -> (f32, f32) {
+    /// Returns the far end of the region in front of the subject: CoC of the last near bin's border, and slope of the
+    /// cross-fade. Without near bins, a border in front of everything.
+    pub fn near_end(&self) -> (f32, f32) {
         let last = self.bins.iter().rposition(|bin| bin.near);
         last.and_then(|last| self.border(last)).unwrap_or((-1e30, 1.0))
     }
 
-    /// The CoC above which no bin that holds anything of a surface in front begins: that of the far border of the bin in focus.
-    pub fn kin_to_px(&self) -> f32 {
+    /// Returns the CoC above which no bin that may contain part of a surface in front begins: the far border of the bin
+    /// in focus.
+    pub fn focus_end_px(&self) -> f32 {
         let focus = self.bins.iter().position(|bin| !bin.near);
         focus.map_or(f32::MAX, |focus| self.bins[focus].high_px * (1.0 + HAND_OVER))
     }
 
-    /// How much of a pixel the layer of bins from `first` on takes as it is; the rest counts as hidden by the near bins
-    /// before it and is filled in, as far as what lies behind is another surface ([`other_surface`]).
-    pub fn unhidden(&self, first: usize) -> Share {
+    /// Returns the weight of a pixel's own content in the layer of bins from `first` on. The rest is occluded by the
+    /// near bins before it and is inpainted, if the background is a different surface ([`other_surface`]).
+    pub fn unhidden(&self, first: usize) -> BinWeight {
         let border_px = first.checked_sub(1).map(|front| self.bins[front].high_px);
-        Share::new(
+        BinWeight::new(
             border_px.map(|at_px| (at_px * (0.5 + 0.5 * HIDDEN_FROM), 1.0 / ((1.0 - HIDDEN_FROM) * at_px))),
             None,
         )
     }
 }
 
-/// How far what is filled in behind a pixel is another surface, 0 to 1, told by their CoC. A surface that comes nearer, such
-/// as the ground, hides its own continuation, which looks like it.
+/// Returns how likely the inpainted background is a different surface, 0 to 1, judged by CoC. A surface that comes
+/// nearer, such as the ground, hides its own continuation, which looks like it.
 #[inline(always)]
 pub fn other_surface(own_px: f32, behind_px: f32) -> f32 {
     let step = (own_px - behind_px) / own_px.min(-1e-3);

@@ -1,54 +1,55 @@
-//! The plan: which bins a picture is split into, at which scale each is filtered, and with which filters.
+//! The plan: the bins that a picture is split into, and the scale and filters of each.
 //!
-//! Filters and memory are fixed per picture size and settings; the quality may change from frame to frame where the
-//! settings are adaptive ([`Plan::set_quality`]), and the bins follow each frame's depth ([`Plan::split`]).
-//! Both executors run a frame pass by pass, under these names (the CPU's `bin` unpacks the picture itself):
+//! Filters and memory are fixed per picture size and settings. The quality may change from frame to frame if the
+//! settings are adaptive ([`Plan::set_quality`]); the bins follow each frame's depth ([`Plan::split`]). Both executors
+//! run a frame pass by pass, under these names (the CPU's `bin` unpacks the picture itself):
 //!
 //! 1. `unpack`: 8-bit sRGB to linear light with highlights expanded; depth to signed CoC.
-//! 2. `bin`: every bin's share of each pixel, premultiplied, averaged down to the bin's scale.
-//! 3. `fill` (only with something in front): what near objects hide is filled in before the bins behind are taken.
-//! 4. `reach`: on a coarse grid, the local radius of each bin's content, and the range of its colours.
+//! 2. `bin`: each pixel times its weight in every bin, premultiplied, averaged down to the bin's scale.
+//! 3. `fill` (only with something in front): inpaints what near objects occlude, before the bins behind them are made.
+//! 4. `reach`: on a coarse grid, the local radius of each bin's content and the range of its colours.
 //! 5. `blur`: per bin a horizontal and a vertical low-rank pass with the local radius.
-//! 6. `composite`: front to back as disjoint coverage, what stays open to the hindmost; back to 8-bit sRGB.
+//! 6. `composite`: front to back as disjoint coverage; the uncovered rest has the colour of the hindmost bin; back to
+//!    8-bit sRGB.
 
 use std::sync::Arc;
 
 use super::bank::Bank;
 use super::ladder::{Compositing, Ladder};
-use super::rung::{FOCUS_BORDER_PX, MOST_FULL_RADIUS_PX, Rung, scale_within};
-pub use super::share::Share;
+use super::rung::{FOCUS_BORDER_PX, MAX_FULL_RADIUS_PX, QualityLevel, scale_within};
+pub use super::share::BinWeight;
 use super::split::{Counts, MAX_PIECES, Piece};
 use super::{Method, Rank, Settings};
 use crate::budget::Quality;
 use crate::frame::{DepthMap, Matte};
 use crate::optics::{CocField, CocKind};
 
-/// Bin pixels a side of a cell of the coarse grid.
+/// Side of a cell of the coarse grid, in bin pixels.
 pub const CELL: usize = 8;
-/// Bin pixels between two places where the radius is read; it is linear between them.
+/// Bin pixels between two segment edges, where the radius is sampled; it is linear between them.
 pub const SEGMENT: usize = 16;
-/// Up to this many bins, so that both executors can hold them in fixed arrays.
+/// Largest number of bins, so that both executors can use fixed arrays.
 pub const MAX_BINS: usize = 13;
 /// A bin pixel with less coverage than this has no colour of its own.
 pub const COVERAGE_FLOOR: f32 = 1e-3;
 
-/// A bin that takes this share of a nearer surface, or more, shows nothing of what that hides.
-pub const HIDING_SHARE: f32 = 0.25;
+/// A bin with at least this weight of a nearer surface shows nothing of the surface it occludes.
+pub const HIDING_WEIGHT: f32 = 0.25;
 
-/// From this coverage on, a bin counts fully when the colour of the hindmost is worked out.
+/// Coverage from which a bin counts fully when the colour of the hindmost bin is computed.
 pub const HINDMOST_COVERAGE: f32 = 0.8;
 
-/// No colour is brighter: a range that cuts nothing, for bins whose filters do not overshoot.
+/// Larger than any colour: a colour range that clamps nothing, for bins whose filters do not overshoot.
 pub const ANY_COLOR: f32 = 1e20;
 
-/// The least weight, along an axis, of a cell within reach in a local radius, which so exists wherever a filter finds
-/// anything.
+/// Smallest weight, per axis, of a cell within the filter support in a local radius: a radius exists wherever a filter
+/// finds content.
 pub const FAR_WEIGHT: f32 = 0.02;
 
-/// A range of signed CoC, and how it is filtered.
+/// A range of signed CoC, with the scale of its picture.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Bin {
-    /// Lower border of the CoC, pixels of the picture; `-inf` for the first.
+    /// Lower border of the CoC, in pixels of the picture; `-inf` for the first bin.
     pub low_px: f32,
     pub high_px: f32,
     /// A bin pixel covers `scale` x `scale` pixels of the picture: one of [`super::rung::SCALES`].
@@ -56,57 +57,57 @@ pub struct Bin {
     /// Columns of the bin's picture.
     pub width: usize,
     pub height: usize,
-    /// Largest radius of its content, in bin pixels, already compensated.
+    /// Largest radius of its content, in bin pixels, compensated for the scale ([`compensated_radius_px`]).
     pub max_radius_px: f32,
-    /// Whether it lies in front of the focal plane.
+    /// Whether it is in front of the focal plane.
     pub near: bool,
-    /// Which of the executor's memories it uses: the same one from frame to frame.
+    /// Index of the executor's buffers it uses; the same from frame to frame.
     pub slot: usize,
 }
 
 impl Bin {
-    /// Width of the neighbourhood that a local radius is the mean of, in cells.
+    /// Returns the standard deviation, in cells, of the neighbourhood over which a local radius is averaged.
     pub fn sigma_cells(&self) -> f32 {
         (self.max_radius_px / (2.0 * CELL as f32)).max(0.5)
     }
 }
 
-/// The plan of the frames of one size. What depends on a frame's depth is [`Plan::split`].
+/// The plan for frames of one size. [`Plan::split`] updates the part that depends on a frame's depth.
 #[derive(Clone, Debug)]
 pub struct Plan {
     /// Columns of the picture.
     pub width: usize,
     pub height: usize,
-    /// How bins become a picture.
+    /// How the bins are composited.
     pub compositing: Compositing,
     pub quality: Quality,
-    pub rung: Rung,
-    /// Every rung that the plan can be set to.
+    pub rung: QualityLevel,
+    /// All quality levels that the plan can be set to.
     pub ladder: Arc<Ladder>,
-    /// Front to back: by ascending CoC.
+    /// Front to back, by ascending CoC.
     pub bins: Vec<Bin>,
-    /// The filters, in units of bin pixels.
+    /// Filters, in bin pixels.
     pub bank: Arc<Bank>,
-    /// Which of the ladder's banks that is.
+    /// Index of `bank` in the ladder's banks.
     pub bank_index: usize,
     /// Highlight recovery: 1 + 1/M, or infinity when off.
     pub expansion: f32,
-    /// Whether the rank is full and the method the paper's: an exact 2-D gather.
+    /// True if the rank is full and the method is the paper's: an exact 2-D gather.
     pub exact: bool,
     coc: CocKind,
-    /// Whether bins stay at full scale as far as [`MOST_FULL_RADIUS_PX`] allows.
+    /// Whether bins stay at full scale up to a radius of [`MAX_FULL_RADIUS_PX`].
     full_scale: bool,
-    /// Largest radius in the bin in focus.
+    /// Largest radius in the bin in focus, in pixels.
     focus_px: f32,
-    /// Largest CoC radius behind the focal plane and in front of it.
+    /// Largest CoC radius behind and in front of the focal plane, in pixels.
     max_px: [f32; 2],
     counts: Counts,
-    /// Behind the focal plane and in front of it, outwards.
+    /// Pieces behind and in front of the focal plane, each outwards.
     pieces: [Vec<Piece>; 2],
 }
 
 impl Plan {
-    /// Plans frames of `width` x `height` pixels, at the settings' quality to begin with. Radii are cut to
+    /// Plans frames of `width` x `height` pixels, at first at the quality of the settings. Radii are clamped to
     /// [`Settings::most_radius_px`].
     pub fn new(settings: &Settings, width: u32, height: u32) -> Self {
         let settings = &settings.within((width, height));
@@ -140,7 +141,7 @@ impl Plan {
         plan
     }
 
-    /// Plans the next frames at another quality, or the nearest that the settings allow. Allocates nothing.
+    /// Plans the next frames at another quality, or at the nearest one that the settings allow. Allocates nothing.
     pub fn set_quality(&mut self, quality: Quality) {
         let level = self.ladder.nearest(quality);
         if level.quality == self.quality {
@@ -152,7 +153,8 @@ impl Plan {
         self.lay_out_pieces();
     }
 
-    /// The bins of a uniform radius or of a ramp; with depth there is one until [`Plan::split`] has seen a frame.
+    /// Lays out the bins of a uniform radius or of a ramp; with depth there is one bin until [`Plan::split`] has seen a
+    /// frame.
     fn lay_out_pieces(&mut self) {
         let [far_px, near_px] = self.max_px;
         let [far, near] = &mut self.pieces;
@@ -170,7 +172,7 @@ impl Plan {
         self.lay_out_bins();
     }
 
-    /// Splits the CoC of a frame into bins where it follows depth and bins are layers; else they stay.
+    /// Splits the CoC of a frame into bins, if the CoC follows depth and bins are layers; otherwise the bins stay.
     pub fn split(&mut self, depth: Option<&DepthMap>, coc: &CocField) {
         if self.compositing != Compositing::Layers {
             return;
@@ -182,7 +184,7 @@ impl Plan {
         self.lay_out_layers();
     }
 
-    /// As [`Plan::split`], by the radius of every pixel.
+    /// Same as [`Plan::split`], given the radius of every pixel.
     pub fn split_radii(&mut self, coc_px: &[f32]) {
         if self.compositing == Compositing::Layers {
             self.counts.count_radii(coc_px, self.width);
@@ -190,9 +192,9 @@ impl Plan {
         }
     }
 
-    /// The radius in front of the focal plane below which all belongs to the bin in focus.
+    /// Returns the radius in front of the focal plane below which everything belongs to the bin in focus, in pixels.
     pub fn near_from_px(&self) -> f32 {
-        self.rung.near_from_px.max(self.rung.near_from_share * self.max_px[0])
+        self.rung.near_from_px.max(self.rung.near_from_fraction * self.max_px[0])
     }
 
     fn lay_out_layers(&mut self) {
@@ -203,19 +205,19 @@ impl Plan {
         self.lay_out_bins();
     }
 
-    /// Makes the bins of the current pieces, front to back. A bin always has the slot of its place, whatever the level:
-    /// 0 in focus, then those behind, outwards, then those in front.
+    /// Makes the bins of the current pieces, front to back. The slot of a bin depends only on its place: 0 in focus,
+    /// then those behind, outwards, then those in front; every quality level uses the same order.
     fn lay_out_bins(&mut self) {
         let [far, near] = &self.pieces;
-        let per_side = self.ladder.most_bins_per_side();
+        let per_side = self.ladder.max_bins_per_side();
         let inner_px = |pieces: &[Piece]| pieces.first().map_or(f32::INFINITY, |piece| piece.border_px);
         let outer_px = |pieces: &[Piece], k: usize| pieces.get(k + 1).map_or(f32::INFINITY, |piece| piece.border_px);
         let bin = |(low_px, high_px): (f32, f32), content: (f32, f32), slot: usize| {
             let scale = match self.compositing {
                 Compositing::Gather => 1,
-                _ if self.full_scale => scale_within(content.1, MOST_FULL_RADIUS_PX),
-                // One radius everywhere.
-                Compositing::Select if content.0 == content.1 => self.rung.even_scale(content.0),
+                _ if self.full_scale => scale_within(content.1, MAX_FULL_RADIUS_PX),
+                // Uniform radius.
+                Compositing::Select if content.0 == content.1 => self.rung.uniform_scale(content.0),
                 _ => self.rung.scale(content.0, content.1),
             };
             Bin {
@@ -234,7 +236,7 @@ impl Plan {
             let content = (piece.low_px, piece.high_px.min(self.max_px[1]));
             self.bins.push(bin((-outer_px(near, k), -piece.border_px), content, 1 + per_side + k));
         }
-        // A uniform radius, whose border is 0, leaves nothing in focus.
+        // A uniform radius has border 0, and no pixels in focus.
         if inner_px(far) > 0.0 {
             self.bins.push(bin((-inner_px(near), inner_px(far)), (0.0, self.focus_px), 0));
         }
@@ -245,59 +247,61 @@ impl Plan {
         }
     }
 
-    /// Whether truncation makes a bin's filters overshoot visibly. Small filters keep nearly all of their terms: even
-    /// ones have `reach + 1`, others `2 reach + 1`.
+    /// Whether truncation makes a bin's filters overshoot visibly. Small filters keep nearly all of their terms: a
+    /// symmetric kernel has `reach + 1`, any other `2 reach + 1`.
     pub fn has_lobes(&self, bin: &Bin) -> bool {
         let reach = self.bin_reach(bin);
-        self.bank.terms < if self.bank.even { reach } else { 2 * reach }
+        self.bank.terms < if self.bank.is_symmetric { reach } else { 2 * reach }
     }
 
-    /// The finest scale that a bin in this slot can have, at any level: far from focus, layers are always reduced.
+    /// Returns the finest scale of any bin in this slot, over all levels: layers far from focus are always reduced.
     pub fn least_scale(&self, slot: usize) -> usize {
-        let side = self.ladder.most_bins_per_side();
-        let fine = slot == 0 || (slot - 1) % side.max(1) < self.ladder.most_fine_bins();
+        let side = self.ladder.max_bins_per_side();
+        let fine = slot == 0 || (slot - 1) % side.max(1) < self.ladder.max_fine_bins();
         if self.full_scale || fine || self.compositing != Compositing::Layers { 1 } else { 2 }
     }
 
-    /// How many slots for bins an executor needs, whatever the level.
+    /// Returns the number of bin slots that an executor needs, over all levels.
     pub fn slots(&self) -> usize {
         match self.coc {
             CocKind::Depth if self.compositing == Compositing::Gather => 1,
-            CocKind::Depth => 1 + 2 * self.ladder.most_bins_per_side(),
+            CocKind::Depth => 1 + 2 * self.ladder.max_bins_per_side(),
             CocKind::Ramp if self.pieces[0].is_empty() => 1,
-            CocKind::Ramp => 1 + self.ladder.most_bins_per_side(),
-            // Its one bin is in slot 1.
+            CocKind::Ramp => 1 + self.ladder.max_bins_per_side(),
+            // The only bin is in slot 1.
             CocKind::Uniform => 2,
         }
     }
 
-    /// The outermost tap of a bin's filters, in bin pixels.
+    /// Returns the outermost tap of a bin's filters, in bin pixels.
     pub fn bin_reach(&self, bin: &Bin) -> usize {
         self.bank.node_reach[self.bank.node(bin.max_radius_px)] as usize
     }
 
-    /// The index of the bin that uses a slot, in this frame.
+    /// Returns the index of the bin in a slot, in this frame.
     pub fn bin_in(&self, slot: usize) -> Option<usize> {
         self.bins.iter().position(|bin| bin.slot == slot)
     }
 
-    /// How many cells away content can reach a cell, and the whole segment that its radius is read for.
+    /// Returns the radius of the neighbourhood of a cell, in cells: the filter support and one segment, for which a
+    /// radius is read.
     pub fn reach_cells(&self, bin: &Bin) -> usize {
         (self.bin_reach(bin) + SEGMENT).div_ceil(CELL)
     }
 
-    /// Radius in bin pixels for a CoC radius in pixels of the picture.
+    /// Returns the radius in bin pixels for a CoC radius in pixels of the picture.
     #[inline(always)]
     pub fn bin_radius_px(&self, bin: &Bin, coc_px: f32) -> f32 {
         compensated_radius_px(coc_px, bin.scale).min(bin.max_radius_px)
     }
 
-    /// How much bin `index` takes of a pixel.
-    pub fn share(&self, index: usize) -> Share {
-        Share::new(index.checked_sub(1).and_then(|front| self.border(front)), self.border(index))
+    /// Returns the weight function of bin `index`.
+    pub fn share(&self, index: usize) -> BinWeight {
+        BinWeight::new(index.checked_sub(1).and_then(|front| self.border(front)), self.border(index))
     }
 
-    /// The mixed pixels of a frame that are taken apart: only layers can, and only with depth of the picture's size.
+    /// Returns the mixed pixels of a frame, if they can be separated into two surfaces: only layers can, and only with
+    /// depth of the picture's size.
     pub fn matte<'a>(&self, depth: Option<&'a DepthMap>, coc: &CocField) -> Option<&'a Matte> {
         let map = depth.filter(|map| (map.width as usize, map.height as usize) == (self.width, self.height))?;
         let some = 1..=Matte::most(self.width, self.height);
@@ -305,18 +309,18 @@ impl Plan {
         (apart && some.contains(&map.matte.pixels.len())).then_some(&map.matte)
     }
 
-    /// The border between bin `index` and the one behind it: its CoC, and 1 over the width of the hand-over.
+    /// Returns the border between bin `index` and the bin behind it: its CoC, and 1 over the width of the cross-fade.
     pub fn border(&self, index: usize) -> Option<(f32, f32)> {
         let at = self.bins[index].high_px;
         at.is_finite().then(|| (at, 1.0 / (2.0 * HAND_OVER * at.abs())))
     }
 }
 
-/// Half the width of the hand-over between two bins, as a fraction of the border's CoC.
+/// Half the width of the cross-fade between two bins, as a fraction of the border's CoC.
 pub(super) const HAND_OVER: f32 = 0.15;
 
-/// Splits the radii of a ramp into pieces of one ratio, as a blur's look goes with the ratio; none where the largest
-/// radius is hardly above that of the bin in focus.
+/// Splits the radii of a ramp into pieces of equal ratio, because the look of a blur depends on the ratio. Returns none
+/// if the largest radius is hardly above that of the bin in focus.
 fn geometric_pieces(max_px: f32, bins: u32) -> impl Iterator<Item = Piece> {
     let ratio = max_px / FOCUS_BORDER_PX;
     let border_px = move |k: u32| FOCUS_BORDER_PX * ratio.powf(k as f32 / bins as f32);
@@ -327,10 +331,10 @@ fn geometric_pieces(max_px: f32, bins: u32) -> impl Iterator<Item = Piece> {
     })
 }
 
-/// The radius, in pixels of a picture reduced by `scale`, that blurs as much as `coc_px` does at full size.
+/// Returns the radius, in pixels of a picture reduced by `scale`, that blurs as much as `coc_px` does at full size.
 ///
 /// The tents down and up add (2 s^2 + 1) / 12 of variance each, per axis in pixels of the picture, and larger pixels
-/// (s^2 - 1) / 12; a disc of radius R has R^2 / 4. What the way down and up adds is taken off the radius.
+/// (s^2 - 1) / 12; a disc of radius R has R^2 / 4. The added variance is subtracted from that of the disc.
 #[inline(always)]
 pub fn compensated_radius_px(coc_px: f32, scale: usize) -> f32 {
     if scale == 1 {

@@ -1,5 +1,5 @@
-//! Pictures in memory of somebody else's, such as arrays of other languages: blurred on the CPU from slice to slice,
-//! without a copy, and with the radius of every pixel given where it is known.
+//! Pictures in foreign memory, such as arrays of other languages: blurred on the CPU from slice to slice, without a
+//! copy, optionally with the radius of every pixel.
 
 use std::ops::ControlFlow;
 
@@ -9,7 +9,7 @@ use super::plan::Plan;
 use super::{BokehError, Settings};
 use crate::optics::CocField;
 
-/// The CPU executor for such pictures of one size; nothing is allocated per picture.
+/// CPU executor for slices of pictures of one size; allocates nothing per picture.
 pub struct SliceBlur {
     settings: Settings,
     size: (u32, u32),
@@ -18,7 +18,7 @@ pub struct SliceBlur {
 }
 
 impl SliceBlur {
-    /// An executor for pictures of `size` (width, height) on `threads` threads, all cores when `None`.
+    /// Creates an executor for pictures of `size` (width, height) on `threads` threads, all cores when `None`.
     ///
     /// # Errors
     /// The blur is too wide, or the picture too large ([`Settings::check`]).
@@ -28,23 +28,23 @@ impl SliceBlur {
         Ok(Self { settings: settings.clone(), size, threads, cpu })
     }
 
-    /// What it was made for.
+    /// Returns its settings.
     pub fn settings(&self) -> &Settings {
         &self.settings
     }
 
-    /// Columns and rows of its pictures.
+    /// Returns columns and rows of its pictures.
     pub fn size(&self) -> (u32, u32) {
         self.size
     }
 
-    /// Blurs a picture into `out`: both `height * width * 3` samples, 8-bit sRGB or linear light as [`Pixels`] has them.
-    /// Highlights are recovered in 8-bit pictures alone. [`Radii::Each`] is for settings whose
-    /// [`CocKind`](crate::optics::CocKind) is `Depth`. `go_on` is asked after each pass, a few times per picture;
-    /// `Break` stops the work, and then `out` holds nothing of use.
+    /// Blurs a picture into `out`. Both have `height * width * 3` samples, 8-bit sRGB or linear light ([`Pixels`]).
+    /// Highlights are recovered in 8-bit pictures only. [`Radii::Each`] needs settings whose
+    /// [`CocKind`](crate::optics::CocKind) is `Depth`. Calls `go_on` after each pass, a few times per picture; on
+    /// `Break` it stops, and `out` is unspecified.
     ///
     /// # Errors
-    /// [`BokehError::NoDepth`], or [`BokehError::Lengths`] when slices have other lengths than the picture.
+    /// [`BokehError::NoDepth`], or [`BokehError::Lengths`] if the lengths of slices do not match the picture.
     pub fn blur<T: Sample>(
         &mut self,
         pixels: &[T],
@@ -64,7 +64,7 @@ impl SliceBlur {
         }
         let flow = self.cpu.blur_pixels(pixels, coc, out, |_| go_on());
         if flow.is_break() {
-            // What the passes left is half of one frame and half of another.
+            // The buffers hold parts of two frames now.
             self.cpu = CpuBokeh::new(Plan::new(&self.settings, self.size.0, self.size.1), self.threads);
         }
         Ok(flow)

@@ -1,42 +1,43 @@
-//! Depth slicing by histogram: splits a frame's CoC into bins where few pixels lie, so that a surface stays in one
-//! piece and two surfaces do not share a bin. A flat background then costs one bin, however wide the possible range.
+//! Depth slicing by histogram: bin borders lie where few pixels are, so that a surface stays in one bin and two
+//! surfaces do not share one. A flat background then costs one bin, however wide the possible range.
 
-use super::rung::{FOCUS_BORDER_PX, Rung};
+use super::rung::{FOCUS_BORDER_PX, QualityLevel};
 use crate::frame::DepthMap;
 use crate::optics::DepthCoc;
 
-/// Buckets to an octave of `|c|`.
+/// Buckets per octave of `|c|`.
 const PER_OCTAVE: usize = 16;
-/// Buckets on one side of the focal plane: `|c|` from 1 px to 256 px, and beyond in the last.
+/// Buckets on one side of the focal plane: `|c|` from 1 px to 256 px; the last bucket holds everything beyond.
 const BUCKETS: usize = 8 * PER_OCTAVE;
-/// Shifted right by this, the bits of a float number the buckets: its exponent, and the top bits of its mantissa.
+/// Right shift that turns the bits of a float into its bucket: exponent and top bits of the mantissa remain.
 const BUCKET_SHIFT: u32 = f32::MANTISSA_DIGITS - 1 - PER_OCTAVE.ilog2();
-/// The shifted bits of the radius at which bucket 0 begins.
+/// Shifted bits of the radius at which bucket 0 begins.
 const FIRST: u32 = FOCUS_BORDER_PX.to_bits() >> BUCKET_SHIFT;
-/// Samples across a frame that has as many columns: at least this many, and less than twice as many.
+/// Minimum of samples across a frame with enough columns; there are less than twice this number.
 const SAMPLES_ACROSS: usize = 320;
-/// What one more bin costs: by this much it must lower the sum over all bins of the variance of `ln |c|` within a bin
-/// times its share of the picture.
+/// Cost of one more bin: it must lower the sum over all bins of (variance of `ln |c|` in the bin) x (fraction of the
+/// picture) by this.
 const BIN_COST: f64 = 0.002;
-/// This share of a bin's pixels may have a smaller radius than its scale is made for.
-const STRAY: f32 = 0.02;
+/// Fraction of a bin's pixels that may have a smaller radius than its scale is made for.
+const STRAY_FRACTION: f32 = 0.02;
 
-/// A range of `|c|` on one side of the focal plane, and where in it pixels lie.
+/// A range of `|c|` on one side of the focal plane that contains pixels.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Piece {
-    /// Border towards the focal plane, pixels.
+    /// Border towards the focal plane, in pixels.
     pub border_px: f32,
-    /// Below this lies nothing but strays.
+    /// Smallest radius, in pixels, ignoring strays.
     pub low_px: f32,
+    /// Largest radius, in pixels.
     pub high_px: f32,
 }
 
-/// The histogram of a frame's CoC.
+/// Histogram of a frame's CoC.
 #[derive(Clone, Debug)]
 pub struct Counts {
-    /// Samples per bucket of `|c|`, behind and in front of the focal plane; those in focus are in no bucket.
+    /// Samples per bucket of `|c|`, behind and in front of the focal plane; pixels in focus are in no bucket.
     sides: [[u32; BUCKETS]; 2],
-    /// All samples, those in focus included.
+    /// Number of samples, including those in focus.
     samples: u32,
 }
 
@@ -47,12 +48,12 @@ impl Default for Counts {
 }
 
 impl Counts {
-    /// Counts the pixels of a frame, on a grid that is fine enough for the statistics.
+    /// Counts the pixels of a frame on a subsampled grid.
     pub fn count(&mut self, depth: &DepthMap, lens: &DepthCoc) {
         self.count_values(&depth.metres, depth.width as usize, |metres| lens.coc_px(metres));
     }
 
-    /// As [`Counts::count`], of `width` radii a row.
+    /// Same as [`Counts::count`] for radii, `width` per row.
     pub fn count_radii(&mut self, coc_px: &[f32], width: usize) {
         self.count_values(coc_px, width, |coc_px| coc_px);
     }
@@ -65,7 +66,7 @@ impl Counts {
             for &value in row.iter().step_by(step) {
                 let coc_px = coc_px_of(value);
                 let bucket = (coc_px.abs().to_bits() >> BUCKET_SHIFT).wrapping_sub(FIRST);
-                // In focus, below bucket 0, the difference wraps.
+                // In focus, below bucket 0, the difference wraps around.
                 if bucket < 1 << 16 {
                     self.sides[usize::from(coc_px < 0.0)][(bucket as usize).min(BUCKETS - 1)] += 1;
                 }
@@ -74,32 +75,32 @@ impl Counts {
         }
     }
 
-    /// Splits one side into `pieces`, from the focal plane outwards, at most as many as the rung has bins: dynamic
-    /// programming finds the cheapest ones. Returns the largest radius, in pixels, that is left to the bin in focus,
-    /// which in front keeps everything up to `near_from_px`.
-    pub fn pieces(&self, near: bool, rung: &Rung, near_from_px: f32, pieces: &mut Vec<Piece>) -> f32 {
+    /// Splits one side into `pieces`, outwards from the focal plane, at most one per bin of the quality level, by
+    /// dynamic programming over the bucket borders. Returns the largest radius that is left to the bin in focus, in
+    /// pixels; in front it keeps everything up to `near_from_px`.
+    pub fn pieces(&self, near: bool, rung: &QualityLevel, near_from_px: f32, pieces: &mut Vec<Piece>) -> f32 {
         pieces.clear();
         let side = &self.sides[usize::from(near)];
         let bins = (rung.bins_per_side as usize).min(MAX_PIECES);
         let Some(last) = side.iter().rposition(|&n| n > 0) else { return FOCUS_BORDER_PX };
-        // A nose is not a layer of its own: what is hardly out of focus in front belongs to the subject.
+        // A nose is no layer of its own: slightly defocused pixels in front belong to the subject.
         let first = if near { near_from_px.log2() * PER_OCTAVE as f32 } else { 0.0 } as usize;
         if last < first {
             return edge_px(last + 1);
         }
-        // Sums of shares of the picture, and of these times ln |c| and times its square, up to each bucket. A constant
-        // factor of |c| (1.04: within the bucket) changes no variance.
+        // Prefix sums over the buckets of w, w ln |c| and w (ln |c|)^2, where w is the fraction of the picture. A
+        // constant factor on |c| (1.04: within the bucket) changes no variance.
         let mut sums = [[0.0f64; 3]; BUCKETS + 1];
         for (k, &n) in side.iter().enumerate() {
-            let (share, log) = (f64::from(n) / f64::from(self.samples), (f64::from(edge_px(k)) * 1.04).ln());
-            sums[k + 1] = [sums[k][0] + share, sums[k][1] + share * log, sums[k][2] + share * log * log];
+            let (fraction, log) = (f64::from(n) / f64::from(self.samples), (f64::from(edge_px(k)) * 1.04).ln());
+            sums[k + 1] = [sums[k][0] + fraction, sums[k][1] + fraction * log, sums[k][2] + fraction * log * log];
         }
-        // Variance of ln |c| in some buckets, times their share of the picture.
+        // Variance of ln |c| over some buckets, times their fraction of the picture.
         let variance = |from: usize, to: usize| {
-            let [share, sum, squares] = std::array::from_fn(|p| sums[to][p] - sums[from][p]);
-            if share > 0.0 { (squares - sum * sum / share).max(0.0) } else { 0.0 }
+            let [fraction, sum, squares] = std::array::from_fn(|p| sums[to][p] - sums[from][p]);
+            if fraction > 0.0 { (squares - sum * sum / fraction).max(0.0) } else { 0.0 }
         };
-        // best[j][to]: least cost of buckets first..to in j + 1 pieces, and where the last of them begins.
+        // best[j][to]: smallest cost of buckets first..to in j + 1 pieces, and the start of the last piece.
         let mut best = [[(f64::INFINITY, 0usize); BUCKETS + 1]; MAX_PIECES];
         for (to, best) in best[0].iter_mut().enumerate().take(last + 2).skip(first + 1) {
             *best = (variance(first, to), first);
@@ -107,7 +108,7 @@ impl Counts {
         for j in 1..bins {
             for to in first + j + 1..=last + 1 {
                 for from in first + j..to {
-                    // A piece begins with pixels. Only the first ones may need full scale, which is expensive.
+                    // A piece begins with pixels. Only the first pieces may need full scale, which is expensive.
                     if side[from] == 0 || j >= rung.fine_bins() && edge_px(from) < rung.scale_from_px[1] {
                         continue;
                     }
@@ -129,19 +130,19 @@ impl Counts {
         pieces.first().map_or(FOCUS_BORDER_PX, |piece| piece.border_px)
     }
 
-    /// The piece of buckets `from..to`, with its border in the empty buckets before it.
+    /// Returns the piece of buckets `from..to`, with its border in the empty buckets before it.
     fn piece(&self, side: &[u32; BUCKETS], from: usize, to: usize) -> Piece {
         let total: u32 = side[from..to].iter().sum();
         let first = (from..to).find(|&k| side[k] > 0).unwrap_or(from);
-        let mut strays = (STRAY * total as f32) as u32;
-        // The first bucket that is not made of strays alone.
+        let mut strays = (STRAY_FRACTION * total as f32) as u32;
+        // First bucket that does not consist of strays alone.
         let low = (from..to).find(|&k| {
             let is_stray = side[k] <= strays;
             strays = strays.saturating_sub(side[k]);
             !is_stray
         });
         let high = (from..to).rposition(|k| side[k] > 0).map_or(from, |k| from + k);
-        // The border is the geometric mean of the gap's ends, but not far out where the gap is wide.
+        // The border is the geometric mean of the gap's ends, but not far out if the gap is wide.
         let gap = (0..first).rev().find(|&k| side[k] > 0).map_or(0, |k| k + 1);
         Piece {
             border_px: (edge_px(gap) * edge_px(first)).sqrt().min(2.5 * edge_px(gap)),
@@ -151,10 +152,10 @@ impl Counts {
     }
 }
 
-/// Most pieces of a side.
+/// Largest number of pieces per side.
 pub const MAX_PIECES: usize = 6;
 
-/// Lower edge of a bucket, in pixels.
+/// Returns the lower edge of a bucket, in pixels.
 fn edge_px(bucket: usize) -> f32 {
     f32::from_bits((FIRST + bucket as u32) << BUCKET_SHIFT)
 }

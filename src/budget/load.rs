@@ -1,72 +1,72 @@
-//! How long a stage takes for a frame, as learnt from the last ones.
+//! Model of a stage's time per frame, learnt from the last frames.
 
 use super::window::Window;
 
-/// The most rungs that a ladder can have.
+/// Largest number of quality levels of a ladder.
 pub const MAX_RUNGS: usize = 8;
 
 /// Frames in the history of loads: 1.5 s at 30 fps.
 const LOADS: usize = 45;
-/// A step up looks only at the newest of these, so that a load that has fallen is soon forgotten. With fewer, no high
-/// percentile is taken at all.
+/// A step up considers only this many of the newest loads, so that a past load is soon forgotten. With fewer loads, no
+/// high percentile is computed.
 pub(super) const RECENT: usize = 20;
 /// Percentiles that count as the high load, for steps down and up: rarer spikes are ignored.
 const HIGH: f64 = 0.95;
 const HIGH_RECENT: f64 = 0.9;
-/// The median of a few loads times this stands for a high percentile, so that a jump of the load is seen at once.
+/// The median of a few loads times this estimates a high percentile, so that a rise of the load is seen at once.
 const ABOVE_MEDIAN: f64 = 1.1;
-/// Frames at a rung before its cost is learnt, the fewest if it is left earlier, and the exponent that damps the
+/// Frames at a level before its cost is learnt, the minimum if it is left earlier, and the exponent that damps the
 /// correction.
 pub(super) const LEARN_FROM: usize = 8;
-pub(super) const LEARN_LEAST: usize = 3;
-const LEARN_SHARE: f64 = 0.3;
-/// No learnt cost is farther than this factor from the initial one, either way.
-pub(super) const LEARN_MOST: f64 = 3.0;
-/// After a pause this long the old loads say nothing: clocks have slowed down and caches are cold.
+pub(super) const MIN_LEARN_FRAMES: usize = 3;
+const LEARN_EXPONENT: f64 = 0.3;
+/// Largest ratio of a learnt cost to the initial one, either way.
+pub(super) const MAX_COST_RATIO: f64 = 3.0;
+/// After a pause this long the old loads are invalid: clocks have slowed down and caches are cold.
 pub(super) const IDLE_NS: u64 = 2_000_000_000;
 
 /// The time measured for one frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Sample {
-    /// The rung that it was made at.
+    /// Quality level of the frame.
     pub rung: usize,
-    /// Its time; 0 means that it was not measured.
+    /// Its time; 0 if it was not measured.
     pub took_ns: u64,
-    /// When it was done.
+    /// Time at which it was finished.
     pub at_ns: u64,
 }
 
-/// A frame's time as `load * cost(rung)`, of a stage. Memory is fixed.
+/// Model of a stage's time per frame: `load * cost(rung)`. Fixed size.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Load {
-    /// Ascending, as learnt; infinite from `rungs` on.
+    /// Learnt costs, ascending; infinite from `rungs` on.
     costs: [f64; MAX_RUNGS],
     initial_costs: [f64; MAX_RUNGS],
     rungs: usize,
     rung: usize,
-    /// Time divided by cost, in nanoseconds, of the last frames of any rung.
+    /// Time divided by cost, in nanoseconds, of the last frames of any level.
     loads: Window<LOADS>,
-    /// The same of the frames since the rung changed, at this rung only.
+    /// Same, only for frames at the present level since it was set.
     rung_loads: Window<LEARN_FROM>,
-    /// The load just before the rung changed, until the new rung's cost has been learnt from it.
+    /// Load just before the level changed, until the new level's cost has been learnt from it.
     load_before: Option<f64>,
-    /// The latest time of any sample.
+    /// Latest time of any sample.
     last_ns: u64,
 }
 
-/// What a sample was.
+/// Classification of a sample.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Noted {
-    /// Of no use.
+pub(super) enum SampleKind {
+    /// Invalid.
     Nothing,
-    /// Of another rung than the present one.
+    /// At another level than the present one.
     Other,
-    /// Of the present rung.
+    /// At the present level.
     Own,
 }
 
 impl Load {
-    /// Of a stage with these relative costs, the cheapest first, that starts at rung `start`.
+    /// Creates the model of a stage with these relative costs, cheapest first, that starts at level `start`.
     pub fn new(ladder: &[f64], start: usize) -> Self {
         assert!((1..=MAX_RUNGS).contains(&ladder.len()) && start < ladder.len(), "1 to {MAX_RUNGS} rungs");
         assert!(ladder[0] > 0.0 && ladder.is_sorted(), "costs ascend from above 0: {ladder:?}");
@@ -84,25 +84,25 @@ impl Load {
         }
     }
 
-    /// The relative costs as learnt, the cheapest first.
+    /// Returns the learnt relative costs, cheapest first.
     pub fn costs(&self) -> &[f64] {
         &self.costs[..self.rungs]
     }
 
-    /// How long the next frame is likely to take, in nanoseconds; `None` before the first sample.
+    /// Returns the expected time of the next frame, in nanoseconds; `None` before the first sample.
     pub fn expected_ns(&self) -> Option<u64> {
         (!self.loads.is_empty()).then(|| (self.loads.median(5) * self.costs[self.rung]) as u64)
     }
 
-    /// Whether so much time has passed that what was measured says nothing.
+    /// Whether the pause before `at_ns` was so long that the old loads are invalid.
     pub fn was_idle(&self, at_ns: u64) -> bool {
         at_ns.saturating_sub(self.last_ns) > IDLE_NS
     }
 
-    /// Takes in a frame's time.
-    pub fn note(&mut self, Sample { rung, took_ns, at_ns }: Sample) -> Noted {
+    /// Adds a frame's time.
+    pub fn note(&mut self, Sample { rung, took_ns, at_ns }: Sample) -> SampleKind {
         if took_ns == 0 || rung >= self.rungs {
-            return Noted::Nothing;
+            return SampleKind::Nothing;
         }
         if self.was_idle(at_ns) {
             self.forget();
@@ -111,28 +111,28 @@ impl Load {
         let load = took_ns as f64 / self.costs[rung];
         self.loads.push(load);
         if rung != self.rung {
-            return Noted::Other;
+            return SampleKind::Other;
         }
         self.rung_loads.push(load);
         if self.rung_loads.len() == LEARN_FROM {
             self.learn();
         }
-        Noted::Own
+        SampleKind::Own
     }
 
-    /// The load that nearly all frames stayed below, and that of the newest ones; and what is usual now.
+    /// Returns the high load of all and of the newest frames, and the usual load now.
     pub fn high(&self) -> ([f64; 2], f64) {
         let current = ABOVE_MEDIAN * self.loads.median(5);
         ([(LOADS, HIGH), (RECENT, HIGH_RECENT)].map(|(count, p)| self.percentile(count, p).max(current)), current)
     }
 
-    /// The load that a fraction `p` of the last `count` frames does not exceed; 0 after fewer than [`RECENT`] frames,
-    /// because the first ones are slow while caches are cold.
+    /// Returns the load that a fraction `p` of the last `count` frames does not exceed; 0 after fewer than [`RECENT`]
+    /// frames, because the first ones are slow while caches are cold.
     fn percentile(&self, count: usize, p: f64) -> f64 {
         if self.loads.len() < RECENT { 0.0 } else { self.loads.percentile(count, p) }
     }
 
-    /// Changes to the rung `to`, and first learns the cost of the one that is left.
+    /// Changes to level `to`, after learning the cost of the previous one.
     pub fn switch_to(&mut self, to: usize) {
         self.learn();
         self.load_before = (!self.rung_loads.is_empty()).then(|| self.rung_loads.median(5));
@@ -140,22 +140,22 @@ impl Load {
         self.rung_loads.clear();
     }
 
-    /// Corrects the cost of the present rung. A change of rung should leave the load as it is, so part of any jump is
-    /// put down to a wrong cost.
+    /// Corrects the cost of the present level. A change of level should leave the load as it is, so part of any change
+    /// of the load is attributed to a wrong cost.
     fn learn(&mut self) {
-        if self.rung_loads.len() < LEARN_LEAST {
+        if self.rung_loads.len() < MIN_LEARN_FRAMES {
             return;
         }
         let Some(before) = self.load_before.take() else { return };
         let (rung, ratio) = (self.rung, self.rung_loads.median(LEARN_FROM) / before);
-        let (low, high) = (self.initial_costs[rung] / LEARN_MOST, self.initial_costs[rung] * LEARN_MOST);
+        let (low, high) = (self.initial_costs[rung] / MAX_COST_RATIO, self.initial_costs[rung] * MAX_COST_RATIO);
         // The costs must stay ascending.
         let below = if rung > 0 { self.costs[rung - 1] } else { 0.0 };
         let above = if rung + 1 < self.rungs { self.costs[rung + 1] } else { f64::INFINITY };
-        self.costs[rung] = (self.costs[rung] * ratio.powf(LEARN_SHARE)).clamp(low.max(below), high.min(above));
+        self.costs[rung] = (self.costs[rung] * ratio.powf(LEARN_EXPONENT)).clamp(low.max(below), high.min(above));
     }
 
-    /// Keeps the rung and the costs, and forgets what the load was.
+    /// Forgets the loads; keeps the level and the costs.
     fn forget(&mut self) {
         self.loads.clear();
         self.rung_loads.clear();

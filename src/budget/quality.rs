@@ -1,4 +1,4 @@
-//! The rungs of the quality ladder. A rung changes fidelity, never the amount of blur.
+//! The quality levels. A level changes fidelity, never the amount of blur.
 
 use crate::names::named;
 

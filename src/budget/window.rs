@@ -1,11 +1,11 @@
-//! The last few values of a measurement, and their percentiles.
+//! Sliding window over the last values of a measurement, with percentiles.
 
-/// The last `N` values, in a ring buffer.
+/// Ring buffer of the last `N` values.
 #[derive(Clone, Copy, Debug)]
 pub struct Window<const N: usize> {
     values: [f64; N],
     len: usize,
-    /// Index of the next value to write, which holds the oldest once the buffer is full.
+    /// Index of the next value to write; it holds the oldest value once the buffer is full.
     next: usize,
 }
 
@@ -23,22 +23,22 @@ impl<const N: usize> Window<N> {
         self.len = (self.len + 1).min(N);
     }
 
-    /// Forgets everything.
+    /// Removes all values.
     pub fn clear(&mut self) {
         (self.len, self.next) = (0, 0);
     }
 
-    /// Values held.
+    /// Returns the number of values.
     pub fn len(&self) -> usize {
         self.len
     }
 
-    /// Whether none is held.
+    /// Whether the window is empty.
     pub fn is_empty(&self) -> bool {
         self.len == 0
     }
 
-    /// The smallest of the last `count` values that at least the fraction `p` (0 to 1) of them does not exceed
+    /// Returns the smallest of the last `count` values that at least the fraction `p` (0 to 1) of them does not exceed
     /// (nearest rank); 0 without values.
     pub fn percentile(&self, count: usize, p: f64) -> f64 {
         let count = count.min(self.len);
@@ -55,7 +55,7 @@ impl<const N: usize> Window<N> {
         sorted[rank - 1]
     }
 
-    /// The median of the last `count` values, the lower one of two; 0 without values.
+    /// Returns the median of the last `count` values, the lower one of two; 0 without values.
     pub fn median(&self, count: usize) -> f64 {
         self.percentile(count, 0.5)
     }
@@ -72,7 +72,7 @@ mod tests {
         for value in [9.0, 8.0, 1.0, 4.0, 2.0, 5.0, 3.0] {
             window.push(value);
         }
-        // Held: 1 4 2 5 3.
+        // The window contains 1 4 2 5 3.
         assert_eq!((window.len(), window.median(5), window.median(3), window.median(1)), (5, 3.0, 3.0, 3.0));
         assert_eq!(
             (window.percentile(5, 0.95), window.percentile(5, 0.6), window.percentile(99, 0.0)),

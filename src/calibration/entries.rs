@@ -1,4 +1,4 @@
-//! Entries that all formats have, as checked values: cameras, lenses, rotations, sizes.
+//! Validates the entries that all formats have: cameras, lenses, rotations, sizes.
 
 use glam::{DMat3, DQuat, DVec2, DVec3};
 
@@ -6,7 +6,7 @@ use super::Distortion;
 use super::error::{CalibrationError, Fault};
 use super::yaml::Value;
 
-/// How far a matrix may be from a rotation: calibrations are written with few digits.
+/// Largest deviation of a matrix from a rotation: calibrations are written with few digits.
 const ROTATION_TOLERANCE: f64 = 1e-3;
 /// Plausible focal lengths in pixels.
 const FOCALS_PX: std::ops::Range<f64> = 1.0..1e6;
@@ -15,7 +15,7 @@ fn impossible(value: Value<'_>, what: &'static str) -> CalibrationError {
     value.refuse(Fault::Impossible { key: value.key(), what })
 }
 
-/// Focal lengths and principal point in pixels, refused where they are implausible.
+/// Returns focal lengths and principal point in pixels; fails if they are implausible.
 pub(super) fn pinhole(value: Value<'_>, [fu, fv, cu, cv]: [f64; 4]) -> Result<(DVec2, DVec2), CalibrationError> {
     if ![fu, fv].iter().all(|focal_px| FOCALS_PX.contains(focal_px)) {
         return Err(impossible(value, "has a focal length that is not between 1 and a million pixels"));
@@ -26,7 +26,7 @@ pub(super) fn pinhole(value: Value<'_>, [fu, fv, cu, cv]: [f64; 4]) -> Result<(D
     Ok((DVec2::new(fu, fv), DVec2::new(cu, cv)))
 }
 
-/// As [`pinhole`], from a 3x3 camera matrix.
+/// Like [`pinhole`], from a 3x3 camera matrix.
 pub(super) fn camera_matrix(value: Value<'_>) -> Result<(DVec2, DVec2), CalibrationError> {
     let [fu, skew, cu, zero, fv, cv, below @ ..] = value.numbers::<9>(3, "3x3")?;
     if skew != 0.0 || zero != 0.0 || below != [0.0, 0.0, 1.0] {
@@ -35,7 +35,7 @@ pub(super) fn camera_matrix(value: Value<'_>) -> Result<(DVec2, DVec2), Calibrat
     pinhole(value, [fu, fv, cu, cv])
 }
 
-/// The distortion with the coefficients `value`, of the lens model that is named, or else radial-tangential.
+/// Returns the distortion with the coefficients `value`, of the lens model `model`, by default radial-tangential.
 pub(super) fn distortion(model: Option<Value<'_>>, value: Value<'_>) -> Result<Distortion, CalibrationError> {
     let name = model.map(|model| model.text()).transpose()?.unwrap_or("radial-tangential");
     let matrix = value.matrix()?;
@@ -71,7 +71,7 @@ pub(super) fn distortion(model: Option<Value<'_>>, value: Value<'_>) -> Result<D
     }
 }
 
-/// The exact rotation next to nine numbers, row by row, which may be off by rounding.
+/// Returns the rotation closest to nine numbers, row by row, which may have rounding errors.
 pub(super) fn rotation(value: Value<'_>, rows: &[f64; 9]) -> Result<DMat3, CalibrationError> {
     let matrix = DMat3::from_cols_array(rows).transpose();
     let deviation = matrix * matrix.transpose() - DMat3::IDENTITY;
@@ -81,7 +81,7 @@ pub(super) fn rotation(value: Value<'_>, rows: &[f64; 9]) -> Result<DMat3, Calib
     Ok(DMat3::from_quat(DQuat::from_mat3(&matrix).normalize()))
 }
 
-/// A pose `x -> rotation x + translation` from a 4x4 matrix.
+/// Returns a pose `x -> rotation x + translation` from a 4x4 matrix.
 pub(super) fn pose(value: Value<'_>) -> Result<(DMat3, DVec3), CalibrationError> {
     let m = value.numbers::<16>(4, "4x4")?;
     if m[12..] != [0.0, 0.0, 0.0, 1.0] {
@@ -91,13 +91,13 @@ pub(super) fn pose(value: Value<'_>) -> Result<(DMat3, DVec3), CalibrationError>
     Ok((turned, DVec3::new(m[3], m[7], m[11])))
 }
 
-/// Columns and rows of pictures.
+/// Returns columns and rows of pictures.
 pub(super) fn size(value: Value<'_>) -> Result<(u32, u32), CalibrationError> {
     let [width, height] = value.numbers::<2>(2, "a width and a height")?;
     Ok((side(value, width)?, side(value, height)?))
 }
 
-/// Columns or rows of pictures.
+/// Returns columns or rows of pictures.
 pub(super) fn side(value: Value<'_>, number: f64) -> Result<u32, CalibrationError> {
     if number.fract() != 0.0 || !(1.0..65536.0).contains(&number) {
         return Err(impossible(value, "is no size of pictures in whole pixels"));
@@ -105,7 +105,7 @@ pub(super) fn side(value: Value<'_>, number: f64) -> Result<u32, CalibrationErro
     Ok(number as u32)
 }
 
-/// `translation` from eye to eye, refused where it is 0.
+/// Returns the `translation` between the cameras; fails if it is 0.
 pub(super) fn nonzero(value: Value<'_>, translation: DVec3) -> Result<DVec3, CalibrationError> {
     if translation.length() < 1e-9 {
         return Err(impossible(value, "puts both cameras in one place (a baseline of 0)"));

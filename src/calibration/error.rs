@@ -1,4 +1,4 @@
-//! What can be wrong with a calibration: what, where, and what to do about it, in one line.
+//! Errors of calibrations: what is wrong, where, and what to do about it, in one line.
 
 use std::fmt;
 #[cfg(feature = "files")]
@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 #[cfg(feature = "files")]
 use crate::files::input::said;
 
-/// Why a calibration cannot be used.
+/// Error of reading or using a calibration.
 #[allow(missing_docs)] // The messages say what the fields are.
 #[derive(Debug, thiserror::Error)]
 pub enum CalibrationError {
@@ -16,41 +16,41 @@ pub enum CalibrationError {
     #[cfg(feature = "files")]
     #[error("cannot read the calibration {}: {}", path.display(), said(source))]
     Io { path: PathBuf, source: io::Error },
-    /// The file is none of those that are known.
+    /// The format of the file is unknown.
     #[error(
         "{}: not a stereo calibration: looked for M1 D1 M2 D2 R T (OpenCV), cam0 and cam1 (Kalibr) and T_BS (EuRoC); \
          name a file with one of them", .0.display()
     )]
     Unknown(PathBuf),
-    /// Files that do not make one calibration.
+    /// The number of files is wrong.
     #[error("a calibration is one or two files, and {0} were named")]
     Files(usize),
-    /// EuRoC keeps each eye in a file of its own.
+    /// EuRoC has a file per camera, and one was given.
     #[error("{}: this is the sensor.yaml of one camera; name those of both, the left one first", .0.display())]
     OneSensor(PathBuf),
-    /// Something in the file is wrong.
+    /// An entry of a file is wrong.
     #[error("{}: {fault}", Place(path, *line))]
     File {
         path: PathBuf,
-        /// Line, from 1; 0 where it is about the whole file.
+        /// Line, from 1; 0 for the whole file.
         line: usize,
         fault: Fault,
     },
     /// Numbers that did not come from a file are wrong.
     #[error("calibration: {0}")]
     Numbers(#[from] Fault),
-    /// The calibration is for pictures of another shape.
+    /// The calibration is for pictures of another aspect.
     #[error(
         "the calibration is for pictures of {}x{}, and these are {}x{}: neither the same size nor the same aspect; \
          calibrate at this size, or record at that one", calibrated.0, calibrated.1, found.0, found.1
     )]
     Shape {
-        /// Columns and rows that it is for.
+        /// Columns and rows of the calibration pictures.
         calibrated: (u32, u32),
         /// Columns and rows of the pictures.
         found: (u32, u32),
     },
-    /// The calibration does not say for which size it is, and it cannot be that of the pictures.
+    /// The calibration does not state its picture size, and does not fit the pictures.
     #[error(
         "the calibration names no picture size, and its principal point ({:.0}, {:.0}) is not near the middle of \
          {}x{}; add `image_size: [WIDTH, HEIGHT]` to it", center_px.0, center_px.1, found.0, found.1
@@ -61,10 +61,10 @@ pub enum CalibrationError {
         /// Columns and rows of the pictures.
         found: (u32, u32),
     },
-    /// The pictures are too small to have four neighbours anywhere, or larger than any map.
+    /// The pictures are too small for bilinear interpolation, or larger than any map.
     #[error("pictures of {}x{} cannot be rectified: each side needs 2 to 16384 pixels", .0.0, .0.1)]
     Size((u32, u32)),
-    /// The eyes are not beside each other.
+    /// The cameras are not side by side.
     #[error(
         "the cameras stand {0} each other: only cameras beside each other are matched; turn the rig, or its pictures \
          and the calibration"
@@ -73,28 +73,28 @@ pub enum CalibrationError {
     /// Left and right are exchanged.
     #[error("the calibration's left camera stands on the right; exchange the two pictures and the two cameras")]
     Swapped,
-    /// There is too little that both eyes see.
+    /// The views of the cameras overlap too little.
     #[error("the cameras look in directions that are too different: they share too little of their pictures")]
     Apart,
 }
 
-/// What can be wrong with an entry.
+/// Fault of an entry.
 #[allow(missing_docs)] // The messages say what the fields are.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Fault {
-    /// The file is no YAML.
+    /// The file is not YAML.
     #[error("not readable as YAML: {0}")]
     Yaml(String),
     /// A key is missing.
     #[error("{key} is missing; {hint}")]
     Missing { key: String, hint: &'static str },
-    /// Something else stands where an entry of a certain kind belongs.
+    /// The entry is of the wrong kind.
     #[error("{key} must be {expected}")]
     Kind { key: String, expected: &'static str },
-    /// What should be a number is none, or infinite.
+    /// The entry is not a finite number.
     #[error("{key} holds {text:?} where a finite number belongs; calibrate again")]
     NotFinite { key: String, text: String },
-    /// A matrix of the wrong size.
+    /// A matrix has the wrong size.
     #[error("{key} is {}x{}, and must be {expected}", found.0, found.1)]
     Dimensions {
         key: String,
@@ -102,31 +102,31 @@ pub enum Fault {
         /// Rows and columns that it must have.
         expected: &'static str,
     },
-    /// A matrix whose data does not fill its rows and columns.
+    /// The data of a matrix does not fill its rows and columns.
     #[error("{key} says {}x{}, and holds {found} numbers", said.0, said.1)]
     Data {
         key: String,
-        /// Rows and columns that it says it has.
+        /// Rows and columns according to the file.
         said: (usize, usize),
-        /// How many numbers there are.
+        /// Number of elements in the data.
         found: usize,
     },
-    /// Numbers that cannot be what they should be.
+    /// The numbers are invalid for their purpose.
     #[error("{key} {what}; calibrate again")]
     Impossible {
         key: String,
-        /// What is wrong with them.
+        /// What is wrong with the numbers.
         what: &'static str,
     },
-    /// A model of camera or lens that is not known here.
+    /// The model of camera or lens is not supported.
     #[error("{key} {found:?} is not known here; known are {known}")]
     Model {
         key: String,
         found: String,
-        /// The models that are known.
+        /// The supported models.
         known: &'static str,
     },
-    /// Coefficients of terms that are not known here.
+    /// Coefficients of unsupported terms are not 0.
     #[error(
         "{key} has coefficients beyond k6 (thin prism, tilt) that are not 0, which are not known here; \
          calibrate without CALIB_THIN_PRISM_MODEL and CALIB_TILTED_MODEL"
@@ -134,7 +134,7 @@ pub enum Fault {
     Prism { key: String },
 }
 
-/// A file and, where one is to blame, a line.
+/// A file and an optional line, for messages.
 struct Place<'a>(&'a Path, usize);
 
 impl fmt::Display for Place<'_> {

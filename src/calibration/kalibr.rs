@@ -1,21 +1,19 @@
-//! Kalibr's camchain: `cam0` and `cam1` with the pose between them.
-//!
-//! P. Furgale et al., *Unified temporal and spatial calibration for multi-sensor systems*, IROS 2013;
-//! the keys are those of Kalibr's page "YAML formats".
+//! Reads Kalibr's camchain: `cam0` and `cam1` with the pose between them (P. Furgale et al., *Unified temporal and
+//! spatial calibration for multi-sensor systems*, IROS 2013); the keys are those of Kalibr's page "YAML formats".
 
 use super::error::CalibrationError;
 use super::euroc::pinhole_only;
 use super::yaml::{File, Value};
 use super::{Eye, StereoCalibration, entries};
 
-/// What to do where a key is missing.
+/// Remedy for a missing key.
 const HINT: &str = "name the camchain that kalibr_calibrate_cameras wrote for both cameras";
 
-/// The calibration of the first two cameras of a chain.
+/// Reads the first two cameras of a chain.
 pub(super) fn from_file(file: &File) -> Result<StereoCalibration, CalibrationError> {
-    let cameras = [file.root().need("cam0", HINT)?, file.root().need("cam1", HINT)?];
+    let cameras = [file.root().require("cam0", HINT)?, file.root().require("cam1", HINT)?];
     // From the axes of cam0 ("cn minus 1") to those of cam1.
-    let pose = cameras[1].need("T_cn_cnm1", HINT)?;
+    let pose = cameras[1].require("T_cn_cnm1", HINT)?;
     let (rotation, translation_m) = entries::pose(pose)?;
     Ok(StereoCalibration {
         eyes: [eye(cameras[0])?, eye(cameras[1])?],
@@ -26,13 +24,13 @@ pub(super) fn from_file(file: &File) -> Result<StereoCalibration, CalibrationErr
     })
 }
 
-/// The camera under `cam0` or `cam1`.
+/// Reads the camera under `cam0` or `cam1`.
 fn eye(camera: Value<'_>) -> Result<Eye, CalibrationError> {
     pinhole_only(camera)?;
-    let intrinsics = camera.need("intrinsics", HINT)?;
+    let intrinsics = camera.require("intrinsics", HINT)?;
     let numbers = intrinsics.numbers::<4>(4, "4 numbers (fu fv pu pv)")?;
     let (focal_px, center_px) = entries::pinhole(intrinsics, numbers)?;
-    let coefficients = camera.need("distortion_coeffs", HINT)?;
+    let coefficients = camera.require("distortion_coeffs", HINT)?;
     Ok(Eye {
         size: camera.get("resolution").map(entries::size).transpose()?,
         focal_px,

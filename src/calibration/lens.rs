@@ -1,4 +1,4 @@
-//! Cameras as rays: from a point in space to a pixel and back.
+//! Projection of points in space to pixels, and back to rays.
 //!
 //! Radial-tangential: D. C. Brown, *Decentering distortion of lenses*, 1966, with OpenCV's rational terms.
 //! Equidistant: J. Kannala, S. Brandt, *A generic camera model and calibration method*, PAMI 28 (2006), eq. 6.
@@ -7,13 +7,13 @@ use glam::{DMat2, DVec2, DVec3};
 
 use super::{Distortion, Eye};
 
-/// Rays further than this from the axis are left out: a flat picture of them would have no end.
-const WIDEST_DEG: f64 = 80.0;
-/// Angle between the rays at which [`Distortion::reach`] samples the model.
+/// Largest angle of a ray to the axis: a flat picture of wider ones would be unbounded.
+const MAX_ANGLE_DEG: f64 = 80.0;
+/// Step of the angle at which [`Distortion::reach`] samples the model.
 const STEP_DEG: f64 = 0.1;
 
 impl Distortion {
-    /// The distorted distance from the axis of a ray at the undistorted distance `radius`, both on the plane at
+    /// Returns the distorted distance from the axis for the undistorted distance `radius`, both on the plane at
     /// distance 1, without the tangential part.
     fn radial(&self, radius: f64) -> f64 {
         match *self {
@@ -29,7 +29,7 @@ impl Distortion {
         }
     }
 
-    /// Where a lens images what a pinhole images at `point`, both on the plane at distance 1.
+    /// Returns the distorted position of the undistorted `point`, both on the plane at distance 1.
     pub fn distort(&self, point: DVec2) -> DVec2 {
         let r2 = point.length_squared();
         let radius = r2.sqrt();
@@ -41,17 +41,16 @@ impl Distortion {
         bent + DVec2::new(across, down)
     }
 
-    /// Greatest distance from the axis up to which the model is one-to-one, on the plane at distance 1: polynomials
-    /// turn back somewhere beyond the rays that they were fitted to. At most that of 80 degrees.
+    /// Returns the largest distance from the axis up to which the model is one-to-one, on the plane at distance 1:
+    /// polynomials turn back beyond the rays that they were fitted to. At most that of 80 degrees.
     pub fn reach(&self) -> f64 {
         let radius = |step: u32| (f64::from(step) * STEP_DEG).to_radians().tan();
-        let last = (WIDEST_DEG / STEP_DEG) as u32;
+        let last = (MAX_ANGLE_DEG / STEP_DEG) as u32;
         let spreads = |step: &u32| self.radial(radius(step + 1)) > self.radial(radius(*step));
         radius((0..last).find(|step| !spreads(step)).unwrap_or(last))
     }
 
-    /// The point that is imaged at `point`: [`Distortion::distort`] backwards. What lies beyond `reach` is taken to be
-    /// there.
+    /// Inverts [`Distortion::distort`]. Points beyond `reach` are clamped to it.
     pub fn undistort(&self, point: DVec2, reach: f64) -> DVec2 {
         let length = point.length();
         if length == 0.0 && self.distort(point) == point {
@@ -60,8 +59,8 @@ impl Distortion {
         if length >= self.radial(reach) {
             return point * (reach / length);
         }
-        // The radial part by bisection, which always converges, to a billionth of the reach; the little that the
-        // tangential part adds by Newton's method.
+        // The radial part by bisection, which always converges, to a billionth of the reach; the small tangential part
+        // by Newton's method.
         let (mut near, mut far) = (0.0, reach);
         for _ in 0..30 {
             let middle = (near + far) / 2.0;
@@ -73,7 +72,7 @@ impl Distortion {
             let slope = |step: DVec2| (self.distort(guess + step) - self.distort(guess - step)) / (2.0 * DELTA);
             let slopes = DMat2::from_cols(slope(DVec2::X * DELTA), slope(DVec2::Y * DELTA));
             let next = guess + slopes.inverse() * (point - self.distort(guess));
-            // A step this long leaves the neighbourhood in which the method converges.
+            // A longer step leaves the neighbourhood in which the method converges.
             if !next.is_finite() || (next - guess).length() > 0.1 {
                 break;
             }
@@ -84,15 +83,15 @@ impl Distortion {
 }
 
 impl Eye {
-    /// The pixel that sees what lies at `point` in the camera's axes (x right, y down, z forward), also outside the
-    /// picture; `None` behind the camera and beyond the lens's `reach`.
+    /// Returns the pixel that sees `point` in the camera's axes (x right, y down, z forward), also outside the picture;
+    /// `None` behind the camera and beyond the lens's `reach`.
     pub fn project(&self, point: DVec3, reach: f64) -> Option<DVec2> {
         let flat = point.truncate() / point.z;
         let is_seen = point.z > 0.0 && flat.length_squared() <= reach * reach;
         is_seen.then(|| self.distortion.distort(flat) * self.focal_px + self.center_px)
     }
 
-    /// The ray of a pixel, on the plane at distance 1; at `reach` where it lies beyond.
+    /// Returns the ray of a pixel, on the plane at distance 1, clamped to `reach`.
     pub fn ray(&self, pixel_px: DVec2, reach: f64) -> DVec2 {
         self.distortion.undistort((pixel_px - self.center_px) / self.focal_px, reach)
     }

@@ -1,7 +1,9 @@
-//! Pictures resampled bilinearly at places that are known beforehand, in fixed point.
+//! Bilinear resampling of pictures with precomputed positions, in fixed point.
 //!
-//! Every pixel has the place of the upper left of its four neighbours and two fractions in 1/256 pixel, 0 to 256. The
-//! four weights sum to 256, so that a picture that stays where it is keeps every bit.
+//! Each pixel has the index of the upper left of its four neighbours and two fractions in 1/256 pixel, 0 to 256. The
+//! four weights sum to 256, so that an identity map keeps every bit.
+//!
+//! twin: shaders/stereo_rectify.wgsl
 
 use std::ops::Range;
 
@@ -10,23 +12,23 @@ use pulp::{Arch, Simd, WithSimd};
 
 use crate::frame::{ColorImage, GrayImage};
 
-/// 1 in fixed point: fractions and weights are in parts of this.
+/// 1 in fixed point: the unit of fractions and weights.
 pub(crate) const ONE: u32 = 256;
-/// Where the second fraction begins.
+/// Bit at which the second fraction begins.
 pub(crate) const DOWN_SHIFT: u32 = 16;
-/// Marks a pixel that sees nothing: the sign bit, which no fractions reach.
+/// Marks a pixel outside the source: the sign bit, which no fractions reach.
 pub(crate) const NOWHERE: u32 = 1 << 31;
-/// Pixels that are gathered before they are weighted: the weighting alone is vector code.
+/// Pixels gathered before they are weighted: only the weighting is vector code.
 const BLOCK: usize = 64;
 /// Bytes of a colour pixel.
 const RGB: usize = 3;
 
-/// Where the pixels of a picture come from in another one of the same size. What lies more than half a pixel outside
-/// becomes black, and within that margin the border pixel itself.
+/// Source positions of the pixels of a picture in another one of the same size. Sources more than half a pixel outside
+/// become black; within that margin the border pixel is used.
 #[derive(Clone, Debug)]
 pub struct Map {
     size: (u32, u32),
-    /// For each pixel the index of the upper left neighbour, which has another one on its right and below.
+    /// For each pixel the index of its upper left neighbour, which has others on its right and below.
     starts: Vec<u32>,
     /// For each pixel the fractions across and, from [`DOWN_SHIFT`] on, down; or [`NOWHERE`].
     fractions: Vec<u32>,
@@ -34,8 +36,8 @@ pub struct Map {
 }
 
 impl Map {
-    /// The map of pictures of `size` (columns, rows; each at least 2) whose pixel at `p` comes from `source(p)`;
-    /// pixel centres are at whole numbers.
+    /// Computes the map of pictures of `size` (columns, rows; each at least 2) whose pixel at `p` comes from
+    /// `source(p)`; pixel centres are at integers.
     pub(super) fn new(size: (u32, u32), source: impl Fn(DVec2) -> Option<DVec2>) -> Self {
         let (width, height) = size;
         let pixels = width as usize * height as usize;
@@ -60,19 +62,18 @@ impl Map {
         Self { size, starts, fractions, arch: Arch::new() }
     }
 
-    /// Columns and rows of the pictures.
+    /// Returns columns and rows of the pictures.
     pub fn size(&self) -> (u32, u32) {
         self.size
     }
 
-    /// For every pixel the index of the upper left one of the four that it comes from, and both fractions: for executors
-    /// elsewhere.
+    /// Returns for each pixel the index of the upper left one of its four sources, and both fractions, for the GPU.
     #[cfg(feature = "gpu")]
     pub(crate) fn words(&self) -> [&[u32]; 2] {
         [&self.starts, &self.fractions]
     }
 
-    /// Where the pixel in column `x` and row `y` comes from, as it is stored; `None` where it sees nothing.
+    /// Returns the source position of the pixel in column `x` and row `y`, as stored; `None` outside the source.
     pub fn source_px(&self, x: u32, y: u32) -> Option<DVec2> {
         let (width, at) = (self.size.0, (y * self.size.0 + x) as usize);
         let (start, fractions) = (self.starts[at], self.fractions[at]);
@@ -84,7 +85,7 @@ impl Map {
     /// Resamples a colour picture into `into`, in sRGB values.
     ///
     /// # Panics
-    /// When `from` has not the size [`Map::size`].
+    /// Panics if `from` does not have the size [`Map::size`].
     pub fn color(&self, from: &ColorImage, into: &mut ColorImage) {
         into.resize(self.size.0, self.size.1);
         self.color_rows(from, 0..self.size.1 as usize, &mut into.rgb);
@@ -93,16 +94,16 @@ impl Map {
     /// Resamples a grey picture into `into`.
     ///
     /// # Panics
-    /// When `from` has not the size [`Map::size`].
+    /// Panics if `from` does not have the size [`Map::size`].
     pub fn gray(&self, from: &GrayImage, into: &mut GrayImage) {
         into.resize(self.size.0, self.size.1);
         self.gray_rows(from, 0..self.size.1 as usize, &mut into.luma);
     }
 
-    /// [`Map::color`] of some rows only: `into` has their bytes.
+    /// Resamples some rows like [`Map::color`]: `into` has their bytes.
     ///
     /// # Panics
-    /// When `from` has not the size [`Map::size`], and when `rows` are not all within it.
+    /// Panics if `from` does not have the size [`Map::size`], or if `rows` exceed it.
     pub fn color_rows(&self, from: &ColorImage, rows: Range<usize>, into: &mut [u8]) {
         assert_eq!(from.size(), self.size, "pictures are resampled at one size");
         let (starts, fractions) = self.rows(rows);
@@ -110,17 +111,17 @@ impl Map {
         self.arch.dispatch(Color { starts, fractions, from: &from.rgb, stride, into: into.as_chunks_mut().0 });
     }
 
-    /// [`Map::gray`] of some rows only: `into` has their bytes.
+    /// Resamples some rows like [`Map::gray`]: `into` has their bytes.
     ///
     /// # Panics
-    /// When `from` has not the size [`Map::size`], and when `rows` are not all within it.
+    /// Panics if `from` does not have the size [`Map::size`], or if `rows` exceed it.
     pub fn gray_rows(&self, from: &GrayImage, rows: Range<usize>, into: &mut [u8]) {
         assert_eq!(from.size(), self.size, "pictures are resampled at one size");
         let (starts, fractions) = self.rows(rows);
         self.arch.dispatch(Gray { starts, fractions, from: &from.luma, stride: self.size.0 as usize, into });
     }
 
-    /// The starts and fractions of the pixels in `rows`.
+    /// Returns the starts and fractions of the pixels in `rows`.
     fn rows(&self, rows: Range<usize>) -> (&[u32], &[u32]) {
         let width = self.size.0 as usize;
         let pixels = rows.start * width..rows.end * width;
@@ -128,7 +129,7 @@ impl Map {
     }
 }
 
-/// The weights of the upper left, upper right, lower left and lower right neighbour: they sum to [`ONE`].
+/// Returns the weights of the upper left, upper right, lower left and lower right neighbour, which sum to [`ONE`].
 #[inline(always)]
 fn weights(fractions: u32) -> [u32; 4] {
     let (across, down) = (fractions & 0x1FF, (fractions >> DOWN_SHIFT) & 0x1FF);
@@ -136,7 +137,7 @@ fn weights(fractions: u32) -> [u32; 4] {
     [ONE + both - across - down, across - both, down - both, both]
 }
 
-/// A mask of all bits, or of none for [`NOWHERE`].
+/// Returns a mask of all bits, or 0 for [`NOWHERE`].
 #[inline(always)]
 fn seen_mask(fractions: u32) -> u32 {
     !((fractions as i32 >> 31) as u32)
@@ -159,7 +160,7 @@ impl WithSimd for Gray<'_> {
         let mut corners = [0_u32; BLOCK];
         for ((starts, fractions), into) in blocks.zip(self.into.chunks_mut(BLOCK)) {
             for (corners, &start) in corners.iter_mut().zip(starts) {
-                // The four neighbours in one word.
+                // Packs the four neighbours into one word.
                 let four = &self.from[start as usize..][..self.stride + 2];
                 *corners = u32::from_le_bytes([four[0], four[1], four[self.stride], four[self.stride + 1]]);
             }
@@ -173,7 +174,7 @@ impl WithSimd for Gray<'_> {
     }
 }
 
-/// As [`Gray`], for sRGB pixels.
+/// Resamples sRGB pixels; `stride` is the bytes of a row.
 struct Color<'a> {
     starts: &'a [u32],
     fractions: &'a [u32],
@@ -196,8 +197,8 @@ impl WithSimd for Color<'_> {
             for ((upper, lower), &start) in uppers.iter_mut().zip(&mut lowers).zip(starts) {
                 let at = start as usize * RGB;
                 let below = at + self.stride;
-                *upper = eight(self.from, at);
-                *lower = eight(self.from, below.min(last)) >> ((below.max(last) - last) * 8);
+                *upper = read_u64(self.from, at);
+                *lower = read_u64(self.from, below.min(last)) >> ((below.max(last) - last) * 8);
             }
             let neighbours = uppers.iter().zip(&lowers).zip(fractions);
             for (pixel, ((&upper, &lower), &fractions)) in pixels.iter_mut().zip(neighbours) {
@@ -211,7 +212,7 @@ impl WithSimd for Color<'_> {
                     + (four[1] & RED_BLUE) * b
                     + (four[2] & RED_BLUE) * c
                     + (four[3] & RED_BLUE) * d;
-                // Sums are 256 times too large. Red and blue are shifted back; green belongs 8 bits up, where it is.
+                // Sums are scaled by 256. Red and blue are shifted back; green belongs 8 bits higher, so it stays.
                 let green = (green + ONE / 2) & 0xFF00;
                 let others = (others + (ONE / 2 * 0x1_0001)) >> 8 & RED_BLUE;
                 *pixel = (green | others) & seen_mask(fractions);
@@ -224,8 +225,8 @@ impl WithSimd for Color<'_> {
     }
 }
 
-/// The eight bytes from `at` on, the first one lowest.
+/// Returns the eight bytes from `at` on, the first one lowest.
 #[inline(always)]
-fn eight(bytes: &[u8], at: usize) -> u64 {
+fn read_u64(bytes: &[u8], at: usize) -> u64 {
     bytes[at..].first_chunk().map_or(0, |&eight| u64::from_le_bytes(eight))
 }

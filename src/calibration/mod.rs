@@ -1,7 +1,7 @@
-//! Two cameras beside each other: how each images the world, how they stand, and what makes their pictures a pair with
-//! the same point in the same row.
+//! Stereo calibration: intrinsics and lens of both cameras, the pose between them, and the rectification of their
+//! pictures.
 //!
-//! [`load`] reads a [`StereoCalibration`]; [`rectifier::Rectifier`] makes its pictures a rectified pair.
+//! [`load`] reads a [`StereoCalibration`]; [`rectifier::Rectifier`] turns its pictures into a rectified pair.
 
 #[cfg(feature = "files")]
 mod entries;
@@ -27,7 +27,7 @@ use glam::{DMat3, DQuat, DVec2, DVec3};
 pub use error::{CalibrationError, Fault};
 use rectification::Rectification;
 
-/// How a lens bends the rays of a pinhole camera.
+/// Lens distortion of a pinhole camera.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Distortion {
     /// OpenCV's model, in its order: k1 k2 p1 p2 k3 k4 k5 k6 (radial, tangential, rational; unused ones are 0).
@@ -36,43 +36,43 @@ pub enum Distortion {
     Equidistant([f64; 4]),
 }
 
-/// One camera as it was calibrated.
+/// Intrinsics and lens of a camera.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Eye {
-    /// Columns and rows of the pictures that the numbers belong to; `None` where the file does not say.
+    /// Columns and rows of the calibration pictures; `None` if the file does not state them.
     pub size: Option<(u32, u32)>,
     /// Focal lengths along columns and rows, in pixels, > 0.
     pub focal_px: DVec2,
-    /// Column and row of the principal point; pixel centres are at whole numbers.
+    /// Column and row of the principal point; pixel centres are at integers.
     pub center_px: DVec2,
-    /// Its lens.
+    /// Lens distortion.
     pub distortion: Distortion,
 }
 
-/// Two cameras, and how the right one stands: `x_right = rotation * x_left + translation_m`.
+/// Two cameras, with the pose of the right one: `x_right = rotation * x_left + translation_m`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StereoCalibration {
     /// Left, then right.
     pub eyes: [Eye; 2],
-    /// From the left camera's axes to the right one's.
+    /// Rotation from the left camera's axes to the right one's.
     pub rotation: DMat3,
-    /// The left camera's place in the right one's axes; about `(-baseline, 0, 0)`.
+    /// Position of the left camera in the right one's axes; about `(-baseline, 0, 0)`.
     pub translation_m: DVec3,
-    /// The rectification that the file itself gives; otherwise it is computed.
+    /// The rectification that the file contains; `None` to compute it.
     pub given: Option<Rectification>,
-    /// Whether the file, which names no unit, had a translation longer than 2: it was then taken as millimetres.
+    /// Whether the translation, which has no unit in the file, was longer than 2 and so taken as millimetres.
     pub assumed_mm: bool,
 }
 
-/// Aspects this close are the same: sizes are whole pixels.
-const SAME_ASPECT: f64 = 0.01;
+/// Relative difference up to which aspects count as equal: sizes are in whole pixels.
+const ASPECT_TOLERANCE: f64 = 0.01;
 
-/// Reads a calibration, recognised by content: OpenCV's FileStorage YAML (one file, or two; of `intrinsics.yml` and
-/// `extrinsics.yml` one is enough where the other one lies beside it), Kalibr's camchain, or EuRoC's `sensor.yaml` of
-/// the left and of the right camera.
+/// Reads a calibration, whose format is recognised by content: OpenCV's FileStorage YAML (one file or two; of
+/// `intrinsics.yml` and `extrinsics.yml` one suffices if the other is beside it), Kalibr's camchain, or EuRoC's
+/// `sensor.yaml` of the left and of the right camera.
 ///
 /// # Errors
-/// A file cannot be read, is none of these, has a key missing, or numbers that cannot be.
+/// Fails if a file is unreadable, of unknown format, or lacks a key, or if numbers are invalid.
 #[cfg(feature = "files")]
 pub fn load(paths: &[&Path]) -> Result<StereoCalibration, CalibrationError> {
     if !(1..=2).contains(&paths.len()) {
@@ -99,7 +99,7 @@ pub fn load(paths: &[&Path]) -> Result<StereoCalibration, CalibrationError> {
 }
 
 #[cfg(feature = "files")]
-/// The file beside `path` with `extrinsic` for `intrinsic` in its name, or the other way round, if there is one.
+/// Returns the file beside `path` with `extrinsic` for `intrinsic` in its name, or the other way round, if it exists.
 fn companion(path: &Path) -> Option<PathBuf> {
     let name = path.file_name()?.to_str()?;
     let other = if name.contains("intrinsic") {
@@ -111,28 +111,28 @@ fn companion(path: &Path) -> Option<PathBuf> {
 }
 
 impl StereoCalibration {
-    /// Half of the rotation between the eyes: applied in the right eye's axes, and its inverse in the left one's, it
-    /// makes both look the same way.
+    /// Returns half of the rotation between the cameras: applied in the right camera's axes, and its inverse in the
+    /// left one's, it makes both look in the same direction.
     fn half_turn(&self) -> DMat3 {
         DMat3::from_quat(DQuat::from_scaled_axis(DQuat::from_mat3(&self.rotation).to_scaled_axis() * -0.5))
     }
 
-    /// The left camera's place in the right one's axes after [`Self::half_turn`], in metres.
+    /// Returns the position of the left camera in the right one's axes after [`Self::half_turn`], in metres.
     fn halfway_m(&self) -> DVec3 {
         self.half_turn() * self.translation_m
     }
 
-    /// Distance of the eyes in metres.
+    /// Returns the distance between the cameras in metres.
     pub fn baseline_m(&self) -> f64 {
         self.translation_m.length()
     }
 
-    /// Whether the camera that is called left stands on the right.
+    /// Whether the left camera is on the right.
     pub fn is_swapped(&self) -> bool {
         self.halfway_m().x > 0.0
     }
 
-    /// The same rig with left and right exchanged; the pictures are to be exchanged as well.
+    /// Returns the same rig with left and right exchanged; the pictures must be exchanged as well.
     #[must_use]
     pub fn exchanged(&self) -> Self {
         let [left, right] = self.eyes;
@@ -146,11 +146,11 @@ impl StereoCalibration {
         }
     }
 
-    /// The calibration for pictures of `size` (columns, rows): scaled to it where the aspect is the same. One that
-    /// names no size is taken to be for `size` if the principal points lie in the middle half of the pictures.
+    /// Returns the calibration for pictures of `size` (columns, rows), scaled if the aspect is the same. Without a size
+    /// in the file it is assumed to be for `size` if the principal points are in the middle half of the pictures.
     ///
     /// # Errors
-    /// Neither holds.
+    /// Fails if the aspect differs, or the principal points are elsewhere.
     pub fn at(&self, size: (u32, u32)) -> Result<Self, CalibrationError> {
         let mut scaled = *self;
         for (side, eye) in scaled.eyes.iter_mut().enumerate() {
@@ -160,7 +160,7 @@ impl StereoCalibration {
             eye.center_px = scaled_px(eye.center_px, scale);
             if let Some(given) = &mut scaled.given {
                 given.centers_px[side] = scaled_px(given.centers_px[side], scale);
-                // Both eyes share one focal length: it is scaled once.
+                // Both cameras share one rectified focal length: it is scaled once.
                 if side == 0 {
                     given.focal_px *= scale;
                 }
@@ -169,7 +169,7 @@ impl StereoCalibration {
         Ok(scaled)
     }
 
-    /// What was assumed for pictures of `size` (columns, rows), a line each for the user; empty if nothing was.
+    /// Returns the assumptions made for pictures of `size` (columns, rows), one line each for the user.
     pub fn notes(&self, size: (u32, u32)) -> Vec<String> {
         let mut notes = Vec::new();
         if self.assumed_mm {
@@ -188,14 +188,14 @@ impl StereoCalibration {
     }
 }
 
-/// A place in a picture after the picture was scaled: its edges, half a pixel outside, go onto each other.
+/// Scales a point with its picture, whose edges lie half a pixel outside the border pixels' centres.
 fn scaled_px(point_px: DVec2, scale: DVec2) -> DVec2 {
     (point_px + 0.5) * scale - 0.5
 }
 
 impl Eye {
-    /// Scale along columns and rows from the pictures it was calibrated with to those of `size`; 1 where their size is
-    /// not known and may be `size`.
+    /// Returns the scale along columns and rows from the calibration pictures to those of `size`; 1 if their size is
+    /// unknown and may be `size`.
     fn scale_to(&self, size: (u32, u32)) -> Result<DVec2, CalibrationError> {
         let sides = |(width, height): (u32, u32)| DVec2::new(f64::from(width), f64::from(height));
         let Some(calibrated) = self.size else {
@@ -205,7 +205,7 @@ impl Eye {
             return if is_plausible { Ok(DVec2::ONE) } else { Err(refusal) };
         };
         let scale = sides(size) / sides(calibrated);
-        let is_same = (scale.x / scale.y - 1.0).abs() <= SAME_ASPECT;
+        let is_same = (scale.x / scale.y - 1.0).abs() <= ASPECT_TOLERANCE;
         if is_same { Ok(scale) } else { Err(CalibrationError::Shape { calibrated, found: size }) }
     }
 }

@@ -1,5 +1,5 @@
-//! OpenCV's FileStorage YAML, as its sample `stereo_calib` writes it: cameras, lenses and pose (M1 D1 M2 D2 R T), what
-//! `stereoRectify` makes of them (R1 R2 P1 P2), or both, in one file or two.
+//! Reads OpenCV's FileStorage YAML, as its sample `stereo_calib` writes it: cameras, lenses and pose (M1 D1 M2 D2 R T),
+//! the results of `stereoRectify` (R1 R2 P1 P2), or both, in one file or two.
 
 use glam::{DMat3, DVec2, DVec3};
 
@@ -8,19 +8,19 @@ use super::rectification::Rectification;
 use super::yaml::{File, Value};
 use super::{Eye, StereoCalibration, entries};
 
-/// A baseline longer than this is in millimetres: no rig of metres is that wide.
-const WIDEST_M: f64 = 2.0;
-/// How far the rectification may be from the pose that it belongs to: numbers of the rotation, and the translation
+/// A longer baseline must be in millimetres: no rig is that many metres wide.
+const MAX_BASELINE_M: f64 = 2.0;
+/// Largest difference between the rectification and the pose: of elements of the rotation, and of the translation
 /// relative to its length.
-const SAME_POSE: f64 = 0.02;
-/// What to do where a camera is missing.
+const POSE_TOLERANCE: f64 = 0.02;
+/// Remedy for a missing camera.
 const CAMERA_HINT: &str = "name the file with M1 D1 M2 D2 (intrinsics.yml) as well";
-/// What to do where a lens is missing.
+/// Remedy for a missing lens.
 const LENS_HINT: &str = "write the lens's coefficients, zeros where the pictures have no distortion";
-/// What to do where the pose is missing.
+/// Remedy for a missing pose.
 const POSE_HINT: &str = "name the file with R and T, or R1 R2 P1 P2 (extrinsics.yml), as well";
 
-/// The names of an entry, in small letters and without underscores.
+/// Alternative names of an entry, in lower case and without underscores.
 type Names = &'static [&'static str];
 
 const CAMERAS: [Names; 2] = [
@@ -41,8 +41,8 @@ const LENSES: [Names; 2] = [
 ];
 const ROTATION: Names = &["r", "rotation", "rotationmatrix"];
 const TRANSLATION: Names = &["t", "translation", "translationvector"];
-/// R1 and R2, which rotate each eye into the rectified axes.
-const TURNS: [Names; 2] = [&["r1", "rectificationleft", "rleft"], &["r2", "rectificationright", "rright"]];
+/// R1 and R2, which rotate from each camera's axes to the rectified ones.
+const ROTATIONS: [Names; 2] = [&["r1", "rectificationleft", "rleft"], &["r2", "rectificationright", "rright"]];
 const PROJECTIONS: [Names; 2] = [&["p1", "projectionleft", "pleft"], &["p2", "projectionright", "pright"]];
 const MODEL: Names = &["distortionmodel"];
 const SIZE: Names = &["imagesize", "size"];
@@ -54,36 +54,37 @@ fn find<'a>(files: &'a [File], names: Names) -> Option<Value<'a>> {
     files.iter().find_map(|file| file.root().find(is_it))
 }
 
-fn need<'a>(files: &'a [File], names: Names, key: &str, hint: &'static str) -> Result<Value<'a>, CalibrationError> {
+fn require<'a>(files: &'a [File], names: Names, key: &str, hint: &'static str) -> Result<Value<'a>, CalibrationError> {
     let missing = || files[0].root().refuse(Fault::Missing { key: key.into(), hint });
     find(files, names).ok_or_else(missing)
 }
 
 /// Whether the files have entries of this format.
 pub(super) fn is_known(files: &[File]) -> bool {
-    CAMERAS.into_iter().chain(TURNS).any(|names| find(files, names).is_some())
+    CAMERAS.into_iter().chain(ROTATIONS).any(|names| find(files, names).is_some())
         || (find(files, ROTATION).is_some() && find(files, TRANSLATION).is_some())
 }
 
-/// Whether cameras or pose are missing, which a second file may have.
+/// Whether cameras or pose are missing, which may be in a second file.
 pub(super) fn is_partial(files: &[File]) -> bool {
-    find(files, CAMERAS[0]).is_none() || (find(files, ROTATION).is_none() && find(files, TURNS[0]).is_none())
+    find(files, CAMERAS[0]).is_none() || (find(files, ROTATION).is_none() && find(files, ROTATIONS[0]).is_none())
 }
 
-/// The calibration in `files`, at least one. The pose is R and T, or else follows from R1 R2 P1 P2; where both are
-/// there they must agree.
+/// Reads the calibration in `files`, at least one. The pose is R and T, or else computed from R1 R2 P1 P2; if both are
+/// present they must agree.
 pub(super) fn from_files(files: &[File]) -> Result<StereoCalibration, CalibrationError> {
     let size = size(files)?;
     let eyes = [eye(files, 0, size)?, eye(files, 1, size)?];
     let mut given = given_rectification(files)?;
     let (rotation, translation) = match given {
         Some((ref given, shift)) if find(files, ROTATION).is_none() => {
-            // From the left eye to the rectified axes, and back to the right eye.
+            // From the left camera to the rectified axes, and on to the right camera.
             let rectified_to_right = given.rotations[1].transpose();
             (rectified_to_right * given.rotations[0], rectified_to_right * DVec3::new(shift, 0.0, 0.0))
         }
         _ => {
-            let (rotation, place) = (need(files, ROTATION, "R", POSE_HINT)?, need(files, TRANSLATION, "T", POSE_HINT)?);
+            let rotation = require(files, ROTATION, "R", POSE_HINT)?;
+            let place = require(files, TRANSLATION, "T", POSE_HINT)?;
             let translation = DVec3::from_array(place.numbers::<3>(3, "3x1")?);
             (entries::rotation(rotation, &rotation.numbers::<9>(3, "3x3")?)?, entries::nonzero(place, translation)?)
         }
@@ -91,14 +92,14 @@ pub(super) fn from_files(files: &[File]) -> Result<StereoCalibration, Calibratio
     if let Some((given, shift)) = &given {
         let turn_error = given.rotations[1] * rotation - given.rotations[0];
         let shift_error = given.rotations[1] * translation - DVec3::new(*shift, 0.0, 0.0);
-        let is_same = turn_error.to_cols_array().iter().all(|part| part.abs() < SAME_POSE);
-        if !is_same || shift_error.length() > SAME_POSE * translation.length() {
-            let value = need(files, TURNS[1], "R2", POSE_HINT)?;
+        let is_same = turn_error.to_cols_array().iter().all(|part| part.abs() < POSE_TOLERANCE);
+        if !is_same || shift_error.length() > POSE_TOLERANCE * translation.length() {
+            let value = require(files, ROTATIONS[1], "R2", POSE_HINT)?;
             let what = "does not belong to R and T: R2 R must be R1, and R2 T along the columns by P2";
             return Err(value.refuse(Fault::Impossible { key: value.key(), what }));
         }
     }
-    let assumed_mm = translation.length() > WIDEST_M;
+    let assumed_mm = translation.length() > MAX_BASELINE_M;
     let unit_m = if assumed_mm { 1e-3 } else { 1.0 };
     if let Some((given, _)) = &mut given {
         given.baseline_m *= unit_m;
@@ -112,7 +113,7 @@ pub(super) fn from_files(files: &[File]) -> Result<StereoCalibration, Calibratio
     })
 }
 
-/// Columns and rows of the pictures, from either spelling; `None` where the files do not say.
+/// Returns columns and rows of the pictures, from either spelling; `None` if the files do not state them.
 fn size(files: &[File]) -> Result<Option<(u32, u32)>, CalibrationError> {
     if let (Some(width), Some(height)) = (find(files, WIDTH), find(files, HEIGHT)) {
         let side = |value: Value<'_>| entries::side(value, value.count()?.into());
@@ -122,36 +123,36 @@ fn size(files: &[File]) -> Result<Option<(u32, u32)>, CalibrationError> {
 }
 
 fn eye(files: &[File], side: usize, size: Option<(u32, u32)>) -> Result<Eye, CalibrationError> {
-    let camera = need(files, CAMERAS[side], ["M1", "M2"][side], CAMERA_HINT)?;
+    let camera = require(files, CAMERAS[side], ["M1", "M2"][side], CAMERA_HINT)?;
     let (focal_px, center_px) = entries::camera_matrix(camera)?;
-    let lens = need(files, LENSES[side], ["D1", "D2"][side], LENS_HINT)?;
+    let lens = require(files, LENSES[side], ["D1", "D2"][side], LENS_HINT)?;
     Ok(Eye { size, focal_px, center_px, distortion: entries::distortion(find(files, MODEL), lens)? })
 }
 
-/// P1 or P2, taken apart.
+/// P1 or P2, decomposed.
 struct Projection<'a> {
     value: Value<'a>,
     focal_px: DVec2,
     center_px: DVec2,
-    /// The fourth column: the focal length times the place of the left eye.
+    /// The fourth column: the focal length times the position of the left camera.
     shift: DVec2,
 }
 
 fn projection(files: &[File], side: usize) -> Result<Projection<'_>, CalibrationError> {
-    let value = need(files, PROJECTIONS[side], ["P1", "P2"][side], POSE_HINT)?;
+    let value = require(files, PROJECTIONS[side], ["P1", "P2"][side], POSE_HINT)?;
     let [fx, _, cx, across, _, fy, cy, down, ..] = value.numbers::<12>(3, "3x4")?;
     let (focal_px, center_px) = entries::pinhole(value, [fx, fy, cx, cy])?;
     Ok(Projection { value, focal_px, center_px, shift: DVec2::new(across, down) })
 }
 
-/// The rectification by R1 R2 P1 P2, and how far points shift along the columns from the left eye to the right one, in
-/// the file's unit; `None` where the files have none of the four.
+/// Reads the rectification R1 R2 P1 P2, and the position of the left camera along the rows of the right one, in the
+/// file's unit; `None` if all four are missing.
 fn given_rectification(files: &[File]) -> Result<Option<(Rectification, f64)>, CalibrationError> {
-    if TURNS.into_iter().chain(PROJECTIONS).all(|names| find(files, names).is_none()) {
+    if ROTATIONS.into_iter().chain(PROJECTIONS).all(|names| find(files, names).is_none()) {
         return Ok(None);
     }
     let turn = |side: usize| {
-        let value = need(files, TURNS[side], ["R1", "R2"][side], POSE_HINT)?;
+        let value = require(files, ROTATIONS[side], ["R1", "R2"][side], POSE_HINT)?;
         entries::rotation(value, &value.numbers::<9>(3, "3x3")?)
     };
     let rotations: [DMat3; 2] = [turn(0)?, turn(1)?];

@@ -1,47 +1,47 @@
-//! The cameras that a rectified pair seems to come from: both turned to look the same way, with rows along the line
-//! between them, one focal length and one principal point.
+//! The virtual cameras of a rectified pair: rotated to the same direction, with rows parallel to the baseline, the same
+//! focal lengths and the same row of the principal point.
 //!
-//! Bouguet's method: each eye turns by half of what they differ in, so that each picture is bent as little as the other
-//! one, then both turn together until the baseline lies along the rows.
+//! Bouguet's method: each camera is rotated by half of the rotation between them, so that both pictures are distorted
+//! equally, then both together until the baseline is parallel to the rows.
 
 use glam::{DMat3, DQuat, DVec2, DVec3};
 
 use super::{CalibrationError, Eye, Fault, StereoCalibration};
 use crate::optics::StereoRig;
 
-/// The rectified focal length is at least this part of the cameras' own: a fisheye's rim is given up before its middle
-/// loses more detail.
-const LEAST_FOCAL: f64 = 0.7;
-/// The rectified focal length is at most this many times the cameras' own: beyond, both see too little in common.
-const MOST_FOCAL: f64 = 3.0;
+/// Minimum ratio of the rectified focal length to the cameras' own: a fisheye's rim is cropped before its centre loses
+/// more detail.
+const MIN_FOCAL_RATIO: f64 = 0.7;
+/// Maximum ratio of the rectified focal length to the cameras' own: beyond it, the views overlap too little.
+const MAX_FOCAL_RATIO: f64 = 3.0;
 /// Points along each border of a picture that are projected into the rectified one.
 const BORDER_POINTS: u32 = 256;
-/// Least z, after rotation, of a ray with z = 1: flatter ones would meet the rectified plane next to infinity, or
+/// Minimum z, after rotation, of a ray with z = 1: flatter ones would meet the rectified plane near infinity, or
 /// behind.
-const FLATTEST: f64 = 0.1;
+const MIN_RAY_Z: f64 = 0.1;
 
-/// How both eyes are turned, and what a pinhole then sees.
+/// Rotations and intrinsics of a rectified pair.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rectification {
-    /// From each eye's own axes (left, right) to the rectified ones.
+    /// Rotations from each camera's own axes (left, right) to the rectified ones.
     pub rotations: [DMat3; 2],
     /// Focal lengths along columns and rows of both rectified pictures, in pixels.
     pub focal_px: DVec2,
-    /// Principal points of the left and of the right rectified picture; in the same row.
+    /// Principal points of the left and of the right rectified picture, in the same row.
     pub centers_px: [DVec2; 2],
-    /// Distance of the eyes in metres, > 0.
+    /// Distance between the cameras in metres, > 0.
     pub baseline_m: f64,
 }
 
 impl Rectification {
-    /// The rectification of a calibration for pictures of `size`: the file's own, else Bouguet's. Of the latter both
-    /// pictures show the same directions, so that the disparity of infinity is 0: the largest window of the pictures'
-    /// aspect within what both eyes see, so that no corner is black; but with a focal length of at least 0.7 times the
-    /// cameras' own.
+    /// Returns the rectification of a calibration for pictures of `size`: the file's own, or else Bouguet's. In the
+    /// latter both pictures show the same directions, so that the disparity of infinity is 0, in the largest window of
+    /// the pictures' aspect within both views, so that no corner is black; but with a focal length of at least 0.7
+    /// times the cameras' own.
     ///
     /// # Errors
-    /// The pictures have another shape; the eyes are exchanged, not beside each other, or look in directions that are
-    /// too different; numbers that cannot be.
+    /// Fails if the pictures have another aspect; if the cameras are swapped, not side by side, or look in too
+    /// different directions; or if numbers are invalid.
     pub fn of(calibration: &StereoCalibration, size: (u32, u32)) -> Result<Self, CalibrationError> {
         let calibration = calibration.at(size)?;
         let halfway_m = calibration.halfway_m();
@@ -65,7 +65,7 @@ impl Rectification {
             return Ok(given);
         }
         let half_turn = calibration.half_turn();
-        // Seen from the right eye the left one then lies along -x.
+        // In the right camera's axes the left camera then lies along -x.
         let onto_rows = DMat3::from_quat(DQuat::from_rotation_arc(halfway_m.normalize(), DVec3::NEG_X));
         let rotations = [onto_rows * half_turn.transpose(), onto_rows * half_turn];
         let (focal_px, center_px) = common_window(&calibration.eyes, &rotations, size)?;
@@ -73,14 +73,14 @@ impl Rectification {
         Ok(Self { rotations, focal_px, centers_px: [center_px; 2], baseline_m: calibration.baseline_m() })
     }
 
-    /// The same with left and right exchanged.
+    /// Returns the rectification with left and right exchanged.
     #[must_use]
     pub fn exchanged(&self) -> Self {
         let ([left, right], [left_px, right_px]) = (self.rotations, self.centers_px);
         Self { rotations: [right, left], centers_px: [right_px, left_px], ..*self }
     }
 
-    /// From disparities of the rectified pair to depth.
+    /// Returns the rig that converts disparities of the rectified pair to depth.
     pub fn rig(&self) -> StereoRig {
         let [left_px, right_px] = self.centers_px;
         StereoRig {
@@ -91,15 +91,15 @@ impl Rectification {
         }
     }
 
-    /// The direction that a pixel of the rectified picture of an eye (0 left, 1 right) shows, in that eye's own axes.
+    /// Returns the direction of a pixel of a rectified picture (0 left, 1 right), in that camera's own axes.
     pub fn direction(&self, side: usize, pixel_px: DVec2) -> DVec3 {
         let flat = (pixel_px - self.centers_px[side]) / self.focal_px;
         self.rotations[side].transpose() * flat.extend(1.0)
     }
 }
 
-/// Focal length and principal point, in pixels, of the largest window of the pictures' aspect within what both eyes
-/// see.
+/// Returns focal length and principal point, in pixels, of the largest window of the pictures' aspect within both
+/// views.
 fn common_window(eyes: &[Eye; 2], rotations: &[DMat3; 2], size: (u32, u32)) -> Result<(f64, DVec2), CalibrationError> {
     let last_px = DVec2::new(f64::from(size.0) - 1.0, f64::from(size.1) - 1.0);
     // Corners of the window on the rectified plane at distance 1: no border point of either picture may lie inside.
@@ -108,7 +108,7 @@ fn common_window(eyes: &[Eye; 2], rotations: &[DMat3; 2], size: (u32, u32)) -> R
         let reach = eye.distortion.reach();
         let rectified = |pixel_px: DVec2| {
             let direction = *rotation * eye.ray(pixel_px, reach).extend(1.0);
-            direction.truncate() / direction.z.max(FLATTEST)
+            direction.truncate() / direction.z.max(MIN_RAY_Z)
         };
         for k in 0..=BORDER_POINTS {
             let along_px = last_px * f64::from(k) / f64::from(BORDER_POINTS);
@@ -122,10 +122,10 @@ fn common_window(eyes: &[Eye; 2], rotations: &[DMat3; 2], size: (u32, u32)) -> R
     let mean_focal_px = eyes.iter().map(|eye| eye.focal_px.element_sum()).sum::<f64>() / 4.0;
     // The focal length at which the picture just fits into the extent.
     let needed_px = (last_px / extent).max_element();
-    if extent.min_element() <= 0.0 || needed_px > mean_focal_px * MOST_FOCAL {
+    if extent.min_element() <= 0.0 || needed_px > mean_focal_px * MAX_FOCAL_RATIO {
         return Err(CalibrationError::Apart);
     }
-    let focal_px = needed_px.max(mean_focal_px * LEAST_FOCAL);
-    // The window's middle comes to the picture's.
+    let focal_px = needed_px.max(mean_focal_px * MIN_FOCAL_RATIO);
+    // Maps the window's centre to the picture's centre.
     Ok((focal_px, last_px / 2.0 - focal_px * (low + high) / 2.0))
 }

@@ -1,4 +1,4 @@
-//! Both eyes' pictures made a rectified pair, frame by frame.
+//! Rectifies the pictures of both cameras, frame by frame.
 
 use super::map::Map;
 use super::rectification::Rectification;
@@ -6,7 +6,7 @@ use super::{CalibrationError, StereoCalibration};
 use crate::frame::{ColorImage, GrayImage};
 use crate::optics::StereoRig;
 
-/// The pictures that can be rectified have sides of these lengths.
+/// Supported side lengths of pictures.
 const SIDES_PX: std::ops::RangeInclusive<u32> = 2..=16384;
 
 /// Rectifies pictures of one size. The maps are computed once; a frame allocates nothing.
@@ -17,10 +17,10 @@ pub struct Rectifier {
 }
 
 impl Rectifier {
-    /// The maps of a calibration for pictures of `size` (columns, rows).
+    /// Computes the maps of a calibration for pictures of `size` (columns, rows).
     ///
     /// # Errors
-    /// As [`Rectification::of`], and when a side has less than 2 pixels.
+    /// Fails like [`Rectification::of`], or if a side is outside 2 to 16384 pixels.
     pub fn new(calibration: &StereoCalibration, size: (u32, u32)) -> Result<Self, CalibrationError> {
         if ![size.0, size.1].iter().all(|side| SIDES_PX.contains(side)) {
             return Err(CalibrationError::Size(size));
@@ -35,39 +35,39 @@ impl Rectifier {
         Ok(Self { rectification, maps })
     }
 
-    /// Columns and rows of the pictures, before and after.
+    /// Returns columns and rows of the pictures, before and after.
     pub fn size(&self) -> (u32, u32) {
         self.maps[0].size()
     }
 
-    /// From disparities of the rectified pair to depth.
+    /// Returns the rig that converts disparities of the rectified pair to depth.
     pub fn rig(&self) -> StereoRig {
         self.rectification.rig()
     }
 
-    /// How the eyes were turned, and what they see now.
+    /// Returns the rotations and the intrinsics of the rectified pair.
     pub fn rectification(&self) -> &Rectification {
         &self.rectification
     }
 
-    /// Where the pixels of the left and of the right rectified picture come from: for other kinds of pictures, and for
-    /// parts of pictures on several threads.
+    /// Returns the maps of the left and of the right rectified picture, for other kinds of pictures, and for parts of
+    /// pictures on several threads.
     pub fn maps(&self) -> &[Map; 2] {
         &self.maps
     }
 
-    /// The left picture, rectified, into `into`.
+    /// Rectifies the left picture into `into`.
     ///
     /// # Panics
-    /// When `from` has not the size [`Rectifier::size`].
+    /// Panics if `from` does not have the size [`Rectifier::size`].
     pub fn left(&self, from: &ColorImage, into: &mut ColorImage) {
         self.maps[0].color(from, into);
     }
 
-    /// The right picture, rectified, into `into`.
+    /// Rectifies the right picture into `into`.
     ///
     /// # Panics
-    /// When `from` has not the size [`Rectifier::size`].
+    /// Panics if `from` does not have the size [`Rectifier::size`].
     pub fn right(&self, from: &GrayImage, into: &mut GrayImage) {
         self.maps[1].gray(from, into);
     }

@@ -1,4 +1,4 @@
-//! YAML as calibrations use it, with the line of every entry, for error messages.
+//! Parses the YAML of calibrations, with the line of every entry for error messages.
 
 use std::path::{Path, PathBuf};
 
@@ -7,8 +7,8 @@ use saphyr_parser::{Event, Parser, ScanError};
 use super::error::{CalibrationError, Fault};
 use crate::files::input;
 
-/// Lists and maps within each other, at most; calibrations need three.
-const MOST_NESTED: usize = 32;
+/// Maximum depth of nested lists and maps; calibrations need three.
+const MAX_NESTING: usize = 32;
 
 /// A parsed file.
 pub(super) struct File {
@@ -36,16 +36,16 @@ pub(super) struct Matrix {
 }
 
 impl File {
-    /// Reads the file `path`.
+    /// Reads and parses the file `path`.
     pub fn open(path: &Path) -> Result<Self, CalibrationError> {
         let fail = |source| CalibrationError::Io { path: path.to_owned(), source };
         let bytes = input::read(path, input::MOST_CALIBRATION_BYTES).map_err(fail)?;
         Self::parse(path, &String::from_utf8_lossy(&bytes))
     }
 
-    /// Reads `text`, the content of `path`.
+    /// Parses `text`, the content of `path`.
     pub fn parse(path: &Path, text: &str) -> Result<Self, CalibrationError> {
-        // OpenCV's first line `%YAML:1.0` is no directive of YAML: as a comment it disturbs nobody.
+        // OpenCV's first line `%YAML:1.0` is not a valid YAML directive, so it is turned into a comment.
         let commented = text.trim_start_matches('\u{feff}').strip_prefix('%').map(|rest| format!("#{rest}"));
         let text = commented.as_deref().unwrap_or(text);
         let root = parse_tree(text).map_err(|(line, what)| CalibrationError::File {
@@ -65,17 +65,17 @@ impl File {
     }
 }
 
-/// Parses the first document of `text`, an empty map where there is none. Fails with the line and what is wrong there.
+/// Parses the first document of `text`; an empty map without any. Fails with the line and the reason.
 fn parse_tree(text: &str) -> Result<Node, (usize, String)> {
     let fault = |error: ScanError| (error.marker().line(), error.info().replace('\n', " "));
-    // Lists and maps that have begun and not ended, the innermost last.
+    // Lists and maps that are still open, the innermost last.
     let mut open: Vec<Node> = Vec::new();
     for event in Parser::new_from_str(text) {
         let (event, span) = event.map_err(fault)?;
         let line = span.start.line();
         let done = match event {
             Event::Scalar(text, ..) => Node { line, kind: Kind::Scalar(text.into_owned()) },
-            Event::SequenceStart(..) | Event::MappingStart(..) if open.len() == MOST_NESTED => {
+            Event::SequenceStart(..) | Event::MappingStart(..) if open.len() == MAX_NESTING => {
                 return Err((line, "nested too deep".into()));
             }
             Event::SequenceStart(..) => {
@@ -98,7 +98,7 @@ fn parse_tree(text: &str) -> Result<Node, (usize, String)> {
             None => return Ok(done),
             Some(Kind::List(list)) => list.push(done),
             Some(Kind::Map(map)) => match map.last_mut() {
-                // A key without its value yet has a placeholder at line 0, which no parsed entry has.
+                // A key that still lacks its value has a placeholder at line 0, which no parsed entry has.
                 Some((_, value)) if value.line == 0 => *value = done,
                 _ => match done.kind {
                     Kind::Scalar(key) => map.push((key, Node { line: 0, kind: Kind::List(Vec::new()) })),
@@ -111,7 +111,7 @@ fn parse_tree(text: &str) -> Result<Node, (usize, String)> {
     Ok(Node { line: 1, kind: Kind::Map(Vec::new()) })
 }
 
-/// An entry of a file, and what it is called.
+/// An entry of a file, with its key.
 #[derive(Clone, Copy)]
 pub(super) struct Value<'a> {
     path: &'a Path,
@@ -121,30 +121,30 @@ pub(super) struct Value<'a> {
 }
 
 impl<'a> Value<'a> {
-    /// The error for `fault` in this file and line.
+    /// Returns the error for `fault` in this file and line.
     pub fn refuse(&self, fault: Fault) -> CalibrationError {
         CalibrationError::File { path: self.path.to_owned(), line: self.line, fault }
     }
 
-    /// Its key, for messages.
+    /// Returns the key, for messages.
     pub fn key(&self) -> String {
         self.key.to_owned()
     }
 
-    /// The entry whose key `is_it`.
+    /// Returns the entry whose key satisfies `is_it`.
     pub fn find(&self, is_it: impl Fn(&str) -> bool) -> Option<Value<'a>> {
         let Kind::Map(map) = self.kind else { return None };
         let (key, node) = map.iter().find(|(key, _)| is_it(key))?;
         Some(Value { path: self.path, key, line: node.line, kind: &node.kind })
     }
 
-    /// The entry `key`, if there is one.
+    /// Returns the entry `key`, if it exists.
     pub fn get(&self, key: &str) -> Option<Value<'a>> {
         self.find(|name| name == key)
     }
 
-    /// The entry `key`; `hint` says what to do where it is missing.
-    pub fn need(&self, key: &str, hint: &'static str) -> Result<Value<'a>, CalibrationError> {
+    /// Returns the entry `key`; `hint` is the remedy if it is missing.
+    pub fn require(&self, key: &str, hint: &'static str) -> Result<Value<'a>, CalibrationError> {
         self.get(key).ok_or_else(|| self.refuse(Fault::Missing { key: key.into(), hint }))
     }
 
@@ -168,7 +168,7 @@ impl<'a> Value<'a> {
         })
     }
 
-    /// A whole number, >= 0.
+    /// Returns an integer >= 0.
     pub fn count(&self) -> Result<u32, CalibrationError> {
         self.text()?.trim_end_matches(".0").parse().map_err(|_| self.wrong_kind("a whole number"))
     }
@@ -179,12 +179,13 @@ impl<'a> Value<'a> {
         Some(list.iter().map(move |node| Value { path, key, line: node.line, kind: &node.kind }))
     }
 
-    /// A matrix: `rows`, `cols` and `data`; a list of rows; or a list of numbers, which is one column.
+    /// Returns a matrix from `rows`, `cols` and `data`; from a list of rows; or from a list of numbers, as one column.
     pub fn matrix(&self) -> Result<Matrix, CalibrationError> {
         if let Kind::Map(_) = self.kind {
-            let side = |key| self.need(key, "a matrix has rows, cols and data")?.count();
+            let side = |key| self.require(key, "a matrix has rows, cols and data")?.count();
             let (rows, cols) = (side("rows")? as usize, side("cols")? as usize);
-            let data = self.need("data", "a matrix has rows, cols and data")?;
+            let data = self.require("data", "a matrix has rows, cols and data")?;
+            // Keeps the matrix's own key for messages.
             let data = Value { key: self.key, ..data }.matrix()?.data;
             if rows.checked_mul(cols) != Some(data.len()) {
                 return Err(self.refuse(Fault::Data { key: self.key(), said: (rows, cols), found: data.len() }));
@@ -211,11 +212,11 @@ impl<'a> Value<'a> {
         Ok(matrix)
     }
 
-    /// Exactly `N` numbers of a matrix with `rows` rows.
+    /// Returns exactly `N` numbers of a matrix with `rows` rows.
     pub fn numbers<const N: usize>(&self, rows: usize, expected: &'static str) -> Result<[f64; N], CalibrationError> {
         let Matrix { rows: found, cols, data } = self.matrix()?;
         let wrong = || self.refuse(Fault::Dimensions { key: self.key(), found: (found, cols), expected });
-        // A vector may lie or stand.
+        // Accepts row and column vectors.
         let fits = found == rows || (rows == N && found == 1);
         data.try_into().ok().filter(|_| fits).ok_or_else(wrong)
     }

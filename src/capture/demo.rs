@@ -1,8 +1,8 @@
-//! The demonstration: a short loop of the project's own scene with its depth, which is in the program itself.
+//! The demonstration: a short, built-in loop of the project's own scene with its depth.
 //!
-//! `recordings/make.rs` renders it, anti-aliased. `color.mjpeg` and `depth.mpng` are JPEGs and PNGs, one after the other:
-//! first a whole picture, then for each frame the tiles that ever change, side by side; `moving.png` says which those are.
-//! Each is decoded when it is first shown, and kept: from the second round on, playing is copying.
+//! `recordings/make.rs` renders it, anti-aliased. `color.mjpeg` and `depth.mpng` are concatenated JPEGs and PNGs: first
+//! a full picture, then for each frame the tiles that ever change, packed side by side; `moving.png` marks these tiles.
+//! Each picture is decoded when it is first shown, and cached: from the second round on, playing only copies.
 
 use std::io::Cursor;
 
@@ -11,68 +11,69 @@ use image::{DynamicImage, ImageFormat, ImageReader};
 use super::{Brings, Camera, CaptureError, Captured, Shot, SourceInfo};
 use crate::frame::Stamp;
 
-/// What the command line calls it.
+/// Name on the command line.
 pub const NAME: &str = "demo";
 /// Width and height of its pictures.
 pub const SIZE_PX: (u32, u32) = (640, 360);
-/// Its frame rate.
+/// Frame rate.
 pub const FRAMES_PER_SECOND: u32 = 24;
-/// Frames of the loop.
+/// Number of frames in the loop.
 pub const FRAMES: u32 = 48;
-/// Side of a tile: a block of a JPEG, so that tiles beside each other do not mix.
+/// Side of a tile: a JPEG block, so that neighbouring tiles do not mix.
 pub const TILE_PX: u32 = 8;
-/// What the lowest and the highest level of depth stand for.
+/// Depths of the lowest and the highest level, in metres.
 const RANGE_M: [f32; 2] = [13.0, 0.44];
 
 const COLOR: &[u8] = include_bytes!("../../recordings/demo/color.mjpeg");
 const DEPTH: &[u8] = include_bytes!("../../recordings/demo/depth.mpng");
 const MOVING: &[u8] = include_bytes!("../../recordings/demo/moving.png");
-/// What each picture of them begins with.
-const JPEG: &[u8] = &[0xff, 0xd8, 0xff];
-const PNG: &[u8] = b"\x89PNG\r\n\x1a\n";
+/// Signatures at which the files are split into pictures.
+const JPEG_SIGNATURE: &[u8] = &[0xff, 0xd8, 0xff];
+const PNG_SIGNATURE: &[u8] = b"\x89PNG\r\n\x1a\n";
 
-/// Plays the demonstration, again and again.
+/// Plays the demonstration in a loop.
 pub struct Demo {
     layout: Layout,
-    /// The pictures of each file.
+    /// The encoded pictures of each file.
     color: Vec<&'static [u8]>,
     depth: Vec<&'static [u8]>,
-    whole: Part,
-    /// What changes in each frame, once it was shown.
-    tiles: Vec<Option<Part>>,
-    /// What each level of depth stands for.
+    base: Pixels,
+    /// The tiles of each frame, once it was shown.
+    tiles: Vec<Option<Pixels>>,
+    /// The depth of each level, in metres.
     metres: [f32; 256],
-    /// Frames until the end.
+    /// Number of frames until the end.
     frames: Option<u64>,
     position: u64,
 }
 
-/// A picture, or tiles of one.
-struct Part {
+/// The colours and depth levels of a picture, or of its tiles.
+struct Pixels {
     rgb: Vec<u8>,
     levels: Vec<u8>,
 }
 
-/// Where the tiles are that ever change.
+/// The positions of the tiles that ever change.
 pub struct Layout {
-    /// Column and row of the first pixel of each.
+    /// Column and row of each tile's first pixel.
     moving: Vec<[u32; 2]>,
 }
 
 impl Layout {
-    /// A layout for the tiles that `moves` is true for, row by row.
+    /// Creates a layout of the tiles for which `moves` is true, in raster order.
     pub fn new(moves: impl IntoIterator<Item = bool>) -> Self {
         let columns = SIZE_PX.0 / TILE_PX;
         let places = (0..).map(|tile| [tile % columns * TILE_PX, tile / columns * TILE_PX]);
         Self { moving: places.zip(moves).filter(|(_, moves)| *moves).map(|(place, _)| place).collect() }
     }
 
-    /// Width and height in pixels of the tiles of a frame, side by side.
+    /// Width and height in pixels of the packed tiles of a frame.
     pub fn size_px(&self) -> (u32, u32) {
         (SIZE_PX.0, (self.moving.len() as u32).div_ceil(SIZE_PX.0 / TILE_PX) * TILE_PX)
     }
 
-    /// The rows of the tiles, [`TILE_PX`] pixels each: numbers of their first pixels among the tiles and in the picture.
+    /// Iterates over the rows of the tiles, [`TILE_PX`] pixels each: the indices of their first pixels among the packed
+    /// tiles and in the picture.
     pub fn runs(&self) -> impl Iterator<Item = [usize; 2]> {
         let width = SIZE_PX.0;
         self.moving.iter().zip(0..).flat_map(move |(&[column, row], tile)| {
@@ -85,34 +86,34 @@ impl Layout {
     }
 }
 
-/// The level that a depth is kept as: even steps of inverse depth, 0.0086 per metre.
+/// Quantizes a depth in metres to a level: uniform steps of inverse depth, 0.0086 per metre.
 pub fn level(z_m: f32) -> u8 {
     let [far, near] = RANGE_M.map(f32::recip);
     ((z_m.recip() - far) / (near - far) * 255.0).round() as u8
 }
 
-/// The depth that a level stands for, in metres.
+/// Returns the depth of a level, in metres.
 pub fn metres(level: u8) -> f32 {
     let [far, near] = RANGE_M.map(f32::recip);
     (far + (near - far) * f32::from(level) / 255.0).recip()
 }
 
 impl Demo {
-    /// The demonstration, for so many frames, or without end.
+    /// Creates the demonstration, for this number of frames, or endless.
     ///
     /// # Errors
     /// It cannot be decoded: the program is damaged.
     pub fn new(frames: Option<u64>) -> Result<Self, CaptureError> {
-        let moving = decoded(MOVING, ImageFormat::Png)?.into_luma8();
+        let moving = decode_image(MOVING, ImageFormat::Png)?.into_luma8();
         let layout = Layout::new(moving.iter().map(|&moves| moves != 0));
-        let [color, depth] = [(COLOR, JPEG), (DEPTH, PNG)].map(|(file, begin)| pictures(file, begin));
+        let [color, depth] = [(COLOR, JPEG_SIGNATURE), (DEPTH, PNG_SIGNATURE)].map(|(file, signature)| split_pictures(file, signature));
         if [&color, &depth].iter().any(|pictures| pictures.len() != 1 + FRAMES as usize) {
             return Err(CaptureError::Demo("pictures are missing".into()));
         }
-        let whole = Part::decode(color[0], depth[0], SIZE_PX)?;
+        let base = Pixels::decode(color[0], depth[0], SIZE_PX)?;
         let tiles = (0..FRAMES).map(|_| None).collect();
         let metres = std::array::from_fn(|level| metres(level as u8));
-        Ok(Self { layout, color, depth, whole, tiles, metres, frames, position: 0 })
+        Ok(Self { layout, color, depth, base, tiles, metres, frames, position: 0 })
     }
 
     fn at_end(&self) -> bool {
@@ -120,10 +121,10 @@ impl Demo {
     }
 }
 
-impl Part {
+impl Pixels {
     fn decode(color: &[u8], depth: &[u8], size_px: (u32, u32)) -> Result<Self, CaptureError> {
-        let rgb = decoded(color, ImageFormat::Jpeg)?.into_rgb8();
-        let levels = decoded(depth, ImageFormat::Png)?.into_luma8();
+        let rgb = decode_image(color, ImageFormat::Jpeg)?.into_rgb8();
+        let levels = decode_image(depth, ImageFormat::Png)?.into_luma8();
         if [rgb.dimensions(), levels.dimensions()] != [size_px; 2] {
             return Err(CaptureError::Demo("a picture has the wrong size".into()));
         }
@@ -131,14 +132,14 @@ impl Part {
     }
 }
 
-/// The pictures of a file, each of which begins like this.
-fn pictures(file: &'static [u8], begin: &[u8]) -> Vec<&'static [u8]> {
-    let mut starts: Vec<usize> = (0..file.len()).filter(|&at| file[at..].starts_with(begin)).collect();
+/// Splits a file into its pictures, each of which begins with a signature.
+fn split_pictures(file: &'static [u8], signature: &[u8]) -> Vec<&'static [u8]> {
+    let mut starts: Vec<usize> = (0..file.len()).filter(|&at| file[at..].starts_with(signature)).collect();
     starts.push(file.len());
     starts.windows(2).map(|pair| &file[pair[0]..pair[1]]).collect()
 }
 
-fn decoded(file: &[u8], format: ImageFormat) -> Result<DynamicImage, CaptureError> {
+fn decode_image(file: &[u8], format: ImageFormat) -> Result<DynamicImage, CaptureError> {
     let decoded = ImageReader::with_format(Cursor::new(file), format).decode();
     decoded.map_err(|error| CaptureError::Demo(error.to_string()))
 }
@@ -163,23 +164,24 @@ impl Camera for Demo {
         if self.at_end() {
             return Ok(Captured::End);
         }
-        let Self { layout, whole, .. } = self;
+        let Self { layout, base, .. } = self;
         let frame = (self.position % u64::from(FRAMES)) as usize;
         let tiles = match &mut self.tiles[frame] {
             Some(tiles) => tiles,
-            none => none.insert(Part::decode(self.color[1 + frame], self.depth[1 + frame], layout.size_px())?),
+            none => none.insert(Pixels::decode(self.color[1 + frame], self.depth[1 + frame], layout.size_px())?),
         };
-        let set = |to: &mut [f32], levels: &[u8]| {
+        let copy_depth = |to: &mut [f32], levels: &[u8]| {
             to.iter_mut().zip(levels).for_each(|(to, &level)| *to = self.metres[usize::from(level)]);
         };
         color.resize(SIZE_PX.0, SIZE_PX.1);
         depth.resize(SIZE_PX.0, SIZE_PX.1);
-        color.rgb.copy_from_slice(&whole.rgb);
-        set(&mut depth.metres, &whole.levels);
+        // Only the moving tiles are stored per frame; everything else comes from the base picture.
+        color.rgb.copy_from_slice(&base.rgb);
+        copy_depth(&mut depth.metres, &base.levels);
         let side = TILE_PX as usize;
         for [from, to] in layout.runs() {
             color.rgb[3 * to..3 * (to + side)].copy_from_slice(&tiles.rgb[3 * from..3 * (from + side)]);
-            set(&mut depth.metres[to..to + side], &tiles.levels[from..from + side]);
+            copy_depth(&mut depth.metres[to..to + side], &tiles.levels[from..from + side]);
         }
         let stamp = Stamp { index: self.position as usize, time_ns: time_ns(self.position), captured_ns: None };
         self.position += 1;

@@ -1,4 +1,4 @@
-//! Why there is no frame.
+//! Errors of frame sources.
 
 #[cfg(feature = "camera")]
 use super::pixels::NoColor;
@@ -8,7 +8,7 @@ use crate::recording::RecordingError;
 #[cfg(feature = "camera")]
 use crate::v4l2::live::OpenError;
 
-/// Why there is no frame.
+/// Why a source delivers no frame.
 #[allow(missing_docs)] // The messages say what the fields are.
 #[derive(Debug, thiserror::Error)]
 pub enum CaptureError {
@@ -26,29 +26,29 @@ pub enum CaptureError {
         start_s: f64,
         /// End of the range.
         end_s: Option<f64>,
-        /// From the first frame to the end of the last.
+        /// Time from the first frame to the end of the last one.
         length_s: f64,
     },
-    /// A picture size or rate that no frame can have.
+    /// A picture size or rate that is not supported.
     #[error("a synthetic camera cannot make {width} x {height} pixels at {fps} frames per second")]
     Format { width: u32, height: u32, fps: f64 },
-    /// The program has no synthetic camera.
+    /// The program was built without a synthetic camera.
     #[error(
         "synthetic: this program was built without that scene; build it with the feature lab, or take `demo`, a recording of it"
     )]
     NoSynthetic,
-    /// The demonstration, which is in the program, cannot be decoded.
+    /// The built-in demonstration cannot be decoded.
     #[error("demo: it cannot be decoded: {0}")]
     Demo(String),
-    /// Side by side needs two halves.
+    /// Side-by-side pictures need an even width.
     #[error(
         "--side-by-side: the pictures of {source_name} are {width}x{height}; two eyes beside each other need an even width"
     )]
     NoHalves { source_name: String, width: u32, height: u32 },
-    /// Side by side needs one picture for both eyes.
+    /// Side-by-side needs both views in one picture.
     #[error("--side-by-side is for a source that gives both eyes in one picture, and {source_name} does not")]
     NotOnePicture { source_name: String },
-    /// Two eyes need one size.
+    /// Both cameras need the same size.
     #[error(
         "{} gives {}x{} and {} {}x{}: both eyes need one size; choose one that both have with --size",
         names[0], left.0, left.1, names[1], right.0, right.1
@@ -56,20 +56,20 @@ pub enum CaptureError {
     EyesDiffer {
         /// Left camera, then right camera.
         names: [String; 2],
-        /// Columns and rows of the left one's pictures.
+        /// Width and height of the left pictures.
         left: (u32, u32),
-        /// Columns and rows of the right one's pictures.
+        /// Width and height of the right pictures.
         right: (u32, u32),
     },
     /// The camera cannot be opened.
     #[cfg(feature = "camera")]
     #[error(transparent)]
     Camera(#[from] OpenError),
-    /// The camera of PipeWire's cannot be opened.
+    /// The PipeWire camera cannot be opened.
     #[cfg(all(feature = "camera", feature = "pipewire"))]
     #[error(transparent)]
     PipeWire(#[from] PipeWireError),
-    /// The camera gives no colours.
+    /// The camera delivers no colour pictures.
     #[cfg(feature = "camera")]
     #[error("{camera}: {source}")]
     NoColor { camera: String, source: NoColor },

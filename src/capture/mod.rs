@@ -1,4 +1,4 @@
-//! Where frames come from.
+//! Sources of frames.
 
 pub mod demo;
 mod error;
@@ -23,102 +23,102 @@ pub use seek::{Seeker, Wish};
 use crate::frame::{ColorImage, DepthMap, GrayImage, Stamp};
 use crate::stats::Cause;
 
-/// Produces frames, one after the other.
+/// A source of frames.
 pub trait Camera: Send {
-    /// What this camera is; stays the same during a run.
+    /// Describes this camera; constant during a run.
     fn info(&self) -> SourceInfo;
 
-    /// Reads the next frame into the buffers of `shot`, as far as the camera [brings it](SourceInfo::brings).
-    /// A live camera waits for the frame, but not much longer than [`PATIENCE`]; the others leave it to the caller
-    /// when the frame is due. On anything but [`Captured::Frame`] the buffers are unspecified.
+    /// Reads the next frame into the buffers of `shot`, as far as the camera [delivers them](SourceInfo::brings). A
+    /// live camera waits for the frame, but not much longer than [`PATIENCE`]; for other cameras, the caller paces the
+    /// frames. On any result but [`Captured::Frame`] the content of the buffers is unspecified.
     ///
     /// # Errors
-    /// The camera failed, and there will be no more frames.
+    /// The camera failed, and will deliver no more frames.
     fn next(&mut self, shot: Shot) -> Result<Captured, CaptureError>;
 
-    /// Passes over the frames before media time `until_ns` without reading them; returns how many those were.
-    /// Cameras that cannot (see [`SourceInfo::live`]) pass over none.
+    /// Skips the frames before media time `until_ns` without reading them; returns how many were skipped. Live cameras
+    /// (see [`SourceInfo::live`]) cannot skip and return 0.
     fn skip(&mut self, until_ns: u64) -> u64 {
         let _ = until_ns;
         0
     }
 
-    /// How long the last call of [`Camera::next`] waited for the frame to come, in nanoseconds.
+    /// Returns how long the last call of [`Camera::next`] waited for the frame, in nanoseconds.
     fn waited_ns(&self) -> u64 {
         0
     }
 
-    /// What says which frame is wanted next, where one can go back and forth.
+    /// Returns the handle that requests frames by position, if the camera can seek.
     fn seeker(&self) -> Option<Arc<Seeker>> {
         None
     }
 
-    /// Goes to the frame at a place that the [seeker](Camera::seeker) knows: it is read next, and media time goes on as if it
-    /// came after the one before. Returns by how much, in nanoseconds, the source's own time is ahead of media time from then
-    /// on.
+    /// Seeks to a frame, by its position in the [seeker](Camera::seeker): it is read next, and media time continues as
+    /// if it followed the previous frame. Returns how far, in nanoseconds, the source's own time is then ahead of media
+    /// time.
     fn seek(&mut self, place: usize) -> i64 {
         let _ = place;
         0
     }
 
-    /// Nobody watches: lets go of the device, if there is one, until [`Camera::next`] is called again.
+    /// Releases the device, if there is one, until [`Camera::next`] is called again: no client watches.
     fn rest(&mut self) {}
 }
 
-/// Buffers for a frame. What the camera does not bring stays as it is.
+/// Buffers for a frame. Those that the camera does not deliver stay unchanged.
 #[derive(Debug)]
 pub struct Shot<'a> {
-    /// The picture; of two eyes the left one's.
+    /// The picture; with a stereo camera, the left one.
     pub color: &'a mut ColorImage,
-    /// Its exact depth.
+    /// Its ground-truth depth.
     pub depth: &'a mut DepthMap,
-    /// What the right eye saw at the same time, as large as the picture.
+    /// The right camera's picture, captured at the same time and of the same size.
     pub right: &'a mut GrayImage,
 }
 
-/// What a camera brings of each frame.
+/// The data that a camera delivers with each frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Brings {
-    /// The picture alone.
+    /// The picture only.
     Color,
-    /// The picture and its exact depth.
+    /// The picture and its ground-truth depth.
     Depth,
-    /// The picture of the left eye, and the right eye's.
+    /// The left and the right camera's pictures.
     RightEye,
 }
 
-/// How long a live camera may wait in [`Camera::next`] before it says [`Captured::Waiting`].
+/// Longest wait of a live camera in [`Camera::next`] before it returns [`Captured::Waiting`].
 pub const PATIENCE: Duration = Duration::from_millis(100);
 
-/// What a camera is.
+/// Properties of a camera.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SourceInfo {
-    /// For the report and for messages.
+    /// Name for the report and for messages.
     pub name: String,
     /// Width and height of every frame, in pixels.
     pub size: (u32, u32),
-    /// Time from frame to frame, > 0.
+    /// Time between frames, > 0.
     pub period_ns: u64,
-    /// Frames until the end, where that is known: for a progress bar.
+    /// Number of frames until the end, if known: for a progress bar.
     pub frames: Option<u64>,
-    /// Whether frames come at their own pace. Otherwise they can be read and passed over at will, and a run that
-    /// wants real time waits for their media time.
+    /// Whether frames arrive at their own pace. Otherwise they can be read and skipped at will, and a real-time run
+    /// waits for their media time.
     pub live: bool,
-    /// What frames consist of.
+    /// The data in each frame.
     pub brings: Brings,
 }
 
-/// What came of reading a frame.
+/// Result of reading a frame.
 #[derive(Debug)]
 pub enum Captured {
     /// A frame.
     Frame(Stamp),
-    /// So many frames came and went before they could be read. Not the end: the next call reads on.
+    /// Number of frames lost before they could be read. Not the end: the next call continues.
     Lost(u64, Cause),
-    /// No frame yet; the camera may be gone for a while. The caller looks whether it should stop, and asks again.
+    /// No frame yet; the camera may be absent for a while. The caller checks whether to stop, and calls again.
     Waiting,
-    /// There was a frame, and it cannot be decoded.
+    /// A frame that cannot be decoded.
     Corrupt(CaptureError),
-    /// There are no more.
+    /// There are no more frames.
     End,
 }

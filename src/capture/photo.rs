@@ -1,29 +1,29 @@
-//! A photo as a camera: one frame that stands still.
+//! A photo as a camera: a single, static frame.
 
 use super::{Brings, Camera, CaptureError, Captured, Shot, SourceInfo};
 use crate::frame::{ColorImage, Stamp};
 
-/// Gives one picture again and again.
+/// Delivers one picture repeatedly.
 pub struct Photo {
     name: String,
     color: ColorImage,
-    /// Frames in all; `None` never ends.
+    /// Total number of frames; `None` never ends.
     frames: Option<u64>,
-    given: u64,
+    delivered: u64,
 }
 
-/// Ten a second: what is changed is soon seen, and each has the time that a photo of many pixels needs.
+/// 10 frames a second: changes show soon, and each frame has the time that a photo of many pixels needs.
 const PERIOD_NS: u64 = 100_000_000;
 
 impl Photo {
-    /// `color`, once, or so many times, or, `repeated` without a number, without end.
+    /// Shows `color` once, or, if `repeated`, `frames` times or endlessly.
     pub fn new(color: ColorImage, name: &str, repeated: bool, frames: Option<u64>) -> Self {
         let frames = if repeated { frames } else { Some(1) };
-        Self { name: name.to_owned(), color, frames, given: 0 }
+        Self { name: name.to_owned(), color, frames, delivered: 0 }
     }
 
     fn at_end(&self) -> bool {
-        self.frames.is_some_and(|frames| self.given >= frames)
+        self.frames.is_some_and(|frames| self.delivered >= frames)
     }
 }
 
@@ -45,16 +45,16 @@ impl Camera for Photo {
         }
         shot.color.resize(self.color.width, self.color.height);
         shot.color.rgb.copy_from_slice(&self.color.rgb);
-        let stamp = Stamp { index: 0, time_ns: self.given.saturating_mul(PERIOD_NS), captured_ns: None };
-        self.given += 1;
+        let stamp = Stamp { index: 0, time_ns: self.delivered.saturating_mul(PERIOD_NS), captured_ns: None };
+        self.delivered += 1;
         Ok(Captured::Frame(stamp))
     }
 
     fn skip(&mut self, until_ns: u64) -> u64 {
-        let from = self.given;
+        let from = self.delivered;
         let until = until_ns.div_ceil(PERIOD_NS);
-        self.given = from.max(self.frames.map_or(until, |frames| until.min(frames)));
-        self.given - from
+        self.delivered = from.max(self.frames.map_or(until, |frames| until.min(frames)));
+        self.delivered - from
     }
 }
 

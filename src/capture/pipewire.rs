@@ -1,4 +1,4 @@
-//! A camera of PipeWire's: frames as they come, also after it has gone, or come back with another size.
+//! A PipeWire camera, which recovers from disappearing and from coming back with another size.
 
 use std::mem;
 
@@ -14,49 +14,49 @@ use crate::pipewire::mode::{Agreed, Mode, Offer};
 use crate::pipewire::reader::{Frame, Reader, Take};
 use crate::stats::Cause;
 use crate::v4l2::live::Wish;
-use crate::v4l2::live::negotiate::{self, Wire};
+use crate::v4l2::live::negotiate::{self, LinkSpeed};
 use crate::v4l2::modes::{FormatModes, Interval, QueueKind, Rates, SizeModes, Sizes};
 use crate::v4l2::queue::Losses;
 use crate::v4l2::{FourCc, Layout};
 
-/// Pictures that are under way at most: one being decoded, one that waits, and one being taken over.
+/// Maximum number of pictures in flight: one being decoded, one waiting, and one being received.
 const PICTURES: usize = 3;
 
-/// A camera of PipeWire's. Its frames have one size from beginning to end: where it comes back with another one, they are
-/// fitted into the first.
+/// A PipeWire camera. All its frames have one size: if it comes back with another one, its pictures are scaled into the
+/// first size.
 pub struct PipeWireCamera {
     reader: Reader,
-    from: Receiver<Picture>,
-    /// Came, and its losses are to be reported before.
+    receiver: Receiver<Picture>,
+    /// A received picture whose losses have to be reported first.
     pending: Option<Picture>,
     info: SourceInfo,
     clock: Clock,
     waited_ns: u64,
     times: MediaTime,
-    /// Frames given so far.
-    given: u64,
+    /// Number of frames delivered.
+    delivered: u64,
 }
 
 /// A decoded picture on its way from the reader's thread.
 struct Picture {
     color: Pooled<ColorImage>,
     captured_ns: u64,
-    /// What was lost since the one before.
+    /// Frames lost since the previous picture.
     losses: Losses,
 }
 
 impl PipeWireCamera {
-    /// Opens the camera that `name` means, in the mode next to `wish`, and starts it. It ends after so many frames, those
-    /// that were lost not included; with `None` never. With `filters`, its pictures go to those who asked for this camera,
-    /// and come while there are any.
+    /// Opens the camera that `name` refers to, in the mode closest to `wish`, and starts it. It ends after `frames`
+    /// frames, lost ones not included; never with `None`. With `filters`, its pictures go to the clients that requested
+    /// this camera, and arrive while there are any.
     ///
     /// # Errors
-    /// There is none, or it cannot be used.
+    /// The camera does not exist, or cannot be used.
     pub fn open(name: &str, filters: bool, wish: Wish, frames: Option<u64>) -> Result<Self, CaptureError> {
-        let (to, from) = link::live();
-        let taker = Taker {
+        let (sender, receiver) = link::live();
+        let picture_decoder = PictureDecoder {
             wish,
-            to,
+            sender,
             pictures: Pool::new(PICTURES, ColorImage::default),
             decoder: None,
             agreed: None,
@@ -64,9 +64,10 @@ impl PipeWireCamera {
             scratch: ColorImage::default(),
             fit: Fit::default(),
             losses: Losses::default(),
-            complained: false,
+            warned: false,
         };
-        let (reader, camera, agreed) = Reader::new(name, filters, taker)?;
+        // Blocks until the camera has announced its format.
+        let (reader, camera, agreed) = Reader::new(name, filters, picture_decoder)?;
         let interval = Interval { numerator: agreed.rate.1, denominator: agreed.rate.0 };
         let ((width, height), fourcc) = (agreed.size, FourCc(agreed.fourcc));
         let info = SourceInfo {
@@ -78,7 +79,7 @@ impl PipeWireCamera {
             brings: Brings::Color,
         };
         let (clock, times) = (Clock::system(), MediaTime::default());
-        Ok(Self { reader, from, pending: None, info, clock, waited_ns: 0, times, given: 0 })
+        Ok(Self { reader, receiver, pending: None, info, clock, waited_ns: 0, times, delivered: 0 })
     }
 }
 
@@ -88,13 +89,13 @@ impl Camera for PipeWireCamera {
     }
 
     fn next(&mut self, shot: Shot) -> Result<Captured, CaptureError> {
-        if self.info.frames.is_some_and(|frames| self.given >= frames) {
+        if self.info.frames.is_some_and(|frames| self.delivered >= frames) {
             return Ok(Captured::End);
         }
         if self.pending.is_none() {
             self.reader.want(true);
             let began_ns = self.clock.now_ns();
-            let received = self.from.recv_timeout(PATIENCE);
+            let received = self.receiver.recv_timeout(PATIENCE);
             self.waited_ns = self.clock.now_ns() - began_ns;
             match received {
                 Received::Item(picture) => self.pending = Some(picture),
@@ -108,8 +109,8 @@ impl Camera for PipeWireCamera {
         }
         let Some(mut picture) = self.pending.take() else { return Ok(Captured::Waiting) };
         mem::swap(shot.color, &mut picture.color);
-        let index = self.given as usize;
-        self.given += 1;
+        let index = self.delivered as usize;
+        self.delivered += 1;
         let (captured_ns, time_ns) = (picture.captured_ns, self.times.since_first_ns(picture.captured_ns));
         Ok(Captured::Frame(Stamp { index, time_ns, captured_ns: Some(captured_ns) }))
     }
@@ -120,13 +121,13 @@ impl Camera for PipeWireCamera {
 
     fn rest(&mut self) {
         self.reader.want(false);
-        // What came before the rest is old by the time somebody watches again.
+        // Pictures from before the pause are outdated when a client watches again.
         self.pending = None;
-        self.from.try_recv();
+        self.receiver.try_recv();
     }
 }
 
-/// Takes the next cause of loss that is to be reported, with its count.
+/// Removes the next cause of loss to report, and returns it with its count.
 fn next_loss(Losses { missed, stale, corrupt }: &mut Losses) -> Option<Captured> {
     let causes = [(missed, Cause::Driver), (stale, Cause::Evicted), (corrupt, Cause::Corrupt)];
     let (count, cause) = causes.into_iter().find(|(count, _)| **count > 0)?;
@@ -134,25 +135,25 @@ fn next_loss(Losses { missed, stale, corrupt }: &mut Losses) -> Option<Captured>
 }
 
 /// Decodes pictures on the reader's thread.
-struct Taker {
+struct PictureDecoder {
     wish: Wish,
-    to: Sender<Picture>,
+    sender: Sender<Picture>,
     pictures: Pool<ColorImage>,
     decoder: Option<Decoder>,
     agreed: Option<Agreed>,
-    /// That of the first agreement.
+    /// Size of the first negotiated mode.
     size: Option<(u32, u32)>,
-    /// Where pictures of another size are decoded.
+    /// Buffer for decoding pictures of another size.
     scratch: ColorImage,
     fit: Fit,
-    /// Since the picture that was handed on last.
+    /// Frames lost since the last picture was sent.
     losses: Losses,
-    /// Whether a warning about pictures that cannot be decoded was logged.
-    complained: bool,
+    /// Whether a warning about undecodable pictures was logged.
+    warned: bool,
 }
 
-impl Taker {
-    /// Decodes a frame, and hands it on; returns whether that was possible.
+impl PictureDecoder {
+    /// Decodes a frame and sends it; fails if it cannot be decoded.
     fn decode(&mut self, frame: &Frame) -> Result<(), String> {
         let Some((agreed, size)) = self.agreed.zip(self.size) else { return Ok(()) };
         let layout = layout(&agreed, frame)?;
@@ -161,7 +162,7 @@ impl Taker {
             None => Decoder::new(&layout).map_err(|error| error.to_string())?,
         };
         let decoder = self.decoder.insert(decoder);
-        // All are on their way where the other end is slow: the newest picture takes the place of one that waits.
+        // All buffers are in flight because the receiver is slow: the newest picture replaces one that waits.
         let Some(mut color) = self.pictures.try_take() else {
             self.losses.stale += 1;
             return Ok(());
@@ -176,8 +177,8 @@ impl Taker {
         };
         decoded.map_err(|error| error.to_string())?;
         let picture = Picture { color, captured_ns: frame.captured_ns, losses: mem::take(&mut self.losses) };
-        if let Ok(Some(overtaken)) = self.to.send(picture) {
-            // Told with the next one.
+        if let Ok(Some(overtaken)) = self.sender.send(picture) {
+            // Reported with the next picture.
             let Losses { missed, stale, corrupt } = overtaken.losses;
             self.losses.missed += missed;
             self.losses.stale += stale + 1;
@@ -187,11 +188,11 @@ impl Taker {
     }
 }
 
-impl Take for Taker {
+impl Take for PictureDecoder {
     fn choose(&mut self, modes: &[Mode]) -> Result<Agreed, String> {
         let modes: Vec<FormatModes> = modes.iter().map(format_modes).collect();
-        // Inside of the machine, as far as anybody can tell.
-        let best = negotiate::ranked(&modes, &self.wish, Wire::Wide).map_err(|error| error.to_string())?;
+        // Treated as an internal connection, since the real one is unknown.
+        let best = negotiate::ranked(&modes, &self.wish, LinkSpeed::Fast).map_err(|error| error.to_string())?;
         let best = best.first().ok_or("it offers nothing")?;
         let Interval { numerator, denominator } = best.interval;
         Ok(Agreed { fourcc: best.fourcc.0, size: best.size_px, rate: (denominator, numerator) })
@@ -209,7 +210,7 @@ impl Take for Taker {
     fn frame(&mut self, frame: &Frame) {
         if let Err(error) = self.decode(frame) {
             self.losses.corrupt += 1;
-            if !mem::replace(&mut self.complained, true) {
+            if !mem::replace(&mut self.warned, true) {
                 tracing::warn!("{error}; going on without such frames");
             }
         }
@@ -222,7 +223,7 @@ impl Take for Taker {
     }
 }
 
-/// How a frame lies in memory: formats of several components come in one plane, or in one for each.
+/// Computes a frame's memory layout: formats of several components arrive in one plane, or in one per component.
 fn layout(agreed: &Agreed, frame: &Frame) -> Result<Layout, String> {
     let apart = match (&agreed.fourcc, frame.planes.len()) {
         (_, 0 | 1) => agreed.fourcc,
@@ -237,7 +238,7 @@ fn layout(agreed: &Agreed, frame: &Frame) -> Result<Layout, String> {
     layout.map_err(|error| error.to_string())
 }
 
-/// A mode as V4L2 has them.
+/// Converts a mode to V4L2's representation.
 pub fn format_modes(mode: &Mode) -> FormatModes {
     let interval = |&(num, denom): &(u32, u32)| Interval { numerator: denom, denominator: num };
     let is_rate = |(num, denom): &&(u32, u32)| *num > 0 && *denom > 0;
@@ -250,7 +251,7 @@ pub fn format_modes(mode: &Mode) -> FormatModes {
         }
         Offer::Range { min, max } => match [max, min].map(|rate| Some(rate).filter(is_rate).map(interval)) {
             [Some(shortest), Some(longest)] => Rates::Range { shortest, longest },
-            // From 0 on: as slow as one likes.
+            // A minimum rate of 0 allows arbitrarily slow rates.
             [Some(shortest), None] => Rates::Range { shortest, longest: Interval { numerator: 1, denominator: 1 } },
             _ => Rates::Unknown,
         },
@@ -279,10 +280,10 @@ mod tests {
             mode(b"NV12", Offer::Range { min: (2, 2), max: (4096, 4096) }, Offer::Range { min: (0, 1), max: (120, 1) }),
         ];
         let chosen = |wish: Wish| {
-            let (to, _from) = link::live();
-            let mut taker = Taker {
+            let (sender, _receiver) = link::live();
+            let mut picture_decoder = PictureDecoder {
                 wish,
-                to,
+                sender,
                 pictures: Pool::new(0, ColorImage::default),
                 decoder: None,
                 agreed: None,
@@ -290,9 +291,9 @@ mod tests {
                 scratch: ColorImage::default(),
                 fit: Fit::default(),
                 losses: Losses::default(),
-                complained: false,
+                warned: false,
             };
-            let Agreed { fourcc, size, rate } = taker.choose(&modes).unwrap();
+            let Agreed { fourcc, size, rate } = picture_decoder.choose(&modes).unwrap();
             format!("{} {size:?} {}/{}", FourCc(fourcc), rate.0, rate.1)
         };
         let any = Wish::any(crate::layout::Content::Color);

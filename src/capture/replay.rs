@@ -7,48 +7,48 @@ use super::{Brings, Camera, CaptureError, Captured, Seeker, Shot, SourceInfo};
 use crate::frame::Stamp;
 use crate::recording::{Recording, Scratch};
 
-/// Which part of a recording to play.
+/// The range of a recording to play.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Part {
-    /// Seconds after the first frame from which frames are played.
+    /// Start of the range, in seconds after the first frame.
     pub start_s: f64,
-    /// Seconds after the first frame before which playing ends; `None` plays to the end.
+    /// End of the range, exclusive, in seconds after the first frame; `None` plays to the end.
     pub end_s: Option<f64>,
-    /// Start over at the end.
+    /// Whether to start over at the end.
     pub looped: bool,
-    /// End after so many frames, those that cannot be read and those passed over included.
+    /// Number of frames until the end, unreadable and skipped ones included.
     pub frames: Option<u64>,
 }
 
-/// Plays a recording in the order of its frames.
+/// Plays a recording in frame order.
 pub struct Replay {
     recording: Arc<Recording>,
     scratch: Scratch,
     name: String,
-    /// Frames of one lap.
+    /// Frames of one lap of the loop.
     lap: Range<usize>,
     /// Media time of one lap.
     lap_ns: u64,
-    /// Whether the right eye's pictures are read as well.
+    /// Whether the right camera's pictures are read, too.
     right_eye: bool,
     looped: bool,
     limit: Option<u64>,
     seeker: Arc<Seeker>,
-    /// The next frame, over all laps.
+    /// Position of the next frame, over all laps.
     position: u64,
-    /// Frames read or passed over so far.
-    given: u64,
-    /// What to add to the time of a position for media time: other than 0 after a seek.
-    behind_ns: i64,
-    /// Good frames of this lap: a loop without any would never end.
-    good: u64,
+    /// Number of frames read or skipped.
+    delivered: u64,
+    /// Offset from a position's source time to media time: nonzero after a seek.
+    seek_offset_ns: i64,
+    /// Readable frames in this lap: a loop without any would never end.
+    readable: u64,
 }
 
 impl Replay {
-    /// Plays `part` of `recording`, which `name` stands for in the report.
+    /// Plays `part` of `recording`, which the report calls `name`.
     ///
     /// # Errors
-    /// There is no frame in that part.
+    /// The range contains no frame.
     pub fn new(recording: Arc<Recording>, name: &str, part: &Part) -> Result<Self, CaptureError> {
         let len = recording.len();
         let first_from = |s: f64| (0..len).find(|&frame| recording.time_ns(frame) as f64 >= s * 1e9).unwrap_or(len);
@@ -62,6 +62,7 @@ impl Replay {
                 length_s: end_ns as f64 / 1e9,
             });
         }
+        // The last frame lasts one period, so that a loop keeps its rhythm.
         let first_ns = recording.time_ns(lap.start);
         let lap_ns = recording.time_ns(lap.end - 1) - first_ns + recording.period_ns();
         let times_ns = lap.clone().map(|frame| recording.time_ns(frame) - first_ns).collect();
@@ -77,39 +78,39 @@ impl Replay {
             limit: part.frames,
             seeker: Arc::new(seeker),
             position: 0,
-            given: 0,
-            behind_ns: 0,
-            good: 0,
+            delivered: 0,
+            seek_offset_ns: 0,
+            readable: 0,
         })
     }
 
-    /// Reads what the right eye saw as well. Frames of a recording with one eye are corrupt then.
+    /// Reads the right camera's pictures, too. Frames of a monocular recording are then corrupt.
     #[must_use]
     pub fn with_right_eye(self) -> Self {
         Self { right_eye: true, ..self }
     }
 
-    /// Frames in all, over all laps; `None` where there is no end.
+    /// Total number of frames, over all laps; `None` if endless.
     fn total(&self) -> Option<u64> {
         let lap = (!self.looped).then_some(self.lap.len() as u64);
         lap.into_iter().chain(self.limit).min()
     }
 
-    /// The frame at the present position, if there is one.
+    /// Stamp of the frame at the current position; `None` at the end.
     fn stamp(&self) -> Option<Stamp> {
         let lap_len = self.lap.len() as u64;
-        let is_over = self.limit.is_some_and(|limit| self.given >= limit);
+        let is_over = self.limit.is_some_and(|limit| self.delivered >= limit);
         if is_over || !self.looped && self.position >= lap_len {
             return None;
         }
         let index = self.lap.start + (self.position % lap_len) as usize;
         // Media time beyond 64 bits ends the loop.
-        let time_ns = self.own_ns(self.position)?.checked_add_signed(self.behind_ns)?;
+        let time_ns = self.source_ns(self.position)?.checked_add_signed(self.seek_offset_ns)?;
         Some(Stamp { index, time_ns, captured_ns: None })
     }
 
-    /// When a position is, where all are played in their order; `None` beyond 64 bits.
-    fn own_ns(&self, position: u64) -> Option<u64> {
+    /// Source time of a position, in playing order; `None` beyond 64 bits.
+    fn source_ns(&self, position: u64) -> Option<u64> {
         let lap_len = self.lap.len() as u64;
         let in_lap_ns = self.seeker.time_ns((position % lap_len) as usize);
         (position / lap_len).checked_mul(self.lap_ns)?.checked_add(in_lap_ns)
@@ -117,7 +118,7 @@ impl Replay {
 
     fn advance(&mut self) {
         self.position += 1;
-        self.given += 1;
+        self.delivered += 1;
     }
 }
 
@@ -136,11 +137,11 @@ impl Camera for Replay {
     fn next(&mut self, shot: Shot) -> Result<Captured, CaptureError> {
         let Some(stamp) = self.stamp() else { return Ok(Captured::End) };
         if stamp.index == self.lap.start {
-            // A whole lap without a good frame.
-            if self.given > 0 && self.good == 0 {
+            // A whole lap without a readable frame.
+            if self.delivered > 0 && self.readable == 0 {
                 return Ok(Captured::End);
             }
-            self.good = 0;
+            self.readable = 0;
         }
         self.advance();
         let Shot { color, right, .. } = shot;
@@ -150,7 +151,7 @@ impl Camera for Replay {
         }
         Ok(match read {
             Ok(()) => {
-                self.good += 1;
+                self.readable += 1;
                 Captured::Frame(stamp)
             }
             Err(error) => Captured::Corrupt(error.into()),
@@ -158,13 +159,13 @@ impl Camera for Replay {
     }
 
     fn skip(&mut self, until_ns: u64) -> u64 {
-        let from = self.given;
+        let from = self.delivered;
         while self.stamp().is_some_and(|stamp| stamp.time_ns < until_ns) {
             self.advance();
-            // It counts as good: it is not known to be bad.
-            self.good += 1;
+            // Counts as readable: it is not known to be bad.
+            self.readable += 1;
         }
-        self.given - from
+        self.delivered - from
     }
 
     fn seeker(&self) -> Option<Arc<Seeker>> {
@@ -173,13 +174,13 @@ impl Camera for Replay {
 
     fn seek(&mut self, place: usize) -> i64 {
         let lap_len = self.lap.len() as u64;
-        let next_ns = self.own_ns(self.position).unwrap_or(u64::MAX).saturating_add_signed(self.behind_ns);
+        let next_ns = self.source_ns(self.position).unwrap_or(u64::MAX).saturating_add_signed(self.seek_offset_ns);
         let lap = if self.looped { self.position / lap_len } else { 0 };
         self.position = lap * lap_len + (place as u64).min(lap_len - 1);
-        let own_ns = self.own_ns(self.position).unwrap_or(u64::MAX);
-        self.behind_ns = next_ns.wrapping_sub(own_ns).cast_signed();
-        // What was passed over is not known to be bad.
-        self.good += 1;
-        -self.behind_ns
+        let source_ns = self.source_ns(self.position).unwrap_or(u64::MAX);
+        self.seek_offset_ns = next_ns.wrapping_sub(source_ns).cast_signed();
+        // Skipped frames are not known to be bad.
+        self.readable += 1;
+        -self.seek_offset_ns
     }
 }

@@ -1,11 +1,11 @@
-//! A stereo camera that gives both eyes beside each other in one picture.
+//! A stereo camera that delivers both views side by side in one picture.
 
 use std::sync::Arc;
 
 use super::{Brings, Camera, CaptureError, Captured, Seeker, Shot, SourceInfo};
 use crate::frame::{ColorImage, luma_of};
 
-/// Splits the pictures of another camera: the left half is the left eye's, the right half the right eye's.
+/// Splits the pictures of another camera: the left half is the left view, the right half the right view.
 pub struct SideBySide {
     camera: Box<dyn Camera>,
     info: SourceInfo,
@@ -13,10 +13,10 @@ pub struct SideBySide {
 }
 
 impl SideBySide {
-    /// Splits what `camera` gives.
+    /// Splits the pictures of `camera`.
     ///
     /// # Errors
-    /// Its pictures have an odd width, or their right half is taken: it brings a right eye already.
+    /// They have an odd width, or `camera` already delivers depth or a right view.
     pub fn new(camera: Box<dyn Camera>) -> Result<Self, CaptureError> {
         let mut info = camera.info();
         let (width, height) = info.size;

@@ -1,40 +1,40 @@
-//! The source `synthetic`: a camera that is rendered, which a program may bring along; this library has none.
+//! The source `synthetic`, a rendered camera. The application registers its implementation; this library has none.
 
 use std::sync::OnceLock;
 
 use super::{Camera, CaptureError};
 
-/// What the synthetic camera makes.
+/// Parameters of the synthetic camera.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Format {
     /// Width and height in pixels.
     pub size: (u32, u32),
     /// Frames per second, > 0.
     pub fps: f64,
-    /// End after so many frames, those passed over included; `None` never ends.
+    /// Number of frames until the end, skipped ones included; `None` never ends.
     pub frames: Option<u64>,
-    /// Threads that render, > 0.
+    /// Number of rendering threads, > 0.
     pub threads: usize,
 }
 
-/// Makes a camera of a format.
+/// Creates a camera.
 ///
 /// # Errors
-/// No camera has such pictures.
+/// The camera does not support this format.
 pub type Make = fn(Format) -> Result<Box<dyn Camera>, CaptureError>;
 
 static MAKE: OnceLock<Make> = OnceLock::new();
 
-/// From now on, `synthetic` is a camera that `make` makes. Only the first call counts.
+/// Registers `make` as the implementation of `synthetic`. Only the first call has an effect.
 pub fn bring(make: Make) {
-    // Who comes later brings the same.
+    // Later callers register the same function.
     let _ = MAKE.set(make);
 }
 
-/// The synthetic camera of a format.
+/// Opens the synthetic camera.
 ///
 /// # Errors
-/// The program brought none, or it has no such pictures.
+/// No implementation is registered, or it does not support this format.
 pub fn open(format: Format) -> Result<Box<dyn Camera>, CaptureError> {
     MAKE.get().ok_or(CaptureError::NoSynthetic)?(format)
 }

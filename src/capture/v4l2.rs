@@ -1,4 +1,4 @@
-//! A V4L2 camera: frames as they come, also after it was unplugged or has changed its mode.
+//! A V4L2 camera, which recovers from being unplugged and from mode changes.
 
 use std::time::Duration;
 
@@ -12,35 +12,36 @@ use crate::stats::Cause;
 use crate::v4l2::live::{Live, Next, Setting, Wish};
 use crate::v4l2::queue::Losses;
 
-/// A V4L2 camera. Its frames have one size from beginning to end: where the camera comes back with another one, they
-/// are fitted into the first.
+/// A V4L2 camera. All its frames have one size: if the camera comes back with another one, its pictures are scaled into
+/// the first size.
 pub struct V4l2Camera {
     live: Live,
     clock: Clock,
     waited_ns: u64,
     decoder: Decoder,
     info: SourceInfo,
-    /// Where pictures of another size are decoded.
+    /// Buffer for decoding pictures of another size.
     scratch: ColorImage,
     fit: Fit,
     times: MediaTime,
-    /// Frames given so far.
-    given: u64,
-    /// Losses that are still to be reported, one cause at a time.
+    /// Number of frames delivered.
+    delivered: u64,
+    /// Losses to be reported, one cause at a time.
     losses: Losses,
     /// Whether a warning about undecodable frames was logged.
-    complained: bool,
+    warned: bool,
 }
 
 impl V4l2Camera {
-    /// Opens the camera that `name` means, in the mode next to `wish`, with its controls set to `settings`, and starts
-    /// it. It ends after so many frames, those that were lost not included; with `None` never.
+    /// Opens the camera that `name` refers to, in the mode closest to `wish`, with its controls set to `settings`, and
+    /// starts it. It ends after `frames` frames, lost ones not included; never with `None`.
     ///
     /// # Errors
-    /// There is none, or it cannot be used.
+    /// The camera does not exist, or cannot be used.
     pub fn open(name: &str, wish: Wish, settings: Vec<Setting>, frames: Option<u64>) -> Result<Self, CaptureError> {
         let clock = Clock::system();
         let live = Live::open(name, wish, settings, clock.clone())?;
+        // The first layout fixes the size for the whole run.
         let layout = *live.layout();
         let decoder =
             Decoder::new(&layout).map_err(|source| CaptureError::NoColor { camera: live.name().to_owned(), source })?;
@@ -61,22 +62,22 @@ impl V4l2Camera {
             scratch: ColorImage::default(),
             fit: Fit::default(),
             times: MediaTime::default(),
-            given: 0,
+            delivered: 0,
             losses: Losses::default(),
-            complained: false,
+            warned: false,
         })
     }
 
-    /// As [`Camera::next`], waiting no longer than `patience`.
-    pub fn next_within(&mut self, patience: Duration, color: &mut ColorImage) -> Captured {
+    /// Reads a frame like [`Camera::next`], waiting for at most `timeout`.
+    pub fn next_within(&mut self, timeout: Duration, color: &mut ColorImage) -> Captured {
         if let Some(lost) = self.next_loss() {
             return lost;
         }
-        if self.info.frames.is_some_and(|frames| self.given >= frames) {
+        if self.info.frames.is_some_and(|frames| self.delivered >= frames) {
             return Captured::End;
         }
         let began_ns = self.clock.now_ns();
-        let next = self.live.next(patience);
+        let next = self.live.next(timeout);
         self.waited_ns = self.clock.now_ns() - began_ns;
         let captured_ns = match next {
             Next::Frame { captured_ns } => captured_ns,
@@ -86,13 +87,14 @@ impl V4l2Camera {
             }
             Next::Waiting => return Captured::Waiting,
         };
-        let good = self.decode(color);
+        // Released at once: a driver without free buffers drops frames.
+        let is_decoded = self.decode(color);
         self.live.release();
-        if !good {
+        if !is_decoded {
             return Captured::Lost(1, Cause::Corrupt);
         }
-        let index = self.given as usize;
-        self.given += 1;
+        let index = self.delivered as usize;
+        self.delivered += 1;
         Captured::Frame(Stamp {
             index,
             time_ns: self.times.since_first_ns(captured_ns),
@@ -100,15 +102,14 @@ impl V4l2Camera {
         })
     }
 
-    /// Decodes the current frame into `color`. Returns false where it cannot be decoded, which is logged the first
-    /// time.
+    /// Decodes the current frame into `color`. Returns false if it cannot be decoded, which is logged the first time.
     fn decode(&mut self, color: &mut ColorImage) -> bool {
         let layout = self.live.layout();
         // The camera may have come back with another layout.
         if layout != self.decoder.layout() {
             match Decoder::new(layout) {
                 Ok(decoder) => self.decoder = decoder,
-                Err(error) => return self.complain(&error),
+                Err(error) => return self.warn_undecodable(&error),
             }
         }
         let Some(planes) = self.live.planes() else { return false };
@@ -121,19 +122,19 @@ impl V4l2Camera {
                 self.fit.fit(&self.scratch, color);
             })
         };
-        decoded.map_or_else(|error| self.complain(&error), |()| true)
+        decoded.map_or_else(|error| self.warn_undecodable(&error), |()| true)
     }
 
-    /// Logs once why frames cannot be decoded, and returns false. A live camera's damaged frames do not end a run.
-    fn complain(&mut self, error: &dyn std::error::Error) -> bool {
-        if !self.complained {
+    /// Logs once why frames cannot be decoded, and returns false. Damaged frames do not end the run of a live camera.
+    fn warn_undecodable(&mut self, error: &dyn std::error::Error) -> bool {
+        if !self.warned {
             tracing::warn!("{}: {error}; going on without such frames", self.live.name());
-            self.complained = true;
+            self.warned = true;
         }
         false
     }
 
-    /// Takes the next cause of loss that is to be reported, with its count.
+    /// Removes the next cause of loss to report, and returns it with its count.
     fn next_loss(&mut self) -> Option<Captured> {
         let Losses { missed, stale, corrupt } = &mut self.losses;
         let causes = [(missed, Cause::Driver), (stale, Cause::Evicted), (corrupt, Cause::Corrupt)];
@@ -165,8 +166,8 @@ impl Eye for V4l2Camera {
         self.info.clone()
     }
 
-    fn next_within(&mut self, patience: Duration, color: &mut ColorImage) -> Captured {
-        V4l2Camera::next_within(self, patience, color)
+    fn next_within(&mut self, timeout: Duration, color: &mut ColorImage) -> Captured {
+        V4l2Camera::next_within(self, timeout, color)
     }
 
     fn rest(&mut self) {
@@ -174,7 +175,7 @@ impl Eye for V4l2Camera {
     }
 }
 
-/// Media time from times of capture.
+/// Converts capture times to media time.
 #[derive(Debug, Default)]
 pub(super) struct MediaTime {
     first_ns: Option<u64>,
@@ -182,7 +183,7 @@ pub(super) struct MediaTime {
 }
 
 impl MediaTime {
-    /// Time since the first frame; always later than the frame before, also where a driver's times step back.
+    /// Returns the time since the first frame; strictly increasing, even where a driver's time stamps step back.
     pub(super) fn since_first_ns(&mut self, captured_ns: u64) -> u64 {
         let first_ns = *self.first_ns.get_or_insert(captured_ns);
         let since_ns = captured_ns.saturating_sub(first_ns);
@@ -199,7 +200,7 @@ mod tests {
     #[test]
     fn media_time_starts_at_0_and_only_goes_on() {
         let mut times = MediaTime::default();
-        let told = [500, 533, 520, 520, 566].map(|captured_ns| times.since_first_ns(captured_ns));
-        assert_eq!(told, [0, 33, 34, 35, 66]);
+        let times_ns = [500, 533, 520, 520, 566].map(|captured_ns| times.since_first_ns(captured_ns));
+        assert_eq!(times_ns, [0, 33, 34, 35, 66]);
     }
 }

@@ -1,22 +1,22 @@
-//! Memory that vectors can be read from and written to without touching two cache lines.
+//! Memory aligned to cache lines, so that no vector access crosses two of them.
 
 use std::ops::{Deref, DerefMut};
 
 /// Bytes of a cache line, and of the widest vector.
 pub const LINE: usize = 64;
 
-/// A fixed number of values that starts at a cache line.
+/// A fixed-size array aligned to a cache line.
 #[derive(Default)]
 pub struct Aligned<T = f32> {
     memory: Vec<T>,
-    /// The first value that begins a cache line.
+    /// Index of the first value at a cache line boundary.
     start: usize,
     length: usize,
 }
 
 impl<T: Copy + Default> Aligned<T> {
     pub fn zeros(length: usize) -> Self {
-        // The allocation is longer than needed by a line, and never moves.
+        // Over-allocated by one line; a Vec that is never resized does not move.
         let memory = vec![T::default(); length + LINE / size_of::<T>()];
         let start = memory.as_ptr().align_offset(LINE).min(LINE / size_of::<T>());
         Self { memory, start, length }
@@ -36,7 +36,7 @@ impl<T> DerefMut for Aligned<T> {
     }
 }
 
-/// A local array that starts at a cache line.
+/// A local array aligned to a cache line.
 #[derive(Clone, Copy)]
 #[repr(align(64))]
 pub struct Line<T>(pub T);

@@ -1,4 +1,4 @@
-//! Device, else processor: what a device does until its first fault, and the processor from there on.
+//! GPU with CPU fallback: a worker runs on a device until its first fault, and on the CPU from then on.
 
 use std::fmt::Display;
 #[cfg(feature = "gpu")]
@@ -8,24 +8,25 @@ use super::GpuError;
 #[cfg(feature = "gpu")]
 use super::device::{Device, Trial};
 
-/// A worker on a device, and what it takes to go on without it. The first fault is answered by the processor, and a line says
-/// so; later ones are the caller's. Where the owner has the processor's code itself, the worker is an `Option`, and `None` then.
+/// A worker on a device, and the data to replace it. The first fault is logged and handled by the fallback; later ones
+/// are returned to the caller. If the owner implements the CPU path itself, the worker is an `Option`, `None` after a
+/// fault.
 #[derive(Debug)]
 pub struct Backed<T, S = ()> {
     worker: T,
-    /// Taken at the fault.
+    /// Taken at the first fault.
     spare: Option<S>,
-    /// The fault, once there was one.
+    /// Message of the first fault.
     failure: Option<String>,
 }
 
 impl<T, S> Backed<T, S> {
-    /// Works by `worker` until that fails; `spare` is what the other one is made of.
+    /// Creates a worker with the data that its replacement is made from.
     pub fn new(worker: T, spare: S) -> Self {
         Self { worker, spare: Some(spare), failure: None }
     }
 
-    /// What works now.
+    /// Returns the current worker.
     pub fn worker(&self) -> &T {
         &self.worker
     }
@@ -34,21 +35,21 @@ impl<T, S> Backed<T, S> {
         &mut self.worker
     }
 
-    /// What the other worker is to be made of, until it is.
+    /// Returns the data for the replacement, until it is used.
     pub fn spare_mut(&mut self) -> Option<&mut S> {
         self.spare.as_mut()
     }
 
-    /// Why the device does it no more; `None` while it does.
+    /// Returns the message of the fault; `None` before any.
     pub fn failure(&self) -> Option<&str> {
         self.failure.as_deref()
     }
 
-    /// Answers a fault: `make` makes the other worker of the failed one and the spare. A line says that the CPU `does` it from
-    /// here on.
+    /// Handles a fault: replaces the worker by the result of `make`, called with the failed worker and the spare data.
+    /// Logs that the CPU `does` the work from now on.
     ///
     /// # Errors
-    /// The other worker works already, and this is its `error`; or it could not be made.
+    /// Returns `error` if the worker was replaced before, or the error of `make`.
     pub fn fall_back<E: Display>(
         &mut self,
         error: E,
@@ -62,10 +63,10 @@ impl<T, S> Backed<T, S> {
         Ok(())
     }
 
-    /// Works; after a fault that is [answered](Self::fall_back), again.
+    /// Runs `work`; after a fault that is [handled](Self::fall_back), runs it again.
     ///
     /// # Errors
-    /// As there; or the work fails again.
+    /// Fails like [`Self::fall_back`], or if the work fails again.
     pub fn run<R, E: Display>(
         &mut self,
         does: &str,
@@ -80,13 +81,13 @@ impl<T, S> Backed<T, S> {
 }
 
 impl<T> Backed<Option<T>> {
-    /// Whether there is a worker, and it did this; where not, the processor is to do it.
+    /// Runs `work` if there is a worker. Returns false without a worker or after a failure: the CPU must do the work.
     pub fn did(&mut self, does: &str, mut work: impl FnMut(&mut T) -> Result<(), GpuError>) -> bool {
         let work = |worker: &mut Option<T>| worker.as_mut().map(&mut work).transpose();
         matches!(self.run(does, work, |_, ()| Ok(None)), Ok(Some(())))
     }
 
-    /// What did it, for the report: `cpu`, `gpu`, or `gpu, then cpu`.
+    /// Returns the backends used, for the report: `cpu`, `gpu`, or `gpu, then cpu`.
     pub fn backends(&self) -> &'static str {
         match (&self.worker, &self.failure) {
             (Some(_), _) => "gpu",
@@ -98,8 +99,8 @@ impl<T> Backed<Option<T>> {
 
 #[cfg(feature = "gpu")]
 impl<T: 'static> Backed<Option<T>> {
-    /// By the worker that `make` makes on a device, where there is one that passes the `trial` of such workers: that is held once for
-    /// each device, and a fault is said then. None on a device that has failed; who had it has said so.
+    /// Creates the worker with `make` on a device, if there is one and it passes the `trial`. The trial runs once per
+    /// device, and logs its fault. There is no worker on a device that has failed, which was reported already.
     pub fn tried(
         device: Option<&Arc<Device>>,
         does: &str,

@@ -1,15 +1,15 @@
-//! Bands: the rows of a picture, split among the threads of a pool.
+//! Bands of rows: splits a picture among the threads of a pool.
 
 use std::ops::Range;
 
 use super::thread_pool::{MOST_ITEMS, ThreadPool};
 
-/// A thread has so many bands of a picture: one that is held up leaves its share to the others.
-const OF_A_THREAD: usize = 4;
-/// Fewer rows are no band: what its passes read of those beside it would be too much.
-const LEAST_ROWS: usize = 40;
+/// Bands per thread: if one thread is delayed, the others take over its bands.
+const BANDS_PER_THREAD: usize = 4;
+/// Smallest number of rows of a band: smaller bands would read too many rows of their neighbours.
+const MIN_ROWS: usize = 40;
 
-/// How a picture is split.
+/// Partition of a picture into bands.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Bands {
     height: usize,
@@ -18,31 +18,31 @@ pub struct Bands {
 }
 
 impl Bands {
-    /// Of so many rows, a multiple of `unit` in each band, for these threads: one band for one thread.
+    /// Splits `height` rows for these threads, a multiple of `unit` rows in each band; one band for one thread.
     pub fn new(height: usize, unit: usize, workers: &ThreadPool) -> Self {
         let threads = workers.thread_count();
-        let most = if threads > 1 { (OF_A_THREAD * threads).min(MOST_ITEMS) } else { 1 };
-        let rows = height.div_ceil(most).max(LEAST_ROWS).next_multiple_of(unit);
+        let max_bands = if threads > 1 { (BANDS_PER_THREAD * threads).min(MOST_ITEMS) } else { 1 };
+        let rows = height.div_ceil(max_bands).max(MIN_ROWS).next_multiple_of(unit);
         Self { height, rows }
     }
 
-    /// The rows of each band.
+    /// Returns the rows of each band.
     pub fn rows(self) -> impl Iterator<Item = Range<usize>> {
         (0..self.height).step_by(self.rows).map(move |first| first..(first + self.rows).min(self.height))
     }
 
-    /// What each band has of a plane with so many values for a row.
+    /// Splits a plane with `of_row` values per row into bands.
     pub fn split<T>(self, plane: &mut [T], of_row: usize) -> impl Iterator<Item = &mut [T]> {
         plane.chunks_mut((self.rows * of_row).max(1))
     }
 
-    /// What each band has of tiles that are `side` rows high and lie `across` beside each other; `side` divides the unit.
+    /// Splits tiles into bands; tiles are `side` rows high, `across` per row of tiles, and `side` divides the unit.
     pub fn split_tiles<T>(self, tiles: &mut [T], side: usize, across: usize) -> impl Iterator<Item = &mut [T]> {
         tiles.chunks_mut((self.rows / side * across).max(1))
     }
 }
 
-/// How many of `count` values each item of a pass has, and no fewer than `least`, which are worth a thread.
+/// Returns the number of values per item of a pass over `count` values: at least `least`, to be worth a thread.
 pub fn share(count: usize, least: usize) -> usize {
     count.div_ceil(MOST_ITEMS).max(least)
 }

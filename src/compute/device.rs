@@ -1,4 +1,4 @@
-//! Which adapter, and the device on it.
+//! GPU adapters, and the device on an adapter.
 
 mod pass;
 mod picture;
@@ -23,11 +23,11 @@ use super::GpuError;
 #[derive(Clone, Copy, Debug)]
 pub struct Shader {
     pub name: &'static str,
-    /// Whole source, shared parts included.
+    /// Source text, including the shared files.
     pub source: &'static str,
 }
 
-/// A shader by the name of its file under `shaders/`, after what it shares with others, that of all its kind first.
+/// Builds a [`Shader`] from a file under `shaders/`, prefixed by the shared files, the common one first.
 macro_rules! shader {
     ($common:literal; $name:literal $(, $shared:literal)*) => {
         $crate::compute::device::Shader {
@@ -42,12 +42,12 @@ macro_rules! shader {
 }
 pub(crate) use shader;
 
-/// How long a device may take before it counts as hung; one in software is slow, but does not hang.
+/// Time after which a device counts as hung; a software device is slow, but does not hang.
 const PATIENCE: Duration = Duration::from_secs(10);
 const PATIENCE_WITH_SOFTWARE: Duration = Duration::from_secs(60);
 
-/// The process's only instance, which it keeps. Drivers that are loaded anew for every device, as the last one's instance
-/// unloads them, may lose something each time: NVIDIA's 580 is gone after 29 of them, or crashes if two threads do it.
+/// Returns the only wgpu instance of the process. Dropping the last instance unloads the drivers, and reloading may
+/// leak: NVIDIA's 580 fails after 29 reloads, or crashes if two threads do it.
 fn instance() -> wgpu::Instance {
     static INSTANCE: OnceLock<wgpu::Instance> = OnceLock::new();
     let make = || {
@@ -58,7 +58,7 @@ fn instance() -> wgpu::Instance {
     INSTANCE.get_or_init(make).clone()
 }
 
-/// Name, kind and driver of every adapter there is, software included.
+/// Returns name, kind and driver of every adapter, including software.
 pub fn adapters() -> Vec<String> {
     let adapters = pollster::block_on(instance().enumerate_adapters(wgpu::Backends::VULKAN));
     adapters.iter().map(|adapter| describe(&adapter.get_info())).collect()
@@ -66,9 +66,10 @@ pub fn adapters() -> Vec<String> {
 
 /// A device and its queue.
 pub struct Device {
-    /// What it was found by; surfaces of windows are made by it, too.
+    /// Instance that found the adapter; also creates the surfaces of windows.
     pub instance: wgpu::Instance,
-    /// What it was opened on.
+    /// Adapter that the device was opened on.
+    /// Adapter that the device was opened on.
     pub adapter: wgpu::Adapter,
     pub device: wgpu::Device,
     pub queue: wgpu::Queue,
@@ -76,21 +77,22 @@ pub struct Device {
     pub name: String,
     /// Whether passes can be timed.
     pub timestamps: bool,
-    /// What trials of it found, by the type of what was tried.
+    /// Results of trials of the device, by the type of the tested worker.
     faults: Mutex<HashMap<TypeId, Option<GpuError>>>,
-    /// Those made so far, by the names of their shaders and the bits of their constants.
+    /// Pipelines made so far, by shader name and bits of the constants.
     pipelines: Mutex<HashMap<(&'static str, Vec<u64>), wgpu::ComputePipeline>>,
+    /// Time after which the device counts as hung.
     patience: Duration,
-    /// The first thing that went wrong.
+    /// First error of the device.
     fault: Arc<Mutex<Option<String>>>,
 }
 
 impl Device {
-    /// Opens the best adapter: a discrete GPU before an integrated one before software, or the one whose name
-    /// contains `wanted` (case aside). With `hardware_only`, software does not count.
+    /// Opens the best adapter: a discrete GPU before an integrated one before software, or the one whose name contains
+    /// `wanted` (case-insensitive). With `hardware_only`, software adapters are ignored.
     ///
     /// # Errors
-    /// Nothing fits, or the device could not be had.
+    /// No adapter fits, or the device could not be created.
     pub fn open(hardware_only: bool, wanted: Option<&str>) -> Result<Self, GpuError> {
         if hardware_only && wanted.is_none() && !has_gpu_node() {
             let found = "no device node of one under /dev".to_owned();
@@ -120,7 +122,7 @@ impl Device {
         let (device, queue) = pollster::block_on(adapter.request_device(&wgpu::DeviceDescriptor {
             label: Some("bokehcam"),
             required_features: if timestamps { wgpu::Features::TIMESTAMP_QUERY } else { wgpu::Features::empty() },
-            // Large pictures need more than the portable 128 MiB a buffer.
+            // Large pictures need more than the portable 128 MiB per buffer.
             required_limits: adapter.limits(),
             ..Default::default()
         }))
@@ -128,25 +130,25 @@ impl Device {
         let fault = Arc::new(Mutex::new(None));
         let report = |fault: &Arc<Mutex<Option<String>>>| {
             let fault = Arc::clone(fault);
-            move |message: String| note(&fault, message)
+            move |message: String| record_fault(&fault, message)
         };
         let (on_error, on_loss) = (report(&fault), report(&fault));
         device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| on_error(error.to_string())));
-        // Dropping the device calls this, too; then nobody is left to read the fault.
+        // Dropping the device calls this, too; the fault is then never read.
         device.set_device_lost_callback(move |_, message| on_loss(format!("device lost: {message}")));
         let patience = if infos[best].device_type == wgpu::DeviceType::Cpu { PATIENCE_WITH_SOFTWARE } else { PATIENCE };
         let (faults, pipelines) = (Mutex::default(), Mutex::default());
         Ok(Self { instance, adapter, device, queue, name, timestamps, faults, pipelines, patience, fault })
     }
 
-    /// The same device, which may take so long before it counts as hung.
+    /// Sets the time after which the device counts as hung.
     #[must_use]
     pub fn with_patience(self, patience: Duration) -> Self {
         Self { patience, ..self }
     }
 
-    /// The pipeline of a shader with its `override` constants; the same again where that was made already. Its bind group
-    /// layout follows from the source. Workgroup memory is not zero when it begins.
+    /// Returns the pipeline of a shader with its `override` constants, from a cache. Its bind group layout follows from
+    /// the source. Workgroup memory is not zero-initialised.
     pub fn pipeline(&self, shader: Shader, constants: &[(&str, f64)]) -> wgpu::ComputePipeline {
         let mut pipelines = self.pipelines.lock().unwrap_or_else(PoisonError::into_inner);
         let constant_bits = constants.iter().map(|(_, value)| value.to_bits()).collect();
@@ -156,9 +158,9 @@ impl Device {
     fn make_pipeline(&self, Shader { name, source }: Shader, constants: &[(&str, f64)]) -> wgpu::ComputePipeline {
         let descriptor =
             wgpu::ShaderModuleDescriptor { label: Some(name), source: wgpu::ShaderSource::Wgsl(source.into()) };
-        // Counting the turns of loops would take a twentieth of the time.
+        // Loop bounding would cost a twentieth of the time.
         let checks = wgpu::ShaderRuntimeChecks { force_loop_bounding: false, ..Default::default() };
-        // SAFETY: all loops end, in all shaders there are.
+        // SAFETY: all loops of all shaders terminate.
         #[allow(unsafe_code)]
         let module = unsafe { self.device.create_shader_module_trusted(descriptor, checks) };
         self.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
@@ -174,7 +176,7 @@ impl Device {
         })
     }
 
-    /// The bind group 0 of a pipeline: `buffers` at bindings 0, 1 and so on.
+    /// Creates bind group 0 of a pipeline: `buffers` at bindings 0, 1 and so on.
     pub fn bindings<'a>(
         &self,
         pipeline: &wgpu::ComputePipeline,
@@ -183,7 +185,7 @@ impl Device {
         self.bound(&pipeline.get_bind_group_layout(0), buffers)
     }
 
-    /// A bind group of a layout: `buffers` at bindings 0, 1 and so on.
+    /// Creates a bind group of a layout: `buffers` at bindings 0, 1 and so on.
     pub fn bound<'a>(
         &self,
         layout: &wgpu::BindGroupLayout,
@@ -198,7 +200,7 @@ impl Device {
         })
     }
 
-    /// A buffer of so many bytes, in whole words; a binding must not be empty.
+    /// Creates a buffer of `bytes` bytes, rounded up to whole words; at least 16, because a binding must not be empty.
     pub fn buffer(&self, label: &str, bytes: usize, usage: wgpu::BufferUsages) -> wgpu::Buffer {
         self.device.create_buffer(&wgpu::BufferDescriptor {
             label: Some(label),
@@ -208,14 +210,14 @@ impl Device {
         })
     }
 
-    /// Refuses sizes whose largest buffer, or whose number of workgroups, exceeds the limits of the device.
+    /// Checks a picture size: its largest buffer and its number of workgroups must be within the limits of the device.
     ///
     /// # Errors
-    /// It does: so large pictures cannot be `done` there.
+    /// The picture is too large to be `done` on this device.
     pub fn has_room(&self, (width, height): (u32, u32), bytes: u64, done: &str) -> Result<(), GpuError> {
         let limits = self.device.limits();
-        let most = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
-        if bytes > most || width.max(height) > limits.max_compute_workgroups_per_dimension {
+        let max_bytes = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
+        if bytes > max_bytes || width.max(height) > limits.max_compute_workgroups_per_dimension {
             let (name, size) = (&self.name, format!("{width} x {height}"));
             return Err(GpuError::Failed(format!("{name}: pictures of {size} are too large to be {done} there")));
         }
@@ -234,10 +236,10 @@ impl Device {
         }
     }
 
-    /// Does something that the device may refuse: that error is returned, and [`Device::check`] does not find it.
+    /// Runs `work` in an error scope: its device errors are returned, and not reported by [`Device::check`].
     ///
     /// # Errors
-    /// The device refused something of it.
+    /// The device reported an error during `work`.
     pub fn attempt<T>(&self, work: impl FnOnce() -> T) -> Result<T, GpuError> {
         let memory = self.device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
         let validation = self.device.push_error_scope(wgpu::ErrorFilter::Validation);
@@ -249,10 +251,10 @@ impl Device {
         }
     }
 
-    /// The first thing that went wrong on the device, if anything did.
+    /// Checks whether the device has failed.
     ///
     /// # Errors
-    /// That thing.
+    /// Returns the first error of the device.
     pub fn check(&self) -> Result<(), GpuError> {
         match self.fault.lock().unwrap_or_else(PoisonError::into_inner).clone() {
             Some(message) => Err(GpuError::Failed(format!("{}: {message}", self.name))),
@@ -262,11 +264,11 @@ impl Device {
 }
 
 /// Records a fault, unless there is one already.
-fn note(fault: &Mutex<Option<String>>, message: String) {
+fn record_fault(fault: &Mutex<Option<String>>, message: String) {
     fault.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(message);
 }
 
-/// Whether the kernel offers any GPU at all. Asking Vulkan instead takes time, and some drivers write to stderr.
+/// Whether the kernel has a GPU device node. Enumerating Vulkan takes time, and some drivers write to stderr.
 fn has_gpu_node() -> bool {
     let render = std::fs::read_dir("/dev/dri")
         .is_ok_and(|entries| entries.flatten().any(|entry| entry.file_name().to_string_lossy().starts_with("render")));
@@ -276,7 +278,7 @@ fn has_gpu_node() -> bool {
             .any(|node| std::path::Path::new(node).exists())
 }
 
-/// The order in which adapters are preferred: the least first.
+/// Returns the rank of an adapter, lowest first.
 fn preference(info: &wgpu::AdapterInfo) -> u32 {
     match info.device_type {
         wgpu::DeviceType::DiscreteGpu => 0,
@@ -286,7 +288,7 @@ fn preference(info: &wgpu::AdapterInfo) -> u32 {
     }
 }
 
-/// Name, kind and driver of an adapter.
+/// Describes an adapter by name, kind and driver.
 fn describe(info: &wgpu::AdapterInfo) -> String {
     let kind = match info.device_type {
         wgpu::DeviceType::Cpu => "software",

@@ -1,22 +1,22 @@
-//! How much memory is free.
+//! Free memory of the process.
 
 use std::fs;
 
 use rustix::process::{Resource, getrlimit};
 
-/// What this process can still take: free memory and swap space, within its own limit (`ulimit -v`) and those of its
-/// control groups. `None` where the system does not say.
+/// Returns how much this process can still allocate: free memory and swap space, within its own limit (`ulimit -v`) and
+/// that of its control group. `None` if the system does not report it.
 pub fn free_bytes() -> Option<u64> {
     let info = fs::read_to_string("/proc/meminfo").ok()?;
     let free = bytes_of(&info, "MemAvailable:")? + bytes_of(&info, "SwapFree:").unwrap_or(0);
     let status = fs::read_to_string("/proc/self/status").unwrap_or_default();
     let own_limit =
-        getrlimit(Resource::As).current.map(|most| most.saturating_sub(bytes_of(&status, "VmSize:").unwrap_or(0)));
+        getrlimit(Resource::As).current.map(|limit| limit.saturating_sub(bytes_of(&status, "VmSize:").unwrap_or(0)));
     Some([own_limit, cgroup_bytes()].into_iter().flatten().fold(free, u64::min))
 }
 
-/// What the limit of this process's control group (version 2) leaves. Those of the groups above it are not read: as a
-/// rule, they are no tighter.
+/// Returns the remainder of the limit of this process's control group (version 2). Parent groups are not read: they are
+/// rarely tighter.
 fn cgroup_bytes() -> Option<u64> {
     let groups = fs::read_to_string("/proc/self/cgroup").ok()?;
     let group = groups.lines().find_map(|line| line.strip_prefix("0::/"))?;
@@ -25,7 +25,7 @@ fn cgroup_bytes() -> Option<u64> {
     Some(number("memory.max")?.saturating_sub(number("memory.current")?))
 }
 
-/// The number in a line of /proc that begins with `name`, as in `NAME:   123 kB`, in bytes.
+/// Returns the number, in bytes, in a line of /proc that begins with `name`, as in `NAME:   123 kB`.
 fn bytes_of(text: &str, name: &str) -> Option<u64> {
     let line = text.lines().find_map(|line| line.strip_prefix(name))?;
     Some(line.trim().trim_end_matches(" kB").parse::<u64>().ok()? << 10)

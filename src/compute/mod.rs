@@ -1,4 +1,4 @@
-//! What the executors run on: a thread pool ([`thread_pool`]), vector instructions ([`simd`]), and a GPU ([`device`]).
+//! Execution resources: a thread pool ([`thread_pool`]), vector instructions ([`simd`]), and a GPU ([`device`]).
 
 pub mod aligned;
 pub mod backed;
@@ -19,17 +19,17 @@ use crate::names::named;
 pub use device::{Device, DeviceFrame, DevicePicture};
 pub use pass_times::PassTimes;
 
-/// A GPU, of which this build has none.
+/// Uninhabited GPU type of builds without GPU support.
 #[cfg(not(feature = "gpu"))]
 #[derive(Debug)]
 pub enum Device {}
 
-/// A picture in a GPU's memory, of which this build has none.
+/// Uninhabited GPU picture of builds without GPU support.
 #[cfg(not(feature = "gpu"))]
 #[derive(Debug)]
 pub enum DevicePicture {}
 
-/// A depth map and its picture in a GPU's memory, of which this build has none.
+/// Uninhabited GPU frame of builds without GPU support.
 #[cfg(not(feature = "gpu"))]
 #[derive(Debug)]
 pub enum DeviceFrame {}
@@ -46,23 +46,23 @@ named! {
     }
 }
 
-/// Where a picture is wanted.
+/// Where a picture is needed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum Place {
     #[default]
     Memory,
-    /// In the memory of the GPU that made it; who computes elsewhere leaves it in memory.
+    /// In the memory of the GPU that made it; a CPU executor leaves it in memory.
     Device,
     Both,
 }
 
-/// Why there is no GPU to compute on.
+/// Why there is no usable GPU.
 #[derive(Clone, Debug, thiserror::Error)]
 pub enum GpuError {
-    /// No adapter fits what was asked for.
+    /// No adapter fits the request.
     #[error("no GPU adapter {wanted}; found: {found}. Use --backend cpu, or install a Vulkan driver")]
     NoAdapter {
-        /// What was asked for.
+        /// Description of the requested adapter.
         wanted: String,
         found: String,
     },
@@ -73,7 +73,7 @@ pub enum GpuError {
 
 #[cfg(not(feature = "gpu"))]
 impl GpuError {
-    /// A GPU was asked for, and this build cannot use any.
+    /// Returns the error of a build without GPU support.
     pub fn left_out() -> Self {
         let wanted = "at all: this build leaves the GPU out (feature `gpu`)".to_owned();
         Self::NoAdapter { wanted, found: "none".to_owned() }
@@ -82,7 +82,7 @@ impl GpuError {
 
 #[cfg(not(feature = "gpu"))]
 impl Device {
-    /// Finds none.
+    /// Always fails.
     ///
     /// # Errors
     /// Always.
@@ -90,7 +90,7 @@ impl Device {
         Err(GpuError::left_out())
     }
 
-    /// There is nothing that could fail.
+    /// Never called: there is no value of this type.
     ///
     /// # Errors
     /// Never.
@@ -101,19 +101,20 @@ impl Device {
 
 thread_local! {
     /// Whether the thread is in [`catch_panic`].
-    static CATCHES: Cell<bool> = const { Cell::new(false) };
+    static IS_CATCHING: Cell<bool> = const { Cell::new(false) };
 }
 
-/// Calls what reports an error by panicking: `None` if it does. What it was changing must not be used afterwards.
+/// Calls code that reports an error by panicking; returns `None` if it panics. State that it was changing must not be
+/// used afterwards.
 pub fn catch_panic<T>(work: impl FnOnce() -> T) -> Option<T> {
-    let before = CATCHES.replace(true);
+    let before = IS_CATCHING.replace(true);
     let done = catch_unwind(AssertUnwindSafe(work));
-    CATCHES.set(before);
+    IS_CATCHING.set(before);
     // The payload is leaked, as dropping it may panic again.
     done.map_err(std::mem::forget).ok()
 }
 
-/// Whether a panic of this thread is only an error, which the caller of [`catch_panic`] reports: no crash to log.
+/// Whether a panic of this thread is inside [`catch_panic`], whose caller reports it: no crash to log.
 pub fn is_catching_panics() -> bool {
-    CATCHES.get()
+    IS_CATCHING.get()
 }

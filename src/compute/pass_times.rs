@@ -1,4 +1,4 @@
-//! What passes take.
+//! Times of the passes of a frame.
 
 use std::time::Duration;
 
@@ -10,10 +10,10 @@ pub struct PassTimes {
 }
 
 impl PassTimes {
-    /// More than the distinct passes of any executor.
+    /// More than the number of distinct passes of any executor.
     const CAPACITY: usize = 16;
 
-    /// No pass yet.
+    /// Creates an empty list.
     pub fn new() -> Self {
         Self { passes: [("", Duration::ZERO); Self::CAPACITY], len: 0 }
     }
@@ -28,7 +28,7 @@ impl PassTimes {
         }
     }
 
-    /// Pass names and times.
+    /// Returns pass names and times.
     pub fn iter(&self) -> impl Iterator<Item = (&'static str, Duration)> + '_ {
         self.passes[..self.len].iter().copied()
     }

@@ -1,26 +1,26 @@
 //! SIMD dispatch: run-time choice of the vector instructions.
 //!
-//! Every pass is a [`pulp::WithSimd`]: compiled once per instruction set (AVX-512, AVX2 with FMA, NEON, or what the
-//! target guarantees), and the best that the machine has is taken. Inside, simple loops are left to the compiler, and
-//! the filters use the vectors themselves.
+//! Every pass is a [`pulp::WithSimd`]: compiled once per instruction set (AVX-512, AVX2 with FMA, NEON, or the target's
+//! baseline), of which the best one available runs. Simple loops are vectorised by the compiler; the filters use
+//! explicit vectors.
 
 use pulp::{Arch, Simd};
 
 use super::aligned::LINE;
 
-/// `a * b + c`: one instruction where there is one, two where it would be a library call.
+/// Computes `a * b + c`: fused if the processor has an instruction for it, because the library call would be slow.
 #[inline(always)]
 pub fn madd<S: Simd>(a: f32, b: f32, c: f32) -> f32 {
     if S::IS_SCALAR { a * b + c } else { a.mul_add(b, c) }
 }
 
-/// [`madd`] of vectors.
+/// [`madd`] for vectors.
 #[inline(always)]
 pub fn fma<S: Simd>(simd: S, a: S::f32s, b: S::f32s, c: S::f32s) -> S::f32s {
     if S::IS_SCALAR { simd.add_f32s(simd.mul_f32s(a, b), c) } else { simd.mul_add_f32s(a, b, c) }
 }
 
-/// One vector of `values`, from index `at` on.
+/// Loads one vector of `values`, from index `at` on.
 #[inline(always)]
 pub fn load<S: Simd>(values: &[f32], at: usize) -> S::f32s {
     S::as_simd_f32s(&values[at..at + S::F32_LANES]).0[0]
@@ -32,7 +32,7 @@ pub fn store<S: Simd>(values: &mut [f32], at: usize, vector: S::f32s) {
     S::as_mut_simd_f32s(&mut values[at..at + S::F32_LANES]).0[0] = vector;
 }
 
-/// The name of the instruction set, for the report.
+/// Returns the name of the instruction set, for the report.
 pub fn name(arch: Arch) -> &'static str {
     match arch {
         #[cfg(target_arch = "x86_64")]
@@ -45,8 +45,7 @@ pub fn name(arch: Arch) -> &'static str {
     }
 }
 
-/// Asks for the cache lines of `values`, which are read some time later: where a pass jumps through memory, the machine does
-/// not see by itself what comes next.
+/// Prefetches the cache lines of `values`, for passes with strides that the hardware prefetcher does not recognise.
 #[allow(unsafe_code)]
 #[inline(always)]
 pub fn prefetch<T>(values: &[T]) {

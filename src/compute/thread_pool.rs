@@ -1,8 +1,8 @@
-//! The thread pool: a fixed number of threads that share out the parts of one pass at a time.
+//! The thread pool: a fixed number of threads that share the parts of one pass at a time.
 //!
-//! A pass is over when every part is done; a member that sleeps through it is not waited for. Nothing is allocated
-//! and no lock is taken. It needs `unsafe` because the threads outlive the borrow of the work they are handed; `run` is
-//! what guarantees that they never use it afterwards, whatever panics.
+//! A pass is over when every part is done; sleeping members are not waited for. Nothing is allocated and no lock is
+//! taken. It needs `unsafe` because the threads outlive the borrow of the work they run; `run` guarantees that they
+//! never use it afterwards, even after a panic.
 #![allow(unsafe_code)]
 
 pub mod relay;
@@ -13,17 +13,17 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 use std::thread::{self, JoinHandle, Thread};
 
-/// One part of a pass: called with the number of the member that does it, and the part's number.
+/// One part of a pass: called with the numbers of the member and of the part.
 type Work<'a> = &'a (dyn Fn(usize, usize) + Sync + 'a);
 
-/// The threads. The thread that calls [`ThreadPool::run`] works as one of them.
+/// The threads of the pool. The thread that calls [`ThreadPool::run`] is member 0.
 pub struct ThreadPool {
     shared: Arc<Shared>,
     members: Vec<JoinHandle<()>>,
 }
 
 struct Shared {
-    /// `epoch << 16 | open << 15 | members at work`. Opening a pass raises the epoch.
+    /// `epoch << 16 | open << 15 | members at work`. Opening a pass increments the epoch.
     gate: AtomicU64,
     /// Valid from the opening of the gate until it is closed and no member is at work.
     work: UnsafeCell<Option<Pass>>,
@@ -39,10 +39,10 @@ struct Pass {
     parts: usize,
 }
 
-/// The start of the members' scratch memory, or of items.
+/// Start of an array of scratch memory or items.
 struct Base<S>(*mut S);
 
-// SAFETY: only hands out addresses; who takes one argues for it. `S: Send` as members are other threads.
+// SAFETY: only returns addresses; each dereference has its own argument. `S: Send` as members are other threads.
 unsafe impl<S: Send> Sync for Base<S> {}
 
 impl<S> Base<S> {
@@ -51,25 +51,26 @@ impl<S> Base<S> {
     }
 }
 
-/// Items of one pass, at most: they are kept on the stack.
+/// Largest number of items of a pass: they are kept on the stack.
 pub const MOST_ITEMS: usize = 32;
 const OPEN: u64 = 1 << 15;
 const AT_WORK: u64 = OPEN - 1;
 const EPOCH: u64 = 1 << 16;
-/// Turns of waiting before a member goes to sleep: about as long as the gap between two passes of a frame.
+/// Spins before a member sleeps: about the time between two passes of a frame.
 const SPINS: u32 = 4_000;
 
-// SAFETY: `work` is written only by the thread in `run` (`&mut self`: there is one) with the gate closed and nobody at
-// work, and read only by members that entered through the open gate; its release/acquire pairs order the two.
+// SAFETY: `work` is written only by the thread in `run` (`&mut self`: there is only one) while the gate is closed and
+// no member is at work, and read only by members that entered through the open gate; its release/acquire pairs order
+// the two.
 unsafe impl Sync for Shared {}
 
-/// Threads that run at once on this machine, at least 1.
+/// Returns the number of hardware threads, at least 1.
 pub fn cores() -> usize {
     thread::available_parallelism().map_or(1, usize::from)
 }
 
 impl ThreadPool {
-    /// A pool of `threads` (at least 1), the caller included; `name` is what the others are called, with a number.
+    /// Creates a pool of `threads` (at least 1), including the caller; the others are named `name` plus a number.
     pub fn new(name: &str, threads: usize) -> Self {
         let shared = Arc::new(Shared {
             gate: AtomicU64::new(0),
@@ -82,18 +83,18 @@ impl ThreadPool {
         let members = (1..threads.max(1))
             .map_while(|k| {
                 let shared = Arc::clone(&shared);
-                // Without the thread the others do its share.
-                thread::Builder::new().name(format!("{name}-{k}")).spawn(move || shared.serve(k)).ok()
+                // If a thread cannot be created, the others do its share.
+                thread::Builder::new().name(format!("{name}-{k}")).spawn(move || shared.run_member(k)).ok()
             })
             .collect::<Vec<_>>();
-        // A thread that starts allocates; from here on nothing does.
+        // A starting thread allocates; afterwards nothing does.
         while shared.started.load(Ordering::Relaxed) < members.len() {
             thread::yield_now();
         }
         Self { shared, members }
     }
 
-    /// Number of threads in the pool, the caller included: fewer than asked for where the system gave no more.
+    /// Returns the number of threads, including the caller: fewer than requested if the system refused some.
     pub fn thread_count(&self) -> usize {
         self.members.len() + 1
     }
@@ -101,21 +102,21 @@ impl ThreadPool {
     /// Calls `work` once with each of `0..parts`, spread over the threads, and returns when all are done.
     ///
     /// # Panics
-    /// When a part panicked, after the others are done.
+    /// Panics if a part panicked, after the others are done.
     pub fn run(&mut self, parts: usize, work: &(dyn Fn(usize) + Sync)) {
         self.run_members(parts, &|_, part| work(part));
     }
 
-    /// As [`ThreadPool::run`], with scratch memory of its own for every member: `scratch` has one for each thread.
+    /// Same as [`ThreadPool::run`], with one element of `scratch` for each thread.
     ///
     /// # Panics
-    /// As [`ThreadPool::run`], and when `scratch` is too short.
+    /// Panics like [`ThreadPool::run`], and if `scratch` is too short.
     pub fn run_with<S: Send>(&mut self, scratch: &mut [S], parts: usize, work: &(dyn Fn(&mut S, usize) + Sync)) {
         assert!(scratch.len() >= self.thread_count(), "every thread needs its scratch");
         let base = Base(scratch.as_mut_ptr());
         self.run_members(parts, &|member, part| {
             // SAFETY: `member` is below the pool's size, which `scratch` covers, and each member is one thread that
-            // does one part at a time; so nobody else holds this element, and `scratch` is borrowed throughout.
+            // does one part at a time; so no other thread uses this element, and `scratch` is borrowed throughout.
             work(unsafe { &mut *base.at(member) }, part);
         });
     }
@@ -123,15 +124,15 @@ impl ThreadPool {
     /// Calls `work` once with each of at most [`MOST_ITEMS`] items, spread over the threads.
     ///
     /// # Panics
-    /// As [`ThreadPool::run`], and when there are more items.
+    /// Panics like [`ThreadPool::run`], and if there are more items.
     pub fn run_each<T: Send>(&mut self, items: impl Iterator<Item = T>, work: &(dyn Fn(T) + Sync)) {
         self.run_each_with(&mut [(); AT_WORK as usize], items, &|(), item| work(item));
     }
 
-    /// The same with scratch memory for every thread, as for [`ThreadPool::run_with`].
+    /// Same as [`Self::run_each`], with one element of `scratch` for each thread ([`ThreadPool::run_with`]).
     ///
     /// # Panics
-    /// As [`ThreadPool::run_with`], and when there are more items.
+    /// Panics like [`ThreadPool::run_with`], and if there are more items.
     pub fn run_each_with<S: Send, T: Send>(
         &mut self,
         scratch: &mut [S],
@@ -143,24 +144,26 @@ impl ThreadPool {
         let count = waiting.iter().flatten().count();
         let base = Base(waiting.as_mut_ptr());
         self.run_with(scratch, count, &|scratch, part| {
-            // SAFETY: `part` is below `count`, which `waiting` has, and is done once: nobody else holds this place.
+            // SAFETY: `part` is below `count`, the length of `waiting`, and runs once: no other thread uses this
+            // element.
             if let Some(item) = unsafe { &mut *base.at(part) }.take() {
                 work(scratch, item);
             }
         });
     }
 
-    /// Opens the gate for a pass, takes parts like a member, and returns once all are done and nobody is at work.
+    /// Opens the gate for a pass, runs parts like a member, and returns once all are done and no member is at work.
     fn run_members(&mut self, parts: usize, work: Work<'_>) {
         if self.members.is_empty() || parts < 2 {
             return (0..parts).for_each(|part| work(0, part));
         }
         let shared = &*self.shared;
-        // SAFETY: only the lifetime changes. The reference is dropped from `shared.work` below, before `run` returns
-        // and only once no member is at work; nobody can enter after the gate is closed.
+        // SAFETY: only the lifetime changes. The reference is removed from `shared.work` below, before `run` returns
+        // and only once no member is at work; no member can enter after the gate is closed.
         let work: Work<'static> = unsafe { std::mem::transmute::<Work<'_>, Work<'static>>(work) };
         shared.next.store(0, Ordering::Relaxed);
-        // SAFETY: the gate is closed and nobody is at work (see the wait below), so nobody else touches the cell.
+        // SAFETY: the gate is closed and no member is at work (see the wait below), so no other thread touches the
+        // cell.
         unsafe { *shared.work.get() = Some(Pass { work, parts }) };
         // Release: members that see the gate open also see the pass.
         let closed = shared.gate.load(Ordering::Relaxed);
@@ -168,15 +171,15 @@ impl ThreadPool {
         let helpers = self.members.iter().take(parts - 1);
         helpers.map(JoinHandle::thread).for_each(Thread::unpark);
 
-        shared.take_parts(0, Pass { work, parts });
+        shared.run_parts(0, Pass { work, parts });
         shared.gate.fetch_and(!OPEN, Ordering::Relaxed);
         let mut turns = 0u32;
-        // Acquire: what members wrote is visible once their leaving is.
+        // Acquire: the members' writes are visible once their leaving is.
         while shared.gate.load(Ordering::Acquire) & AT_WORK != 0 {
             turns += 1;
             if turns.is_multiple_of(64) { thread::yield_now() } else { std::hint::spin_loop() }
         }
-        // SAFETY: closed, and nobody at work.
+        // SAFETY: the gate is closed and no member is at work.
         unsafe { *shared.work.get() = None };
         if shared.panicked.swap(false, Ordering::Relaxed) {
             resume_unwind(Box::new("a part of a pass panicked"));
@@ -185,8 +188,8 @@ impl ThreadPool {
 }
 
 impl Shared {
-    /// What a member's thread runs: enters each pass once, if it is awake in time, until the pool is dropped.
-    fn serve(&self, member: usize) {
+    /// Runs a member's thread: enters each pass once, if it is awake in time, until the pool is dropped.
+    fn run_member(&self, member: usize) {
         self.started.fetch_add(1, Ordering::Relaxed);
         let mut last_epoch = 0;
         loop {
@@ -202,22 +205,23 @@ impl Shared {
                 turns += 1;
                 if turns < SPINS { std::hint::spin_loop() } else { thread::park() }
             };
-            // Acquire pairs with the release in `run`; failing means that the gate moved: look again.
+            // Acquire pairs with the release in `run`. A failure means that the gate changed: try again.
             if self.gate.compare_exchange(gate, gate + 1, Ordering::Acquire, Ordering::Relaxed).is_err() {
                 continue;
             }
             last_epoch = gate / EPOCH;
-            // SAFETY: entered through the open gate, so `run` neither writes the cell nor returns until we leave.
+            // SAFETY: entered through the open gate, so `run` neither writes the cell nor returns until this member
+            // leaves.
             if let Some(pass) = unsafe { *self.work.get() } {
-                self.take_parts(member, pass);
+                self.run_parts(member, pass);
             }
-            // Release: `run` sees what we wrote once it sees us gone.
+            // Release: `run` sees this member's writes once it sees the member leave.
             self.gate.fetch_sub(1, Ordering::Release);
         }
     }
 
-    /// Does parts of a pass until none is left; notes a panic instead of passing it on.
-    fn take_parts(&self, member: usize, pass: Pass) {
+    /// Runs parts of a pass until none is left; records a panic instead of propagating it.
+    fn run_parts(&self, member: usize, pass: Pass) {
         let work = AssertUnwindSafe(|| {
             loop {
                 let part = self.next.fetch_add(1, Ordering::Relaxed);
@@ -228,7 +232,8 @@ impl Shared {
             }
         });
         if let Err(thrown) = catch_unwind(work) {
-            // Dropping it may panic: a member would then never leave, or `run` would with members at work.
+            // Dropping the payload may panic: a member would then never leave, or `run` would return with members at
+            // work.
             if let Err(again) = catch_unwind(AssertUnwindSafe(|| drop(thrown))) {
                 std::mem::forget(again);
             }
@@ -242,14 +247,14 @@ impl Drop for ThreadPool {
         self.shared.stop.store(true, Ordering::Relaxed);
         for member in self.members.drain(..) {
             member.thread().unpark();
-            // A member catches its panics, and there is nobody left to tell.
+            // A member catches its panics, and there is no caller left to report one to.
             let _ = member.join();
         }
     }
 }
 
-/// A slice in equal parts that several threads write at once, each its own: hands out `&mut` slices by index.
-/// [`DisjointParts::part`] is safe because each index can be taken once.
+/// A slice in equal parts that several threads write at once: returns `&mut` slices by index. [`DisjointParts::part`]
+/// is safe because each index can be taken once.
 pub struct DisjointParts<'a, T> {
     base: *mut T,
     length: usize,
@@ -257,7 +262,7 @@ pub struct DisjointParts<'a, T> {
     taken: &'a [AtomicBool],
 }
 
-// SAFETY: a part goes to one taker only (`taken`), and `T: Send` may move between threads.
+// SAFETY: each part is given to one caller only (`taken`), and `T: Send` may move between threads.
 unsafe impl<T: Send> Sync for DisjointParts<'_, T> {}
 
 impl<'a, T> DisjointParts<'a, T> {
@@ -269,19 +274,19 @@ impl<'a, T> DisjointParts<'a, T> {
         Self { base: data.as_mut_ptr(), length: data.len(), each, taken }
     }
 
-    /// The part `index`.
+    /// Returns the part `index`.
     ///
     /// # Panics
-    /// When it is taken a second time, or beyond the end.
+    /// Panics if it is taken a second time, or beyond the end.
     #[allow(clippy::mut_from_ref)]
     pub fn part(&self, index: usize) -> &mut [T] {
-        // A product that wraps would be the start of another part.
+        // An overflowing product would be the start of another part.
         let start = index.checked_mul(self.each).filter(|&start| start < self.length);
         let Some(start) = start.filter(|_| !self.taken[index].swap(true, Ordering::Relaxed)) else {
             panic!("each part is taken once");
         };
         let length = self.each.min(self.length - start);
-        // SAFETY: inside the allocation, which `'a` keeps borrowed; parts do not overlap and each is handed out once.
+        // SAFETY: inside the allocation, which is borrowed for `'a`; parts do not overlap and each is returned once.
         unsafe { std::slice::from_raw_parts_mut(self.base.add(start), length) }
     }
 }

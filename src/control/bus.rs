@@ -1,7 +1,7 @@
-//! A run on the session's message bus: switches and signals for desktops, and an icon in their tray.
+//! Control of a run over the D-Bus session bus: properties and signals for desktops, and a tray icon.
 //!
-//! `docs/ctl.md` describes the interface. What is asked here goes to the same handler as what comes by the socket, and each
-//! change, whoever asked for it, is told as the bus has it: nothing is looked at again and again.
+//! `docs/ctl.md` describes the interface. Requests go to the same handler as those of the socket. Every change,
+//! whatever its origin, is emitted as a signal, so that no client has to poll.
 
 mod tray;
 
@@ -17,28 +17,28 @@ use zbus::{fdo, interface};
 
 use super::{Answer, Handler, Request, Status};
 
-/// What the run is called on the bus; the next one there is waits until this one has ended.
+/// The well-known bus name; if another run has it, this one queues until that has ended.
 const NAME: &str = "io.github.bokehcam.bokehcam";
 const PATH: &str = "/io/github/bokehcam/bokehcam";
 
-/// What desktops see of a run.
+/// The state of a run, as desktops see it.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-struct Seen {
+struct State {
     is_on: bool,
-    /// The preset that was asked for last, where no setting was changed since.
+    /// The preset that was requested last; empty once a setting was changed after it.
     preset: String,
     source: String,
     presets: Vec<String>,
 }
 
-/// Who answers, until the run ends.
+/// The request handler; `None` once the run ends.
 type Slot = Arc<Mutex<Option<Arc<Handler>>>>;
 
-/// The run and what is known of it.
+/// The run's D-Bus object.
 #[derive(Clone)]
 struct Camera {
     handler: Slot,
-    seen: Arc<Mutex<Seen>>,
+    state: Arc<Mutex<State>>,
 }
 
 fn lock<T>(what: &Mutex<T>) -> MutexGuard<'_, T> {
@@ -46,11 +46,11 @@ fn lock<T>(what: &Mutex<T>) -> MutexGuard<'_, T> {
 }
 
 impl Camera {
-    fn seen(&self) -> MutexGuard<'_, Seen> {
-        lock(&self.seen)
+    fn state(&self) -> MutexGuard<'_, State> {
+        lock(&self.state)
     }
 
-    fn ask(&self, request: Request) -> fdo::Result<()> {
+    fn send_request(&self, request: Request) -> fdo::Result<()> {
         let handler = lock(&self.handler).clone();
         let handler = handler.ok_or_else(|| fdo::Error::Failed("it is ending".into()))?;
         match handler(request) {
@@ -63,74 +63,74 @@ impl Camera {
 
 #[interface(name = "io.github.bokehcam.Camera")]
 impl Camera {
-    /// Off if it is on, else on.
+    /// Switches between on and off.
     fn toggle(&self) -> fdo::Result<()> {
-        self.ask(Request::Toggle)
+        self.send_request(Request::Toggle)
     }
 
-    /// Takes the look of a preset.
+    /// Applies the look of a preset.
     fn set_preset(&self, name: String) -> fdo::Result<()> {
-        self.ask(Request::Preset { name })
+        self.send_request(Request::Preset { name })
     }
 
-    /// Whether pictures go out; else the still card.
+    /// Whether pictures are shown; otherwise the still card is.
     #[zbus(property)]
     fn active(&self) -> bool {
-        self.seen().is_on
+        self.state().is_on
     }
 
-    /// The preset that holds; empty where settings hold that are no preset's.
+    /// The current preset; empty if the settings belong to none.
     #[zbus(property)]
     fn preset(&self) -> String {
-        self.seen().preset.clone()
+        self.state().preset.clone()
     }
 
     #[zbus(property(emits_changed_signal = "const"))]
     fn presets(&self) -> Vec<String> {
-        self.seen().presets.clone()
+        self.state().presets.clone()
     }
 
     #[zbus(property(emits_changed_signal = "const"))]
     fn source(&self) -> String {
-        self.seen().source.clone()
+        self.state().source.clone()
     }
 }
 
-/// A run on the bus, until this is dropped.
+/// A run's presence on the bus, until this is dropped.
 pub struct Bus {
     handler: Slot,
 }
 
-/// Puts a run on the bus, which shows these presets. Gives the handler that is to be asked from now on in place of `handler`:
-/// it tells of changes.
+/// Publishes a run with these presets on the bus. Returns the handler to use from now on in place of `handler`: it also
+/// reports changes to the bus.
 ///
 /// # Errors
-/// There is no session bus, or it refuses: one line.
+/// Returns one line if there is no session bus, or it refuses.
 pub fn serve(handler: Arc<Handler>, presets: Vec<String>) -> Result<(Bus, Arc<Handler>), String> {
-    let seen = Arc::new(Mutex::new(Seen { presets, ..Seen::default() }));
+    let state = Arc::new(Mutex::new(State { presets, ..State::default() }));
     let (changed, changes) = mpsc::channel();
-    let noted = Arc::clone(&seen);
+    let noted = Arc::clone(&state);
     let handler: Arc<Handler> = Arc::new(move |request: Request| {
         let asked = request.clone();
         let answer = handler(request);
         if let Answer::Done { status, .. } = &answer {
-            note(&mut lock(&noted), &asked, status);
-            // The bus may have gone.
+            record_change(&mut lock(&noted), &asked, status);
+            // The bus thread may have ended.
             let _ = changed.send(());
         }
         answer
     });
-    // What is seen at first.
+    // Fills the initial state.
     handler(Request::Status);
     let slot: Slot = Arc::new(Mutex::new(Some(Arc::clone(&handler))));
-    let camera = Camera { handler: Arc::clone(&slot), seen: Arc::clone(&seen) };
+    let camera = Camera { handler: Arc::clone(&slot), state: Arc::clone(&state) };
     let refused = |error: zbus::Error| format!("the session's message bus: {error}");
     let bus = Builder::session()
         .and_then(|builder| builder.serve_at(PATH, camera.clone()))
         .and_then(|builder| builder.serve_at(tray::PATH, tray::Item(camera)))
         .and_then(Builder::build)
         .map_err(refused)?;
-    // Without a reply: where another run has the name, this one waits for it.
+    // Without waiting for the reply: if another run owns the name, this one is queued.
     bus.call_method(
         Some("org.freedesktop.DBus"),
         "/org/freedesktop/DBus",
@@ -140,41 +140,41 @@ pub fn serve(handler: Arc<Handler>, presets: Vec<String>) -> Result<(Bus, Arc<Ha
     )
     .map_err(refused)?;
     tray::register(&bus);
-    let told = lock(&seen).clone();
-    let tell = move || {
-        tell(&bus, told, &seen, &changes);
-        // Gone from the bus, and from the tray.
+    let emitted = lock(&state).clone();
+    let emit = move || {
+        emit_changes(&bus, emitted, &state, &changes);
+        // Leaves the bus and the tray.
         let _ = bus.close();
     };
-    thread::Builder::new().name("bus".into()).spawn(tell).map_err(|error| error.to_string())?;
+    thread::Builder::new().name("bus".into()).spawn(emit).map_err(|error| error.to_string())?;
     Ok((Bus { handler: slot }, handler))
 }
 
-/// Takes note of what was done.
-fn note(seen: &mut Seen, asked: &Request, status: &Status) {
-    (seen.is_on, seen.source) = (status.on, status.source.clone());
+/// Records what a request has changed.
+fn record_change(state: &mut State, asked: &Request, status: &Status) {
+    (state.is_on, state.source) = (status.on, status.source.clone());
     match asked {
-        Request::Preset { name } => seen.preset.clone_from(name),
-        Request::Set { .. } => seen.preset.clear(),
+        Request::Preset { name } => state.preset.clone_from(name),
+        Request::Set { .. } => state.preset.clear(),
         _ => {}
     }
 }
 
-/// Tells the bus of changes, until nobody can ask any more.
-fn tell(bus: &Connection, mut told: Seen, seen: &Mutex<Seen>, changes: &Receiver<()>) {
+/// Emits a signal for each change of state, until the handler is dropped.
+fn emit_changes(bus: &Connection, mut emitted: State, state: &Mutex<State>, changes: &Receiver<()>) {
     while let Ok(()) = changes.recv() {
-        let now = lock(seen).clone();
-        if now == told {
+        let now = lock(state).clone();
+        if now == emitted {
             continue;
         }
-        if let Err(error) = told_of(bus, &told, &now) {
+        if let Err(error) = emit_change(bus, &emitted, &now) {
             tracing::debug!("the session's message bus: {error}");
         }
-        told = now;
+        emitted = now;
     }
 }
 
-fn told_of(bus: &Connection, before: &Seen, now: &Seen) -> zbus::Result<()> {
+fn emit_change(bus: &Connection, before: &State, now: &State) -> zbus::Result<()> {
     let mut changed = HashMap::new();
     if before.is_on != now.is_on {
         changed.insert("Active", Value::from(now.is_on));
@@ -185,12 +185,12 @@ fn told_of(bus: &Connection, before: &Seen, now: &Seen) -> zbus::Result<()> {
     let none: [&str; 0] = [];
     let body = ("io.github.bokehcam.Camera", changed, &none[..]);
     bus.emit_signal(None::<&str>, PATH, "org.freedesktop.DBus.Properties", "PropertiesChanged", &body)?;
-    tray::changed(bus)
+    tray::emit_changed(bus)
 }
 
 impl Drop for Bus {
     fn drop(&mut self) {
-        // The thread that tells of changes ends with the last who can ask for one.
+        // The thread that emits changes ends with the last handler.
         drop(lock(&self.handler).take());
     }
 }

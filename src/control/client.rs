@@ -1,4 +1,4 @@
-//! Asks a run.
+//! The client side: sends a request to a run.
 
 use std::io::{self, ErrorKind, Read, Write};
 use std::path::Path;
@@ -7,14 +7,14 @@ use std::time::{Duration, Instant};
 
 use super::{Answer, ControlError, Name, Request, folder, socket};
 
-/// How long an answer may take: longer than any that a run gives itself.
+/// Time limit for an answer: longer than any limit within the run.
 const PATIENCE: Duration = Duration::from_secs(5);
-/// How often one who cannot connect yet tries again.
+/// Interval between attempts to connect.
 const TICK: Duration = Duration::from_millis(20);
-/// The longest answer.
-const MOST_ANSWER_BYTES: u64 = 1 << 20;
+/// Maximum length of an answer.
+const MAX_ANSWER_BYTES: u64 = 1 << 20;
 
-/// The names of all runs that listen, sorted.
+/// Returns the names of all runs that listen, sorted.
 ///
 /// # Errors
 /// The user has no folder for sockets.
@@ -23,10 +23,10 @@ pub fn runs() -> Result<Vec<Name>, ControlError> {
     Ok(folder::names(&folder).into_iter().filter(|name| is_alive(&folder, name)).collect())
 }
 
-/// Asks the run of this name, or the only one, and waits for its answer.
+/// Sends a request to the run of this name, or to the only one, and waits for its answer.
 ///
 /// # Errors
-/// There is no such run, there are several, or it does not answer.
+/// There is no such run, there are several, or the run does not answer.
 pub fn ask(name: Option<&Name>, request: &Request) -> Result<Answer, ControlError> {
     let folder = folder::path()?;
     let there = runs()?;
@@ -51,7 +51,7 @@ pub fn ask(name: Option<&Name>, request: &Request) -> Result<Answer, ControlErro
     serde_json::from_slice(&answer).map_err(|error| silent(format!("it may be of another version: {error}")))
 }
 
-/// Whether a run listens; one that has too much to do is alive, too.
+/// Returns whether a run listens; a run whose queue of connections is full is alive as well.
 fn is_alive(folder: &Path, name: &Name) -> bool {
     match socket::connect(&folder::socket_of(folder, name)) {
         Ok(_) => true,
@@ -59,12 +59,12 @@ fn is_alive(folder: &Path, name: &Name) -> bool {
     }
 }
 
-/// Sends a request and reads what comes until the end.
+/// Sends a request and reads the answer until end of file.
 fn exchange(path: &Path, request: &Request) -> io::Result<Vec<u8>> {
     let until = Instant::now() + PATIENCE;
     let mut stream = loop {
         match socket::connect(path) {
-            // So many ask at once that it does not come to take them all up.
+            // The queue of connections is full: try again.
             Err(error) if error.kind() == ErrorKind::WouldBlock && Instant::now() < until => thread::sleep(TICK),
             connected => break connected?,
         }
@@ -73,26 +73,26 @@ fn exchange(path: &Path, request: &Request) -> io::Result<Vec<u8>> {
     let mut line = serde_json::to_vec(request)?;
     line.push(b'\n');
     match stream.write_all(&line) {
-        // Refused before it was read: the answer says why.
+        // The request was refused before it was read: the answer says why.
         Err(error) if error.kind() == ErrorKind::BrokenPipe => {}
         sent => sent?,
     }
-    let (mut answer, mut some) = (Vec::new(), [0; 4096]);
+    let (mut answer, mut buffer) = (Vec::new(), [0; 4096]);
     loop {
         let left = until.saturating_duration_since(Instant::now());
         if left.is_zero() {
             return Err(ErrorKind::TimedOut.into());
         }
         stream.set_read_timeout(Some(left))?;
-        match stream.read(&mut some) {
+        match stream.read(&mut buffer) {
             Ok(0) => return Ok(answer),
-            Ok(read) => answer.extend_from_slice(&some[..read]),
-            // Answered and closed before the whole request was read: what came is the answer.
+            Ok(read) => answer.extend_from_slice(&buffer[..read]),
+            // The run answered and closed before it had read the whole request: the answer is complete.
             Err(error) if error.kind() == ErrorKind::ConnectionReset && !answer.is_empty() => return Ok(answer),
             Err(error) if error.kind() == ErrorKind::Interrupted => {}
             Err(error) => return Err(error),
         }
-        if answer.len() as u64 > MOST_ANSWER_BYTES {
+        if answer.len() as u64 > MAX_ANSWER_BYTES {
             return Err(io::Error::other("its answer is too long"));
         }
     }

@@ -1,4 +1,4 @@
-//! The folder of the sockets: the user's own, and nobody else's.
+//! The folder of the sockets, which belongs to the user alone.
 
 use std::fs::{self, DirBuilder, File};
 use std::io;
@@ -15,16 +15,16 @@ use rustix::process::geteuid;
 use super::{ControlError, Name, socket};
 use crate::files::trusted::absolute;
 
-/// How long the lock of the folder is waited for: runs hold it for a moment, while they begin.
+/// Time limit for the folder's lock, which runs hold briefly while they start.
 const LOCK_PATIENCE: Duration = Duration::from_secs(1);
 const TICK: Duration = Duration::from_millis(10);
-/// What the names of sockets end with.
+/// File extension of sockets.
 const ENDING: &str = ".sock";
 
-/// The folder of the sockets, which need not exist.
+/// Returns the folder of the sockets, which may not exist yet.
 ///
 /// # Errors
-/// The user has no runtime folder, or it is not theirs alone.
+/// The user has no runtime folder, or the folder is not private to the user.
 pub(super) fn path() -> Result<PathBuf, ControlError> {
     let refuse = |what: String| ControlError::NoFolder(what);
     let runtime = absolute("XDG_RUNTIME_DIR")
@@ -47,11 +47,11 @@ pub(super) fn path() -> Result<PathBuf, ControlError> {
     }
 }
 
-/// The folder, made where there is none, and locked against other runs that begin, until the file is dropped.
+/// Creates the folder if it does not exist, and locks it against other starting runs until the file is dropped.
 ///
 /// # Errors
-/// As for [`path`]; or it cannot be made.
-pub(super) fn locked() -> Result<(PathBuf, File), ControlError> {
+/// Same as for [`path`]; or the folder cannot be created.
+pub(super) fn create_locked() -> Result<(PathBuf, File), ControlError> {
     let folder = path()?;
     let refuse = |error: io::Error| ControlError::NoFolder(format!("{}: {error}", folder.display()));
     match DirBuilder::new().mode(0o700).create(&folder) {
@@ -69,17 +69,17 @@ pub(super) fn locked() -> Result<(PathBuf, File), ControlError> {
         }
         thread::sleep(TICK);
     }
-    // It may have been made by somebody else just now.
+    // Another user may have created it just now.
     path()?;
     Ok((folder.clone(), lock))
 }
 
-/// The socket of a name.
+/// Returns the path of a run's socket.
 pub(super) fn socket_of(folder: &Path, name: &Name) -> PathBuf {
     folder.join(format!("{name}{ENDING}"))
 }
 
-/// The names of all sockets of this user's in the folder, sorted.
+/// Returns the names of all sockets in the folder that belong to this user, sorted.
 pub(super) fn names(folder: &Path) -> Vec<Name> {
     let entries = fs::read_dir(folder).into_iter().flatten().flatten();
     let mut names: Vec<Name> = entries
@@ -90,18 +90,18 @@ pub(super) fn names(folder: &Path) -> Vec<Name> {
     names
 }
 
-/// Whether this is a socket of this user's.
+/// Returns whether the path is a socket of this user.
 pub(super) fn is_ours(path: &Path) -> bool {
     path.symlink_metadata().is_ok_and(|found| found.file_type().is_socket() && found.uid() == geteuid().as_raw())
 }
 
-/// Removes the sockets of runs that are dead. The folder is locked.
+/// Removes the sockets of dead runs; the folder must be locked.
 pub(super) fn sweep(folder: &Path) {
     for name in names(folder) {
         let path = socket_of(folder, &name);
         if socket::connect(&path).is_err_and(|error| error.kind() == ErrorKind::ConnectionRefused) {
             tracing::debug!("{}: its run is dead", path.display());
-            // One that cannot be removed is in the way at worst.
+            // A socket that cannot be removed only blocks its name.
             let _ = fs::remove_file(&path);
         }
     }

@@ -3,20 +3,20 @@
 use std::fmt;
 use std::str::FromStr;
 
-/// What a run is called. As it is part of a file's name, it has letters, digits, `-`, `_` and `.` alone.
+/// The name of a run. It is part of a file name, so it has only letters, digits, `-`, `_` and `.`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Name(String);
 
-/// The longest name: a socket's path has 107 bytes.
-const MOST_BYTES: usize = 32;
+/// Maximum length in bytes: a socket's path has at most 107.
+const MAX_BYTES: usize = 32;
 
 impl Name {
-    /// The names that a run may have which was given none: `base`, `base-2` and so on.
+    /// Returns the default names, to be tried in order: `base`, `base-2` and so on.
     pub(super) fn numbered(base: &'static str) -> impl Iterator<Item = Self> {
         (1..=u16::MAX).map(move |number| Self(if number == 1 { base.into() } else { format!("{base}-{number}") }))
     }
 
-    /// As text.
+    /// Returns the name as text.
     pub fn as_str(&self) -> &str {
         &self.0
     }
@@ -28,10 +28,10 @@ impl FromStr for Name {
     fn from_str(text: &str) -> Result<Self, Self::Err> {
         let fits = |byte: u8| byte.is_ascii_alphanumeric() || b"-_.".contains(&byte);
         match text.as_bytes() {
-            [first, ..] if *first != b'.' && *first != b'-' && text.len() <= MOST_BYTES && text.bytes().all(fits) => {
+            [first, ..] if *first != b'.' && *first != b'-' && text.len() <= MAX_BYTES && text.bytes().all(fits) => {
                 Ok(Self(text.to_owned()))
             }
-            _ => Err(format!("use up to {MOST_BYTES} letters, digits, - _ and ., a letter or digit first")),
+            _ => Err(format!("use up to {MAX_BYTES} letters, digits, - _ and ., a letter or digit first")),
         }
     }
 }

@@ -1,57 +1,57 @@
-//! What is asked, and what is answered.
+//! The messages of the control protocol: requests and answers.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
 
-/// The longest request, its end of line included.
-pub const MOST_REQUEST_BYTES: usize = 16 * 1024;
+/// Maximum length of a request in bytes, its line feed included.
+pub const MAX_REQUEST_BYTES: usize = 16 * 1024;
 
-/// What a run is asked to do.
+/// A request to a run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "do", rename_all = "lowercase", deny_unknown_fields)]
 pub enum Request {
-    /// Show pictures again.
+    /// Shows pictures again.
     On,
-    /// Show the still card in place of pictures.
+    /// Shows the still card in place of pictures.
     Off,
-    /// One or the other.
+    /// Switches between on and off.
     Toggle,
-    /// Blur as a preset says.
+    /// Applies a preset's look.
     Preset {
-        /// Its name.
+        /// The preset's name.
         name: String,
     },
-    /// Change settings of the look: all of them, or none where one cannot be.
+    /// Changes settings of the look: all of them, or none if one is invalid.
     Set {
-        /// Each as `NAME=VALUE`, as behind the dashes of the command line.
+        /// Each as `NAME=VALUE`, named like the flag without its dashes.
         settings: Vec<String>,
     },
-    /// Change nothing.
+    /// Changes nothing; returns the status.
     Status,
-    /// Make depth another way.
+    /// Switches to another source of depth.
     Depth {
-        /// The way, as behind `--depth`.
+        /// The value, as for `--depth`.
         from: String,
     },
-    /// Save the next picture.
+    /// Saves the next picture.
     Snapshot {
-        /// The file, which must not exist; a name of the run's own choice where none is said.
+        /// The file, which must not exist; `None` lets the run choose a name.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         to: Option<PathBuf>,
     },
 }
 
-/// What the run answers.
+/// The answer of a run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(untagged)]
 pub enum Answer {
-    /// It was done: this is how the run is now.
+    /// The request was carried out.
     Done {
-        /// How the run is.
+        /// The run's status afterwards.
         status: Box<Status>,
-        /// What is to be said about it: one line.
+        /// A note on the effect, one line.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         note: Option<String>,
     },
@@ -60,56 +60,56 @@ pub enum Answer {
         /// The file.
         saved: PathBuf,
     },
-    /// Nothing was done.
+    /// Nothing was changed.
     Refused {
-        /// Why, and what to do: one line.
+        /// Why, and what to do, in one line.
         error: String,
-        /// Whether it has to be asked for differently.
+        /// Whether the request itself is invalid.
         usage: bool,
     },
 }
 
 impl Answer {
-    /// It has to be asked for differently.
+    /// Creates a refusal because the request is invalid.
     pub fn usage(error: impl Into<String>) -> Self {
         Self::Refused { error: error.into(), usage: true }
     }
 
-    /// It cannot be done now.
+    /// Creates a refusal because the request cannot be carried out now.
     pub fn failed(error: impl Into<String>) -> Self {
         Self::Refused { error: error.into(), usage: false }
     }
 }
 
-/// How a run is.
+/// The status of a run.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Status {
-    /// What it is called.
+    /// Its name.
     pub name: String,
-    /// Its process.
+    /// Its process number.
     pub pid: u32,
     /// The command: `stream` or `preview`.
     pub command: String,
-    /// Whether it shows pictures; otherwise the still card.
+    /// Whether pictures are shown; otherwise the still card is.
     pub on: bool,
-    /// What the source is called on the command line.
+    /// The source, as on the command line.
     pub source: String,
-    /// Width and height of its pictures, in pixels; `None` before there are any.
+    /// Width and height of its pictures, in pixels; `None` before the first one.
     pub size: Option<(u32, u32)>,
-    /// Where pictures go, as on the command line.
+    /// The outputs, as on the command line.
     pub sinks: Vec<String>,
-    /// Where depth comes from, as behind `--depth`; `None` where there is none, or it cannot be changed.
+    /// The source of depth, as for `--depth`; `None` without depth, or if it cannot be changed.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub depth: Option<String>,
-    /// Whether anybody watches; `None` where that is not noticed.
+    /// Whether there are viewers; `None` if that is unknown.
     pub watched: Option<bool>,
-    /// The rung that frames are blurred at; `None` where nothing is blurred.
+    /// The quality level of the blur; `None` if nothing is blurred.
     pub quality: Option<String>,
-    /// Frames per second now.
+    /// Current frames per second.
     pub fps: f64,
-    /// The settings of the look, by their names.
+    /// The settings of the look, by name.
     pub look: BTreeMap<String, String>,
-    /// Seconds since it began.
+    /// Seconds since the start.
     pub uptime_s: f64,
 }
 

@@ -1,4 +1,4 @@
-//! A run listens: one thread that takes up connections, and one for each of them.
+//! The server side: one thread accepts connections, and each connection has a thread of its own.
 
 use std::fs::{self, File};
 use std::io::{self, ErrorKind, Read, Write};
@@ -12,36 +12,36 @@ use std::time::{Duration, Instant};
 
 use rustix::net::{Shutdown, shutdown};
 
-use super::{Answer, ControlError, MOST_REQUEST_BYTES, Name, Request, folder, socket};
+use super::{Answer, ControlError, MAX_REQUEST_BYTES, Name, Request, folder, socket};
 
-/// How long somebody may take to send a request, and then to take the answer.
+/// Time limit for a client to send its request, and again to take the answer.
 pub const PATIENCE: Duration = Duration::from_secs(1);
-/// Who asks while so many do is told to come back.
-pub const MOST_CLIENTS: usize = 8;
-/// How long a request is waited for that will be refused.
-const HASTE: Duration = Duration::from_millis(10);
-/// How often one who waits for a request looks whether the run is over.
+/// Refuses connections above this number.
+pub const MAX_CLIENTS: usize = 8;
+/// Time to wait for a request that will be refused.
+const REFUSAL_TIMEOUT: Duration = Duration::from_millis(10);
+/// Interval at which a waiting thread checks whether the run is over.
 const TICK: Duration = Duration::from_millis(50);
 
-/// What answers requests, on several threads at once.
+/// Answers requests, from several threads at once.
 pub type Handler = dyn Fn(Request) -> Answer + Send + Sync;
 
-/// A name, and the socket that nobody answers at yet. Dropping it gives both up.
+/// A claimed name with its bound socket, not served yet. Dropping it releases both.
 pub struct Claim {
     name: Name,
     listener: UnixListener,
     path: PathBuf,
-    /// Device and inode of the socket: what else may come to have its name is left alone.
+    /// Device and inode of the socket: another file that took its name meanwhile is not removed.
     file: (u64, u64),
 }
 
-/// Takes a name for this run: the one that was `chosen`, or the first that is free of `base`, `base-2` and so on. Sockets
-/// of runs that are dead are removed.
+/// Claims a name for this run: `chosen`, or the first free one of `base`, `base-2` and so on. Removes the sockets of
+/// dead runs.
 ///
 /// # Errors
-/// The user has no runtime folder; or the chosen name is taken.
+/// The user has no runtime folder, or the chosen name is taken.
 pub fn claim(chosen: Option<&Name>, base: &'static str) -> Result<Claim, ControlError> {
-    let (folder, _lock): (PathBuf, File) = folder::locked()?;
+    let (folder, _lock): (PathBuf, File) = folder::create_locked()?;
     folder::sweep(&folder);
     let free = |name: &Name| folder::socket_of(&folder, name).symlink_metadata().is_err();
     let name = match chosen {
@@ -63,20 +63,20 @@ pub fn claim(chosen: Option<&Name>, base: &'static str) -> Result<Claim, Control
 }
 
 impl Claim {
-    /// The name.
+    /// Returns the name.
     pub fn name(&self) -> &Name {
         &self.name
     }
 
-    /// Answers from now on.
+    /// Starts to answer requests with `handler`.
     ///
     /// # Errors
-    /// The system gives no thread.
+    /// The system cannot create a thread.
     pub fn serve(self, handler: Arc<Handler>) -> io::Result<Server> {
         let over = Arc::new(AtomicBool::new(false));
         let (listener, seen) = (self.listener.try_clone()?, Arc::clone(&over));
         let thread =
-            thread::Builder::new().name("control".into()).spawn(move || listen(&listener, &*handler, &seen))?;
+            thread::Builder::new().name("control".into()).spawn(move || accept_clients(&listener, &*handler, &seen))?;
         Ok(Server { claim: self, over, thread: Some(thread) })
     }
 }
@@ -85,13 +85,13 @@ impl Drop for Claim {
     fn drop(&mut self) {
         let is_ours = |found: fs::Metadata| (found.dev(), found.ino()) == self.file;
         if self.path.symlink_metadata().is_ok_and(is_ours) {
-            // It would be swept by the next run.
+            // A socket left over is removed by the next run.
             let _ = fs::remove_file(&self.path);
         }
     }
 }
 
-/// A run that answers, until this is dropped.
+/// A run's server, which answers until it is dropped.
 pub struct Server {
     claim: Claim,
     over: Arc<AtomicBool>,
@@ -99,7 +99,7 @@ pub struct Server {
 }
 
 impl Server {
-    /// What the run is called.
+    /// Returns the name of the run.
     pub fn name(&self) -> &Name {
         &self.claim.name
     }
@@ -108,15 +108,15 @@ impl Server {
 impl Drop for Server {
     fn drop(&mut self) {
         self.over.store(true, Ordering::Relaxed);
-        // The thread that waits for connections wakes with an error.
+        // Wakes the accepting thread with an error.
         let _ = shutdown(&self.claim.listener, Shutdown::Both);
-        // A panic was printed.
+        // A panic of the thread was printed already.
         let _ = self.thread.take().map(JoinHandle::join);
     }
 }
 
-/// Takes up connections until the run is over, and waits for those under way.
-fn listen(listener: &UnixListener, handler: &Handler, over: &AtomicBool) {
+/// Accepts connections until the run is over, then waits for those in progress.
+fn accept_clients(listener: &UnixListener, handler: &Handler, over: &AtomicBool) {
     let clients = AtomicUsize::new(0);
     thread::scope(|scope| {
         while !over.load(Ordering::Relaxed) {
@@ -125,41 +125,43 @@ fn listen(listener: &UnixListener, handler: &Handler, over: &AtomicBool) {
                 Err(_) if over.load(Ordering::Relaxed) => break,
                 Err(error) => {
                     tracing::debug!("control: {error}");
-                    // Such as too many open files: others may close some.
+                    // For example too many open files: others may be closed meanwhile.
                     thread::sleep(TICK);
                     continue;
                 }
             };
-            let Some(seat) = Seat::take(&clients) else {
+            let Some(slot) = ClientSlot::acquire(&clients) else {
                 refuse(stream);
                 continue;
             };
             let serve = move || {
-                let _seat = seat;
+                let _slot = slot;
                 serve(&stream, handler, over);
             };
-            // Without a thread the connection is closed.
+            // If there is no thread, dropping the closure closes the connection.
             let _ = thread::Builder::new().name("control-client".into()).spawn_scoped(scope, serve);
         }
     });
 }
 
-/// Tells one for whom there is no place, after what was asked: who is closed on with a request unread may lose the answer.
+/// Refuses a client above the limit, after reading its request: closing with unread data may discard the answer.
 fn refuse(stream: UnixStream) {
-    let read = stream.set_read_timeout(Some(HASTE)).and_then(|()| (&stream).read(&mut [0; MOST_REQUEST_BYTES]));
+    let read = stream
+        .set_read_timeout(Some(REFUSAL_TIMEOUT))
+        .and_then(|()| (&stream).read(&mut [0; MAX_REQUEST_BYTES]));
     if let Err(error) = read {
         tracing::debug!("control: refused before it asked: {error}");
     }
     answer(&stream, &Answer::failed("too many ask at once: ask again"));
 }
 
-/// A place among the clients.
-struct Seat<'a>(&'a AtomicUsize);
+/// A slot among the clients.
+struct ClientSlot<'a>(&'a AtomicUsize);
 
-impl<'a> Seat<'a> {
-    /// A place, if one is free. One thread alone gives them.
-    fn take(clients: &'a AtomicUsize) -> Option<Self> {
-        let is_free = clients.load(Ordering::Relaxed) < MOST_CLIENTS;
+impl<'a> ClientSlot<'a> {
+    /// Returns a slot if one is free; only called by the accepting thread, so check and increment cannot race.
+    fn acquire(clients: &'a AtomicUsize) -> Option<Self> {
+        let is_free = clients.load(Ordering::Relaxed) < MAX_CLIENTS;
         is_free.then(|| {
             clients.fetch_add(1, Ordering::Relaxed);
             Self(clients)
@@ -167,19 +169,19 @@ impl<'a> Seat<'a> {
     }
 }
 
-impl Drop for Seat<'_> {
+impl Drop for ClientSlot<'_> {
     fn drop(&mut self) {
         self.0.fetch_sub(1, Ordering::Relaxed);
     }
 }
 
-/// One request, one answer.
+/// Reads one request and sends one answer.
 fn serve(stream: &UnixStream, handler: &Handler, over: &AtomicBool) {
     if !socket::is_own_user(stream) {
         tracing::warn!("control: another user asked, and was refused");
         return answer(stream, &Answer::failed("this run is another user's"));
     }
-    match read(stream, over) {
+    match read_request(stream, over) {
         Ok(None) => {}
         Ok(Some(line)) => match serde_json::from_slice(&line) {
             Ok(request) => answer(stream, &handler(request)),
@@ -189,20 +191,20 @@ fn serve(stream: &UnixStream, handler: &Handler, over: &AtomicBool) {
     }
 }
 
-/// A line; `None` where there is nothing to answer: nothing was sent, or the run is over.
-fn read(mut stream: &UnixStream, over: &AtomicBool) -> Result<Option<Vec<u8>>, String> {
+/// Reads a line; `None` if no answer is needed: nothing was sent, or the run is over.
+fn read_request(mut stream: &UnixStream, over: &AtomicBool) -> Result<Option<Vec<u8>>, String> {
     let until = Instant::now() + PATIENCE;
-    let (mut line, mut some) = (Vec::new(), [0; 1024]);
+    let (mut line, mut buffer) = (Vec::new(), [0; 1024]);
     stream.set_read_timeout(Some(TICK)).map_err(|error| error.to_string())?;
     while !over.load(Ordering::Relaxed) {
-        match stream.read(&mut some) {
+        match stream.read(&mut buffer) {
             Ok(0) if line.is_empty() => return Ok(None),
             Ok(0) => return Err("the request has no end: it is a line".into()),
             Ok(read) => {
-                let end = some[..read].iter().position(|&byte| byte == b'\n');
-                line.extend_from_slice(&some[..end.unwrap_or(read)]);
-                if line.len() >= MOST_REQUEST_BYTES {
-                    return Err(format!("the request is too long: {MOST_REQUEST_BYTES} bytes at most"));
+                let end = buffer[..read].iter().position(|&byte| byte == b'\n');
+                line.extend_from_slice(&buffer[..end.unwrap_or(read)]);
+                if line.len() >= MAX_REQUEST_BYTES {
+                    return Err(format!("the request is too long: {MAX_REQUEST_BYTES} bytes at most"));
                 }
                 if end.is_some() {
                     return Ok(Some(line));
@@ -218,7 +220,7 @@ fn read(mut stream: &UnixStream, over: &AtomicBool) -> Result<Option<Vec<u8>>, S
     Ok(None)
 }
 
-/// Answers; somebody who has gone gets nothing.
+/// Sends an answer; errors are ignored, as the client may have gone.
 fn answer(mut stream: &UnixStream, answer: &Answer) {
     let Ok(mut line) = serde_json::to_vec(answer) else { return };
     line.push(b'\n');

@@ -1,4 +1,4 @@
-//! Connections that wait for nobody.
+//! Socket connections that never block on connecting.
 
 use std::io;
 use std::os::unix::net::UnixStream;
@@ -8,8 +8,8 @@ use rustix::net::sockopt::socket_peercred;
 use rustix::net::{AddressFamily, SocketAddrUnix, SocketFlags, SocketType, connect as connect_to, socket_with};
 use rustix::process::geteuid;
 
-/// Connects to a socket. Where nobody takes up the connections that wait already, that fails
-/// ([`io::ErrorKind::WouldBlock`]); where nobody listens any more, too ([`io::ErrorKind::ConnectionRefused`]).
+/// Connects to a socket. Fails at once if its queue of connections is full ([`io::ErrorKind::WouldBlock`]) or if it has
+/// no listener ([`io::ErrorKind::ConnectionRefused`]).
 pub(super) fn connect(path: &Path) -> io::Result<UnixStream> {
     let flags = SocketFlags::CLOEXEC | SocketFlags::NONBLOCK;
     let socket = socket_with(AddressFamily::UNIX, SocketType::STREAM, flags, None)?;
@@ -19,7 +19,7 @@ pub(super) fn connect(path: &Path) -> io::Result<UnixStream> {
     Ok(stream)
 }
 
-/// Whether the process at the other end is of the same user as this one.
+/// Returns whether the process at the other end belongs to the same user.
 pub(super) fn is_own_user(stream: &UnixStream) -> bool {
     socket_peercred(stream).is_ok_and(|peer| peer.uid == geteuid())
 }

@@ -1,36 +1,36 @@
-//! How the picture of now differs from an earlier one of the same place, such as a plate, though nothing stands before it:
-//! exposure and white balance, a gain per channel; the camera, a shift.
+//! Photometric and geometric alignment of an earlier picture of the same background, such as a plate, with the current
+//! one: a gain per channel for exposure and white balance, and a shift for small movements of the camera.
 
 use super::reduced::MOST;
 use super::tap::Tap;
 
-/// Pixels darker or brighter than these tell no gain.
-const DARK: f32 = 24.0;
-const BRIGHT: f32 = MOST - 8.0;
-/// Bins of the histogram of ratios, and how many there are to a factor of two.
+/// Darker or brighter pixels are not used for gains.
+const MIN_VALUE: f32 = 24.0;
+const MAX_VALUE: f32 = MOST - 8.0;
+/// Number of bins of the histogram of ratios, and bins per factor of two.
 const BINS: usize = 512;
 const PER_OCTAVE: f32 = 128.0;
-/// One pixel in so many tells enough of a gain.
-const SAMPLED: usize = 3;
-/// So much of the pixels, at least, show the background, or there is nothing to learn from.
-const LEAST: usize = 12;
-/// A gain moves by this share towards that of a frame, and at once if it is further away than [`JUMP`].
-const EASE: f32 = 0.25;
-const JUMP: f32 = 0.03;
-/// Differences are no guide to a shift beyond this.
-const FOREIGN: f32 = 24.0;
-/// A step of the shift, and what is not worth one, in reduced pixels.
-const MOST_STEP: f32 = 1.0;
-const LEAST_STEP: f32 = 0.02;
-/// Less texture than this, on average, tells no shift.
-const LEAST_TEXTURE: f32 = 0.05;
+/// Sampling step in pixels of the gain estimation.
+const SAMPLING_STEP: usize = 3;
+/// Minimum fraction of the pixels that must show the background, as its reciprocal.
+const MIN_BACKGROUND_DIVISOR: usize = 12;
+/// Rate at which a gain follows that of a frame; relative differences above [`MAX_EASED`] are followed at once.
+const RATE: f32 = 0.25;
+const MAX_EASED: f32 = 0.03;
+/// Largest difference of pixels used for the shift.
+const MAX_DIFFERENCE: f32 = 24.0;
+/// Largest step of the shift per frame, and the smallest one applied, in downsampled pixels.
+const MAX_STEP: f32 = 1.0;
+const MIN_STEP: f32 = 0.02;
+/// Minimum mean texture for a shift.
+const MIN_TEXTURE: f32 = 0.05;
 
-/// How the plate has to be changed to be as the picture is now.
+/// Gain and shift from the plate to the current picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Alignment {
-    /// What values are multiplied by, per channel.
+    /// Factor per channel.
     pub gain: [f32; 3],
-    /// Where a point of the plate is now, less where it was, in reduced pixels: to the right, and down.
+    /// Position of a point now minus that in the plate, right and down, in downsampled pixels.
     pub shift: [f32; 2],
 }
 
@@ -40,7 +40,7 @@ impl Default for Alignment {
     }
 }
 
-/// Finds alignments; owns the memory for it.
+/// Estimates alignments; owns its buffers.
 #[derive(Debug, Default)]
 pub struct Aligner {
     bins: Vec<u32>,
@@ -50,17 +50,17 @@ pub struct Aligner {
 }
 
 impl Aligner {
-    /// The plate, shifted as `alignment` has it.
+    /// Returns the plate as shifted by the last call of [`Aligner::shift`].
     pub fn shifted(&self) -> &[[f32; 3]] {
         &self.shifted
     }
 
-    /// The plate has changed.
+    /// Invalidates the shifted plate, after a change of the plate.
     pub fn forget(&mut self) {
         self.shifted_by = None;
     }
 
-    /// Shifts the plate.
+    /// Shifts the plate with bilinear interpolation.
     pub fn shift(&mut self, plate: &[[f32; 3]], (width, height): (usize, usize), shift: [f32; 2]) {
         if self.shifted_by == Some(shift) && self.shifted.len() == plate.len() {
             return;
@@ -85,35 +85,35 @@ impl Aligner {
         }
     }
 
-    /// One step towards the alignment of `now`, from the pixels that are not `foreign`.
+    /// Moves `alignment` a step towards that of `now`, from the pixels that are not `foreign`.
     pub fn step(&mut self, now: &[[f32; 3]], foreign: &[bool], size: (usize, usize), alignment: &mut Alignment) {
         for p in 0..3 {
-            if let Some(gain) = self.gain(now, foreign, p) {
+            if let Some(gain) = self.estimate_gain(now, foreign, p) {
                 let off = gain / alignment.gain[p] - 1.0;
-                alignment.gain[p] *= 1.0 + if off.abs() > JUMP { off } else { EASE * off };
+                alignment.gain[p] *= 1.0 + if off.abs() > MAX_EASED { off } else { RATE * off };
             }
         }
-        let step = self.shift_of(now, foreign, size, alignment.gain);
-        if let Some([across, down]) = step.filter(|[across, down]| across.hypot(*down) >= LEAST_STEP) {
-            alignment.shift[0] += across.clamp(-MOST_STEP, MOST_STEP);
-            alignment.shift[1] += down.clamp(-MOST_STEP, MOST_STEP);
+        let step = self.estimate_shift(now, foreign, size, alignment.gain);
+        if let Some([across, down]) = step.filter(|[across, down]| across.hypot(*down) >= MIN_STEP) {
+            alignment.shift[0] += across.clamp(-MAX_STEP, MAX_STEP);
+            alignment.shift[1] += down.clamp(-MAX_STEP, MAX_STEP);
         }
     }
 
-    /// The median ratio of a channel: what stands before the plate is outvoted.
-    fn gain(&mut self, now: &[[f32; 3]], foreign: &[bool], p: usize) -> Option<f32> {
+    /// Returns the median ratio of a channel: foreground is a minority.
+    fn estimate_gain(&mut self, now: &[[f32; 3]], foreign: &[bool], p: usize) -> Option<f32> {
         self.bins.clear();
         self.bins.resize(BINS, 0);
         let mut count = 0;
-        let all = now.iter().zip(&self.shifted).zip(foreign).step_by(SAMPLED);
+        let all = now.iter().zip(&self.shifted).zip(foreign).step_by(SAMPLING_STEP);
         for ((now, plate), _) in all.filter(|(_, foreign)| !**foreign) {
-            if now[p].min(plate[p]) > DARK && now[p].max(plate[p]) < BRIGHT {
+            if now[p].min(plate[p]) > MIN_VALUE && now[p].max(plate[p]) < MAX_VALUE {
                 let bin = (now[p] / plate[p]).log2() * PER_OCTAVE + BINS as f32 / 2.0;
                 self.bins[(bin as usize).min(BINS - 1)] += 1;
                 count += 1;
             }
         }
-        if count < foreign.len() / SAMPLED / LEAST {
+        if count < foreign.len() / SAMPLING_STEP / MIN_BACKGROUND_DIVISOR {
             return None;
         }
         let mut below = 0;
@@ -126,8 +126,9 @@ impl Aligner {
         })
     }
 
-    /// The shift that explains most of the differences that are left (Lucas and Kanade 1981), in the middle channel.
-    fn shift_of(
+    /// Returns the shift by least squares over the optical flow constraint (Lucas and Kanade 1981), in the green
+    /// channel.
+    fn estimate_shift(
         &self,
         now: &[[f32; 3]],
         foreign: &[bool],
@@ -140,11 +141,12 @@ impl Aligner {
                 let at = y * width + x;
                 let value = |at: usize| gain[1] * self.shifted[at][1];
                 let rest = now[at][1] - value(at);
-                if foreign[at] || rest.abs() > FOREIGN {
+                if foreign[at] || rest.abs() > MAX_DIFFERENCE {
                     continue;
                 }
                 let across = 0.5 * (value(at + 1) - value(at - 1));
                 let down = 0.5 * (value(at + width) - value(at - width));
+                // Normal equations of the optical flow constraint: gradient . shift = -difference.
                 let terms = [across * across, across * down, down * down, -across * rest, -down * rest];
                 (0..5).for_each(|k| sums[k] += terms[k]);
                 count += 1;
@@ -152,8 +154,8 @@ impl Aligner {
         }
         let [xx, xy, yy, x, y] = sums;
         let determinant = xx * yy - xy * xy;
-        let least = LEAST_TEXTURE * count as f32;
-        (count > width * height / LEAST && determinant > least * least)
+        let least = MIN_TEXTURE * count as f32;
+        (count > width * height / MIN_BACKGROUND_DIVISOR && determinant > least * least)
             .then(|| [(yy * x - xy * y) / determinant, (xx * y - xy * x) / determinant])
     }
 }

@@ -1,8 +1,8 @@
-//! What stands behind the subject in place of the room: one colour, or a picture, along the same soft outlines.
+//! Virtual background: a colour or a picture replaces the room behind the subject, with the same soft outlines.
 //!
-//! Before the blur, the light of every surface that is well behind the focal plane is replaced, and so is its distance: the
-//! backdrop is in focus. Of a pixel that shows two surfaces only the farther one's share is; what is in front of the subject
-//! blurs over the backdrop as it would over the room.
+//! Before the blur, the light and the distance of every surface well behind the focal plane are replaced; the virtual
+//! background is in focus. In a mixed pixel, only the farther surface's part is replaced. Surfaces in front of the
+//! subject blur over the virtual background as they would over the room.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -12,28 +12,29 @@ use crate::frame::scale::Scale;
 use crate::frame::{ColorImage, DepthMap, MixedPixel};
 use crate::optics::DepthCoc;
 
-/// What has so much of the distance in focus, as a ratio of inverse depths, is none of what is behind; and from so little on
-/// all is. A person leaning back is within the first, and a wall at half as far again as the person is beyond the second.
+/// Ratios of inverse depth to that of the far end of the range in focus: above the first, a surface is kept; below the
+/// second, it is replaced; in between, it is faded. A person leaning back stays above the first; a wall half as far
+/// again as the person is below the second.
 const BEHIND: [f32; 2] = [0.8, 0.667];
-/// A surface nearer to the focal plane than this many pixels of CoC blurs over nothing.
+/// Surfaces in front of the focal plane with a smaller CoC, in pixels, do not blur over the background.
 const SHARP_PX: f32 = 0.5;
 
-/// What is behind the subject.
+/// What to show behind the subject.
 #[derive(Clone, Debug, Default)]
 pub enum Behind {
     /// The room, blurred.
     #[default]
     Blur,
-    /// One colour: sRGB.
+    /// A colour, as sRGB codes.
     Color([u8; 3]),
-    /// A picture, as large as it has to be to cover the frame, cut alike on both sides.
+    /// A picture, scaled to cover the frame and cropped equally on both sides.
     Picture(Arc<BehindPicture>),
 }
 
-/// A picture that stands behind the subject.
+/// A picture for a virtual background.
 #[derive(Debug)]
 pub struct BehindPicture {
-    /// Where it comes from, if that is known.
+    /// The file it was loaded from, if any.
     pub file: Option<PathBuf>,
     /// Its pixels.
     pub image: ColorImage,
@@ -44,28 +45,28 @@ impl PartialEq for Behind {
         match (self, other) {
             (Self::Blur, Self::Blur) => true,
             (Self::Color(a), Self::Color(b)) => a == b,
-            // The same picture, and not one that looks alike: they are compared often.
+            // Compares identity, not content: this comparison runs often.
             (Self::Picture(a), Self::Picture(b)) => Arc::ptr_eq(a, b),
             _ => false,
         }
     }
 }
 
-/// Puts something behind the subject of frame after frame; owns the memory for it.
+/// Replaces the background of frame after frame; owns the memory for it.
 #[derive(Debug)]
 pub struct Backdrop {
     behind: Behind,
     light: Box<[f32; 256]>,
-    /// sRGB of so many steps of light, evenly in its square root.
+    /// Lookup table to sRGB: [`CODES`] entries, uniform in the square root of linear light.
     codes: Box<[u8; CODES]>,
-    /// What is behind, as large as the frame.
+    /// The virtual background, scaled to the frame.
     scaled: ColorImage,
     scale: Scale,
     row: Vec<u16>,
     mixed: Vec<Mixed>,
 }
 
-/// What becomes of a pixel of two surfaces.
+/// The composited values of a mixed pixel.
 #[derive(Debug)]
 struct Mixed {
     at: usize,
@@ -73,13 +74,13 @@ struct Mixed {
     metres: f32,
 }
 
-/// Steps of light: the darkest codes are four steps apart.
+/// Entries of the table to sRGB: the darkest codes are four entries apart.
 const CODES: usize = 4096;
-/// Pixels that are looked at together: mostly all or none are behind.
-const PART: usize = 32;
+/// Pixels processed together: mostly all or none of them are replaced.
+const CHUNK: usize = 32;
 
 impl Backdrop {
-    /// Of one kind; `None` where the room is to be seen.
+    /// Creates a virtual background; `None` for [`Behind::Blur`].
     pub fn new(behind: &Behind) -> Option<Self> {
         if *behind == Behind::Blur {
             return None;
@@ -96,36 +97,36 @@ impl Backdrop {
         })
     }
 
-    /// What it puts there.
+    /// Returns what replaces the room.
     pub fn behind(&self) -> &Behind {
         &self.behind
     }
 
-    /// Puts it behind what is in focus of a picture whose depth has no holes, has its matte and is as large as the picture; a
-    /// map of another size is left as it is.
+    /// Replaces the background of a picture. The map has no holes, has its matte and is as large as the picture; a map
+    /// of another size is left unchanged.
     pub fn lay(&mut self, color: &mut ColorImage, map: &mut DepthMap, lens: &DepthCoc) {
         if color.size() != map.size() {
             return;
         }
-        self.fit(color.size());
-        // The matte first: it goes by the colours that the pixels had.
+        self.scale_to(color.size());
+        // Mixed pixels first: they need the original colours.
         let mut pixels = std::mem::take(&mut map.matte.pixels);
         self.mixed.clear();
-        pixels.retain_mut(|pixel| self.part(pixel, color, lens));
+        pixels.retain_mut(|pixel| self.composite_mixed(pixel, color, lens));
         map.matte.pixels = pixels;
         let parts =
-            color.rgb.chunks_mut(3 * PART).zip(self.scaled.rgb.chunks(3 * PART)).zip(map.metres.chunks_mut(PART));
+            color.rgb.chunks_mut(3 * CHUNK).zip(self.scaled.rgb.chunks(3 * CHUNK)).zip(map.metres.chunks_mut(CHUNK));
         for ((rgb, behind), metres) in parts {
-            let mut shares = [0.0; PART];
-            for (share, metres) in shares.iter_mut().zip(&*metres) {
-                *share = share_behind(*metres, lens);
+            let mut fractions = [0.0; CHUNK];
+            for (fraction, metres) in fractions.iter_mut().zip(&*metres) {
+                *fraction = background_fraction(*metres, lens);
             }
-            let shares = &shares[..metres.len()];
-            if shares.iter().all(|&share| share == 1.0) {
+            let fractions = &fractions[..metres.len()];
+            if fractions.iter().all(|&fraction| fraction == 1.0) {
                 rgb.copy_from_slice(behind);
                 metres.fill(lens.focus_m);
-            } else if shares.iter().any(|&share| share > 0.0) {
-                self.fade(rgb, behind, metres, (shares, lens));
+            } else if fractions.iter().any(|&fraction| fraction > 0.0) {
+                self.blend(rgb, behind, metres, (fractions, lens));
             }
         }
         for &Mixed { at, rgb, metres } in &self.mixed {
@@ -134,23 +135,24 @@ impl Backdrop {
         }
     }
 
-    /// Puts shares of it behind some pixels.
-    fn fade(&self, rgb: &mut [u8], behind: &[u8], metres: &mut [f32], (shares, lens): (&[f32], &DepthCoc)) {
+    /// Blends pixels with the virtual background by the weights `fractions`, 0 to 1.
+    fn blend(&self, rgb: &mut [u8], behind: &[u8], metres: &mut [f32], (fractions, lens): (&[f32], &DepthCoc)) {
         let pixels = rgb.as_chunks_mut::<3>().0.iter_mut().zip(behind.as_chunks::<3>().0);
-        for (((pixel, behind), metres), &share) in pixels.zip(metres).zip(shares) {
-            *metres = pulled(*metres, share, lens);
+        for (((pixel, behind), metres), &fraction) in pixels.zip(metres).zip(fractions) {
+            *metres = pull_to_focus(*metres, fraction, lens);
             for (code, &behind) in pixel.iter_mut().zip(behind) {
                 let [own, light] = [*code, behind].map(|code| self.light[usize::from(code)]);
-                *code = if share == 1.0 { behind } else { self.encode(own + share * (light - own)) };
+                *code = if fraction == 1.0 { behind } else { self.encode(own + fraction * (light - own)) };
             }
         }
     }
 
-    /// Puts it behind a pixel of two surfaces; whether it shows two still that blur apart.
-    fn part(&mut self, pixel: &mut MixedPixel, color: &ColorImage, lens: &DepthCoc) -> bool {
+    /// Composites a mixed pixel with the virtual background. Returns whether it still shows two surfaces that blur
+    /// differently.
+    fn composite_mixed(&mut self, pixel: &mut MixedPixel, color: &ColorImage, lens: &DepthCoc) -> bool {
         let at = pixel.at as usize;
-        let shares = [pixel.near_m, pixel.far_m].map(|metres| share_behind(metres, lens));
-        if shares[1] <= 0.0 {
+        let fractions = [pixel.near_m, pixel.far_m].map(|metres| background_fraction(metres, lens));
+        if fractions[1] <= 0.0 {
             return true;
         }
         let mut rgb = [0; 3];
@@ -159,23 +161,24 @@ impl Backdrop {
                 (self.light[usize::from(color.rgb[3 * at + p])], self.light[usize::from(self.scaled.rgb[3 * at + p])]);
             let surfaces =
                 [light + (1.0 - pixel.share) * pixel.difference[p], light - pixel.share * pixel.difference[p]];
-            let [near, far] = [0, 1].map(|k| surfaces[k] + shares[k] * (behind - surfaces[k]));
+            let [near, far] = [0, 1].map(|k| surfaces[k] + fractions[k] * (behind - surfaces[k]));
             pixel.difference[p] = near - far;
             *code = self.encode(far + pixel.share * (near - far));
         }
         pixel.behind = 1.0;
-        let [near_m, far_m] = [(pixel.near_m, shares[0]), (pixel.far_m, shares[1])].map(|(m, s)| pulled(m, s, lens));
+        let surfaces = [(pixel.near_m, fractions[0]), (pixel.far_m, fractions[1])];
+        let [near_m, far_m] = surfaces.map(|(metres, fraction)| pull_to_focus(metres, fraction, lens));
         let is_in_front = lens.coc_px(near_m) < -SHARP_PX && near_m < far_m;
         (pixel.near_m, pixel.far_m) = (near_m, far_m);
         let seen_m = if pixel.share > 0.5 { near_m } else { far_m };
-        // What is not in front of the backdrop has been composited with it now, and both stay where they are.
+        // A pixel with nothing in front of the background is fully composited now, and moves to the focal plane.
         let metres = if is_in_front { seen_m } else { lens.focus_m };
         self.mixed.push(Mixed { at, rgb, metres });
         is_in_front
     }
 
-    /// Makes the backdrop as large as the frame.
-    fn fit(&mut self, (width, height): (u32, u32)) {
+    /// Scales the virtual background to the frame size.
+    fn scale_to(&mut self, (width, height): (u32, u32)) {
         if self.scaled.size() == (width, height) {
             return;
         }
@@ -183,7 +186,9 @@ impl Backdrop {
         match &self.behind {
             Behind::Blur => {}
             Behind::Color(rgb) => self.scaled.rgb.as_chunks_mut::<3>().0.fill(*rgb),
-            Behind::Picture(picture) => cover(&picture.image, &mut self.scaled, (&mut self.scale, &mut self.row)),
+            Behind::Picture(picture) => {
+                scale_to_cover(&picture.image, &mut self.scaled, (&mut self.scale, &mut self.row));
+            }
         }
     }
 
@@ -193,27 +198,27 @@ impl Backdrop {
     }
 }
 
-/// How far something at this distance is behind: 0 is not, 1 is, and a slope leads from one to the other.
+/// Returns how far a distance counts as background: 0 in focus, 1 behind, with a linear ramp in inverse depth.
 #[inline(always)]
-fn share_behind(metres: f32, lens: &DepthCoc) -> f32 {
+fn background_fraction(metres: f32, lens: &DepthCoc) -> f32 {
     let [none, all] = BEHIND;
     let nearness = lens.far_m() * DepthMap::inverse_of(metres);
-    let share = (none - nearness) / (none - all);
-    let share = if share > 0.0 { share } else { 0.0 };
-    if share < 1.0 { share } else { 1.0 }
+    let fraction = (none - nearness) / (none - all);
+    let fraction = if fraction > 0.0 { fraction } else { 0.0 };
+    if fraction < 1.0 { fraction } else { 1.0 }
 }
 
-/// The distance of something of which a share is at the focal plane now.
-fn pulled(metres: f32, share: f32, lens: &DepthCoc) -> f32 {
-    if share == 0.0 || share == 1.0 {
-        return if share == 0.0 { metres } else { lens.focus_m };
+/// Returns the distance after a `fraction` of it moved to the focal plane, linear in inverse depth.
+fn pull_to_focus(metres: f32, fraction: f32, lens: &DepthCoc) -> f32 {
+    if fraction == 0.0 || fraction == 1.0 {
+        return if fraction == 0.0 { metres } else { lens.focus_m };
     }
     let inverse = DepthMap::inverse_of(metres);
-    (inverse + share * (lens.focus_m.recip() - inverse)).recip()
+    (inverse + fraction * (lens.focus_m.recip() - inverse)).recip()
 }
 
-/// Scales a picture so that it covers `into`, and cuts what is left over, alike on both sides.
-fn cover(from: &ColorImage, into: &mut ColorImage, (scale, row): (&mut Scale, &mut Vec<u16>)) {
+/// Scales a picture so that it covers `into`, and crops the rest equally on both sides.
+fn scale_to_cover(from: &ColorImage, into: &mut ColorImage, (scale, row): (&mut Scale, &mut Vec<u16>)) {
     let [from_width, from_height, width, height] =
         [from.width, from.height, into.width, into.height].map(|side| side as usize);
     let ratio = (width as f64 / from_width as f64).max(height as f64 / from_height as f64);
@@ -233,7 +238,7 @@ mod tests {
     const LENS: DepthCoc = DepthCoc { coc_at_infinity_px: 10.0, focus_m: 1.0, range_m: 0.0, max_coc_px: 20.0 };
     const GREEN: Behind = Behind::Color([0, 177, 64]);
 
-    /// Six pixels in a row at these distances, grey 100.
+    /// Returns six grey pixels (code 100) in a row at these distances.
     fn row(metres: [f32; 6]) -> (ColorImage, DepthMap) {
         let color = ColorImage { width: 6, height: 1, rgb: vec![100; 18] };
         (color, DepthMap { width: 6, height: 1, metres: metres.to_vec(), ..DepthMap::default() })
@@ -269,7 +274,7 @@ mod tests {
     fn a_mixed_pixel_keeps_its_share_of_the_subject() {
         let (mut color, mut map) = row([1.0, 1.0, 1.0, 3.0, 3.0, 3.0]);
         let light = light_of_codes();
-        // Subject 100 before a wall of 200: the pixel between both has 60 % of the subject.
+        // Subject of code 100 before a wall of code 200: the pixel between them is 60 % subject.
         let (near, far) = (light[100], light[200]);
         let own = encode_srgb(0.6 * near + 0.4 * far);
         color.rgb[6..9].fill(own);
@@ -283,7 +288,7 @@ mod tests {
             let due = encode_srgb(0.6 * near + 0.4 * light[code]);
             assert!(color.rgb[6 + p].abs_diff(due) <= 1, "{} not {due}", color.rgb[6 + p]);
         }
-        // The same of something in front: it goes on blurring over the backdrop.
+        // The near surface is in front of the focal plane here: it still blurs over the background.
         (color, map) = before.clone();
         map.matte.pixels = vec![pixel(0.5, 3.0)];
         lay(&GREEN, &mut color, &mut map);
@@ -292,7 +297,7 @@ mod tests {
         for (p, code) in [0, 177, 64].into_iter().enumerate() {
             assert!((left.difference[p] - (near - light[code])).abs() < 0.02);
         }
-        // Nothing changes where neither is behind.
+        // Neither surface is behind: nothing changes.
         (color, map) = before;
         map.matte.pixels = vec![pixel(0.5, 1.0)];
         lay(&GREEN, &mut color, &mut map);

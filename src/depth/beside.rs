@@ -1,24 +1,24 @@
-//! Recorded depth for colours from another source: paired by media time, played in a loop.
+//! Depth of a recording for colour frames of another source: paired by media time, played in a loop.
 
 use super::{DepthError, DepthSource, Seen};
 use crate::frame::DepthMap;
 use crate::recording::{Recording, Scratch};
 
-/// The depth pictures of a recording, played in a loop by the frames' own time.
+/// Plays the depth images of a recording in a loop, paired with colour frames by media time.
 pub struct Beside {
     recording: Recording,
     scratch: Scratch,
     /// Media time of one loop: from the first frame to the end of the last.
-    lap_ns: u64,
-    /// By how much the colours' own time is ahead of media time.
+    loop_ns: u64,
+    /// Offset of the colour source's own time from media time, after a seek.
     ahead_ns: i64,
-    /// Index of the picture that `map` holds; `None` after a failed read, which leaves `map` unspecified.
+    /// Index of the depth image in `map`; `None` after a failed read, which leaves `map` unspecified.
     last: Option<usize>,
     map: DepthMap,
 }
 
 impl Beside {
-    /// Depth of `recording`, which `name` stands for in messages.
+    /// Creates a source from the depth of `recording`; messages call it `name`.
     ///
     /// # Errors
     /// The recording has no depth.
@@ -26,17 +26,17 @@ impl Beside {
         if !recording.has_depth() || recording.is_empty() {
             return Err(DepthError::NoDepth { source_name: name.to_owned() });
         }
-        let lap_ns = recording.time_ns(recording.len() - 1) + recording.period_ns();
-        Ok(Self { recording, scratch: Scratch::default(), lap_ns, ahead_ns: 0, last: None, map: DepthMap::default() })
+        let loop_ns = recording.time_ns(recording.len() - 1) + recording.period_ns();
+        Ok(Self { recording, scratch: Scratch::default(), loop_ns, ahead_ns: 0, last: None, map: DepthMap::default() })
     }
 
-    /// Index of the recording's frame that is shown at media time `time_ns`, by binary search within the loop.
+    /// Returns the index of the recording's frame shown at media time `time_ns`, by binary search within the loop.
     fn index_at(&self, time_ns: u64) -> usize {
-        let in_lap_ns = time_ns % self.lap_ns.max(1);
+        let in_loop_ns = time_ns % self.loop_ns.max(1);
         let (mut low, mut high) = (0, self.recording.len());
         while high - low > 1 {
             let middle = low.midpoint(high);
-            if self.recording.time_ns(middle) <= in_lap_ns { low = middle } else { high = middle }
+            if self.recording.time_ns(middle) <= in_loop_ns { low = middle } else { high = middle }
         }
         low
     }
@@ -45,7 +45,7 @@ impl Beside {
 impl DepthSource for Beside {
     fn read(&mut self, Seen { stamp, .. }: Seen, map: &mut DepthMap) -> Result<(), DepthError> {
         let index = self.index_at(stamp.time_ns.saturating_add_signed(self.ahead_ns));
-        // Colours at a higher rate show one depth picture several times: it is decoded once.
+        // At a higher colour frame rate, one depth image serves several frames: it is decoded once.
         if self.last != Some(index) {
             self.last = None;
             self.recording.read_depth(index, &mut self.scratch, &mut self.map)?;
@@ -75,8 +75,8 @@ mod tests {
         let last = recording.len() - 1;
         let (last_ns, period_ns) = (recording.time_ns(last), recording.period_ns());
         let beside = Beside::new(recording, "portrait").unwrap();
-        let lap_ns = last_ns + period_ns;
-        let times_ns = [0, last_ns - 1, last_ns, lap_ns - 1, lap_ns, 3 * lap_ns + last_ns];
+        let loop_ns = last_ns + period_ns;
+        let times_ns = [0, last_ns - 1, last_ns, loop_ns - 1, loop_ns, 3 * loop_ns + last_ns];
         assert!(last > 1);
         assert_eq!(times_ns.map(|time_ns| beside.index_at(time_ns)), [0, last - 1, last, last, 0, last]);
     }

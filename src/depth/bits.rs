@@ -1,54 +1,55 @@
-//! A bit for every pixel of a picture.
+//! A bitmap with one bit per pixel.
 
-/// Bits of a word.
+/// Bits per word.
 pub const WORD: usize = 64;
 
-/// The bits, row by row, in words.
+/// A bitmap, row by row, in 64-bit words.
 #[derive(Debug, Default)]
 pub struct Bits {
     words: Vec<u64>,
-    /// Words of a row: one more than it needs, so that there is always a next.
+    /// Words per row: one more than needed, so that reading a word and its successor never leaves the buffer.
     across: usize,
 }
 
 impl Bits {
-    /// Of a picture of so many columns and rows, as they were where that is as large as before.
+    /// Resizes to `(width, height)` pixels. Bits keep their values if the size is unchanged, and are unspecified
+    /// otherwise.
     pub fn resize(&mut self, (width, height): (usize, usize)) {
         self.across = width.div_ceil(WORD) + 1;
         self.words.resize(self.across * height, 0);
     }
 
-    /// Of a picture of so many columns and rows, none set.
+    /// Resizes to `(width, height)` pixels and clears all bits.
     pub fn clear(&mut self, size: (usize, usize)) {
         self.words.clear();
         self.resize(size);
     }
 
-    /// All words, row by row, and how many a row has.
+    /// Returns all words, row by row, and the number of words per row.
     pub fn words(&mut self) -> (&mut [u64], usize) {
         (&mut self.words, self.across)
     }
 
-    /// Those of pixel (`x`, `y`), the lowest, and of all to the right of it in its row that the word has place for.
+    /// Returns the [`WORD`] bits that start at pixel (`x`, `y`), which is the lowest bit, and continue to the right.
     #[inline(always)]
-    pub fn from(&self, x: usize, y: usize) -> u64 {
+    pub fn word_from(&self, x: usize, y: usize) -> u64 {
         let (at, shift) = (y * self.across + x / WORD, x % WORD);
         self.words[at] >> shift | self.words[at + 1] << 1 << (WORD - 1 - shift)
     }
 
-    /// Whether that of a pixel is set.
+    /// Whether the bit of a pixel is set.
     #[inline(always)]
     pub fn has(&self, x: usize, y: usize) -> bool {
         self.words[y * self.across + x / WORD] >> (x % WORD) & 1 != 0
     }
 
-    /// Sets that of a pixel.
+    /// Sets the bit of a pixel.
     #[inline(always)]
     pub fn set(&mut self, x: usize, y: usize) {
         self.words[y * self.across + x / WORD] |= 1 << (x % WORD);
     }
 
-    /// Sets those that are set in `bits`, as [`Self::from`] gives them.
+    /// Sets the pixels that are set in `bits`, in the layout that [`Self::word_from`] returns.
     #[inline(always)]
     pub fn set_from(&mut self, x: usize, y: usize, bits: u64) {
         let (at, shift) = (y * self.across + x / WORD, x % WORD);
@@ -57,9 +58,9 @@ impl Bits {
     }
 }
 
-/// The places of the bits that are set, from the lowest on.
+/// Iterates over the positions of the set bits, from the lowest.
 #[inline(always)]
-pub fn places(mut bits: u64) -> impl Iterator<Item = usize> {
+pub fn set_bits(mut bits: u64) -> impl Iterator<Item = usize> {
     std::iter::from_fn(move || {
         let place = bits.trailing_zeros() as usize;
         bits &= bits.wrapping_sub(1);
@@ -78,7 +79,7 @@ mod tests {
         set.iter().for_each(|&x| bits.set(x, 1));
         for x in 0..130 {
             assert_eq!((bits.has(x, 0), bits.has(x, 1), bits.has(x, 2)), (false, set.contains(&x), false));
-            let seen: Vec<_> = places(bits.from(x, 1)).map(|place| x + place).collect();
+            let seen: Vec<_> = set_bits(bits.word_from(x, 1)).map(|place| x + place).collect();
             let there: Vec<_> = set.into_iter().filter(|&at| (x..x + WORD).contains(&at)).collect();
             assert_eq!(seen, there);
         }

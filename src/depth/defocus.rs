@@ -1,52 +1,52 @@
-//! Depth of a single photograph from its own small defocus: what a lens with a large sensor has blurred a little can be
-//! blurred more.
+//! Depth from defocus of a single photograph: what a lens with a large sensor has blurred a little can be blurred more.
 //!
-//! At an edge, the ratio of the gradient to that of the picture blurred once more by a known Gaussian tells how soft the
-//! edge was (Zhuo and Sim, "Defocus map estimation from a single image", 2011, equation 5). Between edges that is spread
-//! along the colours, by a recursive filter in the transformed domain (Gastal and Oliveira, "Domain transform for
-//! edge-aware image and video processing", 2011). A picture alone does not tell on which side of the focus something is:
-//! all that is soft counts as behind.
+//! At an edge, the ratio of the gradient to that of the picture re-blurred by a known Gaussian gives the edge's blur
+//! (Zhuo and Sim, "Defocus map estimation from a single image", 2011, equation 5). Between edges, the sparse blur map
+//! is propagated along similar colours by the recursive domain transform filter (Gastal and Oliveira, "Domain transform
+//! for edge-aware image and video processing", 2011). One picture does not show on which side of the focal plane a
+//! surface lies, so all blur counts as behind it.
 
 use crate::frame::{ColorImage, DepthMap, luma_of};
 
-/// Standard deviation of the Gaussian that the picture is blurred with once more, in pixels of a picture of
-/// [`WIDTH`] columns, and of that which makes gradients steady.
-const AGAIN_PX: f32 = 1.0;
-const STEADY_PX: f32 = 0.8;
-/// Pictures are looked at in about so many columns: soft edges are found where they span few pixels.
+/// Standard deviation of the Gaussian for the re-blur, and of the one that denoises gradients, in pixels of a picture
+/// of [`WIDTH`] columns.
+const REBLUR_PX: f32 = 1.0;
+const DENOISE_PX: f32 = 0.8;
+/// Approximate number of columns in which pictures are analysed: at this size, blurred edges span few pixels.
 const WIDTH: usize = 1024;
-/// Gradients below this, in codes per pixel, are no edges.
-const EDGE: f32 = 4.0;
-/// Softer than this no edge can be told from a gradient of light.
-const MOST_PX: f32 = 4.0;
-/// How far softness spreads, in pixels, and how many codes of colour are as far as all of that.
-const REACH_PX: f32 = 220.0;
-const COLOR_CODES: f32 = 40.0;
-const ROUNDS: u32 = 4;
-/// Side of the squares whose median edges are compared, in pixels, and the least edges of one that counts.
+/// Minimum gradient of an edge, in codes per pixel.
+const MIN_GRADIENT: f32 = 4.0;
+/// Maximum blur of an edge, as a standard deviation: beyond it, an edge cannot be told from a gradient of light.
+const MAX_BLUR_PX: f32 = 4.0;
+/// Spatial and colour standard deviations of the domain transform filter, in pixels and codes, and its iterations.
+const SPATIAL_SIGMA_PX: f32 = 220.0;
+const COLOR_SIGMA_CODES: f32 = 40.0;
+const ITERATIONS: u32 = 4;
+/// Side of the squares whose median edge blurs are compared, in pixels, and the minimum number of edges in a square.
 const SQUARE_PX: usize = 48;
-const LEAST_EDGES: usize = 24;
-/// The shares of the squares that are the sharpest, and that are as soft as it gets.
-const SHARPEST: f32 = 0.2;
-const SOFTEST: f32 = 0.9;
-/// A photograph whose softest squares are softer than the sharpest by less than this is sharp all over: textures differ by
-/// up to a pixel by themselves.
-const LEAST_RANGE_PX: f32 = 1.2;
+const MIN_EDGES: usize = 24;
+/// Quantiles of the squares' median blurs that count as in focus and as fully out of focus.
+const SHARP_QUANTILE: f32 = 0.2;
+const SOFT_QUANTILE: f32 = 0.9;
+/// A photograph whose blur varies by less than this between squares, in pixels, is sharp all over: textures alone
+/// differ by up to a pixel.
+const MIN_RANGE_PX: f32 = 1.2;
 
-/// The relative depth of a photograph, as large as it: its sharpest things are the subject, [`DepthMap::SUBJECT_M`] away, its
-/// softest ones are as good as infinitely far. `None` where it has hardly any edge, or is equally sharp everywhere.
+/// Estimates the relative depth of a photograph, at its size: the sharpest parts are the subject, at
+/// [`DepthMap::SUBJECT_M`], the most blurred ones practically infinitely far. Returns `None` if there are hardly any
+/// edges, or all are equally sharp.
 pub fn depth(color: &ColorImage) -> Option<DepthMap> {
     let by = (color.width as usize / WIDTH).max(1);
-    let small = reduced(color, by);
+    let small = downscale(color, by);
     let size = (small.width as usize, small.height as usize);
-    let edges = softness(&small);
-    let squares = medians(&edges, size);
-    let at = |share: f32| squares.get((squares.len().saturating_sub(1) as f32 * share) as usize).copied();
-    let (sharp_px, soft_px) = (at(SHARPEST)?, at(SOFTEST)?);
-    if soft_px < sharp_px + LEAST_RANGE_PX {
+    let edges = edge_blur(&small);
+    let squares = median_blurs(&edges, size);
+    let at = |quantile: f32| squares.get((squares.len().saturating_sub(1) as f32 * quantile) as usize).copied();
+    let (sharp_px, soft_px) = (at(SHARP_QUANTILE)?, at(SOFT_QUANTILE)?);
+    if soft_px < sharp_px + MIN_RANGE_PX {
         return None;
     }
-    let soft = spread(color, &edges, (size, by));
+    let soft = propagate(color, &edges, (size, by));
     let mut map = DepthMap { subject_m: Some(DepthMap::SUBJECT_M), ..DepthMap::new(color.width, color.height) };
     for (metres, soft) in map.metres.iter_mut().zip(soft) {
         let nearness = 1.0 - ((soft - sharp_px) / (soft_px - sharp_px)).clamp(0.0, 1.0);
@@ -55,8 +55,8 @@ pub fn depth(color: &ColorImage) -> Option<DepthMap> {
     Some(map)
 }
 
-/// Means of squares of `by` pixels each way; what is left over at the right and below is not looked at.
-fn reduced(color: &ColorImage, by: usize) -> ColorImage {
+/// Downscales by the mean of squares of `by` x `by` pixels; a rest at the right and the bottom is cropped.
+fn downscale(color: &ColorImage, by: usize) -> ColorImage {
     let (width, height) = ((color.width as usize / by).max(1), (color.height as usize / by).max(1));
     let mut small = ColorImage::new(width as u32, height as u32);
     for (at, code) in small.rgb.iter_mut().enumerate() {
@@ -69,14 +69,14 @@ fn reduced(color: &ColorImage, by: usize) -> ColorImage {
     small
 }
 
-/// How soft each edge is: the standard deviation of its blur in pixels; not a number where there is no edge.
-fn softness(color: &ColorImage) -> Vec<f32> {
+/// Estimates the blur of each edge pixel, as a standard deviation in pixels; NaN elsewhere.
+fn edge_blur(color: &ColorImage) -> Vec<f32> {
     let (width, height) = (color.width as usize, color.height as usize);
     let mut codes = vec![0; width * height];
     luma_of(&color.rgb, &mut codes);
     let luma: Vec<f32> = codes.iter().map(|&code| f32::from(code)).collect();
-    let own = gaussian(&luma, (width, height), STEADY_PX);
-    let again = gaussian(&luma, (width, height), STEADY_PX.hypot(AGAIN_PX));
+    let own = gaussian(&luma, (width, height), DENOISE_PX);
+    let again = gaussian(&luma, (width, height), DENOISE_PX.hypot(REBLUR_PX));
     let mut soft = vec![f32::NAN; width * height];
     for y in 1..height.max(1) - 1 {
         for x in 1..width.max(1) - 1 {
@@ -86,10 +86,10 @@ fn softness(color: &ColorImage) -> Vec<f32> {
             };
             let [across, down] = gradient(&own, at);
             let steep = across.hypot(down);
-            if steep < EDGE {
+            if steep < MIN_GRADIENT {
                 continue;
             }
-            // Only where it is steepest: beside that, the ratio is another.
+            // Non-maximum suppression: the ratio only holds where the gradient is largest across the edge.
             let (dx, dy) = ((across / steep).round() as isize, (down / steep).round() as isize);
             let beside = |way: isize| {
                 let (x, y) = (x.saturating_add_signed(way * dx), y.saturating_add_signed(way * dy));
@@ -105,22 +105,22 @@ fn softness(color: &ColorImage) -> Vec<f32> {
             }
             let [across, down] = gradient(&again, at);
             let ratio = steep / across.hypot(down).max(1e-3);
-            let all_px = AGAIN_PX / (ratio * ratio - 1.0).max(1e-3).sqrt();
-            // Less what made the gradients steady, and what the difference over two pixels adds.
-            soft[at] = (all_px * all_px - STEADY_PX * STEADY_PX - 1.0 / 3.0).max(0.0).sqrt().min(MOST_PX);
+            let all_px = REBLUR_PX / (ratio * ratio - 1.0).max(1e-3).sqrt();
+            // Subtracts the variance of the denoising Gaussian, and that of the central difference over two pixels.
+            soft[at] = (all_px * all_px - DENOISE_PX * DENOISE_PX - 1.0 / 3.0).max(0.0).sqrt().min(MAX_BLUR_PX);
         }
     }
     soft
 }
 
-/// The median softness of the edges in each square that has enough of them, ascending.
-fn medians(edges: &[f32], (width, height): (usize, usize)) -> Vec<f32> {
+/// Returns the median edge blur of each square with enough edges, ascending.
+fn median_blurs(edges: &[f32], (width, height): (usize, usize)) -> Vec<f32> {
     let (across, down) = (width.div_ceil(SQUARE_PX), height.div_ceil(SQUARE_PX));
     let mut squares = vec![Vec::new(); across * down];
     for (at, &soft) in edges.iter().enumerate().filter(|(_, soft)| soft.is_finite()) {
         squares[at / width / SQUARE_PX * across + at % width / SQUARE_PX].push(soft);
     }
-    let many = squares.iter_mut().filter(|square| square.len() >= LEAST_EDGES);
+    let many = squares.iter_mut().filter(|square| square.len() >= MIN_EDGES);
     let mut medians: Vec<f32> = many
         .map(|square| {
             let middle = square.len() / 2;
@@ -131,58 +131,61 @@ fn medians(edges: &[f32], (width, height): (usize, usize)) -> Vec<f32> {
     medians
 }
 
-/// A Gaussian blur; beyond its edges, a plane is as there.
+/// Applies a separable Gaussian blur; the border is replicated.
 fn gaussian(plane: &[f32], (width, height): (usize, usize), deviation_px: f32) -> Vec<f32> {
-    let reach = (3.0 * deviation_px).ceil() as isize;
+    let radius = (3.0 * deviation_px).ceil() as isize;
     let weight = |k: isize| (-0.5 * (k as f32 / deviation_px).powi(2)).exp();
-    let all: f32 = (-reach..=reach).map(weight).sum();
+    let all: f32 = (-radius..=radius).map(weight).sum();
     let line = |from: &[f32], step: usize, count: usize, start: usize, k: usize| -> f32 {
         let at = |off: isize| from[start + step * k.saturating_add_signed(off).min(count - 1)];
-        (-reach..=reach).map(|off| weight(off) * at(off)).sum::<f32>() / all
+        (-radius..=radius).map(|off| weight(off) * at(off)).sum::<f32>() / all
     };
     let rows: Vec<f32> = (0..width * height).map(|at| line(plane, 1, width, at - at % width, at % width)).collect();
     (0..width * height).map(|at| line(&rows, width, height, at % width, at / width)).collect()
 }
 
-/// The mean of what is known around each pixel, the farther by place and colour the less. What is known is that of a
-/// picture of `size`, each of whose pixels is `by` pixels each way.
-fn spread(color: &ColorImage, known: &[f32], (size, by): ((usize, usize), usize)) -> Vec<f32> {
+/// Propagates the known blur values along similar colours (domain transform, recursive filter). `known` belongs to a
+/// picture of `size` pixels, each of which covers `by` x `by` pixels of `color`. Values and weights are filtered alike
+/// (normalised convolution).
+fn propagate(color: &ColorImage, known: &[f32], (size, by): ((usize, usize), usize)) -> Vec<f32> {
     let (width, height) = (color.width as usize, color.height as usize);
     let mut sums = vec![[0.0; 2]; width * height];
     for (at, &soft) in known.iter().enumerate().filter(|(_, soft)| soft.is_finite()) {
         let (x, y) = (at % size.0 * by + by / 2, at / size.0 * by + by / 2);
         sums[y * width + x] = [soft, 1.0];
     }
-    // Two pixels are as far apart as their colours and places are.
-    let reach_px = REACH_PX * by as f32;
+    // The distance of neighbouring pixels in the transformed domain: one pixel plus the scaled colour difference.
+    let sigma_px = SPATIAL_SIGMA_PX * by as f32;
     let colors = |a: usize, b: usize| -> usize {
         (0..3).map(|p| usize::from(color.rgb[3 * a + p].abs_diff(color.rgb[3 * b + p]))).sum()
     };
-    for round in 0..ROUNDS {
-        let share = 3f32.sqrt() * 2f32.powi((ROUNDS - round - 1) as i32) / (4f32.powi(ROUNDS as i32) - 1.0).sqrt();
-        let feedback = (-(2f32.sqrt()) / (reach_px * share)).exp();
-        let keeps: Vec<f32> =
-            (0..=765).map(|codes| feedback.powf(1.0 + reach_px / COLOR_CODES * codes as f32)).collect();
+    // Each iteration halves the filter's standard deviation: rows, then columns, in both directions.
+    for round in 0..ITERATIONS {
+        let scale =
+            3f32.sqrt() * 2f32.powi((ITERATIONS - round - 1) as i32) / (4f32.powi(ITERATIONS as i32) - 1.0).sqrt();
+        let feedback = (-(2f32.sqrt()) / (sigma_px * scale)).exp();
+        let decay: Vec<f32> =
+            (0..=765).map(|codes| feedback.powf(1.0 + sigma_px / COLOR_SIGMA_CODES * codes as f32)).collect();
         for (lines, count, step, along) in [(height, width, 1, width), (width, height, width, 1)] {
             for line in 0..lines {
                 let at = |k: usize| line * along + k * step;
                 let mut pull = |from: usize, to: usize| {
-                    let keeps = keeps[colors(from, to)];
-                    (0..2).for_each(|p| sums[to][p] += keeps * (sums[from][p] - sums[to][p]));
+                    let decay = decay[colors(from, to)];
+                    (0..2).for_each(|p| sums[to][p] += decay * (sums[from][p] - sums[to][p]));
                 };
                 (1..count).for_each(|k| pull(at(k - 1), at(k)));
                 (1..count).rev().for_each(|k| pull(at(k), at(k - 1)));
             }
         }
     }
-    sums.iter().map(|[sum, weight]| if *weight > 0.0 { sum / weight } else { MOST_PX }).collect()
+    sums.iter().map(|[sum, weight]| if *weight > 0.0 { sum / weight } else { MAX_BLUR_PX }).collect()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    /// Stripes, those of the lower half brighter, softened by this much.
+    /// Vertical stripes, brighter in the lower half, blurred by `deviation_px(half)`.
     fn stripes(deviation_px: impl Fn(usize) -> f32) -> ColorImage {
         let (width, height) = (240usize, 160usize);
         let mut picture = ColorImage::new(width as u32, height as u32);
@@ -201,7 +204,7 @@ mod tests {
     #[test]
     fn soft_edges_are_measured() {
         for deviation_px in [0.6, 1.0, 1.6, 2.4] {
-            let edges = softness(&stripes(|_| deviation_px));
+            let edges = edge_blur(&stripes(|_| deviation_px));
             let known: Vec<f32> = edges.into_iter().filter(|soft| soft.is_finite()).collect();
             let mean = known.iter().sum::<f32>() / known.len() as f32;
             assert!(

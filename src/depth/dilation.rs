@@ -1,7 +1,7 @@
-//! Dilation of flags, such as those of a mask.
+//! Dilation of binary masks.
 
-/// Marks all within so many pixels of what is marked, row by row and column by column.
-pub fn dilate(plane: &mut [bool], line: &mut Vec<bool>, width: usize, reach_px: usize) {
+/// Dilates `plane` by a square of `2 * radius_px + 1` pixels: rows first, then columns. `line` is scratch memory.
+pub fn dilate(plane: &mut [bool], line: &mut Vec<bool>, width: usize, radius_px: usize) {
     let height = plane.len() / width.max(1);
     let mut along = |first: usize, step: usize, count: usize| {
         line.clear();
@@ -9,7 +9,7 @@ pub fn dilate(plane: &mut [bool], line: &mut Vec<bool>, width: usize, reach_px: 
         for back in [false, true] {
             let mut left = 0;
             for k in (0..count).map(|k| if back { count - 1 - k } else { k }) {
-                left = if line[k] { reach_px + 1 } else { left };
+                left = if line[k] { radius_px + 1 } else { left };
                 plane[first + k * step] |= left > 0;
                 left = left.saturating_sub(1);
             }

@@ -1,10 +1,12 @@
-//! Hole filling: unknown depth, taken from the background beside it.
+//! Hole filling: unknown depth is filled from the background.
 //!
-//! A hole beside a person is a depth shadow: the wall that one of the sensor's two eyes could not see. A hole inside
-//! the person is the person. Both come out right when a hole takes the farthest of the nearest known depths to its
-//! left, right, above and below. The empty frame around a registered depth picture is continued the same way.
+//! A hole beside a person is an occlusion shadow: the wall that one of the sensor's two cameras cannot see. A hole
+//! inside the person is the person. Both are correct if a hole takes the farthest of the nearest known depths to its
+//! left, right, above and below. The empty frame around a registered depth picture is filled the same way.
 //!
-//! Holes are found once, as runs of pixels along rows; whatever follows looks at their pixels and at those beside them alone.
+//! Holes are found once, as runs of pixels along rows; later steps access only their pixels and the adjacent ones.
+//!
+//! twin: shaders/refine_beside.wgsl, shaders/refine_fill.wgsl
 
 use std::ops::Range;
 use std::{iter, mem};
@@ -14,11 +16,11 @@ use pulp::{Arch, WithSimd};
 use super::guided_fill::{GuidedHoleFill, Run};
 use crate::frame::{ColorImage, DepthMap};
 
-/// Fills depth maps; owns the memory for it, and the last map that had any depth.
+/// Fills depth maps; owns its buffers and the last map that had any depth.
 #[derive(Debug, Default)]
 pub struct Filler {
     arch: Arch,
-    /// The holes, row by row, what is left of them after a pass, and the depths for those that a pass fills.
+    /// The holes, row by row, the rest of them after a pass, and the filled depths of a pass.
     holes: Vec<Run>,
     left: Vec<Run>,
     filled_m: Vec<f32>,
@@ -29,28 +31,29 @@ pub struct Filler {
 }
 
 impl Filler {
-    /// No memory of earlier frames.
+    /// Creates a filler without a last map.
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// Fills every unknown depth of `map`, in time linear in its pixels. A map with no known depth at all becomes a
-    /// copy of the last good one of the same size; if there is none it stays unknown (0) everywhere.
+    /// Fills every unknown depth of `map`, in time linear in its pixels. A map without any known depth becomes a copy
+    /// of the last good one of its size; without one it stays unknown (0) everywhere.
     pub fn fill(&mut self, map: &mut DepthMap) {
         if self.fill_all(map) {
             self.keep(map);
         }
     }
 
-    /// As [`Filler::fill`], then corrected by `color`, the picture of the map: a filled pixel that took the
-    /// background's depth but looks like the near object beside it takes the object's depth.
+    /// Fills like [`Filler::fill`], then corrects by `color`, the picture of the map: a pixel filled from the
+    /// background takes the depth of the near object beside it if it has that object's colour.
     pub fn fill_guided(&mut self, map: &mut DepthMap, color: &ColorImage) {
         if self.fill_once(map, color) {
             self.keep(map);
         }
     }
 
-    /// The same without keeping the map: returns whether it is to be kept, by [`Filler::take`].
+    /// Fills like [`Filler::fill_guided`] without keeping the map: returns whether to keep it, with
+    /// [`Filler::keep_by_swap`].
     pub(super) fn fill_once(&mut self, map: &mut DepthMap, color: &ColorImage) -> bool {
         let is_good = self.fill_all(map);
         if is_good {
@@ -59,18 +62,18 @@ impl Filler {
         is_good
     }
 
-    /// What was unknown of the last map, row by row.
+    /// Returns the unknown runs of the last map, row by row.
     pub(super) fn holes(&self) -> &[Run] {
         &self.holes
     }
 
-    /// Takes a map to keep it. What `map` has after is of an earlier one.
-    pub(super) fn take(&mut self, map: &mut DepthMap) {
+    /// Keeps a map by swapping buffers: `map` then has the content of an earlier one.
+    pub(super) fn keep_by_swap(&mut self, map: &mut DepthMap) {
         self.last_good.resize(map.width, map.height);
         mem::swap(&mut self.last_good.metres, &mut map.metres);
     }
 
-    /// Fills the holes; returns whether anything was known.
+    /// Fills the holes; returns whether any depth was known.
     fn fill_all(&mut self, map: &mut DepthMap) -> bool {
         let Self { arch, holes, left, filled_m, column_m, .. } = self;
         holes.clear();
@@ -84,13 +87,13 @@ impl Filler {
             return false;
         }
         let is_full = arch.dispatch(FillPass { map, holes, filled_m, column_m });
-        // Every row and column that had a known depth is full now. What is left crosses such a row, so that one more pass
-        // fills it.
+        // Every row and column that had a known depth is full now. The remaining holes cross such a row, so that one
+        // more pass fills them.
         if !is_full {
             let width = map.width as usize;
             left.clear();
             for &hole in &*holes {
-                left.extend(self::holes(&map.metres[hole.of_row(width)]).map(|of_hole| Run {
+                left.extend(self::holes(&map.metres[hole.pixels(width)]).map(|of_hole| Run {
                     start: hole.start + of_hole.start as u32,
                     end: hole.start + of_hole.end as u32,
                     ..hole
@@ -125,8 +128,9 @@ impl WithSimd for FindHoles<'_> {
     }
 }
 
-/// Gives each of the `holes`, which are all that is unknown of a map, the farthest of the nearest known depths above, below,
-/// left and right. Returns whether the map is full now: a pixel whose row and column hold no known depth stays unknown.
+/// Fills each of the `holes`, which are all unknown pixels of a map, with the farthest of the nearest known depths
+/// above, below, left and right. Returns whether the map is full: a pixel whose row and column have no known depth
+/// stays unknown.
 struct FillPass<'a> {
     map: &'a mut DepthMap,
     holes: &'a [Run],
@@ -142,22 +146,22 @@ impl WithSimd for FillPass<'_> {
         let (width, height) = (map.width as usize, map.height as usize);
         let row = |y: usize| &map.metres[y * width..][..width];
         filled_m.clear();
-        // Down: the farthest one of above, left and right. What is nearest above a hole is right above it, or is what was
-        // nearest above the hole that is there.
+        // Downwards: the farthest of above, left and right. The nearest depth above a hole is directly above it, or the
+        // nearest one above the hole that is there.
         column_m.clear();
         column_m.resize(width, 0.0);
         for hole in holes {
             let (y, columns) = (hole.line as usize, hole.range());
             let above_m = &mut column_m[columns.clone()];
             if y > 0 {
-                take_known(above_m, &row(y - 1)[columns.clone()]);
+                update_known(above_m, &row(y - 1)[columns.clone()]);
             }
             let left_m = columns.start.checked_sub(1).map_or(0.0, |x| row(y)[x]);
             let right_m = row(y).get(columns.end).copied().unwrap_or(0.0);
             let beside_m = left_m.max(right_m);
             filled_m.extend(above_m.iter().map(|&above_m| farther(above_m, beside_m)));
         }
-        // Up: the farther one of that and below.
+        // Upwards: the farther one of that and below.
         column_m.fill(0.0);
         let mut is_full = true;
         let (mut end, mut rest) = (filled_m.len(), &mut filled_m[..]);
@@ -165,7 +169,7 @@ impl WithSimd for FillPass<'_> {
             let (y, columns) = (hole.line as usize, hole.range());
             let below_m = &mut column_m[columns.clone()];
             if y + 1 < height {
-                take_known(below_m, &row(y + 1)[columns.clone()]);
+                update_known(below_m, &row(y + 1)[columns.clone()]);
             }
             let (before, filled_m) = mem::take(&mut rest).split_at_mut(end - columns.len());
             (rest, end) = (before, end - columns.len());
@@ -176,7 +180,7 @@ impl WithSimd for FillPass<'_> {
         }
         let mut filled_m = &filled_m[..];
         for hole in holes {
-            let row = &mut map.metres[hole.of_row(width)];
+            let row = &mut map.metres[hole.pixels(width)];
             row.copy_from_slice(&filled_m[..row.len()]);
             filled_m = &filled_m[row.len()..];
         }
@@ -184,9 +188,9 @@ impl WithSimd for FillPass<'_> {
     }
 }
 
-/// Replaces depths by those of a row that are known.
+/// Replaces depths by the known ones of a row.
 #[inline(always)]
-fn take_known(column_m: &mut [f32], row: &[f32]) {
+fn update_known(column_m: &mut [f32], row: &[f32]) {
     for (column_m, &z_m) in column_m.iter_mut().zip(row) {
         *column_m = if DepthMap::is_known(z_m) { z_m } else { *column_m };
     }
@@ -200,12 +204,12 @@ fn farther(a_m: f32, b_m: f32) -> f32 {
 /// Known pixels are skipped in blocks of this size, whose test is vector code.
 const SKIP_BLOCK: usize = 16;
 
-/// The column ranges of the runs of unknown depths in a row.
+/// Returns the column ranges of the runs of unknown depths in a row.
 #[inline(always)]
 pub(super) fn holes(row: &[f32]) -> impl Iterator<Item = Range<usize>> {
     let mut next = 0;
     iter::from_fn(move || {
-        // Most pixels are known. `&` instead of an early exit, so that a block becomes vector code.
+        // Most pixels are known. `&` instead of an early exit, so that the test of a block becomes vector code.
         let all_known = |block: &[f32]| block.iter().fold(true, |all, &z_m| all & DepthMap::is_known(z_m));
         next += SKIP_BLOCK * row[next..].chunks_exact(SKIP_BLOCK).take_while(|block| all_known(block)).count();
         let start = next + row[next..].iter().position(|&z_m| !DepthMap::is_known(z_m))?;

@@ -1,79 +1,81 @@
-//! Keeps the subject in the middle: which part of the picture to show, from frame to frame.
+//! Auto-framing: chooses the part of the picture to show, so that the subject stays in the middle.
 //!
-//! What is in focus has a place and a size in the depth map; the part shown glides there as a camera on a good head does: a
-//! critically damped spring, which sets out only when the subject has really moved, and comes to rest.
+//! The position and the size of the subject are measured in the depth map. The crop follows them like a camera on a
+//! fluid head: a critically damped spring that starts only once the subject has moved clearly, and comes to rest.
 
 use crate::frame::DepthMap;
 use crate::frame::crop::Crop;
 use crate::optics::DepthCoc;
 
-/// What is in focus: so near to the focal plane, as ratios of inverse depths.
+/// Range of inverse depth that counts as in focus, relative to the focal plane's.
 const IN_FOCUS: std::ops::RangeInclusive<f32> = 0.8..=1.25;
-/// Columns that are looked at.
-const LOOKS: usize = 160;
-/// Less of a picture is no subject.
-const LEAST_SHARE: f32 = 0.005;
-/// The subject reaches from here to there, across and down: what is beyond is hands, chairs and noise; but hair is on top.
-const REACHES: [[f32; 2]; 2] = [[0.04, 0.96], [0.01, 0.96]];
-/// Its width and height are at most this of the part shown, and so much is left above it.
-const FILLS: [f32; 2] = [0.75, 0.8];
+/// Number of columns that are sampled.
+const MAX_COLUMNS: usize = 160;
+/// Minimum fraction of the sampled pixels that makes a subject.
+const MIN_FRACTION: f32 = 0.005;
+/// Quantiles of the in-focus pixels that bound the subject, across and down: outside are hands, chairs and noise. The
+/// upper bound is lower, to keep the hair.
+const BOUND_QUANTILES: [[f32; 2]; 2] = [[0.04, 0.96], [0.01, 0.96]];
+/// Maximum width and height of the subject, and the headroom above it, as fractions of the crop.
+const MAX_FILL: [f32; 2] = [0.75, 0.8];
 const HEADROOM: f32 = 0.09;
-/// A resting part sets out when the subject is off by more than this, in sides of the part shown or of its logarithm; it rests
-/// again when it is as near as this.
+/// Hysteresis: a resting crop starts to move when the error exceeds `START`, and rests again below `STOP`. Both are in
+/// sides of the crop, or in the logarithm of the zoom.
 const START: f32 = 0.07;
 const STOP: f32 = 0.004;
-/// Time constant of the spring: after five of them it is there.
+/// Time constant of the spring; it settles within about five of them.
 const TIME_CONSTANT_S: f32 = 0.2;
-/// Frames further apart do not follow each other.
-const LONGEST_GAP_NS: u64 = 2_000_000_000;
+/// Frames further apart in media time are not consecutive: the crop is reset.
+const MAX_GAP_NS: u64 = 2_000_000_000;
 
-/// Follows the subject of frame after frame.
+/// Computes the crop that follows the subject, frame after frame.
 #[derive(Debug)]
 pub struct Follower {
-    most_zoom: f32,
+    max_zoom: f32,
     columns: Vec<u32>,
     rows: Vec<u32>,
     target: [f32; 3],
-    /// Where it is, and how fast that changes, in 1/s: middle across and down, and logarithm of the zoom.
+    /// Current state and its derivative in 1/s: centre across and down (fractions), and logarithm of the zoom.
     place: [f32; 3],
     speed: [f32; 3],
-    moves: bool,
+    is_moving: bool,
     time_ns: Option<u64>,
 }
 
 impl Follower {
-    /// Shows a part as large as `most_zoom` makes it, at most.
-    pub fn new(most_zoom: f32) -> Self {
+    /// Creates a follower that zooms by at most `max_zoom`.
+    pub fn new(max_zoom: f32) -> Self {
         Self {
-            most_zoom,
+            max_zoom,
             columns: Vec::new(),
             rows: Vec::new(),
             target: [0.0; 3],
             place: [0.0; 3],
             speed: [0.0; 3],
-            moves: false,
+            is_moving: false,
             time_ns: None,
         }
     }
 
-    /// Shows a part as large as this makes it from now on, at most, from where it is.
-    pub fn limit(&mut self, most_zoom: f32) {
-        self.most_zoom = most_zoom;
+    /// Sets the maximum zoom from now on; the crop moves there from its current place.
+    pub fn limit(&mut self, max_zoom: f32) {
+        self.max_zoom = max_zoom;
     }
 
-    /// The part to show of the frame at `time_ns` of media time, whose depth has no holes. The first frame sets it at once.
+    /// Returns the crop for the frame at `time_ns` of media time, whose depth map has no holes. The first frame sets it
+    /// at once.
     pub fn part(&mut self, map: &DepthMap, lens: &DepthCoc, time_ns: u64) -> Crop {
-        let seen = self.subject(map, lens);
-        let follows = self.time_ns.filter(|&last_ns| (last_ns..=last_ns + LONGEST_GAP_NS).contains(&time_ns));
-        let wanted = seen.unwrap_or(if follows.is_some() { self.target } else { numbers(Crop::WHOLE) });
+        let seen = self.find_target(map, lens);
+        let follows = self.time_ns.filter(|&last_ns| (last_ns..=last_ns + MAX_GAP_NS).contains(&time_ns));
+        let wanted = seen.unwrap_or(if follows.is_some() { self.target } else { state_of(Crop::WHOLE) });
         match follows {
-            None => (self.place, self.target, self.speed, self.moves) = (wanted, wanted, [0.0; 3], false),
+            None => (self.place, self.target, self.speed, self.is_moving) = (wanted, wanted, [0.0; 3], false),
             Some(last_ns) => {
-                let off = off(self.place, wanted);
-                self.moves = off > if self.moves { STOP } else { START };
-                if self.moves {
+                let distance = crop_distance(self.place, wanted);
+                self.is_moving = distance > if self.is_moving { STOP } else { START };
+                if self.is_moving {
                     self.target = wanted;
-                    self.glide((time_ns - last_ns) as f32 * 1e-9);
+                    self.advance((time_ns - last_ns) as f32 * 1e-9);
                 } else {
                     self.speed = [0.0; 3];
                 }
@@ -84,12 +86,12 @@ impl Follower {
         Crop { center: [x, y], zoom: zoom.exp() }.inside()
     }
 
-    /// Lets the spring pull for so many seconds.
-    fn glide(&mut self, passed_s: f32) {
+    /// Advances the spring by `passed_s` seconds.
+    fn advance(&mut self, passed_s: f32) {
         let rate = TIME_CONSTANT_S.recip();
         let fall = (-rate * passed_s).exp();
         for ((place, speed), target) in self.place.iter_mut().zip(&mut self.speed).zip(self.target) {
-            // The exact solution, so that it depends on the times of frames alone and not on how many there are.
+            // The exact solution of the critically damped spring: independent of the frame rate.
             let off = *place - target;
             let pull = *speed + rate * off;
             *place = target + (off + pull * passed_s) * fall;
@@ -97,10 +99,10 @@ impl Follower {
         }
     }
 
-    /// What would show the subject best; `None` where nothing is in focus.
-    fn subject(&mut self, map: &DepthMap, lens: &DepthCoc) -> Option<[f32; 3]> {
+    /// Returns the ideal crop around the subject; `None` if nothing is in focus.
+    fn find_target(&mut self, map: &DepthMap, lens: &DepthCoc) -> Option<[f32; 3]> {
         let (width, height) = (map.width as usize, map.height as usize);
-        let step = (width / LOOKS).max(1);
+        let step = (width / MAX_COLUMNS).max(1);
         for (counts, side) in [(&mut self.columns, width), (&mut self.rows, height)] {
             counts.clear();
             counts.resize(side.div_ceil(step), 0);
@@ -117,11 +119,11 @@ impl Follower {
             }
             count += *row;
         }
-        if (count as f32) < LEAST_SHARE * (self.columns.len() * self.rows.len()) as f32 {
+        if (count as f32) < MIN_FRACTION * (self.columns.len() * self.rows.len()) as f32 {
             return None;
         }
-        let place = |counts: &[u32], share: f32| {
-            let due = share * count as f32;
+        let place = |counts: &[u32], quantile: f32| {
+            let due = quantile * count as f32;
             let mut sum = 0.0;
             let at = counts.iter().position(|&count| {
                 sum += count as f32;
@@ -129,22 +131,23 @@ impl Follower {
             });
             (at.unwrap_or_default() as f32 + 0.5) / counts.len() as f32
         };
-        let [left, right] = REACHES[0].map(|share| place(&self.columns, share));
-        let [top, bottom] = REACHES[1].map(|share| place(&self.rows, share));
-        let zoom = (FILLS[0] / (right - left).max(1e-3)).min(FILLS[1] / (bottom - top).max(1e-3));
-        let zoom = zoom.clamp(1.0, self.most_zoom);
+        let [left, right] = BOUND_QUANTILES[0].map(|quantile| place(&self.columns, quantile));
+        let [top, bottom] = BOUND_QUANTILES[1].map(|quantile| place(&self.rows, quantile));
+        let zoom = (MAX_FILL[0] / (right - left).max(1e-3)).min(MAX_FILL[1] / (bottom - top).max(1e-3));
+        let zoom = zoom.clamp(1.0, self.max_zoom);
         let middle = 0.5 * (top + bottom);
+        // Centred on the subject, but with no more than the headroom above it.
         let below_headroom = top + (0.5 - HEADROOM) / zoom;
-        Some(numbers(Crop { center: [place(&self.columns, 0.5), middle.min(below_headroom)], zoom }.inside()))
+        Some(state_of(Crop { center: [place(&self.columns, 0.5), middle.min(below_headroom)], zoom }.inside()))
     }
 }
 
-fn numbers(Crop { center: [x, y], zoom }: Crop) -> [f32; 3] {
+fn state_of(Crop { center: [x, y], zoom }: Crop) -> [f32; 3] {
     [x, y, zoom.ln()]
 }
 
-/// How far two parts are apart, in sides of the part shown.
-fn off(a: [f32; 3], b: [f32; 3]) -> f32 {
+/// Returns the distance between two crops, in sides of the crop.
+fn crop_distance(a: [f32; 3], b: [f32; 3]) -> f32 {
     let zoom = b[2].exp();
     let moved = zoom * (a[0] - b[0]).abs().max((a[1] - b[1]).abs());
     moved.max((a[2] - b[2]).abs())

@@ -1,60 +1,62 @@
-//! Hole filling guided by colour: holes beside the foreground that are foreground.
+//! Colour-guided hole filling: finds the holes beside the foreground that belong to it.
 //!
-//! A sensor that sees with two eyes loses a strip beside whatever is near. Filled from behind, that strip takes hair
-//! and shoulders along. Where the colours of the near and the far side of a hole differ, the colour of each pixel
-//! tells which side it belongs to; the near side grows into the hole until the colour is no longer its own.
+//! A stereo or structured-light sensor loses a strip beside near objects. Filled from the background, that strip would
+//! include hair and shoulders. Where the near and the far side of a hole differ in colour, the near side grows into the
+//! hole as long as the pixels' colour is closer to its own (seeded region growing).
+//!
+//! twin: shaders/refine_claim.wgsl, shaders/refine_agree.wgsl
 
 use std::ops::Range;
 
 use crate::frame::{ColorImage, DepthMap};
 
-/// Depths within this ratio are one surface: nothing to decide.
+/// Depths within this ratio are one surface, whose holes need no decision.
 pub const SAME_SURFACE: f32 = 1.15;
-/// Known pixels beside a hole whose mean colour stands for that side.
+/// Known pixels beside a hole in the mean colour of that side.
 pub const SAMPLE_PX: usize = 4;
-/// A pixel is the near side's if it is this much closer to its colour than to the far side's.
+/// A pixel belongs to the near side if its colour is closer to it by this factor than to the far side's.
 pub const PREFERENCE: f32 = 1.3;
-/// How fast the near side's colour follows the pixels it takes.
+/// Rate at which the near side's colour follows the claimed pixels.
 pub const FOLLOW: f32 = 0.2;
-/// A sensor's shadow is at most this share of the picture's width.
-const LONGEST: f32 = 0.12;
+/// Largest width of a sensor's occlusion shadow, as a fraction of the picture's width.
+const MAX_SHADOW_FRACTION: f32 = 0.12;
 
-/// Decides by colour which holes belong to the nearer side; owns the memory for it.
+/// Finds the holes that belong to the nearer side by colour; owns its buffers.
 #[derive(Debug, Default)]
 pub struct GuidedHoleFill {
-    /// Per pixel the depth of the near side that claims it, and whether it is a hole still. Nothing between two frames.
+    /// Per pixel the depth of the near side that claims it, and whether it is still a hole. Cleared after each frame.
     claims_m: Vec<f32>,
     is_hole: Vec<bool>,
-    /// Where there are claims, and where columns enter a hole.
+    /// Lines with claims, and the first pixels of holes in columns.
     claimed: Vec<Line>,
     entries: Vec<usize>,
 }
 
-/// Pixels of a row, one after the other.
+/// Consecutive pixels of a row.
 #[derive(Clone, Copy, Debug)]
 pub struct Run {
-    /// The number of the row.
+    /// Index of the row.
     pub line: u32,
     pub start: u32,
     pub end: u32,
 }
 
 impl Run {
-    /// Its columns.
+    /// Returns the columns.
     #[inline(always)]
     pub fn range(self) -> Range<usize> {
         self.start as usize..self.end as usize
     }
 
-    /// Its pixels in a map of so many columns.
+    /// Returns the pixel indices in a map of `width` columns.
     #[inline(always)]
-    pub fn of_row(self, width: usize) -> Range<usize> {
+    pub fn pixels(self, width: usize) -> Range<usize> {
         let first = self.line as usize * width;
         first + self.start as usize..first + self.end as usize
     }
 }
 
-/// A row or a column, or a part of one: its pixels are `first`, `first + step`, and so on.
+/// A row or a column, or a segment of one: its pixels are `first`, `first + step`, and so on.
 #[derive(Clone, Copy, Debug)]
 struct Line {
     first: usize,
@@ -67,18 +69,18 @@ impl Line {
         self.first + k * self.step
     }
 
-    fn part(self, Range { start, end }: Range<usize>) -> Self {
+    fn segment(self, Range { start, end }: Range<usize>) -> Self {
         Self { first: self.at(start), length: end - start, ..self }
     }
 
-    fn places(self) -> impl Iterator<Item = usize> {
+    fn indices(self) -> impl Iterator<Item = usize> {
         (0..self.length).map(move |k| self.at(k))
     }
 }
 
 impl GuidedHoleFill {
-    /// Moves `holes`, row by row, of a map that was filled from behind to the near side that has their colour, along rows and
-    /// then, for what is left, along columns. Does nothing when the picture has another size than the map.
+    /// Assigns `holes`, row by row, of a map filled from the background to the near side if they have its colour, along
+    /// rows and then, for the rest, along columns. Does nothing if picture and map differ in size.
     pub fn claim(&mut self, map: &mut DepthMap, holes: &[Run], color: &ColorImage) {
         let (width, height) = (map.width as usize, map.height as usize);
         if color.size() != map.size() || holes.is_empty() {
@@ -86,34 +88,34 @@ impl GuidedHoleFill {
         }
         self.claims_m.resize(width * height, 0.0);
         self.is_hole.resize(width * height, false);
-        holes.iter().for_each(|hole| self.is_hole[hole.of_row(width)].fill(true));
+        holes.iter().for_each(|hole| self.is_hole[hole.pixels(width)].fill(true));
         let longest = longest(width);
         for &hole in holes {
             let line = Line { first: hole.line as usize * width, step: 1, length: width };
             let claimed = claim_run(line, hole.range(), longest, &map.metres, &color.rgb, &mut self.claims_m);
             self.claimed.extend(claimed);
         }
-        self.agree(width, map);
+        self.accept_claims(width, map);
         self.find_entries(holes, width);
         for entry in self.entries.drain(..) {
             let (column, start) = (entry % width, entry / width);
             let is_hole = |&y: &usize| self.is_hole[y * width + column];
-            // One row more than is looked at tells that it is too long.
+            // Searches one row more than the limit, to detect holes that are too long.
             let end = (start..height.min(start + longest + 1)).take_while(is_hole).count() + start;
             let line = Line { first: column, step: width, length: height };
             let claimed = claim_run(line, start..end, longest, &map.metres, &color.rgb, &mut self.claims_m);
             self.claimed.extend(claimed);
         }
-        self.agree(1, map);
-        holes.iter().for_each(|hole| self.is_hole[hole.of_row(width)].fill(false));
+        self.accept_claims(1, map);
+        holes.iter().for_each(|hole| self.is_hole[hole.pixels(width)].fill(false));
     }
 
-    /// Lets two of three neighbours across the lines, `across` apart, agree on the claims of holes; what was claimed is none any
-    /// more, and no claim is left.
-    fn agree(&mut self, across: usize, map: &mut DepthMap) {
+    /// Accepts claims on which two of three neighbours across the lines, `across` apart, agree; removes them from the
+    /// holes, and clears all claims.
+    fn accept_claims(&mut self, across: usize, map: &mut DepthMap) {
         let Self { claims_m, is_hole, claimed, .. } = self;
-        // Where two agree, the pixel itself claims or the one before it does.
-        for k in claimed.iter().flat_map(|line| line.places()).flat_map(|k| [k, k + across]) {
+        // If two agree, the pixel itself or the one before it has a claim.
+        for k in claimed.iter().flat_map(|line| line.indices()).flat_map(|k| [k, k + across]) {
             if !is_hole.get(k).is_some_and(|is_hole| *is_hole) {
                 continue;
             }
@@ -124,19 +126,19 @@ impl GuidedHoleFill {
                 is_hole[k] = false;
             }
         }
-        claimed.drain(..).flat_map(Line::places).for_each(|k| claims_m[k] = 0.0);
+        claimed.drain(..).flat_map(Line::indices).for_each(|k| claims_m[k] = 0.0);
     }
 
-    /// Finds the pixels of holes below one that is none.
+    /// Finds the pixels of holes below a pixel without a hole.
     fn find_entries(&mut self, holes: &[Run], width: usize) {
         let Self { is_hole, entries, .. } = self;
         for hole in holes.iter().filter(|hole| hole.line > 0) {
-            let here = hole.of_row(width);
+            let here = hole.pixels(width);
             let above = &is_hole[here.start - width..here.end - width];
             let enters = |k: usize| is_hole[here.start + k] & !above[k];
             for block in (0..here.len()).step_by(BLOCK) {
                 let block = block..(block + BLOCK).min(here.len());
-                // Most are inside: `|` instead of an early exit makes vector code of it.
+                // Most are inside: `|` instead of an early exit, so that the test becomes vector code.
                 if block.clone().fold(false, |any, k| any | enters(k)) {
                     entries.extend(block.filter(|&k| enters(k)).map(|k| here.start + k));
                 }
@@ -145,15 +147,15 @@ impl GuidedHoleFill {
     }
 }
 
-/// The longest hole that may be the near side's, in pixels of a picture of so many columns.
+/// Returns the longest hole that may be the near side's, in pixels of a picture with `width` columns.
 pub fn longest(width: usize) -> usize {
-    ((width as f32 * LONGEST) as usize).max(4)
+    ((width as f32 * MAX_SHADOW_FRACTION) as usize).max(4)
 }
 
-/// Pixels that are looked at at once.
+/// Pixels tested at once.
 const BLOCK: usize = 32;
 
-/// Claims for the near side in a hole of a line; returns the part that it claims.
+/// Claims pixels of a hole in a line for the near side; returns the claimed segment.
 fn claim_run(
     line: Line,
     hole: Range<usize>,
@@ -163,6 +165,7 @@ fn claim_run(
     claims_m: &mut [f32],
 ) -> Option<Line> {
     let Range { start, end } = hole;
+    // Holes at the border have only one side; longer ones are not a shadow.
     if start == 0 || end == line.length || end - start > longest {
         return None;
     }
@@ -181,10 +184,10 @@ fn claim_run(
     } else {
         return None;
     };
-    Some(line.part(claimed))
+    Some(line.segment(claimed))
 }
 
-/// Takes pixels in order for the near side while they have its colour rather than the far side's; returns how many.
+/// Claims pixels in order while their colour is closer to the near side's than to the far side's; returns their number.
 fn grow(
     line: Line,
     pixels: impl Iterator<Item = usize>,

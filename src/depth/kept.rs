@@ -1,9 +1,9 @@
-//! One map for every frame: that of a photo.
+//! A constant depth map for every frame, as for a photo.
 
 use super::{DepthError, DepthSource, Seen};
 use crate::frame::DepthMap;
 
-/// The depth of a picture that stands still.
+/// Returns the same depth map for every frame.
 pub struct Kept(pub DepthMap);
 
 impl DepthSource for Kept {

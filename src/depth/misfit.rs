@@ -1,4 +1,4 @@
-//! How a depth map does not fit its picture, and what brings it so close that colours can do the rest.
+//! Misalignment of a depth map with its picture, and the corrections that the colour-guided alignment needs.
 
 use std::fmt;
 
@@ -6,44 +6,44 @@ use super::agreement::Agreement;
 use super::refine::{Mending, Outlines};
 use crate::frame::{ColorImage, DepthMap};
 
-/// Why a depth map does not fit its picture as it is.
+/// Why a depth map does not fit its picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Misfit {
-    /// Its columns and rows, where it has fewer than the picture.
+    /// Columns and rows of the map, if it has fewer columns than the picture.
     pub smaller: Option<(u32, u32)>,
-    /// How its outlines and those of the picture lie.
+    /// How depth edges and picture edges are aligned.
     pub outlines: Agreement,
 }
 
 impl Misfit {
-    /// Of the measured depth `map` and its picture, if there is any.
+    /// Measures the depth `map` against its picture; `None` if it fits.
     pub fn of(map: &DepthMap, color: &ColorImage) -> Option<Self> {
         Self::with(Agreement::of(map, color), map, color)
     }
 
-    /// The same where it is known how the outlines lie.
+    /// Like [`Misfit::of`] with a known alignment of the outlines.
     pub fn with(outlines: Agreement, map: &DepthMap, color: &ColorImage) -> Option<Self> {
         let smaller = (map.width < color.width).then(|| map.size());
         let fits = smaller.is_none() && matches!(outlines, Agreement::Meets | Agreement::Unknown);
         (!fits).then_some(Self { smaller, outlines })
     }
 
-    /// What mends it; `None`: colours do not know where the outlines are.
+    /// Returns the required correction; `None` if the picture has no edges near the depth edges.
     pub fn mending(self, map: &DepthMap, color: &ColorImage) -> Option<Mending> {
         let (mut outlines, mut distance_px) = (self.outlines, 0);
-        if let Agreement::Beside { distance_px: of_picture_px } = outlines {
-            // Colours find the last pixel, and bring nothing back that is too thin.
-            distance_px = of_picture_px - of_picture_px.signum();
+        if let Agreement::Beside { distance_px: picture_px } = outlines {
+            // The last pixel is left to the colours, so that thin structures are not lost.
+            distance_px = picture_px - picture_px.signum();
             let mut moved = map.clone();
             let unknown: Vec<bool> = map.metres.iter().map(|&metres| !DepthMap::is_known(metres)).collect();
-            let of_map_px = distance_px * map.width as i32 / color.width as i32;
+            let map_px = distance_px * map.width as i32 / color.width as i32;
             moved.metres.iter_mut().for_each(|metres| *metres = DepthMap::inverse_of(*metres));
-            Outlines::default().shift(&mut moved.metres, &unknown, map.width as usize, of_map_px, 0.0);
-            // And back: 0 is unknown either way.
+            Outlines::default().shift(&mut moved.metres, &unknown, map.width as usize, map_px, 0.0);
+            // Back to metres: 0 is unknown in both units.
             moved.metres.iter_mut().filter(|value| **value > 0.0).for_each(|value| *value = value.recip());
             outlines = Agreement::of(&moved, color);
         }
-        // At each scale, edges move by some three pixels.
+        // At each scale, edges move by about three pixels.
         let of_size = self.smaller.map_or(1, |(width, _)| color.width.div_ceil(width.max(1)));
         let coarsest = match outlines {
             Agreement::Unrelated => return None,

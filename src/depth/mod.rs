@@ -1,6 +1,6 @@
-//! Where depth comes from, and what is made of it before the blur: a focus distance ([`focus`]), a map without
-//! holes ([`fill`]), and, for depth that was measured, one that agrees with the picture ([`refine`]); whether it does
-//! before that is measured, too ([`agreement`]).
+//! Depth sources, and the processing of depth maps before the blur: the focus distance ([`focus`]), hole filling
+//! ([`fill`]), the refinement of measured depth against the picture ([`refine`]), and a measure of how well depth edges
+//! match image edges ([`agreement`]).
 
 pub mod agreement;
 mod alignment;
@@ -36,90 +36,94 @@ use crate::frame::{ColorImage, DepthMap, GrayImage, Stamp};
 #[cfg(feature = "files")]
 use crate::recording::RecordingError;
 
-/// Gives each frame its depth.
+/// Provides the depth map of each frame.
 ///
-/// Cameras that know the depth of their frames themselves hand it over with the picture and need no source.
+/// Cameras that deliver depth together with the picture need no source.
 pub trait DepthSource: Send {
-    /// Gives a picture the geometry of its depth, in place: called with every frame, before [`DepthSource::read`] where
-    /// that is called at all. Most depth is that of the picture as it is.
+    /// Rectifies a picture in place, to the geometry of its depth map. Called for every frame, before
+    /// [`DepthSource::read`] if that is called at all. The default does nothing, since most depth maps match the
+    /// picture as it is.
     fn rectify(&mut self, color: &mut ColorImage) {
         let _ = color;
     }
 
-    /// The depth of the frame `seen`, into `map` (resized to fit).
+    /// Writes the depth of the frame `seen` into `map`, which is resized to fit.
     ///
     /// # Errors
-    /// There is none, or it cannot be read; `map` is then unspecified.
+    /// No depth is available for this frame, or it cannot be read; `map` is then unspecified.
     fn read(&mut self, seen: Seen, map: &mut DepthMap) -> Result<(), DepthError>;
 
-    /// What a map costs at each of its efforts, relative to the last and finest, which is 1; ascending. A source without
-    /// a choice has one.
+    /// Returns the relative cost of a map at each effort level, ascending; the last and finest level is 1. A source
+    /// without a choice has one level.
     fn efforts(&self) -> &'static [f64] {
         &[1.0]
     }
 
-    /// Changes the effort, as its place in [`DepthSource::efforts`], from the next map on. It begins with the finest.
+    /// Sets the effort level, an index into [`DepthSource::efforts`], from the next map on. The initial level is the
+    /// finest.
     fn set_effort(&mut self, effort: usize) {
         let _ = effort;
     }
 
-    /// Whether later frames may be given its maps, moved with the picture. Not those whose outlines are a mask's: that is one of
-    /// its frame alone, and what moves before all else is who it is of.
+    /// Whether later frames may reuse a map, warped by the picture's motion. False for maps whose outlines come from a
+    /// mask: a mask is valid for its own frame only, and the person it shows is what moves most.
     fn may_be_shared(&self) -> bool {
         true
     }
 
-    /// Whether its maps have all that is behind the nearer surface, so that nothing need be remembered.
+    /// Whether the maps already contain the background behind the nearer surface, which makes a background memory
+    /// unnecessary.
     fn knows_background(&self) -> bool {
         false
     }
 
-    /// Whether the lens is focused on whom it finds, from the next map on; where it is not, nobody need be found.
+    /// Sets whether the lens focuses on persons, from the next map on. If not, the source may skip person detection.
     fn look_for_persons(&mut self, on: bool) {
         let _ = on;
     }
 
-    /// Another scene comes, as somebody went back or forth in the source: its own time is ahead of media time by so many
-    /// nanoseconds from now on.
+    /// Handles a seek in the source: from now on, the source's own time is ahead of media time by `ahead_ns`
+    /// nanoseconds, and the scene may be a different one.
     fn jump(&mut self, ahead_ns: i64) {
         let _ = ahead_ns;
     }
 
-    /// No frame came for a while: lets go of the device, if there is one, until [`DepthSource::read`] is called again.
+    /// Releases the device, if there is one, until the next [`DepthSource::read`]. Called when no frame came for a
+    /// while.
     fn rest(&mut self) {}
 }
 
-/// A frame, as far as its depth may depend on it.
+/// The part of a frame that its depth may depend on.
 #[derive(Clone, Copy, Debug)]
 pub struct Seen<'a> {
-    /// Which frame, and when.
+    /// Index and times of the frame.
     pub stamp: Stamp,
-    /// Its picture; of two eyes the left one's.
+    /// The picture; of a stereo pair, that of the left camera.
     pub color: &'a ColorImage,
-    /// What the right eye saw, where there is one.
+    /// The picture of the right camera, for stereo sources.
     pub right: Option<&'a GrayImage>,
 }
 
 /// Why a frame has no depth.
 #[derive(Debug, thiserror::Error)]
 pub enum DepthError {
-    /// The recording's depth picture cannot be read.
+    /// The depth image of a recording cannot be read.
     #[cfg(feature = "files")]
     #[error(transparent)]
     Recording(#[from] RecordingError),
-    /// A depth camera has given no map yet. Later frames may have one.
+    /// A depth camera has delivered no map yet. Later frames may have one.
     #[error("{source_name}: no depth yet")]
     Unpaired {
         /// The camera.
         source_name: String,
     },
-    /// The two eyes do not match.
+    /// Stereo matching failed.
     #[error(transparent)]
     Match(#[from] stereo::MatchError),
-    /// A frame came without what the right eye saw.
+    /// A stereo frame lacks the picture of the right camera.
     #[error("{source_name}: this frame has no right eye")]
     OneEye {
-        /// Where the frames come from.
+        /// Name of the frame source.
         source_name: String,
     },
     /// A network cannot be loaded.
@@ -129,23 +133,23 @@ pub enum DepthError {
     /// A network failed.
     #[error("{name}: {why}")]
     Network {
-        /// Its file.
+        /// The network's file.
         name: String,
-        /// What failed.
+        /// The reason.
         why: String,
     },
-    /// A plate cannot be used.
+    /// A background plate cannot be used.
     #[error("{name}: {why}")]
     Plate {
-        /// Its file.
+        /// The plate's file.
         name: String,
-        /// Why not.
+        /// The reason.
         why: String,
     },
-    /// There is no depth at all.
+    /// The source has no depth at all.
     #[error("the effect dof needs depth, and {source_name} has none; use --effect blur or tilt-shift")]
     NoDepth {
-        /// Where the frames come from.
+        /// Name of the frame source.
         source_name: String,
     },
 }

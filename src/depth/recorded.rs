@@ -13,10 +13,10 @@ pub struct Recorded {
 }
 
 impl Recorded {
-    /// Depth of `recording`, which `name` stands for in messages.
+    /// Reads the depth of `recording`, which messages call `name`.
     ///
     /// # Errors
-    /// The recording has no depth.
+    /// Fails if the recording has no depth.
     pub fn new(recording: Arc<Recording>, name: &str) -> Result<Self, DepthError> {
         if recording.has_depth() {
             Ok(Self { recording, scratch: Scratch::default() })

@@ -1,22 +1,22 @@
-//! A picture in few pixels, as the square root of its light: exposure and white balance are factors there, and noise is
-//! nearly the same everywhere.
+//! Downsampled pictures in the square root of linear light: exposure and white balance are factors there, and noise is
+//! nearly uniform.
 
 use pulp::{Arch, WithSimd};
 
 use crate::color::light_of_codes;
 use crate::frame::ColorImage;
 
-/// About so many columns a reduced picture has.
+/// Approximate number of columns of a reduced picture.
 const COLUMNS: u32 = 320;
-/// Values go from 0 to this.
+/// Largest value; values start at 0.
 pub const MOST: f32 = 255.0;
 
 /// Reduces pictures.
 #[derive(Debug)]
 pub struct Reducer {
-    /// Per code; one more, so that there is always a next.
+    /// Square roots by code; one entry more, so that interpolation always has a next one.
     roots: Box<[f32; 257]>,
-    /// Sums of the codes of a row of blocks.
+    /// Sums of the codes in a row of blocks, per column.
     sums: Vec<u32>,
 }
 
@@ -28,19 +28,19 @@ impl Default for Reducer {
     }
 }
 
-/// The side of a block of a picture so wide, in pixels: one pixel of the reduced picture.
+/// Returns the side in pixels of a block, which becomes one pixel, for pictures of this width.
 pub fn block_px(width: u32) -> usize {
     ((width + COLUMNS / 2) / COLUMNS).max(1) as usize
 }
 
-/// Columns and rows of a reduced picture.
+/// Returns columns and rows of a reduced picture.
 pub fn reduced_size(color: &ColorImage) -> (usize, usize) {
     let block_px = block_px(color.width);
     ((color.width as usize).div_ceil(block_px), (color.height as usize).div_ceil(block_px))
 }
 
 impl Reducer {
-    /// The square root of the light of a value in codes, 0 to 255.
+    /// Returns the square root of the linear light of a code, 0 to 255, scaled to [`MOST`].
     #[inline(always)]
     pub fn root(&self, code: f32) -> f32 {
         let first = code as u8;
@@ -48,7 +48,7 @@ impl Reducer {
         a + (b - a) * (code - f32::from(first))
     }
 
-    /// The code of a value whose light's root is this.
+    /// Inverts [`Reducer::root`].
     #[inline(always)]
     fn code(&self, root: f32) -> f32 {
         let next = self.roots[1..256].partition_point(|&other| other <= root) + 1;
@@ -56,22 +56,22 @@ impl Reducer {
         if b > a { (next - 1) as f32 + ((root - a) / (b - a)).min(1.0) } else { 255.0 }
     }
 
-    /// What a code was before it was multiplied by a gain.
+    /// Returns the code before multiplication of its root by `gain`.
     #[inline(always)]
     pub fn without_gain(&self, code: u8, gain: f32) -> u8 {
         (self.code((self.root(f32::from(code)) / gain).min(MOST)) + 0.5) as u8
     }
 
-    /// The light of each code, by channel, once values are multiplied by a gain per channel.
+    /// Computes the linear light of each code, by channel, after multiplication of the root by a gain per channel.
     pub fn expose(&self, gain: [f32; 3], light: &mut [[f32; 256]; 3]) {
         for (light, gain) in light.iter_mut().zip(gain) {
-            // Values are roots of light.
+            // The gain applies to roots of light.
             let exposed = |code: usize| (gain * self.root(code as f32) / MOST).powi(2).min(1.0);
             light.iter_mut().enumerate().for_each(|(code, light)| *light = exposed(code));
         }
     }
 
-    /// The means of the blocks of a picture.
+    /// Computes the block means of a picture.
     pub fn reduce(&mut self, color: &ColorImage, reduced: &mut Vec<[f32; 3]>) {
         Arch::new().dispatch(Reduce { reducer: self, color, reduced });
     }
@@ -88,6 +88,7 @@ impl Reducer {
         let lines = row * block_px..((row + 1) * block_px).min(height);
         self.sums.clear();
         self.sums.resize(3 * width, 0);
+        // Sums the rows of the blocks first, which is vector code.
         for y in lines.clone() {
             for (sum, &code) in self.sums.iter_mut().zip(&color.rgb[3 * y * width..]) {
                 *sum += u32::from(code);

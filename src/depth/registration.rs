@@ -1,7 +1,7 @@
-//! Depth as another camera saw it, moved into the view of the colour camera.
+//! Registration: reprojects a depth map into the view of the colour camera.
 //!
-//! Every depth pixel is a small square that faces its camera. It is put where the colour camera sees it, as large as
-//! it looks from there, and the nearest one wins. What only the colour camera sees stays unknown.
+//! Every depth pixel is a small square that faces its camera. It is drawn where the colour camera sees it, in the size
+//! that it has there, with a z-buffer. Pixels that only the colour camera sees stay unknown.
 
 mod draw;
 
@@ -14,9 +14,9 @@ use crate::frame::DepthMap;
 /// A pinhole camera without distortion. Pixel centres have whole coordinates.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pinhole {
-    /// Columns of the pictures that it was measured with.
+    /// Columns of the calibration pictures.
     pub width: u32,
-    /// Rows of those.
+    /// Rows of the calibration pictures.
     pub height: u32,
     /// Focal length across, in pixels.
     pub fx: f32,
@@ -28,34 +28,34 @@ pub struct Pinhole {
     pub cy: f32,
 }
 
-/// Two cameras that look the same way, and how they stand to each other.
+/// Intrinsics of two cameras that look the same way, and the pose between them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Calibration {
-    /// Sees the depth.
+    /// The depth camera.
     pub depth: Pinhole,
-    /// Sees the colours.
+    /// The colour camera.
     pub color: Pinhole,
-    /// From directions of the depth camera to those of the colour camera.
+    /// Rotation from the depth camera's axes to the colour camera's.
     pub rotation: Mat3,
-    /// Where the depth camera is, seen from the colour camera, in metres.
+    /// Position of the depth camera in the colour camera's axes, in metres.
     pub translation_m: Vec3,
 }
 
-/// What no calibration can be.
+/// Error of an invalid calibration.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum CalibrationError {
-    /// Of the depth camera.
+    /// A parameter of the depth camera is out of range.
     #[error("the depth camera's {0}")]
     Depth(&'static str),
-    /// Of the colour camera.
+    /// A parameter of the colour camera is out of range.
     #[error("the colour camera's {0}")]
     Color(&'static str),
-    /// Of the pose between them.
+    /// The pose between the cameras is invalid.
     #[error("{0}")]
     Pose(&'static str),
 }
 
-/// How far a matrix may be from a rotation: calibrations are written with few digits.
+/// Largest deviation of a matrix from a rotation: calibrations are written with few digits.
 const ROTATION_TOLERANCE: f32 = 1e-2;
 
 impl Pinhole {
@@ -74,7 +74,7 @@ impl Pinhole {
         Ok(())
     }
 
-    /// The same camera with pictures of another size.
+    /// Returns the camera for pictures of another size.
     fn resized(&self, width: u32, height: u32) -> Self {
         let (across, down) = (width as f32 / self.width as f32, height as f32 / self.height as f32);
         Self {
@@ -89,21 +89,21 @@ impl Pinhole {
 }
 
 impl Calibration {
-    /// Two cameras in one.
+    /// Returns a calibration with both cameras in one place.
     pub fn identity(camera: Pinhole) -> Self {
         Self { depth: camera, color: camera, rotation: Mat3::IDENTITY, translation_m: Vec3::ZERO }
     }
 
-    /// Whether it can be.
+    /// Checks the ranges of the numbers.
     ///
     /// # Errors
-    /// A number is out of its range, or the rotation is none.
+    /// Fails if a number is out of range, or the rotation matrix is not a rotation.
     pub fn check(&self) -> Result<(), CalibrationError> {
         self.depth.check().map_err(CalibrationError::Depth)?;
         self.color.check().map_err(CalibrationError::Color)?;
         let unit = self.rotation * self.rotation.transpose() - Mat3::IDENTITY;
         let off = unit.to_cols_array().into_iter().fold(0.0, |most: f32, off| most.max(off.abs()));
-        // NaN is no rotation either.
+        // The negated comparison also rejects NaN.
         if !(off <= ROTATION_TOLERANCE && self.rotation.determinant() > 0.0) {
             return Err(CalibrationError::Pose(
                 "rotation must be a rotation matrix, row by row: rows of length 1 at right angles, determinant 1",
@@ -116,26 +116,26 @@ impl Calibration {
     }
 }
 
-/// Moves depth maps of one size into the colour camera's view. Owns the memory for it.
+/// Reprojects depth maps of one size into the colour camera's view. Owns its buffers.
 #[derive(Debug)]
 pub struct Registration {
     calibration: Calibration,
-    /// Size of the depth maps that the tables are for.
+    /// Size of the depth maps that the tables are valid for.
     size: (u32, u32),
     depth: Pinhole,
     out: Pinhole,
-    /// How far to the right each column looks, a metre ahead, in metres.
+    /// `x / z` of the ray of each column in the depth camera's axes.
     columns: Vec<f32>,
-    /// Where the middle of each row looks, seen by the colour camera.
+    /// The ray of the middle of each row with `z` = 1, in the colour camera's axes.
     rows: Vec<Vec3>,
     arch: Arch,
 }
 
 impl Registration {
-    /// For maps of any size that show all that the depth camera saw when it was calibrated.
+    /// Creates a registration for maps of any size with the field of view of the calibrated depth camera.
     ///
     /// # Errors
-    /// The calibration cannot be.
+    /// Fails if the calibration is invalid.
     pub fn new(calibration: Calibration) -> Result<Self, CalibrationError> {
         calibration.check()?;
         let Calibration { depth, color: out, .. } = calibration;
@@ -143,22 +143,22 @@ impl Registration {
         Ok(Self { calibration, size: (0, 0), depth, out, columns, rows, arch })
     }
 
-    /// Moves `from` into `into`, which covers what the colour camera sees, as finely as `from` does and no finer than
-    /// the colour camera. After the first map of a size nothing is allocated.
+    /// Reprojects `from` into `into`, which covers the colour camera's view in the resolution of `from`, but at most
+    /// that of the colour camera. After the first map of a size nothing is allocated.
     pub fn register(&mut self, from: &DepthMap, into: &mut DepthMap) {
         if from.size() != self.size {
-            self.fit(from.size());
+            self.update_tables(from.size());
         }
         into.resize(self.out.width, self.out.height);
         self.arch.dispatch(Draw { registration: self, from: &from.metres, into: &mut into.metres });
     }
 
-    /// Prepares for maps of another size.
-    fn fit(&mut self, size: (u32, u32)) {
+    /// Computes the tables for maps of another size.
+    fn update_tables(&mut self, size: (u32, u32)) {
         let Calibration { depth, color, rotation, .. } = self.calibration;
         self.size = size;
         self.depth = depth.resized(size.0, size.1);
-        // As many pixels a degree as depth has, where colour has more.
+        // Limits the resolution to that of the depth, in pixels per degree.
         let finer = (self.depth.fx / color.fx).max(self.depth.fy / color.fy).min(1.0);
         let side = |px: u32| ((px as f32 * finer).round() as u32).max(1);
         self.out = color.resized(side(color.width), side(color.height));
@@ -196,7 +196,7 @@ mod tests {
         for (into, from) in into.metres.iter().zip(&from.metres) {
             assert!((into - from).abs() <= 1e-6 * from, "{into} {from}");
         }
-        // The same with pictures of another size.
+        // Also with pictures of another size.
         let half = map(40, 30, |x, _| 1.0 + x);
         assert_eq!(registered(Calibration::identity(CAMERA), &half), half);
     }
@@ -220,13 +220,13 @@ mod tests {
         let (mut known, mut inner) = (0, 0);
         for (k, &z_m) in into.metres.iter().enumerate() {
             let (x, y) = (k as u32 % into.width, k as u32 / into.width);
-            // What both see.
+            // The part that both cameras see.
             let inside = (50..into.width - 50).contains(&x) && (35..into.height - 35).contains(&y);
             inner += u32::from(inside);
             if z_m > 0.0 {
                 let ray = Vec3::new((x as f32 - out.cx) / out.fx, (y as f32 - out.cy) / out.fy, 1.0);
                 let exact_m = point.dot(normal) / ray.dot(normal);
-                // Its slope within a pixel.
+                // Tolerance: the slope of the plane within a pixel.
                 assert!((z_m - exact_m).abs() < 0.006, "{z_m} {exact_m} at {x}, {y}");
                 known += u32::from(inside);
             }

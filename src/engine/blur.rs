@@ -1,4 +1,4 @@
-//! The second half: an executor, and how finely it is to blur the next frame.
+//! The second half of the engine: an executor, and the quality level at which it blurs the next frame.
 
 use std::mem;
 
@@ -11,32 +11,32 @@ use crate::link::pool::Pooled;
 use crate::look::{Look, QualityRule};
 use crate::optics::CocField;
 
-/// How much time there is.
+/// The time that a frame may take.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Time<'a> {
-    /// For the blur of a frame, in nanoseconds.
+    /// Time for the blur of one frame, in nanoseconds.
     pub budget_ns: u64,
-    /// From frame to frame, where they come in real time: then there is a deadline, too.
+    /// Frame period in nanoseconds if frames come in real time; then there is a deadline as well.
     pub period_ns: Option<u64>,
-    /// What depth costs at each effort ([`DepthSource::efforts`](crate::depth::DepthSource::efforts)).
+    /// Relative cost of depth at each effort ([`DepthSource::efforts`](crate::depth::DepthSource::efforts)).
     pub efforts: &'a [f64],
-    /// Whether frames may share depth.
+    /// Whether several frames may share one depth map.
     pub shares_depth: bool,
 }
 
 impl Time<'static> {
-    /// All that it takes.
-    pub const ENOUGH: Self = Self { budget_ns: u64::MAX, period_ns: None, efforts: &[1.0], shares_depth: false };
+    /// No limit.
+    pub const UNLIMITED: Self = Self { budget_ns: u64::MAX, period_ns: None, efforts: &[1.0], shares_depth: false };
 }
 
-/// A frame in memory: a picture, its depth, and what becomes of it.
+/// The images of one frame: the picture, its depth, and the blurred result.
 #[derive(Clone, Debug, Default)]
 pub struct Images {
     /// The picture.
     pub color: ColorImage,
-    /// Its depth, where it has some.
+    /// Its depth, if any.
     pub depth: Option<DepthMap>,
-    /// The picture, blurred.
+    /// The blurred picture.
     pub blurred: ColorImage,
 }
 
@@ -44,34 +44,34 @@ pub struct Images {
 pub struct Blur {
     /// `None` passes frames through.
     executor: Option<Box<dyn Bokeh>>,
-    /// The settings that it was made for, where it was [made](Blur::follow) for a look.
+    /// The settings that the executor was created for, if [`Blur::follow`] created it for a look.
     made_for: Option<Settings>,
-    /// What the executor has run on, when that was looked at last.
+    /// The backends of the executor at the last check; compared by [`Blur::has_moved`].
     backends: Option<&'static str>,
     rule: QualityRule,
-    /// Picks the quality of the next frame, by the time that those before took.
+    /// Picks the quality of the next frame from the times of earlier ones.
     pub(crate) picker: Picker,
 }
 
 impl Default for Blur {
     fn default() -> Self {
-        Self::new(None, QualityRule::Fixed(Quality::default()), Time::ENOUGH)
+        Self::new(None, QualityRule::Fixed(Quality::default()), Time::UNLIMITED)
     }
 }
 
 impl Blur {
-    /// By an executor that was made for the qualities of this rule.
+    /// Creates a blur with an executor that supports all qualities of `rule`.
     pub(crate) fn new(executor: Option<Box<dyn Bokeh>>, rule: QualityRule, time: Time) -> Self {
         let picker = Picker::new((rule, finest_quality(executor.as_deref())), time);
         let backends = executor.as_deref().map(Bokeh::backends);
         Self { executor, made_for: None, backends, rule, picker }
     }
 
-    /// Blurs pictures of `size` pixels as a look says from now on; the quality may follow the time there is where this is
-    /// `adaptive`. `make` makes an executor, where the one before cannot do it.
+    /// Blurs pictures of `size` pixels in this look from the next frame on; with `adaptive`, the quality follows the
+    /// available time. Calls `make` for a new executor if the current one does not fit the look's settings.
     ///
     /// # Errors
-    /// That of `make`: the one before goes on.
+    /// Returns the error of `make`; the current executor stays in use.
     pub fn follow<E>(
         &mut self,
         look: &Look,
@@ -87,23 +87,24 @@ impl Blur {
         Ok(())
     }
 
-    /// By another executor from now on, which has nothing in hand; nor has the one before.
+    /// Replaces the executor. Neither the old nor the new one may have frames in flight.
     pub(crate) fn replace(&mut self, executor: Option<Box<dyn Bokeh>>, rule: QualityRule) {
         (self.backends, self.rule) = (executor.as_deref().map(Bokeh::backends), rule);
         self.picker = self.picker.with(rule, finest_quality(executor.as_deref()));
         self.executor = executor;
     }
 
-    /// What blurs, for the report: on what it runs ([`Bokeh::backends`]), and one line more ([`Bokeh::describe`]).
-    pub(crate) fn about(&self) -> [String; 2] {
+    /// Describes the executor for the report: its backends ([`Bokeh::backends`]) and one more line
+    /// ([`Bokeh::describe`]).
+    pub(crate) fn describe_executor(&self) -> [String; 2] {
         self.executor.as_ref().map_or_else(
             || ["none".to_owned(), "none".to_owned()],
             |executor| [executor.backends().to_owned(), executor.describe()],
         )
     }
 
-    /// Whether the executor has moved to another backend (GPU to processor) since this was asked last: finest quality and times
-    /// are others there.
+    /// Returns whether the executor has moved to another backend (GPU to CPU) since the last call. The finest quality
+    /// and the times differ there, so the picker starts anew.
     pub(crate) fn has_moved(&mut self) -> bool {
         let backends = self.executor.as_deref().map(Bokeh::backends);
         let has_moved = mem::replace(&mut self.backends, backends) != backends;
@@ -113,17 +114,17 @@ impl Blur {
         has_moved
     }
 
-    /// What blurs; `None` passes frames through.
+    /// Returns the executor; `None` passes frames through.
     pub fn executor(&self) -> Option<&dyn Bokeh> {
         self.executor.as_deref()
     }
 
-    /// The quality of the next frame; `None` where nothing is blurred.
+    /// Returns the quality of the next frame; `None` if nothing is blurred.
     pub fn quality(&self) -> Option<Quality> {
         self.executor.as_ref().map(|_| self.picker.quality())
     }
 
-    /// Frames that may be in hand at once, one at least.
+    /// Returns how many frames may be in flight at once, at least one.
     pub(crate) fn capacity(&self) -> usize {
         self.executor.as_ref().map_or(1, |executor| executor.capacity().max(1))
     }
@@ -138,10 +139,10 @@ impl Blur {
         self.executor.as_mut().map_or(Ok(None), |executor| executor.collect(wait))
     }
 
-    /// Blurs a frame on the caller's thread, with nothing else in hand.
+    /// Blurs a frame on the caller's thread; no other frame may be in flight.
     ///
     /// # Errors
-    /// The executor failed: the images are lost.
+    /// Fails if the executor failed; the images are lost then.
     pub fn blur(&mut self, images: &mut Images, coc: CocField) -> Result<(), BokehError> {
         if self.executor.is_none() {
             images.blurred.clone_from(&images.color);
@@ -160,9 +161,9 @@ impl Blur {
     }
 }
 
-/// The finest level that an executor is given as the time allows.
+/// Returns the finest quality that an adaptive blur uses on this executor.
 fn finest_quality(executor: Option<&dyn Bokeh>) -> Quality {
-    // On the processor a finer level takes twice the time for half a decibel, and other programs need it, too.
+    // On the CPU a finer level takes twice the time for half a decibel, and other programs need the CPU as well.
     match executor.map(Bokeh::backend) {
         Some(Backend::Cpu) => Quality::Balanced,
         _ => Quality::Best,

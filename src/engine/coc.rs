@@ -1,4 +1,4 @@
-//! From a frame's depth to its circle of confusion (CoC): the one step that every blur by depth goes through.
+//! Computes a frame's circle of confusion (CoC) from its depth: the one step that every blur by depth goes through.
 
 use std::sync::Arc;
 
@@ -14,34 +14,34 @@ use crate::link::pool::Pooled;
 use crate::look::CocRule;
 use crate::optics::CocField;
 
-/// What is done to a depth map before it is used.
+/// How a depth map is postprocessed before it is used.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Finish {
-    /// Nothing: it was finished before.
+    /// Not at all: it is complete already.
     Keep,
-    /// Holes are filled.
+    /// Fills holes.
     Fill,
-    /// It is fitted to the picture and steadied, and holes are filled.
+    /// Aligns it to the picture's edges, smooths it over time, and fills holes.
     Refine,
 }
 
 impl Finish {
-    /// Of depth as it was measured.
+    /// Returns the postprocessing of measured depth.
     pub fn measured(refine: bool) -> Self {
         if refine { Self::Refine } else { Self::Fill }
     }
 }
 
-/// A [`CocRule`] at work, from frame to frame.
+/// Applies a [`CocRule`] frame by frame.
 pub struct CocMaker {
     rule: CocRule,
     focus: Focus,
     finisher: Finisher,
     mending: Mending,
-    /// Where depth is refined and mattes are found, if not on the processor.
+    /// The GPU that refines depth and estimates mattes; `None` is the CPU.
     device: Option<Arc<Device>>,
     matting: Matting,
-    /// Whether a matte was looked for since it is known where: a device is not tried for nothing.
+    /// Whether a matte was estimated since the device was set: the device is only tried once a matte is needed.
     has_matted: bool,
     background: Option<Background>,
     workers: ThreadPool,
@@ -71,7 +71,7 @@ impl Finisher {
     }
 }
 
-fn focus_of(rule: CocRule) -> FocusRule {
+fn focus_rule(rule: CocRule) -> FocusRule {
     match rule {
         CocRule::Fixed(_) => FocusRule::Auto,
         CocRule::Depth { focus, .. } => focus,
@@ -79,9 +79,9 @@ fn focus_of(rule: CocRule) -> FocusRule {
 }
 
 impl CocMaker {
-    /// Nothing was seen yet. It works on the caller's thread.
+    /// Creates a maker without history, which works on the caller's thread.
     pub fn new(rule: CocRule, finish: Finish) -> Self {
-        let (focus, mending) = (Focus::new(focus_of(rule)), Mending::default());
+        let (focus, mending) = (Focus::new(focus_rule(rule)), Mending::default());
         let (finisher, matting) = (Finisher::new(finish, mending, None), Matting::default());
         Self {
             rule,
@@ -96,29 +96,29 @@ impl CocMaker {
         }
     }
 
-    /// Whether the lens is focused on a subject that is found.
+    /// Returns whether the focus follows a subject that is detected.
     pub fn focuses_on_subject(&self) -> bool {
         matches!(self.rule, CocRule::Depth { focus: FocusRule::Auto, .. })
     }
 
-    /// The same on so many threads, the caller's included: what is made is the same to the bit.
+    /// Uses `threads` threads, the caller's included; the results are bit-identical.
     pub fn on_threads(self, threads: usize) -> Self {
         Self { workers: ThreadPool::new("depth", threads), ..self }
     }
 
-    /// Refines and finds mattes on a device from now on; nothing changes where that is `None`, or the one that does so already.
+    /// Refines depth and estimates mattes on `device` from now on. No effect if it is `None` or already in use.
     pub fn compute_on(&mut self, device: Option<Arc<Device>>) {
         let is_other = |device: &Arc<Device>| !self.device.as_ref().is_some_and(|own| Arc::ptr_eq(own, device));
         if let Some(device) = device.filter(is_other) {
             self.device = Some(device);
             self.has_matted = false;
             if matches!(self.finisher, Finisher::Refine(_)) {
-                self.renew(Finish::Refine);
+                self.reset_finisher(Finish::Refine);
             }
         }
     }
 
-    /// What refined, for the report; `None` where nothing is refined.
+    /// Returns what refines depth, for the report; `None` if nothing is refined.
     pub fn refined_by(&self) -> Option<&'static str> {
         match (&self.finisher, self.rule) {
             (Finisher::Refine(refiner), CocRule::Depth { .. }) => Some(refiner.backends()),
@@ -126,7 +126,7 @@ impl CocMaker {
         }
     }
 
-    /// A copy of the last map that it made, with its picture, where a device has both: once for each.
+    /// Takes the device's copy of the last map and its picture; `None` if missing, or taken already.
     pub fn take_copy(&mut self) -> Option<Pooled<DeviceFrame>> {
         match &mut self.finisher {
             Finisher::Refine(refiner) => refiner.take_copy(),
@@ -134,45 +134,45 @@ impl CocMaker {
         }
     }
 
-    /// What found mattes, for the report; `None` where none was looked for.
+    /// Returns what estimates mattes, for the report; `None` if none was needed so far.
     pub fn matted_by(&self) -> Option<&'static str> {
         self.has_matted.then(|| self.matting.backends())
     }
 
-    /// Finishes maps with no memory of those before.
-    fn renew(&mut self, finish: Finish) {
+    /// Replaces the finisher by one without history.
+    fn reset_finisher(&mut self, finish: Finish) {
         let uses_depth = matches!(self.rule, CocRule::Depth { .. });
-        // What the finisher of before left on the device is not of the next map.
+        // The old finisher's buffers on the device do not belong to the next map.
         self.matting.take_from(None);
         self.finisher = Finisher::new(finish, self.mending, self.device.as_ref().filter(|_| uses_depth));
     }
 
-    /// Mends every map from now on, where it is refined; whether it is.
-    pub fn mend(&mut self, mending: Mending) -> bool {
+    /// Sets the correction of misaligned depth edges; returns whether maps are refined, so that it takes effect.
+    pub fn set_mending(&mut self, mending: Mending) -> bool {
         let refines = matches!(self.finisher, Finisher::Refine(_));
         if std::mem::replace(&mut self.mending, mending) != mending && refines {
-            self.renew(Finish::Refine);
+            self.reset_finisher(Finish::Refine);
         }
         refines
     }
 
-    /// Finishes maps so from now on.
-    pub fn finish_by(&mut self, finish: Finish) {
+    /// Sets how maps are postprocessed.
+    pub fn set_finish(&mut self, finish: Finish) {
         if self.finisher.finish() != finish {
-            self.renew(finish);
+            self.reset_finisher(finish);
         }
     }
 
-    /// Remembers from now on, or no more, what lies behind things.
+    /// Enables or disables the background memory (disocclusion filling from earlier frames).
     pub fn remember(&mut self, remembers: bool) {
         if self.background.is_some() != remembers {
             self.background = remembers.then(Background::default);
         }
     }
 
-    /// Another scene comes: nothing is left of those before.
+    /// Drops all history, because another scene comes.
     pub fn forget(&mut self) {
-        self.focus = Focus::new(focus_of(self.rule));
+        self.focus = Focus::new(focus_rule(self.rule));
         match &mut self.finisher {
             Finisher::Keep => {}
             Finisher::Fill(filler) => **filler = Filler::new(),
@@ -181,21 +181,21 @@ impl CocMaker {
         self.background = self.background.take().map(|_| Background::default());
     }
 
-    /// Follows another rule, from where the lens stands now.
+    /// Follows another rule; the focus moves on from its present distance.
     pub fn follow(&mut self, rule: CocRule, finish: Finish) {
         match (std::mem::replace(&mut self.rule, rule), rule) {
             (CocRule::Depth { .. }, CocRule::Depth { focus, .. }) => {
                 self.focus.follow(focus);
-                self.finish_by(finish);
+                self.set_finish(finish);
             }
             _ => {
-                self.focus = Focus::new(focus_of(rule));
-                self.renew(finish);
+                self.focus = Focus::new(focus_rule(rule));
+                self.reset_finisher(finish);
             }
         }
     }
 
-    /// The CoC of every frame, where that needs no depth.
+    /// Returns the CoC of every frame if the rule needs no depth.
     pub fn fixed(&self) -> Option<CocField> {
         match self.rule {
             CocRule::Fixed(field) => Some(field),
@@ -203,13 +203,13 @@ impl CocMaker {
         }
     }
 
-    /// The CoC of the frame that was taken at `time_ns`. Focuses on what `map` has as it was measured, and only then makes
-    /// up what it has not.
+    /// Computes the CoC of the frame at `time_ns` and finishes `map`. The focus is measured on the raw map, before
+    /// holes are filled.
     pub fn make(&mut self, map: &mut DepthMap, color: &ColorImage, time_ns: u64) -> CocField {
         self.make_noting(map, color, time_ns, |_| ())
     }
 
-    /// The same, which calls `done` after each part, by its name: for benches.
+    /// Does the same as [`CocMaker::make`], and calls `done` with the name of each finished step: for benchmarks.
     #[doc(hidden)]
     pub fn make_noting(
         &mut self,
@@ -225,7 +225,7 @@ impl CocMaker {
         let focus_m = self.focus.focus_m(map, time_ns);
         let field = lens.field((focus_m, range_m), color.width, max_coc_px);
         done("focus");
-        // A map that was made around a subject is finished.
+        // A map made around a subject (`subject_m`) is complete already.
         if map.subject_m.is_none() {
             match &mut self.finisher {
                 Finisher::Keep => {}
@@ -242,13 +242,15 @@ impl CocMaker {
             self.find_matte(map, color, &field);
             done("matte");
         }
+        // Only now, with the matte known, does the background memory learn from this frame and fill what the subject
+        // hides.
         self.reveal(map, color, &field, Some(time_ns));
         done("memory");
         field
     }
 
-    /// Gives a picture the map of one before it, which several share. Where it was not made around a subject, and has
-    /// brought its matte, it needs one of its own.
+    /// Adapts a depth map of an earlier frame to the picture `color`. A map with a subject brings its own matte; for
+    /// any other the matte is estimated from this picture.
     pub fn share(&mut self, map: &mut DepthMap, color: &ColorImage, field: &CocField) {
         if map.subject_m.is_some() {
             return;
@@ -264,15 +266,15 @@ impl CocMaker {
                 self.matting = std::mem::take(&mut self.matting).on(self.device.as_ref());
             }
             let Self { matting, workers, .. } = self;
-            let jump = lens.inverse_depth_of_px(matting::FROM_PX);
+            let depth_step = lens.inverse_depth_of_px(matting::FROM_PX);
             match &self.background {
                 Some(background) => background.find_matte(matting, workers, (map, color), lens),
-                None => matting.find_before(workers, (map, color), jump, None),
+                None => matting.find_before(workers, (map, color), depth_step, None),
             }
         }
     }
 
-    /// Looks at what stands before what is remembered, before that is used.
+    /// Notes which part of the remembered background is covered in this frame, before the memory is used.
     fn cover(&mut self, map: &DepthMap, color: &ColorImage, field: &CocField) {
         let Self { background, workers, .. } = self;
         if let (CocField::Depth(lens), Some(background), false) = (field, background, map.is_smooth) {
@@ -280,7 +282,8 @@ impl CocMaker {
         }
     }
 
-    /// Gives a map what is remembered to lie behind, having learned from it first where it is that of a picture `taken_ns`.
+    /// Fills the hidden background of a map from memory. If `taken_ns` is given, the memory first learns from this
+    /// frame.
     fn reveal(&mut self, map: &mut DepthMap, color: &ColorImage, field: &CocField, taken_ns: Option<u64>) {
         let Self { background, workers, .. } = self;
         if let (CocField::Depth(lens), Some(background), false) = (field, background, map.is_smooth) {

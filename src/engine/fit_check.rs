@@ -1,56 +1,56 @@
-//! Whether the depth of a stream fits its pictures, told from some of the first frames.
+//! Checks, in some of the first frames, whether the depth of a stream is aligned with its pictures.
 
 use crate::depth::agreement::Agreement;
 use crate::depth::misfit::Misfit;
 use crate::depth::refine::Mending;
 use crate::frame::{ColorImage, DepthMap};
 
-/// One of so many frames is looked at, as neighbours are alike.
-const EVERY: u32 = 5;
-/// So many frames of a stream that agree decide.
-const DECISION: usize = 3;
-/// After so many frames without a decision there will be none.
-const LAST: u32 = 300;
+/// Every fifth frame is checked, as neighbouring frames are alike.
+const FRAME_STEP: u32 = 5;
+/// This many frames of a stream must agree on a verdict.
+const REQUIRED_FRAMES: usize = 3;
+/// The check gives up after this many frames.
+const MAX_FRAMES: u32 = 300;
 
-/// What is found.
+/// A misalignment that was found.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Verdict {
-    /// Depth and colours are not registered.
+    /// Depth and colour are not registered.
     Unrelated,
-    /// This mends it.
+    /// The edges are misaligned; this correction aligns them.
     Mend(Misfit, Mending),
 }
 
-/// Decides once.
+/// Checks frames until it reaches a verdict or gives up.
 #[derive(Debug)]
 pub struct FitCheck {
-    /// So many frames that agree decide.
-    decision: usize,
+    /// Number of agreeing frames that make a verdict.
+    required: usize,
     frames: u32,
     unrelated: usize,
     mendings: Vec<(Misfit, Mending)>,
-    meets: bool,
+    is_aligned: bool,
 }
 
 impl FitCheck {
-    /// For a stream of so many frames, where that is known: a picture on its own decides alone.
-    pub fn of(frames: Option<u64>) -> Self {
-        let decision = if frames == Some(1) { 1 } else { DECISION };
-        Self { decision, frames: 0, unrelated: 0, mendings: Vec::new(), meets: false }
+    /// Creates the check for a stream of `frames` frames, if known: a single picture decides alone.
+    pub fn new(frames: Option<u64>) -> Self {
+        let required = if frames == Some(1) { 1 } else { REQUIRED_FRAMES };
+        Self { required, frames: 0, unrelated: 0, mendings: Vec::new(), is_aligned: false }
     }
 
-    /// Whether a frame was seen whose outlines of depth and colour meet.
-    pub fn meets(&self) -> bool {
-        self.meets
+    /// Returns whether a frame was seen whose depth edges and picture edges coincide.
+    pub fn is_aligned(&self) -> bool {
+        self.is_aligned
     }
 
-    /// Takes the next frame, with its depth as it was measured; says so, once, when it is clear that it does not fit.
-    pub fn look(&mut self, map: &DepthMap, color: &ColorImage) -> Option<Verdict> {
-        if self.frames >= LAST {
+    /// Checks the next frame with its raw depth; returns a verdict at most once.
+    pub fn check(&mut self, map: &DepthMap, color: &ColorImage) -> Option<Verdict> {
+        if self.frames >= MAX_FRAMES {
             return None;
         }
         self.frames += 1;
-        if self.frames % EVERY != 1 {
+        if self.frames % FRAME_STEP != 1 {
             return None;
         }
         let outlines = Agreement::of(map, color);
@@ -58,13 +58,13 @@ impl FitCheck {
         match misfit.and_then(|misfit| Some((misfit, misfit.mending(map, color)?))) {
             Some(mending) => self.mendings.push(mending),
             None if misfit.is_some() => self.unrelated += 1,
-            None if outlines == Agreement::Meets => (self.frames, self.meets) = (LAST, true),
+            None if outlines == Agreement::Meets => (self.frames, self.is_aligned) = (MAX_FRAMES, true),
             None => {}
         }
         let verdict = match () {
-            () if self.unrelated == self.decision => Some(Verdict::Unrelated),
-            // The one that does the least.
-            () if self.mendings.len() == self.decision => self
+            () if self.unrelated == self.required => Some(Verdict::Unrelated),
+            // The smallest correction.
+            () if self.mendings.len() == self.required => self
                 .mendings
                 .iter()
                 .min_by_key(|(_, mending)| (mending.distance_px.abs(), mending.coarsest))
@@ -72,7 +72,7 @@ impl FitCheck {
             () => None,
         };
         if verdict.is_some() {
-            self.frames = LAST;
+            self.frames = MAX_FRAMES;
         }
         verdict
     }

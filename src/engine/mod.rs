@@ -1,10 +1,11 @@
-//! Colour and depth in, blurred picture out: all that is done to a frame, whoever asks for it.
+//! The engine: colour and depth in, blurred picture out, for every caller.
 //!
-//! A `Preparation` makes a frame ready: what its depth lacks is filled in or refined, the lens is focused, mixed pixels get
-//! their matte, and the subject is staged. A [`Blur`] blurs it, as finely as there is time for. In a run each of both has a thread
-//! of its own; a [`Stepper`] has both on its caller's, for frame after frame, and [`still`] for a picture on its own.
+//! A `Preparation` preprocesses a frame: it fills or refines depth, focuses the lens, estimates the matte, and
+//! applies virtual background and auto-framing. A [`Blur`] blurs it, as finely as time allows. In a run each of them
+//! has its own thread; a [`Stepper`] runs both on the caller's thread, frame by frame, and [`still`] does so for a
+//! single picture.
 
-// What the threads of a run alone ask of it.
+// Some items are only used by the threads of a run.
 #![cfg_attr(not(feature = "files"), allow(dead_code, unused_imports))]
 
 mod blur;
@@ -20,21 +21,21 @@ pub(crate) use blur::Time;
 pub use blur::{Blur, Images};
 pub use coc::{CocMaker, Finish};
 pub(crate) use preparation::{Input, Origin, Preparation, Staged};
-pub(crate) use staging::Taken;
+pub(crate) use staging::OriginalFrame;
 pub use stepper::Stepper;
 
 use crate::look::{Effect, Look};
 
-/// Both halves, made for each other.
+/// Both halves of the engine, on the same device.
 pub(crate) struct Engine {
     pub preparation: Preparation,
     pub blur: Blur,
 }
 
 impl Engine {
-    /// Nothing was seen yet; `blur` blurs as the look says.
+    /// Creates the engine; `blur` has the executor for the look.
     pub fn new(look: &Look, input: Input, blur: Blur) -> Self {
-        // Without a blur nobody asks for depth.
+        // Without a blur no depth is needed.
         let plain = blur.executor().is_none().then(|| Look::plain(Effect::None));
         let mut preparation = Preparation::new(plain.as_ref().unwrap_or(look), input);
         preparation.beside(blur.executor());

@@ -1,8 +1,9 @@
-//! The first half: from a frame's depth as it was measured come its CoC and its matte, and its subject is staged.
+//! The first half of the engine: computes CoC and matte from a frame's raw depth, then applies virtual background
+//! and auto-framing.
 
 use super::coc::{CocMaker, Finish};
 use super::fit_check::{FitCheck, Verdict};
-use super::staging::{Staging, Taken};
+use super::staging::{OriginalFrame, Staging};
 use crate::bokeh::{Bokeh, BokehError};
 use crate::compute::DeviceFrame;
 use crate::depth::refine::Exactness;
@@ -12,25 +13,25 @@ use crate::link::pool::{Pool, Pooled};
 use crate::look::{BackgroundMemory, Look, Refine};
 use crate::optics::CocField;
 
-/// Said in the report where depth is refined only until it is known to be exact.
+/// Text of the report if refinement stopped because depth turned out to be exact.
 const EXACT: &str = "none, as depth is exact";
 
-/// What is known of depth before it comes.
+/// Where depth comes from, which decides how it is postprocessed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Origin {
-    /// It was finished before.
+    /// It is complete already.
     Finished,
-    /// That of a picture on its own, which nobody knows more of: where the look leaves that open it is refined if it does not fit
-    /// the picture.
+    /// It belongs to a single picture and its origin is unknown: if the look leaves it open, it is refined only if it
+    /// does not fit the picture.
     Single,
-    /// It was made, and not measured: refining it makes it no better.
+    /// It was synthesised or inferred: refinement does not improve it.
     Made,
-    /// It was measured: refining it makes it better, unless it turns out to be exact.
+    /// It was measured: refinement improves it, unless it turns out to be exact.
     Measured,
 }
 
 impl Origin {
-    /// What a look asks to be done to depth.
+    /// Returns the postprocessing that `look` asks for.
     fn finish(self, look: &Look) -> Finish {
         match self {
             Self::Finished => Finish::Keep,
@@ -40,48 +41,48 @@ impl Origin {
     }
 }
 
-/// The frames that come.
+/// Properties of the incoming frames.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Input {
-    /// Columns and rows of the pictures.
+    /// Width and height of the pictures, in pixels.
     pub size: (u32, u32),
-    /// How many there are, where that is known.
+    /// The number of frames, if known.
     pub frames: Option<u64>,
     pub depth: Origin,
-    /// Whether the depth has all that is behind the nearer surface, so that nothing need be remembered.
+    /// Whether the depth source provides the background behind the nearer surface, so that none is remembered.
     pub knows_background: bool,
-    /// Threads to work on, the caller's included: what is made is the same to the bit.
+    /// Number of worker threads, the caller's included; the results are bit-identical.
     pub threads: usize,
 }
 
-/// What is done to a frame once its CoC is known.
+/// The result of virtual background and auto-framing.
 #[derive(Default)]
 pub(crate) struct Staged {
-    /// The part of the picture to show; `None` is all.
+    /// The crop to show; `None` is the whole picture.
     pub part: Option<Crop>,
-    /// The frame as it was before something else stood behind the subject, where that is so and it is to be kept.
-    pub taken: Option<Pooled<Taken>>,
-    /// The picture and its depth, where a device has refined that.
+    /// The frame before its background was replaced, if it was and the original is kept.
+    pub original: Option<Pooled<OriginalFrame>>,
+    /// The device's copy of picture and depth, if the device has refined the depth.
     pub on_device: Option<Pooled<DeviceFrame>>,
 }
 
-/// Prepares frame after frame.
+/// Preprocesses frames one after another.
 pub(crate) struct Preparation {
     input: Input,
-    /// What the look asks to be done to depth.
+    /// The postprocessing that the look asks for.
     finish: Finish,
     coc: CocMaker,
-    /// Tells exact depth, which is not refined unless that is asked for; `None` where nothing is left to be decided.
+    /// Detects exact depth, which is refined only on request; `None` if the look decides that.
     exactness: Option<Exactness>,
     staging: Staging,
-    /// Notices depth that does not fit the pictures; `None` where nothing would come of that.
+    /// Detects depth that does not fit the pictures; `None` if the result would not be used.
     check: Option<FitCheck>,
-    /// What is to be said of the depth.
+    /// A pending warning about the depth.
     remark: Option<String>,
 }
 
 impl Preparation {
-    /// As `look` says.
+    /// Creates the preparation for `look`.
     pub fn new(look: &Look, input: Input) -> Self {
         let finish = input.depth.finish(look);
         let checks = match input.depth {
@@ -95,7 +96,7 @@ impl Preparation {
             coc: CocMaker::new(look.coc_rule(input.size), finish).on_threads(input.threads),
             exactness: exactness(look, finish),
             staging: Staging::new(look),
-            check: checks.then(|| FitCheck::of(input.frames)),
+            check: checks.then(|| FitCheck::new(input.frames)),
             remark: None,
         };
         new.coc.remember(new.remembers(look));
@@ -111,59 +112,60 @@ impl Preparation {
         self.staging.follow(look);
     }
 
-    /// Whether it remembers what lies behind things, from frame to frame.
+    /// Returns whether the hidden background is remembered from frame to frame.
     fn remembers(&self, look: &Look) -> bool {
         let is_stream = matches!(self.input.depth, Origin::Made | Origin::Measured);
         is_stream && look.background_memory == BackgroundMemory::On && !self.input.knows_background
     }
 
-    /// Refines depth and finds mattes where the blur runs ([`CocMaker::compute_on`]).
+    /// Refines depth and estimates mattes on the blur's device ([`CocMaker::compute_on`]).
     pub fn beside(&mut self, bokeh: Option<&dyn Bokeh>) {
         self.coc.compute_on(bokeh.and_then(Bokeh::device));
     }
 
-    /// What is done to depth as far as is known now: exact depth fits already, and what is thin in it would be lost.
+    /// Returns the postprocessing to use now: exact depth is aligned already, and refinement would erase thin
+    /// structures.
     fn finish_now(&self) -> Finish {
-        let meets = self.check.as_ref().is_some_and(FitCheck::meets);
-        let is_exact = self.exactness.as_ref().is_some_and(Exactness::is_exact) && meets;
+        let is_aligned = self.check.as_ref().is_some_and(FitCheck::is_aligned);
+        let is_exact = self.exactness.as_ref().is_some_and(Exactness::is_exact) && is_aligned;
         if is_exact { Finish::Fill } else { self.finish }
     }
 
-    /// What refines, for the report ([`CocMaker::refined_by`]); or did so until depth turned out to be exact.
+    /// Returns what refines depth ([`CocMaker::refined_by`]), or why refinement stopped, for the report.
     pub fn refined_by(&self) -> Option<&'static str> {
         let is_left_alone = self.finish == Finish::Refine && self.finish_now() == Finish::Fill;
         if is_left_alone { Some(EXACT) } else { self.coc.refined_by() }
     }
 
-    /// What found mattes ([`CocMaker::matted_by`]).
+    /// Returns what estimates mattes ([`CocMaker::matted_by`]).
     pub fn matted_by(&self) -> Option<&'static str> {
         self.coc.matted_by()
     }
 
-    /// What is to be said of the depth, once: that it does not fit the pictures.
+    /// Takes the pending warning that the depth does not fit the pictures, if any.
     pub fn remark(&mut self) -> Option<String> {
         self.remark.take()
     }
 
-    /// Another scene comes: nothing is left of those before.
+    /// Drops all history, because another scene comes.
     pub fn forget(&mut self) {
         self.exactness.iter_mut().for_each(Exactness::forget);
         self.coc.forget();
     }
 
-    /// Whether the lens is focused on a subject that is found ([`CocMaker::focuses_on_subject`]).
+    /// Returns whether the focus follows a detected subject ([`CocMaker::focuses_on_subject`]).
     pub fn focuses_on_subject(&self) -> bool {
         self.coc.focuses_on_subject()
     }
 
-    /// The CoC of every frame, where that needs no depth.
+    /// Returns the CoC of every frame if it needs no depth.
     pub fn fixed(&self) -> Option<CocField> {
         self.coc.fixed()
     }
 
-    /// The CoC of the frame that was taken at `time_ns`; finishes its `map`.
+    /// Computes the CoC of the frame at `time_ns`; finishes its `map`.
     pub fn make(&mut self, map: &mut DepthMap, color: &ColorImage, time_ns: u64) -> CocField {
-        match self.check.as_mut().and_then(|check| check.look(map, color)) {
+        match self.check.as_mut().and_then(|check| check.check(map, color)) {
             None => {}
             Some(Verdict::Unrelated) => {
                 self.remark = Some(
@@ -173,52 +175,52 @@ impl Preparation {
                 );
             }
             Some(Verdict::Mend(misfit, mending)) => {
-                if self.coc.mend(mending) {
+                if self.coc.set_mending(mending) {
                     let line = format!("depth is brought to the pictures, as {misfit}; --refine off takes it as it is");
                     self.remark = Some(line);
                 } else if self.input.depth == Origin::Single {
                     self.finish = Finish::Refine;
-                    self.coc.finish_by(Finish::Refine);
+                    self.coc.set_finish(Finish::Refine);
                 }
             }
         }
         if let Some(exactness) = &mut self.exactness {
             exactness.look(map, color);
-            self.coc.finish_by(self.finish_now());
+            self.coc.set_finish(self.finish_now());
         }
         self.coc.make(map, color, time_ns)
     }
 
-    /// Gives a picture the map of one before it ([`CocMaker::share`]).
+    /// Adapts a depth map of an earlier frame to this picture ([`CocMaker::share`]).
     pub fn share(&mut self, map: &mut DepthMap, color: &ColorImage, field: &CocField) {
         self.coc.share(map, color, field);
     }
 
-    /// Puts what was chosen behind the subject of a picture whose depth is finished; keeps the frame as it was in a buffer of
-    /// `kept`, if that changes it ([`Staging::stage`]).
+    /// Replaces the background behind the subject of a picture whose depth is finished ([`Staging::stage`]). If that
+    /// changes the frame and `kept` is given, the original is kept in one of its buffers.
     pub fn stage(
         &mut self,
         color: &mut ColorImage,
         map: &mut DepthMap,
         field: &CocField,
         time_ns: u64,
-        kept: Option<&Pool<Taken>>,
+        kept: Option<&Pool<OriginalFrame>>,
     ) -> Staged {
         let replaces = self.staging.replaces(field);
-        let taken = kept.filter(|_| replaces).map(|pool| {
-            let mut taken = pool.take();
-            taken.keep(color, map);
-            taken
+        let original = kept.filter(|_| replaces).map(|pool| {
+            let mut original = pool.take();
+            original.keep(color, map);
+            original
         });
-        // What is staged has another picture.
+        // The device's copy is of the original picture: useless once the background is replaced.
         let on_device = self.coc.take_copy().filter(|_| !replaces);
-        Staged { part: self.staging.stage(color, map, field, time_ns), taken, on_device }
+        Staged { part: self.staging.stage(color, map, field, time_ns), original, on_device }
     }
 
-    /// All of it for the frame that was taken at `time_ns`: its CoC, and the part of it to show, `None` for all.
+    /// Runs all steps for the frame at `time_ns`; returns its CoC and the crop to show, `None` for all.
     ///
     /// # Errors
-    /// [`BokehError::NoDepth`] where the CoC follows depth.
+    /// [`BokehError::NoDepth`] if the CoC follows depth and there is no map.
     pub fn prepare(
         &mut self,
         color: &mut ColorImage,
@@ -234,7 +236,7 @@ impl Preparation {
     }
 }
 
-/// Watches depth where it is to be refined, and only because it was measured.
+/// Creates the detector of exact depth if depth is refined by default, not on request.
 fn exactness(look: &Look, finish: Finish) -> Option<Exactness> {
     (look.refine == Refine::Auto && finish == Finish::Refine).then(Exactness::default)
 }
@@ -252,7 +254,7 @@ mod tests {
         (color, read_depth(&file("depth/000000.png"), 5000.0, None).unwrap())
     }
 
-    /// The map of the last of some frames of which each has this one, and what is said of its refinement.
+    /// Returns the map of the last of six equal frames, and the report's text on its refinement.
     fn prepared(refine: Refine, (color, map): (&ColorImage, &DepthMap)) -> (DepthMap, Option<&'static str>) {
         let look = Look { refine, background_memory: BackgroundMemory::Off, ..Look::default() };
         let (size, depth) = (color.size(), Origin::Measured);
@@ -278,7 +280,7 @@ mod tests {
     #[test]
     fn a_sensors_depth_is_refined_as_it_is_where_that_is_asked_for() {
         let (color, mut map) = portrait();
-        // Holes, as beside every near thing.
+        // Holes, as a sensor has them beside near objects.
         map.metres.iter_mut().step_by(40).for_each(|metres| *metres = 0.0);
         let [(auto, said), (on, _)] = [Refine::Auto, Refine::On].map(|refine| prepared(refine, (&color, &map)));
         assert!(auto.metres == on.metres && said == Some("cpu"), "{said:?}");

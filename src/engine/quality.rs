@@ -1,33 +1,34 @@
-//! How finely frames are blurred: what there is time for.
+//! Picks the quality level at which frames are blurred, from the time available.
 
 use super::Time;
 use crate::bokeh::rung::COSTS;
 use crate::budget::{DepthTimes, Plan, Planner, Quality, Sample};
 use crate::look::QualityRule;
 
-/// Picks the quality of each frame, and how depth is made, by the time there is.
+/// Picks the quality of each frame, and the effort of its depth, from the time available.
 pub(crate) struct Picker {
-    /// The rungs to pick from, cheapest first.
+    /// The levels to pick from, cheapest first.
     rungs: &'static [Quality],
     planner: Planner,
 }
 
 impl Picker {
-    /// No frame is blurred more finely than `finest` unless that was asked for; in real time, depth is made as there is time,
-    /// and shared by frames only where it may be.
+    /// Creates a picker. With an automatic rule no level finer than `finest` is used. In real time the effort of depth
+    /// follows the time available; frames share depth only if `time` allows it.
     pub(super) fn new((rule, finest): (QualityRule, Quality), time: Time) -> Self {
         let Time { budget_ns, period_ns, efforts, shares_depth } = time;
         let (rungs, costs, places) = Self::ladder(rule, finest);
         Self { rungs, planner: Planner::new((budget_ns, period_ns), (efforts, shares_depth), costs, places) }
     }
 
-    /// The same under another rule, for another executor. What was learnt of the time that rungs take holds no more.
+    /// Returns a picker for another rule and executor. Measured blur times are dropped, those of depth stay.
     pub(super) fn with(&self, rule: QualityRule, finest: Quality) -> Self {
         let (rungs, costs, places) = Self::ladder(rule, finest);
         Self { rungs, planner: self.planner.with_blur(costs, places) }
     }
 
-    /// The qualities that `rule` allows, cheapest first, what they cost, and which of them is the usual and which the first.
+    /// Returns the levels that `rule` allows, cheapest first, their relative costs, and the indices of the default and
+    /// the first one.
     fn ladder(rule: QualityRule, finest: Quality) -> (&'static [Quality], &'static [f64], [usize; 2]) {
         let at = |quality: Quality| quality as usize;
         match rule {
@@ -39,37 +40,37 @@ impl Picker {
         }
     }
 
-    /// A blur may take so long from now on.
-    pub fn allow(&mut self, budget_ns: u64) {
+    /// Sets the time that a blur may take, in nanoseconds.
+    pub fn set_budget(&mut self, budget_ns: u64) {
         self.planner.allow(budget_ns);
     }
 
-    /// What the next frame gets.
+    /// Returns the plan for the next frame.
     pub fn plan(&self) -> Plan {
         self.planner.plan()
     }
 
-    /// The quality of the next frame.
+    /// Returns the quality of the next frame.
     pub fn quality(&self) -> Quality {
         self.rungs[self.plan().rung]
     }
 
-    /// How long the blur of the next frame is likely to take; 0 before anything is known.
+    /// Returns the expected blur time of the next frame; 0 if unknown.
     pub fn expected_ns(&self) -> u64 {
         self.planner.expected_blur_ns().unwrap_or(0)
     }
 
-    /// The depth of a frame took so long.
+    /// Records the times of a frame's depth.
     pub fn note_depth(&mut self, times: DepthTimes) {
         self.planner.note_depth(times);
     }
 
-    /// A frame came too late.
+    /// Records that a frame was too late.
     pub fn note_late(&mut self) {
         self.planner.note_late();
     }
 
-    /// A frame of this quality took so long to blur, and was done at `at_ns`.
+    /// Records that a blur at `quality` took `took_ns` and finished at `at_ns`.
     pub fn note(&mut self, quality: Quality, took_ns: u64, at_ns: u64) {
         if let Some(rung) = self.rungs.iter().position(|&rung| rung == quality) {
             self.planner.note_blur(Sample { rung, took_ns, at_ns });

@@ -1,4 +1,4 @@
-//! Where the subject stands: before what, and in which part of the picture.
+//! Composes the subject: virtual background and auto-framing.
 
 use crate::depth::backdrop::{Backdrop, Behind};
 use crate::depth::follow::Follower;
@@ -7,15 +7,15 @@ use crate::frame::{ColorImage, DepthMap};
 use crate::look::Look;
 use crate::optics::CocField;
 
-/// A picture and its depth as they were before something else stood behind the subject.
+/// A picture and its depth before its background was replaced.
 #[derive(Default)]
-pub(crate) struct Taken {
+pub(crate) struct OriginalFrame {
     color: ColorImage,
     map: DepthMap,
 }
 
-impl Taken {
-    /// Keeps a frame, which is staged next.
+impl OriginalFrame {
+    /// Copies a frame before it is changed.
     pub fn keep(&mut self, color: &ColorImage, map: &DepthMap) {
         self.color.resize(color.width, color.height);
         self.color.rgb.copy_from_slice(&color.rgb);
@@ -25,14 +25,14 @@ impl Taken {
         (self.map.subject_m, self.map.is_smooth) = (map.subject_m, map.is_smooth);
     }
 
-    /// Puts it in the place of what was made of it.
+    /// Swaps the original back into a frame.
     pub fn restore(&mut self, color: &mut ColorImage, map: &mut DepthMap) {
         std::mem::swap(&mut self.color, color);
         std::mem::swap(&mut self.map, map);
     }
 }
 
-/// Stages the subject of frame after frame.
+/// Replaces the background of frames and crops them around the subject.
 #[derive(Default)]
 pub(super) struct Staging {
     backdrop: Option<Backdrop>,
@@ -57,13 +57,13 @@ impl Staging {
         }
     }
 
-    /// Whether it changes pictures of this CoC.
+    /// Returns whether pictures with this CoC are changed.
     pub fn replaces(&self, field: &CocField) -> bool {
         self.backdrop.is_some() && matches!(field, CocField::Depth(_))
     }
 
-    /// Puts what was chosen behind the subject of a picture at `time_ns` of media time, whose depth is finished; returns the part
-    /// of it to show, `None` for all.
+    /// Replaces the background behind the subject of a picture whose depth is finished; `time_ns` is media time.
+    /// Returns the crop to show, `None` for all.
     pub fn stage(
         &mut self,
         color: &mut ColorImage,

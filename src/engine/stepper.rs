@@ -1,4 +1,4 @@
-//! Frame after frame on the caller's thread: what a run does to each, for programs that have threads of their own.
+//! Blurs frame by frame on the caller's thread: what a run does to each frame, for programs with their own threads.
 
 use super::{Blur, Engine, Images, Input, Origin};
 use crate::bokeh::BokehError;
@@ -9,28 +9,28 @@ use crate::frame::crop::Cropper;
 use crate::frame::{ColorImage, DepthMap};
 use crate::look::Look;
 
-/// Blurs the frames of one stream, one at a time. Nothing is allocated once the first frames have passed.
+/// Blurs the frames of one stream, one at a time. Allocates nothing once the first frames have passed.
 pub struct Stepper {
     size: (u32, u32),
     adaptive: bool,
     engine: Engine,
     executors: Executors,
-    /// Whether anybody said how long a blur may take.
+    /// Whether a time budget is set.
     is_timed: bool,
     clock: Clock,
     images: Images,
     cropper: Cropper,
-    /// The part of the picture that goes out.
+    /// The crop that goes out.
     cropped: ColorImage,
 }
 
 impl Stepper {
-    /// For pictures of `size` pixels that shall look like `look`, which is [for a source](Look::for_source) like this one.
-    /// `measured` says whether their depth is, so that refining it makes it better. Where the look leaves the quality open and this is `adaptive`, the quality follows
-    /// the time there is, once [`Stepper::allow`] has said how much.
+    /// Creates a stepper for pictures of `size` pixels. `look` must be adapted to the source ([`Look::for_source`]);
+    /// `measured` says whether depth is measured, so that refinement improves it. If the look leaves the quality open
+    /// and `adaptive` is set, the quality follows the budget given to [`Stepper::allow`].
     ///
     /// # Errors
-    /// The blur is too wide for the pictures, or there is no such GPU.
+    /// The blur is too wide for the pictures, or the requested GPU does not exist.
     pub fn new(
         look: &Look,
         size: (u32, u32),
@@ -41,7 +41,7 @@ impl Stepper {
         let depth = if measured { Origin::Measured } else { Origin::Made };
         let input = Input { size, frames: None, depth, knows_background: false, threads: computing.threads() };
         let mut executors = Executors::new(computing);
-        // Until a time is allowed there is enough.
+        // Until a budget is set, time is unlimited.
         let mut blur = Blur::default();
         blur.follow(look, (size, adaptive), |settings| executors.blur(settings, size))?;
         Ok(Self {
@@ -61,10 +61,10 @@ impl Stepper {
         })
     }
 
-    /// Blurs the next frames as another look says: the focus moves there as a lens does.
+    /// Blurs the next frames in another look; the focus moves smoothly, like a lens.
     ///
     /// # Errors
-    /// As for [`Stepper::new`]: the look before goes on.
+    /// Same as for [`Stepper::new`]; the current look stays in use.
     pub fn follow(&mut self, look: &Look) -> Result<(), BokehError> {
         let Self { engine: Engine { preparation, blur }, executors, size, .. } = self;
         blur.follow(look, (*size, self.adaptive), |settings| executors.blur(settings, *size))?;
@@ -73,39 +73,39 @@ impl Stepper {
         Ok(())
     }
 
-    /// Another scene comes: nothing is left of those before.
+    /// Drops all history, because another scene comes.
     pub fn forget(&mut self) {
         self.engine.preparation.forget();
     }
 
-    /// A blur may take so long from now on, in nanoseconds.
+    /// Sets the time that a blur may take, in nanoseconds.
     pub fn allow(&mut self, budget_ns: u64) {
         self.is_timed = true;
-        self.engine.blur.picker.allow(budget_ns);
+        self.engine.blur.picker.set_budget(budget_ns);
     }
 
-    /// How long the blur of the next frame is likely to take, in nanoseconds; 0 before anything is known.
+    /// Returns the expected blur time of the next frame in nanoseconds; 0 if unknown.
     pub fn expected_ns(&self) -> u64 {
         self.engine.blur.picker.expected_ns()
     }
 
-    /// The quality of the next frame; `None` where nothing is blurred.
+    /// Returns the quality of the next frame; `None` if nothing is blurred.
     pub fn quality(&self) -> Option<Quality> {
         self.engine.blur.quality()
     }
 
-    /// Whether frames need depth.
+    /// Returns whether frames need depth.
     pub fn needs_depth(&self) -> bool {
         self.engine.blur.executor().is_some() && self.engine.preparation.fixed().is_none()
     }
 
-    /// Where the next frame's picture goes, and its depth as it was measured: all of both is to be written, before each
+    /// Returns the buffers for the next picture and its raw depth. Both must be written completely before each
     /// [`Stepper::step`].
     pub fn frame(&mut self) -> (&mut ColorImage, &mut DepthMap) {
         (&mut self.images.color, self.images.depth.get_or_insert_default())
     }
 
-    /// Blurs the [frame](Stepper::frame) that is at `time_ns` of media time, later than the one before.
+    /// Blurs the [frame](Stepper::frame) at media time `time_ns`, which must increase.
     ///
     /// # Errors
     /// The picture has another size, or the executor failed.
@@ -129,7 +129,7 @@ impl Stepper {
         })
     }
 
-    /// What is to be said of the depth, once: that it does not fit the pictures.
+    /// Takes the pending warning that the depth does not fit the pictures, if any.
     pub fn remark(&mut self) -> Option<String> {
         self.engine.preparation.remark()
     }

@@ -1,4 +1,4 @@
-//! One picture on its own: the same blur as in a stream, without one.
+//! Blurs a single picture, in the same way as a stream.
 
 use super::{Blur, Images, Input, Origin, Preparation};
 use crate::bokeh::BokehError;
@@ -7,20 +7,20 @@ use crate::frame::{ColorImage, DepthMap};
 use crate::look::Look;
 use crate::optics::CocField;
 
-/// A depth map for one picture.
+/// A depth map of one picture.
 pub enum Depth {
-    /// As it was measured: with holes, and noise.
+    /// Raw measurements, with holes and noise.
     Measured(DepthMap),
-    /// As a blur had it.
+    /// Complete, as a blur used it.
     Final(DepthMap),
 }
 
-/// What `color` is blurred by: the circle of confusion of every pixel, and the depth map if that follows depth. A
-/// measured map is returned with its holes filled, and refined if the look asks for it; or where it leaves that open and
-/// the map does not fit the picture. What the look puts behind the subject is put into the picture.
+/// Computes the circle of confusion of every pixel of `color`; returns it with the depth map, if it follows depth. A
+/// measured map is returned with its holes filled; it is refined if the look asks for it, or leaves it open and the map
+/// does not fit the picture. A virtual background is put into the picture.
 ///
 /// # Errors
-/// [`BokehError::NoDepth`] when the blur follows depth and there is none.
+/// [`BokehError::NoDepth`] if the blur follows depth and none is given.
 pub fn coc_and_depth(
     look: &Look,
     color: &mut ColorImage,
@@ -32,15 +32,16 @@ pub fn coc_and_depth(
         None => (Origin::Finished, None),
     };
     let input = Input { size: color.size(), frames: Some(1), depth, knows_background: true, threads: 1 };
-    // All of the picture is shown, wherever its subject is.
+    // A single picture is never cropped.
     let (field, _) = Preparation::new(look, input).prepare(color, map.as_mut(), 0)?;
     Ok((field, map.filter(|_| matches!(field, CocField::Depth(_)))))
 }
 
-/// Blurs the picture `color` as `look` says; returns it and what blurred it. It is unchanged where the effect is none.
+/// Blurs the picture `color` as `look` says; returns it with a description of the executor. Effect `none` leaves it
+/// unchanged.
 ///
 /// # Errors
-/// The blur follows depth and there is none, is too wide for the picture, or there is no such GPU.
+/// The blur follows depth and none is given, it is too wide for the picture, or the requested GPU does not exist.
 pub fn blur(
     look: &Look,
     mut color: ColorImage,
@@ -55,6 +56,6 @@ pub fn blur(
     let (mut blur, mut images) = (Blur::default(), Images { color, depth, ..Images::default() });
     blur.follow(look, (size, false), |settings| computing.blur(settings, size))?;
     blur.blur(&mut images, coc)?;
-    let [_, by] = blur.about();
+    let [_, by] = blur.describe_executor();
     Ok((images.blurred, by))
 }

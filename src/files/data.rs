@@ -1,16 +1,16 @@
-//! The folders for programs' data, as the XDG Base Directory Specification has them. A path that is empty or relative names none.
+//! Folders for program data, by the XDG Base Directory Specification. Empty and relative paths are ignored.
 
 use std::env;
 use std::path::PathBuf;
 
 use super::trusted::absolute;
 
-/// The user's own: `$XDG_DATA_HOME`, or `~/.local/share`.
+/// Returns the user's folder: `$XDG_DATA_HOME`, or `~/.local/share`.
 pub fn own() -> Option<PathBuf> {
     absolute("XDG_DATA_HOME").or_else(|| Some(absolute("HOME")?.join(".local/share")))
 }
 
-/// The system's, the first one having precedence: `$XDG_DATA_DIRS`, or the usual two.
+/// Returns the system's folders in order of precedence: `$XDG_DATA_DIRS`, or the two standard ones.
 pub fn system() -> Vec<PathBuf> {
     let listed = env::var_os("XDG_DATA_DIRS").filter(|dirs| !dirs.is_empty());
     let listed = listed.unwrap_or_else(|| "/usr/local/share:/usr/share".into());

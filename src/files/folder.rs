@@ -1,9 +1,9 @@
-//! Folders whose files belong together, such as the pictures of one run: what was there stays until all of the new is
-//! whole.
+//! Folders whose files belong together, such as the pictures of one run: old files stay until all new ones are
+//! complete.
 //!
-//! The list [`LIST`] in the folder says which files were written by us, one name a line: others are never touched. Into
-//! an empty folder files are written directly, each whole. Otherwise they go into a hidden folder within, [`PART`], and
-//! are renamed once all are whole. While it is open the folder is locked.
+//! The list [`LIST`] in the folder names the files that this program wrote, one per line; other files are never
+//! touched. In an empty folder files are written directly, each atomically. Otherwise they are written to a hidden
+//! subfolder, [`PART`], and renamed once all are complete. The folder is locked while it is open.
 
 mod list;
 mod replace;
@@ -20,24 +20,24 @@ pub use self::list::adopt;
 use self::replace::{keep, make_subfolder, recover, refuse_foreign, replace};
 use super::whole::Part;
 
-/// What the list of our own files is called.
+/// The name of the list of our own files.
 pub const LIST: &str = ".bokehcam";
-/// Where files wait that will replace others.
+/// The hidden subfolder for files that will replace others.
 pub const PART: &str = ".bokehcam.part";
 
-/// Why a folder cannot be written.
+/// An error in writing a folder.
 #[derive(Debug, thiserror::Error)]
 pub enum FolderError {
-    /// It has something in it, and nothing may be replaced.
+    /// The folder is not empty, and nothing may be replaced.
     #[error("the folder {} is not empty; choose another or write into it with --force", path.display())]
     NotEmpty { path: PathBuf },
-    /// A file has a name that is to be written, and is none of ours.
+    /// A file that would be overwritten is not ours.
     #[error("{} was not written by bokehcam, and stays: move it away, or choose another folder", path.display())]
     Foreign { path: PathBuf },
-    /// Another program, or this one twice.
+    /// Another run writes the folder.
     #[error("the folder {} is being written by another run: choose another", path.display())]
     Busy { path: PathBuf },
-    /// It was removed or moved away while it was written.
+    /// The folder was removed or moved meanwhile.
     #[error("the folder {} was removed or moved meanwhile", path.display())]
     Gone { path: PathBuf },
     #[error("cannot write {}: {cause}", path.display())]
@@ -54,44 +54,44 @@ impl FolderError {
     }
 }
 
-/// Whether this is a folder that we have written files into.
+/// Returns whether we have written files into this folder.
 pub fn is_ours(path: &Path) -> bool {
     path.join(LIST).symlink_metadata().is_ok_and(|list| list.is_file())
 }
 
-/// Which files will be written.
+/// The files that will be written.
 pub struct Set<'a> {
-    /// Folders within the folder that have files of the set.
+    /// Subfolders with files of the set.
     pub subfolders: &'a [&'a str],
-    /// Whether the set may have a file of this name, such as `000000.png` or `rgb/000000.png`.
+    /// Whether a file name may belong to the set, such as `000000.png` or `rgb/000000.png`.
     pub has: &'a dyn Fn(&str) -> bool,
 }
 
-/// A folder that is being written. Dropping it is as [`Folder::cut`].
+/// A folder that is being written. Dropping it has the effect of [`Folder::cut`].
 #[derive(Debug)]
 pub struct Folder {
-    /// Its name without a slash at the end.
+    /// The path without a trailing slash.
     path: PathBuf,
-    /// The hidden folder within that files go into, if not into the folder itself.
+    /// The hidden subfolder that files are written to, if not to the folder itself.
     staging: Option<PathBuf>,
     list: List,
-    /// Keeps others out as long as it is open.
+    /// Holds the lock while it is open.
     lock: File,
     ended: bool,
 }
 
 impl Folder {
-    /// Opens the folder for a set of files, and makes it where it is missing. What runs that were killed left behind in
-    /// it is kept as `NAME.incomplete`, which is logged.
+    /// Opens the folder for a set of files, and creates it if needed. Files of killed runs are kept as
+    /// `NAME.incomplete`, which is logged.
     ///
     /// # Errors
-    /// It has something in it and `replace` is not set, or has a file of the set that is none of ours; it is being
-    /// written, or cannot be.
+    /// The folder is not empty and `replace` is not set, or has a file of the set that is not ours; another run writes
+    /// it, or it cannot be written.
     pub fn open(path: &Path, replace: bool, set: &Set) -> Result<Self, FolderError> {
         let path: PathBuf = path.components().collect();
         let write = || FolderError::write(&path);
         fs::create_dir_all(&path).map_err(|error| {
-            // The system says of it that it exists, or that it is no folder, and not which of all on the way.
+            // The system reports `exists` or `not a directory`, but not for which part of the path.
             let in_the_way = path.ancestors().find(|part| part.exists() && !part.is_dir());
             let no_folder = || io::Error::new(ErrorKind::NotADirectory, "it is no folder");
             match in_the_way {
@@ -120,27 +120,27 @@ impl Folder {
         Ok(Self { path, staging, list, lock, ended: false })
     }
 
-    /// The folder's name in the end.
+    /// Returns the path of the folder.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// Number of files that were put into it.
+    /// Returns the number of files written so far.
     pub fn files(&self) -> u64 {
         self.list.len()
     }
 
-    /// Whether files that were there go when the new ones are whole.
+    /// Returns whether old files are replaced once the new ones are complete.
     pub fn replaces(&self) -> bool {
         self.staging.is_some()
     }
 
-    /// Starts the file of this name, whose subfolder is made where it is missing. [`Folder::put`] takes it.
+    /// Starts a file with this name, and creates its subfolder if needed. [`Folder::put`] completes it.
     ///
     /// # Errors
     /// The folder is gone, or cannot be written.
     pub fn begin(&self, name: &str) -> Result<Part, FolderError> {
-        self.check_there()?;
+        self.check_exists()?;
         let path = self.target().join(name);
         if let Some((subfolder, _)) = name.rsplit_once('/') {
             make_subfolder(&self.target().join(subfolder))?;
@@ -148,10 +148,10 @@ impl Folder {
         Part::create(&path).map_err(FolderError::write(&path))
     }
 
-    /// Takes a file that is whole.
+    /// Completes a file.
     ///
     /// # Errors
-    /// Something of its name has appeared, or it cannot be written; the folder is then as it was.
+    /// A file with its name has appeared, or it cannot be written; the folder is unchanged.
     pub fn put(&mut self, part: Part) -> Result<(), FolderError> {
         let path = part.path().to_owned();
         let name = path.strip_prefix(self.target()).ok().and_then(Path::to_str).unwrap_or_default().to_owned();
@@ -160,18 +160,18 @@ impl Folder {
             _ => FolderError::Write { path: path.clone(), cause },
         })?;
         self.list.add(&name).inspect_err(|_| {
-            // A file that is not on the list would never be replaced; the list's error is the one to report.
+            // An unlisted file would never be replaced. Report the list's error.
             let _ = fs::remove_file(&path);
         })
     }
 
-    /// Ends a complete set of files: they replace those on the list of an earlier run, whose number is given.
+    /// Ends a complete set of files: it replaces the files on an earlier run's list. Returns their number.
     ///
     /// # Errors
-    /// Something foreign has appeared, which stays, and what was written is kept as `NAME.incomplete`, as is what could not be
-    /// moved.
+    /// A foreign file has appeared, which stays. The new files, and those that could not be moved, are kept as
+    /// `NAME.incomplete`.
     pub fn finish(mut self) -> Result<u64, FolderError> {
-        self.check_there()?;
+        self.check_exists()?;
         self.sync()?;
         self.ended = true;
         let Some(part) = self.staging.take() else {
@@ -185,19 +185,19 @@ impl Folder {
         replaced
     }
 
-    /// Ends an incomplete set of files: what was there stays, and the new files are kept as `NAME.incomplete`, whose
-    /// path is given. If the folder was empty, the new files stay in it.
+    /// Ends an incomplete set of files: old files stay, and the new ones are kept as `NAME.incomplete`; returns that
+    /// path. If the folder was empty, the new files stay in it.
     ///
     /// # Errors
-    /// They cannot be renamed, and stay in a hidden folder within.
+    /// They cannot be renamed, and stay in a hidden subfolder.
     pub fn cut(mut self) -> Result<Option<PathBuf>, FolderError> {
-        self.end()
+        self.end_incomplete()
     }
 
-    /// [`Folder::cut`], also for [`Drop`].
-    fn end(&mut self) -> Result<Option<PathBuf>, FolderError> {
+    /// Does the work of [`Folder::cut`] and [`Drop`].
+    fn end_incomplete(&mut self) -> Result<Option<PathBuf>, FolderError> {
         self.ended = true;
-        self.check_there()?;
+        self.check_exists()?;
         // Files that cannot be synced are kept as well.
         let _ = self.sync();
         match self.staging.take() {
@@ -210,15 +210,15 @@ impl Folder {
         }
     }
 
-    /// Syncs all files at once: waiting for the disk after each would take longer than a camera waits.
+    /// Syncs all files at once: a sync after each would take longer than a camera can wait.
     fn sync(&self) -> Result<(), FolderError> {
         syncfs(&self.lock).map_err(|error| FolderError::write(&self.path)(error.into()))
     }
 
-    fn check_there(&self) -> Result<(), FolderError> {
+    fn check_exists(&self) -> Result<(), FolderError> {
         let identity = |folder: fs::Metadata| (folder.dev(), folder.ino());
         let opened = self.lock.metadata().map(identity).map_err(FolderError::write(&self.path))?;
-        // Another folder of that name is none of ours.
+        // A new folder with the same name is not ours.
         match fs::metadata(&self.path).map(identity) {
             Err(error) if error.kind() != ErrorKind::NotFound => Err(FolderError::write(&self.path)(error)),
             Ok(there) if there == opened => Ok(()),
@@ -226,7 +226,7 @@ impl Folder {
         }
     }
 
-    /// The folder that files are written into now.
+    /// Returns the folder that files are written to now.
     fn target(&self) -> &Path {
         self.staging.as_ref().unwrap_or(&self.path)
     }
@@ -241,7 +241,7 @@ impl Folder {
 impl Drop for Folder {
     fn drop(&mut self) {
         if !self.ended
-            && let Err(error) = self.end()
+            && let Err(error) = self.end_incomplete()
         {
             tracing::warn!("{error}");
         }

@@ -1,4 +1,4 @@
-//! Files that others wrote, read within bounds: no device, no pipe without an end, and no more than expected.
+//! Reads files of unknown origin within bounds: no devices, no endless pipes, and no more bytes than expected.
 
 use std::fs::{File, FileType, OpenOptions};
 use std::io::{self, Read};
@@ -7,19 +7,19 @@ use std::path::Path;
 
 use rustix::fs::OFlags;
 
-/// Most bytes of a text that people or their tools write, such as a list.
-pub const MOST_TEXT_BYTES: u64 = 64 << 20;
+/// Maximum size of a text written by people or their tools, such as a list.
+pub const MAX_TEXT_BYTES: u64 = 64 << 20;
 
-/// Most bytes of a calibration: they have a few thousand.
+/// Maximum size of a calibration; they have a few thousand bytes.
 pub const MOST_CALIBRATION_BYTES: u64 = 1 << 20;
 
-/// Most bytes of a settings file: enough for every setting in a thousand presets.
+/// Maximum size of a settings file: enough for every setting in a thousand presets.
 pub const MOST_SETTINGS_BYTES: u64 = 1 << 20;
 
-/// What is said of a file that is not there.
+/// The message for a missing file.
 pub const NO_FILE: &str = "there is no such file";
 
-/// What the system says, in the words of this program where these are shorter.
+/// Returns the system's error message, shortened.
 pub fn said(error: &io::Error) -> String {
     let text = error.to_string();
     match error.kind() {
@@ -28,13 +28,13 @@ pub fn said(error: &io::Error) -> String {
     }
 }
 
-/// Opens a regular file for reading, links followed. Never waits, as opening a pipe would.
+/// Opens a regular file for reading; follows links. Never blocks, as opening a pipe would.
 ///
 /// # Errors
-/// What the system says, or [`io::ErrorKind::InvalidInput`] with the kind of file it is instead.
+/// Returns the system's error, or [`io::ErrorKind::InvalidInput`] with the kind of the file if it is not regular.
 pub fn open(path: &Path) -> io::Result<File> {
     let file = OpenOptions::new().read(true).custom_flags(OFlags::NONBLOCK.bits() as i32).open(path)?;
-    match unlike_file(file.metadata()?.file_type()) {
+    match special_kind(file.metadata()?.file_type()) {
         None => Ok(file),
         Some(what) => Err(io::Error::new(io::ErrorKind::InvalidInput, format!("it is {what}, not a file"))),
     }
@@ -43,28 +43,28 @@ pub fn open(path: &Path) -> io::Result<File> {
 /// Reads a regular file of at most `most_bytes` bytes.
 ///
 /// # Errors
-/// As for [`open`], or [`io::ErrorKind::FileTooLarge`] with both sizes; nothing of such a file is read.
+/// Same as for [`open`], or [`io::ErrorKind::FileTooLarge`] with both sizes, without reading.
 pub fn read(path: &Path, most_bytes: u64) -> io::Result<Vec<u8>> {
     let file = open(path)?;
     let expected_bytes = file.metadata()?.len();
-    refuse_beyond(most_bytes, expected_bytes)?;
+    check_size(most_bytes, expected_bytes)?;
     let mut bytes = Vec::with_capacity(expected_bytes as usize);
-    // It may grow meanwhile, or state no size, as files under /proc do.
+    // The file may grow meanwhile, or report no size, as files under /proc do.
     file.take(most_bytes + 1).read_to_end(&mut bytes)?;
-    refuse_beyond(most_bytes, bytes.len() as u64)?;
+    check_size(most_bytes, bytes.len() as u64)?;
     Ok(bytes)
 }
 
 /// Reads a regular file of at most `most_bytes` bytes of UTF-8.
 ///
 /// # Errors
-/// As for [`read`], or [`io::ErrorKind::InvalidData`].
+/// Same as for [`read`], or [`io::ErrorKind::InvalidData`].
 pub fn read_text(path: &Path, most_bytes: u64) -> io::Result<String> {
     let text = String::from_utf8(read(path, most_bytes)?);
     text.map_err(|_| io::Error::new(io::ErrorKind::InvalidData, "it is no text in UTF-8"))
 }
 
-fn refuse_beyond(most_bytes: u64, bytes: u64) -> io::Result<()> {
+fn check_size(most_bytes: u64, bytes: u64) -> io::Result<()> {
     if bytes <= most_bytes {
         return Ok(());
     }
@@ -72,13 +72,14 @@ fn refuse_beyond(most_bytes: u64, bytes: u64) -> io::Result<()> {
     Err(io::Error::new(io::ErrorKind::FileTooLarge, what))
 }
 
-/// What is at a place where a file is to be written, where that is none and so is never replaced by one.
+/// Returns the kind of an existing special file or folder at an output path, which must not be replaced; `None` for a
+/// regular file, or none at all.
 pub fn no_file_at(path: &Path) -> Option<&'static str> {
-    unlike_file(path.metadata().ok()?.file_type())
+    special_kind(path.metadata().ok()?.file_type())
 }
 
-/// The kind of a file that is no regular one, in words.
-fn unlike_file(kind: FileType) -> Option<&'static str> {
+/// Returns the kind of a file in words; `None` for a regular file.
+fn special_kind(kind: FileType) -> Option<&'static str> {
     match kind {
         _ if kind.is_file() => None,
         _ if kind.is_dir() => Some("a folder"),
@@ -108,7 +109,7 @@ mod tests {
         assert_eq!(read(&file, 9).unwrap_err().kind(), io::ErrorKind::FileTooLarge);
         std::fs::write(&file, [0xff]).unwrap();
         assert_eq!(read_text(&file, 10).unwrap_err().kind(), io::ErrorKind::InvalidData);
-        // A file that states no size.
-        assert!(!read(Path::new("/proc/self/status"), MOST_TEXT_BYTES).unwrap().is_empty());
+        // A file that reports no size.
+        assert!(!read(Path::new("/proc/self/status"), MAX_TEXT_BYTES).unwrap().is_empty());
     }
 }

@@ -1,10 +1,10 @@
-//! Where a path leads, with links resolved.
+//! Resolves and compares paths.
 
 use std::fs;
 use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 
-/// The path with every link on it resolved; what does not exist yet follows what does.
+/// Resolves all links in a path; components that do not exist are appended as they are.
 pub fn resolved(path: &Path) -> PathBuf {
     let absolute = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
     let existing = absolute.ancestors().find_map(|ancestor| Some((ancestor, ancestor.canonicalize().ok()?)));
@@ -15,11 +15,11 @@ pub fn resolved(path: &Path) -> PathBuf {
     }
 }
 
-/// Whether one of two files or folders is the other one, or lies in it: writing to one may then damage the other.
-/// Neither need exist.
+/// Returns whether one of two paths equals or contains the other, so that writing to one may damage the other. They
+/// need not exist.
 pub fn overlap(one: &Path, other: &Path) -> bool {
     let [one, other] = [one, other].map(resolved);
-    // Paths do not tell when one folder is mounted in two places: device and inode do.
+    // Device and inode also detect a folder that is mounted in two places.
     let identity = |path: &Path| fs::metadata(path).ok().map(|there| (there.dev(), there.ino()));
     let holds = |outer: &Path, inner: &Path| {
         let outer_is = identity(outer);

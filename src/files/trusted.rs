@@ -1,27 +1,28 @@
-//! Places that others cannot have a say in: what the environment names, and what is loaded as code.
+//! Trusted places, which other users cannot change: paths from the environment, and code to load.
 
 use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 
 use rustix::process::{getegid, geteuid};
 
-/// Anybody may write.
+/// Everyone may write.
 const BY_ALL: u32 = 0o002;
-/// The group may.
+/// The group may write.
 const BY_GROUP: u32 = 0o020;
-/// In such a folder everybody renames and removes only what is their own.
+/// Sticky bit: in such a folder users can rename and remove only their own files.
 const STICKY: u32 = 0o1000;
 
-/// The path that a variable of the environment names. One that is empty or relative names none: it would lead wherever the
-/// program happens to be started.
+/// Returns the path in an environment variable; `None` if it is empty or relative, because a relative path would depend
+/// on the working directory.
 pub fn absolute(variable: &str) -> Option<PathBuf> {
     std::env::var_os(variable).map(PathBuf::from).filter(|path| path.is_absolute())
 }
 
-/// Where a file of code really is, with all links on the way resolved.
+/// Resolves the path of a code file, and checks that it is trusted.
 ///
 /// # Errors
-/// It is not there; or others than the user and the system can write to it, or replace it or a folder that it lies in.
+/// The file does not exist; or users other than this one and root can write to it, or replace it or a folder on its
+/// path.
 pub fn code(path: &Path) -> Result<PathBuf, String> {
     let there = path.canonicalize().map_err(|error| format!("{}: {error}", path.display()))?;
     let (user, group) = (geteuid().as_raw(), getegid().as_raw());
@@ -34,10 +35,11 @@ pub fn code(path: &Path) -> Result<PathBuf, String> {
     Ok(there)
 }
 
-/// Why others than `own` user and group, and the system, can write to what has this owner, group and mode.
+/// Returns how users other than `own` (user, group) and root can write to a file of this owner, group and mode; `None`
+/// if they cannot.
 fn others_write(own: (u32, u32), (owner, group): (u32, u32), mode: u32, is_folder: bool) -> Option<&'static str> {
     let is_sticky = is_folder && mode & STICKY != 0;
-    // Where each user has a group of their own, it commonly may write.
+    // The own group often may write, if each user has a private group.
     let by_group = mode & BY_GROUP != 0 && group != own.1 && group != 0;
     match () {
         () if owner != own.0 && owner != 0 => Some("belongs to another user"),

@@ -1,4 +1,4 @@
-//! Where snapshots and recordings go that were given no name, and what they are called.
+//! Default folders and names of snapshots and recordings.
 
 use std::env;
 use std::path::{Path, PathBuf};
@@ -8,28 +8,28 @@ use std::thread;
 use super::input;
 use super::trusted::absolute;
 
-/// The folders of snapshots and of recordings.
+/// The default folders of snapshots and recordings.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Folders {
     pub pictures: PathBuf,
     pub videos: PathBuf,
 }
 
-/// What all names begin with, and what those of pictures and recordings end with.
+/// The prefix of all names, and the suffixes of pictures and recordings.
 const NAME: &str = "bokehcam";
 const PICTURE: &str = ".png";
 const VIDEO: &str = ".mp4";
-/// The date and the time of day in between.
+/// Date and time between them.
 const TIME: &str = "%Y-%m-%d %H-%M-%S";
 
 impl Folders {
-    /// One folder for all.
+    /// Creates folders that are all the same.
     pub fn at(folder: PathBuf) -> Self {
         Self { pictures: folder.clone(), videos: folder }
     }
 
-    /// The user's own folders of pictures and videos, as the environment or `user-dirs.dirs` name them, or as they are
-    /// usually called; where there is none, the current folder.
+    /// Returns the user's folders of pictures and videos, from the environment, `user-dirs.dirs` or their default
+    /// names; the current folder if none exists.
     pub fn of_user() -> Self {
         let home = absolute("HOME");
         let config = absolute("XDG_CONFIG_HOME").or_else(|| Some(home.as_ref()?.join(".config")));
@@ -37,7 +37,7 @@ impl Folders {
             config.and_then(|config| input::read_text(&config.join("user-dirs.dirs"), input::MOST_SETTINGS_BYTES).ok());
         let folder = |variable: &str, usual: &str| {
             let home = home.as_deref();
-            let named = named.as_deref().zip(home).and_then(|(text, home)| named_in(text, variable, home));
+            let named = named.as_deref().zip(home).and_then(|(text, home)| parse_user_dir(text, variable, home));
             let all = [absolute(variable), named, home.map(|home| home.join(usual))];
             all.into_iter()
                 .flatten()
@@ -48,25 +48,25 @@ impl Folders {
         Self { pictures: folder("XDG_PICTURES_DIR", "Pictures"), videos: folder("XDG_VIDEOS_DIR", "Videos") }
     }
 
-    /// Both, each once: earlier versions put recordings beside snapshots.
+    /// Returns both folders, without duplicates: earlier versions put recordings next to snapshots.
     pub fn all(&self) -> impl Iterator<Item = &Path> {
         let pictures = Some(self.pictures.as_path()).filter(|pictures| *pictures != self.videos);
         [self.videos.as_path()].into_iter().chain(pictures)
     }
 
-    /// A path for a recording that is begun now: neither does it exist nor is it `taken`.
+    /// Returns a path for a new recording, which neither exists nor is `taken`.
     pub fn free_video(&self, taken: impl Fn(&Path) -> bool) -> PathBuf {
-        free(&self.videos, VIDEO, taken)
+        unused_path(&self.videos, VIDEO, taken)
     }
 
-    /// A path for a picture that is taken now and does not exist.
+    /// Returns a path for a new picture, which does not exist.
     pub fn free_picture(&self) -> PathBuf {
-        free(&self.pictures, PICTURE, |_| false)
+        unused_path(&self.pictures, PICTURE, |_| false)
     }
 }
 
-/// A path of now in the folder, with this ending: nothing is there, not even a link, nor is it `taken`.
-fn free(folder: &Path, ending: &str, taken: impl Fn(&Path) -> bool) -> PathBuf {
+/// Returns a path in the folder, named by date, with this suffix; neither a file, nor a link, nor `taken`.
+fn unused_path(folder: &Path, ending: &str, taken: impl Fn(&Path) -> bool) -> PathBuf {
     let stem = stem();
     let path = |number: u32| match number {
         1 => folder.join(format!("{stem}{ending}")),
@@ -76,12 +76,13 @@ fn free(folder: &Path, ending: &str, taken: impl Fn(&Path) -> bool) -> PathBuf {
     (1..u32::MAX).map(path).find(is_free).unwrap_or_else(|| path(u32::MAX))
 }
 
-/// The name of a file that is made now, without its ending: with the date and the time of day here.
+/// Returns the file name of a new file without extension: the local date and time.
 pub fn stem() -> String {
     jiff::ZonedDateTime::now().strftime(&format!("{NAME} {TIME}")).to_string()
 }
 
-/// Whether a recording without a name of its own is called so, now or by earlier versions: `bokehcam-7.mp4`.
+/// Returns whether this is a default name of a recording, in the current form or that of earlier versions,
+/// `bokehcam-7.mp4`.
 pub fn is_video(name: &str) -> bool {
     let Some(rest) = name.strip_prefix(NAME).and_then(|rest| rest.strip_suffix(VIDEO)) else { return false };
     let is_number = |text: &str| !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_digit());
@@ -93,7 +94,7 @@ pub fn is_video(name: &str) -> bool {
     is_date && (number.is_empty() || number.strip_prefix('-').is_some_and(is_number))
 }
 
-/// A path as one says it: from the home on, where it is there.
+/// Formats a path for users: relative to the home folder (`~/`) if it lies there.
 pub fn shown(path: &Path) -> String {
     match absolute("HOME").and_then(|home| path.strip_prefix(home).ok().map(Path::to_owned)) {
         Some(inside) => format!("~/{}", inside.display()),
@@ -101,18 +102,19 @@ pub fn shown(path: &Path) -> String {
     }
 }
 
-/// What is written at a place, as one says it: a virtual camera by its name, a file from the home on.
+/// Formats an output for users: a virtual camera by its name, a file as [`shown`].
 pub fn shown_output(name: &str) -> String {
     if name.starts_with('/') { shown(Path::new(name)) } else { name.to_owned() }
 }
 
-/// The folder that a file is in, whole; `None` where there is no such file.
+/// Returns the absolute path of the folder of a file; `None` if the file does not exist.
 pub fn folder_of(file: &Path) -> Option<PathBuf> {
     let folder = file.canonicalize().ok().filter(|file| file.is_file())?;
     folder.parent().map(Path::to_owned)
 }
 
-/// Shows a folder in the desktop's file manager, and waits for neither; `failed` is told, on another thread, why not.
+/// Opens a folder in the desktop's file manager without waiting; calls `failed` with the reason, on another thread, if
+/// that fails.
 pub fn open(folder: PathBuf, failed: impl Fn(String) + Send + 'static) {
     let run = move || {
         let mut command = Command::new("xdg-open");
@@ -124,13 +126,13 @@ pub fn open(folder: PathBuf, failed: impl Fn(String) + Send + 'static) {
         };
         failed(format!("{} cannot be shown: {why}", folder.display()));
     };
-    // Without a thread there is nobody to tell.
+    // If there is no thread, the failure cannot be reported.
     let _ = thread::Builder::new().name("folder".into()).spawn(run);
 }
 
-/// The folder that `user-dirs.dirs` names: a line of `VARIABLE="$HOME/path"` or `VARIABLE="/path"`. The home itself stands
-/// for none.
-fn named_in(text: &str, variable: &str, home: &Path) -> Option<PathBuf> {
+/// Parses a folder from `user-dirs.dirs`: a line of `VARIABLE="$HOME/path"` or `VARIABLE="/path"`. The home folder
+/// itself means none.
+fn parse_user_dir(text: &str, variable: &str, home: &Path) -> Option<PathBuf> {
     let value = text
         .lines()
         .rev()
@@ -138,7 +140,7 @@ fn named_in(text: &str, variable: &str, home: &Path) -> Option<PathBuf> {
     let mut plain = String::new();
     let mut signs = value.chars();
     while let Some(sign) = signs.next() {
-        // A backslash stands before a sign that means something in a shell.
+        // A backslash escapes a character with a meaning in a shell.
         plain.extend(if sign == '\\' { signs.next() } else { Some(sign) });
     }
     match plain.strip_prefix("$HOME/") {
@@ -155,7 +157,7 @@ mod tests {
     fn the_users_folders_are_read_as_they_are_written() {
         let text = "# made by xdg-user-dirs-update\nXDG_PICTURES_DIR=\"$HOME/Bilder\"\nXDG_VIDEOS_DIR=\"/data/My \\\"films\\\"\"\n\
                     XDG_MUSIC_DIR=\"$HOME/\"\nXDG_DESKTOP_DIR=Desktop\n";
-        let named = |variable| named_in(text, variable, Path::new("/home/me"));
+        let named = |variable| parse_user_dir(text, variable, Path::new("/home/me"));
         assert_eq!(named("XDG_PICTURES_DIR"), Some("/home/me/Bilder".into()));
         assert_eq!(named("XDG_VIDEOS_DIR"), Some("/data/My \"films\"".into()));
         for none in ["XDG_MUSIC_DIR", "XDG_DESKTOP_DIR", "XDG_PICTURES", "XDG_TEMPLATES_DIR"] {

@@ -1,7 +1,7 @@
-//! Files that appear under their name only when they are whole: written beside it, synced, then renamed.
+//! Atomic files: written under a hidden name in the same folder, synced, then renamed.
 //!
-//! The part file is hidden, has a name that no other process uses, is never opened through a link, and is locked while
-//! it is being written: one that can be locked was left behind by a process that died.
+//! The part file has a name that no other process uses, is never opened through a link, and is locked while it is being
+//! written: if it can be locked, its process has died.
 
 use std::ffi::{OsStr, OsString};
 use std::fs::{self, File};
@@ -16,37 +16,37 @@ use rustix::fs::{CWD, FlockOperation, RenameFlags, flock, renameat_with};
 
 const SUFFIX: &str = ".part";
 
-/// A file under construction. Dropping it removes what was written.
+/// A file under construction. Dropping it removes the part file.
 #[derive(Debug)]
 pub struct Part {
-    /// The name in the end.
+    /// The final path.
     path: PathBuf,
-    /// The hidden name meanwhile.
+    /// The hidden path meanwhile.
     part: PathBuf,
     file: File,
-    /// Whether there is anything left to remove.
+    /// Whether the part file must be removed on drop.
     open: bool,
 }
 
 impl Part {
-    /// Starts the file that will be at `path`; the folder above it must be there.
+    /// Creates a part file for `path`, whose folder must exist.
     ///
     /// # Errors
-    /// `path` names no file, or the part cannot be made beside it.
+    /// `path` has no file name, or the part file cannot be created.
     pub fn create(path: &Path) -> io::Result<Self> {
-        let (folder, name) = split(path)?;
+        let (folder, name) = split_path(path)?;
         loop {
             let part = folder.join(part_name(name));
             let file = File::create_new(&part)?;
             flock(&file, FlockOperation::NonBlockingLockExclusive)?;
-            // Before it was locked, another process may have taken it for one left behind, and removed it.
+            // Before it was locked, another process may have removed it as an abandoned part.
             if part.symlink_metadata().is_ok() {
                 return Ok(Self { path: path.to_owned(), part, file, open: true });
             }
         }
     }
 
-    /// The name in the end.
+    /// Returns the final path.
     pub fn path(&self) -> &Path {
         &self.path
     }
@@ -55,24 +55,24 @@ impl Part {
         &self.part
     }
 
-    /// The open file, for reading its state and for writing.
+    /// Returns the open file, for writing and for its metadata.
     pub fn file(&self) -> &File {
         &self.file
     }
 
-    /// Gives the file its name once it is safely on the disk. With `replace`, it takes the place of what is there, in
-    /// one step, and has its permissions.
+    /// Syncs the file and renames it to its final path. With `replace`, it atomically replaces an existing file, and
+    /// takes over its permissions.
     ///
     /// # Errors
-    /// [`ErrorKind::AlreadyExists`] without `replace`, or what the system says. The part is then removed.
+    /// [`ErrorKind::AlreadyExists`] without `replace`, or an error of the system. The part file is then removed.
     pub fn commit(mut self, replace: bool) -> io::Result<()> {
         self.try_commit(replace)
     }
 
-    /// As [`Part::commit`], but a part that could not be given its name can still be [kept](Self::keep_incomplete).
+    /// Does the same as [`Part::commit`], but on failure the part can still be [kept](Self::keep_incomplete).
     ///
     /// # Errors
-    /// As for [`Part::commit`].
+    /// Same as for [`Part::commit`].
     pub fn try_commit(&mut self, replace: bool) -> io::Result<()> {
         if replace && let Ok(there) = fs::metadata(&self.path) {
             self.file.set_permissions(there.permissions())?;
@@ -83,46 +83,46 @@ impl Part {
         sync_folder(&self.path)
     }
 
-    /// As [`Part::commit`] without replacing, and without waiting for the disk: the caller syncs the file system later.
+    /// Does the same as [`Part::commit`] without replacing and without sync: the caller syncs the file system later.
     ///
     /// # Errors
-    /// As for [`Part::commit`].
+    /// Same as for [`Part::commit`].
     pub fn commit_unsynced(mut self) -> io::Result<()> {
         rename(&self.part, &self.path, false)?;
         self.open = false;
         Ok(())
     }
 
-    /// Whether somebody removed it, alone or with its folder. What was written can still be read here.
+    /// Returns whether the file was removed, alone or with its folder. Its content is still readable here.
     pub fn is_removed(&self) -> bool {
-        // Not every file system counts names.
-        self.file.metadata().is_ok_and(|file| file.nlink() == 0) && self.whereabouts().is_none()
+        // Not every file system has a correct link count.
+        self.file.metadata().is_ok_and(|file| file.nlink() == 0) && self.current_path().is_none()
     }
 
-    /// Where the file is by now: whoever renamed its folder took it along.
-    fn whereabouts(&self) -> Option<PathBuf> {
+    /// Returns the file's current path, which changes if its folder was renamed.
+    fn current_path(&self) -> Option<PathBuf> {
         let identity = |file: fs::Metadata| (file.dev(), file.ino());
         let own = identity(self.file.metadata().ok()?);
         let is_own = |path: &PathBuf| path.symlink_metadata().is_ok_and(|there| identity(there) == own);
-        let renamed = || fs::read_link(self.by_descriptor()).ok().filter(is_own);
+        let renamed = || fs::read_link(self.descriptor_path()).ok().filter(is_own);
         Some(self.part.clone()).filter(is_own).or_else(renamed)
     }
 
-    /// The name that the system gives to the open file.
-    fn by_descriptor(&self) -> String {
+    /// Returns a path to the open file in `/proc`.
+    fn descriptor_path(&self) -> String {
         format!("/proc/self/fd/{}", self.file.as_raw_fd())
     }
 
-    /// Keeps what is not whole by the name that [`keep_incomplete`] gives it, and tells where it is then: by its hidden name, if
-    /// it cannot be renamed. One that was removed is copied to the nearest folder that is left.
+    /// Keeps an incomplete file under the name of [`keep_incomplete`], or under its hidden name if it cannot be
+    /// renamed; returns the path. A removed file is copied to the nearest folder that still exists.
     ///
     /// # Errors
-    /// It was removed, and cannot be copied: it is lost.
+    /// The file was removed and cannot be copied: it is lost.
     pub fn keep_incomplete(mut self) -> io::Result<PathBuf> {
-        // From here on it is never removed, not even if it cannot be synced or renamed.
+        // From here on it must not be removed, even if it cannot be synced or renamed.
         self.open = false;
         let _ = self.file.sync_all();
-        let Some(part) = self.whereabouts() else { return self.copy_incomplete() };
+        let Some(part) = self.current_path() else { return self.copy_incomplete() };
         let path = match part == self.part {
             true => self.path.clone(),
             false => part.with_file_name(self.path.file_name().unwrap_or_default()),
@@ -130,42 +130,42 @@ impl Part {
         Ok(keep_incomplete(&part, &path).unwrap_or(part))
     }
 
-    /// Copies the file to the nearest folder that is left: the system gives no name back to a file that has lost its last one.
+    /// Copies the file to the nearest existing folder: a file without a name cannot be linked again.
     fn copy_incomplete(&self) -> io::Result<PathBuf> {
-        let (folder, name) = split(&self.path)?;
+        let (folder, name) = split_path(&self.path)?;
         let folder = std::path::absolute(folder)?;
         let left = folder.ancestors().find(|folder| folder.is_dir()).unwrap_or(Path::new("/"));
         let copy = Self::create(&left.join(name))?;
-        // Before it, as it may take long.
+        // Warn first, as copying may take long.
         tracing::warn!("{} was removed: what there is of it is copied to {}", self.path.display(), left.display());
-        io::copy(&mut File::open(self.by_descriptor())?, &mut copy.file())?;
+        io::copy(&mut File::open(self.descriptor_path())?, &mut copy.file())?;
         copy.keep_incomplete()
     }
 }
 
 impl Drop for Part {
     fn drop(&mut self) {
-        if let Some(part) = self.open.then(|| self.whereabouts()).flatten() {
-            // Nobody is left to tell that it cannot be removed.
+        if let Some(part) = self.open.then(|| self.current_path()).flatten() {
+            // A failure cannot be reported here.
             let _ = fs::remove_file(part);
         }
     }
 }
 
-/// Writes a file in one go; with `replace`, as for [`Part::commit`].
+/// Writes a file atomically; `replace` as for [`Part::commit`].
 ///
 /// # Errors
-/// As for [`Part::create`] and [`Part::commit`], or it cannot be written.
+/// Same as for [`Part::create`] and [`Part::commit`], or the file cannot be written.
 pub fn write(path: &Path, bytes: &[u8], replace: bool) -> io::Result<()> {
     let part = Part::create(path)?;
     part.file().write_all(bytes)?;
     part.commit(replace)
 }
 
-/// Renames a file or folder within one file system; without `replace`, never over something that exists.
+/// Renames a file or folder within one file system; without `replace`, never over an existing one.
 ///
 /// # Errors
-/// [`ErrorKind::AlreadyExists`] without `replace`, or what the system says.
+/// [`ErrorKind::AlreadyExists`] without `replace`, or an error of the system.
 pub fn rename(from: &Path, to: &Path, replace: bool) -> io::Result<()> {
     if replace {
         return fs::rename(from, to);
@@ -180,13 +180,13 @@ pub fn rename(from: &Path, to: &Path, replace: bool) -> io::Result<()> {
     }
 }
 
-/// Renames what was begun as `part` to `NAME.incomplete.mp4` (or whatever its ending is: a player opens it then), to
-/// `NAME.incomplete` without one, or to `NAME.incomplete.2.mp4` and on where that is taken.
+/// Renames an incomplete file `part` to `NAME.incomplete.EXT` (so that players still open it), without extension to
+/// `NAME.incomplete`, or to `NAME.incomplete.2.EXT` and so on if the name exists.
 ///
 /// # Errors
-/// What the system says.
+/// Returns the error of the system.
 pub fn keep_incomplete(part: &Path, path: &Path) -> io::Result<PathBuf> {
-    // A folder's name has no ending, whatever dots are in it.
+    // Dots in a folder's name are no extension.
     let ending = path.extension().filter(|_| !part.is_dir());
     let stem = if ending.is_some() { path.file_stem() } else { path.file_name() };
     for number in 1.. {
@@ -205,9 +205,9 @@ pub fn keep_incomplete(part: &Path, path: &Path) -> io::Result<PathBuf> {
     Err(ErrorKind::AlreadyExists.into())
 }
 
-/// Bytes that this process has written of a file that will be at `path`; `None` where it writes none.
+/// Returns the bytes that this process has written so far for a file at `path`; `None` if it writes no such file.
 pub fn bytes_so_far(path: &Path) -> Option<u64> {
-    let (folder, name) = split(path).ok()?;
+    let (folder, name) = split_path(path).ok()?;
     let own = format!(".{}-", std::process::id());
     let parts = fs::read_dir(folder).ok()?.flatten().filter(|entry| {
         let part = entry.file_name();
@@ -216,17 +216,17 @@ pub fn bytes_so_far(path: &Path) -> Option<u64> {
     parts.filter_map(|part| part.metadata().ok()).map(|part| part.len()).max()
 }
 
-/// The parts of `path` whose process is gone. None is locked any more, so who calls this may remove or keep them.
+/// Returns the part files of `path` whose process is gone. They are not locked, so the caller may remove or keep them.
 ///
 /// # Errors
 /// The folder cannot be read.
 pub fn left_behind(path: &Path) -> io::Result<Vec<PathBuf>> {
-    let (folder, name) = split(path)?;
+    let (folder, name) = split_path(path)?;
     let all = all_left_behind(folder)?.into_iter();
     Ok(all.filter(|(_, of)| of == name).map(|(part, _)| part).collect())
 }
 
-/// All parts in a folder whose process is gone, each with the name that it would have had in the end.
+/// Returns all part files in a folder whose process is gone, each with its final name.
 ///
 /// # Errors
 /// The folder cannot be read.
@@ -248,22 +248,22 @@ pub fn all_left_behind(folder: &Path) -> io::Result<Vec<(PathBuf, OsString)>> {
     Ok(found)
 }
 
-/// Syncs the folder of `path`, so that the file's name is safely on the disk, too.
+/// Syncs the folder of `path`, so that the file's name is on disk as well.
 pub(super) fn sync_folder(path: &Path) -> io::Result<()> {
-    let (folder, _) = split(path)?;
-    // Not every file system syncs folders; the file itself is on the disk.
+    let (folder, _) = split_path(path)?;
+    // Not every file system can sync folders; the file itself is on disk.
     let _ = File::open(folder)?.sync_all();
     Ok(())
 }
 
-/// Folder and file name.
-fn split(path: &Path) -> io::Result<(&Path, &OsStr)> {
+/// Splits a path into folder and file name.
+fn split_path(path: &Path) -> io::Result<(&Path, &OsStr)> {
     let name = path.file_name().ok_or_else(|| io::Error::new(ErrorKind::InvalidInput, "this names no file"))?;
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     Ok((folder, name))
 }
 
-/// `.NAME.PROCESS-NUMBER.part`
+/// Returns a new part name: `.NAME.PROCESS-NUMBER.part`.
 fn part_name(name: &OsStr) -> OsString {
     static NEXT: AtomicU32 = AtomicU32::new(0);
     let mut part = OsString::from(".");
@@ -272,7 +272,7 @@ fn part_name(name: &OsStr) -> OsString {
     part
 }
 
-/// The name that a part will have in the end; `None` if the name is not of the form of [`part_name`].
+/// Returns the final name of a part file; `None` if the name does not have the form of [`part_name`].
 fn name_of_part(part: &OsStr) -> Option<&OsStr> {
     let part = part.as_bytes().strip_prefix(b".")?.strip_suffix(SUFFIX.as_bytes())?;
     let (name, numbers) = part.split_at(part.iter().rposition(|&byte| byte == b'.')?);

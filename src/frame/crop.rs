@@ -1,37 +1,37 @@
-//! A part of a picture, enlarged to the whole.
+//! Crops: a part of a picture, enlarged to the picture's size.
 
 use super::ColorImage;
 use super::scale::Scale;
 
-/// A part of a picture, of its proportions, as fractions of its width and height: within 0 to 1.
+/// A part of a picture with the picture's aspect ratio, in fractions of its width and height, 0 to 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Crop {
-    /// Of the part's middle.
+    /// Centre of the part.
     pub center: [f32; 2],
-    /// How much larger it is shown, at least 1: the part's side is the reciprocal.
+    /// Magnification, at least 1: the part's side is the reciprocal.
     pub zoom: f32,
 }
 
 impl Crop {
-    /// All of the picture.
+    /// The whole picture.
     pub const WHOLE: Self = Self { center: [0.5; 2], zoom: 1.0 };
 
-    /// The same, moved into the picture.
+    /// Returns the crop, moved inside the picture.
     pub fn inside(self) -> Self {
         let zoom = self.zoom.max(1.0);
         let half = 0.5 / zoom;
         Self { center: self.center.map(|center| center.clamp(half, 1.0 - half)), zoom }
     }
 
-    /// Where it begins, and how long it is, along a side of so many pixels.
-    fn along(&self, axis: usize, side: u32) -> (f64, f64) {
+    /// Returns start and length of the part along an axis of `side` pixels.
+    fn span(&self, axis: usize, side: u32) -> (f64, f64) {
         let (side, length) = (f64::from(side), f64::from(side) / f64::from(self.zoom));
         let begin = f64::from(self.center[axis]) * side - 0.5 * length;
         (begin.clamp(0.0, side - length), length)
     }
 }
 
-/// Enlarges parts of pictures; owns the memory for it.
+/// Enlarges crops of pictures; owns the scratch memory.
 #[derive(Debug, Default)]
 pub struct Cropper {
     scale: Scale,
@@ -39,14 +39,15 @@ pub struct Cropper {
 }
 
 impl Cropper {
-    /// Writes a part of `from` to `into`, as large as `from`: bilinear, to fractions of a pixel, so that it glides.
+    /// Writes a crop of `from` to `into`, as large as `from`: bilinear, at subpixel positions, so that a moving crop is
+    /// smooth.
     pub fn crop(&mut self, from: &ColorImage, crop: &Crop, into: &mut ColorImage) {
         into.resize(from.width, from.height);
         let (width, height) = (from.width as usize, from.height as usize);
         if from.rgb.is_empty() {
             return;
         }
-        let parts = [crop.along(0, from.width), crop.along(1, from.height)];
+        let parts = [crop.span(0, from.width), crop.span(1, from.height)];
         self.scale.adapt_part((width, height), parts, (width, height));
         for (y, row) in into.rgb.chunks_exact_mut(3 * width).enumerate() {
             self.scale.row(&from.rgb, y, 0..width, &mut self.row, row);
@@ -58,7 +59,7 @@ impl Cropper {
 mod tests {
     use super::*;
 
-    /// Red grows to the right and green downwards, by one code in two pixels.
+    /// Red increases to the right and green downwards, by one code every two pixels.
     fn ramp(width: u32, height: u32) -> ColorImage {
         let pixel = |at: u32| [(at % width / 2) as u8, (at / width / 2) as u8, 77];
         ColorImage { width, height, rgb: (0..width * height).flat_map(pixel).collect() }

@@ -1,16 +1,16 @@
-//! A picture scaled into another size, whole and undistorted: what is left over on two sides becomes black bars.
+//! Letterboxing: scales a whole picture to another size without distortion; the remaining two sides are black bars.
 
 use super::ColorImage;
 use super::scale::Scale;
 
-/// Scales pictures; keeps its memory and weights from one to the next.
+/// Scales pictures; caches scratch memory and weights.
 #[derive(Debug, Default)]
 pub struct Fit {
     scale: Scale,
     row: Vec<u16>,
 }
 
-/// Where a scaled picture comes to lie, in pixels.
+/// Position of the scaled picture, in pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Place {
     left: usize,
@@ -20,9 +20,9 @@ struct Place {
 }
 
 impl Fit {
-    /// Scales `from` as large as it goes into the size that `into` has, in the middle, with black bars beside it or
-    /// above and below. Enlarges bilinearly; shrinks by a triangle as wide as two of the new pixels, so that nothing
-    /// aliases. Pictures of equal size are copied. Allocates only when either size changes.
+    /// Scales `from` to the largest size that fits `into`, centred, with black bars on two sides. Enlarges bilinearly;
+    /// shrinks with a triangle filter twice as wide as a new pixel, which avoids aliasing. Pictures of equal size are
+    /// copied. Allocates only when either size changes.
     pub fn fit(&mut self, from: &ColorImage, into: &mut ColorImage) {
         if from.size() == into.size() {
             into.rgb.copy_from_slice(&from.rgb);
@@ -49,7 +49,7 @@ impl Fit {
         }
     }
 
-    /// `from` where that has the size of `room`, else [`fit`](Self::fit) into `room`.
+    /// Returns `from` if it has the size of `room`, else its [`fit`](Self::fit) in `room`.
     pub fn fitted<'a>(&mut self, from: &'a ColorImage, room: &'a mut ColorImage) -> &'a ColorImage {
         if from.size() == room.size() {
             return from;
@@ -59,19 +59,19 @@ impl Fit {
     }
 }
 
-/// `None` where either picture has no pixels.
+/// Returns the position of the scaled picture; `None` if either picture has no pixels.
 fn place(from: (usize, usize), into: (usize, usize)) -> Option<Place> {
     if from.0 == 0 || from.1 == 0 || into.0 == 0 || into.1 == 0 {
         return None;
     }
-    // Whichever side fills its own first; the other follows, rounded.
+    // One side fills its own exactly; the other follows, rounded.
     let scaled = |side: usize, to: usize, of: usize| ((side * to + of / 2) / of).max(1);
     let (width, height) = if from.0 * into.1 >= from.1 * into.0 {
         (into.0, scaled(from.1, into.0, from.0).min(into.1))
     } else {
         (scaled(from.0, into.1, from.1).min(into.0), into.1)
     };
-    // Even, so that pixels that share their colour in the output are of one kind.
+    // Even, because chroma subsampling shares colour between pairs of pixels.
     Some(Place { left: ((into.0 - width) / 2) & !1, top: ((into.1 - height) / 2) & !1, width, height })
 }
 
@@ -85,7 +85,7 @@ mod tests {
     }
 
     fn fitted(from: &ColorImage, (width, height): (u32, u32)) -> ColorImage {
-        // What was there before must not be seen.
+        // Old content must not be visible.
         let mut into = picture(width, height, |_, _| [77; 3]);
         Fit::default().fit(from, &mut into);
         into
@@ -133,7 +133,7 @@ mod tests {
             };
             let (scaled, expected) =
                 (fitted(&picture(from.0, from.1, ramp(from)), into), picture(into.0, into.1, ramp(into)));
-            // Away from the edges, where half a filter is missing.
+            // Excludes the edges, where half a filter is missing.
             for (x, y) in (8..into.1 - 8).flat_map(|y| (8..into.0 - 8).map(move |x| (x, y))) {
                 for (got, wanted) in at(&scaled, x, y).into_iter().zip(at(&expected, x, y)) {
                     assert!(got.abs_diff(wanted) <= 1, "{from:?} into {into:?} at {x}, {y}: {got} not {wanted}");

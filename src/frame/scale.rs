@@ -1,21 +1,21 @@
-//! A picture in another size, row by row: bilinear where it grows; where it shrinks, by a triangle as wide as two of the
-//! new pixels, so that nothing aliases.
+//! Scales a picture row by row: bilinear when enlarging; when shrinking, with a triangle filter twice as wide as a new
+//! pixel, which avoids aliasing.
 
 use std::ops::Range;
 
 use pulp::{Arch, Simd, WithSimd};
 
-/// Fractional bits of the weights of a row's or column's taps.
+/// Fractional bits of the tap weights.
 const WEIGHT_BITS: u32 = 14;
-/// Fractional bits of a value that is filtered down the columns but not yet along the row; fits 16 bits.
+/// Fractional bits of a value between the vertical and the horizontal filter; fits 16 bits.
 const VALUE_BITS: u32 = 8;
-/// The weight of a tap that is alone.
+/// Weight of a single tap.
 const ONE: u16 = 1 << WEIGHT_BITS;
-/// Columns that are filtered at once, and the values that a pixel of them is read as: the last is not used.
+/// Columns that are filtered at once, and the values that are read per pixel, of which the last is unused.
 const BLOCK: usize = 128;
 const VALUES: usize = 4;
 
-/// From one size to another.
+/// Scaler from one size to another.
 #[derive(Debug, Default)]
 pub struct Scale {
     arch: Arch,
@@ -24,25 +24,25 @@ pub struct Scale {
 }
 
 impl Scale {
-    /// Takes other sizes (columns, rows), neither with a side of 0. Allocates only when one changes.
+    /// Sets the sizes (columns, rows), all sides above 0. Allocates only when a size changes.
     pub fn adapt(&mut self, from: (usize, usize), to: (usize, usize)) {
         self.adapt_part(from, [(0.0, from.0 as f64), (0.0, from.1 as f64)], to);
     }
 
-    /// The same for a part of the source: where it begins, and how long it is, across and down, in pixels and parts of pixels.
-    /// It lies within the source. Allocates no more when another part is taken.
+    /// Sets the sizes for a part of the source, given by start and length across and down, in fractional pixels. The
+    /// part is inside the source. Changing only the part does not allocate.
     pub fn adapt_part(&mut self, from: (usize, usize), [across, down]: [(f64, f64); 2], to: (usize, usize)) {
         self.across.adapt(from.0, across, to.0);
         self.down.adapt(from.1, down, to.1);
     }
 
-    /// Writes these `columns` of the row `y` of the scaled picture to `scaled`, 3 bytes each; `from` are the pixels of
-    /// the whole source, `scratch` any memory, which is grown to a row of it.
+    /// Writes these `columns` of row `y` of the scaled picture to `scaled`, 3 bytes each. `from` is the whole source;
+    /// `scratch` grows to one row of it.
     pub fn row(&self, from: &[u8], y: usize, columns: Range<usize>, scratch: &mut Vec<u16>, scaled: &mut [u8]) {
         if columns.is_empty() {
             return;
         }
-        // A pixel is read as four values.
+        // Four values are read per pixel.
         scratch.resize(3 * self.across.from + 1, 0);
         self.arch.dispatch(Row { scale: self, from, y, columns, row: scratch, scaled });
     }
@@ -65,14 +65,14 @@ impl WithSimd for Row<'_> {
         let Self { scale: Scale { across, down, .. }, from, y, columns, row, scaled } = self;
         let stride = 3 * across.from;
         let (first, weights) = down.taps(y);
-        let needed = across.needs(&columns);
+        let needed = across.source_range(&columns);
         let needed = 3 * needed.start..3 * needed.end;
         filter_down(&from[stride * first + needed.start..], stride, weights, &mut row[needed]);
         across.filter(row, columns, scaled);
     }
 }
 
-/// The weighted sum of `weights.len()` rows of `stride` values each.
+/// Computes the weighted sum of `weights.len()` rows of `stride` values each.
 #[inline(always)]
 fn filter_down(rows: &[u8], stride: usize, weights: &[u16], row: &mut [u16]) {
     if let Some(alone) = weights.iter().position(|&weight| weight == ONE) {
@@ -84,56 +84,57 @@ fn filter_down(rows: &[u8], stride: usize, weights: &[u16], row: &mut [u16]) {
     match *weights {
         [a, b] => {
             for ((sum, &upper), &lower) in row.iter_mut().zip(rows).zip(&rows[stride..]) {
-                *sum = share(upper, a) + share(lower, b);
+                *sum = weigh(upper, a) + weigh(lower, b);
             }
         }
         [a, b, c] => {
             let (second, third) = (&rows[stride..], &rows[2 * stride..]);
             for (((sum, &upper), &middle), &lower) in row.iter_mut().zip(rows).zip(second).zip(third) {
-                *sum = share(upper, a) + share(middle, b) + share(lower, c);
+                *sum = weigh(upper, a) + weigh(middle, b) + weigh(lower, c);
             }
         }
         _ => {
             row.fill(0);
             for (values, &weight) in rows.chunks(stride).zip(weights) {
                 for (sum, &value) in row.iter_mut().zip(values) {
-                    *sum += share(value, weight);
+                    *sum += weigh(value, weight);
                 }
             }
         }
     }
 }
 
-/// A code times a weight below [`ONE`].
+/// Multiplies a code by a weight below [`ONE`].
 #[inline(always)]
-fn share(code: u8, weight: u16) -> u16 {
-    share_of(u16::from(code) << VALUE_BITS, upper(weight))
+fn weigh(code: u8, weight: u16) -> u16 {
+    multiply_high(u16::from(code) << VALUE_BITS, to_u16_weight(weight))
 }
 
-/// A value times a weight of 16 bits, cut to the value's bits: below a tenth of a code in all, for every usual size. The upper
-/// half of a product of 16 bits each, which vectors have.
+/// Multiplies a value by a 16-bit weight, truncated: the total error is below a tenth of a code for all usual sizes.
+/// The high half of a 16-bit product is a vector instruction.
 #[inline(always)]
-fn share_of(value: u16, weight: u16) -> u16 {
+fn multiply_high(value: u16, weight: u16) -> u16 {
     ((u32::from(value) * u32::from(weight)) >> 16) as u16
 }
 
-/// A weight of 16 bits. That of a tap that is alone is a little less than 1, which rounding makes good.
+/// Converts a weight to 16 bits. The weight of a single tap is slightly below 1, which rounding corrects.
 #[inline(always)]
-fn upper(weight: u16) -> u16 {
+fn to_u16_weight(weight: u16) -> u16 {
     if weight == ONE { u16::MAX } else { weight << (16 - WEIGHT_BITS) }
 }
 
-/// The taps of every pixel along one axis of the scaled picture: equally many each, within the source.
+/// Taps of every pixel along one axis of the scaled picture: the same number each, inside the source.
 #[derive(Debug, Default)]
 struct Axis {
     from: usize,
-    /// Where the part begins, and how long it is.
+    /// Start and length of the part of the source.
     part: (f64, f64),
     firsts: Vec<usize>,
     taps: usize,
-    /// `taps` of each pixel; they sum to 1.
+    /// `taps` weights per pixel, with sum 1.
     weights: Vec<u16>,
-    /// The same, as [`share_of`] takes them, for each of the values of a pixel: `[tap][pixel][VALUES]`.
+    /// Same weights in the format of [`multiply_high`], repeated for each of the values of a pixel:
+    /// `[tap][pixel][VALUES]`.
     spread: Vec<u16>,
 }
 
@@ -144,20 +145,21 @@ impl Axis {
         }
         let (begin, length) = part;
         let ratio = length / to as f64;
-        let reach = ratio.max(1.0);
+        let radius = ratio.max(1.0);
         (self.from, self.part) = (from, part);
-        self.taps = ((2.0 * reach).ceil() as usize).min(from);
+        self.taps = ((2.0 * radius).ceil() as usize).min(from);
         self.firsts.clear();
         self.weights.clear();
         for pixel in 0..to {
             let center = begin + (pixel as f64 + 0.5) * ratio - 0.5;
-            let first = ((center - reach).floor() + 1.0).clamp(0.0, (from - self.taps) as f64) as usize;
+            let first = ((center - radius).floor() + 1.0).clamp(0.0, (from - self.taps) as f64) as usize;
             let start = self.weights.len();
-            let tent = |tap: usize| (1.0 - ((first + tap) as f64 - center).abs() / reach).max(0.0);
+            let tent = |tap: usize| (1.0 - ((first + tap) as f64 - center).abs() / radius).max(0.0);
             let sum: f64 = (0..self.taps).map(tent).sum();
             let one = f64::from(1 << WEIGHT_BITS);
             self.weights.extend((0..self.taps).map(|tap| (tent(tap) / sum * one).round() as u16));
-            // What rounding left over goes where it is least: a constant picture stays as it is.
+            // The rounding error is added to the largest weight, where it matters least: a constant picture stays
+            // constant.
             let weights = &mut self.weights[start..];
             let left_over = (1 << WEIGHT_BITS) - weights.iter().map(|&weight| i32::from(weight)).sum::<i32>();
             if let Some(largest) = weights.iter_mut().max() {
@@ -168,7 +170,7 @@ impl Axis {
         self.spread.clear();
         for tap in 0..self.taps {
             let weights = self.weights.iter().skip(tap).step_by(self.taps);
-            self.spread.extend(weights.flat_map(|&weight| [upper(weight); VALUES]));
+            self.spread.extend(weights.flat_map(|&weight| [to_u16_weight(weight); VALUES]));
         }
     }
 
@@ -176,12 +178,12 @@ impl Axis {
         (self.firsts[pixel], &self.weights[pixel * self.taps..][..self.taps])
     }
 
-    /// The pixels of the source that these of the scaled picture are made of.
-    fn needs(&self, pixels: &Range<usize>) -> Range<usize> {
+    /// Returns the source pixels that these scaled pixels depend on.
+    fn source_range(&self, pixels: &Range<usize>) -> Range<usize> {
         self.firsts[pixels.start]..self.firsts[pixels.end - 1] + self.taps
     }
 
-    /// Filters some of a row of 3-channel pixels.
+    /// Filters part of a row of 3-channel pixels.
     #[inline(always)]
     fn filter(&self, row: &[u16], columns: Range<usize>, scaled: &mut [u8]) {
         let to = self.firsts.len();
@@ -191,13 +193,13 @@ impl Axis {
             let mut sums = [1 << (VALUE_BITS - 1); VALUES * BLOCK];
             let mut pixels = [0; VALUES * BLOCK];
             for tap in 0..self.taps {
-                // First the pixels side by side, as they lie apart; then all of them are weighed by vectors.
+                // Gathers the scattered pixels first; then vectors weight all of them.
                 for (pixel, &first) in pixels.as_chunks_mut::<VALUES>().0.iter_mut().zip(firsts) {
                     pixel.copy_from_slice(&row[3 * (first + tap)..][..VALUES]);
                 }
                 let weights = &self.spread[VALUES * (tap * to + at)..][..VALUES * scaled.len()];
                 for ((sum, &value), &weight) in sums.iter_mut().zip(&pixels).zip(weights) {
-                    *sum += share_of(value, weight);
+                    *sum += multiply_high(value, weight);
                 }
             }
             let codes = sums.map(|sum| (sum >> VALUE_BITS) as u8);
@@ -208,7 +210,7 @@ impl Axis {
     }
 }
 
-/// The means of 2x2 values of two rows, rounded, into a row of half as many; an odd last column is left out.
+/// Writes the rounded means of 2x2 values of two rows to a row of half the length; drops an odd last column.
 #[inline(always)]
 pub fn halve_rows(upper: &[u8], lower: &[u8], half: &mut [u8]) {
     let pairs = upper.as_chunks::<2>().0.iter().zip(lower.as_chunks::<2>().0);

@@ -1,9 +1,9 @@
-//! What the numbers of a picture mean as colours.
+//! The colour encoding of pixel values.
 
 use super::Family;
 use crate::color::Matrix;
 
-/// Which numbers stand for black and white.
+/// The quantisation range of pixel values.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Range {
     /// Luma from 16 to 235, chroma from 16 to 240.
@@ -13,25 +13,25 @@ pub enum Range {
     Full,
 }
 
-/// How numbers grow with light.
+/// The transfer function of pixel values.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Transfer {
-    /// Made to be shown on a screen: the curves of sRGB and BT.709, and all that is close to them.
+    /// Display-referred: sRGB, BT.709 and similar curves.
     #[default]
     Display,
-    /// In proportion to the light.
+    /// Proportional to light.
     Linear,
-    /// A power of 2.2 (opRGB) or 2.6 (DCI-P3); in tenths.
+    /// A power function with exponent 2.2 (opRGB) or 2.6 (DCI-P3), in tenths.
     Gamma(u8),
-    /// High dynamic range (SMPTE 2084), of which no faithful 8-bit sRGB picture can be made.
+    /// High dynamic range (SMPTE 2084), which 8-bit sRGB cannot reproduce.
     Pq,
 }
 
-/// What the numbers of a picture mean: which weights make luma, which numbers are black and white, and how they grow with light.
+/// The colour encoding: weights of luma, quantisation range and transfer function.
 pub type Colors = (Matrix, Range, Transfer);
 
-/// What they mean where nobody says.
-pub(super) fn usual(family: Family) -> Colors {
+/// Returns the default encoding of a format family.
+pub(super) fn default_colors(family: Family) -> Colors {
     let range = match family {
         Family::Rgb24 { .. } | Family::Grey | Family::Depth16 | Family::Jpeg => Range::Full,
         Family::Packed422 { .. } | Family::SemiPlanar420 { .. } | Family::Planar420 { .. } => Range::Limited,

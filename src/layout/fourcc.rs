@@ -1,61 +1,61 @@
-//! Pixel formats by their four letters.
+//! Pixel formats by their four-character codes.
 
 use std::fmt;
 use std::str::FromStr;
 
-/// Four letters that name a pixel format, as V4L2 uses them.
+/// A four-character code of a pixel format, as in V4L2.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct FourCc(pub [u8; 4]);
 
-/// What a format's pictures are.
+/// The content of a format's pictures.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Content {
-    /// Colours, or brightness.
+    /// Colour or luma.
     Color,
-    /// Distances.
+    /// Depth.
     Depth,
 }
 
-/// Formats that differ in the order of their samples only.
+/// A family of formats that differ only in the order of their samples.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Family {
-    /// Two pixels in four bytes that share their chroma; where in them the two lumas, Cb and Cr stand.
+    /// Two pixels in four bytes with shared chroma; the fields are byte offsets.
     Packed422 {
-        /// Place of the first luma, 0 or 1; the second is two bytes further.
+        /// Offset of the first luma, 0 or 1; the second is two bytes further.
         luma: usize,
-        /// Place of Cb.
+        /// Offset of Cb.
         cb: usize,
-        /// Place of Cr.
+        /// Offset of Cr.
         cr: usize,
     },
-    /// A plane of luma, then one with a pair of chroma samples for each 2 x 2 pixels.
+    /// A plane of luma, then a plane of interleaved chroma, one pair per 2 x 2 pixels.
     SemiPlanar420 {
-        /// Cr comes before Cb.
+        /// Whether Cr comes before Cb.
         swapped: bool,
-        /// Each plane has memory of its own.
+        /// Whether each plane has its own memory.
         apart: bool,
     },
-    /// A plane of luma, then two of chroma, one sample for each 2 x 2 pixels.
+    /// A plane of luma, then two planes of chroma, one sample per 2 x 2 pixels.
     Planar420 {
-        /// Cr comes before Cb.
+        /// Whether Cr comes before Cb.
         swapped: bool,
-        /// Each plane has memory of its own.
+        /// Whether each plane has its own memory.
         apart: bool,
     },
-    /// Three bytes a pixel.
+    /// Three bytes per pixel.
     Rgb24 {
-        /// Blue comes first.
+        /// Whether blue comes first.
         swapped: bool,
     },
-    /// A byte of luma a pixel.
+    /// One byte of luma per pixel.
     Grey,
-    /// 16 bits a pixel, low byte first.
+    /// 16 bits per pixel, little-endian.
     Depth16,
-    /// A JPEG file a picture.
+    /// A JPEG file per picture.
     Jpeg,
 }
 
-/// The formats that can be read, the best first where bandwidth does not matter.
+/// The supported formats, in order of preference if bandwidth is no limit.
 const TABLE: [(FourCc, Family); 19] = [
     (FourCc::NV12, Family::SemiPlanar420 { swapped: false, apart: false }),
     (FourCc(*b"NM12"), Family::SemiPlanar420 { swapped: false, apart: true }),
@@ -79,15 +79,15 @@ const TABLE: [(FourCc, Family); 19] = [
 ];
 
 impl FourCc {
-    /// A JPEG for each picture, as cameras give it: without its usual tables.
+    /// A JPEG per picture as cameras send it: without Huffman tables.
     pub const MJPG: Self = Self(*b"MJPG");
-    /// A JPEG for each picture.
+    /// A complete JPEG per picture.
     pub const JPEG: Self = Self(*b"JPEG");
     /// Packed 4:2:2, luma first.
     pub const YUYV: Self = Self(*b"YUYV");
     /// Packed 4:2:2, chroma first.
     pub const UYVY: Self = Self(*b"UYVY");
-    /// 4:2:0 with paired chroma.
+    /// 4:2:0 with interleaved chroma.
     pub const NV12: Self = Self(*b"NV12");
     /// 4:2:0 in three planes.
     pub const YU12: Self = Self(*b"YU12");
@@ -95,49 +95,49 @@ impl FourCc {
     pub const RGB3: Self = Self(*b"RGB3");
     /// Blue, green, red.
     pub const BGR3: Self = Self(*b"BGR3");
-    /// Luma alone.
+    /// Luma only.
     pub const GREY: Self = Self(*b"GREY");
     /// 16-bit depth.
     pub const Z16: Self = Self(*b"Z16 ");
-    /// 16-bit brightness, in which some cameras give depth.
+    /// 16-bit luma, which some cameras use for depth.
     pub const Y16: Self = Self(*b"Y16 ");
 
-    /// Every format that can be read.
+    /// Returns all supported formats.
     pub fn supported() -> impl Iterator<Item = Self> {
         TABLE.iter().map(|&(fourcc, _)| fourcc)
     }
 
-    /// From the number that the kernel uses.
+    /// Creates the code from the kernel's number.
     pub fn from_u32(code: u32) -> Self {
         Self(code.to_le_bytes())
     }
 
-    /// The number that the kernel uses.
+    /// Returns the kernel's number.
     pub fn to_u32(self) -> u32 {
         u32::from_le_bytes(self.0)
     }
 
-    /// Which kind of format it is; none where it cannot be read.
+    /// Returns the family; `None` if the format is not supported.
     pub fn family(self) -> Option<Family> {
         TABLE.iter().find(|&&(fourcc, _)| fourcc == self).map(|&(_, family)| family)
     }
 
-    /// Whether pictures in it can be read.
+    /// Returns whether the format is supported.
     pub fn is_supported(self) -> bool {
         self.family().is_some()
     }
 
-    /// Whether pictures in it can be read, and every sample has its place.
+    /// Returns whether the format is supported and uncompressed.
     pub fn is_raw(self) -> bool {
         self.family().is_some_and(|family| family != Family::Jpeg)
     }
 
-    /// What its pictures are; none where they cannot be read.
+    /// Returns the content of its pictures; `None` if the format is not supported.
     pub fn content(self) -> Option<Content> {
         self.family().map(|family| if family == Family::Depth16 { Content::Depth } else { Content::Color })
     }
 
-    /// Bits of a pixel on average; none for compressed formats and for those that cannot be read.
+    /// Returns the mean bits per pixel; `None` for compressed and unsupported formats.
     pub fn bits_per_px(self) -> Option<u32> {
         Some(match self.family()? {
             Family::Packed422 { .. } | Family::Depth16 => 16,
@@ -150,7 +150,7 @@ impl FourCc {
 }
 
 impl Family {
-    /// Buffers that a picture comes in.
+    /// Returns the number of buffers per picture.
     pub fn memory_planes(self) -> usize {
         match self {
             Self::SemiPlanar420 { apart: true, .. } | Self::Planar420 { apart: true, .. } => self.components(),
@@ -158,7 +158,7 @@ impl Family {
         }
     }
 
-    /// Planes of samples; none in compressed formats.
+    /// Returns the number of planes of samples; 0 for compressed formats.
     pub fn components(self) -> usize {
         match self {
             Self::Planar420 { .. } => 3,
@@ -168,8 +168,8 @@ impl Family {
         }
     }
 
-    /// Bytes of a row, and number of rows, of component `index` in a picture of `width` x `height` pixels. A packed row
-    /// of odd width ends in half a pair of pixels, with one of its two chroma samples.
+    /// Returns the bytes per row and the number of rows of component `index` in a picture of `width` x `height` pixels.
+    /// A packed row of odd width ends with half a pair of pixels, which has one of the two chroma samples.
     pub(super) fn rows(self, index: usize, width: usize, height: usize) -> (usize, usize) {
         match (self, index) {
             (Self::Jpeg, _) => (0, 0),
@@ -181,10 +181,11 @@ impl Family {
         }
     }
 
-    /// Stride of component `index`, where the first component of the same memory plane has a stride of `first_bytes`.
+    /// Returns the stride of component `index` if the first component of its memory plane has a stride of
+    /// `first_bytes`.
     pub(super) fn stride_bytes(self, index: usize, first_bytes: usize) -> usize {
         match (self, index) {
-            // An odd row of luma has one chroma pair more than bytes.
+            // An odd row of luma has one byte less than its chroma pairs.
             (Self::SemiPlanar420 { .. }, 1..) => first_bytes.next_multiple_of(2),
             (Self::Planar420 { .. }, 1..) => first_bytes.div_ceil(2),
             _ => first_bytes,
@@ -192,7 +193,7 @@ impl Family {
     }
 }
 
-/// Not the name of a pixel format.
+/// The text is not a pixel format.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("a pixel format has 1 to 4 letters or digits, such as MJPG, YUYV or Z16")]
 pub struct FourCcError;
@@ -200,7 +201,7 @@ pub struct FourCcError;
 impl FromStr for FourCc {
     type Err = FourCcError;
 
-    /// Up to four visible ASCII characters; blanks fill up what lacks.
+    /// Parses up to four visible ASCII characters; pads with blanks.
     fn from_str(text: &str) -> Result<Self, FourCcError> {
         let text = text.trim_end_matches(' ');
         if !(1..=4).contains(&text.len()) || !text.bytes().all(|byte| byte.is_ascii_graphic()) {
@@ -212,7 +213,7 @@ impl FromStr for FourCc {
     }
 }
 
-/// Without trailing blanks. Invisible characters are written as `\xNN`, the kernel's mark for big-endian samples as
+/// Writes the code without trailing blanks; invisible characters as `\xNN`, the kernel's flag for big-endian samples as
 /// `-BE`.
 impl fmt::Display for FourCc {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -226,7 +227,7 @@ impl fmt::Display for FourCc {
                 other => name.push_str(&format!("\\x{other:02x}")),
             }
         }
-        // Bit 31 of the code is the mark.
+        // Bit 31 is the big-endian flag.
         if last & 0x80 != 0 {
             name.push_str("-BE");
         }

@@ -1,4 +1,4 @@
-//! What a picture looks like in memory: its format, where its planes lie, and what its numbers mean as colours.
+//! The memory layout of a picture: format, planes and colour encoding.
 
 mod color;
 mod fourcc;
@@ -7,84 +7,84 @@ use crate::color::Matrix;
 pub use color::{Colors, Range, Transfer};
 pub use fourcc::{Content, Family, FourCc, FourCcError};
 
-/// Widest and highest picture that is accepted, in pixels: what a driver says is believed only so far.
+/// Largest width and height accepted, in pixels, as a bound on what a driver may claim.
 pub const MAX_SIDE_PX: u32 = 8192;
 
-/// Most memory planes and most components of a supported format.
+/// Maximum number of memory planes and components of a supported format.
 pub(crate) const MAX_PLANES: usize = 3;
 
-/// A picture in memory.
+/// The layout of a picture in memory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Layout {
-    /// The format; a supported one.
+    /// The pixel format, a supported one.
     pub fourcc: FourCc,
     /// Columns, 1 to [`MAX_SIDE_PX`].
     pub width: u32,
     /// Rows, 1 to [`MAX_SIDE_PX`].
     pub height: u32,
-    /// Which weights make luma of red, green and blue.
+    /// The luma weights.
     pub matrix: Matrix,
-    /// Which numbers stand for black and white.
+    /// The quantisation range.
     pub range: Range,
-    /// How numbers grow with light.
+    /// The transfer function.
     pub transfer: Transfer,
     planes: [Plane; MAX_PLANES],
     plane_count: usize,
 }
 
-/// One piece of memory of a picture: a buffer of its own in a multi-planar queue, otherwise the only one.
+/// A memory plane of a picture: a separate buffer in a multi-planar queue, otherwise the only buffer.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Plane {
-    /// Bytes from row to row of its first component; 0 in compressed formats.
+    /// Bytes from row to row of its first component; 0 for compressed formats.
     pub stride_bytes: usize,
-    /// As the driver says; may be more than the picture needs, and is the largest picture of compressed formats.
+    /// Size in bytes; may exceed the need, and is an upper bound for compressed formats.
     pub size_bytes: usize,
 }
 
-/// The rows of one component (luma, chroma, or the packed pixels) within the memory of a picture.
+/// The rows of one component (luma, chroma, or packed pixels) within a picture's memory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Component {
-    /// Number of the memory plane.
+    /// Index of the memory plane.
     pub plane: usize,
-    /// Where the first row starts in it.
+    /// Offset of the first row in it.
     pub offset_bytes: usize,
     /// Bytes from row to row.
     pub stride_bytes: usize,
-    /// Those of each row that hold samples.
+    /// Bytes per row that hold samples.
     pub row_bytes: usize,
     /// Number of rows.
     pub rows: usize,
 }
 
 impl Component {
-    /// Bytes of its plane up to the end of its last row, which need not be padded.
+    /// Returns the bytes of its plane up to the end of the last row, which may be unpadded.
     pub fn end_bytes(&self) -> usize {
         self.offset_bytes + self.stride_bytes * (self.rows - 1) + self.row_bytes
     }
 }
 
-/// Why a format cannot be used.
+/// An invalid layout.
 #[allow(missing_docs)] // The messages say what the fields are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum LayoutError {
-    /// No picture is captured through such a queue.
+    /// The queue type does not capture pictures.
     #[error("buffer type {0} does not hold captured pictures")]
     BufferType(u32),
-    /// Not one of the formats that can be read.
+    /// The pixel format is not supported.
     #[error("pixel format {0} is not supported")]
     FourCc(FourCc),
-    /// No picture has this size.
+    /// The size is out of range.
     #[error("the device gives pictures of {width} x {height} pixels, and 1 to {MAX_SIDE_PX} a side can be used")]
     Size { width: u32, height: u32 },
     #[error("the device says {stride_bytes} bytes a row, and {width} pixels of {fourcc} need {needed_bytes}")]
     Stride {
         fourcc: FourCc,
         width: u32,
-        /// As the device says.
+        /// As the device reports it.
         stride_bytes: usize,
         needed_bytes: usize,
     },
-    /// A buffer that cannot hold the picture.
+    /// The buffer is too small for the picture.
     #[error(
         "the device says {size_bytes} bytes a picture, and {width} x {height} pixels of {fourcc} need {needed_bytes}"
     )]
@@ -92,17 +92,17 @@ pub enum LayoutError {
         fourcc: FourCc,
         width: u32,
         height: u32,
-        /// As the device says.
+        /// As the device reports it.
         size_bytes: usize,
         needed_bytes: usize,
     },
-    /// Memory planes that do not fit the format.
+    /// The number of memory planes does not fit the format.
     #[error("the device gives {fourcc} in {found} memory planes instead of {expected}")]
     Planes {
         fourcc: FourCc,
-        /// As the device says.
+        /// As the device reports it.
         found: usize,
-        /// As the format has.
+        /// As the format requires.
         expected: usize,
     },
     #[error(
@@ -112,28 +112,29 @@ pub enum LayoutError {
 }
 
 impl Layout {
-    /// The layout of a picture without padding, as V4L2's defaults have it: for formats that no driver describes.
+    /// Creates the layout of a picture without padding, with V4L2's default colours, for formats that no driver
+    /// describes.
     ///
     /// # Errors
-    /// Such pictures cannot be read.
+    /// The format or size is not supported.
     pub fn packed(fourcc: FourCc, width: u32, height: u32) -> Result<Self, LayoutError> {
         Self::strided(fourcc, width, height, 0)
     }
 
-    /// The same with `stride_bytes` from row to row of each plane's first component; 0 is without padding.
+    /// Does the same with `stride_bytes` from row to row of each plane's first component; 0 is without padding.
     ///
     /// # Errors
-    /// Such pictures cannot be read.
+    /// The format, size or stride is not supported.
     pub fn strided(fourcc: FourCc, width: u32, height: u32, stride_bytes: usize) -> Result<Self, LayoutError> {
         let plane_count = fourcc.family().map_or(1, Family::memory_planes);
         Self::new(fourcc, (width, height), &[Plane { stride_bytes, size_bytes: 0 }; MAX_PLANES][..plane_count], None)
     }
 
-    /// The layout of a picture of `width` x `height` pixels in these memory planes, whose strides and sizes are computed where
-    /// they are 0. Without `colors` those are V4L2's defaults.
+    /// Creates the layout of a picture of `width` x `height` pixels in these memory planes. Strides and sizes of 0 are
+    /// computed. `None` for `colors` uses V4L2's defaults.
     ///
     /// # Errors
-    /// Such pictures cannot be read.
+    /// The format, size, stride or buffer size is not supported.
     pub fn new(
         fourcc: FourCc,
         (width, height): (u32, u32),
@@ -148,7 +149,7 @@ impl Layout {
         if given.len() != plane_count {
             return Err(LayoutError::Planes { fourcc, found: given.len(), expected: plane_count });
         }
-        let (matrix, range, transfer) = colors.unwrap_or_else(|| color::usual(family));
+        let (matrix, range, transfer) = colors.unwrap_or_else(|| color::default_colors(family));
         let mut planes = [Plane::default(); MAX_PLANES];
         planes[..plane_count].copy_from_slice(given);
         let mut layout = Self { fourcc, width, height, matrix, range, transfer, planes, plane_count };
@@ -161,13 +162,13 @@ impl Layout {
             if plane.stride_bytes == 0 {
                 plane.stride_bytes = needed_bytes;
             }
-            // The bound keeps every sum below within 64 bits, whatever the driver says.
+            // The bound keeps every sum below within 64 bits, whatever the driver reports.
             if plane.stride_bytes < needed_bytes || plane.stride_bytes > 1 << 28 {
                 let stride_bytes = plane.stride_bytes;
                 return Err(LayoutError::Stride { fourcc, width, stride_bytes, needed_bytes });
             }
         }
-        // Chroma strides follow from the luma's: half of an odd one, too, must hold a chroma row.
+        // Chroma strides derive from luma's: half of an odd stride must still hold a chroma row.
         for component in layout.components() {
             if component.stride_bytes < component.row_bytes {
                 let stride_bytes = layout.planes[component.plane].stride_bytes;
@@ -187,7 +188,7 @@ impl Layout {
         Ok(layout)
     }
 
-    /// The same with `extra_bytes` between rows.
+    /// Adds `extra_bytes` between rows.
     #[cfg(test)]
     pub fn with_strides(mut self, extra_bytes: usize) -> Self {
         for index in 0..self.plane_count {
@@ -199,19 +200,19 @@ impl Layout {
         self
     }
 
-    /// Which kind of format it is.
+    /// Returns the format's family.
     pub fn family(&self) -> Family {
-        // Layouts are made of supported formats only, but the field is open.
+        // Layouts are created for supported formats only, but the field is public.
         self.fourcc.family().unwrap_or(Family::Jpeg)
     }
 
-    /// The memory planes, 1 to 3.
+    /// Returns the memory planes, 1 to 3.
     pub fn planes(&self) -> &[Plane] {
         &self.planes[..self.plane_count]
     }
 
-    /// The components of a raw picture in the order luma, first chroma, second chroma as they lie in memory; none of
-    /// a compressed one.
+    /// Returns the components of a raw picture in memory order: luma, first chroma, second chroma. Empty for a
+    /// compressed one.
     pub fn components(&self) -> impl Iterator<Item = Component> {
         let family = self.family();
         let apart = self.plane_count > 1;
@@ -229,8 +230,8 @@ impl Layout {
         })
     }
 
-    /// The fewest bytes that memory plane `plane` of a whole picture has: a raw picture with less is cut short. 1 for
-    /// compressed formats.
+    /// Returns the minimum size of memory plane `plane`: a raw picture with fewer bytes is truncated. 1 for compressed
+    /// formats.
     pub fn needed_bytes(&self, plane: usize) -> usize {
         self.components().filter(|component| component.plane == plane).map(|c| c.end_bytes()).max().unwrap_or(1)
     }

@@ -1,30 +1,31 @@
-//! A doorbell (an auto-reset event on a futex): how a thread sleeps until another one has something for it.
+//! An event count (an auto-reset event on a futex): lets a thread sleep until another one signals it.
 //!
-//! One atomic word, and the kernel's `futex` on it: sleep if the word still says so, wake who sleeps. No mutex, so a
-//! thread that is suspended while it goes to sleep or wakes holds up nobody, and ringing while nobody sleeps is one
-//! atomic swap. Wake-ups are not lost, for three reasons:
+//! One atomic word, and the kernel's `futex` on it: sleep if the word still has the expected value, wake the sleepers.
+//! There is no mutex, so a thread that is suspended while it goes to sleep or wakes others blocks no other thread, and
+//! signalling without sleepers is one atomic swap. Wake-ups are not lost, for three reasons:
 //!
-//! - A bell that was rung stays rung until one waiter has silenced it, and nobody falls asleep on a rung bell: the
-//!   kernel looks at the word again, under the lock that the waker takes, too, and returns at once if it has changed.
-//! - Sleepers stand behind the word [`ASLEEP`], which only [`Bell::ring`] replaces, and who replaces it wakes them all.
-//!   So while the bell is [`RUNG`] or [`SILENT`], whoever waits is awake or being woken, and will look at the word.
-//! - What was done before ringing is seen by whoever silences that ring or a later one: each ring is a release, the
-//!   silencing an acquire, and rings in between are read-modify-writes, which carry the release on. So a ring that
-//!   finds the bell rung already needs to do nothing more.
+//! - A signalled bell stays signalled until one waiter resets it, and no thread falls asleep on a signalled bell: the
+//!   kernel compares the word again, under the lock that the waker also takes, and returns at once if it has changed.
+//! - Sleepers are covered by the value [`ASLEEP`], which only [`Bell::ring`] replaces, and the thread that replaces it
+//!   wakes them all. So while the bell is [`RUNG`] or [`SILENT`], every waiter is awake or being woken, and will check
+//!   the word.
+//! - Writes before a ring are visible to the waiter that resets this ring or a later one: each ring is a release, the
+//!   reset an acquire, and rings in between are read-modify-writes, which continue the release sequence. So a ring that
+//!   finds the bell rung already needs no further action.
 //!
-//! Of several waiters, only the one that silences the bell is told; if there is something left for others, it rings
-//! again. A waiter looks for what it waits for before each wait, and is to expect that it is woken for nothing: a bell
-//! may still be rung for what was found without waiting.
+//! Only the waiter that resets the bell returns; if there is work left for others, it rings again. A waiter checks its
+//! condition before each wait, and must expect spurious wake-ups: a bell may still be rung for an item that was found
+//! without waiting.
 
 use std::time::{Duration, Instant};
 
 use super::sync::{AtomicU32, Ordering};
 
-/// Nobody rang, nobody sleeps.
+/// Not rung, and no thread sleeps.
 const SILENT: u32 = 0;
-/// Somebody rang, and no waiter has heard it yet.
+/// Rung, and not yet reset by a waiter.
 const RUNG: u32 = 1;
-/// Nobody rang, and somebody may be asleep.
+/// Not rung, and a thread may be asleep.
 const ASLEEP: u32 = 2;
 
 #[derive(Debug)]
@@ -38,40 +39,40 @@ impl Bell {
         Self { state: AtomicU32::new(SILENT), sleepers: Sleepers::new() }
     }
 
-    /// Rings, and wakes who sleeps. Never waits.
+    /// Signals the bell and wakes the sleepers. Never waits.
     pub(super) fn ring(&self) {
-        // Release: who silences this ring sees what was done before it.
+        // Release: the waiter that resets this ring sees all writes before it.
         if self.state.swap(RUNG, Ordering::Release) == ASLEEP {
             self.sleepers.wake(&self.state);
         }
     }
 
-    /// Sleeps until the bell is rung, and silences it.
+    /// Sleeps until the bell is rung, and resets it.
     pub(super) fn wait(&self) {
         self.wait_until(None);
     }
 
-    /// As [`Bell::wait`], but no longer than `patience`; returns whether the bell was rung.
+    /// Same as [`Bell::wait`] with a timeout; returns whether the bell was rung.
     pub(super) fn wait_timeout(&self, patience: Duration) -> bool {
-        // A time that the clock cannot tell never comes.
+        // A deadline beyond the range of the clock never comes.
         self.wait_until(Instant::now().checked_add(patience))
     }
 
-    /// Sleeps until the bell is rung, and silences it, but not past `deadline`; returns whether the bell was rung.
+    /// Sleeps until the bell is rung, and resets it, but not past `deadline`; returns whether the bell was rung.
     pub(super) fn wait_until(&self, deadline: Option<Instant>) -> bool {
         loop {
-            // Acquire: sees what was done before the ring that is silenced here. A failure reads nothing of anybody's.
+            // Acquire: sees the writes before the ring that is reset here. A failure reads no shared data.
             if self.state.compare_exchange(RUNG, SILENT, Ordering::Acquire, Ordering::Relaxed).is_ok() {
                 return true;
             }
-            // Relaxed: only tells that there is somebody to wake. Where it was rung in between, silence it instead.
+            // Relaxed: only announces a sleeper. If the bell was rung in between, reset it instead.
             let announced = self.state.compare_exchange(SILENT, ASLEEP, Ordering::Relaxed, Ordering::Relaxed);
             if announced == Err(RUNG) {
                 continue;
             }
             let patience = deadline.map(|deadline| deadline.saturating_duration_since(Instant::now()));
             if patience == Some(Duration::ZERO) {
-                // The word may go on saying that somebody sleeps: at worst, one call to the kernel wakes nobody.
+                // The word may keep announcing a sleeper: at worst, one system call wakes no thread.
                 return false;
             }
             self.sleepers.sleep(&self.state, ASLEEP, patience);
@@ -90,26 +91,26 @@ impl Sleepers {
         Self
     }
 
-    /// Sleeps if `word` is `expected`: until woken, for `patience` at most, or shorter for no reason.
+    /// Sleeps if `word` is `expected`: until woken, for at most `patience`, or shorter (spurious wake-up).
     fn sleep(&self, word: &AtomicU32, expected: u32, patience: Option<Duration>) {
         use rustix::thread::futex::{Flags, Timespec, wait};
-        // A time that the kernel cannot count waits for as long as it can.
+        // A timeout beyond the range of the kernel waits for as long as it can.
         let patience = patience.map(|patience| Timespec {
             tv_sec: patience.as_secs().try_into().unwrap_or(i64::MAX),
             tv_nsec: patience.subsec_nanos().into(),
         });
-        // Woken, too late, interrupted by a signal, or the word has changed: in each case the caller looks again.
+        // Woken, timed out, interrupted by a signal, or the word has changed: in each case the caller checks again.
         let _ = wait(word, Flags::PRIVATE, expected, patience.as_ref());
     }
 
     fn wake(&self, word: &AtomicU32) {
         use rustix::thread::futex::{Flags, wake};
-        // Fails only for a word that is not there.
+        // Fails only for an invalid address.
         let _ = wake(word, Flags::PRIVATE, i32::MAX as u32);
     }
 }
 
-/// The same by the C library's `syscall`, the one way that Miri knows: rustix looks for that symbol at run time.
+/// Same through the C library's `syscall`, the only way that Miri supports: rustix looks up that symbol at run time.
 #[cfg(miri)]
 #[derive(Debug)]
 struct Sleepers;
@@ -128,19 +129,19 @@ impl Sleepers {
         });
         let timeout = patience.as_ref().map_or(std::ptr::null(), std::ptr::from_ref);
         let wait = libc::FUTEX_WAIT | libc::FUTEX_PRIVATE_FLAG;
-        // SAFETY: `futex` with these arguments reads the word and the time, which live until it returns.
+        // SAFETY: `futex` with these arguments reads the word and the timeout, which live until it returns.
         unsafe { libc::syscall(libc::SYS_futex, word.as_ptr(), wait, expected, timeout) };
     }
 
     fn wake(&self, word: &AtomicU32) {
         let wake = libc::FUTEX_WAKE | libc::FUTEX_PRIVATE_FLAG;
-        // SAFETY: with these arguments only the word's address counts.
+        // SAFETY: with these arguments only the word's address is used.
         unsafe { libc::syscall(libc::SYS_futex, word.as_ptr(), wake, i32::MAX) };
     }
 }
 
 /// The kernel's part as loom can run it: the lock that `futex` holds while it compares the word and queues the thread,
-/// and the queue. Time passes at once or never.
+/// and the queue. Timeouts expire at once or never.
 #[cfg(loom)]
 #[derive(Debug)]
 struct Sleepers {
@@ -229,7 +230,7 @@ mod tests {
         while heard.load(Ordering::Acquire) < ROUNDS {
             bell.ring();
             rung += 1;
-            // A ring that nobody hears would leave this turning forever.
+            // A lost ring would make this loop endless.
             while heard.load(Ordering::Acquire) < rung.min(ROUNDS) {
                 thread::yield_now();
             }

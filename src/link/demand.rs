@@ -1,11 +1,11 @@
-//! On-demand capture: sinks tell whether anybody watches the output; while nobody does, capture lets the camera rest.
+//! On-demand capture: sinks report whether their output is watched; without watchers, capture pauses the camera.
 
 use std::time::Duration;
 
 use super::bell::Bell;
 use super::sync::{Arc, AtomicBool, AtomicUsize, Ordering};
 
-/// A count of watched outputs that can be waited for. Clones share it.
+/// Number of watched outputs, which a thread can wait for. Clones share it.
 #[derive(Clone, Debug)]
 pub struct Demand(Arc<Shared>);
 
@@ -21,40 +21,40 @@ impl Demand {
         Self(Arc::new(Shared { watched: AtomicUsize::new(0), withheld: AtomicBool::new(false), bell: Bell::new() }))
     }
 
-    /// One more output is watched: until the returned [`Watch`] is dropped.
+    /// Counts one more watched output, until the returned [`Watch`] is dropped.
     pub fn watch(&self) -> Watch {
         self.0.watched.fetch_add(1, Ordering::Release);
-        // After the count, or the waiter could wake, see nobody and sleep on.
+        // After the count, or the waiter could wake, see no watcher and sleep on.
         self.0.bell.ring();
         Watch(self.clone())
     }
 
-    /// Whether any output is watched, and may show something.
+    /// Whether any output is watched and not withheld.
     pub fn is_watched(&self) -> bool {
         !self.0.withheld.load(Ordering::Acquire) && self.has_watchers()
     }
 
-    /// Whether any output is watched, though it may show nothing.
+    /// Whether any output is watched, even if withheld.
     pub fn has_watchers(&self) -> bool {
         self.0.watched.load(Ordering::Acquire) > 0
     }
 
-    /// Nobody counts as watching from now on, whoever does; or everybody again.
+    /// Makes [`Self::is_watched`] false regardless of watchers while `withheld`.
     pub fn withhold(&self, withheld: bool) {
         self.0.withheld.store(withheld, Ordering::Release);
-        // As for a watch.
+        // After the flag, for the same reason.
         self.0.bell.ring();
     }
 
-    /// Wakes who waits, though nobody watches.
+    /// Wakes a waiting thread, even without a watcher.
     pub fn ring(&self) {
         self.0.bell.ring();
     }
 
-    /// Sleeps until an output is watched, but no longer than `patience`; it may also wake for nothing.
+    /// Sleeps until an output is watched, for at most `patience`; may also wake spuriously.
     pub fn wait(&self, patience: Duration) {
         if !self.is_watched() {
-            // Rung or not, the caller looks again.
+            // The result does not matter: the caller checks again.
             self.0.bell.wait_timeout(patience);
         }
     }
@@ -66,7 +66,7 @@ impl Default for Demand {
     }
 }
 
-/// An output that is watched; dropping it says that it no longer is.
+/// A watched output; it stops counting when dropped.
 #[derive(Debug)]
 pub struct Watch(Demand);
 

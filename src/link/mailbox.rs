@@ -1,4 +1,4 @@
-//! One slot, newest wins, and a doorbell to sleep on.
+//! A one-slot mailbox: the newest item wins, and the receiver sleeps on a bell.
 
 use std::time::{Duration, Instant};
 
@@ -7,7 +7,7 @@ use super::slot::{Reader, Writer, slot};
 use super::sync::{Arc, AtomicBool, Ordering};
 use super::{Abandoned, Received};
 
-/// What the ends tell each other besides items.
+/// State shared by both ends, besides items.
 struct Ends {
     bell: Bell,
     /// The sender is gone.
@@ -29,14 +29,14 @@ pub(super) struct Sender<T> {
 }
 
 impl<T> Sender<T> {
-    /// Puts `item` in and wakes the receiver; returns the older item if that was not received.
+    /// Stores `item` and wakes the receiver; returns the older item if it was not received.
     pub(super) fn send(&mut self, item: T) -> Result<Option<T>, Abandoned> {
-        // Relaxed: nothing is read on its account. Seen late, one more item lies in the slot, which drops it.
+        // Relaxed: it orders no other access. If it is seen late, one more item is in the slot, which drops it.
         if self.ends.abandoned.load(Ordering::Relaxed) {
             return Err(Abandoned);
         }
         let displaced = self.writer.put(item);
-        // Only after the item lies in the slot, or the receiver could wake, find nothing and sleep on.
+        // Only after the item is in the slot, or the receiver could wake, find nothing and sleep on.
         self.ends.bell.ring();
         Ok(displaced)
     }
@@ -44,7 +44,7 @@ impl<T> Sender<T> {
 
 impl<T> Drop for Sender<T> {
     fn drop(&mut self) {
-        // Release: who sees it sees the last item, too. Only then the bell, as for an item.
+        // Release: a thread that sees the flag sees the last item, too. The bell is last, as for an item.
         self.ends.ended.store(true, Ordering::Release);
         self.ends.bell.ring();
     }
@@ -64,7 +64,7 @@ impl<T> Receiver<T> {
     }
 
     pub(super) fn recv_timeout(&mut self, patience: Duration) -> Received<T> {
-        // A time that the clock cannot tell never comes.
+        // A deadline beyond the range of the clock never comes.
         self.recv_until(Instant::now().checked_add(patience))
     }
 
@@ -78,7 +78,7 @@ impl<T> Receiver<T> {
             if let Some(item) = self.reader.take() {
                 return Received::Item(item);
             }
-            // Acquire: whatever was sent last happened before. It may have come since the look above.
+            // Acquire: the last item was sent before. It may have come since the check above.
             if self.ends.ended.load(Ordering::Acquire) {
                 return self.reader.take().map_or(Received::Ended, Received::Item);
             }

@@ -1,37 +1,37 @@
-//! How frames change hands between threads, and how buffers come home.
+//! Transfer of frames between threads, and the return of buffers.
 //!
 //! A link has one sender and one receiver, and comes in two kinds behind one interface:
 //!
-//! - [`live`]: a one-slot mailbox in which the newest item wins. Sending never waits; the item that was not read in
-//!   time comes back to the sender, who counts it.
+//! - [`live`]: a one-slot mailbox in which the newest item wins. Sending never waits; an item that was not read in time
+//!   is returned to the sender, which counts it.
 //! - [`lossless`]: a short queue. Sending waits for room, so nothing is lost and every replay is the same.
 //!
-//! Dropping the sender is the end of the stream: what is pending is still delivered. Dropping the receiver makes the
+//! Dropping the sender is the end of the stream: pending items are still delivered. Dropping the receiver makes the
 //! next send fail with [`Abandoned`].
 //!
-//! # What is lock-free, and what is not
-//! On a live link and in a pool, no thread ever holds anything that another one has to wait for:
+//! # Progress guarantees
+//! On a live link and in a pool, no thread ever holds a lock that another one has to wait for:
 //!
-//! - Sending and looking for an item are *wait-free*: a fixed number of steps, one atomic swap that moves the item and
-//!   one for the doorbell, whatever the other end does and wherever the scheduler suspends it (`slot.rs`).
-//! - Taking a free buffer and giving it back are *lock-free*: a buffer bit is cleared by a compare-and-swap that is
-//!   tried again only if another thread has just succeeded, and set by one instruction ([`pool`]).
-//! - None of this allocates, and none calls the kernel, but for one thing: who sends to, or gives a buffer to, a thread
-//!   that sleeps makes one system call to wake it (`bell.rs`). There is no mutex on that way either.
+//! - Sending and polling for an item are *wait-free*: a fixed number of steps, one atomic swap that moves the item and
+//!   one for the bell, independent of the other end and of the scheduler (`slot.rs`).
+//! - Taking and returning a buffer are *lock-free*: a buffer's bit is cleared by a compare-and-swap that is retried
+//!   only if another thread has just succeeded, and set by one instruction ([`pool`]).
+//! - None of this allocates, and none calls the kernel, with one exception: sending an item, or returning a buffer, to
+//!   a sleeping thread makes one system call to wake it (`bell.rs`). There is no mutex on that path either.
 //!
-//! What does wait, because it is meant to: a reader without an item and a taker without a buffer sleep in the kernel
-//! (`futex`) until there is one. A live run has buffers for every place along its way, so its capture never does.
+//! Two operations wait by design: a reader without an item and a taker without a buffer sleep in the kernel (`futex`)
+//! until there is one. A live run has buffers for every place along its way, so its capture never waits.
 //!
-//! Not lock-free is the lossless link: a bounded `crossbeam_channel`. While nobody sleeps it moves items by atomic
-//! operations, but a thread suspended in the middle of moving one holds up that place of the ring; a thread that goes
-//! to sleep registers under a mutex, which its waker takes as well; and its sender waits for room. It serves files,
-//! where nothing is late.
+//! The lossless link is not lock-free: a bounded `crossbeam_channel`. Without sleepers it moves items by atomic
+//! operations, but a thread suspended in the middle of moving one blocks that place of the ring; a thread that goes to
+//! sleep registers under a mutex, which its waker takes as well; and its sender waits for room. It serves files, which
+//! have no deadline.
 //!
-//! # How that is shown
+//! # Verification
 //! Each memory order has its reason beside it. The models in `models.rs` are run by loom in every order of the threads
 //! up to a number of preemptions; `tests/handover.rs` counts a million frames; `tests/allocation.rs` counts
 //! allocations; `scripts/prove-link` runs these, and Miri and ThreadSanitizer where the toolchain has them.
-//! `cargo bench --bench handover` measures, beside a mutex and a condition variable.
+//! `cargo bench --bench handover` compares with a mutex and a condition variable.
 
 mod bell;
 pub mod demand;
@@ -44,41 +44,41 @@ use std::time::Duration;
 
 use crossbeam_channel::{RecvTimeoutError, SendTimeoutError};
 
-/// The receiving end is gone: nobody will read what is sent, and what is pending goes with the sender.
+/// The receiver is gone: no item will be read, and pending ones are dropped with the sender.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("the next stage is gone")]
 pub struct Abandoned;
 
-/// Room of a lossless link: one item being made ready behind one that is ready.
+/// Capacity of a lossless link: one item in progress behind one that is ready.
 pub const LOSSLESS_ITEMS: usize = 2;
 
-/// What came of waiting for an item.
+/// Result of waiting for an item.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Received<T> {
     Item(T),
-    /// None came in time.
+    /// Timed out.
     Nothing,
     /// The sender is gone and nothing is pending.
     Ended,
 }
 
-/// What came of sending an item.
+/// Result of sending an item.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Sent<T> {
     Taken,
-    /// It took the place of this older item (live links only).
+    /// Sent, and displaced this older item (live links only).
     Displaced(T),
-    /// There was no room in time: this is the item (lossless links only).
+    /// Timed out without room; returns the item (lossless links only).
     Full(T),
 }
 
-/// A link in which the newest item wins and sending never waits.
+/// Creates a link in which the newest item wins and sending never waits.
 pub fn live<T>() -> (Sender<T>, Receiver<T>) {
     let (sender, receiver) = mailbox::mailbox();
     (Sender(Tx::Live(sender)), Receiver(Rx::Live(receiver)))
 }
 
-/// A link that loses nothing: sending waits while [`LOSSLESS_ITEMS`] are pending.
+/// Creates a link that loses nothing: sending waits while [`LOSSLESS_ITEMS`] are pending.
 pub fn lossless<T>() -> (Sender<T>, Receiver<T>) {
     let (sender, receiver) = crossbeam_channel::bounded(LOSSLESS_ITEMS);
     (Sender(Tx::Lossless(sender)), Receiver(Rx::Lossless(receiver)))
@@ -93,7 +93,7 @@ enum Tx<T> {
 }
 
 impl<T> Sender<T> {
-    /// Hands `item` over. Gives back the older item that it displaced, if any (live links only).
+    /// Sends `item`. Returns the older item that it displaced, if any (live links only).
     ///
     /// # Errors
     /// The receiver is gone; `item` is dropped.
@@ -104,7 +104,7 @@ impl<T> Sender<T> {
         }
     }
 
-    /// [`Sender::send`] that waits for room no longer than `patience`.
+    /// Same as [`Sender::send`], but waits for room for at most `patience`.
     ///
     /// # Errors
     /// The receiver is gone; `item` is dropped.
@@ -129,7 +129,7 @@ enum Rx<T> {
 }
 
 impl<T> Receiver<T> {
-    /// The next item; sleeps until there is one. `None` once the sender is gone and nothing is pending.
+    /// Waits for the next item. `None` once the sender is gone and nothing is pending.
     pub fn recv(&mut self) -> Option<T> {
         match &mut self.0 {
             Rx::Live(mailbox) => mailbox.recv(),
@@ -137,7 +137,7 @@ impl<T> Receiver<T> {
         }
     }
 
-    /// The next item; sleeps until there is one, but no longer than `patience`.
+    /// Waits for the next item, for at most `patience`.
     pub fn recv_timeout(&mut self, patience: Duration) -> Received<T> {
         match &mut self.0 {
             Rx::Live(mailbox) => mailbox.recv_timeout(patience),
@@ -149,7 +149,7 @@ impl<T> Receiver<T> {
         }
     }
 
-    /// The next item if it is there already.
+    /// Returns the next item if it is pending.
     pub fn try_recv(&mut self) -> Option<T> {
         match &mut self.0 {
             Rx::Live(mailbox) => mailbox.try_recv(),

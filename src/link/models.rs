@@ -1,9 +1,9 @@
-//! The hand-over in loom: every order in which the threads can run, and every value that the memory model lets them
-//! read, up to a number of preemptions. A data race, a leak, and a lost wake-up (a deadlock) end a model as much as a
-//! failed assertion does.
+//! Model checking of the hand-over with loom: every order in which the threads can run, and every value that the memory
+//! model lets them read, up to a number of preemptions. A data race, a leak, or a lost wake-up (a deadlock) fails a
+//! model, as does an assertion.
 //!
-//! `RUSTFLAGS="--cfg loom" cargo test --no-default-features --release --lib link::models`, with a target folder of its
-//! own; `LOOM_MAX_PREEMPTIONS` sets another bound.
+//! `RUSTFLAGS="--cfg loom" cargo test --no-default-features --release --lib link::models`, with a separate target
+//! folder; `LOOM_MAX_PREEMPTIONS` sets another bound.
 
 use std::time::Duration;
 
@@ -18,7 +18,7 @@ use super::pool::Pool;
 use super::sync::Arc;
 use super::{Abandoned, Received, Receiver, live};
 
-/// A thread is interrupted at most this often where it would not wait by itself.
+/// Largest number of preemptions of a thread.
 const PREEMPTIONS: usize = 4;
 const LONG: Duration = Duration::from_secs(1 << 30);
 
@@ -28,8 +28,8 @@ fn model(run: impl Fn() + Sync + Send + 'static) {
     builder.check(run);
 }
 
-/// Sends 0, 1, ... from a thread of its own, and drops its end; gives back what was displaced.
-fn sends(count: u32) -> (thread::JoinHandle<Vec<u32>>, Receiver<Track<u32>>) {
+/// Sends 0, 1, ... from a thread of its own, and drops its end; the thread returns the displaced items.
+fn spawn_sender(count: u32) -> (thread::JoinHandle<Vec<u32>>, Receiver<Track<u32>>) {
     let (mut sender, receiver) = live();
     let send = move || {
         let displaced = (0..count).filter_map(|item| sender.send(Track::new(item)).ok().flatten());
@@ -38,7 +38,7 @@ fn sends(count: u32) -> (thread::JoinHandle<Vec<u32>>, Receiver<Track<u32>>) {
     (thread::spawn(send), receiver)
 }
 
-/// Each of the items was read or displaced, once; in order, and the last one was read.
+/// Asserts that each item was read or displaced once, in order, and that the last one was read.
 fn assert_accounted(count: u32, read: &[u32], displaced: &[u32]) {
     assert!(read.is_sorted() && displaced.is_sorted());
     assert_eq!(read.last(), Some(&(count - 1)));
@@ -50,7 +50,7 @@ fn assert_accounted(count: u32, read: &[u32], displaced: &[u32]) {
 #[test]
 fn every_item_is_read_or_displaced_and_the_end_is_heard() {
     model(|| {
-        let (sender, mut receiver) = sends(3);
+        let (sender, mut receiver) = spawn_sender(3);
         let mut read = Vec::new();
         while let Some(item) = receiver.recv() {
             read.push(item.into_inner());
@@ -62,7 +62,7 @@ fn every_item_is_read_or_displaced_and_the_end_is_heard() {
 #[test]
 fn a_receiver_that_only_looks_or_gives_up_loses_nothing() {
     model(|| {
-        let (sender, mut receiver) = sends(2);
+        let (sender, mut receiver) = spawn_sender(2);
         let mut read: Vec<u32> = receiver.try_recv().map(Track::into_inner).into_iter().collect();
         for patience in [Duration::ZERO, LONG, LONG, LONG] {
             match receiver.recv_timeout(patience) {
@@ -82,7 +82,7 @@ fn a_receiver_is_woken_by_an_item_alone() {
         let (mut sender, mut receiver) = live();
         let reader = thread::spawn(move || receiver.recv().map(Track::into_inner));
         assert!(sender.send(Track::new(5)).is_ok());
-        // Before the end of the sender, which would wake it as well.
+        // Joined before the end of the sender, which would wake the reader as well.
         assert_eq!(reader.join().unwrap(), Some(5));
     });
 }
@@ -106,7 +106,7 @@ fn a_receiver_may_go_at_any_time() {
     });
 }
 
-/// Adds one to the pool's only buffer, so that two at once are one too few (or a data race).
+/// Adds one to the pool's only buffer: concurrent access would lose an increment (or be a data race).
 fn count(pool: &Pool<Track<u32>>) {
     *pool.take().get_mut() += 1;
 }
@@ -224,7 +224,7 @@ fn a_patient_waiter_is_woken_although_another_gave_up() {
             thread::spawn(move || {
                 if shared.0.wait_timeout(Duration::ZERO) {
                     assert!(shared.1.load(Ordering::Relaxed));
-                    // There is still something for the other one.
+                    // The other thread still has a ring to receive.
                     shared.0.ring();
                 }
             })

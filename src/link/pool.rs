@@ -1,25 +1,24 @@
-//! A fixed set of buffers that circulate: taken by a stage, given back by being dropped.
+//! A fixed set of reusable buffers: taken by a stage, returned by being dropped.
 //!
-//! One atomic word has a bit for each buffer that is home. Taking clears one, giving back sets it: a bit says nothing
-//! but whether that buffer is there, so a word that has changed and changed back (the ABA problem) misleads nobody.
-//! Both are lock-free and neither allocates; giving back, in a stage or on its way out, never waits. A taker that
-//! finds no buffer sleeps on a doorbell.
+//! One atomic word has a bit for each free buffer. Taking clears it, returning sets it: a bit only says whether that
+//! buffer is free, so a word that has changed and changed back (the ABA problem) is harmless. Both are lock-free and
+//! neither allocates; returning never waits. A taker without a free buffer sleeps on a bell.
 //!
 //! # Memory orders
-//! Giving back is a *release*, taking an *acquire* of the same word: what was done to a buffer, and its return to its
-//! cell, come before it is taken again. Others that change the word in between do so by read-modify-writes, which carry
-//! a release on.
+//! Returning is a *release*, taking an *acquire* of the same word: all writes to a buffer, and its return to its cell,
+//! happen before it is taken again. Other changes of the word in between are read-modify-writes, which continue the
+//! release sequence.
 
 use std::ops::{Deref, DerefMut};
 
 use super::bell::Bell;
 use super::sync::{Arc, AtomicU64, Ordering, UnsafeCell};
 
-/// Most buffers of a [`Pool`]: the bits of a word.
+/// Largest number of buffers of a [`Pool`]: the bits of a word.
 pub const MOST_BUFFERS: usize = u64::BITS as usize;
 
-/// A fixed set of equal buffers. Nothing is allocated after [`Pool::new`]. A buffer is moved when it is taken and given
-/// back, so let it be a handle of its memory, such as a `Vec`.
+/// A fixed set of equal buffers. Nothing is allocated after [`Pool::new`]. A buffer is moved when it is taken and
+/// returned, so it should be a handle of its memory, such as a `Vec`.
 pub struct Pool<T> {
     shared: Arc<Shared<T>>,
 }
@@ -38,7 +37,7 @@ struct Shared<T> {
 unsafe impl<T: Send> Sync for Shared<T> {}
 
 impl<T> Pool<T> {
-    /// A pool of `count` buffers, each made by `make`.
+    /// Creates a pool of `count` buffers, each made by `make`.
     ///
     /// # Panics
     /// `count` is more than [`MOST_BUFFERS`].
@@ -50,13 +49,13 @@ impl<T> Pool<T> {
         Self { shared: Arc::new(Shared { free: AtomicU64::new(all), cells, bell: Bell::new() }) }
     }
 
-    /// A free buffer; sleeps until one comes home. A pool of none waits forever.
+    /// Takes a free buffer; sleeps until one is returned. A pool without buffers waits forever.
     pub fn take(&self) -> Pooled<T> {
         let mut woken = false;
         loop {
             if let Some((loan, left)) = self.claim() {
-                // Of several takers only one hears the bell, however many buffers came home before it did. Those that
-                // come home later ring for themselves.
+                // However many buffers were returned, the rings before this one woke only one of several takers.
+                // Buffers returned later ring again.
                 if woken && left != 0 {
                     self.shared.bell.ring();
                 }
@@ -67,30 +66,30 @@ impl<T> Pool<T> {
         }
     }
 
-    /// A free buffer, or nothing when all are out. Never waits.
+    /// Takes a free buffer, if any. Never waits.
     pub fn try_take(&self) -> Option<Pooled<T>> {
         self.claim().map(|(loan, _)| loan)
     }
 
-    /// Buffers that are home now.
+    /// Returns the number of free buffers.
     pub fn free(&self) -> usize {
         self.shared.free.load(Ordering::Relaxed).count_ones() as usize
     }
 
-    /// A free buffer, and the bits of those that are left.
+    /// Takes a free buffer; also returns the bits of the remaining ones.
     fn claim(&self) -> Option<(Pooled<T>, u64)> {
-        // Relaxed: only a hint of which one to claim. A buffer whose bell this thread has heard is not overlooked.
+        // Relaxed: only a hint of which one to claim. A buffer whose ring woke this thread is visible.
         let mut free = self.shared.free.load(Ordering::Relaxed);
         while free != 0 {
             let left = free & (free - 1);
-            // Acquire: what was done to the buffer, and its return, come first. Nothing is released: whatever is done
-            // to it now, its return will. Where this fails, another thread got on.
+            // Acquire: the writes to the buffer, and its return, happen before. Nothing is released here: the return
+            // will do that. On failure, another thread made progress.
             match self.shared.free.compare_exchange_weak(free, left, Ordering::Acquire, Ordering::Relaxed) {
                 Ok(_) => {
                     let index = free.trailing_zeros() as usize;
                     let value = self.shared.cell(index, Option::take);
-                    let home = Some(Home { shared: self.shared.clone(), index });
-                    return Some((Pooled { value, home }, left));
+                    let origin = Some(Origin { shared: self.shared.clone(), index });
+                    return Some((Pooled { value, origin }, left));
                 }
                 Err(now) => free = now,
             }
@@ -100,35 +99,35 @@ impl<T> Pool<T> {
 }
 
 impl<T> Shared<T> {
-    /// Only for who holds the loan `index`: its bit is clear, and it was this loan that cleared it.
+    /// Accesses cell `index`; only for the holder of this loan: its bit is clear, and this loan cleared it.
     fn cell<R>(&self, index: usize, access: impl FnOnce(&mut Option<T>) -> R) -> R {
         self.cells[index].with_mut(|cell| {
-            // SAFETY: called twice a loan: by the thread that has just cleared the bit, and by the loan's drop before
-            // it sets the bit. Nobody else can clear it in between, so nobody else is at the cell; and the acquire
-            // of the one follows the release of the other.
+            // SAFETY: called twice per loan: by the thread that has just cleared the bit, and by the loan's drop before
+            // it sets the bit. No other thread can clear it in between, so no other thread accesses the cell; and the
+            // acquire of the first follows the release of the previous loan.
             #[allow(unsafe_code)]
             access(unsafe { &mut *cell })
         })
     }
 }
 
-/// A buffer on loan from a [`Pool`]; dropping it gives it back.
+/// A buffer on loan from a [`Pool`]; dropping it returns it.
 pub struct Pooled<T> {
     /// Empty only while the loan is being dropped.
     value: Option<T>,
-    home: Option<Home<T>>,
+    origin: Option<Origin<T>>,
 }
 
-/// Where a loan belongs; the buffers live as long as their pool or any loan of it.
-struct Home<T> {
+/// Origin of a loan; the buffers live as long as their pool or any loan of it.
+struct Origin<T> {
     shared: Arc<Shared<T>>,
     index: usize,
 }
 
 impl<T> Pooled<T> {
-    /// A buffer that belongs to no pool.
+    /// Creates a buffer that belongs to no pool.
     pub fn detached(value: T) -> Self {
-        Self { value: Some(value), home: None }
+        Self { value: Some(value), origin: None }
     }
 }
 
@@ -147,9 +146,10 @@ impl<T> DerefMut for Pooled<T> {
 
 impl<T> Drop for Pooled<T> {
     fn drop(&mut self) {
-        if let Some(Home { shared, index }) = &self.home {
+        if let Some(Origin { shared, index }) = &self.origin {
             shared.cell(*index, |cell| *cell = self.value.take());
-            // Release: the buffer is home before it is free. Then the bell, or a taker could wake and find nothing.
+            // Release: the buffer is in its cell before it is free. Then the bell, or a taker could wake and find
+            // nothing.
             shared.free.fetch_or(1 << index, Ordering::Release);
             shared.bell.ring();
         }
@@ -183,7 +183,7 @@ mod tests {
             let [first, second] = [(); 2].map(|()| pool.try_take().expect("both are home"));
             std::thread::scope(|scope| {
                 let takers = [(); 2].map(|()| scope.spawn(|| pool.take()));
-                // Asleep, as like as not.
+                // Most likely asleep.
                 std::thread::sleep(std::time::Duration::from_millis(1));
                 drop((first, second));
                 drop(takers.map(|taker| taker.join()));

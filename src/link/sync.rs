@@ -1,4 +1,4 @@
-//! What the hand-over is made of: the standard library's parts, or loom's when it is modelled.
+//! Synchronisation primitives of the hand-over: from the standard library, or from loom for model checking.
 
 #[cfg(loom)]
 pub(super) use loom::{
@@ -14,7 +14,7 @@ pub(super) use std::sync::{
     atomic::{AtomicBool, AtomicU8, AtomicU32, AtomicU64, AtomicUsize, Ordering},
 };
 
-/// The standard library's cell with the interface of loom's, which sees each access and so finds two at once.
+/// Wrapper of the standard library's cell with the interface of loom's, which detects concurrent accesses.
 #[cfg(not(loom))]
 pub(super) struct UnsafeCell<T>(std::cell::UnsafeCell<T>);
 
@@ -24,7 +24,7 @@ impl<T> UnsafeCell<T> {
         Self(std::cell::UnsafeCell::new(value))
     }
 
-    /// Gives `access` the content's address, which is valid as long as the cell.
+    /// Calls `access` with the content's address, which is valid as long as the cell.
     #[inline]
     pub(super) fn with_mut<R>(&self, access: impl FnOnce(*mut T) -> R) -> R {
         access(self.0.get())

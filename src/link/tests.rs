@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use super::*;
 
-/// Deterministic stalls: mostly none, sometimes a yield, now and then a short sleep.
+/// Deterministic delays: mostly none, sometimes a yield, rarely a short sleep.
 struct Stalls(u64);
 
 impl Stalls {

@@ -1,4 +1,4 @@
-//! The lens opening as it is written: its picture, if any, not yet read.
+//! Parses and prints the aperture setting; its picture, if any, is not read yet.
 
 use std::fmt;
 use std::path::PathBuf;
@@ -10,12 +10,12 @@ use crate::bokeh::aperture::{Picture, Shape};
 use crate::recording::RecordingError;
 use crate::recording::still::read_aperture;
 
-/// An aperture as it is written: its picture, if any, not yet read.
+/// The aperture as a setting.
 #[derive(Clone, Debug, PartialEq)]
 pub enum ApertureName {
-    /// A shape by its name and numbers, or a picture that was read.
+    /// A shape by name and numbers, or a picture that was read.
     Drawn(Shape),
-    /// `image:FILE`, not read.
+    /// `image:FILE`, not read yet.
     Image(PathBuf),
 }
 
@@ -77,7 +77,7 @@ impl fmt::Display for ApertureName {
 }
 
 impl ApertureName {
-    /// The name of a shape; a picture of which no file is known has none.
+    /// Returns the name of a shape; `None` for a picture without a known file.
     pub fn of(shape: &Shape) -> Option<Self> {
         match shape {
             Shape::Picture(picture) if picture.file.is_none() => None,
@@ -85,7 +85,7 @@ impl ApertureName {
         }
     }
 
-    /// The shape.
+    /// Returns the shape, and reads its picture if needed.
     ///
     /// # Errors
     /// The picture of `image:FILE` cannot be read.

@@ -1,4 +1,4 @@
-//! What stands behind the subject as it is written: its picture, if any, not yet read.
+//! Parses and prints the setting of the background behind the subject; its picture, if any, is not read yet.
 
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -9,12 +9,12 @@ use crate::depth::backdrop::{Behind, BehindPicture};
 use crate::recording::RecordingError;
 use crate::recording::still::read_color;
 
-/// What is behind the subject as it is written: its picture, if any, not yet read.
+/// The background behind the subject as a setting.
 #[derive(Clone, Debug, PartialEq)]
 pub enum BehindName {
-    /// What needs no reading, or was read.
+    /// Blur, a colour, or a picture that was read.
     Known(Behind),
-    /// `image:FILE`, not read.
+    /// `image:FILE`, not read yet.
     Image(PathBuf),
 }
 
@@ -24,13 +24,13 @@ impl FromStr for BehindName {
         const FORMS: &str = "use blur, color:#RRGGBB or image:FILE";
         match text.split_once(':') {
             None if text == "blur" => Some(Self::Known(Behind::Blur)),
-            Some(("color", color)) => rgb(color).map(|rgb| Self::Known(Behind::Color(rgb))),
+            Some(("color", color)) => parse_rgb(color).map(|rgb| Self::Known(Behind::Color(rgb))),
             Some(("image", file)) if !file.is_empty() => Some(Self::Image(file.into())),
             None if let Some((_, rgb)) = COLORS.iter().find(|(name, _)| *name == text) => {
                 Some(Self::Known(Behind::Color(*rgb)))
             }
-            None if text.starts_with('#') => rgb(text).map(|rgb| Self::Known(Behind::Color(rgb))),
-            // What can be nothing else.
+            None if text.starts_with('#') => parse_rgb(text).map(|rgb| Self::Known(Behind::Color(rgb))),
+            // A file name with a picture's extension needs no `image:`.
             _ if is_picture(text) => Some(Self::Image(text.into())),
             _ => None,
         }
@@ -38,7 +38,7 @@ impl FromStr for BehindName {
     }
 }
 
-/// Colours by name. Green is that of screens that are replaced.
+/// Colours by name. Green and blue are those of chroma-key screens.
 const COLORS: [(&str, [u8; 3]); 6] = [
     ("black", [0; 3]),
     ("white", [255; 3]),
@@ -48,14 +48,14 @@ const COLORS: [(&str, [u8; 3]); 6] = [
     ("blue", [0, 71, 187]),
 ];
 
-/// Whether a text is the name of a picture.
+/// Returns whether a text is the file name of a picture.
 fn is_picture(text: &str) -> bool {
     let ending = Path::new(text).extension().and_then(|ending| ending.to_str()).unwrap_or_default();
     ["png", "jpg", "jpeg"].iter().any(|known| ending.eq_ignore_ascii_case(known))
 }
 
-/// The colour `#RRGGBB`; the sign, which shells take for a comment, may be missing.
-fn rgb(text: &str) -> Option<[u8; 3]> {
+/// Parses `#RRGGBB`; the `#`, with which comments begin in a shell, may be missing.
+fn parse_rgb(text: &str) -> Option<[u8; 3]> {
     let digits = text.strip_prefix('#').unwrap_or(text);
     let number = u32::from_str_radix(digits, 16).ok().filter(|_| digits.len() == 6 && !digits.starts_with('+'))?;
     let [_, red, green, blue] = number.to_be_bytes();
@@ -77,7 +77,7 @@ impl fmt::Display for BehindName {
 }
 
 impl BehindName {
-    /// The name of what is behind; a picture of which no file is known has none.
+    /// Returns the setting for a background; `None` for a picture without a known file.
     pub fn of(behind: &Behind) -> Option<Self> {
         match behind {
             Behind::Picture(picture) if picture.file.is_none() => None,
@@ -85,7 +85,7 @@ impl BehindName {
         }
     }
 
-    /// What is behind.
+    /// Returns the background, and reads its picture if needed.
     ///
     /// # Errors
     /// The picture of `image:FILE` cannot be read.

@@ -1,20 +1,20 @@
-//! By how much a picture is blurred: the circle of confusion (CoC) of its points.
+//! Rules for the circle of confusion (CoC) of a picture.
 
 use crate::depth::focus::FocusRule;
 use crate::optics::{CocField, DepthCoc, Lens};
 
-/// Where the CoC of a frame comes from.
+/// How the CoC of a frame is determined.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum CocRule {
     /// The same field for every frame.
     Fixed(CocField),
     /// The thin lens over the frame's depth.
     Depth {
-        /// What the lens is focused on.
+        /// The subject or distance in focus.
         focus: FocusRule,
-        /// How large the CoC grows.
+        /// The CoC at infinity.
         lens: CocAtInfinity,
-        /// All within half of this to either side of the focal plane is sharp, in metres, >= 0.
+        /// Everything within half of this on either side of the focal plane is sharp, in metres, >= 0.
         range_m: f32,
         /// Largest CoC radius, in pixels.
         max_coc_px: f32,
@@ -26,13 +26,13 @@ pub enum CocRule {
 pub enum CocAtInfinity {
     /// The same at every focus distance, in pixels.
     Px(f32),
-    /// What a real lens gives at each focus distance.
+    /// The value of a real lens at each focus distance.
     Lens(Lens),
 }
 
 impl CocAtInfinity {
-    /// The CoC over depth of a picture `width_px` wide, focused at `focus_m` metres, with a sharp range of `range_m`
-    /// around.
+    /// Returns the CoC as a function of depth, for a picture `width_px` wide, focused at `focus_m` metres with a sharp
+    /// range of `range_m` around it.
     pub fn field(self, (focus_m, range_m): (f32, f32), width_px: u32, max_coc_px: f32) -> CocField {
         let coc_at_infinity_px = match self {
             Self::Px(radius_px) => radius_px,

@@ -1,4 +1,4 @@
-//! What the blur follows, and how it is made of that: settings that have a few values.
+//! The enumerated settings of a look: effect, refinement and background memory.
 
 use crate::names::named;
 
@@ -19,7 +19,7 @@ named! {
 }
 
 impl Effect {
-    /// Whether it needs depth, where there is any.
+    /// Returns whether it needs depth, if there is any.
     pub fn follows_depth(self) -> bool {
         matches!(self, Self::Auto | Self::Dof)
     }

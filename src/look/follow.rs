@@ -1,26 +1,26 @@
-//! How far the picture follows the subject.
+//! Auto-framing: how far the crop may follow the subject.
 
 use std::fmt;
 use std::str::FromStr;
 
 use super::number::number_in;
 
-/// How much larger the picture may become to keep the subject in its middle: 1, which is off, to [`Follow::MOST`].
+/// The largest zoom to keep the subject centred: 1, which is off, to [`Follow::MOST`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Follow(f32);
 
 impl Follow {
-    /// It stays as it is.
+    /// No zoom.
     pub const OFF: Self = Self(1.0);
-    /// Beyond this there is little left of a camera's pixels.
+    /// Maximum zoom: beyond it too few of a camera's pixels remain.
     pub const MOST: f32 = 4.0;
 
-    /// Off from 1 down, and no more than [`Follow::MOST`].
+    /// Creates it from a zoom, clamped from 1 (off) to [`Follow::MOST`].
     pub fn to(zoom: f32) -> Self {
         Self(if zoom > 1.0 { zoom.min(Self::MOST) } else { 1.0 })
     }
 
-    /// How much larger the picture may become; `None` where it stays as it is.
+    /// Returns the largest zoom; `None` if it is off.
     pub fn zoom(self) -> Option<f32> {
         (self != Self::OFF).then_some(self.0)
     }

@@ -1,25 +1,26 @@
-//! What a source allows of a look.
+//! Adapts a look to what its source provides.
 
 use super::{COC_AT_INFINITY_PER_HEIGHT, Effect, Look, MAX_COC_PER_HEIGHT, Strength};
 use crate::depth::focus::FocusRule;
 
-/// What a source knows of depth.
+/// What is known about a source's depth.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Known {
-    /// Whether it has any.
+    /// Whether it has depth.
     pub has_depth: bool,
-    /// Whether that is relative: nothing of it is known in metres.
+    /// Whether depth is relative, without metres.
     pub is_relative: bool,
-    /// Width and height of its pictures; needed where depth is relative.
+    /// Width and height of its pictures; needed if depth is relative.
     pub size: (u32, u32),
 }
 
-/// Where relative depth puts what is nearest.
+/// Distance at which relative depth places the nearest points.
 const NEAREST_M: f32 = 1.0;
 
 impl Look {
-    /// The look as far as a source allows it. Without depth, nobody knows what to keep sharp, and all is blurred alike. With
-    /// relative depth there are no metres: the subject is in focus in place of a distance, and a lens blurs as much by amount.
+    /// Adapts the look to a source. Without depth there is no subject to keep sharp, and everything is blurred equally.
+    /// With relative depth there are no metres: a focus distance becomes focus on the subject, and a lens becomes the
+    /// equivalent amount of blur.
     pub fn for_source(&self, known: Known) -> Self {
         let mut look = self.clone();
         if look.effect.follows_depth() && !known.has_depth {
@@ -40,9 +41,10 @@ impl Look {
 }
 
 impl Strength {
-    /// The strength without a lens that blurs by this share of the height: the default where it is as good as that.
+    /// Returns the strength for a CoC at infinity as a fraction of the picture's height; the default if it is close to
+    /// that.
     pub fn of_share(share: f32) -> Self {
-        // In percent, to a hundredth: finer nobody sees.
+        // In percent with two decimals: finer differences are invisible.
         let percent = |share: f32| (share * 1e4).round() / 1e2;
         match percent(share) {
             usual if (usual - percent(COC_AT_INFINITY_PER_HEIGHT)).abs() < 0.011 => Self::Default,

@@ -1,7 +1,7 @@
-//! How the picture shall look: everything about the blur, for pictures of any size.
+//! The look: all settings of the blur, for pictures of any size.
 //!
-//! A [`Look`] is data: it is read and written by the table of [`settings`], and a [`Patch`] changes some of it. For
-//! pictures of one size it becomes the executor's [`bokeh::Settings`] and a [`CocRule`].
+//! A [`Look`] is data: the table [`settings`] reads and writes it, and a [`Patch`] changes parts of it. For pictures of
+//! one size it becomes the executor's [`bokeh::Settings`] and a [`CocRule`].
 
 #[cfg(feature = "files")]
 mod aperture;
@@ -42,45 +42,45 @@ use crate::depth::backdrop::Behind;
 use crate::depth::focus::FocusRule;
 use crate::optics::{CocField, CocKind};
 
-/// CoC radius at infinity, as a fraction of the picture's height: a portrait lens wide open.
+/// CoC radius at infinity, as a fraction of the picture's height: like a portrait lens wide open.
 pub const COC_AT_INFINITY_PER_HEIGHT: f32 = 1.0 / 45.0;
 /// Largest CoC radius in front of or behind the focal plane, as a fraction of the picture's height.
 pub const MAX_COC_PER_HEIGHT: f32 = 0.06;
-/// Largest CoC radius that settings accept, in pixels: pictures have sides up to 16384 px. For one picture, more than
-/// its diagonal makes no difference.
+/// Largest CoC radius that settings accept, in pixels: pictures have sides of up to 16384 px, and a radius above the
+/// diagonal makes no difference.
 pub const MOST_RADIUS_PX: f32 = 20_000.0;
 
-/// At which rungs of the quality ladder frames are blurred.
+/// The quality levels at which frames are blurred.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum QualityRule {
-    /// All at one rung.
+    /// A single level.
     Fixed(Quality),
-    /// As the time allows, beginning at this rung; the executor is made for all of them.
+    /// Any level, as time allows, starting at this one; the executor must support all.
     Auto(Quality),
 }
 
 /// Everything about the blur, for pictures of any size.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Look {
-    /// What the radius follows.
+    /// Which input determines the CoC radius.
     pub effect: Effect,
     /// Compositing of the effect `dof`.
     pub method: bokeh::Method,
-    /// Where the focal plane is.
+    /// The distance of the focal plane.
     pub focus: FocusRule,
-    /// All within half of this to either side of the focal plane is sharp, in metres, >= 0.
+    /// Everything within half of this on either side of the focal plane is sharp, in metres, >= 0.
     pub focus_range_m: f32,
-    /// How strong the blur is.
+    /// The strength of the blur.
     pub strength: Strength,
-    /// Largest CoC radius in pixels; `None` is a share of the height.
+    /// Largest CoC radius in pixels; `None` is [`MAX_COC_PER_HEIGHT`].
     pub max_coc_px: Option<f32>,
     /// Whether depth is refined.
     pub refine: Refine,
-    /// Whether a stream remembers what lies behind things.
+    /// Whether a stream remembers the background that objects hide.
     pub background_memory: BackgroundMemory,
-    /// What is behind the subject.
+    /// The background behind the subject.
     pub behind: Behind,
-    /// Whether a stream keeps the subject in the middle.
+    /// Whether a stream keeps the subject centred.
     pub follow: Follow,
     /// The band of the effect `tilt-shift`.
     pub tilt: Tilt,
@@ -88,11 +88,11 @@ pub struct Look {
     pub aperture: Aperture,
     /// Width of its soft rim, as a fraction of the radius.
     pub rim: f32,
-    /// Separable terms; `None` takes the quality level's.
+    /// Number of separable terms; `None` is that of the quality level.
     pub rank: Option<bokeh::Rank>,
     /// Highlight recovery; 0 is off.
     pub highlights: f32,
-    /// How finely it is blurred; `None` as the time allows.
+    /// The quality level; `None` follows the time available.
     pub quality: Option<Quality>,
 }
 
@@ -111,7 +111,7 @@ impl Default for Look {
             follow: Follow::OFF,
             tilt: Tilt { center_y: 0.55, band: 0.15, angle_deg: 0.0 },
             aperture: Aperture::default(),
-            // Rank 3 is then as good as rank 7 of a hard disc.
+            // With it, rank 3 is as good as rank 7 with a hard disc.
             rim: 0.2,
             rank: None,
             // Off, as it invents light.
@@ -122,12 +122,12 @@ impl Default for Look {
 }
 
 impl Look {
-    /// The default look with another effect.
+    /// Returns the default look with another effect.
     pub fn plain(effect: Effect) -> Self {
         Self { effect, ..Self::default() }
     }
 
-    /// Which kind of CoC frames have; none when they pass through.
+    /// Returns the kind of CoC that frames have; `None` if they pass through.
     pub fn coc_kind(&self) -> Option<CocKind> {
         match self.effect {
             Effect::None => None,
@@ -137,7 +137,8 @@ impl Look {
         }
     }
 
-    /// A setting that needs depth in metres, if there is one, as a flag: for the message that depth is only relative.
+    /// Returns a setting that needs depth in metres, as a flag, for the message that depth is only relative; `None` if
+    /// the look has no such setting.
     pub fn needs_metres(&self) -> Option<String> {
         match (self.focus, self.strength) {
             (FocusRule::Metres(metres), _) => Some(format!("--focus {metres}")),
@@ -147,20 +148,20 @@ impl Look {
         }
     }
 
-    /// The look that blurs one frame again as it was blurred, given its colours and depth. `coc` is the frame's, which
-    /// has the distance of its focus, and `quality` its rung, if it was blurred.
+    /// Returns the look that reproduces the blur of one frame from its colours and depth. `coc` is the frame's, with
+    /// its focus distance; `quality` is its level, if it was blurred.
     pub fn of_frame(&self, coc: &CocField, quality: Option<Quality>) -> Self {
         let focus = match coc {
             CocField::Depth(lens) => FocusRule::Metres(lens.focus_m),
             CocField::Uniform { .. } | CocField::Ramp(_) => self.focus,
         };
-        // Not `auto`, which blurs all alike where the depth is missing.
+        // Not `auto`, which becomes a uniform blur if depth is missing.
         let effect = if self.effect.follows_depth() { Effect::Dof } else { self.effect };
         Self { effect, focus, quality: quality.or(self.quality), ..self.clone() }
     }
 
-    /// The executor's settings for pictures of `size` pixels; none when frames pass through.
-    /// `adaptive` says whether the quality may follow the time there is.
+    /// Returns the executor's settings for pictures of `size` pixels; `None` if frames pass through. `adaptive` says
+    /// whether the quality may follow the time available.
     pub fn settings(&self, size: (u32, u32), adaptive: bool) -> Option<bokeh::Settings> {
         let coc = self.coc_kind()?;
         let max_px = self.max_coc_px(size);
@@ -180,7 +181,7 @@ impl Look {
         })
     }
 
-    /// Where the CoC of a frame of `size` pixels comes from.
+    /// Returns the rule for the CoC of frames of `size` pixels.
     pub fn coc_rule(&self, size: (u32, u32)) -> CocRule {
         let max_coc_px = self.max_coc_px(size);
         let radius_px = self.at_infinity_px(size).min(max_coc_px);
@@ -200,7 +201,7 @@ impl Look {
         }
     }
 
-    /// At which rung an executor of [`Look::settings`] blurs.
+    /// Returns the quality levels for an executor of [`Look::settings`].
     pub fn quality_rule(&self, adaptive: bool) -> QualityRule {
         match self.quality {
             None if adaptive => QualityRule::Auto(Quality::default()),
@@ -208,7 +209,7 @@ impl Look {
         }
     }
 
-    /// Whether depth is refined before the blur; `measured` is the depth of a recorded stream.
+    /// Returns whether depth is refined before the blur; `measured` says whether it was measured.
     pub fn refines(&self, measured: bool) -> bool {
         match self.refine {
             Refine::Auto => measured,
@@ -217,20 +218,20 @@ impl Look {
         }
     }
 
-    /// CoC radius at infinity in pixels, where it does not depend on a focus that is yet to be found.
+    /// Returns the CoC radius at infinity in pixels; infinite if it depends on a focus that is not known yet.
     fn at_infinity_px(&self, (width, height): (u32, u32)) -> f32 {
         match (self.strength, self.focus) {
             (Strength::Default, _) => height as f32 * COC_AT_INFINITY_PER_HEIGHT,
             (Strength::Percent(percent), _) => height as f32 * percent / 100.0,
             (Strength::AtInfinity(radius_px), _) => radius_px,
             (Strength::Lens(lens), FocusRule::Metres(focus_m)) => lens.coc_at_infinity_px(focus_m, width),
-            // The focus is not known yet: callers take the largest CoC as the bound.
+            // The focus is not known yet: callers use the largest CoC as the bound.
             (Strength::Lens(_), _) => f32::INFINITY,
         }
     }
 
-    /// Largest CoC radius, in pixels. A strength that was asked for holds even above the default limit, unless
-    /// `--max-coc` is given, too.
+    /// Returns the largest CoC radius in pixels. An explicit strength holds even above the default limit, unless
+    /// `--max-coc` is given as well.
     fn max_coc_px(&self, size: (u32, u32)) -> f32 {
         let by_height_px = size.1 as f32 * MAX_COC_PER_HEIGHT;
         self.max_coc_px.unwrap_or(match self.strength {

@@ -1,47 +1,47 @@
-//! Numbers as they are written in settings.
+//! Parses numbers in settings.
 
 use std::fmt;
 use std::ops::RangeInclusive;
 use std::str::FromStr;
 
-/// The number that `text` is, if it lies from `low` to `high`.
+/// Parses a number from `low` to `high`; `None` for anything else.
 pub(crate) fn number_in(text: &str, low: f32, high: f32) -> Option<f32> {
     text.trim().parse().ok().filter(|number| (low..=high).contains(number))
 }
 
-/// A parser of numbers within `range`, its ends included.
+/// Returns a parser of numbers within `range`, ends included.
 pub fn within(range: RangeInclusive<f32>) -> impl Fn(&str) -> Result<f32, String> + Clone + Send + Sync + 'static {
     let (low, high) = range.into_inner();
     move |text| number_in(text, low, high).ok_or_else(|| format!("use a number from {low} to {high}"))
 }
 
-/// A parser of finite numbers above 0.
+/// Parses a finite number above 0.
 ///
 /// # Errors
-/// `text` is no such number.
+/// `text` is not such a number.
 pub fn above_zero(text: &str) -> Result<f32, String> {
     number_in(text, 0.0, f32::MAX).filter(|number| *number > 0.0).ok_or_else(|| "use a number above 0".to_string())
 }
 
-/// A parser of finite numbers from 0.
+/// Parses a finite number from 0.
 ///
 /// # Errors
-/// `text` is no such number.
+/// `text` is not such a number.
 pub fn not_negative(text: &str) -> Result<f32, String> {
     number_in(text, 0.0, f32::MAX).ok_or_else(|| "use a number from 0".to_string())
 }
 
-/// A value, or `auto`: what the picture or the quality level calls for.
+/// A value, or `auto`, which the picture or the quality level determines.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum OrAuto<T> {
     /// `auto`.
     Auto,
-    /// This one.
+    /// An explicit value.
     This(T),
 }
 
 impl<T> OrAuto<T> {
-    /// The value, where one is chosen.
+    /// Returns the explicit value, if any.
     pub fn chosen(self) -> Option<T> {
         match self {
             Self::Auto => None,
@@ -49,7 +49,7 @@ impl<T> OrAuto<T> {
         }
     }
 
-    /// The parser `parse`, which takes `auto` as well. Errors of parsers say what is accepted.
+    /// Extends the parser `parse` by `auto`. Errors of parsers say what is accepted.
     pub fn parser(
         parse: impl Fn(&str) -> Result<T, String> + Clone + Send + Sync + 'static,
     ) -> impl Fn(&str) -> Result<Self, String> + Clone + Send + Sync + 'static {

@@ -1,4 +1,4 @@
-//! Changes of a look: settings by their names, applied to another look.
+//! Changes of a look: a set of named settings that is applied to a look.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -12,19 +12,19 @@ use crate::depth::backdrop::Behind;
 use crate::optics::Lens;
 use crate::recording::RecordingError;
 
-/// Why settings make no look.
+/// An error in the settings of a look.
 #[derive(Debug, thiserror::Error)]
 pub enum LookError {
-    /// A lens is not known by all of its numbers.
+    /// A lens lacks one of its numbers.
     #[error("a lens needs all of --f-number, --focal-length and --sensor-width")]
     Lens,
-    /// A picture that it names cannot be read.
+    /// A picture cannot be read.
     #[error(transparent)]
     Picture(#[from] RecordingError),
 }
 
 impl Patch {
-    /// All settings of a look, so that the look depends on no other.
+    /// Returns all settings of a look, so that the patch makes it from any other.
     pub fn of(look: &Look) -> Self {
         let (coc_at_infinity, lens) = match look.strength {
             Strength::Lens(lens) => (None, Some(lens)),
@@ -54,10 +54,10 @@ impl Patch {
         }
     }
 
-    /// Settings by their names.
+    /// Parses settings by name.
     ///
     /// # Errors
-    /// A look has no such setting, or that has no such value: the name of the setting, and what is wrong.
+    /// Returns the name of a setting that does not exist or has an invalid value, and what is wrong.
     pub fn parse<'a>(settings: impl IntoIterator<Item = (&'a str, &'a str)>) -> Result<Self, (String, String)> {
         let mut patch = Self::default();
         for (name, text) in settings {
@@ -67,13 +67,13 @@ impl Patch {
         Ok(patch)
     }
 
-    /// Names and values of the settings that it sets, in the order of [`SETTINGS`]. Numbers are as short as they can be
+    /// Returns names and values of the settings it sets, in the order of [`SETTINGS`]. Numbers are as short as possible
     /// and parse to the same value.
     pub fn values(&self) -> Vec<Value> {
         SETTINGS.iter().filter_map(|setting| Some((setting.name, (setting.get)(self)?))).collect()
     }
 
-    /// Without the settings that have the same value in `other`.
+    /// Removes the settings that have the same value in `other`.
     pub fn beside(mut self, other: &Self) -> Self {
         let is_same = |setting: &&Setting| (setting.get)(&self) == (setting.get)(other);
         let same: Vec<&Setting> = SETTINGS.iter().filter(is_same).collect();
@@ -81,7 +81,7 @@ impl Patch {
         self
     }
 
-    /// The files of pictures that it names and that are not read yet.
+    /// Returns the files of pictures that are not read yet.
     pub fn files_mut(&mut self) -> impl Iterator<Item = &mut PathBuf> {
         let aperture = match &mut self.aperture {
             Some(ApertureName::Image(file)) => Some(file),
@@ -94,7 +94,7 @@ impl Patch {
         aperture.into_iter().chain(behind)
     }
 
-    /// The settings of a look by all of their names, as those read them who ask a run how it is.
+    /// Returns all settings of a look under all their names, for the status of a run.
     pub fn described(look: &Look) -> BTreeMap<String, String> {
         let named = |(name, value): Value| {
             let alias = setting(name).and_then(Setting::alias);
@@ -103,10 +103,10 @@ impl Patch {
         Self::of(look).values().into_iter().flat_map(named).collect()
     }
 
-    /// Reads the pictures that it names, so that [`Patch::on`] need not.
+    /// Reads the pictures it names, so that [`Patch::on`] need not.
     ///
     /// # Errors
-    /// One cannot be read.
+    /// A picture cannot be read.
     pub fn load(&mut self) -> Result<(), RecordingError> {
         if let Some(name) = &mut self.aperture {
             *name = ApertureName::Drawn(name.load()?);
@@ -117,23 +117,23 @@ impl Patch {
         Ok(())
     }
 
-    /// `base` with these settings; what it does not set is as before.
+    /// Returns `base` with these settings changed.
     ///
     /// # Errors
-    /// A lens misses a number, or a picture cannot be read.
+    /// A lens lacks a number, or a picture cannot be read.
     pub fn on(&self, base: &Look) -> Result<Look, LookError> {
         let mut look = base.clone();
-        macro_rules! take {
+        macro_rules! set {
             ($($field:ident),+) => { $(if let Some(value) = self.$field { look.$field = value; })+ };
         }
-        take!(effect, method, focus, focus_range_m, refine, background_memory, follow, tilt, rim, highlights);
+        set!(effect, method, focus, focus_range_m, refine, background_memory, follow, tilt, rim, highlights);
         look.strength = self.strength(base.strength)?;
         if let Some(max_coc_px) = self.max_coc_px {
             look.max_coc_px = max_coc_px.chosen();
         }
         match (&self.aperture, &look.aperture.shape) {
             (None, _) => {}
-            // The base has this picture already: it is not read again.
+            // The base has this picture already: do not read it again.
             (Some(ApertureName::Image(file)), Shape::Picture(picture)) if picture.file.as_ref() == Some(file) => {}
             (Some(name), _) => look.aperture.shape = name.load()?,
         }
@@ -154,8 +154,8 @@ impl Patch {
         Ok(look)
     }
 
-    /// The strength after this patch: by a lens if it sets any number of one, of which `before` may give the others;
-    /// else the CoC at infinity.
+    /// Returns the strength after this patch: a lens if it sets any number of one (missing ones come from `before`),
+    /// otherwise the CoC at infinity.
     fn strength(&self, before: Strength) -> Result<Strength, LookError> {
         let (f_number, focal_length_mm, sensor_width_mm) = (self.f_number, self.focal_length_mm, self.sensor_width_mm);
         if f_number.or(focal_length_mm).or(sensor_width_mm).is_none() {
@@ -176,7 +176,7 @@ impl Patch {
     }
 }
 
-/// A setting's name and its value, as they follow the dashes.
+/// A setting's name and its value, as on the command line.
 pub type Value = (&'static str, String);
 
 impl Serialize for Patch {

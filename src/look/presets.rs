@@ -1,20 +1,19 @@
-//! Presets: looks by name.
+//! Presets: named looks.
 
 use super::Patch;
 
-/// A look by name: it changes what it sets of another look.
+/// A named look: the settings that it changes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Preset {
     /// Its name.
     pub name: String,
     /// Its settings.
     pub patch: Patch,
-    /// Whether the user made it; else it is built in.
+    /// Whether the user created it; otherwise it is built in.
     pub own: bool,
 }
 
-/// The built-in presets, in the order in which they are shown. What they do not set stays: where the focus is, how
-/// finely it is blurred, what depth is fitted to.
+/// The built-in presets, in display order. They leave some settings as they are: focus, quality and refinement.
 const BUILT_IN: [(&str, &[(&str, &str)]); 5] = [
     (
         "portrait",
@@ -28,7 +27,7 @@ const BUILT_IN: [(&str, &[(&str, &str)]); 5] = [
             ("focus-range", "0"),
         ],
     ),
-    // Rounded blades, a crisp edge, lights that glow.
+    // Rounded blades, a crisp edge, glowing highlights.
     (
         "cinematic",
         &[
@@ -41,7 +40,7 @@ const BUILT_IN: [(&str, &[(&str, &str)]); 5] = [
             ("focus-range", "0"),
         ],
     ),
-    // Discs that fade out, much of them.
+    // Large discs that fade out.
     (
         "dreamy",
         &[
@@ -54,7 +53,7 @@ const BUILT_IN: [(&str, &[(&str, &str)]); 5] = [
             ("focus-range", "0"),
         ],
     ),
-    // A sharp range of 0.3 m: a thing in the hand, and the hand.
+    // A sharp range of 0.3 m, for an object and the hand that holds it.
     (
         "product",
         &[
@@ -82,7 +81,7 @@ const BUILT_IN: [(&str, &[(&str, &str)]); 5] = [
     ),
 ];
 
-/// The built-in presets, in the order in which they are shown.
+/// Returns the built-in presets, in display order.
 pub fn built_in() -> impl Iterator<Item = Preset> {
     BUILT_IN.iter().map(|(name, settings)| Preset {
         name: (*name).to_string(),

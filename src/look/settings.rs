@@ -1,5 +1,5 @@
-//! The settings of a look: one table that the command line, the environment, the settings file, presets, snapshots and
-//! the window go by. [`Look::default`] has their defaults.
+//! The settings of a look: one table for the command line, the environment, the settings file, presets, snapshots and
+//! the window. [`Look::default`] has their defaults.
 
 use std::ops::RangeInclusive;
 use std::str::FromStr;
@@ -11,44 +11,44 @@ use crate::budget::Quality;
 use crate::depth::focus::FocusRule;
 use crate::names::Named;
 
-/// Radial intensity of the aperture that can be chosen.
+/// The valid radial intensities of the aperture.
 pub const INTENSITIES: RangeInclusive<f32> = -1.0..=1.0;
-/// Soft rims that can be chosen, as fractions of the radius.
+/// The valid widths of the soft rim, as fractions of the radius.
 pub const RIMS: RangeInclusive<f32> = 0.0..=1.0;
-/// Highlight recovery that can be chosen.
+/// The valid factors of highlight recovery.
 pub const HIGHLIGHTS: RangeInclusive<f32> = 0.0..=1000.0;
 
-/// What [`above_zero`] takes.
+/// The range that [`above_zero`] accepts.
 const ABOVE_ZERO: RangeInclusive<f32> = f32::from_bits(1)..=f32::MAX;
 
-/// What settings are about: the headings of the help.
+/// A group of settings, with a heading of its own in the help.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Group {
-    /// What the blur does.
+    /// The blur as such.
     Blur,
     /// The lens opening.
     Aperture,
-    /// How finely the blur is computed.
+    /// The precision of the blur.
     Computing,
 }
 
-/// A setting.
+/// A setting of a look.
 pub struct Setting {
-    /// Its name: its flag without the dashes, its key in a file.
+    /// Its name: the flag without dashes, and the key in a file.
     pub name: &'static str,
-    /// The field of [`Patch`] that has it.
+    /// The name of its field in [`Patch`].
     pub id: &'static str,
-    /// What stands for its value in the help.
+    /// The placeholder of its value in the help.
     pub value: &'static str,
-    /// What it is about.
+    /// Its group.
     pub group: Group,
-    /// What it does.
+    /// The help text.
     pub help: &'static str,
-    /// Its values by name, and what each does, where it has but a few.
+    /// Its values by name and what each does; empty if they are not enumerated.
     pub choices: fn() -> Vec<Choice>,
-    /// The numbers that it takes, ends included, where it takes nothing else.
+    /// The range of its numbers, ends included; `None` if it accepts other values.
     pub range: fn() -> Option<RangeInclusive<f32>>,
-    /// Whether its default is worked out from the picture or the quality level, and has no value of its own.
+    /// Whether its default depends on the picture or the quality level, so that it has no fixed value.
     pub computed: bool,
     pub(super) set: fn(&mut Patch, &str) -> Result<(), String>,
     pub(super) get: fn(&Patch) -> Option<String>,
@@ -60,11 +60,12 @@ macro_rules! settings {
         $(#[doc = $help:literal])+
         $field:ident: $type:ty = $name:literal $value:literal $group:ident $parse:expr $(, one of $choices:expr)? $(, in $range:expr)? $(, is $computed:ident)*;
     )+) => {
-        /// Some settings of a look: what a preset, a snapshot, the settings file or flags say. `None` says nothing.
+        /// Some settings of a look, as in a preset, a snapshot, the settings file or flags. `None` leaves a setting
+        /// unset.
         #[derive(Clone, Debug, Default, PartialEq)]
         pub struct Patch { $(#[doc = concat!("The setting `", $name, "`.")] pub $field: Option<$type>,)+ }
 
-        /// All settings of a look, in the order of the help. Nothing else can be in a preset.
+        /// All settings of a look, in the order of the help. Presets consist of these only.
         pub static SETTINGS: [Setting; [$($name),+].len()] = [$(Setting {
             name: $name,
             id: stringify!($field),
@@ -87,12 +88,12 @@ macro_rules! settings {
 /// A value's name, and what it does.
 pub type Choice = (&'static str, &'static str);
 
-/// Names and help of all values of an enumeration.
+/// Returns names and help of all values of an enumeration.
 fn names_of<T: Named>() -> Vec<Choice> {
     T::VALUES.iter().map(|value| (value.name(), value.help())).collect()
 }
 
-fn auto_or<T: Named>() -> Vec<Choice> {
+fn names_with_auto<T: Named>() -> Vec<Choice> {
     [vec![("auto", "As the time allows")], names_of::<T>()].concat()
 }
 
@@ -138,56 +139,56 @@ settings! {
     highlights: f32 = "highlights" "M" Aperture within(HIGHLIGHTS), in HIGHLIGHTS;
     /// Quality level: changes fidelity, never the amount of blur. auto follows the time there is (--budget-ms) where
     /// frames come in real time, up to balanced on the CPU and best on a GPU; elsewhere it is balanced
-    quality: OrAuto<Quality> = "quality" "LEVEL" Computing OrAuto::from_str, one of auto_or::<Quality>();
+    quality: OrAuto<Quality> = "quality" "LEVEL" Computing OrAuto::from_str, one of names_with_auto::<Quality>();
 }
 
-/// The setting of this name, if it is one of a look.
+/// Returns the setting with this name or alias; `None` if a look has no such setting.
 pub fn setting(name: &str) -> Option<&'static Setting> {
     let name = name_of(name);
     SETTINGS.iter().find(|setting| setting.name == name)
 }
 
-/// The name of a setting that is called by its name or by another one; any other text as it is.
+/// Resolves an alias to the setting's name; returns any other text unchanged.
 pub fn name_of(called: &str) -> &str {
     ALIASES.iter().find(|(_, alias)| *alias == called).map_or(called, |(name, _)| name)
 }
 
-/// The settings of a lens, which replace the strength at infinity.
-const OF_A_LENS: [&str; 3] = ["f-number", "focal-length", "sensor-width"];
-/// The strength at infinity, which replaces the settings of a lens.
+/// The settings of a lens, which exclude the strength at infinity.
+const LENS_SETTINGS: [&str; 3] = ["f-number", "focal-length", "sensor-width"];
+/// The strength at infinity, which excludes the settings of a lens.
 const AT_INFINITY: &str = "blur";
-/// Settings by another name that means the same wherever settings are written, and that name.
+/// Setting names and their aliases, valid wherever settings are written.
 const ALIASES: [(&str, &str); 1] = [(AT_INFINITY, "coc-at-infinity")];
 
 impl Setting {
-    /// The names of the settings that cannot go with this one.
+    /// Returns the names of the settings that cannot be combined with this one.
     pub fn excludes(&self) -> &'static [&'static str] {
         match self.name {
-            AT_INFINITY => &OF_A_LENS,
-            name if OF_A_LENS.contains(&name) => &[AT_INFINITY],
+            AT_INFINITY => &LENS_SETTINGS,
+            name if LENS_SETTINGS.contains(&name) => &[AT_INFINITY],
             _ => &[],
         }
     }
 
-    /// Another name that it has.
+    /// Returns its alias, if any.
     pub fn alias(&self) -> Option<&'static str> {
         ALIASES.iter().find(|(name, _)| *name == self.name).map(|(_, alias)| *alias)
     }
 
-    /// Whether it sets how strong the blur is: at infinity or by a lens, of which one excludes the other.
+    /// Returns whether it sets the strength of the blur: at infinity or by a lens, which exclude each other.
     pub fn is_strength(&self) -> bool {
         !self.excludes().is_empty()
     }
 
-    /// Its default value, unless that is [computed](Setting::computed).
+    /// Returns its default value; `None` if that is [computed](Setting::computed).
     pub fn default(&self) -> Option<String> {
         (self.get)(&Patch::of(&Look::default())).filter(|_| !self.computed)
     }
 
-    /// Puts a value into a patch.
+    /// Parses a value into a patch.
     ///
     /// # Errors
-    /// It has no such value: what is accepted.
+    /// The value is invalid: returns what is accepted.
     pub fn set(&self, patch: &mut Patch, text: &str) -> Result<(), String> {
         (self.set)(patch, text)
     }

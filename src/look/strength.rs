@@ -1,4 +1,4 @@
-//! How strong the blur is, for pictures of any size.
+//! The strength of the blur, for pictures of any size.
 
 use std::fmt;
 use std::str::FromStr;
@@ -7,7 +7,7 @@ use super::MOST_RADIUS_PX;
 use super::number::number_in;
 use crate::optics::Lens;
 
-/// How strong the blur is.
+/// The strength of the blur.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Strength {
     /// A CoC radius at infinity of [`COC_AT_INFINITY_PER_HEIGHT`](super::COC_AT_INFINITY_PER_HEIGHT).
@@ -16,7 +16,7 @@ pub enum Strength {
     AtInfinity(f32),
     /// CoC radius at infinity, in percent of the picture's height.
     Percent(f32),
-    /// What this lens does at the distance of focus.
+    /// Given by this lens at the focus distance.
     Lens(Lens),
 }
 
@@ -34,7 +34,7 @@ impl FromStr for Strength {
 }
 
 impl fmt::Display for Strength {
-    /// As the setting `blur` has it; a lens has settings of its own.
+    /// Writes the value of the setting `blur`; a lens has settings of its own.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Default => f.write_str("auto"),

@@ -12,7 +12,7 @@ pub struct Tilt {
     pub center_y: f32,
     /// Width of the band across its direction, as a fraction of the height.
     pub band: f32,
-    /// Turn of the band, clockwise, in degrees; 0 is level.
+    /// Rotation of the band, clockwise, in degrees; 0 is horizontal.
     pub angle_deg: f32,
 }
 
@@ -20,7 +20,7 @@ impl FromStr for Tilt {
     type Err = String;
     fn from_str(text: &str) -> Result<Self, String> {
         let mut parts = text.split(':');
-        // The next part, or its default where the text ends; `None` if it is no number from `low` to `high`.
+        // Parses the next part: its default if the text ends, `None` if it is no number from `low` to `high`.
         let mut next = |low, high, default| match parts.next() {
             None => Some(default),
             Some(part) => part.trim().parse().ok().filter(|number| (low..=high).contains(number)),
@@ -44,20 +44,26 @@ impl fmt::Display for Tilt {
 }
 
 impl Tilt {
-    /// The ramp for a picture of `size` pixels that reaches `max_px` in the corner farthest from the band.
+    /// Returns the ramp for a picture of `size` pixels, which reaches `max_px` in the corner farthest from the band.
     pub fn ramp(&self, (width, height): (u32, u32), max_px: f32) -> Ramp {
         let (width, height) = (width as f32, height as f32);
         let (sin, cos) = self.angle_deg.to_radians().sin_cos();
-        // Across the band; straight down at 0 degrees.
+        // The normal of the band, straight down at 0 degrees.
         let normal = glam::Vec2::new(-sin, cos);
         let offset_px = normal.dot(glam::Vec2::new(width / 2.0, height * self.center_y));
         let half_band_px = height * self.band / 2.0;
         let corners = [(0.0, 0.0), (width, 0.0), (0.0, height), (width, height)];
-        let reach_px = corners
+        let distance_px = corners
             .map(|corner| (normal.dot(corner.into()) - offset_px).abs() - half_band_px)
             .into_iter()
             .fold(0.0, f32::max);
-        Ramp { normal, offset_px, half_band_px, slope: if reach_px > 0.0 { max_px / reach_px } else { 0.0 }, max_px }
+        Ramp {
+            normal,
+            offset_px,
+            half_band_px,
+            slope: if distance_px > 0.0 { max_px / distance_px } else { 0.0 },
+            max_px,
+        }
     }
 }
 

@@ -1,8 +1,9 @@
-//! Networks in a process of their own, which is bounded: in memory by the system, in time by who waits for its answers.
+//! Networks in a process of their own, whose memory the system limits, and whose time the waiting side limits.
 //!
-//! No runtime bounds what it runs: a file of 150 bytes can ask for 40 GB, which aborts a process, or keep a thread at work for
-//! hours. Here the process that aborts or is killed is not the one that shows the picture. The program is started once more,
-//! with [`ARGUMENT`] alone and a socket in place of its standard input, and calls [`serve`] for it.
+//! No runtime limits the network that it runs: a file of 150 bytes can request 40 GB, which aborts the process, or
+//! occupy a thread for hours. Here the process that aborts or is killed is not the one that shows the picture. The
+//! program is started again, with [`ARGUMENT`] as its only argument and a socket as standard input, and calls
+//! [`serve`].
 
 mod message;
 mod process;
@@ -16,37 +17,37 @@ pub use serve::serve;
 use super::{Failure, Network, Runtime};
 use process::Process;
 
-/// What the program is started with, alone, to call [`serve`].
+/// The argument with which the program is started to call [`serve`].
 pub const ARGUMENT: &str = "--run-network-apart";
 
-/// Most bytes of memory that the process may ask for: some times what the largest file takes with all its pictures.
-const MOST_BYTES: u64 = 4 << 30;
-/// A network is loaded in less, also on a machine that is busy with other things.
-const LOADING: Duration = Duration::from_secs(30);
-/// An answer that takes longer is of no use.
-const ANSWERING: Duration = Duration::from_secs(10);
+/// Memory limit of the process: several times the need of the largest file with all its pictures.
+const MAX_MEMORY_BYTES: u64 = 4 << 30;
+/// Time limit for loading a network; a busy machine needs less.
+const LOAD_TIMEOUT: Duration = Duration::from_secs(30);
+/// Time limit for an answer; a later one would be useless.
+const RUN_TIMEOUT: Duration = Duration::from_secs(10);
 
-/// Whether the program calls [`serve`] when it is told to.
-static IS_POSSIBLE: AtomicBool = AtomicBool::new(false);
-/// Whether the program is about to end.
-static ENDS: AtomicBool = AtomicBool::new(false);
+/// Whether the program supports [`ARGUMENT`].
+static IS_ENABLED: AtomicBool = AtomicBool::new(false);
+/// Whether the program is about to exit.
+static IS_EXITING: AtomicBool = AtomicBool::new(false);
 
-/// From now on networks that are not known run in processes of their own: for a program that calls [`serve`] where it is
-/// started with [`ARGUMENT`]. In all others, networks can take all the memory and time there is.
+/// Runs unknown networks in separate processes from now on. Only for a program that calls [`serve`] when started with
+/// [`ARGUMENT`]; in others, networks can use any amount of memory and time.
 pub fn make_possible() {
-    IS_POSSIBLE.store(true, Ordering::Relaxed);
+    IS_ENABLED.store(true, Ordering::Relaxed);
 }
 
-/// The program is about to end: an answer that is not there soon is waited for no longer.
+/// Shortens all waits, because the program is about to exit.
 pub fn hurry() {
-    ENDS.store(true, Ordering::Relaxed);
+    IS_EXITING.store(true, Ordering::Relaxed);
 }
 
-pub(super) fn is_possible() -> bool {
-    IS_POSSIBLE.load(Ordering::Relaxed)
+pub(super) fn is_enabled() -> bool {
+    IS_ENABLED.load(Ordering::Relaxed)
 }
 
-/// Lets a process of its own load a network, and run it from then on.
+/// Starts a process and loads a network in it.
 pub(super) fn load(bytes: &[u8], runtime: Runtime) -> Result<Network, Failure> {
     let process = Process::start().map_err(|error| Failure::Refused(format!("its process does not start: {error}")))?;
     process.load(bytes, runtime)

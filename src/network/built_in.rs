@@ -1,4 +1,4 @@
-//! The runtime that is built in (`rten`): pure Rust, with nothing to install.
+//! The built-in ONNX runtime (`rten`), in pure Rust.
 
 use std::sync::Arc;
 
@@ -8,16 +8,16 @@ use rten_tensor::prelude::*;
 
 use super::{Engine, Network, Port, Tensor, one_line, onnx};
 
-/// A network that the built-in runtime runs.
+/// A network run by the built-in runtime.
 pub struct BuiltIn {
     model: Model,
-    /// One thread: the others are for the blur.
+    /// A pool of one thread; the other cores are for the blur.
     threads: Arc<ThreadPool>,
 }
 
 impl BuiltIn {
     pub fn load(bytes: Vec<u8>) -> Result<Network, String> {
-        let model = Model::load(onnx::without_output_shapes(bytes)?).map_err(one_line)?;
+        let model = Model::load(onnx::remove_output_shapes(bytes)?).map_err(one_line)?;
         let ports = |ids: &[NodeId]| ids.iter().map(|&id| port(&model, id)).collect::<Result<Vec<_>, _>>();
         let (inputs, outputs) = (ports(model.input_ids())?, ports(model.output_ids())?);
         let engine = Box::new(Self { model, threads: Arc::new(ThreadPool::with_num_threads(1)) });

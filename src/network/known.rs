@@ -1,4 +1,4 @@
-//! Networks that are recognised by their content: what they are for, how they are fed, where they are to be had.
+//! Networks recognised by the hash of their content, with task, input scaling and source.
 
 use sha2::{Digest, Sha256};
 
@@ -14,48 +14,48 @@ named! {
     }
 }
 
-/// What the codes 0 to 255 of a picture become.
+/// The conversion of the codes 0 to 255 of a picture to the network's input.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Scaling {
     /// Subtracted from a code, per channel in the network's order.
     pub mean: [f32; 3],
-    /// What the rest is divided by.
+    /// Divisor of the difference.
     pub divisor: [f32; 3],
 }
 
 impl Scaling {
-    /// 0 to 1.
+    /// Scales to 0..1.
     pub const UNIT: Self = Self { mean: [0.0; 3], divisor: [255.0; 3] };
-    /// -1 to 1.
+    /// Scales to -1..1.
     pub const SIGNED: Self = Self { mean: [127.5; 3], divisor: [127.5; 3] };
-    /// Codes as they are.
+    /// Leaves the codes as they are.
     pub const CODES: Self = Self { mean: [0.0; 3], divisor: [1.0; 3] };
-    /// As networks trained on ImageNet have it.
+    /// Mean and standard deviation of ImageNet.
     pub const IMAGENET: Self = Self { mean: [123.675, 116.28, 103.53], divisor: [58.395, 57.12, 57.375] };
 }
 
-/// A network that is recognised.
+/// A recognised network.
 #[derive(Debug)]
 pub struct Known {
-    /// What it is called here, and its file where it is installed.
+    /// Its file name when installed, which also serves as its name.
     pub file: &'static str,
-    /// What it finds.
+    /// Its task.
     pub task: Task,
     /// SHA-256 of its file, in hexadecimal.
     pub sha256: &'static str,
-    /// Bytes of its file.
+    /// Size of its file.
     pub bytes: u64,
     /// Licence of the network.
     pub license: &'static str,
-    /// Where its file is to be had.
+    /// Download address of its file.
     pub address: &'static str,
-    /// How it is fed.
+    /// Scaling of its input.
     pub scaling: Scaling,
-    /// Blue comes first.
+    /// Whether blue comes first.
     pub bgr: bool,
 }
 
-/// The best of each task first; of those that are alike, the one that takes the least time.
+/// The best network of each task first; among equals, the fastest.
 pub static KNOWN: [Known; 7] = [
     Known {
         file: "selfie-landscape.tflite",
@@ -114,7 +114,7 @@ pub static KNOWN: [Known; 7] = [
         bytes: 395_434,
         license: "MIT (SINet, clovaai)",
         address: "https://github.com/royshil/obs-backgroundremoval/raw/875ffda175fc/data/models/SINet_Softmax_simple.onnx",
-        // As it was trained: blue first, and a mean and deviation of its own, over 255 once more.
+        // Trained with blue first, and with its own mean and deviation, divided by 255 once more.
         scaling: Scaling {
             mean: [102.890_434, 111.252_47, 126.912_12],
             divisor: [62.932_92 * 255.0, 62.821_38 * 255.0, 66.355_705 * 255.0],
@@ -134,21 +134,21 @@ pub static KNOWN: [Known; 7] = [
 ];
 
 impl Known {
-    /// The one that a file's content is.
+    /// Returns the known network with this content.
     pub fn of(bytes: &[u8]) -> Option<&'static Self> {
-        if !Self::any_has(bytes.len() as u64) {
+        if !Self::any_has_size(bytes.len() as u64) {
             return None;
         }
         let digest = hex(&Sha256::digest(bytes));
         KNOWN.iter().find(|known| known.sha256 == digest)
     }
 
-    /// Whether one of them has so many bytes: others need not be read.
-    pub(super) fn any_has(bytes: u64) -> bool {
+    /// Returns whether a known network has this size: files of other sizes need not be read.
+    pub(super) fn any_has_size(bytes: u64) -> bool {
         KNOWN.iter().any(|known| known.bytes == bytes)
     }
 
-    /// The first that is called this, with or without the ending of its file.
+    /// Returns the first known network of this name, with or without file extension.
     pub fn named(name: &str) -> Option<&'static Self> {
         KNOWN
             .iter()

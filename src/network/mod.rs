@@ -1,10 +1,9 @@
-//! Neural networks in files, TFLite's and ONNX's: read, run, and kept from doing harm.
+//! Loads and runs neural networks from TFLite and ONNX files, without trusting the files.
 //!
-//! What finds persons in the least time, and comes with the packages, is a TFLite file, which is run by code of our own
-//! (`tflite`). An ONNX file is run by ONNX Runtime where that is installed, and else by a library. No file is trusted: its size and
-//! those of all it takes and gives are bounded, it may have no loops, and what fails in it, fails with a line of text. No
-//! runtime bounds the memory and the time of what it runs, so that a program may let networks that are not known run in a
-//! process of their own ([`apart`]).
+//! The fastest person segmentation, which comes with the packages, is a TFLite file, run by our own code (`tflite`).
+//! ONNX files are run by ONNX Runtime if installed, or else by a library. Files are not trusted: their size and that of
+//! all inputs and outputs is limited, loops are rejected, and failures become one-line errors. No runtime limits memory
+//! and time of a network, so a program may run unknown networks in a separate process ([`apart`]).
 
 pub mod apart;
 mod built_in;
@@ -26,10 +25,10 @@ use crate::compute::catch_panic;
 use crate::files::input;
 use crate::names::named;
 
-/// Most bytes of a file: the networks that a processor can run live have less than 100 MB.
+/// Maximum size of a file: networks that a CPU can run live have less than 100 MB.
 pub const MOST_BYTES: u64 = 200 << 20;
-/// Most values of an input or output: more than any picture that a network is shown.
-pub const MOST_VALUES: usize = 4 << 20;
+/// Maximum number of values of an input or output: more than any picture that a network receives.
+pub const MAX_VALUES: usize = 4 << 20;
 
 named! {
     /// What runs networks.
@@ -43,31 +42,31 @@ named! {
     }
 }
 
-/// What a network takes or gives.
+/// An input or output of a network.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Port {
     /// Its name in the file.
     pub name: String,
-    /// Its sizes; `None` where the caller chooses.
+    /// Its shape; `None` is a size that the caller chooses.
     pub shape: Vec<Option<usize>>,
 }
 
-/// Numbers in some dimensions, the last one varying fastest.
+/// An array of numbers in row-major order.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Tensor {
-    /// Sizes.
+    /// Its shape.
     pub shape: Vec<usize>,
-    /// As many values as the product of the sizes.
+    /// Its values; their number is the product of the shape.
     pub values: Vec<f32>,
 }
 
 impl Tensor {
-    /// Zeros.
+    /// Creates a tensor of zeros.
     pub fn zeros(shape: &[usize]) -> Self {
         Self { shape: shape.to_vec(), values: vec![0.0; shape.iter().product()] }
     }
 
-    /// Takes other sizes and values, keeping its memory where that suffices.
+    /// Replaces shape and values, and reuses the memory if it suffices.
     fn set(&mut self, shape: impl IntoIterator<Item = usize>, values: impl IntoIterator<Item = f32>) {
         self.shape.clear();
         self.shape.extend(shape);
@@ -76,38 +75,38 @@ impl Tensor {
     }
 }
 
-/// What runs a network that it has loaded.
+/// A runtime with a loaded network.
 trait Engine: Send {
-    /// As [`Network::run`]; it may panic.
+    /// Does the same as [`Network::run`]; may panic.
     fn run(&mut self, inputs: &[Tensor], outputs: &mut Vec<Tensor>) -> Result<(), String>;
 }
 
-/// A network that was loaded.
+/// A loaded network.
 pub struct Network {
     engine: Box<dyn Engine>,
-    /// What it takes.
+    /// Its inputs.
     pub inputs: Vec<Port>,
-    /// What it gives.
+    /// Its outputs.
     pub outputs: Vec<Port>,
-    /// What runs it, such as `ONNX Runtime 1.21.0`.
+    /// The runtime, such as `ONNX Runtime 1.21.0`.
     pub runtime: String,
 }
 
 impl Network {
-    /// Runs it on one value of each input, in their order; `outputs` then holds one of each output.
+    /// Runs the network on one value per input, in order; `outputs` receives one value per output.
     ///
     /// # Errors
-    /// What the runtime says.
+    /// Returns the error of the runtime.
     pub fn run(&mut self, inputs: &[Tensor], outputs: &mut Vec<Tensor>) -> Result<(), String> {
-        guarded(|| self.engine.run(inputs, outputs))?;
-        match outputs.iter().find(|output| output.values.len() > MOST_VALUES) {
-            Some(output) => Err(format!("it gave more than {MOST_VALUES} values: {:?}", output.shape)),
+        run_guarded(|| self.engine.run(inputs, outputs))?;
+        match outputs.iter().find(|output| output.values.len() > MAX_VALUES) {
+            Some(output) => Err(format!("it gave more than {MAX_VALUES} values: {:?}", output.shape)),
             None => Ok(()),
         }
     }
 }
 
-/// Why a network is not used.
+/// An error in loading a network.
 #[derive(Debug, thiserror::Error)]
 pub enum NetworkError {
     /// The file cannot be read.
@@ -115,44 +114,45 @@ pub enum NetworkError {
     Read {
         /// The file.
         path: PathBuf,
-        /// Why.
+        /// The cause.
         source: std::io::Error,
     },
-    /// It is no network that can be run here.
+    /// The network cannot be run here.
     #[error("{}: no network that can be run here: {why}", path.display())]
     Refused {
         /// The file.
         path: PathBuf,
-        /// Why.
+        /// The reason.
         why: String,
     },
-    /// There is no ONNX Runtime.
+    /// ONNX Runtime is not available.
     #[error("ONNX Runtime: {0}")]
     NoRuntime(String),
 }
 
-/// A network and how its file begins.
+/// A loaded network, and what is known about its file.
 pub struct Loaded {
-    /// Ready to run.
+    /// The network, ready to run.
     pub network: Network,
-    /// What is known of this very file.
+    /// The known network with this content, if any.
     pub known: Option<&'static Known>,
 }
 
 /// Loads the network in the file `path`.
 ///
 /// # Errors
-/// It cannot be read, is no ONNX file, has loops, needs what the runtime has not, or the runtime asked for is not there.
+/// The file is unreadable, not a network, has loops or operators that the runtime does not support, or the requested
+/// runtime is not available.
 pub fn load(path: &Path, runtime: Runtime) -> Result<Loaded, NetworkError> {
     let bytes = input::read(path, MOST_BYTES).map_err(|source| NetworkError::Read { path: path.into(), source })?;
     let known = Known::of(&bytes);
     let refused = |why: String| NetworkError::Refused { path: path.into(), why };
     if !tflite::is_tflite(&bytes) {
-        onnx::refuse_repeating(&bytes).map_err(refused)?;
+        onnx::reject_loops(&bytes).map_err(refused)?;
     }
-    let loaded = match apart::is_possible() && known.is_none() {
+    let loaded = match apart::is_enabled() && known.is_none() {
         true => apart::load(&bytes, runtime),
-        false => load_here(bytes, runtime),
+        false => load_in_process(bytes, runtime),
     };
     let network = loaded.map_err(|failure| match failure {
         Failure::NoRuntime(why) => NetworkError::NoRuntime(why),
@@ -163,31 +163,31 @@ pub fn load(path: &Path, runtime: Runtime) -> Result<Loaded, NetworkError> {
             .shape
             .iter()
             .try_fold(1usize, |all, side| all.checked_mul(side.unwrap_or(1)))
-            .is_none_or(|all| all > MOST_VALUES)
+            .is_none_or(|all| all > MAX_VALUES)
         {
-            return Err(refused(format!("{} has more than {MOST_VALUES} values: {:?}", port.name, port.shape)));
+            return Err(refused(format!("{} has more than {MAX_VALUES} values: {:?}", port.name, port.shape)));
         }
     }
     Ok(Loaded { network, known })
 }
 
-/// Why a runtime does not run a network.
+/// An error of a runtime in loading a network.
 #[derive(Debug, Serialize, Deserialize)]
 enum Failure {
-    /// It is not there.
+    /// The runtime is not available.
     NoRuntime(String),
-    /// It cannot.
+    /// The network is rejected.
     Refused(String),
 }
 
-/// Lets a runtime in this process load a network.
-fn load_here(bytes: Vec<u8>, runtime: Runtime) -> Result<Network, Failure> {
+/// Loads a network in this process.
+fn load_in_process(bytes: Vec<u8>, runtime: Runtime) -> Result<Network, Failure> {
     if tflite::is_tflite(&bytes) {
         return match runtime {
             Runtime::OnnxRuntime => {
                 Err(Failure::Refused("a .tflite is run by what is built in: leave --network-runtime out".to_owned()))
             }
-            _ => guarded(|| tflite::Tflite::load(&bytes)).map_err(Failure::Refused),
+            _ => run_guarded(|| tflite::Tflite::load(&bytes)).map_err(Failure::Refused),
         };
     }
     let other = match runtime {
@@ -195,19 +195,19 @@ fn load_here(bytes: Vec<u8>, runtime: Runtime) -> Result<Network, Failure> {
         Runtime::Auto => onnx_runtime::environment().ok(),
         Runtime::OnnxRuntime => Some(onnx_runtime::environment().map_err(Failure::NoRuntime)?),
     };
-    guarded(|| match other {
+    run_guarded(|| match other {
         Some(environment) => onnx_runtime::OnnxRuntime::load(&environment, &bytes),
         None => built_in::BuiltIn::load(bytes),
     })
     .map_err(Failure::Refused)
 }
 
-/// Calls a runtime, whose panics are errors.
-fn guarded<T>(work: impl FnOnce() -> Result<T, String>) -> Result<T, String> {
+/// Calls a runtime; turns panics into errors.
+fn run_guarded<T>(work: impl FnOnce() -> Result<T, String>) -> Result<T, String> {
     catch_panic(work).unwrap_or_else(|| Err("its runtime panicked".to_owned()))
 }
 
-/// One line of what a runtime says.
+/// Returns a runtime's message as one line of at most 300 characters.
 fn one_line(error: impl ToString) -> String {
     let text = error.to_string();
     let line = text.split_whitespace().collect::<Vec<_>>().join(" ");

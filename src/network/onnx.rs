@@ -1,22 +1,22 @@
-//! What is looked at in ONNX files before a runtime reads them: nothing in them may run over and over, and the built-in
-//! runtime needs transposed convolutions without the attribute `output_shape`.
+//! Checks and rewrites ONNX files before a runtime reads them: rejects loops, and removes the attribute `output_shape`
+//! of transposed convolutions, which the built-in runtime does not support.
 //!
-//! Converters write that one beside strides that say the same. Only its message is left out; where the sizes do not fit
-//! without it, the network fails when it runs.
+//! Converters write that attribute in addition to strides that imply it. Only the attribute is removed; if the sizes do
+//! not fit without it, the network fails when it runs.
 
-/// Tags of Protocol Buffers: the fields on the way to an attribute (onnx.proto: ModelProto.graph, GraphProto.node,
+/// Protocol Buffers field numbers (onnx.proto): the path to an attribute (ModelProto.graph, GraphProto.node,
 /// NodeProto.attribute), and its name. All are length-delimited.
 const PATH: [u64; 3] = [7, 1, 5];
 const NAME: u64 = 1;
-const LEFT_OUT: &[u8] = b"output_shape";
+const OUTPUT_SHAPE: &[u8] = b"output_shape";
 
-/// Operators that run a part of the network as often as its data say, which may be for ever. No network for pictures needs
-/// one.
-const REPEATING: [&[u8]; 3] = [b"Loop", b"Scan", b"SequenceMap"];
-/// Branches within branches: a network has one or two, and each is a call within a call of a runtime.
-const DEEPEST: usize = 8;
+/// Operators that repeat a part of the network as often as its data says, possibly forever. Networks for pictures do
+/// not need them.
+const LOOP_OPERATORS: [&[u8]; 3] = [b"Loop", b"Scan", b"SequenceMap"];
+/// Maximum nesting of branches: networks have one or two levels, and each is a recursive call in a runtime.
+const MAX_DEPTH: usize = 8;
 
-/// Parts of a model that may have nodes, and the fields of theirs that lead on (onnx.proto).
+/// Messages that may contain nodes, with the fields that lead to them (onnx.proto).
 #[derive(Clone, Copy)]
 enum Part {
     Model,
@@ -38,47 +38,47 @@ impl Part {
     }
 }
 
-/// Looks for what may run for ever, also in branches and in functions of the model's own.
+/// Rejects operators that may run forever, also in branches and in the model's own functions.
 ///
 /// # Errors
-/// There is such an operator; branches lie too deep in each other; or it is no ONNX file.
-pub fn refuse_repeating(model: &[u8]) -> Result<(), String> {
-    refuse_in(Part::Model, model, 0)
+/// There is such an operator, branches are nested too deeply, or the file is not ONNX.
+pub fn reject_loops(model: &[u8]) -> Result<(), String> {
+    reject_loops_in(Part::Model, model, 0)
 }
 
-fn refuse_in(part: Part, message: &[u8], depth: usize) -> Result<(), String> {
-    if depth > DEEPEST {
-        return Err(format!("it has branches within branches, {DEEPEST} deep and more"));
+fn reject_loops_in(part: Part, message: &[u8], depth: usize) -> Result<(), String> {
+    if depth > MAX_DEPTH {
+        return Err(format!("it has branches within branches, {MAX_DEPTH} deep and more"));
     }
     let mut rest = message;
     while !rest.is_empty() {
-        let (tag, content) = field(&mut rest).ok_or_else(no_onnx)?;
+        let (tag, content) = read_field(&mut rest).ok_or_else(not_onnx)?;
         let Some(content) = content else { continue };
         if let (Part::Node, 4) = (part, tag >> 3)
-            && let Some(name) = REPEATING.iter().find(|name| **name == content)
+            && let Some(name) = LOOP_OPERATORS.iter().find(|name| **name == content)
         {
             let name = String::from_utf8_lossy(name);
             return Err(format!("it has the operator {name}, which may run for ever; export it without loops"));
         }
         if let Some(inner) = part.field(tag >> 3) {
-            refuse_in(inner, content, depth + usize::from(matches!(part, Part::Attribute)))?;
+            reject_loops_in(inner, content, depth + usize::from(matches!(part, Part::Attribute)))?;
         }
     }
     Ok(())
 }
 
-fn no_onnx() -> String {
+fn not_onnx() -> String {
     "it is no ONNX file, or not whole".to_owned()
 }
 
-/// The next field of a message: its tag, and its content where it has a length. `None` where it ends too early.
-fn field<'a>(rest: &mut &'a [u8]) -> Option<(u64, Option<&'a [u8]>)> {
-    let tag = varint(rest)?;
+/// Reads the next field of a message: its tag, and its content if length-delimited. `None` if it is truncated.
+fn read_field<'a>(rest: &mut &'a [u8]) -> Option<(u64, Option<&'a [u8]>)> {
+    let tag = read_varint(rest)?;
     let content = match tag & 7 {
-        0 => varint(rest).map(|_| None)?,
+        0 => read_varint(rest).map(|_| None)?,
         1 => rest.split_off(..8).map(|_| None)?,
         2 => {
-            let length = usize::try_from(varint(rest)?).ok()?;
+            let length = usize::try_from(read_varint(rest)?).ok()?;
             Some(rest.split_off(..length)?)
         }
         5 => rest.split_off(..4).map(|_| None)?,
@@ -87,34 +87,34 @@ fn field<'a>(rest: &mut &'a [u8]) -> Option<(u64, Option<&'a [u8]>)> {
     Some((tag, content))
 }
 
-/// The model without attributes that are called `output_shape`.
+/// Removes the attributes named `output_shape` from a model.
 ///
 /// # Errors
-/// It is no ONNX file.
-pub fn without_output_shapes(model: Vec<u8>) -> Result<Vec<u8>, String> {
-    if !model.windows(LEFT_OUT.len()).any(|bytes| bytes == LEFT_OUT) {
+/// The file is not ONNX.
+pub fn remove_output_shapes(model: Vec<u8>) -> Result<Vec<u8>, String> {
+    if !model.windows(OUTPUT_SHAPE.len()).any(|bytes| bytes == OUTPUT_SHAPE) {
         return Ok(model);
     }
     let mut changed = Vec::with_capacity(model.len());
-    copy(&model, &PATH, &mut changed).ok_or_else(no_onnx)?;
+    copy_without_output_shapes(&model, &PATH, &mut changed).ok_or_else(not_onnx)?;
     Ok(changed)
 }
 
-/// Copies a message; `path` leads to the attributes. `None` where it ends too early.
-fn copy(message: &[u8], path: &[u64], to: &mut Vec<u8>) -> Option<()> {
+/// Copies a message without `output_shape` attributes; `path` leads to the attributes. `None` if it is truncated.
+fn copy_without_output_shapes(message: &[u8], path: &[u64], to: &mut Vec<u8>) -> Option<()> {
     let mut rest = message;
     while !rest.is_empty() {
         let start = rest;
-        let (tag, content) = field(&mut rest)?;
+        let (tag, content) = read_field(&mut rest)?;
         match (content, path) {
             (Some(content), [next, further @ ..]) if *next == tag >> 3 => {
-                if further.is_empty() && is_left_out(content)? {
+                if further.is_empty() && is_output_shape(content)? {
                     continue;
                 }
                 let mut inner = Vec::new();
                 match further {
                     [] => inner.extend_from_slice(content),
-                    _ => copy(content, further, &mut inner)?,
+                    _ => copy_without_output_shapes(content, further, &mut inner)?,
                 }
                 put_varint(tag, to);
                 put_varint(inner.len() as u64, to);
@@ -126,17 +126,17 @@ fn copy(message: &[u8], path: &[u64], to: &mut Vec<u8>) -> Option<()> {
     Some(())
 }
 
-/// Whether an attribute is the one to leave out.
-fn is_left_out(mut attribute: &[u8]) -> Option<bool> {
-    // The name is written first.
-    if varint(&mut attribute)? != NAME << 3 | 2 {
+/// Returns whether an attribute is `output_shape`.
+fn is_output_shape(mut attribute: &[u8]) -> Option<bool> {
+    // The name is always written first.
+    if read_varint(&mut attribute)? != NAME << 3 | 2 {
         return Some(false);
     }
-    let length = usize::try_from(varint(&mut attribute)?).ok()?;
-    Some(attribute.get(..length)? == LEFT_OUT)
+    let length = usize::try_from(read_varint(&mut attribute)?).ok()?;
+    Some(attribute.get(..length)? == OUTPUT_SHAPE)
 }
 
-fn varint(bytes: &mut &[u8]) -> Option<u64> {
+fn read_varint(bytes: &mut &[u8]) -> Option<u64> {
     let mut value = 0u64;
     for shift in (0..64).step_by(7) {
         let byte = *bytes.split_off_first()?;
@@ -171,42 +171,42 @@ mod tests {
     fn model(attributes: &[&[u8]]) -> Vec<u8> {
         let attributes: Vec<u8> = attributes.iter().flat_map(|name| with(5, &with(1, name))).collect();
         let node = [with(4, b"ConvTranspose"), attributes].concat();
-        // A number before the graph, and a graph long enough for lengths of two bytes.
+        // A number before the graph, and a graph long enough for two-byte lengths.
         [vec![8, 9], with(7, &[with(1, &node), with(2, &[b'x'; 300])].concat())].concat()
     }
 
     #[test]
     fn only_that_attribute_is_left_out() {
         let with = model(&[b"strides", b"output_shape", b"pads"]);
-        assert_eq!(without_output_shapes(with).unwrap(), model(&[b"strides", b"pads"]));
+        assert_eq!(remove_output_shapes(with).unwrap(), model(&[b"strides", b"pads"]));
         let without = model(&[b"strides"]);
-        assert_eq!(without_output_shapes(without.clone()).unwrap(), without);
+        assert_eq!(remove_output_shapes(without.clone()).unwrap(), without);
     }
 
     #[test]
     fn what_runs_over_and_over_is_found_wherever_it_is() {
         let node = |operator: &[u8], attributes: &[u8]| with(1, &[with(4, operator), attributes.to_vec()].concat());
         let branch = |inner: &[u8]| node(b"If", &with(5, &with(6, inner)));
-        for name in REPEATING {
+        for name in LOOP_OPERATORS {
             let within = node(name, &[]);
             let function = with(25, &with(7, &with(4, name)));
             let models = [with(7, &within), with(7, &branch(&within)), [with(7, &branch(&[])), function].concat()];
             for model in models {
-                assert!(refuse_repeating(&model).unwrap_err().contains("may run for ever"), "{model:?}");
+                assert!(reject_loops(&model).unwrap_err().contains("may run for ever"), "{model:?}");
             }
         }
-        // A name is no operator.
-        refuse_repeating(&with(7, &with(1, &[with(4, b"Conv"), with(3, b"Loop")].concat()))).unwrap();
+        // A node's name is not its operator.
+        reject_loops(&with(7, &with(1, &[with(4, b"Conv"), with(3, b"Loop")].concat()))).unwrap();
         let nested = |count: usize| (0..count).fold(Vec::new(), |inner, _| branch(&inner));
-        refuse_repeating(&with(7, &nested(DEEPEST))).unwrap();
-        refuse_repeating(&with(7, &nested(50))).unwrap_err();
+        reject_loops(&with(7, &nested(MAX_DEPTH))).unwrap();
+        reject_loops(&with(7, &nested(50))).unwrap_err();
     }
 
     #[test]
     fn what_is_cut_off_is_refused() {
         let whole = model(&[b"output_shape", b"strides"]);
         for end in whole.len() - 280..whole.len() {
-            without_output_shapes(whole[..end].to_vec()).unwrap_err();
+            remove_output_shapes(whole[..end].to_vec()).unwrap_err();
         }
     }
 }

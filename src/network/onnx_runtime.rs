@@ -1,4 +1,4 @@
-//! ONNX Runtime, loaded when the program runs, from where the user has it.
+//! ONNX Runtime, loaded dynamically from the user's installation.
 
 use std::env;
 use std::path::{Path, PathBuf};
@@ -9,22 +9,22 @@ use ort::logging::LogLevel;
 use ort::session::{Session, SessionInputValue};
 use ort::value::{TensorRef, ValueType};
 
-use super::{Engine, Network, Port, Tensor, guarded, one_line};
+use super::{Engine, Network, Port, Tensor, one_line, run_guarded};
 use crate::files::trusted;
 
-/// What its library is called, where the loader finds it.
+/// Its library names, for the dynamic loader.
 const NAMES: [&str; 2] = ["libonnxruntime.so.1", "libonnxruntime.so"];
 
-/// A network that ONNX Runtime runs.
+/// A network run by ONNX Runtime.
 pub struct OnnxRuntime(Session);
 
-/// The runtime: opened once, at the first call.
+/// Returns the runtime, which is opened at the first call.
 ///
 /// # Errors
-/// There is none, or it cannot be used.
+/// It is not installed, or cannot be used.
 pub fn environment() -> Result<Environment, String> {
     static OPENED: OnceLock<Result<Environment, String>> = OnceLock::new();
-    OPENED.get_or_init(|| guarded(open)).clone()
+    OPENED.get_or_init(|| run_guarded(open)).clone()
 }
 
 fn open() -> Result<Environment, String> {
@@ -32,8 +32,9 @@ fn open() -> Result<Environment, String> {
                    ORT_DYLIB_PATH naming its capi/libonnxruntime.so.*)"
         .to_owned();
     for library in candidates()? {
-        let opened = place(&library).and_then(|place| ort::init_from(&place).map_err(one_line));
-        // Its own log goes to stderr raw, whatever is in a network's names; what fails is told by the call that fails.
+        let opened = resolve_library(&library).and_then(|place| ort::init_from(&place).map_err(one_line));
+        // Its own log would go to stderr unfiltered, including names from the network; errors are returned by calls
+        // anyway.
         let quiet = |builder: EnvironmentBuilder| {
             let log =
                 |_, _: &str, _: &str, _: &str, message: &str| tracing::debug!("ONNX Runtime: {}", one_line(message));
@@ -43,7 +44,7 @@ fn open() -> Result<Environment, String> {
         };
         match opened.and_then(quiet) {
             Ok(environment) => return Ok(environment),
-            // A bare name that the loader does not know says nothing.
+            // The error of a bare name that the loader does not find is not informative.
             Err(error) if library.is_absolute() => why = error,
             Err(_) => {}
         }
@@ -51,16 +52,15 @@ fn open() -> Result<Environment, String> {
     Err(why)
 }
 
-/// What the loader is asked for: a bare name, which it looks for where the system's libraries are, or a file that is nobody
-/// else's.
-fn place(library: &Path) -> Result<PathBuf, String> {
+/// Returns what the loader opens: a bare name, which it searches among the system's libraries, or a trusted file.
+fn resolve_library(library: &Path) -> Result<PathBuf, String> {
     if library.is_absolute() { trusted::code(library) } else { Ok(library.to_owned()) }
 }
 
-/// The libraries that may be tried, the user's choice alone where there is one.
+/// Returns the libraries to try; only the user's choice if there is one.
 ///
 /// # Errors
-/// The user's choice depends on the folder that the program was started in.
+/// The user's choice is a relative path.
 fn candidates() -> Result<Vec<PathBuf>, String> {
     if let Some(chosen) = env::var_os("ORT_DYLIB_PATH").filter(|chosen| !chosen.is_empty()) {
         let chosen = PathBuf::from(chosen);
@@ -74,7 +74,7 @@ fn candidates() -> Result<Vec<PathBuf>, String> {
         };
     }
     let mut found: Vec<PathBuf> = NAMES.iter().map(PathBuf::from).collect();
-    // What pip installs for the user, or in the virtual environment that is active.
+    // Installed by pip, for the user or in the active virtual environment.
     let roots = [trusted::absolute("VIRTUAL_ENV"), trusted::absolute("HOME").map(|home| home.join(".local"))];
     for python in roots.into_iter().flatten().flat_map(|root| entries(&root.join("lib"))) {
         let capi = python.join("site-packages/onnxruntime/capi");
@@ -90,10 +90,10 @@ fn entries(folder: &Path) -> Vec<PathBuf> {
     listed.map(|entry| entry.path()).collect()
 }
 
-/// Which ONNX Runtime there is.
+/// Returns name and version of the installed ONNX Runtime.
 ///
 /// # Errors
-/// Why there is none.
+/// Returns why it is not available.
 pub fn installed() -> Result<String, String> {
     environment().map(|_| name())
 }
@@ -107,7 +107,7 @@ fn name() -> String {
 impl OnnxRuntime {
     pub fn load(environment: &Environment, bytes: &[u8]) -> Result<Network, String> {
         let builder = Session::builder(environment).map_err(one_line)?;
-        // One thread, which does not wait busily: the others are for the blur.
+        // One thread, without busy waiting; the other cores are for the blur.
         let builder = builder.with_intra_threads(1).map_err(one_line)?.with_inter_threads(1).map_err(one_line)?;
         let mut builder = builder.with_intra_op_spinning(false).map_err(one_line)?;
         let session = builder.commit_from_memory(bytes).map_err(one_line)?;

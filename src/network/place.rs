@@ -1,4 +1,4 @@
-//! Where networks are looked for: the folders of the user and of the system for a program's data.
+//! Searches the data folders of the user and the system for networks.
 
 use std::env;
 use std::path::PathBuf;
@@ -6,13 +6,13 @@ use std::path::PathBuf;
 use super::{Known, MOST_BYTES, Task};
 use crate::files::{data, input};
 
-/// The folders, the user's own first: `bokehcam/models` in `$XDG_DATA_HOME`, in `share` beside the folder of the program, as
-/// it was unpacked or installed, and in each of `$XDG_DATA_DIRS`.
+/// Returns the folders, the user's own first: `bokehcam/models` in `$XDG_DATA_HOME`, in `share` next to the folder of
+/// the program (as unpacked or installed), and in each of `$XDG_DATA_DIRS`.
 pub fn folders() -> Vec<PathBuf> {
-    let beside = env::current_exe().ok().and_then(|program| Some(program.parent()?.parent()?.join("share")));
+    let bundled = env::current_exe().ok().and_then(|program| Some(program.parent()?.parent()?.join("share")));
     let mut folders = Vec::new();
     for folder in
-        data::own().into_iter().chain(beside).chain(data::system()).map(|folder| folder.join("bokehcam/models"))
+        data::own().into_iter().chain(bundled).chain(data::system()).map(|folder| folder.join("bokehcam/models"))
     {
         if !folders.contains(&folder) {
             folders.push(folder);
@@ -21,12 +21,12 @@ pub fn folders() -> Vec<PathBuf> {
     folders
 }
 
-/// The known networks that are installed, with their files: the best of each task first.
+/// Returns the installed known networks with their files, the best of each task first.
 pub fn installed() -> Vec<(&'static Known, PathBuf)> {
     known_in(folders())
 }
 
-/// The known networks in these folders, with their files: the best of each task first.
+/// Returns the known networks in these folders with their files, the best of each task first.
 fn known_in(folders: Vec<PathBuf>) -> Vec<(&'static Known, PathBuf)> {
     let files = folders.into_iter().flat_map(|folder| {
         let mut files: Vec<PathBuf> =
@@ -36,7 +36,7 @@ fn known_in(folders: Vec<PathBuf>) -> Vec<(&'static Known, PathBuf)> {
     });
     let may_be_known = |file: &PathBuf| {
         let is_network = file.extension().is_some_and(|extension| extension == "onnx" || extension == "tflite");
-        is_network && file.metadata().is_ok_and(|metadata| Known::any_has(metadata.len()))
+        is_network && file.metadata().is_ok_and(|metadata| Known::any_has_size(metadata.len()))
     };
     let mut found: Vec<(&'static Known, PathBuf)> = files
         .filter(may_be_known)
@@ -48,12 +48,12 @@ fn known_in(folders: Vec<PathBuf>) -> Vec<(&'static Known, PathBuf)> {
     found
 }
 
-/// The best installed network of a task.
+/// Returns the best installed network for a task.
 pub fn best(task: Task) -> Option<PathBuf> {
     best_in(folders(), task)
 }
 
-/// The best known network of a task in these folders.
+/// Returns the best known network for a task in these folders.
 pub fn best_in(folders: Vec<PathBuf>, task: Task) -> Option<PathBuf> {
     known_in(folders).into_iter().find(|(known, _)| known.task == task).map(|(_, file)| file)
 }

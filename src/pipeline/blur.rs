@@ -1,4 +1,4 @@
-//! Third stage: drops what is too late, and blurs the rest; takes another executor when one comes.
+//! Third stage: drops frames that are too late and blurs the rest; swaps the executor when a frame brings another.
 
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -11,7 +11,7 @@ use super::wanted::Wanted;
 use super::{Ended, Fault, MOST_IN_FLIGHT, Shared};
 use crate::bokeh::{Finished, Job, PassTimes, Picture};
 use crate::compute::Place;
-use crate::engine::{Blur, Staged, Taken};
+use crate::engine::{Blur, OriginalFrame, Staged};
 use crate::frame::crop::Crop;
 use crate::frame::{ColorImage, DepthMap};
 use crate::link::pool::Pooled;
@@ -19,14 +19,14 @@ use crate::link::{Receiver, Sender};
 use crate::optics::CocField;
 use crate::stats::{BlurTimings, Cause};
 
-/// A blurred picture, and what it was made of.
+/// A blurred picture, with its inputs.
 pub(super) struct Blurred {
     pub picture: Picture,
-    /// The picture before; `None` where nothing was blurred, or nobody looks at it.
+    /// The input picture; `None` if nothing was blurred or no viewer wants it.
     pub color: Option<Pooled<ColorImage>>,
     pub depth: Option<Pooled<DepthMap>>,
     pub coc: CocField,
-    /// The part of it that goes out; `None` is all.
+    /// The crop that goes out; `None` is the whole picture.
     pub part: Option<Crop>,
 }
 
@@ -34,28 +34,28 @@ pub(super) struct Stage<'a> {
     blur: Blur,
     /// `None` blurs every frame.
     late: Option<LateRule>,
-    /// Where pictures are wanted; in memory where nobody says.
+    /// Where pictures are wanted; `None` is in memory.
     wanted: Option<Arc<Wanted>>,
     budget_ns: u64,
     shared: &'a Shared,
     times: &'a mut BlurTimings,
-    /// What the executor has in hand, the oldest first.
+    /// The frames that the executor has in flight, oldest first.
     in_hand: VecDeque<Frame<InHand>>,
     last_swap: u64,
 }
 
-/// What is kept of a frame while the executor has it in hand.
+/// The data of a frame that stay here while the executor has it.
 struct InHand {
     coc: CocField,
     part: Option<Crop>,
-    taken: Option<Pooled<Taken>>,
+    original: Option<Pooled<OriginalFrame>>,
 }
 
 type From = Receiver<Frame<Ready>>;
 type To = Sender<Frame<Blurred>>;
 
 impl<'a> Stage<'a> {
-    /// A blur may take `budget_ns`; more is a miss.
+    /// Creates the stage; a blur longer than `budget_ns` counts as a miss.
     pub(super) fn new(
         blur: Blur,
         wanted: Option<Arc<Wanted>>,
@@ -63,13 +63,13 @@ impl<'a> Stage<'a> {
         shared: &'a Shared,
         times: &'a mut BlurTimings,
     ) -> Self {
-        times.by = blur.about();
+        times.by = blur.describe_executor();
         let late = shared.live_ns.map(LateRule::new);
         let in_hand = VecDeque::with_capacity(MOST_IN_FLIGHT);
         Self { blur, late, wanted, budget_ns, shared, times, in_hand, last_swap: 0 }
     }
 
-    /// Runs until the frames end or nobody takes the results, with as many frames in hand as the executor has room for.
+    /// Runs until the input ends or the output is closed, with as many frames in flight as the executor allows.
     pub(super) fn run(mut self, mut from: From, mut to: To) -> Ended {
         loop {
             let next = match self.in_hand.len() {
@@ -87,7 +87,7 @@ impl<'a> Stage<'a> {
                     return Ok(());
                 }
                 if self.blur.executor().is_none() {
-                    if !self.pass(frame, &mut to) {
+                    if !self.pass_through(frame, &mut to) {
                         return Ok(());
                     }
                     continue;
@@ -102,14 +102,14 @@ impl<'a> Stage<'a> {
                     return Ok(());
                 }
                 if self.blur.has_moved() {
-                    self.times.by = self.blur.about();
+                    self.times.by = self.blur.describe_executor();
                 }
             }
         }
     }
 
-    /// Blurs with another executor from now on, if a frame brings one: later frames carry the same one, and only the first counts.
-    /// What the old one has goes out first; returns whether there is anybody to take more.
+    /// Switches to another executor if a frame brings one: later frames carry the same one, and only the first counts.
+    /// First collects the frames that the old one has in flight. Returns whether the output is still open.
     fn swap(&mut self, ready: &mut Ready, to: &mut To) -> Result<bool, Fault> {
         let Some(swap) = ready.swap.take().filter(|swap| swap.number != self.last_swap) else { return Ok(true) };
         self.last_swap = swap.number;
@@ -124,24 +124,24 @@ impl<'a> Stage<'a> {
         Ok(true)
     }
 
-    /// Hands a frame on unblurred, unless it is late; returns whether there is anybody to take more.
-    fn pass(&mut self, frame: Frame<Ready>, to: &mut To) -> bool {
+    /// Forwards a frame unblurred, unless it is late; returns whether the output is still open.
+    fn pass_through(&mut self, frame: Frame<Ready>, to: &mut To) -> bool {
         let Shared { clock, tally, is_viewed, .. } = self.shared;
-        let (frame, Ready { color, depth, coc, staged, .. }) = frame.taken_up(clock.now_ns());
+        let (frame, Ready { color, depth, coc, staged, .. }) = frame.take_item(clock.now_ns());
         if self.is_late(&frame, 0) {
             tally.dropped(frame.ticket, Cause::Late);
             return true;
         }
         let (picture, depth) = (Picture::in_memory(color), depth.filter(|_| *is_viewed));
-        frame.with(Blurred { picture, color: None, depth, coc, part: staged.part }).hand_on(to, tally)
+        frame.with(Blurred { picture, color: None, depth, coc, part: staged.part }).send_to(to, tally)
     }
 
-    /// Gives a frame to the executor, unless it is too late for that; returns whether it did.
+    /// Submits a frame to the executor, unless it is too late; returns whether it was submitted.
     fn submit(&mut self, frame: Frame<Ready>) -> Result<bool, Fault> {
         let Shared { clock, tally, pools, order, wants_yuyv, .. } = self.shared;
-        let (mut frame, Ready { color, depth, coc, staged, times, .. }) = frame.taken_up(clock.now_ns());
+        let (mut frame, Ready { color, depth, coc, staged, times, .. }) = frame.take_item(clock.now_ns());
         times.into_iter().for_each(|times| self.blur.picker.note_depth(times));
-        // The frame waits for those that are under way.
+        // The frame queues behind those in flight.
         let expected_ns = self.blur.picker.expected_ns() * (self.in_hand.len() as u64 + 1);
         if self.is_late(&frame, expected_ns) {
             tally.dropped(frame.ticket, Cause::Late);
@@ -149,10 +149,10 @@ impl<'a> Stage<'a> {
             order.set(self.blur.picker.plan());
             return Ok(false);
         }
-        let Staged { part, taken, on_device } = staged;
+        let Staged { part, original, on_device } = staged;
         frame.trace.quality = self.blur.quality();
         let place = self.wanted.as_ref().map_or(Place::Memory, |wanted| wanted.place());
-        // A part is cut out of the picture in full colour.
+        // A crop is cut out of the full-colour picture, so YUYV is of no use then.
         let is_yuyv = part.is_none() && wants_yuyv.load(Ordering::Relaxed);
         let (ticket, quality) = (frame.ticket.id.0, frame.trace.quality.unwrap_or_default());
         let (out, yuyv) = (pools.outs.take(), is_yuyv.then(|| pools.yuyvs.take()));
@@ -162,12 +162,12 @@ impl<'a> Stage<'a> {
             tally.dropped(frame.ticket, Cause::Failed);
             return Err(error.into());
         }
-        self.in_hand.push_back(frame.with(InHand { coc, part, taken }));
+        self.in_hand.push_back(frame.with(InHand { coc, part, original }));
         Ok(true)
     }
 
-    /// Hands on the oldest frame if it is done; with `wait`, waits until it is. Returns whether there is anybody to
-    /// take more.
+    /// Forwards the oldest frame if it is finished; with `wait`, waits until it is. Returns whether the output is still
+    /// open.
     fn collect(&mut self, wait: bool, to: &mut To) -> Result<bool, Fault> {
         let Shared { clock, tally, is_viewed, .. } = self.shared;
         let finished = match self.blur.collect(wait) {
@@ -182,26 +182,27 @@ impl<'a> Stage<'a> {
         let Some(done) = self.in_hand.pop_front().filter(|oldest| oldest.ticket.id.0 == finished.ticket) else {
             return Err(Fault::LostFrame);
         };
+        // Time in flight splits into the blur itself and the wait behind other frames.
         let Finished { picture, mut color, mut depth, times, .. } = finished;
         let (now_ns, began_ns, between_ns) = (clock.now_ns(), done.since_ns, done.trace.between_ns);
-        let (mut frame, InHand { coc, part, taken }) = done.taken_up(now_ns);
+        let (mut frame, InHand { coc, part, original }) = done.take_item(now_ns);
         frame.trace.blur_ns = self.measure(&frame, &times, now_ns - began_ns);
         frame.trace.between_ns = between_ns + (now_ns - began_ns).saturating_sub(frame.trace.blur_ns);
         frame.trace.passes = times;
-        if let (Some(mut taken), Some(map)) = (taken, &mut depth) {
-            taken.restore(&mut color, map);
+        if let (Some(mut original), Some(map)) = (original, &mut depth) {
+            original.restore(&mut color, map);
         }
         let (color, depth) = (Some(color).filter(|_| *is_viewed), depth.filter(|_| *is_viewed));
-        Ok(frame.with(Blurred { picture, color, depth, coc, part }).hand_on(to, tally))
+        Ok(frame.with(Blurred { picture, color, depth, coc, part }).send_to(to, tally))
     }
 
-    /// Whether a frame comes too late, if its blur takes so long; not the one that was wished for.
+    /// Returns whether a frame is too late if its blur takes `expected_ns`; a frame that was sought never is.
     fn is_late(&mut self, frame: &Frame<()>, expected_ns: u64) -> bool {
         let late = self.late.as_mut().filter(|_| !frame.is_wished);
         late.is_some_and(|late| late.is_late(frame.ticket.captured_ns, frame.since_ns, expected_ns))
     }
 
-    /// Records the times of a finished frame, which was in hand for so long; returns how long its blur took.
+    /// Records the times of a finished frame that was in flight for `in_hand_ns`; returns how long its blur took.
     fn measure(&mut self, done: &Frame<()>, passes: &PassTimes, in_hand_ns: u64) -> u64 {
         let mut in_passes_ns = 0;
         for (name, time) in passes.iter() {
@@ -209,13 +210,13 @@ impl<'a> Stage<'a> {
             self.times.passes.add(name, time_ns);
             in_passes_ns += time_ns;
         }
-        // An executor that times no passes is measured from outside.
+        // If the executor times no passes, the time in flight stands for the blur.
         let blur_ns = if in_passes_ns == 0 { in_hand_ns } else { in_passes_ns };
         let quality = done.trace.quality.unwrap_or_default();
         self.times.took.add(blur_ns);
         self.times.rungs.add(quality.name());
         self.times.misses += u64::from(blur_ns > self.budget_ns);
-        // Where frames overlap, wall time says nothing of a single one.
+        // With overlapping frames, wall time says nothing about a single one.
         let took_ns = if self.blur.capacity() > 1 { in_passes_ns } else { blur_ns };
         self.blur.picker.note(quality, took_ns, done.since_ns);
         self.shared.order.set(self.blur.picker.plan());

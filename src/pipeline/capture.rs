@@ -1,4 +1,4 @@
-//! First stage: reads frames, at their pace.
+//! First stage: reads frames at their pace.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -12,22 +12,22 @@ use crate::link::demand::Demand;
 use crate::link::pool::Pooled;
 use crate::stats::{Cause, Histogram};
 
-/// A picture, and what the camera brought with it.
+/// A picture, with the depth or right picture that the camera delivered.
 pub(super) struct Shot {
     pub color: Pooled<ColorImage>,
     pub depth: Option<Pooled<DepthMap>>,
-    /// The other eye's picture.
+    /// The right camera's picture.
     pub right: Option<Pooled<GrayImage>>,
-    /// By how much the source's own time is ahead of media time, in nanoseconds.
+    /// How far the source's own time is ahead of media time, in nanoseconds.
     pub ahead_ns: i64,
 }
 
 pub(super) struct Stage<'a> {
     camera: Box<dyn Camera>,
     pacer: Pacer,
-    /// `None` captures whether anybody watches or not.
+    /// `None` captures even if there are no viewers.
     demand: Option<Demand>,
-    /// The user's stop, and the end of any stage.
+    /// The user's stop flag, and the flag that another stage has ended.
     stop: [&'a AtomicBool; 2],
     shared: &'a Shared,
     times: &'a mut Histogram,
@@ -46,12 +46,12 @@ impl<'a> Stage<'a> {
         Self { camera, pacer, demand, stop: [stop, over], shared, times }
     }
 
-    /// Captures until the camera ends, a stop is set, or nobody takes the frames.
+    /// Captures until the camera ends, a stop flag is set, or the output is closed.
     pub(super) fn run(mut self, mut to: Sender<Frame<Shot>>) -> Ended {
         let Shared { clock, tally, pools, info, keep_going, .. } = self.shared;
         let brings = info.brings;
         let stopped = || self.stop.iter().any(|stop| stop.load(Ordering::Relaxed));
-        // For a camera that brings neither: they stay empty.
+        // Stand-ins for a camera that brings neither; they stay empty.
         let (mut no_depth, mut no_right) = (DepthMap::default(), GrayImage::default());
         let mut complained = false;
         let seeker = self.camera.seeker();
@@ -63,12 +63,13 @@ impl<'a> Stage<'a> {
             let wish = seeker.as_ref().and_then(|seeker| seeker.wish_after(seek));
             if let Some(wish) = wish {
                 (seek, ahead_ns) = (wish.number, self.camera.seek(wish.place));
-                self.pacer.sought();
+                self.pacer.restart();
+            // A seek is served even if there are no viewers; otherwise the camera pauses until one comes.
             } else if let Some(demand) = self.demand.as_ref().filter(|demand| !demand.is_watched()) {
                 self.camera.rest();
                 let rest_began_ns = clock.now_ns();
                 demand.wait(PATIENCE);
-                self.pacer.rested(clock.now_ns() - rest_began_ns);
+                self.pacer.shift(clock.now_ns() - rest_began_ns);
                 continue;
             }
             tally.lost(self.pacer.skip(&mut *self.camera), Cause::Driver);
@@ -107,7 +108,7 @@ impl<'a> Stage<'a> {
                         since_ns,
                         item: Shot { color, depth, right, ahead_ns },
                     };
-                    if !frame.hand_on(&mut to, tally) {
+                    if !frame.send_to(&mut to, tally) {
                         break;
                     }
                 }

@@ -1,57 +1,57 @@
-//! What may change while a run goes on: how the frames are blurred.
+//! Changes of the blur while a run goes on.
 
 use std::sync::{Mutex, mpsc};
 
 use crate::bokeh::{self, Bokeh};
 use crate::look::{Look, QualityRule};
 
-/// Another blur, from the next frame on. Every frame has the CoC and the executor of one and the same change.
+/// A change of the blur from the next frame on. CoC and executor of a frame always belong to the same change.
 pub struct Change {
-    /// What its frames are known by ([`super::View::change`]); those before any change have 0.
+    /// Identifies its frames ([`super::View::change`]); frames before any change have 0.
     pub number: u64,
     /// How frames are blurred.
     pub look: Look,
-    /// What blurs them.
+    /// The executor from here on.
     pub bokeh: Executor,
 }
 
-/// What blurs from a change on.
+/// The executor from a change on.
 pub enum Executor {
-    /// What did before.
+    /// The current one stays.
     Keep,
-    /// What did before, until that of the look comes with the next change: such frames have the CoC of one look and the
-    /// kernels of another ([`super::View::is_between`]).
+    /// The current one stays until the look's own comes with the next change: until then frames have the CoC of one
+    /// look and the kernels of another ([`super::View::is_between`]).
     Meanwhile,
     /// This one; `None` passes frames through.
     To(Option<Box<dyn Bokeh>>),
 }
 
-/// Makes the changes of a run from looks alone.
+/// Creates the changes of a run from looks.
 pub struct Changes {
     to: mpsc::Sender<Change>,
-    /// Columns and rows of the pictures.
+    /// Width and height of the pictures, in pixels.
     size: (u32, u32),
     adaptive: bool,
-    /// The look that holds.
+    /// The current look.
     look: Look,
-    /// The settings that the executor was made for; `None` if nothing is blurred.
+    /// The settings of the current executor; `None` if nothing is blurred.
     made_for: Option<bokeh::Settings>,
 }
 
 impl Changes {
-    /// The changes of a run that begins with `look`, for pictures of `size` pixels, and what the run takes them from.
-    /// `adaptive` as for the run.
+    /// Creates the sender of a run's changes and the receiver for the run. The run begins with `look`, for pictures of
+    /// `size` pixels; `adaptive` must equal that of the run.
     pub fn new(look: Look, size: (u32, u32), adaptive: bool) -> (Self, mpsc::Receiver<Change>) {
         let (to, changes) = mpsc::channel();
         let made_for = look.settings(size, adaptive);
         (Self { to, size, adaptive, look, made_for }, changes)
     }
 
-    /// Blurs with this look from now on; its frames carry this number, which is one more than that of the look before.
-    /// `make` makes an executor, where that of before cannot do it.
+    /// Switches to another look. Its frames carry `number`, which must be one more than that of the look before. Calls
+    /// `make` for a new executor if the current one does not fit.
     ///
     /// # Errors
-    /// That of `make`: the look before goes on.
+    /// Returns the error of `make`; the current look stays in use.
     pub fn adopt<E>(
         &mut self,
         look: Look,
@@ -65,8 +65,8 @@ impl Changes {
             self.send(number, &look, Executor::Keep);
         } else {
             if is_same_kind {
-                // The same kind of CoC takes effect at once: the present executor does what it can until the new one is
-                // made, and such frames keep the number before.
+                // The same kind of CoC takes effect at once: the current executor does what it can until the new one
+                // is ready, and such frames keep the previous number.
                 self.send(number - 1, &look, Executor::Meanwhile);
             }
             match made_for.as_ref().map(make).transpose() {
@@ -84,15 +84,15 @@ impl Changes {
     }
 
     fn send(&self, number: u64, look: &Look, bokeh: Executor) {
-        // Fails only if the run has ended; then nothing is to be done.
+        // Fails only if the run has ended, which needs no handling.
         let _ = self.to.send(Change { number, look: look.clone(), bokeh });
     }
 }
 
-/// An executor on its way to the blur stage. Each frame of the change brings it, so that it comes whichever frame does.
+/// An executor on its way to the blur stage. Each frame of the change carries it, as any frame may be dropped.
 pub(super) struct Swap {
     pub number: u64,
-    /// Locked once when it is made and once when it is taken.
+    /// Locked once at creation and once when it is taken.
     executor: Mutex<Option<New>>,
 }
 
@@ -103,7 +103,7 @@ impl Swap {
         Self { number, executor: Mutex::new(Some((executor, quality))) }
     }
 
-    /// The executor, for who comes first.
+    /// Takes the executor; only the first caller gets it.
     pub(super) fn take(&self) -> Option<New> {
         self.executor.lock().ok()?.take()
     }

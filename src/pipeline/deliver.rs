@@ -1,4 +1,4 @@
-//! Last stage, on the caller's thread: hands pictures to the sink.
+//! Last stage, on the caller's thread: delivers pictures to the sink.
 
 use std::ops::ControlFlow;
 use std::sync::atomic::Ordering;
@@ -18,16 +18,16 @@ use crate::stats::{Cause, SinkTimings, Ticket};
 
 pub(super) struct Stage<'a> {
     sink: &'a mut dyn Sink,
-    /// A viewer that is sent every frame as well.
+    /// A viewer that receives every frame as well.
     view: Option<Sender<View>>,
     mirror: bool,
     progress: &'a dyn Fn(Progress),
-    /// When pictures are due; `None` shows them as they come.
+    /// When pictures are due; `None` shows them at once.
     playout: Option<Playout>,
     shared: &'a Shared,
     times: &'a mut SinkTimings,
     cropper: Cropper,
-    /// The part of the picture that goes out.
+    /// The crop that goes out.
     cropped: ColorImage,
 }
 
@@ -44,11 +44,11 @@ impl<'a> Stage<'a> {
         Self { sink, view, mirror, progress, playout, shared, times, cropper, cropped }
     }
 
-    /// Delivers frames until they end, the sink wants no more, or the viewer is gone.
+    /// Delivers frames until they end, the sink is closed, or the viewer is gone.
     pub(super) fn run(mut self, mut from: Receiver<Frame<Blurred>>) -> Ended {
         let Shared { clock, tally, .. } = self.shared;
         let mut last_ns = None;
-        // Ticket of the frame that was sent to the viewer last, where that decides whether it was delivered.
+        // Ticket of the frame sent to the viewer last, if its delivery depends on the viewer.
         let mut at_viewer = None;
         loop {
             let wants_yuyv = self.view.is_none() && !self.mirror && self.sink.wants_yuyv();
@@ -65,8 +65,9 @@ impl<'a> Stage<'a> {
                 Received::Ended => break,
             };
             let is_cropped = self.crop_and_mirror(&mut frame.item);
-            let (mut frame, mut blurred) = frame.taken_up(clock.now_ns());
+            let (mut frame, mut blurred) = frame.take_item(clock.now_ns());
             let captured_ns = frame.ticket.captured_ns;
+            // Wait for the frame's play-out time, against jitter.
             if let Some(playout) = &mut self.playout {
                 clock.sleep_until_ns(playout.due_ns(captured_ns, frame.since_ns));
                 frame.trace.playout_ns = clock.now_ns() - frame.since_ns;
@@ -74,7 +75,7 @@ impl<'a> Stage<'a> {
             }
             let began_ns = frame.since_ns + frame.trace.playout_ns;
             frame.trace.age_ns = began_ns.saturating_sub(captured_ns);
-            let was_given = match self.give(&mut blurred.picture, is_cropped, captured_ns, frame.stamp.time_ns) {
+            let was_given = match self.put_picture(&mut blurred.picture, is_cropped, captured_ns, frame.stamp.time_ns) {
                 Ok(ControlFlow::Continue(was_given)) => was_given,
                 Ok(ControlFlow::Break(())) => break,
                 Err(error) => {
@@ -88,9 +89,9 @@ impl<'a> Stage<'a> {
             if let Some(last_ns) = last_ns.replace(now_ns) {
                 self.times.frame.add(now_ns - last_ns);
             }
-            note(frame.stamp.index, &blurred.coc, &frame.trace);
+            log_frame(frame.stamp.index, &blurred.coc, &frame.trace);
             let quality = frame.trace.quality;
-            // What the sink does not keep is delivered once the viewer took it.
+            // A frame that the sink does not keep counts as delivered once the viewer took it.
             let kept = was_given && self.sink.keeps();
             let Frame { ticket, stamp, seek, is_wished, change, is_between, trace, .. } = frame;
             let (done, open) = if self.view.is_none() || kept { (Some(ticket), None) } else { (None, Some(ticket)) };
@@ -114,21 +115,21 @@ impl<'a> Stage<'a> {
                     frames,
                 };
                 match view.send(view_of) {
-                    // A displaced frame is the one before, which the viewer did not take.
+                    // A displaced frame is the previous one, which the viewer did not take.
                     Ok(displaced) => self.count_viewed(displaced.is_none(), std::mem::replace(&mut at_viewer, open)),
-                    // Nobody knows the fate of this frame, nor of the one before: they stay in flight.
+                    // The fate of this frame and of the previous one is unknown: both stay in flight.
                     Err(link::Abandoned) => return Ok(()),
                 }
             }
-            self.tell(quality);
+            self.report_progress(quality);
         }
-        // The viewer still takes the last one.
+        // The viewer still takes the last frame.
         self.count_viewed(true, at_viewer);
         Ok(())
     }
 
-    /// Tells how far the run is, whose last frame had this quality.
-    fn tell(&self, quality: Option<Quality>) {
+    /// Reports the progress of the run; `quality` is that of the last frame.
+    fn report_progress(&self, quality: Option<Quality>) {
         let Shared { tally, info, .. } = self.shared;
         let frames = tally.frames();
         (self.progress)(Progress {
@@ -140,7 +141,7 @@ impl<'a> Stage<'a> {
         });
     }
 
-    /// Cuts out the part that goes out, and flips what goes out; whether a part was cut out.
+    /// Crops and mirrors the picture that goes out; returns whether it was cropped.
     fn crop_and_mirror(&mut self, Blurred { picture, part, .. }: &mut Blurred) -> bool {
         let whole = part.zip(picture.memory());
         let is_cropped = whole.map(|(part, whole)| self.cropper.crop(whole, &part, &mut self.cropped)).is_some();
@@ -151,8 +152,8 @@ impl<'a> Stage<'a> {
         is_cropped
     }
 
-    /// Gives the sink a picture, where that is in memory; `Continue` says whether it was.
-    fn give(
+    /// Passes a picture to the sink if it is in memory; `Continue` says whether it was.
+    fn put_picture(
         &mut self,
         picture: &mut Picture,
         is_cropped: bool,
@@ -172,7 +173,7 @@ impl<'a> Stage<'a> {
         Ok(flow.map_continue(|()| true))
     }
 
-    /// Counts a frame whose delivery was up to the viewer: delivered if that took it, else evicted.
+    /// Counts a frame whose delivery depended on the viewer: delivered if it was taken, otherwise evicted.
     fn count_viewed(&self, taken: bool, ticket: Option<Ticket>) {
         match ticket {
             Some(ticket) if taken => self.shared.tally.delivered(ticket),
@@ -181,7 +182,7 @@ impl<'a> Stage<'a> {
         }
     }
 
-    /// The next frame; `Nothing` when the sink is to repeat its last picture before one comes.
+    /// Receives the next frame; `Nothing` if the sink must repeat its last picture first.
     fn next<T>(&self, from: &mut Receiver<T>) -> Received<T> {
         match self.sink.hold() {
             Some(hold) => from.recv_timeout(hold),
@@ -190,8 +191,8 @@ impl<'a> Stage<'a> {
     }
 }
 
-/// Tells of a frame that went out, to who asks for that.
-fn note(index: usize, coc: &CocField, trace: &Trace) {
+/// Logs a delivered frame at trace level.
+fn log_frame(index: usize, coc: &CocField, trace: &Trace) {
     let ms = |ns: u64| ns as f64 / 1e6;
     let focus_m = if let CocField::Depth(lens) = coc { Some(lens.focus_m) } else { None };
     let quality = trace.quality.map(Quality::name);
@@ -200,7 +201,7 @@ fn note(index: usize, coc: &CocField, trace: &Trace) {
     tracing::trace!(index, focus_m, quality, depth_held, depth_ms, blur_ms, age_ms, "frame");
 }
 
-/// Flips a picture left to right.
+/// Mirrors a picture left to right.
 fn mirror(picture: &mut ColorImage) {
     let row_bytes = picture.width as usize * 3;
     for row in picture.rgb.chunks_exact_mut(row_bytes.max(1)) {

@@ -1,4 +1,4 @@
-//! Second stage: gives each frame its depth and its CoC; here a change of the blur begins.
+//! Second stage: computes depth and CoC of each frame; changes of the blur take effect here.
 
 use std::mem;
 use std::sync::{Arc, mpsc};
@@ -18,38 +18,38 @@ use crate::link::{Received, Receiver, Sender};
 use crate::optics::CocField;
 use crate::stats::{Cause, DepthTimings};
 
-/// After this time without a frame nobody watches: a depth camera may rest.
+/// After this time without a frame there are no viewers, and a depth camera may pause.
 const IDLE: Duration = Duration::from_secs(3);
 
-/// All that the blur needs of a frame.
+/// Everything that the blur needs of a frame.
 pub(super) struct Ready {
     pub color: Pooled<ColorImage>,
     pub depth: Option<Pooled<DepthMap>>,
     pub coc: CocField,
     pub staged: Staged,
-    /// What its depth took; `None` where it has none.
+    /// Times of its depth; `None` if it has none.
     pub times: Option<DepthTimes>,
-    /// The last change of what blurs, if there was one: every frame since then brings it.
+    /// The last change of the executor, if any: every later frame carries it.
     pub swap: Option<Arc<Swap>>,
 }
 
 pub(super) struct Stage<'a> {
     preparation: Preparation,
     source: Option<Box<dyn DepthSource>>,
-    /// Where changes of the blur come from, and whether executors are made for every quality.
+    /// The changes of the blur, and whether executors support every quality.
     changes: (Option<mpsc::Receiver<Change>>, bool),
-    /// How well and how often depth is made; `None` makes it as well as can be, for every frame.
+    /// Effort and rate of depth; `None` computes full-effort depth for every frame.
     rate: Option<Rate<'a>>,
     shared: &'a Shared,
     times: &'a mut DepthTimings,
-    /// The last change, and whether its executor is still to come.
+    /// The number of the last change, and whether its executor is still being created.
     change: (u64, bool),
     swap: Option<Arc<Swap>>,
-    /// The number of the last wish to go back or forth in the source.
+    /// The number of the last seek in the source.
     seek: u64,
 }
 
-/// A frame's depth and CoC; none where the CoC is that of every frame.
+/// A frame's depth and CoC; no depth if the CoC is the same for every frame.
 type Made = (Option<Pooled<DepthMap>>, CocField);
 
 impl<'a> Stage<'a> {
@@ -64,7 +64,7 @@ impl<'a> Stage<'a> {
         Self { preparation, source, changes, rate, shared, times, change: (0, false), swap: None, seek: 0 }
     }
 
-    /// Runs until the frames end or nobody takes the results. Changes of the blur take effect between frames.
+    /// Runs until the input ends or the output is closed. Changes of the blur take effect between frames.
     pub(super) fn run(mut self, mut from: Receiver<Frame<Shot>>, mut to: Sender<Frame<Ready>>) -> Ended {
         let Shared { clock, tally, .. } = self.shared;
         let mut complained = false;
@@ -77,17 +77,17 @@ impl<'a> Stage<'a> {
                     continue;
                 }
             };
-            self.change();
+            self.apply_changes();
             if mem::replace(&mut self.seek, frame.seek) != frame.seek {
-                self.jump(frame.item.ahead_ns);
+                self.handle_seek(frame.item.ahead_ns);
             }
-            let (mut frame, Shot { mut color, depth, right, .. }) = frame.taken_up(clock.now_ns());
+            let (mut frame, Shot { mut color, depth, right, .. }) = frame.take_item(clock.now_ns());
             let held_before = self.times.held;
             let (depth, coc) = match self.depth_and_coc((depth, right), &mut color, frame.stamp) {
                 Ok(made) => made,
                 Err(fault) => {
                     let (cause, goes_on) = match &fault {
-                        // A depth camera that has given no map yet soon will.
+                        // A depth camera without a map so far will deliver one soon.
                         Fault::Depth(DepthError::Unpaired { .. }) => (Cause::Unpaired, true),
                         Fault::Depth(_) => (Cause::Corrupt, self.shared.keep_going),
                         _ => (Cause::Failed, false),
@@ -106,14 +106,14 @@ impl<'a> Stage<'a> {
             self.times.matted_by = self.preparation.matted_by().or(self.times.matted_by);
             (frame.change, frame.is_between) = self.change;
             frame.trace.depth_held = self.times.held > held_before;
-            if !self.staged(frame, color, depth, coc).hand_on(&mut to, tally) {
+            if !self.stage_frame(frame, color, depth, coc).send_to(&mut to, tally) {
                 return Ok(());
             }
         }
     }
 
-    /// Follows the looks that have come.
-    fn change(&mut self) {
+    /// Applies the changes that have arrived.
+    fn apply_changes(&mut self) {
         let (changes, adaptive) = &self.changes;
         for Change { number, look, bokeh } in changes.iter().flat_map(mpsc::Receiver::try_iter) {
             self.preparation.follow(&look);
@@ -129,15 +129,15 @@ impl<'a> Stage<'a> {
         self.source.iter_mut().for_each(|source| source.look_for_persons(finds_subject));
     }
 
-    /// Another scene comes, as somebody went back or forth in the source.
-    fn jump(&mut self, ahead_ns: i64) {
+    /// Drops all history after a seek in the source.
+    fn handle_seek(&mut self, ahead_ns: i64) {
         self.preparation.forget();
         self.rate.iter_mut().for_each(Rate::forget);
         self.source.iter_mut().for_each(|source| source.jump(ahead_ns));
     }
 
-    /// Stages the frame's subject, which is the last that is done to a frame here.
-    fn staged(
+    /// Applies virtual background and auto-framing, the last step here, and stamps the frame's depth time.
+    fn stage_frame(
         &mut self,
         mut frame: Frame<()>,
         mut color: Pooled<ColorImage>,
@@ -145,7 +145,7 @@ impl<'a> Stage<'a> {
         coc: CocField,
     ) -> Frame<Ready> {
         let Shared { clock, pools, is_viewed, .. } = self.shared;
-        let kept = is_viewed.then_some(&pools.taken);
+        let kept = is_viewed.then_some(&pools.original);
         let staged = depth.as_mut().map(|map| self.preparation.stage(&mut color, map, &coc, frame.stamp.time_ns, kept));
         let (began_ns, at_ns) = (mem::replace(&mut frame.since_ns, clock.now_ns()), frame.since_ns);
         frame.trace.depth_ns = at_ns - began_ns;
@@ -159,7 +159,7 @@ impl<'a> Stage<'a> {
         frame.with(Ready { color, depth, coc, staged: staged.unwrap_or_default(), times, swap })
     }
 
-    /// The frame's depth and CoC: new ones, or those of the frame before where there is no time for more. A CoC that is the same
+    /// Computes the frame's depth and CoC, or reuses those of an earlier frame if time is short. A CoC that is the same
     /// for every frame needs no depth.
     fn depth_and_coc(
         &mut self,
@@ -178,26 +178,26 @@ impl<'a> Stage<'a> {
         if wanted.as_ref().is_some_and(|wanted| wanted.wants_own_depth()) {
             self.rate.iter_mut().for_each(Rate::forget);
         }
-        if let Some((field, rate)) = self.rate.as_mut().and_then(|rate| Some((rate.holds()?, rate))) {
+        if let Some((field, rate)) = self.rate.as_mut().and_then(|rate| Some((rate.next_held()?, rate))) {
             let mut map = brought.unwrap_or_else(|| pools.depths.take());
-            rate.give_held(&mut map, color);
+            rate.warp_held(&mut map, color);
             self.preparation.share(&mut map, color, &field);
             self.times.held += 1;
             return Ok((Some(map), field));
         }
         let seen = Seen { stamp, color, right: right.as_deref() };
-        let mut map = brought.map_or_else(|| self.read(seen), Ok)?;
+        let mut map = brought.map_or_else(|| self.read_map(seen), Ok)?;
         let field = self.preparation.make(&mut map, color, stamp.time_ns);
         self.preparation.remark().into_iter().for_each(|remark| tracing::warn!("{}: {remark}", info.name));
         self.times.took.add(clock.now_ns() - began_ns);
         if let Some(rate) = &mut self.rate {
-            rate.made((&map, field), color);
+            rate.keep((&map, field), color);
         }
         Ok((Some(map), field))
     }
 
-    /// A depth map from the source, made with as much effort as there is time for.
-    fn read(&mut self, seen: Seen) -> Result<Pooled<DepthMap>, Fault> {
+    /// Reads a depth map from the source, with the effort that the time allows.
+    fn read_map(&mut self, seen: Seen) -> Result<Pooled<DepthMap>, Fault> {
         let Shared { pools, info, .. } = self.shared;
         let source = self.source.as_mut().ok_or_else(|| Fault::NoDepth { source_name: info.name.clone() })?;
         if let Some(rate) = &self.rate {

@@ -7,17 +7,17 @@ use crate::depth::DepthError;
 use crate::sink::SinkError;
 use crate::stats::Report;
 
-/// A run that failed: why, and the report of what it did until then.
+/// The error of a failed run, with the report up to the failure.
 #[derive(Debug, thiserror::Error)]
 #[error("{fault}")]
 pub struct PipelineError {
     /// The fault that ended it.
     pub fault: Fault,
-    /// The report up to there.
+    /// The report up to the failure.
     pub report: Box<Report>,
 }
 
-/// What can end a run early.
+/// A fault that ends a run early.
 #[allow(missing_docs)] // The messages say what the fields are.
 #[derive(Debug, thiserror::Error)]
 pub enum Fault {
@@ -29,22 +29,22 @@ pub enum Fault {
     Bokeh(#[from] BokehError),
     #[error(transparent)]
     Sink(#[from] SinkError),
-    /// The blur needs depth that nobody has.
+    /// The blur needs depth that the source lacks.
     #[error("the effect dof needs depth, and {source_name} has none; use --effect blur or tilt-shift")]
     NoDepth {
-        /// Where the frames come from.
+        /// The name of the frame source.
         source_name: String,
     },
-    /// The executor broke its contract.
+    /// The executor returned frames out of order, or none.
     #[error("the blur executor gave back another frame than the oldest, or none: please report this")]
     LostFrame,
     #[error("the {stage} stage panicked: {message}; please report this")]
     Panic { stage: &'static str, message: String },
-    /// The system gave no thread.
+    /// The system could not create a thread.
     #[error("cannot start the thread of the {stage} stage: {cause}")]
     Thread {
         stage: &'static str,
-        /// What the system said.
+        /// The system's error.
         cause: io::Error,
     },
 }

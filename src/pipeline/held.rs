@@ -5,8 +5,8 @@ use crate::depth::motion::Motion;
 use crate::frame::{ColorImage, DepthMap, MixedPixel};
 use crate::optics::CocField;
 
-/// A map that later frames are given, moved as their pictures have. Around a subject it has a matte of its own: what is
-/// behind stays as it was, and the nearer surface's colours follow those of each frame.
+/// A depth map that is reused for later frames, warped by the motion between the pictures. A map with a subject keeps
+/// its matte: the background stays, and the colours of the nearer surface follow each frame.
 pub(super) struct HeldMap {
     /// Its mixed pixels have the light of the farther surface in place of the difference.
     map: DepthMap,
@@ -14,9 +14,9 @@ pub(super) struct HeldMap {
     motion: Motion,
 }
 
-/// Of less than this share of a pixel, no colour is told from a frame.
-const LEAST_SHARE: f32 = 0.05;
-/// Surfaces move apart from each other whose CoC differs by so many pixels.
+/// Smallest alpha by which a colour difference is divided: below, noise would dominate.
+const MIN_ALPHA: f32 = 0.05;
+/// Surfaces whose CoC differs by this much, in pixels, move separately.
 const APART_PX: f32 = 1.0;
 
 impl HeldMap {
@@ -24,30 +24,32 @@ impl HeldMap {
         Self { map: DepthMap::default(), light: light_of_codes(), motion: Motion::default() }
     }
 
-    /// Whether there was none yet.
+    /// Returns whether no map was kept yet.
     pub fn is_empty(&self) -> bool {
         self.map.metres.is_empty()
     }
 
-    /// Keeps the map of a picture, which has this CoC.
+    /// Keeps the map of the picture `color`, which has the CoC `field`.
     pub fn keep(&mut self, map: &DepthMap, color: &ColorImage, field: &CocField) {
-        copy(map, &mut self.map);
-        let jump = if let CocField::Depth(lens) = field { lens.inverse_depth_of_px(APART_PX) } else { f32::INFINITY };
-        self.motion.keep(map, color, jump);
+        copy_map(map, &mut self.map);
+        let depth_step =
+            if let CocField::Depth(lens) = field { lens.inverse_depth_of_px(APART_PX) } else { f32::INFINITY };
+        self.motion.keep(map, color, depth_step);
         let matte = &mut self.map.matte.pixels;
         matte.clear();
         if map.subject_m.is_some() && map.size() == color.size() {
             matte.extend(map.matte.pixels.iter().map(|pixel| {
-                let own = own(&self.light, color, pixel);
+                // Compositing solved for the background: own = far + alpha * difference.
+                let own = linear_rgb(&self.light, color, pixel);
                 let far = |p: usize| own[p] - pixel.share * pixel.difference[p];
                 MixedPixel { difference: std::array::from_fn(far), ..*pixel }
             }));
         }
     }
 
-    /// Gives a later picture the map.
-    pub fn give(&mut self, map: &mut DepthMap, color: &ColorImage) {
-        copy(&self.map, map);
+    /// Writes the kept map, warped to the later picture `color`, into `map`.
+    pub fn warp_to(&mut self, map: &mut DepthMap, color: &ColorImage) {
+        copy_map(&self.map, map);
         let Self { map: held, light, motion } = self;
         let moved = motion.find(held, color);
         if moved {
@@ -65,7 +67,7 @@ impl HeldMap {
             ((0..width).contains(&x) && (0..height).contains(&y)).then(|| with_colors(light, color, &pixel))
         }));
         if moved {
-            // Of two that have come to one place, the one of which more is seen.
+            // If two pixels moved to one place, the one with the larger alpha stays.
             let pixels = &mut map.matte.pixels;
             pixels.sort_unstable_by(|a, b| a.at.cmp(&b.at).then(b.share.total_cmp(&a.share)));
             pixels.dedup_by_key(|pixel| pixel.at);
@@ -73,24 +75,24 @@ impl HeldMap {
     }
 }
 
-/// A held pixel with the difference of the colours that it has in a picture.
+/// Returns a held pixel with the colour difference for a picture: own = far + alpha * difference, solved for it.
 fn with_colors(light: &[f32; 256], color: &ColorImage, pixel: &MixedPixel) -> MixedPixel {
-    let own = own(light, color, pixel);
-    let (share, rest) = (pixel.share.max(LEAST_SHARE), (1.0 - pixel.share).max(1e-3));
+    let own = linear_rgb(light, color, pixel);
+    let (share, rest) = (pixel.share.max(MIN_ALPHA), (1.0 - pixel.share).max(1e-3));
     let difference = |p: usize| {
         let difference = (own[p] - pixel.difference[p]) / share;
-        // No surface is darker than black, or brighter than white.
+        // The light of both surfaces stays within black and white.
         difference.clamp(-own[p] / rest, (1.0 - own[p]) / rest)
     };
     MixedPixel { difference: std::array::from_fn(difference), ..*pixel }
 }
 
-/// The light of a pixel in a picture.
-fn own(light: &[f32; 256], color: &ColorImage, pixel: &MixedPixel) -> [f32; 3] {
+/// Returns the linear light of a pixel of a picture.
+fn linear_rgb(light: &[f32; 256], color: &ColorImage, pixel: &MixedPixel) -> [f32; 3] {
     [0, 1, 2].map(|p| light[usize::from(color.rgb[3 * pixel.at as usize + p])])
 }
 
-fn copy(from: &DepthMap, to: &mut DepthMap) {
+fn copy_map(from: &DepthMap, to: &mut DepthMap) {
     to.resize(from.width, from.height);
     to.metres.copy_from_slice(&from.metres);
     (to.subject_m, to.is_smooth) = (from.subject_m, from.is_smooth);
@@ -104,7 +106,7 @@ mod tests {
     const FIELD: CocField =
         CocField::Depth(DepthCoc { coc_at_infinity_px: 10.0, focus_m: 1.0, range_m: 0.0, max_coc_px: 20.0 });
 
-    /// A person of noise, `right` px beside their place before a wall of noise.
+    /// Renders a person of noise, shifted `right` pixels, in front of a wall of noise.
     fn person(right: i32) -> (ColorImage, DepthMap) {
         let (width, height) = (640, 360);
         let (mut color, mut map) = (ColorImage::new(width, height), DepthMap::new(width, height));
@@ -131,11 +133,11 @@ mod tests {
         let mut held = HeldMap::new();
         held.keep(&then.1, &then.0, &FIELD);
         let mut given = DepthMap::default();
-        held.give(&mut given, &now.0);
+        held.warp_to(&mut given, &now.0);
         assert!(given.metres == now.1.metres, "the map has moved");
         let places = |map: &DepthMap| map.matte.pixels.iter().map(|pixel| pixel.at).collect::<Vec<_>>();
         assert_eq!(places(&given), places(&now.1));
-        held.give(&mut given, &then.0);
+        held.warp_to(&mut given, &then.0);
         assert!(given.metres == then.1.metres && places(&given) == places(&then.1), "what rests is where it was");
     }
 
@@ -155,22 +157,22 @@ mod tests {
         let mut held = HeldMap::new();
         held.keep(&map, &color, &FIELD);
         let mut given = DepthMap::default();
-        held.give(&mut given, &color);
+        held.warp_to(&mut given, &color);
         for (a, b) in given.matte.pixels.iter().zip(&map.matte.pixels) {
             assert!(a.difference.iter().zip(&b.difference).all(|(a, b)| (a - b).abs() < 1e-5), "{a:?} {b:?}");
         }
-        // The person has gone: what was mixed shows what is behind, and both its surfaces are that.
+        // The person has left: the mixed pixel shows the background, so both its surfaces have that colour.
         color.rgb[3..6].copy_from_slice(&[30, 60, 200]);
-        held.give(&mut given, &color);
+        held.warp_to(&mut given, &color);
         assert!(given.matte.pixels[1].difference.iter().all(|difference| difference.abs() < 1e-5));
-        // A map that was measured has none: each frame finds its own.
+        // A measured map has no matte here: each frame estimates its own.
         held.keep(&DepthMap { subject_m: None, ..map }, &color, &FIELD);
-        held.give(&mut given, &color);
+        held.warp_to(&mut given, &color);
         assert!(given.matte.pixels.is_empty() && given.subject_m.is_none());
     }
 
-    /// The bundled recording, whose frames are a twelfth of a second apart: blurred by depth that moved, they are more like
-    /// those blurred by their own than by depth that stays where it was.
+    /// The bundled recording, whose frames are 1/12 s apart: blurred with warped depth, frames are closer to those
+    /// blurred with their own depth than with unwarped depth.
     #[test]
     fn what_moved_blurs_a_real_motion_more_like_its_own_depth() {
         use crate::computing::Computing;
@@ -190,14 +192,14 @@ mod tests {
         let blurred = |color: &ColorImage, map: &DepthMap| {
             blur(&look, color.clone(), Some(Depth::Final(map.clone())), &Computing::default()).unwrap().0
         };
-        // Squared differences in all, and beside outlines.
+        // Sums of squared differences: over all pixels, and near depth edges.
         let (mut off, mut counts) = ([[0.0; 2]; 2], [0.0; 2]);
         for k in [1, 7, 13, 19] {
             let (then, now) = (frame(k - 1), frame(k));
             let mut held = HeldMap::new();
             held.keep(&then.1, &then.0, &CocField::Depth(lens));
             let mut moved = DepthMap::default();
-            held.give(&mut moved, &now.0);
+            held.warp_to(&mut moved, &now.0);
             let own = blurred(&now.0, &now.1);
             let others = [&then.1, &moved].map(|map| blurred(&now.0, map));
             let width = own.width as usize;

@@ -1,12 +1,12 @@
-//! Which frames are not blurred, as they would come too late.
+//! Decides which frames are too late to be blurred.
 
 use crate::budget::DEADLINE_PERIODS;
 
-/// When a frame is not worth blurring: it would be delivered later than two periods after its capture, and there is a
-/// newer one already or soon. But rather ten pictures a second, old as they are, than none.
+/// Finds frames not worth blurring: a frame that would be delivered later than two periods after its capture, while a
+/// newer one is there or about to come. Yet ten late pictures a second are better than none.
 pub(super) struct LateRule {
     period_ns: u64,
-    /// When a frame was last found not to be late.
+    /// When a frame last passed.
     last_passed_ns: Option<u64>,
 }
 
@@ -18,11 +18,11 @@ impl LateRule {
         Self { period_ns, last_passed_ns: None }
     }
 
-    /// Whether not to blur a frame that was captured at `captured_ns` and whose blur is expected to take `expected_ns`.
-    /// A frame that is not late is taken to be blurred.
+    /// Returns whether to skip a frame captured at `captured_ns` whose blur is expected to take `expected_ns`. The
+    /// caller is expected to blur a frame that passes.
     pub(super) fn is_late(&mut self, captured_ns: u64, now_ns: u64, expected_ns: u64) -> bool {
         let age_ns = now_ns.saturating_sub(captured_ns);
-        // Younger than a period, it is the newest there is.
+        // A frame younger than a period is the newest there is.
         let late = age_ns > self.period_ns && age_ns + expected_ns > DEADLINE_PERIODS * self.period_ns;
         let starved = self.last_passed_ns.is_none_or(|last_ns| now_ns.saturating_sub(last_ns) >= STARVED_NS);
         if late && !starved {

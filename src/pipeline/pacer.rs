@@ -1,19 +1,19 @@
-//! Replays stored frames in real time: each waits for its media time, and those that would miss theirs are passed over,
+//! Replays stored frames in real time: each waits for its media time, and those that would miss theirs are skipped,
 //! as a camera would have overwritten them.
 
 use crate::capture::Camera;
 use crate::clock::Clock;
 
-/// A stop is seen after this time at the latest.
+/// Longest time until a stop is noticed.
 const NAP_NS: u64 = 50_000_000;
 
 pub(super) struct Pacer {
     clock: Clock,
     active: bool,
     period_ns: u64,
-    /// When media time 0 was or will be; known with the first frame.
+    /// The time of media time 0; `None` before the first frame.
     epoch_ns: Option<u64>,
-    /// Time to read a frame: a moving average.
+    /// Time to read a frame, a moving average.
     read_ns: u64,
 }
 
@@ -22,7 +22,7 @@ impl Pacer {
         Self { clock, active, period_ns, epoch_ns: None, read_ns: 0 }
     }
 
-    /// Passes over the frames that would be more than a period late when they are read; returns how many.
+    /// Skips the frames that would be more than a period late once read; returns how many.
     pub(super) fn skip(&self, camera: &mut dyn Camera) -> u64 {
         match self.epoch_ns {
             Some(epoch_ns) if self.active => {
@@ -33,18 +33,18 @@ impl Pacer {
         }
     }
 
-    /// Stands still for as long as nobody took frames: they go on from where they were.
-    pub(super) fn rested(&mut self, rest_ns: u64) {
+    /// Shifts the schedule by a pause, so that frames go on from where they were.
+    pub(super) fn shift(&mut self, rest_ns: u64) {
         self.epoch_ns = self.epoch_ns.map(|epoch_ns| epoch_ns + rest_ns);
     }
 
-    /// The next frame is due at once: it was asked for.
-    pub(super) fn sought(&mut self) {
+    /// Restarts the schedule: the next frame is due at once, after a seek.
+    pub(super) fn restart(&mut self) {
         self.epoch_ns = None;
     }
 
-    /// Waits until the frame of media time `time_ns`, which took `read_ns` to read, is due, or until `stop` says so.
-    /// Returns the time at which it was captured: when it was due, or now where nothing is paced.
+    /// Waits until the frame of media time `time_ns`, which took `read_ns` to read, is due, or until `stop` returns
+    /// true. Returns its capture time: when it was due, or now if the source is not paced.
     pub(super) fn wait(&mut self, time_ns: u64, read_ns: u64, stop: impl Fn() -> bool) -> u64 {
         let now_ns = self.clock.now_ns();
         if !self.active {
@@ -55,7 +55,7 @@ impl Pacer {
         while !stop() && self.clock.now_ns() < due_ns {
             self.clock.sleep_until_ns(due_ns.min(self.clock.now_ns() + NAP_NS));
         }
-        // Stopped early, the frame would otherwise be delivered before it was captured.
+        // After an early stop the frame must not be stamped with a capture time in the future.
         due_ns.min(self.clock.now_ns())
     }
 }
@@ -67,7 +67,7 @@ mod tests {
 
     const PERIOD_NS: u64 = 100;
 
-    /// Frames every 100 ns, by position.
+    /// A camera with a frame every 100 ns, as a position.
     struct Positions(u64);
 
     impl Camera for Positions {
@@ -84,7 +84,7 @@ mod tests {
         }
     }
 
-    /// Plays 40 frames that take `read_ns` each; returns how many were read, and the latest by how much.
+    /// Plays 40 frames that take `read_ns` each; returns how many were read, and the largest delay.
     fn play(read_ns: u64) -> (u64, u64) {
         let clock = Clock::manual();
         let mut pacer = Pacer::new(clock.clone(), true, PERIOD_NS);
@@ -137,7 +137,7 @@ mod tests {
         let mut camera = Positions(1);
         pacer.wait(0, 0, || false);
         clock.advance_ns(60 * PERIOD_NS);
-        pacer.rested(60 * PERIOD_NS);
+        pacer.shift(60 * PERIOD_NS);
         assert_eq!(pacer.skip(&mut camera), 0);
         assert_eq!(pacer.wait(PERIOD_NS, 0, || false), 61 * PERIOD_NS);
     }

@@ -2,74 +2,75 @@
 
 use crate::bokeh::{BokehError, Settings};
 use crate::capture::Brings;
-use crate::engine::Taken;
+use crate::engine::OriginalFrame;
 use crate::frame::{ColorImage, DepthMap, GrayImage, YuyvImage};
 use crate::link::LOSSLESS_ITEMS;
 use crate::link::pool::Pool;
 
-/// The buffers: they are made once, and come back when they are dropped.
+/// The buffer pools: buffers are created once and return when dropped.
 pub(super) struct Pools {
     pub colors: Pool<ColorImage>,
     pub depths: Pool<DepthMap>,
-    /// The right eye's pictures.
+    /// Pictures of the right camera.
     pub rights: Pool<GrayImage>,
-    /// Frames as they were taken, where something else stands behind the subject.
-    pub taken: Pool<Taken>,
+    /// Frames before their background was replaced.
+    pub original: Pool<OriginalFrame>,
     /// Blurred pictures.
     pub outs: Pool<ColorImage>,
     pub yuyvs: Pool<YuyvImage>,
 }
 
 impl Pools {
-    /// For pictures of `size` pixels.
+    /// Creates the pools for pictures of `size` pixels.
     pub fn new(places: &Places, size: (u32, u32), brings: Brings) -> Self {
         let picture = || ColorImage::new(size.0, size.1);
         Self {
             colors: Pool::new(places.colors(), picture),
             depths: Pool::new(places.depths(), DepthMap::default),
             rights: Pool::new(if brings == Brings::RightEye { places.rights() } else { 0 }, GrayImage::default),
-            taken: Pool::new(places.taken(), Taken::default),
+            original: Pool::new(places.original(), OriginalFrame::default),
             outs: Pool::new(places.outs(), picture),
             yuyvs: Pool::new(places.outs(), YuyvImage::default),
         }
     }
 }
 
-/// Room for buffers along the way, so that no stage waits for one that another has no need to give back.
+/// Counts of buffers such that no stage ever waits for one that another stage holds.
 pub(super) struct Places {
-    /// Frames that the executor has in hand at once; 0 where nothing blurs.
+    /// Frames that the executor has in flight; 0 if nothing is blurred.
     pub in_blur: usize,
-    /// Whether a viewer is sent every picture, and what it was made of.
+    /// Whether a viewer receives every picture and its inputs.
     pub viewed: bool,
 }
 
-/// Most frames that any executor has in hand.
+/// Maximum number of frames that any executor has in flight.
 pub(super) const MOST_IN_FLIGHT: usize = 4;
 
-/// Whether there is room for a run over `frames` pictures of `size` (width, height): for blurring one, and for those under way.
+/// Checks that the memory suffices for a run over `frames` pictures of `size` (width, height): for blurring one, and
+/// for those in flight.
 ///
 /// # Errors
 /// [`BokehError::Memory`].
 pub fn check_room(size: (u32, u32), frames: Option<u64>) -> Result<(), BokehError> {
     let places = Places { in_blur: MOST_IN_FLIGHT, viewed: false };
-    // Colours are there from the start, depth as it comes.
+    // All colour buffers exist from the start; depth buffers are created as frames come.
     let depths = frames.map_or(places.depths() as u64, |frames| frames.min(places.depths() as u64));
     Settings::check_room(size, 3 * (places.colors() + places.outs()) as u64 + 4 * depths)
 }
 
 impl Places {
-    /// A link's items, and the one that it displaces or that waits for room.
+    /// The items of a link, and the one that is displaced or waits for room.
     const LINK: usize = LOSSLESS_ITEMS + 1;
-    /// The one that a stage is working on.
+    /// The item that a stage works on.
     const HAND: usize = 1;
 
     pub fn colors(&self) -> usize {
-        // Three stages with the links behind them, and the last stage: where nothing blurs, the captured pictures
-        // themselves go on to the sink.
+        // Three stages with the links behind them, and the last stage: if nothing is blurred, the captured pictures
+        // themselves go to the sink.
         3 * (Self::HAND + Self::LINK) + Self::HAND + self.in_blur + self.views()
     }
 
-    /// Those that a viewer has: one that it shows, one that it takes, and one that it keeps for long.
+    /// Returns the buffers of a viewer: one shown, one being taken, one kept for long.
     fn views(&self) -> usize {
         if self.viewed { 3 * Self::HAND + Self::LINK } else { 0 }
     }
@@ -78,17 +79,18 @@ impl Places {
         self.colors()
     }
 
-    /// Frames as they were taken, from before something else stood behind the subject until they are blurred.
-    pub fn taken(&self) -> usize {
+    /// Returns the buffers for original frames, from the replacement of the background until they are blurred.
+    pub fn original(&self) -> usize {
         2 * Self::HAND + Self::LINK + self.in_blur
     }
 
-    /// The right eye's picture goes no further than its depth.
+    /// Returns the buffers for the right camera, whose pictures go no further than the depth stage.
     pub fn rights(&self) -> usize {
         2 * Self::HAND + Self::LINK
     }
 
-    /// Blurred pictures: with the executor, the blur and the deliver stage, and in the link between those.
+    /// Returns the buffers for blurred pictures: in the executor, the blur and deliver stages, and the link between
+    /// them.
     pub fn outs(&self) -> usize {
         if self.in_blur == 0 { 0 } else { self.in_blur + 2 * Self::HAND + Self::LINK + self.views() }
     }

@@ -1,45 +1,45 @@
-//! The play-out delay against jitter: pictures are shown a steady time after they were captured, so that they come as
-//! evenly as they were taken.
+//! The play-out delay against jitter: pictures are shown at a steady delay after capture, so that they come out as
+//! evenly as they were captured.
 //!
-//! The time that the stages need varies, so a picture that is ready early waits. The delay adapts to that time: nearly
-//! all pictures are ready before it has passed, and none is kept until it is too old.
+//! The processing time varies, so a picture that is ready early waits. The delay adapts to that time: nearly all
+//! pictures are ready before it has passed, and none waits until it is too old.
 
-/// Share of the pictures that are to be ready in time; the others are shown as soon as they are ready.
+/// Fraction of the pictures that are to be ready in time; the others are shown as soon as they are ready.
 const IN_TIME: f64 = 0.97;
-/// Fall of the delay with every picture that was ready in time, in periods like all that follows.
+/// Decrease of the delay per picture that was in time, in periods like all that follow.
 const FALL: f64 = 0.0006;
-/// Its rise with every other picture: both balance when the share [`IN_TIME`] is ready in time.
+/// Increase per late picture: both balance when the fraction [`IN_TIME`] is in time.
 const RISE: f64 = FALL * IN_TIME / (1.0 - IN_TIME);
-/// If a picture was very late, the delay rises by this share of its lateness instead.
+/// If a picture was very late, the delay rises by this fraction of its lateness instead,
 const RISE_SHARE: f64 = 0.25;
-/// But never by more than this, since a single picture may be late by accident.
+/// but never by more than this, since a single picture may be late by accident.
 const MAX_RISE: f64 = 0.09;
 /// Longest delay; the rest of two periods is left for the sink.
 const MAX_DELAY: f64 = 1.85;
-/// Longest delay to begin with: the first picture tells little of those to come.
+/// Longest initial delay: the first picture says little about later ones.
 const MAX_FIRST_DELAY: f64 = 1.0;
 
 /// The delay from capture to output.
 pub(super) struct Playout {
     period_ns: f64,
-    /// In periods; unknown before the first picture.
+    /// In periods; `None` before the first picture.
     delay: Option<f64>,
 }
 
 impl Playout {
-    /// For pictures that come every `period_ns`.
+    /// Creates the delay for pictures that come every `period_ns`.
     pub(super) fn new(period_ns: u64) -> Self {
         Self { period_ns: period_ns as f64, delay: None }
     }
 
-    /// When to show the picture that was captured at `captured_ns` and is ready now: in the past if it is late. Adapts
-    /// the delay.
+    /// Returns when to show the picture that was captured at `captured_ns` and is ready now, in the past if it is late.
+    /// Adapts the delay.
     pub(super) fn due_ns(&mut self, captured_ns: u64, now_ns: u64) -> u64 {
         let age = now_ns.saturating_sub(captured_ns) as f64 / self.period_ns;
         let delay = self.delay.get_or_insert(age.min(MAX_FIRST_DELAY));
         let due_ns = captured_ns + (*delay * self.period_ns) as u64;
         let late_by = age - *delay;
-        // At least by `RISE`, but not beyond what this picture needed.
+        // At least by `RISE`, but not beyond the need of this picture.
         *delay += if late_by > 0.0 { (RISE_SHARE * late_by).clamp(RISE.min(late_by), MAX_RISE) } else { -FALL };
         *delay = delay.clamp(0.0, MAX_DELAY);
         due_ns
@@ -53,7 +53,8 @@ mod tests {
     const MS: u64 = 1_000_000;
     const PERIOD_NS: u64 = 33 * MS;
 
-    /// Shows pictures that are ready after these times; returns the intervals, longest first, and the ages at output.
+    /// Plays pictures that are ready after the given times; returns the intervals, longest first, and the ages at
+    /// output.
     fn play(ready_ns: impl Iterator<Item = u64>) -> (Vec<u64>, Vec<u64>) {
         let mut playout = Playout::new(PERIOD_NS);
         let (mut shown, mut ages) = (Vec::new(), Vec::new());

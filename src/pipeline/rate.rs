@@ -1,4 +1,4 @@
-//! With how much effort depth is made, and how many frames share a map, as the blur stage has planned.
+//! The effort of depth and how many frames share a map, as planned by the blur stage.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -7,7 +7,7 @@ use crate::budget::Plan;
 use crate::frame::{ColorImage, DepthMap};
 use crate::optics::CocField;
 
-/// What the blur stage tells the depth stage.
+/// The plan, shared by the blur stage (writer) and the depth stage (reader).
 pub(super) struct Order(AtomicU64);
 
 impl Order {
@@ -15,7 +15,7 @@ impl Order {
         Self(AtomicU64::new(Self::bits(plan)))
     }
 
-    /// Tells the plan for the next frames.
+    /// Publishes the plan for the next frames.
     pub(super) fn set(&self, plan: Plan) {
         self.0.store(Self::bits(plan), Ordering::Relaxed);
     }
@@ -24,21 +24,21 @@ impl Order {
         (frames as u64) << 32 | effort as u64
     }
 
-    /// Frames that share a map, and the effort.
+    /// Returns how many frames share a map, and the effort.
     fn get(&self) -> (usize, usize) {
         let bits = self.0.load(Ordering::Relaxed);
         ((bits >> 32) as usize, bits as u32 as usize)
     }
 }
 
-/// Counts which frames are given the depth of an earlier one.
+/// Decides which frames reuse the depth of an earlier one.
 pub(super) struct Rate<'a> {
     order: &'a Order,
     /// Frames since depth was made, that one included.
     age: usize,
-    /// The CoC of the last depth, while later frames may share both.
+    /// The CoC of the last depth, while later frames may reuse both.
     last: Option<CocField>,
-    /// The depth that goes with it.
+    /// The depth that belongs to `last`.
     held: HeldMap,
 }
 
@@ -47,13 +47,13 @@ impl<'a> Rate<'a> {
         Self { order, age: 0, last: None, held: HeldMap::new() }
     }
 
-    /// The effort for the next depth.
+    /// Returns the effort for the next depth.
     pub(super) fn effort(&self) -> usize {
         self.order.get().1
     }
 
-    /// Counts a frame; returns the CoC of the last depth if the frame is given both, `None` if it needs its own.
-    pub(super) fn holds(&mut self) -> Option<CocField> {
+    /// Counts a frame; returns the CoC of the last depth if the frame reuses both, `None` if it needs its own.
+    pub(super) fn next_held(&mut self) -> Option<CocField> {
         if self.age >= self.order.get().0 {
             self.last = None;
         }
@@ -61,20 +61,20 @@ impl<'a> Rate<'a> {
         self.last
     }
 
-    /// Nothing is held any more: the next frame's depth is made anew.
+    /// Drops the held depth: the next frame gets its own.
     pub(super) fn forget(&mut self) {
         self.last = None;
     }
 
-    /// Gives a picture the depth that is held.
-    pub(super) fn give_held(&mut self, map: &mut DepthMap, color: &ColorImage) {
-        self.held.give(map, color);
+    /// Writes the held depth, warped to the picture, into `map`.
+    pub(super) fn warp_held(&mut self, map: &mut DepthMap, color: &ColorImage) {
+        self.held.warp_to(map, color);
     }
 
-    /// Depth of a picture was made: keeps it if later frames may share it.
-    pub(super) fn made(&mut self, (map, field): (&DepthMap, CocField), color: &ColorImage) {
+    /// Keeps newly computed depth of a picture if later frames may reuse it.
+    pub(super) fn keep(&mut self, (map, field): (&DepthMap, CocField), color: &ColorImage) {
         self.age = 1;
-        // The first one in any case: then the memory is allocated, and not during a later frame.
+        // The first one in any case, so that memory is allocated now and not during a later frame.
         if self.order.get().0 > 1 || self.held.is_empty() {
             self.held.keep(map, color, &field);
             self.last = Some(field);
@@ -99,9 +99,9 @@ mod tests {
                 rate.forget();
             }
             let mut frame = |_| {
-                let held = rate.holds().is_some();
+                let held = rate.next_held().is_some();
                 if !held {
-                    rate.made((&map, CocField::Uniform { radius_px: 1.0 }), &ColorImage::new(2, 2));
+                    rate.keep((&map, CocField::Uniform { radius_px: 1.0 }), &ColorImage::new(2, 2));
                 }
                 held
             };

@@ -1,4 +1,4 @@
-//! What a run is made of, and how it begins.
+//! The parts of a run, and how it begins.
 
 use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, mpsc};
@@ -28,21 +28,22 @@ named! {
 
 /// How the frames of a run are blurred.
 pub struct Blurring {
-    /// How they look at first.
+    /// The initial look.
     pub look: Look,
-    /// What blurs them so: an executor of its [settings](Look::settings). `None` passes them through (effect `none`).
+    /// The executor for the [settings](Look::settings) of that look. `None` passes frames through (effect `none`).
     pub bokeh: Option<Box<dyn Bokeh>>,
-    /// Whether that was made for every quality, so that it can follow the time there is.
+    /// Whether the executor supports every quality, so that it can follow the time available.
     pub adaptive: bool,
-    /// Where a change of all that comes from; `None` keeps everything as it is.
+    /// The changes of the blur; `None` keeps everything as it is.
     pub changes: Option<mpsc::Receiver<Change>>,
 }
 
 impl Blurring {
-    /// Pictures of `size` pixels in this look, and what changes it later. `make` makes the executor.
+    /// Creates the initial blur for pictures of `size` pixels, and the sender of later changes. Calls `make` for the
+    /// executor.
     ///
     /// # Errors
-    /// That of `make`.
+    /// Returns the error of `make`.
     pub fn begin<E>(
         look: Look,
         (size, adaptive): ((u32, u32), bool),
@@ -54,57 +55,58 @@ impl Blurring {
     }
 }
 
-/// Everything a run is made of.
+/// Everything a run consists of.
 pub struct Run<'a> {
-    /// Where frames come from.
+    /// The source of the frames.
     pub camera: Box<dyn Camera>,
-    /// Where their depth comes from, unless they bring it with them; read only where the look follows it.
+    /// The source of depth, unless the camera brings it; read only if the look follows depth.
     pub depth: Option<Box<dyn DepthSource>>,
-    /// What blurs them; `None` passes them through (effect `none`).
+    /// The executor; `None` passes frames through (effect `none`).
     pub bokeh: Option<Box<dyn Bokeh>>,
-    /// How they are blurred: `bokeh` is an executor of its [settings](Look::settings).
+    /// How frames are blurred; `bokeh` is an executor for its [settings](Look::settings).
     pub look: Look,
-    /// Whether `bokeh` was made for every quality, so that it can follow the time there is.
+    /// Whether `bokeh` supports every quality, so that it can follow the time available.
     pub adaptive: bool,
-    /// Whether depth was measured, so that refining it makes it better ([`Look::refines`]).
+    /// Whether depth is measured, so that refinement improves it ([`Look::refines`]).
     pub measured: bool,
-    /// Threads that finish depth.
+    /// Number of threads that finish depth.
     pub threads: usize,
-    /// Where a change of all that comes from; `None` keeps everything as it is.
+    /// The changes of the blur; `None` keeps everything as it is.
     pub changes: Option<mpsc::Receiver<Change>>,
-    /// Where they go.
+    /// The destination of the frames.
     pub sink: Box<dyn Sink>,
     /// Real time, or all frames.
     pub pace: Pace,
-    /// Time that a frame's blur may take, in nanoseconds; more is counted as a miss. In real time, depth is made with less
-    /// effort, and then for fewer frames, where both do not fit the time until a frame is due.
+    /// Time that a frame's blur may take, in nanoseconds; more is counted as a miss. In real time, if depth and blur do
+    /// not fit the frame period, depth is computed with less effort, then shared by several frames.
     pub budget_ns: u64,
-    /// Count frames that cannot be read, and go on; otherwise the first one ends the run.
+    /// Whether to count unreadable frames and go on; otherwise the first one ends the run.
     pub keep_going: bool,
-    /// Where the sink tells whether anybody watches; the camera rests while nobody does.
+    /// Whether the sink has viewers; the camera pauses while there are none. `None` always captures.
     pub demand: Option<Demand>,
-    /// Flip the pictures left to right on their way out.
+    /// Whether to mirror the output left to right.
     pub mirror: bool,
-    /// Where blurred pictures are wanted; `None` is in memory, as is a mirrored picture always. The sink is given none
-    /// that is not in memory.
+    /// Where blurred pictures are wanted; `None` is in memory, and a mirrored picture always is. The sink only receives
+    /// pictures in memory.
     pub wanted: Option<Arc<Wanted>>,
-    /// Who is shown each frame that the sink took, with what it was made of; the newest wins. Where the sink
-    /// [keeps](Sink::keeps) nothing, a frame is delivered once it was taken from here.
+    /// Receives each frame that the sink took, with its inputs; the newest wins. If the sink [keeps](Sink::keeps)
+    /// nothing, a frame counts as delivered once it was received here.
     pub view: Option<Sender<View>>,
-    /// What measures time.
+    /// The clock.
     pub clock: Clock,
     /// Once set, no more frames are captured.
     pub stop: &'a AtomicBool,
-    /// Told after each delivered frame, on the caller's thread.
+    /// Called after each delivered frame, on the caller's thread.
     pub progress: &'a dyn Fn(Progress),
 }
 
 impl<'a> Run<'a> {
-    /// A run of every frame of `camera`, blurred as `look` says, into `sink`, as fast as it goes. `depth` gives their
-    /// measured depth in metres where the look follows depth and the camera does not bring it. `stop` ends the run.
+    /// Creates a run of every frame of `camera`, blurred as `look` says, into `sink`, as fast as possible. `depth`
+    /// provides measured depth in metres if the look follows depth and the camera does not bring it. `stop` ends the
+    /// run.
     ///
     /// # Errors
-    /// The blur is too wide for the pictures, or there is no such GPU.
+    /// The blur is too wide for the pictures, or the requested GPU does not exist.
     pub fn new(
         camera: Box<dyn Camera>,
         depth: Option<Box<dyn DepthSource>>,
@@ -119,7 +121,7 @@ impl<'a> Run<'a> {
         Ok(Self { measured: depth.is_some(), ..Self::of(camera, depth, blurring, sink, stop) })
     }
 
-    /// The same of frames that are blurred so, whose depth is not taken to be measured.
+    /// Creates a run like [`Run::new`] with a given blur; depth is not assumed to be measured.
     pub fn of(
         camera: Box<dyn Camera>,
         depth: Option<Box<dyn DepthSource>>,
@@ -150,12 +152,12 @@ impl<'a> Run<'a> {
         }
     }
 
-    /// From frame to frame, where they come in real time.
+    /// Returns the frame period if frames come in real time.
     pub(super) fn live_ns(&self) -> Option<u64> {
         (self.pace == Pace::Realtime).then(|| self.camera.info().period_ns)
     }
 
-    /// What is done to each frame, by the executor, which is taken.
+    /// Creates the engine; takes the executor.
     pub(super) fn engine(&mut self) -> Engine {
         let info = self.camera.info();
         let depth = self.depth.as_ref();

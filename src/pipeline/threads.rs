@@ -1,4 +1,4 @@
-//! The threads of the stages: how they start, and what becomes of a panic.
+//! The threads of the stages: how they start, and how a panic ends the run.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::{self, Scope, ScopedJoinHandle};
@@ -16,15 +16,15 @@ pub(super) fn spawn<'scope>(
     thread.spawn_scoped(scope, move || guard(stage, over, body)).map_err(|cause| Fault::Thread { stage, cause })
 }
 
-/// Runs a stage; makes an error of a panic, and tells capture that the end has come.
+/// Runs a stage; turns a panic into an error, and signals the end to the capture stage.
 pub(super) fn guard(stage: &'static str, over: &AtomicBool, body: impl FnOnce() -> Ended) -> Ended {
-    // Nothing of a stage is used after it panicked but its counts and times, which are whole at every step.
+    // After a panic only the stage's counts and times are used, which are consistent at every step.
     let ended = std::panic::catch_unwind(std::panic::AssertUnwindSafe(body));
     over.store(true, Ordering::Relaxed);
     ended.unwrap_or_else(|panic| Err(Fault::panic(stage, &*panic)))
 }
 
 pub(super) fn join(thread: ScopedJoinHandle<Ended>) -> Ended {
-    // The guard lets no panic through but one that its own handling raised.
+    // The guard catches every panic except one that its own handling raised.
     thread.join().unwrap_or_else(|panic| Err(Fault::panic("upstream", &*panic)))
 }

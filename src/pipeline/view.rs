@@ -1,4 +1,4 @@
-//! What others see of a run while it goes on.
+//! The public view of a run in progress.
 
 use crate::bokeh::{PassTimes, Picture};
 use crate::budget::Quality;
@@ -8,53 +8,53 @@ use crate::link::pool::Pooled;
 use crate::optics::CocField;
 use crate::stats::Frames;
 
-/// How far a run is.
+/// The progress of a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Progress {
-    /// Frames captured, those that were lost included.
+    /// Captured frames, lost ones included.
     pub captured: u64,
-    /// Frames delivered.
+    /// Delivered frames.
     pub delivered: u64,
-    /// Frames dropped, for any cause.
+    /// Dropped frames, for any cause.
     pub dropped: u64,
-    /// Frames to be captured in all, where that is known.
+    /// The total number of frames to capture, if known.
     pub total: Option<u64>,
-    /// The rung that the last frame was blurred at; `None` where it was not.
+    /// The quality level of the last frame; `None` if it was not blurred.
     pub quality: Option<Quality>,
 }
 
-/// A frame, for who looks at more than the picture.
+/// A frame with its inputs, for viewers that need more than the picture.
 pub struct View {
-    /// The picture; in memory where the sink was given it.
+    /// The blurred picture; in memory if the sink received it.
     pub picture: Picture,
-    /// The picture as it was taken; `None` where nothing was blurred.
+    /// The input picture; `None` if nothing was blurred.
     pub color: Option<Pooled<ColorImage>>,
-    /// Its depth, holes filled, as it was before something else stood behind the subject.
+    /// Its depth, holes filled, before the background was replaced.
     pub depth: Option<Pooled<DepthMap>>,
-    /// The radius of every pixel.
+    /// The CoC radius of every pixel.
     pub coc: CocField,
-    /// Which frame it is.
+    /// Identifies the frame.
     pub stamp: Stamp,
-    /// When it was captured, on the run's clock.
+    /// The capture time, on the run's clock.
     pub captured_ns: u64,
-    /// The part of it that goes out; `None` is all.
+    /// The crop that goes out; `None` is the whole picture.
     pub part: Option<Crop>,
-    /// The number of the last change before it; 0 where there was none.
+    /// The number of the last change before it; 0 if there was none.
     pub change: u64,
-    /// Whether it was blurred by the executor of the look before, as its own was still being made.
+    /// Whether the previous look's executor blurred it, because its own was still being created.
     pub is_between: bool,
-    /// The number of the last wish of a [`Seeker`](crate::capture::Seeker) before it; 0 where there was none.
+    /// The number of the last seek ([`Seeker`](crate::capture::Seeker)) before it; 0 if there was none.
     pub seek: u64,
-    /// Whether it is the frame of that wish: it is shown however late it is.
+    /// Whether it is the target of that seek: it is shown however late it is.
     pub is_wished: bool,
-    /// What it took.
+    /// Its processing times.
     pub trace: Trace,
     /// The counts of the run up to this frame.
     pub frames: Frames,
 }
 
 impl View {
-    /// A picture that was blurred so, of which nothing else is known.
+    /// Creates a view of a blurred picture of which nothing else is known.
     pub fn of(picture: Picture, coc: CocField) -> Self {
         Self {
             picture,
@@ -74,25 +74,25 @@ impl View {
     }
 }
 
-/// What a frame took on its way, in nanoseconds.
+/// The processing times of a frame, in nanoseconds.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Trace {
-    /// Whether its depth was taken over from an earlier frame.
+    /// Whether it reuses the depth of an earlier frame.
     pub depth_held: bool,
     /// Reading and decoding, waits excluded.
     pub decode_ns: u64,
     /// Depth and CoC.
     pub depth_ns: u64,
-    /// The blur; 0 where there was none.
+    /// The blur; 0 if there was none.
     pub blur_ns: u64,
-    /// All waits between stages until it was ready: in links, and where the executor had others in hand.
+    /// All waits between stages until it was ready: in links, and behind other frames in the executor.
     pub between_ns: u64,
-    /// The wait for its turn, so that frames come as evenly as they were taken.
+    /// The wait for its play-out time.
     pub playout_ns: u64,
-    /// How old it was then: all of the above, but for a stored frame's decoding, which is over when it is captured.
+    /// Its age at output: all of the above, except a stored frame's decoding, which is over before it is captured.
     pub age_ns: u64,
-    /// The blur's passes.
+    /// The passes of the blur.
     pub passes: PassTimes,
-    /// The rung it was blurred at.
+    /// The quality level of the blur.
     pub quality: Option<Quality>,
 }

@@ -1,4 +1,4 @@
-//! Where blurred pictures are wanted: in memory, on the GPU that blurs, or both; and whether with depth of their own.
+//! Where blurred pictures are wanted (in memory, on the GPU, or both), and whether each needs depth of its own.
 
 use std::sync::atomic::{AtomicBool, AtomicU8, Ordering};
 
@@ -6,42 +6,42 @@ use crate::compute::Place;
 
 const PLACES: [Place; 3] = [Place::Memory, Place::Device, Place::Both];
 
-/// A wish that may change while a run goes on; frames that are blurred already keep to the one before.
+/// A request that may change during a run; frames in flight keep to the previous one.
 #[derive(Debug, Default)]
 pub struct Wanted {
     place: AtomicU8,
-    /// Whether somebody needs them in memory, wherever else they are wanted.
+    /// Whether pictures are needed in memory in addition.
     needed: AtomicBool,
     own_depth: AtomicBool,
 }
 
 impl Wanted {
-    /// Where pictures are wanted.
+    /// Creates a request for pictures in `place`.
     pub fn new(place: Place) -> Self {
         Self { place: AtomicU8::new(place as u8), ..Self::default() }
     }
 
-    /// Where they are wanted from now on.
+    /// Sets where pictures are wanted.
     pub fn set(&self, place: Place) {
         self.place.store(place as u8, Ordering::Relaxed);
     }
 
-    /// Whether they are needed in memory from now on, besides.
+    /// Sets whether pictures are needed in memory in addition.
     pub fn need(&self, needed: bool) {
         self.needed.store(needed, Ordering::Relaxed);
     }
 
-    /// Whether each frame is to have depth of its own from now on, however little time there is.
+    /// Sets whether each frame must have depth of its own, however little time there is.
     pub fn want_own_depth(&self, own: bool) {
         self.own_depth.store(own, Ordering::Relaxed);
     }
 
-    /// Whether it is now.
+    /// Returns whether each frame must have depth of its own.
     pub fn wants_own_depth(&self) -> bool {
         self.own_depth.load(Ordering::Relaxed)
     }
 
-    /// Where they are wanted now.
+    /// Returns where pictures are wanted.
     pub fn place(&self) -> Place {
         match PLACES[usize::from(self.place.load(Ordering::Relaxed))] {
             Place::Device if self.needed.load(Ordering::Relaxed) => Place::Both,

@@ -1,29 +1,29 @@
-//! Frames in the buffers of a stream. PipeWire's bindings give their memory, but neither its header nor where it ends, so
-//! that this is done by hand.
+//! Access to the frames in a stream's buffers. PipeWire's bindings expose neither the header nor the end of the data,
+//! so this module uses the raw structures.
 
 use std::slice;
 
 use pipewire::spa::sys;
 use pipewire::stream::Stream;
 
-/// When a picture was taken, by the system's monotonic clock, and its number.
+/// Capture time of a picture, on the system's monotonic clock, and its sequence number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Header {
     pub captured_ns: u64,
     pub sequence: u64,
 }
 
-/// Has `fill` write a frame of `frame_bytes` bytes at most into a free buffer of `stream`, with `stride` bytes from row to
-/// row (0 where it has no rows), and hands it to the readers. `fill` returns how many bytes there are, with the header.
-/// Returns whether there was a buffer: readers may hold them all.
+/// Lets `fill` write a frame of at most `frame_bytes` bytes into a free buffer of `stream`, with `stride` bytes per row
+/// (0 if it has no rows), and queues it for the readers. `fill` returns the number of bytes used and the header.
+/// Returns whether a buffer was available: readers may hold them all.
 ///
-/// Only for the thread of the stream's loop.
-pub fn give(stream: &Stream, frame_bytes: usize, stride: i32, fill: impl FnOnce(&mut [u8]) -> (usize, Header)) -> bool {
+/// Must be called on the thread of the stream's loop.
+pub fn write_frame(stream: &Stream, frame_bytes: usize, stride: i32, fill: impl FnOnce(&mut [u8]) -> (usize, Header)) -> bool {
     // SAFETY: the buffer, if it is not null, and all that it points to belong to this program from here to
-    // `queue_raw_buffer`: buffers are removed by the stream's loop alone, which is busy with this call. PipeWire has
-    // mapped `maxsize` bytes at `data` (flag MAP_BUFFERS) or left `data` null, and `chunk` and the header lie in memory
-    // that it shares with the readers, who do not write to it. `find_meta_data` returns null or a header of at least the
-    // size asked for. `fill` returns, or the program ends: this is called from C, through which nothing unwinds.
+    // `queue_raw_buffer`: only the stream's loop removes buffers, and it is busy with this call. PipeWire has mapped
+    // `maxsize` bytes at `data` (flag MAP_BUFFERS) or left `data` null; `chunk` and the header lie in memory that it
+    // shares with the readers, which do not write to it. `find_meta_data` returns null or a header of at least the
+    // requested size. `fill` returns, or the program ends: this is called from C, through which nothing unwinds.
     #[allow(unsafe_code)]
     unsafe {
         let handle = stream.dequeue_raw_buffer();
@@ -50,7 +50,7 @@ pub fn give(stream: &Stream, frame_bytes: usize, stride: i32, fill: impl FnOnce(
                 meta.seq = header.sequence;
             }
         } else if !data.is_null() {
-            // A buffer that is too small goes out empty: there is no other way to give it back.
+            // A buffer that is too small is queued empty: there is no other way to return it.
             (*(*data).chunk).size = 0;
         }
         stream.queue_raw_buffer(handle);

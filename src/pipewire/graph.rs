@@ -1,4 +1,4 @@
-//! What there is in PipeWire's graph now: cameras, and who is connected.
+//! Snapshot of PipeWire's graph: cameras and connected clients.
 
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -13,90 +13,91 @@ use super::PipeWireError;
 use super::mode::{self, Mode};
 use super::session::Session;
 
-/// How long the daemon may take to tell what there is.
-const PATIENCE: Duration = Duration::from_secs(3);
+/// Longest wait for the daemon to list its objects.
+const TIMEOUT: Duration = Duration::from_secs(3);
 
-/// A node that gives video.
+/// A node that provides video.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Source {
-    /// The name by which it is found again.
+    /// The name that identifies it.
     pub name: String,
-    /// The name for people.
+    /// The name for users.
     pub label: String,
-    /// Whether it is a camera by its role: programs list those alone.
+    /// Whether its role is `Camera`: programs list only such nodes.
     pub is_camera: bool,
-    /// Who gives it, by process, where that is known.
+    /// The process that provides it, if known.
     pub process: Option<u32>,
-    /// What readers call it in this daemon's life.
+    /// Its identifier for readers while the daemon runs.
     pub serial: String,
-    /// Formats that are known here, with their sizes and rates; empty where they were not asked for.
+    /// Supported formats with their sizes and rates; empty if they were not requested.
     pub modes: Vec<Mode>,
 }
 
-/// A camera that can be read from.
+/// A camera that can be read.
 pub type Camera = Source;
 
 impl Source {
-    /// Whether this very program gives it.
+    /// Whether this program itself provides it.
     pub fn is_ours(&self) -> bool {
         self.process == Some(std::process::id())
     }
 }
 
-/// What there is.
+/// The objects in the graph.
 #[derive(Clone, Debug, Default)]
 pub struct Graph {
-    /// Nodes that give video, cameras and others.
+    /// Nodes that provide video, cameras and others.
     pub sources: Vec<Source>,
     /// Names of all nodes.
     pub names: Vec<String>,
-    /// Programs that are connected, by their own names.
+    /// Names of the connected programs.
     pub clients: Vec<String>,
-    /// Whether the session manager gives a filter to who asks for the camera that it is for.
+    /// Whether the session manager supports filters that stand in for a camera.
     pub has_filters: bool,
 }
 
 impl Graph {
-    /// Looks at the graph of this session's daemon, without the modes of its cameras.
+    /// Lists the objects of this session's daemon, without the cameras' modes.
     ///
     /// # Errors
-    /// There is no daemon, or it does not answer.
+    /// The daemon does not run, or does not answer.
     pub fn look() -> Result<Self, PipeWireError> {
-        Self::of(&Session::open()?, |_| false)
+        Self::read(&Session::open()?, |_| false)
     }
 
-    /// The same with the modes of its cameras.
+    /// Lists the objects of this session's daemon, with the cameras' modes.
     ///
     /// # Errors
-    /// As for [`Graph::look`].
+    /// The daemon does not run, or does not answer.
     pub fn look_closely() -> Result<Self, PipeWireError> {
-        Self::of(&Session::open()?, |_| true)
+        Self::read(&Session::open()?, |_| true)
     }
 
-    /// The camera that `name` means, with its modes, for a filter to stand in for.
+    /// Finds the camera that `name` refers to, with its modes, for a filter to stand in for.
     ///
     /// # Errors
-    /// There is none, there are several, or the session manager knows no filters.
+    /// No camera matches, several do, or the session manager does not support filters.
     pub fn filterable(name: &str) -> Result<Camera, PipeWireError> {
         let session = Session::open()?;
-        if !Self::of(&session, |_| false)?.has_filters {
+        if !Self::read(&session, |_| false)?.has_filters {
             return Err(PipeWireError::NoFilters);
         }
-        Self::camera(&session, name, false)
+        Self::find_camera(&session, name, false)
     }
 
-    /// The camera that `name` means, with its modes; with `exactly`, what programs remember it by has to be the same.
+    /// Finds the camera that `name` refers to, with its modes; with `exactly`, only by its identifying name.
     ///
     /// # Errors
-    /// There is none, there are several, or this program gives it itself.
-    pub(super) fn camera(session: &Session, name: &str, exactly: bool) -> Result<Camera, PipeWireError> {
+    /// No camera matches, several do, or this program itself provides it.
+    pub(super) fn find_camera(session: &Session, name: &str, exactly: bool) -> Result<Camera, PipeWireError> {
         let wanted = name.to_lowercase();
         let has_part = move |source: &Source| {
             [&source.name, &source.label].into_iter().any(|text| text.to_lowercase().contains(&wanted))
         };
         let has_name = |source: &Source| source.name == name || (!exactly && source.label == name);
-        let mut graph = Self::of(session, has_part.clone())?;
+        let mut graph = Self::read(session, has_part.clone())?;
         graph.sources.retain(|source| source.is_camera);
+        // An exact name takes precedence over a partial match.
         let found = match graph.sources.iter().position(has_name) {
             Some(found) => found,
             None => {
@@ -118,10 +119,11 @@ impl Graph {
         if camera.is_ours() { Err(PipeWireError::Own { name: camera.name }) } else { Ok(camera) }
     }
 
-    /// Looks at the graph that a session is connected to, with the modes of those that `closely` says.
-    pub(super) fn of(session: &Session, closely: impl Fn(&Source) -> bool + 'static) -> Result<Self, PipeWireError> {
+    /// Lists the objects of the daemon that a session is connected to, with the modes of the sources for which
+    /// `wants_modes` is true.
+    pub(super) fn read(session: &Session, wants_modes: impl Fn(&Source) -> bool + 'static) -> Result<Self, PipeWireError> {
         let registry = session.core.get_registry_rc().map_err(PipeWireError::refused("its registry"))?;
-        let found: Rc<RefCell<Found>> = Rc::default();
+        let found: Rc<RefCell<Listing>> = Rc::default();
         let (finder, objects) = (Rc::clone(&found), registry.downgrade());
         let _listener = registry
             .add_listener_local()
@@ -130,16 +132,16 @@ impl Graph {
                 let Some(properties) = object.props else { return };
                 let is_source = found.add(object.id, &object.type_, properties);
                 if let Some(registry) = objects.upgrade().filter(|_| is_source) {
-                    found.ask_for_modes(|| registry.bind(object).ok(), &closely);
+                    found.request_modes(|| registry.bind(object).ok(), &wants_modes);
                 }
             })
             .register();
-        // Once for what there is, and once for what was asked of that meanwhile.
+        // One round trip lists the objects, and a second one returns the modes requested meanwhile.
         for _ in 0..2 {
-            let question = session.ask()?;
-            let began = Instant::now();
-            while !session.has_answered(question) {
-                let left = PATIENCE.checked_sub(began.elapsed()).ok_or(PipeWireError::Silent)?;
+            let round_trip = session.sync()?;
+            let started = Instant::now();
+            while !session.is_synced(round_trip) {
+                let left = TIMEOUT.checked_sub(started.elapsed()).ok_or(PipeWireError::Silent)?;
                 session.serve(Some(left));
                 if session.is_lost() {
                     return Err(PipeWireError::Silent);
@@ -150,31 +152,31 @@ impl Graph {
         Ok(graph)
     }
 
-    /// Whether somebody connects readers with cameras: without, a reader waits for ever.
+    /// Whether a session manager runs, which connects readers with cameras: without one, a reader waits forever.
     pub fn has_session_manager(&self) -> bool {
         let is_manager = |name: &String| name.contains("WirePlumber") || name.contains("pipewire-media-session");
         self.clients.iter().any(is_manager)
     }
 }
 
-/// What was told so far.
+/// The objects listed so far.
 #[derive(Default)]
-struct Found {
-    sources: Vec<Told>,
+struct Listing {
+    sources: Vec<VideoNode>,
     names: Vec<String>,
     clients: Vec<Client>,
     has_filters: bool,
 }
 
-/// A video node.
-struct Told {
+/// A video node, with its list of formats.
+struct VideoNode {
     source: Source,
-    /// The number of the client that gives it.
+    /// Id of the client that provides it.
     client: Option<u32>,
     /// Entries of its list of formats.
     formats: Rc<RefCell<Vec<Vec<u8>>>>,
-    /// What listens to it, before what it listens to.
-    _asked: Option<(NodeListener, Node)>,
+    /// The listener, dropped before the node it listens to.
+    _subscription: Option<(NodeListener, Node)>,
 }
 
 struct Client {
@@ -183,8 +185,8 @@ struct Client {
     process: Option<u32>,
 }
 
-impl Found {
-    /// Takes note of an object; returns whether it is a node that gives video.
+impl Listing {
+    /// Records an object; returns whether it is a node that provides video.
     fn add(&mut self, id: u32, kind: &ObjectType, properties: &DictRef) -> bool {
         let text = |key: &str| properties.get(key).map(str::to_owned);
         let number = |key: &str| properties.get(key).and_then(|text| text.parse().ok());
@@ -209,9 +211,10 @@ impl Found {
                     name,
                 };
                 let client = number("client.id");
-                self.sources.push(Told { source, client, formats: Rc::default(), _asked: None });
+                self.sources.push(VideoNode { source, client, formats: Rc::default(), _subscription: None });
                 true
             }
+            // Session managers that support filters publish this metadata object.
             ObjectType::Metadata => {
                 self.has_filters |= properties.get("metadata.name") == Some("filters");
                 false
@@ -220,24 +223,24 @@ impl Found {
         }
     }
 
-    /// Asks the source that was noted last for its formats, if that is wanted.
-    fn ask_for_modes(&mut self, bind: impl FnOnce() -> Option<Node>, closely: &impl Fn(&Source) -> bool) {
-        let Some(told) = self.sources.last_mut().filter(|told| closely(&told.source)) else { return };
+    /// Requests the formats of the last recorded source, if `wants_modes` is true for it.
+    fn request_modes(&mut self, bind: impl FnOnce() -> Option<Node>, wants_modes: &impl Fn(&Source) -> bool) {
+        let Some(video_node) = self.sources.last_mut().filter(|video_node| wants_modes(&video_node.source)) else { return };
         let Some(node) = bind() else { return };
-        let formats = Rc::clone(&told.formats);
+        let formats = Rc::clone(&video_node.formats);
         let listener = node
             .add_listener_local()
             .param(move |_, _, _, _, pod| formats.borrow_mut().extend(pod.map(|pod| pod.as_bytes().to_vec())))
             .register();
         node.enum_params(0, Some(ParamType::EnumFormat), 0, u32::MAX);
-        told._asked = Some((listener, node));
+        video_node._subscription = Some((listener, node));
     }
 
     fn graph(self) -> Graph {
         let Self { sources, names, clients, has_filters } = self;
         let process = |id: Option<u32>| clients.iter().find(|client| Some(client.id) == id)?.process;
-        let sources = sources.into_iter().map(|Told { source, client, formats, .. }| {
-            let modes = formats.borrow().iter().flat_map(|pod| mode::read(pod)).collect();
+        let sources = sources.into_iter().map(|VideoNode { source, client, formats, .. }| {
+            let modes = formats.borrow().iter().flat_map(|pod| mode::parse_modes(pod)).collect();
             Source { process: process(client), modes, ..source }
         });
         let clients = clients.iter().map(|client| client.name.clone()).collect();

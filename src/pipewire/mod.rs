@@ -1,9 +1,8 @@
-//! PipeWire: cameras that the programs of a session share, without a kernel module.
+//! PipeWire: cameras shared by the programs of a session, without a kernel module.
 //!
-//! A camera is a node of the class `Video/Source` with the role `Camera`; [`node`] makes one, [`graph`] lists those that
-//! there are, and [`reader`] reads from one. Everything of PipeWire's belongs to the thread that made it, so each node and
-//! each reader has a thread of its own, which is woken by a counter of the kernel's (`wake`): no lock is taken on a frame's
-//! way.
+//! A camera is a node of the class `Video/Source` with the role `Camera`; [`node`] creates one, [`graph`] lists them,
+//! and [`reader`] reads from one. PipeWire's objects belong to the thread that created them, so each node and each
+//! reader has a thread of its own, which an eventfd (`wake`) wakes: no lock is taken on a frame's path.
 
 mod buffer;
 mod error;
@@ -18,12 +17,13 @@ mod wake;
 
 pub use error::PipeWireError;
 
-/// The group of the nodes that this program filters a camera with: what is in it is not given the filter itself.
+/// Returns the link group of the nodes with which this program filters a camera: group members are not connected to the
+/// filter itself.
 fn group() -> String {
     format!("bokehcam-{}", std::process::id())
 }
 
-/// Whether there is a socket where the daemon of this session is looked for.
+/// Whether the socket of this session's daemon exists.
 pub fn is_there() -> bool {
     std::path::Path::new(&session::socket()).exists()
 }

@@ -1,4 +1,4 @@
-//! What a camera of PipeWire's offers, read from its own notation.
+//! The modes that a PipeWire camera offers, parsed from pods.
 
 use pipewire::spa::param::format::{FormatProperties, MediaSubtype, MediaType};
 use pipewire::spa::param::video::VideoFormat;
@@ -6,10 +6,10 @@ use pipewire::spa::pod::deserialize::PodDeserializer;
 use pipewire::spa::pod::{CanonicalFixedSizedPod, ChoiceValue, Object, Value};
 use pipewire::spa::utils::{Choice, ChoiceEnum, Fraction, Id, Rectangle};
 
-/// A picture format, by the name that the kernel has for it.
+/// A picture format, as the kernel's four-character code.
 pub type FourCc = [u8; 4];
 
-/// Formats that are known, and what PipeWire calls them.
+/// Supported formats with their PipeWire equivalents.
 const FORMATS: [(FourCc, VideoFormat); 11] = [
     (*b"YUYV", VideoFormat::YUY2),
     (*b"UYVY", VideoFormat::UYVY),
@@ -23,23 +23,23 @@ const FORMATS: [(FourCc, VideoFormat); 11] = [
     (*b"GREY", VideoFormat::GRAY8),
     MOTION_JPEG,
 ];
-/// Pictures by themselves have a place of their own in PipeWire's notation.
+/// Compressed pictures are a media subtype of their own in PipeWire, not a video format.
 const MOTION_JPEG: (FourCc, VideoFormat) = (*b"MJPG", VideoFormat::Encoded);
 
-/// What PipeWire calls a format; `None` where that is compressed.
+/// Returns PipeWire's name for a raw format; `None` if the format is compressed or unknown.
 pub(super) fn video_format(fourcc: FourCc) -> Option<VideoFormat> {
     let found = FORMATS.iter().find(|(known, _)| *known == fourcc)?.1;
     (found != VideoFormat::Encoded).then_some(found)
 }
 
-/// Values that a camera offers of something.
+/// The values that a camera offers for a property.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Offer<T> {
-    /// It does not tell.
+    /// Not stated.
     Unknown,
-    /// These and no others.
+    /// Only these.
     These(Vec<T>),
-    /// Every one between two.
+    /// Every value between two.
     Range { min: T, max: T },
 }
 
@@ -57,36 +57,36 @@ impl<T> Offer<T> {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Mode {
     pub fourcc: FourCc,
-    /// Columns and rows.
+    /// Widths and heights, in pixels.
     pub sizes: Offer<(u32, u32)>,
     /// Pictures per second, as fractions.
     pub rates: Offer<(u32, u32)>,
 }
 
-/// What pictures are like.
+/// The negotiated format of the pictures.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Agreed {
     pub fourcc: FourCc,
-    /// Columns and rows.
+    /// Width and height, in pixels.
     pub size: (u32, u32),
     /// Pictures per second, as a fraction, > 0.
     pub rate: (u32, u32),
 }
 
 impl Agreed {
-    /// The mode that offers this and nothing else.
+    /// Returns the mode that offers only this format.
     pub fn mode(&self) -> Mode {
         let Self { fourcc, size, rate } = *self;
         Mode { fourcc, sizes: Offer::These(vec![size]), rates: Offer::These(vec![rate]) }
     }
 }
 
-/// What two sides have agreed on; `None` where that is not known here.
-pub(super) fn agreed(format: &[u8]) -> Option<Agreed> {
-    read(format).into_iter().find_map(|Mode { fourcc, sizes, rates }| {
+/// Reads the negotiated format; `None` if it is not supported.
+pub(super) fn parse_agreed(format: &[u8]) -> Option<Agreed> {
+    parse_modes(format).into_iter().find_map(|Mode { fourcc, sizes, rates }| {
         let Offer::These(sizes) = sizes else { return None };
         let rate = match rates {
-            // A rate of 0 is one that varies.
+            // A rate of 0 means a variable rate.
             Offer::These(rates) => rates.first().copied().filter(|(num, denom)| *num > 0 && *denom > 0),
             _ => None,
         };
@@ -94,10 +94,10 @@ pub(super) fn agreed(format: &[u8]) -> Option<Agreed> {
     })
 }
 
-/// The modes in one entry of a camera's list: none where its formats are not known here.
-pub(super) fn read(pod: &[u8]) -> Vec<Mode> {
+/// Reads the modes in one entry of a camera's list; empty if none of its formats is supported.
+pub(super) fn parse_modes(pod: &[u8]) -> Vec<Mode> {
     let Ok((_, Value::Object(object))) = PodDeserializer::deserialize_any_from(pod) else { return Vec::new() };
-    let id = |key: FormatProperties| match ids(value(&object, key)) {
+    let id = |key: FormatProperties| match parse_ids(find_value(&object, key)) {
         Offer::These(values) => values,
         _ => Vec::new(),
     };
@@ -105,6 +105,7 @@ pub(super) fn read(pod: &[u8]) -> Vec<Mode> {
         return Vec::new();
     }
     let raw = id(FormatProperties::VideoFormat);
+    // A pod may list several raw formats, but compressed ones have a subtype each.
     let is_known = |(fourcc, format): &(FourCc, VideoFormat)| match id(FormatProperties::MediaSubtype)[..] {
         [subtype] if subtype == MediaSubtype::Raw.as_raw() => {
             *fourcc != MOTION_JPEG.0 && raw.contains(&format.as_raw())
@@ -112,14 +113,14 @@ pub(super) fn read(pod: &[u8]) -> Vec<Mode> {
         [subtype] if subtype == MediaSubtype::Mjpg.as_raw() => *fourcc == MOTION_JPEG.0,
         _ => false,
     };
-    let sizes = match value(&object, FormatProperties::VideoSize) {
+    let sizes = match find_value(&object, FormatProperties::VideoSize) {
         Some(Value::Rectangle(size)) => Offer::These(vec![*size]),
-        Some(Value::Choice(ChoiceValue::Rectangle(choice))) => offer(choice),
+        Some(Value::Choice(ChoiceValue::Rectangle(choice))) => parse_offer(choice),
         _ => Offer::Unknown,
     };
-    let rates = match value(&object, FormatProperties::VideoFramerate) {
+    let rates = match find_value(&object, FormatProperties::VideoFramerate) {
         Some(Value::Fraction(rate)) => Offer::These(vec![*rate]),
-        Some(Value::Choice(ChoiceValue::Fraction(choice))) => offer(choice),
+        Some(Value::Choice(ChoiceValue::Fraction(choice))) => parse_offer(choice),
         _ => Offer::Unknown,
     };
     let sizes = sizes.map(|Rectangle { width, height }| (width, height));
@@ -129,20 +130,20 @@ pub(super) fn read(pod: &[u8]) -> Vec<Mode> {
     FORMATS.iter().filter(|known| is_known(known)).map(mode).collect()
 }
 
-fn value(object: &Object, key: FormatProperties) -> Option<&Value> {
+fn find_value(object: &Object, key: FormatProperties) -> Option<&Value> {
     object.properties.iter().find(|property| property.key == key.as_raw()).map(|property| &property.value)
 }
 
-fn ids(value: Option<&Value>) -> Offer<u32> {
+fn parse_ids(value: Option<&Value>) -> Offer<u32> {
     match value {
         Some(Value::Id(id)) => Offer::These(vec![id.0]),
-        Some(Value::Choice(ChoiceValue::Id(choice))) => offer(choice).map(|Id(id)| id),
+        Some(Value::Choice(ChoiceValue::Id(choice))) => parse_offer(choice).map(|Id(id)| id),
         _ => Offer::Unknown,
     }
 }
 
-/// Without repetitions: the one that the camera prefers is mostly among the others as well.
-fn offer<T: CanonicalFixedSizedPod + Copy + PartialEq>(Choice(_, choice): &Choice<T>) -> Offer<T> {
+/// Converts a choice, without repetitions: the preferred value is usually also among the alternatives.
+fn parse_offer<T: CanonicalFixedSizedPod + Copy + PartialEq>(Choice(_, choice): &Choice<T>) -> Offer<T> {
     match choice {
         ChoiceEnum::None(value) => Offer::These(vec![*value]),
         ChoiceEnum::Range { min, max, .. } | ChoiceEnum::Step { min, max, .. } => Offer::Range { min: *min, max: *max },
@@ -168,19 +169,19 @@ mod tests {
     fn what_is_written_is_read() {
         for (fourcc, _) in FORMATS {
             let one = Agreed { fourcc, size: (1280, 720), rate: (30_000, 1001) };
-            let pod = param::format(&one);
-            assert_eq!((read(&pod), agreed(&pod)), (vec![one.mode()], Some(one)));
+            let pod = param::build_format(&one);
+            assert_eq!((parse_modes(&pod), parse_agreed(&pod)), (vec![one.mode()], Some(one)));
             let several = |sizes: [(u32, u32); 2]| Mode {
                 fourcc,
                 sizes: Offer::These(sizes.to_vec()),
                 rates: Offer::Range { min: (0, 1), max: (60, 1) },
             };
-            // What is preferred comes first.
+            // The preferred value comes first.
             let [small, large] = [(640, 480), one.size];
-            assert_eq!(read(&param::offer(&several([small, large]), &one)), [several([large, small])]);
+            assert_eq!(parse_modes(&param::build_offer(&several([small, large]), &one)), [several([large, small])]);
             let silent = Mode { fourcc, sizes: Offer::Unknown, rates: Offer::Unknown };
             assert_eq!(
-                (read(&param::offer(&silent, &one)), agreed(&param::offer(&silent, &one))),
+                (parse_modes(&param::build_offer(&silent, &one)), parse_agreed(&param::build_offer(&silent, &one))),
                 (vec![silent], None)
             );
         }
@@ -188,8 +189,8 @@ mod tests {
 
     #[test]
     fn what_is_no_list_of_formats_has_none() {
-        assert_eq!(read(&param::header()), []);
-        assert_eq!(read(&[]), []);
-        assert_eq!(read(&[8, 0, 0, 0, 15]), []);
+        assert_eq!(parse_modes(&param::header()), []);
+        assert_eq!(parse_modes(&[]), []);
+        assert_eq!(parse_modes(&[8, 0, 0, 0, 15]), []);
     }
 }

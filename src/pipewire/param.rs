@@ -1,4 +1,4 @@
-//! Formats and buffers in PipeWire's own notation (*pods*).
+//! Builds PipeWire's descriptions of formats and buffers (*pods*).
 
 use pipewire::spa::param::ParamType;
 use pipewire::spa::param::format::{FormatProperties, MediaSubtype, MediaType};
@@ -9,16 +9,16 @@ use pipewire::spa::utils::{Choice, ChoiceEnum, ChoiceFlags, Fraction, Id, Rectan
 
 use super::mode::{self, Agreed, Mode, Offer};
 
-/// Buffers that are asked for, fewest to most: as many as readers may hold at once.
+/// Number of buffers: default, minimum and maximum. Readers may hold that many at once.
 const BUFFERS: (i32, i32, i32) = (4, 2, 16);
 
-/// One picture format with one size and one rate: browsers and OBS list no camera that leaves one of them open.
-pub fn format(agreed: &Agreed) -> Vec<u8> {
-    offer(&agreed.mode(), agreed)
+/// Builds one picture format with one size and one rate: browsers and OBS list no camera that leaves one of them open.
+pub fn build_format(agreed: &Agreed) -> Vec<u8> {
+    build_offer(&agreed.mode(), agreed)
 }
 
-/// A mode, of which `best` is to be taken where the other side has no wish.
-pub fn offer(mode: &Mode, best: &Agreed) -> Vec<u8> {
+/// Builds a mode, with `best` as the default if the other side has no preference.
+pub fn build_offer(mode: &Mode, best: &Agreed) -> Vec<u8> {
     let id = |key: FormatProperties, value: u32| Property::new(key.as_raw(), Value::Id(Id(value)));
     let raw = mode::video_format(mode.fourcc);
     let subtype = if raw.is_some() { MediaSubtype::Raw } else { MediaSubtype::Mjpg };
@@ -29,11 +29,11 @@ pub fn offer(mode: &Mode, best: &Agreed) -> Vec<u8> {
             Some(id(FormatProperties::MediaType, MediaType::Video.as_raw())),
             Some(id(FormatProperties::MediaSubtype, subtype.as_raw())),
             raw.map(|format| id(FormatProperties::VideoFormat, format.as_raw())),
-            values(&mode.sizes, best.size, |(width, height)| Rectangle { width, height })
-                .map(|sizes| one_or(sizes, Value::Rectangle, ChoiceValue::Rectangle))
+            to_choice(&mode.sizes, best.size, |(width, height)| Rectangle { width, height })
+                .map(|sizes| value_or_choice(sizes, Value::Rectangle, ChoiceValue::Rectangle))
                 .map(|sizes| Property::new(FormatProperties::VideoSize.as_raw(), sizes)),
-            values(&mode.rates, best.rate, |(num, denom)| Fraction { num, denom })
-                .map(|rates| one_or(rates, Value::Fraction, ChoiceValue::Fraction))
+            to_choice(&mode.rates, best.rate, |(num, denom)| Fraction { num, denom })
+                .map(|rates| value_or_choice(rates, Value::Fraction, ChoiceValue::Fraction))
                 .map(|rates| Property::new(FormatProperties::VideoFramerate.as_raw(), rates)),
         ]
         .into_iter()
@@ -42,8 +42,8 @@ pub fn offer(mode: &Mode, best: &Agreed) -> Vec<u8> {
     )
 }
 
-/// What is offered, in PipeWire's notation: a single value as [`ChoiceEnum::None`].
-fn values<T: CanonicalFixedSizedPod>(
+/// Converts an offer to PipeWire's representation: a single value becomes [`ChoiceEnum::None`].
+fn to_choice<T: CanonicalFixedSizedPod>(
     offer: &Offer<(u32, u32)>,
     best: (u32, u32),
     value: impl Fn((u32, u32)) -> T,
@@ -64,8 +64,8 @@ fn values<T: CanonicalFixedSizedPod>(
     }
 }
 
-/// A value by itself, or a choice.
-fn one_or<T: CanonicalFixedSizedPod>(
+/// Wraps a single value as such, and several as a choice.
+fn value_or_choice<T: CanonicalFixedSizedPod>(
     values: ChoiceEnum<T>,
     one: impl Fn(T) -> Value,
     several: impl Fn(Choice<T>) -> ChoiceValue,
@@ -76,12 +76,12 @@ fn one_or<T: CanonicalFixedSizedPod>(
     }
 }
 
-/// Buffers in memory, as the other side lays them out.
+/// Describes buffers in memory, with the layout chosen by the other side.
 pub fn any_buffers() -> Vec<u8> {
     object(SpaTypes::ObjectParamBuffers, ParamType::Buffers, vec![number_of_buffers(), in_memory()])
 }
 
-/// Buffers of one plane in memory.
+/// Describes buffers with one plane in memory, of `frame_bytes` bytes with `stride` bytes per row.
 pub fn buffers(frame_bytes: i32, stride: i32) -> Vec<u8> {
     let int = |key, value| Property::new(key, Value::Int(value));
     object(
@@ -111,7 +111,7 @@ fn choice(key: u32, choice: ChoiceEnum<i32>) -> Property {
     Property::new(key, Value::Choice(ChoiceValue::Int(Choice(ChoiceFlags::empty(), choice))))
 }
 
-/// A header with each buffer, for time and number of the picture.
+/// Requests a header with each buffer, for the picture's time stamp and sequence number.
 pub fn header() -> Vec<u8> {
     let bytes = size_of::<sys::spa_meta_header>() as i32;
     object(

@@ -1,4 +1,4 @@
-//! Reading from a camera of PipeWire's: its pictures as they come, also after it or the daemon has gone and come back.
+//! Reads pictures from a PipeWire camera, and recovers when the camera or the daemon disappears and returns.
 
 use std::cell::{Cell, RefCell};
 use std::rc::Rc;
@@ -25,45 +25,45 @@ use super::session::Session;
 use super::wake::Waker;
 use crate::clock::Clock;
 
-/// How long a camera may take from the first question to its first word about pictures.
-const PATIENCE: Duration = Duration::from_secs(8);
-/// From one look for a camera that has gone to the next.
-const RETRY: Duration = Duration::from_millis(500);
-/// While nobody wants pictures there is nothing to do but to be stopped.
-const LONG: Duration = Duration::from_secs(3600);
-/// A stream without a picture for so many periods, and at least for a second, has stalled.
-const SILENT_PERIODS: u64 = 5;
-const LEAST_SILENCE_NS: u64 = 1_000_000_000;
-/// A time of capture that is further in the past is no time of the system's monotonic clock.
-const OLDEST_NS: u64 = 10_000_000_000;
-/// A gap in a camera's numbers that is longer is no loss, but another count.
-const MOST_MISSED: u64 = 1000;
+/// Longest wait for a camera's first format, from the request on.
+const TIMEOUT: Duration = Duration::from_secs(8);
+/// Period between attempts to find a camera that has disappeared.
+const RETRY_PERIOD: Duration = Duration::from_millis(500);
+/// Wait while no pictures are requested: only a stop or a request ends it.
+const IDLE_WAIT: Duration = Duration::from_secs(3600);
+/// Number of periods, and at least a second, without a picture after which a stream counts as stalled.
+const TIMEOUT_PERIODS: u64 = 5;
+const MIN_TIMEOUT_NS: u64 = 1_000_000_000;
+/// An older capture time does not come from the system's monotonic clock.
+const MAX_AGE_NS: u64 = 10_000_000_000;
+/// A longer gap in a camera's sequence numbers is a restart of the count, not a loss.
+const MAX_MISSED: u64 = 1000;
 
 /// A picture in PipeWire's memory.
 pub struct Frame<'a> {
     /// The used bytes of each plane.
     pub planes: &'a [&'a [u8]],
-    /// From row to row of the first plane; 0 where that is not told.
+    /// Bytes per row of the first plane; 0 if not stated.
     pub stride_bytes: usize,
-    /// By the system's monotonic clock.
+    /// Capture time on the system's monotonic clock.
     pub captured_ns: u64,
 }
 
-/// Takes what a camera gives. Everything is called on the reader's thread.
+/// Receives a camera's pictures. All methods are called on the reader's thread.
 pub trait Take: Send + 'static {
-    /// What to ask the camera for, of what it offers.
+    /// Selects the mode to request from those that the camera offers.
     ///
     /// # Errors
-    /// Nothing of it can be used: one line.
+    /// None of them is usable: a one-line message.
     fn choose(&mut self, modes: &[Mode]) -> Result<Agreed, String>;
 
-    /// What pictures are like from now on.
+    /// Sets the format of the following pictures.
     fn begin(&mut self, agreed: &Agreed);
 
-    /// A picture.
+    /// Receives a picture.
     fn frame(&mut self, frame: &Frame);
 
-    /// Pictures that came and went unread, and pictures that are damaged.
+    /// Counts pictures that were lost unread and pictures that are damaged.
     fn lost(&mut self, missed: u64, stale: u64, corrupt: u64);
 }
 
@@ -76,16 +76,16 @@ pub struct Reader {
     thread: Option<JoinHandle<()>>,
 }
 
-/// Who waits for the camera: told once which it is and what it gives, or why there is none.
+/// Channel that receives, once, the camera and its format, or the error.
 type Ready = mpsc::Sender<Result<(Camera, Agreed), PipeWireError>>;
 
 impl Reader {
-    /// Begins to read from the camera that `name` means: what programs remember it by, what people see, or a part of
-    /// one of them. With `filters`, its pictures go to those who asked for this camera, by a node of this program's that
-    /// stands in for it: then they come while that has readers.
+    /// Starts to read from the camera that `name` refers to: its identifying name, its label, or a part of either. With
+    /// `filters`, its pictures go to the clients that requested this camera, through a node of this program that stands
+    /// in for it: they arrive only while that node has readers.
     ///
     /// # Errors
-    /// There is no daemon, no such camera, or it offers nothing that can be used.
+    /// The daemon does not run, no camera matches, or it offers no usable mode.
     pub fn new(name: &str, filters: bool, take: impl Take) -> Result<(Self, Camera, Agreed), PipeWireError> {
         let waker = Waker::new().map_err(PipeWireError::Thread)?;
         let (stop, is_wanted) = (Arc::new(AtomicBool::new(false)), Arc::new(AtomicBool::new(true)));
@@ -101,16 +101,16 @@ impl Reader {
             is_away: Cell::new(None),
             filters,
         };
-        let (bell, end, wanted, meant) = (waker.clone(), Arc::clone(&stop), Arc::clone(&is_wanted), name.to_owned());
-        let run = move || Rc::new(listener).run(&meant, &bell, [&end, &wanted]);
+        let (waker_handle, end, wanted, owned_name) = (waker.clone(), Arc::clone(&stop), Arc::clone(&is_wanted), name.to_owned());
+        let run = move || Rc::new(listener).run(&owned_name, &waker_handle, [&end, &wanted]);
         let thread = Some(thread::Builder::new().name("pipewire".into()).spawn(run).map_err(PipeWireError::Thread)?);
         let reader = Self { waker, stop, is_wanted, thread };
         let (camera, agreed) =
-            is_ready.recv_timeout(PATIENCE).map_err(|_| PipeWireError::NoPictures { name: name.to_owned() })??;
+            is_ready.recv_timeout(TIMEOUT).map_err(|_| PipeWireError::NoPictures { name: name.to_owned() })??;
         Ok((reader, camera, agreed))
     }
 
-    /// Whether pictures are wanted; while they are not, the camera is let go of.
+    /// Sets whether pictures are requested; while they are not, the camera is released.
     pub fn want(&self, wanted: bool) {
         if self.is_wanted.swap(wanted, Ordering::AcqRel) != wanted {
             self.waker.wake();
@@ -122,7 +122,7 @@ impl Drop for Reader {
     fn drop(&mut self) {
         self.stop.store(true, Ordering::Release);
         self.waker.wake();
-        // A panic of the thread was printed; there is nothing left to do about it.
+        // A panic of the thread was printed already.
         let _ = self.thread.take().map(JoinHandle::join);
     }
 }
@@ -131,29 +131,30 @@ impl Drop for Reader {
 struct Listener {
     take: RefCell<Box<dyn Take>>,
     clock: Clock,
-    /// Until the first agreement.
+    /// Set until the first format is negotiated.
     ready: RefCell<Option<Ready>>,
     camera: RefCell<Option<Camera>>,
     agreed: Cell<Option<Agreed>>,
-    /// When the last picture came, or the stream began.
+    /// When the last picture arrived, or the stream started.
     last_ns: Cell<u64>,
-    /// The camera's number of the last picture.
+    /// The camera's sequence number of the last picture.
     sequence: Cell<Option<u64>>,
-    /// Since when there are no pictures, if that was said.
+    /// Start of the current outage, if it was reported.
     is_away: Cell<Option<u64>>,
-    /// Whether the pictures go to those who asked for the camera.
+    /// Whether the pictures go to the clients that requested the camera.
     filters: bool,
 }
 
 impl Listener {
-    fn run(self: Rc<Self>, meant: &str, waker: &Waker, [stop, wanted]: [&AtomicBool; 2]) {
+    fn run(self: Rc<Self>, name: &str, waker: &Waker, [stop, wanted]: [&AtomicBool; 2]) {
         while !stop.load(Ordering::Acquire) {
             if !wanted.load(Ordering::Acquire) {
-                waker.wait(LONG);
+                waker.wait(IDLE_WAIT);
                 continue;
             }
             let is_first = self.ready.borrow().is_some();
-            let ended = self.serve(meant, waker, [stop, wanted]);
+            let ended = self.serve(name, waker, [stop, wanted]);
+            // The first connection of a filter only learns the format; the next one is passive.
             if self.filters && is_first && self.ready.borrow().is_none() {
                 continue;
             }
@@ -161,7 +162,7 @@ impl Listener {
                 continue;
             }
             if let Some(ready) = self.ready.take() {
-                let error = ended.err().unwrap_or(PipeWireError::NoPictures { name: meant.to_owned() });
+                let error = ended.err().unwrap_or(PipeWireError::NoPictures { name: name.to_owned() });
                 return drop(ready.send(Err(error)));
             }
             if self.is_away.get().is_none() {
@@ -169,7 +170,7 @@ impl Listener {
                 let why = ended.err().map_or_else(|| "it gives no more pictures".to_owned(), |error| error.to_string());
                 tracing::warn!("{}: {why}; waiting for it to come back", self.name());
             }
-            waker.wait(RETRY);
+            waker.wait(RETRY_PERIOD);
         }
     }
 
@@ -177,40 +178,40 @@ impl Listener {
         self.camera.borrow().as_ref().map_or_else(String::new, |camera| format!("pipewire:{}", camera.name))
     }
 
-    /// Reads until there is nothing to be read, or nobody wants it.
+    /// Reads until the stream ends, or no pictures are requested.
     ///
     /// # Errors
-    /// The daemon or the camera is not there, or refuses.
+    /// The daemon or the camera is absent, or refuses.
     fn serve(
         self: &Rc<Self>,
-        meant: &str,
+        name: &str,
         waker: &Waker,
         [stop, wanted]: [&AtomicBool; 2],
     ) -> Result<(), PipeWireError> {
         let session = Session::open()?;
-        // Once it was found, it is that one which is waited for.
+        // Once a camera was found, only that one is accepted.
         let known = self.camera.borrow().as_ref().map(|camera| camera.name.clone());
-        let camera = Graph::camera(&session, known.as_deref().unwrap_or(meant), known.is_some())?;
+        let camera = Graph::find_camera(&session, known.as_deref().unwrap_or(name), known.is_some())?;
         let refused = |why| PipeWireError::NoMode { name: camera.name.clone(), why };
-        let asked = self.take.borrow_mut().choose(&camera.modes).map_err(refused)?;
-        // A camera tells its format to those alone who keep it going.
+        let requested = self.take.borrow_mut().choose(&camera.modes).map_err(refused)?;
+        // A camera states its format only to readers that keep it running.
         let is_passive = self.filters && self.ready.borrow().is_none();
-        let mut about = properties! {
+        let mut props = properties! {
             *pipewire::keys::MEDIA_TYPE => "Video",
             *pipewire::keys::MEDIA_CATEGORY => "Capture",
             *pipewire::keys::MEDIA_ROLE => "Camera",
-            // The name `bokehcam` is that of a camera that others look for.
+            // Other programs would take a node with the name `bokehcam` for a camera.
             *pipewire::keys::NODE_NAME => "bokehcam-reader",
             "target.object" => camera.serial.as_str(),
         };
         if self.filters {
-            about.insert("node.link-group", super::group());
+            props.insert("node.link-group", super::group());
         }
         if is_passive {
-            about.insert("node.passive", "in");
+            props.insert("node.passive", "in");
         }
         let stream =
-            StreamRc::new(session.core.clone(), "bokehcam", about).map_err(PipeWireError::refused("a stream"))?;
+            StreamRc::new(session.core.clone(), "bokehcam", props).map_err(PipeWireError::refused("a stream"))?;
         self.camera.replace(Some(camera));
         let has_ended = Rc::new(Cell::new(false));
         let [formats, pictures] = std::array::from_fn(|_| Rc::clone(self));
@@ -218,26 +219,26 @@ impl Listener {
         let _listener = stream
             .add_local_listener::<()>()
             .state_changed(move |_, (), old, state| {
-                let rests = (old, &state) == (StreamState::Streaming, &StreamState::Paused);
-                // One that is passive rests while nobody reads.
-                let has_gone =
-                    matches!(state, StreamState::Error(_) | StreamState::Unconnected) || rests && !is_passive;
-                ended.set(ended.get() || has_gone);
+                let is_pausing = (old, &state) == (StreamState::Streaming, &StreamState::Paused);
+                // A passive stream is paused while there are no readers.
+                let has_ended_now =
+                    matches!(state, StreamState::Error(_) | StreamState::Unconnected) || is_pausing && !is_passive;
+                ended.set(ended.get() || has_ended_now);
             })
             .param_changed(move |stream, (), id, format| {
                 if let Some(format) = format.filter(|_| id == ParamType::Format.as_raw()) {
-                    formats.agree(stream, format.as_bytes());
+                    formats.handle_format(stream, format.as_bytes());
                 }
             })
             .process(move |stream, ()| pictures.take(stream))
             .register()
             .map_err(PipeWireError::refused("to be listened to"))?;
-        let format = param::format(&asked);
+        let format = param::build_format(&requested);
         let mut formats: Vec<&Pod> = Pod::from_bytes(&format).into_iter().collect();
         let flags = StreamFlags::AUTOCONNECT | StreamFlags::DONT_RECONNECT | StreamFlags::MAP_BUFFERS;
         stream.connect(Direction::Input, None, flags, &mut formats).map_err(PipeWireError::refused("a reader"))?;
-        let (bell, descriptor) = (waker.clone(), waker.descriptor().map_err(PipeWireError::Thread)?);
-        let _bell = session.event_loop().add_io(descriptor, IoFlags::IN, move |_| bell.silence());
+        let (waker_handle, descriptor) = (waker.clone(), waker.descriptor().map_err(PipeWireError::Thread)?);
+        let _bell = session.event_loop().add_io(descriptor, IoFlags::IN, move |_| waker_handle.clear());
 
         self.last_ns.set(self.clock.now_ns());
         self.sequence.set(None);
@@ -246,14 +247,14 @@ impl Listener {
                 break;
             }
             if is_passive && stream.state() != StreamState::Streaming {
-                session.serve(Some(LONG));
+                session.serve(Some(IDLE_WAIT));
                 self.last_ns.set(self.clock.now_ns());
                 if session.is_lost() || has_ended.get() {
                     break;
                 }
                 continue;
             }
-            let until_ns = self.last_ns.get() + self.longest_silence_ns();
+            let until_ns = self.last_ns.get() + self.timeout_ns();
             session.serve(Some(Duration::from_nanos(until_ns.saturating_sub(self.clock.now_ns()))));
             if session.is_lost() || has_ended.get() || self.clock.now_ns() >= until_ns.max(self.last_ns.get()) {
                 break;
@@ -262,16 +263,16 @@ impl Listener {
         Ok(())
     }
 
-    fn longest_silence_ns(&self) -> u64 {
+    fn timeout_ns(&self) -> u64 {
         let period_ns = |Agreed { rate: (num, denom), .. }| 1_000_000_000 * u64::from(denom) / u64::from(num).max(1);
-        // A camera takes its time for the first picture.
-        let least_ns = if self.sequence.get().is_none() { 3 * LEAST_SILENCE_NS } else { LEAST_SILENCE_NS };
-        self.agreed.get().map_or(least_ns, |agreed| (SILENT_PERIODS * period_ns(agreed)).max(least_ns))
+        // A camera needs longer for its first picture.
+        let min_ns = if self.sequence.get().is_none() { 3 * MIN_TIMEOUT_NS } else { MIN_TIMEOUT_NS };
+        self.agreed.get().map_or(min_ns, |agreed| (TIMEOUT_PERIODS * period_ns(agreed)).max(min_ns))
     }
 
-    /// The camera says what its pictures are like.
-    fn agree(&self, stream: &Stream, format: &[u8]) {
-        let Some(agreed) = mode::agreed(format) else {
+    /// Handles the camera's announcement of its format.
+    fn handle_format(&self, stream: &Stream, format: &[u8]) {
+        let Some(agreed) = mode::parse_agreed(format) else {
             return tracing::warn!("{}: its pictures cannot be read", self.name());
         };
         self.agreed.set(Some(agreed));
@@ -283,12 +284,12 @@ impl Listener {
         }
         let camera = self.camera.borrow().clone();
         if let Some((ready, camera)) = self.ready.take().zip(camera) {
-            // Who waits may have given up.
+            // The receiver may have timed out.
             let _ = ready.send(Ok((camera, agreed)));
         }
     }
 
-    /// Takes the newest picture.
+    /// Dequeues the newest picture.
     fn take(&self, stream: &Stream) {
         let mut newest: Option<Buffer> = None;
         let mut stale = 0;
@@ -306,10 +307,11 @@ impl Listener {
         let sequence = header.as_ref().map_or(0, MetaHeader::seq);
         let gap =
             self.sequence.replace(Some(sequence)).map_or(0, |last| sequence.saturating_sub(last.saturating_add(1)));
-        let missed = if gap > MOST_MISSED { 0 } else { gap.saturating_sub(stale) };
+        // The camera did deliver the stale ones.
+        let missed = if gap > MAX_MISSED { 0 } else { gap.saturating_sub(stale) };
         let mut is_corrupt = header.as_ref().is_some_and(|header| header.flags().contains(MetaHeaderFlags::CORRUPTED));
-        let told_ns = header.as_ref().and_then(|header| u64::try_from(header.pts()).ok());
-        let is_time = |told_ns: &u64| (now_ns.saturating_sub(OLDEST_NS)..=now_ns).contains(told_ns);
+        let stamp_ns = header.as_ref().and_then(|header| u64::try_from(header.pts()).ok());
+        let is_plausible = |stamp_ns: &u64| (now_ns.saturating_sub(MAX_AGE_NS)..=now_ns).contains(stamp_ns);
         let mut planes: [&[u8]; 3] = [&[]; 3];
         let (mut count, mut stride_bytes) = (0, 0);
         for (plane, data) in planes.iter_mut().zip(buffer.datas_mut()) {
@@ -330,7 +332,7 @@ impl Listener {
             take.lost(missed, stale, u64::from(is_corrupt || is_empty));
         }
         if !is_corrupt && !is_empty {
-            let captured_ns = told_ns.filter(is_time).unwrap_or(now_ns);
+            let captured_ns = stamp_ns.filter(is_plausible).unwrap_or(now_ns);
             take.frame(&Frame { planes: &planes[..count], stride_bytes, captured_ns });
         }
     }

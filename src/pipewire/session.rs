@@ -1,4 +1,4 @@
-//! A connection to PipeWire's daemon, on the thread that makes it.
+//! A connection to PipeWire's daemon, on the thread that opens it.
 
 use std::cell::Cell;
 use std::rc::Rc;
@@ -11,18 +11,18 @@ use pipewire::main_loop::MainLoopRc;
 
 use super::PipeWireError;
 
-/// A connection. Dropped in this order: what listens, what is connected, what runs it.
+/// A connection. The fields are dropped in this order: the listener, the connection, the loop that runs it.
 pub struct Session {
     _listener: Listener,
     is_lost: Rc<Cell<bool>>,
-    /// The last answer to a [`Session::ask`].
-    answered: Rc<Cell<Option<i32>>>,
+    /// Number of the last completed [`Session::sync`].
+    last_sync: Rc<Cell<Option<i32>>>,
     pub core: CoreRc,
     _context: ContextRc,
     main_loop: MainLoopRc,
 }
 
-/// The core object has this number; an error of its own with this code is the end of the connection.
+/// Id of the core object; an error on it with this code means that the connection has ended.
 const CORE: u32 = 0;
 const BROKEN_PIPE: i32 = -rustix::io::Errno::PIPE.raw_os_error();
 
@@ -30,7 +30,7 @@ impl Session {
     /// Connects to the daemon of this session.
     ///
     /// # Errors
-    /// There is none.
+    /// The daemon does not run, or refuses.
     pub fn open() -> Result<Self, PipeWireError> {
         pipewire::init();
         super::quiet::silence();
@@ -38,13 +38,13 @@ impl Session {
         let context = ContextRc::new(&main_loop, None).map_err(PipeWireError::refused("a context"))?;
         let core = context.connect_rc(None).map_err(|_| PipeWireError::NoDaemon { socket: socket() })?;
         let is_lost = Rc::new(Cell::new(false));
-        let answered = Rc::new(Cell::new(None));
-        let (lost, answer) = (Rc::clone(&is_lost), Rc::clone(&answered));
+        let last_sync = Rc::new(Cell::new(None));
+        let (lost, done) = (Rc::clone(&is_lost), Rc::clone(&last_sync));
         let listener = core
             .add_listener_local()
             .done(move |id, seq| {
                 if id == CORE {
-                    answer.set(Some(seq.seq()));
+                    done.set(Some(seq.seq()));
                 }
             })
             .error(move |id, _, code, message| {
@@ -54,48 +54,48 @@ impl Session {
                 }
             })
             .register();
-        // SAFETY: it is left when this is dropped, on the same thread, as nothing here is `Send`.
+        // SAFETY: `drop` leaves it on the same thread, as nothing here is `Send`.
         #[allow(unsafe_code)]
         unsafe {
             main_loop.loop_().enter();
         }
-        Ok(Self { _listener: listener, is_lost, answered, core, _context: context, main_loop })
+        Ok(Self { _listener: listener, is_lost, last_sync, core, _context: context, main_loop })
     }
 
-    /// The loop, to add what it waits for.
+    /// The event loop, to which further sources can be added.
     pub fn event_loop(&self) -> &pipewire::loop_::Loop {
         self.main_loop.loop_()
     }
 
-    /// Whether the daemon has gone.
+    /// Whether the connection to the daemon is lost.
     pub fn is_lost(&self) -> bool {
         self.is_lost.get()
     }
 
-    /// Serves what comes, for `patience` at most (`None`: until something does).
-    pub fn serve(&self, patience: Option<Duration>) {
-        // The loop counts whole milliseconds: rounded up, or it would be asked again and again until the time has come.
-        let whole = |patience: Duration| Duration::from_millis(patience.as_micros().div_ceil(1000).min(60_000) as u64);
-        let patience = patience.map_or(Timeout::Infinite, |patience| Timeout::Finite(whole(patience)));
-        self.event_loop().iterate(patience);
+    /// Runs one iteration of the loop, for at most `timeout` (`None`: until an event arrives).
+    pub fn serve(&self, timeout: Option<Duration>) {
+        // The loop counts whole milliseconds: rounded up, or it would spin until the deadline.
+        let round_up = |timeout: Duration| Duration::from_millis(timeout.as_micros().div_ceil(1000).min(60_000) as u64);
+        let timeout = timeout.map_or(Timeout::Infinite, |timeout| Timeout::Finite(round_up(timeout)));
+        self.event_loop().iterate(timeout);
     }
 
-    /// Asks the daemon to answer, and returns the number that [`Session::has_answered`] is to be asked with.
-    pub fn ask(&self) -> Result<i32, PipeWireError> {
+    /// Requests a round trip to the daemon, and returns its number for [`Session::is_synced`].
+    pub fn sync(&self) -> Result<i32, PipeWireError> {
         self.core.sync(0).map(|seq| seq.seq()).map_err(PipeWireError::refused("a question"))
     }
 
-    /// Whether all was done that was asked for before this question.
-    pub fn has_answered(&self, question: i32) -> bool {
-        self.answered.get() == Some(question)
+    /// Whether all requests made before this round trip are done.
+    pub fn is_synced(&self, round_trip: i32) -> bool {
+        self.last_sync.get() == Some(round_trip)
     }
 }
 
-/// From its making on, the loop belongs to this thread, also between two calls of [`Session::serve`]: PipeWire's own thread
-/// runs callbacks of a loop that belongs to nobody by itself, beside those of this one.
+/// Until then, the loop belongs to this thread, also between two calls of [`Session::serve`]: PipeWire's own thread
+/// would run the callbacks of a loop without an owner itself, concurrently with this thread.
 impl Drop for Session {
     fn drop(&mut self) {
-        // SAFETY: it was entered by `open`, on the same thread.
+        // SAFETY: `open` entered it on the same thread.
         #[allow(unsafe_code)]
         unsafe {
             self.main_loop.loop_().leave();
@@ -103,7 +103,7 @@ impl Drop for Session {
     }
 }
 
-/// Where the daemon is looked for, as its library does.
+/// Returns the path of the daemon's socket, by the rules of its library.
 pub fn socket() -> String {
     let variable = |name: &str| std::env::var(name).ok().filter(|value| !value.is_empty());
     let name = variable("PIPEWIRE_REMOTE").unwrap_or_else(|| "pipewire-0".into());

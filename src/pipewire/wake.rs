@@ -1,4 +1,4 @@
-//! How another thread wakes PipeWire's loop: a counter of the kernel's, without a lock or memory of ours.
+//! Wakes PipeWire's loop from another thread through an eventfd, without locks or allocations.
 
 use std::io;
 use std::os::fd::OwnedFd;
@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use rustix::event::{EventfdFlags, PollFd, PollFlags, Timespec, eventfd, poll};
 
-/// Wakes the loop that polls [`Waker::descriptor`]. Clones wake the same one.
+/// Wakes the loop that polls [`Waker::descriptor`]. Clones share one eventfd.
 #[derive(Clone, Debug)]
 pub struct Waker(Arc<OwnedFd>);
 
@@ -16,28 +16,28 @@ impl Waker {
         Ok(Self(Arc::new(eventfd(0, EventfdFlags::CLOEXEC | EventfdFlags::NONBLOCK)?)))
     }
 
-    /// Wakes the loop. Never waits; what was done before is seen by who is woken.
+    /// Wakes the loop. Never blocks; earlier writes of the caller are visible to the woken thread.
     pub fn wake(&self) {
-        // It fails only where 2^64 wakes were not heard yet.
+        // Fails only if 2^64 wakes are pending.
         let _ = rustix::io::write(&*self.0, &1_u64.to_ne_bytes());
     }
 
-    /// Silences what was rung until now.
-    pub fn silence(&self) {
-        let mut rung = [0; 8];
-        // It fails only where there was nothing to silence.
-        let _ = rustix::io::read(&*self.0, &mut rung);
+    /// Clears pending wakes.
+    pub fn clear(&self) {
+        let mut pending = [0; 8];
+        // Fails only if nothing is pending.
+        let _ = rustix::io::read(&*self.0, &mut pending);
     }
 
-    /// Sleeps until it is rung, but no longer than `patience`, and silences it.
-    pub fn wait(&self, patience: Duration) {
-        let patience = Timespec::try_from(patience).ok();
-        // Rung or not, the caller looks again.
-        let _ = poll(&mut [PollFd::new(&*self.0, PollFlags::IN)], patience.as_ref());
-        self.silence();
+    /// Waits for a wake, for at most `timeout`, and clears it.
+    pub fn wait(&self, timeout: Duration) {
+        let timeout = Timespec::try_from(timeout).ok();
+        // The caller checks its state in either case.
+        let _ = poll(&mut [PollFd::new(&*self.0, PollFlags::IN)], timeout.as_ref());
+        self.clear();
     }
 
-    /// Another descriptor of the counter: readable once it was rung.
+    /// Returns another descriptor of the eventfd, which is readable while a wake is pending.
     pub fn descriptor(&self) -> io::Result<OwnedFd> {
         self.0.try_clone()
     }

@@ -1,4 +1,4 @@
-//! The `calib.txt` of a rectified pair: in the form of Middlebury and ETH3D, or in that of KITTI.
+//! Reads the `calib.txt` of a rectified pair, in the format of Middlebury and ETH3D or of KITTI.
 
 use std::path::Path;
 
@@ -7,11 +7,11 @@ use super::geometry::Geometry;
 use super::{kitti, middlebury};
 
 impl Geometry {
-    /// Reads a calibration; its format is recognised by its content. A KITTI file has four cameras: the folder of the
-    /// picture `left` selects the pair; if it is none of KITTI's, the colour cameras 2 and 3, else 0 and 1.
+    /// Reads a calibration; the content decides its format. A KITTI file has four cameras: the folder of the picture
+    /// `left` selects the pair; if it is not a KITTI folder, the colour cameras 2 and 3, or else 0 and 1.
     ///
     /// # Errors
-    /// It cannot be read, is of another kind, lacks a key, or has numbers that cannot be.
+    /// The file is unreadable, of another format, lacks a key, or has invalid numbers.
     pub fn read(file: &Path, left: &Path) -> Result<Self, RecordingError> {
         Self::read_as(file, |text| {
             if middlebury::calib::is_middlebury(text) {

@@ -1,7 +1,7 @@
-//! Picture files as they are coded: recognised by their first bytes, bounded by their header, and unpacked row by row.
+//! Encoded picture files: detected by their first bytes, limited by their header, and decoded row by row.
 //!
-//! What a file may cost is known before it is unpacked: at most [`MAX_SIDE_PX`] columns and rows, and beside the pixels
-//! that are asked for one row of a PNG, or of a JPEG the file (up to [`MAX_JPEG_BYTES`]) twice and 6 bytes a pixel.
+//! The memory for a file is bounded before it is decoded: at most [`MAX_SIDE_PX`] columns and rows. Besides the pixels,
+//! a PNG needs one row; a JPEG needs twice the file (up to [`MAX_JPEG_BYTES`]) and 6 bytes per pixel.
 
 use std::fs::File;
 use std::io::{BufReader, Cursor, ErrorKind, Read, Seek};
@@ -17,16 +17,16 @@ use super::jpeg;
 use super::samples::Samples;
 use crate::files::input;
 
-/// Far more than a photograph of 8192 x 8192 pixels takes.
+/// Far more than a photograph of 8192 x 8192 pixels needs.
 const MAX_JPEG_BYTES: u64 = 96 << 20;
 
-/// The largest float map that is accepted: 4 bytes a pixel, and room for a header.
+/// Largest float map accepted: 4 bytes per pixel, and room for a header.
 const MAX_PFM_BYTES: u64 = 4 * (MAX_SIDE_PX as u64 * MAX_SIDE_PX as u64) + 4096;
 
-/// Memory that a PNG's texts and profiles may take, which are not shown.
+/// Memory limit for a PNG's texts and profiles, which are not shown.
 const MAX_METADATA_BYTES: usize = 64 << 20;
 
-/// Formats that are read.
+/// The supported formats.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Format {
     Png,
@@ -34,14 +34,14 @@ enum Format {
     Pfm,
 }
 
-/// A picture whose header has been read.
+/// A picture whose header was read.
 pub(super) enum Coded<'a> {
-    /// Unpacked straight from the disk.
+    /// Decoded straight from disk.
     Png(Box<png::Reader<BufReader<File>>>),
     Jpeg(Box<JpegDecoder<Cursor<&'a [u8]>>>),
 }
 
-/// Where a run of pixels goes: the number of its first one in the picture, row by row, and the distance to the next.
+/// The position of a run of pixels: index of the first one in row-major order, and distance to the next.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Run {
     pub(super) first: usize,
@@ -49,7 +49,7 @@ pub(super) struct Run {
 }
 
 impl<'a> Coded<'a> {
-    /// Opens a PNG or JPEG; `memory` takes the file where it has to be read as a whole.
+    /// Opens a PNG or JPEG; `memory` receives a file that must be read completely.
     pub(super) fn open(path: &Path, memory: &'a mut Vec<u8>) -> Result<Self, PictureFault> {
         let (mut file, format) = open_detected(path)?;
         let coded = match format {
@@ -58,8 +58,8 @@ impl<'a> Coded<'a> {
                 let ((width, height), _) = jpeg::header(&mut BufReader::new(&mut file))?;
                 check_size(width, height)?;
                 read_from_start(file, MAX_JPEG_BYTES, memory)?;
-                // The decoder would fill up what is missing with grey.
-                if !jpeg::is_whole(memory) {
+                // The decoder would fill missing data with grey.
+                if !jpeg::is_complete(memory) {
                     return Err(PictureFault::Truncated);
                 }
                 Self::Jpeg(Box::new(JpegDecoder::new(Cursor::new(memory.as_slice())).map_err(jpeg_fault)?))
@@ -90,16 +90,16 @@ impl<'a> Coded<'a> {
         }
     }
 
-    /// Decodes a picture of 8-bit RGB (no other samples) into `into`, a JPEG without the copy that [`Coded::runs`]
-    /// makes.
-    pub(super) fn rgb(self, memory: &mut Vec<u8>, into: &mut [u8]) -> Result<Extras, PictureFault> {
+    /// Decodes a picture of 8-bit RGB into `into`; a JPEG avoids the copy that [`Coded::decode_runs`] makes. The caller
+    /// checks that the samples are 8-bit RGB.
+    pub(super) fn decode_rgb(self, memory: &mut Vec<u8>, into: &mut [u8]) -> Result<Extras, PictureFault> {
         match self {
             Self::Jpeg(mut decoder) if decoder.color_type() == ColorType::Rgb8 => {
                 let extras = Extras::of_jpeg(&mut decoder);
                 decoder.read_image(into).map_err(jpeg_fault)?;
                 Ok(extras)
             }
-            other => other.runs(memory, |run, row| {
+            other => other.decode_runs(memory, |run, row| {
                 if run.step == 1 {
                     into[3 * run.first..][..row.len()].copy_from_slice(row);
                 } else {
@@ -110,9 +110,9 @@ impl<'a> Coded<'a> {
         }
     }
 
-    /// Decodes the picture and calls `each` for every run of pixels with its bytes, laid out as [`Samples`] say: a row
-    /// of a PNG, or a whole JPEG. `memory` is working memory.
-    pub(super) fn runs(
+    /// Decodes the picture and calls `each` for every run of pixels with its bytes, in the format of
+    /// [`Coded::samples`]: a row of a PNG, or a whole JPEG. `memory` is working memory.
+    pub(super) fn decode_runs(
         mut self,
         memory: &mut Vec<u8>,
         mut each: impl FnMut(Run, &[u8]),
@@ -127,9 +127,9 @@ impl<'a> Coded<'a> {
                     reader.read_row(memory).map_err(png_fault)?.ok_or(PictureFault::Truncated)?;
                     each(run, &memory[..pixels * bytes_per_pixel]);
                 }
-                // Reading beyond the last row has the decoder check the end of the coded data.
+                // Reading beyond the last row makes the decoder check the end of the coded data.
                 reader.read_row(memory).map_err(png_fault)?;
-                // Metadata may follow the pixels; a fault in it is no reason to refuse them.
+                // Metadata may follow the pixels; a fault in it must not reject the picture.
                 let _ = reader.finish();
                 Ok(Extras::of_png(reader.info()))
             }
@@ -144,7 +144,7 @@ impl<'a> Coded<'a> {
     }
 }
 
-/// Columns and rows, and the samples, of a PNG or JPEG. No more than its header is read.
+/// Reads width, height and samples of a PNG or JPEG from its header only.
 pub(super) fn header(path: &Path) -> Result<((u32, u32), Samples), PictureFault> {
     let (file, format) = open_detected(path)?;
     let (size, samples) = match format {
@@ -162,7 +162,7 @@ pub(super) fn header(path: &Path) -> Result<((u32, u32), Samples), PictureFault>
     Ok((size, samples))
 }
 
-/// The content of a PFM.
+/// Reads the content of a PFM file.
 pub(super) fn read_pfm<'a>(path: &Path, memory: &'a mut Vec<u8>) -> Result<&'a [u8], PictureFault> {
     match open_detected(path)? {
         (file, Some(Format::Pfm)) => read_from_start(file, MAX_PFM_BYTES, memory),
@@ -170,7 +170,7 @@ pub(super) fn read_pfm<'a>(path: &Path, memory: &'a mut Vec<u8>) -> Result<&'a [
     }
 }
 
-/// Header and metadata that a PNG has before its pixels.
+/// Reads the header of a PNG and the metadata before its pixels.
 pub(super) fn png_info(path: &Path) -> Result<png::Info<'static>, PictureFault> {
     let (file, format) = open_detected(path)?;
     if format != Some(Format::Png) {
@@ -179,8 +179,7 @@ pub(super) fn png_info(path: &Path) -> Result<png::Info<'static>, PictureFault> 
     Ok(png_decoder(file)?.read_info().map_err(png_fault)?.info().clone())
 }
 
-/// Opens a regular file and detects its format by its first bytes; `None` is one that is not read. The file is left at
-/// its start.
+/// Opens a regular file and detects its format by the first bytes; `None` if unsupported. The file is rewound.
 fn open_detected(path: &Path) -> Result<(File, Option<Format>), PictureFault> {
     let mut file = input::open(path).map_err(|error| match error.kind() {
         ErrorKind::NotFound | ErrorKind::NotADirectory => PictureFault::Missing,
@@ -226,22 +225,22 @@ pub(super) fn check_size(width: u32, height: u32) -> Result<(), PictureFault> {
 
 fn png_decoder(file: File) -> Result<png::Decoder<BufReader<File>>, PictureFault> {
     let mut decoder = png::Decoder::new_with_limits(BufReader::new(file), png::Limits { bytes: MAX_METADATA_BYTES });
-    // Palettes and fewer than 8 bits become plain samples.
+    // Expands palettes and samples of fewer than 8 bits.
     decoder.set_transformations(png::Transformations::EXPAND);
-    // Checked before memory is allocated for a row.
+    // Check the size before memory is allocated for a row.
     let (width, height) = decoder.read_header_info().map_err(png_fault)?.size();
     check_size(width, height)?;
     Ok(decoder)
 }
 
-/// Where the rows of a PNG go, in the order in which they are stored, and how many pixels each has.
+/// Returns the runs of a PNG's rows, in stored order, and the pixels of each.
 fn png_runs(width: usize, height: usize, is_interlaced: bool) -> impl Iterator<Item = (Run, usize)> {
-    /// First column, distance of columns, first row, distance of rows.
+    /// First column, column step, first row, row step.
     const WHOLE: [[usize; 4]; 1] = [[0, 1, 0, 1]];
     const ADAM7: [[usize; 4]; 7] =
         [[0, 8, 0, 8], [4, 8, 0, 8], [0, 4, 4, 8], [2, 4, 0, 4], [0, 2, 2, 4], [1, 2, 0, 2], [0, 1, 1, 2]];
     let passes: &[[usize; 4]] = if is_interlaced { &ADAM7 } else { &WHOLE };
-    // A pass without a column has no row, either.
+    // A pass without columns has no rows.
     passes.iter().filter(move |pass| pass[0] < width).flat_map(move |&[column, step, row, row_step]| {
         let pixels = (width - column).div_ceil(step);
         (row..height).step_by(row_step).map(move |row| (Run { first: row * width + column, step }, pixels))

@@ -1,4 +1,4 @@
-//! What every layout is read into: frames whose pictures are still on the disk.
+//! The common form of all layouts: frames whose pictures are still on disk.
 
 use std::collections::HashMap;
 use std::fs;
@@ -11,30 +11,30 @@ use super::fault::{LineFault, PictureFault};
 use super::{Options, Pair, Unpaired};
 use crate::optics::StereoRig;
 
-/// A layout: how it is recognised, and how it is read.
+/// A recording layout: its detection and its reader.
 pub(super) struct Layout {
-    /// For users, such as `TUM RGB-D`.
+    /// The name for users, such as `TUM RGB-D`.
     pub(super) name: &'static str,
-    /// The files by which it is recognised, for messages.
+    /// The files that identify it, for messages.
     pub(super) looked_for: &'static str,
     /// Whether the folder has this layout.
     pub(super) is_in: fn(&Path) -> bool,
-    /// Reads what lists and calibrations there are.
+    /// Reads its lists and calibrations.
     pub(super) open: fn(&Folder, &Options) -> Result<Contents, RecordingError>,
 }
 
-/// What opening a layout yields.
+/// The content of a recording.
 #[derive(Debug)]
 pub(super) struct Contents {
     pub(super) frames: Vec<Listed>,
     pub(super) depth: Option<DepthForm>,
     pub(super) pair: Option<Pair>,
-    /// How many disparities to search, from 0, where that is stated: a multiple of 16.
+    /// Number of disparities to search, from 0, if stated: a multiple of 16.
     pub(super) disparities: Option<u32>,
     pub(super) unpaired: Unpaired,
 }
 
-/// A frame as listed. The times that there are increase strictly.
+/// A frame of a list. Known times increase strictly.
 #[derive(Debug)]
 pub(super) struct Listed {
     pub(super) time_ns: Option<u64>,
@@ -43,48 +43,48 @@ pub(super) struct Listed {
     pub(super) depth: Option<Source>,
 }
 
-/// How depth is stored.
+/// The encoding of depth.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum DepthForm {
     Units(DepthUnits),
-    /// Relative inverse depth in grey pictures: black and white are the farthest and the nearest, or the other way round.
+    /// Relative inverse depth in grey pictures: black is the farthest and white the nearest, or the other way round.
     Inverse {
         white_is_far: bool,
     },
-    /// Disparities in a PFM; the rig is that of the colour pictures at their size.
+    /// Disparities in a PFM; the rig belongs to the colour pictures at their size.
     Disparity(StereoRig),
 }
 
 /// The folder of a recording.
 #[derive(Debug)]
 pub(super) struct Folder {
-    /// As it was named: for messages.
+    /// The path as given, for messages.
     pub(super) dir: PathBuf,
-    /// With every link resolved: no picture may lie outside it.
+    /// The path with all links resolved: no picture may lie outside it.
     pub(super) root: PathBuf,
 }
 
-/// A line of a list.
+/// A line of a list, for messages.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Place {
     pub(super) list: &'static str,
     pub(super) line: u32,
 }
 
-/// A picture, and where it is named.
+/// A picture, and the line that names it.
 #[derive(Clone, Debug)]
 pub(super) struct Source {
-    /// `None` if no list names it: it was found in its folder.
+    /// `None` if it was found in its folder instead of a list.
     pub(super) place: Option<Place>,
-    /// Relative to the folder of the recording. Only pictures with a `place` have a fault.
+    /// Path relative to the recording's folder. Only a picture with a `place` can have a fault.
     pub(super) file: Result<PathBuf, LineFault>,
 }
 
 impl Folder {
-    /// The path of a picture, with every link resolved.
+    /// Returns the path of a picture with all links resolved.
     pub(super) fn locate(&self, source: &Source) -> Result<PathBuf, RecordingError> {
         let path = self.root.join(source.file(&self.dir)?);
-        // A path that cannot be resolved cannot be read either, and reading says why.
+        // A path that cannot be resolved cannot be read either, and the reader reports why.
         self.within(path.canonicalize().unwrap_or(path), source)
     }
 
@@ -93,28 +93,28 @@ impl Folder {
     }
 }
 
-/// How many folders a [`Locator`] remembers.
-const MOST_FOLDERS: usize = 64;
-/// What takes longer is said to.
-const LONG: Duration = Duration::from_secs(2);
+/// Number of folders that a [`Locator`] caches.
+const MAX_FOLDERS: usize = 64;
+/// A search that takes longer is reported.
+const SLOW_LOOKUP: Duration = Duration::from_secs(2);
 
-/// Goes through the pictures of long lists: resolves their folders once, and says what takes long.
+/// Locates the pictures of long lists: caches resolved folders, and warns if it takes long.
 pub(super) struct Locator<'a> {
     folder: &'a Folder,
     resolved: HashMap<PathBuf, PathBuf>,
     began: Instant,
-    is_told: bool,
+    has_warned: bool,
 }
 
 impl<'a> Locator<'a> {
     pub(super) fn new(folder: &'a Folder) -> Self {
-        Self { folder, resolved: HashMap::new(), began: Instant::now(), is_told: false }
+        Self { folder, resolved: HashMap::new(), began: Instant::now(), has_warned: false }
     }
 
-    /// As [`Folder::locate`].
+    /// Same as [`Folder::locate`].
     pub(super) fn locate(&mut self, source: &Source) -> Result<PathBuf, RecordingError> {
-        if !self.is_told && self.began.elapsed() > LONG {
-            self.is_told = true;
+        if !self.has_warned && self.began.elapsed() > SLOW_LOOKUP {
+            self.has_warned = true;
             tracing::warn!(
                 "{}: its pictures are looked through for one to begin with; this takes long",
                 self.folder.dir.display()
@@ -122,23 +122,23 @@ impl<'a> Locator<'a> {
         }
         let path = self.folder.root.join(source.file(&self.folder.dir)?);
         let (Some(parent), Some(name)) = (path.parent(), path.file_name()) else { return self.folder.locate(source) };
-        if self.resolved.len() > MOST_FOLDERS {
+        if self.resolved.len() > MAX_FOLDERS {
             self.resolved.clear();
         }
         let resolve = || parent.canonicalize().unwrap_or_else(|_| parent.to_owned());
         let there = self.resolved.entry(parent.to_owned()).or_insert_with(resolve).join(name);
-        // The picture itself may be a link, too.
+        // The picture itself may be a link.
         if there.is_symlink() { self.folder.locate(source) } else { self.folder.within(there, source) }
     }
 }
 
 impl Source {
-    /// A picture that no list names.
+    /// Creates a source for a picture that is in no list.
     pub(super) fn found(file: PathBuf) -> Self {
         Self { place: None, file: Ok(file) }
     }
 
-    /// The file, or the fault of the line that should have named it.
+    /// Returns the file, or the fault of the line that should name it.
     pub(super) fn file(&self, dir: &Path) -> Result<&Path, RecordingError> {
         self.file.as_deref().map_err(|fault| {
             let (list, line) = self.place.map_or((dir.to_owned(), 0), |place| (dir.join(place.list), place.line));
@@ -146,7 +146,7 @@ impl Source {
         })
     }
 
-    /// The error for a picture that has `fault`, with the place where it is named.
+    /// Returns the error for a picture with `fault`, with the line that names it.
     pub(super) fn error(&self, dir: &Path, fault: PictureFault) -> RecordingError {
         let file = self.file.clone().unwrap_or_default();
         match self.place {
@@ -156,10 +156,10 @@ impl Source {
     }
 }
 
-/// Names of the PNG and JPEG files in `folder` whose stems are made of digits and `_`, in the order of their numbers.
+/// Returns the names of the PNG and JPEG files in `folder` whose stems consist of digits and `_`, in numeric order.
 ///
 /// # Errors
-/// The folder cannot be listed, or has no such file.
+/// The folder cannot be listed, or contains no such file.
 pub(super) fn numbered_pictures(folder: &Path) -> Result<Vec<String>, RecordingError> {
     let is_picture = |name: &String| {
         let (stem, extension) = name.rsplit_once('.').unwrap_or_default();
@@ -170,7 +170,7 @@ pub(super) fn numbered_pictures(folder: &Path) -> Result<Vec<String>, RecordingE
     let entries = fs::read_dir(folder).and_then(|entries| entries.map(|entry| Ok(entry?.file_name())).collect());
     let entries: Vec<_> = entries.map_err(RecordingError::io("list", folder))?;
     let mut names: Vec<_> = entries.into_iter().filter_map(|name| name.into_string().ok()).filter(is_picture).collect();
-    // Shorter names first: numbers without leading zeros are in order, too.
+    // Shorter names first, so that numbers without leading zeros are sorted correctly.
     names.sort_unstable_by(|a, b| (a.len(), a).cmp(&(b.len(), b)));
     if names.is_empty() { Err(RecordingError::EmptyFolder { folder: folder.to_owned() }) } else { Ok(names) }
 }

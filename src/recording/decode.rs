@@ -1,4 +1,4 @@
-//! From PNG and JPEG files to pixels. The format is recognised by the content.
+//! Decodes PNG and JPEG files to pixels; the content decides the format.
 
 use std::path::Path;
 
@@ -12,34 +12,34 @@ use super::samples::Samples;
 use crate::color::luminance;
 use crate::frame::{ColorImage, DepthMap, GrayImage};
 
-/// Memory for decoding that is kept from frame to frame.
+/// Working memory for decoding, kept from frame to frame.
 #[derive(Debug, Default)]
 pub struct Scratch {
-    /// Content of a file that has to be read as a whole: a JPEG or PFM.
+    /// The content of a file that must be read completely: a JPEG or PFM.
     file: Vec<u8>,
-    /// A row of a PNG, or all rows of a JPEG.
+    /// One row of a PNG, or all pixels of a JPEG.
     pixels: Vec<u8>,
-    /// A right picture before it becomes luma.
+    /// A right picture before its conversion to luma.
     right: ColorImage,
 }
 
 impl Scratch {
-    /// The content of the float map `path`.
+    /// Reads the float map `path`.
     pub(super) fn read_pfm(&mut self, path: &Path) -> Result<&[u8], PictureFault> {
         coded::read_pfm(path, &mut self.file)
     }
 }
 
-/// How depth is stored in 16-bit pictures.
+/// The encoding of depth in 16-bit pictures.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct DepthUnits {
     /// Units per metre, > 0.
     pub(super) scale: f32,
-    /// A value that means unknown, besides 0.
+    /// Another value that means unknown, besides 0.
     pub(super) invalid: Option<u16>,
 }
 
-/// What a picture is, as far as its header tells.
+/// The kind of a picture according to its header.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Kind {
     Color,
@@ -47,7 +47,7 @@ pub(super) enum Kind {
     Grey,
 }
 
-/// Columns and rows, and the kind, of the picture at `path`. No more of it is read than its header.
+/// Reads width, height and kind of a picture from its header only.
 pub(super) fn header(path: &Path) -> Result<((u32, u32), Kind), PictureFault> {
     let (size, samples) = coded::header(path)?;
     let kind = match samples {
@@ -58,8 +58,8 @@ pub(super) fn header(path: &Path) -> Result<((u32, u32), Kind), PictureFault> {
     Ok((size, kind))
 }
 
-/// Decodes to 8-bit RGB; grey is repeated, transparency ignored, 16 bits rounded to 8. With `expected`, a picture of
-/// another size is refused before it is decoded. Returns its colour profile, its EXIF, and what was lost.
+/// Decodes to 8-bit RGB: grey is repeated, transparency ignored, 16 bits are rounded to 8. With `expected`, a picture
+/// of another size is rejected before it is decoded. Returns colour profile, EXIF, and what was lost.
 pub(super) fn color(
     path: &Path,
     expected: Option<(u32, u32)>,
@@ -73,34 +73,34 @@ pub(super) fn color(
     }
     into.resize(found.0, found.1);
     if samples == (Samples { channels: 3, are_wide: false }) {
-        return coded.rgb(&mut scratch.pixels, &mut into.rgb);
+        return coded.decode_rgb(&mut scratch.pixels, &mut into.rgb);
     }
     let channels = if samples.has_color() { [0, 1, 2] } else { [0; 3] };
-    coded.runs(&mut scratch.pixels, |run, row| {
+    coded.decode_runs(&mut scratch.pixels, |run, row| {
         let pixels = into.rgb.as_chunks_mut::<3>().0[run.first..].iter_mut().step_by(run.step);
         for (rgb, pixel) in pixels.zip(row.chunks_exact(samples.bytes_per_pixel())) {
             *rgb = channels.map(|channel| match samples.are_wide {
-                true => ((u32::from(wide(pixel, channel)) * 255 + 32767) / 65535) as u8,
+                true => ((u32::from(sample_u16(pixel, channel)) * 255 + 32767) / 65535) as u8,
                 false => pixel[channel],
             });
         }
     })
 }
 
-/// The 16-bit sample of `channel`.
-fn wide(pixel: &[u8], channel: usize) -> u16 {
+/// Returns the 16-bit sample of a channel.
+fn sample_u16(pixel: &[u8], channel: usize) -> u16 {
     u16::from_be_bytes([pixel[2 * channel], pixel[2 * channel + 1]])
 }
 
-/// Decodes a right picture to luma, computed from its colour as that of the left one. A picture of another size than
-/// the `left` one is refused before it is decoded.
+/// Decodes a right picture to luma, from RGB as for the left one. A picture whose size differs from `left` is rejected
+/// before it is decoded.
 pub(super) fn right_luma(
     path: &Path,
     left: (u32, u32),
     scratch: &mut Scratch,
     into: &mut GrayImage,
 ) -> Result<(), PictureFault> {
-    // Moved out, since `color` needs the rest of the scratch memory.
+    // Moved out, as `color` needs the rest of the scratch memory.
     let mut right = std::mem::take(&mut scratch.right);
     let decoded = color(path, Some(left), scratch, &mut right);
     if decoded.is_ok() {
@@ -113,7 +113,7 @@ pub(super) fn right_luma(
     })
 }
 
-/// Decodes 16-bit grey to metres. With `color_size`, a map that does not cover such a colour picture is refused.
+/// Decodes 16-bit grey to metres. With `color_size`, a map that does not cover such a picture is rejected.
 pub(super) fn depth(
     path: &Path,
     units: DepthUnits,
@@ -136,10 +136,10 @@ pub(super) fn depth(
     }
     into.resize(found.0, found.1);
     let arch = Arch::new();
-    coded.runs(&mut scratch.pixels, |run, row| {
+    coded.decode_runs(&mut scratch.pixels, |run, row| {
         let (values, metres) = (row.as_chunks().0, &mut into.metres[run.first..]);
         if run.step == 1 {
-            arch.dispatch(InMetres { values, units, metres });
+            arch.dispatch(ConvertToMetres { values, units, metres });
         } else {
             let pixels = metres.iter_mut().step_by(run.step).zip(values);
             pixels.for_each(|(metres, value)| *metres = units.metres(*value));
@@ -149,24 +149,24 @@ pub(super) fn depth(
 }
 
 impl DepthUnits {
-    /// The distance that the bytes of a number stand for; 0 where it is none.
+    /// Converts a big-endian value to metres; 0 if it is unknown.
     #[inline(always)]
     fn metres(self, value: [u8; 2]) -> f32 {
-        // 0 is invalid anyhow.
+        // 0 is unknown in any case.
         let (value, invalid) = (u16::from_be_bytes(value), self.invalid.unwrap_or(0));
         let depth_m = f32::from(value) / self.scale;
         if (value != invalid) & DepthMap::is_known(depth_m) { depth_m } else { 0.0 }
     }
 }
 
-/// Numbers side by side, made distances.
-struct InMetres<'a> {
+/// Converts adjacent values to metres.
+struct ConvertToMetres<'a> {
     values: &'a [[u8; 2]],
     units: DepthUnits,
     metres: &'a mut [f32],
 }
 
-impl WithSimd for InMetres<'_> {
+impl WithSimd for ConvertToMetres<'_> {
     type Output = ();
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, _: S) {
@@ -177,8 +177,8 @@ impl WithSimd for InMetres<'_> {
     }
 }
 
-/// Decodes relative inverse depth, 8 or 16 bits, grey or of colours that are grey, to metres in units of the nearest. A map
-/// that does not cover a colour picture of `color` pixels is refused.
+/// Decodes relative inverse depth (8 or 16 bits, grey, or RGB with grey content) to distances relative to the nearest
+/// one. A map that does not cover a picture of `color` pixels is rejected.
 pub(super) fn inverse_depth(
     path: &Path,
     white_is_far: bool,
@@ -192,31 +192,31 @@ pub(super) fn inverse_depth(
         return Err(PictureFault::DepthSize { found, color });
     }
     into.resize(found.0, found.1);
-    grey_of(coded, &mut scratch.pixels, &mut into.metres)?;
+    decode_grey(coded, &mut scratch.pixels, &mut into.metres)?;
     for value in &mut into.metres {
         *value = DepthMap::relative_m(if white_is_far { 1.0 - *value } else { *value });
     }
     Ok(())
 }
 
-/// Decodes to columns, rows and grey values, 0 to 1 as stored (not linearised): luma for a colour picture, multiplied
-/// by the alpha if there is one.
+/// Decodes to width, height and grey values, 0 to 1 as stored (not linearised): luma for a colour picture, multiplied
+/// by alpha if there is one.
 pub(super) fn grey(path: &Path) -> Result<(u32, u32, Vec<f32>), PictureFault> {
     let mut scratch = Scratch::default();
     let coded = Coded::open(path, &mut scratch.file)?;
     let (width, height) = coded.size();
     let mut grey = vec![0.0; width as usize * height as usize];
-    grey_of(coded, &mut scratch.pixels, &mut grey)?;
+    decode_grey(coded, &mut scratch.pixels, &mut grey)?;
     Ok((width, height, grey))
 }
 
-fn grey_of(coded: Coded, pixels: &mut Vec<u8>, grey: &mut [f32]) -> Result<(), PictureFault> {
+fn decode_grey(coded: Coded, pixels: &mut Vec<u8>, grey: &mut [f32]) -> Result<(), PictureFault> {
     let samples = coded.samples();
-    coded.runs(pixels, |run, row| {
+    coded.decode_runs(pixels, |run, row| {
         let pixels = grey[run.first..].iter_mut().step_by(run.step);
         for (grey, pixel) in pixels.zip(row.chunks_exact(samples.bytes_per_pixel())) {
             let sample = |channel: usize| match samples.are_wide {
-                true => f32::from(wide(pixel, channel)) / 65535.0,
+                true => f32::from(sample_u16(pixel, channel)) / 65535.0,
                 false => f32::from(pixel[channel]) / 255.0,
             };
             let luma = match samples.has_color() {

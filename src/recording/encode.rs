@@ -1,4 +1,4 @@
-//! From pixels to PNG and JPEG.
+//! Encodes pixels as PNG and JPEG.
 
 use std::borrow::Cow;
 
@@ -11,13 +11,13 @@ use super::unit::{self, DISPARITY_SCALE, Meaning};
 use super::{jpeg, xmp};
 use crate::frame::{ColorImage, DepthMap, DisparityMap};
 
-/// High enough that the blur, not the file format, decides what is seen.
+/// High enough that compression artefacts stay invisible.
 const JPEG_QUALITY: u8 = 95;
 
-/// As small as choosing a filter for each row, in half the time (measured on 640x480 colour and depth).
+/// Compresses as well as a filter chosen per row, in half the time (measured on 640x480 colour and depth).
 const FILTER: png::Filter = png::Filter::Paeth;
 
-/// Appends `image` to `file` as PNG, with the fast compression that keeps up with a camera.
+/// Appends `image` to `file` as PNG, with a fast compression that keeps up with a camera.
 pub(super) fn color_png(image: &ColorImage, file: &mut Vec<u8>) -> Result<(), png::EncodingError> {
     photo_png(image, &Extras::default(), file)
 }
@@ -38,7 +38,7 @@ pub(super) fn photo_png(image: &ColorImage, extras: &Extras, file: &mut Vec<u8>)
     writer.finish()
 }
 
-/// Appends `image` to `file`, which is empty, as JPEG, with its colour profile, EXIF and XMP.
+/// Appends `image` to `file`, which must be empty, as JPEG, with its colour profile, EXIF and XMP.
 pub(super) fn photo_jpeg(image: &ColorImage, extras: &Extras, file: &mut Vec<u8>) -> ImageResult<()> {
     let mut encoder = JpegEncoder::new_with_quality(&mut *file, JPEG_QUALITY);
     if let Some(profile) = &extras.icc_profile {
@@ -86,7 +86,7 @@ fn png_16bit(
     file: &mut Vec<u8>,
 ) -> Result<(), png::EncodingError> {
     units.clear();
-    units.extend(values.iter().flat_map(|&value| in_units(value, scale).to_be_bytes()));
+    units.extend(values.iter().flat_map(|&value| quantize(value, scale).to_be_bytes()));
     let mut encoder = png::Encoder::new(file, width, height);
     encoder.set_color(png::ColorType::Grayscale);
     encoder.set_depth(png::BitDepth::Sixteen);
@@ -100,32 +100,32 @@ fn png_16bit(
     writer.finish()
 }
 
-/// The nearest unit, 1 to 65535, or 0 for unknown. What lies beyond the range becomes unknown rather than a wrong
-/// value; what is known and less than one unit stays known.
-fn in_units(value: f32, scale: f32) -> u16 {
+/// Quantises to the nearest unit, 1 to 65535, or 0 for unknown. A value beyond the range becomes unknown, not clamped;
+/// a known value below one unit stays known.
+fn quantize(value: f32, scale: f32) -> u16 {
     let units = (value * scale).round();
-    if DepthMap::is_known(value) && value <= largest(scale) { units.clamp(1.0, MOST_UNITS) as u16 } else { 0 }
+    if DepthMap::is_known(value) && value <= largest(scale) { units.clamp(1.0, MAX_UNITS) as u16 } else { 0 }
 }
 
-const MOST_UNITS: f32 = u16::MAX as f32;
+const MAX_UNITS: f32 = u16::MAX as f32;
 
-/// The largest value that is written at `scale` units per 1.0: one that still rounds to 65535.
+/// Returns the largest value that can be written at `scale` units per 1.0: it still rounds to 65535.
 pub(super) fn largest(scale: f32) -> f32 {
-    (MOST_UNITS + 0.499) / scale
+    (MAX_UNITS + 0.499) / scale
 }
 
 #[cfg(test)]
 mod tests {
-    use super::in_units;
+    use super::quantize;
 
     #[test]
     fn depth_is_rounded_and_what_does_not_fit_is_unknown() {
-        assert_eq!(in_units(1.0, 5000.0), 5000);
-        assert_eq!(in_units(1.00011, 5000.0), 5001);
-        assert_eq!(in_units(13.107, 5000.0), 65535);
-        assert_eq!(in_units(1e-6, 5000.0), 1);
+        assert_eq!(quantize(1.0, 5000.0), 5000);
+        assert_eq!(quantize(1.00011, 5000.0), 5001);
+        assert_eq!(quantize(13.107, 5000.0), 65535);
+        assert_eq!(quantize(1e-6, 5000.0), 1);
         for unknown in [0.0, -1.0, f32::NAN, f32::INFINITY, 13.2, 1e11, 1e-9] {
-            assert_eq!(in_units(unknown, 5000.0), 0, "{unknown} m");
+            assert_eq!(quantize(unknown, 5000.0), 0, "{unknown} m");
         }
     }
 }

@@ -1,4 +1,4 @@
-//! Metadata of picture files: what is carried over to a picture made from another, and what is lost.
+//! Metadata of picture files that is copied to derived pictures.
 
 use std::io::{BufRead, Seek};
 
@@ -8,37 +8,37 @@ use image::metadata::Orientation;
 
 use super::xmp;
 
-/// Metadata of a picture, and what was lost when it was read.
+/// Metadata of a picture, and what was lost on reading.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Extras {
-    /// ICC profile of its RGB values; `None` means sRGB.
+    /// ICC profile of its RGB values; `None` is sRGB.
     pub icc_profile: Option<Vec<u8>>,
-    /// EXIF, from its TIFF header on.
+    /// EXIF data, beginning with the TIFF header.
     pub exif: Option<Vec<u8>>,
-    /// XMP packet, which holds rights and authors.
+    /// XMP packet, with rights and authors.
     pub xmp: Option<String>,
-    /// What the file had and 8-bit RGB cannot hold, in words.
+    /// What 8-bit RGB cannot hold, in words for a message.
     pub left_behind: Vec<&'static str>,
 }
 
-/// Most bytes of EXIF that a JPEG holds: a segment has 65533, six of which are its identifier.
-const MOST_JPEG_EXIF_BYTES: usize = 65_533 - 6;
-/// Most bytes of a profile that a JPEG holds: 255 segments, each less 14 bytes that number it.
-const MOST_JPEG_ICC_BYTES: usize = 255 * (65_533 - 14);
+/// Maximum EXIF bytes in a JPEG: a segment has 65533, six of which are its identifier.
+const MAX_JPEG_EXIF_BYTES: usize = 65_533 - 6;
+/// Maximum profile bytes in a JPEG: 255 segments, less 14 bytes of numbering each.
+const MAX_JPEG_ICC_BYTES: usize = 255 * (65_533 - 14);
 
 impl Extras {
-    /// The metadata of a PNG as it is stored, before its palette is expanded.
+    /// Reads the metadata of a PNG as stored, before its palette is expanded.
     pub(super) fn of_png(info: &png::Info) -> Self {
         let exif = info.exif_metadata.as_deref().map(<[u8]>::to_vec);
         let mut extras = Self { exif, ..Self::default() };
-        extras.take_profile(info.icc_profile.as_deref().map(<[u8]>::to_vec));
+        extras.set_profile(info.icc_profile.as_deref().map(<[u8]>::to_vec));
         if let Some(chunk) = info.utf8_text.iter().find(|chunk| chunk.keyword == xmp::PNG_KEYWORD) {
             let mut chunk = chunk.clone();
-            // Of what is compressed, no more is unpacked than makes sense.
-            let packet = chunk.decompress_text_with_limit(xmp::MOST_BYTES).and_then(|()| chunk.get_text());
-            extras.take_xmp(packet.map(String::into_bytes).map_err(|_| "XMP that is damaged"));
+            // Limit decompression to a sensible size.
+            let packet = chunk.decompress_text_with_limit(xmp::MAX_BYTES).and_then(|()| chunk.get_text());
+            extras.set_xmp(packet.map(String::into_bytes).map_err(|_| "XMP that is damaged"));
         }
-        // Transparency is a channel of its own (2 or 4 samples), or else in a tRNS chunk.
+        // Transparency is either a channel (2 or 4 samples) or a tRNS chunk.
         let alpha_is_in_trns = info.color_type == png::ColorType::Indexed || info.trns.is_some();
         if info.trns.is_some() || (!alpha_is_in_trns && info.color_type.samples().is_multiple_of(2)) {
             extras.left_behind.push("transparency");
@@ -50,19 +50,19 @@ impl Extras {
     }
 
     pub(super) fn of_jpeg<R: BufRead + Seek>(decoder: &mut JpegDecoder<R>) -> Self {
-        // Metadata that cannot be read is no reason to refuse the pixels.
+        // Unreadable metadata must not reject the picture.
         let exif = decoder.exif_metadata().ok().flatten();
         let mut extras = Self { exif, ..Self::default() };
-        extras.take_profile(decoder.icc_profile().ok().flatten());
+        extras.set_profile(decoder.icc_profile().ok().flatten());
         if let Some(packet) = decoder.xmp_metadata().ok().flatten() {
-            extras.take_xmp(Ok(packet));
+            extras.set_xmp(Ok(packet));
         }
         extras
     }
 
-    /// Keeps a profile only if it is for RGB: the pixels become RGB, so one for grey or CMYK does not apply any more.
-    fn take_profile(&mut self, profile: Option<Vec<u8>>) {
-        /// Where an ICC profile states its colour space.
+    /// Keeps a profile only if it is for RGB: the pixels become RGB, so a grey or CMYK profile no longer applies.
+    fn set_profile(&mut self, profile: Option<Vec<u8>>) {
+        /// Position of the colour space in an ICC profile.
         const SPACE: std::ops::Range<usize> = 16..20;
         match profile {
             Some(profile) if profile.get(SPACE) != Some(b"RGB ") => {
@@ -72,8 +72,8 @@ impl Extras {
         }
     }
 
-    /// Keeps what of a packet still holds.
-    fn take_xmp(&mut self, packet: Result<Vec<u8>, &'static str>) {
+    /// Keeps the parts of a packet that are still valid.
+    fn set_xmp(&mut self, packet: Result<Vec<u8>, &'static str>) {
         self.left_behind.extend(packet.iter().flat_map(|packet| xmp::lost(packet)));
         match packet.and_then(xmp::kept) {
             Ok(packet) => self.xmp = Some(packet),
@@ -81,17 +81,17 @@ impl Extras {
         }
     }
 
-    /// How to turn the picture upright. Removes that from the EXIF: the caller turns the pixels.
+    /// Returns the orientation and removes it from the EXIF: the caller rotates the pixels.
     pub(super) fn take_orientation(&mut self) -> Orientation {
         let turned = self.exif.as_deref_mut().and_then(Orientation::remove_from_exif_chunk);
         turned.unwrap_or(Orientation::NoTransforms)
     }
 
-    /// Removes the thumbnail from the EXIF, which would still show the picture before its pixels were changed.
+    /// Removes the EXIF thumbnail, which would still show the original picture.
     #[must_use]
     pub fn without_thumbnail(mut self) -> Self {
         if let Some(exif) = &mut self.exif {
-            // A thumbnail may be hidden in damaged EXIF: all of it is dropped.
+            // Damaged EXIF may hide a thumbnail: drop all of it.
             if remove_thumbnail(exif).is_none() {
                 self.exif = None;
                 self.left_behind.push("EXIF that is damaged");
@@ -100,18 +100,18 @@ impl Extras {
         self
     }
 
-    /// Drops what is too large for a JPEG.
+    /// Drops metadata that is too large for a JPEG.
     #[must_use]
     pub fn for_jpeg(mut self) -> Self {
-        if self.exif.as_ref().is_some_and(|exif| exif.len() > MOST_JPEG_EXIF_BYTES) {
+        if self.exif.as_ref().is_some_and(|exif| exif.len() > MAX_JPEG_EXIF_BYTES) {
             self.exif = None;
             self.left_behind.push("EXIF larger than a JPEG holds");
         }
-        if self.icc_profile.as_ref().is_some_and(|profile| profile.len() > MOST_JPEG_ICC_BYTES) {
+        if self.icc_profile.as_ref().is_some_and(|profile| profile.len() > MAX_JPEG_ICC_BYTES) {
             self.icc_profile = None;
             self.left_behind.push("a colour profile larger than a JPEG holds");
         }
-        if self.xmp.as_ref().is_some_and(|packet| packet.len() > xmp::MOST_JPEG_BYTES) {
+        if self.xmp.as_ref().is_some_and(|packet| packet.len() > xmp::MAX_JPEG_BYTES) {
             self.xmp = None;
             self.left_behind.push("XMP larger than a JPEG holds");
         }
@@ -119,11 +119,10 @@ impl Extras {
     }
 }
 
-/// Cuts the thumbnail's directory (IFD1) off the chain of EXIF directories, and overwrites the thumbnail with zeros.
-/// `None` if an offset points outside.
+/// Unlinks the thumbnail's directory (IFD1) from the chain of EXIF directories, and overwrites the thumbnail with
+/// zeros. Returns `None` if an offset points outside.
 ///
-/// A directory is a count (2 bytes), entries of 12 bytes (the tag first, the value at byte 8), and the next one's
-/// offset.
+/// A directory is a count (2 bytes), entries of 12 bytes (tag first, value at byte 8), and the offset of the next one.
 fn remove_thumbnail(exif: &mut [u8]) -> Option<()> {
     const THUMBNAIL_OFFSET: u16 = 0x0201;
     const THUMBNAIL_LENGTH: u16 = 0x0202;
@@ -142,7 +141,7 @@ fn remove_thumbnail(exif: &mut [u8]) -> Option<()> {
     };
     let first = u32_at(exif, 4)?;
     let next_link = first + 2 + 12 * usize::from(u16_at(exif, first)?);
-    // A single directory may lack the offset of a next one.
+    // A single directory may lack the offset of the next one.
     let Some(second) = u32_at(exif, next_link).filter(|&second| second != 0) else { return Some(()) };
     let entries = usize::from(u16_at(exif, second)?);
     let value = |exif: &[u8], tag: u16| {

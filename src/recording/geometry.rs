@@ -1,4 +1,4 @@
-//! The geometry of a rectified pair, whatever form its `calib.txt` has.
+//! The geometry of a rectified pair, whatever the format of its `calib.txt`.
 
 use std::path::Path;
 
@@ -7,7 +7,7 @@ use super::fault::GeometryFault;
 use crate::files::input;
 use crate::optics::StereoRig;
 
-/// Relative difference of the two focal lengths that is taken for rounding.
+/// Relative difference of the focal lengths that counts as rounding.
 const FOCAL_TOLERANCE: f64 = 1e-3;
 
 /// The geometry of a rectified pair.
@@ -15,31 +15,34 @@ const FOCAL_TOLERANCE: f64 = 1e-3;
 pub struct Geometry {
     /// Focal length, baseline and difference of the principal points.
     pub rig: StereoRig,
-    /// Columns and rows of the pictures that it is for, where that is stated.
+    /// Width and height of the pictures that it is for, if stated.
     pub size: Option<(u32, u32)>,
-    /// How many disparities to search, from 0, where that is stated: a multiple of 16.
+    /// Number of disparities to search, from 0, if stated: a multiple of 16.
     pub disparities: Option<u32>,
 }
 
-/// What is wrong, and in which line, from 1, if it is in one.
-pub(super) type Wrong = (Option<u32>, GeometryFault);
+/// A fault, and its line from 1 if it is in a single one.
+pub(super) type GeometryError = (Option<u32>, GeometryFault);
 
 impl Geometry {
     /// Reads a calibration file in the format of `parse`.
-    pub(super) fn read_as(file: &Path, parse: impl Fn(&str) -> Result<Self, Wrong>) -> Result<Self, RecordingError> {
+    pub(super) fn read_as(
+        file: &Path,
+        parse: impl Fn(&str) -> Result<Self, GeometryError>,
+    ) -> Result<Self, RecordingError> {
         let text = input::read_text(file, input::MOST_CALIBRATION_BYTES)
             .map_err(RecordingError::io("read the calibration", file))?;
         parse(&text).map_err(|(line, fault)| RecordingError::Geometry { file: file.to_owned(), line, fault })
     }
 
-    /// The geometry scaled to pictures of `size`, larger or smaller. `file` is where it is from, for the message.
+    /// Scales the geometry to pictures of `size`. `file` is its source, for the message.
     ///
     /// # Errors
-    /// They are of another aspect.
+    /// The pictures have another aspect ratio.
     pub fn fitted(mut self, file: &Path, size: (u32, u32)) -> Result<Self, RecordingError> {
         let Some(of) = self.size.filter(|&of| of != size) else { return Ok(self) };
         let [width, height, of_width, of_height] = [size.0, size.1, of.0, of.1].map(u64::from);
-        // Cross-multiplied aspect ratios, equal within a pixel.
+        // Compare the aspect ratios by cross-multiplication, with a tolerance of one pixel.
         if (width * of_height).abs_diff(height * of_width) > of_width.max(of_height).max(width).max(height) {
             let fault = GeometryFault::Size { of, pictures: size };
             return Err(RecordingError::Geometry { file: file.to_owned(), line: None, fault });
@@ -53,8 +56,8 @@ impl Geometry {
     }
 }
 
-/// A rectified rig of two focal lengths (left, right) and `doffs_px`, the column of the right principal point less that
-/// of the left one. Fails if the focal lengths differ or the baseline is not > 0.
+/// Creates a rectified rig from two focal lengths (left, right), the baseline, and `doffs_px`, the column of the right
+/// principal point minus that of the left one. Fails if the focal lengths differ or the baseline is not > 0.
 pub(super) fn rig(focal_px: [f64; 2], doffs_px: f64, baseline_m: f64) -> Result<StereoRig, GeometryFault> {
     let [left_px, right_px] = focal_px;
     if (left_px - right_px).abs() > FOCAL_TOLERANCE * left_px {
@@ -69,8 +72,8 @@ pub(super) fn rig(focal_px: [f64; 2], doffs_px: f64, baseline_m: f64) -> Result<
     if rig.baseline_m > 0.0 { Ok(rig) } else { Err(GeometryFault::NoBaseline) }
 }
 
-/// The `N` numbers in `text`, separated by white space, brackets, commas and semicolons. `None` if their count is
-/// another, or one is not a finite number.
+/// Parses `N` numbers separated by white space, brackets, commas and semicolons. Returns `None` if there are more or
+/// fewer, or one is not finite.
 pub(super) fn numbers<const N: usize>(text: &str) -> Option<[f64; N]> {
     let is_separator = |c: char| c.is_whitespace() || matches!(c, '[' | ']' | ';' | ',');
     let words = text.split(is_separator).filter(|word| !word.is_empty());
@@ -90,7 +93,7 @@ mod tests {
         let fitted = |geometry: Geometry, size| geometry.fitted(Path::new("calib.txt"), size);
         let half = fitted(full, (1000, 500)).unwrap();
         assert_eq!((half.rig.focal_px, half.rig.doffs_px, half.disparities), (500.0, 15.0, Some(48)));
-        // The same point: half the disparity, the same distance.
+        // The same point: half the disparity, equal distance.
         assert_eq!(half.rig.depth_m(20.0), full.rig.depth_m(40.0));
         assert_eq!(fitted(full, (2000, 1001)).unwrap(), full);
         let refused = fitted(full, (1000, 700)).unwrap_err().to_string();

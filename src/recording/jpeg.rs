@@ -1,18 +1,18 @@
-//! The markers of a JPEG.
+//! Parses the markers of a JPEG file.
 
 use std::io::{BufReader, ErrorKind, Read, Seek};
 
 use super::fault::PictureFault;
 use super::samples::Samples;
 
-/// Segments that a file may have before its frame; cameras write some tens.
+/// Maximum number of segments before the frame header; cameras write some tens.
 const MAX_SEGMENTS: usize = 1000;
 
-/// Bytes outside of segments that are passed over before the frame.
+/// Maximum number of bytes outside segments that are skipped before the frame header.
 const MAX_STRAY_BYTES: usize = 1 << 16;
 
-/// Reads size (columns, rows) and samples from the frame header (SOF segment) of a JPEG; no pixel is decoded. `file` is
-/// at its start.
+/// Reads size (columns, rows) and samples from the frame header (SOF segment) of a JPEG without decoding pixels. `file`
+/// must be at its start.
 pub(super) fn header(file: &mut BufReader<impl Read + Seek>) -> Result<((u32, u32), Samples), PictureFault> {
     fn read<const N: usize>(file: &mut impl Read) -> Result<[u8; N], PictureFault> {
         let mut bytes = [0; N];
@@ -26,7 +26,7 @@ pub(super) fn header(file: &mut BufReader<impl Read + Seek>) -> Result<((u32, u3
     let [mut prefix, mut code] = read(file)?;
     let mut stray_bytes = 0;
     for _ in 0..MAX_SEGMENTS {
-        // Any FF may pad a marker; other bytes between segments are passed over.
+        // Any FF may pad a marker; skip other bytes between segments.
         while prefix != 0xFF || matches!(code, 0 | 0xFF) {
             (prefix, [code]) = (code, read(file)?);
             stray_bytes += 1;
@@ -35,7 +35,7 @@ pub(super) fn header(file: &mut BufReader<impl Read + Seek>) -> Result<((u32, u3
             }
         }
         match code {
-            // TEM, RSTn and SOI are markers alone, without a segment.
+            // TEM, RSTn and SOI have no segment.
             0x01 | 0xD0..=0xD8 => {}
             // SOFn; DHT, JPG and DAC lie in the same range. Length and precision come before the size.
             0xC0..=0xCF if !matches!(code, 0xC4 | 0xC8 | 0xCC) => {
@@ -48,7 +48,7 @@ pub(super) fn header(file: &mut BufReader<impl Read + Seek>) -> Result<((u32, u3
             // EOI or SOS.
             0xD9 | 0xDA => return Err(PictureFault::Damaged("no frame before its data".into())),
             _ => {
-                // The length counts its own two bytes.
+                // The length includes its own two bytes.
                 let length = i64::from(u16::from_be_bytes(read(file)?));
                 file.seek_relative((length - 2).max(0))?;
             }
@@ -58,10 +58,11 @@ pub(super) fn header(file: &mut BufReader<impl Read + Seek>) -> Result<((u32, u3
     Err(PictureFault::Damaged(format!("more than {MAX_SEGMENTS} segments before its frame")))
 }
 
-/// Puts an application segment (APPn) of this content, of at most 65533 bytes, behind those that a whole JPEG begins with.
+/// Inserts an application segment (APPn) with up to 65533 bytes of `content` after those at the start of a complete
+/// JPEG.
 pub(super) fn insert_application_segment(file: &mut Vec<u8>, number: u8, content: &[u8]) {
     let mut at = 2;
-    // The file has to begin with JFIF, and EXIF comes before all else.
+    // The file must begin with JFIF, and EXIF precedes all other segments.
     while let Some(&[0xFF, 0xE0 | 0xE1, high, low]) = file.get(at..).and_then(<[u8]>::first_chunk) {
         at += 2 + usize::from(u16::from_be_bytes([high, low]));
     }
@@ -70,8 +71,8 @@ pub(super) fn insert_application_segment(file: &mut Vec<u8>, number: u8, content
     file.splice(at..at, [0xFF, 0xE0 | number, high, low].into_iter().chain(content.iter().copied()));
 }
 
-/// Whether following the segments of a JPEG leads to its end marker (EOI), which a file that was cut short lacks.
-pub(super) fn is_whole(bytes: &[u8]) -> bool {
+/// Returns whether the segments lead to the end marker (EOI), which a truncated file lacks.
+pub(super) fn is_complete(bytes: &[u8]) -> bool {
     const START: u8 = 0xD8;
     const END: u8 = 0xD9;
     let mut rest = bytes;
@@ -85,7 +86,7 @@ pub(super) fn is_whole(bytes: &[u8]) -> bool {
         rest = match marker {
             END => return true,
             START | 0x01 => after,
-            // Skipped by its length: its content may look like markers.
+            // Skip a segment by its length, as its content may look like markers.
             _ => {
                 let Some(&[high, low]) = after.first_chunk() else { return false };
                 let Some(next) = after.get(usize::from(u16::from_be_bytes([high, low]))..) else { return false };

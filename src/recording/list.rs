@@ -1,4 +1,4 @@
-//! Lists of pictures and their times: text files with one entry a line.
+//! Lists of pictures and their times: text files with one entry per line.
 
 use std::ops::RangeInclusive;
 use std::path::{Component, Path, PathBuf};
@@ -6,25 +6,26 @@ use std::path::{Component, Path, PathBuf};
 use super::contents::{Place, Source};
 use super::error::RecordingError;
 use super::fault::LineFault;
-use super::timeline::MOST_LENGTH_NS;
+use super::timeline::MAX_LENGTH_NS;
 use crate::files::input;
 
-/// Most lines of a list: nine hours at 30 frames per second.
-const MOST_ENTRIES: usize = 1_000_000;
+/// Maximum number of lines: nine hours at 30 frames per second.
+const MAX_ENTRIES: usize = 1_000_000;
 
-/// Faulty text is quoted in messages up to this length.
+/// Maximum number of characters that messages quote of faulty text.
 const QUOTED_CHARS: usize = 40;
 
 /// A picture and its time.
 #[derive(Debug)]
 pub(super) struct Entry {
-    /// Nanoseconds; `None` if no usable time is known. If a line states a wrong one, `source` has the fault.
+    /// In nanoseconds; `None` if unknown or invalid. If a line states an invalid one, `source` has the fault.
     pub(super) time_ns: Option<u64>,
     pub(super) source: Source,
 }
 
 impl Entry {
-    /// The entry of a line. A fault of its time takes the place of the file, since reading the file is what reports it.
+    /// Creates the entry of a line. A fault of the time replaces the file, because it is reported when the file is
+    /// read.
     pub(super) fn new(place: Place, time_ns: Result<u64, LineFault>, file: Result<PathBuf, LineFault>) -> Self {
         match time_ns {
             Ok(time_ns) => Self { time_ns: Some(time_ns), source: Source { place: Some(place), file } },
@@ -33,26 +34,26 @@ impl Entry {
     }
 }
 
-/// Reads the list `list` in `dir`; `parse` turns the place and text of a line into an entry.
+/// Reads the list `list` in `dir`; `parse` converts the place and text of a line to an entry.
 ///
 /// # Errors
-/// It cannot be read, has no line, or has more than [`MOST_ENTRIES`].
+/// The list is unreadable, empty, or has more than [`MAX_ENTRIES`] lines.
 pub(super) fn read<T>(
     dir: &Path,
     list: &'static str,
     parse: impl Fn(Place, Result<&str, LineFault>) -> T,
 ) -> Result<Vec<T>, RecordingError> {
     let path = dir.join(list);
-    let bytes = input::read(&path, input::MOST_TEXT_BYTES).map_err(RecordingError::io("read the list", &path))?;
-    // Counted before parsing: an entry takes far more memory than its line.
-    if lines(&bytes).nth(MOST_ENTRIES).is_some() {
-        return Err(RecordingError::LongList { list: path, most: MOST_ENTRIES });
+    let bytes = input::read(&path, input::MAX_TEXT_BYTES).map_err(RecordingError::io("read the list", &path))?;
+    // Count before parsing: an entry takes far more memory than its line.
+    if lines(&bytes).nth(MAX_ENTRIES).is_some() {
+        return Err(RecordingError::LongList { list: path, most: MAX_ENTRIES });
     }
     let entries: Vec<T> = lines(&bytes).map(|(line, text)| parse(Place { list, line }, text)).collect();
     if entries.is_empty() { Err(RecordingError::EmptyList { list: path }) } else { Ok(entries) }
 }
 
-/// Refuses the first faulty entry.
+/// Returns the first faulty entry as an error.
 pub(super) fn refuse_faults<'a>(
     dir: &Path,
     mut entries: impl Iterator<Item = &'a Entry>,
@@ -60,8 +61,8 @@ pub(super) fn refuse_faults<'a>(
     entries.try_for_each(|entry| entry.source.file(dir).map(|_| ()))
 }
 
-/// Clears the times that break the increasing order or lie more than ten years from most others, and marks their
-/// entries as faulty. As few as possible are cleared: one wrong time far ahead does not cost all that follow it, and of
+/// Clears the times that violate the increasing order or lie more than ten years from most others, and marks their
+/// entries as faulty. Clears as few as possible: one wrong time far ahead does not invalidate all that follow, and of
 /// equal times the first is kept.
 pub(super) fn clear_unordered_times<'a>(entries: impl Iterator<Item = &'a mut Entry>) {
     let entries: Vec<_> = entries.filter(|entry| entry.time_ns.is_some()).collect();
@@ -77,25 +78,26 @@ pub(super) fn clear_unordered_times<'a>(entries: impl Iterator<Item = &'a mut En
         match &entry.source.file {
             _ if !is_kept => entry.source.file = Err(LineFault::OutOfOrder),
             Ok(_) => entry.source.file = Err(LineFault::TooFar),
-            // A fault that is known already says more.
+            // An existing fault is more informative.
             Err(_) => {}
         }
     }
 }
 
-/// The range of [`MOST_LENGTH_NS`] that holds the most of some increasing times; of equally good ones the first.
+/// Returns the range of length [`MAX_LENGTH_NS`] with the most of some increasing times; the first of several.
 fn busiest_range(times: &[u64]) -> RangeInclusive<u64> {
-    let range_from = |&first_ns: &u64| first_ns..=first_ns.saturating_add(MOST_LENGTH_NS);
+    let range_from = |&first_ns: &u64| first_ns..=first_ns.saturating_add(MAX_LENGTH_NS);
     let count = |range: &RangeInclusive<u64>| {
         times.partition_point(|time| time <= range.end()) - times.partition_point(|time| time < range.start())
     };
-    // `max_by_key` takes the last of equal ones.
+    // `max_by_key` returns the last of equal elements, so iterate in reverse.
     times.iter().map(range_from).rev().max_by_key(count).unwrap_or(0..=0)
 }
 
 /// Marks a longest strictly increasing subsequence (patience sorting, from the end).
 fn longest_increasing(times: &[u64]) -> Vec<bool> {
-    // heads[k]: of all increasing runs of k + 1 elements found so far, the first element of the one that starts latest.
+    // heads[k]: among the increasing runs of k + 1 elements found so far, the first element of the run that starts
+    // latest.
     let mut heads: Vec<usize> = Vec::new();
     let mut next = vec![None; times.len()];
     for (index, &time) in times.iter().enumerate().rev() {
@@ -115,9 +117,9 @@ fn longest_increasing(times: &[u64]) -> Vec<bool> {
     is_kept
 }
 
-/// Numbers, from 1, and texts of the lines that are neither blank nor comments.
+/// Returns number (from 1) and text of the lines that are neither blank nor comments.
 pub(super) fn lines(bytes: &[u8]) -> impl Iterator<Item = (u32, Result<&str, LineFault>)> {
-    // Some editors begin UTF-8 with a byte order mark.
+    // Some editors write a byte order mark.
     let bytes = bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes);
     let lines = (1..).zip(bytes.split(|&byte| byte == b'\n').map(<[u8]>::trim_ascii));
     lines
@@ -125,7 +127,7 @@ pub(super) fn lines(bytes: &[u8]) -> impl Iterator<Item = (u32, Result<&str, Lin
         .map(|(line, text)| (line, str::from_utf8(text).map_err(|_| LineFault::NotUtf8)))
 }
 
-/// The path of a file name that stays in its folder, as far as its text tells: links are resolved when it is opened.
+/// Checks that a file name stays within its folder, by its text only: links are resolved when it is opened.
 pub(super) fn inside(file: &str) -> Result<PathBuf, LineFault> {
     if file.contains(char::is_control) {
         return Err(LineFault::FileName(quoted(file)));
@@ -159,10 +161,10 @@ mod tests {
     #[test]
     fn a_date_of_another_age_costs_only_itself() {
         assert_eq!(busiest_range(&[]), 0..=0);
-        assert_eq!(busiest_range(&[7, 8]), 7..=7 + MOST_LENGTH_NS);
-        let now_ns = 5 * MOST_LENGTH_NS;
-        assert_eq!(busiest_range(&[0, now_ns, now_ns + 9, u64::MAX]), now_ns..=now_ns + MOST_LENGTH_NS);
-        assert_eq!(busiest_range(&[0, u64::MAX]), 0..=MOST_LENGTH_NS);
+        assert_eq!(busiest_range(&[7, 8]), 7..=7 + MAX_LENGTH_NS);
+        let now_ns = 5 * MAX_LENGTH_NS;
+        assert_eq!(busiest_range(&[0, now_ns, now_ns + 9, u64::MAX]), now_ns..=now_ns + MAX_LENGTH_NS);
+        assert_eq!(busiest_range(&[0, u64::MAX]), 0..=MAX_LENGTH_NS);
     }
 
     #[test]

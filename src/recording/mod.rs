@@ -1,7 +1,7 @@
-//! Recordings on disk, read and written frame by frame; and single pictures ([`still`], [`snapshot`]).
+//! Recordings on disk, read and written frame by frame, and single pictures ([`still`], [`snapshot`]).
 //!
-//! A [`Recording`] is opened by its folder, and its layout is recognised by its content. [`tum`] is the layout that
-//! is read and written; `kitti`, `euroc` and `middlebury` are read, and have two eyes.
+//! A [`Recording`] is opened by its folder; the content decides its layout. [`tum`] can be read and written; `kitti`,
+//! `euroc` and `middlebury` can be read, and are stereo.
 
 pub mod geometry;
 pub mod snapshot;
@@ -41,44 +41,44 @@ use crate::frame::{ColorImage, DepthMap, GrayImage};
 use crate::optics::StereoRig;
 use contents::{DepthForm, Folder, Layout, Locator, Source};
 
-/// The layouts that are read, in the order in which they are looked for.
+/// The supported layouts, in order of detection.
 const LAYOUTS: [Layout; 4] = [tum::LAYOUT, euroc::LAYOUT, kitti::LAYOUT, middlebury::LAYOUT];
 
-/// Pictures with more columns or rows are refused by their header, before memory is allocated. Reading the largest
-/// takes at most four times the 192 MiB of its RGB.
+/// Maximum width and height; larger pictures are rejected by their header, before memory is allocated. Reading the
+/// largest takes at most four times the 192 MiB of its RGB.
 const MAX_SIDE_PX: u32 = 8192;
 
-/// What the numbers of depth pictures are.
+/// The meaning of the values in depth pictures.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum DepthUnit {
     /// Distances, in 16 bits.
     #[default]
     Metres,
-    /// Relative inverse depth, in grey pictures of any kind, from 0 to the largest number they can have.
+    /// Relative inverse depth, in grey pictures of any kind, from 0 to the largest value.
     Inverse {
         /// Whether white is the farthest instead of the nearest.
         white_is_far: bool,
     },
 }
 
-/// How to read a recording.
+/// Options for reading a recording.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Options {
     /// Units of the depth pictures per metre, > 0.
     pub depth_scale: f32,
-    /// What the numbers of depth pictures are.
+    /// The meaning of the values in depth pictures.
     pub depth_unit: DepthUnit,
     /// A depth value that means unknown; 0 always does.
     pub depth_invalid: Option<u16>,
-    /// Largest difference in time between a colour picture and its depth map or right picture, in nanoseconds.
+    /// Largest time difference between a colour picture and its depth map or right picture, in nanoseconds.
     pub pair_tolerance_ns: u64,
-    /// Whether faulty lines of the lists become frames that fail to read, and so do right pictures that are missing.
-    /// Otherwise the first one fails [`Recording::open`].
+    /// Whether faulty lines of lists and missing right pictures become frames that fail to read. Otherwise the first
+    /// one fails [`Recording::open`].
     pub keep_going: bool,
 }
 
 impl Default for Options {
-    /// As in the TUM benchmark: 5000 units per metre, pairs within 20 ms. Faulty lists are refused.
+    /// Values of the TUM benchmark: 5000 units per metre, pairs within 20 ms. Faulty lists are rejected.
     fn default() -> Self {
         Self {
             depth_scale: tum::DEPTH_SCALE,
@@ -90,33 +90,33 @@ impl Default for Options {
     }
 }
 
-/// Listed pictures that belong to no frame, since no partner is near enough in time.
+/// Counts of listed pictures that belong to no frame, because no counterpart is near enough in time.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Unpaired {
     /// Colour pictures.
     pub color: usize,
     /// Depth maps.
     pub depth: usize,
-    /// Pictures of the right eye.
+    /// Pictures of the right camera.
     pub right: usize,
 }
 
-/// Stereo geometry of a recording.
+/// The stereo geometry of a recording.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Pair {
-    /// The pictures are rectified, and this is their geometry.
+    /// The pictures are rectified, with this geometry.
     Rectified(StereoRig),
-    /// The pictures are as the cameras took them; with this they can be rectified.
+    /// The pictures are not rectified; this calibration allows it.
     Raw(Box<StereoCalibration>),
     /// The recording has no calibration.
     Unstated,
 }
 
-/// An opened recording: its lists are in memory (some 300 bytes a frame), its pictures are read one by one when asked
-/// for, into memory that the caller keeps.
+/// An opened recording: its lists are in memory (about 300 bytes per frame), its pictures are read on request, into
+/// memory of the caller.
 ///
-/// Where there is depth, the frames are the pairs of a colour picture and a depth map, and where there are two eyes
-/// those of a left and a right picture; [`Recording::unpaired`] counts what is left over.
+/// With depth, a frame is a pair of a colour picture and a depth map; with two cameras, of a left and a right picture.
+/// [`Recording::unpaired`] counts the pictures without counterpart.
 #[derive(Debug)]
 pub struct Recording {
     layout: &'static str,
@@ -130,7 +130,7 @@ pub struct Recording {
     unpaired: Unpaired,
 }
 
-/// A frame whose pictures are still on the disk.
+/// A frame whose pictures are on disk.
 #[derive(Debug)]
 struct Frame {
     time_ns: u64,
@@ -140,12 +140,12 @@ struct Frame {
 }
 
 impl Recording {
-    /// Opens the recording in the folder `dir`. Reads its lists, and of its pictures the headers it needs.
+    /// Opens the recording in the folder `dir`. Reads its lists, and the headers of pictures where needed.
     ///
     /// # Errors
-    /// The folder is no recording, or a list is missing or empty; no depth map or right picture pairs with a colour
-    /// picture; the calibration is faulty; the depth scale is not a number > 0; no colour picture can be read (the
-    /// fault of the first is given). Without `keep_going`, any faulty line of a list, and a missing right picture.
+    /// The folder is not a recording, or a list is missing or empty; no depth map or right picture pairs with a colour
+    /// picture; the calibration is faulty; the depth scale is not a number > 0; no colour picture is readable (reports
+    /// the first). Without `keep_going` also any faulty line of a list, and a missing right picture.
     pub fn open(dir: &Path, options: &Options) -> Result<Self, RecordingError> {
         check_depth_scale(options.depth_scale)?;
         let root = dir.canonicalize().map_err(RecordingError::io("open the recording", dir))?;
@@ -173,28 +173,28 @@ impl Recording {
         })
     }
 
-    /// The name of the layout, such as `TUM RGB-D`.
+    /// Returns the name of the layout, such as `TUM RGB-D`.
     pub fn layout(&self) -> &'static str {
         self.layout
     }
 
-    /// Number of frames, those that will fail to read included.
+    /// Returns the number of frames, including those that will fail to read.
     pub fn len(&self) -> usize {
         self.frames.len()
     }
 
-    /// Whether there is no frame. Never so for an opened recording.
+    /// Returns whether there are no frames; never true for an opened recording.
     pub fn is_empty(&self) -> bool {
         self.frames.is_empty()
     }
 
-    /// Columns and rows of the colour pictures, in pixels: those of the first one with a readable header.
+    /// Returns width and height of the colour pictures: those of the first one with a readable header.
     pub fn size(&self) -> (u32, u32) {
         self.size
     }
 
-    /// Time of frame `index` in nanoseconds after the first frame; strictly increasing. A frame whose own time cannot
-    /// be used has one between its neighbours'.
+    /// Returns the time of frame `index` in nanoseconds after the first frame; strictly increasing. A frame without a
+    /// usable time gets one between its neighbours'.
     ///
     /// # Panics
     /// `index` is not below [`Recording::len`].
@@ -202,37 +202,37 @@ impl Recording {
         self.frames[index].time_ns
     }
 
-    /// Median distance between frames in nanoseconds, > 0; that of 30 frames per second if there is only one.
+    /// Returns the median frame period in nanoseconds, > 0; that of 30 frames per second if there is only one frame.
     pub fn period_ns(&self) -> u64 {
         self.period_ns
     }
 
-    /// Whether its depth is only relative.
+    /// Returns whether its depth is only relative.
     pub fn has_relative_depth(&self) -> bool {
         matches!(self.depth, Some(DepthForm::Inverse { .. }))
     }
 
-    /// Whether its depth is in units that [`Options::depth_scale`] states.
+    /// Returns whether its depth is in the units of [`Options::depth_scale`].
     pub fn has_depth_in_units(&self) -> bool {
         matches!(self.depth, Some(DepthForm::Units(_)))
     }
 
-    /// Whether the frames have depth.
+    /// Returns whether the frames have depth.
     pub fn has_depth(&self) -> bool {
         self.depth.is_some()
     }
 
-    /// The stereo geometry, if the frames have a right picture.
+    /// Returns the stereo geometry, if the frames have right pictures.
     pub fn pair(&self) -> Option<&Pair> {
         self.pair.as_ref()
     }
 
-    /// How many disparities to search, from 0, where the recording says so: a multiple of 16.
+    /// Returns the number of disparities to search, from 0, if the recording states it: a multiple of 16.
     pub fn disparities(&self) -> Option<u32> {
         self.disparities
     }
 
-    /// What is listed and belongs to no frame.
+    /// Returns the counts of listed pictures without a frame.
     pub fn unpaired(&self) -> Unpaired {
         self.unpaired
     }
@@ -240,8 +240,8 @@ impl Recording {
     /// Reads the colour picture of frame `index`, of [`Recording::size`], into `into`.
     ///
     /// # Errors
-    /// The picture is missing, of another size or kind, cut short or damaged, or outside the recording; its line in
-    /// the list is faulty; there is no such frame. What `into` holds is then unspecified.
+    /// The picture is missing, of another size or kind, truncated or damaged, or outside the recording; its line in the
+    /// list is faulty; there is no such frame. The content of `into` is then unspecified.
     pub fn read_color(&self, index: usize, scratch: &mut Scratch, into: &mut ColorImage) -> Result<(), RecordingError> {
         let source = &self.frame(index)?.color;
         let path = self.folder.locate(source)?;
@@ -254,7 +254,7 @@ impl Recording {
     /// with at most as many pixels.
     ///
     /// # Errors
-    /// As [`Recording::read_color`]; also where the recording has no depth.
+    /// Same as for [`Recording::read_color`]; or the recording has no depth.
     pub fn read_depth(&self, index: usize, scratch: &mut Scratch, into: &mut DepthMap) -> Result<(), RecordingError> {
         let no_depth = || RecordingError::NoDepth { dir: self.folder.dir.clone() };
         let form = self.depth.as_ref().ok_or_else(no_depth)?;
@@ -275,7 +275,7 @@ impl Recording {
     /// Reads the right picture of frame `index`, of [`Recording::size`], as luma into `into`.
     ///
     /// # Errors
-    /// As [`Recording::read_color`]; also where the recording has one eye only.
+    /// Same as for [`Recording::read_color`]; or the recording has one camera only.
     pub fn read_right(&self, index: usize, scratch: &mut Scratch, into: &mut GrayImage) -> Result<(), RecordingError> {
         let one_eye = || RecordingError::NoRight { dir: self.folder.dir.clone() };
         let frame = self.frame(index)?;
@@ -291,15 +291,15 @@ impl Recording {
     }
 }
 
-/// The files that make a folder a recording, for each layout: for messages.
+/// Returns the files that identify each layout, for messages.
 fn looked_for() -> String {
     LAYOUTS.map(|layout| format!("{} ({})", layout.looked_for, layout.name)).join(", ")
 }
 
-/// The size of the first colour picture that has a readable header; if none has, what is wrong with the first.
+/// Returns the size of the first colour picture with a readable header, or else the error of the first one.
 fn first_size<'a>(folder: &Folder, colors: impl Iterator<Item = &'a Source>) -> Result<(u32, u32), RecordingError> {
     let (mut first_error, mut locator) = (None, Locator::new(folder));
-    // A list may name one unreadable file many times: it is opened once.
+    // A list may name an unreadable file many times: open it once.
     let mut unreadable = HashSet::new();
     for source in colors {
         let size = locator.locate(source).and_then(|path| {
@@ -319,12 +319,13 @@ fn first_size<'a>(folder: &Folder, colors: impl Iterator<Item = &'a Source>) -> 
     Err(first_error.unwrap_or_else(|| RecordingError::EmptyList { list: folder.dir.clone() }))
 }
 
-/// Whether a depth map of these columns and rows covers the view of a colour picture of these: it is not larger and has the
-/// same aspect, within a pixel.
+/// Returns whether a depth map of this size covers the view of a colour picture: it is not larger and has the same
+/// aspect ratio, within a pixel.
 pub fn depth_covers(depth: (u32, u32), color: (u32, u32)) -> bool {
     let (depth_width, depth_height) = (u64::from(depth.0), u64::from(depth.1));
     let (width, height) = (u64::from(color.0), u64::from(color.1));
-    // Cross-multiplied aspect ratios: one pixel of the depth map changes them by at most the longer colour side.
+    // Compare the aspect ratios by cross-multiplication: one pixel of the depth map changes them by at most the longer
+    // colour side.
     let skew = (depth_width * height).abs_diff(depth_height * width);
     (1..=width).contains(&depth_width) && (1..=height).contains(&depth_height) && skew <= width.max(height)
 }

@@ -1,4 +1,4 @@
-//! Pairing of two lists of pictures by nearest time.
+//! Pairs two lists of pictures by nearest time.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -6,30 +6,30 @@ use std::collections::BinaryHeap;
 use super::contents::Source;
 use super::list::Entry;
 
-/// The list that a time is from, and its index there.
+/// The list of a time, and its index there.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum Stream {
     Color(usize),
     Depth(usize),
 }
 
-/// Entries with their partners.
+/// Entries with their counterparts.
 pub(super) struct Paired {
-    /// Those that have a partner, and those without a time, which stay as frames that fail to read.
+    /// Pairs, and entries without a time, which stay as frames that fail to read.
     pub(super) frames: Vec<(Entry, Option<Source>)>,
-    /// How many of the first list were left over.
+    /// Number of unpaired entries of the first list.
     pub(super) left_over: usize,
-    /// How many of the second one were.
+    /// Number of unpaired entries of the second list.
     pub(super) others_left_over: usize,
 }
 
-/// Pairs two lists by [`nearest`] time. Entries with a time and without a partner are counted and left out.
-pub(super) fn join(entries: Vec<Entry>, others: Vec<Entry>, tolerance_ns: u64) -> Paired {
+/// Pairs two lists with [`pair_nearest`]. Entries with a time but no counterpart are counted and dropped.
+pub(super) fn pair_by_time(entries: Vec<Entry>, others: Vec<Entry>, tolerance_ns: u64) -> Paired {
     let times = |entries: &[Entry]| entries.iter().filter_map(|entry| entry.time_ns).collect::<Vec<_>>();
-    let mut partners = nearest(&times(&entries), &times(&others), tolerance_ns).into_iter();
+    let mut partners = pair_nearest(&times(&entries), &times(&others), tolerance_ns).into_iter();
 
     let mut paired = Paired { frames: Vec::new(), left_over: 0, others_left_over: others.len() };
-    // `nearest` counts only entries with a time.
+    // `pair_nearest` sees only entries with a time.
     let mut timed: Vec<_> =
         others.into_iter().filter(|other| other.time_ns.is_some()).map(|other| Some(other.source)).collect();
     for entry in entries {
@@ -47,18 +47,18 @@ pub(super) fn join(entries: Vec<Entry>, others: Vec<Entry>, tolerance_ns: u64) -
     paired
 }
 
-/// Pairs of indices into two strictly increasing lists of times: the closest pair first, then the closest of what
-/// is left, each time used at most once, as the TUM benchmark's tool does it. For each colour time, its partner.
+/// Pairs two strictly increasing lists of times greedily, the closest pair first, each time at most once, as the TUM
+/// benchmark's `associate.py` does. Returns the counterpart of each colour time.
 ///
-/// In the merged order the closest two of different streams are always neighbours, so that only neighbours are
-/// looked at: `n log n` for any tolerance.
-fn nearest(color_ns: &[u64], depth_ns: &[u64], tolerance_ns: u64) -> Vec<Option<usize>> {
+/// In merged order the closest two times of different lists are always neighbours, so only neighbours are candidates:
+/// `n log n` for any tolerance.
+fn pair_nearest(color_ns: &[u64], depth_ns: &[u64], tolerance_ns: u64) -> Vec<Option<usize>> {
     let colors = color_ns.iter().enumerate().map(|(index, &time)| (time, Stream::Color(index)));
     let depths = depth_ns.iter().enumerate().map(|(index, &time)| (time, Stream::Depth(index)));
     let mut merged: Vec<_> = colors.chain(depths).collect();
     merged.sort_unstable();
 
-    // A linked list of those not yet paired; its ends point beyond `merged`.
+    // A linked list of the times not paired yet; its ends point outside `merged`.
     let len = merged.len();
     let mut before: Vec<usize> = (0..len).map(|at| at.wrapping_sub(1)).collect();
     let mut after: Vec<usize> = (1..=len).collect();
@@ -72,7 +72,7 @@ fn nearest(color_ns: &[u64], depth_ns: &[u64], tolerance_ns: u64) -> Vec<Option<
             _ => return None,
         };
         let gap_ns = right_ns - left_ns;
-        // The indices settle ties as the benchmark's tool does, by time.
+        // Indices break ties as the benchmark's tool does.
         (gap_ns <= tolerance_ns).then_some(Reverse((gap_ns, color, depth, left, right)))
     };
     let mut candidates: BinaryHeap<_> = (1..len).filter_map(|right| candidate(right - 1, right)).collect();
@@ -85,7 +85,7 @@ fn nearest(color_ns: &[u64], depth_ns: &[u64], tolerance_ns: u64) -> Vec<Option<
         }
         partners[color] = Some(depth);
         (is_paired[left], is_paired[right]) = (true, true);
-        // The neighbours on either side of the pair become neighbours of each other.
+        // The neighbours of the pair become neighbours of each other.
         let (outer_left, outer_right) = (before[left], after[right]);
         if let Some(next) = after.get_mut(outer_left) {
             *next = outer_right;
@@ -100,9 +100,9 @@ fn nearest(color_ns: &[u64], depth_ns: &[u64], tolerance_ns: u64) -> Vec<Option<
 
 #[cfg(test)]
 mod tests {
-    use super::nearest;
+    use super::pair_nearest;
 
-    /// The benchmark's tool, word for word: all pairs within the tolerance, sorted, taken greedily.
+    /// Reference: the benchmark's algorithm, all pairs within the tolerance, sorted, taken greedily.
     fn all_pairs(color_ns: &[u64], depth_ns: &[u64], tolerance_ns: u64) -> Vec<Option<usize>> {
         let mut pairs: Vec<_> = (0..color_ns.len())
             .flat_map(|color| (0..depth_ns.len()).map(move |depth| (color, depth)))
@@ -136,7 +136,7 @@ mod tests {
             let (color_ns, depth_ns) = (times(20), times(20));
             for tolerance_ns in [0, 1, 3, 10, u64::MAX] {
                 assert_eq!(
-                    nearest(&color_ns, &depth_ns, tolerance_ns),
+                    pair_nearest(&color_ns, &depth_ns, tolerance_ns),
                     all_pairs(&color_ns, &depth_ns, tolerance_ns),
                     "{color_ns:?} {depth_ns:?} within {tolerance_ns}"
                 );

@@ -1,4 +1,4 @@
-//! The portable float map: one float a pixel, bottom row first. The usual way to keep disparity and depth.
+//! The portable float map (PFM): one float per pixel, bottom row first, common for disparity and depth.
 
 use std::io::Write;
 use std::path::Path;
@@ -11,12 +11,12 @@ use super::unit::Meaning;
 use crate::frame::DepthMap;
 use crate::optics::StereoRig;
 
-/// Whether the name says that the file is a PFM.
+/// Returns whether the file name has the extension `.pfm`.
 pub(super) fn is_named(path: &Path) -> bool {
     path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("pfm"))
 }
 
-/// Reads the values as stored, unknown ones as 0, and their meaning where the file states it (else the caller decides).
+/// Reads the values as stored, with 0 for unknown, and their meaning if the file states it.
 pub(super) fn read(path: &Path) -> Result<(DepthMap, Option<Meaning>), PictureFault> {
     let mut map = DepthMap::default();
     let ((width, height), meaning) = parse(Scratch::default().read_pfm(path)?, &mut map.metres)?;
@@ -24,7 +24,7 @@ pub(super) fn read(path: &Path) -> Result<(DepthMap, Option<Meaning>), PictureFa
     Ok((map, meaning))
 }
 
-/// Reads disparities and converts them to metres. `rig` is for the colour picture of `color` pixels (columns, rows),
+/// Reads disparities and converts them to metres. `rig` is for the colour picture of `color` (columns, rows) pixels,
 /// whose view the disparity map must cover.
 pub(super) fn read_disparity_as_depth(
     path: &Path,
@@ -38,7 +38,7 @@ pub(super) fn read_disparity_as_depth(
         return Err(PictureFault::DepthSize { found, color });
     }
     (into.width, into.height) = found;
-    // The map's disparities are in its own pixels, and the rig is in those of the colour picture.
+    // Disparities are in pixels of the map, the rig in pixels of the colour picture.
     let zoom = color.0 as f32 / found.0 as f32;
     for value in &mut into.metres {
         *value = if DepthMap::is_known(*value) { rig.depth_m(*value * zoom) } else { 0.0 };
@@ -46,7 +46,7 @@ pub(super) fn read_disparity_as_depth(
     Ok(())
 }
 
-/// Parses a PFM into `values`, top row first, unknown ones as 0. Gives columns and rows, and the meaning if the file
+/// Parses a PFM into `values`, top row first, with 0 for unknown. Returns width and height, and the meaning if the file
 /// states it.
 fn parse(bytes: &[u8], values: &mut Vec<f32>) -> Result<((u32, u32), Option<Meaning>), PictureFault> {
     let mut rest = bytes;
@@ -61,7 +61,7 @@ fn parse(bytes: &[u8], values: &mut Vec<f32>) -> Result<((u32, u32), Option<Mean
     let width = number(word(&mut rest)?)?;
     let height = number(word(&mut rest)?)?;
     check_size(width, height)?;
-    // Only the sign is used: negative means that the low byte comes first.
+    // Only the sign is used: negative is little-endian.
     let scale_text = word(&mut rest)?;
     let scale: f32 = number(scale_text)?;
     let row_bytes = width as usize * 4;
@@ -75,7 +75,7 @@ fn parse(bytes: &[u8], values: &mut Vec<f32>) -> Result<((u32, u32), Option<Mean
     Ok(((width, height), Meaning::of_pfm_scale(scale_text)))
 }
 
-/// The next word of the header. Exactly one white space ends it, since pixels may follow.
+/// Reads the next word of the header. Exactly one white space ends it, since pixels may follow.
 fn word<'a>(rest: &mut &'a [u8]) -> Result<&'a str, PictureFault> {
     let start = rest.iter().position(|byte| !byte.is_ascii_whitespace()).ok_or(PictureFault::Truncated)?;
     let length = rest[start..].iter().position(u8::is_ascii_whitespace).ok_or(PictureFault::Truncated)?;
@@ -91,7 +91,7 @@ fn number<T: std::str::FromStr>(word: &str) -> Result<T, PictureFault> {
 
 /// Appends `values` (`height` x `width`, row-major) to `file` as a little-endian PFM that states their `meaning`.
 pub(super) fn write(width: u32, height: u32, values: &[f32], meaning: Meaning, file: &mut Vec<u8>) {
-    // Writing to memory does not fail.
+    // Writing to memory cannot fail.
     let _ = write!(file, "Pf\n{width} {height}\n{}\n", meaning.pfm_scale());
     for row in values.chunks_exact(width.max(1) as usize).rev() {
         file.extend(row.iter().flat_map(|value| value.to_le_bytes()));

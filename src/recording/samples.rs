@@ -1,11 +1,11 @@
-//! How the pixels of a picture file are stored.
+//! The sample format of picture files.
 
 /// Channels and bit depth of a pixel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Samples {
-    /// 1 is grey, 3 colour; one more is transparency.
+    /// 1 is grey, 3 is colour; one more is alpha.
     pub channels: usize,
-    /// Whether samples have 16 bits, high byte first, or 8.
+    /// Whether samples have 16 bits, big-endian, instead of 8.
     pub are_wide: bool,
 }
 

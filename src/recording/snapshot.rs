@@ -1,7 +1,7 @@
-//! Snapshots: a blurred picture with its settings inside, and beside it, where that is wanted, the files that it was made from.
+//! Snapshots: a blurred picture with its settings inside, optionally with its input files.
 //!
 //! `NAME.png` holds the settings as a text (keyword [`KEYWORD`]) of lines `--flag=value`. `NAME-color.png` is the
-//! picture before the blur, `NAME-depth.pfm` its depth as the blur had it, in metres.
+//! picture before the blur, `NAME-depth.pfm` the depth that the blur used, in metres.
 
 use std::fs;
 use std::io::ErrorKind;
@@ -14,26 +14,26 @@ use super::still::{write_color, write_depth};
 use crate::files::whole;
 use crate::frame::{ColorImage, DepthMap};
 
-/// The keyword of the text in a PNG that has the settings.
+/// The keyword of the PNG text with the settings.
 pub const KEYWORD: &str = "bokehcam";
 
-/// A frame to keep.
+/// The content of a snapshot.
 #[derive(Clone, Copy, Debug)]
 pub struct Snapshot<'a> {
-    /// The picture after the blur.
+    /// The blurred picture.
     pub picture: &'a ColorImage,
-    /// What it was made from, where that is to be kept: the picture before the blur, and its depth, if the blur had any.
+    /// The inputs to save, if any: the picture before the blur, and its depth, if there is one.
     pub sources: Option<(&'a ColorImage, Option<&'a DepthMap>)>,
-    /// The settings, by their flags without the dashes.
+    /// The settings, as flags without dashes and their values.
     pub settings: &'a [(&'static str, String)],
 }
 
-/// Saves a frame as `dir/stem.png` and the files beside it; where one of these names is taken, under the first of
-/// `stem-2`, `stem-3` and so on that is free. Makes the folder. Gives back the picture's path. The picture appears
-/// last: where it is, the others are. When something fails, none of them stays.
+/// Saves a frame as `dir/stem.png` with its input files. If one of the names exists, uses the first free one of
+/// `stem-2`, `stem-3` and so on. Creates the folder. Returns the path of the picture. The picture is written last, so
+/// its inputs exist whenever it does. On failure no file remains.
 ///
 /// # Errors
-/// The folder or a file in it cannot be written; `stem` is no plain file name; a setting has a line break.
+/// The folder or a file cannot be written; `stem` is not a plain file name; a setting has a line break.
 pub fn save(dir: &Path, stem: &str, snapshot: &Snapshot) -> Result<PathBuf, RecordingError> {
     let unfit = |what: &str| RecordingError::picture(&dir.join(stem))(PictureFault::Encoding(what.to_string()));
     if Path::new(stem).file_name() != Some(stem.as_ref()) {
@@ -56,13 +56,13 @@ pub fn save(dir: &Path, stem: &str, snapshot: &Snapshot) -> Result<PathBuf, Reco
     Err(RecordingError::io("create", &dir.join(stem))(ErrorKind::AlreadyExists.into()))
 }
 
-/// Writes the picture and the files beside it, or none of them.
+/// Writes the picture and its input files, or none of them.
 fn write(path: &Path, snapshot: &Snapshot, png: &[u8]) -> Result<(), RecordingError> {
     let (color, depth) = sources(path);
     if let Some(taken) = [path, &color, &depth].into_iter().find(|path| path.symlink_metadata().is_ok()) {
         return Err(RecordingError::Exists { path: taken.to_owned() });
     }
-    // Only these are removed on failure: another process may write files of the same names.
+    // Only these are removed on failure, as another process may write files of the same names.
     let mut written_files = Vec::new();
     let sources_written = snapshot.sources.map_or(Ok(()), |(before, map)| {
         write_color(&color, before, false)?;
@@ -76,36 +76,36 @@ fn write(path: &Path, snapshot: &Snapshot, png: &[u8]) -> Result<(), RecordingEr
         })
     });
     if written.is_err() {
-        // The first failure is the one to report.
+        // Report the first failure only.
         written_files.into_iter().for_each(|file| drop(fs::remove_file(file)));
     }
     written
 }
 
-/// What the names of the files beside a snapshot have in place of `.png`.
+/// Suffixes that replace `.png` in the names of the input files.
 const COLOR: &str = "-color.png";
 const DEPTH: &str = "-depth.pfm";
 
-/// Paths of the files beside the snapshot `path`: the picture before the blur, and its depth, which need not exist.
+/// Returns the paths of a snapshot's input files: the picture before the blur, and its depth. They need not exist.
 pub fn sources(path: &Path) -> (PathBuf, PathBuf) {
-    (beside(path, COLOR), beside(path, DEPTH))
+    (sibling_path(path, COLOR), sibling_path(path, DEPTH))
 }
 
-fn beside(path: &Path, ending: &str) -> PathBuf {
+fn sibling_path(path: &Path, ending: &str) -> PathBuf {
     let mut name = path.file_stem().unwrap_or_default().to_owned();
     name.push(ending);
     path.with_file_name(name)
 }
 
-/// The settings in a snapshot, by their flags without the dashes.
+/// Reads the settings from a snapshot, as flags without dashes and their values.
 ///
 /// # Errors
-/// The file is missing, no PNG, damaged, or has no settings in it.
+/// The file is missing, not a PNG, damaged, or contains no settings.
 pub fn settings(path: &Path) -> Result<Vec<(String, String)>, RecordingError> {
-    text(path).and_then(|text| parse(&text)).map_err(RecordingError::picture(path))
+    read_text(path).and_then(|text| parse(&text)).map_err(RecordingError::picture(path))
 }
 
-/// Names and values of the lines `--name=value`.
+/// Parses lines of `--name=value`.
 fn parse(text: &str) -> Result<Vec<(String, String)>, PictureFault> {
     let setting = |line: &str| {
         let (name, value) = line.strip_prefix("--")?.split_once('=')?;
@@ -118,8 +118,8 @@ fn parse(text: &str) -> Result<Vec<(String, String)>, PictureFault> {
     text.lines().filter(|line| !line.trim().is_empty()).map(parsed).collect()
 }
 
-/// The settings in a PNG as text.
-fn text(path: &Path) -> Result<String, PictureFault> {
+/// Reads the settings from a PNG as text.
+fn read_text(path: &Path) -> Result<String, PictureFault> {
     let info = coded::png_info(path)?;
     let fault = coded::png_fault;
     if let Some(chunk) = info.utf8_text.iter().find(|chunk| chunk.keyword == KEYWORD) {

@@ -1,6 +1,6 @@
-//! Single pictures: colour, depth, disparity and grey, to and from files.
+//! Reads and writes single pictures: colour, depth, disparity and grey.
 //!
-//! What is written appears whole or not at all, and replaces nothing unless `force` says so.
+//! Files are written atomically, and replace existing ones only with `force`.
 
 use std::fmt::Display;
 use std::io::ErrorKind;
@@ -19,19 +19,19 @@ use crate::files::whole;
 use crate::frame::{ColorImage, DepthMap, DisparityMap};
 use crate::optics::StereoRig;
 
-/// Reads a PNG or JPEG (told by the content) as 8-bit RGB, upright where it says how it was held. Grey is repeated,
-/// transparency ignored, 16 bits rounded to 8. At most 8192 x 8192 pixels.
+/// Reads a PNG or JPEG (detected by content) as 8-bit RGB, rotated upright by its orientation tag. Grey is repeated,
+/// transparency ignored, 16 bits are rounded to 8. At most 8192 x 8192 pixels.
 ///
 /// # Errors
-/// The file is missing, no PNG or JPEG, too large, cut short or damaged.
+/// The file is missing, not a PNG or JPEG, too large, truncated or damaged.
 pub fn read_color(path: &Path) -> Result<ColorImage, RecordingError> {
     read_photo(path).map(|(image, _)| image)
 }
 
-/// The same, with what the file has besides its pixels. Its EXIF says that the picture is upright.
+/// Does the same as [`read_color`], and returns the metadata, whose orientation is then upright.
 ///
 /// # Errors
-/// As [`read_color`].
+/// Same as for [`read_color`].
 pub fn read_photo(path: &Path) -> Result<(ColorImage, Extras), RecordingError> {
     let (mut scratch, mut image) = (Scratch::default(), ColorImage::default());
     let read = decode::color(path, None, &mut scratch, &mut image);
@@ -46,27 +46,27 @@ pub fn read_photo(path: &Path) -> Result<(ColorImage, Extras), RecordingError> {
     Ok((ColorImage { width, height, rgb: upright.into_bytes() }, extras))
 }
 
-/// What a map file holds.
+/// The content of a map file.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Map {
     /// Metres.
     Depth(DepthMap),
-    /// Pixels, where the file says so.
+    /// In pixels, with the stereo rig if the file states it.
     Disparity(DisparityMap, Option<StereoRig>),
 }
 
-/// Reads a map from a 16-bit grey PNG, where 0 and `invalid` mean unknown, or from a `.pfm`. Which it is, and of which
-/// units, is what the file says, as those of [`write_depth`] and [`write_disparity`] do. What says nothing is depth, in
-/// metres in a `.pfm` and in 1/5000 m in a PNG. `depth_scale`, in units of a PNG per metre, goes before both. Upright
-/// where a PNG says how it was held. At most 8192 x 8192 pixels.
+/// Reads a map from a 16-bit grey PNG, where 0 and `invalid` mean unknown, or from a `.pfm`. Metadata in the file
+/// decides quantity and unit, as written by [`write_depth`] and [`write_disparity`]. A file without them is depth, in
+/// metres in a `.pfm` and in 1/5000 m in a PNG. `depth_scale`, in units of a PNG per metre, overrides both. A PNG is
+/// rotated upright by its orientation tag. At most 8192 x 8192 pixels.
 ///
 /// # Errors
-/// The file is missing, of another kind (8-bit grey has too few steps for depth), too large, cut short or damaged;
-/// the scale is not a number > 0.
+/// The file is missing, of another kind (8-bit grey has too few steps for depth), too large, truncated or damaged; the
+/// scale is not a number > 0.
 pub fn read_map(path: &Path, depth_scale: Option<f32>, invalid: Option<u16>) -> Result<Map, RecordingError> {
     let fault = || RecordingError::picture(path);
     depth_scale.map_or(Ok(()), check_depth_scale)?;
-    let (map, says) = if pfm::is_named(path) {
+    let (map, meaning) = if pfm::is_named(path) {
         pfm::read(path).map_err(fault())?
     } else {
         let info = coded::png_info(path).ok();
@@ -87,13 +87,13 @@ pub fn read_map(path: &Path, depth_scale: Option<f32>, invalid: Option<u16>) -> 
             (None, Some(Meaning::Depth { per_m })) => per_m,
             (None, None) => tum::DEPTH_SCALE,
         };
-        let turned = info.as_ref().map(|info| Extras::of_png(info).take_orientation());
+        let orientation = info.as_ref().map(|info| Extras::of_png(info).take_orientation());
         let (mut scratch, mut depth) = (Scratch::default(), DepthMap::default());
         let units = DepthUnits { scale, invalid };
         decode::depth(path, units, None, &mut scratch, &mut depth).map_err(fault())?;
-        (upright(depth, turned.unwrap_or(Orientation::NoTransforms)), text)
+        (upright(depth, orientation.unwrap_or(Orientation::NoTransforms)), text)
     };
-    Ok(match says {
+    Ok(match meaning {
         Some(Meaning::Disparity { rig }) => {
             Map::Disparity(DisparityMap { width: map.width, height: map.height, px: map.metres }, rig)
         }
@@ -101,10 +101,10 @@ pub fn read_map(path: &Path, depth_scale: Option<f32>, invalid: Option<u16>) -> 
     })
 }
 
-/// Whether the depth map `path` of `depth` pixels (columns, rows) is that of a picture of `color` pixels, seen alike.
+/// Checks that the depth map `path` of `depth` (columns, rows) pixels covers a picture of `color` pixels.
 ///
 /// # Errors
-/// It is larger, or of another aspect.
+/// The map is larger, or of another aspect ratio.
 pub fn check_depth_size(path: &Path, depth: (u32, u32), color: (u32, u32)) -> Result<(), RecordingError> {
     match depth_covers(depth, color) {
         true => Ok(()),
@@ -112,10 +112,10 @@ pub fn check_depth_size(path: &Path, depth: (u32, u32), color: (u32, u32)) -> Re
     }
 }
 
-/// The same of a mask.
+/// Does the same as [`check_depth_size`] for a mask.
 ///
 /// # Errors
-/// As [`check_depth_size`].
+/// Same as for [`check_depth_size`].
 pub fn check_mask_size(path: &Path, mask: (u32, u32), color: (u32, u32)) -> Result<(), RecordingError> {
     match depth_covers(mask, color) {
         true => Ok(()),
@@ -123,7 +123,7 @@ pub fn check_mask_size(path: &Path, mask: (u32, u32), color: (u32, u32)) -> Resu
     }
 }
 
-/// A map turned as its file says.
+/// Rotates a map by its orientation tag.
 fn upright(map: DepthMap, orientation: Orientation) -> DepthMap {
     let DepthMap { width, height, metres, .. } = map;
     let image: ImageBuffer<Luma<f32>, _> = ImageBuffer::from_raw(width, height, metres).unwrap_or_default();
@@ -140,10 +140,10 @@ fn upright(map: DepthMap, orientation: Orientation) -> DepthMap {
     DepthMap { width: image.width(), height: image.height(), metres: image.into_raw(), ..DepthMap::default() }
 }
 
-/// Reads a depth map in metres, as [`read_map`]. Disparity becomes depth where the file says which eyes see it.
+/// Reads a depth map in metres, as [`read_map`]. Disparity is converted to depth if the file states the stereo rig.
 ///
 /// # Errors
-/// As for [`read_map`]; the file holds disparity and does not say of which eyes.
+/// Same as for [`read_map`]; or the file holds disparity without a stereo rig.
 pub fn read_depth(path: &Path, depth_scale: f32, invalid: Option<u16>) -> Result<DepthMap, RecordingError> {
     match read_map(path, Some(depth_scale), invalid)? {
         Map::Depth(map) => Ok(map),
@@ -152,11 +152,11 @@ pub fn read_depth(path: &Path, depth_scale: f32, invalid: Option<u16>) -> Result
     }
 }
 
-/// Reads relative inverse depth of a picture of `color` pixels: grey, 8 or 16 bits, white is near unless it is said to be far.
-/// The distances are in units of the nearest.
+/// Reads relative inverse depth for a picture of `color` pixels: grey, 8 or 16 bits, white is near unless
+/// `white_is_far`. The distances are relative to the nearest one.
 ///
 /// # Errors
-/// As [`read_color`]; it is not grey, or does not cover the picture.
+/// Same as for [`read_color`]; or the file is not grey, or does not cover the picture.
 pub fn read_inverse_depth(path: &Path, white_is_far: bool, color: (u32, u32)) -> Result<DepthMap, RecordingError> {
     let (mut scratch, mut map) = (Scratch::default(), DepthMap::default());
     let read = decode::inverse_depth(path, white_is_far, color, &mut scratch, &mut map);
@@ -167,7 +167,7 @@ pub fn read_inverse_depth(path: &Path, white_is_far: bool, color: (u32, u32)) ->
 /// (KITTI). At most 8192 x 8192 pixels.
 ///
 /// # Errors
-/// As [`read_depth`].
+/// Same as for [`read_depth`].
 pub fn read_disparity(path: &Path) -> Result<DisparityMap, RecordingError> {
     let map = match pfm::is_named(path) {
         true => pfm::read(path).map(|(map, _)| map),
@@ -181,38 +181,38 @@ pub fn read_disparity(path: &Path) -> Result<DisparityMap, RecordingError> {
     Ok(DisparityMap { width: map.width, height: map.height, px: map.metres })
 }
 
-/// Reads a PNG or JPEG as columns, rows and grey values, row-major, 0 to 1 as stored (not linearised): the luma of a
-/// colour, and darker as it is more transparent. At most 8192 x 8192 pixels.
+/// Reads a PNG or JPEG as width, height and grey values, row-major, 0 to 1 as stored (not linearised): luma for a
+/// colour picture, multiplied by alpha. At most 8192 x 8192 pixels.
 ///
 /// # Errors
-/// As [`read_color`].
+/// Same as for [`read_color`].
 pub fn read_grey(path: &Path) -> Result<(u32, u32, Vec<f32>), RecordingError> {
     decode::grey(path).map_err(RecordingError::picture(path))
 }
 
-/// [`read_grey`] of the picture of an aperture.
+/// Reads the picture of an aperture, as [`read_grey`].
 ///
 /// # Errors
-/// As [`read_color`]; or it lets no light through.
+/// Same as for [`read_color`]; or the picture is black.
 pub fn read_aperture(path: &Path) -> Result<(u32, u32, Vec<f32>), RecordingError> {
     let picture = read_grey(path)?;
-    // A kernel of nothing would blur nothing.
+    // An all-zero kernel cannot be normalised.
     let is_dark = picture.2.iter().all(|value| *value <= 0.0);
     if is_dark { Err(RecordingError::picture(path)(PictureFault::Dark)) } else { Ok(picture) }
 }
 
-/// Writes a `.png`, `.jpg` or `.jpeg`.
+/// Writes a `.png`, `.jpg` or `.jpeg` file.
 ///
 /// # Errors
-/// Another extension; the file exists and `force` is not set; it cannot be written.
+/// The extension is another one; the file exists and `force` is not set; the file cannot be written.
 pub fn write_color(path: &Path, image: &ColorImage, force: bool) -> Result<(), RecordingError> {
     write_photo(path, image, &Extras::default(), force)
 }
 
-/// The same, with what goes with the picture.
+/// Does the same as [`write_color`], with metadata.
 ///
 /// # Errors
-/// As [`write_color`].
+/// Same as for [`write_color`].
 pub fn write_photo(path: &Path, image: &ColorImage, extras: &Extras, force: bool) -> Result<(), RecordingError> {
     let mut file = Vec::new();
     let encoded = match photo_format(path)? {
@@ -222,19 +222,19 @@ pub fn write_photo(path: &Path, image: &ColorImage, extras: &Extras, force: bool
     write(path, encoded, &file, force)
 }
 
-/// What pictures are written as.
+/// A file format for pictures.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PhotoFormat {
-    /// Without loss.
+    /// Lossless.
     Png,
-    /// Smaller.
+    /// Lossy, and smaller.
     Jpeg,
 }
 
-/// The format of a picture of this name.
+/// Returns the picture format for a file name.
 ///
 /// # Errors
-/// It ends with something else than `.png`, `.jpg` or `.jpeg`.
+/// The extension is not `.png`, `.jpg` or `.jpeg`.
 pub fn photo_format(path: &Path) -> Result<PhotoFormat, RecordingError> {
     match path.extension().unwrap_or_default().to_ascii_lowercase().to_str() {
         Some("png") => Ok(PhotoFormat::Png),
@@ -243,12 +243,12 @@ pub fn photo_format(path: &Path) -> Result<PhotoFormat, RecordingError> {
     }
 }
 
-/// Writes a 16-bit grey `.png` of `depth_scale` units per metre, where 0 is unknown and so is what lies beyond 65535
-/// units; or a `.pfm` of metres as they are. Either file says in its metadata that it holds depth (the `.png` its scale,
-/// too), so that it is read back without an option.
+/// Writes a 16-bit grey `.png` of `depth_scale` units per metre, where 0 is unknown, as is depth beyond 65535 units; or
+/// a `.pfm` in metres. The metadata of either file states that it holds depth (and the scale of a `.png`), so it can be
+/// read back without options.
 ///
 /// # Errors
-/// As [`write_color`]; the scale is not a number > 0.
+/// Same as for [`write_color`]; or the scale is not a number > 0.
 pub fn write_depth(path: &Path, depth: &DepthMap, depth_scale: f32, force: bool) -> Result<(), RecordingError> {
     check_depth_scale(depth_scale)?;
     let meaning = Meaning::Depth { per_m: depth_scale };
@@ -263,12 +263,12 @@ pub fn write_depth(path: &Path, depth: &DepthMap, depth_scale: f32, force: bool)
     write(path, encoded, &file, force)
 }
 
-/// Writes a 16-bit grey `.png` of 256 units per pixel, where 0 is unknown and so is what lies beyond 65535 units
-/// (KITTI); or a `.pfm` of pixels, where infinity is unknown (Middlebury). Either file says in its metadata that it holds
-/// disparity; the `.png` has focal length and baseline, too, where a `rig` is given.
+/// Writes a 16-bit grey `.png` of 256 units per pixel, where 0 is unknown, as is disparity beyond 65535 units (KITTI);
+/// or a `.pfm` in pixels, where infinity is unknown (Middlebury). The metadata of either file states that it holds
+/// disparity; that of a `.png` also has focal length and baseline if `rig` is given.
 ///
 /// # Errors
-/// As [`write_color`].
+/// Same as for [`write_color`].
 pub fn write_disparity(
     path: &Path,
     disparity: &DisparityMap,
@@ -289,19 +289,19 @@ pub fn write_disparity(
     write(path, encoded, &file, force)
 }
 
-/// What depth and disparity maps are written as.
+/// A file format for depth and disparity maps.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum MapFormat {
     /// 16-bit grey.
     Png,
-    /// Floats.
+    /// 32-bit floats.
     Pfm,
 }
 
-/// The format of a depth or disparity map of this name.
+/// Returns the map format for a file name.
 ///
 /// # Errors
-/// It ends with something else than `.png` or `.pfm`.
+/// The extension is not `.png` or `.pfm`.
 pub fn map_format(path: &Path) -> Result<MapFormat, RecordingError> {
     if pfm::is_named(path) {
         Ok(MapFormat::Pfm)

@@ -1,21 +1,21 @@
-//! Times and period of the frames of a recording.
+//! Times and frame period of a recording.
 
-/// The period of recordings with fewer than two known times: 30 frames per second.
+/// Period of a recording with fewer than two known times: 30 frames per second.
 const DEFAULT_PERIOD_NS: u64 = 33_333_333;
 
-/// Ten years, the longest that a recording may be: keeps arithmetic with times and periods far from overflow.
-pub(super) const MOST_LENGTH_NS: u64 = 10 * 366 * 24 * 3600 * 1_000_000_000;
+/// Maximum length of a recording, ten years: keeps arithmetic with times and periods far from overflow.
+pub(super) const MAX_LENGTH_NS: u64 = 10 * 366 * 24 * 3600 * 1_000_000_000;
 
-/// Median distance of strictly increasing times; [`DEFAULT_PERIOD_NS`] if there are fewer than two.
+/// Returns the median interval of strictly increasing times; [`DEFAULT_PERIOD_NS`] if there are fewer than two.
 pub(super) fn median_period_ns(times_ns: impl Iterator<Item = u64> + Clone) -> u64 {
     let mut periods_ns: Vec<u64> = times_ns.clone().skip(1).zip(times_ns).map(|(next, time)| next - time).collect();
     let middle = periods_ns.len() / 2;
     if periods_ns.is_empty() { DEFAULT_PERIOD_NS } else { *periods_ns.select_nth_unstable(middle).1 }
 }
 
-/// A time for every frame, in nanoseconds after the first, strictly increasing, hardly beyond [`MOST_LENGTH_NS`].
-/// Frames whose time is unknown are spread evenly between their neighbours, or follow one period apart at the ends. The
-/// known times increase strictly.
+/// Returns a time for every frame in nanoseconds after the first, strictly increasing, hardly beyond [`MAX_LENGTH_NS`].
+/// Unknown times are interpolated between their neighbours, or extrapolated by the period at the ends. The known times
+/// must increase strictly.
 pub(super) fn fill(times_ns: &[Option<u64>]) -> Vec<u64> {
     let known: Vec<(usize, u64)> =
         times_ns.iter().enumerate().filter_map(|(index, &time)| Some((index, time?))).collect();
@@ -38,8 +38,8 @@ pub(super) fn fill(times_ns: &[Option<u64>]) -> Vec<u64> {
     (0..times_ns.len())
         .map(|index| {
             let time_ns = u64::try_from(estimate_ns(index) - start_ns).unwrap_or(u64::MAX);
-            // More frames than nanoseconds between two times push the later ones on.
-            let time_ns = time_ns.min(MOST_LENGTH_NS).max(earliest_ns);
+            // If there are more frames than nanoseconds between two times, the later ones are delayed.
+            let time_ns = time_ns.min(MAX_LENGTH_NS).max(earliest_ns);
             earliest_ns = time_ns + 1;
             time_ns
         })
@@ -66,8 +66,8 @@ mod tests {
     #[test]
     fn times_increase_even_where_there_is_no_room() {
         assert_eq!(fill(&[Some(7), None, None, Some(8), Some(9)]), [0, 1, 2, 3, 4]);
-        assert_eq!(fill(&[Some(0), Some(u64::MAX), None]), [0, MOST_LENGTH_NS, MOST_LENGTH_NS + 1]);
-        assert_eq!(fill(&[Some(0), Some(MOST_LENGTH_NS), None]), [0, MOST_LENGTH_NS, MOST_LENGTH_NS + 1]);
+        assert_eq!(fill(&[Some(0), Some(u64::MAX), None]), [0, MAX_LENGTH_NS, MAX_LENGTH_NS + 1]);
+        assert_eq!(fill(&[Some(0), Some(MAX_LENGTH_NS), None]), [0, MAX_LENGTH_NS, MAX_LENGTH_NS + 1]);
     }
 
     #[test]

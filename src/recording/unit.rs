@@ -1,12 +1,12 @@
-//! Whether a map file holds depth or disparity, and in which unit. Our files say so where other programs ignore it: a
-//! PNG in a text chunk (keyword [`KEYWORD`]), a PFM by the spelling of its scale, whose value is always 1.
+//! Quantity (depth or disparity) and unit of a map file. Our files state them where other programs ignore it: a PNG in
+//! a text chunk (keyword [`KEYWORD`]), a PFM by the spelling of its scale, whose absolute value is always 1.
 
 use crate::optics::StereoRig;
 
 /// Units of a 16-bit disparity picture per pixel, as in the KITTI benchmark.
 pub const DISPARITY_SCALE: f32 = 256.0;
 
-/// The keyword of the text in a PNG.
+/// The keyword of the text chunk in a PNG.
 pub(super) const KEYWORD: &str = "bokehcam map";
 
 /// Quantity and unit of the values in a map file.
@@ -18,13 +18,13 @@ pub(super) enum Meaning {
     },
     /// Disparity in pixels of the map.
     Disparity {
-        /// The stereo rig that measured it, where it is known.
+        /// The stereo rig that measured it, if known.
         rig: Option<StereoRig>,
     },
 }
 
 impl Meaning {
-    /// The text for a PNG. A rig that is only assumed is left out: its distances are not real.
+    /// Returns the text for a PNG. A rig that is only assumed is omitted, as its distances are not real.
     pub(super) fn text(&self) -> String {
         match self {
             Self::Depth { per_m } => format!("depth units_per_metre={per_m}"),
@@ -36,7 +36,7 @@ impl Meaning {
         }
     }
 
-    /// Parses the text of a PNG; `None` if it is not one of ours, or has values that are impossible.
+    /// Parses the text of a PNG; `None` if it is not ours, or has invalid values.
     pub(super) fn of_text(text: &str) -> Option<Self> {
         let mut words = text.split_ascii_whitespace();
         let kind = words.next()?;
@@ -62,8 +62,8 @@ impl Meaning {
         }
     }
 
-    /// The scale of a PFM. Its value is -1: negative for little-endian, and 1 since some readers multiply by it. Only
-    /// the spelling tells the kinds apart.
+    /// Returns the scale of a PFM. Its value is -1: negative for little-endian, and 1 because some readers multiply by
+    /// it. Only the spelling distinguishes the quantities.
     pub(super) fn pfm_scale(&self) -> &'static str {
         match self {
             Self::Depth { .. } => "-1000e-3",
@@ -71,7 +71,7 @@ impl Meaning {
         }
     }
 
-    /// The meaning of a PFM whose scale is spelled as ours. There is no room in it for a rig.
+    /// Returns the meaning of a PFM by the spelling of its scale; it cannot hold a rig.
     pub(super) fn of_pfm_scale(scale: &str) -> Option<Self> {
         let meanings = [Self::Depth { per_m: 1.0 }, Self::Disparity { rig: None }];
         meanings.into_iter().find(|meaning| meaning.pfm_scale() == scale)

@@ -1,49 +1,49 @@
-//! XMP packets, which hold rights, authors and titles: what of one still holds for a picture whose pixels have changed.
+//! XMP packets, which hold rights, authors and titles: keeps the parts that stay valid after the pixels have changed.
 //!
-//! Only the packet itself goes on. What it says of other parts of its file, which do not, is taken out: Extended XMP, depth
-//! maps (GDepth) and gain maps, and pictures of the picture.
+//! Only the main packet is kept. References to other parts of the file are removed: Extended XMP, depth maps (GDepth),
+//! gain maps, and thumbnails.
 
 /// The keyword of a packet in a PNG.
 pub(super) const PNG_KEYWORD: &str = "XML:com.adobe.xmp";
-/// What a segment of a JPEG with a packet begins with.
+/// Identifier at the start of a JPEG segment with a packet.
 pub(super) const JPEG_NAME: &[u8] = b"http://ns.adobe.com/xap/1.0/\0";
-/// Most bytes of a packet that a JPEG holds: a segment has 65533.
-pub(super) const MOST_JPEG_BYTES: usize = 65_533 - JPEG_NAME.len();
-/// Most bytes of a packet that is looked at: most have a few thousand.
-pub(super) const MOST_BYTES: usize = 4 << 20;
+/// Maximum bytes of a packet in a JPEG: a segment has 65533.
+pub(super) const MAX_JPEG_BYTES: usize = 65_533 - JPEG_NAME.len();
+/// Maximum bytes of a packet that is read; most have a few thousand.
+pub(super) const MAX_BYTES: usize = 4 << 20;
 
-/// Prefixes of what is about other parts of the file.
-const ELSEWHERE: [&str; 8] =
+/// Prefixes of attributes about other parts of the file.
+const EXTERNAL_PREFIXES: [&str; 8] =
     ["xmpNote:", "GDepth:", "GImage:", "GAudio:", "GCamera:", "hdrgm:", "Container:", "HDRGainMap:"];
-/// Names of what shows the picture as it was.
+/// Names of elements with thumbnails of the original picture.
 const THUMBNAILS: [&str; 2] = ["xmp:Thumbnails", "xmpGImg:image"];
 const ORIENTATION: &str = "tiff:Orientation";
 
-/// Attributes that speak of what is worth a word when it is lost, and the word.
-const WORTH_A_WORD: [(&str, &str); 2] =
+/// Attributes whose loss is reported, with the words for it.
+const REPORTED_LOSSES: [(&str, &str); 2] =
     [("xmpNote:HasExtendedXMP", "Extended XMP"), ("GDepth:Format", "the depth map in its XMP")];
 
-/// In words, what a packet has that its picture does not take along.
+/// Returns, in words, the parts of a packet that are not kept.
 pub(super) fn lost(packet: &[u8]) -> impl Iterator<Item = &'static str> {
     let has = |name: &str| packet.windows(name.len()).any(|bytes| bytes == name.as_bytes());
-    WORTH_A_WORD.into_iter().filter(move |(name, _)| has(name)).map(|(_, word)| word)
+    REPORTED_LOSSES.into_iter().filter(move |(name, _)| has(name)).map(|(_, word)| word)
 }
 
-/// The packet of a picture that stands upright and is alone in its file.
+/// Returns the packet for a picture that is upright and alone in its file.
 ///
 /// # Errors
-/// In words, what cannot be taken over.
+/// Returns, in words, what cannot be kept.
 pub(super) fn kept(packet: Vec<u8>) -> Result<String, &'static str> {
     let packet = String::from_utf8(packet).map_err(|_| "XMP that is not in UTF-8")?;
-    let packet = without_attributes(&packet, &ELSEWHERE);
+    let packet = without_attributes(&packet, &EXTERNAL_PREFIXES);
     let is_there = |name: &&str| packet.contains(&format!("<{name}"));
-    if ELSEWHERE.iter().chain(&THUMBNAILS).any(is_there) || packet.contains(THUMBNAILS[1]) {
+    if EXTERNAL_PREFIXES.iter().chain(&THUMBNAILS).any(is_there) || packet.contains(THUMBNAILS[1]) {
         return Err("XMP that has other pictures");
     }
-    Ok(upright(packet))
+    Ok(reset_orientation(packet))
 }
 
-/// The packet without attributes whose names begin so. What declares their prefixes stays, and does no harm.
+/// Removes attributes with these prefixes. The declarations of the prefixes stay, which is harmless.
 fn without_attributes(packet: &str, prefixes: &[&str]) -> String {
     let mut kept = String::with_capacity(packet.len());
     let mut rest = packet;
@@ -65,7 +65,7 @@ fn without_attributes(packet: &str, prefixes: &[&str]) -> String {
     kept + rest
 }
 
-/// How long the attribute is that a text begins with: a name, `=`, and a value in quotes.
+/// Returns the length of the attribute at the start of a text: a name, `=`, and a quoted value.
 fn attribute_bytes(text: &str) -> Option<usize> {
     let (name, value) = text.split_once('=')?;
     let is_name = |c: char| c.is_ascii_alphanumeric() || matches!(c, ':' | '_' | '-' | '.');
@@ -75,8 +75,8 @@ fn attribute_bytes(text: &str) -> Option<usize> {
     name.trim_ascii_end().chars().all(is_name).then_some(text.len() - quoted.len() + end)
 }
 
-/// The same, where the packet says how the picture was held.
-fn upright(mut packet: String) -> String {
+/// Sets the orientation in a packet to upright.
+fn reset_orientation(mut packet: String) -> String {
     let mut from = 0;
     while let Some(found) = packet[from..].find(ORIENTATION) {
         let after = from + found + ORIENTATION.len();
@@ -113,7 +113,7 @@ mod tests {
             ["Extended XMP", "the depth map in its XMP"]
         );
         assert_eq!(lost(packet("", "").as_bytes()).count(), 0);
-        // A value that never ends stays as it is.
+        // An unterminated value stays as it is.
         assert!(kept(" GDepth:Data=\"AAAA", "").unwrap().contains("GDepth:Data"));
         for elements in ["<GDepth:Data>AAAA</GDepth:Data>", "<xmp:Thumbnails/>", "<Container:Directory/>"] {
             assert!(kept("", elements).is_err(), "{elements}");

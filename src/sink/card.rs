@@ -1,63 +1,63 @@
-//! The still card: what a live output shows while there is no picture.
+//! The still card that a live output shows while there is no picture.
 
 use crate::frame::ColorImage;
 
-/// Background at the top and at the bottom, and the icon; sRGB.
+/// Background colour at the top and at the bottom, and colour of the icon; sRGB.
 const TOP: [f32; 3] = [44.0, 48.0, 56.0];
 const BOTTOM: [f32; 3] = [24.0, 26.0, 31.0];
 const ICON: [f32; 3] = [150.0, 158.0, 170.0];
 
-/// How far the icon reaches from the middle to either side, up and down, in units.
-const REACH: (f32, f32) = (2.2, 1.8);
+/// Half-width and half-height of the icon, in units.
+const HALF_SIZE: (f32, f32) = (2.2, 1.8);
 
-/// A camera that is crossed out, in the middle of a dark picture: the camera is off.
+/// Draws a crossed-out camera in the centre of a dark picture: the camera is off.
 pub fn draw(picture: &mut ColorImage) {
     let (width, height) = (picture.width as usize, picture.height as usize);
     // The icon is about four units wide and two high.
     let unit_px = 0.09 * width.min(height) as f32;
     let middle = (width as f32 / 2.0, height as f32 / 2.0);
-    let around = |middle: f32, reach: f32| {
-        // The edge is antialiased over a pixel: half of one to either side.
-        let reach_px = reach * unit_px + 1.0;
-        (middle - reach_px).max(0.0) as usize..(middle + reach_px) as usize
+    let pixel_range = |middle: f32, half_size: f32| {
+        // The edge is antialiased over one pixel: half a pixel to either side.
+        let half_size_px = half_size * unit_px + 1.0;
+        (middle - half_size_px).max(0.0) as usize..(middle + half_size_px) as usize
     };
-    let (columns, rows) = (around(middle.0, REACH.0), around(middle.1, REACH.1));
+    let (columns, rows) = (pixel_range(middle.0, HALF_SIZE.0), pixel_range(middle.1, HALF_SIZE.1));
     for (y, row) in picture.rgb.chunks_exact_mut((3 * width).max(1)).enumerate() {
         let down = (y as f32 + 0.5) / height as f32;
-        let behind: [f32; 3] = std::array::from_fn(|channel| TOP[channel] + (BOTTOM[channel] - TOP[channel]) * down);
+        let background: [f32; 3] = std::array::from_fn(|channel| TOP[channel] + (BOTTOM[channel] - TOP[channel]) * down);
         let pixels = row.as_chunks_mut::<3>().0;
-        pixels.fill(behind.map(|value| value.round() as u8));
+        pixels.fill(background.map(|value| value.round() as u8));
         if !rows.contains(&y) {
             continue;
         }
         for (x, pixel) in pixels.iter_mut().enumerate().take(columns.end).skip(columns.start) {
             let at = ((x as f32 + 0.5 - middle.0) / unit_px, (y as f32 + 0.5 - middle.1) / unit_px);
-            let cover = (0.5 - icon_distance(at) * unit_px).clamp(0.0, 1.0);
+            let coverage = (0.5 - icon_distance(at) * unit_px).clamp(0.0, 1.0);
             *pixel = std::array::from_fn(|channel| {
-                (behind[channel] + (ICON[channel] - behind[channel]) * cover).round() as u8
+                (background[channel] + (ICON[channel] - background[channel]) * coverage).round() as u8
             });
         }
     }
 }
 
-/// Signed distance to the crossed-out camera, in units, negative inside: its body, its lens at the right, and a stroke
-/// across with a gap to both.
+/// Returns the signed distance to the crossed-out camera, in units, negative inside: its body, its lens at the right,
+/// and a stroke across, with a gap to both.
 fn icon_distance(at: (f32, f32)) -> f32 {
     let body = rectangle_distance((at.0 + 0.55, at.1), (1.35, 1.0), 0.3);
-    // A trapezium that opens to the right; 0.9 makes a distance of the height above a sloping side.
+    // A trapezium that opens to the right; 0.9 converts the height above a sloping side to a distance.
     let beside = at.0 - 1.0;
     let lens = (-beside).max(beside - 0.9).max((at.1.abs() - 0.3 - 0.5 * beside.clamp(0.0, 0.9)) * 0.9);
     let stroke = segment_distance(at, (-2.0, -1.55), (2.0, 1.55));
     body.min(lens).max(0.34 - stroke).min(stroke - 0.13)
 }
 
-/// Signed distance to a rectangle around the origin with rounded corners.
+/// Returns the signed distance to a rectangle around the origin with rounded corners.
 fn rectangle_distance(at: (f32, f32), half: (f32, f32), corner: f32) -> f32 {
     let (x, y) = (at.0.abs() - half.0 + corner, at.1.abs() - half.1 + corner);
     x.max(0.0).hypot(y.max(0.0)) + x.max(y).min(0.0) - corner
 }
 
-/// Distance to the line segment from `from` to `to`.
+/// Returns the distance to the line segment from `from` to `to`.
 fn segment_distance(at: (f32, f32), from: (f32, f32), to: (f32, f32)) -> f32 {
     let (line, offset) = ((to.0 - from.0, to.1 - from.1), (at.0 - from.0, at.1 - from.1));
     let along = (offset.0 * line.0 + offset.1 * line.1) / (line.0 * line.0 + line.1 * line.1);
@@ -76,9 +76,9 @@ mod tests {
             draw(&mut card);
             let light = |pixel: &&[u8; 3]| pixel[1] > 120;
             let pixels = card.rgb.as_chunks::<3>().0;
-            let share = pixels.iter().filter(light).count() as f32 / pixels.len() as f32;
-            assert!((0.01..0.1).contains(&share), "{width} x {height}: {share}");
-            // None of it in the outer quarter.
+            let fraction = pixels.iter().filter(light).count() as f32 / pixels.len() as f32;
+            assert!((0.01..0.1).contains(&fraction), "{width} x {height}: {fraction}");
+            // No light pixels in the outer quarter.
             for (at, pixel) in pixels.iter().enumerate() {
                 let (x, y) = (at as u32 % width, at as u32 / width);
                 let outside = |at: u32, of: u32| at < of / 4 || at >= of - of / 4;

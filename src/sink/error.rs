@@ -16,7 +16,7 @@ const NOT_BUILT: &str = "this program was built without a window; build it with 
 #[allow(missing_docs)] // The messages say what the fields are.
 #[derive(Debug, thiserror::Error)]
 pub enum SinkError {
-    /// Not the name of a sink.
+    /// The name is not that of a sink.
     #[error(
         "no sink '{name}'{}: use /dev/videoN or pipewire[:NAME] (a virtual camera), {}DIR/ (a folder, with the slash), FILE.y4m, \
          FILE.mp4, FILE.mkv, FILE.webm, - (y4m on standard output) or null",
@@ -25,22 +25,22 @@ pub enum SinkError {
     )]
     Target {
         name: String,
-        /// What may have been meant.
+        /// A similar name that may have been meant.
         near: Option<String>,
     },
-    /// A folder that is there, and may be meant or not.
+    /// An existing folder, named without the slash that would make it a sink.
     #[error("no sink '{name}': it is a folder; to write numbered PNG files into it, give {name}/ (with the slash)")]
     NoSlash { name: String },
-    /// Standard output has a name of its own.
+    /// Standard output is named `-`.
     #[error("y4m on standard output is called -")]
     NameOfStdout,
-    /// A file that is no video.
+    /// An existing file that is not a video.
     #[error("{} is neither a folder nor a video: give DIR/, FILE.y4m, FILE.mp4, FILE.mkv or FILE.webm", path.display())]
     NoFolder { path: PathBuf },
     #[error("{} is {what}, and is not replaced by a file; choose another name{}", path.display(), if *what == "a pipe" { ", or write y4m into it by `--to - > PIPE`" } else { "" })]
     NoFile {
         path: PathBuf,
-        /// Such as a folder.
+        /// For example a folder.
         what: &'static str,
     },
     #[error("{} exists; choose another name or overwrite it with --force", path.display())]
@@ -48,27 +48,27 @@ pub enum SinkError {
     /// The folder cannot be written.
     #[error(transparent)]
     Folder(#[from] FolderError),
-    /// It failed, but what it had is kept.
+    /// Writing failed, but the frames until then are kept.
     #[error("{error}; what there was until then is kept as {}", kept.display())]
     Kept {
         error: Box<SinkError>,
         /// The file or folder.
         kept: PathBuf,
     },
-    /// It failed, and what it had could not be kept.
+    /// Writing failed, and the frames until then could not be kept.
     #[error("{error}; what there was until then is lost: {cause}")]
     Lost {
         error: Box<SinkError>,
-        /// Why it could not be kept.
+        /// Why they could not be kept.
         cause: io::Error,
     },
-    /// Somebody removed the file, or its folder.
+    /// The file or its folder was removed while it was written.
     #[error("{} was removed while it was written", path.display())]
     Removed { path: PathBuf },
     /// A defect of this program.
     #[error("{sink}: panicked: {what}; please report this")]
     Panic { sink: String, what: String },
-    /// The system gives no thread for an output.
+    /// The system refused a thread for an output.
     #[error("{sink}: cannot start its thread: {cause}")]
     Thread { sink: String, cause: io::Error },
     /// The file system refused.
@@ -76,13 +76,13 @@ pub enum SinkError {
     Write {
         /// The file or folder.
         path: PathBuf,
-        /// What the system said.
+        /// The system error.
         cause: io::Error,
     },
-    /// There is no room left for it.
+    /// The disk is full.
     #[error("the disk is full (No space left on device): {} ends early", path.display())]
     Full { path: PathBuf },
-    /// A frame of another size than the stream's.
+    /// A frame's size differs from the stream's.
     #[error("the stream is {} x {} pixels, and a frame has {} x {}", made_for.0, made_for.1, got.0, got.1)]
     Size {
         /// Width and height of the stream.
@@ -117,33 +117,33 @@ pub enum SinkError {
     #[cfg(feature = "camera")]
     #[error(transparent)]
     Loopback(#[from] LoopbackError),
-    /// The virtual camera cannot be given to PipeWire.
+    /// PipeWire does not accept the virtual camera.
     #[cfg(feature = "pipewire")]
     #[error(transparent)]
     PipeWire(#[from] PipeWireError),
-    /// Built without PipeWire.
+    /// The program was built without PipeWire.
     #[cfg(not(feature = "pipewire"))]
     #[error(
         "--to pipewire: this program was built without PipeWire; build it with the feature pipewire. For a folder of this \
          name, ./pipewire"
     )]
     NoPipeWire,
-    /// A camera of PipeWire's without the name that it should have.
+    /// The name of a PipeWire camera is empty or unreadable.
     #[error(
         "pipewire:NAME needs a name that people can read, such as pipewire:'My camera'; without one, it is pipewire"
     )]
     NoLabel,
-    /// A filter without the camera that it is for.
+    /// A filter without a PipeWire camera as the source.
     #[error("--to filter is for a stream of a camera that PipeWire has: bokehcam stream pipewire:NAME --to filter")]
     Filter,
-    /// Built without virtual cameras.
+    /// The program was built without virtual cameras.
     #[cfg(not(feature = "camera"))]
     #[error("{}: this program was built without cameras; build it with the feature camera", path.display())]
     NoCamera { path: PathBuf },
 }
 
 impl SinkError {
-    /// Puts the path to a system error.
+    /// Converts a system error, for `map_err`: adds the path.
     pub(super) fn write(path: &Path) -> impl FnOnce(io::Error) -> Self {
         |cause| match cause.kind() {
             io::ErrorKind::StorageFull => Self::Full { path: path.to_owned() },

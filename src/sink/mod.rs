@@ -1,8 +1,8 @@
-//! Where frames go.
+//! Outputs for frames.
 //!
-//! A file appears under its name only when it is complete: it is written beside that name and renamed. Nothing that
-//! exists is overwritten unless that was asked for, and then only by what is whole. What has frames and cannot have its
-//! name is kept as `NAME.incomplete`.
+//! A file appears under its name only when it is complete: it is written beside that name and renamed. Existing files
+//! are overwritten only on request, and only by complete ones. An output that has frames but cannot get its name is
+//! kept as `NAME.incomplete`.
 
 #[doc(hidden)]
 pub mod card;
@@ -53,136 +53,136 @@ use crate::frame::{ColorImage, YuyvImage};
 use crate::link::demand::Demand;
 use crate::stats::{NodeUse, OutputUse};
 
-/// Whether all frames came that were to come.
+/// Whether the output has all frames of the run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Ending {
-    /// They did, as far as anybody knows how many there would be.
+    /// It has, as far as the number of frames is known.
     Whole,
-    /// A fault came between, or somebody broke off what has an end of its own.
+    /// A fault or an interrupt ended the run before its own end.
     Cut,
 }
 
-/// Takes finished frames, in order.
+/// Receives finished frames, in order.
 ///
-/// Dropping a sink without [`Sink::finish`] gives up its output: no file gets its name, but frames that it has are
+/// Dropping a sink without [`Sink::finish`] aborts its output: no file gets its name, but frames already written are
 /// kept.
 pub trait Sink: Send {
-    /// Takes one frame, which was captured at `time_ns` by the clock of its source, later than the one before. `Break`
-    /// says that the reader at the other end has gone; it did not get this frame.
+    /// Writes one frame, captured at `time_ns` by the clock of its source, later than the previous one. `Break` means
+    /// that the reader at the other end has gone; it did not get this frame.
     ///
     /// # Errors
-    /// The frame could not be written. A file then takes no more; what it had is kept, and the error says where.
+    /// The frame could not be written. A file then accepts no more; its content is kept, and the error says where.
     fn put(&mut self, frame: &ColorImage, time_ns: u64) -> Result<ControlFlow<()>, SinkError>;
 
-    /// Whether pictures are to come by [`Sink::put_yuyv`] from now on, where that is easy. Those that are under way come
-    /// as they were wanted before, so whoever has said so once takes both for good.
+    /// Whether pictures should come through [`Sink::put_yuyv`] from now on, where that is cheap. Pictures in flight
+    /// still arrive in the earlier form, so a sink that has once returned true must accept both from then on.
     fn wants_yuyv(&mut self) -> bool {
         false
     }
 
-    /// [`Sink::put`] of a picture that is YUYV already, for sinks that [wanted](Sink::wants_yuyv) such. The memory of
-    /// another picture may be left in its place.
+    /// Writes a picture that is YUYV already, for sinks that [want](Sink::wants_yuyv) it, like [`Sink::put`]. May swap
+    /// the picture's memory for another buffer.
     ///
     /// # Errors
-    /// As for [`Sink::put`]; it never wanted such.
+    /// Those of [`Sink::put`]; the sink never wanted YUYV.
     fn put_yuyv(&mut self, frame: &mut YuyvImage, time_ns: u64) -> Result<ControlFlow<()>, SinkError> {
         let _ = (frame, time_ns);
         Err(SinkError::Yuyv)
     }
 
-    /// Told before [`Sink::put`] and [`Sink::put_yuyv`] when that frame was captured, by the clock of the run: for outputs
-    /// that hand it on.
+    /// Sets the capture time, by the clock of the run, of the frame in the next [`Sink::put`] or [`Sink::put_yuyv`]:
+    /// for outputs that pass it on.
     fn captured(&mut self, captured_ns: u64) {
         let _ = captured_ns;
     }
 
-    /// How long a live output may go without a picture from now on; whenever that has passed, [`Sink::repeat`] is
-    /// called. `None` for everything that stores frames.
+    /// Longest time that a live output may go without a picture; whenever it has passed, [`Sink::repeat`] is called.
+    /// `None` for outputs that store frames.
     fn hold(&self) -> Option<Duration> {
         None
     }
 
-    /// Shows the last picture again; a still card before the first, and while nobody watches. `Continue` says whether
-    /// anything was shown; `Break` as for [`Sink::put`].
+    /// Shows the last picture again; a still card before the first one, and while no client watches. `Continue` holds
+    /// whether anything was shown; `Break` is as for [`Sink::put`].
     ///
     /// # Errors
-    /// It could not be written.
+    /// The picture could not be written.
     fn repeat(&mut self) -> Result<ControlFlow<(), bool>, SinkError> {
         Ok(ControlFlow::Continue(false))
     }
 
-    /// Takes the still card in the place of a picture, so that nothing of the pictures before can be seen any more. Whoever
-    /// calls it goes on to do so, at the times of frames, until the next picture.
+    /// Shows the still card instead of a picture, so that earlier pictures are no longer visible. The caller repeats
+    /// it, at frame times, until the next picture.
     ///
     /// # Errors
-    /// As for [`Sink::put`].
+    /// Those of [`Sink::put`].
     fn cover(&mut self, card: &ColorImage, time_ns: u64) -> Result<ControlFlow<()>, SinkError> {
         self.put(card, time_ns)
     }
 
-    /// Called in place of [`Sink::put`] for a frame that is not in CPU memory: a preview alone gets it.
+    /// Called instead of [`Sink::put`] for a frame that is not in CPU memory: only a preview gets it.
     fn pass_by(&mut self) {}
 
-    /// Whether frames that are put now go anywhere. While they do not, a frame counts as delivered once a preview shows
+    /// Whether frames currently reach an output. While they do not, a frame counts as delivered once a preview shows
     /// it.
     fn keeps(&self) -> bool {
         true
     }
 
-    /// Whether people see pictures as they come, as those of a virtual camera.
+    /// Whether its pictures are seen as they come, like those of a virtual camera.
     fn is_live(&self) -> bool {
         false
     }
 
-    /// Outputs that were given the card last, by [`Sink::cover`], and have not taken it yet.
+    /// Lists outputs that [`Sink::cover`] has sent the card, and that have not shown it yet.
     fn uncovered(&self) -> Vec<Uncovered> {
         Vec::new()
     }
 
-    /// What became of the frames that were put, of cameras that were given to PipeWire.
+    /// Returns the counters of frames sent to PipeWire cameras.
     fn nodes(&self) -> Vec<Counter<NodeUse>> {
         Vec::new()
     }
 
-    /// The same, of several outputs that get their frames at a time of their own.
+    /// Returns the counters of outputs that get their frames asynchronously.
     fn outputs(&self) -> Vec<Counter<OutputUse>> {
         Vec::new()
     }
 
-    /// Completes the output after the last frame. One that was cut short replaces nothing.
+    /// Completes the output after the last frame. A truncated one replaces nothing.
     ///
     /// # Errors
-    /// The output could not be completed; what there is of it is then kept, and the error says where. An error of
-    /// before is not reported again.
+    /// The output could not be completed; its content is then kept, and the error says where. An earlier error is not
+    /// reported again.
     fn finish(self: Box<Self>, ending: Ending) -> Result<(), SinkError> {
         let _ = ending;
         Ok(())
     }
 
-    /// One line for the report: what this is, and where.
+    /// Describes the output and its location, in one line for the report.
     fn describe(&self) -> String {
         "a sink of its own".into()
     }
 }
 
-/// Counts what a sink did, also after that has ended.
+/// Reads the counts of a sink, also after it has ended.
 pub type Counter<T> = Arc<dyn Fn() -> T + Send + Sync>;
 
-/// What the counters say now.
+/// Reads all counters.
 pub(crate) fn read<T>(counters: &[Counter<T>]) -> Vec<T> {
     counters.iter().map(|count| count()).collect()
 }
 
-/// An output that may still show a picture in the place of the card.
+/// An output that may still show a picture instead of the card.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Uncovered {
-    /// What it is, and where.
+    /// Description of the output.
     pub output: String,
-    /// Whether people see its pictures as they come.
+    /// Whether its pictures are seen as they come.
     pub is_live: bool,
 }
 
-/// Takes frames and forgets them.
+/// Discards all frames.
 pub struct Null;
 
 impl Sink for Null {
@@ -199,31 +199,31 @@ impl Sink for Null {
     }
 }
 
-/// What the frames will be like, what may be overwritten, and who is told of readers.
+/// Parameters for opening a sink.
 #[derive(Clone, Debug)]
 pub struct Options {
     /// Width and height in pixels.
     pub size: (u32, u32),
-    /// Time from frame to frame, > 0.
+    /// Time between frames, > 0.
     pub period_ns: u64,
-    /// How many frames will come at most, where that is known.
+    /// Maximum number of frames, if known.
     pub frames: Option<u64>,
-    /// Overwrite what exists.
+    /// Whether existing outputs may be overwritten.
     pub force: bool,
-    /// Width and height of a virtual camera; `None`: those of the frames, the width made even.
+    /// Width and height of a virtual camera; `None`: those of the frames, with the width rounded down to even.
     pub out_size: Option<(u32, u32)>,
-    /// Threads that compress a video; `None`: as many as the encoder takes. Its bytes may depend on them.
+    /// Number of encoder threads of a video; `None`: the encoder's default. The resulting bytes may depend on it.
     pub threads: Option<usize>,
-    /// Notice by a virtual camera whether somebody watches.
+    /// Receives whether a virtual camera is watched.
     pub demand: Option<Demand>,
-    /// For a filter: what the camera of PipeWire's is called, or a part of that, whose readers it gives its pictures to.
+    /// For a filter: the name of the PipeWire camera whose readers get the pictures, or a part of it.
     pub stands_for: Option<String>,
-    /// Once set, the run is to end: nobody is waited for any more who does nothing.
+    /// Set when the run has to end: from then on, stalled processes and readers are no longer waited for.
     pub stop: Arc<AtomicBool>,
 }
 
 impl Options {
-    /// Nothing that exists is overwritten, nobody is told of readers, and nothing stops the run.
+    /// Creates options that overwrite nothing, report no readers, and never stop.
     pub fn new(size: (u32, u32), period_ns: u64) -> Self {
         let stop = Arc::default();
         Self {
@@ -240,7 +240,7 @@ impl Options {
     }
 }
 
-/// The frames of a stream keep the size that its header states.
+/// Checks that a frame has the size that the stream's header states.
 fn check_size(made_for: (u32, u32), got: (u32, u32)) -> Result<(), SinkError> {
     if got == made_for { Ok(()) } else { Err(SinkError::Size { made_for, got }) }
 }

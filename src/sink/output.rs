@@ -1,4 +1,4 @@
-//! The file of a sink: gets its name when it is complete, and is kept under another if it cannot be.
+//! The file of a sink: gets its name when it is complete, and is kept under another name if it cannot have it.
 
 use std::fs::{self, File};
 use std::io::{self, ErrorKind};
@@ -8,7 +8,7 @@ use super::{Ending, SinkError};
 use crate::files::input::no_file_at;
 use crate::files::whole::{self, Part};
 
-/// A file under construction that holds frames. What has frames is never removed: where it cannot have its name, it is
+/// A file under construction that holds frames. A file with frames is never removed: if it cannot get its name, it is
 /// kept as `NAME.incomplete`.
 #[derive(Debug)]
 pub(super) struct Output {
@@ -16,13 +16,13 @@ pub(super) struct Output {
     force: bool,
     /// `None` once it has ended.
     part: Option<Part>,
-    /// Frames that are in it.
+    /// Number of frames in it.
     pub frames: u64,
 }
 
 impl Output {
-    /// Prepares to write `path`; missing folders above it are made. What a run that was killed left of it is kept,
-    /// which is logged.
+    /// Prepares to write `path`, creating missing parent folders. Unfinished files of a killed run are kept, which is
+    /// logged.
     pub(super) fn create(path: &Path, force: bool) -> Result<Self, SinkError> {
         if let Some(what) = no_file_at(path) {
             return Err(SinkError::NoFile { path: path.to_owned(), what });
@@ -40,7 +40,7 @@ impl Output {
         Ok(Self { path: path.to_owned(), force, part: Some(part), frames: 0 })
     }
 
-    /// The name in the end.
+    /// The final name.
     pub(super) fn path(&self) -> &Path {
         &self.path
     }
@@ -50,7 +50,7 @@ impl Output {
         self.part.is_none()
     }
 
-    /// Where it is meanwhile.
+    /// The temporary name.
     pub(super) fn part(&self) -> &Path {
         self.part.as_ref().map_or(&self.path, Part::part)
     }
@@ -59,33 +59,33 @@ impl Output {
         self.part.as_ref().map(Part::file).ok_or_else(|| ErrorKind::NotFound.into())
     }
 
-    /// Looks whether the file is still there: what is written to one that was removed is lost.
-    pub(super) fn check_there(&self) -> Result<(), SinkError> {
+    /// Fails if the file was removed: anything further written to it would be lost.
+    pub(super) fn check_exists(&self) -> Result<(), SinkError> {
         match self.part.as_ref().is_some_and(Part::is_removed) {
             true => Err(SinkError::Removed { path: self.path.clone() }),
             false => Ok(()),
         }
     }
 
-    /// Goes on with a file that has the same frames in a better form.
+    /// Continues with a file that has the same frames in a better form.
     pub(super) fn replace(&mut self, part: Part) {
         // Dropping the old part removes it.
         self.part = Some(part);
     }
 
-    /// Gives the finished file its name, or keeps it under another. One that was cut short replaces nothing.
+    /// Gives the finished file its name, or keeps it under another one. A truncated file replaces nothing.
     pub(super) fn complete(&mut self, ending: Ending) -> Result<(), SinkError> {
-        let there = self.check_there();
+        let exists = self.check_exists();
         let Some(mut part) = self.part.take() else { return Ok(()) };
-        if let Err(error) = there {
+        if let Err(error) = exists {
             return Err(self.keep_if_frames(part, error));
         }
         let replace = self.force && ending == Ending::Whole;
         let Err(cause) = part.try_commit(replace) else { return Ok(()) };
         let is_name_taken = cause.kind() == ErrorKind::AlreadyExists;
-        // Only a recording that was cut short gets here with `force`: it is no error that the old one stays.
+        // Only a truncated recording gets here with `force`; keeping the old file is not an error.
         if is_name_taken && self.force {
-            let (kept, path) = (kept(part), self.path.display());
+            let (kept, path) = (keep(part), self.path.display());
             tracing::warn!("{path} stays as it was: what was to replace it was cut short, and {kept}");
             return Ok(());
         }
@@ -94,22 +94,22 @@ impl Output {
         Err(self.keep_if_frames(part, error))
     }
 
-    /// Ends the file after a write error: keeps what there is, and adds to the error where.
-    pub(super) fn failed(&mut self, error: SinkError) -> SinkError {
+    /// Ends the file after a write error: keeps its content, and adds its location to the error.
+    pub(super) fn fail(&mut self, error: SinkError) -> SinkError {
         match self.part.take() {
             Some(part) => self.keep_if_frames(part, error),
             None => error,
         }
     }
 
-    /// Removes what was written.
-    pub(super) fn give_up(&mut self) {
+    /// Removes the file.
+    pub(super) fn discard(&mut self) {
         self.part = None;
     }
 
-    /// Keeps a part that has frames, and adds to the error where; removes any other.
+    /// Keeps a part that has frames, and adds its location to the error; removes any other.
     fn keep_if_frames(&self, part: Part, error: SinkError) -> SinkError {
-        // An encoder may have taken frames and not written any yet.
+        // An encoder may have accepted frames and not written any yet.
         let has_frames = self.frames > 0 && part.file().metadata().is_ok_and(|file| file.len() > 0);
         if !has_frames {
             return error;
@@ -125,30 +125,30 @@ impl Output {
 impl Drop for Output {
     fn drop(&mut self) {
         if let Some(part) = self.part.take().filter(|_| self.frames > 0) {
-            // Before the line, which may not be wanted: what it states would not be done then.
-            let kept = kept(part);
+            // Done before the log call, whose arguments are not evaluated if the level is disabled.
+            let kept = keep(part);
             tracing::warn!("{}: what there is of it {kept}", self.path.display());
         }
     }
 }
 
-/// Keeps the part, and says where.
-fn kept(part: Part) -> String {
+/// Keeps the part, and returns where as text for a message.
+fn keep(part: Part) -> String {
     match part.keep_incomplete() {
         Ok(kept) => format!("is kept as {}", kept.display()),
         Err(cause) => format!("is lost: {cause}"),
     }
 }
 
-/// Keeps what runs that were killed left of `path`; gives the new names.
+/// Keeps the files that killed runs left of `path`; returns the new names.
 fn recover(path: &Path) -> Result<Vec<PathBuf>, SinkError> {
     // A folder may be writable without being readable.
-    let left = whole::left_behind(path).unwrap_or_default();
-    let kept = left.into_iter().map(|part| keep_or_remove(&part, path));
+    let abandoned = whole::left_behind(path).unwrap_or_default();
+    let kept = abandoned.into_iter().map(|part| keep_or_remove(&part, path));
     kept.filter_map(Result::transpose).collect::<Result<_, _>>().map_err(SinkError::write(path))
 }
 
-/// Renames a part that was left behind to that of `path` with `.incomplete` in it, and gives that name; removes an empty one.
+/// Renames an abandoned part to `path` with `.incomplete` in the name, and returns that name; removes an empty one.
 fn keep_or_remove(part: &Path, path: &Path) -> io::Result<Option<PathBuf>> {
     let done = match part.metadata().map(|part| part.len()) {
         Ok(0) => fs::remove_file(part).map(|()| None),
@@ -162,10 +162,10 @@ fn keep_or_remove(part: &Path, path: &Path) -> io::Result<Option<PathBuf>> {
     }
 }
 
-/// Keeps the videos that killed runs left unfinished in a folder, each as `NAME.incomplete.mp4`; gives the new names.
-/// Videos whose `NAME` does not satisfy `is_ours` are left alone, and so is what cannot be renamed.
+/// Keeps the videos that killed runs left unfinished in a folder, each as `NAME.incomplete.mp4`; returns the new names.
+/// Ignores videos whose `NAME` does not satisfy `is_ours`, and those that cannot be renamed.
 pub fn recover_all(folder: &Path, is_ours: impl Fn(&str) -> bool) -> Vec<PathBuf> {
-    let left = whole::all_left_behind(folder).unwrap_or_default().into_iter();
-    let ours = left.filter(|(_, name)| name.to_str().is_some_and(&is_ours));
+    let abandoned = whole::all_left_behind(folder).unwrap_or_default().into_iter();
+    let ours = abandoned.filter(|(_, name)| name.to_str().is_some_and(&is_ours));
     ours.filter_map(|(part, name)| keep_or_remove(&part, &folder.join(name)).ok().flatten()).collect()
 }

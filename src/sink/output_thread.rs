@@ -1,4 +1,4 @@
-//! An output on a thread of its own, so that none waits for another.
+//! An output on a thread of its own, so that no output waits for another.
 
 use std::ops::ControlFlow;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -14,28 +14,28 @@ use crate::frame::ColorImage;
 use crate::link::{self, Abandoned, Received, Sender, Sent};
 use crate::stats::{NodeUse, OutputUse};
 
-/// An output that takes longer than this to complete is named to the user, who waits for it.
-const PATIENCE: Duration = Duration::from_secs(3);
+/// An output that takes longer than this to complete is reported to the user, who waits for it.
+const LONG_WAIT: Duration = Duration::from_secs(3);
 
-/// A sink on a thread of its own, and the link that it gets its pictures by.
+/// A sink on a thread of its own, and the link that delivers its pictures.
 pub(super) struct OutputThread {
     pub name: String,
-    /// Whether people see its pictures as they come.
+    /// Whether its pictures are seen as they come.
     pub is_live: bool,
     /// `None` once no more pictures will come.
-    to: Option<Sender<Arc<Picture>>>,
+    sender: Option<Sender<Arc<Picture>>>,
     shared: Arc<Shared>,
     outcome: Receiver<Outcome>,
     thread: Option<JoinHandle<()>>,
     nodes: Vec<Counter<NodeUse>>,
 }
 
-/// A picture that several outputs share.
+/// A picture shared by several outputs.
 pub(super) struct Picture {
     image: ColorImage,
-    /// By the clock of the source.
+    /// Time by the clock of the source.
     time_ns: u64,
-    /// By the clock of the run.
+    /// Capture time by the clock of the run.
     captured_ns: u64,
     /// Whether this is the still card.
     is_card: bool,
@@ -43,14 +43,14 @@ pub(super) struct Picture {
 
 /// How an output ended.
 pub(super) enum Outcome {
-    /// Its sink failed while frames came.
+    /// The sink failed while frames came.
     Failed(SinkError),
-    /// Its sink was completed, or its reader had gone.
+    /// The sink was completed, or its reader had gone.
     Ended(Result<(), SinkError>),
 }
 
 impl Outcome {
-    /// What went wrong, if anything did.
+    /// Returns the error, if there was one.
     pub fn error(self) -> Option<SinkError> {
         match self {
             Self::Failed(error) | Self::Ended(Err(error)) => Some(error),
@@ -59,98 +59,98 @@ impl Outcome {
     }
 }
 
-/// What an output and its thread know of each other.
+/// State shared by an output and its thread.
 #[derive(Default)]
 struct Shared {
-    /// How the run ended; unset, the sink is given up.
+    /// How the run ended; if unset, the sink is aborted.
     ending: OnceLock<Ending>,
-    /// Whether what it was given last is the still card.
+    /// Whether the last picture was the still card.
     shows_card: AtomicBool,
     frames: AtomicU64,
     repeats: AtomicU64,
     lost: AtomicU64,
 }
 
-/// What becomes of pictures that come faster than an output takes them.
+/// Policy for pictures that come faster than an output accepts them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Backpressure {
     /// They wait, and all other outputs with them.
     Block,
-    /// A newer one takes the place of the one that waits.
+    /// A newer picture replaces the waiting one.
     DropOldest,
 }
 
 impl OutputThread {
-    /// Starts a thread that gives `sink` its pictures. `told` is called there once that has ended, with the number of
-    /// frames that it took.
+    /// Starts a thread that passes pictures to `sink`, and calls `on_end` once the sink has ended, with the number of
+    /// frames received.
     ///
     /// # Errors
-    /// The system gives no thread; the sink is given up.
+    /// The system refuses the thread; the sink is aborted.
     pub fn start(
         sink: Box<dyn Sink>,
         backpressure: Backpressure,
-        told: impl FnOnce(u64, &Outcome) + Send + 'static,
+        on_end: impl FnOnce(u64, &Outcome) + Send + 'static,
     ) -> io::Result<Self> {
-        let (to, from) = if backpressure == Backpressure::DropOldest { link::live() } else { link::lossless() };
+        let (sender, receiver) = if backpressure == Backpressure::DropOldest { link::live() } else { link::lossless() };
         let (name, is_live, nodes) = (sink.describe(), sink.is_live(), sink.nodes());
-        let (shared, own) = (Arc::<Shared>::default(), name.clone());
-        let (tell, outcome) = mpsc::channel();
-        let mine = Arc::clone(&shared);
+        let (shared, sink_name) = (Arc::<Shared>::default(), name.clone());
+        let (outcome_sender, outcome) = mpsc::channel();
+        let thread_shared = Arc::clone(&shared);
         let serve = move || {
-            // A panic is the error of this output alone.
-            let ended = catch_unwind(AssertUnwindSafe(|| serve(sink, from, &mine)));
+            // A panic is an error of this output only.
+            let ended = catch_unwind(AssertUnwindSafe(|| serve(sink, receiver, &thread_shared)));
             let outcome = ended.unwrap_or_else(|panic| {
                 let text = panic.downcast_ref::<&str>().copied().or(panic.downcast_ref::<String>().map(String::as_str));
-                Outcome::Failed(SinkError::Panic { sink: own, what: text.unwrap_or("no reason given").into() })
+                Outcome::Failed(SinkError::Panic { sink: sink_name, what: text.unwrap_or("no reason given").into() })
             });
-            told(mine.frames.load(Ordering::Relaxed), &outcome);
-            // Who does not ask needs no answer.
-            let _ = tell.send(outcome);
+            on_end(thread_shared.frames.load(Ordering::Relaxed), &outcome);
+            // The receiver may be gone.
+            let _ = outcome_sender.send(outcome);
         };
         let thread = Some(thread::Builder::new().name("output".into()).spawn(serve)?);
-        Ok(Self { name, is_live, to: Some(to), shared, outcome, thread, nodes })
+        Ok(Self { name, is_live, sender: Some(sender), shared, outcome, thread, nodes })
     }
 
-    /// Hands a picture over. Gives it back where one that blocks had no room for so long.
-    pub fn send(&mut self, picture: Arc<Picture>, patience: Duration) -> Option<Arc<Picture>> {
-        let sent = self.to.as_mut().map_or(Err(Abandoned), |to| to.send_timeout(picture, patience));
+    /// Sends a picture. Returns it if a blocking output had no space within `timeout`.
+    pub fn send(&mut self, picture: Arc<Picture>, timeout: Duration) -> Option<Arc<Picture>> {
+        let sent = self.sender.as_mut().map_or(Err(Abandoned), |sender| sender.send_timeout(picture, timeout));
         match sent {
             Ok(Sent::Taken) => None,
             Ok(Sent::Displaced(_)) => {
-                self.lose();
+                self.count_lost();
                 None
             }
             Ok(Sent::Full(picture)) => Some(picture),
             Err(Abandoned) => {
-                self.to = None;
+                self.sender = None;
                 None
             }
         }
     }
 
     /// Counts a picture that it did not get.
-    pub fn lose(&self) {
+    pub fn count_lost(&self) {
         self.shared.lost.fetch_add(1, Ordering::Relaxed);
     }
 
-    /// Whether it still takes pictures, as far as that is known.
+    /// Whether it still accepts pictures, as far as is known.
     pub fn is_open(&self) -> bool {
-        self.to.is_some()
+        self.sender.is_some()
     }
 
-    /// Itself, if it may still show a picture in the place of the card.
+    /// Returns this output, if it may still show a picture instead of the card.
     pub fn uncovered(&self) -> Option<Uncovered> {
         let is_covered = self.shared.shows_card.load(Ordering::Acquire);
         (!is_covered).then(|| Uncovered { output: self.name.clone(), is_live: self.is_live })
     }
 
-    /// Whether nothing more becomes of it.
+    /// Whether its thread has ended.
     #[cfg(test)]
     pub fn has_ended(&self) -> bool {
         self.thread.as_ref().is_none_or(JoinHandle::is_finished)
     }
 
-    /// How it ended, if it has.
+    /// Returns how it ended, if it has.
     pub fn outcome(&mut self) -> Option<Outcome> {
         match self.outcome.try_recv() {
             Ok(outcome) => Some(outcome),
@@ -159,16 +159,16 @@ impl OutputThread {
         }
     }
 
-    /// No more pictures will come: its thread completes it.
+    /// Signals that no more pictures will come: its thread completes the sink.
     pub fn close(&mut self, ending: Ending) {
         let _ = self.shared.ending.set(ending);
-        self.to = None;
+        self.sender = None;
     }
 
-    /// Waits until it has ended. Who waits for long is told for what.
+    /// Waits until it has ended; logs a long wait.
     pub fn join(mut self) -> Outcome {
-        self.to = None;
-        let outcome = match self.outcome.recv_timeout(PATIENCE) {
+        self.sender = None;
+        let outcome = match self.outcome.recv_timeout(LONG_WAIT) {
             Err(RecvTimeoutError::Timeout) => {
                 tracing::warn!("{}: waiting until it is complete; Ctrl-C once more gives it up", self.name);
                 self.outcome.recv().ok()
@@ -178,7 +178,7 @@ impl OutputThread {
         outcome.unwrap_or(Outcome::Ended(Ok(())))
     }
 
-    /// Reads what it did with its frames, also after its end.
+    /// Creates a counter of its frames, which stays valid after its end.
     pub fn counter(&self) -> Counter<OutputUse> {
         let (output, shared) = (self.name.clone(), Arc::clone(&self.shared));
         Arc::new(move || OutputUse {
@@ -195,23 +195,23 @@ impl OutputThread {
 }
 
 impl Drop for OutputThread {
-    /// What its sink does in the end comes before whoever drops it goes on, such as to the program's end.
+    /// Waits for the sink's end before the caller continues, for example to the program's end.
     fn drop(&mut self) {
-        self.to = None;
+        self.sender = None;
         // It catches its panics.
         let _ = self.thread.take().map(JoinHandle::join);
     }
 }
 
-/// Gives a sink what comes until nothing more does, and completes it.
-fn serve(mut sink: Box<dyn Sink>, mut from: link::Receiver<Arc<Picture>>, shared: &Shared) -> Outcome {
+/// Passes pictures to a sink until no more come, and completes it.
+fn serve(mut sink: Box<dyn Sink>, mut receiver: link::Receiver<Arc<Picture>>, shared: &Shared) -> Outcome {
     loop {
         let received = match sink.hold() {
-            Some(hold) => from.recv_timeout(hold),
-            None => from.recv().map_or(Received::Ended, Received::Item),
+            Some(hold) => receiver.recv_timeout(hold),
+            None => receiver.recv().map_or(Received::Ended, Received::Item),
         };
         let flow = match received {
-            Received::Item(picture) => give(&mut *sink, &picture, shared),
+            Received::Item(picture) => put_picture(&mut *sink, &picture, shared),
             Received::Nothing => sink.repeat().map(|flow| {
                 let repeats = u64::from(flow == ControlFlow::Continue(true));
                 shared.repeats.fetch_add(repeats, Ordering::Relaxed);
@@ -222,7 +222,7 @@ fn serve(mut sink: Box<dyn Sink>, mut from: link::Receiver<Arc<Picture>>, shared
         match flow {
             Ok(ControlFlow::Continue(())) => {}
             Ok(ControlFlow::Break(())) => {
-                drop(from);
+                drop(receiver);
                 return Outcome::Ended(sink.finish(Ending::Whole));
             }
             // Not finished: a sink that fails has kept its output itself.
@@ -235,28 +235,28 @@ fn serve(mut sink: Box<dyn Sink>, mut from: link::Receiver<Arc<Picture>>, shared
     }
 }
 
-fn give(sink: &mut dyn Sink, picture: &Picture, shared: &Shared) -> Result<ControlFlow<()>, SinkError> {
+fn put_picture(sink: &mut dyn Sink, picture: &Picture, shared: &Shared) -> Result<ControlFlow<()>, SinkError> {
     let Picture { image, time_ns, captured_ns, is_card } = picture;
     sink.captured(*captured_ns);
     let flow = if *is_card { sink.cover(image, *time_ns)? } else { sink.put(image, *time_ns)? };
     if flow.is_continue() {
         shared.frames.fetch_add(1, Ordering::Relaxed);
-        // Release: who sees the card there sees that the sink has taken it.
+        // Release: a reader that sees the card here also sees that the sink has received it.
         shared.shows_card.store(*is_card, Ordering::Release);
     }
     Ok(flow)
 }
 
-/// Pictures that go round: as many as all outputs hold at a time, each copied once for all of them.
+/// A pool of pictures, sized by the number that the outputs hold at a time; each is copied once for all outputs.
 #[derive(Default)]
 pub(super) struct Pictures {
     all: Vec<Arc<Picture>>,
 }
 
 impl Pictures {
-    /// A copy of `frame` that outputs can share. Its memory is that of a picture which none has any more, once there are
-    /// such.
-    pub fn share(&mut self, frame: &ColorImage, time_ns: u64, captured_ns: u64, is_card: bool) -> Arc<Picture> {
+    /// Copies `frame` to a picture that outputs can share. Reuses a picture that no output holds any more, if there is
+    /// one.
+    pub fn copy_frame(&mut self, frame: &ColorImage, time_ns: u64, captured_ns: u64, is_card: bool) -> Arc<Picture> {
         let free = self.all.iter_mut().position(|picture| Arc::get_mut(picture).is_some());
         let at = free.unwrap_or_else(|| {
             self.all.push(Arc::new(Picture { image: ColorImage::default(), time_ns, captured_ns, is_card }));

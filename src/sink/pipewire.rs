@@ -1,9 +1,9 @@
-//! A virtual camera of PipeWire's: what call programs of the session list as a camera, without a kernel module; or a filter,
-//! which programs are given that ask for a real one.
+//! A PipeWire virtual camera, which the session's call programs list without a kernel module; or a filter that replaces
+//! a real camera for the programs that request it.
 //!
-//! Pictures go to the node's thread in the format that readers take, by a slot in which the newest wins, and are copied there
-//! to the readers' memory. While nobody watches they stay here. The node shows a still card until the first one comes, and
-//! again once nobody watches.
+//! Pictures go to the node's thread in the readers' format, through a slot in which the newest wins, and are copied
+//! there to the readers' memory. While no client watches, they are dropped here. The node shows a still card until the
+//! first picture, and again while no client watches.
 
 mod encoder;
 
@@ -12,7 +12,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::Duration;
 
-use encoder::{Encoder, Format, writable};
+use encoder::{Encoder, Format, writable_modes};
 
 use super::rate::frame_rate;
 use super::{Counter, Options, Sink, SinkError, card, check_size};
@@ -26,31 +26,31 @@ use crate::pipewire::mode::{Agreed, Mode};
 use crate::pipewire::node::{Drawn, Memory, Node, Settings, Show};
 use crate::stats::NodeUse;
 
-/// What a camera is called that was given no name.
+/// Default name of a camera.
 const NAME: &str = "bokehcam";
-/// The shortest and the longest time after which a reader is given the last picture again.
+/// Shortest and longest time after which the last picture is repeated for readers.
 const HOLD: (Duration, Duration) = (Duration::from_millis(100), Duration::from_secs(1));
-/// Pictures that are under way at most: one being made, one that waits, and two with the node, as it takes the next one
-/// before it lets go of the last.
+/// Maximum number of pictures in flight: one being made, one waiting, and two with the node, which receives the next
+/// one before it releases the last.
 const PICTURES: usize = 4;
 
-/// A camera that is given to PipeWire.
+/// A camera provided to PipeWire.
 pub struct PipeWire {
     node: Node,
-    about: String,
-    /// Of the pictures of the run.
+    description: String,
+    /// Size of the run's pictures.
     size: (u32, u32),
-    to: Sender<Frame>,
+    sender: Sender<Frame>,
     pictures: Pool<Picture>,
-    /// What readers have agreed on, packed.
+    /// The readers' negotiated format, packed.
     format: Arc<AtomicU64>,
-    /// For what was agreed on when the last picture came.
+    /// Encoder for the format that was negotiated when the last picture came.
     encoder: Encoder,
     is_watched: Arc<AtomicBool>,
     captured_ns: u64,
 }
 
-/// A picture in the format of readers.
+/// A picture in the readers' format.
 struct Picture {
     format: Format,
     bytes: Vec<u8>,
@@ -59,13 +59,13 @@ struct Picture {
 /// A picture on its way to the node.
 struct Frame {
     picture: Pooled<Picture>,
-    /// By the system's monotonic clock.
+    /// Capture time on the system's monotonic clock.
     captured_ns: u64,
 }
 
 impl PipeWire {
-    /// Gives PipeWire a camera that people see as `label` (`None`: bokehcam), with a still card until the first picture
-    /// comes. With a demand in the options, that is told whether somebody watches.
+    /// Creates a PipeWire camera shown to users as `label` (`None`: bokehcam), with a still card until the first
+    /// picture comes. A demand in the options is kept up to date with whether the camera is watched.
     ///
     /// # Errors
     /// PipeWire cannot be reached, or refuses.
@@ -73,19 +73,19 @@ impl PipeWire {
         let label = label.unwrap_or(NAME);
         let camera = Self::new(label, (node_name(label), None), |best| vec![best.mode()], options)?;
         let (width, height) = camera.encoder.format().size();
-        let about = format!("PipeWire camera {} ({label}), YUY2 {width}x{height}", camera.node.name());
-        Ok(Self { about, ..camera })
+        let description = format!("PipeWire camera {} ({label}), YUY2 {width}x{height}", camera.node.name());
+        Ok(Self { description, ..camera })
     }
 
-    /// Gives everybody who asks for the camera that the options [name](Options::stands_for) the pictures of this sink, in the
-    /// formats of that camera.
+    /// Creates a filter for the camera that the options [name](Options::stands_for): all clients that request the
+    /// camera get the pictures of this sink, in the formats of that camera.
     ///
     /// # Errors
-    /// As for [`PipeWire::open`]; there is no such camera, or the session manager knows no filters.
+    /// Those of [`PipeWire::open`]; the camera does not exist, or the session manager does not support filters.
     pub fn filter(options: &Options) -> Result<Self, SinkError> {
-        let meant = options.stands_for.as_deref().ok_or(SinkError::Filter)?;
-        let camera = Graph::filterable(meant)?;
-        let modes = writable(&camera.modes);
+        let camera_name = options.stands_for.as_deref().ok_or(SinkError::Filter)?;
+        let camera = Graph::filterable(camera_name)?;
+        let modes = writable_modes(&camera.modes);
         if modes.is_empty() {
             let why = "it gives pictures of no format that can be written".to_owned();
             return Err(PipeWireError::NoMode { name: camera.name, why }.into());
@@ -93,11 +93,12 @@ impl PipeWire {
         let label = format!("{}, blurred", camera.label);
         let name = (format!("{NAME}.{}", camera.name), Some(camera.name.clone()));
         let filter = Self::new(&label, name, |_| modes, options)?;
-        let about = format!("everybody who asks for pipewire:{} ({})", camera.name, camera.label);
-        Ok(Self { about, ..filter })
+        let description = format!("everybody who asks for pipewire:{} ({})", camera.name, camera.label);
+        Ok(Self { description, ..filter })
     }
 
-    /// A node of this name, perhaps one that stands for a camera, with the modes that `modes` makes of its own best one.
+    /// Creates a node, which may stand in for a camera, with the modes that `modes` returns for the node's default
+    /// mode.
     fn new(
         label: &str,
         (name, stands_for): (String, Option<String>),
@@ -105,7 +106,7 @@ impl PipeWire {
         options: &Options,
     ) -> Result<Self, SinkError> {
         let (width, height) = options.out_size.unwrap_or(options.size);
-        // Two pixels share their colour, and readers halve the height as well.
+        // Two pixels share their chroma, and readers subsample the height as well.
         let size = ((width & !1).max(2), (height & !1).max(2));
         let (rate, scale) = frame_rate(options.period_ns);
         let saturated = |number: u64| u32::try_from(number).unwrap_or(u32::MAX);
@@ -118,10 +119,10 @@ impl PipeWire {
             stands_for,
             hold: (2 * Duration::from_nanos(options.period_ns)).clamp(HOLD.0, HOLD.1),
         };
-        let (to, from) = link::live();
+        let (sender, receiver) = link::live();
         let (is_watched, format) = (Arc::new(AtomicBool::new(false)), Arc::new(AtomicU64::default()));
         let mut screen = Screen {
-            from,
+            receiver,
             frame: None,
             is_new: false,
             card: Picture { format: Format::from(&best), bytes: Vec::new() },
@@ -135,11 +136,11 @@ impl PipeWire {
         let (first, bytes) = (encoder.format(), encoder.memory().bytes);
         let node = Node::new(settings, screen)?;
         let pictures = Pool::new(PICTURES, || Picture { format: first, bytes: vec![0; bytes] });
-        let about = String::new();
-        Ok(Self { node, about, size: options.size, to, pictures, format, encoder, is_watched, captured_ns: 0 })
+        let description = String::new();
+        Ok(Self { node, description, size: options.size, sender, pictures, format, encoder, is_watched, captured_ns: 0 })
     }
 
-    fn agreed(&self) -> Format {
+    fn negotiated_format(&self) -> Format {
         Format::unpacked(self.format.load(Ordering::Relaxed))
     }
 }
@@ -148,7 +149,7 @@ fn count(counter: &AtomicU64, pictures: u64) {
     counter.fetch_add(pictures, Ordering::Relaxed);
 }
 
-/// The name that programs remember a camera by: small letters and digits, and dashes for what is between them.
+/// Derives a camera's node name from its label: lower-case letters and digits, joined by dashes.
 fn node_name(label: &str) -> String {
     let words = label.split(|c: char| !c.is_alphanumeric()).filter(|word| !word.is_empty());
     let name = words.map(str::to_lowercase).collect::<Vec<_>>().join("-");
@@ -156,7 +157,7 @@ fn node_name(label: &str) -> String {
 }
 
 impl PipeWire {
-    /// Sends the node a picture, which `make` makes where it is for somebody.
+    /// Sends the node a picture, which `make` creates only if the camera is watched.
     fn send(&mut self, make: impl FnOnce(&mut Self, &mut Picture)) -> ControlFlow<()> {
         if !self.is_watched.load(Ordering::Relaxed) {
             count(&self.node.counts().unwatched, 1);
@@ -167,7 +168,7 @@ impl PipeWire {
             return ControlFlow::Continue(());
         };
         make(self, &mut picture);
-        match self.to.send(Frame { picture, captured_ns: self.captured_ns }) {
+        match self.sender.send(Frame { picture, captured_ns: self.captured_ns }) {
             Ok(overtaken) => count(&self.node.counts().overtaken, overtaken.is_some().into()),
             // The node's thread has panicked, which was printed.
             Err(link::Abandoned) => return ControlFlow::Break(()),
@@ -183,7 +184,7 @@ impl Sink for PipeWire {
     }
 
     fn put(&mut self, frame: &ColorImage, _: u64) -> Result<ControlFlow<()>, SinkError> {
-        let format = self.agreed();
+        let format = self.negotiated_format();
         if self.encoder.format() != format
             && let Some(encoder) = Encoder::new(format)
         {
@@ -196,13 +197,13 @@ impl Sink for PipeWire {
     }
 
     fn wants_yuyv(&mut self) -> bool {
-        self.agreed().is_yuyv(self.size)
+        self.negotiated_format().is_yuyv(self.size)
     }
 
     fn put_yuyv(&mut self, frame: &mut YuyvImage, _: u64) -> Result<ControlFlow<()>, SinkError> {
         check_size(self.size, frame.size())?;
         Ok(self.send(|camera, picture| {
-            // What readers have agreed on meanwhile comes with the next one.
+            // A format negotiated meanwhile applies from the next picture on.
             picture.format = Format::yuyv(camera.size);
             std::mem::swap(&mut picture.bytes, &mut frame.bytes);
         }))
@@ -214,33 +215,33 @@ impl Sink for PipeWire {
 
     fn nodes(&self) -> Vec<Counter<NodeUse>> {
         let (node, counts) = (self.node.name().to_owned(), Arc::clone(self.node.counts()));
-        let of = |counter: &AtomicU64| counter.load(Ordering::Relaxed);
+        let load = |counter: &AtomicU64| counter.load(Ordering::Relaxed);
         vec![Arc::new(move || NodeUse {
             node: node.clone(),
-            shown: of(&counts.shown),
-            repeats: of(&counts.repeats),
-            unwatched: of(&counts.unwatched),
-            overtaken: of(&counts.overtaken),
-            no_buffer: of(&counts.no_buffer),
-            returns: of(&counts.returns),
+            shown: load(&counts.shown),
+            repeats: load(&counts.repeats),
+            unwatched: load(&counts.unwatched),
+            overtaken: load(&counts.overtaken),
+            no_buffer: load(&counts.no_buffer),
+            returns: load(&counts.returns),
         })]
     }
 
     fn describe(&self) -> String {
-        self.about.clone()
+        self.description.clone()
     }
 }
 
-/// What the node shows, on its thread.
+/// The node's pictures, on its thread.
 struct Screen {
-    from: Receiver<Frame>,
-    /// The picture that came last, while somebody watches.
+    receiver: Receiver<Frame>,
+    /// The last picture, while a client watches.
     frame: Option<Frame>,
-    /// Whether that was not drawn yet.
+    /// Whether it was not drawn yet.
     is_new: bool,
-    /// Shown while there is none, as agreed.
+    /// Shown while there is no picture, in the negotiated format.
     card: Picture,
-    /// Tells what was agreed on.
+    /// Publishes the negotiated format.
     format: Arc<AtomicU64>,
     demand: Option<Demand>,
     watch: Option<Watch>,
@@ -249,8 +250,8 @@ struct Screen {
 
 impl Show for Screen {
     fn update(&mut self) -> bool {
-        let Some(frame) = self.from.try_recv() else { return false };
-        // What comes when the last reader has just left is for nobody.
+        let Some(frame) = self.receiver.try_recv() else { return false };
+        // A picture that arrives just after the last reader left is dropped.
         self.is_new = self.is_watched.load(Ordering::Relaxed);
         self.frame = self.is_new.then_some(frame);
         true
@@ -281,7 +282,7 @@ impl Show for Screen {
         self.is_watched.store(is_watched, Ordering::Relaxed);
         self.watch = self.demand.as_ref().filter(|_| is_watched).map(Demand::watch);
         if !is_watched {
-            // The next reader is not to see what the last one saw.
+            // The next reader must not see the last reader's picture.
             (self.frame, self.is_new) = (None, false);
         }
     }

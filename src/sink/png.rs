@@ -12,8 +12,8 @@ use crate::files::folder::{Folder, Set};
 use crate::files::whole::Part;
 use crate::frame::ColorImage;
 
-/// `DIR/000000.png` and on, numbered in the order in which frames come out. Each file appears whole; those of an
-/// earlier run stay until all of the new are there.
+/// Writes `DIR/000000.png` and on, numbered in output order. Each file appears complete; files of an earlier run stay
+/// until all new ones exist.
 pub struct PngFolder {
     path: PathBuf,
     /// `None` once it has ended.
@@ -22,11 +22,11 @@ pub struct PngFolder {
 }
 
 impl PngFolder {
-    /// Makes the folder where it is missing.
+    /// Opens the folder, creating it if it is missing.
     ///
     /// # Errors
-    /// It has something in it and `force` is not set, has a file of somebody else's that is called like a frame to
-    /// come, or cannot be made.
+    /// The folder is not empty and `force` is not set, contains another program's file with the name of an expected
+    /// frame, or cannot be created.
     pub fn create(path: &Path, options: &Options) -> Result<Self, SinkError> {
         let has = |name: &str| number(name).is_some_and(|number| options.frames.is_none_or(|frames| number < frames));
         let folder = Folder::open(path, options.force, &Set { subfolders: &[], has: &has })?;
@@ -54,7 +54,7 @@ fn encode(frame: &ColorImage, part: &Part) -> Result<(), SinkError> {
     buffered.flush().map_err(SinkError::write(part.path()))
 }
 
-/// The number in a file name, if it is one that this sink gives.
+/// Parses the number in a file name, if this sink would use that name.
 fn number(name: &str) -> Option<u64> {
     let number = name.strip_suffix(".png")?.parse().ok()?;
     (name == file_name(number)).then_some(number)
@@ -67,7 +67,7 @@ fn file_name(number: u64) -> String {
 impl Sink for PngFolder {
     fn put(&mut self, frame: &ColorImage, _: u64) -> Result<ControlFlow<()>, SinkError> {
         let Err(error) = self.add(frame) else { return Ok(ControlFlow::Continue(())) };
-        // What cannot be renamed stays in the hidden folder; the first error is the one to report.
+        // Files that cannot be renamed stay in the hidden folder; the first error is the one to report.
         let kept = self.folder.take().and_then(|folder| folder.cut().ok().flatten());
         Err(match kept {
             Some(kept) => SinkError::Kept { error: Box::new(error), kept },

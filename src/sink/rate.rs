@@ -1,17 +1,17 @@
-//! Frame rates as the fractions that formats and drivers take.
+//! Frame rates as the fractions that formats and drivers accept.
 
-/// Frames per second as numerator and denominator: a whole or NTSC rate (n * 1000 / 1001) if the period is within
-/// rounding of it, else in thousandths; for less than one per second by the period in whole milliseconds.
+/// Returns frames per second as numerator and denominator: an integer or NTSC rate (n * 1000 / 1001) if the period is
+/// within rounding of it, else in thousandths; below one per second from the period in whole milliseconds.
 pub(super) fn frame_rate(period_ns: u64) -> (u64, u64) {
     let period_ns = period_ns.max(1);
     let per_second = 1e9 / period_ns as f64;
     let whole = per_second.round();
-    // Whole and NTSC rates are 1e-3 apart; this leaves room for rounded periods.
-    let near = |rate: f64| rate >= 1.0 && (per_second / rate - 1.0).abs() < 2e-4;
+    // Integer and NTSC rates are 1e-3 apart; this tolerance allows for rounded periods.
+    let is_near = |rate: f64| rate >= 1.0 && (per_second / rate - 1.0).abs() < 2e-4;
     let ntsc = (per_second * 1.001).round();
-    if near(whole) {
+    if is_near(whole) {
         (whole as u64, 1)
-    } else if near(ntsc / 1.001) {
+    } else if is_near(ntsc / 1.001) {
         (ntsc as u64 * 1000, 1001)
     } else if per_second >= 1.0 {
         reduce((per_second * 1000.0).round() as u64, 1000)

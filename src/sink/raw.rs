@@ -1,8 +1,8 @@
-//! Pictures in the raw formats that cameras give: the way back of [`capture::pixels`](crate::capture::pixels), for programs
-//! that take what they gave.
+//! R'G'B' to the raw formats of cameras: the inverse of [`capture::pixels`](crate::capture::pixels), for programs that
+//! expect a camera's format.
 //!
-//! Chroma lies where the decoder takes it to lie: on the left one of its two pixels, and midway between its two rows. So
-//! nothing moves, whatever a picture says of that.
+//! Chroma is sited where the decoder assumes it: horizontally on the left pixel of each pair, and vertically midway
+//! between its two rows. So nothing shifts, whatever siting a picture declares.
 
 use pulp::{Arch, Simd, WithSimd};
 
@@ -10,19 +10,19 @@ use super::yuv::Converter;
 use crate::frame::ColorImage;
 use crate::layout::{Component, Family, Layout, Range};
 
-/// Encodes pictures of one layout. Owns the memory for it.
+/// Encodes pictures of one layout, with its own buffers.
 #[derive(Debug)]
 pub struct Encoder {
     arch: Arch,
     layout: Layout,
     converter: Converter,
-    /// A row of the picture, or the sum of two: red, green and blue, each with one value more before it and two after.
+    /// A row of the picture, or the sum of two: red, green and blue, each padded by one value before it and two after.
     sums: [Vec<u16>; 3],
 }
 
 impl Encoder {
-    /// An encoder for pictures of this layout; `None` where that is compressed or has no colours. Numbers of every curve are
-    /// written as they are.
+    /// Creates an encoder for pictures of this layout; `None` if the layout is compressed or has no colours. Values are
+    /// not converted to another transfer curve.
     pub fn new(layout: &Layout) -> Option<Self> {
         match layout.family() {
             Family::Rgb24 { .. }
@@ -40,10 +40,10 @@ impl Encoder {
         })
     }
 
-    /// Encodes `picture` into the memory planes of the layout. Allocates nothing.
+    /// Encodes `picture` into the memory planes of the layout. Does not allocate.
     ///
     /// # Panics
-    /// The picture has another size, or a plane is shorter than the layout [needs](Layout::needed_bytes) it.
+    /// The picture has another size, or a plane is shorter than the layout [needs](Layout::needed_bytes).
     pub fn encode(&mut self, picture: &ColorImage, planes: &mut [&mut [u8]]) {
         let Self { arch, layout, converter, sums } = self;
         assert_eq!(picture.size(), (layout.width, layout.height), "an encoder is for pictures of one size");
@@ -51,7 +51,7 @@ impl Encoder {
     }
 }
 
-/// One picture, compiled for each instruction set.
+/// One picture to encode, compiled for each instruction set.
 struct Frame<'a, 'p> {
     layout: &'a Layout,
     converter: &'a Converter,
@@ -72,12 +72,12 @@ impl WithSimd for Frame<'_, '_> {
         let (second, third) = (components.next(), components.next());
         let family = layout.family();
         for (y, row) in rgb.chunks_exact(row_bytes).enumerate() {
-            let out = row_of(planes, &first, y);
+            let out = row_mut(planes, &first, y);
             match family {
-                Family::Rgb24 { swapped } => copy(row, out, swapped, layout.range),
+                Family::Rgb24 { swapped } => write_rgb(row, out, swapped, layout.range),
                 Family::Packed422 { luma, cb, .. } => {
-                    sum(sums, row, None);
-                    packed(converter, row, sums, out, (luma, cb));
+                    load_sums(sums, row, None);
+                    write_packed(converter, row, sums, out, (luma, cb));
                 }
                 _ => {
                     for (luma, pixel) in out.iter_mut().zip(row.as_chunks::<3>().0) {
@@ -88,21 +88,21 @@ impl WithSimd for Frame<'_, '_> {
         }
         for (y, rows) in rgb.chunks(2 * row_bytes).enumerate() {
             let (upper, lower) = rows.split_at(row_bytes);
-            // The only row, at an odd edge.
+            // At an odd edge, the only row counts twice.
             let lower = if lower.is_empty() { upper } else { lower };
             match (family, second, third) {
                 (Family::SemiPlanar420 { swapped, .. }, Some(pairs), _) => {
-                    sum(sums, upper, Some(lower));
-                    for (pair, sum) in row_of(planes, &pairs, y).as_chunks_mut::<2>().0.iter_mut().zip(chroma(sums)) {
+                    load_sums(sums, upper, Some(lower));
+                    for (pair, sum) in row_mut(planes, &pairs, y).as_chunks_mut::<2>().0.iter_mut().zip(chroma_sums(sums)) {
                         let [cb, cr] = converter.chroma(sum, 3);
                         *pair = if swapped { [cr, cb] } else { [cb, cr] };
                     }
                 }
                 (Family::Planar420 { swapped, .. }, Some(one), Some(other)) => {
-                    sum(sums, upper, Some(lower));
-                    // One plane after the other, as a memory plane can have both.
+                    load_sums(sums, upper, Some(lower));
+                    // One component after the other, as a memory plane can contain both.
                     for (component, which) in [(one, usize::from(swapped)), (other, usize::from(!swapped))] {
-                        for (out, sum) in row_of(planes, &component, y).iter_mut().zip(chroma(sums)) {
+                        for (out, sum) in row_mut(planes, &component, y).iter_mut().zip(chroma_sums(sums)) {
                             *out = converter.chroma(sum, 3)[which];
                         }
                     }
@@ -113,15 +113,15 @@ impl WithSimd for Frame<'_, '_> {
     }
 }
 
-/// A row of a component.
+/// Returns a row of a component.
 #[inline(always)]
-fn row_of<'a>(planes: &'a mut [&mut [u8]], at: &Component, y: usize) -> &'a mut [u8] {
+fn row_mut<'a>(planes: &'a mut [&mut [u8]], at: &Component, y: usize) -> &'a mut [u8] {
     &mut planes[at.plane][at.offset_bytes + y * at.stride_bytes..][..at.row_bytes]
 }
 
 /// Writes a row of RGB.
 #[inline(always)]
-fn copy(row: &[u8], out: &mut [u8], swapped: bool, range: Range) {
+fn write_rgb(row: &[u8], out: &mut [u8], swapped: bool, range: Range) {
     if swapped {
         for (out, &[red, green, blue]) in out.as_chunks_mut::<3>().0.iter_mut().zip(row.as_chunks::<3>().0) {
             *out = [blue, green, red];
@@ -134,9 +134,9 @@ fn copy(row: &[u8], out: &mut [u8], swapped: bool, range: Range) {
     }
 }
 
-/// Takes one row apart, or the sum of two; what is beyond its ends is as they are.
+/// Splits one row, or the sum of two, into channels; replicates the values at both ends.
 #[inline(always)]
-fn sum(sums: &mut [Vec<u16>; 3], upper: &[u8], lower: Option<&[u8]>) {
+fn load_sums(sums: &mut [Vec<u16>; 3], upper: &[u8], lower: Option<&[u8]>) {
     let width = upper.len() / 3;
     let [red, green, blue] = sums;
     let (reds, greens, blues) = (&mut red[1..=width], &mut green[1..=width], &mut blue[1..=width]);
@@ -161,9 +161,9 @@ fn sum(sums: &mut [Vec<u16>; 3], upper: &[u8], lower: Option<&[u8]>) {
     }
 }
 
-/// Four times the mean around the left pixel of each pair: half of that, and a quarter of each neighbour.
+/// Returns four times the chroma-siting mean (1 2 1) / 4 around the left pixel of each pair.
 #[inline(always)]
-fn chroma(sums: &[Vec<u16>; 3]) -> impl Iterator<Item = [i32; 3]> + '_ {
+fn chroma_sums(sums: &[Vec<u16>; 3]) -> impl Iterator<Item = [i32; 3]> + '_ {
     let [red, green, blue] = sums.each_ref().map(|sums| {
         let (left, right) = (sums.as_chunks::<2>().0, sums[2..].as_chunks::<2>().0);
         left.iter().zip(right).map(|(pair, next)| i32::from(pair[0]) + 2 * i32::from(pair[1]) + i32::from(next[0]))
@@ -171,14 +171,14 @@ fn chroma(sums: &[Vec<u16>; 3]) -> impl Iterator<Item = [i32; 3]> + '_ {
     red.zip(green).zip(blue).map(|((red, green), blue)| [red, green, blue])
 }
 
-/// Writes a row of 4:2:2, in which the first luma, and the sample of Cb, have these places. Half a pair, at an odd edge, has
-/// one sample of chroma.
+/// Writes a row of 4:2:2, in which `luma` and `cb` are the offsets of the first luma and of the Cb sample. Half a pair,
+/// at an odd edge, has one chroma sample.
 #[inline(always)]
-fn packed(converter: &Converter, row: &[u8], sums: &[Vec<u16>; 3], out: &mut [u8], (luma, cb): (usize, usize)) {
+fn write_packed(converter: &Converter, row: &[u8], sums: &[Vec<u16>; 3], out: &mut [u8], (luma, cb): (usize, usize)) {
     let cr = cb ^ 2;
     let (pairs, rest) = out.as_chunks_mut::<4>();
     let (colors, last) = row.as_chunks::<6>();
-    let mut chroma = chroma(sums);
+    let mut chroma = chroma_sums(sums);
     for ((out, pair), sum) in pairs.iter_mut().zip(colors).zip(&mut chroma) {
         (out[luma], out[luma + 2]) = (
             converter.luma([0, 1, 2].map(|p| i32::from(pair[p]))),
@@ -188,8 +188,8 @@ fn packed(converter: &Converter, row: &[u8], sums: &[Vec<u16>; 3], out: &mut [u8
     }
     if let (&[red, green, blue], Some(sum), [_, _]) = (last, chroma.next(), &*rest) {
         rest[luma] = converter.luma([red, green, blue].map(i32::from));
-        let place = luma ^ 1;
-        rest[place] = converter.chroma(sum, 2)[usize::from(place != cb)];
+        let chroma_at = luma ^ 1;
+        rest[chroma_at] = converter.chroma(sum, 2)[usize::from(chroma_at != cb)];
     }
 }
 

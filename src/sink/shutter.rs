@@ -1,4 +1,4 @@
-//! A shutter before a sink: while it is closed, the sink is given the still card, and nothing of the pictures.
+//! A shutter before a sink: while it is closed, the sink gets the still card instead of pictures.
 
 use std::cell::OnceCell;
 use std::ops::ControlFlow;
@@ -13,65 +13,66 @@ use crate::frame::{ColorImage, YuyvImage};
 use crate::link::demand::Demand;
 use crate::stats::{NodeUse, OutputUse};
 
-/// A sink that others can keep the pictures from, by its [`Release`]. The card comes at once, also between two frames;
-/// from then on the camera rests: nobody counts as watching. The card goes on, as often as frames came, until there is a
-/// picture again after it was opened.
+/// A sink whose pictures can be blocked through its [`Release`]. The card is shown at once, also between two frames;
+/// from then on the camera is released: no client counts as watching. After reopening, the card is repeated at the
+/// frame rate until the next picture.
 pub struct Shutter {
     sink: Box<dyn Sink>,
     closed: Arc<AtomicBool>,
-    asked: Receiver<Asked>,
-    /// Who wants a copy of the next picture.
+    requests: Receiver<Request>,
+    /// Receivers of a copy of the next picture.
     copies: Vec<SyncSender<ColorImage>>,
-    /// Who waits until all outputs show the card, and until when.
+    /// Receivers that wait until all outputs show the card, with their deadlines.
     covers: Vec<(SyncSender<Vec<Uncovered>>, Instant)>,
     demand: Demand,
     /// Whether the demand is withheld.
-    rests: bool,
-    /// Whether the sink was given the card last.
+    withheld: bool,
+    /// Whether the card was the last picture sent to the sink.
     shows_card: bool,
     size: (u32, u32),
-    /// Made once it is wanted: who is never off needs no memory for it.
+    /// Created on first use: a shutter that never closes needs no memory for it.
     card: OnceCell<ColorImage>,
     period: Duration,
     clock: Clock,
-    /// The time of the last picture, as the sink was told it.
+    /// Time of the last picture, as passed to the sink.
     last_ns: Option<u64>,
-    /// When the sink was given something last.
-    given_ns: u64,
-    /// By how much the sink's time is ahead of the source's, which stands still while that rests.
-    ahead_ns: u64,
+    /// When a picture was last sent to the sink.
+    sent_ns: u64,
+    /// How far the sink's time is ahead of the source's, which stands still while the camera is released.
+    offset_ns: u64,
 }
 
-/// How soon the card comes, whenever the next frame would; and while there are no pictures that it would replace.
+/// Longest delay of the card, whatever the time of the next frame; and the period while no pictures come that it would
+/// replace.
 const TICK: Duration = Duration::from_millis(20);
 const IDLE_TICK: Duration = Duration::from_millis(100);
 
-/// How long outputs may take to show the card.
-const PATIENCE: Duration = Duration::from_secs(1);
+/// Longest wait for outputs to show the card.
+const COVER_TIMEOUT: Duration = Duration::from_secs(1);
 
-/// Closes and opens a [`Shutter`], and takes pictures behind it, from any thread.
+/// Closes and opens a [`Shutter`], and copies pictures behind it, from any thread.
 #[derive(Clone)]
 pub struct Release {
     closed: Arc<AtomicBool>,
-    ask: Sender<Asked>,
-    /// The sink as one.
-    all: Uncovered,
+    request_sender: Sender<Request>,
+    /// The whole sink as one output.
+    whole_sink: Uncovered,
 }
 
-/// What others want of a shutter, and where the answer goes. Who gave up waiting misses nothing.
-enum Asked {
+/// Requests to a shutter, each with its reply channel. A requester that has timed out is ignored.
+enum Request {
     Picture(SyncSender<ColorImage>),
     Covered(SyncSender<Vec<Uncovered>>, Instant),
 }
 
-/// These outputs, which people see live, may still show a picture though they were to show the card.
+/// These live outputs may still show a picture instead of the card.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("no more pictures come, but {0} may still show the last one: it does not take the card")]
 pub struct NotCovered(pub String);
 
 impl Shutter {
-    /// A shutter before `sink`, for pictures of `size` pixels every `period`. It is closed while `closed` says so; `demand` is
-    /// what the camera rests by.
+    /// Creates a shutter before `sink`, for pictures of `size` pixels every `period`. It is closed while `closed` is
+    /// set; `demand` is withheld to release the camera.
     pub fn new(
         sink: Box<dyn Sink>,
         size: (u32, u32),
@@ -80,60 +81,60 @@ impl Shutter {
         clock: Clock,
         closed: Arc<AtomicBool>,
     ) -> (Self, Release) {
-        let (ask, asked) = mpsc::channel();
-        let all = Uncovered { output: sink.describe(), is_live: sink.is_live() };
+        let (request_sender, requests) = mpsc::channel();
+        let whole_sink = Uncovered { output: sink.describe(), is_live: sink.is_live() };
         let shutter = Self {
             sink,
             closed: Arc::clone(&closed),
-            asked,
+            requests,
             copies: Vec::new(),
             covers: Vec::new(),
             demand,
-            rests: false,
+            withheld: false,
             shows_card: false,
             size,
             card: OnceCell::new(),
             period,
             clock,
             last_ns: None,
-            given_ns: 0,
-            ahead_ns: 0,
+            sent_ns: 0,
+            offset_ns: 0,
         };
-        (shutter, Release { closed, ask, all })
+        (shutter, Release { closed, request_sender, whole_sink })
     }
 
-    /// Whether it is closed. Once the card is there, the camera follows.
+    /// Whether it is closed. Once the card is shown, the camera is released.
     fn is_closed(&mut self) -> bool {
         let closed = self.closed.load(Ordering::Acquire);
-        let rests = closed && self.shows_card;
-        if rests != self.rests {
-            self.rests = rests;
-            self.demand.withhold(rests);
+        let withheld = closed && self.shows_card;
+        if withheld != self.withheld {
+            self.withheld = withheld;
+            self.demand.withhold(withheld);
         }
         closed
     }
 
-    /// Gives the sink a picture by `give`, or the card while it is closed.
-    fn pass(
+    /// Sends the sink a picture by `put`, or the card while it is closed.
+    fn send_picture(
         &mut self,
         time_ns: u64,
-        give: impl FnOnce(&mut Self, u64) -> Result<ControlFlow<()>, SinkError>,
+        put: impl FnOnce(&mut Self, u64) -> Result<ControlFlow<()>, SinkError>,
     ) -> Result<ControlFlow<()>, SinkError> {
         let closed = self.is_closed();
         let time_ns = self.time_ns(time_ns);
         if closed {
-            return self.give_card(time_ns);
+            return self.send_card(time_ns);
         }
-        self.note(time_ns, false);
-        give(self, time_ns)
+        self.record_sent(time_ns, false);
+        put(self, time_ns)
     }
 
-    /// Takes note of who wants something; tells those who wait for the card where it is.
-    fn hear(&mut self) {
-        for asked in self.asked.try_iter() {
-            match asked {
-                Asked::Picture(to) => self.copies.push(to),
-                Asked::Covered(to, until) => self.covers.push((to, until)),
+    /// Handles pending requests; answers those that wait for the card once it is shown.
+    fn handle_requests(&mut self) {
+        for request in self.requests.try_iter() {
+            match request {
+                Request::Picture(to) => self.copies.push(to),
+                Request::Covered(to, until) => self.covers.push((to, until)),
             }
         }
         if self.covers.is_empty() {
@@ -152,15 +153,15 @@ impl Shutter {
         });
     }
 
-    /// Whether anybody waits for a copy.
-    fn is_asked(&mut self) -> bool {
-        self.hear();
+    /// Whether a copy of a picture is requested.
+    fn is_copy_requested(&mut self) -> bool {
+        self.handle_requests();
         !self.copies.is_empty()
     }
 
-    /// Gives the sink the card.
-    fn give_card(&mut self, time_ns: u64) -> Result<ControlFlow<()>, SinkError> {
-        self.note(time_ns, true);
+    /// Sends the sink the card.
+    fn send_card(&mut self, time_ns: u64) -> Result<ControlFlow<()>, SinkError> {
+        self.record_sent(time_ns, true);
         let card = self.card.get_or_init(|| {
             let mut card = ColorImage::new(self.size.0, self.size.1);
             card::draw(&mut card);
@@ -168,49 +169,49 @@ impl Shutter {
         });
         let given = self.sink.cover(card, time_ns);
         self.is_closed();
-        self.hear();
+        self.handle_requests();
         given
     }
 
-    fn note(&mut self, time_ns: u64, shows_card: bool) {
-        (self.last_ns, self.given_ns, self.shows_card) = (Some(time_ns), self.clock.now_ns(), shows_card);
+    fn record_sent(&mut self, time_ns: u64, shows_card: bool) {
+        (self.last_ns, self.sent_ns, self.shows_card) = (Some(time_ns), self.clock.now_ns(), shows_card);
     }
 
-    /// How long ago the sink was given something.
-    fn silent(&self) -> Duration {
-        Duration::from_nanos(self.clock.now_ns().saturating_sub(self.given_ns))
+    /// Returns the time since a picture was last sent to the sink.
+    fn time_since_sent(&self) -> Duration {
+        Duration::from_nanos(self.clock.now_ns().saturating_sub(self.sent_ns))
     }
 
-    /// A time of the source's as the sink is told it: later than the one before.
+    /// Converts the source's time to the sink's: later than the previous one.
     fn time_ns(&mut self, time_ns: u64) -> u64 {
         let period_ns = self.period.as_nanos() as u64;
         match self.last_ns {
-            Some(last_ns) if self.shows_card && time_ns + self.ahead_ns <= last_ns => {
-                self.ahead_ns = last_ns + period_ns - time_ns;
+            Some(last_ns) if self.shows_card && time_ns + self.offset_ns <= last_ns => {
+                self.offset_ns = last_ns + period_ns - time_ns;
             }
             _ => {}
         }
-        time_ns + self.ahead_ns
+        time_ns + self.offset_ns
     }
 }
 
 impl Sink for Shutter {
     fn put(&mut self, frame: &ColorImage, time_ns: u64) -> Result<ControlFlow<()>, SinkError> {
-        self.pass(time_ns, |shutter, time_ns| {
-            if shutter.is_asked() {
+        self.send_picture(time_ns, |shutter, time_ns| {
+            if shutter.is_copy_requested() {
                 shutter.copies.drain(..).for_each(|to| drop(to.try_send(frame.clone())));
             }
             shutter.sink.put(frame, time_ns)
         })
     }
 
-    /// Copies are in full colour.
+    /// Requested copies need full colour.
     fn wants_yuyv(&mut self) -> bool {
-        !self.is_asked() && self.sink.wants_yuyv()
+        !self.is_copy_requested() && self.sink.wants_yuyv()
     }
 
     fn put_yuyv(&mut self, frame: &mut YuyvImage, time_ns: u64) -> Result<ControlFlow<()>, SinkError> {
-        self.pass(time_ns, |shutter, time_ns| shutter.sink.put_yuyv(frame, time_ns))
+        self.send_picture(time_ns, |shutter, time_ns| shutter.sink.put_yuyv(frame, time_ns))
     }
 
     fn cover(&mut self, card: &ColorImage, time_ns: u64) -> Result<ControlFlow<()>, SinkError> {
@@ -237,33 +238,33 @@ impl Sink for Shutter {
         self.sink.outputs()
     }
 
-    /// Until the sink or the card is due, but never longer than a tick: it may be closed meanwhile.
+    /// Waits until the sink or the card is due, but at most a tick: it may be closed meanwhile.
     fn hold(&self) -> Option<Duration> {
         let due = if self.shows_card { Some(self.period) } else { self.sink.hold() };
-        let rests = self.shows_card || !self.demand.is_watched();
-        let tick = if rests && self.covers.is_empty() { IDLE_TICK } else { TICK };
-        Some(due.map_or(tick, |due| due.saturating_sub(self.silent()).min(tick)))
+        let is_idle = self.shows_card || !self.demand.is_watched();
+        let tick = if is_idle && self.covers.is_empty() { IDLE_TICK } else { TICK };
+        Some(due.map_or(tick, |due| due.saturating_sub(self.time_since_sent()).min(tick)))
     }
 
     fn repeat(&mut self) -> Result<ControlFlow<(), bool>, SinkError> {
-        let (closed, silent) = (self.is_closed(), self.silent());
-        self.hear();
+        let (closed, time_since_sent) = (self.is_closed(), self.time_since_sent());
+        self.handle_requests();
         if closed || self.shows_card && self.demand.is_watched() {
-            if self.shows_card && silent < self.period {
+            if self.shows_card && time_since_sent < self.period {
                 return Ok(ControlFlow::Continue(false));
             }
-            let time_ns = self.last_ns.map_or(0, |last_ns| last_ns + (silent.as_nanos() as u64).max(1));
-            return Ok(self.give_card(time_ns)?.map_continue(|()| true));
+            let time_ns = self.last_ns.map_or(0, |last_ns| last_ns + (time_since_sent.as_nanos() as u64).max(1));
+            return Ok(self.send_card(time_ns)?.map_continue(|()| true));
         }
-        if self.sink.hold().is_none_or(|due| silent < due) {
+        if self.sink.hold().is_none_or(|due| time_since_sent < due) {
             return Ok(ControlFlow::Continue(false));
         }
-        self.given_ns = self.clock.now_ns();
+        self.sent_ns = self.clock.now_ns();
         self.sink.repeat()
     }
 
     fn pass_by(&mut self) {
-        // The sink is given nothing, so there is no card to wait for.
+        // The sink gets nothing, so there is no card to wait for.
         self.shows_card = self.closed.load(Ordering::Acquire);
         self.is_closed();
         self.sink.pass_by();
@@ -283,7 +284,7 @@ impl Sink for Shutter {
 }
 
 impl Release {
-    /// No picture passes from now on, or pictures do again.
+    /// Blocks pictures from now on, or lets them pass again.
     pub fn close(&self, closed: bool) {
         self.closed.store(closed, Ordering::Release);
     }
@@ -293,26 +294,26 @@ impl Release {
         self.closed.load(Ordering::Acquire)
     }
 
-    /// A copy of the next picture that passes; `None` where none does in time.
-    pub fn picture(&self, patience: Duration) -> Option<ColorImage> {
-        let (to, take) = mpsc::sync_channel(1);
-        self.ask.send(Asked::Picture(to)).ok()?;
-        take.recv_timeout(patience).ok()
+    /// Returns a copy of the next picture that passes; `None` if none does in time.
+    pub fn picture(&self, timeout: Duration) -> Option<ColorImage> {
+        let (to, reply) = mpsc::sync_channel(1);
+        self.request_sender.send(Request::Picture(to)).ok()?;
+        reply.recv_timeout(timeout).ok()
     }
 
-    /// Waits until every output has taken the card, after [`Release::close`]. Gives a note back where one that nobody sees
-    /// live has not yet.
+    /// Waits until every output shows the card, after [`Release::close`]. Returns a note about outputs that do not yet,
+    /// if they are not live.
     ///
     /// # Errors
-    /// One may still show a picture.
+    /// A live output may still show a picture.
     pub fn wait_covered(&self) -> Result<Option<String>, NotCovered> {
-        let (to, take) = mpsc::sync_channel(1);
+        let (to, reply) = mpsc::sync_channel(1);
         // A run that has ended shows nothing.
-        let asked = self.ask.send(Asked::Covered(to, Instant::now() + PATIENCE));
-        let uncovered = match asked.map(|()| take.recv_timeout(2 * PATIENCE)) {
+        let sent = self.request_sender.send(Request::Covered(to, Instant::now() + COVER_TIMEOUT));
+        let uncovered = match sent.map(|()| reply.recv_timeout(2 * COVER_TIMEOUT)) {
             Ok(Ok(uncovered)) => uncovered,
-            // What gives the outputs their pictures waits for one of them.
-            Ok(Err(RecvTimeoutError::Timeout)) => vec![self.all.clone()],
+            // The thread that sends the pictures is blocked by one of the outputs.
+            Ok(Err(RecvTimeoutError::Timeout)) => vec![self.whole_sink.clone()],
             Ok(Err(RecvTimeoutError::Disconnected)) | Err(_) => Vec::new(),
         };
         let names = |is_live: bool| {

@@ -1,4 +1,4 @@
-//! Adds and removes the sinks of a [`Tee`] while frames go on, and tells what becomes of them.
+//! Adds and removes the sinks of a [`Tee`] while frames flow, and reports their outcome.
 
 use std::sync::Arc;
 use std::sync::mpsc::{self, Receiver, Sender};
@@ -8,131 +8,131 @@ use super::Sink;
 use super::Tee;
 use super::output_thread::{Backpressure, Outcome, OutputThread};
 
-/// Adds members to a [`Tee`] and removes them, from any thread. Both come about with the next frame, or soon after where there
-/// are none.
+/// Adds and removes members of a [`Tee`], from any thread. Both take effect with the next frame, or soon after if there
+/// are no frames.
 #[derive(Clone)]
 pub struct Switchboard {
-    to: Sender<Asked>,
-    tell: Tell,
+    to: Sender<Request>,
+    report: Report,
 }
 
-/// What became of a member.
+/// A change in a member's state.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Notice {
-    /// The name that it was added by.
+    /// The name under which it was added.
     pub member: String,
-    /// What became of it.
+    /// Its new state.
     pub fate: Fate,
 }
 
-/// What becomes of a member: first it begins, then it is completed or fails.
+/// States of a member: first it begins, then it is completed or fails.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Fate {
     /// It gets the frames from now on.
     Began,
-    /// It is whole.
+    /// It is complete.
     Completed {
-        /// Frames that it took.
+        /// Number of frames it received.
         frames: u64,
     },
-    /// It was given up.
+    /// It was aborted.
     Failed {
-        /// Frames that it took.
+        /// Number of frames it received.
         frames: u64,
-        /// Why: one line.
+        /// The reason, in one line.
         why: String,
     },
 }
 
-/// There is no run any more.
+/// The run has ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("the pictures have ended")]
 pub struct Over;
 
-type Tell = Arc<dyn Fn(Notice) + Send + Sync>;
+type Report = Arc<dyn Fn(Notice) + Send + Sync>;
 
-/// What a switchboard asks of its tee.
-pub(super) enum Asked {
-    Add(Joining),
+/// Requests of a switchboard to its tee.
+pub(super) enum Request {
+    Add(NewMember),
     Remove(String),
 }
 
-impl Asked {
-    /// The member that it is about.
+impl Request {
+    /// Name of the member concerned.
     pub fn name(&self) -> &str {
         match self {
-            Self::Add(member) => &member.life.name,
+            Self::Add(member) => &member.reporter.name,
             Self::Remove(name) => name,
         }
     }
 }
 
 impl Switchboard {
-    /// A handle, and where its requests come out. `tell` is called for each step in a member's life, among others on the thread
-    /// that frames are on: it must be quick.
-    pub(super) fn new(tell: impl Fn(Notice) + Send + Sync + 'static) -> (Self, Receiver<Asked>) {
-        let (to, asked) = mpsc::channel();
-        (Self { to, tell: Arc::new(tell) }, asked)
+    /// Creates a switchboard, and the receiver of its requests. `report` is called for each state change of a member,
+    /// also on the thread of the frames: it must be quick.
+    pub(super) fn new(report: impl Fn(Notice) + Send + Sync + 'static) -> (Self, Receiver<Request>) {
+        let (to, requests) = mpsc::channel();
+        (Self { to, report: Arc::new(report) }, requests)
     }
 
-    /// Adds a sink. A member that has this name already is completed first.
+    /// Adds a sink. A member with the same name is completed first.
     ///
     /// # Errors
-    /// The run is over: the sink was given up, which is told as well.
+    /// The run has ended: the sink was aborted, which is reported as well.
     pub fn add(&self, name: &str, sink: Box<dyn Sink>) -> Result<(), Over> {
-        let life = Life { name: name.into(), over: false, tell: Arc::clone(&self.tell) };
-        self.to.send(Asked::Add(Joining { sink, life })).map_err(|_| Over)
+        let reporter = Reporter { name: name.into(), is_reported: false, report: Arc::clone(&self.report) };
+        self.to.send(Request::Add(NewMember { sink, reporter })).map_err(|_| Over)
     }
 
-    /// Takes the member of this name out and completes it; nothing where there is none.
+    /// Removes the member with this name and completes it; does nothing if it does not exist.
     pub fn remove(&self, name: &str) {
-        // Without a run, there is none.
-        let _ = self.to.send(Asked::Remove(name.into()));
+        // Without a run, there are no members.
+        let _ = self.to.send(Request::Remove(name.into()));
     }
 }
 
-/// A sink on its way in. Dropped in this order: given up, then told.
-pub(super) struct Joining {
+/// A sink to be added. Fields drop in this order: first the sink, then the report.
+pub(super) struct NewMember {
     sink: Box<dyn Sink>,
-    life: Life,
+    reporter: Reporter,
 }
 
-impl Joining {
-    /// Starts its thread; `None` where the system gives none, and it is told that the member was given up.
+impl NewMember {
+    /// Starts its thread; `None` if the system refuses the thread, and the member is reported as failed.
     pub fn start(self) -> Option<OutputThread> {
-        let Self { sink, life } = self;
-        life.tell(Fate::Began);
-        OutputThread::start(sink, Backpressure::DropOldest, |frames, outcome| life.ended(frames, outcome)).ok()
+        let Self { sink, reporter } = self;
+        reporter.report(Fate::Began);
+        OutputThread::start(sink, Backpressure::DropOldest, |frames, outcome| reporter.report_end(frames, outcome)).ok()
     }
 }
 
-/// Tells what becomes of a member, in any case.
-struct Life {
+/// Reports a member's outcome exactly once.
+struct Reporter {
     name: String,
-    /// Whether its end was told.
-    over: bool,
-    tell: Tell,
+    /// Whether its end was reported.
+    is_reported: bool,
+    report: Report,
 }
 
-impl Life {
-    fn tell(&self, fate: Fate) {
-        (self.tell)(Notice { member: self.name.clone(), fate });
+impl Reporter {
+    fn report(&self, fate: Fate) {
+        (self.report)(Notice { member: self.name.clone(), fate });
     }
 
-    /// Tells how a member ended that took so many frames.
-    fn ended(mut self, frames: u64, outcome: &Outcome) {
-        self.over = true;
-        self.tell(match outcome {
+    /// Reports how a member ended that received `frames` frames.
+    fn report_end(mut self, frames: u64, outcome: &Outcome) {
+        self.is_reported = true;
+        self.report(match outcome {
             Outcome::Ended(Ok(())) => Fate::Completed { frames },
             Outcome::Failed(error) | Outcome::Ended(Err(error)) => Fate::Failed { frames, why: error.to_string() },
         });
     }
 }
 
-impl Drop for Life {
+impl Drop for Reporter {
     fn drop(&mut self) {
-        if !self.over {
-            self.tell(Fate::Failed { frames: 0, why: "it was given up".into() });
+        if !self.is_reported {
+            self.report(Fate::Failed { frames: 0, why: "it was given up".into() });
         }
     }
 }

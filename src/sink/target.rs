@@ -1,4 +1,4 @@
-//! Sinks by their names.
+//! Parses and opens sinks by their names.
 
 use std::fmt;
 use std::fs;
@@ -14,7 +14,7 @@ use super::{Ffmpeg, Null, Options, PngFolder, Sink, SinkError, Y4m, Y4mFile};
 use crate::files::{folder, place};
 use crate::names::nearest;
 
-/// How the name of a camera of PipeWire's begins.
+/// Prefix of the name of a PipeWire camera.
 const PIPEWIRE: &str = "pipewire";
 const FILTER: &str = "filter";
 
@@ -31,13 +31,13 @@ pub enum Target {
     Video(PathBuf),
     /// `/dev/videoN`, or another name of a device: a virtual camera.
     Device(PathBuf),
-    /// `pipewire` or `pipewire:NAME`: a camera of PipeWire's, with the name that people see.
+    /// `pipewire` or `pipewire:NAME`: a PipeWire camera, with the name shown to users.
     PipeWire(Option<String>),
-    /// `filter`: given to all who ask for the camera that is the source.
+    /// `filter`: replaces the source camera for all clients that request it.
     Filter,
-    /// `window`: seen on the screen.
+    /// `window`: a window on the screen.
     Window,
-    /// `DIR/`, or an existing folder that we wrote: numbered PNG files.
+    /// `DIR/`, or an existing folder written by this program: numbered PNG files.
     Folder(PathBuf),
 }
 
@@ -63,16 +63,16 @@ impl FromStr for Target {
             _ if name.ends_with('/') || folder::is_ours(&path) => Ok(Self::Folder(path)),
             (_, Some("y4m")) => Ok(Self::Y4m(path)),
             (_, Some("mp4" | "mkv" | "webm")) => Ok(Self::Video(path)),
-            // Not a folder just because it is nothing else: a slip in the name of a camera would fill the disk.
+            // An unknown name must not become a folder: a typo in the name of a camera would fill the disk.
             _ if path.is_dir() => Err(SinkError::NoSlash { name: name.into() }),
             _ if path.exists() => Err(SinkError::NoFolder { path }),
-            _ => Err(SinkError::Target { name: name.into(), near: near(name) }),
+            _ => Err(SinkError::Target { name: name.into(), near: suggest(name) }),
         }
     }
 }
 
-/// The sink that `name` may have been meant for.
-fn near(name: &str) -> Option<String> {
+/// Returns the sink that `name` may have been meant for.
+fn suggest(name: &str) -> Option<String> {
     if name.contains('/') && !name.starts_with("/dev/") {
         return None;
     }
@@ -84,7 +84,7 @@ fn near(name: &str) -> Option<String> {
     nearest(word, [PIPEWIRE, FILTER, "window", "null"]).map(|sink| format!("{sink}{label}"))
 }
 
-/// Whether this is a character device, or the name of a video device that is not there yet.
+/// Whether this is a character device, or the name of a video device that does not exist yet.
 fn is_device(path: &Path) -> bool {
     let number = path.to_str().and_then(|name| name.strip_prefix("/dev/video"));
     number.is_some_and(|number| number.bytes().all(|digit| digit.is_ascii_digit()))
@@ -110,7 +110,7 @@ impl Target {
     ///
     /// # Errors
     /// Something of that name exists and `force` is not set, the place cannot be written, or ffmpeg is missing. A
-    /// window is no sink: it is opened by who starts the run.
+    /// window is not a sink: the caller that starts the run opens it.
     pub fn open(&self, options: &Options) -> Result<Box<dyn Sink>, SinkError> {
         Ok(match self {
             Self::Null => Box::new(Null),
@@ -132,7 +132,7 @@ impl Target {
         })
     }
 
-    /// Whether frames are seen as they come, and none later.
+    /// Whether frames are seen as they come, and not stored.
     pub fn is_live(&self) -> bool {
         self.is_camera() || *self == Self::Window
     }
@@ -149,7 +149,7 @@ impl Target {
             (Self::Stdout, Self::Stdout) | (Self::Window, Self::Window) | (Self::Filter, Self::Filter) => true,
             (Self::PipeWire(own), Self::PipeWire(others)) => own == others,
             _ => match (self.path(), other.path()) {
-                (Some(own), Some(others)) => same_place(own, others),
+                (Some(own), Some(others)) => is_same_place(own, others),
                 _ => false,
             },
         }
@@ -157,7 +157,7 @@ impl Target {
 
     /// Whether this is the device node `path`, by whatever name.
     pub fn is_device(&self, path: &Path) -> bool {
-        matches!(self, Self::Device(own) if same_place(own, path))
+        matches!(self, Self::Device(own) if is_same_place(own, path))
     }
 
     /// The file, folder or device that this writes to, if it is one.
@@ -169,8 +169,8 @@ impl Target {
     }
 }
 
-/// Whether two names lead to one file or device, be it there or not yet.
-fn same_place(one: &Path, other: &Path) -> bool {
+/// Whether two names lead to the same file or device, which need not exist yet.
+fn is_same_place(one: &Path, other: &Path) -> bool {
     let device = |path: &Path| fs::metadata(path).ok().filter(|node| node.file_type().is_char_device());
     match (device(one), device(other)) {
         (Some(one), Some(other)) => one.rdev() == other.rdev(),

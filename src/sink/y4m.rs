@@ -1,4 +1,4 @@
-//! YUV4MPEG2: uncompressed video that players and encoders read from a file or a pipe.
+//! YUV4MPEG2 (y4m): uncompressed video that players and encoders read from a file or a pipe.
 
 use std::fs::File;
 use std::io::{ErrorKind, Write};
@@ -9,7 +9,7 @@ use std::time::Duration;
 use super::output::Output;
 use super::pipe::Pipe;
 use super::rate::frame_rate;
-use super::steady::{Place, Steady};
+use super::steady::{Action, Steady};
 use super::yuv::Converter;
 use super::{Ending, Options, Sink, SinkError, check_size};
 use crate::color::Matrix;
@@ -17,13 +17,13 @@ use crate::frame::ColorImage;
 use crate::layout::Range;
 
 /// Longest gap between frames that a file fills by repeating the last picture; longer ones are cut to this.
-const LONGEST_STILL: Duration = Duration::from_secs(10);
-/// The same for a stream, whose viewer falls behind by as much.
-const LONGEST_STILL_LIVE: Duration = Duration::from_secs(1);
+const MAX_STILL: Duration = Duration::from_secs(10);
+/// Longest such gap in a stream; its viewer falls behind by the same time.
+const MAX_STILL_LIVE: Duration = Duration::from_secs(1);
 
-/// A y4m stream into anything that takes bytes: 4:2:0, limited range, BT.709 from 720 rows on, else BT.601.
+/// A y4m stream into any writer: 4:2:0, limited range, BT.709 from 720 rows on, else BT.601.
 pub struct Y4m<W: Write> {
-    to: W,
+    writer: W,
     name: PathBuf,
     size: (u32, u32),
     converter: Converter,
@@ -32,45 +32,45 @@ pub struct Y4m<W: Write> {
     header: Vec<u8>,
     /// The last picture, with its header.
     picture: Vec<u8>,
-    /// Bytes of the whole pictures that were written, and their header.
+    /// Number of bytes in the header and the complete pictures written.
     whole_bytes: u64,
 }
 
 impl<W: Write> Y4m<W> {
-    /// A stream into `to`, which `name` stands for in messages. The header goes out with the first frame.
-    pub fn new(to: W, name: &Path, options: &Options) -> Self {
-        Self::with_longest_still(to, name, options, LONGEST_STILL_LIVE)
+    /// Creates a stream into `writer`, which messages call `name`. The header is written with the first frame.
+    pub fn new(writer: W, name: &Path, options: &Options) -> Self {
+        Self::with_max_still(writer, name, options, MAX_STILL_LIVE)
     }
 
-    fn with_longest_still(to: W, name: &Path, options: &Options, longest_still: Duration) -> Self {
+    fn with_max_still(writer: W, name: &Path, options: &Options, max_still: Duration) -> Self {
         let (width, height) = options.size;
         let (rate, scale) = frame_rate(options.period_ns);
         let header = format!("YUV4MPEG2 W{width} H{height} F{rate}:{scale} Ip A1:1 C420jpeg XCOLORRANGE=LIMITED\n");
         Self {
-            to,
+            writer,
             name: name.to_owned(),
             size: options.size,
             converter: Converter::new(Matrix::for_height(height), Range::Limited),
-            steady: Steady::new((rate, scale), longest_still),
+            steady: Steady::new((rate, scale), max_still),
             header: header.into_bytes(),
             picture: Vec::new(),
             whole_bytes: 0,
         }
     }
 
-    /// Writes a frame that was captured at `time_ns`. To keep the rate constant, the picture before it is repeated
-    /// where frames are missing, and a frame that comes too early is left out.
+    /// Writes a frame captured at `time_ns`. To keep the rate constant, the previous picture is repeated where frames
+    /// are missing, and a frame that comes too early is dropped.
     ///
     /// # Errors
     /// The frame has another size, or writing failed.
     pub fn write(&mut self, frame: &ColorImage, time_ns: u64) -> Result<(), SinkError> {
         check_size(self.size, frame.size())?;
-        let missing = match self.steady.place(time_ns) {
-            Place::Taken => return Ok(()),
-            Place::After(missing) => missing,
-            Place::AfterGap(missing, gap) => {
-                let (name, most_s) = (self.name.display(), self.steady.longest_still().as_secs());
-                tracing::warn!("{name}: there was no picture for {} s, which are {most_s} s of video", gap.as_secs());
+        let missing = match self.steady.schedule(time_ns) {
+            Action::Skip => return Ok(()),
+            Action::Repeat(missing) => missing,
+            Action::RepeatAfterGap(missing, gap) => {
+                let (name, max_s) = (self.name.display(), self.steady.max_still().as_secs());
+                tracing::warn!("{name}: there was no picture for {} s, which are {max_s} s of video", gap.as_secs());
                 missing
             }
         };
@@ -85,40 +85,40 @@ impl<W: Write> Y4m<W> {
 
     fn flush_picture(&mut self) -> Result<(), SinkError> {
         self.flush_header()?;
-        self.to.write_all(&self.picture).map_err(SinkError::write(&self.name))?;
+        self.writer.write_all(&self.picture).map_err(SinkError::write(&self.name))?;
         self.whole_bytes += self.picture.len() as u64;
         Ok(())
     }
 
     fn flush_header(&mut self) -> Result<(), SinkError> {
-        self.to.write_all(&self.header).map_err(SinkError::write(&self.name))?;
+        self.writer.write_all(&self.header).map_err(SinkError::write(&self.name))?;
         self.whole_bytes += self.header.len() as u64;
         self.header.clear();
         Ok(())
     }
 
-    /// Writes the header if no frame has done so, and gives the writer back.
+    /// Writes the header if no frame has done so, and returns the writer.
     ///
     /// # Errors
     /// Writing failed.
     pub fn into_inner(mut self) -> Result<W, SinkError> {
         self.complete()?;
-        Ok(self.to)
+        Ok(self.writer)
     }
 
     /// Ends the stream; one without frames gets its header.
     fn complete(&mut self) -> Result<(), SinkError> {
-        if self.steady.surplus > 0 {
-            let (name, surplus) = (self.name.display(), self.steady.surplus);
-            tracing::warn!("{name}: {surplus} frames came faster than its rate, and are left out");
+        if self.steady.dropped > 0 {
+            let (name, dropped) = (self.name.display(), self.steady.dropped);
+            tracing::warn!("{name}: {dropped} frames came faster than its rate, and are left out");
         }
         self.flush_header()?;
-        self.to.flush().map_err(SinkError::write(&self.name))
+        self.writer.flush().map_err(SinkError::write(&self.name))
     }
 }
 
 impl Y4m<Pipe> {
-    /// A stream on standard output, past the standard library's line buffer.
+    /// Creates a stream on standard output that bypasses the standard library's line buffer.
     ///
     /// # Errors
     /// Standard output is closed.
@@ -129,19 +129,19 @@ impl Y4m<Pipe> {
     }
 }
 
-/// The kind of an error that only says that the reader has gone (`BrokenPipe`) or takes nothing any more (`TimedOut`).
+/// Returns the kind of an error that means that the reader has gone (`BrokenPipe`) or has stalled (`TimedOut`).
 fn reader_gone(error: &SinkError) -> Option<ErrorKind> {
     let SinkError::Write { cause, .. } = error else { return None };
     Some(cause.kind()).filter(|kind| matches!(kind, ErrorKind::BrokenPipe | ErrorKind::TimedOut))
 }
 
-/// A stream whose reader may go at any time, which ends the run but is no fault.
+/// A stream whose reader may go at any time, which ends the run without an error.
 impl<W: Write + Send> Sink for Y4m<W> {
     fn put(&mut self, frame: &ColorImage, time_ns: u64) -> Result<ControlFlow<()>, SinkError> {
         match self.write(frame, time_ns) {
             Err(error) if reader_gone(&error) == Some(ErrorKind::TimedOut) => {
                 tracing::warn!("{}: its reader does not read, and the last picture is not whole", self.name.display());
-                // The header may be cut as well: it must not be written again at the end.
+                // The header may be truncated as well: it must not be written again at the end.
                 self.header.clear();
                 Ok(ControlFlow::Break(()))
             }
@@ -169,27 +169,27 @@ pub struct Y4mFile {
 }
 
 impl Y4mFile {
-    /// Opens the file for writing, beside its name.
+    /// Opens the file for writing, under a temporary name.
     ///
     /// # Errors
-    /// It exists and `force` is not set, or cannot be written.
+    /// The file exists and `force` is not set, or it cannot be written.
     pub fn create(path: &Path, options: &Options) -> Result<Self, SinkError> {
         let output = Output::create(path, options.force)?;
         let file = output.file().and_then(File::try_clone).map_err(SinkError::write(path))?;
-        Ok(Self { stream: Y4m::with_longest_still(file, path, options, LONGEST_STILL), output })
+        Ok(Self { stream: Y4m::with_max_still(file, path, options, MAX_STILL), output })
     }
 
-    /// Ends the file after a write error: cuts off an incomplete picture, and keeps the whole ones.
+    /// Ends the file after a write error: cuts off an incomplete picture, and keeps the complete ones.
     fn failed(&mut self, error: SinkError) -> SinkError {
         // If that fails, players skip the incomplete picture.
-        let _ = self.stream.to.set_len(self.stream.whole_bytes);
-        self.output.failed(error)
+        let _ = self.stream.writer.set_len(self.stream.whole_bytes);
+        self.output.fail(error)
     }
 }
 
 impl Sink for Y4mFile {
     fn put(&mut self, frame: &ColorImage, time_ns: u64) -> Result<ControlFlow<()>, SinkError> {
-        match self.output.check_there().and_then(|()| self.stream.write(frame, time_ns)) {
+        match self.output.check_exists().and_then(|()| self.stream.write(frame, time_ns)) {
             Ok(()) => {
                 self.output.frames += 1;
                 Ok(ControlFlow::Continue(()))

@@ -1,21 +1,22 @@
-//! Pictures as YUYV: Y Cb Y Cr, two pixels sharing their colour; BT.601, limited range, as readers of cameras assume.
+//! R'G'B' to YUYV conversion: Y Cb Y Cr, two pixels sharing their chroma (4:2:2); ITU-R BT.601, limited range, as
+//! readers of cameras assume. twin: shaders/yuyv.wgsl
 
 use pulp::{Arch, Simd, WithSimd};
 
 use crate::frame::ColorImage;
 
-/// Encodes pictures of an even number of pixels.
+/// Encodes pictures with an even number of pixels.
 pub struct Encoder {
     arch: Arch,
 }
 
 impl Encoder {
-    /// For this processor.
+    /// Creates an encoder that uses the best instruction set of this processor.
     pub fn new() -> Self {
         Self { arch: Arch::new() }
     }
 
-    /// Encodes `picture` into `yuyv`, which has two bytes for each of its pixels.
+    /// Encodes `picture` into `yuyv`, which has two bytes per pixel.
     pub fn encode(&self, picture: &ColorImage, yuyv: &mut [u8]) {
         self.arch.dispatch(Yuyv { rgb: &picture.rgb, yuyv });
     }
@@ -27,10 +28,10 @@ impl Default for Encoder {
     }
 }
 
-/// Pixels that are converted together: whole vectors of every width.
+/// Number of pixels converted together: a multiple of every vector width.
 const BLOCK: usize = 64;
 
-/// Converts an even number of pixels, all rows as one: every pair from the first pixel on shares its chroma.
+/// Converts an even number of pixels, with all rows as one: every pair from the first pixel on shares its chroma.
 struct Yuyv<'a> {
     rgb: &'a [u8],
     yuyv: &'a mut [u8],
@@ -47,7 +48,7 @@ impl WithSimd for Yuyv<'_> {
             rgb_to_yuyv(rgb, yuyv);
         }
         if !rest.is_empty() {
-            // Padded to a block.
+            // The remainder is padded to a block.
             let (mut rgb, mut yuyv) = ([0; 3 * BLOCK], [0; 2 * BLOCK]);
             rgb[..rest.len()].copy_from_slice(rest);
             rgb_to_yuyv(&rgb, &mut yuyv);
@@ -57,9 +58,9 @@ impl WithSimd for Yuyv<'_> {
     }
 }
 
-/// Converts pixels to YUYV (BT.601, limited range), within one code of the exact value. 16-bit integers with
-/// coefficients of 8 bits fit the most pixels into a vector. Two pixels are taken apart as three words and put together
-/// as two: words are cheaper to move about than bytes.
+/// Converts pixels to YUYV (BT.601, limited range), within one code value of the exact result. 16-bit integers with
+/// 8-bit coefficients fit the most pixels into a vector. Two pixels are loaded as three words and stored as two: words
+/// are cheaper to shuffle than bytes.
 #[inline(always)]
 fn rgb_to_yuyv(rgb: &[u8; 3 * BLOCK], yuyv: &mut [u8; 2 * BLOCK]) {
     const PAIRS: usize = BLOCK / 2;
@@ -75,7 +76,7 @@ fn rgb_to_yuyv(rgb: &[u8; 3 * BLOCK], yuyv: &mut [u8; 2 * BLOCK]) {
     for pair in 0..PAIRS {
         let ((r0, g0), (b0, r1), (g1, b1)) = (bytes(rg[pair]), bytes(br[pair]), bytes(gb[pair]));
         let (r, g, b) = ((r0 + r1) as i16, (g0 + g1) as i16, (b0 + b1) as i16);
-        // Coefficients are halved, since these are sums of two pixels: at most 28 560 to either side.
+        // The coefficients are halved, since these are sums of two pixels: at most 28 560 in magnitude.
         let cb = (((56 * b - 19 * r - 37 * g + 128) >> 8) + 128) as u16;
         let cr = (((56 * r - 47 * g - 9 * b + 128) >> 8) + 128) as u16;
         (left[pair], right[pair]) = (luma(r0, g0, b0) | cb << 8, luma(r1, g1, b1) | cr << 8);
@@ -90,7 +91,7 @@ fn rgb_to_yuyv(rgb: &[u8; 3 * BLOCK], yuyv: &mut [u8; 2 * BLOCK]) {
 mod tests {
     use super::*;
 
-    /// Y'CbCr of BT.601 in limited range, not rounded.
+    /// Reference Y'CbCr of BT.601 in limited range, not rounded.
     fn exact([r, g, b]: [f64; 3]) -> [f64; 3] {
         let luma = 0.299 * r + 0.587 * g + 0.114 * b;
         [
@@ -100,7 +101,7 @@ mod tests {
         ]
     }
 
-    /// Every 5th value of each channel in pairs of unequal pixels; the count is no multiple of a block.
+    /// Every 5th value of each channel in pairs of unequal pixels; the count is not a multiple of a block.
     fn colors() -> ColorImage {
         let values = || (0..=255).step_by(5).map(|value| value as u8);
         let all = values().flat_map(|r| values().flat_map(move |g| values().map(move |b| [r, g, b])));

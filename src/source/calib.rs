@@ -1,4 +1,4 @@
-//! The calibration files of `--calib`: the geometry of an already rectified stereo pair, or how to rectify a raw one.
+//! Reads the calibration files of `--calib`: the geometry of a rectified stereo pair, or the calibration of a raw one.
 
 use std::path::{Path, PathBuf};
 
@@ -6,29 +6,30 @@ use super::SourceError;
 use crate::calibration::{self, CalibrationError, Fault, StereoCalibration};
 use crate::recording::geometry::Geometry;
 
-/// What a calibration says of two eyes.
+/// A calibration of two cameras.
 pub enum Eyes {
     /// Their pictures are rectified: a `calib.txt` of Middlebury, ETH3D or KITTI.
     Rectified {
-        /// Their geometry, scaled to the pictures at hand.
+        /// Their geometry, scaled to the given pictures.
         geometry: Geometry,
-        /// Columns and rows of the pictures that the calibration was made for, where the file says so.
+        /// Width and height of the pictures that the calibration is for, if stated.
         made_for: Option<(u32, u32)>,
     },
-    /// Their pictures are raw, and this tells how to rectify them: OpenCV's, Kalibr's or EuRoC's.
+    /// Their pictures are raw; the calibration of OpenCV, Kalibr or EuRoC allows to rectify them.
     Raw(Box<StereoCalibration>),
 }
 
-/// Reads a calibration, recognised by content, for pictures of `size` (columns, rows) in the file or folder `pictures`.
+/// Reads a calibration (the content decides its format) for pictures of `size` (columns, rows) in the file or folder
+/// `pictures`.
 ///
 /// # Errors
-/// It is of another kind, lacks an entry, has numbers that cannot be, or is for pictures of another aspect.
+/// The file is of another format, lacks an entry, has invalid numbers, or is for pictures of another aspect ratio.
 pub fn read(files: &[PathBuf], pictures: &Path, size: (u32, u32)) -> Result<Eyes, SourceError> {
     let paths: Vec<&Path> = files.iter().map(PathBuf::as_path).collect();
     match (calibration::load(&paths), &paths[..]) {
         (Ok(calibration), _) => Ok(Eyes::Raw(Box::new(calibration))),
-        // Not recognised, and not named as YAML: perhaps a `calib.txt`. A broken `.yml` keeps its own error.
-        (Err(error), [file]) if !is_yaml(file) && is_of_another_kind(&error) => {
+        // Not recognised and without a YAML extension: try `calib.txt`. A broken `.yml` keeps its own error.
+        (Err(error), [file]) if !is_yaml(file) && is_unrecognized(&error) => {
             let stated = Geometry::read(file, pictures)?;
             Ok(Eyes::Rectified { geometry: stated.fitted(file, size)?, made_for: stated.size })
         }
@@ -41,6 +42,6 @@ fn is_yaml(file: &Path) -> bool {
     extension.is_some_and(|extension| extension == "yml" || extension == "yaml")
 }
 
-fn is_of_another_kind(error: &CalibrationError) -> bool {
+fn is_unrecognized(error: &CalibrationError) -> bool {
     matches!(error, CalibrationError::Unknown(_) | CalibrationError::File { fault: Fault::Yaml(_), .. })
 }

@@ -1,4 +1,4 @@
-//! The cameras, virtual cameras and camera controls of this machine, as they are now. A build without cameras has none.
+//! Lists the cameras, virtual cameras and camera controls of this machine. A build without cameras has none.
 
 use super::SourceName;
 use crate::knob::Knob;
@@ -11,22 +11,22 @@ use crate::v4l2::{
 /// A device to choose.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Choice {
-    /// What the command line calls it.
+    /// Its name on the command line.
     pub name: String,
-    /// What a person calls it.
+    /// Its name for users.
     pub label: String,
 }
 
-/// A path longer than this is shown by its end.
-const LONG: usize = 36;
+/// Maximum length of a label in characters; longer paths are shortened to their end.
+const MAX_LABEL_CHARS: usize = 36;
 
 impl Choice {
-    /// What is no device: called by its name, of which a long path keeps the end.
+    /// Creates a choice that is no device: its label is its name, of which a long path keeps the end.
     pub fn of(name: &str) -> Self {
-        let is_short = |from: &usize| name[*from..].chars().count() < LONG;
+        let is_short = |from: &usize| name[*from..].chars().count() < MAX_LABEL_CHARS;
         let cuts = || name.match_indices('/').map(|(at, _)| at).skip(1);
         let end = cuts().find(is_short).or(cuts().last());
-        let label = match end.filter(|_| name.chars().count() > LONG) {
+        let label = match end.filter(|_| name.chars().count() > MAX_LABEL_CHARS) {
             Some(from) => format!("…{}", &name[from..]),
             None => name.to_owned(),
         };
@@ -34,7 +34,7 @@ impl Choice {
     }
 }
 
-/// Cameras.
+/// Returns the cameras.
 pub fn cameras() -> Vec<Choice> {
     #[cfg(feature = "camera")]
     return choices(Kind::Capture);
@@ -42,7 +42,7 @@ pub fn cameras() -> Vec<Choice> {
     return Vec::new();
 }
 
-/// Cameras that only PipeWire has: none of this program's own, and none that [`cameras`] lists.
+/// Returns the cameras that only PipeWire has, without this program's own and those of [`cameras`].
 pub fn shared_cameras() -> Vec<Choice> {
     #[cfg(feature = "pipewire")]
     {
@@ -60,7 +60,7 @@ pub fn shared_cameras() -> Vec<Choice> {
     Vec::new()
 }
 
-/// Virtual cameras that could be written to.
+/// Returns the virtual cameras that could be written to.
 pub fn virtual_cameras() -> Vec<Choice> {
     #[cfg(feature = "camera")]
     let mut found = choices(Kind::Virtual);
@@ -70,7 +70,7 @@ pub fn virtual_cameras() -> Vec<Choice> {
     found
 }
 
-/// The camera that PipeWire can be given, where it is there.
+/// Returns the camera that this program would offer in PipeWire, if PipeWire runs.
 fn pipewire() -> Option<Choice> {
     #[cfg(feature = "pipewire")]
     return crate::pipewire::is_there()
@@ -90,7 +90,8 @@ fn choices(kind: Kind) -> Vec<Choice> {
     node::nodes().into_iter().filter(of_kind).map(choice).collect()
 }
 
-/// The camera whose controls can be changed while `source` runs; none of a pair, whose pictures have to stay alike.
+/// Returns the camera whose controls can be changed while `source` runs; `None` for a pair, whose pictures must stay
+/// alike.
 pub fn camera_of(source: &SourceName) -> Option<String> {
     match source {
         #[cfg(feature = "camera")]
@@ -99,7 +100,7 @@ pub fn camera_of(source: &SourceName) -> Option<String> {
     }
 }
 
-/// The controls of a camera; empty where it has none, or they cannot be listed (which is logged).
+/// Returns the controls of a camera; empty if it has none, or on an error (which is logged).
 pub fn knobs(camera: &str) -> Vec<Knob> {
     #[cfg(feature = "camera")]
     return knobs::list(camera).unwrap_or_else(|error| {
@@ -113,10 +114,10 @@ pub fn knobs(camera: &str) -> Vec<Knob> {
     };
 }
 
-/// Sets a control of a camera; returns all its controls, since others may change with it.
+/// Sets a control of a camera; returns all its controls, since others may change as well.
 ///
 /// # Errors
-/// The camera refuses: one line for the person.
+/// Returns one line for users if the camera refuses.
 pub fn turn(camera: &str, knob: &str, value: i64) -> Result<Vec<Knob>, String> {
     #[cfg(feature = "camera")]
     return knobs::turn(camera, knob, value).map_err(|error| error.to_string());
@@ -124,7 +125,7 @@ pub fn turn(camera: &str, knob: &str, value: i64) -> Result<Vec<Knob>, String> {
     return Err(format!("{camera}: this build leaves cameras out (feature `camera`), so {knob} cannot be {value}"));
 }
 
-/// The device nodes that may be cameras: a look into one folder.
+/// Returns the device nodes that may be cameras, from a listing of `/dev`.
 pub fn nodes() -> Vec<String> {
     let entries = std::fs::read_dir("/dev").into_iter().flatten().flatten();
     let mut names: Vec<String> = entries.filter_map(|entry| entry.file_name().into_string().ok()).collect();

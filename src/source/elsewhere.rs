@@ -1,6 +1,6 @@
-//! External depth for a source: from another recording, or from a depth camera.
+//! External depth for a source, from another recording or a depth camera.
 
-use super::opened::depth_of;
+use super::opened::recorded_depth_from;
 use super::{DepthChoice, DepthFrom, Options, Source, SourceError, SourceName, Wanted, one_camera, options};
 use crate::capture::Brings;
 use crate::clock::Clock;
@@ -8,10 +8,10 @@ use crate::depth::DepthSource;
 use crate::depth::beside::Beside;
 use crate::recording::Recording;
 
-/// Gives `source` the depth that `--depth` names, where that is a folder or a depth camera; else returns it unchanged.
+/// Adds the depth that `--depth` names to `source`, if it is external; otherwise returns the source unchanged.
 ///
 /// # Errors
-/// It cannot be opened, or an option does not apply to it.
+/// The depth cannot be opened, or an option does not apply to it.
 pub(super) fn with_external_depth(
     source: Source,
     name: &SourceName,
@@ -38,13 +38,13 @@ pub(super) fn with_external_depth(
         DepthChoice::Auto | DepthChoice::Recorded | DepthChoice::Stereo | DepthChoice::None => return Ok(source),
         DepthChoice::Folder(folder) => {
             let recording = Recording::open(folder, &wanted.reading())?;
-            let depth_from = depth_of(&recording);
+            let depth_from = recorded_depth_from(&recording);
             wanted.check_relative(depth_from)?;
             first_depth = wanted.first_depth(&recording);
             (Box::new(Beside::new(recording, &folder.display().to_string())?), depth_from)
         }
         DepthChoice::Device(name) => (open_depth_camera(name, depth, clock)?, DepthFrom::Units),
-        DepthChoice::OneCamera(chosen) => return one_camera::give(source, chosen, name, wanted),
+        DepthChoice::OneCamera(chosen) => return one_camera::add_depth(source, chosen, name, wanted),
         DepthChoice::Defocus => {
             return SourceError::usage("--depth defocus is for a photograph: bokehcam render PHOTO --depth defocus");
         }
@@ -52,7 +52,7 @@ pub(super) fn with_external_depth(
     Ok(Source { depth: Some(external), depth_from, first_depth, ..source })
 }
 
-/// Opens the depth camera `name` with the scale and registration that the options state.
+/// Opens the depth camera `name` with scale and registration from the options.
 #[cfg(feature = "camera")]
 fn open_depth_camera(name: &str, options: &options::Depth, clock: &Clock) -> Result<Box<dyn DepthSource>, SourceError> {
     use super::registration;

@@ -1,4 +1,4 @@
-//! Why a source cannot be opened.
+//! Errors of opening a source.
 
 use std::io;
 use std::path::PathBuf;
@@ -9,18 +9,18 @@ use crate::depth::DepthError;
 use crate::files::input;
 use crate::recording::RecordingError;
 
-/// Why a source cannot be opened.
+/// An error in opening a source.
 #[allow(missing_docs)] // The messages say what the fields are.
 #[derive(Debug, thiserror::Error)]
 pub enum SourceError {
-    /// What is asked for does not make sense together.
+    /// The options contradict each other.
     #[error("{0}")]
     Usage(String),
-    /// What is named is not here (or more of it than one), which the machine decides and not the name: a camera that is not
-    /// plugged in, a disk that is not mounted, a network that is not installed.
+    /// The named thing is missing on this machine, or ambiguous: a camera that is not plugged in, a disk that is not
+    /// mounted, a network that is not installed. The same name may be right later.
     #[error("{0}")]
     NotThere(String),
-    /// The calibration of a depth camera cannot be used.
+    /// The calibration of a depth camera is invalid.
     #[error("{}:{line}: {what}", path.display())]
     Registration {
         path: PathBuf,
@@ -33,13 +33,13 @@ pub enum SourceError {
     Io { path: PathBuf, source: io::Error },
     #[error(transparent)]
     Capture(#[from] CaptureError),
-    /// It is no recording, or a faulty one.
+    /// The folder is not a recording, or a faulty one.
     #[error(transparent)]
     Recording(#[from] RecordingError),
-    /// There is no depth.
+    /// Depth is not available.
     #[error(transparent)]
     Depth(#[from] DepthError),
-    /// The calibration of two eyes cannot be used.
+    /// The calibration of a stereo pair is invalid.
     #[error(transparent)]
     Calibration(#[from] CalibrationError),
     /// The depth camera cannot be opened.
@@ -49,12 +49,12 @@ pub enum SourceError {
 }
 
 impl SourceError {
-    /// Whether the caller has to write something differently: the same words will not become right by themselves.
+    /// Returns whether the arguments must be changed: the same ones would never succeed.
     pub fn is_wrong_argument(&self) -> bool {
         matches!(self, Self::Usage(_) | Self::Registration { .. })
     }
 
-    /// The same, said of what is called `name`.
+    /// Prefixes the message with `name`.
     #[must_use]
     pub fn of(self, name: &str) -> Self {
         match self {

@@ -1,4 +1,4 @@
-//! Sets up depth from two eyes: their geometry from options, calibration or recording, then rectifier and matcher.
+//! Sets up stereo depth: geometry from options, calibration or recording, then rectifier and matcher.
 
 use std::path::Path;
 
@@ -14,16 +14,16 @@ use crate::look::Look;
 use crate::optics::StereoRig;
 use crate::recording::Pair;
 
-/// What is known of two eyes, enough to match their pictures.
-enum Stated {
-    /// Their pictures are a rectified pair.
+/// The geometry of two cameras, sufficient for stereo matching.
+enum Geometry {
+    /// The pictures are rectified.
     Rectified(StereoRig),
-    /// The pictures need this rectification.
+    /// The pictures must be rectified first.
     Raw(Box<Rectifier>),
 }
 
 impl options::Stereo {
-    /// Refuses the options about two eyes, for a source with only one.
+    /// Rejects stereo options for a source with one camera.
     ///
     /// # Errors
     /// One of them is given.
@@ -43,7 +43,7 @@ impl options::Stereo {
         }
     }
 
-    /// The stereo geometry that `--focal-px`, `--baseline-m` and `--doffs-px` state, if they are given.
+    /// Returns the stereo geometry of `--focal-px`, `--baseline-m` and `--doffs-px`, if given.
     fn rig(&self) -> Result<Option<StereoRig>, SourceError> {
         match (self.focal_px, self.baseline_m) {
             (Some(focal_px), Some(baseline_m)) => {
@@ -54,12 +54,12 @@ impl options::Stereo {
         }
     }
 
-    /// How the two eyes stand: by the numbers in the options, else by `--calib`, else by what the source states
-    /// (`pair`). Whether pictures are rectified is never guessed: matching raw ones gives plausible but wrong depth.
-    fn resolve_pair(&self, pair: &Pair, source_name: &str, size: (u32, u32)) -> Result<Stated, SourceError> {
+    /// Determines the geometry from the numbers in the options, else from `--calib`, else from the source (`pair`).
+    /// Whether pictures are rectified is never guessed: matching raw ones gives plausible but wrong depth.
+    fn resolve_pair(&self, pair: &Pair, source_name: &str, size: (u32, u32)) -> Result<Geometry, SourceError> {
         if let Some(rig) = self.rig()? {
             return match (self.rectified, pair) {
-                (true, _) | (false, Pair::Rectified(_)) => Ok(Stated::Rectified(rig)),
+                (true, _) | (false, Pair::Rectified(_)) => Ok(Geometry::Rectified(rig)),
                 _ => Err(SourceError::Usage(
                     "--focal-px and --baseline-m are those of a rectified pair: add --rectified if this is one, or use \
                      --calib FILE"
@@ -75,20 +75,20 @@ impl options::Stereo {
             }),
         };
         match from_file.as_ref().unwrap_or(pair) {
-            Pair::Rectified(rig) => Ok(Stated::Rectified(*rig)),
+            Pair::Rectified(rig) => Ok(Geometry::Rectified(*rig)),
             Pair::Raw(calibration) => {
-                // Rectified by others from this calibration: only its geometry is needed.
+                // Rectified already with this calibration: only its geometry is needed.
                 let stated = if self.rectified {
-                    Stated::Rectified(Rectification::of(calibration, size)?.rig())
+                    Geometry::Rectified(Rectification::of(calibration, size)?.rig())
                 } else {
-                    Stated::Raw(Box::new(Rectifier::new(calibration, size)?))
+                    Geometry::Raw(Box::new(Rectifier::new(calibration, size)?))
                 };
                 for note in calibration.notes(size) {
                     tracing::warn!("{note}");
                 }
                 Ok(stated)
             }
-            Pair::Unstated if self.rectified => Ok(Stated::Rectified(StereoRig::assumed(size.0))),
+            Pair::Unstated if self.rectified => Ok(Geometry::Rectified(StereoRig::assumed(size.0))),
             Pair::Unstated => Err(SourceError::Usage(
                 "depth from two eyes needs --calib FILE, or --rectified if their pictures are rectified already"
                     .to_string(),
@@ -97,11 +97,11 @@ impl options::Stereo {
     }
 }
 
-/// Sets up stereo matching for the source `info`. `pair` is what the source states of its eyes, and `disparities` how
-/// many occur in it, where that is known.
+/// Sets up stereo matching for the source `info`. `pair` is the geometry that the source states, and `disparities` the
+/// number of disparities, if known.
 ///
 /// # Errors
-/// It is not stated what they are, a calibration cannot be used, or there is no such GPU.
+/// The geometry is not stated, a calibration is invalid, or the requested GPU does not exist.
 pub fn open(
     info: &SourceInfo,
     pair: &Pair,
@@ -110,15 +110,15 @@ pub fn open(
     computing: &Computing,
 ) -> Result<StereoDepth, SourceError> {
     let stated = options.resolve_pair(pair, &info.name, info.size)?;
-    // What nobody knows is found out.
+    // An unknown number of disparities is found out during the run.
     let is_known = options.max_disparity.is_some() || disparities.is_some();
     let disparities = options.max_disparity.unwrap_or_else(|| default_disparities(disparities, info.size.0));
     let matcher = computing.matcher(disparities, Effort::Full, info.size)?;
     let (depth, how) = match stated {
-        Stated::Raw(rectifier) => {
+        Geometry::Raw(rectifier) => {
             (StereoDepth::of_raw(&info.name, *rectifier, matcher, disparities), "to be rectified")
         }
-        Stated::Rectified(rig) => (StereoDepth::of_rectified(&info.name, rig, matcher, disparities), "rectified"),
+        Geometry::Rectified(rig) => (StereoDepth::of_rectified(&info.name, rig, matcher, disparities), "rectified"),
     };
     let StereoRig { focal_px, baseline_m, doffs_px, metric } = *depth.rig();
     let note = if metric { "" } else { ", assumed" };
@@ -135,7 +135,7 @@ pub fn open(
     })
 }
 
-/// Refuses a look that needs metres where the geometry of the eyes is only assumed.
+/// Rejects a look that needs metres if the geometry is only assumed.
 ///
 /// # Errors
 /// The focus or the lens needs metres, and `rig` has none.
@@ -147,7 +147,7 @@ pub fn check_focus(rig: &StereoRig, look: &Look) -> Result<(), SourceError> {
     )))
 }
 
-/// Disparities to try: as many as are known to occur, else those of a tenth of the picture's width.
+/// Returns the number of disparities to search: the known number, or else a tenth of the picture's width.
 fn default_disparities(known: Option<u32>, width_px: u32) -> u32 {
     known.unwrap_or(width_px.div_ceil(10)).next_multiple_of(16).clamp(16, Settings::MOST_DISPARITIES)
 }

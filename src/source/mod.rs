@@ -1,7 +1,6 @@
-//! Sources by name: a camera, two of them, a recording, a photo, the demonstration or the synthetic scene, with the depth
-//! that goes with it.
+//! Sources by name: a camera or two, a recording, a photo, the demonstration or the synthetic scene, with their depth.
 //!
-//! The command line, the window and other programs open them in one way:
+//! The command line, the window and other programs all open them like this:
 //!
 //! ```no_run
 //! use bokehcam::look::Look;
@@ -52,33 +51,33 @@ use crate::pipeline::{Blurring, Run};
 use crate::recording::{Options as Reading, Recording, Scratch};
 use crate::sink::Sink;
 
-/// What depth comes from.
+/// The origin of depth.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum DepthFrom {
-    /// There is none, or it is not used.
+    /// No depth, or it is not used.
     #[default]
     Nothing,
-    /// Numbers in units of their own, as 16-bit pictures and depth cameras have them.
+    /// Values in units that need a scale, from 16-bit pictures and depth cameras.
     Units,
-    /// Metres, or disparities that become metres.
+    /// Metres, or disparities that are converted to metres.
     Metres,
-    /// Grey pictures of relative inverse depth.
+    /// Relative inverse depth from grey pictures.
     Relative,
-    /// Two eyes.
+    /// Stereo matching.
     Eyes,
-    /// Networks: relative distances.
+    /// Networks; the distances are relative.
     Networks,
-    /// A picture of what is behind: what stands before it, and what does not.
+    /// Difference from a clean plate (a picture of the background): foreground or background.
     Plate,
 }
 
 impl DepthFrom {
-    /// Whether it tells only what is nearer, and nothing in metres.
+    /// Returns whether distances are relative, not in metres.
     pub fn is_relative(self) -> bool {
         matches!(self, Self::Relative | Self::Networks | Self::Plate)
     }
 
-    /// Whether another way to depth may take its place: it is none, or made of the pictures alone.
+    /// Returns whether another origin may replace it: there is no depth, or it is inferred from the pictures alone.
     pub fn is_of_pictures(self) -> bool {
         matches!(self, Self::Nothing | Self::Networks | Self::Plate)
     }
@@ -86,81 +85,82 @@ impl DepthFrom {
 
 /// An opened source.
 pub struct Source {
-    /// Gives the frames.
+    /// The source of frames.
     pub camera: Box<dyn Camera>,
-    /// Gives their depth, where the camera does not.
+    /// The source of depth, unless the camera brings it.
     pub depth: Option<Box<dyn DepthSource>>,
-    /// Geometry of the two eyes, where depth is matched from them.
+    /// The stereo geometry, if depth is matched.
     pub rig: Option<StereoRig>,
-    /// What depth comes from.
+    /// The origin of depth.
     pub depth_from: DepthFrom,
-    /// What makes the depth, where networks do.
+    /// Describes the networks that infer depth, if any.
     pub networks: Option<String>,
-    /// What finds the person to focus on, where the depth is measured.
+    /// Describes the network that detects the person in focus, if depth is measured.
     pub persons: Option<String>,
-    /// How far the plate is, where that makes the depth.
+    /// The progress of the clean plate, if depth is made from one.
     pub guide: Option<Arc<Guide>>,
-    /// The first map of recorded depth, where the look uses depth.
+    /// The first map of recorded depth, if the look uses depth.
     pub first_depth: Option<DepthMap>,
 }
 
-/// How a source is opened.
+/// Options for opening a source.
 #[derive(Clone, Debug, Default)]
 pub struct Options {
-    /// Which frames.
+    /// The range of frames.
     pub frames: Frames,
-    /// How depth pictures are read.
+    /// The encoding of depth pictures.
     pub depth: options::Depth,
-    /// Layout and geometry of its two eyes.
+    /// Layout and geometry of a stereo source.
     pub stereo: options::Stereo,
-    /// How networks are run.
+    /// The options of networks.
     pub networks: options::Networks,
-    /// Where depth comes from.
+    /// The origin of depth.
     pub depth_choice: DepthChoice,
-    /// What runs the stereo matching.
+    /// The hardware for stereo matching.
     pub computing: Computing,
-    /// Faulty lines in a recording's frame lists become frames that fail, instead of an error on opening.
+    /// Whether faulty lines in a recording's lists become frames that fail, instead of an error on opening.
     pub keep_going: bool,
-    /// The pictures of a camera of PipeWire's go to those who asked for that camera, and come while there are any.
+    /// Whether the program acts as a filter of a PipeWire camera: pictures go only to the clients of that camera, and
+    /// only while there are any.
     pub filters: bool,
 }
 
-/// What the caller of [`Source::open`] asked for.
+/// The request to [`Source::open`].
 struct Wanted<'a> {
     options: &'a Options,
-    /// The look that the depth is for; `None` where depth is wanted for its own sake, as for recording it.
+    /// The look that the depth is for; `None` if depth is wanted as such, for example to record it.
     look: Option<&'a Look>,
 }
 
-/// What refuses metres for relative inverse depth.
+/// Part of the message that rejects metres for relative inverse depth.
 pub const INVERSE_TELLS: &str = "inverse depth without a scale tells";
 
-/// Whether depth from two eyes is refined by default: refinement does not model the errors of stereo matching, but
-/// makes its depth steadier.
+/// Whether stereo depth is refined by default: refinement does not model the errors of stereo matching, but makes its
+/// depth steadier.
 const REFINES_STEREO: bool = true;
 
 impl Source {
-    /// Opens a source. `look` decides whether depth is needed; without one, any depth there is gets opened.
+    /// Opens a source. `look` decides whether depth is needed; without one, any available depth is opened.
     ///
     /// # Errors
-    /// It cannot be read, it has no frame between `--start` and `--end`, or an option does not apply to it.
+    /// The source cannot be read, has no frame between `--start` and `--end`, or an option does not apply to it.
     pub fn open(name: &SourceName, options: &Options, look: Option<&Look>) -> Result<Self, SourceError> {
         let wanted = Wanted { options, look };
         let source = Self::open_with_own_depth(name, &wanted)?;
-        let source = networks::for_lone_camera(source, &wanted);
+        let source = networks::add_network_depth(source, &wanted);
         let source = elsewhere::with_external_depth(source, name, &wanted, &Clock::system())?;
-        Ok(networks::for_focus(source, &wanted))
+        Ok(networks::add_person_detection(source, &wanted))
     }
 
-    /// A source from a camera that the caller has opened; `depth` gives depth in metres for its frames.
+    /// Creates a source from a camera that the caller has opened; `depth` provides depth in metres for its frames.
     pub fn of(camera: Box<dyn Camera>, depth: Option<Box<dyn DepthSource>>) -> Self {
         let has_depth = depth.is_some() || camera.info().brings == Brings::Depth;
         let depth_from = if has_depth { DepthFrom::Metres } else { DepthFrom::Nothing };
         Self { camera, depth, rig: None, depth_from, networks: None, persons: None, guide: None, first_depth: None }
     }
 
-    /// Opens a source with the depth it has by itself: recorded, exact, or matched from its two eyes. Depth from
-    /// another device or recording is added by [`elsewhere::with_external_depth`].
+    /// Opens a source with its own depth: recorded, exact, or matched. Depth from another device or recording is added
+    /// by [`elsewhere::with_external_depth`].
     fn open_with_own_depth(name: &SourceName, wanted: &Wanted) -> Result<Self, SourceError> {
         let Options { frames, stereo, depth_choice, computing, .. } = wanted.options;
         name.check(frames)?;
@@ -205,26 +205,26 @@ impl Source {
         Ok(Self { depth_from, first_depth, ..Self::of(camera, depth) })
     }
 
-    /// Whether its frames have depth.
+    /// Returns whether its frames have depth.
     pub fn has_depth(&self) -> bool {
         self.depth.is_some() || self.camera.info().brings == Brings::Depth
     }
 
-    /// A look adapted to this source, which was opened with `options`.
+    /// Adapts a look to this source, which was opened with `options`.
     ///
     /// # Errors
-    /// As for [`fitting_look`].
+    /// Same as for [`fitting_look`].
     pub fn fitting_look(&self, look: &Look, options: &Options) -> Result<Look, SourceError> {
         fitting_look(look, &options.depth_choice, self.has_depth())
     }
 
-    /// Whether its depth was measured (and not computed exactly), so that refinement improves it.
+    /// Returns whether its depth is measured (not computed exactly), so that refinement improves it.
     pub fn is_measured(&self) -> bool {
         let is_made = matches!(self.depth_from, DepthFrom::Networks | DepthFrom::Plate);
         self.depth.is_some() && !is_made && (self.rig.is_none() || REFINES_STEREO)
     }
 
-    /// A run of its frames ([`Run::of`]), which are blurred so, into `sink`, as fast as it goes. `stop` ends the run.
+    /// Creates a run of its frames ([`Run::of`]) with this blur into `sink`, as fast as possible. `stop` ends the run.
     pub fn into_run(self, blurring: Blurring, sink: Box<dyn Sink>, stop: &AtomicBool) -> Run<'_> {
         let measured = self.is_measured();
         Run { measured, ..Run::of(self.camera, self.depth, blurring, sink, stop) }
@@ -232,7 +232,7 @@ impl Source {
 }
 
 impl Wanted<'_> {
-    /// How a recording with depth pictures is read.
+    /// Returns the options for reading a recording with depth pictures.
     fn reading(&self) -> Reading {
         let Options { depth, keep_going, .. } = self.options;
         Reading {
@@ -244,13 +244,13 @@ impl Wanted<'_> {
         }
     }
 
-    /// Whether the effect is one that uses depth.
+    /// Returns whether the effect uses depth.
     pub fn uses_depth(&self) -> bool {
         self.look.is_none_or(|look| look.effect.follows_depth())
     }
 
-    /// The first depth map of a recording, to see what its numbers are; `None` where the look does not use depth. A faulty map
-    /// is no error here: it is reported when the frame is read.
+    /// Reads the first depth map of a recording, to inspect its values; `None` if the look does not use depth. A faulty
+    /// map is not an error here: it is reported when the frame is read.
     pub fn first_depth(&self, recording: &Recording) -> Option<DepthMap> {
         let mut map = DepthMap::default();
         let is_used = self.look.is_some_and(|look| look.effect.follows_depth()) && recording.has_depth();
@@ -258,7 +258,7 @@ impl Wanted<'_> {
         read.ok().map(|()| map)
     }
 
-    /// Refuses a look that needs real distances for relative ones.
+    /// Rejects a look that needs real distances if depth is relative.
     fn check_relative(&self, depth_from: DepthFrom) -> Result<(), SourceError> {
         let is_used = depth_from == DepthFrom::Relative && self.uses_depth();
         self.look.filter(|_| is_used).map_or(Ok(()), |look| refuse_metres(look, INVERSE_TELLS))
@@ -272,8 +272,8 @@ impl Wanted<'_> {
         Ok(())
     }
 
-    /// Whether depth comes from stereo matching, if the source has two eyes; `has_depth` tells whether it has depth of
-    /// another kind, which `auto` prefers.
+    /// Returns whether depth comes from stereo matching, if the source is stereo; `has_depth` says whether it has other
+    /// depth, which `auto` prefers.
     fn uses_stereo(&self, has_depth: bool) -> bool {
         match self.options.depth_choice {
             DepthChoice::Stereo => true,
@@ -283,10 +283,10 @@ impl Wanted<'_> {
     }
 }
 
-/// The look adapted to a source with or without depth: without, depth of field becomes tilt-shift.
+/// Adapts a look to a source with or without depth: without depth, `auto` becomes a uniform blur.
 ///
 /// # Errors
-/// The look needs depth that there is not, or its lens needs a focus distance.
+/// The look needs depth that the source lacks, or its lens needs a focus distance.
 pub fn fitting_look(look: &Look, depth: &DepthChoice, has_depth: bool) -> Result<Look, SourceError> {
     let uses_depth = has_depth && *depth != DepthChoice::None;
     if look.effect == Effect::Dof && !uses_depth {

@@ -1,24 +1,24 @@
-//! What a person can choose of a camera: its sizes and rates; and which way it looks.
+//! The sizes and rates of a camera, and whether it faces the user.
 
-/// A size of a camera's pictures, and the rates at which it gives them.
+/// A picture size of a camera, and its frame rates.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Mode {
-    /// Columns and rows.
+    /// Width and height.
     pub size: (u32, u32),
-    /// Frames per second, the most first.
+    /// Frames per second, in descending order.
     pub fps: Vec<f64>,
 }
 
-/// Offered of a camera that has every size of a range.
+/// The sizes offered for a camera that supports a range of sizes.
 #[cfg(feature = "camera")]
 const USUAL_SIZES: [(u32, u32); 7] =
     [(3840, 2160), (2560, 1440), (1920, 1080), (1280, 720), (960, 540), (640, 480), (640, 360)];
-/// Offered of a camera that has every rate of a range.
+/// The rates offered for a camera that supports a range of rates.
 #[cfg(feature = "camera")]
 const USUAL_FPS: [f64; 5] = [60.0, 50.0, 30.0, 25.0, 15.0];
 
-/// The sizes and rates of a camera over all of its formats, the largest first; none where it does not tell, or it cannot be
-/// asked (which is logged).
+/// Returns sizes and rates of a camera over all its formats, the largest first; empty if they are unknown or on an
+/// error (which is logged).
 pub fn modes(camera: &str) -> Vec<Mode> {
     #[cfg(feature = "camera")]
     {
@@ -28,7 +28,7 @@ pub fn modes(camera: &str) -> Vec<Mode> {
             modes::modes(&device).map_err(|error| error.to_string())
         });
         match asked {
-            Ok(formats) => return joined(&formats),
+            Ok(formats) => return merge_formats(&formats),
             Err(error) => tracing::info!("{camera}: its sizes cannot be listed: {error}"),
         }
     }
@@ -37,7 +37,7 @@ pub fn modes(camera: &str) -> Vec<Mode> {
 }
 
 #[cfg(feature = "camera")]
-fn joined(formats: &[crate::v4l2::modes::FormatModes]) -> Vec<Mode> {
+fn merge_formats(formats: &[crate::v4l2::modes::FormatModes]) -> Vec<Mode> {
     use crate::v4l2::modes::{Rates, Sizes};
     let mut joined: Vec<Mode> = Vec::new();
     let mut add = |size: (u32, u32), rates: &Rates| {
@@ -79,8 +79,8 @@ fn joined(formats: &[crate::v4l2::modes::FormatModes]) -> Vec<Mode> {
     joined
 }
 
-/// Whether who sits before a camera looks at its pictures as into a mirror: every camera, but a virtual one, and one that says
-/// that it is at a device's back.
+/// Returns whether users expect this camera's pictures to be mirrored: true for all cameras except virtual ones, and
+/// those that report to be on the back of a device.
 #[cfg(feature = "camera")]
 pub fn faces_user(camera: &str) -> bool {
     use crate::v4l2::{Device, controls, controls::Value, node};
@@ -88,20 +88,20 @@ pub fn faces_user(camera: &str) -> bool {
     let path = path.canonicalize().unwrap_or(path);
     let is_virtual = node::nodes().iter().any(|node| node.path == path && node.kind == node::Kind::Virtual);
     let orientation = Device::open(&path).ok().and_then(|device| controls::get(&device, ORIENTATION).ok());
-    !is_virtual && !matches!(orientation, Some(Value::Number(AT_THE_BACK)))
+    !is_virtual && !matches!(orientation, Some(Value::Number(ORIENTATION_BACK)))
 }
 
-/// This build has no cameras.
+/// Returns false, as this build has no cameras.
 #[cfg(not(feature = "camera"))]
 pub fn faces_user(_: &str) -> bool {
     false
 }
 
-/// `V4L2_CID_CAMERA_ORIENTATION`, as controls are called here, and its value `V4L2_CAMERA_ORIENTATION_BACK`.
+/// The name of `V4L2_CID_CAMERA_ORIENTATION` among our controls, and the value `V4L2_CAMERA_ORIENTATION_BACK`.
 #[cfg(feature = "camera")]
 const ORIENTATION: &str = "camera_orientation";
 #[cfg(feature = "camera")]
-const AT_THE_BACK: i64 = 1;
+const ORIENTATION_BACK: i64 = 1;
 
 #[cfg(all(test, feature = "camera"))]
 mod tests {
@@ -127,14 +127,14 @@ mod tests {
             format(false, sizes(&[((1280, 720), &[30.0, 60.0]), ((1920, 1080), &[30.0])])),
             format(true, sizes(&[((4000, 3000), &[5.0])])),
         ];
-        let found: Vec<_> = joined(&formats).into_iter().map(|mode| (mode.size, mode.fps)).collect();
+        let found: Vec<_> = merge_formats(&formats).into_iter().map(|mode| (mode.size, mode.fps)).collect();
         let expected =
             [((1920, 1080), vec![30.0]), ((1280, 720), vec![60.0, 30.0, 10.0]), ((640, 480), vec![30.0, 15.0])];
         assert_eq!(found, expected);
         let (shortest, longest) = (Interval::from_fps(30.0), Interval::from_fps(15.0));
         let rates = Rates::Range { shortest, longest };
         let range = Sizes::Range { min_px: (320, 180), max_px: (1280, 720), step_px: (2, 2), rates };
-        let found = joined(&[format(false, range)]);
+        let found = merge_formats(&[format(false, range)]);
         assert_eq!(
             found.iter().map(|mode| mode.size).collect::<Vec<_>>(),
             [(1280, 720), (960, 540), (640, 480), (640, 360)]

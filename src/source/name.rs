@@ -1,4 +1,4 @@
-//! The names of sources, as users write them: cameras, folders of recordings, `demo` and `synthetic`.
+//! Parses the names of sources: cameras, folders of recordings, photos, `demo` and `synthetic`.
 
 use std::ffi::OsStr;
 use std::fmt;
@@ -8,13 +8,13 @@ use std::str::FromStr;
 use super::{DepthFrom, Frames, Source, SourceError, near, photo};
 use crate::capture::demo;
 
-/// What the synthetic scene is called.
+/// The name of the synthetic scene.
 const SYNTHETIC: &str = "synthetic";
 
-/// How the name of a camera of PipeWire's begins.
+/// The prefix of PipeWire cameras.
 const PIPEWIRE: &str = "pipewire:";
 
-/// What kind of source frames come from.
+/// The kind of a source.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Kind {
     /// A camera, or two.
@@ -24,27 +24,27 @@ pub enum Kind {
     Recording,
     /// The demonstration.
     Demo,
-    /// A photo: one frame that stands still.
+    /// A photo: a single frame.
     Photo,
     /// The synthetic scene.
     Synthetic,
 }
 
-/// A camera: the name that the user gave, and the device node that it was resolved to.
+/// A camera: the name from the user, and the device node that it resolved to.
 #[cfg(feature = "camera")]
 #[derive(Clone, Debug, PartialEq)]
 pub struct Named {
-    /// As the user wrote it.
+    /// The name as written by the user.
     pub name: String,
     node: PathBuf,
 }
 
-/// Where frames come from, as it is written.
+/// The name of a source.
 #[derive(Clone, Debug, PartialEq)]
 pub enum SourceName {
-    /// The moving scene with known depth, rendered frame by frame.
+    /// The moving scene with exact depth, rendered frame by frame.
     Synthetic,
-    /// The demonstration: a loop of that scene, with its depth, that is in the program.
+    /// The demonstration: a loop of that scene with its depth, embedded in the program.
     Demo,
     /// A folder with a recording.
     Folder(PathBuf),
@@ -53,7 +53,7 @@ pub enum SourceName {
     /// A camera.
     #[cfg(feature = "camera")]
     Camera(Named),
-    /// A camera of PipeWire's, by what follows `pipewire:`.
+    /// A PipeWire camera, by the name after `pipewire:`.
     #[cfg(all(feature = "camera", feature = "pipewire"))]
     PipeWire(String),
     /// Two cameras, the left one first.
@@ -68,18 +68,18 @@ impl FromStr for SourceName {
     }
 }
 
-/// Whether a text is meant as a path, and not as the name of a camera.
-fn looks_like_a_path(text: &str) -> bool {
+/// Returns whether a text is meant as a path rather than the name of a camera.
+fn is_path(text: &str) -> bool {
     text.contains('/') && !text.starts_with("/dev/")
 }
 
-/// Whether a file is a video, by its name.
+/// Returns whether a file is a video, by its extension.
 fn is_video(path: &Path) -> bool {
     let ending = path.extension().and_then(OsStr::to_str).unwrap_or_default().to_lowercase();
     ["mp4", "mkv", "webm", "mov", "avi", "m4v", "y4m"].contains(&ending.as_str())
 }
 
-/// As it is written.
+/// Writes the name so that it parses again.
 impl fmt::Display for SourceName {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
@@ -96,8 +96,8 @@ impl fmt::Display for SourceName {
     }
 }
 
-/// What can be a source.
-fn sources() -> &'static str {
+/// Returns the accepted sources, for messages.
+fn accepted_sources() -> &'static str {
     match cfg!(feature = "camera") {
         true if cfg!(feature = "pipewire") => {
             "a camera, pipewire:NAME, two cameras LEFT,RIGHT, a photo (PNG or JPEG), a folder with a recording, demo or synthetic"
@@ -107,14 +107,14 @@ fn sources() -> &'static str {
     }
 }
 
-/// There is no such folder; with a suggestion if a sibling has a similar name.
-fn no_folder(text: &str) -> SourceError {
-    let hint =
-        near::folder(Path::new(text)).map_or(String::new(), |near| format!(", did you mean {}?", near.display()));
-    SourceError::NotThere(format!("there is no such folder{hint}; use {}", sources()))
+/// Creates the error for a missing folder; suggests a sibling with a similar name.
+fn missing_folder(text: &str) -> SourceError {
+    let hint = near::similar_folder(Path::new(text))
+        .map_or(String::new(), |near| format!(", did you mean {}?", near.display()));
+    SourceError::NotThere(format!("there is no such folder{hint}; use {}", accepted_sources()))
 }
 
-/// Parses the name of one camera, or of two as `LEFT,RIGHT`; the message of an error suggests similar names.
+/// Parses the name of one camera, or of two as `LEFT,RIGHT`; errors suggest similar names.
 #[cfg(feature = "camera")]
 fn parse_cameras(text: &str) -> Result<SourceName, SourceError> {
     let named = |name: &str| {
@@ -122,17 +122,17 @@ fn parse_cameras(text: &str) -> Result<SourceName, SourceError> {
         Ok(Named { name: name.to_owned(), node })
     };
     let refuse = |error: crate::v4l2::node::NodeError| {
-        Err(SourceError::NotThere(match near::folder(Path::new(text)) {
-            Some(near) => format!("{error}; or did you mean the folder {}? Use {}", near.display(), sources()),
-            None => format!("{error}; use {}", sources()),
+        Err(SourceError::NotThere(match near::similar_folder(Path::new(text)) {
+            Some(near) => format!("{error}; or did you mean the folder {}? Use {}", near.display(), accepted_sources()),
+            None => format!("{error}; use {}", accepted_sources()),
         }))
     };
-    // First as one camera: its own name may contain commas, too.
+    // Try a single camera first, as its own name may contain commas.
     let not_one_camera = match named(text) {
         Ok(camera) => return Ok(SourceName::Camera(camera)),
         Err(error) => error,
     };
-    // For the same reason, any comma may be the one between the two names.
+    // For the same reason, try every comma as the separator.
     let halves = |(at, _): (usize, &str)| (&text[..at], &text[at + 1..]);
     let pairs = || text.match_indices(',').map(halves);
     for (left, right) in pairs() {
@@ -140,7 +140,7 @@ fn parse_cameras(text: &str) -> Result<SourceName, SourceError> {
             let same = |a: &Path, b: &Path| a.canonicalize().ok() == b.canonicalize().ok();
             if same(&left.node, &right.node) {
                 let what = format!("the left and the right eye are one camera, {}", left.node.display());
-                // By two names: the other one may be plugged in later.
+                // If the names differ, the other camera may just not be plugged in.
                 let may_come = left.name != right.name;
                 return Err(if may_come { SourceError::NotThere(what) } else { SourceError::Usage(what) });
             }
@@ -149,12 +149,12 @@ fn parse_cameras(text: &str) -> Result<SourceName, SourceError> {
     }
     match pairs().next() {
         None => refuse(not_one_camera),
-        // Reports the half that is no camera.
+        // Report the half that is no camera.
         Some((left, right)) => refuse(named(left).and_then(|_| named(right)).err().unwrap_or(not_one_camera)),
     }
 }
 
-/// Parses what follows `pipewire:`; whether there is such a camera is seen when it is opened.
+/// Parses the name after `pipewire:`; its existence is checked when it is opened.
 fn parse_pipewire(name: &str) -> Result<SourceName, SourceError> {
     #[cfg(all(feature = "camera", feature = "pipewire"))]
     return match name.is_empty() {
@@ -171,8 +171,8 @@ fn parse_pipewire(name: &str) -> Result<SourceName, SourceError> {
 fn parse_cameras(text: &str) -> Result<SourceName, SourceError> {
     let what = "this build leaves cameras out (feature `camera`)";
     Err(match text.starts_with("/dev/") || text.parse::<u32>().is_ok() {
-        true => SourceError::Usage(format!("{what}: use {}", sources())),
-        false => SourceError::NotThere(format!("there is no such folder, and {what}: use {}", sources())),
+        true => SourceError::Usage(format!("{what}: use {}", accepted_sources())),
+        false => SourceError::NotThere(format!("there is no such folder, and {what}: use {}", accepted_sources())),
     })
 }
 
@@ -187,7 +187,7 @@ impl SourceName {
     /// Parses the name of a source. A folder's path need not be UTF-8.
     ///
     /// # Errors
-    /// It names no source, or one that is not there now: the message says what is accepted.
+    /// The name is not a source, or the source does not exist; the message says what is accepted.
     pub fn from_os(name: &OsStr) -> Result<Self, SourceError> {
         let path = Path::new(name);
         match name.to_str() {
@@ -200,14 +200,16 @@ impl SourceName {
                 "a video is read as pictures; ffmpeg makes a folder of them, which is the source then: mkdir -p clip/rgb && \
                  ffmpeg -i '{text}' -r 25 clip/rgb/%06d.png && (cd clip && ls rgb/* | awk '{{print NR/25, $0}}' > rgb.txt)"
             )),
-            _ if path.is_file() => SourceError::usage(format!("it is neither a folder nor a photo: use {}", sources())),
-            Some(text) if looks_like_a_path(text) => Err(no_folder(text)),
+            _ if path.is_file() => {
+                SourceError::usage(format!("it is neither a folder nor a photo: use {}", accepted_sources()))
+            }
+            Some(text) if is_path(text) => Err(missing_folder(text)),
             Some(text) => parse_cameras(text),
-            None => Err(no_folder(&path.display().to_string())),
+            None => Err(missing_folder(&path.display().to_string())),
         }
     }
 
-    /// What a camera of PipeWire's is called there, or a part of that.
+    /// Returns the name, or part of it, of a PipeWire camera.
     pub fn shared(&self) -> Option<&str> {
         match self {
             #[cfg(all(feature = "camera", feature = "pipewire"))]
@@ -216,7 +218,7 @@ impl SourceName {
         }
     }
 
-    /// What it is.
+    /// Returns the kind of the source.
     pub fn kind(&self) -> Kind {
         match self {
             SourceName::Synthetic => Kind::Synthetic,
@@ -230,10 +232,10 @@ impl SourceName {
         }
     }
 
-    /// Refuses the options that choose a part of a recording, where this is none.
+    /// Rejects the options for parts of a recording if this is not a recording.
     ///
     /// # Errors
-    /// Such an option is given, and this is no recording.
+    /// Such an option is given, and this is not a recording.
     pub fn check(&self, frames: &Frames) -> Result<(), SourceError> {
         let what = match self {
             SourceName::Folder(_) => return Ok(()),
@@ -257,7 +259,7 @@ impl SourceName {
         )))
     }
 
-    /// The folder of a recording, or the file of a photo: what is read.
+    /// Returns the folder of a recording, or the file of a photo.
     pub fn folder(&self) -> Option<&Path> {
         match self {
             SourceName::Folder(path) | SourceName::Photo(path) => Some(path),
@@ -265,7 +267,7 @@ impl SourceName {
         }
     }
 
-    /// What is to be said of a source with this name that was opened: one line.
+    /// Returns a note for users on a source that was opened with this name, in one line.
     pub fn note(&self, source: &Source) -> Option<String> {
         let SourceName::Photo(path) = self else { return None };
         let depth = match source.depth_from {
@@ -279,7 +281,7 @@ impl SourceName {
         ))
     }
 
-    /// The device nodes of its cameras.
+    /// Returns the device nodes of its cameras.
     pub fn devices(&self) -> Vec<&Path> {
         match self {
             SourceName::Synthetic | SourceName::Demo | SourceName::Folder(_) | SourceName::Photo(_) => Vec::new(),

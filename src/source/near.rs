@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 
 use crate::names::nearest;
 
-/// The existing sibling of `path` that is a folder of the most similar name, if any is similar enough.
-pub fn folder(path: &Path) -> Option<PathBuf> {
+/// Returns the sibling folder of `path` with the most similar name, if one is similar enough.
+pub fn similar_folder(path: &Path) -> Option<PathBuf> {
     let name = path.file_name()?.to_str()?;
     let parent = path.parent().unwrap_or(Path::new(""));
     let listed = if parent.as_os_str().is_empty() { Path::new(".") } else { parent };
@@ -23,9 +23,9 @@ mod tests {
         for name in ["portrait", "stereo"] {
             std::fs::create_dir(home.path().join(name)).unwrap();
         }
-        assert_eq!(folder(&home.path().join("portrat")), Some(home.path().join("portrait")));
-        assert_eq!(folder(&home.path().join("Steroe/")), Some(home.path().join("stereo")));
-        assert_eq!(folder(&home.path().join("holiday")), None);
-        assert_eq!(folder(Path::new("/nowhere/at/all")), None);
+        assert_eq!(similar_folder(&home.path().join("portrat")), Some(home.path().join("portrait")));
+        assert_eq!(similar_folder(&home.path().join("Steroe/")), Some(home.path().join("stereo")));
+        assert_eq!(similar_folder(&home.path().join("holiday")), None);
+        assert_eq!(similar_folder(Path::new("/nowhere/at/all")), None);
     }
 }

@@ -1,4 +1,4 @@
-//! Depth from one camera by networks: those that the user names, or those that are installed.
+//! Depth from a single camera by networks, either named by the user or installed.
 
 use super::{DepthFrom, OneCamera, Options, Source, SourceError, Wanted};
 use crate::depth::focus::{FocusRule, OnPersons, Persons};
@@ -10,13 +10,13 @@ use crate::look::Look;
 #[cfg(feature = "networks")]
 use super::{DepthChoice, NetworkFile};
 
-/// Networks at work, and what they are in a few words.
+/// Opened networks, and a short description of them.
 type Opened = (Box<dyn Companion>, String);
 
-/// Refuses a look that needs real distances, for depth in which `who` knows only relative ones.
+/// Rejects a look that needs real distances; `who` is the subject of the message, a source of relative depth.
 ///
 /// # Errors
-/// It does.
+/// The look needs real distances.
 pub fn refuse_metres(look: &Look, who: &str) -> Result<(), SourceError> {
     match look.needs_metres() {
         None => Ok(()),
@@ -29,7 +29,7 @@ pub fn refuse_metres(look: &Look, who: &str) -> Result<(), SourceError> {
 /// Opens the networks `chosen`, for a look.
 ///
 /// # Errors
-/// One is not installed or cannot be used.
+/// A network is not installed or cannot be used.
 #[cfg(feature = "networks")]
 pub(super) fn open(chosen: &OneCamera, wanted: &Wanted) -> Result<Opened, SourceError> {
     use crate::depth::single_camera::{Hints, SingleCamera};
@@ -59,7 +59,7 @@ pub(super) fn open(chosen: &OneCamera, wanted: &Wanted) -> Result<Opened, Source
     Ok((Box::new(networks), about))
 }
 
-/// The best networks that are installed, if there are any.
+/// Returns the best installed networks, if any.
 #[cfg(feature = "networks")]
 pub fn installed() -> OneCamera {
     use crate::network::{self, Task};
@@ -69,18 +69,18 @@ pub fn installed() -> OneCamera {
     OneCamera { plate: None, matte: best(Task::Matte), mono: best(Task::Mono) }
 }
 
-/// The best networks that are installed: this build has none.
+/// Returns none, as this build has no networks.
 #[cfg(not(feature = "networks"))]
 pub fn installed() -> OneCamera {
     OneCamera::default()
 }
 
-/// Gives a source that has no depth that of the installed networks, if there are any and nothing else is asked for.
+/// Adds depth of the installed networks to a source without depth, if there are any and no other depth was requested.
 #[cfg(feature = "networks")]
-pub(super) fn for_lone_camera(source: Source, wanted: &Wanted) -> Source {
+pub(super) fn add_network_depth(source: Source, wanted: &Wanted) -> Source {
     let is_lone = !source.has_depth() && wanted.options.depth_choice == DepthChoice::Auto;
     let needs_metres = wanted.look.is_some_and(|look| look.needs_metres().is_some());
-    // A source that is recorded has no look: what it shows is kept, and not what can be made of it at any time.
+    // A source without a look is being recorded: record only what cannot be computed later.
     if !is_lone || needs_metres || !wanted.look.is_some_and(|look| look.effect.follows_depth()) {
         return source;
     }
@@ -93,7 +93,7 @@ pub(super) fn for_lone_camera(source: Source, wanted: &Wanted) -> Source {
             let depth: Option<Box<dyn DepthSource>> = Some(depth);
             Source { depth, depth_from: DepthFrom::Networks, networks: Some(about), ..source }
         }
-        // They were not asked for.
+        // The networks were not requested explicitly.
         Err(error) => {
             tracing::warn!("{error}; going on without it");
             source
@@ -101,27 +101,27 @@ pub(super) fn for_lone_camera(source: Source, wanted: &Wanted) -> Source {
     }
 }
 
-/// What finds the person to focus on, and what that is in a few words; `None` where no network for that is installed.
+/// Opens the network that detects the person in focus, with a short description; `None` if none is installed.
 #[cfg(feature = "networks")]
-fn persons(wanted: &Wanted) -> Option<(Persons, String)> {
+fn open_person_detector(wanted: &Wanted) -> Option<(Persons, String)> {
     let finder = OneCamera { mono: None, ..installed() };
     finder.matte.as_ref()?;
     let opened = open(&finder, wanted);
-    let told = opened.inspect_err(|error| tracing::warn!("{error}; the focus goes by distance alone"));
-    told.ok().map(|(finder, about)| (Persons::new(finder), about))
+    let logged = opened.inspect_err(|error| tracing::warn!("{error}; the focus goes by distance alone"));
+    logged.ok().map(|(finder, about)| (Persons::new(finder), about))
 }
 
 #[cfg(not(feature = "networks"))]
-fn persons(_: &Wanted) -> Option<(Persons, String)> {
+fn open_person_detector(_: &Wanted) -> Option<(Persons, String)> {
     None
 }
 
-/// Lets the installed network find the person to focus on in depth that was measured, where there is one.
-pub(super) fn for_focus(mut source: Source, wanted: &Wanted) -> Source {
+/// Adds person detection for the focus to a source with measured depth, if a network is installed.
+pub(super) fn add_person_detection(mut source: Source, wanted: &Wanted) -> Source {
     let is_used = wanted.look.is_some_and(|look| look.effect.follows_depth()) && !source.depth_from.is_of_pictures();
     if source.depth.is_some()
         && is_used
-        && let Some((persons, about)) = persons(wanted)
+        && let Some((persons, about)) = open_person_detector(wanted)
     {
         let is_matched = source.depth_from == DepthFrom::Eyes;
         let on_persons = |depth| Box::new(OnPersons::new(depth, persons, is_matched)) as Box<dyn DepthSource>;
@@ -131,10 +131,10 @@ pub(super) fn for_focus(mut source: Source, wanted: &Wanted) -> Source {
     source
 }
 
-/// The same for the map of one picture that comes from a file.
+/// Detects the person in focus for the map of a single picture from a file.
 pub fn find_person(options: &Options, look: &Look, color: &ColorImage, map: &mut DepthMap) {
     let is_used = look.effect.follows_depth() && look.focus == FocusRule::Auto;
-    if is_used && let Some((mut persons, _)) = persons(&Wanted { options, look: Some(look) }) {
+    if is_used && let Some((mut persons, _)) = open_person_detector(&Wanted { options, look: Some(look) }) {
         let stamp = Stamp { index: 0, time_ns: 0, captured_ns: None };
         persons.mark(Seen { stamp, color, right: None }, map);
     }
@@ -146,6 +146,6 @@ pub(super) fn open(_: &OneCamera, _: &Wanted) -> Result<Opened, SourceError> {
 }
 
 #[cfg(not(feature = "networks"))]
-pub(super) fn for_lone_camera(source: Source, _: &Wanted) -> Source {
+pub(super) fn add_network_depth(source: Source, _: &Wanted) -> Source {
     source
 }

@@ -1,4 +1,4 @@
-//! Depth from the pictures of one camera: networks, and who stands before a picture of what is behind them.
+//! Depth from the pictures of a single camera: networks, and background subtraction with a clean plate.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -12,12 +12,12 @@ use crate::frame::{ColorImage, DepthMap, Stamp};
 use crate::look::Look;
 use crate::recording::still;
 
-/// Gives `source` the depth that `chosen` makes of its pictures.
+/// Adds the depth of `chosen` to `source`.
 ///
 /// # Errors
-/// A file cannot be read or is of another size, the source cannot be asked to step aside, a network cannot be used, or the
-/// look needs real distances.
-pub(super) fn give(
+/// A file is unreadable or of another size, the source is not live, so that no plate can be taken, a network cannot be
+/// used, or the look needs real distances.
+pub(super) fn add_depth(
     source: Source,
     chosen: &OneCamera,
     name: &SourceName,
@@ -32,7 +32,7 @@ pub(super) fn give(
             let depth = companion.map(|networks| networks as Box<dyn DepthSource>);
             return Ok(Source { depth, depth_from: DepthFrom::Networks, networks: about, ..source });
         }
-        Some(PlateFile::At(file)) => Some(read(file, info.size)?),
+        Some(PlateFile::At(file)) => Some(read_plate(file, info.size)?),
         Some(PlateFile::Taken) if info.live => None,
         Some(PlateFile::Taken) => {
             return SourceError::usage(format!(
@@ -41,17 +41,17 @@ pub(super) fn give(
             ));
         }
     };
-    let depth = PlateDepth::new(plate, lock(name), companion);
+    let depth = PlateDepth::new(plate, create_lock(name), companion);
     let guide = Some(depth.guide());
     let depth: Option<Box<dyn DepthSource>> = Some(Box::new(depth));
     let depth_from = if about.is_some() { DepthFrom::Networks } else { DepthFrom::Plate };
     Ok(Source { depth, depth_from, networks: about, guide, ..source })
 }
 
-/// The depth of one picture, as `chosen`.
+/// Computes the depth of a single picture with `chosen`.
 ///
 /// # Errors
-/// As for a source; or what was chosen fails, or the plate is none of this picture.
+/// Same as for a source; or the computation fails, or the plate does not match the picture.
 pub fn depth_of_picture(
     chosen: &OneCamera,
     options: &Options,
@@ -67,7 +67,7 @@ pub fn depth_of_picture(
     match (&chosen.plate, networks) {
         (None, Some(mut networks)) => networks.read(seen, &mut map)?,
         (Some(PlateFile::At(file)), networks) => {
-            let mut source = PlateDepth::new(Some(read(file, color.size())?), None, networks);
+            let mut source = PlateDepth::new(Some(read_plate(file, color.size())?), None, networks);
             source.read(seen, &mut map)?;
             let step = source.guide().step();
             if step != Step::Ready {
@@ -82,7 +82,7 @@ pub fn depth_of_picture(
     Ok(map)
 }
 
-fn read(file: &Path, (width, height): (u32, u32)) -> Result<ColorImage, SourceError> {
+fn read_plate(file: &Path, (width, height): (u32, u32)) -> Result<ColorImage, SourceError> {
     let plate = still::read_color(file)?;
     if plate.size() == (width, height) {
         return Ok(plate);
@@ -95,8 +95,8 @@ fn read(file: &Path, (width, height): (u32, u32)) -> Result<ColorImage, SourceEr
     ))
 }
 
-/// What holds the camera's exposure, white balance and focus while a plate is used.
-fn lock(name: &SourceName) -> Option<Lock> {
+/// Returns the function that locks the camera's exposure, white balance and focus while a plate is used.
+fn create_lock(name: &SourceName) -> Option<Lock> {
     #[cfg(feature = "camera")]
     if let Some(camera) = super::devices::camera_of(name) {
         use crate::v4l2::live::hold::Held;
@@ -114,9 +114,9 @@ fn lock(name: &SourceName) -> Option<Lock> {
     None
 }
 
-/// A plate source for the pictures of a camera, and how far it is: for a program that takes a plate and no more.
+/// Creates a plate source for the pictures of a camera, with its progress, for a program that only takes a plate.
 pub fn taking(name: &SourceName) -> (PlateDepth, Arc<Guide>) {
-    let source = PlateDepth::new(None, lock(name), None);
+    let source = PlateDepth::new(None, create_lock(name), None);
     let guide = source.guide();
     (source, guide)
 }

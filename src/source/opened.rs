@@ -1,4 +1,4 @@
-//! Opens the camera, recording or scene that a name means, and its recorded depth.
+//! Opens a camera, recording or scene by name, with its recorded depth.
 
 use std::sync::Arc;
 
@@ -34,20 +34,20 @@ const SYNTHETIC_SIZE: (u32, u32) = (640, 480);
 /// Frame rate of the synthetic scene.
 const SYNTHETIC_FPS: f64 = 30.0;
 
-/// An opened source before stereo matching is set up for it.
+/// An opened source before stereo matching is set up.
 pub(super) struct Opened {
     pub camera: Box<dyn Camera>,
     pub depth: Option<Box<dyn DepthSource>>,
     pub depth_from: DepthFrom,
     pub first_depth: Option<DepthMap>,
-    /// What the source states of its two eyes.
+    /// The stereo geometry that the source states.
     pub pair: Pair,
-    /// How many disparities occur in it, where a recording states that.
+    /// The number of disparities, if a recording states it.
     pub disparities: Option<u32>,
 }
 
 impl Opened {
-    /// Opens the source; of a pair, the right eye is read only where stereo matching will use it.
+    /// Opens the source; right pictures are read only if stereo matching will use them.
     pub fn open(name: &SourceName, wanted: &Wanted) -> Result<Self, SourceError> {
         let Options { frames, .. } = wanted.options;
         let without_depth = |camera| Self {
@@ -81,7 +81,7 @@ impl Opened {
                     camera = camera.with_right_eye();
                 }
                 let disparities = recording.disparities();
-                let depth_from = depth_of(&recording);
+                let depth_from = recorded_depth_from(&recording);
                 wanted.check_relative(depth_from)?;
                 let first_depth = wanted.first_depth(&recording);
                 let depth = match recording.has_depth() {
@@ -106,7 +106,8 @@ impl Opened {
             }
             #[cfg(feature = "camera")]
             SourceName::Camera(camera) => {
-                let camera = V4l2Camera::open(&camera.name, wish(frames), frames.control.clone(), frames.frames)?;
+                let camera =
+                    V4l2Camera::open(&camera.name, camera_request(frames), frames.control.clone(), frames.frames)?;
                 Ok(without_depth(Box::new(camera)))
             }
             #[cfg(all(feature = "camera", feature = "pipewire"))]
@@ -120,13 +121,15 @@ impl Opened {
                 Ok(without_depth(Box::new(PipeWireCamera::open(
                     name,
                     wanted.options.filters,
-                    wish(frames),
+                    camera_request(frames),
                     frames.frames,
                 )?)))
             }
             #[cfg(feature = "camera")]
             SourceName::Cameras([left, right]) => {
-                let open = |eye: &name::Named| V4l2Camera::open(&eye.name, wish(frames), frames.control.clone(), None);
+                let open = |eye: &name::Named| {
+                    V4l2Camera::open(&eye.name, camera_request(frames), frames.control.clone(), None)
+                };
                 let eyes = TwoEyes::new(open(left)?, open(right)?, Clock::system(), frames.frames)?;
                 Ok(without_depth(Box::new(eyes)))
             }
@@ -134,8 +137,8 @@ impl Opened {
     }
 }
 
-/// Whether a recording has depth, and in metres or in units of its own.
-pub(super) fn depth_of(recording: &Recording) -> DepthFrom {
+/// Returns the kind of a recording's depth.
+pub(super) fn recorded_depth_from(recording: &Recording) -> DepthFrom {
     match recording.has_depth() {
         false => DepthFrom::Nothing,
         true if recording.has_relative_depth() => DepthFrom::Relative,
@@ -145,7 +148,7 @@ pub(super) fn depth_of(recording: &Recording) -> DepthFrom {
 }
 
 #[cfg(feature = "camera")]
-fn wish(frames: &Frames) -> Wish {
+fn camera_request(frames: &Frames) -> Wish {
     Wish {
         content: Content::Color,
         size_px: frames.size.map(|size| (size.width, size.height)),

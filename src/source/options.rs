@@ -1,6 +1,6 @@
-//! How a source is opened: options that hold for files, cameras and other programs alike.
+//! Options for opening a source, for files and cameras.
 
-// What options say is shown as it is written, brackets included.
+// The help texts contain brackets that are not links.
 #![allow(rustdoc::broken_intra_doc_links)]
 
 mod one_camera;
@@ -26,7 +26,7 @@ pub use one_camera::{Order, Range};
 
 /// Units of a 16-bit depth picture per metre: the TUM convention.
 pub const DEPTH_SCALE: f32 = 5000.0;
-/// Units of a depth camera per metre: most give millimetres.
+/// Units of a depth camera per metre: most use millimetres.
 #[cfg(feature = "camera")]
 const LIVE_DEPTH_SCALE: f32 = 1000.0;
 
@@ -103,7 +103,7 @@ names::named! {
 }
 
 impl Depth {
-    /// What the numbers of depth pictures in files are.
+    /// Returns the meaning of the values in depth files.
     pub fn file_unit(&self) -> crate::recording::DepthUnit {
         use crate::recording::DepthUnit as Unit;
         match self.depth_unit {
@@ -112,12 +112,12 @@ impl Depth {
         }
     }
 
-    /// Units per metre of depth pictures in files.
+    /// Returns the units per metre in depth files.
     pub fn file_scale(&self) -> f32 {
         self.depth_scale.unwrap_or(DEPTH_SCALE)
     }
 
-    /// Units per metre of a depth camera.
+    /// Returns the units per metre of a depth camera.
     #[cfg(feature = "camera")]
     pub fn live_scale(&self) -> f32 {
         self.depth_scale.unwrap_or(LIVE_DEPTH_SCALE)
@@ -158,35 +158,35 @@ pub struct Stereo {
     pub doffs_px: Option<f32>,
 }
 
-/// Where depth comes from.
+/// The origin of depth.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub enum DepthChoice {
-    /// The source's, when the effect needs it.
+    /// The source's own, if the effect needs it.
     #[default]
     Auto,
-    /// The source's.
+    /// The source's own.
     Recorded,
-    /// The source's two eyes.
+    /// Stereo matching of the source's two cameras.
     Stereo,
-    /// None: for the effects that need none.
+    /// None, for effects that need none.
     None,
     /// The depth of the recording in this folder.
     Folder(PathBuf),
     /// A depth camera, by its path or name.
     Device(String),
-    /// A plate and networks, from the pictures alone.
+    /// A clean plate or networks, from the pictures alone.
     OneCamera(OneCamera),
-    /// The small defocus of a photograph itself.
+    /// Depth from the slight defocus of a photograph itself.
     Defocus,
 }
 
 impl DepthChoice {
-    /// Whether it names depth that is not the source's own.
+    /// Returns whether the depth is not the source's own.
     pub fn is_elsewhere(&self) -> bool {
         matches!(self, Self::Folder(_) | Self::Device(_) | Self::OneCamera(_) | Self::Defocus)
     }
 
-    /// The word that was meant by one that is none, if any is like it: a hint for a message.
+    /// Returns a hint for a message if a text resembles a keyword.
     pub fn hint(text: &str) -> String {
         const WORDS: [&str; 8] = ["auto", "recorded", "stereo", "none", "matte", "mono", "plate", "defocus"];
         let meant = crate::names::nearest(text, WORDS).filter(|word| *word != text);
@@ -216,12 +216,12 @@ impl FromStr for DepthChoice {
     }
 }
 
-/// Columns and rows, each 1 to 16384.
+/// A size in pixels, each side 1 to 16384.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Size {
-    /// Columns.
+    /// Width.
     pub width: u32,
-    /// Rows.
+    /// Height.
     pub height: u32,
 }
 
@@ -235,7 +235,7 @@ impl FromStr for Size {
     }
 }
 
-/// Parses `NAME=VALUE`; whether the camera has such a control is only known once it is open.
+/// Parses `NAME=VALUE`; whether the camera has such a control is checked when it is open.
 #[cfg(all(feature = "camera", feature = "clap"))]
 fn control(text: &str) -> Result<Setting, String> {
     let parts = text.split_once('=').map(|(name, value)| (name.trim(), value.trim()));
@@ -256,9 +256,9 @@ fn depth_unit(text: &str) -> Result<DepthUnit, String> {
 
 #[cfg(feature = "clap")]
 fn disparities(text: &str) -> Result<u32, String> {
-    const MOST: u32 = Settings::MOST_DISPARITIES;
-    let good = |disparities: &u32| (16..=MOST).contains(disparities) && disparities.is_multiple_of(16);
-    text.parse().ok().filter(good).ok_or_else(|| format!("use a multiple of 16 from 16 to {MOST}"))
+    const MAX: u32 = Settings::MOST_DISPARITIES;
+    let good = |disparities: &u32| (16..=MAX).contains(disparities) && disparities.is_multiple_of(16);
+    text.parse().ok().filter(good).ok_or_else(|| format!("use a multiple of 16 from 16 to {MAX}"))
 }
 
 #[cfg(feature = "clap")]
@@ -269,7 +269,7 @@ fn rate(text: &str) -> Result<f64, String> {
         .ok_or_else(|| "use frames per second from 0.1 to 1000".to_string())
 }
 
-/// A parser of times in seconds, from 0.
+/// Parses a time in seconds, from 0.
 pub fn seconds(text: &str) -> Result<f64, String> {
     text.parse().ok().filter(|s: &f64| s.is_finite() && *s >= 0.0).ok_or_else(|| "use seconds from 0".to_string())
 }

@@ -1,4 +1,4 @@
-//! Photos, and the files beside them that have their depth.
+//! Photos, and the depth files next to them.
 
 use std::fs::File;
 use std::io::Read;
@@ -11,19 +11,19 @@ use crate::look::Look;
 use crate::optics::StereoRig;
 use crate::recording::{DepthUnit, snapshot, still, still::Map};
 
-/// What follows the name of a photo in that of its depth. The first is that of a snapshot.
+/// Suffixes of depth files, after the photo's stem. The first is that of snapshots.
 const DEPTH: [&str; 4] = ["-depth.pfm", "-depth.png", ".depth.pfm", ".depth.png"];
-/// What follows the name of a snapshot in that of the picture before the blur.
+/// Suffix of a snapshot's picture before the blur.
 const COLOR: &str = "-color";
 
-/// Whether a file is a picture that can be read, by its first bytes: PNG or JPEG.
+/// Returns whether a file is a PNG or JPEG, by its first bytes.
 pub fn is_photo(path: &Path) -> bool {
     let mut first = [0; 8];
     let read = File::open(path).and_then(|mut file| file.read_exact(&mut first));
     read.is_ok() && (first == *b"\x89PNG\r\n\x1a\n" || first.starts_with(&[0xff, 0xd8, 0xff]))
 }
 
-/// The picture that a photo stands for: of a snapshot, the one that it was made of.
+/// Returns the picture to use for a photo: for a snapshot, its picture before the blur.
 pub fn original(path: &Path) -> PathBuf {
     let before = snapshot::sources(path).0;
     if before.is_file() { before } else { path.to_owned() }
@@ -31,20 +31,20 @@ pub fn original(path: &Path) -> PathBuf {
 
 /// The depth of a photo.
 pub struct PhotoDepth {
-    /// As it was measured, or finished around a subject.
+    /// The map, as measured or finished around a subject.
     pub map: DepthMap,
-    /// What it comes from.
+    /// Its origin.
     pub from: DepthFrom,
     /// Whether refinement improves it.
     pub measured: bool,
-    /// What gives it, in a few words.
+    /// A short description of its source.
     pub by: String,
 }
 
-/// The depth that the photo at `path`, of the colours `color`, has where nothing else was said: as for [`Source::open`].
+/// Returns the default depth of the photo at `path` with the colours `color`, as [`Source::open`] finds it.
 ///
 /// # Errors
-/// As for [`Source::open`].
+/// Same as for [`Source::open`].
 pub fn depth_of(
     path: &Path,
     color: &ColorImage,
@@ -56,26 +56,26 @@ pub fn depth_of(
     let Source { depth: Some(depth), depth_from: from, networks, .. } = &mut source else { return Ok(None) };
     let mut map = DepthMap::default();
     depth.read(Seen { stamp: Stamp { index: 0, time_ns: 0, captured_ns: None }, color, right: None }, &mut map)?;
-    let beside = || depth_file(path).map(|file| format!("{}, beside it", file.display()));
-    let by = networks.take().or_else(beside).unwrap_or_default();
+    let describe_file = || depth_file(path).map(|file| format!("{}, beside it", file.display()));
+    let by = networks.take().or_else(describe_file).unwrap_or_default();
     Ok(Some(PhotoDepth { map, from: *from, measured, by }))
 }
 
-/// The files that are read for a photo: what it stands for, and its depth beside it.
+/// Returns the files to read for a photo: the picture, and its depth file if there is one.
 pub fn files_of(path: &Path) -> impl Iterator<Item = PathBuf> {
     let original = original(path);
     let depth = depth_file(&original);
     [original].into_iter().chain(depth)
 }
 
-/// A photo, its depth if there is any beside it, and what that depth is.
+/// A photo, its depth if there is any, and the origin of the depth.
 pub(super) type Photo = (ColorImage, Option<DepthMap>, DepthFrom);
 
-/// Reads a photo upright; of a snapshot, the picture that it was made of. Its depth is the file `NAME-depth` or `NAME.depth`
-/// beside it, a `.pfm` or `.png`, unless another is asked for.
+/// Reads a photo, rotated upright; for a snapshot, its picture before the blur. Its depth is the `.pfm` or `.png` file
+/// `NAME-depth` or `NAME.depth` next to it, unless the options request another origin.
 ///
 /// # Errors
-/// It cannot be read, or what is named as its depth cannot, or is of another size.
+/// The photo or its depth file is unreadable, or the depth has another size.
 pub(super) fn read(path: &Path, options: &Options) -> Result<Photo, SourceError> {
     let path = &original(path);
     let color = still::read_color(path)?;
@@ -102,7 +102,7 @@ pub(super) fn read(path: &Path, options: &Options) -> Result<Photo, SourceError>
     Ok((color, Some(map), from))
 }
 
-/// The file beside a photo that has its depth.
+/// Returns the depth file next to a photo.
 fn depth_file(photo: &Path) -> Option<PathBuf> {
     let stem = photo.file_stem()?.to_str()?;
     let stem = stem.strip_suffix(COLOR).unwrap_or(stem);

@@ -1,4 +1,4 @@
-//! The file that says how a depth camera stands beside the colour camera.
+//! The calibration file of a depth camera relative to the colour camera.
 
 use std::path::Path;
 
@@ -47,7 +47,7 @@ impl Camera {
 /// Reads the calibration file `path`.
 ///
 /// # Errors
-/// It cannot be read, has a wrong or a missing key, or numbers that cannot be.
+/// The file is unreadable, has a wrong or missing key, or invalid numbers.
 pub fn load(path: &Path) -> Result<Registration, SourceError> {
     parse(
         path,
@@ -56,10 +56,10 @@ pub fn load(path: &Path) -> Result<Registration, SourceError> {
     )
 }
 
-/// Reads the text of the calibration file `path`.
+/// Parses the text of the calibration file `path`.
 ///
 /// # Errors
-/// The text is no depth calibration.
+/// The text is not a depth calibration.
 pub fn parse(path: &Path, text: &str) -> Result<Registration, SourceError> {
     let refuse = |at: usize, what: String| SourceError::Registration {
         path: path.to_owned(),
@@ -122,7 +122,7 @@ translation_m = [0.5, 0, 0]
         let mut into = DepthMap::default();
         parse(Path::new("c.toml"), GOOD).unwrap().register(&from, &mut into);
         assert_eq!(into.metres, [0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 1.0, 1.0], "half a metre to the right is two pixels");
-        // Row by row: a quarter turn about the optical axis puts x on y.
+        // Row by row: a quarter turn about the optical axis maps x to y.
         let turned = GOOD.replace("1, 0, 0, 0, 1, 0, 0, 0, 1", "0, -1, 0, 1, 0, 0, 0, 0, 1").replace("[0.5", "[0");
         let from = DepthMap {
             width: 4,

@@ -1,14 +1,14 @@
 //! Percentiles in fixed memory: counts over buckets of time that grow with the time itself.
 
-/// Every power of two is cut into `2^SPLIT_BITS` equal buckets. A bucket is read out at its middle, so the error is at
+/// Every power of two is split into `2^SPLIT_BITS` equal buckets. A bucket is read at its middle, so the error is at
 /// most half of 1/64 of the value: 0.8 %.
 const SPLIT_BITS: u32 = 6;
 const SPLIT: u64 = 1 << SPLIT_BITS;
-/// Times from `2^MAX_BITS` ns (73 minutes) on share the last bucket.
+/// Times of `2^MAX_BITS` ns (73 minutes) and more share the last bucket.
 const MAX_BITS: u32 = 42;
 const BUCKETS: usize = ((MAX_BITS - SPLIT_BITS + 1) as usize) << SPLIT_BITS;
 
-/// A histogram of times in nanoseconds, exact to 1 % and below 64 ns exactly, in 19 KiB.
+/// A log-linear histogram of times in nanoseconds (as HdrHistogram), exact to 1 %, and exact below 64 ns, in 19 KiB.
 #[derive(Clone, Debug)]
 pub struct Histogram {
     counts: Box<[u64]>,
@@ -23,25 +23,25 @@ impl Default for Histogram {
 }
 
 impl Histogram {
-    /// Counts one time.
+    /// Adds one time.
     pub fn add(&mut self, time_ns: u64) {
         self.counts[bucket(time_ns)] += 1;
         self.samples += 1;
         self.max_ns = self.max_ns.max(time_ns);
     }
 
-    /// Times counted.
+    /// Returns the number of times added.
     pub fn samples(&self) -> u64 {
         self.samples
     }
 
-    /// The longest time, exactly; 0 without samples.
+    /// Returns the exact maximum; 0 without samples.
     pub fn max_ns(&self) -> u64 {
         self.max_ns
     }
 
-    /// The smallest time that at least the fraction `p` (0 to 1) of the samples does not exceed (nearest rank);
-    /// 0 without samples.
+    /// Returns the percentile `p` (0 to 1) by nearest rank: the smallest time that at least this fraction of the
+    /// samples does not exceed; 0 without samples.
     pub fn percentile_ns(&self, p: f64) -> u64 {
         let rank = ((p * self.samples as f64).ceil() as u64).clamp(1, self.samples.max(1));
         let mut cumulative = 0;
@@ -55,15 +55,15 @@ impl Histogram {
     }
 }
 
-/// The index of the bucket that counts `time_ns`.
+/// Returns the bucket of `time_ns`.
 fn bucket(time_ns: u64) -> usize {
     let time_ns = time_ns.min((1 << MAX_BITS) - 1);
-    // Below SPLIT the buckets are single nanoseconds.
+    // Below SPLIT each bucket is a single nanosecond.
     let shift = (time_ns | SPLIT).ilog2() - SPLIT_BITS;
     ((time_ns >> shift) + (u64::from(shift) << SPLIT_BITS)) as usize
 }
 
-/// The time in the middle of a bucket.
+/// Returns the time in the middle of a bucket.
 fn middle_ns(bucket: usize) -> u64 {
     let bucket = bucket as u64;
     let shift = (bucket >> SPLIT_BITS).saturating_sub(1);
@@ -76,7 +76,7 @@ fn middle_ns(bucket: usize) -> u64 {
 pub struct PassHistograms(Vec<(&'static str, Histogram)>);
 
 impl PassHistograms {
-    /// Counts one run of the pass `name`. Memory is taken only when a pass is seen for the first time.
+    /// Adds one run of the pass `name`. Allocates only when a pass is seen for the first time.
     pub fn add(&mut self, name: &'static str, time_ns: u64) {
         let index = self.0.iter().position(|pass| pass.0 == name).unwrap_or_else(|| {
             self.0.push((name, Histogram::default()));
@@ -85,7 +85,7 @@ impl PassHistograms {
         self.0[index].1.add(time_ns);
     }
 
-    /// Pass names and histograms.
+    /// Iterates over pass names and histograms.
     pub fn iter(&self) -> impl Iterator<Item = (&'static str, &Histogram)> {
         self.0.iter().map(|(name, histogram)| (*name, histogram))
     }

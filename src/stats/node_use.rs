@@ -1,26 +1,26 @@
-//! What became of the pictures in each of several outputs.
+//! Counts of pictures per output.
 
 use std::fmt;
 
 use serde::Serialize;
 
-/// What became of the pictures in a camera that was given to PipeWire: each that was delivered there was shown, or was
-/// not for one of the reasons here; the last one may be on its way.
+/// Counts of a PipeWire camera: each delivered picture was either shown or skipped for one of the reasons below; the
+/// last one may be in flight.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct NodeUse {
-    /// What programs remember the camera by.
+    /// The node name, by which programs remember the camera.
     pub node: String,
-    /// Pictures that readers were given, those that are shown again not included.
+    /// Pictures that readers received, repeats not included.
     pub shown: u64,
-    /// Times that readers were given the last picture again, or the still card.
+    /// How often readers received the last picture again, or the still card.
     pub repeats: u64,
-    /// Pictures while nobody watched.
+    /// Pictures skipped without viewers.
     pub unwatched: u64,
-    /// Pictures that a newer one overtook on its way.
+    /// Pictures replaced by a newer one before they were shown.
     pub overtaken: u64,
-    /// Pictures for which the readers left no buffer.
+    /// Pictures for which the readers had left no buffer.
     pub no_buffer: u64,
-    /// Times that PipeWire went and came back.
+    /// How often PipeWire went away and came back.
     pub returns: u64,
 }
 
@@ -38,17 +38,16 @@ impl fmt::Display for NodeUse {
     }
 }
 
-/// What one of several outputs did with the frames that were delivered: each was taken, or lost; the last one may be on its
-/// way.
+/// Counts of one of several outputs: each delivered frame was taken or lost; the last one may be in flight.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct OutputUse {
-    /// What it is, and where.
+    /// The output's kind and place.
     pub output: String,
-    /// Frames that it took, the still card included.
+    /// Frames taken, the still card included.
     pub frames: u64,
-    /// Times that it was given its last picture again, because no new one came.
+    /// How often the last picture was sent again because no new one came.
     pub repeats: u64,
-    /// Frames that a newer one overtook while it was busy with those before.
+    /// Frames replaced by a newer one while the output was busy.
     pub lost: u64,
 }
 

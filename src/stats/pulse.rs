@@ -1,37 +1,38 @@
-//! How fast frames come now, for who asks from another thread.
+//! A frame rate meter that other threads can read.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// The rate of a run's frames over the last ones. One thread counts; any may look, and nobody waits.
+/// The current frame rate of a run, an exponential moving average. One thread records frames; any may read, without
+/// locks.
 #[derive(Debug, Default)]
 pub struct Pulse {
-    /// When the last frame came, and the mean time from one to the next; 0 before there is any.
+    /// The time of the last frame, and the mean interval; both 0 before there is one.
     last_ns: AtomicU64,
     mean_ns: AtomicU64,
 }
 
-/// The newest frame's share of the mean.
-const SHARE: f64 = 0.1;
-/// Frames that are this much later than usual have stopped.
+/// Weight of the newest interval in the mean.
+const WEIGHT: f64 = 0.1;
+/// A frame that is this much later than usual is a pause, not a slow frame.
 const STOPPED_NS: u64 = 500_000_000;
 
 impl Pulse {
-    /// A frame came at `now_ns`.
+    /// Records a frame at `now_ns`.
     pub fn beat(&self, now_ns: u64) {
         let last_ns = self.last_ns.swap(now_ns, Ordering::Relaxed);
         let mean_ns = self.mean_ns.load(Ordering::Relaxed);
         let took_ns = now_ns.saturating_sub(last_ns);
         let mean_ns = match (last_ns, mean_ns) {
             (0, _) => 0,
-            // The first, and the first after a rest.
+            // The first interval.
             (_, 0) => took_ns,
             (_, mean_ns) if took_ns > mean_ns + STOPPED_NS => mean_ns,
-            (_, mean_ns) => (mean_ns as f64 + (took_ns as f64 - mean_ns as f64) * SHARE) as u64,
+            (_, mean_ns) => (mean_ns as f64 + (took_ns as f64 - mean_ns as f64) * WEIGHT) as u64,
         };
         self.mean_ns.store(mean_ns, Ordering::Relaxed);
     }
 
-    /// Frames per second at `now_ns`; 0 where none come any more.
+    /// Returns the frames per second at `now_ns`; 0 if frames have stopped.
     pub fn per_second(&self, now_ns: u64) -> f64 {
         let (last_ns, mean_ns) = (self.last_ns.load(Ordering::Relaxed), self.mean_ns.load(Ordering::Relaxed));
         let silent_ns = now_ns.saturating_sub(last_ns);
@@ -59,7 +60,7 @@ mod tests {
         }
         assert!((pulse.per_second(now_ns) - 25.0).abs() < 0.1);
         assert!(pulse.per_second(now_ns + 1_000_000_000) == 0.0);
-        // A rest is no slow frame.
+        // A pause does not count as a slow frame.
         pulse.beat(now_ns + 3_000_000_000);
         assert!((pulse.per_second(now_ns + 3_000_000_000) - 25.0).abs() < 0.1);
     }

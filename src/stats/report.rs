@@ -7,92 +7,92 @@ use serde::ser::{Serialize, SerializeMap, Serializer};
 
 use super::{Frames, Histogram, NodeUse, OutputUse, Timings};
 
-/// What a run was made of, after all defaults were resolved.
+/// The parts of a run, after all defaults were resolved.
 #[derive(Clone, Debug, Default)]
 pub struct About {
-    /// Where the frames came from.
+    /// The source of the frames.
     pub source: String,
-    /// Where they went.
+    /// Their destination.
     pub sink: String,
-    /// Time that a frame's blur may take.
+    /// Time that a frame's blur may take, in nanoseconds.
     pub budget_ns: u64,
-    /// Wall time of the run.
+    /// Wall time of the run, in nanoseconds.
     pub elapsed_ns: u64,
-    /// Processor time that the program used meanwhile.
+    /// CPU time of the program meanwhile, in nanoseconds.
     pub cpu_ns: u64,
-    /// The outputs, where there were several.
+    /// The outputs, if there are several.
     pub outputs: Vec<OutputUse>,
-    /// Cameras that were given to PipeWire.
+    /// The PipeWire cameras.
     pub pipewire: Vec<NodeUse>,
 }
 
 /// The report (`--report`). Times are in milliseconds.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct Report {
-    /// What became of every frame.
+    /// Counts of all frames, by fate.
     pub frames: Frames,
-    /// From capture to delivery.
+    /// Time from capture to delivery.
     pub latency_ms: Option<Spread>,
-    /// From one delivery to the next.
+    /// Time from one delivery to the next.
     pub frame_ms: Option<Spread>,
-    /// Per stage, and per pass of the blur as `blur.PASS`.
+    /// Times per stage, and per pass of the blur as `blur.PASS`.
     pub stages_ms: StagesMs,
-    /// How finely the frames were blurred.
+    /// The quality levels used.
     pub quality: QualityUse,
     /// Time that a frame's blur may take.
     pub budget_ms: f64,
     /// Frames whose blur took longer.
     pub misses: u64,
-    /// Frames that took over the depth of an earlier one, moved with the picture, to save time.
+    /// Frames that reused the depth of an earlier one, warped with the picture, to save time.
     pub depth_held: u64,
-    /// Times that a live output was given its last picture again, because no new one came.
+    /// How often a live output was sent its last picture again because no new one came.
     pub repeats: u64,
     /// `cpu`, `gpu` or `none`.
     pub backend: String,
-    /// What executed the blur.
+    /// The executor of the blur.
     pub adapter: String,
-    /// What refined the depth: `cpu`, `gpu`, `gpu, then cpu` or `none`.
+    /// The backend that refined depth: `cpu`, `gpu`, `gpu, then cpu` or `none`.
     pub refined_by: String,
-    /// What found the mattes, as that.
+    /// The backend that estimated mattes, with the same values.
     pub matted_by: String,
-    /// Where the frames came from.
+    /// The source of the frames.
     pub source: String,
-    /// Where they went.
+    /// Their destination.
     pub sink: String,
     /// Wall time of the run, in seconds.
     pub elapsed_s: f64,
-    /// Processor time that the program used meanwhile, all threads together, in seconds.
+    /// CPU time of the program meanwhile, all threads together, in seconds.
     pub cpu_s: f64,
-    /// What each of several outputs did with the frames.
+    /// Counts per output, if there are several.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub outputs: Vec<OutputUse>,
-    /// What became of the pictures in cameras that were given to PipeWire.
+    /// Counts per PipeWire camera.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub pipewire: Vec<NodeUse>,
-    /// What the window showed, where there was one.
+    /// Measurements of the window, if there was one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub window: Option<WindowUse>,
-    /// What made this report.
+    /// The versions that produced this report.
     pub versions: Versions,
 }
 
-/// What a window showed, and how quickly.
+/// Frames that a window showed, and their latencies.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct WindowUse {
-    /// Frames that were on the screen.
+    /// Frames shown on the screen.
     pub presented: u64,
-    /// From the start of the preview to its first frame.
+    /// Time from the start of the preview to its first frame.
     pub first_frame_ms: Option<f64>,
-    /// From capture to the screen.
+    /// Time from capture to the screen.
     pub latency_ms: Option<Spread>,
-    /// From an input to the picture that shows what it did.
+    /// Time from an input to the picture that shows its effect.
     pub reaction_ms: Option<Spread>,
-    /// Drawing a frame and its controls, and handing them to the display.
+    /// Time to draw a frame with its controls and to present it.
     pub present_ms: Option<Spread>,
 }
 
 impl WindowUse {
-    /// Sums up what a window measured.
+    /// Summarises the measurements of a window.
     pub fn new(presented: u64, first_frame_ns: Option<u64>, [latency, reaction, present]: [&Histogram; 3]) -> Self {
         Self {
             presented,
@@ -130,26 +130,26 @@ pub struct StageMs {
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct StagesMs(pub Vec<(String, StageMs)>);
 
-/// How finely the frames were blurred.
+/// The quality levels used.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct QualityUse {
-    /// Share of the blurred frames per rung used, summing to 1; in JSON members of the object itself.
+    /// Fraction of the blurred frames per quality level, summing to 1; in JSON these are members of the object itself.
     pub share: Vec<(&'static str, f64)>,
-    /// Changes of rung.
+    /// Number of changes of the level.
     pub switches: u64,
 }
 
-/// What made a report.
+/// The versions that produced a report.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct Versions {
-    /// This program.
+    /// The version of this program.
     pub bokehcam: &'static str,
-    /// Operating system and processor family.
+    /// Operating system and CPU architecture.
     pub platform: String,
 }
 
 impl Report {
-    /// Sums up a run. Frame counts that do not [balance](Frames::balance) are a bug of this program, which is logged.
+    /// Summarises a run. Frame counts that do not [balance](Frames::balance) are a bug of this program and logged.
     pub fn new(frames: Frames, timings: &Timings, about: About) -> Self {
         if !frames.balance() {
             tracing::error!(?frames, "the frames do not add up: please report this");
@@ -208,7 +208,7 @@ impl Report {
     }
 }
 
-/// Milliseconds, rounded to three decimals: the histograms are no more precise.
+/// Returns milliseconds, rounded to three decimals, as the histograms are no more precise.
 fn ms(time_ns: u64) -> f64 {
     (time_ns as f64 / 1e3).round() / 1e3
 }
@@ -267,7 +267,7 @@ impl fmt::Display for Report {
         if self.depth_held > 0 {
             write!(f, "\ndepth: {} frames took over that of an earlier one, to save time", self.depth_held)?;
         }
-        // Which of several took less than was delivered.
+        // Only outputs that lost frames.
         let mut lossy = self.outputs.iter().filter(|output| output.lost > 0);
         lossy.try_for_each(|output| write!(f, "\n{output}"))?;
         self.pipewire.iter().try_for_each(|node| write!(f, "\n{node}"))

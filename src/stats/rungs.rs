@@ -1,6 +1,6 @@
 use super::QualityUse;
 
-/// Frames per rung of the quality ladder, by the rungs' names.
+/// Counts frames per quality level, by the levels' names.
 #[derive(Clone, Debug, Default)]
 pub struct RungCounts {
     frames: Vec<(&'static str, u64)>,
@@ -9,7 +9,7 @@ pub struct RungCounts {
 }
 
 impl RungCounts {
-    /// Counts one frame at `rung`. Memory is taken only when a rung is seen for the first time.
+    /// Counts one frame at `rung`. Allocates only when a level is seen for the first time.
     pub fn add(&mut self, rung: &'static str) {
         match self.frames.iter_mut().find(|seen| seen.0 == rung) {
             Some(seen) => seen.1 += 1,

@@ -1,4 +1,4 @@
-//! What became of every frame: captured = delivered + dropped, by cause, + in flight.
+//! Frame accounting: captured = delivered + dropped (by cause) + in flight.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -6,34 +6,34 @@ use serde::Serialize;
 
 use crate::frame::FrameId;
 
-/// Why a frame was dropped.
+/// The cause of a dropped frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Cause {
-    /// The source had overwritten it before it could be read.
+    /// The source had overwritten it before it was read.
     Driver,
     /// It could not be decoded.
     Corrupt,
-    /// A newer frame took its place in a link.
+    /// A newer frame replaced it in a link.
     Evicted,
-    /// It was too old when its turn to be blurred came.
+    /// It was too old when it could be blurred.
     Late,
-    /// It found no partner (two cameras).
+    /// It had no counterpart of another camera.
     Unpaired,
     /// A stage failed on it.
     Failed,
 }
 
-/// A frame on its way: made when it is captured, used up when its fate is known.
+/// A frame in flight: created at capture, consumed when its fate is known.
 #[derive(Debug)]
 #[must_use = "a frame is delivered or dropped, never forgotten"]
 pub struct Ticket {
-    /// Place in the order of capture.
+    /// Index in the order of capture.
     pub id: FrameId,
-    /// When the frame was captured, on the run's clock.
+    /// The capture time, on the run's clock.
     pub captured_ns: u64,
 }
 
-/// Counts frames from several threads. No frame can be counted twice: its [`Ticket`] is used up.
+/// Counts frames from several threads. A [`Ticket`] is consumed when it is counted, so no frame counts twice.
 #[derive(Debug, Default)]
 pub struct Tally {
     captured: AtomicU64,
@@ -43,38 +43,38 @@ pub struct Tally {
 }
 
 impl Tally {
-    /// Nothing counted yet.
+    /// Creates a tally of zeros.
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// A frame was captured.
+    /// Counts a captured frame.
     pub fn captured(&self, captured_ns: u64) -> Ticket {
         self.in_flight.fetch_add(1, Ordering::Relaxed);
         Ticket { id: FrameId(self.captured.fetch_add(1, Ordering::Relaxed)), captured_ns }
     }
 
-    /// `count` frames were lost before there was a picture of them.
+    /// Counts `count` frames that were lost before they were read.
     pub fn lost(&self, count: u64, cause: Cause) {
         self.captured.fetch_add(count, Ordering::Relaxed);
         self.dropped[cause as usize].fetch_add(count, Ordering::Relaxed);
     }
 
-    /// The frame reached the sink.
+    /// Counts a frame that reached the sink.
     pub fn delivered(&self, ticket: Ticket) {
         let Ticket { .. } = ticket;
         self.in_flight.fetch_sub(1, Ordering::Relaxed);
         self.delivered.fetch_add(1, Ordering::Relaxed);
     }
 
-    /// The frame ends here.
+    /// Counts a dropped frame.
     pub fn dropped(&self, ticket: Ticket, cause: Cause) {
         let Ticket { .. } = ticket;
         self.in_flight.fetch_sub(1, Ordering::Relaxed);
         self.dropped[cause as usize].fetch_add(1, Ordering::Relaxed);
     }
 
-    /// The counts now. While stages run, a frame that moves meanwhile may be missed; at rest they are exact.
+    /// Returns the current counts. While stages run, a frame may be missed; once they have ended, the counts are exact.
     pub fn frames(&self) -> Frames {
         let dropped = |cause: Cause| self.dropped[cause as usize].load(Ordering::Relaxed);
         Frames {
@@ -100,9 +100,9 @@ pub struct Frames {
     pub captured: u64,
     /// Frames that reached the sink.
     pub delivered: u64,
-    /// Frames that did not, by cause.
+    /// Frames that did not reach the sink, by cause.
     pub dropped: Dropped,
-    /// Frames still on their way when the run ended; 0 unless a stage failed or the sink was closed from outside.
+    /// Frames still in flight when the run ended; 0 unless a stage failed or the sink was closed from outside.
     pub in_flight: u64,
 }
 
@@ -124,7 +124,7 @@ pub struct Dropped {
 }
 
 impl Dropped {
-    /// Causes by name, in the order of the report.
+    /// Returns the counts with the names of their causes, in the order of the report.
     pub fn by_cause(&self) -> [(&'static str, u64); 6] {
         [
             ("driver", self.driver),
@@ -136,14 +136,14 @@ impl Dropped {
         ]
     }
 
-    /// All causes together.
+    /// Returns the sum over all causes.
     pub fn total(&self) -> u64 {
         self.by_cause().iter().map(|cause| cause.1).sum()
     }
 }
 
 impl Frames {
-    /// The accounting law: captured = delivered + dropped + in flight.
+    /// Returns whether captured = delivered + dropped + in flight.
     pub fn balance(&self) -> bool {
         self.captured == self.delivered + self.dropped.total() + self.in_flight
     }

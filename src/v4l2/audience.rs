@@ -1,8 +1,9 @@
-//! Whether others read from a virtual camera.
+//! Detects whether other programs read from a virtual camera.
 //!
-//! From v4l2loopback 0.13 on the module itself tells, by an event: whether a reader streams. (0.13 does not see those
-//! that use plain `read()`.) Before, whoever else has the node open is taken for a reader, looked up when the node is
-//! opened or closed; readers of other users, and outside of a container, are then seen only with the rights to look.
+//! From v4l2loopback 0.13 on, the module itself sends an event when a reader starts or stops streaming. (0.13 misses
+//! readers that use plain `read()`.) With earlier versions, every other process that has the node open counts as a
+//! reader; they are looked up when the node is opened or closed. Processes of other users, and outside of a container,
+//! are then visible only with sufficient rights.
 
 use std::io;
 use std::os::fd::{AsFd, OwnedFd};
@@ -19,27 +20,27 @@ use super::holders::other_holders;
 
 /// The module's event "client usage"; its data begin with a `u32`: 1 while a reader streams, else 0.
 const CLIENT_USAGE: u32 = PRIVATE_START + 0x08E0_0000 + 1;
-/// Time from an opening to the look at who holds the node: a program that only lists cameras has closed it by then.
+/// Delay from an open to the search for holders: a program that only lists cameras has closed the node by then.
 const SETTLE: Duration = Duration::from_millis(60);
 
-/// What came of listening.
+/// Result of waiting.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ReaderEvent {
     /// Whether there are readers now.
     Readers(bool),
     Nothing,
-    /// The end: [`Stop`] was used or dropped, or the node is gone.
+    /// The end: [`Stop`] was dropped, or the node is gone.
     Stopped,
 }
 
-/// Listens for readers of one node.
+/// Watches for readers of one node.
 #[derive(Debug)]
 pub struct Audience {
     device: Arc<Device>,
-    /// Where the module sends no events: an inotify watch for the node being opened or closed.
-    opens: Option<OwnedFd>,
-    /// With `opens`: the first answer was not given yet, and needs no waiting.
-    fresh: bool,
+    /// An inotify watch for the node being opened or closed, if the module sends no events.
+    open_watch: Option<OwnedFd>,
+    /// With `open_watch`: the first result is still due, and needs no waiting.
+    first_result: bool,
     stop: OwnedFd,
 }
 
@@ -48,19 +49,19 @@ pub struct Stop(OwnedFd);
 
 impl Drop for Stop {
     fn drop(&mut self) {
-        // It only fails where it was used before.
+        // Fails only if it was written before.
         let _ = rustix::io::write(&self.0, &1_u64.to_ne_bytes());
     }
 }
 
 impl Audience {
-    /// Begins to listen.
+    /// Starts to watch.
     ///
     /// # Errors
-    /// Neither the module tells of its readers nor the system who opens the node.
+    /// The module sends no events, and the system cannot watch the node either.
     pub fn new(device: Arc<Device>) -> io::Result<(Self, Stop)> {
         let subscribed = device.subscribe(CLIENT_USAGE, SEND_INITIAL);
-        let opens = match subscribed {
+        let open_watch = match subscribed {
             Ok(()) => None,
             Err(_) => {
                 let watch = inotify::init(inotify::CreateFlags::NONBLOCK | inotify::CreateFlags::CLOEXEC)?;
@@ -70,78 +71,78 @@ impl Audience {
             }
         };
         let stop = eventfd(0, EventfdFlags::CLOEXEC | EventfdFlags::NONBLOCK)?;
-        let other_end = stop.try_clone()?;
-        Ok((Self { device, opens, fresh: true, stop }, Stop(other_end)))
+        let stop_writer = stop.try_clone()?;
+        Ok((Self { device, open_watch, first_result: true, stop }, Stop(stop_writer)))
     }
 
-    /// Whether the module tells of its readers; otherwise whoever opens the node counts as one.
+    /// Whether the module reports its readers; otherwise every process that opens the node counts as one.
     pub fn has_module_events(&self) -> bool {
-        self.opens.is_none()
+        self.open_watch.is_none()
     }
 
-    /// Sleeps until the readers may have changed, but no longer than `patience` (`None`: for ever).
-    pub fn wait(&mut self, patience: Option<Duration>) -> ReaderEvent {
-        match &self.opens {
-            None => self.next_event(patience),
-            Some(opens) => {
-                if !std::mem::take(&mut self.fresh) {
-                    match self.sleep(opens, PollFlags::IN, patience) {
-                        Woken::Ready => {}
-                        Woken::Late => return ReaderEvent::Nothing,
-                        Woken::Stop => return ReaderEvent::Stopped,
+    /// Waits until the readers may have changed, for at most `timeout` (`None`: forever).
+    pub fn wait(&mut self, timeout: Option<Duration>) -> ReaderEvent {
+        match &self.open_watch {
+            None => self.next_event(timeout),
+            Some(open_watch) => {
+                if !std::mem::take(&mut self.first_result) {
+                    match self.poll_fd(open_watch, PollFlags::IN, timeout) {
+                        Poll::Ready => {}
+                        Poll::TimedOut => return ReaderEvent::Nothing,
+                        Poll::Stop => return ReaderEvent::Stopped,
                     }
-                    // No flags: only a stop ends this pause early.
-                    if let Woken::Stop = self.sleep(&self.stop, PollFlags::empty(), Some(SETTLE)) {
+                    // Without flags, only a stop ends this wait early.
+                    if let Poll::Stop = self.poll_fd(&self.stop, PollFlags::empty(), Some(SETTLE)) {
                         return ReaderEvent::Stopped;
                     }
-                    drain(opens);
+                    drain(open_watch);
                 }
                 ReaderEvent::Readers(!other_holders(self.device.path()).is_empty())
             }
         }
     }
 
-    /// Waits for the module's next event; an event of another kind is [`ReaderEvent::Nothing`].
-    fn next_event(&self, patience: Option<Duration>) -> ReaderEvent {
-        match self.sleep(&*self.device, PollFlags::PRI, patience) {
-            Woken::Ready => {}
-            Woken::Late => return ReaderEvent::Nothing,
-            Woken::Stop => return ReaderEvent::Stopped,
+    /// Waits for the module's next event; other events return [`ReaderEvent::Nothing`].
+    fn next_event(&self, timeout: Option<Duration>) -> ReaderEvent {
+        match self.poll_fd(&*self.device, PollFlags::PRI, timeout) {
+            Poll::Ready => {}
+            Poll::TimedOut => return ReaderEvent::Nothing,
+            Poll::Stop => return ReaderEvent::Stopped,
         }
         match self.device.dequeue_event() {
             Ok(event) if event.kind == CLIENT_USAGE => ReaderEvent::Readers(event.data[..4] != [0; 4]),
             Ok(_) => ReaderEvent::Nothing,
             Err(error) => match Errno::from_io_error(&error) {
-                // Woken for nothing: no event is pending.
+                // A spurious wake-up: no event is pending.
                 Some(Errno::NOENT | Errno::AGAIN) => ReaderEvent::Nothing,
                 _ => ReaderEvent::Stopped,
             },
         }
     }
 
-    /// Polls `on` for `flags`, and for the stop, no longer than `patience` (`None`: for ever).
-    fn sleep(&self, on: impl AsFd, flags: PollFlags, patience: Option<Duration>) -> Woken {
-        let patience = patience.and_then(|patience| Timespec::try_from(patience).ok());
-        let mut fds = [PollFd::new(&on, flags), PollFd::new(&self.stop, PollFlags::IN)];
-        match poll(&mut fds, patience.as_ref()) {
-            Ok(0) | Err(Errno::INTR) => Woken::Late,
-            Ok(_) if fds[1].revents().is_empty() && fds[0].revents().intersects(flags) => Woken::Ready,
-            // Neither what was waited for nor the end: the node is gone.
-            _ => Woken::Stop,
+    /// Polls `fd` for `flags`, and for the stop, for at most `timeout` (`None`: forever).
+    fn poll_fd(&self, fd: impl AsFd, flags: PollFlags, timeout: Option<Duration>) -> Poll {
+        let timeout = timeout.and_then(|timeout| Timespec::try_from(timeout).ok());
+        let mut fds = [PollFd::new(&fd, flags), PollFd::new(&self.stop, PollFlags::IN)];
+        match poll(&mut fds, timeout.as_ref()) {
+            Ok(0) | Err(Errno::INTR) => Poll::TimedOut,
+            Ok(_) if fds[1].revents().is_empty() && fds[0].revents().intersects(flags) => Poll::Ready,
+            // Neither the requested flags nor a stop: the node is gone.
+            _ => Poll::Stop,
         }
     }
 }
 
-enum Woken {
+enum Poll {
     Ready,
-    Late,
+    TimedOut,
     Stop,
 }
 
-/// Discards all pending inotify events: what they were does not matter, as the holders are looked up afterwards.
-fn drain(opens: &OwnedFd) {
+/// Discards all pending inotify events: their content does not matter, since the holders are looked up afterwards.
+fn drain(open_watch: &OwnedFd) {
     let mut events = [0_u8; 1024];
-    while rustix::io::read(opens, &mut events).is_ok_and(|bytes| bytes > 0) {}
+    while rustix::io::read(open_watch, &mut events).is_ok_and(|bytes| bytes > 0) {}
 }
 
 #[cfg(test)]
@@ -151,7 +152,7 @@ mod tests {
 
     use super::*;
 
-    /// A device that is no virtual camera does not tell; any file's holders can be looked up.
+    /// A device that is not a virtual camera sends no events; the holders of any file can be looked up.
     fn listen(file: &std::path::Path) -> (Audience, Stop) {
         Audience::new(Arc::new(Device::open(file).unwrap())).unwrap()
     }
@@ -163,12 +164,12 @@ mod tests {
 
     #[test]
     fn another_process_that_keeps_the_node_open_is_a_reader_until_it_ends() {
-        // The system's only device that every user may open and nobody else keeps open.
+        // The only system device that every user may open and that no other process keeps open.
         let node = std::path::Path::new("/dev/full");
         let (mut audience, _stop) = listen(node);
         assert!(!audience.has_module_events());
         assert_eq!(audience.wait(None), ReaderEvent::Readers(false));
-        // Looked at and left: no reader.
+        // Opened and closed again: no reader.
         drop(std::fs::File::open(node).unwrap());
         assert_eq!(audience.wait(Some(Duration::from_secs(20))), ReaderEvent::Readers(false));
         assert_eq!(audience.wait(Some(Duration::from_millis(1))), ReaderEvent::Nothing);
@@ -177,8 +178,8 @@ mod tests {
         assert_eq!(audience.wait(Some(Duration::from_secs(20))), ReaderEvent::Readers(true));
         reader.kill().unwrap();
         reader.wait().unwrap();
-        let heard = std::iter::repeat_with(|| audience.wait(Some(Duration::from_secs(20))));
-        assert!(heard.take(3).any(|heard| heard == ReaderEvent::Readers(false)));
+        let events = std::iter::repeat_with(|| audience.wait(Some(Duration::from_secs(20))));
+        assert!(events.take(3).any(|event| event == ReaderEvent::Readers(false)));
     }
 
     #[test]

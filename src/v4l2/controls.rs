@@ -1,4 +1,4 @@
-//! A camera's own settings, such as exposure (V4L2 controls): listing them, reading them, and setting them by name.
+//! V4L2 controls, a camera's own settings such as exposure: listing, reading, and setting them by name.
 
 mod value;
 
@@ -13,37 +13,37 @@ use super::device::{Device, Request, zeroed};
 use super::node::text;
 pub use value::{ControlError, Value};
 
-/// A setting that a device offers.
+/// A control that a device offers.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Control {
-    /// Its name as tools write it: `exposure_dynamic_framerate`.
+    /// Name as tools write it: `exposure_dynamic_framerate`.
     pub name: String,
-    /// Its name as the driver writes it: `Exposure, Dynamic Framerate`.
+    /// Name as the driver writes it: `Exposure, Dynamic Framerate`.
     pub label: String,
     pub id: u32,
-    /// What values it takes.
+    /// The type of its values.
     pub kind: Kind,
-    /// The least value; for a text, its least length in bytes.
+    /// Smallest value; for a string, its minimum length in bytes.
     pub minimum: i64,
-    /// The largest value; for a bit mask, all its bits; for a text, its largest length in bytes.
+    /// Largest value; for a bit mask, all its bits; for a string, its maximum length in bytes.
     pub maximum: i64,
-    /// Distance from one value to the next, at least 1.
+    /// Distance between adjacent values, at least 1.
     pub step: u64,
     /// The driver's default value.
     pub default: i64,
-    /// The items of a menu. Numbers may be missing between.
+    /// Menu items. Their indices may have gaps.
     pub items: Vec<Item>,
-    /// Its present value; `None` if it cannot be read or has no single value (a button, a table).
+    /// Current value; `None` if it cannot be read or has no single value (a button, a table).
     pub value: Option<Value>,
     /// Whether it can be read but not set.
     pub read_only: bool,
-    /// Whether it has no effect now, because another control overrides it.
+    /// Whether another control overrides it, so that it has no effect now.
     pub inactive: bool,
-    /// Whether it cannot be set now, because the device is streaming.
+    /// Whether it cannot be set while the device is streaming.
     pub grabbed: bool,
 }
 
-/// What values a control takes.
+/// The type of a control's values.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Kind {
@@ -53,25 +53,25 @@ pub enum Kind {
     Menu,
     /// One of several numbers.
     IntegerMenu,
-    /// Does something when it is set.
+    /// Triggers an action when it is set.
     Button,
-    /// Whole numbers of 64 bits.
+    /// 64-bit integers.
     Integer64,
     String,
     Bitmask,
-    /// Tables and structures, which have no value that one could type.
+    /// Arrays and structures, which have no single value to type in.
     Compound,
 }
 
-/// An item of a menu.
+/// A menu item.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Item {
     pub index: i64,
-    /// Its name; of a menu of numbers, the number.
+    /// Its name; in a menu of numbers, the number.
     pub name: String,
 }
 
-/// Old and new names of the controls that Linux 5.14 renamed: either name finds whichever the device has.
+/// Old and new names of the controls that Linux 5.14 renamed. Either name finds the control, whichever the device has.
 const RENAMED: [(&str, &str); 5] = [
     ("exposure_auto", "auto_exposure"),
     ("exposure_auto_priority", "exposure_dynamic_framerate"),
@@ -80,13 +80,13 @@ const RENAMED: [(&str, &str); 5] = [
     ("white_balance_temperature_auto", "white_balance_automatic"),
 ];
 
-/// The control that makes a camera halve its rate in the dark when it is 1.
+/// The control that, when it is 1, lets a camera halve its frame rate in the dark.
 pub const LOW_LIGHT: &str = "exposure_dynamic_framerate";
 
-/// All controls of a device with their values, in the driver's order. A device without any has an empty list.
+/// Lists all controls of a device with their values, in the driver's order; empty if it has none.
 ///
 /// # Errors
-/// The error of the system that broke the listing off, other than the one that ends it.
+/// The system error that interrupted the enumeration, except the one that ends it.
 pub fn list(device: &Device) -> io::Result<Vec<Control>> {
     const NEXT: u32 = sys::V4L2_CTRL_FLAG_NEXT_CTRL | sys::V4L2_CTRL_FLAG_NEXT_COMPOUND;
     let (mut controls, mut last, mut faults) = (Vec::new(), 0, 0);
@@ -95,14 +95,14 @@ pub fn list(device: &Device) -> io::Result<Vec<Control>> {
         query.id = last | NEXT;
         match device.query_control(&mut query) {
             Ok(()) => {
-                // A driver that ignores the flags of `NEXT` gives the same control again and again.
+                // A driver that ignores the flags of `NEXT` returns the same control again and again.
                 if query.id <= last {
                     return Ok(controls);
                 }
                 last = query.id;
                 controls.extend(describe(device, &query));
             }
-            // Some firmware fails at single controls, whose id is not told: go on id by id.
+            // Some firmware fails on single controls without returning their id: continue with the next id.
             Err(error) if error.raw_os_error() == Some(EIO) && faults < MAX_FAULTS => {
                 faults += 1;
                 last += 1;
@@ -116,35 +116,35 @@ pub fn list(device: &Device) -> io::Result<Vec<Control>> {
 const EIO: i32 = 5;
 const EINVAL: i32 = 22;
 const ENOTTY: i32 = 25;
-/// After so many failures the whole device is taken to fail.
+/// After this many failures, the whole device counts as failing.
 const MAX_FAULTS: u32 = 64;
 
-/// The control of this name, also under its former or later name.
+/// Finds the control with this name, or with its old or new equivalent.
 pub fn find<'a>(controls: &'a [Control], name: &str) -> Option<&'a Control> {
     let renamed = RENAMED.iter().find_map(|(old, new)| match name {
         _ if name == *old => Some(*new),
         _ if name == *new => Some(*old),
         _ => None,
     });
-    let called = |wanted: &str| controls.iter().find(|control| control.name == wanted);
-    called(name).or_else(|| called(renamed?))
+    let find_named = |wanted: &str| controls.iter().find(|control| control.name == wanted);
+    find_named(name).or_else(|| find_named(renamed?))
 }
 
-/// What a control is set to.
+/// Reads the value of a control.
 ///
 /// # Errors
-/// There is none of this name, or it has no value to read.
+/// No control has this name, or it has no readable value.
 pub fn get(device: &Device, name: &str) -> Result<Value, ControlError> {
     let controls = list(device).map_err(|source| ControlError::Device { name: name.to_owned(), source })?;
     let control = find(&controls, name).ok_or_else(|| ControlError::unknown(name, &controls))?;
     control.value.clone().ok_or_else(|| ControlError::NoValue(control.name.clone()))
 }
 
-/// Sets a control by its name: a number, the name or number of a menu's item, `on` or `off`, a text. Returns what it is
-/// set to then, which may be another value where the device decides so.
+/// Sets a control by its name, to a number, a menu item's name or index, `on` or `off`, or a text. Returns the value
+/// that the device then reports, which may differ from the requested one.
 ///
 /// # Errors
-/// There is no such control, it does not take this value, it cannot be set now, or the device refuses.
+/// The control does not exist, does not accept this value, cannot be set now, or the device refuses.
 pub fn set(device: &Device, name: &str, value: &str) -> Result<Option<Value>, ControlError> {
     let failed = |source| ControlError::Device { name: name.to_owned(), source };
     let controls = list(device).map_err(failed)?;
@@ -154,11 +154,12 @@ pub fn set(device: &Device, name: &str, value: &str) -> Result<Option<Value>, Co
     Ok(read(device, control).ok().flatten())
 }
 
-/// The control that a query found, with its menu and present value; `None` for a class heading or a disabled control.
+/// Builds a control from a query's result, with its menu and current value; `None` for class headings and disabled
+/// controls.
 fn describe(device: &Device, query: &sys::v4l2_query_ext_ctrl) -> Option<Control> {
     let label = text(&query.name.map(c_char::cast_unsigned));
-    let flag = |flag| query.flags & flag != 0;
-    if flag(sys::V4L2_CTRL_FLAG_DISABLED) || query.type_ == sys::v4l2_ctrl_type_V4L2_CTRL_TYPE_CTRL_CLASS {
+    let has_flag = |flag| query.flags & flag != 0;
+    if has_flag(sys::V4L2_CTRL_FLAG_DISABLED) || query.type_ == sys::v4l2_ctrl_type_V4L2_CTRL_TYPE_CTRL_CLASS {
         return None;
     }
     let mut control = Control {
@@ -172,13 +173,13 @@ fn describe(device: &Device, query: &sys::v4l2_query_ext_ctrl) -> Option<Control
         default: query.default_value,
         items: Vec::new(),
         value: None,
-        read_only: flag(sys::V4L2_CTRL_FLAG_READ_ONLY),
-        inactive: flag(sys::V4L2_CTRL_FLAG_INACTIVE),
-        grabbed: flag(sys::V4L2_CTRL_FLAG_GRABBED),
+        read_only: has_flag(sys::V4L2_CTRL_FLAG_READ_ONLY),
+        inactive: has_flag(sys::V4L2_CTRL_FLAG_INACTIVE),
+        grabbed: has_flag(sys::V4L2_CTRL_FLAG_GRABBED),
     };
     control.items = items(device, &control);
-    if !flag(sys::V4L2_CTRL_FLAG_WRITE_ONLY) {
-        // One that cannot be read does not keep the others from being listed.
+    if !has_flag(sys::V4L2_CTRL_FLAG_WRITE_ONLY) {
+        // A control that cannot be read must not keep the others from being listed.
         control.value = read(device, &control).ok().flatten();
     }
     Some(control)
@@ -187,7 +188,7 @@ fn describe(device: &Device, query: &sys::v4l2_query_ext_ctrl) -> Option<Control
 fn kind(query: &sys::v4l2_query_ext_ctrl) -> Kind {
     let is_array = query.nr_of_dims > 0;
     match query.type_ {
-        // The type is that of its elements.
+        // An array's type is that of its elements.
         _ if is_array => Kind::Compound,
         sys::v4l2_ctrl_type_V4L2_CTRL_TYPE_INTEGER => Kind::Integer,
         sys::v4l2_ctrl_type_V4L2_CTRL_TYPE_BOOLEAN => Kind::Boolean,
@@ -201,17 +202,17 @@ fn kind(query: &sys::v4l2_query_ext_ctrl) -> Kind {
     }
 }
 
-/// The name that `v4l2-ctl` makes of a driver's label: letters and digits in lower case, one underscore for each run of
-/// other characters.
+/// Returns the name that `v4l2-ctl` derives from a driver's label: lower-case letters and digits, and one underscore
+/// for each run of other characters.
 fn tool_name(label: &str) -> String {
     let words = label.split(|c: char| !c.is_ascii_alphanumeric()).filter(|word| !word.is_empty());
     words.map(str::to_ascii_lowercase).collect::<Vec<_>>().join("_")
 }
 
-/// The items of a menu; none for other kinds. The driver refuses the numbers that its menu leaves out.
+/// Lists the items of a menu; empty for other kinds. The driver refuses the indices that its menu leaves out.
 fn items(device: &Device, control: &Control) -> Vec<Item> {
-    /// More than any menu has: bounds the loop whatever range a driver states.
-    const MOST_ITEMS: i64 = 1024;
+    /// More than any menu has; bounds the loop whatever range a driver states.
+    const MAX_ITEMS: i64 = 1024;
     if !matches!(control.kind, Kind::Menu | Kind::IntegerMenu) {
         return Vec::new();
     }
@@ -225,17 +226,17 @@ fn items(device: &Device, control: &Control) -> Vec<Item> {
         let name = unsafe { if control.kind == Kind::Menu { text(&union.name) } else { union.value.to_string() } };
         Some(Item { index, name })
     };
-    (control.minimum..=control.maximum.min(control.minimum.saturating_add(MOST_ITEMS))).filter_map(item).collect()
+    (control.minimum..=control.maximum.min(control.minimum.saturating_add(MAX_ITEMS))).filter_map(item).collect()
 }
 
-/// Size of the buffer for a text of at most `maximum` bytes, its final zero included; `None` if no text is so long.
+/// Returns the buffer size for a text of at most `maximum` bytes and its final zero; `None` if no text is that long.
 fn text_buffer_bytes(maximum: i64) -> Option<usize> {
-    /// More than any text has: bounds the memory whatever length a driver states.
-    const MOST_BYTES: usize = 1 << 16;
-    usize::try_from(maximum).ok().filter(|&bytes| bytes < MOST_BYTES).map(|bytes| bytes + 1)
+    /// More than any text has; bounds the allocation whatever length a driver states.
+    const MAX_BYTES: usize = 1 << 16;
+    usize::try_from(maximum).ok().filter(|&bytes| bytes < MAX_BYTES).map(|bytes| bytes + 1)
 }
 
-/// The present value of a control; `None` for kinds that have no single value.
+/// Reads a control's current value; `None` for kinds without a single value.
 fn read(device: &Device, control: &Control) -> io::Result<Option<Value>> {
     let mut exchanged: sys::v4l2_ext_control = zeroed();
     exchanged.id = control.id;
@@ -289,8 +290,8 @@ fn exchange(device: &Device, request: Request, control: &mut sys::v4l2_ext_contr
     let mut controls: sys::v4l2_ext_controls = zeroed();
     controls.count = 1;
     controls.controls = control;
-    // SAFETY: the requests are those of this type. It points to one control, as its count says; that holds a number, or
-    // points to as many bytes as its size says, which live in the caller until this returns.
+    // SAFETY: both requests take this type. It points to one control, as its count says; that control holds a number,
+    // or points to a buffer of the size it states, which the caller keeps alive until this returns.
     #[allow(unsafe_code)]
     unsafe {
         device.ioctl(request, &mut controls)

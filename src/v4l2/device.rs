@@ -9,14 +9,14 @@ use rustix::fs::{Mode, OFlags};
 use v4l::v4l_sys as sys;
 use v4l::v4l2::vidioc;
 
-/// A device node such as `/dev/video0`. Calls never block: where there is nothing to dequeue, they say so.
+/// A device node such as `/dev/video0`. Calls never block: they return `WouldBlock` where there is nothing to dequeue.
 #[derive(Debug)]
 pub struct Device {
     fd: OwnedFd,
     path: PathBuf,
 }
 
-/// The number of an ioctl.
+/// An ioctl number.
 pub type Request = std::ffi::c_ulong;
 
 macro_rules! ioctls {
@@ -28,7 +28,7 @@ macro_rules! ioctls {
                     return Err(io::ErrorKind::InvalidInput.into());
                 }
                 // SAFETY: the type is the one that the request's number was made of, and the driver follows no pointer
-                // in it: `is_flat` says so.
+                // in it, as `is_flat` has checked.
                 #[allow(unsafe_code)]
                 unsafe { self.ioctl(vidioc::$request as Request, argument) }
             }
@@ -36,7 +36,7 @@ macro_rules! ioctls {
     };
 }
 
-/// An argument of an ioctl that holds its whole answer: the driver follows no pointer out of it.
+/// An ioctl argument that contains its whole result: the driver follows no pointer out of it.
 trait Flat {
     /// Whether the driver follows no pointer in this value.
     fn is_flat(&self) -> bool {
@@ -63,7 +63,7 @@ flat!(
 );
 
 impl Flat for sys::v4l2_format {
-    /// The format of an overlay points to clips and a bitmap; those of queues of pictures are numbers.
+    /// An overlay's format points to clips and a bitmap; formats of picture queues are plain numbers.
     fn is_flat(&self) -> bool {
         let pictures = [
             sys::v4l2_buf_type_V4L2_BUF_TYPE_VIDEO_CAPTURE,
@@ -79,9 +79,9 @@ impl Device {
     /// Opens a node for reading and writing.
     ///
     /// # Errors
-    /// What the system says.
+    /// The system's error.
     pub fn open(path: &Path) -> io::Result<Self> {
-        // Closed in child processes, or they would keep the camera busy.
+        // CLOEXEC: child processes would keep the camera busy otherwise.
         let flags = OFlags::RDWR | OFlags::NONBLOCK | OFlags::CLOEXEC;
         let fd = rustix::fs::open(path, flags, Mode::empty())?;
         Ok(Self { fd, path: path.to_owned() })
@@ -91,14 +91,14 @@ impl Device {
         &self.path
     }
 
-    /// Calls the driver, again when a signal came between.
+    /// Calls the driver, repeating the call if a signal interrupts it.
     ///
     /// # Errors
-    /// What the driver says.
+    /// The driver's error.
     ///
     /// # Safety
-    /// `T` must be the type that `request` reads and writes, and pointers in it must be good for what the driver does
-    /// with them.
+    /// `T` must be the type that `request` reads and writes, and pointers in it must be valid for the driver's
+    /// accesses.
     #[allow(unsafe_code)]
     pub unsafe fn ioctl<T>(&self, request: Request, argument: &mut T) -> io::Result<()> {
         loop {
@@ -113,39 +113,39 @@ impl Device {
     }
 
     ioctls! {
-        /// What the device is.
+        /// Reads the device's identity and capabilities.
         query_capability: VIDIOC_QUERYCAP(sys::v4l2_capability);
-        /// The format number `index` of a queue.
+        /// Reads the format number `index` of a queue.
         enum_format: VIDIOC_ENUM_FMT(sys::v4l2_fmtdesc);
-        /// The size number `index` of a format.
+        /// Reads the size number `index` of a format.
         enum_frame_size: VIDIOC_ENUM_FRAMESIZES(sys::v4l2_frmsizeenum);
-        /// The time from frame to frame number `index` of a format and size.
+        /// Reads the frame interval number `index` of a format and size.
         enum_frame_interval: VIDIOC_ENUM_FRAMEINTERVALS(sys::v4l2_frmivalenum);
-        /// The format that is set.
+        /// Reads the current format.
         get_format: VIDIOC_G_FMT(sys::v4l2_format);
         /// Sets a format; the driver may change every part of it.
         set_format: VIDIOC_S_FMT(sys::v4l2_format);
-        /// What setting a format would give.
+        /// Returns the format that setting this one would result in.
         try_format: VIDIOC_TRY_FMT(sys::v4l2_format);
         get_parameters: VIDIOC_G_PARM(sys::v4l2_streamparm);
         /// Sets the frame rate; the driver may change it.
         set_parameters: VIDIOC_S_PARM(sys::v4l2_streamparm);
-        /// The value of a control.
+        /// Reads the value of a control.
         get_control: VIDIOC_G_CTRL(sys::v4l2_control);
-        /// Asks for buffers; the driver says how many it gives.
+        /// Requests buffers; the driver returns how many it grants.
         request_buffers: VIDIOC_REQBUFS(sys::v4l2_requestbuffers);
-        /// What a control is, or the one after it.
+        /// Describes a control, or the next one.
         query_control: VIDIOC_QUERY_EXT_CTRL(sys::v4l2_query_ext_ctrl);
-        /// An item of a control's menu.
+        /// Reads an item of a control's menu.
         query_menu: VIDIOC_QUERYMENU(sys::v4l2_querymenu);
         /// Starts streaming on a queue of this type.
         stream_on: VIDIOC_STREAMON(i32);
-        /// Stops streaming; every buffer comes back.
+        /// Stops streaming; every buffer is returned.
         stream_off: VIDIOC_STREAMOFF(i32);
     }
 }
 
-/// What a node itself can do; `capabilities` says what all nodes of its device together can.
+/// Returns the capabilities of a node itself; `capabilities` has those of all nodes of its device together.
 pub fn own_caps(capability: &sys::v4l2_capability) -> u32 {
     match capability.capabilities & sys::V4L2_CAP_DEVICE_CAPS {
         0 => capability.capabilities,
@@ -153,16 +153,16 @@ pub fn own_caps(capability: &sys::v4l2_capability) -> u32 {
     }
 }
 
-/// A structure of the kernel's, all zero.
+/// Returns a kernel structure with all bits zero.
 pub fn zeroed<T: KernelStruct>() -> T {
-    // SAFETY: `KernelStruct` says that zero is a value of every field.
+    // SAFETY: `KernelStruct` guarantees that zero is valid for every field.
     #[allow(unsafe_code)]
     unsafe {
         std::mem::zeroed()
     }
 }
 
-/// Plain C structures for which all bits zero is a value.
+/// Plain C structures for which all bits zero is a valid value.
 ///
 /// # Safety
 /// Every field must accept zero: integers, unions of them, and pointers, which are then null.

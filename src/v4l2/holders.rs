@@ -1,4 +1,4 @@
-//! Who has a device open: what to tell where the system says no more than "busy".
+//! Finds the processes that have a device open, for messages where the system reports only "busy".
 
 use std::fmt;
 use std::fs;
@@ -9,12 +9,12 @@ use std::path::Path;
 #[derive(Clone, Debug, PartialEq, Eq, serde::Serialize)]
 pub struct Holder {
     pub pid: u32,
-    /// Its name as the system cuts it, to 15 bytes.
+    /// Process name, truncated by the system to 15 bytes.
     pub name: String,
 }
 
 impl Holder {
-    /// Whether it is this program: who looks into a device has it open, too.
+    /// Whether it is this program, which has the device open while it examines it.
     pub fn is_this_program(&self) -> bool {
         self.pid == std::process::id()
     }
@@ -26,31 +26,31 @@ impl fmt::Display for Holder {
     }
 }
 
-/// The processes that have the device node `path` open, this one included. Those of other users stay unseen without
-/// the rights to look.
+/// Lists the processes that have the device node `path` open, this one included. Other users' processes are missing
+/// without the rights to see them.
 pub fn holders(path: &Path) -> Vec<Holder> {
     let Ok(device) = fs::metadata(path).map(|node| node.rdev()) else { return Vec::new() };
     let processes = fs::read_dir("/proc").into_iter().flatten().flatten();
     let pids = processes.filter_map(|entry| entry.file_name().to_str()?.parse::<u32>().ok());
-    pids.filter(|pid| holds(*pid, device)).map(|pid| Holder { pid, name: name(pid) }).collect()
+    pids.filter(|pid| has_open(*pid, device)).map(|pid| Holder { pid, name: process_name(pid) }).collect()
 }
 
-/// The same without this program.
+/// Lists the holders except this program.
 pub fn other_holders(path: &Path) -> Vec<Holder> {
     holders(path).into_iter().filter(|holder| !holder.is_this_program()).collect()
 }
 
-/// Whether a process has the character device of this number open.
-fn holds(pid: u32, device: u64) -> bool {
+/// Whether a process has the character device with this number open.
+fn has_open(pid: u32, device: u64) -> bool {
     let files = fs::read_dir(format!("/proc/{pid}/fd")).into_iter().flatten().flatten();
     files.into_iter().any(|file| {
-        // The link first: looking at what it leads to may wake a network mount.
+        // Read the link first: following it may block on a network mount.
         fs::read_link(file.path()).is_ok_and(|target| target.starts_with("/dev"))
             && fs::metadata(file.path()).is_ok_and(|open| open.rdev() == device)
     })
 }
 
-fn name(pid: u32) -> String {
+fn process_name(pid: u32) -> String {
     fs::read_to_string(format!("/proc/{pid}/comm")).map_or_else(|_| "?".into(), |name| name.trim_end().to_owned())
 }
 

@@ -1,4 +1,4 @@
-//! Virtual cameras of the kernel module v4l2loopback: what is written to a node is read by others as a camera's frames.
+//! Virtual cameras of the kernel module v4l2loopback: programs read the frames written to a node as those of a camera.
 
 mod error;
 
@@ -18,23 +18,23 @@ pub use self::error::{LoopbackError, modprobe, nodes};
 use super::device::{Device, zeroed};
 use super::holders::other_holders;
 
-// What its nodes say that they can do depends on who uses them; what their driver is does not.
+// A node's reported capabilities depend on its users; its driver name does not.
 pub use super::node::LOOPBACK_DRIVER as DRIVER;
 
 const OUTPUT: u32 = sys::v4l2_buf_type_V4L2_BUF_TYPE_VIDEO_OUTPUT;
 /// The module's control `keep_format`.
 const KEEP_FORMAT: u32 = sys::V4L2_CID_BASE | 0xf000;
-/// How long a write may wait for room; no version of the module has made one wait so far.
-const WRITE_PATIENCE: Timespec = Timespec { tv_sec: 0, tv_nsec: 200_000_000 };
+/// Longest wait for space before a write is repeated; no version of the module has needed it so far.
+const WRITE_TIMEOUT: Timespec = Timespec { tv_sec: 0, tv_nsec: 200_000_000 };
 
-/// How the pixels of a frame lie in memory; all without gaps between rows or planes.
+/// Pixel format and memory layout of a frame; all without padding between rows or planes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Layout {
-    /// Y Cb Y Cr: two pixels share their colour.
+    /// Packed Y Cb Y Cr: two pixels share their chroma (4:2:2).
     Yuyv,
-    /// Three planes, colour halved both ways.
+    /// Three planes, chroma halved in both directions (4:2:0).
     Yu12,
-    /// Two planes, colour halved both ways and interleaved.
+    /// Two planes, chroma halved in both directions and interleaved (4:2:0).
     Nv12,
     Rgb24,
     Bgr24,
@@ -54,11 +54,11 @@ impl Layout {
         std::str::from_utf8(code).unwrap_or("????")
     }
 
-    fn of(fourcc: u32) -> Option<Self> {
+    fn from_fourcc(fourcc: u32) -> Option<Self> {
         Self::ALL.iter().find(|(_, code)| u32::from_le_bytes(**code) == fourcc).map(|(layout, _)| *layout)
     }
 
-    /// Bytes of a frame. Columns are even, and so are rows where they share their colour.
+    /// Returns the bytes of a frame. The size must be even where pixels share chroma.
     pub fn frame_bytes(self, (width, height): (u32, u32)) -> usize {
         let pixels = width as usize * height as usize;
         match self {
@@ -68,8 +68,8 @@ impl Layout {
         }
     }
 
-    /// Whether frames of this size can be laid out so: sides along which pixels share their colour must be even.
-    fn takes(self, (width, height): (u32, u32)) -> bool {
+    /// Whether frames of this size fit the layout: sides along which pixels share chroma must be even.
+    fn fits_size(self, (width, height): (u32, u32)) -> bool {
         match self {
             Self::Yuyv => width.is_multiple_of(2),
             Self::Yu12 | Self::Nv12 => width.is_multiple_of(2) && height.is_multiple_of(2),
@@ -78,7 +78,7 @@ impl Layout {
     }
 }
 
-/// A node that frames are written to.
+/// A loopback node opened for writing.
 #[derive(Debug)]
 pub struct Output {
     device: Arc<Device>,
@@ -87,24 +87,24 @@ pub struct Output {
     size: (u32, u32),
 }
 
-/// Frames that a node keeps, as the module was loaded; `None` where it does not tell.
+/// Returns how many frames each node buffers, as set when the module was loaded; `None` if it cannot be read.
 pub fn buffers() -> Option<u32> {
     let text = fs::read_to_string("/sys/module/v4l2loopback/parameters/max_buffers").ok()?;
-    text.trim().parse().ok().filter(|buffers| (1..=MOST_BUFFERS).contains(buffers))
+    text.trim().parse().ok().filter(|buffers| (1..=MAX_BUFFERS).contains(buffers))
 }
 
-/// The module keeps no more.
-const MOST_BUFFERS: u32 = 32;
+/// The module's upper limit.
+const MAX_BUFFERS: u32 = 32;
 
 impl Output {
-    /// Opens a node and starts to stream YUYV to it, in BT.601 and limited range, as readers assume of every picture:
-    /// `size` pixels (the width even), `rate / scale` frames per second. Where a reader or a control has fixed the
-    /// format, that one is used instead: see [`Output::layout`] and [`Output::size`].
+    /// Opens a node and starts streaming YUYV to it, in BT.601 and limited range, which readers assume for every
+    /// picture: `size` in pixels (the width even), `rate / scale` frames per second. Where a reader or a control has
+    /// fixed the format, that format is used instead: see [`Output::layout`] and [`Output::size`].
     ///
     /// # Errors
-    /// It is no free node of the module, or its fixed format cannot be written.
+    /// It is not a free node of the module, or its fixed format cannot be written.
     pub fn open(path: &Path, size: (u32, u32), (rate, scale): (u64, u64)) -> Result<Self, LoopbackError> {
-        let device = Device::open(path).map_err(|cause| refused(path, cause))?;
+        let device = Device::open(path).map_err(|cause| open_error(path, cause))?;
         let mut capability: sys::v4l2_capability = zeroed();
         if device.query_capability(&mut capability).is_err() {
             return Err(LoopbackError::NoVideo { path: path.to_owned() });
@@ -113,16 +113,16 @@ impl Output {
         if text(&capability.driver) != DRIVER {
             return Err(LoopbackError::NotLoopback { path: path.to_owned(), card });
         }
-        let can = |any: u32| capability.device_caps & any != 0;
-        // With exclusive_caps, a node that announces capture but no output has a writer, unless its format is kept.
-        let has_writer = can(sys::V4L2_CAP_VIDEO_CAPTURE) && !can(sys::V4L2_CAP_VIDEO_OUTPUT) && !keeps_format(&device);
-        // Versions before 0.14 let several programs write, and without exclusive_caps do not show that one does: the
-        // lock at least keeps out another run of this program.
+        let has_caps = |any: u32| capability.device_caps & any != 0;
+        // With exclusive_caps, a node that reports capture but no output has a writer, unless its format is kept.
+        let has_writer = has_caps(sys::V4L2_CAP_VIDEO_CAPTURE) && !has_caps(sys::V4L2_CAP_VIDEO_OUTPUT) && !keeps_format(&device);
+        // Versions before 0.14 let several programs write, and without exclusive_caps do not show it: the lock at least
+        // keeps out another instance of this program.
         let locked = flock(&device, FlockOperation::NonBlockingLockExclusive);
         if has_writer || locked.is_err_and(|error| error == Errno::WOULDBLOCK) {
             return Err(LoopbackError::Taken { path: path.to_owned(), by: other_holders(path) });
         }
-        if !can(sys::V4L2_CAP_VIDEO_CAPTURE | sys::V4L2_CAP_VIDEO_OUTPUT) {
+        if !has_caps(sys::V4L2_CAP_VIDEO_CAPTURE | sys::V4L2_CAP_VIDEO_OUTPUT) {
             return Err(LoopbackError::Stuck { path: path.to_owned() });
         }
         let (layout, size) = set_format(&device, size)?;
@@ -131,15 +131,15 @@ impl Output {
         let saturated = |number: u64| u32::try_from(number).unwrap_or(u32::MAX);
         parameters.parm.output.timeperframe =
             sys::v4l2_fract { numerator: saturated(scale), denominator: saturated(rate) };
-        // Only tells readers that ask: frames come when they are written.
+        // Informs readers only: the module passes frames on when they are written.
         if let Err(error) = device.set_parameters(&mut parameters) {
             tracing::debug!("{}: the frame rate cannot be set: {error}", path.display());
         }
         match device.stream_on(&mut (OUTPUT as i32)) {
-            // Up to 0.13 a node that is closed without this call having been made takes no frames any more. From 0.14
-            // on the call wants buffers first (EINVAL), and the first write starts the stream.
+            // Up to 0.13, a node that was closed without this call accepts no more frames. From 0.14 on the call needs
+            // buffers first (EINVAL), and the first write starts the stream.
             Err(error) if Errno::from_io_error(&error) != Some(Errno::INVAL) => {
-                return Err(busy_or(&device, "the stream cannot be started", error));
+                return Err(operation_error(&device, "the stream cannot be started", error));
             }
             _ => {}
         }
@@ -150,34 +150,34 @@ impl Output {
         &self.device
     }
 
-    /// The name that it shows to users.
+    /// The name shown to users.
     pub fn card(&self) -> &str {
         &self.card
     }
 
-    /// How pixels are to be laid out.
+    /// The pixel layout that frames must have.
     pub fn layout(&self) -> Layout {
         self.layout
     }
 
-    /// Columns and rows of a frame.
+    /// Width and height of a frame, in pixels.
     pub fn size(&self) -> (u32, u32) {
         self.size
     }
 
-    /// Writes one frame into every buffer of the module: a new reader is first given what lies there, however old.
+    /// Writes one frame into every buffer of the module, because a new reader first gets the buffered frames, however
+    /// old.
     ///
     /// # Errors
-    /// The system refused.
+    /// A write failed.
     pub fn overwrite(&self, frame: &[u8]) -> Result<(), LoopbackError> {
-        (0..buffers().unwrap_or(MOST_BUFFERS)).try_for_each(|_| self.write(frame))
+        (0..buffers().unwrap_or(MAX_BUFFERS)).try_for_each(|_| self.write(frame))
     }
 
-    /// Shows one frame, of exactly [`Layout::frame_bytes`]. Never waits for readers: whoever was too slow for the
-    /// frames before gets this one.
+    /// Writes one frame of exactly [`Layout::frame_bytes`]. Never waits for readers: a slow reader skips to this frame.
     ///
     /// # Errors
-    /// The system refused.
+    /// The write failed.
     pub fn write(&self, frame: &[u8]) -> Result<(), LoopbackError> {
         let failed = |cause| LoopbackError::System {
             path: self.device.path().to_owned(),
@@ -196,10 +196,10 @@ impl Output {
                 Err(Errno::AGAIN) if !waited => {
                     waited = true;
                     let mut fds = [PollFd::from_borrowed_fd(self.device.as_fd(), PollFlags::OUT)];
-                    // Room, a timeout or an error: the next write tells which.
-                    let _ = poll(&mut fds, Some(&WRITE_PATIENCE));
+                    // Space, a timeout or an error: the next write shows which.
+                    let _ = poll(&mut fds, Some(&WRITE_TIMEOUT));
                 }
-                Err(Errno::BUSY) => return Err(busy_or(&self.device, "a frame cannot be written", Errno::BUSY.into())),
+                Err(Errno::BUSY) => return Err(operation_error(&self.device, "a frame cannot be written", Errno::BUSY.into())),
                 Err(error) => return Err(failed(error.into())),
             }
         }
@@ -208,13 +208,13 @@ impl Output {
 
 impl Drop for Output {
     fn drop(&mut self) {
-        // Readers stay; what cannot be stopped ends with the node's closing.
+        // Readers stay connected; a stream that cannot be stopped ends when the node is closed.
         let _ = self.device.stream_off(&mut (OUTPUT as i32));
     }
 }
 
-/// Sets YUYV of `size` as the node's format; returns the layout and size that hold then, which are others where the
-/// format is fixed.
+/// Sets YUYV of `size` as the node's format; returns the layout and size then in effect, which differ where the format
+/// is fixed.
 fn set_format(device: &Device, size: (u32, u32)) -> Result<(Layout, (u32, u32)), LoopbackError> {
     let mut format: sys::v4l2_format = zeroed();
     format.type_ = OUTPUT;
@@ -226,23 +226,23 @@ fn set_format(device: &Device, size: (u32, u32)) -> Result<(Layout, (u32, u32)),
         bytesperline: 2 * size.0,
         sizeimage: Layout::Yuyv.frame_bytes(size) as u32,
         colorspace: sys::v4l2_colorspace_V4L2_COLORSPACE_SRGB,
-        // Without it the kernel takes the last fields for not set.
+        // Without it, the kernel treats the last fields as unset.
         priv_: sys::V4L2_PIX_FMT_PRIV_MAGIC,
         flags: 0,
         __bindgen_anon_1: sys::v4l2_pix_format__bindgen_ty_1 { ycbcr_enc: sys::v4l2_ycbcr_encoding_V4L2_YCBCR_ENC_601 },
         quantization: sys::v4l2_quantization_V4L2_QUANTIZATION_LIM_RANGE,
         xfer_func: sys::v4l2_xfer_func_V4L2_XFER_FUNC_SRGB,
     };
-    let refused = |cause| busy_or(device, "its format cannot be set", cause);
+    let refused = |cause| operation_error(device, "its format cannot be set", cause);
     match device.set_format(&mut format) {
         Err(error) if Errno::from_io_error(&error) == Some(Errno::BUSY) => {
-            // 0.13 refuses every format but the one that is fixed. A node that has a writer refuses that one, too.
+            // 0.13 refuses every format except the fixed one. A node that has a writer refuses that one, too.
             device.get_format(&mut format).map_err(refused)?;
             device.set_format(&mut format).map_err(refused)?;
         }
         done => done.map_err(refused)?,
     }
-    // Asked for, since some versions answer the call above with the buffer's size instead of the frame's.
+    // Read back, since some versions return the buffer's size instead of the frame's from the call above.
     let mut format: sys::v4l2_format = zeroed();
     format.type_ = OUTPUT;
     device.get_format(&mut format).map_err(refused)?;
@@ -250,7 +250,7 @@ fn set_format(device: &Device, size: (u32, u32)) -> Result<(Layout, (u32, u32)),
     #[allow(unsafe_code)]
     let pix = unsafe { format.fmt.pix };
     let size = (pix.width, pix.height);
-    match Layout::of(pix.pixelformat).filter(|layout| layout.takes(size) && pix.width > 0 && pix.height > 0) {
+    match Layout::from_fourcc(pix.pixelformat).filter(|layout| layout.fits_size(size) && pix.width > 0 && pix.height > 0) {
         Some(layout) if layout.frame_bytes(size) == pix.sizeimage as usize => Ok((layout, size)),
         _ => Err(LoopbackError::Frozen {
             path: device.path().to_owned(),
@@ -262,14 +262,14 @@ fn set_format(device: &Device, size: (u32, u32)) -> Result<(Layout, (u32, u32)),
     }
 }
 
-/// Whether the module's control `keep_format` is set: the format then stays when nobody writes.
+/// Whether the module's control `keep_format` is set: the format then stays when the writer closes the node.
 fn keeps_format(device: &Device) -> bool {
     let mut control = sys::v4l2_control { id: KEEP_FORMAT, value: 0 };
     device.get_control(&mut control).is_ok() && control.value != 0
 }
 
-/// Why a node could not be opened.
-fn refused(path: &Path, cause: io::Error) -> LoopbackError {
+/// Maps a failed open to its error.
+fn open_error(path: &Path, cause: io::Error) -> LoopbackError {
     let path = path.to_owned();
     match Errno::from_io_error(&cause) {
         Some(Errno::NOENT | Errno::NOTDIR | Errno::NODEV | Errno::NXIO) => LoopbackError::Missing { path },
@@ -281,8 +281,8 @@ fn refused(path: &Path, cause: io::Error) -> LoopbackError {
     }
 }
 
-/// Why the node refused what was tried (`doing`): the module has several errors for a node with another writer.
-fn busy_or(device: &Device, doing: &'static str, cause: io::Error) -> LoopbackError {
+/// Maps a failed operation (`doing`) to its error: the module has several error codes for a node with another writer.
+fn operation_error(device: &Device, doing: &'static str, cause: io::Error) -> LoopbackError {
     let path = device.path().to_owned();
     let by = other_holders(&path);
     match Errno::from_io_error(&cause) {
@@ -292,7 +292,7 @@ fn busy_or(device: &Device, doing: &'static str, cause: io::Error) -> LoopbackEr
     }
 }
 
-/// A text that ends at its first zero.
+/// Decodes a text up to its first zero byte.
 fn text(bytes: &[u8]) -> String {
     let end = bytes.iter().position(|&byte| byte == 0).unwrap_or(bytes.len());
     String::from_utf8_lossy(&bytes[..end]).into_owned()

@@ -1,4 +1,5 @@
-//! Video4Linux: what capture, live depth and the virtual camera share. The one place that names the crate `v4l`.
+//! Video4Linux support shared by capture, live depth and the virtual camera. The only module that names the crate
+//! `v4l`.
 
 pub mod audience;
 pub mod controls;

@@ -1,4 +1,4 @@
-//! What a capture device offers: formats, their sizes, and the rates of each size.
+//! The modes of a capture device: formats, their sizes, and the frame rates of each size.
 
 use std::fmt;
 use std::io;
@@ -10,21 +10,21 @@ use super::device::{own_caps, zeroed};
 use super::node::text;
 use super::{Device, FourCc};
 
-/// The two kinds of capture queues. A device has one of them; some have both.
+/// The two kinds of capture queues. A device has one of them, or both.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum QueueKind {
-    /// A frame is one piece of memory.
+    /// A frame is one block of memory.
     SinglePlanar,
-    /// A frame may be several.
+    /// A frame may have several.
     MultiPlanar,
 }
 
 impl QueueKind {
-    /// Both, the common one first.
+    /// Both kinds, the common one first.
     pub const ALL: [Self; 2] = [Self::SinglePlanar, Self::MultiPlanar];
 
-    /// The buffer type, as the kernel numbers them.
+    /// The kernel's buffer type.
     pub fn buffer_type(self) -> u32 {
         match self {
             Self::SinglePlanar => sys::v4l2_buf_type_V4L2_BUF_TYPE_VIDEO_CAPTURE,
@@ -32,7 +32,7 @@ impl QueueKind {
         }
     }
 
-    /// The capability that announces it.
+    /// The capability flag that announces this kind.
     pub fn capability(self) -> u32 {
         match self {
             Self::SinglePlanar => sys::V4L2_CAP_VIDEO_CAPTURE,
@@ -44,13 +44,13 @@ impl QueueKind {
 /// A pixel format that a device offers.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct FormatModes {
-    /// The queue that gives it.
+    /// The queue that delivers it.
     pub queue: QueueKind,
     #[serde(serialize_with = "as_text")]
     pub fourcc: FourCc,
-    /// What the driver calls it.
+    /// The driver's name for it.
     pub description: String,
-    /// A library would have to convert to it: the device itself does not send it.
+    /// Whether a library would have to convert to it, because the device itself does not send it.
     pub emulated: bool,
     pub sizes: Sizes,
 }
@@ -59,17 +59,17 @@ pub struct FormatModes {
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Sizes {
-    /// The driver does not tell.
+    /// The driver does not list them.
     Unknown,
-    /// These and no others.
+    /// Only these.
     Discrete(Vec<SizeModes>),
-    /// Every size of a grid.
+    /// All sizes on a grid.
     Range {
         /// Smallest width and height, in pixels.
         min_px: (u32, u32),
         /// Largest width and height, in pixels.
         max_px: (u32, u32),
-        /// From one width, and one height, to the next, in pixels, > 0.
+        /// Distance between adjacent widths and heights, in pixels, > 0.
         step_px: (u32, u32),
         /// Rates at the largest size.
         rates: Rates,
@@ -89,31 +89,32 @@ pub struct SizeModes {
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Rates {
-    /// The driver does not tell.
+    /// The driver does not list them.
     Unknown,
-    /// These and no others, the fastest first.
+    /// Only these, the fastest first.
     Discrete(Vec<Interval>),
-    /// Every rate between two; in steps, where the driver has them.
+    /// Every rate between two; in steps, if the driver has them.
     Range { shortest: Interval, longest: Interval },
 }
 
-/// Time from frame to frame: a fraction of seconds.
+/// Time between frames: a fraction of seconds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Interval {
-    /// Seconds, > 0 ...
+    /// Seconds, > 0, ...
     pub numerator: u32,
     /// ... divided by this, > 0.
     pub denominator: u32,
 }
 
 impl Interval {
-    /// The interval, if the driver gave a usable one.
+    /// Creates the interval, if the driver's fraction is usable.
     pub fn new(fraction: sys::v4l2_fract) -> Option<Self> {
         let sys::v4l2_fract { numerator, denominator } = fraction;
         (numerator > 0 && denominator > 0).then_some(Self { numerator, denominator })
     }
 
-    /// The interval of a rate, to a thousandth of a frame per second; NTSC rates such as 29.97 are exact (1001/30000).
+    /// Returns the interval of a rate, to a thousandth of a frame per second; NTSC rates such as 29.97 are exact
+    /// (1001/30000).
     pub fn from_fps(fps: f64) -> Self {
         let nominal = (fps * 1.001).round();
         // Tolerant enough that 23.98, too, means 24000/1001 frames per second.
@@ -130,7 +131,7 @@ impl Interval {
         f64::from(self.denominator) / f64::from(self.numerator)
     }
 
-    /// The time in nanoseconds.
+    /// The interval in nanoseconds.
     pub fn period_ns(self) -> u64 {
         (u64::from(self.numerator) * 1_000_000_000 / u64::from(self.denominator)).max(1)
     }
@@ -142,7 +143,7 @@ impl Interval {
 
 impl fmt::Display for Interval {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        // Two digits tell 29.97 from 30; a whole rate needs none.
+        // Two digits distinguish 29.97 from 30; a whole rate needs none.
         let fps = (self.fps() * 100.0).round() / 100.0;
         write!(f, "{fps}")
     }
@@ -151,13 +152,13 @@ impl fmt::Display for Interval {
 impl Serialize for Interval {
     fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         #[derive(Serialize)]
-        struct Told {
+        struct Fields {
             fps: f64,
             numerator: u32,
             denominator: u32,
         }
         let Self { numerator, denominator } = *self;
-        Told { fps: (self.fps() * 1000.0).round() / 1000.0, numerator, denominator }.serialize(serializer)
+        Fields { fps: (self.fps() * 1000.0).round() / 1000.0, numerator, denominator }.serialize(serializer)
     }
 }
 
@@ -166,8 +167,8 @@ impl fmt::Display for Rates {
         match self {
             Self::Unknown => write!(f, "rates unknown"),
             Self::Discrete(intervals) => {
-                for (place, interval) in intervals.iter().enumerate() {
-                    write!(f, "{}{interval}", if place > 0 { ", " } else { "" })?;
+                for (index, interval) in intervals.iter().enumerate() {
+                    write!(f, "{}{interval}", if index > 0 { ", " } else { "" })?;
                 }
                 write!(f, " fps")
             }
@@ -181,8 +182,8 @@ impl fmt::Display for Sizes {
         match self {
             Self::Unknown => write!(f, "sizes unknown"),
             Self::Discrete(sizes) => {
-                for (place, SizeModes { size_px, rates }) in sizes.iter().enumerate() {
-                    write!(f, "{}{}x{} ({rates})", if place > 0 { ", " } else { "" }, size_px.0, size_px.1)?;
+                for (index, SizeModes { size_px, rates }) in sizes.iter().enumerate() {
+                    write!(f, "{}{}x{} ({rates})", if index > 0 { ", " } else { "" }, size_px.0, size_px.1)?;
                 }
                 Ok(())
             }
@@ -195,9 +196,9 @@ impl fmt::Display for Sizes {
 }
 
 impl Rates {
-    /// The offered interval nearest to `wanted`; `None` where the driver does not tell.
+    /// Returns the offered interval nearest to `wanted`; `None` if the driver lists none.
     pub fn nearest(&self, wanted: Interval) -> Option<Interval> {
-        // By ratio: 1/30 and 333333/10000000 are the same rate.
+        // Compared by ratio: 1/30 and 333333/10000000 are the same rate.
         let distance = |interval: &Interval| (interval.fps() / wanted.fps()).ln().abs();
         match self {
             Self::Unknown => None,
@@ -209,13 +210,13 @@ impl Rates {
     }
 }
 
-/// Bound of every list: no driver offers as many entries, so a longer one would never end.
+/// Limit of every list: no driver offers this many entries, so a longer list would never end.
 const MAX_ENTRIES: u32 = 512;
 
-/// What `device` offers on all its capture queues, in the order of the driver. Empty where it captures nothing.
+/// Lists the formats of all capture queues of `device`, in the driver's order; empty if it captures nothing.
 ///
 /// # Errors
-/// The device answers nothing at all (it is gone).
+/// The device does not answer (it is gone).
 pub fn modes(device: &Device) -> io::Result<Vec<FormatModes>> {
     let mut capability = zeroed::<sys::v4l2_capability>();
     device.query_capability(&mut capability)?;
@@ -240,7 +241,7 @@ pub fn modes(device: &Device) -> io::Result<Vec<FormatModes>> {
     Ok(found)
 }
 
-/// The sizes of a format, each with its rates.
+/// Lists the sizes of a format, each with its rates.
 fn sizes(device: &Device, fourcc: FourCc) -> Sizes {
     let mut discrete = Vec::new();
     for index in 0..MAX_ENTRIES {
@@ -267,9 +268,10 @@ enum SizeEntry {
     Range { min_px: (u32, u32), max_px: (u32, u32), step_px: (u32, u32) },
 }
 
-/// The size or range of sizes in an entry of the driver's list; `None` where its type is unknown or its size empty.
+/// Returns the size or range of sizes in an entry of the driver's list; `None` if its type is unknown or its size is
+/// empty.
 fn size_entry(entry: &sys::v4l2_frmsizeenum) -> Option<SizeEntry> {
-    // SAFETY: every member of the union is made of integers, for which all bits are values.
+    // SAFETY: every member of the union consists of integers, for which all bit patterns are valid.
     #[allow(unsafe_code)]
     let (one, range) = unsafe { (entry.__bindgen_anon_1.discrete, entry.__bindgen_anon_1.stepwise) };
     let found = match entry.type_ {
@@ -290,7 +292,7 @@ fn size_entry(entry: &sys::v4l2_frmsizeenum) -> Option<SizeEntry> {
     (largest.0 > 0 && largest.1 > 0).then_some(found)
 }
 
-/// The rates of a format at a size, as the driver lists them.
+/// Lists the rates of a format at a size, as the driver reports them.
 pub fn rates(device: &Device, fourcc: FourCc, size_px: (u32, u32)) -> Rates {
     let mut discrete = Vec::new();
     for index in 0..MAX_ENTRIES {
@@ -299,7 +301,7 @@ pub fn rates(device: &Device, fourcc: FourCc, size_px: (u32, u32)) -> Rates {
         if device.enum_frame_interval(&mut entry).is_err() {
             break;
         }
-        // SAFETY: every member of the union is made of integers, for which all bits are values.
+        // SAFETY: every member of the union consists of integers, for which all bit patterns are valid.
         #[allow(unsafe_code)]
         let (one, range) = unsafe { (entry.__bindgen_anon_1.discrete, entry.__bindgen_anon_1.stepwise) };
         if entry.type_ == sys::v4l2_frmivaltypes_V4L2_FRMIVAL_TYPE_DISCRETE {
@@ -316,7 +318,7 @@ pub fn rates(device: &Device, fourcc: FourCc, size_px: (u32, u32)) -> Rates {
     if discrete.is_empty() { Rates::Unknown } else { Rates::Discrete(discrete) }
 }
 
-/// As people write it.
+/// Serializes the code as its text.
 fn as_text<S: serde::Serializer>(fourcc: &FourCc, serializer: S) -> Result<S::Ok, S::Error> {
     serializer.collect_str(fourcc)
 }

@@ -1,4 +1,4 @@
-//! Which device nodes there are, and which of them somebody means.
+//! The V4L2 device nodes, and the one that a user's name refers to.
 
 use std::fmt::{self, Write as _};
 use std::fs;
@@ -11,45 +11,45 @@ use v4l::v4l_sys as sys;
 
 use super::device::{Device, own_caps, zeroed};
 
-/// A node of Video4Linux, as it was when the list was made.
+/// A V4L2 node, as it was when it was listed.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Node {
-    /// Such as `/dev/video0`.
+    /// For example `/dev/video0`.
     pub path: PathBuf,
-    /// The number in its name, if there is one.
+    /// The number in its name, if it has one.
     pub index: Option<u32>,
-    /// Name of the device, for people. Two devices may have the same.
+    /// The device's name for users. Two devices may share one.
     pub card: String,
     /// Name of the driver.
     pub driver: String,
-    /// Where the device is plugged in.
+    /// The bus address where the device is connected.
     pub bus: String,
     pub kind: Kind,
-    /// Whether frames can be taken from it now. A virtual camera may change its mind when it is written to.
+    /// Whether frames can be captured from it now. For a virtual camera, this changes when a program writes to it.
     pub captures: bool,
-    /// Whether frames can be given to it now.
+    /// Whether frames can be written to it now.
     pub outputs: bool,
-    /// Links that stay the same when numbers change: by the device's serial number first, then by its place.
+    /// Links that stay the same when numbers change: first by the device's serial number, then by its port.
     pub links: Vec<PathBuf>,
-    /// How it is connected, where that is USB.
+    /// Its USB connection, if it has one.
     pub usb: Option<Usb>,
-    /// Whether this user may not open it.
+    /// Whether this user has no permission to open it.
     pub denied: bool,
-    /// Why less is known of it than of others: it cannot be opened, or does not answer.
+    /// Why its details are missing: it cannot be opened, or does not answer.
     pub problem: Option<String>,
 }
 
-/// What a node does.
+/// The function of a node.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Kind {
-    /// A camera, or what looks like one.
+    /// A camera, or a similar capture device.
     Capture,
-    /// A virtual camera of v4l2loopback: whoever writes to it gives others their frames.
+    /// A virtual camera of v4l2loopback, whose frames another program writes.
     Virtual,
-    /// Takes frames and shows them.
+    /// Accepts frames and displays them.
     Output,
-    /// Gives data about frames, not frames.
+    /// Delivers metadata about frames, no frames.
     Metadata,
     /// A codec or scaler: frames in, frames out.
     MemoryToMemory,
@@ -59,22 +59,22 @@ pub enum Kind {
 
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Usb {
-    /// Signalling rate, in Mbit/s: 480 is USB 2, 5000 and more USB 3.
+    /// Signalling rate, in Mbit/s: 480 for USB 2, 5000 and more for USB 3.
     pub mbit_per_s: f32,
-    /// Vendor and product, such as `046d:085c`.
+    /// Vendor and product id, such as `046d:085c`.
     pub id: String,
 }
 
-/// Why a name leads to no node.
+/// Why a name does not resolve to a node.
 #[derive(Debug, thiserror::Error, PartialEq, Eq)]
 pub enum NodeError {
-    /// Nothing has this name.
+    /// No device has this name.
     #[error("there is no camera '{name}'{}", listed(.there, ": there is ", "; no camera is connected (`bokehcam doctor` tells more)"))]
     None { name: String, there: Vec<String> },
     /// Several devices have this name.
     #[error("'{name}' is the name of {}; use the path of one", listed(.candidates, "", "several"))]
     Ambiguous { name: String, candidates: Vec<String> },
-    /// The path leads to something else.
+    /// The path does not lead to a device.
     #[error("{}: this is no device node", .0.display())]
     NotADevice(PathBuf),
 }
@@ -89,37 +89,37 @@ impl fmt::Display for Node {
     }
 }
 
-/// All nodes, by number. What cannot be opened is listed too, with its [problem](Node::problem).
+/// Lists all nodes by number, also those that cannot be opened, with their [problem](Node::problem).
 pub fn nodes() -> Vec<Node> {
-    Places::default().nodes()
+    SystemPaths::default().nodes()
 }
 
-/// The node that is meant by `name`: its path, its number, one of its links' names, or a part of its card's name (case
-/// aside). Names of cards are for nodes that frames can be taken from: real cameras before virtual ones.
+/// Resolves `name` to a node: its path, its number, the name of one of its links, or a substring of its card's name
+/// (case-insensitive). Card names match only capture nodes, real cameras before virtual ones.
 ///
 /// # Errors
-/// There is none, or there are several.
+/// No node matches, or several do.
 pub fn resolve(name: &str) -> Result<PathBuf, NodeError> {
-    Places::default().resolve(name)
+    SystemPaths::default().resolve(name)
 }
 
-/// Where the system keeps its nodes.
-struct Places {
-    /// The folder of sysfs with a folder for each node.
+/// The system folders with the nodes.
+struct SystemPaths {
+    /// The sysfs folder with one subfolder per node.
     class: PathBuf,
     dev: PathBuf,
 }
 
-impl Default for Places {
+impl Default for SystemPaths {
     fn default() -> Self {
         Self { class: "/sys/class/video4linux".into(), dev: "/dev".into() }
     }
 }
 
-impl Places {
+impl SystemPaths {
     /// See [`nodes`].
     fn nodes(&self) -> Vec<Node> {
-        // From both: a container may lack either.
+        // Reads both folders: a container may lack either.
         let mut names: Vec<(u32, String)> = [&self.class, &self.dev]
             .into_iter()
             .flat_map(|folder| names_in(folder))
@@ -136,7 +136,7 @@ impl Places {
         names.iter().filter_map(|(index, name)| self.node(*index, name, &links)).collect()
     }
 
-    /// Describes the node `name`; `None` if its device went away meanwhile. `links` are pairs of a target and its link.
+    /// Describes the node `name`; `None` if its device has meanwhile gone. `links` are pairs of a target and its link.
     fn node(&self, index: u32, name: &str, links: &[(PathBuf, PathBuf)]) -> Option<Node> {
         let (path, class) = (self.dev.join(name), self.class.join(name));
         let read = |file: &str| fs::read_to_string(class.join(file)).unwrap_or_default().trim().to_owned();
@@ -155,9 +155,10 @@ impl Places {
             path,
         };
         let mut capability: sys::v4l2_capability = zeroed();
+        // The driver knows more than sysfs, but the node may be unreadable.
         match Device::open(&node.path).and_then(|device| device.query_capability(&mut capability)) {
             Ok(()) => node.describe(&capability),
-            Err(error) if is_gone(&error) => return None,
+            Err(error) if is_unplugged(&error) => return None,
             Err(error) if error.kind() == io::ErrorKind::NotFound => {
                 node.problem =
                     Some(format!("the system has it, but {} is missing (a container?)", node.path.display()));
@@ -177,7 +178,7 @@ impl Places {
             return match fs::metadata(&path) {
                 Ok(metadata) if metadata.file_type().is_char_device() => Ok(path),
                 Ok(_) => Err(NodeError::NotADevice(path)),
-                // Taken as it is: opening it will tell why it cannot be examined.
+                // Accepted: opening it will show why it cannot be examined.
                 Err(error) if error.kind() != io::ErrorKind::NotFound => Ok(path),
                 Err(_) => Err(not_found(name, &self.nodes())),
             };
@@ -187,33 +188,33 @@ impl Places {
         let exact = number.into_iter().chain(linked).chain([self.dev.join(name)]);
         match exact.filter(|path| !name.is_empty() && path.exists()).find(|path| !path.is_dir()) {
             Some(path) => Ok(path),
-            None => by_card(name, &self.nodes()).map(|node| node.path.clone()),
+            None => find_by_card(name, &self.nodes()).map(|node| node.path.clone()),
         }
     }
 }
 
 impl Node {
-    /// Fills in what the driver says of the node.
+    /// Fills in what the driver reports about the node.
     fn describe(&mut self, capability: &sys::v4l2_capability) {
         self.card = text(&capability.card);
         self.driver = text(&capability.driver);
         self.bus = text(&capability.bus_info);
         let caps = own_caps(capability);
-        let can = |any: u32| caps & any != 0;
-        let has_frames = can(sys::V4L2_CAP_VIDEO_CAPTURE | sys::V4L2_CAP_VIDEO_CAPTURE_MPLANE);
-        self.captures = has_frames && can(sys::V4L2_CAP_STREAMING);
-        self.outputs = can(sys::V4L2_CAP_VIDEO_OUTPUT | sys::V4L2_CAP_VIDEO_OUTPUT_MPLANE);
+        let has_caps = |any: u32| caps & any != 0;
+        let has_frames = has_caps(sys::V4L2_CAP_VIDEO_CAPTURE | sys::V4L2_CAP_VIDEO_CAPTURE_MPLANE);
+        self.captures = has_frames && has_caps(sys::V4L2_CAP_STREAMING);
+        self.outputs = has_caps(sys::V4L2_CAP_VIDEO_OUTPUT | sys::V4L2_CAP_VIDEO_OUTPUT_MPLANE);
         self.kind = if self.driver == LOOPBACK_DRIVER {
             Kind::Virtual
-        } else if can(sys::V4L2_CAP_VIDEO_M2M | sys::V4L2_CAP_VIDEO_M2M_MPLANE) {
-            // Its queues are the two ends of one conversion: frames come out only for those that go in.
+        } else if has_caps(sys::V4L2_CAP_VIDEO_M2M | sys::V4L2_CAP_VIDEO_M2M_MPLANE) {
+            // Its two queues are the ends of one conversion: frames come out only for those that go in.
             (self.captures, self.outputs) = (false, false);
             Kind::MemoryToMemory
         } else if self.captures {
             Kind::Capture
         } else if self.outputs {
             Kind::Output
-        } else if can(sys::V4L2_CAP_META_CAPTURE | sys::V4L2_CAP_META_OUTPUT) {
+        } else if has_caps(sys::V4L2_CAP_META_CAPTURE | sys::V4L2_CAP_META_OUTPUT) {
             Kind::Metadata
         } else {
             Kind::Other
@@ -221,19 +222,19 @@ impl Node {
     }
 }
 
-/// What v4l2loopback calls itself, in all versions.
+/// The driver name that all versions of v4l2loopback report.
 pub const LOOPBACK_DRIVER: &str = "v4l2 loopback";
 
-/// The text in a field of a kernel structure, up to its first zero byte and trimmed. Bytes that are no UTF-8 become
-/// replacement characters.
+/// Decodes a text field of a kernel structure, up to its first zero byte and trimmed. Invalid UTF-8 becomes replacement
+/// characters.
 pub fn text(field: &[u8]) -> String {
     let end = field.iter().position(|byte| *byte == 0).unwrap_or(field.len());
     String::from_utf8_lossy(&field[..end]).trim().to_owned()
 }
 
-/// The one node that frames can be taken from whose card's name contains `name`, case aside. Virtual cameras are looked
-/// at only if no real one matches.
-fn by_card<'a>(name: &str, nodes: &'a [Node]) -> Result<&'a Node, NodeError> {
+/// Finds the only capture node whose card name contains `name`, ignoring case. Virtual cameras count only if no real
+/// one matches.
+fn find_by_card<'a>(name: &str, nodes: &'a [Node]) -> Result<&'a Node, NodeError> {
     let wanted = name.to_lowercase();
     let named = |kind| -> Vec<&Node> {
         let fits = |node: &&Node| node.captures && node.kind == kind && node.card.to_lowercase().contains(&wanted);
@@ -256,7 +257,7 @@ fn not_found(name: &str, nodes: &[Node]) -> NodeError {
 }
 
 impl Node {
-    /// As displayed, with its first link: tells devices of the same name apart.
+    /// Formats the node with its first link, which distinguishes devices of the same name.
     fn with_link(&self) -> String {
         let mut line = self.to_string();
         if let Some(link) = self.links.first() {
@@ -266,8 +267,8 @@ impl Node {
     }
 }
 
-/// The device was unplugged.
-fn is_gone(error: &io::Error) -> bool {
+/// Whether the device was unplugged.
+fn is_unplugged(error: &io::Error) -> bool {
     const ENXIO: i32 = 6;
     const ENODEV: i32 = 19;
     matches!(error.raw_os_error(), Some(ENXIO | ENODEV))
@@ -284,14 +285,14 @@ fn number(name: &str) -> Option<u32> {
     name.strip_prefix("video")?.parse().ok()
 }
 
-/// How the camera behind a node is connected, where that is USB.
+/// Returns the USB connection of the camera behind a node, if it has one.
 pub fn usb_of(node: &Path) -> Option<Usb> {
     let node = fs::canonicalize(node).ok()?;
-    usb(&Places::default().class.join(node.file_name()?))
+    usb(&SystemPaths::default().class.join(node.file_name()?))
 }
 
-/// The USB device of the node whose folder in sysfs is `class`: `device` there links to a USB interface, whose parent
-/// folder is that of the USB device.
+/// Reads the USB device of the node whose folder in sysfs is `class`: `device` there links to a USB interface, whose
+/// parent folder is that of the USB device.
 fn usb(class: &Path) -> Option<Usb> {
     let interface = fs::canonicalize(class.join("device")).ok()?;
     let read = |file: &str| Some(fs::read_to_string(interface.parent()?.join(file)).ok()?.trim().to_owned());

@@ -1,4 +1,4 @@
-//! What `stream` and `preview` have in common for those who control them.
+//! Remote control shared by `stream` and `preview`: names, rules, and errors as answers.
 
 use std::path::PathBuf;
 
@@ -9,11 +9,11 @@ use bokehcam::controller::{Facts, Rules};
 use bokehcam::look::{Look, Patch, Strength};
 use bokehcam::source::{self, DepthFrom};
 
-/// Takes a name for a run. Without a folder for sockets the run goes on, and the inner error is the line that says so,
-/// once nothing else is in its way.
+/// Claims a name for a run. Without a folder for sockets the run continues, and the inner error is the line to log
+/// later.
 ///
 /// # Errors
-/// The name that it was given is taken.
+/// Fails if the name is taken.
 pub fn claim(name: Option<&Name>, command: &'static str) -> Result<Result<Claim, String>, CliError> {
     match control::claim(name, command) {
         Ok(claim) => Ok(Ok(claim)),
@@ -22,8 +22,8 @@ pub fn claim(name: Option<&Name>, command: &'static str) -> Result<Result<Claim,
     }
 }
 
-/// The answer to what cannot be done.
-pub fn refused(error: &CliError) -> Answer {
+/// Converts an error to an answer.
+pub fn to_answer(error: &CliError) -> Answer {
     match error {
         CliError::Exists(path) => Answer::failed(format!("{} exists: choose another name", path.display())),
         error if error.is_wrong_argument() => Answer::usage(error.to_string()),
@@ -31,33 +31,33 @@ pub fn refused(error: &CliError) -> Answer {
     }
 }
 
-/// Requests and looks as the command line has them.
-pub struct AsCommandLine {
-    /// The settings file, where one was chosen.
+/// Applies requests by the rules of the command line.
+pub struct CommandLineRules {
+    /// The settings file chosen by `--config`, if any.
     pub config: Option<PathBuf>,
-    /// What the warnings about settings to no effect go by, but for what source and look decide.
+    /// Facts for warnings about settings without effect, except those that follow from source and look.
     pub unused: unused::Run,
 }
 
-impl Rules for AsCommandLine {
+impl Rules for CommandLineRules {
     fn settings(&self, settings: &[String]) -> Result<Patch, Answer> {
-        changes::patch(settings).map_err(|error| refused(&error))
+        changes::patch(settings).map_err(|error| to_answer(&error))
     }
 
     fn preset(&self, name: &str) -> Result<Patch, Answer> {
-        changes::preset(self.config.as_deref(), name).map_err(|error| refused(&error))
+        changes::preset(self.config.as_deref(), name).map_err(|error| to_answer(&error))
     }
 
     fn changed(&self, patch: &Patch, look: &Look, facts: &Facts) -> Result<(Look, Option<String>), Answer> {
-        changed(patch, look, facts, self.unused).map_err(|error| refused(&error))
+        apply_patch(patch, look, facts, self.unused).map_err(|error| to_answer(&error))
     }
 }
 
-/// The look of a run after a change, and what of the change has no effect.
+/// Returns the look of a run after a change, and a note on the parts of the change without effect.
 ///
 /// # Errors
-/// The run cannot have such a look.
-fn changed(
+/// Fails if the run cannot have this look.
+fn apply_patch(
     patch: &Patch,
     look: &Look,
     facts: &Facts,

@@ -1,4 +1,4 @@
-//! What can go wrong between the arguments and the pipeline.
+//! Errors between the arguments and the pipeline.
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -15,11 +15,11 @@ use bokehcam::recording::RecordingError;
 use bokehcam::sink::SinkError;
 use bokehcam::source::SourceError;
 
-/// Why a command did not do what was asked for.
-#[allow(missing_docs)] // The messages say what the fields are.
+/// Error of a command.
+#[allow(missing_docs)] // The messages name the fields.
 #[derive(Debug, thiserror::Error)]
 pub enum CliError {
-    /// The arguments do not make sense together.
+    /// The arguments contradict each other.
     #[error("{0}")]
     Usage(String),
     /// The settings file cannot be used.
@@ -27,16 +27,16 @@ pub enum CliError {
     Settings {
         path: PathBuf,
         line: usize,
-        /// What is wrong, and what is accepted.
+        /// The fault, and the accepted values.
         what: String,
     },
-    /// Something would be overwritten.
+    /// The output exists.
     #[error("{} exists: choose another name, or give --force to overwrite it", .0.display())]
     Exists(PathBuf),
-    /// Something would be overwritten that never is.
+    /// The output exists, and the command has no way to overwrite.
     #[error("{} exists, and stays as it is: choose another name", .0.display())]
     #[cfg(feature = "camera")]
-    Stays(PathBuf),
+    NeverReplaced(PathBuf),
     /// A file or folder cannot be read or written.
     #[error("{}: {}", path.display(), input::said(source))]
     Io {
@@ -44,18 +44,18 @@ pub enum CliError {
         path: PathBuf,
         source: io::Error,
     },
-    /// The report of a run could not have its name.
+    /// The report could not be renamed to its final path.
     #[error("{error}; the report is kept as {}", kept.display())]
     ReportKept {
         error: Box<CliError>,
-        /// The file.
+        /// The file with the report.
         kept: PathBuf,
     },
     /// There is no window, or it failed.
     #[error(transparent)]
     #[cfg(feature = "window")]
     Window(#[from] bokehcam_window::window::WindowError),
-    /// A preview ended without ever having shown a frame.
+    /// A preview ended before its first frame.
     #[error("{0}")]
     #[cfg(feature = "window")]
     NoFrames(String),
@@ -63,53 +63,53 @@ pub enum CliError {
     #[error("{0}")]
     #[cfg(feature = "window")]
     OutputFailed(String),
-    /// No plate could be taken.
+    /// The plate could not be taken.
     #[error("no plate: {0}")]
     NoPlate(String),
-    /// A run does not do what it was asked for.
+    /// A running instance refused a request.
     #[error("{0}")]
     Control(String),
-    /// The service cannot be switched.
+    /// The service cannot be switched on or off.
     #[error("{0}")]
     Service(String),
     /// A diagram cannot be drawn.
     #[error("the diagram cannot be drawn: {0}")]
     Diagram(String),
-    /// No handler of signals can be set.
+    /// The signal handler cannot be set.
     #[error("signals cannot be handled: {0}")]
     Signals(String),
-    /// This program was built so.
+    /// This program was built without cameras.
     #[error("this bokehcam was built without cameras: build it with the feature camera")]
     #[cfg(not(feature = "camera"))]
     NoCameras,
-    /// A name leads to no device.
+    /// The name matches no device.
     #[error(transparent)]
     #[cfg(feature = "camera")]
     Node(#[from] bokehcam::v4l2::node::NodeError),
-    /// A device of another sort.
+    /// The file is not a video device.
     #[error("{}: this is no video device", .0.display())]
     #[cfg(feature = "camera")]
     NotVideo(PathBuf),
-    /// A name means no camera of PipeWire's.
+    /// The name matches no PipeWire camera.
     #[error("there is no camera '{0}' in PipeWire; `bokehcam devices` lists what there is")]
     #[cfg(feature = "camera")]
-    NoShared(String),
-    /// `doctor` found something to be missing.
+    NoPipeWireCamera(String),
+    /// `doctor` found essential parts missing.
     #[error("there is no {0} to work with: see above for what to do")]
     #[cfg(feature = "camera")]
     NotReady(String),
     /// A picture or a recording cannot be read or written.
     #[error(transparent)]
     Recording(RecordingError),
-    /// The settings make no look.
+    /// The settings do not form a valid look.
     #[error(transparent)]
     Look(#[from] LookError),
     #[error(transparent)]
     Capture(#[from] CaptureError),
-    /// There is no depth.
+    /// Depth cannot be computed.
     #[error(transparent)]
     Depth(#[from] DepthError),
-    /// The calibration of two eyes cannot be used.
+    /// The stereo calibration cannot be used.
     #[error(transparent)]
     Calibration(#[from] CalibrationError),
     /// The source cannot be opened.
@@ -127,7 +127,7 @@ pub enum CliError {
 impl From<RecordingError> for CliError {
     fn from(error: RecordingError) -> Self {
         match error {
-            // Here it is known what the way to overwrite is called.
+            // This error names the command line's `--force`.
             RecordingError::Exists { path } => CliError::Exists(path),
             other => CliError::Recording(other),
         }
@@ -135,13 +135,13 @@ impl From<RecordingError> for CliError {
 }
 
 impl CliError {
-    /// For `map_err`: adds the file's path to an I/O error.
+    /// Returns a converter for `map_err` that adds the file's path to an I/O error.
     pub fn io(path: &Path) -> impl FnOnce(io::Error) -> Self {
         let path = path.to_owned();
         move |source| CliError::Io { path, source }
     }
 
-    /// Whether the caller has to write something differently.
+    /// Whether the command line is at fault.
     pub fn is_wrong_argument(&self) -> bool {
         if let CliError::Source(error) = self {
             return error.is_wrong_argument();
@@ -155,12 +155,12 @@ impl CliError {
         )
     }
 
-    /// 2 for what the caller has to write differently, else 1.
+    /// Returns 2 if the command line is at fault, else 1.
     pub fn exit_code(&self) -> ExitCode {
         if self.is_wrong_argument() { ExitCode::from(2) } else { ExitCode::FAILURE }
     }
 
-    /// Whether its cause is that the reader of our output went away, as in `... | head`: that is no failure.
+    /// Whether the reader of the output closed it, as in `... | head`, which is no failure.
     pub fn is_broken_pipe(&self) -> bool {
         let mut cause: Option<&(dyn std::error::Error + 'static)> = Some(self);
         while let Some(error) = cause {

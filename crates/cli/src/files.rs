@@ -1,4 +1,4 @@
-//! Output files: what may be overwritten, and writing them whole or not at all.
+//! Output files: overwrite protection, and atomic writing.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -10,10 +10,10 @@ use super::log;
 use bokehcam::files::input::no_file_at;
 use bokehcam::files::{place, whole};
 
-/// Refuses to replace files, unless with `--force`.
+/// Refuses to replace files without `--force`.
 ///
 /// # Errors
-/// [`CliError::Exists`] when one of `paths` exists and `force` is not given; [`CliError::Usage`] when it is no file.
+/// [`CliError::Exists`] if one of `paths` exists and `force` is not set; [`CliError::Usage`] if it is not a file.
 pub fn refuse_overwrite<'a>(paths: impl IntoIterator<Item = &'a Path>, force: bool) -> Result<(), CliError> {
     for path in paths {
         if let Some(what) = no_file_at(path) {
@@ -29,10 +29,10 @@ pub fn refuse_overwrite<'a>(paths: impl IntoIterator<Item = &'a Path>, force: bo
     Ok(())
 }
 
-/// Refuses to write over what is read, whatever links lead there.
+/// Refuses to overwrite an input, also through links.
 ///
 /// # Errors
-/// [`CliError::Usage`] when `target`, which the option `what` names, is `source`, lies in it, or holds it.
+/// [`CliError::Usage`] if `target`, the value of the option `what`, is `source`, lies in it, or contains it.
 pub fn refuse_source(what: &str, target: &Path, source: &Path) -> Result<(), CliError> {
     if !place::overlap(target, source) {
         return Ok(());
@@ -47,10 +47,10 @@ pub fn refuse_source(what: &str, target: &Path, source: &Path) -> Result<(), Cli
     Err(CliError::Usage(format!("{what} {target}: {how} {source}, which is read; choose another place")))
 }
 
-/// Writes a file whole; with `replace`, in place of what is there.
+/// Writes a file atomically; `replace` allows an existing one.
 ///
 /// # Errors
-/// [`CliError::Exists`] where something is there, without `replace`; [`CliError::Io`] when the folder cannot be written.
+/// [`CliError::Exists`] if the file exists without `replace`; [`CliError::Io`] if it cannot be written.
 pub fn write_whole(path: &Path, bytes: &[u8], replace: bool) -> Result<(), CliError> {
     whole::write(path, bytes, replace).map_err(|error| match error.kind() {
         ErrorKind::AlreadyExists => CliError::Exists(path.to_owned()),
@@ -58,10 +58,10 @@ pub fn write_whole(path: &Path, bytes: &[u8], replace: bool) -> Result<(), CliEr
     })
 }
 
-/// Makes the folder that `path` is to be in.
+/// Creates the parent folder of `path`.
 ///
 /// # Errors
-/// [`CliError::Io`] when it cannot be made.
+/// [`CliError::Io`] if it cannot be created.
 pub fn make_folder_of(path: &Path) -> Result<(), CliError> {
     match path.parent().filter(|folder| !folder.as_os_str().is_empty()) {
         Some(folder) => fs::create_dir_all(folder).map_err(CliError::io(folder)),
@@ -69,9 +69,9 @@ pub fn make_folder_of(path: &Path) -> Result<(), CliError> {
     }
 }
 
-/// Says what runs that were killed left hidden in the folders of `paths`. It is left to the user: where nodes share a
-/// folder and not its locks, a file that seems to be left behind may be one that another run is writing.
-pub fn tell_of_leftovers<'a>(paths: impl IntoIterator<Item = &'a Path>) {
+/// Warns of hidden files that killed runs left in the folders of `paths`. Removing them is left to the user: where
+/// machines share a folder but not its locks, another run may still be writing one.
+pub fn report_leftovers<'a>(paths: impl IntoIterator<Item = &'a Path>) {
     let folder_of = |path: &'a Path| match path.parent() {
         _ if path.is_dir() => path,
         Some(folder) if !folder.as_os_str().is_empty() => folder,

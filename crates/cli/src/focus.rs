@@ -1,4 +1,4 @@
-//! Whether a focus in metres and a depth map speak of the same distances.
+//! Checks a focus in metres against the distances of a depth map.
 
 use super::log;
 use bokehcam::depth::focus::FocusRule;
@@ -6,13 +6,13 @@ use bokehcam::frame::DepthMap;
 use bokehcam::look::{CocRule, Look};
 use bokehcam::optics::{CocField, DepthCoc};
 
-/// So much of a map on one side of the focal plane, and blurred, is all of it: the rest is noise.
-const NEARLY_ALL: f32 = 0.99;
-/// What has a smaller radius is sharp, in pixels.
-const SHARP_PX: f32 = 1.0;
+/// Fraction of a map that must be blurred on one side of the focal plane to count as all of it: the rest is noise.
+const MIN_BLURRED_FRACTION: f32 = 0.99;
+/// CoC radius up to which a pixel is sharp, in pixels.
+const MAX_SHARP_PX: f32 = 1.0;
 
-/// Warns of a focus in metres that nothing in `map` is near, and of a map that knows no distance; `in_units` says that
-/// `--depth-scale` makes metres of it. The picture has `size` pixels.
+/// Warns of a focus in metres that nothing in `map` is near, and of a map without known depth; `in_units` is true if
+/// `--depth-scale` converts it to metres. `size` is that of the picture, in pixels.
 pub fn warn_of_focus(look: &Look, size: (u32, u32), map: &DepthMap, in_units: bool) {
     let (FocusRule::Metres(focus_m), CocRule::Depth { lens, range_m, max_coc_px, .. }) =
         (look.focus, look.coc_rule(size))
@@ -27,25 +27,25 @@ pub fn warn_of_focus(look: &Look, size: (u32, u32), map: &DepthMap, in_units: bo
     }
 }
 
-/// Why nothing is sharp, where that is so.
+/// Describes why nothing is sharp, if so.
 fn out_of_focus(coc: &DepthCoc, map: &DepthMap) -> Option<String> {
     let mut known: Vec<f32> = map.metres.iter().copied().filter(|&metres| DepthMap::is_known(metres)).collect();
     if known.is_empty() {
         return Some("no depth is known anywhere".to_string());
     }
-    let share = |is_there: &dyn Fn(f32) -> bool| {
-        known.iter().filter(|&&metres| is_there(coc.coc_px(metres))).count() as f32 / known.len() as f32
+    let fraction = |is_side: &dyn Fn(f32) -> bool| {
+        known.iter().filter(|&&metres| is_side(coc.coc_px(metres))).count() as f32 / known.len() as f32
     };
-    let side = match (share(&|coc_px| coc_px > SHARP_PX), share(&|coc_px| coc_px < -SHARP_PX)) {
-        (behind, _) if behind >= NEARLY_ALL => "beyond",
-        (_, before) if before >= NEARLY_ALL => "before",
+    let side = match (fraction(&|coc_px| coc_px > MAX_SHARP_PX), fraction(&|coc_px| coc_px < -MAX_SHARP_PX)) {
+        (behind, _) if behind >= MIN_BLURRED_FRACTION => "beyond",
+        (_, before) if before >= MIN_BLURRED_FRACTION => "before",
         _ => return None,
     };
-    let mut at = |share: f32| {
-        let index = (share * (known.len() - 1) as f32).round() as usize;
+    let mut quantile_m = |fraction: f32| {
+        let index = (fraction * (known.len() - 1) as f32).round() as usize;
         *known.select_nth_unstable_by(index, f32::total_cmp).1
     };
-    let (nearest_m, farthest_m) = (at(1.0 - NEARLY_ALL), at(NEARLY_ALL));
+    let (nearest_m, farthest_m) = (quantile_m(1.0 - MIN_BLURRED_FRACTION), quantile_m(MIN_BLURRED_FRACTION));
     Some(format!(
         "the depth lies from {nearest_m:.3} to {farthest_m:.3} m, all of it {side} that, and nothing is sharp"
     ))

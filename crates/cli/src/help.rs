@@ -1,14 +1,14 @@
-//! The pages of help: the first has the options that most people need, and `--help-all` shows all.
+//! Help pages: the first one has the common options, and `--help-all` shows all.
 
 use clap::{Arg, Command, Id};
 
-use super::settings::table::{GIVEN_TO_WINDOW, STATED_BY_WINDOW, all_settings};
+use super::settings::table::{WINDOW_START, WINDOW_STATE, all_settings};
 
-/// The option that shows all of them.
+/// Option that shows all pages.
 pub const ALL: &str = "--help-all";
 
-/// The settings on the first page of a command that has them. A window's are on that of a window alone.
-const FIRST: [&str; 20] = [
+/// Settings on the first page of each command that has them; those of a window only for `preview`.
+const FIRST_PAGE: [&str; 20] = [
     "size",
     "fps",
     "loop",
@@ -30,16 +30,16 @@ const FIRST: [&str; 20] = [
     "force",
     "full-screen",
 ];
-/// Others that single commands have there.
-const ALSO: [(&str, &[&str]); 5] = [
+/// Further settings on the first page of single commands.
+const FIRST_PAGE_EXTRA: [(&str, &[&str]); 5] = [
     ("preview", &["split", "instruments", "fresh"]),
     ("render", &["depth-unit", "depth-scale", "tilt"]),
     ("record", &["start", "end", "depth-scale"]),
     ("dump", &["backend", "threads"]),
     ("save", &["backend", "threads"]),
 ];
-/// Options of single commands that are no settings, or that settings are of less use to, and not on their first page.
-const LESS: [(&str, &[&str]); 6] = [
+/// Options of single commands that are not on their first page: not settings, or of little use there.
+const LATER_PAGES: [(&str, &[&str]); 6] = [
     ("stream", &["name", "tray"]),
     ("preview", &["name", "loop", "frames", "on-demand"]),
     ("render", &["debug-dir"]),
@@ -47,10 +47,10 @@ const LESS: [(&str, &[&str]); 6] = [
     ("plate", &["loop", "frames"]),
     ("bokehcam", &["log-format", "config"]),
 ];
-/// What a picture on its own has no use for.
-const OF_STREAMS: [&str; 3] = ["follow", "background-memory", "depth-calibration"];
+/// Settings without use for a single picture.
+const STREAM_ONLY: [&str; 3] = ["follow", "background-memory", "depth-calibration"];
 
-/// Where depth comes from, for streams.
+/// Help of `--depth` for streams.
 pub const DEPTH: &str = "\
 Where depth comes from:
   auto          the source's own; a lone camera's or photo's from an installed network
@@ -64,8 +64,8 @@ Where depth comes from:
   FOLDER        a recording, whose depth is played in a loop
   CAMERA        a depth camera: /dev/videoN, N, or part of its name";
 
-/// The same for a picture on its own.
-const DEPTH_OF_PICTURE: &str = "\
+/// Help of `--depth` for a single picture.
+const PICTURE_DEPTH: &str = "\
 Where depth comes from:
   auto          NAME-depth.png or .pfm beside the picture NAME, else an installed network
   recorded      the file beside it alone
@@ -75,23 +75,23 @@ Where depth comes from:
   plate:FILE    a picture of what is behind the person
   defocus       how sharp the picture is where, which is magnified";
 
-/// Settings of which less is to be said where there is but one picture.
-const OF_PICTURE: [(&str, &str); 4] = [
+/// Settings with a shorter help for a single picture.
+const PICTURE_HELP: [(&str, &str); 4] = [
     ("quality", "Quality level: changes fidelity, never the amount of blur"),
     ("refine", "Whether depth is fitted to the picture: edges onto colour edges, less noise"),
     ("threads", "Threads of the CPU backend [default: one per core]"),
     ("depth-scale", "Units of a 16-bit depth picture per metre (TUM 5000, millimetres 1000) [default: 5000]"),
 ];
 
-/// A command's help as it is where all of its options are shown.
-pub fn whole(command: Command) -> Command {
+/// Sets the help texts of `render`; all options stay visible.
+pub fn full_help(command: Command) -> Command {
     command.mut_subcommand("render", |render| {
         render.mut_args(|arg| match arg.get_long() {
-            Some(name) if OF_STREAMS.contains(&name) => arg.hide(true),
+            Some(name) if STREAM_ONLY.contains(&name) => arg.hide(true),
             Some("depth") => arg
                 .help("Where depth comes from: auto, matte, mono, plate:FILE, defocus or none")
-                .long_help(DEPTH_OF_PICTURE),
-            Some(name) => match OF_PICTURE.iter().find(|(of, _)| *of == name) {
+                .long_help(PICTURE_DEPTH),
+            Some(name) => match PICTURE_HELP.iter().find(|(option, _)| *option == name) {
                 Some((_, help)) => arg.help(*help),
                 None => arg,
             },
@@ -100,30 +100,30 @@ pub fn whole(command: Command) -> Command {
     })
 }
 
-/// The same with the options hidden that are not on the first pages.
-pub fn first(command: Command) -> Command {
+/// Hides the options that are not on the first pages.
+pub fn short_help(command: Command) -> Command {
     let settings = all_settings();
     let ids: Vec<&Id> = settings.get_arguments().map(Arg::get_id).collect();
-    page(command, &ids)
+    hide_options(command, &ids)
 }
 
-fn page(command: Command, settings: &[&Id]) -> Command {
+fn hide_options(command: Command, settings: &[&Id]) -> Command {
     let name = command.get_name().to_owned();
-    let listed = |table: &[(&str, &[&str])], option: &str| {
+    let is_in = |table: &[(&str, &[&str])], option: &str| {
         table.iter().any(|(command, options)| *command == name && options.contains(&option))
     };
-    let is_windows = |option: &str| STATED_BY_WINDOW.contains(&option) || GIVEN_TO_WINDOW.contains(&option);
-    let is_first = |option: &str| FIRST.contains(&option) && (name == "preview" || !is_windows(option));
+    let is_windows = |option: &str| WINDOW_STATE.contains(&option) || WINDOW_START.contains(&option);
+    let is_first = |option: &str| FIRST_PAGE.contains(&option) && (name == "preview" || !is_windows(option));
     let is_more = |arg: &Arg| {
         let option = arg.get_long().unwrap_or_default();
-        let is_listed = !settings.contains(&arg.get_id()) || is_first(option) || listed(&ALSO, option);
-        !arg.is_hide_set() && (!is_listed || listed(&LESS, option))
+        let is_listed = !settings.contains(&arg.get_id()) || is_first(option) || is_in(&FIRST_PAGE_EXTRA, option);
+        !arg.is_hide_set() && (!is_listed || is_in(&LATER_PAGES, option))
     };
     let more = command.get_arguments().filter(|arg| is_more(arg)).count();
     let command = command.mut_args(|arg| if is_more(&arg) { arg.hide(true) } else { arg });
     let rest = command.get_after_help().map(ToString::to_string).unwrap_or_default();
     let command = if more == 0 { command } else { command.after_help(format!("{more} more options: {ALL}\n\n{rest}")) };
-    command.mut_subcommands(|below| page(below, settings))
+    command.mut_subcommands(|subcommand| hide_options(subcommand, settings))
 }
 
 #[cfg(test)]
@@ -132,14 +132,14 @@ mod tests {
     use crate::commands::Cli;
     use clap::CommandFactory;
 
-    fn shown(command: &Command) -> Vec<String> {
+    fn visible_options(command: &Command) -> Vec<String> {
         let shown = command.get_arguments().filter(|arg| !arg.is_hide_set());
         shown.filter_map(|arg| arg.get_long().map(str::to_owned)).collect()
     }
 
-    /// The built command `path`, on its first page and whole.
+    /// Builds the command `path` with its first page only, and with all options.
     fn pages(path: &[&str]) -> [Command; 2] {
-        [first(whole(Cli::command())), whole(Cli::command())].map(|mut command| {
+        [short_help(full_help(Cli::command())), full_help(Cli::command())].map(|mut command| {
             command.build();
             path.iter().fold(command, |command, name| command.find_subcommand(name).unwrap().clone())
         })
@@ -163,21 +163,21 @@ mod tests {
                 continue;
             }
             let [few, all] = pages(path);
-            let (few, all) = (shown(&few), shown(&all));
+            let (few, all) = (visible_options(&few), visible_options(&all));
             assert!(few.len() <= 25, "{path:?}: {} of {}: {few:?}", few.len(), all.len());
             assert!(few.iter().all(|option| all.contains(option)), "{path:?}");
             let command = pages(path)[1].clone();
-            let useless = |option: &str| path == ["render"] && OF_STREAMS.contains(&option);
+            let useless = |option: &str| path == ["render"] && STREAM_ONLY.contains(&option);
             for option in command.get_arguments().filter_map(Arg::get_long) {
                 assert!(all.iter().any(|shown| shown == option) || useless(option), "{path:?}: {option}");
             }
         }
-        assert!(shown(&pages(&["ctl", "on"])[0]).len() <= 5);
+        assert!(visible_options(&pages(&["ctl", "on"])[0]).len() <= 5);
     }
 
     #[test]
     fn every_option_of_the_tables_is_there() {
-        for (name, options) in ALSO.iter().chain(&LESS) {
+        for (name, options) in FIRST_PAGE_EXTRA.iter().chain(&LATER_PAGES) {
             let path: &[&str] = match *name {
                 "bokehcam" => &[],
                 "dump" | "save" => &["config", name],

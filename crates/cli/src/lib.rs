@@ -1,4 +1,4 @@
-//! The command line: arguments to options, and one function per command.
+//! The command line: parses arguments and settings; one module per command.
 
 #![allow(missing_docs)]
 
@@ -31,25 +31,25 @@ use settings::file::SettingsFile;
 use settings::layers::Layers;
 use settings::{arguments, environment};
 
-/// Runs the program. What goes wrong becomes one line on stderr and an exit code: 1 at run time, 2 in the arguments.
+/// Runs the program. An error becomes one line on stderr and an exit code: 1 for failures, 2 for wrong arguments.
 pub fn run(args: impl IntoIterator<Item = OsString>) -> ExitCode {
     let args: Vec<OsString> = args.into_iter().collect();
     #[cfg(feature = "networks")]
-    if networks_apart::is_asked_for(&args) {
+    if networks_apart::is_worker_call(&args) {
         return networks_apart::serve();
     }
-    let args = arguments::joined(args);
+    let args = arguments::join_negative_numbers(args);
     #[cfg(feature = "lab")]
     bokehcam_lab::synthetic::bring();
-    log::tell_of_panics();
-    log::write_as(arguments::log_format(&args));
-    let code = run_to_end(&args);
+    log::install_panic_hook();
+    log::set_format(arguments::log_format(&args));
+    let code = run_command(&args);
     log::flush();
     code
 }
 
-/// Parses the arguments and runs the command; what it logs may still be waiting to be printed afterwards.
-fn run_to_end(args: &[OsString]) -> ExitCode {
+/// Parses the arguments and runs the command; log lines may still be queued afterwards.
+fn run_command(args: &[OsString]) -> ExitCode {
     let fail = |error: &CliError, from: Option<(&SettingsFile, &Layers)>| {
         log::error(&environment::with_origin(&error.to_string(), args, error.is_wrong_argument(), from));
         error.exit_code()
@@ -63,9 +63,9 @@ fn run_to_end(args: &[OsString]) -> ExitCode {
     #[cfg(feature = "networks")]
     bokehcam::network::apart::make_possible();
     environment::warn_of_unknown();
-    match commands::perform(cli, &matches, &file, &layers) {
+    match commands::run(cli, &matches, &file, &layers) {
         Ok(()) => ExitCode::SUCCESS,
-        // Whoever read our output has seen enough.
+        // The reader of our output closed it: no failure.
         Err(error) if error.is_broken_pipe() => ExitCode::SUCCESS,
         Err(error) => fail(&error, Some((&file, &layers))),
     }

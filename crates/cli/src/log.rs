@@ -1,4 +1,4 @@
-//! Everything that goes to stderr: log lines, messages, errors; as text, or as one JSON object a line.
+//! Output to stderr: log lines, messages, errors; as text, or as one JSON object per line.
 //!
 //! All of it goes through one [`Screen`].
 
@@ -21,25 +21,25 @@ use tracing_subscriber::registry::LookupSpan;
 use super::options::{Global, LogFormat};
 use super::screen::Screen;
 
-/// How messages are written; text until [`start`] says otherwise.
+/// Whether messages are JSON; text until [`set_format`].
 static JSON: AtomicBool = AtomicBool::new(false);
 static QUIET: AtomicBool = AtomicBool::new(false);
 
 /// The only writer to stderr, shared by all threads.
 pub fn screen() -> &'static Screen {
     static SCREEN: OnceLock<Screen> = OnceLock::new();
-    let lost = |lines: u64| encoded("WARN", &format!("{lines} lines are missing: the terminal took none for too long"));
+    let lost = |lines: u64| encode("WARN", &format!("{lines} lines are missing: the terminal took none for too long"));
     SCREEN.get_or_init(|| Screen::new(io::stderr(), lost))
 }
 
-/// Chooses how messages are written: also for what is wrong before the arguments are understood.
-pub fn write_as(format: LogFormat) {
+/// Sets the format of messages, also for errors before the arguments are parsed.
+pub fn set_format(format: LogFormat) {
     JSON.store(format == LogFormat::Json, Ordering::Relaxed);
 }
 
-/// Installs the logger. Its level comes from `RUST_LOG`, else from `-v` or `-q`, else it is that of warnings.
+/// Installs the logger. Its level comes from `RUST_LOG`, else from `-v` or `-q`, else it is `warn`.
 pub fn start(global: &Global) {
-    write_as(global.log_format);
+    set_format(global.log_format);
     QUIET.store(global.quiet, Ordering::Relaxed);
     let level = match (global.quiet, global.verbose) {
         (true, _) => "error",
@@ -49,102 +49,102 @@ pub fn start(global: &Global) {
         (_, 1) => "bokehcam=info,warn",
         (_, _) => "bokehcam=debug,info",
     };
-    let asked_for = std::env::var("RUST_LOG").ok().filter(|text| !text.is_empty());
+    let from_env = std::env::var("RUST_LOG").ok().filter(|text| !text.is_empty());
     let filter: Targets =
-        asked_for.and_then(|text| text.parse().ok()).or_else(|| level.parse().ok()).unwrap_or_default();
+        from_env.and_then(|text| text.parse().ok()).or_else(|| level.parse().ok()).unwrap_or_default();
     let no_color = std::env::var_os("NO_COLOR").is_some_and(|value| !value.is_empty());
     let log = tracing_subscriber::fmt::layer().with_writer(LogLines);
     let full = tracing_subscriber::fmt::format();
     let log = log.with_ansi(io::stderr().is_terminal() && !no_color);
     let all = tracing_subscriber::registry();
-    // It fails if there is a logger already, as in tests; that one stays.
+    // Fails if a logger is installed already, as in tests; that one stays.
     let _ = match global.log_format {
-        LogFormat::Text => all.with(log.event_format(ForPeople(full)).with_filter(filter)).try_init(),
+        LogFormat::Text => all.with(log.event_format(PlainFormat(full)).with_filter(filter)).try_init(),
         LogFormat::Json => all.with(log.json().with_filter(filter)).try_init(),
     };
 }
 
-/// A message of one or more lines.
+/// Prints a message of one or more lines.
 pub fn say(text: &str) {
-    message("INFO", text);
+    print_message("INFO", text);
 }
 
-/// A warning, unless `--quiet` is given.
+/// Prints a warning, unless `--quiet` is given.
 pub fn warn(what: &str) {
-    remark("WARN", "warning", what);
+    print_remark("WARN", "warning", what);
 }
 
-/// What is done that was not asked for, unless `--quiet` is given.
+/// Prints a note on an automatic action, unless `--quiet` is given.
 pub fn note(what: &str) {
-    remark("INFO", "note", what);
+    print_remark("INFO", "note", what);
 }
 
-fn remark(level: &str, name: &str, what: &str) {
+fn print_remark(level: &str, name: &str, what: &str) {
     match JSON.load(Ordering::Relaxed) {
         _ if QUIET.load(Ordering::Relaxed) => {}
-        true => message(level, what),
-        false => message(level, &format!("{name}: {}", printable(what, &[]))),
+        true => print_message(level, what),
+        false => print_message(level, &format!("{name}: {}", escape_controls(what, &[]))),
     }
 }
 
-/// What went wrong, in one line.
+/// Prints an error in one line.
 pub fn error(what: &str) {
     match JSON.load(Ordering::Relaxed) {
-        true => message("ERROR", what),
-        false => message("ERROR", &format!("error: {}", printable(what, &[]))),
+        true => print_message("ERROR", what),
+        false => print_message("ERROR", &format!("error: {}", escape_controls(what, &[]))),
     }
 }
 
-fn message(level: &str, text: &str) {
-    screen().print(encoded(level, text).as_bytes());
+fn print_message(level: &str, text: &str) {
+    screen().print(encode(level, text).as_bytes());
 }
 
-/// Most characters of a line that are printed: names and values of others may be of any length.
-const MOST_CHARS: usize = 1000;
-/// Of a longer line, so many at its end.
-const LAST_CHARS: usize = 300;
+/// Maximum length of a printed line, in characters: file names and values may have any length.
+const MAX_CHARS: usize = 1000;
+/// Characters kept at the end of a longer line.
+const TAIL_CHARS: usize = 300;
 
-/// A text whose lines are at most [`MOST_CHARS`] long: of longer ones the start and the end, and how much is left out between.
-fn cut(text: &str) -> Cow<'_, str> {
-    // A character has a byte at least.
-    if text.split('\n').all(|line| line.len() <= MOST_CHARS) {
+/// Shortens lines longer than [`MAX_CHARS`] to their start and end, with the number of omitted characters between.
+fn shorten_lines(text: &str) -> Cow<'_, str> {
+    // A line has at most as many characters as bytes.
+    if text.split('\n').all(|line| line.len() <= MAX_CHARS) {
         return text.into();
     }
-    let cut = |line: &str| {
+    let shorten = |line: &str| {
         let chars = line.chars().count();
-        if chars <= MOST_CHARS {
+        if chars <= MAX_CHARS {
             return line.to_owned();
         }
         let place = |at: usize| line.char_indices().nth(at).map_or(line.len(), |(place, _)| place);
-        let (first, last) = (MOST_CHARS - LAST_CHARS, chars - LAST_CHARS);
+        let (first, last) = (MAX_CHARS - TAIL_CHARS, chars - TAIL_CHARS);
         format!("{} ... ({} characters) ... {}", &line[..place(first)], last - first, &line[place(last)..])
     };
-    text.split('\n').map(cut).collect::<Vec<_>>().join("\n").into()
+    text.split('\n').map(shorten).collect::<Vec<_>>().join("\n").into()
 }
 
-/// A message as it is printed, with its line end: as text, or as a JSON object in the logger's own form.
-fn encoded(level: &str, text: &str) -> String {
-    let text = &*cut(text);
+/// Formats a message with its line end: as text, or as a JSON object in the logger's own form.
+fn encode(level: &str, text: &str) -> String {
+    let text = &*shorten_lines(text);
     if !JSON.load(Ordering::Relaxed) {
-        return format!("{}\n", printable(text, &['\n']));
+        return format!("{}\n", escape_controls(text, &['\n']));
     }
     let mut timestamp = String::new();
-    // It fails only without a clock: then the time stays empty.
+    // Fails only without a clock: then the time stays empty.
     let _ = SystemTime.format_time(&mut Writer::new(&mut timestamp));
     let object = json!({"timestamp": timestamp, "level": level, "fields": {"message": text}, "target": "bokehcam"});
     format!("{object}\n")
 }
 
-/// Waits until everything that was said is written, but not for a terminal that takes nothing.
+/// Waits until all messages are written, but not for a stalled terminal.
 pub fn flush() {
     screen().flush();
 }
 
-/// Makes panics go through [`screen`], too: a thread that panics must neither wait for the terminal nor keep others
-/// waiting for it.
-pub fn tell_of_panics() {
+/// Installs a panic hook that prints through [`screen`]: a panicking thread must neither wait for the terminal nor
+/// block others.
+pub fn install_panic_hook() {
     std::panic::set_hook(Box::new(|panic| {
-        // It is caught, and becomes an error that is reported elsewhere.
+        // The panic is caught and reported as an error elsewhere.
         if bokehcam::compute::is_catching_panics() {
             return;
         }
@@ -152,31 +152,32 @@ pub fn tell_of_panics() {
         let backtrace = std::backtrace::Backtrace::capture();
         let text = format!("thread '{}' {panic}", thread.name().unwrap_or("unnamed"));
         match backtrace.status() {
-            std::backtrace::BacktraceStatus::Captured => message("ERROR", &format!("{text}\n{backtrace}")),
-            _ => message("ERROR", &text),
+            std::backtrace::BacktraceStatus::Captured => print_message("ERROR", &format!("{text}\n{backtrace}")),
+            _ => print_message("ERROR", &text),
         }
     }));
 }
 
-/// Escapes, as in Rust source, control characters and those that change the direction of writing, except `keep`: names
-/// of files and devices may hold anything, and a terminal obeys what it is sent.
-pub fn printable<'a>(text: &'a str, keep: &[char]) -> Cow<'a, str> {
+/// Escapes, as in Rust source, control and bidirectional formatting characters, except `keep`: names of files and
+/// devices may contain any character, and a terminal would execute them.
+pub fn escape_controls<'a>(text: &'a str, keep: &[char]) -> Cow<'a, str> {
     let is_bidi = |c: char| matches!(c, '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}');
-    let risky = |c: char| (c.is_control() || is_bidi(c) || matches!(c, '\u{2028}' | '\u{2029}')) && !keep.contains(&c);
-    if !text.contains(risky) {
+    let is_separator = |c: char| matches!(c, '\u{2028}' | '\u{2029}');
+    let is_risky = |c: char| (c.is_control() || is_bidi(c) || is_separator(c)) && !keep.contains(&c);
+    if !text.contains(is_risky) {
         return text.into();
     }
     let mut escaped = String::with_capacity(text.len() + 8);
     for c in text.chars() {
-        if risky(c) { escaped.extend(c.escape_default()) } else { escaped.push(c) }
+        if is_risky(c) { escaped.extend(c.escape_default()) } else { escaped.push(c) }
     }
     escaped.into()
 }
 
-/// Our own warnings and errors as messages are written; all else with its time and place.
-struct ForPeople(Format);
+/// Formats this program's warnings and errors like messages, and all other events with time and target.
+struct PlainFormat(Format);
 
-impl<S, N> FormatEvent<S, N> for ForPeople
+impl<S, N> FormatEvent<S, N> for PlainFormat
 where
     S: Subscriber + for<'a> LookupSpan<'a>,
     N: for<'a> FormatFields<'a> + 'static,
@@ -195,10 +196,10 @@ where
     }
 }
 
-/// Collects each event of the logger in one [`LogLine`].
+/// Creates one [`LogLine`] per event of the logger.
 struct LogLines;
 
-/// The text of one event, printed as a whole when it is dropped.
+/// Text of one event, printed as a whole on drop.
 struct LogLine(Vec<u8>);
 
 impl MakeWriter<'_> for LogLines {
@@ -228,21 +229,21 @@ impl Drop for LogLine {
         {
             let fields = object["fields"].as_object_mut().into_iter().flat_map(|fields| fields.values_mut());
             for value in fields {
-                if let Some(text) = value.as_str().map(|text| cut(text).into_owned()) {
+                if let Some(text) = value.as_str().map(|text| shorten_lines(text).into_owned()) {
                     *value = text.into();
                 }
             }
             return screen().print(format!("{object}\n").as_bytes());
         }
-        let text = cut(text.trim_end_matches('\n'));
-        // The logger's colours need the escape character; it has already escaped those in the texts it was given.
-        let line = printable(&text, &['\x1b']);
+        let text = shorten_lines(text.trim_end_matches('\n'));
+        // The logger's colours need the escape character; it has already escaped those in its field values.
+        let line = escape_controls(&text, &['\x1b']);
         screen().print(format!("{line}\n").as_bytes());
     }
 }
 
-/// clap's message of several paragraphs as one line, without its usage and help hints; without a tip, too, where all values
-/// are listed.
+/// Joins clap's message of several paragraphs to one line, without usage and help hints, and without a tip if all
+/// values are listed.
 pub fn one_line(error: &clap::Error) -> String {
     let text = error.render().to_string();
     let is_hint = |line: &&str| {
@@ -255,7 +256,7 @@ pub fn one_line(error: &clap::Error) -> String {
         let separator = match sentence.chars().last() {
             None => "",
             Some(':' | '.') => " ",
-            // A list of possible values belongs to what is before it.
+            // A list of possible values continues the previous line.
             Some(_) if line.starts_with('[') => " ",
             Some(_) => "; ",
         };
@@ -271,20 +272,21 @@ mod tests {
 
     #[test]
     fn of_a_long_line_its_start_and_its_end_are_printed() {
-        assert!(matches!(cut(&"x".repeat(MOST_CHARS)), Cow::Borrowed(_)));
+        assert!(matches!(shorten_lines(&"x".repeat(MAX_CHARS)), Cow::Borrowed(_)));
         let name = "ä".repeat(50_000);
         let text = format!("short\nrgb.txt:7: {name}.png is missing\n");
-        let lines: Vec<String> = cut(&text).lines().map(str::to_owned).collect();
+        let lines: Vec<String> = shorten_lines(&text).lines().map(str::to_owned).collect();
         assert_eq!((lines.len(), lines[0].as_str()), (2, "short"));
         assert!(lines[1].starts_with("rgb.txt:7: ää") && lines[1].ends_with("ä.png is missing"), "{}", lines[1]);
         assert!(lines[1].contains("ä ... (49026 characters) ... ä"), "{}", lines[1]);
-        assert!(lines[1].chars().count() < MOST_CHARS + 40 && text.ends_with('\n') && cut(&text).ends_with('\n'));
+        assert!(lines[1].chars().count() < MAX_CHARS + 40);
+        assert!(text.ends_with('\n') && shorten_lines(&text).ends_with('\n'));
     }
 
     #[test]
     fn what_a_terminal_would_obey_is_spelt_out() {
-        assert_eq!(printable("a\x1b[2Jb\u{9b}31m\r\u{202e}\n", &['\n']), "a\\u{1b}[2Jb\\u{9b}31m\\r\\u{202e}\n");
-        assert_eq!(printable("ä 木\n", &[]), "ä 木\\n");
-        assert!(matches!(printable("plain ünïcode", &[]), Cow::Borrowed(_)));
+        assert_eq!(escape_controls("a\x1b[2Jb\u{9b}31m\r\u{202e}\n", &['\n']), "a\\u{1b}[2Jb\\u{9b}31m\\r\\u{202e}\n");
+        assert_eq!(escape_controls("ä 木\n", &[]), "ä 木\\n");
+        assert!(matches!(escape_controls("plain ünïcode", &[]), Cow::Borrowed(_)));
     }
 }

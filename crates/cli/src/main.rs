@@ -1,4 +1,4 @@
-//! Arguments in, exit code out.
+//! The program: runs the command line of this library.
 
 use std::process::ExitCode;
 

@@ -1,18 +1,18 @@
-//! This program as the process that runs a network for another one of it.
+//! This program as the worker process that runs a network for another instance.
 
 use std::ffi::OsString;
 use std::process::ExitCode;
 
 use bokehcam::network::apart;
 
-/// Whether it was started for that.
-pub fn is_asked_for(args: &[OsString]) -> bool {
+/// Whether the arguments start the worker process.
+pub fn is_worker_call(args: &[OsString]) -> bool {
     matches!(args, [_, argument] if argument == apart::ARGUMENT)
 }
 
-/// Runs the network until nobody wants its answers.
+/// Runs the network until the parent process stops reading.
 pub fn serve() -> ExitCode {
-    // A signal is for the program that waits for the answers: this one ends with it.
+    // Signals are for the parent process: this one ends with it.
     let ignored = ctrlc::set_handler(|| {}).is_ok();
     match apart::serve() {
         Ok(()) if ignored => ExitCode::SUCCESS,

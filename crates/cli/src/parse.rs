@@ -1,4 +1,4 @@
-//! From arguments to a command with its settings.
+//! Parsing of arguments to a command with its settings.
 
 use std::ffi::OsString;
 use std::path::Path;
@@ -12,7 +12,7 @@ use super::settings::file::SettingsFile;
 use super::settings::layers::Layers;
 use super::settings::{save, table};
 
-/// Why arguments are no command.
+/// Error of parsing, by its origin.
 pub enum Refusal {
     Arguments(clap::Error),
     Settings(CliError),
@@ -24,7 +24,7 @@ impl From<clap::Error> for Refusal {
     }
 }
 
-/// A parsed command line, and the settings that come from elsewhere.
+/// A parsed command line, and the settings from other layers.
 pub struct Parsed {
     pub cli: Cli,
     pub matches: ArgMatches,
@@ -34,23 +34,23 @@ pub struct Parsed {
 
 /// Parses arguments together with the environment, preset, snapshot and settings file that apply.
 pub fn parse(args: &[OsString]) -> Result<Parsed, Refusal> {
-    let command = help::whole(table::with_environment(Cli::command()));
+    let command = help::full_help(table::with_environment(Cli::command()));
     let wants_all = args.iter().take_while(|arg| *arg != "--").any(|arg| arg == help::ALL);
-    let command = if wants_all { command } else { help::first(command) };
-    // Once without the settings file, to learn its name and the preset's; then again with their values as defaults.
+    let command = if wants_all { command } else { help::short_help(command) };
+    // The first pass finds the settings file and the preset; the second one uses their values as defaults.
     let given = command.clone().try_get_matches_from(args)?;
     let chosen = Cli::from_arg_matches(&given)?.global.config;
-    let file = settings_for(&given, chosen.as_deref()).map_err(Refusal::Settings)?;
-    let layers = Layers::of(&file, &given).map_err(Refusal::Settings)?;
-    let matches = layers.as_defaults(command).try_get_matches_from(args)?;
+    let file = load_settings(&given, chosen.as_deref()).map_err(Refusal::Settings)?;
+    let layers = Layers::resolve(&file, &given).map_err(Refusal::Settings)?;
+    let matches = layers.apply_defaults(command).try_get_matches_from(args)?;
     Ok(Parsed { cli: Cli::from_arg_matches(&matches)?, matches, file, layers })
 }
 
 /// Loads the settings file, with the exceptions of `config save` and `config dump`.
-fn settings_for(given: &ArgMatches, chosen: Option<&Path>) -> Result<SettingsFile, CliError> {
+fn load_settings(given: &ArgMatches, chosen: Option<&Path>) -> Result<SettingsFile, CliError> {
     let config = given.subcommand_matches("config").and_then(ArgMatches::subcommand_name);
     match (config, chosen) {
-        // `config save` creates the file that is named.
+        // `config save` creates the chosen file.
         (Some("save"), Some(path)) if path.symlink_metadata().is_err() => return Ok(SettingsFile::default()),
         (Some("dump"), _) => save::refuse_redirect(chosen)?,
         _ => {}

@@ -5,23 +5,23 @@ use std::path::Path;
 
 use super::CliError;
 use super::commands::{Command, ConfigCommand};
-use super::log::{one_line, printable};
+use super::log::{escape_controls, one_line};
 use super::parse::{Refusal, parse};
-use super::settings::arguments::joined;
+use super::settings::arguments::join_negative_numbers;
 use super::settings::dump;
 use super::settings::file::SettingsFile;
 
-/// Parses a command line. For `config dump` returns what that would print, for other commands an empty text.
+/// Parses a command line. Returns the output of `config dump`, and an empty text for other commands.
 ///
 /// # Errors
-/// The command line is refused: the message that would be printed.
+/// Returns the message for a command line that cannot be parsed.
 pub fn arguments(args: &[OsString]) -> Result<String, String> {
-    let parsed = parse(&joined(args.iter().cloned())).map_err(|refusal| {
+    let parsed = parse(&join_negative_numbers(args.iter().cloned())).map_err(|refusal| {
         let message = match refusal {
             Refusal::Arguments(error) => one_line(&error),
             Refusal::Settings(error) => error.to_string(),
         };
-        printable(&message, &[]).into_owned()
+        escape_controls(&message, &[]).into_owned()
     })?;
     Ok(match parsed.cli.command {
         Command::Config(ConfigCommand::Dump { .. }) => {
@@ -34,7 +34,7 @@ pub fn arguments(args: &[OsString]) -> Result<String, String> {
 /// Parses the text of a settings file, and looks up each preset in it.
 ///
 /// # Errors
-/// It is no settings file.
+/// Fails if the text is not a settings file.
 pub fn settings(path: &Path, text: &str) -> Result<(), CliError> {
     let file = SettingsFile::parse(path, text)?;
     for name in file.presets.keys() {

@@ -1,6 +1,6 @@
-//! Warnings of what can be done and is hardly meant: numbers in the wrong unit, and pictures in the wrong place.
+//! Warnings of valid but implausible input: numbers in the wrong unit, and pictures in the wrong place.
 //!
-//! Each is one line, and nothing is refused for it.
+//! Each is one line, and never an error.
 
 use std::fmt::Display;
 use std::path::Path;
@@ -15,41 +15,42 @@ use bokehcam::optics::{Lens, StereoRig};
 use bokehcam::source::options::DEPTH_SCALE;
 use bokehcam::source::{DepthFrom, OneCamera, Options, PlateFile, Source};
 
-/// Values that differ less from each other are one.
-const ALIKE: f32 = 0.02;
-/// Eyes that stand further apart are those of no camera that is carried or driven.
-const WIDEST_BASELINE_M: f32 = 3.0;
-/// Lenses and sensors of fewer millimetres are given in another unit.
-const LEAST_MM: f32 = 0.5;
-/// Of the pixels of a depth map, sorted, the last ones may be wrong.
-const FARTHEST: f32 = 0.98;
-/// Where all is nearer than this, in metres, a map has another unit than is assumed.
-const NEAR_M: f32 = 1.0;
-/// What is before a plate in more of the picture than this, and has a longer outline for its size, is nobody who stands there.
-const MOST_BEFORE_PLATE: f32 = 0.2;
-const MOST_RAGGED: f32 = 16.0;
+/// Tolerance below which grey values (0 to 1) count as equal.
+const TOLERANCE: f32 = 0.02;
+/// Maximum plausible baseline, in metres, of a camera that is carried or driven.
+const MAX_BASELINE_M: f32 = 3.0;
+/// Minimum plausible size of lens and sensor: smaller values have another unit.
+const MIN_LENS_MM: f32 = 0.5;
+/// Quantile for the largest distance of a map: the farthest pixels may be wrong.
+const FAR_QUANTILE: f32 = 0.98;
+/// If all depth is nearer than this, in metres, the map has another unit than assumed.
+const MIN_FAR_M: f32 = 1.0;
+/// A foreground that covers more of the picture than this and has a more ragged outline is no person in front of the
+/// plate.
+const MAX_FOREGROUND: f32 = 0.2;
+const MAX_RAGGEDNESS: f32 = 16.0;
 
-/// Warns of eyes that stand far apart.
+/// Warns of an implausibly wide baseline.
 pub fn warn_of_baseline(rig: Option<StereoRig>) {
-    rig.and_then(|rig| far_apart(&rig)).iter().for_each(|line| log::warn(line));
+    rig.and_then(|rig| check_baseline(&rig)).iter().for_each(|line| log::warn(line));
 }
 
-fn far_apart(rig: &StereoRig) -> Option<String> {
+fn check_baseline(rig: &StereoRig) -> Option<String> {
     let StereoRig { baseline_m, metric, .. } = *rig;
-    let is_wide = metric && baseline_m > WIDEST_BASELINE_M;
+    let is_wide = metric && baseline_m > MAX_BASELINE_M;
     is_wide.then(|| format!("{baseline_m} m between the eyes; if that is in millimetres, it is {} m", baseline_m / 1e3))
 }
 
-/// Warns of a lens in another unit, or one that cannot be focused as near as it shall.
+/// Warns of a lens in another unit, or one that cannot focus as near as requested.
 pub fn warn_of_lens(look: &Look) {
     let Strength::Lens(lens) = look.strength else { return };
-    odd_lens(&lens, look.focus).iter().for_each(|line| log::warn(line));
+    check_lens(&lens, look.focus).iter().for_each(|line| log::warn(line));
 }
 
-fn odd_lens(lens: &Lens, focus: FocusRule) -> Option<String> {
+fn check_lens(lens: &Lens, focus: FocusRule) -> Option<String> {
     let Lens { focal_length_mm, sensor_width_mm, .. } = *lens;
     let small = [("focal-length", focal_length_mm), ("sensor-width", sensor_width_mm)];
-    if let Some((name, mm)) = small.into_iter().find(|(_, mm)| *mm < LEAST_MM) {
+    if let Some((name, mm)) = small.into_iter().find(|(_, mm)| *mm < MIN_LENS_MM) {
         return Some(format!("--{name} {mm} is in millimetres; if that is in metres, it is {}", mm * 1e3));
     }
     match focus {
@@ -61,7 +62,7 @@ fn odd_lens(lens: &Lens, focus: FocusRule) -> Option<String> {
     }
 }
 
-/// Warns of a scale that is the size of a unit.
+/// Warns of a scale that is the inverse of units per metre.
 pub fn warn_of_depth_scale(scale: Option<f32>) {
     if let Some(scale) = scale.filter(|scale| *scale < 1.0) {
         log::warn(&format!(
@@ -71,89 +72,89 @@ pub fn warn_of_depth_scale(scale: Option<f32>) {
     }
 }
 
-/// Warns of a mask that tells nothing.
+/// Warns of a mask without information.
 pub fn warn_of_mask(file: &Path, mask: &Mask, color: &ColorImage) {
-    odd_mask(mask, color).iter().for_each(|what| log::warn(&format!("{}: {what}", file.display())));
+    check_mask(mask, color).iter().for_each(|what| log::warn(&format!("{}: {what}", file.display())));
 }
 
-fn odd_mask(mask: &Mask, color: &ColorImage) -> Option<&'static str> {
-    let (low, high) = range(&mask.share)?;
+fn check_mask(mask: &Mask, color: &ColorImage) -> Option<&'static str> {
+    let (low, high) = value_range(&mask.share)?;
     match () {
-        () if low > 1.0 - ALIKE => {
+        () if low > 1.0 - TOLERANCE => {
             Some("the mask is white all over: all of the picture is the subject, and stays sharp")
         }
-        () if high < ALIKE => Some("the mask is black all over: there is no subject, and all is blurred"),
-        () if high - low < ALIKE => Some("the mask is one grey all over: it tells no subject from what is behind"),
+        () if high < TOLERANCE => Some("the mask is black all over: there is no subject, and all is blurred"),
+        () if high - low < TOLERANCE => Some("the mask is one grey all over: it tells no subject from what is behind"),
         () if is_picture(&mask.share, mask.width, color) => Some("this is the picture itself, and no mask of it"),
         () => None,
     }
 }
 
-/// The least and the largest of values that are known.
-fn range(values: &[f32]) -> Option<(f32, f32)> {
+/// Returns the smallest and the largest of the known values.
+fn value_range(values: &[f32]) -> Option<(f32, f32)> {
     let mut known = values.iter().copied().filter(|value| value.is_finite());
     let first = known.next()?;
     Some(known.fold((first, first), |(low, high), value| (low.min(value), high.max(value))))
 }
 
-/// Whether values, 0 to 1 and row by row, are how bright the picture is.
+/// Whether the values (0 to 1, row by row) equal the picture's luma.
 fn is_picture(values: &[f32], width: u32, color: &ColorImage) -> bool {
     if width != color.width || values.len() != color.rgb.len() / 3 {
         return false;
     }
-    let sum: f32 = values.iter().zip(greys(color)).map(|(value, grey)| (value - grey).abs()).sum();
-    sum <= 0.5 * ALIKE * values.len() as f32
+    let sum: f32 = values.iter().zip(luma_values(color)).map(|(value, grey)| (value - grey).abs()).sum();
+    sum <= 0.5 * TOLERANCE * values.len() as f32
 }
 
-/// How bright each pixel is when it is read as grey, 0 to 1.
-fn greys(color: &ColorImage) -> impl Iterator<Item = f32> {
+/// Returns the luma of each pixel (0 to 1), from the gamma-encoded codes.
+fn luma_values(color: &ColorImage) -> impl Iterator<Item = f32> {
     color.rgb.as_chunks::<3>().0.iter().map(|pixel| {
         let [r, g, b] = pixel.map(|code| f32::from(code) / 255.0);
         luminance(r, g, b)
     })
 }
 
-/// Warns of depth that knows no distances, or all of them in another unit; `is_stated` says that the unit is known. Whether it
-/// did.
-pub fn warn_of_map(name: &dyn Display, map: &DepthMap, is_stated: bool) -> bool {
-    odd_map(map, is_stated).iter().inspect(|what| log::warn(&format!("{name}: {what}"))).count() > 0
+/// Warns of depth without distances, or with distances in another unit; `is_unit_known` skips the latter. Returns
+/// whether it did.
+pub fn warn_of_map(name: &dyn Display, map: &DepthMap, is_unit_known: bool) -> bool {
+    check_map(map, is_unit_known).iter().inspect(|what| log::warn(&format!("{name}: {what}"))).count() > 0
 }
 
-fn odd_map(map: &DepthMap, is_stated: bool) -> Option<String> {
+fn check_map(map: &DepthMap, is_unit_known: bool) -> Option<String> {
     let mut known: Vec<f32> = map.metres.iter().copied().filter(|&metres| DepthMap::is_known(metres)).collect();
-    let Some((nearest_m, farthest_m)) = range(&known) else {
+    let Some((nearest_m, farthest_m)) = value_range(&known) else {
         return Some("no depth is known anywhere in it".to_owned());
     };
     if farthest_m - nearest_m <= 1e-3 * farthest_m {
         return Some(format!("all of it is {nearest_m:.3} m away, so that nothing is nearer than anything else"));
     }
-    let at = (FARTHEST * (known.len() - 1) as f32) as usize;
+    let at = (FAR_QUANTILE * (known.len() - 1) as f32) as usize;
     let far_m = *known.select_nth_unstable_by(at, f32::total_cmp).1;
-    (!is_stated && far_m < NEAR_M).then(|| {
+    (!is_unit_known && far_m < MIN_FAR_M).then(|| {
         format!(
             "at {DEPTH_SCALE} units per metre all of it is nearer than {far_m:.2} m; if it is in millimetres, add --depth-scale 1000"
         )
     })
 }
 
-/// Warns of inverse depth that has one value only, or is the picture. Whether it did.
+/// Warns of inverse depth that is constant or a copy of the picture. Returns whether it did.
 pub fn warn_of_inverse(name: &dyn Display, map: &DepthMap, color: &ColorImage) -> bool {
-    odd_inverse(map, color).iter().inspect(|what| log::warn(&format!("{name}: {what}"))).count() > 0
+    check_inverse(map, color).iter().inspect(|what| log::warn(&format!("{name}: {what}"))).count() > 0
 }
 
-fn odd_inverse(map: &DepthMap, color: &ColorImage) -> Option<&'static str> {
+fn check_inverse(map: &DepthMap, color: &ColorImage) -> Option<&'static str> {
     let nearness: Vec<f32> = map.metres.iter().map(|&metres| DepthMap::SUBJECT_M / metres).collect();
-    let (low, high) = range(&nearness)?;
+    let (low, high) = value_range(&nearness)?;
     if high - low < 1e-3 {
         return Some("it has one value all over, so that nothing is nearer than anything else");
     }
-    // How it was scaled does not matter: the picture is scaled alike.
-    let greys: Vec<f32> = greys(color).collect();
+    // Pearson's correlation is independent of the map's scale.
+    let greys: Vec<f32> = luma_values(color).collect();
     (map.size() == color.size() && correlation(&nearness, &greys).abs() > 0.999)
         .then_some("this is the picture itself, and no depth of it")
 }
 
-/// How far values go with others, -1 to 1; those that are unknown count for nothing.
+/// Returns Pearson's correlation (-1 to 1) of two lists, ignoring unknown `values`.
 fn correlation(values: &[f32], others: &[f32]) -> f64 {
     let pairs =
         || values.iter().zip(others).filter(|(value, _)| value.is_finite()).map(|(a, b)| [*a, *b].map(f64::from));
@@ -165,29 +166,28 @@ fn correlation(values: &[f32], others: &[f32]) -> f64 {
     ab / (aa * bb).sqrt().max(f64::MIN_POSITIVE)
 }
 
-/// Warns of numbers that a source is opened with, and of its first depth. Whether of that.
+/// Warns of implausible options of a source, and of its first depth. Returns whether it warned of the latter.
 pub fn warn_of_source(source: &Source, look: &Look, options: &Options) -> bool {
     warn_of_lens(look);
     warn_of_depth_scale(options.depth.depth_scale);
-    let is_stated = source.depth_from != DepthFrom::Units || options.depth.depth_scale.is_some();
+    let is_unit_known = source.depth_from != DepthFrom::Units || options.depth.depth_scale.is_some();
     warn_of_baseline(source.rig);
     let has_metres = matches!(source.depth_from, DepthFrom::Units | DepthFrom::Metres);
     source.first_depth.as_ref().filter(|_| has_metres).is_some_and(|map| {
-        warn_of_map(&format!("the first depth picture of {}", source.camera.info().name), map, is_stated)
+        warn_of_map(&format!("the first depth picture of {}", source.camera.info().name), map, is_unit_known)
     })
 }
 
-/// Warns where nobody was found in a picture, or what cannot be a person. Without a choice it was the installed network that
-/// looked.
+/// Warns if no person was found, or an implausible one. `chosen` is `None` for the installed network.
 pub fn warn_of_subject(chosen: Option<&OneCamera>, map: &DepthMap, image: Option<&Path>) {
     let plate = chosen.and_then(|chosen| chosen.plate.as_ref()).and_then(|plate| match plate {
         PlateFile::At(file) => Some(file.as_path()),
         PlateFile::Taken => None,
     });
-    odd_subject(map, plate, image).iter().for_each(|line| log::warn(line));
+    check_subject(map, plate, image).iter().for_each(|line| log::warn(line));
 }
 
-fn odd_subject(map: &DepthMap, plate: Option<&Path>, image: Option<&Path>) -> Option<String> {
+fn check_subject(map: &DepthMap, plate: Option<&Path>, image: Option<&Path>) -> Option<String> {
     let subject_m = map.subject_m?;
     let is_near = |at: usize| map.metres[at] <= subject_m;
     let count = map.metres.len();
@@ -201,7 +201,7 @@ fn odd_subject(map: &DepthMap, plate: Option<&Path>, image: Option<&Path>) -> Op
             "{plate}: nobody stands before it, and all is blurred; a plate shows the place without the person"
         )),
         None if near == 0 => Some("nobody was found in the picture, and all of it is blurred".to_owned()),
-        Some(plate) if near as f32 > MOST_BEFORE_PLATE * count as f32 && raggedness(map, is_near) > MOST_RAGGED => {
+        Some(plate) if near as f32 > MAX_FOREGROUND * count as f32 && raggedness(map, is_near) > MAX_RAGGEDNESS => {
             Some(format!(
                 "{plate}: {} % of the picture differs from it, in shreds, and stays sharp: it was taken from elsewhere; a plate \
                  needs a camera that stands still, as on a tripod",
@@ -212,9 +212,9 @@ fn odd_subject(map: &DepthMap, plate: Option<&Path>, image: Option<&Path>) -> Op
     }
 }
 
-/// How long the outline of what is near is, in sides of a square as large: 4 of a square, 6 to 9 of a person.
+/// Returns the outline of the near region over the square root of its area: 4 for a square, 6 to 9 for a person.
 fn raggedness(map: &DepthMap, is_near: impl Fn(usize) -> bool) -> f32 {
-    // Hair would count in all pixels.
+    // Subsampled: at full resolution, hair would dominate the outline.
     let (width, height) = (map.width as usize, map.height as usize);
     let step = (width / 160).max(1);
     let columns: Vec<usize> = (0..width).step_by(step).collect();
@@ -251,20 +251,20 @@ mod tests {
     fn a_plate_from_elsewhere_leaves_shreds_and_a_person_has_an_outline() {
         let plate = Some(Path::new("room.png"));
         let person = |x: f32, y: f32| (x - 320.0).hypot(y - 130.0) < 90.0 || (y > 200.0 && (x - 320.0).abs() < 200.0);
-        assert_eq!(odd_subject(&map(person), plate, None), None);
+        assert_eq!(check_subject(&map(person), plate, None), None);
         let shreds = |x: f32, y: f32| person(x, y) || (x * 0.12).sin() * (y * 0.2).cos() > 0.5;
-        let said = odd_subject(&map(shreds), plate, None).unwrap();
+        let said = check_subject(&map(shreds), plate, None).unwrap();
         assert!(said.starts_with("room.png: ") && said.contains("as on a tripod"), "{said}");
-        // What a network finds is not compared with a plate.
-        assert_eq!(odd_subject(&map(shreds), None, None), None);
-        assert!(odd_subject(&map(|_, _| false), None, None).unwrap().contains("nobody was found"));
+        // A network's result is not compared with a plate.
+        assert_eq!(check_subject(&map(shreds), None, None), None);
+        assert!(check_subject(&map(|_, _| false), None, None).unwrap().contains("nobody was found"));
     }
 
     #[test]
     fn eyes_of_vehicles_are_usual_and_those_of_houses_are_not() {
         let rig = |baseline_m, metric| StereoRig { focal_px: 700.0, baseline_m, doffs_px: 0.0, metric };
-        assert_eq!(far_apart(&rig(2.0, true)), None);
-        assert_eq!(far_apart(&rig(60.0, false)), None);
-        assert!(far_apart(&rig(63.5, true)).unwrap().contains("it is 0.0635 m"));
+        assert_eq!(check_baseline(&rig(2.0, true)), None);
+        assert_eq!(check_baseline(&rig(60.0, false)), None);
+        assert!(check_baseline(&rig(63.5, true)).unwrap().contains("it is 0.0635 m"));
     }
 }

@@ -1,4 +1,4 @@
-//! The report of a run: where it may go, and what becomes of it where it cannot go there.
+//! The report of a run: its path, and the fallback if it cannot be written there.
 
 use std::io::{ErrorKind, Write};
 use std::path::Path;
@@ -11,13 +11,13 @@ use bokehcam::files::whole::Part;
 use bokehcam::sink::Target;
 use bokehcam::stats::Report;
 
-/// The path that means standard output.
+/// Path that stands for standard output.
 const STDOUT: &str = "-";
 
-/// Checks before a run that its report may be written to `path`, beside what goes to `targets`.
+/// Checks before a run that its report may be written to `path`, next to the outputs `targets`.
 ///
 /// # Errors
-/// Something is there that may not be overwritten, or is no report; or one of `targets` writes there, too.
+/// Fails if `path` exists without `force` or is not a report, or if one of `targets` writes there, too.
 pub fn check(path: Option<&Path>, force: bool, targets: &[Target]) -> Result<(), CliError> {
     let usage = |text: String| Err(CliError::Usage(text));
     let Some(path) = path.filter(|path| *path != STDOUT) else {
@@ -48,28 +48,28 @@ pub fn check(path: Option<&Path>, force: bool, targets: &[Target]) -> Result<(),
 /// Checks before a run that its report can be written.
 ///
 /// # Errors
-/// Its folder cannot be written.
-pub fn try_out(path: Option<&Path>) -> Result<(), CliError> {
+/// Fails if its folder cannot be written.
+pub fn check_writable(path: Option<&Path>) -> Result<(), CliError> {
     match path {
-        // With a part file beside it: opening the path itself would disturb the reader of a pipe.
+        // Uses a part file next to it: opening the path itself would disturb the reader of a pipe.
         Some(path) if path != STDOUT => Part::create(path).map(drop).map_err(CliError::io(path)),
         _ => Ok(()),
     }
 }
 
-/// Writes the report of a run as JSON, to standard output where `path` is `-`. What has come to its name since the run began
-/// stays, unless `force` is given. A report that cannot have its name is kept as `NAME.incomplete`; where nothing can be
-/// written, it goes to the terminal.
+/// Writes the report of a run as JSON, to standard output if `path` is `-`. A file created there during the run is kept
+/// without `force`; the report is then kept as `NAME.incomplete`. If nothing can be written, it is printed to the
+/// terminal.
 ///
 /// # Errors
-/// It could not have its name.
+/// Fails if the report is not at `path`.
 pub fn write(path: &Path, report: &Report, force: bool) -> Result<(), CliError> {
     let mut json = Vec::new();
     report.write_json(&mut json).map_err(CliError::io(path))?;
     if path == STDOUT {
         return print(&json);
     }
-    let refused = |cause: std::io::Error| match cause.kind() {
+    let to_error = |cause: std::io::Error| match cause.kind() {
         ErrorKind::AlreadyExists => CliError::Exists(path.to_owned()),
         _ => CliError::io(path)(cause),
     };
@@ -78,11 +78,11 @@ pub fn write(path: &Path, report: &Report, force: bool) -> Result<(), CliError> 
         Ok(mut part) => match part.try_commit(force) {
             Ok(()) => return Ok(()),
             Err(cause) => match part.keep_incomplete() {
-                Ok(kept) => return Err(CliError::ReportKept { error: Box::new(refused(cause)), kept }),
-                Err(_) => refused(cause),
+                Ok(kept) => return Err(CliError::ReportKept { error: Box::new(to_error(cause)), kept }),
+                Err(_) => to_error(cause),
             },
         },
-        Err(cause) => refused(cause),
+        Err(cause) => to_error(cause),
     };
     say(&format!("the report has no other place:\n{}", String::from_utf8_lossy(&json)));
     Err(error)

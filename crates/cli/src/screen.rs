@@ -1,8 +1,8 @@
-//! The one way to standard error: a thread that prints lines and draws the progress bar, so that no other one waits.
+//! The only writer to standard error: a thread that prints lines and draws the progress bar, so that no other thread
+//! waits.
 //!
-//! A terminal may stop taking text for as long as it likes (Ctrl-S, a suspended remote shell, a reader of a pipe that
-//! stands still). Then that thread alone waits; lines queue up, and those that find the queue full are dropped and
-//! counted.
+//! A terminal may stall for any time (Ctrl-S, a suspended remote shell, a stopped reader of a pipe). Then only that
+//! thread waits; lines queue up, and those that find the queue full are dropped and counted.
 
 use std::io::{self, Write};
 use std::sync::Arc;
@@ -13,61 +13,61 @@ use std::time::{Duration, Instant};
 
 use indicatif::ProgressBar;
 
-/// Entries that may wait in the queue.
+/// Capacity of the queue, in entries.
 const QUEUE_CAPACITY: usize = 1024;
 /// Time between two redraws of the bar.
 const REDRAW_INTERVAL: Duration = Duration::from_millis(100);
-/// A write that takes longer than this is not waited for in [`Screen::flush`].
+/// Maximum time that [`Screen::flush`] waits for one write.
 const STALL_TIMEOUT: Duration = Duration::from_millis(400);
-/// Time between two looks at whether everything is printed.
+/// Time between two checks in [`Screen::flush`].
 const POLL_INTERVAL: Duration = Duration::from_millis(2);
 
 /// Prints lines and one bar on a thread of its own.
 pub struct Screen {
-    /// `None` where the thread could not be started: whoever prints then writes (and waits) by itself.
+    /// `None` if the thread could not be started: then callers write (and wait) themselves.
     queue: Option<SyncSender<Entry>>,
     shared: Arc<Shared>,
 }
 
-/// Progress of a command: written by the thread that works, read by the one that draws the bar.
+/// Progress of a command, shared by the worker thread and the thread that draws the bar.
 #[derive(Debug, Default)]
 pub struct Count {
     done: AtomicU64,
-    /// Set when the bar is to go.
+    /// Set to remove the bar.
     over: AtomicBool,
 }
 
 impl Count {
-    /// Sets how many are done.
+    /// Sets the number of completed items.
     pub fn set(&self, done: u64) {
         self.done.store(done, Ordering::Relaxed);
     }
 }
 
-/// What is sent to the printing thread.
+/// Message to the printing thread.
 enum Entry {
-    /// Whole lines, with their ends.
+    /// Complete lines, with their line ends.
     Text(Vec<u8>),
-    /// Draws this from now on, until the count is over.
+    /// Starts drawing the bar, until its count is over.
     Bar(ProgressBar, Arc<Count>),
-    /// The bar's count is over.
+    /// Removes the bar.
     NoBar,
 }
 
 #[derive(Default)]
 struct Shared {
-    /// Entries that were offered to the queue.
+    /// Number of entries offered to the queue.
     sent: AtomicU64,
-    /// Entries that were printed or dropped: [`Screen::flush`] waits until it reaches `sent`.
+    /// Number of entries printed or dropped: [`Screen::flush`] waits until it reaches `sent`.
     done: AtomicU64,
-    /// Texts that were dropped because the queue was full.
+    /// Number of texts dropped because the queue was full.
     lost: AtomicU64,
-    /// Counted up at the beginning and at the end of every write: odd while one is going on.
+    /// Incremented at the start and at the end of every write: odd during a write.
     prints: AtomicU64,
 }
 
 impl Screen {
-    /// Starts a thread that prints to `out`; `lost_notice` makes the line that tells how many lines were dropped.
+    /// Starts a thread that prints to `out`; `lost_notice` formats the line that reports the number of dropped lines.
     pub fn new(out: impl Write + Send + 'static, lost_notice: fn(u64) -> String) -> Self {
         let shared = Arc::new(Shared::default());
         let (queue, entries) = sync_channel(QUEUE_CAPACITY);
@@ -76,16 +76,16 @@ impl Screen {
         Self { queue: thread.is_ok().then_some(queue), shared }
     }
 
-    /// Queues whole lines, with their ends, or drops them if the queue is full. Never waits.
+    /// Queues complete lines, with their line ends, or drops them if the queue is full. Never blocks.
     pub fn print(&self, lines: &[u8]) {
         match &self.queue {
             Some(_) => self.send(Entry::Text(lines.to_vec())),
-            // A closed standard error is no reason to fail.
+            // A closed standard error is no failure.
             None => drop(io::stderr().write_all(lines)),
         }
     }
 
-    /// Draws `bar` from now on; returns the count that it shows.
+    /// Starts drawing `bar`; returns the count that it shows.
     pub fn begin(&self, bar: ProgressBar) -> Arc<Count> {
         let count = Arc::new(Count::default());
         if self.queue.is_some() {
@@ -97,13 +97,13 @@ impl Screen {
     /// Removes the bar that shows `count`.
     pub fn end(&self, count: &Count) {
         count.over.store(true, Ordering::Relaxed);
-        // If the queue is full, the bar goes with the next entry that is printed.
+        // If the queue is full, the bar is removed with the next printed entry.
         if self.queue.is_some() {
             self.send(Entry::NoBar);
         }
     }
 
-    /// Waits until everything sent so far is printed; gives up on a terminal that takes nothing for [`STALL_TIMEOUT`].
+    /// Waits until everything sent so far is printed; gives up on a terminal that stalls for [`STALL_TIMEOUT`].
     pub fn flush(&self) {
         let Shared { sent, done, prints, .. } = &*self.shared;
         let last = sent.load(Ordering::Acquire);
@@ -121,17 +121,17 @@ impl Screen {
 
     fn send(&self, entry: Entry) {
         let is_text = matches!(entry, Entry::Text(_));
-        // Counted first, so that `flush` never believes too early that everything is printed.
+        // Counted first, so that `flush` never returns early.
         self.shared.sent.fetch_add(1, Ordering::AcqRel);
         if self.queue.as_ref().is_none_or(|queue| queue.try_send(entry).is_err()) {
-            // What is dropped is done, or `flush` would wait for it.
+            // Dropped entries count as done, or `flush` would wait for them.
             self.shared.done.fetch_add(1, Ordering::AcqRel);
             self.shared.lost.fetch_add(u64::from(is_text), Ordering::Relaxed);
         }
     }
 }
 
-/// The state of the printing thread.
+/// State of the printing thread.
 struct Printer<W> {
     out: W,
     lost_notice: fn(u64) -> String,
@@ -140,7 +140,7 @@ struct Printer<W> {
 }
 
 impl<W: Write> Printer<W> {
-    /// Prints entries until the [`Screen`] is gone, and redraws the bar, if there is one, every [`REDRAW_INTERVAL`].
+    /// Prints entries until the [`Screen`] is dropped, and redraws the bar, if any, every [`REDRAW_INTERVAL`].
     fn run(mut self, entries: &Receiver<Entry>) {
         loop {
             let next = match &self.bar {
@@ -152,7 +152,7 @@ impl<W: Write> Printer<W> {
             }
             self.shared.prints.fetch_add(1, Ordering::Relaxed);
             self.handle(next.ok());
-            // Once it has caught up, so that one notice covers all lines lost meanwhile.
+            // Only after catching up, so that one notice covers all lost lines.
             if self.shared.done.load(Ordering::Acquire) == self.shared.sent.load(Ordering::Acquire) {
                 self.report_lost();
             }
@@ -160,7 +160,7 @@ impl<W: Write> Printer<W> {
         }
     }
 
-    /// Prints an entry; without one (the redraw interval is over) redraws the bar.
+    /// Prints an entry; `None`, after the redraw interval, redraws the bar.
     fn handle(&mut self, entry: Option<Entry>) {
         if let Some((bar, _)) = self.bar.take_if(|(_, count)| count.over.load(Ordering::Relaxed)) {
             bar.finish_and_clear();
@@ -182,10 +182,10 @@ impl<W: Write> Printer<W> {
         }
     }
 
-    /// Prints lines where the bar is, and draws the bar again below them.
+    /// Prints lines above the bar, and redraws the bar below them.
     fn print(&mut self, lines: &[u8]) {
         let Self { out, bar, .. } = self;
-        // A closed standard error is no reason to fail.
+        // A closed standard error is no failure.
         let mut write = || drop(out.write_all(lines));
         match bar {
             Some((bar, _)) => bar.suspend(write),
@@ -193,7 +193,7 @@ impl<W: Write> Printer<W> {
         }
     }
 
-    /// Prints how many lines were dropped since the last notice.
+    /// Prints the number of lines dropped since the last notice.
     fn report_lost(&mut self) {
         let lost = self.shared.lost.swap(0, Ordering::Relaxed);
         if lost > 0 {
@@ -208,21 +208,21 @@ mod tests {
 
     use super::*;
 
-    /// A terminal that takes nothing until it is told to.
+    /// A terminal that stalls until it is resumed.
     #[derive(Clone, Default)]
-    struct Stopped(Arc<Taking>);
+    struct StalledTerminal(Arc<TerminalState>);
 
     #[derive(Default)]
-    struct Taking {
-        /// Whether it takes anything, and what it took.
+    struct TerminalState {
+        /// Whether it accepts text, and the text so far.
         state: Mutex<(bool, Vec<u8>)>,
-        told: Condvar,
+        resumed: Condvar,
     }
 
-    impl Stopped {
-        fn go_on(&self) {
+    impl StalledTerminal {
+        fn resume(&self) {
             self.0.state.lock().unwrap().0 = true;
-            self.0.told.notify_all();
+            self.0.resumed.notify_all();
         }
 
         fn text(&self) -> String {
@@ -230,10 +230,10 @@ mod tests {
         }
     }
 
-    impl Write for Stopped {
+    impl Write for StalledTerminal {
         fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-            let Taking { state, told } = &*self.0;
-            let mut state = told.wait_while(state.lock().unwrap(), |(goes, _)| !*goes).unwrap();
+            let TerminalState { state, resumed } = &*self.0;
+            let mut state = resumed.wait_while(state.lock().unwrap(), |(accepts, _)| !*accepts).unwrap();
             state.1.extend_from_slice(bytes);
             Ok(bytes.len())
         }
@@ -245,7 +245,7 @@ mod tests {
 
     #[test]
     fn nobody_waits_for_a_terminal_that_takes_nothing() {
-        let terminal = Stopped::default();
+        let terminal = StalledTerminal::default();
         let screen = Screen::new(terminal.clone(), |lines| format!("{lines} lines are missing\n"));
         let count = screen.begin(ProgressBar::hidden());
         let lines = 2 * QUEUE_CAPACITY;
@@ -257,14 +257,14 @@ mod tests {
         screen.end(&count);
         assert_eq!(terminal.text(), "");
 
-        terminal.go_on();
+        terminal.resume();
         screen.flush();
         screen.print(b"the last\n");
         screen.flush();
         let text = terminal.text();
-        let (told, missing): (Vec<&str>, Vec<&str>) = text.lines().partition(|line| !line.contains("missing"));
-        let numbers: Vec<usize> = told.iter().filter_map(|line| line.parse().ok()).collect();
-        assert!(numbers.is_sorted() && numbers.first() == Some(&0) && told.last() == Some(&"the last"), "{text}");
+        let (printed, missing): (Vec<&str>, Vec<&str>) = text.lines().partition(|line| !line.contains("missing"));
+        let numbers: Vec<usize> = printed.iter().filter_map(|line| line.parse().ok()).collect();
+        assert!(numbers.is_sorted() && numbers.first() == Some(&0) && printed.last() == Some(&"the last"), "{text}");
         let [missing] = missing[..] else { panic!("{text}") };
         let missing: usize = missing.split(' ').next().and_then(|count| count.parse().ok()).unwrap();
         assert_eq!(numbers.len() + missing, lines, "every line is printed or counted");
@@ -272,8 +272,8 @@ mod tests {
 
     #[test]
     fn all_is_printed_in_order_once_it_is_flushed() {
-        let terminal = Stopped::default();
-        terminal.go_on();
+        let terminal = StalledTerminal::default();
+        terminal.resume();
         let screen = Screen::new(terminal.clone(), |lines| format!("{lines} lines are missing\n"));
         let count = screen.begin(ProgressBar::hidden());
         (0..500).for_each(|line| screen.print(format!("{line}\n").as_bytes()));

@@ -1,4 +1,4 @@
-//! From `--to` to one sink.
+//! Conversion of `--to` options to one sink.
 
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -10,10 +10,11 @@ use bokehcam::files::place;
 use bokehcam::sink::{Backpressure, Options, Sink, Target, Tee};
 use bokehcam::source::{DepthChoice, SourceName};
 
-/// Refuses sinks that collide with each other or with what is read, and options that need other sinks.
+/// Refuses sinks that collide with each other or with an input, and options that need other sinks.
 ///
 /// # Errors
-/// Two of them write to one place; one writes to what is read; an option needs a virtual camera where there is none.
+/// Fails if two sinks write to one place, a sink overwrites an input, or an option lacks the virtual camera that it
+/// needs.
 pub fn check(targets: &[Target], parts: &Streaming, source: &SourceName) -> Result<(), CliError> {
     let usage = |text: String| Err(CliError::Usage(text));
     let Streaming { stream, blur, .. } = parts;
@@ -30,6 +31,7 @@ pub fn check(targets: &[Target], parts: &Streaming, source: &SourceName) -> Resu
         if targets[..index].iter().any(|other| other.collides_with(target)) {
             return usage(format!("--to {target}: given twice; each sink needs a place of its own"));
         }
+        // The frames of a folder sink could overwrite a file within it.
         let lies_in = |other: &Target| match (other, target.path()) {
             (Target::Folder(folder), Some(path)) => place::resolved(path).starts_with(place::resolved(folder)),
             _ => false,
@@ -72,11 +74,10 @@ pub fn check(targets: &[Target], parts: &Streaming, source: &SourceName) -> Resu
     }
 }
 
-/// Opens all sinks as one. With [`Backpressure::Block`] all files get every frame, unless `closed` says that pictures are
-/// kept away.
+/// Opens all sinks as one. With [`Backpressure::Block`] all files get every frame, except while `closed` is set.
 ///
 /// # Errors
-/// One cannot be opened; the others are then given up.
+/// Fails if one cannot be opened; the others are discarded.
 pub fn open(
     targets: &[Target],
     options: &Options,

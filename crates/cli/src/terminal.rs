@@ -1,4 +1,4 @@
-//! What the user sees while a command runs, and how it is ended.
+//! Terminal output while a command runs, and its interruption.
 
 use std::cell::Cell;
 use std::fmt;
@@ -17,28 +17,28 @@ use super::screen::{Count, Screen};
 use bokehcam::depth::plate::{Guide, Step};
 use bokehcam::stats::Report;
 
-/// The first Ctrl-C (or a termination signal) sets the flag, so that the file in hand is finished; the second ends
-/// the program at once.
+/// Returns a flag that the first Ctrl-C (or termination signal) sets, so that the file in hand is finished; the second
+/// ends the program at once.
 ///
 /// # Errors
-/// The system has no place for a signal handler.
+/// Fails if the signal handler cannot be set.
 pub fn stop_flag() -> Result<Arc<AtomicBool>, CliError> {
-    /// Signals that come within so long of the first are no second ones.
-    const TOGETHER: Duration = Duration::from_millis(100);
-    /// What shells expect of a program that SIGINT ended.
-    const INTERRUPTED: i32 = 130;
+    /// Signals this soon after the first count as the same one.
+    const SAME_REQUEST: Duration = Duration::from_millis(100);
+    /// Exit code of a program ended by SIGINT, by shell convention.
+    const SIGINT_EXIT_CODE: i32 = 130;
     let stop = Arc::new(AtomicBool::new(false));
     let is_stopping = Arc::clone(&stop);
     let mut first: Option<Instant> = None;
     let handler = move || {
         match first {
-            // `timeout`, for one, signals a program and then its group: that is one wish.
-            Some(first) if first.elapsed() < TOGETHER => return,
-            Some(_) => std::process::exit(INTERRUPTED),
+            // `timeout`, for one, signals a program and then its group: a single request to stop.
+            Some(first) if first.elapsed() < SAME_REQUEST => return,
+            Some(_) => std::process::exit(SIGINT_EXIT_CODE),
             None => first = Some(Instant::now()),
         }
         is_stopping.store(true, Ordering::Relaxed);
-        // Nobody waits for a network that hangs.
+        // A hanging network must not delay the end.
         #[cfg(feature = "networks")]
         bokehcam::network::apart::hurry();
         #[cfg(feature = "gpu")]
@@ -49,11 +49,11 @@ pub fn stop_flag() -> Result<Arc<AtomicBool>, CliError> {
     Ok(stop)
 }
 
-/// A bar of delivered frames on stderr; silent when that is no terminal.
+/// A progress bar of delivered frames on stderr; silent if stderr is no terminal.
 pub struct Progress(Option<(&'static Screen, Arc<Count>)>);
 
 impl Progress {
-    /// A bar for `frames` frames, or a counter when their number is not known.
+    /// Creates a bar for `frames` frames, or a counter if their number is unknown.
     pub fn new(frames: Option<u64>, global: &Global) -> Self {
         if global.quiet || !io::stderr().is_terminal() {
             return Self(None);
@@ -65,7 +65,7 @@ impl Progress {
         let bar = ProgressBar::with_draw_target(frames, ProgressDrawTarget::stderr());
         let style = ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar());
         let rate = |state: &ProgressState, to: &mut dyn fmt::Write| {
-            // Writing into memory cannot fail.
+            // Writing to memory cannot fail.
             let _ = write!(to, "{:.1}", state.per_sec());
         };
         bar.set_style(style.with_key("rate", rate));
@@ -73,13 +73,13 @@ impl Progress {
         Self(Some((screen, screen.begin(bar))))
     }
 
-    /// None.
+    /// Creates a bar that shows nothing.
     #[cfg(feature = "camera")]
     pub fn silent() -> Self {
         Self(None)
     }
 
-    /// Sets how many frames are delivered.
+    /// Sets the number of delivered frames.
     pub fn delivered(&self, frames: u64) {
         self.0.iter().for_each(|(_, count)| count.set(frames));
     }
@@ -91,37 +91,37 @@ impl Drop for Progress {
     }
 }
 
-/// Tells a person who takes a plate what to do, once each.
+/// Prints each step of taking a plate once, as guidance for the user.
 pub struct Guidance {
     guide: Option<Arc<Guide>>,
     is_quiet: bool,
-    told: Cell<Option<Step>>,
+    printed: Cell<Option<Step>>,
 }
 
 impl Guidance {
-    /// Tells of the plate that is taken or used, if there is one.
+    /// Follows the plate that `guide` takes or uses, if any.
     pub fn new(guide: Option<Arc<Guide>>, global: &Global) -> Self {
-        Self { guide, is_quiet: global.quiet, told: Cell::new(None) }
+        Self { guide, is_quiet: global.quiet, printed: Cell::new(None) }
     }
 
-    /// How far the plate is.
+    /// Returns the current step.
     pub fn step(&self) -> Option<Step> {
         self.guide.as_ref().map(|guide| guide.step())
     }
 
-    /// Says what is new.
-    pub fn tell(&self) {
+    /// Prints the step, if it is new.
+    pub fn print_step(&self) {
         let Some(step) = self.step() else { return };
-        // How much of it is taken is no news, nor is a plate that was there from the start.
+        // Progress within a step is not printed, nor a plate that exists from the start.
         let news = if matches!(step, Step::Taking(_)) { Step::Taking(0) } else { step };
-        let told = self.told.replace(Some(news));
-        if !self.is_quiet && told != Some(news) && (told.is_some() || news != Step::Ready) {
+        let printed = self.printed.replace(Some(news));
+        if !self.is_quiet && printed != Some(news) && (printed.is_some() || news != Step::Ready) {
             say(&step.to_string());
         }
     }
 }
 
-/// Says how a run went, and what its stages took where more is to be told.
+/// Prints the report of a run; with `--verbose`, the times of its stages, too.
 pub fn say_report(report: &Report, global: &Global) {
     let is_shown = |line: &&str| global.verbose > 0 || !line.contains(" ms: ");
     if !global.quiet {
@@ -129,15 +129,15 @@ pub fn say_report(report: &Report, global: &Global) {
     }
 }
 
-/// Prints to standard output, with what a terminal would obey escaped.
+/// Prints to standard output, with terminal control characters escaped.
 ///
 /// # Errors
-/// Nobody reads, or it is full.
+/// Fails if the reader closed it, or the disk is full.
 pub fn print(bytes: &[u8]) -> Result<(), CliError> {
     let mut stdout = io::stdout().lock();
     let text = String::from_utf8_lossy(bytes);
     stdout
-        .write_all(log::printable(&text, &['\n', '\t']).as_bytes())
+        .write_all(log::escape_controls(&text, &['\n', '\t']).as_bytes())
         .and_then(|()| stdout.flush())
         .map_err(CliError::io("standard output".as_ref()))
 }

@@ -1,5 +1,5 @@
-//! What people need who work on bokehcam: a scene with exact depth, rendered through a pinhole or a thin lens, and the
-//! camera `synthetic` that films it; and what the rank of an aperture costs. The benches are in `benches/`.
+//! Tools for developers of bokehcam: a scene with exact depth, rendered through a pinhole or a thin lens, the camera
+//! `synthetic` that films it, and an analysis of aperture ranks. The benches are in `benches/`.
 
 pub mod aperture;
 pub mod scene;

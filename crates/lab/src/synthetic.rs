@@ -1,4 +1,4 @@
-//! The project's own scene as a camera, with exact depth.
+//! The project's own scene as a camera with exact depth.
 
 use bokehcam::capture::synthetic::{self, Format};
 use bokehcam::capture::{Brings, Camera, CaptureError, Captured, Shot, SourceInfo};
@@ -6,7 +6,7 @@ use bokehcam::frame::Stamp;
 
 use crate::scene::{Scene, View};
 
-/// Renders a moving portrait, each frame when it is asked for.
+/// Renders a moving portrait, frame by frame on request.
 pub struct Synthetic {
     scene: Scene,
     view: View,
@@ -14,16 +14,16 @@ pub struct Synthetic {
     position: u64,
 }
 
-/// One ray per pixel: a camera has to keep pace.
+/// One ray per pixel, because a camera must keep pace.
 const SAMPLES_PER_PIXEL: u32 = 1;
-/// Pictures beyond this are no camera's.
+/// Maximum width and height.
 const MAX_SIDE_PX: u32 = 8192;
 
 impl Synthetic {
-    /// A camera of the given format.
+    /// Creates a camera of the given format.
     ///
     /// # Errors
-    /// The size is 0 or beyond 8192 pixels, or the rate is not a usable number.
+    /// The size is 0 or beyond 8192 pixels, or the rate is invalid.
     pub fn new(format: Format) -> Result<Self, CaptureError> {
         let Format { size: (width, height), fps, .. } = format;
         let sides = 1..=MAX_SIDE_PX;
@@ -42,7 +42,7 @@ impl Synthetic {
     }
 }
 
-/// From now on, the source `synthetic` is this camera.
+/// Registers this camera as the source `synthetic`.
 pub fn bring() {
     synthetic::bring(|format| Ok(Box::new(Synthetic::new(format)?)));
 }

@@ -1,4 +1,4 @@
-//! The desktop's own dialog for a file or a folder: its portal, or `zenity`.
+//! The desktop's file chooser: the XDG desktop portal, or `zenity`.
 
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -8,21 +8,21 @@ use rfd::FileDialog;
 use super::services::Browse;
 use bokehcam::files::data;
 
-/// Shown where there is no dialog.
+/// Error shown if the desktop has no file chooser.
 const NO_DIALOG: &str = "This desktop has no file dialog (neither a portal nor zenity): drop a folder or a photo on the window, \
                          or start `bokehcam preview FOLDER`.";
-/// Nobody cancels a dialog sooner: it never was there.
-const AT_ONCE: Duration = Duration::from_millis(250);
+/// A dialog that "cancels" within this time was never shown: no user is that fast.
+const MIN_DIALOG_TIME: Duration = Duration::from_millis(250);
 
-/// Asks the person; `None` where they chose nothing. Waits for them.
+/// Shows a file chooser and blocks until it closes; `None` if the user cancels.
 ///
 /// # Errors
-/// There is no dialog: one line that says what to do instead.
+/// Returns a one-line message with the alternatives if there is no dialog.
 pub fn pick(what: Browse) -> Result<Option<String>, String> {
     if !has_portal() && !has_zenity() {
         return Err(NO_DIALOG.to_owned());
     }
-    let began = Instant::now();
+    let opened_at = Instant::now();
     let picked = match what {
         Browse::Folder => FileDialog::new().set_title("Open a recording: its folder").pick_folder(),
         Browse::Photo | Browse::Behind => {
@@ -33,21 +33,21 @@ pub fn pick(what: Browse) -> Result<Option<String>, String> {
     };
     match picked {
         Some(path) => name_of(&path).map(Some),
-        None if began.elapsed() < AT_ONCE => Err(NO_DIALOG.to_owned()),
+        None if opened_at.elapsed() < MIN_DIALOG_TIME => Err(NO_DIALOG.to_owned()),
         None => Ok(None),
     }
 }
 
-/// A path as the name of a source.
+/// Returns a path as a source name.
 ///
 /// # Errors
-/// It is no text.
+/// Fails if the path is not valid UTF-8.
 pub fn name_of(path: &Path) -> Result<String, String> {
-    let is_no_text = || format!("{}: its name is no text (UTF-8); rename it to open it here", path.display());
-    path.to_str().map(str::to_owned).ok_or_else(is_no_text)
+    let not_utf8 = || format!("{}: its name is no text (UTF-8); rename it to open it here", path.display());
+    path.to_str().map(str::to_owned).ok_or_else(not_utf8)
 }
 
-/// Whether the desktop offers its dialogs over D-Bus: there is a bus, and somebody to start on it.
+/// Whether a portal can answer over D-Bus: a session bus exists, and a service file with which it can start the portal.
 fn has_portal() -> bool {
     let is_there =
         |name: &str, file: &str| std::env::var_os(name).is_some_and(|dir| PathBuf::from(dir).join(file).exists());

@@ -1,4 +1,4 @@
-//! Key bindings: one table, which the help shows and the panel acts by.
+//! Key bindings: one table that the help displays and that maps key events to actions.
 
 use egui::{Event, Key, Modifiers};
 
@@ -6,41 +6,42 @@ use super::state::{Action, Shown, Source, State, tweak};
 use bokehcam::depth::focus::FocusRule;
 use bokehcam::look::Look;
 
-/// Keys to press together.
+/// A key with its modifiers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Chord {
     pub key: Key,
-    /// Whether Ctrl is held.
+    /// Whether Ctrl must be held.
     pub ctrl: bool,
-    /// Whether Shift is held. Counts only for letters: some keyboards need it for other signs.
+    /// Whether Shift must be held. Checked only for letters: on some keyboard layouts other characters need Shift
+    /// anyway.
     pub shift: bool,
 }
 
-/// What a key does.
+/// A set of chords and the action they trigger.
 pub struct Binding {
-    /// Any of these triggers it.
+    /// Alternative chords; each one triggers the action.
     pub chords: &'static [Chord],
-    /// What the help calls them.
+    /// The chords as the help displays them.
     pub keys: &'static str,
-    pub does: &'static str,
+    pub help: &'static str,
     /// Whether it repeats while the key is held.
     pub repeats: bool,
     make: fn(&State, Context) -> Option<Action>,
 }
 
-/// Bindings of one kind.
+/// A titled group of bindings in the help.
 pub struct Group {
-    /// What they are about.
+    /// The title.
     pub name: &'static str,
     pub bindings: &'static [Binding],
 }
 
-/// What is known when a key is pressed, besides the state.
+/// Values that an action depends on besides the state.
 #[derive(Clone, Copy, Debug)]
 pub struct Context {
-    /// Columns and rows of the picture; some blur is a share of them.
+    /// Width and height of the picture in pixels; relative blur amounts depend on it.
     pub size: (u32, u32),
-    /// Pixels of the window along a side of one of the picture's, where all of it is seen.
+    /// Scale of the picture when it fits the window: window pixels per picture pixel.
     pub fit: f32,
     /// Index of the pressed chord in [`Binding::chords`].
     pub chord: usize,
@@ -64,35 +65,36 @@ const fn ctrl_shift(key: Key) -> Chord {
 
 type Make = fn(&State, Context) -> Option<Action>;
 
-/// A binding that acts once per press.
-const fn once(chords: &'static [Chord], keys: &'static str, does: &'static str, make: Make) -> Binding {
-    Binding { chords, keys, does, repeats: false, make }
+/// Creates a binding that acts once per press.
+const fn once(chords: &'static [Chord], keys: &'static str, help: &'static str, make: Make) -> Binding {
+    Binding { chords, keys, help, repeats: false, make }
 }
 
-/// A binding that repeats while the key is held.
-const fn held(chords: &'static [Chord], keys: &'static str, does: &'static str, make: Make) -> Binding {
-    Binding { chords, keys, does, repeats: true, make }
+/// Creates a binding that repeats while the key is held.
+const fn repeat(chords: &'static [Chord], keys: &'static str, help: &'static str, make: Make) -> Binding {
+    Binding { chords, keys, help, repeats: true, make }
 }
 
-/// Changes the look; `None` if that leaves it as it is. Changes of one `stroke` are undone together.
-fn look(state: &State, stroke: &'static str, change: impl FnOnce(&mut Look)) -> Option<Action> {
+/// Returns the action that changes the look, or `None` if `change` has no effect. Consecutive changes with the same
+/// `stroke` share one undo step.
+fn edit_look(state: &State, stroke: &'static str, change: impl FnOnce(&mut Look)) -> Option<Action> {
     let mut look = state.look.clone();
     change(&mut look);
     (look != state.look).then(|| Action::Look { look: Box::new(look), stroke: Some(stroke) })
 }
 
-/// Toggles between a view and the picture.
-fn show(state: &State, shown: Shown) -> Option<Action> {
+/// Toggles between `shown` and the normal picture.
+fn toggle_view(state: &State, shown: Shown) -> Option<Action> {
     Some(Action::Show(if state.shown == shown { Shown::Picture } else { shown }))
 }
 
-/// The direction of a pair of opposite keys: -1 for the first chord, 1 for the second.
-fn way(context: Context) -> f32 {
+/// Returns the direction of a pair of opposite keys: -1 for the first chord of the pair, 1 for the second.
+fn sign(context: Context) -> f32 {
     if context.chord.is_multiple_of(2) { -1.0 } else { 1.0 }
 }
 
-/// What Esc closes, one thing at a time.
-fn step_back(state: &State) -> Option<Action> {
+/// Returns the action of Esc: closes the topmost open item, one per press.
+fn close_topmost(state: &State) -> Option<Action> {
     if state.closing {
         Some(Action::StayOpen)
     } else if state.self_timer {
@@ -118,13 +120,13 @@ fn step_back(state: &State) -> Option<Action> {
     }
 }
 
-/// A step of focus by the arrow keys, as a fraction of the picture.
-const STEP: f32 = 0.02;
-/// A step of the amount of blur, or of the f-number: a third of a stop.
+/// Focus step of an arrow key, as a fraction of the picture.
+const FOCUS_STEP: f32 = 0.02;
+/// Factor of the blur amount or the f-number per key press: a third of a stop.
 const THIRD_STOP: f32 = 1.122;
-/// A step of the focal range, in metres.
+/// Step of the focus range, in metres.
 const RANGE_STEP_M: f32 = 0.05;
-/// A step of the size of text.
+/// Factor of the text scale per key press.
 const TEXT_STEP: f32 = 1.1;
 
 pub const GROUPS: [Group; 5] = [
@@ -147,26 +149,26 @@ pub const GROUPS: [Group; 5] = [
                 "the preset of that number",
                 |state, context| state.presets.get(context.chord).map(|preset| Action::Preset(preset.name.clone())),
             ),
-            held(&[key(Key::OpenBracket), key(Key::CloseBracket)], "[  ]", "less blur, more blur", |state, context| {
-                let factor = THIRD_STOP.powf(way(context));
-                look(state, "key blur", |look| tweak::blur_by(look, factor, context.size.1))
+            repeat(&[key(Key::OpenBracket), key(Key::CloseBracket)], "[  ]", "less blur, more blur", |state, context| {
+                let factor = THIRD_STOP.powf(sign(context));
+                edit_look(state, "key blur", |look| tweak::blur_by(look, factor, context.size.1))
             }),
-            held(
+            repeat(
                 &[key(Key::Semicolon), key(Key::Quote)],
                 ";  '",
                 "smaller f-number, larger f-number",
                 |state, context| {
-                    let factor = THIRD_STOP.powf(way(context));
-                    look(state, "key f-number", |look| {
+                    let factor = THIRD_STOP.powf(sign(context));
+                    edit_look(state, "key f-number", |look| {
                         tweak::f_number_by(look, factor, state.distance_m(), context.size)
                     })
                 },
             ),
-            held(&[key(Key::Comma), key(Key::Period)], ",  .", "less in focus, more in focus", |state, context| {
-                look(state, "key focal range", |look| tweak::focus_range_by(look, RANGE_STEP_M * way(context)))
+            repeat(&[key(Key::Comma), key(Key::Period)], ",  .", "less in focus, more in focus", |state, context| {
+                edit_look(state, "key focal range", |look| tweak::focus_range_by(look, RANGE_STEP_M * sign(context)))
             }),
-            held(&[ctrl(Key::Z)], "Ctrl+Z", "undo", |_, _| Some(Action::Undo)),
-            held(&[ctrl_shift(Key::Z), ctrl(Key::Y)], "Ctrl+Shift+Z", "redo", |_, _| Some(Action::Redo)),
+            repeat(&[ctrl(Key::Z)], "Ctrl+Z", "undo", |_, _| Some(Action::Undo)),
+            repeat(&[ctrl_shift(Key::Z), ctrl(Key::Y)], "Ctrl+Shift+Z", "redo", |_, _| Some(Action::Redo)),
             once(&[key(Key::R)], "R", "back to the usual look", |_, _| Some(Action::Reset)),
         ],
     },
@@ -175,22 +177,24 @@ pub const GROUPS: [Group; 5] = [
         bindings: &[
             once(&[key(Key::T)], "T", "take a plate of what is behind you", |_, _| Some(Action::TakePlate)),
             once(&[key(Key::A)], "A", "focus on the subject", |state, _| {
-                look(state, "key auto", |look| look.focus = FocusRule::Auto)
+                edit_look(state, "key auto", |look| look.focus = FocusRule::Auto)
             }),
-            held(
+            repeat(
                 &[key(Key::ArrowLeft), key(Key::ArrowRight)],
                 "Left, Right",
                 "move the point of focus, turn the sharp band",
                 |state, context| {
-                    let to_the_right = if state.mirror { -way(context) } else { way(context) };
-                    look(state, "key arrows", |look| tweak::move_focus(look, STEP * to_the_right, 0.0))
+                    let to_the_right = if state.mirror { -sign(context) } else { sign(context) };
+                    edit_look(state, "key arrows", |look| tweak::move_focus(look, FOCUS_STEP * to_the_right, 0.0))
                 },
             ),
-            held(
+            repeat(
                 &[key(Key::ArrowUp), key(Key::ArrowDown)],
                 "Up, Down",
                 "move the point of focus, move the sharp band",
-                |state, context| look(state, "key arrows", |look| tweak::move_focus(look, 0.0, STEP * way(context))),
+                |state, context| {
+                    edit_look(state, "key arrows", |look| tweak::move_focus(look, 0.0, FOCUS_STEP * sign(context)))
+                },
             ),
         ],
     },
@@ -203,11 +207,11 @@ pub const GROUPS: [Group; 5] = [
             once(&[key(Key::Z)], "Z", "freeze the picture, pause a recording", |state, _| {
                 Some(Action::Freeze(!state.frozen))
             }),
-            held(
+            repeat(
                 &[key(Key::PageUp), key(Key::PageDown)],
                 "PageUp, PageDown",
                 "of a recording: stop, one frame back or on",
-                |state, context| state.transport.map(|_| Action::Step(way(context) as i32)),
+                |state, context| state.transport.map(|_| Action::Step(sign(context) as i32)),
             ),
             once(&[key(Key::Home)], "Home", "the recording's first frame", |state, _| {
                 state.transport.map(|_| Action::Seek(0))
@@ -219,12 +223,12 @@ pub const GROUPS: [Group; 5] = [
                 &[key(Key::Minus), key(Key::Plus), key(Key::Minus), key(Key::Equals)],
                 "Minus, Plus",
                 "smaller, larger: 100, 200, 400, 800 %",
-                |state, context| Some(Action::Zoom(state.zoom.stepped(way(context) as i32, context.fit), None)),
+                |state, context| Some(Action::Zoom(state.zoom.stepped(sign(context) as i32, context.fit), None)),
             ),
             once(&[key(Key::M)], "M", "mirror the window", |state, _| Some(Action::Mirror(!state.mirror))),
-            once(&[key(Key::D)], "D", "show depth", |state, _| show(state, Shown::Depth)),
-            once(&[key(Key::C)], "C", "show the blur radius", |state, _| show(state, Shown::Coc)),
-            once(&[key(Key::N)], "N", "show the layers of the blur", |state, _| show(state, Shown::Bins)),
+            once(&[key(Key::D)], "D", "show depth", |state, _| toggle_view(state, Shown::Depth)),
+            once(&[key(Key::C)], "C", "show the blur radius", |state, _| toggle_view(state, Shown::Coc)),
+            once(&[key(Key::N)], "N", "show the layers of the blur", |state, _| toggle_view(state, Shown::Bins)),
         ],
     },
     Group {
@@ -259,18 +263,19 @@ pub const GROUPS: [Group; 5] = [
             once(&[key(Key::F), key(Key::F11)], "F, F11", "full screen", |state, _| {
                 Some(Action::FullScreen(!state.full_screen))
             }),
-            // Minus twice, because `way` goes by pairs; without Shift, Plus is Equals on many keyboards.
-            held(
+            // Minus is listed twice because `sign` takes chords in pairs; without Shift, Plus is Equals on many
+            // layouts.
+            repeat(
                 &[ctrl(Key::Minus), ctrl(Key::Plus), ctrl(Key::Minus), ctrl(Key::Equals)],
                 "Ctrl+−  Ctrl++",
                 "smaller text, larger text",
-                |state, context| Some(Action::TextScale(state.habits.text_scale * TEXT_STEP.powf(way(context)))),
+                |state, context| Some(Action::TextScale(state.habits.text_scale * TEXT_STEP.powf(sign(context)))),
             ),
             once(&[ctrl(Key::Num0)], "Ctrl+0", "text as usual", |_, _| Some(Action::TextScale(1.0))),
             once(&[key(Key::F1), key(Key::Questionmark)], "F1, ?", "these keys", |state, _| {
                 Some(Action::Help(!state.help))
             }),
-            once(&[key(Key::Escape)], "Esc", "close what is open, leave full screen", |state, _| step_back(state)),
+            once(&[key(Key::Escape)], "Esc", "close what is open, leave full screen", |state, _| close_topmost(state)),
             once(&[key(Key::Q), ctrl(Key::Q), ctrl(Key::W)], "Q, Ctrl+Q", "close the window", |_, _| {
                 Some(Action::Close)
             }),
@@ -278,14 +283,14 @@ pub const GROUPS: [Group; 5] = [
     },
 ];
 
-/// Whether the control that has the focus uses this key itself.
-fn is_for_controls(chord: Chord) -> bool {
+/// Whether a focused control handles this key itself.
+fn is_handled_by_controls(chord: Chord) -> bool {
     let keys = [Key::ArrowLeft, Key::ArrowRight, Key::ArrowUp, Key::ArrowDown, Key::Space, Key::Escape];
     !chord.ctrl && keys.contains(&chord.key)
 }
 
-/// Whether an action may come of a key: under the help and the question, nothing is changed unseen.
-fn is_uncovered(action: &Action, state: &State) -> bool {
+/// Whether a key may trigger this action now: nothing may change unseen beneath the help or the closing dialog.
+fn is_allowed(action: &Action, state: &State) -> bool {
     match action {
         Action::Close | Action::StayOpen => true,
         Action::Help(_) | Action::FullScreen(_) | Action::TextScale(_) => !state.closing,
@@ -293,42 +298,43 @@ fn is_uncovered(action: &Action, state: &State) -> bool {
     }
 }
 
-/// Whether the key is a letter, a digit or a sign on its own, which some programs for people who speak press by mistake.
-fn is_single(chord: Chord) -> bool {
+/// Whether the chord is a single printable character without Ctrl, which speech-input software may press by accident.
+fn is_single_key(chord: Chord) -> bool {
     !chord.ctrl && chord.key.symbol_or_name().len() == 1
 }
 
-/// Whether the key is a letter. Only then do Shift and Alt matter: other signs may need them on some keyboards.
+/// Whether the key is a letter. Shift and Alt are checked for letters only: some layouts need them for other
+/// characters.
 fn is_letter(key: Key) -> bool {
     key.name().len() == 1 && key.name().chars().all(|c| c.is_ascii_alphabetic())
 }
 
 impl Chord {
-    /// Whether this chord was pressed.
-    fn is(self, pressed: Key, modifiers: Modifiers) -> bool {
+    /// Whether the pressed key and modifiers match this chord.
+    fn matches(self, pressed: Key, modifiers: Modifiers) -> bool {
         let shift = !is_letter(self.key) || self.shift == modifiers.shift;
         self.key == pressed && self.ctrl == modifiers.ctrl && shift && (!modifiers.alt || !is_letter(self.key))
     }
 }
 
-/// The action that is bound to the key in `event`, if any. While a control is `focused`, it keeps some keys to itself.
+/// Returns the action bound to a key event. While a control is `focused`, the keys it handles itself are ignored.
 pub fn action(event: &Event, state: &State, context: Context, focused: bool) -> Option<Action> {
     let Event::Key { key, pressed: true, repeat, modifiers, .. } = event else { return None };
     let bindings = GROUPS.iter().flat_map(|group| group.bindings);
     let found = bindings.filter(|binding| binding.repeats || !repeat).find_map(|binding| {
-        let chord = binding.chords.iter().position(|chord| chord.is(*key, *modifiers))?;
+        let chord = binding.chords.iter().position(|chord| chord.matches(*key, *modifiers))?;
         Some((binding, chord))
     });
     let (binding, chord) = found?;
-    if !state.habits.single_keys && is_single(binding.chords[chord]) {
+    if !state.habits.single_keys && is_single_key(binding.chords[chord]) {
         return None;
     }
-    // A question goes at once, though one of its buttons has the focus.
+    // Esc closes the closing dialog even while one of its buttons has the focus.
     let closes = state.closing && *key == Key::Escape;
-    if focused && is_for_controls(binding.chords[chord]) && !closes {
+    if focused && is_handled_by_controls(binding.chords[chord]) && !closes {
         return None;
     }
-    (binding.make)(state, Context { chord, ..context }).filter(|action| is_uncovered(action, state))
+    (binding.make)(state, Context { chord, ..context }).filter(|action| is_allowed(action, state))
 }
 
 #[cfg(test)]

@@ -1,11 +1,11 @@
-//! The preview: a window that shows a source in portrait mode, live, and lets a person find their look.
+//! The preview: a window that shows a source with live background blur, with controls for the look.
 //!
-//! Three threads beside the pipeline's own: the window's (the main thread: events, controls, presenting), the
-//! session's (opens sources, makes executors, takes outputs up and down), and the one that runs the pipeline. What the
-//! person does is an [`state::Action`]; [`state::State::apply`] makes of it another state and the
-//! [`state::Request`]s that only others can bring about.
+//! Three threads run besides those of the pipeline: the main thread (events, controls, presenting), the session's
+//! (opens sources, creates executors, starts and stops outputs), and one that runs the pipeline. User input becomes a
+//! [`state::Action`]; [`state::State::apply`] turns it into the new state and the [`state::Request`]s for the side
+//! effects.
 
-// For the program alone: what its names do not say, comments do.
+// Internal to the program: public items are documented only where their names do not suffice.
 #![allow(missing_docs)]
 
 pub mod dialog;

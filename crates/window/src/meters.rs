@@ -1,4 +1,4 @@
-//! What the instruments show: the last frames, how long they took, and what became of the others.
+//! Measurements for the instruments: recent frames, stage times, and drop counts.
 
 use std::collections::VecDeque;
 
@@ -6,103 +6,104 @@ use bokehcam::budget::{Quality, Window};
 use bokehcam::pipeline::{Trace, View};
 use bokehcam::stats::{Frames, Histogram};
 
-/// Frames that the instruments look back on.
+/// Number of recent frames that the meters keep.
 pub const FRAMES: usize = 240;
-/// A nanosecond in milliseconds.
+/// Milliseconds per nanosecond.
 const MS: f64 = 1e-6;
-/// Weight of a new frame in the moving means of the stages, which single frames shall not make jump.
-const EASE: f64 = 0.08;
+/// Weight of a new frame in the exponential moving averages, low enough that single outliers do not show.
+const SMOOTHING: f64 = 0.08;
 
-/// One frame, for the graph.
+/// One frame in the graph.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Bar {
-    /// Time of its blur, in milliseconds.
+    /// Duration of its blur, in milliseconds.
     pub blur_ms: f32,
-    /// From the presented frame before to this one, in milliseconds.
+    /// Time since the previously presented frame, in milliseconds; 0 for the first frame.
     pub interval_ms: f32,
-    /// The rung it was blurred at; `None` where it was not.
+    /// Quality level of the blur; `None` if the frame was not blurred.
     pub quality: Option<Quality>,
 }
 
-/// The last frames, and totals of all.
+/// Statistics of the recent frames, and totals of the whole run.
 #[derive(Clone, Debug, Default)]
 pub struct Meters {
-    /// The last [`FRAMES`], the oldest first.
+    /// The last [`FRAMES`] frames, oldest first.
     bars: VecDeque<Bar>,
     latency_ms: Window<FRAMES>,
     reaction_ms: Window<FRAMES>,
-    /// Mean times of the last frames.
+    /// Moving averages of the stage times.
     pub stages: Stages,
-    /// What became of the source's frames.
+    /// Captured and dropped frames of the source.
     pub frames: Frames,
-    /// When the last frame was presented, and when the preview started.
-    last_ns: Option<u64>,
-    begun_ns: Option<u64>,
-    /// What was presented in all.
+    /// Time of the last presented frame; `None` before the first.
+    last_presented_ns: Option<u64>,
+    /// Start of the preview.
+    started_ns: Option<u64>,
+    /// Totals since the start of the preview.
     pub totals: Totals,
 }
 
-/// Moving means of the stages' times, in milliseconds.
+/// Exponential moving averages of the stage times, in milliseconds.
 #[derive(Clone, Debug, Default)]
 pub struct Stages {
     pub decode_ms: f64,
     pub depth_ms: f64,
     pub blur_ms: f64,
-    /// Waits between the stages, the way to the screen included.
+    /// Queueing time between the stages, including the delivery to the screen.
     pub between_ms: f64,
     pub playout_ms: f64,
     pub present_ms: f64,
-    /// Share of the frames with depth of their own.
-    own_depth: f64,
-    /// The blur's passes, by name.
+    /// Fraction of the frames with a newly estimated depth map.
+    fresh_depth_fraction: f64,
+    /// Times of the blur's passes, by name.
     pub passes: Vec<(&'static str, f64)>,
 }
 
 impl Stages {
-    /// Every how many frames depth is made.
-    pub fn depth_every(&self) -> u32 {
-        if self.own_depth > 0.0 { self.own_depth.recip().round() as u32 } else { 1 }
+    /// Returns how many frames share one depth map, at least 1.
+    pub fn depth_interval(&self) -> u32 {
+        if self.fresh_depth_fraction > 0.0 { self.fresh_depth_fraction.recip().round() as u32 } else { 1 }
     }
 }
 
-/// What was presented in all.
+/// Totals since the start of the preview.
 #[derive(Clone, Debug, Default)]
 pub struct Totals {
     pub presented: u64,
-    /// From the start of the preview to the first frame, in nanoseconds.
+    /// Time from the start of the preview to the first presented frame, in nanoseconds.
     pub first_frame_ns: Option<u64>,
-    /// From capture to the end of presenting.
+    /// Latency from capture to the end of presenting.
     pub latency: Histogram,
-    /// From an input to the picture that shows what it did.
+    /// Latency from an input to the first picture that shows its effect.
     pub reaction: Histogram,
     pub present: Histogram,
 }
 
-/// The instruments' numbers: over the last [`FRAMES`] frames.
+/// Numbers for the instruments over the last [`FRAMES`] frames.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Summary {
-    /// Frames presented a second.
+    /// Presented frames per second.
     pub fps: f64,
-    /// Median and 99th percentile from capture to presented, in milliseconds.
+    /// Median and 99th percentile of the latency from capture to the end of presenting, in milliseconds.
     pub latency_ms: [f64; 2],
-    /// Median and 99th percentile from input to picture, in milliseconds.
+    /// Median and 99th percentile of the latency from input to picture, in milliseconds.
     pub reaction_ms: [f64; 2],
 }
 
 impl Meters {
-    /// The preview started at `now_ns`: the time to the first frame counts from here.
+    /// Sets the start of the preview, from which the time to the first frame counts. Later calls have no effect.
     pub fn begin(&mut self, now_ns: u64) {
-        self.begun_ns.get_or_insert(now_ns);
+        self.started_ns.get_or_insert(now_ns);
     }
 
-    /// Forgets the last frames, for another source. Totals stay.
+    /// Clears the recent frames for a new source; totals remain.
     pub fn restart(&mut self) {
-        let (begun_ns, totals) = (self.begun_ns, std::mem::take(&mut self.totals));
-        *self = Self { begun_ns, totals, ..Self::default() };
+        let (started_ns, totals) = (self.started_ns, std::mem::take(&mut self.totals));
+        *self = Self { started_ns, totals, ..Self::default() };
     }
 
-    /// Counts a frame that was presented at `now_ns` of the run's clock, which took `present_ns`. Allocates nothing.
-    pub fn presented(&mut self, view: &View, now_ns: u64, present_ns: u64) {
+    /// Records a frame presented at `now_ns` (run clock), where presenting took `present_ns`. Does not allocate.
+    pub fn add_frame(&mut self, view: &View, now_ns: u64, present_ns: u64) {
         let latency_ns = now_ns.saturating_sub(view.captured_ns);
         self.count(&view.trace, now_ns, latency_ns, present_ns);
         self.frames = view.frames;
@@ -113,16 +114,17 @@ impl Meters {
         self.totals.presented += 1;
         self.totals.latency.add(latency_ns);
         self.totals.present.add(present_ns);
-        if let (None, Some(begun_ns)) = (self.totals.first_frame_ns, self.begun_ns) {
-            self.totals.first_frame_ns = Some(now_ns.saturating_sub(begun_ns));
+        if let (None, Some(started_ns)) = (self.totals.first_frame_ns, self.started_ns) {
+            self.totals.first_frame_ns = Some(now_ns.saturating_sub(started_ns));
         }
-        let interval_ms = self.last_ns.replace(now_ns).map(|last_ns| now_ns.saturating_sub(last_ns) as f64 * MS);
+        let last_ns = self.last_presented_ns.replace(now_ns);
+        let interval_ms = last_ns.map(|last_ns| now_ns.saturating_sub(last_ns) as f64 * MS);
         self.latency_ms.push(latency_ns as f64 * MS);
         self.stages.add(trace, (latency_ns, present_ns), self.bars.is_empty());
         if self.bars.len() == FRAMES {
             self.bars.pop_front();
         }
-        // All at once, and never again.
+        // Reserves the full capacity on the first frame, so that later frames never allocate.
         self.bars.reserve(FRAMES - self.bars.len());
         self.bars.push_back(Bar {
             blur_ms: (trace.blur_ns as f64 * MS) as f32,
@@ -131,15 +133,15 @@ impl Meters {
         });
     }
 
-    /// Counts an input whose effect was on the screen this much later.
-    pub fn reacted(&mut self, after_ns: u64) {
+    /// Records the latency from an input to its effect on the screen.
+    pub fn add_reaction(&mut self, after_ns: u64) {
         self.totals.reaction.add(after_ns);
         self.reaction_ms.push(after_ns as f64 * MS);
     }
 
-    /// Fills the meters with a plausible run, for pictures of the instruments.
+    /// Fills the meters with a plausible run, for screenshots of the instruments.
     #[cfg(test)]
-    pub fn fill_for_looks(&mut self) {
+    pub fn fill_with_samples(&mut self) {
         let rungs = [Quality::Balanced, Quality::High, Quality::Fast, Quality::Balanced];
         for k in 0..300u64 {
             let mut passes = bokehcam::bokeh::PassTimes::new();
@@ -162,7 +164,7 @@ impl Meters {
             };
             self.count(&trace, k * 33_400_000, 41_000_000 + k * 20_000, 1_900_000);
         }
-        self.reacted(24_000_000);
+        self.add_reaction(24_000_000);
         self.frames.captured = 300;
         self.frames.dropped.late = 2;
         self.frames.dropped.evicted = 5;
@@ -170,15 +172,15 @@ impl Meters {
         self.frames.dropped.unpaired = 31;
     }
 
-    /// The last frames, the oldest first.
+    /// Returns the recent frames, oldest first.
     pub fn bars(&self) -> impl ExactSizeIterator<Item = &Bar> {
         self.bars.iter()
     }
 
-    /// The numbers of the last frames. To be called a few times a second, as it sorts.
+    /// Computes the summary of the recent frames. It sorts, so call it only a few times per second.
     pub fn summary(&self) -> Summary {
         let spread = |window: &Window<FRAMES>| [0.5, 0.99].map(|p| window.percentile(FRAMES, p));
-        // The first frame has no interval.
+        // The first frame has no interval: it is 0.
         let intervals = self.bars().map(|bar| f64::from(bar.interval_ms)).filter(|&ms| ms > 0.0);
         let (count, sum_ms) = intervals.fold((0.0, 0.0), |(count, sum), ms| (count + 1.0, sum + ms));
         Summary {
@@ -190,14 +192,14 @@ impl Meters {
 }
 
 impl Stages {
-    /// Moves the means towards the times of a frame; the first frame sets them.
+    /// Updates the averages with the times of a frame; the first frame initialises them.
     fn add(&mut self, trace: &Trace, (latency_ns, present_ns): (u64, u64), first: bool) {
-        let weight = if first { 1.0 } else { EASE };
+        let weight = if first { 1.0 } else { SMOOTHING };
         let ease = |mean_ms: &mut f64, ns: u64| *mean_ms += (ns as f64 * MS - *mean_ms) * weight;
         let to_screen_ns = latency_ns.saturating_sub(trace.age_ns + present_ns);
         ease(&mut self.between_ms, trace.between_ns + to_screen_ns);
         ease(&mut self.playout_ms, trace.playout_ns);
-        self.own_depth += (f64::from(u8::from(!trace.depth_held)) - self.own_depth) * weight;
+        self.fresh_depth_fraction += (f64::from(u8::from(!trace.depth_held)) - self.fresh_depth_fraction) * weight;
         ease(&mut self.decode_ms, trace.decode_ns);
         ease(&mut self.depth_ms, trace.depth_ns);
         ease(&mut self.blur_ms, trace.blur_ns);
@@ -218,7 +220,7 @@ mod tests {
 
     const PERIOD_NS: u64 = 40_000_000;
 
-    fn ran(frames: u64) -> Meters {
+    fn meters_after(frames: u64) -> Meters {
         let mut meters = Meters::default();
         meters.begin(1_000);
         for k in 0..frames {
@@ -231,7 +233,7 @@ mod tests {
     #[test]
     fn the_last_frames_are_held_oldest_first() {
         for frames in [0, 1, 7, FRAMES as u64, 3 * FRAMES as u64 + 5] {
-            let meters = ran(frames);
+            let meters = meters_after(frames);
             let held = frames.min(FRAMES as u64);
             let blurs: Vec<f32> = meters.bars().map(|bar| bar.blur_ms).collect();
             assert_eq!(blurs.len() as u64, held);
@@ -241,7 +243,7 @@ mod tests {
 
     #[test]
     fn rates_and_percentiles_are_those_of_the_frames() {
-        let meters = ran(100);
+        let meters = meters_after(100);
         let summary = meters.summary();
         assert!((summary.fps - 25.0).abs() < 1e-3, "{summary:?}");
         assert!((summary.latency_ms[0] - 5.049).abs() < 2e-3 && (summary.latency_ms[1] - 5.098).abs() < 2e-3);
@@ -253,8 +255,8 @@ mod tests {
 
     #[test]
     fn another_source_begins_anew_but_totals_go_on() {
-        let mut meters = ran(10);
-        meters.reacted(9_000_000);
+        let mut meters = meters_after(10);
+        meters.add_reaction(9_000_000);
         meters.restart();
         assert_eq!((meters.bars().len(), meters.summary()), (0, Summary::default()));
         assert_eq!((meters.totals.presented, meters.totals.reaction.samples()), (10, 1));
@@ -264,7 +266,7 @@ mod tests {
 
     #[test]
     fn stages_follow_the_frames() {
-        let mut meters = ran(400);
+        let mut meters = meters_after(400);
         assert!((meters.stages.present_ms - 2.0).abs() < 1e-9);
         let mut passes = bokehcam::bokeh::PassTimes::new();
         passes.add("blur", std::time::Duration::from_millis(7));
@@ -287,7 +289,7 @@ mod tests {
                     playout_ns: 7_000_000,
                     ..Trace::default()
                 };
-                // 3 ms from the pipeline to the window, and 2 in it.
+                // 3 ms from the pipeline to the window, and 2 ms to present.
                 meters.count(&trace, k * PERIOD_NS, trace.age_ns + 5_000_000, 2_000_000);
             }
             let stages = meters.stages;
@@ -296,7 +298,7 @@ mod tests {
             assert!((stages.between_ms - 7.0).abs() < 1e-6, "{stages:?}");
             let sum_ms = parts.iter().sum::<f64>();
             assert!((sum_ms - (depth_ms + 25.0)).abs() < 1.5, "{every}: {sum_ms}");
-            assert_eq!(u64::from(stages.depth_every()), every);
+            assert_eq!(u64::from(stages.depth_interval()), every);
         }
     }
 }

@@ -1,4 +1,4 @@
-//! What a session needs of the system: sources, outputs, executors, and the settings file. Errors are one line of text.
+//! System services of a session: sources, outputs, executors, and the settings file. Errors are one line of text.
 
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -10,108 +10,109 @@ use bokehcam::look::{Look, presets::Preset};
 use bokehcam::sink::Sink;
 use bokehcam::source::{Source, devices::Choice};
 
-/// An option of the command line that is not part of the look: its name and its value.
+/// A command-line option that is not part of the look: name and value.
 pub type Switch = (String, String);
 
-/// What a person is asked for.
+/// Kinds of paths that the user can choose.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Browse {
     /// The folder of a recording.
     Folder,
     /// The file of a photo.
     Photo,
-    /// The file of a picture to stand behind the subject.
+    /// The file of a background picture.
     Behind,
 }
 
-/// Asks the person and waits for the answer: the name of a source, or of a file; or nothing. An error is one line.
+/// Opens a file chooser and blocks: returns the name of a source or a file, or `None` if cancelled. Errors are one
+/// line.
 pub type Pick = Box<dyn FnOnce() -> Result<Option<String>, String> + Send>;
 
-/// A source that was opened.
+/// An opened source.
 pub struct Opened {
-    /// What the command line calls it.
+    /// Name on the command line.
     pub name: String,
     /// Its frames and their depth.
     pub source: Source,
-    /// Whether its depth is used: it has some, and that was not declined.
+    /// Whether its depth is used: it has depth, and the user did not decline it.
     pub has_depth: bool,
-    /// The ways to depth that it has, and the one that is used.
+    /// Depth methods it supports, and the active one.
     pub ways: Vec<Way>,
     pub way: Option<Way>,
-    /// Lines for the person: what was assumed, what is missing and where to get it.
+    /// Messages to the user: assumptions, and missing parts with where to get them.
     pub notes: Vec<String>,
-    /// The camera's controls, such as exposure, if it has any.
+    /// The camera's driver controls, such as exposure.
     pub controls: Vec<Knob>,
-    /// What else is known of the camera; nothing of other sources.
+    /// Other properties of the camera; default for other sources.
     pub camera: Camera,
 }
 
-/// What a session needs of the system.
+/// System services that a session needs.
 pub trait Services: Send {
-    /// The sources that can be opened now.
+    /// Returns the available sources.
     fn sources(&mut self) -> Vec<Choice>;
 
-    /// The virtual cameras that can be written to now.
+    /// Returns the available virtual cameras.
     fn virtual_cameras(&mut self) -> Vec<Choice>;
 
-    /// Opens a source; an empty name is the first camera there is, else the demonstration. Its depth is made this `way`, `None`
-    /// for the usual one; a plate is taken at the start.
+    /// Opens a source; an empty name is the first camera, or without a camera the demonstration. `way` is the depth
+    /// method, `None` for the default; a background plate is captured at the start.
     ///
     /// # Errors
-    /// It cannot be opened.
+    /// Fails if it cannot be opened.
     fn open(&mut self, name: &str, way: Option<Way>) -> Result<Opened, String>;
 
-    /// Whether the source of this name can have depth this way now.
+    /// Checks that the source supports this depth method now.
     ///
     /// # Errors
-    /// It cannot: one line, what to do.
+    /// Returns a one-line message with advice if it does not.
     fn can(&mut self, name: &str, way: Way) -> Result<(), String> {
         let _ = (name, way);
         Ok(())
     }
 
-    /// Whether other devices came, or some went, since this was asked last.
+    /// Whether devices appeared or disappeared since the last call.
     fn devices_changed(&mut self) -> bool {
         false
     }
 
-    /// Whether what somebody offers can be a source.
+    /// Checks that `name` is a valid source.
     ///
     /// # Errors
-    /// It cannot: one line.
+    /// Returns a one-line message if it is not.
     fn check(&self, name: &str) -> Result<(), String> {
         let _ = name;
         Ok(())
     }
 
-    /// A way to ask the person for a source, or a file.
+    /// Returns a function that opens a file chooser.
     fn browse(&self, what: Browse) -> Pick {
         let _ = what;
         Box::new(|| Err("there is no file dialog".to_owned()))
     }
 
-    /// Opens the source of this name with pictures of another size (columns, rows) and rate from now on.
+    /// Selects the frame size (width, height) and rate with which this source is opened from now on.
     fn choose_mode(&mut self, name: &str, size: (u32, u32), fps: f64) {
         let _ = (name, size, fps);
     }
 
-    /// Sets a control of the camera that was opened last; gives back all of its controls.
+    /// Sets a driver control of the camera opened last. Returns all of its controls.
     ///
     /// # Errors
-    /// The camera refuses.
+    /// Fails if the camera rejects the value.
     fn turn(&mut self, knob: &str, value: i64) -> Result<Vec<Knob>, String>;
 
-    /// An executor for pictures of `size` pixels.
+    /// Creates an executor for pictures of `size` pixels.
     ///
     /// # Errors
-    /// There is no such GPU.
+    /// Fails if the requested GPU does not exist.
     fn executor(&mut self, settings: &bokeh::Settings, size: (u32, u32)) -> Result<Box<dyn Bokeh>, String>;
 
-    /// Opens an output: a virtual camera or a file, for pictures of `size` pixels every `period_ns`, which end once
+    /// Opens an output, a virtual camera or a file, for pictures of `size` pixels every `period_ns`; it ends once
     /// `stop` is set.
     ///
     /// # Errors
-    /// It cannot be opened.
+    /// Fails if it cannot be opened.
     fn output(
         &mut self,
         name: &str,
@@ -120,37 +121,37 @@ pub trait Services: Send {
         stop: &Arc<AtomicBool>,
     ) -> Result<Box<dyn Sink>, String>;
 
-    /// The command that shows `source` in this look: `bokehcam preview ...` with the window's `switches`, or
+    /// Returns the command that shows `source` with this look: `bokehcam preview ...` with the window's `switches`, or
     /// `bokehcam stream ...` into `outputs`.
     fn command(&self, look: &Look, source: &str, outputs: &[String], switches: &[Switch]) -> String;
 
-    /// The settings: presets are there.
+    /// Returns the settings store, which has the presets.
     fn settings(&mut self) -> &mut dyn SettingsStore;
 }
 
-/// The settings, wherever they are kept.
+/// Persistent settings.
 pub trait SettingsStore: Send {
-    /// The presets, the person's own last, as they are now.
+    /// Returns the current presets, the user's own last.
     fn presets(&mut self) -> Vec<Preset>;
 
-    /// Saves a look under a name of the person's.
+    /// Saves a look as a user preset.
     ///
     /// # Errors
-    /// The settings file cannot be written, or the name cannot be one.
+    /// Fails if the settings file cannot be written or the name is invalid.
     fn save_preset(&mut self, name: &str, look: &Look) -> Result<(), String>;
 
-    /// Gives a preset of the person's another name.
+    /// Renames a user preset.
     ///
     /// # Errors
-    /// As for saving; or there is none, or one of the new name.
+    /// Fails as for saving, if there is no such preset, or if the new name is taken.
     fn rename_preset(&mut self, name: &str, new: &str) -> Result<(), String>;
 
-    /// Deletes a preset of the person's.
+    /// Deletes a user preset.
     ///
     /// # Errors
-    /// The settings file cannot be written, or has no such preset.
+    /// Fails if the settings file cannot be written or lacks the preset.
     fn delete_preset(&mut self, name: &str) -> Result<(), String>;
 
-    /// As [`Services::command`].
+    /// Returns the command line of [`Services::command`].
     fn command(&self, look: &Look, source: &str, outputs: &[String], switches: &[Switch]) -> String;
 }

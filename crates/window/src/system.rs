@@ -1,4 +1,4 @@
-//! [`Services`] by the operating system: real cameras, files and GPUs.
+//! [`Services`] of the operating system: real cameras, files and GPUs.
 
 use std::collections::BTreeMap;
 use std::str::FromStr;
@@ -19,47 +19,47 @@ use bokehcam::sink::{self, Sink, Target};
 use bokehcam::source::devices::{self, Choice};
 use bokehcam::source::{self, DepthChoice, Kind, OneCamera, Options, Size, Source, SourceName, modes};
 
-/// Shown when there is no camera, and the demonstration takes its place.
+/// Shown if there is no camera, and the demonstration replaces it.
 const NO_CAMERA: &str = "No camera was found.";
 /// Shown with the synthetic scene.
 const RENDERED: &str = "This scene is rendered while it plays, as fast as the machine can; `demo` plays smoothly.";
-/// Shown where no network is installed.
+/// Shown if no network is installed.
 const NO_NETWORK: &str = "There is no network yet: `bokehcam models get` gets one, then this finds you.";
-/// Shown where the command line declines the depth that there is.
+/// Shown if the command line declines the source's depth.
 const DECLINED: &str = "This source has depth, and --depth none declines it: leave that out for blur by depth.";
 
-/// Opens everything as the command line would.
+/// Opens sources and outputs like the command line does.
 pub struct System {
-    /// How sources are opened.
+    /// Options for opening sources.
     pub options: Options,
-    /// The look at the start.
+    /// The initial look.
     pub look: Look,
-    /// Makes what blurs.
+    /// Creates executors.
     pub executors: Executors,
-    /// Width and height of virtual cameras; `None`: those of the frames.
+    /// Width and height of virtual cameras; `None` for those of the frames.
     pub out_size: Option<(u32, u32)>,
-    /// Overwrite what exists.
+    /// Whether to overwrite existing files.
     pub force: bool,
-    /// Where settings are kept.
+    /// Persistent settings.
     pub settings: Box<dyn SettingsStore>,
-    /// The sources that were opened, the last one first: they stay on the list, even if they are no cameras.
+    /// Sources opened so far, most recent first: they stay in the list even if they are no cameras.
     opened: Vec<Choice>,
-    /// The camera of which other pictures were chosen, and which.
+    /// Camera name with the frame size and rate chosen for it.
     mode: Option<(String, Size, f64)>,
-    /// The device nodes as they were last, and whether they were others before that.
+    /// Device nodes at the last check, and whether that check found a change.
     nodes: (Vec<String>, bool),
-    /// Values of the camera's knobs that were turned, by name.
-    turned: BTreeMap<String, i64>,
-    /// The camera that was opened last, where it has knobs.
+    /// Values of the driver controls set by the user, by name.
+    control_values: BTreeMap<String, i64>,
+    /// Device of the camera opened last, if it has driver controls.
     camera: Option<String>,
-    /// The way to depth that was chosen in the window.
+    /// Depth method that the user chose in the window.
     way: Option<Way>,
-    /// The source that was opened last by its usual way, and its own ways to depth.
+    /// Name of the source opened last with its default method, and the methods it supports itself.
     own_ways: (String, Vec<Way>),
 }
 
 impl System {
-    /// A system that overwrites nothing; nothing is open yet.
+    /// Creates a system without an open source, which does not overwrite files.
     pub fn new(options: Options, look: Look, settings: Box<dyn SettingsStore>) -> Self {
         Self {
             executors: Executors::new(options.computing.clone()),
@@ -71,19 +71,19 @@ impl System {
             opened: Vec::new(),
             mode: None,
             nodes: (devices::nodes(), false),
-            turned: BTreeMap::new(),
+            control_values: BTreeMap::new(),
             camera: None,
             way: None,
             own_ways: Default::default(),
         }
     }
 
-    /// What is known of the camera that was opened, if it is one alone.
-    fn facts_of(&self, source: &Source, name: &SourceName) -> Camera {
+    /// Returns the properties of the opened source.
+    fn camera_properties(&self, source: &Source, name: &SourceName) -> Camera {
         let is_relative = source.depth_from.is_relative();
         let is_lone = source.depth_from.is_of_pictures();
         let Some(camera) = &self.camera else {
-            // What only PipeWire has is a laptop's own.
+            // A camera known only to PipeWire is a laptop's built-in one.
             let faces_user = is_lone && name.kind() == Kind::Camera;
             return Camera { is_relative, faces_user, ..Camera::default() };
         };
@@ -95,19 +95,19 @@ impl System {
         }
     }
 
-    /// Opens a source to be played for as long as the window is open, with depth whether or not the look needs it.
+    /// Opens a source for continuous playback, with depth even if the current look does not need it.
     fn open_source(&self, name: &str, way: Option<Way>) -> Result<(Source, SourceName), String> {
         let source_name = SourceName::from_str(name).map_err(|error| error.of(name).to_string())?;
         let mut options = self.options.clone();
         if let Some(way) = way {
-            options.depth_choice = self.choice(way);
+            options.depth_choice = self.depth_choice_for(way);
         }
-        // The others have no end.
+        // Only recordings and photos end.
         options.frames.repeat &= matches!(source_name.kind(), Kind::Recording | Kind::Photo);
         if let Some((_, size, fps)) = self.mode.as_ref().filter(|(camera, ..)| camera == name) {
             (options.frames.size, options.frames.fps) = (Some(*size), Some(*fps));
         }
-        // The window may switch to an effect that needs depth later, and does without metres where there are none.
+        // A later look may need depth; without metric settings, relative depth is accepted.
         let look = Look {
             effect: Effect::Auto,
             focus: FocusRule::Auto,
@@ -119,8 +119,8 @@ impl System {
         Ok((source, source_name))
     }
 
-    /// How depth is made this way; what the command line said of depth from elsewhere is the source's own.
-    fn choice(&self, way: Way) -> DepthChoice {
+    /// Returns the depth choice of a method. Depth from elsewhere on the command line counts as the source's own.
+    fn depth_choice_for(&self, way: Way) -> DepthChoice {
         match (way, &self.options.depth_choice) {
             (Way::Measured, choice @ (DepthChoice::Folder(_) | DepthChoice::Device(_) | DepthChoice::Auto)) => {
                 choice.clone()
@@ -136,12 +136,13 @@ impl System {
         }
     }
 
-    /// The ways to depth of a source that was opened by `way`, the usual ones first.
+    /// Returns the depth methods of a source opened with `way`, its own ones first.
     fn ways(&mut self, source: &Source, name: &SourceName, way: Option<Way>) -> Vec<Way> {
         let called = name.to_string();
         if way.is_none() || self.own_ways.0 != called {
             let mut own = Vec::new();
             match name {
+                // Checks the recording itself, because the opened source reveals only the method in use.
                 SourceName::Folder(folder) => {
                     let recording = Recording::open(folder, &Reading { keep_going: true, ..Reading::default() }).ok();
                     let has = |own: &mut Vec<Way>, is: bool, way: Way| own.extend(is.then_some(way));
@@ -161,6 +162,7 @@ impl System {
             ways.extend(installed.matte.is_some().then_some(Way::Person));
             ways.extend((installed.matte.is_some() && installed.mono.is_some()).then_some(Way::PersonAndDistance));
         }
+        // A plate is for live cameras without depth of their own.
         let is_alone = name.kind() == Kind::Camera && self.own_ways.1.is_empty();
         ways.extend(is_alone.then_some(Way::Plate));
         ways
@@ -193,7 +195,7 @@ impl Services for System {
         if lacks {
             return Err(NO_NETWORK.to_owned());
         }
-        // A recording is opened twice without harm; a camera is used already.
+        // A recording can be opened twice to check it; a camera is busy.
         let is_file = SourceName::from_str(name).is_ok_and(|name| matches!(name.kind(), Kind::Recording | Kind::Photo));
         if is_file { self.open_source(name, Some(way)).map(drop) } else { Ok(()) }
     }
@@ -212,7 +214,7 @@ impl Services for System {
             name => name.to_owned(),
         };
         let (source, source_name) = self.open_source(&name, way)?;
-        // Networks that nobody asked for are no news to a person who sees what they do.
+        // Automatically used networks are not announced, because the user sees their effect.
         let is_asked = matches!(self.options.depth_choice, DepthChoice::OneCamera(_)) || way.is_some();
         notes.extend(source.networks.iter().filter(|_| is_asked).map(|networks| format!("Depth by {networks}.")));
         for by in source.networks.iter().chain(&source.persons) {
@@ -226,14 +228,14 @@ impl Services for System {
             notes.push(DECLINED.to_owned());
         }
         let has_depth = source.has_depth() && !is_declined;
-        self.turned.clear();
+        self.control_values.clear();
         notes.extend(source_name.note(&source));
         self.opened.retain(|choice| choice.name != name);
         self.opened.insert(0, Choice::of(&name));
         self.camera = devices::camera_of(&source_name);
         let controls = self.camera.as_deref().map(devices::knobs).unwrap_or_default();
         self.way = way;
-        let camera = self.facts_of(&source, &source_name);
+        let camera = self.camera_properties(&source, &source_name);
         let mut ways = self.ways(&source, &source_name, way);
         let networks = match &self.options.depth_choice {
             DepthChoice::OneCamera(chosen) if chosen.has_networks() => chosen.clone(),
@@ -248,7 +250,7 @@ impl Services for System {
     fn devices_changed(&mut self) -> bool {
         let nodes = devices::nodes();
         let differ = nodes != self.nodes.0;
-        // Once more a moment later: a node is there before everybody may open it.
+        // Reports the change once more at the next check: a new node exists before its access rights are set.
         let again = std::mem::replace(&mut self.nodes, (nodes, differ)).1;
         differ || again
     }
@@ -275,7 +277,7 @@ impl Services for System {
     fn turn(&mut self, knob: &str, value: i64) -> Result<Vec<Knob>, String> {
         let Some(camera) = &self.camera else { return Err("this source has no controls".to_owned()) };
         let controls = devices::turn(camera, knob, value)?;
-        self.turned.insert(knob.to_owned(), value);
+        self.control_values.insert(knob.to_owned(), value);
         Ok(controls)
     }
 
@@ -300,11 +302,12 @@ impl Services for System {
     fn command(&self, look: &Look, source: &str, outputs: &[String], switches: &[Switch]) -> String {
         let mut switches = match outputs {
             [] => switches.to_vec(),
-            // A command that writes to outputs has no window to set options of.
+            // A command that writes to outputs has no window options.
             _ => Vec::new(),
         };
-        if !self.turned.is_empty() {
-            let controls: Vec<String> = self.turned.iter().map(|(name, value)| format!("{name}={value}")).collect();
+        if !self.control_values.is_empty() {
+            let controls: Vec<String> =
+                self.control_values.iter().map(|(name, value)| format!("{name}={value}")).collect();
             switches.push(("control".into(), controls.join(",")));
         }
         if let Some((_, size, fps)) = self.mode.as_ref().filter(|(camera, ..)| camera == source) {

@@ -1,8 +1,8 @@
-//! The window's texts: in English, as they are where they are used, or as a translation has them.
+//! Texts of the window: in English as written in the code, or translated.
 //!
-//! `texts.toml` beside this file is the table of all of them. A translation is that file with the right sides filled in: it
-//! is found by the language of the environment or by `--language`. German comes with the program, in `texts/de.toml`. What the program says elsewhere, such as why a
-//! file cannot be read, is in English.
+//! `texts.toml` next to this file lists all of them. A translation is that file with the right-hand sides filled in; it
+//! is found by the environment's language or by `--language`. German is built in (`texts/de.toml`). Messages from
+//! elsewhere in the program, such as file errors, are in English.
 
 use std::cell::Cell;
 use std::collections::HashMap;
@@ -11,27 +11,27 @@ use std::path::{Path, PathBuf};
 
 use bokehcam::files::{data, input};
 
-/// Texts by their English.
+/// Translations by English text.
 pub type Table = HashMap<String, String>;
 
 thread_local! {
-    /// What this thread, the window's, speaks; English where there is none.
+    /// The translation used on this thread, the window's; `None` for English.
     static TABLE: Cell<Option<&'static Table>> = const { Cell::new(None) };
 }
 
-/// Speaks by this table from now on, on this thread, which is to be called once.
+/// Sets this thread's translation; call once, because the table is leaked.
 pub fn speak(table: Table) {
     TABLE.set(Some(Box::leak(Box::new(table))));
 }
 
-/// A text in the language that is spoken; itself where that has none for it.
+/// Returns the translation of a text, or the text itself if it has none.
 pub fn tr(english: &str) -> &str {
     #[cfg(test)]
-    tests::saw(english);
+    tests::record_text(english);
     TABLE.get().and_then(|table| table.get(english)).filter(|text| !text.is_empty()).map_or(english, String::as_str)
 }
 
-/// The same with values in the places `{}`, in their order.
+/// Returns the translation with `values` inserted at the placeholders `{}`, in order.
 pub fn tr_with(english: &str, values: &[&dyn Display]) -> String {
     let mut text = String::new();
     let mut values = values.iter();
@@ -44,30 +44,31 @@ pub fn tr_with(english: &str, values: &[&dyn Display]) -> String {
     text
 }
 
-/// A sentence in the language that is spoken: where the table has it, as it is or with values in its places `{}` or `{name}`,
-/// which then are in those of the translation. Names and reasons of errors are in no table, and stay.
+/// Translates a complete sentence, matching table entries with the placeholders `{}` or `{name}` and inserting the
+/// values into the translation. Names and error reasons are not in the table and stay unchanged.
 pub fn translated(sentence: &str) -> String {
     let table = TABLE.get().into_iter().flatten();
-    // What has values says most itself where it is longest.
+    // Of several matching entries, the longest is the most specific.
     let said = table.filter(|(_, text)| !text.is_empty()).filter_map(|(english, text)| match english == sentence {
         true => Some((usize::MAX, text.clone())),
-        false => Some((english.len(), filled(text, &values_in(english, sentence)?))),
+        false => Some((english.len(), fill_placeholders(text, &match_values(english, sentence)?))),
     });
     said.max_by_key(|(length, _)| *length).map_or_else(|| sentence.to_owned(), |(_, text)| text)
 }
 
-/// The places of a text with values, and what follows each of them.
-fn places(text: &str) -> impl Iterator<Item = (&str, &str)> {
+/// Returns the placeholders of a text, as name and the literal text that follows.
+fn placeholders(text: &str) -> impl Iterator<Item = (&str, &str)> {
     text.split('{').skip(1).filter_map(|part| part.split_once('}'))
 }
 
-/// What a sentence has in the places of a text; `None` where that is another one. Such a text begins with words of its own.
-fn values_in<'a>(text: &'a str, sentence: &'a str) -> Option<Vec<(&'a str, &'a str)>> {
+/// Matches a sentence against a text with placeholders, and returns name and value of each; `None` if it does not
+/// match. Such texts must begin with a literal part that contains a space.
+fn match_values<'a>(text: &'a str, sentence: &'a str) -> Option<Vec<(&'a str, &'a str)>> {
     let (before, _) = text.split_once('{').filter(|(before, _)| before.contains(' '))?;
     let mut rest = sentence.strip_prefix(before)?;
-    let count = places(text).count();
+    let count = placeholders(text).count();
     let mut values = Vec::new();
-    for (index, (name, after)) in places(text).enumerate() {
+    for (index, (name, after)) in placeholders(text).enumerate() {
         let end = if index + 1 == count { rest.len().checked_sub(after.len())? } else { rest.find(after)? };
         let (value, from) = (rest.get(..end)?, rest.get(end..)?);
         rest = from.strip_prefix(after)?;
@@ -76,25 +77,25 @@ fn values_in<'a>(text: &'a str, sentence: &'a str) -> Option<Vec<(&'a str, &'a s
     rest.is_empty().then_some(values)
 }
 
-/// A translation with values in its places: by their names, or in order where they have none.
-fn filled(text: &str, values: &[(&str, &str)]) -> String {
+/// Fills a translation's placeholders by name, or in order if they are unnamed.
+fn fill_placeholders(text: &str, values: &[(&str, &str)]) -> String {
     let mut filled = text.split('{').next().unwrap_or_default().to_owned();
-    for (index, (name, after)) in places(text).enumerate() {
+    for (index, (name, after)) in placeholders(text).enumerate() {
         let named = values.iter().find(|(other, _)| !name.is_empty() && *other == name).or(values.get(index));
         filled.extend([named.map_or("", |(_, value)| value), after]);
     }
     filled
 }
 
-/// The table to speak by: of the language that was chosen, or of a file; else of the environment's language. `None` is
+/// Returns the translation to use: of the language or file named, else of the environment's language. `None` is
 /// English.
 ///
 /// # Errors
-/// There is no translation into the language that was chosen, or it cannot be read: one line.
+/// Returns a one-line message if there is no such translation, or it cannot be read.
 pub fn chosen(language: Option<&str>) -> Result<Option<Table>, String> {
     let Some(name) = language else {
-        let Some(language) = usual_language() else { return Ok(None) };
-        // Nobody asked for this one: the window is in English then.
+        let Some(language) = environment_language() else { return Ok(None) };
+        // The environment's language was not requested explicitly, so errors fall back to English.
         let own = find(&language)
             .and_then(|path| read(&path).map_err(|line| tracing::warn!("{line}; the window is in English")).ok());
         return Ok(own.or_else(|| built_in(&language)));
@@ -114,8 +115,7 @@ pub fn chosen(language: Option<&str>) -> Result<Option<Table>, String> {
     }
 }
 
-/// The translation into a language, such as `de_AT.UTF-8` or `de`, that comes with the program. A file of the person's has
-/// precedence.
+/// Returns the built-in translation into a language such as `de_AT.UTF-8` or `de`. A user's file has precedence.
 pub fn built_in(language: &str) -> Option<Table> {
     let short = language.split(['.', '@', '_']).next()?;
     let text = match short {
@@ -128,15 +128,15 @@ pub fn built_in(language: &str) -> Option<Table> {
 /// Reads a translation.
 ///
 /// # Errors
-/// It cannot be read, or is no list of texts: one line.
+/// Returns a one-line message if it cannot be read or is no list of texts.
 fn read(path: &Path) -> Result<Table, String> {
     let at = |what: &dyn Display| format!("{}: {what}", path.display()).replace('\n', ", ");
     let text = input::read_text(path, input::MOST_SETTINGS_BYTES).map_err(|error| at(&error))?;
     toml::from_str(&text).map_err(|error: toml::de::Error| at(&error.message()))
 }
 
-/// The file of the translation into `language`, such as `de_AT` or `de`, in the folders for data of the environment; `None`
-/// where there is none, as for English.
+/// Finds the file of a translation into `language`, such as `de_AT` or `de`, in the XDG data folders; `None` if no file
+/// exists, as for English.
 fn find(language: &str) -> Option<PathBuf> {
     let language = language.split(['.', '@']).next().filter(|name| is_name(name))?;
     let short = language.split('_').next().unwrap_or(language);
@@ -147,13 +147,13 @@ fn find(language: &str) -> Option<PathBuf> {
     named(language).or_else(|| named(short))
 }
 
-/// The language of the environment, as POSIX has it.
-fn usual_language() -> Option<String> {
+/// Returns the environment's language, in POSIX's order of precedence.
+fn environment_language() -> Option<String> {
     let set = |name: &str| std::env::var(name).ok().filter(|value| !value.is_empty());
     set("LC_ALL").or_else(|| set("LC_MESSAGES")).or_else(|| set("LANG"))
 }
 
-/// Whether this names a language, and no place among files.
+/// Whether this is a language name and not a path.
 fn is_name(name: &str) -> bool {
     !name.is_empty() && name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_' || c == '-')
 }
@@ -169,16 +169,16 @@ pub mod tests {
         static SEEN: RefCell<BTreeSet<String>> = const { RefCell::new(BTreeSet::new()) };
     }
 
-    pub fn saw(text: &str) {
+    pub fn record_text(text: &str) {
         SEEN.with_borrow_mut(|seen| seen.insert(text.to_owned()));
     }
 
-    /// What was asked for on this thread.
+    /// Returns the texts requested on this thread.
     pub fn seen() -> BTreeSet<String> {
         SEEN.with_borrow(Clone::clone)
     }
 
-    /// The table that translators begin with.
+    /// Returns the template for translators.
     pub fn english() -> Table {
         toml::from_str(include_str!("texts.toml")).unwrap()
     }

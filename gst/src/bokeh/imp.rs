@@ -1,4 +1,4 @@
-//! Pads, properties, events and queries: what GStreamer asks of an element. What becomes of a picture is in `stream`.
+//! Pads, properties, events and queries of the element. `stream` processes the pictures.
 
 use std::sync::{LazyLock, Mutex, MutexGuard, PoisonError};
 
@@ -16,36 +16,36 @@ use crate::settings::{PARAM_SPECS, PROPERTIES, Values};
 pub(super) static CATEGORY: LazyLock<gst::DebugCategory> =
     LazyLock::new(|| gst::DebugCategory::new("bokeh", gst::DebugColorFlags::empty(), Some("bokehcam's element")));
 
-/// Time from picture to picture where nobody says: thirty a second.
-pub(super) const USUAL_PERIOD: gst::ClockTime = gst::ClockTime::from_nseconds(33_333_333);
+/// Default frame period, without a frame rate in the caps: 30 pictures a second.
+pub(super) const DEFAULT_PERIOD: gst::ClockTime = gst::ClockTime::from_nseconds(33_333_333);
 
 pub struct Imp {
     pub(super) sink: gst_base::AggregatorPad,
     pub(super) values: Mutex<Values>,
     pub(super) lateness: Mutex<Lateness>,
     pub(super) counts: Mutex<Counts>,
-    /// Held while a picture is blurred; nothing that must not wait needs it.
+    /// Locked while a picture is blurred; nothing that must not block needs it.
     pub(super) stream: Mutex<Stream>,
 }
 
-/// What became of pictures and maps.
+/// Statistics of pictures and maps.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Counts {
-    /// Pictures that came.
+    /// Pictures received.
     pub pictures: u64,
-    /// Maps that were used.
+    /// Maps used for the first time.
     pub maps: u64,
-    /// Pictures with the map of one before.
+    /// Pictures blurred with an earlier picture's map.
     pub shared: u64,
-    /// Pictures that came too late.
+    /// Pictures dropped because they were late.
     pub late: u64,
-    /// Pictures before the first map.
+    /// Pictures dropped before the first map.
     pub without_map: u64,
     pub quality: &'static str,
 }
 
 pub(super) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    // Nothing is left half done that the next picture would not set anew.
+    // The next picture overwrites any half-written state.
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
@@ -60,7 +60,7 @@ impl ObjectSubclass for Imp {
         Self {
             sink: gst::PadBuilder::<gst_base::AggregatorPad>::from_template(&template).build(),
             values: Mutex::default(),
-            lateness: Mutex::new(Lateness::new(USUAL_PERIOD)),
+            lateness: Mutex::new(Lateness::new(DEFAULT_PERIOD)),
             counts: Mutex::default(),
             stream: Mutex::default(),
         }
@@ -169,13 +169,13 @@ impl AggregatorImpl for Imp {
 
     fn stop(&self) -> Result<(), gst::ErrorMessage> {
         lock(&self.stream).close();
-        lock(&self.lateness).forget();
+        lock(&self.lateness).reset();
         Ok(())
     }
 
     fn flush(&self) -> Result<gst::FlowSuccess, gst::FlowError> {
-        lock(&self.stream).forget();
-        lock(&self.lateness).forget();
+        lock(&self.stream).reset();
+        lock(&self.lateness).reset();
         self.parent_flush()
     }
 
@@ -190,22 +190,22 @@ impl AggregatorImpl for Imp {
                         return false;
                     }
                 };
-                // A picture is blurred within its period, or it is late.
-                let period = pictures.period().unwrap_or(USUAL_PERIOD);
+                // The latency is one period: a picture that takes longer is late.
+                let period = pictures.period().unwrap_or(DEFAULT_PERIOD);
                 lock(&self.stream).set_pictures(pictures);
                 lock(&self.lateness).period = period;
                 self.obj().set_latency(period, Some(period));
                 self.obj().src_pad().mark_reconfigure();
             }
-            gst::EventView::Caps(caps) => lock(&self.stream).set_map_format(MapFormat::of(caps.caps())),
-            // What goes out has the times of what came in.
+            gst::EventView::Caps(caps) => lock(&self.stream).set_map_format(MapFormat::from_caps(caps.caps())),
+            // Output keeps the timestamps of the input.
             gst::EventView::Segment(segment) if is_picture => {
                 if let Some(segment) = segment.segment().downcast_ref::<gst::ClockTime>() {
                     self.obj().update_segment(segment);
                 }
             }
-            gst::EventView::FlushStop(_) if is_picture => lock(&self.stream).forget(),
-            gst::EventView::FlushStop(_) => lock(&self.stream).forget_maps(),
+            gst::EventView::FlushStop(_) if is_picture => lock(&self.stream).reset(),
+            gst::EventView::FlushStop(_) => lock(&self.stream).reset_maps(),
             _ => {}
         }
         self.parent_sink_event(pad, event)
@@ -213,7 +213,7 @@ impl AggregatorImpl for Imp {
 
     fn sink_query(&self, pad: &gst_base::AggregatorPad, query: &mut gst::QueryRef) -> bool {
         match query.view_mut() {
-            // What comes in goes out in the same format.
+            // Output has the format of the input.
             gst::QueryViewMut::Caps(caps) if *pad == self.sink => {
                 let template = pad.pad_template_caps();
                 let wanted = caps.filter().map_or_else(
@@ -229,13 +229,13 @@ impl AggregatorImpl for Imp {
 
     fn src_event(&self, event: gst::Event) -> bool {
         if let (gst::EventView::Qos(qos), true) = (event.view(), lock(&self.values).qos) {
-            lock(&self.lateness).note(qos.get());
+            lock(&self.lateness).record(qos.get());
         }
         self.parent_src_event(event)
     }
 
     fn next_time(&self) -> Option<gst::ClockTime> {
-        // Live, the next picture waits for its depth, but not for ever.
+        // In live pipelines, this is the deadline for waiting for the depth map.
         let picture = self.sink.peek_buffer()?;
         running_time(&self.sink, &picture)
     }
@@ -250,7 +250,7 @@ impl AggregatorImpl for Imp {
         _: Option<&gst::query::Allocation>,
         query: &mut gst::query::Allocation,
     ) -> Result<(), gst::LoggableError> {
-        // Rows may lie as they like.
+        // Any row stride is supported.
         query.add_allocation_meta::<gst_video::VideoMeta>(None);
         Ok(())
     }

@@ -1,4 +1,4 @@
-//! One picture after the other: finds its depth, blurs it, and hands it on.
+//! Processing of pictures: finds the depth map, blurs, and pushes the result.
 
 use std::time::Instant;
 
@@ -9,25 +9,25 @@ use bokehcam::source::{DepthChoice, fitting_look};
 use gst::subclass::prelude::*;
 use gst_base::prelude::*;
 
-use super::imp::{CATEGORY, Imp, USUAL_PERIOD, lock};
+use super::imp::{CATEGORY, DEFAULT_PERIOD, Imp, lock};
 use crate::maps::{Found, MapFormat, Maps, Units, running_time};
 use crate::pictures::Pictures;
 use crate::settings::as_properties;
 
-/// What is known of the stream.
+/// State of the stream.
 #[derive(Default)]
 pub struct Stream {
     depth_pad: Option<gst_base::AggregatorPad>,
     pictures: Option<Pictures>,
     maps: Maps,
     stepper: Option<Stepper>,
-    /// What the stepper was made for: the settings, their version, and whether there is depth.
+    /// Parameters of the stepper: the look, the version of the settings, and whether there is depth.
     look: Look,
     version: u64,
     has_depth: bool,
     time: MediaTime,
-    /// Whether it was said that pictures wait for the first map.
-    has_said: bool,
+    /// Whether the warning about missing maps was posted.
+    has_warned: bool,
 }
 
 impl Stream {
@@ -50,29 +50,29 @@ impl Stream {
         self.maps.format = format;
     }
 
-    /// The caps of what goes out: those of what comes in.
+    /// Returns the caps of the output, which are those of the input.
     pub fn caps(&self) -> Option<gst::Caps> {
         self.pictures.as_ref().map(Pictures::caps)
     }
 
-    /// Another scene comes.
-    pub fn forget(&mut self) {
+    /// Discards the state of past pictures, for a seek or a new scene.
+    pub fn reset(&mut self) {
         self.stepper.iter_mut().for_each(Stepper::forget);
-        self.forget_maps();
-        self.time.forget();
+        self.reset_maps();
+        self.time.reset();
     }
 
-    pub fn forget_maps(&mut self) {
-        self.maps.forget();
+    pub fn reset_maps(&mut self) {
+        self.maps.reset();
     }
 
-    /// Nothing comes any more.
+    /// Discards everything but the pad, at the end of the stream.
     pub fn close(&mut self) {
         *self = Self { depth_pad: self.depth_pad.take(), ..Self::default() };
     }
 
     fn period(&self) -> gst::ClockTime {
-        self.pictures.as_ref().and_then(Pictures::period).unwrap_or(USUAL_PERIOD)
+        self.pictures.as_ref().and_then(Pictures::period).unwrap_or(DEFAULT_PERIOD)
     }
 
     fn find_map(&mut self, due: Option<gst::ClockTime>, is_late: bool) -> Found {
@@ -84,23 +84,23 @@ impl Stream {
     }
 }
 
-/// Time since the first picture, strictly increasing, whatever seeks do to running time.
+/// Time since the first picture, strictly increasing even if seeks reset the running time.
 #[derive(Debug, Default)]
 struct MediaTime {
-    /// Running time less this is media time.
-    ahead_ns: Option<i128>,
+    /// Running time minus media time.
+    offset_ns: Option<i128>,
     last_ns: Option<u64>,
 }
 
 impl MediaTime {
-    fn at(&mut self, due: Option<gst::ClockTime>, period: gst::ClockTime) -> u64 {
+    fn next_ns(&mut self, due: Option<gst::ClockTime>, period: gst::ClockTime) -> u64 {
         let next_ns = self.last_ns.map_or(0, |last_ns| last_ns + period.nseconds());
         let time_ns = due.map_or(next_ns, |due| {
             let due_ns = i128::from(due.nseconds());
-            let ahead_ns = *self.ahead_ns.get_or_insert(due_ns - i128::from(next_ns));
-            let later = u64::try_from(due_ns - ahead_ns).ok().filter(|&ns| self.last_ns.is_none_or(|last| ns > last));
+            let offset_ns = *self.offset_ns.get_or_insert(due_ns - i128::from(next_ns));
+            let later = u64::try_from(due_ns - offset_ns).ok().filter(|&ns| self.last_ns.is_none_or(|last| ns > last));
             later.unwrap_or_else(|| {
-                self.ahead_ns = Some(due_ns - i128::from(next_ns));
+                self.offset_ns = Some(due_ns - i128::from(next_ns));
                 next_ns
             })
         });
@@ -108,16 +108,16 @@ impl MediaTime {
         time_ns
     }
 
-    fn forget(&mut self) {
-        self.ahead_ns = None;
+    fn reset(&mut self) {
+        self.offset_ns = None;
     }
 }
 
 impl Imp {
-    /// The next picture to hand on; `None` where one is left out. `is_late` says that nothing is waited for any more.
+    /// Returns the next output picture, `None` if one is dropped. With `is_late`, the deadline for waiting has passed.
     ///
     /// # Errors
-    /// There will be no more, one is not there yet, or it failed, which is then said.
+    /// Returns `Eos`, `NEED_DATA` if the input is incomplete, or `Error` after posting an error message.
     pub(super) fn next_picture(&self, is_late: bool) -> Result<Option<gst::Buffer>, gst::FlowError> {
         let Some(input) = self.sink.peek_buffer() else {
             return Err(match self.sink.is_eos() {
@@ -135,29 +135,29 @@ impl Imp {
         if let Some(position) = input.pts() {
             self.obj().set_position(position);
         }
-        self.count(found);
-        // An end before any map is as if there were no pad.
+        self.count_map(found);
+        // A depth pad that ends before its first map counts as unlinked.
         if found == Found::Nothing && stream.depth_pad.as_ref().is_some_and(|pad| !pad.is_eos()) {
             lock(&self.counts).without_map += 1;
-            if !std::mem::replace(&mut stream.has_said, true) {
+            if !std::mem::replace(&mut stream.has_warned, true) {
                 const WHY: &str = "pictures are left out until the first depth map comes through the pad depth";
                 gst::element_imp_warning!(self, gst::StreamError::Failed, ("{WHY}"));
             }
             return Ok(None);
         }
         if lock(&self.lateness).is_too_late(due, Instant::now()) {
-            self.leave_out(&input, due);
+            self.drop_late(&input, due);
             return Ok(None);
         }
-        self.control(&input);
-        self.adopt(stream, found != Found::Nothing)?;
+        self.sync_controllers(&input);
+        self.update_stepper(stream, found != Found::Nothing)?;
         self.blur(stream, input, due, period).map_err(|fault| {
             gst::element_imp_error!(self, gst::StreamError::Failed, ("{}", as_properties(&fault)));
             gst::FlowError::Error
         })
     }
 
-    fn count(&self, found: Found) {
+    fn count_map(&self, found: Found) {
         let mut counts = lock(&self.counts);
         counts.pictures += 1;
         match found {
@@ -167,20 +167,20 @@ impl Imp {
         }
     }
 
-    /// Sets the properties that controllers move.
-    fn control(&self, input: &gst::BufferRef) {
+    /// Updates the properties with active controllers.
+    fn sync_controllers(&self, input: &gst::BufferRef) {
         if self.obj().has_active_control_bindings() {
             let segment = self.sink.segment();
             let time = segment.downcast_ref::<gst::ClockTime>().and_then(|segment| segment.to_stream_time(input.pts()));
             if let Some(time) = time {
-                // Fails only where a binding is broken, which its owner is told.
+                // Fails only for a broken binding, which GStreamer logs.
                 let _ = self.obj().sync_values(time);
             }
         }
     }
 
-    /// Makes the stepper follow the settings, and whether there is depth.
-    fn adopt(&self, stream: &mut Stream, has_depth: bool) -> Result<(), gst::FlowError> {
+    /// Applies changed settings to the stepper, or creates it.
+    fn update_stepper(&self, stream: &mut Stream, has_depth: bool) -> Result<(), gst::FlowError> {
         let values = {
             let values = lock(&self.values);
             if stream.stepper.is_some() && (stream.version, stream.has_depth) == (values.version, has_depth) {
@@ -212,7 +212,7 @@ impl Imp {
         });
         match followed {
             Ok(()) => Ok(()),
-            // What was before goes on.
+            // The previous look stays in use.
             Err(fault) if stream.stepper.is_some() => {
                 gst::element_imp_warning!(self, gst::LibraryError::Settings, ("{}", as_properties(&fault)));
                 Ok(())
@@ -224,7 +224,7 @@ impl Imp {
         }
     }
 
-    /// Blurs a picture by the map that was found for it.
+    /// Blurs a picture by its depth map.
     fn blur(
         &self,
         stream: &mut Stream,
@@ -257,9 +257,9 @@ impl Imp {
             };
             maps.read(units, depth)?;
         }
-        let blurred = stepper.step(time.at(due, period)).map_err(|error| error.to_string())?;
+        let blurred = stepper.step(time.next_ns(due, period)).map_err(|error| error.to_string())?;
         let pool = self.obj().buffer_pool().ok_or("there is no pool of buffers")?;
-        // The base class leaves that to who uses it.
+        // The base class leaves activation to the caller.
         if !pool.is_active() {
             pool.set_active(true).map_err(|error| error.to_string())?;
         }
@@ -277,8 +277,8 @@ impl Imp {
         Ok(Some(output))
     }
 
-    /// Counts a picture that comes too late, and says so as elements do.
-    fn leave_out(&self, input: &gst::BufferRef, due: Option<gst::ClockTime>) {
+    /// Counts a late picture, and posts a QoS message.
+    fn drop_late(&self, input: &gst::BufferRef, due: Option<gst::ClockTime>) {
         let (done, late) = {
             let mut counts = lock(&self.counts);
             counts.late += 1;
@@ -292,7 +292,7 @@ impl Imp {
             .stats(gst::format::Buffers::from_u64(done), gst::format::Buffers::from_u64(late))
             .src(&*self.obj())
             .build();
-        // Nobody listens where there is no bus.
+        // Fails only without a bus.
         let _ = self.obj().post_message(message);
     }
 }

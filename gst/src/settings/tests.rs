@@ -1,7 +1,7 @@
 use super::*;
 
 fn place(name: &str) -> usize {
-    SETTINGS.iter().position(|setting| super::called(setting) == name).unwrap()
+    SETTINGS.iter().position(|setting| super::property_name(setting) == name).unwrap()
 }
 
 #[test]
@@ -33,8 +33,8 @@ fn a_lens_takes_the_place_of_a_radius_and_the_other_way_round() {
     let look = lens.on(&Look::default()).unwrap();
     assert_eq!(values.look(&Look::default()), Ok(look.clone()));
     values.set_text(place("coc-at-infinity"), Some("3%".into())).unwrap();
-    let share = Patch::parse([("coc-at-infinity", "3%")]).unwrap().on(&Look::default()).unwrap();
-    assert_eq!(values.look(&look), Ok(share));
+    let percent = Patch::parse([("coc-at-infinity", "3%")]).unwrap().on(&Look::default()).unwrap();
+    assert_eq!(values.look(&look), Ok(percent));
 }
 
 #[test]

@@ -27,7 +27,7 @@ EXAMPLES = """examples:
 
 
 class Parser(argparse.ArgumentParser):
-    """Errors are one line, as the program has them."""
+    """Reports errors in one line, like the program."""
 
     def error(self, message: str) -> NoReturn:
         raise UsageError(message)
@@ -89,7 +89,7 @@ def parser() -> Parser:
 
 
 def number(kind: Callable[[str], float], least: float) -> Callable[[str], float]:
-    """A parser of numbers from `least` on."""
+    """Returns a parser of numbers with the minimum `least`."""
 
     def parse(text: str) -> float:
         value = kind(text)
@@ -102,7 +102,7 @@ def number(kind: Callable[[str], float], least: float) -> Callable[[str], float]
 
 
 def sources_of(given: argparse.Namespace) -> list[str]:
-    """The sources by name, and those of the list."""
+    """Returns the sources of the arguments and of the list."""
     if given.list is None:
         return list(given.sources)
     try:
@@ -112,8 +112,8 @@ def sources_of(given: argparse.Namespace) -> list[str]:
     return [*given.sources] + [line for line in text.splitlines() if line.strip()]
 
 
-def planned(given: argparse.Namespace, rest: list[str]) -> tuple[Job, list[Unit], list[Unit]]:
-    """The job, all that belongs to it, and what of it is to be done."""
+def plan_job(given: argparse.Namespace, rest: list[str]) -> tuple[Job, list[Unit], list[Unit]]:
+    """Returns the job, all of its units, and the unfinished ones."""
     command, flags = plan.split_flags(rest)
     formats = plan.FORMATS[command]
     extension = given.format or formats[0]
@@ -141,7 +141,7 @@ def planned(given: argparse.Namespace, rest: list[str]) -> tuple[Job, list[Unit]
 
 
 def run(arguments: list[str]) -> int:
-    """Runs a farm; its exit code.
+    """Runs a farm and returns the exit code.
 
     Raises:
         UsageError: the arguments are wrong.
@@ -149,7 +149,7 @@ def run(arguments: list[str]) -> int:
     """
     end = arguments.index("--") if "--" in arguments else len(arguments)
     given, rest = parser().parse_intermixed_args(arguments[:end]), arguments[end + 1 :]
-    job, units, left = planned(given, rest)
+    job, units, left = plan_job(given, rest)
     noun = "recordings" if job.command == "stream" else "pictures"
     if not left:
         say(f"{len(units)} of {len(units)} {noun} are in {given.out}, as they were")
@@ -161,23 +161,23 @@ def run(arguments: list[str]) -> int:
     options = drive.Options(given.address, given.cpus, given.gpus, given.shard, given.retries)
     with plan.at_work(job):
         drive.connect(options)
-        # Ray has set a handler of its own.
+        # Replaces Ray's handler.
         signal.signal(signal.SIGTERM, stop)
         try:
             farm = drive.Farm(job, options)
             tally = farm.run(left)
         finally:
             drive.leave()
-    return summed_up(tally, len(units), len(units) - len(left), noun, given.out)
+    return summarise(tally, len(units), len(units) - len(left), noun, given.out)
 
 
 def stop(_signal: int, _frame: FrameType | None) -> NoReturn:
-    """Ends as Ctrl-C does."""
+    """Ends the farm like Ctrl-C."""
     raise KeyboardInterrupt
 
 
-def summed_up(tally: Tally, all_units: int, there_before: int, noun: str, out: str) -> int:
-    """Says what became of all; the exit code."""
+def summarise(tally: Tally, all_units: int, there_before: int, noun: str, out: str) -> int:
+    """Prints the results and returns the exit code."""
     for text, (source, times) in tally.warnings.items():
         if times > 1:
             say(f"warning, of {times} {noun}, such as {source}: {text}")

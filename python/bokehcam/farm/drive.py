@@ -1,6 +1,6 @@
-"""Tasks on a Ray cluster: handed out, tried again where they failed, and accounted for.
+"""Tasks on a Ray cluster: submission, retries, and accounting.
 
-Ray is not asked to try again: here it is known which results of a task are there, and why others are not.
+Ray's own retries are off: this module knows which results of a task exist, and why others failed.
 """
 
 from __future__ import annotations
@@ -21,16 +21,16 @@ from . import work
 from .plan import FarmError
 from .work import Job, Outcome, Result, Unit, finished, frames_of
 
-# Where the program calls its arguments wrong for so many sources, before any result, it is not for the sources.
-REFUSED_AT_MOST = 3
-# So many tasks at least wait for a free place on the nodes, else as many as run.
-LEAST_WAITING = 8
-LOOK_S = 5.0
+# If the program rejects this many sources before the first result, the flags are at fault.
+MAX_REFUSED = 3
+# Minimum number of tasks queued beyond those that can run, so that nodes never wait.
+MIN_WAITING = 8
+NODE_POLL_S = 5.0
 
 
 @dataclass(frozen=True)
 class Options:
-    """How tasks are run: what each takes of a node, and how often one that failed is tried again."""
+    """Resources of each task on a node, and the number of retries."""
 
     address: str | None
     cpus: int
@@ -41,38 +41,38 @@ class Options:
 
 @dataclass
 class Task:
-    """Results that are made together, how often that failed, and what the program said of the one that is tried again."""
+    """Units that run together, the number of failures, and the program's error of a unit that is retried."""
 
     units: list[Unit]
     failed: int = 0
     cause: str = ""
-    # The node where that was.
+    # The node of the failure.
     avoid: str = ""
 
 
 @dataclass
 class Tally:
-    """What became of all."""
+    """Totals of the farm."""
 
     made: int = 0
     frames: int = 0
     elapsed_s: float = 0.0
     nodes: set[str] = field(default_factory=set)
     failed: dict[str, Result] = field(default_factory=dict)
-    # What was said, of which source first, and how often.
+    # Warnings: the text, its first source, and the number of occurrences.
     warnings: dict[str, tuple[str, int]] = field(default_factory=dict)
-    # Why it was ended before everything had been tried, and whether for wrong arguments.
+    # Reason for ending early, and whether the arguments were wrong.
     ended: str = ""
     refused: bool = False
 
     def rate(self) -> str:
-        """How fast frames come from all nodes together."""
+        """Formats the frame rate of all nodes together."""
         return (
             f"{self.frames / max(self.elapsed_s, 1e-3):.1f} frames/s over {len(self.nodes)} node{'s' * (len(self.nodes) != 1)}"
         )
 
     def add(self, frames: int) -> None:
-        """A result is there that has so many frames."""
+        """Counts a result with this number of frames."""
         self.made, self.frames = self.made + 1, self.frames + frames
 
 
@@ -80,7 +80,7 @@ def connect(options: Options) -> None:
     """Joins a cluster, or starts one on this machine; `address` as Ray takes it.
 
     Raises:
-        FarmError: there is none.
+        FarmError: no cluster can be reached.
     """
     os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
     cloudpickle.register_pickle_by_value(work)
@@ -90,11 +90,11 @@ def connect(options: Options) -> None:
         raise FarmError(f"no Ray cluster: {' '.join(str(error).split())}") from error
     largest = max((node["Resources"].get("CPU", 0) for node in ray.nodes() if node["Alive"]), default=0)
     if largest < options.cpus:
-        tell(f"warning: no node has {options.cpus} CPUs (the largest has {largest:g}): waiting for one that joins")
+        print_line(f"warning: no node has {options.cpus} CPUs (the largest has {largest:g}): waiting for one that joins")
 
 
-def tell(line: str) -> None:
-    """A line for people, above the progress bar."""
+def print_line(line: str) -> None:
+    """Prints a line above the progress bar."""
     tqdm.write(line, file=sys.stderr)
 
 
@@ -104,7 +104,7 @@ def leave() -> None:
 
 
 class Farm:
-    """A job at work."""
+    """A running job."""
 
     def __init__(self, job: Job, options: Options):
         self.job, self.options, self.tally = job, options, Tally()
@@ -112,10 +112,10 @@ class Farm:
         self.running: dict[ray.ObjectRef[Outcome], Task] = {}
         self.unfit: dict[str, str] = {}
         self.alive: set[str] = set()
-        self.looked_s, self.places = -LOOK_S, 1
+        self.polled_s, self.places = -NODE_POLL_S, 1
 
     def run(self, units: list[Unit]) -> Tally:
-        """Makes all results that can be made. Interrupted, it stops what runs."""
+        """Runs all units. If interrupted, stops the running tasks."""
         size = self.options.shard if self.job.command == "render" else 1
         waiting = deque(Task(units[start : start + size]) for start in range(0, len(units), size))
         job, started_s = ray.put(self.job), time.monotonic()
@@ -123,16 +123,16 @@ class Farm:
         with tqdm(total=len(units), unit="", disable=None, bar_format="{n_fmt}/{total_fmt} |{bar}| {elapsed}{postfix}") as bar:
             try:
                 while waiting or self.running:
-                    self.look_around()
-                    most = self.places + max(LEAST_WAITING, self.places)
-                    while waiting and len(self.running) < most:
+                    self.update_nodes()
+                    limit = self.places + max(MIN_WAITING, self.places)
+                    while waiting and len(self.running) < limit:
                         task = waiting.popleft()
-                        self.running[self.placed(task).remote(job, task.units)] = task
+                        self.running[self.place(task).remote(job, task.units)] = task
                     refs = list(self.running)
                     if ray.wait(refs, num_returns=1, timeout=1.0)[0]:
-                        # All that have ended meanwhile, as to look takes longer the more there are.
+                        # All finished tasks at once, as polling takes longer the more there are.
                         for ref in ray.wait(refs, num_returns=len(refs), timeout=0)[0]:
-                            waiting.extend(self.note(self.running.pop(ref), ref))
+                            waiting.extend(self.record(self.running.pop(ref), ref))
                     self.end_early(waiting)
                     self.tally.elapsed_s = time.monotonic() - started_s
                     bar.n = self.tally.made + len(self.tally.failed)
@@ -142,44 +142,44 @@ class Farm:
                     ray.cancel(ref, force=True)
         return self.tally
 
-    def look_around(self) -> None:
-        """Notes, every few seconds, which nodes there are."""
-        if time.monotonic() - self.looked_s < LOOK_S:
+    def update_nodes(self) -> None:
+        """Updates the list of nodes every few seconds."""
+        if time.monotonic() - self.polled_s < NODE_POLL_S:
             return
-        self.looked_s = time.monotonic()
+        self.polled_s = time.monotonic()
         alive = [node for node in ray.nodes() if node["Alive"]]
         self.alive = {node["NodeID"] for node in alive}
         self.places = max(1, sum(int(node["Resources"].get("CPU", 0) // self.options.cpus) for node in alive))
         if self.alive and self.alive <= self.unfit.keys():
             self.tally.ended = f"no node is left that can do it: {'; '.join(set(self.unfit.values()))}"
         for ref, task in self.running.items():
-            # It waits for a node that is gone.
+            # The task waits for a node that has left.
             if task.avoid and self.alive <= {*self.unfit, task.avoid}:
                 ray.cancel(ref)
 
-    def placed(self, task: Task) -> Any:
-        """The task for nodes that are fit for it; rather not for the one where it failed, while there are others."""
+    def place(self, task: Task) -> Any:
+        """Restricts the task to fit nodes, and avoids the node of its failure while there are others."""
         if self.alive <= {*self.unfit, task.avoid}:
             task.avoid = ""
         nodes = [*self.unfit, *([task.avoid] if task.avoid else [])]
         return self.perform.options(label_selector={"ray.io/node-id": f"!in({','.join(nodes)})"} if nodes else {})
 
-    def note(self, task: Task, ref: ray.ObjectRef[Outcome]) -> list[Task]:
-        """Takes note of what a task did; what is to be done again."""
+    def record(self, task: Task, ref: ray.ObjectRef[Outcome]) -> list[Task]:
+        """Records the outcome of a task; returns the tasks to retry."""
         try:
             outcome: Outcome = ray.get(ref)
         except ray.exceptions.TaskCancelledError:
             return [task]
         except ray.exceptions.RayError as error:
-            return self.after_death(task, error)
+            return self.retry_after_death(task, error)
         if outcome.unfit:
-            return self.without(outcome, task)
+            return self.exclude_node(outcome, task)
         self.tally.nodes.add(outcome.node)
         again = []
         for result in outcome.results:
             if not result.cause:
                 self.tally.add(result.frames)
-            # What is said twice in the same words, of two nodes where there are two, will be said again.
+            # The same error twice, on two nodes if there are two, would come again.
             elif task.failed >= self.options.retries or task.cause == result.cause:
                 self.give_up(result)
             else:
@@ -188,8 +188,8 @@ class Farm:
             self.warn(result)
         return again
 
-    def after_death(self, task: Task, error: Exception) -> list[Task]:
-        """What is left of a task whose worker or node died."""
+    def retry_after_death(self, task: Task, error: Exception) -> list[Task]:
+        """Returns the tasks to retry after the death of a worker or node."""
         left = []
         for unit in task.units:
             if report := finished(self.job, unit):
@@ -197,7 +197,7 @@ class Farm:
             else:
                 left.append(unit)
         if task.failed < self.options.retries:
-            # Apart from each other, so that one that is to blame takes none with it again.
+            # Separate tasks, so that a fatal unit takes no others with it again.
             return [Task([unit], task.failed + 1, task.cause, task.avoid) for unit in left]
         what = type(error).__name__
         cause = next((line.strip() for line in str(error).splitlines() if line.strip()), what)
@@ -205,31 +205,31 @@ class Farm:
             self.give_up(Result(unit, f"{what}: {cause}"))
         return []
 
-    def without(self, outcome: Outcome, task: Task) -> list[Task]:
-        """Keeps tasks away from a node that is unfit; that was no attempt."""
+    def exclude_node(self, outcome: Outcome, task: Task) -> list[Task]:
+        """Keeps tasks away from an unfit node; this does not count as an attempt."""
         if outcome.node not in self.unfit:
             self.unfit[outcome.node] = outcome.unfit
-            tell(f"warning: {outcome.host} gets no tasks: {outcome.unfit}")
-        self.looked_s = -LOOK_S
+            print_line(f"warning: {outcome.host} gets no tasks: {outcome.unfit}")
+        self.polled_s = -NODE_POLL_S
         return [task]
 
     def give_up(self, result: Result) -> None:
         self.tally.failed[result.unit.output] = result
-        tell(f"failed: {result.unit.source}: {result.cause}")
+        print_line(f"failed: {result.unit.source}: {result.cause}")
 
     def warn(self, result: Result) -> None:
-        """Tells a warning of the program once, and counts it."""
+        """Prints a warning of the program once, and counts it."""
         for text in dict.fromkeys(result.warnings):
             general = text.replace(result.unit.source, "it")
             source, times = self.tally.warnings.get(general, (result.unit.source, 0))
             self.tally.warnings[general] = source, times + 1
             if not times:
-                tell(f"warning: {source}: {text}")
+                print_line(f"warning: {source}: {text}")
 
     def end_early(self, waiting: deque[Task]) -> None:
-        """Ends where it can come to nothing."""
+        """Ends the farm if no unit can succeed."""
         refused = [result for result in self.tally.failed.values() if result.refused]
-        if not self.tally.made and len(refused) >= REFUSED_AT_MOST:
+        if not self.tally.made and len(refused) >= MAX_REFUSED:
             self.tally.refused = True
             self.tally.ended = (
                 f"the program refused the first {len(refused)} sources, so the flags are wrong: {refused[0].cause}"

@@ -1,4 +1,4 @@
-"""What is to be made of which sources, and what of it is there; all that can be wrong is found before anything starts."""
+"""Planning of a job: its units, and which are finished; all errors are found before anything starts."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from .work import HIDDEN, OURS, REPORTS, Job, Unit, finished, located, read_repo
 
 PICTURES = (".png", ".jpg", ".jpeg")
 DEPTH_MAPS = (".png", ".pfm")
-# As the program names the depth map beside a photo.
+# The program's name for the depth map next to a photo.
 DEPTH_SUFFIX = "-depth"
-# What each command can write; the first is the default.
+# Formats that each command can write; the first is the default.
 FORMATS = {"stream": ("mp4", "mkv", "webm", "y4m", "png"), "render": ("png", "jpg")}
-# Flags of the program that the farm gives itself, or that make no sense with it.
+# Flags of the program that the farm sets itself, or that make no sense with it.
 OWN_FLAGS = {
     "stream": (
         "--to",
@@ -37,11 +37,11 @@ OWN_FLAGS = {
     ),
     "render": ("--out", "--depth-map", "--mask", "--like", "--debug-dir", "--force", "--config", "--log-format"),
 }
-MOST_NAME_BYTES = 255
+MAX_NAME_BYTES = 255
 
 
 class UsageError(Exception):
-    """The caller has to write something differently."""
+    """The arguments are wrong."""
 
 
 class FarmError(Exception):
@@ -49,7 +49,7 @@ class FarmError(Exception):
 
 
 def program_at(given: str) -> tuple[str, str]:
-    """The program for the nodes, and what it says of its version. A name without a folder is looked up on each node."""
+    """Returns the program for the nodes, and its version. Each node looks up a name without a folder in its path."""
     found = located(given)
     if not found:
         raise FarmError(f"there is no program {given}: install bokehcam, or name its file with --bokehcam or BOKEHCAM")
@@ -60,7 +60,7 @@ def program_at(given: str) -> tuple[str, str]:
 
 
 def split_flags(rest: list[str]) -> tuple[str, tuple[str, ...]]:
-    """The command of the program, and its flags."""
+    """Splits the arguments into the program's command and its flags."""
     command = "stream"
     if rest and not rest[0].startswith("-"):
         command, rest = rest[0], rest[1:]
@@ -76,7 +76,7 @@ def split_flags(rest: list[str]) -> tuple[str, tuple[str, ...]]:
 
 
 def refuse_bad_flags(program: str, command: str, flags: tuple[str, ...]) -> None:
-    """Lets the program read its flags, without doing anything."""
+    """Lets the program parse its flags without running."""
     needed = ["demo", "--to", "null"] if command == "stream" else ["a.png", "--out", "b.png"]
     asked = subprocess.run(
         [located(program) or program, command, *needed, *flags, "--help"],
@@ -90,7 +90,7 @@ def refuse_bad_flags(program: str, command: str, flags: tuple[str, ...]) -> None
 
 
 def settings() -> tuple[dict[str, str], str]:
-    """The program's settings here: from the environment, and the text of the settings file. They hold on all nodes."""
+    """Returns the program's settings on this machine for all nodes: from the environment, and the settings file's text."""
     environment = {name: value for name, value in os.environ.items() if name.startswith("BOKEHCAM_")}
     given = environment.pop("BOKEHCAM_CONFIG", None)
     folder = Path(os.environ.get("XDG_CONFIG_HOME") or Path.home() / ".config")
@@ -104,15 +104,15 @@ def settings() -> tuple[dict[str, str], str]:
 
 
 def with_defaults(environment: dict[str, str], text: str, cpus: int, gpus: float) -> dict[str, str]:
-    """Settings for tasks that share a node, where neither the environment nor the file (`text`) has them. Without a GPU of
-    its own a task looks for none: results are the same to the bit on all nodes."""
+    """Adds settings for tasks that share a node, unless the environment or the file (`text`) sets them. A task without a
+    GPU uses none: results are the same to the bit on all nodes."""
     defaults = {"threads": str(cpus), "backend": "gpu" if gpus else "cpu"}
     free = {name: value for name, value in defaults.items() if not re.search(rf"(?m)^\s*{name}\s*=", text)}
     return {**{f"BOKEHCAM_{name.upper()}": value for name, value in free.items()}, **environment}
 
 
 def units(command: str, sources: Iterable[str], extension: str, depth_maps: str | None) -> list[Unit]:
-    """What is to be made, in the order of the sources, each with a name that no other one has."""
+    """Returns the units in the order of the sources, each with a unique name."""
     paths = [path for source in sources for path in expanded(command, Path(source))]
     if not paths:
         raise UsageError("there are no sources")
@@ -126,14 +126,14 @@ def units(command: str, sources: Iterable[str], extension: str, depth_maps: str 
             raise UsageError(
                 f"{other} and {path}: the result of both would be {output}; give them to two farms with an --out each"
             )
-        if output in (REPORTS, HIDDEN) or len(os.fsencode(f"{output}.json")) > MOST_NAME_BYTES:
+        if output in (REPORTS, HIDDEN) or len(os.fsencode(f"{output}.json")) > MAX_NAME_BYTES:
             raise UsageError(f"{path}: its result cannot be called {output}; give the source another name")
         planned.append(Unit(str(path), output, depth_of(path, depth_maps) if command == "render" else ()))
     return planned
 
 
 def expanded(command: str, source: Path) -> list[Path]:
-    """One recording; or one picture, or the pictures of a folder."""
+    """Returns a recording, a picture, or the pictures of a folder."""
     path = Path(os.path.abspath(source))
     if not path.exists():
         raise UsageError(f"{source}: there is no such file or folder")
@@ -154,7 +154,7 @@ def expanded(command: str, source: Path) -> list[Path]:
 
 
 def depth_of(picture: Path, folder: str | None) -> tuple[str, ...]:
-    """Arguments for a picture's depth map: of the same name in `folder`, else NAME-depth beside it, if there is one."""
+    """Returns the arguments for a picture's depth map: of the same name in `folder`, else NAME-depth next to it, if any."""
     if folder is not None:
         there = [Path(os.path.abspath(folder)) / f"{picture.stem}{end}" for end in DEPTH_MAPS]
         found = next((path for path in there if path.exists()), None)
@@ -167,7 +167,7 @@ def depth_of(picture: Path, folder: str | None) -> tuple[str, ...]:
 
 
 def to_do(job: Job, planned: list[Unit]) -> list[Unit]:
-    """What is not finished. Whatever else is in the place of a result stays, and is an error."""
+    """Returns the unfinished units. Foreign files in place of a result are kept, and are an error."""
     return [unit for unit in planned if not finished(job, unit) and may_be_made(job, unit)]
 
 
@@ -193,7 +193,7 @@ def may_be_made(job: Job, unit: Unit) -> bool:
 
 @contextmanager
 def at_work(job: Job) -> Iterator[None]:
-    """Makes the folder ready for a job, keeps other farms out of it, and leaves nothing hidden but the lock."""
+    """Prepares the folder for a job, locks it against other farms, and leaves only the lock hidden in it."""
     try:
         for folder in (job.folder, job.folder / REPORTS, job.hidden):
             folder.mkdir(parents=True, exist_ok=True)
@@ -220,7 +220,7 @@ def take(lock: IO[str], job: Job) -> None:
 
 
 def try_link(job: Job) -> None:
-    """Results get their names by links."""
+    """Checks for hard links, by which results are published."""
     link = job.hidden / f"{job.id}-{0:012x}"
     try:
         os.link(job.settings_file, link)
@@ -230,7 +230,7 @@ def try_link(job: Job) -> None:
 
 
 def sweep(hidden: Path, of_job: Callable[[str], bool]) -> None:
-    """Removes what jobs have left, if `of_job` says so of them: attempts that were killed, and settings."""
+    """Removes leftovers of the jobs that `of_job` selects: killed attempts, and settings."""
     for entry in os.scandir(hidden):
         ours = OURS.fullmatch(entry.name)
         if ours and of_job(ours[1]):
@@ -241,5 +241,5 @@ def sweep(hidden: Path, of_job: Callable[[str], bool]) -> None:
 
 
 def new_id() -> str:
-    """Names a job by its time of start, so that older ones come first."""
+    """Returns a job id from the start time, so that ids sort by age."""
     return f"{time.time_ns():016x}"

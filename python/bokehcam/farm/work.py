@@ -1,11 +1,11 @@
-"""What runs on a node: the program as a child, and each of its results exactly once.
+"""Work on a node: runs the program as a child process, and publishes each result exactly once.
 
-An attempt has a folder of its own, hidden within the folder of the results and thus on the same file system. There the
-program writes the result and its report. The report then gets its place in ``reports/``, and last the result gets its
-name by ``link``, which fails where that is taken: of several attempts at one thing one succeeds, and a result that is
-there has its report. What is left of an attempt that was killed is in its folder, where nobody takes it for a result.
+Each attempt has its own folder, hidden in the folder of the results and thus on the same file system. The program
+writes the result and its report there. The report is then moved to ``reports/``, and last the result gets its name by
+``link``, which fails if the name exists: one of several attempts succeeds, and every result has its report. Remains
+of a killed attempt stay in its folder, where they cannot be taken for a result.
 
-Nothing but the standard library is used, and nothing else of this package: Ray brings this module to the nodes.
+Uses only the standard library, and nothing else of this package: Ray sends this module to the nodes.
 """
 
 from __future__ import annotations
@@ -28,15 +28,15 @@ from typing import Any
 
 Report = dict[str, Any]
 
-# Within the folder of the results: their reports, and what is ours alone.
+# Within the folder of the results: reports, and the farm's private files.
 REPORTS = "reports"
 HIDDEN = ".bokehcam-farm"
 # Folders of attempts (JOB-NUMBER) and settings of jobs (JOB.toml), where JOB is its time of start.
 OURS = re.compile(r"([0-9a-f]{16})(-[0-9a-f]{12}|\.toml)")
 
-# Replaces itself by the program, which then dies with its parent (PR_SET_PDEATHSIG, kept by exec) and is deaf to signals
-# that would make it end early and call that a whole result. In a process of its own, because between fork and exec
-# only a process of one thread may run Python safely.
+# Execs the program, which dies with its parent (PR_SET_PDEATHSIG, kept by exec) and has the signals blocked that would
+# end it early with a seemingly complete result. A separate process, because only a single-threaded process may safely
+# run Python between fork and exec.
 PRELUDE = """
 import ctypes, os, signal, sys
 parent, program = int(sys.argv[1]), sys.argv[2]
@@ -50,7 +50,7 @@ os.execv(program, sys.argv[2:])
 
 @dataclass(frozen=True)
 class Unit:
-    """One result: what it is made of, its name in the folder, and arguments that it alone has."""
+    """One result: its source, its name in the folder, and its own arguments."""
 
     source: str
     output: str
@@ -59,7 +59,7 @@ class Unit:
 
 @dataclass(frozen=True)
 class Job:
-    """What all results have in common. `command` is ``stream`` or ``render``, `format` an extension, `environment` that of the
+    """Settings shared by all units. `command` is ``stream`` or ``render``, `format` an extension, `environment` that of the
     program's settings."""
 
     id: str
@@ -82,7 +82,7 @@ class Job:
         return self.hidden / f"{self.id}.toml"
 
     def asked(self, unit: Unit) -> dict[str, Any]:
-        """All that decides what the result looks like. Threads do not."""
+        """Returns everything that determines the result; threads do not."""
         environment = {name: value for name, value in self.environment.items() if name != "BOKEHCAM_THREADS"}
         given = json.dumps([environment, self.settings], sort_keys=True)
         return {
@@ -94,8 +94,8 @@ class Job:
 
 @dataclass(frozen=True)
 class Result:
-    """What became of a unit: the frames that are in its result, or the `cause` why there is none. `refused` says that the
-    program called its arguments wrong."""
+    """Outcome of a unit: the number of frames, or the `cause` of the failure. `refused` is true if the program rejected
+    its arguments."""
 
     unit: Unit
     cause: str = ""
@@ -106,7 +106,7 @@ class Result:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What became of a task. A node that is `unfit`, and why, did nothing."""
+    """Outcome of a task. `unfit` is the reason why the node did nothing."""
 
     host: str
     node: str
@@ -115,7 +115,7 @@ class Outcome:
 
 
 def perform(job: Job, units: list[Unit], node: str = "") -> Outcome:
-    """Makes the results of a task, one after the other; those that are there stay."""
+    """Makes the results of a task in order; existing ones stay."""
     if not node:
         import ray
 
@@ -128,7 +128,7 @@ def perform(job: Job, units: list[Unit], node: str = "") -> Outcome:
 
 
 def fit(job: Job) -> tuple[str, str]:
-    """The program on this node, and why nothing can be made here."""
+    """Returns the program on this node, and the reason if the node is unfit."""
     if not job.settings_file.exists():
         return "", f"{job.folder} is not there, or is another folder: is the shared storage mounted?"
     program = located(job.program)
@@ -141,13 +141,13 @@ def fit(job: Job) -> tuple[str, str]:
 
 
 def located(program: str) -> str | None:
-    """The whole path of a program that is named, or by its path."""
+    """Returns the absolute path of a program, from its name or path."""
     found = shutil.which(program)
     return os.path.abspath(found) if found else None
 
 
 def version_of(program: str) -> str:
-    """What it says of itself; nothing where it is none."""
+    """Returns the program's version line; empty if it is not bokehcam."""
     try:
         asked = subprocess.run([program, "--version"], capture_output=True, text=True, stdin=subprocess.DEVNULL, timeout=60)
     except (OSError, subprocess.SubprocessError):
@@ -157,7 +157,7 @@ def version_of(program: str) -> str:
 
 
 def make(job: Job, unit: Unit, program: str) -> Result:
-    """Makes one result, unless it is there."""
+    """Makes one result, unless it exists."""
     if report := finished(job, unit):
         return Result(unit, frames=frames_of(report))
     place = job.hidden / f"{job.id}-{secrets.token_hex(6)}"
@@ -171,7 +171,7 @@ def make(job: Job, unit: Unit, program: str) -> Result:
 
 
 def attempt(job: Job, unit: Unit, program: str, place: Path) -> Result:
-    """Makes one result in `place`, and gives it its name."""
+    """Makes one result in `place`, and publishes it."""
     part, report_part = place / unit.output, place / "report.json"
     started = time.monotonic()
     code, said = run(job, program, arguments(job, unit, part, report_part))
@@ -185,11 +185,11 @@ def attempt(job: Job, unit: Unit, program: str, place: Path) -> Result:
     if not complete(report, job.command):
         return Result(unit, "its report does not account for all frames", warnings=warnings)
     final = job.folder / unit.output
-    # A report that is there is that of an attempt which did not come further, or of the one that is first; then it stays.
+    # An existing report is that of an attempt without a result, or of the winner; then it stays.
     if not os.path.lexists(final):
         put_report(job, unit, report, report_part)
     if publish(part, final):
-        # Another attempt may have put its own there meanwhile.
+        # Another attempt may have replaced the report meanwhile.
         if read_report(report_of(job.folder, unit)) != report:
             put_report(job, unit, report, report_part)
     elif not finished(job, unit):
@@ -198,19 +198,19 @@ def attempt(job: Job, unit: Unit, program: str, place: Path) -> Result:
 
 
 def arguments(job: Job, unit: Unit, part: Path, report: Path) -> list[str]:
-    """The program's arguments."""
+    """Returns the program's arguments."""
     own = ["--log-format", "json", "--config", str(job.settings_file)]
     common = [*own, job.command, unit.source, *job.flags, *unit.extra]
     if job.command == "render":
         return [*common, "--out", str(part)]
-    # In real time frames may be dropped, and a second run would give another result.
+    # In real time, frames may be dropped, and a second run would give another result.
     to = f"{part}/" if job.format == "png" else str(part)
     return [*common, "--to", to, "--report", str(report), "--pace", "asap"]
 
 
 def run(job: Job, program: str, given: list[str]) -> tuple[int, list[tuple[str, str]]]:
-    """Runs the program to its end; its exit code, and what it said: levels and texts."""
-    # Settings of the node do not count, and without a runtime folder no `bokehcam ctl` that is meant for a camera finds it.
+    """Runs the program to its end; returns its exit code and its log as levels and texts."""
+    # Ignores the node's settings; without a runtime folder, `bokehcam ctl` for a camera cannot reach it.
     left_out = ("BOKEHCAM_", "RUST_LOG", "XDG_RUNTIME_DIR")
     environment = {name: value for name, value in os.environ.items() if not name.startswith(left_out)}
     child = subprocess.run(
@@ -219,14 +219,14 @@ def run(job: Job, program: str, given: list[str]) -> tuple[int, list[tuple[str, 
         stdout=subprocess.DEVNULL,
         stderr=subprocess.PIPE,
         env={**environment, **job.environment},
-        # Where the files lie that flags name without a whole path.
+        # Relative paths in flags count from here.
         cwd=job.working_folder if job.working_folder.is_dir() else job.folder,
     )
     return child.returncode, [message(line) for line in child.stderr.decode(errors="replace").splitlines() if line.strip()]
 
 
 def message(line: str) -> tuple[str, str]:
-    """A line of the program's log: level and text. What others wrote there has no level."""
+    """Parses a line of the program's log: level and text. Lines of other origin have no level."""
     try:
         said = json.loads(line)
         return said["level"], said["fields"]["message"]
@@ -235,7 +235,7 @@ def message(line: str) -> tuple[str, str]:
 
 
 def cause_of(code: int, said: list[tuple[str, str]]) -> str:
-    """Why the program failed, in its own words where it had any."""
+    """Returns the program's own error message, if any, or its signal or exit code."""
     if code < 0:
         killed = f"the program was killed by signal {-code} ({signal.strsignal(-code)})"
         return f"{killed}; perhaps the node has too little memory" if -code == signal.SIGKILL else killed
@@ -244,12 +244,12 @@ def cause_of(code: int, said: list[tuple[str, str]]) -> str:
 
 
 def in_words(job: Job, place: Path, text: str) -> str:
-    """A message of an attempt, as if it had worked on the result itself; in one line."""
+    """Replaces the attempt's folder in a message by that of the results; joins it to one line."""
     return " ".join(text.replace(str(place), str(job.folder)).split())
 
 
 def publish(part: Path, final: Path) -> bool:
-    """Gives a result its name, unless that is taken; whether it has it."""
+    """Publishes a result under its name, unless that exists; returns whether it did."""
     if part.is_dir():
         try:
             os.rename(part, final)
@@ -261,13 +261,13 @@ def publish(part: Path, final: Path) -> bool:
     try:
         os.link(part, final)
     except FileExistsError:
-        # A network file system may repeat what it has done already, when the answer was lost.
+        # A network file system may repeat a completed request whose answer was lost.
         return os.stat(part).st_nlink == 2
     return True
 
 
 def put_report(job: Job, unit: Unit, report: Report, part: Path) -> None:
-    """Gives a report its place, by way of the file `part`."""
+    """Writes a report atomically, through the file `part`."""
     with open(part, "w", encoding="utf-8") as file:
         json.dump(report, file, indent=2)
         file.flush()
@@ -277,7 +277,7 @@ def put_report(job: Job, unit: Unit, report: Report, part: Path) -> None:
 
 
 def sync(folder: Path) -> None:
-    """Waits until the names in a folder are on the disk."""
+    """Flushes a folder's entries to disk."""
     opened = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
     try:
         os.fsync(opened)
@@ -286,12 +286,12 @@ def sync(folder: Path) -> None:
 
 
 def report_of(folder: Path, unit: Unit) -> Path:
-    """Where the report of a result is."""
+    """Returns the path of a result's report."""
     return folder / REPORTS / f"{unit.output}.json"
 
 
 def read_report(path: Path) -> Report | None:
-    """A report; `None` where there is no file, and an empty one where it holds something else."""
+    """Reads a report; returns `None` without a file, and an empty one for other contents."""
     try:
         report = json.loads(path.read_bytes())
     except FileNotFoundError:
@@ -302,7 +302,7 @@ def read_report(path: Path) -> Report | None:
 
 
 def complete(report: Report, command: str) -> bool:
-    """Whether a report was written to its end by a farm, and knows of every frame what became of it."""
+    """Whether a farm completed the report, and it accounts for every frame."""
     if not isinstance(report.get("farm"), dict):
         return False
     if command == "render":
@@ -316,19 +316,19 @@ def complete(report: Report, command: str) -> bool:
 
 
 def frames_of(report: Report) -> int:
-    """The frames of a result; a picture is one."""
+    """Returns the number of frames of a result; 1 for a picture."""
     return int(report["frames"]["delivered"]) if "frames" in report else 1
 
 
 def measure(output: Path) -> dict[str, int]:
-    """How large a result is: a file's bytes, or the number of files in a folder."""
+    """Returns the size of a result: a file's bytes, or the number of files in a folder."""
     if output.is_dir():
         return {"files": len(os.listdir(output))}
     return {"bytes": output.stat().st_size}
 
 
 def finished(job: Job, unit: Unit) -> Report | None:
-    """The whole report of a result that is there, and was made of the same source by the same flags and settings."""
+    """Returns the report of a finished result, made from the same source by the same flags and settings."""
     report = read_report(report_of(job.folder, unit))
     if not report or not complete(report, job.command):
         return None

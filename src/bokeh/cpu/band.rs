@@ -1,5 +1,7 @@
-//! Pass `bin`: the picture becomes linear light, and each bin gets its share of every pixel, premultiplied and
-//! averaged down to its scale, with the coarse grid over it. One reading of the picture serves every bin.
+//! Pass `bin`: converts the picture to linear light, multiplies each pixel by its weight in every bin, and averages the
+//! premultiplied result down to the bin's scale, with the coarse grid. The picture is read once for all bins.
+//!
+//! twin: shaders/bin.wgsl
 
 use pulp::{Simd, WithSimd};
 
@@ -8,48 +10,49 @@ use super::fill::{Behind, HalfRows};
 use super::tent::{MARGIN, WIDE};
 use super::tiles::{BLOCK, TILE_H, TILE_W, Tiles, widen};
 use super::unpack::{Source, Surfaces};
-use crate::bokeh::plan::{CELL, MAX_BINS, Share};
+use crate::bokeh::plan::{BinWeight, CELL, MAX_BINS};
 
-/// Some rows of the picture: whole rows of cells of every bin.
+/// A band of rows of the picture: whole rows of cells of every bin.
 pub struct Band<'a> {
     pub source: Source<'a>,
     pub tiles: &'a Tiles,
-    /// First row, and how many.
+    /// Range of rows.
     pub rows: std::ops::Range<usize>,
-    /// The bins to be filled, from one of the plan's on.
+    /// Buffers of the bins to fill, by the bin's index in the plan.
     pub bins: [Option<BinRows<'a>>; MAX_BINS],
-    /// What near objects hide is left out (to be done when it is filled in), or put in.
+    /// Treatment of pixels that near objects occlude.
     pub hidden: Hidden<'a>,
-    /// Per block, the first bin that has to wait for a fill, or [`NONE`].
+    /// Per block, the first bin that waits for inpainting, or [`NONE`].
     pub waits: &'a mut [usize],
-    /// Memory of the thread.
+    /// Scratch memory of the thread.
     pub sums: &'a mut BandSums,
 }
 
-/// How a band treats what near objects hide.
+/// How a band treats pixels that near objects occlude.
 pub enum Hidden<'a> {
-    /// There is nothing to hide.
+    /// There are no near objects.
     Nothing,
-    /// A layer and those behind it wait where not all is unhidden to it. The picture at half size is laid.
+    /// Before inpainting: a layer and those behind it wait in blocks where anything is occluded for it. The picture at
+    /// half size is written.
     Waits { layers: &'a [Layer], halves: HalfRows<'a> },
-    /// Blocks where a layer waited are done, for its bins alone.
+    /// After inpainting: fills the blocks where a layer waited, for its bins only.
     Filled { first: usize, behind: Behind<'a> },
 }
 
-/// A layer behind others: its first bin, and what of a pixel is not hidden from it.
+/// A layer behind others: its first bin, and the weight of a pixel's own content in it.
 #[derive(Clone, Copy)]
 pub struct Layer {
     pub first: usize,
-    pub unhidden: Share,
+    pub unhidden: BinWeight,
 }
 
-/// Rows from the one that is read to the one that is asked for.
+/// Rows between the row being processed and the row being prefetched.
 const AHEAD: isize = 2;
 
 /// No bin waits.
 pub const NONE: usize = usize::MAX;
 
-/// Sums of a thread, for each bin.
+/// Sums of a thread for each bin.
 pub struct BandSums(Vec<BinSums>);
 
 impl BandSums {
@@ -72,12 +75,12 @@ impl WithSimd for Band<'_> {
 }
 
 impl Band<'_> {
-    /// Adds one block of columns to every bin that it contributes to. In the first pass a block in which anything is hidden
-    /// does the bins that it hides nothing from, and waits for the fill with the others; the passes for the layers behind
-    /// ([`Hidden::Filled`]) do those.
+    /// Adds one block of columns to every bin that it contributes to. In the first pass, a block with occluded pixels
+    /// does only the bins in front of the first layer that needs inpainting; the passes for the layers behind
+    /// ([`Hidden::Filled`]) do the others.
     #[inline(always)]
     fn block<V: Simd>(&mut self, simd: V, block: usize) {
-        // One tile more on every side: a cell's means take in pixels of its neighbours.
+        // One tile more on every side, because the averages of a cell include pixels of its neighbours.
         let tile_columns = (block * (BLOCK / TILE_W)).saturating_sub(1)..(block + 1) * (BLOCK / TILE_W) + 1;
         let tile_rows = (self.rows.start / TILE_H).saturating_sub(1)..self.rows.end.div_ceil(TILE_H) + 1;
         match &self.hidden {
@@ -100,9 +103,9 @@ impl Band<'_> {
             }
             *active = is_filled
                 || bin
-                    .share
+                    .weight
                     .as_ref()
-                    .is_none_or(|share| self.tiles.any_within(share, tile_columns.clone(), tile_rows.clone()));
+                    .is_none_or(|weight| self.tiles.any_within(weight, tile_columns.clone(), tile_rows.clone()));
             match *active {
                 true => reach = reach.max(bin.scale as isize / 2),
                 false => bin.clear(block),
@@ -135,7 +138,7 @@ impl Band<'_> {
                 }
                 Hidden::Filled { behind, .. } => {
                     let width = self.source.size.0;
-                    behind.put(simd, (block * BLOCK) as isize - MARGIN as isize, inside, width, &mut surfaces);
+                    behind.inpaint(simd, (block * BLOCK) as isize - MARGIN as isize, inside, width, &mut surfaces);
                 }
             }
             let mut range = (f32::INFINITY, f32::NEG_INFINITY);
@@ -157,7 +160,7 @@ impl Band<'_> {
     }
 }
 
-/// Columns of a block that hold anything, in whole vectors of the coarsest bin.
+/// Returns the columns of a block inside the picture, rounded up to whole vectors of the coarsest bin.
 fn columns_of(block: usize, width: usize) -> usize {
     (width - block * BLOCK).next_multiple_of(2 * TILE_W).min(BLOCK)
 }

@@ -1,4 +1,6 @@
-//! One bin in the pass `bin`: rows of the picture in, rows of the bin and of its cells out.
+//! One bin in the pass `bin`: adds rows of the picture to rows of the bin and its cells.
+//!
+//! twin: shaders/bin.wgsl, shaders/tent.wgsl
 
 #![allow(clippy::needless_range_loop)] // Planes and columns index several arrays at once.
 
@@ -6,41 +8,42 @@ use pulp::Simd;
 
 use super::cell_sums::{CellSums, accumulate_columns, clear_cells};
 use super::rows::{CELL_PLANES, EMPTY_CELL, STRIP, STRIP_CELLS, STRIP_ROW};
-use super::tent::{MARGIN, Means, PLANE, SUMS, ShareAt, WIDE, is_nothing, reduce, sum_row};
+use super::tent::{MARGIN, Means, PLANE, SUMS, WIDE, WeightAt, is_zero, reduce, sum_row};
 use super::tiles::BLOCK;
 use super::unpack::Surfaces;
-use crate::bokeh::plan::{CELL, COVERAGE_FLOOR, Share};
+use crate::bokeh::plan::{BinWeight, CELL, COVERAGE_FLOOR};
 use crate::compute::aligned::Line;
 use crate::compute::simd::{load, prefetch, store};
 
-/// One bin's memory of a band.
+/// Output of one bin for a band.
 pub struct BinRows<'a> {
-    /// What it takes of a pixel; `None` takes everything (no depth edges to respect).
-    pub share: Option<Share>,
-    /// Pixels of the picture a bin pixel covers, each way.
+    /// Weight of a pixel in the bin; `None` is 1 everywhere (no depth discontinuities).
+    pub weight: Option<BinWeight>,
+    /// Pixels of the picture per bin pixel and axis.
     pub scale: usize,
     /// Columns and rows of the bin.
     pub size: (usize, usize),
-    /// Whether the range of its colours is wanted.
+    /// Whether the range of its colours is needed.
     pub ranged: bool,
     /// Rows of the bin in this band.
     pub rows: usize,
-    /// As [`Strips`](super::rows::Strips) has it.
+    /// Strips of the band, laid out like [`Strips`](super::rows::Strips).
     pub out: &'a mut [f32],
+    /// Strips across.
     pub across: usize,
     /// `[row of cells][CELL_PLANES][across]`.
     pub cells: &'a mut [f32],
-    /// Per block, whether `out` holds anything but zeros there.
+    /// Per block, whether `out` has any non-zero values.
     pub filled: &'a mut [bool],
 }
 
-/// Sums of a bin: two of its rows that are being filled, the last one done, and the row of cells.
+/// Sums of a bin: the two bin rows in progress, the last finished row, and the row of cells.
 #[derive(Clone)]
 pub struct BinSums {
     rows: Line<[[[f32; WIDE]; SUMS]; 2]>,
-    /// Which of the two rows are begun.
+    /// Whether each of the two rows has been started.
     touched: [bool; 2],
-    /// Whether the frame before left anything in the bin where the row of cells is.
+    /// Whether the bin has data of the previous frame at the row of cells.
     stale: bool,
     cells: CellSums,
     means: Means,
@@ -60,10 +63,10 @@ impl BinSums {
     }
 }
 
-/// Rows from the one that is stored to the one that is asked for: a strip of it lies far from the next.
+/// Rows between the row being stored and the row being prefetched, which is far away in memory.
 const AHEAD: usize = 2;
 
-/// Where row `row` of the strip at column `x` begins.
+/// Returns the offset of row `row` of the strip at column `x`.
 #[inline(always)]
 fn strip_row(across: usize, x: usize, row: usize) -> usize {
     (row / CELL * across + x / STRIP) * STRIP_CELLS + row % CELL * STRIP_ROW
@@ -89,13 +92,13 @@ impl BinRows<'_> {
         }
     }
 
-    /// Row `row` of the strip at column `x`.
+    /// Returns row `row` of the strip at column `x`.
     #[inline(always)]
     fn strip_row(&mut self, x: usize, row: usize) -> &mut [f32] {
         &mut self.out[strip_row(self.across, x, row)..][..STRIP_ROW]
     }
 
-    /// Repeats the last column to the end of the last strip.
+    /// Repeats the last column up to the end of the last strip.
     pub fn repeat_end(&mut self) {
         let last = (self.size.0 - 1) % STRIP;
         for row in 0..self.rows {
@@ -114,7 +117,7 @@ impl BinRows<'_> {
         self.rows.div_ceil(CELL)
     }
 
-    /// Adds row `y` of the picture (it may lie outside) to the bin rows of a band that begins at row `first`.
+    /// Adds row `y` of the picture (may be outside it) to the bin rows of a band that begins at row `first`.
     #[inline(always)]
     #[allow(clippy::too_many_arguments)]
     pub fn add<V: Simd, const S: usize>(
@@ -128,7 +131,7 @@ impl BinRows<'_> {
         range: (f32, f32),
     ) {
         let rows = self.rows as isize;
-        let meets = self.share.is_none_or(|share| share.meets(range));
+        let meets = self.weight.is_none_or(|weight| weight.meets(range));
         if S == 1 {
             if (0..rows).contains(&(y - first)) {
                 let row = (block, columns, (y - first) as usize);
@@ -141,7 +144,7 @@ impl BinRows<'_> {
             }
             return;
         }
-        // The bin row above takes this row as the `k + S`-th of its tent, the one below as the `k`-th.
+        // For the bin row above, this is row `k + S` of its tent; for the row below, row `k`.
         let s = S as isize;
         let from = y - first + s / 2;
         let (lower, k) = (from.div_euclid(s), from.rem_euclid(s));
@@ -158,7 +161,7 @@ impl BinRows<'_> {
             let rise = (k as f32 + 0.5) / (S * S) as f32;
             sum_row(
                 simd,
-                &ShareAt::new(simd, &self.share),
+                &WeightAt::new(simd, &self.weight),
                 surfaces,
                 columns,
                 [1.0 / S as f32 - rise, rise],
@@ -186,7 +189,7 @@ impl BinRows<'_> {
         }
     }
 
-    /// Begins a row of cells with its first row.
+    /// Starts a row of cells if this is its first row.
     #[inline(always)]
     fn open_cells(&mut self, (block, _, row): (usize, usize, usize), sums: &mut BinSums) {
         if row.is_multiple_of(CELL) {
@@ -195,7 +198,7 @@ impl BinRows<'_> {
         }
     }
 
-    /// A row that the bin takes nothing of.
+    /// Clears a row without content in this bin.
     #[inline(always)]
     fn empty_row<const S: usize>(&mut self, (block, columns, row): (usize, usize, usize), sums: &BinSums) {
         let x0 = block * BLOCK / S;
@@ -206,7 +209,7 @@ impl BinRows<'_> {
         }
     }
 
-    /// A row of a bin at full scale, straight from the picture.
+    /// Stores a row of a bin at full scale, without averaging.
     #[inline(always)]
     fn whole_row<V: Simd>(
         &mut self,
@@ -215,11 +218,11 @@ impl BinRows<'_> {
         sums: &mut BinSums,
         surfaces: &Surfaces<WIDE>,
     ) {
-        let share = ShareAt::new(simd, &self.share);
+        let weight = WeightAt::new(simd, &self.weight);
         for x in (0..columns.min(self.across * STRIP - block * BLOCK)).step_by(V::F32_LANES) {
-            let taken = share.taken(simd, surfaces, MARGIN + x);
+            let taken = weight.at_surfaces(simd, surfaces, MARGIN + x);
             let out = self.strip_row(block * BLOCK + x, row);
-            if is_nothing(simd, taken) {
+            if is_zero(simd, taken) {
                 if sums.stale {
                     for p in 0..4 {
                         store::<V>(out, p * STRIP + x % STRIP, simd.splat_f32s(0.0));
@@ -227,7 +230,8 @@ impl BinRows<'_> {
                 }
                 continue;
             }
-            let values = share.of(simd, taken, surfaces, MARGIN + x);
+            let values = weight.apply(simd, taken, surfaces, MARGIN + x);
+            // The strips of the next rows are far away in memory.
             let ahead = &self.strip_row(block * BLOCK + x, (row + AHEAD).min(self.rows - 1))[x % STRIP..];
             for p in 0..4 {
                 prefetch(&ahead[p * STRIP..][..V::F32_LANES]);
@@ -236,8 +240,8 @@ impl BinRows<'_> {
             for p in 0..4 {
                 store::<V>(out, p * STRIP + x % STRIP, values[p]);
             }
-            // At full scale a pixel is its own mean: its colour counts whatever its share. Of two surfaces that is the
-            // colour of what the bin takes of both.
+            // At full scale a pixel is its own mean: its colour counts whatever its weight. For two surfaces it is the
+            // colour of their weighted sum.
             let mut own = None;
             if self.ranged {
                 let mut colors = [values[0], values[1], values[2]];
@@ -260,7 +264,7 @@ impl BinRows<'_> {
         self.filled[row / CELL * blocks + block] = true;
     }
 
-    /// Stores the row of cells when its last row is done.
+    /// Stores the row of cells after its last row.
     #[inline(always)]
     fn close_cells<const S: usize>(&mut self, (block, columns, row): (usize, usize, usize), sums: &mut BinSums) {
         if row % CELL == CELL - 1 || row == self.rows - 1 {
@@ -272,7 +276,7 @@ impl BinRows<'_> {
         }
     }
 
-    /// Stores a row of the bin, and adds it to its cells.
+    /// Stores a row of the bin and adds it to its cells.
     #[inline(always)]
     fn finish_row<V: Simd, const S: usize>(
         &mut self,
@@ -296,7 +300,7 @@ impl BinRows<'_> {
             let coverage = load::<V>(&means[3], x);
             let mut own = None;
             if self.ranged {
-                // Unpremultiplied; where hardly anything is, no colour is made of next to nothing.
+                // Unpremultiplied; the floor avoids amplifying the colour of almost empty pixels.
                 let inverse = simd.div_f32s(one, simd.max_f32s(coverage, floor));
                 let mut colors = [inverse; 3];
                 for p in 0..3 {

@@ -1,7 +1,10 @@
-//! Pass `blur`: the low-rank filters over one strip of one bin, rows first, then columns.
+//! Pass `blur`: the low-rank separable filters over one strip of one bin, rows first, then columns (McGraw, *Fast Bokeh
+//! Effects Using Low-Rank Linear Filters*, eq. 2).
 //!
-//! The radius is read at the edges of segments of `SEGMENT` pixels and the taps are linear between them, so that it
-//! varies without steps.
+//! The radius is sampled at the edges of segments of `SEGMENT` pixels, and the taps are linear between them, so that
+//! the blur varies without steps.
+//!
+//! twin: shaders/blur_rows.wgsl, shaders/blur_columns.wgsl
 
 #![allow(clippy::needless_range_loop)] // Terms and planes index several arrays at once.
 
@@ -9,9 +12,7 @@ use std::ops::Range;
 
 use pulp::{Simd, WithSimd};
 
-use super::filter::{
-    BLOCK_ROWS, Taps, along_column, along_column_block, along_row, keep_in_range, most_row_len, row_len,
-};
+use super::filter::{BLOCK_ROWS, Taps, along_column, along_column_block, along_row, keep_in_range, max_row_len, row_len};
 use super::rows::{Cells, EDGE_VALUES, Edges, PIECE, STRIP, STRIP_EDGES, STRIP_ROW, Strips};
 use crate::bokeh::bank::Bank;
 use crate::bokeh::plan::{CELL, Plan, SEGMENT};
@@ -23,52 +24,52 @@ pub const GROUP: usize = 4;
 
 /// One strip of one bin.
 pub struct Strip<'a> {
-    /// The bin; its `out` and `active` are passed on their own.
+    /// The bin's input; `out` and `active` are passed separately.
     pub source: &'a Strips,
     /// Columns and rows of the bin.
     pub size: (usize, usize),
-    /// The grid as measured (what is where).
+    /// The coarse grid with the bin's coverage.
     pub cells: &'a Cells,
     /// Radius and range of colours, from `reach`.
     pub edges: &'a Edges,
     pub bank: &'a Bank,
     /// Whether the bin covers every pixel.
     pub whole: bool,
-    /// Whether the aperture is turned (content in front of the focal plane).
+    /// Whether the aperture is rotated by 180 degrees (content in front of the focal plane).
     pub turned: bool,
-    /// Outermost tap that this bin can need.
+    /// Outermost tap of this bin's filters.
     pub reach: usize,
     pub strip: usize,
     /// `[row][4][STRIP]`: the result.
     pub out: &'a mut [f32],
-    /// Per row of cells, whether the result holds anything: of the last frame before, of this one after.
+    /// Per row of cells, whether the result has any content: of the last frame before, of this one after.
     pub active: &'a mut [bool],
-    /// Memory of the thread.
+    /// Scratch memory of the thread.
     pub scratch: &'a mut Scratch,
 }
 
-/// Rows of the horizontal filters' results that are kept: as many as a block of rows needs, up to a power of two, so
-/// that an index is masked.
+/// Returns the capacity of the ring of horizontally filtered rows: enough for a block of rows, rounded up to a power of
+/// two so that an index is masked.
 fn ring_rows(reach: usize) -> usize {
     (2 * reach + BLOCK_ROWS).next_power_of_two()
 }
 
-/// Memory of one thread for the pass `blur`.
+/// Scratch memory of one thread for the pass `blur`.
 pub struct Scratch {
     /// `[row % ring][term][4][STRIP]`.
     rows: Aligned,
-    /// Rows of a strip and what the filters reach on both sides: `[BLOCK_ROWS][4][STRIP + 2 pad]`.
+    /// Rows of a strip with the filter support on both sides: `[BLOCK_ROWS][4][STRIP + 2 pad]`.
     lines: Aligned,
-    /// Rows of cells whose rows are filtered.
+    /// Rows of cells that have content to filter.
     filtered: Vec<bool>,
 }
 
 impl Scratch {
-    /// Memory for every bin of a plan.
+    /// Allocates for every bin of a plan.
     pub fn new(plan: &Plan) -> Self {
-        let reach = plan.ladder.most_reach();
+        let reach = plan.ladder.max_reach();
         Self {
-            rows: Aligned::zeros(ring_rows(reach) * most_row_len(GROUP.min(plan.ladder.most_terms()))),
+            rows: Aligned::zeros(ring_rows(reach) * max_row_len(GROUP.min(plan.ladder.max_terms()))),
             lines: Aligned::zeros(BLOCK_ROWS * 4 * (STRIP + 2 * reach.next_multiple_of(PIECE))),
             filtered: Vec::with_capacity(plan.height.div_ceil(CELL)),
         }
@@ -82,7 +83,7 @@ impl WithSimd for Strip<'_> {
         if !self.mark_active() {
             return;
         }
-        // A whole bin covers every pixel, and that needs no filter.
+        // A whole bin has coverage 1 everywhere, which needs no filter.
         if self.whole {
             self.filter_groups::<S, 3>(simd);
         } else {
@@ -97,7 +98,7 @@ impl Strip<'_> {
     fn filter_groups<S: Simd, const P: usize>(&mut self, simd: S) {
         let terms = self.bank.terms;
         for first in (0..terms).step_by(GROUP) {
-            match ((terms - first).min(GROUP), self.bank.even) {
+            match ((terms - first).min(GROUP), self.bank.is_symmetric) {
                 (1, true) => self.filter_group::<S, 1, true, P>(simd, first),
                 (2, true) => self.filter_group::<S, 2, true, P>(simd, first),
                 (3, true) => self.filter_group::<S, 3, true, P>(simd, first),
@@ -110,8 +111,8 @@ impl Strip<'_> {
         }
     }
 
-    /// Finds the rows of cells that get a result (`active`), and those whose rows have to be filtered for it: most of a
-    /// bin is empty, as its surface covers part of the picture. False when nothing reaches the strip.
+    /// Finds the rows of cells that get a result (`active`) and those that must be filtered for it: most of a bin is
+    /// empty, because its surface covers part of the picture. Returns false if the strip stays empty.
     #[inline(always)]
     fn mark_active(&mut self) -> bool {
         let (across, down) = (self.reach.div_ceil(CELL), self.reach.div_ceil(CELL));
@@ -125,7 +126,7 @@ impl Strip<'_> {
             let reach = y.saturating_sub(down)..(y + down + 1).min(rows);
             let active = filtered[reach].iter().any(|&f| f);
             let was = std::mem::replace(&mut self.active[y], active);
-            // Clears what the previous frame left there; elsewhere there are zeros already.
+            // Clears the rows written in the previous frame; all others are zero already.
             if was && !active {
                 let end = ((y + 1) * CELL).min(self.size.1);
                 self.out[y * CELL * 4 * STRIP..end * 4 * STRIP].fill(0.0);
@@ -136,7 +137,7 @@ impl Strip<'_> {
 
     /// Filters `R` terms from `first` on: all rows, then all columns.
     #[inline(always)]
-    fn filter_group<S: Simd, const R: usize, const EVEN: bool, const P: usize>(&mut self, simd: S, first: usize) {
+    fn filter_group<S: Simd, const R: usize, const SYMMETRIC: bool, const P: usize>(&mut self, simd: S, first: usize) {
         let mut scratch = std::mem::take(&mut self.scratch.rows);
         let rows = &mut scratch[..ring_rows(self.reach) * row_len::<S>(R)];
         let mut next_y = 0;
@@ -144,25 +145,25 @@ impl Strip<'_> {
             if !self.active[y / CELL] {
                 continue;
             }
-            // A ring of rows, no more than the columns reach, stays in the nearest caches.
+            // The ring holds only the rows that the columns need, so that it stays in the nearest caches.
             let end_y = (y + self.reach + BLOCK_ROWS).min(self.size.1);
             next_y = next_y.max(y.saturating_sub(self.reach));
             while next_y < end_y {
                 let source_ys = next_y..(next_y + BLOCK_ROWS).min(end_y);
-                self.filter_rows::<S, R, EVEN, P>(simd, first, source_ys, rows);
+                self.filter_rows::<S, R, SYMMETRIC, P>(simd, first, source_ys, rows);
                 next_y = (next_y + BLOCK_ROWS).min(end_y);
             }
             let ys = y..(y + BLOCK_ROWS).min(self.size.1);
             prefetch(&self.out[ys.end * STRIP_ROW..(ys.end + BLOCK_ROWS).min(self.size.1) * STRIP_ROW]);
-            self.filter_columns::<S, R, EVEN, P>(simd, first, ys, rows);
+            self.filter_columns::<S, R, SYMMETRIC, P>(simd, first, ys, rows);
         }
         self.scratch.rows = scratch;
     }
 
-    /// The horizontal pass over the rows `ys`, `BLOCK_ROWS` at most: `R` terms from `first` on, all planes of each in turn in
-    /// the ring `rows`.
+    /// Filters the rows `ys` horizontally, at most `BLOCK_ROWS`: `R` terms from `first` on, every plane, into the ring
+    /// `rows`.
     #[inline(always)]
-    fn filter_rows<S: Simd, const R: usize, const EVEN: bool, const P: usize>(
+    fn filter_rows<S: Simd, const R: usize, const SYMMETRIC: bool, const P: usize>(
         &mut self,
         simd: S,
         first: usize,
@@ -175,7 +176,7 @@ impl Strip<'_> {
         // The source's rows are copied `PIECE` columns at a time.
         let pad = self.reach.next_multiple_of(PIECE);
         let span = STRIP + 2 * pad;
-        // All copies come first, as a line is read across the vectors it was written in: at once, that has to wait.
+        // All lines are copied first: unaligned loads right after the stores would stall on store forwarding.
         for (k, y) in ys.clone().enumerate() {
             if self.scratch.filtered[y / CELL] {
                 self.source.copy_line(self.strip, y, self.size.0, pad, &mut lines[k * 4 * span..][..4 * span]);
@@ -197,12 +198,12 @@ impl Strip<'_> {
             let edges = self.edges.at(self.strip, y);
             for x in (0..STRIP).step_by(S::F32_LANES) {
                 let taps = self.taps::<R>(&self.bank.horizontal, first, &edges, x);
-                // The radius is linear between two edges, and the same at both nearly everywhere: then a tap is one number
-                // for the whole vector and not a vector of its own.
+                // The radius is mostly the same at both edges; a tap is then one number for the whole vector instead of
+                // a vector of its own.
                 let sums = if taps.steady {
-                    along_row::<S, R, EVEN, false, P>(simd, &taps, &planes, x + pad)
+                    along_row::<S, R, SYMMETRIC, false, P>(simd, &taps, &planes, x + pad)
                 } else {
-                    along_row::<S, R, EVEN, true, P>(simd, &taps, &planes, x + pad)
+                    along_row::<S, R, SYMMETRIC, true, P>(simd, &taps, &planes, x + pad)
                 };
                 for r in 0..R {
                     for p in 0..P {
@@ -214,9 +215,9 @@ impl Strip<'_> {
         self.scratch.lines = lines;
     }
 
-    /// The vertical pass for the rows `ys` of the result, `BLOCK_ROWS` at most, from the ring of filtered `rows`.
+    /// Filters the rows `ys` of the result vertically, at most `BLOCK_ROWS`, from the ring of filtered `rows`.
     #[inline(always)]
-    fn filter_columns<S: Simd, const R: usize, const EVEN: bool, const P: usize>(
+    fn filter_columns<S: Simd, const R: usize, const SYMMETRIC: bool, const P: usize>(
         &mut self,
         simd: S,
         first: usize,
@@ -229,7 +230,7 @@ impl Strip<'_> {
             *edges = self.edges.at(self.strip, y);
         }
         for x in (0..STRIP).step_by(S::F32_LANES) {
-            // With one radius for the whole picture, the rows of a block have the same taps and share what they read.
+            // With a uniform radius, the rows of a block have the same taps and share their loads.
             if P == 3 && ys.len() == BLOCK_ROWS {
                 let shared = self.taps::<R>(table, first, &edges[0], x);
                 let mut same = true;
@@ -238,7 +239,7 @@ impl Strip<'_> {
                     same &= taps.steady && taps.left == shared.left;
                 }
                 if same {
-                    let sums = along_column_block::<S, R, EVEN, P>(simd, &shared, rows, ys.start, x, self.size.1);
+                    let sums = along_column_block::<S, R, SYMMETRIC, P>(simd, &shared, rows, ys.start, x, self.size.1);
                     for k in 0..BLOCK_ROWS {
                         self.add_to_result::<S, R, P>(simd, first, (x, ys.start + k), sums[k], &edges[k]);
                     }
@@ -248,16 +249,16 @@ impl Strip<'_> {
             for (edges, y) in edges.iter().zip(ys.clone()) {
                 let taps = self.taps::<R>(table, first, edges, x);
                 let sums = if taps.steady {
-                    along_column::<S, R, EVEN, false, P>(simd, &taps, rows, y, x, self.size.1)
+                    along_column::<S, R, SYMMETRIC, false, P>(simd, &taps, rows, y, x, self.size.1)
                 } else {
-                    along_column::<S, R, EVEN, true, P>(simd, &taps, rows, y, x, self.size.1)
+                    along_column::<S, R, SYMMETRIC, true, P>(simd, &taps, rows, y, x, self.size.1)
                 };
                 self.add_to_result::<S, R, P>(simd, first, (x, y), sums, edges);
             }
         }
     }
 
-    /// Adds the sums of a group to the result; after the last group, clamps it.
+    /// Adds the sums of a group to the result, and clamps it after the last group.
     #[inline(always)]
     fn add_to_result<S: Simd, const R: usize, const P: usize>(
         &mut self,
@@ -285,7 +286,7 @@ impl Strip<'_> {
         }
     }
 
-    /// The taps in `table` of the vector at column `x` of the strip, for the terms from `first` on.
+    /// Returns the taps in `table` for the vector at column `x` of the strip, for the terms from `first` on.
     #[inline(always)]
     fn taps<'b, const R: usize>(
         &self,

@@ -1,4 +1,4 @@
-//! What the coarse grid over a bin is summed from: a row of cells, column by column.
+//! Accumulators of the coarse grid over a bin: one row of cells, column by column.
 
 #![allow(clippy::needless_range_loop)] // Planes index several arrays at once.
 
@@ -10,10 +10,10 @@ use crate::bokeh::plan::COVERAGE_FLOOR;
 use crate::compute::aligned::Line;
 use crate::compute::simd::{load, store};
 
-/// The rows of a row of cells so far, column by column.
+/// Partial sums of a row of cells, column by column.
 pub type CellSums = Line<[[f32; PLANE]; CELL_PLANES]>;
 
-/// Makes the cells empty.
+/// Empties the cells.
 #[inline(always)]
 pub fn clear_cells(cells: &mut CellSums) {
     for (plane, &value) in cells.0.iter_mut().zip(&EMPTY_CELL) {
@@ -21,8 +21,8 @@ pub fn clear_cells(cells: &mut CellSums) {
     }
 }
 
-/// Adds a vector of bin pixels to the sums of a row of cells, column by column: coverage and coverage times |CoC|, and with
-/// `own` the lowest and highest colour.
+/// Adds a vector of bin pixels to a row of cells, column by column: coverage, coverage times |CoC|, and with `own` the
+/// lowest and highest colour.
 #[inline(always)]
 pub fn accumulate_columns<V: Simd>(
     simd: V,
@@ -37,7 +37,7 @@ pub fn accumulate_columns<V: Simd>(
     }
     let Some(own) = own else { return };
     let cells = &mut cells.0;
-    // Without coverage there is no colour: an addition puts it out of range.
+    // A pixel without coverage has no colour: an offset moves it out of range.
     let counts = simd.greater_than_f32s(sums[0], simd.splat_f32s(COVERAGE_FLOOR));
     let beyond = simd.select_f32s(counts, simd.splat_f32s(0.0), simd.splat_f32s(NO_COLOR));
     for p in 0..3 {

@@ -1,4 +1,6 @@
-//! Pass `composite`: the blurred bins, front to back, become one picture; back to its pixels' kind.
+//! Pass `composite`: combines the blurred bins, front to back, into one picture of the input's pixel kind.
+//!
+//! twin: shaders/composite.wgsl, shaders/surfaces.wgsl
 
 #![allow(clippy::needless_range_loop)] // Planes and columns index several arrays at once.
 
@@ -17,25 +19,25 @@ use crate::color::luminance;
 use crate::compute::aligned::Line;
 use crate::compute::simd::{fma, load, madd, prefetch, store};
 
-/// Makes rows `y0..` of the result: a row of tiles.
+/// Computes rows `y0..` of the result: a row of tiles.
 pub struct Composite<'a, T> {
     pub plan: &'a Plan,
     pub slots: &'a [Slot],
-    /// Tells which tiles stay as they are.
+    /// Tiles, some of which stay unchanged.
     pub tiles: &'a Tiles,
-    /// Tell where something behind can show.
+    /// Where the background is visible past a silhouette.
     pub silhouettes: &'a Silhouettes,
-    /// The frame as it came, and its pixels.
+    /// The input frame and its pixels.
     pub frame: &'a Source<'a>,
     pub pixels: &'a [T],
-    /// `[row][3][width]`, from the gather.
+    /// Result of the gather, `[row][3][width]`.
     pub gathered: &'a [f32],
-    /// Back to 8 bits.
+    /// Table from linear light to 8 bits.
     pub encode: &'a EncodeTable,
     pub y0: usize,
-    /// Memory of the thread.
+    /// Scratch memory of the thread.
     pub layers: &'a mut Layers,
-    /// Whole rows of RGB.
+    /// Output: whole rows of RGB.
     pub out: &'a mut [T],
 }
 
@@ -46,7 +48,7 @@ impl<T: Sample> WithSimd for Composite<'_, T> {
         let width = self.plan.width;
         let row_of_tiles = self.y0 / TILE_H * self.tiles.across;
         let out = std::mem::take(&mut self.out);
-        self.layers.begin(self.plan.near_to());
+        self.layers.begin(self.plan.near_end());
         let layered = self.plan.compositing == Compositing::Layers;
         let (mut color, mut coc_px) = (Line([[0.0; CHUNK]; 3]), [0.0; CHUNK]);
         for x0 in (0..width).step_by(CHUNK) {
@@ -64,16 +66,18 @@ impl<T: Sample> WithSimd for Composite<'_, T> {
                 let row = &mut row[x0 * 3..][..take * 3];
                 match self.plan.compositing {
                     Compositing::Layers => {
+                        // In focus, and nothing near spreads here: the input is the result.
                         if !self.read_layers(simd, y, x0, still) {
                             row.copy_from_slice(&self.pixels[(y * width + x0) * 3..][..take * 3]);
                             continue;
                         }
+                        // Several surfaces are visible only near silhouettes; elsewhere a cheaper compositing suffices.
                         let reaching = if may_reach { self.silhouettes.reaching(y, x0) } else { None };
-                        let of_one_surface = reaching.is_none() && self.layers.are_of_one_surface(ranges);
-                        if !of_one_surface {
+                        let is_one_surface = reaching.is_none() && self.layers.have_one_surface(ranges);
+                        if !is_one_surface {
                             coc_row(self.frame, y, x0, &mut coc_px[..take]);
                         }
-                        self.layers.flatten(simd, &reaching, &coc_px, of_one_surface, &mut color);
+                        self.layers.composite(simd, &reaching, &coc_px, is_one_surface, &mut color);
                     }
                     Compositing::Select => self.select(simd, y, x0, take, &mut color.0),
                     Compositing::Gather => copy_gathered(self.gathered, width, y, x0, &mut color.0),
@@ -86,7 +90,7 @@ impl<T: Sample> WithSimd for Composite<'_, T> {
 }
 
 impl<T> Composite<'_, T> {
-    /// Asks for what the bins have of a chunk of `rows` rows.
+    /// Prefetches the bins of a chunk of `rows` rows.
     #[inline(always)]
     fn prefetch(&self, x0: usize, rows: usize) {
         for bin in &self.plan.bins {
@@ -106,7 +110,8 @@ impl<T> Composite<'_, T> {
         }
     }
 
-    /// Reads the bins that hold anything in a chunk; false where it is `still` and nothing near reaches it: it stays.
+    /// Reads the bins with content in a chunk. Returns false if the chunk stays unchanged: it is `still` and nothing
+    /// near spreads there.
     #[inline(always)]
     fn read_layers<S: Simd>(&mut self, simd: S, y: usize, x0: usize, still: bool) -> bool {
         let (plan, layers) = (self.plan, &mut *self.layers);
@@ -115,18 +120,18 @@ impl<T> Composite<'_, T> {
             if still && !bin.near && layers.count() == 0 {
                 return false;
             }
-            if sample(simd, bin, &self.slots[bin.slot], y, x0, layers.next()) {
-                layers.keep(bin);
+            if sample(simd, bin, &self.slots[bin.slot], y, x0, layers.next_buffer()) {
+                layers.push(bin);
             }
         }
         true
     }
 
-    /// The colour of a chunk of `take` pixels, from the bins of each pixel's own CoC, by their share of it.
+    /// Computes the colour of a chunk of `take` pixels from the bins at each pixel's own CoC, by their weights.
     #[inline(always)]
     fn select<S: Simd>(&mut self, simd: S, y: usize, x0: usize, take: usize, color: &mut [[f32; CHUNK]; 3]) {
         self.layers.clear();
-        let layer = self.layers.next();
+        let layer = self.layers.next_buffer();
         let mut coc = [0.0; CHUNK];
         coc_row(self.frame, y, x0, &mut coc[..take]);
         *color = [[0.0; CHUNK]; 3];
@@ -134,9 +139,9 @@ impl<T> Composite<'_, T> {
             if !sample(simd, bin, &self.slots[bin.slot], y, x0, layer) {
                 continue;
             }
-            let share = self.plan.share(k);
+            let bin_weight = self.plan.share(k);
             for x in 0..CHUNK {
-                let weight = share.at(coc[x]) / if layer[3][x] > 1e-6 { layer[3][x] } else { 1e-6 };
+                let weight = bin_weight.at(coc[x]) / if layer[3][x] > 1e-6 { layer[3][x] } else { 1e-6 };
                 for p in 0..3 {
                     color[p][x] = madd::<S>(layer[p][x], weight, color[p][x]);
                 }
@@ -154,43 +159,44 @@ fn copy_gathered(rows: &[f32], width: usize, y: usize, x0: usize, color: &mut [[
     }
 }
 
-/// Reads a chunk of a bin at the picture's scale (linear interpolation); false when there is nothing in it.
+/// Reads a chunk of a bin at the picture's scale with linear interpolation. Returns false if it is empty.
 #[inline(always)]
 fn sample<S: Simd>(simd: S, bin: &Bin, slot: &Slot, y: usize, x0: usize, out: &mut [[f32; CHUNK]; 4]) -> bool {
     if !slot.present {
         return false;
     }
     let along = ((y as f32 + 0.5) / bin.scale as f32 - 0.5).clamp(0.0, (bin.height - 1) as f32);
-    let (above, share) = (along as usize, along.fract());
+    let (above, fraction) = (along as usize, along.fract());
     let below = (above + 1).min(bin.height - 1);
     let columns = (x0 / bin.scale).saturating_sub(1)..(x0 + CHUNK) / bin.scale + 1;
-    let holds = |y: usize| slot.strips(columns.clone()).any(|strip| slot.is_active(strip, y, bin.height));
-    if !holds(above) && !holds(below) {
+    let has_content = |y: usize| slot.strips(columns.clone()).any(|strip| slot.is_active(strip, y, bin.height));
+    if !has_content(above) && !has_content(below) {
         return false;
     }
     match bin.scale {
-        1 => upsample::<S, 1>(simd, slot, bin.height, (above, below, share), x0, out),
-        2 => upsample::<S, 2>(simd, slot, bin.height, (above, below, share), x0, out),
-        4 => upsample::<S, 4>(simd, slot, bin.height, (above, below, share), x0, out),
-        _ => upsample::<S, 8>(simd, slot, bin.height, (above, below, share), x0, out),
+        1 => upsample::<S, 1>(simd, slot, bin.height, (above, below, fraction), x0, out),
+        2 => upsample::<S, 2>(simd, slot, bin.height, (above, below, fraction), x0, out),
+        4 => upsample::<S, 4>(simd, slot, bin.height, (above, below, fraction), x0, out),
+        _ => upsample::<S, 8>(simd, slot, bin.height, (above, below, fraction), x0, out),
     }
     true
 }
 
-/// A chunk of a bin of scale `S`, linear between rows `above` and `below` (by `share`) and between columns.
+/// Upsamples a chunk of a bin of scale `S`: linear between rows `above` and `below` (fraction `fraction`) and between
+/// columns.
 #[inline(always)]
 fn upsample<V: Simd, const S: usize>(
     simd: V,
     slot: &Slot,
     height: usize,
-    (above, below, share): (usize, usize, f32),
+    (above, below, fraction): (usize, usize, f32),
     x0: usize,
     out: &mut [[f32; CHUNK]; 4],
 ) {
     let width = slot.source.across * STRIP;
-    let share = simd.splat_f32s(share);
+    let fraction = simd.splat_f32s(fraction);
     let (first, end) = (x0 / S, ((x0 + CHUNK) / S).min(width));
-    // A piece lies in one strip.
+    // A piece is inside one strip.
     let piece =
         |x: usize, y: usize, p: usize| &slot.out[((x / STRIP * height + y) * 4 + p) * STRIP + x % STRIP..][..PIECE];
     if S == 1 {
@@ -210,7 +216,7 @@ fn upsample<V: Simd, const S: usize>(
             let line = &mut line[PIECE + x - first..][..PIECE];
             for k in (0..PIECE).step_by(V::F32_LANES) {
                 let (a, b) = (load::<V>(a, k), load::<V>(b, k));
-                store::<V>(line, k, fma(simd, simd.sub_f32s(b, a), share, a));
+                store::<V>(line, k, fma(simd, simd.sub_f32s(b, a), fraction, a));
             }
         }
         if first == 0 {
@@ -238,7 +244,7 @@ fn upsample<V: Simd, const S: usize>(
     }
 }
 
-/// Undoes the expansion of a chunk's highlights.
+/// Reverses the highlight expansion of a chunk.
 #[inline(always)]
 fn compress_highlights(color: &mut [[f32; CHUNK]; 3], expansion: f32) {
     if expansion.is_finite() {

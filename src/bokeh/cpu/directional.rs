@@ -1,5 +1,8 @@
-//! Directional interpolation, a part of the pass `fill`: outlines run on behind what hides them ([`DIRECTIONS`]). A quarter of
-//! the picture's size is fine enough for it.
+//! Directional inpainting, a part of the pass `fill`: continues outlines behind an occluder ([`DIRECTIONS`], after
+//! Bertalmio et al., *Image Inpainting*, SIGGRAPH 2000, section 3). Works at a quarter of the picture's size, which is
+//! fine enough.
+//!
+//! twin: shaders/directional.wgsl
 
 #![allow(clippy::needless_range_loop)] // Planes and directions index several arrays at once.
 
@@ -9,33 +12,33 @@ use pulp::{Arch, Simd, WithSimd};
 
 use super::levels::{Level, PLANES};
 use super::silhouettes::Silhouettes;
-use crate::bokeh::occlusion::{DIRECTIONS, GRAIN, MOST_STEPS, ONE_ENDED, ONE_SURFACE_PX, TRUSTED_STEPS, likeness};
+use crate::bokeh::occlusion::{DIRECTIONS, GRAIN, MAX_STEPS, ONE_ENDED, ONE_SURFACE_PX, TRUSTED_STEPS, likeness};
 use crate::compute::thread_pool::{MOST_ITEMS, ThreadPool};
 
-/// Columns beside a row of steps, so that a step sideways stays in it.
+/// Padding columns beside a row of steps, so that a sideways step stays inside it.
 const PAD: usize = 2;
-/// Ways to look: each direction, and back.
+/// Search directions: each line both ways.
 const WAYS: usize = 2 * DIRECTIONS.len();
-/// Pixels of the picture a side of one of the level, which is a cell of the silhouettes' grid.
+/// Pixels of the picture per side of a level's pixel, which is a cell of the silhouettes' grid.
 const PIXEL: usize = GRAIN;
-/// Steps, where there is no end that way: they saturate there.
+/// Step count without an end in that direction: steps saturate there.
 const NONE: u8 = u8::MAX;
-const _: () = assert!(MOST_STEPS == NONE - 1);
+const _: () = assert!(MAX_STEPS == NONE - 1);
 
-/// What a level knows, and how far that is from each pixel that knows nothing.
+/// The known pixels of a level, and the distances to them from each hidden pixel.
 pub struct Directional {
     width: usize,
     height: usize,
-    /// Light and CoC of the pixels that know something.
+    /// Light and CoC of the known pixels.
     ends: Vec<[f32; 4]>,
-    /// [`NONE`] where nothing is known, and beside the picture, else 0.
+    /// [`NONE`] where unknown and outside the picture, else 0.
     open: Vec<u8>,
-    /// A plane like `open` for each way: steps to the next pixel that knows something.
+    /// For each way, a plane like `open`: steps to the next known pixel.
     steps: Vec<u8>,
 }
 
 impl Directional {
-    /// Memory for a level of `width` x `height`.
+    /// Allocates for a level of `width` x `height`.
     pub fn new(width: usize, height: usize) -> Self {
         let padded = (width + 2 * PAD) * height;
         Self {
@@ -47,7 +50,7 @@ impl Directional {
         }
     }
 
-    /// Fills those pixels of a level that know nothing, as far as they see any that do, where silhouettes uncover them.
+    /// Fills the unknown pixels of a level that silhouettes uncover and whose lines reach a known pixel.
     pub fn fill(&mut self, level: &mut Level, silhouettes: &Silhouettes, workers: &mut ThreadPool, arch: Arch) {
         let (width, stride) = (self.width, self.stride());
         let each = self.height.div_ceil(MOST_ITEMS);
@@ -71,11 +74,11 @@ impl Directional {
     }
 }
 
-/// Lengths of a step in each direction.
+/// Length of a step in each direction.
 const LENGTHS: Lines = [1.0, SQRT_5, SQRT_2, SQRT_5, 1.0, SQRT_5, SQRT_2, SQRT_5];
 const SQRT_5: f32 = 2.236_068;
 
-/// The step of a way, across and down.
+/// Returns the step of a way, across and down.
 #[inline(always)]
 fn step_of(way: usize) -> (isize, isize) {
     let (across, down) = DIRECTIONS[way / 2];
@@ -83,7 +86,7 @@ fn step_of(way: usize) -> (isize, isize) {
     (sign * across as isize, sign * down as isize)
 }
 
-/// What some rows of the level know, from row `first` on.
+/// Collects the known pixels of some rows of the level, from row `first` on.
 struct Survey<'a> {
     level: &'a Level,
     first: usize,
@@ -111,7 +114,7 @@ impl WithSimd for Survey<'_> {
     }
 }
 
-/// The steps of a way, from those of the pixel that is one step on.
+/// Distance transform along one way: steps of a pixel = steps of the pixel one step on, plus 1.
 struct Walk<'a> {
     way: usize,
     open: &'a [u8],
@@ -128,7 +131,7 @@ impl WithSimd for Walk<'_> {
         let columns = PAD..stride - PAD;
         let next = (PAD as isize + across) as usize;
         for k in 0..height {
-            // Rows in the order in which the one that is a step on comes first.
+            // In the order that makes the pixel one step on come first.
             let y = if down > 0 { height - 1 - k } else { k };
             let open = &open[y * stride..][..stride];
             let (before, rest) = steps.split_at_mut(y * stride);
@@ -140,7 +143,7 @@ impl WithSimd for Walk<'_> {
                         row[x] = open[x] & row[(x as isize + across) as usize].saturating_add(1);
                     }
                 }
-                // Outside the picture there is no end.
+                // Outside the picture there is no known pixel.
                 _ if y as isize + down < 0 || y as isize + down >= height as isize => {
                     row[columns.clone()].copy_from_slice(&open[columns.clone()]);
                 }
@@ -159,7 +162,7 @@ impl WithSimd for Walk<'_> {
     }
 }
 
-/// What the lines through the open pixels of some rows agree on.
+/// Combines the lines through the unknown pixels of some rows.
 struct Vote<'a> {
     seen: &'a Directional,
     silhouettes: &'a Silhouettes,
@@ -178,7 +181,7 @@ impl WithSimd for Vote<'_> {
             let open = &seen.open[y * padded + PAD..][..seen.width];
             let [shows, _] = self.silhouettes.row(y * PIXEL);
             for x in (0..seen.width).filter(|&x| open[x] == NONE && shows[x] > 0.0) {
-                if let Some(value) = seen.between(x, y) {
+                if let Some(value) = seen.interpolate(x, y) {
                     for (p, value) in value.into_iter().enumerate() {
                         row[p * stride + x] = value;
                     }
@@ -188,14 +191,14 @@ impl WithSimd for Vote<'_> {
     }
 }
 
-/// A value for each direction.
+/// One value per direction.
 type Lines = [f32; DIRECTIONS.len()];
 
 impl Directional {
-    /// Light and CoC of an open pixel times how far they are trusted, and that; `None` where one surface alone is seen from it, or
-    /// nothing near enough.
+    /// Returns light and CoC of an unknown pixel, times their trust, and the trust. Returns `None` if only one surface
+    /// is seen from it, or nothing near enough.
     #[inline(always)]
-    fn between(&self, x: usize, y: usize) -> Option<[f32; PLANES]> {
+    fn interpolate(&self, x: usize, y: usize) -> Option<[f32; PLANES]> {
         let (stride, plane) = (self.stride(), self.open.len());
         let at = y * stride + PAD + x;
         let (mut ends, mut steps, mut coc_px) =
@@ -203,22 +206,22 @@ impl Directional {
         for way in 0..WAYS {
             let (d, side, (across, down)) = (way / 2, way % 2, step_of(way));
             let count = self.steps[way * plane + at];
-            // Where there is no end, any pixel will do, as it does not count.
+            // Without an end any pixel will do, because its weight is 0.
             let count_on = if count < NONE { isize::from(count) } else { 0 };
             let end = (y as isize + count_on * down) as usize * self.width + (x as isize + count_on * across) as usize;
             (ends[side][d], steps[side][d], coc_px[side][d]) = (end, f32::from(count), self.ends[end][3]);
         }
         let seen_px = steps.as_flattened().iter().zip(coc_px.as_flattened());
-        let seen_px = seen_px.filter(|&(&steps, _)| steps <= f32::from(MOST_STEPS)).map(|(_, &px)| px);
-        let (least_px, most_px) = seen_px.fold((f32::MAX, f32::MIN), |(least, most), px| (least.min(px), most.max(px)));
-        if most_px - least_px < ONE_SURFACE_PX {
+        let seen_px = seen_px.filter(|&(&steps, _)| steps <= f32::from(MAX_STEPS)).map(|(_, &px)| px);
+        let (low_px, high_px) = seen_px.fold((f32::MAX, f32::MIN), |(low, high), px| (low.min(px), high.max(px)));
+        if high_px - low_px < ONE_SURFACE_PX {
             return None;
         }
         let (mut weights, mut second, mut line_px) = (Lines::default(), Lines::default(), Lines::default());
         let mut shortest = f32::MAX;
         for d in 0..DIRECTIONS.len() {
             let ([to_a, to_b], [a_px, b_px]) = (steps.map(|steps| steps[d]), coc_px.map(|coc_px| coc_px[d]));
-            let (has_a, has_b) = (to_a <= f32::from(MOST_STEPS), to_b <= f32::from(MOST_STEPS));
+            let (has_a, has_b) = (to_a <= f32::from(MAX_STEPS), to_b <= f32::from(MAX_STEPS));
             let alike = likeness(a_px, b_px);
             let (to_a, to_b) = (if has_a { to_a } else { 0.0 }, if has_b { to_b } else { 0.0 });
             let sum = to_a + to_b;
@@ -234,17 +237,17 @@ impl Directional {
         if trust <= 0.0 {
             return None;
         }
-        // How many agree with each line counts four times over: a mean of two surfaces is neither.
+        // Agreement of a line with the others counts to the fourth power: a mean of two surfaces would be neither.
         let mut scores = Lines::default();
         for e in 0..DIRECTIONS.len() {
             for d in 0..DIRECTIONS.len() {
                 scores[d] += weights[e] * likeness(line_px[d], line_px[e]);
             }
         }
-        let most = scores.iter().fold(1e-30f32, |most, &score| most.max(score));
+        let best = scores.iter().fold(1e-30f32, |best, &score| best.max(score));
         let mut total = 0.0;
         for d in 0..DIRECTIONS.len() {
-            let agreed = scores[d] * scores[d] / (most * most);
+            let agreed = scores[d] * scores[d] / (best * best);
             weights[d] *= agreed * agreed;
             total += weights[d];
         }

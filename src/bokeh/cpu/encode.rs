@@ -1,4 +1,6 @@
-//! Linear light back to 8-bit sRGB.
+//! Conversion of linear light to 8-bit sRGB.
+//!
+//! twin: shaders/composite.wgsl (`code_of`)
 
 #![allow(clippy::needless_range_loop)] // Columns index several arrays at once.
 
@@ -6,15 +8,15 @@ use crate::color::encode_srgb;
 
 /// Pixels composited at once.
 pub const CHUNK: usize = 128;
-/// Entries of one half of the table back to 8 bits: small enough for the nearest cache, fine enough that decoding and
-/// encoding is the identity.
+/// Entries of one half of the table: small enough for the nearest cache, fine enough that decoding and encoding is the
+/// identity.
 const ENCODE_STEPS: usize = 1 << 12;
-/// Light below this has a half of its own, with finer steps, as the curve is steep there.
+/// Light below this has its own half with finer steps, because the curve is steep there.
 const DARK: f32 = 1.0 / 16.0;
-/// Entries of the table: two halves of `ENCODE_STEPS + 1`, and up to a power of two, so that an index is masked.
+/// Entries of the table: two halves of `ENCODE_STEPS + 1`, rounded up to a power of two so that an index is masked.
 const ENCODE_SIZE: usize = 4 * ENCODE_STEPS;
 
-/// Linear light to 8-bit sRGB: light up to [`DARK`] in `ENCODE_STEPS` steps, then all of it.
+/// Table from linear light to 8-bit sRGB: light up to [`DARK`] in `ENCODE_STEPS` steps, then the whole range.
 pub struct EncodeTable(Box<[u8; ENCODE_SIZE]>);
 
 impl EncodeTable {
@@ -27,7 +29,7 @@ impl EncodeTable {
         Self(codes)
     }
 
-    /// Looks up the 8-bit sRGB of a chunk.
+    /// Converts a chunk to 8-bit sRGB by table lookup.
     #[inline(always)]
     pub fn encode(&self, color: &[[f32; CHUNK]; 3], out: &mut [u8]) {
         let mut index = [[0u32; CHUNK]; 3];
@@ -37,7 +39,7 @@ impl EncodeTable {
                 let light = if light < 1.0 { light } else { 1.0 };
                 let steps = ENCODE_STEPS as f32;
                 let (scale, first) = if light < DARK { (steps / DARK, 0.0) } else { (steps, steps + 1.0) };
-                // Beyond 2^23 a float has no fraction, and its lowest bits are the integer.
+                // At 2^23 a float has no fraction, and its lowest bits are the integer.
                 *index = (light * scale + first + 8_388_608.0).to_bits();
             }
         }

@@ -1,7 +1,12 @@
-//! Pass `fill`, the inpainting of disocclusions: what near objects hide is filled in from around them, colour and CoC,
-//! before the bins behind are taken. Pull-push: averages over ever larger areas, of known pixels only, flow back into
-//! the holes, but where lines through a hole tell which surface goes on behind it. Every layer is filled for itself, from what does not lie in front of it: behind a head are the trees that
-//! stand behind it, and behind both the sky.
+//! Pass `fill`, the inpainting of disocclusions: colour and CoC of the background that near objects occlude, before the
+//! bins behind them are made.
+//!
+//! Pull-push (Gortler et al., *The Lumigraph*, SIGGRAPH 1996): averages of known pixels over ever larger areas flow
+//! back into the holes. Directional inpainting takes precedence where lines through a hole show which surface continues
+//! behind it. Each layer is inpainted separately, from pixels that are not in front of it: behind a head are the trees,
+//! and behind both the sky.
+//!
+//! twin: shaders/hide.wgsl, pull.wgsl, coarse.wgsl, fill.wgsl
 
 #![allow(clippy::needless_range_loop)] // Planes and columns index several arrays at once.
 
@@ -16,34 +21,34 @@ use super::rows::{PIECE, Rows};
 use super::silhouettes::Silhouettes;
 use super::unpack::Surfaces;
 use crate::bokeh::occlusion::{GRAIN, other_surface};
-use crate::bokeh::plan::{Plan, Share};
+use crate::bokeh::plan::{BinWeight, Plan};
 use crate::compute::simd::{load, store};
 use crate::compute::thread_pool::{DisjointParts, ThreadPool};
 
-/// A pixel of which less is known after all has flowed back is not known at all.
+/// Known weight below which a pixel counts as unknown even after the push.
 const KNOWN: f32 = 0.5;
-/// Rows of a level that are one part of the work.
+/// Rows of a level per work item.
 const PART: usize = 8;
 
-/// The pyramid, finest level (half the picture's size) first.
+/// The image pyramid, finest level (half the picture's size) first.
 pub struct Pyramid {
     /// The picture at half size.
     halves: Rows<PLANES>,
     levels: Vec<Level>,
-    /// For the level above the finest.
+    /// Directional inpainting of the level above the finest.
     directional: Directional,
-    /// Which parts are handed out, as many as there can be.
+    /// Flags of the work items of the largest pass.
     taken: Vec<AtomicBool>,
 }
 
-/// The picture at half size, as the bands lay it: means of linear r, g, b and CoC, and the least CoC of any surface.
+/// Picture at half size, written by the bands: means of linear r, g, b and CoC, and the smallest CoC of any surface.
 pub struct Halves<'a> {
     width: usize,
     stride: usize,
     rows: DisjointParts<'a, f32>,
 }
 
-/// A band of it.
+/// One band of the picture at half size.
 pub struct HalfRows<'a> {
     first: usize,
     width: usize,
@@ -52,19 +57,19 @@ pub struct HalfRows<'a> {
     rows: &'a mut [f32],
 }
 
-/// What was filled in.
+/// The inpainted background.
 #[derive(Clone, Copy)]
 pub struct Behind<'a> {
     level: &'a Level,
     silhouettes: &'a Silhouettes,
-    unhidden: Share,
+    unhidden: BinWeight,
     nearest_px: f32,
-    /// Bins whose CoC are all above this hold nothing of a surface in front.
-    kin_to_px: f32,
+    /// Bins whose CoC are all above this contain nothing of a surface in front.
+    focus_end_px: f32,
 }
 
 impl Pyramid {
-    /// Memory for pictures of `width` x `height`.
+    /// Allocates for pictures of `width` x `height`.
     pub fn new(width: usize, height: usize) -> Self {
         let mut levels = Vec::new();
         let (mut w, mut h) = (width.div_ceil(2), height.div_ceil(2));
@@ -81,16 +86,16 @@ impl Pyramid {
         Self { halves: Rows::new(levels[0].width, levels[0].height, 0), levels, directional, taken }
     }
 
-    /// The picture at half size, to be laid in bands of `rows` rows of the picture.
+    /// Returns the picture at half size, to be written in bands of `rows` rows of the picture.
     pub fn halves(&mut self, rows: usize) -> Halves<'_> {
         let (stride, row_len) = (self.halves.stride, self.halves.row_len());
         let rows = DisjointParts::new(&mut self.halves.data, rows / 2 * row_len, &mut self.taken);
         Halves { width: self.levels[0].width, stride, rows }
     }
 
-    /// Fills what is hidden by all that is not `unhidden`, once the halves are laid.
-    pub fn fill(&mut self, unhidden: &Share, silhouettes: &Silhouettes, workers: &mut ThreadPool, arch: Arch) {
-        self.lay_base(unhidden, workers, arch);
+    /// Inpaints the pixels that are not `unhidden`, after the picture at half size is written.
+    pub fn fill(&mut self, unhidden: &BinWeight, silhouettes: &Silhouettes, workers: &mut ThreadPool, arch: Arch) {
+        self.compute_base(unhidden, workers, arch);
         for k in 1..self.levels.len() {
             let (fine, coarse) = self.levels.split_at_mut(k);
             let (fine, coarse) = (&fine[k - 1], &mut coarse[0]);
@@ -114,14 +119,15 @@ impl Pyramid {
         }
     }
 
-    /// What lies behind near objects, as the layer of bins from `first` on sees it, as far as a silhouette uncovers it.
+    /// Returns the background behind near objects for the layer of bins from `first` on, limited to where a silhouette
+    /// uncovers it.
     pub fn behind<'a>(&'a self, silhouettes: &'a Silhouettes, plan: &Plan, first: usize) -> Behind<'a> {
         let (unhidden, nearest_px) = (plan.unhidden(first), plan.nearest_behind_px(first));
-        Behind { level: &self.levels[0], silhouettes, unhidden, nearest_px, kin_to_px: plan.kin_to_px() }
+        Behind { level: &self.levels[0], silhouettes, unhidden, nearest_px, focus_end_px: plan.focus_end_px() }
     }
 
-    /// The finest level: known is what nothing that hides touches, nor its neighbours.
-    fn lay_base(&mut self, unhidden: &Share, workers: &mut ThreadPool, arch: Arch) {
+    /// Computes the finest level: a pixel is known if neither it nor a neighbour is covered by an occluder.
+    fn compute_base(&mut self, unhidden: &BinWeight, workers: &mut ThreadPool, arch: Arch) {
         let level = &mut self.levels[0];
         let (width, height, row_len) = (level.width, level.height, level.rows.row_len());
         let halves = &self.halves;
@@ -133,14 +139,14 @@ impl Pyramid {
 }
 
 impl Halves<'_> {
-    /// A band of `rows` rows of the picture (`height` rows in all).
+    /// Returns a band of `rows` rows of the picture (`height` rows in all).
     pub fn band(&self, band: usize, rows: usize, height: usize) -> HalfRows<'_> {
         HalfRows { first: band * rows, width: self.width, height, stride: self.stride, rows: self.rows.part(band) }
     }
 }
 
 impl HalfRows<'_> {
-    /// Adds the inner columns of row `y`, `columns` of the piece, which begin at column `x0` of the picture.
+    /// Adds the inner columns of row `y`: `columns` of the piece, which begin at column `x0` of the picture.
     #[inline(always)]
     pub fn add<const W: usize>(&mut self, x0: usize, columns: Range<usize>, y: usize, surfaces: &Surfaces<W>) {
         let (row, odd) = ((y - self.first) / 2, y % 2 == 1);
@@ -148,7 +154,7 @@ impl HalfRows<'_> {
         let count = (columns.len() / 2).min(self.width - first);
         let shown;
         let seen = match surfaces.mixed {
-            // What is known behind a subject does not lie before it: a pixel is what it shows.
+            // A mixed pixel counts as the composite it shows: its farther surface is not in front of the subject.
             true => {
                 shown = surfaces.shown();
                 &shown
@@ -156,14 +162,14 @@ impl HalfRows<'_> {
             false => &surfaces.back,
         };
         let pairs = |p: usize| seen.0[p][columns.start..].as_chunks::<2>().0.iter().take(count);
-        // A last row without a partner stands for two.
-        let share = if !odd && y + 1 == self.height { 0.5 } else { 0.25 };
+        // A last row without a partner counts twice.
+        let weight = if !odd && y + 1 == self.height { 0.5 } else { 0.25 };
         let planes = &mut self.rows[row * PLANES * self.stride..][..PLANES * self.stride];
         let (means, nearest) = planes.split_at_mut((PLANES - 1) * self.stride);
         for (p, plane) in means.chunks_exact_mut(self.stride).enumerate() {
             for (value, &[a, b]) in plane[first..].iter_mut().zip(pairs(p)) {
                 let before = if odd { *value } else { 0.0 };
-                *value = before + share * (a + b);
+                *value = before + weight * (a + b);
             }
         }
         let nearest = &mut nearest[first..];
@@ -172,12 +178,12 @@ impl HalfRows<'_> {
             *value = if odd && *value < here { *value } else { here };
         }
         if surfaces.mixed {
-            // What something near covers in part is not known either.
+            // A pixel that a near surface covers partly is not known either.
             let fronts = surfaces.front.0[3][columns.start..].as_chunks::<2>().0.iter().take(count);
-            let shares = surfaces.share.0[columns.start..].as_chunks::<2>().0;
-            for ((value, cocs_px), shares) in nearest.iter_mut().zip(fronts).zip(shares) {
-                for (coc_px, share) in cocs_px.iter().zip(shares) {
-                    *value = if *share > 0.0 && *coc_px < *value { *coc_px } else { *value };
+            let alphas = surfaces.alpha.0[columns.start..].as_chunks::<2>().0;
+            for ((value, cocs_px), alphas) in nearest.iter_mut().zip(fronts).zip(alphas) {
+                for (coc_px, alpha) in cocs_px.iter().zip(alphas) {
+                    *value = if *alpha > 0.0 && *coc_px < *value { *coc_px } else { *value };
                 }
             }
         }
@@ -185,13 +191,20 @@ impl HalfRows<'_> {
 }
 
 impl Behind<'_> {
-    /// Replaces what is hidden in a piece of row `y` that begins at column `x0` of the picture.
+    /// Replaces the hidden pixels in a piece of row `y` that begins at column `x0` of the picture.
     #[inline(always)]
-    pub fn put<S: Simd, const W: usize>(&self, simd: S, x0: isize, y: usize, width: usize, surfaces: &mut Surfaces<W>) {
+    pub fn inpaint<S: Simd, const W: usize>(
+        &self,
+        simd: S,
+        x0: isize,
+        y: usize,
+        width: usize,
+        surfaces: &mut Surfaces<W>,
+    ) {
         let (row, [shows, uncovers]) = (self.level.rows.row(y / 2), self.silhouettes.row(y));
         for start in (0..W).step_by(PIECE) {
             let coc = &mut surfaces.back.0[3][start..start + PIECE];
-            // What a silhouette only touches keeps its own colour: it is seen, and filling would smear it.
+            // A pixel that a silhouette only touches keeps its colour: it is visible, and inpainting would smear it.
             let mut hidden = [0.0; PIECE];
             let mut any = false;
             for x in 0..PIECE {
@@ -202,9 +215,10 @@ impl Behind<'_> {
                 continue;
             }
             let first = x0 + start as isize;
-            // Pieces begin where cells do. Away from all silhouettes nothing behind can be seen.
+            // Pieces begin at cell borders. Away from all silhouettes the background is not visible.
             let cell = |x: usize| ((first + x as isize).max(0) as usize / GRAIN).min(uncovers.len() - 1);
-            // Where it matters for what others see alone, it must not get among what is in front itself, nor half of it.
+            // Where the background matters only for the blur of others, it must not mix with the surface in front, not
+            // even by half.
             let (mut square, mut any_uncovered) = ([0.0; PIECE], false);
             for (k, square) in square.as_chunks_mut::<GRAIN>().0.iter_mut().enumerate() {
                 let cell = cell(k * GRAIN);
@@ -218,7 +232,7 @@ impl Behind<'_> {
             for (p, fill) in fill.iter_mut().enumerate() {
                 let plane = &row[p * self.level.rows.stride..];
                 if first >= 0 && first as usize + PIECE <= width {
-                    // Pieces begin at even columns, and two columns have the same half.
+                    // Pieces begin at even columns; two columns share a half-size column.
                     let halves = &plane[first as usize / 2..][..PIECE / 2];
                     for k in 0..PIECE / 2 {
                         (fill[2 * k], fill[2 * k + 1]) = (halves[k], halves[k]);
@@ -230,11 +244,11 @@ impl Behind<'_> {
                 }
             }
             for x in 0..PIECE {
-                // Where something near touches every pixel nothing is known, and nothing lies behind.
+                // If something near touches every pixel, nothing is known, and there is no background.
                 let known = if fill[PLANES - 1][x] > KNOWN { hidden[x] } else { 0.0 };
                 hidden[x] = known * other_surface(coc[x], fill[3][x]);
                 let (px, square) = (fill[3][x], square[x]);
-                let is_wanted = match px > self.kin_to_px {
+                let is_wanted = match px > self.focus_end_px {
                     true => square > 0.0 || square == 0.0 && hidden[x] >= 1.0,
                     false => square > px * px,
                 };
@@ -243,7 +257,7 @@ impl Behind<'_> {
             for x in 0..PIECE {
                 fill[3][x] = if fill[3][x] > self.nearest_px { fill[3][x] } else { self.nearest_px };
             }
-            // By hand, as the compiler would take the same pixel of all planes together.
+            // Explicit vectors, because the compiler would vectorise across the planes.
             for (plane, fill) in surfaces.back.0.iter_mut().zip(&fill) {
                 for x in (0..PIECE).step_by(S::F32_LANES) {
                     let own = load::<S>(plane, start + x);
@@ -254,11 +268,11 @@ impl Behind<'_> {
             }
         }
         if surfaces.mixed {
-            // Behind the nearer surface of a pixel lies its farther one.
-            let planes = surfaces.share.0.iter_mut().zip(&mut surfaces.behind.0);
-            for ((share, behind), coc_px) in planes.zip(&surfaces.front.0[3]) {
+            // Behind the nearer surface of a mixed pixel is its farther one.
+            let planes = surfaces.alpha.0.iter_mut().zip(&mut surfaces.behind.0);
+            for ((alpha, behind), coc_px) in planes.zip(&surfaces.front.0[3]) {
                 let before = self.unhidden.at(*coc_px);
-                (*share, *behind) = (*share * before, 1.0 - (1.0 - *behind) * before);
+                (*alpha, *behind) = (*alpha * before, 1.0 - (1.0 - *behind) * before);
             }
         }
     }

@@ -1,10 +1,12 @@
-//! The filters of the pass `blur` for one vector of pixels: along a row, down a column, and what keeps the result in
-//! range.
+//! The filter kernels of the pass `blur` for one vector of pixels: along a row, down a column, and the clamp of the
+//! result.
 //!
 //! A kernel of rank r is `K(y, x) = sum_i v_i(y) h_i(x)` (McGraw 2015, equation 2), so each term is one pass along rows
-//! and one down columns: for a kernel of side n, 2 r n taps a pixel instead of n^2. Where every profile is even, taps
+//! and one down columns: for a kernel of side n, 2 r n taps a pixel instead of n^2. If every profile is symmetric, taps
 //! at -j and j share one multiplication. The loops are written for registers: a value is loaded once and used by all
-//! terms of its group, as loads and not multiplications are what these passes wait for.
+//! terms of its group, because the loads limit these passes, not the multiplications.
+//!
+//! twin: shaders/filter.wgsl, shaders/blur_rows.wgsl, shaders/blur_columns.wgsl
 
 #![allow(clippy::needless_range_loop)] // Terms and planes index several arrays at once.
 
@@ -14,28 +16,30 @@ use super::rows::{EDGE_VALUES, PIECE, STRIP, STRIP_EDGES, STRIP_ROW};
 use crate::bokeh::plan::SEGMENT;
 use crate::compute::simd::{fma, load};
 
-/// Rows of the result that are filtered at once, where they can share what they read.
+/// Rows of the result that are filtered at once, if they can share loads.
 pub const BLOCK_ROWS: usize = 4;
 
-/// AVX2 has half the registers of others, too few for a block's sums of all planes.
+/// Whether there are too few registers for a block's sums of all planes: AVX2 has half as many as the others.
 #[inline(always)]
 fn has_few_registers<S: Simd>() -> bool {
     S::F32_LANES == 8
 }
 
-/// Values from one row between both passes to the next, of so many terms: `[term][4][STRIP]`. Where one plane after the other is
-/// read down the rows, these are a line further apart, as a power of two would share few lines of the nearest cache.
+/// Returns the values from one row to the next between both passes: `[term][4][STRIP]`. If the planes are read one
+/// after the other down the rows, a cache line is added, because a power of two would map the rows to few sets of the
+/// nearest cache.
 #[inline(always)]
 pub fn row_len<S: Simd>(terms: usize) -> usize {
-    if has_few_registers::<S>() { most_row_len(terms) } else { terms * STRIP_ROW }
+    if has_few_registers::<S>() { max_row_len(terms) } else { terms * STRIP_ROW }
 }
 
-/// [`row_len`] of any processor.
-pub fn most_row_len(terms: usize) -> usize {
+/// Upper bound of [`row_len`] on any processor.
+pub fn max_row_len(terms: usize) -> usize {
     terms * STRIP_ROW + PIECE
 }
 
-/// Clamps coverage to 0..1 and premultiplied colour to the range of colours within reach: truncated filters overshoot.
+/// Clamps coverage to 0..1 and premultiplied colour to the range of colours within the filter support: truncated
+/// filters overshoot.
 #[inline(always)]
 pub fn keep_in_range<S: Simd>(simd: S, sums: &mut [S::f32s; 4], edges: &[[f32; EDGE_VALUES]; STRIP_EDGES], x: usize) {
     let (left, right) = (&edges[x / SEGMENT], &edges[x / SEGMENT + 1]);
@@ -50,7 +54,7 @@ pub fn keep_in_range<S: Simd>(simd: S, sums: &mut [S::f32s; 4], edges: &[[f32; E
     sums[3] = coverage;
 }
 
-/// Where each pixel of a segment lies between the segment's edges.
+/// Position of each pixel between the edges of its segment, 0 to 1.
 const ACROSS: [f32; SEGMENT] = {
     let mut at = [0.0; SEGMENT];
     let mut k = 0;
@@ -61,30 +65,32 @@ const ACROSS: [f32; SEGMENT] = {
     at
 };
 
-/// Linear from `left` to `right` as `across` goes from 0 to 1.
+/// Interpolates linearly from `left` to `right` as `across` goes from 0 to 1.
 #[inline(always)]
 fn lerp<S: Simd>(simd: S, left: f32, right: f32, across: S::f32s) -> S::f32s {
     fma(simd, simd.splat_f32s(right - left), across, simd.splat_f32s(left))
 }
 
-/// The taps of a group of `R` terms for one vector of a segment.
+/// Taps of a group of `R` terms for one vector of a segment.
 pub struct Taps<'a, const R: usize> {
     pub table: &'a [f32],
-    /// Where in the table tap 0 of the radius at the left edge of the segment has the group's first term.
+    /// Index in the table of tap 0 and the group's first term, for the radius at the left edge of the segment.
     pub left: usize,
-    /// The same at the right edge.
+    /// Same index for the right edge.
     pub right: usize,
-    /// From one tap to the next in the table; negative where the aperture is turned.
+    /// Table entries from one tap to the next; negative if the aperture is turned.
     pub step: isize,
+    /// Outermost tap.
     pub reach: usize,
-    /// Where in the segment the vector begins.
+    /// First pixel of the vector within the segment.
     pub lane: usize,
-    /// Whether the taps are the same all along the segment.
+    /// Whether the taps are constant along the segment.
     pub steady: bool,
 }
 
 impl<const R: usize> Taps<'_, R> {
-    /// Tap `j` of every term, per pixel: with `VARY` linear between the segment's edges, else that of the left one.
+    /// Returns tap `j` of every term, per pixel: with `VARY` linear between the segment's edges, else that of the left
+    /// edge.
     #[inline(always)]
     fn at<S: Simd, const VARY: bool>(&self, simd: S, j: isize) -> [S::f32s; R] {
         let left = &self.table[self.left.wrapping_add_signed(j * self.step)..][..R];
@@ -104,10 +110,10 @@ impl<const R: usize> Taps<'_, R> {
     }
 }
 
-/// The horizontal pass for one vector: every term of the group, every plane. The sums of all terms (at most 4 x 4
-/// vectors) stay in registers while the taps go outwards, so that a value that all terms need is read once.
+/// Filters one vector horizontally: every term of the group, every plane. The sums of all terms (at most 4 x 4 vectors)
+/// stay in registers while the taps go outwards, so that a value is loaded once for all terms.
 #[inline(always)]
-pub fn along_row<S: Simd, const R: usize, const EVEN: bool, const VARY: bool, const P: usize>(
+pub fn along_row<S: Simd, const R: usize, const SYMMETRIC: bool, const VARY: bool, const P: usize>(
     simd: S,
     taps: &Taps<'_, R>,
     planes: &[&[f32]; 4],
@@ -123,10 +129,10 @@ pub fn along_row<S: Simd, const R: usize, const EVEN: bool, const VARY: bool, co
     }
     for j in 1..=taps.reach {
         let weights = taps.at::<S, VARY>(simd, j as isize);
-        let opposite = if EVEN { weights } else { taps.at::<S, VARY>(simd, -(j as isize)) };
+        let opposite = if SYMMETRIC { weights } else { taps.at::<S, VARY>(simd, -(j as isize)) };
         for p in 0..P {
             let (after, before) = (load::<S>(planes[p], x + j), load::<S>(planes[p], x - j));
-            if EVEN {
+            if SYMMETRIC {
                 let both = simd.add_f32s(after, before);
                 for r in 0..R {
                     sums[r][p] = fma(simd, weights[r], both, sums[r][p]);
@@ -141,10 +147,10 @@ pub fn along_row<S: Simd, const R: usize, const EVEN: bool, const VARY: bool, co
     sums
 }
 
-/// The vertical pass for one vector of columns and `BLOCK_ROWS` rows from `y` on: `R` terms, `P` planes (3 without
-/// coverage, else 4). A tap is one number for all of these pixels, so a row that is read once serves all their sums.
+/// Filters one vector of columns and `BLOCK_ROWS` rows from `y` on vertically: `R` terms, `P` planes (3 without
+/// coverage, else 4). The taps are equal for all of these pixels, so a row is loaded once for all their sums.
 #[inline(always)]
-pub fn along_column_block<S: Simd, const R: usize, const EVEN: bool, const P: usize>(
+pub fn along_column_block<S: Simd, const R: usize, const SYMMETRIC: bool, const P: usize>(
     simd: S,
     taps: &Taps<'_, R>,
     rows: &[f32],
@@ -152,7 +158,7 @@ pub fn along_column_block<S: Simd, const R: usize, const EVEN: bool, const P: us
     x: usize,
     height: usize,
 ) -> [[S::f32s; 4]; BLOCK_ROWS] {
-    if EVEN && has_few_registers::<S>() && y >= taps.reach && y + BLOCK_ROWS + taps.reach <= height {
+    if SYMMETRIC && has_few_registers::<S>() && y >= taps.reach && y + BLOCK_ROWS + taps.reach <= height {
         return along_column_planes::<S, R, P>(simd, taps, rows, y, x);
     }
     let row_len = row_len::<S>(R);
@@ -160,7 +166,7 @@ pub fn along_column_block<S: Simd, const R: usize, const EVEN: bool, const P: us
     let mut sums = [[simd.splat_f32s(0.0); 4]; BLOCK_ROWS];
     let reach = taps.reach as isize;
     for offset in -reach..BLOCK_ROWS as isize + reach {
-        // Beyond the picture its outermost row goes on; rows lie in a ring, a power of two of them.
+        // Beyond the picture its outermost row repeats; rows are in a ring whose size is a power of two.
         let inside = (y as isize + offset).clamp(0, height as isize - 1) as usize;
         let row = &rows[(inside & ring_mask) * row_len..][..row_len];
         for r in 0..R {
@@ -182,8 +188,8 @@ pub fn along_column_block<S: Simd, const R: usize, const EVEN: bool, const P: us
     sums
 }
 
-/// The same for even profiles, one plane of a term after the other, where the taps reach neither end of the picture: as they go
-/// outwards, `BLOCK_ROWS` rows above and below stay in registers, and one more of each is read.
+/// Variant of [`along_column_block`] for symmetric profiles, plane by plane, if the taps stay inside the picture: as
+/// they go outwards, `BLOCK_ROWS` rows above and below stay in registers, and one more of each is loaded.
 #[inline(always)]
 fn along_column_planes<S: Simd, const R: usize, const P: usize>(
     simd: S,
@@ -200,7 +206,7 @@ fn along_column_planes<S: Simd, const R: usize, const P: usize>(
         let weight = |j: usize| simd.splat_f32s(taps.table[taps.left.wrapping_add_signed(j as isize * taps.step) + r]);
         for p in 0..P {
             let value = |y: usize| load::<S>(rows, (y & ring_mask) * row_len + (r * 4 + p) * STRIP + x);
-            // Row `y + i` is at `i % N`, seen from either side.
+            // Row `y + i` is at index `i % N`, on both sides.
             let mut above = [value(y), value(y + 1), value(y + 2), value(y + 3)];
             let mut below = above;
             let mut sums = above;
@@ -228,10 +234,10 @@ fn along_column_planes<S: Simd, const R: usize, const P: usize>(
     all
 }
 
-/// The vertical pass for one vector: the terms of the group summed, every plane. Unlike along a row the terms meet
-/// here, so one sum a plane suffices.
+/// Filters one vector vertically: the terms of the group summed, every plane. Unlike along a row, the terms are added
+/// here, so one sum per plane suffices.
 #[inline(always)]
-pub fn along_column<S: Simd, const R: usize, const EVEN: bool, const VARY: bool, const P: usize>(
+pub fn along_column<S: Simd, const R: usize, const SYMMETRIC: bool, const VARY: bool, const P: usize>(
     simd: S,
     taps: &Taps<'_, R>,
     rows: &[f32],
@@ -241,7 +247,7 @@ pub fn along_column<S: Simd, const R: usize, const EVEN: bool, const VARY: bool,
 ) -> [S::f32s; 4] {
     let row_len = row_len::<S>(R);
     let weights = taps.at::<S, VARY>(simd, 0);
-    // Rows lie in a ring, a power of two of them.
+    // Rows are in a ring whose size is a power of two.
     let ring_mask = rows.len() / row_len - 1;
     let here = &rows[(y & ring_mask) * row_len..][..row_len];
     let mut sums = [simd.splat_f32s(0.0); 4];
@@ -254,12 +260,12 @@ pub fn along_column<S: Simd, const R: usize, const EVEN: bool, const VARY: bool,
         let below = &rows[((y + j).min(height - 1) & ring_mask) * row_len..][..row_len];
         let above = &rows[(y.saturating_sub(j) & ring_mask) * row_len..][..row_len];
         let weights = taps.at::<S, VARY>(simd, j as isize);
-        let opposite = if EVEN { weights } else { taps.at::<S, VARY>(simd, -(j as isize)) };
+        let opposite = if SYMMETRIC { weights } else { taps.at::<S, VARY>(simd, -(j as isize)) };
         for r in 0..R {
             for p in 0..P {
                 let at = (r * 4 + p) * STRIP + x;
                 let (below, above) = (load::<S>(below, at), load::<S>(above, at));
-                sums[p] = if EVEN {
+                sums[p] = if SYMMETRIC {
                     fma(simd, weights[r], simd.add_f32s(below, above), sums[p])
                 } else {
                     fma(simd, opposite[r], above, fma(simd, weights[r], below, sums[p]))
@@ -279,7 +285,7 @@ mod tests {
 
     const HEIGHT: usize = 60;
 
-    /// Compares the columns of a block with those of each of its rows, at the ends of the picture and between.
+    /// Compares filtering a block of rows with filtering its rows one by one, at the ends of the picture and between.
     struct Compare {
         reach: usize,
     }

@@ -1,4 +1,4 @@
-//! The executor's frames: one in, one out.
+//! The `Bokeh` interface of the CPU executor: one frame in, one frame out.
 
 use std::ops::ControlFlow;
 use std::time::Instant;
@@ -13,7 +13,7 @@ impl CpuBokeh {
     /// Blurs one picture.
     ///
     /// # Errors
-    /// The picture has another size than the plan, or `coc` needs depth and there is none.
+    /// The picture and the plan have different sizes, or `coc` needs depth and the frame has none.
     pub fn blur(
         &mut self,
         color: &ColorImage,

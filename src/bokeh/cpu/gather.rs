@@ -1,5 +1,8 @@
-//! The paper's plain forms, for comparison: every pixel gathers with exactly its own radius, from all around it,
-//! with no regard to depth edges. Separable (passes `blur`), or exact in two dimensions (pass `gather`).
+//! The paper's plain forms, for comparison: every pixel gathers from its surroundings with exactly its own radius,
+//! ignoring depth discontinuities. Separable (passes `blur`; McGraw, eq. 2), or exact in two dimensions (pass
+//! `gather`).
+//!
+//! twin: shaders/gather.wgsl
 
 use std::ops::ControlFlow;
 use std::sync::atomic::AtomicBool;
@@ -13,46 +16,47 @@ use crate::bokeh::plan::Plan;
 use crate::compute::simd::madd;
 use crate::compute::thread_pool::{DisjointParts, ThreadPool};
 
-/// Rows that are gathered in two dimensions before anybody is asked whether to go on.
+/// Rows of the exact gather between two calls of `go_on`.
 const ROWS_AT_ONCE: usize = 64;
 
-/// Runs both forms of the gather, and has their memory.
+/// Both forms of the gather, with their buffers.
 pub struct Gather {
-    /// As in [`Exact`]; none unless the plan is exact.
+    /// Kernels of [`Exact`]; empty unless the plan is exact.
     kernels: Vec<[Vec<f32>; 2]>,
     source: Rows<4>,
     /// Signed CoC, `[row][width]`.
     coc: Vec<f32>,
-    /// Results of the horizontal pass, `[row][term][3][width]`; none where the plan is exact.
+    /// Results of the horizontal pass, `[row][term][3][width]`; empty if the plan is exact.
     rows: Vec<f32>,
     result: Vec<f32>,
 }
 
 impl Gather {
-    /// Memory for pictures of a plan.
+    /// Allocates for the pictures of a plan.
     pub fn new(plan: &Plan) -> Self {
         let (bank, pixels) = (&plan.bank, plan.width * plan.height);
         Self {
             kernels: if plan.exact {
-                let turned = |node| if bank.even { Vec::new() } else { bank.kernel(node, true) };
+                let turned = |node| if bank.is_symmetric { Vec::new() } else { bank.kernel(node, true) };
                 (0..bank.nodes).map(|node| [bank.kernel(node, false), turned(node)]).collect()
             } else {
                 Vec::new()
             },
-            source: Rows::new(plan.width, plan.height, plan.ladder.most_reach().next_multiple_of(PIECE)),
+            source: Rows::new(plan.width, plan.height, plan.ladder.max_reach().next_multiple_of(PIECE)),
             coc: vec![0.0; pixels],
-            rows: vec![0.0; if plan.exact { 0 } else { pixels * 3 * plan.ladder.most_terms() }],
+            rows: vec![0.0; if plan.exact { 0 } else { pixels * 3 * plan.ladder.max_terms() }],
             result: vec![0.0; pixels * 3],
         }
     }
 
-    /// `[row][3][width]` of the last frame.
+    /// Returns the result of the last frame, `[row][3][width]`.
     pub fn result(&self) -> &[f32] {
         &self.result
     }
 
-    /// Blurs a frame whose one bin is in `strips`: copies that to padded rows, finds the CoC of every pixel, and
-    /// gathers with the full kernels, which takes long and so asks `go_on` now and then, or with the separable ones.
+    /// Blurs a frame whose only bin is in `strips`: copies it to padded rows, computes the CoC of every pixel, and
+    /// gathers with the full kernels, which takes long and therefore calls `go_on` now and then, or with the separable
+    /// ones.
     pub fn run(
         &mut self,
         (workers, arch): (&mut ThreadPool, Arch),
@@ -105,12 +109,13 @@ impl Gather {
 
 /// One row of the exact gather: each pixel with the full kernel of its own radius.
 struct Exact<'a> {
-    /// Colour and coverage (1 everywhere), padded by the reach.
+    /// Colour and coverage (1 everywhere), padded by the filter half-width.
     pub source: &'a Rows<4>,
     pub size: (usize, usize),
-    /// Kernels by node, `(2 r + 1)^2` taps each, far and turned; turned ones only where that makes a difference.
+    /// Kernels by node, `(2 r + 1)^2` taps each, far and turned; the turned ones are empty if the aperture is
+    /// symmetric.
     pub kernels: &'a [[Vec<f32>; 2]],
-    /// The bank (for the nodes).
+    /// The bank, for its nodes.
     pub bank: &'a Bank,
     /// Signed CoC of this row.
     pub coc: &'a [f32],
@@ -124,16 +129,16 @@ impl WithSimd for Exact<'_> {
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
         let (width, height) = self.size;
-        // Each pixel has a kernel of its own, so the vectors go along the kernel's rows and not over pixels.
+        // Each pixel has its own kernel, so the vectors run along the kernel's rows and not over pixels.
         for x in 0..width {
             let node = self.bank.node(self.coc[x].abs());
             let reach = self.bank.node_reach[node] as usize;
-            let kernel = &self.kernels[node][usize::from(self.coc[x] < 0.0 && !self.bank.even)];
+            let kernel = &self.kernels[node][usize::from(self.coc[x] < 0.0 && !self.bank.is_symmetric)];
             let side = 2 * reach + 1;
             let mut sums = [simd.splat_f32s(0.0); 3];
             let mut tails = [0.0f32; 3];
             for (k, taps) in kernel.chunks_exact(side).enumerate() {
-                // Beyond the picture its outermost row goes on.
+                // Beyond the picture its outermost row repeats.
                 let y = (self.y + k).saturating_sub(reach).min(height - 1);
                 let row = self.source.row(y);
                 let (taps, taps_tail) = S::as_simd_f32s(taps);
@@ -157,7 +162,7 @@ impl WithSimd for Exact<'_> {
 
 /// One row of the horizontal pass of the separable gather: `[term][3][width]`.
 struct GatherRow<'a> {
-    /// As in [`Exact`].
+    /// Same as in [`Exact`].
     pub source: &'a Rows<4>,
     pub width: usize,
     pub bank: &'a Bank,
@@ -175,7 +180,7 @@ impl WithSimd for GatherRow<'_> {
         for x in 0..self.width {
             let node = self.bank.node(self.coc[x].abs());
             let reach = self.bank.node_reach[node] as isize;
-            // In front of the focal plane a lens turns its aperture.
+            // In front of the focal plane a lens rotates its aperture by 180 degrees.
             let sign = if self.coc[x] < 0.0 { -1 } else { 1 };
             for t in 0..self.bank.terms {
                 let mut sum = [0.0f32; 3];
@@ -217,7 +222,8 @@ impl WithSimd for GatherColumn<'_> {
             let mut sum = [0.0f32; 3];
             for j in -reach..=reach {
                 let y = self.y.saturating_add_signed(j).min(height - 1);
-                // Made with the radii of row `y` there, not of this pixel: what a separable gather gets wrong.
+                // Row `y` was filtered with the radii of its own pixels, not of this one: the error of a separable
+                // gather.
                 let row = &self.rows[y * terms * 3 * width..][..terms * 3 * width];
                 let taps = &self.bank.vertical[self.bank.tap(node, sign * j)..][..terms];
                 for (t, tap) in taps.iter().enumerate() {

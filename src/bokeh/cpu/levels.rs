@@ -1,27 +1,29 @@
-//! The levels of the pyramid of the pass `fill`, some rows at a time.
+//! Kernels of the image pyramid of the pass `fill`, some rows at a time (pull-push).
+//!
+//! twin: shaders/pyramid.wgsl, pull.wgsl, coarse.wgsl
 
 #![allow(clippy::needless_range_loop)] // Planes and columns index several arrays at once.
 
 use pulp::{Simd, WithSimd};
 
 use super::rows::{PIECE, Rows};
-use crate::bokeh::plan::Share;
+use crate::bokeh::plan::BinWeight;
 
-/// Planes of a level: premultiplied colour and CoC, and how much of it is known.
+/// Planes of a level: premultiplied colour and CoC, and the known weight.
 pub const PLANES: usize = 5;
 
-/// A picture of the pyramid.
+/// One level of the pyramid.
 pub struct Level {
     pub width: usize,
     pub height: usize,
     pub rows: Rows<PLANES>,
 }
 
-/// Some rows of the finest level, from row `first` on.
+/// Computes some rows of the finest level, from row `first` on.
 pub struct Base<'a> {
     pub halves: &'a Rows<PLANES>,
     pub size: (usize, usize),
-    pub unhidden: &'a Share,
+    pub unhidden: &'a BinWeight,
     pub first: usize,
     pub rows: &'a mut [f32],
 }
@@ -36,7 +38,7 @@ impl WithSimd for Base<'_> {
             let (known, last) = (&mut known[..width], width - 1);
             let nearest = |y: usize| &self.halves.row(y)[(PLANES - 1) * stride..][..width];
             let (above, here, below) = (nearest(y.saturating_sub(1)), nearest(y), nearest((y + 1).min(height - 1)));
-            // What hides a pixel the most is what is nearest: of three rows, then of three columns.
+            // The smallest CoC of the 3x3 neighbourhood decides: minimum over three rows, then over three columns.
             let of_rows = &mut planes[..width];
             for x in 0..width {
                 of_rows[x] = least(above[x], least(here[x], below[x]));
@@ -61,18 +63,18 @@ impl WithSimd for Base<'_> {
     }
 }
 
-/// The lesser of two, in one instruction.
+/// Returns the minimum, in one instruction.
 #[inline(always)]
 fn least(a: f32, b: f32) -> f32 {
     if a < b { a } else { b }
 }
 
-/// Some rows of a level from the finer one, by half: the sum of four pixels weighed by how far each is known, made a mean
-/// where that is more than 1. Less than that adds up from level to level, so that the coarsest one knows something if any
-/// pixel does.
+/// Pull: some rows of a level at half the finer level's size. The sum of four pixels weighted by their known weights,
+/// divided by the total where it is above 1. Smaller totals accumulate from level to level, so that the coarsest level
+/// is known if any pixel is.
 pub struct Pull<'a> {
     pub fine: &'a Level,
-    /// The first row, and the rows' planes.
+    /// First row of `rows`.
     pub first: usize,
     pub rows: &'a mut [f32],
     pub stride: usize,
@@ -99,6 +101,7 @@ impl WithSimd for Pull<'_> {
                     }
                 }
             }
+            // Sums become means only where more than one pixel is known.
             let (planes, known) = out.split_at_mut((PLANES - 1) * stride);
             let known = &mut known[..width];
             for plane in planes.chunks_exact_mut(stride) {
@@ -114,8 +117,8 @@ impl WithSimd for Pull<'_> {
     }
 }
 
-/// Some rows of a level: what it does not know, from the coarser one, bilinearly: 3/4 of the coarse pixel that covers this
-/// one and 1/4 of the neighbour nearest to it, each way.
+/// Push: fills the unknown part of some rows of a level bilinearly from the coarser one: per axis, 3/4 of the coarse
+/// pixel that covers this one and 1/4 of its nearest neighbour.
 pub struct Push<'a> {
     pub coarse: &'a Level,
     pub first: usize,
@@ -133,6 +136,7 @@ impl WithSimd for Push<'_> {
             let [here, there] = beside(y, coarse.height).map(|row| coarse.rows.row(row));
             for first in (0..width).step_by(2 * PIECE) {
                 let count = (2 * PIECE).min(width - first);
+                // Unknown fraction of each pixel; most pixels are known completely.
                 let mut open = [0.0; 2 * PIECE];
                 let known = &out[(PLANES - 1) * stride + first..][..count];
                 for (open, known) in open.iter_mut().zip(known) {
@@ -162,10 +166,11 @@ impl WithSimd for Push<'_> {
     }
 }
 
-/// Two pixels for each of [`PIECE`] coarse ones from column `first` on, between the rows `here` and `there`.
+/// Interpolates two pixels for each of [`PIECE`] coarse ones from column `first` on, between the rows `here` and
+/// `there`.
 #[inline(always)]
 fn between(here: &[f32], there: &[f32], first: usize, values: &mut [f32; 2 * PIECE]) {
-    // One more on both sides; outside, the outermost repeat.
+    // One more on both sides; outside, the outermost pixels repeat.
     let mut rows = [[0.0; PIECE + 2]; 2];
     for (row, line) in rows.iter_mut().zip([here, there]) {
         if first > 0 && first + PIECE < line.len() {
@@ -186,7 +191,7 @@ fn between(here: &[f32], there: &[f32], first: usize, values: &mut [f32; 2 * PIE
     }
 }
 
-/// The coarse row that covers row `at`, and the neighbour nearest to it, of `limit`.
+/// Returns the coarse row that covers row `at`, and its nearest neighbour, clamped to `limit` rows.
 #[inline(always)]
 fn beside(at: usize, limit: usize) -> [usize; 2] {
     let neighbour = if at.is_multiple_of(2) { (at / 2).saturating_sub(1) } else { at / 2 + 1 };

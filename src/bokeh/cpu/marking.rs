@@ -1,4 +1,6 @@
-//! Finds the silhouettes of a frame: jumps of the CoC from one pixel to the next, and mixed pixels.
+//! Marks the silhouettes of a frame: CoC discontinuities between neighbouring pixels, and mixed pixels.
+//!
+//! twin: shaders/silhouette.wgsl, shaders/unpack.wgsl
 
 use pulp::{Simd, WithSimd};
 
@@ -9,20 +11,20 @@ use super::unpack::{Source, coc_row};
 use crate::bokeh::occlusion::{self, GRAIN, SHOWS, Silhouette};
 use crate::optics::{CocField, DepthCoc};
 
-/// Pixels that are looked at together: a row of a tile.
+/// Pixels processed together: a row of a tile.
 const CHUNK: usize = TILE_W;
-/// What is not measured, or farther than this, counts as this far, in metres.
+/// Depth of unmeasured or farther pixels, in metres.
 const FAR_M: f32 = 1e6;
 
 /// Marks the silhouettes of a row of tiles.
 pub struct Marking<'a> {
     pub source: &'a Source<'a>,
-    /// The CoC in each of the tiles.
+    /// CoC range of each tile.
     pub ranges: &'a [(f32, f32)],
-    /// The rows of the picture, and those of the grid over them.
+    /// Rows of the picture; `marks` are the rows of the grid over them.
     pub rows: std::ops::Range<usize>,
     pub marks: &'a mut [f32],
-    /// The radius from which on something in front is a layer of its own.
+    /// Radius from which something in front is a layer of its own, in pixels.
     pub near_from_px: f32,
 }
 
@@ -33,11 +35,11 @@ impl WithSimd for Marking<'_> {
         let (width, height) = self.source.size;
         let across = width.div_ceil(GRAIN);
         self.marks.fill(NONE);
-        // A smaller map has steps that are no silhouettes: those between its own pixels.
-        let (least_px, metres) = match self.source.coc {
+        // A smaller map has steps between its own pixels that are no silhouettes.
+        let (min_step_px, metres) = match self.source.coc {
             Radii::Field(CocField::Depth(lens), Some(map)) => {
-                let least_px = (width as f32 / map.width.max(1) as f32).max(1.0);
-                (least_px, (map.size() == (width as u32, height as u32)).then_some((lens, &map.metres)))
+                let min_step_px = (width as f32 / map.width.max(1) as f32).max(1.0);
+                (min_step_px, (map.size() == (width as u32, height as u32)).then_some((lens, &map.metres)))
             }
             _ => (1.0, None),
         };
@@ -48,13 +50,16 @@ impl WithSimd for Marking<'_> {
             for x0 in (0..width).step_by(CHUNK) {
                 let take = CHUNK.min(width - x0);
                 let with_next = (take + 1).min(width - x0);
-                // Within a tile, and to the next one, nothing jumps by more than what they range over.
-                if next < self.rows.end && span_px(&self.ranges[x0 / TILE_W..]) < least_px {
+                // No step within a tile, or to the next one, exceeds their CoC range.
+                if next < self.rows.end && span_px(&self.ranges[x0 / TILE_W..]) < min_step_px {
                     continue;
                 }
+                // The test on depth needs no division and rejects nearly all pixels.
                 if let Some((lens, metres)) = metres {
                     let (a, b) = (&metres[y * width + x0..][..with_next], &metres[next * width + x0..][..take]);
-                    if !jumps(lens, least_px, &a[..take], b) && !jumps(lens, least_px, &a[..with_next - 1], &a[1..]) {
+                    if !has_step(lens, min_step_px, &a[..take], b)
+                        && !has_step(lens, min_step_px, &a[..with_next - 1], &a[1..])
+                    {
                         continue;
                     }
                 }
@@ -62,20 +67,20 @@ impl WithSimd for Marking<'_> {
                 coc_row(self.source, next, x0, &mut below[..take]);
                 let last_px = here[with_next - 1];
                 here[with_next..].fill(last_px);
-                let mut beyond_px = [f32::MIN; CHUNK];
+                let mut excess_step_px = [f32::MIN; CHUNK];
                 for x in 0..take {
                     let [right_px, down_px] = [here[x + 1], below[x]].map(|px| {
                         let (near_px, far_px) = if here[x] < px { (here[x], px) } else { (px, here[x]) };
-                        occlusion::beyond_px(near_px, far_px, least_px)
+                        occlusion::excess_step_px(near_px, far_px, min_step_px)
                     });
-                    beyond_px[x] = if right_px > down_px { right_px } else { down_px };
+                    excess_step_px[x] = if right_px > down_px { right_px } else { down_px };
                 }
-                if highest(&beyond_px) < 0.0 {
+                if highest(&excess_step_px) < 0.0 {
                     continue;
                 }
-                for x in (0..take).filter(|&x| beyond_px[x] >= 0.0) {
+                for x in (0..take).filter(|&x| excess_step_px[x] >= 0.0) {
                     for other in [here[x + 1], below[x]] {
-                        mark(row, across, x0 + x, Silhouette::between(here[x], other, least_px, self.near_from_px));
+                        mark(row, across, x0 + x, Silhouette::between(here[x], other, min_step_px, self.near_from_px));
                     }
                 }
             }
@@ -87,12 +92,12 @@ impl WithSimd for Marking<'_> {
             let (x, y) = (pixel.at as usize % width, pixel.at as usize / width);
             let (near_px, far_px) = (lens.coc_px(pixel.near_m), lens.coc_px(pixel.far_m));
             let row = &mut self.marks[(y - self.rows.start) / GRAIN * SHOWS * across..][..SHOWS * across];
-            mark(row, across, x, Silhouette::between(near_px, far_px, least_px, self.near_from_px));
+            mark(row, across, x, Silhouette::between(near_px, far_px, min_step_px, self.near_from_px));
         }
     }
 }
 
-/// How far the CoC of the first two of some tiles lie apart at most.
+/// Returns the CoC range of the first two tiles together.
 #[inline(always)]
 fn span_px(ranges: &[(f32, f32)]) -> f32 {
     let (low_px, high_px) = ranges[0];
@@ -103,20 +108,20 @@ fn span_px(ranges: &[(f32, f32)]) -> f32 {
 #[inline(always)]
 fn mark(row: &mut [f32], across: usize, x: usize, silhouette: Option<Silhouette>) {
     let Some(silhouette) = silhouette else { return };
-    let reaches_px = [silhouette.shows_px, silhouette.shows_back_px, silhouette.uncovers_px];
-    for (plane, px) in row.chunks_exact_mut(across).zip(reaches_px) {
+    let distances_px = [silhouette.shows_px, silhouette.shows_back_px, silhouette.uncovers_px];
+    for (plane, px) in row.chunks_exact_mut(across).zip(distances_px) {
         plane[x / GRAIN] = plane[x / GRAIN].max(px);
     }
 }
 
-/// Whether the CoC may jump by `least_px` between any two of these, in metres. Without a division: the CoC is linear in
-/// 1/depth, but for the sharp range and its cuts, which make jumps smaller.
+/// Whether the CoC may step by `min_step_px` between any two of these, in metres. Needs no division: the CoC is linear
+/// in 1/depth, except for the sharp range and its clamps, which make steps smaller.
 #[inline(always)]
-fn jumps(lens: &DepthCoc, least_px: f32, a: &[f32], b: &[f32]) -> bool {
+fn has_step(lens: &DepthCoc, min_step_px: f32, a: &[f32], b: &[f32]) -> bool {
     let (steep, far) = (lens.coc_at_infinity_px * lens.far_m(), |m: f32| if m > 0.0 && m < FAR_M { m } else { FAR_M });
     let excess = |a: f32, b: f32| {
         let (a, b) = (far(a), far(b));
-        (a - b).abs() * steep - 0.999 * least_px * a * b
+        (a - b).abs() * steep - 0.999 * min_step_px * a * b
     };
     let mut most = [f32::MIN; 16];
     let ((a, a_rest), (b, b_rest)) = (a.as_chunks::<16>(), b.as_chunks::<16>());

@@ -1,4 +1,4 @@
-//! The CPU executor: every core, the best vector instructions that the machine has, nothing allocated per frame.
+//! The CPU executor: uses every core and the best vector instructions available, and allocates nothing per frame.
 
 mod band;
 mod bin;
@@ -34,14 +34,14 @@ use marking::Marking;
 use pulp::Arch;
 use reach::Reach;
 use rows::Slot;
-use shelves::{BinShelves, StripShelves};
+use shelves::{BinParts, StripParts};
 use silhouettes::Silhouettes;
 use tiles::{BLOCK, Survey, TILE_H, Tiles};
 use unpack::Source;
 
 use super::Finished;
 use super::ladder::Compositing;
-use super::occlusion::MOST_LAYERS;
+use super::occlusion::MAX_LAYERS;
 use super::plan::{CELL, MAX_BINS, Plan};
 use super::rung::SCALES;
 use crate::budget::Quality;
@@ -60,18 +60,18 @@ pub struct CpuBokeh {
     silhouettes: Silhouettes,
     slots: Vec<Slot>,
     pyramid: Option<fill::Pyramid>,
-    /// Per band and block, the first bin that waits for a fill.
+    /// Per band and block, the first bin that waits for inpainting.
     waits: Vec<usize>,
     gather: Option<Gather>,
-    members: Vec<Member>,
-    /// Flags for [`DisjointParts`]: as many as any pass has parts.
+    members: Vec<ThreadMemory>,
+    /// Flags for [`DisjointParts`]: one per part of the largest pass.
     taken: Vec<AtomicBool>,
     /// The last frame, until it is collected.
     done: Option<Finished>,
 }
 
-/// Memory of one thread.
-struct Member {
+/// Scratch memory of one thread.
+struct ThreadMemory {
     coc: Vec<f32>,
     sums: BandSums,
     reach: Vec<f32>,
@@ -80,17 +80,17 @@ struct Member {
 }
 
 impl CpuBokeh {
-    /// An executor of `plan` on `threads` threads (all cores when `None`).
+    /// Creates an executor of `plan` on `threads` threads (all cores when `None`).
     pub fn new(plan: Plan, threads: Option<usize>) -> Self {
         let threads = threads.unwrap_or_else(cores);
         let (width, height) = (plan.width, plan.height);
         let workers = ThreadPool::new("blur", threads);
         let slots: Vec<Slot> = (0..plan.slots()).map(|slot| Slot::new(&plan, slot)).collect();
         let members = (0..workers.thread_count())
-            .map(|_| Member {
+            .map(|_| ThreadMemory {
                 coc: vec![0.0; width],
                 sums: BandSums::new(),
-                // The pass takes a grid and a row of it.
+                // The pass needs a grid and one row of it.
                 reach: Vec::with_capacity(slots.iter().map(|slot| slot.cells.data.len() * 2).max().unwrap_or(0)),
                 blur: Scratch::new(&plan),
                 layers: layers::Layers::new(),
@@ -115,13 +115,13 @@ impl CpuBokeh {
         }
     }
 
-    /// Changes the quality of the frames to come, where the plan has others.
+    /// Changes the quality of the next frames, if the plan has other levels.
     pub fn set_quality(&mut self, quality: Quality) {
         self.plan.set_quality(quality);
     }
 
-    /// Blurs the `pixels` of one picture into `out`, which has the length of it; `lap` is called after each pass with its
-    /// name, and may stop the rest. A frame that was stopped leaves nothing behind that another could be made from.
+    /// Blurs the `pixels` of one picture into `out`, which has the same length. Calls `lap` with the name of each pass
+    /// after it; `lap` may stop the frame, which leaves the buffers in an unusable state.
     pub(super) fn blur_pixels<T: Sample>(
         &mut self,
         pixels: &[T],
@@ -135,7 +135,7 @@ impl CpuBokeh {
         let frame = Source::new(&self.plan, T::pixels(pixels), coc);
         self.split(&frame);
         lap("split")?;
-        // With something in front, blocks in which it hides anything get their bins behind after the fill.
+        // If something is in front, blocks where it occludes anything get the bins behind it after the inpainting.
         self.bin(&frame, None);
         lap("bin")?;
         for layer in self.plan.layers().skip(1) {
@@ -161,19 +161,19 @@ impl CpuBokeh {
         lap("composite")
     }
 
-    /// Splits the frame's CoC into bins, finds the tiles that stay as they are, and which bins hold anything.
+    /// Splits the frame's CoC into bins; finds the tiles that stay unchanged and the bins that are not empty.
     fn split(&mut self, frame: &Source<'_>) {
         let across = self.tiles.across;
         let layered = self.plan.compositing == Compositing::Layers;
         if layered {
             let near_from_px = self.plan.near_from_px();
-            // The split is a part of its own, beside those that survey a row of tiles each.
+            // Part 0 computes the split; the other parts each survey a row of tiles.
             let mut alone = [AtomicBool::new(false)];
             let plan = DisjointParts::new(std::slice::from_mut(&mut self.plan), 1, &mut alone);
             let ranges = DisjointParts::new(&mut self.tiles.ranges, across, &mut self.taken);
             let marks = self.silhouettes.marks(TILE_H);
             let arch = self.arch;
-            self.workers.run_with(&mut self.members, self.tiles.down + 1, &|member: &mut Member, part| {
+            self.workers.run_with(&mut self.members, self.tiles.down + 1, &|member: &mut ThreadMemory, part| {
                 let Some(row) = part.checked_sub(1) else {
                     return match frame.coc {
                         Radii::Field(field, depth) => plan.part(0)[0].split(depth, field),
@@ -188,7 +188,7 @@ impl CpuBokeh {
             self.silhouettes.spread(&mut self.workers, arch);
         }
         self.tiles.settle(layered);
-        // What lies in front may spread to any tile in focus, so bins are needed there, too.
+        // Near content may spread to any tile in focus, so bins are needed there as well.
         if self.plan.bins.iter().any(|bin| bin.near) {
             self.tiles.idle.fill(false);
         }
@@ -197,31 +197,31 @@ impl CpuBokeh {
             let bin = &self.plan.bins[k];
             let slot = &mut self.slots[bin.slot];
             let meets = || self.tiles.any_within(&self.plan.share(k), 0..self.tiles.across, 0..self.tiles.down);
-            // What is filled in may be in any bin behind.
+            // Inpainted pixels may be in any bin behind.
             slot.present = !layered || k >= in_front || meets();
             slot.reshape(&self.plan, bin);
         }
     }
 
-    /// Pass `bin`: all bins, or those of a `layer` in blocks that waited for its fill.
+    /// Pass `bin`: all bins, or those of a `layer` in the blocks that waited for its inpainting.
     fn bin(&mut self, frame: &Source<'_>, layer: Option<Range<usize>>) {
         let plan = &self.plan;
         let blocks = plan.width.div_ceil(BLOCK);
-        // Bands of 32 rows at least, as each reads some rows of its neighbours again.
+        // Bands of at least 32 rows, because each reads some rows of its neighbours again.
         let coarsest = plan.bins.iter().map(|bin| bin.scale).max().unwrap_or(1).max(SCALES[2]);
         let rows = CELL * coarsest;
-        let mut shelves: [Option<BinShelves<'_>>; MAX_BINS] = [const { None }; MAX_BINS];
+        let mut shelves: [Option<BinParts<'_>>; MAX_BINS] = [const { None }; MAX_BINS];
         for slot in self.slots.iter_mut().filter(|slot| slot.present) {
             let Some(k) = plan.bin_in(slot.index) else { continue };
             if layer.as_ref().is_none_or(|layer| layer.contains(&k)) {
-                shelves[k] = Some(BinShelves::new(plan, k, slot, rows));
+                shelves[k] = Some(BinParts::new(plan, k, slot, rows));
             }
         }
         let (arch, tiles) = (self.arch, &self.tiles);
         let bands = plan.height.div_ceil(rows);
         let waits = DisjointParts::new(&mut self.waits[..bands * blocks], blocks, &mut self.taken);
         let behind = |first: usize| Layer { first, unhidden: plan.unhidden(first) };
-        let mut layers = [behind(0); MOST_LAYERS];
+        let mut layers = [behind(0); MAX_LAYERS];
         let mut count = 0;
         for (layer, range) in layers.iter_mut().zip(plan.layers().skip(1)) {
             (*layer, count) = (behind(range.start), count + 1);
@@ -234,7 +234,7 @@ impl CpuBokeh {
             (Some(pyramid), None) if !layers.is_empty() => (Some(pyramid.halves(rows)), None),
             _ => (None, None),
         };
-        self.workers.run_with(&mut self.members, bands, &|member: &mut Member, band| {
+        self.workers.run_with(&mut self.members, bands, &|member: &mut ThreadMemory, band| {
             let hidden = match (&halves, filled) {
                 (Some(halves), _) => Hidden::Waits { layers, halves: halves.band(band, rows, plan.height) },
                 (_, Some((first, behind))) => Hidden::Filled { first, behind },
@@ -256,7 +256,7 @@ impl CpuBokeh {
     fn reach(&mut self) {
         let (plan, arch) = (&self.plan, self.arch);
         let parts = DisjointParts::new(&mut self.slots, 1, &mut self.taken);
-        self.workers.run_with(&mut self.members, plan.bins.len(), &|member: &mut Member, part| {
+        self.workers.run_with(&mut self.members, plan.bins.len(), &|member: &mut ThreadMemory, part| {
             let bin = &plan.bins[part];
             for slot in parts.part(bin.slot).iter_mut().filter(|slot| slot.present) {
                 let (cells, edges, scratch) = (&slot.cells, &mut slot.edges, &mut member.reach);
@@ -265,19 +265,19 @@ impl CpuBokeh {
         });
     }
 
-    /// Pass `blur`: each part is a strip; the strips of all bins are numbered through, so that no thread runs idle.
+    /// Pass `blur`: each part is a strip. The strips of all bins are numbered consecutively, so that no thread idles.
     fn blur_bins(&mut self) {
         let (plan, arch) = (&self.plan, self.arch);
-        let mut shelves: [Option<StripShelves<'_>>; MAX_BINS] = [const { None }; MAX_BINS];
+        let mut shelves: [Option<StripParts<'_>>; MAX_BINS] = [const { None }; MAX_BINS];
         let mut parts = 0;
         for slot in self.slots.iter_mut().filter(|slot| slot.present) {
             let Some(k) = plan.bin_in(slot.index) else { continue };
             let strips = slot.source.across;
-            shelves[k] = Some(StripShelves::new(&plan.bins[k], slot, parts));
+            shelves[k] = Some(StripParts::new(&plan.bins[k], slot, parts));
             parts += strips;
         }
-        self.workers.run_with(&mut self.members, parts, &|member: &mut Member, part| {
-            // The bin of a part is the last one that begins at or before it.
+        self.workers.run_with(&mut self.members, parts, &|member: &mut ThreadMemory, part| {
+            // The bin of a part is the last one whose first part is not after it.
             let all = shelves.iter().zip(&plan.bins).filter_map(|(shelf, bin)| shelf.as_ref().zip(Some(bin)));
             let Some((shelf, bin)) = all.filter(|(shelf, _)| shelf.first <= part).max_by_key(|(shelf, _)| shelf.first)
             else {
@@ -308,7 +308,7 @@ impl CpuBokeh {
         let gathered = self.gather.as_ref().map_or(&[][..], |gather| gather.result());
         let (plan, slots, tiles, silhouettes) = (&self.plan, &self.slots, &self.tiles, &self.silhouettes);
         let (arch, encode) = (self.arch, &self.encode);
-        self.workers.run_with(&mut self.members, plan.height.div_ceil(TILE_H), &|member: &mut Member, part| {
+        self.workers.run_with(&mut self.members, plan.height.div_ceil(TILE_H), &|member: &mut ThreadMemory, part| {
             let (y0, layers) = (part * TILE_H, &mut member.layers);
             let out = out.part(part);
             arch.dispatch(composite::Composite {

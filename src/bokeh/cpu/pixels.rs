@@ -1,24 +1,24 @@
-//! What pictures are made of, and their circles of confusion, as they lie in memory.
+//! Sample types of pictures in memory, and their circles of confusion.
 
 use super::encode::{CHUNK, EncodeTable};
 use crate::frame::DepthMap;
 use crate::optics::CocField;
 
-/// The pixels of a picture: R, G, B after each other, row-major, no padding.
+/// Pixels of a picture: interleaved R, G, B, row-major, no padding.
 #[derive(Clone, Copy, Debug)]
 pub enum Pixels<'a> {
     /// 8-bit sRGB.
     Srgb(&'a [u8]),
-    /// Linear light, 1 = white of sRGB, with its primaries. What is below 0 counts as 0 where it is blurred, what is above
-    /// [`Pixels::MOST_LIGHT`] as that.
+    /// Linear light, 1 = sRGB white, with the primaries of sRGB. Before blurring, values are clamped to the range from
+    /// 0 to [`Pixels::MOST_LIGHT`].
     Linear(&'a [f32]),
 }
 
 impl Pixels<'_> {
-    /// The brightest light: the largest half float. Filters sum products, which stay finite.
+    /// The brightest light: the largest half float. Sums of products in the filters stay finite.
     pub const MOST_LIGHT: f32 = 65_504.0;
 
-    /// Linear light as it is blurred.
+    /// Clamps linear light to the range that can be blurred.
     #[inline(always)]
     pub fn light(value: f32) -> f32 {
         let value = if value > 0.0 { value } else { 0.0 };
@@ -29,18 +29,18 @@ impl Pixels<'_> {
 /// The circle of confusion of every pixel: a signed radius in pixels, positive behind the focal plane.
 #[derive(Clone, Copy, Debug)]
 pub enum Radii<'a> {
-    /// By a rule, over depth of any size where it follows depth.
+    /// Computed by a rule, from a depth map of any size if it follows depth.
     Field(&'a CocField, Option<&'a DepthMap>),
-    /// Each given, row-major; finite.
+    /// Given per pixel, row-major; finite.
     Each(&'a [f32]),
 }
 
-/// What pixels are made of.
+/// Type of a colour sample.
 pub trait Sample: Copy + Send + Sync {
-    /// The pixels as one of the two kinds.
+    /// Wraps samples as pixels of their kind.
     fn pixels(samples: &[Self]) -> Pixels<'_>;
 
-    /// Writes a chunk of linear light; `out` may be shorter.
+    /// Writes a chunk of linear light as samples; `out` may be shorter.
     fn write(color: &[[f32; CHUNK]; 3], encode: &EncodeTable, out: &mut [Self]);
 }
 
@@ -62,7 +62,7 @@ impl Sample for f32 {
 
     #[inline(always)]
     fn write(color: &[[f32; CHUNK]; 3], _: &EncodeTable, out: &mut [f32]) {
-        // Beside the brightest light, few terms of a filter sum up to less than nothing.
+        // Next to very bright light, filters of few terms may sum to less than 0.
         for (x, pixel) in out.as_chunks_mut::<3>().0.iter_mut().enumerate() {
             *pixel = [Pixels::light(color[0][x]), Pixels::light(color[1][x]), Pixels::light(color[2][x])];
         }

@@ -1,4 +1,4 @@
-//! What the passes leave behind, for comparing the executors pass by pass and for looking at a blur from within.
+//! Read access to intermediate results, for comparing the executors pass by pass and for inspecting a blur.
 
 use super::CpuBokeh;
 use super::pixels::{Pixels, Radii};
@@ -14,7 +14,7 @@ use crate::optics::CocField;
 const SPAN: usize = 64;
 
 impl CpuBokeh {
-    /// The result of a pass over the last frame, in the layout that [`Probe`] states. Allocates; not for every frame.
+    /// Returns the result of a pass over the last frame, in the layout of [`Probe`]. Allocates; not for every frame.
     pub fn probe(&self, probe: Probe) -> Vec<[f32; 4]> {
         match probe {
             Probe::Bin(k) => {
@@ -37,12 +37,12 @@ impl CpuBokeh {
         }
     }
 
-    /// The plan, with the bins of the last frame.
+    /// Returns the plan, with the bins of the last frame.
     pub fn plan(&self) -> &Plan {
         &self.plan
     }
 
-    /// The radius that every pixel of bin `k` was filtered with in the last frame, in bin pixels.
+    /// Returns the radius with which every pixel of bin `k` was filtered in the last frame, in bin pixels.
     pub fn radius_px(&self, k: usize) -> Vec<f32> {
         let bin = &self.plan.bins[k];
         let edges = &self.slots[bin.slot].edges;
@@ -59,9 +59,9 @@ impl CpuBokeh {
         radii
     }
 
-    /// A frame as the bins take it, per pixel: linear r, g, b with highlights expanded, and CoC. With `filled`, which
-    /// has to be the last frame, what near objects hide is filled in, as for the bins behind all of them. Two surfaces of a pixel
-    /// are put together again, and the CoC is the nearer one's.
+    /// Returns a frame as the bins see it, per pixel: linear r, g, b with highlights expanded, and CoC. With `filled`,
+    /// which requires the last frame, occluded pixels are inpainted, as for the bins behind all near ones. Mixed pixels
+    /// are composited again, with the CoC of the nearer surface.
     pub fn scene(&self, color: &ColorImage, depth: Option<&DepthMap>, coc: &CocField, filled: bool) -> Vec<[f32; 4]> {
         let (width, height) = (color.width as usize, color.height as usize);
         let source = Source::new(&self.plan, Pixels::Srgb(&color.rgb), Radii::Field(coc, depth));
@@ -74,7 +74,7 @@ impl CpuBokeh {
             for x0 in (0..width).step_by(SPAN) {
                 source.unpack::<pulp::Scalar, SPAN>(y, x0 as isize, SPAN, &mut surfaces);
                 if let Some(behind) = &behind {
-                    behind.put(pulp::Scalar::new(), x0 as isize, y, width, &mut surfaces);
+                    behind.inpaint(pulp::Scalar::new(), x0 as isize, y, width, &mut surfaces);
                 }
                 scene.extend((0..SPAN.min(width - x0)).map(|x| surfaces.pixel(x)));
             }
@@ -82,35 +82,35 @@ impl CpuBokeh {
         scene
     }
 
-    /// Whether something in the last frame was in front, and what it hides was filled in.
+    /// Whether something in the last frame was in front, so that the background behind it was inpainted.
     pub fn filled(&self) -> bool {
         self.pyramid.is_some() && self.last_layer() > 0
     }
 
-    /// How far a pixel of this CoC in the last frame, which was [`filled`](Self::filled), was replaced for the bins that
-    /// do not lie in front of the focal plane, 0 to 1.
+    /// Returns how far a pixel of this CoC was inpainted for the bins that are not in front of the focal plane, 0 to 1.
+    /// The last frame must have been [`filled`](Self::filled).
     pub fn hidden(&self, coc_px: f32) -> f32 {
         1.0 - self.plan.unhidden(self.last_layer()).at(coc_px)
     }
 
-    /// The first bin that is not in front of the focal plane.
+    /// Returns the first bin that is not in front of the focal plane.
     fn last_layer(&self) -> usize {
         self.plan.layers().last().map_or(0, |layer| layer.start)
     }
 
-    /// Whether a pixel of the last frame lies in a tile where nothing behind is blurred: unless something in front
-    /// reaches it, it stays as it is.
+    /// Whether a pixel of the last frame is in a tile without background blur: it stays unchanged unless something in
+    /// front spreads there.
     pub fn is_still(&self, (x, y): (usize, usize)) -> bool {
         self.tiles.still[y / TILE_H * self.tiles.across + x / TILE_W]
     }
 
-    /// Whether anything in the last frame belonged to bin `k`; if not, its passes were left out.
+    /// Whether bin `k` had any content in the last frame; if not, its passes were skipped.
     pub fn is_present(&self, k: usize) -> bool {
         self.slots[self.plan.bins[k].slot].present
     }
 
-    /// Whether a pixel of a bin of scale `scale`, or any within `around` bin pixels of it, lies in a tile that no bin
-    /// of the last frame needed, all around it being in focus: the bins may be empty there.
+    /// Whether a pixel of a bin of scale `scale`, or any within `around` bin pixels of it, is in a tile that no bin of
+    /// the last frame needed because its surroundings are in focus: the bins may be empty there.
     pub fn is_idle_around(&self, (x, y): (usize, usize), around: usize, scale: usize) -> bool {
         let tiles = |at: usize, tile: usize, count: usize| {
             let first = at.saturating_sub(around) * scale / tile;

@@ -1,5 +1,7 @@
-//! Pass `reach`, a dilation of radii on the coarse grid. Each cell gets the radius of the content that the filters can
-//! reach from there (its mean, weighted by coverage and nearness), and the range of its colours.
+//! Pass `reach`, a dilation of radii on the coarse grid. Each cell gets the mean radius of the content within the
+//! filter support, weighted by coverage and nearness, and the range of its colours.
+//!
+//! twin: shaders/reach.wgsl
 
 #![allow(clippy::needless_range_loop)] // Planes and distances index several arrays at once.
 
@@ -8,20 +10,20 @@ use pulp::{Simd, WithSimd};
 use super::rows::{CELL_PLANES, Cells, EDGE_VALUES, Edges, NO_COLOR};
 use crate::bokeh::plan::{ANY_COLOR, Bin, CELL, FAR_WEIGHT, Plan, SEGMENT};
 
-/// Weight of a cell `distance` cells away, along one axis.
+/// Returns the weight of a cell `distance` cells away, along one axis: a Gaussian plus [`FAR_WEIGHT`].
 pub fn nearness(distance: usize, bin: &Bin) -> f32 {
     let d = distance as f32 / bin.sigma_cells();
     (-0.5 * d * d).exp() + FAR_WEIGHT
 }
 
-/// Combines the neighbourhood of every cell of a bin, one axis after the other, and writes radius and range of colours at
+/// Combines the neighbourhood of every cell of a bin, one axis after the other, and writes radius and colour range at
 /// the `edges` of segments.
 pub struct Reach<'a> {
     pub plan: &'a Plan,
     pub bin: &'a Bin,
     pub cells: &'a Cells,
     pub edges: &'a mut Edges,
-    /// Grows to the size of the grid and one row of it.
+    /// Grows to the size of the grid plus one row of it.
     pub scratch: &'a mut Vec<f32>,
 }
 
@@ -36,12 +38,12 @@ impl WithSimd for Reach<'_> {
 #[inline(always)]
 fn reach<S: Simd>(simd: S, plan: &Plan, bin: &Bin, cells: &Cells, edges: &mut Edges, scratch: &mut Vec<f32>) {
     let (width, height, radius) = (cells.width, cells.height, plan.reach_cells(bin));
-    // Only blurs of thousands of pixels reach farther; they are cut.
+    // Only blurs of thousands of pixels have a larger radius; they are clamped.
     let mut weights = [0.0; 64];
     let radius = radius.min(weights.len() - 1);
     (0..=radius).for_each(|d| weights[d] = nearness(d, bin));
     let row_len = CELL_PLANES * width;
-    // All of it is written before it is read.
+    // Everything is written before it is read.
     scratch.resize(scratch.len().max(cells.data.len() + row_len), 0.0);
     let (across, row) = scratch[..cells.data.len() + row_len].split_at_mut(cells.data.len());
     for (k, (source, target)) in cells.data.chunks_exact(width).zip(across.chunks_exact_mut(width)).enumerate() {
@@ -66,7 +68,7 @@ fn reach<S: Simd>(simd: S, plan: &Plan, bin: &Bin, cells: &Cells, edges: &mut Ed
             row[width + x] = plan.bin_radius_px(bin, coc_px);
         }
         if plan.has_lobes(bin) {
-            // Where nothing is in reach there is nothing to keep in range.
+            // Without content in the support there is no range to clamp to.
             row[2 * width..].iter_mut().filter(|value| value.abs() >= NO_COLOR).for_each(|value| *value = 0.0);
         } else {
             row[2 * width..5 * width].fill(-ANY_COLOR);
@@ -74,7 +76,7 @@ fn reach<S: Simd>(simd: S, plan: &Plan, bin: &Bin, cells: &Cells, edges: &mut Ed
         }
         let out = &mut edges.data[y * edges.across * EDGE_VALUES..][..edges.across * EDGE_VALUES];
         for (edge, values) in out.chunks_exact_mut(EDGE_VALUES).enumerate() {
-            // An edge lies between two cells, or at an end of the row: the mean of both sides.
+            // An edge is between two cells, or at an end of the row: the mean of both sides.
             let right = edge * SEGMENT / CELL;
             let (left, right) = (right.saturating_sub(1), right.min(width - 1));
             for (plane, value) in values.iter_mut().take(CELL_PLANES - 1).enumerate() {

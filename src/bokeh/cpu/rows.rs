@@ -1,4 +1,4 @@
-//! The memory of the CPU executor: pictures as rows of planes, and a bin's result as strips.
+//! Buffers of the CPU executor: pictures as rows of planes, and a bin's result as strips.
 
 use std::ops::Range;
 use std::sync::atomic::AtomicBool;
@@ -8,7 +8,7 @@ use crate::bokeh::plan::{Bin, CELL, Plan, SEGMENT};
 use crate::compute::aligned::Aligned;
 use crate::compute::simd::prefetch;
 
-/// Columns of a strip: what one part of the blur pass produces.
+/// Columns of a strip: the output of one part of the blur pass.
 pub const STRIP: usize = 32;
 
 /// A picture of `CH` planes, row by row: `[row][plane][stride]`, each plane row with `pad` columns on both sides.
@@ -16,23 +16,23 @@ pub struct Rows<const CH: usize> {
     pub data: Aligned,
     /// Values from one plane row to the next.
     pub stride: usize,
-    /// Columns before the first pixel, and at least as many after the last.
+    /// Columns before the first pixel; at least this number also after the last.
     pub pad: usize,
 }
 
 impl<const CH: usize> Rows<CH> {
-    /// Zeros, `width` rounded up to whole tiles.
+    /// Allocates zeros, with `width` rounded up to whole tiles.
     pub fn new(width: usize, height: usize, pad: usize) -> Self {
         let stride = width.next_multiple_of(TILE_W) + 2 * pad;
         Self { data: Aligned::zeros(stride * CH * height), stride, pad }
     }
 
-    /// Values in a row, all planes together.
+    /// Returns the number of values in a row, all planes together.
     pub fn row_len(&self) -> usize {
         self.stride * CH
     }
 
-    /// Row `y`, all planes.
+    /// Returns row `y`, all planes.
     #[inline(always)]
     pub fn row(&self, y: usize) -> &[f32] {
         &self.data[y * self.row_len()..][..self.row_len()]
@@ -57,23 +57,23 @@ pub struct Cells {
     pub height: usize,
 }
 
-/// Lowest colour (and, negative, highest colour) of a cell without any.
+/// Lowest colour (and, negated, highest colour) of an empty cell.
 pub const NO_COLOR: f32 = 1e30;
 /// Planes of [`Cells`].
 pub const CELL_PLANES: usize = 8;
 
-/// A cell that holds nothing.
+/// Initial values of an empty cell.
 pub const EMPTY_CELL: [f32; CELL_PLANES] = [0.0, 0.0, NO_COLOR, NO_COLOR, NO_COLOR, -NO_COLOR, -NO_COLOR, -NO_COLOR];
 
 impl Cells {
-    /// An empty grid over `width` x `height` bin pixels (`width` in whole tiles).
+    /// Creates an empty grid over `width` x `height` bin pixels (`width` in whole tiles).
     pub fn new(width: usize, height: usize) -> Self {
         let mut cells = Self { data: Vec::new(), width: 0, height: 0 };
         cells.reshape(width, height);
         cells
     }
 
-    /// Empties the grid and gives it another size.
+    /// Empties the grid and resizes it.
     pub fn reshape(&mut self, width: usize, height: usize) {
         (self.width, self.height) = (width.next_multiple_of(TILE_W) / CELL, height.div_ceil(CELL));
         self.data.clear();
@@ -81,18 +81,18 @@ impl Cells {
         planes.for_each(|value| self.data.extend(std::iter::repeat_n(value, self.width)));
     }
 
-    /// A plane of row `y`.
+    /// Returns a plane of row `y`.
     #[inline(always)]
     pub fn plane(&self, y: usize, plane: usize) -> &[f32] {
         &self.data[(y * CELL_PLANES + plane) * self.width..][..self.width]
     }
 }
 
-/// What the filters need to know at every edge of a segment, per row of cells: `[row][edge][EDGE_VALUES]`.
+/// Filter parameters at every segment edge, per row of cells: `[row][edge][EDGE_VALUES]`.
 pub struct Edges {
     /// Radius in bin pixels, lowest colour (3), highest colour (3), unused.
     pub data: Vec<f32>,
-    /// Edges across: one more than there are segments.
+    /// Edges across: one more than segments.
     pub across: usize,
     pub height: usize,
 }
@@ -103,24 +103,25 @@ pub const EDGE_VALUES: usize = 8;
 pub const STRIP_EDGES: usize = STRIP / SEGMENT + 1;
 
 impl Edges {
-    /// Edges of a grid of cells.
+    /// Creates the edges of a grid of cells.
     pub fn new(cells: &Cells) -> Self {
         let mut edges = Self { data: Vec::new(), across: 0, height: 0 };
         edges.reshape(cells);
         edges
     }
 
-    /// Gives the edges another size; their content is unspecified after.
+    /// Resizes the edges; their content is unspecified afterwards.
     pub fn reshape(&mut self, cells: &Cells) {
         (self.across, self.height) = (cells.width * CELL / SEGMENT + 1, cells.height);
         self.data.resize(self.across * self.height * EDGE_VALUES, 0.0);
     }
 
-    /// The values at the edges of a strip in row `y` of the bin, linear between the middle rows of the cells.
+    /// Returns the values at the edges of a strip in row `y` of the bin, linear between the middle rows of the cells.
     #[inline(always)]
     pub fn at(&self, strip: usize, y: usize) -> [[f32; EDGE_VALUES]; STRIP_EDGES] {
         let cell_y = (y as f32 - (CELL as f32 - 1.0) / 2.0) * (1.0 / CELL as f32);
-        // Above the middle of the first cells these hold. A comparison: `max` would check for NaN, too.
+        // Above the middle of the first row of cells, its values apply. A comparison, because `max` would also check
+        // for NaN.
         let cell_y = if cell_y < 0.0 { 0.0 } else { cell_y };
         let above = (cell_y as usize).min(self.height - 1);
         let share = cell_y - above as f32;
@@ -138,7 +139,7 @@ impl Edges {
     }
 }
 
-/// A bin's picture in strips, so that a filter that goes down a strip reads on and on:
+/// A bin's picture in strips, so that a filter down a strip reads memory sequentially:
 /// `[row of cells][strip][CELL][4][STRIP]`, premultiplied colour and coverage.
 pub struct Strips {
     pub data: Aligned,
@@ -149,17 +150,17 @@ pub struct Strips {
 pub const PIECE: usize = 16;
 /// Values of a row of a strip.
 pub const STRIP_ROW: usize = 4 * STRIP;
-/// Values of a strip of a row of cells.
+/// Values of a strip in a row of cells.
 pub const STRIP_CELLS: usize = CELL * STRIP_ROW;
 
 impl Strips {
-    /// Row `y` of a strip: `[4][STRIP]`.
+    /// Returns row `y` of a strip: `[4][STRIP]`.
     #[inline(always)]
     pub fn row(&self, strip: usize, y: usize) -> &[f32] {
         &self.data[(y / CELL * self.across + strip) * STRIP_CELLS + y % CELL * STRIP_ROW..][..STRIP_ROW]
     }
 
-    /// Asks for what [`Strips::copy_line`] reads.
+    /// Prefetches the memory that [`Strips::copy_line`] reads.
     #[inline(always)]
     pub fn prefetch_line(&self, strip: usize, y: usize, pad: usize) {
         let first = (strip * STRIP).saturating_sub(pad);
@@ -179,7 +180,7 @@ impl Strips {
         let span = STRIP + 2 * pad;
         for at in (0..span).step_by(PIECE) {
             let x = (strip * STRIP + at) as isize - pad as isize;
-            // A piece lies in one strip; past the picture's last column there may be strips of which none is real.
+            // A piece is inside one strip; past the picture's last column there may be strips without real columns.
             let inside = x.clamp(0, width as isize - 1) as usize;
             let row = self.row(inside / STRIP, y);
             for p in 0..4 {
@@ -195,43 +196,43 @@ impl Strips {
     }
 }
 
-/// What one bin needs while a frame is blurred: memory for the largest that it can be, in the shape of the current one.
+/// Buffers of one bin: allocated for the largest bin of the slot, in the shape of the current one.
 pub struct Slot {
     pub index: usize,
-    /// What the pass `bin` makes.
+    /// Result of the pass `bin`.
     pub source: Strips,
-    /// The coarse grid as measured.
+    /// The coarse grid with the bin's coverage.
     pub cells: Cells,
-    /// Per row of cells and block, whether `source` holds anything but zeros.
+    /// Per row of cells and block, whether `source` has any non-zero values.
     pub filled: Vec<bool>,
-    /// The radius and the range of colours within reach.
+    /// Radius and colour range within the filter support.
     pub edges: Edges,
     /// The blurred bin, `[strip][row][4][STRIP]`: premultiplied colour and coverage.
     pub out: Aligned,
-    /// Per strip and row of cells, whether `out` holds anything but zeros.
+    /// Per strip and row of cells, whether `out` has any non-zero values.
     pub active: Vec<bool>,
-    /// Whether anything in the frame belongs to this bin.
+    /// Whether the frame has content in this bin.
     pub present: bool,
     /// Flags for three [`DisjointParts`](crate::compute::thread_pool::DisjointParts) at once.
     pub taken: [Vec<AtomicBool>; 3],
-    /// That of the bin whose shape it has; 0 before the first.
+    /// Scale of the bin whose shape it has; 0 before the first.
     scale: usize,
 }
 
 impl Slot {
-    /// The strips that hold these columns of the bin, as far as there are any.
+    /// Returns the strips that contain these columns of the bin, clamped to the existing ones.
     #[inline(always)]
     pub fn strips(&self, columns: Range<usize>) -> Range<usize> {
         columns.start / STRIP..columns.end.div_ceil(STRIP).min(self.source.across)
     }
 
-    /// Whether the result of a bin so high holds anything but zeros in the row of cells of row `y` of a strip.
+    /// Whether the result of a bin of this `height` has content in the row of cells of row `y` of a strip.
     #[inline(always)]
     pub fn is_active(&self, strip: usize, y: usize, height: usize) -> bool {
         self.active[strip * height.div_ceil(CELL) + y / CELL]
     }
 
-    /// Zeros for the largest bin that can be in the slot; the system provides pages only as frames touch them.
+    /// Allocates zeros for the largest bin of the slot; the system provides pages only as frames touch them.
     pub fn new(plan: &Plan, slot: usize) -> Self {
         let scale = plan.least_scale(slot);
         let (width, height) = (plan.width.div_ceil(scale), plan.height.div_ceil(scale));
@@ -254,7 +255,7 @@ impl Slot {
         }
     }
 
-    /// Takes the shape of a bin; where its scale is another than before, clears all that was used.
+    /// Takes the shape of a bin; if the scale changed, clears the used memory.
     pub fn reshape(&mut self, plan: &Plan, bin: &Bin) {
         if self.scale == bin.scale {
             return;
@@ -273,7 +274,7 @@ impl Slot {
         self.edges.reshape(&self.cells);
     }
 
-    /// The values that the current shape uses: of `source`, and of `out`.
+    /// Returns the number of values that the current shape uses: of `source`, and of `out`.
     pub fn used(&self, bin: &Bin) -> (usize, usize) {
         let across = self.source.across;
         (across * bin.height.div_ceil(CELL) * STRIP_CELLS, across * bin.height * STRIP_ROW)

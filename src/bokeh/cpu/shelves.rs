@@ -1,19 +1,19 @@
-//! Disjoint slices: what the parts of a pass that runs over every bin at once read and write, bin by bin.
+//! Disjoint slices of the bins' buffers for passes whose parts run over every bin at once.
 #![allow(missing_docs)] // The fields are those of `BinRows`.
 
 use super::bin::BinRows;
 use super::rows::{CELL_PLANES, Cells, Edges, STRIP_CELLS, STRIP_ROW, Slot, Strips};
 use super::tiles::BLOCK;
 use crate::bokeh::ladder::Compositing;
-use crate::bokeh::plan::{Bin, CELL, Plan, Share};
+use crate::bokeh::plan::{Bin, BinWeight, CELL, Plan};
 use crate::compute::thread_pool::DisjointParts;
 
-/// What the parts of the pass `bin` write for one bin.
-pub struct BinShelves<'a> {
+/// Output of the pass `bin` for one bin.
+pub struct BinParts<'a> {
     source: DisjointParts<'a, f32>,
     cells: DisjointParts<'a, f32>,
     filled: DisjointParts<'a, bool>,
-    share: Option<Share>,
+    weight: Option<BinWeight>,
     scale: usize,
     size: (usize, usize),
     ranged: bool,
@@ -22,14 +22,14 @@ pub struct BinShelves<'a> {
     rows: usize,
 }
 
-impl<'a> BinShelves<'a> {
-    /// Splits the memory of the `k`-th bin into bands of `rows` rows of the picture, in whole rows of cells.
+impl<'a> BinParts<'a> {
+    /// Splits the buffers of the `k`-th bin into bands of `rows` rows of the picture, in whole rows of cells.
     pub fn new(plan: &Plan, k: usize, slot: &'a mut Slot, rows: usize) -> Self {
         let bin = &plan.bins[k];
         let blocks = plan.width.div_ceil(BLOCK);
         let used = slot.used(bin).0;
         let [first, second, third] = &mut slot.taken;
-        // Rows of the bin, and of its cells, in a band.
+        // Rows of the bin and of its cells in a band.
         let bin_rows = rows / bin.scale;
         let cells = bin_rows / CELL;
         Self {
@@ -38,17 +38,17 @@ impl<'a> BinShelves<'a> {
             filled: DisjointParts::new(&mut slot.filled[..blocks * bin.height.div_ceil(CELL)], cells * blocks, third),
             across: slot.source.across,
             rows: bin_rows,
-            share: (plan.compositing == Compositing::Layers).then(|| plan.share(k)),
+            weight: (plan.compositing == Compositing::Layers).then(|| plan.share(k)),
             ranged: plan.has_lobes(bin),
             scale: bin.scale,
             size: (bin.width, bin.height),
         }
     }
 
-    /// The memory of one band, which can be taken once.
+    /// Returns the buffers of one band; each band can be taken once.
     pub fn part(&self, band: usize) -> BinRows<'_> {
         BinRows {
-            share: self.share,
+            weight: self.weight,
             scale: self.scale,
             size: self.size,
             ranged: self.ranged,
@@ -61,9 +61,9 @@ impl<'a> BinShelves<'a> {
     }
 }
 
-/// What the parts of the pass `blur` read and write for one bin.
-pub struct StripShelves<'a> {
-    /// The part that is its first strip.
+/// Input and output of the pass `blur` for one bin.
+pub struct StripParts<'a> {
+    /// Number of the part that does its first strip.
     pub first: usize,
     pub source: &'a Strips,
     pub cells: &'a Cells,
@@ -72,8 +72,8 @@ pub struct StripShelves<'a> {
     pub active: DisjointParts<'a, bool>,
 }
 
-impl<'a> StripShelves<'a> {
-    /// Splits the memory of a bin into strips; `first` is the part that does its first strip.
+impl<'a> StripParts<'a> {
+    /// Splits the buffers of a bin into strips; `first` is the part that does its first strip.
     pub fn new(bin: &Bin, slot: &'a mut Slot, first: usize) -> Self {
         let used = slot.used(bin).1;
         let down = bin.height.div_ceil(CELL);

@@ -1,8 +1,11 @@
-//! Silhouettes: the places where the depth jumps, and how far from them what lies behind can show.
+//! Silhouettes (occlusion boundaries): the depth discontinuities, and how far from them the background is visible.
 //!
-//! A surface is opaque. Where the CoC changes by less than a pixel from pixel to pixel, all that a pixel sees through the
-//! aperture is that one surface: a ray at CoC `c` lies `|c|` from the pixel, so nothing farther than the radius at the
-//! silhouette can come from behind it. On a coarse grid, each jump marks how far that is; the marks spread over it.
+//! A surface is opaque. Where the CoC changes by less than a pixel from pixel to pixel, a pixel shows only that one
+//! surface through the aperture: a ray at CoC `c` is `|c|` away from the pixel, so nothing from behind appears farther
+//! from a silhouette than the radius there. Each discontinuity marks this distance on a coarse grid; the marks are then
+//! dilated.
+//!
+//! twin: shaders/spread.wgsl, shaders/uncover.wgsl
 
 #![allow(clippy::needless_range_loop)] // Lanes index two arrays at once.
 
@@ -15,9 +18,9 @@ use super::encode::CHUNK;
 use crate::bokeh::occlusion::{GRAIN, SHOWS};
 use crate::compute::thread_pool::{DisjointParts, ThreadPool};
 
-/// No silhouette.
+/// Distance without a silhouette.
 pub const NONE: f32 = -1.0;
-/// Rows of the grid that are one part of the work.
+/// Rows of the grid per work item.
 const PART: usize = 8;
 
 /// The grid over a picture: `[row][SHOWS][across]`.
@@ -25,19 +28,19 @@ pub struct Silhouettes {
     /// Columns and rows of the grid.
     across: usize,
     down: usize,
-    /// How far the silhouettes in a cell reach, in pixels; [`NONE`] without any.
+    /// Radius of the silhouettes in a cell, in pixels; [`NONE`] without any.
     marks: Vec<f32>,
-    /// The squares of the reaches less those of the distances, along a row: the largest of any silhouette.
+    /// After the dilation along rows: the maximum over silhouettes of radius^2 - distance^2.
     along: Vec<f32>,
-    /// The largest along each line, `[row][SHOWS]`.
+    /// Maximum of each line of `along`, `[row][SHOWS]`.
     tops: Vec<f32>,
-    /// The same over rows and columns: above 0 where a silhouette reaches a cell.
+    /// After the dilation along rows and columns: above 0 within the radius of a silhouette.
     reached: Vec<f32>,
     taken: Vec<AtomicBool>,
 }
 
 impl Silhouettes {
-    /// Memory for pictures of `width` x `height` pixels.
+    /// Allocates for pictures of `width` x `height` pixels.
     pub fn new(width: usize, height: usize) -> Self {
         let (across, down) = (width.div_ceil(GRAIN), height.div_ceil(GRAIN));
         let cells = vec![NONE; across * SHOWS * down];
@@ -46,12 +49,12 @@ impl Silhouettes {
         Self { across, down, marks: cells.clone(), along: cells.clone(), tops, reached: cells, taken }
     }
 
-    /// The marks, to be made in parts of so many rows of the picture, whole rows of the grid.
+    /// Returns the marks, to be written in parts of `rows` rows of the picture, whole rows of the grid.
     pub fn marks(&mut self, rows: usize) -> DisjointParts<'_, f32> {
         DisjointParts::new(&mut self.marks, rows / GRAIN * SHOWS * self.across, &mut self.taken)
     }
 
-    /// Spreads the marks, along the rows and then down the columns.
+    /// Dilates the marks by their radii, along the rows and then down the columns.
     pub fn spread(&mut self, workers: &mut ThreadPool, arch: Arch) {
         let (across, row_len, down) = (self.across, self.across * SHOWS, self.down);
         let marks = &self.marks;
@@ -82,7 +85,7 @@ impl Silhouettes {
                     for other in y.saturating_sub(reach)..(y + reach + 1).min(down) {
                         let (from, distance_px) = (other * SHOWS + plane, (other.abs_diff(y) * GRAIN) as f32);
                         let distance_square = distance_px * distance_px;
-                        // Most lines hold no silhouette, or none that reaches so far.
+                        // Most lines have no silhouette, or none with a radius that large.
                         if tops[from] - distance_square > NONE {
                             keep_highest(out, &along[from * across..][..across], distance_square);
                         }
@@ -92,8 +95,8 @@ impl Silhouettes {
         });
     }
 
-    /// Whether a silhouette may reach any pixel of a chunk of some rows, from column `x0` on: without, [`Self::reaching`] is `None`
-    /// in all of them.
+    /// Whether any pixel of a chunk of some rows, from column `x0` on, may be within the radius of a silhouette. If
+    /// not, [`Self::reaching`] is `None` in all of them.
     #[inline(always)]
     pub fn may_reach(&self, rows: Range<usize>, x0: usize) -> bool {
         let mut rows = (rows.start / GRAIN).saturating_sub(1)..(rows.end.div_ceil(GRAIN) + 1).min(self.down);
@@ -104,8 +107,8 @@ impl Silhouettes {
         })
     }
 
-    /// How far silhouettes reach some pixels of row `y` from column `x0` on, a multiple of the grain: of any silhouette, and of
-    /// those before what is not in front. `None` where none reaches any.
+    /// Returns radius^2 - distance^2 of silhouettes for a chunk of row `y` from column `x0` on, a multiple of the
+    /// grain: for any silhouette, and for those whose background is not in front. Returns `None` if all are outside.
     #[inline(always)]
     pub fn reaching(&self, y: usize, x0: usize) -> Option<Reaching> {
         let along = ((y as f32 + 0.5) / GRAIN as f32 - 0.5).max(0.0);
@@ -130,26 +133,25 @@ impl Silhouettes {
         (highest(&reaching.0[0]) > 0.0).then_some(reaching)
     }
 
-    /// The cells of row `y` of the picture: above 0 where something behind a silhouette can be seen, and where what a
-    /// silhouette hides matters.
+    /// Returns the cells of row `y` of the picture: above 0 where the background past a silhouette is visible, and
+    /// where the background that it hides matters.
     #[inline(always)]
     pub fn row(&self, y: usize) -> [&[f32]; 2] {
         [0, SHOWS - 1].map(|plane| &self.reached[(y / GRAIN * SHOWS + plane) * self.across..][..self.across])
     }
 }
 
-/// Cells of a chunk, and one more on both sides.
+/// Cells of a chunk, plus one on both sides.
 const CELLS: usize = CHUNK / GRAIN + 2;
-/// Pixels of the widest vector.
+/// Lanes of the widest vector.
 const WIDEST: usize = 16;
 
-/// The squares of the reaches of silhouettes less those of their distances, by the cells of a chunk: see
-/// [`Silhouettes::reaching`].
+/// The maximum of radius^2 - distance^2, by the cells of a chunk: see [`Silhouettes::reaching`].
 pub struct Reaching([[f32; CELLS]; 2]);
 
 impl Reaching {
-    /// Those of some pixels from column `x` of the chunk on, linear between the middles of cells; `None` where none reaches
-    /// any.
+    /// Returns the values of some pixels from column `x` of the chunk on, linear between the centres of cells; `None`
+    /// if all are outside.
     #[inline(always)]
     pub fn pixels(&self, x: usize, count: usize) -> Option<[[f32; WIDEST]; 2]> {
         let cells = &self.0[0][x / GRAIN..][..count / GRAIN + 2];
@@ -171,7 +173,7 @@ impl Reaching {
     }
 }
 
-/// The highest of some values.
+/// Returns the maximum.
 #[inline(always)]
 pub fn highest(values: &[f32]) -> f32 {
     let mut highest = [f32::MIN; 16];
@@ -184,12 +186,12 @@ pub fn highest(values: &[f32]) -> f32 {
     rest.iter().copied().chain(highest).fold(f32::MIN, f32::max)
 }
 
-/// How many cells away something can be whose reach has this square, in pixels.
+/// Returns the radius in cells for a squared radius in pixels, rounded up.
 fn cells_within(square: f32) -> usize {
     if square < 0.0 { 0 } else { square.sqrt() as usize / GRAIN + 1 }
 }
 
-/// Spreads the marks of a row along it: there are few.
+/// Dilates the marks of a row along it, one by one: there are few.
 #[inline(always)]
 fn spread_row(marks: &[f32], out: &mut [f32]) {
     out.fill(NONE);

@@ -1,5 +1,7 @@
-//! Shares of a row of pixels, and the tent that averages them down: twice as wide as a pixel of the bin, so that
-//! reducing a picture keeps its centroid.
+//! Weighted pixels of a row, and the tent filter that downscales them: twice as wide as a bin pixel, which preserves
+//! the centroid.
+//!
+//! twin: shaders/tent.wgsl
 
 #![allow(clippy::needless_range_loop)] // Planes index several arrays at once.
 
@@ -7,15 +9,15 @@ use pulp::Simd;
 
 use super::tiles::BLOCK;
 use super::unpack::{Piece, Surfaces};
-use crate::bokeh::plan::{HIDING_SHARE, Share};
+use crate::bokeh::plan::{BinWeight, HIDING_WEIGHT};
 use crate::compute::aligned::Line;
 use crate::compute::simd::{fma, load, store};
 
-/// Columns beyond a block on both sides that its averages reach.
+/// Columns on both sides of a block that its averages include.
 pub const MARGIN: usize = 16;
 /// Columns of a block and its margins.
 pub const WIDE: usize = BLOCK + 2 * MARGIN;
-/// Values of a plane of a block: a line more than needed, as planes at multiples of 4096 bytes hinder each other.
+/// Length of a plane of a block: one cache line more than needed, because planes at multiples of 4096 bytes conflict.
 pub const PLANE: usize = BLOCK + 16;
 /// Planes of a sum: premultiplied colour, coverage, coverage times |CoC|.
 pub const SUMS: usize = 5;
@@ -23,12 +25,12 @@ pub const SUMS: usize = 5;
 /// A row of a block of the bin: the planes of a sum.
 pub type Means = Line<[[f32; PLANE]; SUMS]>;
 
-/// Adds a row's shares to two rows of sums, or begins them where they are `fresh`. Down the picture the tent falls for one row of the bin while it rises for
-/// the next, so a row of the picture is read once and never kept: one pass makes any scale.
+/// Adds a weighted row to two rows of sums, or starts them if they are `fresh`. Vertically, the tent falls for one row
+/// of the bin while it rises for the next, so a row of the picture is read once and never stored, at any scale.
 #[inline(always)]
 pub fn sum_row<S: Simd>(
     simd: S,
-    share: &ShareAt<S>,
+    weight: &WeightAt<S>,
     surfaces: &Surfaces<WIDE>,
     columns: usize,
     weights: [f32; 2],
@@ -39,8 +41,8 @@ pub fn sum_row<S: Simd>(
     let weights = [simd.splat_f32s(weights[0]), simd.splat_f32s(weights[1])];
     let [above, below] = rows;
     for x in (0..columns + 2 * MARGIN).step_by(S::F32_LANES) {
-        let taken = share.taken(simd, surfaces, x);
-        if is_nothing(simd, taken) {
+        let taken = weight.at_surfaces(simd, surfaces, x);
+        if is_zero(simd, taken) {
             for p in 0..SUMS {
                 if fresh[0] {
                     store::<S>(&mut above[p], x, zero);
@@ -51,7 +53,7 @@ pub fn sum_row<S: Simd>(
             }
             continue;
         }
-        let values = share.of(simd, taken, surfaces, x);
+        let values = weight.apply(simd, taken, surfaces, x);
         for p in 0..SUMS {
             let falling = if fresh[0] { zero } else { load::<S>(&above[p], x) };
             let rising = if fresh[1] { zero } else { load::<S>(&below[p], x) };
@@ -61,50 +63,50 @@ pub fn sum_row<S: Simd>(
     }
 }
 
-/// A share, ready for vectors.
-pub struct ShareAt<S: Simd> {
+/// Weight of a bin, prepared for vectors.
+pub struct WeightAt<S: Simd> {
     steps: Option<[[S::f32s; 2]; 2]>,
 }
 
-impl<S: Simd> ShareAt<S> {
+impl<S: Simd> WeightAt<S> {
     #[inline(always)]
-    pub fn new(simd: S, share: &Option<Share>) -> Self {
-        // A step at `at` of a slope: slope c + (1/2 - slope at).
+    pub fn new(simd: S, weight: &Option<BinWeight>) -> Self {
+        // A step at `at` with a slope: slope c + (1/2 - slope at).
         let step = |(at, slope): (f32, f32)| [simd.splat_f32s(slope), simd.splat_f32s(0.5 - slope * at)];
-        Self { steps: share.as_ref().map(|share| [step(share.front), step(share.behind)]) }
+        Self { steps: weight.as_ref().map(|weight| [step(weight.front), step(weight.behind)]) }
     }
 
-    /// What the bin takes of a vector of pixels: of their only surface or the farther one, and of the nearer one where some
+    /// Returns the weights of a vector of pixels: of their only or farther surface, and of the nearer one where some
     /// have two.
     #[inline(always)]
-    pub fn taken(&self, simd: S, surfaces: &Surfaces<WIDE>, x: usize) -> [S::f32s; 2] {
+    pub fn at_surfaces(&self, simd: S, surfaces: &Surfaces<WIDE>, x: usize) -> [S::f32s; 2] {
         let back = self.at(simd, &surfaces.back, x);
         [back, if surfaces.mixed { self.at(simd, &surfaces.front, x) } else { back }]
     }
 
-    /// Premultiplied colour, coverage, and coverage times |CoC| of a vector of pixels, of which so much is `taken`, whatever
-    /// surfaces they show.
+    /// Returns premultiplied colour, coverage, and coverage times |CoC| of a vector of pixels with weights `taken`, for
+    /// one or two surfaces.
     #[inline(always)]
-    pub fn of(&self, simd: S, taken: [S::f32s; 2], surfaces: &Surfaces<WIDE>, x: usize) -> [S::f32s; SUMS] {
-        let back = times(simd, taken[0], &surfaces.back, x);
+    pub fn apply(&self, simd: S, taken: [S::f32s; 2], surfaces: &Surfaces<WIDE>, x: usize) -> [S::f32s; SUMS] {
+        let back = scale_surface(simd, taken[0], &surfaces.back, x);
         if !surfaces.mixed {
             return back;
         }
-        let front = times(simd, taken[1], &surfaces.front, x);
-        let (share, behind) = (load::<S>(&surfaces.share.0, x), load::<S>(&surfaces.behind.0, x));
-        // What is known of the farther surface without being seen, and the bins that take none of the nearer one.
+        let front = scale_surface(simd, taken[1], &surfaces.front, x);
+        let (alpha, behind) = (load::<S>(&surfaces.alpha.0, x), load::<S>(&surfaces.behind.0, x));
+        // Parts of the farther surface that are known but not visible count only in bins without the nearer one.
         let one = simd.splat_f32s(1.0);
-        let unseen = simd.sub_f32s(simd.add_f32s(behind, share), one);
-        let hidden = simd.min_f32s(simd.mul_f32s(simd.splat_f32s(1.0 / HIDING_SHARE), front[3]), one);
+        let unseen = simd.sub_f32s(simd.add_f32s(behind, alpha), one);
+        let hidden = simd.min_f32s(simd.mul_f32s(simd.splat_f32s(1.0 / HIDING_WEIGHT), front[3]), one);
         let behind = simd.sub_f32s(behind, simd.mul_f32s(unseen, hidden));
         let mut both = back;
         for p in 0..SUMS {
-            both[p] = fma(simd, share, front[p], simd.mul_f32s(behind, back[p]));
+            both[p] = fma(simd, alpha, front[p], simd.mul_f32s(behind, back[p]));
         }
         both
     }
 
-    /// The share of a vector of pixels of one surface.
+    /// Returns the weights of a vector of pixels of one surface.
     #[inline(always)]
     fn at(&self, simd: S, piece: &Piece<WIDE>, x: usize) -> S::f32s {
         let [zero, one] = [simd.splat_f32s(0.0), simd.splat_f32s(1.0)];
@@ -116,29 +118,29 @@ impl<S: Simd> ShareAt<S> {
     }
 }
 
-/// Whether nothing is `taken` of any pixel of a vector.
+/// Whether the weights of a whole vector are 0.
 #[inline(always)]
-pub fn is_nothing<S: Simd>(simd: S, taken: [S::f32s; 2]) -> bool {
+pub fn is_zero<S: Simd>(simd: S, taken: [S::f32s; 2]) -> bool {
     let any = simd.greater_than_f32s(simd.max_f32s(taken[0], taken[1]), simd.splat_f32s(0.0));
     simd.first_true_m32s(any) == S::F32_LANES
 }
 
-/// A share of a vector of pixels of one surface, as [`ShareAt::of`] has it.
+/// Multiplies a vector of pixels of one surface by their weights, in the layout of [`WeightAt::apply`].
 #[inline(always)]
-fn times<S: Simd>(simd: S, share: S::f32s, piece: &Piece<WIDE>, x: usize) -> [S::f32s; SUMS] {
-    let mut values = [share; SUMS];
+fn scale_surface<S: Simd>(simd: S, weight: S::f32s, piece: &Piece<WIDE>, x: usize) -> [S::f32s; SUMS] {
+    let mut values = [weight; SUMS];
     for p in 0..3 {
-        values[p] = simd.mul_f32s(share, load::<S>(&piece.0[p], x));
+        values[p] = simd.mul_f32s(weight, load::<S>(&piece.0[p], x));
     }
-    values[4] = simd.mul_f32s(share, simd.abs_f32s(load::<S>(&piece.0[3], x)));
+    values[4] = simd.mul_f32s(weight, simd.abs_f32s(load::<S>(&piece.0[3], x)));
     values
 }
 
-/// The tent across: a row of sums at the bin's scale. Weights repeat every `S` columns, so rise and fall fit in one vector
-/// each, and what is left to add up are runs of `S` values.
+/// Applies the tent horizontally: a row of sums at the bin's scale. Weights repeat every `S` columns, so rise and fall
+/// fit in one vector each, and the remaining sums are over runs of `S` values.
 #[inline(always)]
 pub fn reduce<V: Simd, const S: usize>(simd: V, sums: &[[f32; WIDE]; SUMS], columns: usize, means: &mut Means) {
-    // The ascending half of the tent, and the descending one, as often as they fit.
+    // Rising half of the tent, repeated; the falling half follows from it.
     let ramp: [f32; BLOCK] = const {
         let mut ramp = [0.0; BLOCK];
         let mut k = 0;

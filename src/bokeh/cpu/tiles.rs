@@ -1,30 +1,29 @@
-//! Tile classification: what is where, before any colour is read: the range of CoC of every tile, and the tiles that
-//! stay as they are.
+//! Tile classification before any colour is read: the CoC range of every tile, and the tiles that stay unchanged.
 
 use super::pixels::Radii;
 use super::unpack::{Source, coc_row};
-use crate::bokeh::plan::Share;
+use crate::bokeh::plan::BinWeight;
 use crate::optics::CocField;
 
 /// Pixels of the picture across a tile.
 pub const TILE_W: usize = 64;
-/// Columns of the picture that are read at once.
+/// Columns of the picture per block.
 pub const BLOCK: usize = 4 * TILE_W;
 /// Rows of a tile.
 pub const TILE_H: usize = 8;
-/// The picture around a tile that can change it, in tiles: the widest filter at full scale in a bin that is in focus,
-/// and the cells that its radius is a mean of.
+/// Neighbourhood that can change a tile, in tiles: the widest filter at full scale of the bin in focus, and the cells
+/// over which its radius is averaged.
 const AROUND: (usize, usize) = (1, 3);
-/// Filters of a smaller radius have one tap.
+/// Filters of a smaller radius have one tap, in pixels.
 const SHARP_PX: f32 = 0.4;
 
 /// The tiles of a picture.
 pub struct Tiles {
     /// Lowest and highest CoC in pixels, row by row.
     pub ranges: Vec<(f32, f32)>,
-    /// Per tile, whether nothing within its reach is blurred by anything behind: it stays as it is.
+    /// Per tile, whether no background within its neighbourhood is blurred: it stays unchanged.
     pub still: Vec<bool>,
-    /// Per tile, whether it and all around it is still, so that no bin needs it.
+    /// Per tile, whether it and its neighbourhood are still, so that no bin needs it.
     pub idle: Vec<bool>,
     scratch: Vec<bool>,
     pub across: usize,
@@ -32,7 +31,7 @@ pub struct Tiles {
 }
 
 impl Tiles {
-    /// Tiles of a picture of `width` x `height` pixels.
+    /// Allocates for a picture of `width` x `height` pixels.
     pub fn new(width: usize, height: usize) -> Self {
         let (across, down) = (width.div_ceil(TILE_W), height.div_ceil(TILE_H));
         let flags = vec![false; across * down];
@@ -46,7 +45,7 @@ impl Tiles {
         }
     }
 
-    /// Finds the tiles that stay as they are, once all ranges are known.
+    /// Finds the tiles that stay unchanged, after all ranges are known.
     pub fn settle(&mut self, enabled: bool) {
         let sharp = |&(low, high): &(f32, f32)| low >= -SHARP_PX && high <= SHARP_PX;
         self.idle.iter_mut().zip(&self.ranges).for_each(|(tile, range)| *tile = enabled && sharp(range));
@@ -55,33 +54,43 @@ impl Tiles {
         erode(&self.still, &mut self.scratch, &mut self.idle, size);
     }
 
-    /// Whether any CoC of some tiles does not have the whole share.
-    pub fn any_outside(&self, share: &Share, columns: std::ops::Range<usize>, rows: std::ops::Range<usize>) -> bool {
+    /// Whether the weight is below 1 at the lowest CoC of any of these tiles.
+    pub fn any_outside(
+        &self,
+        weight: &BinWeight,
+        columns: std::ops::Range<usize>,
+        rows: std::ops::Range<usize>,
+    ) -> bool {
         let columns = columns.start.min(self.across)..columns.end.min(self.across);
         (rows.start..rows.end.min(self.down)).any(|row| {
             let at = row * self.across;
-            self.ranges[at + columns.start..at + columns.end].iter().any(|range| share.at(range.0) < 1.0)
+            self.ranges[at + columns.start..at + columns.end].iter().any(|range| weight.at(range.0) < 1.0)
         })
     }
 
-    /// Whether any CoC of some tiles has a share; columns and rows of tiles are cut at the picture's end.
-    pub fn any_within(&self, share: &Share, columns: std::ops::Range<usize>, rows: std::ops::Range<usize>) -> bool {
+    /// Whether the weight is above 0 for any CoC of these tiles; their columns and rows are clamped to the picture.
+    pub fn any_within(
+        &self,
+        weight: &BinWeight,
+        columns: std::ops::Range<usize>,
+        rows: std::ops::Range<usize>,
+    ) -> bool {
         let columns = columns.start.min(self.across)..columns.end.min(self.across);
         (rows.start..rows.end.min(self.down)).any(|row| {
             let at = row * self.across;
             let tiles = &self.ranges[at + columns.start..at + columns.end];
             let idle = &self.idle[at + columns.start..at + columns.end];
-            tiles.iter().zip(idle).any(|(&range, &idle)| !idle && share.meets(range))
+            tiles.iter().zip(idle).any(|(&range, &idle)| !idle && weight.meets(range))
         })
     }
 }
 
-/// A row of tiles.
+/// Computes the CoC ranges of a row of tiles.
 pub struct Survey<'a> {
     pub source: &'a Source<'a>,
     pub row: usize,
     pub ranges: &'a mut [(f32, f32)],
-    /// As many values as the picture has columns.
+    /// Scratch for one row of the picture.
     pub coc: &'a mut [f32],
 }
 
@@ -90,7 +99,7 @@ impl pulp::WithSimd for Survey<'_> {
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, _: S) {
         let (width, height) = self.source.size;
-        // CoC grows with depth: where the two pictures have the same size, the range of depth tells that of CoC.
+        // CoC grows with depth: if the two pictures have the same size, the CoC range follows from the depth range.
         let direct = match self.source.coc {
             Radii::Field(CocField::Depth(lens), Some(map)) if map.size() == (width as u32, height as u32) => {
                 Some((lens, map))
@@ -107,7 +116,7 @@ impl pulp::WithSimd for Survey<'_> {
                 }
             };
             for (range, values) in self.ranges.iter_mut().zip(values.chunks(TILE_W)) {
-                // What is unknown is infinitely far.
+                // Unknown depth counts as infinite.
                 let unknown = |value: f32| direct.is_some() && (value <= 0.0 || value.is_nan());
                 widen(range, values, |value| if unknown(value) { f32::INFINITY } else { value });
             }
@@ -125,7 +134,7 @@ impl pulp::WithSimd for Survey<'_> {
     }
 }
 
-/// Widens a range by some values, each as `of` has it.
+/// Widens a range by some values, each mapped by `of`.
 #[inline(always)]
 pub fn widen(range: &mut (f32, f32), values: &[f32], of: impl Fn(f32) -> f32) {
     let (mut low, mut high) = ([f32::INFINITY; 16], [f32::NEG_INFINITY; 16]);
@@ -137,7 +146,7 @@ pub fn widen(range: &mut (f32, f32), values: &[f32], of: impl Fn(f32) -> f32) {
             high[k] = if value > high[k] { value } else { high[k] };
         }
     }
-    // Halves against halves, as one value after the other waits for each.
+    // Reduction in halves, because a sequential one would wait for each value.
     for half in [8, 4, 2, 1] {
         for k in 0..half {
             low[k] = if low[k + half] < low[k] { low[k + half] } else { low[k] };
@@ -151,7 +160,7 @@ pub fn widen(range: &mut (f32, f32), values: &[f32], of: impl Fn(f32) -> f32) {
     }
 }
 
-/// A tile stays set when all around it are set.
+/// Erosion: a tile stays set if its whole neighbourhood is set.
 fn erode(from: &[bool], scratch: &mut [bool], to: &mut [bool], (across, down): (usize, usize)) {
     for (row, out) in from.chunks_exact(across).zip(scratch.chunks_exact_mut(across)) {
         for (x, out) in out.iter_mut().enumerate() {

@@ -1,4 +1,6 @@
-//! Pass `unpack`: pixels to linear light with highlights expanded, and depth to signed CoC.
+//! Unpacking: pixels to linear light with highlights expanded, and depth to signed CoC.
+//!
+//! twin: shaders/unpack.wgsl, shaders/radii.wgsl
 
 use std::ops::Range;
 
@@ -12,8 +14,8 @@ use crate::compute::simd::{madd, prefetch};
 use crate::frame::Matte;
 use crate::optics::CocField;
 
-/// [`srgb_to_linear`](crate::color::srgb_to_linear) of an 8-bit value as a polynomial, which vectors can evaluate: off by less than 3e-5, or 0.004
-/// of the step to the next code.
+/// Polynomial approximation of [`srgb_to_linear`](crate::color::srgb_to_linear) for 8-bit values, which vectors can
+/// evaluate: off by less than 3e-5, or 0.004 of the step to the next code.
 #[inline(always)]
 pub fn decode<S: Simd>(code: u8) -> f32 {
     const CURVE: [f32; 5] = [-0.533_835_2, 0.768_090_4, 0.499_064_57, 0.034_400_677, 0.000_875_118];
@@ -25,7 +27,7 @@ pub fn decode<S: Simd>(code: u8) -> f32 {
     if x <= 0.04045 { x * (1.0 / 12.92) } else { light }
 }
 
-/// What a colour of this luminance is multiplied by to recover its highlight; dark colours hardly change.
+/// Returns the highlight expansion factor of a colour of this luminance; dark colours hardly change.
 ///
 /// With `expansion = 1 + 1/M`, white becomes `M + 1` times as bright as it looks. All channels share the factor, so
 /// that the hue stays.
@@ -34,87 +36,87 @@ pub fn expand(luminance: f32, expansion: f32) -> f32 {
     expansion / (expansion - luminance)
 }
 
-/// Undoes [`expand`]: the factor for a colour of this expanded luminance.
+/// Returns the factor that reverses [`expand`], for a colour of this expanded luminance.
 #[inline(always)]
 pub fn compress(luminance: f32, expansion: f32) -> f32 {
     expansion / (expansion + luminance)
 }
 
-/// A frame as it came.
+/// The input frame.
 #[derive(Clone, Copy)]
 pub struct Source<'a> {
     /// Columns and rows.
     pub size: (usize, usize),
     pub pixels: Pixels<'a>,
     pub coc: Radii<'a>,
-    /// Its mixed pixels, where they are taken apart.
+    /// Its mixed pixels, if they are separated into two surfaces.
     pub matte: Option<&'a Matte>,
-    /// Highlight recovery, infinite when off.
+    /// Highlight recovery, 1 + 1/M; infinite when off.
     pub expansion: f32,
 }
 
 /// Some pixels of a row: linear light r, g, b and CoC.
 pub type Piece<const W: usize> = Line<[[f32; W]; 4]>;
 
-/// Some pixels of a row, each of one surface or two.
+/// Some pixels of a row, each with one surface or two.
 pub struct Surfaces<const W: usize> {
     /// The only surface of a pixel, or the farther of two.
     pub back: Piece<W>,
-    /// The nearer of two; only where some are `mixed`, and their share is above 0.
+    /// The nearer of two; valid only if `mixed`, and where its alpha is above 0.
     pub front: Piece<W>,
-    /// How much of a pixel the nearer surface covers.
-    pub share: Line<[f32; W]>,
-    /// How much of it is known of the farther one.
+    /// Alpha of the nearer surface.
+    pub alpha: Line<[f32; W]>,
+    /// Known fraction of the farther surface.
     pub behind: Line<[f32; W]>,
-    /// Whether any pixel here has two.
+    /// Whether any pixel here has two surfaces.
     pub mixed: bool,
 }
 
 impl<const W: usize> Surfaces<W> {
-    /// Memory for them.
+    /// Creates surfaces without mixed pixels.
     pub fn new() -> Self {
         let [back, front] = [Line([[0.0; W]; 4]); 2];
-        Self { back, front, share: Line([0.0; W]), behind: Line([1.0; W]), mixed: false }
+        Self { back, front, alpha: Line([0.0; W]), behind: Line([1.0; W]), mixed: false }
     }
 
-    /// What pixels show, both surfaces together, with the CoC of the one that has more of it.
+    /// Returns both surfaces composited, with the CoC of the one that covers more.
     #[inline(always)]
     pub fn shown(&self) -> Piece<W> {
         let mut shown = self.back;
         for (p, plane) in shown.0.iter_mut().enumerate() {
             for (x, value) in plane.iter_mut().enumerate() {
-                let (front, share) = (self.front.0[p][x], self.share.0[x]);
-                let of_front = if p < 3 { share } else { f32::from(u8::from(share > 0.5)) };
-                *value += of_front * (front - *value);
+                let (front, alpha) = (self.front.0[p][x], self.alpha.0[x]);
+                let front_weight = if p < 3 { alpha } else { f32::from(u8::from(alpha > 0.5)) };
+                *value += front_weight * (front - *value);
             }
         }
         shown
     }
 
-    /// A pixel with both its surfaces: linear r, g, b, and the CoC of the nearer one.
+    /// Returns a composited pixel: linear r, g, b, and the CoC of the nearer surface.
     pub fn pixel(&self, x: usize) -> [f32; 4] {
         let back = self.back.0.each_ref().map(|plane| plane[x]);
-        if !self.mixed || self.share.0[x] <= 0.0 {
+        if !self.mixed || self.alpha.0[x] <= 0.0 {
             return back;
         }
-        let (front, share) = (self.front.0.each_ref().map(|plane| plane[x]), self.share.0[x]);
-        std::array::from_fn(|p| if p < 3 { back[p] + share * (front[p] - back[p]) } else { front[p] })
+        let (front, alpha) = (self.front.0.each_ref().map(|plane| plane[x]), self.alpha.0[x]);
+        std::array::from_fn(|p| if p < 3 { back[p] + alpha * (front[p] - back[p]) } else { front[p] })
     }
 }
 
 impl<'a> Source<'a> {
-    /// A frame of `plan`.
+    /// Creates the input frame of a plan.
     pub fn new(plan: &Plan, pixels: Pixels<'a>, coc: Radii<'a>) -> Self {
         let matte = match coc {
             Radii::Field(field, depth) => plan.matte(depth, field),
             Radii::Each(_) => None,
         };
-        // Only codes are clipped at white.
+        // Only 8-bit codes are clipped at white.
         let expansion = if matches!(pixels, Pixels::Srgb(_)) { plan.expansion } else { f32::INFINITY };
         Self { size: (plan.width, plan.height), pixels, coc, matte, expansion }
     }
 
-    /// Some pixels of row `y` from column `x0` on; outside, the outermost pixels repeat.
+    /// Unpacks some pixels of row `y` from column `x0` on; outside, the outermost pixels repeat.
     #[inline(always)]
     pub fn unpack<S: Simd, const W: usize>(&self, y: usize, x0: isize, columns: usize, surfaces: &mut Surfaces<W>) {
         let width = self.size.0;
@@ -126,7 +128,7 @@ impl<'a> Source<'a> {
         let count = end - before;
         match self.pixels {
             Pixels::Srgb(rgb) => {
-                // Channel by channel first, as bytes: vectors take three apart at once.
+                // Deinterleaved as bytes first, which vectorises.
                 let mut codes = [[0u8; W]; 3];
                 let [r, g, b] = &mut codes;
                 let pixels = rgb[row][first * 3..].as_chunks::<3>().0;
@@ -157,8 +159,8 @@ impl<'a> Source<'a> {
         }
         self.unmix(y * width + first..y * width + first + count, before, surfaces);
         if before > 0 || end < columns {
-            let Surfaces { back, front, share, behind, mixed } = surfaces;
-            let twos = front.0.iter_mut().chain([&mut share.0, &mut behind.0]).filter(|_| *mixed);
+            let Surfaces { back, front, alpha, behind, mixed } = surfaces;
+            let twos = front.0.iter_mut().chain([&mut alpha.0, &mut behind.0]).filter(|_| *mixed);
             for plane in back.0.iter_mut().chain(twos) {
                 let (left, right) = (plane[before], plane[end - 1]);
                 plane[..before].fill(left);
@@ -167,7 +169,7 @@ impl<'a> Source<'a> {
         }
     }
 
-    /// Asks for what [`Source::unpack`] reads of row `y`.
+    /// Prefetches the memory that [`Source::unpack`] reads of row `y`.
     #[inline(always)]
     pub fn prefetch(&self, y: usize, x0: isize, columns: usize) {
         let (width, height) = self.size;
@@ -186,30 +188,31 @@ impl<'a> Source<'a> {
         }
     }
 
-    /// Takes the mixed pixels among those at `range` apart; the first of the range is value `at` of the surfaces.
+    /// Separates the mixed pixels in `range` into their surfaces; the first pixel of the range is at index `at` of the
+    /// surfaces.
     #[inline(always)]
     fn unmix<const W: usize>(&self, range: Range<usize>, at: usize, surfaces: &mut Surfaces<W>) {
         surfaces.mixed = false;
         let (Radii::Field(CocField::Depth(lens), _), Some(matte)) = (self.coc, self.matte) else { return };
         let start = range.start;
-        let Surfaces { back, front, share, behind, mixed } = surfaces;
+        let Surfaces { back, front, alpha, behind, mixed } = surfaces;
         for pixel in matte.within(range) {
             if !*mixed {
                 front.0.as_flattened_mut().fill(0.0);
-                share.0.fill(0.0);
+                alpha.0.fill(0.0);
                 behind.0.fill(1.0);
                 *mixed = true;
             }
             let x = at + pixel.at as usize - start;
-            // Both colours are as bright as the pixel's highlights are made: their sum stays the pixel.
+            // Both colours get the highlight factor of the pixel, so that they composite to it again.
             let factor = match self.expansion.is_finite() {
                 true => compress(luminance(back.0[0][x], back.0[1][x], back.0[2][x]), self.expansion).recip(),
                 false => 1.0,
             };
-            (share.0[x], behind.0[x]) = (pixel.share, pixel.behind);
+            (alpha.0[x], behind.0[x]) = (pixel.share, pixel.behind);
             for p in 0..3 {
                 let own = back.0[p][x];
-                // Depth may be that of another frame, with other colours: no light is below 0.
+                // Depth may be that of another frame with other colours: light is clamped to 0.
                 front.0[p][x] = (own + (1.0 - pixel.share) * factor * pixel.difference[p]).max(0.0);
                 back.0[p][x] = (own - pixel.share * factor * pixel.difference[p]).max(0.0);
             }
@@ -218,7 +221,7 @@ impl<'a> Source<'a> {
     }
 }
 
-/// The CoC of the pixels of row `y` from column `x0` on.
+/// Computes the CoC of the pixels of row `y` from column `x0` on.
 #[inline(always)]
 pub fn coc_row(source: &Source<'_>, y: usize, x0: usize, coc: &mut [f32]) {
     let (width, height) = source.size;
@@ -250,7 +253,7 @@ pub fn coc_row(source: &Source<'_>, y: usize, x0: usize, coc: &mut [f32]) {
     }
 }
 
-/// The sample of a row of `of` values that pixel `index` of `pixels` falls on.
+/// Returns the sample, of a row of `of` values, at pixel `index` of `pixels`.
 #[inline(always)]
 pub fn nearest(index: usize, pixels: usize, of: usize) -> usize {
     ((2 * index + 1) * of / (2 * pixels)).min(of - 1)

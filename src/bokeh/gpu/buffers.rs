@@ -1,84 +1,84 @@
-//! What lives on the device: allocated once per picture size.
+//! Device buffers, allocated once per picture size.
 
 use super::layout::Capacity;
 use super::shaders::{Bin, Frame, LIST_HEAD};
 use crate::bokeh::bank::Bank;
 use crate::bokeh::ladder::Compositing;
-use crate::bokeh::occlusion::{GRAIN, MOST_LAYERS};
+use crate::bokeh::occlusion::{GRAIN, MAX_LAYERS};
 use crate::bokeh::plan::{MAX_BINS, Plan};
 use crate::compute::device::{Device, UNIFORM_STRIDE};
 use crate::frame::{Matte, MixedPixel};
 
-/// The buffers of a plan.
+/// Device buffers of a plan.
 pub struct Buffers {
     /// Uniform `Frame`.
     pub frame: wgpu::Buffer,
     /// Uniform `Bin`, an array.
     pub bins: wgpu::Buffer,
-    /// Uniform `Work`, one every [`UNIFORM_STRIDE`] bytes.
+    /// Uniforms `Work`, one every [`UNIFORM_STRIDE`] bytes.
     pub work: wgpu::Buffer,
     pub color: wgpu::Buffer,
     /// Linear light and CoC.
     pub scene: wgpu::Buffer,
-    /// Mixed pixels: uploaded in metres, and then the nearer surface of each.
+    /// Mixed pixels: uploaded in metres, later the nearer surface of each.
     pub mixed: wgpu::Buffer,
-    /// Range of CoC of each tile of the picture.
+    /// CoC range of each tile of the picture.
     pub ranges: wgpu::Buffer,
-    /// Silhouettes: how far each cell's reach, what of that is left along rows, and all over.
+    /// Silhouettes: radius per cell, dilated along rows, and dilated along both axes.
     pub marks: wgpu::Buffer,
     pub along: wgpu::Buffer,
     pub reached: wgpu::Buffer,
-    /// The scene as a layer sees it, behind others.
+    /// The scene as a layer behind others sees it, inpainted.
     pub behind: wgpu::Buffer,
-    /// The pictures of all bins.
+    /// Pictures of all bins.
     pub source: wgpu::Buffer,
     /// Coarse grids of all bins.
     pub grid: wgpu::Buffer,
-    /// Radius and range of colours at the edges of segments, of all bins.
+    /// Radius and colour range at the segment edges of all bins.
     pub edges: wgpu::Buffer,
-    /// Results of the horizontal filters, of the bins that are filtered at once.
+    /// Results of the horizontal filters, for the bins of a batch.
     pub rows: wgpu::Buffer,
     pub blurred: wgpu::Buffer,
-    /// Lists of what is there: tiles of the bins, of their rows, and of their results.
+    /// Lists of non-empty tiles: of the bins, of their rows, and of their results.
     pub binned: wgpu::Buffer,
     pub filtered: wgpu::Buffer,
     pub active: wgpu::Buffer,
-    /// Per tile of the picture, the bins that it shows, a bit each.
+    /// Per tile of the picture, a bit mask of the bins with content there.
     pub shown: wgpu::Buffer,
     pub result: wgpu::Buffer,
     /// CoC of the nearest surface, at half size.
     pub nearest_px: wgpu::Buffer,
-    /// All levels of the pyramid, and what is found along lines.
+    /// All levels of the pyramid, and the result of directional inpainting.
     pub pyramid: wgpu::Buffer,
-    /// How much each of its pixels knows.
+    /// Known weight of each pixel of the pyramid.
     pub known: wgpu::Buffer,
-    /// The filters of each bank.
+    /// Filters of each bank.
     pub banks: Vec<Filters>,
-    /// Kernels of the exact gather, and where each node's starts.
+    /// Kernels of the exact gather, and the start of each node's kernel.
     pub kernels: [wgpu::Buffer; 2],
 }
 
-/// The filters of a bank.
+/// Filters of a bank.
 pub struct Filters {
     pub terms: usize,
-    /// Horizontal and vertical, four terms a vector.
+    /// Horizontal and vertical taps, four terms per vector.
     pub taps: [wgpu::Buffer; 2],
     /// Outermost tap of each node.
     pub node_reach: wgpu::Buffer,
 }
 
-/// Bytes of a packed picture, in whole words of whole quads.
+/// Returns the bytes of a packed picture, in whole words of whole groups of four pixels.
 pub fn picture_bytes(plan: &Plan) -> u64 {
     (plan.width * plan.height).div_ceil(4) as u64 * 12
 }
 
-/// How many uniforms `Work` a frame can need: one for each layer, one for all bins, and for the filters one for every group
-/// of four terms of every batch of bins.
+/// Returns the largest number of uniforms `Work` of a frame: one per layer, one for all bins, and for the filters one
+/// per group of four terms of every batch of bins.
 pub fn work_count(plan: &Plan) -> usize {
-    MOST_LAYERS + 1 + MAX_BINS * plan.ladder.most_terms().div_ceil(4)
+    MAX_LAYERS + 1 + MAX_BINS * plan.ladder.max_terms().div_ceil(4)
 }
 
-/// Bytes of the largest buffer of filters or kernels.
+/// Returns the bytes of the largest buffer of filters or kernels.
 pub fn filter_bytes(plan: &Plan) -> u64 {
     let of_bank = |bank: &Bank| (bank.horizontal.len() / bank.terms * bank.terms.div_ceil(4) * 16) as u64;
     let of_node = |&reach: &u32| u64::from(2 * reach + 1).pow(2) * 4;
@@ -87,7 +87,7 @@ pub fn filter_bytes(plan: &Plan) -> u64 {
 }
 
 impl Buffers {
-    /// Allocates everything and uploads what never changes.
+    /// Allocates everything and uploads the constant data.
     pub fn new(device: &Device, plan: &Plan, capacity: &Capacity) -> Self {
         use wgpu::BufferUsages as Usage;
         let buffer = |label: &str, bytes: usize, usage: Usage| {
@@ -125,7 +125,7 @@ impl Buffers {
             source: storage("source", capacity.pixels * 2),
             grid: storage("grid", capacity.cells * 8),
             edges: storage("edges", capacity.edges * 8),
-            rows: storage("rows", capacity.rows * 2 * plan.ladder.most_terms().min(4)),
+            rows: storage("rows", capacity.rows * 2 * plan.ladder.max_terms().min(4)),
             blurred: storage("blurred", capacity.pixels * 2),
             binned: list("binned", capacity.binned),
             filtered: list("filtered", capacity.filtered),
@@ -154,13 +154,13 @@ impl Buffers {
         }
     }
 
-    /// A buffer for a depth map, of so many bytes.
+    /// Creates a buffer of `bytes` bytes for a depth map.
     pub fn radii(device: &Device, bytes: u64) -> wgpu::Buffer {
         device.buffer("radii", bytes as usize, wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST)
     }
 }
 
-/// The taps with their terms padded with zeros to groups of four, the vectors of the shaders.
+/// Pads the terms of each tap with zeros to groups of four, the vectors of the shaders.
 fn pad_to_fours(taps: &[f32], terms: usize) -> Vec<[f32; 4]> {
     let padded = |tap: &[f32]| {
         let mut four = [0.0; 4];
@@ -170,8 +170,8 @@ fn pad_to_fours(taps: &[f32], terms: usize) -> Vec<[f32; 4]> {
     taps.chunks(terms).flat_map(|tap| tap.chunks(4).map(padded)).collect()
 }
 
-/// The pixels of all levels of the pyramid that are kept, from a quarter of the size of a picture to one pixel, and what is found
-/// along lines for the first of them.
+/// Returns the number of stored pixels of the pyramid: all levels from a quarter of the picture's size to one pixel,
+/// and the result of directional inpainting for the first of them.
 fn pyramid_pixels(width: usize, height: usize) -> usize {
     let halved = |size: &[usize; 2]| size.map(|side| side.div_ceil(2));
     let finest = [width, height].map(|side| side.div_ceil(4));
@@ -179,7 +179,7 @@ fn pyramid_pixels(width: usize, height: usize) -> usize {
     levels.chain([finest]).map(|[across, down]| across * down).sum()
 }
 
-/// Every node's kernel, one after the other, and where each starts.
+/// Returns the kernels of all nodes, one after the other, and the start of each.
 fn kernels(bank: &Bank) -> (Vec<f32>, Vec<u32>) {
     let (mut taps, mut starts) = (Vec::new(), Vec::new());
     for node in 0..bank.nodes {

@@ -1,4 +1,4 @@
-//! Where the bins of a frame lie in the buffers that all bins share, and what is filtered at once.
+//! Layout of the bins of a frame in the buffers that all bins share, and the batches that are filtered together.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -7,16 +7,16 @@ use super::shaders::{Bin, RESULT_TILE, ROWS_TILE, SHARED_FROM, TILE};
 use crate::bokeh::ladder::Compositing;
 use crate::bokeh::plan::{CELL, MAX_BINS, Plan, SEGMENT};
 
-/// Columns of a tile of the CPU executor: both executors' grids are as wide, so that their cells agree.
+/// Columns of a tile of the CPU executor: the grids of both executors have the same width, so that their cells agree.
 const GRID_ROUNDING: usize = 64;
 
-/// The bins of a frame.
+/// Layout of the bins of a frame.
 pub struct Layout {
     /// Uniforms, front to back.
     pub bins: Vec<Bin>,
-    /// How many of them lie in front of the focal plane.
+    /// Number of bins in front of the focal plane.
     pub near: usize,
-    /// Bins that are filtered at once: as many as the memory for rows holds.
+    /// Bins that are filtered together, limited by the buffer for rows.
     pub batches: Vec<Range<usize>>,
 }
 
@@ -25,37 +25,37 @@ pub struct Layout {
 pub struct Capacity {
     /// Pixels of all bins.
     pub pixels: usize,
-    /// Pixels of the bins that are filtered at once: the largest bin.
+    /// Pixels of the largest bin: a batch always holds at least one bin.
     pub rows: usize,
     /// Cells of all bins.
     pub cells: usize,
     /// Edges of all bins.
     pub edges: usize,
-    /// Tiles of all bins as they are made.
+    /// Tiles of all bins in pass `bin`.
     pub binned: usize,
-    /// Tiles of rows of all bins.
+    /// Row tiles of all bins.
     pub filtered: usize,
-    /// Tiles of the results of all bins.
+    /// Result tiles of all bins.
     pub active: usize,
 }
 
 impl Capacity {
-    /// What the bins of any frame need, at any level.
-    pub fn of(plan: &Plan) -> Self {
+    /// Returns the elements that the bins of any frame need, at any quality level.
+    pub fn for_plan(plan: &Plan) -> Self {
         if plan.compositing == Compositing::Layers {
-            return Self::of_scales(plan, (0..plan.slots()).map(|slot| plan.least_scale(slot)));
+            return Self::for_scales(plan, (0..plan.slots()).map(|slot| plan.least_scale(slot)));
         }
         // Otherwise a level has the same bins in every frame: the maximum over all levels suffices.
         let mut plan = plan.clone();
         let ladder = Arc::clone(&plan.ladder);
-        ladder.iter().fold(Self::default(), |most, step| {
+        ladder.iter().fold(Self::default(), |largest, step| {
             plan.set_quality(step.quality);
-            most.max(Self::of_scales(&plan, plan.bins.iter().map(|bin| bin.scale)))
+            largest.max(Self::for_scales(&plan, plan.bins.iter().map(|bin| bin.scale)))
         })
     }
 
-    /// What bins at these scales need.
-    fn of_scales(plan: &Plan, scales: impl Iterator<Item = usize>) -> Self {
+    /// Returns the elements that bins of these scales need.
+    fn for_scales(plan: &Plan, scales: impl Iterator<Item = usize>) -> Self {
         let mut capacity = Self::default();
         for scale in scales {
             let (width, height) = (plan.width.div_ceil(scale), plan.height.div_ceil(scale));
@@ -72,7 +72,7 @@ impl Capacity {
         capacity
     }
 
-    /// The larger of each.
+    /// Returns the elementwise maximum.
     fn max(self, other: Self) -> Self {
         Self {
             pixels: self.pixels.max(other.pixels),
@@ -86,35 +86,35 @@ impl Capacity {
     }
 }
 
-/// How many tiles cover a bin.
+/// Returns the number of tiles that cover a bin.
 pub fn tiles(size: [u32; 2], tile: [usize; 2]) -> usize {
     (size[0] as usize).div_ceil(tile[0]) * (size[1] as usize).div_ceil(tile[1])
 }
 
-/// How many tiles pass `bin` makes a bin from.
+/// Returns the number of tiles of a bin in pass `bin`.
 pub fn binned_tiles(size: [u32; 2], scale: u32) -> usize {
     let sharing = if scale >= SHARED_FROM { 2 } else { 1 };
     tiles(size.map(|side| side * sharing), [TILE as usize; 2])
 }
 
-/// Cells across and down a bin.
+/// Returns the cells across and down a bin.
 fn cells(width: usize, height: usize) -> [usize; 2] {
     [width.next_multiple_of(GRID_ROUNDING) / CELL, height.div_ceil(CELL)]
 }
 
-/// Edges across, and rows of cells.
+/// Returns the edges across, and the rows of cells.
 fn edges(width: usize, height: usize) -> [usize; 2] {
     let [across, down] = cells(width, height);
     [across * CELL / SEGMENT + 1, down]
 }
 
 impl Layout {
-    /// No bins; room for any plan's, so that laying out allocates nothing.
+    /// Creates an empty layout with capacity for any plan, so that [`Self::lay_out`] allocates nothing.
     pub fn new() -> Self {
         Self { bins: Vec::with_capacity(MAX_BINS), near: 0, batches: Vec::with_capacity(MAX_BINS) }
     }
 
-    /// Gives the current bins of a plan their places in the shared buffers, and divides them into batches whose pixels
+    /// Assigns the current bins of a plan to offsets in the shared buffers, and divides them into batches whose pixels
     /// fit `capacity.rows`.
     pub fn lay_out(&mut self, plan: &Plan, capacity: &Capacity) {
         self.bins.clear();
@@ -128,11 +128,12 @@ impl Layout {
         for (k, bin) in plan.bins.iter().enumerate() {
             let ([cells_across, down], [edges, _]) = (cells(bin.width, bin.height), edges(bin.width, bin.height));
             let pixels = bin.width * bin.height;
+            // Starts a new batch when the buffer for rows is full.
             if batch_pixels + pixels > capacity.rows && k > first {
                 self.batches.push(first..k);
                 (first, batch_pixels) = (k, 0);
             }
-            let share = plan.share(k);
+            let weight = plan.share(k);
             let size = [bin.width as u32, bin.height as u32];
             self.bins.push(Bin {
                 size,
@@ -141,8 +142,8 @@ impl Layout {
                 edges: edges as u32,
                 turned: u32::from(bin.near),
                 whole: u32::from(plan.compositing != Compositing::Layers),
-                front: share.front.into(),
-                behind: share.behind.into(),
+                front: weight.front.into(),
+                behind: weight.behind.into(),
                 max_radius_px: bin.max_radius_px,
                 sigma_cells: bin.sigma_cells(),
                 reach_cells: plan.reach_cells(bin) as u32,

@@ -1,5 +1,5 @@
 //! The GPU executor: wgpu compute passes, one WGSL file each under `shaders/`, with the names of the passes in
-//! [`super::plan`]; where one is several dispatches (`fill`: hide, pull, coarse, directional, fill), each has a file.
+//! [`super::plan`]. A pass of several dispatches (`fill`: hide, pull, coarse, directional, fill) has a file for each.
 
 mod buffers;
 mod layout;
@@ -30,8 +30,8 @@ use crate::compute::{Backend, GpuError, Place};
 use crate::link::pool::{Pool, Pooled};
 use crate::optics::CocField;
 
-/// Results that may be on the device at once: those in flight, those on their way, and those that somebody looks at.
-/// When all are out, results go to memory.
+/// Largest number of results on the device: those in flight, queued, or in use by a viewer. When all are in use,
+/// results are copied to memory.
 const ON_DEVICE: usize = CAPACITY + 7;
 
 /// Runs a plan with wgpu compute passes.
@@ -39,21 +39,21 @@ pub struct GpuBokeh {
     plan: Plan,
     device: Arc<Device>,
     buffers: Buffers,
-    /// The current frame's depth map, as CoC or in metres; grows to the largest that came.
+    /// Depth map of the current frame, as CoC or in metres; grows to the largest one seen.
     radii: wgpu::Buffer,
     capacity: Capacity,
     layout: Layout,
     passes: Passes,
     ring: Ring,
-    /// A frame that the device did not take, until it is given back.
+    /// A frame that the device refused, until it is taken back.
     refused: Option<Job>,
-    /// Results that stay on the device, once any is wanted there.
+    /// Pool of results that stay on the device, created when the first one is requested.
     results: Option<Pool<DevicePicture>>,
 }
 
 impl GpuBokeh {
-    /// An executor of `plan` on the adapter whose name contains `adapter`, else on the best one; with
-    /// `hardware_only`, software adapters do not count (unless named).
+    /// Creates an executor of `plan` on the adapter whose name contains `adapter`, else on the best one. With
+    /// `hardware_only`, software adapters are ignored unless named.
     ///
     /// # Errors
     /// No adapter fits, or its device failed.
@@ -61,15 +61,15 @@ impl GpuBokeh {
         Self::on(plan, Arc::new(Device::open(hardware_only, adapter)?))
     }
 
-    /// An executor of `plan` on a device.
+    /// Creates an executor of `plan` on a device.
     ///
     /// # Errors
-    /// The device is too small for such pictures, or failed.
+    /// The device is too small for these pictures, or failed.
     pub fn on(plan: &Plan, device: Arc<Device>) -> Result<Self, BokehError> {
         let allowed = device.device.limits().max_storage_buffer_binding_size;
-        let capacity = Capacity::of(plan);
-        let rows = capacity.rows * plan.ladder.most_terms().min(4);
-        // A pixel is four halves, also in each of the up to four terms that rows are filtered with at once.
+        let capacity = Capacity::for_plan(plan);
+        let rows = capacity.rows * plan.ladder.max_terms().min(4);
+        // A pixel is four halves, also in each of the up to four terms per row pass.
         let largest = (capacity.pixels.max(rows).max(1) as u64 * 8).max(buffers::filter_bytes(plan));
         if largest > allowed {
             return Err(GpuError::Failed(format!(
@@ -87,7 +87,7 @@ impl GpuBokeh {
         Ok(Self { plan, device, buffers, radii, capacity, layout, passes, ring, refused, results })
     }
 
-    /// Memory to leave a result in on the device, where `place` asks for that and some is free.
+    /// Returns a free picture on the device for a result, if `place` asks for one.
     fn device_picture(&mut self, place: Place) -> Option<Pooled<DevicePicture>> {
         if place == Place::Memory {
             return None;
@@ -96,7 +96,7 @@ impl GpuBokeh {
         self.results.get_or_insert_with(|| Pool::new(ON_DEVICE, || DevicePicture::new(device, size))).try_take()
     }
 
-    /// The uniform `Frame` of a job, whose depth may be `in_metres`; `common.wgsl` says what the numbers mean.
+    /// Returns the uniform `Frame` of a job, whose depth may be `in_metres`; see `common.wgsl` for the values.
     fn frame_uniform(&self, job: &Job, in_metres: bool) -> shaders::Frame {
         let plan = &self.plan;
         let (coc_kind, coc, ramp) = match job.coc {
@@ -123,7 +123,7 @@ impl GpuBokeh {
             most_px: most_px(&job.coc),
             coc,
             ramp,
-            even: u32::from(plan.bank.even),
+            even: u32::from(plan.bank.is_symmetric),
             extent: plan.bank.extent as f32,
             rows_apart: self.capacity.rows as u32,
             expansion: if plan.expansion.is_finite() { plan.expansion } else { 0.0 },
@@ -136,7 +136,7 @@ impl GpuBokeh {
     }
 }
 
-/// No |CoC| of a frame is above this, in pixels, > 0: the shaders divide by it.
+/// Returns an upper bound > 0 of |CoC| in a frame, in pixels: the shaders divide by it.
 fn most_px(coc: &CocField) -> f32 {
     let most_px = match coc {
         CocField::Uniform { radius_px } => *radius_px,
@@ -165,7 +165,7 @@ impl Bokeh for GpuBokeh {
         let started = Instant::now();
         let on_device = self.device_picture(job.place);
         job.out.resize(made_for.0, made_for.1);
-        // Two pixels of a row share their colour.
+        // YUYV shares chroma between two pixels of a row.
         if job.place != Place::Memory || !made_for.0.is_multiple_of(2) {
             job.yuyv = None;
         }
@@ -173,7 +173,7 @@ impl Bokeh for GpuBokeh {
             yuyv.resize(made_for.0, made_for.1);
         }
         let is_here = |frame: &Pooled<DeviceFrame>| frame.is_on(&self.device) && frame.size() == made_for;
-        // Kept until this frame is submitted: whatever takes its place there has to come later.
+        // Kept until this frame is submitted: its buffers may be overwritten only afterwards.
         let shared = job.on_device.take().filter(is_here);
         let mut shared_metres = None;
         if let (CocField::Depth(lens), Some(map)) = (job.coc, &job.depth) {

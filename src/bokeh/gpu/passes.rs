@@ -1,56 +1,56 @@
-//! The passes in their order: pipelines and bind groups made once, one `encode` per frame.
+//! The passes in their order: pipelines and bind groups are made once, and recorded for every frame.
 
 use std::ops::Range;
 
 use super::buffers::{Buffers, Filters, work_count};
 use super::layout::{self, Layout, tiles};
-use super::shaders::{self, Bin, EDGES_TILE, LINE, RESULT_TILE, ROWS_TILE, SMALL_TILE, TAKING_TURNS, TILE, Work};
+use super::shaders::{self, Bin, EDGES_TILE, LINE, MAX_TILE_WORKGROUPS, RESULT_TILE, ROWS_TILE, SMALL_TILE, TILE, Work};
 use crate::bokeh::ladder::Compositing;
-use crate::bokeh::occlusion::{GRAIN, MOST_LAYERS};
+use crate::bokeh::occlusion::{GRAIN, MAX_LAYERS};
 use crate::bokeh::plan::{MAX_BINS, Plan};
 use crate::compute::device::{Device, Pass, Recorder, Shader, UNIFORM_STRIDE, uniform_at, workgroups_2d};
 
-/// Which uniform `Work` a dispatch has: that of its layer, of `reach`, or of a batch of the filters.
-const ALL: usize = MOST_LAYERS;
+/// Index of the uniform `Work` of a dispatch: 0.. for layers, `ALL` for `reach`, then one per batch of the filters.
+const ALL: usize = MAX_LAYERS;
 const FIRST_BATCH: usize = ALL + 1;
-/// What counts as one pass, where it is several.
+/// Pass names under which several dispatches are timed together.
 const FILL: &str = shaders::FILL.name;
 const SILHOUETTES: &str = shaders::UNPACK.name;
 
 /// The passes of a layer.
 struct Layer {
-    /// What is known behind those in front of it, up and down a pyramid and along lines, and the scene with that filled in;
-    /// the foremost has the scene as it is.
+    /// Inpainting of the background behind the layers in front: pull-push, directional, and the filled scene. `None`
+    /// for the foremost layer, which uses the scene unchanged.
     fill: Option<[Pass; 4]>,
     bin: Pass,
 }
 
-/// Everything that a frame runs.
+/// All passes of a frame.
 pub struct Passes {
     clear: Pass,
     unpack: Pass,
-    /// The silhouettes spread over their grid, along rows and down columns.
+    /// Dilation of the silhouettes over their grid, along rows and down columns.
     silhouettes: [Pass; 2],
-    /// What may hide others.
+    /// Finds the nearest surface, a possible occluder.
     hide: Pass,
     layers: Vec<Layer>,
     gather: Option<Pass>,
     reach: Pass,
-    /// For each bank, rows and columns of each batch of bins and group of terms.
+    /// Per bank, the row and column pass of each batch of bins and group of terms.
     blur: Vec<Vec<[Pass; 2]>>,
     composite: Pass,
-    /// The uniforms `Work` as they are uploaded.
+    /// The uniforms `Work` as uploaded.
     work: Vec<u8>,
 }
 
-/// Makes the passes.
+/// Creates passes.
 struct Maker<'a> {
     device: &'a Device,
     buffers: &'a Buffers,
 }
 
 impl Maker<'_> {
-    /// A pass with these uniforms first and then `buffers`.
+    /// Creates a pass that binds these uniforms first and then `buffers`.
     fn pass(
         &self,
         shader: Shader,
@@ -62,34 +62,34 @@ impl Maker<'_> {
         Pass::new(self.device, shader, &shaders::CONSTANTS, uniforms.iter().cloned().chain(buffers), workgroups)
     }
 
-    /// A pass over several bins at once, which are in uniform `Work` number `work`; binds that and the bins first. How many
-    /// workgroups it takes is up to the frame.
+    /// Creates a pass over several bins, given by uniform `Work` number `work`; binds that and the bins first. The
+    /// number of workgroups depends on the frame.
     fn over_bins(&self, shader: Shader, work: usize, buffers: &[&wgpu::Buffer]) -> Pass {
         let uniforms = [uniform_at::<Work>(&self.buffers.work, work), self.buffers.bins.as_entire_buffer_binding()];
         self.pass(shader, &uniforms, buffers, [1; 3])
     }
 }
 
-/// What `unpack` binds: the CoC of the depth map is in it, whose buffer may become another.
+/// Returns the bindings of `unpack`, including the depth map, whose buffer may be replaced.
 fn unpack_bindings<'a>(b: &'a Buffers, radii: &'a wgpu::Buffer) -> impl Iterator<Item = wgpu::BufferBinding<'a>> {
     let read = [&b.bins, &b.frame, &b.color, radii];
     let buffers = read.into_iter().chain([&b.scene, &b.ranges, &b.mixed, &b.shown, &b.binned, &b.marks]);
     std::iter::once(uniform_at::<Work>(&b.work, 0)).chain(buffers.map(wgpu::Buffer::as_entire_buffer_binding))
 }
 
-/// Workgroups for so many pieces of work, which they take turns with.
+/// Returns the workgroups for a list of tiles, over which they loop.
 fn turns(pieces: usize) -> [u32; 3] {
-    [pieces.clamp(1, TAKING_TURNS) as u32, 1, 1]
+    [pieces.clamp(1, MAX_TILE_WORKGROUPS) as u32, 1, 1]
 }
 
-/// Workgroups of `tile` x `tile` for `size` invocations.
+/// Returns the workgroups of `tile` x `tile` invocations that cover `size`.
 fn over(size: [u32; 2], tile: u32) -> [u32; 3] {
     let [across, down] = size.map(|size| size.div_ceil(tile));
     [across, down, 1]
 }
 
 impl Passes {
-    /// The passes of a plan over its buffers.
+    /// Creates the passes of a plan over its buffers.
     pub fn new(device: &Device, plan: &Plan, b: &Buffers, radii: &wgpu::Buffer) -> Self {
         let maker = Maker { device, buffers: b };
         let picture = [plan.width as u32, plan.height as u32];
@@ -102,7 +102,7 @@ impl Passes {
             maker.pass(shaders::UNCOVER, &[], &[&b.frame, &b.along, &b.reached], grid).named(SILHOUETTES),
         ];
         let hide = maker.pass(shaders::HIDE, &[], &hide, over(half, TILE)).named(FILL);
-        let layers = (0..MOST_LAYERS).map(|index| {
+        let layers = (0..MAX_LAYERS).map(|index| {
             let fill = (index > 0).then(|| {
                 let pulled = [&b.frame, &b.scene, &b.nearest_px, &b.pyramid, &b.known, &b.mixed];
                 let coarse = [&b.frame, &b.pyramid, &b.known];
@@ -116,7 +116,7 @@ impl Passes {
                 ];
                 let work = [uniform_at::<Work>(&b.work, index)];
                 [
-                    // A thread takes four pixels of half the size, or of the picture.
+                    // A thread does four pixels of half the size, or of the picture.
                     maker.pass(shaders::PULL, &work, &pulled, over(half, 2 * TILE)).named(FILL),
                     maker.pass(shaders::COARSE, &[], &coarse, [1; 3]).named(FILL),
                     maker.pass(shaders::DIRECTIONAL, &[], &lines, over(quarter, SMALL_TILE)).named(FILL),
@@ -169,12 +169,12 @@ impl Passes {
         }
     }
 
-    /// Binds another buffer of the CoC of depth maps.
+    /// Binds a new buffer for depth maps.
     pub fn set_radii(&mut self, device: &Device, b: &Buffers, radii: &wgpu::Buffer) {
         self.unpack.bind(device, unpack_bindings(b, radii));
     }
 
-    /// Uploads which bins each pass of this frame does, with the terms of the plan's bank.
+    /// Uploads the bins of each pass of this frame, with the terms of the plan's bank.
     pub fn upload(&mut self, device: &Device, b: &Buffers, plan: &Plan, layout: &Layout) {
         let terms = b.banks[plan.bank_index].terms;
         let groups = terms.div_ceil(4);
@@ -202,9 +202,9 @@ impl Passes {
         device.queue.write_buffer(&b.bins, 0, bytemuck::cast_slice(&layout.bins));
     }
 
-    /// Records one frame of a plan's level.
+    /// Records one frame at the plan's quality level.
     pub fn record(&self, recorder: &mut Recorder, plan: &Plan, layout: &Layout) {
-        // Workgroups that take turns with the tiles of some bins.
+        // Workgroups that loop over the tiles of some bins.
         let workgroups = |bins: &[Bin], of: &dyn Fn(&Bin) -> usize| turns(bins.iter().map(of).sum());
         recorder.run(&self.clear);
         recorder.run(&self.unpack);

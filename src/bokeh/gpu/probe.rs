@@ -1,4 +1,4 @@
-//! What the passes leave behind, for comparing the executors pass by pass.
+//! Read access to intermediate results, for comparing the executors pass by pass.
 
 use super::GpuBokeh;
 use super::shaders::{LIST_HEAD, RESULT_TILE};
@@ -7,7 +7,7 @@ use crate::bokeh::{BokehError, Probe};
 use crate::compute::device::{Readback, Recorder};
 
 impl GpuBokeh {
-    /// The result of a pass over the last frame, in the layout that [`Probe`] states. Waits and allocates; for tests.
+    /// Returns the result of a pass over the last frame, in the layout of [`Probe`]. Waits and allocates; for tests.
     ///
     /// # Errors
     /// The device failed.
@@ -19,7 +19,7 @@ impl GpuBokeh {
                 let values = self.read(&b.edges, bin.edges_at * 8, bin.edges * bin.cells[1] * 8)?;
                 Ok(values.as_chunks::<4>().0.iter().map(|value| value.map(f32::from_bits)).collect())
             }
-            // Cells and tiles that hold nothing were not written, and have values of earlier frames.
+            // Cells and tiles without content were not written, and have values of earlier frames.
             Probe::Bin(k) => {
                 let bin = &self.layout.bins[k];
                 let cells = self.read(&b.grid, bin.cells_at * 8, bin.cells[0] * bin.cells[1] * 8)?;
@@ -40,7 +40,7 @@ impl GpuBokeh {
         }
     }
 
-    /// The pixels of bin `k` in `buffer`, zero where they were not written.
+    /// Returns the pixels of bin `k` in `buffer`, zero where they were not written.
     fn pixels(
         &self,
         k: usize,
@@ -68,8 +68,8 @@ impl GpuBokeh {
     }
 }
 
-/// A value of half precision: shifted to single precision, then times 2^112 for the other exponent bias. Exact for
-/// subnormals, too; infinities become large.
+/// Converts half to single precision: shifts the bits, then multiplies by 2^112 for the different exponent bias. Exact
+/// for subnormals, too; infinities become large numbers.
 fn from_half(bits: u16) -> f32 {
     let magnitude = f32::from_bits(u32::from(bits & 0x7fff) << 13) * f32::from_bits(0x7780_0000);
     if bits & 0x8000 != 0 { -magnitude } else { magnitude }

@@ -1,4 +1,4 @@
-//! Depth on its way to the device: as CoC, which is all that the passes make of it, in the 16 bits that they keep it in.
+//! Upload of depth as CoC in 16 bits: the format in which the passes store it, and all they need of depth.
 
 use pulp::{Arch, Simd, WithSimd};
 use wgpu::{Queue, QueueWriteBufferView};
@@ -6,23 +6,23 @@ use wgpu::{Queue, QueueWriteBufferView};
 use crate::frame::DepthMap;
 use crate::optics::DepthCoc;
 
-/// Pixels that are converted before they are copied: they stay in the nearest cache. Even, as two are a word.
+/// Pixels that are converted before they are copied, so that they stay in the nearest cache. Even, as two are a word.
 const BLOCK: usize = 1024;
-/// What stands for the largest CoC, as `unpack2x16snorm` reads it.
+/// Code of the largest CoC, as `unpack2x16snorm` reads it.
 const WHOLE: f32 = 32_767.0;
-/// A float of this size has no fraction, and its lowest bits are the integer, a negative one's as well.
+/// A float of this size has no fraction, and its lowest bits are the integer, also for negative integers.
 const NO_FRACTION: f32 = 12_582_912.0;
 
-/// Bytes of a map of so many pixels, in whole words.
+/// Returns the bytes of a map of `pixels` pixels, in whole words.
 pub fn radii_bytes(pixels: usize) -> u64 {
     (2 * pixels).next_multiple_of(4) as u64
 }
 
-/// Writes the CoC of a map to `buffer`, as signed square roots of its share of `most_px`, which none is above: the same 16 bits
-/// that the scene has in the end (`scene_packed` of `common.wgsl`), so that nothing is rounded that would not be anyhow.
+/// Writes the CoC of a map to `buffer`, as signed square roots of its fraction of `most_px`, an upper bound: the same
+/// 16 bits as in the scene (`scene_packed` of `common.wgsl`), so that no extra rounding occurs.
 pub fn upload(queue: &Queue, buffer: &wgpu::Buffer, map: &DepthMap, lens: DepthCoc, most_px: f32) {
     let Some(size) = wgpu::BufferSize::new(radii_bytes(map.metres.len())) else { return };
-    // A device that has failed has no memory for it, which is found out later.
+    // A failed device returns no memory; the failure is reported later.
     if let Some(to) = queue.write_buffer_with(buffer, 0, size) {
         Arch::new().dispatch(Radii { lens, metres: &map.metres, most_px, to });
     }
@@ -32,7 +32,7 @@ struct Radii<'a> {
     lens: DepthCoc,
     metres: &'a [f32],
     most_px: f32,
-    /// Memory that is only written, and in order.
+    /// Mapped memory, written once and in order.
     to: QueueWriteBufferView,
 }
 
@@ -44,7 +44,7 @@ impl WithSimd for Radii<'_> {
         let (mut codes, mut at) = ([0; BLOCK], 0);
         for metres in self.metres.chunks(BLOCK) {
             to_codes(&self.lens, self.most_px, metres, &mut codes);
-            // The last word of an odd number of pixels is filled up with what was there.
+            // The last word of an odd number of pixels is padded with a stale code.
             let bytes: &[u8] = bytemuck::cast_slice(&codes[..metres.len().next_multiple_of(2)]);
             self.to.slice(at..at + bytes.len()).copy_from_slice(bytes);
             at += bytes.len();
@@ -52,13 +52,13 @@ impl WithSimd for Radii<'_> {
     }
 }
 
-/// The CoC of some pixels in 16 bits.
+/// Converts depth to CoC in 16 bits.
 #[inline(always)]
 fn to_codes(lens: &DepthCoc, most_px: f32, metres: &[f32], codes: &mut [u16; BLOCK]) {
-    let share_per_px = 1.0 / most_px;
+    let fraction_per_px = 1.0 / most_px;
     for (code, &metres) in codes.iter_mut().zip(metres) {
         let coc_px = lens.coc_px(metres);
-        let root = (coc_px.abs() * share_per_px).sqrt().copysign(coc_px);
+        let root = (coc_px.abs() * fraction_per_px).sqrt().copysign(coc_px);
         *code = (root * WHOLE + NO_FRACTION).to_bits() as u16;
     }
 }

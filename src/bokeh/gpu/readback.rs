@@ -1,5 +1,5 @@
-//! The way back from the device: a ring of buffers, copied to after a frame and mapped later, so that submitting never
-//! waits. A picture that stays on the device goes the same way, without being copied.
+//! Readback of results: a ring of buffers, copied to after a frame and mapped later, so that submitting never waits.
+//! Pictures that stay on the device use the same ring without a copy.
 
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -10,10 +10,10 @@ use crate::bokeh::{BokehError, Finished, Job, PassTimes, Picture};
 use crate::compute::device::{Device, DevicePicture, Readback, Stamps};
 use crate::link::pool::Pooled;
 
-/// Frames that may be in flight: one on the device, one waiting, one on its way back.
+/// Largest number of frames in flight: one on the device, one waiting, one being read back.
 pub const CAPACITY: usize = 3;
-/// Passes of a frame that are timed, at most.
-const MOST_PASSES: usize = 256;
+/// Largest number of timed passes per frame.
+const MAX_PASSES: usize = 256;
 
 /// Buffers of one frame in flight.
 pub struct Slot {
@@ -21,25 +21,25 @@ pub struct Slot {
     pub stamps: Option<Stamps>,
 }
 
-/// A frame that was submitted.
+/// A submitted frame.
 pub struct Sent {
-    /// What was to be done.
+    /// The job as it was submitted.
     pub job: Job,
-    /// Where the result is left on the device.
+    /// Copy of the result that stays on the device.
     pub on_device: Option<Pooled<DevicePicture>>,
-    /// Bytes of it that were copied to the slot; 0 where it stays on the device.
+    /// Bytes of the result that are copied to the slot; 0 if it stays on the device.
     pub copied: u64,
-    /// What to wait for.
+    /// Submission to wait for.
     pub submission: wgpu::SubmissionIndex,
-    /// When it was begun.
+    /// Time of the submission.
     pub started: Instant,
 }
 
-/// A frame on its way back.
+/// A frame being read back.
 struct Pending {
     slot: Slot,
     sent: Sent,
-    /// Whether the device is done with it.
+    /// Whether the device has finished it.
     done: Arc<AtomicBool>,
 }
 
@@ -51,24 +51,24 @@ impl Pending {
     }
 }
 
-/// The frames on their way back, and the buffers for more.
+/// Frames being read back, and free buffers for more.
 pub struct Ring {
     free: Vec<Slot>,
     pending: VecDeque<Pending>,
-    /// When the last frame was back.
+    /// Time at which the last frame was read back.
     last: Option<Instant>,
 }
 
 impl Ring {
-    /// A ring for pictures of `bytes` (a multiple of 4).
+    /// Creates a ring for pictures of `bytes` bytes (a multiple of 4).
     pub fn new(device: &Device, bytes: usize) -> Self {
         let slot =
-            || Slot { picture: Readback::new(device, "picture back", bytes), stamps: Stamps::new(device, MOST_PASSES) };
+            || Slot { picture: Readback::new(device, "picture back", bytes), stamps: Stamps::new(device, MAX_PASSES) };
         let free = std::iter::repeat_with(slot).take(CAPACITY).collect();
         Self { free, pending: VecDeque::with_capacity(CAPACITY), last: None }
     }
 
-    /// A slot to copy a frame to.
+    /// Returns a free slot, if any.
     pub fn take(&mut self) -> Option<Slot> {
         self.free.pop()
     }
@@ -77,12 +77,12 @@ impl Ring {
         self.pending.len()
     }
 
-    /// Gives back the oldest frame in flight as it was submitted, after an error: its buffers are dropped.
+    /// After an error, returns the oldest frame in flight as it was submitted; its buffers are dropped.
     pub fn give_up(&mut self) -> Option<Job> {
         self.pending.pop_front().map(|pending| pending.sent.job)
     }
 
-    /// Starts the way back of a frame that was submitted.
+    /// Starts the readback of a submitted frame.
     pub fn push(&mut self, device: &Device, slot: Slot, sent: Sent) {
         if sent.copied > 0 {
             slot.picture.map();
@@ -93,7 +93,7 @@ impl Ring {
         self.pending.push_back(Pending { slot, sent, done });
     }
 
-    /// The oldest frame, if it is back; with `wait`, blocks until it is.
+    /// Returns the oldest frame if it is finished; with `wait`, blocks until it is.
     ///
     /// # Errors
     /// The device failed.
@@ -116,12 +116,12 @@ impl Ring {
         if let Some(stamps) = &slot.stamps {
             times = stamps.read(device)?;
         } else {
-            // Frames run one after the other: the time before the previous one was back does not count.
+            // Frames run one after the other: time before the previous frame was finished does not count.
             let began = self.last.map_or(sent.started, |last| last.max(sent.started));
             times.add("gpu", began.elapsed());
         }
         self.last = Some(Instant::now());
-        // Only now, so that the frame can be given back after an error.
+        // Removed only now, so that the frame can be taken back after an error.
         let Some(Pending { slot, sent, .. }) = self.pending.pop_front() else { return Ok(None) };
         let Sent { job, on_device, copied, .. } = sent;
         self.free.push(slot);

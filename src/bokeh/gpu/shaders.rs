@@ -1,26 +1,27 @@
-//! The shaders, and what Rust shares with them: uniforms and numbers.
+//! The shaders, and the uniforms and constants that Rust shares with them.
 
 use bytemuck::{Pod, Zeroable};
 
 use crate::bokeh::bank::{OCTAVE_SHIFT, OCTAVES_FROM_PX};
 use crate::bokeh::occlusion::{
-    DIRECTIONS, FADE, GRAIN, HALF_ALIKE_PX, MARGIN_PX, MOST_STEPS, ONE_ENDED, ONE_SURFACE_PX, OTHER_FROM, OTHER_TO,
+    DIRECTIONS, FADE, GRAIN, HALF_ALIKE_PX, MARGIN_PX, MAX_STEPS, ONE_ENDED, ONE_SURFACE_PX, OTHER_FROM, OTHER_TO,
     OWN_COVERAGE, TRUSTED_STEPS,
 };
 use crate::bokeh::plan::{
-    ANY_COLOR, CELL, COVERAGE_FLOOR, FAR_WEIGHT, HAND_OVER, HIDING_SHARE, HINDMOST_COVERAGE, SEGMENT,
+    ANY_COLOR, CELL, COVERAGE_FLOOR, FAR_WEIGHT, HAND_OVER, HIDING_WEIGHT, HINDMOST_COVERAGE, SEGMENT,
 };
 use crate::compute::device::{Shader, shader};
 
-/// Nothing is listed.
+/// Empties the tile lists.
 pub const CLEAR: Shader = shader!("common"; "clear", "list");
 /// 8-bit sRGB to linear light, with the CoC.
 pub const UNPACK: Shader =
     shader!("common"; "unpack", "radii", "silhouette", "cells", "range", "mixed", "list", "tiles", "next", "meet");
-/// How far silhouettes reach along rows, and whether any reaches a cell.
+/// Dilation of the silhouettes along rows.
 pub const SPREAD: Shader = shader!("common"; "spread", "cells");
+/// Dilation of the silhouettes down columns.
 pub const UNCOVER: Shader = shader!("common"; "uncover", "cells");
-/// A bin's share of each pixel, and the coarse grid over it.
+/// Weighted pixels of each bin, and the coarse grid over it.
 pub const BIN: Shader = shader!("common"; "bin", "mixed", "tent", "list", "tiles", "todo", "next");
 /// Local radius and range of colours.
 pub const REACH: Shader = shader!("common"; "reach", "work");
@@ -28,15 +29,15 @@ pub const BLUR_ROWS: Shader = shader!("common"; "blur_rows", "filter", "node", "
 pub const BLUR_COLUMNS: Shader = shader!("common"; "blur_columns", "filter", "node", "show", "list", "tiles", "todo");
 /// The exact two-dimensional gather.
 pub const GATHER: Shader = shader!("common"; "gather", "node");
-/// The nearest surface.
+/// CoC of the nearest surface.
 pub const HIDE: Shader = shader!("common"; "hide", "mixed");
-/// What is known behind a layer, at half size and over ever larger areas.
+/// Pull-push: the known background at half size and over ever larger areas.
 pub const PULL: Shader = shader!("common"; "pull", "pyramid", "base", "mixed");
-/// The largest areas, and back.
+/// Pull-push: the coarsest levels, and back.
 pub const COARSE: Shader = shader!("common"; "coarse", "pyramid");
-/// What lines past what hides agree on.
+/// Directional inpainting.
 pub const DIRECTIONAL: Shader = shader!("common"; "directional", "pyramid");
-/// Back to the picture.
+/// Push to the picture.
 pub const FILL: Shader =
     shader!("common"; "fill", "pyramid", "base", "mixed", "cells", "range", "list", "tiles", "next", "meet");
 pub const COMPOSITE: Shader = shader!("common"; "composite", "surfaces", "cells", "list", "yuyv");
@@ -59,29 +60,29 @@ pub const ALL: [Shader; 15] = [
     COMPOSITE,
 ];
 
-/// Invocations of a workgroup in x and in y, for pictures and bins, and for what is smaller.
+/// Invocations of a workgroup in x and in y: for pictures and bins, and for smaller grids.
 pub const TILE: u32 = 16;
 pub const SMALL_TILE: u32 = 8;
-// `fill` makes a tile of the picture from a small one of half its size.
+// `fill` computes a tile of the picture from a small one at half size.
 const _: () = assert!(TILE == 2 * SMALL_TILE);
-// A thread of `unpack` does as many pixels of a row as a cell of the silhouettes' grid has.
+// A thread of `unpack` does the pixels of one row of a cell of the silhouettes' grid.
 const _: () = assert!(GRAIN == 4);
-/// Invocations of a workgroup that goes along lines.
+/// Invocations of a one-dimensional workgroup.
 pub const LINE: u32 = 256;
-/// Sides of edges that a workgroup does in `reach`, two an edge.
+/// Sides of segment edges per workgroup of `reach`, two per edge.
 pub const EDGES_TILE: [usize; 2] = [TILE as usize, SMALL_TILE as usize];
-/// Pixels of a bin that a workgroup makes in `blur_rows` and in `blur_columns`.
+/// Pixels of a bin per workgroup of `blur_rows`, and of `blur_columns`.
 pub const ROWS_TILE: [usize; 2] = [64, 4];
 pub const RESULT_TILE: [usize; 2] = [8, 32];
 
-/// So many workgroups, at most, take turns with the tiles of a list: more than any device runs at once.
-pub const TAKING_TURNS: usize = 4096;
+/// Largest number of workgroups that share a list of tiles: more than any device runs at once.
+pub const MAX_TILE_WORKGROUPS: usize = 4096;
 /// Words of a list before its flags.
 pub const LIST_HEAD: usize = 16;
-/// The scale of a bin from which on a pixel of it has so many taps that four threads share them, two each way.
+/// Scale of a bin from which four threads share the many taps of a pixel, two per axis.
 pub const SHARED_FROM: u32 = 4;
 
-/// Steps of [`DIRECTIONS`] across (0) or down (1), four bits each, 8 more than they are.
+/// Packs the steps of [`DIRECTIONS`] across (0) or down (1), four bits each, offset by 8.
 const fn steps(axis: usize) -> f64 {
     let (mut packed, mut d) = (0u32, 0);
     while d < DIRECTIONS.len() {
@@ -93,7 +94,7 @@ const fn steps(axis: usize) -> f64 {
     packed as f64
 }
 
-/// The `override` constants of `common.wgsl`.
+/// Values of the `override` constants of `common.wgsl`.
 pub const CONSTANTS: [(&str, f64); 31] = [
     ("CELL", CELL as f64),
     ("SEGMENT", SEGMENT as f64),
@@ -102,7 +103,7 @@ pub const CONSTANTS: [(&str, f64); 31] = [
     ("FAR_WEIGHT", FAR_WEIGHT as f64),
     ("OTHER_FROM", OTHER_FROM as f64),
     ("OTHER_TO", OTHER_TO as f64),
-    ("HIDING_SHARE", HIDING_SHARE as f64),
+    ("HIDING_WEIGHT", HIDING_WEIGHT as f64),
     ("HINDMOST_COVERAGE", HINDMOST_COVERAGE as f64),
     ("GRAIN", GRAIN as f64),
     ("MARGIN_PX", MARGIN_PX as f64),
@@ -111,7 +112,7 @@ pub const CONSTANTS: [(&str, f64); 31] = [
     ("OWN_COVERAGE", OWN_COVERAGE as f64),
     ("STEPS_ACROSS", steps(0)),
     ("STEPS_DOWN", steps(1)),
-    ("MOST_STEPS", MOST_STEPS as f64),
+    ("MAX_STEPS", MAX_STEPS as f64),
     ("HALF_ALIKE_PX", HALF_ALIKE_PX as f64),
     ("ONE_SURFACE_PX", ONE_SURFACE_PX as f64),
     ("TRUSTED_STEPS", TRUSTED_STEPS as f64),
@@ -128,7 +129,7 @@ pub const CONSTANTS: [(&str, f64); 31] = [
     ("SHARED_FROM", SHARED_FROM as f64),
 ];
 
-/// `Frame` of `common.wgsl`, where each field is explained.
+/// Uniform `Frame` of `common.wgsl`, where the fields are documented.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[allow(missing_docs)]
@@ -153,11 +154,11 @@ pub struct Frame {
     pub rows_apart: u32,
     pub yuyv: u32,
     pub front_px: f32,
-    /// As long as the uniform is.
+    /// Padding to the size of the uniform.
     pub unused: [u32; 2],
 }
 
-/// `Bin` of `common.wgsl`.
+/// Uniform `Bin` of `common.wgsl`.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[allow(missing_docs)]
@@ -184,7 +185,7 @@ pub struct Bin {
     pub has_lobes: u32,
 }
 
-/// `Work` of `common.wgsl`.
+/// Uniform `Work` of `common.wgsl`.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[allow(missing_docs)]

@@ -1,4 +1,4 @@
-//! Whether a device blurs as the CPU does.
+//! Self-test of a device: compares its blur with the CPU's.
 
 use std::sync::Arc;
 
@@ -17,13 +17,13 @@ use crate::optics::{CocField, CocKind, DepthCoc};
 const WIDTH: u32 = 96;
 const HEIGHT: u32 = 64;
 const RADIUS_PX: f32 = 12.0;
-/// A value that differs by more is wrong.
+/// Largest accepted difference of an 8-bit value.
 const CODES: u8 = 4;
 
-/// Blurs a small picture of noise at three distances on `device` and on the CPU, once for each device.
+/// Blurs a small noise picture at three distances on `device` and on the CPU, once per device.
 ///
 /// # Errors
-/// The device failed, or makes another picture of it.
+/// The device failed, or its result differs from the CPU's.
 pub fn try_out(device: &Arc<Device>) -> Result<(), BokehError> {
     match device.fault_of::<GpuBokeh, BokehError>(|| Ok(trial(device)?.fault(device)))? {
         Some(GpuError::Failed(fault)) => {

@@ -18,7 +18,7 @@ fn settings(coc: CocKind, quality: Quality) -> Settings {
     }
 }
 
-/// A frame whose pixels have these CoC.
+/// Splits a frame whose pixels have these CoC.
 fn split(plan: &mut Plan, coc_px: impl Iterator<Item = f32>) {
     let lens = DepthCoc { coc_at_infinity_px: 16.0, focus_m: 1.0, range_m: 0.0, max_coc_px: 30.0 };
     let metres: Vec<f32> = coc_px.map(|coc_px| 1.0 / (1.0 - coc_px / 16.0)).collect();
@@ -48,7 +48,7 @@ fn bins_tile_the_line_front_to_back() {
 #[test]
 fn borders_lie_where_no_pixels_do() {
     let mut plan = Plan::new(&settings(CocKind::Depth, Quality::Balanced), 640, 360);
-    // In focus, a thing at 6 px, a wall at 11 to 12 px, and something near at -9 px.
+    // In focus, an object at 6 px, a wall at 11 to 12 px, and something near at -9 px.
     let parts = [(0.0, 100), (6.0, 60), (11.0, 100), (12.0, 100), (-9.0, 40)];
     split(&mut plan, parts.iter().flat_map(|&(coc_px, count)| std::iter::repeat_n(coc_px, count)));
     let borders: Vec<f32> = plan.bins[1..].iter().map(|bin| bin.low_px).collect();

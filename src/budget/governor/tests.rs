@@ -1,11 +1,12 @@
 use super::*;
-use crate::budget::load::{IDLE_NS, LEARN_FROM, LEARN_MOST, RECENT};
+use crate::budget::load::{IDLE_NS, LEARN_FROM, MAX_COST_RATIO, RECENT};
 
 const COSTS: [f64; 5] = [1.0, 1.5, 2.0, 3.0, 4.0];
 const BUDGET_NS: u64 = 1_000_000;
 const PERIOD_NS: u64 = 33_000_000;
 
-/// A machine of this load (nanoseconds at the cheapest rung) with a governor, its samples `late` frames late.
+/// A simulated machine with this load (nanoseconds at the cheapest level) and a governor; samples are `late` frames
+/// late.
 struct Machine {
     governor: Governor<1>,
     costs: [f64; 5],
@@ -22,7 +23,7 @@ impl Machine {
         Self { governor, costs: COSTS, under_way, late, now_ns: PERIOD_NS, switches: 0 }
     }
 
-    /// Plays frames; those of `spike` take ten times as long. Returns the rung of each.
+    /// Simulates frames, ten times as slow where `spike` is true. Returns the level of each.
     fn play(&mut self, load_ns: f64, frames: usize, spike: impl Fn(usize) -> bool) -> Vec<usize> {
         let mut rungs = Vec::new();
         for frame in 0..frames {
@@ -91,7 +92,7 @@ fn the_floor_is_the_floor() {
 #[test]
 fn costs_are_learnt_until_a_ladder_that_was_misjudged_does_not_pump() {
     let mut machine = Machine::new(0);
-    // The fourth rung is dearer than it was said to be: it seems to fit, and does not.
+    // The fourth level costs more than declared: it seems to fit, and does not.
     machine.costs = [1.0, 1.5, 2.0, 3.9, 4.5];
     let switches_in = |machine: &mut Machine| {
         let before = machine.switches;
@@ -112,7 +113,7 @@ fn a_sample_that_measures_nothing_is_none() {
         governor.note(Sample { rung: 77, took_ns: 9_000_000, at_ns }, BUDGET_NS);
     }
     assert_eq!((governor.rung(), governor.expected_ns()), (3, None));
-    // Times that run backwards are taken in order.
+    // Decreasing timestamps are accepted.
     (0..5).for_each(|k| governor.note(Sample { rung: 3, took_ns: 9_000_000, at_ns: 50 - k }, BUDGET_NS));
     assert_eq!(governor.rung(), 0);
 }
@@ -123,7 +124,7 @@ fn after_a_long_pause_only_what_is_new_counts() {
     machine.play(550_000.0, 100, |_| false);
     assert_eq!(machine.governor.rung(), 1);
     machine.now_ns += 10 * IDLE_NS;
-    // The clocks have to wake up first: a slow frame is no reason, and the load before is forgotten.
+    // A slow first frame (CPU clocks must rise) changes nothing, and the load before the pause is forgotten.
     let rungs = machine.play(200_000.0, 60, |frame| frame < 1);
     assert!(rungs.iter().all(|&rung| rung >= 1));
     assert_eq!(machine.governor.rung(), 4);
@@ -136,7 +137,7 @@ fn late_samples_of_another_rung_decide_nothing() {
         governor.note(Sample { rung: 2, took_ns: 50_000_000, at_ns }, BUDGET_NS);
     }
     assert_eq!(governor.rung(), 4);
-    // Its own first samples do, with what the others told.
+    // Its own first samples do, together with those of the others.
     (21..24).for_each(|at_ns| governor.note(Sample { rung: 4, took_ns: 90_000_000, at_ns }, BUDGET_NS));
     assert_eq!(governor.rung(), 0);
 }
@@ -151,7 +152,7 @@ fn a_smaller_budget_is_heeded_at_once() {
     assert_eq!(machine.governor.rung(), 1);
 }
 
-/// As light as to step up to the finest rung: returns after how many frames that comes.
+/// Simulates a load light enough for the finest level. Returns the number of frames until it is reached.
 fn frames_to_the_top(machine: &mut Machine) -> u32 {
     let rises = |_: &u32| {
         machine.play(200_000.0, 1, |_| false);
@@ -160,14 +161,14 @@ fn frames_to_the_top(machine: &mut Machine) -> u32 {
     (1..5000).find(rises).expect("it rises")
 }
 
-/// As heavy as to step down from there, once it is clear that the load has changed and not a cost.
+/// Simulates a load that needs a step down, after enough frames that it is not attributed to a wrong cost.
 fn take_back(machine: &mut Machine) {
     machine.play(200_000.0, LEARN_FROM, |_| false);
     machine.play(400_000.0, 10, |_| false);
     assert_eq!(machine.governor.rung(), 2);
 }
 
-/// Whether a step up after `frames` was one of this patience: the loads before it must first be forgotten.
+/// Whether a step up after `frames` frames had this patience: the earlier loads must be forgotten first.
 fn is_of(patience: u32, frames: u32) -> bool {
     (patience..=patience + RECENT as u32).contains(&frames)
 }
@@ -181,7 +182,7 @@ fn a_step_that_is_taken_back_is_tried_ever_more_rarely_until_one_holds() {
         take_back(&mut machine);
     }
     frames_to_the_top(&mut machine);
-    machine.play(200_000.0, (REGRET * MOST_PATIENCE) as usize, |_| false);
+    machine.play(200_000.0, (REGRET * MAX_PATIENCE) as usize, |_| false);
     take_back(&mut machine);
     let frames = frames_to_the_top(&mut machine);
     assert!(is_of(PATIENCE, frames), "{frames} frames after a step up that held");
@@ -202,7 +203,7 @@ fn a_pause_ends_the_wait_for_the_next_try() {
 #[test]
 fn a_load_that_is_too_high_now_and_then_is_too_high() {
     let mut machine = Machine::new(0);
-    // Every sixth frame takes more than there is at the fourth rung; the median knows nothing of it.
+    // Every sixth frame takes too long at the fourth level; the median does not show it.
     let mut play = |frames: usize| -> Vec<usize> {
         (0..frames).flat_map(|k| machine.play(if k % 6 == 5 { 420_000.0 } else { 240_000.0 }, 1, |_| false)).collect()
     };
@@ -215,7 +216,7 @@ fn a_step_up_goes_no_further_than_was_allowed_all_the_while() {
     let mut machine = Machine::new(0);
     machine.play(550_000.0, 100, |_| false);
     assert_eq!(machine.governor.rung(), 1);
-    // First there is time for the fourth rung, then for the fifth.
+    // At first the fourth level fits, then the fifth.
     machine.play(280_000.0, 25, |_| false);
     let up = machine.play(200_000.0, 40, |_| false);
     let rose: Vec<usize> = up.chunk_by(|a, b| a == b).map(|rungs| rungs[0]).collect();
@@ -227,13 +228,13 @@ fn a_step_up_goes_no_further_than_was_allowed_all_the_while() {
 #[test]
 fn no_cost_is_learnt_beyond_what_is_credible() {
     let mut machine = Machine::new(0);
-    // The finest rung takes ten times what it was said to.
+    // The finest level takes ten times its declared cost.
     machine.costs = [1.0, 1.5, 2.0, 3.0, 40.0];
     machine.play(70_000.0, 5000, |_| false);
-    assert_eq!(machine.governor.costs()[4], LEARN_MOST * COSTS[4]);
+    assert_eq!(machine.governor.costs()[4], MAX_COST_RATIO * COSTS[4]);
 }
 
-/// How long the next frame is expected to take, of a governor that has seen ten times this, and then this after a pause.
+/// Returns the expected time after ten equal frames, a pause, and one faster frame.
 fn expected_after(pause_ns: u64) -> Option<u64> {
     let mut governor = Governor::new(&[1.0], 0);
     (1..=10).for_each(|at_ns| governor.note(Sample { rung: 0, took_ns: 500, at_ns }, BUDGET_NS));
@@ -258,7 +259,7 @@ fn the_first_step_up_comes_with_the_last_frame_of_the_patience() {
 
 #[test]
 fn a_load_that_is_about_the_budget_changes_nothing() {
-    // Of what the median stands for, KEEP lies between these.
+    // KEEP, relative to the median, is between these.
     for (share_of_budget, kept) in [(0.92, true), (0.95, false)] {
         let mut machine = Machine::new(0);
         machine.play(share_of_budget * BUDGET_NS as f64 / COSTS[2], 300, |_| false);

@@ -2,7 +2,7 @@ use super::*;
 
 const MS: u64 = 1_000_000;
 const PERIOD_NS: u64 = 33 * MS;
-/// The blur's rungs, from draft to balanced, and two efforts of depth.
+/// The blur's levels, from draft to balanced, and two efforts of depth.
 const RUNGS: [f64; 3] = [0.68, 0.7, 1.0];
 const EFFORTS: [f64; 2] = [0.5, 1.0];
 const BALANCED: usize = 2;
@@ -11,12 +11,12 @@ fn planner(efforts: &[f64]) -> Planner {
     Planner::new((PERIOD_NS, Some(PERIOD_NS)), (efforts, true), &RUNGS, [BALANCED, BALANCED])
 }
 
-/// Plays frames of a machine where depth at full effort and the usual blur take so long, in milliseconds; returns the plans.
+/// Simulates frames whose depth at full effort and usual blur take these times in milliseconds. Returns the plans.
 fn play(planner: &mut Planner, times_ms: (f64, f64), frames: u64) -> Vec<Plan> {
     play_held(planner, times_ms, 2.0, frames)
 }
 
-/// The same where depth that is taken over takes `held_ms`.
+/// Same as [`play`], with `held_ms` for reused depth.
 fn play_held(planner: &mut Planner, (depth_ms, blur_ms): (f64, f64), held_ms: f64, frames: u64) -> Vec<Plan> {
     let ns = |ms: f64| (ms * MS as f64) as u64;
     let mut since = usize::MAX;
@@ -35,7 +35,7 @@ fn play_held(planner: &mut Planner, (depth_ms, blur_ms): (f64, f64), held_ms: f6
         .collect()
 }
 
-/// The plan that is kept, and how often it changes from there on.
+/// Returns the final plan, and the number of changes after settling.
 fn settled(efforts: &[f64], times_ms: (f64, f64)) -> (Plan, usize) {
     let mut planner = planner(efforts);
     play(&mut planner, times_ms, 300);
@@ -49,15 +49,15 @@ fn with_less_time_effort_goes_first_then_the_blur_then_depth_of_its_own() {
     for (depth_ms, blur_ms, expected) in [
         (12.0, 12.0, plan(1, 1, 2)),
         (24.0, 18.0, plan(1, 1, 2)),
-        // Together too late: with less effort not.
+        // Together too late: not with less effort.
         (27.0, 22.0, plan(1, 0, 2)),
         (40.0, 20.0, plan(1, 0, 2)),
         (50.0, 28.0, plan(1, 0, 1)),
-        // No effort makes depth fast enough for each frame; the blur has most of its budget in any case.
+        // No effort makes depth fast enough for each frame; the blur keeps most of its budget.
         (70.0, 15.0, plan(2, 0, 2)),
         (70.0, 20.0, plan(2, 0, 1)),
         (140.0, 15.0, plan(3, 0, 2)),
-        // A blur that nothing makes fast enough is no reason to hold depth.
+        // A blur that is too slow at any level is no reason to reuse depth.
         (10.0, 60.0, plan(1, 1, 0)),
     ] {
         let (found, changes) = settled(&EFFORTS, (depth_ms, blur_ms));
@@ -65,7 +65,7 @@ fn with_less_time_effort_goes_first_then_the_blur_then_depth_of_its_own() {
     }
 }
 
-/// The case of a recording of 1280x720 on two cores: depth takes more than a frame's time, and the blur half of it.
+/// A recording of 1280x720 on two cores: depth takes more than a frame's time, the blur half of it.
 #[test]
 fn a_blur_that_fits_is_not_lowered_where_depth_does_not() {
     for depth_ms in [30.0, 35.0, 60.0, 100.0] {
@@ -96,7 +96,7 @@ fn all_the_time_there_is_is_taken_and_no_more() {
             let took = |plan: Plan| (times_ms.0 * EFFORTS[plan.effort], times_ms.1 * RUNGS[plan.rung]);
             for finer in finer.into_iter().flatten() {
                 let (depth_ms, blur_ms) = took(finer);
-                // Half of its time is a stage's own; above, there is room only if both are in time.
+                // Half of its time is guaranteed to each stage; more fits only if both are in time.
                 let share_ms = (depth_ms + 2.0 * (finer.frames - 1) as f64) / finer.frames as f64;
                 let has_room = share_ms < 0.8 * 29.7 && blur_ms < 0.8 * 33.0 && 4.0 + depth_ms + blur_ms < 0.8 * 52.8;
                 assert!(!has_room, "{times_ms:?}: {plan:?} where there is time for {finer:?}");
@@ -144,8 +144,8 @@ fn depth_is_shared_only_where_that_saves_something_and_costs_the_blur_nothing_wh
     }
 }
 
-/// Plays a machine whose depth takes so long, and longer in one frame of eight; the shares of frames at the usual blur, and of
-/// those that were given depth of another, once it has settled.
+/// Simulates depth of `depth_ms`, and `spike_ms` in one frame of eight. Returns the fractions of frames with the usual
+/// blur and with shared depth, after settling.
 fn played_with_spikes(planner: &mut Planner, (depth_ms, spike_ms, blur_ms): (u64, u64, f64)) -> [f64; 2] {
     let (mut usual, mut shared) = (0, 0);
     for frame in 0..1200 {
@@ -162,7 +162,7 @@ fn played_with_spikes(planner: &mut Planner, (depth_ms, spike_ms, blur_ms): (u64
     [usual, shared].map(|frames| frames as f64 / 900.0)
 }
 
-/// What others do on the machine makes one depth of eight late: no level of the blur makes that good.
+/// Other processes delay depth in one of eight frames: no level of the blur compensates for that.
 #[test]
 fn spikes_of_depth_do_not_lower_a_blur_that_has_time() {
     for (shares, efforts) in [(false, &[1.0][..]), (true, &[1.0]), (true, &EFFORTS)] {
@@ -176,7 +176,7 @@ fn spikes_of_depth_do_not_lower_a_blur_that_has_time() {
     }
 }
 
-/// A mask is of its frame: there are fewer frames then, and before that the blur gives up what makes a difference.
+/// A mask belongs to its frame: the frame rate drops instead, and the blur is lowered first if that helps.
 #[test]
 fn depth_that_may_not_be_shared_never_is_and_the_blur_gives_way_first() {
     for (depth_ms, rung) in [(20.0, BALANCED), (26.0, BALANCED), (31.0, 1), (60.0, BALANCED), (200.0, BALANCED)] {

@@ -1,12 +1,13 @@
-//! From the bytes that a driver gives to 8-bit sRGB.
+//! Conversion of raw and JPEG pictures to 8-bit sRGB.
 //!
-//! - **Chroma** of 4:2:2 and 4:2:0 is interpolated linearly. Across, it is taken to lie on the left one of its two
-//!   pixels, and down, midway between its two rows, as in MPEG-2 and as V4L2 has it. In JPEG it lies midway both ways.
-//! - **Curves**: numbers on the curve of BT.709 are taken as sRGB, as they are. BT.709 defines what a camera records;
-//!   what a screen makes of it is close to sRGB's curve, and players and browsers show either alike. Converting by
-//!   the camera's curve would wash pictures out, and drivers name either curve for the same pixels.
-//!   Linear numbers and plain powers are converted by a table.
-//! - **Primaries** are not converted: a camera that says BT.2020 or DCI-P3 shows slightly less saturated colours.
+//! - **Chroma** of 4:2:2 and 4:2:0 is upsampled by linear interpolation. Horizontally, it is co-sited with the left
+//!   pixel of each pair, and vertically, midway between its two rows, as in MPEG-2 and in V4L2. In JPEG it lies midway
+//!   in both directions.
+//! - **Transfer**: values on the curve of BT.709 are treated as sRGB, unchanged. BT.709 defines what a camera records;
+//!   a screen's response to it is close to sRGB's curve, and players and browsers show both alike. Converting by the
+//!   camera's curve would wash pictures out, and drivers report either curve for the same pixels. Linear values and
+//!   pure powers are converted by a table.
+//! - **Primaries** are not converted: pictures of a camera that reports BT.2020 or DCI-P3 look slightly less saturated.
 
 mod jpeg;
 mod raw;
@@ -18,7 +19,7 @@ mod ycc;
 use crate::frame::ColorImage;
 use crate::layout::{Content, Family, FourCc, Layout, Transfer};
 
-/// Decodes the pictures of one layout. Owns the memory for it.
+/// Decodes the pictures of one layout, with its own buffers.
 #[derive(Debug)]
 pub struct Decoder {
     layout: Layout,
@@ -31,7 +32,7 @@ enum Kind {
     Jpeg(jpeg::Jpeg),
 }
 
-/// A format in which there are no colours.
+/// The format contains no colours.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{0} holds depth, not colours: use it with --depth")]
 pub struct NoColor(pub FourCc);
@@ -39,40 +40,40 @@ pub struct NoColor(pub FourCc);
 /// Why a picture cannot be decoded. The next one may be good.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum PixelError {
-    /// Memory planes lack, or there are too many.
+    /// The number of memory planes is wrong.
     #[error("the picture has {found} memory planes instead of {expected}")]
     Planes {
-        /// As given.
+        /// Number of planes passed.
         found: usize,
-        /// As the layout has.
+        /// Number of planes in the layout.
         expected: usize,
     },
-    /// It is cut short.
+    /// The picture is truncated.
     #[error("the picture is cut short: {found_bytes} of {needed_bytes} bytes")]
     Short {
-        /// As given.
+        /// Bytes passed.
         found_bytes: usize,
-        /// What the layout needs.
+        /// Bytes that the layout needs.
         needed_bytes: usize,
     },
-    /// The JPEG is cut short or damaged.
+    /// The JPEG is truncated or damaged.
     #[error("damaged JPEG: {0}")]
     Jpeg(String),
-    /// The JPEG's size is not the one that was agreed upon.
+    /// The JPEG's size differs from the negotiated one.
     #[error("the JPEG has {} x {} pixels instead of {} x {}", found.0, found.1, expected.0, expected.1)]
     Size {
-        /// Columns and rows of the JPEG.
+        /// Width and height of the JPEG.
         found: (usize, usize),
-        /// Columns and rows of the layout.
+        /// Width and height of the layout.
         expected: (usize, usize),
     },
 }
 
 impl Decoder {
-    /// A decoder for pictures of this layout.
+    /// Creates a decoder for pictures of this layout.
     ///
     /// # Errors
-    /// They have no colours.
+    /// The layout contains no colours.
     pub fn new(layout: &Layout) -> Result<Self, NoColor> {
         if layout.fourcc.content() != Some(Content::Color) {
             return Err(NoColor(layout.fourcc));
@@ -89,16 +90,16 @@ impl Decoder {
         Ok(Self { layout: *layout, kind })
     }
 
-    /// The layout that it decodes.
+    /// The layout of the pictures to decode.
     pub fn layout(&self) -> &Layout {
         &self.layout
     }
 
-    /// Decodes a picture, given as the used bytes of each memory plane, into `out` (resized to fit). Raw formats
-    /// allocate nothing once `out` has its size; the library behind JPEG allocates a few rows of pixels and its tables.
+    /// Decodes a picture, passed as the used bytes of each memory plane, into `out` (resized to fit). Raw formats
+    /// allocate nothing once `out` has its size; the JPEG library allocates a few rows of pixels and its tables.
     ///
     /// # Errors
-    /// The picture is cut short or damaged; the content of `out` is then unspecified.
+    /// The picture is truncated or damaged; the content of `out` is then unspecified.
     pub fn decode(&mut self, planes: &[&[u8]], out: &mut ColorImage) -> Result<(), PixelError> {
         let expected = self.layout.planes().len();
         if planes.len() != expected {

@@ -1,4 +1,4 @@
-//! Formats in which every sample has its place.
+//! Decoding of uncompressed formats.
 
 use pulp::{Arch, Simd, WithSimd};
 
@@ -8,7 +8,7 @@ use super::ycc::{self, Coefficients};
 use crate::frame::ColorImage;
 use crate::layout::{Component, Family, Layout, Range};
 
-/// Decodes raw pictures row by row; the rows in between stay in the cache.
+/// Decodes raw pictures row by row, so that intermediate rows stay in the cache.
 #[derive(Debug)]
 pub(super) struct Raw {
     arch: Arch,
@@ -17,24 +17,24 @@ pub(super) struct Raw {
     rows: Rows,
 }
 
-/// Memory for one row at its stages.
+/// Buffers for the stages of one row.
 #[derive(Debug)]
 struct Rows {
     luma: Vec<u8>,
-    /// Chroma samples as they come: alternating, or those of two rows of one kind.
+    /// Chroma samples as read: alternating, or those of two rows of one kind.
     chroma: [Vec<u8>; 2],
-    /// Cb and Cr for pairs of pixels, times 4, and the last one twice.
+    /// Cb and Cr for pairs of pixels, times 4, with the last sample repeated.
     half: [Vec<u16>; 2],
-    /// Cb and Cr for each pixel: distance from grey, times 256.
+    /// Cb and Cr for each pixel, relative to grey, times 256.
     full: [Vec<i16>; 2],
     colors: [Vec<u8>; 3],
 }
 
 impl Raw {
-    /// For pictures of this layout: RGB, grey or Y'CbCr.
+    /// Creates a decoder for pictures of this layout: RGB, grey or Y'CbCr.
     pub(super) fn new(layout: &Layout) -> Self {
         let is_rgb = matches!(layout.family(), Family::Rgb24 { .. } | Family::Grey);
-        // Of RGB and grey the table expands the range; of Y'CbCr the coefficients do.
+        // For RGB and grey, the table expands the range; for Y'CbCr, the coefficients do.
         let range = if is_rgb { layout.range } else { Range::Full };
         let width = if is_rgb { 0 } else { layout.width as usize };
         let pairs = width.div_ceil(2);
@@ -42,7 +42,7 @@ impl Raw {
         Self {
             arch: Arch::new(),
             coefficients: Coefficients::new(layout.matrix, layout.range),
-            table: transfer::table(layout.transfer, range),
+            table: transfer::build_table(layout.transfer, range),
             rows: Rows {
                 luma: bytes(),
                 chroma: [bytes(), bytes()],
@@ -53,14 +53,14 @@ impl Raw {
         }
     }
 
-    /// Takes the vector instructions `arch` instead of the best.
+    /// Uses the vector instructions `arch` instead of the best available ones.
     #[cfg(test)]
     pub(super) fn with_arch(mut self, arch: Arch) -> Self {
         self.arch = arch;
         self
     }
 
-    /// Decodes a picture of `layout` into `out` (resized to fit), unless one of its planes is cut short.
+    /// Decodes a picture of `layout` into `out` (resized to fit); fails if one of its planes is truncated.
     pub(super) fn decode(&mut self, layout: &Layout, planes: &[&[u8]], out: &mut ColorImage) -> Result<(), PixelError> {
         for (index, plane) in planes.iter().enumerate() {
             let (found_bytes, needed_bytes) = (plane.len(), layout.needed_bytes(index));
@@ -96,7 +96,7 @@ impl<'a> Samples<'a> {
         &self.plane[self.at.offset_bytes + y * self.at.stride_bytes..][..self.at.row_bytes]
     }
 
-    /// Of half as many rows as the picture, the nearest and the second nearest one to its row `y`.
+    /// Returns the nearest and the second nearest row of chroma, which has half the picture's rows, to row `y`.
     #[inline(always)]
     fn nearest_two(self, y: usize) -> [&'a [u8]; 2] {
         let near = y / 2;
@@ -125,19 +125,19 @@ impl WithSimd for Frame<'_> {
                     ycc::interleave([row, row, row], out);
                 }
                 Family::Packed422 { luma, cb, cr } => {
-                    raw.rows.packed(first.row(y), luma == 0, cb < cr);
-                    raw.rows.finish(&raw.coefficients, None, out);
+                    raw.rows.load_packed(first.row(y), luma == 0, cb < cr);
+                    raw.rows.convert_row(&raw.coefficients, None, out);
                 }
                 Family::SemiPlanar420 { swapped, .. } => {
-                    raw.rows.semi_planar(second.nearest_two(y), swapped);
-                    raw.rows.finish(&raw.coefficients, Some(first.row(y)), out);
+                    raw.rows.interpolate_semi_planar(second.nearest_two(y), swapped);
+                    raw.rows.convert_row(&raw.coefficients, Some(first.row(y)), out);
                 }
                 Family::Planar420 { swapped, .. } => {
                     let [cb, cr] = if swapped { [third, second] } else { [second, third] };
-                    raw.rows.planar([cb.nearest_two(y), cr.nearest_two(y)]);
-                    raw.rows.finish(&raw.coefficients, Some(first.row(y)), out);
+                    raw.rows.interpolate_planar([cb.nearest_two(y), cr.nearest_two(y)]);
+                    raw.rows.convert_row(&raw.coefficients, Some(first.row(y)), out);
                 }
-                // Neither comes here: they are no raw colours.
+                // Unreachable: these are not raw colour formats.
                 Family::Depth16 | Family::Jpeg => return,
             }
             if let Some(table) = &raw.table {
@@ -148,17 +148,16 @@ impl WithSimd for Frame<'_> {
 }
 
 impl Rows {
-    /// Takes a 4:2:2 row apart into luma and, times 4, the chroma of pairs: luma and chroma alternate, and so do Cb and
-    /// Cr.
+    /// Splits a 4:2:2 row into luma and the chroma of pairs, times 4: luma and chroma alternate, and so do Cb and Cr.
     #[inline(always)]
-    fn packed(&mut self, row: &[u8], luma_first: bool, cb_first: bool) {
+    fn load_packed(&mut self, row: &[u8], luma_first: bool, cb_first: bool) {
         let width = row.len() / 2;
         let [alternating, _] = &mut self.chroma;
         let (luma, alternating) = (&mut self.luma[..width], &mut alternating[..width]);
         if luma_first {
-            ycc::split(row, luma, alternating);
+            ycc::deinterleave(row, luma, alternating);
         } else {
-            ycc::split(row, alternating, luma);
+            ycc::deinterleave(row, alternating, luma);
         }
         let [cb, cr] = &mut self.half;
         let (first, second) = if cb_first { (cb, cr) } else { (cr, cb) };
@@ -166,18 +165,18 @@ impl Rows {
             let pair = u16::from_le_bytes(*pair);
             (*first, *second) = ((pair & 0xFF) * 4, (pair >> 8) * 4);
         }
-        // A last pixel without a partner has half its chroma; the other half is its neighbour's.
+        // A last pixel without a partner has only one chroma sample; the other one is copied from its neighbour.
         if let ([.., last], true) = (&*alternating, width % 2 == 1) {
             let at = width / 2;
             first[at] = u16::from(*last) * 4;
-            // 512 is grey, 128, times 4.
+            // Grey is 128, times 4: 512.
             second[at] = at.checked_sub(1).map_or(512, |before| second[before]);
         }
     }
 
     /// Interpolates the chroma of a 4:2:0 row, times 4, between two rows of alternating Cb and Cr.
     #[inline(always)]
-    fn semi_planar(&mut self, [near, far]: [&[u8]; 2], swapped: bool) {
+    fn interpolate_semi_planar(&mut self, [near, far]: [&[u8]; 2], swapped: bool) {
         let [cb, cr] = &mut self.half;
         let (first, second) = if swapped { (cr, cb) } else { (cb, cr) };
         let pairs = near.as_chunks::<2>().0.iter().zip(far.as_chunks::<2>().0);
@@ -188,16 +187,16 @@ impl Rows {
         }
     }
 
-    /// As [`Rows::semi_planar`], between two rows of Cb and two of Cr.
+    /// Interpolates the chroma of a 4:2:0 row, times 4, between two rows of Cb and two of Cr.
     #[inline(always)]
-    fn planar(&mut self, [cb, cr]: [[&[u8]; 2]; 2]) {
-        ycc::mix(cb[0], cb[1], &mut self.half[0]);
-        ycc::mix(cr[0], cr[1], &mut self.half[1]);
+    fn interpolate_planar(&mut self, [cb, cr]: [[&[u8]; 2]; 2]) {
+        ycc::interpolate_quarter(cb[0], cb[1], &mut self.half[0]);
+        ycc::interpolate_quarter(cr[0], cr[1], &mut self.half[1]);
     }
 
-    /// Converts luma (what [`Rows::packed`] left, where none is given) and the chroma of pairs to pixels.
+    /// Converts luma (by default the row that [`Rows::load_packed`] stored) and the chroma of pairs to pixels.
     #[inline(always)]
-    fn finish(&mut self, by: &Coefficients, luma: Option<&[u8]>, out: &mut [u8]) {
+    fn convert_row(&mut self, coefficients: &Coefficients, luma: Option<&[u8]>, out: &mut [u8]) {
         let width = out.len() / 3;
         let luma = luma.unwrap_or(&self.luma[..width]);
         let [cb, cr] = &mut self.half;
@@ -205,16 +204,16 @@ impl Rows {
         for (half, full) in [(cb, &mut *full_cb), (cr, &mut *full_cr)] {
             let last = half.len() - 1;
             half[last] = half[last - 1];
-            ycc::widen(half, full);
+            ycc::upsample_chroma(half, full);
         }
         let [red, green, blue] = &mut self.colors;
         let (red, green, blue) = (&mut red[..width], &mut green[..width], &mut blue[..width]);
-        ycc::convert(by, luma, [&full_cb[..width], &full_cr[..width]], [&mut *red, &mut *green, &mut *blue]);
+        ycc::convert(coefficients, luma, [&full_cb[..width], &full_cr[..width]], [&mut *red, &mut *green, &mut *blue]);
         ycc::interleave([red, green, blue], out);
     }
 }
 
-/// Turns blue, green, red into red, green, blue.
+/// Swaps blue, green, red into red, green, blue.
 #[inline(always)]
 fn bgr_to_rgb(row: &[u8], out: &mut [u8]) {
     for (out, &[blue, green, red]) in out.as_chunks_mut::<3>().0.iter_mut().zip(row.as_chunks::<3>().0) {

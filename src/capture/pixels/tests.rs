@@ -1,10 +1,10 @@
-//! Against what the definitions say in floating point, with bytes that come from a generator.
+//! Comparison with floating-point reference implementations, on pseudo-random bytes.
 
 use super::*;
 use crate::color::Matrix;
 use crate::layout::Range;
 
-/// Numbers that look random: the same everywhere.
+/// A deterministic pseudo-random generator.
 pub(super) struct Random(pub u64);
 
 impl Random {
@@ -18,7 +18,7 @@ impl Random {
     }
 }
 
-/// Luma and chroma of a pixel to colours, as the definitions have it.
+/// Converts luma and chroma of a pixel to colours by the standard's formulas.
 fn to_rgb([luma, cb, cr]: [f64; 3], matrix: Matrix, range: Range) -> [f64; 3] {
     let (red, blue) = match matrix {
         Matrix::Bt601 => (0.299, 0.114),
@@ -48,10 +48,10 @@ fn to_ycc(rgb: [f64; 3], matrix: Matrix, range: Range) -> [f64; 3] {
     }
 }
 
-/// How a format stores the sample (0 luma, 1 Cb, 2 Cr) of pixel or pair `x`, `y`: memory plane and byte.
+/// Location of the sample (0 luma, 1 Cb, 2 Cr) of pixel or pair `x`, `y`: memory plane and byte.
 type Place = fn(&Layout, usize, usize, usize) -> (usize, usize);
 
-/// Formats with their chroma's step down, and where samples lie; written down apart from the decoder.
+/// Formats with their vertical chroma step and sample locations, written independently of the decoder.
 const FORMATS: [(&[u8; 4], usize, Place); 12] = [
     (b"YUYV", 1, |l, s, x, y| (0, y * l.planes()[0].stride_bytes + [2 * x, 4 * x + 1, 4 * x + 3][s])),
     (b"YVYU", 1, |l, s, x, y| (0, y * l.planes()[0].stride_bytes + [2 * x, 4 * x + 3, 4 * x + 1][s])),
@@ -103,7 +103,7 @@ fn decoded(decoder: &mut Decoder, planes: &[Vec<u8>]) -> ColorImage {
     out
 }
 
-/// Chroma at a pixel: on the left one of a pair, midway between rows where those have a pair, too.
+/// Reference chroma of a pixel: co-sited with the left one of a pair, and midway between rows if they are subsampled.
 fn chroma(get: impl Fn(usize, usize) -> f64, pairs: usize, rows: usize, down: usize, x: usize, y: usize) -> f64 {
     let across = |row: usize| {
         let (left, right) = (get(x / 2, row), get((x / 2 + 1).min(pairs - 1), row));
@@ -154,14 +154,14 @@ fn the_usual_error_is_that_of_rounding() {
     let planes = memory(&layout, &mut Random(2));
     let out = decoded(&mut Decoder::new(&layout).unwrap(), &planes);
     let (mut sum, mut count) = (0.0, 0.0);
-    // On the left pixels chroma is not interpolated.
+    // Chroma is not interpolated on the left pixels.
     for (bytes, pixels) in planes[0].chunks_exact(4).zip(out.rgb.chunks_exact(6)) {
         let exact = to_rgb([bytes[0], bytes[1], bytes[3]].map(f64::from), layout.matrix, layout.range);
         for (&byte, exact) in pixels.iter().zip(exact).filter(|(_, exact)| (1.0..254.0).contains(exact)) {
             (sum, count) = (sum + f64::from(byte) - exact, count + 1.0);
         }
     }
-    // No tint: on average neither brighter nor darker.
+    // No tint: the mean error is zero.
     assert!((sum / count).abs() < 0.02, "{}", sum / count);
 }
 
@@ -181,7 +181,7 @@ fn a_picture_comes_back_from_every_format_with_any_stride_and_size() {
                     planes[plane][at] = ycc[0].round() as u8;
                     for (sample, value) in ycc.into_iter().enumerate().skip(1) {
                         let (plane, at) = place(&format, sample, x / 2, y / down);
-                        // A lone last pixel has but one kind of chroma.
+                        // A lone last pixel has only one kind of chroma.
                         if let Some(byte) = planes[plane].get_mut(at) {
                             *byte = value.round() as u8;
                         }
@@ -189,7 +189,7 @@ fn a_picture_comes_back_from_every_format_with_any_stride_and_size() {
                 }
             }
             let out = decoded(&mut Decoder::new(&format).unwrap(), &planes);
-            // Away from the edges of bands, where rows share chroma, and from the lone last pixel.
+            // Only away from the edges of bands, where rows share chroma, and from the lone last pixel.
             let whole = if down == 1 { (width as usize & !1).max(1) } else { width as usize };
             for (k, pixel) in out.rgb.chunks_exact(3).enumerate() {
                 let (x, y) = (k % width as usize, k / width as usize);

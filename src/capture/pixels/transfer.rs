@@ -1,4 +1,4 @@
-//! Tables that turn a camera's RGB codes into sRGB, by its transfer curve and range.
+//! Lookup tables that convert a camera's RGB codes to sRGB, by its transfer curve and range.
 
 use crate::color::linear_to_srgb;
 use crate::layout::{Range, Transfer};
@@ -6,9 +6,9 @@ use crate::layout::{Range, Transfer};
 /// A new byte for each byte.
 pub(super) type Table = [u8; 256];
 
-/// The table for red, green and blue on the curve `transfer`; none where it would change nothing.
-pub(super) fn table(transfer: Transfer, range: Range) -> Option<Box<Table>> {
-    // What values are raised to for linear light; none on curves that are shown as they are.
+/// Builds the table for red, green and blue on the curve `transfer`; `None` if it would change nothing.
+pub(super) fn build_table(transfer: Transfer, range: Range) -> Option<Box<Table>> {
+    // Exponent that yields linear light; `None` for curves that are shown unchanged.
     let exponent = match transfer {
         Transfer::Linear => Some(1.0),
         Transfer::Gamma(tenths) => Some(f64::from(tenths) / 10.0),
@@ -35,13 +35,13 @@ mod tests {
 
     #[test]
     fn linear_light_becomes_brighter_and_the_ends_stay() {
-        assert!(table(Transfer::Display, Range::Full).is_none());
-        let linear = table(Transfer::Linear, Range::Full).unwrap();
+        assert!(build_table(Transfer::Display, Range::Full).is_none());
+        let linear = build_table(Transfer::Linear, Range::Full).unwrap();
         // Middle grey reflects 18 to 22 per cent.
         assert_eq!((linear[0], linear[55], linear[255]), (0, 128, 255));
-        let near = table(Transfer::Gamma(22), Range::Full).unwrap();
+        let near = build_table(Transfer::Gamma(22), Range::Full).unwrap();
         assert!(near.iter().zip(0..=255u8).all(|(&byte, code)| byte.abs_diff(code) <= 9), "{near:?}");
-        let limited = table(Transfer::Display, Range::Limited).unwrap();
+        let limited = build_table(Transfer::Display, Range::Limited).unwrap();
         assert_eq!((limited[0], limited[16], limited[126], limited[235], limited[255]), (0, 0, 128, 255, 255));
     }
 }

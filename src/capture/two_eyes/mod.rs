@@ -1,7 +1,7 @@
-//! Two cameras beside each other as one: frames that were taken at the same time, within half a period.
+//! Two cameras side by side as one stereo camera: pairs of frames captured within half a period of each other.
 //!
-//! The left camera is the clock: a frame of it waits for its partner for half a period, and is lost without one. So
-//! where one camera goes away nothing is shown until it is back, and every frame of the left one is accounted for.
+//! The left camera is the clock: each of its frames waits for its partner for half a period, and is lost without one.
+//! So if one camera disappears, no frame is delivered until it is back, and every left frame is accounted for.
 
 mod pairing;
 
@@ -15,63 +15,63 @@ use pairing::{Pairing, Verdict};
 
 /// One of the two cameras.
 pub trait Eye: Send {
-    /// As [`Camera::info`].
+    /// Describes the camera, like [`Camera::info`].
     fn info(&self) -> SourceInfo;
 
-    /// As [`Camera::next`], waiting no longer than `patience`; `captured_ns` of the frame is set.
-    fn next_within(&mut self, patience: Duration, color: &mut ColorImage) -> Captured;
+    /// Reads a frame like [`Camera::next`], waiting for at most `timeout`; sets the frame's `captured_ns`.
+    fn next_within(&mut self, timeout: Duration, color: &mut ColorImage) -> Captured;
 
-    /// As [`Camera::rest`].
+    /// Releases the device, like [`Camera::rest`].
     fn rest(&mut self);
 }
 
-/// Two cameras as one.
+/// Two cameras as one stereo camera.
 pub struct TwoEyes<E> {
     left: E,
     right: E,
     clock: Clock,
     info: SourceInfo,
     pairing: Pairing,
-    /// The last picture of the right camera.
+    /// The latest picture of the right camera.
     right_color: ColorImage,
-    /// Pairs given so far.
-    given: u64,
+    /// Number of pairs delivered.
+    delivered: u64,
     waited_ns: u64,
     /// Frames of the right camera without a partner.
-    rights_alone: u64,
-    /// How far apart in time the frames of pairs are taken.
+    unpaired_rights: u64,
+    /// Absolute time differences within the pairs.
     skews: Histogram,
 }
 
-/// Pairs after which the median of how far apart they are taken is logged.
+/// Number of pairs after which their median time difference is logged.
 const FIRST_PAIRS: u64 = 30;
-/// Polls of the right camera in a row: one that never runs dry must not keep the left one waiting.
-const MOST_POLLS: usize = 8;
+/// Consecutive polls of the right camera: a camera that always has frames must not delay the left one.
+const MAX_POLLS: usize = 8;
 
 impl<E: Eye> TwoEyes<E> {
-    /// Pairs the frames of `left` and `right`, two cameras without end; ends after so many pairs, with `None` never.
+    /// Pairs the frames of `left` and `right`, two endless cameras; ends after `frames` pairs, never with `None`.
     ///
     /// # Errors
-    /// Their pictures are not of one size.
+    /// Their pictures differ in size.
     pub fn new(left: E, right: E, clock: Clock, frames: Option<u64>) -> Result<Self, CaptureError> {
-        let (ours, theirs) = (left.info(), right.info());
-        if ours.size != theirs.size {
-            let names = [ours.name, theirs.name];
-            return Err(CaptureError::EyesDiffer { names, left: ours.size, right: theirs.size });
+        let (left_info, right_info) = (left.info(), right.info());
+        if left_info.size != right_info.size {
+            let names = [left_info.name, right_info.name];
+            return Err(CaptureError::EyesDiffer { names, left: left_info.size, right: right_info.size });
         }
-        // Rates within 2 % count as one, such as 29.97 and 30.
-        if ours.period_ns.abs_diff(theirs.period_ns) > ours.period_ns / 50 {
+        // Rates within 2 % count as equal, such as 29.97 and 30.
+        if left_info.period_ns.abs_diff(right_info.period_ns) > left_info.period_ns / 50 {
             let fps = |period_ns: u64| 1e9 / period_ns as f64;
-            let (left_fps, right_fps) = (fps(ours.period_ns), fps(theirs.period_ns));
+            let (left_fps, right_fps) = (fps(left_info.period_ns), fps(right_info.period_ns));
             tracing::warn!(
                 "{} gives {left_fps:.1} frames a second and {} {right_fps:.1}: many will find no partner; choose a rate \
                  that both have with --fps",
-                ours.name,
-                theirs.name
+                left_info.name,
+                right_info.name
             );
         }
         let info =
-            SourceInfo { name: format!("{} and {}", ours.name, theirs.name), frames, brings: Brings::RightEye, ..ours };
+            SourceInfo { name: format!("{} and {}", left_info.name, right_info.name), frames, brings: Brings::RightEye, ..left_info };
         Ok(Self {
             pairing: Pairing::new(info.period_ns),
             left,
@@ -79,35 +79,35 @@ impl<E: Eye> TwoEyes<E> {
             clock,
             info,
             right_color: ColorImage::default(),
-            given: 0,
+            delivered: 0,
             waited_ns: 0,
-            rights_alone: 0,
+            unpaired_rights: 0,
             skews: Histogram::default(),
         })
     }
 
-    /// Reads frames of the right camera until one is the partner of the left frame in hand. Returns how much later that
-    /// one was taken, in nanoseconds; `None` where there is none in time.
+    /// Reads frames of the right camera until one matches the current left frame. Returns how much later it was
+    /// captured, in nanoseconds; `None` if none arrives in time.
     fn find_partner(&mut self) -> Option<i64> {
-        let deadline_ns = self.clock.now_ns() + self.pairing.half_ns();
+        let deadline_ns = self.clock.now_ns() + self.pairing.max_skew_ns();
         let mut polls = 0;
         loop {
-            match self.pairing.judge() {
+            match self.pairing.match_frames() {
                 Verdict::Pair { skew_ns } => return Some(skew_ns),
-                Verdict::LeftAlone | Verdict::NeedsLeft => return None,
-                Verdict::RightAlone => self.rights_alone += 1,
+                Verdict::UnpairedLeft | Verdict::NeedsLeft => return None,
+                Verdict::UnpairedRight => self.unpaired_rights += 1,
                 Verdict::NeedsRight => {}
             }
             let remaining_ns = deadline_ns.saturating_sub(self.clock.now_ns());
-            // However late it is, the partner may be there already: one poll is always made.
-            if remaining_ns == 0 && polls > 0 || polls == MOST_POLLS {
-                self.pairing.give_up_left();
+            // The partner may be available already, however late it is: always poll once.
+            if remaining_ns == 0 && polls > 0 || polls == MAX_POLLS {
+                self.pairing.drop_left();
                 return None;
             }
             polls += 1;
             let began_ns = self.clock.now_ns();
             match self.right.next_within(Duration::from_nanos(remaining_ns), &mut self.right_color) {
-                Captured::Frame(stamp) => self.pairing.right(stamp.captured_ns.unwrap_or(began_ns)),
+                Captured::Frame(stamp) => self.pairing.set_right(stamp.captured_ns.unwrap_or(began_ns)),
                 Captured::Lost(count, cause) => {
                     tracing::debug!("{count} frames of the right camera were lost: {cause:?}");
                 }
@@ -117,7 +117,7 @@ impl<E: Eye> TwoEyes<E> {
         }
     }
 
-    /// Counts how far apart a pair was taken, and logs the median once, after [`FIRST_PAIRS`].
+    /// Records the time difference of a pair, and logs the median once, after [`FIRST_PAIRS`].
     fn record_skew(&mut self, skew_ns: i64) {
         self.skews.add(skew_ns.unsigned_abs());
         if self.skews.samples() == FIRST_PAIRS {
@@ -140,19 +140,19 @@ impl<E: Eye> Camera for TwoEyes<E> {
     }
 
     fn next(&mut self, Shot { color, right, .. }: Shot) -> Result<Captured, CaptureError> {
-        if self.info.frames.is_some_and(|frames| self.given >= frames) {
+        if self.info.frames.is_some_and(|frames| self.delivered >= frames) {
             return Ok(Captured::End);
         }
         let began_ns = self.clock.now_ns();
         let captured = self.left.next_within(PATIENCE, color);
         self.waited_ns = self.clock.now_ns() - began_ns;
         let Captured::Frame(stamp) = captured else { return Ok(captured) };
-        self.pairing.left(stamp.captured_ns.unwrap_or(began_ns));
+        self.pairing.set_left(stamp.captured_ns.unwrap_or(began_ns));
         Ok(match self.find_partner() {
             Some(skew_ns) => {
                 right.set_luma_of(&self.right_color);
                 self.record_skew(skew_ns);
-                self.given += 1;
+                self.delivered += 1;
                 Captured::Frame(stamp)
             }
             None => Captured::Lost(1, Cause::Unpaired),
@@ -176,10 +176,10 @@ impl<E> Drop for TwoEyes<E> {
         tracing::info!(
             "{}: {} pairs, {:.1} ms apart (at most {:.1}); {} frames of the right camera had no partner",
             self.info.name,
-            self.given,
+            self.delivered,
             ms(self.skews.percentile_ns(0.5)),
             ms(self.skews.max_ns()),
-            self.rights_alone
+            self.unpaired_rights
         );
     }
 }

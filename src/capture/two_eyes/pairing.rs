@@ -1,75 +1,74 @@
-//! Which frame of the right camera belongs to which of the left one, by the times they were taken.
+//! Matches frames of the left and the right camera by their capture times.
 
-/// The frames in hand, one of each eye at most, by their times.
+/// Capture times of the frames to be matched, at most one per camera.
 #[derive(Debug)]
 pub(super) struct Pairing {
-    /// Frames that are less than this apart are a pair: half a period.
-    half_ns: u64,
+    /// Largest time difference of a pair, exclusive: half a period.
+    max_skew_ns: u64,
     left_ns: Option<u64>,
     right_ns: Option<u64>,
 }
 
-/// What to do about the frames in hand.
+/// The next step with the current frames.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Verdict {
-    /// They are a pair: the right one was taken so much later, in nanoseconds. Neither is in hand any more.
+    /// They are a pair; the right one was captured `skew_ns` nanoseconds later. Both are removed.
     Pair { skew_ns: i64 },
-    /// The left one waits for one of the right camera.
+    /// The left frame waits for a right one.
     NeedsRight,
-    /// There is none of the left camera.
+    /// There is no left frame.
     NeedsLeft,
-    /// The right one was too early for every left one to come; it is not in hand any more.
-    RightAlone,
-    /// The right one was taken too late for the left one, which is not in hand any more. The right one stays for the
-    /// next.
-    LeftAlone,
+    /// The right frame is too early for this and every later left frame, and is removed.
+    UnpairedRight,
+    /// The right frame is too late for the left one, which is removed. The right one stays for the next.
+    UnpairedLeft,
 }
 
 impl Pairing {
-    /// Pairs frames that come every `period_ns`.
+    /// Creates a matcher for frames that arrive every `period_ns`.
     pub(super) fn new(period_ns: u64) -> Self {
-        Self { half_ns: (period_ns / 2).max(1), left_ns: None, right_ns: None }
+        Self { max_skew_ns: (period_ns / 2).max(1), left_ns: None, right_ns: None }
     }
 
-    /// How far apart frames of a pair may be, and how long one waits for the other.
-    pub(super) fn half_ns(&self) -> u64 {
-        self.half_ns
+    /// Largest time difference of a pair, and the longest wait for a partner.
+    pub(super) fn max_skew_ns(&self) -> u64 {
+        self.max_skew_ns
     }
 
-    /// A frame of the left camera came; the one in hand, if any, is given up.
-    pub(super) fn left(&mut self, taken_ns: u64) {
-        self.left_ns = Some(taken_ns);
+    /// Sets the left frame; replaces the current one, if any.
+    pub(super) fn set_left(&mut self, captured_ns: u64) {
+        self.left_ns = Some(captured_ns);
     }
 
-    /// A frame of the right camera came; the one in hand, if any, is given up.
-    pub(super) fn right(&mut self, taken_ns: u64) {
-        self.right_ns = Some(taken_ns);
+    /// Sets the right frame; replaces the current one, if any.
+    pub(super) fn set_right(&mut self, captured_ns: u64) {
+        self.right_ns = Some(captured_ns);
     }
 
     pub(super) fn clear(&mut self) {
         (self.left_ns, self.right_ns) = (None, None);
     }
 
-    /// What to do now.
-    pub(super) fn judge(&mut self) -> Verdict {
+    /// Compares the current frames, and removes those that are done.
+    pub(super) fn match_frames(&mut self) -> Verdict {
         let Some(left_ns) = self.left_ns else { return Verdict::NeedsLeft };
         let Some(right_ns) = self.right_ns else { return Verdict::NeedsRight };
-        // Nanoseconds since the system started: far below the sign.
+        // Nanoseconds since boot fit into an `i64`.
         let skew_ns = right_ns as i64 - left_ns as i64;
-        if skew_ns.unsigned_abs() < self.half_ns {
+        if skew_ns.unsigned_abs() < self.max_skew_ns {
             self.clear();
             Verdict::Pair { skew_ns }
         } else if skew_ns < 0 {
             self.right_ns = None;
-            Verdict::RightAlone
+            Verdict::UnpairedRight
         } else {
             self.left_ns = None;
-            Verdict::LeftAlone
+            Verdict::UnpairedLeft
         }
     }
 
-    /// The left frame in hand has waited long enough; it is not in hand any more.
-    pub(super) fn give_up_left(&mut self) {
+    /// Removes the left frame, which has waited long enough.
+    pub(super) fn drop_left(&mut self) {
         self.left_ns = None;
     }
 }
@@ -81,31 +80,31 @@ mod tests {
     const MS: u64 = 1_000_000;
     const PERIOD_NS: u64 = 33 * MS;
 
-    /// What becomes of frames taken at these times: pairs, and those that stay alone. As the camera does it: a left
-    /// frame is taken, and then right ones until it is judged.
+    /// Returns the pairs of frames with these capture times, and the numbers of unpaired left and right ones. Like the
+    /// camera, it takes a left frame, and then right ones until it is matched.
     fn play(left: &[u64], right: &[u64]) -> (Vec<(u64, u64)>, usize, usize) {
         let mut pairing = Pairing::new(PERIOD_NS);
         let mut rights = right.iter().copied();
-        let (mut pairs, mut lefts_alone, mut rights_alone) = (Vec::new(), 0, 0);
+        let (mut pairs, mut unpaired_lefts, mut unpaired_rights) = (Vec::new(), 0, 0);
         for &left_ns in left {
-            pairing.left(left_ns);
+            pairing.set_left(left_ns);
             loop {
-                match pairing.judge() {
+                match pairing.match_frames() {
                     Verdict::Pair { skew_ns } => pairs.push((left_ns, left_ns.wrapping_add_signed(skew_ns))),
-                    Verdict::LeftAlone => lefts_alone += 1,
-                    Verdict::RightAlone => rights_alone += 1,
+                    Verdict::UnpairedLeft => unpaired_lefts += 1,
+                    Verdict::UnpairedRight => unpaired_rights += 1,
                     Verdict::NeedsLeft => break,
                     Verdict::NeedsRight => match rights.next() {
-                        Some(right_ns) => pairing.right(right_ns),
+                        Some(right_ns) => pairing.set_right(right_ns),
                         None => {
-                            pairing.give_up_left();
-                            lefts_alone += 1;
+                            pairing.drop_left();
+                            unpaired_lefts += 1;
                         }
                     },
                 }
             }
         }
-        (pairs, lefts_alone, rights_alone)
+        (pairs, unpaired_lefts, unpaired_rights)
     }
 
     fn times(count: u64, skew_ns: u64, jitter_ns: u64) -> Vec<u64> {
@@ -130,10 +129,10 @@ mod tests {
     fn no_pair_is_further_apart_and_every_left_frame_is_accounted_for() {
         // The worst skew: the partner changes with the jitter.
         let (left, right) = (times(300, 0, 6 * MS), times(300, 16 * MS, 6 * MS));
-        let (pairs, lefts_alone, _) = play(&left, &right);
+        let (pairs, unpaired_lefts, _) = play(&left, &right);
         assert!(pairs.iter().all(|(left_ns, right_ns)| left_ns.abs_diff(*right_ns) < PERIOD_NS / 2));
         assert!(pairs.is_sorted_by(|a, b| a.0 < b.0 && a.1 < b.1), "no frame is taken twice");
-        assert_eq!(pairs.len() + lefts_alone, 300);
+        assert_eq!(pairs.len() + unpaired_lefts, 300);
     }
 
     #[test]
@@ -143,17 +142,17 @@ mod tests {
             whole.iter().enumerate().filter(|(k, _)| !lost.contains(k)).map(|(_, &ns)| ns).collect()
         };
         let later: Vec<u64> = whole.iter().map(|ns| ns + 5 * MS).collect();
-        let (pairs, lefts_alone, rights_alone) = play(&without(&[10, 11, 40]), &later);
-        assert_eq!((pairs.len(), lefts_alone, rights_alone), (97, 0, 3));
-        let (pairs, lefts_alone, rights_alone) = play(&later, &without(&[10, 11, 40]));
-        assert_eq!((pairs.len(), lefts_alone, rights_alone), (97, 3, 0));
+        let (pairs, unpaired_lefts, unpaired_rights) = play(&without(&[10, 11, 40]), &later);
+        assert_eq!((pairs.len(), unpaired_lefts, unpaired_rights), (97, 0, 3));
+        let (pairs, unpaired_lefts, unpaired_rights) = play(&later, &without(&[10, 11, 40]));
+        assert_eq!((pairs.len(), unpaired_lefts, unpaired_rights), (97, 3, 0));
         assert!(pairs.iter().all(|(left_ns, right_ns)| left_ns - right_ns == 5 * MS));
     }
 
     #[test]
     fn one_eye_alone_gives_no_pairs() {
         assert_eq!(play(&times(10, 0, 0), &[]), (vec![], 10, 0));
-        // Old ones from before it went away.
+        // Right frames from before the camera disappeared.
         assert_eq!(play(&times(10, 400 * MS, 0), &times(3, 0, 0)), (vec![], 10, 3));
     }
 }

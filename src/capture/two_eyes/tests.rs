@@ -4,11 +4,11 @@ use crate::frame::{DepthMap, GrayImage, Stamp};
 const MS: u64 = 1_000_000;
 const PERIOD_NS: u64 = 33 * MS;
 
-/// A camera whose frames are there at these times; every byte of one is its number. Frames that are not read before the
-/// next one are lost, as with a driver.
+/// A camera whose frames arrive at these times; every byte of a frame is its index. As with a driver, a frame that is
+/// not read before the next one arrives is lost.
 struct FakeEye {
     clock: Clock,
-    taken_ns: Vec<u64>,
+    captured_ns: Vec<u64>,
     next: usize,
     size: (u32, u32),
 }
@@ -19,21 +19,21 @@ impl Eye for FakeEye {
         SourceInfo { name, size: self.size, period_ns: PERIOD_NS, frames: None, live: true, brings }
     }
 
-    fn next_within(&mut self, patience: Duration, color: &mut ColorImage) -> Captured {
+    fn next_within(&mut self, timeout: Duration, color: &mut ColorImage) -> Captured {
         let now_ns = self.clock.now_ns();
-        let overwritten = self.taken_ns[self.next..].windows(2).take_while(|pair| pair[1] <= now_ns).count();
+        let overwritten = self.captured_ns[self.next..].windows(2).take_while(|pair| pair[1] <= now_ns).count();
         if overwritten > 0 {
             self.next += overwritten;
             return Captured::Lost(overwritten as u64, Cause::Evicted);
         }
-        let until_ns = now_ns + patience.as_nanos() as u64;
-        match self.taken_ns.get(self.next) {
-            Some(&taken_ns) if taken_ns <= until_ns => {
-                self.clock.sleep_until_ns(taken_ns);
+        let until_ns = now_ns + timeout.as_nanos() as u64;
+        match self.captured_ns.get(self.next) {
+            Some(&captured_ns) if captured_ns <= until_ns => {
+                self.clock.sleep_until_ns(captured_ns);
                 color.resize(self.size.0, self.size.1);
                 color.rgb.fill(self.next as u8);
                 self.next += 1;
-                Captured::Frame(Stamp { index: self.next - 1, time_ns: taken_ns, captured_ns: Some(taken_ns) })
+                Captured::Frame(Stamp { index: self.next - 1, time_ns: captured_ns, captured_ns: Some(captured_ns) })
             }
             Some(_) => {
                 self.clock.sleep_until_ns(until_ns);
@@ -48,7 +48,7 @@ impl Eye for FakeEye {
 
 fn eyes(left_ns: Vec<u64>, right_ns: Vec<u64>) -> (TwoEyes<FakeEye>, Clock) {
     let clock = Clock::manual();
-    let eye = |taken_ns| FakeEye { clock: clock.clone(), taken_ns, next: 0, size: (4, 2) };
+    let eye = |captured_ns| FakeEye { clock: clock.clone(), captured_ns, next: 0, size: (4, 2) };
     (TwoEyes::new(eye(left_ns), eye(right_ns), clock.clone(), None).unwrap(), clock)
 }
 
@@ -56,7 +56,8 @@ fn times(frames: impl Iterator<Item = u64>, skew_ns: u64) -> Vec<u64> {
     frames.map(|k| (k + 1) * PERIOD_NS + skew_ns).collect()
 }
 
-/// The numbers of the pairs, and how many frames were lost without a partner and otherwise; whoever reads takes so long.
+/// Returns the indices of the pairs, and the numbers of frames lost without a partner and otherwise; the reader takes
+/// `takes_ns` per pair.
 fn play(camera: &mut TwoEyes<FakeEye>, clock: &Clock, takes_ns: u64) -> (Vec<(u8, u8)>, u64, u64) {
     let (mut color, mut depth, mut right) = (ColorImage::default(), DepthMap::default(), GrayImage::default());
     let (mut pairs, mut unpaired, mut lost) = (Vec::new(), 0, 0);
@@ -96,7 +97,7 @@ fn a_frame_without_a_partner_is_counted_and_the_next_ones_are_pairs_again() {
     let (mut camera, clock) = eyes(left, right);
     let (pairs, unpaired, lost) = play(&mut camera, &clock, MS);
     assert_eq!((pairs.len(), unpaired, lost), (37, 2, 0));
-    // Numbers count what each camera gave.
+    // Indices count the frames that each camera delivered.
     assert_eq!((pairs[4], pairs[5], pairs[36]), ((4, 4), (7, 5), (38, 37)));
 }
 
@@ -123,7 +124,7 @@ fn who_reads_slowly_gets_fewer_pairs_and_every_left_frame_is_accounted_for() {
 #[test]
 fn eyes_of_two_sizes_are_refused() {
     let clock = Clock::manual();
-    let eye = |size| FakeEye { clock: clock.clone(), taken_ns: Vec::new(), next: 0, size };
+    let eye = |size| FakeEye { clock: clock.clone(), captured_ns: Vec::new(), next: 0, size };
     let error = TwoEyes::new(eye((640, 480)), eye((1280, 720)), clock.clone(), None).err().unwrap().to_string();
     assert!(error.contains("640x480") && error.contains("1280x720") && error.contains("--size"), "{error}");
 }

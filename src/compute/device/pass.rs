@@ -1,4 +1,4 @@
-//! Passes on a device, in their order, and what each took by the device's own timestamps.
+//! Compute passes on a device, recorded in order and timed by the device's timestamps.
 
 use std::time::Duration;
 
@@ -6,7 +6,7 @@ use super::readback::Readback;
 use super::{Device, Shader};
 use crate::compute::{GpuError, PassTimes};
 
-/// A pipeline, its buffers, and how many workgroups it takes.
+/// A pipeline with its buffers and number of workgroups.
 pub struct Pass {
     name: &'static str,
     pipeline: wgpu::ComputePipeline,
@@ -15,7 +15,7 @@ pub struct Pass {
 }
 
 impl Pass {
-    /// A pass over `buffers`, at bindings 0, 1 and so on.
+    /// Creates a pass over `buffers`, at bindings 0, 1 and so on.
     pub fn new<'a>(
         device: &Device,
         shader: Shader,
@@ -28,27 +28,27 @@ impl Pass {
         Self { name: shader.name, pipeline, bindings, workgroups }
     }
 
-    /// The same, whose time counts for another name.
+    /// Changes the name under which the pass is timed.
     #[must_use]
     pub fn named(self, name: &'static str) -> Self {
         Self { name, ..self }
     }
 
-    /// Takes other buffers.
+    /// Binds other buffers.
     pub fn bind<'a>(&mut self, device: &Device, buffers: impl IntoIterator<Item = wgpu::BufferBinding<'a>>) {
         self.bindings = device.bindings(&self.pipeline, buffers.into_iter());
     }
 }
 
-/// Records passes, each of which sees what those before it wrote.
+/// Records passes; each sees the writes of those before it.
 pub struct Recorder<'a> {
-    /// For copies between passes.
+    /// Encoder, for copies between passes.
     pub encoder: wgpu::CommandEncoder,
     stamps: Option<&'a mut Stamps>,
 }
 
 impl<'a> Recorder<'a> {
-    /// Nothing is recorded yet. With `stamps`, the passes are timed.
+    /// Starts recording. With `stamps`, the passes are timed.
     pub fn new(device: &Device, mut stamps: Option<&'a mut Stamps>) -> Self {
         if let Some(stamps) = &mut stamps {
             stamps.names.clear();
@@ -62,9 +62,9 @@ impl<'a> Recorder<'a> {
         self.run_by(pass, pass.workgroups);
     }
 
-    /// The same by another number of workgroups.
+    /// Records a pass with another number of workgroups.
     pub fn run_by(&mut self, pass: &Pass, [x, y, z]: [u32; 3]) {
-        let timestamp_writes = self.stamps.as_mut().and_then(|stamps| stamps.of_next(pass.name));
+        let timestamp_writes = self.stamps.as_mut().and_then(|stamps| stamps.next_writes(pass.name));
         let descriptor = wgpu::ComputePassDescriptor { label: Some(pass.name), timestamp_writes };
         let mut recorded = self.encoder.begin_compute_pass(&descriptor);
         recorded.set_pipeline(&pass.pipeline);
@@ -72,7 +72,7 @@ impl<'a> Recorder<'a> {
         recorded.dispatch_workgroups(x, y, z);
     }
 
-    /// Has the device do all of it, waits, and gives the first `bytes` of `source`, whole words, to `take`.
+    /// Submits everything, waits, and calls `take` with the first `bytes` of `source`, whole words.
     ///
     /// # Errors
     /// The device failed, or took too long.
@@ -88,7 +88,7 @@ impl<'a> Recorder<'a> {
         let submission = submit(device, encoder, stamps.as_deref_mut());
         readback.map();
         device.poll(Some(submission))?;
-        // Where others use the device, too, one of them may be about to run the callback.
+        // If other threads use the device, too, one of them may be about to run the callback.
         device.wait_for(|| !readback.is_pending())?;
         let taken = readback.read(device, take)?;
         if let Some(stamps) = stamps {
@@ -97,7 +97,7 @@ impl<'a> Recorder<'a> {
         Ok(taken)
     }
 
-    /// Has the device do all of it, and asks for the times.
+    /// Submits everything, and requests the timestamps.
     pub fn submit(self, device: &Device) -> wgpu::SubmissionIndex {
         submit(device, self.encoder, self.stamps)
     }
@@ -118,44 +118,44 @@ fn submit(
     submission
 }
 
-/// Timestamps before and after each pass of a frame, and their way back.
+/// Timestamps before and after each pass of a frame, and their readback.
 pub struct Stamps {
     set: wgpu::QuerySet,
     resolved: wgpu::Buffer,
     readback: Readback,
-    /// The timed passes, in order; no more than there is room for.
+    /// Names of the timed passes, in order; at most `capacity`.
     names: Vec<&'static str>,
-    most: usize,
+    capacity: usize,
     last: PassTimes,
 }
 
 impl Stamps {
-    /// For so many passes; those after that are not timed. `None` where the device has no timestamps.
-    pub fn new(device: &Device, most: usize) -> Option<Self> {
+    /// Creates timestamps for `capacity` passes; later ones are not timed. `None` if the device has no timestamps.
+    pub fn new(device: &Device, capacity: usize) -> Option<Self> {
         use wgpu::BufferUsages as Usage;
         let set = || {
             device.device.create_query_set(&wgpu::QuerySetDescriptor {
                 label: Some("pass times"),
                 ty: wgpu::QueryType::Timestamp,
-                count: 2 * most as u32,
+                count: 2 * capacity as u32,
             })
         };
         // Two stamps of 8 bytes.
-        let bytes = 16 * most;
+        let bytes = 16 * capacity;
         device.timestamps.then(|| Self {
             set: set(),
             resolved: device.buffer("stamps", bytes, Usage::QUERY_RESOLVE | Usage::COPY_SRC),
             readback: Readback::new(device, "stamps back", bytes),
-            names: Vec::with_capacity(most),
-            most,
+            names: Vec::with_capacity(capacity),
+            capacity,
             last: PassTimes::new(),
         })
     }
 
-    /// Where the next pass leaves its stamps.
-    fn of_next(&mut self, name: &'static str) -> Option<wgpu::ComputePassTimestampWrites<'_>> {
+    /// Returns where the next pass writes its timestamps.
+    fn next_writes(&mut self, name: &'static str) -> Option<wgpu::ComputePassTimestampWrites<'_>> {
         let index = 2 * self.names.len() as u32;
-        (self.names.len() < self.most).then(|| {
+        (self.names.len() < self.capacity).then(|| {
             self.names.push(name);
             wgpu::ComputePassTimestampWrites {
                 query_set: &self.set,
@@ -165,33 +165,33 @@ impl Stamps {
         })
     }
 
-    /// Copies the stamps to where the host can read them.
+    /// Copies the timestamps to a buffer that the host can read.
     fn fetch(&mut self, encoder: &mut wgpu::CommandEncoder) {
         encoder.resolve_query_set(&self.set, 0..2 * self.names.len() as u32, &self.resolved, 0);
         self.readback.copy(encoder, &self.resolved, self.resolved.size());
     }
 
-    /// The time of each pass of what was [fetched](Recorder::fetch) last.
+    /// Returns the time of each pass of the last [fetch](Recorder::fetch).
     pub fn last(&self) -> PassTimes {
         self.last
     }
 
-    /// Whether they are still on their way.
+    /// Whether the timestamps are still being read back.
     pub fn are_pending(&self) -> bool {
         self.readback.is_pending()
     }
 
-    /// The time of each pass, once they are here; of none where the device's clock changed meanwhile, as stamps that run
-    /// backwards show: they say nothing.
+    /// Returns the time of each pass, after the readback. Empty if a timestamp pair decreases, because the device's
+    /// clock then changed in between and all of them are invalid.
     ///
     /// # Errors
-    /// They did not come back.
+    /// The readback failed.
     pub fn read(&self, device: &Device) -> Result<PassTimes, GpuError> {
         let period_ns = f64::from(device.queue.get_timestamp_period());
         self.readback.read(device, |bytes| {
             let mut times = PassTimes::new();
             for (name, bytes) in self.names.iter().zip(bytes.as_chunks::<16>().0) {
-                // The beginning in the lower half, the end in the upper one.
+                // Start in the lower half, end in the upper one.
                 let stamps = u128::from_le_bytes(*bytes);
                 let Some(ticks) = ((stamps >> 64) as u64).checked_sub(stamps as u64) else { return PassTimes::new() };
                 times.add(name, Duration::from_nanos((ticks as f64 * period_ns) as u64));
@@ -201,16 +201,16 @@ impl Stamps {
     }
 }
 
-/// Bytes from one uniform to the next in a buffer of several: no device asks for more.
+/// Stride of uniforms that share a buffer, in bytes: the largest alignment that a device may require.
 pub const UNIFORM_STRIDE: u64 = 256;
 
-/// Uniform number `index` of several in a buffer.
+/// Returns the binding of uniform number `index` in a buffer.
 pub fn uniform_at<T>(buffer: &wgpu::Buffer, index: usize) -> wgpu::BufferBinding<'_> {
     let size = wgpu::BufferSize::new(size_of::<T>() as u64);
     wgpu::BufferBinding { buffer, offset: index as u64 * UNIFORM_STRIDE, size }
 }
 
-/// Workgroups in x and y, as a device may limit both to 65,535: `workgroups` in all, or a few more.
+/// Returns a 2-D dispatch of at least `workgroups` workgroups: a device may limit x and y to 65,535.
 pub fn workgroups_2d(workgroups: u32) -> [u32; 3] {
     let down = workgroups.div_ceil(32_768).max(1);
     [workgroups.div_ceil(down), down, 1]

@@ -1,4 +1,4 @@
-//! Pictures and their depth in a device's memory.
+//! Pictures and depth maps in a device's memory.
 
 use super::Device;
 
@@ -11,10 +11,10 @@ pub struct DevicePicture {
 }
 
 impl DevicePicture {
-    /// Memory for a picture of `size` pixels.
+    /// Allocates a picture of `size` pixels.
     pub fn new(device: &Device, size: (u32, u32)) -> Self {
         use wgpu::BufferUsages as Usage;
-        // Whole quads of pixels: what follows the last pixel is unspecified.
+        // Whole groups of four pixels: bytes after the last pixel are unspecified.
         let quads = (size.0 as usize * size.1 as usize).div_ceil(4);
         let buffer = device.buffer("picture", quads * 12, Usage::STORAGE | Usage::COPY_SRC | Usage::COPY_DST);
         Self { device: device.device.clone(), size, buffer }
@@ -34,7 +34,7 @@ impl DevicePicture {
     }
 }
 
-/// A depth map as large as its picture, and that picture, in a device's memory.
+/// A picture and its depth map of the same size, in a device's memory.
 #[derive(Clone, Debug)]
 pub struct DeviceFrame {
     device: wgpu::Device,
@@ -46,7 +46,7 @@ pub struct DeviceFrame {
 }
 
 impl DeviceFrame {
-    /// Memory for a frame of `size` pixels.
+    /// Allocates a frame of `size` pixels.
     pub fn new(device: &Device, size: (u32, u32)) -> Self {
         use wgpu::BufferUsages as Usage;
         let pixels = size.0 as usize * size.1 as usize;
@@ -54,7 +54,7 @@ impl DeviceFrame {
         Self::of(device, size, &buffer("metres", 4 * pixels), &buffer("rgb", 3 * pixels))
     }
 
-    /// What is in buffers of `device`, which can be copied from, until something else is.
+    /// Wraps buffers of `device` with usage `COPY_SRC`; their content is valid until they are overwritten.
     pub fn of(device: &Device, size: (u32, u32), metres: &wgpu::Buffer, rgb: &wgpu::Buffer) -> Self {
         Self { device: device.device.clone(), size, metres: metres.clone(), rgb: rgb.clone() }
     }
@@ -63,7 +63,7 @@ impl DeviceFrame {
         self.size
     }
 
-    /// Whether it is in the memory of `device`.
+    /// Whether the frame is in the memory of `device`.
     pub fn is_on(&self, device: &Device) -> bool {
         self.device == device.device
     }

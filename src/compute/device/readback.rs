@@ -1,4 +1,4 @@
-//! The way back from a device to the host.
+//! Readback from a device to the host.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU8, Ordering};
@@ -6,12 +6,12 @@ use std::sync::atomic::{AtomicU8, Ordering};
 use super::Device;
 use crate::compute::GpuError;
 
-/// Memory that a device copies to and the host reads.
+/// Buffer that the device copies to and the host maps.
 pub struct Readback {
     buffer: wgpu::Buffer,
     /// [`PENDING`], [`READY`] or [`FAILED`]: set by the device's callback.
     state: Arc<AtomicU8>,
-    /// Bytes of it that are copied to.
+    /// Bytes of the last copy.
     copied: u64,
 }
 
@@ -20,24 +20,24 @@ const PENDING: u8 = 1;
 const FAILED: u8 = 2;
 
 impl Readback {
-    /// For so many bytes.
+    /// Allocates `bytes` bytes.
     pub fn new(device: &Device, label: &str, bytes: usize) -> Self {
         let usage = wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST;
         Self { buffer: device.buffer(label, bytes, usage), state: Arc::new(AtomicU8::new(READY)), copied: 0 }
     }
 
-    /// Bytes that there is room for.
+    /// Returns the capacity in bytes.
     pub fn size(&self) -> u64 {
         self.buffer.size()
     }
 
-    /// Records that the first `bytes` of `source`, whole words, are copied here.
+    /// Records a copy of the first `bytes` of `source`, whole words.
     pub fn copy(&mut self, encoder: &mut wgpu::CommandEncoder, source: &wgpu::Buffer, bytes: u64) {
         encoder.copy_buffer_to_buffer(source, 0, &self.buffer, 0, bytes);
         self.copied = bytes;
     }
 
-    /// Asks for what was copied, once that was submitted.
+    /// Requests the mapping of the copied bytes, after the submission.
     pub fn map(&self) {
         self.state.store(PENDING, Ordering::Relaxed);
         let state = Arc::clone(&self.state);
@@ -46,15 +46,15 @@ impl Readback {
         });
     }
 
-    /// Whether it is still on its way.
+    /// Whether the mapping is still pending.
     pub fn is_pending(&self) -> bool {
         self.state.load(Ordering::Acquire) == PENDING
     }
 
-    /// Takes what has come back.
+    /// Calls `take` with the copied bytes, and unmaps them.
     ///
     /// # Errors
-    /// Nothing has.
+    /// The mapping is not ready or failed.
     pub fn read<T>(&self, device: &Device, take: impl FnOnce(&[u8]) -> T) -> Result<T, GpuError> {
         let fault = |error: &dyn std::fmt::Display| GpuError::Failed(format!("{}: {error}", device.name));
         if self.state.load(Ordering::Acquire) != READY {

@@ -1,4 +1,4 @@
-//! Whether a device does what the processor does: drivers have faults, and none is to be found out by whoever is looked at.
+//! Self-test of a device against the CPU, which catches driver faults before a user sees them.
 
 use std::any::TypeId;
 use std::sync::PoisonError;
@@ -6,20 +6,20 @@ use std::sync::PoisonError;
 use super::Device;
 use crate::compute::GpuError;
 
-/// What came of doing something small on a device and on the processor.
+/// Result of a small computation on a device, compared with the CPU's.
 #[derive(Clone, Copy, Debug)]
 pub struct Trial {
-    /// Results that differ, and all of them.
+    /// Number of values that differ; `all` is their total.
     pub wrong: usize,
     pub all: usize,
-    /// One in so many may differ, as roundings fall either way.
+    /// One in this many may differ, because of rounding.
     pub one_in: usize,
-    /// What results they are, such as `depths of a trial`.
+    /// Description of the values, such as `depths of a trial`.
     pub results: &'static str,
 }
 
 impl Trial {
-    /// What is wrong, where more is than may be.
+    /// Returns an error if too many values differ.
     pub fn fault(&self, device: &Device) -> Option<GpuError> {
         let (Self { wrong, all, one_in, results }, name) = (self, &device.name);
         (wrong * one_in > *all).then(|| {
@@ -29,11 +29,11 @@ impl Trial {
 }
 
 impl Device {
-    /// The fault that `trial` finds in what workers of the type `T` do on this device, if any. It is held at the first call, and
-    /// again only where it could not be.
+    /// Returns the fault that `trial` finds in workers of type `T` on this device, if any. Runs the trial at the first
+    /// call, and again only if it could not be completed.
     ///
     /// # Errors
-    /// The trial could not be held.
+    /// The trial could not be completed.
     pub fn fault_of<T: 'static, E>(
         &self,
         trial: impl FnOnce() -> Result<Option<GpuError>, E>,

@@ -1,26 +1,26 @@
-//! Waiting for a device, which may never answer.
+//! Waiting for a device, which may hang.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use super::{Device, note};
+use super::{Device, record_fault};
 use crate::compute::{GpuError, catch_panic};
 
-/// How often one who waits looks whether it has been long enough.
-const LOOK: Duration = Duration::from_millis(100);
-/// How long a device may take once the program is to end.
-const LAST_PATIENCE: Duration = Duration::from_secs(1);
+/// Interval at which a waiting thread checks for the timeout.
+const POLL: Duration = Duration::from_millis(100);
+/// Time after which a device counts as hung once the program is to end.
+const END_PATIENCE: Duration = Duration::from_secs(1);
 
 /// Whether the program is to end.
-static ENDS: AtomicBool = AtomicBool::new(false);
+static ENDING: AtomicBool = AtomicBool::new(false);
 
-/// From now on no device of this process is waited for longer than a second: somebody asked the program to end.
+/// Limits waiting for any device of this process to a second from now on, because the program is to end.
 pub fn end_soon() {
-    ENDS.store(true, Ordering::Relaxed);
+    ENDING.store(true, Ordering::Relaxed);
 }
 
 impl Device {
-    /// Runs the callbacks of what the device has done. With `until`, first waits for that submission.
+    /// Runs the callbacks of finished work. With `until`, first waits for that submission.
     ///
     /// # Errors
     /// The device failed, or took too long.
@@ -29,48 +29,48 @@ impl Device {
         let began = Instant::now();
         loop {
             let poll = match &until {
-                Some(index) => wgpu::PollType::Wait { submission_index: Some(index.clone()), timeout: Some(LOOK) },
+                Some(index) => wgpu::PollType::Wait { submission_index: Some(index.clone()), timeout: Some(POLL) },
                 None => wgpu::PollType::Poll,
             };
-            // A device that is lost meanwhile makes it panic.
+            // wgpu panics if the device is lost meanwhile.
             match catch_panic(|| self.device.poll(poll)) {
-                Some(Err(wgpu::PollError::Timeout)) if !self.hangs(began) => continue,
+                Some(Err(wgpu::PollError::Timeout)) if !self.is_hung(began) => continue,
                 Some(Ok(_)) => {}
-                Some(Err(wgpu::PollError::Timeout)) => self.give_up(began),
-                Some(Err(error)) => note(&self.fault, error.to_string()),
-                None => note(&self.fault, "device lost".to_owned()),
+                Some(Err(wgpu::PollError::Timeout)) => self.mark_hung(began),
+                Some(Err(error)) => record_fault(&self.fault, error.to_string()),
+                None => record_fault(&self.fault, "device lost".to_owned()),
             }
             return self.check();
         }
     }
 
-    /// Waits until `done`, which a callback of finished work makes true.
+    /// Waits until `done` returns true, which a callback of finished work causes.
     ///
     /// # Errors
-    /// As for [`Device::poll`].
+    /// Fails like [`Device::poll`].
     pub fn wait_for(&self, done: impl Fn() -> bool) -> Result<(), GpuError> {
         let began = Instant::now();
         // The work is done: another thread that polls the device is about to run the callback.
         while !done() {
             self.check()?;
-            if self.hangs(began) {
-                self.give_up(began);
+            if self.is_hung(began) {
+                self.mark_hung(began);
             }
             std::thread::yield_now();
         }
         Ok(())
     }
 
-    /// Whether the device has taken too long for what it was given.
-    fn hangs(&self, began: Instant) -> bool {
-        let patience = if ENDS.load(Ordering::Relaxed) { self.patience.min(LAST_PATIENCE) } else { self.patience };
+    /// Whether the device counts as hung since `began`.
+    fn is_hung(&self, began: Instant) -> bool {
+        let patience = if ENDING.load(Ordering::Relaxed) { self.patience.min(END_PATIENCE) } else { self.patience };
         began.elapsed() >= patience
     }
 
-    /// Counts the device as hung.
-    fn give_up(&self, began: Instant) {
-        // Leaked: freeing them would wait for the device.
+    /// Marks the device as hung.
+    fn mark_hung(&self, began: Instant) {
+        // Leaked, because freeing them would wait for the device.
         std::mem::forget((self.instance.clone(), self.device.clone(), self.queue.clone()));
-        note(&self.fault, format!("no answer for {:.0} s", began.elapsed().as_secs_f64()));
+        record_fault(&self.fault, format!("no answer for {:.0} s", began.elapsed().as_secs_f64()));
     }
 }

@@ -1,38 +1,38 @@
-//! A relay: memory that the parts of one pass work on one after the other, block by block, each following close behind
-//! the one before it.
+//! A relay (pipelined wavefront): the parts of one pass process the same blocks of memory one after the other, each
+//! part closely behind the previous one.
 
 use std::cell::UnsafeCell;
 use std::ops::{Deref, DerefMut};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread;
 
-/// Blocks that go from part to part. All parts of a pass take all blocks, in the same order; a part has a block once the
-/// part of the number before has passed it on. Parts are begun in the order of their numbers, so that whoever is waited
-/// for is at work.
+/// Blocks that are passed from part to part. All parts of a pass take all blocks in the same order; a part gets a block
+/// once the previous part has released it. Parts start in the order of their numbers, so a part that is waited for is
+/// already running.
 pub struct Relay<T> {
     blocks: Vec<Block<T>>,
 }
 
-/// A cache line of its own, so that waiting for one block does not slow work on another.
+/// One cache line each, so that waiting for one block does not slow work on another (no false sharing).
 #[repr(align(64))]
 struct Block<T> {
-    /// Twice the number of the part that is next, and one more while it has the block.
+    /// Twice the number of the next part, plus one while it holds the block.
     turn: AtomicUsize,
     value: UnsafeCell<T>,
 }
 
-// SAFETY: a block is used only by who raised its `turn` from even to odd, which one thread can, and until it is even
-// again; that acquires what the part before released. `T: Send` as the parts run on several threads.
+// SAFETY: a block is used only by the part that raised its `turn` from even to odd, which one thread can, until it is
+// even again; that acquires the release of the previous part. `T: Send` as the parts run on several threads.
 unsafe impl<T: Send> Sync for Relay<T> {}
 
 impl<T> Relay<T> {
-    /// Of these blocks.
+    /// Creates a relay of these blocks.
     pub fn new(blocks: impl Iterator<Item = T>) -> Self {
         let block = |value| Block { turn: AtomicUsize::new(0), value: UnsafeCell::new(value) };
         Self { blocks: blocks.map(block).collect() }
     }
 
-    /// Begins a pass, for which `prepare` is called with each block: part 0 is next everywhere.
+    /// Begins a pass and calls `prepare` with each block: part 0 is next everywhere.
     pub fn begin(&mut self, mut prepare: impl FnMut(&mut T)) {
         for Block { turn, value } in &mut self.blocks {
             *turn.get_mut() = 0;
@@ -40,14 +40,14 @@ impl<T> Relay<T> {
         }
     }
 
-    /// What part number `part` takes the blocks by: once for each part of a pass, and before all else that it does, so
-    /// that a panic passes them on.
+    /// Returns the iterator over the blocks for part number `part`: to be called once per part, before anything that
+    /// may panic, so that a panic releases the blocks.
     pub fn runner(&self, part: usize) -> Runner<'_, T> {
         Runner { relay: self, part, next: 0 }
     }
 }
 
-/// One part on its way through the blocks. Those that it has not taken when it is dropped go on untouched.
+/// Iterates over the blocks for one part. When dropped, it passes the remaining blocks on unchanged.
 pub struct Runner<'a, T> {
     relay: &'a Relay<T>,
     part: usize,
@@ -55,13 +55,13 @@ pub struct Runner<'a, T> {
 }
 
 impl<'a, T> Runner<'a, T> {
-    /// The next block, once the part before has passed it on; `None` after the last one.
+    /// Waits for the next block until the previous part has released it; `None` after the last one.
     pub fn next_block(&mut self) -> Option<Turn<'a, T>> {
         let block = self.relay.blocks.get(self.next)?;
         self.next += 1;
         let due = 2 * self.part;
         let mut turns = 0u32;
-        // Acquire pairs with the release of the part before.
+        // Acquire pairs with the release of the previous part.
         while block.turn.compare_exchange_weak(due, due + 1, Ordering::Acquire, Ordering::Relaxed).is_err() {
             while block.turn.load(Ordering::Relaxed) != due {
                 turns += 1;
@@ -74,12 +74,12 @@ impl<'a, T> Runner<'a, T> {
 
 impl<T> Drop for Runner<'_, T> {
     fn drop(&mut self) {
-        // A part that panicked must not keep the others waiting.
+        // A part that panicked must not block the others.
         while self.next_block().is_some() {}
     }
 }
 
-/// A block while a part has it.
+/// A block held by a part.
 pub struct Turn<'a, T> {
     block: &'a Block<T>,
 }
@@ -87,7 +87,7 @@ pub struct Turn<'a, T> {
 impl<T> Deref for Turn<'_, T> {
     type Target = T;
     fn deref(&self) -> &T {
-        // SAFETY: `turn` is odd, and it was this one that made it so.
+        // SAFETY: `turn` is odd, and this guard made it so.
         unsafe { &*self.block.value.get() }
     }
 }
@@ -101,7 +101,7 @@ impl<T> DerefMut for Turn<'_, T> {
 
 impl<T> Drop for Turn<'_, T> {
     fn drop(&mut self) {
-        // Release: the next part sees what this one wrote.
+        // Release: the next part sees the writes of this one.
         self.block.turn.fetch_add(1, Ordering::Release);
     }
 }
@@ -120,7 +120,7 @@ mod tests {
                 relay.begin(Vec::clear);
                 workers.run(parts, &|part| {
                     let mut runner = relay.runner(part);
-                    // Some leave blocks out.
+                    // Some parts skip all blocks.
                     while let Some(mut block) = runner.next_block().filter(|_| part % 5 != 3) {
                         block.push(part);
                     }
@@ -146,7 +146,7 @@ mod tests {
             });
         });
         assert!(std::panic::catch_unwind(pass).is_err());
-        // Whoever panicked takes no more parts; with the others alive, all else is done.
+        // The thread that panicked runs no more parts; the others finish the rest.
         relay.begin(|block| assert_eq!(*block, 5));
     }
 }

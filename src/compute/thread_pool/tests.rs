@@ -44,7 +44,7 @@ fn a_panic_in_a_part_reaches_the_caller_and_the_pool_lives_on() {
     assert_eq!(sum.load(Ordering::Relaxed), 45);
 }
 
-/// What panics again when it is dropped.
+/// A value whose drop panics again.
 struct Bomb;
 
 impl Drop for Bomb {

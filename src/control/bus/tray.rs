@@ -1,5 +1,5 @@
-//! The icon in the desktop's tray: a StatusNotifierItem, by
-//! <https://www.freedesktop.org/wiki/Specifications/StatusNotifierItem/>. A click switches the camera off and on.
+//! The tray icon, a StatusNotifierItem (<https://www.freedesktop.org/wiki/Specifications/StatusNotifierItem/>). A click
+//! switches the camera off and on.
 
 use std::thread;
 
@@ -10,47 +10,47 @@ use zbus::zvariant::ObjectPath;
 use super::Camera;
 use crate::control::Request;
 
-/// Where trays look for items.
+/// The object path at which trays expect items.
 pub(super) const PATH: &str = "/StatusNotifierItem";
 const INTERFACE: &str = "org.kde.StatusNotifierItem";
-/// Who collects the items.
+/// The service that collects the items.
 const WATCHER: &str = "org.kde.StatusNotifierWatcher";
-/// Of the package, and of every icon theme.
+/// Icon names: `bokehcam` is installed with the package, the other one is in every icon theme.
 const ON: &str = "bokehcam";
 const OFF: &str = "camera-disabled-symbolic";
 
-/// The icon.
+/// The tray item.
 pub(super) struct Item(pub Camera);
 
-/// A picture: columns, rows, bytes. There are none: icons have names.
+/// A picture as width, height and bytes; always an empty list here, as icons are given by name.
 type Pixmap = (i32, i32, Vec<u8>);
 
 #[interface(name = "org.kde.StatusNotifierItem")]
 impl Item {
-    /// A click.
+    /// Handles a click.
     fn activate(&self, _x: i32, _y: i32) {
-        self.press();
+        self.toggle();
     }
 
-    /// A click with the middle button.
+    /// Handles a click with the middle button.
     fn secondary_activate(&self, _x: i32, _y: i32) {
-        self.press();
+        self.toggle();
     }
 
-    /// There is no menu.
+    /// Does nothing: there is no menu.
     fn context_menu(&self, _x: i32, _y: i32) {}
 
-    /// The next preset, or the one before.
+    /// Selects the next preset, or the previous one.
     fn scroll(&self, delta: i32, _orientation: &str) {
-        let seen = self.0.seen().clone();
-        let Some(count) = std::num::NonZeroUsize::new(seen.presets.len()) else { return };
-        let at = seen.presets.iter().position(|name| *name == seen.preset);
+        let state = self.0.state().clone();
+        let Some(count) = std::num::NonZeroUsize::new(state.presets.len()) else { return };
+        let at = state.presets.iter().position(|name| *name == state.preset);
         let next = match (at, delta > 0) {
             (None, _) => 0,
             (Some(at), true) => (at + count.get() - 1) % count,
             (Some(at), false) => (at + 1) % count,
         };
-        if let Err(error) = self.0.ask(Request::Preset { name: seen.presets[next].clone() }) {
+        if let Err(error) = self.0.send_request(Request::Preset { name: state.presets[next].clone() }) {
             tracing::warn!("{error}");
         }
     }
@@ -82,7 +82,7 @@ impl Item {
 
     #[zbus(property)]
     fn icon_name(&self) -> &str {
-        if self.0.seen().is_on { ON } else { OFF }
+        if self.0.state().is_on { ON } else { OFF }
     }
 
     #[zbus(property)]
@@ -90,13 +90,13 @@ impl Item {
         Vec::new()
     }
 
-    /// Icon, its pixmaps, title and text.
+    /// Returns icon, pixmaps, title and text.
     #[zbus(property)]
     fn tool_tip(&self) -> (String, Vec<Pixmap>, String, String) {
-        let seen = self.0.seen();
-        let is = if seen.is_on { "on; a click switches it off" } else { "off; a click switches it on" };
-        let look = if seen.preset.is_empty() { String::new() } else { format!(", {}", seen.preset) };
-        (String::new(), Vec::new(), format!("{}{look}", seen.source), format!("The camera is {is}"))
+        let state = self.0.state();
+        let is = if state.is_on { "on; a click switches it off" } else { "off; a click switches it on" };
+        let look = if state.preset.is_empty() { String::new() } else { format!(", {}", state.preset) };
+        (String::new(), Vec::new(), format!("{}{look}", state.source), format!("The camera is {is}"))
     }
 
     #[zbus(property)]
@@ -104,7 +104,7 @@ impl Item {
         false
     }
 
-    /// As trays know one that has none.
+    /// Returns the path that stands for "no menu".
     #[zbus(property)]
     fn menu(&self) -> ObjectPath<'_> {
         ObjectPath::from_static_str_unchecked("/NO_DBUSMENU")
@@ -112,22 +112,22 @@ impl Item {
 }
 
 impl Item {
-    fn press(&self) {
-        if let Err(error) = self.0.ask(Request::Toggle) {
+    fn toggle(&self) {
+        if let Err(error) = self.0.send_request(Request::Toggle) {
             tracing::warn!("{error}");
         }
     }
 }
 
-/// Tells trays to look again.
-pub(super) fn changed(bus: &Connection) -> zbus::Result<()> {
+/// Signals trays to reload the icon and its text.
+pub(super) fn emit_changed(bus: &Connection) -> zbus::Result<()> {
     for signal in ["NewIcon", "NewToolTip"] {
         bus.emit_signal(None::<&str>, PATH, INTERFACE, signal, &())?;
     }
     Ok(())
 }
 
-/// Tells the collector of the icon, and each later one, as desktops start theirs anew.
+/// Registers the icon with the watcher, and again with each later one, as desktops may restart theirs.
 pub(super) fn register(bus: &Connection) {
     let bus = bus.clone();
     let listen = move || {
@@ -142,19 +142,19 @@ pub(super) fn register(bus: &Connection) {
 
 fn keep_registered(bus: &Connection) -> zbus::Result<()> {
     let daemon = Proxy::new(bus, "org.freedesktop.DBus", "/org/freedesktop/DBus", "org.freedesktop.DBus")?;
-    // First of all, so that none is missed.
+    // Subscribe before the first registration, so that no new owner is missed.
     let owners = daemon.receive_signal_with_args("NameOwnerChanged", &[(0, WATCHER)])?;
-    tell(bus);
+    register_item(bus);
     for change in owners {
         let Ok((_, _, new)) = change.body().deserialize::<(String, String, String)>() else { continue };
         if !new.is_empty() {
-            tell(bus);
+            register_item(bus);
         }
     }
     Ok(())
 }
 
-fn tell(bus: &Connection) {
+fn register_item(bus: &Connection) {
     let own = bus.unique_name().map(|name| name.as_str().to_owned()).unwrap_or_default();
     let path = "/StatusNotifierWatcher";
     if let Err(error) = bus.call_method(Some(WATCHER), path, Some(WATCHER), "RegisterStatusNotifierItem", &own) {

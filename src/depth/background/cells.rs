@@ -1,19 +1,20 @@
-//! Where what is hidden may be seen: squares of the picture, beside those where as much is open.
+//! Square cells of the picture in which blur may reveal the hidden background: those near cells where the background is
+//! open.
 
 use std::ops::Range;
 
 use pulp::{Arch, WithSimd};
 
-use super::KNOWN;
+use super::MIN_ROUNDS;
 use crate::compute::bands::Bands;
 use crate::compute::thread_pool::{MOST_ITEMS, ThreadPool};
 use crate::frame::DepthMap;
 
-/// Side of a cell, and the step of the search in it, in pixels.
+/// Side of a cell, and the sampling step in it, in pixels.
 pub const CELL: usize = 16;
 const STEP: usize = 2;
 
-/// The squares of a picture.
+/// The cells of a picture.
 #[derive(Debug, Default)]
 pub struct Cells {
     cells: Vec<Cell>,
@@ -23,16 +24,16 @@ pub struct Cells {
 
 #[derive(Clone, Copy, Debug, Default)]
 struct Cell {
-    /// Whether anything in it hides what is known, and whether anything that is known is open.
+    /// Whether a known background is hidden, and whether one is visible, anywhere in the cell.
     hides: bool,
     open: bool,
-    /// Whether something open is near in its row, and whether in the picture.
+    /// Whether a cell with visible background is within the blur radius, along its row, and in two dimensions.
     beside: bool,
-    wanted: bool,
+    is_selected: bool,
 }
 
 impl Cells {
-    /// Looks at pixels of all cells. Returns the largest inverse depth of what hides anything.
+    /// Classifies all cells. Returns the largest inverse depth of the surfaces that hide a known background, in 1/m.
     pub fn survey(&mut self, workers: &mut ThreadPool, size: (usize, usize), known: &Known) -> f32 {
         let (width, height) = size;
         self.size = size;
@@ -48,25 +49,25 @@ impl Cells {
         nearest.into_iter().fold(0.0, f32::max)
     }
 
-    /// Wanted are cells that hide something, up to `reach_px` away from an open one.
-    pub fn spread(&mut self, reach_px: f32) {
-        let reach = (reach_px / CELL as f32).ceil() as usize;
+    /// Selects the cells within `radius_px`, rounded up to cells, of one with visible background.
+    pub fn spread(&mut self, radius_px: f32) {
+        let radius = (radius_px / CELL as f32).ceil() as usize;
         let across = self.size.0.div_ceil(CELL);
         let down = self.cells.len() / across;
         for row in 0..down {
-            self.walk(|k| row * across + k, across, reach, |cell| cell.open, |cell| &mut cell.beside);
+            self.mark_within(|k| row * across + k, across, radius, |cell| cell.open, |cell| &mut cell.beside);
         }
         for column in 0..across {
-            self.walk(|k| k * across + column, down, reach, |cell| cell.beside, |cell| &mut cell.wanted);
+            self.mark_within(|k| k * across + column, down, radius, |cell| cell.beside, |cell| &mut cell.is_selected);
         }
     }
 
-    /// Marks, of a line of `count` cells, those that are up to `reach` away from one that `is` something.
-    fn walk(
+    /// Marks the cells of a line that are up to `radius` away from one that satisfies `is`.
+    fn mark_within(
         &mut self,
         place: impl Fn(usize) -> usize,
         count: usize,
-        reach: usize,
+        radius: usize,
         is: impl Fn(&Cell) -> bool,
         mark: impl Fn(&mut Cell) -> &mut bool,
     ) {
@@ -75,22 +76,22 @@ impl Cells {
             for k in 0..count {
                 let cell = &mut self.cells[place(if back { count - 1 - k } else { k })];
                 since = if is(cell) { 0 } else { since + 1 };
-                *mark(cell) |= since <= reach;
+                *mark(cell) |= since <= radius;
             }
         }
     }
 
-    /// The columns of each wanted cell that row `y` of the picture goes through.
+    /// Iterates over the column ranges of the selected cells that row `y` of the picture crosses.
     #[inline(always)]
-    pub fn wanted_in(&self, y: usize) -> impl Iterator<Item = Range<usize>> {
+    pub fn selected_in(&self, y: usize) -> impl Iterator<Item = Range<usize>> {
         let (width, across) = (self.size.0, self.size.0.div_ceil(CELL));
         let cells = self.cells[y / CELL * across..][..across].iter().enumerate();
-        let wanted = cells.filter(|(_, cell)| cell.hides && cell.wanted);
-        wanted.map(move |(k, _)| k * CELL..((k + 1) * CELL).min(width))
+        let is_selected = cells.filter(|(_, cell)| cell.hides && cell.is_selected);
+        is_selected.map(move |(k, _)| k * CELL..((k + 1) * CELL).min(width))
     }
 }
 
-/// Looks at the cells of some rows; the largest inverse depth of what hides anything.
+/// Classifies the cells of some rows. Returns the largest inverse depth of what hides a known background.
 struct Survey<'a> {
     known: &'a Known<'a>,
     width: usize,
@@ -113,7 +114,7 @@ impl WithSimd for Survey<'_> {
                 let nearest = &mut nearest[..count];
                 let (mut is_hiding, mut is_open) = (0, 0);
                 for k in 0..count {
-                    let (inverse, hiding, open) = known.look(metres[k], rounds[k], inverse[k]);
+                    let (inverse, hiding, open) = known.classify(metres[k], rounds[k], inverse[k]);
                     let is_looked_at = u32::from(k % STEP == 0);
                     let hiding = hiding & is_looked_at;
                     is_hiding |= hiding;
@@ -129,30 +130,30 @@ impl WithSimd for Survey<'_> {
     }
 }
 
-/// What is remembered, and the map before it.
+/// The remembered background, and the map in front of it.
 #[derive(Clone, Copy)]
 pub struct Known<'a> {
-    /// Depth of the pixels of the map, in metres.
+    /// Depth of the map's pixels, in metres.
     pub metres: &'a [f32],
-    /// For how many rounds what is remembered was seen, and its inverse depth, in 1/m.
+    /// Number of rounds in which the background was seen, and its inverse depth, in 1/m.
     pub rounds: &'a [u8],
     pub inverse: &'a [f32],
-    /// Surfaces are another beyond this step of inverse depth, in 1/m.
+    /// Minimum step of inverse depth between different surfaces, in 1/m.
     pub other: f32,
 }
 
 impl<'a> Known<'a> {
-    /// Some pixels from `at` on: depth, rounds, and inverse depth that is remembered.
+    /// Returns `count` pixels from `at` on: depth, and of the background, rounds and inverse depth.
     #[inline(always)]
     pub fn pixels(&self, at: usize, count: usize) -> (&'a [f32], &'a [u8], &'a [f32]) {
         (&self.metres[at..][..count], &self.rounds[at..][..count], &self.inverse[at..][..count])
     }
 
-    /// The inverse depth of such a pixel, and where something is known behind it, whether it hides that or is open: 1, or else 0.
+    /// Returns a pixel's inverse depth, and whether it hides a known background, or shows it: 1 or 0.
     #[inline(always)]
-    pub fn look(&self, metres: f32, rounds: u8, inverse: f32) -> (f32, u32, u32) {
+    pub fn classify(&self, metres: f32, rounds: u8, inverse: f32) -> (f32, u32, u32) {
         let own = DepthMap::inverse_of(metres);
-        let (is_known, is_before) = (rounds >= KNOWN, own - inverse > self.other);
+        let (is_known, is_before) = (rounds >= MIN_ROUNDS, own - inverse > self.other);
         (own, u32::from(is_known & is_before), u32::from(is_known & !is_before))
     }
 }

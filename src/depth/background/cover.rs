@@ -1,7 +1,8 @@
-//! What stands before what is remembered.
+//! Tracks the surfaces in front of the remembered background.
 //!
-//! Behind the thing that was put before it first, what is remembered goes on. Behind a second one, nearer, is the first: what
-//! is remembered is then not what was seen last, and is forgotten at once.
+//! Behind the first surface that covers it, the background stays valid. If a second surface appears in front of the
+//! first, the first one is what lies behind it: the remembered background was not what was seen last, and is forgotten
+//! at once.
 
 use pulp::{Arch, WithSimd};
 
@@ -12,10 +13,10 @@ use crate::frame::{ColorImage, DepthMap};
 use crate::optics::DepthCoc;
 
 impl Background {
-    /// Looks at what stands before what is remembered, in every frame, before that is used: what is not behind it any more is
-    /// forgotten.
+    /// Updates the covering surfaces, in every frame before the background is used, and forgets pixels that are no
+    /// longer directly behind their covering surface.
     pub fn cover(&mut self, workers: &mut ThreadPool, (map, color): (&DepthMap, &ColorImage), lens: &DepthCoc) {
-        if map.size() != color.size() || !self.knows(color) {
+        if map.size() != color.size() || !self.is_usable_for(color) {
             return;
         }
         let (width, other) = (self.size.0, lens.inverse_depth_of_px(OTHER_PX));
@@ -29,19 +30,19 @@ impl Background {
             *forgets = Arch::new().dispatch(Cover { metres, inverse, rounds, cover, other });
         });
         if forgets.contains(&true) {
-            self.revise();
-            self.doubt(map, color, other);
+            self.assign_revision();
+            self.check_outlines(map, color, other);
         }
     }
 }
 
-/// Looks at some pixels; whether anything is forgotten.
+/// Updates some pixels. Returns whether any was forgotten.
 struct Cover<'a> {
     metres: &'a [f32],
-    /// What is remembered.
+    /// Inverse depth of the background, in 1/m.
     inverse: &'a [f32],
     rounds: &'a mut [u8],
-    /// Inverse depth of what hides it, in 1/m; 0 where nothing does.
+    /// Inverse depth of the covering surface, in 1/m; 0 without one.
     cover: &'a mut [f32],
     other: f32,
 }
@@ -56,7 +57,7 @@ impl WithSimd for Cover<'_> {
         for (&z_m, ((&inverse, rounds), cover)) in metres.iter().zip(remembered) {
             let own = DepthMap::inverse_of(z_m);
             let is_hidden = (*rounds > 0) & (own - inverse > other);
-            // What hides it may come nearer, step by step, and may go: what is behind that hides it, too.
+            // The covering surface may approach gradually, or leave: the one behind it then covers the background.
             let is_nearer = is_hidden & (*cover > 0.0) & (own - *cover > other);
             *cover = if is_hidden & !is_nearer { own } else { 0.0 };
             *rounds = if is_nearer { 0 } else { *rounds };

@@ -1,30 +1,31 @@
-//! What is seen beside outlines, and what it tells of what is remembered behind them.
+//! Checks the remembered background against what is seen beside outlines.
 //!
-//! Something may be put behind a subject, or change there, so that only a part of it is seen, beside the subject's outline.
-//! Where that is not what is remembered, what is remembered next to it is doubtful, and is forgotten: behind the subject, and
-//! behind that thing, too, or else what is behind the thing would show where the thing goes on.
+//! An object may be put behind a subject, or change there, so that only a part of it is visible, beside the subject's
+//! outline. If it differs from the remembered background, the background next to it is doubtful and is forgotten:
+//! behind the subject, and behind the object too, or else the old background would appear where the object continues
+//! behind the subject.
 
 use super::cells::CELL;
-use super::{Background, KNOWN};
+use super::{Background, MIN_ROUNDS};
 use crate::depth::reduced::block_px;
 use crate::frame::{ColorImage, DepthMap};
 
-/// Step of the search for outlines, in pixels.
+/// Sampling step of the search for outlines, in pixels.
 const STEP: usize = 2;
-/// What is seen beside an outline is looked for so far away from a pixel that hides something, and goes on for so much more,
-/// in pixels: closer by, camera and depth map mix both.
+/// Distance from a sampled pixel at which the surface beyond an outline is read, and the further distance over which it
+/// has to continue, in pixels: closer by, camera and depth map mix both surfaces.
 const BESIDE_PX: usize = 7;
 const GOES_ON_PX: usize = 3;
-/// An outline is a jump of so many of the steps by which surfaces are another: heads are round.
-const JUMP: f32 = 2.0;
+/// Minimum step at an outline, in units of the step between surfaces: heads are round.
+const MIN_STEP: f32 = 2.0;
 
-/// What is seen beside the outlines in a cell.
+/// Evidence about the background, from beside the outlines in a cell.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Witness {
-    /// How many places speak against what is remembered next to them, and how many for it.
+    /// Numbers of places that contradict the background next to them, and that agree with it.
     against: u16,
     agreeing: u16,
-    /// The inverse depths, least and largest, of what is remembered that they speak against, in 1/m.
+    /// Smallest and largest inverse depth of the contradicted background, in 1/m.
     least: f32,
     most: f32,
 }
@@ -37,29 +38,29 @@ impl Witness {
         self.against = self.against.saturating_add(1);
     }
 
-    /// Whether it speaks against what is remembered with this inverse depth.
+    /// Whether the evidence contradicts a background at this inverse depth.
     fn is_against(&self, inverse: f32) -> bool {
         self.against > self.agreeing && (self.least..=self.most).contains(&inverse)
     }
 }
 
 impl Background {
-    /// Forgets what is remembered next to outlines beside which something else is seen.
-    pub(super) fn doubt(&mut self, map: &DepthMap, color: &ColorImage, other: f32) {
+    /// Forgets the background next to outlines beside which something else is seen.
+    pub(super) fn check_outlines(&mut self, map: &DepthMap, color: &ColorImage, other: f32) {
         let (width, height) = self.size;
         let (across, down) = (width.div_ceil(CELL), height.div_ceil(CELL));
         let mut witnesses = std::mem::take(&mut self.witnesses);
         witnesses.clear();
         witnesses.resize(across * down, Witness::default());
-        let seen = Seen { memory: self, metres: &map.metres, other, block_px: block_px(color.width) };
+        let seen = Comparison { memory: self, metres: &map.metres, other, block_px: block_px(color.width) };
         for y in (0..height).step_by(STEP) {
             for x in (0..width).step_by(STEP) {
-                seen.ask((x, y), &mut witnesses[y / CELL * across + x / CELL]);
+                seen.collect_evidence((x, y), &mut witnesses[y / CELL * across + x / CELL]);
             }
         }
         let mut forgets = false;
         for (at, witness) in witnesses.iter().enumerate().filter(|(_, witness)| witness.against > witness.agreeing) {
-            // As far as blur reaches behind an outline.
+            // The neighbouring cells, too: as far as blur reveals.
             let around = |at: usize, most: usize| at.saturating_sub(1) * CELL..((at + 2) * CELL).min(most);
             for y in around(at / across, height) {
                 for at in around(at % across, width).map(|x| y * width + x) {
@@ -73,12 +74,12 @@ impl Background {
         }
         self.witnesses = witnesses;
         if forgets {
-            self.revise();
+            self.assign_revision();
         }
     }
 
-    /// Forgets surfaces that look otherwise than remembered, where hair and outlines are far.
-    pub(super) fn renew(&mut self, map: &DepthMap, color: &ColorImage, other: f32) {
+    /// Forgets visible surfaces whose colour has changed, away from hair and outlines.
+    pub(super) fn forget_changed(&mut self, map: &DepthMap, color: &ColorImage, other: f32) {
         let ((width, height), block_px) = (self.size, block_px(color.width));
         let across = width.div_ceil(block_px);
         for block in 0..self.unlike.len() {
@@ -88,6 +89,7 @@ impl Background {
             let (x, y) = (block % across * block_px, block / across * block_px);
             let (right, below) = ((x + CELL).min(width - 1), (y + CELL).min(height - 1));
             let around = [(x, y), (x.saturating_sub(CELL), y), (right, y), (x, y.saturating_sub(CELL)), (x, below)];
+            // Hair and outlines are where a neighbour hides the background.
             let is_open = |(x, y): (usize, usize)| {
                 let at = y * width + x;
                 DepthMap::inverse_of(map.metres[at]) - self.inverse[at] <= other
@@ -102,17 +104,17 @@ impl Background {
     }
 }
 
-/// What is seen, and what is remembered.
-struct Seen<'a> {
+/// The current depth map, and the background to check.
+struct Comparison<'a> {
     memory: &'a Background,
     metres: &'a [f32],
     other: f32,
     block_px: usize,
 }
 
-impl Seen<'_> {
-    /// Asks what is seen beside a pixel on each side that is beyond an outline, where the pixel is in front.
-    fn ask(&self, (x, y): (usize, usize), witness: &mut Witness) {
+impl Comparison<'_> {
+    /// Reads the surface beyond an outline on each side of a pixel in front, and adds the evidence to `witness`.
+    fn collect_evidence(&self, (x, y): (usize, usize), witness: &mut Witness) {
         let (width, height) = self.memory.size;
         let (at, other) = (y * width + x, self.other);
         let own = self.near(at);
@@ -123,17 +125,17 @@ impl Seen<'_> {
             };
             let Some((first, second)) = beside(BESIDE_PX).zip(beside(BESIDE_PX + GOES_ON_PX)) else { continue };
             let [near, further] = [first, second].map(|(x, y)| self.near(y * width + x));
-            if own - near <= JUMP * other || (near - further).abs() > other {
+            if own - near <= MIN_STEP * other || (near - further).abs() > other {
                 continue;
             }
-            let known = |at: usize| (self.memory.rounds[at] >= KNOWN).then(|| self.memory.inverse[at]);
+            let known = |at: usize| (self.memory.rounds[at] >= MIN_ROUNDS).then(|| self.memory.inverse[at]);
             let is_there = |inverse: f32| (near - inverse).abs() <= other;
             match () {
                 () if known(at).is_some_and(is_there) && self.looks_otherwise(second) => {
                     witness.contradict((near - other, near + other));
                 }
                 () if known(at).is_some_and(is_there) => witness.agreeing = witness.agreeing.saturating_add(1),
-                // It came there, as it hides something that was seen.
+                // The surface is new: it hides a background that was seen.
                 () if known(first.1 * width + first.0).is_some_and(|inverse| near - inverse > other) => {
                     witness.contradict((0.0, near - other));
                 }

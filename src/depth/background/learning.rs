@@ -1,42 +1,42 @@
-//! What a picture teaches: a block of pixels at a time, in vectors.
+//! Updates the background from a picture, a block of pixels at a time, vectorised.
 
 use std::ops::Range;
 
 use pulp::{Arch, WithSimd};
 
-use super::{Background, LESSONS};
+use super::{Background, FRAMES_PER_UPDATE};
 use crate::compute::bands::Bands;
 use crate::compute::thread_pool::ThreadPool;
 use crate::depth::bits::Bits;
 use crate::frame::{ColorImage, DepthMap};
 
-/// One row of so many of a lesson teaches.
+/// Interval of the rows that one update covers.
 const ROWS: usize = 2;
-/// No pixel is surer than after so many rounds.
-const SUREST: u8 = 250;
-/// From this many on its colour is looked at in one round of so many.
+/// Upper bound of the round counter.
+const MAX_ROUNDS: u8 = 250;
+/// Rounds from which on a pixel's colour is only updated in one round of `REFRESH_ROUNDS`.
 const SURE: u8 = 8;
-const REFRESH: usize = 4;
-/// What is hidden is surer by one round less in so many rounds.
-const FADES: usize = 2;
-/// Nothing is learned so close to another surface, in pixels: camera and depth map mix them there.
+const REFRESH_ROUNDS: usize = 4;
+/// Interval in rounds at which a hidden pixel's counter decreases by one.
+const FADE_ROUNDS: usize = 2;
+/// Minimum distance to another surface of an updated pixel, in pixels: camera and depth map mix both closer by.
 const CLEAR_PX: usize = 3;
-/// A change of more codes than this is another colour.
+/// Maximum change of a channel, in codes, that counts as noise.
 const CHANGED: i32 = 20;
-/// A new picture counts as one of so many.
+/// Length of the running average: a new value has weight `1 / MEMORY`.
 const MEMORY: i32 = 4;
-/// Pixels of a row that are looked at at once.
+/// Pixels of a row processed at once.
 const BLOCK: usize = 32;
 
-/// Numbers of a block, and with those beside it.
+/// One value per pixel of a block, and the same with its neighbours.
 type Lanes<T> = [T; BLOCK];
 type Wide = [f32; BLOCK + 2 * CLEAR_PX];
 
 impl Background {
-    /// Learns from the rows of a picture that are due. Surfaces are another beyond a step `other` of inverse depth.
+    /// Updates the background from the rows that are due. A step of inverse depth above `other` is another surface.
     pub(super) fn learn_rows(&mut self, workers: &mut ThreadPool, (map, color): (&DepthMap, &ColorImage), other: f32) {
-        let (size, lesson) = (self.size, self.frame / LESSONS);
-        self.revise();
+        let (size, lesson) = (self.size, self.frame / FRAMES_PER_UPDATE);
+        self.assign_revision();
         self.mixed.clear(size);
         for pixel in &map.matte.pixels {
             self.mixed.set(pixel.at as usize % size.0, pixel.at as usize / size.0);
@@ -51,19 +51,19 @@ impl Background {
     }
 }
 
-/// What is learned from.
+/// The input of an update.
 struct View<'a> {
     map: &'a DepthMap,
     color: &'a ColorImage,
     other: f32,
     mixed: &'a Bits,
-    /// What each code would have been when it was remembered, by channel.
+    /// Per code and channel, the code at the exposure of the remembered picture.
     codes: &'a [[u8; 256]; 3],
     size: (usize, usize),
     lesson: usize,
 }
 
-/// Learns from some rows.
+/// Updates some rows.
 struct Learn<'a> {
     view: &'a View<'a>,
     rows: Range<usize>,
@@ -90,13 +90,13 @@ impl WithSimd for Learn<'_> {
 }
 
 impl View<'_> {
-    /// Learns from a block from a pixel on.
+    /// Updates a block that begins at a pixel.
     #[inline(always)]
     fn learn(&self, (begin, y): (usize, usize), rgb: &mut [u8], inverse: &mut [f32], rounds: &mut [u8]) {
         let (other, count, at) = (self.other, rounds.len().min(BLOCK), y * self.size.0 + begin);
         let (inverse, rounds) = (&mut inverse[..count], &mut rounds[..count]);
         let round = self.lesson / ROWS;
-        let (fades, refreshes) = (round.is_multiple_of(FADES), (round + y).is_multiple_of(REFRESH));
+        let (fades, refreshes) = (round.is_multiple_of(FADE_ROUNDS), (round + y).is_multiple_of(REFRESH_ROUNDS));
         let (mut own, mut steps) = ([0.0; BLOCK], [0.0; BLOCK]);
         let metres = &self.map.metres[at..][..count];
         let (mut seen, mut is_hidden, mut is_sure) = ([0u32; BLOCK], [false; BLOCK], [true; BLOCK]);
@@ -109,7 +109,7 @@ impl View<'_> {
             is_sure[k] = (seen[k] >= u32::from(SURE)) & (steps[k] >= -other) & !refreshes;
             is_idle &= if is_hidden[k] { !fades } else { is_sure[k] };
         }
-        // Most of a picture is known, or hides it.
+        // Most blocks are well known, or hidden.
         if is_idle {
             return;
         }
@@ -122,7 +122,7 @@ impl View<'_> {
                 kept[p][k] = i32::from(rgb[3 * k + p]);
             }
         }
-        // Rounding takes turns, so that it evens out.
+        // The rounding offset rotates, so that rounding errors average out.
         let turn = i32::from(round as i16) % MEMORY;
         for k in 0..count {
             let apart = [now[0][k] - kept[0][k], now[1][k] - kept[1][k], now[2][k] - kept[2][k]];
@@ -135,7 +135,7 @@ impl View<'_> {
             }
             let nearer = if is_same { inverse[k] + steps[k] / MEMORY as f32 } else { own[k] };
             inverse[k] = if learns { nearer } else { inverse[k] };
-            let surer = if seen[k] < u32::from(SUREST) { seen[k] + 1 } else { u32::from(SUREST) };
+            let surer = if seen[k] < u32::from(MAX_ROUNDS) { seen[k] + 1 } else { u32::from(MAX_ROUNDS) };
             let surer = if is_same { surer } else { 1 };
             let fainter = seen[k] - u32::from(is_hidden[k] & fades);
             rounds[k] = if learns { surer } else { fainter } as u8;
@@ -147,7 +147,7 @@ impl View<'_> {
         }
     }
 
-    /// Which pixels of a block are clear of other surfaces; `own` is their inverse depth.
+    /// Returns which pixels of a block are clear of other surfaces; `own` is their inverse depth.
     #[inline(always)]
     fn clear(&self, (begin, y): (usize, usize), own: &Lanes<f32>, count: usize) -> Lanes<bool> {
         let ((width, height), metres, other) = (self.size, &self.map.metres, self.other);
@@ -155,7 +155,7 @@ impl View<'_> {
         let (top, bottom) = (y.saturating_sub(CLEAR_PX), (y + CLEAR_PX).min(height - 1));
         let mut mixed = 0;
         for y in top..=bottom {
-            mixed |= self.mixed.from(first, y);
+            mixed |= self.mixed.word_from(first, y);
         }
         mixed <<= first + CLEAR_PX - begin;
         let mut close = 0;

@@ -1,9 +1,9 @@
-//! What lies behind things, remembered from when it was seen.
+//! Background memory: colour and depth behind moving foreground, remembered from when they were visible.
 //!
-//! Whoever moves in front of a room uncovers some of it and covers it again: around their outline, where blur shows what is
-//! hidden, it was mostly seen a moment ago. Per pixel, the farthest surface that lasted is kept, colour and depth; it is
-//! known while it is seen or was seen often enough, and fades while it is hidden. What is not behind a thing any more, as
-//! something else was put between, is forgotten at once; and all is when the camera moves.
+//! A person who moves in a room uncovers and covers parts of it: around the outline, where blur reveals the background,
+//! it was mostly visible a moment ago. Per pixel, the farthest stable surface is kept, with colour and depth. It is
+//! known once it was seen often enough; its counter fades while it is hidden. A pixel is forgotten at once if something
+//! else was put between, and all are if the camera moves.
 
 mod cells;
 mod cover;
@@ -25,59 +25,59 @@ use super::reduced::{MOST, Reducer, block_px, reduced_size};
 use cells::Cells;
 use doubt::Witness;
 
-/// Surfaces are another where the CoC differs by so many pixels.
+/// Minimum difference of the CoC between different surfaces, in pixels.
 const OTHER_PX: f32 = 2.0 * FROM_PX;
-/// One frame of so many teaches.
-const LESSONS: usize = 4;
-/// A pixel is known that was seen in so many rounds, in each of which every row teaches once.
-const KNOWN: u8 = 2;
-/// A camera has moved that is off by so many pixels, or where more than this share of what is remembered looks otherwise,
-/// by more than so much of [`MOST`].
+/// Interval of the updates, in frames.
+const FRAMES_PER_UPDATE: usize = 4;
+/// Number of rounds from which on a pixel is known; each round updates every row once.
+const MIN_ROUNDS: u8 = 2;
+/// The camera counts as moved if the alignment is off by more than this, in pixels, or if a larger fraction of the
+/// remembered pixels differs by more than `UNLIKE` (of [`MOST`]).
 const MOVED_PX: f32 = 1.0;
-const UNLIKE_SHARE: f32 = 0.25;
+const MAX_UNLIKE: f32 = 0.25;
 const UNLIKE: f32 = 24.0;
-/// Nothing is learned from one for so long after.
-const REST_NS: u64 = 500_000_000;
-/// Frames further apart in time are of another place.
-const LONGEST_GAP_NS: u64 = 2_000_000_000;
+/// Time without updates after a camera movement.
+const PAUSE_NS: u64 = 500_000_000;
+/// Frames further apart in media time are unrelated: the memory starts anew.
+const MAX_GAP_NS: u64 = 2_000_000_000;
 
-/// A memory of what lies behind.
+/// A memory of the hidden background.
 #[derive(Debug)]
 pub struct Background {
     size: (usize, usize),
-    /// Per pixel: sRGB as the camera exposed at first, inverse depth in 1/m, and for how many rounds it was seen.
+    /// Per pixel: sRGB at the initial exposure, inverse depth in 1/m, and number of rounds in which it was seen.
     rgb: Vec<u8>,
     inverse: Vec<f32>,
     rounds: Vec<u8>,
-    /// Inverse depth of what hides it, in 1/m; 0 where nothing does.
+    /// Inverse depth of the covering surface, in 1/m; 0 without one.
     cover: Vec<f32>,
-    /// A number that these three have for themselves ([`Behind::revision`]).
+    /// A number unique to this content of the three ([`Behind::revision`]).
     revision: u64,
     frame: usize,
     time_ns: u64,
-    /// The camera moved before this time: nothing is learned until then.
+    /// Updates resume at this media time, after a camera movement.
     resumes_ns: u64,
-    /// What is remembered, in few pixels; whether each has any, and whether it cannot be compared with this frame.
+    /// The memory in reduced resolution; whether each pixel has a value, and whether it is excluded from the alignment.
     reduced: Vec<[f32; 3]>,
     has: Vec<bool>,
     hidden: Vec<bool>,
-    /// Whether it is seen, and looks otherwise than remembered.
+    /// Whether it is visible and looks different from the memory.
     unlike: Vec<bool>,
-    /// What is seen beside the outlines in each cell.
+    /// Evidence from beside the outlines, per cell.
     witnesses: Vec<Witness>,
     reducer: Reducer,
     now: Vec<[f32; 3]>,
     aligner: Aligner,
     gain: [f32; 3],
-    /// The light of each code that is remembered, by channel, as the camera exposes now.
+    /// Linear light of each remembered code, by channel, at the current exposure.
     light: Box<[[f32; 256]; 3]>,
     own_light: Box<[f32; 256]>,
-    /// What each code of now would have been at first, by channel.
+    /// Per current code and channel, the code at the initial exposure.
     codes: Box<[[u8; 256]; 3]>,
-    /// Pixels of the matte that is learned beside.
+    /// Mixed pixels of the current matte, beside which nothing is learned.
     mixed: Bits,
     cells: Cells,
-    /// What is revealed in each band.
+    /// The revealed pixels of each band.
     pixels: Vec<Vec<MixedPixel>>,
 }
 
@@ -113,8 +113,8 @@ impl Default for Background {
 }
 
 impl Background {
-    /// Learns from the picture taken at `time_ns` and its depth, without holes and with its matte, as far as `lens` tells
-    /// surfaces apart. A map of another size than its picture's teaches nothing.
+    /// Updates the memory from the picture at media time `time_ns` and its depth map, which has no holes and has its
+    /// matte. `lens` defines which surfaces differ. Resets the memory if the map and the picture differ in size.
     pub fn learn(
         &mut self,
         workers: &mut ThreadPool,
@@ -127,28 +127,28 @@ impl Background {
             self.size = (0, 0);
             return;
         }
-        let follows = (self.time_ns..=self.time_ns.saturating_add(LONGEST_GAP_NS)).contains(&time_ns);
+        let follows = (self.time_ns..=self.time_ns.saturating_add(MAX_GAP_NS)).contains(&time_ns);
         if self.size != size || !follows {
-            self.forget(size);
+            self.reset(size);
             self.resumes_ns = time_ns;
         }
         self.time_ns = time_ns;
         self.frame += 1;
-        if time_ns < self.resumes_ns || !self.frame.is_multiple_of(LESSONS) {
+        if time_ns < self.resumes_ns || !self.frame.is_multiple_of(FRAMES_PER_UPDATE) {
             return;
         }
         let other = lens.inverse_depth_of_px(OTHER_PX);
         if !self.align(map, color, other) {
-            self.forget(size);
-            self.resumes_ns = time_ns.saturating_add(REST_NS);
+            self.reset(size);
+            self.resumes_ns = time_ns.saturating_add(PAUSE_NS);
             return;
         }
         self.learn_rows(workers, (map, color), other);
-        self.doubt(map, color, other);
-        self.renew(map, color, other);
+        self.check_outlines(map, color, other);
+        self.forget_changed(map, color, other);
     }
 
-    /// Finds the matte of a picture by `matting`, before what is known to lie behind.
+    /// Finds the matte of a picture by `matting`, using the known background.
     pub fn find_matte(
         &self,
         matting: &mut Matting,
@@ -157,23 +157,23 @@ impl Background {
         lens: &DepthCoc,
     ) {
         let (jump, other) = [FROM_PX, OTHER_PX].map(|px| lens.inverse_depth_of_px(px)).into();
-        let behind = self.knows(color).then(|| self.seen(other));
+        let behind = self.is_usable_for(color).then(|| self.as_behind(other));
         matting.find_before(workers, (map, color), jump, behind.as_ref());
     }
 
-    /// Whether anything is known of pictures like this one.
-    fn knows(&self, color: &ColorImage) -> bool {
+    /// Whether the memory is usable for a picture of this size.
+    fn is_usable_for(&self, color: &ColorImage) -> bool {
         self.size == (color.width as usize, color.height as usize) && self.time_ns >= self.resumes_ns
     }
 
-    /// What is remembered, where surfaces are another beyond a step `other` of inverse depth, in 1/m.
-    fn seen(&self, other: f32) -> Behind<'_> {
+    /// Returns the remembered background, for surfaces that are more than `other` of inverse depth apart, in 1/m.
+    fn as_behind(&self, other: f32) -> Behind<'_> {
         let Self { rgb, inverse, rounds, light, revision, .. } = self;
-        Behind { rgb, inverse, rounds, known: KNOWN, light, other, revision: *revision }
+        Behind { rgb, inverse, rounds, known: MIN_ROUNDS, light, other, revision: *revision }
     }
 
-    /// Starts anew.
-    fn forget(&mut self, size: (usize, usize)) {
+    /// Resets the memory.
+    fn reset(&mut self, size: (usize, usize)) {
         let count = size.0 * size.1;
         self.size = size;
         self.rgb.resize(3 * count, 0);
@@ -184,16 +184,16 @@ impl Background {
         self.cover.resize(count, 0.0);
         self.reduced.clear();
         self.gain = [1.0; 3];
-        self.revise();
+        self.assign_revision();
     }
 
-    /// What is remembered changes.
-    fn revise(&mut self) {
+    /// Assigns a new revision, since the content changes.
+    fn assign_revision(&mut self) {
         static REVISIONS: AtomicU64 = AtomicU64::new(1);
         self.revision = REVISIONS.fetch_add(1, Ordering::Relaxed);
     }
 
-    /// Finds how the camera exposes now. Whether it stands where it stood.
+    /// Estimates the current exposure, and returns whether the camera has stayed in place.
     fn align(&mut self, map: &DepthMap, color: &ColorImage, other: f32) -> bool {
         let size = reduced_size(color);
         let block_px = block_px(color.width);
@@ -212,16 +212,17 @@ impl Background {
             for column in 0..size.0 {
                 let (at, place) =
                     (row * size.0 + column, middle(row, self.size.1) * self.size.0 + middle(column, self.size.0));
-                let is_known = rounds[place] >= KNOWN;
+                let is_known = rounds[place] >= MIN_ROUNDS;
                 let is_seen = is_known && (DepthMap::inverse_of(map.metres[place]) - inverse[place]).abs() <= other;
                 hidden[at] = !(is_seen && has[at]);
                 if is_seen && !has[at] {
-                    // What was learned is as the camera exposed at first.
+                    // Remembered values are at the initial exposure.
                     (reduced[at], has[at]) = (std::array::from_fn(|p| now[at][p] / self.gain[p]), true);
                     self.aligner.forget();
                 }
             }
         }
+        // Exposure changes are estimated as a gain per channel, from the visible background only.
         let mut alignment = Alignment { gain: self.gain, ..Alignment::default() };
         self.aligner.shift(reduced, size, [0.0; 2]);
         self.aligner.step(now, hidden, size, &mut alignment);
@@ -238,6 +239,6 @@ impl Background {
             counts[usize::from(is_unlike)] += usize::from(!hidden);
         }
         let [x, y] = alignment.shift.map(|shift| shift * block_px as f32);
-        x.hypot(y) <= MOVED_PX && counts[1] as f32 <= UNLIKE_SHARE * (counts[0] + counts[1]) as f32
+        x.hypot(y) <= MOVED_PX && counts[1] as f32 <= MAX_UNLIKE * (counts[0] + counts[1]) as f32
     }
 }

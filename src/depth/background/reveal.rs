@@ -1,4 +1,4 @@
-//! What the pixels of a map hide, as far as that is remembered and may be seen.
+//! Adds the remembered background to the pixels that hide it, where blur may reveal it.
 
 use std::ops::Range;
 
@@ -13,10 +13,10 @@ use crate::frame::{ColorImage, DepthMap, Matte, MixedPixel};
 use crate::optics::DepthCoc;
 
 impl Background {
-    /// Gives the pixels of a map that hide something remembered, as far as blur can show it, what that is.
+    /// Adds the hidden background to the matte of a map, for pixels within the blur radius of a visible background.
     pub fn reveal(&mut self, workers: &mut ThreadPool, map: &mut DepthMap, color: &ColorImage, lens: &DepthCoc) {
         let size = self.size;
-        if map.size() != color.size() || !self.knows(color) {
+        if map.size() != color.size() || !self.is_usable_for(color) {
             return;
         }
         let mut cells = std::mem::take(&mut self.cells);
@@ -31,7 +31,7 @@ impl Background {
         workers.run_each(bands.rows().zip(&mut pixels), &|(rows, pixels)| {
             Arch::new().dispatch(Reveal { background: self, map, color, known: &known, rows, pixels });
         });
-        // The first band's are taken, not copied.
+        // The first band's vector is moved, not copied.
         if let Some((first, others)) = pixels.split_first_mut() {
             std::mem::swap(&mut map.matte.pixels, first);
             others.iter().for_each(|pixels| map.matte.pixels.extend_from_slice(pixels));
@@ -42,7 +42,7 @@ impl Background {
         self.pixels = pixels;
     }
 
-    /// A pixel at `metres` and what it hides.
+    /// Creates the matte entry of a pixel at `metres` that hides a known background.
     #[inline(always)]
     fn behind(&self, at: usize, metres: f32, rgb: &[u8]) -> MixedPixel {
         let (light, own) = (light_at(&self.rgb, &self.light, at), &rgb[3 * at..][..3]);
@@ -55,7 +55,7 @@ impl Background {
     }
 }
 
-/// Finds the mixed pixels of some rows, and what the others of them hide.
+/// Merges the mixed pixels of some rows with the pixels that hide a background.
 struct Reveal<'a> {
     background: &'a Background,
     map: &'a DepthMap,
@@ -74,14 +74,14 @@ impl WithSimd for Reveal<'_> {
         pixels.clear();
         let mut mixed = map.matte.within(rows.start * width..rows.end * width);
         for y in rows {
-            for columns in background.cells.wanted_in(y) {
+            for columns in background.cells.selected_in(y) {
                 let (first, end) = (y * width + columns.start, y * width + columns.end);
                 pixels.extend_from_slice(take_before(&mut mixed, first));
                 let (metres, rounds, inverse) = known.pixels(first, columns.len());
                 let mut is_hiding = [0; CELL];
                 let hiding = &mut is_hiding[..columns.len()];
                 for k in 0..hiding.len() {
-                    hiding[k] = known.look(metres[k], rounds[k], inverse[k]).1;
+                    hiding[k] = known.classify(metres[k], rounds[k], inverse[k]).1;
                 }
                 let mut here = take_before(&mut mixed, end).iter().peekable();
                 for (k, hides) in hiding.iter().enumerate() {
@@ -98,7 +98,7 @@ impl WithSimd for Reveal<'_> {
     }
 }
 
-/// Takes those pixels away that come before one.
+/// Splits off the pixels before index `at`.
 #[inline(always)]
 fn take_before<'a>(pixels: &mut &'a [MixedPixel], at: usize) -> &'a [MixedPixel] {
     let mut count = 0;

@@ -1,26 +1,27 @@
-//! Which of the subjects that are found from map to map is meant: the lens stays with one while others come and go.
+//! Temporal hysteresis of the subject: the lens stays with one subject while others come and go.
 
-/// Two distances this close together, in dioptres, are of one subject; and how fast it may move, in dioptres a second.
+/// Maximum distance between two measurements of one subject at rest, in dioptres, and its maximum speed, in dioptres a
+/// second.
 const SAME: f32 = 0.12;
 const SPEED: f32 = 2.0;
-/// Time in which it moves, at most: after a longer gap nobody knows which of two is the one of before.
-const LONGEST_S: f32 = 0.1;
-/// Another subject is turned to once it was there for so long, and in so many maps one after the other: neither who passes by is
-/// meant, nor what a single map shows.
-const PATIENCE_NS: u64 = 400_000_000;
-const LEAST_MAPS: u32 = 3;
+/// Upper bound of the time for which motion is assumed: after a longer gap, two subjects could not be told apart.
+const MAX_GAP_S: f32 = 0.1;
+/// Another subject is chosen after this time and this number of consecutive maps, so that neither a passer-by nor a
+/// single bad map moves the focus.
+const MIN_DURATION_NS: u64 = 400_000_000;
+const MIN_MAPS: u32 = 3;
 
-/// How far a subject may have moved between two times, in dioptres.
+/// Returns how far a subject may have moved between two times, in dioptres.
 pub fn tolerance(from_ns: u64, to_ns: u64) -> f32 {
     let elapsed_s = to_ns.saturating_sub(from_ns) as f32 / 1e9;
-    SAME + SPEED * elapsed_s.min(LONGEST_S)
+    SAME + SPEED * elapsed_s.min(MAX_GAP_S)
 }
 
-/// Stays with a subject.
+/// The hysteresis' state: the current subject and its rival.
 #[derive(Debug, Default)]
-pub struct Loyalty {
+pub struct Hysteresis {
     subject: Option<Seen>,
-    /// Another one, since the subject was last found.
+    /// Another subject, found since the current one was last found.
     rival: Option<Seen>,
 }
 
@@ -28,7 +29,7 @@ pub struct Loyalty {
 struct Seen {
     dioptres: f32,
     time_ns: u64,
-    /// When it cannot have been there yet, and in how many maps it was found.
+    /// The last time it was not found, and the number of maps in which it was.
     since_ns: u64,
     maps: u32,
 }
@@ -38,14 +39,14 @@ impl Seen {
         (dioptres - self.dioptres).abs() <= tolerance(self.time_ns, time_ns)
     }
 
-    fn again(self, dioptres: f32, time_ns: u64) -> Self {
+    fn update(self, dioptres: f32, time_ns: u64) -> Self {
         Self { dioptres, time_ns, maps: self.maps.saturating_add(1), ..self }
     }
 }
 
-impl Loyalty {
-    /// The distance to focus on, in dioptres, where a map has the subject that would be chosen without a memory at `found`.
-    /// `stays` tells where something still is near a distance.
+impl Hysteresis {
+    /// Returns the distance to focus on, in dioptres, given the subject `found` in a map without memory. `stays`
+    /// returns the distance of a remaining subject near a given one, if there is any.
     pub fn choose(&mut self, found: f32, stays: impl Fn(f32) -> Option<f32>, time_ns: u64) -> f32 {
         let new = |since_ns| Seen { dioptres: found, time_ns, since_ns, maps: 1 };
         let Some(subject) = self.subject else {
@@ -53,21 +54,21 @@ impl Loyalty {
             return found;
         };
         if subject.is_same(found, time_ns) {
-            (self.subject, self.rival) = (Some(subject.again(found, time_ns)), None);
+            (self.subject, self.rival) = (Some(subject.update(found, time_ns)), None);
             return found;
         }
         let rival = self.rival.filter(|rival| rival.is_same(found, time_ns));
-        let rival = rival.map_or_else(|| new(subject.time_ns), |rival| rival.again(found, time_ns));
-        let has_stayed = rival.maps >= LEAST_MAPS && time_ns.saturating_sub(rival.since_ns) >= PATIENCE_NS;
-        // The first maps may be bad as well.
-        let outvotes = subject.maps < LEAST_MAPS && rival.maps > subject.maps;
+        let rival = rival.map_or_else(|| new(subject.time_ns), |rival| rival.update(found, time_ns));
+        let has_stayed = rival.maps >= MIN_MAPS && time_ns.saturating_sub(rival.since_ns) >= MIN_DURATION_NS;
+        // A subject from the first maps may itself be an error.
+        let outvotes = subject.maps < MIN_MAPS && rival.maps > subject.maps;
         if has_stayed || outvotes {
             (self.subject, self.rival) = (Some(rival), None);
             return found;
         }
         self.rival = Some(rival);
         let dioptres = stays(subject.dioptres).filter(|&dioptres| subject.is_same(dioptres, time_ns));
-        // Time in which it was not seen is none in which it could move unseen.
+        // The time while it was not found does not widen the tolerance.
         let now = Seen { dioptres: dioptres.unwrap_or(subject.dioptres), time_ns, ..subject };
         self.subject = Some(now);
         now.dioptres
@@ -80,10 +81,10 @@ mod tests {
 
     const MS: u64 = 1_000_000;
 
-    /// The distances chosen where these are found, one map every `step_ms`; all of them are there all the time.
+    /// Returns the distances chosen for these found ones, one map every `step_ms`; all of them remain present.
     fn chosen(found: &[f32], step_ms: u64) -> Vec<f32> {
-        let mut loyalty = Loyalty::default();
-        let mut choose = |(map, &found): (u64, &f32)| loyalty.choose(found, Some, map * step_ms * MS);
+        let mut hysteresis = Hysteresis::default();
+        let mut choose = |(map, &found): (u64, &f32)| hysteresis.choose(found, Some, map * step_ms * MS);
         (0..).zip(found).map(&mut choose).collect()
     }
 

@@ -1,7 +1,6 @@
-//! Where the lens is focused: at a distance, at the nearest large subject, at a point of the picture, or at the thing that was
-//! there.
+//! Focus distance: fixed, on the nearest large subject, at a point of the picture, or on an object that is tracked.
 //!
-//! The focus moves like a lens, in dioptres (1/m): it eases towards its target and does not follow small changes.
+//! The focus moves like a lens, in dioptres (1/m): it eases towards its target and ignores small changes.
 
 mod loyalty;
 mod persons;
@@ -11,7 +10,7 @@ mod track;
 use std::fmt;
 use std::str::FromStr;
 
-use loyalty::Loyalty;
+use loyalty::Hysteresis;
 pub use persons::{OnPersons, Persons};
 use subject::Subject;
 use track::Track;
@@ -23,7 +22,7 @@ use crate::frame::DepthMap;
 pub enum FocusRule {
     /// A distance in metres, > 0.
     Metres(f32),
-    /// Whom a mask shows; where there is nobody, or no mask, the nearest subject that is large enough to be meant.
+    /// The person that a mask shows; without one, the nearest large subject.
     Auto,
     /// A point, as fractions of width and height (0 to 1).
     Point {
@@ -32,7 +31,7 @@ pub enum FocusRule {
         /// Fraction of the height, from the top.
         y: f32,
     },
-    /// The thing at a point, as fractions of width and height (0 to 1), wherever it goes from there.
+    /// The object at a point, as fractions of width and height (0 to 1), which is tracked from there.
     Track {
         /// Fraction of the width, from the left.
         x: f32,
@@ -41,7 +40,7 @@ pub enum FocusRule {
     },
 }
 
-/// Before the point of a thing that is tracked.
+/// Prefix of the point of a tracked object.
 const TRACK: &str = "track:";
 
 impl FromStr for FocusRule {
@@ -72,20 +71,21 @@ impl fmt::Display for FocusRule {
     }
 }
 
-/// Used when nothing was ever known to focus on: the distance of somebody at a desk.
+/// Focus distance before any depth is known: a person at a desk.
 const FALLBACK_M: f32 = 1.0;
-/// Time in which the focus covers 63 % of its way.
+/// Time constant of the exponential easing, which covers 63 % of the way.
 const TIME_CONSTANT_S: f64 = 0.25;
-/// Relative change of the target that sets a resting focus moving, and the distance at which it rests again.
+/// Hysteresis, as a relative change of the target: a resting focus starts to move above `START`, and rests below
+/// `STOP`.
 const START: f32 = 0.03;
 const STOP: f32 = 0.005;
 
-/// The focus from frame to frame: a function of the depth maps and their media times alone.
+/// The focus from frame to frame: a function of the depth maps and their media times only.
 #[derive(Debug)]
 pub struct Focus {
     rule: FocusRule,
     subject: Subject,
-    loyalty: Loyalty,
+    hysteresis: Hysteresis,
     track: Option<Track>,
     window_m: Vec<f32>,
     lens: Option<EasedLens>,
@@ -99,32 +99,32 @@ struct EasedLens {
 }
 
 impl Focus {
-    /// A lens that was not focused yet: the first frame sets it at once.
+    /// Creates a focus whose first frame sets the distance at once.
     pub fn new(rule: FocusRule) -> Self {
-        let (subject, loyalty) = (Subject::default(), Loyalty::default());
-        Self { rule, subject, loyalty, track: None, window_m: Vec::new(), lens: None }
+        let (subject, hysteresis) = (Subject::default(), Hysteresis::default());
+        Self { rule, subject, hysteresis, track: None, window_m: Vec::new(), lens: None }
     }
 
-    /// Focuses on something else: the lens moves there from where it is.
+    /// Changes the rule: the lens moves from where it is.
     pub fn follow(&mut self, rule: FocusRule) {
         if self.rule != rule {
             self.rule = rule;
-            (self.loyalty, self.track) = (Loyalty::default(), None);
+            (self.hysteresis, self.track) = (Hysteresis::default(), None);
             self.lens.iter_mut().for_each(|lens| lens.moving = true);
         }
     }
 
-    /// The focus distance in metres for a frame at `time_ns` of media time, from its depth as measured (not filled).
-    /// Where the map knows nothing of the subject, the lens stays where it is.
+    /// Returns the focus distance in metres for a frame at media time `time_ns`, from its measured depth (holes not
+    /// filled). If the map does not contain the subject, the lens stays where it is.
     pub fn focus_m(&mut self, map: &DepthMap, time_ns: u64) -> f32 {
         let target_m = match self.rule {
             FocusRule::Metres(focus_m) => Some(focus_m),
             FocusRule::Auto if map.subject_m.is_some() => map.subject_m,
             FocusRule::Auto => {
-                let Self { subject, loyalty, .. } = self;
+                let Self { subject, hysteresis, .. } = self;
                 let nearest = subject.find(map);
                 let found = map.person_m.map(f32::recip).or(nearest);
-                found.map(|found| 1.0 / loyalty.choose(found, |dioptres| subject.stays(dioptres), time_ns))
+                found.map(|found| 1.0 / hysteresis.choose(found, |dioptres| subject.stays(dioptres), time_ns))
             }
             FocusRule::Track { x, y } => {
                 let track = self.track.get_or_insert_with(|| Track::new([x, y]));
@@ -138,7 +138,7 @@ impl Focus {
         let target = 1.0 / target_m;
         let lens = self.lens.get_or_insert(EasedLens { dioptres: target, time_ns, moving: false });
         lens.ease(target, time_ns);
-        // A distance that was asked for is kept to the last bit.
+        // A fixed distance is returned exactly.
         if lens.dioptres == target { target_m } else { 1.0 / lens.dioptres }
     }
 }
@@ -150,13 +150,13 @@ impl EasedLens {
         let off = (target - self.dioptres).abs() / target;
         self.moving = off > if self.moving { STOP } else { START };
         if self.moving {
-            let share = 1.0 - (-elapsed_s / TIME_CONSTANT_S).exp();
-            self.dioptres += (target - self.dioptres) * share as f32;
+            let fraction = 1.0 - (-elapsed_s / TIME_CONSTANT_S).exp();
+            self.dioptres += (target - self.dioptres) * fraction as f32;
         }
     }
 }
 
-/// Median of the known depths in a small window around a point; the window grows until it holds some.
+/// Returns the median of the known depths in a small window around a point, which grows until it contains some.
 fn point_m(map: &DepthMap, x: f32, y: f32, window_m: &mut Vec<f32>) -> Option<f32> {
     let (width, height) = (map.width as usize, map.height as usize);
     if width == 0 || height == 0 {
@@ -164,11 +164,11 @@ fn point_m(map: &DepthMap, x: f32, y: f32, window_m: &mut Vec<f32>) -> Option<f3
     }
     let at = |fraction: f32, size: usize| ((fraction * size as f32) as usize).min(size - 1);
     let (x_px, y_px) = (at(x, width), at(y, height));
-    let mut reach_px = (width.min(height) / 50).max(2);
+    let mut radius_px = (width.min(height) / 50).max(2);
     loop {
         window_m.clear();
-        let columns = x_px.saturating_sub(reach_px)..(x_px + reach_px + 1).min(width);
-        for row in y_px.saturating_sub(reach_px)..(y_px + reach_px + 1).min(height) {
+        let columns = x_px.saturating_sub(radius_px)..(x_px + radius_px + 1).min(width);
+        for row in y_px.saturating_sub(radius_px)..(y_px + radius_px + 1).min(height) {
             let row = &map.metres[row * width..][columns.clone()];
             window_m.extend(row.iter().copied().filter(|&z_m| DepthMap::is_known(z_m)));
         }
@@ -176,10 +176,10 @@ fn point_m(map: &DepthMap, x: f32, y: f32, window_m: &mut Vec<f32>) -> Option<f3
             let middle = window_m.len() / 2;
             return Some(*window_m.select_nth_unstable_by(middle, f32::total_cmp).1);
         }
-        if reach_px >= width.max(height) {
+        if radius_px >= width.max(height) {
             return None;
         }
-        reach_px *= 2;
+        radius_px *= 2;
     }
 }
 
@@ -193,7 +193,7 @@ mod tests {
         DepthMap { width: 8, height: 8, metres: vec![metres; 64], ..DepthMap::default() }
     }
 
-    /// Somebody at 1 m over so many of 64 columns, and the room at 3 m.
+    /// A person at 1 m over `columns` of 64 columns, and the room at 3 m.
     fn beside(columns: usize) -> DepthMap {
         let metres = (0..64 * 64).map(|k| if k % 64 < columns { 1.0 } else { 3.0 });
         DepthMap { width: 64, height: 64, metres: metres.collect(), ..DepthMap::default() }
@@ -205,7 +205,7 @@ mod tests {
         let found = |columns| 1.0 / Subject::default().find(&beside(columns)).unwrap();
         assert!(found(16) < 1.1 && found(9) > 2.9, "large enough, and not");
         for frame in 0..300u64 {
-            // Now large enough, now not, for a few frames each.
+            // Alternates between large enough and too small, every few frames.
             let columns = if frame % 7 < 3 { 16 } else { 9 };
             let focus_m = focus.focus_m(&beside(columns), frame * FRAME_NS);
             assert!((focus_m - 1.0).abs() < 0.02, "{frame}: {focus_m}");
@@ -222,7 +222,7 @@ mod tests {
         assert!((400_000_000..600_000_000).contains(&turned), "{turned}");
         let settled_m = (200..300u64).map(|k| focus.focus_m(&flat(3.0), k * FRAME_NS)).last().unwrap();
         assert!((settled_m - 3.0).abs() < 0.03, "{settled_m}");
-        // From 3 m to 1 m in a second: never more than what the lens' own inertia makes of it.
+        // From 3 m to 1 m in a second: the error stays within the lens' own lag.
         for k in 0..30u64 {
             let at_m = 3.0 / (1.0 + 2.0 * k as f32 / 30.0);
             let focus_m = focus.focus_m(&flat(at_m), (300 + k) * FRAME_NS);

@@ -1,63 +1,64 @@
-//! Measured depth in which a person is the subject, whatever else is near: a network says where persons are.
+//! Focus on persons in measured depth: a network finds them, whatever else is nearer.
 
 use crate::depth::dilation::dilate;
 use crate::depth::plate::Companion;
 use crate::depth::{DepthError, DepthSource, Seen};
 use crate::frame::{ColorImage, DepthMap, Mask};
 
-/// A person is looked for so often, in nanoseconds of media time: the depth between is that of whoever is there by then.
+/// Interval of the person detection in media time; in between, the last mask is used on the new maps.
 const EVERY_NS: u64 = 200_000_000;
-/// Share of the picture that is somebody's, at least: less is a face on a poster, or a mistake.
-const LEAST_SHARE: f32 = 0.01;
-/// Where a mask is this sure, no room is seen beside a person.
+/// Minimum fraction of the mask that makes a person: less is a face on a poster, or an error.
+const MIN_FRACTION: f32 = 0.01;
+/// Minimum mask value of pixels that surely show the person and not the room.
 const SURE: f32 = 0.9;
-/// So much of the height, from the top of each column of a mask, is head and shoulders: below, masks of persons have what they hold,
-/// and what stands before them.
+/// Height of head and shoulders, from the top of each column of the mask, as a fraction of its height: further below,
+/// masks include held objects, and objects in front of the person.
 const HEAD: f32 = 1.0 / 6.0;
-/// A head and shoulders are within so many dioptres: a quarter of a metre at one.
+/// Depth range of head and shoulders, in dioptres: 25 cm at 1 m.
 const BODY: f32 = 0.25;
-/// What is so much farther than who it is part of was matched wrongly, as a knitted pullover is with itself.
+/// Depth beyond the person's by this factor is a mismatch, as on the repetitive texture of a knitted pullover.
 const TOO_FAR: f32 = 1.25;
-/// Share of a row within an outline that has their distance, at least: masks of persons have other things as well.
+/// Minimum fraction of a row within the outline at the person's distance: masks include other objects as well.
 const THEIRS: f32 = 0.4;
-/// Outlines of masks are this uncertain, in pixels of theirs.
+/// Uncertainty of mask outlines, in mask pixels.
 const OUTLINE_PX: usize = 2;
 
-/// Finds how far persons are in maps.
+/// Measures the distance of persons in depth maps.
 pub struct Persons {
     finder: Box<dyn Companion>,
     last_ns: Option<u64>,
     /// Columns and rows of the mask.
     size: (usize, usize),
-    /// The pixels of the mask that are their heads and shoulders; none while there is nobody.
+    /// Mask pixels of heads and shoulders; empty if there is no person.
     places: Vec<u32>,
-    /// Where the mask is not sure; for mending, with the outlines.
+    /// Whether a mask pixel is not sure; dilated by [`Self::mend`].
     outside: Vec<bool>,
     line: Vec<bool>,
     dioptres: Vec<f32>,
 }
 
 impl Persons {
-    /// Those whom `finder` finds in the pictures.
+    /// Creates it for the persons that `finder` detects.
     pub fn new(finder: Box<dyn Companion>) -> Self {
         let (places, outside, line) = (Vec::new(), Vec::new(), Vec::new());
         Self { finder, last_ns: None, size: (0, 0), places, outside, line, dioptres: Vec::new() }
     }
 
-    /// Gives the map of the frame `seen` the distance of the person in it ([`DepthMap::person_m`]).
+    /// Sets [`DepthMap::person_m`], the person's distance in the frame `seen`.
     pub fn mark(&mut self, seen: Seen, map: &mut DepthMap) {
         let time_ns = seen.stamp.time_ns;
         if self.last_ns.is_none_or(|last_ns| time_ns.abs_diff(last_ns) >= EVERY_NS) {
             self.last_ns = Some(time_ns);
-            self.look(seen);
+            self.detect(seen);
         }
         map.person_m = self.distance_m(map);
     }
 
-    /// The same for a map that was matched, which has holes in persons: what is far behind a person, or not known, within their outlines
-    /// in this very frame, gets their distance where enough beside it has.
+    /// Sets [`DepthMap::person_m`] like [`Self::mark`], and repairs stereo mismatches: within the outline in this
+    /// frame, depth that is unknown or far behind the person is set to the person's distance, in rows where enough has
+    /// it.
     pub fn mend(&mut self, seen: Seen, map: &mut DepthMap) {
-        self.look(seen);
+        self.detect(seen);
         map.person_m = self.distance_m(map);
         let Some(person_m) = map.person_m else { return };
         let (columns, rows) = self.size;
@@ -69,6 +70,7 @@ impl Persons {
             let mut from = 0;
             while from < width {
                 let is_inside = |x: usize| !outside[x * columns / width];
+                // The next run of pixels inside the outline, or outside of it.
                 let run = (from..width).take_while(|&x| is_inside(x) == is_inside(from)).count();
                 let pixels = &mut row[from..from + run];
                 let theirs = pixels.iter().filter(|&&metres| is_theirs(metres)).count();
@@ -83,7 +85,7 @@ impl Persons {
         }
     }
 
-    fn look(&mut self, seen: Seen) {
+    fn detect(&mut self, seen: Seen) {
         self.places.clear();
         let Some(Mask { width, height, share }) = self.finder.persons(seen) else { return };
         let (columns, rows) = (*width as usize, *height as usize);
@@ -96,12 +98,13 @@ impl Persons {
         }
         self.outside.clear();
         self.outside.extend(share.iter().map(|&share| share < SURE));
-        if (self.places.len() as f32) < LEAST_SHARE * share.len() as f32 {
+        if (self.places.len() as f32) < MIN_FRACTION * share.len() as f32 {
             self.places.clear();
         }
     }
 
-    /// How far most of their heads and shoulders are in a map, in metres; who is nearest has most.
+    /// Returns the distance of most head and shoulder pixels, in metres: the densest range of [`BODY`] dioptres. The
+    /// nearest person has the most pixels.
     fn distance_m(&mut self, map: &DepthMap) -> Option<f32> {
         let Self { size: (columns, rows), places, dioptres, .. } = self;
         let within = |at: usize, of: usize, size: u32| (2 * at + 1) * size as usize / (2 * of);
@@ -112,6 +115,7 @@ impl Persons {
         dioptres.clear();
         dioptres.extend(metres.filter(|&metres| DepthMap::is_known(metres)).map(f32::recip));
         dioptres.sort_unstable_by(f32::total_cmp);
+        // A sliding window over the sorted values.
         let (mut from, mut most) = (0, 0..0);
         for to in 1..=dioptres.len() {
             while dioptres[to - 1] - dioptres[from] > BODY {
@@ -125,7 +129,7 @@ impl Persons {
     }
 }
 
-/// A source of depth whose maps have the distance of the person.
+/// A depth source that adds the person's distance to the maps of another one.
 pub struct OnPersons {
     depth: Box<dyn DepthSource>,
     persons: Persons,
@@ -134,7 +138,8 @@ pub struct OnPersons {
 }
 
 impl OnPersons {
-    /// The maps of `depth`, and in them the `persons`; of maps that were matched, their holes are mended ([`Persons::mend`]).
+    /// Creates it from the maps of `depth`; if they are from stereo matching (`is_matched`), they are repaired
+    /// ([`Persons::mend`]).
     pub fn new(depth: Box<dyn DepthSource>, persons: Persons, is_matched: bool) -> Self {
         Self { depth, persons, is_wanted: true, is_matched }
     }
@@ -193,8 +198,8 @@ mod tests {
     use crate::depth::focus::{Focus, FocusRule};
     use crate::frame::Stamp;
 
-    /// A room at 4 m, a shelf of a third of the picture in its middle at 0.8 m, and somebody at its left at 1.6 m, behind a table
-    /// that masks take for theirs.
+    /// A room at 4 m, a shelf at 0.8 m in the middle third of the picture, and a person at 1.6 m on the left, behind a
+    /// table that masks include.
     struct Room {
         looks: u32,
         mask: Mask,
@@ -220,7 +225,7 @@ mod tests {
             for (at, metres) in map.metres.iter_mut().enumerate() {
                 *metres = match at as u32 % SIZE.0 {
                     0..36 if at as u32 / SIZE.0 >= 40 => 0.8,
-                    // Who comes nearer, by 1 mm a frame.
+                    // The person approaches by 1 mm a frame.
                     0..32 => 1.6 - 0.001 * seen.stamp.index as f32,
                     36..68 => 0.8,
                     _ => 4.0,
@@ -242,7 +247,7 @@ mod tests {
         }
     }
 
-    /// Where the lens is after two seconds, with somebody there or not.
+    /// Returns the focus distance after two seconds, with or without a person.
     fn focus_m(person: bool, is_wanted: bool) -> f32 {
         let mut source = OnPersons::new(Box::new(Room::new(person)), Persons::new(Box::new(Room::new(person))), false);
         source.look_for_persons(is_wanted);
@@ -276,7 +281,7 @@ mod tests {
                     match (x, y) {
                         (8..14, 20..30) => *metres = 3.5,
                         (14..16, 20..30) => *metres = 0.0,
-                        // Nearer, and without.
+                        // Nearer pixels are kept, and unknown ones outside the person too.
                         (2..6, 30..36) => *metres = 0.4,
                         (70..80, 20..30) => *metres = 0.0,
                         _ => {}

@@ -1,40 +1,40 @@
-//! The nearest large subject of a depth map.
+//! Finds the nearest large subject of a depth map.
 
 use crate::frame::DepthMap;
 
-/// Cells of the histogram over disparity (dioptres), and the disparity that its last cell ends at: 0.2 m.
+/// Cells of the disparity histogram, in dioptres, and the upper end of the last cell: 0.2 m.
 const CELLS: usize = 256;
 const NEAREST: f32 = 5.0;
-/// A subject spans this many cells to either side of its peak: a head is some 0.25 m deep at 1 m.
-const REACH: usize = 6;
-/// Share of the weight of all known pixels that makes a subject large enough, and of that of all pixels where few are known:
-/// holes make nothing large.
+/// Half-width of a subject in cells: a head is about 0.25 m deep at 1 m.
+const RADIUS: usize = 6;
+/// Minimum fraction of the known pixels' weight that makes a subject large, and lower bound of the known weight as a
+/// fraction of all: holes must not make small things large.
 const LARGE: f32 = 0.10;
-const LEAST_KNOWN: f32 = 0.5;
-/// What is so far off the middle, in halves of the width, stands beside what is so much larger and so much nearer to the middle:
-/// leaves that somebody is seen past, not the subject.
+const MIN_KNOWN: f32 = 0.5;
+/// Off-centre subjects are skipped: from this offset on, in half widths, if another subject behind is larger by the
+/// factor `LARGER` and closer to the centre by `MORE_CENTRAL`; for example leaves beside a person.
 const BESIDE: f32 = 0.3;
 const LARGER: f32 = 1.6;
 const MORE_CENTRAL: f32 = 0.6;
-/// Rows and columns looked at, at most; more would only cost time.
-const LOOKS: usize = 160;
+/// Maximum number of sampled rows and columns.
+const MAX_SAMPLES: usize = 160;
 
-/// Finds the nearest large subject in a histogram over disparity, in which the middle of the picture weighs most.
+/// Finds the nearest large subject in a histogram over disparity, weighted towards the picture's centre.
 #[derive(Debug)]
 pub struct Subject {
     cells: [Cell; CELLS],
-    /// The weight of all pixels that count.
+    /// Total weight for comparison with [`LARGE`].
     total: f32,
     columns: Vec<f32>,
 }
 
-/// Sums over pixels.
+/// Weighted sums over pixels.
 #[derive(Clone, Copy, Debug, Default)]
 struct Cell {
     weight: f32,
-    /// Of weight x disparity, so that the distance is finer than the cells.
+    /// Sum of weight x disparity, for a resolution finer than the cells.
     disparity: f32,
-    /// Of weight x column, from -1 to 1.
+    /// Sum of weight x column, from -1 to 1.
     column: f32,
 }
 
@@ -49,7 +49,7 @@ impl Cell {
         self.disparity / self.weight
     }
 
-    /// How far off the middle it is, in halves of the width.
+    /// Returns the absolute mean offset from the centre, in half widths.
     fn off_middle(&self) -> f32 {
         (self.column / self.weight).abs()
     }
@@ -62,9 +62,10 @@ impl Default for Subject {
 }
 
 impl Subject {
-    /// Distance of the subject in dioptres; the largest one's when none is large; `None` without any known depth.
+    /// Returns the subject's distance in dioptres: the nearest large one's, or else the largest one's; `None` if no
+    /// depth is known.
     pub fn find(&mut self, map: &DepthMap) -> Option<f32> {
-        self.weigh(map);
+        self.fill_histogram(map);
         if self.total == 0.0 {
             return None;
         }
@@ -72,7 +73,7 @@ impl Subject {
         let is_peak = |cell: &usize| is_peak(&bodies, *cell);
         let is_large = |&cell: &usize| bodies[cell].weight >= LARGE * self.total;
         let large = |below: usize| (0..below).rev().filter(is_peak).filter(is_large);
-        // What is farthest is the background: it makes nothing before it small.
+        // The farthest large peak is the background, which does not count as the larger subject.
         let background = (0..CELLS).filter(is_peak).find(is_large);
         let is_beside = |&cell: &usize| {
             let own = bodies[cell];
@@ -80,7 +81,7 @@ impl Subject {
                 other.weight >= LARGER * own.weight && other.off_middle() <= MORE_CENTRAL * own.off_middle()
             };
             let is_apart =
-                |other: &usize| other + 2 * REACH < cell && background.is_some_and(|far| far + 2 * REACH < *other);
+                |other: &usize| other + 2 * RADIUS < cell && background.is_some_and(|far| far + 2 * RADIUS < *other);
             own.off_middle() >= BESIDE && large(cell).filter(is_apart).any(|other| outdoes(bodies[other]))
         };
         let nearest = large(CELLS).find(|cell| !is_beside(cell));
@@ -92,7 +93,8 @@ impl Subject {
         std::array::from_fn(|cell| self.body(cell))
     }
 
-    /// Where something is left, near this distance, of a subject that was large enough, in the map that was looked at last.
+    /// Returns the distance of a remaining subject near `dioptres` in the last map, if at least half a large one is
+    /// left.
     pub fn stays(&self, dioptres: f32) -> Option<f32> {
         let around = Self::window(Self::cell(dioptres)).map(|cell| self.body(cell));
         let most = around.max_by(|a, b| a.weight.total_cmp(&b.weight))?;
@@ -110,22 +112,22 @@ impl Subject {
     }
 
     fn window(cell: usize) -> std::ops::Range<usize> {
-        cell.saturating_sub(REACH)..(cell + REACH + 1).min(CELLS)
+        cell.saturating_sub(RADIUS)..(cell + RADIUS + 1).min(CELLS)
     }
 
     /// Fills the histogram.
-    fn weigh(&mut self, map: &DepthMap) {
+    fn fill_histogram(&mut self, map: &DepthMap) {
         self.cells.fill(Cell::default());
         let (width, height) = (map.width as usize, map.height as usize);
         let (mut known, mut all) = (0.0, 0.0);
-        let step = width.div_ceil(LOOKS).max(1);
+        let step = width.div_ceil(MAX_SAMPLES).max(1);
         self.columns.clear();
         self.columns.extend((0..width).step_by(step).map(|x| center_offset(x, width)));
-        for y in (0..height).step_by(height.div_ceil(LOOKS).max(1)) {
+        for y in (0..height).step_by(height.div_ceil(MAX_SAMPLES).max(1)) {
             let row_weight = 1.0 - 0.9 * center_offset(y, height).powi(2);
             let row = map.metres[y * width..][..width].iter().step_by(step);
             for (&metres, &column) in row.zip(&self.columns) {
-                // A person sits in the middle more surely than at a height.
+                // A person's column is more certain than the row.
                 let weight = row_weight * (1.0 - 0.95 * column * column).powi(2);
                 all += weight;
                 if DepthMap::is_known(metres) {
@@ -136,7 +138,7 @@ impl Subject {
                 }
             }
         }
-        self.total = if known > 0.0 { known.max(LEAST_KNOWN * all) } else { 0.0 };
+        self.total = if known > 0.0 { known.max(MIN_KNOWN * all) } else { 0.0 };
     }
 }
 
@@ -144,7 +146,7 @@ fn is_peak(bodies: &[Cell; CELLS], cell: usize) -> bool {
     Subject::window(cell).all(|other| bodies[other].weight <= bodies[cell].weight)
 }
 
-/// Where a pixel is, from -1 to 1.
+/// Returns a pixel's position relative to the centre, from -1 to 1.
 fn center_offset(at_px: usize, size_px: usize) -> f32 {
     (at_px as f32 + 0.5) / size_px as f32 * 2.0 - 1.0
 }
@@ -153,7 +155,7 @@ fn center_offset(at_px: usize, size_px: usize) -> f32 {
 mod tests {
     use super::*;
 
-    /// A map of a room at 5 m, with somebody in the middle at 1.2 m, and leaves at 0.55 m on the left up to this column.
+    /// A room at 5 m, a person in the middle at 1.2 m, and leaves at 0.55 m from the left up to column `until`.
     fn leaves(until: f32, is_known: impl Fn(usize) -> bool) -> DepthMap {
         let (width, height) = (160, 90);
         let metres = |at: usize| {
@@ -173,7 +175,7 @@ mod tests {
     fn leaves_at_a_side_are_not_the_subject_however_much_of_the_room_is_unknown() {
         for until in [0.1, 0.2, 0.25, 0.3, 0.35] {
             for every in [1, 2, 3, 7] {
-                // Only what is far is unknown, as where nothing can be matched.
+                // Only far depth is unknown, as where stereo matching fails.
                 let whole = leaves(until, |_| true);
                 let map = leaves(until, |at| whole.metres[at] < 2.0 || at % every == 0);
                 let found_m = 1.0 / Subject::default().find(&map).unwrap();

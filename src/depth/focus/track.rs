@@ -1,92 +1,94 @@
-//! Follows the thing that is at a point of the picture, wherever it goes.
+//! Tracks the object at a point of the picture in the depth maps (mean shift in position and depth).
 
 use super::loyalty::tolerance;
 use super::point_m;
 use crate::frame::DepthMap;
 
-/// Rows and columns looked at, at most.
-const LOOKS: usize = 120;
-/// At first it is looked for so far around the point, as a share of each side; and its spread is at least and at most this.
-const FIRST_REACH: f32 = 0.2;
+/// Maximum number of sampled rows and columns.
+const MAX_SAMPLES: usize = 120;
+/// Initial search radius around the point, and bounds of the object's spread (standard deviation), as fractions of each
+/// side.
+const FIRST_RADIUS: f32 = 0.2;
 const SPREAD: [f32; 2] = [0.02, 0.2];
-/// Later it is looked for so many spreads around where it was, and this share of each side more.
+/// Later search radius: a multiple of the spread, plus a margin as a fraction of each side.
 const SPREADS: f32 = 2.5;
 const MARGIN: f32 = 0.05;
-/// Less of it is left of what there was where it is hidden, or the map is bad: it stays where it is.
-const LEAST_LEFT: f32 = 0.3;
-/// How fast its size follows what is seen of it.
-const SIZE_SHARE: f32 = 0.1;
+/// Minimum fraction of the object's previous size: with less it is hidden, or the map is bad, and the track holds.
+const MIN_LEFT: f32 = 0.3;
+/// Smoothing factor of size and spread, per map.
+const SIZE_EASE: f32 = 0.1;
 
-/// A thing that was pointed at.
+/// A tracked object, with the point where it was selected.
 #[derive(Debug)]
 pub struct Track {
     at: [f32; 2],
-    thing: Option<Thing>,
+    object: Option<Object>,
 }
 
-/// Shares of width and height.
+/// State of the object; positions are fractions of width and height.
 #[derive(Clone, Copy, Debug)]
-struct Thing {
+struct Object {
     dioptres: f32,
     time_ns: u64,
     center: [f32; 2],
     spread: [f32; 2],
-    /// Of the picture.
-    share: f32,
+    /// Size as a fraction of the picture.
+    fraction: f32,
 }
 
 impl Track {
-    /// Of what is at these fractions of width and height in the first map that is looked at.
+    /// Creates a track of the object at these fractions of width and height in the first map.
     pub fn new(at: [f32; 2]) -> Self {
-        Self { at, thing: None }
+        Self { at, object: None }
     }
 
-    /// Its distance in dioptres, in a map of this time; `None` where no map knew it yet.
+    /// Returns the object's distance in dioptres in a map at `time_ns`; `None` as long as no map had it.
     pub fn find(&mut self, map: &DepthMap, time_ns: u64, window_m: &mut Vec<f32>) -> Option<f32> {
-        let found = match self.thing {
+        let found = match self.object {
             None => {
                 let dioptres = 1.0 / point_m(map, self.at[0], self.at[1], window_m)?;
-                let (center, reach) = (self.at, [FIRST_REACH; 2]);
-                let at_first = Thing { dioptres, time_ns, center, spread: [0.0; 2], share: 0.0 };
-                Some(seen(map, at_first, (reach, tolerance(0, 0))).unwrap_or(at_first))
+                let (center, radius) = (self.at, [FIRST_RADIUS; 2]);
+                let at_first = Object { dioptres, time_ns, center, spread: [0.0; 2], fraction: 0.0 };
+                Some(measure(map, at_first, (radius, tolerance(0, 0))).unwrap_or(at_first))
             }
             Some(was) => {
-                let reach = was.spread.map(|spread| SPREADS * spread + MARGIN);
-                // Somewhere near is its peak; from there it reaches as far as one thing does.
-                let near = seen(map, was, (reach, tolerance(was.time_ns, time_ns)));
-                let now =
-                    near.and_then(|near| seen(map, Thing { center: was.center, ..near }, (reach, tolerance(0, 0))));
-                now.filter(|now| now.share >= LEAST_LEFT * was.share).map(|now| {
-                    let share = was.share + (now.share - was.share) * SIZE_SHARE;
-                    let spread = [0, 1].map(|k| was.spread[k] + (now.spread[k] - was.spread[k]) * SIZE_SHARE);
-                    Thing { share, spread, ..now }
+                let radius = was.spread.map(|spread| SPREADS * spread + MARGIN);
+                // First finds the mean distance within the motion tolerance, then the object around that distance.
+                let near = measure(map, was, (radius, tolerance(was.time_ns, time_ns)));
+                let now = near.and_then(|near| {
+                    measure(map, Object { center: was.center, ..near }, (radius, tolerance(0, 0)))
+                });
+                now.filter(|now| now.fraction >= MIN_LEFT * was.fraction).map(|now| {
+                    let fraction = was.fraction + (now.fraction - was.fraction) * SIZE_EASE;
+                    let spread = [0, 1].map(|k| was.spread[k] + (now.spread[k] - was.spread[k]) * SIZE_EASE);
+                    Object { fraction, spread, ..now }
                 })
             }
         };
-        match (found, &mut self.thing) {
-            (Some(found), _) => self.thing = Some(Thing { time_ns, ..found }),
-            // Time in which it was hidden is none in which it could move unseen.
+        match (found, &mut self.object) {
+            (Some(found), _) => self.object = Some(Object { time_ns, ..found }),
+            // The time while it was hidden does not widen the tolerance.
             (None, Some(was)) => was.time_ns = time_ns,
             (None, None) => {}
         }
-        self.thing.map(|thing| thing.dioptres)
+        self.object.map(|object| object.dioptres)
     }
 }
 
-/// What a map has within `reach` of a thing's place and `tolerance` of its distance; `None` where that is nothing.
-fn seen(map: &DepthMap, thing: Thing, (reach, tolerance): ([f32; 2], f32)) -> Option<Thing> {
+/// Measures the pixels within `radius` of an object's centre and `tolerance` of its distance; `None` if there are none.
+fn measure(map: &DepthMap, object: Object, (radius, tolerance): ([f32; 2], f32)) -> Option<Object> {
     let size = [map.width as usize, map.height as usize];
-    let steps = size.map(|count| count.div_ceil(LOOKS).max(1));
+    let steps = size.map(|count| count.div_ceil(MAX_SAMPLES).max(1));
     let range = |k: usize| {
         let at = |fraction: f32| ((fraction.clamp(0.0, 1.0) * size[k] as f32) as usize).min(size[k]);
-        (at(thing.center[k] - reach[k])..at(thing.center[k] + reach[k])).step_by(steps[k])
+        (at(object.center[k] - radius[k])..at(object.center[k] + radius[k])).step_by(steps[k])
     };
     let (mut count, mut dioptres, mut places, mut squares) = (0.0, 0.0, [0.0; 2], [0.0; 2]);
     for y in range(1) {
         for x in range(0) {
             let metres = map.metres[y * size[0] + x];
             let inverse = DepthMap::inverse_of(metres);
-            if DepthMap::is_known(metres) && (inverse - thing.dioptres).abs() <= tolerance {
+            if DepthMap::is_known(metres) && (inverse - object.dioptres).abs() <= tolerance {
                 count += 1.0;
                 dioptres += inverse;
                 for (k, at) in [x, y].into_iter().enumerate() {
@@ -102,7 +104,7 @@ fn seen(map: &DepthMap, thing: Thing, (reach, tolerance): ([f32; 2], f32)) -> Op
         let spread =
             [0, 1].map(|k| (squares[k] / count - center[k] * center[k]).max(0.0).sqrt().clamp(SPREAD[0], SPREAD[1]));
         let looks = (size[0] / steps[0]).max(1) * (size[1] / steps[1]).max(1);
-        Thing { dioptres: dioptres / count, center, spread, share: count / looks as f32, ..thing }
+        Object { dioptres: dioptres / count, center, spread, fraction: count / looks as f32, ..object }
     })
 }
 
@@ -112,7 +114,8 @@ mod tests {
 
     const FRAME_NS: u64 = 33_000_000;
 
-    /// Two things before a wall at 4 m: one as wide as a head at column `x`, at `metres`, and another at 0.5 m on the left.
+    /// Two objects before a wall at 4 m: one of a head's width at column `x`, at `metres`, and another at 0.5 m on the
+    /// left.
     fn scene(x: f32, metres: f32) -> DepthMap {
         let (width, height) = (160, 90);
         let depth = |at: usize| {

@@ -1,9 +1,9 @@
-//! Depth from a camera of its own, beside the one that gives the colours.
+//! Depth from a separate depth camera next to the colour camera.
 //!
-//! The newest maps are kept and paired with the colours by the time they were taken. When none comes any more, the last
-//! one stays: a blur that follows an old map is wrong at its edges, but a blur that vanishes shows the room. The loss
-//! of depth is logged once, and so is its return. Before the first map, and after a rest, there is no map, and frames
-//! are not shown.
+//! The newest maps are kept and paired with the colour frames by capture time. When the camera stops, the last map
+//! stays: a blur by an old map is wrong at its edges, but without blur the room would be visible. The loss of depth is
+//! logged once, and so is its return. Before the first map, and after a pause, there is no map, and frames are not
+//! shown.
 
 mod pairing;
 mod units;
@@ -20,31 +20,31 @@ use crate::layout::Content;
 use crate::v4l2::live::{Live, Next, OpenError, Wish};
 use pairing::Pairing;
 
-/// A warning is logged when the newest map is older than this.
+/// Age of the newest map in ns from which a warning is logged.
 const STALE_NS: u64 = 1_000_000_000;
 
-/// A picture waits up to a depth period divided by this for a map that fits it better than those that are there.
+/// Divisor of the depth period: how long a frame waits for a better matching map.
 const WAIT_DIVISOR: u32 = 4;
 
-/// Polls of the camera in a row: a driver that never runs dry must not keep a picture waiting.
-const MOST_POLLS: usize = 8;
+/// Maximum number of polls in a row: a driver that never runs dry must not delay a frame.
+const MAX_POLLS: usize = 8;
 
-/// A depth camera.
+/// A depth camera with its conversion, registration and pairing.
 pub struct LiveDepth {
     live: Live,
     units: Units,
     registration: Option<Registration>,
     pairing: Pairing,
     clock: Clock,
-    /// Whether the loss of depth was logged, and its return was not.
+    /// Whether the loss of depth was logged, but not its return.
     stale: bool,
 }
 
 impl LiveDepth {
-    /// Opens the depth camera that `name` means. Without a registration its view is taken to be that of the colours.
+    /// Opens the depth camera `name`. Without a registration its view is assumed to be that of the colour camera.
     ///
     /// # Errors
-    /// There is none, it is busy, or it gives no depth.
+    /// Fails if the camera does not exist, is busy, or does not deliver depth.
     pub fn open(name: &str, units: Units, registration: Option<Registration>, clock: Clock) -> Result<Self, OpenError> {
         let live = Live::open(name, Wish::any(Content::Depth), Vec::new(), clock.clone())?;
         if registration.is_none() {
@@ -56,9 +56,9 @@ impl LiveDepth {
         Ok(Self { live, units, registration, pairing: Pairing::default(), clock, stale: false })
     }
 
-    /// Decodes the maps that the camera has ready into `pairing`; waits for the first of them up to `patience`.
+    /// Decodes the maps that the camera has ready into `pairing`; waits up to `patience` for the first of them.
     fn take_maps(&mut self, mut patience: Duration) {
-        for _ in 0..MOST_POLLS {
+        for _ in 0..MAX_POLLS {
             match self.live.next(patience) {
                 Next::Frame { captured_ns } => {
                     let (layout, planes) = (*self.live.layout(), self.live.planes());
@@ -77,7 +77,7 @@ impl LiveDepth {
         }
     }
 
-    /// Logs when no maps have come for a while, and when they come again: each change once.
+    /// Logs when no map has arrived for a while, and when maps arrive again: each change once.
     fn log_staleness(&mut self, now_ns: u64, newest_ns: u64) {
         let stale = now_ns.saturating_sub(newest_ns) > STALE_NS;
         if stale != self.stale {
@@ -94,7 +94,7 @@ impl DepthSource for LiveDepth {
     fn read(&mut self, Seen { stamp, .. }: Seen, map: &mut DepthMap) -> Result<(), DepthError> {
         self.take_maps(Duration::ZERO);
         let now_ns = self.clock.now_ns();
-        // Colours without a time of capture get the newest map.
+        // Colour frames without a capture time get the newest map.
         let taken_ns = stamp.captured_ns.unwrap_or(now_ns);
         let period_ns = self.live.agreed().interval.period_ns();
         if self.pairing.is_worth_waiting(taken_ns, period_ns) {
@@ -119,7 +119,7 @@ impl DepthSource for LiveDepth {
 
     fn rest(&mut self) {
         self.live.rest();
-        // Afterwards somebody else may sit there: an old map would be wrong.
+        // The scene may be different afterwards, so that an old map would be wrong.
         self.pairing.clear();
         self.stale = false;
     }

@@ -1,31 +1,31 @@
-//! Which depth map belongs to a picture.
+//! Pairs depth maps with colour frames by capture time.
 
 use crate::frame::DepthMap;
 
-/// Maps that are kept: depth may lead or lag by a frame.
+/// Number of kept maps: depth may lead or lag by a frame.
 const KEPT: usize = 3;
 
-/// After this many periods without a map the camera has stopped, and waiting for it would only add delay.
+/// Number of periods without a map after which the camera counts as stopped, and waiting would only add delay.
 const STOPPED_PERIODS: u64 = 4;
 
-/// The newest maps with the times they were taken at.
+/// The newest maps with their capture times.
 #[derive(Debug, Default)]
 pub(super) struct Pairing {
     maps: [DepthMap; KEPT],
-    /// None where there is no map.
+    /// Capture times; `None` for an unused map.
     taken_ns: [Option<u64>; KEPT],
     /// Index of the oldest map, which the next one overwrites.
     next: usize,
 }
 
 impl Pairing {
-    /// The map to overwrite; [`Pairing::keep`] makes it the newest. Until then there is one less.
+    /// Returns the map to overwrite, which is unused until [`Pairing::keep`] makes it the newest.
     pub(super) fn oldest(&mut self) -> &mut DepthMap {
         self.taken_ns[self.next] = None;
         &mut self.maps[self.next]
     }
 
-    /// Makes the overwritten oldest map the newest, taken at this time.
+    /// Makes the overwritten map the newest, captured at `taken_ns`.
     pub(super) fn keep(&mut self, taken_ns: u64) {
         self.taken_ns[self.next] = Some(taken_ns);
         self.next = (self.next + 1) % KEPT;
@@ -35,12 +35,12 @@ impl Pairing {
         self.taken_ns = [None; KEPT];
     }
 
-    /// When the newest was taken.
+    /// Returns the capture time of the newest map.
     pub(super) fn newest_ns(&self) -> Option<u64> {
         self.taken_ns.into_iter().flatten().max()
     }
 
-    /// Whether a better map for a picture of this time may come at once: the newest is more than half a period older,
+    /// Whether a better map for a frame captured at `taken_ns` is due: the newest map is more than half a period older,
     /// and the camera still runs.
     pub(super) fn is_worth_waiting(&self, taken_ns: u64, period_ns: u64) -> bool {
         self.newest_ns().is_some_and(|newest_ns| {
@@ -49,7 +49,7 @@ impl Pairing {
         })
     }
 
-    /// The map that was taken nearest to this time.
+    /// Returns the map captured nearest to this time.
     pub(super) fn nearest(&self, taken_ns: u64) -> Option<&DepthMap> {
         let kept = self.maps.iter().zip(self.taken_ns).filter_map(|(map, at_ns)| Some((map, at_ns?)));
         kept.min_by_key(|(_, at_ns)| at_ns.abs_diff(taken_ns)).map(|(map, _)| map)

@@ -1,21 +1,21 @@
-//! From 16-bit numbers to metres.
+//! Converts 16-bit depth to metres.
 
 use crate::frame::DepthMap;
 use crate::layout::Family;
 use crate::v4l2::Layout;
 
-/// What a depth camera's numbers mean. 0 and the largest number, where sensors clip, are unknown.
+/// The unit of a depth camera's numbers. 0 and the largest number, at which sensors clip, are unknown.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Units {
-    /// Units a metre.
+    /// Units per metre.
     pub per_m: f32,
-    /// Another number that means unknown.
+    /// Another number for unknown depth.
     pub invalid: u16,
 }
 
 impl Units {
-    /// Decodes a picture of this layout into `map` (resized to fit). Returns false where the layout holds no 16-bit
-    /// depth, or the plane is cut short.
+    /// Decodes a picture of this layout into `map`, which is resized to fit. Returns false if the layout is not 16-bit
+    /// depth, or the plane is too short.
     pub(super) fn decode(&self, layout: &Layout, plane: &[u8], map: &mut DepthMap) -> bool {
         if layout.family() != Family::Depth16 || plane.len() < layout.needed_bytes(0) {
             return false;

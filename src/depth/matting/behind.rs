@@ -1,26 +1,28 @@
-//! What is known to lie behind pixels.
+//! The remembered background behind pixels.
 
-/// What was seen at each pixel of a picture, and may lie behind what is there now.
+/// A remembered background picture, which may be hidden now.
+/// twin: shaders/matte_behind.wgsl
 #[derive(Clone, Copy, Debug)]
 pub struct Behind<'a> {
     /// 8-bit sRGB, 3 bytes a pixel.
     pub rgb: &'a [u8],
     /// Inverse depth of each pixel, in 1/m.
     pub inverse: &'a [f32],
-    /// For how many rounds each was seen.
+    /// Number of rounds in which each pixel was seen.
     pub rounds: &'a [u8],
-    /// It is known from so many rounds on, at least one.
+    /// Minimum number of rounds, at least 1, from which a pixel counts as known.
     pub known: u8,
-    /// The linear light of each code of `rgb`, by channel, as the camera exposes now.
+    /// Linear light of each code of `rgb`, by channel, at the camera's current exposure.
     pub light: &'a [[f32; 256]; 3],
-    /// It lies behind what is nearer by more than this step of inverse depth, in 1/m.
+    /// Minimum step of inverse depth, in 1/m, from a surface to the background behind it.
     pub other: f32,
-    /// A number that no other `rgb`, `inverse` and `rounds` have in this process.
+    /// A number unique in this process for this content of `rgb`, `inverse` and `rounds`.
     pub revision: u64,
 }
 
 impl Behind<'_> {
-    /// The light behind pixel `at`, whose nearer surface has inverse depth `near`, in 1/m; `None` where that is not known.
+    /// Returns the linear light behind pixel `at`, whose nearer surface is at inverse depth `near`, in 1/m; `None` if
+    /// unknown.
     #[inline(always)]
     pub fn light(&self, at: usize, near: f32) -> Option<[f32; 3]> {
         let is_known = (self.rounds[at] >= self.known) & (near - self.inverse[at] > self.other);
@@ -28,7 +30,7 @@ impl Behind<'_> {
     }
 }
 
-/// The light of a pixel of 8-bit sRGB whose codes have this light, by channel.
+/// Returns the linear light of pixel `at` of an 8-bit sRGB picture, by a table for each channel.
 #[inline(always)]
 pub fn light_at(rgb: &[u8], light: &[[f32; 256]; 3], at: usize) -> [f32; 3] {
     let (rgb, mut of_pixel) = (&rgb[3 * at..][..3], [0.0; 3]);

@@ -1,7 +1,8 @@
-//! The colours of surfaces, in clusters: a square cell of pixels has one of each surface that it shows, at most two.
+//! Colour models of surfaces from clusters: each square cell of pixels has one cluster per surface, at most two.
 //!
-//! What is wanted around a mixed pixel are means and covariances of both surfaces, close by where there are pure pixels
-//! and from some way off where there are none, as in hair. Cells have both for a tenth of the time that pixels need.
+//! Around a mixed pixel, the means and covariances of both surfaces' colours are needed, close by where there are pure
+//! pixels, and from further away where there are none, as in hair. Cells provide both in a tenth of the time of single
+//! pixels.
 
 mod answers;
 mod cell;
@@ -13,32 +14,34 @@ use crate::depth::bits::Bits;
 
 pub(super) use answers::Clusters;
 #[cfg(feature = "gpu")]
-pub(super) use answers::{FRINGE_PIXELS, HALF_PX, REACHES_CELLS};
+pub(super) use answers::{FRINGE_PIXELS, HALF_PX, RADII_CELLS};
 #[cfg(feature = "gpu")]
 pub(super) use cell::{AT_EDGE_WEIGHT, CLOSE_PX, CLOSE_WEIGHT};
 
 /// Side of a cell, in pixels.
 pub(super) const CELL_PX: usize = 8;
 
-/// The place of the cluster of the near surface's pixels at edges, after those of the near and the far surface.
+/// Index of the fringe cluster (edge pixels of the near surface), after those of the near and the far surface.
 const FRINGE: usize = 2;
-/// So much of a pixel at an edge that the map gives to the near surface is that, on average.
-pub(super) const FRINGE_SHARE: f32 = 0.75;
-/// From the first share down, the colour of such pixels is not that of the near surface; from the second up, it is.
-pub(super) const FRINGE_SHARES: [f32; 2] = [-0.1, 0.25];
+/// Average coverage by the near surface of the edge pixels that the map assigns to it.
+pub(super) const FRINGE_ALPHA: f32 = 0.75;
+/// Alphas of the fringe's mean colour, relative to the pure surfaces: below the first, it is another colour than the
+/// near surface's; above the second, it is the same one.
+pub(super) const FRINGE_ALPHAS: [f32; 2] = [-0.1, 0.25];
 
-/// Pixels of one surface in a cell, weighted.
+/// Weighted pixels of one surface in a cell.
 #[derive(Clone, Copy, Debug, Default)]
 struct Cluster {
     sums: Sums,
-    /// Means of position and inverse depth.
+    /// Weighted means of position, in pixels, and of inverse depth, in 1/m.
     x: f32,
     y: f32,
     inverse: f32,
 }
 
 impl Cluster {
-    /// Of the sums of pixels, and of their columns and rows in a cell and their inverse depths, with their weights.
+    /// Creates a cluster from colour sums, and the weighted sums of columns, rows (relative to the cell's corner) and
+    /// inverse depths.
     #[inline(always)]
     fn new(sums: Sums, [x, y, inverse]: [f32; 3], (left, top): (usize, usize)) -> Self {
         if sums.weight() <= 0.0 {
@@ -49,7 +52,7 @@ impl Cluster {
     }
 }
 
-/// Sums over pixels: the weight, and with it their light and the products of that; ten, and up to whole vectors.
+/// Weighted sums over pixels: weight, light (3), and products of light (6); padded from ten to whole vectors.
 #[derive(Clone, Copy, Debug, Default)]
 struct Sums([f32; 12]);
 
@@ -81,7 +84,7 @@ pub struct Color {
 }
 
 impl Color {
-    /// Of pixels of this total weight, and the weighted sums of their light and of the products of that.
+    /// Computes mean and covariance from the total weight, and the weighted sums of the light and of its products.
     #[inline(always)]
     pub(super) fn of_sums(weight: f32, light: [f32; 3], squares: Symmetric) -> Self {
         let mean = light.map(|light| light / weight);
@@ -89,7 +92,7 @@ impl Color {
         Self { mean, covariance: std::array::from_fn(|k| squares[k] / weight - of_mean[k]) }
     }
 
-    /// Adds a weight of another, in a weighted sum.
+    /// Adds another colour times a weight.
     #[inline(always)]
     pub(super) fn add(&mut self, weight: f32, other: &Self) {
         self.mean.iter_mut().zip(other.mean).for_each(|(sum, value)| *sum += weight * value);
@@ -102,50 +105,50 @@ impl Color {
     }
 }
 
-/// The colours around a mixed pixel.
+/// Colours of both surfaces around a mixed pixel.
 struct Surfaces {
     near: Color,
     far: Color,
-    /// What the near surface has at edges, and how far that counts, 0 to 1.
+    /// Colour of the near surface's edge pixels, and its confidence, 0 to 1.
     fringe: Option<(Color, f32)>,
 }
 
-/// What clusters are made of.
+/// The input of clustering.
 pub(super) struct View<'a> {
     /// Columns and rows.
     pub size: (usize, usize),
-    /// Depth of all pixels, in metres; one surface's inverse depths differ by no more than `jump`, in 1/m.
+    /// Depth of all pixels, in metres; inverse depths of one surface differ by at most `depth_step`, in 1/m.
     pub metres: &'a [f32],
-    pub jump: f32,
-    /// Pixels that may be mixed.
+    pub depth_step: f32,
+    /// Pixels beside depth discontinuities, which may be mixed.
     pub at_edge: &'a Bits,
-    /// 8-bit sRGB, and the light of each code.
+    /// 8-bit sRGB, and the linear light of each code.
     pub rgb: &'a [u8],
     pub light: &'a [f32; 256],
 }
 
 impl View<'_> {
-    /// The colour of a pixel in linear light.
+    /// Returns the linear light of a pixel.
     #[inline(always)]
     pub fn light(&self, at: usize) -> [f32; 3] {
         light_of(self.light, self.rgb, at)
     }
 }
 
-/// The contrast of the colours of two surfaces. What `fringe` has, the pixels at edges that the map gives to the near one, is
-/// mostly that surface. If its colour says otherwise, the near surface has other colours here than where its pixels are
-/// pure, as hair beside a face has: then it has those of the fringe, less the far surface that is mixed in.
+/// Computes the colour contrast of two surfaces. The fringe (edge pixels that the map assigns to the near surface)
+/// mostly shows that surface. If its colour differs from the pure pixels', such as hair beside a face, the near surface
+/// gets the fringe's colour, with the far surface's part removed.
 #[inline(always)]
 fn contrast(Surfaces { near, far, fringe }: Surfaces) -> Contrast {
-    let pure = Contrast::of([near, far]);
+    let pure = Contrast::new([near, far]);
     let Some((fringe, weight)) = fringe else { return pure };
     let other =
-        weight * ((FRINGE_SHARES[1] - pure.share(fringe.mean)) / (FRINGE_SHARES[1] - FRINGE_SHARES[0])).clamp(0.0, 1.0);
+        weight * ((FRINGE_ALPHAS[1] - pure.alpha(fringe.mean)) / (FRINGE_ALPHAS[1] - FRINGE_ALPHAS[0])).clamp(0.0, 1.0);
     if other <= 0.0 {
         return pure;
     }
-    let own = |p: usize| (far.mean[p] + (fringe.mean[p] - far.mean[p]) / FRINGE_SHARE).clamp(0.0, 1.0);
+    let own = |p: usize| (far.mean[p] + (fringe.mean[p] - far.mean[p]) / FRINGE_ALPHA).clamp(0.0, 1.0);
     let mean = std::array::from_fn(|p| near.mean[p] + other * (own(p) - near.mean[p]));
     let covariance = std::array::from_fn(|k| near.covariance[k] + other * (fringe.covariance[k] - near.covariance[k]));
-    Contrast::of([Color { mean, covariance }, far])
+    Contrast::new([Color { mean, covariance }, far])
 }

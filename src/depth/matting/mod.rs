@@ -1,9 +1,9 @@
-//! Matting along depth edges: which pixels show two surfaces at once, how much of each, and in which colours.
+//! Matting along depth edges: finds the mixed pixels, the coverage (alpha) of their nearer surface, and both colours.
 //!
-//! A depth map has one sample a pixel, a camera's pixel is an area: on an outline it is a share of what is near and the
-//! rest of what is far. Both surfaces have pure pixels close by, whose colours say how likely the mixed pixel's is for
-//! each share (Bayesian matting, after Chuang et al. 2001), and the map says which shares are likely before that.
-//! Everything is local, from one frame, and in time that grows with the length of the outlines.
+//! A depth map has one sample per pixel, but a camera's pixel is an area: on an outline, part of it shows the near
+//! surface and the rest the far one. Pure pixels nearby give the colours of both surfaces, and with them the likelihood
+//! of the pixel's colour for each alpha (Bayesian matting, after Chuang et al. 2001); the map gives the prior. All
+//! steps are local and use one frame; the time grows with the length of the outlines.
 
 mod behind;
 mod clusters;
@@ -40,64 +40,64 @@ use share::{Evidence, LANES, Labels, Prior};
 use survey::Survey;
 use trace::{Trace, Wide};
 
-/// Where the CoC jumps by so many pixels or more, pixels are worth taking apart.
+/// Minimum difference of the CoC across a depth discontinuity, in pixels, for its pixels to be matted.
 pub const FROM_PX: f32 = 0.5;
-/// Shares beyond this are those of a pure pixel.
+/// Above this alpha, a pixel counts as pure.
 const NEARLY_PURE: f32 = 0.98;
 
-/// So many pixels away from an edge, at most.
-const MOST_STEPS: usize = 16;
-/// Where there are too many edges, only those of a jump twice as large are looked at, and so on, so many times.
-const MOST_DOUBLINGS: usize = 8;
-/// Fewer pixels are not worth another thread.
-const LEAST_PIXELS: usize = 256;
+/// Maximum distance of traced pixels from an edge, in pixels.
+const MAX_STEPS: usize = 16;
+/// If there are too many edges, the minimum depth step is doubled, at most this often.
+const MAX_DOUBLINGS: usize = 8;
+/// Minimum number of pixels per thread.
+const MIN_PIXELS: usize = 256;
 
 /// Estimates mattes; owns the memory for it.
 #[derive(Debug)]
 pub struct Matting {
     arch: Arch,
     light: Box<[f32; 256]>,
-    /// Whether pixels differ in depth from one of their eight neighbours: the others are pure.
+    /// Pixels beside a depth discontinuity to one of the eight neighbours; all others are pure.
     at_edge: Bits,
     survey: Survey,
     edges: Vec<EdgePixel>,
-    /// The pixels at edges, and then those that were traced.
+    /// The pixels at edges, followed by the traced ones.
     pixels: Vec<Pixel>,
     clusters: Clusters,
     evidence: Vec<Evidence>,
     wide: Wide,
-    /// The places of those that are mixed, in the order of the picture, and memory for that.
+    /// Indices of the mixed pixels in raster order, and scratch memory for the sort.
     order: Vec<u32>,
     traced: Vec<u64>,
-    /// The next map and its picture.
+    /// GPU buffers of the next map and its picture.
     on_device: Option<DeviceFrame>,
-    /// Whether it was said that there are too many edges.
-    is_noise_said: bool,
-    /// Finds them in the processor's place, as long as the device does not fail.
+    /// Whether the warning about too many edges was logged.
+    is_noise_logged: bool,
+    /// The GPU implementation, used until the device fails.
     #[cfg(feature = "gpu")]
     gpu: Backed<Option<gpu::GpuMatting>>,
 }
 
-/// A pixel beside a jump of depth.
+/// A pixel beside a depth discontinuity.
 #[derive(Clone, Copy, Debug, Default)]
 struct EdgePixel {
     x: u32,
     y: u32,
-    /// Inverse depth of the nearest and the farthest of the pixel and its neighbours, in 1/m.
+    /// Largest and smallest inverse depth of the 3x3 neighbourhood, in 1/m.
     near: f32,
     far: f32,
-    /// What the map says of it; nothing of a pixel that was traced.
+    /// Labels from the map; unused for traced pixels.
     labels: Labels,
 }
 
 impl EdgePixel {
-    /// The inverse depth in the middle between both surfaces.
+    /// Returns the mean of both surfaces' inverse depths.
     #[inline(always)]
     fn middle(&self) -> f32 {
         0.5 * (self.near + self.far)
     }
 
-    /// Whether an inverse depth is closer to that of the near surface.
+    /// Whether an inverse depth is closer to the near surface's.
     #[inline(always)]
     fn is_near(&self, inverse: f32) -> bool {
         inverse > self.middle()
@@ -108,32 +108,32 @@ impl EdgePixel {
 #[derive(Clone, Copy, Debug)]
 struct Pixel {
     edge: EdgePixel,
-    /// The place of the answer with the surfaces around it.
-    answer: u32,
-    /// Its own light, and what is behind it where that is known.
+    /// Index of the colour model of the surfaces around.
+    model: u32,
+    /// Linear light of the pixel, and of the background behind it if known.
     own: [f32; 3],
     behind: Option<[f32; 3]>,
-    /// How much of it the near surface has.
-    share: f32,
+    /// Coverage by the near surface, 0 to 1.
+    alpha: f32,
 }
 
 impl Pixel {
-    /// One that nothing else is known of.
+    /// Creates a pixel that is not evaluated yet.
     #[inline(always)]
-    fn new(edge: EdgePixel, answer: u32) -> Self {
-        Self { edge, answer, own: [0.0; 3], behind: None, share: 0.0 }
+    fn new(edge: EdgePixel, model: u32) -> Self {
+        Self { edge, model, own: [0.0; 3], behind: None, alpha: 0.0 }
     }
 
-    /// Its place in a picture so wide.
+    /// Returns the pixel's index in a picture `width` pixels wide.
     #[inline(always)]
     fn at(&self, width: usize) -> usize {
         self.edge.y as usize * width + self.edge.x as usize
     }
 
-    /// Whether it shows two surfaces.
+    /// Whether the pixel shows two surfaces.
     #[inline(always)]
     fn is_mixed(&self) -> bool {
-        if self.edge.labels.is_near { self.share <= NEARLY_PURE } else { self.share >= 1.0 - NEARLY_PURE }
+        if self.edge.labels.is_near { self.alpha <= NEARLY_PURE } else { self.alpha >= 1.0 - NEARLY_PURE }
     }
 }
 
@@ -152,7 +152,7 @@ impl Default for Matting {
             order: Vec::new(),
             traced: Vec::new(),
             on_device: None,
-            is_noise_said: false,
+            is_noise_logged: false,
             #[cfg(feature = "gpu")]
             gpu: Backed::default(),
         }
@@ -160,8 +160,8 @@ impl Default for Matting {
 }
 
 impl Matting {
-    /// The same on a device, where there is one that finds mattes as the processor does. When it fails, the processor goes on, from
-    /// the frame on with which it does.
+    /// Moves the computation to `device`, if its GPU matting passes a trial against the CPU. If the device fails later,
+    /// the CPU takes over from that frame on.
     #[must_use]
     pub fn on(self, device: Option<&Arc<Device>>) -> Self {
         #[cfg(feature = "gpu")]
@@ -175,12 +175,12 @@ impl Matting {
         }
     }
 
-    /// The map and the picture of the next call are on a device already, as they are in memory.
+    /// Sets the GPU buffers that already contain the map and the picture of the next call.
     pub fn take_from(&mut self, on_device: Option<DeviceFrame>) {
         self.on_device = on_device;
     }
 
-    /// What finds mattes, for the report: `cpu`, `gpu`, or `gpu, then cpu`.
+    /// Returns the backends used, for the report: `cpu`, `gpu`, or `gpu, then cpu`.
     pub fn backends(&self) -> &'static str {
         #[cfg(feature = "gpu")]
         return self.gpu.backends();
@@ -188,35 +188,35 @@ impl Matting {
         "cpu"
     }
 
-    /// Finds the mixed pixels of a map as large as its picture, beside jumps of inverse depth of more than `jump`, in 1/m.
-    /// Of another size, or where `jump` is not finite, it has none; with more edges than [`Matte::most`] it has those beside the
-    /// largest jumps.
-    pub fn find(&mut self, map: &mut DepthMap, color: &ColorImage, jump: f32) {
-        self.find_before(&mut ThreadPool::new("matte", 1), (map, color), jump, None);
+    /// Finds the mixed pixels beside steps of inverse depth larger than `depth_step`, in 1/m. Finds none if the map and
+    /// the picture differ in size, or `depth_step` is not finite. If there are more than [`Matte::most`] edge pixels,
+    /// only the largest steps count.
+    pub fn find(&mut self, map: &mut DepthMap, color: &ColorImage, depth_step: f32) {
+        self.find_before(&mut ThreadPool::new("matte", 1), (map, color), depth_step, None);
     }
 
-    /// The same on several threads, with what is known to lie behind pixels. The matte is the same to the bit for any number of
-    /// threads.
+    /// Finds mixed pixels like [`Self::find`], on several threads, and uses the known background `behind` pixels. The
+    /// result is bit-identical for any number of threads.
     pub fn find_before(
         &mut self,
         workers: &mut ThreadPool,
         (map, color): (&mut DepthMap, &ColorImage),
-        jump: f32,
+        depth_step: f32,
         behind: Option<&Behind>,
     ) {
         let on_device = self.on_device.take();
         map.matte.pixels.clear();
-        if map.size() != color.size() || map.metres.is_empty() || !jump.is_finite() {
+        if map.size() != color.size() || map.metres.is_empty() || !depth_step.is_finite() {
             return;
         }
         #[cfg(not(feature = "gpu"))]
         let _ = on_device;
         let most = Matte::most(map.width as usize, map.height as usize);
-        let asked = jump;
-        let jumps = || std::iter::successors(Some(asked), |jump| Some(2.0 * jump)).take(MOST_DOUBLINGS);
-        let is_noise_said = &mut self.is_noise_said;
-        let mut say = |jump: f32| {
-            if jump > asked && !std::mem::replace(is_noise_said, true) {
+        let least_step = depth_step;
+        let depth_steps = || std::iter::successors(Some(least_step), |step| Some(2.0 * step)).take(MAX_DOUBLINGS);
+        let is_noise_logged = &mut self.is_noise_logged;
+        let mut log_noise = |depth_step: f32| {
+            if depth_step > least_step && !std::mem::replace(is_noise_logged, true) {
                 tracing::info!(
                     "the depth has jumps nearly everywhere: outlines are taken apart only where it jumps most"
                 );
@@ -224,9 +224,9 @@ impl Matting {
         };
         #[cfg(feature = "gpu")]
         if self.gpu.did("finds mattes", |gpu| {
-            for jump in jumps() {
-                if gpu.find((map, color), on_device.clone(), jump, behind)? <= most {
-                    say(jump);
+            for depth_step in depth_steps() {
+                if gpu.find((map, color), on_device.clone(), depth_step, behind)? <= most {
+                    log_noise(depth_step);
                     break;
                 }
             }
@@ -238,20 +238,20 @@ impl Matting {
         let Self { arch, light, at_edge, survey, edges, pixels, clusters, evidence, wide, order, traced, .. } = self;
         let arch = *arch;
         let size = (map.width as usize, map.height as usize);
-        let fits = |jump: &f32| {
-            survey.find((arch, workers), map, *jump, (at_edge, edges));
+        let fits = |depth_step: &f32| {
+            survey.find((arch, workers), map, *depth_step, (at_edge, edges));
             edges.len() <= most
         };
-        // Noise has more edges than any picture has: those beside the largest jumps are what counts.
-        let Some(jump) = jumps().find(fits) else { return };
-        say(jump);
+        // Only noise has more edges than `most`: then the largest steps are what counts.
+        let Some(depth_step) = depth_steps().find(fits) else { return };
+        log_noise(depth_step);
         clusters.clear(size);
         pixels.clear();
-        pixels.extend(edges.iter().map(|edge| Pixel::new(*edge, clusters.ask(jump, edge))));
+        pixels.extend(edges.iter().map(|edge| Pixel::new(*edge, clusters.request_model(depth_step, edge))));
         let (metres, matte, rgb) = (&map.metres, &mut map.matte, &color.rgb[..]);
-        clusters.find((arch, workers), &View { size, metres, jump, at_edge, rgb, light }, 0);
-        // Those between surfaces of which one has no pixels tell nothing.
-        pixels.retain(|pixel| clusters.at(pixel.answer).is_some());
+        clusters.find((arch, workers), &View { size, metres, depth_step, at_edge, rgb, light }, 0);
+        // Without pure pixels of both surfaces, a colour says nothing about alpha.
+        pixels.retain(|pixel| clusters.at(pixel.model).is_some());
         let on_edges = pixels.len();
         let (mut compared, mut marked) = (0..0, edges.len());
         wide.steps.clear();
@@ -259,8 +259,9 @@ impl Matting {
         loop {
             let found = compared.end..pixels.len();
             evidence.resize(found.len().div_ceil(LANES), Evidence::default());
-            let each = bands::share(found.len(), LEAST_PIXELS).next_multiple_of(LANES);
-            let view = View { size, metres, jump, at_edge, rgb, light };
+            // Evaluate the new pixels, then trace one step further from those with some alpha.
+            let each = bands::share(found.len(), MIN_PIXELS).next_multiple_of(LANES);
+            let view = View { size, metres, depth_step, at_edge, rgb, light };
             let parts = pixels[found.clone()].chunks_mut(each).zip(evidence.chunks_mut(each / LANES));
             workers.run_each(parts, &|(pixels, evidence)| {
                 let view = &view;
@@ -272,24 +273,25 @@ impl Matting {
                 wide.steps.push(found.clone());
             }
             compared = found;
-            if compared.is_empty() || steps == MOST_STEPS {
+            if compared.is_empty() || steps == MAX_STEPS {
                 break;
             }
             let (compared, workers) = (compared.clone(), &mut *workers);
             let found_until = compared.end;
-            let trace = Trace { arch, workers, size, metres, jump, rgb, light, at_edge, clusters, compared, pixels };
+            let trace =
+                Trace { arch, workers, size, metres, depth_step, rgb, light, at_edge, clusters, compared, pixels };
             marked += arch.dispatch(trace);
-            // Noise, too: no hair is that long.
+            // Noise: hair is not that long.
             if marked > most {
                 pixels.truncate(found_until);
                 break;
             }
             steps += 1;
         }
-        wide.drop(size, pixels);
-        sort(size.0, pixels, on_edges, (order, traced));
+        wide.discard_wide(size, pixels);
+        sort_mixed(size.0, pixels, on_edges, (order, traced));
 
-        let each = bands::share(order.len(), LEAST_PIXELS);
+        let each = bands::share(order.len(), MIN_PIXELS);
         matte.pixels.resize(order.len(), MixedPixel::default());
         workers.run_each(order.chunks(each).zip(matte.pixels.chunks_mut(each)), &|(order, mixed)| {
             arch.dispatch(Mix { clusters, width: size.0, pixels, order, mixed });
@@ -297,8 +299,9 @@ impl Matting {
     }
 }
 
-/// Replaces `order` by the places of the mixed pixels, of which the first are in order and the others are not; `rest` is memory.
-fn sort(width: usize, pixels: &[Pixel], first: usize, (order, rest): (&mut Vec<u32>, &mut Vec<u64>)) {
+/// Replaces `order` by the indices of the mixed pixels in raster order. The `first` ones are in order already, the rest
+/// is sorted in `rest` and merged.
+fn sort_mixed(width: usize, pixels: &[Pixel], first: usize, (order, rest): (&mut Vec<u32>, &mut Vec<u64>)) {
     const PLACE_BITS: u32 = 32;
     let key = |k: usize| (pixels[k].at(width) as u64) << PLACE_BITS | k as u64;
     let mixed = |places: Range<usize>| places.filter(|&k| pixels[k].is_mixed());
@@ -316,21 +319,21 @@ fn sort(width: usize, pixels: &[Pixel], first: usize, (order, rest): (&mut Vec<u
     order.extend(rest.map(|key| key as u32));
 }
 
-/// The colour of a pixel in linear light.
+/// Returns the linear light of a pixel.
 #[inline(always)]
 fn light_of(light: &[f32; 256], rgb: &[u8], at: usize) -> [f32; 3] {
     let code = &rgb[3 * at..][..3];
     [light[usize::from(code[0])], light[usize::from(code[1])], light[usize::from(code[2])]]
 }
 
-/// The columns and rows of a pixel and those around it, `by` pixels to each side, as far as the picture has them.
+/// Returns the columns and rows within `by` pixels of a pixel, clamped to the picture.
 #[inline(always)]
-fn around(edge: &EdgePixel, by: usize, (width, height): (usize, usize)) -> (Range<usize>, Range<usize>) {
+fn neighbourhood(edge: &EdgePixel, by: usize, (width, height): (usize, usize)) -> (Range<usize>, Range<usize>) {
     let (x, y) = (edge.x as usize, edge.y as usize);
     (x.saturating_sub(by)..(x + by + 1).min(width), y.saturating_sub(by)..(y + by + 1).min(height))
 }
 
-/// The larger of two numbers: one instruction, unlike `f32::max`, which looks for what is no number.
+/// Returns the larger number, in one instruction: unlike `f32::max`, it does not handle NaN.
 #[inline(always)]
 fn larger(a: f32, b: f32) -> f32 {
     if a > b { a } else { b }

@@ -1,4 +1,5 @@
-//! What is done to many pixels at once.
+//! The per-pixel steps, vectorised.
+//! twin: shaders/matte_compare.wgsl, matte_weigh.wgsl, matte_mix.wgsl
 
 use pulp::WithSimd;
 
@@ -9,7 +10,7 @@ use super::contrast::Parts;
 use super::share::{Colors, Evidence, LANES, Prior};
 use crate::frame::MixedPixel;
 
-/// Compares pixels with the surfaces around them.
+/// Evaluates pixels against the colours of the surfaces around.
 pub struct Compare<'a> {
     pub view: &'a View<'a>,
     pub clusters: &'a Clusters,
@@ -20,13 +21,13 @@ pub struct Compare<'a> {
 
 impl WithSimd for Compare<'_> {
     type Output = ();
-    // No vectors by hand: the call has the compiler use what the processor has, in all that it takes in. Loops, not closures for
-    // iterators, which would not have them.
+    // No explicit vectors: the dispatch compiles all inlined code for the processor's instruction set. Loops instead of
+    // iterator closures, which would not be.
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, _: S) {
         let Self { view, clusters, behind, pixels, evidence } = self;
         for (pixels, evidence) in pixels.chunks_mut(LANES).zip(evidence) {
-            // What lies apart in memory first, so that none waits for another.
+            // Scattered reads first, so that they overlap.
             for pixel in &mut *pixels {
                 let at = pixel.at(view.size.0);
                 pixel.own = view.light(at);
@@ -37,26 +38,26 @@ impl WithSimd for Compare<'_> {
             }
             let mut colors = Colors::NONE;
             for (k, pixel) in pixels.iter_mut().enumerate() {
-                let Some(contrast) = clusters.at(pixel.answer) else { continue };
-                // What is remembered of a surface that looks otherwise here is not of that surface.
+                let Some(contrast) = clusters.at(pixel.model) else { continue };
+                // A remembered colour unlike the far surface here is of another surface.
                 pixel.behind = match pixel.behind {
                     Some(light) if contrast.is_like_far(light) => Some(light),
                     _ => None,
                 };
                 let discriminant = contrast.discriminant(pixel.behind);
-                let share = discriminant.share(pixel.own);
+                let alpha = discriminant.alpha(pixel.own);
                 let off_line = match pixel.behind {
-                    Some(light) => Some(contrast.off_line(light, pixel.own, share)),
+                    Some(light) => Some(contrast.off_line(light, pixel.own, alpha)),
                     None => None,
                 };
-                colors.set(k, pixel.edge.labels, (share, discriminant.precision), off_line);
+                colors.set(k, pixel.edge.labels, (alpha, discriminant.precision), off_line);
             }
-            *evidence = Evidence::of(&colors);
+            *evidence = Evidence::new(&colors);
         }
     }
 }
 
-/// Gives pixels their shares, by what is likely in this frame: that is found from the first of them.
+/// Computes alpha of pixels by the frame's prior, which is estimated from the first call's pixels.
 pub struct Weigh<'a> {
     pub prior: &'a mut Prior,
     pub is_first: bool,
@@ -70,23 +71,23 @@ impl WithSimd for Weigh<'_> {
     fn with_simd<S: pulp::Simd>(self, _: S) {
         let Self { prior, is_first, evidence, pixels } = self;
         if is_first {
-            *prior = Prior::of(evidence);
+            *prior = Prior::estimate(evidence);
         }
         for (pixels, evidence) in pixels.chunks_mut(LANES).zip(evidence) {
-            let shares = prior.shares(evidence);
-            for (pixel, share) in pixels.iter_mut().zip(shares) {
-                pixel.share = share;
+            let alphas = prior.alphas(evidence);
+            for (pixel, alpha) in pixels.iter_mut().zip(alphas) {
+                pixel.alpha = alpha;
             }
         }
     }
 }
 
-/// Takes mixed pixels apart.
+/// Separates mixed pixels into their two colours.
 pub struct Mix<'a> {
     pub clusters: &'a Clusters,
     pub width: usize,
     pub pixels: &'a [Pixel],
-    /// The places of those that are mixed.
+    /// Indices of the mixed pixels.
     pub order: &'a [u32],
     pub mixed: &'a mut [MixedPixel],
 }
@@ -100,18 +101,18 @@ impl WithSimd for Mix<'_> {
         for (order, mixed) in order.chunks(LANES).zip(mixed.chunks_mut(LANES)) {
             for (k, &place) in order.iter().enumerate() {
                 let pixel = &pixels[place as usize];
-                if let Some(contrast) = clusters.at(pixel.answer) {
-                    parts.set(k, contrast.before(pixel.behind), pixel.own, pixel.share);
+                if let Some(contrast) = clusters.at(pixel.model) {
+                    parts.set(k, contrast.before(pixel.behind), pixel.own, pixel.alpha);
                 }
             }
             let differences = parts.differences();
             for (k, (&place, mixed)) in order.iter().zip(mixed).enumerate() {
                 let pixel = &pixels[place as usize];
-                let Pixel { edge, behind, share, .. } = *pixel;
-                let behind = if behind.is_some() { 1.0 } else { 1.0 - share };
+                let Pixel { edge, behind, alpha, .. } = *pixel;
+                let behind = if behind.is_some() { 1.0 } else { 1.0 - alpha };
                 let (near_m, far_m) = (edge.near.recip(), edge.far.recip());
                 let difference = [differences[0][k], differences[1][k], differences[2][k]];
-                *mixed = MixedPixel { at: pixel.at(width) as u32, near_m, far_m, share, behind, difference };
+                *mixed = MixedPixel { at: pixel.at(width) as u32, near_m, far_m, share: alpha, behind, difference };
             }
         }
     }

@@ -1,30 +1,34 @@
-//! The share of a mixed pixel: what its colour says, and what was likely before that.
+//! Alpha of mixed pixels: the posterior mean, from the likelihood of the colour and a prior from the depth map
+//! (Bayesian matting, Chuang et al. 2001).
+//! twin: shaders/matte_compare.wgsl, matte_prior.wgsl, matte_weights.wgsl
 
 #![allow(clippy::needless_range_loop)] // Steps and pixels index several arrays at once.
 
 use super::larger;
 
-/// Pixels that are weighed at once. So many for every processor, as the sums over all pixels depend on it.
+/// Pixels evaluated at once. The same number on every processor, since the order of the sums over all pixels depends on
+/// it.
 pub const LANES: usize = 16;
-/// Numbers of that many pixels.
+/// One number per lane.
 pub type Lanes = [f32; LANES];
 
-/// Shares are tried in steps of an eighth.
+/// Number of alphas that are sampled, in steps of an eighth.
 pub const STEPS: usize = 9;
 const STEP: f32 = 1.0 / (STEPS - 1) as f32;
-/// Those of the map's side of one half.
+/// Index of one half, and number of samples on the map's side of it.
 const MIDDLE: usize = STEPS / 2;
 const SIDE: usize = STEPS - MIDDLE;
-/// Surfaces have spots that no pixel around is like: so likely a pure pixel is one, times what evens out densities.
+/// Probability that a pure pixel is an outlier, a spot of a colour that no pixel around has, times a factor that makes
+/// it comparable with the densities.
 pub const OUTLIER: f32 = 0.02;
 
-/// How many of a pixel's four sides, and of its four corners, are of its own surface, where the outline is about straight.
+/// Numbers of a pixel's four sides, and four corners, on its own surface, for outlines that are about straight.
 pub const OUTLINES: [(u32, u32); 5] = [(2, 2), (2, 3), (3, 2), (3, 3), (4, 3)];
-/// For each of them: how likely the pixel's own surface has half of it, five eighths, and so on to all of it, over straight
-/// outlines in all directions that pass anywhere; but for a part, which is evenly any of these, as of all other outlines (the more,
-/// the likelier it is that only something thin passes there). The last row is of pixels beyond the edges of the map, which are
-/// traced.
-pub const SHARES: [[f32; SIDE]; OUTLINES.len() + 2] = [
+/// Prior probability that the pixel's own surface covers 1/2, 5/8, ... 1 of it, for each of [`OUTLINES`]: for straight
+/// outlines in all directions and positions, mixed with a uniform distribution (the larger, the likelier it is that
+/// only something thin passes there). The first row is for all other outlines, the last one for traced pixels beyond
+/// the map's edges.
+pub const ALPHA_PRIORS: [[f32; SIDE]; OUTLINES.len() + 2] = [
     [0.2, 0.2, 0.2, 0.2, 0.2],
     [0.227, 0.358, 0.254, 0.133, 0.029],
     [0.058, 0.095, 0.177, 0.365, 0.305],
@@ -33,116 +37,118 @@ pub const SHARES: [[f32; SIDE]; OUTLINES.len() + 2] = [
     [0.100, 0.100, 0.100, 0.100, 0.600],
     [0.060, 0.060, 0.060, 0.060, 0.760],
 ];
-/// Likelihoods that are as good as nothing, of a share, and of a colour that is off the line between both surfaces.
-pub const LEAST: f32 = 1e-18;
-pub const LEAST_OFF_LINE: f32 = 1e-6;
+/// Lower bounds of likelihoods: of an alpha, and of a colour off the line between both surfaces.
+pub const MIN_LIKELIHOOD: f32 = 1e-18;
+pub const MIN_OFF_LINE: f32 = 1e-6;
 
-/// What the depth map says of a pixel at an edge.
+/// Labels of an edge pixel, from the depth map.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Labels {
-    /// Whether it is of the near surface.
+    /// Whether it belongs to the near surface.
     pub is_near: bool,
-    /// Whether a side of the pixel, and not only a corner, borders the other surface.
+    /// Whether the other surface is on a side of the pixel, not only at a corner.
     pub borders: bool,
-    /// Which row of [`SHARES`] its sides and corners have.
+    /// Row of [`ALPHA_PRIORS`], by the sides and corners.
     pub outline: u8,
-    /// Whether it is part of something so thin that no pixel need be covered by half.
+    /// Whether it is part of something so thin that it may cover less than half of any pixel.
     pub is_thin: bool,
 }
 
 impl Labels {
-    /// Those of a pixel beyond the edges of the map.
+    /// Labels of a traced pixel, beyond the edges of the map.
     pub const BEYOND: Self = Self { is_near: false, borders: false, outline: OUTLINES.len() as u8 + 1, is_thin: false };
 
-    /// What a pixel's sides and corners say, of which so many are of its own surface; `borders` where a side is of the other one.
+    /// Creates labels from the numbers of `sides` and `corners` on the pixel's own surface; `borders` if a side is on
+    /// the other surface.
     #[inline(always)]
     pub fn new(is_near: bool, borders: bool, sides: u32, corners: u32) -> Self {
         let mut outline = 0;
         for (k, at) in OUTLINES.iter().enumerate() {
             outline = if *at == (sides, corners) { k as u8 + 1 } else { outline };
         }
-        // Two neighbours in a row, at most.
+        // At most two neighbours, as on a line.
         Self { is_near, borders, outline, is_thin: is_near && sides + corners <= 2 }
     }
 }
 
-/// What the colours of some pixels at edges say; of the places that are left over, nothing.
+/// Colour measurements of several pixels; unused lanes have `is_there` 0.
 #[derive(Clone, Copy, Debug)]
 pub struct Colors {
-    /// What share of the near surface it is, from below 0 to above 1, and the reciprocal variance of that.
-    share: Lanes,
+    /// Maximum-likelihood alpha along the line between both colours, below 0 to above 1, and its reciprocal variance.
+    alpha: Lanes,
     precision: Lanes,
-    /// How far it is off the line between both surfaces, as a squared distance in standard deviations.
+    /// Squared Mahalanobis distance of the colour to that line.
     off_line: Lanes,
-    /// Labels, 1 or 0; whether there is a pixel at all.
+    /// Labels, 1 or 0; the last one is 1 if the lane is used.
     is_near: Lanes,
     borders: Lanes,
     is_thin: Lanes,
-    /// How likely each share of the pixel's own surface was, from half of it to all.
-    shares: [Lanes; SIDE],
+    /// Prior probabilities of the own surface's coverage, from one half to 1.
+    priors: [Lanes; SIDE],
     is_there: Lanes,
-    /// How likely it is that a pure pixel is like none, times the deviation of its share.
+    /// Probability of an outlier, times the standard deviation of alpha.
     outlier: Lanes,
 }
 
 impl Colors {
     pub const NONE: Self = Self {
-        share: [0.0; LANES],
+        alpha: [0.0; LANES],
         precision: [1.0; LANES],
         off_line: [0.0; LANES],
         is_near: [0.0; LANES],
         borders: [0.0; LANES],
         is_thin: [0.0; LANES],
-        shares: [[0.0; LANES]; SIDE],
+        priors: [[0.0; LANES]; SIDE],
         is_there: [0.0; LANES],
         outlier: [0.0; LANES],
     };
 
-    /// Adds a pixel; `off_line` where the light behind it is known.
+    /// Sets lane `k`; `off_line` only if the background is known.
     #[inline(always)]
-    pub fn set(&mut self, k: usize, labels: Labels, (share, precision): (f32, f32), off_line: Option<f32>) {
+    pub fn set(&mut self, k: usize, labels: Labels, (alpha, precision): (f32, f32), off_line: Option<f32>) {
         let Labels { is_near, borders, outline, is_thin } = labels;
         let number = |is: bool| f32::from(u8::from(is));
-        (self.share[k], self.precision[k], self.off_line[k]) = (share, precision, off_line.unwrap_or(0.0));
+        (self.alpha[k], self.precision[k], self.off_line[k]) = (alpha, precision, off_line.unwrap_or(0.0));
         (self.is_near[k], self.borders[k], self.is_thin[k]) = (number(is_near), number(borders), number(is_thin));
-        for (shares, share) in self.shares.iter_mut().zip(SHARES[usize::from(outline)]) {
-            shares[k] = share;
+        for (priors, prior) in self.priors.iter_mut().zip(ALPHA_PRIORS[usize::from(outline)]) {
+            priors[k] = prior;
         }
-        // No pixel of a surface whose light is known is like none of it.
+        // With a known background, a far pixel is no outlier.
         (self.is_there[k], self.outlier[k]) = (1.0, OUTLIER * number(is_near || off_line.is_none()));
     }
 }
 
-/// What is known of some pixels at edges.
+/// Likelihoods of several edge pixels.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Evidence {
     is_near: Lanes,
     borders: Lanes,
-    /// Likelihood of the pixel's colour if it is pure, as the map says.
+    /// Likelihood of the colour of a pure pixel of the labelled surface.
     pure: Lanes,
-    /// The expectation over shares of the map's side of one half (over all where it is thin), and that of the same times the share.
+    /// Expected likelihood over the alphas on the map's side of one half (over all if thin), and of likelihood times
+    /// alpha.
     half: [Lanes; 2],
-    /// The means over all shares.
+    /// Means of both over all alphas.
     any: [Lanes; 2],
 }
 
 impl Evidence {
-    /// How likely colours are for each share.
+    /// Computes the likelihoods over the sampled alphas.
     #[inline(always)]
-    pub fn of(colors: &Colors) -> Self {
+    pub fn new(colors: &Colors) -> Self {
         let mut evidence = Self { is_near: colors.is_near, borders: colors.borders, ..Self::default() };
         for k in 0..LANES {
-            let (share, precision) = (colors.share[k], colors.precision[k]);
-            let share = if share > -0.3 { share } else { -0.3 };
-            let share = if share < 1.3 { share } else { 1.3 };
-            // What is no mixture of both has a colour of its own, as lone hair beside a face.
-            let fits = colors.is_there[k] * larger(exp(-colors.off_line[k]), LEAST_OFF_LINE);
+            let (alpha, precision) = (colors.alpha[k], colors.precision[k]);
+            let alpha = if alpha > -0.3 { alpha } else { -0.3 };
+            let alpha = if alpha < 1.3 { alpha } else { 1.3 };
+            // A colour off the line between both surfaces is no mixture of them, such as a lone hair beside a face.
+            let fits = colors.is_there[k] * larger(exp(-colors.off_line[k]), MIN_OFF_LINE);
             let mut likelihoods = [0.0; STEPS];
             let mut any = [0.0; 2];
             for step in 0..STEPS {
                 let tried = step as f32 * STEP;
-                let off = tried - share;
-                likelihoods[step] = fits * larger(exp(-0.5 * precision * off * off), LEAST);
+                let off = tried - alpha;
+                likelihoods[step] = fits * larger(exp(-0.5 * precision * off * off), MIN_LIKELIHOOD);
                 any[0] += likelihoods[step];
                 any[1] += likelihoods[step] * tried;
             }
@@ -150,7 +156,7 @@ impl Evidence {
             let mut side = [0.0; 2];
             for own in 0..SIDE {
                 let step = if is_near { MIDDLE + own } else { MIDDLE - own };
-                let likely = colors.shares[own][k] * likelihoods[step];
+                let likely = colors.priors[own][k] * likelihoods[step];
                 side[0] += likely;
                 side[1] += likely * (step as f32 * STEP);
             }
@@ -166,24 +172,24 @@ impl Evidence {
     }
 }
 
-/// How likely pixels at edges are mixed at all in this frame, and how often the depth map errs: from a hard mask neither is,
-/// and from a camera half of them are. Found by expectation maximisation.
+/// Probabilities, in this frame, that an edge pixel is mixed at all, and that the depth map is wrong. For a hard mask
+/// both are 0; for a camera, about half of the edge pixels are mixed. Estimated by expectation maximisation.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Prior {
     pub mixed: f32,
     pub wrong: f32,
 }
 
-/// The first guess, what is least likely of both, what is most, and rounds until it is found.
+/// Initial value, lower bound of both, upper bounds, and number of iterations.
 pub const PRIOR: Prior = Prior { mixed: 0.3, wrong: 0.01 };
-pub const PRIOR_FLOOR: f32 = 0.002;
-pub const PRIOR_MOST: Prior = Prior { mixed: 0.9, wrong: 0.3 };
+pub const PRIOR_MIN: f32 = 0.002;
+pub const PRIOR_MAX: Prior = Prior { mixed: 0.9, wrong: 0.3 };
 pub const PRIOR_ROUNDS: usize = 4;
 
 impl Prior {
-    /// What makes all that is known of a frame's pixels most likely.
+    /// Estimates the prior of a frame by expectation maximisation over the evidence of its pixels.
     #[inline(always)]
-    pub fn of(evidence: &[Evidence]) -> Self {
+    pub fn estimate(evidence: &[Evidence]) -> Self {
         let mut prior = PRIOR;
         for _ in 0..PRIOR_ROUNDS {
             let [pure, half, any] = prior.weights();
@@ -192,49 +198,49 @@ impl Prior {
                 for k in 0..LANES {
                     let (half, any) = (half * one.half[0][k], any * one.any[0][k]);
                     let total = pure * one.pure[k] + half + any;
-                    let is_told = f32::from(u8::from(total > f32::MIN_POSITIVE));
-                    let share = is_told / larger(total, f32::MIN_POSITIVE);
-                    wrong[k] += any * share;
-                    all[k] += is_told;
-                    mixed[k] += one.borders[k] * (half * share);
-                    bordering[k] += one.borders[k] * is_told;
+                    let is_valid = f32::from(u8::from(total > f32::MIN_POSITIVE));
+                    let scale = is_valid / larger(total, f32::MIN_POSITIVE);
+                    wrong[k] += any * scale;
+                    all[k] += is_valid;
+                    mixed[k] += one.borders[k] * (half * scale);
+                    bordering[k] += one.borders[k] * is_valid;
                 }
             }
             let [mixed, bordering, wrong, all] = [mixed, bordering, wrong, all].map(|sums| sums.iter().sum::<f32>());
-            prior.mixed = (mixed / bordering.max(1.0)).clamp(PRIOR_FLOOR, PRIOR_MOST.mixed);
-            prior.wrong = (wrong / all.max(1.0)).clamp(PRIOR_FLOOR, PRIOR_MOST.wrong);
+            prior.mixed = (mixed / bordering.max(1.0)).clamp(PRIOR_MIN, PRIOR_MAX.mixed);
+            prior.wrong = (wrong / all.max(1.0)).clamp(PRIOR_MIN, PRIOR_MAX.wrong);
         }
         prior
     }
 
-    /// How likely a pixel is pure, part of a soft outline where the map says, or anything.
+    /// Returns the weights of a pure pixel, of a soft outline where the map has it, and of any alpha.
     #[inline(always)]
     fn weights(&self) -> [f32; 3] {
         [larger(1.0 - self.mixed - self.wrong, 0.0), self.mixed, self.wrong]
     }
 
-    /// The expected shares of the near surface, 0 to 1.
+    /// Returns the posterior means of alpha, 0 to 1.
     #[inline(always)]
-    pub fn shares(&self, one: &Evidence) -> Lanes {
+    pub fn alphas(&self, one: &Evidence) -> Lanes {
         let [pure, half, any] = self.weights();
-        let mut shares = [0.0; LANES];
+        let mut alphas = [0.0; LANES];
         for k in 0..LANES {
             let pure = pure * one.pure[k];
             let total = pure + half * one.half[0][k] + any * one.any[0][k];
             let near = pure * one.is_near[k] + half * one.half[1][k] + any * one.any[1][k];
-            shares[k] = if total > f32::MIN_POSITIVE { near / total } else { one.is_near[k] };
+            alphas[k] = if total > f32::MIN_POSITIVE { near / total } else { one.is_near[k] };
         }
-        shares
+        alphas
     }
 }
 
-/// e to a power that is not above 0, to within some 2e-7 of it, and as good as nothing below e to the -80: without branches and
-/// calls, so that loops become vector code, and the same on every processor.
+/// Returns e to a power <= 0, with a relative error of about 2e-7; practically 0 below e^-80. Free of branches and
+/// calls, so that loops vectorise, and identical on every processor.
 #[inline(always)]
 fn exp(power: f32) -> f32 {
-    // Added to a small number, it leaves that rounded to a whole one, in its lowest bits.
+    // Adding this rounds a small number to an integer, in the lowest bits of the mantissa.
     const ROUND: f32 = 12_582_912.0;
-    /// ln 2, in two parts, of which the first times a small whole number is exact.
+    /// ln 2 in two parts (Cody and Waite): the first one times a small integer is exact.
     const LN_2: [f32; 2] = [355.0 / 512.0, -2.121_944_4e-4];
     const BIAS: u32 = 127;
     const MANTISSA_BITS: u32 = f32::MANTISSA_DIGITS - 1;
@@ -253,7 +259,7 @@ fn exp(power: f32) -> f32 {
 mod tests {
     use super::*;
 
-    /// Whether a place is on the near side of a straight outline.
+    /// Whether a point is on the near side of a straight outline.
     fn is_inside(direction: [f32; 2], offset: f32, x: f32, y: f32) -> bool {
         direction[0] * x + direction[1] * y < offset
     }
@@ -274,26 +280,26 @@ mod tests {
                 let at = |k: usize| (k as f32 + 0.5) / SAMPLES as f32 - 0.5;
                 let of_own =
                     |k: &usize| is_inside([cos, sin], offset, at(k % SAMPLES), at(k / SAMPLES)) == is_near(0, 0);
-                let share = (0..SAMPLES * SAMPLES).filter(of_own).count() as f32 / (SAMPLES * SAMPLES) as f32;
-                let step = ((share - 0.5).max(0.0) / STEP).min((SIDE - 1) as f32);
+                let alpha = (0..SAMPLES * SAMPLES).filter(of_own).count() as f32 / (SAMPLES * SAMPLES) as f32;
+                let step = ((alpha - 0.5).max(0.0) / STEP).min((SIDE - 1) as f32);
                 let below = (step as usize).min(SIDE - 2);
                 found[row][below] += 1.0 - (step - below as f32);
                 found[row][below + 1] += step - below as f32;
             }
         }
-        for (found, shares) in found.iter().zip(&SHARES[1..]) {
+        for (found, priors) in found.iter().zip(&ALPHA_PRIORS[1..]) {
             let total: f32 = found.iter().sum();
-            // What is evenly any share is as much as the least likely one has, and no more than three quarters.
-            let even = SIDE as f32 * shares.iter().copied().fold(1.0, f32::min);
-            assert!(even < 0.75, "{shares:?}");
+            // The uniform part: as much as the least likely sample has, and less than three quarters.
+            let even = SIDE as f32 * priors.iter().copied().fold(1.0, f32::min);
+            assert!(even < 0.75, "{priors:?}");
             let least = found.iter().copied().fold(total, f32::min) / total;
             let even = (even - SIDE as f32 * least).max(0.0);
-            for (found, share) in found.iter().zip(shares) {
+            for (found, prior) in found.iter().zip(priors) {
                 let expected = (1.0 - even) * found / total + even / SIDE as f32;
-                assert!((share - expected).abs() < 0.03, "{share} is not {expected}: {shares:?}, {found:?}");
+                assert!((prior - expected).abs() < 0.03, "{prior} is not {expected}: {priors:?}, {found:?}");
             }
         }
-        SHARES.iter().for_each(|shares| assert!((shares.iter().sum::<f32>() - 1.0).abs() < 2e-3, "{shares:?}"));
+        ALPHA_PRIORS.iter().for_each(|priors| assert!((priors.iter().sum::<f32>() - 1.0).abs() < 2e-3, "{priors:?}"));
     }
 
     #[test]

@@ -1,4 +1,5 @@
-//! The pixels beside jumps of depth.
+//! Edge detection: pixels beside depth discontinuities.
+//! twin: shaders/matte_survey.wgsl, matte_edges.wgsl
 
 use std::ops::Range;
 
@@ -8,41 +9,41 @@ use super::share::Labels;
 use super::{EdgePixel, larger, smaller};
 use crate::compute::bands::Bands;
 use crate::compute::thread_pool::ThreadPool;
-use crate::depth::bits::{Bits, WORD, places};
+use crate::depth::bits::{Bits, WORD, set_bits};
 use crate::frame::DepthMap;
 
-/// Finds them; owns the memory for it.
+/// Finds edge pixels; owns the memory for it.
 #[derive(Debug, Default)]
 pub struct Survey(Vec<Band>);
 
-/// What is found in a band, and what that needs.
+/// Results and memory of one band of rows.
 #[derive(Debug, Default)]
 struct Band {
     edges: Vec<EdgePixel>,
-    /// Three rows, which take turns.
+    /// A ring buffer of three rows.
     rows: [Vec<Block>; 3],
 }
 
-/// Pixels of a row, with one more on either side.
+/// [`WORD`] pixels of a row, with one more on either side.
 #[derive(Clone, Copy, Debug)]
 struct Block {
-    /// The highest and the lowest inverse depth of them, in 1/m; 0 where it is unknown.
+    /// Largest and smallest inverse depth in the block, in 1/m; 0 if unknown.
     near: f32,
     far: f32,
-    /// That of each, once it was needed.
+    /// Inverse depth of each pixel, computed on demand.
     inverse: Option<[f32; WIDE]>,
 }
 
 const WIDE: usize = WORD + 2;
 
 impl Survey {
-    /// Replaces `edges` by the pixels of a map that differ by more than `jump` from one of their eight neighbours, row by row,
-    /// and marks them.
+    /// Replaces `edges` by the pixels whose inverse depth varies by more than `depth_step` in their 3x3 neighbourhood,
+    /// row by row, and marks them in `at_edge`.
     pub fn find(
         &mut self,
         (arch, workers): (Arch, &mut ThreadPool),
         map: &DepthMap,
-        jump: f32,
+        depth_step: f32,
         (at_edge, edges): (&mut Bits, &mut Vec<EdgePixel>),
     ) {
         let (width, height) = (map.width as usize, map.height as usize);
@@ -53,7 +54,7 @@ impl Survey {
         found.resize_with(bands.rows().count(), Band::default);
         let parts = bands.rows().zip(bands.split(words, across)).zip(&mut *found);
         workers.run_each(parts, &|((of_band, words), band)| {
-            arch.dispatch(FindEdges { map, jump, of_band, words, across, band });
+            arch.dispatch(FindEdges { map, depth_step, of_band, words, across, band });
         });
         edges.clear();
         found.iter().for_each(|band| edges.extend_from_slice(&band.edges));
@@ -63,9 +64,9 @@ impl Survey {
 /// Finds the edges of a band of rows.
 struct FindEdges<'a> {
     map: &'a DepthMap,
-    jump: f32,
+    depth_step: f32,
     of_band: Range<usize>,
-    /// Marks for its pixels, so many words for a row.
+    /// Bitmap words of the band, `across` per row.
     words: &'a mut [u64],
     across: usize,
     band: &'a mut Band,
@@ -75,13 +76,13 @@ impl WithSimd for FindEdges<'_> {
     type Output = ();
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        let Self { map, jump, of_band, words, across, band: Band { edges, rows } } = self;
+        let Self { map, depth_step, of_band, words, across, band: Band { edges, rows } } = self;
         let (width, height) = (map.width as usize, map.height as usize);
         let metres = |y: usize| &map.metres[y * width..][..width];
         edges.clear();
         let first = of_band.start;
         for y in of_band {
-            // The row below is new; before the first one, that itself is, too, and the one above.
+            // Each row adds the one below; the first row of the band adds all three.
             for y in (if y == first { y.saturating_sub(1) } else { y + 1 })..(y + 2).min(height) {
                 let row = &mut rows[y % 3];
                 row.clear();
@@ -99,8 +100,8 @@ impl WithSimd for FindEdges<'_> {
                     let block = &rows[y % 3][k];
                     (near, far) = (larger(near, block.near), smaller(far, block.far));
                 }
-                // Mostly it is one surface.
-                if near - far <= jump {
+                // Most blocks show one surface.
+                if near - far <= depth_step {
                     continue;
                 }
                 let begin = k * WORD;
@@ -111,16 +112,17 @@ impl WithSimd for FindEdges<'_> {
                 let (near, far) = ranges(&three);
                 let mut found = [0; WORD];
                 for x in 0..WORD {
-                    found[x] = u8::from(near[x] - far[x] > jump);
+                    found[x] = u8::from(near[x] - far[x] > depth_step);
                 }
                 let there = !0 >> (WORD - (width - begin).min(WORD));
                 *word = word_of(&found) & there;
-                for place in places(*word) {
+                for place in set_bits(*word) {
                     let [x, y] = [(begin + place) as u32, y as u32];
                     let mut edge = EdgePixel { x, y, near: near[place], far: far[place], labels: Labels::default() };
                     let own = three[1][place + 1];
-                    // The surface that is seen beside a nearer one is its own, even where a third one is farther.
-                    edge.far = if edge.near - own > jump { own } else { edge.far };
+                    // If this pixel is the farther one, its own surface is the far one, even beside a third one behind
+                    // it.
+                    edge.far = if edge.near - own > depth_step { own } else { edge.far };
                     edge.labels = labels(&edge, &three, place + 1, (width, height));
                     edges.push(edge);
                 }
@@ -129,10 +131,10 @@ impl WithSimd for FindEdges<'_> {
     }
 }
 
-/// The highest and the lowest inverse depth of some pixels, in 1/m.
+/// Returns the largest and smallest inverse depth of some pixels, in 1/m.
 #[inline(always)]
 fn ends<S: Simd>(simd: S, metres: &[f32]) -> [f32; 2] {
-    // Inverse depth falls with depth, so that one division each is enough.
+    // Inverse depth decreases with depth, so one division per extreme is enough.
     let [least, most] = [DepthMap::LEAST_M, DepthMap::MOST_M].map(|metres| simd.splat_f32s(metres));
     let [mut nearest, mut farthest] = [simd.splat_f32s(f32::INFINITY), simd.splat_f32s(0.0)];
     let (head, tail) = S::as_simd_f32s(metres);
@@ -140,7 +142,7 @@ fn ends<S: Simd>(simd: S, metres: &[f32]) -> [f32; 2] {
         let is_known =
             simd.and_m32s(simd.greater_than_or_equal_f32s(metres, least), simd.less_than_or_equal_f32s(metres, most));
         nearest = simd.min_f32s(nearest, simd.select_f32s(is_known, metres, nearest));
-        // What is unknown is farthest.
+        // Unknown depth counts as infinite.
         farthest = simd.max_f32s(farthest, simd.select_f32s(is_known, metres, simd.splat_f32s(f32::INFINITY)));
     }
     let (mut nearest, mut farthest) = (simd.reduce_min_f32s(nearest), simd.reduce_max_f32s(farthest));
@@ -152,7 +154,8 @@ fn ends<S: Simd>(simd: S, metres: &[f32]) -> [f32; 2] {
     [DepthMap::inverse_of(nearest), DepthMap::inverse_of(farthest)]
 }
 
-/// The inverse depth of a block of a row and of one pixel more on either side, in 1/m; what is beyond the row is as its ends.
+/// Returns the inverse depth of a block of a row and of one more pixel on either side, in 1/m; the border is
+/// replicated.
 #[inline(always)]
 fn inverse(metres: &[f32], begin: usize) -> [f32; WIDE] {
     let mut inverse = [0.0; WIDE];
@@ -169,7 +172,7 @@ fn inverse(metres: &[f32], begin: usize) -> [f32; WIDE] {
     inverse
 }
 
-/// The highest and the lowest inverse depth around each pixel of a block.
+/// Returns the maximum and minimum inverse depth of each pixel's 3x3 neighbourhood, separably.
 #[inline(always)]
 fn ranges([above, here, below]: &[[f32; WIDE]; 3]) -> ([f32; WORD], [f32; WORD]) {
     let (mut high, mut low) = ([0.0; WIDE], [0.0; WIDE]);
@@ -185,27 +188,27 @@ fn ranges([above, here, below]: &[[f32; WIDE]; 3]) -> ([f32; WORD], [f32; WORD])
     (near, far)
 }
 
-/// The bits of bytes that are 1 or 0.
+/// Packs bytes, each 1 or 0, into bits.
 #[inline(always)]
 fn word_of(bytes: &[u8; WORD]) -> u64 {
-    // `|` instead of an early exit, so that it becomes vector code: mostly there are none.
+    // `|` instead of an early exit, to vectorise: mostly there are none.
     if bytes.iter().fold(0, |any, byte| any | byte) == 0 {
         return 0;
     }
     let mut word = 0;
     for (k, bytes) in bytes.as_chunks().0.iter().enumerate() {
-        // The product has the sum of all bytes, each moved to a bit of its own, in its highest byte.
+        // The highest byte of the product is the sum of all bytes, each shifted to its own bit.
         word |= (u64::from_le_bytes(*bytes).wrapping_mul(0x0102_0408_1020_4080) >> 56) << (8 * k);
     }
     word
 }
 
-/// What the map says of an edge pixel, by the inverse depth of its row and those beside it, where it is at place `at`.
+/// Computes the labels of the edge pixel at index `at` of its row, from the inverse depths of three rows.
 #[inline(always)]
 fn labels(edge: &EdgePixel, rows: &[[f32; WIDE]; 3], at: usize, (width, height): (usize, usize)) -> Labels {
     let (x, y, middle) = (edge.x as usize, edge.y as usize, edge.middle());
     let is_near = rows[1][at] > middle;
-    // No branches; what is beyond the picture is no neighbour.
+    // Without branches; pixels beyond the picture are no neighbours.
     let (columns, lines) = ([x > 0, true, x + 1 < width], [y > 0, true, y + 1 < height]);
     let (mut borders, mut sides, mut alike) = (false, 0, 0);
     for (k, (row, is_line)) in rows.iter().zip(lines).enumerate() {
@@ -217,6 +220,6 @@ fn labels(edge: &EdgePixel, rows: &[[f32; WIDE]; 3], at: usize, (width, height):
             borders |= is_side & !is_alike;
         }
     }
-    // Less the pixel itself.
+    // `alike` includes the pixel itself.
     Labels::new(is_near, borders, sides, alike - sides - 1)
 }

@@ -1,27 +1,28 @@
-//! Symmetric matrices of three rows, and vectors: what covariances of colours need.
+//! Symmetric 3x3 matrices and vectors, for covariances of colours.
+//! twin: shaders/matte_contrast.wgsl
 
 /// A symmetric matrix: xx, xy, xz, yy, yz, zz.
 pub type Symmetric = [f32; 6];
 
-/// The upper triangle of `a` times its transpose.
+/// Returns the upper triangle of `a` times its transpose (outer product).
 #[inline(always)]
 pub(super) fn outer(a: [f32; 3]) -> Symmetric {
     [a[0] * a[0], a[0] * a[1], a[0] * a[2], a[1] * a[1], a[1] * a[2], a[2] * a[2]]
 }
 
-/// The product of two vectors.
+/// Returns the dot product.
 #[inline(always)]
 pub(super) fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
-/// `matrix` times `vector`.
+/// Returns `matrix` times `vector`.
 #[inline(always)]
 pub(super) fn times(&[xx, xy, xz, yy, yz, zz]: &Symmetric, vector: [f32; 3]) -> [f32; 3] {
     [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]].map(|row| dot(row, vector))
 }
 
-/// The inverse, by the adjugate; of a matrix that has none, zeros.
+/// Returns the inverse, by the adjugate; zeros for a singular matrix.
 #[inline(always)]
 pub(super) fn inverse(&[xx, xy, xz, yy, yz, zz]: &Symmetric) -> Symmetric {
     let (a, b, c) = (yy * zz - yz * yz, xz * yz - xy * zz, xy * yz - xz * yy);

@@ -1,4 +1,5 @@
-//! Thin things beyond the edges of the map.
+//! Traces thin structures, such as hair, beyond the edges of the depth map.
+//! twin: shaders/matte_trace.wgsl, matte_claim.wgsl, matte_wide.wgsl
 
 use std::ops::Range;
 
@@ -6,63 +7,63 @@ use pulp::{Arch, WithSimd};
 
 use super::clusters::{Clusters, View};
 use super::share::Labels;
-use super::{EdgePixel, Pixel, around};
+use super::{EdgePixel, Pixel, neighbourhood};
 use crate::compute::thread_pool::ThreadPool;
-use crate::depth::bits::{Bits, places};
+use crate::depth::bits::{Bits, set_bits};
 use crate::frame::DepthMap;
 
-/// Neighbours of a pixel with this share are looked at, too, where the map has no edge.
+/// Minimum alpha of a pixel whose neighbours are traced, where the map has no edge.
 pub const TRACED_FROM: f32 = 0.1;
 
-/// Follows thin things, such as hair, to where the depth map has nothing of them: from pixels that show something near though
-/// the map has none there, to neighbours that do so, too (hysteresis, as edges are traced).
+/// Follows thin structures to where the depth map does not have them: from pixels with some alpha that are far in the
+/// map, to their neighbours, if these have some alpha too (hysteresis, as in Canny's edge tracing).
 pub struct Trace<'a> {
     pub arch: Arch,
     pub workers: &'a mut ThreadPool,
-    /// As in a [`View`].
+    /// See [`View`].
     pub size: (usize, usize),
     pub metres: &'a [f32],
-    pub jump: f32,
+    pub depth_step: f32,
     pub rgb: &'a [u8],
     pub light: &'a [f32; 256],
     pub at_edge: &'a mut Bits,
     pub clusters: &'a mut Clusters,
-    /// From these of the pixels one step is taken; what that finds is added to them.
+    /// The pixels from which to trace one step; the new ones are appended to `pixels`.
     pub compared: Range<usize>,
     pub pixels: &'a mut Vec<Pixel>,
 }
 
 impl WithSimd for Trace<'_> {
-    /// How many pixels it has marked.
+    /// The number of newly marked pixels.
     type Output = usize;
-    // One after the other, as the clusters that one needs are made of what is marked until then.
+    // Sequential: a new colour model depends on the pixels marked so far.
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, _: S) -> usize {
-        let Self { arch, workers, size, metres, jump, rgb, light, at_edge, clusters, compared, pixels } = self;
+        let Self { arch, workers, size, metres, depth_step, rgb, light, at_edge, clusters, compared, pixels } = self;
         let mut marked = 0;
         for k in compared {
-            let Pixel { edge, share, .. } = pixels[k];
-            if edge.labels.is_near || share < TRACED_FROM {
+            let Pixel { edge, alpha, .. } = pixels[k];
+            if edge.labels.is_near || alpha < TRACED_FROM {
                 continue;
             }
-            let (xs, ys) = around(&edge, 1, size);
+            let (xs, ys) = neighbourhood(&edge, 1, size);
             for y in ys {
-                for place in places(!at_edge.from(xs.start, y) & below(xs.len())) {
+                for place in set_bits(!at_edge.word_from(xs.start, y) & below(xs.len())) {
                     let x = xs.start + place;
-                    let is_far = (DepthMap::inverse_of(metres[y * size.0 + x]) - edge.far).abs() <= jump;
+                    let is_far = (DepthMap::inverse_of(metres[y * size.0 + x]) - edge.far).abs() <= depth_step;
                     if !is_far {
                         continue;
                     }
                     at_edge.set(x, y);
                     marked += 1;
                     let next = EdgePixel { x: x as u32, y: y as u32, labels: Labels::BEYOND, ..edge };
-                    let asked = clusters.asked();
-                    let answer = clusters.ask(jump, &next);
-                    if answer as usize == asked {
-                        clusters.find((arch, workers), &View { size, metres, jump, at_edge, rgb, light }, asked);
+                    let count = clusters.model_count();
+                    let model = clusters.request_model(depth_step, &next);
+                    if model as usize == count {
+                        clusters.find((arch, workers), &View { size, metres, depth_step, at_edge, rgb, light }, count);
                     }
-                    if clusters.at(answer).is_some() {
-                        pixels.push(Pixel::new(next, answer));
+                    if clusters.at(model).is_some() {
+                        pixels.push(Pixel::new(next, model));
                     }
                 }
             }
@@ -71,29 +72,29 @@ impl WithSimd for Trace<'_> {
     }
 }
 
-/// So many bits, the lowest ones.
+/// Returns a mask of the `count` lowest bits.
 #[inline(always)]
 fn below(count: usize) -> u64 {
     (1 << count) - 1
 }
 
-/// Tells what is wide from what is thin; owns the memory for it.
+/// Separates wide regions from thin structures; owns the memory for it.
 #[derive(Debug, Default)]
 pub struct Wide {
-    /// The places of the pixels that each step has traced.
+    /// Ranges of the pixels that were traced in each step.
     pub steps: Vec<Range<usize>>,
-    /// What was traced, what of that has some of what is near, and what is part of something wide.
+    /// Traced pixels, those of them with some alpha, and those in wide regions.
     traced: Bits,
     seen: Bits,
     wide: Bits,
-    /// The places of those in the middle of something wide, of a step.
+    /// Indices of the pixels of a step whose 3x3 neighbourhood is full.
     middles: Vec<usize>,
 }
 
 impl Wide {
-    /// Lets go of pixels that were traced into something far that looks like what is near: a hair nowhere fills a square of three
-    /// pixels, as a picture's frame does.
-    pub fn drop(&mut self, size: (usize, usize), pixels: &mut [Pixel]) {
+    /// Discards pixels that were traced into a far surface that looks like the near one: a hair never fills a square of
+    /// three pixels, as the edge of a picture frame does.
+    pub fn discard_wide(&mut self, size: (usize, usize), pixels: &mut [Pixel]) {
         let Self { steps, traced, seen, wide, middles } = self;
         if steps.iter().all(Range::is_empty) {
             return;
@@ -101,35 +102,35 @@ impl Wide {
         for bits in [&mut *traced, &mut *seen, &mut *wide] {
             bits.clear(size);
         }
-        for Pixel { edge, share, .. } in steps.iter().flat_map(|step| &pixels[step.clone()]) {
+        for Pixel { edge, alpha, .. } in steps.iter().flat_map(|step| &pixels[step.clone()]) {
             let (x, y) = (edge.x as usize, edge.y as usize);
             traced.set(x, y);
-            if *share >= TRACED_FROM {
+            if *alpha >= TRACED_FROM {
                 seen.set(x, y);
             }
         }
         for step in &*steps {
             let is_middle = |edge: &EdgePixel| {
-                let (xs, ys) = around(edge, 1, size);
-                let missing = ys.fold(0, |missing, y| missing | !seen.from(xs.start, y));
+                let (xs, ys) = neighbourhood(edge, 1, size);
+                let missing = ys.fold(0, |missing, y| missing | !seen.word_from(xs.start, y));
                 missing & below(xs.len()) == 0
             };
             middles.clear();
             middles.extend(step.clone().filter(|&k| is_middle(&pixels[k].edge)));
-            // The outline of what is wide is part of it, and seen from the next step on.
+            // The outline of a wide region belongs to it, and counts as seen from the next step on.
             for &middle in &*middles {
-                let (xs, ys) = around(&pixels[middle].edge, 2, size);
+                let (xs, ys) = neighbourhood(&pixels[middle].edge, 2, size);
                 for y in ys {
-                    let part = traced.from(xs.start, y) & below(xs.len());
+                    let part = traced.word_from(xs.start, y) & below(xs.len());
                     seen.set_from(xs.start, y, part);
                     wide.set_from(xs.start, y, part);
                 }
             }
         }
         for pixel in steps.iter().flat_map(|step| step.clone()) {
-            let Pixel { edge, share, .. } = &mut pixels[pixel];
+            let Pixel { edge, alpha, .. } = &mut pixels[pixel];
             if wide.has(edge.x as usize, edge.y as usize) {
-                *share = 0.0;
+                *alpha = 0.0;
             }
         }
     }

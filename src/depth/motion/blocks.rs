@@ -1,4 +1,4 @@
-//! Block matching on reduced pictures, from coarse to fine.
+//! Hierarchical block matching on luma pyramids (minimum sum of absolute differences).
 
 use crate::depth::reduced::block_px;
 use crate::frame::ColorImage;
@@ -6,45 +6,45 @@ use crate::frame::scale::halve_rows;
 
 use super::Vector;
 
-/// Columns and rows of a cell of each level; what is compared is twice as large, and has it in its middle.
+/// Side of a cell in pixels of each level; the compared window is twice as large, around the cell.
 pub const CELL: usize = 4;
 const WINDOW: usize = 2 * CELL;
-/// Levels, each of half the size of the one before.
+/// Pyramid levels, each half the size of the previous one.
 const LEVELS: usize = 3;
-/// Pixels of the coarsest level that are searched either way.
+/// Search radius on the coarsest level, in pixels.
 const SEARCH: i32 = 4;
-/// Another vector than none has to be better by so many codes a pixel.
+/// Advantage of the zero vector: any other one has to be better by one code per pixel.
 const AT_REST: u32 = (WINDOW * WINDOW) as u32;
 
-/// A picture's luma.
+/// A pyramid level: luma, and the cells' motion.
 #[derive(Debug, Default)]
 struct Level {
     width: usize,
     height: usize,
     luma: Vec<u8>,
-    /// Per cell.
+    /// Motion vector per cell.
     moved: Vec<Vector>,
 }
 
-/// Finds how the blocks of a picture moved.
+/// Estimates the motion of the blocks of a picture.
 #[derive(Debug, Default)]
 pub struct Blocks {
     then: [Level; LEVELS],
     now: [Level; LEVELS],
-    /// Sums of a row of blocks.
+    /// Column sums of a row of blocks.
     sums: Vec<u16>,
 }
 
 impl Blocks {
-    /// Keeps a picture.
+    /// Sets the reference picture.
     #[inline(always)]
     pub fn keep(&mut self, color: &ColorImage) {
         reduce(color, &mut self.then, &mut self.sums);
     }
 
-    /// Finds where its blocks are in a later one; of those of the finest level, that do not rest.
+    /// Finds the motion of the reference picture's blocks to a later one; on the finest level, skips cells at rest.
     #[inline(always)]
-    pub fn find(&mut self, color: &ColorImage, rests: impl Fn((usize, usize)) -> bool) {
+    pub fn find(&mut self, color: &ColorImage, is_at_rest: impl Fn((usize, usize)) -> bool) {
         reduce(color, &mut self.now, &mut self.sums);
         for level in (0..LEVELS).rev() {
             let (finer, coarser) = self.then.split_at_mut(level + 1);
@@ -53,7 +53,7 @@ impl Blocks {
             then.moved.clear();
             for row in 0..down {
                 for column in 0..across {
-                    if level == 0 && rests((column, row)) {
+                    if level == 0 && is_at_rest((column, row)) {
                         then.moved.push([0; 2]);
                         continue;
                     }
@@ -73,9 +73,9 @@ impl Blocks {
         }
     }
 
-    /// How the cell moved, in pixels of the finest level.
+    /// Returns a cell's motion, in pixels of the finest level.
     #[inline(always)]
-    pub fn of(&self, (column, row): (usize, usize)) -> Vector {
+    pub fn vector_of(&self, (column, row): (usize, usize)) -> Vector {
         let (across, down) = self.then[0].cells();
         self.then[0].moved[row.min(down - 1) * across + column.min(across - 1)]
     }
@@ -100,11 +100,11 @@ impl Best<'_> {
     #[inline(always)]
     fn search_all(&mut self) {
         for y in -SEARCH..=SEARCH {
-            (-SEARCH..=SEARCH).for_each(|x| self.look([x, y]));
+            (-SEARCH..=SEARCH).for_each(|x| self.try_vector([x, y]));
         }
     }
 
-    /// Around the vectors of the next coarser level.
+    /// Tests the vectors of the coarser level's cells around, then the neighbours of the best one.
     #[inline(always)]
     fn search_near(&mut self, coarser: &Level, [column, row]: [usize; 2]) {
         let (across, down) = coarser.cells();
@@ -113,24 +113,24 @@ impl Best<'_> {
             let place = |cell: usize, by: i32, count: usize| (cell as i32 / 2 + by).clamp(0, count as i32 - 1) as usize;
             let moved = coarser.moved[place(row, y, down) * across + place(column, x, across)].map(|px| 2 * px);
             if moved != last {
-                self.look(moved);
+                self.try_vector(moved);
                 last = moved;
             }
         }
         let [x, y] = self.moved;
         for by in [[-1, -1], [0, -1], [1, -1], [-1, 0], [1, 0], [-1, 1], [0, 1], [1, 1]] {
-            self.look([x + by[0], y + by[1]]);
+            self.try_vector([x + by[0], y + by[1]]);
         }
     }
 
     #[inline(always)]
-    fn look(&mut self, moved: Vector) {
+    fn try_vector(&mut self, moved: Vector) {
         if let Some(sad) = self.sad_of(moved).filter(|&sad| sad < self.sad) {
             (self.moved, self.sad) = (moved, sad);
         }
     }
 
-    /// The sum of absolute differences; `None` outside of the picture.
+    /// Returns the sum of absolute differences; `None` if the window leaves the picture.
     #[inline(always)]
     fn sad_of(&self, moved: Vector) -> Option<u32> {
         let (width, height) = (self.now.width, self.now.height);
@@ -148,7 +148,7 @@ impl Best<'_> {
     }
 }
 
-/// Makes the levels of a picture: the mean luma of blocks, and of four pixels each.
+/// Builds the pyramid: the mean luma of blocks, then repeated halving.
 #[inline(always)]
 fn reduce(color: &ColorImage, levels: &mut [Level; LEVELS], sums: &mut Vec<u16>) {
     let (block, width) = (block_px(color.width), color.width as usize);
@@ -156,7 +156,7 @@ fn reduce(color: &ColorImage, levels: &mut [Level; LEVELS], sums: &mut Vec<u16>)
     (finest.width, finest.height) = (width / block, color.height as usize / block);
     finest.luma.resize(finest.width * finest.height, 0);
     sums.resize(3 * width, 0);
-    // Green counts twice.
+    // Luma is (r + 2g + b) / 4.
     let scale = 65536 / (4 * block * block) as u32;
     for (row, luma) in finest.luma.chunks_exact_mut(finest.width).enumerate() {
         sums.fill(0);

@@ -1,4 +1,4 @@
-//! Pictures that are compared, cell by cell.
+//! Comparison of two pictures, cell by cell.
 
 use std::ops::Range;
 
@@ -8,11 +8,11 @@ use crate::frame::DepthMap;
 use super::Vector;
 use super::layers::{Cell, Grid};
 
-/// Pixels beyond a plain nearer surface that are compared with it: what shows that it moved is its outline.
+/// Radius in pixels by which the mask of an untextured near surface is dilated: only its outline shows motion.
 const BEYOND_PX: usize = 2;
-/// Surfaces of which a cell shows fewer pixels, of those that are compared, say nothing.
-const LEAST: u32 = 20;
-/// Rows of a cell that are compared.
+/// Minimum number of compared pixels of a surface in a cell.
+const MIN_PIXELS: u32 = 20;
+/// Number of rows of a cell that are compared.
 const ROWS: usize = 8;
 
 /// Two pictures, and the depth of the first.
@@ -21,23 +21,23 @@ pub struct Pictures<'a> {
     pub now: &'a [u8],
     pub map: &'a DepthMap,
     pub grid: Grid,
-    /// Of a cell that is looked at, which bytes belong to the nearer surface, and which do not.
+    /// Byte masks of the current cell: the near surface, and the rest.
     pub masks: &'a mut [Vec<u8>; 2],
 }
 
 impl Pictures<'_> {
-    /// Column and row of a cell.
+    /// Returns column and row of a cell.
     pub fn place(&self, at: usize) -> (usize, usize) {
         let across = self.grid.cells().0;
         (at % across, at / across)
     }
 
-    /// Marks what belongs to the nearer surface of a cell.
+    /// Computes the mask of a cell's near surface.
     #[inline(always)]
     pub fn mask(&mut self, place: (usize, usize), &Cell { split_m, is_plain, .. }: &Cell) {
         let beyond_px = if is_plain { BEYOND_PX } else { 0 };
         let (width, height) = self.grid.size;
-        let [columns, rows] = self.grid.part(place, self.grid.size);
+        let [columns, rows] = self.grid.cell_range(place, self.grid.size);
         let (map, map_size) = (self.map, (self.map.width as usize, self.map.height as usize));
         let [near, far] = &mut *self.masks;
         near.clear();
@@ -45,8 +45,8 @@ impl Pictures<'_> {
             let from = near.len();
             near.resize(from + 3 * columns.len(), 0);
             let row = near[from..].as_chunks_mut::<3>().0;
-            let reach = |at: usize, count: usize| [at.saturating_sub(beyond_px), at, (at + beyond_px).min(count - 1)];
-            for y in reach(y, height) {
+            let window = |at: usize, count: usize| [at.saturating_sub(beyond_px), at, (at + beyond_px).min(count - 1)];
+            for y in window(y, height) {
                 if map_size == self.grid.size {
                     let line = &map.metres[y * width..][..width];
                     row.iter_mut()
@@ -60,7 +60,7 @@ impl Pictures<'_> {
                 }
             }
             if is_plain {
-                // Along the row, too.
+                // Dilation along the row.
                 spread(row.iter_mut(), 1);
                 spread(row.iter_mut().rev(), 2);
                 row.iter_mut().for_each(|near| *near = [near[1] | near[2]; 3]);
@@ -70,12 +70,12 @@ impl Pictures<'_> {
         far.extend(near.iter().map(|near| !near));
     }
 
-    /// The mean difference of a cell that moved so far, or of its nearer or farther surface, which are then marked. Of what is
-    /// outside of the picture nothing is known: `None` where that is most of it, or it shows too little.
+    /// Returns the mean absolute difference of a cell after a displacement, or of its near or far surface, whose mask
+    /// must be set. Pixels outside the picture are ignored; `None` if these are the majority, or too few are left.
     #[inline(always)]
-    pub fn off(&self, place: (usize, usize), [right, down]: Vector, is_near: Option<bool>) -> Option<f32> {
+    pub fn mean_difference(&self, place: (usize, usize), [right, down]: Vector, is_near: Option<bool>) -> Option<f32> {
         let (width, height) = self.grid.size;
-        let [columns, rows] = self.grid.part(place, self.grid.size);
+        let [columns, rows] = self.grid.cell_range(place, self.grid.size);
         let inside = |range: &Range<usize>, by: i32, count: usize| {
             let clamp = |px: usize| (px as i32 + by).clamp(0, count as i32) - by;
             clamp(range.start) as usize..clamp(range.end).max(0) as usize
@@ -106,11 +106,11 @@ impl Pictures<'_> {
                 }
             }
         }
-        (count >= 3 * LEAST).then(|| sum as f32 / count as f32)
+        (count >= 3 * MIN_PIXELS).then(|| sum as f32 / count as f32)
     }
 }
 
-/// Marks by its byte `to` what is marked by its first one, and as many pixels after.
+/// Dilates byte 0 by [`BEYOND_PX`] pixels along the iterator, into byte `to`.
 fn spread<'a>(row: impl Iterator<Item = &'a mut [u8; 3]>, to: usize) {
     row.fold(0, |left_px: usize, near| {
         let left_px = if near[0] != 0 { BEYOND_PX + 1 } else { left_px };
@@ -119,19 +119,19 @@ fn spread<'a>(row: impl Iterator<Item = &'a mut [u8; 3]>, to: usize) {
     });
 }
 
-/// Bytes that are compared at once: a row of a cell has some of these.
-const AT_ONCE: usize = 16;
+/// Bytes compared at once; a row of a cell has several times as many.
+const CHUNK: usize = 16;
 
-/// The sum of absolute differences.
+/// Returns the sum of absolute differences.
 #[inline(always)]
 fn difference(then: &[u8], now: &[u8]) -> u32 {
     let sum = |then: &[u8], now: &[u8]| then.iter().zip(now).map(|(a, b)| u32::from(a.abs_diff(*b))).sum::<u32>();
-    let ((then, then_rest), (now, now_rest)) = (then.as_chunks::<AT_ONCE>(), now.as_chunks::<AT_ONCE>());
+    let ((then, then_rest), (now, now_rest)) = (then.as_chunks::<CHUNK>(), now.as_chunks::<CHUNK>());
     let rest = sum(then_rest, now_rest);
     then.iter().zip(now).fold(rest, |total, (then, now)| total + sum(then, now))
 }
 
-/// The same of the bytes that are marked, and how many these are.
+/// Returns the sum of absolute differences of the masked bytes, and their number.
 #[inline(always)]
 fn marked_difference((then, now): (&[u8], &[u8]), mask: &[u8]) -> (u32, u32) {
     let sum = |then: &[u8], now: &[u8], mask: &[u8]| {
@@ -139,8 +139,8 @@ fn marked_difference((then, now): (&[u8], &[u8]), mask: &[u8]) -> (u32, u32) {
         let difference: u32 = pairs.map(|((a, b), m)| u32::from((a & m).abs_diff(b & m))).sum();
         (difference, mask.iter().map(|m| u32::from(m & 1)).sum::<u32>())
     };
-    let ((then, then_rest), (now, now_rest)) = (then.as_chunks::<AT_ONCE>(), now.as_chunks::<AT_ONCE>());
-    let (mask, mask_rest) = mask.as_chunks::<AT_ONCE>();
+    let ((then, then_rest), (now, now_rest)) = (then.as_chunks::<CHUNK>(), now.as_chunks::<CHUNK>());
+    let (mask, mask_rest) = mask.as_chunks::<CHUNK>();
     let rest = sum(then_rest, now_rest, mask_rest);
     then.iter().zip(now).zip(mask).fold(rest, |(total, count), ((then, now), mask)| {
         let (difference, marked) = sum(then, now, mask);

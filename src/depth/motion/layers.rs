@@ -1,4 +1,4 @@
-//! The cells of a picture, the one or two surfaces that each shows, and how these moved.
+//! Cells of a picture, with one or two surfaces each, and the motion of these.
 
 use std::ops::Range;
 
@@ -8,20 +8,21 @@ use super::Vector;
 use super::blocks::{Blocks, CELL};
 use super::compare::Pictures;
 
-/// A surface rests up to so many times the median change, in codes, which is mostly camera noise, within these bounds.
+/// A surface is at rest up to this multiple of the median change, which is mostly camera noise, within these bounds, in
+/// codes.
 const RESTS: f32 = 2.5;
 const RESTS_BOUNDS: (f32, f32) = (2.5, 8.0);
-/// Where a cell as a whole changes by less than this share of that, its surfaces rest, too.
+/// Fraction of that threshold below which the cell as a whole is at rest.
 const WHOLE: f32 = 0.3;
-/// What moved differs by less than this share of what it would differ by at rest, or it is not known how it moved.
+/// Maximum ratio of the difference after motion to that at rest; otherwise the motion is unknown.
 const BETTER: f32 = 0.7;
-/// A vector that is a pixel longer has to be better by so many codes.
+/// Cost of each pixel of a vector's length, in codes.
 const PER_PX: f32 = 0.1;
-/// A vector like those around is taken where it is worse by no more than this factor.
+/// Maximum ratio by which a neighbour's vector may be worse to be adopted.
 const AS_GOOD: f32 = 1.15;
-/// Surfaces whose inverse depths differ by less than this share are taken for one.
+/// Maximum relative difference of inverse depth within one surface.
 const ALIKE: f32 = 0.3;
-/// Steps of the search for a vector: beside, above and below.
+/// Steps of the vector search (diamond pattern).
 const STEPS: [Vector; 4] = [[0, -1], [-1, 0], [1, 0], [0, 1]];
 
 /// A surface in a cell.
@@ -29,22 +30,22 @@ const STEPS: [Vector; 4] = [[0, -1], [-1, 0], [1, 0], [0, 1]];
 pub struct Surface {
     /// Inverse depth, in 1/m.
     pub inverse: f32,
-    /// How it moved.
+    /// Its motion vector.
     pub moved: Vector,
     is_known: bool,
-    /// Mean differences, in codes, at rest and as it moved; at rest 0 where it shows too little.
+    /// Mean absolute differences, in codes: at rest, and after motion. At rest 0 if too few pixels are compared.
     at_rest: f32,
     off: f32,
 }
 
-/// A cell: its nearer surface, and the farther one, from `split_m` on, where it shows two.
+/// A cell with one or two surfaces: pixels from `split_m` on belong to the far one.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Cell {
     pub near: Surface,
     pub far: Option<Surface>,
-    /// Infinite where there is one surface.
+    /// Infinite if there is one surface.
     pub split_m: f32,
-    /// Whether the nearer surface looks as if it rested, and the other one does not.
+    /// Whether the near surface seems at rest for lack of texture, while the far one moves.
     pub is_plain: bool,
 }
 
@@ -57,11 +58,11 @@ impl Cell {
         self.far.map_or(self.near.moved, |far| far.moved)
     }
 
-    pub fn moves(&self) -> bool {
+    pub fn is_moving(&self) -> bool {
         self.surfaces().any(|surface| surface.moved != [0; 2])
     }
 
-    /// The surface of which `inverse` depth is.
+    /// Returns the surface whose inverse depth is closest to `inverse`.
     pub fn nearest(&self, inverse: f32) -> Surface {
         let is_far = |far: &Surface| (far.inverse - inverse).abs() < (self.near.inverse - inverse).abs();
         self.far.filter(is_far).unwrap_or(self.near)
@@ -71,19 +72,19 @@ impl Cell {
         if is_near { Some(&mut self.near) } else { self.far.as_mut() }
     }
 
-    pub fn rests(&self, rests_below: f32) -> bool {
+    pub fn is_at_rest(&self, rests_below: f32) -> bool {
         self.surfaces().all(|surface| surface.at_rest <= rests_below)
     }
 }
 
-/// The cells around one.
+/// Iterates over the up to eight neighbouring cells.
 pub fn around((column, row): (usize, usize), (across, down): (usize, usize)) -> impl Iterator<Item = (usize, usize)> {
     let range = |at: usize, count: usize| at.saturating_sub(1)..(at + 2).min(count);
     let cells = range(row, down).flat_map(move |y| range(column, across).map(move |x| (x, y)));
     cells.filter(move |&cell| cell != (column, row))
 }
 
-/// Pictures of `size` in cells of so many pixels either way.
+/// A grid of square cells over pictures of `size`.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Grid {
     pub size: (usize, usize),
@@ -91,14 +92,14 @@ pub struct Grid {
 }
 
 impl Grid {
-    /// Columns and rows of cells.
+    /// Returns the numbers of columns and rows of cells.
     pub fn cells(&self) -> (usize, usize) {
         (self.size.0.div_ceil(self.cell_px), self.size.1.div_ceil(self.cell_px))
     }
 
-    /// Columns and rows of pixels of a cell, in a map of another size of the same view.
+    /// Returns the pixel columns and rows of a cell, in a map of size `map` of the same view.
     #[inline(always)]
-    pub fn part(&self, (column, row): (usize, usize), map: (usize, usize)) -> [Range<usize>; 2] {
+    pub fn cell_range(&self, (column, row): (usize, usize), map: (usize, usize)) -> [Range<usize>; 2] {
         let on_map =
             |px: usize, count: usize, of: usize| if of == count { px.min(count) } else { px.min(count) * of / count };
         let span =
@@ -107,16 +108,17 @@ impl Grid {
     }
 }
 
-/// Finds the surfaces of the cells of a map, which are another from a step of `jump` on, in 1/m. `ranges` is memory.
+/// Finds the surfaces of all cells: two if inverse depths differ by more than `depth_step`, in 1/m. `ranges` is scratch
+/// memory.
 #[inline(always)]
-pub fn survey(map: &DepthMap, grid: &Grid, jump: f32, cells: &mut Vec<Cell>, ranges: &mut [Vec<f32>; 2]) {
+pub fn find_surfaces(map: &DepthMap, grid: &Grid, depth_step: f32, cells: &mut Vec<Cell>, ranges: &mut [Vec<f32>; 2]) {
     let size = (map.width as usize, map.height as usize);
     let (across, down) = grid.cells();
     let [nearest_m, farthest_m] = ranges;
     cells.clear();
     for row in 0..down {
-        let [_, lines] = grid.part((0, row), size);
-        // Down the columns first, which is vector code.
+        let [_, lines] = grid.cell_range((0, row), size);
+        // Column-wise minima and maxima first, which vectorises.
         for range in [&mut *nearest_m, &mut *farthest_m] {
             range.clear();
             range.extend_from_slice(&map.metres[lines.start.min(size.1 - 1) * size.0..][..size.0]);
@@ -129,12 +131,12 @@ pub fn survey(map: &DepthMap, grid: &Grid, jump: f32, cells: &mut Vec<Cell>, ran
             }
         }
         for column in 0..across {
-            let [columns, _] = grid.part((column, row), size);
+            let [columns, _] = grid.cell_range((column, row), size);
             let nearest = nearest_m[columns.clone()].iter().copied().fold(f32::INFINITY, f32::min);
             let farthest = farthest_m[columns].iter().copied().fold(0.0, f32::max);
             let (near, far) = (DepthMap::inverse_of(nearest), DepthMap::inverse_of(farthest));
             let surface = |inverse: f32| Surface { inverse, ..Surface::default() };
-            cells.push(match near - far > jump {
+            cells.push(match near - far > depth_step {
                 true => {
                     Cell { near: surface(near), far: Some(surface(far)), split_m: 2.0 / (near + far), is_plain: false }
                 }
@@ -145,12 +147,12 @@ pub fn survey(map: &DepthMap, grid: &Grid, jump: f32, cells: &mut Vec<Cell>, ran
 }
 
 impl Pictures<'_> {
-    /// Compares all cells at rest. Returns the change, in codes, up to which a surface rests.
+    /// Compares all cells at rest. Returns the threshold of the change, in codes, up to which a surface is at rest.
     #[inline(always)]
     pub fn compare(&mut self, cells: &mut [Cell], changes: &mut Vec<f32>) -> f32 {
         changes.clear();
         for (at, cell) in cells.iter_mut().enumerate() {
-            let off = self.off(self.place(at), [0; 2], None).unwrap_or(0.0);
+            let off = self.mean_difference(self.place(at), [0; 2], None).unwrap_or(0.0);
             for is_near in [true, false] {
                 cell.at(is_near).into_iter().for_each(|surface| {
                     *surface = Surface { inverse: surface.inverse, at_rest: off, off, is_known: true, moved: [0; 2] };
@@ -166,7 +168,7 @@ impl Pictures<'_> {
             if cell.far.is_some() && cell.near.at_rest > WHOLE * rests_below {
                 let whole = cell.near.at_rest;
                 self.compare_surfaces(self.place(at), cell);
-                let changes = whole > rests_below || !cell.rests(rests_below);
+                let changes = whole > rests_below || !cell.is_at_rest(rests_below);
                 if cell.near.is_known && cell.near.at_rest <= rests_below && changes {
                     cell.is_plain = true;
                     self.compare_surfaces(self.place(at), cell);
@@ -180,7 +182,7 @@ impl Pictures<'_> {
     fn compare_surfaces(&mut self, place: (usize, usize), cell: &mut Cell) {
         self.mask(place, cell);
         for is_near in [true, false] {
-            let off = self.off(place, [0; 2], Some(is_near));
+            let off = self.mean_difference(place, [0; 2], Some(is_near));
             if let Some(surface) = cell.at(is_near) {
                 (surface.at_rest, surface.is_known) = (off.unwrap_or(0.0), off.is_some());
                 surface.off = surface.at_rest;
@@ -188,30 +190,31 @@ impl Pictures<'_> {
         }
     }
 
-    /// Takes a vector for a surface, if it is the best so far.
+    /// Adopts a vector for a surface if it is the best so far.
     #[inline(always)]
-    fn look(&self, (place, is_near): ((usize, usize), Option<bool>), surface: &mut Surface, moved: Vector) {
+    fn try_vector(&self, (place, is_near): ((usize, usize), Option<bool>), surface: &mut Surface, moved: Vector) {
         let length_px = |moved: Vector| (moved[0].abs() + moved[1].abs()) as f32;
         let most = surface.off + PER_PX * (length_px(surface.moved) - length_px(moved));
-        if let Some(off) = self.off(place, moved, is_near).filter(|off| *off < most) {
+        if let Some(off) = self.mean_difference(place, moved, is_near).filter(|off| *off < most) {
             (surface.off, surface.moved) = (off, moved);
         }
     }
 
-    /// Finds how all surfaces moved that do not rest.
+    /// Estimates the motion of all surfaces that are not at rest.
     #[inline(always)]
     pub fn refine(&mut self, cells: &mut [Cell], blocks: &Blocks, rests_below: f32) {
         let grid = self.grid.cells();
         let scale = (self.grid.cell_px / CELL) as i32;
-        for (at, cell) in cells.iter_mut().enumerate().filter(|(_, cell)| !cell.rests(rests_below)) {
+        for (at, cell) in cells.iter_mut().enumerate().filter(|(_, cell)| !cell.is_at_rest(rests_below)) {
             let place = self.place(at);
             let is_split = cell.far.is_some();
             if is_split {
                 self.mask(place, cell);
             }
+            // Start from the block vectors of the cell and its neighbours, then refine with halved steps.
             let (mut rough, mut count) = ([[0; 2]; 9], 0);
             for place in [place].into_iter().chain(around(place, grid)) {
-                let moved = blocks.of(place).map(|px| scale * px);
+                let moved = blocks.vector_of(place).map(|px| scale * px);
                 if moved != [0; 2] && !rough[..count].contains(&moved) {
                     rough[count] = moved;
                     count += 1;
@@ -225,13 +228,13 @@ impl Pictures<'_> {
                 };
                 let compared = is_split.then_some(is_near);
                 for &moved in &rough[..count] {
-                    self.look((place, compared), surface, moved);
+                    self.try_vector((place, compared), surface, moved);
                 }
                 let mut step = (scale / 2).max(1);
                 while step > 0 {
                     let [x, y] = surface.moved;
                     for by in STEPS {
-                        self.look((place, compared), surface, [x + step * by[0], y + step * by[1]]);
+                        self.try_vector((place, compared), surface, [x + step * by[0], y + step * by[1]]);
                     }
                     if surface.moved == [x, y] || step > 1 {
                         step /= 2;
@@ -242,22 +245,21 @@ impl Pictures<'_> {
                 }
             }
             if cell.is_plain {
-                // By itself it rests, and has to look as plain where it moved to.
+                // The dilated mask moved; the surface's own pixels must match there too, or else it stays at rest.
                 self.mask(place, &Cell { is_plain: false, ..*cell });
-                if self.off(place, cell.near.moved, Some(true)).is_none_or(|off| off > rests_below) {
+                if self.mean_difference(place, cell.near.moved, Some(true)).is_none_or(|off| off > rests_below) {
                     cell.near = Surface { moved: [0; 2], is_known: true, at_rest: 0.0, off: 0.0, ..cell.near };
                 }
             }
         }
     }
 
-    /// Gives surfaces that moved like none around the median of those, where it is about as good, and the same to those of
-    /// which nothing is known.
+    /// Replaces outlier vectors and unknown ones by the median of the neighbours, if it matches about as well.
     #[inline(always)]
     pub fn smooth(&mut self, cells: &mut [Cell], rests_below: f32) {
         let grid = self.grid.cells();
         let count = cells.len();
-        // There and back: what is known comes to what is not from all sides.
+        // Forwards, then backwards, so that known vectors propagate from all sides.
         for at in (0..count).chain((0..count).rev()) {
             let (place, is_split, mut is_marked) = (self.place(at), cells[at].far.is_some(), false);
             for is_near in [true, false] {
@@ -265,7 +267,7 @@ impl Pictures<'_> {
                 if surface.is_known && surface.at_rest <= RESTS_BOUNDS.0 {
                     continue;
                 }
-                // Of each cell around, the surface that is as far.
+                // From each neighbour, the surface at a similar depth.
                 let (mut vectors, mut count) = ([[0; 8]; 2], 0);
                 for (column, row) in around(place, grid) {
                     let other = cells[row * grid.0 + column].nearest(surface.inverse);
@@ -285,7 +287,7 @@ impl Pictures<'_> {
                     self.mask(place, &cells[at]);
                     is_marked = true;
                 }
-                let off = self.off(place, median, is_split.then_some(is_near));
+                let off = self.mean_difference(place, median, is_split.then_some(is_near));
                 let as_good = match surface.is_known {
                     true if surface.at_rest <= rests_below => off.is_some_and(|off| off <= BETTER * surface.at_rest),
                     true => off.is_none_or(|off| off <= AS_GOOD * surface.off),

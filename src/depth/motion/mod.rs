@@ -1,7 +1,7 @@
-//! Motion from one picture to a later one, and depth that moves with it: block matching from coarse to fine, apart for the
-//! nearer and the farther surface of a block that shows two.
+//! Motion estimation between two pictures, and motion-compensated depth: hierarchical block matching, separately for
+//! the near and the far surface of blocks that show two.
 //!
-//! What rests stays as it is, to the bit. What moves is laid over what is farther, and what it uncovers is as far as the
+//! Depth at rest stays bit-identical. Moved depth occludes farther depth; disoccluded pixels take the depth of the
 //! farther side of the gap.
 
 mod blocks;
@@ -17,18 +17,18 @@ use blocks::{Blocks, CELL};
 use compare::Pictures;
 use layers::{Cell, Grid};
 
-/// Columns and rows that something moved by, in pixels: right and down.
+/// A displacement in pixels: right, down.
 pub type Vector = [i32; 2];
 
-/// Finds how a picture moved that is kept; owns the memory for it.
+/// Estimates the motion of a reference picture; owns the memory for it.
 #[derive(Debug, Default)]
 pub struct Motion {
     arch: Arch,
-    /// The picture that is kept.
+    /// The reference picture.
     rgb: Vec<u8>,
     grid: Grid,
     blocks: Blocks,
-    /// Row by row; none where nothing is kept.
+    /// Row by row; empty if there is no reference.
     cells: Vec<Cell>,
     masks: [Vec<u8>; 2],
     ranges: [Vec<f32>; 2],
@@ -37,30 +37,33 @@ pub struct Motion {
 }
 
 impl Motion {
-    /// Keeps a picture and its depth, which has no holes. Surfaces are another where inverse depth differs by `jump`, in 1/m.
-    pub fn keep(&mut self, map: &DepthMap, color: &ColorImage, jump: f32) {
+    /// Sets the reference picture and its depth map, which has no holes. A step of inverse depth above `depth_step`, in
+    /// 1/m, separates surfaces.
+    pub fn keep(&mut self, map: &DepthMap, color: &ColorImage, depth_step: f32) {
         self.grid = Grid { size: (color.width as usize, color.height as usize), cell_px: CELL * block_px(color.width) };
         self.cells.clear();
         let is_known = map.metres.first().is_some_and(|&metres| DepthMap::is_known(metres));
-        if is_known && jump.is_finite() && self.grid.size.0.min(self.grid.size.1) >= 2 * self.grid.cell_px {
+        if is_known && depth_step.is_finite() && self.grid.size.0.min(self.grid.size.1) >= 2 * self.grid.cell_px {
             self.rgb.clone_from(&color.rgb);
-            self.arch.dispatch(Keep { motion: self, map, color, jump });
+            self.arch.dispatch(Keep { motion: self, map, color, depth_step });
         }
     }
 
-    /// Finds how what is kept, with its depth `map`, has moved in a later picture; whether anything has.
+    /// Estimates the motion from the reference picture, with its depth `map`, to a later one. Returns whether anything
+    /// moved.
     pub fn find(&mut self, map: &DepthMap, color: &ColorImage) -> bool {
         let is_alike = (color.width as usize, color.height as usize) == self.grid.size;
         is_alike && !self.cells.is_empty() && self.arch.dispatch(Find { motion: self, map, color })
     }
 
-    /// Moves the depth `from`, which was kept, as was found. `to` is a copy of it.
+    /// Warps the depth `from` of the reference picture by the estimated motion into `to`, which is a copy of it on
+    /// entry.
     pub fn warp(&mut self, from: &DepthMap, to: &mut DepthMap) {
         let Self { arch, cells, grid, above, .. } = self;
         arch.dispatch(warp::Warp { cells, grid, from, to, above });
     }
 
-    /// How the surface at `metres` moved that pixel `at` shows.
+    /// Returns the motion of the surface at `metres` in pixel `at`.
     pub fn of(&self, at: usize, metres: f32) -> Vector {
         let (across, down) = self.grid.cells();
         let place = (at % self.grid.size.0 / self.grid.cell_px, at / self.grid.size.0 / self.grid.cell_px);
@@ -77,7 +80,7 @@ struct Keep<'a> {
     motion: &'a mut Motion,
     map: &'a DepthMap,
     color: &'a ColorImage,
-    jump: f32,
+    depth_step: f32,
 }
 
 impl WithSimd for Keep<'_> {
@@ -86,7 +89,7 @@ impl WithSimd for Keep<'_> {
     fn with_simd<S: pulp::Simd>(self, _: S) {
         let Motion { blocks, cells, grid, ranges, .. } = self.motion;
         blocks.keep(self.color);
-        layers::survey(self.map, grid, self.jump, cells, ranges);
+        layers::find_surfaces(self.map, grid, self.depth_step, cells, ranges);
     }
 }
 
@@ -103,14 +106,14 @@ impl WithSimd for Find<'_> {
         let Motion { rgb, grid, blocks, cells, masks, changes, .. } = self.motion;
         let mut pictures = Pictures { then: rgb, now: &self.color.rgb, map: self.map, grid: *grid, masks };
         let rests_below = pictures.compare(cells, changes);
-        if cells.iter().all(|cell| cell.rests(rests_below)) {
+        if cells.iter().all(|cell| cell.is_at_rest(rests_below)) {
             return false;
         }
         let across = grid.cells().0;
-        blocks.find(self.color, |(column, row)| cells[row * across + column].rests(rests_below));
+        blocks.find(self.color, |(column, row)| cells[row * across + column].is_at_rest(rests_below));
         pictures.refine(cells, blocks, rests_below);
         pictures.smooth(cells, rests_below);
-        cells.iter().any(Cell::moves)
+        cells.iter().any(Cell::is_moving)
     }
 }
 

@@ -3,10 +3,10 @@ use super::*;
 const SIZE: (usize, usize) = (640, 360);
 const FAR_M: f32 = 4.0;
 const NEAR_M: f32 = 1.0;
-/// In 1/m.
-const JUMP: f32 = 0.1;
+/// Minimum step between surfaces, in 1/m.
+const DEPTH_STEP: f32 = 0.1;
 
-/// Spots of three pixels, the same wherever they are asked for.
+/// Returns a random texture with spots of three pixels, as a function of the position.
 fn texture(x: i32, y: i32, plane: u32) -> u8 {
     let spot = |x: i32, y: i32| {
         let hash = (x as u64 & 0xffff) << 32 | (y as u64 & 0xffff) << 8 | u64::from(plane);
@@ -17,7 +17,7 @@ fn texture(x: i32, y: i32, plane: u32) -> u8 {
     (40 + (spot(column, row) + spot(column + 1, row) + spot(column, row + 1)) / 5) as u8
 }
 
-/// A picture and its depth of what is seen at each pixel: a grey value, and metres.
+/// Renders a picture and its depth map from a function of the pixel: grey value and metres.
 fn seen(of: impl Fn(i32, i32) -> (u8, f32)) -> (ColorImage, DepthMap) {
     let (mut color, mut map) =
         (ColorImage::new(SIZE.0 as u32, SIZE.1 as u32), DepthMap::new(SIZE.0 as u32, SIZE.1 as u32));
@@ -29,10 +29,10 @@ fn seen(of: impl Fn(i32, i32) -> (u8, f32)) -> (ColorImage, DepthMap) {
     (color, map)
 }
 
-/// The depth of `then` where it is by the time of `now`.
+/// Returns the depth of `then`, warped by the motion to `now`.
 fn moved(then: &(ColorImage, DepthMap), now: &ColorImage) -> DepthMap {
     let mut motion = Motion::default();
-    motion.keep(&then.1, &then.0, JUMP);
+    motion.keep(&then.1, &then.0, DEPTH_STEP);
     let mut map = then.1.clone();
     if motion.find(&then.1, now) {
         motion.warp(&then.1, &mut map);
@@ -40,7 +40,7 @@ fn moved(then: &(ColorImage, DepthMap), now: &ColorImage) -> DepthMap {
     map
 }
 
-/// A square of `side` px in the middle, moved by `near`, before a slanted wall, moved by `far`.
+/// A square of 140 px in the middle, moved by `near`, before a wall, moved by `far`.
 fn square(near: Vector, far: Vector, plain: bool) -> (ColorImage, DepthMap) {
     seen(|x, y| {
         let (own_x, own_y) = (x - near[0], y - near[1]);
@@ -74,8 +74,8 @@ fn the_depth_of_a_picture_that_moved_has_moved_as_far() {
         for y in 0..SIZE.1 as i32 {
             for x in 0..SIZE.0 as i32 {
                 let (from_x, from_y) = (x - shift[0], y - shift[1]);
-                // What came in from beyond the border is like what is at the border. Of what is so near to it that most of a
-                // block is gone, nothing is known.
+                // Content from beyond the border is replicated from it. Close to the border, most of a block is
+                // missing, and the motion is unknown.
                 let is_inside = |from: i32, count: usize| (24..count as i32 - 24).contains(&from);
                 let is_far = shift.iter().any(|px| px.abs() > 8);
                 if is_far
@@ -92,7 +92,7 @@ fn the_depth_of_a_picture_that_moved_has_moved_as_far() {
     }
 }
 
-/// The share of pixels with another depth than expected.
+/// Returns the fraction of pixels whose depth is not as expected.
 fn wrong(found: &DepthMap, expected: &DepthMap) -> f32 {
     let count = found.metres.iter().zip(&expected.metres).filter(|(a, b)| (*a - *b).abs() > 0.01).count();
     count as f32 / found.metres.len() as f32
@@ -150,7 +150,7 @@ fn what_cannot_be_compared_stays() {
 fn a_surface_is_asked_for_by_its_depth() {
     let (then, now) = (square([0; 2], [0; 2], false), square([10, 0], [-4, 0], false));
     let mut motion = Motion::default();
-    motion.keep(&then.1, &then.0, JUMP);
+    motion.keep(&then.1, &then.0, DEPTH_STEP);
     assert!(motion.find(&then.1, &now.0));
     // On both sides of the square's left outline.
     for x in [246, 250, 253] {

@@ -1,4 +1,4 @@
-//! Depth that moves.
+//! Motion-compensated depth.
 
 use std::ops::Range;
 
@@ -9,17 +9,18 @@ use super::layers::{Cell, Grid};
 use crate::depth::fill::holes;
 use crate::frame::DepthMap;
 
-/// Moves a map.
+/// Warps a map.
 pub struct Warp<'a> {
     pub cells: &'a [Cell],
     pub grid: &'a Grid,
     pub from: &'a DepthMap,
-    /// A copy, to begin with.
+    /// A copy of `from` on entry.
     pub to: &'a mut DepthMap,
     pub above: &'a mut Vec<Above>,
 }
 
-/// Of a column, the row after the hole that was filled last, how many rows that has, and what is above it.
+/// State of a column: the row after the last filled hole, the number of rows of the hole so far, and the depth above
+/// it.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Above {
     end: usize,
@@ -27,7 +28,7 @@ pub struct Above {
     metres: f32,
 }
 
-/// What nothing was moved to.
+/// Marks disoccluded pixels.
 const HOLE: f32 = f32::INFINITY;
 
 impl WithSimd for Warp<'_> {
@@ -37,9 +38,10 @@ impl WithSimd for Warp<'_> {
         let Self { cells, grid, from, .. } = self;
         let (width, size) = (from.width as usize, (from.width as usize, from.height as usize));
         let place = |at: usize| (at % grid.cells().0, at / grid.cells().0);
-        let moving = || cells.iter().enumerate().filter(|(_, cell)| cell.moves());
+        let moving = || cells.iter().enumerate().filter(|(_, cell)| cell.is_moving());
         for (at, cell) in moving() {
-            let [xs, ys] = grid.part(place(at), size);
+            let [xs, ys] = grid.cell_range(place(at), size);
+            // First clear all moving surfaces; the second pass writes them at their new places.
             let [near, far] = [cell.near.moved, cell.far_moved()].map(|moved| moved != [0; 2]);
             for y in ys {
                 for metres in &mut self.to.metres[y * width..][xs.clone()] {
@@ -49,17 +51,17 @@ impl WithSimd for Warp<'_> {
             }
         }
         for (at, cell) in moving() {
-            let part = grid.part(place(at), size);
+            let cell_range = grid.cell_range(place(at), size);
             let [near, far] = [cell.near.moved, cell.far_moved()];
             if near == far {
-                lay(from, self.to, part, self.on_map(near), |_| true);
+                move_surface(from, self.to, cell_range, self.on_map(near), |_| true);
                 continue;
             }
             if near != [0; 2] {
-                lay(from, self.to, part.clone(), self.on_map(near), |metres| metres < cell.split_m);
+                move_surface(from, self.to, cell_range.clone(), self.on_map(near), |metres| metres < cell.split_m);
             }
             if far != [0; 2] {
-                lay(from, self.to, part, self.on_map(far), |metres| metres >= cell.split_m);
+                move_surface(from, self.to, cell_range, self.on_map(far), |metres| metres >= cell.split_m);
             }
         }
         self.fill();
@@ -67,14 +69,14 @@ impl WithSimd for Warp<'_> {
 }
 
 impl Warp<'_> {
-    /// A vector in pixels of the map.
+    /// Scales a vector to pixels of the map.
     fn on_map(&self, [x, y]: Vector) -> Vector {
         let (width, height) = self.grid.size;
         let on_map = |px: i32, of: u32, count: usize| (px as f32 * of as f32 / count as f32).round() as i32;
         [on_map(x, self.from.width, width), on_map(y, self.from.height, height)]
     }
 
-    /// Fills the holes: each is as far as the farther of its sides, across where it is narrower.
+    /// Fills holes with the farther depth on both sides, across the narrower direction.
     #[inline(always)]
     fn fill(&mut self) {
         let (width, height) = (self.to.width as usize, self.to.height as usize);
@@ -112,10 +114,10 @@ impl Warp<'_> {
     }
 }
 
-/// Lays what `is_taken` of a part where it has moved to, over what is farther. What is beyond the border of the picture is
-/// like what is at it.
+/// Copies the depth of a cell's surface, selected by `is_taken`, to its new place, if it is nearer than the depth there.
+/// At the picture's border, the edge pixels are replicated.
 #[inline(always)]
-fn lay(
+fn move_surface(
     from: &DepthMap,
     to: &mut DepthMap,
     [xs, ys]: [Range<usize>; 2],
@@ -123,13 +125,13 @@ fn lay(
     is_taken: impl Fn(f32) -> bool,
 ) {
     let (width, height) = (from.width as usize, from.height as usize);
-    let reach = |px: &Range<usize>, by: i32, count: usize| {
+    let target_range = |px: &Range<usize>, by: i32, count: usize| {
         let begins = if px.start == 0 { 0 } else { (px.start as i32 + by).clamp(0, count as i32) };
         let ends = if px.end == count { count as i32 } else { (px.end as i32 + by).clamp(0, count as i32) };
         begins as usize..ends.max(begins) as usize
     };
-    let (columns, rows) = (reach(&xs, right, width), reach(&ys, down, height));
-    // Between what the border is repeated for, it is a plain move.
+    let (columns, rows) = (target_range(&xs, right, width), target_range(&ys, down, height));
+    // Between the replicated columns, it is a plain copy.
     let inner = |px: usize| ((px as i32 + right).max(0) as usize).clamp(columns.start, columns.end);
     let (begins, ends) = (inner(xs.start), inner(xs.end));
     for y in rows {

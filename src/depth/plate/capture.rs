@@ -1,28 +1,29 @@
-//! Taking a plate: the median of pictures in which nothing moves.
+//! Captures a plate: the per-pixel median of pictures without motion.
 
 use crate::depth::reduced::Reducer;
 use crate::frame::{ColorImage, Mask};
 
-/// They are so far apart, at least.
+/// Minimum time between the pictures.
 const APART_NS: u64 = 80_000_000;
-/// A picture in which more than this share of the pixels differ by more than so much from the first one is another.
-const MOVES_SHARE: f32 = 0.003;
+/// A picture shows motion if more than this fraction of its reduced pixels differs from the first one by more than
+/// `MOVES`.
+const MAX_MOVING: f32 = 0.003;
 const MOVES: f32 = 12.0;
-/// Less of a picture than this is no person.
-const PERSONS_SHARE: f32 = 0.004;
+/// Minimum fraction of a picture that counts as a person.
+const MIN_PERSON: f32 = 0.004;
 
-/// What became of a picture.
+/// The result of adding a picture.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Taken {
-    /// More are needed; so much of them there are, 0 to 1.
+    /// More pictures are needed; the progress, 0 to 1.
     More(f32),
-    /// It differs from those before, which are given up: something moves.
+    /// The picture shows motion or a person; the previous pictures were discarded.
     Moved,
-    /// The plate.
+    /// The finished plate.
     Whole(ColorImage),
 }
 
-/// Pictures on the way to a plate.
+/// Pictures collected for a plate.
 #[derive(Debug, Default)]
 pub struct Capture {
     pictures: Vec<ColorImage>,
@@ -33,22 +34,23 @@ pub struct Capture {
 }
 
 impl Capture {
-    /// Of so many pictures the median is taken.
+    /// Number of pictures for the median.
     pub const PICTURES: usize = 11;
 
-    /// Adds a picture at this time; all have the same size. Where `persons` are known, none may be there.
+    /// Adds a picture at media time `time_ns`; all have the same size. With a mask of `persons`, pictures with a person
+    /// are rejected.
     pub fn add(&mut self, color: &ColorImage, time_ns: u64, persons: Option<&Mask>) -> Taken {
         self.reducer.reduce(color, &mut self.now);
         let are_there = persons.is_some_and(|persons| {
-            let count = persons.share.iter().filter(|share| **share > 0.5).count();
-            count as f32 > PERSONS_SHARE * persons.share.len() as f32
+            let count = persons.share.iter().filter(|alpha| **alpha > 0.5).count();
+            count as f32 > MIN_PERSON * persons.share.len() as f32
         });
         if are_there {
-            self.forget();
+            self.reset();
             return Taken::Moved;
         }
-        if self.first.len() == self.now.len() && differing(&self.first, &self.now) > MOVES_SHARE {
-            self.forget();
+        if self.first.len() == self.now.len() && differing(&self.first, &self.now) > MAX_MOVING {
+            self.reset();
             return Taken::Moved;
         }
         if self.pictures.is_empty() {
@@ -58,23 +60,23 @@ impl Capture {
             self.last_ns = Some(time_ns);
             return self.add_any(color);
         }
-        Taken::More(self.share())
+        Taken::More(self.progress())
     }
 
-    /// As [`Self::add`], whatever moves, and however soon.
+    /// Adds a picture unconditionally, without the checks of [`Self::add`].
     pub fn add_any(&mut self, color: &ColorImage) -> Taken {
         self.pictures.push(color.clone());
         match self.pictures.len() {
             Self::PICTURES => Taken::Whole(self.finish()),
-            _ => Taken::More(self.share()),
+            _ => Taken::More(self.progress()),
         }
     }
 
-    fn share(&self) -> f32 {
+    fn progress(&self) -> f32 {
         self.pictures.len() as f32 / Self::PICTURES as f32
     }
 
-    /// The plate of the pictures there are, of which there is one at least.
+    /// Returns the plate of the pictures so far, at least one.
     pub fn finish(&mut self) -> ColorImage {
         let mut plate = self.pictures[0].clone();
         let mut values = Vec::with_capacity(Self::PICTURES);
@@ -84,18 +86,18 @@ impl Capture {
             let middle = values.len() / 2;
             *code = *values.select_nth_unstable(middle).1;
         }
-        self.forget();
+        self.reset();
         plate
     }
 
-    fn forget(&mut self) {
+    fn reset(&mut self) {
         self.pictures.clear();
         self.first.clear();
         self.last_ns = None;
     }
 }
 
-/// The share of the pixels in which two reduced pictures differ.
+/// Returns the fraction of pixels in which two reduced pictures differ.
 pub fn differing(a: &[[f32; 3]], b: &[[f32; 3]]) -> f32 {
     let differ = |(a, b): &(&[f32; 3], &[f32; 3])| (0..3).any(|p| (a[p] - b[p]).abs() > MOVES);
     a.iter().zip(b).filter(differ).count() as f32 / a.len().max(1) as f32
@@ -121,7 +123,7 @@ mod tests {
         let mut moved = 0;
         for step in 0..40 {
             match capture.add(&picture(step, step < 6), u64::from(step) * 100_000_000, None) {
-                Taken::More(share) => assert!(share < 1.0),
+                Taken::More(progress) => assert!(progress < 1.0),
                 Taken::Moved => moved += 1,
                 Taken::Whole(plate) => {
                     assert!(moved == 1 && step > 12, "{moved} {step}");

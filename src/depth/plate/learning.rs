@@ -1,43 +1,43 @@
-//! A plate that stays true: what is surely background is learned again and again, and so is what was put down. Who stands
-//! before it never is.
+//! Keeps a plate up to date: sure background is learned continuously, and objects that were put down are added. A
+//! person in front of the plate is never learned.
 
-use super::subject::{Part, Subject};
+use super::subject::{Component, Subject};
 use crate::depth::alignment::Alignment;
 use crate::depth::reduced::{Reducer, block_px, reduced_size};
 use crate::frame::ColorImage;
 
-/// The whole picture is learned from once in this time.
+/// Time in which every row is learned from once.
 const ROUND_NS: u64 = 2_000_000_000;
-/// A pixel is learned from the second round in which nothing stood so near, in reduced pixels, on.
+/// A pixel is learned after this many rounds without foreground within `NEAR` reduced pixels.
 const ROUNDS: u8 = 2;
 const NEAR: usize = 6;
-/// A new picture counts as one of so many.
+/// Length of the running average: a new value has weight `1 / MEMORY`.
 const MEMORY: u16 = 4;
-/// What rested for so long is no person, if so much of it did.
+/// Time after which a region at rest is no person, and the minimum fraction of its pixels at rest.
 const REST_NS: u64 = 5_000_000_000;
 const AT_REST: f32 = 0.95;
-/// A change of more than this is no rest.
+/// Minimum change of a pixel in motion.
 const MOVES: f32 = 6.0;
 
-/// What is known of how long things are as they are.
+/// The age of the scene's content.
 #[derive(Debug, Default)]
 pub struct Learning {
-    /// Of every reduced pixel, in how many rounds nothing was near.
+    /// Per reduced pixel, number of rounds without foreground nearby.
     rounds: Vec<u8>,
-    /// Of every pixel before the plate, what it last was when it changed, and when that was.
+    /// Per foreground pixel, its value at the last change, and the time of that.
     changed: Vec<([f32; 3], u64)>,
-    /// The row to learn from next, and when the last one was.
+    /// The next row to learn from, and the time of the last one.
     row: usize,
     last_ns: Option<u64>,
-    /// Rounding takes turns, so that it evens out.
+    /// Rotating rounding offset, so that rounding errors average out.
     turn: u16,
 }
 
-/// What is learned from.
+/// The input of an update.
 #[derive(Clone, Copy)]
 pub struct Lesson<'a> {
     pub color: &'a ColorImage,
-    /// The same, reduced.
+    /// The picture in reduced resolution.
     pub now: &'a [[f32; 3]],
     pub subject: &'a Subject,
     pub alignment: &'a Alignment,
@@ -45,7 +45,7 @@ pub struct Lesson<'a> {
 }
 
 impl Learning {
-    /// Learns from a picture. Whether the plate is another now.
+    /// Updates the plate from a picture. Returns whether the plate has changed.
     pub fn learn(
         &mut self,
         lesson: Lesson,
@@ -76,17 +76,17 @@ impl Learning {
             }
             self.row = (self.row + 1) % down;
         }
-        self.take_note(&lesson);
-        for part in self.put_down(&lesson) {
-            for &at in &lesson.subject.pixels[part.first..part.end] {
+        self.record_changes(&lesson);
+        for component in self.find_put_down(&lesson) {
+            for &at in &lesson.subject.pixels[component.first..component.end] {
                 brush.paint((at as usize % across, at as usize / across), 1);
             }
         }
         brush.changed
     }
 
-    /// Takes note of what changed of what is before the plate.
-    fn take_note(&mut self, lesson: &Lesson) {
+    /// Records changes of the foreground pixels.
+    fn record_changes(&mut self, lesson: &Lesson) {
         for &at in &lesson.subject.pixels {
             let (now, (last, since_ns)) = (&lesson.now[at as usize], &mut self.changed[at as usize]);
             if (0..3).any(|p| (now[p] - last[p]).abs() > MOVES) {
@@ -95,19 +95,20 @@ impl Learning {
         }
     }
 
-    /// The parts that were put down and left: all that rest, but the one that a person may be.
-    fn put_down<'a>(&self, lesson: &Lesson<'a>) -> impl Iterator<Item = Part> + use<'a> {
-        let Subject { parts, pixels, .. } = lesson.subject;
-        let rests = |part: &Part| {
-            let pixels = &pixels[part.first..part.end];
+    /// Returns the regions of objects that were put down: all at rest, except the one that may be the person.
+    fn find_put_down<'a>(&self, lesson: &Lesson<'a>) -> impl Iterator<Item = Component> + use<'a> {
+        let Subject { components, pixels, .. } = lesson.subject;
+        let rests = |component: &Component| {
+            let pixels = &pixels[component.first..component.end];
             let resting = pixels.iter().filter(|&&at| self.changed[at as usize].1 + REST_NS < lesson.time_ns).count();
             resting as f32 >= AT_REST * pixels.len() as f32
         };
-        let resting: Vec<bool> = parts.iter().map(rests).collect();
-        let size = |k: &usize| parts[*k].end - parts[*k].first;
-        let main = (0..parts.len()).filter(|&k| !resting[k]).max_by_key(size);
-        let main = main.or_else(|| (0..parts.len()).max_by_key(size));
-        parts.iter().copied().enumerate().filter(move |(k, _)| resting[*k] && main != Some(*k)).map(|(_, part)| part)
+        let resting: Vec<bool> = components.iter().map(rests).collect();
+        let size = |k: &usize| components[*k].end - components[*k].first;
+        let main = (0..components.len()).filter(|&k| !resting[k]).max_by_key(size);
+        let main = main.or_else(|| (0..components.len()).max_by_key(size));
+        let others = components.iter().copied().enumerate().filter(move |(k, _)| resting[*k] && main != Some(*k));
+        others.map(|(_, component)| component)
     }
 }
 
@@ -117,7 +118,7 @@ fn is_near(foreign: &[bool], (across, down): (usize, usize), (column, row): (usi
         .any(|row| foreign[row * across..][columns.clone()].contains(&true))
 }
 
-/// Paints blocks of a picture onto its plate.
+/// Copies blocks of a picture to its plate.
 struct Brush<'a> {
     lesson: Lesson<'a>,
     reducer: &'a Reducer,
@@ -128,12 +129,12 @@ struct Brush<'a> {
 }
 
 impl Brush<'_> {
-    /// The new picture is one of so many.
+    /// Averages a block into the plate, with weight one in `of`.
     fn paint(&mut self, (column, row): (usize, usize), of: u16) {
         let (width, height) = (self.plate.width as usize, self.plate.height as usize);
         let Alignment { gain, shift } = *self.lesson.alignment;
         let block_px = block_px(self.plate.width);
-        // Where a point of the plate is now, to the nearest pixel.
+        // Current position of the plate's points, rounded to pixels.
         let off = shift.map(|shift| (shift * block_px as f32).round() as isize);
         let mut sums = [0.0f32; 3];
         let lines = row * block_px..((row + 1) * block_px).min(height);
@@ -156,9 +157,9 @@ impl Brush<'_> {
                 }
             }
         }
-        let share = 1.0 / (lines.len() * columns.len()) as f32;
+        let scale = 1.0 / (lines.len() * columns.len()) as f32;
         let at = row * self.lesson.color.width.div_ceil(block_px as u32) as usize + column;
-        self.reduced[at] = sums.map(|sum| self.reducer.root(sum * share));
+        self.reduced[at] = sums.map(|sum| self.reducer.root(sum * scale));
         self.changed = true;
     }
 }

@@ -1,8 +1,8 @@
-//! Who stands before a plate: a picture of what is behind, taken once from a camera that stands still. No network is
-//! needed, and what a person holds is theirs.
+//! Foreground from a plate: a picture of the background, captured once by a camera at rest. It needs no network, and
+//! includes the objects that a person holds.
 //!
-//! Each picture is compared with the plate in few pixels, after its exposure, white balance and shift are
-//! taken out of it; shadows are background. The plate goes on learning where nobody is.
+//! Each picture is compared with the plate in reduced resolution, after compensating for exposure, white balance and
+//! shift; shadows count as background. The plate is updated where there is no foreground.
 
 mod capture;
 mod learning;
@@ -20,13 +20,13 @@ use crate::depth::matting::mask::Backdrop;
 use crate::depth::reduced::{Reducer, block_px, reduced_size};
 use crate::frame::{ColorImage, Mask};
 
-/// Steps of the alignment with the first picture; later ones need one.
+/// Iterations of the alignment on the first picture; later ones need one.
 const FIRST_STEPS: usize = 8;
-/// A plate from which more of the picture differs is none of it, and fits again when less does.
-const MOST_SHARE: f32 = 0.6;
-const LESS_SHARE: f32 = 0.5;
+/// The plate no longer matches the picture above the first fraction of foreground, and matches again below the second.
+const MAX_FOREGROUND: f32 = 0.6;
+const FIT_FOREGROUND: f32 = 0.5;
 
-/// A plate at work.
+/// A plate in use.
 #[derive(Debug)]
 pub struct Plate {
     color: ColorImage,
@@ -37,7 +37,7 @@ pub struct Plate {
     alignment: Alignment,
     subject: Subject,
     learning: Learning,
-    /// The light of each code of the plate, by channel, as the camera exposes now.
+    /// Linear light of each code of the plate, by channel, at the current exposure.
     light: Box<[[f32; 256]; 3]>,
     mask: Mask,
     begun: bool,
@@ -45,7 +45,7 @@ pub struct Plate {
 }
 
 impl Plate {
-    /// A plate that was taken.
+    /// Creates a plate from its picture.
     pub fn new(color: ColorImage) -> Self {
         let (mut reducer, mut reduced) = (Reducer::default(), Vec::new());
         reducer.reduce(&color, &mut reduced);
@@ -65,12 +65,12 @@ impl Plate {
         }
     }
 
-    /// What it shows now.
+    /// Returns the plate's picture, with all updates.
     pub fn color(&self) -> &ColorImage {
         &self.color
     }
 
-    /// What it shows, as the camera sees it now.
+    /// Returns the plate as a background at the current exposure and shift.
     pub fn backdrop(&self) -> Backdrop<'_> {
         let block_px = block_px(self.color.width) as f32;
         let shift_px = self.alignment.shift.map(|shift| (shift * block_px).round() as isize);
@@ -82,19 +82,19 @@ impl Plate {
         self.color.size()
     }
 
-    /// Who stands before it, in the picture that was looked at last.
+    /// Returns the mask of the foreground in the last picture.
     pub fn mask(&self) -> &Mask {
         &self.mask
     }
 
-    /// Compares a picture of the same size with the plate, where `persons` are known or not. Whether it is of the same
-    /// place and light.
+    /// Compares a picture of the plate's size with it; a mask of `persons`, if known, restricts the foreground. Returns
+    /// whether the plate matches the place and the light.
     pub fn look(&mut self, color: &ColorImage, time_ns: u64, persons: Option<&Mask>) -> bool {
         let size = reduced_size(color);
         self.reducer.reduce(color, &mut self.now);
         self.subject.foreign.resize(self.now.len(), false);
         if !self.fits {
-            // What was found of another picture is no way back to this one.
+            // The alignment with a mismatched picture is no starting point.
             self.alignment = Alignment::default();
             self.subject.foreign.fill(false);
             self.begun = false;
@@ -110,7 +110,7 @@ impl Plate {
             subject.keep_persons(persons, size);
         }
         self.begun = true;
-        self.fits = subject.share() < if self.fits { MOST_SHARE } else { LESS_SHARE };
+        self.fits = subject.foreground_fraction() < if self.fits { MAX_FOREGROUND } else { FIT_FOREGROUND };
         if self.fits {
             let lesson = Lesson { color, now, subject, alignment, time_ns };
             if self.learning.learn(lesson, &self.reducer, &mut self.color, reduced) {
@@ -122,7 +122,7 @@ impl Plate {
         self.fits
     }
 
-    /// The mask is undecided at outlines: the mean of a pixel and those around it.
+    /// Draws the mask, soft at outlines: the mean over 3x3 pixels.
     fn draw_mask(&mut self, (width, height): (usize, usize)) {
         self.mask.resize(width as u32, height as u32);
         let foreign = &self.subject.foreign;

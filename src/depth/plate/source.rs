@@ -1,4 +1,4 @@
-//! A plate as a source of depth: taken with a countdown, then used.
+//! Depth source with a plate: captured after a countdown, then used.
 
 use std::any::Any;
 use std::fmt;
@@ -10,39 +10,39 @@ use crate::depth::matting::mask::MaskMatting;
 use crate::depth::{DepthError, DepthSource, Seen};
 use crate::frame::{ColorImage, DepthMap, Mask};
 
-/// So long a person has to step out of the picture.
+/// Time for a person to step out of the picture.
 const COUNTDOWN_NS: u64 = 3_000_000_000;
-/// A camera that has just been started finds its exposure in this time.
+/// Time in which a newly started camera settles its exposure.
 const SETTLES_NS: u64 = 1_000_000_000;
-/// What moves for longer than this before a plate could be taken is the camera, or will not stop.
+/// Motion that prevents a capture for longer than this does not stop by itself.
 const RESTLESS_NS: u64 = 10_000_000_000;
 
-/// What holds exposure, white balance and focus of a camera where they are until it is dropped.
+/// Locks the camera's exposure, white balance and focus, until the result is dropped.
 pub type Lock = Box<dyn FnOnce() -> Option<Box<dyn Any + Send>> + Send>;
 
-/// What else looks at the pictures, and knows more of them than a plate tells.
+/// A second source that sees the same pictures and knows more than a plate.
 pub trait Companion: DepthSource {
-    /// Where persons are in the picture `seen`, which is the next one; `None` where that is not known.
+    /// Returns a mask of the persons in the picture `seen`, which is the next one; `None` if unknown.
     fn persons(&mut self, seen: Seen) -> Option<&Mask>;
 
-    /// Gives `map` the distances of all that is behind what `mask` has, in the same picture.
+    /// Fills `map` with the distances behind the subject, which `mask` has, in the same picture.
     fn measure_behind(&mut self, color: &ColorImage, mask: &Mask, map: &mut DepthMap);
 }
 
-/// How far a plate is, for the person who waits for it.
+/// Progress of the capture, shown to the user.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Step {
-    /// They have so many seconds to step out of the picture.
+    /// Seconds left to step out of the picture.
     StepOut(u32),
-    /// It is being taken; so much of it is, in percent.
+    /// The capture's progress in percent.
     Taking(u32),
     /// Something moves.
     Moves,
-    /// Something has moved for so long that no plate can be taken.
+    /// Something has moved for so long that no plate can be captured.
     Restless,
-    /// There is one.
+    /// The plate is in use.
     Ready,
-    /// There is one, and the picture is another: the camera was moved, or the light is.
+    /// The plate does not match the picture: the camera was moved or the light has changed.
     Unlike,
 }
 
@@ -65,10 +65,10 @@ impl fmt::Display for Step {
     }
 }
 
-/// What those who wait for a plate share with it.
+/// State shared with the user interface.
 #[derive(Debug, Default)]
 pub struct Guide {
-    /// The kind of step, times [`KINDS`], plus its number.
+    /// Kind of the step times [`KINDS`], plus its number.
     step: AtomicU32,
     again: AtomicBool,
 }
@@ -76,7 +76,7 @@ pub struct Guide {
 const KINDS: u32 = 1 << 16;
 
 impl Guide {
-    /// The step now.
+    /// Returns the current step.
     pub fn step(&self) -> Step {
         let step = self.step.load(Ordering::Relaxed);
         let number = step % KINDS;
@@ -90,12 +90,12 @@ impl Guide {
         }
     }
 
-    /// Takes another plate.
+    /// Requests the capture of a new plate.
     pub fn take_again(&self) {
         self.again.store(true, Ordering::Relaxed);
     }
 
-    fn tell(&self, step: Step) {
+    fn set_step(&self, step: Step) {
         let (kind, number) = match step {
             Step::StepOut(seconds) => (0, seconds),
             Step::Taking(percent) => (1, percent),
@@ -110,7 +110,7 @@ impl Guide {
 
 #[derive(Debug)]
 enum State {
-    /// To be taken: since when, once there was a picture.
+    /// Waits for the countdown; contains its start, once there was a picture.
     Waiting(Option<u64>),
     Taking {
         capture: Box<Capture>,
@@ -119,33 +119,33 @@ enum State {
     Using(Box<Plate>),
 }
 
-/// Depth with a matte from a plate: who stands before it is in focus, all else is far, or as far as a companion says. While
-/// there is none, everything is blurred, or what the companion makes of it is.
+/// Depth source from a plate: the foreground is in focus, and the rest is far, or as far as the companion measures.
+/// Without a usable plate, everything is blurred, or the companion's depth is used.
 pub struct PlateDepth {
     state: State,
     guide: Arc<Guide>,
     lock: Option<Lock>,
     companion: Option<Box<dyn Companion>>,
-    /// While this lives, the camera is as it was when the plate was taken.
+    /// Keeps the camera's settings locked as long as it lives.
     locked: Option<Box<dyn Any + Send>>,
     matting: MaskMatting,
     first_ns: Option<u64>,
 }
 
 impl PlateDepth {
-    /// A plate that is there, or one that is to be taken from the first pictures.
+    /// Creates a source from an existing plate, or one that captures it from the first pictures.
     pub fn new(plate: Option<ColorImage>, lock: Option<Lock>, companion: Option<Box<dyn Companion>>) -> Self {
         let state = plate.map_or(State::Waiting(None), |plate| State::Using(Box::new(Plate::new(plate))));
         let guide = Arc::default();
         Self { state, guide, lock, companion, locked: None, matting: MaskMatting::default(), first_ns: None }
     }
 
-    /// How far it is.
+    /// Returns the shared state of the capture.
     pub fn guide(&self) -> Arc<Guide> {
         Arc::clone(&self.guide)
     }
 
-    /// The plate, once there is one.
+    /// Returns the plate, once captured.
     pub fn plate(&self) -> Option<&ColorImage> {
         match &self.state {
             State::Using(plate) => Some(plate.color()),
@@ -153,8 +153,8 @@ impl PlateDepth {
         }
     }
 
-    /// Goes on from a picture towards a plate, or compares it with the one there is; tells how far that is.
-    fn look(&mut self, seen: Seen) -> Step {
+    /// Advances the capture by a picture, or compares it with the plate. Returns the new step.
+    fn advance(&mut self, seen: Seen) -> Step {
         let Seen { stamp, color, .. } = seen;
         let now_ns = stamp.time_ns;
         if self.guide.again.swap(false, Ordering::Relaxed) {
@@ -181,7 +181,7 @@ impl PlateDepth {
                 Step::Taking(0)
             }
             State::Taking { capture, since_ns } => match capture.add(color, now_ns, persons) {
-                Taken::More(share) => Step::Taking((100.0 * share) as u32),
+                Taken::More(progress) => Step::Taking((100.0 * progress) as u32),
                 Taken::Moved if now_ns > *since_ns + RESTLESS_NS => Step::Restless,
                 Taken::Moved => Step::Moves,
                 Taken::Whole(plate) => {
@@ -201,9 +201,9 @@ impl PlateDepth {
 
 impl DepthSource for PlateDepth {
     fn read(&mut self, seen: Seen, map: &mut DepthMap) -> Result<(), DepthError> {
-        let (step, color) = (self.look(seen), seen.color);
-        self.guide.tell(step);
-        // Until there is a plate, and where it is of no use, others know better than nobody.
+        let (step, color) = (self.advance(seen), seen.color);
+        self.guide.set_step(step);
+        // Without a usable plate, the companion's depth is better than none.
         if let (Some(companion), true) = (&mut self.companion, step != Step::Ready) {
             return companion.read(seen, map);
         }

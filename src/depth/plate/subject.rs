@@ -1,4 +1,4 @@
-//! What stands before the plate: pixels that differ from it, less what is only lit otherwise, joined to parts.
+//! Foreground segmentation: pixels that differ from the plate, except changes of light, as connected components.
 
 use crate::depth::alignment::Alignment;
 use crate::depth::dilation::dilate;
@@ -6,65 +6,65 @@ use crate::depth::reduced::MOST;
 use crate::depth::tap::nearest;
 use crate::frame::Mask;
 
-/// Differences from here on may be of something before the plate, and from the second on are, in a quiet picture.
+/// Hysteresis thresholds of the difference, for low noise: possible foreground, and certain foreground.
 const WEAK: f32 = 6.0;
 const STRONG: f32 = 13.0;
-/// The same in a noisy one, in standard deviations.
+/// Thresholds for high noise, in standard deviations.
 const WEAK_DEVIATIONS: f32 = 4.0;
 const STRONG_DEVIATIONS: f32 = 8.0;
-/// No camera is noisier than this, in what is left of it in a reduced pixel.
-const MOST_DEVIATION: f32 = 3.0;
-/// What was before the plate a frame ago is so from this share of the threshold on (hysteresis).
-const STAYS: f32 = 0.75;
-/// A shadow leaves this share of the light's root, at least, and the same colour but for a difference of so much.
+/// Upper bound of the noise's standard deviation in a reduced pixel.
+const MAX_DEVIATION: f32 = 3.0;
+/// Factor of the thresholds for pixels that were foreground in the previous frame (hysteresis).
+const HYSTERESIS: f32 = 0.75;
+/// Minimum ratio of a shadow's value (root of light) to the plate's, and maximum deviation from the plate's colour.
 const DARKEST_SHADOW: f32 = 0.72;
 const SHADE: f32 = 4.0;
-/// A lamp that is switched on makes the root of no channel less, or so many times what it was; and of one no more than so many
-/// times what it makes of another.
+/// Ratios of values under a lamp that was switched on: minimum and maximum per channel, and maximum between channels.
 const UNLIT: f32 = 0.98;
 const BRIGHTEST: f32 = 1.8;
 const TINT: f32 = 1.25;
-/// From one pixel to the next, light changes by no more than this: outlines do.
+/// Maximum change of the ratio between neighbours under changed light; outlines exceed it.
 const SOFT: f32 = 0.035;
-/// Parts of less than this share of the picture are noise.
-const LEAST_PART: f32 = 0.002;
-/// Holes of less than this share of the picture are no background.
-const LEAST_HOLE: f32 = 0.001;
+/// Minimum size of a component, as a fraction of the picture.
+const MIN_COMPONENT: f32 = 0.002;
+/// Holes up to this fraction of the picture are filled.
+const MAX_HOLE: f32 = 0.001;
 
-/// A mask of persons says so from here on. What is as close to them as this, as a share of the picture's width, is theirs;
-/// and so is what else is joined to them, as what they hold, unless it is larger than this share of them.
+/// Minimum mask value of a person; radius around persons that belongs to them, as a fraction of the mask's width; and
+/// maximum size of what else is connected to them, such as held objects, relative to them.
 const PERSON: f32 = 0.5;
 const CLOSE: f32 = 0.02;
 const HELD: f32 = 0.3;
 
-/// What a pixel shows.
+/// Label of a pixel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Label {
     Background,
-    /// As the background, but in shadow or in another light.
+    /// Background in a shadow or under other light.
     Relit,
-    /// Perhaps something before it.
+    /// Possible foreground.
     Weak,
     Strong,
 }
 
-/// A part of the picture that hangs together.
+/// A connected component of the foreground.
 #[derive(Clone, Copy, Debug)]
-pub struct Part {
-    /// Where its pixels begin in [`Subject::pixels`], and where they end.
+pub struct Component {
+    /// Its range in [`Subject::pixels`].
     pub first: usize,
     pub end: usize,
 }
 
-/// How far values of a row, three a pixel, are from those of the plate: half a pixel of what is `beside` it (above and below;
-/// left and right are in `own`) is no difference, as nothing stands that still. Values of the plate times `gain`.
+/// Computes the differences of a row from the plate, three values a pixel. Shifts by up to half a pixel are tolerated:
+/// values between the plate's pixel and its neighbours (`beside`: above and below; left and right from `own`) are no
+/// difference. The plate's values are multiplied by `gain`.
 fn differences(now: &[f32], own: &[f32], beside: [&[f32]; 2], gain: &[f32], off: &mut [f32]) {
     let count = off.len();
     let off_at = |value: f32, own: f32, around: [f32; 4], gain: f32| {
         let halves = around.map(|beside| 0.5 * (own + beside));
         let low = halves.into_iter().fold(own, f32::min);
         let high = halves.into_iter().fold(own, f32::max);
-        // What is cut off at white is at least as bright.
+        // The plate may be clipped at white: brighter values are no difference.
         ((gain * low).min(MOST) - value).max(value - (gain * high).min(MOST))
     };
     let [above, below] = beside.map(|row| &row[..count]);
@@ -72,65 +72,66 @@ fn differences(now: &[f32], own: &[f32], beside: [&[f32]; 2], gain: &[f32], off:
     for k in 3..count.max(6) - 3 {
         off[k] = off_at(now[k], own[k], [own[k - 3], own[k + 3], above[k], below[k]], gain[k]);
     }
-    // At both ends there is nothing on one side.
+    // The first and the last pixel have one neighbour in the row.
     for k in (0..count.min(3)).chain(count.saturating_sub(3).max(3)..count) {
         let (left, right) = (own[if k < 3 { k } else { k - 3 }], own[if k + 3 < count { k + 3 } else { k }]);
         off[k] = off_at(now[k], own[k], [left, right, above[k], below[k]], gain[k]);
     }
 }
 
-/// Finds what stands before a plate; owns the memory for it.
+/// Segments the foreground; owns the memory for it.
 #[derive(Debug, Default)]
 pub struct Subject {
     labels: Vec<Label>,
-    /// Of a row, three values a pixel: the gain, and how far each is from the plate's.
+    /// Per row, three values a pixel: gain, and difference from the plate.
     line: Vec<f32>,
     off: Vec<f32>,
-    /// How bright a pixel is beside its plate.
+    /// Ratio of each pixel's brightness to the plate's.
     ratios: Vec<f32>,
     seen: Vec<bool>,
     front: Vec<u32>,
     sample: Vec<f32>,
-    /// A line of flags.
+    /// Scratch memory for dilation.
     flags: Vec<bool>,
-    /// Whether a pixel of a mask of persons is one, or close to one.
+    /// Whether a pixel of the persons' mask is in or close to a person.
     near: Vec<bool>,
-    /// Whether a pixel is of something before the plate.
+    /// Whether a pixel is foreground.
     pub foreign: Vec<bool>,
-    /// The pixels of all parts, part by part.
+    /// The pixels of all components, one after the other.
     pub pixels: Vec<u32>,
-    pub parts: Vec<Part>,
+    pub components: Vec<Component>,
 }
 
 impl Subject {
-    /// How much of the picture is before the plate, 0 to 1.
-    pub fn share(&self) -> f32 {
+    /// Returns the fraction of the picture that is foreground.
+    pub fn foreground_fraction(&self) -> f32 {
         self.pixels.len() as f32 / self.foreign.len().max(1) as f32
     }
 
-    /// Compares a picture with its plate; `foreign` is what it was in the frame before, and is what it is now, after.
+    /// Segments a picture against its plate. `foreign` contains the previous frame's foreground on entry, for the
+    /// hysteresis, and the new one on return.
     pub fn find(&mut self, now: &[[f32; 3]], plate: &[[f32; 3]], size: (usize, usize), alignment: &Alignment) {
         let deviation = self.deviation(now, plate, alignment);
         let weak = WEAK.max(WEAK_DEVIATIONS * deviation);
         let strong = STRONG.max(STRONG_DEVIATIONS * deviation);
         self.label(now, plate, size, (alignment.gain, weak, strong));
         self.grow_light(size);
-        self.join(size);
+        self.find_components(size);
         self.fill_holes(size);
     }
 
-    /// The standard deviation of noise, from the median of what differs where nothing stood before the plate.
+    /// Estimates the noise's standard deviation by the median absolute deviation of the background pixels.
     fn deviation(&mut self, now: &[[f32; 3]], plate: &[[f32; 3]], alignment: &Alignment) -> f32 {
-        /// The median of absolute values of a normal distribution is so much of its deviation.
+        /// Median absolute deviation of a normal distribution, in standard deviations.
         const MEDIAN: f32 = 0.6745;
         self.sample.clear();
         let all = now.iter().zip(plate).zip(&self.foreign).filter(|(_, foreign)| !**foreign);
-        // Some are enough.
+        // A sample suffices.
         self.sample.extend(all.step_by(5).map(|((now, plate), _)| (now[1] - alignment.gain[1] * plate[1]).abs()));
         let middle = self.sample.len() / 2;
         match self.sample.is_empty() {
             true => 0.0,
-            false => (*self.sample.select_nth_unstable_by(middle, f32::total_cmp).1 / MEDIAN).min(MOST_DEVIATION),
+            false => (*self.sample.select_nth_unstable_by(middle, f32::total_cmp).1 / MEDIAN).min(MAX_DEVIATION),
         }
     }
 
@@ -161,7 +162,8 @@ impl Subject {
                 let ratio = (values.iter().sum::<f32>() + 1.0) / (exposed.iter().sum::<f32>() + 1.0);
                 self.ratios.push(ratio);
                 let most = off[0].max(off[1]).max(off[2]).max(0.0);
-                let stays = if self.foreign[at] { STAYS } else { 1.0 };
+                let stays = if self.foreign[at] { HYSTERESIS } else { 1.0 };
+                // {|| A shadow darkens all channels alike, and a lamp brightens them by similar factors.
                 let in_shadow = || {
                     let off = values.iter().zip(exposed).map(|(value, exposed)| (value - ratio * exposed).abs());
                     (DARKEST_SHADOW..1.0).contains(&ratio) && off.fold(0.0, f32::max) < SHADE
@@ -181,7 +183,7 @@ impl Subject {
         }
     }
 
-    /// What the background goes over into without an outline is the background in another light.
+    /// Grows the background into relit pixels where the light changes smoothly, without an outline.
     fn grow_light(&mut self, (width, height): (usize, usize)) {
         self.front.clear();
         let is_background = |&at: &u32| self.labels[at as usize] == Label::Background;
@@ -209,12 +211,12 @@ impl Subject {
         }
     }
 
-    /// Pixels that differ and hang together are a part, if enough of them differ much.
-    fn join(&mut self, size: (usize, usize)) {
-        let least = ((LEAST_PART * self.labels.len() as f32) as usize).max(4);
+    /// Finds the connected components with enough certain foreground pixels (hysteresis thresholding).
+    fn find_components(&mut self, size: (usize, usize)) {
+        let least = ((MIN_COMPONENT * self.labels.len() as f32) as usize).max(4);
         self.foreign.fill(false);
         self.pixels.clear();
-        self.parts.clear();
+        self.components.clear();
         self.seen.clear();
         self.seen.extend(self.labels.iter().map(|&label| label == Label::Background));
         for start in 0..self.labels.len() {
@@ -229,26 +231,26 @@ impl Subject {
                 continue;
             }
             self.pixels[first..].iter().for_each(|&at| self.foreign[at as usize] = true);
-            self.parts.push(Part { first, end: self.pixels.len() });
+            self.components.push(Component { first, end: self.pixels.len() });
         }
     }
 
-    /// What is nobody's, as where a lamp was switched on, is background: what is neither close to `persons` nor joined to them
-    /// and small enough to be held.
+    /// Removes foreground that belongs to no person, such as the light of a lamp: pixels neither close to `persons` nor
+    /// in a component that is connected to them and small enough to be held.
     pub fn keep_persons(&mut self, persons: &Mask, size: (usize, usize)) {
         let of_mask = (persons.width as usize, persons.height as usize);
         if persons.share.is_empty() {
             return;
         }
         self.seen.clear();
-        self.seen.extend(persons.share.iter().map(|share| *share > PERSON));
+        self.seen.extend(persons.share.iter().map(|alpha| *alpha > PERSON));
         let mut near = std::mem::take(&mut self.near);
         near.clone_from(&self.seen);
         dilate(&mut near, &mut self.flags, of_mask.0, (CLOSE * of_mask.0 as f32).ceil() as usize);
         let place = |at: u32| nearest(at as usize, size, of_mask);
         let mut kept = 0;
-        for part in &mut self.parts {
-            let range = part.first..part.end;
+        for component in &mut self.components {
+            let range = component.first..component.end;
             let of_persons = self.pixels[range.clone()].iter().filter(|&&at| self.seen[place(at)]).count();
             let away = self.pixels[range.clone()].iter().filter(|&&at| !near[place(at)]).count();
             let is_theirs = away as f32 <= HELD * of_persons as f32;
@@ -262,16 +264,16 @@ impl Subject {
                     self.foreign[at as usize] = false;
                 }
             }
-            *part = Part { first, end: kept };
+            *component = Component { first, end: kept };
         }
         self.pixels.truncate(kept);
-        self.parts.retain(|part| part.first < part.end);
+        self.components.retain(|component| component.first < component.end);
         self.near = near;
     }
 
-    /// Small holes are a part's own: colours that happen to be those of the background behind.
+    /// Fills small holes: colours that happen to match the background.
     fn fill_holes(&mut self, size: (usize, usize)) {
-        let most = (LEAST_HOLE * self.labels.len() as f32) as usize;
+        let most = (MAX_HOLE * self.labels.len() as f32) as usize;
         self.seen.clone_from(&self.foreign);
         for start in 0..self.seen.len() {
             if self.seen[start] {
@@ -286,7 +288,7 @@ impl Subject {
     }
 }
 
-/// Adds to `pixels` all that hang together with `start` and were not seen, corners included.
+/// Appends to `pixels` the unseen pixels connected to `start`, 8-connected.
 fn flood(start: usize, (width, height): (usize, usize), seen: &mut [bool], pixels: &mut Vec<u32>) {
     let mut next = pixels.len();
     seen[start] = true;

@@ -1,14 +1,15 @@
-//! Edge alignment, guided by colour: depth edges, moved onto the edges of the colour picture.
+//! Colour-guided edge alignment: moves depth edges onto the edges of the colour picture.
 //!
-//! In a band around the jumps of depth each pixel asks the pixels around it: which depth do those have that look like
-//! you? Depths far from any jump are sure and count in full; those in the band, which may be the error, count little.
-//! The answer is one of the surfaces around, never a depth between them: the votes are split at the middle of their
-//! range, the heavier half is kept, and so on until what is left is one surface (a weighted mode, found by bisection).
-//! What already agrees with its answer is not touched, so that exact depth stays exact.
+//! In a band around depth discontinuities each pixel takes the depth of those pixels around it that have its colour.
+//! Depths far from any discontinuity are reliable and count in full; those in the band may be wrong and count little.
+//! The result is the depth of one of the surfaces around, never one between them: the votes are split at the middle of
+//! their range, the heavier half is kept, and so on until one surface is left (a weighted mode, found by bisection).
+//! Pixels that agree with their result are not changed, so that exact depth stays exact.
 //!
-//! The idea of letting colour weigh depth is the joint bilateral filter's (Kopf et al., *Joint bilateral upsampling*,
+//! Weighting depth by colour is the idea of the joint bilateral filter (Kopf et al., *Joint bilateral upsampling*,
 //! 2007); its mean would invent depths at edges, the mode does not (Min, Lu, Do, *Depth video enhancement based on
 //! weighted mode filtering*, 2012).
+//! twin: shaders/refine_band.wgsl, shaders/refine_vote.wgsl
 
 use std::iter;
 use std::ops::Range;
@@ -17,39 +18,39 @@ use pulp::{Arch, WithSimd};
 
 use super::planes::{Planes, SetColors, SetDepths};
 use super::tiles::{self, Tiles};
-use super::votes::{self, REACH_LANES, Votes, Weights, jump_at};
+use super::votes::{self, RADIUS_LANES, Votes, Weights, depth_step_at};
 use crate::compute::bands::{self, Bands};
 use crate::compute::thread_pool::ThreadPool;
 
-/// How far from a jump a depth may be wrong, in pixels.
+/// Width of the band beside a discontinuity in which a depth may be wrong, in pixels.
 pub const BAND_PX: usize = 4;
-/// Weight of a depth that may be wrong itself, and of one that nobody measured.
-pub const UNSURE: f32 = 0.12;
-pub const MADE_UP: f32 = 0.02;
-/// Neighbours on the two sides of a jump differ by at least this share of one: an edge may be spread over some pixels.
-pub const EDGE_SHARE: f32 = 0.25;
-/// Rounds; each can move an edge by up to [`BAND_PX`].
+/// Weight of a depth within the band, and of one that was filled in.
+pub const UNCERTAIN: f32 = 0.12;
+pub const FILLED: f32 = 0.02;
+/// Minimum fraction of a depth step between neighbours at an edge, which may be spread over some pixels.
+pub const EDGE_FRACTION: f32 = 0.25;
+/// Number of rounds; each can move an edge by up to [`BAND_PX`].
 pub const ROUNDS: usize = 2;
-/// Fewer pixels are not worth another thread.
-const LEAST_ASKED: usize = 64;
+/// Minimum number of pixels per thread.
+const MIN_PIXELS_PER_THREAD: usize = 64;
 
-/// Aligns maps of inverse depth; owns the memory for it.
+/// Aligns maps of inverse depth; owns its buffers.
 #[derive(Debug)]
 pub struct Aligner {
     planes: Planes,
-    /// Both sides of every jump, and what lies within [`BAND_PX`] of one.
+    /// Both sides of every discontinuity, and all pixels within [`BAND_PX`] of one.
     edge: Vec<bool>,
     band: Vec<bool>,
     scratch: Vec<bool>,
     tiles: Tiles,
-    /// Weight of votes by distance.
+    /// Spatial weights of the votes.
     nearby: Weights,
-    /// Pixels to ask, in order: first those at an edge, then the neighbours of those that changed.
+    /// Worklist of pixels, in order: first those at edges, then the neighbours of those that changed.
     front: Vec<u32>,
-    /// What those that are asked at once answer.
-    answers: Vec<f32>,
-    /// All that were asked in the first round.
-    asked: Vec<u32>,
+    /// Results of the pixels that are processed in parallel.
+    results: Vec<f32>,
+    /// All pixels processed in the first round.
+    pixels: Vec<u32>,
     /// Pixels that changed in the last round.
     moved: Vec<u32>,
 }
@@ -64,16 +65,16 @@ impl Default for Aligner {
             tiles: Tiles::default(),
             nearby: votes::weights_by_distance(),
             front: Vec::new(),
-            answers: Vec::new(),
-            asked: Vec::new(),
+            results: Vec::new(),
+            pixels: Vec::new(),
             moved: Vec::new(),
         }
     }
 }
 
 impl Aligner {
-    /// Moves the edges of `inverse` onto those of the picture `rgb`. Steps of inverse depth above `jump` are edges;
-    /// depths that are `unknown` were made up.
+    /// Moves the edges of `inverse` onto those of the picture `rgb`. Steps of inverse depth above `depth_step` are
+    /// edges; depths that are `unknown` were filled in.
     pub fn align(
         &mut self,
         (arch, workers): (Arch, &mut ThreadPool),
@@ -81,14 +82,14 @@ impl Aligner {
         unknown: &[bool],
         rgb: &[u8],
         width: usize,
-        jump: f32,
+        depth_step: f32,
     ) {
         let height = inverse.len() / width;
         let bands = Bands::new(height, tiles::ROWS, workers);
         self.moved.clear();
-        self.asked.clear();
+        self.pixels.clear();
         for round in 0..ROUNDS {
-            let Self { planes, edge, band, scratch, tiles, nearby, front, answers, asked, moved } = self;
+            let Self { planes, edge, band, scratch, tiles, nearby, front, results, pixels, moved } = self;
             if round == 0 {
                 for mask in [&mut *edge, &mut *band, &mut *scratch] {
                     mask.clear();
@@ -98,55 +99,55 @@ impl Aligner {
                 let parts = bands.rows().zip(bands.split(edge, width)).zip(tiles.split(bands));
                 workers.run_each(parts, &|((rows, edge), has_edge)| {
                     let columns = |_| iter::once(0..width);
-                    arch.dispatch(FindEdges { inverse, width, jump, columns, rows, edge: &mut *edge });
+                    arch.dispatch(FindEdges { inverse, width, depth_step, columns, rows, edge: &mut *edge });
                     tiles::mark(has_edge, edge, width);
                 });
                 tiles.find_near();
                 front.clear();
                 tiles.find_all(edge, front);
-                planes.resize(width, height, REACH_LANES);
+                planes.resize(width, height, RADIUS_LANES);
             } else {
-                // Only what moved in the round before can have moved edges, and can move its neighbours now.
+                // Only pixels that moved in the last round can have moved edges, or can move their neighbours now.
                 workers.run_each(bands.rows().zip(bands.split(edge, width)), &|(rows, edge)| {
-                    arch.dispatch(FindEdges { inverse, width, jump, columns: |y| tiles.columns(y), rows, edge });
+                    arch.dispatch(FindEdges { inverse, width, depth_step, columns: |y| tiles.columns(y), rows, edge });
                 });
             }
             workers.run_each(bands.rows().zip(bands.split(scratch, width)), &|(rows, out)| {
-                arch.dispatch(SpreadAlong { tiles, width, edge, rows, out });
+                arch.dispatch(DilateRows { tiles, width, edge, rows, out });
             });
             let parts = planes.split(bands).zip(bands.split(band, width));
             workers.run_each(parts, &|(mut planes, band)| {
                 let rows = planes.rows.clone();
-                arch.dispatch(SpreadAcross { tiles, width, along: scratch, rows, out: band });
+                arch.dispatch(DilateColumns { tiles, width, along: scratch, rows, out: band });
                 let planes = &mut planes;
                 if round == 0 {
                     arch.dispatch(SetColors { planes, tiles, rgb });
                 }
-                arch.dispatch(SetDepths { planes, tiles, inverse, unknown, band, weights: [MADE_UP, UNSURE] });
+                arch.dispatch(SetDepths { planes, tiles, inverse, unknown, band, weights: [FILLED, UNCERTAIN] });
             });
             if round > 0 {
                 front.clear();
                 front.extend(moved.iter().filter(|&&k| band[k as usize]));
             }
             moved.clear();
-            vote((arch, workers), (planes, nearby, jump), (inverse, band), (front, answers, moved));
+            vote((arch, workers), (planes, nearby, depth_step), (inverse, band), (front, results, moved));
             if round == 0 {
-                std::mem::swap(front, asked);
+                std::mem::swap(front, pixels);
             }
         }
-        decide(&self.asked, inverse, rgb, width, jump);
+        snap_to_surfaces(&self.pixels, inverse, rgb, width, depth_step);
     }
 }
 
-/// Finds the surface of the pixels at edges, the `front`, and of the neighbours of those that turn out to lie on another
-/// surface: an edge moves like a front, and where it is right it costs little. What a pixel is told depends on its own depth
-/// alone, and on the planes: those of the front are asked at once. `band` is where depths may change; a pixel leaves it when it
-/// joins the front, so that it is asked once.
+/// Finds the surface of the pixels at edges, the `front`, and of the neighbours of those that change: an edge moves
+/// like a wavefront, and costs little where it is correct. A result depends only on the pixel's own depth and on the
+/// planes, so that the whole front is computed in parallel. `band` marks the pixels that may change; a pixel leaves it
+/// when it joins the front, so that it is processed once.
 fn vote(
     (arch, workers): (Arch, &mut ThreadPool),
-    (planes, nearby, jump): (&Planes, &Weights, f32),
+    (planes, nearby, depth_step): (&Planes, &Weights, f32),
     (inverse, band): (&mut [f32], &mut [bool]),
-    (front, answers, moved): (&mut Vec<u32>, &mut Vec<f32>, &mut Vec<u32>),
+    (front, results, moved): (&mut Vec<u32>, &mut Vec<f32>, &mut Vec<u32>),
 ) {
     let width = planes.width;
     for &k in &*front {
@@ -154,25 +155,25 @@ fn vote(
     }
     let mut next = 0;
     while next < front.len() {
-        let asked = &front[next..];
-        let each = bands::share(asked.len(), LEAST_ASKED);
-        answers.resize(asked.len(), 0.0);
-        workers.run_each(asked.chunks(each).zip(answers.chunks_mut(each)), &|(asked, answers)| {
-            arch.dispatch(Vote { planes, nearby, inverse, jump, asked, answers });
+        let pixels = &front[next..];
+        let each = bands::share(pixels.len(), MIN_PIXELS_PER_THREAD);
+        results.resize(pixels.len(), 0.0);
+        workers.run_each(pixels.chunks(each).zip(results.chunks_mut(each)), &|(pixels, results)| {
+            arch.dispatch(Vote { planes, nearby, inverse, depth_step, pixels, results });
         });
-        for &answer in &*answers {
-            let asked = front[next];
+        for &result in &*results {
+            let pixel = front[next];
             next += 1;
-            let k = asked as usize;
-            if answer == inverse[k] {
+            let k = pixel as usize;
+            if result == inverse[k] {
                 continue;
             }
-            inverse[k] = answer;
-            moved.push(asked);
+            inverse[k] = result;
+            moved.push(pixel);
             let (x, y) = (k % width, k / width);
             let beside =
                 [(x > 0, k.wrapping_sub(1)), (x + 1 < width, k + 1), (y > 0, k.wrapping_sub(width)), (true, k + width)];
-            // Below the last row `k + width` lies beyond the band.
+            // For the last row, `k + width` lies beyond the mask.
             for (inside, beside) in beside {
                 if inside && beside < band.len() && band[beside] {
                     band[beside] = false;
@@ -183,18 +184,17 @@ fn vote(
     }
 }
 
-/// Gives those pixels that are left between two surfaces, as where a ramp was an edge, the one of both whose colour beside them
-/// is more like theirs.
-fn decide(asked: &[u32], inverse: &mut [f32], rgb: &[u8], width: usize, jump: f32) {
+/// Snaps pixels still between two surfaces, as on a blurred edge, to the neighbour of more similar colour.
+fn snap_to_surfaces(pixels: &[u32], inverse: &mut [f32], rgb: &[u8], width: usize, depth_step: f32) {
     let color = |k: usize| [0, 1, 2].map(|p| i32::from(rgb[3 * k + p]));
     let height = inverse.len() / width;
-    for k in asked.iter().map(|&k| k as usize) {
+    for k in pixels.iter().map(|&k| k as usize) {
         let (x, y, here) = (k % width, k / width, inverse[k]);
         let pairs = [(x > 0 && x + 1 < width, 1), (y > 0 && y + 1 < height, width)];
         let mut ends = pairs.into_iter().filter(|(inside, _)| *inside).map(|(_, step)| (k - step, k + step));
         let is_between = |&(a, b): &(usize, usize)| {
             let (low, high) = (inverse[a].min(inverse[b]), inverse[a].max(inverse[b]));
-            here - low > jump_at(jump, here) && high - here > jump_at(jump, high)
+            here - low > depth_step_at(depth_step, here) && high - here > depth_step_at(depth_step, high)
         };
         if let Some((a, b)) = ends.rfind(is_between) {
             let apart = |of: usize| color(of).into_iter().zip(color(k)).map(|(a, b)| (a - b).pow(2)).sum::<i32>();
@@ -203,11 +203,11 @@ fn decide(asked: &[u32], inverse: &mut [f32], rgb: &[u8], width: usize, jump: f3
     }
 }
 
-/// Marks both sides of every jump, in some columns of each row of a band.
+/// Marks both sides of every discontinuity, in some columns of each row of a band.
 struct FindEdges<'a, C> {
     inverse: &'a [f32],
     width: usize,
-    jump: f32,
+    depth_step: f32,
     columns: C,
     rows: Range<usize>,
     edge: &'a mut [bool],
@@ -217,7 +217,7 @@ impl<I: Iterator<Item = Range<usize>>, C: Fn(usize) -> I> WithSimd for FindEdges
     type Output = ();
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, _: S) {
-        let Self { inverse, width, jump, columns, rows, edge } = self;
+        let Self { inverse, width, depth_step, columns, rows, edge } = self;
         let height = inverse.len() / width;
         for (line, y) in rows.enumerate() {
             let row = &inverse[y * width..][..width];
@@ -229,7 +229,7 @@ impl<I: Iterator<Item = Range<usize>>, C: Fn(usize) -> I> WithSimd for FindEdges
                 // At the ends of the row a pixel is its own neighbour.
                 for x in [start, end - 1] {
                     let around = [above[x], below[x], row[x.saturating_sub(1)], row[(x + 1).min(width - 1)]];
-                    edge[x] = around.into_iter().any(|beside| is_jump(row[x], beside, jump));
+                    edge[x] = around.into_iter().any(|beside| is_edge_between(row[x], beside, depth_step));
                 }
                 if end - start <= 2 {
                     continue;
@@ -239,7 +239,7 @@ impl<I: Iterator<Item = Range<usize>>, C: Fn(usize) -> I> WithSimd for FindEdges
                     [&above[from..], &row[start..], &row[from..], &row[from + 1..], &below[from..]]
                         .map(|row| &row[..len]);
                 for (k, edge) in edge[from..][..len].iter_mut().enumerate() {
-                    let is = |beside: f32| is_jump(here[k], beside, jump);
+                    let is = |beside: f32| is_edge_between(here[k], beside, depth_step);
                     *edge = is(above[k]) | is(below[k]) | is(left[k]) | is(right[k]);
                 }
             }
@@ -247,11 +247,11 @@ impl<I: Iterator<Item = Range<usize>>, C: Fn(usize) -> I> WithSimd for FindEdges
     }
 }
 
-/// So far beside an edge the band goes: the edge pixel itself is the first of it.
-const REST_PX: usize = BAND_PX - 1;
+/// Width of the band beside an edge pixel, which is itself the first pixel of it.
+const SIDE_PX: usize = BAND_PX - 1;
 
-/// Marks what lies within [`BAND_PX`] of an edge along the rows of a band.
-struct SpreadAlong<'a> {
+/// Marks the pixels within [`BAND_PX`] of an edge along the rows of a band.
+struct DilateRows<'a> {
     tiles: &'a Tiles,
     width: usize,
     edge: &'a [bool],
@@ -259,7 +259,7 @@ struct SpreadAlong<'a> {
     out: &'a mut [bool],
 }
 
-impl WithSimd for SpreadAlong<'_> {
+impl WithSimd for DilateRows<'_> {
     type Output = ();
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, _: S) {
@@ -269,9 +269,9 @@ impl WithSimd for SpreadAlong<'_> {
                 let row = &edge[y * width..][..width];
                 let out = &mut out[line * width..][..width];
                 out[columns.clone()].copy_from_slice(&row[columns.clone()]);
-                for px in 1..=REST_PX {
+                for px in 1..=SIDE_PX {
                     let Range { start, end } = columns;
-                    // What has no neighbour so far to the left, or to the right, is left out.
+                    // Pixels without a neighbour this far to the left or right are skipped.
                     let (after, before) = (start.max(px), end.min(width.saturating_sub(px)));
                     if after < end {
                         or_assign(&mut out[after..end], &row[after - px..end - px]);
@@ -285,8 +285,8 @@ impl WithSimd for SpreadAlong<'_> {
     }
 }
 
-/// The same down the columns, of what is marked `along` the rows.
-struct SpreadAcross<'a> {
+/// Dilates the mask `along` down the columns.
+struct DilateColumns<'a> {
     tiles: &'a Tiles,
     width: usize,
     along: &'a [bool],
@@ -294,7 +294,7 @@ struct SpreadAcross<'a> {
     out: &'a mut [bool],
 }
 
-impl WithSimd for SpreadAcross<'_> {
+impl WithSimd for DilateColumns<'_> {
     type Output = ();
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, _: S) {
@@ -304,7 +304,7 @@ impl WithSimd for SpreadAcross<'_> {
             for columns in tiles.columns(y) {
                 let out = &mut out[line * width..][columns.clone()];
                 out.fill(false);
-                for other in y.saturating_sub(REST_PX)..(y + BAND_PX).min(height) {
+                for other in y.saturating_sub(SIDE_PX)..(y + BAND_PX).min(height) {
                     or_assign(out, &along[other * width..][columns.clone()]);
                 }
             }
@@ -319,32 +319,32 @@ fn or_assign(to: &mut [bool], from: &[bool]) {
     }
 }
 
-/// Whether two neighbours lie on the two sides of a jump, or share enough of one.
+/// Whether two neighbours differ by a sufficient fraction of a depth step.
 #[inline(always)]
-fn is_jump(here: f32, beside: f32, jump: f32) -> bool {
-    (here - beside).abs() > EDGE_SHARE * jump_at(jump, here)
+fn is_edge_between(here: f32, beside: f32, depth_step: f32) -> bool {
+    (here - beside).abs() > EDGE_FRACTION * depth_step_at(depth_step, here)
 }
 
-/// Asks pixels for their surface.
+/// Computes the surface of each listed pixel.
 struct Vote<'a> {
     planes: &'a Planes,
     nearby: &'a Weights,
     inverse: &'a [f32],
-    jump: f32,
-    asked: &'a [u32],
-    answers: &'a mut [f32],
+    depth_step: f32,
+    pixels: &'a [u32],
+    results: &'a mut [f32],
 }
 
 impl WithSimd for Vote<'_> {
     type Output = ();
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, _: S) {
-        let Self { planes, nearby, inverse, jump, asked, answers } = self;
+        let Self { planes, nearby, inverse, depth_step, pixels, results } = self;
         let mut votes = Votes::default();
-        for (&asked, answer) in asked.iter().zip(answers) {
-            let k = asked as usize;
+        for (&pixel, result) in pixels.iter().zip(results) {
+            let k = pixel as usize;
             votes.gather(planes, nearby, k % planes.width, k / planes.width);
-            *answer = votes.surface(inverse[k], jump);
+            *result = votes.surface(inverse[k], depth_step);
         }
     }
 }

@@ -1,128 +1,130 @@
-//! Whether the depth of a stream is exact: known everywhere, without noise, and at rest where its picture rests.
+//! Detects exact depth streams: known everywhere, without noise, and static where the picture is static.
 //!
-//! Refinement mends what sensors get wrong. Where nothing is wrong it can only lose: what is thin, as hair is, it takes for
-//! noise. One frame tells little, so that several decide, and depth that was found to be a sensor's remains so for long.
+//! Refinement corrects sensor errors. On exact depth it can only do harm: it takes thin structures like hair for noise.
+//! One frame is not conclusive, so that several decide, and a stream once recognised as a sensor's needs much longer to
+//! become exact.
 
 use super::noise::{NO_NOISE, NoiseMeter};
 use super::temporal::{MOVED, MOVED_BOUNDS};
 use crate::frame::{ColorImage, DepthMap};
 
-/// Once something is decided, two frames that follow each other are compared in one of so many.
-const EVERY: u32 = 5;
-/// So many looks in a row decide, and so many that depth is exact which was not so before: five seconds at 30 frames a second.
+/// Once decided, two consecutive frames of this many are compared.
+const PERIOD: u32 = 5;
+/// Comparisons in a row that change the decision, and for depth that was ever inexact: five seconds at 30 frames per
+/// second.
 const DECISION: u32 = 3;
 const LONG_DECISION: u32 = 30;
-/// Rows and columns that are looked at, at most.
-const LOOKS: usize = 96;
-/// Where colours rest in less than this share of the picture, nothing is learned of how steady depth is.
-const LEAST_RESTING: f32 = 0.1;
+/// Maximum number of sampled rows and of sampled columns.
+const GRID: usize = 96;
+/// Minimum fraction of the picture with static colours for a comparison.
+const MIN_STATIC_FRACTION: f32 = 0.1;
 
-/// What speaks against exact depth.
+/// Measures of deviation from exact depth.
 #[derive(Clone, Copy, Debug)]
 struct Faults {
-    /// Share of the pixels whose depth is unknown.
+    /// Fraction of the pixels with unknown depth.
     holes: f32,
-    /// Standard deviation of the noise, as a share of the median of inverse depth.
+    /// Standard deviation of the noise, relative to the median of inverse depth.
     noise: f32,
-    /// Share of the pixels with resting colours whose depth does not rest.
-    restless: f32,
+    /// Fraction of the pixels with static colours whose depth is not static.
+    unsteady: f32,
 }
 
 impl Faults {
-    /// Depth with less than these becomes exact, and remains so with less than those (hysteresis).
-    const MOST: [Self; 2] = [
-        Self { holes: 0.001, noise: NO_NOISE, restless: 0.01 },
-        Self { holes: 0.01, noise: 2.0 * NO_NOISE, restless: 0.03 },
+    /// Limits to become exact, and to stay exact (hysteresis).
+    const LIMITS: [Self; 2] = [
+        Self { holes: 0.001, noise: NO_NOISE, unsteady: 0.01 },
+        Self { holes: 0.01, noise: 2.0 * NO_NOISE, unsteady: 0.03 },
     ];
 
-    fn are_within(self, most: Self) -> bool {
-        self.holes <= most.holes && self.noise <= most.noise && self.restless <= most.restless
+    fn are_within(self, limits: Self) -> bool {
+        self.holes <= limits.holes && self.noise <= limits.noise && self.unsteady <= limits.unsteady
     }
 }
 
-/// Decides from frame to frame; owns the memory for it.
+/// Decides frame by frame; owns its buffers.
 #[derive(Debug, Default)]
 pub struct Exactness {
     is_exact: bool,
-    /// Whether depth was ever found not to be exact.
+    /// Whether depth was ever found to be inexact.
     was_inexact: bool,
-    /// Looks in a row that speak against what is decided.
+    /// Comparisons in a row that contradict the decision.
     against: u32,
-    /// Frames that were taken.
+    /// Number of frames so far.
     frames: u32,
     meter: NoiseMeter,
     size: (u32, u32),
-    /// Of the frame before, if that was looked at, and of this one.
-    before: Vec<Look>,
-    now: Vec<Look>,
+    /// Samples of the last frame, if it was sampled, and of this one.
+    before: Vec<Sample>,
+    now: Vec<Sample>,
     changes: Vec<f32>,
     sorted: Vec<f32>,
 }
 
-/// A pixel that is looked at.
+/// A sampled pixel.
 #[derive(Clone, Copy, Debug)]
-struct Look {
+struct Sample {
     rgb: [u8; 3],
-    /// Inverse depth in 1/m; 0 where it is unknown.
+    /// Inverse depth in 1/m; 0 where unknown.
     inverse: f32,
 }
 
 impl Exactness {
-    /// Whether depth was found to be exact.
+    /// Whether the depth is considered exact.
     pub fn is_exact(&self) -> bool {
         self.is_exact
     }
 
-    /// Another scene comes: it is not compared with the frame before.
+    /// Starts a new scene: the next frame is not compared with the last one.
     pub fn forget(&mut self) {
         self.before.clear();
     }
 
-    /// Takes the next frame with its depth as it was measured, and decides. Nothing is decided where the map has not the size
-    /// of the picture.
+    /// Processes the next frame with its depth as measured. Frames whose map does not have the size of the picture are
+    /// ignored.
     pub fn look(&mut self, map: &DepthMap, color: &ColorImage) {
         let is_decided = self.is_exact || self.was_inexact;
-        let turn = self.frames % EVERY;
+        let turn = self.frames % PERIOD;
         self.frames = self.frames.wrapping_add(1);
         if map.size() != color.size() || map.metres.is_empty() || is_decided && turn > 1 {
             return self.before.clear();
         }
         self.sample(map, color);
         let (now, before) = (&self.now, &self.before);
-        let restless = if self.size == map.size() && before.len() == now.len() {
-            restless(now, before, (&mut self.changes, &mut self.sorted))
+        let unsteady = if self.size == map.size() && before.len() == now.len() {
+            unsteady(now, before, (&mut self.changes, &mut self.sorted))
         } else {
             None
         };
-        if let Some(restless) = restless {
-            self.decide(map, restless);
+        if let Some(unsteady) = unsteady {
+            self.decide(map, unsteady);
         }
         self.size = map.size();
         std::mem::swap(&mut self.now, &mut self.before);
     }
 
-    /// Looks at the pixels of a grid.
+    /// Samples the pixels of a grid.
     fn sample(&mut self, map: &DepthMap, color: &ColorImage) {
         let (width, height) = (map.width as usize, map.height as usize);
         self.now.clear();
-        for y in (0..height).step_by(height.div_ceil(LOOKS)) {
-            for at in (y * width..(y + 1) * width).step_by(width.div_ceil(LOOKS)) {
+        for y in (0..height).step_by(height.div_ceil(GRID)) {
+            for at in (y * width..(y + 1) * width).step_by(width.div_ceil(GRID)) {
                 let rgb = [0, 1, 2].map(|p| color.rgb[3 * at + p]);
-                self.now.push(Look { rgb, inverse: DepthMap::inverse_of(map.metres[at]) });
+                self.now.push(Sample { rgb, inverse: DepthMap::inverse_of(map.metres[at]) });
             }
         }
     }
 
-    /// Lets a frame count, whose depth does not rest in this share of the pixels whose colours do.
-    fn decide(&mut self, map: &DepthMap, restless: f32) {
+    /// Updates the decision; `unsteady` is the fraction of pixels with static colours whose depth is not static.
+    fn decide(&mut self, map: &DepthMap, unsteady: f32) {
         let size = (map.width as usize, map.height as usize);
         let inverse = |at: usize| DepthMap::inverse_of(map.metres[at]);
         let noise = self.meter.noise(inverse, |at| inverse(at) == 0.0, size);
         let known = self.sorted.len();
-        let Some(median) = middle(&mut self.sorted) else { return };
+        let Some(median) = median(&mut self.sorted) else { return };
         let holes = 1.0 - known as f32 / self.now.len() as f32;
-        let faults = Faults { holes, noise: noise / median, restless };
-        let speaks_against = faults.are_within(Faults::MOST[usize::from(self.is_exact)]) != self.is_exact;
+        let faults = Faults { holes, noise: noise / median, unsteady };
+        let speaks_against = faults.are_within(Faults::LIMITS[usize::from(self.is_exact)]) != self.is_exact;
         self.was_inexact |= !self.is_exact && !speaks_against;
         self.against = if speaks_against { self.against + 1 } else { 0 };
         let needed = if self.was_inexact && !self.is_exact { LONG_DECISION } else { DECISION };
@@ -133,31 +135,31 @@ impl Exactness {
     }
 }
 
-/// The share of the pixels with resting colours whose depth does not rest; `None` if there are too few. Fills `sorted` with
-/// the inverse depths that are known now.
-fn restless(now: &[Look], before: &[Look], (changes, sorted): (&mut Vec<f32>, &mut Vec<f32>)) -> Option<f32> {
-    let change = |(now, before): (&Look, &Look)| {
+/// Returns the fraction of the pixels with static colours whose depth is not static; `None` if there are too few. Fills
+/// `sorted` with the inverse depths known now.
+fn unsteady(now: &[Sample], before: &[Sample], (changes, sorted): (&mut Vec<f32>, &mut Vec<f32>)) -> Option<f32> {
+    let change = |(now, before): (&Sample, &Sample)| {
         now.rgb.iter().zip(before.rgb).map(|(now, before)| f32::from(now.abs_diff(before))).sum::<f32>()
     };
     changes.clear();
     changes.extend(now.iter().zip(before).map(change));
-    let moved = (MOVED * middle(changes)?).clamp(MOVED_BOUNDS.0, MOVED_BOUNDS.1);
+    let moved = (MOVED * median(changes)?).clamp(MOVED_BOUNDS.0, MOVED_BOUNDS.1);
     sorted.clear();
     sorted.extend(now.iter().map(|look| look.inverse).filter(|&inverse| inverse > 0.0));
-    let least = NO_NOISE * middle(sorted)?;
-    let (mut resting, mut restless) = (0, 0);
+    let least = NO_NOISE * median(sorted)?;
+    let (mut resting, mut unsteady) = (0, 0);
     for pair @ (now, before) in now.iter().zip(before) {
         if change(pair) <= moved {
             resting += 1;
-            restless += usize::from((now.inverse - before.inverse).abs() > least);
+            unsteady += usize::from((now.inverse - before.inverse).abs() > least);
         }
     }
-    let is_enough = resting as f32 >= LEAST_RESTING * now.len() as f32;
-    is_enough.then(|| restless as f32 / resting as f32)
+    let is_enough = resting as f32 >= MIN_STATIC_FRACTION * now.len() as f32;
+    is_enough.then(|| unsteady as f32 / resting as f32)
 }
 
-/// The median; changes the order.
-fn middle(values: &mut [f32]) -> Option<f32> {
+/// Returns the median; reorders the values.
+fn median(values: &mut [f32]) -> Option<f32> {
     let at = values.len() / 2;
     (!values.is_empty()).then(|| *values.select_nth_unstable_by(at, f32::total_cmp).1)
 }
@@ -168,10 +170,10 @@ mod tests {
 
     const SIZE: (u32, u32) = (128, 96);
 
-    /// What is done to the depth of a frame.
+    /// Modifies the depth of a pixel.
     type Damage = fn(at: u32, frame: u32, z_m: f32) -> f32;
 
-    /// A picture with thin things, and its depth, damaged.
+    /// Returns a picture with thin structures, and its modified depth.
     fn frame(number: u32, damage: Damage) -> (ColorImage, DepthMap) {
         let (mut color, mut map) = (ColorImage::new(SIZE.0, SIZE.1), DepthMap::new(SIZE.0, SIZE.1));
         for at in 0..SIZE.0 * SIZE.1 {
@@ -190,9 +192,9 @@ mod tests {
     const EXACT: Damage = |_, _, z_m| z_m;
     const HOLES: Damage = |at, _, z_m| if at.is_multiple_of(50) { 0.0 } else { z_m };
     const NOISE: Damage = |at, _, z_m| z_m * (1.0 + 0.02 * noise(at, 0));
-    const RESTLESS: Damage = |at, frame, z_m| if at % 13 == frame % 2 { z_m * 1.01 } else { z_m };
+    const UNSTEADY: Damage = |at, frame, z_m| if at % 13 == frame % 2 { z_m * 1.01 } else { z_m };
 
-    /// Whether depth is found to be exact after each of so many frames of each kind.
+    /// Returns the decision after each frame, for a number of frames of each kind.
     fn decisions(exactness: &mut Exactness, kinds: &[(Damage, u32)]) -> Vec<bool> {
         let mut looks = Vec::new();
         for &(damage, count) in kinds {
@@ -214,7 +216,7 @@ mod tests {
 
     #[test]
     fn depth_with_holes_or_noise_or_that_flickers_is_not_exact() {
-        for damage in [HOLES, NOISE, RESTLESS] {
+        for damage in [HOLES, NOISE, UNSTEADY] {
             assert!(decisions(&mut Exactness::default(), &[(damage, 300)]).iter().all(|&exact| !exact));
         }
     }
@@ -223,9 +225,9 @@ mod tests {
     fn a_single_frame_decides_nothing_and_a_sensor_is_believed_late() {
         let exactness = &mut Exactness::default();
         assert!(decisions(exactness, &[(EXACT, 20), (HOLES, 3), (EXACT, 40)])[10..].iter().all(|&exact| exact));
-        let looks = decisions(exactness, &[(HOLES, 4 * EVERY * DECISION), (EXACT, EVERY * (LONG_DECISION - 1))]);
-        assert!(looks[(2 * EVERY * DECISION) as usize..].iter().all(|&exact| !exact), "held back for long");
-        assert!(decisions(exactness, &[(EXACT, 3 * EVERY)])[2 * EVERY as usize], "and found in the end");
+        let looks = decisions(exactness, &[(HOLES, 4 * PERIOD * DECISION), (EXACT, PERIOD * (LONG_DECISION - 1))]);
+        assert!(looks[(2 * PERIOD * DECISION) as usize..].iter().all(|&exact| !exact), "held back for long");
+        assert!(decisions(exactness, &[(EXACT, 3 * PERIOD)])[2 * PERIOD as usize], "and found in the end");
     }
 
     #[test]

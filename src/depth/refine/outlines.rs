@@ -1,6 +1,6 @@
-//! Morphology of a depth map: near things grow or shrink all around.
+//! Morphology of depth maps: grows or shrinks near objects.
 
-/// Moves outlines; owns the memory for it.
+/// Moves outlines; owns its buffers.
 #[derive(Debug, Default)]
 pub struct Outlines {
     before: Vec<f32>,
@@ -9,10 +9,11 @@ pub struct Outlines {
 }
 
 impl Outlines {
-    /// Moves all outlines of a map of inverse depth by `distance_px` of its pixels: outwards, seen from the nearer surface, or
-    /// inwards where that is negative. A square dilation or erosion of nearness, one axis after the other, of steps above
-    /// `jump`: what differs less is one surface, and noise. What is `unknown` stays as it is, and moves nothing.
-    pub fn shift(&mut self, inverse: &mut [f32], unknown: &[bool], width: usize, distance_px: i32, jump: f32) {
+    /// Moves all outlines of a map of inverse depth by `distance_px` of its pixels: outwards, seen from the nearer
+    /// surface; inwards if negative. A greyscale dilation or erosion with a square, one axis after the other. Changes
+    /// up to `depth_step` are undone, as one surface or noise. Pixels that are `unknown` stay unchanged and do not
+    /// affect others.
+    pub fn shift(&mut self, inverse: &mut [f32], unknown: &[bool], width: usize, distance_px: i32, depth_step: f32) {
         if distance_px == 0 || width == 0 {
             return;
         }
@@ -20,42 +21,43 @@ impl Outlines {
         self.before.clear();
         self.before.extend_from_slice(inverse);
         for y in 0..height {
-            self.run(inverse, unknown, (y * width, 1, width), distance_px);
+            self.filter_line(inverse, unknown, (y * width, 1, width), distance_px);
         }
         for x in 0..width {
-            self.run(inverse, unknown, (x, width, height), distance_px);
+            self.filter_line(inverse, unknown, (x, width, height), distance_px);
         }
         for (value, &before) in inverse.iter_mut().zip(&self.before) {
-            if (*value - before).abs() <= jump {
+            if (*value - before).abs() <= depth_step {
                 *value = before;
             }
         }
     }
 
-    /// Replaces each known value of `len`, `step` apart, by the largest (outwards) or least one within reach.
-    fn run(
+    /// Replaces each of `len` values, `step` apart, by the maximum (outwards) or minimum within the distance; skips
+    /// unknown ones.
+    fn filter_line(
         &mut self,
         inverse: &mut [f32],
         unknown: &[bool],
         (first, step, len): (usize, usize, usize),
         distance_px: i32,
     ) {
-        let (reach, outwards) = (distance_px.unsigned_abs() as usize, distance_px > 0);
-        let nothing = if outwards { f32::NEG_INFINITY } else { f32::INFINITY };
+        let (radius, outwards) = (distance_px.unsigned_abs() as usize, distance_px > 0);
+        let neutral = if outwards { f32::NEG_INFINITY } else { f32::INFINITY };
         let pick = |a: f32, b: f32| if outwards { a.max(b) } else { a.min(b) };
         let values = &mut self.line;
         values.clear();
-        values.resize(reach, nothing);
+        values.resize(radius, neutral);
         let unknown = || unknown[first..].iter().step_by(step);
-        let known = |(&value, &unknown): (&f32, &bool)| if unknown { nothing } else { value };
+        let known = |(&value, &unknown): (&f32, &bool)| if unknown { neutral } else { value };
         values.extend(inverse[first..].iter().step_by(step).zip(unknown()).take(len).map(known));
-        values.resize(len + 2 * reach, nothing);
-        // Windows of twice the size, until they are as large as two of them that overlap have to be.
-        let (window, mut size) = (2 * reach + 1, 1);
+        values.resize(len + 2 * radius, neutral);
+        // Doubles the windows until two overlapping ones cover the whole window, as in a sparse table.
+        let (window, mut size) = (2 * radius + 1, 1);
         while 2 * size <= window {
             self.scratch.clone_from(values);
             for (k, value) in values.iter_mut().enumerate() {
-                *value = pick(*value, self.scratch.get(k + size).copied().unwrap_or(nothing));
+                *value = pick(*value, self.scratch.get(k + size).copied().unwrap_or(neutral));
             }
             size *= 2;
         }

@@ -1,5 +1,5 @@
-//! Depth and colour of a frame laid out for windows that take every second pixel: even and odd columns apart, so that
-//! the pixels of one row of a window lie side by side.
+//! Deinterleaves depth and colour of a frame into even and odd columns, for windows that take every second pixel: the
+//! pixels of a window's row are then contiguous.
 
 use std::ops::Range;
 
@@ -8,25 +8,25 @@ use pulp::WithSimd;
 use super::tiles::Tiles;
 use crate::compute::bands::Bands;
 
-/// Values that a window reads of a row.
+/// Values that a window reads from a row.
 pub const LANES: usize = 16;
-/// Columns of one parity before the picture's first and after its last, in which nothing weighs anything.
+/// Padding columns of one parity before the first and after the last column, with weight 0.
 const MARGIN: usize = LANES;
 
-/// Values that are laid out at a time.
+/// Values deinterleaved at a time.
 const CHUNK: usize = 64;
 
-/// Planes of a frame, even columns in the first half of each row, odd ones in the second.
+/// Planes of a frame: even columns in the first half of each row, odd ones in the second.
 #[derive(Debug, Default)]
 pub struct Planes {
     /// Columns of the picture.
     pub width: usize,
     /// Rows of the picture.
     pub height: usize,
-    /// Values of one parity in a row.
+    /// Values of one parity in a row, with padding.
     stride: usize,
-    /// Pixels of one parity that a window reaches to the left.
-    reach: usize,
+    /// Radius of a window to the left, in pixels of one parity.
+    radius: usize,
     /// Inverse depth, and its confidence.
     depths: [Vec<f32>; 2],
     /// Red, green and blue.
@@ -34,8 +34,8 @@ pub struct Planes {
 }
 
 impl Planes {
-    /// Makes room for a picture, and for windows that reach over `reach` pixels of one parity.
-    pub fn resize(&mut self, width: usize, height: usize, reach: usize) {
+    /// Allocates for pictures of this size; windows begin `radius` pixels of one parity before their centre.
+    pub fn resize(&mut self, width: usize, height: usize, radius: usize) {
         if (self.width, self.height) != (width, height) {
             (self.width, self.height, self.stride) = (width, height, width.div_ceil(2) + 2 * MARGIN);
             let count = 2 * self.stride * height;
@@ -48,10 +48,10 @@ impl Planes {
                 plane.resize(count, 0);
             }
         }
-        self.reach = reach;
+        self.radius = radius;
     }
 
-    /// The planes of each band.
+    /// Splits the planes into bands.
     pub fn split(&mut self, bands: Bands) -> impl Iterator<Item = PlanesBand<'_>> {
         let (width, stride) = (self.width, self.stride);
         let [inverse, confidence] = self.depths.each_mut().map(|plane| bands.split(plane, 2 * stride));
@@ -67,31 +67,31 @@ impl Planes {
         )
     }
 
-    /// The place of column `x` in row `y`.
+    /// Returns the index of column `x` in row `y`.
     #[inline(always)]
-    fn place(&self, x: usize, y: usize) -> usize {
+    fn index_of(&self, x: usize, y: usize) -> usize {
         (2 * y + x % 2) * self.stride + MARGIN + x / 2
     }
 
-    /// Red, green and blue of a pixel.
+    /// Returns red, green and blue of a pixel.
     #[inline(always)]
     pub fn color(&self, x: usize, y: usize) -> [f32; 3] {
-        let at = self.place(x, y);
+        let at = self.index_of(x, y);
         self.colors.each_ref().map(|plane| f32::from(plane[at]))
     }
 
-    /// The pixels of row `y` with the parity of `x`, from `reach` before it on: inverse depth and confidence, and red, green,
-    /// blue.
+    /// Returns the pixels of row `y` with the parity of `x`, from `radius` before it on: inverse depth and confidence,
+    /// and red, green, blue.
     #[inline(always)]
     pub fn window(&self, x: usize, y: usize) -> ([&[f32; LANES]; 2], [&[u8; LANES]; 3]) {
-        let at = self.place(x, y) - self.reach;
+        let at = self.index_of(x, y) - self.radius;
         (self.depths.each_ref().map(|plane| chunk(plane, at)), self.colors.each_ref().map(|plane| chunk(plane, at)))
     }
 }
 
-/// Lays values out from these places on, of either parity.
+/// Deinterleaves values to the given start indices of each parity.
 #[inline(always)]
-fn part<T: Copy>(plane: &mut [T], [even, odd]: [usize; 2], values: &[T]) {
+fn deinterleave<T: Copy>(plane: &mut [T], [even, odd]: [usize; 2], values: &[T]) {
     let (pairs, last) = values.as_chunks::<2>();
     let (before, after) = plane.split_at_mut(odd);
     let even = &mut before[even..][..values.len().div_ceil(2)];
@@ -103,7 +103,7 @@ fn part<T: Copy>(plane: &mut [T], [even, odd]: [usize; 2], values: &[T]) {
     }
 }
 
-/// What a band of rows has of all planes.
+/// A band of rows of all planes.
 pub struct PlanesBand<'a> {
     pub rows: Range<usize>,
     width: usize,
@@ -113,9 +113,9 @@ pub struct PlanesBand<'a> {
 }
 
 impl PlanesBand<'_> {
-    /// The places of the `line`th row from the even column `x` on, of either parity.
+    /// Returns the indices of the `line`th row from the even column `x` on, for each parity.
     #[inline(always)]
-    fn places(&self, x: usize, line: usize) -> [usize; 2] {
+    fn start_indices(&self, x: usize, line: usize) -> [usize; 2] {
         [0, 1].map(|parity| (2 * line + parity) * self.stride + MARGIN + x / 2)
     }
 }
@@ -142,9 +142,9 @@ impl WithSimd for SetColors<'_, '_> {
                     for (((pixel, red), green), blue) in pixels.iter().zip(red).zip(green).zip(blue) {
                         [*red, *green, *blue] = *pixel;
                     }
-                    let places = planes.places(columns.start + k * CHUNK, line);
+                    let start_indices = planes.start_indices(columns.start + k * CHUNK, line);
                     for (plane, values) in planes.colors.iter_mut().zip(&values) {
-                        part(plane, places, &values[..pixels.len()]);
+                        deinterleave(plane, start_indices, &values[..pixels.len()]);
                     }
                 }
             }
@@ -152,16 +152,16 @@ impl WithSimd for SetColors<'_, '_> {
     }
 }
 
-/// Copies inverse depths near edges, and how much each of them weighs, into a band of the planes.
+/// Copies inverse depths near edges, and their weights as votes, into a band of the planes.
 pub struct SetDepths<'a, 'b> {
     pub planes: &'a mut PlanesBand<'b>,
     pub tiles: &'a Tiles,
-    /// Inverse depths of the picture, row by row, and whether each was made up.
+    /// Inverse depths of the picture, row by row, and whether each was filled in.
     pub inverse: &'a [f32],
     pub unknown: &'a [bool],
-    /// Whether those of the band may be wrong.
+    /// Whether each depth of the band may be wrong.
     pub band: &'a [bool],
-    /// How much depths that were made up count as votes, and those that may be wrong.
+    /// Weights of filled-in depths, and of those that may be wrong.
     pub weights: [f32; 2],
 }
 
@@ -169,23 +169,23 @@ impl WithSimd for SetDepths<'_, '_> {
     type Output = ();
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, _: S) {
-        let Self { planes, tiles, inverse, unknown, band, weights: [made_up, unsure] } = self;
+        let Self { planes, tiles, inverse, unknown, band, weights: [filled_weight, uncertain_weight] } = self;
         let width = planes.width;
         for (line, y) in planes.rows.clone().enumerate() {
             for columns in tiles.columns(y) {
                 let row = y * width;
-                let places = planes.places(columns.start, line);
-                part(planes.depths[0], places, &inverse[row..][columns.clone()]);
+                let start_indices = planes.start_indices(columns.start, line);
+                deinterleave(planes.depths[0], start_indices, &inverse[row..][columns.clone()]);
                 for begin in columns.clone().step_by(CHUNK) {
                     let chunk = begin..(begin + CHUNK).min(columns.end);
                     let mut weights = [1.0; CHUNK];
                     let flags = unknown[row..][chunk.clone()].iter().zip(&band[line * width..][chunk.clone()]);
                     for (weight, (&unknown, &band)) in weights.iter_mut().zip(flags) {
-                        *weight = if band { unsure } else { 1.0 };
-                        *weight = if unknown { made_up } else { *weight };
+                        *weight = if band { uncertain_weight } else { 1.0 };
+                        *weight = if unknown { filled_weight } else { *weight };
                     }
-                    let places = planes.places(begin, line);
-                    part(planes.depths[1], places, &weights[..chunk.len()]);
+                    let start_indices = planes.start_indices(begin, line);
+                    deinterleave(planes.depths[1], start_indices, &weights[..chunk.len()]);
                 }
             }
         }

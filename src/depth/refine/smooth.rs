@@ -1,8 +1,11 @@
-//! Spatial denoising (edge-preserving): less noise of smooth surfaces.
+//! Edge-preserving spatial denoising of surfaces.
 //!
 //! The sigma filter (Lee, *Digital image smoothing and the sigma filter*, 1983) along rows and then along columns, with
-//! taps in symmetric pairs: a pair counts only if both its ends belong to the surface. A slanted plane then stays
-//! where it is, up to its very rim, and the two sides of an edge are never mixed.
+//! taps in symmetric pairs: `v = v_0 + sum(v_-k + v_k - 2 v_0) / (2 PAIRS + 1)`, where a pair counts only if both its
+//! ends belong to the surface. So slanted planes are preserved up to their very rim, and the two sides of an edge never
+//! mix.
+//!
+//! twin: shaders/refine_smooth.wgsl
 
 use std::ops::Range;
 
@@ -12,29 +15,29 @@ use super::noise::NO_NOISE;
 use crate::compute::bands::Bands;
 use crate::compute::thread_pool::ThreadPool;
 
-/// Distances in pixels of the pairs that are averaged: sparse, because the noise of depth sensors is correlated over
-/// some pixels. A denser set of the same reach gains nothing.
+/// Offsets of the averaged pairs in pixels: sparse, because the noise of depth sensors is correlated over some pixels.
+/// A denser set with the same radius gains nothing.
 pub const PAIRS_PX: [usize; 4] = [2, 4, 6, 8];
 /// Depths within this many standard deviations belong to one surface.
 pub const SAME_SURFACE: f32 = 3.5;
 
-/// Reduces the noise of maps of inverse depth; owns the memory for it.
+/// Denoises maps of inverse depth; owns its buffers.
 #[derive(Debug, Default)]
 pub struct Smoother {
-    /// Of every thread.
+    /// One per thread.
     lines: Vec<Lines>,
 }
 
-/// Some rows of the map after the pass along them, which take turns, and one before it.
+/// A ring buffer of rows after the horizontal pass, and one row before it.
 #[derive(Debug, Default)]
 struct Lines {
     along_rows: Vec<f32>,
     row: Vec<f32>,
 }
 
-/// How far the pairs reach, in pixels, and the rows that a pass along columns looks at.
-const REACH_PX: usize = PAIRS_PX[PAIRS_PX.len() - 1];
-const ROWS: usize = 2 * REACH_PX + 1;
+/// Radius of the filter in pixels, and the number of rows of the vertical pass.
+const RADIUS_PX: usize = PAIRS_PX[PAIRS_PX.len() - 1];
+const ROWS: usize = 2 * RADIUS_PX + 1;
 
 impl Lines {
     fn resize(&mut self, width: usize) {
@@ -44,8 +47,8 @@ impl Lines {
 }
 
 impl Smoother {
-    /// Makes inverse depth, `focus_m` over `metres`, whose noise has the standard deviation `noise`, averaged within its
-    /// surfaces.
+    /// Computes inverse depth, `focus_m` over `metres`, and denoises it; `noise` is the standard deviation of its
+    /// noise.
     pub fn smooth(
         &mut self,
         (arch, workers): (Arch, &mut ThreadPool),
@@ -57,7 +60,7 @@ impl Smoother {
         inverse.resize(metres.len(), 0.0);
         let bands = Bands::new(metres.len().checked_div(width).unwrap_or(0), 1, workers);
         let limit = if noise < NO_NOISE { None } else { Some(SAME_SURFACE * noise) };
-        // Before they start: a thread that has no part of this frame would allocate in a later one.
+        // Sized here for every thread: one without a part of this frame would allocate in a later one.
         self.lines.resize_with(workers.thread_count(), Lines::default);
         if limit.is_some() {
             self.lines.iter_mut().for_each(|lines| lines.resize(width));
@@ -66,30 +69,30 @@ impl Smoother {
         workers.run_each_with(&mut self.lines, parts, &|Lines { along_rows, row }, (rows, out)| {
             let Some(limit) = limit else {
                 let values = &metres[rows.start * width..rows.end * width];
-                return arch.dispatch(Over { focus_m, values, out });
+                return arch.dispatch(Invert { focus_m, values, out });
             };
             arch.dispatch(Smooth { metres, focus_m, rows, out, width, limit, along_rows, row });
         });
     }
 }
 
-/// Takes the distance in focus over values, as [`Over`], row by row of so many columns.
-pub fn over((arch, workers): (Arch, &mut ThreadPool), focus_m: f32, (values, out): (&[f32], &mut [f32]), width: usize) {
+/// Computes `focus_m / from` in parallel, like [`Invert`]; rows have `width` values.
+pub fn invert((arch, workers): (Arch, &mut ThreadPool), focus_m: f32, (from, out): (&[f32], &mut [f32]), width: usize) {
     let bands = Bands::new(out.len() / width, 1, workers);
     let parts = bands.rows().zip(bands.split(out, width));
     workers.run_each(parts, &|(rows, out)| {
-        arch.dispatch(Over { focus_m, values: &values[rows.start * width..], out });
+        arch.dispatch(Invert { focus_m, values: &from[rows.start * width..], out });
     });
 }
 
-/// The distance in focus over values: inverse depth of depth in metres, and the other way round.
-pub struct Over<'a> {
+/// Computes `focus_m / values`: converts depth in metres to inverse depth and back.
+pub struct Invert<'a> {
     pub focus_m: f32,
     pub values: &'a [f32],
     pub out: &'a mut [f32],
 }
 
-impl WithSimd for Over<'_> {
+impl WithSimd for Invert<'_> {
     type Output = ();
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, _: S) {
@@ -100,12 +103,12 @@ impl WithSimd for Over<'_> {
     }
 }
 
-/// The sigma filter along rows and then along columns, as soon as a row has all that it needs: so its rows are in a near cache.
-/// Ends of a pair within `limit` of its middle lie on the middle's surface.
+/// The sigma filter along rows, and along columns as soon as a row has all its inputs, so that they are still in the
+/// cache. Ends of a pair within `limit` of its centre lie on the centre's surface.
 struct Smooth<'a> {
     metres: &'a [f32],
     focus_m: f32,
-    /// The rows that are wanted, for `out`.
+    /// Range of output rows.
     rows: Range<usize>,
     out: &'a mut [f32],
     width: usize,
@@ -120,15 +123,15 @@ impl WithSimd for Smooth<'_> {
     fn with_simd<S: pulp::Simd>(self, simd: S) {
         let Self { metres, focus_m, rows, out, width, limit, along_rows, row } = self;
         let height = metres.len() / width;
-        for y in rows.start.saturating_sub(REACH_PX)..rows.end + REACH_PX {
+        for y in rows.start.saturating_sub(RADIUS_PX)..rows.end + RADIUS_PX {
             if y < height {
-                Over { focus_m, values: &metres[y * width..][..width], out: row }.with_simd(simd);
+                Invert { focus_m, values: &metres[y * width..][..width], out: row }.with_simd(simd);
                 smooth_row(row, &mut along_rows[y % ROWS * width..][..width], limit);
             }
-            let Some(y) = y.checked_sub(REACH_PX).filter(|&y| y >= rows.start) else { continue };
+            let Some(y) = y.checked_sub(RADIUS_PX).filter(|&y| y >= rows.start) else { continue };
             let row = |y: usize| &along_rows[y % ROWS * width..][..width];
             let (here, out) = (row(y), &mut out[(y - rows.start) * width..][..width]);
-            if y >= REACH_PX && y + REACH_PX < height {
+            if y >= RADIUS_PX && y + RADIUS_PX < height {
                 average(PAIRS_PX.map(|px| [row(y - px), row(y + px)]), here, out, limit);
             } else {
                 out.fill(0.0);
@@ -141,13 +144,13 @@ impl WithSimd for Smooth<'_> {
     }
 }
 
-/// The filter along a row.
+/// Filters along a row.
 #[inline(always)]
 fn smooth_row(row: &[f32], out: &mut [f32], limit: f32) {
     let width = row.len();
-    let inside = width.saturating_sub(2 * REACH_PX);
-    // Beside the borders, where some pairs lack an end; all of a row that has nothing else.
-    let ends = if inside == 0 { [0..width, width..width] } else { [0..REACH_PX, width - REACH_PX..width] };
+    let inside = width.saturating_sub(2 * RADIUS_PX);
+    // Pixels near the borders, where some pairs lack an end; whole rows if they are too short.
+    let ends = if inside == 0 { [0..width, width..width] } else { [0..RADIUS_PX, width - RADIUS_PX..width] };
     for x in ends.into_iter().flatten() {
         let here = row[x];
         let mut sum = 0.0;
@@ -158,12 +161,12 @@ fn smooth_row(row: &[f32], out: &mut [f32], limit: f32) {
     }
     if inside > 0 {
         let part = |from: usize| &row[from..][..inside];
-        let pairs = PAIRS_PX.map(|px| [part(REACH_PX - px), part(REACH_PX + px)]);
-        average(pairs, part(REACH_PX), &mut out[REACH_PX..][..inside], limit);
+        let pairs = PAIRS_PX.map(|px| [part(RADIUS_PX - px), part(RADIUS_PX + px)]);
+        average(pairs, part(RADIUS_PX), &mut out[RADIUS_PX..][..inside], limit);
     }
 }
 
-/// The mean of pixels and their pairs, of which none lacks an end.
+/// Filters pixels of which all pairs are complete.
 #[inline(always)]
 fn average(pairs: [[&[f32]; 2]; PAIRS_PX.len()], here: &[f32], out: &mut [f32], limit: f32) {
     let count = out.len();
@@ -174,7 +177,8 @@ fn average(pairs: [[&[f32]; 2]; PAIRS_PX.len()], here: &[f32], out: &mut [f32], 
     }
 }
 
-/// The differences of both ends of a pair from its middle, where both lie on the middle's surface.
+/// Returns the sum of the differences of both ends of a pair from its centre, or 0 unless both lie on the centre's
+/// surface.
 #[inline(always)]
 fn pair(before: f32, here: f32, after: f32, limit: f32) -> f32 {
     let (before, after) = (before - here, after - here);
@@ -182,12 +186,11 @@ fn pair(before: f32, here: f32, after: f32, limit: f32) -> f32 {
     if same { before + after } else { 0.0 }
 }
 
-/// The mean over all taps, of the sum of the pairs' differences. A pair that was left out counts as two taps equal to the
-/// middle.
+/// Returns the mean over all taps from the sum of differences. A rejected pair counts as two taps equal to the centre.
 #[inline(always)]
 fn mean(here: f32, sum: f32) -> f32 {
-    const SHARE: f32 = 1.0 / (2 * PAIRS_PX.len() + 1) as f32;
-    here + sum * SHARE
+    const WEIGHT: f32 = 1.0 / (2 * PAIRS_PX.len() + 1) as f32;
+    here + sum * WEIGHT
 }
 
 /// Adds the differences of pairs to `out`.
@@ -198,7 +201,7 @@ fn add_pair(before: &[f32], here: &[f32], after: &[f32], out: &mut [f32], limit:
     }
 }
 
-/// Turns the summed differences in `out` into the mean.
+/// Converts the summed differences in `out` to the mean.
 #[inline(always)]
 fn finish_mean(row: &[f32], out: &mut [f32]) {
     for (&here, out) in row.iter().zip(out) {

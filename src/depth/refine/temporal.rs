@@ -1,68 +1,70 @@
-//! The temporal filter: depth that rests where the picture rests.
+//! The temporal filter: keeps depth static where the picture is static.
 //!
-//! A recursive average of the inverse depth of each pixel. It forgets where the colour changed, because something
-//! moved there, and follows where the depth changes by more than noise. A depth that jumps from one surface to another
-//! while the colours around rest is mostly the sensor's: the outline of a still person flickers by some pixels. Such a
-//! jump is believed only once it lasts.
+//! A recursive average of the inverse depth of each pixel. It restarts where the colour changed, because something
+//! moved there, and follows where the depth changes by more than noise. A depth that switches between two surfaces
+//! while the colours around are static is mostly sensor noise: the outline of a still person flickers by some pixels.
+//! Such a step is accepted only once it lasts.
+//!
+//! twin: shaders/refine_change.wgsl, shaders/refine_steady.wgsl
 
 use std::ops::Range;
 
 use pulp::{Arch, WithSimd};
 
-use super::smooth::over;
+use super::smooth::invert;
 use crate::compute::bands::Bands;
 use crate::compute::thread_pool::ThreadPool;
 
-/// Frames that the average spans, at most: the variance of still noise falls to 1/15.
-pub const LONGEST: f32 = 8.0;
-/// Frames for which a jump under resting colours is held back: a tenth of a second at 30 per second.
-pub const HOLD: u8 = 2;
-/// A pixel rests up to a change of colour (of red, green and blue together, in steps of 8-bit sRGB, averaged over 3x3
-/// pixels) of this many times the median change, which is mostly camera noise, within these bounds; at twice that it
-/// has moved.
+/// Maximum number of frames in the average: the variance of static noise falls to 1/15.
+pub const MAX_FRAMES: f32 = 8.0;
+/// Frames for which a step under static colours is held back: a tenth of a second at 30 per second.
+pub const HOLD_FRAMES: u8 = 2;
+/// A pixel is static up to a change of colour (of red, green and blue together, in steps of 8-bit sRGB, averaged over
+/// 3x3 pixels) of this many factor the median change, which is mostly camera noise, within these bounds; at twice that
+/// it has moved completely.
 pub const MOVED: f32 = 2.5;
 pub const MOVED_BOUNDS: (f32, f32) = (8.0, 24.0);
-/// Frames further apart than this in media time, or not in order, do not follow each other.
+/// Frames further apart than this in media time, or not in order, are not consecutive.
 const LONGEST_GAP_NS: u64 = 500_000_000;
-/// Rows and columns sampled for the median change, at most.
-pub const LOOKS: usize = 64;
+/// Maximum number of rows and of columns sampled for the median change.
+pub const GRID: usize = 64;
 
-/// Whether a frame follows the one before, by their media times.
+/// Whether two frames are consecutive by their media factor.
 pub fn follows(before_ns: u64, time_ns: u64) -> bool {
     (before_ns..=before_ns.saturating_add(LONGEST_GAP_NS)).contains(&time_ns)
 }
 
-/// What a change of inverse depth means.
+/// Thresholds for changes of inverse depth.
 #[derive(Clone, Copy, Debug)]
 pub struct Limits {
-    /// Below this it is noise, and averaged.
+    /// Changes below this are noise, and averaged.
     pub noise: f32,
-    /// Above this it is another surface.
-    pub jump: f32,
+    /// Changes above this are another surface.
+    pub depth_step: f32,
 }
 
-/// Steadies maps of inverse depth; remembers the last frame.
+/// Filters maps of inverse depth in time; stores the last frame.
 #[derive(Debug, Default)]
 pub struct TemporalFilter {
     width: usize,
     time_ns: u64,
-    /// Inverse depth as it was given out; empty before the first frame.
+    /// Filtered inverse depth; empty before the first frame.
     mean: Vec<f32>,
-    /// Frames in the mean.
+    /// Number of frames in the mean.
     count: Vec<f32>,
-    /// Frames for which a jump was held back.
+    /// Number of frames for which a step was held back.
     held: Vec<u8>,
     /// The last picture.
     rgb: Vec<u8>,
-    /// Change of colour since the last frame, summed up over 3x3 pixels.
+    /// Change of colour since the last frame, summed over 3x3 pixels.
     change: Vec<u16>,
-    /// Of every thread.
+    /// One per thread.
     lines: Vec<Lines>,
-    /// Memory for the samples of the median.
-    looks: Vec<f32>,
+    /// Buffer for the samples of the median.
+    samples: Vec<f32>,
 }
 
-/// Changes of colour of three rows, summed up along them; and of the pixels of one.
+/// Colour changes of three rows, summed horizontally; and those of single pixels of one row.
 #[derive(Debug, Default)]
 struct Lines {
     rows: [Vec<u16>; 3],
@@ -70,18 +72,18 @@ struct Lines {
 }
 
 impl TemporalFilter {
-    /// Multiplies the remembered inverse depth, as its unit has become `times` smaller.
-    pub fn rescale(&mut self, times: f32) {
-        self.mean.iter_mut().for_each(|v| *v *= times);
+    /// Multiplies the stored inverse depth by `factor`, after a change of its unit.
+    pub fn rescale(&mut self, factor: f32) {
+        self.mean.iter_mut().for_each(|v| *v *= factor);
     }
 
-    /// Starts anew with the next frame.
+    /// Discards the state, so that the next frame starts anew.
     pub fn forget(&mut self) {
         self.mean.clear();
     }
 
-    /// Steadies `inverse` of the frame at `time_ns`, with the picture `rgb`; gives it out as `metres`, `focus_m` over it.
-    pub fn steady(
+    /// Filters `inverse` of the frame at `time_ns` with the picture `rgb`, and writes `focus_m` over it to `metres`.
+    pub fn filter(
         &mut self,
         (arch, workers): (Arch, &mut ThreadPool),
         inverse: &[f32],
@@ -94,7 +96,7 @@ impl TemporalFilter {
         let bands = Bands::new(inverse.len() / width, 1, workers);
         if same_size && in_order {
             self.change.resize(inverse.len(), 0);
-            // Before they start: a thread that has no part of this frame would allocate in a later one.
+            // Sized here for every thread: one without a part of this frame would allocate in a later one.
             self.lines.resize_with(workers.thread_count(), Lines::default);
             let rows = self.lines.iter_mut().flat_map(|Lines { rows, single }| rows.iter_mut().chain([single]));
             rows.for_each(|row| row.resize(width, 0));
@@ -123,37 +125,36 @@ impl TemporalFilter {
             self.held.resize(inverse.len(), 0);
             self.rgb.clear();
             self.rgb.extend_from_slice(rgb);
-            over((arch, workers), focus_m, (inverse, metres), width);
+            invert((arch, workers), focus_m, (inverse, metres), width);
         }
         (self.width, self.time_ns) = (width, time_ns);
     }
 
-    /// The median of the mean change over a grid of samples.
+    /// Returns the median colour change over a grid of samples.
     fn median_change(&mut self) -> f32 {
         let height = self.change.len() / self.width;
-        self.looks.clear();
-        for y in (0..height).step_by(height.div_ceil(LOOKS)) {
+        self.samples.clear();
+        for y in (0..height).step_by(height.div_ceil(GRID)) {
             let row = &self.change[y * self.width..][..self.width];
-            self.looks.extend(row.iter().step_by(self.width.div_ceil(LOOKS)).map(|&change| per_pixel(change)));
+            self.samples.extend(row.iter().step_by(self.width.div_ceil(GRID)).map(|&change| per_pixel(change)));
         }
-        let middle = self.looks.len() / 2;
-        *self.looks.select_nth_unstable_by(middle, f32::total_cmp).1
+        let middle = self.samples.len() / 2;
+        *self.samples.select_nth_unstable_by(middle, f32::total_cmp).1
     }
 }
 
-/// The mean of a change that was summed up over 3x3 pixels.
+/// Returns the mean of a change that was summed over 3x3 pixels.
 #[inline(always)]
 fn per_pixel(change: u16) -> f32 {
     f32::from(change) / 9.0
 }
 
-/// How much the colours around each pixel changed between two pictures, summed up over 3x3 pixels: at the border the outermost
-/// ones count twice.
+/// Computes the colour change around each pixel between two pictures, summed over 3x3 pixels; the border repeats.
 struct Change<'a> {
     pictures: [&'a [u8]; 2],
     width: usize,
     lines: &'a mut Lines,
-    /// The rows that are wanted, for `change`.
+    /// Range of output rows.
     rows: Range<usize>,
     change: &'a mut [u16],
 }
@@ -176,7 +177,7 @@ impl WithSimd for Change<'_> {
             for (sum, three) in row.iter_mut().skip(1).zip(single.windows(3)) {
                 *sum = three[0] + three[1] + three[2];
             }
-            // The row above has all its neighbours now; the last one is its own.
+            // The row above now has all its neighbours; the last row is its own neighbour.
             let end = if y + 1 < height { y } else { height };
             for y in y.saturating_sub(1).max(rows.start)..end.min(rows.end) {
                 let [above, here, below] = [y.saturating_sub(1), y, (y + 1).min(height - 1)].map(|y| &sums[y % 3]);
@@ -189,14 +190,14 @@ impl WithSimd for Change<'_> {
     }
 }
 
-/// Moves the average of each pixel towards the new inverse depth, and gives it out.
+/// Moves the average of each pixel towards the new inverse depth, and outputs it in metres.
 struct Average<'a> {
     inverse: &'a [f32],
     mean: &'a mut [f32],
     count: &'a mut [f32],
     held: &'a mut [u8],
     change: &'a [u16],
-    /// Up to this change of colour a pixel rests.
+    /// Largest change of colour of a static pixel.
     moved: f32,
     limits: Limits,
     metres: &'a mut [f32],
@@ -211,20 +212,21 @@ impl WithSimd for Average<'_> {
         let (per_moved, per_noise) = (1.0 / moved, 1.0 / limits.noise);
         let state = mean.iter_mut().zip(count).zip(held).zip(change);
         for ((&inverse, metres), (((mean, count), held), &change)) in inverse.iter().zip(metres).zip(state) {
-            // From 1 up to the bound to 0 at twice the bound: the weight of the past.
-            let rest = unit(2.0 - per_pixel(change) * per_moved);
+            // Weight of the past: 1 up to the bound, falling to 0 at twice the bound.
+            let past_weight = unit(2.0 - per_pixel(change) * per_moved);
             let step = inverse - *mean;
-            let noise_share = unit(step.abs() * per_noise);
-            let changed = noise_share >= 1.0;
-            let hold = (step.abs() > limits.jump) & (rest >= 1.0) & (*held < HOLD);
-            let frames = *count * rest;
-            // The nearer to the limit, the less it is noise: the share of the new depth grows to 1 there, smoothly.
-            let squared = noise_share * noise_share;
-            let share = 1.0 / (frames + 1.0);
-            let share = share + (1.0 - share) * squared * squared;
-            let v = if hold { *mean } else { *mean + share * step };
+            let noise_ratio = unit(step.abs() * per_noise);
+            let changed = noise_ratio >= 1.0;
+            let hold = (step.abs() > limits.depth_step) & (past_weight >= 1.0) & (*held < HOLD_FRAMES);
+            let frames = *count * past_weight;
+            // The closer to the limit, the less likely it is noise: the weight of the new depth grows smoothly to 1
+            // there.
+            let squared = noise_ratio * noise_ratio;
+            let alpha = 1.0 / (frames + 1.0);
+            let alpha = alpha + (1.0 - alpha) * squared * squared;
+            let v = if hold { *mean } else { *mean + alpha * step };
             let longer = frames + 1.0;
-            let longer = if longer < LONGEST { longer } else { LONGEST };
+            let longer = if longer < MAX_FRAMES { longer } else { MAX_FRAMES };
             *count = if hold {
                 *count
             } else if changed {
@@ -238,7 +240,7 @@ impl WithSimd for Average<'_> {
     }
 }
 
-/// `x` cut to 0 to 1.
+/// Clamps `x` to 0 to 1.
 #[inline(always)]
 fn unit(x: f32) -> f32 {
     let x = if x > 0.0 { x } else { 0.0 };

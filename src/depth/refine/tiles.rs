@@ -1,15 +1,15 @@
-//! The parts of a picture that have edges: only there, edges are aligned.
+//! Tracks the tiles of a picture near edges: only those are aligned.
 
 use std::ops::Range;
 
 use crate::compute::bands::Bands;
 
-/// Columns and rows of a tile: as far as edges move in the rounds before the last, and what a band and then a window reach
-/// from there. More would be laid out in vain.
+/// Columns and rows of a tile: how far edges move in all rounds but the last, plus the radius of the band and of a
+/// window. Larger tiles would be copied to the planes in vain.
 const COLUMNS: usize = 20;
 pub const ROWS: usize = 20;
 
-/// The tiles of a picture that have an edge, and those around them.
+/// The tiles of a picture that have an edge, and their neighbours.
 #[derive(Debug, Default)]
 pub struct Tiles {
     width: usize,
@@ -19,7 +19,7 @@ pub struct Tiles {
 }
 
 impl Tiles {
-    /// Takes a picture of so many columns and rows, of whose edges nothing is known.
+    /// Resets to a picture of this size without edges.
     pub fn clear(&mut self, width: usize, height: usize) {
         let down = height.div_ceil(ROWS);
         (self.width, self.across) = (width, width.div_ceil(COLUMNS));
@@ -29,12 +29,12 @@ impl Tiles {
         }
     }
 
-    /// The tiles of each band, of whole tiles, for [`mark`].
+    /// Splits the tiles into bands of whole tiles, for [`mark`].
     pub fn split(&mut self, bands: Bands) -> impl Iterator<Item = &mut [bool]> {
         bands.split_tiles(&mut self.has_edge, ROWS, self.across)
     }
 
-    /// Finds what lies near the tiles that have edges.
+    /// Finds the tiles that have edges, and their neighbours.
     pub fn find_near(&mut self) {
         let down = self.has_edge.len() / self.across;
         for k in (0..self.has_edge.len()).filter(|&k| self.has_edge[k]) {
@@ -46,7 +46,7 @@ impl Tiles {
         }
     }
 
-    /// Adds the places of all edges, in order.
+    /// Appends the pixel indices of all edges, in order.
     pub fn find_all(&self, edge: &[bool], places: &mut Vec<u32>) {
         for (y, row) in edge.chunks_exact(self.width).enumerate() {
             let tiles = &self.has_edge[y / ROWS * self.across..][..self.across];
@@ -58,7 +58,7 @@ impl Tiles {
         }
     }
 
-    /// The columns of row `y` near edges, from the left; each range begins at an even one.
+    /// Returns the column ranges of row `y` near edges, from the left; each begins at an even column.
     pub fn columns(&self, y: usize) -> impl Iterator<Item = Range<usize>> + use<'_> {
         let tiles = &self.is_near[y / ROWS * self.across..][..self.across];
         let runs = tiles.chunk_by(|a, b| a == b).scan(0, |begin, run| {

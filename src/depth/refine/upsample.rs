@@ -1,16 +1,18 @@
-//! Joint bilateral upsampling: a depth map with fewer pixels than its picture (or more), brought to the picture's size.
+//! Joint bilateral upsampling: resamples a depth map to the size of its picture.
 //!
-//! Smooth surfaces are interpolated, in inverse depth, in which planes are linear. Across a jump or beside a hole the
-//! nearest depth is taken, so that no depth comes out that nobody measured; where the edge runs exactly is then for
-//! the colours to say.
+//! Smooth surfaces are interpolated bilinearly in inverse depth, in which planes are linear. Across a discontinuity or
+//! beside a hole the nearest depth is taken, so that no depth is invented; the colour-guided alignment places the edge
+//! exactly later.
+//!
+//! twin: shaders/refine_prepare.wgsl
 
 use crate::depth::tap::Tap;
 use crate::frame::DepthMap;
 
-/// Neighbours whose inverse depths differ by less than this share of the larger are one surface.
+/// Inverse depths that differ by less than this fraction of the larger belong to one surface.
 pub const SAME_SURFACE: f32 = 0.05;
 
-/// Resamples depth maps; owns the memory for it.
+/// Resamples depth maps; owns its buffers.
 #[derive(Debug, Default)]
 pub struct Upsampler {
     metres: Vec<f32>,
@@ -44,8 +46,8 @@ impl Upsampler {
     }
 }
 
-/// The depth between four neighbours (upper two, then lower two), `right` and `down` (0 to 1) of the way; the nearest
-/// neighbour's where they are not one surface.
+/// Interpolates four neighbours (upper two, then lower two) at the fractions `right` and `down` (0 to 1); returns the
+/// nearest one if they are not one surface.
 fn interpolate(four_m: [f32; 4], right: f32, down: f32) -> f32 {
     let nearest_m = four_m[usize::from(right >= 0.5) + 2 * usize::from(down >= 0.5)];
     if !four_m.into_iter().all(DepthMap::is_known) {

@@ -1,17 +1,17 @@
-//! A thread for work that may take longer than a frame.
+//! A worker thread for tasks that may take longer than a frame.
 
 use std::sync::mpsc::{Receiver, SyncSender, TryRecvError, TrySendError, sync_channel};
 use std::thread::{self, JoinHandle};
 
-/// A thread that does one task at a time: given, done, and taken back.
-pub struct Aside<T> {
+/// A worker thread that processes one task at a time: submit, process, return.
+pub struct Worker<T> {
     to: Option<SyncSender<T>>,
     from: Receiver<T>,
     thread: Option<JoinHandle<()>>,
 }
 
-impl<T: Send + 'static> Aside<T> {
-    /// Starts a thread of this name that does `work`; `None` where there cannot be one more.
+impl<T: Send + 'static> Worker<T> {
+    /// Starts a thread called `name` that runs `work` on each task; `None` if no thread can be created.
     pub fn new(name: &str, work: fn(&mut T)) -> Option<Self> {
         let ((to, tasks), (done, from)) = (sync_channel::<T>(1), sync_channel(1));
         let run = move || {
@@ -26,19 +26,19 @@ impl<T: Send + 'static> Aside<T> {
         Some(Self { to: Some(to), from, thread: Some(thread) })
     }
 
-    /// Gives the thread a task, which has none; returns it where the thread is gone.
-    pub fn give(&self, task: T) -> Result<(), T> {
+    /// Submits a task to the idle thread; returns the task if the thread has ended.
+    pub fn submit(&self, task: T) -> Result<(), T> {
         match &self.to {
             Some(to) => to.try_send(task).map_err(|(TrySendError::Full(task) | TrySendError::Disconnected(task))| task),
             None => Err(task),
         }
     }
 
-    /// The task that was given, if it is done, or once it is with `wait`.
+    /// Returns the processed task, or `None` if it is not done; waits for it if `wait`.
     ///
     /// # Errors
-    /// The thread is gone.
-    pub fn take(&self, wait: bool) -> Result<Option<T>, String> {
+    /// The thread has ended.
+    pub fn collect(&self, wait: bool) -> Result<Option<T>, String> {
         let gone = "its thread is gone".to_owned();
         match wait {
             true => self.from.recv().map(Some).map_err(|_| gone),
@@ -51,12 +51,12 @@ impl<T: Send + 'static> Aside<T> {
     }
 }
 
-impl<T> Drop for Aside<T> {
-    /// Waits for what is under way: a runtime must not be at work while the program ends.
+impl<T> Drop for Worker<T> {
+    /// Waits for the current task: a runtime must not be active while the program exits.
     fn drop(&mut self) {
         self.to = None;
         if let Some(thread) = self.thread.take() {
-            // Whatever it died of, nobody waits for its work any more.
+            // A panic in the thread is irrelevant now.
             let _ = thread.join();
         }
     }
@@ -76,26 +76,26 @@ mod tests {
             thread::sleep(Duration::from_millis(100));
             IS_DONE.store(true, Ordering::Relaxed);
         };
-        let aside = Aside::new("test", work).unwrap();
-        aside.give(()).unwrap();
+        let aside = Worker::new("test", work).unwrap();
+        aside.submit(()).unwrap();
         drop(aside);
         assert!(IS_DONE.load(Ordering::Relaxed));
     }
 
     #[test]
     fn tasks_come_back_done_and_a_thread_that_died_is_told() {
-        let aside = Aside::new("test", |task: &mut i32| {
+        let aside = Worker::new("test", |task: &mut i32| {
             assert!(*task > 0, "this test's own");
             *task *= 2;
         })
         .unwrap();
-        assert_eq!(aside.take(false), Ok(None));
+        assert_eq!(aside.collect(false), Ok(None));
         for task in [21, 4] {
-            aside.give(task).unwrap();
-            assert_eq!(aside.take(true), Ok(Some(2 * task)));
+            aside.submit(task).unwrap();
+            assert_eq!(aside.collect(true), Ok(Some(2 * task)));
         }
-        aside.give(0).unwrap();
-        assert!(aside.take(true).is_err());
-        assert_eq!(aside.give(1), Err(1));
+        aside.submit(0).unwrap();
+        assert!(aside.collect(true).is_err());
+        assert_eq!(aside.submit(1), Err(1));
     }
 }

@@ -1,86 +1,89 @@
-//! What a subject holds: what is as near and joined to them, decided part by part.
+//! Held objects: regions as near as the subject and connected to it, decided per region.
 //!
-//! A network's nearness trembles, and around a person it is that of both surfaces mixed. So a pixel counts by a threshold with
-//! hysteresis; a part counts that reaches beyond the rim of the person; and it joins after some frames, as a whole.
+//! A network's depth fluctuates, and around a person it mixes both surfaces. So pixels are selected by a threshold with
+//! hysteresis; regions have to extend beyond the rim of the person; and they are added after some frames, as a whole.
 
-use super::parts::Parts;
+use super::parts::Components;
 use crate::depth::dilation::dilate;
 
-/// What is no person is as near as the subject from here on, where it was theirs in the frame before, and where it was not.
+/// Minimum nearness of a held object's pixels, if held in the previous frame, and if not (hysteresis).
 const AS_NEAR: [f32; 2] = [0.83, 0.92];
-/// So far around a person the network's outlines are off, in pixels of the mask.
+/// Uncertainty of the network's outlines around a person, in mask pixels.
 const RIM_PX: usize = 5;
-/// Where a thing meets the person, so many pixels of their soft outline are inside of both.
+/// Radius in which an object's mask replaces the soft outline of the person, in pixels.
 const SEAM_PX: usize = 2;
-/// A part joins that was there for so many frames; and one that is joined to nobody any more is let go after so many.
+/// Number of frames after which a region is added, and after which a disconnected one is removed.
 const JOINS: u8 = 5;
 const LEAVES: u8 = 8;
 
 /// Decides from frame to frame; owns the memory for it.
 #[derive(Debug, Default)]
 pub struct Belongings {
-    /// Whether pixels are the subject's, though no person's.
+    /// Whether a pixel belongs to a held object.
     held: Vec<bool>,
-    /// For how many frames each has been to join, or is joined to nobody.
+    /// Number of frames for which a pixel was connected but not held, or held but not connected.
     waited: Vec<u8>,
-    /// Whether pixels are a person's, and within [`RIM_PX`] of one.
+    /// Whether a pixel is a person's, and within [`RIM_PX`] of one.
     persons: Vec<bool>,
     rim: Vec<bool>,
-    /// Whether they may be the subject's, whether they are joined to them, and whether anything beyond the rim is close.
+    /// Whether a pixel is near enough to be held, whether it is also connected to the subject, and whether such pixels
+    /// beyond the rim are close.
     may_be: Vec<bool>,
     joined: Vec<bool>,
     beyond: Vec<bool>,
     front: Vec<u32>,
     line: Vec<bool>,
-    parts: Parts,
+    components: Components,
 }
 
 impl Belongings {
-    /// Forgets the frame before: the next one is another scene.
+    /// Resets the state, for a new scene.
     pub fn forget(&mut self) {
         self.held.clear();
     }
 
-    /// Adds what is held to the shares of a mask so wide, in which each pixel is so near: 1 at the subject. A person's is what
-    /// has more than the share `part`.
-    pub fn add(&mut self, shares: &mut [f32], nearness: &[f32], width: usize, part: f32) {
-        let is_first = self.held.len() != shares.len();
+    /// Adds held objects to a mask `width` pixels wide, given the nearness of each pixel (1 at the subject). Persons
+    /// are pixels above `threshold`.
+    pub fn add(&mut self, alphas: &mut [f32], nearness: &[f32], width: usize, threshold: f32) {
+        let is_first = self.held.len() != alphas.len();
         if is_first {
             self.held.clear();
-            self.held.resize(shares.len(), false);
+            self.held.resize(alphas.len(), false);
             self.waited.clear();
-            self.waited.resize(shares.len(), JOINS);
+            self.waited.resize(alphas.len(), JOINS);
         }
-        self.find_joined(shares, nearness, width, part);
+        self.find_joined(alphas, nearness, width, threshold);
         self.decide(width);
-        // Their soft outline is inside where a thing goes on.
+        // Where an object continues, the person's soft outline is inside of both.
         self.beyond.clone_from(&self.held);
         dilate(&mut self.beyond, &mut self.line, width, SEAM_PX);
-        for (share, (beyond, person)) in shares.iter_mut().zip(self.beyond.iter().zip(&self.persons)) {
-            *share = if *beyond & *person { 1.0 } else { *share };
+        for (alpha, (beyond, person)) in alphas.iter_mut().zip(self.beyond.iter().zip(&self.persons)) {
+            *alpha = if *beyond & *person { 1.0 } else { *alpha };
         }
-        for (share, _) in shares.iter_mut().zip(&self.held).filter(|(_, held)| **held) {
-            *share = 1.0;
+        for (alpha, _) in alphas.iter_mut().zip(&self.held).filter(|(_, held)| **held) {
+            *alpha = 1.0;
         }
     }
 
-    /// Finds what is as near as the subject and joined to them, step by step, as far as it reaches beyond their rim.
-    fn find_joined(&mut self, shares: &[f32], nearness: &[f32], width: usize, part: f32) {
+    /// Finds the pixels as near as the subject and connected to it (4-connected), in regions that extend beyond the
+    /// rim.
+    fn find_joined(&mut self, alphas: &[f32], nearness: &[f32], width: usize, threshold: f32) {
         let Self { held, persons, rim, may_be, joined, beyond, front, line, .. } = self;
         persons.clear();
-        persons.extend(shares.iter().map(|&share| share > part));
+        persons.extend(alphas.iter().map(|&alpha| alpha > threshold));
         rim.clone_from(persons);
         dilate(rim, line, width, RIM_PX);
         may_be.clear();
         let as_near = |(&near, &held): (&f32, &bool)| near > AS_NEAR[usize::from(!held)];
         may_be.extend(nearness.iter().zip(&*held).zip(&*persons).map(|(pixel, &person)| as_near(pixel) && !person));
         joined.clear();
-        joined.resize(shares.len(), false);
+        joined.resize(alphas.len(), false);
         front.clear();
-        for start in (0..shares.len()).filter(|&at| shares[at] > 0.9) {
+        for start in (0..alphas.len()).filter(|&at| alphas[at] > 0.9) {
             joined[start] = true;
             front.push(start as u32);
         }
+        // Flood fill from the person's sure pixels.
         let mut next = 0;
         while let Some(&at) = front.get(next) {
             next += 1;
@@ -92,7 +95,7 @@ impl Belongings {
                 (true, at.wrapping_sub(width)),
                 (true, at + width),
             ];
-            for (_, at) in beside.into_iter().filter(|&(inside, at)| inside && at < shares.len()) {
+            for (_, at) in beside.into_iter().filter(|&(inside, at)| inside && at < alphas.len()) {
                 if !joined[at] && (persons[at] || may_be[at]) {
                     joined[at] = true;
                     front.push(at as u32);
@@ -100,25 +103,25 @@ impl Belongings {
             }
         }
         beyond.clear();
-        beyond.extend((0..shares.len()).map(|at| may_be[at] && !rim[at] && (joined[at] || held[at])));
+        beyond.extend((0..alphas.len()).map(|at| may_be[at] && !rim[at] && (joined[at] || held[at])));
         dilate(beyond, line, width, RIM_PX);
-        for at in 0..shares.len() {
+        for at in 0..alphas.len() {
             joined[at] &= may_be[at] && beyond[at];
         }
     }
 
-    /// A part joins as a whole, and what was the subject's remains so for a while.
+    /// Adds regions as a whole, and keeps pixels that were held for a while.
     fn decide(&mut self, width: usize) {
-        let Self { held, waited, may_be, joined, beyond, parts, .. } = self;
-        parts.find(joined, width, |at| held[at] || waited[at] >= JOINS);
-        for (pixels, part) in parts.runs() {
-            let joins = part.is_person && 2 * part.found > part.pixels;
+        let Self { held, waited, may_be, joined, beyond, components, .. } = self;
+        components.find(joined, width, |at| held[at] || waited[at] >= JOINS);
+        for (pixels, component) in components.runs() {
+            let joins = component.is_person && 2 * component.found > component.pixels;
             for at in pixels {
                 let stays = held[at] && may_be[at] && beyond[at] && waited[at] < LEAVES;
                 let was = std::mem::replace(&mut held[at], joins || stays);
                 waited[at] = match () {
-                    () if joins || part.is_person && was => 0,
-                    () if part.is_person || held[at] => waited[at].saturating_add(1),
+                    () if joins || component.is_person && was => 0,
+                    () if component.is_person || held[at] => waited[at].saturating_add(1),
                     () => 0,
                 };
             }
@@ -132,7 +135,7 @@ mod tests {
 
     const SIZE: (usize, usize) = (64, 32);
 
-    /// A person in the left columns, beside whom some columns are near, and all else is far.
+    /// A person in the left columns, near columns beside it, and the rest far.
     struct Scene {
         belongings: Belongings,
     }
@@ -142,17 +145,18 @@ mod tests {
             Self { belongings: Belongings::default() }
         }
 
-        /// Which columns are the subject's in the next frame, where those beside the person, up to one, are so near.
+        /// Returns which columns are the subject's in the next frame, if those up to `up_to` beside the person have
+        /// nearness `near`.
         fn sees(&mut self, up_to: usize, near: f32) -> Vec<bool> {
             let of = |at: usize, far: f32, near: f32| match at % SIZE.0 {
                 0..20 => 1.0,
                 x if x < up_to => near,
                 _ => far,
             };
-            let mut shares: Vec<f32> = (0..SIZE.0 * SIZE.1).map(|at| of(at, 0.0, 0.0)).collect();
+            let mut alphas: Vec<f32> = (0..SIZE.0 * SIZE.1).map(|at| of(at, 0.0, 0.0)).collect();
             let nearness: Vec<f32> = (0..SIZE.0 * SIZE.1).map(|at| of(at, 0.1, near)).collect();
-            self.belongings.add(&mut shares, &nearness, SIZE.0, 0.5);
-            shares[16 * SIZE.0..][..SIZE.0].iter().map(|&share| share == 1.0).collect()
+            self.belongings.add(&mut alphas, &nearness, SIZE.0, 0.5);
+            alphas[16 * SIZE.0..][..SIZE.0].iter().map(|&alpha| alpha == 1.0).collect()
         }
     }
 
@@ -182,14 +186,14 @@ mod tests {
         }
         let joined = (0..20).map(|_| scene.sees(40, 1.0)).position(|columns_now| columns_now == columns(40));
         assert!(joined.is_some_and(|frames| frames <= usize::from(JOINS)), "{joined:?}");
-        // What grows by some pixels, as it moves, is theirs at once, and what goes is not.
+        // Pixels added by motion are held at once, and removed ones are not.
         assert_eq!(scene.sees(43, 1.0), columns(43));
         assert_eq!(scene.sees(43, 0.3), columns(20));
     }
 
     #[test]
     fn the_rim_of_a_person_is_not_what_they_hold() {
-        // The network's outlines are fat.
+        // The network's outlines are too wide.
         assert_eq!(Scene::new().sees(20 + RIM_PX, 1.0), columns(20));
     }
 }

@@ -1,62 +1,62 @@
-//! Which pixels of a network's mask are a person's, decided as a whole where the network is unsure.
+//! Decides the unsure regions of a network's mask: person or background.
 //!
-//! Between 0 and 1 a mask means two things: on an outline, that a pixel is mixed; elsewhere, that the network does not know.
-//! Nobody's hand is half there, so away from outlines a pixel is a person's, or it is not. An enclosed hole that the network is
-//! unsure of is none, and a mask in which it is sure of nothing shows nobody.
+//! A mask value between 0 and 1 has two meanings: on an outline, a mixed pixel; elsewhere, an unsure network. Away from
+//! outlines, no pixel is half a person, so each is decided either way. An enclosed hole of which the network is unsure
+//! is filled, and a mask in which it is sure of nothing shows no person.
 
-use super::parts::Parts;
+use super::parts::Components;
 use crate::frame::Mask;
 
-/// A pixel is a person's from one half on: less, if it was so in the frame before, and more if it was not.
+/// Hysteresis of the threshold 1/2: lower by this if the pixel was a person's in the previous frame, and higher if not.
 const HYSTERESIS: f32 = 0.1;
-/// Where an enclosed hole has less than this, the network is sure that it is one; and the same once it was filled.
+/// Mask value below which an enclosed hole is certain, if it was not filled in the previous frame, and if it was.
 const SURE_HOLE: [f32; 2] = [0.15, 0.1];
-/// Larger holes stay, as a share of the mask: an arm akimbo encloses more.
+/// Maximum size of a filled hole, as a fraction of the mask: an arm akimbo encloses more.
 const LARGEST_HOLE: f32 = 0.02;
-/// The network is sure that a pixel is a person's from here on.
+/// Minimum mask value of a certain person pixel.
 const SURE: f32 = 0.9;
-/// A part is a person's whose pixels are sure by this share; and the same while somebody is there.
+/// Minimum fraction of certain pixels in a person's region, if no person was there, and if one was.
 const PERSON: [f32; 2] = [0.6, 0.4];
-/// Smaller parts are nobody's, as a share of the mask.
-const LEAST_PART: f32 = 0.001;
-/// For so long, somebody who was there or may have been is not gone.
+/// Minimum size of a person's region, as a fraction of the mask.
+const MIN_COMPONENT: f32 = 0.001;
+/// Time for which a person may be unsure before it counts as gone.
 const DOUBT_NS: u64 = 300_000_000;
 
-/// Pixels all around that one is decided with: half with those beside it, the rest with those beside them.
-const REACH: usize = 2;
+/// Radius of the neighbourhood for decisions: equal pixels within 1 decide half, within 2 fully.
+const RADIUS: usize = 2;
 
 /// Decides from frame to frame; owns the memory for it.
 #[derive(Debug, Default)]
 pub struct Decision {
-    /// Whether pixels are a person's, and in the frame before.
+    /// Whether a pixel is a person's, in this and in the previous frame.
     persons: Vec<bool>,
     before: Vec<bool>,
-    parts: Parts,
-    /// How many of the pixels above, below and at a pixel are a person's, within one and within [`REACH`].
+    components: Components,
+    /// Vertical sums of person pixels around a pixel, within 1 and within [`RADIUS`].
     columns: [Vec<u8>; 2],
-    /// When a person was seen last; `None` before the first frame.
+    /// When a person was last seen; `None` before the first frame.
     seen_ns: Option<u64>,
     is_present: bool,
 }
 
 impl Decision {
-    /// Forgets the frame before: the next one is another scene.
+    /// Resets the state, for a new scene.
     pub fn forget(&mut self) {
         self.before.clear();
         (self.seen_ns, self.is_present) = (None, false);
     }
 
-    /// Makes `decided` what `mask` is with all decided that can be, in a picture that was taken at this time.
+    /// Writes the decided mask of a picture at `now_ns` to `decided`.
     pub fn decide(&mut self, mask: &Mask, now_ns: u64, decided: &mut Mask) {
         decided.clone_from(mask);
         self.classify(&mask.share);
         let width = mask.width as usize;
-        let Self { persons, before, parts, .. } = self;
-        parts.find(persons, width, |at| match persons[at] {
+        let Self { persons, before, components, .. } = self;
+        components.find(persons, width, |at| match persons[at] {
             true => mask.share[at] > SURE,
             false => mask.share[at] < SURE_HOLE[usize::from(before[at])],
         });
-        if !self.is_somebody_there(now_ns) {
+        if !self.is_person_present(now_ns) {
             decided.share.fill(0.0);
             self.before.clear();
             return;
@@ -66,71 +66,70 @@ impl Decision {
         std::mem::swap(&mut self.persons, &mut self.before);
     }
 
-    /// Whether each pixel is a person's, by its share and the frame before.
-    fn classify(&mut self, shares: &[f32]) {
+    /// Classifies each pixel by its mask value and the previous frame (hysteresis).
+    fn classify(&mut self, alphas: &[f32]) {
         let Self { persons, before, .. } = self;
         persons.clear();
-        if before.len() == shares.len() {
+        if before.len() == alphas.len() {
             let least = |was: bool| if was { 0.5 - HYSTERESIS } else { 0.5 + HYSTERESIS };
-            persons.extend(shares.iter().zip(&*before).map(|(&share, &was)| share > least(was)));
+            persons.extend(alphas.iter().zip(&*before).map(|(&alpha, &was)| alpha > least(was)));
         } else {
-            persons.extend(shares.iter().map(|&share| share > 0.5));
+            persons.extend(alphas.iter().map(|&alpha| alpha > 0.5));
             before.clear();
-            before.resize(shares.len(), false);
+            before.resize(alphas.len(), false);
         }
     }
 
-    /// Whether a part of the mask is a person, or was so until just now.
-    fn is_somebody_there(&mut self, now_ns: u64) -> bool {
-        let least = LEAST_PART * self.persons.len() as f32;
+    /// Whether a region of the mask is a person, or was one until just now.
+    fn is_person_present(&mut self, now_ns: u64) -> bool {
+        let least = MIN_COMPONENT * self.persons.len() as f32;
         let sure = PERSON[usize::from(self.is_present)];
         let is_person = |pixels: u32, found: u32| pixels as f32 > least && found as f32 >= sure * pixels as f32;
-        if self.parts.all().any(|part| part.is_person && is_person(part.pixels, part.found)) {
+        if self.components.all().any(|component| component.is_person && is_person(component.pixels, component.found)) {
             (self.seen_ns, self.is_present) = (Some(now_ns), true);
         }
-        // Nobody is seen at once that the network is unsure of: before, it may have been somebody. Time goes back where a
-        // recording begins anew.
+        // At the start, an unsure region may be a person, too. Time goes back when a recording restarts.
         let seen_ns = *self.seen_ns.get_or_insert(now_ns);
         self.is_present &= now_ns.saturating_sub(seen_ns) <= DOUBT_NS;
         now_ns.saturating_sub(seen_ns) <= DOUBT_NS
     }
 
-    /// Enclosed holes that the network is nowhere sure of become the person's.
+    /// Fills small enclosed holes without certain pixels.
     fn fill_holes(&mut self) {
         let largest = (LARGEST_HOLE * self.persons.len() as f32) as u32;
-        for (pixels, part) in self.parts.runs() {
-            if !part.is_person && !part.is_open && part.found == 0 && part.pixels <= largest {
+        for (pixels, component) in self.components.runs() {
+            if !component.is_person && !component.is_open && component.found == 0 && component.pixels <= largest {
                 self.persons[pixels].fill(true);
             }
         }
     }
 
-    /// Moves shares to 0 or 1, the farther from the outline the more.
-    fn settle(&mut self, width: usize, shares: &mut [f32]) {
+    /// Moves mask values to 0 or 1, fully from [`RADIUS`] pixels off the outline, and by half next to it.
+    fn settle(&mut self, width: usize, alphas: &mut [f32]) {
         let Self { persons, columns, .. } = self;
         let height = persons.len() / width.max(1);
-        let clamped = |at: usize, by: usize, count: usize| (at + by).saturating_sub(REACH).min(count - 1);
+        let clamped = |at: usize, by: usize, count: usize| (at + by).saturating_sub(RADIUS).min(count - 1);
         for y in 0..height {
-            for (reach, sums) in columns.iter_mut().enumerate().map(|(k, sums)| (k + 1, sums)) {
+            for (radius, sums) in columns.iter_mut().enumerate().map(|(k, sums)| (k + 1, sums)) {
                 sums.clear();
                 sums.resize(width, 0);
-                for by in REACH - reach..=REACH + reach {
+                for by in RADIUS - radius..=RADIUS + radius {
                     let row = &persons[clamped(y, by, height) * width..][..width];
                     sums.iter_mut().zip(row).for_each(|(sum, &is_person)| *sum += u8::from(is_person));
                 }
             }
             let row = y * width..(y + 1) * width;
-            for (x, (share, &is_person)) in shares[row.clone()].iter_mut().zip(&persons[row]).enumerate() {
-                let alike = |reach: usize| {
-                    let all = if is_person { 2 * reach as u8 + 1 } else { 0 };
-                    let sums = &columns[reach - 1];
-                    (REACH - reach..=REACH + reach).all(|by| sums[clamped(x, by, width)] == all)
+            for (x, (alpha, &is_person)) in alphas[row.clone()].iter_mut().zip(&persons[row]).enumerate() {
+                let alike = |radius: usize| {
+                    let all = if is_person { 2 * radius as u8 + 1 } else { 0 };
+                    let sums = &columns[radius - 1];
+                    (RADIUS - radius..=RADIUS + radius).all(|by| sums[clamped(x, by, width)] == all)
                 };
                 let decided = if is_person { 1.0 } else { 0.0 };
-                *share = match () {
-                    () if *share == decided || !alike(1) => *share,
-                    () if alike(REACH) => decided,
-                    () => 0.5 * (*share + decided),
+                *alpha = match () {
+                    () if *alpha == decided || !alike(1) => *alpha,
+                    () if alike(RADIUS) => decided,
+                    () => 0.5 * (*alpha + decided),
                 };
             }
         }
@@ -144,7 +143,7 @@ mod tests {
     const SIZE: (usize, usize) = (64, 48);
     const FRAME_NS: u64 = 33_000_000;
 
-    /// A mask of a person, with the share of every other pixel `at` of `inside`, and none elsewhere.
+    /// Creates a mask from a function of column and row.
     fn mask(share: impl Fn(usize, usize) -> f32) -> Mask {
         let share = (0..SIZE.0 * SIZE.1).map(|at| share(at % SIZE.0, at / SIZE.0)).collect();
         Mask { width: SIZE.0 as u32, height: SIZE.1 as u32, share }
@@ -158,7 +157,7 @@ mod tests {
         if is_body(x, y) { 1.0 } else { 0.0 }
     }
 
-    /// The shares of a body with a hole of this size and share, decided.
+    /// Returns the decided values in a square hole of this side and mask value in a body.
     fn hole(side: usize, share: f32) -> Vec<f32> {
         let is_hole = |x: usize, y: usize| (20..20 + side).contains(&x) && (12..12 + side).contains(&y);
         let mut decided = Mask::default();
@@ -177,7 +176,7 @@ mod tests {
     #[test]
     fn what_is_unsure_is_decided_but_for_the_outline() {
         let mut decided = Mask::default();
-        // A hand of which the network is not sure, and a chair of which it is not either.
+        // An unsure hand, and an unsure chair.
         let share = |x: usize, y: usize| match x {
             0..10 if y >= 30 => 0.3,
             48..60 if y >= 30 => 0.7,
@@ -205,7 +204,7 @@ mod tests {
     #[test]
     fn a_room_with_nobody_is_blurred_after_half_a_second_and_who_comes_in_is_found_at_once() {
         let (mut decision, mut decided) = (Decision::default(), Mask::default());
-        // What a network makes of a room: much that may be somebody, and little that it is sure of.
+        // A network's mask of an empty room: a large unsure region, and few certain pixels.
         let room = mask(|x, y| match (x, y) {
             (30..34, 20..24) => 0.97,
             (10..40, 10..40) => 0.7,
@@ -217,9 +216,9 @@ mod tests {
         };
         assert!((0..60).all(|frame| !sharp(&room, frame) || frame * FRAME_NS < 500_000_000));
         assert!(sharp(&mask(body), 60), "in the frame in which they come");
-        // They go: the same.
+        // The person leaves: the same delay.
         assert!((61..120).all(|frame| !sharp(&room, frame) || (frame - 60) * FRAME_NS < 500_000_000));
-        // Who moves, and is not well seen for two frames, is still there.
+        // A moving person who is unsure for two frames remains.
         assert!(sharp(&mask(body), 120) && sharp(&room, 121) && sharp(&room, 122));
     }
 }

@@ -1,34 +1,34 @@
-//! How a network is shown a picture, and which of its answers is meant.
+//! Feeds pictures to a network: input layout and scaling, and the selection of its output.
 
 use crate::frame::ColorImage;
 use crate::frame::scale::Scale;
 use crate::network::{Loaded, Network, Port, Scaling, Task, Tensor};
 
-/// Longest side of the picture that a network is shown, in pixels.
-const MOST_SIDE: usize = 1024;
+/// Maximum side of a network's input picture, in pixels.
+const MAX_SIDE: usize = 1024;
 
-/// What the user says of a network that is not known; `None` is guessed.
+/// User-given properties of an unknown network; `None` is guessed.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Hints {
-    /// What the codes of the picture become.
+    /// Scaling of the picture's codes.
     pub scaling: Option<Scaling>,
-    /// Whether blue comes first.
+    /// Whether the channel order is blue, green, red.
     pub bgr: Option<bool>,
 }
 
-/// A network that is shown pictures.
+/// A network with a picture input.
 pub struct Feed {
     network: Network,
-    /// Columns and rows of the picture that it is shown.
+    /// Columns and rows of the input picture.
     size: (usize, usize),
-    /// Whether the three channels of its picture lie in planes, or beside each other.
+    /// Whether the input is planar (NCHW) or interleaved (NHWC).
     planes: bool,
     scaling: Scaling,
     bgr: bool,
-    /// Which input the picture is, and which output the answer.
+    /// Index of the picture input, and of the output that is used.
     picture: usize,
     answer: usize,
-    /// The outputs that are inputs for the next picture: input, output.
+    /// Recurrent states: pairs of an input and the output that feeds it for the next picture.
     memory: Vec<(usize, usize)>,
     inputs: Vec<Tensor>,
     outputs: Vec<Tensor>,
@@ -37,19 +37,19 @@ pub struct Feed {
     small: Vec<u8>,
 }
 
-/// What a network says: some planes of numbers, as large as it likes.
+/// A network's output: one or two channels, of the network's own size.
 #[derive(Clone, Copy, Debug)]
 pub struct Answer<'a> {
     /// Columns and rows.
     pub size: (usize, usize),
-    /// How many numbers each pixel has.
+    /// Numbers per pixel.
     pub channels: usize,
     values: &'a [f32],
     planes: bool,
 }
 
 impl Answer<'_> {
-    /// The number of a channel at a pixel.
+    /// Returns the number of a channel at a pixel.
     #[inline(always)]
     pub fn at(&self, pixel: usize, channel: usize) -> f32 {
         let pixels = self.size.0 * self.size.1;
@@ -58,10 +58,11 @@ impl Answer<'_> {
 }
 
 impl Feed {
-    /// Finds out how a network is shown pictures.
+    /// Finds the inputs and outputs of a network.
     ///
     /// # Errors
-    /// It does not take a picture, or more than one.
+    /// The network does not take exactly one picture, takes other inputs than recurrent states and ratios, or has no
+    /// usable output.
     pub fn new(Loaded { network, known }: Loaded, task: Task, hints: &Hints) -> Result<Self, String> {
         let inputs = &network.inputs;
         let pictures: Vec<usize> = (0..inputs.len()).filter(|&k| channels_at(&inputs[k], &[3]).is_some()).collect();
@@ -73,14 +74,14 @@ impl Feed {
         };
         let planes = channels_at(&inputs[picture], &[3]) == Some(1);
         let sides = if planes { [3, 2] } else { [2, 1] };
-        // Where it takes any size: small, and a multiple of what networks halve their pictures to.
+        // For a variable input size: small, and divisible by the usual strides of networks.
         let usual = match task {
             Task::Matte => [256, 144],
             Task::Mono => [320, 192],
         };
         let [width, height] = [0, 1].map(|k| inputs[picture].shape[sides[k]].unwrap_or(usual[k]));
-        if !(1..=MOST_SIDE).contains(&width) || !(1..=MOST_SIDE).contains(&height) {
-            return Err(format!("it is shown pictures of {width} x {height}: at most {MOST_SIDE} a side are sensible"));
+        if !(1..=MAX_SIDE).contains(&width) || !(1..=MAX_SIDE).contains(&height) {
+            return Err(format!("it is shown pictures of {width} x {height}: at most {MAX_SIDE} a side are sensible"));
         }
         let outputs = &network.outputs;
         let answers = |named: bool| {
@@ -92,7 +93,7 @@ impl Feed {
         };
         let answer = answers(true).or_else(|| answers(false)).or((outputs.len() == 1).then_some(0));
         let answer = answer.ok_or("none of its outputs is a picture of one channel or two")?;
-        // What else it takes is what it gave the last time, in the same order (as Robust Video Matting has it); or a ratio.
+        // Other inputs are recurrent states, in the order of the outputs (as in Robust Video Matting), or a ratio.
         let others = (0..inputs.len()).filter(|&k| k != picture && !is_ratio(&inputs[k]));
         let states =
             (outputs.len() + 1).saturating_sub(inputs.iter().filter(|port| !is_ratio(port)).count())..outputs.len();
@@ -103,7 +104,7 @@ impl Feed {
         let inputs = (0..inputs.len()).map(|k| match k {
             _ if k == picture => Tensor::zeros(&if planes { [1, 3, height, width] } else { [1, height, width, 3] }),
             _ if is_ratio(&inputs[k]) => Tensor { shape: vec![1], values: vec![1.0] },
-            // Sizes that it leaves open are 1 at first: one number stands for all.
+            // Variable sizes of states are 1 at first: one number is broadcast.
             _ => Tensor::zeros(&inputs[k].shape.iter().map(|side| side.unwrap_or(1)).collect::<Vec<_>>()),
         });
         let inputs = inputs.collect();
@@ -130,26 +131,26 @@ impl Feed {
         })
     }
 
-    /// Forgets what it gave for the picture before: the next one is another scene.
+    /// Resets the recurrent states, for a new scene.
     pub fn forget(&mut self) {
         for &(input, _) in &self.memory {
             self.inputs[input].values.fill(0.0);
         }
     }
 
-    /// Shows it a picture, and runs it.
+    /// Runs the network on a picture.
     ///
     /// # Errors
-    /// As for [`Self::answer`].
-    pub fn see(&mut self, color: &ColorImage) -> Result<Answer<'_>, String> {
-        self.show(color);
+    /// See [`Self::answer`].
+    pub fn infer(&mut self, color: &ColorImage) -> Result<Answer<'_>, String> {
+        self.set_picture(color);
         self.answer()
     }
 
-    /// Runs it on the picture that it was shown.
+    /// Runs the network on the picture set by [`Self::set_picture`].
     ///
     /// # Errors
-    /// What the runtime says, or the answer is no picture of finite numbers.
+    /// The runtime fails, or the output is no picture of finite numbers.
     pub fn answer(&mut self) -> Result<Answer<'_>, String> {
         self.network.run(&self.inputs, &mut self.outputs)?;
         for &(input, output) in &self.memory {
@@ -163,8 +164,8 @@ impl Feed {
         }
     }
 
-    /// Shows it a picture, for [`Self::answer`].
-    pub fn show(&mut self, color: &ColorImage) {
+    /// Sets the input picture for [`Self::answer`].
+    pub fn set_picture(&mut self, color: &ColorImage) {
         let (width, height) = self.size;
         self.scale.adapt((color.width as usize, color.height as usize), self.size);
         self.small.resize(3 * width, 0);
@@ -183,7 +184,7 @@ impl Feed {
     }
 }
 
-/// The place of the channels in a port of pictures that have so many, 1 or 3; `None` if it is no such port.
+/// Returns the channel axis of a picture port with one of these channel counts, 1 or 3; `None` if it is not a picture.
 fn channels_at(port: &Port, channels: &[usize]) -> Option<usize> {
     let &[batch, planes, _, last] = port.shape.as_slice() else { return None };
     let has = |side: Option<usize>| side.is_some_and(|side| channels.contains(&side));
@@ -195,12 +196,12 @@ fn channels_at(port: &Port, channels: &[usize]) -> Option<usize> {
     }
 }
 
-/// Whether it is one number, such as the ratio by which a network may shrink its picture.
+/// Whether the port is a scalar, such as a downsampling ratio.
 fn is_ratio(port: &Port) -> bool {
     port.shape.len() <= 1
 }
 
-/// The picture that a tensor is: the one of one channel or two whose sizes say so.
+/// Interprets a tensor as a picture of one or two channels, by its shape.
 fn picture_of(tensor: &Tensor) -> Option<Answer<'_>> {
     let values = tensor.values.as_slice();
     let (planes, channels, height, width) = match *tensor.shape.as_slice() {
@@ -209,6 +210,6 @@ fn picture_of(tensor: &Tensor) -> Option<Answer<'_>> {
         [1, height, width] | [height, width] => (true, 1, height, width),
         _ => return None,
     };
-    let whole = width > 1 && height > 1 && width * height * channels == values.len();
-    whole.then_some(Answer { size: (width, height), channels, values, planes })
+    let is_valid = width > 1 && height > 1 && width * height * channels == values.len();
+    is_valid.then_some(Answer { size: (width, height), channels, values, planes })
 }

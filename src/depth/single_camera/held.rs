@@ -1,68 +1,67 @@
-//! What belongs to a subject: what is as near and joined to it, such as a mug that is held; and what does not: others, who
-//! are further away.
+//! Completes masks: adds what a subject holds, such as a mug, and removes persons further away.
 
 use super::belongings::Belongings;
 use super::relief::Relief;
 use crate::depth::tap::nearest;
 use crate::frame::Mask;
 
-/// A person of whom less is as near as this is another one, further away.
+/// Minimum mean nearness of a subject; persons further away are others.
 const OTHERS: f32 = 0.55;
-/// Who was another, or was not, in the frame before stays so by this much (hysteresis).
+/// Hysteresis of that threshold.
 const HYSTERESIS: f32 = 0.07;
-/// A part of the mask begins here.
-const PART: f32 = 0.5;
+/// Minimum mask value of a region.
+const THRESHOLD: f32 = 0.5;
 
-/// Joins masks with what belongs to them; owns the memory for it.
+/// Completes masks by nearness; owns the memory for it.
 #[derive(Default)]
 pub struct Held {
     mask: Mask,
-    /// Of each pixel of the mask, how near it is.
+    /// Nearness of each mask pixel.
     nearness: Vec<f32>,
-    /// Whether it was another's in the frame before.
+    /// Whether a pixel was another person's in the previous frame.
     others: Vec<bool>,
-    /// Whether a pixel was seen to be part of what is looked at, and those that are yet to be looked around.
+    /// Visited pixels, and the queue of the flood fill.
     seen: Vec<bool>,
     front: Vec<u32>,
     belongings: Belongings,
 }
 
 impl Held {
-    /// The mask of the subject and all that is theirs.
+    /// Returns the mask of the subject with held objects.
     pub fn mask(&self) -> &Mask {
         &self.mask
     }
 
-    /// Forgets the frame before: the next one is another scene.
+    /// Resets the state, for a new scene.
     pub fn forget(&mut self) {
         self.others.clear();
         self.belongings.forget();
     }
 
-    /// Joins a mask with what is as near, and takes others away.
-    pub fn join(&mut self, mask: &Mask, relief: &Relief) {
+    /// Adds held objects to a mask, and removes other persons.
+    pub fn complete(&mut self, mask: &Mask, relief: &Relief) {
         let (width, height) = (mask.width as usize, mask.height as usize);
         self.mask.clone_from(mask);
         let near = |at: usize| relief.nearness()[nearest(at, (width, height), relief.size())];
         self.nearness.clear();
         self.nearness.extend((0..width * height).map(near));
-        self.take_others_away();
-        self.belongings.add(&mut self.mask.share, &self.nearness, width, PART);
+        self.remove_others();
+        self.belongings.add(&mut self.mask.share, &self.nearness, width, THRESHOLD);
     }
 
-    /// Parts of the mask that are mostly far away are other people's.
-    fn take_others_away(&mut self) {
+    /// Removes regions of the mask whose mean nearness is low: other persons.
+    fn remove_others(&mut self) {
         let count = self.mask.share.len();
         self.seen.clear();
         self.seen.resize(count, false);
         let is_first = self.others.len() != count;
         self.others.resize(count, false);
         for start in 0..self.mask.share.len() {
-            if self.seen[start] || self.mask.share[start] < PART {
+            if self.seen[start] || self.mask.share[start] < THRESHOLD {
                 continue;
             }
             self.front.clear();
-            self.flood(start, |held, at| held.mask.share[at] >= PART);
+            self.flood(start, |held, at| held.mask.share[at] >= THRESHOLD);
             let near: f32 = self.front.iter().map(|&at| self.nearness[at as usize]).sum();
             let were_others = self.front.iter().filter(|&&at| self.others[at as usize]).count();
             let least = match () {
@@ -73,18 +72,18 @@ impl Held {
             let are_others = near < least * self.front.len() as f32;
             self.front.iter().for_each(|&at| self.others[at as usize] = are_others);
             if are_others {
-                // Their soft outlines go with them.
-                let part = std::mem::take(&mut self.front);
-                for &at in &part {
+                // Including their soft outlines.
+                let component = std::mem::take(&mut self.front);
+                for &at in &component {
                     self.clear_around(at as usize);
                 }
-                self.front = part;
+                self.front = component;
             }
         }
         self.others.iter_mut().zip(&self.seen).for_each(|(is_other, seen)| *is_other &= seen);
     }
 
-    /// Adds to `front` what is connected to `start` and belongs to it.
+    /// Appends to `front` the pixels connected to `start` that belong to it (4-connected).
     fn flood(&mut self, start: usize, belongs: impl Fn(&Self, usize) -> bool) {
         let (width, height) = (self.mask.width as usize, self.mask.height as usize);
         let mut next = self.front.len();
@@ -109,12 +108,12 @@ impl Held {
     }
 
     fn clear_around(&mut self, at: usize) {
-        const REACH: usize = 3;
+        const RADIUS: usize = 3;
         let (width, height) = (self.mask.width as usize, self.mask.height as usize);
         let (x, y) = (at % width, at / width);
-        for y in y.saturating_sub(REACH)..(y + REACH + 1).min(height) {
-            for x in x.saturating_sub(REACH)..(x + REACH + 1).min(width) {
-                // Not those of a subject beside them.
+        for y in y.saturating_sub(RADIUS)..(y + RADIUS + 1).min(height) {
+            for x in x.saturating_sub(RADIUS)..(x + RADIUS + 1).min(width) {
+                // Keeps the pixels of a subject beside them.
                 let at = y * width + x;
                 if self.others[at] || self.nearness[at] < OTHERS {
                     self.mask.share[at] = 0.0;
@@ -130,10 +129,11 @@ mod tests {
 
     const SIZE: (usize, usize) = (32, 16);
 
-    /// From one column to before another.
+    /// A range of columns, the end excluded.
     type Columns = (usize, usize);
 
-    /// Which columns are the subject's, where a mask has persons in some of them, and these are so near; others are far.
+    /// Returns which columns are the subject's, for a mask with these persons and nearness in these columns; the rest
+    /// is far.
     fn joined(persons: &[Columns], near: &[(Columns, f32)]) -> Vec<bool> {
         let inside = |at: usize| near.iter().find(|((from, to), _)| (*from..*to).contains(&(at % SIZE.0)));
         let persons = columns(persons);
@@ -146,8 +146,8 @@ mod tests {
             nearness: (0..SIZE.0 * SIZE.1).map(|at| inside(at).map_or(0.1, |(_, nearness)| *nearness)).collect(),
             ..Held::default()
         };
-        held.take_others_away();
-        held.belongings.add(&mut held.mask.share, &held.nearness, SIZE.0, PART);
+        held.remove_others();
+        held.belongings.add(&mut held.mask.share, &held.nearness, SIZE.0, THRESHOLD);
         held.mask.share[8 * SIZE.0..][..SIZE.0].iter().map(|share| *share > 0.5).collect()
     }
 
@@ -168,7 +168,7 @@ mod tests {
             let share = (0..SIZE.0 * SIZE.1).map(|at| f32::from(u8::from(persons(at)))).collect();
             held.mask = Mask { width: SIZE.0 as u32, height: SIZE.1 as u32, share };
             held.nearness = (0..SIZE.0 * SIZE.1).map(|at| if at % SIZE.0 < 16 { 1.0 } else { nearness }).collect();
-            held.take_others_away();
+            held.remove_others();
             held.mask.share[8 * SIZE.0 + 23] > 0.5
         };
         for first in [OTHERS - 0.02, OTHERS + 0.02] {
@@ -185,7 +185,7 @@ mod tests {
     fn others_further_away_are_not_the_subject() {
         let near = [((4, 10), 1.0), ((20, 26), 0.3)];
         assert_eq!(joined(&[(4, 10), (20, 26)], &near), columns(&[(4, 10)]));
-        // Two side by side, as near as each other, both are.
+        // Two persons side by side, about as near, are both subjects.
         let near = [((4, 10), 1.0), ((20, 26), 0.9)];
         assert_eq!(joined(&[(4, 10), (20, 26)], &near), columns(&[(4, 10), (20, 26)]));
     }

@@ -1,8 +1,8 @@
-//! Depth with a matte from one ordinary camera, by networks of the user's own: where a person is (`matte`), how near all
-//! is (`mono`), or both.
+//! Depth and matte from one ordinary camera, by the user's own networks: a person mask (`matte`), relative depth
+//! (`mono`), or both.
 //!
-//! A person is one surface, in focus by default. What is as near and joined to them, as what they hold, is theirs; other
-//! people, further away, are not. With a mask alone, all else is infinitely far.
+//! The person is one surface, in focus by default. Objects as near as and connected to the person, such as held ones,
+//! belong to it; persons further away do not. With a mask alone, everything else is infinitely far.
 
 mod absence;
 mod aside;
@@ -32,17 +32,17 @@ use crate::compute::thread_pool::cores;
 use crate::frame::{ColorImage, DepthMap, Mask};
 use crate::network::{self, Runtime, Task};
 
-/// Of so many frames, what is beside persons is looked at in one, by effort: a room hardly moves. Persons are looked for in each:
-/// their outlines are those of one frame.
+/// Interval in frames of the depth network beside persons, per effort level: a room hardly moves. The person network
+/// runs in every frame, since outlines are valid for one frame only.
 const EVERY: [u64; 3] = [8, 4, 2];
-/// The same where no persons are looked for.
+/// The interval without a person network.
 const EVERY_ALONE: [u64; 3] = [2, 1, 1];
-/// What that costs.
+/// Relative cost of each effort level.
 const EFFORTS: [f64; EVERY.len()] = [0.5, 0.8, 1.0];
-/// Between two frames further apart than this, the first is no guide to the second.
+/// Frames further apart in media time are unrelated.
 const APART_NS: u64 = 500_000_000;
 
-/// Networks at work on the pictures of a camera.
+/// Depth from networks that run on a camera's pictures.
 pub struct SingleCamera {
     name: String,
     runtime: String,
@@ -52,22 +52,22 @@ pub struct SingleCamera {
     held: Held,
     spread: Spread,
     matting: MaskMatting,
-    /// As its place in [`EVERY`].
+    /// Index into [`EVERY`].
     effort: usize,
-    /// Whether pictures come in their own time: else what was seen of each does not depend on how fast this machine is.
+    /// Whether frames arrive in real time; if not, the results must not depend on this machine's speed.
     is_live: bool,
     frames: u64,
     last_ns: Option<u64>,
     turn: Turn,
-    /// Whether persons are to be found.
+    /// Whether a person network was loaded.
     has_subject: bool,
 }
 
 impl SingleCamera {
-    /// Loads the networks in these files, of which there is one at least.
+    /// Loads the networks in these files, at least one.
     ///
     /// # Errors
-    /// One cannot be loaded, or is none for its task.
+    /// A network cannot be loaded, or is for another task.
     pub fn open(
         matte: Option<&Path>,
         mono: Option<&Path>,
@@ -109,24 +109,23 @@ impl SingleCamera {
         Ok(networks)
     }
 
-    /// What they are, in a few words: their names, and what runs them.
+    /// Returns a short description: the networks' names, and their runtime.
     pub fn describe(&self) -> String {
         format!("{}, run by {}", self.name, self.runtime)
     }
 
-    /// Shows the networks a grey picture: what cannot be run is told before there are others.
+    /// Runs the networks on a grey picture, so that errors appear at the start.
     fn try_out(&mut self) -> Result<(), DepthError> {
         let Self { name, person, relief, .. } = self;
         let failed = |why| DepthError::Network { name: name.clone(), why };
         let mut grey = ColorImage::new(64, 48);
         grey.rgb.fill(128);
-        person.as_mut().map_or(Ok(()), |person| person.look(&grey, 0)).map_err(failed)?;
-        relief.as_mut().map_or(Ok(()), |relief| relief.look(&grey, None)).map_err(failed)
+        person.as_mut().map_or(Ok(()), |person| person.run(&grey, 0)).map_err(failed)?;
+        relief.as_mut().map_or(Ok(()), |relief| relief.run(&grey, None)).map_err(failed)
     }
 
-    /// Takes note of a picture, taken at this time: whose turn it is. One that was begun already goes on: nobody looks at it
-    /// twice.
-    fn begin(&mut self, time_ns: u64) {
+    /// Starts a picture at `time_ns`: decides which networks run. Does nothing if the picture was started already.
+    fn begin_picture(&mut self, time_ns: u64) {
         if self.last_ns == Some(time_ns) {
             return;
         }
@@ -136,31 +135,31 @@ impl SingleCamera {
             self.person.iter_mut().for_each(Person::forget);
             self.held.forget();
         }
-        // Alone, it is what outlines come from.
+        // Without a person network, depth is also the source of the outlines.
         let every = if self.has_subject { EVERY } else { EVERY_ALONE }[self.effort];
-        // A room hardly moves; a picture after a break is another one. Outlines are those of their frame.
-        let aside = self.is_live && self.has_subject && !apart && cores() > 1;
-        self.turn = Turn { persons: true, all: apart || self.frames.is_multiple_of(every), aside };
+        // Run depth in the background in real time, but not after a break, when the last result is of another scene.
+        let in_background = self.is_live && self.has_subject && !apart && cores() > 1;
+        self.turn = Turn { persons: true, all: apart || self.frames.is_multiple_of(every), in_background };
         self.frames += 1;
     }
 
-    /// Lets the network for persons look, if it is its turn; one that fails is turned off.
-    fn look_for_persons(&mut self, color: &ColorImage, time_ns: u64) {
-        // Nobody looks at one picture twice.
+    /// Runs the person network if it is due; disables it on an error.
+    fn run_person_network(&mut self, color: &ColorImage, time_ns: u64) {
+        // At most one run per picture.
         let is_turn = std::mem::take(&mut self.turn.persons);
-        if let Some(Err(why)) = self.person.as_mut().filter(|_| is_turn).map(|person| person.look(color, time_ns)) {
+        if let Some(Err(why)) = self.person.as_mut().filter(|_| is_turn).map(|person| person.run(color, time_ns)) {
             tracing::error!("{}: the person's network is turned off, and all is blurred: {why}", self.name);
             self.person = None;
         }
     }
 }
 
-/// Lets the network for depth look around what `mask` has, if it is its turn; one that fails is turned off.
-fn look_at_all(relief: &mut Option<Relief>, (name, turn): (&str, Turn), color: &ColorImage, mask: Option<&Mask>) {
+/// Runs the depth network around the subject in `mask` if it is due; disables it on an error.
+fn run_depth(relief: &mut Option<Relief>, (name, turn): (&str, Turn), color: &ColorImage, mask: Option<&Mask>) {
     let looked = relief.as_mut().map(|relief| match turn {
-        Turn { all: false, .. } => relief.take_in(false),
-        Turn { aside: true, .. } => relief.look_aside(color, mask),
-        Turn { aside: false, .. } => relief.look(color, mask),
+        Turn { all: false, .. } => relief.collect(false),
+        Turn { in_background: true, .. } => relief.run_async(color, mask),
+        Turn { in_background: false, .. } => relief.run(color, mask),
     });
     if let Some(Err(why)) = looked {
         tracing::error!("{name}: the network for depth is turned off: {why}");
@@ -168,27 +167,27 @@ fn look_at_all(relief: &mut Option<Relief>, (name, turn): (&str, Turn), color: &
     }
 }
 
-/// Whether it is the turn of a network.
+/// The networks that are due for the current picture.
 #[derive(Clone, Copy, Debug, Default)]
 struct Turn {
     persons: bool,
     all: bool,
-    /// Whether what it sees may be told some frames later.
-    aside: bool,
+    /// Whether the depth result may arrive some frames later.
+    in_background: bool,
 }
 
 impl DepthSource for SingleCamera {
     fn read(&mut self, Seen { stamp, color, .. }: Seen, map: &mut DepthMap) -> Result<(), DepthError> {
-        self.begin(stamp.time_ns);
-        self.look_for_persons(color, stamp.time_ns);
+        self.begin_picture(stamp.time_ns);
+        self.run_person_network(color, stamp.time_ns);
         let Self { name, person, absence, relief, held, spread, matting, turn, .. } = self;
         let mask = person.as_ref().map(Person::mask);
-        if mask.is_some_and(|mask| absence.is_news(mask, stamp.time_ns)) {
+        if mask.is_some_and(|mask| absence.should_report(mask, stamp.time_ns)) {
             tracing::warn!("{name}: nobody was found for {} s, and all is blurred", Absence::LONG_NS / 1_000_000_000);
         }
-        look_at_all(relief, (name, *turn), color, mask);
+        run_depth(relief, (name, *turn), color, mask);
         if let (Some(mask), Some(relief)) = (mask, &relief) {
-            held.join(mask, relief);
+            held.complete(mask, relief);
         }
         map.resize(color.width, color.height);
         map.matte.pixels.clear();
@@ -197,7 +196,7 @@ impl DepthSource for SingleCamera {
             Some(relief) if !self.has_subject => spread.over(relief.nearness(), relief.size(), map),
             _ => map.metres.fill(DepthMap::FAR_M),
         }
-        // Without a mask there is a subject only where there was to be one, and then nothing is in focus.
+        // If the person network was disabled, the subject stays set, so that everything is blurred.
         map.subject_m = (self.has_subject || relief.is_none()).then_some(DepthMap::SUBJECT_M);
         map.is_smooth = map.subject_m.is_none();
         if let Some(person) = &person {
@@ -208,7 +207,7 @@ impl DepthSource for SingleCamera {
     }
 
     fn efforts(&self) -> &'static [f64] {
-        // Without what is beside persons, there is nothing to save.
+        // Without a depth network, there is nothing to save.
         if self.relief.is_some() { &EFFORTS } else { &EFFORTS[EFFORTS.len() - 1..] }
     }
 
@@ -218,7 +217,7 @@ impl DepthSource for SingleCamera {
 
     fn set_effort(&mut self, effort: usize) {
         self.effort = effort.min(EVERY.len() - 1);
-        // Nobody saves effort but where time is short.
+        // Effort is only reduced when time is short, so frames arrive in real time.
         self.is_live = true;
     }
 
@@ -229,23 +228,23 @@ impl DepthSource for SingleCamera {
 
 impl Companion for SingleCamera {
     fn persons(&mut self, Seen { stamp, color, .. }: Seen) -> Option<&Mask> {
-        self.begin(stamp.time_ns);
-        self.look_for_persons(color, stamp.time_ns);
+        self.begin_picture(stamp.time_ns);
+        self.run_person_network(color, stamp.time_ns);
         self.person.as_ref().map(Person::mask)
     }
 
     fn measure_behind(&mut self, color: &ColorImage, mask: &Mask, map: &mut DepthMap) {
-        look_at_all(&mut self.relief, (&self.name, self.turn), color, Some(mask));
+        run_depth(&mut self.relief, (&self.name, self.turn), color, Some(mask));
         if let Some(relief) = &self.relief {
             self.spread.over(relief.behind(), relief.size(), map);
         }
     }
 }
 
-/// Distances of a picture from nearness in fewer pixels, linear between them.
+/// Upsamples nearness to distances, bilinearly.
 #[derive(Default)]
 struct Spread {
-    /// Per column of the picture, those of the nearness on both sides.
+    /// Per output column, the two source columns.
     columns: Vec<Tap>,
     row: Vec<f32>,
 }

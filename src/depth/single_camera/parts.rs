@@ -1,41 +1,41 @@
-//! The connected parts of a mask, of persons and of what is behind them.
+//! Connected components of a binary mask, foreground and background, by runs (union-find).
 
 use std::ops::Range;
 
-/// Pixels of one kind that are connected by their sides.
+/// A component, connected by sides (4-connected).
 #[derive(Clone, Copy, Debug)]
-pub struct Part {
-    /// The part that this one turned out to be joined to, or itself.
-    joined_to: u32,
+pub struct Component {
+    /// Parent in the union-find forest, or its own index.
+    parent: u32,
     pub is_person: bool,
-    /// How many pixels it has.
+    /// Number of pixels.
     pub pixels: u32,
-    /// In how many of them something is so that was asked for.
+    /// Number of pixels that satisfy the predicate.
     pub found: u32,
-    /// Whether it reaches the border of the picture.
+    /// Whether it touches the border of the picture.
     pub is_open: bool,
 }
 
-/// Pixels of one kind beside each other in a row.
+/// Consecutive pixels of one kind in a row.
 #[derive(Clone, Debug)]
 struct Run {
     pixels: Range<usize>,
-    part: u32,
+    component: u32,
 }
 
-/// Finds parts, run by run; owns the memory for it.
+/// Finds connected components; owns the memory for it.
 #[derive(Debug, Default)]
-pub struct Parts {
+pub struct Components {
     runs: Vec<Run>,
-    parts: Vec<Part>,
+    components: Vec<Component>,
 }
 
-impl Parts {
-    /// Finds the parts of a mask so wide, and in how many of the pixels of each `is_so`.
-    pub fn find(&mut self, persons: &[bool], width: usize, is_so: impl Fn(usize) -> bool) {
-        let Self { runs, parts } = self;
+impl Components {
+    /// Finds the components of a mask `width` pixels wide, and counts the pixels of each that satisfy `predicate`.
+    pub fn find(&mut self, persons: &[bool], width: usize, predicate: impl Fn(usize) -> bool) {
+        let Self { runs, components } = self;
         runs.clear();
-        parts.clear();
+        components.clear();
         let mut above = 0..0;
         for (y, row) in persons.chunks_exact(width.max(1)).enumerate() {
             let (began, mut start) = (runs.len(), y * width);
@@ -43,54 +43,58 @@ impl Parts {
                 let pixels = start..start + same.len();
                 start = pixels.end;
                 let at_side = pixels.start.is_multiple_of(width) || pixels.end.is_multiple_of(width);
-                let mut part = parts.len() as u32;
-                parts.push(Part {
-                    joined_to: part,
+                let mut component = components.len() as u32;
+                components.push(Component {
+                    parent: component,
                     is_person: same[0],
                     pixels: same.len() as u32,
-                    found: pixels.clone().map(|at| u32::from(is_so(at))).sum(),
+                    found: pixels.clone().map(|at| u32::from(predicate(at))).sum(),
                     is_open: at_side || y == 0 || (y + 1) * width == persons.len(),
                 });
-                // Those above that end before this one are past for all that follow, too.
+                // Runs above that end before this one are irrelevant to all later ones.
                 above.start +=
                     runs[above.clone()].iter().take_while(|run| run.pixels.end + width <= pixels.start).count();
                 let beside = runs[above.clone()].iter().take_while(|run| run.pixels.start + width < pixels.end);
                 for run in beside.filter(|run| persons[run.pixels.start] == same[0]) {
-                    part = join(parts, part, run.part);
+                    component = merge(components, component, run.component);
                 }
-                runs.push(Run { pixels, part });
+                runs.push(Run { pixels, component });
             }
             above = began..runs.len();
         }
     }
 
-    /// All parts.
-    pub fn all(&self) -> impl Iterator<Item = &Part> {
-        self.parts.iter().enumerate().filter(|(at, part)| part.joined_to as usize == *at).map(|(_, part)| part)
+    /// Iterates over all components.
+    pub fn all(&self) -> impl Iterator<Item = &Component> {
+        let roots = self.components.iter().enumerate().filter(|(at, component)| component.parent as usize == *at);
+        roots.map(|(_, component)| component)
     }
 
-    /// Pixels beside each other, and the part that they are of.
-    pub fn runs(&self) -> impl Iterator<Item = (Range<usize>, &Part)> {
-        self.runs.iter().map(|run| (run.pixels.clone(), &self.parts[whole(&self.parts, run.part) as usize]))
+    /// Iterates over all runs, with their components.
+    pub fn runs(&self) -> impl Iterator<Item = (Range<usize>, &Component)> {
+        self.runs.iter().map(|run| {
+            let root = root(&self.components, run.component);
+            (run.pixels.clone(), &self.components[root as usize])
+        })
     }
 }
 
-/// The part that this one is joined to in the end.
-fn whole(parts: &[Part], mut part: u32) -> u32 {
-    while parts[part as usize].joined_to != part {
-        part = parts[part as usize].joined_to;
+/// Returns the root of a component.
+fn root(components: &[Component], mut component: u32) -> u32 {
+    while components[component as usize].parent != component {
+        component = components[component as usize].parent;
     }
-    part
+    component
 }
 
-/// Joins two parts, and returns what they are together: the older one, so that chains stay short.
-fn join(parts: &mut [Part], a: u32, b: u32) -> u32 {
-    let (a, b) = (whole(parts, a), whole(parts, b));
+/// Merges two components and returns the root: the older one, so that chains stay short.
+fn merge(components: &mut [Component], a: u32, b: u32) -> u32 {
+    let (a, b) = (root(components, a), root(components, b));
     let (old, young) = (a.min(b), a.max(b));
     if old != young {
-        let Part { pixels, found, is_open, .. } = parts[young as usize];
-        parts[young as usize].joined_to = old;
-        let all = &mut parts[old as usize];
+        let Component { pixels, found, is_open, .. } = components[young as usize];
+        components[young as usize].parent = old;
+        let all = &mut components[old as usize];
         (all.pixels, all.found, all.is_open) = (all.pixels + pixels, all.found + found, all.is_open || is_open);
     }
     old
@@ -112,10 +116,10 @@ mod tests {
             "....##....",
         ];
         let persons: Vec<bool> = picture.iter().flat_map(|row| row.bytes().map(|b| b == b'#')).collect();
-        let mut parts = Parts::default();
-        parts.find(&persons, 10, |at| at % 10 < 5);
+        let mut components = Components::default();
+        components.find(&persons, 10, |at| at % 10 < 5);
         let mut found: Vec<_> =
-            parts.all().map(|part| (part.is_person, part.pixels, part.found, part.is_open)).collect();
+            components.all().map(|part| (part.is_person, part.pixels, part.found, part.is_open)).collect();
         found.sort_unstable();
         let background = persons.iter().filter(|is| !**is).count() as u32 - 1;
         let left = (0..60).filter(|at| at % 10 < 5 && !persons[*at]).count() as u32;
@@ -130,7 +134,7 @@ mod tests {
             ]
         );
         let covered: usize =
-            parts.runs().map(|(pixels, part)| pixels.filter(|&at| persons[at] == part.is_person).count()).sum();
+            components.runs().map(|(pixels, part)| pixels.filter(|&at| persons[at] == part.is_person).count()).sum();
         assert_eq!(covered, persons.len());
     }
 }

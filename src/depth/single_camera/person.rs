@@ -1,23 +1,23 @@
-//! Where a person is: a network's mask, steady where it is undecided.
+//! Person mask from a network, temporally smoothed where it is unsure.
 
 use super::decision::Decision;
 use super::feed::{Answer, Feed};
 use crate::frame::{ColorImage, Mask};
 
-/// How far an undecided pixel stays what it was in the frame before; less where frames in between are missing.
+/// Weight of the previous frame for an undecided pixel at 30 frames a second; it decreases with longer gaps.
 const STEADINESS: f32 = 0.8;
 const FRAME_NS: f32 = 1e9 / 30.0;
 
-/// Finds persons, from frame to frame.
+/// Computes the person mask from frame to frame.
 pub struct Person {
     feed: Feed,
-    /// What the network says, steady where it is undecided.
+    /// The network's mask after temporal smoothing.
     steady: Mask,
     decision: Decision,
     mask: Mask,
-    /// Whether the numbers are those before the last step of a network: they were seen beyond 0 to 1.
+    /// Whether the network outputs logits: values outside of 0 to 1 were seen.
     is_raw: bool,
-    /// When the picture before was taken.
+    /// When the previous picture was taken.
     seen_ns: Option<u64>,
 }
 
@@ -33,36 +33,36 @@ impl Person {
         }
     }
 
-    /// Forgets the frame before: the next one is another scene.
+    /// Resets the state, for a new scene.
     pub fn forget(&mut self) {
         self.feed.forget();
         self.decision.forget();
         self.seen_ns = None;
     }
 
-    /// The mask of the last picture.
+    /// Returns the mask of the last picture.
     pub fn mask(&self) -> &Mask {
         &self.mask
     }
 
-    /// Finds the mask of a picture, taken at this time; undecided pixels are averaged with those of the one before, and decided ones not, so
-    /// that nothing lags (as MediaPipe has it).
+    /// Computes the mask of a picture taken at `time_ns`. Undecided pixels are averaged with the previous frame's and
+    /// decided ones not, so that nothing lags (as in MediaPipe).
     ///
     /// # Errors
-    /// As for [`Feed::see`].
-    pub fn look(&mut self, color: &ColorImage, time_ns: u64) -> Result<(), String> {
-        let answer = self.feed.see(color)?;
+    /// See [`Feed::infer`].
+    pub fn run(&mut self, color: &ColorImage, time_ns: u64) -> Result<(), String> {
+        let answer = self.feed.infer(color)?;
         let pixels = answer.size.0 * answer.size.1;
-        let beyond = |share: f32| !(-0.01..=1.01).contains(&share);
+        let beyond = |alpha: f32| !(-0.01..=1.01).contains(&alpha);
         self.is_raw |= (0..pixels).any(|pixel| beyond(answer.at(pixel, answer.channels - 1)));
         let size = (answer.size.0 as u32, answer.size.1 as u32);
         let before_ns = self.seen_ns.filter(|_| (self.steady.width, self.steady.height) == size);
         let steadiness = before_ns.map_or(0.0, |before_ns| steadiness(time_ns.abs_diff(before_ns)));
         self.steady.resize(size.0, size.1);
-        for (pixel, share) in self.steady.share.iter_mut().enumerate() {
-            let new = share_of(&answer, pixel, self.is_raw);
+        for (pixel, alpha) in self.steady.share.iter_mut().enumerate() {
+            let new = alpha_of(&answer, pixel, self.is_raw);
             let keeps = steadiness * uncertainty(new);
-            *share = new + (*share - new) * keeps;
+            *alpha = new + (*alpha - new) * keeps;
         }
         self.seen_ns = Some(time_ns);
         self.decision.decide(&self.steady, time_ns, &mut self.mask);
@@ -70,13 +70,13 @@ impl Person {
     }
 }
 
-/// How far an undecided pixel stays what it was so long ago: who moves is elsewhere by then.
+/// Returns the weight of a previous frame so long ago: a person has moved by then.
 fn steadiness(gap_ns: u64) -> f32 {
     STEADINESS.powf((gap_ns as f32 / FRAME_NS).max(1.0))
 }
 
-/// The share of a person: of two channels, the second is theirs.
-fn share_of(answer: &Answer, pixel: usize, is_raw: bool) -> f32 {
+/// Returns the mask value: of two channels, the second one is the person.
+fn alpha_of(answer: &Answer, pixel: usize, is_raw: bool) -> f32 {
     let own = answer.at(pixel, answer.channels - 1);
     match (is_raw, answer.channels) {
         (false, _) => own.clamp(0.0, 1.0),
@@ -89,9 +89,10 @@ fn sigmoid(value: f32) -> f32 {
     1.0 / (1.0 + (-value).exp())
 }
 
-/// How undecided a share is: 1 at one half, 0 at 0 and at 1. Binary entropy is close to this parabola's root.
-fn uncertainty(share: f32) -> f32 {
-    let off = 2.0 * share - 1.0;
+/// Returns the uncertainty of a mask value: 1 at one half, 0 at 0 and 1. Approximates binary entropy by a power of a
+/// parabola.
+fn uncertainty(alpha: f32) -> f32 {
+    let off = 2.0 * alpha - 1.0;
     (1.0 - off * off).max(0.0).powf(0.75)
 }
 
@@ -109,9 +110,9 @@ mod tests {
     #[test]
     fn uncertainty_is_that_of_a_coin() {
         for step in 1..100 {
-            let share = step as f32 / 100.0;
-            let entropy = -share * share.log2() - (1.0 - share) * (1.0 - share).log2();
-            assert!((uncertainty(share) - entropy).abs() < 0.03, "{share}: {} {entropy}", uncertainty(share));
+            let alpha = step as f32 / 100.0;
+            let entropy = -alpha * alpha.log2() - (1.0 - alpha) * (1.0 - alpha).log2();
+            assert!((uncertainty(alpha) - entropy).abs() < 0.03, "{alpha}: {} {entropy}", uncertainty(alpha));
         }
         assert_eq!((uncertainty(0.0), uncertainty(1.0), uncertainty(0.5)), (0.0, 0.0, 1.0));
     }

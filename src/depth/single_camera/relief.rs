@@ -1,50 +1,50 @@
-//! How near everything is: a network's relative inverse depth, and what it is measured against.
+//! Normalises a network's relative inverse depth.
 //!
-//! Its numbers grow with nearness, in a scale and from a zero that wander from frame to frame. Two anchors of the picture
-//! itself do away with both: the subject, and what is farthest.
+//! The network's values increase with nearness, but their scale and offset vary from frame to frame. Two anchors in the
+//! picture fix both: the subject, and the farthest surface.
 
-use super::aside::Aside;
+use super::aside::Worker;
 use super::feed::Feed;
 use crate::depth::tap::nearest;
 use crate::frame::{ColorImage, Mask};
 
-/// Of all numbers, sorted, this share is farther than what counts as the farthest, or nearer than the nearest.
+/// Fraction of the sorted values that is ignored at each end.
 const OUTLIERS: f32 = 0.03;
-/// How far the network's outlines are off, in its pixels: so far around a person nothing is told of what is behind.
+/// Uncertainty of the network's outlines, in its pixels: within it around a person, the background is unknown.
 const MARGIN_PX: usize = 7;
-/// What is around a person is carried on behind them over so many pixels and more.
+/// Radius of the box filter that extends the surroundings behind a person, in pixels.
 const SPREAD_PX: usize = 24;
-/// Nothing behind a subject is nearer than this: it would be the subject's own.
+/// Upper bound of the nearness behind a subject, so that it stays background.
 const NEAREST_BEHIND: f32 = 0.9;
 
-/// Nearness from frame to frame.
+/// Relative depth from frame to frame.
 pub struct Relief {
-    /// What was found last.
+    /// The latest result.
     found: Found,
-    /// Away while the thread has it.
+    /// `None` while the worker thread has it.
     finder: Option<Box<Finder>>,
-    aside: Option<Aside<Box<Finder>>>,
+    worker: Option<Worker<Box<Finder>>>,
 }
 
-/// How near everything in a picture is.
+/// The result for one picture.
 #[derive(Default)]
 struct Found {
     /// Columns and rows.
     size: (usize, usize),
-    /// Relative inverse depth: 1 at the subject, 0 at what is farthest.
+    /// Relative inverse depth: 1 at the subject, 0 at the farthest surface.
     nearness: Vec<f32>,
-    /// The same of what is behind the subject.
+    /// Relative inverse depth with the subject removed.
     behind: Vec<f32>,
 }
 
-/// Finds it.
+/// Computes relative depth; moved to the worker thread and back.
 struct Finder {
     feed: Feed,
     found: Found,
     outcome: Result<(), String>,
-    /// The mask of the subject in the picture that was shown; nobody's where it is empty.
+    /// The subject's mask in the current picture; empty without a subject.
     mask: Mask,
-    /// How far each is the subject's.
+    /// Mask value of each pixel, at the network's resolution.
     subject: Vec<f32>,
     known: Vec<f32>,
     spread: Vec<f32>,
@@ -65,7 +65,7 @@ impl Relief {
             sorted: Vec::new(),
             line: Vec::new(),
         };
-        Self { found: Found::default(), finder: Some(Box::new(finder)), aside: None }
+        Self { found: Found::default(), finder: Some(Box::new(finder)), worker: None }
     }
 
     /// Columns and rows.
@@ -73,65 +73,65 @@ impl Relief {
         self.found.size
     }
 
-    /// Relative inverse depth of the picture that was seen last, 1 at the subject and 0 at what is farthest.
+    /// Returns the relative inverse depth of the latest picture: 1 at the subject, 0 at the farthest surface.
     pub fn nearness(&self) -> &[f32] {
         &self.found.nearness
     }
 
-    /// The same, with the subject away: below 1.
+    /// Returns the relative inverse depth with the subject removed, below 1.
     pub fn behind(&self) -> &[f32] {
         &self.found.behind
     }
 
-    /// Finds the nearness of all that a picture shows, the subject being what `mask` has, or else what is nearest.
+    /// Computes the relative depth of a picture. The subject is in `mask`; without a mask, it is the nearest surface.
     ///
     /// # Errors
-    /// As for [`Feed::see`].
-    pub fn look(&mut self, color: &ColorImage, mask: Option<&Mask>) -> Result<(), String> {
-        self.take_in(true)?;
+    /// See [`Feed::infer`].
+    pub fn run(&mut self, color: &ColorImage, mask: Option<&Mask>) -> Result<(), String> {
+        self.collect(true)?;
         let Some(mut finder) = self.finder.take() else { return Ok(()) };
-        finder.show(color, mask);
+        finder.set_picture(color, mask);
         finder.find();
-        self.take_back(finder)
+        self.store(finder)
     }
 
-    /// The same in a thread of its own, once anything was found: [`Self::take_in`] has it later. Nothing is begun while
-    /// another picture is under way.
+    /// Computes it on the worker thread, once there is a first result: [`Self::collect`] collects it later. Does
+    /// nothing while another picture is in progress.
     ///
     /// # Errors
-    /// As for [`Feed::see`].
-    pub fn look_aside(&mut self, color: &ColorImage, mask: Option<&Mask>) -> Result<(), String> {
+    /// See [`Feed::infer`].
+    pub fn run_async(&mut self, color: &ColorImage, mask: Option<&Mask>) -> Result<(), String> {
         if self.found.nearness.is_empty() {
-            return self.look(color, mask);
+            return self.run(color, mask);
         }
-        self.take_in(false)?;
+        self.collect(false)?;
         let Some(mut finder) = self.finder.take() else { return Ok(()) };
-        finder.show(color, mask);
-        if self.aside.is_none() {
-            self.aside = Aside::new("inference", |finder: &mut Box<Finder>| finder.find());
+        finder.set_picture(color, mask);
+        if self.worker.is_none() {
+            self.worker = Worker::new("inference", |finder: &mut Box<Finder>| finder.find());
         }
-        let given = match &self.aside {
-            Some(aside) => aside.give(finder),
+        let given = match &self.worker {
+            Some(worker) => worker.submit(finder),
             None => Err(finder),
         };
         given.or_else(|mut finder| {
             finder.find();
-            self.take_back(finder)
+            self.store(finder)
         })
     }
 
-    /// Takes in what the thread has found, or will have with `wait`.
+    /// Collects the thread's result if it is done; waits for it if `wait`.
     ///
     /// # Errors
-    /// As for [`Feed::see`].
-    pub fn take_in(&mut self, wait: bool) -> Result<(), String> {
-        match self.aside.as_ref().filter(|_| self.finder.is_none()).map(|aside| aside.take(wait)).transpose()? {
-            Some(Some(finder)) => self.take_back(finder),
+    /// See [`Feed::infer`].
+    pub fn collect(&mut self, wait: bool) -> Result<(), String> {
+        match self.worker.as_ref().filter(|_| self.finder.is_none()).map(|worker| worker.collect(wait)).transpose()? {
+            Some(Some(finder)) => self.store(finder),
             _ => Ok(()),
         }
     }
 
-    fn take_back(&mut self, mut finder: Box<Finder>) -> Result<(), String> {
+    fn store(&mut self, mut finder: Box<Finder>) -> Result<(), String> {
         let outcome = std::mem::replace(&mut finder.outcome, Ok(()));
         if outcome.is_ok() {
             std::mem::swap(&mut self.found, &mut finder.found);
@@ -142,8 +142,8 @@ impl Relief {
 }
 
 impl Finder {
-    fn show(&mut self, color: &ColorImage, mask: Option<&Mask>) {
-        self.feed.show(color);
+    fn set_picture(&mut self, color: &ColorImage, mask: Option<&Mask>) {
+        self.feed.set_picture(color);
         match mask {
             Some(mask) => self.mask.clone_from(mask),
             None => self.mask.resize(0, 0),
@@ -165,22 +165,22 @@ impl Finder {
         nearness.extend((0..pixels).map(|pixel| answer.at(pixel, 0)));
         subject.clear();
         let of_mask = (mask.width as usize, mask.height as usize);
-        let share = |at: usize| if of_mask.0 == 0 { 0.0 } else { mask.share[nearest(at, answer.size, of_mask)] };
-        subject.extend((0..pixels).map(share));
+        let alpha = |at: usize| if of_mask.0 == 0 { 0.0 } else { mask.share[nearest(at, answer.size, of_mask)] };
+        subject.extend((0..pixels).map(alpha));
         self.measure();
-        self.look_behind();
+        self.extrapolate_behind();
     }
 
-    /// Scales the network's numbers by the two anchors.
+    /// Scales the network's values by the two anchors.
     fn measure(&mut self) {
-        let Self { found: Found { nearness, .. }, subject: shares, sorted, .. } = self;
-        let mut anchor = |share: f32, counts: &dyn Fn(usize) -> bool| {
+        let Self { found: Found { nearness, .. }, subject: alphas, sorted, .. } = self;
+        let mut anchor = |quantile: f32, counts: &dyn Fn(usize) -> bool| {
             sorted.clear();
             sorted.extend(nearness.iter().enumerate().filter(|(at, _)| counts(*at)).map(|(_, &value)| value));
-            let at = (share * sorted.len().saturating_sub(1) as f32) as usize;
+            let at = (quantile * sorted.len().saturating_sub(1) as f32) as usize;
             (!sorted.is_empty()).then(|| *sorted.select_nth_unstable_by(at, f32::total_cmp).1)
         };
-        let person = |at: usize| shares[at] > 0.9;
+        let person = |at: usize| alphas[at] > 0.9;
         let farthest = anchor(OUTLIERS, &|at| !person(at)).or_else(|| anchor(OUTLIERS, &|_| true));
         let subject = anchor(0.5, &person).or_else(|| anchor(1.0 - OUTLIERS, &|_| true));
         let (Some(farthest), Some(subject)) = (farthest, subject) else { return };
@@ -188,17 +188,17 @@ impl Finder {
         nearness.iter_mut().for_each(|value| *value = (*value - farthest) * scale);
     }
 
-    /// What is around the subject, carried on behind it.
-    fn look_behind(&mut self) {
+    /// Extrapolates the surroundings behind the subject by normalised convolution.
+    fn extrapolate_behind(&mut self) {
         let Self { found: Found { size, nearness, behind }, subject, known, spread, line, .. } = self;
         let size = *size;
         behind.clone_from(nearness);
-        if subject.iter().all(|&share| share < 0.5) {
+        if subject.iter().all(|&alpha| alpha < 0.5) {
             return;
         }
         known.clear();
-        known.extend(subject.iter().map(|&share| f32::from(u8::from(share < 0.5))));
-        // Near an outline the numbers of both surfaces are mixed.
+        known.extend(subject.iter().map(|&alpha| f32::from(u8::from(alpha < 0.5))));
+        // Near an outline, the values mix both surfaces.
         erode(known, line, size);
         for (value, known) in behind.iter_mut().zip(&*known) {
             *value *= known;
@@ -207,7 +207,7 @@ impl Finder {
         let elsewhere = total(behind) / total(known).max(1.0);
         spread.clone_from(known);
         for plane in [&mut *behind, &mut *spread] {
-            // A mean over a square, twice: smooth, and as far as a person is wide.
+            // Two box filters: smooth, and as wide as a person.
             for _ in 0..2 {
                 mean(plane, line, size);
             }
@@ -223,7 +223,7 @@ impl Finder {
     }
 }
 
-/// Calls `change` with every row of a plane and then with every column, each as a line.
+/// Calls `change` with every row of a plane, then with every column.
 fn by_lines(
     plane: &mut [f32],
     line: &mut Vec<f32>,
@@ -242,7 +242,7 @@ fn by_lines(
     }
 }
 
-/// Where anything within [`MARGIN_PX`] is 0, all becomes 0.
+/// Sets to 0 everything within [`MARGIN_PX`] of a 0.
 fn erode(plane: &mut [f32], line: &mut Vec<f32>, size: (usize, usize)) {
     by_lines(plane, line, size, |line, set| {
         let mut last = None;
@@ -258,15 +258,15 @@ fn erode(plane: &mut [f32], line: &mut Vec<f32>, size: (usize, usize)) {
     });
 }
 
-/// The mean of every pixel and those within [`SPREAD_PX`], row by row and column by column.
+/// Applies a box filter of radius [`SPREAD_PX`], rows then columns.
 fn mean(plane: &mut [f32], line: &mut Vec<f32>, size: (usize, usize)) {
     by_lines(plane, line, size, |line, set| {
-        let (mut sum, reach) = (0.0f64, SPREAD_PX.min(line.len() - 1));
-        line[..reach].iter().for_each(|&value| sum += f64::from(value));
+        let (mut sum, radius) = (0.0f64, SPREAD_PX.min(line.len() - 1));
+        line[..radius].iter().for_each(|&value| sum += f64::from(value));
         for at in 0..line.len() {
-            sum += line.get(at + reach).map_or(0.0, |&value| f64::from(value));
-            set(at, (sum / (2 * reach + 1) as f64) as f32);
-            sum -= at.checked_sub(reach).map_or(0.0, |left| f64::from(line[left]));
+            sum += line.get(at + radius).map_or(0.0, |&value| f64::from(value));
+            set(at, (sum / (2 * radius + 1) as f64) as f32);
+            sum -= at.checked_sub(radius).map_or(0.0, |left| f64::from(line[left]));
         }
     });
 }

@@ -1,9 +1,9 @@
 //! The epipolar check: whether two pictures are a rectified pair, with the same point in the same row, further to the
 //! left in the right picture.
 //!
-//! Distinctive points (Shi and Tomasi, *Good features to track*, CVPR 1994) of the left picture are looked for in the
-//! right one by normalised correlation, in rows above and below and on both sides: first at half resolution, then to
-//! parts of a pixel at the full one. Only points that match in one place, and in both directions, count.
+//! Distinctive points (Shi and Tomasi, *Good features to track*, CVPR 1994) of the left picture are searched in the
+//! right one by normalised cross-correlation, in rows above and below and on both sides: first at half resolution, then
+//! with subpixel accuracy at full resolution. Only unique and mutual matches count.
 
 mod search;
 
@@ -13,54 +13,54 @@ use pulp::Arch;
 
 use super::MatchError;
 use crate::frame::GrayImage;
-use search::{Coarse, Search, corners, halved, refined};
+use search::{Coarse, Search, find_corners, halve, refine};
 
-/// Fewer matches tell nothing.
-const LEAST_MATCHES: u32 = 12;
-/// Rows of a rectified pair agree this well in the median, in pixels.
-const MOST_OFF_PX: f32 = 0.75;
-/// Six of ten points of a rectified pair lie this near to that median, in pixels.
-const MOST_SPREAD_PX: f32 = 1.0;
-/// Disparities of what is far are around 0; those beyond this count as negative.
+/// With fewer matches the verdict is unclear.
+const MIN_MATCHES: u32 = 12;
+/// Largest median row offset of a rectified pair, in pixels.
+const MAX_ROW_OFFSET_PX: f32 = 0.75;
+/// Largest deviation from that median of six of ten points of a rectified pair, in pixels.
+const MAX_ROW_SPREAD_PX: f32 = 1.0;
+/// Disparities of distant points are around 0; those below this count as negative.
 const NEGATIVE_PX: f32 = -1.0;
-/// A disparity has so many points, and so large a share of all, at it or above.
-const SOME_POINTS: usize = 4;
-const SOME_SHARE: f32 = 0.015;
-/// With more negative disparities than this share, the eyes are exchanged.
-const MOST_NEGATIVE: f32 = 0.7;
+/// The largest disparity is one that at least this many points, and this fraction of all, have or exceed.
+const MIN_DISPARITY_POINTS: usize = 4;
+const MIN_DISPARITY_FRACTION: f32 = 0.015;
+/// With a larger fraction of negative disparities, left and right are swapped.
+const MAX_NEGATIVE_FRACTION: f32 = 0.7;
 
-/// What the points that were found in both pictures say.
+/// Statistics of the points found in both pictures.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct PairCheck {
     /// Points found in both pictures.
     pub matches: u32,
-    /// Row in the right picture less that in the left one, in pixels: the median.
+    /// Median of the row in the right picture minus that in the left one, in pixels.
     pub vertical_px: f32,
-    /// Distance from that median within which six of ten points lie, in pixels.
+    /// Deviation from that median within which six of ten points lie, in pixels.
     pub vertical_spread_px: f32,
-    /// Share of points with a negative disparity: further to the right in the right picture.
+    /// Fraction of points with a negative disparity: further to the right in the right picture.
     pub negative_share: f32,
-    /// The largest disparity that some points have, in pixels; 0 where there are none.
+    /// The largest disparity that several points have, in pixels; 0 without points.
     pub largest_px: f32,
-    /// Whether both pictures are one.
+    /// Whether both pictures are identical.
     pub is_one: bool,
 }
 
-/// What a pair is.
+/// Verdict on a pair.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Verdict {
-    /// Rows agree, and the left picture is that of the left eye.
+    /// Rows match, and left and right are not swapped.
     Rectified,
-    /// Rows do not agree.
+    /// Rows do not match.
     RowsOff {
-        /// Distance of the rows within which most points lie, in pixels.
+        /// Row offset within which most points lie, in pixels.
         px: f32,
     },
-    /// Rows agree, and the left picture is that of the right eye.
+    /// Rows match, but left and right are swapped.
     Swapped,
-    /// One picture was given for both eyes.
+    /// Both pictures are identical.
     Same,
-    /// Too little was found to tell.
+    /// Too few points were found.
     Unclear {
         /// Points found in both pictures.
         matches: u32,
@@ -68,16 +68,16 @@ pub enum Verdict {
 }
 
 impl PairCheck {
-    /// What this makes the pair.
+    /// Derives the verdict from the statistics.
     pub fn verdict(&self) -> Verdict {
         let Self { matches, vertical_px, vertical_spread_px, negative_share, is_one, .. } = *self;
-        if matches < LEAST_MATCHES {
+        if matches < MIN_MATCHES {
             Verdict::Unclear { matches }
         } else if is_one {
             Verdict::Same
-        } else if vertical_px.abs() > MOST_OFF_PX || vertical_spread_px > MOST_SPREAD_PX {
+        } else if vertical_px.abs() > MAX_ROW_OFFSET_PX || vertical_spread_px > MAX_ROW_SPREAD_PX {
             Verdict::RowsOff { px: vertical_px.abs() + vertical_spread_px }
-        } else if negative_share > MOST_NEGATIVE {
+        } else if negative_share > MAX_NEGATIVE_FRACTION {
             Verdict::Swapped
         } else {
             Verdict::Rectified
@@ -97,22 +97,22 @@ impl fmt::Display for Verdict {
             Self::Unclear { matches } => write!(
                 f,
                 "too little texture to tell whether the pair is rectified: {matches} points were found in both \
-                 pictures, and {LEAST_MATCHES} are needed"
+                 pictures, and {MIN_MATCHES} are needed"
             ),
         }
     }
 }
 
-/// Looks for points of `left` in `right`, at disparities from `-disparities` to `disparities` and in rows up to 24
-/// pixels away. For once a run: it allocates.
+/// Searches for points of `left` in `right`, at disparities from `-disparities` to `disparities` and in rows up to 24
+/// pixels away. It allocates: call it once a run, not per frame.
 ///
 /// # Errors
-/// The pictures are not of one size.
+/// Fails if the pictures differ in size.
 pub fn check(left: &GrayImage, right: &GrayImage, disparities: u32) -> Result<PairCheck, MatchError> {
     if left.size() != right.size() {
         return Err(MatchError::Sizes { left: left.size(), right: right.size() });
     }
-    let halves = [halved(left), halved(right)];
+    let halves = [halve(left), halve(right)];
     let coarse = halves.each_ref().map(|half| Coarse::new(half, disparities.min(left.width) as i32 / 2));
     let arch = Arch::new();
     let mut scores = Vec::new();
@@ -120,37 +120,37 @@ pub fn check(left: &GrayImage, right: &GrayImage, disparities: u32) -> Result<Pa
         arch.dispatch(Search { from: &halves[from], into: &coarse[1 - from], at, scores: &mut scores })
     };
     let mut moved_px: Vec<(f32, f32)> = Vec::new();
-    for (x, y) in corners(&halves[0]) {
+    for (x, y) in find_corners(&halves[0]) {
         let Some((dx, dy)) = search(0, (x, y)) else { continue };
         let Some((back_dx, back_dy)) = search(1, (x + dx, y + dy)) else { continue };
-        // Only mutual best matches, within a pixel of the half size.
+        // Only mutual best matches, within a pixel at half resolution.
         if (dx + back_dx).abs() <= 1 && (dy + back_dy).abs() <= 1 {
-            moved_px.extend(refined(left, right, (2 * x, 2 * y), (2 * dx, 2 * dy)));
+            moved_px.extend(refine(left, right, (2 * x, 2 * y), (2 * dx, 2 * dy)));
         }
     }
-    // Where nothing can be matched nothing is known of them either.
+    // Without matches the verdict is unclear even for identical pictures.
     Ok(PairCheck { is_one: !moved_px.is_empty() && left.luma == right.luma, ..summary(&moved_px) })
 }
 
-/// Statistics of the moves (across, down) of all matched points, from left to right picture.
+/// Computes statistics of the displacements (across, down) of all matched points, from left to right picture.
 fn summary(moved_px: &[(f32, f32)]) -> PairCheck {
     if moved_px.is_empty() {
         return PairCheck::default();
     }
-    let quantile = |values: &mut Vec<f32>, share: f32| {
-        let at = (values.len() as f32 * share) as usize;
+    let quantile = |values: &mut Vec<f32>, fraction: f32| {
+        let at = (values.len() as f32 * fraction) as usize;
         *values.select_nth_unstable_by(at, f32::total_cmp).1
     };
     let mut down_px: Vec<f32> = moved_px.iter().map(|&(_, down_px)| down_px).collect();
     let vertical_px = quantile(&mut down_px, 0.5);
     down_px.iter_mut().for_each(|down_px| *down_px = (*down_px - vertical_px).abs());
-    // A disparity is a move to the left: the negated move across.
+    // A disparity is a displacement to the left, hence the sign.
     let negative = moved_px.iter().filter(|&&(across_px, _)| -across_px < NEGATIVE_PX).count();
     let mut disparities_px: Vec<f32> = moved_px.iter().map(|&(across_px, _)| -across_px).collect();
     disparities_px.sort_unstable_by(|a, b| b.total_cmp(a));
-    let some = SOME_POINTS.max((SOME_SHARE * moved_px.len() as f32) as usize);
+    let rank = MIN_DISPARITY_POINTS.max((MIN_DISPARITY_FRACTION * moved_px.len() as f32) as usize);
     PairCheck {
-        largest_px: disparities_px.get(some - 1).map_or(0.0, |largest_px| largest_px.max(0.0)),
+        largest_px: disparities_px.get(rank - 1).map_or(0.0, |largest_px| largest_px.max(0.0)),
         matches: moved_px.len() as u32,
         vertical_px,
         vertical_spread_px: quantile(&mut down_px, 0.6),

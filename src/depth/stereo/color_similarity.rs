@@ -1,9 +1,9 @@
-//! Occlusions at the border, filled by colour similarity: what has the colour of a surface that both eyes see belongs
-//! to it.
+//! Fills occlusions at the border by colour similarity: a pixel with the colour of a surface that both cameras see
+//! belongs to that surface.
 //!
-//! The left border is filled along the picture ([`super::border`]), which misses what stands before it and touches
-//! nothing that the right eye sees: leaves before a wall become wall. Where the known pixels of a colour nearly all lie
-//! on one surface, so do the border's, and where their disparity says otherwise, they take the surface's.
+//! The left border is filled along the picture ([`super::border`]), which misses objects that stand in front of it and
+//! touch nothing that the right camera sees: leaves before a wall become wall. If nearly all known pixels of a colour
+//! lie on one surface, border pixels of that colour do, too, and take its disparity where theirs differs.
 
 use std::ops::AddAssign;
 
@@ -11,33 +11,33 @@ use super::Settings;
 use super::fixed::{ONE, UNKNOWN, is_known};
 use crate::frame::ColorImage;
 
-/// Disparities this far apart, in fixed point, are not of one surface.
-const APART: u16 = 8 * ONE;
-/// Classes of disparities, each [`APART`] wide.
-const CLASSES: usize = Settings::MOST_DISPARITIES as usize * ONE as usize / APART as usize + 1;
-/// Colours that are told apart.
+/// Disparities this far apart, in fixed point, belong to different surfaces.
+const MIN_GAP: u16 = 8 * ONE;
+/// Number of disparity bins, each [`MIN_GAP`] wide.
+const BINS: usize = Settings::MOST_DISPARITIES as usize * ONE as usize / MIN_GAP as usize + 1;
+/// Number of colour bins.
 const COLORS: usize = 1 << 12;
-/// Colours are learned from the columns up to this many times the border's widest.
+/// Colours are learned from this many times as many columns as the border has at its widest.
 const LEARNED_WIDTHS: usize = 4;
-/// Known pixels that a colour needs to stand for a surface.
-const LEAST_PIXELS: u32 = 16;
-/// A colour stands for a surface that has at least this many eighths of its pixels.
-const MOST_OF_8: u32 = 7;
-/// Of the nine pixels at this spacing around one, itself included, more than half must be of its surface.
-const AROUND_PX: usize = 2;
+/// Known pixels that a colour needs to identify a surface.
+const MIN_PIXELS: u32 = 16;
+/// A colour identifies a surface with at least this many eighths of its pixels.
+const MIN_EIGHTHS: u32 = 7;
+/// Spacing in pixels of the 3x3 samples around a pixel, of which more than half must be on its surface.
+const SPACING_PX: usize = 2;
 
-/// Colours of the pixels of a map.
+/// The colours of a map's pixels.
 #[derive(Clone, Copy)]
 pub struct Colors<'a> {
     /// The picture, as large as the map times `every`.
     pub image: &'a ColorImage,
-    /// The map's pixels stand for the first of so many columns and rows.
+    /// Step in columns and rows of the picture from one pixel of the map to the next.
     pub every: usize,
 }
 
 impl Colors<'_> {
-    /// Which of the [`COLORS`] a pixel has: 5 bits for each difference of two channels, which shading changes little,
-    /// and 2 for the brightness.
+    /// Returns the colour bin of a pixel: 5 bits for each of two channel differences, which shading changes little, and
+    /// 2 for the brightness.
     fn at(&self, x: usize, y: usize) -> usize {
         let at = 3 * self.every * (y * self.image.width as usize + x);
         let [red, green, blue] = [0, 1, 2].map(|channel| usize::from(self.image.rgb[at + channel]));
@@ -45,14 +45,14 @@ impl Colors<'_> {
     }
 }
 
-/// Whether one of the [`COLORS`] is none: all channels are about the same. Greys are everywhere, in grey pictures above
-/// all, and say nothing.
+/// Whether a colour bin is grey, with all channels about equal. Greys are everywhere, above all in grey pictures, and
+/// identify no surface.
 fn is_grey(color: usize) -> bool {
-    // Differences are shifted to be positive: 15 and 16 are those around 0.
+    // Differences are shifted to be positive: bins 15 and 16 are those around 0.
     [color >> 7, color >> 2 & 31].iter().all(|difference| [15, 16].contains(difference))
 }
 
-/// How many pixels, and the sum of their disparities in 1/8 px, which fits for pictures of 8 million pixels.
+/// A number of pixels and the sum of their disparities in 1/8 px, which fits for pictures of 8 million pixels.
 #[derive(Clone, Copy, Debug, Default)]
 struct Tally {
     count: u32,
@@ -74,21 +74,21 @@ impl AddAssign for Tally {
     }
 }
 
-/// Fills by colour; owns the memory for it.
+/// Fills by colour; owns its buffers.
 #[derive(Debug, Default)]
 pub struct ColorSimilarity {
-    /// Known pixels by colour and class of disparity.
-    tallies: Vec<[Tally; CLASSES]>,
-    /// Known pixels by colour.
+    /// Known pixels by colour and disparity bin.
+    tallies: Vec<[Tally; BINS]>,
+    /// Number of known pixels by colour.
     counts: Vec<u32>,
-    /// The disparity of the surface that has a colour, or unknown.
+    /// Disparity of the surface that each colour identifies, or unknown.
     surfaces: Vec<u16>,
-    /// The surface that each pixel of the border has by its colour, `[row][column]`.
+    /// Disparity of the surface that each border pixel's colour identifies, `[row][column]`.
     border_surfaces: Vec<u16>,
 }
 
 impl ColorSimilarity {
-    /// Corrects the pixels of `map` that were filled, those left of column `first` of their row.
+    /// Corrects the filled pixels of `map`: those left of column `first` of their row.
     pub fn correct(&mut self, map: &mut [u16], width: usize, first: &[usize], colors: Colors) {
         self.prepare(map.len());
         let columns = first.iter().max().map_or(0, |&most| (most + 1).min(width));
@@ -102,17 +102,17 @@ impl ColorSimilarity {
         for (y, (row, &first)) in map.chunks_exact_mut(width).zip(first).enumerate() {
             for (x, d) in row[..first].iter_mut().enumerate() {
                 let surface = self.border_surfaces[y * columns + x];
-                if surface != UNKNOWN && surface.abs_diff(*d) >= APART && self.is_amid(surface, x, y, columns) {
+                if surface != UNKNOWN && surface.abs_diff(*d) >= MIN_GAP && self.has_support(surface, x, y, columns) {
                     *d = surface;
                 }
             }
         }
     }
 
-    /// Empties the results, and takes all the memory that maps of so many pixels can need, so that a wider border later
-    /// allocates nothing.
+    /// Clears the results and reserves the memory for maps of `pixels` pixels, so that a wider border later allocates
+    /// nothing.
     fn prepare(&mut self, pixels: usize) {
-        self.tallies.resize(COLORS, [Tally::default(); CLASSES]);
+        self.tallies.resize(COLORS, [Tally::default(); BINS]);
         self.counts.resize(COLORS, 0);
         self.surfaces.clear();
         self.surfaces.reserve(COLORS);
@@ -120,7 +120,7 @@ impl ColorSimilarity {
         self.border_surfaces.reserve(pixels);
     }
 
-    /// Learns which surface each colour stands for, from every other column and row of the known pixels of the first
+    /// Learns which surface each colour identifies, from every other column and row of the known pixels of the first
     /// `end` columns; `first` has the first known column of each row.
     fn learn(&mut self, map: &[u16], width: usize, first: &[usize], end: usize, colors: Colors) {
         self.counts.fill(0);
@@ -130,19 +130,19 @@ impl ColorSimilarity {
                     let color = colors.at(x, y);
                     // Cleared on first use: most colours do not occur.
                     if self.counts[color] == 0 {
-                        self.tallies[color] = [Tally::default(); CLASSES];
+                        self.tallies[color] = [Tally::default(); BINS];
                     }
                     self.counts[color] += 1;
-                    let class = usize::from(d / APART).min(CLASSES - 1);
-                    self.tallies[color][class] += Tally { count: 1, sum: u32::from(d / Tally::UNIT) };
+                    let bin = usize::from(d / MIN_GAP).min(BINS - 1);
+                    self.tallies[color][bin] += Tally { count: 1, sum: u32::from(d / Tally::UNIT) };
                 }
             }
         }
         self.surfaces.extend(self.counts.iter().zip(&self.tallies).enumerate().map(|(color, (&count, tallies))| {
-            if count < LEAST_PIXELS || is_grey(color) {
+            if count < MIN_PIXELS || is_grey(color) {
                 return UNKNOWN;
             }
-            // A surface may lie in two neighbouring classes.
+            // A surface may extend over two adjacent bins.
             let mut best = Tally::default();
             for pair in tallies.windows(2) {
                 let mut both = pair[0];
@@ -151,18 +151,18 @@ impl ColorSimilarity {
                     best = both;
                 }
             }
-            if 8 * best.count >= MOST_OF_8 * count { best.mean() } else { UNKNOWN }
+            if 8 * best.count >= MIN_EIGHTHS * count { best.mean() } else { UNKNOWN }
         }));
     }
 
-    /// Whether most colours around a pixel of the border stand for this surface, too.
-    fn is_amid(&self, surface: u16, x: usize, y: usize, columns: usize) -> bool {
+    /// Whether most pixels around a border pixel have colours of this surface.
+    fn has_support(&self, surface: u16, x: usize, y: usize, columns: usize) -> bool {
         let rows = self.border_surfaces.len() / columns;
         let mut same = 0;
-        for y in [y.saturating_sub(AROUND_PX), y, (y + AROUND_PX).min(rows - 1)] {
-            for x in [x.saturating_sub(AROUND_PX), x, (x + AROUND_PX).min(columns - 1)] {
+        for y in [y.saturating_sub(SPACING_PX), y, (y + SPACING_PX).min(rows - 1)] {
+            for x in [x.saturating_sub(SPACING_PX), x, (x + SPACING_PX).min(columns - 1)] {
                 let other = self.border_surfaces[y * columns + x];
-                same += u32::from(other != UNKNOWN && other.abs_diff(surface) < APART);
+                same += u32::from(other != UNKNOWN && other.abs_diff(surface) < MIN_GAP);
             }
         }
         same > 4
@@ -189,7 +189,8 @@ mod tests {
         (50..70).contains(&x)
     }
 
-    /// A near green surface before a far wall, and in the border, which was taken for wall, a patch of this colour.
+    /// Corrects a scene with a near green surface before a far wall, and a patch of this colour in the border, filled
+    /// as wall.
     fn corrected(patch: [u8; 3], every: usize) -> Vec<u16> {
         let (width, height) = SIZE;
         let mut image = ColorImage::new((width * every) as u32, (height * every) as u32);
@@ -213,7 +214,7 @@ mod tests {
         for every in [1, 2] {
             for (k, d) in corrected(GREEN, every).into_iter().enumerate() {
                 let (x, y) = (k % SIZE.0, k / SIZE.0);
-                // Its corners have too little of their colour around them.
+                // Its corners have too few pixels of their colour around them.
                 let corner = [4, 5, 10, 11].contains(&x) && [10, 11, 18, 19].contains(&y);
                 if !corner {
                     assert_eq!(d, if is_near(x) || is_patch(x, y) { NEAR } else { FAR }, "{x}, {y}");

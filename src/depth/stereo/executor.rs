@@ -1,26 +1,26 @@
-//! What finds the disparities that both eyes agree on.
+//! The interface of the matching kernels.
 
 use std::sync::Arc;
 
 use crate::compute::thread_pool::ThreadPool;
 use crate::compute::{Device, GpuError};
 
-/// Finds the disparities that both eyes agree on, pair after pair. All executors find the same, to the bit.
+/// Finds the disparities that pass the left-right consistency check, pair after pair. All executors agree to the bit.
 pub trait Executor: Send {
-    /// One line for the report.
+    /// Describes the executor in one line for the report.
     fn describe(&self) -> String;
 
-    /// The GPU that it runs on.
+    /// Returns the GPU that the executor uses.
     fn device(&self) -> Option<Arc<Device>> {
         None
     }
 
-    /// Writes the disparities of the left picture to `out`, in fixed point ([`super::fixed`]). `eyes` are the grey values
-    /// of the left and the right picture, row by row. What it had in the last pair is likely for a pixel that has not
-    /// changed since. Islands are dropped; gaps are filled along their row and marked ([`super::fixed::FILLED`]), but
-    /// what is left of the first known pixel of a row stays unknown.
+    /// Writes the disparities of the left picture to `out`, in fixed point ([`super::fixed`]). `pair` are the grey
+    /// values of the left and the right picture, row by row. Pixels that have not changed since the last pair prefer
+    /// their last disparity. Islands are removed; gaps are filled along their row and marked
+    /// ([`super::fixed::FILLED`]), but pixels left of the first known one of a row stay unknown.
     ///
     /// # Errors
-    /// The GPU failed.
-    fn disparities(&mut self, eyes: [&[u8]; 2], workers: &mut ThreadPool, out: &mut [u16]) -> Result<(), GpuError>;
+    /// Fails if the GPU fails.
+    fn disparities(&mut self, pair: [&[u8]; 2], workers: &mut ThreadPool, out: &mut [u16]) -> Result<(), GpuError>;
 }

@@ -1,4 +1,4 @@
-//! Which executor matches: one on a GPU, one on the CPU, or the second where the first fails.
+//! Selects the executor: one on a GPU, one on the CPU, or the CPU's when the GPU fails.
 
 #[cfg(feature = "gpu")]
 use std::sync::Arc;
@@ -15,19 +15,19 @@ use crate::compute::device::Device;
 use crate::compute::thread_pool::ThreadPool;
 use crate::compute::{Backend, GpuError};
 
-/// Makes executors on the chosen backend.
+/// Creates executors on the chosen backend.
 pub(super) struct Executors {
     threads: usize,
-    /// The GPU, if one is used, and whether it was asked for by name or kind, so that the CPU must not take its place.
+    /// The GPU, if one is used, and whether it was requested by name or kind, so that the CPU must not replace it.
     #[cfg(feature = "gpu")]
     gpu: Option<(Arc<Device>, bool)>,
 }
 
 impl Executors {
-    /// Executors on one GPU or on the CPU, for a pool of `threads`.
+    /// Opens a GPU or selects the CPU, for a pool of `threads`.
     ///
     /// # Errors
-    /// A GPU was asked for and there is none that fits.
+    /// Fails if a GPU is required and none fits.
     #[cfg(feature = "gpu")]
     pub fn new(backend: Backend, adapter: Option<&str>, threads: usize) -> Result<Self, GpuError> {
         if backend == Backend::Cpu {
@@ -44,20 +44,20 @@ impl Executors {
         }
     }
 
-    /// Executors on the CPU, for a pool of `threads`.
+    /// Selects the CPU, for a pool of `threads`.
     ///
     /// # Errors
-    /// A GPU was asked for.
+    /// Fails if a GPU is required.
     #[cfg(not(feature = "gpu"))]
     pub fn new(backend: Backend, adapter: Option<&str>, threads: usize) -> Result<Self, GpuError> {
         if backend == Backend::Gpu || adapter.is_some() { Err(GpuError::left_out()) } else { Ok(Self { threads }) }
     }
 
-    /// An executor for pictures of `size` (columns, rows) and at least so many disparities, at most 256, that drops
-    /// islands of up to `island` pixels.
+    /// Creates an executor for pictures of `size` (columns, rows) and at least `disparities` candidates, at most 256,
+    /// that removes islands of up to `island` pixels.
     ///
     /// # Errors
-    /// The GPU that was asked for has no room, or failed.
+    /// Fails if the required GPU lacks memory or fails.
     pub fn executor(
         &self,
         size: (usize, usize),
@@ -69,7 +69,7 @@ impl Executors {
             match GpuExecutor::new(device, size, disparities, island) {
                 Ok(gpu) => {
                     let threads = self.threads;
-                    let cpu: Makes = Box::new(move || Box::new(CpuExecutor::new(size, disparities, island, threads)));
+                    let cpu: MakeCpu = Box::new(move || Box::new(CpuExecutor::new(size, disparities, island, threads)));
                     return Ok(Box::new(Backed::new(Box::new(gpu) as Box<dyn Executor>, cpu)));
                 }
                 Err(error) if *is_required => return Err(error),
@@ -80,12 +80,12 @@ impl Executors {
     }
 }
 
-/// What makes the executor on the CPU.
+/// Creates the executor on the CPU.
 #[cfg(feature = "gpu")]
-type Makes = Box<dyn FnOnce() -> Box<dyn Executor> + Send>;
+type MakeCpu = Box<dyn FnOnce() -> Box<dyn Executor> + Send>;
 
 #[cfg(feature = "gpu")]
-impl Executor for Backed<Box<dyn Executor>, Makes> {
+impl Executor for Backed<Box<dyn Executor>, MakeCpu> {
     fn describe(&self) -> String {
         self.worker().describe()
     }
@@ -94,8 +94,9 @@ impl Executor for Backed<Box<dyn Executor>, Makes> {
         self.worker().device()
     }
 
-    fn disparities(&mut self, eyes: [&[u8]; 2], workers: &mut ThreadPool, out: &mut [u16]) -> Result<(), GpuError> {
-        // At the fault a pair is matched anew, so that none is lost; what the last one made likely is gone with the GPU.
-        self.run("matches", |executor| executor.disparities(eyes, workers, out), |_, make| Ok(make()))
+    fn disparities(&mut self, pair: [&[u8]; 2], workers: &mut ThreadPool, out: &mut [u16]) -> Result<(), GpuError> {
+        // After a fault the CPU matches the same pair, so that none is lost; only the temporal prior is lost with the
+        // GPU.
+        self.run("matches", |executor| executor.disparities(pair, workers, out), |_, make| Ok(make()))
     }
 }

@@ -1,14 +1,16 @@
-//! Occlusion filling from the background: what only one eye sees lies behind what hides it from the other, so gaps take
-//! the farther one of the disparities left and right of them.
+//! Occlusion filling from the background: a pixel that only one camera sees lies behind the object that hides it from
+//! the other, so gaps take the farther one of the disparities left and right of them.
+//!
+//! twin: shaders/stereo_gaps.wgsl
 
 use super::fixed::{UNKNOWN, is_known};
 
-/// The first column of a row whose disparity both eyes agree on.
+/// Returns the first column of a row with a known disparity.
 pub fn first_known(row: &[u16]) -> Option<usize> {
     row.iter().position(|&d| is_known(d))
 }
 
-/// Fills the gaps of a row, with the bits of `mark` set; one without any disparity stays as it is.
+/// Fills the gaps of a row and sets the bits of `mark` in them; a row without any disparity is not changed.
 pub fn fill_row(row: &mut [u16], mark: u16) {
     let mut x = 0;
     while x < row.len() {
@@ -25,11 +27,11 @@ pub fn fill_row(row: &mut [u16], mark: u16) {
     }
 }
 
-/// Fills the rows of `map` without any disparity from the nearest one above, or else below; the others are full. A map
-/// without any becomes 0.
+/// Fills rows of `map` without any disparity from the nearest one above, or else below; all others must be full. A map
+/// without any disparity becomes 0.
 pub fn fill_empty_rows(map: &mut [u16], width: usize) {
     let height = map.len() / width;
-    // One pixel tells whether a row is full or empty.
+    // Rows are full or empty, so their first pixel decides.
     let Some(first) = (0..height).find(|&y| map[y * width] != UNKNOWN) else { return map.fill(0) };
     for y in (0..first).rev() {
         map.copy_within((y + 1) * width..(y + 2) * width, y * width);

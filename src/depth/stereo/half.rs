@@ -1,15 +1,15 @@
-//! Half the columns and rows: pictures down, and disparities up again.
+//! Half resolution: downsamples pictures and upsamples disparities.
 
 use crate::frame::GrayImage;
 use crate::frame::scale::halve_rows;
 
-/// Columns and rows of half a picture.
+/// Returns the columns and rows of a half-size picture, rounded up.
 pub fn size((width, height): (usize, usize)) -> (usize, usize) {
     (width.div_ceil(2), height.div_ceil(2))
 }
 
-/// The means of 2x2 pixels; a last odd column or row is its own neighbour.
-pub fn shrink(from: &GrayImage, into: &mut GrayImage) {
+/// Averages 2x2 pixels; a last odd column or row is repeated.
+pub fn downsample(from: &GrayImage, into: &mut GrayImage) {
     into.resize(from.width.div_ceil(2), from.height.div_ceil(2));
     let (width, height) = (from.width as usize, from.height as usize);
     for (y, out) in into.luma.chunks_exact_mut(width.div_ceil(2)).enumerate() {
@@ -22,12 +22,12 @@ pub fn shrink(from: &GrayImage, into: &mut GrayImage) {
     }
 }
 
-/// Upsamples row `y` of the disparities `px` of `small`, the picture `whole` at half size, into `out`. Of the four
-/// nearest small pixels a pixel takes the disparity of the one closest to it in brightness, so that edges follow the
+/// Upsamples row `y` of the disparities `px` of `small`, which is `whole` at half size, into `out`. Each pixel takes
+/// the disparity of that one of the four nearest small pixels whose brightness is closest, so that edges follow the
 /// picture; doubled, as a small pixel is as wide as two.
-pub fn grow_row(whole: &GrayImage, small: &GrayImage, px: &[f32], y: usize, out: &mut [f32]) {
+pub fn upsample_row(whole: &GrayImage, small: &GrayImage, px: &[f32], y: usize, out: &mut [f32]) {
     let (columns, rows) = (small.width as usize, small.height as usize);
-    // Even rows and columns lie nearer to the one before, odd ones nearer to the one after.
+    // The second nearest small row or column is the previous one for even pixels, and the next one for odd ones.
     let near = y / 2;
     let other = if y.is_multiple_of(2) { near.saturating_sub(1) } else { (near + 1).min(rows - 1) };
     let row = |y: usize| (&small.luma[y * columns..(y + 1) * columns], &px[y * columns..(y + 1) * columns]);

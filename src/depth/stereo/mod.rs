@@ -1,7 +1,8 @@
-//! Depth from two eyes: the disparity of a rectified pair.
+//! Depth from stereo: the disparity of a rectified pair.
 //!
-//! [`create`] makes a [`Matcher`]. An executor finds the disparities that both eyes agree on and fills the gaps between
-//! them, in whole numbers, so that all executors find the same ([`fixed`]); what is left is common to all (`tidy`).
+//! [`create`] makes a [`Matcher`]. An executor finds the disparities that pass the left-right consistency check and
+//! fills the gaps between them, in integers, so that all executors agree to the bit ([`fixed`]); the post-processing is
+//! common to all (`tidy`).
 
 mod border;
 pub mod check;
@@ -29,28 +30,29 @@ use std::sync::atomic::AtomicBool;
 use color_similarity::Colors;
 use executor::Executor;
 use executors::Executors;
-use tidy::Tidy;
+use tidy::PostProcessor;
 
 use crate::compute::thread_pool::{DisjointParts, ThreadPool};
 use crate::compute::{Backend, Device, GpuError};
 use crate::frame::{ColorImage, DisparityMap, GrayImage};
 use crate::names::named;
 
-/// How pairs are matched.
+/// Settings of a matcher.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
     /// Columns and rows of both pictures.
     pub size: (u32, u32),
-    /// Disparities that are tried, from 0 on: rounded up ([`fixed::range`]), at most [`Settings::MOST_DISPARITIES`].
+    /// Number of candidate disparities, from 0 on: rounded up ([`fixed::range`]), at most
+    /// [`Settings::MOST_DISPARITIES`].
     pub disparities: u32,
-    /// How much is done for it.
+    /// Resolution at which pairs are matched.
     pub effort: Effort,
     /// Threads on the CPU, at least 1.
     pub threads: usize,
 }
 
 impl Settings {
-    /// As many disparities as can be tried.
+    /// The largest number of candidate disparities.
     pub const MOST_DISPARITIES: u32 = 256;
 }
 
@@ -64,42 +66,43 @@ named! {
     }
 }
 
-/// A rectified stereo pair: the same point is in the same row.
+/// A rectified stereo pair: a scene point lies in the same row of both pictures.
 #[derive(Clone, Copy, Debug)]
 pub struct Pair<'a> {
-    /// What the left eye saw.
+    /// Picture of the left camera.
     pub left: &'a GrayImage,
-    /// The same in colour, if it is known: tells more of what the right eye does not see.
+    /// The left picture in colour, if available: it improves the part that the right camera does not see.
     pub color: Option<&'a ColorImage>,
-    /// What the right eye saw.
+    /// Picture of the right camera.
     pub right: &'a GrayImage,
 }
 
-/// Finds the disparity of rectified pairs.
+/// Computes the disparity of rectified pairs.
 pub trait Matcher: Send {
-    /// What runs it, for the report.
+    /// Describes the device or the CPU that matches, in one line for the report.
     fn describe(&self) -> String;
 
     /// Changes the effort from the next pair on.
     fn set_effort(&mut self, effort: Effort);
 
-    /// The GPU that it runs on, for what else there is to do of its pairs.
+    /// Returns the GPU that the matcher uses, so that other steps of the pipeline can share it.
     #[doc(hidden)]
     fn device(&self) -> Option<Arc<Device>> {
         None
     }
 
-    /// The disparity of `pair` into `into`, which becomes as large as its pictures; every pixel is answered.
+    /// Computes the disparity of `pair` in pixels and resizes `into` to the size of its pictures; every pixel gets a
+    /// value.
     ///
     /// # Errors
-    /// The pictures are not of the size that was set; the GPU failed.
+    /// Fails if the pictures do not have the size in the settings, or the GPU fails.
     fn disparity(&mut self, pair: Pair, into: &mut DisparityMap) -> Result<(), MatchError>;
 }
 
-/// Why a pair has no disparity.
+/// Error of matching a pair.
 #[derive(Debug, thiserror::Error)]
 pub enum MatchError {
-    /// Two eyes of one size are needed.
+    /// The pictures of a pair differ in size.
     #[error(
         "the left picture is {}x{}, and the right one {}x{}; both eyes need one size",
         left.0, left.1, right.0, right.1
@@ -110,7 +113,7 @@ pub enum MatchError {
         /// Columns and rows of the right picture.
         right: (u32, u32),
     },
-    /// The pictures are of another size than was set.
+    /// The pictures do not have the size that the matcher was made for.
     #[error("the matcher is made for {}x{} and was given {}x{}", made_for.0, made_for.1, got.0, got.1)]
     Size {
         /// Width and height that the matcher was made for.
@@ -118,15 +121,15 @@ pub enum MatchError {
         /// Columns and rows of the pictures.
         got: (u32, u32),
     },
-    /// No GPU, or it failed.
+    /// There is no GPU, or it failed.
     #[error(transparent)]
     Gpu(#[from] GpuError),
 }
 
-/// A matcher on the GPU or the CPU; `adapter` is part of a GPU adapter's name.
+/// Creates a matcher on the GPU or the CPU; `adapter` is part of a GPU adapter's name.
 ///
 /// # Errors
-/// A GPU was asked for and there is none that fits, or it failed.
+/// Fails if a GPU is required and none fits, or if it fails.
 pub fn create(settings: &Settings, backend: Backend, adapter: Option<&str>) -> Result<Box<dyn Matcher>, MatchError> {
     let workers = ThreadPool::new("match", settings.threads);
     let executors = Executors::new(backend, adapter, workers.thread_count())?;
@@ -140,27 +143,27 @@ pub fn create(settings: &Settings, backend: Backend, adapter: Option<&str>) -> R
     }))
 }
 
-/// Islands of up to so many pixels are taken for mismatches, in pictures of full size.
+/// Speckles of at most this many pixels are treated as mismatches, at full resolution.
 const SPECKLE: u32 = 100;
 
 struct Matching {
     settings: Settings,
     workers: ThreadPool,
-    /// By [`Effort`].
+    /// Indexed by [`Effort`].
     levels: [Level; 2],
-    /// Left and right at half the size.
+    /// Left and right picture at half resolution.
     small: [GrayImage; 2],
-    /// A flag for each row, with which [`DisjointParts`] hands it to one thread only.
+    /// A flag per row, with which [`DisjointParts`] ensures that only one thread writes it.
     taken: Vec<AtomicBool>,
 }
 
-/// What one effort needs.
+/// State of one effort.
 struct Level {
     executor: Box<dyn Executor>,
-    tidy: Tidy,
-    /// Disparities in fixed point, as they are found.
+    tidy: PostProcessor,
+    /// Disparities in fixed point, as the executor returns them.
     map: Vec<u16>,
-    /// Disparities of the small pair in pixels; empty at full size, where they go to the caller's map.
+    /// Disparities of the half-size pair in pixels; empty at full size, where they go to the caller's map.
     px: Vec<f32>,
 }
 
@@ -168,30 +171,30 @@ impl Level {
     fn new(settings: &Settings, effort: Effort, executors: &Executors) -> Result<Self, GpuError> {
         let whole = (settings.size.0 as usize, settings.size.1 as usize);
         let (size, disparities, island) = match effort {
-            // The same island has a quarter of the pixels.
+            // An island has a quarter of its pixels at half resolution.
             Effort::Fast => (half::size(whole), settings.disparities.div_ceil(2), SPECKLE / 4),
             Effort::Full => (whole, settings.disparities, SPECKLE),
         };
         let pixels = size.0 * size.1;
         Ok(Self {
             executor: executors.executor(size, disparities as usize, island)?,
-            tidy: Tidy::new(size),
+            tidy: PostProcessor::new(size),
             map: vec![0; pixels],
             px: vec![0.0; if effort == Effort::Fast { pixels } else { 0 }],
         })
     }
 
-    /// Matches a pair of this level's size and writes a disparity for every pixel, in pixels, to `into`, or without it
-    /// to the level's own `px`.
+    /// Matches a pair of this level's size and writes a disparity for every pixel, in pixels, to `into`, or to the
+    /// level's own `px` if that is `None`.
     fn match_pair(
         &mut self,
-        eyes: [&GrayImage; 2],
+        pair: [&GrayImage; 2],
         colors: Option<Colors>,
         workers: &mut ThreadPool,
         into: Option<&mut [f32]>,
     ) -> Result<(), GpuError> {
         let Self { executor, tidy, map, px } = self;
-        let [luma, right] = eyes.map(|eye| &*eye.luma);
+        let [luma, right] = pair.map(|picture| &*picture.luma);
         executor.disparities([luma, right], workers, map)?;
         tidy.fill(map, luma, colors, workers, into.unwrap_or(px));
         Ok(())
@@ -221,6 +224,7 @@ impl Matcher for Matching {
                 return Err(MatchError::Size { made_for: self.settings.size, got });
             }
         }
+        // Half-size pictures are matched with every second pixel of the colour image.
         let colors = |every| color.map(|image| Colors { image, every });
         into.resize(left.width, left.height);
         let Self { settings, workers, levels, small, taken } = self;
@@ -228,12 +232,12 @@ impl Matcher for Matching {
         match settings.effort {
             Effort::Full => level.match_pair([left, right], colors(1), workers, Some(&mut into.px))?,
             Effort::Fast => {
-                half::shrink(left, &mut small[0]);
-                half::shrink(right, &mut small[1]);
+                half::downsample(left, &mut small[0]);
+                half::downsample(right, &mut small[1]);
                 let [small_left, small_right] = &*small;
                 level.match_pair([small_left, small_right], colors(2), workers, None)?;
                 let (px, rows) = (&level.px, DisjointParts::new(&mut into.px, left.width as usize, taken));
-                workers.run(left.height as usize, &|y| half::grow_row(left, small_left, px, y, rows.part(y)));
+                workers.run(left.height as usize, &|y| half::upsample_row(left, small_left, px, y, rows.part(y)));
             }
         }
         Ok(())

@@ -1,4 +1,4 @@
-//! Pairs are rectified where they are matched: on a GPU, or on the processor, which takes over when that fails.
+//! Rectifies pairs on the device that matches them: on a GPU, or on the CPU, which takes over when the GPU fails.
 
 #[cfg(feature = "gpu")]
 use std::sync::Arc;
@@ -12,7 +12,7 @@ use crate::compute::Device;
 use crate::compute::backed::Backed;
 use crate::frame::{ColorImage, GrayImage};
 
-/// Rectifies the pictures of both eyes; the same to the bit wherever it does.
+/// Rectifies both pictures of a pair; CPU and GPU agree to the bit.
 pub(super) struct PairRectifier {
     rectifier: Rectifier,
     #[cfg(feature = "gpu")]
@@ -20,7 +20,7 @@ pub(super) struct PairRectifier {
 }
 
 impl PairRectifier {
-    /// On the processor.
+    /// Creates a rectifier on the CPU.
     pub fn new(rectifier: Rectifier) -> Self {
         Self {
             rectifier,
@@ -29,9 +29,9 @@ impl PairRectifier {
         }
     }
 
-    /// On a device, where there is one that does it right: what keeps it from that is said.
+    /// Moves the rectification to `device` if its results are exact; otherwise logs why it stays on the CPU.
     #[cfg(feature = "gpu")]
-    pub fn on(self, device: Option<Arc<Device>>) -> Self {
+    pub fn with_device(self, device: Option<Arc<Device>>) -> Self {
         let gpu = device.and_then(|device| match GpuRectifier::new(&device, self.rectifier.maps()) {
             Ok(gpu) => Some(gpu),
             Err(error) => {
@@ -42,7 +42,7 @@ impl PairRectifier {
         Self { gpu: Backed::new(gpu, ()), ..self }
     }
 
-    /// The left picture, rectified, into `into`.
+    /// Rectifies the left picture into `into`.
     pub fn left(&mut self, from: &ColorImage, into: &mut ColorImage) {
         #[cfg(feature = "gpu")]
         if self.gpu.did("rectifies", |gpu| gpu.left(from, into)) {
@@ -51,7 +51,7 @@ impl PairRectifier {
         self.rectifier.left(from, into);
     }
 
-    /// The right picture, rectified, into `into`.
+    /// Rectifies the right picture into `into`.
     pub fn right(&mut self, from: &GrayImage, into: &mut GrayImage) {
         #[cfg(feature = "gpu")]
         if self.gpu.did("rectifies", |gpu| gpu.right(from, into)) {

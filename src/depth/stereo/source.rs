@@ -1,9 +1,9 @@
-//! Two eyes as a source of depth: rectified if they are not yet, matched, and turned into metres.
+//! Stereo as a source of depth: pairs are rectified if necessary, matched, and converted to metres.
 //!
-//! The blur needs no more than the disparity: with `z = f B / (d + doffs)`, the thin lens `c = c_inf (1 - z_f / z)` is
-//! `c = (c_inf / d_f) (d_f - d)`, counted from the disparity of infinity, which is `(A / 2B) (d_f - d)` for an aperture
-//! of diameter `A`. Focal length and baseline cancel out, so that a rig of which nothing is known
-//! ([`StereoRig::assumed`]) blurs as well as a measured one; only distances in metres mean nothing then.
+//! The blur needs only the disparity: with `z = f B / (d + doffs)`, the thin lens `c = c_inf (1 - z_f / z)` is `c =
+//! (c_inf / d_f) (d_f - d)`, counted from the disparity of infinity, which is `(A / 2B) (d_f - d)` for an aperture of
+//! diameter `A`. Focal length and baseline cancel out, so that an uncalibrated rig ([`StereoRig::assumed`]) blurs as
+//! well as a measured one; only its distances in metres are meaningless.
 
 use super::check::{Verdict, check};
 use super::rectify::PairRectifier;
@@ -13,43 +13,43 @@ use crate::depth::{DepthError, DepthSource, Seen};
 use crate::frame::{ColorImage, DepthMap, DisparityMap, GrayImage};
 use crate::optics::StereoRig;
 
-/// Disparities are taken to be at least this far above that of infinity: finer ones are not measured, and depth stays
+/// Disparities are clamped to at least this far above that of infinity: finer ones cannot be measured, and depth stays
 /// finite.
-const FARTHEST_PX: f32 = 1.0 / 16.0;
+const MIN_DISPARITY_PX: f32 = 1.0 / 16.0;
 
-/// Pairs that are checked at most until one tells whether it is rectified; each check takes the time of a few frames.
-const MOST_CHECKS: u32 = 5;
+/// Maximum number of pairs checked until one is conclusive; each check takes the time of a few frames.
+const MAX_CHECKS: u32 = 5;
 
-/// What a map costs with little effort beside a full one, as measured: an eighth of the candidates, and what does not
-/// depend on them.
+/// Measured time per map by effort, relative to the full one: half the resolution has an eighth of the candidates, and
+/// some costs are fixed.
 const EFFORTS: [f64; 2] = [0.33, 1.0];
 
-/// What comes nearer later has so many pixels more.
-const NEARER_PX: u32 = 8;
+/// Margin in pixels above the largest disparity found, for objects that come nearer later.
+const MARGIN_PX: u32 = 8;
 
 type Widen = Box<dyn Fn(u32) -> Result<Box<dyn Matcher>, DepthError> + Send>;
 
-/// Depth from the frames of a camera that brings a right eye.
+/// Computes depth from the frames of a camera that delivers a right picture.
 pub struct StereoDepth {
     source_name: String,
     rig: StereoRig,
     rectifier: Option<PairRectifier>,
     matcher: Box<dyn Matcher>,
     left: GrayImage,
-    /// Where pictures are rectified to.
+    /// Destination of the rectified left picture, which is then swapped with the raw one.
     color: ColorImage,
     right: GrayImage,
     disparity: DisparityMap,
     disparities: u32,
-    /// Makes a matcher that tries more.
+    /// Makes a matcher with more candidate disparities.
     widen: Option<Widen>,
-    /// Pairs that may still be checked for whether they are rectified.
+    /// Number of pairs that may still be checked for rectification.
     checks_left: u32,
 }
 
 impl StereoDepth {
-    /// Depth by `matcher`, which tries so many `disparities`, from pairs that `rig` took and that are rectified
-    /// already. `source_name` stands for their source in messages.
+    /// Creates a source that matches rectified pairs of `rig` with `matcher`, which has `disparities` candidates.
+    /// `source_name` names the camera in messages.
     pub fn of_rectified(source_name: &str, rig: StereoRig, matcher: Box<dyn Matcher>, disparities: u32) -> Self {
         Self {
             source_name: source_name.to_owned(),
@@ -62,38 +62,38 @@ impl StereoDepth {
             disparity: DisparityMap::default(),
             disparities,
             widen: None,
-            checks_left: MOST_CHECKS,
+            checks_left: MAX_CHECKS,
         }
     }
 
-    /// The same from pairs that `rectifier` rectifies, on the GPU that matches if one does. Their left pictures are rectified as
-    /// well.
+    /// Creates a source that rectifies pairs with `rectifier`, left pictures included, on the GPU of the matcher if it
+    /// has one.
     pub fn of_raw(source_name: &str, rectifier: Rectifier, matcher: Box<dyn Matcher>, disparities: u32) -> Self {
         let rig = rectifier.rig();
         let rectifier = PairRectifier::new(rectifier);
         #[cfg(feature = "gpu")]
-        let rectifier = rectifier.on(matcher.device());
+        let rectifier = rectifier.with_device(matcher.device());
         Self { rectifier: Some(rectifier), ..Self::of_rectified(source_name, rig, matcher, disparities) }
     }
 
-    /// Lets a matcher that `widen` makes take over where the first pairs have larger disparities than were expected; where
-    /// they are as large as was asked for, that is said.
+    /// Lets `widen` replace the matcher if the first pairs have larger disparities than it tries; without it, that is
+    /// only logged.
     pub fn widening(self, widen: impl Fn(u32) -> Result<Box<dyn Matcher>, DepthError> + Send + 'static) -> Self {
         Self { widen: Some(Box::new(widen)), ..self }
     }
 
-    /// Checks a pair, where none has told yet, and its range of disparities.
+    /// Checks a pair and its range of disparities, unless an earlier check was conclusive.
     fn check(&mut self, right: Option<&GrayImage>) -> Result<(), DepthError> {
         if self.checks_left == 0 {
             return Ok(());
         }
         let right = right.unwrap_or(&self.right);
         let (source_name, calibrated) = (&self.source_name, self.rectifier.is_some());
-        // Twice as far: nearer things than expected are seen, too.
+        // Twice the range, so that objects nearer than expected are found, too.
         let found = check(&self.left, right, (2 * self.disparities).min(Settings::MOST_DISPARITIES))?;
         let clear = log_check((source_name, calibrated), found.verdict());
         self.checks_left = if clear { 0 } else { self.checks_left - 1 };
-        let needed = (found.largest_px.ceil() as u32 + NEARER_PX).next_multiple_of(16).min(Settings::MOST_DISPARITIES);
+        let needed = (found.largest_px.ceil() as u32 + MARGIN_PX).next_multiple_of(16).min(Settings::MOST_DISPARITIES);
         if found.verdict() != Verdict::Rectified || found.largest_px < self.disparities as f32 {
             return Ok(());
         }
@@ -112,19 +112,19 @@ impl StereoDepth {
         Ok(())
     }
 
-    /// What takes the pictures, once they are rectified.
+    /// Returns the cameras of the rectified pictures.
     pub fn rig(&self) -> &StereoRig {
         &self.rig
     }
 
-    /// What runs the matching.
+    /// Describes the device or the CPU that matches.
     pub fn describe(&self) -> String {
         self.matcher.describe()
     }
 }
 
-/// Logs the verdict on a pair that is rectified, as was claimed or as its calibration (`calibrated`) should have made it.
-/// Returns false where the pair cannot tell.
+/// Logs the verdict on a pair that is supposed to be rectified; `calibrated` says whether it was rectified here.
+/// Returns false if the verdict is unclear.
 fn log_check((source_name, calibrated): (&str, bool), verdict: Verdict) -> bool {
     match verdict {
         Verdict::Rectified => tracing::info!("{source_name}: {verdict}"),
@@ -180,14 +180,14 @@ impl DepthSource for StereoDepth {
     }
 }
 
-/// Disparity as depth. What is unknown stays so; what is at infinity, or beyond it by an error of measurement, gets the
+/// Converts disparity to depth. Unknown pixels stay 0; those at infinity, or beyond it by measurement error, get the
 /// largest depth that can be measured.
 pub fn metres(disparity: &DisparityMap, rig: &StereoRig, map: &mut DepthMap) {
     map.resize(disparity.width, disparity.height);
     let (focal_baseline, doffs_px) = (rig.focal_px * rig.baseline_m, rig.doffs_px);
     for (z_m, &d_px) in map.metres.iter_mut().zip(&disparity.px) {
         let known = (d_px > 0.0) & (d_px < f32::INFINITY);
-        let known_m = focal_baseline / (d_px + doffs_px).max(FARTHEST_PX);
+        let known_m = focal_baseline / (d_px + doffs_px).max(MIN_DISPARITY_PX);
         *z_m = if known { known_m } else { 0.0 };
     }
 }
@@ -204,7 +204,7 @@ mod tests {
 
     const STAMP: Stamp = Stamp { index: 0, time_ns: 0, captured_ns: None };
 
-    /// Takes the difference of the eyes for their disparity.
+    /// Returns the difference of the two pictures as their disparity.
     struct Difference(Effort);
 
     impl Matcher for Difference {
@@ -220,9 +220,9 @@ mod tests {
                 return Err(MatchError::Sizes { left: left.size(), right: right.size() });
             }
             into.resize(left.width, left.height);
-            let share = if self.0 == Effort::Full { 1.0 } else { 0.5 };
+            let factor = if self.0 == Effort::Full { 1.0 } else { 0.5 };
             for (px, (&left, &right)) in into.px.iter_mut().zip(left.luma.iter().zip(&right.luma)) {
-                *px = (f32::from(left) - f32::from(right)) * share;
+                *px = (f32::from(left) - f32::from(right)) * factor;
             }
             Ok(())
         }
@@ -245,7 +245,7 @@ mod tests {
         metres(&disparity, &RIG, &mut map);
         assert_eq!(map.metres[..5], [1.0, 0.5, 0.0, 0.0, 0.0]);
         assert!((map.metres[5] - 10.0 / 5.01).abs() < 1e-5);
-        // Infinity lies at 5 px: what is there or beyond is far, and known.
+        // Infinity lies at 5 px: disparities up to there are known, and clamped to the largest depth.
         metres(&disparity, &StereoRig { doffs_px: -5.0, ..RIG }, &mut map);
         assert_eq!(map.metres, [160.0, 1.0, 0.0, 0.0, 0.0, 160.0]);
     }
@@ -290,7 +290,7 @@ mod tests {
             center_px: DVec2::new(32.0, center_y_px),
             distortion: Distortion::RadialTangential([0.1, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]),
         };
-        // The right eye looks some rows lower.
+        // The right camera sees everything some rows further up.
         let calibration = StereoCalibration {
             eyes: [eye(24.0), eye(20.0)],
             rotation: DMat3::IDENTITY,

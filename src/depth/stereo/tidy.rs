@@ -1,6 +1,5 @@
-//! Post-processing: turns what an executor found into a disparity for every pixel. The left border and empty rows are
-//! filled, near things lose the rim that they are too fat by, and the median of 3x3 pixels removes what
-//! outliers are left.
+//! Post-processing of an executor's result: fills the left border and empty rows, corrects foreground fattening, and
+//! removes the remaining outliers with a 3x3 median.
 
 use std::sync::atomic::AtomicBool;
 
@@ -13,21 +12,21 @@ use super::fixed::{FILLED, ONE};
 use super::gaps;
 use crate::compute::thread_pool::{DisjointParts, ThreadPool};
 
-/// Post-processes maps of one size; owns the memory for it.
-pub struct Tidy {
+/// Post-processes maps of one size; owns its buffers.
+pub struct PostProcessor {
     width: usize,
     border: Border,
     similarity: ColorSimilarity,
     fattening: Fattening,
     /// The median of the filled map.
     smooth: Vec<u16>,
-    /// A flag for each row, with which [`DisjointParts`] hands it to one thread only.
+    /// A flag per row, with which [`DisjointParts`] ensures that only one thread writes it.
     taken: Vec<AtomicBool>,
     arch: Arch,
 }
 
-impl Tidy {
-    /// For maps of this size.
+impl PostProcessor {
+    /// Allocates for maps of this size.
     pub fn new((width, height): (usize, usize)) -> Self {
         Self {
             width,
@@ -40,7 +39,8 @@ impl Tidy {
         }
     }
 
-    /// Fills what is unknown in `map`, whose left picture is `luma`, and writes its 3x3 median to `px`, in pixels, above 0.
+    /// Fills unknown pixels of `map`, whose left picture is `luma`, and writes its 3x3 median to `px`, in pixels, above
+    /// 0.
     pub fn fill(
         &mut self,
         map: &mut [u16],
@@ -55,19 +55,19 @@ impl Tidy {
         if let Some(colors) = colors {
             similarity.correct(map, width, border.first(), colors);
         }
-        // Ways along which brightness changes too much have reached nothing.
+        // Paths with too large changes of brightness have reached no pixel.
         for (row, &first) in map.chunks_exact_mut(width).zip(border.first()) {
             gaps::fill_row(&mut row[..=first], 0);
         }
         gaps::fill_empty_rows(map, width);
-        // What is by chance has no outline: the median comes first, and again where pixels were decided one by one.
+        // The first median removes outliers, which have no colour edge; the second smooths the per-pixel decisions.
         median_map(map, width, (workers, arch), taken, smooth, |fixed| fixed);
         fattening.correct(smooth, map, luma, colors, workers);
         median_map(map, width, (workers, arch), taken, px, to_px);
     }
 }
 
-/// Writes the median of 3x3 of each pixel of `map` to `out`, by way of `to`.
+/// Writes the 3x3 median of each pixel of `map` to `out`, converted by `to`.
 fn median_map<T: Send>(
     map: &[u16],
     width: usize,
@@ -85,7 +85,7 @@ fn median_map<T: Send>(
     });
 }
 
-/// The median of three rows and columns; beyond the border the outermost pixels repeat.
+/// Computes the median of three rows and columns; beyond the border the outermost pixels repeat.
 struct Median<'a, T, F> {
     rows: [&'a [u16]; 3],
     out: &'a mut [T],
@@ -110,7 +110,7 @@ impl<T, F: Fn(u16) -> T> WithSimd for Median<'_, T, F> {
         if width < 3 {
             return;
         }
-        // Slices of one length need no bounds checks: vector code.
+        // Slices of equal length need no bounds checks, so that this loop becomes vector code.
         let inner = width - 2;
         let (above, here, below) = (columns(above, inner), columns(here, inner), columns(below, inner));
         for (x, out) in out[1..=inner].iter_mut().enumerate() {
@@ -129,29 +129,30 @@ impl<T, F: Fn(u16) -> T> WithSimd for Median<'_, T, F> {
     }
 }
 
-/// `row` from its first, second and third column on: what is before, at and after each of `length` inner pixels.
+/// Returns `row` from its first, second and third column on: the left neighbours, pixels and right neighbours of
+/// `length` inner pixels.
 #[inline(always)]
 fn columns(row: &[u16], length: usize) -> [&[u16]; 3] {
     [&row[..length], &row[1..=length], &row[2..length + 2]]
 }
 
-/// The median of nine disparities, filled in or not.
+/// Returns the median of nine disparities, ignoring the mark of filled ones.
 #[inline(always)]
 fn median_known(nine: [u16; 9]) -> u16 {
     median(nine.map(|d| d & !FILLED))
 }
 
-/// Pixels from fixed point, above 0: 0 would mean unknown, and a disparity of 0 is known.
+/// Converts fixed point to pixels, above 0: 0 would mean unknown, and a disparity of 0 is known.
 #[inline(always)]
 fn to_px(fixed: u16) -> f32 {
     f32::from(if fixed > 1 { fixed } else { 1 }) / f32::from(ONE)
 }
 
-/// The fifth of nine, by 19 exchanges (Paeth, *Median finding on a 3x3 grid*, Graphics Gems, 1990).
+/// Returns the median of nine with 19 exchanges (Paeth, *Median finding on a 3x3 grid*, Graphics Gems, 1990).
 #[inline(always)]
 fn median(nine: [u16; 9]) -> u16 {
     let [mut a, mut b, mut c, mut d, mut e, mut f, mut g, mut h, mut i] = nine;
-    // Written out: a loop over places would not become vector code.
+    // Unrolled: a loop over indices would not become vector code.
     macro_rules! exchange {
         ($($low:ident $high:ident),*) => {
             $(($low, $high) = ($low.min($high), $low.max($high));)*

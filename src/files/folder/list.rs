@@ -1,4 +1,4 @@
-//! The list of files that we wrote into a folder.
+//! The list of the files that we wrote into a folder.
 
 use std::collections::HashSet;
 use std::fs::{self, File};
@@ -11,7 +11,7 @@ use rustix::fs::OFlags;
 use super::{FolderError, LIST};
 use crate::files::{input, whole};
 
-/// A list that grows.
+/// A list that is being written.
 #[derive(Debug)]
 pub(super) struct List {
     path: PathBuf,
@@ -21,7 +21,7 @@ pub(super) struct List {
 }
 
 impl List {
-    /// Begins a new list in `folder`, in place of one whose files are gone.
+    /// Creates a new list in `folder`; replaces an old one, whose files are gone.
     pub(super) fn create(folder: &Path) -> Result<Self, FolderError> {
         let path = folder.join(LIST);
         let removed = match fs::remove_file(&path) {
@@ -32,13 +32,13 @@ impl List {
         Ok(Self { path, file, bytes: 0, len: 0 })
     }
 
-    /// Adds to the list of `folder`, which is made where it is missing. Never through a link.
+    /// Opens the list of `folder` for appending; creates it if needed. Does not follow links.
     pub(super) fn open(folder: &Path) -> Result<Self, FolderError> {
         let path = folder.join(LIST);
         let mut options = File::options();
         options.append(true).create(true).custom_flags(OFlags::NOFOLLOW.bits() as i32);
         let opened = options.open(&path).and_then(|mut file| {
-            // Its last line may have no end.
+            // The last line may be unterminated.
             file.write_all(b"\n")?;
             Ok((file.metadata()?.len(), file))
         });
@@ -50,11 +50,11 @@ impl List {
         self.len
     }
 
-    /// Adds a name. Where that fails, the list stays as it was.
+    /// Appends a name. If that fails, the list is unchanged.
     pub(super) fn add(&mut self, name: &str) -> Result<(), FolderError> {
         let line = format!("{name}\n");
         if let Err(cause) = self.file.write_all(line.as_bytes()) {
-            // A name that was cut could be that of another file. The first error is the one to report.
+            // A truncated name could be that of another file. Report the first error.
             let _ = self.file.set_len(self.bytes);
             return Err(FolderError::Write { path: self.path.clone(), cause });
         }
@@ -64,10 +64,10 @@ impl List {
     }
 }
 
-/// The names in a list.
+/// The names on a list.
 #[derive(Debug, Default)]
 pub(super) struct Names {
-    /// In the order in which they were written.
+    /// In the order of writing.
     ordered: Vec<String>,
     all: HashSet<String>,
 }
@@ -86,30 +86,29 @@ impl Names {
     }
 }
 
-/// The names in the list of `folder`; none where there is no list. What does not lie within the folder, at most one
-/// folder down, is passed over.
+/// Reads the names on the list of `folder`; empty without a list. Skips names outside the folder or more than one
+/// folder deep.
 pub(super) fn read(folder: &Path) -> Result<Names, FolderError> {
     let path = folder.join(LIST);
-    // Never through a link: it would be the list of another folder.
+    // Do not follow a link: it could lead to another folder's list.
     if !fs::symlink_metadata(&path).is_ok_and(|there| there.is_file()) {
         return Ok(Names::default());
     }
-    let text = input::read_text(&path, input::MOST_TEXT_BYTES).map_err(FolderError::write(&path))?;
-    let ordered: Vec<String> = text.lines().filter(|name| lies_within(name)).map(str::to_owned).collect();
+    let text = input::read_text(&path, input::MAX_TEXT_BYTES).map_err(FolderError::write(&path))?;
+    let ordered: Vec<String> = text.lines().filter(|name| is_within(name)).map(str::to_owned).collect();
     let all = ordered.iter().cloned().collect();
     Ok(Names { ordered, all })
 }
 
-/// Adds existing files to the list of `folder`, which is made where it is missing, so that a run may replace them:
-/// files that are known in another way to belong to what it replaces. What does not lie within the folder, at most one
-/// folder down, is passed over.
+/// Adds existing files to the list of `folder`, which is created if needed, so that a run may replace them. The caller
+/// knows from elsewhere that they belong to the old set. Skips names outside the folder or more than one folder deep.
 ///
 /// # Errors
 /// The list cannot be read or written.
 pub fn adopt(folder: &Path, names: impl IntoIterator<Item = String>) -> Result<(), FolderError> {
     let known = read(folder)?;
     let mut seen = HashSet::new();
-    let new = names.into_iter().filter(|name| lies_within(name) && !known.contains(name));
+    let new = names.into_iter().filter(|name| is_within(name) && !known.contains(name));
     let lines: String = new.filter(|name| seen.insert(name.clone())).map(|name| name + "\n").collect();
     if lines.is_empty() {
         return Ok(());
@@ -119,8 +118,8 @@ pub fn adopt(folder: &Path, names: impl IntoIterator<Item = String>) -> Result<(
     whole::write(&path, list.as_bytes(), true).map_err(FolderError::write(&path))
 }
 
-/// Whether a name is a plain path of at most one folder and a file that is not hidden.
-fn lies_within(name: &str) -> bool {
+/// Returns whether a name is a plain path of at most one folder and a file that is not hidden.
+fn is_within(name: &str) -> bool {
     let mut parts = Path::new(name).components();
     let is_plain = |part: Option<Component>| part.is_none_or(|part| matches!(part, Component::Normal(_)));
     !name.is_empty()
@@ -137,12 +136,12 @@ mod tests {
     #[test]
     fn a_name_leads_one_folder_down_at_most_and_never_up() {
         for name in ["0.png", "rgb/0.png", "rgb.txt", "rgb/..0.png"] {
-            assert!(lies_within(name), "{name}");
+            assert!(is_within(name), "{name}");
         }
         let bad =
             ["", ".", "..", ".hidden", "../0.png", "rgb/..", "rgb/../0.png", "rgb/../../0.png", "/0.png", "a/b/0.png"];
         for name in bad {
-            assert!(!lies_within(name), "{name}");
+            assert!(!is_within(name), "{name}");
         }
     }
 }

@@ -1,4 +1,4 @@
-//! How one set of files takes the place of another, and what becomes of that of an interrupted run.
+//! Replaces one set of files by another, and recovers from interrupted runs.
 
 use std::fs;
 use std::io::ErrorKind;
@@ -8,7 +8,7 @@ use super::list::{self, List};
 use super::{FolderError, LIST, PART, Set};
 use crate::files::whole;
 
-/// Fails if the folder has a file of the set that is not on its list: somebody else wrote it.
+/// Fails if the folder has a file of the set that is not on its list, so that another program wrote it.
 pub(super) fn refuse_foreign(path: &Path, set: &Set) -> Result<(), FolderError> {
     let ours = list::read(path)?;
     for subfolder in [""].iter().chain(set.subfolders) {
@@ -30,8 +30,7 @@ pub(super) fn refuse_foreign(path: &Path, set: &Set) -> Result<(), FolderError> 
     Ok(())
 }
 
-/// Recovers from a run that was killed: keeps what it left in [`PART`] as `NAME.incomplete`, and removes files that it was
-/// writing.
+/// Recovers from a killed run: keeps its files in [`PART`] as `NAME.incomplete`, and removes partly written files.
 pub(super) fn recover(path: &Path, set: &Set) -> Result<(), FolderError> {
     let part = path.join(PART);
     if is_folder(&part) {
@@ -43,7 +42,7 @@ pub(super) fn recover(path: &Path, set: &Set) -> Result<(), FolderError> {
         }
     }
     for folder in [""].iter().chain(set.subfolders).map(|subfolder| path.join(subfolder)) {
-        // Where there is none, nothing is left behind.
+        // If the folder is missing, there is nothing to remove.
         for (part, name) in whole::all_left_behind(&folder).unwrap_or_default() {
             let file = folder.join(name);
             let name = file.strip_prefix(path).ok().and_then(Path::to_str);
@@ -56,15 +55,15 @@ pub(super) fn recover(path: &Path, set: &Set) -> Result<(), FolderError> {
     Ok(())
 }
 
-/// Puts the files of `part`, all of which are whole, into the folder `path`, each in the place of the old one of its name, and
-/// removes what else is on the old list; the number of old files. Nothing is replaced but what that list has.
+/// Moves the files of `part`, all of which are complete, into the folder `path`, replacing old ones with the same name,
+/// and removes the other files on the old list; returns the number of old files. Replaces only files on that list.
 pub(super) fn replace(part: &Path, path: &Path) -> Result<u64, FolderError> {
     let (old, new) = (list::read(path)?, list::read(part)?);
     let is_foreign = |name: &&String| !old.contains(name) && path.join(name).symlink_metadata().is_ok();
     if let Some(name) = new.iter().find(is_foreign) {
         return Err(FolderError::Foreign { path: path.join(name) });
     }
-    // Whatever happens from here on, those that were moved are ours, and no other is.
+    // List each file as it is moved, so that after a failure exactly the moved files are ours.
     let mut ours = List::open(path)?;
     let is_old = |name: &String| old.contains(name) && is_file(path, name);
     let gone = old.iter().filter(|name| is_old(name)).count() as u64;
@@ -87,14 +86,14 @@ pub(super) fn replace(part: &Path, path: &Path) -> Result<u64, FolderError> {
     whole::rename(&part.join(LIST), &list, true).map_err(FolderError::write(&list))?;
     fs::remove_dir_all(part).map_err(FolderError::write(part))?;
     for name in old.iter().filter_map(|name| Some(name.rsplit_once('/')?.0)) {
-        // Succeeds once the subfolder is empty.
+        // Succeeds only if the subfolder is empty.
         let _ = fs::remove_dir(path.join(name));
     }
     whole::sync_folder(&list).map_err(FolderError::write(path))?;
     Ok(gone)
 }
 
-/// Whether `name` is a file in the folder `path`, and no link leads there.
+/// Returns whether `name` is a regular file in the folder `path`, reached without links.
 fn is_file(path: &Path, name: &str) -> bool {
     let folder_is_own = name.rsplit_once('/').is_none_or(|(subfolder, _)| is_folder(&path.join(subfolder)));
     folder_is_own && fs::symlink_metadata(path.join(name)).is_ok_and(|there| there.is_file())
@@ -111,10 +110,10 @@ pub(super) fn make_subfolder(path: &Path) -> Result<(), FolderError> {
     }
 }
 
-/// Renames `part` to `NAME.incomplete` beside the folder `path`; within it, if that is another file system or not
-/// writable. Gives the new path.
+/// Renames `part` to `NAME.incomplete` next to the folder `path`, or inside it if the parent is another file system or
+/// not writable. Returns the new path.
 pub(super) fn keep(part: &Path, path: &Path) -> Result<PathBuf, FolderError> {
-    // Names such as `..` give no file name.
+    // Paths such as `..` have no file name.
     let path = if path.file_name().is_some() { path.to_owned() } else { fs::canonicalize(path).unwrap_or(path.into()) };
     let within = path.join(path.file_name().unwrap_or("files".as_ref()));
     let kept = whole::keep_incomplete(part, &path).or_else(|_| whole::keep_incomplete(part, &within));

@@ -18,7 +18,7 @@ fn put(folder: &mut Folder, name: &str, text: &str) {
     folder.put(part).unwrap();
 }
 
-/// Files with their content, those of subfolders included, sorted; our own list left out.
+/// Returns all files as `name=content`, including subfolders, sorted, without our own list.
 fn all(path: &Path) -> Vec<String> {
     let mut found = Vec::new();
     for entry in fs::read_dir(path).unwrap().map(|entry| entry.unwrap().path()) {
@@ -52,7 +52,7 @@ fn files_go_into_an_empty_folder_as_they_come() {
     assert_eq!(all(&path), ["0.png=zero", "rgb/0.png=deep"]);
     assert!(matches!(Folder::open(&path, false, &SET), Err(FolderError::NotEmpty { .. })));
 
-    // Files that went by other hands leave a list of nothing, which is no obstacle.
+    // Files removed by others leave an empty list, which is no obstacle.
     fs::remove_file(path.join("0.png")).unwrap();
     fs::remove_dir_all(path.join("rgb")).unwrap();
     drop(Folder::open(&path, false, &SET).unwrap());
@@ -99,7 +99,7 @@ fn foreign_files_are_refused_and_never_touched() {
         assert!(error.contains(name) && error.contains("not written by bokehcam"), "{error}");
         fs::remove_file(path.join(name)).unwrap();
     }
-    // One that appears meanwhile.
+    // A foreign file that appears meanwhile.
     let mut folder = open(&path).unwrap();
     put(&mut folder, "1.png", "new");
     fs::write(path.join("1.png"), "mine").unwrap();
@@ -107,7 +107,7 @@ fn foreign_files_are_refused_and_never_touched() {
     assert_eq!(all(&path), ["0.png=old", "1.png=mine"]);
     assert_eq!(all(&dir.path().join("out.incomplete")), ["1.png=new"]);
 
-    // A list of somebody else's making, and a link in place of a subfolder.
+    // A forged list, and a link in place of a subfolder.
     let other = dir.path().join("other");
     fs::create_dir(&other).unwrap();
     fs::write(other.join("3.png"), "mine").unwrap();
@@ -150,18 +150,18 @@ fn what_a_killed_run_left_is_kept_or_done_with() {
         files.iter().for_each(|name| fs::write(folder.join(name), "new").unwrap());
         fs::write(folder.join(LIST), names).unwrap();
     };
-    // Killed while it wrote.
+    // Killed while writing.
     leave(PART, &["0.png"], "0.png\n");
     fs::write(path.join(".1.png.77-0.part"), "half").unwrap();
     fs::write(path.join(".mine.77-0.part"), "half").unwrap();
     drop(open(&path).unwrap());
     assert_eq!(all(&path), [".mine.77-0.part=half", "0.png=old", "1.png=old"]);
     assert_eq!(all(&dir.path().join("out.incomplete")), ["0.png=new"]);
-    // Before there was anything.
+    // Killed before anything was written.
     leave(PART, &[], "");
     drop(open(&path).unwrap());
     assert!(!dir.path().join("out.incomplete.2").exists());
-    // Killed while it moved its files: two of three are there already, and ours.
+    // Killed while moving files: two of three are in place, and ours.
     ["0.png", "2.png"].iter().for_each(|name| fs::write(path.join(name), "new").unwrap());
     list::List::open(&path).unwrap().add("2.png").unwrap();
     leave(PART, &["3.png"], "0.png\n2.png\n3.png\n");

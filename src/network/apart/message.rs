@@ -1,35 +1,35 @@
-//! What the two processes say to each other: a line of JSON with its length before it, and numbers behind it.
+//! The protocol between the two processes: a line of JSON preceded by its length, then raw numbers.
 
 use std::io::{self, ErrorKind, Read, Write};
 
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
-use crate::network::{Failure, MOST_VALUES, Port, Tensor};
+use crate::network::{Failure, MAX_VALUES, Port, Tensor};
 
-/// Most bytes of a line: names of ports and sizes are short.
-const MOST_BYTES: u32 = 1 << 20;
+/// Maximum length of a line; names of ports and sizes are short.
+const MAX_LINE_BYTES: u32 = 1 << 20;
 
-/// What is asked of the process.
+/// A request to the process.
 #[derive(Debug, Serialize, Deserialize)]
 pub enum Request {
-    /// To load a network of so many bytes, which follow, by the runtime of this name.
+    /// Load a network with a runtime; `bytes` bytes of the file follow.
     Load { runtime: String, bytes: usize },
-    /// To run it on inputs of these sizes, whose values follow.
+    /// Run it on inputs of these shapes; their values follow.
     Run(Vec<Vec<usize>>),
 }
 
-/// What it answers.
+/// A reply of the process.
 #[derive(Debug, Serialize, Deserialize)]
 pub enum Reply {
     Loaded(Ports),
     NotLoaded(Failure),
-    /// The outputs have these sizes; their values follow.
+    /// The outputs have these shapes; their values follow.
     Ran(Vec<Vec<usize>>),
     Failed(String),
 }
 
-/// What a network takes and gives, and what runs it.
+/// Inputs and outputs of a network, and its runtime.
 #[derive(Debug, Serialize, Deserialize)]
 pub struct Ports {
     pub inputs: Vec<Port>,
@@ -39,7 +39,7 @@ pub struct Ports {
 
 pub fn send(to: &mut impl Write, message: &impl Serialize) -> io::Result<()> {
     let line = serde_json::to_vec(message)?;
-    let length = u32::try_from(line.len()).ok().filter(|length| *length <= MOST_BYTES);
+    let length = u32::try_from(line.len()).ok().filter(|length| *length <= MAX_LINE_BYTES);
     let length = length.ok_or_else(|| io::Error::new(ErrorKind::InvalidData, "it has too many ports or sizes"))?;
     to.write_all(&length.to_le_bytes())?;
     to.write_all(&line)
@@ -49,7 +49,7 @@ pub fn receive<T: DeserializeOwned>(from: &mut impl Read) -> io::Result<T> {
     let mut length = [0; 4];
     from.read_exact(&mut length)?;
     let length = u32::from_le_bytes(length);
-    if length > MOST_BYTES {
+    if length > MAX_LINE_BYTES {
         return Err(io::Error::new(ErrorKind::InvalidData, "it says too much"));
     }
     let mut line = vec![0; length as usize];
@@ -70,7 +70,7 @@ pub fn send_values(to: &mut impl Write, tensors: &[Tensor], bytes: &mut Vec<u8>)
     Ok(())
 }
 
-/// Takes in the values of tensors of these sizes, none of which is larger than any may be.
+/// Reads the values of tensors of these shapes; refuses tensors above [`MAX_VALUES`].
 pub fn receive_values(
     from: &mut impl Read,
     shapes: Vec<Vec<usize>>,
@@ -80,7 +80,7 @@ pub fn receive_values(
     tensors.resize_with(shapes.len(), Tensor::default);
     for (tensor, shape) in tensors.iter_mut().zip(shapes) {
         let count = shape.iter().try_fold(1usize, |all, &side| all.checked_mul(side));
-        let count = count.filter(|count| *count <= MOST_VALUES);
+        let count = count.filter(|count| *count <= MAX_VALUES);
         let count = count.ok_or_else(|| io::Error::new(ErrorKind::InvalidData, "it has too many values"))?;
         bytes.resize(4 * count, 0);
         from.read_exact(bytes)?;

@@ -1,4 +1,4 @@
-//! The side of the process that a network's answers are for.
+//! The client side, which waits for a network's answers.
 
 use std::io::{self, ErrorKind, Read, Write};
 use std::os::fd::OwnedFd;
@@ -9,47 +9,47 @@ use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
 use super::message::{Ports, Reply, Request, receive, receive_values, send, send_values, shapes};
-use super::{ANSWERING, ARGUMENT, ENDS, LOADING, MOST_BYTES};
+use super::{ARGUMENT, IS_EXITING, LOAD_TIMEOUT, MAX_MEMORY_BYTES, RUN_TIMEOUT};
 use crate::network::{Engine, Failure, Network, Runtime, Tensor, one_line};
 
-/// So often is looked whether there is reason to wait no longer.
-const SLICE: Duration = Duration::from_millis(50);
-/// An answer that is nearly there is waited for when the program ends, too.
-const LAST: Duration = Duration::from_millis(500);
+/// Interval at which a wait is checked for its end.
+const POLL_INTERVAL: Duration = Duration::from_millis(50);
+/// Time limit for an answer once the program is about to exit.
+const EXIT_TIMEOUT: Duration = Duration::from_millis(500);
 
-/// A process that runs a network; it is killed when it is dropped.
+/// A process that runs a network; it is killed on drop.
 pub struct Process {
     child: Child,
     stream: UnixStream,
     outputs: usize,
-    /// Why it is not asked any more.
+    /// The error that ended communication.
     failed: Option<String>,
     buffer: Vec<u8>,
 }
 
 impl Process {
-    /// Starts this program once more.
+    /// Starts this program again.
     pub fn start() -> io::Result<Self> {
-        // It is this very program also where its file was replaced since.
-        Self::of(Command::new("/proc/self/exe").arg0("bokehcam").arg(ARGUMENT))
+        // Runs the same program even if its file was replaced meanwhile.
+        Self::spawn(Command::new("/proc/self/exe").arg0("bokehcam").arg(ARGUMENT))
     }
 
-    fn of(command: &mut Command) -> io::Result<Self> {
+    fn spawn(command: &mut Command) -> io::Result<Self> {
         let (stream, other) = UnixStream::pair()?;
-        stream.set_read_timeout(Some(SLICE))?;
-        stream.set_write_timeout(Some(SLICE))?;
-        // Ctrl-C is for this program, which then ends the other one in its own time. What a runtime says on stderr would go to
-        // the terminal as it is.
+        stream.set_read_timeout(Some(POLL_INTERVAL))?;
+        stream.set_write_timeout(Some(POLL_INTERVAL))?;
+        // Its own process group, because Ctrl-C must only reach this program, which ends the other one itself. stderr
+        // is discarded, as a runtime would write to the terminal directly.
         let command = command.process_group(0).stdin(OwnedFd::from(other)).stdout(Stdio::null()).stderr(Stdio::null());
         let child = command.spawn()?;
-        // With its end of the socket kept here, too, its death would not be heard of.
+        // Close our copy of its end of the socket, or its death would go unnoticed.
         command.stdin(Stdio::null());
         Ok(Self { child, stream, outputs: 0, failed: None, buffer: Vec::new() })
     }
 
     pub fn load(mut self, content: &[u8], runtime: Runtime) -> Result<Network, Failure> {
         let request = Request::Load { runtime: runtime.name().to_owned(), bytes: content.len() };
-        let reply = self.ask(LOADING, |stream, _| {
+        let reply = self.exchange(LOAD_TIMEOUT, |stream, _| {
             send(stream, &request)?;
             stream.write_all(content)?;
             receive(stream)
@@ -64,21 +64,21 @@ impl Process {
         }
     }
 
-    /// Says and hears something within a time. A process that does not answer is killed, and asked no more.
-    fn ask<T>(
+    /// Exchanges messages within a time limit. A process that does not answer is killed and not used again.
+    fn exchange<T>(
         &mut self,
         patience: Duration,
-        talk: impl FnOnce(&mut Patient, &mut Vec<u8>) -> io::Result<T>,
+        talk: impl FnOnce(&mut TimedStream, &mut Vec<u8>) -> io::Result<T>,
     ) -> Result<T, String> {
         if let Some(why) = &self.failed {
             return Err(why.clone());
         }
-        let mut stream = Patient { stream: &self.stream, until: Instant::now() + patience, hurries: false };
+        let mut stream = TimedStream { stream: &self.stream, until: Instant::now() + patience, is_exiting: false };
         talk(&mut stream, &mut self.buffer).map_err(|error| {
             let why = match error.kind() {
-                ErrorKind::TimedOut if stream.hurries => "it gave no answer before the program ended".to_owned(),
+                ErrorKind::TimedOut if stream.is_exiting => "it gave no answer before the program ended".to_owned(),
                 ErrorKind::TimedOut => format!("it gave no answer in {} s", patience.as_secs_f32()),
-                ErrorKind::UnexpectedEof | ErrorKind::BrokenPipe | ErrorKind::ConnectionReset => self.how_it_ended(),
+                ErrorKind::UnexpectedEof | ErrorKind::BrokenPipe | ErrorKind::ConnectionReset => self.describe_end(),
                 _ => one_line(error),
             };
             self.kill();
@@ -86,12 +86,12 @@ impl Process {
         })
     }
 
-    /// Of a process that has closed its end, and is about to end, if it has not.
-    fn how_it_ended(&mut self) -> String {
-        // One that lives on with its end closed is not waited for.
+    /// Kills a process that has closed its end, and describes how it ended.
+    fn describe_end(&mut self) -> String {
+        // Do not wait for a process that lives on with its end closed.
         let _ = self.child.kill();
         let signal = self.child.wait().ok().and_then(|status| status.signal());
-        let most = MOST_BYTES >> 30;
+        let most = MAX_MEMORY_BYTES >> 30;
         match signal {
             Some(_) => {
                 format!("its process aborted: it asks for more than {most} GiB of memory, or its runtime crashed")
@@ -101,7 +101,7 @@ impl Process {
     }
 
     fn kill(&mut self) {
-        // It may have ended by itself. A killed process is gone soon, and what is left of it is collected here.
+        // It may have ended by itself; `wait` reaps it.
         let _ = self.child.kill();
         let _ = self.child.wait();
     }
@@ -112,7 +112,7 @@ const OUT_OF_TURN: &str = "its process answers what it was not asked";
 impl Engine for Process {
     fn run(&mut self, inputs: &[Tensor], outputs: &mut Vec<Tensor>) -> Result<(), String> {
         let count = self.outputs;
-        self.ask(ANSWERING, |stream, buffer| {
+        self.exchange(RUN_TIMEOUT, |stream, buffer| {
             send(stream, &Request::Run(shapes(inputs)))?;
             send_values(stream, inputs, buffer)?;
             match receive(stream)? {
@@ -132,24 +132,24 @@ impl Drop for Process {
     }
 }
 
-/// A stream that is waited for until a time, or shortly where the program ends.
-struct Patient<'a> {
+/// A stream with a time limit, which is shortened when the program is about to exit.
+struct TimedStream<'a> {
     stream: &'a UnixStream,
     until: Instant,
-    hurries: bool,
+    is_exiting: bool,
 }
 
-impl Patient<'_> {
-    /// Tries until it is done: at least once, as this program may have been stopped meanwhile.
-    fn until_done<T>(&mut self, mut work: impl FnMut(&mut &UnixStream) -> io::Result<T>) -> io::Result<T> {
+impl TimedStream<'_> {
+    /// Retries until success, error or time limit; at least once, as this program may have been suspended meanwhile.
+    fn retry<T>(&mut self, mut work: impl FnMut(&mut &UnixStream) -> io::Result<T>) -> io::Result<T> {
         loop {
             match work(&mut &*self.stream) {
                 Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::Interrupted) => {}
                 done => return done,
             }
-            if !self.hurries && ENDS.load(Ordering::Relaxed) {
-                self.hurries = true;
-                self.until = self.until.min(Instant::now() + LAST);
+            if !self.is_exiting && IS_EXITING.load(Ordering::Relaxed) {
+                self.is_exiting = true;
+                self.until = self.until.min(Instant::now() + EXIT_TIMEOUT);
             }
             if Instant::now() >= self.until {
                 return Err(ErrorKind::TimedOut.into());
@@ -158,15 +158,15 @@ impl Patient<'_> {
     }
 }
 
-impl Read for Patient<'_> {
+impl Read for TimedStream<'_> {
     fn read(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
-        self.until_done(|stream| stream.read(bytes))
+        self.retry(|stream| stream.read(bytes))
     }
 }
 
-impl Write for Patient<'_> {
+impl Write for TimedStream<'_> {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        self.until_done(|stream| stream.write(bytes))
+        self.retry(|stream| stream.write(bytes))
     }
 
     fn flush(&mut self) -> io::Result<()> {
@@ -179,8 +179,8 @@ mod tests {
     use super::*;
 
     fn asked(command: &mut Command, patience: Duration) -> (Process, String) {
-        let mut process = Process::of(command).unwrap();
-        let why = process.ask(patience, |stream, _| receive::<Reply>(stream)).unwrap_err();
+        let mut process = Process::spawn(command).unwrap();
+        let why = process.exchange(patience, |stream, _| receive::<Reply>(stream)).unwrap_err();
         (process, why)
     }
 
@@ -189,13 +189,13 @@ mod tests {
         let (mut process, why) = asked(Command::new("sleep").arg("1000"), Duration::from_millis(100));
         assert_eq!(why, "it gave no answer in 0.1 s");
         assert_eq!(process.child.wait().unwrap().signal(), Some(9));
-        let again = process.ask(LOADING, |stream, _| receive::<Reply>(stream)).unwrap_err();
+        let again = process.exchange(LOAD_TIMEOUT, |stream, _| receive::<Reply>(stream)).unwrap_err();
         assert_eq!(again, why);
     }
 
     #[test]
     fn a_process_that_ends_or_talks_nonsense_is_told_of_at_once() {
-        let shell = |script: &str| asked(Command::new("sh").args(["-c", script]), LOADING).1;
+        let shell = |script: &str| asked(Command::new("sh").args(["-c", script]), LOAD_TIMEOUT).1;
         assert_eq!(shell("exit 3"), "its process ended");
         assert!(shell("kill -ABRT $$").contains("more than 4 GiB of memory"));
         assert!(shell("printf '\\377\\377\\377\\377x' >&0; sleep 1000").contains("too much"));
@@ -205,7 +205,7 @@ mod tests {
     #[test]
     fn more_values_than_any_output_has_are_not_waited_for() {
         let script = "printf '\\33\\0\\0\\0{\"Ran\":[[1,1,99999,99999]]}' >&0; sleep 1000";
-        let mut process = Process::of(Command::new("sh").args(["-c", script])).unwrap();
+        let mut process = Process::spawn(Command::new("sh").args(["-c", script])).unwrap();
         process.outputs = 1;
         assert!(process.run(&[], &mut Vec::new()).unwrap_err().contains("too many values"));
     }

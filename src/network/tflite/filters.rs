@@ -1,30 +1,31 @@
-//! Filters: over all channels of a pixel, over the pixels around it, over those of its own channel.
+//! Convolution kernels: pointwise (1x1), im2col for larger filters, and depthwise. Checked against
+//! `tests/reference.rs`.
 
 use pulp::{Simd, WithSimd};
 
-use super::kernels::{Axis, Size, activated, vectors, vectors_mut};
+use super::kernels::{Axis, Size, activate, vectors, vectors_mut};
 use super::model::Activation;
 use crate::compute::simd::{fma, load};
 
-/// Pixels of which sums are made at once for one block, and for each of two: what 16 registers hold.
-const AT_ONCE: usize = 12;
-const AT_ONCE_OF_TWO: usize = AT_ONCE / 2;
-/// Results of a row that a filter makes at once.
-const ALONG: usize = 8;
+/// Pixels per register tile, for one output block and for each of two: as many sums as 16 registers hold.
+const TILE_PIXELS: usize = 12;
+const TILE_PIXELS_OF_TWO: usize = TILE_PIXELS / 2;
+/// Outputs of a row per tile of a depthwise filter.
+const ROW_TILE: usize = 8;
 
-/// Sums over the channels of each pixel.
+/// Pointwise (1x1) convolution: a matrix product over channels, register-tiled.
 pub struct Pointwise<'a> {
     /// `[block][pixel][lane]`.
     pub input: &'a [f32],
     pub pixels: usize,
-    /// `[block of the result][channel][lane]`.
+    /// `[output block][channel][lane]`.
     pub weights: &'a [f32],
-    /// `[channel of the result]`.
+    /// `[output channel]`.
     pub bias: &'a [f32],
     pub activation: Activation,
-    /// `[block][plane]`, of which the first pixels are made.
+    /// `[block][plane]`; the first `pixels` of each plane are written.
     pub out: &'a mut [f32],
-    /// Values from block to block of the result.
+    /// Values from block to block of the output.
     pub plane: usize,
 }
 
@@ -34,29 +35,30 @@ impl WithSimd for Pointwise<'_> {
     fn with_simd<S: Simd>(mut self, simd: S) {
         let blocks = self.bias.len() / S::F32_LANES;
         for block in (0..blocks / 2).map(|pair| 2 * pair) {
-            self.all::<S, AT_ONCE_OF_TWO, 2>(simd, block);
+            self.fill_block::<S, TILE_PIXELS_OF_TWO, 2>(simd, block);
         }
         if !blocks.is_multiple_of(2) {
-            self.all::<S, AT_ONCE, 1>(simd, blocks - 1);
+            self.fill_block::<S, TILE_PIXELS, 1>(simd, blocks - 1);
         }
     }
 }
 
 impl Pointwise<'_> {
     #[inline(always)]
-    fn all<S: Simd, const N: usize, const M: usize>(&mut self, simd: S, block: usize) {
+    fn fill_block<S: Simd, const N: usize, const M: usize>(&mut self, simd: S, block: usize) {
         let whole = self.pixels / N * N;
+        // Full tiles first, then single pixels.
         for first in (0..whole).step_by(N) {
-            self.sums::<S, N, M>(simd, block, first);
+            self.fill_tile::<S, N, M>(simd, block, first);
         }
         for first in whole..self.pixels {
-            self.sums::<S, 1, M>(simd, block, first);
+            self.fill_tile::<S, 1, M>(simd, block, first);
         }
     }
 
-    /// `N` pixels of `M` blocks.
+    /// Computes `N` pixels of `M` blocks.
     #[inline(always)]
-    fn sums<S: Simd, const N: usize, const M: usize>(&mut self, simd: S, block: usize, first: usize) {
+    fn fill_tile<S: Simd, const N: usize, const M: usize>(&mut self, simd: S, block: usize, first: usize) {
         let (plane, depth) = (self.pixels * S::F32_LANES, self.input.len() / self.pixels);
         let weights: [&[S::f32s]; M] =
             std::array::from_fn(|m| &vectors::<S>(self.weights)[(block + m) * depth..][..depth]);
@@ -78,21 +80,21 @@ impl Pointwise<'_> {
             let out = &mut self.out[(block + m) * self.plane + first * S::F32_LANES..][..N * S::F32_LANES];
             let out: &mut [S::f32s; N] = vectors_mut::<S>(out).try_into().expect("as many as are made");
             for (out, sums) in out.iter_mut().zip(&sums) {
-                *out = activated(simd, self.activation, sums[m]);
+                *out = activate(simd, self.activation, sums[m]);
             }
         }
     }
 }
 
-/// What lies under the filter of each result of a row, as channels of a picture of one row: the filter then is one over channels.
-/// `out` has zeros where nothing is ever written.
-pub fn under_filter(input: &[f32], size: &Size, [down, across]: &[Axis; 2], row: usize, made: &Size, out: &mut [f32]) {
+/// Unfolds the inputs of one output row (im2col): every tap becomes a channel, so that the filter is a pointwise
+/// convolution. Values of `out` that are never written must be 0 (padding of channels).
+pub fn im2col_row(input: &[f32], size: &Size, [down, across]: &[Axis; 2], row: usize, made: &Size, out: &mut [f32]) {
     let (rows, first_row) = down.inside(row, size.rows);
     let taps = (0..down.taps).flat_map(|tap| (0..across.taps).map(move |column| (tap, column)));
     for (place, (tap, column)) in taps.enumerate() {
-        // The results that have this tap in the picture.
-        let from = across.before.saturating_sub(column).div_ceil(across.step);
-        let to = (size.columns + across.before).saturating_sub(column).div_ceil(across.step).min(made.columns);
+        // The outputs for which this tap is within the picture.
+        let from = across.padding.saturating_sub(column).div_ceil(across.step);
+        let to = (size.columns + across.padding).saturating_sub(column).div_ceil(across.step).min(made.columns);
         for channel in 0..size.channels {
             let (depth, lane) = (place * size.channels + channel, channel % size.lanes);
             let block = &mut out[depth / made.lanes * made.plane()..][..made.plane()];
@@ -103,14 +105,14 @@ pub fn under_filter(input: &[f32], size: &Size, [down, across]: &[Axis; 2], row:
                 let line =
                     channel / size.lanes * size.plane() + (first_row + tap - rows.start) * size.columns * size.lanes;
                 let line = &input[line..][..size.columns * size.lanes];
-                let line = &line[(from * across.step + column - across.before) * size.lanes..];
+                let line = &line[(from * across.step + column - across.padding) * size.lanes..];
                 pixels.zip(line.chunks(across.step * size.lanes)).for_each(|(out, input)| *out = input[lane]);
             }
         }
     }
 }
 
-/// A filter for each channel, at steps of 1 or 2 along a row: `weights` are `[block][tap][lane]`.
+/// Depthwise convolution with a stride of 1 or 2 along a row; `weights` are `[block][tap][lane]`.
 pub struct Depthwise<'a> {
     pub input: &'a [f32],
     pub size: Size,
@@ -120,7 +122,7 @@ pub struct Depthwise<'a> {
     pub activation: Activation,
     pub out: &'a mut [f32],
     pub result: Size,
-    /// As many lines as the filter has, with what lies beyond their ends.
+    /// A ring buffer of as many lines as the filter has taps, with padding at both ends.
     pub lines: &'a mut [f32],
 }
 
@@ -150,31 +152,32 @@ impl Depthwise<'_> {
             for (y, out) in out.chunks_exact_mut(result.columns * S::F32_LANES).enumerate() {
                 let (inside, first_row) = down.inside(y, size.rows);
                 let last = first_row + inside.len();
+                // Read each input row into the ring buffer once, when the first output needs it.
                 let next = rows.by_ref();
                 while next.len() > size.rows - last {
                     let (row, values) = next.next().expect("as many as are left");
-                    lines[row % down.taps * line + across.before * S::F32_LANES..][..row_len].copy_from_slice(values);
+                    lines[row % down.taps * line + across.padding * S::F32_LANES..][..row_len].copy_from_slice(values);
                 }
                 let lines: &[f32] = lines;
                 let under = (first_row..)
                     .zip(inside)
                     .map(|(row, tap)| (&lines[row % down.taps * line..][..line], &weights[tap * taps..][..taps]));
                 let out = vectors_mut::<S>(out);
-                let whole = result.columns / ALONG * ALONG;
-                for first in (0..whole).step_by(ALONG) {
-                    filtered::<S, STEP, ALONG>(simd, under.clone(), bias, activation, first, out);
+                let whole = result.columns / ROW_TILE * ROW_TILE;
+                for first in (0..whole).step_by(ROW_TILE) {
+                    filter_tile::<S, STEP, ROW_TILE>(simd, under.clone(), bias, activation, first, out);
                 }
                 for first in whole..result.columns {
-                    filtered::<S, STEP, 1>(simd, under.clone(), bias, activation, first, out);
+                    filter_tile::<S, STEP, 1>(simd, under.clone(), bias, activation, first, out);
                 }
             }
         }
     }
 }
 
-/// `N` results of a row, of lines and the taps on them.
+/// Computes `N` outputs of a row from the lines under the filter and their taps.
 #[inline(always)]
-fn filtered<'a, S: Simd, const STEP: usize, const N: usize>(
+fn filter_tile<'a, S: Simd, const STEP: usize, const N: usize>(
     simd: S,
     under: impl Iterator<Item = (&'a [f32], &'a [f32])>,
     bias: S::f32s,
@@ -193,6 +196,6 @@ fn filtered<'a, S: Simd, const STEP: usize, const N: usize>(
         }
     }
     for (out, sum) in out[first..][..N].iter_mut().zip(sums) {
-        *out = activated(simd, activation, sum);
+        *out = activate(simd, activation, sum);
     }
 }

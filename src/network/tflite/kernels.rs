@@ -1,18 +1,18 @@
-//! The operators, on pictures in blocks of channels: as many as a vector has, side by side, for one pixel after the other.
-//! A step along a row is then a step of one vector, whatever the network's channels (nChw8c of oneDNN).
+//! Operators on pictures in blocks of channels: one vector of channels per pixel, pixels in order. A step along a row
+//! is then one vector, whatever the number of channels (nChw8c layout of oneDNN).
 
 use pulp::{Simd, WithSimd};
 
 use super::model::{Activation, Steps};
 use crate::compute::simd::{fma, load};
 
-/// A picture's size, and how it is in memory.
+/// A picture's size and memory layout.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Size {
     pub rows: usize,
     pub columns: usize,
     pub channels: usize,
-    /// Channels of a block; those of the last one that are too many are never looked at, or meet weights of 0.
+    /// Channels per block; unused channels of the last one are ignored or meet weights of 0.
     pub lanes: usize,
 }
 
@@ -25,55 +25,55 @@ impl Size {
         self.rows * self.columns
     }
 
-    /// Values in memory.
+    /// Returns the number of values in memory.
     pub fn len(&self) -> usize {
         self.blocks() * self.plane()
     }
 
-    /// Values of a block.
+    /// Returns the values per block.
     pub fn plane(&self) -> usize {
         self.pixels() * self.lanes
     }
 }
 
-/// A filter's taps on one axis: their number, the step, and how many lie before the first pixel.
+/// A filter on one axis: number of taps, stride, and padding before the first pixel.
 #[derive(Clone, Copy, Debug)]
 pub struct Axis {
     pub taps: usize,
     pub step: usize,
-    pub before: usize,
+    pub padding: usize,
 }
 
 impl Axis {
-    /// Those of a filter, and how many results they make of so many pixels.
-    fn new(taps: usize, step: usize, beyond: bool, pixels: usize) -> Option<(Self, usize)> {
-        let count = if beyond { pixels.div_ceil(step) } else { pixels.checked_sub(taps)? / step + 1 };
+    /// Creates the axis of a filter; returns it with the number of outputs for `pixels` inputs.
+    fn new(taps: usize, step: usize, is_padded: bool, pixels: usize) -> Option<(Self, usize)> {
+        let count = if is_padded { pixels.div_ceil(step) } else { pixels.checked_sub(taps)? / step + 1 };
         let outside = (count.checked_sub(1)? * step + taps).saturating_sub(pixels);
-        Some((Self { taps, step, before: if beyond { outside / 2 } else { 0 } }, count))
+        Some((Self { taps, step, padding: if is_padded { outside / 2 } else { 0 } }, count))
     }
 
-    /// The taps of a result that lie in the picture, and the pixel under the first of them.
+    /// Returns the taps of output `at` that lie within the picture, and the pixel under the first of them.
     pub fn inside(&self, at: usize, pixels: usize) -> (std::ops::Range<usize>, usize) {
         let first = at * self.step;
-        let from = self.before.saturating_sub(first);
-        let to = (pixels + self.before).saturating_sub(first).min(self.taps);
-        (from..to.max(from), (first + from).saturating_sub(self.before))
+        let from = self.padding.saturating_sub(first);
+        let to = (pixels + self.padding).saturating_sub(first).min(self.taps);
+        (from..to.max(from), (first + from).saturating_sub(self.padding))
     }
 
-    /// Pixels of a line with all that lies beyond its ends, for so many results of it.
+    /// Returns the length of a line with padding, for `results` outputs.
     pub fn line(&self, pixels: usize, results: usize) -> usize {
-        (self.before + pixels).max((results - 1) * self.step + self.taps)
+        (self.padding + pixels).max((results - 1) * self.step + self.taps)
     }
 }
 
-/// The axes of a filter over a picture, and the rows and columns of what it makes.
+/// Returns the axes of a filter over a picture, and the rows and columns of its output.
 pub fn axes(size: &Size, [down, across]: [usize; 2], steps: &Steps) -> Option<([Axis; 2], [usize; 2])> {
-    let (down, rows) = Axis::new(down, steps.down, steps.beyond, size.rows)?;
-    let (across, columns) = Axis::new(across, steps.across, steps.beyond, size.columns)?;
+    let (down, rows) = Axis::new(down, steps.down, steps.is_padded, size.rows)?;
+    let (across, columns) = Axis::new(across, steps.across, steps.is_padded, size.columns)?;
     Some(([down, across], [rows, columns]))
 }
 
-/// Values as vectors: all of them, as every picture has whole ones.
+/// Views values as vectors; there is no remainder, as every picture consists of whole vectors.
 #[inline(always)]
 pub fn vectors<S: Simd>(values: &[f32]) -> &[S::f32s] {
     S::as_simd_f32s(values).0
@@ -85,10 +85,10 @@ pub fn vectors_mut<S: Simd>(values: &mut [f32]) -> &mut [S::f32s] {
 }
 
 #[inline(always)]
-pub fn activated<S: Simd>(simd: S, activation: Activation, sum: S::f32s) -> S::f32s {
+pub fn activate<S: Simd>(simd: S, activation: Activation, sum: S::f32s) -> S::f32s {
     let zero = simd.splat_f32s(0.0);
     match activation {
-        // Few are logistic but those of the mask: a pass of its own does them.
+        // Logistic is rare except at the mask: a separate pass computes it.
         Activation::None | Activation::Logistic => sum,
         Activation::Relu => simd.max_f32s(sum, zero),
         Activation::HardSwish => {
@@ -99,7 +99,7 @@ pub fn activated<S: Simd>(simd: S, activation: Activation, sum: S::f32s) -> S::f
     }
 }
 
-/// 1 / (1 + exp(-x)) of each value.
+/// Applies 1 / (1 + exp(-x)) to each value.
 pub struct Logistic<'a> {
     pub values: &'a mut [f32],
 }
@@ -114,10 +114,10 @@ impl WithSimd for Logistic<'_> {
     }
 }
 
-/// exp(x) to 2e-7 of itself: 2 to the power of a whole number, whose bits are the exponent's, and of a rest.
+/// Computes exp(x) with a relative error of 2e-7: 2^n by the exponent bits, times a Taylor series of the remainder.
 #[inline(always)]
 fn exp(x: f32) -> f32 {
-    /// Added to a float below 2^22, it leaves the nearest whole number in the last bits.
+    /// Adding it to a float below 2^22 rounds to an integer, which is then in the low bits.
     const WHOLE: f32 = 12_582_912.0;
     let power = (x * std::f32::consts::LOG2_E).clamp(-126.0, 126.0);
     let whole = power + WHOLE;
@@ -126,7 +126,7 @@ fn exp(x: f32) -> f32 {
     f32::from_bits(series.to_bits().wrapping_add(whole.to_bits() << 23))
 }
 
-/// How many channels a vector has.
+/// Returns the number of channels per vector.
 pub struct Lanes;
 
 impl WithSimd for Lanes {
@@ -137,18 +137,18 @@ impl WithSimd for Lanes {
     }
 }
 
-/// What is done to each value by itself, or to two of the same place; `gate` has a value for each channel.
-pub struct Each<'a> {
+/// Elementwise `a * gate + b` with activation; `gate` has one value per channel.
+pub struct Elementwise<'a> {
     pub a: &'a [f32],
     pub gate: Option<&'a [f32]>,
     pub b: Option<&'a [f32]>,
     pub activation: Activation,
     pub out: &'a mut [f32],
-    /// Values of a block.
+    /// Values per block.
     pub plane: usize,
 }
 
-impl WithSimd for Each<'_> {
+impl WithSimd for Elementwise<'_> {
     type Output = ();
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
@@ -160,15 +160,15 @@ impl WithSimd for Each<'_> {
             let out = vectors_mut::<S>(out).iter_mut().zip(a);
             match b {
                 Some(b) => out.zip(vectors::<S>(&b[block * plane..][..plane])).for_each(|((out, a), b)| {
-                    *out = activated(simd, activation, fma(simd, *a, gate, *b));
+                    *out = activate(simd, activation, fma(simd, *a, gate, *b));
                 }),
-                None => out.for_each(|(out, a)| *out = activated(simd, activation, simd.mul_f32s(*a, gate))),
+                None => out.for_each(|(out, a)| *out = activate(simd, activation, simd.mul_f32s(*a, gate))),
             }
         }
     }
 }
 
-/// The mean of each channel of a picture, or of the sum of two.
+/// The mean of each channel of a picture, or of the sum of two pictures.
 pub struct Mean<'a> {
     pub a: &'a [f32],
     pub b: Option<&'a [f32]>,
@@ -194,16 +194,16 @@ impl WithSimd for Mean<'_> {
     }
 }
 
-/// To twice the size, between the middles of pixels.
-pub struct Enlarge<'a> {
+/// Bilinear upsampling to twice the size, with half-pixel centres.
+pub struct Upsample<'a> {
     pub input: &'a [f32],
     pub size: Size,
-    /// A row between two.
+    /// Working memory: one vertically interpolated row.
     pub row: &'a mut [f32],
     pub out: &'a mut [f32],
 }
 
-impl WithSimd for Enlarge<'_> {
+impl WithSimd for Upsample<'_> {
     type Output = ();
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {

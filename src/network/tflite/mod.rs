@@ -1,6 +1,6 @@
-//! Networks in TFLite files of the kind that tells persons from rooms: MobileNet-like ones for one picture, made of ten kinds
-//! of operators ([`model::Kind`]), run on one thread with the machine's vectors. Weights are packed once; the memory of pictures
-//! between the operators is shared as soon as it is free.
+//! TFLite networks for person segmentation: MobileNet-like, with a single input and ten kinds of operators
+//! ([`model::Kind`]), run on one thread with SIMD. Weights are packed once; memory of intermediate pictures is reused
+//! as soon as it is free.
 
 mod filters;
 mod kernels;
@@ -14,13 +14,13 @@ use pulp::Arch;
 
 pub use model::is_tflite;
 
-use self::filters::{Depthwise, Pointwise, under_filter};
-use self::kernels::{Each, Enlarge, Logistic, Mean};
+use self::filters::{Depthwise, Pointwise, im2col_row};
+use self::kernels::{Elementwise, Logistic, Mean, Upsample};
 use self::model::{Activation, Model};
 use self::plan::{Plan, Step, Work};
 use super::{Engine, Network, Port, Tensor};
 
-/// A network that runs here.
+/// A network run by this module.
 pub struct Tflite {
     plan: Plan,
     arch: Arch,
@@ -29,10 +29,10 @@ pub struct Tflite {
 }
 
 impl Tflite {
-    /// Reads a file.
+    /// Loads a TFLite file.
     ///
     /// # Errors
-    /// It is cut or no TFLite file, or has what none of the operators here is.
+    /// The file is truncated, not TFLite, or uses unsupported operators.
     pub fn load(bytes: &[u8]) -> Result<Network, String> {
         let model = Model::read(bytes)?;
         let port = |tensor: usize| {
@@ -95,7 +95,7 @@ impl Step {
                 let input_row = &mut scratch[..under.len()];
                 input_row.fill(0.0);
                 for row in 0..result.rows {
-                    under_filter(input, &size, axes, row, under, input_row);
+                    im2col_row(input, &size, axes, row, under, input_row);
                     let out = &mut out[row * row_len..];
                     arch.dispatch(Pointwise { input: input_row, pixels, weights, bias, activation, out, plane });
                 }
@@ -104,7 +104,7 @@ impl Step {
                 let (axes, lines) = (*axes, &mut scratch[..*lines]);
                 arch.dispatch(Depthwise { input, size, axes, weights, bias, activation, out, result, lines });
             }
-            Work::Doubling { weights, bias } => {
+            Work::TransposedConvolution { weights, bias } => {
                 let (lanes, sums) = (size.lanes, &mut scratch[..pixels * bias.len()]);
                 arch.dispatch(Pointwise { input, pixels, weights, bias, activation, out: sums, plane: size.plane() });
                 for (y, out) in out.chunks_exact_mut(result.columns).enumerate() {
@@ -115,14 +115,14 @@ impl Step {
                     }
                 }
             }
-            Work::Each { gate, b } => {
+            Work::Elementwise { gate, b } => {
                 let gate = gate.map(|slot| &slots[slot][..]);
-                arch.dispatch(Each { a: input, gate, b: seen(b), activation, out, plane });
+                arch.dispatch(Elementwise { a: input, gate, b: seen(b), activation, out, plane });
             }
             Work::Mean { b } => arch.dispatch(Mean { a: input, b: seen(b), out, plane: size.plane() }),
-            Work::Enlarge => {
+            Work::Upsample => {
                 let row = &mut scratch[..size.columns * size.lanes];
-                arch.dispatch(Enlarge { input, size, row, out });
+                arch.dispatch(Upsample { input, size, row, out });
             }
         }
         if activation == Activation::Logistic {

@@ -1,25 +1,25 @@
-//! What a TFLite file says: tensors, and operators between them (schema.fbs of TensorFlow Lite, version 3).
+//! Parses TFLite files: tensors and operators (schema.fbs of TensorFlow Lite, version 3).
 
 use half::f16;
 
-use super::table::{CUT, Table};
-use crate::network::MOST_VALUES;
+use super::table::{TRUNCATED, Table};
+use crate::network::MAX_VALUES;
 
-/// Values of all tensors together, at most: a network for one picture at a time has a few millions.
-pub const MOST_IN_ALL: usize = 16 * MOST_VALUES;
-/// Tensors and operators, at most.
-const MOST_PARTS: usize = 2000;
+/// Maximum number of values of all tensors together: a network for single pictures has a few millions.
+pub const MAX_TOTAL_VALUES: usize = 16 * MAX_VALUES;
+/// Maximum number of tensors, and of operators.
+const MAX_PARTS: usize = 2000;
 
 /// A tensor: a picture `[1, rows, columns, channels]`, or constants.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Tensor {
     pub name: String,
     pub shape: Vec<usize>,
-    /// Its values, where the file has them.
+    /// Its values, if it is constant.
     pub constant: Option<Vec<f32>>,
 }
 
-/// What is done to a sum at last.
+/// The activation applied to a sum.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Activation {
     #[default]
@@ -29,12 +29,12 @@ pub enum Activation {
     Logistic,
 }
 
-/// A filter's steps, and whether it goes beyond the picture's edges, where zeros are.
+/// A filter's strides, and whether the picture is zero-padded at its edges ("same" padding).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Steps {
     pub down: usize,
     pub across: usize,
-    pub beyond: bool,
+    pub is_padded: bool,
 }
 
 /// An operator.
@@ -44,19 +44,20 @@ pub enum Kind {
     Convolution(Steps),
     /// Input, weights `[1, rows, columns, channels]`, bias.
     Depthwise(Steps),
-    /// Input, weights `[out, 2, 2, in]`, bias: each pixel becomes four (an operator of MediaPipe's).
-    Doubling,
+    /// Input, weights `[out, 2, 2, in]`, bias: transposed convolution with stride 2, each pixel becomes four (a custom
+    /// operator of MediaPipe).
+    TransposedConvolution,
     Activation(Activation),
-    /// The mean of each channel over the picture.
+    /// The mean of each channel over the picture (global average pooling).
     Mean,
-    /// One times the other, which has a value for each channel.
+    /// The product of a picture and one value per channel.
     Scale,
     Sum,
-    /// To twice the size, between the middles of pixels.
-    Enlarge,
+    /// Bilinear upsampling to twice the size, with half-pixel centres.
+    Upsample,
 }
 
-/// An operator and the tensors that it is between.
+/// An operator, with the indices of its tensors.
 #[derive(Clone, Debug)]
 pub struct Operator {
     pub kind: Kind,
@@ -69,19 +70,19 @@ pub struct Operator {
 #[derive(Clone, Debug)]
 pub struct Model {
     pub tensors: Vec<Tensor>,
-    /// In the order in which they can be done.
+    /// In order of execution.
     pub operators: Vec<Operator>,
     pub input: usize,
     pub output: usize,
 }
 
-/// Whether a file is of this kind.
+/// Returns whether a file is TFLite.
 pub fn is_tflite(bytes: &[u8]) -> bool {
     bytes.get(4..8) == Some(b"TFL3")
 }
 
 impl Model {
-    /// Reads a file.
+    /// Parses a file.
     pub fn read(bytes: &[u8]) -> Result<Self, String> {
         let root = Table::root(bytes)?;
         let codes = root.tables(1)?.iter().map(code).collect::<Result<Vec<_>, String>>()?;
@@ -89,27 +90,28 @@ impl Model {
         let [graph] = root.tables(2)?[..] else { return Err("it has not one graph".to_owned()) };
         let tables = graph.tables(0)?;
         let steps = graph.tables(3)?;
-        if tables.len().max(steps.len()) > MOST_PARTS {
-            return Err(format!("it has more than {MOST_PARTS} tensors or operators"));
+        if tables.len().max(steps.len()) > MAX_PARTS {
+            return Err(format!("it has more than {MAX_PARTS} tensors or operators"));
         }
         let mut tensors = tables.iter().map(|table| tensor(table, &buffers)).collect::<Result<Vec<_>, String>>()?;
         let in_all = tensors.iter().map(|tensor| tensor.shape.iter().product::<usize>()).sum::<usize>();
-        if in_all > MOST_IN_ALL {
-            return Err(format!("its tensors have more than {MOST_IN_ALL} values"));
+        if in_all > MAX_TOTAL_VALUES {
+            return Err(format!("its tensors have more than {MAX_TOTAL_VALUES} values"));
         }
         let mut operators = Vec::new();
         for step in steps {
-            let code = codes.get(step.int(0)? as usize).ok_or(CUT)?;
-            let index = |k: i32| usize::try_from(k).ok().filter(|&k| k < tensors.len()).ok_or_else(|| CUT.to_owned());
+            let code = codes.get(step.int(0)? as usize).ok_or(TRUNCATED)?;
+            let index =
+                |k: i32| usize::try_from(k).ok().filter(|&k| k < tensors.len()).ok_or_else(|| TRUNCATED.to_owned());
             let inputs = step.ints(1)?.into_iter().map(index).collect::<Result<Vec<_>, String>>()?;
             let [output] = step.ints(2)?[..] else { return Err("an operator gives more than one tensor".to_owned()) };
             let output = index(output)?;
             let Some((kind, activation)) = kind(code, &step)? else {
-                // Constants in 16 bits become some in 32.
-                let [from] = inputs[..] else { return Err(CUT.to_owned()) };
+                // Dequantisation: 16-bit constants become 32-bit ones here.
+                let [from] = inputs[..] else { return Err(TRUNCATED.to_owned()) };
                 let values = tensors[from].constant.take().unwrap_or_default();
                 if values.len() != tensors[output].shape.iter().product::<usize>() {
-                    return Err(CUT.to_owned());
+                    return Err(TRUNCATED.to_owned());
                 }
                 tensors[output].constant = Some(values);
                 continue;
@@ -124,40 +126,40 @@ impl Model {
     }
 }
 
-/// Which operator one of the file's codes is: a number, and the name where it is one of somebody's own.
+/// Parses an operator code: its number, and its name if it is a custom one.
 fn code(table: &Table<'_>) -> Result<(i32, String), String> {
     let number = i32::from(table.byte(0)?).max(table.int(3)?);
     Ok((number, String::from_utf8_lossy(table.bytes(1)?).into_owned()))
 }
 
 fn tensor(table: &Table<'_>, buffers: &[Table<'_>]) -> Result<Tensor, String> {
-    let shape = table.ints(0)?.into_iter().map(|side| usize::try_from(side).map_err(|_| CUT.to_owned()));
+    let shape = table.ints(0)?.into_iter().map(|side| usize::try_from(side).map_err(|_| TRUNCATED.to_owned()));
     let shape = shape.collect::<Result<Vec<_>, String>>()?;
     let name = String::from_utf8_lossy(table.bytes(3)?).into_owned();
-    let count = shape.iter().try_fold(1usize, |all, &side| all.checked_mul(side)).filter(|&all| all <= MOST_VALUES);
-    let count = count.ok_or_else(|| format!("{name:?} has more than {MOST_VALUES} values: {shape:?}"))?;
-    let bytes = buffers.get(table.int(2)? as usize).ok_or(CUT)?.bytes(0)?;
+    let count = shape.iter().try_fold(1usize, |all, &side| all.checked_mul(side)).filter(|&all| all <= MAX_VALUES);
+    let count = count.ok_or_else(|| format!("{name:?} has more than {MAX_VALUES} values: {shape:?}"))?;
+    let bytes = buffers.get(table.int(2)? as usize).ok_or(TRUNCATED)?.bytes(0)?;
     let values: Vec<f32> = match table.byte(1)? {
         0 => bytes.as_chunks().0.iter().map(|four| f32::from_le_bytes(*four)).collect(),
         1 => bytes.as_chunks().0.iter().map(|two| f16::from_le_bytes(*two).to_f32()).collect(),
-        // Sizes and axes.
+        // Shapes and axes.
         2 => bytes.as_chunks().0.iter().map(|four| i32::from_le_bytes(*four) as f32).collect(),
         _ => return Err(format!("{name:?} is neither of floats nor of sizes")),
     };
     if !values.is_empty() && values.len() != count {
-        return Err(CUT.to_owned());
+        return Err(TRUNCATED.to_owned());
     }
     Ok(Tensor { name, shape, constant: (!values.is_empty()).then_some(values) })
 }
 
-/// What an operator does, and what to the result at last; `None` where it only makes other numbers of constants.
+/// Parses an operator and its activation; `None` if it only converts constants.
 fn kind((code, name): &(i32, String), step: &Table<'_>) -> Result<Option<(Kind, Activation)>, String> {
     let options = step.table(4)?;
     let byte = |number: usize| options.map_or(Ok(0), |options| options.byte(number));
     let int = |number: usize| options.map_or(Ok(0), |options| options.int(number));
     let steps = || -> Result<Steps, String> {
         let side = |number: usize| Ok::<_, String>(usize::try_from(int(number)?.max(1)).expect("at least 1"));
-        Ok(Steps { beyond: byte(0)? == 0, across: side(1)?, down: side(2)? })
+        Ok(Steps { is_padded: byte(0)? == 0, across: side(1)?, down: side(2)? })
     };
     let activation = |number: usize| match byte(number)? {
         0 => Ok(Activation::None),
@@ -172,8 +174,8 @@ fn kind((code, name): &(i32, String), step: &Table<'_>) -> Result<Option<(Kind, 
         14 => (Kind::Activation(Activation::Logistic), Activation::None),
         18 => (Kind::Scale, activation(0)?),
         19 => (Kind::Activation(Activation::Relu), Activation::None),
-        23 if byte(2)? == 0 && byte(3)? != 0 => (Kind::Enlarge, Activation::None),
-        32 if name == "Convolution2DTransposeBias" => (Kind::Doubling, Activation::None),
+        23 if byte(2)? == 0 && byte(3)? != 0 => (Kind::Upsample, Activation::None),
+        32 if name == "Convolution2DTransposeBias" => (Kind::TransposedConvolution, Activation::None),
         40 => (Kind::Mean, Activation::None),
         117 => (Kind::Activation(Activation::HardSwish), Activation::None),
         _ => return Err(format!("operator {code} {name:?} is none of those that are built in")),

@@ -1,42 +1,43 @@
-//! The steps of a network, with the memory that they share: each is checked once, so that none can fail when it runs.
+//! The execution plan of a network: its steps and their shared memory. Each step is checked once, so that none can fail
+//! at run time.
 
 use pulp::Arch;
 
 use super::kernels::{Axis, Lanes, Size, axes};
-use super::model::{Activation, Kind, MOST_IN_ALL, Model, Operator, Tensor};
+use super::model::{Activation, Kind, MAX_TOTAL_VALUES, Model, Operator, Tensor};
 
-/// What a step does.
+/// The operation of a step.
 pub enum Work {
-    /// Sums over channels, of the pixels themselves or of a row of what is under a filter.
+    /// Pointwise convolution, of the pixels themselves or of an im2col row (`under`).
     Pointwise {
         weights: Vec<f32>,
         bias: Vec<f32>,
         under: Option<([Axis; 2], Size)>,
     },
-    /// Sums over the pixels under a filter; and how many values its lines have.
+    /// Depthwise convolution; `lines` is the size of its ring buffer.
     Depthwise {
         weights: Vec<f32>,
         bias: Vec<f32>,
         axes: [Axis; 2],
         lines: usize,
     },
-    /// Each pixel becomes four, of one channel: the sums are `[pixel][down][across]`.
-    Doubling {
+    /// Transposed convolution with stride 2 and one output channel: the sums are `[pixel][down][across]`.
+    TransposedConvolution {
         weights: Vec<f32>,
         bias: Vec<f32>,
     },
-    /// Of two and a gate, which of them are there.
-    Each {
+    /// Elementwise operation with optional gate and second summand.
+    Elementwise {
         gate: Option<usize>,
         b: Option<usize>,
     },
     Mean {
         b: Option<usize>,
     },
-    Enlarge,
+    Upsample,
 }
 
-/// A step: from slot to slot.
+/// A step, which reads and writes slots.
 pub struct Step {
     pub work: Work,
     pub activation: Activation,
@@ -49,27 +50,27 @@ pub struct Step {
 /// A network that is ready to run.
 pub struct Plan {
     pub steps: Vec<Step>,
-    /// Values of each slot.
+    /// Number of values of each slot.
     pub slots: Vec<usize>,
-    /// Values of the memory that a step needs for itself.
+    /// Number of values of the working memory of the steps.
     pub scratch: usize,
     pub input: (usize, Size),
     pub output: (usize, Size),
 }
 
-/// What a tensor is kept in.
-struct Kept {
+/// The slot of a tensor.
+struct Allocation {
     slot: usize,
     size: Size,
-    /// How many steps still want it.
-    wanted: usize,
+    /// Number of steps that still read it.
+    uses: usize,
 }
 
-/// Makes a plan, tensor by tensor.
+/// Builds a plan, operator by operator.
 struct Planner<'a> {
     model: &'a Model,
     lanes: usize,
-    kept: Vec<Option<Kept>>,
+    kept: Vec<Option<Allocation>>,
     free: Vec<usize>,
     plan: Plan,
 }
@@ -85,7 +86,7 @@ fn size_of(tensor: &Tensor, lanes: impl Fn(usize) -> usize) -> Result<Size, Stri
 }
 
 impl Plan {
-    /// The plan of a model on this machine.
+    /// Creates the plan of a model for this machine.
     pub fn new(model: &Model) -> Result<Self, String> {
         let input = size_of(&model.tensors[model.input], |channels| channels)?;
         let plan =
@@ -93,14 +94,14 @@ impl Plan {
         let kept = model.tensors.iter().map(|_| None).collect();
         let lanes = Arch::new().dispatch(Lanes);
         let mut planner = Planner { model, lanes, kept, free: Vec::new(), plan };
-        planner.kept[model.input] = Some(Kept { slot: 0, size: input, wanted: planner.wanted(model.input) });
+        planner.kept[model.input] = Some(Allocation { slot: 0, size: input, uses: planner.count_uses(model.input) });
         let mut operators = model.operators.iter().peekable();
         while let Some(operator) = operators.next() {
             let mut operator = operator.clone();
-            // What follows and is wanted by nothing else is done with it.
+            // Fuse the next operator if nothing else reads this output.
             while let Some(next) = operators.peek()
-                && planner.wanted(operator.output) == 1
-                && let Some(both) = joined(&operator, next)
+                && planner.count_uses(operator.output) == 1
+                && let Some(both) = fuse(&operator, next)
             {
                 operator = both;
                 operators.next();
@@ -112,13 +113,13 @@ impl Plan {
     }
 }
 
-/// Two operators as one, where the second takes what the first gives.
-fn joined(first: &Operator, second: &Operator) -> Option<Operator> {
+/// Fuses two operators into one, if the second reads the output of the first and the combination is supported.
+fn fuse(first: &Operator, second: &Operator) -> Option<Operator> {
     let other = |k: usize| second.inputs.get(1 - k).copied().filter(|&other| other != first.output);
     let place = second.inputs.iter().position(|&input| input == first.output)?;
     let mut both = Operator { output: second.output, ..first.clone() };
     match (first.kind, second.kind) {
-        (_, Kind::Activation(activation)) if first.activation == Activation::None && takes(first.kind) => {
+        (_, Kind::Activation(activation)) if first.activation == Activation::None && fuses_activation(first.kind) => {
             both.activation = activation;
         }
         (Kind::Scale, Kind::Sum) if first.activation == Activation::None && first.inputs.len() == 2 => {
@@ -133,25 +134,25 @@ fn joined(first: &Operator, second: &Operator) -> Option<Operator> {
     Some(both)
 }
 
-/// Whether a step can do an activation at last.
-fn takes(kind: Kind) -> bool {
-    matches!(kind, Kind::Convolution(_) | Kind::Depthwise(_) | Kind::Doubling | Kind::Sum)
+/// Returns whether a step can apply an activation to its result.
+fn fuses_activation(kind: Kind) -> bool {
+    matches!(kind, Kind::Convolution(_) | Kind::Depthwise(_) | Kind::TransposedConvolution | Kind::Sum)
 }
 
 impl Planner<'_> {
-    /// How many operators take a tensor, and one more for the output.
-    fn wanted(&self, tensor: usize) -> usize {
+    /// Returns how many operators read a tensor; the network's output counts as one more.
+    fn count_uses(&self, tensor: usize) -> usize {
         let by = self.model.operators.iter().flat_map(|operator| &operator.inputs).filter(|&&input| input == tensor);
         by.count() + usize::from(tensor == self.model.output)
     }
 
-    fn picture(&self, tensor: usize) -> Result<(usize, Size), String> {
+    fn find_picture(&self, tensor: usize) -> Result<(usize, Size), String> {
         let kept = self.kept[tensor].as_ref();
         kept.map(|kept| (kept.slot, kept.size))
             .ok_or_else(|| format!("{:?} is taken before it is given", self.model.tensors[tensor].name))
     }
 
-    /// Constants of a shape; `None` in it is any size.
+    /// Returns the constants of a tensor; `None` in `shape` matches any size.
     fn constant(&self, tensor: usize, shape: &[Option<usize>]) -> Result<(&[f32], &[usize]), String> {
         let tensor = &self.model.tensors[tensor];
         let fits = tensor.shape.len() == shape.len()
@@ -170,13 +171,13 @@ impl Planner<'_> {
         Ok(bias)
     }
 
-    /// Channels in whole vectors.
+    /// Rounds channels up to whole vectors.
     fn padded(&self, channels: usize) -> usize {
         channels.next_multiple_of(self.lanes)
     }
 
-    /// Weights `[out][depth]` as [`super::kernels::Pointwise`] takes them.
-    fn packed(&self, weights: &[f32], depth: usize) -> Vec<f32> {
+    /// Packs weights `[out][depth]` for [`super::kernels::Pointwise`].
+    fn pack_weights(&self, weights: &[f32], depth: usize) -> Vec<f32> {
         let (out, all, lanes) = (weights.len() / depth, self.padded(depth), self.lanes);
         let mut packed = vec![0.0; self.padded(out) * all];
         for (channel, weights) in weights.chunks_exact(depth).enumerate() {
@@ -187,24 +188,28 @@ impl Planner<'_> {
         packed
     }
 
-    /// Sees to it that there is so much memory for a step's own use.
-    fn scratch(&mut self, values: usize) -> Result<(), String> {
+    /// Ensures working memory for `values` values.
+    fn reserve_scratch(&mut self, values: usize) -> Result<(), String> {
         self.plan.scratch = self.plan.scratch.max(values);
         self.check_memory()
     }
 
     fn check_memory(&self) -> Result<(), String> {
         let values = self.plan.slots.iter().chain([&self.plan.scratch]).sum::<usize>();
-        if values > MOST_IN_ALL { Err(format!("it takes memory for more than {MOST_IN_ALL} values")) } else { Ok(()) }
+        if values > MAX_TOTAL_VALUES {
+            Err(format!("it takes memory for more than {MAX_TOTAL_VALUES} values"))
+        } else {
+            Ok(())
+        }
     }
 
     fn add(&mut self, operator: &Operator) -> Result<(), String> {
         let tensor = &self.model.tensors[operator.output];
         let wrong = || format!("an operator cannot make {:?}: {:?}", tensor.name, tensor.shape);
         let [first, others @ ..] = &operator.inputs[..] else { return Err(wrong()) };
-        let (input, size) = self.picture(*first)?;
+        let (input, size) = self.find_picture(*first)?;
         let lanes = self.lanes;
-        let result = size_of(tensor, |_| if operator.kind == Kind::Doubling { 1 } else { lanes })?;
+        let result = size_of(tensor, |_| if operator.kind == Kind::TransposedConvolution { 1 } else { lanes })?;
         let in_vectors = size.lanes == lanes;
         let made = |[rows, columns]: [usize; 2], channels: usize| Size { rows, columns, channels, ..result };
         let like_input = Size { lanes: result.lanes, ..size };
@@ -214,11 +219,11 @@ impl Planner<'_> {
                 let ([out, down, across], bias) = ([shape[0], shape[1], shape[2]], self.bias(bias, shape[0])?);
                 let (axes, sides) = axes(&size, [down, across], &steps).ok_or_else(wrong)?;
                 let depth = down * across * size.channels;
-                let weights = self.packed(weights, depth);
+                let weights = self.pack_weights(weights, depth);
                 let alone = in_vectors && [down, across, steps.down, steps.across] == [1; 4];
                 let row = Size { rows: 1, columns: sides[1], channels: depth, lanes };
                 if !alone {
-                    self.scratch(row.len())?;
+                    self.reserve_scratch(row.len())?;
                 }
                 (Work::Pointwise { weights, bias, under: (!alone).then_some((axes, row)) }, made(sides, out))
             }
@@ -234,44 +239,45 @@ impl Planner<'_> {
                 }
                 let bias = self.bias(bias, size.channels)?;
                 let lines = axes[0].taps * axes[1].line(size.columns, sides[1]) * lanes;
-                self.scratch(lines)?;
+                self.reserve_scratch(lines)?;
                 (Work::Depthwise { weights: spread, bias, axes, lines }, made(sides, size.channels))
             }
-            (Kind::Doubling, &[weights, bias]) if in_vectors => {
+            (Kind::TransposedConvolution, &[weights, bias]) if in_vectors => {
                 let (weights, _) = self.constant(weights, &[Some(1), Some(2), Some(2), Some(size.channels)])?;
                 let (bias, _) = self.constant(bias, &[Some(1)])?;
-                let (mut four, weights) = (vec![bias[0]; 4], self.packed(weights, size.channels));
+                let (mut four, weights) = (vec![bias[0]; 4], self.pack_weights(weights, size.channels));
                 four.resize(self.padded(4), 0.0);
-                self.scratch(size.pixels() * four.len())?;
-                (Work::Doubling { weights, bias: four }, made([2 * size.rows, 2 * size.columns], 1))
+                self.reserve_scratch(size.pixels() * four.len())?;
+                (Work::TransposedConvolution { weights, bias: four }, made([2 * size.rows, 2 * size.columns], 1))
             }
-            (Kind::Activation(_), []) if in_vectors => (Work::Each { gate: None, b: None }, like_input),
+            (Kind::Activation(_), []) if in_vectors => (Work::Elementwise { gate: None, b: None }, like_input),
             (Kind::Scale, &[gate, ref b @ ..]) if in_vectors => {
-                let ((gate, gate_size), b) = (self.picture(gate)?, b.first().map(|&b| self.picture(b)).transpose()?);
+                let ((gate, gate_size), b) =
+                    (self.find_picture(gate)?, b.first().map(|&b| self.find_picture(b)).transpose()?);
                 let is_gate = gate_size == Size { rows: 1, columns: 1, ..size };
                 if !is_gate || b.is_some_and(|(_, b)| b != size) {
                     return Err(wrong());
                 }
-                (Work::Each { gate: Some(gate), b: b.map(|(slot, _)| slot) }, like_input)
+                (Work::Elementwise { gate: Some(gate), b: b.map(|(slot, _)| slot) }, like_input)
             }
             (Kind::Sum, &[b]) if in_vectors => {
-                let (b, b_size) = self.picture(b)?;
+                let (b, b_size) = self.find_picture(b)?;
                 if b_size != size {
                     return Err(wrong());
                 }
-                (Work::Each { gate: None, b: Some(b) }, like_input)
+                (Work::Elementwise { gate: None, b: Some(b) }, like_input)
             }
             (Kind::Mean, others) if in_vectors => {
-                // The axes, or the other of a sum, which has axes of its own no more.
-                let b = others.iter().find_map(|&other| self.picture(other).ok());
+                // The second input is either the axes, or the second summand of a fused sum.
+                let b = others.iter().find_map(|&other| self.find_picture(other).ok());
                 if b.is_some_and(|(_, b)| b != size) {
                     return Err(wrong());
                 }
                 (Work::Mean { b: b.map(|(slot, _)| slot) }, Size { rows: 1, columns: 1, ..size })
             }
-            (Kind::Enlarge, _) if in_vectors => {
-                self.scratch(size.columns * lanes)?;
-                (Work::Enlarge, made([2 * size.rows, 2 * size.columns], size.channels))
+            (Kind::Upsample, _) if in_vectors => {
+                self.reserve_scratch(size.columns * lanes)?;
+                (Work::Upsample, made([2 * size.rows, 2 * size.columns], size.channels))
             }
             _ => return Err(wrong()),
         };
@@ -282,18 +288,20 @@ impl Planner<'_> {
             Kind::Activation(activation) => activation,
             _ => operator.activation,
         };
-        let output = self.slot(result.len());
+        let output = self.allocate_slot(result.len());
         self.check_memory()?;
         self.plan.steps.push(Step { work, activation, input, size, output, result });
         for &tensor in &operator.inputs {
-            self.let_go(tensor);
+            self.release(tensor);
         }
-        self.kept[operator.output] = Some(Kept { slot: output, size: result, wanted: self.wanted(operator.output) });
+        self.kept[operator.output] =
+            Some(Allocation { slot: output, size: result, uses: self.count_uses(operator.output) });
         Ok(())
     }
 
-    /// A slot of so many values at least: one that is free, the least of those that are large enough, or the largest.
-    fn slot(&mut self, values: usize) -> usize {
+    /// Allocates a slot for `values` values: the smallest free one that is large enough, or else the largest free one,
+    /// enlarged.
+    fn allocate_slot(&mut self, values: usize) -> usize {
         let lens = &self.plan.slots;
         let fits = |&&slot: &&usize| (lens[slot] < values, lens[slot].abs_diff(values));
         match self.free.iter().min_by_key(fits).copied() {
@@ -309,10 +317,10 @@ impl Planner<'_> {
         }
     }
 
-    fn let_go(&mut self, tensor: usize) {
+    fn release(&mut self, tensor: usize) {
         if let Some(kept) = &mut self.kept[tensor] {
-            kept.wanted -= 1;
-            if kept.wanted == 0 {
+            kept.uses -= 1;
+            if kept.uses == 0 {
                 self.free.push(kept.slot);
                 self.kept[tensor] = None;
             }

@@ -7,7 +7,7 @@ mod reference;
 use file::{Value, table_file};
 use reference::reference;
 
-/// Numbers of no pattern between -1 and 1.
+/// Returns pseudo-random numbers between -1 and 1.
 fn noise(seed: &mut u32, count: usize) -> Vec<f32> {
     let mut next = || {
         *seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
@@ -16,7 +16,7 @@ fn noise(seed: &mut u32, count: usize) -> Vec<f32> {
     (0..count).map(|_| next()).collect()
 }
 
-/// Puts a network together, operator by operator.
+/// Builds a network operator by operator.
 struct Builder {
     model: Model,
     seed: u32,
@@ -38,7 +38,7 @@ impl Builder {
         self.model.tensors.len() - 1
     }
 
-    /// An operator on these tensors that makes a picture of this shape; what it makes.
+    /// Adds an operator on these tensors with an output of this shape; returns the output's index.
     fn add(&mut self, kind: Kind, activation: Activation, inputs: &[usize], shape: [usize; 4]) -> usize {
         let Model { tensors, operators, output, .. } = &mut self.model;
         tensors.push(Part { name: "p".into(), shape: shape.to_vec(), constant: None });
@@ -49,7 +49,7 @@ impl Builder {
 
     fn filter(&mut self, out: Option<usize>, taps: [usize; 2], steps: Steps, activation: Activation) -> usize {
         let [_, rows, columns, channels] = self.shape();
-        let count = |pixels: usize, taps: usize, step: usize| match steps.beyond {
+        let count = |pixels: usize, taps: usize, step: usize| match steps.is_padded {
             true => pixels.div_ceil(step),
             false => (pixels - taps) / step + 1,
         };
@@ -69,7 +69,7 @@ impl Builder {
         let wanted = reference(&self.model, &values);
         let mut outputs = Vec::new();
         let mut network = Tflite::of(&self.model).unwrap();
-        // Twice: what is left of the first must not be seen in the second.
+        // Twice, so that remains of the first run would show in the second.
         for _ in 0..2 {
             network.run(&[Tensor { shape: shape.clone(), values: values.clone() }], &mut outputs).unwrap();
         }
@@ -82,11 +82,11 @@ impl Builder {
     }
 }
 
-const ONE: Steps = Steps { down: 1, across: 1, beyond: true };
-const TWO: Steps = Steps { down: 2, across: 2, beyond: true };
+const ONE: Steps = Steps { down: 1, across: 1, is_padded: true };
+const TWO: Steps = Steps { down: 2, across: 2, is_padded: true };
 const FIRST: (Option<usize>, [usize; 2], Steps) = (Some(21), [3, 3], TWO);
 
-/// A network that has begun as those for pictures do.
+/// Returns a network with a first layer like those for pictures.
 fn begun(rows: usize, columns: usize) -> Builder {
     let mut net = Builder::new([1, rows, columns, 3]);
     net.filter(FIRST.0, FIRST.1, FIRST.2, Activation::HardSwish);
@@ -95,8 +95,8 @@ fn begun(rows: usize, columns: usize) -> Builder {
 
 #[test]
 fn a_filter_is_the_sum_of_what_lies_under_it() {
-    let within = Steps { beyond: false, ..ONE };
-    let skewed = Steps { down: 3, across: 2, beyond: true };
+    let within = Steps { is_padded: false, ..ONE };
+    let skewed = Steps { down: 3, across: 2, is_padded: true };
     for (taps, steps) in [([3, 3], TWO), ([1, 1], ONE), ([5, 2], skewed), ([3, 4], within), ([1, 1], TWO)] {
         for (rows, columns) in [(13, 29), (8, 24), (5, 4)] {
             let mut net = Builder::new([1, rows, columns, 3]);
@@ -109,7 +109,7 @@ fn a_filter_is_the_sum_of_what_lies_under_it() {
 #[test]
 fn sums_over_channels_of_any_number_and_filters_of_each() {
     for (channels, taps, steps) in
-        [(1, [3, 3], ONE), (24, [5, 5], TWO), (88, [3, 3], TWO), (7, [5, 3], Steps { beyond: false, ..ONE })]
+        [(1, [3, 3], ONE), (24, [5, 5], TWO), (88, [3, 3], TWO), (7, [5, 3], Steps { is_padded: false, ..ONE })]
     {
         let mut net = begun(14, 50);
         net.filter(Some(channels), [1, 1], ONE, Activation::HardSwish);
@@ -134,9 +134,10 @@ fn gates_sums_means_and_enlargements() {
     net.add(Kind::Mean, Activation::None, &[both], [1, 1, 1, channels]);
     let second = net.filter(Some(channels), [1, 1], ONE, Activation::Logistic);
     let scaled = net.add(Kind::Scale, Activation::None, &[sum, second], [1, rows, columns, channels]);
-    let wide = net.add(Kind::Enlarge, Activation::None, &[scaled], [1, 2 * rows, 2 * columns, channels]);
+    let wide = net.add(Kind::Upsample, Activation::None, &[scaled], [1, 2 * rows, 2 * columns, channels]);
     let (weights, bias) = (net.constant(&[1, 2, 2, channels]), net.constant(&[1]));
-    let mask = net.add(Kind::Doubling, Activation::None, &[wide, weights, bias], [1, 4 * rows, 4 * columns, 1]);
+    let mask =
+        net.add(Kind::TransposedConvolution, Activation::None, &[wide, weights, bias], [1, 4 * rows, 4 * columns, 1]);
     net.add(Kind::Activation(Activation::Logistic), Activation::None, &[mask], [1, 4 * rows, 4 * columns, 1]);
     net.check();
 }
@@ -156,7 +157,7 @@ fn what_does_not_fit_together_is_refused() {
     refused(|model| model.operators[1].inputs.truncate(1));
     refused(|model| model.operators[1].kind = Kind::Depthwise(Steps { across: 3, ..ONE }));
     refused(|model| model.operators[0].kind = Kind::Sum);
-    // Sizes that would take more memory than any network does.
+    // Sizes that exceed the memory limit.
     refused(|model| {
         model.tensors[0].shape = vec![1, 1 << 20, 1 << 20, 3];
         let operator = model.operators[0].clone();
@@ -166,7 +167,7 @@ fn what_does_not_fit_together_is_refused() {
     });
 }
 
-/// A network in a file: a filter whose weights have 16 bits, and a logistic function.
+/// Returns a network as a file: a filter with 16-bit weights, and a logistic function.
 fn small_file() -> Vec<u8> {
     use Value::{Byte, Bytes, Int, Ints, Table, Tables};
     let weights: Vec<u8> = [1.0f32, -0.5, 0.25, 2.0, 0.0, 1.0]

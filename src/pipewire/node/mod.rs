@@ -1,11 +1,12 @@
-//! A camera that this program gives: a node that others read from.
+//! A camera provided by this program: a node that others read from.
 //!
-//! A camera of its own has one format, so that no reader asks for another one. It drives the graph, so that readers get a
-//! picture when there is one. A node with readers is `Streaming`, which is the only state in which anybody watches: whether it
-//! drives tells nothing, as that stays so until the session manager suspends it, five seconds after the last reader.
+//! An independent camera has one format, so that no reader requests another one. It drives the graph, so that readers
+//! get each picture at once. A node with readers is `Streaming`, and only that state means that it is watched: its role
+//! as the driver does not, since it keeps that until the session manager suspends it, five seconds after the last
+//! reader.
 //!
-//! A *filter* stands in for a camera: WirePlumber, from 0.5 on, gives it to everybody who asks for that camera, but for those
-//! who are in one group with it. It offers what the camera offers, and the camera drives both.
+//! A *filter* stands in for a camera: WirePlumber, from 0.5 on, connects it to every client that requests that camera,
+//! except members of its own link group. It offers the camera's modes, and the camera drives both.
 
 mod provider;
 
@@ -19,76 +20,76 @@ use super::PipeWireError;
 use super::mode::{Agreed, Mode};
 use super::wake::Waker;
 
-/// How long the daemon may take to have the node in its graph.
-const PATIENCE: Duration = Duration::from_secs(10);
+/// Longest wait for the node to appear in the daemon's graph.
+const TIMEOUT: Duration = Duration::from_secs(10);
 
-/// What a node is called, and what it shows.
+/// Names and modes of a node.
 #[derive(Clone, Debug)]
 pub struct Settings {
-    /// The name that programs remember it by; another node that has it already makes it `NAME-2`.
+    /// The name that identifies it; if another node has it already, it becomes `NAME-2`.
     pub name: String,
-    /// The name that people see.
+    /// The name shown to users.
     pub label: String,
-    /// What readers may choose from.
+    /// The modes that readers may choose from.
     pub modes: Vec<Mode>,
-    /// What they are given where they have no wish.
+    /// The format for readers without a preference.
     pub best: Agreed,
-    /// The name of the camera whose readers are given this one.
+    /// The name of the camera that the node stands in for.
     pub stands_for: Option<String>,
-    /// The longest time that a reader is left without a picture: then the last one is given again.
+    /// Longest time without a picture for a reader: then the last one is repeated.
     pub hold: Duration,
 }
 
 /// Memory of a picture.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Memory {
-    /// Bytes, at most.
+    /// Maximum number of bytes.
     pub bytes: usize,
-    /// From row to row; 0 where it has no rows.
+    /// Bytes per row; 0 if it has no rows.
     pub stride: usize,
 }
 
-/// A picture that was written.
+/// A picture that was drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Drawn {
     pub bytes: usize,
-    /// When it was captured, by the system's monotonic clock, or `None` where it was shown before, or is none of a camera's.
+    /// Capture time on the system's monotonic clock; `None` for repeats and pictures that no camera captured.
     pub captured_ns: Option<u64>,
 }
 
-/// What a node shows. Everything is called on the node's thread.
+/// The pictures of a node. All methods are called on the node's thread.
 pub trait Show: Send + 'static {
-    /// Takes over what is new; returns whether there is something to be shown now.
+    /// Fetches new pictures; returns whether there is one to show now.
     fn update(&mut self) -> bool;
 
-    /// What pictures are to be like from now on, of what was offered; returns the memory that each takes.
+    /// Sets the format of the following pictures, one of the offered ones; returns the memory that each needs.
     fn begin(&mut self, agreed: &Agreed) -> Memory;
 
-    /// Writes the picture that is to be shown into `frame`, as agreed.
+    /// Writes the current picture into `frame`, in the negotiated format.
     fn draw(&mut self, frame: &mut [u8]) -> Drawn;
 
-    /// Somebody watches from now on, or nobody.
+    /// Reports whether the node is watched.
     fn watched(&mut self, is_watched: bool);
 }
 
-/// What became of the pictures.
+/// Counts of the pictures, by outcome.
 #[derive(Debug, Default)]
 pub struct Counts {
-    /// Pictures that readers were given, once each.
+    /// Pictures delivered to readers, each counted once.
     pub shown: AtomicU64,
-    /// Pictures that they were given again, the still card included.
+    /// Repeated pictures, the still card included.
     pub repeats: AtomicU64,
-    /// Pictures that came while nobody watched.
+    /// Pictures that arrived while no client watched.
     pub unwatched: AtomicU64,
-    /// Pictures that a newer one overtook on their way.
+    /// Pictures replaced by a newer one before delivery.
     pub overtaken: AtomicU64,
-    /// Pictures for which there was no buffer: the readers held them all.
+    /// Pictures without a free buffer: the readers held them all.
     pub no_buffer: AtomicU64,
-    /// Times that the daemon went and came back.
+    /// Reconnections to the daemon.
     pub returns: AtomicU64,
 }
 
-/// A node, until this is dropped.
+/// A node, which is removed on drop.
 #[derive(Debug)]
 pub struct Node {
     name: String,
@@ -99,24 +100,24 @@ pub struct Node {
 }
 
 impl Node {
-    /// Makes the node; it outlives the daemon, and is there again when that comes back.
+    /// Creates the node; it outlives the daemon, and reappears when the daemon returns.
     ///
     /// # Errors
-    /// There is no daemon, or it refuses.
+    /// The daemon does not run, or refuses.
     pub fn new(settings: Settings, show: impl Show) -> Result<Self, PipeWireError> {
         let waker = Waker::new().map_err(PipeWireError::Thread)?;
         let (stop, counts) = (Arc::new(AtomicBool::new(false)), Arc::new(Counts::default()));
         let (ready, is_ready) = mpsc::channel();
         let provider = Provider::new(settings, Box::new(show), Arc::clone(&counts));
-        let (bell, end) = (waker.clone(), Arc::clone(&stop));
-        let thread = thread::Builder::new().name("pipewire".into()).spawn(move || provider.run(&bell, &end, &ready));
+        let (waker_handle, end) = (waker.clone(), Arc::clone(&stop));
+        let thread = thread::Builder::new().name("pipewire".into()).spawn(move || provider.run(&waker_handle, &end, &ready));
         let thread = Some(thread.map_err(PipeWireError::Thread)?);
         let mut node = Self { name: String::new(), waker, stop, counts, thread };
-        node.name = is_ready.recv_timeout(PATIENCE).map_err(|_| PipeWireError::Silent)??;
+        node.name = is_ready.recv_timeout(TIMEOUT).map_err(|_| PipeWireError::Silent)??;
         Ok(node)
     }
 
-    /// What programs remember it by.
+    /// The name that identifies it.
     pub fn name(&self) -> &str {
         &self.name
     }
@@ -125,7 +126,7 @@ impl Node {
         &self.counts
     }
 
-    /// There is something new to show. Never waits.
+    /// Announces a new picture. Never blocks.
     pub fn wake(&self) {
         self.waker.wake();
     }
@@ -135,7 +136,7 @@ impl Drop for Node {
     fn drop(&mut self) {
         self.stop.store(true, Ordering::Release);
         self.waker.wake();
-        // A panic of the thread was printed; there is nothing left to do about it.
+        // A panic of the thread was printed already.
         let _ = self.thread.take().map(JoinHandle::join);
     }
 }

@@ -1,6 +1,6 @@
-//! The layout of the EuRoC and ASL sets: `mav0/cam0` and `mav0/cam1`, each with `data.csv` (lines of
-//! `nanoseconds,file`), the pictures in `data`, and `sensor.yaml`. The pictures are not rectified. Without `data.csv`
-//! the names of the pictures are their times.
+//! The layout of the EuRoC and ASL data sets: `mav0/cam0` and `mav0/cam1`, each with `data.csv` (lines of
+//! `nanoseconds,file`), the pictures in `data`, and `sensor.yaml`. The pictures are not rectified. Without `data.csv`,
+//! the file names of the pictures are their times.
 
 use std::path::{Path, PathBuf};
 
@@ -11,7 +11,7 @@ use super::list::{self, Entry, clear_unordered_times, inside, quoted, refuse_fau
 use super::{Options, Pair, Unpaired, pair, timeline};
 use crate::calibration;
 
-/// A folder for each camera, with its list.
+/// One folder per camera, with its list.
 pub(super) const LAYOUT: Layout = Layout {
     name: "EuRoC/ASL",
     looked_for: "mav0/cam0 with data.csv or data",
@@ -19,14 +19,14 @@ pub(super) const LAYOUT: Layout = Layout {
     open,
 };
 
-/// Paths of a camera's files, below the folder of the recording.
+/// A camera's paths, relative to the folder of the recording.
 struct Camera {
     list: &'static str,
     pictures: &'static str,
     sensor: &'static str,
 }
 
-/// Left and right, where the folder is the parent of `mav0`, and where it is `mav0`.
+/// Left and right camera, first if the folder is the parent of `mav0`, then if it is `mav0` itself.
 const CAMERAS: [[Camera; 2]; 2] = [
     [
         Camera { list: "mav0/cam0/data.csv", pictures: "mav0/cam0/data", sensor: "mav0/cam0/sensor.yaml" },
@@ -43,7 +43,7 @@ impl Camera {
         dir.join(self.list).exists() || dir.join(self.pictures).is_dir()
     }
 
-    /// The pictures of the camera with their times: by its list, or without one by their names.
+    /// Reads the camera's pictures with their times, from its list or else from the file names.
     fn read(&self, dir: &Path, options: &Options) -> Result<Vec<Entry>, RecordingError> {
         let mut entries = match dir.join(self.list).exists() {
             true => list::read(dir, self.list, |place, text| {
@@ -66,7 +66,7 @@ impl Camera {
         Ok(entries)
     }
 
-    /// Entries of the pictures whose name is a time in nanoseconds; others are left out.
+    /// Returns entries for the pictures whose names are times in nanoseconds; skips others.
     fn entries_by_name(&self, dir: &Path) -> Result<Vec<Entry>, RecordingError> {
         let names = numbered_pictures(&dir.join(self.pictures))?;
         let entry = |name: String| {
@@ -81,7 +81,7 @@ impl Camera {
     }
 }
 
-/// Pairs the pictures of the two cameras by time, and reads their calibration. A left camera alone has no pair.
+/// Pairs the pictures of the two cameras by time, and reads their calibration. A left camera alone yields no pair.
 fn open(folder: &Folder, options: &Options) -> Result<Contents, RecordingError> {
     let dir = &folder.dir;
     let [left, right] = CAMERAS.iter().find(|[left, _]| left.is_in(dir)).unwrap_or(&CAMERAS[0]);
@@ -91,10 +91,10 @@ fn open(folder: &Folder, options: &Options) -> Result<Contents, RecordingError> 
         let frames = entries.into_iter().map(|left| frame(left, None)).collect();
         return Ok(Contents { frames, depth: None, pair: None, disparities: None, unpaired: Unpaired::default() });
     }
-    // A right picture that is further away than half a period is nearer to another left one, which may be missing.
+    // A right picture more than half a period away belongs to another left one, which may be missing.
     let half_period_ns = timeline::median_period_ns(entries.iter().filter_map(|entry| entry.time_ns)) / 2;
     let tolerance_ns = options.pair_tolerance_ns.min(half_period_ns);
-    let paired = pair::join(entries, right.read(dir, options)?, tolerance_ns);
+    let paired = pair::pair_by_time(entries, right.read(dir, options)?, tolerance_ns);
     if paired.frames.iter().all(|(_, right)| right.is_none()) {
         return Err(RecordingError::NoEyePairs { dir: dir.clone(), tolerance_ns });
     }
@@ -112,9 +112,9 @@ fn open(folder: &Folder, options: &Options) -> Result<Contents, RecordingError> 
     })
 }
 
-/// Parses nanoseconds as a whole number: today's date in nanoseconds takes 61 bits, and `f64` has 53.
+/// Parses a whole number of nanoseconds: today's date takes 61 bits, and `f64` has 53.
 fn parse_ns(text: &str) -> Result<u64, LineFault> {
-    // `parse` alone would also take a sign.
+    // `parse` alone would accept a sign.
     let is_number = text.bytes().all(|byte| byte.is_ascii_digit());
     text.parse().ok().filter(|_| is_number).ok_or_else(|| LineFault::Nanoseconds(quoted(text)))
 }

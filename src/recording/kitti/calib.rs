@@ -1,24 +1,24 @@
-//! `calib.txt`: rows of 12 numbers, each the 3x4 projection of a camera, `P0:` to `P3:` or `P_rect_00:` and so on. Rows
-//! without a key are P0 to P3 if there are four, else the left and the right camera.
+//! Parses KITTI's `calib.txt`: rows of 12 numbers, each the 3x4 projection matrix of a camera, `P0:` to `P3:` or
+//! `P_rect_00:` and so on. Four rows without keys are P0 to P3; fewer are the left and the right camera.
 
 use crate::recording::fault::GeometryFault;
-use crate::recording::geometry::{Geometry, Wrong, numbers, rig};
+use crate::recording::geometry::{Geometry, GeometryError, numbers, rig};
 
-/// A camera's projection: `P[0]` is the focal length, `P[2]` the column of the principal point, both in pixels, and
-/// `P[3]` minus the focal length times how far right the camera stands, in metres.
+/// A camera's projection matrix: `P[0]` is the focal length and `P[2]` the column of the principal point, both in
+/// pixels; `P[3]` is minus the focal length times the camera's offset to the right in metres.
 type Projection = [f64; 12];
 
-/// A line with a projection.
+/// A line with a projection matrix.
 struct Row {
     line: u32,
-    /// Number of the camera; `None` for a row without a key.
+    /// The camera's number; `None` for a row without a key.
     camera: Option<usize>,
     projection: Result<Projection, GeometryFault>,
 }
 
-/// The geometry of the cameras `left` and `left + 1`. Without `left`, those are the colour cameras 2 and 3 if they are
-/// there, else 0 and 1.
-pub(in crate::recording) fn parse(text: &str, left: Option<usize>) -> Result<Geometry, Wrong> {
+/// Parses the geometry of the cameras `left` and `left + 1`. If `left` is `None`, these are the colour cameras 2 and 3
+/// if present, or else 0 and 1.
+pub(in crate::recording) fn parse(text: &str, left: Option<usize>) -> Result<Geometry, GeometryError> {
     let rows: Vec<Row> = (1..).zip(text.lines()).filter_map(|(line, text)| parse_row(line, text)).collect();
     if rows.is_empty() {
         return Err((None, GeometryFault::Unknown));
@@ -27,7 +27,7 @@ pub(in crate::recording) fn parse(text: &str, left: Option<usize>) -> Result<Geo
     let keyless = |nth: usize| rows.iter().filter(|row| row.camera.is_none()).nth(nth);
     let left = left.unwrap_or_else(|| if keyed(3).or(keyless(3)).is_some() { 2 } else { 0 });
     let projection_of = |camera: usize| {
-        // Rows without a key: four are P0 to P3, fewer are those of the left and the right camera.
+        // Four rows without keys are P0 to P3; fewer are the left and the right camera.
         let row = match (keyed(camera), keyless(3)) {
             (Some(row), _) => Some(row),
             (None, Some(_)) => keyless(camera),
@@ -43,7 +43,7 @@ pub(in crate::recording) fn parse(text: &str, left: Option<usize>) -> Result<Geo
     Ok(Geometry { rig, size: None, disparities: None })
 }
 
-/// The projection in a line; `None` if the line is for something else.
+/// Parses the projection matrix in a line; `None` if the line is something else.
 fn parse_row(line: u32, text: &str) -> Option<Row> {
     let (key, values) = match text.split_once(':') {
         Some((key, values)) => (key.trim(), values),
@@ -67,7 +67,7 @@ fn parse_row(line: u32, text: &str) -> Option<Row> {
 mod tests {
     use super::*;
 
-    /// Grey cameras 0.5 m apart, colour cameras 0.55 m, as KITTI writes them.
+    /// Grey cameras 0.5 m apart, colour cameras 0.55 m apart, as KITTI writes them.
     const FOUR: &str = "P0: 700 0 600 0 0 700 180 0 0 0 1 0\nP1: 700 0 600 -350 0 700 180 0 0 0 1 0\n\
                         P2: 7.0e+02 0 610 42 0 700 180 0.2 0 0 1 0.003\nP3: 700 0 612 -343 0 700 180 0 0 0 1 0\n\
                         Tr: 1 0 0 0 0 1 0 0 0 0 1 0\n";

@@ -1,5 +1,5 @@
-//! The layouts of the KITTI benchmarks, odometry (one sequence) and stereo, and what people make of them: a folder for
-//! each eye, whose pictures have a number and the same name in both, `calib.txt`, and `times.txt` with one time a line.
+//! The layouts of the KITTI benchmarks, odometry (one sequence) and stereo, and their derivatives: a folder per camera,
+//! whose pictures are numbered and named alike in both, `calib.txt`, and `times.txt` with one time per line.
 
 pub(super) mod calib;
 mod times;
@@ -13,61 +13,61 @@ use super::geometry::Geometry;
 use super::list::{clear_unordered_times, refuse_faults};
 use super::{Options, Pair, Unpaired};
 
-/// Recognised by the folders of the two eyes.
+/// Detected by the folders of the two cameras.
 pub(super) const LAYOUT: Layout =
     Layout { name: "KITTI", looked_for: "image_2 and image_3, or image_0 and image_1", is_in, open };
 
-/// The folders of two eyes.
-struct Eyes {
+/// The folders of the two cameras.
+struct FolderPair {
     left: &'static str,
     right: &'static str,
-    /// The number of the left camera in the calibration; the right one follows it.
+    /// Number of the left camera in the calibration; the right one is the next.
     camera: Option<usize>,
 }
 
-/// Colour goes before grey.
-const EYES: [Eyes; 6] = [
-    Eyes { left: "image_2", right: "image_3", camera: Some(2) },
-    Eyes { left: "image_02/data", right: "image_03/data", camera: Some(2) },
-    Eyes { left: "colored_0", right: "colored_1", camera: Some(2) },
-    Eyes { left: "image_0", right: "image_1", camera: Some(0) },
-    Eyes { left: "image_00/data", right: "image_01/data", camera: Some(0) },
-    Eyes { left: "image_l", right: "image_r", camera: None },
+/// Known pairs of folders; colour before grey.
+const FOLDER_PAIRS: [FolderPair; 6] = [
+    FolderPair { left: "image_2", right: "image_3", camera: Some(2) },
+    FolderPair { left: "image_02/data", right: "image_03/data", camera: Some(2) },
+    FolderPair { left: "colored_0", right: "colored_1", camera: Some(2) },
+    FolderPair { left: "image_0", right: "image_1", camera: Some(0) },
+    FolderPair { left: "image_00/data", right: "image_01/data", camera: Some(0) },
+    FolderPair { left: "image_l", right: "image_r", camera: None },
 ];
 
 const CALIBRATIONS: [&str; 2] = ["calib.txt", "calib_cam_to_cam.txt"];
 
 fn is_in(dir: &Path) -> bool {
-    EYES.iter().any(|eyes| dir.join(eyes.left).is_dir())
+    FOLDER_PAIRS.iter().any(|folders| dir.join(folders.left).is_dir())
 }
 
-/// The number of the left camera whose folder the picture `left` is in.
+/// Returns the number of the left camera whose folder contains the picture `left`.
 pub(super) fn camera_of(left: &Path) -> Option<usize> {
     let folder = left.parent()?;
-    EYES.iter().find(|eyes| folder.ends_with(eyes.left))?.camera
+    FOLDER_PAIRS.iter().find(|folders| folder.ends_with(folders.left))?.camera
 }
 
-/// Lists the pictures of both eyes, with their times, and reads the calibration.
+/// Lists the pictures of both cameras with their times, and reads the calibration.
 fn open(folder: &Folder, options: &Options) -> Result<Contents, RecordingError> {
     let dir = &folder.dir;
-    let eyes = eyes(dir)?;
-    let names = numbered_pictures(&dir.join(eyes.left))?;
-    let right_names: HashSet<String> = numbered_pictures(&dir.join(eyes.right))?.into_iter().collect();
+    let folders = find_folders(dir)?;
+    let names = numbered_pictures(&dir.join(folders.left))?;
+    let right_names: HashSet<String> = numbered_pictures(&dir.join(folders.right))?.into_iter().collect();
     let known_names: HashSet<&String> = names.iter().collect();
     let right_alone: Vec<_> = right_names.iter().filter(|name| !known_names.contains(name)).collect();
     if !options.keep_going {
         let no_partner =
             |eye: &str, name: &String, other| RecordingError::NoPartner { path: dir.join(eye).join(name), other };
         if let Some(name) = names.iter().find(|name| !right_names.contains(*name)) {
-            return Err(no_partner(eyes.left, name, eyes.right));
+            return Err(no_partner(folders.left, name, folders.right));
         }
-        // The smallest, so that the message is the same each time: a `HashSet` has no order.
+        // Take the smallest, so that the message is reproducible: a `HashSet` has no order.
         if let Some(name) = right_alone.iter().min() {
-            return Err(no_partner(eyes.right, name, eyes.left));
+            return Err(no_partner(folders.right, name, folders.left));
         }
     }
 
-    let pictures = names.iter().map(|name| (name.as_str(), PathBuf::from(format!("{}/{name}", eyes.left))));
+    let pictures = names.iter().map(|name| (name.as_str(), PathBuf::from(format!("{}/{name}", folders.left))));
     let mut entries = times::timed_entries(dir, pictures.collect(), options)?;
     clear_unordered_times(entries.iter_mut());
     if !options.keep_going {
@@ -75,14 +75,14 @@ fn open(folder: &Folder, options: &Options) -> Result<Contents, RecordingError> 
     }
     let frames = entries.into_iter().zip(&names).map(|(left, name)| Listed {
         time_ns: left.time_ns,
-        // `times.txt` does not name the pictures: its line is cited only where the time itself is faulty.
+        // `times.txt` does not name pictures: its line is cited only if the time itself is faulty.
         color: Source { place: left.source.place.filter(|_| left.source.file.is_err()), ..left.source },
-        right: Some(Source::found(Path::new(eyes.right).join(name))),
+        right: Some(Source::found(Path::new(folders.right).join(name))),
         depth: None,
     });
     let calibration = CALIBRATIONS.iter().map(|name| dir.join(name)).find(|path| path.exists());
     let pair = match calibration {
-        Some(path) => Pair::Rectified(Geometry::read_as(&path, |text| calib::parse(text, eyes.camera))?.rig),
+        Some(path) => Pair::Rectified(Geometry::read_as(&path, |text| calib::parse(text, folders.camera))?.rig),
         None => Pair::Unstated,
     };
     Ok(Contents {
@@ -94,12 +94,12 @@ fn open(folder: &Folder, options: &Options) -> Result<Contents, RecordingError> 
     })
 }
 
-/// The first pair of folders that are both there.
-fn eyes(dir: &Path) -> Result<&'static Eyes, RecordingError> {
+/// Returns the first pair of folders that both exist.
+fn find_folders(dir: &Path) -> Result<&'static FolderPair, RecordingError> {
     let has = |eye: &str| dir.join(eye).is_dir();
-    if let Some(eyes) = EYES.iter().find(|eyes| has(eyes.left) && has(eyes.right)) {
-        return Ok(eyes);
+    if let Some(folders) = FOLDER_PAIRS.iter().find(|folders| has(folders.left) && has(folders.right)) {
+        return Ok(folders);
     }
-    let alone = EYES.iter().find(|eyes| has(eyes.left)).unwrap_or(&EYES[0]);
+    let alone = FOLDER_PAIRS.iter().find(|folders| has(folders.left)).unwrap_or(&FOLDER_PAIRS[0]);
     Err(RecordingError::MissingEye { dir: dir.to_owned(), missing: alone.right, present: alone.left })
 }

@@ -1,4 +1,4 @@
-//! When the pictures were taken: `times.txt`, one time in seconds a line, that of picture 0 first.
+//! Times of the pictures: `times.txt`, with one time in seconds per line, beginning with picture 0.
 
 use std::path::{Path, PathBuf};
 
@@ -10,18 +10,18 @@ use crate::recording::list::{self, Entry, quoted};
 
 const LIST: &str = "times.txt";
 
-/// Period where there is no list of times: 10 frames per second, as KITTI's cameras were triggered.
+/// Period without a list of times: 10 frames per second, the trigger rate of KITTI's cameras.
 const PERIOD_NS: u64 = 100_000_000;
 
-/// Seconds up to which a time is taken: beyond any date.
+/// Upper bound of a valid time in seconds: beyond any date.
 const LAST_S: f64 = 1e10;
 
-/// Entries with times for `pictures` (name, file). A picture whose name is the number n has the time in line n (from 0)
-/// of `times.txt`, so that an excerpt may keep the list of the whole; other names count by their position. Without the
-/// list, the pictures are [`PERIOD_NS`] apart.
+/// Returns entries with times for `pictures` (name, file). A picture named by the number n has the time in line n (from
+/// 0) of `times.txt`, so that an excerpt may keep the full list; other names count by position. Without the list, the
+/// pictures are [`PERIOD_NS`] apart.
 ///
 /// # Errors
-/// Without `keep_going`, a picture has no time.
+/// A picture has no time, and `keep_going` is not set.
 pub(super) fn timed_entries(
     dir: &Path,
     pictures: Vec<(&str, PathBuf)>,
@@ -50,8 +50,8 @@ pub(super) fn timed_entries(
     entries.collect()
 }
 
-/// Parses seconds >= 0, with or without an exponent (KITTI writes `1.037359e-01`), to nanoseconds. `f64` is exact
-/// enough: the times count from the first picture.
+/// Parses seconds >= 0, with or without an exponent (KITTI writes `1.037359e-01`), to nanoseconds. `f64` is precise
+/// enough, as times count from the first picture.
 fn parse_ns(text: &str) -> Result<u64, LineFault> {
     let seconds = text.parse().ok().filter(|seconds| (0.0..LAST_S).contains(seconds));
     seconds.map(|seconds: f64| (seconds * 1e9).round() as u64).ok_or_else(|| LineFault::Time(quoted(text)))

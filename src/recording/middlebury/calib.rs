@@ -1,21 +1,22 @@
-//! `calib.txt`: `key=value` lines; `cam0` and `cam1` are 3x3 matrices, `baseline` is in millimetres, `doffs` the column
-//! of the right principal point less that of the left, `ndisp` a bound on the disparities.
+//! Parses Middlebury's `calib.txt`: `key=value` lines; `cam0` and `cam1` are 3x3 matrices, `baseline` is in
+//! millimetres, `doffs` is the column of the right principal point minus that of the left one, `ndisp` bounds the
+//! disparities.
 
 use crate::recording::MAX_SIDE_PX;
 use crate::recording::fault::GeometryFault;
-use crate::recording::geometry::{Geometry, Wrong, numbers, rig};
+use crate::recording::geometry::{Geometry, GeometryError, numbers, rig};
 
 const MM_PER_M: f64 = 1000.0;
 
-/// Whether the text is in this format: whether it has one of its keys.
+/// Returns whether the text has a key of this format.
 pub(in crate::recording) fn is_middlebury(text: &str) -> bool {
     let keys = ["cam0", "cam1", "baseline", "doffs"];
     text.lines().any(|line| line.split_once('=').is_some_and(|(key, _)| keys.contains(&key.trim())))
 }
 
-/// The geometry of the pair. One of `cam1` and `doffs` may be missing. An `ndisp` of the full width, as ETH3D has it,
-/// bounds nothing and is left out.
-pub(in crate::recording) fn parse(text: &str) -> Result<Geometry, Wrong> {
+/// Parses the geometry of the pair. Either `cam1` or `doffs` may be missing. An `ndisp` of the full width, as in ETH3D,
+/// is ignored, as it bounds nothing.
+pub(in crate::recording) fn parse(text: &str) -> Result<Geometry, GeometryError> {
     let find = |wanted: &str| {
         let mut lines = (1..).zip(text.lines());
         lines.find_map(|(line, text)| {
@@ -81,7 +82,7 @@ mod tests {
         let read = parse(GOOD).unwrap();
         assert_eq!((read.rig.focal_px, read.rig.baseline_m, read.rig.doffs_px), (994.978, 0.193_001, 31.086));
         assert_eq!((read.size, read.disparities, read.rig.metric), (Some((741, 497)), Some(80), true));
-        // Without doffs, the cameras say it.
+        // Without doffs, it follows from the cameras.
         assert_eq!(parse(&GOOD.replace("doffs", "#doffs")).unwrap().rig.doffs_px, 31.086);
         // ETH3D: the width as ndisp.
         assert_eq!(parse(&GOOD.replace("ndisp=70", "ndisp=741")).unwrap().disparities, None);

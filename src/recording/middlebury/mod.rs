@@ -1,5 +1,5 @@
-//! The layout of the Middlebury and ETH3D two-view stereo sets: one pair, `im0.png` and `im1.png`, a recording of one
-//! frame. `calib.txt` beside it has the geometry, and with it `disp0.pfm` is depth.
+//! The layout of the Middlebury and ETH3D two-view stereo sets: one pair, `im0.png` and `im1.png`, as a recording of
+//! one frame. `calib.txt` has the geometry, with which `disp0.pfm` becomes depth.
 
 pub(super) mod calib;
 
@@ -12,26 +12,30 @@ use super::geometry::Geometry;
 use super::{Options, Pair, Unpaired};
 use crate::optics::StereoRig;
 
-pub(super) const LAYOUT: Layout =
-    Layout { name: "Middlebury stereo", looked_for: "im0.png and im1.png", is_in: |dir| eyes(dir).is_some(), open };
+pub(super) const LAYOUT: Layout = Layout {
+    name: "Middlebury stereo",
+    looked_for: "im0.png and im1.png",
+    is_in: |dir| find_pair(dir).is_some(),
+    open,
+};
 
-/// Pictures of the left and the right eye; the second names are those of the sets of 2001 and 2003.
-const EYES: [[&str; 2]; 2] = [["im0.png", "im1.png"], ["im2.png", "im6.png"]];
+/// Left and right picture; the second pair of names is that of the sets of 2001 and 2003.
+const PICTURE_PAIRS: [[&str; 2]; 2] = [["im0.png", "im1.png"], ["im2.png", "im6.png"]];
 
 const CALIBRATION: &str = "calib.txt";
 
-/// Disparities of the left picture.
+/// Disparities of the left picture, in order of preference.
 const DISPARITIES: [&str; 2] = ["disp0.pfm", "disp0GT.pfm"];
 
-fn eyes(dir: &Path) -> Option<[Source; 2]> {
-    let eyes = EYES.iter().find(|eyes| eyes.iter().all(|eye| dir.join(eye).exists()))?;
-    Some(eyes.map(|eye| Source::found(eye.into())))
+fn find_pair(dir: &Path) -> Option<[Source; 2]> {
+    let pair = PICTURE_PAIRS.iter().find(|pair| pair.iter().all(|picture| dir.join(picture).exists()))?;
+    Some(pair.map(|picture| Source::found(picture.into())))
 }
 
-/// Makes a recording of one frame: the pair, with depth if there are a calibration and a disparity map.
+/// Creates a recording of one frame: the pair, with depth if there are a calibration and a disparity map.
 fn open(folder: &Folder, _: &Options) -> Result<Contents, RecordingError> {
     let dir = &folder.dir;
-    let [color, right] = eyes(dir).unwrap_or(EYES[0].map(|eye| Source::found(eye.into())));
+    let [color, right] = find_pair(dir).unwrap_or(PICTURE_PAIRS[0].map(|picture| Source::found(picture.into())));
     let file = dir.join(CALIBRATION);
     let rig = match file.exists() {
         true => Some(read_rig(folder, &color, &file)?),

@@ -39,7 +39,7 @@ pub(super) fn read_pairs(dir: &Path, list: &'static str) -> Result<Vec<[Entry; 2
     })
 }
 
-/// How many columns there are, and the first five.
+/// Returns the number of columns, and the first five.
 fn columns(text: &str) -> (usize, [Option<&str>; 5]) {
     let mut columns = text.split_ascii_whitespace();
     (columns.clone().count(), std::array::from_fn(|_| columns.next()))

@@ -1,4 +1,4 @@
-//! Which files of a folder belong to the recording in it: those that its lists name.
+//! Determines which files of a folder belong to its recording: those that its lists name.
 
 use std::fs;
 use std::path::Path;
@@ -8,13 +8,13 @@ use crate::recording::list::Entry;
 
 const LISTS: [&str; 3] = [COLOR_LIST, DEPTH_LIST, ASSOCIATIONS];
 
-/// The lists that are there.
+/// Returns the lists that exist.
 pub(super) fn lists(dir: &Path) -> impl Iterator<Item = String> {
     LISTS.into_iter().filter(|list| is_file(&dir.join(list))).map(str::to_owned)
 }
 
-/// The PNG and JPEG pictures that the lists name and that are there, at most one folder down. Faulty lists and lines
-/// are passed over: pictures that are not found here are kept.
+/// Returns the PNG and JPEG pictures that the lists name and that exist, at most one folder deep. Skips faulty lists
+/// and lines: pictures not found here are kept.
 pub(super) fn pictures(dir: &Path) -> impl Iterator<Item = String> {
     let entries = |list: &'static str| -> Vec<Entry> {
         if !is_file(&dir.join(list)) {
@@ -35,7 +35,7 @@ fn is_picture(file: &Path) -> bool {
     ["png", "jpg", "jpeg"].into_iter().any(is)
 }
 
-/// Whether this is a file and not a link to one.
+/// Returns whether the path is a regular file, not a link to one.
 fn is_file(path: &Path) -> bool {
     fs::symlink_metadata(path).is_ok_and(|there| there.is_file())
 }

@@ -1,9 +1,9 @@
 //! The layout of the TUM RGB-D benchmark.
 //!
-//! `rgb.txt` and `depth.txt` have lines of `time file`, `associations.txt` has lines of `time file time file`, the
-//! colour or the depth first. Times are decimal seconds, files are named relative to the folder, `#` begins a
-//! comment. `associations.txt` is a ready pairing and used where it exists; else `rgb.txt` is paired with
-//! `depth.txt` by nearest time, as the benchmark's own tool does it; `rgb.txt` alone is a recording without depth.
+//! `rgb.txt` and `depth.txt` have lines of `time file`, `associations.txt` has lines of `time file time file`, colour
+//! or depth first. Times are decimal seconds, file names are relative to the folder, `#` begins a comment.
+//! `associations.txt` is a ready pairing, used if it exists; otherwise `rgb.txt` is paired with `depth.txt` by nearest
+//! time, like the benchmark's own tool; `rgb.txt` alone is a recording without depth.
 
 mod growing;
 mod list;

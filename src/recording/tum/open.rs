@@ -1,4 +1,4 @@
-//! Makes frames of the lists.
+//! Builds frames from the lists.
 
 use std::collections::{HashMap, HashSet};
 use std::path::Path;
@@ -11,10 +11,10 @@ use crate::recording::error::RecordingError;
 use crate::recording::list::{Entry, clear_unordered_times, refuse_faults};
 use crate::recording::{Options, Unpaired, pair};
 
-/// After so many pictures that do not tell the columns of the associations apart, no more are looked at.
-const MOST_PICTURES: usize = 1000;
+/// Maximum number of pictures that are inspected to tell the columns of the associations apart.
+const MAX_PICTURES: usize = 1000;
 
-/// Whether `dir` has a list of this layout.
+/// Returns whether `dir` has a list of this layout.
 pub(super) fn is_in(dir: &Path) -> bool {
     [ASSOCIATIONS, COLOR_LIST, DEPTH_LIST].iter().any(|list| dir.join(list).exists())
 }
@@ -32,7 +32,7 @@ pub(super) fn open(folder: &Folder, options: &Options) -> Result<Contents, Recor
     }
 }
 
-/// Pairs `rgb.txt` with `depth.txt`, if that is there, by nearest time.
+/// Pairs `rgb.txt` with `depth.txt`, if it exists, by nearest time.
 fn from_lists(dir: &Path, has_depth: bool, options: &Options) -> Result<Contents, RecordingError> {
     let read = |list| {
         let mut entries = list::read(dir, list)?;
@@ -47,7 +47,7 @@ fn from_lists(dir: &Path, has_depth: bool, options: &Options) -> Result<Contents
         let frames = colors.into_iter().map(|color| to_frame(color, None)).collect();
         return Ok(to_contents(frames, None, Unpaired::default()));
     }
-    let paired = pair::join(colors, read(DEPTH_LIST)?, options.pair_tolerance_ns);
+    let paired = pair::pair_by_time(colors, read(DEPTH_LIST)?, options.pair_tolerance_ns);
     if paired.frames.iter().all(|(_, depth)| depth.is_none()) {
         return Err(RecordingError::NoPairs { dir: dir.to_owned(), tolerance_ns: options.pair_tolerance_ns });
     }
@@ -60,7 +60,7 @@ fn to_frame(color: Entry, depth: Option<Source>) -> Listed {
     Listed { time_ns: color.time_ns, color: color.source, right: None, depth }
 }
 
-/// `depth_options` are given if the frames have depth.
+/// `depth_options` must be given if the frames have depth.
 fn to_contents(frames: Vec<Listed>, depth_options: Option<&Options>, unpaired: Unpaired) -> Contents {
     let depth = depth_options.map(|options| match options.depth_unit {
         DepthUnit::Metres => {
@@ -71,7 +71,7 @@ fn to_contents(frames: Vec<Listed>, depth_options: Option<&Options>, unpaired: U
     Contents { frames, depth, pair: None, disparities: None, unpaired }
 }
 
-/// Takes the pairs of `associations.txt` as they are; the colour gives the time of a frame.
+/// Takes the pairs of `associations.txt` as they are; the colour picture determines the time of a frame.
 fn from_associations(folder: &Folder, options: &Options) -> Result<Contents, RecordingError> {
     let mut pairs = list::read_pairs(&folder.dir, ASSOCIATIONS)?;
     if !is_color_first(folder, &pairs)? {
@@ -85,11 +85,11 @@ fn from_associations(folder: &Folder, options: &Options) -> Result<Contents, Rec
     Ok(to_contents(frames, Some(options), Unpaired::default()))
 }
 
-/// Whether the colour is in the first columns, and the depth in the last ones: told by a file that another list names,
-/// else by a pair of pictures of different kinds.
+/// Returns whether colour is in the first two columns and depth in the last two, decided by a file that another list
+/// names, or else by a pair of pictures of different kinds.
 fn is_color_first(folder: &Folder, pairs: &[[Entry; 2]]) -> Result<bool, RecordingError> {
     for (list, is_color) in [(COLOR_LIST, true), (DEPTH_LIST, false)] {
-        // Here the other lists are only a hint: what is wrong with them does no harm.
+        // The other lists are only a hint here: ignore their faults.
         let Ok(entries) = list::read(&folder.dir, list) else { continue };
         let files: HashSet<_> = entries.iter().filter_map(|entry| entry.source.file.as_ref().ok()).collect();
         let is_listed = |entry: &Entry| entry.source.file.as_ref().is_ok_and(|file| files.contains(file));
@@ -111,16 +111,16 @@ fn is_color_first(folder: &Folder, pairs: &[[Entry; 2]]) -> Result<bool, Recordi
             (Some(Kind::Depth), _) | (_, Some(Kind::Color)) => return Ok(false),
             _ => {}
         }
-        if kinds.len() > MOST_PICTURES {
+        if kinds.len() > MAX_PICTURES {
             break;
         }
     }
-    // Broken lines say more about what is wrong than unreadable columns do.
+    // Broken lines are a better explanation than unreadable columns.
     refuse_faults(&folder.dir, pairs.iter().flatten())?;
     Err(RecordingError::Columns { list: folder.dir.join(ASSOCIATIONS) })
 }
 
-/// The kind of a picture, if it can be read. Each file is read once, and then found in `kinds`.
+/// Returns the kind of a picture, if readable. Each file is read once and cached in `kinds`.
 fn cached_kind<'a>(
     locator: &mut Locator,
     source: &'a Source,

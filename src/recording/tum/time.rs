@@ -1,15 +1,15 @@
-//! Times as the lists write them: decimal seconds, kept to the nanosecond without going through `f64`, which has
-//! only 53 bits for the 61 that today's date in nanoseconds takes.
+//! Times in lists: decimal seconds, converted to nanoseconds without `f64`, which has only 53 bits for the 61 of
+//! today's date.
 
 use std::fmt;
 
 const NS_PER_S: u64 = 1_000_000_000;
 
-/// Nanoseconds of a decimal number of seconds, >= 0; digits beyond the ninth decimal are cut.
+/// Parses a decimal number of seconds >= 0 to nanoseconds; digits beyond the ninth decimal are truncated.
 pub(super) fn parse_ns(text: &str) -> Option<u64> {
     let (seconds, decimals) = text.split_once('.').unwrap_or((text, ""));
     let digits = |part: &str| part.bytes().all(|byte| byte.is_ascii_digit());
-    // `parse` alone would also take a sign.
+    // `parse` alone would accept a sign.
     if !(digits(seconds) && digits(decimals)) || (seconds.is_empty() && decimals.is_empty()) {
         return None;
     }
@@ -19,7 +19,7 @@ pub(super) fn parse_ns(text: &str) -> Option<u64> {
     seconds.checked_mul(NS_PER_S)?.checked_add(fraction_ns)
 }
 
-/// Displays nanoseconds as decimal seconds, exactly.
+/// Formats nanoseconds as exact decimal seconds.
 pub(super) struct Seconds(pub(super) u64);
 
 impl fmt::Display for Seconds {

@@ -1,4 +1,4 @@
-//! Writing a recording.
+//! Writes a recording.
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -14,15 +14,15 @@ use crate::recording::{MAX_SIDE_PX, check_depth_scale, depth_covers, encode};
 const COLOR_FOLDER: &str = "rgb";
 const DEPTH_FOLDER: &str = "depth";
 
-/// The files that a recording may have in its folder.
+/// The files of a recording within its folder.
 const SET: Set = Set { subfolders: &[COLOR_FOLDER, DEPTH_FOLDER], has: &is_ours };
 
-/// How to write a recording.
+/// Options for writing a recording.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct WriterOptions {
     /// Units of the depth pictures per metre, > 0. A depth beyond 65535 units is written as unknown.
     pub depth_scale: f32,
-    /// Whether a recording that is already in the folder may be replaced, once the new one is whole.
+    /// Whether an existing recording in the folder may be replaced, once the new one is complete.
     pub overwrite: bool,
 }
 
@@ -33,52 +33,52 @@ impl Default for WriterOptions {
     }
 }
 
-/// Writes a recording frame by frame, with the memory of one frame.
+/// Writes a recording frame by frame, with memory for one frame.
 ///
-/// The pictures are `rgb/000000.png` (8-bit RGB) and `depth/000000.png` (16-bit grey, 0 = unknown) and so on. The
-/// lists come last; until then the folder is not a recording. What an earlier recording named in its lists stays until
-/// the new one is whole, and nothing else in the folder is ever touched. [`Writer::finish`] or [`Writer::cut`] ends it;
-/// without one of them there are no lists.
+/// The pictures are `rgb/000000.png` (8-bit RGB), `depth/000000.png` (16-bit grey, 0 = unknown) and so on. The lists
+/// are finished last; until then the folder is not a recording. Files of an earlier recording stay until the new one is
+/// complete, and no other file in the folder is touched. [`Writer::finish`] or [`Writer::cut`] must end it; otherwise
+/// there are no lists.
 pub struct Writer {
     dir: PathBuf,
     depth_scale: f32,
     color: GrowingList,
-    /// Begins with the first depth map: a recording without depth has no list of it.
+    /// Created with the first depth map: a recording without depth has no depth list.
     depth: Option<GrowingList>,
-    /// After the lists, so that it is closed after them.
+    /// Declared after the lists, so that it is dropped after them.
     folder: Folder,
     count: usize,
     last_ns: Option<u64>,
     size: Option<(u32, u32)>,
-    /// Known depths of all frames, and of these the ones that were too far for the file.
+    /// Number of known depth values, and of those beyond the range of the file.
     depths: (u64, u64),
     /// Working memory for encoding: samples of a depth map, and the picture file.
     units: Vec<u8>,
     file: Vec<u8>,
 }
 
-/// What became of a recording.
+/// The result of a recording.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Written {
-    /// The recording.
+    /// The folder of the recording.
     pub dir: PathBuf,
-    /// How many frames it has.
+    /// The number of frames.
     pub frames: usize,
-    /// Files of an earlier recording that went.
+    /// Number of files removed of an earlier recording.
     pub replaced: u64,
-    /// Depths that were known, in all frames.
+    /// Number of known depth values in all frames.
     pub depths: u64,
-    /// Depths beyond what the file holds, written as unknown.
+    /// Number of depth values beyond the range of the file, written as unknown.
     pub too_far: u64,
 }
 
 impl Writer {
-    /// Starts a recording in the folder `dir`, which is created where needed. A recording there that a killed process
-    /// began gets its lists, as far as it came.
+    /// Starts a recording in the folder `dir`, which is created if needed. An unfinished recording of a killed process
+    /// in that folder gets its lists first.
     ///
     /// # Errors
-    /// The folder has something in it, which may not be overwritten, or pictures of the names of a recording that no
-    /// list names; it is being written by others, or cannot be; the depth scale is not a number > 0.
+    /// The folder has content that may not be overwritten, or pictures with names of a recording that no list names;
+    /// another process writes it, or it cannot be written; the depth scale is not a number > 0.
     pub fn create(dir: &Path, options: &WriterOptions) -> Result<Self, RecordingError> {
         check_depth_scale(options.depth_scale)?;
         GrowingList::rescue(dir, &[DEPTH_LIST, COLOR_LIST])?;
@@ -106,12 +106,11 @@ impl Writer {
         })
     }
 
-    /// Adds a frame at `time_ns`, in nanoseconds of any clock. A frame without depth among others that have it is
-    /// left unpaired by readers.
+    /// Adds a frame at `time_ns`, in nanoseconds of any clock. Readers skip a frame without depth if others have it.
     ///
     /// # Errors
-    /// The frame does not fit the recording: the time is not after the last one, the colour picture differs in size
-    /// from the first, the depth map does not cover it. Or a file cannot be written. The recording stays as it was.
+    /// The frame does not fit the recording: its time is not after the last one, the size of the colour picture differs
+    /// from the first, or the depth map does not cover it. Or a file cannot be written. The recording is unchanged.
     pub fn add(&mut self, time_ns: u64, color: &ColorImage, depth: Option<&DepthMap>) -> Result<(), RecordingError> {
         self.check(time_ns, color, depth)
             .map_err(|reason| RecordingError::Unrecordable { index: self.count, reason })?;
@@ -132,7 +131,7 @@ impl Writer {
         encode::color_png(color, &mut self.file).map_err(|e| self.encoding(e))?;
         self.write_picture(COLOR_FOLDER, &file_name)?;
 
-        // Lists after pictures, so that what they name is there; a frame that fails is in neither list.
+        // Lists after pictures, so that listed files exist; a frame that fails is in neither list.
         let time = Seconds(time_ns);
         if depth.is_some() {
             let list = match &mut self.depth {
@@ -152,17 +151,17 @@ impl Writer {
         Ok(())
     }
 
-    /// Frames added so far.
+    /// Returns the number of frames so far.
     pub fn frames(&self) -> usize {
         self.count
     }
 
-    /// The largest depth that is written, in metres.
+    /// Returns the largest depth that can be written, in metres.
     pub fn max_depth_m(&self) -> f32 {
         encode::largest(self.depth_scale)
     }
 
-    /// Completes the recording: its lists appear, and what it replaces goes.
+    /// Completes the recording: its lists get their names, and a replaced recording is removed.
     ///
     /// # Errors
     /// No frame was added (an empty recording cannot be read), or a list cannot be written.
@@ -173,11 +172,11 @@ impl Writer {
         Ok(written)
     }
 
-    /// Ends a recording that was broken off. If it was to replace an earlier one, that stays, and the new one is kept
-    /// beside the folder as `NAME.incomplete`; otherwise it stays in its folder. It can be read in either place.
+    /// Ends a recording that was interrupted. If it was to replace an earlier one, that one stays, and the new one is
+    /// kept next to the folder as `NAME.incomplete`; otherwise it stays in its folder. It is readable in either place.
     ///
     /// # Errors
-    /// As for [`Writer::finish`].
+    /// Same as for [`Writer::finish`].
     pub fn cut(self) -> Result<Written, RecordingError> {
         let mut written = self.written();
         let folder = self.with_lists()?;
@@ -190,13 +189,13 @@ impl Writer {
         Written { dir: self.dir.clone(), frames: self.count, replaced: 0, depths, too_far }
     }
 
-    /// The folder, after the lists got their names in it.
+    /// Finishes the lists and returns the folder.
     fn with_lists(self) -> Result<Folder, RecordingError> {
         let mut folder = self.folder;
         if self.count == 0 {
             return Err(RecordingError::NothingRecorded { dir: self.dir });
         }
-        // The colour list comes last: with it, the folder becomes a recording.
+        // The colour list comes last, because it makes the folder a recording.
         if let Some(depth) = self.depth {
             depth.put(&mut folder)?;
         }
@@ -204,7 +203,7 @@ impl Writer {
         Ok(folder)
     }
 
-    /// Fails with the reason if the frame cannot become the next one of the recording.
+    /// Checks that the frame can be the next one of the recording; returns the reason if not.
     fn check(&self, time_ns: u64, color: &ColorImage, depth: Option<&DepthMap>) -> Result<(), String> {
         let (width, height) = color.size();
         if let Some(last_ns) = self.last_ns.filter(|&last_ns| time_ns <= last_ns) {
@@ -251,7 +250,7 @@ fn depth_head(depth_scale: f32) -> String {
     format!("# depth maps, 16-bit PNG, {depth_scale} units per metre, 0 = unknown\n# timestamp filename\n")
 }
 
-/// Whether this is a name that a recording has for a list or picture, such as `rgb/000000.png`.
+/// Returns whether a recording uses this name for a list or picture, such as `rgb/000000.png`.
 fn is_ours(name: &str) -> bool {
     let folders = [COLOR_FOLDER, DEPTH_FOLDER];
     let number = folders.iter().find_map(|folder| name.strip_prefix(folder)?.strip_prefix('/')?.strip_suffix(".png"));

@@ -12,18 +12,18 @@ use crate::color::Matrix;
 
 const PROGRAM: &str = "ffmpeg";
 
-/// How ffmpeg writes a file, by the extension of its name.
+/// Output parameters of ffmpeg, selected by the file's extension.
 pub(super) struct Format {
     pub container: Container,
     muxer: &'static [&'static str],
     encoder: &'static [&'static str],
-    /// Unit of the times of frames, as a fraction of a second.
+    /// Unit of the frames' time stamps, as a fraction of a second.
     time_base: &'static str,
 }
 
 impl Format {
-    /// Every format is written in pieces of a second, so that a file that was cut short can be played.
-    pub(super) fn of(path: &Path) -> Self {
+    /// Selects the format. Every format is written in pieces of a second, so that a truncated file can be played.
+    pub(super) fn for_path(path: &Path) -> Self {
         let extension = path.extension().map(|extension| extension.to_string_lossy().to_lowercase());
         let matroska = |muxer, encoder| Self { container: Container::Matroska, muxer, encoder, time_base: "1:1000" };
         match extension.as_deref() {
@@ -34,8 +34,8 @@ impl Format {
     }
 }
 
-/// A tick of which the usual frame periods are multiples, and so long that a gap of half a day is below 2^28 ticks:
-/// readers doubt longer ones.
+/// A tick that divides the usual frame periods, and long enough that a gap of half a day is below 2^28 ticks: readers
+/// distrust longer ones.
 const MP4_TIME_BASE: &str = "1:6000";
 
 const FRAGMENTS: &[&str] =
@@ -47,11 +47,12 @@ const H264: &[&str] = &["-c:v", "libx264", "-preset", "veryfast", "-crf", "18"];
 const VP9: &[&str] =
     &["-c:v", "libvpx-vp9", "-crf", "24", "-b:v", "0", "-deadline", "realtime", "-cpu-used", "5", "-row-mt", "1"];
 
-/// The command that encodes the Matroska stream on its standard input into the file `part`, on so many `threads`.
+/// Builds the command that encodes the Matroska stream on its standard input into the file `part`, with `threads`
+/// threads.
 pub(super) fn encode(format: &Format, part: &Path, height: u32, threads: Option<usize>) -> Command {
     let color = match Matrix::for_height(height) {
         Matrix::Bt601 => "smpte170m",
-        // What players expect of high definition.
+        // Players expect this for high definition.
         Matrix::Bt709 | Matrix::Bt2020 => "bt709",
     };
     // Tagged on the frames, for filters, and on the stream, for the muxer. 4:2:0 encoders refuse odd sizes.
@@ -67,7 +68,7 @@ pub(super) fn encode(format: &Format, part: &Path, height: u32, threads: Option<
         .args([frame_timing_option(), "vfr", "-enc_time_base", format.time_base])
         .args(format.encoder)
         .args(threads.iter().flat_map(|threads| ["-threads".to_owned(), threads.to_string()]))
-        // Without random numbers for its parts: the same frames are the same file.
+        // No random identifiers: the same frames produce the same file.
         .args(["-fflags", "+bitexact", "-flush_packets", "1"])
         .args(format.muxer)
         .arg(as_file(part))
@@ -75,8 +76,8 @@ pub(super) fn encode(format: &Format, part: &Path, height: u32, threads: Option<
     command
 }
 
-/// The command that copies `from` to `to` as an mp4 with its index in front, so that a player can start before it has
-/// the whole file.
+/// Builds the command that copies `from` to `to` as an mp4 with its index in front, so that a player can start before
+/// it has the whole file.
 pub(super) fn index_in_front(from: &Path, to: &Path) -> Command {
     let mut command = base_command();
     command.arg("-i").arg(as_file(from)).args(["-c", "copy", "-movflags", "+faststart", "-f", "mp4"]).arg(as_file(to));
@@ -84,27 +85,27 @@ pub(super) fn index_in_front(from: &Path, to: &Path) -> Command {
     command
 }
 
-/// ffmpeg in a process group of its own, which says nothing but errors and overwrites its output file.
+/// Builds an ffmpeg command in a process group of its own, which logs only errors and overwrites its output file.
 fn base_command() -> Command {
     let mut command = Command::new(PROGRAM);
     command
         .args(["-hide_banner", "-nostdin", "-loglevel", "error", "-y"])
         .stdout(Stdio::null())
         .stderr(Stdio::piped())
-        // Ctrl-C on a terminal goes to the whole group, and ffmpeg must live to see the last frame.
+        // Ctrl-C on a terminal signals the whole group, and ffmpeg must survive until the last frame.
         .process_group(0);
     command
 }
 
-/// Marked as a file, so that ffmpeg takes neither a dash for an option nor a colon for a protocol.
+/// Prefixes the path as a file, so that ffmpeg interprets neither a dash as an option nor a colon as a protocol.
 fn as_file(path: &Path) -> OsString {
     let mut name = OsString::from("file:");
     name.push(path);
     name
 }
 
-/// The name of the option by which frames keep their times: `-fps_mode` since ffmpeg 5.1, `-vsync` before, which later
-/// versions do not know any more.
+/// Returns the name of the option by which frames keep their times: `-fps_mode` since ffmpeg 5.1, `-vsync` before,
+/// which later versions no longer support.
 fn frame_timing_option() -> &'static str {
     let said = output_within(Command::new(PROGRAM).arg("-version"), Duration::from_secs(2));
     if said.as_deref().and_then(version).is_some_and(|version| version < (5, 1)) { "-vsync" } else { "-fps_mode" }

@@ -1,4 +1,4 @@
-//! Whether a video file is whole, by its container: one that was cut short lacks what is written last.
+//! Checks whether a video file is complete, by its container: a truncated file lacks the parts written last.
 
 use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom};
@@ -6,14 +6,14 @@ use std::path::Path;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Container {
-    /// `.mp4`, its index at the front or in fragments.
+    /// `.mp4`, with its index at the front or in fragments.
     Mp4,
     /// `.mkv` and `.webm`.
     Matroska,
 }
 
 impl Container {
-    /// Whether the file is whole, and if not, what is missing.
+    /// Checks whether the file is complete, and returns what is missing otherwise.
     ///
     /// # Errors
     /// The file cannot be read.
@@ -30,8 +30,8 @@ impl Container {
 const NO_END: &str = "its end is missing";
 const NO_INDEX: &str = "its index is missing";
 
-/// An mp4 is whole if its boxes (ISO 14496-12) lie one after the other up to the end of the file, one of them is an
-/// index (`moov`), and the last one of a fragmented file (`moof`) is what ffmpeg closes it with (`mfra`).
+/// Checks an mp4: its boxes (ISO 14496-12) must be contiguous up to the end of the file, one of them an index (`moov`),
+/// and the last one of a fragmented file (`moof`) the one with which ffmpeg closes it (`mfra`).
 fn check_mp4(file: &mut File, len_bytes: u64) -> io::Result<Result<(), &'static str>> {
     let (mut at, mut has_index, mut has_fragments, mut last) = (0, false, false, [0; 4]);
     while at < len_bytes {
@@ -41,7 +41,7 @@ fn check_mp4(file: &mut File, len_bytes: u64) -> io::Result<Result<(), &'static 
             return Ok(Err(NO_END));
         }
         let number = |bytes: &[u8]| bytes.iter().fold(0, |number, &byte| number << 8 | u64::from(byte));
-        // 0 means up to the end of the file, 1 that a 64-bit size follows the kind.
+        // 0 means up to the end of the file, 1 that a 64-bit size follows the type.
         let size_bytes = match number(&head[..4]) {
             0 => len_bytes - at,
             1 => number(&head[8..]),
@@ -65,15 +65,15 @@ fn check_mp4(file: &mut File, len_bytes: u64) -> io::Result<Result<(), &'static 
     })
 }
 
-/// A Matroska file is whole if the size of its segment is known, and the segment ends where the file does: ffmpeg
-/// writes the size last.
+/// Checks a Matroska file (RFC 9559): the size of its segment must be known, and the segment must end with the file,
+/// because ffmpeg writes the size last.
 fn check_matroska(file: &mut File, len_bytes: u64) -> io::Result<Result<(), &'static str>> {
     const SEGMENT: [u8; 4] = [0x18, 0x53, 0x80, 0x67];
     // The segment begins after a header of some 40 bytes.
     let mut head = [0; 128];
     let head = read_up_to(file, &mut head)?;
     let Some(at) = head.windows(SEGMENT.len()).position(|bytes| bytes == SEGMENT) else { return Ok(Err(NO_INDEX)) };
-    // The leading zeros of its first byte say how many bytes a size has; only ones mean unknown.
+    // The leading zeros of the first byte encode the length of the size; all ones mean unknown.
     let size = &head[at + SEGMENT.len()..];
     let Some(size_len) = size.first().map(|first| first.leading_zeros() as usize + 1).filter(|&len| len <= size.len())
     else {

@@ -1,4 +1,4 @@
-//! Compressed video through the ffmpeg program: frames with their times into its standard input.
+//! Compressed video through the ffmpeg program, which reads time-stamped frames from its standard input.
 
 mod command;
 mod container;
@@ -24,12 +24,12 @@ use super::{Ending, Options, Sink, SinkError, check_size};
 use crate::files::whole::Part;
 use crate::frame::ColorImage;
 
-/// An encoder that does not read by then gets its frames all the same.
-const PATIENCE: Duration = Duration::from_secs(2);
+/// Longest wait for an encoder to start reading; frames are sent to it in any case.
+const STARTUP_TIMEOUT: Duration = Duration::from_secs(2);
 
-/// A file encoded by a child process: H.264 in `.mp4` and `.mkv`, VP9 in `.webm`, at the times of its frames.
+/// A file encoded by a child process: H.264 in `.mp4` and `.mkv`, VP9 in `.webm`, with the frames' time stamps.
 pub struct Ffmpeg {
-    // Dropped in this order: the process before the file that it writes.
+    // Fields drop in this order: the process before the file that it writes.
     input: Option<RawVideo<Pipe>>,
     process: Process,
     format: Format,
@@ -39,14 +39,14 @@ pub struct Ffmpeg {
 }
 
 impl Ffmpeg {
-    /// Starts ffmpeg, found through `PATH`, to write `path`, and waits until it reads: loading it takes tenths of a second, and
-    /// the first frame would stand in the way of those behind it for as long.
+    /// Starts ffmpeg, found through `PATH`, to write `path`, and waits until it reads: loading it takes tenths of a
+    /// second, and the first frame would delay those behind it by that time.
     ///
     /// # Errors
     /// The file exists and `force` is not set, or ffmpeg is missing or cannot be started.
     pub fn create(path: &Path, options: &Options) -> Result<Self, SinkError> {
         let output = Output::create(path, options.force)?;
-        let format = Format::of(path);
+        let format = Format::for_path(path);
         let mut command = command::encode(&format, output.part(), options.size.1, options.threads);
         let mut process = Process::start(&mut command, &options.stop).map_err(|cause| match cause.kind() {
             ErrorKind::NotFound => SinkError::NoFfmpeg { path: path.to_owned() },
@@ -54,12 +54,12 @@ impl Ffmpeg {
         })?;
         let mut watchdog = process.watchdog();
         let pipe = match process.stdin() {
-            Some(stdin) => Pipe::own(OwnedFd::from(stdin), move |blocked| !watchdog.hangs(blocked)),
+            Some(stdin) => Pipe::from_owned(OwnedFd::from(stdin), move |blocked| !watchdog.hangs(blocked)),
             None => Err(ErrorKind::BrokenPipe.into()),
         };
         let input = pipe.and_then(|pipe| RawVideo::new(pipe, options.size, options.period_ns));
         let input = input.map_err(SinkError::write(path))?;
-        input.to.settle(PATIENCE).map_err(SinkError::write(path))?;
+        input.to.wait_drained(STARTUP_TIMEOUT).map_err(SinkError::write(path))?;
         Ok(Self { input: Some(input), process, format, output, size: options.size, stop: Arc::clone(&options.stop) })
     }
 
@@ -70,33 +70,34 @@ impl Ffmpeg {
         check_outcome(ended, self.output.path(), self.output.part(), self.format.container)
     }
 
-    /// Copies an mp4 to one with its index at the front. If that fails, as for want of room, the file stays as it is.
+    /// Copies an mp4 to one with its index at the front. If that fails, for example on a full disk, the file stays as
+    /// it is.
     fn move_index_to_front(&mut self) {
         if self.format.container != Container::Mp4 {
             return;
         }
-        let tidied = Part::create(self.output.path()).map_err(SinkError::write(self.output.path())).and_then(|part| {
+        let indexed = Part::create(self.output.path()).map_err(SinkError::write(self.output.path())).and_then(|part| {
             let command = command::index_in_front(self.output.part(), part.part());
             run(command, &self.stop, self.output.path(), part.part()).map(|()| part)
         });
-        match tidied {
+        match indexed {
             Ok(part) => self.output.replace(part),
             Err(error) => tracing::info!("{}: its index stays in pieces: {error}", self.output.path().display()),
         }
     }
 }
 
-/// Runs ffmpeg to write `part`, which must then be a whole mp4.
+/// Runs ffmpeg to write `part`, which must then be a complete mp4.
 fn run(mut command: Command, stop: &Arc<AtomicBool>, path: &Path, part: &Path) -> Result<(), SinkError> {
     let ended = Process::start(&mut command, stop).and_then(|mut process| process.wait());
     check_outcome(ended, path, part, Container::Mp4)
 }
 
-/// What ffmpeg says when frames are missing from a file, though it may end as if all were well.
+/// Messages of ffmpeg about frames missing from a file, though its exit status may be success.
 const LOSSES: [&str; 5] =
     ["av_interleaved_write_frame", "Error writing", "Error muxing", "No space left", "Input/output error"];
 
-/// Fails unless ffmpeg ended well, did not report losses, and left a whole file at `part`. `path` is for the message.
+/// Fails unless ffmpeg succeeded, reported no losses, and left a complete file at `part`. `path` is for the message.
 fn check_outcome(ended: io::Result<Ended>, path: &Path, part: &Path, container: Container) -> Result<(), SinkError> {
     let Ended { status, said } = ended.map_err(SinkError::write(path))?;
     let path = path.to_owned();
@@ -120,10 +121,10 @@ impl Sink for Ffmpeg {
     fn put(&mut self, frame: &ColorImage, time_ns: u64) -> Result<ControlFlow<()>, SinkError> {
         check_size(self.size, frame.size())?;
         let Some(input) = &mut self.input else { return Ok(ControlFlow::Break(())) };
-        if let Err(error) = self.output.check_there() {
-            // It still completes the file, which can be copied; how it ended says nothing more.
+        if let Err(error) = self.output.check_exists() {
+            // It still completes the file, which can be copied; its result adds no information.
             let _ = self.end(false);
-            return Err(self.output.failed(error));
+            return Err(self.output.fail(error));
         }
         let Err(cause) = input.write(frame, time_ns) else {
             self.output.frames += 1;
@@ -131,14 +132,14 @@ impl Sink for Ffmpeg {
         };
         let path = self.output.path().to_owned();
         let error = match cause.kind() {
-            // ffmpeg closes its input only by ending: how it ended tells more than the broken pipe.
+            // ffmpeg closes its input only by exiting: its exit status is more informative than the broken pipe.
             ErrorKind::BrokenPipe | ErrorKind::TimedOut => match self.end(cause.kind() == ErrorKind::TimedOut) {
                 Ok(()) => SinkError::Ffmpeg { path, status: "ended early".into(), said: String::new() },
                 Err(error) => error,
             },
             _ => SinkError::Write { path, cause },
         };
-        Err(self.output.failed(error))
+        Err(self.output.fail(error))
     }
 
     fn finish(mut self: Box<Self>, ending: Ending) -> Result<(), SinkError> {
@@ -147,16 +148,16 @@ impl Sink for Ffmpeg {
         }
         if self.output.frames == 0 {
             tracing::warn!("{}: there was no frame, so there is no file", self.output.path().display());
-            self.output.give_up();
+            self.output.discard();
             return Ok(());
         }
         let ended = self.end(false);
-        match self.output.check_there().and(ended) {
+        match self.output.check_exists().and(ended) {
             Ok(()) => {
                 self.move_index_to_front();
                 self.output.complete(ending)
             }
-            Err(error) => Err(self.output.failed(error)),
+            Err(error) => Err(self.output.fail(error)),
         }
     }
 

@@ -1,4 +1,4 @@
-//! Uncompressed video with times, as ffmpeg reads it: a Matroska stream without an end, of one frame a cluster.
+//! Uncompressed video with time stamps for ffmpeg: an endless Matroska stream with one frame per cluster.
 //!
 //! Elements are those of RFC 9559; the codec is `V_UNCOMPRESSED`, I420.
 
@@ -9,10 +9,10 @@ use crate::frame::ColorImage;
 use crate::layout::Range;
 use crate::sink::yuv::Converter;
 
-/// Times are in microseconds.
+/// Time stamps are in microseconds.
 const TICK_NS: u64 = 1000;
-/// Least distance of frames, 1 ms: encoders would take closer ones for the same frame.
-const LEAST_TICKS: u64 = 1000;
+/// Minimum distance of frames, 1 ms: encoders would merge closer ones.
+const MIN_TICKS: u64 = 1000;
 
 /// A stream of raw frames.
 pub(super) struct RawVideo<W: Write> {
@@ -22,12 +22,12 @@ pub(super) struct RawVideo<W: Write> {
     first_ns: Option<u64>,
     /// Time of the last frame, in ticks after the first.
     last_ticks: Option<u64>,
-    /// A cluster, encoded and not yet written.
+    /// An encoded cluster that is not written yet.
     bytes: Vec<u8>,
 }
 
 impl<W: Write> RawVideo<W> {
-    /// A stream into `to` of frames of `size` that mostly come every `period_ns`. Its header is written at once.
+    /// Creates a stream into `to` of frames of `size` that usually come every `period_ns`. Writes its header at once.
     pub(super) fn new(mut to: W, size: (u32, u32), period_ns: u64) -> io::Result<Self> {
         let matrix = Matrix::for_height(size.1);
         to.write_all(&header(size, period_ns, matrix))?;
@@ -40,11 +40,11 @@ impl<W: Write> RawVideo<W> {
         })
     }
 
-    /// Writes a frame that was captured at `time_ns`, as a cluster of its own.
+    /// Writes a frame captured at `time_ns`, as a cluster of its own.
     pub(super) fn write(&mut self, frame: &ColorImage, time_ns: u64) -> io::Result<()> {
         let first_ns = *self.first_ns.get_or_insert(time_ns);
         let ticks = (time_ns.saturating_sub(first_ns) + TICK_NS / 2) / TICK_NS;
-        let ticks = self.last_ticks.map_or(ticks, |last| ticks.max(last + LEAST_TICKS));
+        let ticks = self.last_ticks.map_or(ticks, |last| ticks.max(last + MIN_TICKS));
         self.last_ticks = Some(ticks);
         let (width, height) = (frame.width as usize, frame.height as usize);
         let picture_bytes = width * height + 2 * width.div_ceil(2) * height.div_ceil(2);
@@ -52,9 +52,9 @@ impl<W: Write> RawVideo<W> {
         // Track 1, at the time of the cluster, a key frame.
         let block_head = [0x81, 0, 0, 0x80];
         let block_bytes = block_head.len() + picture_bytes;
-        begin_element(CLUSTER, time.len() + SIMPLE_BLOCK.len() + SIZE_BYTES + block_bytes, &mut self.bytes);
+        append_element_head(CLUSTER, time.len() + SIMPLE_BLOCK.len() + SIZE_BYTES + block_bytes, &mut self.bytes);
         self.bytes.extend_from_slice(&time);
-        begin_element(SIMPLE_BLOCK, block_bytes, &mut self.bytes);
+        append_element_head(SIMPLE_BLOCK, block_bytes, &mut self.bytes);
         self.bytes.extend_from_slice(&block_head);
         self.converter.append(frame, &mut self.bytes);
         let written = self.to.write_all(&self.bytes);
@@ -67,35 +67,36 @@ const SEGMENT: &[u8] = &[0x18, 0x53, 0x80, 0x67];
 const CLUSTER: &[u8] = &[0x1f, 0x43, 0xb6, 0x75];
 const TIMESTAMP: &[u8] = &[0xe7];
 const SIMPLE_BLOCK: &[u8] = &[0xa3];
-/// Sizes are written as eight bytes, the first of which is 01 to say so.
+/// Sizes are written as eight bytes, which the first byte, 01, indicates.
 const SIZE_BYTES: usize = 8;
 const UNKNOWN_SIZE: [u8; SIZE_BYTES] = [0x01, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff];
 
 /// Appends the head of an element whose content of `bytes` bytes is to follow.
-fn begin_element(id: &[u8], bytes: usize, to: &mut Vec<u8>) {
+fn append_element_head(id: &[u8], bytes: usize, to: &mut Vec<u8>) {
     to.extend_from_slice(id);
     to.extend_from_slice(&(bytes as u64 | 1 << 56).to_be_bytes());
 }
 
 fn element(id: &[u8], content: &[u8]) -> Vec<u8> {
     let mut element = Vec::with_capacity(id.len() + SIZE_BYTES + content.len());
-    begin_element(id, content.len(), &mut element);
+    append_element_head(id, content.len(), &mut element);
     element.extend_from_slice(content);
     element
 }
 
-/// Everything before the first cluster: EBML header, and the head of an endless segment with its info and one track.
+/// Builds everything before the first cluster: the EBML header, and the head of an endless segment with its info and
+/// one track.
 fn header((width, height): (u32, u32), period_ns: u64, matrix: Matrix) -> Vec<u8> {
     let number = |id: &[u8], value: u64| element(id, &value.to_be_bytes());
-    let within = |id: &[u8], parts: &[Vec<u8>]| element(id, &parts.concat());
-    // As ITU-T H.273 numbers them.
+    let master_element = |id: &[u8], parts: &[Vec<u8>]| element(id, &parts.concat());
+    // Codes of ITU-T H.273.
     let color = match matrix {
         Matrix::Bt601 => 6,
         Matrix::Bt709 => 1,
         Matrix::Bt2020 => 9,
     };
-    // Matrix, chroma siting (in the middle of four pixels, both ways), limited range, transfer, primaries.
-    let colour = within(
+    // Matrix, chroma siting (in the centre of four pixels, both ways), limited range, transfer, primaries.
+    let colour = master_element(
         &[0x55, 0xb0],
         &[
             number(&[0x55, 0xb1], color),
@@ -106,12 +107,12 @@ fn header((width, height): (u32, u32), period_ns: u64, matrix: Matrix) -> Vec<u8
             number(&[0x55, 0xbb], color),
         ],
     );
-    // Width, height, layout of the pixels.
-    let video = within(
+    // Width, height, pixel layout.
+    let video = master_element(
         &[0xe0],
         &[number(&[0xb0], width.into()), number(&[0xba], height.into()), element(&[0x2e, 0xb5, 0x24], b"I420"), colour],
     );
-    let track = within(
+    let track = master_element(
         &[0xae],
         &[
             // Number and unique number.
@@ -126,10 +127,10 @@ fn header((width, height): (u32, u32), period_ns: u64, matrix: Matrix) -> Vec<u8
             video,
         ],
     );
-    let mut header = within(
+    let mut header = master_element(
         &[0x1a, 0x45, 0xdf, 0xa3],
         &[
-            // Versions, longest identifiers and sizes, kind of document and its versions.
+            // Versions, longest identifiers and sizes, document type and its versions.
             number(&[0x42, 0x86], 1),
             number(&[0x42, 0xf7], 1),
             number(&[0x42, 0xf2], 4),
@@ -141,11 +142,11 @@ fn header((width, height): (u32, u32), period_ns: u64, matrix: Matrix) -> Vec<u8
     );
     header.extend_from_slice(SEGMENT);
     header.extend_from_slice(&UNKNOWN_SIZE);
-    // Info: the length of a tick, the programs that mux and write.
-    let by = |id: &[u8]| element(id, b"bokehcam");
-    header.extend(within(
+    // Info: the length of a tick, the muxing and the writing program.
+    let app_name = |id: &[u8]| element(id, b"bokehcam");
+    header.extend(master_element(
         &[0x15, 0x49, 0xa9, 0x66],
-        &[number(&[0x2a, 0xd7, 0xb1], TICK_NS), by(&[0x4d, 0x80]), by(&[0x57, 0x41])],
+        &[number(&[0x2a, 0xd7, 0xb1], TICK_NS), app_name(&[0x4d, 0x80]), app_name(&[0x57, 0x41])],
     ));
     header.extend(element(&[0x16, 0x54, 0xae, 0x6b], &track));
     header

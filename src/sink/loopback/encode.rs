@@ -1,4 +1,4 @@
-//! Pictures as frames in the pixel layouts of V4L2; Y'CbCr ones in BT.601, limited range.
+//! Encodes pictures in V4L2 pixel layouts; Y'CbCr in BT.601, limited range.
 
 use crate::color::Matrix;
 use crate::frame::ColorImage;
@@ -7,12 +7,12 @@ use crate::sink::yuv::Converter;
 use crate::sink::yuyv;
 use crate::v4l2::loopback::Layout;
 
-/// Encodes pictures of one layout.
+/// Encodes pictures in one layout.
 pub(super) struct Encoder {
     layout: Layout,
     yuyv: yuyv::Encoder,
     planar: Converter,
-    /// Working memory: planes that are to be interleaved.
+    /// Scratch buffer: planes to be interleaved.
     planes: Vec<u8>,
 }
 
@@ -38,6 +38,7 @@ impl Encoder {
                 self.planar.append(picture, bytes);
             }
             Layout::Nv12 => {
+                // NV12 is planar 4:2:0 with the two chroma planes interleaved.
                 self.planes.clear();
                 self.planar.append(picture, &mut self.planes);
                 let (luma, chroma) = self.planes.split_at(picture.rgb.len() / 3);
@@ -69,7 +70,7 @@ mod tests {
     use super::*;
 
     fn encoded(layout: Layout, picture: &ColorImage) -> Vec<u8> {
-        // What was there before must not matter.
+        // Previous content must not matter.
         let mut bytes = vec![9; 77];
         Encoder::new(layout).encode(picture, &mut bytes);
         assert_eq!(bytes.len(), layout.frame_bytes(picture.size()));

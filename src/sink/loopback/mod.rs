@@ -1,8 +1,8 @@
-//! A virtual camera: a node of v4l2loopback that call programs read from.
+//! A virtual camera: a v4l2loopback node that call programs read.
 //!
-//! Its format stays the same for the whole run; pictures of another size are fitted into it. Nothing makes a writer
-//! wait there, so frames go out when they come; where none comes, the last one is written again, so that readers that
-//! come late, or give up on a silent camera, have something to show.
+//! Its format is constant during a run; pictures of another size are scaled into it. A writer never blocks there, so
+//! frames are written as they come; while none comes, the last one is repeated, so that readers that connect late, or
+//! give up on a silent camera, have a picture.
 
 mod encode;
 mod watch;
@@ -21,24 +21,24 @@ use crate::link::demand::Demand;
 use crate::v4l2::audience::Audience;
 use crate::v4l2::loopback::{Layout, LoopbackError, Output};
 
-/// The shortest time after which a picture is repeated.
-const SHORTEST_HOLD: Duration = Duration::from_millis(100);
-/// While nobody watches the card is written as often as keeps the node alive.
+/// Shortest time after which a picture is repeated.
+const MIN_HOLD: Duration = Duration::from_millis(100);
+/// Period of the card while no client watches, which keeps the node alive.
 const IDLE_HOLD: Duration = Duration::from_secs(1);
 
-/// A virtual camera that is written to.
+/// A virtual camera opened for writing.
 pub struct Loopback {
     output: Output,
-    /// Whether frames of the run that are YUYV can be written as they are.
+    /// Whether YUYV frames of the run can be written unchanged.
     wants_yuyv: bool,
     encoder: Encoder,
     fit: Fit,
     fitted: ColorImage,
-    /// The frame that was written last, encoded.
+    /// The last frame written, encoded.
     bytes: Vec<u8>,
     /// Whether that is the still card.
     shows_card: bool,
-    /// When the card was written last in the place of a picture.
+    /// When the card was last written instead of a picture.
     covered_ns: u64,
     hold: Duration,
     demand: Option<Demand>,
@@ -46,15 +46,15 @@ pub struct Loopback {
 }
 
 impl Loopback {
-    /// Opens the node, and shows a still card there until the first picture comes. With a demand in the options, that
-    /// is told whether somebody watches.
+    /// Opens the node, and shows a still card until the first picture comes. A demand in the options is kept up to date
+    /// with whether the camera is watched.
     ///
     /// # Errors
-    /// It is no free node of v4l2loopback, its format is fixed to one that cannot be written, or the system does not
-    /// tell who reads from it.
+    /// It is not a free node of v4l2loopback, its format is fixed to one that cannot be written, or the system cannot
+    /// detect readers.
     pub fn open(path: &Path, options: &Options) -> Result<Self, SinkError> {
         let size = options.out_size.unwrap_or(options.size);
-        // Two pixels share their colour.
+        // Two pixels share their chroma.
         let even = ((size.0 & !1).max(2), size.1.max(1));
         let output = Output::open(path, even, frame_rate(options.period_ns))?;
         if output.size() != even {
@@ -70,7 +70,7 @@ impl Loopback {
             bytes: Vec::new(),
             shows_card: true,
             covered_ns: 0,
-            hold: (2 * Duration::from_nanos(options.period_ns)).clamp(SHORTEST_HOLD, IDLE_HOLD),
+            hold: (2 * Duration::from_nanos(options.period_ns)).clamp(MIN_HOLD, IDLE_HOLD),
             demand: options.demand.clone(),
             _watcher,
             output,
@@ -79,7 +79,7 @@ impl Loopback {
         Ok(loopback)
     }
 
-    /// Whether nobody watches, as far as that is noticed.
+    /// Whether no client watches, as far as that is detected.
     fn is_unwatched(&self) -> bool {
         self.demand.as_ref().is_some_and(|demand| !demand.is_watched())
     }
@@ -88,12 +88,12 @@ impl Loopback {
         card::draw(&mut self.fitted);
         self.encoder.encode(&self.fitted, &mut self.bytes);
         self.shows_card = true;
-        // All buffers of the driver: a new reader is first given what lies there, which must be no picture from before.
+        // Fill all buffers of the driver: a new reader first gets their content, which must not be an earlier picture.
         Ok(self.output.overwrite(&self.bytes)?)
     }
 }
 
-/// Starts a thread that tells `demand` whether anybody reads from the camera.
+/// Starts a thread that updates `demand` when readers of the camera come and go.
 fn start_watcher(path: &Path, output: &Output, demand: Demand) -> Result<Watcher, SinkError> {
     let refused = |cause| LoopbackError::System {
         path: path.to_owned(),
@@ -130,7 +130,7 @@ impl Sink for Loopback {
         Ok(ControlFlow::Continue(()))
     }
 
-    /// The driver keeps the card: it is written again only as often as any last picture is.
+    /// The driver keeps the card, so it is rewritten only as often as any last picture.
     fn cover(&mut self, _: &ColorImage, time_ns: u64) -> Result<ControlFlow<()>, SinkError> {
         if !self.shows_card {
             self.show_card()?;
@@ -146,16 +146,16 @@ impl Sink for Loopback {
         true
     }
 
-    /// Once nobody watches, the card soon takes the place of the last picture, and then seldom needs to be written.
+    /// While no client watches, the card soon replaces the last picture, and is then rarely rewritten.
     fn hold(&self) -> Option<Duration> {
         match (self.is_unwatched(), self.shows_card) {
             (true, true) => Some(IDLE_HOLD),
-            (true, false) => Some(SHORTEST_HOLD),
+            (true, false) => Some(MIN_HOLD),
             (false, _) => Some(self.hold),
         }
     }
 
-    /// Once nobody watches, the still card takes the place of the last frame.
+    /// While no client watches, the still card replaces the last frame.
     fn repeat(&mut self) -> Result<ControlFlow<(), bool>, SinkError> {
         if self.is_unwatched() && !self.shows_card {
             self.show_card()?;
@@ -178,8 +178,8 @@ impl Sink for Loopback {
 
 impl Drop for Loopback {
     fn drop(&mut self) {
-        // Otherwise readers that stay would show the last picture of a person for good. An error is not reported: it
-        // would have come with the frames before.
+        // Otherwise connected readers would show the last picture of a person forever. An error is not reported: it
+        // would have occurred with earlier frames.
         if !self.shows_card {
             let _ = self.show_card();
         }

@@ -1,4 +1,4 @@
-//! Notices whether anybody reads from the virtual camera, and tells the demand.
+//! Watches whether the virtual camera has readers, and updates the demand.
 
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
@@ -8,10 +8,11 @@ use crate::clock::Clock;
 use crate::link::demand::Demand;
 use crate::v4l2::audience::{Audience, ReaderEvent, Stop};
 
-/// How long a camera still counts as watched after its last reader left: call programs close and open it repeatedly.
-const LINGER: Duration = Duration::from_millis(2500);
+/// Time for which a camera still counts as watched after its last reader left: call programs close and reopen it
+/// repeatedly.
+const WATCH_HOLD: Duration = Duration::from_millis(2500);
 
-/// A thread that watches until it is dropped.
+/// A thread that watches for readers until it is dropped.
 pub(super) struct Watcher {
     stop: Option<Stop>,
     thread: Option<JoinHandle<()>>,
@@ -19,7 +20,7 @@ pub(super) struct Watcher {
 
 impl Watcher {
     pub(super) fn start((mut audience, stop): (Audience, Stop), demand: Demand) -> io::Result<Self> {
-        let listen = move || follow_readers(&demand, &Clock::system(), |patience| audience.wait(patience));
+        let listen = move || follow_readers(&demand, &Clock::system(), |timeout| audience.wait(timeout));
         let thread = thread::Builder::new().name("audience".into()).spawn(listen)?;
         Ok(Self { stop: Some(stop), thread: Some(thread) })
     }
@@ -28,13 +29,13 @@ impl Watcher {
 impl Drop for Watcher {
     fn drop(&mut self) {
         drop(self.stop.take());
-        // A panic of the thread was printed; there is nothing left to do about it.
+        // A panic of the thread was printed already.
         let _ = self.thread.take().map(JoinHandle::join);
     }
 }
 
-/// Holds a watch on `demand` while there are readers, and [`LINGER`] longer, until it is told to stop. `wait` blocks
-/// for the next event, at most for the given time (`None`: without limit).
+/// Holds a watch on `demand` while there are readers, and [`WATCH_HOLD`] longer, until it is stopped. `wait` blocks for
+/// the next event, at most for the given time (`None`: without limit).
 fn follow_readers(demand: &Demand, clock: &Clock, mut wait: impl FnMut(Option<Duration>) -> ReaderEvent) {
     let mut watch = None;
     let mut release_at_ns: Option<u64> = None;
@@ -49,7 +50,8 @@ fn follow_readers(demand: &Demand, clock: &Clock, mut wait: impl FnMut(Option<Du
                 }
             }
             ReaderEvent::Readers(false) if watch.is_some() => {
-                release_at_ns.get_or_insert(clock.now_ns() + LINGER.as_nanos() as u64);
+                // A repeated report must not extend the hold.
+                release_at_ns.get_or_insert(clock.now_ns() + WATCH_HOLD.as_nanos() as u64);
             }
             ReaderEvent::Readers(false) | ReaderEvent::Nothing => {}
             ReaderEvent::Stopped => return,
@@ -68,20 +70,20 @@ mod tests {
 
     const SECOND: Duration = Duration::from_secs(1);
 
-    /// Plays what is heard, and when: each after so long, but not beyond what the listener is ready to wait. Returns
-    /// for each whether the demand was watched when it was waited for, and for how long.
-    fn play(heard: &[(Duration, ReaderEvent)]) -> Vec<(bool, Option<Duration>)> {
+    /// Plays events, each after a delay, but returns earlier if the listener's timeout is shorter. Returns for each
+    /// wait whether the demand was watched, and the timeout.
+    fn play(events: &[(Duration, ReaderEvent)]) -> Vec<(bool, Option<Duration>)> {
         let (demand, clock) = (Demand::new(), Clock::manual());
-        let mut left = heard.iter();
+        let mut left = events.iter();
         let mut seen = Vec::new();
         let mut next = left.next().copied();
-        follow_readers(&demand, &clock, |patience| {
-            seen.push((demand.is_watched(), patience));
+        follow_readers(&demand, &clock, |timeout| {
+            seen.push((demand.is_watched(), timeout));
             let Some((after, what)) = next else { return ReaderEvent::Stopped };
-            match patience {
-                Some(patience) if patience < after => {
-                    next = Some((after - patience, what));
-                    clock.advance_ns(patience.as_nanos() as u64);
+            match timeout {
+                Some(timeout) if timeout < after => {
+                    next = Some((after - timeout, what));
+                    clock.advance_ns(timeout.as_nanos() as u64);
                     ReaderEvent::Nothing
                 }
                 _ => {
@@ -105,7 +107,7 @@ mod tests {
         ]);
         assert_eq!(
             seen,
-            [(false, None), (false, None), (true, None), (true, Some(LINGER)), (false, None), (true, None)]
+            [(false, None), (false, None), (true, None), (true, Some(WATCH_HOLD)), (false, None), (true, None)]
         );
     }
 

@@ -1,4 +1,4 @@
-//! Pictures in the formats that readers of a camera may ask for.
+//! Encodes pictures in the formats that readers of a camera may request.
 
 use image::ExtendedColorType;
 use image::codecs::jpeg::JpegEncoder;
@@ -10,24 +10,24 @@ use crate::pipewire::mode::{Agreed, Mode, Offer};
 use crate::pipewire::node::Memory;
 use crate::sink::{raw, yuyv};
 
-/// As cameras compress, or finer.
+/// At least the quality of usual cameras.
 const JPEG_QUALITY: u8 = 90;
-/// What a picture of noise takes as JPEG at most, and its head.
+/// Upper bound for a noise picture as JPEG, and for its header.
 const JPEG_BYTES_PER_PX: usize = 3;
 const JPEG_HEAD_BYTES: usize = 4096;
-/// The widest and highest pictures that are made where a camera leaves it open.
+/// Largest picture side offered where a camera leaves it open.
 const MAX_SIDE_PX: u32 = 4096;
 
 /// Encodes pictures of any size into one format of one size.
 pub(super) struct Encoder {
     format: Format,
     layout: Layout,
-    how: How,
+    method: Method,
     fit: Fit,
     fitted: ColorImage,
 }
 
-enum How {
+enum Method {
     Yuyv(yuyv::Encoder),
     Raw(Box<raw::Encoder>),
     Jpeg,
@@ -47,7 +47,7 @@ impl From<&Agreed> for Format {
 }
 
 impl Format {
-    /// In one number, which threads hand each other without a lock. Sides have 16 bits: there are no longer ones.
+    /// Packs the format into one number, which threads exchange without a lock. 16 bits per side are sufficient.
     pub fn packed(self) -> u64 {
         let (width, height) = self.size;
         u64::from(u32::from_le_bytes(self.fourcc)) << 32 | u64::from(width as u16) << 16 | u64::from(height as u16)
@@ -58,7 +58,7 @@ impl Format {
         Self { fourcc: ((packed >> 32) as u32).to_le_bytes(), size: (side(16), side(0)) }
     }
 
-    /// Whether a picture of that size is in this format once it is YUYV.
+    /// Whether the format is YUYV of that size.
     pub fn is_yuyv(self, size: (u32, u32)) -> bool {
         self.fourcc == *b"YUYV" && self.size == size
     }
@@ -77,28 +77,28 @@ impl Format {
 }
 
 impl Encoder {
-    /// `None` for a format that is not written.
+    /// Creates an encoder; `None` for a format that cannot be written.
     pub fn new(format: Format) -> Option<Self> {
         let layout = format.layout()?;
-        let how = match layout.family() {
-            Family::Jpeg => How::Jpeg,
-            // Two pixels share their colour.
-            _ if format.is_yuyv(format.size) && format.size.0.is_multiple_of(2) => How::Yuyv(yuyv::Encoder::new()),
-            _ => How::Raw(Box::new(raw::Encoder::new(&layout)?)),
+        let method = match layout.family() {
+            Family::Jpeg => Method::Jpeg,
+            // Two pixels share their chroma.
+            _ if format.is_yuyv(format.size) && format.size.0.is_multiple_of(2) => Method::Yuyv(yuyv::Encoder::new()),
+            _ => Method::Raw(Box::new(raw::Encoder::new(&layout)?)),
         };
         let fitted = ColorImage::new(format.size.0, format.size.1);
-        Some(Self { format, layout, how, fit: Fit::default(), fitted })
+        Some(Self { format, layout, method, fit: Fit::default(), fitted })
     }
 
     pub fn format(&self) -> Format {
         self.format
     }
 
-    /// What a picture takes.
+    /// Memory that a picture needs.
     pub fn memory(&self) -> Memory {
         let (width, height) = self.format.size;
-        match self.how {
-            How::Jpeg => {
+        match self.method {
+            Method::Jpeg => {
                 Memory { bytes: JPEG_HEAD_BYTES + JPEG_BYTES_PER_PX * width as usize * height as usize, stride: 0 }
             }
             _ => Memory {
@@ -108,20 +108,20 @@ impl Encoder {
         }
     }
 
-    /// Writes a picture, fitted into the size, in the place of what `bytes` holds.
+    /// Encodes a picture, scaled into the format's size, into `bytes`, whose content is replaced.
     pub fn encode(&mut self, picture: &ColorImage, bytes: &mut Vec<u8>) {
         let needed = self.memory().bytes;
         let picture = self.fit.fitted(picture, &mut self.fitted);
-        match &mut self.how {
-            How::Yuyv(encoder) => {
+        match &mut self.method {
+            Method::Yuyv(encoder) => {
                 bytes.resize(needed, 0);
                 encoder.encode(picture, bytes);
             }
-            How::Raw(encoder) => {
+            Method::Raw(encoder) => {
                 bytes.resize(needed, 0);
                 encoder.encode(picture, &mut [bytes]);
             }
-            How::Jpeg => {
+            Method::Jpeg => {
                 bytes.clear();
                 let mut encoder = JpegEncoder::new_with_quality(&mut *bytes, JPEG_QUALITY);
                 let done = encoder.encode(&picture.rgb, picture.width, picture.height, ExtendedColorType::Rgb8);
@@ -134,8 +134,8 @@ impl Encoder {
     }
 }
 
-/// Those of a camera's modes that pictures can be given in, with sizes within bounds.
-pub(super) fn writable(modes: &[Mode]) -> Vec<Mode> {
+/// Returns those of a camera's modes that can be written, with sizes within bounds.
+pub(super) fn writable_modes(modes: &[Mode]) -> Vec<Mode> {
     let is_written = |mode: &&Mode| Encoder::new(Format { fourcc: mode.fourcc, size: (16, 16) }).is_some();
     let within = |(width, height): (u32, u32)| width.max(height) <= MAX_SIDE_PX && width.min(height) > 0;
     let bounded = |mode: &Mode| {
@@ -160,7 +160,7 @@ mod tests {
     const FORMATS: [&[u8; 4]; 10] =
         [b"YUYV", b"UYVY", b"YVYU", b"NV12", b"NV21", b"YU12", b"YV12", b"RGB3", b"BGR3", b"MJPG"];
 
-    /// Every format that a reader of a camera may ask for comes out as the picture that went in.
+    /// Every format that a reader may request decodes to the original picture.
     #[test]
     fn what_readers_decode_is_the_picture() {
         let mut picture = ColorImage::new(64, 48);
@@ -200,7 +200,7 @@ mod tests {
     #[test]
     fn only_what_can_be_written_is_offered() {
         let mode = |fourcc: &[u8; 4], sizes| Mode { fourcc: *fourcc, sizes, rates: Offer::Unknown };
-        let offered = writable(&[
+        let offered = writable_modes(&[
             mode(b"GREY", Offer::These(vec![(640, 480)])),
             mode(b"MJPG", Offer::These(vec![(640, 480), (10_000, 8)])),
             mode(b"NV12", Offer::Range { min: (1, 1), max: (1 << 31, 1 << 31) }),

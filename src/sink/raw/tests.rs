@@ -1,4 +1,4 @@
-//! Against what the definitions say in floating point, and back through the decoder.
+//! Comparison with a floating-point reference, and round trips through the decoder.
 
 use super::*;
 use crate::capture::pixels::Decoder;
@@ -23,7 +23,7 @@ fn encoded(layout: &Layout, picture: &ColorImage, arch: Arch) -> Vec<Vec<u8>> {
     planes
 }
 
-/// Y'CbCr of a colour, not rounded.
+/// Reference Y'CbCr of a colour, not rounded.
 fn exact([r, g, b]: [f64; 3], matrix: Matrix, range: Range) -> [f64; 3] {
     let [red, green, blue] = matrix.weights();
     let y = red * r + green * g + blue * b;
@@ -35,7 +35,7 @@ fn exact([r, g, b]: [f64; 3], matrix: Matrix, range: Range) -> [f64; 3] {
     [black + luma / 255.0 * y, of(b, blue), of(r, red)]
 }
 
-/// The colour that a pair's chroma is of: a quarter, a half and a quarter around its left pixel, of one row or of two.
+/// Reference colour of a pair's chroma: (1 2 1) / 4 around its left pixel, over one row or two.
 fn around(picture: &ColorImage, pair: usize, rows: &[usize]) -> [f64; 3] {
     let last = (picture.width as usize - 1, picture.height as usize - 1);
     let at = |x: usize, y: usize, p: usize| {
@@ -46,7 +46,8 @@ fn around(picture: &ColorImage, pair: usize, rows: &[usize]) -> [f64; 3] {
     [0, 1, 2].map(|p| rows.iter().map(|&y| row(y, p)).sum::<f64>() * share)
 }
 
-/// The sample (0 luma, 1 Cb, 2 Cr) of a pixel or pair, written down apart from the encoder; none at the edge of half a pair.
+/// The sample (0 luma, 1 Cb, 2 Cr) of a pixel or pair, located independently of the encoder; `None` at the edge of half
+/// a pair.
 fn sample(layout: &Layout, planes: &[Vec<u8>], which: usize, x: usize, y: usize) -> Option<u8> {
     let components: Vec<Component> = layout.components().collect();
     let byte = |index: usize, at: usize| {
@@ -122,7 +123,7 @@ fn what_is_decoded_is_what_was_encoded() {
             let slices: Vec<&[u8]> = planes.iter().map(Vec::as_slice).collect();
             let mut back = ColorImage::default();
             Decoder::new(&layout).unwrap().decode(&slices, &mut back).unwrap();
-            // Away from the edges, beyond which the ramp does not go on.
+            // Only away from the edges, beyond which the ramp does not continue.
             let inner = |at: usize| (2..62).contains(&(at % 64)) && (2..14).contains(&(at / 64));
             let pixels = ramp.rgb.as_chunks::<3>().0.iter().zip(back.rgb.as_chunks::<3>().0).enumerate();
             for (at, (was, is)) in pixels.filter(|&(at, _)| inner(at)) {

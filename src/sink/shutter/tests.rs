@@ -5,7 +5,7 @@ use super::*;
 const PERIOD: Duration = Duration::from_millis(40);
 const PERIOD_NS: u64 = PERIOD.as_nanos() as u64;
 
-/// What a sink was given: whether that is the card, and when.
+/// The pictures that a sink got: whether each is the card, and its time.
 type Got = Arc<Mutex<Vec<(bool, u64)>>>;
 
 struct Witness(Got);
@@ -53,7 +53,7 @@ fn a_closed_shutter_lets_nothing_pass_and_the_camera_rests() {
     assert_eq!(shutter.repeat().unwrap(), ControlFlow::Continue(true), "nobody waits for a frame");
     assert!(!demand.is_watched() && demand.has_watchers());
     assert_eq!(shutter.repeat().unwrap(), ControlFlow::Continue(false), "not more often than frames");
-    // One that was on its way.
+    // A picture that was in flight.
     assert!(shutter.put(&picture, PERIOD_NS).unwrap().is_continue());
     for _ in 0..2 {
         clock.advance_ns(PERIOD_NS);
@@ -64,7 +64,7 @@ fn a_closed_shutter_lets_nothing_pass_and_the_camera_rests() {
     clock.advance_ns(PERIOD_NS);
     assert_eq!(shutter.repeat().unwrap(), ControlFlow::Continue(true), "the card stays until there is a picture");
     assert!(demand.is_watched());
-    // The source stood still meanwhile; a sink's time goes on, whatever comes.
+    // The source stood still meanwhile; the sink's time advances all the same.
     for time in [2, 3] {
         assert!(shutter.put(&picture, time * PERIOD_NS).unwrap().is_continue());
     }
@@ -121,7 +121,7 @@ fn a_copy_is_in_full_colour_and_what_is_yuyv_stays_behind_a_closed_shutter_as_we
     while shutter.wants_yuyv() {
         std::thread::sleep(Duration::from_millis(1));
     }
-    // What was under way passes, and is no answer.
+    // A picture in flight passes, and is not the requested copy.
     assert!(shutter.put_yuyv(&mut yuyv, 0).unwrap().is_continue());
     assert!(!shutter.wants_yuyv() && !asks.is_finished());
     assert!(shutter.put(&picture, PERIOD_NS).unwrap().is_continue());

@@ -1,4 +1,4 @@
-//! Sinks that come and go.
+//! Sinks that are added and removed during a run.
 
 use std::io;
 use std::sync::atomic::AtomicU64;
@@ -9,22 +9,22 @@ use std::time::Instant;
 use super::*;
 use crate::sink::switch::{Fate, Over};
 
-/// Nothing here takes so long: against a hang.
+/// No step takes this long: detects a hang.
 const HANG: Duration = Duration::from_secs(120);
 
-/// A member that behaves as it is told to.
+/// A member with configurable behaviour.
 #[derive(Default)]
 struct Fake {
     name: &'static str,
-    /// Frames that it was given, by their first byte.
+    /// First bytes of the frames it got.
     got: Arc<std::sync::Mutex<Vec<u8>>>,
     repeats: Arc<AtomicU64>,
     hold: Option<Duration>,
-    /// The frame that its reader wants no more.
+    /// The frame at which its reader leaves.
     leaves_at: Option<usize>,
-    /// The frame that it cannot write.
+    /// The frame that it fails to write.
     fails_at: Option<usize>,
-    /// It is completed once this says so.
+    /// Completion waits for this signal.
     finish_at: Option<Receiver<()>>,
     finish_fails: bool,
     finish_panics: bool,
@@ -73,11 +73,11 @@ fn switch() -> (Box<Tee>, Switchboard, Receiver<Notice>) {
     (Box::new(switch), board, told)
 }
 
-/// Gives frames, each once the members are through with the one before.
+/// Sends frames, each after the members have processed the previous one.
 fn put(switch: &mut Tee, numbers: std::ops::Range<u8>) {
     let frames = |count: &Counter<OutputUse>| count().frames + count().lost;
     for number in numbers {
-        switch.take_orders();
+        switch.handle_requests();
         let counts: Vec<_> = switch.outputs.iter().map(|(_, output)| output.counter()).collect();
         let before: Vec<_> = counts.iter().map(frames).collect();
         let mut frame = ColorImage::new(2, 2);
@@ -92,7 +92,7 @@ fn put(switch: &mut Tee, numbers: std::ops::Range<u8>) {
     }
 }
 
-/// All that was told until now, members' names in their order.
+/// Returns all notices so far, sorted by member.
 fn all(told: &Receiver<Notice>) -> Vec<(String, Fate)> {
     let mut all: Vec<_> = told.try_iter().map(|told| (told.member, told.fate)).collect();
     all.sort_by(|a, b| a.0.cmp(&b.0));
@@ -142,9 +142,9 @@ fn a_member_that_fails_or_whose_reader_goes_is_taken_out_and_the_others_go_on() 
     board.add("b", Box::new(good)).unwrap();
     board.add("c", Box::new(Fake { leaves_at: Some(2), ..Fake::default() })).unwrap();
     put(&mut switch, 0..5);
-    switch.take_orders();
+    switch.handle_requests();
     assert_eq!(switch.outputs.len(), 1);
-    // A member that failed while it ran is its own affair, not the run's.
+    // A member's failure during the run does not fail the run.
     switch.finish(Ending::Whole).unwrap();
     assert_eq!(*got.lock().unwrap(), [0, 1, 2, 3, 4]);
     let [a, b, c] = [failed("a", 1, "cannot write a: full"), completed("b", 5), completed("c", 2)];
@@ -177,7 +177,7 @@ fn errors_at_the_end_are_told_and_returned_after_all_are_completed() {
     let (complete, finish_at) = mpsc::channel();
     board.add("c", Box::new(Fake { finish_at: Some(finish_at), ..Fake::default() })).unwrap();
     put(&mut switch, 0..2);
-    // After the others have failed, as like as not.
+    // After the others have failed, most likely.
     thread::spawn(move || {
         thread::sleep(Duration::from_millis(20));
         complete.send(()).unwrap();
@@ -189,7 +189,7 @@ fn errors_at_the_end_are_told_and_returned_after_all_are_completed() {
         completed("c", 2),
     ];
     assert_eq!(all(&told), [began("a"), a, began("b"), b, began("c"), c]);
-    // Whoever comes too late learns it, in both ways.
+    // A late request is refused, and reported as failed.
     assert_eq!(board.add("d", Box::new(Fake::default())), Err(Over));
     assert_eq!(all(&told), [failed("d", 0, "it was given up")]);
 }
@@ -239,7 +239,7 @@ fn without_pictures_orders_are_taken_and_live_members_repeat_when_they_are_due()
     assert_eq!(all(&told), [completed("file", 1), began("live"), completed("live", 1)]);
 }
 
-/// A recording that stalls holds up neither the camera nor the frames, and says what it lost.
+/// A stalled recording delays neither the camera nor the frames, and counts its losses.
 #[test]
 fn no_member_waits_for_another() {
     let (mut switch, board, told) = switch();
@@ -247,7 +247,7 @@ fn no_member_waits_for_another() {
     let camera = Fake::default();
     let got = Arc::clone(&camera.got);
     let stalled = Fake { name: "stalled", ..Fake::default() };
-    // It takes its first frame once nobody holds this.
+    // It receives its first frame once this lock is released.
     let (stuck, held) = (Arc::clone(&stalled.got), stalled.got.lock().unwrap().clone());
     assert!(held.is_empty());
     let hold = stuck.lock().unwrap();
@@ -266,7 +266,7 @@ fn no_member_waits_for_another() {
     complete.send(()).unwrap();
     let outputs = switch.outputs();
     switch.finish(Ending::Whole).unwrap();
-    // The one that its thread came upon first, and the newest.
+    // The first one that its thread dequeued, and the newest.
     let taken = stuck.lock().unwrap().clone();
     let count = taken.len() as u64;
     assert!(taken.last() == Some(&19) && count <= 2, "{taken:?}");

@@ -10,7 +10,7 @@ use crate::link::demand::Demand;
 use crate::sink::Shutter;
 use crate::sink::shutter::NotCovered;
 
-/// Nothing here takes so long: against a hang.
+/// No step takes this long: detects a hang.
 const HANG: Duration = Duration::from_secs(120);
 
 #[track_caller]
@@ -22,19 +22,19 @@ fn until(what: &str, mut is: impl FnMut() -> bool) {
     }
 }
 
-/// Tells what it is given: the first byte of each picture, and its end.
+/// Reports what it gets: the first byte of each picture, and its end.
 struct Fake {
     name: &'static str,
     tells: Sender<String>,
-    /// Takes a picture only once this says so, if there is anything to say it.
+    /// Each picture waits for a signal, if this is set.
     may_take: Option<Receiver<()>>,
     is_live: bool,
-    /// Pictures until its reader goes, or it fails.
+    /// Number of pictures until its reader goes, or it fails.
     leaves_at: usize,
     fails_at: usize,
     finish_fails: bool,
     taken: usize,
-    /// Counts the pictures that it was given, also those that it does not take yet.
+    /// Counts the pictures that it got, including those that still wait.
     given: Arc<AtomicUsize>,
 }
 
@@ -59,7 +59,7 @@ impl Fake {
     fn wait(&self) {
         self.given.fetch_add(1, Ordering::Relaxed);
         if let Some(may_take) = &self.may_take {
-            // Once nobody holds it up any more it takes all.
+            // After the sender is dropped, it accepts all pictures.
             let _ = may_take.recv_timeout(HANG);
         }
     }
@@ -118,12 +118,12 @@ fn next(told: &Receiver<String>) -> String {
     told.recv_timeout(HANG).unwrap()
 }
 
-/// What one of the outputs did, by its name.
+/// Returns the counts of an output, by its name.
 fn used(frames: &[Counter<OutputUse>], name: &str) -> OutputUse {
     frames.iter().map(|count| count()).find(|output| output.output == name).unwrap()
 }
 
-/// A camera and a file go on beside an output that takes nothing, in real time, and each counts its own.
+/// A camera and a file run in real time beside a stalled output, and each counts its own losses.
 #[test]
 fn in_real_time_none_waits_for_another_and_each_counts_what_it_lost() {
     let (camera, shown) = fake("camera");
@@ -142,7 +142,7 @@ fn in_real_time_none_waits_for_another_and_each_counts_what_it_lost() {
         until("it was given the first", || given.load(Ordering::Relaxed) == 1);
     }
     assert!(taken.try_recv().is_err(), "it has taken none yet");
-    // Two of them, as all but the one that it had and the newest are gone.
+    // Two of them: the one that it had and the newest; all others were dropped.
     drop(may);
     tee.finish(Ending::Whole).unwrap();
     assert_eq!((next(&taken), next(&taken), next(&taken)), ("0".into(), "49".into(), "Whole".into()));
@@ -160,7 +160,7 @@ fn files_that_are_to_miss_nothing_get_all_and_what_is_live_waits_for_none_of_the
     slow.may_take = Some(may_take);
     let mut tee = tee([slow, camera], Backpressure::Block, &Arc::default());
     let frames = tee.outputs();
-    // It has one, two wait in its queue, and the next one waits for room.
+    // One is being written, two wait in the queue, and the next one waits for space.
     let gives = thread::spawn(move || {
         for number in 0..20 {
             assert!(tee.put(&picture(number), 0).unwrap().is_continue());
@@ -176,7 +176,7 @@ fn files_that_are_to_miss_nothing_get_all_and_what_is_live_waits_for_none_of_the
     assert_eq!((used(&frames, "slow").frames, used(&frames, "slow").lost), (20, 0));
 }
 
-/// A run whose sink is a tee behind a shutter, driven as the last stage drives it.
+/// Runs a tee behind a shutter, driven like in the last pipeline stage.
 fn driven(
     sinks: impl IntoIterator<Item = Fake>,
     backpressure: Backpressure,
@@ -206,7 +206,7 @@ fn driven(
     drives.join().unwrap();
 }
 
-/// Off is off for who looks at a camera, whatever another output does; and who asked learns which has not the card.
+/// Closing takes effect for a live camera, whatever another output does; the caller learns which output lacks the card.
 #[test]
 fn off_reaches_what_is_live_beside_an_output_that_stalls() {
     for backpressure in [Backpressure::DropOldest, Backpressure::Block] {
@@ -311,7 +311,7 @@ fn one_that_fails_is_left_out_unless_it_is_live_and_is_an_error_in_the_end() {
         for number in 0..100 {
             error = error.or(tee.put(&picture(number), 0).err());
         }
-        // It was seen to fail by then, or is now.
+        // The failure was detected by then, or is detected now.
         let error = error.or(tee.finish(Ending::Cut).err()).unwrap();
         assert_eq!(error.to_string(), "cannot write broken: full");
         assert_eq!(of_broken.iter().count(), 1, "what has failed is not completed");

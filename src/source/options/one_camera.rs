@@ -1,6 +1,6 @@
-//! What makes depth from the pictures of one camera: a plate, networks, and how these are run.
+//! Options of depth from a single camera: a clean plate, networks, and how they are run.
 
-// What options say is shown as it is written, brackets included.
+// The help texts contain brackets that are not links.
 #![allow(rustdoc::broken_intra_doc_links)]
 
 use std::fmt;
@@ -51,7 +51,7 @@ names::named! {
 
 #[cfg(feature = "networks")]
 impl Range {
-    /// What the codes of a picture become.
+    /// Returns the scaling of a picture's codes.
     pub fn scaling(self) -> Scaling {
         match self {
             Self::Unit => Scaling::UNIT,
@@ -73,43 +73,43 @@ names::named! {
     }
 }
 
-/// A network: the best that is installed for its task, or a file.
+/// A network: the best installed one for its task, or a file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum NetworkFile {
     /// The best known one in the folders of installed networks.
     Installed,
-    /// An ONNX file.
+    /// A network file.
     At(PathBuf),
 }
 
-/// A plate: taken at the start, or a file.
+/// A clean plate: taken at the start, or a file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum PlateFile {
-    /// To be taken from the first pictures.
+    /// Taken from the first pictures.
     Taken,
-    /// A picture of what is behind.
+    /// A picture of the background.
     At(PathBuf),
 }
 
-/// What makes depth from the pictures of one camera: one of these at least.
+/// The origin of depth from a single camera; at least one field is set.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct OneCamera {
-    /// What is behind.
+    /// The clean plate.
     pub plate: Option<PlateFile>,
-    /// Where a person is.
+    /// The network that segments a person.
     pub matte: Option<NetworkFile>,
-    /// How near everything is.
+    /// The network that estimates depth.
     pub mono: Option<NetworkFile>,
 }
 
 impl OneCamera {
-    /// As `--depth` takes it, whatever the files.
+    /// Returns the value of `--depth` without files.
     pub fn kinds(&self) -> String {
         let kinds = [("plate", self.plate.is_some()), ("matte", self.matte.is_some()), ("mono", self.mono.is_some())];
         kinds.into_iter().filter(|(_, is_there)| *is_there).map(|(kind, _)| kind).collect::<Vec<_>>().join(",")
     }
 
-    /// The files that it names.
+    /// Returns the files that it names.
     pub fn files_mut(&mut self) -> impl Iterator<Item = &mut PathBuf> {
         let plate = match &mut self.plate {
             Some(PlateFile::At(file)) => Some(file),
@@ -122,12 +122,13 @@ impl OneCamera {
         plate.into_iter().chain(networks)
     }
 
-    /// Whether there is any network.
+    /// Returns whether it has a network.
     pub fn has_networks(&self) -> bool {
         self.matte.is_some() || self.mono.is_some()
     }
 
-    /// Parses `plate[:FILE]`, `matte[:FILE]` and `mono[:FILE]`, with commas between; `None` if the text means something else.
+    /// Parses `plate[:FILE]`, `matte[:FILE]` and `mono[:FILE]`, separated by commas; `None` if the text means something
+    /// else.
     pub(super) fn parse(text: &str) -> Option<Result<Self, String>> {
         let is_kind = |text: &str| {
             let kind = text.split([':', ',']).next().unwrap_or_default();
@@ -139,7 +140,7 @@ impl OneCamera {
         let mut chosen = Self::default();
         let mut rest = Some(text);
         while let Some(text) = rest {
-            // A comma divides only where another kind follows: files may have commas in their names.
+            // A comma separates only if another kind follows, as file names may contain commas.
             let comma = text.match_indices(',').map(|(at, _)| at).find(|at| is_kind(&text[at + 1..]));
             let part = &text[..comma.unwrap_or(text.len())];
             rest = comma.map(|at| &text[at + 1..]);
@@ -165,7 +166,7 @@ impl OneCamera {
     }
 }
 
-/// As `--depth` takes it.
+/// Writes the value of `--depth`.
 impl fmt::Display for OneCamera {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let network = |network: &Option<NetworkFile>| match network {
@@ -220,7 +221,7 @@ mod tests {
             (Range::Unit, 0.0, 1.0),
             (Range::Signed, -1.0, 1.0),
             (Range::Codes, 0.0, 255.0),
-            // Of red: (0 - 0.485) / 0.229 and (1 - 0.485) / 0.229.
+            // For red: (0 - 0.485) / 0.229 and (1 - 0.485) / 0.229.
             (Range::Imagenet, -2.117_904, 2.248_908),
         ] {
             let Scaling { mean, divisor } = range.scaling();

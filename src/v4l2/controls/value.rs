@@ -1,4 +1,4 @@
-//! Values of controls: how they are written, and which ones a control takes.
+//! Values of controls: their text form, and which ones a control accepts.
 
 use std::fmt;
 use std::io;
@@ -7,11 +7,11 @@ use serde::Serialize;
 
 use super::{Control, Item, Kind};
 
-/// What a control is set to.
+/// A control's value.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 #[serde(untagged)]
 pub enum Value {
-    /// A number; 0 and 1 for no and yes; the number of a menu's item.
+    /// A number; 0 and 1 for off and on; the index of a menu item.
     Number(i64),
     Text(String),
 }
@@ -25,10 +25,10 @@ impl fmt::Display for Value {
     }
 }
 
-/// Why a control is not set, or not read.
+/// Why a control cannot be set or read.
 #[derive(Debug, thiserror::Error)]
 pub enum ControlError {
-    /// The device has none of this name.
+    /// The device has no control with this name.
     #[error("control {name}: {}", suggestion(near, *count))]
     Unknown {
         name: String,
@@ -37,19 +37,19 @@ pub enum ControlError {
         /// How many controls there are.
         count: usize,
     },
-    /// It does not take this value.
+    /// The control does not accept this value.
     #[error("control {name}={value}: {accepted}")]
     Value { name: String, value: String, accepted: String },
-    /// It cannot be set, or not now.
+    /// The control cannot be set, or not now.
     #[error("control {name} {why}")]
     Fixed { name: String, why: &'static str },
-    /// It has no value that one could write down.
+    /// The control has no value that can be written as text.
     #[error("control {0} has no value to read")]
     NoValue(String),
     #[error("control {name}: {source}")]
     Device {
         name: String,
-        /// What the system says.
+        /// The system error.
         source: io::Error,
     },
 }
@@ -63,17 +63,17 @@ fn suggestion(near: &[String], count: usize) -> String {
 }
 
 impl ControlError {
-    /// The error for a `name` that no control has, with up to three similar names to suggest.
+    /// Creates the error for an unknown `name`, with up to three similar names to suggest.
     pub(super) fn unknown(name: &str, controls: &[Control]) -> Self {
-        /// Least likeness, from 0 to 1, of a name that may have been meant.
-        const ALIKE: f64 = 0.75;
+        /// Minimum similarity, from 0 to 1, for a name to be suggested.
+        const MIN_SIMILARITY: f64 = 0.75;
         const MAX_SUGGESTIONS: usize = 3;
-        let likeness = |control: &Control| {
+        let similarity = |control: &Control| {
             let contains = !name.is_empty() && control.name.contains(name);
             if contains { 1.0 } else { strsim::normalized_damerau_levenshtein(&control.name, name) }
         };
-        let mut near: Vec<(f64, &str)> = controls.iter().map(|control| (likeness(control), &*control.name)).collect();
-        near.retain(|(likeness, _)| *likeness >= ALIKE);
+        let mut near: Vec<(f64, &str)> = controls.iter().map(|control| (similarity(control), &*control.name)).collect();
+        near.retain(|(similarity, _)| *similarity >= MIN_SIMILARITY);
         near.sort_by(|a, b| b.0.total_cmp(&a.0));
         let near = near.iter().take(MAX_SUGGESTIONS).map(|(_, name)| (*name).to_owned()).collect();
         Self::Unknown { name: name.to_owned(), near, count: controls.len() }
@@ -84,20 +84,20 @@ impl Control {
     /// Parses a value of this control as a user writes it, and checks that the control can be set to it now.
     ///
     /// # Errors
-    /// It takes no such value, or none now.
+    /// The control does not accept this value, or cannot be set now.
     pub fn parse(&self, text: &str) -> Result<Value, ControlError> {
         let why = match () {
             () if self.kind == Kind::Compound => "is a table, which cannot be set by one value",
             () if self.read_only => "is read-only",
             () if self.grabbed => "cannot be set while the device is streaming",
             () if self.inactive => "has no effect now: another control overrides it, such as an automatic mode",
-            () => return self.value_of(text).ok_or_else(|| self.refuse(text)),
+            () => return self.parse_value(text).ok_or_else(|| self.refuse(text)),
         };
         Err(ControlError::Fixed { name: self.name.clone(), why })
     }
 
-    /// The value that `text` stands for; `None` if the control does not take it. Ignores whether it can be set now.
-    fn value_of(&self, text: &str) -> Option<Value> {
+    /// Parses `text` as a value; `None` if the control does not accept it. Ignores whether the control can be set now.
+    fn parse_value(&self, text: &str) -> Option<Value> {
         let number = number(text);
         let value = match self.kind {
             Kind::Button => Some(1),
@@ -107,7 +107,7 @@ impl Control {
                 _ => None,
             },
             Kind::Integer | Kind::Integer64 => number.filter(|number| {
-                // Wraps to the right `u64` where the range is wider than an `i64`.
+                // The wrapping difference is the right `u64` even where the range is wider than an `i64`.
                 let above_minimum = number.wrapping_sub(self.minimum).cast_unsigned();
                 (self.minimum..=self.maximum).contains(number) && above_minimum.is_multiple_of(self.step)
             }),
@@ -124,25 +124,25 @@ impl Control {
         value.map(Value::Number)
     }
 
-    /// All bits that a bit mask may have, of its 32.
+    /// Returns the mask of the 32 bits that may be set.
     fn bits(&self) -> i64 {
         self.maximum & i64::from(u32::MAX)
     }
 
-    /// The menu item that `text` means: its number, its name, or its name as [`super::tool_name`] writes it.
+    /// Finds the menu item that `text` names: by its index, its name, or its name as [`super::tool_name`] writes it.
     fn item(&self, text: &str) -> Option<&Item> {
-        let by = |fits: &dyn Fn(&Item) -> bool| self.items.iter().find(|item| fits(item));
+        let find_item = |matches_text: &dyn Fn(&Item) -> bool| self.items.iter().find(|item| matches_text(item));
         let number = number(text);
-        by(&|item| Some(item.index) == number)
-            .or_else(|| by(&|item| item.name.eq_ignore_ascii_case(text)))
-            .or_else(|| by(&|item| !item.name.is_empty() && super::tool_name(&item.name) == super::tool_name(text)))
+        find_item(&|item| Some(item.index) == number)
+            .or_else(|| find_item(&|item| item.name.eq_ignore_ascii_case(text)))
+            .or_else(|| find_item(&|item| !item.name.is_empty() && super::tool_name(&item.name) == super::tool_name(text)))
     }
 
     fn refuse(&self, text: &str) -> ControlError {
         ControlError::Value { name: self.name.clone(), value: text.to_owned(), accepted: self.accepted() }
     }
 
-    /// Which values it takes, as the hint of an error message.
+    /// Describes the accepted values, as the hint of an error message.
     pub fn accepted(&self) -> String {
         let steps = if self.step > 1 { format!(" in steps of {}", self.step) } else { String::new() };
         match self.kind {
@@ -160,7 +160,7 @@ impl Control {
     }
 }
 
-/// Decimal, or hexadecimal after 0x.
+/// Parses a decimal number, or a hexadecimal one after 0x.
 fn number(text: &str) -> Option<i64> {
     match text.strip_prefix("0x").or_else(|| text.strip_prefix("0X")) {
         Some(digits) => i64::from_str_radix(digits, 16).ok(),
@@ -233,9 +233,9 @@ mod tests {
             (&holes, "", "use 1 (Manual Mode)"),
             (&numbers, "1", "use 0 (100), 2 (400)"),
         ];
-        for (control, text, said) in refused {
+        for (control, text, message) in refused {
             let error = control.parse(text).unwrap_err().to_string();
-            assert!(error.contains(said) && !error.contains('\n'), "{error}");
+            assert!(error.contains(message) && !error.contains('\n'), "{error}");
         }
     }
 
@@ -278,9 +278,9 @@ mod tests {
     fn near_misses_are_suggested() {
         let controls = ["brightness", "contrast", "exposure_time_absolute", "auto_exposure"]
             .map(|name| control(name, Kind::Integer, (0, 9, 1)));
-        let said = |name| ControlError::unknown(name, &controls).to_string();
-        assert!(said("brightnes").ends_with("did you mean brightness?"), "{}", said("brightnes"));
-        assert!(said("exposure").ends_with("did you mean exposure_time_absolute or auto_exposure?"));
-        assert!(said("zoom").contains("devices --controls"));
+        let message = |name| ControlError::unknown(name, &controls).to_string();
+        assert!(message("brightnes").ends_with("did you mean brightness?"), "{}", message("brightnes"));
+        assert!(message("exposure").ends_with("did you mean exposure_time_absolute or auto_exposure?"));
+        assert!(message("zoom").contains("devices --controls"));
     }
 }

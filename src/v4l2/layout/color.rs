@@ -1,12 +1,12 @@
-//! What the numbers of a picture mean as colours.
+//! Interpretation of V4L2's colour codes.
 
 use v4l::v4l_sys as sys;
 
 use crate::color::Matrix;
 use crate::layout::{Colors, Family, Range, Transfer};
 
-/// What the codes of a format say of its colours; a code that is 0 or unknown has V4L2's default for the colour space.
-/// SMPTE 240M, an early standard of high definition, counts as BT.709.
+/// Resolves a format's colour codes; a code that is 0 or unknown takes V4L2's default for the colour space. SMPTE 240M,
+/// an early HD standard, counts as BT.709.
 pub(super) fn resolve(
     family: Family,
     colorspace: u32,
@@ -14,7 +14,7 @@ pub(super) fn resolve(
     quantization: u32,
     transfer: u32,
 ) -> Colors {
-    // JPEG files define their colours themselves.
+    // JPEG files define their own colours.
     if family == Family::Jpeg {
         return (Matrix::Bt601, Range::Full, Transfer::Display);
     }
@@ -39,7 +39,7 @@ pub(super) fn resolve(
     let range = match quantization {
         sys::v4l2_quantization_V4L2_QUANTIZATION_FULL_RANGE => Range::Full,
         sys::v4l2_quantization_V4L2_QUANTIZATION_LIM_RANGE => Range::Limited,
-        // Grey is no Y'CbCr: sensors give it over their full range.
+        // Grey is not Y'CbCr: sensors deliver it in full range.
         _ if matches!(family, Family::Rgb24 { .. } | Family::Grey | Family::Depth16) => Range::Full,
         _ if colorspace == sys::v4l2_colorspace_V4L2_COLORSPACE_JPEG => Range::Full,
         _ => Range::Limited,

@@ -1,4 +1,4 @@
-//! Layouts as drivers state them.
+//! Conversion of V4L2 formats to [`Layout`]s.
 
 mod color;
 #[cfg(test)]
@@ -8,7 +8,7 @@ use v4l::v4l_sys as sys;
 
 use crate::layout::{Family, FourCc, Layout, LayoutError, MAX_PLANES, Plane};
 
-/// What the kernel's single- and multi-planar structure have in common, not checked yet.
+/// The fields shared by the kernel's single- and multi-planar structures, unchecked.
 struct Raw {
     fourcc: FourCc,
     width: u32,
@@ -23,15 +23,15 @@ struct Raw {
 }
 
 impl Layout {
-    /// The layout in the driver's answer to `VIDIOC_G_FMT` or `VIDIOC_S_FMT`, single- or multi-planar. Where the driver
-    /// leaves the colours open, V4L2's defaults hold; values that are not known count as open.
+    /// Reads the layout from the driver's answer to `VIDIOC_G_FMT` or `VIDIOC_S_FMT`, single- or multi-planar. Colour
+    /// properties that the driver leaves open, or that are unknown, take V4L2's defaults.
     ///
     /// # Errors
-    /// Such pictures cannot be read.
+    /// Pictures of this format cannot be read.
     pub fn from_format(format: &sys::v4l2_format) -> Result<Self, LayoutError> {
         let raw = match format.type_ {
             sys::v4l2_buf_type_V4L2_BUF_TYPE_VIDEO_CAPTURE | sys::v4l2_buf_type_V4L2_BUF_TYPE_VIDEO_OUTPUT => {
-                // SAFETY: the type says that this part of the union was written; every bit pattern of it is valid.
+                // SAFETY: the type says that this member of the union was written; every bit pattern of it is valid.
                 #[allow(unsafe_code)]
                 Raw::single(unsafe { &format.fmt.pix })
             }
@@ -48,9 +48,9 @@ impl Layout {
 }
 
 impl Raw {
-    /// From the format of a single-planar queue.
+    /// Reads the format of a single-planar queue.
     fn single(pix: &sys::v4l2_pix_format) -> Self {
-        // Without this mark the fields after it were never written.
+        // Without this magic number, the fields after it were never written.
         let extended = pix.priv_ == sys::V4L2_PIX_FMT_PRIV_MAGIC;
         let if_extended = |value| if extended { value } else { 0 };
         // SAFETY: two names of one number.
@@ -72,9 +72,9 @@ impl Raw {
         }
     }
 
-    /// From the format of a multi-planar queue.
+    /// Reads the format of a multi-planar queue.
     fn multi(pix: &sys::v4l2_pix_format_mplane) -> Self {
-        // The structure is packed, so its fields are copied before they are looked at.
+        // The structure is packed, so its fields are copied before they are referenced.
         let formats = pix.plane_fmt;
         let mut planes = [Plane::default(); MAX_PLANES];
         for (plane, format) in planes.iter_mut().zip(formats) {
@@ -97,7 +97,7 @@ impl Raw {
         }
     }
 
-    /// The layout, if what the driver says is possible.
+    /// Validates the driver's values and builds the layout.
     fn into_layout(self) -> Result<Layout, LayoutError> {
         let Self { fourcc, field, plane_count, .. } = self;
         if !matches!(field, sys::v4l2_field_V4L2_FIELD_ANY | sys::v4l2_field_V4L2_FIELD_NONE) {

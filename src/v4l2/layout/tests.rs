@@ -25,7 +25,7 @@ fn single(fourcc: FourCc, width: u32, height: u32, stride_bytes: u32, size_bytes
 }
 
 fn with_color(mut format: sys::v4l2_format, color: [u32; 4]) -> sys::v4l2_format {
-    // SAFETY: `single` wrote this part of the union.
+    // SAFETY: `single` wrote this member of the union.
     #[allow(unsafe_code)]
     let pix = unsafe { &mut format.fmt.pix };
     pix.colorspace = color[0];
@@ -38,7 +38,7 @@ fn with_color(mut format: sys::v4l2_format, color: [u32; 4]) -> sys::v4l2_format
 fn multi(fourcc: FourCc, width: u32, height: u32, planes: &[(u32, u32)]) -> sys::v4l2_format {
     let mut format: sys::v4l2_format = zeroed();
     format.type_ = sys::v4l2_buf_type_V4L2_BUF_TYPE_VIDEO_CAPTURE_MPLANE;
-    // SAFETY: zero is a value of every field.
+    // SAFETY: zero is a valid value of every field.
     #[allow(unsafe_code)]
     let pix = unsafe { &mut format.fmt.pix_mp };
     pix.width = width;
@@ -109,7 +109,7 @@ fn colours_that_are_left_open_follow_the_colour_space() {
     }
     let rgb = Layout::from_format(&with_color(single(FourCc::RGB3, 64, 8, 192, 1536), [8, 0, 0, 0])).unwrap();
     assert_eq!(rgb.range, Full);
-    // A JPEG is what it says itself to be.
+    // A JPEG defines its own colours, whatever the driver reports.
     let jpeg = Layout::from_format(&with_color(single(FourCc::MJPG, 64, 8, 0, 9999), [3, 2, 2, 5])).unwrap();
     assert_eq!((jpeg.matrix, jpeg.range, jpeg.transfer), (Bt601, Full, Display));
 }
@@ -137,7 +137,7 @@ fn components_lie_where_the_kernel_puts_them() {
     assert_eq!(at(apart), [(0, 0, 704, 640, 480), (1, 0, 768, 640, 240)]);
     let three = Layout::from_format(&multi(FourCc(*b"YM12"), 16, 4, &[(32, 128), (16, 32), (16, 32)])).unwrap();
     assert_eq!(at(three), [(0, 0, 32, 16, 4), (1, 0, 16, 8, 2), (2, 0, 16, 8, 2)]);
-    // A multi-planar queue may give a format of one memory plane, too.
+    // A multi-planar queue may also offer a format with a single memory plane.
     let one = Layout::from_format(&multi(FourCc::NV12, 640, 480, &[(640, 460_800)])).unwrap();
     assert_eq!(at(one), [(0, 0, 640, 640, 480), (0, 307_200, 640, 640, 240)]);
     let odd = Layout::packed(FourCc::NV12, 5, 3).unwrap();
@@ -161,7 +161,7 @@ fn what_cannot_be_read_is_refused() {
     let mut other = single(FourCc::YUYV, 64, 8, 128, 1024);
     other.type_ = 13;
     assert_eq!(refusal(other), LayoutError::BufferType(13));
-    // Nothing said: as narrow as can be.
+    // No stride stated: rows are packed tightly.
     let open = Layout::from_format(&single(FourCc::YUYV, 64, 8, 0, 0)).unwrap();
     assert_eq!(open.planes(), [Plane { stride_bytes: 128, size_bytes: 1024 }]);
 }

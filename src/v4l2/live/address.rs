@@ -1,4 +1,4 @@
-//! The identity of a camera, by which it is found again when the number of its node has changed.
+//! The identity of a camera, by which it is found again when its node's number has changed.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -8,25 +8,25 @@ use v4l::v4l_sys as sys;
 use crate::v4l2::device::{Device, own_caps, zeroed};
 use crate::v4l2::node::{Node, nodes, text};
 
-/// A camera, however it is numbered.
+/// A camera, independent of its number.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Address {
-    /// As it was given, a link perhaps.
-    given: PathBuf,
-    /// Its node when it was found last.
+    /// The path as it was given, possibly a link.
+    requested: PathBuf,
+    /// Its node when it was last found.
     node: PathBuf,
-    /// Names by serial number or port that led to it.
+    /// Links by serial number or port that led to it.
     links: Vec<PathBuf>,
     card: String,
     bus: String,
 }
 
 impl Address {
-    /// The camera behind `given`, which answered with this capability.
-    pub fn new(given: &Path, capability: &sys::v4l2_capability) -> Self {
-        let node = fs::canonicalize(given).unwrap_or_else(|_| given.to_owned());
+    /// Creates the identity of the camera behind `requested`, which answered with this capability.
+    pub fn new(requested: &Path, capability: &sys::v4l2_capability) -> Self {
+        let node = fs::canonicalize(requested).unwrap_or_else(|_| requested.to_owned());
         Self {
-            given: given.to_owned(),
+            requested: requested.to_owned(),
             links: links_to(&node),
             node,
             card: text(&capability.card),
@@ -34,42 +34,43 @@ impl Address {
         }
     }
 
-    /// Its node when it was found last.
+    /// Its node when it was last found.
     pub fn node(&self) -> &Path {
         &self.node
     }
 
-    /// What it is called.
+    /// Its card name.
     pub fn card(&self) -> &str {
         &self.card
     }
 
-    /// Looks for the camera: where its links and its node lead; with `everywhere`, among all nodes, too, each of which
-    /// is opened for that.
+    /// Searches for the camera: first via its links and last node; with `everywhere`, also among all nodes, each of
+    /// which has to be opened.
     pub fn find(&mut self, everywhere: bool) -> Option<PathBuf> {
-        let linked = [&self.given].into_iter().chain(&self.links).filter_map(|link| fs::canonicalize(link).ok());
+        let linked = [&self.requested].into_iter().chain(&self.links).filter_map(|link| fs::canonicalize(link).ok());
         let known: Vec<PathBuf> = linked.chain([self.node.clone()]).collect();
         let found = known.into_iter().find(|node| self.is_at(node));
-        let found = found.or_else(|| everywhere.then(|| self.among(&nodes())).flatten())?;
+        let found = found.or_else(|| everywhere.then(|| self.find_among(&nodes())).flatten())?;
         self.node.clone_from(&found);
         Some(found)
     }
 
-    /// Whether the camera of this name is at that node now, wherever it is plugged in.
+    /// Whether a camera with this name is at that node now, whatever its port.
     fn is_at(&self, node: &Path) -> bool {
         let mut capability: sys::v4l2_capability = zeroed();
         let answered = Device::open(node).and_then(|device| device.query_capability(&mut capability));
         answered.is_ok() && self.matches(&capability)
     }
 
-    /// Whether a node with this answer is the camera's: its other nodes have the same name, but give no frames.
+    /// Whether a node with these capabilities is the camera's: its other nodes have the same name, but deliver no
+    /// frames.
     fn matches(&self, capability: &sys::v4l2_capability) -> bool {
         let frames = sys::V4L2_CAP_VIDEO_CAPTURE | sys::V4L2_CAP_VIDEO_CAPTURE_MPLANE;
         text(&capability.card) == self.card && own_caps(capability) & frames != 0
     }
 
-    /// The node of the same camera at the same place, or else the only one of the same name.
-    fn among(&self, nodes: &[Node]) -> Option<PathBuf> {
+    /// Finds the node of the same camera at the same port, or else the only one of the same name.
+    fn find_among(&self, nodes: &[Node]) -> Option<PathBuf> {
         let named: Vec<&Node> = nodes.iter().filter(|node| node.captures && node.card == self.card).collect();
         let same_place = named.iter().find(|node| node.bus == self.bus);
         match (same_place, named.as_slice()) {
@@ -80,7 +81,7 @@ impl Address {
     }
 }
 
-/// The names under `/dev/v4l` that lead to a node.
+/// Lists the links under `/dev/v4l` that lead to a node.
 fn links_to(node: &Path) -> Vec<PathBuf> {
     let folders = ["/dev/v4l/by-id", "/dev/v4l/by-path"].into_iter().filter_map(|folder| fs::read_dir(folder).ok());
     let links = folders.flatten().flatten().map(|entry| entry.path());
@@ -111,7 +112,7 @@ mod tests {
 
     fn c920() -> Address {
         Address {
-            given: "/dev/video0".into(),
+            requested: "/dev/video0".into(),
             node: "/dev/video0".into(),
             links: Vec::new(),
             card: "C920".into(),
@@ -136,7 +137,7 @@ mod tests {
     #[test]
     fn a_camera_is_known_by_its_name_and_place_and_not_by_its_number() {
         let address = c920();
-        let found = |nodes: &[Node]| address.among(nodes);
+        let found = |nodes: &[Node]| address.find_among(nodes);
         let moved = node("/dev/video4", "C920", "usb-1");
         let other = node("/dev/video0", "Laptop", "usb-1");
         let elsewhere = node("/dev/video2", "C920", "usb-3");

@@ -14,19 +14,19 @@ use crate::v4l2::queue::QueueError;
 #[allow(missing_docs)] // The messages say what the fields are.
 #[derive(Debug, thiserror::Error)]
 pub enum OpenError {
-    /// No device is meant by the name.
+    /// No device matches the name.
     #[error(transparent)]
     Name(#[from] NodeError),
-    /// The node is not there, or nothing is behind it.
+    /// The node does not exist, or has no device.
     #[error("{}: there is no camera; is it plugged in? `bokehcam devices` lists what there is", .0.display())]
     Gone(PathBuf),
     #[error("{}: permission denied; join the group that may use cameras: sudo usermod -aG video $USER, then log in again", .0.display())]
     Denied(PathBuf),
-    /// Someone else has it.
+    /// Another program uses it.
     #[error("{}: the camera is busy{}", path.display(), held_by(.holders))]
     Busy {
         path: PathBuf,
-        /// Who has it open.
+        /// The processes that have it open.
         holders: Vec<Holder>,
     },
     #[error("{}: this is no camera: {what}; `bokehcam devices` lists those that are", path.display())]
@@ -35,26 +35,26 @@ pub enum OpenError {
         /// What it is instead.
         what: &'static str,
     },
-    /// It has no mode that can be used.
+    /// It offers no usable mode.
     #[error("{}: {source}", path.display())]
     NoMode { path: PathBuf, source: NoMode },
-    /// It gives pictures that cannot be read.
+    /// Its pictures cannot be read.
     #[error("{}: {source}", path.display())]
     Layout { path: PathBuf, source: LayoutError },
-    /// The cable is full.
+    /// The USB bandwidth is exhausted.
     #[error(
         "{}: not enough USB bandwidth to start; choose --format MJPG, a smaller --size or a lower --fps, or plug the \
          camera into another USB port than other cameras",
         .0.display()
     )]
     Bandwidth(PathBuf),
-    /// A control cannot be set as asked.
+    /// A control cannot be set as requested.
     #[error("{}: {source}", path.display())]
     Control { path: PathBuf, source: ControlError },
-    /// The queue of buffers cannot be had.
+    /// The queue of buffers cannot be set up.
     #[error("{}: the camera cannot be started: {source}", path.display())]
     Queue { path: PathBuf, source: QueueError },
-    /// Anything else that the system says.
+    /// Any other system error.
     #[error("{}: {what}: {source}", path.display())]
     Io { path: PathBuf, what: &'static str, source: io::Error },
 }
@@ -68,7 +68,8 @@ const ENODEV: i32 = rustix::io::Errno::NODEV.raw_os_error();
 const ENOSPC: i32 = rustix::io::Errno::NOSPC.raw_os_error();
 
 impl OpenError {
-    /// The error for a system call that failed on the node `path`; `what` names the call, or what failed with it.
+    /// Creates the error for a system call that failed on the node `path`; `what` names the call, or what failed with
+    /// it.
     pub fn at(path: &Path, what: &'static str, source: io::Error) -> Self {
         let path = path.to_owned();
         match source.raw_os_error() {
@@ -79,10 +80,10 @@ impl OpenError {
         }
     }
 
-    /// The error for a queue of buffers of the node `path`.
+    /// Creates the error for a queue of buffers of the node `path`.
     pub fn queue(path: &Path, source: QueueError) -> Self {
         match source {
-            // When streaming starts, no space is left on the USB bus, not on a disk.
+            // When streaming starts, ENOSPC means lack of USB bandwidth, not of disk space.
             QueueError::Refused { step: "STREAMON", source } if source.raw_os_error() == Some(ENOSPC) => {
                 Self::Bandwidth(path.to_owned())
             }
@@ -96,18 +97,18 @@ impl OpenError {
         }
     }
 
-    /// Whether trying again in a moment may help: another program may let go of the device, or a driver recover.
+    /// Whether a retry may help: another program may release the device, or a driver recover.
     pub fn is_transient(&self) -> bool {
         matches!(self, Self::Busy { .. } | Self::Queue { .. } | Self::Io { .. })
     }
 
-    /// Whether the device is not there: it may come back.
+    /// Whether the device is absent: it may come back.
     pub fn is_gone(&self) -> bool {
         matches!(self, Self::Gone(_) | Self::Name(_))
     }
 }
 
-/// Whether the device behind an open descriptor went away.
+/// Whether the device behind an open descriptor is gone.
 pub fn is_gone(error: &QueueError) -> bool {
     matches!(error.source().and_then(io::Error::raw_os_error), Some(ENXIO | ENODEV))
 }

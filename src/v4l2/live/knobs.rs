@@ -1,4 +1,4 @@
-//! The controls of a camera that a person would turn while it streams, through a second opening of its node.
+//! The user-adjustable controls of a camera while it streams, through a second file descriptor of its node.
 
 use std::path::Path;
 
@@ -10,20 +10,20 @@ use crate::v4l2::controls::{self, Control, Kind, Value};
 use crate::v4l2::device::Device;
 use crate::v4l2::node;
 
-/// The knobs of the camera that is meant by `name` (see [`node::resolve`]), in the driver's order, as they are now. The
-/// camera may be streaming, here or elsewhere.
+/// Lists the knobs of the camera that `name` refers to (see [`node::resolve`]), in the driver's order, with their
+/// current values. The camera may be streaming, here or elsewhere.
 ///
 /// # Errors
-/// There is no such camera, it cannot be opened, or it fails.
+/// The camera does not exist, cannot be opened, or fails.
 pub fn list(name: &str) -> Result<Vec<Knob>, OpenError> {
     knobs(&open(name)?)
 }
 
-/// Sets one of them; returns all as they are then, since others may change with it. A value that the control does not
-/// take changes nothing.
+/// Sets a knob; returns all of them with their new values, since others may change with it. A value that the control
+/// does not accept changes nothing.
 ///
 /// # Errors
-/// As for [`list`]; there is no such knob, it does not take this value or none now, or the camera refuses.
+/// Those of [`list`]; the knob does not exist, does not accept this value now, or the camera refuses.
 pub fn turn(name: &str, knob: &str, value: i64) -> Result<Vec<Knob>, OpenError> {
     let device = open(name)?;
     controls::set(&device, knob, &value.to_string())
@@ -31,7 +31,7 @@ pub fn turn(name: &str, knob: &str, value: i64) -> Result<Vec<Knob>, OpenError> 
     knobs(&device)
 }
 
-/// A second opening of the camera that is meant by `name`.
+/// Opens the camera that `name` refers to a second time.
 pub(super) fn open(name: &str) -> Result<Device, OpenError> {
     let path: &Path = &node::resolve(name)?;
     Device::open(path).map_err(|error| OpenError::at(path, "it cannot be opened", error))
@@ -43,10 +43,10 @@ fn knobs(device: &Device) -> Result<Vec<Knob>, OpenError> {
     Ok(all.into_iter().filter_map(knob).collect())
 }
 
-/// The knob for a control; `None` where a person would not turn it: it is read-only, has no number, is about sound, or
-/// is specific to a driver.
+/// Converts a control to a knob; `None` if a user would not adjust it: it is read-only, has no number, is about sound,
+/// or is driver-specific.
 fn knob(control: Control) -> Option<Knob> {
-    /// Ids of a class that are this far from its first one, or further, are specific to a driver.
+    /// Ids at least this far from the first one of their class are driver-specific.
     const DRIVER_SPECIFIC: u32 = 0x1000;
     // The upper half of an id is its class. In every class ids begin at the same number, here that of `CID_BASE`.
     let is_for_users = matches!(control.id & !0xffff, sys::V4L2_CTRL_CLASS_USER | sys::V4L2_CTRL_CLASS_CAMERA)

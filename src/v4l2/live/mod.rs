@@ -1,5 +1,5 @@
-//! A device that gives frames for hours: once it was opened, it is recovered from whatever happens to it. It may stall,
-//! fail, be unplugged, come back under another number; frames go on when they can.
+//! A capture device that delivers frames for hours, with recovery from failures. It may stall, fail, be unplugged or
+//! return under another number; frames continue when they can.
 
 mod address;
 pub mod error;
@@ -28,7 +28,7 @@ use crate::v4l2::controls;
 use crate::v4l2::node;
 use crate::v4l2::queue::{Losses, Planes};
 
-/// A device node that gives frames.
+/// A device node that delivers frames.
 pub struct Live {
     address: Address,
     name: String,
@@ -40,67 +40,69 @@ pub struct Live {
     watchdog: Watchdog,
     low_rate: LowRateCheck,
     losses: Losses,
-    /// The first frame was asked for.
-    begun: bool,
-    /// The current frame was given out.
-    given: bool,
-    /// What was said last about why there are no frames, so that it is said once.
-    said: String,
-    /// When all nodes were searched last.
+    /// Whether the first frame was requested.
+    started: bool,
+    /// Whether the current frame was passed to the caller.
+    frame_out: bool,
+    /// The last warning about missing frames, so that it is not repeated.
+    last_warning: String,
+    /// When all nodes were last searched.
     searched_ns: u64,
 }
 
 enum State {
     Streaming(Box<Session>),
-    /// Closed after a failure; to be opened again at this time.
+    /// Closed after a failure; to be reopened at this time.
     Away {
         retry_ns: u64,
     },
-    /// Closed because nobody watches.
+    /// Closed because no client watches.
     Resting,
 }
 
-/// What came of waiting for a frame.
+/// Result of waiting for a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Next {
-    /// A frame, to be read with [`Live::planes`] and given back with [`Live::release`].
+    /// A frame, to be read with [`Live::planes`] and returned with [`Live::release`].
     Frame {
-        /// When it was taken, on the system's monotonic clock; when it was dequeued, where the driver does not tell.
+        /// Capture time on the system's monotonic clock; the dequeuing time if the driver reports none.
         captured_ns: u64,
     },
-    /// Frames that nobody will see. Each is told once, before the frame that follows them.
+    /// Lost frames. Each is reported once, before the frame that follows it.
     Lost(Losses),
-    /// No frame yet, or the device is away: ask again.
+    /// No frame yet, or the device is absent: call again.
     Waiting,
 }
 
-/// How often a device that is away is looked for.
-const LOOK_NS: u64 = 150_000_000;
-/// How often among all nodes: each is opened for that.
-const SEARCH_NS: u64 = 1_000_000_000;
-/// Pause after an error of the driver, for it to recover.
-const ERROR_NAP_NS: u64 = 5_000_000;
-/// How often a camera is tried at the start, and how long between: whoever closes it may take a while.
-const TRIES: u32 = 5;
-const TRY_NAP_NS: u64 = 200_000_000;
-/// A frame with an older time stamp than this was stamped by another clock than ours.
-const CREDIBLE_AGE_NS: u64 = 5_000_000_000;
+/// Period between attempts to reopen an absent device.
+const RETRY_NS: u64 = 150_000_000;
+/// Period between searches of all nodes, each of which has to be opened.
+const SEARCH_PERIOD_NS: u64 = 1_000_000_000;
+/// Pause after a driver error, to let the driver recover.
+const ERROR_PAUSE_NS: u64 = 5_000_000;
+/// Number of attempts to open a camera at the start, and the pause between them: another program may need time to close
+/// it.
+const MAX_TRIES: u32 = 5;
+const TRY_PAUSE_NS: u64 = 200_000_000;
+/// A frame with an older time stamp than this was stamped by another clock.
+const MAX_STAMP_AGE_NS: u64 = 5_000_000_000;
 
 impl Live {
     /// Opens the device that `name` means (a path, a number, a link's name, part of a card's name), sets the controls
     /// `settings` and starts it.
     ///
     /// # Errors
-    /// There is none, or it cannot be used; one that is busy or fails was given a second.
+    /// No device matches, or it cannot be used; a busy or failing one is retried for about a second.
     pub fn open(name: &str, wish: Wish, settings: Vec<Setting>, clock: Clock) -> Result<Self, OpenError> {
         let path = node::resolve(name)?;
         let mut tries = 1;
         let session = loop {
             match Session::open(&path, &wish, &settings, None, &clock) {
-                Err(error) if error.is_transient() && tries < TRIES => {
+                // Another program may just be closing it, or the driver recovering.
+                Err(error) if error.is_transient() && tries < MAX_TRIES => {
                     tracing::debug!("{error}; trying again");
                     tries += 1;
-                    clock.sleep_until_ns(clock.now_ns() + TRY_NAP_NS);
+                    clock.sleep_until_ns(clock.now_ns() + TRY_PAUSE_NS);
                 }
                 opened => break opened?,
             }
@@ -119,75 +121,75 @@ impl Live {
             watchdog: Watchdog::new(agreed.interval.period_ns(), now_ns),
             low_rate: LowRateCheck::new(agreed.interval.fps(), now_ns),
             losses: Losses::default(),
-            begun: false,
-            given: false,
-            said: String::new(),
+            started: false,
+            frame_out: false,
+            last_warning: String::new(),
             searched_ns: now_ns,
             clock,
         })
     }
 
-    /// Its node and its name.
+    /// Its node and card name.
     pub fn name(&self) -> &str {
         &self.name
     }
 
-    /// What was agreed on last.
+    /// The mode last agreed with the driver.
     pub fn agreed(&self) -> &Agreed {
         &self.agreed
     }
 
-    /// How its pictures look in memory. May change whenever it was away.
+    /// The memory layout of its frames. May change after a reconnection.
     pub fn layout(&self) -> &Layout {
         &self.agreed.layout
     }
 
-    /// Waits for a frame, not much longer than `patience`. The newest one counts, the others are lost. Opens the device
-    /// if it is closed.
-    pub fn next(&mut self, patience: Duration) -> Next {
-        if self.given {
+    /// Waits for a frame, not much longer than `timeout`. Only the newest one is returned, the others are lost.
+    /// Reopens the device if it is closed.
+    pub fn next(&mut self, timeout: Duration) -> Next {
+        if self.frame_out {
             self.release();
         }
         match &mut self.state {
             State::Streaming(session) => {
-                if !std::mem::replace(&mut self.begun, true) {
-                    // Frames that came while the program got ready are nobody's loss.
-                    session.queue.begin();
-                    self.watchdog.started(self.clock.now_ns());
-                    self.low_rate.restarted(self.clock.now_ns());
+                if !std::mem::replace(&mut self.started, true) {
+                    // Frames captured while the program was starting do not count as lost.
+                    session.queue.reset_losses();
+                    self.watchdog.on_start(self.clock.now_ns());
+                    self.low_rate.restart(self.clock.now_ns());
                 }
-                // A frame may be there already: the last call told losses instead.
+                // A frame may be available already if the last call reported losses instead.
                 if session.queue.current().is_none() {
-                    match session.queue.wait_newest(patience) {
-                        Ok(true) => self.frame_came(),
+                    match session.queue.wait_newest(timeout) {
+                        Ok(true) => self.handle_frame(),
                         Ok(false) => {
-                            let remedy = self.watchdog.silence(self.clock.now_ns());
-                            self.apply(remedy, "no frames");
+                            let remedy = self.watchdog.on_silence(self.clock.now_ns());
+                            self.apply_remedy(remedy, "no frames");
                         }
-                        Err(error) => self.failed(&error),
+                        Err(error) => self.handle_error(&error),
                     }
                 }
             }
             State::Away { retry_ns } => {
                 let (now_ns, until_ns) = (self.clock.now_ns(), *retry_ns);
                 if now_ns < until_ns {
-                    self.clock.sleep_until_ns(until_ns.min(now_ns + patience.as_nanos() as u64));
+                    self.clock.sleep_until_ns(until_ns.min(now_ns + timeout.as_nanos() as u64));
                 } else {
                     self.reopen();
                 }
             }
             State::Resting => {
-                self.watchdog.started(self.clock.now_ns());
+                self.watchdog.on_start(self.clock.now_ns());
                 self.reopen();
             }
         }
         self.report()
     }
 
-    /// What [`Live::next`] returns: losses before the frame that follows them.
+    /// Returns the result of [`Live::next`]: losses before the frame that follows them.
     fn report(&mut self) -> Next {
         if let State::Streaming(session) = &mut self.state {
-            add(&mut self.losses, session.queue.take_losses());
+            add_losses(&mut self.losses, session.queue.take_losses());
         }
         if self.losses.total() > 0 {
             return Next::Lost(std::mem::take(&mut self.losses));
@@ -195,23 +197,23 @@ impl Live {
         let State::Streaming(session) = &self.state else { return Next::Waiting };
         let Some((frame, _)) = session.queue.current() else { return Next::Waiting };
         let now_ns = self.clock.now_ns();
-        let credible = |stamp_ns: &u64| now_ns.saturating_sub(*stamp_ns) < CREDIBLE_AGE_NS;
-        self.given = true;
-        // Never in the future, by however little clocks differ.
-        Next::Frame { captured_ns: frame.stamp_ns.filter(credible).unwrap_or(now_ns).min(now_ns) }
+        let plausible = |stamp_ns: &u64| now_ns.saturating_sub(*stamp_ns) < MAX_STAMP_AGE_NS;
+        self.frame_out = true;
+        // Never in the future, however little the clocks differ.
+        Next::Frame { captured_ns: frame.stamp_ns.filter(plausible).unwrap_or(now_ns).min(now_ns) }
     }
 
-    /// The planes of the frame that was given last; nothing after it went back.
+    /// The planes of the frame returned last; `None` after its release.
     pub fn planes(&self) -> Option<Planes<'_>> {
         match &self.state {
-            State::Streaming(session) if self.given => session.queue.current().map(|(_, planes)| planes),
+            State::Streaming(session) if self.frame_out => session.queue.current().map(|(_, planes)| planes),
             _ => None,
         }
     }
 
-    /// The frame that was given last was read: its memory goes back to the driver.
+    /// Returns the memory of the last frame, which was read, to the driver.
     pub fn release(&mut self) {
-        self.given = false;
+        self.frame_out = false;
         if let State::Streaming(session) = &mut self.state {
             session.queue.release();
         }
@@ -223,25 +225,25 @@ impl Live {
             tracing::debug!("{}: closed, nobody watches", self.name);
         }
         self.close(State::Resting);
-        self.said.clear();
+        self.last_warning.clear();
     }
 
-    /// A frame was dequeued: tells the watchdog and the check for a low rate, and counts what was lost before it.
-    fn frame_came(&mut self) {
+    /// Handles a dequeued frame: updates the watchdog and the low-rate check, and counts the losses before it.
+    fn handle_frame(&mut self) {
         let State::Streaming(session) = &mut self.state else { return };
         let now_ns = self.clock.now_ns();
         let losses = session.queue.take_losses();
-        add(&mut self.losses, losses);
-        if let Some(trouble) = self.watchdog.frame(now_ns) {
+        add_losses(&mut self.losses, losses);
+        if let Some(trouble) = self.watchdog.on_frame(now_ns) {
             tracing::warn!("{}: frames again after {:.1} s", self.name, trouble.as_secs_f64());
         }
-        self.said.clear();
-        // The rate of a virtual camera is the business of the program that writes to it.
+        self.last_warning.clear();
+        // A virtual camera's rate depends on the program that writes to it.
         let low_fps = if session.is_loopback() {
             None
         } else {
-            // Frames that came in vain are part of the camera's rate.
-            self.low_rate.frames(1 + losses.stale + losses.corrupt, losses.missed, now_ns)
+            // Discarded frames, too, are part of the camera's rate.
+            self.low_rate.count(1 + losses.stale + losses.corrupt, losses.missed, now_ns)
         };
         if let Some(fps) = low_fps {
             self.warn_of_low_rate(fps);
@@ -263,24 +265,24 @@ impl Live {
     }
 
     fn close(&mut self, state: State) {
-        self.given = false;
+        self.frame_out = false;
         if let State::Streaming(session) = &mut self.state {
             session.queue.stop();
-            add(&mut self.losses, session.queue.take_losses());
+            add_losses(&mut self.losses, session.queue.take_losses());
         }
         self.state = state;
     }
 
-    /// Warns, but not of the same twice in a row.
-    fn say(&mut self, what: String) {
-        if self.said != what {
+    /// Warns, unless the last warning was the same.
+    fn warn_once(&mut self, what: String) {
+        if self.last_warning != what {
             tracing::warn!("{}: {what}", self.name);
-            self.said = what;
+            self.last_warning = what;
         }
     }
 }
 
-fn add(sum: &mut Losses, losses: Losses) {
+fn add_losses(sum: &mut Losses, losses: Losses) {
     sum.missed += losses.missed;
     sum.stale += losses.stale;
     sum.corrupt += losses.corrupt;

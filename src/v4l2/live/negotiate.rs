@@ -1,4 +1,4 @@
-//! Which of a camera's modes to take: by what its cable carries, not by taste.
+//! Selection of a camera's mode, by the bandwidth of its connection.
 
 use std::cmp::Ordering;
 
@@ -6,7 +6,7 @@ use crate::layout::{Content, Family};
 use crate::v4l2::FourCc;
 use crate::v4l2::modes::{FormatModes, Interval, QueueKind, Rates, SizeModes, Sizes};
 
-/// What is wanted of a camera. What is not said is chosen.
+/// Constraints on a camera's mode. Open ones are chosen automatically.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Wish {
     pub content: Content,
@@ -17,76 +17,76 @@ pub struct Wish {
 }
 
 impl Wish {
-    /// Whatever suits, of this content.
+    /// Constrains only the content.
     pub fn any(content: Content) -> Self {
         Self { content, size_px: None, fps: None, fourcc: None }
     }
 }
 
-/// How a camera is connected.
+/// The bandwidth of a camera's connection.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Wire {
-    /// USB 2 or slower, or not known to be faster: raw pictures beyond VGA take more than it carries.
-    Narrow,
-    /// USB 3, or inside the machine.
-    Wide,
+pub enum LinkSpeed {
+    /// USB 2 or slower, or unknown: raw pictures beyond VGA exceed its bandwidth.
+    Slow,
+    /// USB 3, or an internal connection.
+    Fast,
 }
 
-/// A mode to ask for.
+/// A mode to request.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Choice {
     pub queue: QueueKind,
     pub fourcc: FourCc,
     /// Width and height, in pixels.
     pub size_px: (u32, u32),
-    /// Time from frame to frame.
+    /// Time between frames.
     pub interval: Interval,
 }
 
-/// Why no mode can be taken.
+/// Why no mode is usable.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum NoMode {
     #[error("it offers no picture format; a virtual camera offers one only while something writes to it")]
     Nothing,
-    /// No format that can be read.
+    /// No offered format can be read.
     #[error("it offers {offered}, of which none can be read as {as_what}; readable are {readable}")]
     Unreadable { offered: String, as_what: &'static str, readable: String },
-    /// Not the one that was asked for.
+    /// The requested format is not offered.
     #[error("it does not offer {wanted}; choose --format from {offered}")]
     Format {
-        /// What was asked for.
+        /// The requested format.
         wanted: FourCc,
         offered: String,
     },
 }
 
-/// Wanted where nothing is said.
+/// Used where the request leaves size or rate open.
 const DEFAULT_SIZE_PX: (u32, u32) = (1280, 720);
 const DEFAULT_FPS: f64 = 30.0;
-/// USB 2 carries raw pictures up to this size and rate, in pixels per second: 30 fps, and a little for rounded rates.
+/// USB 2 carries raw pictures up to this size and rate, in pixels per second: 30 fps, with a margin for rounded rates.
 const VGA_PX_PER_S: f64 = 640.0 * 480.0 * 30.5;
 /// Logarithm of the ratio of two rates below which viewers see no difference: about a tenth.
 const SAME_RATE: f64 = 0.1;
 
-/// The best mode of each readable format, the best of all first: never empty.
+/// Ranks the best mode of each readable format, the best of all first; never empty.
 ///
 /// # Errors
-/// There is none.
-pub fn ranked(modes: &[FormatModes], wish: &Wish, wire: Wire) -> Result<Vec<Choice>, NoMode> {
+/// No mode is usable.
+pub fn ranked(modes: &[FormatModes], wish: &Wish, link_speed: LinkSpeed) -> Result<Vec<Choice>, NoMode> {
     let readable = |fourcc: FourCc| fourcc.content() == Some(wish.content);
     let suits = |format: &&FormatModes| readable(format.fourcc) && wish.fourcc.is_none_or(|f| f == format.fourcc);
     let mut best: Vec<(Rank, Choice)> =
-        modes.iter().filter(suits).filter_map(|format| best_mode(format, wish, wire)).collect();
+        modes.iter().filter(suits).filter_map(|format| best_mode(format, wish, link_speed)).collect();
     if best.is_empty() {
-        let offered = list(modes.iter().map(|format| format.fourcc));
-        let readable_offered = list(modes.iter().map(|format| format.fourcc).filter(|fourcc| readable(*fourcc)));
+        let offered = join_names(modes.iter().map(|format| format.fourcc));
+        let readable_offered = join_names(modes.iter().map(|format| format.fourcc).filter(|fourcc| readable(*fourcc)));
         return Err(match wish.fourcc {
             _ if modes.is_empty() => NoMode::Nothing,
             Some(wanted) if !readable_offered.is_empty() => NoMode::Format { wanted, offered: readable_offered },
             _ => NoMode::Unreadable {
                 offered,
                 as_what: if wish.content == Content::Color { "colours" } else { "depth" },
-                readable: list(FourCc::supported().filter(|fourcc| readable(*fourcc))),
+                readable: join_names(FourCc::supported().filter(|fourcc| readable(*fourcc))),
             },
         });
     }
@@ -94,21 +94,21 @@ pub fn ranked(modes: &[FormatModes], wish: &Wish, wire: Wire) -> Result<Vec<Choi
     Ok(best.into_iter().map(|(_, choice)| choice).collect())
 }
 
-/// Penalties of a mode, the weightiest first; compared one after the other, and the least is the best.
+/// Penalties of a mode, the most important first; compared lexicographically, the smallest wins.
 type Rank = [f64; 6];
 
 fn compare(a: &Rank, b: &Rank) -> Ordering {
     a.iter().zip(b).map(|(a, b)| a.total_cmp(b)).find(|order| order.is_ne()).unwrap_or(Ordering::Equal)
 }
 
-/// The mode of a format that is nearest to the wish.
-fn best_mode(format: &FormatModes, wish: &Wish, wire: Wire) -> Option<(Rank, Choice)> {
+/// Finds the mode of a format that is nearest to the request.
+fn best_mode(format: &FormatModes, wish: &Wish, link_speed: LinkSpeed) -> Option<(Rank, Choice)> {
     let wanted_px = wish.size_px.unwrap_or(DEFAULT_SIZE_PX);
     let modes: Vec<((u32, u32), &Rates)> = match &format.sizes {
         Sizes::Unknown => vec![(wanted_px, &Rates::Unknown)],
         Sizes::Discrete(sizes) => sizes.iter().map(|SizeModes { size_px, rates }| (*size_px, rates)).collect(),
         Sizes::Range { min_px, max_px, step_px, rates } => {
-            // The nearest value of the grid, also where a driver has its limits the wrong way round.
+            // The nearest value on the grid, even where a driver has swapped its limits.
             let on_grid = |wanted: u32, min: u32, max: u32, step: u32| {
                 let steps = (wanted.clamp(min, max.max(min)) - min + step / 2) / step.max(1);
                 (min + steps * step).min(max.max(min))
@@ -118,55 +118,56 @@ fn best_mode(format: &FormatModes, wish: &Wish, wire: Wire) -> Option<(Rank, Cho
             vec![((width, height), rates)]
         }
     };
-    let ranked = modes.into_iter().map(|(size_px, rates)| rank(format, size_px, rates, wanted_px, wish, wire));
+    let ranked = modes.into_iter().map(|(size_px, rates)| rank(format, size_px, rates, wanted_px, wish, link_speed));
     ranked.min_by(|(a, _), (b, _)| compare(a, b))
 }
 
-/// The penalties of a format at one of its sizes, and the mode to ask for there: the rate nearest to the wish.
+/// Returns the penalties of a format at one of its sizes, and the mode to request there: the rate nearest to the
+/// request.
 fn rank(
     format: &FormatModes,
     size_px: (u32, u32),
     rates: &Rates,
     wanted_px: (u32, u32),
     wish: &Wish,
-    wire: Wire,
+    link_speed: LinkSpeed,
 ) -> (Rank, Choice) {
     let wanted = Interval::from_fps(wish.fps.unwrap_or(DEFAULT_FPS));
-    // Where the driver does not tell, the wish is as good as anything.
+    // Where the driver lists no rates, the requested one is as good as any.
     let interval = rates.nearest(wanted).unwrap_or(wanted);
     let choice = Choice { queue: format.queue, fourcc: format.fourcc, size_px, interval };
     let log_ratio = |a: f64, b: f64| (a / b).ln();
     let if_visible = |distance: f64| if distance < SAME_RATE { 0.0 } else { distance };
     // Negative, and so no penalty, where the mode is faster.
     let slower = if_visible(log_ratio(wanted.fps(), interval.fps()));
-    let off_rate = if_visible(log_ratio(wanted.fps(), interval.fps()).abs());
-    let off_size =
+    let rate_error = if_visible(log_ratio(wanted.fps(), interval.fps()).abs());
+    let size_error =
         log_ratio(size_px.0.into(), wanted_px.0.into()).abs() + log_ratio(size_px.1.into(), wanted_px.1.into()).abs();
-    // A size that was asked for is kept, however slow; otherwise a fluent picture matters more.
-    let (first, second) = if wish.size_px.is_some() { (off_size, slower) } else { (slower, off_size) };
-    let preference = format_place(format.fourcc, &choice, wire);
+    // A requested size is kept, however slow; otherwise a fluent picture matters more.
+    let (first, second) = if wish.size_px.is_some() { (size_error, slower) } else { (slower, size_error) };
+    let preference = format_preference(format.fourcc, &choice, link_speed);
     let emulated = f64::from(u8::from(format.emulated));
     let multi_planar = f64::from(u8::from(format.queue == QueueKind::MultiPlanar));
-    ([first, second, off_rate, emulated, preference, multi_planar], choice)
+    ([first, second, rate_error, emulated, preference, multi_planar], choice)
 }
 
-/// Place of a format among those that give the same size and rate: its place among the supported ones, unless it is
-/// moved before (-100) or behind (1000) all of them.
-fn format_place(fourcc: FourCc, choice: &Choice, wire: Wire) -> f64 {
+/// Returns the preference of a format among those with the same size and rate: its index among the supported ones,
+/// unless it is moved before (-100) or behind (1000) all of them.
+fn format_preference(fourcc: FourCc, choice: &Choice, link_speed: LinkSpeed) -> f64 {
     let place = FourCc::supported().position(|supported| supported == fourcc).unwrap_or(usize::MAX) as f64;
     let px_per_s = f64::from(choice.size_px.0) * f64::from(choice.size_px.1) * choice.interval.fps();
-    let raw_fits = wire == Wire::Wide || px_per_s <= VGA_PX_PER_S;
+    let raw_fits = link_speed == LinkSpeed::Fast || px_per_s <= VGA_PX_PER_S;
     match fourcc.family() {
-        // Grey only where there are no colours.
+        // Grey only where no colour format exists.
         Some(Family::Grey) => 1000.0,
-        // Compressed first where the cable does not carry raw pictures.
+        // Compressed first where the connection does not carry raw pictures.
         Some(Family::Jpeg) if !raw_fits => place - 100.0,
         _ => place,
     }
 }
 
-/// The names without repetitions, for messages.
-fn list(fourccs: impl Iterator<Item = FourCc>) -> String {
+/// Joins the names without repetitions, for messages.
+fn join_names(fourccs: impl Iterator<Item = FourCc>) -> String {
     let mut names: Vec<String> = Vec::new();
     for name in fourccs.map(|fourcc| fourcc.to_string()) {
         if !names.contains(&name) {
@@ -225,37 +226,37 @@ mod tests {
         Wish { content: Content::Color, size_px, fps, fourcc: fourcc.map(|f| FourCc(*f)) }
     }
 
-    fn chosen(modes: &[FormatModes], wish: Wish, wire: Wire) -> String {
-        let best = ranked(modes, &wish, wire).unwrap()[0];
+    fn chosen(modes: &[FormatModes], wish: Wish, link_speed: LinkSpeed) -> String {
+        let best = ranked(modes, &wish, link_speed).unwrap()[0];
         format!("{}x{} {} {}", best.size_px.0, best.size_px.1, best.fourcc, best.interval)
     }
 
     #[test]
     fn cameras_on_a_narrow_wire_compress_what_is_large() {
         let any = wish(None, None, None);
-        assert_eq!(chosen(&office(), any, Wire::Narrow), "1280x720 MJPG 30");
+        assert_eq!(chosen(&office(), any, LinkSpeed::Slow), "1280x720 MJPG 30");
         let vga = wish(Some((640, 480)), None, None);
-        assert_eq!(chosen(&office(), vga, Wire::Narrow), "640x480 YUYV 30");
+        assert_eq!(chosen(&office(), vga, LinkSpeed::Slow), "640x480 YUYV 30");
         let full = wish(Some((1920, 1080)), None, None);
-        assert_eq!(chosen(&office(), full, Wire::Narrow), "1920x1080 MJPG 30");
-        assert_eq!(chosen(&capture_box(), any, Wire::Narrow), "1280x720 MJPG 30");
-        assert_eq!(chosen(&capture_box(), any, Wire::Wide), "1280x720 NV12 30");
-        assert_eq!(chosen(&capture_box(), wish(None, Some(60.0), None), Wire::Wide), "1280x720 NV12 60");
+        assert_eq!(chosen(&office(), full, LinkSpeed::Slow), "1920x1080 MJPG 30");
+        assert_eq!(chosen(&capture_box(), any, LinkSpeed::Slow), "1280x720 MJPG 30");
+        assert_eq!(chosen(&capture_box(), any, LinkSpeed::Fast), "1280x720 NV12 30");
+        assert_eq!(chosen(&capture_box(), wish(None, Some(60.0), None), LinkSpeed::Fast), "1280x720 NV12 60");
     }
 
     #[test]
     fn without_a_wish_the_picture_is_fluent_and_a_wish_is_kept() {
-        assert_eq!(chosen(&raw_only(), wish(None, None, None), Wire::Narrow), "640x480 YUYV 30");
-        assert_eq!(chosen(&raw_only(), wish(Some((1280, 720)), None, None), Wire::Narrow), "1280x720 YUYV 10");
-        assert_eq!(chosen(&raw_only(), wish(None, Some(10.0), None), Wire::Narrow), "1280x720 YUYV 10");
-        assert_eq!(chosen(&office(), wish(None, None, Some(b"YUYV")), Wire::Narrow), "640x480 YUYV 30");
-        assert_eq!(chosen(&office(), wish(Some((1280, 700)), Some(60.0), None), Wire::Narrow), "1280x720 MJPG 60");
-        assert_eq!(chosen(&office(), wish(Some((4000, 3000)), None, None), Wire::Narrow), "1920x1080 MJPG 30");
+        assert_eq!(chosen(&raw_only(), wish(None, None, None), LinkSpeed::Slow), "640x480 YUYV 30");
+        assert_eq!(chosen(&raw_only(), wish(Some((1280, 720)), None, None), LinkSpeed::Slow), "1280x720 YUYV 10");
+        assert_eq!(chosen(&raw_only(), wish(None, Some(10.0), None), LinkSpeed::Slow), "1280x720 YUYV 10");
+        assert_eq!(chosen(&office(), wish(None, None, Some(b"YUYV")), LinkSpeed::Slow), "640x480 YUYV 30");
+        assert_eq!(chosen(&office(), wish(Some((1280, 700)), Some(60.0), None), LinkSpeed::Slow), "1280x720 MJPG 60");
+        assert_eq!(chosen(&office(), wish(Some((4000, 3000)), None, None), LinkSpeed::Slow), "1920x1080 MJPG 30");
     }
 
     #[test]
     fn every_format_is_there_to_fall_back_on() {
-        let all = ranked(&office(), &wish(None, None, None), Wire::Narrow).unwrap();
+        let all = ranked(&office(), &wish(None, None, None), LinkSpeed::Slow).unwrap();
         let formats: Vec<String> = all.iter().map(|choice| choice.fourcc.to_string()).collect();
         assert_eq!(formats, ["MJPG", "YUYV"]);
     }
@@ -264,11 +265,11 @@ mod tests {
     fn grids_and_unknown_sizes_take_the_wish() {
         let sizes = Sizes::Range { min_px: (16, 16), max_px: (3840, 2160), step_px: (2, 2), rates: Rates::Unknown };
         let grid = vec![FormatModes { sizes, ..format(b"NV12", &[]) }];
-        assert_eq!(chosen(&grid, wish(None, None, None), Wire::Wide), "1280x720 NV12 30");
-        assert_eq!(chosen(&grid, wish(Some((641, 10)), Some(29.97), None), Wire::Wide), "642x16 NV12 29.97");
-        assert_eq!(chosen(&grid, wish(Some((9000, 9000)), None, None), Wire::Wide), "3840x2160 NV12 30");
+        assert_eq!(chosen(&grid, wish(None, None, None), LinkSpeed::Fast), "1280x720 NV12 30");
+        assert_eq!(chosen(&grid, wish(Some((641, 10)), Some(29.97), None), LinkSpeed::Fast), "642x16 NV12 29.97");
+        assert_eq!(chosen(&grid, wish(Some((9000, 9000)), None, None), LinkSpeed::Fast), "3840x2160 NV12 30");
         let unknown = vec![FormatModes { sizes: Sizes::Unknown, ..format(b"YU12", &[]) }];
-        assert_eq!(chosen(&unknown, wish(Some((800, 600)), None, None), Wire::Narrow), "800x600 YU12 30");
+        assert_eq!(chosen(&unknown, wish(Some((800, 600)), None, None), LinkSpeed::Slow), "800x600 YU12 30");
     }
 
     #[test]
@@ -276,18 +277,18 @@ mod tests {
         let sizes: &[(u32, u32, &[u32])] = &[(640, 480, &[30])];
         let any = wish(None, None, None);
         let both = vec![format(b"GREY", sizes), format(b"YUYV", sizes)];
-        assert_eq!(chosen(&both, any, Wire::Wide), "640x480 YUYV 30");
-        assert_eq!(chosen(&both[..1], any, Wire::Wide), "640x480 GREY 30");
+        assert_eq!(chosen(&both, any, LinkSpeed::Fast), "640x480 YUYV 30");
+        assert_eq!(chosen(&both[..1], any, LinkSpeed::Fast), "640x480 GREY 30");
         let emulated = FormatModes { emulated: true, ..format(b"NV12", sizes) };
-        assert_eq!(chosen(&[emulated, format(b"YUYV", sizes)], any, Wire::Wide), "640x480 YUYV 30");
+        assert_eq!(chosen(&[emulated, format(b"YUYV", sizes)], any, LinkSpeed::Fast), "640x480 YUYV 30");
         let multi = FormatModes { queue: QueueKind::MultiPlanar, ..format(b"YUYV", sizes) };
-        let best = ranked(&[multi, format(b"YUYV", sizes)], &any, Wire::Wide).unwrap();
+        let best = ranked(&[multi, format(b"YUYV", sizes)], &any, LinkSpeed::Fast).unwrap();
         assert_eq!(best[0].queue, QueueKind::SinglePlanar);
     }
 
     #[test]
     fn what_cannot_be_had_is_said_with_what_can() {
-        let refusal = |modes: &[FormatModes], wish| ranked(modes, &wish, Wire::Wide).unwrap_err().to_string();
+        let refusal = |modes: &[FormatModes], wish| ranked(modes, &wish, LinkSpeed::Fast).unwrap_err().to_string();
         let refused = refusal(&office(), wish(None, None, Some(b"NV12")));
         assert_eq!(refused, "it does not offer NV12; choose --format from YUYV, MJPG");
         let unreadable = refusal(&[format(b"H264", &[(640, 480, &[30])])], wish(None, None, None));

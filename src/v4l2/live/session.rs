@@ -1,4 +1,4 @@
-//! A camera that is open and streams: from the device node to the running queue.
+//! An open, streaming camera: from the device node to the running queue.
 
 use std::fmt;
 use std::path::Path;
@@ -6,7 +6,7 @@ use std::path::Path;
 use v4l::v4l_sys as sys;
 
 use super::error::OpenError;
-use super::negotiate::{Choice, Wire, Wish, ranked};
+use super::negotiate::{Choice, LinkSpeed, Wish, ranked};
 use crate::clock::Clock;
 use crate::layout::{Layout, LayoutError};
 use crate::v4l2::device::{Device, own_caps, zeroed};
@@ -15,16 +15,16 @@ use crate::v4l2::node::{LOOPBACK_DRIVER, text};
 use crate::v4l2::queue::{DeviceKernel, Queue, Writer};
 use crate::v4l2::{controls, node};
 
-/// A control and what to set it to, as they are written.
+/// A control's name and value, as text.
 pub type Setting = (String, String);
 
-/// What was agreed with the driver.
+/// The mode agreed with the driver.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Agreed {
-    /// What was asked for in the end.
+    /// The mode requested.
     pub choice: Choice,
     pub layout: Layout,
-    /// Time from frame to frame, as the driver says.
+    /// Time between frames, as the driver reports it.
     pub interval: Interval,
 }
 
@@ -35,52 +35,53 @@ impl fmt::Display for Agreed {
     }
 }
 
-/// An open camera that streams.
+/// An open, streaming camera.
 pub struct Session {
     pub queue: Queue<DeviceKernel>,
     pub agreed: Agreed,
-    /// What it answered when it was opened.
+    /// Its capabilities when it was opened.
     pub capability: sys::v4l2_capability,
 }
 
-/// Formats that are tried where the driver does not take the best.
-const TRIES: usize = 6;
+/// How many formats are tried if the driver refuses the best one.
+const MAX_FORMATS: usize = 6;
 
 impl Session {
-    /// Opens the camera at `path`, agrees on a mode, sets its controls and starts it. With `before` (what was agreed
-    /// last time) that mode is asked for first, which is quick, and a control that cannot be set is only warned of.
+    /// Opens the camera at `path`, negotiates a mode, sets its controls and starts it. With `previous`, the last agreed
+    /// mode, that mode is requested first, which is fast, and a control that cannot be set only causes a warning.
     ///
     /// # Errors
-    /// Any of this is refused.
+    /// Any of these steps is refused.
     pub fn open(
         path: &Path,
         wish: &Wish,
         settings: &[Setting],
-        before: Option<&Agreed>,
+        previous: Option<&Agreed>,
         clock: &Clock,
     ) -> Result<Self, OpenError> {
         let device = Device::open(path).map_err(|error| OpenError::at(path, "it cannot be opened", error))?;
         let capability = query_camera(&device)?;
-        let agreed = agree(&device, &capability, wish, before)?;
+        let agreed = negotiate(&device, &capability, wish, previous)?;
         for (name, value) in settings {
             match controls::set(&device, name, value) {
                 Ok(_) => {}
-                Err(error) if before.is_some() => tracing::warn!("{}: {error}", path.display()),
+                // A running stream must not end because of a control.
+                Err(error) if previous.is_some() => tracing::warn!("{}: {error}", path.display()),
                 Err(source) => return Err(OpenError::Control { path: path.to_owned(), source }),
             }
         }
-        let least_bytes: Vec<usize> =
+        let min_bytes: Vec<usize> =
             (0..agreed.layout.planes().len()).map(|plane| agreed.layout.needed_bytes(plane)).collect();
         let writer = if is_loopback(&capability) { Writer::Program } else { Writer::Driver };
         let kernel = DeviceKernel::new(device, agreed.choice.queue, writer);
         let refused = |error| OpenError::queue(path, error);
         let mut queue =
-            Queue::new(kernel, &least_bytes, agreed.interval.period_ns(), clock.clone()).map_err(refused)?;
+            Queue::new(kernel, &min_bytes, agreed.interval.period_ns(), clock.clone()).map_err(refused)?;
         queue.start().map_err(refused)?;
         Ok(Self { queue, agreed, capability })
     }
 
-    /// Whether frames come from another program, not from a camera.
+    /// Whether frames come from another program instead of a camera.
     pub fn is_loopback(&self) -> bool {
         is_loopback(&self.capability)
     }
@@ -94,7 +95,7 @@ fn is_loopback(capability: &sys::v4l2_capability) -> bool {
     text(&capability.driver) == LOOPBACK_DRIVER
 }
 
-/// Asks the device what it is; an error if it is no camera.
+/// Queries the device's capabilities; fails if it is not a camera.
 fn query_camera(device: &Device) -> Result<sys::v4l2_capability, OpenError> {
     let path = device.path();
     let mut capability: sys::v4l2_capability = zeroed();
@@ -108,50 +109,50 @@ fn query_camera(device: &Device) -> Result<sys::v4l2_capability, OpenError> {
     }
 }
 
-/// Why a device with this capability is no camera; `None` where it is one.
+/// Returns why a device with these capabilities is not a camera; `None` if it is one.
 fn why_no_camera(capability: &sys::v4l2_capability) -> Option<&'static str> {
     let caps = own_caps(capability);
-    let can = |any: u32| caps & any != 0;
-    if can(sys::V4L2_CAP_VIDEO_M2M | sys::V4L2_CAP_VIDEO_M2M_MPLANE) {
+    let has_caps = |any: u32| caps & any != 0;
+    if has_caps(sys::V4L2_CAP_VIDEO_M2M | sys::V4L2_CAP_VIDEO_M2M_MPLANE) {
         return Some("it converts pictures");
     }
-    if !can(sys::V4L2_CAP_VIDEO_CAPTURE | sys::V4L2_CAP_VIDEO_CAPTURE_MPLANE) {
+    if !has_caps(sys::V4L2_CAP_VIDEO_CAPTURE | sys::V4L2_CAP_VIDEO_CAPTURE_MPLANE) {
         return Some(match text(&capability.driver) {
             driver if driver == LOOPBACK_DRIVER => "it is a virtual camera, and nothing writes to it",
-            _ if can(sys::V4L2_CAP_META_CAPTURE) => "it tells about another node's pictures",
+            _ if has_caps(sys::V4L2_CAP_META_CAPTURE) => "it tells about another node's pictures",
             _ => "it captures no pictures",
         });
     }
-    (!can(sys::V4L2_CAP_STREAMING)).then_some("it does not stream")
+    (!has_caps(sys::V4L2_CAP_STREAMING)).then_some("it does not stream")
 }
 
 const ENOTTY: i32 = rustix::io::Errno::NOTTY.raw_os_error();
 
-/// Sets a mode on the device: that of `before` if the driver still gives the same layout, otherwise the first of the
-/// [`TRIES`] best for `wish` that it takes. The driver may change size, rate, and a format that `wish` does not name, but
-/// not to other content: such a mode is passed over. Fails at once where the device is gone or busy, and else with the
-/// first refusal.
-fn agree(
+/// Sets a mode on the device: that of `previous` if the driver still returns the same layout, otherwise the first
+/// accepted one of the [`MAX_FORMATS`] best for `wish`. The driver may change the size, the rate, and a format that
+/// `wish` leaves open, but a mode of other content is skipped. Fails at once if the device is gone or busy, and
+/// otherwise with the first refusal.
+fn negotiate(
     device: &Device,
     capability: &sys::v4l2_capability,
     wish: &Wish,
-    before: Option<&Agreed>,
+    previous: Option<&Agreed>,
 ) -> Result<Agreed, OpenError> {
-    if let Some(before) = before {
-        match set_format(device, &before.choice) {
-            Ok(layout) if layout == before.layout => return Ok(with_rate(device, before.choice, layout)),
+    if let Some(previous) = previous {
+        match set_format(device, &previous.choice) {
+            Ok(layout) if layout == previous.layout => return Ok(with_rate(device, previous.choice, layout)),
             Err(error @ (OpenError::Gone(_) | OpenError::Busy { .. })) => return Err(error),
-            // The camera has changed: agree anew.
+            // The camera has changed: negotiate again.
             _ => {}
         }
     }
     let path = device.path();
     let offered = modes(device).map_err(|error| OpenError::at(path, "VIDIOC_QUERYCAP", error))?;
-    let choices = ranked(&offered, wish, wire(path, capability))
+    let choices = ranked(&offered, wish, link_speed(path, capability))
         .map_err(|source| OpenError::NoMode { path: path.to_owned(), source })?;
-    // The first one, that of the best mode, is what the user is told.
+    // The first refusal, that of the best mode, is reported to the user.
     let mut refusal = None;
-    for choice in choices.into_iter().take(TRIES) {
+    for choice in choices.into_iter().take(MAX_FORMATS) {
         match set_format(device, &choice) {
             Ok(layout) if wish.fourcc.is_some_and(|fourcc| fourcc != layout.fourcc) => {
                 let what = "it does not give the format that it offers";
@@ -175,7 +176,7 @@ fn agree(
         .unwrap_or_else(|| OpenError::NotACamera { path: path.to_owned(), what: "it takes none of its formats" }))
 }
 
-/// Sets a format; returns the layout that the driver made of it.
+/// Sets a format; returns the layout that the driver chose.
 fn set_format(device: &Device, choice: &Choice) -> Result<Layout, OpenError> {
     let mut format: sys::v4l2_format = zeroed();
     format.type_ = choice.queue.buffer_type();
@@ -194,43 +195,43 @@ fn set_format(device: &Device, choice: &Choice) -> Result<Layout, OpenError> {
         .map_err(|source: LayoutError| OpenError::Layout { path: device.path().to_owned(), source })
 }
 
-/// Sets the rate, where it can be set, and reads it back.
+/// Sets the frame rate, if possible, and reads it back.
 fn with_rate(device: &Device, choice: Choice, layout: Layout) -> Agreed {
     let mut parameters: sys::v4l2_streamparm = zeroed();
     parameters.type_ = choice.queue.buffer_type();
-    // Read first, as the other parameters are to stay. Inputs that follow the rate of their signal refuse.
+    // Read first to keep the other parameters. Inputs that follow their signal's rate refuse.
     if device.get_parameters(&mut parameters).is_ok() {
         parameters.parm.capture.timeperframe = choice.interval.fraction();
         if let Err(error) = device.set_parameters(&mut parameters) {
             tracing::debug!("{}: the rate cannot be set: {error}", device.path().display());
         }
     }
-    let mut told: sys::v4l2_streamparm = zeroed();
-    told.type_ = choice.queue.buffer_type();
-    let told = device.get_parameters(&mut told).ok().and_then(|()| {
-        // SAFETY: of a capture queue's parameters this member was written, and all its members are integers.
+    let mut reported: sys::v4l2_streamparm = zeroed();
+    reported.type_ = choice.queue.buffer_type();
+    let reported = device.get_parameters(&mut reported).ok().and_then(|()| {
+        // SAFETY: for a capture queue this member was written, and all its members are integers.
         #[allow(unsafe_code)]
-        Interval::new(unsafe { told.parm.capture.timeperframe })
+        Interval::new(unsafe { reported.parm.capture.timeperframe })
     });
-    Agreed { choice, layout, interval: told.filter(|told| told.period_ns() < MAX_PERIOD_NS).unwrap_or(choice.interval) }
+    Agreed { choice, layout, interval: reported.filter(|reported| reported.period_ns() < MAX_PERIOD_NS).unwrap_or(choice.interval) }
 }
 
-/// A rate slower than a frame in ten seconds is a driver's mistake.
+/// A rate below one frame in ten seconds is a driver's mistake.
 const MAX_PERIOD_NS: u64 = 10_000_000_000;
 
-/// How the camera is connected, as far as that is known.
-fn wire(path: &Path, capability: &sys::v4l2_capability) -> Wire {
+/// Classifies the camera's connection, as far as it is known.
+fn link_speed(path: &Path, capability: &sys::v4l2_capability) -> LinkSpeed {
     const USB_2_MBIT_PER_S: f32 = 480.0;
     if !text(&capability.bus_info).starts_with("usb-") {
-        return Wire::Wide;
+        return LinkSpeed::Fast;
     }
     match node::usb_of(path) {
-        Some(usb) if usb.mbit_per_s > USB_2_MBIT_PER_S => Wire::Wide,
-        _ => Wire::Narrow,
+        Some(usb) if usb.mbit_per_s > USB_2_MBIT_PER_S => LinkSpeed::Fast,
+        _ => LinkSpeed::Slow,
     }
 }
 
-/// Warns if the size or the rate (by more than 2 %) is not the one that was asked for.
+/// Warns if the size or the rate (by more than 2 %) differs from the requested one.
 fn warn_of_differences(device: &Device, agreed: &Agreed, wish: &Wish) {
     let size = (agreed.layout.width, agreed.layout.height);
     let other_size = wish.size_px.is_some_and(|wanted| wanted != size);

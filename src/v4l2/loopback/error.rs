@@ -1,4 +1,4 @@
-//! What is wrong with a node, and what to do about it.
+//! Errors of loopback nodes, with advice on what to do.
 
 use std::fmt;
 use std::fs;
@@ -7,38 +7,38 @@ use std::path::{Path, PathBuf};
 
 use crate::v4l2::holders::Holder;
 
-/// Why a node takes no frames.
+/// Why frames cannot be written to a node.
 #[allow(missing_docs)] // The messages say what the fields are.
 #[derive(Debug, thiserror::Error)]
 pub enum LoopbackError {
-    /// There is no such node.
+    /// The node does not exist.
     #[error("there is no {}: {}", path.display(), remedy(path))]
     Missing { path: PathBuf },
-    /// It is no node of Video4Linux.
+    /// It is not a Video4Linux node.
     #[error("{} is no video device: {}", path.display(), remedy(path))]
     NoVideo { path: PathBuf },
     /// It belongs to another driver.
     #[error("{} is '{card}', not a virtual camera: {}", path.display(), remedy(Path::new("")))]
     NotLoopback {
         path: PathBuf,
-        /// Name of the device.
+        /// The device's name.
         card: String,
     },
-    /// No right to open it.
+    /// The user may not open it.
     #[error(
         "{} may not be opened by you: join the group that owns it with `sudo usermod -aG video $USER`, \
          and log in again",
         path.display()
     )]
     Denied { path: PathBuf },
-    /// Someone else writes to it, or as many have it open as may.
+    /// Another program writes to it, or the limit of openers is reached.
     #[error("{} is in use{}: stop that, or take another virtual camera", path.display(), By(by))]
     Taken {
         path: PathBuf,
-        /// Who has it open.
+        /// The processes that have it open.
         by: Vec<Holder>,
     },
-    /// Its format cannot be changed, and is none that can be written.
+    /// Its format is fixed to one that cannot be written.
     #[error(
         "{} is fixed to {fourcc} of {width} x {height} pixels{}: stop that, or set it free with \
          `v4l2-ctl -d {} -c keep_format=0`",
@@ -49,10 +49,10 @@ pub enum LoopbackError {
         fourcc: String,
         width: u32,
         height: u32,
-        /// Who has it open.
+        /// The processes that have it open.
         by: Vec<Holder>,
     },
-    /// It takes no frames and gives none.
+    /// It accepts no frames and delivers none.
     #[error(
         "{} was left by its last writer in a state in which it takes no frames, a fault of v4l2loopback before 0.13: \
          load the module anew with `{}`",
@@ -63,12 +63,12 @@ pub enum LoopbackError {
     System {
         path: PathBuf,
         doing: &'static str,
-        /// What the system said.
+        /// The system error.
         cause: io::Error,
     },
 }
 
-/// Writes ` by this, that`, or nothing if no holder is known.
+/// Displays ` by this, that`, or nothing if no holder is known.
 struct By<'a>(&'a [Holder]);
 
 impl fmt::Display for By<'_> {
@@ -80,10 +80,10 @@ impl fmt::Display for By<'_> {
     }
 }
 
-/// The command that makes `path` a virtual camera; `/dev/video10` if it is no name of a node.
+/// Returns the command that makes `path` a virtual camera; `/dev/video10` if it is not a node's name.
 pub fn modprobe(path: &Path) -> String {
     let number = path.to_str().and_then(|path| path.strip_prefix("/dev/video")?.parse::<u32>().ok()).unwrap_or(10);
-    // The module takes its options only while it is loaded, so a loaded one must go first.
+    // The module takes its options only when it is loaded, so a loaded one must be removed first.
     let unload = if Path::new("/sys/module/v4l2loopback").exists() { "sudo modprobe -r v4l2loopback && " } else { "" };
     format!(
         "{unload}sudo modprobe v4l2loopback devices=1 video_nr={number} card_label=\"bokehcam\" exclusive_caps=1 \
@@ -91,7 +91,7 @@ pub fn modprobe(path: &Path) -> String {
     )
 }
 
-/// All nodes of v4l2loopback, sorted by number, whether or not they can be opened: those with its attribute
+/// Lists all nodes of v4l2loopback by number, whether or not they can be opened, recognized by their attribute
 /// `max_openers` in sysfs.
 pub fn nodes() -> Vec<PathBuf> {
     let entries = fs::read_dir("/sys/class/video4linux").into_iter().flatten().flatten();
@@ -102,12 +102,12 @@ pub fn nodes() -> Vec<PathBuf> {
     numbers.into_iter().map(|number| PathBuf::from(format!("/dev/video{number}"))).collect()
 }
 
-/// Advice for a user whose `path` is no virtual camera: use one of those there are, or make one.
+/// Advises a user whose `path` is not a virtual camera: use an existing one, or create one.
 fn remedy(path: &Path) -> String {
     let there: Vec<String> = nodes().iter().map(|node| node.display().to_string()).collect();
     match there.is_empty() {
         true => format!("make a virtual camera with `{}`", modprobe(path)),
-        // Making others is the second choice: the module is reloaded for that, which removes these.
+        // Creating one is the second choice: it reloads the module, which removes the existing nodes.
         false => format!("use {}, or make others with `{}`", there.join(" or "), modprobe(path)),
     }
 }

@@ -4,9 +4,9 @@ use super::*;
 fn what_is_no_virtual_camera_is_refused_with_what_to_do() {
     let open = |path: &str| Output::open(Path::new(path), (640, 480), (30, 1)).unwrap_err().to_string();
     for path in ["/dev/video199", "/dev/null", "/dev", "/dev/no-such"] {
-        let said = open(path);
-        assert!(said.contains(path) && said.contains("modprobe v4l2loopback devices=1"), "{said}");
-        assert_eq!(said.lines().count(), 1);
+        let message = open(path);
+        assert!(message.contains(path) && message.contains("modprobe v4l2loopback devices=1"), "{message}");
+        assert_eq!(message.lines().count(), 1);
     }
     assert!(open("/dev/video199").contains("video_nr=199"));
     assert!(open("/dev/null").contains("no video device"));
@@ -27,12 +27,12 @@ fn a_frame_has_the_bytes_of_its_layout() {
 
 #[test]
 fn a_layout_takes_sizes_in_which_shared_colours_come_out_even() {
-    let takes = |layout: Layout| [(4, 2), (4, 3), (3, 2), (3, 3)].map(|size| layout.takes(size));
-    assert_eq!(takes(Layout::Yuyv), [true, true, false, false]);
+    let fits = |layout: Layout| [(4, 2), (4, 3), (3, 2), (3, 3)].map(|size| layout.fits_size(size));
+    assert_eq!(fits(Layout::Yuyv), [true, true, false, false]);
     for layout in [Layout::Yu12, Layout::Nv12] {
-        assert_eq!(takes(layout), [true, false, false, false]);
+        assert_eq!(fits(layout), [true, false, false, false]);
     }
     for layout in [Layout::Rgb24, Layout::Bgr24] {
-        assert_eq!(takes(layout), [true; 4]);
+        assert_eq!(fits(layout), [true; 4]);
     }
 }

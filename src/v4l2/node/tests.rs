@@ -1,4 +1,4 @@
-//! Which node is what, and which one a name means.
+//! Classification of nodes, and resolution of names.
 
 use super::*;
 
@@ -6,7 +6,7 @@ fn capability(driver: &str, card: &[u8], device_caps: u32) -> sys::v4l2_capabili
     let mut capability: sys::v4l2_capability = zeroed();
     capability.driver[..driver.len()].copy_from_slice(driver.as_bytes());
     capability.card[..card.len()].copy_from_slice(card);
-    // A real driver names here what its other nodes can do.
+    // A real driver lists here what its other nodes can do.
     capability.capabilities = sys::V4L2_CAP_DEVICE_CAPS | sys::V4L2_CAP_VIDEO_CAPTURE | device_caps;
     capability.device_caps = device_caps;
     capability
@@ -71,7 +71,7 @@ fn a_part_of_the_cards_name_finds_the_camera_and_only_cameras() {
         node(11, LOOPBACK_DRIVER, "Phone", CAMERA),
         node(12, LOOPBACK_DRIVER, "Idle", OUTPUT),
     ];
-    let found = |name| by_card(name, &nodes).map(|node| node.index.unwrap());
+    let found = |name| find_by_card(name, &nodes).map(|node| node.index.unwrap());
     assert_eq!(found("front"), Ok(0));
     assert_eq!(found("webcam"), Ok(0), "a real camera goes before a virtual one");
     assert_eq!(found("pHONE"), Ok(11));
@@ -81,7 +81,7 @@ fn a_part_of_the_cards_name_finds_the_camera_and_only_cameras() {
         let error = found(name).unwrap_err().to_string();
         assert!(error.contains("/dev/video0 (HD Webcam: Front)") && !error.contains("Idle"), "{error}");
     }
-    let error = by_card("x", &[]).unwrap_err().to_string();
+    let error = find_by_card("x", &[]).unwrap_err().to_string();
     assert!(error.contains("no camera is connected") && !error.contains('\n'), "{error}");
 }
 
@@ -96,21 +96,21 @@ fn paths_numbers_and_links_lead_to_nodes() {
     fs::write(class.join("video7/name"), "Cam\n").unwrap();
     fs::write(dev.join("video7"), "").unwrap();
     std::os::unix::fs::symlink("../../video7", dev.join("v4l/by-id/usb-Cam_1-video-index0")).unwrap();
-    let places = Places { class, dev: fs::canonicalize(&dev).unwrap() };
+    let paths = SystemPaths { class, dev: fs::canonicalize(&dev).unwrap() };
 
-    let nodes = places.nodes();
+    let nodes = paths.nodes();
     assert_eq!(nodes.iter().map(|node| node.index.unwrap()).collect::<Vec<_>>(), [7, 8]);
     assert_eq!((nodes[0].card.as_str(), nodes[0].links.len()), ("Cam", 1), "known although it does not answer");
     assert!(nodes[0].problem.is_some());
     assert!(nodes[1].problem.as_ref().unwrap().contains("missing"));
 
-    assert_eq!(places.resolve("7").unwrap(), places.dev.join("video7"));
-    assert_eq!(places.resolve("video7").unwrap(), places.dev.join("video7"));
-    assert_eq!(places.resolve("usb-Cam_1-video-index0").unwrap(), places.dev.join("v4l/by-id/usb-Cam_1-video-index0"));
-    assert_eq!(places.resolve("/dev/null").unwrap(), PathBuf::from("/dev/null"));
+    assert_eq!(paths.resolve("7").unwrap(), paths.dev.join("video7"));
+    assert_eq!(paths.resolve("video7").unwrap(), paths.dev.join("video7"));
+    assert_eq!(paths.resolve("usb-Cam_1-video-index0").unwrap(), paths.dev.join("v4l/by-id/usb-Cam_1-video-index0"));
+    assert_eq!(paths.resolve("/dev/null").unwrap(), PathBuf::from("/dev/null"));
     for wrong in ["9", "/dev/video4711", "v4l", "."] {
-        assert!(matches!(places.resolve(wrong), Err(NodeError::None { .. })), "{wrong}");
+        assert!(matches!(paths.resolve(wrong), Err(NodeError::None { .. })), "{wrong}");
     }
     let file = dev.join("video7");
-    assert_eq!(places.resolve(file.to_str().unwrap()), Err(NodeError::NotADevice(file)));
+    assert_eq!(paths.resolve(file.to_str().unwrap()), Err(NodeError::NotADevice(file)));
 }

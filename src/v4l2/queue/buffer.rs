@@ -1,39 +1,39 @@
-//! What came in a buffer, and what did not.
+//! A dequeued buffer's content, and the frames that were lost.
 
 use std::ops::Deref;
 
-/// Most planes of a buffer.
+/// Maximum number of planes of a buffer.
 pub const MAX_PLANES: usize = v4l::v4l_sys::VIDEO_MAX_PLANES as usize;
 
-/// A buffer that the kernel gave back.
+/// A buffer that the kernel returned.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Dequeued {
     pub index: u32,
     pub sequence: u32,
-    /// When the frame was taken, on the system's monotonic clock, where the driver uses that.
+    /// Capture time on the system's monotonic clock, if the driver uses that clock.
     pub stamp_ns: Option<u64>,
-    /// The driver says that its content is damaged.
+    /// Whether the driver reports damaged content.
     pub flagged: bool,
-    /// What of each plane was filled.
-    pub parts: [Part; MAX_PLANES],
+    /// The filled range of each plane.
+    pub filled: [ByteRange; MAX_PLANES],
 }
 
-/// Part of a plane, in bytes.
+/// A range of bytes in a plane.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Part {
+pub struct ByteRange {
     pub start: usize,
-    /// The byte after its last.
+    /// End of the range, exclusive.
     pub end: usize,
 }
 
-/// Frames that were not given out, by cause.
+/// Frames that were not delivered, by cause.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Losses {
-    /// The driver dropped them.
+    /// Dropped by the driver.
     pub missed: u64,
-    /// Passed over, as a newer one was there.
+    /// Skipped because a newer one was available.
     pub stale: u64,
-    /// Damaged, empty or cut short.
+    /// Damaged, empty or truncated.
     pub corrupt: u64,
 }
 
@@ -43,7 +43,7 @@ impl Losses {
     }
 }
 
-/// The planes of a frame, as far as they are filled.
+/// The filled ranges of a frame's planes.
 #[derive(Clone, Copy, Debug)]
 pub struct Planes<'a> {
     pub(super) planes: [&'a [u8]; MAX_PLANES],

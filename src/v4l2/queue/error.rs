@@ -2,24 +2,24 @@
 
 use std::io;
 
-use super::{BUFFERS, LEAST_BUFFERS};
+use super::{BUFFERS, MIN_BUFFERS};
 
 /// Why a queue cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum QueueError {
     #[error("{step}: {source}")]
     Refused {
-        /// What was asked for.
+        /// The failed call.
         step: &'static str,
         source: io::Error,
     },
     /// Too few to read one while another is filled.
-    #[error("the driver gives {granted} of {BUFFERS} buffers, and {LEAST_BUFFERS} are needed")]
+    #[error("the driver gives {granted} of {BUFFERS} buffers, and {MIN_BUFFERS} are needed")]
     TooFewBuffers {
-        /// As many as there are.
+        /// The number of buffers granted.
         granted: u32,
     },
-    /// A driver that breaks the rules.
+    /// The driver violated the V4L2 protocol.
     #[error("the driver gave back buffer {0}, which it did not have")]
     Foreign(u32),
 }
@@ -29,7 +29,7 @@ impl QueueError {
         move |source| Self::Refused { step, source }
     }
 
-    /// What the driver said, where it said something.
+    /// Returns the system error, if there is one.
     pub fn source(&self) -> Option<&io::Error> {
         match self {
             Self::Refused { source, .. } => Some(source),

@@ -1,4 +1,4 @@
-//! What a queue needs of the kernel, and how a real device gives it.
+//! The kernel interface of a queue, and its implementation for real devices.
 
 use std::io;
 use std::os::fd::AsFd;
@@ -9,7 +9,7 @@ use rustix::mm::{MapFlags, ProtFlags, mmap, munmap};
 use v4l::v4l_sys as sys;
 use v4l::v4l2::vidioc;
 
-use super::{Dequeued, MAX_PLANES, Part};
+use super::{ByteRange, Dequeued, MAX_PLANES};
 use crate::v4l2::device::{Device, Request, zeroed};
 use crate::v4l2::modes::QueueKind;
 
@@ -18,51 +18,51 @@ pub trait Kernel {
     /// A mapped plane; dropping it unmaps it.
     type Memory: AsRef<[u8]>;
 
-    /// Asks for `count` buffers; gives how many there are now.
+    /// Requests `count` buffers; returns how many were granted.
     fn request(&mut self, count: u32) -> io::Result<u32>;
-    /// Tells about a buffer.
-    fn query(&mut self, index: u32) -> io::Result<Described>;
+    /// Describes a buffer.
+    fn query(&mut self, index: u32) -> io::Result<BufferInfo>;
     /// Maps a plane of a buffer.
     fn map(&mut self, span: Span) -> io::Result<Self::Memory>;
-    /// Makes sure that the first `bytes` of a plane, whose buffer was dequeued, stay as they are until it is queued.
-    fn settle(&mut self, memory: &mut Self::Memory, bytes: usize) {
+    /// Ensures that the first `bytes` of a dequeued buffer's plane do not change until the buffer is queued again.
+    fn snapshot(&mut self, memory: &mut Self::Memory, bytes: usize) {
         let _ = (memory, bytes);
     }
-    /// Gives a buffer to the driver.
+    /// Passes a buffer to the driver.
     fn queue(&mut self, index: u32) -> io::Result<()>;
-    /// Takes the oldest filled buffer; [`io::ErrorKind::WouldBlock`] when there is none.
+    /// Dequeues the oldest filled buffer; [`io::ErrorKind::WouldBlock`] when there is none.
     fn dequeue(&mut self) -> io::Result<Dequeued>;
     fn stream_on(&mut self) -> io::Result<()>;
-    /// Stops the stream; all buffers come back.
+    /// Stops the stream; all buffers are returned.
     fn stream_off(&mut self) -> io::Result<()>;
     /// Waits until there is something to dequeue, an error included.
-    fn wait(&mut self, patience: Duration) -> io::Result<Wake>;
+    fn wait(&mut self, timeout: Duration) -> io::Result<Wake>;
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Wake {
-    Late,
+    TimedOut,
     /// A buffer is filled.
     Filled,
-    /// Something is wrong; dequeuing tells what.
-    Trouble,
+    /// An error condition; dequeuing returns its cause.
+    Error,
 }
 
-/// Where a plane's memory is, as the kernel numbers it.
+/// The location of a plane's memory, in the device's address space.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Span {
     pub offset: u64,
-    /// How much, in bytes.
+    /// Length, in bytes.
     pub length_bytes: usize,
 }
 
-/// What the kernel knows of a buffer.
+/// The kernel's description of a buffer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Described {
+pub struct BufferInfo {
     pub planes: [Span; MAX_PLANES],
-    /// How many of those there are.
+    /// Number of valid entries in `planes`.
     pub plane_count: usize,
-    /// The driver has it, to fill or filled.
+    /// Whether the driver owns it, to fill or filled.
     pub in_kernel: bool,
 }
 
@@ -74,21 +74,21 @@ pub struct DeviceKernel {
     writer: Writer,
 }
 
-/// Who fills a device's buffers.
+/// Writer of a device's buffers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Writer {
-    /// A driver, which leaves a buffer alone from when it is dequeued until it is queued again, as V4L2 demands.
+    /// A driver, which does not touch a buffer from its dequeuing until it is queued again, as V4L2 demands.
     Driver,
-    /// Another program through v4l2loopback, which goes round its buffers whatever its readers hold.
+    /// Another program through v4l2loopback, which cycles through its buffers whether or not a reader holds them.
     Program,
 }
 
-/// A part of a device's memory, readable.
+/// A mapped, readable region of a device's memory.
 #[derive(Debug)]
 pub struct Mapping {
     address: *mut std::ffi::c_void,
     length_bytes: usize,
-    /// What is read instead, where the memory may change meanwhile.
+    /// Copy to read from, where the memory may change meanwhile.
     copy: Option<Vec<u8>>,
 }
 
@@ -96,15 +96,15 @@ pub struct Mapping {
 #[allow(unsafe_code)]
 unsafe impl Send for Mapping {}
 
-/// A buffer's description together with the planes that it points to. It does so only during an ioctl: the pointer is
-/// stale once the value was moved.
+/// A buffer's description together with the planes that it points to. The pointer is valid only during an ioctl: it
+/// dangles once the value has moved.
 struct Buffer {
     head: sys::v4l2_buffer,
     planes: [sys::v4l2_plane; MAX_PLANES],
 }
 
 impl DeviceKernel {
-    /// The queue of `kind` of a device.
+    /// Creates the queue of `kind` of a device.
     pub fn new(device: Device, kind: QueueKind, writer: Writer) -> Self {
         Self { device, kind, writer }
     }
@@ -113,7 +113,7 @@ impl DeviceKernel {
         &self.device
     }
 
-    /// Makes `request` (QUERYBUF, QBUF or DQBUF) for a buffer; returns what the driver filled in.
+    /// Issues `request` (QUERYBUF, QBUF or DQBUF) for a buffer; returns what the driver filled in.
     fn buffer_ioctl(&self, request: Request, index: u32) -> io::Result<Buffer> {
         let mut buffer = Buffer { head: zeroed(), planes: [zeroed(); MAX_PLANES] };
         buffer.head.index = index;
@@ -124,7 +124,7 @@ impl DeviceKernel {
             buffer.head.m.planes = buffer.planes.as_mut_ptr();
         }
         // SAFETY: all three requests take a `v4l2_buffer`. Its pointer, used with a multi-planar queue only, leads to
-        // as many planes as its length says, which live until after the call.
+        // the number of planes that its length says, which live until after the call.
         #[allow(unsafe_code)]
         unsafe {
             self.device.ioctl(request, &mut buffer.head)?;
@@ -151,11 +151,11 @@ impl Kernel for DeviceKernel {
         Ok(request.count)
     }
 
-    fn query(&mut self, index: u32) -> io::Result<Described> {
+    fn query(&mut self, index: u32) -> io::Result<BufferInfo> {
         let buffer = self.buffer_ioctl(vidioc::VIDIOC_QUERYBUF as Request, index)?;
         let plane_count = self.plane_count(&buffer);
         let mut planes = [Span::default(); MAX_PLANES];
-        // SAFETY: the members that are read are integers, and with memory of kind MMAP the kernel writes these.
+        // SAFETY: the members read are integers, and with MMAP memory the kernel writes these.
         #[allow(unsafe_code)]
         unsafe {
             match self.kind {
@@ -172,12 +172,12 @@ impl Kernel for DeviceKernel {
             }
         }
         let in_kernel = buffer.head.flags & (sys::V4L2_BUF_FLAG_QUEUED | sys::V4L2_BUF_FLAG_DONE) != 0;
-        Ok(Described { planes, plane_count, in_kernel })
+        Ok(BufferInfo { planes, plane_count, in_kernel })
     }
 
     fn map(&mut self, span: Span) -> io::Result<Mapping> {
         let Span { offset, length_bytes } = span;
-        // SAFETY: a new mapping at a place that the kernel chooses disturbs no other memory.
+        // SAFETY: a new mapping at an address that the kernel chooses disturbs no other memory.
         #[allow(unsafe_code)]
         let address = unsafe {
             mmap(std::ptr::null_mut(), length_bytes, ProtFlags::READ, MapFlags::SHARED, self.device.as_fd(), offset)?
@@ -186,8 +186,8 @@ impl Kernel for DeviceKernel {
         Ok(Mapping { address, length_bytes, copy })
     }
 
-    fn settle(&mut self, memory: &mut Mapping, bytes: usize) {
-        memory.settle(bytes);
+    fn snapshot(&mut self, memory: &mut Mapping, bytes: usize) {
+        memory.snapshot(bytes);
     }
 
     fn queue(&mut self, index: u32) -> io::Result<()> {
@@ -196,13 +196,13 @@ impl Kernel for DeviceKernel {
 
     fn dequeue(&mut self) -> io::Result<Dequeued> {
         let buffer = self.buffer_ioctl(vidioc::VIDIOC_DQBUF as Request, 0)?;
-        let mut parts = [Part::default(); MAX_PLANES];
+        let mut filled = [ByteRange::default(); MAX_PLANES];
         match self.kind {
-            QueueKind::SinglePlanar => parts[0] = Part { start: 0, end: buffer.head.bytesused as usize },
+            QueueKind::SinglePlanar => filled[0] = ByteRange { start: 0, end: buffer.head.bytesused as usize },
             QueueKind::MultiPlanar => {
-                for (part, plane) in parts.iter_mut().zip(&buffer.planes) {
+                for (range, plane) in filled.iter_mut().zip(&buffer.planes) {
                     // `bytesused` counts from the plane's first byte, not from `data_offset`.
-                    *part = Part { start: plane.data_offset as usize, end: plane.bytesused as usize };
+                    *range = ByteRange { start: plane.data_offset as usize, end: plane.bytesused as usize };
                 }
             }
         }
@@ -213,10 +213,10 @@ impl Kernel for DeviceKernel {
         Ok(Dequeued {
             index: buffer.head.index,
             sequence: buffer.head.sequence,
-            // Other clocks cannot be compared with ours, and 0 is no time.
+            // Other clocks cannot be compared with ours, and 0 means no time.
             stamp_ns: (monotonic && stamp_ns > 0).then_some(stamp_ns),
             flagged: flags & sys::V4L2_BUF_FLAG_ERROR != 0,
-            parts,
+            filled,
         })
     }
 
@@ -228,30 +228,30 @@ impl Kernel for DeviceKernel {
         self.device.stream_off(&mut (self.kind.buffer_type() as i32))
     }
 
-    fn wait(&mut self, patience: Duration) -> io::Result<Wake> {
-        let timeout = Timespec { tv_sec: patience.as_secs() as i64, tv_nsec: patience.subsec_nanos().into() };
-        // Errors are reported without being asked for. No events are subscribed to, so PRI, too, is trouble.
+    fn wait(&mut self, timeout: Duration) -> io::Result<Wake> {
+        let timeout = Timespec { tv_sec: timeout.as_secs() as i64, tv_nsec: timeout.subsec_nanos().into() };
+        // Errors are reported without being requested. No events are subscribed to, so PRI, too, is an error.
         let mut fds = [PollFd::new(&self.device, PollFlags::IN)];
         if poll(&mut fds, Some(&timeout))? == 0 {
-            return Ok(Wake::Late);
+            return Ok(Wake::TimedOut);
         }
         let woken = fds[0].revents();
-        let trouble = PollFlags::ERR | PollFlags::HUP | PollFlags::NVAL | PollFlags::PRI;
-        Ok(if woken.intersects(trouble) { Wake::Trouble } else { Wake::Filled })
+        let errors = PollFlags::ERR | PollFlags::HUP | PollFlags::NVAL | PollFlags::PRI;
+        Ok(if woken.intersects(errors) { Wake::Error } else { Wake::Filled })
     }
 }
 
 impl Mapping {
     /// Copies the first `bytes` if another program may overwrite them. A write during the copy may tear the picture,
-    /// but later ones do not change what is read.
-    fn settle(&mut self, bytes: usize) {
+    /// but later writes do not affect it.
+    fn snapshot(&mut self, bytes: usize) {
         let Some(copy) = &mut self.copy else { return };
         let bytes = bytes.min(self.length_bytes);
-        // By words, since volatile reads of single bytes would be slow.
+        // Copied by words, since volatile reads of single bytes would be slow.
         let (words, rest) = copy[..bytes].as_chunks_mut::<{ size_of::<u64>() }>();
         let (address, rest_at) = (self.address.cast::<u64>(), words.len() * size_of::<u64>());
         for (k, word) in words.iter_mut().enumerate() {
-            // SAFETY: within the mapping, which begins at a page. Volatile, as others write to it.
+            // SAFETY: within the mapping, which is page-aligned. Volatile, as other programs write to it.
             #[allow(unsafe_code)]
             let value = unsafe { address.add(k).read_volatile() };
             *word = value.to_ne_bytes();
@@ -270,8 +270,9 @@ impl AsRef<[u8]> for Mapping {
         if let Some(copy) = &self.copy {
             return copy;
         }
-        // SAFETY: the mapping is readable, of this length, and stays until this value is dropped. A driver writes to it
-        // only while it has the buffer, and the queue reads no buffer then; where others write, `copy` is read instead.
+        // SAFETY: the mapping is readable, of this length, and lives until this value is dropped. A driver writes to it
+        // only while it owns the buffer, and the queue reads no buffer then; where others write, `copy` is read
+        // instead.
         #[allow(unsafe_code)]
         unsafe {
             std::slice::from_raw_parts(self.address.cast::<u8>(), self.length_bytes)
@@ -304,12 +305,12 @@ mod tests {
         let device = Device::open(file.path()).unwrap();
         let mut kernel = DeviceKernel::new(device, QueueKind::SinglePlanar, Writer::Program);
         let mut memory = kernel.map(Span { offset: 0, length_bytes: bytes.len() }).unwrap();
-        kernel.settle(&mut memory, bytes.len());
-        // The writer comes round again.
+        kernel.snapshot(&mut memory, bytes.len());
+        // The writer overwrites the buffer.
         file.rewind().unwrap();
         file.write_all(&vec![0xff; bytes.len()]).unwrap();
         assert_eq!(memory.as_ref(), bytes);
-        kernel.settle(&mut memory, 5);
+        kernel.snapshot(&mut memory, 5);
         assert_eq!((&memory.as_ref()[..5], &memory.as_ref()[5..]), (&[0xff; 5][..], &bytes[5..]));
     }
 }

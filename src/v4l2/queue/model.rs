@@ -1,4 +1,4 @@
-//! A model of the kernel's side of a queue. It knows every buffer's state, fails at random where a kernel may, and
+//! A model of the kernel's side of a queue. It tracks every buffer's state, fails at random where a kernel may, and
 //! panics where its user breaks a rule of V4L2.
 
 use std::cell::RefCell;
@@ -7,7 +7,7 @@ use std::io;
 use std::rc::Rc;
 use std::time::Duration;
 
-use super::{Dequeued, Described, Kernel, MAX_PLANES, Part, Span, Wake};
+use super::{BufferInfo, ByteRange, Dequeued, Kernel, MAX_PLANES, Span, Wake};
 use crate::clock::Clock;
 
 pub const EINTR: i32 = 4;
@@ -28,7 +28,7 @@ enum Buffer {
     Done { sequence: u32, flagged: bool, used_bytes: usize },
 }
 
-/// How likely things go wrong at a call, each from 0 to 1.
+/// Probability of each failure per call, from 0 to 1.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Chances {
     pub interrupted: f64,
@@ -38,17 +38,17 @@ pub struct Chances {
     pub gone: f64,
 }
 
-/// What happened, from the kernel's side.
+/// The events, as the kernel saw them.
 #[derive(Clone, Debug, Default)]
 pub struct Facts {
-    /// Frames given out, damaged ones included.
-    pub handed: u64,
-    /// Those of them that are damaged.
+    /// Frames delivered, damaged ones included.
+    pub delivered: u64,
+    /// Damaged frames among those delivered.
     pub damaged: u64,
-    /// Frames between those, which were not.
+    /// Frames lost between those delivered.
     pub missed: u64,
-    /// Most buffers that were filled or to be filled at once.
-    pub most_queued: usize,
+    /// Largest number of buffers that the kernel had at once, filled or to be filled.
+    pub max_queued: usize,
     pub starts: u64,
 }
 
@@ -63,14 +63,14 @@ pub struct State {
     streaming: bool,
     mapped: usize,
     sequence: u32,
-    last_handed: Option<u32>,
+    last_delivered: Option<u32>,
     pub gone: bool,
-    /// Queries about buffers fail.
-    pub mute: bool,
+    /// Whether queries about buffers fail.
+    pub queries_fail: bool,
     pub facts: Facts,
 }
 
-/// The model; clones are the same one.
+/// The model; clones share their state.
 #[derive(Clone)]
 pub struct Model(pub Rc<RefCell<State>>);
 
@@ -108,14 +108,14 @@ impl Model {
             streaming: false,
             mapped: 0,
             sequence: 0,
-            last_handed: None,
+            last_delivered: None,
             gone: false,
-            mute: false,
+            queries_fail: false,
             facts: Facts::default(),
         })))
     }
 
-    /// Nothing mapped, nothing streaming.
+    /// Whether nothing is mapped or streaming.
     pub fn is_clean(&self) -> bool {
         let state = self.0.borrow();
         state.mapped == 0 && (state.gone || !state.streaming && state.buffers.is_empty())
@@ -123,7 +123,7 @@ impl Model {
 }
 
 impl State {
-    /// A pseudo-random number (xorshift).
+    /// Returns a pseudo-random number (xorshift64, Marsaglia 2003).
     pub fn random(&mut self) -> u64 {
         self.random ^= self.random << 13;
         self.random ^= self.random >> 7;
@@ -131,12 +131,12 @@ impl State {
         self.random
     }
 
-    /// True with this probability.
+    /// Returns true with this probability.
     pub fn chance(&mut self, probability: f64) -> bool {
         ((self.random() >> 11) as f64 / (1u64 << 53) as f64) < probability
     }
 
-    /// Begins any ioctl: fails if the device is gone, or by chance as if a signal had interrupted it.
+    /// Starts any ioctl: fails if the device is gone, or at random as if a signal had interrupted it.
     fn call(&mut self) -> io::Result<()> {
         if self.gone {
             return error(ENODEV);
@@ -144,7 +144,7 @@ impl State {
         if self.chance(self.chances.interrupted) { error(EINTR) } else { Ok(()) }
     }
 
-    /// Fails by chance, with any of these errors.
+    /// Fails at random, with one of `errnos`.
     fn refuse(&mut self, errnos: &[i32]) -> io::Result<()> {
         if self.chance(self.chances.refused) {
             let which = self.random() as usize % errnos.len();
@@ -153,13 +153,13 @@ impl State {
         Ok(())
     }
 
-    /// Buffers that the kernel has, filled or to be filled.
+    /// Counts the buffers that the kernel has, filled or to be filled.
     pub fn with_kernel(&self) -> usize {
         self.buffers.iter().filter(|buffer| **buffer != Buffer::Dequeued).count()
     }
 
-    /// A period passes and the camera takes a picture: it fills the oldest empty buffer, if there is one.
-    pub fn shoot(&mut self) {
+    /// Advances one period, in which the camera fills the oldest empty buffer, if there is one.
+    pub fn capture_frame(&mut self) {
         self.clock.advance_ns(PERIOD_NS);
         self.sequence += 1;
         if self.chance(self.chances.dropped) {
@@ -198,17 +198,17 @@ impl Kernel for Model {
         Ok(granted)
     }
 
-    fn query(&mut self, index: u32) -> io::Result<Described> {
+    fn query(&mut self, index: u32) -> io::Result<BufferInfo> {
         let mut state = self.0.borrow_mut();
         state.call()?;
-        if state.mute {
+        if state.queries_fail {
             return error(EIO);
         }
         let in_kernel = state.buffers[index as usize] != Buffer::Dequeued;
         let span = |plane: u64| Span { offset: u64::from(index) * 8 + plane, length_bytes: PLANE_BYTES };
         let mut planes = [Span::default(); MAX_PLANES];
         (planes[0], planes[1]) = (span(0), span(1));
-        Ok(Described { planes, plane_count: 2, in_kernel })
+        Ok(BufferInfo { planes, plane_count: 2, in_kernel })
     }
 
     fn map(&mut self, span: Span) -> io::Result<Memory> {
@@ -227,7 +227,7 @@ impl Kernel for Model {
         state.refuse(&[EINVAL, EIO])?;
         state.buffers[index as usize] = Buffer::Queued;
         state.order.push_back(index);
-        state.facts.most_queued = state.facts.most_queued.max(state.order.len());
+        state.facts.max_queued = state.facts.max_queued.max(state.order.len());
         Ok(())
     }
 
@@ -245,7 +245,7 @@ impl Kernel for Model {
         let Some(index) = state.done() else { return error(EAGAIN) };
         if state.chance(chances.refused) {
             if state.chance(0.5) {
-                // The error comes with a buffer, as it may from a real driver.
+                // The error consumes a buffer, as it may with a real driver.
                 state.order.pop_front();
                 state.buffers[index as usize] = Buffer::Dequeued;
             }
@@ -257,15 +257,15 @@ impl Kernel for Model {
         else {
             unreachable!("it was done");
         };
-        state.facts.handed += 1;
+        state.facts.delivered += 1;
         state.facts.damaged += u64::from(flagged || used_bytes < PLANE_BYTES);
-        let last = state.last_handed.replace(sequence);
+        let last = state.last_delivered.replace(sequence);
         state.facts.missed += last.map_or(0, |last| u64::from(sequence - last - 1));
-        let mut parts = [Part::default(); MAX_PLANES];
-        parts[0] = Part { start: 0, end: PLANE_BYTES };
-        parts[1] = Part { start: 0, end: used_bytes };
+        let mut filled = [ByteRange::default(); MAX_PLANES];
+        filled[0] = ByteRange { start: 0, end: PLANE_BYTES };
+        filled[1] = ByteRange { start: 0, end: used_bytes };
         let stamp_ns = Some(1_000_000 + u64::from(sequence) * PERIOD_NS);
-        Ok(Dequeued { index, sequence, stamp_ns, flagged, parts })
+        Ok(Dequeued { index, sequence, stamp_ns, flagged, filled })
     }
 
     fn stream_on(&mut self) -> io::Result<()> {
@@ -274,7 +274,7 @@ impl Kernel for Model {
         let idle = state.buffers.iter().filter(|buffer| **buffer != Buffer::Queued).count();
         assert_eq!(idle, 0, "the stream starts with {idle} buffers that are not queued");
         state.refuse(&[ENOSPC, EINVAL])?;
-        (state.streaming, state.sequence, state.last_handed) = (true, 0, None);
+        (state.streaming, state.sequence, state.last_delivered) = (true, 0, None);
         state.facts.starts += 1;
         Ok(())
     }
@@ -288,26 +288,26 @@ impl Kernel for Model {
         Ok(())
     }
 
-    fn wait(&mut self, patience: Duration) -> io::Result<Wake> {
+    fn wait(&mut self, timeout: Duration) -> io::Result<Wake> {
         let mut state = self.0.borrow_mut();
         if state.gone {
-            return Ok(Wake::Trouble);
+            return Ok(Wake::Error);
         }
         state.clock.advance_ns(1000);
         state.call()?;
-        let until_ns = state.clock.now_ns() + patience.as_nanos() as u64;
+        let until_ns = state.clock.now_ns() + timeout.as_nanos() as u64;
         if !state.streaming {
-            return Ok(Wake::Trouble);
+            return Ok(Wake::Error);
         }
-        // The caller may have been away for a while.
+        // The caller may have been busy for a few frames.
         for _ in 0..state.random() % 4 {
-            state.shoot();
+            state.capture_frame();
         }
         while state.done().is_none() {
             if state.clock.now_ns() >= until_ns {
-                return Ok(Wake::Late);
+                return Ok(Wake::TimedOut);
             }
-            state.shoot();
+            state.capture_frame();
         }
         Ok(Wake::Filled)
     }

@@ -1,37 +1,37 @@
-//! How many frames a driver dropped, by the numbers that it gives them.
+//! Counts the frames that a driver dropped, from its sequence numbers.
 
-/// Compares each frame's number with the one before.
+/// Compares each frame's sequence number with the previous one.
 #[derive(Debug)]
 pub struct Sequence {
-    /// Number and time of the frame before.
+    /// Sequence number and time stamp of the previous frame.
     last: Option<(u32, Option<u64>)>,
-    /// Time from frame to frame where none was missing.
+    /// Measured time between consecutive frames.
     period_ns: f64,
 }
 
-/// Share of its expected time that a gap in the numbers must have taken to be believed: some drivers count a broken
-/// frame twice.
-const CREDIBLE: f64 = 0.65;
-/// Weight of each new interval in the measured period, a moving average.
-const GAIN: f64 = 0.1;
+/// Minimum fraction of the expected time that a gap in the numbers must take to count as lost frames: some drivers
+/// number a broken frame twice.
+const MIN_GAP_FRACTION: f64 = 0.65;
+/// Weight of each new interval in the measured period (exponential moving average).
+const PERIOD_SMOOTHING: f64 = 0.1;
 
 impl Sequence {
-    /// Frames are expected every `period_ns` nanoseconds; the real period is measured.
+    /// Creates a counter that expects frames every `period_ns` nanoseconds; the real period is measured.
     pub fn new(period_ns: u64) -> Self {
         Self { last: None, period_ns: period_ns as f64 }
     }
 
-    /// The stream starts anew, and with it the numbers.
+    /// Resets the counter: the stream restarts, and with it the numbers.
     pub fn restart(&mut self) {
         self.last = None;
     }
 
-    /// A frame with this number came, taken at `stamp_ns` where the driver says so. Returns how many were lost between
-    /// it and the one before. A driver that always gives the same number loses none that could be known of.
+    /// Adds a frame with this sequence number, captured at `stamp_ns` if the driver reports it. Returns how many frames
+    /// were lost since the previous one. With a driver that always repeats one number, no loss can be detected.
     pub fn step(&mut self, number: u32, stamp_ns: Option<u64>) -> u64 {
         let Some((last, last_ns)) = self.last.replace((number, stamp_ns)) else { return 0 };
         let ahead = number.wrapping_sub(last);
-        // Backwards: the driver began anew by itself.
+        // Backwards: the driver restarted its numbers by itself.
         if ahead == 0 || ahead > u32::MAX / 2 {
             return 0;
         }
@@ -42,14 +42,14 @@ impl Sequence {
         if gap == 0 {
             // Longer intervals are pauses: a camera that stalled does not have another rate.
             if passed_ns < 4.0 * self.period_ns {
-                self.period_ns += GAIN * (passed_ns - self.period_ns);
+                self.period_ns += PERIOD_SMOOTHING * (passed_ns - self.period_ns);
             }
             return 0;
         }
-        if passed_ns >= CREDIBLE * f64::from(ahead) * self.period_ns {
+        if passed_ns >= MIN_GAP_FRACTION * f64::from(ahead) * self.period_ns {
             return gap;
         }
-        // The numbers jumped in too short a time: as many frames were lost as fit into it.
+        // The numbers advanced too fast: count the frames that fit into the elapsed time.
         let periods = (passed_ns / self.period_ns).round() as u64;
         periods.saturating_sub(1).min(gap)
     }
@@ -61,7 +61,7 @@ mod tests {
 
     const PERIOD_NS: u64 = 33_333_333;
 
-    /// Losses over frames of (number, time in periods).
+    /// Counts the losses over frames of (number, time in periods).
     fn losses(frames: &[(u32, f64)]) -> u64 {
         let mut sequence = Sequence::new(PERIOD_NS);
         let stamp = |periods: f64| Some(1_000_000_000 + (periods * PERIOD_NS as f64) as u64);
@@ -97,7 +97,7 @@ mod tests {
 
     #[test]
     fn the_real_period_counts_where_the_stated_one_is_wrong() {
-        // Twice as fast as stated: the gap of one takes one stated period.
+        // Twice the stated rate: the gap of one takes one stated period.
         let mut sequence = Sequence::new(PERIOD_NS);
         let half_ns = PERIOD_NS / 2;
         for number in 0..60 {

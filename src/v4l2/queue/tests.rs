@@ -4,7 +4,7 @@ use super::model::{Chances, EBUSY, ENODEV, ENOSPC, Facts, Model, PERIOD_NS, PLAN
 use super::{Losses, Queue, QueueError};
 use crate::clock::Clock;
 
-const PATIENCE: Duration = Duration::from_millis(100);
+const TIMEOUT: Duration = Duration::from_millis(100);
 
 fn open(model: &Model, clock: &Clock) -> Result<Queue<Model>, QueueError> {
     Queue::new(model.clone(), &[PLANE_BYTES, PLANE_BYTES], PERIOD_NS, clock.clone())
@@ -14,7 +14,7 @@ fn errno(error: &QueueError) -> i32 {
     error.source().and_then(std::io::Error::raw_os_error).unwrap_or(0)
 }
 
-fn add(sum: &mut Losses, losses: Losses) {
+fn add_losses(sum: &mut Losses, losses: Losses) {
     sum.missed += losses.missed;
     sum.stale += losses.stale;
     sum.corrupt += losses.corrupt;
@@ -29,19 +29,19 @@ fn the_newest_frame_wins_and_the_others_are_counted() {
     let (mut taken, mut losses) = (0, Losses::default());
     let mut last = None;
     for _ in 0..1000 {
-        assert!(queue.wait_newest(PATIENCE).unwrap());
+        assert!(queue.wait_newest(TIMEOUT).unwrap());
         let (frame, planes) = queue.current().unwrap();
         assert_eq!((planes.len(), planes[0].len(), planes[1].len()), (2, PLANE_BYTES, PLANE_BYTES));
         assert!(last < Some(frame.sequence), "frames come in order");
         last = Some(frame.sequence);
         taken += 1;
         queue.release();
-        add(&mut losses, queue.take_losses());
+        add_losses(&mut losses, queue.take_losses());
     }
-    let Facts { handed, missed, most_queued, .. } = model.0.borrow().facts.clone();
-    assert_eq!((losses.missed, losses.corrupt, most_queued), (missed, 0, 4));
+    let Facts { delivered, missed, max_queued, .. } = model.0.borrow().facts.clone();
+    assert_eq!((losses.missed, losses.corrupt, max_queued), (missed, 0, 4));
     assert!(losses.stale > 100, "the model shoots up to three frames between two looks");
-    assert_eq!(handed, taken + losses.stale);
+    assert_eq!(delivered, taken + losses.stale);
 }
 
 #[test]
@@ -58,12 +58,12 @@ fn parts_of_damaged_frames_are_never_given_out() {
     queue.start().unwrap();
     let mut losses = Losses::default();
     for _ in 0..500 {
-        if queue.wait_newest(PATIENCE).unwrap() {
+        if queue.wait_newest(TIMEOUT).unwrap() {
             let (frame, planes) = queue.current().unwrap();
             assert!(!frame.flagged && planes[1].len() == PLANE_BYTES);
             queue.release();
         }
-        add(&mut losses, queue.take_losses());
+        add_losses(&mut losses, queue.take_losses());
     }
     assert_eq!(losses.corrupt, model.0.borrow().facts.damaged);
     assert!(losses.corrupt > 100);
@@ -79,7 +79,7 @@ fn too_few_buffers_are_refused_and_freed() {
             Ok(mut queue) => {
                 assert!(enough);
                 queue.start().unwrap();
-                assert!(queue.wait_newest(PATIENCE).unwrap());
+                assert!(queue.wait_newest(TIMEOUT).unwrap());
             }
             Err(QueueError::TooFewBuffers { granted: told }) => assert!(!enough && told == granted),
             Err(other) => panic!("{other}"),
@@ -95,14 +95,14 @@ fn a_frame_that_was_not_released_goes_back_and_counts() {
     let mut queue = open(&model, &clock).unwrap();
     queue.start().unwrap();
     for _ in 0..20 {
-        assert!(queue.wait_newest(PATIENCE).unwrap());
+        assert!(queue.wait_newest(TIMEOUT).unwrap());
     }
     queue.stop();
     assert!(queue.current().is_none());
     let losses = queue.take_losses();
-    assert_eq!(losses.stale, model.0.borrow().facts.handed);
+    assert_eq!(losses.stale, model.0.borrow().facts.delivered);
     queue.start().unwrap();
-    assert!(queue.wait_newest(PATIENCE).unwrap());
+    assert!(queue.wait_newest(TIMEOUT).unwrap());
     drop(queue);
     assert!(model.is_clean());
 }
@@ -113,16 +113,16 @@ fn what_came_before_the_beginning_is_not_counted() {
     let model = Model::new(7, Chances::default(), clock.clone());
     let mut queue = open(&model, &clock).unwrap();
     queue.start().unwrap();
-    // All buffers are filled, and more frames than those are dropped.
+    // All buffers are filled, and further frames are dropped.
     for _ in 0..9 {
-        model.0.borrow_mut().shoot();
+        model.0.borrow_mut().capture_frame();
     }
-    queue.begin();
-    let before = model.0.borrow().facts.handed;
+    queue.reset_losses();
+    let before = model.0.borrow().facts.delivered;
     assert_eq!(before, 4, "one for each buffer");
-    assert!(queue.wait_newest(PATIENCE).unwrap());
+    assert!(queue.wait_newest(TIMEOUT).unwrap());
     let (sequence, losses) = (queue.current().unwrap().0.sequence, queue.take_losses());
-    let after = model.0.borrow().facts.handed - before;
+    let after = model.0.borrow().facts.delivered - before;
     assert!(sequence >= 9, "{sequence}");
     assert_eq!(losses, Losses { stale: after - 1, ..Losses::default() });
 }
@@ -134,13 +134,13 @@ fn a_buffer_that_was_refused_is_offered_again() {
     let mut queue = open(&model, &clock).unwrap();
     queue.start().unwrap();
     for round in 0..3 {
-        assert!(queue.wait_newest(PATIENCE).unwrap());
-        // Those that are passed over go back, the one that was read does not.
+        assert!(queue.wait_newest(TIMEOUT).unwrap());
+        // Skipped buffers are requeued; the one that was read is refused.
         model.0.borrow_mut().chances.refused = 1.0;
         queue.release();
         model.0.borrow_mut().chances.refused = 0.0;
         assert_eq!(model.0.borrow().with_kernel(), 3, "round {round}");
-        assert!(queue.wait_newest(PATIENCE).unwrap());
+        assert!(queue.wait_newest(TIMEOUT).unwrap());
         assert_eq!(model.0.borrow().with_kernel(), 3, "all but the one that is being read");
         queue.release();
         assert_eq!(model.0.borrow().with_kernel(), 4);
@@ -155,17 +155,17 @@ fn a_buffer_of_which_nothing_can_be_learnt_is_left_to_the_kernel() {
     queue.start().unwrap();
     let fails = |fails: bool| {
         let mut state = model.0.borrow_mut();
-        (state.mute, state.chances.refused) = (fails, if fails { 1.0 } else { 0.0 });
+        (state.queries_fail, state.chances.refused) = (fails, if fails { 1.0 } else { 0.0 });
     };
     fails(true);
-    assert!(queue.wait_newest(PATIENCE).is_err());
+    assert!(queue.wait_newest(TIMEOUT).is_err());
     fails(false);
-    // The model panics where a buffer that it has is queued again.
-    assert!(queue.wait_newest(PATIENCE).unwrap());
+    // The model panics if a buffer that it owns is queued again.
+    assert!(queue.wait_newest(TIMEOUT).unwrap());
 }
 
 /// Runs a queue against a kernel that fails at random: opens, starts, reads, stops. The model panics where a rule is
-/// broken. Returns frames taken, what was lost, and how often each of these errors came.
+/// broken. Returns the frames read, the losses, and the model's counts; adds to `errors` by errno.
 fn fuzz(seed: u64, chances: Chances, errors: &mut [u64; 256]) -> (u64, Losses, Facts) {
     let clock = Clock::manual();
     let model = Model::new(seed, chances, clock.clone());
@@ -186,9 +186,9 @@ fn fuzz(seed: u64, chances: Chances, errors: &mut [u64; 256]) -> (u64, Losses, F
                 continue;
             }
             for _ in 0..40 {
-                match queue.wait_newest(PATIENCE) {
+                match queue.wait_newest(TIMEOUT) {
                     Ok(true) => {
-                        // At times the reader itself does not get to it.
+                        // Sometimes the reader itself skips a frame.
                         if model.0.borrow_mut().chance(0.9) {
                             assert!(queue.current().is_some());
                             taken += 1;
@@ -201,7 +201,7 @@ fn fuzz(seed: u64, chances: Chances, errors: &mut [u64; 256]) -> (u64, Losses, F
             }
             queue.stop();
         }
-        add(&mut losses, queue.take_losses());
+        add_losses(&mut losses, queue.take_losses());
         drop(queue);
         assert!(model.is_clean(), "seed {seed}: something is left mapped, queued or streaming");
     }
@@ -223,10 +223,10 @@ fn whatever_fails_no_buffer_is_lost_or_queued_twice_and_each_frame_counts_once()
             gone: 0.0,
         };
         let (taken, losses, facts) = fuzz(seed, chances, &mut errors);
-        assert_eq!(taken + losses.stale + losses.corrupt, facts.handed, "seed {seed}: {losses:?} {facts:?}");
+        assert_eq!(taken + losses.stale + losses.corrupt, facts.delivered, "seed {seed}: {losses:?} {facts:?}");
         assert_eq!(losses.corrupt, facts.damaged, "seed {seed}");
         assert_eq!(losses.missed, facts.missed, "seed {seed}");
-        frames += facts.handed;
+        frames += facts.delivered;
     }
     assert!(frames > 100_000, "{frames}");
     assert!(errors[EBUSY as usize] > 10 && errors[ENOSPC as usize] > 10 && errors[super::EIO as usize] > 1000);
@@ -239,7 +239,7 @@ fn a_device_that_goes_leaves_nothing_mapped() {
     for seed in 1..200 {
         let chances = Chances { interrupted: 0.1, refused: 0.05, gone: 0.02, ..Chances::default() };
         let (taken, losses, facts) = fuzz(seed, chances, &mut errors);
-        assert_eq!(taken + losses.stale + losses.corrupt, facts.handed, "seed {seed}");
+        assert_eq!(taken + losses.stale + losses.corrupt, facts.delivered, "seed {seed}");
         gone += u64::from(errors[ENODEV as usize] > 0);
     }
     assert!(gone > 100);

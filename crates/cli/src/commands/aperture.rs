@@ -1,4 +1,4 @@
-//! `aperture`: what a rank costs in shape, for any aperture (after McGraw's figures 3 to 5).
+//! `aperture`: the approximation error of any aperture by separable rank (after McGraw's figures 3 to 5).
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -70,7 +70,7 @@ struct Row<'a> {
 }
 
 impl<'a> Row<'a> {
-    fn of(analysis: &'a Analysis, picture: &Path) -> Self {
+    fn new(analysis: &'a Analysis, picture: &Path) -> Self {
         Self {
             aperture: &analysis.name,
             picture: picture.file_name().unwrap_or_default().to_string_lossy().into_owned(),
@@ -84,7 +84,7 @@ impl<'a> Row<'a> {
 /// Runs the command.
 ///
 /// # Errors
-/// An output exists and `--force` is not given, or cannot be written; an aperture's picture cannot be read.
+/// Fails if an output exists without `--force` or cannot be written, or an aperture's picture cannot be read.
 pub fn run(command: &ApertureCommand, global: &Global) -> Result<(), CliError> {
     let ranks = sorted_ranks(&command.ranks)?;
     let outputs: Vec<PathBuf> = command.apertures.iter().map(|name| command.out.join(picture_name(name))).collect();
@@ -100,6 +100,7 @@ pub fn run(command: &ApertureCommand, global: &Global) -> Result<(), CliError> {
     }
     refuse_overwrite(all.map(PathBuf::as_path), command.output.force)?;
 
+    // Everything is computed before the first file is written.
     let mut analyses = Vec::new();
     for name in &command.apertures {
         let mask = Aperture { shape: name.load()?, intensity: 0.0 }.mask(usize::from(command.size), command.rim);
@@ -108,7 +109,7 @@ pub fn run(command: &ApertureCommand, global: &Global) -> Result<(), CliError> {
     let table = Table {
         size_px: usize::from(command.size),
         rim: command.rim,
-        apertures: analyses.iter().zip(&outputs).map(|(analysis, path)| Row::of(analysis, path)).collect(),
+        apertures: analyses.iter().zip(&outputs).map(|(analysis, path)| Row::new(analysis, path)).collect(),
     };
     let json = serde_json::to_vec_pretty(&table).map_err(|error| CliError::io(&table_path)(error.into()))?;
     let plot = error_by_rank(&analyses, command.size, command.rim).map_err(CliError::Diagram)?;
@@ -135,7 +136,7 @@ fn sorted_ranks(ranks: &[u16]) -> Result<Vec<usize>, CliError> {
     }
 }
 
-/// A file name that says which aperture it is, whatever characters that has.
+/// Returns a file name for the aperture, safe for any characters in its own name.
 fn picture_name(name: &ApertureName) -> String {
     let text = match name {
         ApertureName::Image(file) => format!("image-{}", file.file_stem().unwrap_or_default().to_string_lossy()),

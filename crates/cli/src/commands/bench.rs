@@ -1,4 +1,4 @@
-//! `bench`: how fast the blur is on this machine, and the whole chain of a stream.
+//! `bench`: measures the blur on this machine, or the whole chain of a stream.
 
 mod chain;
 mod picture;
@@ -27,14 +27,14 @@ use bokehcam::look::{COC_AT_INFINITY_PER_HEIGHT, Look, MOST_RADIUS_PX, Strength}
 use bokehcam::optics::CocField;
 use bokehcam::source::{self, DepthChoice, Size, SourceName};
 
-/// Frames that are measured where nobody says how many: as many as there is time for.
+/// Frames measured by default, if the time limit allows.
 const FRAMES: u32 = 20;
-const LEAST_FRAMES: usize = 5;
-const ENOUGH: Duration = Duration::from_secs(2);
-/// Frames before those that are measured: caches fill, and the processor's clock rises.
+const MIN_FRAMES: usize = 5;
+const TIME_LIMIT: Duration = Duration::from_secs(2);
+/// Unmeasured frames at the start: caches fill, and the processor's clock rises.
 const WARM_UP_FRAMES: usize = 2;
 
-/// Above the rows of the table.
+/// Column titles of the table.
 const HEADING: &str = "size        coc px  quality    p50 ms   p95 ms   max ms     fps  executor\n";
 
 /// Measure the blur on this machine, without reading or writing files
@@ -94,7 +94,7 @@ pub struct BenchCommand {
     blur: options::Blur,
 }
 
-/// One line of the result.
+/// One row of the result.
 #[derive(Serialize)]
 struct Measured {
     size_px: (u32, u32),
@@ -112,7 +112,7 @@ struct Measured {
 /// Runs the command; each line is printed as soon as it is measured.
 ///
 /// # Errors
-/// The options do not fit each other, there is no such executor, or it failed.
+/// Fails if the options conflict, the backend is missing, or the blur fails.
 pub fn run(command: &BenchCommand, global: &options::Global, given: &Given) -> Result<(), CliError> {
     if let Some(source) = &command.chain {
         return chain::run(command, source, given);
@@ -142,13 +142,13 @@ pub fn run(command: &BenchCommand, global: &options::Global, given: &Given) -> R
     let mut done = 0;
     let levels = if command.quality.is_empty() { &[Quality::default()][..] } else { &command.quality };
     for size in &command.sizes {
-        let (color, depth) = picture::of(command.scene, (size.width, size.height))?;
+        let (color, depth) = picture::first_frame(command.scene, (size.width, size.height))?;
         let default_coc_px = [size.height as f32 * COC_AT_INFINITY_PER_HEIGHT];
         let radii_px = if command.coc.is_empty() { &default_coc_px[..] } else { &command.coc };
         for &coc_px in radii_px {
             for &quality in levels {
                 for computing in command.computings() {
-                    // The bar goes before a row is printed where it was.
+                    // Each row erases the bar, so every combination starts a new one.
                     let progress =
                         Progress::new(Some(combinations * u64::from(command.frames.unwrap_or(FRAMES))), global);
                     let before = done * u64::from(command.frames.unwrap_or(FRAMES));
@@ -171,11 +171,11 @@ pub fn run(command: &BenchCommand, global: &options::Global, given: &Given) -> R
     Ok(())
 }
 
-/// The table of one size at the default quality, for what `--backend auto` takes and for the CPU: some seconds of work.
+/// Returns the table of one size at the default quality for `--backend auto` and for the CPU; takes some seconds.
 #[cfg(feature = "camera")]
-pub fn short() -> String {
+pub fn short_table() -> String {
     const SIZE: (u32, u32) = (1280, 720);
-    let frame = match picture::of(picture::Scene::default(), SIZE) {
+    let frame = match picture::first_frame(picture::Scene::default(), SIZE) {
         Ok(frame) => frame,
         Err(error) => return format!("{error}\n"),
     };
@@ -187,7 +187,7 @@ pub fn short() -> String {
         match measure(None, &Look::default(), (&frame.0, &frame.1), blur, &computing, (&progress, 0)) {
             Ok(measured) => {
                 table += &measured.line(false, false);
-                // The second would be the same again.
+                // `auto` chose the CPU: its row is already there.
                 if measured.executor.starts_with(Backend::Cpu.name()) {
                     break;
                 }
@@ -199,18 +199,18 @@ pub fn short() -> String {
 }
 
 impl BenchCommand {
-    /// What runs the blur, for each number of threads that was asked for.
+    /// Returns one configuration per `--threads` value.
     fn computings(&self) -> Vec<Computing> {
-        let of = |threads| Computing { backend: self.backend, adapter: self.adapter.clone(), threads };
+        let with_threads = |threads| Computing { backend: self.backend, adapter: self.adapter.clone(), threads };
         match &self.threads[..] {
-            [] => vec![of(None)],
-            list => list.iter().map(|&threads| of(Some(usize::from(threads)))).collect(),
+            [] => vec![with_threads(None)],
+            list => list.iter().map(|&threads| with_threads(Some(usize::from(threads)))).collect(),
         }
     }
 }
 
-/// Measures one combination of settings: blurs the same picture again and again after a warm-up. `progress` had counted
-/// `before` frames.
+/// Measures one combination of settings: blurs the same picture repeatedly after a warm-up. `before` is the number of
+/// frames that `progress` has already counted.
 fn measure(
     frames: Option<u32>,
     look: &Look,
@@ -228,6 +228,7 @@ fn measure(
     };
     let mut color = color.clone();
     let (coc, depth) = coc_and_depth(&look, &mut color, Some(Depth::Measured(depth.clone())))?;
+    // One frame at a time: the latency is measured, not the throughput.
     let mut bokeh = computing.blur(&settings, size)?;
     let buffers = Buffers {
         colors: Pool::new(bokeh.capacity(), || color.clone()),
@@ -241,8 +242,8 @@ fn measure(
     let mut passes = BTreeMap::<_, Vec<Duration>>::new();
     let began = Instant::now();
     for frame in 1..=frames.unwrap_or(FRAMES) {
-        let is_enough = frames.is_none() && times.len() >= LEAST_FRAMES && began.elapsed() > ENOUGH;
-        if is_enough {
+        let is_over = frames.is_none() && times.len() >= MIN_FRAMES && began.elapsed() > TIME_LIMIT;
+        if is_over {
             break;
         }
         progress.delivered(before + u64::from(frame));
@@ -271,12 +272,12 @@ fn measure(
     })
 }
 
-/// The quantile `share` (0 to 1) of sorted times, in milliseconds.
-fn quantile_ms(sorted: &[Duration], share: f64) -> f64 {
-    sorted[((sorted.len() - 1) as f64 * share).round() as usize].as_secs_f64() * 1e3
+/// Returns the quantile `fraction` (0 to 1) of sorted times, in milliseconds.
+fn quantile_ms(sorted: &[Duration], fraction: f64) -> f64 {
+    sorted[((sorted.len() - 1) as f64 * fraction).round() as usize].as_secs_f64() * 1e3
 }
 
-/// Copies of one frame, as many as the executor holds at a time, so that no copying is measured.
+/// Pools of copies of one frame, as large as the executor's capacity, so that copying is not measured.
 struct Buffers {
     colors: Pool<ColorImage>,
     depths: Option<Pool<DepthMap>>,
@@ -284,7 +285,7 @@ struct Buffers {
 }
 
 impl Buffers {
-    /// Blurs the frame once: the time from handing it over until it is back, and the times of its passes.
+    /// Blurs the frame once; returns the time from submission to completion, and the time of each pass.
     fn time_frame(&self, bokeh: &mut dyn Bokeh, coc: CocField) -> Result<(Duration, PassTimes), CliError> {
         let (color, depth) = (self.colors.take(), self.depths.as_ref().map(Pool::take));
         let job = Job { out: self.results.take(), ..Job::new(color, depth, coc) };
@@ -297,10 +298,10 @@ impl Buffers {
 }
 
 impl Measured {
-    /// The result as one JSON object, or as a row of the table with its passes (if asked for) in a second line.
+    /// Formats the result as one JSON object, or as a table row with an optional second line for the passes.
     fn line(&self, json: bool, passes: bool) -> String {
         if json {
-            // Numbers and texts always have a form in JSON.
+            // Numbers and strings always serialise.
             return serde_json::to_string(self).unwrap_or_default() + "\n";
         }
         let Self { size_px: (width, height), coc_px, quality, executor, p50_ms, p95_ms, max_ms, frames_per_s, .. } =

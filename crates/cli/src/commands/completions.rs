@@ -1,4 +1,4 @@
-//! `completions`: what shells complete, made of the table that the command line is parsed by.
+//! `completions`: shell completions, generated from the clap command.
 
 use std::any::TypeId;
 use std::path::PathBuf;
@@ -11,7 +11,7 @@ use bokehcam::look::presets;
 use bokehcam::sink::Target;
 use bokehcam::source::SourceName;
 
-/// What is completed of options whose values are more than a few names.
+/// Suggestions for options whose values are more than a list of names.
 const VALUES: [(&str, &[&str]); 4] = [
     ("depth", &["auto", "recorded", "stereo", "none", "matte", "mono", "plate", "matte,mono", "defocus"]),
     ("aperture", &["disc", "ring:", "polygon:", "heart", "star:", "image:"]),
@@ -19,14 +19,14 @@ const VALUES: [(&str, &[&str]); 4] = [
     ("focus", &["auto"]),
 ];
 
-/// The command with what is completed of its options: names where there are any, and files where one is wanted alone.
-pub fn completed(command: Command, file: &SettingsFile) -> Command {
+/// Adds suggested values to the command's options; options that take no file get no file completion.
+pub fn add_completions(command: Command, file: &SettingsFile) -> Command {
     let names: Vec<String> =
         presets::built_in().map(|preset| preset.name).chain(file.presets.keys().cloned()).collect();
-    below(command, &names)
+    add_to_tree(command, &names)
 }
 
-fn below(command: Command, presets: &[String]) -> Command {
+fn add_to_tree(command: Command, presets: &[String]) -> Command {
     let command = command.mut_args(|arg| {
         let option = arg.get_long().unwrap_or(arg.get_id().as_str()).to_owned();
         let values = VALUES.iter().find(|(name, _)| *name == option).map(|(_, values)| *values);
@@ -39,10 +39,10 @@ fn below(command: Command, presets: &[String]) -> Command {
             None => arg.value_hint(ValueHint::Other),
         }
     });
-    command.mut_subcommands(|below| self::below(below, presets))
+    command.mut_subcommands(|subcommand| add_to_tree(subcommand, presets))
 }
 
-/// Whether a value may be a file or a folder.
+/// Whether the option takes a file or folder, or already has suggestions.
 fn takes_file(arg: &Arg) -> bool {
     let kind = arg.get_value_parser().type_id();
     let has_names = !arg.get_possible_values().is_empty();

@@ -1,4 +1,4 @@
-//! `ctl`: asks a stream or a preview that runs for something.
+//! `ctl`: sends a command to a running stream or preview.
 
 use std::fmt::Write;
 use std::path::{self, Path, PathBuf};
@@ -8,7 +8,7 @@ use clap::{Args, Subcommand};
 use crate::error::CliError;
 use crate::log;
 use crate::options::Global;
-use crate::settings::paths::counted_from;
+use crate::settings::paths::resolve_paths;
 use crate::terminal::{print, say};
 use bokehcam::control::client::{ask, runs};
 use bokehcam::control::{Answer, ControlError, Name, Request, Status};
@@ -81,19 +81,21 @@ enum Verb {
 /// Runs the command.
 ///
 /// # Errors
-/// There is no such run, or several; or it refuses.
+/// Fails if no run matches, several do, or the run refuses.
 pub fn run(command: CtlCommand, global: &Global) -> Result<(), CliError> {
     let CtlCommand { name, verb } = command;
     let verb = verb.unwrap_or(Verb::List);
     let as_json = matches!(verb, Verb::Status { json: true });
     let is_status = matches!(verb, Verb::Status { .. });
     let request = match verb {
-        Verb::List => return list(name.as_ref()),
+        Verb::List => return list_runs(name.as_ref()),
         Verb::On => Request::On,
         Verb::Off => Request::Off,
         Verb::Toggle => Request::Toggle,
         Verb::Preset { preset } => Request::Preset { name: preset },
-        Verb::Set { settings } => Request::Set { settings: settings.into_iter().map(here).collect::<Result<_, _>>()? },
+        Verb::Set { settings } => {
+            Request::Set { settings: settings.into_iter().map(resolve_setting).collect::<Result<_, _>>()? }
+        }
         Verb::Depth { from } => Request::Depth { from },
         Verb::Status { .. } => Request::Status,
         Verb::Snapshot { to } => Request::Snapshot { to: to.map(|to| absolute(&to)).transpose()? },
@@ -102,12 +104,12 @@ pub fn run(command: CtlCommand, global: &Global) -> Result<(), CliError> {
         Answer::Done { status, note } => {
             note.iter().for_each(|note| log::warn(note));
             match (is_status, as_json) {
-                (_, true) => print(format!("{}\n", json(&status)?).as_bytes()),
-                (true, false) => print(lines(&status).as_bytes()),
-                // A key has no terminal: this is for people.
+                (_, true) => print(format!("{}\n", status_json(&status)?).as_bytes()),
+                (true, false) => print(status_text(&status).as_bytes()),
+                // A key binding has no terminal: only people read this.
                 (false, false) if global.quiet => Ok(()),
                 (false, false) => {
-                    say(&format!("{} is {}", status.name, state(&status)));
+                    say(&format!("{} is {}", status.name, describe_state(&status)));
                     Ok(())
                 }
             }
@@ -127,8 +129,8 @@ impl From<ControlError> for CliError {
     }
 }
 
-/// Says what runs, a line each.
-fn list(name: Option<&Name>) -> Result<(), CliError> {
+/// Prints one line per running instance.
+fn list_runs(name: Option<&Name>) -> Result<(), CliError> {
     let runs: Vec<Name> = runs()?.into_iter().filter(|run| name.is_none_or(|name| run == name)).collect();
     if runs.is_empty() {
         say("nothing runs: begin with `bokehcam stream` or `bokehcam preview`");
@@ -145,11 +147,11 @@ fn list(name: Option<&Name>) -> Result<(), CliError> {
     print(runs.iter().map(line).collect::<String>().as_bytes())
 }
 
-/// A setting as the run understands it, which is in another folder.
-fn here(setting: String) -> Result<String, CliError> {
+/// Makes relative paths in a setting absolute: the run may have another working directory.
+fn resolve_setting(setting: String) -> Result<String, CliError> {
     let Some((name, value)) = setting.split_once('=') else { return Ok(setting) };
     let folder = std::env::current_dir().map_err(CliError::io(".".as_ref()))?;
-    let whole = counted_from(&folder, name, value);
+    let whole = resolve_paths(&folder, name, value);
     if whole == value {
         return Ok(setting);
     }
@@ -165,16 +167,16 @@ fn absolute(path: &Path) -> Result<PathBuf, CliError> {
     }
 }
 
-fn json(status: &Status) -> Result<String, CliError> {
+fn status_json(status: &Status) -> Result<String, CliError> {
     serde_json::to_string(status).map_err(|error| CliError::Control(error.to_string()))
 }
 
-fn state(status: &Status) -> &'static str {
+fn describe_state(status: &Status) -> &'static str {
     if status.on { "on" } else { "off: a still card is shown in place of the picture" }
 }
 
-/// The status for people.
-fn lines(status: &Status) -> String {
+/// Formats the status as text.
+fn status_text(status: &Status) -> String {
     let Status { name, pid, command, source, size, sinks, watched, quality, fps, look, uptime_s, .. } = status;
     let size = size.map_or_else(String::new, |(width, height)| format!(", {width}x{height}"));
     let watched = match watched {
@@ -189,7 +191,7 @@ fn lines(status: &Status) -> String {
     let look: Vec<String> = look.collect();
     let whole_s = *uptime_s as u64;
     let (hours, minutes, seconds) = (whole_s / 3600, whole_s / 60 % 60, whole_s % 60);
-    let mut text = format!("{name} is {}\n", state(status));
+    let mut text = format!("{name} is {}\n", describe_state(status));
     // Writing to a String cannot fail.
     let _ = write!(
         text,

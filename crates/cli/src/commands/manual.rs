@@ -1,4 +1,4 @@
-//! `manual`: the manual pages, made of the table that the command line is parsed by.
+//! `manual`: writes the manual pages, generated from the clap command.
 
 use std::fs;
 use std::io;
@@ -28,13 +28,13 @@ pub struct ManualCommand {
 /// Runs the command for the program that `table` describes.
 ///
 /// # Errors
-/// A page exists and may not be overwritten, or the folder cannot be written.
+/// Fails if a page exists without `--force`, or the folder cannot be written.
 pub fn run(command: &ManualCommand, mut table: Command) -> Result<(), CliError> {
-    // `help` has nothing of its own to say.
+    // `help` needs no page.
     table = table.disable_help_subcommand(true);
     table.build();
     let mut pages = Vec::new();
-    add(&table, table.get_name(), &mut pages).map_err(CliError::io(&command.out))?;
+    add_pages(&table, table.get_name(), &mut pages).map_err(CliError::io(&command.out))?;
     for (name, _) in &mut pages {
         *name = command.out.join(&*name);
     }
@@ -43,14 +43,14 @@ pub fn run(command: &ManualCommand, mut table: Command) -> Result<(), CliError> 
     pages.iter().try_for_each(|(path, page)| write_whole(path, page, command.output.force))
 }
 
-/// Adds the file names and texts of the pages of a command, and of those below it that help lists.
-fn add(command: &Command, program: &str, pages: &mut Vec<(PathBuf, Vec<u8>)>) -> io::Result<()> {
-    let below = || command.get_subcommands().filter(|below| !below.is_hide_set());
-    below().try_for_each(|below| add(below, program, pages))?;
-    // A command with settings has more options than anybody reads in a line.
+/// Adds the pages (file name and text) of a command and its visible subcommands.
+fn add_pages(command: &Command, program: &str, pages: &mut Vec<(PathBuf, Vec<u8>)>) -> io::Result<()> {
+    let visible = || command.get_subcommands().filter(|subcommand| !subcommand.is_hide_set());
+    visible().try_for_each(|subcommand| add_pages(subcommand, program, pages))?;
+    // The full usage line of a command with settings has too many options to read.
     let usage = command.clone().render_usage().to_string();
     let page = Man::new(command.clone().override_usage(usage.trim_start_matches("Usage:").trim().to_owned()))
-        // A build has no date. None at all would be left out, and what follows taken for it.
+        // A build has no date. An empty one would be left out, and the next field would take its place.
         .date(" ")
         .source(format!("{program} {}", env!("CARGO_PKG_VERSION")))
         .manual("User Commands");
@@ -60,7 +60,7 @@ fn add(command: &Command, program: &str, pages: &mut Vec<(PathBuf, Vec<u8>)>) ->
     page.render_synopsis_section(&mut text)?;
     page.render_description_section(&mut text)?;
     page.render_options_section(&mut text)?;
-    if below().next().is_some() {
+    if visible().next().is_some() {
         page.render_subcommands_section(&mut text)?;
     }
     let mut rest = after_help(&command.get_after_help().map(ToString::to_string).unwrap_or_default());
@@ -72,7 +72,7 @@ fn add(command: &Command, program: &str, pages: &mut Vec<(PathBuf, Vec<u8>)>) ->
     Ok(())
 }
 
-/// The examples as they are written, line by line, and what else is said after the options.
+/// Formats the text after the options: examples line by line, the rest as notes.
 fn after_help(text: &str) -> Roff {
     let mut page = Roff::new();
     let mut lines = text.lines().peekable();

@@ -1,4 +1,4 @@
-//! The commands: what each is called and what it does, one function per command.
+//! The commands: their names and help, one `run` function per module.
 
 #[cfg(feature = "lab")]
 mod aperture;
@@ -112,8 +112,8 @@ Examples:
 /// Runs a command.
 ///
 /// # Errors
-/// What the command says.
-pub fn perform(cli: Cli, matches: &ArgMatches, file: &SettingsFile, layers: &Layers) -> Result<(), CliError> {
+/// The error of the command.
+pub fn run(cli: Cli, matches: &ArgMatches, file: &SettingsFile, layers: &Layers) -> Result<(), CliError> {
     match cli.command {
         #[cfg(feature = "window")]
         Command::Preview(command) => preview::run(&command, &cli.global, layers.given(matches)),
@@ -133,11 +133,11 @@ pub fn perform(cli: Cli, matches: &ArgMatches, file: &SettingsFile, layers: &Lay
         Command::Models(command) => models::run(&command),
         Command::Completions { shell } => {
             let mut script = Vec::new();
-            let mut table = completions::completed(help::whole(Cli::command()), file);
+            let mut table = completions::add_completions(help::full_help(Cli::command()), file);
             clap_complete::generate(shell, &mut table, "bokehcam", &mut script);
             print(&script)
         }
-        Command::Manual(command) => manual::run(&command, help::whole(Cli::command())),
+        Command::Manual(command) => manual::run(&command, help::full_help(Cli::command())),
         Command::Config(ConfigCommand::Dump { .. }) => {
             print(dump::as_toml(&layers.resolved(matches), &file.presets).as_bytes())
         }

@@ -1,4 +1,4 @@
-//! `models`: the networks that are known, and those that are installed.
+//! `models`: lists known and installed networks, and installs them.
 
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
@@ -47,16 +47,16 @@ enum What {
 /// Runs the command.
 ///
 /// # Errors
-/// The file is no network that is known, or cannot be copied.
+/// Fails if the file is not a known network, or cannot be copied.
 pub fn run(command: &ModelsCommand) -> Result<(), CliError> {
     match &command.what {
-        None | Some(What::List) => print(listed().as_bytes()),
-        Some(What::Add { files }) => files.iter().try_for_each(|file| add(file)),
-        Some(What::Get { name }) => get(name.as_deref()),
+        None | Some(What::List) => print(format_list().as_bytes()),
+        Some(What::Add { files }) => files.iter().try_for_each(|file| add_file(file)),
+        Some(What::Get { name }) => fetch(name.as_deref()),
     }
 }
 
-fn listed() -> String {
+fn format_list() -> String {
     let installed = network::installed();
     let mut text = String::from("known networks, the best of each task first:\n");
     for known in &KNOWN {
@@ -82,74 +82,74 @@ fn listed() -> String {
     text
 }
 
-fn add(file: &Path) -> Result<(), CliError> {
+fn add_file(file: &Path) -> Result<(), CliError> {
     if file.to_str().is_some_and(|name| name.contains("://")) {
         let what = "this is no file that is here: `bokehcam models get NAME` fetches a known network";
         return Err(CliError::Usage(format!("{}: {what}", file.display())));
     }
-    let bytes = input::read(file, network::MOST_BYTES).map_err(failed(file))?;
+    let bytes = input::read(file, network::MOST_BYTES).map_err(io_error(file))?;
     let known = Known::of(&bytes).ok_or_else(|| {
         let what = "it is none of the networks that are known (`bokehcam models` lists them), or not whole: one of your own is \
                     used from where it is, by --depth matte:FILE or mono:FILE";
-        failed(file)(io::Error::new(io::ErrorKind::InvalidData, what))
+        io_error(file)(io::Error::new(io::ErrorKind::InvalidData, what))
     })?;
     install(known, &bytes)
 }
 
-fn failed(path: &Path) -> impl FnOnce(io::Error) -> CliError {
+fn io_error(path: &Path) -> impl FnOnce(io::Error) -> CliError {
     let path = path.to_owned();
     move |source| CliError::Io { path, source }
 }
 
-/// Writes a network to where those of this user are; what is there already stays.
+/// Writes a network into this user's folder; an existing file is kept.
 fn install(known: &Known, bytes: &[u8]) -> Result<(), CliError> {
     let no_home = || CliError::Usage("there is no home folder to install it in: set HOME or XDG_DATA_HOME".to_owned());
     let folder = network::folders().into_iter().next().ok_or_else(no_home)?;
     let target = folder.join(known.file);
-    std::fs::create_dir_all(&folder).map_err(failed(&folder))?;
+    std::fs::create_dir_all(&folder).map_err(io_error(&folder))?;
     match input::read(&target, network::MOST_BYTES) {
         Ok(there) if there == bytes => {}
         Ok(_) => {
             let what = "another file is there under this name: move it away";
-            return Err(failed(&target)(io::Error::new(io::ErrorKind::AlreadyExists, what)));
+            return Err(io_error(&target)(io::Error::new(io::ErrorKind::AlreadyExists, what)));
         }
         Err(error) if error.kind() == io::ErrorKind::NotFound => {
-            whole::write(&target, bytes, false).map_err(failed(&target))?;
+            whole::write(&target, bytes, false).map_err(io_error(&target))?;
         }
-        Err(error) => return Err(failed(&target)(error)),
+        Err(error) => return Err(io_error(&target)(error)),
     }
     say(&format!("{}: installed as {}, for --depth {}", known.file, target.display(), known.task.name()));
     Ok(())
 }
 
-/// Fetches a known network and installs it.
-fn get(name: Option<&str>) -> Result<(), CliError> {
-    let none = |name: &str| {
+/// Downloads a known network and installs it.
+fn fetch(name: Option<&str>) -> Result<(), CliError> {
+    let unknown = |name: &str| {
         let names: Vec<&str> = KNOWN.iter().map(|known| known.file).collect();
         CliError::Usage(format!("there is no network {name:?}: use one of {}", names.join(", ")))
     };
-    let known = name.map_or(Ok(&KNOWN[0]), |name| Known::named(name).ok_or_else(|| none(name)))?;
+    let known = name.map_or(Ok(&KNOWN[0]), |name| Known::named(name).ok_or_else(|| unknown(name)))?;
     if let Some((_, file)) = network::installed().iter().find(|(other, _)| std::ptr::eq(*other, known)) {
         say(&format!("{}: installed already, as {}", known.file, file.display()));
         return Ok(());
     }
-    let bytes = fetched(known)?;
-    let is_whole = Known::of(&bytes).is_some_and(|came| std::ptr::eq(came, known));
+    let bytes = download(known)?;
+    let is_whole = Known::of(&bytes).is_some_and(|found| std::ptr::eq(found, known));
     if !is_whole {
         let what =
             format!("what came is not {}, and is not kept: {} bytes of {}", known.file, bytes.len(), known.bytes);
-        return Err(failed(Path::new(known.address))(io::Error::new(io::ErrorKind::InvalidData, what)));
+        return Err(io_error(Path::new(known.address))(io::Error::new(io::ErrorKind::InvalidData, what)));
     }
     install(known, &bytes)
 }
 
-/// What is at a network's address, and one byte more than it should be at most.
-fn fetched(known: &Known) -> Result<Vec<u8>, CliError> {
+/// Downloads a network from its address; at most one byte more than its known size, to detect a longer file.
+fn download(known: &Known) -> Result<Vec<u8>, CliError> {
     const CLIENTS: [(&str, &[&str]); 2] = [
         ("curl", &["--fail", "--location", "--silent", "--show-error", "--proto", "=https", "--max-time", "300"]),
         ("wget", &["--https-only", "--no-verbose", "--timeout=60", "--output-document=-"]),
     ];
-    let address = || failed(Path::new(known.address));
+    let address = || io_error(Path::new(known.address));
     for (client, options) in CLIENTS {
         say(&format!("{client} {} {}", options.join(" "), known.address));
         let mut command = Command::new(client);
@@ -165,7 +165,7 @@ fn fetched(known: &Known) -> Result<Vec<u8>, CliError> {
         let read = child.stdout.take().map_or(Ok(0), |out| out.take(known.bytes + 1).read_to_end(&mut bytes));
         let status = child.wait().map_err(address())?;
         read.map_err(address())?;
-        // One that is stopped in the middle of too much has failed, too: what came tells more.
+        // A client that is cut off at the limit fails, too; the caller then reports the wrong content instead.
         return match bytes.len() as u64 <= known.bytes && !status.success() {
             true => Err(address()(io::Error::other(format!(
                 "{client} failed ({status}): `bokehcam models add FILE` takes what a browser fetched"

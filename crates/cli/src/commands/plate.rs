@@ -1,4 +1,4 @@
-//! `plate`: a picture of what is behind you.
+//! `plate`: takes a picture of the background (the plate) for `--depth plate:FILE`.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use clap::Args;
 
 use crate::error::CliError;
-use crate::files::{make_folder_of, refuse_overwrite, refuse_source, tell_of_leftovers};
+use crate::files::{make_folder_of, refuse_overwrite, refuse_source, report_leftovers};
 use crate::log;
 use crate::options;
 use crate::settings::layers::Given;
@@ -47,8 +47,8 @@ pub struct PlateCommand {
 /// Runs the command.
 ///
 /// # Errors
-/// The source cannot be read, the picture never comes to rest, or the plate exists (without `--force`) or cannot be
-/// written.
+/// Fails if the source is unreadable, the picture never stands still, or the plate exists (without `--force`) or cannot
+/// be written.
 pub fn run(command: &PlateCommand, global: &options::Global, given: &Given) -> Result<(), CliError> {
     let PlateCommand { source: name, to, frames, output } = command;
     refuse_overwrite([to.as_path()], output.force)?;
@@ -67,17 +67,18 @@ pub fn run(command: &PlateCommand, global: &options::Global, given: &Given) -> R
             ..unused::Run::default()
         },
     );
+    // Ctrl-C ends the reading, not the program: a recording's plate so far is still written.
     let stop = terminal::stop_flag()?;
     let mut frames = Frames { camera, stop, color: ColorImage::default() };
     let plate = match frames.camera.info().live {
-        true => taken(&mut frames, name, global)?,
-        false => usual(&mut frames)?,
+        true => plate_from_camera(&mut frames, name, global)?,
+        false => plate_from_recording(&mut frames)?,
     };
     if name.kind() == Kind::Photo {
         log::warn("a photo stands still: whoever is in it is in the plate, and is not found before it");
     }
     make_folder_of(to)?;
-    tell_of_leftovers([to.as_path()]);
+    report_leftovers([to.as_path()]);
     still::write_color(to, &plate, output.force)?;
     if !global.quiet {
         terminal::say(&format!("{}: written, for --depth plate:{0}", to.display()));
@@ -85,7 +86,7 @@ pub fn run(command: &PlateCommand, global: &options::Global, given: &Given) -> R
     Ok(())
 }
 
-/// The frames of a source, one after the other.
+/// Reads the colour frames of a source in order.
 struct Frames {
     camera: Box<dyn Camera>,
     stop: Arc<AtomicBool>,
@@ -93,7 +94,7 @@ struct Frames {
 }
 
 impl Frames {
-    /// Reads the next frame; `None` at the end, or once the user ends it.
+    /// Reads the next frame; returns `None` at the end, or when the user stops.
     fn next(&mut self) -> Result<Option<Stamp>, CliError> {
         let (mut depth, mut right) = (DepthMap::default(), GrayImage::default());
         while !self.stop.load(Ordering::Relaxed) {
@@ -108,14 +109,14 @@ impl Frames {
     }
 }
 
-/// The plate of a camera, with a countdown for the person before it.
-fn taken(frames: &mut Frames, name: &SourceName, global: &options::Global) -> Result<ColorImage, CliError> {
+/// Takes the plate from a camera, with a countdown for the user.
+fn plate_from_camera(frames: &mut Frames, name: &SourceName, global: &options::Global) -> Result<ColorImage, CliError> {
     let (mut source, guide) = one_camera::taking(name);
     let guidance = Guidance::new(Some(guide), global);
     let mut map = DepthMap::default();
     while let Some(stamp) = frames.next()? {
         source.read(Seen { stamp, color: &frames.color, right: None }, &mut map)?;
-        guidance.tell();
+        guidance.print_step();
         match (source.plate(), guidance.step()) {
             (Some(plate), _) => return Ok(plate.clone()),
             (None, Some(step @ Step::Restless)) => return Err(CliError::NoPlate(step.to_string())),
@@ -125,8 +126,8 @@ fn taken(frames: &mut Frames, name: &SourceName, global: &options::Global) -> Re
     Err(CliError::NoPlate("it ended before the plate was taken".to_owned()))
 }
 
-/// The plate of a recording: of some frames all over it, what each pixel mostly is.
-fn usual(frames: &mut Frames) -> Result<ColorImage, CliError> {
+/// Returns the plate of a recording: the per-pixel median of frames spread evenly over it.
+fn plate_from_recording(frames: &mut Frames) -> Result<ColorImage, CliError> {
     let count = frames.camera.info().frames.unwrap_or(1);
     let every = (count / Capture::PICTURES as u64).max(1);
     let (mut capture, mut index) = (Capture::default(), 0);

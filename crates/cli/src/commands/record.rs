@@ -1,4 +1,4 @@
-//! `record`: a source as a recording.
+//! `record`: writes a source as a recording.
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
@@ -49,7 +49,7 @@ pub struct RecordCommand {
 /// Runs the command.
 ///
 /// # Errors
-/// The source cannot be read, or the recording exists (without `--force`) or cannot be written.
+/// Fails if the source is unreadable, or the recording exists (without `--force`) or cannot be written.
 pub fn run(command: &RecordCommand, global: &options::Global, given: &Given) -> Result<(), CliError> {
     let options = Options {
         frames: command.frames.clone(),
@@ -88,8 +88,9 @@ pub fn run(command: &RecordCommand, global: &options::Global, given: &Given) -> 
     let stop = terminal::stop_flag()?;
     let progress = terminal::Progress::new(info.frames, global);
     let (mut color, mut depth, mut right) = (ColorImage::default(), DepthMap::default(), GrayImage::default());
-    let (mut lost, mut is_doubted) = (0, rig.is_some());
-    let mut take = || -> Result<bool, CliError> {
+    // Matched depth does not depend on --depth-scale; other depth is doubted once.
+    let (mut lost, mut skip_check) = (0, rig.is_some());
+    let mut record_frames = || -> Result<bool, CliError> {
         while !stop.load(Ordering::Relaxed) {
             let stamp = match camera.next(Shot { color: &mut color, depth: &mut depth, right: &mut right })? {
                 Captured::Frame(stamp) => stamp,
@@ -107,8 +108,9 @@ pub fn run(command: &RecordCommand, global: &options::Global, given: &Given) -> 
                 source.read(Seen { stamp, color: &color, right }, &mut depth)?;
             }
             let has_depth = source.is_some() || info.brings == Brings::Depth;
-            if let Some(doubt) = doubt(&depth, writer.max_depth_m()).filter(|_| has_depth && !is_doubted) {
-                is_doubted = true;
+            let doubt = describe_implausible(&depth, writer.max_depth_m());
+            if let Some(doubt) = doubt.filter(|_| has_depth && !skip_check) {
+                skip_check = true;
                 tracing::warn!(
                     "frame {}: {doubt}; is --depth-scale, the units of a metre, that of the source?",
                     stamp.index
@@ -117,19 +119,20 @@ pub fn run(command: &RecordCommand, global: &options::Global, given: &Given) -> 
             writer.add(stamp.time_ns, &color, has_depth.then_some(&depth))?;
             progress.delivered(writer.frames() as u64);
         }
-        // A camera has no end of its own.
+        // A camera is endless: stopping it is its regular end.
         Ok(info.live || info.frames.is_none())
     };
-    let taken = take();
+    // On errors, the frames recorded so far are kept below.
+    let outcome = record_frames();
     drop(progress);
     if lost > 0 {
         tracing::warn!("{lost} frames came and went before they could be written");
     }
-    match taken {
+    match outcome {
         Ok(true) => {
             let max_depth_m = writer.max_depth_m();
             let written = writer.finish()?;
-            say_what_is_too_far(&written, max_depth_m);
+            warn_out_of_range_depth(&written, max_depth_m);
             if !global.quiet {
                 let gone = match written.replaced {
                     0 => String::new(),
@@ -140,10 +143,10 @@ pub fn run(command: &RecordCommand, global: &options::Global, given: &Given) -> 
             }
             Ok(())
         }
-        Ok(false) => keep(writer, &command.to),
+        Ok(false) => keep_partial(writer, &command.to),
         Err(fault) => {
             if writer.frames() > 0
-                && let Err(error) = keep(writer, &command.to)
+                && let Err(error) = keep_partial(writer, &command.to)
             {
                 tracing::warn!("{error}");
             }
@@ -152,8 +155,8 @@ pub fn run(command: &RecordCommand, global: &options::Global, given: &Given) -> 
     }
 }
 
-/// Keeps what there is of a recording that did not come to its end, and says where.
-fn keep(writer: Writer, to: &Path) -> Result<(), CliError> {
+/// Keeps the frames of an interrupted recording, and reports where.
+fn keep_partial(writer: Writer, to: &Path) -> Result<(), CliError> {
     let written = writer.cut()?;
     let frames = written.frames;
     if written.dir == to {
@@ -165,26 +168,26 @@ fn keep(writer: Writer, to: &Path) -> Result<(), CliError> {
     Ok(())
 }
 
-/// Nearer than this is no scene that depth cameras see.
-const NEAR_M: f32 = 0.05;
+/// Minimum distance, in metres, that a depth camera can measure.
+const MIN_SCENE_M: f32 = 0.05;
 
-/// What makes all the depth of a frame unlikely, where a recording holds at most `max_depth_m`.
-fn doubt(depth: &DepthMap, max_depth_m: f32) -> Option<String> {
+/// Describes why all the depth of a frame is implausible, if it is; a recording holds at most `max_depth_m`.
+fn describe_implausible(depth: &DepthMap, max_depth_m: f32) -> Option<String> {
     let known = depth.metres.iter().copied().filter(|&metres| DepthMap::is_known(metres));
     let (least_m, largest_m) = known.fold((f32::INFINITY, 0.0_f32), |(a, b), metres| (a.min(metres), b.max(metres)));
     if largest_m == 0.0 {
         None
     } else if least_m > max_depth_m {
         Some(format!("all depth is {least_m:.1} m away or more, and a recording holds up to {max_depth_m:.1} m"))
-    } else if largest_m < NEAR_M {
+    } else if largest_m < MIN_SCENE_M {
         Some(format!("all depth is nearer than {:.1} mm", largest_m * 1e3))
     } else {
         None
     }
 }
 
-/// Says how much of the depth was lost.
-fn say_what_is_too_far(written: &Written, max_depth_m: f32) {
+/// Warns about depth beyond the recording's range.
+fn warn_out_of_range_depth(written: &Written, max_depth_m: f32) {
     if written.too_far > 0 {
         let percent = 100.0 * written.too_far as f64 / written.depths as f64;
         tracing::warn!(
@@ -200,7 +203,7 @@ mod tests {
     #[test]
     fn depth_that_no_camera_sees_is_doubted() {
         let said = |metres: &[f32]| {
-            doubt(
+            describe_implausible(
                 &DepthMap { width: metres.len() as u32, height: 1, metres: metres.into(), ..DepthMap::default() },
                 13.1,
             )

@@ -1,4 +1,4 @@
-//! `service`: the camera for calls with every session, by one switch.
+//! `service`: starts the virtual camera with every session, by a systemd user unit.
 
 mod manager;
 
@@ -44,39 +44,39 @@ enum What {
     Status,
 }
 
-/// The unit as packages bring it, and the program in it.
+/// The unit file of the packages, and the program in it.
 const UNIT: &str = include_str!("../../../../packaging/bokehcam.service");
 const PROGRAM: &str = "/usr/bin/bokehcam";
-/// The longest file of settings that is read.
-const MOST_BYTES: u64 = 64 * 1024;
-/// A stream that cannot start has said so after that.
-const SETTLING: Duration = Duration::from_secs(1);
+/// Maximum size of stream.conf, in bytes.
+const MAX_BYTES: u64 = 64 * 1024;
+/// A stream that cannot start fails within this time.
+const STARTUP_TIME: Duration = Duration::from_secs(1);
 
 /// Runs the command.
 ///
 /// # Errors
-/// There is no user session of systemd's, the unit cannot be written, or systemd refuses.
+/// Fails if there is no systemd user session, the unit cannot be written, or systemd refuses.
 pub fn run(command: &ServiceCommand) -> Result<(), CliError> {
     match command.what.unwrap_or(What::Status) {
         What::On => {
-            on(Unit::ask()?)?;
-            thread::sleep(SETTLING);
-            say_how(&Unit::ask()?)
+            enable(Unit::query()?)?;
+            thread::sleep(STARTUP_TIME);
+            print_status(&Unit::query()?)
         }
-        What::Off => off(&Unit::ask()?),
-        What::Status => say_how(&Unit::ask()?),
+        What::Off => disable(&Unit::query()?),
+        What::Status => print_status(&Unit::query()?),
     }
 }
 
-fn on(mut unit: Unit) -> Result<(), CliError> {
+fn enable(mut unit: Unit) -> Result<(), CliError> {
     if unit.state == State::Missing {
-        let path = own_unit()?;
+        let path = unit_path()?;
         if path.symlink_metadata().is_err() {
             write_unit(&path)?;
             say(&format!("wrote {}, as no package has brought the unit", path.display()));
         }
-        systemd::tell(&["daemon-reload"])?;
-        unit = Unit::ask()?;
+        systemd::run(&["daemon-reload"])?;
+        unit = Unit::query()?;
         if unit.state == State::Missing {
             let what = "systemd does not take it as a unit: remove it, and `bokehcam service on` writes another";
             return Err(CliError::Service(format!("{}: {what}", path.display())));
@@ -89,33 +89,33 @@ fn on(mut unit: Unit) -> Result<(), CliError> {
             program.display()
         )));
     }
-    systemd::tell(&["enable", "--now", systemd::NAME])
+    systemd::run(&["enable", "--now", systemd::NAME])
 }
 
-fn off(unit: &Unit) -> Result<(), CliError> {
+fn disable(unit: &Unit) -> Result<(), CliError> {
     if unit.state == State::Missing {
         say("it is off: there is no unit bokehcam.service");
         return Ok(());
     }
-    systemd::tell(&["disable", "--now", systemd::NAME])?;
+    systemd::run(&["disable", "--now", systemd::NAME])?;
     say("it is off, and stays off");
     Ok(())
 }
 
-/// Says how the service is, and where its settings are.
-fn say_how(unit: &Unit) -> Result<(), CliError> {
+/// Prints the state of the service, and the location of its settings.
+fn print_status(unit: &Unit) -> Result<(), CliError> {
     if unit.state == State::Missing {
         return print(b"off: there is no unit bokehcam.service yet; `bokehcam service on` writes and starts one\n");
     }
-    let last = || systemd::last_line().map_or_else(String::new, |line| format!("\n  says      {line}"));
+    let last_line = || systemd::last_line().map_or_else(String::new, |line| format!("\n  says      {line}"));
     let is = match unit.state {
         State::Missing | State::Stopped => "does not run".to_owned(),
-        State::Runs => "runs".to_owned(),
-        State::Waits => format!("tries again every five seconds{}", last()),
-        State::Failed => format!("gave up{}", last()),
+        State::Running => "runs".to_owned(),
+        State::Restarting => format!("tries again every five seconds{}", last_line()),
+        State::Failed => format!("gave up{}", last_line()),
     };
     let is_on = if unit.is_enabled { "on" } else { "off" };
-    let (streams, from) = streams(&unit.streams)?;
+    let (streams, from) = stream_arguments(&unit.arguments)?;
     print(
         format!("{is_on}: it {is}\n  streams   {streams}\n  settings  {from}\n  unit      {}\n", unit.file.display())
             .as_bytes(),
@@ -128,33 +128,33 @@ fn say_how(unit: &Unit) -> Result<(), CliError> {
     Ok(())
 }
 
-/// What is streamed, and where that is said: in the user's file, or by the unit's own `usual`.
-fn streams(usual: &str) -> Result<(String, String), CliError> {
+/// Returns the arguments of `bokehcam stream`, and their origin: the user's file, or `default` of the unit.
+fn stream_arguments(default: &str) -> Result<(String, String), CliError> {
     let no_home =
         || CliError::Service("there is no folder of settings: neither XDG_CONFIG_HOME nor HOME is a whole path".into());
     let path = file::user_file().ok_or_else(no_home)?.with_file_name("stream.conf");
-    let text = match input::read_text(&path, MOST_BYTES) {
+    let text = match input::read_text(&path, MAX_BYTES) {
         Ok(text) => text,
         Err(_) if path.symlink_metadata().is_err() => String::new(),
         Err(error) => return Err(CliError::io(&path)(error)),
     };
-    // The last one holds, as systemd reads it.
-    let stated = text.lines().filter_map(|line| line.trim().strip_prefix("STREAM=")).next_back();
-    Ok(match stated {
-        Some(stated) => (stated.trim_matches(['"', '\'']).to_owned(), path.display().to_string()),
-        None => (usual.to_owned(), format!("{} would have others: STREAM=\"...\"", path.display())),
+    // The last assignment wins, as in systemd.
+    let configured = text.lines().filter_map(|line| line.trim().strip_prefix("STREAM=")).next_back();
+    Ok(match configured {
+        Some(configured) => (configured.trim_matches(['"', '\'']).to_owned(), path.display().to_string()),
+        None => (default.to_owned(), format!("{} would have others: STREAM=\"...\"", path.display())),
     })
 }
 
-/// Where the user's own unit is.
-fn own_unit() -> Result<PathBuf, CliError> {
+/// Returns the path of the user's own unit.
+fn unit_path() -> Result<PathBuf, CliError> {
     let config = absolute("XDG_CONFIG_HOME").or_else(|| Some(absolute("HOME")?.join(".config")));
     let no_folder =
         || CliError::Service("there is no folder for units: neither XDG_CONFIG_HOME nor HOME is a whole path".into());
     Ok(config.ok_or_else(no_folder)?.join("systemd/user").join(systemd::NAME))
 }
 
-/// Writes the unit with this very program in it.
+/// Writes the unit with the path of this program.
 fn write_unit(path: &Path) -> Result<(), CliError> {
     let program = std::env::current_exe().map_err(CliError::io("this program".as_ref()))?;
     let name = program

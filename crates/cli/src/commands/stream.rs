@@ -1,4 +1,4 @@
-//! `stream`: a source, blurred, into a sink.
+//! `stream`: blurs a source into one or more sinks.
 
 mod control;
 
@@ -9,13 +9,13 @@ use std::time::Duration;
 
 use clap::Args;
 
-use control::{Beat, Looks, Running, Served};
+use control::{ControlServer, LookChanger, RunInfo, RunStats};
 
 #[cfg(feature = "window")]
 use crate::commands::preview;
-use crate::controlled::{self, AsCommandLine};
+use crate::controlled::{self, CommandLineRules};
 use crate::error::CliError;
-use crate::files::tell_of_leftovers;
+use crate::files::report_leftovers;
 use crate::focus;
 use crate::options;
 use crate::plausible;
@@ -86,11 +86,11 @@ const TO: &str = "pipewire, pipewire:NAME or /dev/videoN (virtual camera), filte
                   DIR/ (numbered PNG), FILE.y4m, - (y4m on standard output), FILE.mp4, .mkv or .webm (ffmpeg), or null; may \
                   be given more than once";
 
-/// Runs the command; `given` is for warnings and for the window. The report is written whenever the pipeline ran,
-/// however it ended.
+/// Runs the command; `given` serves warnings and the window. The report is written whenever the pipeline ran, even if
+/// it failed.
 ///
 /// # Errors
-/// The options do not fit the source, something would be overwritten, or a stage of the pipeline failed.
+/// Fails if the options do not fit the source, an output exists, or a stage of the pipeline fails.
 pub fn run(command: &StreamCommand, global: &options::Global, given: Given) -> Result<(), CliError> {
     let StreamCommand { parts, .. } = command;
     sinks::check(&command.to, parts, &command.source)?;
@@ -117,24 +117,24 @@ pub fn run(command: &StreamCommand, global: &options::Global, given: Given) -> R
     stream_opened(command, global, opened, claim)
 }
 
-/// A source that was opened, and what it decides.
+/// An opened source, and settings derived from it.
 struct Opened {
     source: Source,
     options: source::Options,
     info: SourceInfo,
-    /// The look, as the source allows it.
+    /// The look, limited to the source's abilities.
     look: Look,
     pace: Pace,
-    /// What the warnings about settings to no effect go by.
+    /// Facts for warnings about settings without effect.
     unused: unused::Run,
 }
 
 impl Opened {
-    /// Opens the source, and warns of settings that have no effect on it.
+    /// Opens the source, and warns of settings without effect on it.
     fn open(command: &StreamCommand, given: &Given) -> Result<Self, CliError> {
         let StreamCommand { parts, to, .. } = command;
         let look = look::look(&parts.blur, &parts.computing.quality)?;
-        let options = source::Options { filters: command.filters(), ..parts.source_options() };
+        let options = source::Options { filters: command.is_filter(), ..parts.source_options() };
         let source = Source::open(&command.source, &options, Some(&look))?;
         let info = source.camera.info();
         let is_live = info.live || to.iter().any(Target::is_live);
@@ -160,23 +160,23 @@ impl Opened {
         Ok(Self { source, options, info, look, pace, unused })
     }
 
-    /// Whether the quality may follow the time there is.
+    /// Whether the quality adapts to the available time.
     fn is_adaptive(&self) -> bool {
         self.pace == Pace::Realtime
     }
 }
 
 impl StreamCommand {
-    /// Whether others have the camera while it is open, so that it opens with them alone.
-    fn filters(&self) -> bool {
+    /// Whether the stream filters a shared camera: then the camera is open only while others read it.
+    fn is_filter(&self) -> bool {
         self.to.contains(&Target::Filter)
     }
 
-    /// Opens the outputs. `noticed` notices who watches, and they end once `stop` is set; `closed` keeps pictures from them.
+    /// Opens the outputs. `demand` counts their watchers, `stop` ends them, and `closed` keeps pictures from them.
     fn outputs(
         &self,
         opened: &Opened,
-        noticed: Option<&Demand>,
+        demand: Option<&Demand>,
         stop: &Arc<AtomicBool>,
         closed: &Arc<AtomicBool>,
     ) -> Result<Box<dyn Sink>, CliError> {
@@ -187,19 +187,19 @@ impl StreamCommand {
             force: output.force,
             out_size: stream.out_size.map(|size| (size.width, size.height)),
             threads: options.computing.threads,
-            demand: noticed.cloned(),
+            demand: demand.cloned(),
             stands_for: self.source.shared().map(str::to_owned),
             stop: Arc::clone(stop),
             ..sink::Options::new(info.size, info.period_ns)
         };
         let backpressure = if *pace == Pace::Realtime { Backpressure::DropOldest } else { Backpressure::Block };
         let sink = sinks::open(&self.to, &sink_options, backpressure, closed)?;
-        // By now the outputs have what was left of them.
-        tell_of_leftovers(self.to.iter().filter(|target| !target.is_camera()).filter_map(Target::path));
+        // The outputs have cleaned up their own leftovers by now.
+        report_leftovers(self.to.iter().filter(|target| !target.is_camera()).filter_map(Target::path));
         Ok(sink)
     }
 
-    /// Says where the frames come from, with which depth, and where they go.
+    /// Prints the source, the origin of its depth, and the outputs.
     fn announce(&self, Opened { source, info, look, .. }: &Opened, to: &str, quiet: bool) {
         let say = |line: &str| (!quiet).then(|| terminal::say(line));
         if let Some(networks) = &source.networks {
@@ -209,26 +209,27 @@ impl StreamCommand {
         if let Some(persons) = source.persons.as_ref().filter(|_| is_found) {
             say(&format!("focus on persons by {persons}"));
         }
-        let takes_whatever = self.parts.blur.takes_whatever_depth();
-        // That a map would be taken is no news to who wants none.
-        if let Some(note) = self.source.note(source).filter(|_| source.has_depth() || takes_whatever) {
+        let takes_any_depth = self.parts.blur.accepts_any_depth();
+        // The source's note on its depth map is irrelevant if no depth is wanted.
+        if let Some(note) = self.source.note(source).filter(|_| source.has_depth() || takes_any_depth) {
             say(&note);
         }
         say(&format!("{}, to {to}{}", info.name, if info.live { "; Ctrl-C ends" } else { "" }));
-        if takes_whatever && !source.has_depth() {
+        if takes_any_depth && !source.has_depth() {
             unused::warn_of_no_depth(unused::From::Source(self.source.kind()));
         }
     }
 
-    /// Answers those who control the run, if it could be claimed; says why not, where somebody may want to.
+    /// Starts the control server, if the run could claim its name; otherwise logs the reason where control is likely
+    /// wanted.
     fn serve(
         &self,
         claim: Result<Claim, String>,
         opened: &Opened,
-        (demand, release, beat): (Option<Demand>, Release, Arc<Beat>),
-        looks: Looks,
+        (demand, release, stats): (Option<Demand>, Release, Arc<RunStats>),
+        looks: LookChanger,
         config: Option<&Path>,
-    ) -> Result<Option<Served>, CliError> {
+    ) -> Result<Option<ControlServer>, CliError> {
         let Opened { source, options, info, unused, .. } = opened;
         let claim = match claim {
             Ok(claim) => claim,
@@ -240,7 +241,7 @@ impl StreamCommand {
                 return Ok(None);
             }
         };
-        let run = Running {
+        let run = RunInfo {
             status: Status {
                 source: self.source.to_string(),
                 size: Some(info.size),
@@ -256,15 +257,15 @@ impl StreamCommand {
             },
             demand,
             release,
-            beat,
+            stats,
         };
-        let rules = AsCommandLine { config: config.map(Path::to_owned), unused: *unused };
+        let rules = CommandLineRules { config: config.map(Path::to_owned), unused: *unused };
         let tray = self.tray.then(|| SettingsFile::load(config)).transpose()?;
         control::serve(claim, run, looks, rules, tray.map(|file| file.preset_names())).map(Some)
     }
 }
 
-/// Runs the opened source into the outputs, while those who know its name control it.
+/// Runs the opened source into the outputs, with the control server.
 fn stream_opened(
     command: &StreamCommand,
     global: &options::Global,
@@ -275,29 +276,29 @@ fn stream_opened(
     let (info, computing) = (opened.info.clone(), opened.options.computing.clone());
     pipeline::check_room(info.size, info.frames)?;
     let adaptive = opened.is_adaptive();
-    // What a change of the look needs runs on the same device.
+    // Executors for later looks run on the same device.
     let mut executors = Executors::new(computing.clone());
-    let make = |settings: &_| executors.blur(settings, info.size);
-    let (blurring, changes) = Blurring::begin(opened.look.clone(), (info.size, adaptive), make)?;
-    // Outputs are opened last, so that none is begun where the run cannot start.
+    let create_blur = |settings: &_| executors.blur(settings, info.size);
+    let (blurring, changes) = Blurring::begin(opened.look.clone(), (info.size, adaptive), create_blur)?;
+    // Outputs are opened last: none is begun if the run cannot start.
     let demand = Demand::new();
-    let on_demand = stream.on_demand || command.filters();
-    // Where nobody notices who watches, somebody may at any time.
+    let on_demand = stream.on_demand || command.is_filter();
+    // Without `--on-demand`, the run counts as watched all the time.
     let _watch = (!on_demand).then(|| demand.watch());
-    let noticed = on_demand.then(|| demand.clone());
+    let watchers = on_demand.then(|| demand.clone());
     let stop = terminal::stop_flag()?;
-    report::try_out(stream.report.as_deref())?;
+    report::check_writable(stream.report.as_deref())?;
     let closed = Arc::default();
-    let sink = command.outputs(&opened, noticed.as_ref(), &stop, &closed)?;
+    let sink = command.outputs(&opened, watchers.as_ref(), &stop, &closed)?;
     command.announce(&opened, &sink.describe(), global.quiet);
     let guidance = terminal::Guidance::new(opened.source.guide.clone(), global);
     let bar = terminal::Progress::new(info.frames, global);
     let period = Duration::from_nanos(info.period_ns);
     let (sink, release) = Shutter::new(sink, info.size, period, demand.clone(), Clock::system(), closed);
-    let beat = Arc::new(Beat::default());
-    let looks = Looks { look: opened.look.clone(), changes, executors };
-    let for_others = (noticed, release, Arc::clone(&beat));
-    let server = command.serve(claim, &opened, for_others, looks, global.config.as_deref())?;
+    let stats = Arc::new(RunStats::default());
+    let looks = LookChanger { look: opened.look.clone(), changes, executors };
+    let shared_state = (watchers, release, Arc::clone(&stats));
+    let server = command.serve(claim, &opened, shared_state, looks, global.config.as_deref())?;
     let pace = opened.pace;
     let run = opened.source.into_run(blurring, Box::new(sink), &stop);
     let ended = pipeline::run(Run {
@@ -310,20 +311,20 @@ fn stream_opened(
         mirror: stream.mirror,
         progress: &|progress| {
             bar.delivered(progress.delivered);
-            beat.note(&progress);
-            guidance.tell();
+            stats.record(&progress);
+            guidance.print_step();
         },
         ..run
     });
     drop((server, bar));
-    close(ended, stream.report.as_deref(), output.force, global)
+    finish(ended, stream.report.as_deref(), output.force, global)
 }
 
-/// Writes the report and says what it says.
+/// Writes and prints the report.
 ///
 /// # Errors
-/// The run failed, or its report cannot be written.
-fn close(
+/// Fails if the run failed or its report cannot be written.
+fn finish(
     ended: Result<Report, PipelineError>,
     path: Option<&Path>,
     force: bool,
@@ -336,7 +337,7 @@ fn close(
     let written = path.map_or(Ok(()), |path| report::write(path, &report, force));
     terminal::say_report(&report, global);
     match (ended, written) {
-        // What ended the run is the error to tell.
+        // The run's own error takes precedence.
         (Err(ended), Err(unwritten)) => {
             terminal::say(&format!("the report is not written: {unwritten}"));
             Err(ended)

@@ -1,4 +1,4 @@
-//! Options of several groups at once.
+//! Combinations of option groups.
 
 use clap::Args;
 
@@ -37,7 +37,7 @@ pub struct Streaming {
 }
 
 impl Streaming {
-    /// How the source is opened.
+    /// Returns the options for opening the source.
     pub fn source_options(&self) -> Options {
         Options {
             frames: self.frames.clone(),

@@ -1,4 +1,4 @@
-//! The settings of a look, by their table, as options of commands.
+//! Command-line options for the settings of a look, generated from their table.
 
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Arg, ArgMatches, Args, Command, FromArgMatches};
@@ -7,7 +7,7 @@ use bokehcam::look::settings::{Group, Setting};
 use bokehcam::look::{Patch, SETTINGS};
 use bokehcam::names::Named;
 
-/// Settings of a look: with `QUALITY` how finely it is computed, else all others.
+/// Settings of a look: the quality settings if `QUALITY`, else all others.
 #[derive(Clone, Debug, Default)]
 pub struct LookSettings<const QUALITY: bool>(pub Patch);
 
@@ -46,7 +46,7 @@ impl<const QUALITY: bool> FromArgMatches for LookSettings<QUALITY> {
     }
 }
 
-/// The command-line option of a look's setting; its value stays text, and is only checked here.
+/// Returns the command-line option of a setting; the value stays text, and is only checked here.
 fn option(setting: &'static Setting) -> Arg {
     let heading = match setting.group {
         Group::Blur => "Blur",
@@ -77,7 +77,7 @@ fn option(setting: &'static Setting) -> Arg {
     }
 }
 
-/// A parser of values that have names.
+/// Returns a parser for the names of `T`'s values.
 pub fn named<T: Named + Send + Sync>() -> impl TypedValueParser<Value = T> {
     let values = T::VALUES.iter().map(|value| PossibleValue::new(value.name()).help(value.help()));
     PossibleValuesParser::new(values).try_map(|name| bokehcam::names::parse::<T>(&name))

@@ -1,5 +1,4 @@
-//! The options that commands share, in groups: what can be written on the command line, in the environment or in
-//! the settings file, before it means anything.
+//! Option groups shared by commands: their values from the command line, the environment or the settings file.
 
 mod groups;
 mod look;
@@ -74,8 +73,8 @@ pub struct Blur {
 }
 
 impl Blur {
-    /// Whether depth is optional: used if the source has any, else left out without an error.
-    pub fn takes_whatever_depth(&self) -> bool {
+    /// Whether depth is optional: used if available, else left out without an error.
+    pub fn accepts_any_depth(&self) -> bool {
         self.look.0.effect == Some(Effect::Auto) && self.depth == DepthChoice::Auto
     }
 }
@@ -99,7 +98,7 @@ pub struct Computing {
 }
 
 impl Computing {
-    /// The same options for executors.
+    /// Converts these options to the library's type.
     pub fn choice(&self) -> computing::Computing {
         let Self { backend, adapter, threads, .. } = self.clone();
         computing::Computing { backend, adapter, threads }
@@ -151,12 +150,12 @@ pub struct Output {
     pub force: bool,
 }
 
-/// A parser of sources. A folder's name need not be text.
+/// Returns a parser of source names; names of folders may be non-UTF-8.
 pub fn source_name() -> impl TypedValueParser<Value = SourceName> {
     OsStringValueParser::new().try_map(|name| SourceName::from_os(&name))
 }
 
-/// A parser of numbers of threads.
+/// Returns a parser of thread counts.
 pub fn threads() -> impl TypedValueParser<Value = usize> {
     RangedI64ValueParser::<u64>::new().range(1..=1024).map(|threads| threads as usize)
 }

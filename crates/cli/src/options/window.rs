@@ -1,4 +1,4 @@
-//! What a window shows first, as it is written.
+//! Options for the initial state of a window.
 
 use std::path::PathBuf;
 

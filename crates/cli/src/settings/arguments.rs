@@ -1,4 +1,4 @@
-//! The command line before it is parsed, and the message where it cannot be.
+//! Preprocessing of the command line, and the message if it cannot be parsed.
 
 use std::error::Error as _;
 use std::ffi::{OsStr, OsString};
@@ -14,11 +14,11 @@ use crate::log;
 use crate::options::LogFormat;
 use bokehcam::source::SourceError;
 
-/// The arguments, with a number below zero made part of the option that it follows: `--focus -1` is `--focus=-1`, and
-/// not an option `-1`, so that the option can say what it accepts.
-pub fn joined(args: impl IntoIterator<Item = OsString>) -> Vec<OsString> {
+/// Joins a negative number to the option before it: `--focus -1` becomes `--focus=-1` instead of an option `-1`, so
+/// that the option can report its accepted values.
+pub fn join_negative_numbers(args: impl IntoIterator<Item = OsString>) -> Vec<OsString> {
     let mut joined: Vec<OsString> = Vec::new();
-    // Until `--`: what follows that is never an option.
+    // After `--`, no argument is an option.
     let mut are_options = true;
     for arg in args {
         let is_number = matches!(arg.as_bytes(), [b'-', b'0'..=b'9' | b'.', ..]);
@@ -36,13 +36,13 @@ pub fn joined(args: impl IntoIterator<Item = OsString>) -> Vec<OsString> {
     joined
 }
 
-/// Whether this is `--name`, without a value.
+/// Whether the argument is `--name` without a value.
 fn is_open_option(arg: &OsStr) -> bool {
     let bytes = arg.as_bytes();
     bytes.len() > 2 && bytes.starts_with(b"--") && !bytes.contains(&b'=')
 }
 
-/// How messages are to be written, as far as that can be told of arguments that may be wrong.
+/// Returns the log format, as far as it can be read from arguments that may be invalid.
 pub fn log_format(args: &[OsString]) -> LogFormat {
     let after = |pair: &[OsString]| pair[0] == "--log-format" && pair[1] == "json";
     match args.iter().any(|arg| arg == "--log-format=json") || args.windows(2).any(after) {
@@ -51,8 +51,8 @@ pub fn log_format(args: &[OsString]) -> LogFormat {
     }
 }
 
-/// Says what is wrong with the arguments; or shows the help that they ask for. Where they name what is not there now, the
-/// fault is the machine's, and the exit code is 1: the same arguments may be right later.
+/// Prints the error of the arguments, or the requested help. If they name a missing device or file, the exit code is 1:
+/// the same arguments may be right later.
 pub fn refuse(error: &clap::Error, args: &[OsString]) -> ExitCode {
     match error.kind() {
         ErrorKind::DisplayHelp | ErrorKind::DisplayVersion => {
@@ -61,16 +61,16 @@ pub fn refuse(error: &clap::Error, args: &[OsString]) -> ExitCode {
                     log::error(&CliError::io("standard output".as_ref())(error).to_string());
                     ExitCode::FAILURE
                 }
-                // A closed standard output is no reason to fail.
+                // A closed standard output is no failure.
                 _ => ExitCode::SUCCESS,
             };
         }
         ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand => {
             let _ = error.print();
         }
-        ErrorKind::InvalidUtf8 => log::error(&not_text(args)),
+        ErrorKind::InvalidUtf8 => log::error(&non_utf8_message(args)),
         _ => {
-            let what = unknown::said(error, args).unwrap_or_else(|| log::one_line(error));
+            let what = unknown::explain(error, args).unwrap_or_else(|| log::one_line(error));
             log::error(&environment::with_origin(&what, args, true, None));
         }
     }
@@ -78,7 +78,7 @@ pub fn refuse(error: &clap::Error, args: &[OsString]) -> ExitCode {
     if names_a_source.is_some_and(|error| !error.is_wrong_argument()) { ExitCode::FAILURE } else { ExitCode::from(2) }
 }
 
-fn not_text(args: &[OsString]) -> String {
+fn non_utf8_message(args: &[OsString]) -> String {
     let escaped = |arg: &OsString| arg.clone().into_vec().escape_ascii().to_string();
     let which = args.iter().find(|arg| arg.to_str().is_none()).map(escaped);
     format!("'{}' is no text in UTF-8: rename it, or name a link to it", which.unwrap_or_default())
@@ -102,7 +102,7 @@ mod tests {
             (&["--", "-1"], &["--", "-1"]),
             (&["--out", "--", "--x", "-1"], &["--out", "--", "--x", "-1"]),
         ] {
-            assert_eq!(joined(args(given)), args(expected));
+            assert_eq!(join_negative_numbers(args(given)), args(expected));
         }
     }
 }

@@ -1,4 +1,4 @@
-//! Changes of the look of a run, as others ask for them: parsed and refused like the command line.
+//! Changes of a running instance's look: parsed and validated like the command line.
 
 use std::ffi::OsString;
 use std::path::Path;
@@ -12,11 +12,11 @@ use crate::log;
 use crate::options::LookSettings;
 use bokehcam::look::{Patch, settings};
 
-/// The changes that settings make, each written `NAME=VALUE`.
+/// Parses settings, each written `NAME=VALUE`, as a patch of a look.
 ///
 /// # Errors
-/// One is no setting of a look, or has no such value; one excludes another, or is there twice; the picture of an aperture
-/// cannot be read.
+/// Fails if a name is no setting of a look, a value is invalid, settings are repeated or exclude each other, or an
+/// aperture's picture cannot be read.
 pub fn patch(settings: &[String]) -> Result<Patch, CliError> {
     let pairs = settings.iter().map(|setting| {
         let pair = setting.split_once('=').filter(|(name, _)| !name.is_empty());
@@ -24,46 +24,47 @@ pub fn patch(settings: &[String]) -> Result<Patch, CliError> {
             .ok_or_else(|| CliError::Usage(format!("'{setting}': write NAME=VALUE, such as blur=3% or focus=auto")))?;
         let name = name.trim_start_matches('-');
         if settings::setting(name).is_none() {
-            Err(CliError::Usage(no_setting(name, value)))
+            Err(CliError::Usage(unknown_setting(name, value)))
         } else {
             Ok((name, value))
         }
     });
     let pairs = pairs.collect::<Result<Vec<_>, CliError>>()?;
-    let command = of_a_look();
+    let command = look_command();
     let flags = pairs.iter().map(|(name, value)| OsString::from(format!("--{name}={value}")));
     command.try_get_matches_from(flags).map_err(|error| CliError::Usage(log::one_line(&error)))?;
-    loaded(Patch::parse(pairs))
+    load_patch(Patch::parse(pairs))
 }
 
-fn of_a_look() -> Command {
+fn look_command() -> Command {
     let command = Command::new("settings").disable_help_flag(true).no_binary_name(true);
     LookSettings::<true>::augment_args(LookSettings::<false>::augment_args(command))
 }
 
-/// Why a look has no setting of this name, and what to do.
-fn no_setting(name: &str, value: &str) -> String {
+/// Explains why a look has no setting of this name, and the remedy.
+fn unknown_setting(name: &str, value: &str) -> String {
     if name == "preset" {
         return format!("a preset is taken by `bokehcam ctl preset {value}`");
     }
     if table::is_setting(name) {
         return format!("'{name}' cannot be changed while it runs: only the look can");
     }
-    let hint = table::nearest_in(of_a_look(), name).map_or(String::new(), |near| format!(", did you mean {near}?"));
+    let near = table::suggest_option(look_command(), name);
+    let hint = near.map_or(String::new(), |near| format!(", did you mean {near}?"));
     format!("there is no setting '{name}' of the look{hint}")
 }
 
-/// The changes that a preset makes, built in or of the settings file, as that is now.
+/// Returns the patch of a preset, built in or from the current settings file.
 ///
 /// # Errors
-/// There is no such preset; the settings file, or the picture of an aperture, cannot be read.
+/// Fails if the preset does not exist, or the settings file or an aperture's picture cannot be read.
 pub fn preset(chosen: Option<&Path>, name: &str) -> Result<Patch, CliError> {
     let file = SettingsFile::load(chosen)?;
-    let values = file.preset(name).ok_or_else(|| CliError::Usage(file.no_preset(name)))?;
-    loaded(Patch::parse(values.iter().map(|(name, value)| (name.as_str(), value.as_str()))))
+    let values = file.preset(name).ok_or_else(|| CliError::Usage(file.unknown_preset(name)))?;
+    load_patch(Patch::parse(values.iter().map(|(name, value)| (name.as_str(), value.as_str()))))
 }
 
-fn loaded(patch: Result<Patch, (String, String)>) -> Result<Patch, CliError> {
+fn load_patch(patch: Result<Patch, (String, String)>) -> Result<Patch, CliError> {
     let mut patch = patch.map_err(|(name, what)| CliError::Usage(format!("{name}: {what}")))?;
     patch.load()?;
     Ok(patch)
@@ -73,14 +74,14 @@ fn loaded(patch: Result<Patch, (String, String)>) -> Result<Patch, CliError> {
 mod tests {
     use super::*;
 
-    fn changed(settings: &[&str]) -> Result<Vec<(&'static str, String)>, String> {
+    fn parse_patch(settings: &[&str]) -> Result<Vec<(&'static str, String)>, String> {
         let settings: Vec<String> = settings.iter().map(ToString::to_string).collect();
         patch(&settings).map(|patch| patch.values()).map_err(|error| error.to_string())
     }
 
     #[test]
     fn settings_are_those_of_the_command_line() {
-        let values = changed(&["blur=3%", "focus=auto", "quality=fast"]).unwrap();
+        let values = parse_patch(&["blur=3%", "focus=auto", "quality=fast"]).unwrap();
         let text = |value: &str| value.to_string();
         assert_eq!(values, [("focus", text("auto")), ("blur", text("3%")), ("quality", text("fast"))]);
         for (bad, said) in [
@@ -99,7 +100,7 @@ mod tests {
             (&["rim=0.1", "rim=0.2"], "cannot be used multiple times"),
             (&["aperture=image:/nowhere.png"], "/nowhere.png"),
         ] {
-            let refused = changed(bad).unwrap_err();
+            let refused = parse_patch(bad).unwrap_err();
             assert!(refused.contains(said) && !refused.contains('\n'), "{bad:?}: {refused}");
         }
     }

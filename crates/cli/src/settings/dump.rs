@@ -7,8 +7,8 @@ use super::file::PRESETS;
 use super::layers::Setting;
 use super::table::Values;
 
-/// The settings in TOML, each with its help above it and its origin behind it, then the presets of the file. Commented
-/// out are settings without a value, and `preset`, whose values are all in the list already.
+/// Formats the settings as TOML, each with its help above and its origin behind it, then the presets of the file.
+/// Settings without a value are commented out, and so is `preset`, whose values are all in the list already.
 pub fn as_toml(settings: &[Setting], presets: &BTreeMap<String, Values>) -> String {
     let mut text = String::from("# bokehcam settings. Flags and the environment go before this file.\n");
     for setting in settings {
@@ -31,12 +31,12 @@ pub fn as_toml(settings: &[Setting], presets: &BTreeMap<String, Values>) -> Stri
     text
 }
 
-/// The value in TOML: numbers and booleans bare, all else in quotes.
+/// Formats a value as TOML: numbers and booleans bare, others in quotes.
 fn toml_value(text: &str) -> String {
     toml_number(text).unwrap_or_else(|| toml_edit::Value::from(text)).to_string()
 }
 
-/// `text` as a TOML number or boolean, if it is one.
+/// Parses `text` as a TOML number or boolean, if it is one.
 pub fn toml_number(text: &str) -> Option<toml_edit::Value> {
     let whole = text.parse::<i64>().map(toml_edit::Value::from).ok();
     let whole = whole.or_else(|| text.parse::<bool>().map(toml_edit::Value::from).ok());

@@ -5,14 +5,14 @@ use std::os::unix::ffi::OsStrExt;
 
 use super::file::SettingsFile;
 use super::layers::Layers;
-use super::table::{PREFIX, all_settings, given_variable, nearest_setting, variable};
+use super::table::{PREFIX, all_settings, given_variable, suggest_setting, variable};
 use crate::log;
 use bokehcam::look::settings;
 
-/// Variables of this program that are no settings: the path of the settings file, and those of the tests.
+/// Variables of this program that are not settings: the path of the settings file, and those of the tests.
 const NOT_SETTINGS: [&str; 6] = ["CONFIG", "DATA", "NO_VM", "PAIR", "SCREENSHOTS", "VM"];
 
-/// Warns of variables that begin with `BOKEHCAM_` and belong to no setting.
+/// Warns of variables with the prefix `BOKEHCAM_` that match no setting.
 pub fn warn_of_unknown() {
     let settings = all_settings();
     let names = settings.get_arguments().flat_map(|arg| {
@@ -24,21 +24,21 @@ pub fn warn_of_unknown() {
         let rest = name.strip_prefix(PREFIX);
         rest.is_some_and(|rest| !NOT_SETTINGS.contains(&rest)) && !known.contains(name)
     };
-    let mut unknown: Vec<String> = names.filter(is_unknown).map(|name| described(&name)).collect();
+    let mut unknown: Vec<String> = names.filter(is_unknown).map(|name| describe_unknown(&name)).collect();
     unknown.sort();
     if !unknown.is_empty() {
         log::warn(&format!("in the environment there is {}", unknown.join(" and ")));
     }
 }
 
-fn described(name: &str) -> String {
+fn describe_unknown(name: &str) -> String {
     let setting = name.strip_prefix(PREFIX).unwrap_or(name).replace('_', "-").to_lowercase();
-    let hint = nearest_setting(&setting).map_or(String::new(), |near| format!(", did you mean {}?", variable(&near)));
+    let hint = suggest_setting(&setting).map_or(String::new(), |near| format!(", did you mean {}?", variable(&near)));
     format!("{name}, which is no setting{hint}")
 }
 
-/// An error message, with what it is of appended where that is none of the arguments: environment variables that set the
-/// options it names, if these are wrong, and keys of the settings file.
+/// Appends to an error message the origin of the settings that it names, unless they are arguments: environment
+/// variables, if a value is invalid, and keys of the settings file.
 pub fn with_origin(
     message: &str,
     args: &[OsString],
@@ -47,13 +47,13 @@ pub fn with_origin(
 ) -> String {
     let message = &if are_wrong { with_variables(message, args) } else { message.to_owned() };
     let options: Vec<&str> = options_in(message).filter(|_| are_wrong).collect();
-    let keys = file.map_or(Vec::new(), |(file, layers)| layers.behind(message, &options, file));
+    let keys = file.map_or(Vec::new(), |(file, layers)| layers.name_origins(message, &options, file));
     if keys.is_empty() { message.to_owned() } else { format!("{message} ({})", keys.join(", ")) }
 }
 
 fn with_variables(message: &str, args: &[OsString]) -> String {
     let mut variables: Vec<String> = options_in(message)
-        .filter(|name| !called(name).any(|name| has_option(args, name)))
+        .filter(|name| !names_of(name).any(|name| has_option(args, name)))
         .filter_map(|name| {
             let variable = given_variable(name);
             let value = std::env::var_os(&variable).filter(|value| !value.is_empty())?;
@@ -67,22 +67,22 @@ fn with_variables(message: &str, args: &[OsString]) -> String {
     }
 }
 
-/// All names of the setting that is called so.
-fn called(name: &str) -> impl Iterator<Item = &str> {
+/// Returns all names of a setting.
+fn names_of(name: &str) -> impl Iterator<Item = &str> {
     let alias = settings::setting(name).and_then(settings::Setting::alias);
     [Some(settings::name_of(name)), alias].into_iter().flatten()
 }
 
-/// Whether the option `--name` is among the arguments.
+/// Whether the arguments contain the option `--name`.
 fn has_option(args: &[OsString], name: &str) -> bool {
-    let is_it = |arg: &OsString| {
+    let is_option = |arg: &OsString| {
         let rest = arg.as_bytes().strip_prefix(b"--").and_then(|rest| rest.strip_prefix(name.as_bytes()));
         rest.is_some_and(|rest| rest.is_empty() || rest[0] == b'=')
     };
-    args.iter().any(is_it)
+    args.iter().any(is_option)
 }
 
-/// The options `--name` that occur in a text, without their dashes.
+/// Finds the options `--name` in a text, without their dashes.
 fn options_in(text: &str) -> impl Iterator<Item = &str> {
     text.match_indices("--").filter_map(|(at, _)| {
         let rest = &text[at + 2..];

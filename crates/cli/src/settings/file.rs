@@ -1,38 +1,38 @@
-//! The settings file. Which value holds where there are several is up to [`super::layers`].
+//! The settings file. [`super::layers`] decides which value applies.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use toml::de::{DeTable, DeValue};
 
-use super::paths::counted_from;
-use super::table::{Values, is_setting, nearest_setting, parse_flags};
+use super::paths::resolve_paths;
+use super::table::{Values, is_setting, parse_flags, suggest_setting};
 use crate::error::CliError;
-use crate::log::{one_line, printable};
+use crate::log::{escape_controls, one_line};
 use bokehcam::files::input;
 use bokehcam::files::trusted::absolute;
 use bokehcam::look::{self, SETTINGS, presets};
 #[cfg(feature = "window")]
 use bokehcam::look::{Patch, presets::Preset};
 
-/// A settings file whose values have been checked.
+/// A settings file with validated values.
 #[derive(Debug, Default)]
 pub struct SettingsFile {
     pub values: Values,
-    /// The settings of each preset in it.
+    /// Settings of each preset of the file.
     pub presets: BTreeMap<String, Values>,
-    /// The file itself; `None` where there is none.
+    /// Path of the file, if any.
     pub path: Option<PathBuf>,
 }
 
-/// The table of the file that the presets are in.
+/// Name of the table of presets.
 pub const PRESETS: &str = "presets";
 
 impl SettingsFile {
-    /// Reads `chosen`, or else the user's file if there is one.
+    /// Reads `chosen`, or else the user's file, if any.
     ///
     /// # Errors
-    /// The file cannot be read, is not TOML, has a key that is no setting, or a value that its flag would refuse.
+    /// Fails if the file is unreadable, is not TOML, or has an unknown key or a value that its flag would reject.
     pub fn load(chosen: Option<&Path>) -> Result<Self, CliError> {
         let path = match (chosen, user_file()) {
             (Some(chosen), _) => chosen.to_owned(),
@@ -46,13 +46,13 @@ impl SettingsFile {
     /// Parses the text of the settings file at `path`.
     ///
     /// # Errors
-    /// As [`SettingsFile::load`].
+    /// Fails like [`SettingsFile::load`].
     pub fn parse(path: &Path, text: &str) -> Result<Self, CliError> {
         let refuse = |(byte, what): (usize, String)| CliError::Settings {
             path: path.to_owned(),
             line: text[..byte.min(text.len())].matches('\n').count() + 1,
-            // It may quote keys and values, which may hold anything.
-            what: printable(&what, &[]).into_owned(),
+            // It may quote keys and values with any characters.
+            what: escape_controls(&what, &[]).into_owned(),
         };
         let keys = DeTable::parse(text).map_err(|error| {
             refuse((error.span().map_or(0, |span| span.start), error.message().replace('\n', ", ")))
@@ -60,26 +60,27 @@ impl SettingsFile {
         let mut file = Self { path: Some(path.to_owned()), ..Self::default() };
         let whole = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
         let folder = whole.parent().unwrap_or(&whole);
-        let (tables, settings): (Vec<_>, Vec<_>) = in_order(keys.get_ref()).partition(|entry| entry.name == PRESETS);
-        file.values = checked(settings, &is_setting, folder).map_err(refuse)?;
+        let entries = sorted_entries(keys.get_ref());
+        let (tables, settings): (Vec<_>, Vec<_>) = entries.partition(|entry| entry.name == PRESETS);
+        file.values = check_values(settings, &is_setting, folder).map_err(refuse)?;
         for presets in tables {
             let no_table = || refuse((presets.at, "presets are tables: write [presets.NAME]".to_string()));
-            for entry in in_order(presets.value.as_table().ok_or_else(no_table)?) {
+            for entry in sorted_entries(presets.value.as_table().ok_or_else(no_table)?) {
                 let settings = entry.value.as_table().ok_or_else(no_table)?;
                 check_name(entry.name).map_err(|what| refuse((entry.at, what)))?;
-                let of_a_look = |name: &str| look::settings::setting(name).is_some();
-                let values = checked(in_order(settings), &of_a_look, folder).map_err(refuse)?;
+                let is_look_setting = |name: &str| look::settings::setting(name).is_some();
+                let values = check_values(sorted_entries(settings), &is_look_setting, folder).map_err(refuse)?;
                 file.presets.insert(entry.name.to_owned(), values);
             }
         }
         if let Some(unknown) = file.values.get("preset").filter(|name| file.preset(name).is_none()) {
-            let at = in_order(keys.get_ref()).find(|entry| entry.name == "preset").map_or(0, |entry| entry.at);
-            return Err(refuse((at, file.no_preset(unknown))));
+            let at = sorted_entries(keys.get_ref()).find(|entry| entry.name == "preset").map_or(0, |entry| entry.at);
+            return Err(refuse((at, file.unknown_preset(unknown))));
         }
         Ok(file)
     }
 
-    /// The settings of a preset, built-in or in this file.
+    /// Returns the settings of a preset, built-in or from this file.
     pub fn preset(&self, name: &str) -> Option<Values> {
         let built_in = presets::built_in().find(|preset| preset.name == name);
         let values = built_in.map(|preset| preset.patch.values());
@@ -88,19 +89,19 @@ impl SettingsFile {
         values.map(owned).or_else(|| self.presets.get(name).cloned())
     }
 
-    /// The names of all presets, those in this file last.
+    /// Returns the names of all presets, those of this file last.
     pub fn preset_names(&self) -> Vec<String> {
         let built_in = presets::built_in().map(|preset| preset.name.to_owned());
         built_in.chain(self.presets.keys().cloned()).collect()
     }
 
-    /// All presets, those in this file last. One that cannot be used, such as one whose aperture is a picture that is
-    /// gone, is left out with a warning.
+    /// Returns all presets, those of this file last. Unusable ones, for example with a missing aperture picture, are
+    /// skipped with a warning.
     #[cfg(feature = "window")]
     pub fn all_presets(&self) -> Vec<Preset> {
-        let of_user = self.presets.iter().filter_map(|(name, values)| {
+        let user_presets = self.presets.iter().filter_map(|(name, values)| {
             let pairs = values.iter().map(|(name, value)| (name.as_str(), value.as_str()));
-            // This never fails: the values were checked when the file was read.
+            // Never fails: the values were validated when the file was read.
             let mut patch = Patch::parse(pairs).ok()?;
             match patch.load() {
                 Ok(()) => Some(Preset { name: name.clone(), patch, own: true }),
@@ -110,21 +111,21 @@ impl SettingsFile {
                 }
             }
         });
-        presets::built_in().chain(of_user).collect()
+        presets::built_in().chain(user_presets).collect()
     }
 
-    /// The message that there is no preset of this name, with a list of those there are.
-    pub fn no_preset(&self, name: &str) -> String {
+    /// Formats the message for an unknown preset, with a list of the known ones.
+    pub fn unknown_preset(&self, name: &str) -> String {
         let built_in = presets::built_in().map(|preset| preset.name);
         let all: Vec<String> = built_in.chain(self.presets.keys().cloned()).collect();
         format!("there is no preset '{name}': use {}", all.join(", "))
     }
 }
 
-/// Checks the name of a preset that a user defines.
+/// Validates the name of a user's preset.
 ///
 /// # Errors
-/// It is empty, has control characters, or is that of a built-in preset.
+/// Fails if the name is empty, has control characters, or is that of a built-in preset.
 pub fn check_name(name: &str) -> Result<(), String> {
     if name.trim().is_empty() {
         return Err("a preset needs a name".to_string());
@@ -138,7 +139,7 @@ pub fn check_name(name: &str) -> Result<(), String> {
     }
 }
 
-/// A key of a table with its value.
+/// A key of a table, and its value.
 struct Entry<'a> {
     name: &'a str,
     /// Byte offset of the key in the file.
@@ -146,16 +147,16 @@ struct Entry<'a> {
     value: &'a DeValue<'a>,
 }
 
-/// The keys of a table in the order of the file (the parser sorts them by name), so that the first error is reported.
-fn in_order<'a>(table: &'a DeTable<'a>) -> impl Iterator<Item = Entry<'a>> {
+/// Returns the keys of a table in file order (the parser sorts them by name), so that the first error is reported.
+fn sorted_entries<'a>(table: &'a DeTable<'a>) -> impl Iterator<Item = Entry<'a>> {
     let mut keys: Vec<_> = table.iter().collect();
     keys.sort_unstable_by_key(|(key, _)| key.span().start);
     keys.into_iter().map(|(key, value)| Entry { name: key.get_ref(), at: key.span().start, value: value.get_ref() })
 }
 
-/// The values as text, each checked by the parser of its flag, with relative paths counted from `folder`. An error is the
-/// byte offset of a key and what is wrong with it.
-fn checked<'a>(
+/// Converts values to text, validates each by the parser of its flag, and resolves relative paths against `folder`. An
+/// error is the byte offset of a key and the fault.
+fn check_values<'a>(
     entries: impl IntoIterator<Item = Entry<'a>>,
     allowed: &dyn Fn(&str) -> bool,
     folder: &Path,
@@ -163,7 +164,7 @@ fn checked<'a>(
     let mut values = Values::new();
     for Entry { name, at, value } in entries {
         if !is_setting(name) {
-            let hint = nearest_setting(name).map_or(";".to_owned(), |near| format!(", did you mean {near}?"));
+            let hint = suggest_setting(name).map_or(";".to_owned(), |near| format!(", did you mean {near}?"));
             let what = format!("there is no setting '{name}'{hint} `bokehcam config dump` shows them all");
             return Err((at, what));
         }
@@ -173,42 +174,42 @@ fn checked<'a>(
         let value = match value {
             DeValue::String(text) => text.clone().into_owned(),
             DeValue::Boolean(yes) => yes.to_string(),
-            // The flags read decimal numbers alone: none with a prefix such as 0x.
+            // Flags accept decimal numbers only, without a prefix such as 0x.
             DeValue::Integer(number) => {
                 i64::from_str_radix(number.as_str(), number.radix()).map_or(number.to_string(), |n| n.to_string())
             }
             DeValue::Float(number) => number.as_str().trim_start_matches('+').to_owned(),
             _ => return Err((at, format!("'{name}' must be a text, a number, true or false"))),
         };
-        let value = counted_from(folder, name, &value);
+        let value = resolve_paths(folder, name, &value);
         if values.insert(look::settings::name_of(name).to_owned(), value).is_some() {
             return Err((at, format!("'{name}' is there already, by its other name: leave one of them out")));
         }
-        // With those before it, so that two settings that exclude each other are found, too.
+        // Validated with the preceding ones, to find settings that exclude each other.
         parse_flags(&values).map_err(|error| (at, one_line(&error)))?;
     }
     Ok(values)
 }
 
-/// The names of a look's settings, as a list for people.
+/// Returns the names of a look's settings as a comma-separated list.
 fn look_names() -> String {
     SETTINGS.each_ref().map(|setting| setting.name).join(", ")
 }
 
-/// `$XDG_CONFIG_HOME/bokehcam/config.toml`, or the same under `~/.config`.
+/// Returns `$XDG_CONFIG_HOME/bokehcam/config.toml`, or the equivalent under `~/.config`.
 pub fn user_file() -> Option<PathBuf> {
-    Some(folder("XDG_CONFIG_HOME", ".config")?.join("config.toml"))
+    Some(app_folder("XDG_CONFIG_HOME", ".config")?.join("config.toml"))
 }
 
-/// The folder for what is remembered and no setting: `$XDG_STATE_HOME/bokehcam`, or the same under `~/.local/state`.
+/// Returns the folder for remembered state: `$XDG_STATE_HOME/bokehcam`, or the equivalent under `~/.local/state`.
 #[cfg(feature = "window")]
 pub fn state_folder() -> Option<PathBuf> {
-    folder("XDG_STATE_HOME", ".local/state")
+    app_folder("XDG_STATE_HOME", ".local/state")
 }
 
-/// This program's folder in the one that the environment variable names, else in `usual` under the user's home.
-fn folder(variable: &str, usual: &str) -> Option<PathBuf> {
-    let folder = absolute(variable).or_else(|| Some(absolute("HOME")?.join(usual)))?;
+/// Returns this program's folder below that of the environment variable, else below `default` in the user's home.
+fn app_folder(variable: &str, default: &str) -> Option<PathBuf> {
+    let folder = absolute(variable).or_else(|| Some(absolute("HOME")?.join(default)))?;
     Some(folder.join("bokehcam"))
 }
 

@@ -1,13 +1,13 @@
-//! From options to a look.
+//! Conversion of options to a look.
 
 use crate::error::CliError;
 use crate::options;
 use bokehcam::look::{Look, Patch};
 
-/// The look that options ask for, whatever the source.
+/// Returns the look of the options, before it is limited to the source's abilities.
 ///
 /// # Errors
-/// A lens is not known by all of its numbers, or the aperture's picture cannot be read.
+/// Fails if a lens lacks some of its numbers, or the aperture's picture cannot be read.
 pub fn look(blur: &options::Blur, quality: &options::LookSettings<true>) -> Result<Look, CliError> {
     let patch = Patch { quality: quality.0.quality, ..blur.look.0.clone() };
     Ok(patch.on(&Look::default())?)

@@ -1,5 +1,5 @@
-//! Settings, wherever they are said: which there are ([`table`]), arguments, environment, file, presets, which of them
-//! holds ([`layers`]), and how they are printed and saved.
+//! Settings from all sources: their names ([`table`]), arguments, environment, file, presets, precedence ([`layers`]),
+//! printing and saving.
 
 pub mod arguments;
 pub mod changes;

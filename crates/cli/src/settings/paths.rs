@@ -1,4 +1,4 @@
-//! Files that settings name, and what relative ones count from: the folder that they are written in.
+//! Paths in settings, relative to the folder in which the setting is written.
 
 use std::any::TypeId;
 use std::path::{Path, PathBuf};
@@ -7,22 +7,22 @@ use super::table::all_settings;
 use bokehcam::look::{Patch, settings};
 use bokehcam::source::DepthChoice;
 
-/// The value of the setting `name` with every relative path in it counted from `folder`; any other value as it is.
-pub fn counted_from(folder: &Path, name: &str, value: &str) -> String {
-    let whole = |file: &str| folder.join(file).to_str().map_or_else(|| file.to_owned(), str::to_owned);
+/// Makes the relative paths in a setting's value absolute, relative to `folder`; other values stay.
+pub fn resolve_paths(folder: &Path, name: &str, value: &str) -> String {
+    let absolute = |file: &str| folder.join(file).to_str().map_or_else(|| file.to_owned(), str::to_owned);
     let name = settings::name_of(name);
     if settings::setting(name).is_some() {
         let mut patch = Patch::parse([(name, value)]).unwrap_or_default();
         let files = patch.files_mut().map(|file| *file = folder.join(&*file)).count();
-        let whole = patch.values().pop().filter(|_| files > 0);
-        return whole.map_or_else(|| value.to_owned(), |(_, value)| value);
+        let absolute = patch.values().pop().filter(|_| files > 0);
+        return absolute.map_or_else(|| value.to_owned(), |(_, value)| value);
     }
     let every = all_settings();
     let Some(arg) = every.get_arguments().find(|arg| arg.get_long() == Some(name)) else { return value.to_owned() };
     let kind = arg.get_value_parser().type_id();
     if kind == TypeId::of::<PathBuf>() && value != "-" {
         let delimiter = arg.get_value_delimiter().unwrap_or('\0');
-        return value.split(delimiter).map(whole).collect::<Vec<_>>().join(&delimiter.to_string());
+        return value.split(delimiter).map(absolute).collect::<Vec<_>>().join(&delimiter.to_string());
     }
     if kind == TypeId::of::<DepthChoice>() {
         return match value.parse() {
@@ -30,19 +30,19 @@ pub fn counted_from(folder: &Path, name: &str, value: &str) -> String {
                 chosen.files_mut().for_each(|file| *file = folder.join(&*file));
                 chosen.to_string()
             }
-            Ok(DepthChoice::Folder(_) | DepthChoice::Device(_)) if folder.join(value).is_dir() => whole(value),
+            Ok(DepthChoice::Folder(_) | DepthChoice::Device(_)) if folder.join(value).is_dir() => absolute(value),
             _ => value.to_owned(),
         };
     }
-    // A language is a name, or a file.
-    if name == "language" && value.ends_with(".toml") { whole(value) } else { value.to_owned() }
+    // A language is a name or a file.
+    if name == "language" && value.ends_with(".toml") { absolute(value) } else { value.to_owned() }
 }
 
-/// The file that a value names, if that is a whole path: `image:/a/b.png` names `/a/b.png`.
-pub fn file_in(value: &str) -> Option<&str> {
+/// Returns the file in a value if its path is absolute: `image:/a/b.png` contains `/a/b.png`.
+pub fn absolute_file_in(value: &str) -> Option<&str> {
     let file = value.get(value.find('/')?..)?;
-    let is_whole = value.strip_suffix(file).is_some_and(|before| before.is_empty() || before.ends_with(':'));
-    is_whole.then_some(file)
+    let is_complete = value.strip_suffix(file).is_some_and(|before| before.is_empty() || before.ends_with(':'));
+    is_complete.then_some(file)
 }
 
 #[cfg(test)]
@@ -54,7 +54,7 @@ mod tests {
         let home = tempfile::tempdir().unwrap();
         std::fs::create_dir(home.path().join("room")).unwrap();
         let at = |file: &str| format!("{}/{file}", home.path().display());
-        for (name, value, whole) in [
+        for (name, value, absolute) in [
             ("behind", "image:wall.jpg", format!("image:{}", at("wall.jpg"))),
             ("behind", "image:/wall.jpg", "image:/wall.jpg".into()),
             ("behind", "blur", "blur".into()),
@@ -72,9 +72,10 @@ mod tests {
             ("depth", "video4", "video4".into()),
             ("nothing", "x", "x".into()),
         ] {
-            assert_eq!(counted_from(home.path(), name, value), whole, "{name}={value}");
+            assert_eq!(resolve_paths(home.path(), name, value), absolute, "{name}={value}");
         }
-        assert_eq!(file_in("image:/a:b.png"), Some("/a:b.png"));
-        assert_eq!((file_in("/a/b"), file_in("a/b"), file_in("disc")), (Some("/a/b"), None, None));
+        assert_eq!(absolute_file_in("image:/a:b.png"), Some("/a:b.png"));
+        assert_eq!(absolute_file_in("/a/b"), Some("/a/b"));
+        assert_eq!((absolute_file_in("a/b"), absolute_file_in("disc")), (None, None));
     }
 }

@@ -1,35 +1,35 @@
-//! Saving presets.
+//! Saving, renaming and deleting presets in the settings file.
 
 use std::path::Path;
 
 use toml_edit::{DocumentMut, Item, Table, TableLike};
 
 use super::file::{PRESETS, check_name};
-use super::paths::counted_from;
+use super::paths::resolve_paths;
 use super::save;
 use crate::error::CliError;
 use bokehcam::look::{Value, settings as table};
 
-/// Saves settings ([`Patch::of`] a look, so that the preset depends on nothing else) as the preset `name` in the file
-/// at `path`, in place of one of that name. All else in the file stays as it is, and the file changes as a whole or
-/// not at all; it and its folder are made where they are missing.
+/// Saves settings ([`Patch::of`] a look, so that the preset is self-contained) as the preset `name` in the file at
+/// `path`, replacing one of that name. The rest of the file stays; the file is replaced atomically, and created with
+/// its folder if missing.
 ///
 /// # Errors
-/// The name cannot be one; the file is no settings file, or cannot be read or written.
+/// Fails if the name is invalid, or the file is not a settings file or cannot be read or written.
 pub fn save(path: &Path, name: &str, settings: &[Value]) -> Result<(), CliError> {
     check_name(name).map_err(CliError::Usage)?;
-    let here = std::env::current_dir().map_err(CliError::io(".".as_ref()))?;
-    let settings: Vec<Value> = settings.iter().map(|(name, value)| (*name, counted_from(&here, name, value))).collect();
-    save::edit(path, |document| with_preset(document, name, &settings))
+    let cwd = std::env::current_dir().map_err(CliError::io(".".as_ref()))?;
+    let settings: Vec<Value> = settings.iter().map(|(name, value)| (*name, resolve_paths(&cwd, name, value))).collect();
+    save::edit(path, |document| set_preset(document, name, &settings))
 }
 
-/// Gives the user's preset `name` another name; its place, its settings and their comments stay as they were.
+/// Renames the user's preset `name`; its settings and their comments stay.
 ///
 /// # Errors
-/// There is no such preset in the file, or one of the new name; or as for [`save`].
+/// Fails if the file lacks the preset or already has one of the new name, or like [`save`].
 pub fn rename(path: &Path, name: &str, new: &str) -> Result<(), CliError> {
     check_name(new).map_err(CliError::Usage)?;
-    change_own(path, name, |presets| {
+    edit_preset(path, name, |presets| {
         if presets.contains_key(new) {
             return Err(CliError::Usage(format!("there is a preset '{new}' already: choose another name")));
         }
@@ -42,16 +42,16 @@ pub fn rename(path: &Path, name: &str, new: &str) -> Result<(), CliError> {
 /// Deletes the user's preset `name`.
 ///
 /// # Errors
-/// There is no such preset in the file; or as for [`save`].
+/// Fails if the file lacks the preset, or like [`save`].
 pub fn delete(path: &Path, name: &str) -> Result<(), CliError> {
-    change_own(path, name, |presets| {
+    edit_preset(path, name, |presets| {
         presets.remove(name);
         Ok(())
     })
 }
 
-/// Changes the table of presets of a file that has the preset `name`.
-fn change_own(
+/// Edits the table of presets of a file that contains the preset `name`.
+fn edit_preset(
     path: &Path,
     name: &str,
     change: impl FnOnce(&mut dyn TableLike) -> Result<(), CliError>,
@@ -67,10 +67,10 @@ fn change_own(
     .and(changed)
 }
 
-/// Sets the preset `name` to exactly `settings`. `None` where `presets` or the preset exists and is no table.
-fn with_preset(document: &mut DocumentMut, name: &str, settings: &[Value]) -> Option<()> {
+/// Sets the preset `name` to exactly `settings`. Returns `None` if `presets` or the preset exists but is not a table.
+fn set_preset(document: &mut DocumentMut, name: &str, settings: &[Value]) -> Option<()> {
     let mut new_presets = Table::new();
-    // Without a line `[presets]` of its own.
+    // No line `[presets]` of its own.
     new_presets.set_implicit(true);
     let presets = document.entry(PRESETS).or_insert(Item::Table(new_presets)).as_table_like_mut()?;
     if presets.get(name).is_none() {
@@ -95,7 +95,7 @@ mod tests {
     use bokehcam::depth::focus::FocusRule;
     use bokehcam::look::{Effect, Look, Patch, Strength};
 
-    fn parsed(text: &str) -> SettingsFile {
+    fn parse(text: &str) -> SettingsFile {
         SettingsFile::parse(Path::new("c.toml"), text).unwrap()
     }
 
@@ -107,7 +107,7 @@ mod tests {
             strength: Strength::AtInfinity(9.0),
             ..Look::plain(Effect::TiltShift)
         };
-        let file = parsed(
+        let file = parse(
             "rim = 0.9\n[presets.lens]\neffect = \"auto\"\nf-number = 2\nfocal-length = 50\nsensor-width = 36\n[presets.\"no\"]\n",
         );
         let all = file.all_presets();
@@ -120,7 +120,7 @@ mod tests {
         assert_eq!(looks[6], base);
         assert!(matches!(looks[5], Look { strength: Strength::Lens(_), effect: Effect::Auto, .. }));
         assert_eq!(looks[4].effect, Effect::TiltShift);
-        // From any preset to any other is the same as from the start.
+        // Changing from any preset to another gives the same look as from the default.
         for from in &looks[..5] {
             for (to, straight) in all.iter().zip(&looks[..5]) {
                 let look = to.patch.on(from).unwrap();
@@ -131,7 +131,7 @@ mod tests {
 
     #[test]
     fn a_preset_that_cannot_be_is_left_out() {
-        let all = parsed("[presets.gone]\naperture = \"image:/nowhere.png\"\n[presets.here]\nrim = 0\n").all_presets();
+        let all = parse("[presets.gone]\naperture = \"image:/nowhere.png\"\n[presets.here]\nrim = 0\n").all_presets();
         assert_eq!(
             all.iter().filter(|preset| preset.own).map(|preset| preset.name.as_str()).collect::<Vec<_>>(),
             ["here"]
@@ -155,14 +155,14 @@ mod tests {
         let saved = fs::read_to_string(&path).unwrap();
         assert!(saved.starts_with(text), "{saved}");
         assert!(saved.contains("rim = 0.3\n") && saved.contains("blur = \"3.5%\"\n"), "{saved}");
-        let all = parsed(&saved).all_presets();
+        let all = parse(&saved).all_presets();
         let preset = all.iter().find(|preset| preset.name.starts_with("Abend")).unwrap();
         assert_eq!(preset.patch.on(&Look::plain(Effect::Blur)).unwrap(), look);
 
         save(&path, "old", &[("rim", "0.5".to_string()), ("aperture", "heart".to_string())]).unwrap();
         let again = fs::read_to_string(&path).unwrap();
         assert!(again.contains("[presets.old] # dear\n# soft\nrim = 0.5 # so\n"), "{again}");
-        let settings = &parsed(&again).presets["old"];
+        let settings = &parse(&again).presets["old"];
         assert_eq!(settings.iter().map(|(k, v)| format!("{k}={v}")).collect::<Vec<_>>(), ["aperture=heart", "rim=0.5"]);
         assert_eq!(fs::read_dir(path.parent().unwrap()).unwrap().count(), 1, "no leftovers");
     }
@@ -217,7 +217,7 @@ mod tests {
         std::os::unix::fs::symlink(&real, &link).unwrap();
         save(&link, "b", &[("rim", "0.5".to_string())]).unwrap();
         assert!(link.symlink_metadata().unwrap().is_symlink());
-        let file = parsed(&fs::read_to_string(&real).unwrap());
+        let file = parse(&fs::read_to_string(&real).unwrap());
         assert_eq!((file.presets["a"]["rim"].as_str(), file.presets["b"]["rim"].as_str()), ("0.1", "0.5"));
     }
 }

@@ -1,4 +1,4 @@
-//! Writing the settings file: what is new goes in, all else in it stays as it was, comments and order included.
+//! Editing the settings file: new values go in, the rest stays, comments and order included.
 
 use std::fs::{self, File};
 use std::io;
@@ -11,7 +11,7 @@ use toml_edit::{DocumentMut, Item, TableLike, Value};
 use super::dump::toml_number;
 use super::file::{self, SettingsFile};
 use super::layers::Setting;
-use super::paths::counted_from;
+use super::paths::resolve_paths;
 use super::table::excluded_by;
 use crate::error::CliError;
 use crate::files::write_whole;
@@ -19,15 +19,15 @@ use crate::terminal;
 use bokehcam::files::input;
 use bokehcam::look::settings;
 
-/// `config save`: the settings given as flags, into the file that was chosen or the user's.
+/// Runs `config save`: writes the settings given as flags to the chosen file or the user's.
 ///
 /// # Errors
-/// No setting was given; the file is no settings file, or cannot be read or written.
+/// Fails if no setting is given, or the file is not a settings file or cannot be read or written.
 pub fn run(chosen: Option<&Path>, settings: &[Setting]) -> Result<(), CliError> {
-    let here = std::env::current_dir().map_err(CliError::io(".".as_ref()))?;
+    let cwd = std::env::current_dir().map_err(CliError::io(".".as_ref()))?;
     let by_flag = settings.iter().filter(|setting| setting.origin == "flag");
     let given: Vec<(String, String)> = by_flag
-        .filter_map(|Setting { name, value, .. }| Some((name.clone(), counted_from(&here, name, value.as_deref()?))))
+        .filter_map(|Setting { name, value, .. }| Some((name.clone(), resolve_paths(&cwd, name, value.as_deref()?))))
         .collect();
     let names: Vec<String> = given.iter().map(|(name, _)| name.clone()).collect();
     if names.is_empty() {
@@ -49,22 +49,23 @@ pub fn run(chosen: Option<&Path>, settings: &[Setting]) -> Result<(), CliError> 
     Ok(())
 }
 
-/// The file that settings and presets are saved in: the one that was chosen, else the user's.
+/// Returns the file for saving settings and presets: the chosen one, else the user's.
 ///
 /// # Errors
-/// None was chosen, and there is no home.
+/// Fails if none is chosen and the user has no home folder.
 pub fn file_to_save(chosen: Option<&Path>) -> Result<PathBuf, CliError> {
-    let nowhere =
+    let no_home =
         || CliError::Usage("there is no home to keep settings in: name a file with --config FILE".to_string());
-    chosen.map(Path::to_owned).or_else(file::user_file).ok_or_else(nowhere)
+    chosen.map(Path::to_owned).or_else(file::user_file).ok_or_else(no_home)
 }
 
-/// Changes the settings file at `path`, as a whole or not at all; it and its folder are made where they are missing.
+/// Edits the settings file at `path` atomically; creates it and its folder if missing.
 ///
 /// # Errors
-/// It is no settings file, before or after, or cannot be read or written; `change` has no place in it.
+/// Fails if the file is not a settings file before or after the change, cannot be read or written, or `change` returns
+/// `None`.
 pub fn edit(path: &Path, change: impl FnOnce(&mut DocumentMut) -> Option<()>) -> Result<(), CliError> {
-    // A symbolic link, as into a repository of settings, is written through and not replaced.
+    // A symbolic link, for example into a repository of settings, is followed and not replaced.
     let path = &link_target(path)?;
     let text = match input::read_text(path, input::MOST_SETTINGS_BYTES) {
         Err(error) if error.kind() == io::ErrorKind::NotFound => String::new(),
@@ -76,7 +77,7 @@ pub fn edit(path: &Path, change: impl FnOnce(&mut DocumentMut) -> Option<()>) ->
     let mut document: DocumentMut = text.parse().map_err(|_| no_place())?;
     change(&mut document).ok_or_else(no_place)?;
     let edited = document.to_string();
-    // What cannot be read back is not written.
+    // Unreadable results are not written.
     SettingsFile::parse(path, &edited)?;
     if let Some(folder) = path.parent() {
         fs::create_dir_all(folder).map_err(CliError::io(folder))?;
@@ -84,12 +85,12 @@ pub fn edit(path: &Path, change: impl FnOnce(&mut DocumentMut) -> Option<()>) ->
     write_whole(path, edited.as_bytes(), true)
 }
 
-/// Follows the symbolic links at `path`. Unlike with `canonicalize`, nothing need be there at the end of them yet.
+/// Follows the symbolic links at `path`. Unlike `canonicalize`, the final target need not exist.
 fn link_target(path: &Path) -> Result<PathBuf, CliError> {
-    /// As many as Linux follows.
-    const MOST_LINKS: usize = 40;
+    /// Linux's limit.
+    const MAX_LINKS: usize = 40;
     let mut target = path.to_owned();
-    for _ in 0..MOST_LINKS {
+    for _ in 0..MAX_LINKS {
         match fs::read_link(&target) {
             Ok(to) => target = target.parent().unwrap_or(Path::new("")).join(to),
             Err(_) => return Ok(target),
@@ -98,13 +99,13 @@ fn link_target(path: &Path) -> Result<PathBuf, CliError> {
     Err(CliError::io(path)(io::Error::new(io::ErrorKind::InvalidInput, "a loop of links")))
 }
 
-/// The key that a table has a setting by, which may be its other name.
+/// Returns the key of a setting in a table, which may be its alias.
 pub fn key_of<'a>(table: &dyn TableLike, name: &'a str) -> &'a str {
     let alias = settings::setting(name).and_then(settings::Setting::alias);
     alias.filter(|alias| table.contains_key(alias)).unwrap_or(name)
 }
 
-/// Sets a key. If it is there already, its place and the comments around its value stay.
+/// Sets a key. An existing key keeps its position and the comments around its value.
 pub fn set(table: &mut dyn TableLike, name: &str, text: &str) {
     let key = key_of(table, name);
     let mut value = toml_number(text).unwrap_or_else(|| Value::from(text));
@@ -117,10 +118,10 @@ pub fn set(table: &mut dyn TableLike, name: &str, text: &str) {
     }
 }
 
-/// Refuses to print into the very file that is about to be read: the shell has emptied it by then.
+/// Refuses to print into the settings file itself: the shell has already emptied it.
 ///
 /// # Errors
-/// Standard output is the settings file.
+/// Fails if standard output is the settings file.
 pub fn refuse_redirect(chosen: Option<&Path>) -> Result<(), CliError> {
     let Some(path) = chosen.map(Path::to_owned).or_else(file::user_file) else { return Ok(()) };
     let stdout = io::stdout().as_fd().try_clone_to_owned().and_then(|stdout| File::from(stdout).metadata());

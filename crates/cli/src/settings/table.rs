@@ -1,5 +1,5 @@
-//! Settings by name: a setting's environment variable and its key in the settings file follow from the name of its
-//! flag, and all three are parsed by the flag's parser.
+//! Settings by name: a setting's environment variable and its key in the settings file follow from its flag's name, and
+//! the flag's parser reads all three.
 
 use std::collections::BTreeMap;
 use std::ffi::OsString;
@@ -10,71 +10,71 @@ use clap::{Arg, ArgMatches, Args, Command};
 use crate::options::Every;
 use bokehcam::look::settings;
 
-/// Settings by their flags without the dashes, each value as it would follow its flag.
+/// Values of settings by the names of their flags, without dashes; each as written after its flag.
 pub type Values = BTreeMap<String, String>;
 
-/// What the variables of settings begin with.
+/// Prefix of the variables of settings.
 pub const PREFIX: &str = "BOKEHCAM_";
 
-/// Settings of the window alone that it states itself in the commands that it puts together: they may have changed since.
-pub const STATED_BY_WINDOW: [&str; 8] =
+/// Window-only settings that the window writes into composed commands with its current values.
+pub const WINDOW_STATE: [&str; 8] =
     ["show", "split", "full-screen", "instruments", "panel", "text-scale", "single-keys", "fresh"];
-/// The others of the window alone, which stay as they were given.
-pub const GIVEN_TO_WINDOW: [&str; 3] = ["language", "theme", "save-to"];
+/// The other window-only settings, which keep their initial values.
+pub const WINDOW_START: [&str; 3] = ["language", "theme", "save-to"];
 
-/// The variable of a setting: `BOKEHCAM_` and the flag's name in capitals.
+/// Returns the environment variable of a setting: `BOKEHCAM_` and the flag's name in capitals.
 pub fn variable(setting: &str) -> String {
     format!("{PREFIX}{}", setting.replace('-', "_").to_uppercase())
 }
 
-/// The variable that a setting has its value from: by its other name, if that alone is there.
+/// Returns the variable that sets a setting: that of its alias if only that one is set.
 pub fn given_variable(setting: &str) -> String {
-    let is_there = |variable: &String| std::env::var_os(variable).is_some_and(|value| !value.is_empty());
+    let is_set = |variable: &String| std::env::var_os(variable).is_some_and(|value| !value.is_empty());
     let by_name = variable(setting);
-    let other = settings::setting(setting).and_then(settings::Setting::alias).map(variable).filter(is_there);
-    if is_there(&by_name) { by_name } else { other.unwrap_or(by_name) }
+    let other = settings::setting(setting).and_then(settings::Setting::alias).map(variable).filter(is_set);
+    if is_set(&by_name) { by_name } else { other.unwrap_or(by_name) }
 }
 
-/// Gives every setting its environment variable.
+/// Assigns every setting its environment variable.
 pub fn with_environment(command: Command) -> Command {
-    on_settings(command, &|arg, name| arg.env(given_variable(name)).hide_env(true))
+    map_settings(command, &|arg, name| arg.env(given_variable(name)).hide_env(true))
 }
 
-/// A command that has every setting and nothing else.
+/// Returns a command with every setting and nothing else.
 pub fn all_settings() -> Command {
     Every::augment_args(Command::new("settings").disable_help_flag(true).no_binary_name(true))
 }
 
-/// Whether there is a setting of this name.
+/// Whether a setting of this name exists.
 pub fn is_setting(name: &str) -> bool {
     all_settings().get_arguments().any(|arg| arg.get_long() == Some(settings::name_of(name)))
 }
 
-/// The setting whose name clap would suggest.
-pub fn nearest_setting(name: &str) -> Option<String> {
-    nearest_in(all_settings(), name)
+/// Returns the setting that clap would suggest for a misspelt name.
+pub fn suggest_setting(name: &str) -> Option<String> {
+    suggest_option(all_settings(), name)
 }
 
-/// The option of a command whose name clap would suggest.
-pub fn nearest_in(command: Command, name: &str) -> Option<String> {
+/// Returns the option of a command that clap would suggest for a misspelt name.
+pub fn suggest_option(command: Command, name: &str) -> Option<String> {
     let error = command.try_get_matches_from([format!("--{name}")]).err()?;
     let suggested = error.get(ContextKind::SuggestedArg)?;
     (error.kind() == ErrorKind::UnknownArgument).then(|| suggested.to_string().trim_start_matches('-').to_owned())
 }
 
-/// Parses settings as if they were flags.
+/// Parses settings like flags.
 ///
 /// # Errors
-/// One of them would be refused.
+/// Fails if a flag would reject its value.
 pub fn parse_flags(values: &Values) -> Result<ArgMatches, clap::Error> {
     let flags = values.iter().map(|(name, value)| OsString::from(format!("--{name}={value}")));
     all_settings().try_get_matches_from(flags)
 }
 
-/// Names of the settings that exclude, or are excluded by, one of `names`.
+/// Returns the settings that exclude, or are excluded by, one of `names`.
 pub fn excluded_by(names: &[String]) -> Vec<String> {
     let every = all_settings();
-    // clap knows a conflict from the side that declares it.
+    // clap lists a conflict only on the side that declares it.
     let exclude_each_other = |a: &Arg, b: &Arg| {
         let lists = |from: &Arg, to: &Arg| every.get_arg_conflicts_with(from).iter().any(|x| x.get_id() == to.get_id());
         lists(a, b) || lists(b, a)
@@ -85,10 +85,10 @@ pub fn excluded_by(names: &[String]) -> Vec<String> {
     excluded.filter_map(|arg| arg.get_long().map(str::to_owned)).collect()
 }
 
-/// Rewrites each setting of a command and of those below it.
-pub fn on_settings(command: Command, rewrite: &dyn Fn(Arg, &str) -> Arg) -> Command {
+/// Rewrites each setting of a command and its subcommands.
+pub fn map_settings(command: Command, rewrite: &dyn Fn(Arg, &str) -> Arg) -> Command {
     let settings = all_settings();
-    // By id: a command may have an option of the same name that is no setting.
+    // By id: a command may have an option of the same name that is not a setting.
     rewrite_args(command, &|arg: Arg| match settings.get_arguments().find(|setting| setting.get_id() == arg.get_id()) {
         Some(setting) => rewrite(arg, setting.get_long().unwrap_or_default()),
         None => arg,
@@ -96,5 +96,5 @@ pub fn on_settings(command: Command, rewrite: &dyn Fn(Arg, &str) -> Arg) -> Comm
 }
 
 fn rewrite_args(command: Command, rewrite: &dyn Fn(Arg) -> Arg) -> Command {
-    command.mut_args(rewrite).mut_subcommands(|below| rewrite_args(below, rewrite))
+    command.mut_args(rewrite).mut_subcommands(|subcommand| rewrite_args(subcommand, rewrite))
 }

@@ -1,4 +1,4 @@
-//! What is said of an option that a command does not have, and of a command that there is not.
+//! Messages for unknown options and commands.
 
 use std::ffi::OsString;
 use std::os::unix::ffi::OsStrExt;
@@ -8,15 +8,15 @@ use clap::{Arg, Command, CommandFactory};
 
 use crate::commands::Cli;
 
-/// Options that people try, and what does that.
-const MEANT: [(&str, &str); 4] =
+/// Plausible wrong names of options, and the right ones.
+const SYNONYMS: [(&str, &str); 4] =
     [("background", "behind"), ("output", "out"), ("input-size", "size"), ("strength", "blur")];
 
-/// In more commands than this nobody looks.
-const MOST_COMMANDS: usize = 4;
+/// Maximum number of commands that a message lists.
+const MAX_COMMANDS: usize = 4;
 
-/// The message for an unknown option or command, where there is more to say than clap does.
-pub fn said(error: &clap::Error, args: &[OsString]) -> Option<String> {
+/// Returns the message for an unknown option or command, if it can say more than clap's.
+pub fn explain(error: &clap::Error, args: &[OsString]) -> Option<String> {
     let invalid = |kind| Some(error.get(kind)?.to_string());
     match error.kind() {
         ErrorKind::UnknownArgument => unknown_option(error, &invalid(ContextKind::InvalidArg)?, args),
@@ -37,10 +37,11 @@ fn unknown_option(error: &clap::Error, invalid: &str, args: &[OsString]) -> Opti
     let mut path = Vec::new();
     let mut command = &program;
     for word in words.iter().filter(|word| !word.starts_with('-')) {
-        let Some(below) = command.find_subcommand(word) else { break };
-        path.push(below.get_name());
-        command = below;
+        let Some(subcommand) = command.find_subcommand(word) else { break };
+        path.push(subcommand.get_name());
+        command = subcommand;
     }
+    // The command path, such as `config dump`, selects the hint.
     let here = path.join(" ");
     let Some(name) = invalid.strip_prefix("--") else {
         if here == "render" && !invalid.starts_with('-') {
@@ -60,19 +61,19 @@ fn unknown_option(error: &clap::Error, invalid: &str, args: &[OsString]) -> Opti
     let of = if here.is_empty() { "here".to_owned() } else { format!("of `{here}`") };
     let none = format!("there is no option {invalid} {of}");
     let has = |command: &Command, name: &str| command.get_arguments().any(|arg| has_name(arg, name));
-    let meant = MEANT.iter().find(|(tried, meant)| *tried == name && has(command, meant)).map(|(_, meant)| *meant);
+    let meant = SYNONYMS.iter().find(|(tried, meant)| *tried == name && has(command, meant)).map(|(_, meant)| *meant);
     if let Some(meant) = meant {
         return Some(format!("{none}, did you mean --{meant}?"));
     }
     let mut others = Vec::new();
-    with_option(&program, name, &mut Vec::new(), &mut others);
+    collect_with_option(&program, name, &mut Vec::new(), &mut others);
     match others.len() {
-        1..=MOST_COMMANDS => Some(format!("{none}: it is for {}", others.join(", "))),
+        1..=MAX_COMMANDS => Some(format!("{none}: it is for {}", others.join(", "))),
         0 => {
             let suggested = error.get(ContextKind::SuggestedArg);
             Some(suggested.map_or_else(|| none.clone(), |near| format!("{none}, did you mean {near}?")))
         }
-        _ => Some(format!("{none}: it is for {} and others", others[..MOST_COMMANDS].join(", "))),
+        _ => Some(format!("{none}: it is for {} and others", others[..MAX_COMMANDS].join(", "))),
     }
 }
 
@@ -80,15 +81,16 @@ fn has_name(arg: &Arg, name: &str) -> bool {
     arg.get_long() == Some(name) || arg.get_all_aliases().is_some_and(|all| all.contains(&name))
 }
 
-/// Collects the commands that have an option.
-fn with_option<'a>(command: &'a Command, name: &str, path: &mut Vec<&'a str>, found: &mut Vec<String>) {
+/// Collects the commands with the option `name`.
+fn collect_with_option<'a>(command: &'a Command, name: &str, path: &mut Vec<&'a str>, found: &mut Vec<String>) {
     if !path.is_empty() && command.get_arguments().any(|arg| has_name(arg, name)) {
         found.push(format!("`{}`", path.join(" ")));
     }
-    // Of settings alone `config` has every one.
-    for below in command.get_subcommands().filter(|below| !below.is_hide_set() && below.get_name() != "config") {
-        path.push(below.get_name());
-        with_option(below, name, path, found);
+    // `config` has every setting.
+    let is_listed = |subcommand: &&Command| !subcommand.is_hide_set() && subcommand.get_name() != "config";
+    for subcommand in command.get_subcommands().filter(is_listed) {
+        path.push(subcommand.get_name());
+        collect_with_option(subcommand, name, path, found);
         path.pop();
     }
 }

@@ -1,38 +1,38 @@
-//! Warnings of settings that were given and have no effect in this run, in one line for every command.
+//! Warnings of given settings without effect in this run, in one line per command.
 //!
-//! Given are those of flags, the environment and a preset; the settings file is meant for all runs.
+//! Covers flags, the environment and a preset; the settings file is meant for all runs.
 
 use super::layers::Setting;
-use super::table::{GIVEN_TO_WINDOW, STATED_BY_WINDOW, given_variable};
+use super::table::{WINDOW_START, WINDOW_STATE, given_variable};
 use crate::log;
 use bokehcam::look::{Effect, Value};
 use bokehcam::source::{DepthFrom, Kind};
 
-/// What decides in a run which settings have an effect.
+/// Facts of a run that decide which settings have an effect.
 #[derive(Clone, Copy, Debug)]
 pub struct Run {
-    /// What frames come from.
+    /// Origin of the frames.
     pub source: From,
-    /// What depth comes from.
+    /// Origin of the depth.
     pub depth: DepthFrom,
     /// Whether the effect uses depth.
     pub uses_depth: bool,
-    /// What the blur follows.
+    /// Effect of the blur.
     pub effect: Effect,
-    /// Whether the strength is that of a lens.
+    /// Whether the strength is given as a lens.
     pub lens: bool,
     /// Whether frames come in real time.
     pub realtime: bool,
     /// Whether the user chose the CPU backend.
     pub cpu_only: bool,
-    /// Whether a video is compressed.
+    /// Whether the run encodes a video.
     pub compresses: bool,
-    /// Whether there is a window.
+    /// Whether the run has a window.
     pub window: bool,
 }
 
 impl Default for Run {
-    /// A picture that is not blurred.
+    /// Returns the facts of an unblurred still picture.
     fn default() -> Self {
         Self {
             source: From::Picture,
@@ -48,23 +48,23 @@ impl Default for Run {
     }
 }
 
-/// What frames come from.
+/// Origin of the frames.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum From {
     /// A source of frames.
     Source(Kind),
     Picture,
-    /// The scene that is measured.
+    /// The scene of `bench`.
     Bench,
 }
 
-/// Why a setting has no effect in a run; `None` where it has one.
+/// Returns the reason why a setting has no effect in a run, if so.
 type Why = fn(&Run) -> Option<&'static str>;
 
-/// Settings, and what they need to have an effect.
+/// Settings, and their condition for an effect.
 type Need = (&'static [&'static str], Why);
 
-/// What settings need of the source alone.
+/// Conditions that depend on the source alone.
 const NEEDS_OF_SOURCE: &[Need] = &[
     (&["size", "fps"], |run| match run.source {
         From::Source(Kind::Recording) => Some("a recording has its own"),
@@ -75,7 +75,7 @@ const NEEDS_OF_SOURCE: &[Need] = &[
     (&["format", "control"], |run| (run.source != From::Source(Kind::Camera)).then_some("the source is no camera")),
 ];
 
-/// What other settings need.
+/// Other conditions.
 const NEEDS: &[Need] = &[
     (&["depth-scale", "depth-invalid"], |run| match run.depth {
         DepthFrom::Nothing => Some(NO_DEPTH),
@@ -100,40 +100,40 @@ const NEEDS: &[Need] = &[
     (&["network-runtime", "network-range", "network-order"], |run| {
         (run.depth != DepthFrom::Networks).then_some("no network makes the depth")
     }),
-    (&["focus"], |run| if run.lens { None } else { dof(run) }),
-    (&["focus-range", "method"], dof),
-    (&["refine"], |run| if run.source == From::Bench { Some("the scene's depth is exact") } else { dof(run) }),
+    (&["focus"], |run| if run.lens { None } else { needs_dof(run) }),
+    (&["focus-range", "method"], needs_dof),
+    (&["refine"], |run| if run.source == From::Bench { Some("the scene's depth is exact") } else { needs_dof(run) }),
     (&["background-memory"], |run| match (run.source, run.depth) {
         (From::Picture | From::Bench, _) => Some("a picture on its own has nothing to remember"),
         (_, DepthFrom::Plate) => Some("the plate has what lies behind"),
-        _ => dof(run),
+        _ => needs_dof(run),
     }),
-    (&["behind"], |run| if run.source == From::Bench { Some("the scene is its own") } else { dof(run) }),
+    (&["behind"], |run| if run.source == From::Bench { Some("the scene is its own") } else { needs_dof(run) }),
     (&["follow"], |run| match run.source {
         From::Picture | From::Bench => Some("a picture on its own is shown as a whole"),
-        From::Source(_) => dof(run),
+        From::Source(_) => needs_dof(run),
     }),
     (&["tilt"], |run| (run.effect != Effect::TiltShift).then_some("the effect is not tilt-shift")),
     (&["blur", "f-number", "focal-length", "sensor-width"], |run| {
-        if run.source == From::Bench { Some("`bench` takes --coc") } else { blur(run) }
+        if run.source == From::Bench { Some("`bench` takes --coc") } else { needs_blur(run) }
     }),
-    (&["max-coc", "aperture", "intensity", "rim", "rank", "highlights", "quality"], blur),
-    (&["backend"], computed),
-    (&["adapter"], |run| computed(run).or(run.cpu_only.then_some("--backend cpu takes no GPU"))),
-    (&["threads"], |run| computed(run).filter(|_| !run.compresses)),
+    (&["max-coc", "aperture", "intensity", "rim", "rank", "highlights", "quality"], needs_blur),
+    (&["backend"], needs_executor),
+    (&["adapter"], |run| needs_executor(run).or(run.cpu_only.then_some("--backend cpu takes no GPU"))),
+    (&["threads"], |run| needs_executor(run).filter(|_| !run.compresses)),
     (&["budget-ms"], |run| match run.realtime {
-        true => blur(run),
+        true => needs_blur(run),
         false => Some("frames do not come in real time: add --pace realtime"),
     }),
-    (&STATED_BY_WINDOW, windowless),
-    (&GIVEN_TO_WINDOW, windowless),
+    (&WINDOW_STATE, needs_window),
+    (&WINDOW_START, needs_window),
 ];
 
 const NO_DEPTH: &str = "there is no depth";
 const DEPTH_UNUSED: &str = "the effect does not use depth";
 
-/// Settings of depth of field need the effect that uses depth.
-fn dof(run: &Run) -> Option<&'static str> {
+/// Condition of depth-of-field settings: an effect that uses depth.
+fn needs_dof(run: &Run) -> Option<&'static str> {
     match (run.effect, run.depth) {
         (effect, _) if effect.follows_depth() => None,
         (_, DepthFrom::Nothing) => Some(NO_DEPTH),
@@ -141,27 +141,27 @@ fn dof(run: &Run) -> Option<&'static str> {
     }
 }
 
-/// Settings of the blur need any effect that blurs.
-fn blur(run: &Run) -> Option<&'static str> {
+/// Condition of blur settings: an effect that blurs.
+fn needs_blur(run: &Run) -> Option<&'static str> {
     (run.effect == Effect::None).then_some("nothing is blurred")
 }
 
-/// Settings of what computes need something to compute.
-fn computed(run: &Run) -> Option<&'static str> {
-    blur(run).filter(|_| run.depth != DepthFrom::Eyes)
+/// Condition of executor settings: a blur or a stereo match to compute.
+fn needs_executor(run: &Run) -> Option<&'static str> {
+    needs_blur(run).filter(|_| run.depth != DepthFrom::Eyes)
 }
 
-/// Settings of the window need one.
-fn windowless(run: &Run) -> Option<&'static str> {
+/// Condition of window settings: a window.
+fn needs_window(run: &Run) -> Option<&'static str> {
     (!run.window).then_some("there is no window")
 }
 
-/// Warns of the given settings that have no effect in this run.
+/// Warns of the given settings without effect in this run.
 pub fn warn(given: &[Setting], run: &Run) {
-    line_of(unused(given, run)).iter().for_each(|line| log::warn(line));
+    format_line(unused(given, run)).iter().for_each(|line| log::warn(line));
 }
 
-/// The warning of settings that were changed in this run to no effect.
+/// Returns the warning about changed settings without effect in this run.
 pub fn note(changed: &[Value], run: &Run) -> Option<String> {
     let given: Vec<Setting> = changed
         .iter()
@@ -172,22 +172,22 @@ pub fn note(changed: &[Value], run: &Run) -> Option<String> {
             help: String::new(),
         })
         .collect();
-    line_of(unused(&given, run))
+    format_line(unused(&given, run))
 }
 
-/// Warns of the given settings that have no effect with this kind of source; all else can be changed in the window.
+/// Warns of the given settings without effect on this kind of source; all others can be changed in the window.
 #[cfg(feature = "window")]
 pub fn warn_by_source(given: &[Setting], source: Kind) {
     let run = Run { source: From::Source(source), realtime: true, window: true, ..Run::default() };
-    line_of(without(NEEDS_OF_SOURCE, given, &run)).iter().for_each(|line| log::warn(line));
+    format_line(find_unmet(NEEDS_OF_SOURCE, given, &run)).iter().for_each(|line| log::warn(line));
 }
 
 fn unused<'a>(given: &'a [Setting], run: &Run) -> Vec<(&'a Setting, &'static str)> {
-    without(&[NEEDS_OF_SOURCE, NEEDS].concat(), given, run)
+    find_unmet(&[NEEDS_OF_SOURCE, NEEDS].concat(), given, run)
 }
 
-/// Those of the settings that miss what they need, and why.
-fn without<'a>(needs: &[Need], given: &'a [Setting], run: &Run) -> Vec<(&'a Setting, &'static str)> {
+/// Finds the settings with an unmet condition, and the reasons.
+fn find_unmet<'a>(needs: &[Need], given: &'a [Setting], run: &Run) -> Vec<(&'a Setting, &'static str)> {
     let why = |setting: &Setting| {
         let (_, why) = needs.iter().find(|(names, _)| names.contains(&setting.name.as_str()))?;
         why(run)
@@ -195,8 +195,8 @@ fn without<'a>(needs: &[Need], given: &'a [Setting], run: &Run) -> Vec<(&'a Sett
     given.iter().filter_map(|setting| Some((setting, why(setting)?))).collect()
 }
 
-/// The warning in one line, with the settings of one reason together.
-fn line_of(unused: Vec<(&Setting, &str)>) -> Option<String> {
+/// Formats the warning in one line, grouped by reason.
+fn format_line(unused: Vec<(&Setting, &str)>) -> Option<String> {
     let mut reasons: Vec<&str> = Vec::new();
     for (_, why) in &unused {
         if !reasons.contains(why) {
@@ -211,7 +211,7 @@ fn line_of(unused: Vec<(&Setting, &str)>) -> Option<String> {
     (!reasons.is_empty()).then(text)
 }
 
-/// A setting as the user wrote it, and where.
+/// Formats a setting as the user wrote it.
 fn as_given(setting: &Setting) -> String {
     let Setting { name, value, origin, .. } = setting;
     let value = value.as_deref().unwrap_or_default();
@@ -222,7 +222,7 @@ fn as_given(setting: &Setting) -> String {
     }
 }
 
-/// Warns that all is blurred alike, as there is no depth. Not for those who chose to do without.
+/// Warns that everything is blurred equally for lack of depth; not for users who chose to do without.
 pub fn warn_of_no_depth(source: From) {
     let fix = match source {
         From::Picture => {
@@ -271,7 +271,7 @@ mod tests {
         let all = all_settings();
         let is_camera = |name: &&str| ["format", "control"].contains(name);
         let is_setting = |name: &&str| all.get_arguments().any(|arg| arg.get_long() == Some(name));
-        let is_of_window = |name: &&str| STATED_BY_WINDOW.contains(name) || GIVEN_TO_WINDOW.contains(name);
+        let is_of_window = |name: &&str| WINDOW_STATE.contains(name) || WINDOW_START.contains(name);
         let window = |name: &&str| cfg!(feature = "window") || !is_of_window(name);
         assert!(names.iter().all(|name| is_setting(name) || is_camera(name) || !window(name)), "{names:?}");
         names.sort_unstable();

@@ -1,54 +1,54 @@
-//! A kernel and its low-rank approximations, and how far they are from each other.
+//! A kernel and the errors of its low-rank approximations.
 
 use serde::Serialize;
 
 use bokehcam::bokeh::aperture::Mask;
 use bokehcam::bokeh::low_rank::Decomposition;
 
-/// The error curves end at this rank.
+/// Largest rank of the error curves.
 const LAST_PLOTTED_RANK: usize = 16;
 
-/// A kernel of unit sum, and its approximations.
+/// A kernel of unit sum, with its approximations.
 pub struct Analysis {
-    /// The aperture as it was written.
+    /// The aperture as a setting.
     pub name: String,
     /// Rows and columns of the kernel.
     pub size: usize,
     /// `size * size` taps, row-major, their sum 1.
     pub kernel: Vec<f64>,
-    /// The largest tap: what the errors are relative to.
+    /// The largest tap, to which errors are relative.
     pub plateau: f64,
-    /// One for each rank that was asked for.
+    /// One per requested rank.
     pub approximations: Vec<Approximation>,
     /// `sqrt(sum_{i>r} sigma_i^2 / sum sigma_i^2)` for r = 1, 2, ...
     pub truncation_errors: Vec<f64>,
-    /// Singular values, the largest first.
+    /// Singular values in descending order.
     pub sigma: Vec<f64>,
-    /// Singular values that are more than rounding.
+    /// Number of singular values above rounding errors.
     pub numerical_rank: usize,
 }
 
-/// A kernel from its first terms, scaled to unit sum again.
+/// The kernel from its first terms, normalised to unit sum.
 pub struct Approximation {
     /// Terms of the sum.
     pub rank: usize,
     /// `size * size` taps, row-major, their sum 1.
     pub taps: Vec<f64>,
-    /// How far it is from the kernel.
+    /// The errors relative to the kernel.
     pub errors: RankErrors,
 }
 
-/// How far an approximation is from the kernel.
+/// The errors of an approximation.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct RankErrors {
     rank: usize,
     /// Frobenius norm of the difference over that of the kernel, both of unit sum.
     relative_error: f64,
-    /// The same before the approximation is scaled to unit sum: the tail of the singular values.
+    /// Relative error before normalisation to unit sum: the tail of the singular values.
     truncation_error: f64,
     /// Largest absolute difference over the kernel's largest tap.
     largest_error: f64,
-    /// Most negative tap over the kernel's largest tap; 0 when there is none.
+    /// Most negative tap over the kernel's largest tap; 0 without negative taps.
     most_negative_tap: f64,
 }
 

@@ -1,4 +1,4 @@
-//! What a rank costs in shape, for any aperture (after McGraw's figures 3 to 5).
+//! The effect of the rank on an aperture's shape (after McGraw's figures 3 to 5).
 
 mod analysis;
 mod plot;

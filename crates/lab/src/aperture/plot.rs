@@ -1,13 +1,13 @@
-//! Error over rank of several apertures, as SVG.
+//! Plots error over rank of several apertures as SVG.
 
 use plotters::prelude::*;
 
 use super::analysis::Analysis;
 
 const SIZE_PX: (u32, u32) = (880, 560);
-/// The error axis ends here, in percent; what is smaller is not drawn.
-const LEAST_PERCENT: f64 = 0.01;
-/// Colours that stay apart for the colour-blind (Okabe and Ito 2008).
+/// Lower end of the error axis in percent; smaller errors are not drawn.
+const MIN_PERCENT: f64 = 0.01;
+/// Colours that colour-blind people can distinguish (Okabe and Ito 2008).
 const COLORS: [RGBColor; 7] = [
     RGBColor(0, 0, 0),
     RGBColor(230, 159, 0),
@@ -18,10 +18,10 @@ const COLORS: [RGBColor; 7] = [
     RGBColor(0, 114, 178),
 ];
 
-/// The diagram: truncation error in percent, on a logarithmic axis, over the number of separable terms.
+/// Plots truncation error in percent on a logarithmic axis over the number of separable terms.
 ///
 /// # Errors
-/// The drawing library refuses.
+/// The drawing library fails.
 pub fn error_by_rank(analyses: &[Analysis], size_px: u16, rim: f32) -> Result<String, String> {
     let mut svg = String::new();
     let area = SVGBackend::with_string(&mut svg, SIZE_PX).into_drawing_area();
@@ -32,7 +32,7 @@ pub fn error_by_rank(analyses: &[Analysis], size_px: u16, rim: f32) -> Result<St
 
 type Area<'a> = DrawingArea<SVGBackend<'a>, plotters::coord::Shift>;
 
-/// Draws the whole diagram: one curve and one entry of the legend for each aperture.
+/// Draws the whole diagram: one curve and one legend entry per aperture.
 fn draw(
     area: &Area,
     analyses: &[Analysis],
@@ -41,9 +41,9 @@ fn draw(
 ) -> Result<(), DrawingAreaErrorKind<std::io::Error>> {
     area.fill(&WHITE)?;
     let ranks = analyses.iter().map(|analysis| analysis.truncation_errors.len()).max().unwrap_or(1);
-    let visible_percent = |error: &f64| Some(error * 100.0).filter(|&percent| percent >= LEAST_PERCENT);
+    let visible_percent = |error: &f64| Some(error * 100.0).filter(|&percent| percent >= MIN_PERCENT);
     let errors = analyses.iter().flat_map(|analysis| analysis.truncation_errors.iter().filter_map(visible_percent));
-    // Down to a power of ten, and over at least the decade from 10 to 100 %.
+    // Round down to a power of ten, and cover at least the decade from 10 to 100 %.
     let (low, high) = (10f64.powf(errors.fold(10.0, f64::min).log10().floor()), 100.0);
     let mut chart = ChartBuilder::on(area)
         .caption(
@@ -67,7 +67,7 @@ fn draw(
         .light_line_style(BLACK.mix(0.06))
         .draw()?;
     for (analysis, color) in analyses.iter().zip(COLORS.iter().cycle()) {
-        // Beyond its exact rank a kernel has no error to draw.
+        // At its exact rank a kernel has no error to draw.
         let points: Vec<(f64, f64)> =
             (1..).map(f64::from).zip(analysis.truncation_errors.iter().map_while(visible_percent)).collect();
         let line = color.stroke_width(2);

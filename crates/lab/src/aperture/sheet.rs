@@ -1,4 +1,4 @@
-//! A picture of one aperture's analysis: kernel and approximations above, signed differences below.
+//! Draws the analysis of one aperture: kernel and approximations above, signed differences below.
 
 use super::analysis::Analysis;
 use bokehcam::color::encode_srgb;
@@ -6,11 +6,11 @@ use bokehcam::frame::ColorImage;
 
 /// Space around and between the panels, in pixels.
 const MARGIN_PX: usize = 12;
-/// Height of the line in which the ranks are written, in pixels.
+/// Height of the line with the ranks, in pixels.
 const LABEL_PX: usize = 26;
-/// Panels are magnified to about this side, in pixels.
+/// Approximate side of a magnified panel, in pixels.
 const PANEL_PX: usize = 200;
-/// A difference of this share of the plateau has the full colour.
+/// A difference of this fraction of the plateau gets the full colour.
 const FULL_DIFFERENCE: f64 = 0.5;
 
 const PAPER: [u8; 3] = [228, 228, 228];
@@ -34,8 +34,8 @@ const DIGITS: [u16; 10] = [
 /// Pixels per cell of a digit.
 const DIGIT_CELL_PX: usize = 3;
 
-/// The sheet: the kernel, then one column per rank, headed by the rank. Negative taps of an approximation are blue;
-/// a difference is red where the approximation has too much and blue where it has too little.
+/// Draws the sheet: the kernel, then one column per rank under its number. Negative taps of an approximation are blue;
+/// a difference is red where the approximation is too large, and blue where it is too small.
 pub fn draw(analysis: &Analysis) -> ColorImage {
     let zoom = (PANEL_PX / analysis.size).max(1);
     let panel = analysis.size * zoom;
@@ -58,10 +58,10 @@ pub fn draw(analysis: &Analysis) -> ColorImage {
     sheet.image
 }
 
-/// The colour of a tap relative to the plateau: black to white for 0 to 1, blue below 0.
+/// Returns the colour of a tap relative to the plateau: black to white for 0 to 1, blue below 0.
 fn tap_color(tap: f64) -> [u8; 3] {
     if tap < 0.0 {
-        // The root lifts faint negative lobes out of the black.
+        // The square root makes faint negative lobes visible.
         let strength = (-tap / FULL_DIFFERENCE).min(1.0).sqrt();
         return BLUE.map(|channel| (channel * strength) as u8);
     }
@@ -83,7 +83,7 @@ struct Sheet {
 }
 
 impl Sheet {
-    /// Draws `size * size` colours, row by row, as a panel with its corner at (`left`, `top`).
+    /// Draws `size * size` colours in row-major order as a panel with its corner at (`left`, `top`).
     fn panel(&mut self, left: usize, top: usize, colors: impl Iterator<Item = [u8; 3]>) {
         for (cell, color) in colors.enumerate() {
             let (column, row) = (cell % self.size, cell / self.size);
@@ -94,7 +94,7 @@ impl Sheet {
     /// Draws a number in the label line, centred over the panel at `left` that is `panel` pixels wide.
     fn number(&mut self, left: usize, panel: usize, number: usize) {
         let digits = number.to_string();
-        // Three cells of a digit and one of space.
+        // Three cells for a digit and one for space.
         let advance = 4 * DIGIT_CELL_PX;
         let mut x = left + panel.saturating_sub(digits.len() * advance) / 2;
         let top = LABEL_PX.saturating_sub(5 * DIGIT_CELL_PX);

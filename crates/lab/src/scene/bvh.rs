@@ -1,35 +1,35 @@
-//! A tree of boxes over shapes, so that a ray tests a few of thousands.
+//! A bounding volume hierarchy, so that a ray tests only a few of thousands of shapes.
 
 use super::ray::{Bounds, Ray};
 use super::shape::Shape;
 
-/// A bounding volume hierarchy over the shapes of one part, whose leaves are ranges of `order`.
+/// A bounding volume hierarchy over the shapes of one part; its leaves are ranges of `order`.
 #[derive(Clone, Debug, Default)]
 pub struct Bvh {
     nodes: Vec<Node>,
-    /// Indices of the shapes.
+    /// Indices of the shapes, grouped by leaf.
     order: Vec<u32>,
 }
 
 #[derive(Clone, Copy, Debug)]
 struct Node {
     bounds: Bounds,
-    /// Where a leaf begins in `order`. For an inner node, the index of its second child; the first one is the next
+    /// For a leaf, its start in `order`. For an inner node, the index of its second child; the first one is the next
     /// node.
     first: u32,
-    /// Shapes in a leaf; 0 for an inner node.
+    /// Number of shapes in a leaf; 0 for an inner node.
     count: u32,
     /// Axis along which an inner node was split.
     axis: usize,
 }
 
-/// Nodes of at most this many shapes are leaves.
+/// A node of at most this many shapes is a leaf.
 const LEAF_SHAPES: usize = 3;
-/// Slices of equal width between which a node may be split.
+/// Number of equal slices between which a node can be split.
 const BUCKETS: usize = 12;
 
 impl Bvh {
-    /// The tree over `shapes`.
+    /// Builds the tree over `shapes`.
     pub fn new(shapes: &[Shape]) -> Self {
         let boxes: Vec<Bounds> = shapes.iter().map(Shape::bounds).collect();
         let mut tree = Self { nodes: Vec::new(), order: (0..shapes.len() as u32).collect() };
@@ -39,13 +39,13 @@ impl Bvh {
         tree
     }
 
-    /// The box around everything.
+    /// Returns the bounding box of all shapes.
     pub fn bounds(&self) -> Bounds {
         self.nodes.first().map_or(Bounds::EMPTY, |root| root.bounds)
     }
 
-    /// Adds the nodes for `order[start..end]`, and reorders that range by them. Splits along the longest axis, where the
-    /// surface area heuristic (sum of area times number of shapes of both sides) is least.
+    /// Adds the nodes for `order[start..end]`, and sorts that range. Splits along the longest axis where the surface
+    /// area heuristic (sum of area times number of shapes of both sides) is minimal; binned SAH, Wald 2007.
     fn split(&mut self, boxes: &[Bounds], start: usize, end: usize) {
         let box_of = |shape: &u32| boxes[*shape as usize];
         let bounds = self.order[start..end].iter().map(box_of).fold(Bounds::EMPTY, Bounds::join);
@@ -83,17 +83,17 @@ impl Bvh {
         let Some(at) = (1..BUCKETS).min_by(|a, b| cost_at(*a).total_cmp(&cost_at(*b))) else { return };
         self.order[start..end].sort_by_key(|shape| bucket(&box_of(shape)));
         let middle = start + filled[..at].iter().map(|s| s.1).sum::<usize>();
-        // An inner node from here on: its first child comes right after it.
+        // From here on it is an inner node: its first child comes right after it.
         self.nodes[index].count = 0;
         self.split(boxes, start, middle);
         self.nodes[index].first = self.nodes.len() as u32;
         self.split(boxes, middle, end);
     }
 
-    /// The nearest shape that the ray meets before `t_max`: `t` and the shape's index.
+    /// Returns the nearest hit before `t_max`: `t` and the shape's index.
     pub fn intersect(&self, shapes: &[Shape], ray: &Ray, mut t_max: f32) -> Option<(f32, u32)> {
         let mut found = None;
-        // One entry a level of the tree at most, and one: trees over scenes of hundreds of shapes have some 20.
+        // At most one entry per level of the tree and one more; trees over hundreds of shapes have about 20 levels.
         let mut stack = [0u32; 64];
         let mut stacked = usize::from(!self.nodes.is_empty());
         while stacked > 0 {
@@ -110,7 +110,7 @@ impl Bvh {
                     }
                 }
             } else {
-                // The child that the ray comes to first is taken first: it is last on the stack.
+                // The near child is pushed last, so it is visited first.
                 let (near, far) =
                     if ray.direction[node.axis] > 0.0 { (index + 1, node.first) } else { (node.first, index + 1) };
                 stack[stacked] = far;

@@ -1,10 +1,10 @@
-//! A signed distance function sampled on a grid, which is faster to read many times than the function is to compute.
+//! A signed distance function sampled on a grid, which is cheaper to look up than to evaluate.
 
 use glam::{UVec3, Vec3};
 
 use super::ray::Bounds;
 
-/// A signed distance in metres (a lower bound of it suffices), negative inside.
+/// A signed distance in metres, negative inside; a lower bound suffices.
 pub type Distance = fn(Vec3) -> f32;
 
 /// Distances at the corners of cubic cells.
@@ -14,7 +14,7 @@ pub struct Grid {
     cell_m: f32,
     cells_per_m: f32,
     size: UVec3,
-    /// `size.z * size.y * size.x` metres, `x` fastest.
+    /// `size.z * size.y * size.x` distances in metres, `x` fastest.
     gaps_m: Vec<f32>,
 }
 
@@ -31,12 +31,13 @@ impl Grid {
         Self { bounds: Bounds { low: bounds.low, high }, cell_m, cells_per_m: cell_m.recip(), size, gaps_m }
     }
 
-    /// The size of a cell, in metres.
+    /// Returns the size of a cell, in metres.
     pub fn cell_m(&self) -> f32 {
         self.cell_m
     }
 
-    /// The distance at `p` in metres, interpolated: off by less than a cell. Outside, the way to the grid is added.
+    /// Returns the interpolated distance at `p` in metres; the error is less than a cell. Outside, adds the distance to
+    /// the grid.
     #[inline]
     pub fn gap_m(&self, p: Vec3) -> f32 {
         let inside = p.clamp(self.bounds.low, self.bounds.high);
@@ -64,7 +65,7 @@ mod tests {
         for k in 0..1000u32 {
             let p = 1.6 * (Vec3::new((k % 10) as f32, (k / 10 % 10) as f32, (k / 100) as f32) / 9.0 - 0.5);
             let gap_m = grid.gap_m(p);
-            // Outside the box the way to the box is added, which is at most that much too long.
+            // Outside the box the distance to the box is added, an overestimate of at most twice that.
             let outside_m = (p - p.clamp(Vec3::splat(-0.5), Vec3::splat(0.5))).length();
             assert!(gap_m >= ball(p) - 0.02 && gap_m <= ball(p) + 0.02 + 2.0 * outside_m, "{p}: {gap_m}");
         }

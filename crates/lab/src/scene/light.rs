@@ -1,7 +1,7 @@
-//! Light: a few lamps, light from all around, and what is in their way.
+//! Lighting: a few lamps, ambient light, and their occlusion.
 //!
 //! Everything here is a smooth function of the point (soft shadows come from distances, not from random rays), so
-//! pictures have no grain, however few rays they are made of.
+//! pictures have no noise even with few rays.
 
 use glam::Vec3;
 
@@ -10,29 +10,29 @@ use super::part::Surface;
 
 #[derive(Clone, Copy, Debug)]
 pub struct Light {
-    /// Where it is, in metres.
+    /// Position in metres.
     pub position: Vec3,
-    /// What a white surface 1 m away, facing it, shines with (linear, 1 = white).
+    /// Radiance of a white surface at 1 m that faces it (linear, 1 = white).
     pub power: Vec3,
-    /// Radius of the lamp over its distance: how soft its shadows are.
+    /// Radius of the lamp over its distance: the softness of its shadows.
     pub softness: f32,
     /// Parts cast shadows on themselves only if the light is nearer than this, in metres.
     pub casts_within_m: f32,
 }
 
-/// Light from all around, by the direction that a surface faces.
+/// Ambient light, by the direction that a surface faces.
 #[derive(Clone, Copy, Debug)]
 pub struct Ambient {
     pub above: Vec3,
     pub below: Vec3,
 }
 
-/// A ball in the way of light, in the world.
+/// A ball that occludes light, in world coordinates.
 #[derive(Clone, Copy, Debug)]
 pub struct Shade {
     pub centre: Vec3,
     pub radius: f32,
-    /// The part that it stands for: it does not shade that one.
+    /// The part that it represents, which it does not shade.
     pub part: usize,
 }
 
@@ -41,38 +41,38 @@ pub struct Shade {
 pub struct Lit<'a> {
     /// The point in the world, in metres.
     pub p: Vec3,
-    /// Unit vector to the eye.
+    /// Unit vector to the camera.
     pub to_eye: Vec3,
-    /// The surface, its directions in the world.
+    /// The surface, with its directions in world coordinates.
     pub surface: Surface,
     /// The part that it belongs to.
     pub part: usize,
     pub shades: &'a [Shade],
 }
 
-/// A part's form and the point in its frame, for what the part hides from itself.
+/// A part's form and a point in its frame, for self-occlusion.
 #[derive(Clone, Copy)]
 pub struct Form<'a> {
-    /// Distances from the form.
+    /// Distances to the form.
     pub grid: &'a Grid,
-    /// A world direction in the part's frame.
+    /// Rotates a world direction into the part's frame.
     pub to_local: &'a dyn Fn(Vec3) -> Vec3,
     /// The point in the part's frame.
     pub p: Vec3,
-    /// The unit normal of the form there, before roughening.
+    /// The unit normal of the form there, without bump mapping.
     pub normal: Vec3,
 }
 
-/// Light that contributes less than this (1 = white) gets no shadow: it would not be seen.
+/// Light that contributes less than this (1 = white) gets no shadow, as it would be invisible.
 const FAINT: f32 = 0.03;
-/// Balls further away than this shade nothing, in metres.
-const SHADE_REACH_M: f32 = 0.7;
+/// Balls farther away than this do not occlude, in metres.
+const SHADE_RADIUS_M: f32 = 0.7;
 
-/// The radiance that the point sends to the eye: reflected lamps and ambient light, and its own emission. `form` is
-/// that of its part, which hides light from itself.
+/// Returns the radiance from the point to the camera: reflected lamps and ambient light, plus emission. `form` is that
+/// of its part, for self-occlusion.
 pub fn shine(lit: &Lit, lights: &[Light], ambient: &Ambient, form: Option<Form>) -> Vec3 {
     let surface = &lit.surface;
-    let near = |s: &Shade| s.part != lit.part && s.centre.distance_squared(lit.p) < SHADE_REACH_M * SHADE_REACH_M;
+    let near = |s: &Shade| s.part != lit.part && s.centre.distance_squared(lit.p) < SHADE_RADIUS_M * SHADE_RADIUS_M;
     let shaded = lit.shades.iter().any(near);
     let mut open = surface.open * form.map_or(1.0, |f| openness(&f));
     if shaded {
@@ -91,7 +91,7 @@ pub fn shine(lit: &Lit, lights: &[Light], ambient: &Ambient, form: Option<Form>)
         if (lambert + lobe) * strength.max_element() <= 0.0 {
             continue;
         }
-        // Cavities that only the paint knows of hide some of each lamp, too.
+        // Cavities of the paint, which the geometry lacks, also hide part of each lamp.
         let mut seen = 0.4 + 0.6 * surface.open;
         if lambert.max(lobe) * strength.max_element() > FAINT {
             if shaded {
@@ -107,12 +107,12 @@ pub fn shine(lit: &Lit, lights: &[Light], ambient: &Ambient, form: Option<Form>)
     surface.albedo * diffuse + highlight + surface.emission
 }
 
-/// The shares of a lamp's light that are reflected to the eye diffusely, and in the highlight (Blinn and Phong's).
+/// Returns the fractions of a lamp's light reflected to the camera: diffuse, and in the highlight (Blinn-Phong).
 fn reflection(surface: &Surface, to_light: Vec3, to_eye: Vec3) -> (f32, f32) {
     let half = (to_light + to_eye).normalize_or_zero();
     let facing = surface.normal.dot(to_light);
     if surface.fibre != Vec3::ZERO {
-        // Kajiya and Kay's model of hair: bright across the fibre, dark along.
+        // Hair after Kajiya and Kay 1989: bright across the fibre, dark along it.
         let across = |v: Vec3| (1.0 - surface.fibre.dot(v).powi(2)).max(0.0).sqrt();
         let around = ((facing + 0.6) / 1.6).clamp(0.0, 1.0);
         return (across(to_light) * around, surface.gloss * across(half).powf(surface.shine) * around);
@@ -122,28 +122,28 @@ fn reflection(surface: &Surface, to_light: Vec3, to_eye: Vec3) -> (f32, f32) {
         return (lambert, 0.0);
     }
     let lobe = surface.normal.dot(half).max(0.0).powf(surface.shine);
-    // Stronger at grazing angles, as by Fresnel; it fades in where the surface begins to face the lamp.
+    // Stronger at grazing angles, like Fresnel reflection; fades in where the surface begins to face the lamp.
     let edge = 1.0 + 3.0 * (1.0 - half.dot(to_eye).max(0.0)).powi(5);
     (lambert, surface.gloss * lobe * edge * facing.min(0.25) * 4.0)
 }
 
-/// How much of the surroundings the part's own form leaves open, 0 to 1: ambient occlusion by how much smaller the
-/// distances along the normal are than the way there.
+/// Returns how open the part's own form leaves the surroundings, 0 to 1: ambient occlusion from how much smaller the
+/// distances along the normal are than the distances travelled.
 fn openness(form: &Form) -> f32 {
-    // Cells along the normal, and weights. The grid has no detail finer than a cell: they start at one and a half.
+    // Distances along the normal in cells, and weights. They start at 1.5, as the grid has no detail finer than a cell.
     let taps = [(1.5, 1.0), (4.0, 0.7), (10.0, 0.45), (24.0, 0.28)].map(|(n, weight)| (n * form.grid.cell_m(), weight));
     let (mut hidden, mut total) = (0.0, 0.0);
-    for (reach_m, weight) in taps {
-        let gap_m = form.grid.gap_m(form.p + reach_m * form.normal);
-        hidden += weight * (1.0 - (gap_m / reach_m).clamp(0.0, 1.0));
+    for (range_m, weight) in taps {
+        let gap_m = form.grid.gap_m(form.p + range_m * form.normal);
+        hidden += weight * (1.0 - (gap_m / range_m).clamp(0.0, 1.0));
         total += weight;
     }
     (1.0 - 1.15 * hidden / total).max(0.0)
 }
 
-/// The share of a lamp that is seen past the part's own form, 0 to 1, after Quilez's soft shadows.
+/// Returns the visible fraction of a lamp past the part's own form, 0 to 1 (soft shadows after I. Quilez).
 fn form_visibility(form: &Form, direction: Vec3, distance_m: f32, softness: f32) -> f32 {
-    let reach_m = distance_m.min(1.2);
+    let range_m = distance_m.min(1.2);
     let cell_m = form.grid.cell_m();
     let start = form.p + 0.7 * cell_m * form.normal;
     let (mut seen, mut along_m) = (1.0f32, 1.2 * cell_m);
@@ -154,14 +154,14 @@ fn form_visibility(form: &Form, direction: Vec3, distance_m: f32, softness: f32)
             return 0.0;
         }
         along_m += gap_m.clamp(1.5 * cell_m, 0.4);
-        if along_m > reach_m {
+        if along_m > range_m {
             break;
         }
     }
     smooth(seen)
 }
 
-/// The share of a lamp that is seen past the [`Shade`]s of other parts, 0 to 1.
+/// Returns the visible fraction of a lamp past the [`Shade`]s of other parts, 0 to 1.
 fn shades_visibility(lit: &Lit, direction: Vec3, distance_m: f32, softness: f32) -> f32 {
     let mut seen = 1.0;
     for shade in lit.shades.iter().filter(|s| s.part != lit.part) {
@@ -176,7 +176,7 @@ fn shades_visibility(lit: &Lit, direction: Vec3, distance_m: f32, softness: f32)
     seen
 }
 
-/// How much of the surroundings the [`Shade`]s of other parts leave open, 0 to 1.
+/// Returns how open the [`Shade`]s of other parts leave the surroundings, 0 to 1.
 fn shades_openness(lit: &Lit) -> f32 {
     let mut open = 1.0;
     for shade in lit.shades.iter().filter(|s| s.part != lit.part) {
@@ -188,7 +188,7 @@ fn shades_openness(lit: &Lit) -> f32 {
     open
 }
 
-/// The smoothstep of `x` in 0..1.
+/// Returns the smoothstep of `x` in 0..1.
 fn smooth(x: f32) -> f32 {
     x * x * (3.0 - 2.0 * x)
 }

@@ -1,9 +1,9 @@
-//! A small ray caster with a moving portrait: the synthetic camera, the bundled recordings, and the physics that
-//! the blur is measured against.
+//! A small ray caster with a moving portrait, for the synthetic camera, the bundled recordings, and as the ground truth
+//! of the blur.
 //!
-//! The world is in metres, `x` right, `y` up, `z` away from the camera, whose left eye is at the origin and looks
-//! along `z`. A pixel's ray goes through `((column - cx) / focal_px, -(row - cy) / focal_px, 1)` with
-//! `cx = (width - 1) / 2`, `cy = (height - 1) / 2`: its parameter is the depth.
+//! The world is in metres, `x` right, `y` up, `z` away from the camera; the left camera is at the origin and looks
+//! along `z`. A pixel's ray has the direction `((column - cx) / focal_px, -(row - cy) / focal_px, 1)` with `cx = (width
+//! - 1) / 2`, `cy = (height - 1) / 2`, so its parameter is the depth.
 
 mod bvh;
 mod grid;
@@ -25,7 +25,7 @@ use light::{Ambient, Form, Light, Lit, Shade};
 use part::{Part, Spot};
 use ray::{Bounds, Pose, Ray};
 
-/// Things in space, lit, that repeat their motion after [`Scene::period_s`].
+/// A lit scene whose motion repeats after [`Scene::period_s`].
 #[derive(Clone, Debug)]
 pub struct Scene {
     parts: Vec<Part>,
@@ -38,38 +38,38 @@ pub struct Scene {
 }
 
 impl Scene {
-    /// A person at a table in a room in the evening: subject in focus at 1.2 m, a twig in front at half a metre,
-    /// furniture, a shelf and a window on a lit street behind.
+    /// Returns a person at a table in a room in the evening: subject in focus at 1.2 m, a twig in front at half a
+    /// metre; behind, furniture, a shelf and a window to a lit street.
     pub fn portrait() -> Scene {
         portrait::with_front()
     }
 
-    /// The same without what stands in front of the person: as a webcam sees most people.
+    /// Returns the portrait without objects in front of the person, as a webcam sees most people.
     pub fn sitter() -> Scene {
         Self::of(Situation::Sits)
     }
 
-    /// A person in a situation.
+    /// Returns a person in a situation.
     pub fn of(situation: Situation) -> Scene {
         portrait::of(Some(situation), situation)
     }
 
-    /// The same room without the person.
+    /// Returns the room of a situation without the person.
     pub fn room_of(situation: Situation) -> Scene {
         portrait::of(None, situation)
     }
 
-    /// Length of the seamless loop, in seconds.
+    /// Returns the length of the seamless loop, in seconds.
     pub fn period_s(&self) -> f64 {
         self.period_s
     }
 
-    /// Depth of the subject's face, in metres.
+    /// Returns the depth of the subject's face, in metres.
     pub fn focus_m(&self) -> f32 {
         self.focus_m
     }
 
-    /// The scene as it stands at `time_s`.
+    /// Returns the scene at `time_s`.
     fn at(&self, time_s: f64) -> Moment<'_> {
         let phase = (time_s / self.period_s).rem_euclid(1.0) as f32;
         let poses: Vec<Pose> = self.parts.iter().map(|part| (part.motion)(phase)).collect();
@@ -91,16 +91,16 @@ impl Scene {
     }
 }
 
-/// A scene at one time.
+/// A scene at one point in time.
 struct Moment<'a> {
     scene: &'a Scene,
     poses: Vec<Pose>,
-    /// Bounding box of each part, in the world.
+    /// Bounding box of each part, in world coordinates.
     boxes: Vec<Bounds>,
     shades: Vec<Shade>,
 }
 
-/// What a ray meets first.
+/// The first hit of a ray.
 #[derive(Clone, Copy)]
 struct Hit {
     t: f32,
@@ -109,7 +109,7 @@ struct Hit {
 }
 
 impl Moment<'_> {
-    /// The nearest hit along the ray.
+    /// Returns the nearest hit along the ray.
     fn intersect(&self, ray: &Ray) -> Option<Hit> {
         let mut hit: Option<Hit> = None;
         for (part, (group, pose)) in self.scene.parts.iter().zip(&self.poses).enumerate() {
@@ -125,23 +125,23 @@ impl Moment<'_> {
         hit
     }
 
-    /// The linear radiance that comes along the ray, and the depth where it comes from.
-    fn look(&self, ray: &Ray) -> (Vec3, f32) {
+    /// Returns the linear radiance along the ray, and the depth of its origin.
+    fn trace_ray(&self, ray: &Ray) -> (Vec3, f32) {
         match self.intersect(ray) {
             Some(hit) => (self.radiance(ray, hit), hit.t),
             None => (self.scene.background, 0.0),
         }
     }
 
-    /// The linear radiance that the surface at `hit` sends back along the ray. Shading is done in the world, the paint
-    /// and the part's own form are in the part's frame.
+    /// Returns the linear radiance of the surface at `hit` towards the ray's origin. Shading uses world coordinates;
+    /// paint and the part's own form use the part's frame.
     fn radiance(&self, ray: &Ray, hit: Hit) -> Vec3 {
         let (part, pose) = (&self.scene.parts[hit.part], &self.poses[hit.part]);
         let (shape, material) = (&part.shapes[hit.shape], &part.materials[hit.shape]);
         let p = ray.at(hit.t);
         let local = pose.to_local(p);
         let mut point = shape.surface(local);
-        // Open shapes are seen from both sides.
+        // Open shapes are visible from both sides.
         if (pose.turn * point.normal).dot(ray.unit) > 0.0 {
             point.normal = -point.normal;
         }
@@ -154,7 +154,7 @@ impl Moment<'_> {
             seed: material.seed,
         };
         let mut surface = (material.paint)(&spot);
-        // A surface that reflects nothing needs no shadows.
+        // A surface without reflection needs no shadows.
         if surface.albedo == Vec3::ZERO && surface.gloss <= 0.0 {
             return surface.emission;
         }

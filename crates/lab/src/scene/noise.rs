@@ -1,45 +1,45 @@
-//! Hashes and value noise: the only source of randomness here, so every picture is the same on every run.
+//! Hashes and value noise: the only randomness here, so pictures are reproducible.
 
 use glam::Vec3;
 
-/// A well-mixed hash of a number.
+/// Returns a well-mixed hash of a number.
 pub fn hash(x: u32) -> u32 {
     let x = (x ^ (x >> 16)).wrapping_mul(0x7feb_352d);
     let x = (x ^ (x >> 15)).wrapping_mul(0x846c_a68b);
     x ^ (x >> 16)
 }
 
-/// The hash of `x` as a number in 0..1.
+/// Returns the hash of `x` as a number in 0..1.
 pub fn unit(x: u32) -> f32 {
     (hash(x) >> 8) as f32 / (1 << 24) as f32
 }
 
-/// The hash of a cell of the plane as a number in 0..1.
+/// Returns the hash of a cell of the plane as a number in 0..1.
 pub fn cell(x: i32, y: i32) -> f32 {
     unit((x as u32).wrapping_mul(0x9e37_79b1) ^ (y as u32).wrapping_mul(0x85eb_ca77))
 }
 
-/// A stream of numbers from a seed, for placing things.
+/// A pseudo-random number generator with a seed.
 pub struct Dice(u32);
 
 impl Dice {
-    /// The stream of `seed`.
+    /// Creates the generator of `seed`.
     pub fn new(seed: u32) -> Self {
         Self(hash(seed ^ 0x51ab_7e11))
     }
 
-    /// The next number in 0..1.
+    /// Returns the next number in 0..1.
     pub fn next(&mut self) -> f32 {
         self.0 = self.0.wrapping_add(0x9e37_79b9);
         unit(self.0)
     }
 
-    /// The next number in `low..high`.
+    /// Returns the next number in `low..high`.
     pub fn between(&mut self, low: f32, high: f32) -> f32 {
         low + (high - low) * self.next()
     }
 
-    /// A direction, evenly spread over the sphere.
+    /// Returns a direction, uniformly distributed over the sphere.
     pub fn direction(&mut self) -> Vec3 {
         let y = self.between(-1.0, 1.0);
         let (sin, cos) = (std::f32::consts::TAU * self.next()).sin_cos();
@@ -48,7 +48,7 @@ impl Dice {
     }
 }
 
-/// Smooth value noise in 0..1 with cells of size 1.
+/// Returns smooth value noise in 0..1 with cells of size 1.
 pub fn value(p: Vec3) -> f32 {
     let floor = p.floor();
     let f = p - floor;
@@ -66,14 +66,14 @@ pub fn value(p: Vec3) -> f32 {
     mix(mix(row(0, 0), row(1, 0), w.y), mix(row(0, 1), row(1, 1), w.y), w.z)
 }
 
-/// `octaves` of value noise, each twice as fine and half as strong, in 0..1.
+/// Returns `octaves` of value noise, each twice as fine and half as strong, in 0..1.
 pub fn fractal(mut p: Vec3, octaves: u32) -> f32 {
     let (mut sum, mut weight, mut total) = (0.0, 1.0, 0.0);
     for _ in 0..octaves {
         sum += weight * value(p);
         total += weight;
         weight *= 0.5;
-        // Not quite twice, and shifted, so that the cells of the octaves do not coincide.
+        // Not exactly doubled, and shifted, so that the cells of the octaves do not coincide.
         p = p * 2.03 + Vec3::splat(17.3);
     }
     sum / total

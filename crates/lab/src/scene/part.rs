@@ -1,4 +1,4 @@
-//! Rigid parts of a scene: shapes, what they are painted with, and how they move.
+//! Rigid parts of a scene: shapes, materials and motion.
 
 use std::sync::Arc;
 
@@ -9,10 +9,10 @@ use super::grid::Grid;
 use super::ray::Pose;
 use super::shape::Shape;
 
-/// A point of a surface to be painted, in the frame of its part.
+/// A surface point to be painted, in the frame of its part.
 #[derive(Clone, Copy, Debug)]
 pub struct Spot {
-    /// The point, in metres.
+    /// Position in metres.
     pub p: Vec3,
     pub normal: Vec3,
     /// Surface coordinates of the shape.
@@ -24,29 +24,29 @@ pub struct Spot {
     pub seed: u32,
 }
 
-/// How a surface answers light, at one point.
+/// The optical properties of a surface point.
 #[derive(Clone, Copy, Debug)]
 pub struct Surface {
     /// Diffuse reflectance, linear, 0 to 1.
     pub albedo: Vec3,
-    /// Radiance that it gives off by itself, linear, 1 = white.
+    /// Emitted radiance, linear, 1 = white.
     pub emission: Vec3,
-    /// Unit normal, perhaps roughened.
+    /// Unit normal, possibly bump-mapped.
     pub normal: Vec3,
     /// Strength of the highlight.
     pub gloss: f32,
-    /// Sharpness of the highlight: the exponent of its lobe.
+    /// Exponent of the highlight's lobe.
     pub shine: f32,
-    /// How far light creeps around the edge of shadow, 0 (hard) to 1 (skin, leaves, cloth).
+    /// How far light wraps around the edge of shadow, 0 (hard) to 1 (skin, leaves, cloth).
     pub wrap: f32,
-    /// Light from all around that reaches the point, 0 to 1, on top of what the part's own form hides.
+    /// Ambient light that reaches the point, 0 to 1, in addition to the occlusion by the part's own form.
     pub open: f32,
-    /// The direction of a fibre, which is lit as a thread rather than as a surface; zero for surfaces.
+    /// Direction of a fibre, which is shaded as a thread; zero for surfaces.
     pub fibre: Vec3,
 }
 
 impl Surface {
-    /// A dull surface of the given reflectance at the spot.
+    /// Creates a matt surface of the given reflectance.
     pub fn matt(spot: &Spot, albedo: Vec3) -> Self {
         Self {
             albedo,
@@ -65,25 +65,25 @@ impl Surface {
     }
 }
 
-/// Turns a spot into a surface.
+/// Computes the surface of a spot.
 pub type Paint = fn(&Spot) -> Surface;
 
-/// A paint with its colour and seed.
+/// A paint with colour and seed.
 #[derive(Clone, Copy, Debug)]
 pub struct Material {
     pub paint: Paint,
     pub tint: Vec3,
-    /// Sets apart things of the same paint.
+    /// Distinguishes objects with the same paint.
     pub seed: u32,
 }
 
 impl Material {
-    /// A paint of one colour.
+    /// Creates a material of one colour.
     pub fn new(paint: Paint, tint: Vec3) -> Self {
         Self { paint, tint, seed: 0 }
     }
 
-    /// The same paint with another seed.
+    /// Returns the material with another seed.
     pub fn seeded(self, seed: u32) -> Self {
         Self { seed, ..self }
     }
@@ -93,27 +93,27 @@ impl Material {
 #[derive(Clone, Debug)]
 pub struct Part {
     pub shapes: Vec<Shape>,
-    /// The paint of each shape.
+    /// The material of each shape.
     pub materials: Vec<Material>,
-    /// The tree over the shapes; made by [`Part::built`].
+    /// The tree over the shapes, built by [`Part::built`].
     pub tree: Bvh,
-    /// Where the part stands at a phase (0..1) of the loop.
+    /// The pose at a phase (0..1) of the loop.
     pub motion: fn(f32) -> Pose,
-    /// Roughly the part's form: what hides light from its own surfaces.
+    /// The approximate form, for self-occlusion.
     pub form: Option<Arc<Grid>>,
-    /// Whether it belongs to the person of a portrait.
+    /// Whether it belongs to the person.
     pub is_subject: bool,
     /// Balls (centre, radius in metres) that shade other parts.
     pub shades: Vec<(Vec3, f32)>,
 }
 
 impl Part {
-    /// A part without shapes that stays where it is.
+    /// Creates a static part without shapes.
     pub fn still() -> Self {
         Self::moving(|_| Pose::REST)
     }
 
-    /// A part without shapes that moves.
+    /// Creates a moving part without shapes.
     pub fn moving(motion: fn(f32) -> Pose) -> Self {
         Self {
             shapes: Vec::new(),
@@ -139,7 +139,7 @@ impl Part {
         }
     }
 
-    /// The part with its tree.
+    /// Returns the part with its tree.
     pub fn built(mut self) -> Self {
         self.tree = Bvh::new(&self.shapes);
         self

@@ -1,35 +1,36 @@
-//! Rays, boxes around things, and rigid poses.
+//! Rays, bounding boxes, and rigid poses.
 
 use glam::{Mat3, Vec3};
 
-/// A half line. `origin + t * direction`; for a camera ray `direction.z` is 1, so that `t` is the depth in metres.
+/// A half line `origin + t * direction`. For a camera ray `direction.z` is 1, so `t` is the depth in metres.
 #[derive(Clone, Copy, Debug)]
 pub struct Ray {
     pub origin: Vec3,
     /// Step per unit of `t`, of any length.
     pub direction: Vec3,
-    /// `direction` at length 1.
+    /// `direction`, normalised.
     pub unit: Vec3,
     /// Length of `direction`.
     pub length: f32,
-    /// One over each component of `direction`.
+    /// Reciprocals of the components of `direction`.
     pub inverse: Vec3,
 }
 
 impl Ray {
-    /// The ray from `origin` along `direction`.
+    /// Creates the ray from `origin` along `direction`.
     pub fn new(origin: Vec3, direction: Vec3) -> Self {
         let length = direction.length();
         Self { origin, direction, unit: direction / length, length, inverse: direction.recip() }
     }
 
-    /// The point at `t`.
+    /// Returns the point at `t`.
     pub fn at(&self, t: f32) -> Vec3 {
         self.origin + t * self.direction
     }
 
-    /// The point of the ray nearest to `p`, and how far along in metres: intersections are computed from there,
-    /// because a hair's radius squared is lost in the rounding of a squared camera distance.
+    /// Returns the point of the ray nearest to `p`, and its distance along the ray in metres. Intersections are
+    /// computed from there, because the square of a hair's radius would be lost in the rounding of a squared camera
+    /// distance.
     pub fn near(&self, p: Vec3) -> (Vec3, f32) {
         let along_m = (p - self.origin).dot(self.unit);
         (self.origin + along_m * self.unit, along_m)
@@ -38,22 +39,22 @@ impl Ray {
 
 #[derive(Clone, Copy, Debug)]
 pub struct Bounds {
-    /// The corner of the lowest coordinates.
+    /// The corner with the lowest coordinates.
     pub low: Vec3,
-    /// The corner of the highest coordinates.
+    /// The corner with the highest coordinates.
     pub high: Vec3,
 }
 
 impl Bounds {
-    /// The box that holds nothing.
+    /// The empty box.
     pub const EMPTY: Bounds = Bounds { low: Vec3::INFINITY, high: Vec3::NEG_INFINITY };
 
-    /// The box of `centre` and half its size.
+    /// Creates the box around `centre` with half its size.
     pub fn around(centre: Vec3, half: Vec3) -> Self {
         Self { low: centre - half, high: centre + half }
     }
 
-    /// The smallest box that holds both.
+    /// Returns the smallest box that contains both.
     pub fn join(self, other: Bounds) -> Self {
         Self { low: self.low.min(other.low), high: self.high.max(other.high) }
     }
@@ -62,20 +63,20 @@ impl Bounds {
         0.5 * (self.low + self.high)
     }
 
-    /// A box around the box as it stands in `pose`.
+    /// Returns a bounding box of the box in `pose`.
     pub fn posed(&self, pose: &Pose) -> Self {
         let (half, turn) = (0.5 * (self.high - self.low), pose.turn);
-        let reach = turn.x_axis.abs() * half.x + turn.y_axis.abs() * half.y + turn.z_axis.abs() * half.z;
-        Self::around(pose.to_world(self.centre()), reach)
+        let half_extent = turn.x_axis.abs() * half.x + turn.y_axis.abs() * half.y + turn.z_axis.abs() * half.z;
+        Self::around(pose.to_world(self.centre()), half_extent)
     }
 
-    /// Half the surface: what the chance of being hit by a ray is proportional to.
+    /// Returns half the surface area, to which the probability of a hit is proportional.
     pub fn half_area(&self) -> f32 {
         let d = (self.high - self.low).max(Vec3::ZERO);
         d.x * d.y + d.y * d.z + d.z * d.x
     }
 
-    /// Where the ray is inside, cut to `0..t_max`.
+    /// Returns the interval of the ray inside the box, clipped to `0..t_max`; `None` if it is empty.
     pub fn span(&self, ray: &Ray, t_max: f32) -> Option<(f32, f32)> {
         let a = (self.low - ray.origin) * ray.inverse;
         let b = (self.high - ray.origin) * ray.inverse;
@@ -85,39 +86,39 @@ impl Bounds {
     }
 }
 
-/// Where a part stands: `world = turn * local + place`.
+/// The pose of a part: `world = turn * local + place`.
 #[derive(Clone, Copy, Debug)]
 pub struct Pose {
     pub turn: Mat3,
-    /// Where the part's origin is, in metres.
+    /// Position of the part's origin, in metres.
     pub place: Vec3,
 }
 
 impl Pose {
-    /// At the origin, not turned.
+    /// The identity.
     pub const REST: Pose = Pose { turn: Mat3::IDENTITY, place: Vec3::ZERO };
 
-    /// `self` after `inner`.
+    /// Returns the composition: `inner` first, then `self`.
     pub fn over(self, inner: Pose) -> Pose {
         Pose { turn: self.turn * inner.turn, place: self.turn * inner.place + self.place }
     }
 
-    /// A turn about the point `pivot`.
+    /// Creates a rotation around the point `pivot`.
     pub fn about(pivot: Vec3, turn: Mat3) -> Pose {
         Pose { turn, place: pivot - turn * pivot }
     }
 
-    /// A world point in the part's frame.
+    /// Converts a world point to the part's frame.
     pub fn to_local(self, p: Vec3) -> Vec3 {
         self.turn.transpose() * (p - self.place)
     }
 
-    /// A point of the part in the world.
+    /// Converts a point of the part's frame to world coordinates.
     pub fn to_world(self, p: Vec3) -> Vec3 {
         self.turn * p + self.place
     }
 
-    /// The ray in the part's frame; `t` keeps its meaning.
+    /// Converts the ray to the part's frame; `t` keeps its meaning.
     pub fn ray_to_local(&self, ray: &Ray) -> Ray {
         Ray::new(self.to_local(ray.origin), self.turn.transpose() * ray.direction)
     }

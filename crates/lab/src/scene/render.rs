@@ -1,4 +1,4 @@
-//! Pictures of a scene: through a pinhole, and through a thin lens.
+//! Renders a scene through a pinhole or a thin lens.
 
 use std::sync::{Mutex, PoisonError};
 
@@ -9,7 +9,7 @@ use super::{Moment, Scene};
 use bokehcam::color::encode_srgb;
 use bokehcam::frame::{ColorImage, DepthMap, Mask};
 
-/// A camera: picture size, focal length, and which eye of a rectified pair.
+/// A camera: picture size, focal length, and position in a rectified pair.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct View {
     /// Columns.
@@ -18,27 +18,27 @@ pub struct View {
     pub height: u32,
     /// Focal length in pixels, for this width.
     pub focal_px: f32,
-    /// Where the eye is along `x`: 0 for the left (or only) one, the baseline in metres for the right one.
+    /// Position of the camera along `x`: 0 for the left (or only) one, the baseline in metres for the right one.
     pub eye_offset_m: f32,
 }
 
 impl View {
-    /// The view that the portrait was composed for: the focal length equals the picture's width (53 degrees).
+    /// Creates the view that the portrait was composed for: the focal length equals the picture's width (53 degrees).
     pub fn new(width: u32, height: u32) -> Self {
         Self { width, height, focal_px: width as f32, eye_offset_m: 0.0 }
     }
 
-    /// The same camera moved to the right by `baseline_m`.
+    /// Returns this camera moved to the right by `baseline_m`.
     pub fn right_eye(self, baseline_m: f32) -> Self {
         Self { eye_offset_m: self.eye_offset_m + baseline_m, ..self }
     }
 
-    /// Column and row of the optical axis; pixel centres are at whole numbers.
+    /// Returns column and row of the optical axis; pixel centres are at integers.
     pub fn principal_point_px(&self) -> Vec2 {
         0.5 * Vec2::new(self.width as f32 - 1.0, self.height as f32 - 1.0)
     }
 
-    /// Where the ray of the picture position `p_px` meets the plane at unit depth, seen from the eye.
+    /// Returns where the ray of the picture position `p_px` meets the plane at unit depth, relative to the camera.
     fn slope(&self, p_px: Vec2) -> Vec2 {
         let q = (p_px - self.principal_point_px()) / self.focal_px;
         Vec2::new(q.x, -q.y)
@@ -52,7 +52,7 @@ impl View {
         Ray::new(self.eye(), self.slope(p_px).extend(1.0))
     }
 
-    /// The ray that leaves the lens at `lens_m` (right and up of its middle) and meets the pinhole's ray at the
+    /// Returns the ray that leaves the lens at `lens_m` (right and up of its centre) and meets the pinhole ray at the
     /// focal plane.
     fn lens_ray(&self, p_px: Vec2, lens_m: Vec2, focus_m: f32) -> Ray {
         let direction = self.slope(p_px) - lens_m / focus_m;
@@ -60,20 +60,20 @@ impl View {
     }
 }
 
-/// A thin lens: a point at depth `z` becomes the aperture's picture, of radius `c = coc_at_infinity_px (1 -
-/// focus_m / z)` px, upright behind the focal plane (`c > 0`) and turned by 180 degrees in front of it.
+/// A thin lens: a point at depth `z` becomes an image of the aperture with radius `c = coc_at_infinity_px (1 - focus_m
+/// / z)` px, upright behind the focal plane (`c > 0`) and rotated by 180 degrees in front of it.
 #[derive(Clone, Copy, Debug)]
 pub struct ThinLens<'a> {
     /// CoC radius of a point at infinity, in pixels of the view.
     pub coc_at_infinity_px: f32,
     /// Depth of the focal plane, in metres, > 0.
     pub focus_m: f32,
-    /// Lens points `u` in the unit disc (x right, y down), evenly spread over the opening, one per ray: pixel `p`
-    /// sees depth `z` at `p + c(z) u`. A blur is smooth when its disc has no more pixels than there are points.
+    /// Lens points `u` in the unit disc (x right, y down), evenly distributed over the opening, one per ray: pixel `p`
+    /// sees depth `z` at `p + c(z) u`. A blur is smooth if its disc has no more pixels than there are points.
     pub aperture: &'a [DVec2],
 }
 
-/// Linear light: `height` x `width`, row-major, 1 = white, not limited.
+/// Linear light: `height` x `width`, row-major, 1 = white, not clipped.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LinearImage {
     /// Columns.
@@ -90,7 +90,7 @@ impl LinearImage {
         Self { width, height, rgb: vec![Vec3::ZERO; width as usize * height as usize] }
     }
 
-    /// The picture as 8-bit sRGB; what is brighter than white is white.
+    /// Returns the picture as 8-bit sRGB, clipped to white.
     pub fn to_srgb(&self) -> ColorImage {
         let mut image = ColorImage::new(self.width, self.height);
         for (bytes, light) in image.rgb.chunks_exact_mut(3).zip(&self.rgb) {
@@ -100,36 +100,36 @@ impl LinearImage {
     }
 }
 
-/// One picture through a lens, twice.
+/// One picture through a lens, in two versions.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LensPicture {
-    /// Every ray cut to white before the rays are averaged: the blur that can be known from the 8-bit picture.
+    /// Rays are clipped to white before averaging: the best blur that the 8-bit picture allows.
     pub clipped: LinearImage,
-    /// The rays as bright as they are: what a real lens does.
+    /// Rays are not clipped: the result of a real lens.
     pub hdr: LinearImage,
 }
 
-/// Where in its pixel ray `k` goes, in -0.5..0.5; ray 0 goes through the centre.
+/// Returns the offset of ray `k` in its pixel, in -0.5..0.5; ray 0 goes through the centre.
 fn pinhole_jitter(k: u32) -> Vec2 {
-    // The plane's most even additive sequence (after M. Roberts' R2).
+    // The most uniform additive sequence of the plane (M. Roberts' R2).
     additive_sequence(k, 0.754_877_666_246_692_8, 0.569_840_290_998_053_3)
 }
 
-/// As [`pinhole_jitter`], with steps that share no rhythm with the lens points of the same number.
+/// Returns offsets like [`pinhole_jitter`], with steps that do not correlate with the lens points of the same index.
 fn lens_jitter(k: u32) -> Vec2 {
     additive_sequence(k, std::f64::consts::SQRT_2, 1.732_050_807_568_877_2)
 }
 
-/// Point `k` of an additive sequence (of multiples of the steps modulo 1), in -0.5..0.5.
+/// Returns point `k` of an additive sequence (multiples of the steps modulo 1), in -0.5..0.5.
 fn additive_sequence(k: u32, step_x: f64, step_y: f64) -> Vec2 {
     let wrap = |step: f64| ((f64::from(k) * step + 0.5).fract() - 0.5) as f32;
     Vec2::new(wrap(step_x), wrap(step_y))
 }
 
 impl Scene {
-    /// The picture through a pinhole, `samples_per_pixel` (>= 1) rays to a pixel, each cut to white, averaged in
-    /// linear light; and the exact depth of every pixel centre (0 where there is nothing). Both are resized to the
-    /// view. The result does not depend on `threads` (>= 1).
+    /// Renders through a pinhole: `samples_per_pixel` (>= 1) rays per pixel, each clipped to white, averaged in linear
+    /// light; and the exact depth of every pixel centre (0 where there is nothing). Both are resized to the view. The
+    /// result does not depend on `threads` (>= 1).
     pub fn render_pinhole(
         &self,
         view: &View,
@@ -157,7 +157,7 @@ impl Scene {
         });
     }
 
-    /// How much of each pixel the person covers, 0 to 1, of as many rays as [`Self::render_pinhole`] takes.
+    /// Renders the person's alpha per pixel, 0 to 1, with the same rays as [`Self::render_pinhole`].
     pub fn render_coverage(&self, view: &View, time_s: f64, samples_per_pixel: u32, threads: usize) -> Mask {
         let mut mask = Mask::default();
         mask.resize(view.width, view.height);
@@ -167,28 +167,28 @@ impl Scene {
         let moment = self.at(time_s);
         let jitter: Vec<Vec2> = (0..samples_per_pixel.max(1)).map(pinhole_jitter).collect();
         let rows = mask.share.chunks_exact_mut(view.width as usize).enumerate();
-        for_each_parallel(rows, threads, |(row, shares)| {
-            for (column, share) in shares.iter_mut().enumerate() {
+        for_each_parallel(rows, threads, |(row, alphas)| {
+            for (column, alpha) in alphas.iter_mut().enumerate() {
                 let centre = Vec2::new(column as f32, row as f32);
                 let is_subject = |offset: &&Vec2| {
                     let hit = moment.intersect(&view.pinhole_ray(centre + **offset));
                     hit.is_some_and(|hit| self.parts[hit.part].is_subject)
                 };
-                *share = jitter.iter().filter(is_subject).count() as f32 / jitter.len() as f32;
+                *alpha = jitter.iter().filter(is_subject).count() as f32 / jitter.len() as f32;
             }
         });
         mask
     }
 
-    /// The picture through a thin lens, one ray per point of the aperture to each pixel, averaged in linear light
-    /// over the pixel and the lens. The result does not depend on `threads`; an aperture without points gives black.
+    /// Renders through a thin lens: one ray per aperture point and pixel, averaged in linear light over pixel and lens.
+    /// The result does not depend on `threads`; an aperture without points gives black.
     pub fn render_thin_lens(&self, view: &View, time_s: f64, lens: &ThinLens, threads: usize) -> LensPicture {
         let mut picture = LensPicture { clipped: LinearImage::black(view), hdr: LinearImage::black(view) };
         if lens.aperture.is_empty() || view.width == 0 {
             return picture;
         }
-        // A ray from the side -u of the lens is off by focal_px * radius_m * (1 / focus_m - 1 / z) u px at depth z:
-        // by c(z) u.
+        // A ray through the lens at -u is offset by focal_px * radius_m * (1 / focus_m - 1 / z) u px at depth z, which
+        // is c(z) u.
         let radius_m = lens.coc_at_infinity_px * lens.focus_m / view.focal_px;
         let moment = self.at(time_s);
         let samples: Vec<(Vec2, Vec2)> = (0..)
@@ -201,7 +201,7 @@ impl Scene {
             for (column, (clipped, hdr)) in clipped.iter_mut().zip(hdr).enumerate() {
                 let centre = Vec2::new(column as f32, row as f32);
                 for (jitter, lens_m) in &samples {
-                    let (light, _) = moment.look(&view.lens_ray(centre + *jitter, *lens_m, lens.focus_m));
+                    let (light, _) = moment.trace_ray(&view.lens_ray(centre + *jitter, *lens_m, lens.focus_m));
                     *clipped += light.min(Vec3::ONE);
                     *hdr += light;
                 }
@@ -214,11 +214,12 @@ impl Scene {
 }
 
 impl Moment<'_> {
-    /// The mean of the pixel's rays, each cut to white, and the depth along the first one, through the centre.
+    /// Returns the mean of the pixel's rays, each clipped to white, and the depth along the first one, through the
+    /// centre.
     fn pinhole_pixel(&self, view: &View, centre: Vec2, jitter: &[Vec2]) -> (Vec3, f32) {
         let (mut sum, mut depth_m) = (Vec3::ZERO, 0.0);
         for (k, offset) in jitter.iter().enumerate() {
-            let (light, z_m) = self.look(&view.pinhole_ray(centre + *offset));
+            let (light, z_m) = self.trace_ray(&view.pinhole_ray(centre + *offset));
             sum += light.min(Vec3::ONE);
             if k == 0 {
                 depth_m = z_m;
@@ -228,7 +229,7 @@ impl Moment<'_> {
     }
 }
 
-/// Does `work` for every item on `threads` threads, of which the caller's is one.
+/// Runs `work` for every item on `threads` threads, the caller's included.
 fn for_each_parallel<T: Send>(items: impl Iterator<Item = T> + Send, threads: usize, work: impl Fn(T) + Sync) {
     let items = Mutex::new(items);
     let run = || {

@@ -1,4 +1,4 @@
-//! The primitives: where a ray meets them, and what the surface is like there.
+//! The primitives: ray intersections and surface properties.
 
 use std::sync::Arc;
 
@@ -10,7 +10,7 @@ use super::ray::{Bounds, Ray};
 /// A closed or open surface.
 #[derive(Clone, Debug)]
 pub enum Shape {
-    /// The parallelogram `centre + u * right + v * up` for `u`, `v` in -1..1, where `cut` (u, v) holds.
+    /// The parallelogram `centre + u * right + v * up` for `u`, `v` in -1..1, restricted to `cut` (u, v).
     Quad {
         centre: Vec3,
         /// From the middle to the right edge.
@@ -24,20 +24,20 @@ pub enum Shape {
         centre: Vec3,
         radius: f32,
     },
-    /// A stretched ball: the points that `to_unit * (p - centre)` puts on the unit sphere.
+    /// An ellipsoid: the points that `to_unit * (p - centre)` maps to the unit sphere.
     Ellipsoid {
         centre: Vec3,
-        /// Shrinks the surface to the unit sphere.
+        /// Maps the surface to the unit sphere.
         to_unit: Mat3,
     },
-    /// A box, turned by `axes` (whose columns are the box's directions).
+    /// A box, rotated by `axes` (whose columns are the directions of its edges).
     Cuboid {
         centre: Vec3,
         axes: Mat3,
-        /// Half the edges in metres.
+        /// Half the edges, in metres.
         half: Vec3,
     },
-    /// Two balls and the cone that touches both: a hair, a twig.
+    /// Two balls and the cone tangent to both: a hair, a twig.
     Cone {
         a: Vec3,
         b: Vec3,
@@ -48,7 +48,7 @@ pub enum Shape {
     },
     /// The side of an upright frustum without lids: a lamp shade, a pot.
     Frustum {
-        /// Middle of the lower rim.
+        /// Centre of the lower rim.
         base: Vec3,
         height: f32,
         /// Radius of the lower rim.
@@ -59,30 +59,30 @@ pub enum Shape {
     /// The zero set of a distance function inside a box.
     Field {
         distance: Distance,
-        /// Where it is looked for.
+        /// The box to search.
         bounds: Bounds,
-        /// Distances nowhere larger than the function's, to a cell: the way to the surface is walked through them.
+        /// A grid of the function, accurate to a cell: sphere tracing uses it away from the surface.
         guide: Arc<Grid>,
     },
 }
 
-/// Outline of a [`Shape::Quad`] that fills its parallelogram.
+/// The outline of a [`Shape::Quad`] that fills its parallelogram.
 pub fn whole(_: Vec2) -> bool {
     true
 }
 
-/// A field counts as met this near its surface, in metres.
+/// A field counts as hit at this distance from its surface, in metres.
 const FIELD_TOLERANCE_M: f32 = 2e-5;
-/// Steps before a grazing ray is taken to miss a field.
+/// Maximum number of steps; a ray that needs more grazes the field and counts as a miss.
 const FIELD_STEPS: u32 = 160;
 
 impl Shape {
-    /// An ellipsoid of half axes `radii` (metres) along the columns of the rotation `axes`.
+    /// Creates an ellipsoid with half axes `radii` (metres) along the columns of the rotation `axes`.
     pub fn ellipsoid(centre: Vec3, axes: Mat3, radii: Vec3) -> Shape {
         Shape::Ellipsoid { centre, to_unit: Mat3::from_diagonal(radii.recip()) * axes.transpose() }
     }
 
-    /// A box around the shape.
+    /// Returns a bounding box of the shape.
     pub fn bounds(&self) -> Bounds {
         match *self {
             Shape::Quad { centre, right, up, .. } => Bounds::around(centre, right.abs() + up.abs() + Vec3::splat(1e-4)),
@@ -106,7 +106,7 @@ impl Shape {
         }
     }
 
-    /// The first `t` in `0..t_max` at which the ray meets the surface from outside (from either side for open
+    /// Returns the first `t` in `0..t_max` at which the ray meets the surface from outside (from either side for open
     /// shapes).
     pub fn intersect(&self, ray: &Ray, t_max: f32) -> Option<f32> {
         let t = match *self {
@@ -123,7 +123,7 @@ impl Shape {
                 let (p, along_m) = ray.near(centre);
                 let (o, d) = (to_unit * (p - centre), to_unit * ray.unit);
                 let (a, b) = (d.length_squared(), o.dot(d));
-                // The distance of the line from the middle by its own foot point keeps the precision.
+                // Computing the line's distance from the centre at its own foot point preserves precision.
                 let h = 1.0 - (o - d * (b / a)).length_squared();
                 if h < 0.0 {
                     return None;
@@ -140,8 +140,8 @@ impl Shape {
         (t > 0.0 && t < t_max).then_some(t)
     }
 
-    /// The outward unit normal at the surface's point `p`, and surface coordinates: `u`, `v` in -1..1 for a quad, the
-    /// way along (0..1) for a cone, angle and height (0..1) for a frustum, else zero.
+    /// Returns the outward unit normal at the surface point `p`, and surface coordinates: `u`, `v` in -1..1 for a quad,
+    /// the position along (0..1) for a cone, angle and height (0..1) for a frustum, zero otherwise.
     pub fn surface(&self, p: Vec3) -> SurfacePoint {
         let plain = |normal: Vec3| SurfacePoint {
             normal: normal.normalize_or(Vec3::NEG_Z),
@@ -171,7 +171,7 @@ impl Shape {
             Shape::Cone { a, b, radius_a, radius_b } => {
                 let ab = b - a;
                 let along = ((p - a).dot(ab) / ab.length_squared()).clamp(0.0, 1.0);
-                // Seen from the axis the side leans by the difference of the radii.
+                // The difference of the radii tilts the side relative to the axis.
                 let normal = (p - a - along * ab).normalize_or(Vec3::NEG_Z) * ab.length()
                     + ab.normalize_or_zero() * (radius_a - radius_b);
                 let tangent = ab.normalize_or(Vec3::Y);
@@ -184,7 +184,7 @@ impl Shape {
                 SurfacePoint { uv: Vec2::new(q.z.atan2(q.x), q.y / height), ..plain(side + lean * Vec3::Y) }
             }
             Shape::Field { distance, .. } => {
-                // Half the way between the samples, in metres: finer than any feature of a form.
+                // Half the distance between the samples, in metres: finer than any feature of a form.
                 let e = 2e-4;
                 // Four corners of a cube give the gradient with the fewest evaluations.
                 let corners =
@@ -195,7 +195,7 @@ impl Shape {
     }
 }
 
-/// Normal and coordinates of a surface at one of its points.
+/// Normal and coordinates of a surface point.
 #[derive(Clone, Copy, Debug)]
 pub struct SurfacePoint {
     pub normal: Vec3,
@@ -215,16 +215,17 @@ fn intersect_quad(ray: &Ray, centre: Vec3, right: Vec3, up: Vec3, cut: fn(Vec2) 
     (t.is_finite() && uv.abs().max_element() <= 1.0 && cut(uv)).then_some(t)
 }
 
-/// The slab test in the box's own axes.
+/// Intersects a box with the slab method in its own axes.
 fn intersect_cuboid(ray: &Ray, centre: Vec3, axes: Mat3, half: Vec3) -> Option<f32> {
     let inverse = (axes.transpose() * ray.direction).recip();
     let middle = (axes.transpose() * (centre - ray.origin)) * inverse;
-    let reach = half * inverse.abs();
-    let (enter, leave) = ((middle - reach).max_element(), (middle + reach).min_element());
+    let half_extent = half * inverse.abs();
+    let (enter, leave) = ((middle - half_extent).max_element(), (middle + half_extent).min_element());
     (enter <= leave && enter > 0.0).then_some(enter)
 }
 
-/// Metres along the ray to a cone with round ends (I. Quilez's rounded cone): first its side, then the two balls.
+/// Returns metres along the ray to a cone with round ends (I. Quilez's rounded cone): first its side, then the two
+/// balls.
 fn intersect_cone(ray: &Ray, a: Vec3, b: Vec3, radius_a: f32, radius_b: f32) -> Option<f32> {
     let (origin, along_m) = ray.near(0.5 * (a + b));
     let (ab, oa, ob, d) = (b - a, origin - a, origin - b, ray.unit);
@@ -239,7 +240,7 @@ fn intersect_cone(ray: &Ray, a: Vec3, b: Vec3, radius_a: f32, radius_b: f32) -> 
         return None;
     }
     let t = (-h.sqrt() - k1) / k2;
-    // Where along the axis the side is met: the balls take over beyond both rims.
+    // Position of the hit along the axis: beyond the rims the balls take over.
     let y = m1 - radius_a * shrink + t * m2;
     if y > 0.0 && y < side {
         return Some(along_m + t);
@@ -253,7 +254,7 @@ fn intersect_cone(ray: &Ray, a: Vec3, b: Vec3, radius_a: f32, radius_b: f32) -> 
     t.is_finite().then_some(along_m + t)
 }
 
-/// The first of the two points on the infinite cone that lies between the rims; the inside counts as well.
+/// Returns the first of the two hits on the infinite cone between the rims; the inside counts as well.
 fn intersect_frustum(ray: &Ray, base: Vec3, height: f32, low_radius: f32, high_radius: f32) -> Option<f32> {
     let (start, along_m) = ray.near(base + 0.5 * height * Vec3::Y);
     let (o, d) = (start - base, ray.unit);
@@ -273,8 +274,8 @@ fn intersect_frustum(ray: &Ray, base: Vec3, height: f32, low_radius: f32, high_r
         .find(|t| *t > 0.0)
 }
 
-/// Sphere tracing: in steps of the distance, by the guide as long as it is safely away from the surface, which saves
-/// computing the distance function.
+/// Sphere tracing (Hart 1996): steps by the guide while it is safely away from the surface, which saves evaluations of
+/// the distance function.
 fn intersect_field(ray: &Ray, distance: Distance, bounds: &Bounds, guide: &Grid, t_max: f32) -> Option<f32> {
     let (mut t, leave) = bounds.span(ray, t_max)?;
     for _ in 0..FIELD_STEPS {

@@ -1,4 +1,4 @@
-//! Bare scenes whose pictures are known by calculation: what a lens is measured with.
+//! Bare scenes with analytically known pictures, for measuring a lens.
 
 use glam::Vec3;
 
@@ -8,10 +8,10 @@ use super::noise;
 use super::part::{Material, Part, Spot, Surface};
 use super::shape::{Shape, whole};
 
-/// A small ball of light.
+/// A small luminous ball.
 #[derive(Clone, Copy, Debug)]
 pub struct PointLight {
-    /// Middle, in metres (x right, y up, z away from the camera).
+    /// Centre in metres (x right, y up, z away from the camera).
     pub centre_m: Vec3,
     /// Radius, in metres.
     pub radius_m: f32,
@@ -20,7 +20,7 @@ pub struct PointLight {
 }
 
 impl Scene {
-    /// Balls of light in the dark, which stay where they are.
+    /// Returns static luminous balls in the dark.
     pub fn lights(lights: &[PointLight]) -> Scene {
         let mut part = Part::still();
         for light in lights {
@@ -30,7 +30,7 @@ impl Scene {
         dark_scene(part, lights.first().map_or(1.0, |light| light.centre_m.z))
     }
 
-    /// A mottled wall that faces the camera, shines by itself, and fills every view narrower than 120 degrees.
+    /// Returns a mottled, luminous wall that faces the camera and fills every view narrower than 120 degrees.
     pub fn wall(depth_m: f32) -> Scene {
         let mut part = Part::still();
         let size_m = 2.0 * depth_m;
@@ -41,7 +41,7 @@ impl Scene {
     }
 }
 
-/// A scene of one part without lights: what is seen shines by itself.
+/// Creates a scene of one self-luminous part without lights.
 fn dark_scene(part: Part, focus_m: f32) -> Scene {
     Scene {
         parts: vec![part.built()],
@@ -58,7 +58,7 @@ fn glow(spot: &Spot) -> Surface {
 }
 
 fn mottle(spot: &Spot) -> Surface {
-    // By direction, so that the mottles have the same size in the picture at every depth.
+    // A function of direction, so that the mottles have the same size in the picture at every depth.
     let p = 25.0 * spot.p / spot.p.z.max(1e-3);
     let radiance = Vec3::new(noise::fractal(p, 3), noise::fractal(p + 7.0, 3), noise::fractal(p + 13.0, 3));
     Surface { emission: 0.1 + 0.8 * radiance, ..Surface::matt(spot, Vec3::ZERO) }

@@ -17,7 +17,7 @@ fn does(state: &State, key: Key, modifiers: Modifiers) -> Option<Action> {
 fn no_two_keys_are_the_same_and_each_says_what_it_does() {
     let mut seen = HashSet::new();
     for binding in GROUPS.iter().flat_map(|group| group.bindings) {
-        assert!(!binding.keys.is_empty() && !binding.does.is_empty());
+        assert!(!binding.keys.is_empty() && !binding.help.is_empty());
         let own: HashSet<_> = binding.chords.iter().map(|chord| (chord.key, chord.ctrl, chord.shift)).collect();
         for chord in own {
             assert!(seen.insert(chord), "{chord:?} is bound twice");
@@ -27,7 +27,7 @@ fn no_two_keys_are_the_same_and_each_says_what_it_does() {
 
 #[test]
 fn each_key_is_what_the_help_says() {
-    // Every name of the help is a key of its binding.
+    // Each chord's displayed name must begin with its first key.
     for binding in GROUPS.iter().flat_map(|group| group.bindings) {
         let first = binding.chords[0];
         let sign = match first.key {
@@ -96,7 +96,7 @@ fn keys_do_what_their_names_say() {
         (Key::Num0, ctrl, Action::TextScale(1.0)),
         (Key::Plus, ctrl | Modifiers::SHIFT, Action::TextScale(1.1)),
         (Key::Minus, ctrl, Action::TextScale(1.0 / 1.1)),
-        // A sign may need Shift on one keyboard and not on another.
+        // A character may need Shift on one keyboard layout and not on another.
         (Key::Questionmark, Modifiers::SHIFT, Action::Help(true)),
     ] {
         assert_eq!(does(&state, key, modifiers), Some(action), "{key:?} {modifiers:?}");

@@ -1,4 +1,4 @@
-//! Cards over the picture, with words and buttons.
+//! Cards over the picture, with text and buttons.
 
 use egui::{Align2, Area, Context, Id, Label, Margin, Order, Rect, RichText, Ui, pos2};
 
@@ -8,7 +8,7 @@ use super::state::Action;
 use super::theme::{Colors, GAP, card, medium};
 use crate::texts::tr;
 
-/// Draws a card where `area` says, no wider than `width` points nor than the window. Its rectangle.
+/// Draws a card in `area`, limited to `width` points and to the window's width. Returns its rectangle.
 pub fn show(
     ctx: &Context,
     area: Area,
@@ -28,32 +28,32 @@ pub fn title(ui: &mut Ui, text: &str) {
     ui.label(RichText::new(tr(text)).family(medium()).size(16.0));
 }
 
-/// A text of as many lines as it needs; none if it is empty.
-pub fn words(ui: &mut Ui, colors: &Colors, text: &str) {
+/// Adds wrapped text; nothing if it is empty.
+pub fn paragraph(ui: &mut Ui, colors: &Colors, text: &str) {
     if !text.is_empty() {
         ui.add(Label::new(RichText::new(tr(text)).color(colors.text)).wrap());
     }
 }
 
-/// Cards that are drawn one above the other at the bottom of the picture, clear of faces.
+/// Cards stacked upwards from the bottom of the picture, so that they do not cover faces.
 pub struct Stack<'a> {
     pub ctx: &'a Context,
-    /// Points from the bottom of the picture's room to the next card.
+    /// Distance from the bottom of the picture's area to the next card, in points.
     pub bottom: f32,
 }
 
 impl Stack<'_> {
-    /// Adds a card without controls. A click on it is not one on the picture below.
-    pub fn tell(&mut self, id: Id, width: f32, opacity: f32, text: &str) {
+    /// Adds a card without controls. A click on it does not reach the picture below.
+    pub fn add_text(&mut self, id: Id, width: f32, opacity: f32, text: &str) {
         let area = Area::new(id).order(Order::Foreground);
         self.add(area, width, Margin::symmetric(14, 9), |ui, colors| {
             ui.set_opacity(opacity);
-            words(ui, colors, text);
+            paragraph(ui, colors, text);
         });
     }
 
-    /// Adds a card with buttons: what each is called, its hint, and what it does.
-    pub fn ask(
+    /// Adds a card with buttons, given as text, hint and action.
+    pub fn add_buttons(
         &mut self,
         id: &str,
         width: f32,
@@ -64,7 +64,7 @@ impl Stack<'_> {
         let area = Area::new(Id::unique(id)).order(Order::Middle);
         self.add(area, width, 14, |ui, colors| {
             title(ui, heading);
-            words(ui, colors, why);
+            paragraph(ui, colors, why);
             ui.add_space(2.0);
             ui.horizontal_wrapped(|ui| {
                 for (text, hint, action) in buttons {
@@ -76,8 +76,8 @@ impl Stack<'_> {
         });
     }
 
-    /// Adds a card with what `content` draws.
-    pub fn card(&mut self, id: &str, width: f32, content: impl FnOnce(&mut Ui, &Colors)) {
+    /// Adds a card with custom content.
+    pub fn add_card(&mut self, id: &str, width: f32, content: impl FnOnce(&mut Ui, &Colors)) {
         self.add(Area::new(Id::unique(id)).order(Order::Foreground), width, Margin::symmetric(18, 10), content);
     }
 

@@ -1,58 +1,60 @@
-//! Where the panel stands: beside the picture or below it, whichever leaves it larger, and never on it.
+//! Layout of the panel: beside or below the picture, whichever leaves the picture larger; it never overlaps the
+//! picture.
 
 use egui::{Context, Id, Rect, Vec2, pos2, vec2};
 
 use super::theme::{GAP, PAD, WIDTH};
 
-/// Height of a row of the first screen, and the gap below it.
+/// Height of a row of the first screen, and the gap below it, in points.
 pub const CELL: f32 = 30.0;
 pub const CELL_GAP: f32 = 6.0;
-/// The least width of a control of the first screen, in any language.
-const LEAST_CELL: f32 = 196.0;
-/// The line around the panel.
+/// Minimum width of a control of the first screen that fits the labels of every language, in points.
+const MIN_CELL_WIDTH: f32 = 196.0;
+/// Width of the panel's border, in points.
 pub const LINE: f32 = 1.0;
-/// The controls of the first screen stand in so many cells.
+/// Number of cells that the controls of the first screen occupy.
 pub const CELLS: usize = 7;
-/// Beside the picture it is read as a list, and stays where it is when the window grows: it stands there unless the picture would
-/// be smaller than this share of what it is above the panel.
-const BESIDE: f32 = 0.75;
+/// Minimum ratio of the picture's scale beside the panel to its scale above it for the panel to stand beside it. The
+/// side is preferred because the panel reads as a list there and keeps its position when the window grows.
+const MIN_SCALE_RATIO: f32 = 0.75;
 
-/// The panel's place, and what it leaves.
+/// Areas of the panel and the picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Dock {
     pub panel: Rect,
-    /// For the picture, and all that is drawn over it.
+    /// Area for the picture and its overlays.
     pub room: Rect,
-    /// The controls of the first screen that stand side by side.
+    /// Number of columns of the first screen's controls.
     pub columns: usize,
 }
 
 impl Dock {
-    /// The place in a window for a picture of `size`; `more` is whether the panel shows all there is, and scrolls.
-    pub fn of(window: Rect, size: (u32, u32), more: bool) -> Self {
-        let (right, bottom) = (Self::beside(window), Self::below(window, more));
+    /// Computes the layout in a window for a picture of `size`. `expanded` is whether the panel is expanded, and
+    /// scrolls.
+    pub fn of(window: Rect, size: (u32, u32), expanded: bool) -> Self {
+        let (right, bottom) = (Self::at_right(window), Self::at_bottom(window, expanded));
         let scale = |dock: &Self| {
             let room = dock.room.size();
             (room.x / size.0.max(1) as f32).min(room.y / size.1.max(1) as f32)
         };
-        let is_wide = right.panel.width() >= LEAST_CELL + 2.0 * PAD;
-        if is_wide && scale(&right) >= BESIDE * scale(&bottom) { right } else { bottom }
+        let is_wide = right.panel.width() >= MIN_CELL_WIDTH + 2.0 * PAD;
+        if is_wide && scale(&right) >= MIN_SCALE_RATIO * scale(&bottom) { right } else { bottom }
     }
 
-    fn beside(window: Rect) -> Self {
+    fn at_right(window: Rect) -> Self {
         let width = (WIDTH + GAP).min(window.width() / 2.0);
         let at = window.right() - width;
         let panel = Rect::from_min_max(pos2(at, window.top() + GAP), window.max - vec2(GAP, GAP));
         Self { panel, room: Rect::from_min_max(window.min, pos2(at - GAP, window.bottom())), columns: 1 }
     }
 
-    fn below(window: Rect, more: bool) -> Self {
+    fn at_bottom(window: Rect, expanded: bool) -> Self {
         let inner = window.width() - 2.0 * (GAP + PAD);
-        let columns = (((inner + CELL_GAP) / (LEAST_CELL + CELL_GAP)) as usize).clamp(1, 4);
+        let columns = (((inner + CELL_GAP) / (MIN_CELL_WIDTH + CELL_GAP)) as usize).clamp(1, 4);
         let rows = CELLS.div_ceil(columns) as f32;
-        let least = rows * (CELL + CELL_GAP) - CELL_GAP + 2.0 * (PAD + LINE) + 2.0;
-        let most = window.height() * if more { 0.6 } else { 0.5 } - GAP;
-        let height = if more { most } else { least.min(most) }.max(0.0);
+        let min_height = rows * (CELL + CELL_GAP) - CELL_GAP + 2.0 * (PAD + LINE) + 2.0;
+        let max_height = window.height() * if expanded { 0.6 } else { 0.5 } - GAP;
+        let height = if expanded { max_height } else { min_height.min(max_height) }.max(0.0);
         let top = window.bottom() - GAP - height;
         let panel = Rect::from_min_max(pos2(window.left() + GAP, top), window.max - vec2(GAP, GAP));
         Self { panel, room: Rect::from_min_max(window.min, pos2(window.right(), top - GAP)), columns }
@@ -63,17 +65,17 @@ fn id() -> Id {
     Id::unique("room of the picture")
 }
 
-/// Takes note of what the panel leaves.
+/// Stores the area that the panel leaves free.
 pub fn set_room(ctx: &Context, room: Rect) {
     ctx.data_mut(|data| data.insert_temp(id(), room));
 }
 
-/// What the panel leaves of the window: for the picture, and all that is drawn over it.
+/// Returns the area that the panel leaves free, for the picture and its overlays.
 pub fn room(ctx: &Context) -> Rect {
     ctx.data(|data| data.get_temp(id())).unwrap_or_else(|| ctx.content_rect())
 }
 
-/// The room's size in pixels of the window.
+/// Returns the size of the free area in pixels of the window.
 pub fn room_px(ctx: &Context) -> (u32, u32) {
     let Vec2 { x, y } = room(ctx).size().max(Vec2::ZERO) * ctx.pixels_per_point();
     (x.round() as u32, y.round() as u32)

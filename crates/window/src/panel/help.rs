@@ -21,11 +21,11 @@ const GESTURES: [(&str, &str); 9] = [
     ("Tab", "from control to control; Space and the arrow keys change it"),
 ];
 
-/// Points that an arrow key scrolls.
+/// Scroll distance of an arrow key, in points.
 const LINE: f32 = 40.0;
 
-/// Draws the help over everything, in two columns where the window is wide. Enter or a click beside it closes it; the arrow
-/// and page keys scroll it.
+/// Draws the help as a modal, in two columns if the window is wide. Enter or a click outside closes it; the arrow and
+/// page keys scroll it.
 pub fn show(ctx: &Context, state: &State, actions: &mut Vec<Action>) {
     let window = ctx.content_rect();
     let columns = if window.width() > 720.0 { 2 } else { 1 };
@@ -53,18 +53,19 @@ pub fn show(ctx: &Context, state: &State, actions: &mut Vec<Action>) {
         if switch(ui, "Ask before closing", hint, asks) {
             actions.push(Action::AskBeforeClosing(!asks));
         }
+        // 100 points for the heading and the two switches.
         let height = (window.height() - 2.0 * (GAP + PAD) - 100.0).max(20.0);
         ScrollArea::vertical().max_height(height).show(ui, |ui| {
-            ui.scroll_with_delta(vec2(0.0, scrolled(ui, height)));
-            let gestures = |ui: &mut Ui| table(ui, "On the picture", GESTURES.into_iter());
+            ui.scroll_with_delta(vec2(0.0, scroll_distance(ui, height)));
+            let gestures = |ui: &mut Ui| add_table(ui, "On the picture", GESTURES.into_iter());
             if columns == 2 {
                 ui.columns_const(|[left, right]| {
-                    GROUPS[..3].iter().for_each(|group| keys(left, group));
-                    GROUPS[3..].iter().for_each(|group| keys(right, group));
+                    GROUPS[..3].iter().for_each(|group| add_keys(left, group));
+                    GROUPS[3..].iter().for_each(|group| add_keys(right, group));
                     gestures(right);
                 });
             } else {
-                GROUPS.iter().for_each(|group| keys(ui, group));
+                GROUPS.iter().for_each(|group| add_keys(ui, group));
                 gestures(ui);
             }
         });
@@ -74,8 +75,8 @@ pub fn show(ctx: &Context, state: &State, actions: &mut Vec<Action>) {
     }
 }
 
-/// How far the keys that were pressed scroll, in points: a page is `height`.
-fn scrolled(ui: &Ui, height: f32) -> f32 {
+/// Returns the scroll distance of the pressed keys in points; a page is `height`.
+fn scroll_distance(ui: &Ui, height: f32) -> f32 {
     let steps = [
         (Key::ArrowUp, LINE),
         (Key::ArrowDown, -LINE),
@@ -87,12 +88,12 @@ fn scrolled(ui: &Ui, height: f32) -> f32 {
     ui.input(|input| steps.iter().filter(|(key, _)| input.key_pressed(*key)).map(|(_, by)| by).sum())
 }
 
-fn keys(ui: &mut Ui, group: &Group) {
-    table(ui, group.name, group.bindings.iter().map(|binding| (binding.keys, binding.does)));
+fn add_keys(ui: &mut Ui, group: &Group) {
+    add_table(ui, group.name, group.bindings.iter().map(|binding| (binding.keys, binding.help)));
 }
 
-/// A titled table of keys or gestures and what they do.
-fn table<'a>(ui: &mut Ui, name: &str, rows: impl Iterator<Item = (&'a str, &'a str)>) {
+/// Adds a titled table of keys or gestures with their effects.
+fn add_table<'a>(ui: &mut Ui, name: &str, rows: impl Iterator<Item = (&'a str, &'a str)>) {
     let colors = Colors::here(ui);
     ui.spacing_mut().interact_size.y = 17.0;
     ui.add_space(8.0);

@@ -1,4 +1,4 @@
-//! Icons, drawn with a few lines.
+//! Icons drawn as line art.
 
 use std::f32::consts::TAU;
 
@@ -12,14 +12,14 @@ use crate::texts::tr;
 /// Side of an icon button, in points.
 pub const SIDE: f32 = 26.0;
 
-/// What an icon shows.
+/// The available icons.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Icon {
-    /// An arrow that turns back.
+    /// An arrow that curves to the left.
     Undo,
-    /// An arrow that turns forth.
+    /// An arrow that curves to the right.
     Redo,
-    /// A circle that begins anew.
+    /// A circular arrow.
     Reset,
     Help,
     Close,
@@ -27,16 +27,16 @@ pub enum Icon {
     Panel,
     Play,
     Pause,
-    /// One frame back.
+    /// Step one frame back.
     Back,
-    /// One frame on.
+    /// Step one frame forward.
     Forward,
 }
 
-/// Draws an icon button. Whether it was clicked.
+/// Adds an icon button. Returns whether it was clicked.
 pub fn button(ui: &mut Ui, icon: Icon, hint: &str, enabled: bool) -> bool {
     let colors = Colors::here(ui);
-    // What can no longer be done keeps the focus, from which the next control is reached.
+    // A button that becomes disabled keeps the focus, so that Tab continues from there.
     let id = ui.scope_id().with(hint);
     let keeps_focus = ui.memory(|memory| memory.has_focus(id));
     let sense = match (enabled, keeps_focus) {
@@ -61,17 +61,17 @@ fn draw(painter: &Painter, icon: Icon, at: Pos2, color: Color32) {
     match icon {
         Icon::Undo | Icon::Redo => {
             let side = if icon == Icon::Undo { -1.0 } else { 1.0 };
-            arc(painter, at + vec2(side, 1.5), 5.5, [0.5, 1.0], stroke);
+            draw_arc(painter, at + vec2(side, 1.5), 5.5, [0.5, 1.0], stroke);
             let tip = at + vec2(side * 6.5, 3.0);
             painter.add(Shape::line(vec![tip + vec2(-3.6, -3.4), tip, tip + vec2(3.6, -3.4)], stroke));
         }
         Icon::Reset => {
-            arc(painter, at, 6.0, [0.12, 0.92], stroke);
+            draw_arc(painter, at, 6.0, [0.12, 0.92], stroke);
             let tip = at + Vec2::angled(0.12 * TAU) * 6.0;
             painter.add(Shape::line(vec![tip + vec2(-4.6, -0.6), tip, tip + vec2(0.8, 4.6)], stroke));
         }
         Icon::Help => {
-            arc(painter, at + vec2(0.0, -3.0), 3.2, [0.5, 1.12], stroke);
+            draw_arc(painter, at + vec2(0.0, -3.0), 3.2, [0.5, 1.12], stroke);
             let foot = at + vec2(0.0, 2.0);
             painter.add(Shape::line(vec![at + vec2(2.3, -0.8), at + vec2(0.2, 0.7), foot], stroke));
             painter.circle_filled(at + vec2(0.0, 5.6), 1.2, color);
@@ -82,16 +82,16 @@ fn draw(painter: &Painter, icon: Icon, at: Pos2, color: Color32) {
                 painter.circle_filled(at + vec2(knob, y), 2.4, color);
             }
         }
-        Icon::Play => triangle(painter, at + vec2(1.0, 0.0), 1.0, color),
+        Icon::Play => draw_triangle(painter, at + vec2(1.0, 0.0), 1.0, color),
         Icon::Pause => {
             for x in [-3.5, 3.5] {
-                bar(painter, at + vec2(x, 0.0), color);
+                draw_bar(painter, at + vec2(x, 0.0), color);
             }
         }
         Icon::Back | Icon::Forward => {
             let side = if icon == Icon::Back { -1.0 } else { 1.0 };
-            triangle(painter, at + vec2(-2.0 * side, 0.0), side, color);
-            bar(painter, at + vec2(6.0 * side, 0.0), color);
+            draw_triangle(painter, at + vec2(-2.0 * side, 0.0), side, color);
+            draw_bar(painter, at + vec2(6.0 * side, 0.0), color);
         }
         Icon::Close => {
             for down in [-1.0, 1.0] {
@@ -101,19 +101,19 @@ fn draw(painter: &Painter, icon: Icon, at: Pos2, color: Color32) {
     }
 }
 
-/// A triangle that points to the right (`side` is 1) or left (-1).
-fn triangle(painter: &Painter, at: Pos2, side: f32, color: Color32) {
+/// Draws a triangle that points right (`side` is 1) or left (-1).
+fn draw_triangle(painter: &Painter, at: Pos2, side: f32, color: Color32) {
     let points = [vec2(-4.0, -6.0), vec2(6.0, 0.0), vec2(-4.0, 6.0)].map(|point| at + vec2(side * point.x, point.y));
     painter.add(Shape::convex_polygon(points.to_vec(), color, Stroke::NONE));
 }
 
-/// An upright bar.
-fn bar(painter: &Painter, at: Pos2, color: Color32) {
+/// Draws a vertical bar.
+fn draw_bar(painter: &Painter, at: Pos2, color: Color32) {
     painter.rect_filled(Rect::from_center_size(at, vec2(3.0, 12.0)), CornerRadius::same(1), color);
 }
 
-/// A part of a circle, from the first of `turns` (of a whole turn, clockwise from the right) to the second.
-fn arc(painter: &Painter, center: Pos2, radius: f32, turns: [f32; 2], stroke: Stroke) {
+/// Draws an arc between two angles in turns, clockwise from the right.
+fn draw_arc(painter: &Painter, center: Pos2, radius: f32, turns: [f32; 2], stroke: Stroke) {
     let points = (0..=20).map(|k| {
         let turn = turns[0] + (turns[1] - turns[0]) * k as f32 / 20.0;
         center + Vec2::angled(turn * TAU) * radius
@@ -121,8 +121,8 @@ fn arc(painter: &Painter, center: Pos2, radius: f32, turns: [f32; 2], stroke: St
     painter.add(Shape::line(points.collect(), stroke));
 }
 
-/// A camera that takes a picture.
-pub fn camera(painter: &Painter, center: Pos2, color: Color32) {
+/// Draws a camera.
+pub fn draw_camera(painter: &Painter, center: Pos2, color: Color32) {
     let stroke = Stroke::new(1.5, color);
     let body = Rect::from_center_size(center + vec2(0.0, 1.0), vec2(18.0, 12.0));
     painter.rect_stroke(body, CornerRadius::same(3), stroke, StrokeKind::Middle);
@@ -130,8 +130,8 @@ pub fn camera(painter: &Painter, center: Pos2, color: Color32) {
     painter.line_segment([center + vec2(-3.0, -7.0), center + vec2(3.0, -7.0)], stroke);
 }
 
-/// A dot, as on a recorder's button; a square, to stop, while it records.
-pub fn record(painter: &Painter, center: Pos2, on: bool, color: Color32) {
+/// Draws the record button: a dot, or a stop square while it records.
+pub fn draw_record(painter: &Painter, center: Pos2, on: bool, color: Color32) {
     if on {
         painter.rect_filled(Rect::from_center_size(center, Vec2::splat(9.0)), CornerRadius::same(2), color);
     } else {

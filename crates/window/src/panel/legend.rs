@@ -1,19 +1,19 @@
-//! The legend of a view's colours, drawn over the picture.
+//! The colour legend of a diagnostic view, drawn over the picture.
 
 use egui::{Align2, Color32, FontFamily, FontId, Mesh, Painter, Rect, Shape, Stroke, Ui, Vec2, pos2, vec2};
 
 use super::state::State;
 use super::theme::{Colors, GAP, PAD, card};
-use super::views::{BIN_COLORS, Legend, depth_share, diverging, perceptual};
+use super::views::{BIN_COLORS, Legend, depth_fraction, diverging, perceptual};
 use crate::texts::{tr, tr_with};
 
 const WIDTH: f32 = 260.0;
-/// Height of a bar of colours.
-const BAR: f32 = 14.0;
-/// Steps of a bar of colours.
-const CELLS: usize = 64;
+/// Height of a colour bar, in points.
+const BAR_HEIGHT: f32 = 14.0;
+/// Number of steps in a colour bar.
+const STEPS_PER_BAR: usize = 64;
 
-/// Draws the legend of what is shown, at the left, `above` points from the bottom, unless the window is too small for it.
+/// Draws the legend at the left, `above` points from the bottom, unless the window is too small.
 pub fn show(ui: &Ui, state: &State, above: f32) {
     let Some(legend) = state.legend else { return };
     let window = super::dock::room(ui.ctx());
@@ -38,26 +38,26 @@ pub fn show(ui: &Ui, state: &State, above: f32) {
         let font = FontId::new(12.5, super::theme::medium());
         painter.text(inner.left_top(), Align2::LEFT_TOP, text, font, colors.text);
     };
-    let bar = Rect::from_min_size(inner.min + vec2(0.0, 22.0), vec2(inner.width(), BAR));
+    let bar = Rect::from_min_size(inner.min + vec2(0.0, 22.0), vec2(inner.width(), BAR_HEIGHT));
     match legend {
         Legend::Depth { near_m, far_m } => {
             title(if state.known().is_relative { "Depth: far to near" } else { "Depth in metres" });
-            ramp(painter, bar, |share| perceptual()[(share * 255.0) as usize]);
+            draw_ramp(painter, bar, |fraction| perceptual()[(fraction * 255.0) as usize]);
             let in_metres = !state.known().is_relative;
             for metres in nice_depths(near_m, far_m).into_iter().filter(|_| in_metres) {
-                let x = bar.left() + depth_share(metres, near_m, far_m).clamp(0.0, 1.0) * bar.width();
-                tick(painter, &colors, bar, x, &meters_label(metres));
+                let x = bar.left() + depth_fraction(metres, near_m, far_m).clamp(0.0, 1.0) * bar.width();
+                draw_tick(painter, &colors, bar, x, &meters_label(metres));
             }
         }
-        Legend::Coc { most_px } => {
+        Legend::Coc { max_px } => {
             title("Blur radius in pixels");
-            ramp(painter, bar, |share| diverging(2.0 * share - 1.0));
-            hatch(painter, Rect::from_min_max(bar.min, bar.center_bottom()));
-            let most = format!("{most_px:.0}");
-            let [in_front, behind] = ["{} in front", "{} behind"].map(|text| tr_with(text, &[&most]));
+            draw_ramp(painter, bar, |fraction| diverging(2.0 * fraction - 1.0));
+            draw_hatch(painter, Rect::from_min_max(bar.min, bar.center_bottom()));
+            let max_radius = format!("{max_px:.0}");
+            let [in_front, behind] = ["{} in front", "{} behind"].map(|text| tr_with(text, &[&max_radius]));
             let labels = [in_front, "0".to_owned(), behind];
             for (label, side) in labels.iter().zip([-1.0, 0.0, 1.0]) {
-                tick(painter, &colors, bar, bar.center().x + side * bar.width() / 2.0, label);
+                draw_tick(painter, &colors, bar, bar.center().x + side * bar.width() / 2.0, label);
             }
         }
         Legend::Bins { count, high_px } => {
@@ -71,21 +71,21 @@ pub fn show(ui: &Ui, state: &State, above: f32) {
     }
 }
 
-/// Fills a bar with `color(share)`, the share going from 0 at the left to 1 at the right.
-fn ramp(painter: &Painter, bar: Rect, color: impl Fn(f32) -> [u8; 3]) {
+/// Fills a bar with `color(t)`, where t runs from 0 at the left to 1 at the right.
+fn draw_ramp(painter: &Painter, bar: Rect, color: impl Fn(f32) -> [u8; 3]) {
     let mut mesh = Mesh::default();
-    let width = bar.width() / CELLS as f32;
-    for cell in 0..CELLS {
-        let [r, g, b] = color((cell as f32 + 0.5) / CELLS as f32);
-        // A little wider, against gaps between the cells.
+    let width = bar.width() / STEPS_PER_BAR as f32;
+    for cell in 0..STEPS_PER_BAR {
+        let [r, g, b] = color((cell as f32 + 0.5) / STEPS_PER_BAR as f32);
+        // Cells overlap slightly, to avoid gaps between them.
         let at = Rect::from_min_size(bar.min + vec2(cell as f32 * width, 0.0), vec2(width + 0.25, bar.height()));
         mesh.add_colored_rect(at, Color32::from_rgb(r, g, b));
     }
     painter.add(Shape::mesh(mesh));
 }
 
-/// Hatches a part of a bar, as the view hatches what lies in front.
-fn hatch(painter: &Painter, rect: Rect) {
+/// Hatches part of a bar like the view hatches pixels in front of the focal plane.
+fn draw_hatch(painter: &Painter, rect: Rect) {
     let painter = painter.with_clip_rect(rect);
     let mut x = rect.left();
     while x < rect.right() + rect.height() {
@@ -95,8 +95,8 @@ fn hatch(painter: &Painter, rect: Rect) {
     }
 }
 
-/// A tick under a bar with its label, which is moved aside where it would stick out.
-fn tick(painter: &Painter, colors: &Colors, bar: Rect, x: f32, label: &str) {
+/// Draws a tick below a bar with its label, shifted inwards if it would stick out.
+fn draw_tick(painter: &Painter, colors: &Colors, bar: Rect, x: f32, label: &str) {
     painter.line_segment([pos2(x, bar.bottom()), pos2(x, bar.bottom() + 4.0)], Stroke::new(1.0, colors.text));
     let font = FontId::new(12.0, FontFamily::Proportional);
     let galley = painter.layout_no_wrap(label.to_owned(), font, colors.text);
@@ -104,12 +104,12 @@ fn tick(painter: &Painter, colors: &Colors, bar: Rect, x: f32, label: &str) {
     painter.galley(pos2(left, bar.bottom() + 5.0), galley, colors.text);
 }
 
-/// A line of the legend of bins: colour, number, and the CoC from the end of the bin before to its own.
+/// Draws a row of the bin legend: colour, index, and the CoC range from the previous bin's end to its own.
 fn draw_bin_entry(painter: &Painter, colors: &Colors, at: egui::Pos2, index: usize, high_px: &[f32]) {
     let [r, g, b] = BIN_COLORS[index % BIN_COLORS.len()];
     let swatch = Rect::from_min_size(at, Vec2::new(22.0, 15.0));
     painter.rect_filled(swatch, egui::CornerRadius::same(3), Color32::from_rgb(r, g, b));
-    // Luma in tenths: white figures on what is darker than 120 of 255.
+    // White text if the luma (weights 0.3, 0.6, 0.1) is below 120 of 255.
     let dark = u32::from(r) * 3 + u32::from(g) * 6 + u32::from(b) < 1200;
     let ink = if dark { Color32::WHITE } else { Color32::BLACK };
     let font = FontId::new(11.0, super::theme::medium());
@@ -126,16 +126,16 @@ fn draw_bin_entry(painter: &Painter, colors: &Colors, at: egui::Pos2, index: usi
     painter.text(swatch.right_center() + vec2(6.0, 0.0), Align2::LEFT_CENTER, range, font, colors.text);
 }
 
-/// Round distances within a range, in metres from near to far, with room between them for their labels.
+/// Returns round distances within a range, in metres from near to far, spaced so that their labels do not overlap.
 pub fn nice_depths(near_m: f32, far_m: f32) -> Vec<f32> {
     const STEPS: [f32; 9] = [1.0, 1.2, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 7.0];
-    // Of the bar's width.
-    const APART: f32 = 0.17;
+    // Minimum distance of two labels, as a fraction of the bar's width.
+    const MIN_SPACING: f32 = 0.17;
     let mut chosen: Vec<f32> = Vec::new();
     let nice = (-1..3).flat_map(|decade| STEPS.map(|step| step * 10f32.powi(decade)));
     for metres in nice.filter(|metres| (near_m..=far_m).contains(metres)) {
-        let share = depth_share(metres, near_m, far_m);
-        if chosen.last().is_none_or(|&last| depth_share(last, near_m, far_m) - share >= APART) {
+        let fraction = depth_fraction(metres, near_m, far_m);
+        if chosen.last().is_none_or(|&last| depth_fraction(last, near_m, far_m) - fraction >= MIN_SPACING) {
             chosen.push(metres);
         }
     }

@@ -39,61 +39,62 @@ use canvas::Gestures;
 use dock::Dock;
 use place::Place;
 
-/// After this many seconds without pointer or keyboard the panel hides, in full screen.
-const HIDES_AFTER_S: f64 = 4.0;
-/// Points that the controls need: text is no larger than leaves them so many.
-const LEAST_SIZE: Vec2 = Vec2::new(320.0, 200.0);
-/// Shown when they have not.
-const CRAMPED: &str = "The window is too small for text of this size: it is as large as there is room for.";
-/// A key or the wheel that rests for this many seconds counts as let go.
-const LET_GO_AFTER_S: f64 = 0.8;
+/// Seconds without pointer or keyboard input after which the panel hides in full screen.
+const HIDE_DELAY_S: f64 = 4.0;
+/// Minimum size of the window in points; the text scale is limited to preserve it.
+const MIN_SIZE: Vec2 = Vec2::new(320.0, 200.0);
+/// Shown if the chosen text scale exceeds that limit.
+const TEXT_TOO_LARGE: &str = "The window is too small for text of this size: it is as large as there is room for.";
+/// Seconds after which a key or the wheel without further events counts as released.
+const RELEASE_DELAY_S: f64 = 0.8;
 
-/// What the controls remember from frame to frame besides egui's own memory.
+/// State of the controls between frames, besides egui's own memory.
 #[derive(Default)]
 pub struct Panel {
-    /// Whether the panel never hides: a screen reader would not find it again.
+    /// Whether the panel never hides, because screen readers could not find it again.
     pub stays: bool,
     /// Whether fonts and styles are installed.
     ready: bool,
-    /// When pointer or keyboard were used last, in egui's seconds.
+    /// Time of the last pointer or keyboard input, in egui's seconds.
     active_s: f64,
-    /// When the pointer was.
-    pointed_s: f64,
-    /// Whether the touch that is going on brought the panel back, and does nothing else.
+    /// Time of the last pointer movement or press, in egui's seconds.
+    pointer_used_s: f64,
+    /// Whether the current touch only reopened the panel, and has no other effect.
     waking: bool,
-    /// When a control in hand changed the look last, until it is let go.
+    /// Time of the last look change by a control that is still held, in egui's seconds.
     stroke_s: Option<f64>,
     gestures: Gestures,
     sheet: sheet::Memory,
     instruments: instruments::Cache,
-    notes: notes::Ages,
+    notes: notes::NoteTimes,
     badges: badges::Badges,
-    /// What had the focus before something covered the window, and whether something does.
+    /// The control that had the focus before a modal covered the window.
     focused: Option<Id>,
+    /// Whether a modal covers the window.
     covered: bool,
     timer: timer::Timer,
     transport: transport::Bar,
-    /// The place of the picture, as fractions, of which somebody wants to know more.
+    /// Position to probe for depth and blur, as fractions of the picture.
     pub probed: Option<[f32; 2]>,
-    /// Whether the window has no room for text of the size that was chosen.
+    /// Whether the window is too small for the chosen text scale.
     cramped: bool,
-    /// Whether a control had the focus or a list was open at the end of the last pass.
+    /// Whether a control had the focus or a popup was open at the end of the last pass.
     was_in_hand: bool,
 }
 
-/// The picture's area in the window, for the gestures on it.
+/// The picture's area in the window.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Canvas {
     /// The picture's area, in pixels of the window.
     pub area: Area,
-    /// The picture's own columns and rows.
+    /// The picture's width and height in pixels.
     pub size: (u32, u32),
-    /// The part of the enlarged picture that is seen there.
+    /// The visible part of the zoomed picture.
     pub part: Option<Part>,
 }
 
 impl Panel {
-    /// Draws the controls, reads keys and gestures, and adds what the person did to `actions`.
+    /// Draws the controls, handles keys and gestures, and appends the resulting actions.
     pub fn show(&mut self, ui: &mut Ui, state: &State, canvas: Canvas, actions: &mut Vec<Action>) {
         let ctx = ui.ctx().clone();
         if !std::mem::replace(&mut self.ready, true) {
@@ -110,15 +111,15 @@ impl Panel {
         let in_use = awake || self.stays || self.sheet.is_in_use(&ctx);
         let is_shown = !state.bare && state.panel && (in_use || !state.full_screen);
         let dock = is_shown.then(|| Dock::of(window, size, state.shows_more()));
-        // Before keys and gestures are read: what they zoom by is the window as it is now.
+        // Must precede keys and gestures: their zoom steps depend on the current layout.
         dock::set_room(&ctx, dock.map_or(window, |dock| dock.room));
         self.read_keys(ui, state, size, actions);
         self.probed = None;
         if let Some(place) = place {
             self.gestures.show(ui, state, place, self.waking, actions);
-            self.probed = probe::place(ui, state, &place);
+            self.probed = probe::probed_point(ui, state, &place);
         }
-        if state.full_screen && self.pointer_rests(ui) {
+        if state.full_screen && self.is_pointer_idle(ui) {
             ctx.set_cursor_icon(egui::CursorIcon::None);
         }
         if self.probed.is_some() {
@@ -128,7 +129,7 @@ impl Panel {
         self.sheet.show(&ctx, state, dock, size, actions);
         if !state.bare {
             if awake && !state.panel {
-                sheet::way_back(&ctx, actions);
+                sheet::show_reopen_button(&ctx, actions);
             }
             if in_use || dock.is_some() {
                 bottom = self.transport.show(&ctx, state, actions);
@@ -144,28 +145,28 @@ impl Panel {
         if state.help {
             help::show(&ctx, state, actions);
         }
-        self.give_back_focus(&ctx, state.help || state.closing);
+        self.restore_focus(&ctx, state.help || state.closing);
         theme::focus_ring(&ctx);
-        actions.extend(parts::take_said(&ctx).map(Action::Note));
+        actions.extend(parts::take_message(&ctx).map(Action::Note));
         self.was_in_hand = ctx.memory(|memory| memory.focused().is_some()) || egui::Popup::is_any_open(&ctx);
-        self.settle(ui, &actions[first..]).into_iter().for_each(|settle| actions.push(settle));
+        self.end_stroke(ui, &actions[first..]).into_iter().for_each(|settle| actions.push(settle));
     }
 
-    /// Makes text and controls as large as was chosen, as far as there is room for them, and tells where there is not; a new
-    /// scale holds from the next pass on.
+    /// Sets the text scale, limited to the window's size, and adds a note when the limit takes effect. egui applies a
+    /// new scale in the next pass.
     fn set_text_scale(&mut self, ctx: &Context, chosen: f32, actions: &mut Vec<Action>) {
         let window = ctx.content_rect().size() * ctx.zoom_factor();
-        let most = (window.x / LEAST_SIZE.x).min(window.y / LEAST_SIZE.y).max(1.0);
-        if !std::mem::replace(&mut self.cramped, chosen > most) && self.cramped {
-            actions.push(Action::Note(CRAMPED.to_owned()));
+        let max_scale = (window.x / MIN_SIZE.x).min(window.y / MIN_SIZE.y).max(1.0);
+        if !std::mem::replace(&mut self.cramped, chosen > max_scale) && self.cramped {
+            actions.push(Action::Note(TEXT_TOO_LARGE.to_owned()));
         }
-        if (ctx.zoom_factor() - chosen.min(most)).abs() > 1e-3 {
-            ctx.set_zoom_factor(chosen.min(most));
+        if (ctx.zoom_factor() - chosen.min(max_scale)).abs() > 1e-3 {
+            ctx.set_zoom_factor(chosen.min(max_scale));
         }
     }
 
-    /// Gives the focus back to what had it, once nothing covers the window any more.
-    fn give_back_focus(&mut self, ctx: &Context, covered: bool) {
+    /// Restores the focus once no modal covers the window any more.
+    fn restore_focus(&mut self, ctx: &Context, covered: bool) {
         match (std::mem::replace(&mut self.covered, covered), covered) {
             (true, false) => self.focused.into_iter().for_each(|id| ctx.memory_mut(|memory| memory.request_focus(id))),
             (false, false) => self.focused = ctx.memory(|memory| memory.focused()),
@@ -173,25 +174,26 @@ impl Panel {
         }
     }
 
-    /// Adds the actions of the keys that were pressed, unless text is being typed.
+    /// Adds the actions of the pressed keys, unless text is being typed.
     fn read_keys(&mut self, ui: &Ui, state: &State, size: (u32, u32), actions: &mut Vec<Action>) {
         let ctx = ui.ctx();
         if ctx.text_edit_focused() {
             return;
         }
-        // egui has already used Esc to drop the focus or to close a list, or a question does: it must not close anything else.
+        // egui or a question has already handled Esc (dropped the focus, closed a popup): it must not close anything
+        // else.
         let is_used = self.was_in_hand || self.sheet.is_asking() && !state.help && !state.closing;
         let escaped = ui.input(|input| input.key_pressed(egui::Key::Escape)) && is_used;
         let focused = ctx.memory(|memory| memory.focused().is_some()) || escaped;
-        let context = keys::Context { size, fit: place::fit(ctx, size), chord: 0 };
+        let context = keys::Context { size, fit: place::fit_scale(ctx, size), chord: 0 };
         ui.input(|input| {
             actions.extend(input.events.iter().filter_map(|event| keys::action(event, state, context, focused)));
         });
     }
 
-    /// Whether pointer or keyboard were used a short while ago, or the person `waits` for the first picture. A touch that
-    /// brings the panel back is remembered.
-    fn is_awake(&mut self, ui: &Ui, has_panel: bool, waits: bool) -> bool {
+    /// Whether pointer or keyboard were used recently, or no picture has arrived yet (`is_waiting`). Also records a
+    /// touch that reopens the panel.
+    fn is_awake(&mut self, ui: &Ui, has_panel: bool, is_waiting: bool) -> bool {
         let began = |event: &Event| matches!(event, Event::Touch { phase: egui::TouchPhase::Start, .. });
         let (now_s, active, touched) = ui.input(|input| {
             let is_use = |event: &Event| {
@@ -202,36 +204,36 @@ impl Panel {
             (input.time, active, input.events.iter().any(began))
         });
         if touched {
-            self.waking = has_panel && now_s - self.active_s > HIDES_AFTER_S && !self.sheet.is_in_use(ui.ctx());
+            self.waking = has_panel && now_s - self.active_s > HIDE_DELAY_S && !self.sheet.is_in_use(ui.ctx());
         }
-        // Its first seconds count from the first picture.
-        if active || waits {
+        // The first countdown starts with the first picture.
+        if active || is_waiting {
             self.active_s = now_s;
         }
-        is_before(ui, self.active_s + HIDES_AFTER_S)
+        is_in_future(ui, self.active_s + HIDE_DELAY_S)
     }
 
-    /// Whether the pointer has not been moved for so long that nobody looks for it; where it keeps the panel, it stays.
-    fn pointer_rests(&mut self, ui: &Ui) -> bool {
+    /// Whether the pointer has not moved for [`HIDE_DELAY_S`] and can be hidden; false over the panel.
+    fn is_pointer_idle(&mut self, ui: &Ui) -> bool {
         let at = ui.input(|input| {
             if input.pointer.is_moving() || input.pointer.any_down() || input.pointer.any_released() {
-                self.pointed_s = input.time;
+                self.pointer_used_s = input.time;
             }
             input.pointer.latest_pos()
         });
-        !is_before(ui, self.pointed_s + HIDES_AFTER_S)
+        !is_in_future(ui, self.pointer_used_s + HIDE_DELAY_S)
             && !self.sheet.rect().zip(at).is_some_and(|(panel, at)| panel.contains(at))
     }
 
-    /// The action that ends a stroke, once the control is let go: its changes are undone together, later ones apart.
-    fn settle(&mut self, ui: &Ui, done: &[Action]) -> Option<Action> {
+    /// Returns the action that ends an undo stroke once the control is released; later changes start a new undo step.
+    fn end_stroke(&mut self, ui: &Ui, done: &[Action]) -> Option<Action> {
         let (now_s, down, released) =
             ui.input(|input| (input.time, input.pointer.any_down(), input.pointer.any_released()));
         if done.iter().any(|action| matches!(action, Action::Look { stroke: Some(_), .. })) {
             self.stroke_s = Some(now_s);
         }
         let changed_s = self.stroke_s?;
-        if released || !down && now_s - changed_s > LET_GO_AFTER_S {
+        if released || !down && now_s - changed_s > RELEASE_DELAY_S {
             self.stroke_s = None;
             return Some(Action::Settle);
         }
@@ -239,8 +241,8 @@ impl Panel {
     }
 }
 
-/// Whether it is not yet this time, in egui's seconds; when it is, there is another pass.
-fn is_before(ui: &Ui, end_s: f64) -> bool {
+/// Whether `end_s` (egui's seconds) is in the future; if so, requests a repaint for that time.
+fn is_in_future(ui: &Ui, end_s: f64) -> bool {
     let left_s = end_s - ui.input(|input| input.time);
     if left_s > 0.0 {
         ui.ctx().request_repaint_after(Duration::from_secs_f64(left_s + 0.01));

@@ -1,4 +1,4 @@
-//! Messages: notes that fade, failures of outputs, and why a source gives no frames.
+//! Messages: notes that fade, failures of outputs, and the reason why a source delivers no frames.
 
 use std::time::Duration;
 
@@ -11,29 +11,28 @@ use super::theme::GAP;
 use super::timer::Timer;
 use crate::texts::tr_with;
 
-/// A note is shown for this long, plus some time per letter to read it.
+/// Time a note is shown, plus reading time per character, in seconds.
 const SHOWN_S: f64 = 3.5;
 const PER_LETTER_S: f64 = 0.05;
-/// Of that time, it fades during the last part.
-const FADES_S: f64 = 0.4;
-/// The most notes that are shown at once.
-const MOST: usize = 3;
-/// What the source is when it is no camera and no recording.
+/// Fade-out at the end of that time, in seconds.
+const FADE_S: f64 = 0.4;
+/// Maximum number of notes shown at once.
+const MAX_SHOWN: usize = 3;
+/// Title and text for the demonstration source.
 const DEMONSTRATION: [&str; 2] = [
     "This is a demonstration",
     "No camera is in use. Choose one under “Camera”; `bokehcam doctor` says why there is none.",
 ];
 
-/// When notes were first shown.
+/// First display times of the notes.
 #[derive(Default)]
-pub struct Ages {
-    /// Number of a note, and the time in egui's seconds.
+pub struct NoteTimes {
+    /// Number of a note, and its first display time in egui's seconds.
     seen: Vec<(u64, f64)>,
 }
 
-impl Ages {
-    /// Draws, upwards from `bottom` points above the bottom of the window: the banner, the
-    /// failure of an output, and the notes.
+impl NoteTimes {
+    /// Draws the banner, output failures, and notes, stacked from `bottom` points above the window's bottom upwards.
     pub fn show(
         &mut self,
         ctx: &Context,
@@ -45,12 +44,13 @@ impl Ages {
         timer.show(&mut stack, state, actions);
         plate::show(&mut stack, state, actions);
         if state.is_demonstration() && !state.bare && !state.knows_demonstration {
-            stack.ask("demonstration", 460.0, DEMONSTRATION, [("OK", "Esc", Action::KnowDemonstration)], actions);
+            let buttons = [("OK", "Esc", Action::KnowDemonstration)];
+            stack.add_buttons("demonstration", 460.0, DEMONSTRATION, buttons, actions);
         }
-        banner(&mut stack, state, actions);
+        add_banner(&mut stack, state, actions);
         if let Some(why) = &state.trouble {
-            let [title, why] = trouble(why);
-            stack.ask("trouble", 460.0, [title, why], [("OK", "Esc", Action::Dismiss)], actions);
+            let [title, why] = failure_texts(why);
+            stack.add_buttons("trouble", 460.0, [title, why], [("OK", "Esc", Action::Dismiss)], actions);
         }
         plate::offer(&mut stack, state, actions);
         let now_s = ctx.input(|input| input.time);
@@ -60,7 +60,7 @@ impl Ages {
                 self.seen.push((note.number, now_s));
             }
         }
-        // Time to the next pass that shows a change: the begin of a fade, or a step of it.
+        // Time until the next visible change: the start of a fade, or its next step.
         let mut next_s = f64::INFINITY;
         let shown: Vec<(&str, f32)> = state
             .notes
@@ -71,28 +71,29 @@ impl Ages {
                 if left_s <= 0.0 {
                     return None;
                 }
-                next_s = next_s.min(if left_s > FADES_S { left_s - FADES_S } else { 1.0 / 20.0 });
-                Some((note.text.as_str(), (left_s / FADES_S).min(1.0) as f32))
+                next_s = next_s.min(if left_s > FADE_S { left_s - FADE_S } else { 1.0 / 20.0 });
+                Some((note.text.as_str(), (left_s / FADE_S).min(1.0) as f32))
             })
             .collect();
         if next_s.is_finite() {
             ctx.request_repaint_after(Duration::from_secs_f64(next_s + 0.005));
         }
-        for (&(text, opacity), place) in shown.iter().rev().take(MOST).zip(0..) {
-            stack.tell(Id::unique(("note", place)), 460.0, opacity, text);
+        for (&(text, opacity), place) in shown.iter().rev().take(MAX_SHOWN).zip(0..) {
+            stack.add_text(Id::unique(("note", place)), 460.0, opacity, text);
         }
     }
 }
 
-/// What is said of an output that failed: a title, and what became of it.
-fn trouble(why: &str) -> [&str; 2] {
+/// Returns the title and text for an output failure.
+fn failure_texts(why: &str) -> [&str; 2] {
     let is_full = why.contains("No space left on device");
     let kept = why.split_once("; ").map_or(why, |(_, kept)| kept);
     if is_full { ["The disk is full: the recording has ended", kept] } else { ["What was written has ended", why] }
 }
 
-/// Draws why the source gives no frames and a button to try again, clear of the picture's middle.
-fn banner(stack: &mut Stack, state: &State, actions: &mut Vec<Action>) {
+/// Draws the reason why the source delivers no frames with a retry button, at the bottom so as not to cover the
+/// picture's middle.
+fn add_banner(stack: &mut Stack, state: &State, actions: &mut Vec<Action>) {
     let silent;
     let (title, why, button) = match (&state.source, state.silent_s) {
         (Source::Running(_), None) => return,
@@ -105,5 +106,5 @@ fn banner(stack: &mut Stack, state: &State, actions: &mut Vec<Action>) {
         (Source::Lost(why), _) => ("No picture", why.as_str(), Some("Try again")),
         (Source::Ended, _) => ("The end", "The recording is over.", Some("Play again")),
     };
-    stack.ask("banner", 360.0, [title, why], button.map(|text| (text, "F5", Action::Retry)), actions);
+    stack.add_buttons("banner", 360.0, [title, why], button.map(|text| (text, "F5", Action::Retry)), actions);
 }

@@ -1,4 +1,4 @@
-//! The controls that the sections are made of.
+//! The widgets from which the sections are built.
 
 use std::ops::RangeInclusive;
 
@@ -10,38 +10,38 @@ use egui::{
 use super::theme::{Colors, ROW, medium};
 use crate::texts::{tr, tr_with};
 
-/// Room for a number beside its name.
+/// Width of a number beside its label, in points.
 const NUMBER_WIDTH: f32 = 70.0;
 
-/// A control for a number.
+/// A labelled number with a slider.
 #[derive(Clone)]
 pub struct Number<'a> {
     label: &'a str,
-    /// What it does, shown while the pointer rests on it.
+    /// Tooltip.
     hint: &'a str,
     range: RangeInclusive<f32>,
-    /// Digits after the point.
+    /// Decimal places.
     digits: usize,
     /// Whether the slider is logarithmic.
-    ratios: bool,
-    /// Before and after the number.
-    around: [&'a str; 2],
+    logarithmic: bool,
+    /// Prefix and suffix of the number.
+    affixes: [&'a str; 2],
 }
 
 impl<'a> Number<'a> {
-    /// A number of this range, without a unit, on a linear slider.
+    /// Creates a number in `range` without a unit, on a linear slider.
     pub fn new(label: &'a str, hint: &'a str, range: RangeInclusive<f32>, digits: usize) -> Self {
-        Self { label, hint, range, digits, ratios: false, around: ["", ""] }
+        Self { label, hint, range, digits, logarithmic: false, affixes: ["", ""] }
     }
 
-    /// The same with a unit, before and after it.
+    /// Adds a prefix and a suffix, such as a unit.
     pub fn unit(self, before: &'a str, after: &'a str) -> Self {
-        Self { around: [before, after], ..self }
+        Self { affixes: [before, after], ..self }
     }
 
-    /// The same on a logarithmic slider.
-    pub fn ratios(self) -> Self {
-        Self { ratios: true, ..self }
+    /// Makes the slider logarithmic.
+    pub fn logarithmic(self) -> Self {
+        Self { logarithmic: true, ..self }
     }
 
     pub fn label(&self) -> &'a str {
@@ -49,10 +49,10 @@ impl<'a> Number<'a> {
     }
 }
 
-/// Controls with a hint, shown while the pointer rests on them.
+/// Widgets with a tooltip.
 pub trait Hinted {
-    /// Shows a text of the table, unless it is empty; not where the control is scrolled out of sight, though egui takes it to
-    /// be there.
+    /// Adds a translated tooltip unless `text` is empty. Suppresses it where the widget is scrolled out of sight, which
+    /// egui does not check.
     fn hint(self, text: &str) -> Self;
 }
 
@@ -66,18 +66,18 @@ impl Hinted for Response {
     }
 }
 
-/// Draws a name, a number to drag or type, and a slider under them. Whether the number was changed.
-pub fn number(ui: &mut Ui, how: &Number, value: &mut f32) -> bool {
-    let Number { label, hint, ref range, digits, ratios, around: [before, after] } = *how;
+/// Adds a label, a number to drag or type, and a slider below them. Returns whether the number changed.
+pub fn number(ui: &mut Ui, spec: &Number, value: &mut f32) -> bool {
+    let Number { label, hint, ref range, digits, logarithmic, affixes: [before, after] } = *spec;
     let label = tr(label);
     let mut changed = false;
     ui.scope(|ui| {
         ui.spacing_mut().item_spacing.y = 0.0;
         let name = ui.horizontal(|ui| {
-            // The number stays whole; a long name goes on in a second line.
-            let most = (ui.available_width() - NUMBER_WIDTH).max(20.0);
+            // The number never wraps; a long label does.
+            let max_width = (ui.available_width() - NUMBER_WIDTH).max(20.0);
             let name = ui.scope(|ui| {
-                ui.set_max_width(most);
+                ui.set_max_width(max_width);
                 ui.add(Label::new(label).wrap())
             });
             let name = name.inner.hint(hint);
@@ -86,7 +86,7 @@ pub fn number(ui: &mut Ui, how: &Number, value: &mut f32) -> bool {
                 ui.spacing_mut().interact_size = Vec2::new(24.0, 20.0);
                 // Dragging over 300 points, the panel's width, covers the range.
                 let per_point = (range.end() - range.start()) / 300.0;
-                // What was chosen elsewhere may lie outside; it stays until somebody moves it.
+                // A value set elsewhere may lie outside the range; it stays until the user moves it.
                 let mut typed = *value;
                 let drag = DragValue::new(&mut typed).range(range.clone()).clamp_existing_to_range(false);
                 let drag = drag
@@ -96,18 +96,18 @@ pub fn number(ui: &mut Ui, how: &Number, value: &mut f32) -> bool {
                     .min_decimals(digits)
                     .prefix(before)
                     .suffix(after);
-                // Many write 1,5.
+                // Accepts a decimal comma, as in 1,5.
                 let (ctx, shown) = (ui.ctx().clone(), f64::from(*value));
                 let drag = drag.custom_parser(|text| {
                     let number: f64 = text.trim().replace(',', ".").parse().ok()?;
-                    // On its way through the panel, Tab leaves behind what was there.
+                    // Moving on with Tab re-enters the displayed value: that is no input.
                     if (number - shown).abs() > 0.1f64.powi(digits as i32) {
-                        say_range(&ctx, how, number);
+                        report_range(&ctx, spec, number);
                     }
                     Some(number)
                 });
                 let is_other = ui.add(drag).labelled_by(name.id).hint(hint).changed();
-                // The keyboard's way through the panel leaves behind the number as it is shown, rounded.
+                // Moving the keyboard focus re-enters the displayed, rounded value: that is no change.
                 if is_other && (typed - *value).abs() > 0.501 * 0.1f32.powi(digits as i32) {
                     (*value, changed) = (typed, true);
                 }
@@ -116,13 +116,13 @@ pub fn number(ui: &mut Ui, how: &Number, value: &mut f32) -> bool {
         });
         ui.spacing_mut().slider_width = ui.available_width().max(10.0);
         ui.spacing_mut().interact_size.y = 20.0;
-        // A logarithmic slider that begins at 0 has to begin its decades somewhere.
-        let least = if ratios { f64::from(*range.start()).max(1e-3) } else { 0.0 };
+        // A logarithmic slider from 0 needs a smallest positive value.
+        let smallest = if logarithmic { f64::from(*range.start()).max(1e-3) } else { 0.0 };
         let mut slid = *value;
         let slider = Slider::new(&mut slid, range.clone()).clamping(SliderClamping::Edits).show_value(false);
-        let slider = ui.add(slider.logarithmic(ratios).smallest_positive(least)).labelled_by(name.inner.id);
+        let slider = ui.add(slider.logarithmic(logarithmic).smallest_positive(smallest)).labelled_by(name.inner.id);
         if slider.hint(hint).changed() {
-            // A digit more than is shown.
+            // Rounds to one more digit than is displayed.
             let steps = 10f32.powi(digits as i32 + 1);
             (*value, changed) = ((slid * steps).round() / steps, true);
         }
@@ -130,45 +130,45 @@ pub fn number(ui: &mut Ui, how: &Number, value: &mut f32) -> bool {
     changed
 }
 
-/// Where a line for the person waits for the end of the pass.
-fn said() -> Id {
+/// Returns the key under which a message waits for the end of the pass.
+fn message_id() -> Id {
     Id::unique("said by a control")
 }
 
-/// Says what becomes of a number that was typed, if it cannot be.
-fn say_range(ctx: &Context, how: &Number, number: f64) {
-    let Number { label, ref range, digits, around: [before, after], .. } = *how;
-    // As it is shown: half a step beyond is the end itself.
+/// Queues a message if a typed number is out of range: it names the range and the value used.
+fn report_range(ctx: &Context, spec: &Number, number: f64) {
+    let Number { label, ref range, digits, affixes: [before, after], .. } = *spec;
+    // Compares rounded values: half a displayed step beyond a limit still displays as the limit.
     let half = 0.5 * 0.1f64.powi(digits as i32);
-    let (least, most) = (f64::from(*range.start()), f64::from(*range.end()));
-    if number < least - half || number > most + half {
-        let taken = if number < least { least } else { most };
-        let [least, most, taken] = [least, most, taken].map(|number| format!("{before}{number:.digits$}{after}"));
-        let line = tr_with("{} goes from {} to {}: {} was taken.", &[&tr(label), &least, &most, &taken]);
-        ctx.data_mut(|data| data.insert_temp(said(), line));
+    let (min, max) = (f64::from(*range.start()), f64::from(*range.end()));
+    if number < min - half || number > max + half {
+        let taken = if number < min { min } else { max };
+        let [min, max, taken] = [min, max, taken].map(|number| format!("{before}{number:.digits$}{after}"));
+        let line = tr_with("{} goes from {} to {}: {} was taken.", &[&tr(label), &min, &max, &taken]);
+        ctx.data_mut(|data| data.insert_temp(message_id(), line));
     }
 }
 
-/// The line that a control had for the person in this pass.
-pub fn take_said(ctx: &Context) -> Option<String> {
-    ctx.data_mut(|data| data.remove_temp(said()))
+/// Takes the message that a widget queued in this pass.
+pub fn take_message(ctx: &Context) -> Option<String> {
+    ctx.data_mut(|data| data.remove_temp(message_id()))
 }
 
-/// Draws options side by side, each with a name, a hint and what it stands for; `can` says which may be chosen. The one that
-/// was clicked, or chosen by the arrow keys.
+/// Adds a group of radio buttons in a grid, given as name, tooltip and value; `is_selectable` tells which values are
+/// selectable. Returns the value that was clicked, or selected by the arrow keys.
 pub fn choose<T: PartialEq + Copy>(
     ui: &mut Ui,
     what: &str,
     options: &[(&str, &str, T)],
     chosen: T,
-    can: impl Fn(T) -> bool,
+    is_selectable: impl Fn(T) -> bool,
 ) -> Option<T> {
     let colors = Colors::here(ui);
     let what = tr(what);
     let font = |chosen: bool| FontId::new(12.5, if chosen { medium() } else { egui::FontFamily::Proportional });
     let width_of = |name: &str| ui.painter().layout_no_wrap(tr(name).to_owned(), font(true), colors.text).size().x;
     let widest = options.iter().map(|(name, ..)| width_of(name)).fold(0.0, f32::max) + 12.0;
-    // As many side by side as are whole in this language.
+    // As many columns as fit the widest name in this language, with the rows evenly filled.
     let whole = (1..=options.len()).rev().find(|columns| ui.available_width() / *columns as f32 >= widest);
     let columns = options.len().div_ceil(options.len().div_ceil(whole.unwrap_or(1).max(1)).max(1)).max(1);
     let rows = options.len().div_ceil(columns);
@@ -181,7 +181,7 @@ pub fn choose<T: PartialEq + Copy>(
         let (row, column) = (index / columns, index % columns);
         let corner = pos2(rect.left() + cell_width * column as f32, rect.top() + ROW * row as f32);
         let cell = Rect::from_min_size(corner, Vec2::new(cell_width, ROW));
-        let (is_chosen, is_possible) = (option == chosen, can(option));
+        let (is_chosen, is_possible) = (option == chosen, is_selectable(option));
         let sense = if is_possible { Sense::click() } else { Sense::hover() };
         let response = ui.interact(cell, ui.scope_id().with((what, index)), sense);
         response
@@ -200,7 +200,7 @@ pub fn choose<T: PartialEq + Copy>(
     group.chosen(ui)
 }
 
-/// Controls of which one is chosen: by a click, or by an arrow key that goes on to it from its neighbour.
+/// A radio group: the user selects by click, or by an arrow key from the neighbour that has the focus.
 pub struct Group<T>(Vec<(Response, T)>);
 
 impl<T> Default for Group<T> {
@@ -210,14 +210,14 @@ impl<T> Default for Group<T> {
 }
 
 impl<T> Group<T> {
-    /// Adds the next control; those that can only be hovered are never chosen.
+    /// Adds the next widget; disabled ones (hover only) are never selected.
     pub fn add(&mut self, control: Response, option: T) {
         if control.sense.senses_click() {
             self.0.push((control, option));
         }
     }
 
-    /// What was chosen in this pass, if anything.
+    /// Returns the value selected in this pass.
     pub fn chosen(mut self, ui: &Ui) -> Option<T> {
         let focused = self.0.iter().position(|(control, _)| control.has_focus());
         let by_arrow = focused.and_then(|at| {
@@ -236,8 +236,8 @@ impl<T> Group<T> {
     }
 }
 
-/// Draws a list that opens, of names, each with a hint (or none) and what it stands for. Another one that was chosen.
-pub fn list<'a, T: PartialEq>(
+/// Adds a drop-down list, given as name, tooltip and value. Returns a newly selected value.
+pub fn dropdown<'a, T: PartialEq>(
     ui: &mut Ui,
     what: &str,
     shown: &str,
@@ -261,7 +261,7 @@ pub fn list<'a, T: PartialEq>(
     picked
 }
 
-/// Draws a name and a switch. Whether it was clicked.
+/// Adds a labelled switch. Returns whether it was clicked.
 pub fn switch(ui: &mut Ui, label: &str, hint: &str, on: bool) -> bool {
     let colors = Colors::here(ui);
     let label = tr(label);
@@ -282,37 +282,37 @@ pub fn switch(ui: &mut Ui, label: &str, hint: &str, on: bool) -> bool {
     response.hint(hint).clicked()
 }
 
-/// Draws a button. Whether it was clicked.
+/// Adds a button. Returns whether it was clicked.
 pub fn button(ui: &mut Ui, text: &str, hint: &str) -> bool {
     ui.button(tr(text)).hint(hint).clicked()
 }
 
-/// Tells a screen reader what a list or a field is called.
-pub fn called(control: &Response, name: &str, role: Role) {
+/// Sets the accessible name of a list or a field for screen readers.
+pub fn set_accessible_name(control: &Response, name: &str, role: Role) {
     control.widget_info(|| WidgetInfo::labeled(role, control.enabled(), tr(name)));
 }
 
-/// A line of explanation.
+/// Adds a line of small explanatory text.
 pub fn remark(ui: &mut Ui, text: &str) {
     let colors = Colors::here(ui);
     ui.label(RichText::new(tr(text)).text_style(TextStyle::Small).color(colors.weak));
 }
 
-/// A path, of which the end says which file it is: a long one is cut at its beginning.
+/// Adds a path, shortened at its beginning because the end identifies the file.
 pub fn path(ui: &mut Ui, path: &str) {
     let shown = bokehcam::files::user_folders::shown_output(path);
-    ui.scope(|ui| remark(ui, &end_of(&shown, 38))).response.on_hover_text(path);
+    ui.scope(|ui| remark(ui, &truncate_start(&shown, 38))).response.on_hover_text(path);
 }
 
-/// The last of at most so many signs of a text, after dots if there are more.
-pub fn end_of(text: &str, most: usize) -> String {
-    match text.chars().count().checked_sub(most) {
+/// Returns the last `max_chars` characters of a text, the first of them replaced by an ellipsis if it is longer.
+pub fn truncate_start(text: &str, max_chars: usize) -> String {
+    match text.chars().count().checked_sub(max_chars) {
         None | Some(0) => text.to_owned(),
         Some(over) => ['…'].into_iter().chain(text.chars().skip(over + 1)).collect(),
     }
 }
 
-/// Draws a part of the panel, unless it is folded. Whether its title was clicked.
+/// Adds a foldable section. Returns whether its title was clicked.
 pub fn section(ui: &mut Ui, name: &str, open: bool, body: impl FnOnce(&mut Ui)) -> bool {
     let colors = Colors::here(ui);
     ui.add_space(4.0);

@@ -1,8 +1,8 @@
-//! The plate: the offer to take one, and what to do while it is taken.
+//! The background plate: the offer to capture one, and instructions during the capture.
 
 use egui::{ProgressBar, RichText};
 
-use super::cards::{Stack, words};
+use super::cards::{Stack, paragraph};
 use super::dock::room;
 use super::parts::button;
 use super::state::{Action, State};
@@ -12,7 +12,7 @@ use bokehcam::depth::plate::Step;
 
 const WIDTH: f32 = 420.0;
 
-/// Draws the ways to a portrait, where nothing is known of depth.
+/// Draws the offer of depth methods, if the source has no depth.
 pub fn offer(stack: &mut Stack, state: &State, actions: &mut Vec<Action>) {
     if !state.offers_depth() || state.bare {
         return;
@@ -20,15 +20,15 @@ pub fn offer(stack: &mut Stack, state: &State, actions: &mut Vec<Action>) {
     let network = ("Find me by a small network", "It tells a person from what is behind", Action::FindMe);
     let plate =
         ("Show me the empty room", "Step out for four seconds; the camera has to stand still (T)", Action::TakePlate);
-    let plate = Some(plate).filter(|_| state.takes_plates());
+    let plate = Some(plate).filter(|_| state.can_capture_plate());
     let buttons = [network].into_iter().chain(plate).chain([("Not now", "Esc", Action::DeclinePlate)]);
-    // A small picture is not covered by words.
+    // Omits the explanation if it would cover a small picture.
     let is_small = room(stack.ctx).height() < 360.0;
     let why = if is_small { "" } else { "Who is near is not known here, so all is blurred." };
-    stack.ask("plate offer", WIDTH, ["A portrait from this picture alone", why], buttons, actions);
+    stack.add_buttons("plate offer", WIDTH, ["A portrait from this picture alone", why], buttons, actions);
 }
 
-/// Draws what the person has to do for the plate now.
+/// Draws the instructions for the current step of the capture.
 pub fn show(stack: &mut Stack, state: &State, actions: &mut Vec<Action>) {
     let Some(step) = state.plate.filter(|step| *step != Step::Ready) else { return };
     let (title, why) = match step {
@@ -38,12 +38,13 @@ pub fn show(stack: &mut Stack, state: &State, actions: &mut Vec<Action>) {
         Step::Restless => {
             ("No plate so far", "Something keeps moving: let the camera stand on something firm, and step out.")
         }
+        // `Step::Unlike`: the plate does not match the picture.
         _ => (
             "Another picture",
             "The camera was moved, or the light has changed: nobody can be told from what is behind, so all is blurred.",
         ),
     };
-    stack.card("plate", WIDTH, |ui, colors| {
+    stack.add_card("plate", WIDTH, |ui, colors| {
         ui.label(RichText::new(tr(title)).family(medium()).size(22.0));
         match step {
             Step::StepOut(seconds) => {
@@ -54,7 +55,7 @@ pub fn show(stack: &mut Stack, state: &State, actions: &mut Vec<Action>) {
             }
             _ => {}
         }
-        words(ui, colors, why);
+        paragraph(ui, colors, why);
         if step == Step::Unlike && button(ui, "Take another plate", "T") {
             actions.push(Action::TakePlate);
         }

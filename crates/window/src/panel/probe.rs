@@ -1,43 +1,43 @@
-//! What is under the pointer: its depth and its blur.
+//! The probe: depth and blur under the pointer.
 
 use egui::{Align, Align2, Context, Id, LayerId, Order, Ui, vec2};
 
-use super::marks::label;
+use super::marks::draw_label;
 use super::place::Place;
 use super::state::{Shown, State};
 use crate::texts::{tr, tr_with};
 use crate::views::Probe;
 use bokehcam::frame::DepthMap;
 
-/// While the pointer rests, frames go on: what is said of them is renewed this often, in seconds.
+/// Update interval of the values while the pointer rests, in seconds: frames continue to change them.
 const PERIOD_S: f32 = 0.2;
 
-/// The place under the pointer, as fractions of the picture, where somebody wants to know of it: while instruments or a view
-/// other than the picture are shown, or Alt is held.
-pub fn place(ui: &Ui, state: &State, place: &Place) -> Option<[f32; 2]> {
+/// Returns the probed position as fractions of the picture. The probe is active while the instruments or a diagnostic
+/// view are shown, or Alt is held.
+pub fn probed_point(ui: &Ui, state: &State, place: &Place) -> Option<[f32; 2]> {
     let (at, alt) = ui.input(|input| (input.pointer.hover_pos(), input.modifiers.alt));
     let is_wanted = alt || !state.bare && (state.instruments || state.shown != Shown::Picture);
-    let at = at.filter(|at| is_wanted && place.seen.contains(*at))?;
+    let at = at.filter(|at| is_wanted && place.visible.contains(*at))?;
     // Not through the panel.
     let layer = ui.ctx().layer_id_at(at);
-    (layer.is_none() || layer == Some(ui.layer_id())).then(|| place.fractions(at))
+    (layer.is_none() || layer == Some(ui.layer_id())).then(|| place.to_fractions(at))
 }
 
-/// Draws what is known there beside the pointer.
+/// Draws the probe's values beside the pointer.
 pub fn show(ctx: &Context, state: &State) {
     ctx.request_repaint_after_secs(PERIOD_S);
     let Some((probe, at)) = state.probe.zip(ctx.pointer_latest_pos()) else { return };
     let painter = ctx.layer_painter(LayerId::new(Order::Middle, Id::unique("probe")));
-    let text = text(probe, state.camera.is_relative);
-    // Right and below, unless that is outside.
+    let text = format_probe(probe, state.camera.is_relative);
+    // At the lower right of the pointer, unless that would be outside the window.
     let window = super::dock::room(ctx);
     let (x, dx) = if at.x + 240.0 < window.right() { (Align::Min, 16.0) } else { (Align::Max, -12.0) };
     let (y, dy) = if at.y + 50.0 < window.bottom() { (Align::Min, 20.0) } else { (Align::Max, -12.0) };
-    label(&painter, at + vec2(dx, dy), Align2([x, y]), &text, None);
+    draw_label(&painter, at + vec2(dx, dy), Align2([x, y]), &text, None);
 }
 
-/// Relative distances are in units of the nearest one, and have no metres.
-fn text(probe: Probe, is_relative: bool) -> String {
+/// Formats the probe's values. Relative distances are in units of the nearest one, not in metres.
+fn format_probe(probe: Probe, is_relative: bool) -> String {
     let depth = match (probe.depth_m, is_relative) {
         (None, _) => tr("no depth").to_owned(),
         (Some(far), true) if far >= 0.99 * DepthMap::FAR_M => tr("far").to_owned(),

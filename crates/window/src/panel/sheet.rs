@@ -1,24 +1,24 @@
-//! The panel itself: what everybody needs, and more on a wish.
+//! The panel: the first screen with the essential controls, and an expanded part.
 
 use egui::{Area, Context, Id, Order, Rect, ScrollArea, Ui, Vec2, vec2};
 
 use super::cards;
 use super::dock::{Dock, LINE};
 use super::icons::{self, Icon};
-use super::parts::end_of;
-use super::sections::{self, Editing, Sheet, Thumbs, first};
+use super::parts::truncate_start;
+use super::sections::{self, Editing, Sheet, Thumbnails, first};
 use super::state::{Action, Source, State};
 use super::theme::{self, Colors, GAP, PAD};
 use crate::texts::{tr, tr_with};
 
-/// What the panel remembers.
+/// State of the panel between frames.
 #[derive(Default)]
 pub struct Memory {
     editing: Editing,
-    thumbs: Thumbs,
-    /// Where the panel was drawn last; `None` while it is closed.
+    thumbnails: Thumbnails,
+    /// Rectangle at the last drawing; `None` while it is closed.
     rect: Option<Rect>,
-    /// The control that had the focus in the pass before.
+    /// The control that had the focus in the previous pass.
     focused: Option<Id>,
 }
 
@@ -27,24 +27,24 @@ fn id() -> Id {
 }
 
 impl Memory {
-    /// Whether the pointer is over the panel, or a control has the focus or a list open: then it must not hide.
+    /// Whether the panel must not hide: the pointer is over it, a control has the focus, or a popup is open.
     pub fn is_in_use(&self, ctx: &Context) -> bool {
         let pointer = ctx.input(|input| input.pointer.latest_pos());
         let under_pointer = self.rect.zip(pointer).is_some_and(|(rect, at)| rect.contains(at));
         under_pointer || ctx.memory(|memory| memory.focused().is_some()) || ctx.any_popup_open()
     }
 
-    /// Whether it asks something that Esc gives up.
+    /// Whether a dialog is open that Esc cancels.
     pub fn is_asking(&self) -> bool {
         self.rect.is_some() && self.editing.is_asking()
     }
 
-    /// Where it was drawn last, if it is open.
+    /// Returns its rectangle at the last drawing, if it is open.
     pub fn rect(&self) -> Option<Rect> {
         self.rect
     }
 
-    /// Draws the panel where it stands; what does not fit is scrolled.
+    /// Draws the panel in its dock, scrolling if it does not fit.
     pub fn show(
         &mut self,
         ctx: &Context,
@@ -71,7 +71,7 @@ impl Memory {
                         header(ui, state, sheet.actions);
                         status(ui, state);
                         ui.spacing_mut().combo_width = ui.available_width();
-                        sections::show(ui, &mut sheet, &mut self.editing, &mut self.thumbs);
+                        sections::show(ui, &mut sheet, &mut self.editing, &mut self.thumbnails);
                     }
                     self.follow_focus(ui);
                     let Sheet { look, stroke, .. } = sheet;
@@ -81,13 +81,14 @@ impl Memory {
                 });
             });
         });
+        // The status line changes without any input.
         if matches!(state.source, Source::Running(_)) && state.shows_more() && !state.stands_still() {
             ctx.request_repaint_after_secs(STATUS_PERIOD_S);
         }
         self.rect = Some(drawn.response.rect);
     }
 
-    /// Scrolls to the control that the focus moved to, if that is out of sight.
+    /// Scrolls to a newly focused control that is out of sight.
     fn follow_focus(&mut self, ui: &Ui) {
         let focused = ui.ctx().memory(|memory| memory.focused());
         if let Some(id) = focused.filter(|_| focused != self.focused)
@@ -101,8 +102,8 @@ impl Memory {
     }
 }
 
-/// Draws a button that brings the panel back, where it was.
-pub fn way_back(ctx: &Context, actions: &mut Vec<Action>) {
+/// Draws a button that reopens the panel, at the panel's corner.
+pub fn show_reopen_button(ctx: &Context, actions: &mut Vec<Action>) {
     let corner = ctx.content_rect().right_top() + vec2(-GAP - icons::SIDE - 6.0, GAP);
     let area = Area::new(id().with("way back")).fixed_pos(corner).order(Order::Middle);
     cards::show(ctx, area, 60.0, 3, |ui, _| {
@@ -115,13 +116,13 @@ pub fn way_back(ctx: &Context, actions: &mut Vec<Action>) {
 /// Seconds between updates of the focus distance, which changes without any input.
 const STATUS_PERIOD_S: f32 = 0.5;
 
-/// The state of the source and the distance of focus, in one line.
+/// Adds a line with the source's status and the focus distance.
 fn status(ui: &mut Ui, state: &State) {
     let colors = Colors::here(ui);
     let mut parts: Vec<String> = Vec::new();
     if let Source::Running(running) = &state.source {
-        // What comes after it has to be seen, too.
-        parts.push(end_of(&running.label, 34));
+        // Shortened, to leave room for the focus distance.
+        parts.push(truncate_start(&running.label, 34));
     }
     let focused = state.look.effect.follows_depth() && !state.known().is_relative;
     if let Some(metres) = state.focus_m.filter(|metres| focused && metres.is_finite()) {
@@ -137,11 +138,11 @@ fn status(ui: &mut Ui, state: &State) {
     ui.add(egui::Label::new(text).truncate());
 }
 
-/// Buttons for undo, redo, reset, help and hiding the panel.
+/// Adds the buttons for undo, redo, reset, help and hiding the panel.
 fn header(ui: &mut Ui, state: &State, actions: &mut Vec<Action>) {
     ui.horizontal(|ui| {
         ui.spacing_mut().item_spacing.x = 2.0;
-        let (undo, redo) = state.history.can();
+        let (undo, redo) = state.history.can_undo_redo();
         let buttons = [
             (Icon::Undo, "Undo (Ctrl+Z)", undo, Action::Undo),
             (Icon::Redo, "Redo (Ctrl+Shift+Z)", redo, Action::Redo),

@@ -1,4 +1,4 @@
-//! The panel without a display: real input events in, actions and shapes out.
+//! Panel tests without a display: input events in, actions and shapes out.
 
 mod access;
 mod covers;
@@ -26,7 +26,7 @@ use crate::present::Area;
 use bokehcam::depth::focus::FocusRule;
 use bokehcam::look::Look;
 
-/// A window of the controls alone.
+/// A headless window that runs the controls alone.
 struct Window {
     ctx: egui::Context,
     panel: Panel,
@@ -38,21 +38,21 @@ struct Window {
 }
 
 impl Window {
-    /// A window of 1280 x 720 pixels that the picture fills.
+    /// Creates a window of 1280 x 720 pixels that the picture fills.
     fn new() -> Self {
         Self::of(sample::state(), (1280, 720))
     }
 
     fn of(state: State, size: (u32, u32)) -> Self {
         let mut window = Self::unseen(state, size);
-        // Fonts and measures hold from the second pass on.
+        // Fonts and layout are stable from the second pass on.
         for _ in 0..4 {
             window.pass(Vec::new());
         }
         window
     }
 
-    /// The same before its first pass.
+    /// Creates a window before its first pass.
     fn unseen(state: State, (width, height): (u32, u32)) -> Self {
         let area = Area { x: 0, y: 0, width, height };
         Self {
@@ -66,7 +66,7 @@ impl Window {
         }
     }
 
-    /// One pass of egui; what was done is applied, as the window does.
+    /// Runs one pass of egui and applies the resulting actions, like the window.
     fn pass_with_output(&mut self, events: Vec<Event>) -> (Vec<Action>, FullOutput) {
         self.time_s += 1.0 / 60.0;
         let mut input = RawInput {
@@ -92,7 +92,7 @@ impl Window {
         actions
     }
 
-    /// Passes until `seconds` are over, without any input.
+    /// Runs passes for `seconds` without any input.
     fn wait(&mut self, seconds: f64) -> Vec<Action> {
         let end_s = self.time_s + seconds;
         let mut actions = Vec::new();
@@ -102,7 +102,7 @@ impl Window {
         actions
     }
 
-    /// All texts that are drawn, and where.
+    /// Returns all texts drawn, with their rectangles.
     fn boxes(&mut self) -> Vec<(String, Rect)> {
         fn add(shape: &egui::Shape, to: &mut Vec<(String, Rect)>) {
             match shape {
@@ -118,7 +118,7 @@ impl Window {
         texts
     }
 
-    /// All texts that are drawn, and their middles.
+    /// Returns all texts drawn, with their centres.
     fn places(&mut self) -> Vec<(String, Pos2)> {
         self.boxes().into_iter().map(|(text, at)| (text, at.center())).collect()
     }
@@ -165,13 +165,13 @@ fn button(pos: Pos2, pressed: bool) -> Event {
     Event::PointerButton { pos, button: PointerButton::Primary, pressed, modifiers: Modifiers::NONE }
 }
 
-/// A turn of the wheel.
+/// Creates a wheel event.
 fn scrolled(unit: MouseWheelUnit, by: f32, modifiers: Modifiers) -> Event {
     let source = egui::MouseWheelSource::Unknown;
     Event::MouseWheel { unit, delta: Vec2::new(0.0, by), phase: TouchPhase::Move, source, modifiers }
 }
 
-/// The last look that was made.
+/// Returns the last look among the actions.
 fn last_look(actions: &[Action]) -> Option<Look> {
     actions.iter().rev().find_map(|action| match action {
         Action::Look { look, .. } => Some((**look).clone()),
@@ -179,7 +179,7 @@ fn last_look(actions: &[Action]) -> Option<Look> {
     })
 }
 
-/// The point of the picture that was focused last.
+/// Returns the focus point of the last look.
 fn point(actions: &[Action]) -> [f32; 2] {
     match last_look(actions).map(|look| look.focus) {
         Some(FocusRule::Point { x, y }) => [x, y],
@@ -191,7 +191,7 @@ fn close(a: [f32; 2], b: [f32; 2]) -> bool {
     a.iter().zip(b).all(|(a, b)| (a - b).abs() < 2e-3)
 }
 
-/// Where on the panel one may click without hitting the picture.
+/// A position on the panel, clear of the picture.
 fn on_panel() -> Pos2 {
     pos2(1280.0 - 40.0, 400.0)
 }

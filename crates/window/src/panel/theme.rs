@@ -12,31 +12,31 @@ use bokehcam::budget::Quality;
 
 /// Width of the panel, in points.
 pub const WIDTH: f32 = 300.0;
-/// Distance of panel and cards from the window's border.
+/// Distance of panel and cards from the window's border, in points.
 pub const GAP: f32 = 10.0;
-/// Margin inside of them.
+/// Inner margin of panel and cards, in points.
 pub const PAD: f32 = 14.0;
-/// Height of a control that is clicked.
+/// Height of a clickable control, in points.
 pub const ROW: f32 = 26.0;
 
-/// Colours of a theme. Text on `card` or `field` has a contrast of 4.5 or more, whatever the picture below.
+/// Colours of a theme. Text on `card` or `field` has a contrast of at least 4.5:1 over any picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Colors {
-    /// Behind text: the panel, hardly translucent.
+    /// Background of panel and cards, slightly translucent.
     pub card: Color32,
-    /// Behind the text of a control.
+    /// Background of a control.
     pub field: Color32,
-    /// The same, while the pointer is over the control.
+    /// Background of a hovered control.
     pub hover: Color32,
     pub text: Color32,
-    /// Text that is less important.
+    /// Less important text.
     pub weak: Color32,
-    /// What is chosen, and lines that mean something.
+    /// Selected controls and significant lines.
     pub accent: Color32,
     /// Text on `accent`.
     pub on_accent: Color32,
     pub line: Color32,
-    /// What went wrong, and recording.
+    /// Errors, and recording.
     pub alarm: Color32,
 }
 
@@ -64,12 +64,12 @@ const LIGHT: Colors = Colors {
     alarm: Color32::from_rgb(178, 24, 24),
 };
 
-/// On the picture itself, in both themes: light lines with a dark border stand out on any picture.
+/// Marks on the picture, in both themes: light lines with a dark border stand out on any picture.
 pub const ON_PICTURE: Color32 = Color32::from_rgb(255, 255, 255);
 pub const SHADE: Color32 = Color32::from_rgba_premultiplied(0, 0, 0, 150);
 
 impl Colors {
-    /// The colours of a theme.
+    /// Returns the colours of a theme.
     pub fn of(theme: Theme) -> Self {
         match theme {
             Theme::Dark => DARK,
@@ -77,7 +77,7 @@ impl Colors {
         }
     }
 
-    /// Behind a control that is chosen, or under the pointer.
+    /// Returns the background of a control, by its state.
     pub fn fill(&self, chosen: bool, hovered: bool) -> Color32 {
         match (chosen, hovered) {
             (true, _) => self.accent,
@@ -86,7 +86,7 @@ impl Colors {
         }
     }
 
-    /// Text there; weak where it cannot be chosen.
+    /// Returns the text colour for that background; dimmed if it cannot be selected.
     pub fn on_fill(&self, chosen: bool, possible: bool) -> Color32 {
         match (chosen, possible) {
             (true, _) => self.on_accent,
@@ -95,14 +95,14 @@ impl Colors {
         }
     }
 
-    /// The colours of the theme that is in use.
+    /// Returns the colours of the active theme.
     pub fn here(ui: &egui::Ui) -> Self {
         Self::of(if ui.visuals().dark_mode { Theme::Dark } else { Theme::Light })
     }
 }
 
-/// The colour of a rung, and a letter for those who cannot tell the colours apart.
-pub fn rung(quality: Option<Quality>, theme: Theme) -> (Color32, &'static str) {
+/// Returns the colour of a quality level, and a letter for colour-blind users.
+pub fn quality_color(quality: Option<Quality>, theme: Theme) -> (Color32, &'static str) {
     let pick = |on_dark: [u8; 3], on_light: [u8; 3]| {
         let [r, g, b] = if theme == Theme::Light { on_light } else { on_dark };
         Color32::from_rgb(r, g, b)
@@ -117,22 +117,22 @@ pub fn rung(quality: Option<Quality>, theme: Theme) -> (Color32, &'static str) {
     }
 }
 
-/// The font family of headings and of what is chosen.
+/// Returns the font family of headings and selected controls.
 pub fn medium() -> FontFamily {
     FontFamily::Name("medium".into())
 }
 
-/// Installs fonts and styles; to be called once, before the first pass that draws.
+/// Installs fonts and styles; call once, before the first pass that draws.
 pub fn install(ctx: &Context) {
     ctx.set_fonts(fonts());
     for theme in [Theme::Dark, Theme::Light] {
         ctx.set_style_of(theme, style(theme));
     }
-    // Our own keys change the text's size.
+    // The key bindings change the text scale instead.
     ctx.options_mut(|options| options.zoom_with_keyboard = false);
 }
 
-/// The two fonts that come with the program, in place of egui's.
+/// Returns the two bundled fonts, replacing egui's.
 fn fonts() -> FontDefinitions {
     let mut fonts = FontDefinitions::empty();
     let files: [(&str, &[u8]); 2] = [
@@ -150,7 +150,7 @@ fn fonts() -> FontDefinitions {
     fonts
 }
 
-/// Text sizes and spacing.
+/// Returns text sizes and spacing.
 fn style(theme: Theme) -> Style {
     let colors = Colors::of(theme);
     let mut style = Style { visuals: visuals(theme, &colors), animation_time: 0.12, ..Style::default() };
@@ -174,7 +174,7 @@ fn style(theme: Theme) -> Style {
     spacing.scroll = ScrollStyle {
         bar_width: 6.0,
         floating_width: 4.0,
-        // Nothing lies under it.
+        // Reserves space beside the scroll bar, so that it covers nothing.
         floating_allocated_width: 10.0,
         ..ScrollStyle::floating()
     };
@@ -182,7 +182,7 @@ fn style(theme: Theme) -> Style {
     style
 }
 
-/// Colours and shapes of egui's own widgets.
+/// Returns colours and shapes of egui's own widgets.
 fn visuals(theme: Theme, colors: &Colors) -> Visuals {
     let mut visuals = if theme == Theme::Dark { Visuals::dark() } else { Visuals::light() };
     let radius = CornerRadius::same(7);
@@ -211,7 +211,7 @@ fn visuals(theme: Theme, colors: &Colors) -> Visuals {
     visuals.window_stroke = Stroke::new(1.0, colors.line);
     visuals.window_corner_radius = CornerRadius::same(12);
     visuals.menu_corner_radius = CornerRadius::same(9);
-    // Soft shadows are many triangles, and the CPU may have to draw them.
+    // Soft shadows need many triangles, which the CPU may have to draw.
     (visuals.window_shadow, visuals.popup_shadow) = (Shadow::NONE, Shadow::NONE);
     visuals.slider_trailing_fill = true;
     visuals.handle_shape = HandleShape::Circle;
@@ -219,13 +219,13 @@ fn visuals(theme: Theme, colors: &Colors) -> Visuals {
     visuals
 }
 
-/// The same colour, fully opaque.
+/// Returns the same colour, fully opaque.
 pub fn opaque(color: Color32) -> Color32 {
     let [r, g, b, _] = color.to_srgba_unmultiplied();
     Color32::from_rgb(r, g, b)
 }
 
-/// The frame of panel and cards.
+/// Returns the frame of panel and cards.
 pub fn card(colors: &Colors) -> egui::Frame {
     egui::Frame::new()
         .fill(colors.card)
@@ -234,7 +234,7 @@ pub fn card(colors: &Colors) -> egui::Frame {
         .inner_margin(Margin::same(PAD as i8))
 }
 
-/// Draws a ring around the control that has the keyboard focus, as far as it is in sight.
+/// Draws a ring around the visible part of the control that has the keyboard focus.
 pub fn focus_ring(ctx: &Context) {
     let focused = ctx.memory(|memory| memory.focused()).and_then(|id| ctx.read_response(id));
     if let Some(response) = focused.filter(|response| response.sense.interactive()) {

@@ -1,4 +1,4 @@
-//! The self-timer: the seconds until a snapshot, counted below the face of who poses.
+//! The self-timer: a countdown to a snapshot, below the picture's middle so as not to cover the face.
 
 use egui::RichText;
 
@@ -6,17 +6,17 @@ use super::cards::Stack;
 use super::state::{Action, State};
 use super::theme::medium;
 
-/// Time to get back into the picture.
+/// Delay of the snapshot, in seconds.
 const DELAY_S: f64 = 3.0;
 
-/// When the snapshot is due, in egui's seconds.
+/// Due time of the snapshot, in egui's seconds.
 #[derive(Debug, Default)]
 pub struct Timer {
     due_s: Option<f64>,
 }
 
 impl Timer {
-    /// Draws the seconds that are left, and asks for the snapshot when none is.
+    /// Draws the remaining seconds, and triggers the snapshot at 0.
     pub fn show(&mut self, stack: &mut Stack, state: &State, actions: &mut Vec<Action>) {
         let ctx = stack.ctx;
         let now_s = ctx.input(|input| input.time);
@@ -28,7 +28,7 @@ impl Timer {
             return;
         }
         ctx.request_repaint_after_secs((left_s.fract() + 0.005) as f32);
-        stack.card("self-timer", 200.0, |ui, _| {
+        stack.add_card("self-timer", 200.0, |ui, _| {
             ui.label(RichText::new(left_s.ceil().to_string()).family(medium()).size(40.0));
         });
     }

@@ -1,4 +1,4 @@
-//! The bar under a recording: pause, step and a line to drag.
+//! The playback bar of a recording: pause, step and a seek slider.
 
 use egui::{Area, Context, Id, Margin, Order, Slider, pos2};
 
@@ -10,27 +10,27 @@ use super::theme::GAP;
 use crate::texts::tr_with;
 
 const HEIGHT: f32 = 44.0;
-/// Less room shows the line alone, without the time.
-const LEAST_WIDTH: f32 = 330.0;
+/// Minimum width that shows the time beside the slider, in points.
+const MIN_TIME_WIDTH: f32 = 330.0;
 
-/// With less there is no line to drag: the bar is there again once the panel is closed.
-const TOO_NARROW: f32 = 200.0;
+/// Minimum width for the slider, in points: below, the bar is hidden.
+const MIN_WIDTH: f32 = 200.0;
 
-/// What the bar remembers.
+/// State of the bar between frames.
 #[derive(Debug, Default)]
 pub struct Bar {
-    /// Whether the recording plays on once the line is let go.
+    /// Whether playback resumes when the slider is released.
     plays_on: bool,
 }
 
 impl Bar {
-    /// Draws the bar at the bottom of the picture's room, where the source is a recording. Its height, with the gap above.
+    /// Draws the bar at the bottom of the picture's area if the source is a recording. Returns its height with the gap.
     pub fn show(&mut self, ctx: &Context, state: &State, actions: &mut Vec<Action>) -> f32 {
         let running = matches!(state.source, Source::Running(_));
         let Some(transport) = state.transport.filter(|_| running) else { return 0.0 };
         let room = room(ctx);
         let (left, width) = (room.left() + GAP, room.width() - 2.0 * GAP);
-        if width < TOO_NARROW {
+        if width < MIN_WIDTH {
             return 0.0;
         }
         let corner = pos2(left, room.bottom() - GAP - HEIGHT);
@@ -57,7 +57,7 @@ impl Bar {
                 }
                 let times = format!("{} / {}", clock(transport.time_ns), clock(transport.length_ns));
                 let frame = tr_with("Frame {} of {}", &[&(transport.place + 1), &transport.frames]);
-                let shows_time = width >= LEAST_WIDTH;
+                let shows_time = width >= MIN_TIME_WIDTH;
                 let text = egui::RichText::new(if shows_time { &times } else { "" }).monospace().size(12.5);
                 let label = ui.label(text).on_hover_text(&frame);
                 ui.spacing_mut().slider_width = (ui.available_width() - 6.0).max(20.0);
@@ -65,6 +65,7 @@ impl Bar {
                 let line = Slider::new(&mut place, 0..=transport.frames.saturating_sub(1)).show_value(false);
                 let line = ui.add(line).labelled_by(label.id);
                 let is_moved = line.changed();
+                // Pauses during the drag, so that playback does not move the slider.
                 if line.drag_started() && !state.frozen && state.can_pause() {
                     self.plays_on = true;
                     actions.push(Action::Freeze(true));
@@ -82,7 +83,7 @@ impl Bar {
     }
 }
 
-/// Minutes, seconds and hundredths.
+/// Formats a time as minutes, seconds and hundredths.
 fn clock(ns: u64) -> String {
     let hundredths = ns / 10_000_000;
     format!("{}:{:02}.{:02}", hundredths / 6000, hundredths / 100 % 60, hundredths % 100)

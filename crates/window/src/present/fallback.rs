@@ -1,19 +1,19 @@
-//! Keeps the window alive when the GPU fails: it is then drawn on the CPU.
+//! Falls back to drawing on the CPU when the GPU fails.
 
 use super::soft::Painter;
 use super::{Controls, Drawing, PresentError, Presenter};
 use bokehcam::compute::DevicePicture;
 use bokehcam::compute::backed::Backed;
 
-/// Presents with a GPU, and from its first error on with another presenter.
+/// Presents with a GPU, and after its first error with another presenter.
 pub struct Fallback<Other> {
-    /// With what makes the other presenter, and a painter for it that is kept up to date with the controls.
+    /// The GPU presenter with its spare: a constructor, and a painter that always has the current controls.
     presenter: Backed<Box<dyn Presenter>, (Other, Painter)>,
     size: (u32, u32),
 }
 
 impl<Other: FnOnce(Painter) -> Result<Box<dyn Presenter>, PresentError>> Fallback<Other> {
-    /// Presents with `first`, and with what `other` makes once `first` fails.
+    /// Creates a presenter that uses `first`, and after it fails the one that `other` creates.
     pub fn new(first: Box<dyn Presenter>, other: Other) -> Self {
         Self { presenter: Backed::new(first, (other, Painter::new())), size: (0, 0) }
     }
@@ -42,8 +42,8 @@ impl<Other: FnOnce(Painter) -> Result<Box<dyn Presenter>, PresentError>> Present
         presenter.run("draws", |presenter| presenter.present(drawing), make)
     }
 
-    fn takes(&self, picture: &DevicePicture) -> bool {
-        self.presenter.worker().takes(picture)
+    fn supports(&self, picture: &DevicePicture) -> bool {
+        self.presenter.worker().supports(picture)
     }
 
     fn has_device(&self) -> bool {
@@ -66,7 +66,7 @@ mod tests {
     const SIZE: (u32, u32) = (64, 48);
     const PIXELS: usize = (SIZE.0 * SIZE.1) as usize;
 
-    /// Draws so many times.
+    /// Fails after this number of frames.
     struct Gpu(u32);
 
     impl Presenter for Gpu {
@@ -100,7 +100,7 @@ mod tests {
         }
     }
 
-    /// A texture that is set once, and later only used.
+    /// Controls with a texture that is set once, and later only used.
     fn controls(with_texture: bool, left_px: f32) -> Controls {
         let id = TextureId::Managed(7);
         let mut textures = TexturesDelta::default();

@@ -1,7 +1,7 @@
-//! How the window's content gets onto the screen: two presenters that show the same.
+//! Puts the window's content on the screen, with two equivalent presenters.
 //!
-//! `gpu` draws with the device that blurs, so that a picture blurred there need not be read back; `soft` draws on the
-//! CPU into memory shared with the display server, where there is no GPU.
+//! `gpu` draws on the device that blurs, so that blurred pictures need not be read back; `soft` draws on the CPU into
+//! memory shared with the display server, if there is no GPU.
 
 mod fallback;
 pub mod gpu;
@@ -21,9 +21,9 @@ use bokehcam::frame::ColorImage;
 /// A rectangle of the window, in pixels.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Area {
-    /// Columns from the left; the area lies within the window.
+    /// Offset from the left; the area lies within the window.
     pub x: u32,
-    /// Rows from the top.
+    /// Offset from the top.
     pub y: u32,
     pub width: u32,
     pub height: u32,
@@ -33,7 +33,7 @@ pub struct Area {
 #[derive(Clone, Copy, Debug)]
 pub enum Image<'a> {
     Memory(&'a ColorImage),
-    /// On a GPU; only a presenter that [takes](Presenter::takes) it can show it.
+    /// On a GPU; only a presenter that [supports](Presenter::supports) it can show it.
     Device(&'a DevicePicture),
 }
 
@@ -46,25 +46,25 @@ impl Image<'_> {
     }
 }
 
-/// What is drawn under the controls.
+/// The content below the controls.
 #[derive(Clone, Copy, Debug)]
 pub struct Drawing<'a> {
-    /// Where the picture goes, scaled to fill it; the rest of the window is the background.
+    /// Area of the picture, which is scaled to fill it; the rest of the window is background.
     pub area: Area,
-    /// The part of the enlarged picture that fills the area instead: its pixels as they are.
+    /// Visible part of a zoomed picture, which fills the area with unscaled square pixels instead.
     pub part: Option<Part>,
     pub picture: Image<'a>,
-    /// A picture of the same size to show instead, left of this fraction of the picture's width as it is shown.
+    /// A picture of the same size to show left of this fraction of the displayed width.
     pub before: Option<(&'a ColorImage, f32)>,
-    /// Whether pictures are flipped left to right; the split is not.
+    /// Whether pictures are mirrored; the split is not.
     pub mirror: bool,
-    /// Whether pictures are shown grey and dim, because no new ones come.
+    /// Whether pictures are shown grey and dim, because no new ones arrive.
     pub stale: bool,
-    /// Colour of the rest of the window, sRGB.
+    /// Background colour, sRGB.
     pub background: [u8; 3],
 }
 
-/// The look of a stale picture, grey and dim: each channel is `(r * R + g * G + b * B) / 2^BITS`.
+/// Weights of a stale picture, grey and dim: each channel is `(r * R + g * G + b * B) / 2^BITS`.
 pub struct Tone;
 
 impl Tone {
@@ -74,32 +74,32 @@ impl Tone {
     pub const STALE_BITS: u32 = 16;
 }
 
-/// Controls that changed, as egui gives them.
+/// Updated controls from egui.
 #[derive(Clone)]
 pub struct Controls {
     pub primitives: Vec<egui::ClippedPrimitive>,
-    /// Textures to set before and to free after.
+    /// Textures to set before drawing and to free after.
     pub textures: egui::TexturesDelta,
-    /// Pixels of the window per point of the controls.
+    /// Window pixels per point.
     pub pixels_per_point: f32,
 }
 
 /// Shows pictures and controls in a window.
 pub trait Presenter {
-    /// The window has another size, in pixels; one without pixels shows nothing.
+    /// Sets the window's size in pixels; with zero size, nothing is shown.
     fn resize(&mut self, size: (u32, u32));
 
-    /// Controls to paint from now on.
+    /// Replaces the controls.
     fn set_controls(&mut self, controls: Controls);
 
-    /// Shows the drawing with the controls on it.
+    /// Shows the drawing with the controls over it.
     ///
     /// # Errors
-    /// The window cannot be drawn to any more.
+    /// Fails if the window cannot be drawn to any more.
     fn present(&mut self, drawing: &Drawing) -> Result<(), PresentError>;
 
-    /// Whether it can show this picture straight from the GPU; otherwise it needs it in memory.
-    fn takes(&self, picture: &DevicePicture) -> bool {
+    /// Whether it can show this picture directly from the GPU; otherwise the picture must be in memory.
+    fn supports(&self, picture: &DevicePicture) -> bool {
         let _ = picture;
         false
     }
@@ -115,11 +115,11 @@ pub trait Presenter {
 #[error("cannot draw to the window: {0}")]
 pub struct PresentError(pub String);
 
-/// A presenter for `window`: with the GPU where there is a `device`; on the CPU without one, where it cannot draw to
-/// the window, and from the moment it fails.
+/// Creates a presenter for `window`: on the GPU if there is a `device`; on the CPU without one, if the device cannot
+/// draw to the window, or once it fails.
 ///
 /// # Errors
-/// Neither can draw to it.
+/// Fails if neither can draw to it.
 pub fn create(window: Arc<Window>, device: Option<Arc<Device>>) -> Result<Box<dyn Presenter>, PresentError> {
     if let Some(device) = device {
         match gpu::Gpu::new(Arc::clone(&window), device) {

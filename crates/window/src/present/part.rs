@@ -1,24 +1,25 @@
-//! The part of an enlarged picture that is seen.
+//! Geometry of a zoomed picture, of which only a part is visible, and of a fitted one.
 
 use super::Area;
 
-/// A picture whose pixels are squares of the window, of which only a part is seen.
+/// The visible part of a picture that is zoomed by an integer factor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Part {
-    /// Pixels of the window along a side of one of the picture, > 0.
+    /// Window pixels per picture pixel, > 0.
     pub factor: u32,
-    /// The column and row of the enlarged picture, as it is seen (mirrored), at the area's top left.
+    /// Column and row of the zoomed picture, in display orientation (mirrored), at the area's top left.
     pub at: (u32, u32),
 }
 
-/// Where a picture of `size` goes in a window, enlarged by a whole `factor`, and which part of it is seen. In the window's middle
-/// is `center`, as fractions of the picture as it is seen, as far as nothing is left empty for that.
+/// Computes where a picture of `size`, zoomed by an integer `factor`, lies in a window, and which part is visible.
+/// `center` is the point to centre, as fractions of the picture in display orientation, clamped so that no space is
+/// wasted.
 pub fn enlarged(size: (u32, u32), window: (u32, u32), factor: u32, center: [f32; 2]) -> (Area, Part) {
     let side = |side: u32, window: u32, center: f32| {
         let whole = side.saturating_mul(factor);
         let hidden = whole.saturating_sub(window);
         let at = (center * whole as f32 - window as f32 / 2.0).round().clamp(0.0, hidden as f32) as u32;
-        // Offset and length of the area, and what is left out before it.
+        // Offset and length of the area, and the hidden pixels before it.
         (window.saturating_sub(whole) / 2, whole.min(window), at.min(hidden))
     };
     let (x, width, left) = side(size.0, window.0, center[0]);
@@ -26,13 +27,13 @@ pub fn enlarged(size: (u32, u32), window: (u32, u32), factor: u32, center: [f32;
     (Area { x, y, width, height }, Part { factor, at: (left, above) })
 }
 
-/// The largest area with the aspect ratio of `size` within a `window`, or the room at its top left, centred.
+/// Returns the largest area with the aspect ratio of `size` within `window`, centred.
 pub fn fitted(size: (u32, u32), window: (u32, u32)) -> Area {
     let [width, height, all_width, all_height] = [size.0, size.1, window.0, window.1].map(u64::from);
     if width == 0 || height == 0 || all_width == 0 || all_height == 0 {
         return Area::default();
     }
-    // Whichever side limits; the other is rounded to whole pixels.
+    // One side limits; the other one is rounded to whole pixels.
     let fills_width = all_width * height <= all_height * width;
     let (fit_width, fit_height) = match fills_width {
         true => (all_width, (all_width * height + width / 2) / width),
@@ -46,7 +47,8 @@ pub fn fitted(size: (u32, u32), window: (u32, u32)) -> Area {
 }
 
 impl Part {
-    /// Fills `line` (RGB) with the columns `from` of row `y` of the enlarged picture, which is `width` pixels wide before that.
+    /// Fills `line` (RGB) with the columns `from` of row `y` of the zoomed picture; `width` is the picture's unzoomed
+    /// width.
     pub fn row(self, rgb: &[u8], width: u32, y: usize, from: std::ops::Range<usize>, line: &mut [u8]) {
         let factor = self.factor.max(1) as usize;
         let row = &rgb.as_chunks::<3>().0[y / factor * width as usize..];

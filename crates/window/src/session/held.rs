@@ -1,4 +1,4 @@
-//! A picture that stays on the screen, blurred anew with every look.
+//! A frame held on the screen, blurred again with every new look.
 
 use super::super::services::Services;
 use bokehcam::bokeh::BokehError;
@@ -9,42 +9,43 @@ use bokehcam::engine::{Blur, Images};
 use bokehcam::look::Look;
 use bokehcam::optics::CocField;
 
-/// A frame that stays.
+/// A held frame.
 #[derive(Clone, Debug)]
 pub struct Still {
-    /// Different for each frame that stayed; the same in another look.
+    /// Identifies the frame; unchanged when it is blurred with another look.
     pub number: u64,
-    /// As it was taken, its depth with holes filled where its look follows depth, and what became of it.
+    /// Input picture, its depth map (holes filled if its look uses depth), and the blurred picture.
     pub images: Images,
-    /// The radius of every pixel.
+    /// Circle of confusion as a function of depth.
     pub coc: CocField,
-    /// The number of the change of look that it is of.
+    /// Number of the look change that it was blurred with.
     pub change: u64,
-    /// The rung that it was blurred at.
+    /// Quality level that it was blurred with.
     pub quality: Option<Quality>,
 }
 
-/// Blurs the frame that stays.
+/// Blurs a held frame.
 pub(super) struct HeldBlur {
     held: Still,
-    /// The rule of focus at first: while it stays, so does the distance.
+    /// Focus rule when the frame was taken: while the look keeps it, the focus distance stays fixed.
     focus: FocusRule,
-    again: Blur,
+    blur: Blur,
 }
 
-/// Shown when a look needs depth that the frame has not.
+/// Shown when a look needs depth that the frame lacks.
 const NO_DEPTH: &str = "The picture that stays was taken without depth: let the next ones come, for blur by depth.";
 
 impl HeldBlur {
-    /// Nothing is blurred yet; `focus` is the rule of the look that it was blurred in.
+    /// Creates the blur for a frame; `focus` is the focus rule of the look that the frame was taken with.
     pub fn new(held: Still, focus: FocusRule) -> Self {
-        Self { held, focus, again: Blur::default() }
+        Self { held, focus, blur: Blur::default() }
     }
 
-    /// The frame in this look, which is that of the change of this number.
+    /// Returns the frame blurred with `look`, which belongs to the look change `change`.
     ///
     /// # Errors
-    /// The look needs depth that the frame has not, or the executor cannot be made or fails: one line.
+    /// Returns a one-line message if the look needs depth that the frame lacks, or the executor cannot be created or
+    /// fails.
     pub fn blur(&mut self, look: &Look, change: u64, services: &mut dyn Services) -> Result<Still, String> {
         let Still { number, images, coc, .. } = &self.held;
         let fixed = if look.focus == self.focus { look.of_frame(coc, None) } else { look.clone() };
@@ -58,14 +59,14 @@ impl HeldBlur {
             let depth = made.depth.take().map(Depth::Final);
             (coc, made.depth) = still::coc_and_depth(&fixed, &mut made.color, depth).map_err(plain)?;
         }
-        self.again.follow(&fixed, (size, false), |settings| services.executor(settings, size))?;
-        if let Err(error) = self.again.blur(&mut made, coc) {
-            self.again = Blur::default();
+        self.blur.follow(&fixed, (size, false), |settings| services.executor(settings, size))?;
+        if let Err(error) = self.blur.blur(&mut made, coc) {
+            self.blur = Blur::default();
             return Err(plain(error));
         }
-        // What stands behind the subject is no part of the frame as it was taken.
+        // Keeps the original picture, without the virtual background composed into `made`.
         let depth = images.depth.clone().filter(|_| made.depth.is_some());
         let images = Images { color: images.color.clone(), depth, blurred: made.blurred };
-        Ok(Still { number: *number, images, coc, change, quality: self.again.quality() })
+        Ok(Still { number: *number, images, coc, change, quality: self.blur.quality() })
     }
 }

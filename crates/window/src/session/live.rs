@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 
 use super::super::services::{Opened, Services};
 use super::super::state::{Output, Running, Source};
-use super::{News, SessionEvent, Start};
+use super::{EventSender, SessionEvent, Start};
 use bokehcam::clock::Clock;
 use bokehcam::depth::plate::Guide;
 use bokehcam::link;
@@ -20,7 +20,7 @@ use bokehcam::sink::{Shutter, Switchboard, Tee};
 use bokehcam::source::{Kind, SourceName};
 use bokehcam::stats::Report;
 
-/// A run, and the channels into it.
+/// A running pipeline, and the handles that control it.
 pub(super) struct Live {
     pub size: (u32, u32),
     pub period_ns: u64,
@@ -28,23 +28,23 @@ pub(super) struct Live {
     changes: Changes,
     board: Switchboard,
     pub stop: Arc<AtomicBool>,
-    /// How far the plate is, where that makes the depth.
+    /// Progress of the background plate, if depth comes from it.
     pub guide: Option<Arc<Guide>>,
     thread: JoinHandle<Option<Report>>,
 }
 
-/// The window's pictures come in real time.
+/// The pipeline adapts the quality level to real time, because the window is live.
 const ADAPTIVE: bool = true;
 
 impl Live {
-    /// Starts a run. `wrote` is called with what becomes of its outputs, `ended` once with how it ended.
+    /// Starts a run. `wrote` is called with events of its outputs, `ended` once with the run's result.
     ///
     /// # Errors
-    /// The executor cannot be made, or the system gives no thread: one line.
+    /// Returns a one-line message if the executor or the thread cannot be created.
     pub(super) fn begin(
         opened: Opened,
         start: &mut Start,
-        news: &News,
+        events: &EventSender,
         wrote: impl Fn(Notice) + Send + Sync + 'static,
         ended: impl FnOnce(Result<Report, PipelineError>) + Send + 'static,
     ) -> Result<(Self, Source), String> {
@@ -58,6 +58,7 @@ impl Live {
             Blurring::begin(look, (info.size, ADAPTIVE), |settings| start.services.executor(settings, info.size))?;
         let executor = blurring.bokeh.as_ref().map_or_else(|| "no blur".into(), |bokeh| bokeh.describe());
         let (budget_ns, threads) = (start.budget_ns.unwrap_or(info.period_ns), start.threads);
+        // Outputs can be added and removed during the run; the shutter withholds pictures from all of them.
         let (switch, board) = Tee::switched("window", wrote);
         let period = Duration::from_nanos(info.period_ns);
         let (demand, off) = (start.demand.clone(), Arc::clone(&start.off));
@@ -65,9 +66,10 @@ impl Live {
         *start.release.lock().unwrap_or_else(PoisonError::into_inner) = Some(release);
         let (view, views) = link::live();
         let stop = Arc::new(AtomicBool::new(false));
-        let (stopped, wake, keep_going) = (Arc::clone(&stop), Arc::clone(&news.wake), start.keep_going);
+        let (stopped, wake, keep_going) = (Arc::clone(&stop), Arc::clone(&events.wake), start.keep_going);
         let (wanted, demand) = (Arc::clone(&start.wanted), start.demand.clone());
-        news.send(SessionEvent::Views(views, guide.clone(), seeker));
+        // Before the thread starts, so that the window can receive the first frame.
+        events.send(SessionEvent::Views(views, guide.clone(), seeker));
         let run = move || {
             pipeline::run(Run {
                 threads,
@@ -109,15 +111,15 @@ impl Live {
         Ok((live, source))
     }
 
-    /// The look as far as the source allows it.
+    /// Returns the look as far as the source supports it.
     pub(super) fn effective(&self, look: &Look) -> Look {
         look.for_source(self.known)
     }
 
-    /// Blurs with this look from now on, which the source [allows](Self::effective); its frames carry this number.
+    /// Blurs with this look from now on, which the source must [support](Self::effective); its frames carry `number`.
     ///
     /// # Errors
-    /// Its executor cannot be made: one line. The one before goes on.
+    /// Returns a one-line message if the executor cannot be created. The previous look stays active.
     pub(super) fn adopt(&mut self, look: Look, number: u64, services: &mut dyn Services) -> Result<(), String> {
         let size = self.size;
         self.changes.adopt(look, number, |settings| {
@@ -128,24 +130,24 @@ impl Live {
         })
     }
 
-    /// Adds a sink to the run.
-    pub(super) fn write_to(&self, output: &Output, sink: Box<dyn Sink>) {
-        // A run that has ended gives the sink up, and tells so by `wrote`.
+    /// Adds an output to the run.
+    pub(super) fn add_output(&self, output: &Output, sink: Box<dyn Sink>) {
+        // A run that has ended rejects the sink and reports that through `wrote`.
         let _ = self.board.add(&output.name, sink);
     }
 
-    /// Takes an output out of the run, which completes it.
-    pub(super) fn end(&self, output: &Output) {
+    /// Removes an output from the run, which completes its file.
+    pub(super) fn remove_output(&self, output: &Output) {
         self.board.remove(&output.name);
     }
 
-    /// Ends the run and waits for it; gives back its report.
+    /// Stops the run and waits for it. Returns its report.
     pub(super) fn stop(self) -> Option<Report> {
         self.stop.store(true, Ordering::Relaxed);
         self.join()
     }
 
-    /// Waits for a run that has ended or was told to.
+    /// Waits for a run that has ended or been stopped.
     pub(super) fn join(self) -> Option<Report> {
         self.thread.join().ok().flatten()
     }

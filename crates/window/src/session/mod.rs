@@ -1,5 +1,5 @@
-//! What goes on behind the window: a thread of its own opens sources, runs the pipeline, makes executors for new looks,
-//! and begins and ends outputs. None of it holds up the window.
+//! The session: a background thread that opens sources, runs the pipeline, creates executors for new looks, and starts
+//! and stops outputs, without blocking the window.
 
 mod held;
 mod host;
@@ -29,194 +29,194 @@ use bokehcam::sink::Release;
 use bokehcam::sink::switch::Notice;
 use bokehcam::stats::Report;
 
-/// A close that takes longer is logged.
-const PATIENCE: Duration = Duration::from_secs(3);
+/// A slower close is logged.
+const SLOW_CLOSE: Duration = Duration::from_secs(3);
 
-/// Wakes the window's thread to take events; called from any thread.
+/// Wakes the window's thread to receive events; callable from any thread.
 pub type Wake = Arc<dyn Fn() + Send + Sync>;
 
-/// What a session starts with.
+/// Initial configuration of a session.
 pub struct Start {
-    /// Opens sources and outputs, and makes executors.
+    /// Opens sources and outputs, and creates executors.
     pub services: Box<dyn Services>,
     pub look: Look,
-    /// The source; empty for the first camera there is, else the demonstration.
+    /// Name of the source; empty for the first camera, or without a camera the demonstration.
     pub source: String,
-    /// Outputs to start together with the source.
+    /// Outputs that start with the source.
     pub outputs: Vec<Output>,
-    /// Count frames that fail and go on.
+    /// Whether to count failed frames and continue.
     pub keep_going: bool,
-    /// Time that a frame's blur may take; `None` is the frame period.
+    /// Time budget for the blur of a frame; `None` for the frame period.
     pub budget_ns: Option<u64>,
-    /// Threads that finish depth.
+    /// Number of threads for depth post-processing.
     pub threads: usize,
-    /// Where snapshots and recordings go.
+    /// Folders for snapshots and recordings.
     pub folders: Folders,
-    /// Where blurred pictures are wanted.
+    /// Whether the pipeline must deliver blurred frames.
     pub wanted: Arc<Wanted>,
-    /// Whether anybody watches: sources rest while nobody does.
+    /// Counts the viewers: sources pause while there are none.
     pub demand: Demand,
-    /// Whether outputs have the still card in place of pictures.
+    /// Whether outputs get the still card instead of the picture.
     pub off: Arc<AtomicBool>,
-    /// By what it is known whether they do.
+    /// Handle of the current run's outputs, to switch that.
     pub release: CurrentRelease,
 }
 
-/// What keeps pictures from the outputs of the run that there is. Locked when a run begins, and by who asks from outside.
+/// The current run's switch that withholds pictures from the outputs. Set when a run begins; remote control locks it,
+/// too.
 pub type CurrentRelease = Arc<Mutex<Option<Release>>>;
 
-/// What comes from a session.
+/// Events from a session to the window.
 pub enum SessionEvent {
     Update(Update),
-    /// A new run started: its frames come from here, how far its plate is, if that makes its depth, and what goes back and
-    /// forth in it, if it is a recording.
+    /// A new run: receiver of its frames, progress of its background plate, and seek handle if it is a recording.
     Views(Receiver<View>, Option<Arc<Guide>>, Option<Arc<Seeker>>),
-    /// A text for the clipboard.
+    /// Text for the clipboard.
     Copy(String),
-    /// The frame that stays, in another look.
+    /// The held frame with a new look.
     Blurred(Box<Still>),
 }
 
-/// How a frame is saved.
-pub struct Saving {
-    /// Whether what it was made from is saved beside it.
+/// Options of a save.
+pub struct SaveOptions {
+    /// Whether the input images are saved as well.
     pub with_sources: bool,
-    /// Who asked for it from outside.
-    pub order: Option<StillOrder>,
+    /// The remote request, if it is one.
+    pub request: Option<SnapshotRequest>,
 }
 
-/// A frame that somebody else asked for.
-pub struct StillOrder {
-    /// The file; `None` is where snapshots usually go.
+/// A snapshot requested by remote control.
+pub struct SnapshotRequest {
+    /// Path of the file; `None` for the snapshot folder.
     pub to: Option<PathBuf>,
     pub answer: SyncSender<Result<PathBuf, Answer>>,
 }
 
-/// What is left of a session.
+/// Result of a session.
 #[derive(Debug, Default)]
 pub struct Closed {
-    /// The report of the last run, if there was one.
+    /// Report of the last run.
     pub report: Option<Report>,
-    /// Why an output failed, the first that did: one line.
+    /// One-line message of the first output that failed.
     pub failed: Option<String>,
 }
 
-/// What a session is to do.
-enum Order {
-    Do(Request),
-    Save(Box<Still>, Saving),
+/// Commands to the session's thread.
+enum Command {
+    Request(Request),
+    Save(Box<Still>, SaveOptions),
     Hold(Box<Still>, bool),
-    LetGo,
+    Release,
     Copy(Vec<Switch>),
-    /// What became of an output of the run of this number.
-    Wrote(u64, Notice),
-    /// The run of this number ended.
+    /// An event of an output of the run with this number.
+    OutputEvent(u64, Notice),
+    /// The run with this number ended.
     Ended(u64, Box<Result<Report, PipelineError>>),
     Close,
 }
 
-/// The window's handle of a session.
+/// The window's handle to a session.
 pub struct Session {
-    orders: mpsc::Sender<Order>,
-    heard: mpsc::Receiver<SessionEvent>,
+    commands: mpsc::Sender<Command>,
+    events: mpsc::Receiver<SessionEvent>,
     thread: JoinHandle<Closed>,
 }
 
 impl Session {
-    /// Starts the thread, which opens the source at once.
+    /// Starts the thread, which opens the source immediately.
     ///
     /// # Errors
-    /// The system gives no thread.
+    /// Fails if the thread cannot be created.
     pub fn begin(start: Start, wake: Wake) -> std::io::Result<Self> {
-        let (orders, inbox) = mpsc::channel();
-        let (told, heard) = mpsc::channel();
-        let to_itself = orders.clone();
+        let (commands, inbox) = mpsc::channel();
+        let (sender, events) = mpsc::channel();
+        let own_commands = commands.clone();
         let thread = thread::Builder::new()
             .name("session".into())
-            .spawn(move || Host::new(start, News { told, wake }, to_itself).run(&inbox))?;
-        Ok(Self { orders, heard, thread })
+            .spawn(move || Host::new(start, EventSender { sender, wake }, own_commands).run(&inbox))?;
+        Ok(Self { commands, events, thread })
     }
 
-    /// Asks for a request to be carried out; ignored after the end.
-    pub fn order(&self, request: Request) {
-        let _ = self.orders.send(Order::Do(request));
+    /// Sends a request; ignored if the session has ended.
+    pub fn send(&self, request: Request) {
+        let _ = self.commands.send(Command::Request(request));
     }
 
-    /// Asks for a frame to be saved.
-    pub fn save(&self, still: Still, saving: Saving) {
-        let _ = self.orders.send(Order::Save(Box::new(still), saving));
+    /// Sends a frame to be saved.
+    pub fn save(&self, still: Still, saving: SaveOptions) {
+        let _ = self.commands.send(Command::Save(Box::new(still), saving));
     }
 
-    /// This frame stays: it is to be blurred anew with every look, until it is [let go](Self::let_go); at once if it `is_behind`,
-    /// as it still waits for the look that was chosen before it stayed.
+    /// Holds a frame: it is blurred again with every new look until [`Self::let_go`]. With `is_behind` it is blurred
+    /// immediately, because it does not have the latest look yet.
     pub fn hold(&self, still: Still, is_behind: bool) {
-        let _ = self.orders.send(Order::Hold(Box::new(still), is_behind));
+        let _ = self.commands.send(Command::Hold(Box::new(still), is_behind));
     }
 
-    /// No frame stays any more.
+    /// Releases the held frame.
     pub fn let_go(&self) {
-        let _ = self.orders.send(Order::LetGo);
+        let _ = self.commands.send(Command::Release);
     }
 
-    /// Asks for the equivalent command, for the clipboard; `switches` are the window's options.
+    /// Requests the equivalent command for the clipboard; `switches` are the window's options.
     pub fn copy(&self, switches: Vec<Switch>) {
-        let _ = self.orders.send(Order::Copy(switches));
+        let _ = self.commands.send(Command::Copy(switches));
     }
 
-    /// The next event, if one is waiting.
+    /// Returns the next event without blocking.
     pub fn hear(&self) -> Option<SessionEvent> {
-        self.heard.try_recv().ok()
+        self.events.try_recv().ok()
     }
 
-    /// Ends the run and completes all outputs.
+    /// Ends the run, completes all outputs, and waits for the thread.
     pub fn close(self) -> Closed {
-        let _ = self.orders.send(Order::Close);
-        // Nobody will take its events any more.
-        drop(self.heard);
+        let _ = self.commands.send(Command::Close);
+        // Disconnects first: events are not received any more.
+        drop(self.events);
         let began = Instant::now();
-        let mut told = false;
+        let mut has_warned = false;
         while !self.thread.is_finished() {
             thread::sleep(Duration::from_millis(20));
-            if !told && began.elapsed() > PATIENCE {
+            if !has_warned && began.elapsed() > SLOW_CLOSE {
                 tracing::warn!("waiting for the source or an output to end; Ctrl-C twice aborts");
-                told = true;
+                has_warned = true;
             }
         }
         self.thread.join().unwrap_or_default()
     }
 }
 
-/// Sends events to the window, and wakes it.
+/// Sends events to the window and wakes it.
 #[derive(Clone)]
-struct News {
-    told: mpsc::Sender<SessionEvent>,
+struct EventSender {
+    sender: mpsc::Sender<SessionEvent>,
     wake: Wake,
 }
 
-impl News {
-    fn tell(&self, told: Update) {
-        self.send(SessionEvent::Update(told));
+impl EventSender {
+    fn send_update(&self, update: Update) {
+        self.send(SessionEvent::Update(update));
     }
 
     fn note(&self, line: impl Into<String>) {
         let line = line.into();
         tracing::info!("{line}");
-        self.tell(Update::Note(line));
+        self.send_update(Update::Note(line));
     }
 
-    /// Tells in which folder a file is now.
-    fn kept(&self, file: &Path) {
-        folders::folder_of(file).into_iter().for_each(|folder| self.tell(Update::Kept(folder)));
+    /// Reports the folder of a saved file.
+    fn report_saved(&self, file: &Path) {
+        folders::folder_of(file).into_iter().for_each(|folder| self.send_update(Update::Kept(folder)));
     }
 
-    /// Shows a folder, and tells why not.
+    /// Opens a folder in the file manager; reports failures as a note.
     fn open(&self, folder: PathBuf) {
-        let news = self.clone();
-        folders::open(folder, move |line| news.note(line));
+        let events = self.clone();
+        folders::open(folder, move |line| events.note(line));
     }
 
-    fn send(&self, heard: SessionEvent) {
-        let _ = self.told.send(heard);
+    fn send(&self, event: SessionEvent) {
+        let _ = self.sender.send(event);
         (self.wake)();
     }
 }

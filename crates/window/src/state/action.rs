@@ -1,4 +1,4 @@
-//! What a person can do, what others have to do then, and what they tell.
+//! Messages of the state machine: user actions, requests to the session, and its updates.
 
 use std::path::PathBuf;
 
@@ -10,178 +10,178 @@ use bokehcam::look::Look;
 use bokehcam::look::presets::Preset;
 use bokehcam::source::devices::Choice;
 
-/// What a person can do. Every control and key is one of these.
+/// A user action. Every control and key produces one of these.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Action {
-    /// Another look. Looks of the same `stroke` (one drag of one control) are undone together.
+    /// Changes the look. Changes with the same `stroke` (one drag of one control) share one undo step.
     Look {
         look: Box<Look>,
-        /// The control in hand, or `None` for a single change.
+        /// The control in use, or `None` for a single change.
         stroke: Option<&'static str>,
     },
-    /// The control in hand was let go: what comes next is undone on its own.
+    /// Ends the stroke: the control was released, and the next change starts a new undo step.
     Settle,
-    /// Back to the look before.
+    /// Restores the previous look.
     Undo,
     Redo,
-    /// Back to the look at the start.
+    /// Restores the initial look.
     Reset,
-    /// The look of a preset.
+    /// Applies a preset.
     Preset(String),
     /// Saves the look as a preset.
     SavePreset(String),
-    /// Gives a preset of the person's another name.
+    /// Renames a user preset from the first name to the second.
     RenamePreset(String, String),
-    /// Deletes a preset of the person's.
+    /// Deletes a user preset.
     DeletePreset(String),
-    /// Shows something else of the frames.
+    /// Changes the displayed view.
     Show(Shown),
-    /// Shows what was before the blur left of this fraction, or nowhere.
+    /// Shows the unblurred picture left of this fraction of the width; `None` turns that off.
     Split(Option<f32>),
-    /// Mirrors the window, or not.
+    /// Switches mirroring of the window.
     Mirror(bool),
-    /// Keeps the picture, or lets the next ones come.
+    /// Freezes or unfreezes the picture.
     Freeze(bool),
-    /// Shows a still card in place of pictures, here and outside, and lets the camera rest; or shows them again.
+    /// Replaces the picture by a still card in the window and the outputs, and pauses the camera; or ends that.
     Off(bool),
-    /// Shows the picture so many times as large (0: as large as fits), around a point of it or what was in the middle.
+    /// Sets the zoom factor (0: fit to the window) around a point of the picture, or its current centre.
     Zoom(u32, Option<[f32; 2]>),
-    /// This point of an enlarged picture comes to the window's middle.
+    /// Centres this point of the zoomed picture.
     Pan([f32; 2]),
-    /// Goes to the frame at this place of the recording.
+    /// Seeks to this frame of the recording.
     Seek(usize),
-    /// Stops so many frames after the one that is shown.
+    /// Pauses and moves by this number of frames.
     Step(i32),
     /// Opens or closes the panel.
     Panel(bool),
     /// Shows or hides the instruments.
     Instruments(bool),
-    /// Hides all but the picture, or not.
+    /// Shows only the picture, or everything again.
     Bare(bool),
-    /// Shows or hides the help on keys.
+    /// Shows or hides the help.
     Help(bool),
-    /// Fills the screen, or not.
+    /// Switches full screen.
     FullScreen(bool),
-    /// Text and controls of this size, 1 as usual.
+    /// Sets the scale of text and controls; 1 is the default.
     TextScale(f32),
-    /// Keys without Ctrl do something, or nothing.
+    /// Enables or disables key bindings without Ctrl.
     SingleKeys(bool),
-    /// Closing asks first while something is recorded, or never.
+    /// Switches the confirmation before closing while an output is active.
     AskBeforeClosing(bool),
-    /// Opens or folds a section of the panel.
+    /// Unfolds or folds a section of the panel.
     Section(&'static str, bool),
-    /// Tells the person something.
+    /// Shows a message.
     Note(String),
-    /// Saves what is shown, and what is needed to make it again.
+    /// Saves the displayed picture, with its inputs if [`Self::KeepSources`] is on.
     Snapshot,
-    /// Saves what is shown in a few seconds, or not after all.
+    /// Starts or cancels a snapshot with self-timer.
     SelfTimer(bool),
-    /// Shows the folder that something was saved in last.
+    /// Opens the folder of the last saved file.
     OpenFolder,
-    /// Begins a recording (video), or ends it.
+    /// Starts or stops a recording.
     Record(bool),
-    /// Writes to this virtual camera, or to none.
+    /// Switches to this virtual camera, or to none.
     VirtualCamera(Option<String>),
     Open(String),
-    /// Asks for a source, or a picture, by a dialog.
+    /// Opens a file chooser for a source or a background picture.
     Browse(Browse),
-    /// Other pictures of the camera: their columns and rows, and frames per second.
+    /// Switches the camera's frame size (width, height) and rate (fps).
     Mode((u32, u32), f64),
-    /// Opens the source again.
+    /// Reopens the source.
     Retry,
-    /// Sets a control of the camera.
+    /// Sets a driver control of the camera.
     Control(String, i64),
-    /// Takes a plate: a picture of what is behind the person, who is told when to step aside.
+    /// Captures a background plate: the user is told when to step out of the picture.
     TakePlate,
-    /// Finds the person by a network.
+    /// Gets depth from person segmentation.
     FindMe,
-    /// Takes no way to depth now.
+    /// Declines the offered depth methods.
     DeclinePlate,
-    /// Blurs what is not in focus, or nothing.
+    /// Switches blur by depth on or off.
     Portrait(bool),
-    /// Makes depth another way.
+    /// Switches the depth method.
     DepthBy(Way),
-    /// Looks again which sources and virtual cameras there are.
+    /// Refreshes the lists of sources and virtual cameras.
     Refresh,
-    /// Puts the equivalent command on the clipboard.
+    /// Copies the equivalent command to the clipboard.
     CopyCommand,
-    /// Closes the window, or asks first.
+    /// Closes the window, or opens the confirmation dialog.
     Close,
-    /// Does not close it after all.
+    /// Cancels closing.
     StayOpen,
-    /// What went wrong is known.
+    /// Dismisses the failure of an output.
     Dismiss,
-    /// That this is a demonstration is known.
+    /// Dismisses the notice about the demonstration.
     KnowDemonstration,
-    /// Snapshots are saved with what is needed to make them again, or alone.
+    /// Switches whether snapshots include their inputs.
     KeepSources(bool),
 }
 
-/// What others have to do after an action.
+/// Side effects of an action, for the window or the session to carry out.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Request {
     Look(Box<Look>),
-    /// Save it under this name.
+    /// Saves a preset under this name.
     SavePreset(String, Box<Look>),
     RenamePreset(String, String),
     DeletePreset(String),
-    /// Save the frame that is shown, with all that is needed to make it again or alone.
+    /// Saves the displayed picture.
     Snapshot,
-    /// Show a folder.
+    /// Opens a folder in the file manager.
     OpenFolder(PathBuf),
-    /// Begin to write to an output. A recording without a name is to be given one.
+    /// Starts an output. A recording without a name gets one.
     Begin(Output),
     End(Output),
     Open(String),
-    /// Open it, if it can be a source.
+    /// Opens this source if it is valid.
     Offer(String),
     Browse(Browse),
-    /// Open the camera again with pictures of this size and rate.
+    /// Reopens the camera with this frame size (width, height) and rate (fps).
     Mode((u32, u32), f64),
     Control(String, i64),
-    /// Take a plate, and use it.
+    /// Captures a background plate, and uses it for depth.
     TakePlate,
-    /// Make depth this way from now on.
+    /// Switches the depth method.
     DepthBy(Way),
-    /// Show the frame at this place of the recording.
+    /// Seeks to this frame of the recording.
     Seek(usize),
-    /// Look which sources and virtual cameras there are.
+    /// Refreshes the lists of sources and virtual cameras.
     Refresh,
-    /// Put the equivalent command on the clipboard.
+    /// Copies the equivalent command to the clipboard.
     CopyCommand,
-    /// Fill the screen, or not.
+    /// Switches full screen.
     FullScreen(bool),
-    /// Let no picture pass, or let them again.
+    /// Withholds the picture from the outputs, or passes it again.
     Off(bool),
     Close,
 }
 
-/// What the session tells the window.
+/// Updates from the session to the window.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Update {
-    /// The source is another one now.
+    /// The source or its status changed.
     Source(Source),
-    /// What can be chosen.
+    /// Available sources and virtual cameras.
     Choices {
         sources: Vec<Choice>,
         virtual_cameras: Vec<Choice>,
     },
     Presets(Vec<Preset>),
     Controls(Vec<Knob>),
-    /// What else is known of the camera, before it runs.
+    /// Properties of the camera, sent before it runs.
     Camera(Camera),
-    /// What somebody offered can be a source.
+    /// An offered source is valid, and is to be opened.
     Offered(String),
-    /// Somebody chose what is to stand behind the subject.
+    /// The user chose another background.
     Behind(Behind),
-    /// The outputs that are written to now: after each that was begun or ended, also where that failed.
+    /// Active outputs: sent after each start or stop, including failed ones.
     Outputs(Vec<Output>),
     /// Bytes of the recording so far.
     Recorded(u64),
-    /// Something was saved in this folder.
+    /// A file was saved in this folder.
     Kept(PathBuf),
-    /// A line for the person.
+    /// A message to the user.
     Note(String),
-    /// A line that stays until it was read: an output failed.
+    /// Failure of an output: a message that stays until it is dismissed.
     Trouble(String),
 }

@@ -1,43 +1,43 @@
-//! How actions change the state.
+//! Applies actions to the state.
 
 use super::{Action, Output, Request, Shown, Source, State, Way};
 use bokehcam::depth::focus::FocusRule;
 use bokehcam::look::{Effect, Look, Patch, Strength};
 
-/// Shown when a look or a view needs depth and there is none: what to do.
+/// Shown when a look or a view needs depth and the source has none.
 pub const NO_DEPTH: &str = "Who is near is not known here: a small network or a picture of the empty room tells.";
-/// The same for a photo.
+/// Shown instead for a photo.
 pub const NO_DEPTH_OF_PHOTO: &str =
     "This photo has no depth. A network gives it (`bokehcam models get`), or a depth map beside it: NAME-depth.png.";
-/// The same where it was declined on the command line.
+/// Shown instead if the command line declined the source's depth.
 pub const DECLINED: &str = "This source has depth that `--depth none` declines. “Depth from” under More uses it.";
-/// Shown when depth is to be viewed while it is not computed.
+/// Shown when the depth view is requested while depth is not computed.
 pub const NOT_FOLLOWED: &str = "Depth is made only while the blur follows it: switch Portrait on first.";
-/// Shown when what the blur is made of is to be viewed while there is none.
+/// Shown when a view of the blur's internals is requested without blur.
 pub const NOT_BLURRED: &str = "Nothing is blurred: there is nothing to show of it.";
-/// Shown when a plate is to be taken of what is no camera.
+/// Shown when a background plate is requested but the source is not a camera.
 pub const NO_PLATE: &str = "Open a camera first: a plate needs one that stands still.";
-/// Shown when a look needs metres that relative depth has not.
+/// Shown when a look needs metric depth but the depth is relative.
 pub const NO_METRES: &str = "Nothing is known in metres here: the subject is in focus, and blur is given as an amount.";
-/// Shown when the picture is frozen while something is written.
-pub const GOES_ON: &str =
+/// Shown when the window is frozen while an output is active.
+pub const OUTPUTS_CONTINUE: &str =
     "Only this window is frozen. What is recorded or sent goes on live, and in every look that you choose here.";
 /// Shown when there is no virtual camera.
 pub const NO_VIRTUAL_CAMERA: &str = "No camera for calls is set up yet: `bokehcam doctor` says how.";
 
 impl State {
-    /// Applies an action; gives back what the window or the session has to do for it.
+    /// Applies an action. Returns the requests that the window or the session must carry out.
     pub fn apply(&mut self, action: Action) -> Vec<Request> {
         match action {
             Action::Look { look, stroke } => return self.set_look(*look, stroke),
             Action::Settle => self.history.settle(),
             Action::Undo => {
                 let before = self.history.undo(&self.look);
-                return self.go_to(before);
+                return self.replace_look(before);
             }
             Action::Redo => {
                 let after = self.history.redo(&self.look);
-                return self.go_to(after);
+                return self.replace_look(after);
             }
             Action::Reset => return self.set_look(self.first_look.clone(), None),
             Action::Preset(name) => return self.set_preset(&name),
@@ -50,6 +50,7 @@ impl State {
             },
             Action::RenamePreset(name, new) => return vec![Request::RenamePreset(name, new)],
             Action::DeletePreset(name) => return vec![Request::DeletePreset(name)],
+            // Views without data are refused, with a note that explains why.
             Action::Show(Shown::Depth) if !self.may_have_depth() => self.note(self.no_depth()),
             Action::Show(Shown::Depth) if !self.look.effect.follows_depth() => self.note(NOT_FOLLOWED),
             Action::Show(Shown::Coc | Shown::Bins) if self.look.effect == Effect::None => self.note(NOT_BLURRED),
@@ -88,7 +89,7 @@ impl State {
             Action::Mode(size, fps) => return self.set_mode(size, fps),
             Action::Retry => return self.open(self.source_name.clone()),
             Action::Control(name, value) => return self.set_control(name, value),
-            Action::TakePlate if self.takes_plates() => {
+            Action::TakePlate if self.can_capture_plate() => {
                 self.declined_plate = false;
                 return vec![Request::TakePlate];
             }
@@ -108,31 +109,31 @@ impl State {
         Vec::new()
     }
 
-    /// Closes the window; asks first, but only once, where something is recorded or calls may have the picture.
+    /// Closes the window. The first call only opens the confirmation dialog if an output is active.
     fn close(&mut self) -> Vec<Request> {
         let asks = self.habits.ask_before_closing && !self.outputs.is_empty() && !self.closing;
         self.closing = asks;
         if asks { Vec::new() } else { vec![Request::Close] }
     }
 
-    /// Keeps the picture, and says what goes out meanwhile.
+    /// Freezes or unfreezes the picture, with a note that active outputs continue.
     fn freeze(&mut self, on: bool) {
         if on && !self.frozen && !self.outputs.is_empty() {
-            self.note(GOES_ON);
+            self.note(OUTPUTS_CONTINUE);
         }
         self.frozen = on;
     }
 
-    /// What to do where depth is needed and there is none.
+    /// Returns advice for a source without depth.
     pub fn no_depth(&self) -> &'static str {
-        match (self.is_photo(), self.declines_own()) {
+        match (self.is_photo(), self.declines_own_depth()) {
             (_, true) => DECLINED,
             (true, false) => NO_DEPTH_OF_PHOTO,
             (false, false) => NO_DEPTH,
         }
     }
 
-    /// Blurs what is not in focus, or nothing. Without depth, the ways to it are offered.
+    /// Switches blur by depth on or off. If there is no depth, offers the methods to get it.
     fn set_portrait(&mut self, on: bool) -> Vec<Request> {
         if on && !self.may_have_depth() {
             self.declined_plate = false;
@@ -143,23 +144,22 @@ impl State {
         self.set_look(Look { effect, ..self.look.clone() }, None)
     }
 
-    /// Changes the look as far as the source allows it; the one before can be undone.
+    /// Changes the look as far as the source supports it, with an undo step.
     pub(super) fn set_look(&mut self, look: Look, stroke: Option<&'static str>) -> Vec<Request> {
-        let look = self.fitting(look);
+        let look = self.adapt_look(look);
         if look == self.look {
             return Vec::new();
         }
-        self.history.keep(&self.look, stroke);
-        self.go_to(Some(look))
+        self.history.push(&self.look, stroke);
+        self.replace_look(Some(look))
     }
 
-    /// Changes the look without remembering the one before. With an effect that needs no depth, a lens and the depth
-    /// view are given up.
-    fn go_to(&mut self, look: Option<Look>) -> Vec<Request> {
+    /// Changes the look without an undo step. An effect without depth also drops lens parameters and the depth view.
+    fn replace_look(&mut self, look: Option<Look>) -> Vec<Request> {
         let Some(look) = look else { return Vec::new() };
-        let mut look = self.fitting(look);
+        let mut look = self.adapt_look(look);
         if self.look.effect.follows_depth() && !look.effect.follows_depth() {
-            // Without depth there are no distances that a lens needs, and no depth to view.
+            // A lens needs distances, and the depth view needs depth.
             if matches!(look.strength, Strength::Lens(_)) {
                 look.strength = Strength::Default;
             }
@@ -192,10 +192,10 @@ impl State {
         }
     }
 
-    /// The look after a change.
+    /// Returns the look after a patch.
     ///
     /// # Errors
-    /// It needs depth that there is not, or settings that do not go together: one line.
+    /// Returns a one-line message if the patch needs depth that the source lacks, or its settings conflict.
     pub fn patched(&self, patch: &Patch) -> Result<Look, String> {
         if patch.effect.is_some_and(Effect::follows_depth) && !self.may_have_depth() {
             return Err(self.no_depth().to_owned());
@@ -205,7 +205,7 @@ impl State {
         let asks = matches!(patch.focus, Some(FocusRule::Metres(_)))
             || patch.focus_range_m.is_some_and(|range_m| range_m > 0.0)
             || is_lens(&look) && !is_lens(&self.look);
-        // Of a whole look, such as a preset, what needs metres is left out.
+        // In a whole look, such as a preset, metric settings are dropped instead of rejected.
         let is_one_change = patch.effect.is_none();
         match self.known().is_relative && look.effect.follows_depth() && is_one_change && asks {
             true => Err(NO_METRES.to_owned()),
@@ -215,39 +215,39 @@ impl State {
 
     fn record(&mut self, on: bool) -> Vec<Request> {
         match (on, self.recording().cloned()) {
-            (true, None) => self.begin(Output { name: String::new(), is_camera: false }),
-            (false, Some(output)) => self.end(output),
+            (true, None) => self.start_output(Output { name: String::new(), is_camera: false }),
+            (false, Some(output)) => self.stop_output(output),
             (true, Some(_)) | (false, None) => Vec::new(),
         }
     }
 
-    /// Changes the virtual camera that is written to, or ends it with `None`.
+    /// Switches to another virtual camera, or stops the active one with `None`.
     fn set_virtual_camera(&mut self, name: Option<String>) -> Vec<Request> {
         let current = self.virtual_camera().cloned();
         if current.as_ref().map(|output| &output.name) == name.as_ref() {
-            // With nothing to end, this came of a wish to start the first camera of none.
+            // No camera was active, so the request was to start one although none exists.
             if name.is_none() {
                 self.note(NO_VIRTUAL_CAMERA);
             }
             return Vec::new();
         }
-        let mut requests: Vec<_> = current.into_iter().flat_map(|output| self.end(output)).collect();
-        requests.extend(name.into_iter().flat_map(|name| self.begin(Output { name, is_camera: true })));
+        let mut requests: Vec<_> = current.into_iter().flat_map(|output| self.stop_output(output)).collect();
+        requests.extend(name.into_iter().flat_map(|name| self.start_output(Output { name, is_camera: true })));
         requests
     }
 
-    /// Asks for an output. It is listed at once, so that it is not begun twice; the session reports what became of it.
-    fn begin(&mut self, output: Output) -> Vec<Request> {
+    /// Requests an output. It is listed immediately, so that it cannot start twice; the session reports the outcome.
+    fn start_output(&mut self, output: Output) -> Vec<Request> {
         self.outputs.push(output.clone());
         vec![Request::Begin(output)]
     }
 
-    fn end(&mut self, output: Output) -> Vec<Request> {
+    fn stop_output(&mut self, output: Output) -> Vec<Request> {
         self.outputs.retain(|other| *other != output);
         vec![Request::End(output)]
     }
 
-    /// Asks for a source, and forgets what was known of the one before.
+    /// Requests a source, and clears the state of the previous one.
     pub(super) fn open(&mut self, name: String) -> Vec<Request> {
         if name != self.source_name {
             self.controls.clear();
@@ -263,9 +263,9 @@ impl State {
         let Some(control) = self.controls.iter_mut().find(|control| control.name == name && control.active) else {
             return Vec::new();
         };
-        let (least, most, _) = control.range;
-        // Not `clamp`, which panics if a driver gives a range upside down.
-        let value = value.min(most).max(least);
+        let (min, max, _) = control.range;
+        // Not `clamp`, which panics if a driver reports an inverted range.
+        let value = value.min(max).max(min);
         if std::mem::replace(&mut control.value, value) == value {
             return Vec::new();
         }

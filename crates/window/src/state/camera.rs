@@ -1,21 +1,21 @@
-//! What the window knows of a camera besides its controls, and what a person chooses of it.
+//! Properties of a camera besides its controls, and settings that depend on them.
 
 use super::{Request, Source, State};
 use bokehcam::source::modes::Mode;
 
-/// The source that runs: what a camera offers, and what is true of its depth.
+/// Camera modes, and properties of the running source.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Camera {
-    /// Its sizes and rates, the largest first.
+    /// Frame sizes and rates, largest first.
     pub modes: Vec<Mode>,
-    /// Whether it faces the person, who expects a mirror.
+    /// Whether the camera faces the user, who then expects a mirrored picture.
     pub faces_user: bool,
-    /// Whether distances are only relative, without metres; of any source.
+    /// Whether depth is relative, without metres; applies to any kind of source.
     pub is_relative: bool,
 }
 
 impl State {
-    /// Takes another camera. Unless somebody chose otherwise, one that faces the person is a mirror, and all else is not.
+    /// Sets the camera's properties. Unless the user chose, mirrors the picture if the camera faces the user.
     pub(super) fn set_camera(&mut self, camera: Camera) {
         if !self.mirror_chosen {
             self.mirror = camera.faces_user;
@@ -23,7 +23,7 @@ impl State {
         self.camera = camera;
     }
 
-    /// Asks for other pictures of the camera.
+    /// Requests another frame size and rate of the camera.
     pub(super) fn set_mode(&mut self, size: (u32, u32), fps: f64) -> Vec<Request> {
         self.source = Source::Opening;
         (self.frozen, self.focus_m) = (false, None);
@@ -45,13 +45,13 @@ mod tests {
         let camera = |faces_user| Update::Camera(Camera { faces_user, ..Camera::default() });
         let mut state = sample::state();
         for faces_user in [true, false, true] {
-            state.hear(camera(faces_user));
+            state.apply_update(camera(faces_user));
             assert_eq!((state.mirror, mirror_of(&state)), (faces_user, None), "the command has the same default");
         }
         state.apply(Action::Mirror(false));
         assert_eq!(mirror_of(&state).as_deref(), Some("false"));
         for faces_user in [true, false] {
-            state.hear(camera(faces_user));
+            state.apply_update(camera(faces_user));
             assert!(!state.mirror, "as was said");
         }
         state.apply(Action::Mirror(true));
@@ -61,7 +61,7 @@ mod tests {
     #[test]
     fn what_can_be_a_source_is_opened_and_other_pictures_of_a_camera_are_asked_for() {
         let mut state = sample::state();
-        assert_eq!(state.hear(Update::Offered("photo.jpg".into())), Some(Request::Open("photo.jpg".into())));
+        assert_eq!(state.apply_update(Update::Offered("photo.jpg".into())), Some(Request::Open("photo.jpg".into())));
         assert_eq!((state.source_name.as_str(), &state.source), ("photo.jpg", &Source::Opening));
         assert_eq!(state.apply(Action::Mode((640, 480), 30.0)), [Request::Mode((640, 480), 30.0)]);
     }

@@ -1,10 +1,10 @@
-//! The look as far as the source allows it.
+//! Adapts the look to the source.
 
 use super::{Source, State};
 use bokehcam::look::{Effect, Known, Look};
 
 impl State {
-    /// What is known of depth.
+    /// Returns the properties of the source's depth.
     pub fn known(&self) -> Known {
         let size = match &self.source {
             Source::Running(running) => running.size,
@@ -14,17 +14,17 @@ impl State {
         Known { has_depth: self.may_have_depth(), is_relative, size }
     }
 
-    /// The look to be kept for the next time: as it was chosen, whatever this source has not.
+    /// Returns the look to be saved: as the user chose it, before it was adapted to the source.
     pub fn chosen_look(&self) -> Look {
-        let is_fitted = self.fitted && self.look.effect == Effect::Blur;
+        let is_fitted = self.effect_replaced && self.look.effect == Effect::Blur;
         Look { effect: if is_fitted { Effect::Auto } else { self.look.effect }, ..self.look.clone() }
     }
 
-    /// A look as far as the source allows it; remembers if that changed its effect.
-    pub(super) fn fitting(&mut self, look: Look) -> Look {
-        let fitting = look.for_source(self.known());
-        self.fitted |= fitting.effect != look.effect;
-        fitting
+    /// Returns the look as far as the source supports it, and records if its effect was replaced.
+    pub(super) fn adapt_look(&mut self, look: Look) -> Look {
+        let adapted = look.for_source(self.known());
+        self.effect_replaced |= adapted.effect != look.effect;
+        adapted
     }
 }
 
@@ -41,12 +41,12 @@ mod tests {
         let mut state = state();
         let lens = Strength::Lens(tweak::LENS);
         state.look = Look { focus: FocusRule::Metres(2.5), strength: lens, focus_range_m: 0.4, ..look() };
-        state.hear(Update::Camera(Camera { is_relative: true, ..Camera::default() }));
-        let told = state.hear(Update::Source(running(true)));
+        state.apply_update(Update::Camera(Camera { is_relative: true, ..Camera::default() }));
+        let told = state.apply_update(Update::Source(running(true)));
         assert!(matches!(told, Some(Request::Look(look)) if look.needs_metres().is_none()), "{:?}", state.look);
         assert_eq!(state.look.needs_metres(), None);
         assert!(state.notes.iter().any(|note| note.text.contains("in metres")), "and it is said");
-        // Nothing brings them back, and keys that mean metres blur by amount.
+        // Nothing restores them, and keys for metric settings change the amount instead.
         let before = tweak::amount(&state.look, 720).unwrap();
         let mut more = state.look.clone();
         tweak::f_number_by(&mut more, 0.5, 1.0, (1280, 720));
@@ -62,7 +62,7 @@ mod tests {
         for focus_m in [0.7, 1.24, 3.0] {
             look.strength = Strength::Lens(tweak::lens_of(&look, focus_m, size));
             let Strength::Lens(lens) = look.strength else { unreachable!() };
-            look.strength = Strength::of_share(tweak::amount_of(lens, focus_m, size));
+            look.strength = Strength::of_share(tweak::lens_fraction(lens, focus_m, size));
             assert_eq!(look, Look::default(), "focused at {focus_m} m");
         }
     }

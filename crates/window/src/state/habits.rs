@@ -1,26 +1,26 @@
-//! What of the window goes on from run to run, besides the look and the source.
+//! Window settings that persist between runs, besides the look and the source.
 
 use std::collections::BTreeMap;
 use std::ops::RangeInclusive;
 
 use serde::{Deserialize, Serialize};
 
-/// The text scales that can be chosen; 1 is the usual size.
+/// Valid text scales; 1 is the default.
 pub const TEXT_SCALES: RangeInclusive<f32> = 0.75..=3.0;
 
-/// How a person has the window.
+/// Persistent preferences of the user.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, rename_all = "kebab-case")]
 pub struct Habits {
-    /// How large text and controls are, in [`TEXT_SCALES`]; 1 is usual.
+    /// Scale of text and controls, within [`TEXT_SCALES`].
     pub text_scale: f32,
-    /// Whether keys without Ctrl do something: letters, digits and signs.
+    /// Whether bindings of single letters, digits and signs (without Ctrl) are enabled.
     pub single_keys: bool,
-    /// Whether closing asks first while something is recorded, or calls may have the picture.
+    /// Whether closing asks for confirmation while an output is active.
     pub ask_before_closing: bool,
-    /// Whether snapshots are saved with what is needed to make them again.
+    /// Whether snapshots include the input images and settings that reproduce them.
     pub keep_sources: bool,
-    /// Sections of the panel that were opened or folded, by name.
+    /// Sections of the panel that the user unfolded (true) or folded (false), by name.
     pub sections: BTreeMap<String, bool>,
 }
 
@@ -37,14 +37,14 @@ impl Default for Habits {
 }
 
 impl Habits {
-    /// Sets the text scale, as far as it can be.
+    /// Sets the text scale, clamped to [`TEXT_SCALES`].
     pub fn set_text_scale(&mut self, scale: f32) {
         if scale.is_finite() {
             self.text_scale = scale.clamp(*TEXT_SCALES.start(), *TEXT_SCALES.end());
         }
     }
 
-    /// The same with every value in its range, as a file may hold anything.
+    /// Returns the settings with every value in range: a file may contain anything.
     pub fn checked(mut self) -> Self {
         let scale = std::mem::replace(&mut self.text_scale, 1.0);
         self.set_text_scale(scale);

@@ -1,12 +1,12 @@
-//! How the session's updates change the state.
+//! Applies the session's updates to the state.
 
 use super::apply::NO_METRES;
 use super::{Request, Shown, Source, State, Update};
 use bokehcam::look::Look;
 
 impl State {
-    /// Applies an update of the session; gives back the request for another look where a new source needs one.
-    pub fn hear(&mut self, update: Update) -> Option<Request> {
+    /// Applies an update of the session. Returns a request if a new source requires a different look or was offered.
+    pub fn apply_update(&mut self, update: Update) -> Option<Request> {
         match update {
             Update::Source(source) => return self.set_source(source),
             Update::Choices { sources, virtual_cameras } => {
@@ -20,7 +20,7 @@ impl State {
             Update::Outputs(outputs) => {
                 self.outputs = outputs;
                 self.recorded_bytes = self.recorded_bytes.filter(|_| self.recording().is_some());
-                // Nothing is lost any more.
+                // Without outputs there is nothing to confirm any more.
                 self.closing &= !self.outputs.is_empty();
             }
             Update::Recorded(bytes) => self.recorded_bytes = Some(bytes),
@@ -31,7 +31,7 @@ impl State {
         None
     }
 
-    /// Takes another source, and fits the view and the look to it.
+    /// Sets the source, and adapts the view and the look to it.
     fn set_source(&mut self, source: Source) -> Option<Request> {
         if let Source::Running(running) = &source {
             self.meters.restart();
@@ -43,10 +43,11 @@ impl State {
             self.note(self.no_depth());
         }
         let chosen = match &self.source {
-            // A portrait that was given up for want of depth comes back, unless another effect was chosen since.
+            // Restores a portrait effect that a source without depth replaced, unless the user chose another effect
+            // since.
             Source::Running(running) if running.has_depth => {
                 let chosen = self.chosen_look();
-                self.fitted = false;
+                self.effect_replaced = false;
                 chosen
             }
             _ => self.look.clone(),
@@ -54,7 +55,7 @@ impl State {
         if self.known().is_relative && self.may_have_depth() && chosen.needs_metres().is_some() {
             self.note(NO_METRES);
         }
-        let look = self.fitting(chosen);
+        let look = self.adapt_look(chosen);
         (look != self.look).then(|| {
             self.look = look;
             Request::Look(Box::new(self.look.clone()))

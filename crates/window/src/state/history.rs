@@ -2,40 +2,41 @@
 
 use bokehcam::look::Look;
 
-/// The most looks that can be undone.
-const MOST: usize = 100;
+/// Maximum number of undo steps.
+const MAX_STEPS: usize = 100;
 
-/// The looks before the present one, and those that were undone.
+/// Undo and redo stacks of looks.
 #[derive(Clone, Debug, Default)]
 pub struct History {
-    /// The latest last.
+    /// Previous looks, most recent last.
     past: Vec<Look>,
-    /// The latest undone last.
+    /// Undone looks, most recently undone last.
     future: Vec<Look>,
-    /// The control in hand: its changes are undone together.
+    /// The control in use: its changes share one undo step.
     stroke: Option<&'static str>,
 }
 
 impl History {
-    /// Remembers `look`, which is about to be replaced. Changes of one stroke count as one until [`History::settle`].
-    pub fn keep(&mut self, look: &Look, stroke: Option<&'static str>) {
+    /// Pushes `look`, which is about to be replaced. Changes with the same stroke share one step until
+    /// [`History::settle`].
+    pub fn push(&mut self, look: &Look, stroke: Option<&'static str>) {
         self.future.clear();
         if stroke.is_some() && stroke == self.stroke {
             return;
         }
         self.stroke = stroke;
-        if self.past.len() == MOST {
+        if self.past.len() == MAX_STEPS {
             self.past.remove(0);
         }
         self.past.push(look.clone());
     }
 
-    /// The stroke is over.
+    /// Ends the stroke: the next change starts a new undo step.
     pub fn settle(&mut self) {
         self.stroke = None;
     }
 
-    /// The look before `look`, which itself is kept for [`History::redo`].
+    /// Returns the previous look; moves `look` to the redo stack.
     pub fn undo(&mut self, look: &Look) -> Option<Look> {
         self.stroke = None;
         let before = self.past.pop()?;
@@ -43,7 +44,7 @@ impl History {
         Some(before)
     }
 
-    /// The look that was undone last; `look` is kept for [`History::undo`].
+    /// Returns the look that was undone last; moves `look` to the undo stack.
     pub fn redo(&mut self, look: &Look) -> Option<Look> {
         self.stroke = None;
         let after = self.future.pop()?;
@@ -51,8 +52,8 @@ impl History {
         Some(after)
     }
 
-    /// Whether there is anything to undo, and to redo.
-    pub fn can(&self) -> (bool, bool) {
+    /// Returns whether there is anything to undo, and to redo.
+    pub fn can_undo_redo(&self) -> (bool, bool) {
         (!self.past.is_empty(), !self.future.is_empty())
     }
 }

@@ -1,6 +1,7 @@
-//! What the window shows and lets one change: a state, and the actions that change it.
+//! Model of the window: its state, and the actions that change it.
 //!
-//! Nothing here draws, waits or asks the system: [`State::apply`] and [`State::hear`] are functions of the state alone.
+//! Nothing here draws, blocks, or calls the system: [`State::apply`] and [`State::apply_update`] depend on the state
+//! alone.
 
 mod action;
 mod apply;
@@ -44,178 +45,177 @@ use bokehcam::look::presets::Preset;
 use bokehcam::source::devices::Choice;
 use bokehcam::source::{DepthFrom, Kind};
 
-/// The source as it is now.
+/// Status of the source.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub enum Source {
-    /// It is being opened.
     #[default]
     Opening,
     Running(Running),
-    /// Why there are no frames any more, or never were. The last picture stays.
+    /// No frames, for this reason. The last picture stays.
     Lost(String),
-    /// It came to its end. The last picture stays.
+    /// The end of the recording was reached. The last picture stays.
     Ended,
 }
 
-/// A source whose frames come.
+/// A source that delivers frames.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Running {
-    /// What the command line calls it.
+    /// Name on the command line.
     pub name: String,
-    /// What it calls itself.
+    /// Display name.
     pub label: String,
-    /// Width and height of its pictures.
+    /// Width and height of its frames, in pixels.
     pub size: (u32, u32),
-    /// Time from frame to frame.
+    /// Frame period.
     pub period_ns: u64,
     /// Whether its frames have depth.
     pub has_depth: bool,
-    /// Whether its frames come at their own pace, as a camera's do. Others can stand still.
+    /// Whether frames arrive in real time, as from a camera; other sources can be paused.
     pub is_live: bool,
-    /// What it is; a photo is one picture that stands still.
+    /// Kind of source; a photo is a single still frame.
     pub kind: Kind,
-    /// What its depth comes from.
+    /// Origin of its depth.
     pub depth_from: DepthFrom,
-    /// The ways to depth that it has, and the one that is used.
+    /// Depth methods the source supports, and the active one.
     pub ways: Vec<Way>,
     pub way: Option<Way>,
     pub executor: String,
-    /// Time that a frame's blur may take.
+    /// Time budget for the blur of a frame.
     pub budget_ns: u64,
 }
 
-/// An output that is written to.
+/// An active output.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Output {
-    /// What the command line calls it.
+    /// Name on the command line.
     pub name: String,
-    /// Whether it is a virtual camera; otherwise a recording.
+    /// True for a virtual camera, false for a recording.
     pub is_camera: bool,
 }
 
-/// A line for the person. It is shown for a while.
+/// A message to the user, shown for a while.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Note {
-    /// Counts from 1, different for each line.
+    /// Unique number, counting from 1.
     pub number: u64,
     pub text: String,
 }
 
-/// All that the window shows, but the picture itself.
+/// Everything that the window shows except the picture itself.
 #[derive(Clone, Debug, Default)]
 pub struct State {
-    /// The look as it was chosen.
+    /// The chosen look.
     pub look: Look,
-    /// What `reset` goes back to.
+    /// The look that `reset` restores.
     pub first_look: Look,
-    /// What the source is called on the command line.
+    /// The source's name on the command line.
     pub source_name: String,
     pub source: Source,
-    /// The sources that can be chosen.
+    /// The available sources.
     pub sources: Vec<Choice>,
-    /// The virtual cameras that can be chosen.
+    /// The available virtual cameras.
     pub virtual_cameras: Vec<Choice>,
     pub controls: Vec<Knob>,
-    /// What else is known of the camera.
+    /// Other properties of the camera.
     pub camera: Camera,
     pub presets: Vec<Preset>,
-    /// The name of the one that was chosen or saved last.
+    /// The preset that was chosen or saved last.
     chosen_preset: Option<String>,
-    /// Where pictures go besides the window.
+    /// Active outputs besides the window.
     pub outputs: Vec<Output>,
-    /// Whether a snapshot is due in a few seconds.
+    /// Whether the self-timer is counting down to a snapshot.
     pub self_timer: bool,
-    /// Where something was saved last.
+    /// Location of the last saved file.
     pub kept_in: Option<PathBuf>,
-    /// What of a frame is shown.
+    /// The displayed view of a frame.
     pub shown: Shown,
-    /// Whether the window shows pictures as a mirror does.
+    /// Whether the window mirrors the picture.
     pub mirror: bool,
-    /// Whether frames are still blurred for the look before, as their own kernels are being made.
+    /// Whether frames still use other kernels while those of the chosen look are being built.
     pub between: bool,
-    /// What of the picture goes out; `None` is all.
+    /// The crop that outputs get; `None` for the whole picture.
     pub part: Option<Crop>,
-    /// Whether somebody said so; otherwise it depends on the camera.
+    /// Whether the user set `mirror`; otherwise it depends on the camera.
     pub mirror_chosen: bool,
-    /// Whether the window keeps the picture it has.
+    /// Whether the displayed picture is frozen.
     pub frozen: bool,
-    /// Whether the picture of a photo is there: all that follow would be the same.
+    /// Whether the final picture of a photo is displayed: later ones would be identical.
     pub settled: bool,
-    /// Whether outputs have the still card in place of pictures, and the camera rests.
+    /// Whether outputs get the still card instead of the picture, and the camera is paused.
     pub off: bool,
-    /// Where the recording is, if the source is one.
+    /// Playback position, if the source is a recording.
     pub transport: Option<Transport>,
     pub zoom: Zoom,
-    /// What is under the pointer, where that is shown.
+    /// Values under the pointer, while the probe is shown.
     pub probe: Option<Probe>,
-    /// Left of this fraction of its width, the picture is shown as before the blur.
+    /// Split position as a fraction of the width: left of it, the picture is shown before the blur.
     pub split: Option<f32>,
     /// Whether the panel is open.
     pub panel: bool,
     /// Whether the instruments are shown.
     pub instruments: bool,
-    /// Whether nothing but the picture is shown.
+    /// Whether all controls and overlays are hidden.
     pub bare: bool,
-    /// Whether the help on keys is shown.
+    /// Whether the help is shown.
     pub help: bool,
     /// Whether the window fills the screen.
     pub full_screen: bool,
-    /// Seconds without a frame, where the source runs but has been silent for too long.
+    /// Seconds since the last frame, if a running source has been silent for too long.
     pub silent_s: Option<u64>,
     /// Distance of the focal plane in the last frame, in metres.
     pub focus_m: Option<f32>,
-    /// What the colours of a view other than the picture mean.
+    /// Colour legend of a diagnostic view.
     pub legend: Option<Legend>,
-    /// Lines for the person, the newest last, and no more than a few.
+    /// Messages to the user, newest last, at most [`MAX_NOTES`].
     pub notes: Vec<Note>,
-    /// How far the plate is, where that makes the depth.
+    /// Progress of the background plate, if depth comes from it.
     pub plate: Option<Step>,
-    /// Whether the person wants no other way to depth.
+    /// Whether the user declined other depth methods.
     pub declined_plate: bool,
-    /// Whether the person knows that this is a demonstration.
+    /// Whether the user dismissed the notice that this is a demonstration.
     pub knows_demonstration: bool,
-    /// Whether the person is asked if the window shall close although something is recorded.
+    /// Whether the dialog that confirms closing is open.
     pub closing: bool,
-    /// What of the window goes on from run to run.
+    /// Settings that persist between runs.
     pub habits: Habits,
-    /// Bytes of the recording so far, where they are known.
+    /// Bytes of the recording so far, if known.
     pub recorded_bytes: Option<u64>,
-    /// What went wrong with an output, until the person knows.
+    /// Failure of an output, until the user dismisses it.
     pub trouble: Option<String>,
     pub meters: Meters,
-    /// The looks before, and those that were undone.
+    /// Undo and redo history of the look.
     pub history: History,
-    /// Whether the effect differs from what was chosen, because the source has no depth.
-    fitted: bool,
+    /// Whether the effect differs from the chosen one because the source has no depth.
+    effect_replaced: bool,
     /// Number of the last note.
     noted: u64,
 }
 
-/// Shown once a plate is taken.
+/// Shown once the background plate is captured.
 const PLATE_TAKEN: &str = "Come back: what is behind you is known now. Keep the camera where it is.";
-/// The most notes that are kept.
-const NOTES: usize = 6;
+/// Maximum number of notes that are kept.
+const MAX_NOTES: usize = 6;
 
 impl State {
-    /// A window that opens `source_name` and shows it in `look`, with the panel open.
+    /// Creates the state of a window that opens `source_name` with `look`, with the panel open.
     pub fn new(look: Look, source_name: String) -> Self {
         Self { first_look: look.clone(), look, source_name, panel: true, ..Self::default() }
     }
 
-    /// Adds a line for the person, in the language that is spoken.
+    /// Adds a message, translated into the display language.
     pub fn note(&mut self, text: impl Into<String>) {
         let text = translated(&text.into());
-        // Said once more, it is shown anew, and once.
+        // A repeated message replaces the earlier one and is shown anew.
         self.notes.retain(|note| note.text != text);
         self.noted += 1;
         self.notes.push(Note { number: self.noted, text });
-        if self.notes.len() > NOTES {
+        if self.notes.len() > MAX_NOTES {
             self.notes.remove(0);
         }
     }
 
-    /// Takes note of how far the plate is. Whether that is new.
-    pub fn guide(&mut self, step: Option<Step>) -> bool {
+    /// Updates the progress of the background plate. Returns whether it changed.
+    pub fn set_plate_step(&mut self, step: Option<Step>) -> bool {
         let before = std::mem::replace(&mut self.plate, step);
         if step == Some(Step::Ready) && before.is_some_and(|before| before != Step::Ready) {
             self.note(PLATE_TAKEN);
@@ -228,7 +228,7 @@ impl State {
         matches!(&self.source, Source::Running(running) if running.name == demo::NAME)
     }
 
-    /// The ways to depth that the source has.
+    /// Returns the depth methods that the source supports.
     pub fn ways(&self) -> &[Way] {
         match &self.source {
             Source::Running(running) => &running.ways,
@@ -236,39 +236,39 @@ impl State {
         }
     }
 
-    /// The one by which it has its depth.
+    /// Returns the active depth method.
     pub fn way(&self) -> Option<Way> {
         if let Source::Running(running) = &self.source { running.way } else { None }
     }
 
-    /// Whether a plate can be taken.
-    pub fn takes_plates(&self) -> bool {
+    /// Whether a background plate can be captured.
+    pub fn can_capture_plate(&self) -> bool {
         self.ways().contains(&Way::Plate)
     }
 
-    /// What finds the person while there is no plate yet, or it is of another picture.
+    /// Returns person segmentation as a fallback while the plate is missing or does not match the picture.
     pub fn way_without_plate(&self) -> Option<Way> {
         let lacks_plate = self.plate.is_some_and(|step| step != Step::Ready);
         Some(Way::Person).filter(|way| lacks_plate && self.ways().contains(way))
     }
 
-    /// Whether nothing is known of depth, and the person is offered ways to it.
+    /// Whether the source has no depth and the user is offered methods to get it.
     pub fn offers_depth(&self) -> bool {
         let is_plain = matches!(&self.source, Source::Running(running) if !running.has_depth);
-        is_plain && !self.declines_own() && !self.declined_plate && self.plate.is_none()
+        is_plain && !self.declines_own_depth() && !self.declined_plate && self.plate.is_none()
     }
 
-    /// Whether the source has depth of its own that was declined.
-    fn declines_own(&self) -> bool {
+    /// Whether the source could measure its own depth, but the user turned that off.
+    fn declines_own_depth(&self) -> bool {
         !self.may_have_depth() && self.ways().iter().any(|way| matches!(way, Way::Measured | Way::Stereo))
     }
 
-    /// What the source is called, in short; empty where that is not known.
+    /// Returns a short display name of the source; empty if unknown.
     pub fn title(&self) -> &str {
         let listed = self.sources.iter().find(|choice| choice.name == self.source_name);
         let name = match (listed, &self.source) {
             (Some(choice), _) => choice.label.as_str(),
-            // After its name, a camera tells its mode.
+            // A camera's label has its mode after the name.
             (None, Source::Running(running)) => running.label.split(", ").next().unwrap_or_default(),
             (None, _) => self.source_name.as_str(),
         };
@@ -276,7 +276,7 @@ impl State {
         name.trim_end_matches('/').rsplit('/').next().unwrap_or(name)
     }
 
-    /// Whether the panel shows all there is.
+    /// Whether the panel is expanded.
     pub fn shows_more(&self) -> bool {
         self.habits.sections.get("More").copied().unwrap_or(false)
     }
@@ -286,17 +286,17 @@ impl State {
         matches!(&self.source, Source::Running(running) if running.kind == Kind::Photo)
     }
 
-    /// Whether the picture that is shown stays: it was frozen, is a photo's, or no others come.
+    /// Whether the displayed picture stays: it is frozen, a photo's final one, or the source has stopped.
     pub fn keeps_picture(&self) -> bool {
         self.frozen || self.settled || matches!(self.source, Source::Lost(_) | Source::Ended)
     }
 
-    /// Whether the window needs no frames: it keeps its picture, and the source can stand still.
+    /// Whether the pipeline can pause: the window keeps its picture, and the source can stand still.
     pub fn stands_still(&self) -> bool {
         (self.frozen || self.settled) && matches!(&self.source, Source::Running(running) if !running.is_live)
     }
 
-    /// Whether frames have depth, as far as is known: without a running source they may.
+    /// Whether frames have depth; assumed true while no source is running.
     pub fn may_have_depth(&self) -> bool {
         match &self.source {
             Source::Running(running) => running.has_depth,
@@ -304,23 +304,23 @@ impl State {
         }
     }
 
-    /// Distance of the focal plane in the last frame, in metres; one where there is none to start from.
+    /// Returns the distance of the focal plane in the last frame in metres, or 1 if unknown.
     pub fn distance_m(&self) -> f32 {
         self.focus_m.filter(|metres| metres.is_finite()).unwrap_or(1.0)
     }
 
-    /// The recording that is being written, if any.
+    /// Returns the active recording.
     pub fn recording(&self) -> Option<&Output> {
         self.outputs.iter().find(|output| !output.is_camera)
     }
 
-    /// The virtual camera that is written to, if any.
+    /// Returns the active virtual camera.
     pub fn virtual_camera(&self) -> Option<&Output> {
         self.outputs.iter().find(|output| output.is_camera)
     }
 
-    /// The index of the preset that the look is of, wherever it is focused: of several that look the same, the one that was
-    /// chosen or saved last, else the first.
+    /// Returns the index of the preset that matches the look, ignoring the focus. If several match, prefers the one
+    /// that was chosen or saved last, else the first.
     pub fn preset_in_use(&self) -> Option<usize> {
         let is_in_use = |preset: &Preset| {
             let used = preset.patch.on(&self.look);

@@ -1,4 +1,4 @@
-//! A state to try things on.
+//! Sample states for tests.
 
 use super::{Running, Source, State, Way};
 use bokehcam::knob::Knob;
@@ -7,17 +7,17 @@ use bokehcam::look::{Effect, Look, Patch, Strength, Tilt};
 use bokehcam::source::devices::Choice;
 use bokehcam::source::{DepthFrom, Kind};
 
-/// A look as a person may have it.
+/// Returns a typical look.
 pub fn look() -> Look {
     Look { tilt: Tilt { center_y: 0.5, band: 0.15, angle_deg: 0.0 }, highlights: 8.0, ..Look::default() }
 }
 
-/// Another look than [`look`], by how strong it is.
+/// Returns [`look`] with a different blur strength.
 pub fn blurred(radius_px: f32) -> Look {
     Look { strength: Strength::AtInfinity(radius_px), ..look() }
 }
 
-/// A source whose frames come.
+/// Returns a running source.
 pub fn running(has_depth: bool) -> Source {
     Source::Running(Running {
         name: "portrait".into(),
@@ -35,7 +35,7 @@ pub fn running(has_depth: bool) -> Source {
     })
 }
 
-/// A window that shows a running source with depth, and has everything to choose from.
+/// Returns the state of a window with a running source with depth, and several choices in every list.
 pub fn state() -> State {
     let mut state = State::new(look(), "portrait".into());
     state.source = running(true);
@@ -61,7 +61,7 @@ pub fn state() -> State {
         active: true,
     };
     let menu = vec![(1, "Manual Mode".to_owned()), (3, "Aperture Priority Mode".to_owned())];
-    // What is behind More is seen.
+    // Expands the panel.
     state.habits.sections.insert("More".into(), true);
     state.controls = vec![
         control("brightness", 10, (-64, 64, 1)),

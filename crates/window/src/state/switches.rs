@@ -1,11 +1,11 @@
-//! What the window shows, as options of the command line.
+//! The window's state as command-line options.
 
 use super::{Shown, State};
 use crate::services::Switch;
 use bokehcam::look::Look;
 
 impl State {
-    /// The options that reproduce the window, besides those of the look; defaults are left out.
+    /// Returns the options that reproduce the window, besides those of the look; defaults are omitted.
     pub fn switches(&self) -> Vec<Switch> {
         let shown = Some(self.shown).filter(|shown| *shown != Shown::default());
         let yes = |on: bool| on.then(|| "true".to_owned());
@@ -16,7 +16,7 @@ impl State {
             ("full-screen", yes(self.full_screen)),
             ("instruments", yes(self.instruments)),
             ("panel", (!self.panel).then(|| "false".to_owned())),
-            // A look without any setting would be the one that is remembered.
+            // Without any look setting the saved look would be loaded.
             ("fresh", yes(self.look == Look::default())),
             ("single-keys", (!self.habits.single_keys).then(|| "false".to_owned())),
             ("text-scale", (self.habits.text_scale != 1.0).then(|| format!("{:.2}", self.habits.text_scale))),

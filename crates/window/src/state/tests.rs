@@ -19,7 +19,7 @@ fn radius_px(state: &State) -> f32 {
 #[test]
 fn a_look_takes_effect_and_can_be_undone_and_redone() {
     let mut state = state();
-    assert_eq!(state.history.can(), (false, false));
+    assert_eq!(state.history.can_undo_redo(), (false, false));
     for radius_px in [1.0, 2.0, 3.0] {
         let effects = set(&mut state, radius_px, None);
         assert_eq!(effects, [Request::Look(Box::new(blurred(radius_px)))]);
@@ -27,16 +27,16 @@ fn a_look_takes_effect_and_can_be_undone_and_redone() {
     assert_eq!(set(&mut state, 3.0, None), [], "nothing changed");
     assert_eq!(state.apply(Action::Undo), [Request::Look(Box::new(blurred(2.0)))]);
     state.apply(Action::Undo);
-    assert_eq!((radius_px(&state), state.history.can()), (1.0, (true, true)));
+    assert_eq!((radius_px(&state), state.history.can_undo_redo()), (1.0, (true, true)));
     state.apply(Action::Redo);
     assert_eq!(radius_px(&state), 2.0);
-    // Another look closes the way forth.
+    // A new look clears the redo history.
     set(&mut state, 9.0, None);
     assert_eq!((state.apply(Action::Redo), radius_px(&state)), (vec![], 9.0));
     for _ in 0..9 {
         state.apply(Action::Undo);
     }
-    assert_eq!((&state.look, state.history.can()), (&look(), (false, true)));
+    assert_eq!((&state.look, state.history.can_undo_redo()), (&look(), (false, true)));
 }
 
 #[test]
@@ -85,7 +85,7 @@ fn presets_are_looks_by_name() {
     let effects = state.apply(Action::Preset("cinematic".into()));
     assert_eq!((effects.len(), radius_px(&state)), (1, 30.0));
     assert_eq!(state.preset_in_use(), Some(1));
-    // Where it is focused is no part of what a preset is.
+    // A preset does not include the focus.
     state.look.focus = FocusRule::Metres(3.0);
     assert_eq!(state.preset_in_use(), Some(1));
     assert_eq!(state.apply(Action::Preset("nothing".into())), []);
@@ -116,7 +116,7 @@ fn a_photo_is_told_what_gives_it_depth() {
     let Source::Running(camera) = running(false) else { unreachable!() };
     let photo = Source::Running(Running { kind: Kind::Photo, is_live: false, ..camera.clone() });
     for (source, hint) in [(Source::Running(camera), NO_DEPTH), (photo, NO_DEPTH_OF_PHOTO)] {
-        state.hear(Update::Source(source));
+        state.apply_update(Update::Source(source));
         state.apply(Action::Show(Shown::Depth));
         assert_eq!(state.notes.last().unwrap().text, hint);
     }
@@ -130,9 +130,9 @@ fn a_photo_is_told_what_gives_it_depth() {
 #[test]
 fn what_needs_depth_says_so_where_there_is_none() {
     let mut state = state();
-    // What follows depth blurs all alike, and the session is told.
+    // An effect that follows depth becomes a uniform blur, and the session is notified.
     let even = Look { effect: Effect::Blur, ..look() };
-    assert_eq!(state.hear(Update::Source(running(false))), Some(Request::Look(Box::new(even.clone()))));
+    assert_eq!(state.apply_update(Update::Source(running(false))), Some(Request::Look(Box::new(even.clone()))));
     for action in [Action::Preset("cinematic".into()), Action::Show(Shown::Depth)] {
         let before = state.notes.last().map(|note| note.number);
         assert_eq!(state.apply(action), []);
@@ -143,16 +143,16 @@ fn what_needs_depth_says_so_where_there_is_none() {
     assert_eq!(state.apply(Action::Reset), [], "nor does the first look follow any");
     assert_eq!(state.apply(Action::Preset("miniature".into())).len(), 1);
     assert_eq!(state.look.effect, Effect::TiltShift);
-    state.hear(Update::Source(running(true)));
+    state.apply_update(Update::Source(running(true)));
     assert_eq!(state.look.effect, Effect::TiltShift, "that was chosen");
-    // It follows depth again where there is some; a view of it goes back to the picture when the next source has none.
+    // With depth, it follows depth again; the depth view returns to the picture when the next source has none.
     state.apply(Action::Portrait(true));
-    state.hear(Update::Source(running(false)));
+    state.apply_update(Update::Source(running(false)));
     assert_eq!(state.look.effect, Effect::Blur);
-    state.hear(Update::Source(running(true)));
+    state.apply_update(Update::Source(running(true)));
     assert_eq!(state.look.effect, Effect::Auto);
     state.apply(Action::Show(Shown::Depth));
-    state.hear(Update::Source(running(false)));
+    state.apply_update(Update::Source(running(false)));
     assert_eq!(state.shown, Shown::Picture);
 }
 
@@ -176,7 +176,7 @@ fn outputs_begin_once_and_end_once() {
     assert_eq!(state.apply(Action::Record(true)), [Request::Begin(recording.clone())]);
     assert_eq!(state.apply(Action::Record(true)), [], "twice at once");
     let named = Output { name: "clip.mp4".into(), is_camera: false };
-    state.hear(Update::Outputs(vec![named.clone()]));
+    state.apply_update(Update::Outputs(vec![named.clone()]));
     assert_eq!(state.recording(), Some(&named));
     assert_eq!(state.apply(Action::Record(false)), [Request::End(named)]);
     assert_eq!(state.apply(Action::Record(false)), []);
@@ -198,7 +198,7 @@ fn a_source_is_opened_lost_and_opened_again() {
     assert_eq!(state.apply(Action::Open("/dev/video0".into())), [Request::Open("/dev/video0".into())]);
     assert_eq!((&state.source, state.frozen, state.controls.len()), (&Source::Opening, false, 0));
     for end in [Source::Lost("unplugged".into()), Source::Ended] {
-        state.hear(Update::Source(end.clone()));
+        state.apply_update(Update::Source(end.clone()));
         assert_eq!(state.source, end);
         assert_eq!(state.apply(Action::Retry), [Request::Open("/dev/video0".into())]);
         assert_eq!(state.source, Source::Opening);
@@ -219,12 +219,12 @@ fn controls_of_the_camera_stay_in_their_range() {
 fn notes_are_few_and_numbered_and_none_is_there_twice() {
     let mut state = state();
     for k in 0..20 {
-        state.hear(Update::Note(format!("note {k}")));
+        state.apply_update(Update::Note(format!("note {k}")));
     }
     let numbers: Vec<u64> = state.notes.iter().map(|note| note.number).collect();
     assert_eq!(numbers, [15, 16, 17, 18, 19, 20]);
     assert_eq!(state.notes.last().unwrap().text, "note 19");
-    // What is said twice is shown once.
+    // A repeated message is shown once.
     ["a", "b", "a"].iter().for_each(|line| state.note(*line));
     assert_eq!(state.notes[4..].iter().map(|note| note.text.as_str()).collect::<Vec<_>>(), ["b", "a"]);
 }
@@ -232,9 +232,9 @@ fn notes_are_few_and_numbered_and_none_is_there_twice() {
 #[test]
 fn what_went_wrong_stays_until_it_is_known() {
     let mut state = state();
-    state.hear(Update::Trouble("the disk is full".into()));
+    state.apply_update(Update::Trouble("the disk is full".into()));
     for k in 0..20 {
-        state.hear(Update::Note(format!("note {k}")));
+        state.apply_update(Update::Note(format!("note {k}")));
     }
     assert_eq!(state.trouble.as_deref(), Some("the disk is full"));
     assert_eq!(state.apply(Action::Dismiss), []);
@@ -265,14 +265,14 @@ fn amount_and_lens_are_converted_and_the_f_number_goes_the_way_it_says() {
     for (size, percent, focus_m) in [((1280, 720), 2.2, 1.2), ((640, 480), 1.0, 2.5), ((1080, 1920), 3.0, 4.0)] {
         let look = Look { strength: Strength::Percent(percent), ..look() };
         let lens = tweak::lens_of(&look, focus_m, size);
-        let back = 100.0 * tweak::amount_of(lens, focus_m, size);
+        let back = 100.0 * tweak::lens_fraction(lens, focus_m, size);
         assert!((back - percent).abs() < 1e-3 * percent, "{size:?}: {percent} % is {lens:?}, which is {back} %");
         for factor in [1.122, 1.0 / 1.122] {
             let mut look = look.clone();
             tweak::f_number_by(&mut look, factor, focus_m, size);
             let Strength::Lens(turned) = look.strength else { panic!("{:?}", look.strength) };
-            let turned = tweak::amount_of(turned, focus_m, size);
-            // Beyond what lenses have, it stays where it is.
+            let turned = tweak::lens_fraction(turned, focus_m, size);
+            // At the limit of f-numbers, it stays.
             assert!(if factor > 1.0 { turned < percent / 100.0 } else { turned >= 0.999 * percent / 100.0 });
         }
     }
@@ -289,10 +289,10 @@ fn numbers_are_as_one_would_write_them() {
         let digits = value.split([',', ' ', ':']).map(|number| number.chars().filter(char::is_ascii_digit).count());
         assert!(digits.max().unwrap_or(0) <= 5, "{name} = {value}");
     }
-    // However small the steps, they go on.
+    // However small the steps, they accumulate.
     let before = tweak::amount(&look, 720);
     (0..40).for_each(|_| tweak::blur_by(&mut look, 1.0023, 720));
-    assert!(tweak::amount(&look, 720) > before.map(|share| 1.05 * share));
+    assert!(tweak::amount(&look, 720) > before.map(|fraction| 1.05 * fraction));
 }
 
 #[test]
@@ -311,17 +311,17 @@ fn arrows_move_what_is_sharp() {
     tweak::move_focus(&mut look, 0.02, 0.1);
     assert!((look.tilt.center_y - 0.6).abs() < 1e-6 && (look.tilt.angle_deg - 2.0).abs() < 1e-6);
     for (angle, by, is) in [(89.0, 2.0, -89.0), (-89.0, -2.0, 89.0), (0.0, 360.0, 0.0)] {
-        assert!((tweak::turned(angle, by) - is).abs() < 1e-4, "{angle} by {by}");
+        assert!((tweak::rotate_band(angle, by) - is).abs() < 1e-4, "{angle} by {by}");
     }
 }
 
 #[test]
 fn a_plate_is_offered_where_a_camera_has_no_depth_and_its_end_is_told_once() {
     let mut state = state();
-    assert!(!state.takes_plates() && !state.offers_depth());
+    assert!(!state.can_capture_plate() && !state.offers_depth());
     assert_eq!((state.apply(Action::TakePlate), &state.notes.last().unwrap().text[..]), (vec![], NO_PLATE));
-    state.hear(Update::Source(running(false)));
-    assert!(state.takes_plates() && state.offers_depth());
+    state.apply_update(Update::Source(running(false)));
+    assert!(state.can_capture_plate() && state.offers_depth());
     state.apply(Action::DeclinePlate);
     assert!(state.declined_plate);
     assert_eq!(state.apply(Action::TakePlate), [Request::TakePlate]);
@@ -330,12 +330,12 @@ fn a_plate_is_offered_where_a_camera_has_no_depth_and_its_end_is_told_once() {
     for (step, is_new) in
         [(Step::StepOut(3), true), (Step::StepOut(3), false), (Step::Taking(50), true), (Step::Ready, true)]
     {
-        assert_eq!(state.guide(Some(step)), is_new, "{step:?}");
+        assert_eq!(state.set_plate_step(Some(step)), is_new, "{step:?}");
     }
     assert_eq!(state.notes.len(), notes + 1);
-    assert!(!state.guide(Some(Step::Ready)) && state.guide(None));
-    // A plate that was there from the start is no news.
-    assert!(state.guide(Some(Step::Ready)));
+    assert!(!state.set_plate_step(Some(Step::Ready)) && state.set_plate_step(None));
+    // A plate that was ready from the start is not announced.
+    assert!(state.set_plate_step(Some(Step::Ready)));
     assert_eq!(state.notes.len(), notes + 1);
 }
 
@@ -343,7 +343,7 @@ fn a_plate_is_offered_where_a_camera_has_no_depth_and_its_end_is_told_once() {
 fn a_source_without_depth_changes_no_look_for_the_next_time() {
     let mut state = state();
     let chosen = state.look.clone();
-    state.hear(Update::Source(running(false)));
+    state.apply_update(Update::Source(running(false)));
     assert_eq!((chosen.effect, state.look.effect, state.chosen_look()), (Effect::Auto, Effect::Blur, chosen));
     state.apply(Action::Preset("miniature".into()));
     assert_eq!(state.chosen_look().effect, Effect::TiltShift, "that was chosen");

@@ -1,20 +1,20 @@
-//! Small changes of a look, made by a key or the wheel.
+//! Incremental changes of a look by keys or the wheel.
 
 use bokehcam::bokeh::Rank;
 use bokehcam::depth::focus::FocusRule;
 use bokehcam::look::{COC_AT_INFINITY_PER_HEIGHT, Effect, Look, MAX_COC_PER_HEIGHT, Strength};
 use bokehcam::optics::Lens;
 
-/// The lens to start from where none was chosen: a portrait lens on full frame.
+/// The initial lens: a portrait lens on full frame.
 pub const LENS: Lens = Lens { focal_length_mm: 50.0, f_number: 1.8, sensor_width_mm: 36.0 };
-/// The f-numbers that can be chosen.
+/// Valid f-numbers.
 pub const F_NUMBERS: std::ops::RangeInclusive<f32> = 0.7..=22.0;
-/// The focal ranges that can be chosen, in metres.
+/// Valid focus ranges, in metres.
 pub const FOCUS_RANGES_M: std::ops::RangeInclusive<f32> = 0.0..=3.0;
-/// The distances that can be focused at, in metres.
+/// Valid focus distances, in metres.
 pub const DISTANCES_M: std::ops::RangeInclusive<f32> = 0.2..=20.0;
 
-/// CoC radius at infinity as a share of the picture's height; `None` where the strength is given as a lens.
+/// Returns the CoC radius at infinity as a fraction of the picture's height; `None` if the strength is given as a lens.
 pub fn amount(look: &Look, height_px: u32) -> Option<f32> {
     match look.strength {
         Strength::Default => Some(COC_AT_INFINITY_PER_HEIGHT),
@@ -24,135 +24,136 @@ pub fn amount(look: &Look, height_px: u32) -> Option<f32> {
     }
 }
 
-/// Makes the blur `factor` times as strong, by its f-number where the strength is given as a lens.
+/// Scales the blur by `factor`, through the f-number if the strength is given as a lens.
 pub fn blur_by(look: &mut Look, factor: f32, height_px: u32) {
-    // As a share of the height: below that no blur is visible, so a step down ends at 0, and one up starts from half.
-    let least = 0.002;
+    // Fraction of the height below which blur is invisible: a step down ends at 0, and a step up from 0 starts at half
+    // of it.
+    let min = 0.002;
     match (look.strength, amount(look, height_px)) {
-        (_, Some(share)) => {
-            let share = if share < least && factor < 1.0 { 0.0 } else { share.max(least / 2.0) * factor };
-            // A radius beyond the usual limit may stay.
-            let most = amount(look, height_px).unwrap_or_default().max(MAX_COC_PER_HEIGHT);
-            look.strength = Strength::Percent(short(share.min(most) * 100.0));
+        (_, Some(fraction)) => {
+            let fraction = if fraction < min && factor < 1.0 { 0.0 } else { fraction.max(min / 2.0) * factor };
+            // A radius already above the usual limit is kept.
+            let max = amount(look, height_px).unwrap_or_default().max(MAX_COC_PER_HEIGHT);
+            look.strength = Strength::Percent(round_significant(fraction.min(max) * 100.0));
         }
         (Strength::Lens(lens), None) if look.effect.follows_depth() => {
-            look.strength = Strength::Lens(stopped(lens, 1.0 / factor));
+            look.strength = Strength::Lens(scale_f_number(lens, 1.0 / factor));
         }
         _ => {}
     }
 }
 
-/// The f-number at which [`LENS`], focused at `focus_m`, blurs by a share of the height of pictures of this size; infinite
-/// where that is none.
-pub fn f_number_of(share: f32, focus_m: f32, (width, height): (u32, u32)) -> f32 {
+/// Returns the f-number at which [`LENS`], focused at `focus_m`, has a CoC radius of `fraction` of the picture's
+/// height; infinite if `fraction` is 0.
+pub fn f_number_of(fraction: f32, focus_m: f32, (width, height): (u32, u32)) -> f32 {
     let wide_open = Lens { f_number: 1.0, ..LENS };
-    wide_open.coc_at_infinity_px(focus_m, width) / (share * height.max(1) as f32)
+    wide_open.coc_at_infinity_px(focus_m, width) / (fraction * height.max(1) as f32)
 }
 
-/// The share of the height by which a lens, focused at `focus_m`, blurs pictures of this size.
-pub fn amount_of(lens: Lens, focus_m: f32, (width, height): (u32, u32)) -> f32 {
+/// Returns the CoC radius at infinity of a lens focused at `focus_m`, as a fraction of the picture's height.
+pub fn lens_fraction(lens: Lens, focus_m: f32, (width, height): (u32, u32)) -> f32 {
     lens.coc_at_infinity_px(focus_m, width) / height.max(1) as f32
 }
 
-/// How strong the blur of a look is, as a share of the height, whichever way it is given.
-pub fn share_of(look: &Look, focus_m: f32, size: (u32, u32)) -> f32 {
+/// Returns the blur strength of a look as a fraction of the height, for either kind of strength.
+pub fn blur_fraction(look: &Look, focus_m: f32, size: (u32, u32)) -> f32 {
     match look.strength {
-        Strength::Lens(lens) => amount_of(lens, focus_m, size),
+        Strength::Lens(lens) => lens_fraction(lens, focus_m, size),
         _ => amount(look, size.1).unwrap_or_default(),
     }
 }
 
-/// Makes the blur of a look so strong, a share of the height, the way it is given: a lens is stopped up or down.
-pub fn set_share(look: &mut Look, share: f32, focus_m: f32, size: (u32, u32)) {
+/// Sets the blur strength as a fraction of the height; for a lens, by its f-number.
+pub fn set_blur_fraction(look: &mut Look, fraction: f32, focus_m: f32, size: (u32, u32)) {
     look.strength = match look.strength {
         Strength::Lens(lens) => {
-            let factor = amount_of(lens, focus_m, size) / share.max(1e-4);
-            Strength::Lens(stopped(lens, if factor.is_finite() { factor } else { 1.0 }))
+            let factor = lens_fraction(lens, focus_m, size) / fraction.max(1e-4);
+            Strength::Lens(scale_f_number(lens, if factor.is_finite() { factor } else { 1.0 }))
         }
-        _ => Strength::Percent(percent(share)),
+        _ => Strength::Percent(percent(fraction)),
     };
 }
 
-/// A share as a percentage, to a hundredth: finer nobody sees.
-fn percent(share: f32) -> f32 {
-    (share * 1e4).round() / 1e2
+/// Converts a fraction to a percentage, rounded to a hundredth: finer steps are invisible.
+fn percent(fraction: f32) -> f32 {
+    (fraction * 1e4).round() / 1e2
 }
 
-/// The lens of a look, or the one that blurs as much while focused at `focus_m`, as far as there is one.
+/// Returns the lens of a look, or [`LENS`] stopped to blur equally when focused at `focus_m`.
 pub fn lens_of(look: &Look, focus_m: f32, size: (u32, u32)) -> Lens {
     match (look.strength, amount(look, size.1)) {
         (Strength::Lens(lens), _) => lens,
-        (_, share) => {
-            let f_number = f_number_of(share.unwrap_or_default(), focus_m, size);
-            // It may be one that no lens has: nothing is lost on the way back.
-            Lens { f_number: short(f_number.clamp(0.01, 10_000.0)), ..LENS }
+        (_, fraction) => {
+            let f_number = f_number_of(fraction.unwrap_or_default(), focus_m, size);
+            // Possibly beyond real lenses, so that the conversion back is lossless.
+            Lens { f_number: round_significant(f_number.clamp(0.01, 10_000.0)), ..LENS }
         }
     }
 }
 
-/// Makes the f-number `factor` times as large, from that of [`lens_of`]. Does nothing unless the blur follows depth: a lens
+/// Scales the f-number by `factor`, starting from [`lens_of`]. No effect unless the blur follows depth, because a lens
 /// needs distances.
 pub fn f_number_by(look: &mut Look, factor: f32, focus_m: f32, size: (u32, u32)) {
     if !look.effect.follows_depth() {
         return;
     }
-    look.strength = Strength::Lens(stopped(lens_of(look, focus_m, size), factor));
+    look.strength = Strength::Lens(scale_f_number(lens_of(look, focus_m, size), factor));
 }
 
-/// A lens whose f-number is `factor` times as large, within what can be chosen.
-fn stopped(lens: Lens, factor: f32) -> Lens {
-    let (least, most) = (F_NUMBERS.start().min(lens.f_number), F_NUMBERS.end().max(lens.f_number));
-    let f_number = (lens.f_number * factor).clamp(least, most);
-    Lens { f_number: short(f_number), ..lens }
+/// Returns a lens with its f-number scaled by `factor`, within [`F_NUMBERS`].
+fn scale_f_number(lens: Lens, factor: f32) -> Lens {
+    let (min, max) = (F_NUMBERS.start().min(lens.f_number), F_NUMBERS.end().max(lens.f_number));
+    let f_number = (lens.f_number * factor).clamp(min, max);
+    Lens { f_number: round_significant(f_number), ..lens }
 }
 
-/// Widens the focal range by some metres, in steps of a centimetre.
+/// Widens the focus range, in steps of a centimetre.
 pub fn focus_range_by(look: &mut Look, by_m: f32) {
     let range_m = ((look.focus_range_m + by_m) * 100.0).round() / 100.0;
     look.focus_range_m = range_m.clamp(*FOCUS_RANGES_M.start(), *FOCUS_RANGES_M.end());
 }
 
-/// Moves what is sharp by fractions of the picture's width and height: the band of tilt-shift (sideways turns it), the
-/// distance of focus where one was chosen (up and right is farther), else the point of focus.
+/// Moves the focus by fractions of the picture's width and height: the tilt-shift band (dx rotates it), a focus
+/// distance (up and right increase it), else the focus point.
 pub fn move_focus(look: &mut Look, dx: f32, dy: f32) {
     if look.effect == Effect::TiltShift {
         look.tilt.center_y = (look.tilt.center_y + dy).clamp(0.0, 1.0);
-        // A key's step of 0.02 turns by 2 degrees.
-        look.tilt.angle_deg = turned(look.tilt.angle_deg, dx * 100.0);
+        // A key's step of 0.02 rotates by 2 degrees.
+        look.tilt.angle_deg = rotate_band(look.tilt.angle_deg, dx * 100.0);
         return;
     }
     look.focus = match look.focus {
         FocusRule::Metres(metres) => {
-            // The same step is a share of the distance: 4 %.
+            // Steps are proportional to the distance: 4 %.
             let metres = metres * (1.0 + 2.0 * (dx - dy));
-            FocusRule::Metres(short(metres.clamp(*DISTANCES_M.start(), *DISTANCES_M.end())))
+            FocusRule::Metres(round_significant(metres.clamp(*DISTANCES_M.start(), *DISTANCES_M.end())))
         }
         FocusRule::Auto => point(0.5 + dx, 0.5 + dy),
         FocusRule::Point { x, y } | FocusRule::Track { x, y } => point(x + dx, y + dy),
     };
 }
 
-/// The focus at a place of the picture, or the nearest one in it.
+/// Returns a focus on a point of the picture, clamped to it.
 pub fn point(x: f32, y: f32) -> FocusRule {
-    FocusRule::Point { x: short(x.clamp(0.0, 1.0)), y: short(y.clamp(0.0, 1.0)) }
+    FocusRule::Point { x: round_significant(x.clamp(0.0, 1.0)), y: round_significant(y.clamp(0.0, 1.0)) }
 }
 
-/// The focus on what is at a place of the picture, or the nearest one in it, wherever it goes.
+/// Returns a focus that tracks the object at a point of the picture, clamped to it.
 pub fn track(x: f32, y: f32) -> FocusRule {
-    FocusRule::Track { x: short(x.clamp(0.0, 1.0)), y: short(y.clamp(0.0, 1.0)) }
+    FocusRule::Track { x: round_significant(x.clamp(0.0, 1.0)), y: round_significant(y.clamp(0.0, 1.0)) }
 }
 
-/// A number with four digits that count, as one would write it: finer nobody sees, and commands stay short.
-pub fn short(value: f32) -> f32 {
+/// Rounds to four significant digits: finer steps are invisible, and commands stay short.
+pub fn round_significant(value: f32) -> f32 {
     format!("{value:.3e}").parse().unwrap_or(value)
 }
 
-/// An angle plus `by_deg`, wrapped to -90 to 90 degrees: a band turned by 180 degrees is the same.
-pub fn turned(angle_deg: f32, by_deg: f32) -> f32 {
+/// Returns an angle plus `by_deg`, wrapped to -90 to 90 degrees: rotating a band by 180 degrees changes nothing.
+pub fn rotate_band(angle_deg: f32, by_deg: f32) -> f32 {
     (angle_deg + by_deg + 90.0).rem_euclid(180.0) - 90.0
 }
 
-/// The label for a number of separable terms; `None` leaves it to the quality.
+/// Returns the label for a number of separable terms; `None` is chosen by the quality level.
 pub fn rank_label(rank: Option<Rank>) -> String {
     match rank {
         None => "auto".into(),

@@ -1,27 +1,27 @@
-//! Where depth comes from, as a person chooses it.
+//! Depth methods, as the user selects them.
 
 use std::fmt;
 use std::str::FromStr;
 
 use bokehcam::source::{DepthChoice, DepthFrom, NetworkFile, OneCamera, PlateFile};
 
-/// A way to depth.
+/// A depth method.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Way {
-    /// The source's own: a depth camera's, or recorded.
+    /// Measured by a depth camera, or recorded.
     Measured,
-    /// Two eyes.
+    /// Stereo matching of two cameras.
     Stereo,
-    /// A network that finds people.
+    /// Person segmentation by a network.
     Person,
-    /// That, and one that tells how far everything is.
+    /// Person segmentation and monocular depth by networks.
     PersonAndDistance,
-    /// A picture of what is behind, taken now.
+    /// A background plate captured at the start.
     Plate,
 }
 
 impl Way {
-    /// As `--depth` takes it, for the network that is installed.
+    /// Returns the corresponding choice of `--depth`, with the installed networks.
     pub fn choice(self) -> DepthChoice {
         let installed = Some(NetworkFile::Installed);
         match self {
@@ -38,7 +38,7 @@ impl Way {
         }
     }
 
-    /// All of them, and what `--depth` calls each.
+    /// All methods, with their names in `--depth`.
     const NAMES: [(Self, &'static str); 5] = [
         (Self::Measured, "recorded"),
         (Self::Stereo, "stereo"),
@@ -47,7 +47,7 @@ impl Way {
         (Self::Plate, "plate"),
     ];
 
-    /// What `--depth` calls it, with the networks that a plate is completed by.
+    /// Returns the value of `--depth`, including the networks that complement a plate.
     pub fn flag(self) -> String {
         match self.choice() {
             DepthChoice::OneCamera(chosen) => chosen.kinds(),
@@ -55,7 +55,7 @@ impl Way {
         }
     }
 
-    /// The way by which a source got its depth, with a plate or without; `None` where it has none.
+    /// Returns the method that provided a source's depth; `None` without depth.
     pub fn of(depth_from: DepthFrom, networks: &OneCamera, has_plate: bool) -> Option<Self> {
         match depth_from {
             DepthFrom::Nothing => None,

@@ -1,4 +1,4 @@
-//! The bins view: in which depth bin each pixel is blurred.
+//! The bins view: colours each pixel by the depth bin in which it is blurred.
 
 use super::Legend;
 use super::colors::BINS;
@@ -10,18 +10,19 @@ use bokehcam::budget::Quality;
 use bokehcam::frame::{ColorImage, DepthMap};
 use bokehcam::optics::CocField;
 
-/// The most bins that there can be.
-pub const MOST: usize = MAX_BINS;
+/// Maximum number of bins.
+pub const MAX: usize = MAX_BINS;
 
-/// Splits frames into bins as the blur did. Keeps its plan as long as settings and size stay the same.
+/// Splits frames into bins like the blur does. Caches its plan while settings and size stay the same.
 #[derive(Default)]
 pub struct Bins {
-    /// The plan, and the settings and the size that it was made for.
+    /// The plan, with the settings and size that it was made for.
     made: Option<(Settings, (u32, u32), Plan)>,
 }
 
 impl Bins {
-    /// A plan with the bins of this frame. It is made anew only if what decides their borders changed.
+    /// Returns a plan with the bins of this frame. Rebuilds the plan only if settings that affect the bins' bounds
+    /// changed.
     pub fn split(
         &mut self,
         settings: &Settings,
@@ -37,7 +38,7 @@ impl Bins {
         };
         self.made = self.made.take().filter(is_current);
         let (.., plan) = self.made.get_or_insert_with(|| {
-            // The bins' borders do not depend on the kernels; these take the least time to make.
+            // The bins do not depend on the aperture's kernels, so cheap ones suffice.
             let aperture = Aperture::default();
             let cheap = Settings { aperture, rank: Some(Rank::Terms(1)), adaptive: true, ..settings.clone() };
             let plan = Plan::new(&cheap, size.0, size.1);
@@ -49,17 +50,19 @@ impl Bins {
     }
 }
 
-/// Colours each pixel by the bin of `plan` that its CoC falls in. `columns` are those of [`Field::new`].
+/// Colours each pixel by the bin of `plan` that contains its CoC. `columns` comes from [`Field::new`].
 pub fn draw(field: &Field, columns: &[u32], plan: &Plan, image: &mut ColorImage) -> Legend {
-    let mut high_px = [f32::INFINITY; MOST];
-    let count = plan.bins.len().min(MOST);
+    let mut high_px = [f32::INFINITY; MAX];
+    let count = plan.bins.len().min(MAX);
     for (high_px, bin) in high_px.iter_mut().zip(&plan.bins) {
         *high_px = bin.high_px;
     }
     let borders = &high_px[..count.saturating_sub(1)];
     let (rows, row_bytes) = (image.height, image.width as usize * 3);
     for (y, row) in (0..).zip(image.rgb.chunks_exact_mut(row_bytes.max(1))) {
-        field.row(y, rows, columns, row, |_, coc_px| BINS[borders.iter().filter(|&&border| coc_px >= border).count()]);
+        field.color_row(y, rows, columns, row, |_, coc_px| {
+            BINS[borders.iter().filter(|&&border| coc_px >= border).count()]
+        });
     }
     Legend::Bins { count, high_px }
 }

@@ -2,7 +2,7 @@
 
 use std::sync::LazyLock;
 
-/// Entries of the table of [`perceptual`] colours.
+/// Number of entries in the table of [`perceptual`] colours.
 pub const ENTRIES: usize = 256;
 
 /// Colours of bins, front to back: after Okabe and Ito, lightened or darkened so that neighbours differ in lightness.
@@ -41,18 +41,19 @@ static PERCEPTUAL: LazyLock<[[u8; 3]; ENTRIES]> = LazyLock::new(|| {
     })
 });
 
-/// The colours from 0 (darkest, violet) to 1 (lightest, yellow): even steps look even.
+/// Returns the colours from 0 (darkest, violet) to 1 (lightest, yellow), perceptually uniform.
 pub fn perceptual() -> &'static [[u8; 3]; ENTRIES] {
     &PERCEPTUAL
 }
 
-/// A colour from -1 (in front: red-brown) over 0 (sharp: nearly white) to 1 (behind: blue), equally dark at both ends.
-pub fn diverging(share: f32) -> [u8; 3] {
+/// Returns a diverging colour for `position` from -1 (in front: red-brown) over 0 (sharp: nearly white) to 1 (behind:
+/// blue), equally dark at both ends.
+pub fn diverging(position: f32) -> [u8; 3] {
     const SHARP: [f32; 3] = [246.0, 246.0, 242.0];
     const NEAR: [[f32; 3]; 2] = [[238.0, 150.0, 70.0], [122.0, 30.0, 20.0]];
     const FAR: [[f32; 3]; 2] = [[90.0, 160.0, 215.0], [16.0, 42.0, 105.0]];
-    let [middle, end] = if share < 0.0 { NEAR } else { FAR };
-    let t = 2.0 * share.abs().min(1.0);
+    let [middle, end] = if position < 0.0 { NEAR } else { FAR };
+    let t = 2.0 * position.abs().min(1.0);
     let (from, to, t) = if t < 1.0 { (SHARP, middle, t) } else { (middle, end, t - 1.0) };
     std::array::from_fn(|k| (from[k] + (to[k] - from[k]) * t).round() as u8)
 }

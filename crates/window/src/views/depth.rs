@@ -1,37 +1,37 @@
-//! The depth view: colours linear in dioptres (1/m), as the blur is, and as eyes judge distance.
+//! The depth view: colours linear in dioptres (1/m), like the blur and like depth perception.
 
 use super::Legend;
 use super::colors::{ENTRIES, perceptual};
 use super::sample::depth_row;
 use bokehcam::frame::{ColorImage, DepthMap};
 
-/// Cells of the histogram over dioptres, which ends at 10 dioptres: 0.1 m.
+/// Number of histogram cells over dioptres, up to `NEAREST_DIOPTRES`: 0.1 m.
 const CELLS: usize = 512;
 const NEAREST_DIOPTRES: f32 = 10.0;
-/// Depth is sampled about this many times across a frame.
+/// Approximate number of depth samples across a frame.
 const SAMPLES_ACROSS: usize = 160;
-/// This share of the pixels may lie beyond either end of the colours.
-const BEYOND: f32 = 0.01;
-/// The share of the way to their target that the ends move per frame.
-const EASE: f32 = 0.12;
-/// Unknown depth: a checkerboard in two greys, which the colours do not contain.
+/// Fraction of the pixels that may exceed the colour range at either end.
+const OUTLIER_FRACTION: f32 = 0.01;
+/// Weight of the new frame in the moving average of the range.
+const SMOOTHING: f32 = 0.12;
+/// Checkerboard for unknown depth, in two greys that the colour map does not contain.
 const UNKNOWN: [[u8; 3]; 2] = [[96, 96, 96], [150, 150, 150]];
-/// The range while no depth was ever known, in dioptres: 5 m to 1 m.
-const FIRST_RANGE: [f32; 2] = [0.2, 1.0];
+/// Far and near end in dioptres until a depth is known: 5 m to 1 m.
+const INITIAL_RANGE: [f32; 2] = [0.2, 1.0];
 
-/// The range of the colours, far and near end in dioptres, eased from frame to frame.
+/// Colour range: far and near end in dioptres, smoothed over time.
 #[derive(Default)]
 pub struct Range(Option<[f32; 2]>);
 
-/// Position of a depth in the colours: 0 at `far_m`, 1 at `near_m`, below or above for depths outside of these.
-pub fn share_of(depth_m: f32, near_m: f32, far_m: f32) -> f32 {
+/// Returns the position of a depth in the colour range: 0 at `far_m`, 1 at `near_m`, beyond these for depths outside.
+pub fn fraction_of(depth_m: f32, near_m: f32, far_m: f32) -> f32 {
     let (near, far) = (1.0 / near_m, 1.0 / far_m);
     (1.0 / depth_m - far) / (near - far)
 }
 
-/// Draws a depth map; `columns` holds the map's column for each of the image's.
+/// Draws a depth map; `columns` has the map's column for each column of the image.
 pub fn draw(depth: &DepthMap, columns: &[u32], range: &mut Range, image: &mut ColorImage) -> Legend {
-    let [far, near] = range.follow(depth);
+    let [far, near] = range.update(depth);
     let colors = perceptual();
     let (scale, rows) = ((ENTRIES - 1) as f32 / (near - far), image.height);
     let row_bytes = image.width as usize * 3;
@@ -52,19 +52,20 @@ pub fn draw(depth: &DepthMap, columns: &[u32], range: &mut Range, image: &mut Co
 }
 
 impl Range {
-    /// Moves the range a part of the way to that of this map; the first map sets it.
-    fn follow(&mut self, depth: &DepthMap) -> [f32; 2] {
-        let Some(target) = ends(depth) else { return self.0.unwrap_or(FIRST_RANGE) };
+    /// Moves the range towards that of this map (exponential moving average); the first map sets it.
+    fn update(&mut self, depth: &DepthMap) -> [f32; 2] {
+        let Some(target) = percentile_range(depth) else { return self.0.unwrap_or(INITIAL_RANGE) };
         let range = self.0.get_or_insert(target);
         for (end, target) in range.iter_mut().zip(target) {
-            *end += (target - *end) * EASE;
+            *end += (target - *end) * SMOOTHING;
         }
         *range
     }
 }
 
-/// Far and near end, in dioptres, of all pixels but a share [`BEYOND`] at either end. `None` if no depth is known.
-fn ends(depth: &DepthMap) -> Option<[f32; 2]> {
+/// Returns far and near end in dioptres, the percentiles [`OUTLIER_FRACTION`] and 1 - [`OUTLIER_FRACTION`]. `None` if
+/// no depth is known.
+fn percentile_range(depth: &DepthMap) -> Option<[f32; 2]> {
     let mut cells = [0u32; CELLS];
     let step = (depth.width as usize / SAMPLES_ACROSS).max(1);
     let mut known = 0;
@@ -78,15 +79,15 @@ fn ends(depth: &DepthMap) -> Option<[f32; 2]> {
     if known == 0 {
         return None;
     }
-    let beyond = (BEYOND * known as f32) as u32;
+    let beyond = (OUTLIER_FRACTION * known as f32) as u32;
     let cell_dioptres = NEAREST_DIOPTRES / CELLS as f32;
     let far = cells_passed(cells.iter(), beyond) as f32 * cell_dioptres;
     let near = (CELLS - cells_passed(cells.iter().rev(), beyond)) as f32 * cell_dioptres;
-    // Not at infinity, and not so narrow that noise would fill all the colours.
+    // Keeps the far end finite, and the range wide enough that noise does not span all colours.
     Some([far.max(cell_dioptres / 2.0), near.max(far + 4.0 * cell_dioptres)])
 }
 
-/// How many cells come before the one where the sum of the counts exceeds `beyond`.
+/// Returns the number of cells before the one where the cumulative count exceeds `beyond`.
 fn cells_passed<'a>(cells: impl Iterator<Item = &'a u32>, beyond: u32) -> usize {
     let mut seen = 0;
     cells

@@ -1,4 +1,4 @@
-//! Views of what a picture was blurred by: depth, circle of confusion and bins, in false colours with a legend.
+//! Diagnostic views of the blur: depth, circle of confusion and bins, in false colours with a legend.
 
 mod bins;
 mod colors;
@@ -9,9 +9,9 @@ mod sample;
 #[cfg(test)]
 mod tests;
 
-pub use bins::MOST as MOST_BINS;
+pub use bins::MAX as MAX_BINS;
 pub use colors::{BINS as BIN_COLORS, diverging, perceptual};
-pub use depth::share_of as depth_share;
+pub use depth::fraction_of as depth_fraction;
 pub use probe::Probe;
 
 use bokehcam::bokeh::Settings;
@@ -33,12 +33,12 @@ named! {
     }
 }
 
-/// What the colours of a view mean.
+/// Meaning of a view's colours.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Legend {
     /// Depth: [`perceptual`] colours, linear in dioptres, light is near.
     Depth {
-        /// Distance of the lightest colour, in metres; nearer is no lighter.
+        /// Distance of the lightest colour, in metres; nearer depths have the same colour.
         near_m: f32,
         /// Distance of the darkest colour, in metres.
         far_m: f32,
@@ -46,18 +46,18 @@ pub enum Legend {
     /// Circle of confusion: [`diverging`] colours, hatched in front.
     Coc {
         /// Radius of the darkest colours, in front and behind, in pixels.
-        most_px: f32,
+        max_px: f32,
     },
-    /// Bins, front to back, by [`BIN_COLORS`].
+    /// Bins, front to back, in [`BIN_COLORS`].
     Bins {
-        /// How many there are.
+        /// Number of bins.
         count: usize,
-        /// Signed CoC at which each ends, in pixels; infinite for the last.
-        high_px: [f32; MOST_BINS],
+        /// Signed CoC at which each bin ends, in pixels; infinite for the last.
+        high_px: [f32; MAX_BINS],
     },
 }
 
-/// Draws views. Keeps their memory, and the range of the depth colours, which is eased from frame to frame.
+/// Draws views. Keeps their buffers, and the depth view's colour range, which is smoothed over time.
 #[derive(Default)]
 pub struct Views {
     image: ColorImage,
@@ -69,8 +69,8 @@ pub struct Views {
 }
 
 impl Views {
-    /// Draws the view `shown` of this frame, as large as its picture; `None` for the picture itself and for what the
-    /// frame lacks. `settings` are those that it was blurred with. Allocates only for another size or other bins.
+    /// Draws the view `shown` of a frame, in its picture's size; `None` for the picture itself or if the frame lacks
+    /// the data. `settings` are those of the frame's blur. Allocates only if the size or the bins change.
     pub fn draw(&mut self, shown: Shown, view: &View, settings: Option<&Settings>) -> Option<&ColorImage> {
         self.legend = None;
         let size = view.picture.size();
@@ -91,12 +91,12 @@ impl Views {
         self.legend.map(|_| &self.image)
     }
 
-    /// The view that was drawn last.
+    /// Returns the view drawn last.
     pub fn image(&self) -> &ColorImage {
         &self.image
     }
 
-    /// What the colours of the view that was drawn last mean.
+    /// Returns the legend of the view drawn last.
     pub fn legend(&self) -> Option<Legend> {
         self.legend
     }

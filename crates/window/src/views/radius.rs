@@ -1,5 +1,5 @@
-//! The view of the circle of confusion: white is sharp, darker is more blurred. What lies in front is hatched, so that
-//! it differs from what lies behind by more than colour.
+//! The view of the circle of confusion: white is sharp, darker is more blurred. Pixels in front are hatched, to differ
+//! from those behind by more than colour.
 
 use super::Legend;
 use super::colors::diverging;
@@ -7,30 +7,30 @@ use super::sample::Field;
 use bokehcam::bokeh::Settings;
 use bokehcam::frame::ColorImage;
 
-/// Period of the hatching in pixels, for a picture of 720 rows, and the share of it that a line takes.
+/// Period of the hatching in pixels for a picture of 720 rows, and a line's fraction of it.
 const HATCH_PX: f32 = 12.0;
-const LINE_SHARE: f32 = 0.25;
-/// Signed CoC below which a pixel counts as in front, so that noise of the depth does not hatch a sharp face.
-const FRONT_FROM_PX: f32 = -0.5;
-/// Entries of the table of colours.
+const LINE_FRACTION: f32 = 0.25;
+/// Signed CoC below which a pixel counts as in front; below 0 so that depth noise does not hatch a sharp face.
+const FRONT_THRESHOLD_PX: f32 = -0.5;
+/// Number of entries in the colour table.
 const STEPS: usize = 256;
-/// The colours end at this radius or more, in pixels, so that a nearly sharp picture looks sharp.
-const LEAST_PX: f32 = 2.0;
+/// Minimum radius of the darkest colour, in pixels, so that a nearly sharp picture looks sharp.
+const MIN_SCALE_END_PX: f32 = 2.0;
 
-/// Colours each pixel by its signed CoC. `columns` are those of [`Field::new`].
+/// Colours each pixel by its signed CoC. `columns` comes from [`Field::new`].
 pub fn draw(field: &Field, columns: &[u32], settings: Option<&Settings>, image: &mut ColorImage) -> Legend {
-    let most_px = settings.map_or(0.0, |settings| settings.far_max_px.max(settings.near_max_px)).max(LEAST_PX);
+    let max_px = settings.map_or(0.0, |settings| settings.far_max_px.max(settings.near_max_px)).max(MIN_SCALE_END_PX);
     let table: [[u8; 3]; STEPS] = std::array::from_fn(|k| diverging(2.0 * k as f32 / (STEPS - 1) as f32 - 1.0));
-    let (scale, middle) = ((STEPS - 1) as f32 / (2.0 * most_px), (STEPS - 1) as f32 / 2.0);
+    let (scale, middle) = ((STEPS - 1) as f32 / (2.0 * max_px), (STEPS - 1) as f32 / 2.0);
     let period_px = ((HATCH_PX * image.height as f32 / 720.0) as u32).max(4);
-    let line_px = (period_px as f32 * LINE_SHARE).ceil() as u32;
+    let line_px = (period_px as f32 * LINE_FRACTION).ceil() as u32;
     let (rows, row_bytes) = (image.height, image.width as usize * 3);
     for (y, row) in (0..).zip(image.rgb.chunks_exact_mut(row_bytes.max(1))) {
-        field.row(y, rows, columns, row, |x, coc_px| {
+        field.color_row(y, rows, columns, row, |x, coc_px| {
             let color = table[(coc_px * scale + middle).clamp(0.0, (STEPS - 1) as f32) as usize];
-            let hatched = coc_px < FRONT_FROM_PX && (x + y) % period_px < line_px;
+            let hatched = coc_px < FRONT_THRESHOLD_PX && (x + y) % period_px < line_px;
             if hatched { color.map(|channel| channel / 2) } else { color }
         });
     }
-    Legend::Coc { most_px }
+    Legend::Coc { max_px }
 }

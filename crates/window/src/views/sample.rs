@@ -1,26 +1,26 @@
-//! The circle of confusion at each pixel of the picture.
+//! Evaluates the circle of confusion at each pixel of the picture.
 
 use bokehcam::frame::DepthMap;
 use bokehcam::optics::{CocField, DepthCoc, Ramp};
 
-/// What gives each pixel its CoC.
+/// Source of each pixel's CoC.
 pub enum Field<'a> {
     /// The same radius everywhere, in pixels.
-    Even(f32),
+    Uniform(f32),
     Ramp(Ramp),
-    /// Depth, which may have fewer pixels than the picture.
+    /// From depth; the map may be smaller than the picture.
     Depth(&'a DepthMap, DepthCoc),
 }
 
 impl<'a> Field<'a> {
-    /// The field of a picture of `size` pixels. Fills `columns` with the depth map's column for each of the picture's.
-    /// `None` where the field needs depth and there is none.
+    /// Creates the field of a picture of `size` pixels. Fills `columns` with the depth map's column for each of the
+    /// picture's. `None` if the field needs depth and has no map.
     pub fn new(coc: &CocField, depth: Option<&'a DepthMap>, size: (u32, u32), columns: &mut Vec<u32>) -> Option<Self> {
         let map_columns = depth.map_or(size.0, |depth| depth.width);
         columns.clear();
-        columns.extend((0..size.0).map(|x| scaled(x, size.0, map_columns)));
+        columns.extend((0..size.0).map(|x| scale_index(x, size.0, map_columns)));
         match *coc {
-            CocField::Uniform { radius_px } => Some(Self::Even(radius_px)),
+            CocField::Uniform { radius_px } => Some(Self::Uniform(radius_px)),
             CocField::Ramp(ramp) => Some(Self::Ramp(ramp)),
             CocField::Depth(lens) => depth.filter(|depth| depth.height > 0).map(|depth| Self::Depth(depth, lens)),
         }
@@ -28,10 +28,17 @@ impl<'a> Field<'a> {
 
     /// Sets each pixel of `row`, row `y` of a picture of `rows` rows, to `color(x, signed CoC in pixels)`.
     #[inline(always)]
-    pub fn row(&self, y: u32, rows: u32, columns: &[u32], row: &mut [u8], mut color: impl FnMut(u32, f32) -> [u8; 3]) {
+    pub fn color_row(
+        &self,
+        y: u32,
+        rows: u32,
+        columns: &[u32],
+        row: &mut [u8],
+        mut color: impl FnMut(u32, f32) -> [u8; 3],
+    ) {
         let pixels = (0..).zip(row.as_chunks_mut::<3>().0);
         match self {
-            Self::Even(radius_px) => pixels.for_each(|(x, pixel)| *pixel = color(x, *radius_px)),
+            Self::Uniform(radius_px) => pixels.for_each(|(x, pixel)| *pixel = color(x, *radius_px)),
             Self::Ramp(ramp) => {
                 let y_px = y as f32 + 0.5;
                 pixels.for_each(|(x, pixel)| *pixel = color(x, ramp.coc_px(x as f32 + 0.5, y_px)));
@@ -46,13 +53,13 @@ impl<'a> Field<'a> {
     }
 }
 
-/// The row of a depth map that belongs to row `y` of a picture of `rows` rows.
+/// Returns the row of a depth map for row `y` of a picture of `rows` rows.
 pub fn depth_row(depth: &DepthMap, y: u32, rows: u32) -> &[f32] {
-    let at = scaled(y, rows, depth.height) as usize;
+    let at = scale_index(y, rows, depth.height) as usize;
     &depth.metres[at * depth.width as usize..][..depth.width as usize]
 }
 
-/// The index `at` of `from` pixels, scaled to an index of `to` pixels.
-pub fn scaled(at: u32, from: u32, to: u32) -> u32 {
+/// Scales the index `at` of `from` pixels to an index of `to` pixels.
+pub fn scale_index(at: u32, from: u32, to: u32) -> u32 {
     (u64::from(at) * u64::from(to) / u64::from(from.max(1))) as u32
 }

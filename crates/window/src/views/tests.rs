@@ -10,7 +10,7 @@ use bokehcam::pipeline::Trace;
 
 const LENS: DepthCoc = DepthCoc { coc_at_infinity_px: 16.0, focus_m: 2.0, range_m: 0.0, max_coc_px: 43.0 };
 
-/// A view of `size` pixels, with a map of `map` pixels whose depth grows from left to right.
+/// Creates a view of `size` pixels with a depth map of `map` pixels whose depth grows from left to right.
 fn view(size: (u32, u32), map: (u32, u32), coc: CocField) -> View {
     let pictures = Pool::new(1, || ColorImage::new(size.0, size.1));
     let maps = Pool::new(1, || {
@@ -60,7 +60,8 @@ fn near_is_light_and_the_legend_says_how_near() {
     assert!(row.windows(2).all(|pair| pair[1] <= pair[0] + 0.6), "{row:?}");
     let Some(Legend::Depth { near_m, far_m }) = views.legend() else { panic!("{:?}", views.legend()) };
     assert!((near_m - 0.5).abs() < 0.02 && (8.0..12.0).contains(&far_m), "{near_m} to {far_m}");
-    assert!((depth_share(near_m, near_m, far_m) - 1.0).abs() < 1e-6 && depth_share(far_m, near_m, far_m).abs() < 1e-6);
+    let fraction = |depth_m| depth_fraction(depth_m, near_m, far_m);
+    assert!((fraction(near_m) - 1.0).abs() < 1e-6 && fraction(far_m).abs() < 1e-6);
 }
 
 #[test]
@@ -83,14 +84,14 @@ fn sharp_is_white_and_front_and_back_are_told_apart_without_colour() {
     let column = |metres: f32| ((metres - 0.5) / 9.5 * 640.0) as u32;
     let sharp = pixel(image, column(2.0), 100);
     assert!(lightness(sharp) > 235.0, "{sharp:?}");
-    // In front, lightness changes along a column: it is hatched. Behind, it does not.
+    // In front, lightness varies along a column because of the hatching. Behind, it does not.
     let changes = |metres: f32| {
         let greys: Vec<_> = (0..360).map(|y| lightness(pixel(image, column(metres), y))).collect();
         greys.windows(2).filter(|pair| (pair[0] - pair[1]).abs() > 20.0).count()
     };
     assert!(changes(0.8) > 40 && changes(6.0) == 0, "{} and {}", changes(0.8), changes(6.0));
     assert!(lightness(pixel(image, column(9.9), 100)) < lightness(pixel(image, column(3.0), 100)));
-    assert!(matches!(views.legend(), Some(Legend::Coc { most_px }) if most_px == settings.near_max_px));
+    assert!(matches!(views.legend(), Some(Legend::Coc { max_px }) if max_px == settings.near_max_px));
 }
 
 #[test]

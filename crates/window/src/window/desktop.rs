@@ -1,4 +1,4 @@
-//! The desktop's colour scheme, as its portal tells it: light and dark follow the desktop while the window is open.
+//! Follows the desktop's colour scheme, light or dark, through its portal.
 //!
 //! The interface is <https://flatpak.github.io/xdg-desktop-portal/docs/doc-org.freedesktop.portal.Settings.html>.
 
@@ -11,11 +11,11 @@ use zbus::zvariant::{OwnedValue, Value};
 const NAMESPACE: &str = "org.freedesktop.appearance";
 const KEY: &str = "color-scheme";
 
-/// Calls `tell` with the desktop's theme, and with each later one until that gives back false; from a thread of its own,
-/// since a portal may have to be started first. Where there is no session bus or no portal, it is never called.
-pub(super) fn follow(tell: impl Fn(Theme) -> bool + Send + 'static) {
+/// Calls `on_theme` with the desktop's theme and each later one until it returns false; on its own thread, because a
+/// portal may have to be started first. Never called without a session bus or a portal.
+pub(super) fn watch_theme(on_theme: impl Fn(Theme) -> bool + Send + 'static) {
     let asked = thread::Builder::new().name("desktop".into()).spawn(move || {
-        if let Err(error) = listen(&tell) {
+        if let Err(error) = watch_portal(&on_theme) {
             tracing::debug!("the desktop tells no colour scheme: {error}");
         }
     });
@@ -24,32 +24,32 @@ pub(super) fn follow(tell: impl Fn(Theme) -> bool + Send + 'static) {
     }
 }
 
-fn listen(tell: &impl Fn(Theme) -> bool) -> zbus::Result<()> {
+fn watch_portal(on_theme: &impl Fn(Theme) -> bool) -> zbus::Result<()> {
     let bus = Connection::session()?;
     let (name, path) = ("org.freedesktop.portal.Desktop", "/org/freedesktop/portal/desktop");
     let portal = Proxy::new(&bus, name, path, "org.freedesktop.portal.Settings")?;
-    // First of all, so that no change is missed.
+    // Subscribes first, so that no change is missed.
     let changes = portal.receive_signal("SettingChanged")?;
-    // `Read` is what old portals have; it wraps the value once more.
+    // Old portals have only `Read`, which wraps the value once more.
     let asked = portal.call("ReadOne", &(NAMESPACE, KEY)).or_else(|_| portal.call("Read", &(NAMESPACE, KEY)));
     let now: OwnedValue = asked?;
-    if !tell(theme(&now)) {
+    if !on_theme(theme_of(&now)) {
         return Ok(());
     }
     for change in changes {
         let Ok((namespace, key, value)) = change.body().deserialize::<(String, String, OwnedValue)>() else { continue };
-        if (namespace.as_str(), key.as_str()) == (NAMESPACE, KEY) && !tell(theme(&value)) {
+        if (namespace.as_str(), key.as_str()) == (NAMESPACE, KEY) && !on_theme(theme_of(&value)) {
             break;
         }
     }
     Ok(())
 }
 
-/// The theme of a colour scheme: 1 prefers dark, 2 light, and all else has no preference, which is dark here, as pictures
-/// are judged best in dark surroundings.
-fn theme(scheme: &Value) -> Theme {
+/// Returns the theme for a colour scheme: 1 prefers dark, 2 light, others have no preference. The default is dark,
+/// because pictures are judged best in dark surroundings.
+fn theme_of(scheme: &Value) -> Theme {
     match scheme {
-        Value::Value(inner) => theme(inner),
+        Value::Value(inner) => theme_of(inner),
         Value::U32(2) => Theme::Light,
         _ => Theme::Dark,
     }

@@ -1,4 +1,4 @@
-//! The window on the screen, and what draws in it.
+//! The window, its input, and its presenter.
 
 use std::sync::Arc;
 
@@ -19,16 +19,16 @@ pub(super) struct Gfx {
     pub presenter: Box<dyn Presenter>,
 }
 
-/// The application id that desktops group windows by.
+/// Application id by which desktops group windows.
 const CLASS: &str = "bokehcam";
-const FIRST_SIZE: LogicalSize<f64> = LogicalSize::new(1280.0, 720.0);
-const LEAST_SIZE: LogicalSize<f64> = LogicalSize::new(240.0, 160.0);
+const DEFAULT_SIZE: LogicalSize<f64> = LogicalSize::new(1280.0, 720.0);
+const MIN_SIZE: LogicalSize<f64> = LogicalSize::new(240.0, 160.0);
 
 impl Gfx {
-    /// Opens the window, in the size that is remembered.
+    /// Opens the window with the saved size.
     ///
     /// # Errors
-    /// The display refuses it, or nothing can draw in it.
+    /// Fails if the display refuses the window, or no presenter can draw to it.
     pub fn open(
         events: &ActiveEventLoop,
         ctx: &egui::Context,
@@ -37,16 +37,17 @@ impl Gfx {
         device: Option<Arc<Device>>,
     ) -> Result<Self, WindowError> {
         use winit::platform::{wayland::WindowAttributesExtWayland, x11::WindowAttributesExtX11};
-        let inner = size.map_or(FIRST_SIZE, |size| LogicalSize::new(size.width, size.height));
-        let wanted = Window::default_attributes()
+        let inner = size.map_or(DEFAULT_SIZE, |size| LogicalSize::new(size.width, size.height));
+        let attributes = Window::default_attributes()
             .with_title(CLASS)
             .with_inner_size(inner)
-            .with_min_inner_size(LEAST_SIZE)
+            .with_min_inner_size(MIN_SIZE)
             .with_maximized(size.is_some_and(|size| size.maximized))
             .with_fullscreen(full_screen.then_some(Fullscreen::Borderless(None)));
-        let wanted = WindowAttributesExtX11::with_name(wanted, CLASS, CLASS);
-        let wanted = WindowAttributesExtWayland::with_name(wanted, CLASS, CLASS);
-        let window = events.create_window(wanted).map_err(|error| WindowError::NoWindow(error.to_string()))?;
+        // X11 and Wayland set the application id separately.
+        let attributes = WindowAttributesExtX11::with_name(attributes, CLASS, CLASS);
+        let attributes = WindowAttributesExtWayland::with_name(attributes, CLASS, CLASS);
+        let window = events.create_window(attributes).map_err(|error| WindowError::NoWindow(error.to_string()))?;
         let window = Arc::new(window);
         let mut presenter = present::create(Arc::clone(&window), device)?;
         let PhysicalSize { width, height } = window.inner_size();
@@ -58,16 +59,16 @@ impl Gfx {
             &window,
             Some(scale),
             window.theme(),
-            Some(MOST_TEXTURE_PX),
+            Some(MAX_TEXTURE_PX),
         );
         Ok(Self { window, input, presenter })
     }
 
-    /// Where a picture of `size` lies in the window, in the `room` at its top left that the panel leaves: centred, as large as fits
-    /// or enlarged, and then which part of it is seen.
+    /// Returns the picture's area within `room`, the part of the window that the panel leaves at its top left: centred,
+    /// fitted or zoomed, with the visible part if zoomed.
     pub fn area(&self, size: (u32, u32), room: (u32, u32), zoom: Zoom, mirror: bool) -> (Area, Option<Part>) {
         let PhysicalSize { width, height } = self.window.inner_size();
-        // Until the controls are laid out for a new size, the room is of the size before.
+        // Until the next layout, the room may be that of a previous, larger window.
         let room = (room.0.min(width), room.1.min(height));
         if zoom.factor == 0 {
             return (fitted(size, room), None);
@@ -77,7 +78,7 @@ impl Gfx {
         (area, Some(part))
     }
 
-    /// The size to remember; `None` in full screen, whose size is not the window's own.
+    /// Returns the size to save; `None` in full screen, which is not the window's own size.
     pub fn size(&self) -> Option<Size> {
         let LogicalSize { width, height } = self.window.inner_size().to_logical::<f64>(self.window.scale_factor());
         let maximized = self.window.is_maximized();
@@ -85,5 +86,5 @@ impl Gfx {
     }
 }
 
-/// Any GPU takes textures of this size.
-const MOST_TEXTURE_PX: usize = 4096;
+/// Maximum texture side; every GPU supports it.
+const MAX_TEXTURE_PX: usize = 4096;

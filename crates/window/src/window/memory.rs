@@ -1,4 +1,4 @@
-//! What is remembered from one preview to the next: how large the window was, and how the person had it.
+//! State that persists between previews: window size, preferences, source and look.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -13,46 +13,46 @@ use bokehcam::look::{Look, Patch};
 use bokehcam::recording::RecordingError;
 use bokehcam::source::SourceName;
 
-/// What a preview ended with.
+/// State saved at the end of a preview.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, rename_all = "kebab-case")]
 pub struct Memory {
-    /// What the source is called on the command line.
+    /// The source's name on the command line.
     pub source: Option<String>,
-    /// How the person had the window.
+    /// The user's preferences.
     pub habits: Habits,
-    /// The settings of the look, by name.
+    /// Settings of the look, by name.
     pub look: BTreeMap<String, String>,
-    /// The window's size, if it is known.
+    /// The window's size, if known.
     pub size: Option<Size>,
 }
 
-/// A window's size in points.
+/// A window's size in logical pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Size {
-    /// Columns.
+    /// Width.
     pub width: f64,
-    /// Rows.
+    /// Height.
     pub height: f64,
-    /// Whether it filled the screen beside the desktop's bars.
+    /// Whether the window was maximized.
     #[serde(default)]
     pub maximized: bool,
 }
 
-/// A side beyond these is taken for a mistake.
-const LEAST: f64 = 200.0;
-const MOST: f64 = 16_384.0;
+/// Valid range of a side, in logical pixels; values outside are ignored.
+const MIN_SIDE: f64 = 200.0;
+const MAX_SIDE: f64 = 16_384.0;
 
 impl Memory {
-    /// What the file remembers; `None` if it is missing or not sensible, without an error, as it is no setting.
+    /// Reads the file; `None` if it is missing or invalid, without an error, because users do not edit it.
     pub fn read(path: &Path) -> Option<Self> {
         let memory: Self = toml::from_str(&input::read_text(path, input::MOST_SETTINGS_BYTES).ok()?).ok()?;
-        let sides = LEAST..=MOST;
+        let sides = MIN_SIDE..=MAX_SIDE;
         let size = memory.size.filter(|size| sides.contains(&size.width) && sides.contains(&size.height));
         Some(Self { size, habits: memory.habits.checked(), ..memory })
     }
 
-    /// The source, if it is still there.
+    /// Returns the source, if its devices still exist.
     pub fn source(&self) -> Option<String> {
         let is_there = |name: &&String| {
             SourceName::from_str(name).is_ok_and(|name| name.devices().iter().all(|node| node.exists()))
@@ -60,13 +60,13 @@ impl Memory {
         self.source.as_ref().filter(is_there).cloned()
     }
 
-    /// Remembers a source, by a name that holds wherever the next preview is started.
+    /// Sets the source, by a name that is valid in any working directory.
     pub fn set_source(&mut self, name: &str) {
-        self.source = Some(anywhere(name)).filter(|name| !name.is_empty());
+        self.source = Some(absolute_name(name)).filter(|name| !name.is_empty());
     }
 
-    /// The look, without pictures that cannot be read any more, of which `gone` is told; `None` where none is remembered, or
-    /// one that cannot be any more.
+    /// Returns the look, without pictures that cannot be read any more, each of which is reported to `gone`; `None` if
+    /// no valid look is saved.
     pub fn look(&self, mut gone: impl FnMut(String)) -> Option<Look> {
         let settings = self.look.iter().map(|(name, value)| (name.as_str(), value.as_str()));
         let mut patch = Patch::parse(settings).ok().filter(|_| !self.look.is_empty())?;
@@ -76,17 +76,17 @@ impl Memory {
         patch.on(&Look::default()).ok()
     }
 
-    /// Remembers a look.
+    /// Sets the look.
     pub fn set_look(&mut self, look: &Look) {
         let kept = |value: String| match value.strip_prefix("image:") {
-            Some(file) => format!("image:{}", anywhere(file)),
+            Some(file) => format!("image:{}", absolute_name(file)),
             None => value,
         };
         let values = Patch::of(look).values().into_iter();
         self.look = values.map(|(name, value)| (name.to_owned(), kept(value))).collect();
     }
 
-    /// Writes the file, whole or not at all. If that fails, the next window is as if it were the first.
+    /// Writes the file atomically. On failure, the next preview starts with defaults.
     pub fn write(&self, path: &Path) {
         let Ok(text) = toml::to_string(self) else { return };
         let folder = path.parent().map_or(Ok(()), fs::create_dir_all);
@@ -97,8 +97,8 @@ impl Memory {
     }
 }
 
-/// A name that holds wherever the next preview is started: of a file or folder that is here, its whole path.
-fn anywhere(name: &str) -> String {
+/// Returns a name that is valid in any working directory: the absolute path of an existing file or folder, else `name`.
+fn absolute_name(name: &str) -> String {
     let is_here = Path::new(name).is_relative() && Path::new(name).exists();
     let absolute = std::path::absolute(name).ok().filter(|_| is_here);
     absolute.map_or_else(|| name.to_owned(), |path| path.display().to_string())
@@ -128,7 +128,7 @@ mod tests {
             fs::write(&path, text).unwrap();
             assert_eq!(Memory::read(&path), None, "{text}");
         }
-        // What cannot be is left out, and the rest holds.
+        // Invalid values are dropped, and the others remain.
         fs::write(
             &path,
             "source = \"1\"\n[habits]\ntext-scale = 1e9\n[size]\nwidth = nan\nheight = 7\n[look]\nrim = \"9\"\n",

@@ -1,7 +1,7 @@
-//! The window: winit's events in, pictures and controls out.
+//! The window: handles winit's events, and presents pictures and controls.
 //!
-//! Its thread does nothing that can take long. A frame that comes is shown at once with the controls as they are;
-//! controls are laid out anew when something happened to them, and five times a second while instruments are shown.
+//! Its thread never blocks for long. A new frame is presented immediately with the existing controls; the controls are
+//! laid out again only after events, and five times a second while the instruments are shown.
 
 mod app;
 mod desktop;
@@ -37,75 +37,75 @@ bokehcam::names::named! {
     }
 }
 
-/// What the window's thread is woken for.
+/// User events that wake the window's thread.
 #[derive(Debug)]
-enum Call {
-    /// The session has told something.
+enum UserEvent {
+    /// The session sent an event.
     Session,
-    /// A screen reader came, went, or wants something done.
+    /// A screen reader connected, disconnected, or requests an action.
     Access(accesskit_winit::Event),
-    /// The desktop has these colours now.
+    /// The desktop's colour scheme changed.
     Theme(egui::Theme),
-    /// The system has a font for a text.
+    /// A missing font was found.
     Fonts,
-    /// Somebody asks for something from outside.
+    /// Remote control sent a request.
     Control,
 }
 
-impl From<accesskit_winit::Event> for Call {
+impl From<accesskit_winit::Event> for UserEvent {
     fn from(event: accesskit_winit::Event) -> Self {
         Self::Access(event)
     }
 }
 
-/// The name that others control a preview by, and what they are understood and allowed to.
+/// Name and rules of remote control.
 pub struct Control {
     pub claim: Claim,
     pub rules: Arc<dyn Rules>,
 }
 
-/// What a preview begins with.
+/// Configuration of a preview.
 pub struct Preview {
-    /// What the window shows first.
+    /// Initial state of the window.
     pub state: State,
-    /// What the session starts with.
+    /// Configuration of the session.
     pub session: session::Start,
-    /// Its colours.
+    /// Colour theme.
     pub theme: ThemeChoice,
-    /// The GPU to draw with, if any.
+    /// GPU to draw with, if any.
     pub device: Option<Arc<Device>>,
-    /// Close the window when the source ends.
+    /// Whether to close the window when the source ends.
     pub close_at_end: bool,
-    /// What is remembered of the preview before, and where.
+    /// State saved by the previous preview, and its file.
     pub memory: Memory,
     pub memory_file: Option<PathBuf>,
-    /// By what others control it, or the line that says why they cannot.
+    /// Remote control, or a line with the reason why it is unavailable.
     pub control: Result<Control, String>,
-    /// Once set, the window closes.
+    /// Closes the window once set.
     pub stop: Arc<AtomicBool>,
 }
 
-/// How a preview ended.
+/// Result of a preview.
 #[derive(Clone, Debug, Default)]
 pub struct Ended {
-    /// The report of the last run.
+    /// Report of the last run.
     pub report: Option<Report>,
-    /// Why there were no frames (any more), where that was so when the window closed.
+    /// Reason why the source delivered no frames when the window closed.
     pub lost: Option<String>,
-    /// Why an output failed, if one did.
+    /// Message of the first output that failed.
     pub unwritten: Option<String>,
 }
 
-/// Why there is no window.
+/// Reasons why there is no window.
 #[derive(Debug, thiserror::Error)]
 pub enum WindowError {
-    /// No display server, or one that refuses.
+    /// There is no display server, or it refused the window.
     #[error("there can be no window: {0}; without one, `bokehcam stream SOURCE --to SINK` does the same")]
     NoWindow(String),
-    /// It cannot be drawn to.
+    /// The window cannot be drawn to.
     #[error(transparent)]
     Present(#[from] super::present::PresentError),
-    /// The system gives no thread.
+    /// The session's thread cannot be created.
     #[error("cannot start the session's thread: {0}")]
     Thread(#[from] std::io::Error),
 }
@@ -113,7 +113,7 @@ pub enum WindowError {
 /// Shows the window until it is closed.
 ///
 /// # Errors
-/// There is no display, or the window cannot be drawn to.
+/// Fails if there is no display, or the window cannot be drawn to.
 pub fn show(preview: Preview) -> Result<Ended, WindowError> {
     let mut events = event_loop()?;
     let proxy = events.create_proxy();
@@ -127,7 +127,7 @@ pub fn show(preview: Preview) -> Result<Ended, WindowError> {
     ended
 }
 
-/// An error's text without the location in its library's source, which winit puts before it.
+/// Returns an error's text without the source location that winit puts before it.
 fn plain(error: &impl std::fmt::Display) -> String {
     let text = error.to_string();
     match text.split_once(".rs:").and_then(|(_, rest)| rest.split_once(": ")) {
@@ -136,9 +136,9 @@ fn plain(error: &impl std::fmt::Display) -> String {
     }
 }
 
-/// The event loop. winit panics if a library that the display needs is missing: that becomes an error, too, and the
-/// panic hook is silenced meanwhile.
-fn event_loop() -> Result<EventLoop<Call>, WindowError> {
+/// Creates the event loop. winit panics if a library that the display needs is missing: that becomes an error too, and
+/// the panic hook is silenced meanwhile.
+fn event_loop() -> Result<EventLoop<UserEvent>, WindowError> {
     let hook = std::panic::take_hook();
     std::panic::set_hook(Box::new(|_| {}));
     let made = std::panic::catch_unwind(|| EventLoop::with_user_event().build());

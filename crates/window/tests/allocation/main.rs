@@ -1,4 +1,4 @@
-//! A frame allocates nothing once the executor has warmed up.
+//! Per-frame work does not allocate after the warm-up.
 #![allow(missing_docs, unsafe_code)]
 
 #[path = "../../../../tests/common/mod.rs"]
@@ -35,16 +35,16 @@ struct Counting;
 
 static ALLOCATIONS: AtomicUsize = AtomicUsize::new(0);
 
-// SAFETY: every call goes to the system's allocator as it is; counting touches nothing of it.
+// SAFETY: every call is forwarded to the system's allocator; the counter does not touch its memory.
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         ALLOCATIONS.fetch_add(1, Ordering::Relaxed);
-        // SAFETY: the caller's promises are passed on.
+        // SAFETY: the caller upholds the contract of `alloc`.
         unsafe { System.alloc(layout) }
     }
 
     unsafe fn dealloc(&self, memory: *mut u8, layout: Layout) {
-        // SAFETY: the caller's promises are passed on.
+        // SAFETY: the caller upholds the contract of `dealloc`.
         unsafe { System.dealloc(memory, layout) }
     }
 }
@@ -52,7 +52,7 @@ unsafe impl GlobalAlloc for Counting {
 #[global_allocator]
 static COUNTING: Counting = Counting;
 
-/// One test, for another one's allocations would be counted with its own.
+/// A single test, because parallel tests would be counted as well.
 #[test]
 fn a_frame_allocates_nothing() {
     blur();
@@ -65,7 +65,7 @@ fn a_frame_allocates_nothing() {
     window();
 }
 
-/// A frame in a window: its view, its painting at its own size and scaled, and the instruments.
+/// A frame in the window: its views, painting unscaled and scaled, and the instruments.
 fn window() {
     use bokehcam::bokeh::Picture;
     use bokehcam::optics::{CocField, DepthCoc};
@@ -107,17 +107,17 @@ fn window() {
             };
             painter.paint(&mut pixels, &drawing);
         }
-        meters.presented(&view, at * 33_000_000, 2_000_000);
-        meters.reacted(5_000_000);
+        meters.add_frame(&view, at * 33_000_000, 2_000_000);
+        meters.add_reaction(5_000_000);
     };
-    // Both sizes, mirrored or not, stale or not.
+    // All combinations of sizes, mirrored or not, stale or not.
     (0..12).for_each(&mut frame);
     let before = ALLOCATIONS.load(Ordering::Relaxed);
     (12..40).for_each(frame);
     assert_eq!(ALLOCATIONS.load(Ordering::Relaxed), before, "a window's frame");
 }
 
-/// Both pictures of a pair that is not rectified yet.
+/// Rectification of both pictures of a stereo pair.
 fn rectification() {
     let eye = |shift_px: f64| Eye {
         size: Some((160, 120)),
@@ -148,14 +148,14 @@ fn rectification() {
     assert_eq!(ALLOCATIONS.load(Ordering::Relaxed), before);
 }
 
-/// From thread to thread and home again, both ends sleeping now and then.
+/// Passing buffers between threads and back to their pool, with both ends blocking occasionally.
 fn hand_over() {
     const READ: usize = 1_000;
     let pool = Pool::new(2, || ColorImage::new(16, 16));
     let (mut to, mut from) = live::<Pooled<ColorImage>>();
     let allocations = thread::scope(|scope| {
         let reader = scope.spawn(move || {
-            // Threads allocate as they begin; sleeping and waking may do so once.
+            // Threads allocate when they start; the first sleep and wake-up may, too.
             let mut before = 0;
             for read in 0..READ {
                 if read == READ / 5 {
@@ -168,7 +168,7 @@ fn hand_over() {
             }
             ALLOCATIONS.load(Ordering::Relaxed) - before
         });
-        // Both buffers are out where the reader is slow: then this end sleeps. It goes on until the reader is gone.
+        // With a slow reader both buffers are in use, and this end blocks. It continues until the reader is gone.
         for frame in 0.. {
             if to.send(pool.take()).is_err() {
                 break;
@@ -204,7 +204,7 @@ fn refinement() {
     }
 }
 
-/// A pair rectified, and matched by what needs no memory; after that it is the matcher's own affair.
+/// Rectification and stereo matching on the CPU, with changing effort.
 fn two_eyes() {
     let size = (160, 120);
     let eye = |center_y_px| Eye {
@@ -233,7 +233,7 @@ fn two_eyes() {
         depth.set_effort(index % 2);
         depth.read(Seen { stamp, color: &color, right: Some(&right) }, &mut map).expect("depth");
     };
-    // The first ones are looked at, for whether they are a rectified pair.
+    // The first frames are checked for being rectified already.
     (0..6).for_each(&mut frame);
     let before = ALLOCATIONS.load(Ordering::Relaxed);
     (6..11).for_each(&mut frame);
@@ -259,7 +259,7 @@ fn blur() {
     }
 }
 
-/// Nor do pictures in memory of somebody else's, of either kind.
+/// Slices of caller-owned memory do not allocate either, for both pixel types.
 fn slices() {
     let size = (160, 120);
     let map = three_depths(size.0, size.1);
@@ -278,7 +278,7 @@ fn slices() {
     assert_eq!(ALLOCATIONS.load(Ordering::Relaxed), before);
 }
 
-/// Nor does a change of the quality level, not even the first one.
+/// Changing the quality level does not allocate, not even the first time.
 fn levels() {
     let (width, height) = (160, 120);
     let (image, map) = (noise(width, height), three_depths(width, height));

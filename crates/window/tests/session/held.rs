@@ -1,4 +1,4 @@
-//! A frame that stays on the screen, and sources that stand still.
+//! Held frames, and paused sources.
 
 use std::time::{Duration, Instant};
 
@@ -19,7 +19,7 @@ use super::watched::{Watched, is_running};
 
 const GREEN: [u8; 3] = [0, 177, 64];
 
-/// A session whose first frame stays.
+/// Creates a session whose first frame is held.
 fn holding(source: &str) -> (Watched, View) {
     let mut watched = Watched::begin(source);
     watched.until("it runs", |told| is_running(told, 32));
@@ -37,9 +37,9 @@ fn still(number: u64, images: Images, coc: CocField) -> Still {
     Still { number, images, coc, change: 0, quality: None }
 }
 
-/// The frame in another look.
+/// Returns the held frame blurred with another look.
 fn in_look(watched: &mut Watched, look: &Look) -> Still {
-    watched.session.order(Request::Look(Box::new(look.clone())));
+    watched.session.send(Request::Look(Box::new(look.clone())));
     let began = Instant::now();
     loop {
         watched.hear();
@@ -67,7 +67,7 @@ fn a_frame_that_stays_is_blurred_as_each_look_says() {
         let blurred = in_look(&mut watched, wanted);
         assert!(blurred.number == 7 && blurred.change > last, "{} after {last}", blurred.change);
         last = blurred.change;
-        // What was in focus stays in focus, until another focus is chosen.
+        // The focus distance stays fixed until another focus is chosen.
         let focus = if wanted.focus == look().focus { FocusRule::Metres(coc.focus_m) } else { wanted.focus };
         let depth = view.depth.as_deref().cloned().map(Depth::Final);
         let same = Look { focus, ..wanted.clone() };
@@ -78,7 +78,7 @@ fn a_frame_that_stays_is_blurred_as_each_look_says() {
     let plain = in_look(&mut watched, &Look { effect: Effect::None, ..look() });
     assert_eq!((plain.images.blurred.rgb, plain.quality), (color.rgb.clone(), None));
     watched.session.let_go();
-    watched.session.order(Request::Look(Box::new(look())));
+    watched.session.send(Request::Look(Box::new(look())));
     watched.frame("the next frames come in the look", |view| matches!(view.coc, CocField::Depth(_)));
     assert!(watched.blurred.is_empty());
 }
@@ -87,7 +87,7 @@ fn a_frame_that_stays_is_blurred_as_each_look_says() {
 fn what_stood_behind_a_frame_that_stays_is_taken_away_again() {
     let mut watched = Watched::begin("32");
     watched.until("it runs", |told| is_running(told, 32));
-    watched.session.order(Request::Look(Box::new(Look { behind: Behind::Color(GREEN), ..look() })));
+    watched.session.send(Request::Look(Box::new(Look { behind: Behind::Color(GREEN), ..look() })));
     let is_green = |picture: &ColorImage| picture.rgb.as_chunks().0.contains(&GREEN);
     let view = watched.frame("a green one", |view| is_green(view.picture.memory().unwrap()));
     assert!(!is_green(view.color.as_deref().unwrap()), "the picture as the camera gave it");
@@ -104,7 +104,7 @@ fn a_frame_without_depth_says_so_when_depth_is_needed() {
     let color = view.color.as_deref().unwrap().clone();
     let images = Images { color, ..Images::default() };
     watched.session.hold(still(8, images, view.coc), false);
-    watched.session.order(Request::Look(Box::new(Look { strength: Strength::AtInfinity(3.0), ..look() })));
+    watched.session.send(Request::Look(Box::new(Look { strength: Strength::AtInfinity(3.0), ..look() })));
     watched.until("why not", |told| matches!(told, Update::Note(line) if line.contains("without depth")));
     let even = in_look(&mut watched, &Look { effect: Effect::Blur, ..look() });
     assert_eq!(even.number, 8);
@@ -124,7 +124,7 @@ fn nothing_is_captured_while_nobody_watches_unless_it_is_written() {
     watched.until("it runs", |told| is_running(told, 32));
     watched.frame("a frame", |_| true);
     watched.watch = None;
-    // What is on its way still comes, and then nothing for a second.
+    // Frames in flight still arrive, and then nothing for a second.
     let rests = |watched: &mut Watched| {
         let (began, mut last) = (Instant::now(), Instant::now());
         while last.elapsed() < Duration::from_secs(1) {
@@ -137,9 +137,9 @@ fn nothing_is_captured_while_nobody_watches_unless_it_is_written() {
     };
     rests(&mut watched);
     let film = Output { name: "film".into(), is_camera: false };
-    watched.session.order(Request::Begin(film.clone()));
+    watched.session.send(Request::Begin(film.clone()));
     watched.frame("frames come for the film", |_| true);
-    watched.session.order(Request::End(film));
+    watched.session.send(Request::End(film));
     watched
         .until("the film is complete", |told| matches!(told, Update::Note(line) if line.starts_with("Complete: film")));
     rests(&mut watched);

@@ -1,4 +1,4 @@
-//! What goes on behind the preview's window: sources, looks and outputs come and go while frames go on.
+//! The preview's session: sources, looks and outputs change while frames continue.
 #![allow(missing_docs)]
 
 #[path = "../../../../tests/common/mod.rs"]
@@ -37,17 +37,17 @@ fn a_look_takes_effect_while_frames_go_on() {
     let made = watched.executors.load(Ordering::SeqCst);
 
     let stronger = Look { strength: Strength::AtInfinity(5.0), ..look() };
-    watched.session.order(Request::Look(Box::new(stronger.clone())));
+    watched.session.send(Request::Look(Box::new(stronger.clone())));
     watched.frame("more blur", |view| radius_px(view) == 5.0);
     let near = Look { focus: bokehcam::depth::focus::FocusRule::Metres(0.7), ..stronger };
-    watched.session.order(Request::Look(Box::new(near.clone())));
+    watched.session.send(Request::Look(Box::new(near.clone())));
     watched.frame("another focus", |view| matches!(view.coc, CocField::Depth(coc) if (coc.focus_m - 0.7).abs() < 0.02));
     assert!(watched.executors.load(Ordering::SeqCst) <= made + 1, "another focus needs no other executor");
 
     let even = Look { effect: Effect::Blur, ..near.clone() };
-    watched.session.order(Request::Look(Box::new(even)));
+    watched.session.send(Request::Look(Box::new(even)));
     watched.frame("an even blur", |view| radius_px(view) == -5.0);
-    watched.session.order(Request::Look(Box::new(Look { effect: Effect::None, ..near })));
+    watched.session.send(Request::Look(Box::new(Look { effect: Effect::None, ..near })));
     watched.frame("no blur", |view| view.color.is_none());
     let report = watched.heard.session.close().report.unwrap();
     assert!(report.frames.balance(), "{:?}", report.frames);
@@ -57,17 +57,17 @@ fn a_look_takes_effect_while_frames_go_on() {
 fn sources_come_and_go_and_one_that_is_lost_can_be_tried_again() {
     let mut watched = Watched::begin("nothing");
     watched.until("why", |told| *told == Update::Source(Source::Lost("no such source: nothing".into())));
-    watched.session.order(Request::Begin(Output { name: "film".into(), is_camera: false }));
+    watched.session.send(Request::Begin(Output { name: "film".into(), is_camera: false }));
     watched.until("nothing to write", |told| matches!(told, Update::Note(line) if line.contains("no source")));
-    watched.session.order(Request::Open("32".into()));
+    watched.session.send(Request::Open("32".into()));
     watched.until("it runs", |told| is_running(told, 32));
     watched.frame("a frame", |view| view.picture.size().0 == 32);
-    watched.session.order(Request::Open("48".into()));
+    watched.session.send(Request::Open("48".into()));
     watched.until("the other runs", |told| is_running(told, 48));
     watched.frame("a frame of the other", |view| view.picture.size().0 == 48);
-    watched.session.order(Request::Open("24 then no more".into()));
+    watched.session.send(Request::Open("24 then no more".into()));
     watched.until("its end", |told| *told == Update::Source(Source::Ended));
-    watched.session.order(Request::Open("24 then no more".into()));
+    watched.session.send(Request::Open("24 then no more".into()));
     watched.until("it runs again", |told| is_running(told, 24));
     watched.until("and ends", |told| *told == Update::Source(Source::Ended));
     let report = watched.heard.session.close().report.unwrap();
@@ -79,7 +79,7 @@ fn a_plate_is_taken_where_there_was_no_depth_and_again_without_a_new_run() {
     let mut watched = Watched::begin("32");
     watched.until("it runs", |told| is_running(told, 32));
     assert!(watched.guide.is_none());
-    watched.session.order(Request::TakePlate);
+    watched.session.send(Request::TakePlate);
     watched.until("it runs again", |told| is_running(told, 32));
     let guide = watched.guide.clone().expect("how far the plate is");
     watched.frame("all is far until there is a plate", |view| {
@@ -87,12 +87,12 @@ fn a_plate_is_taken_where_there_was_no_depth_and_again_without_a_new_run() {
     });
     assert!(matches!(guide.step(), Step::StepOut(1..=3)), "{:?}", guide.step());
     watched.frame("the countdown is over", |_| !matches!(guide.step(), Step::StepOut(_)));
-    watched.session.order(Request::TakePlate);
+    watched.session.send(Request::TakePlate);
     watched.frame("the countdown has begun again", |_| matches!(guide.step(), Step::StepOut(_)));
     assert!(!watched.told.iter().any(|told| is_running(told, 32)), "no new run");
-    // Another source has no plate, and neither has this one when it is opened afterwards.
+    // Another source has no plate, nor has this one when it is reopened.
     for width in [48, 32] {
-        watched.session.order(Request::Open(width.to_string()));
+        watched.session.send(Request::Open(width.to_string()));
         watched.until("it runs", |told| is_running(told, width));
         assert!(watched.guide.is_none());
     }
@@ -104,16 +104,16 @@ fn outputs_are_begun_and_completed_and_one_that_cannot_be_is_told() {
     let mut watched = Watched::begin("32");
     watched.until("it runs", |told| is_running(told, 32));
     let output = |name: &str, is_camera| Output { name: name.into(), is_camera };
-    watched.session.order(Request::Begin(output("full", false)));
+    watched.session.send(Request::Begin(output("full", false)));
     watched.until("why not", |told| *told == Update::Note("the disk is full".into()));
     watched.until("none is written", |told| *told == Update::Outputs(Vec::new()));
-    watched.session.order(Request::Begin(output("film", false)));
-    watched.session.order(Request::Begin(output("camera", true)));
+    watched.session.send(Request::Begin(output("film", false)));
+    watched.session.send(Request::Begin(output("camera", true)));
     watched.until("two", |told| *told == Update::Outputs(vec![output("film", false), output("camera", true)]));
     watched.session.copy(vec![("split".into(), "0.5".into())]);
     watched.until("the command", |told| matches!(told, Update::Note(line) if line.starts_with("Copied: show 32")));
     watched.hear();
-    // The film is there already: the command makes another one.
+    // The film's file exists already: the command names another one.
     let (copied, end) = (watched.copied.clone().unwrap(), r#"", "camera"] [("split", "0.5")]"#);
     let film = copied.strip_prefix("show 32 [\"").and_then(|rest| rest.strip_suffix(end));
     assert!(film.is_some_and(|film| is_video(film.rsplit('/').next().unwrap())), "{copied}");
@@ -123,11 +123,11 @@ fn outputs_are_begun_and_completed_and_one_that_cannot_be_is_told() {
         assert!(began.elapsed() < PATIENCE);
         std::thread::sleep(Duration::from_millis(5));
     }
-    watched.session.order(Request::End(output("film", false)));
+    watched.session.send(Request::End(output("film", false)));
     watched
         .until("the film is complete", |told| matches!(told, Update::Note(line) if line.starts_with("Complete: film")));
-    // A recording ends with its source, and a virtual camera goes on with the next one.
-    watched.session.order(Request::Open("48".into()));
+    // A recording ends with its source, and a virtual camera continues with the next one.
+    watched.session.send(Request::Open("48".into()));
     watched.until("the other runs", |told| is_running(told, 48));
     watched.until("one", |told| *told == Update::Outputs(vec![output("camera", true)]));
     while !has(&watched, "camera 48") {
@@ -145,7 +145,7 @@ fn an_output_that_fails_is_told_for_good_and_is_not_forgotten_at_the_end() {
     for (name, why) in [("fills up", "full now"), ("no end", "full at the end")] {
         let mut watched = Watched::begin("32");
         watched.until("it runs", |told| is_running(told, 32));
-        watched.session.order(Request::Begin(Output { name: name.into(), is_camera: false }));
+        watched.session.send(Request::Begin(Output { name: name.into(), is_camera: false }));
         if name == "fills up" {
             watched.until("why", |told| matches!(told, Update::Trouble(line) if line.contains(why)));
             watched.until("none is written", |told| *told == Update::Outputs(Vec::new()));

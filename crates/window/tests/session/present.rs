@@ -1,4 +1,4 @@
-//! What the window shows, painted into memory.
+//! The window's content, painted into memory.
 #![allow(missing_docs)]
 
 use crate::common;
@@ -49,14 +49,14 @@ fn at(image: &ColorImage, x: u32, y: u32) -> [u8; 3] {
     image.rgb.as_chunks().0[(y * image.width + x) as usize]
 }
 
-/// egui with the window's own fonts.
+/// Creates an egui context with the window's fonts.
 fn context() -> egui::Context {
     let context = egui::Context::default();
     panel::dress(&context);
     context
 }
 
-/// Controls of every kind, text first.
+/// Lays out controls of every kind, text first.
 fn controls(context: &egui::Context, size: (u32, u32), pixels_per_point: f32) -> Controls {
     let points = egui::vec2(size.0 as f32, size.1 as f32) / pixels_per_point;
     let mut input = egui::RawInput {
@@ -85,7 +85,7 @@ fn controls(context: &egui::Context, size: (u32, u32), pixels_per_point: f32) ->
     }
 }
 
-/// What it is, the size of the picture, that of the window, and where in it the picture is.
+/// Description, picture size, window size, and the picture's area.
 type Layout = (&'static str, (u32, u32), (u32, u32), Area);
 
 fn layouts() -> [Layout; 7] {
@@ -100,7 +100,7 @@ fn layouts() -> [Layout; 7] {
     ]
 }
 
-/// Every way to show two pictures.
+/// Returns every way to show two pictures.
 fn manners<'a>(picture: &'a ColorImage, before: &'a ColorImage, place: Area) -> Vec<(String, Drawing<'a>)> {
     let mut all = Vec::new();
     for (mirror, stale) in [(false, false), (true, false), (false, true)] {
@@ -150,7 +150,7 @@ fn a_mirror_flips_the_picture_and_not_the_split() {
             9..11 => [255; 3],
             _ => at(&picture, 39 - x, y),
         };
-        // The divider is two bright columns between two dark ones.
+        // The divider: two bright columns between two dark ones.
         let expected = if x == 8 || x == 11 { [24; 3] } else { expected };
         assert_eq!(pixels[(y * 40 + x) as usize], word(expected), "{x}, {y}");
     }
@@ -192,7 +192,7 @@ fn text_and_controls_are_painted_over_the_picture() {
     let (size, context) = ((480, 480), context());
     let picture = color(480, 480, |_, _| [90, 140, 60]);
     let shown = drawing(&picture, area(0, 0, 480, 480));
-    // A window grows to its content in its first frames.
+    // An egui window grows to its content during the first frames.
     let mut painter = painter(size, Some(controls(&context, size, 1.0)));
     painter.set_controls(controls(&context, size, 1.0));
     let mut pixels = vec![0; 480 * 480];
@@ -203,7 +203,7 @@ fn text_and_controls_are_painted_over_the_picture() {
     assert_eq!(pixels[480 * 480 - 1], plain, "the corner is free");
     let kinds: std::collections::HashSet<u32> = pixels.iter().copied().collect();
     assert!(kinds.len() > 40, "text has smooth edges: {} colours", kinds.len());
-    // The controls go, and the picture is whole again.
+    // Without controls, the picture is fully visible again.
     painter.set_controls(Controls {
         primitives: Vec::new(),
         textures: egui::TexturesDelta::default(),
@@ -213,7 +213,7 @@ fn text_and_controls_are_painted_over_the_picture() {
     assert!(pixels.iter().all(|&pixel| pixel == plain));
 }
 
-/// A picture enlarged around several places, in windows that are smaller and larger than it, in every manner.
+/// Returns a picture zoomed around several points, in smaller and larger windows, in every way.
 fn enlargements<'a>(picture: &'a ColorImage, before: &'a ColorImage) -> Vec<(String, (u32, u32), Drawing<'a>)> {
     let mut all = Vec::new();
     for window in [(40, 30), (97, 60)] {

@@ -1,4 +1,4 @@
-//! A session as the window has it, on sources and outputs of the tests' own.
+//! A session with fake sources and outputs.
 
 use std::ops::{ControlFlow, Deref, DerefMut};
 use std::path::Path;
@@ -23,7 +23,8 @@ use bokehcam_window::state::{Camera, Source, Update, Way};
 
 use super::heard::Heard;
 
-/// Opens small synthetic scenes: the name is their width, `24 then no more` has two frames, and `nothing` is not there.
+/// Opens small synthetic scenes: the name is their width, `24 then no more` has two frames, and `nothing` does not
+/// exist.
 struct Small {
     executors: Arc<AtomicUsize>,
     written: Arc<Mutex<Vec<String>>>,
@@ -52,7 +53,7 @@ impl Sink for Film {
     }
 }
 
-/// A camera that does not know its depth.
+/// A camera without depth.
 struct Plain(Synthetic);
 
 impl Capture for Plain {
@@ -111,7 +112,7 @@ impl Services for Small {
     }
 }
 
-/// Settings that hold nothing: of presets there is one.
+/// An empty settings store with a single preset.
 struct NoSettings;
 
 impl SettingsStore for NoSettings {

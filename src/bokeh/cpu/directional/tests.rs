@@ -6,7 +6,7 @@ const HEIGHT: usize = 48;
 const NEAR_PX: f32 = 0.0;
 const FAR_PX: f32 = 12.0;
 
-/// Two surfaces with a straight outline between them, and a bar across that hides them.
+/// Makes two surfaces with a straight outline between them, and a bar across that hides them.
 fn level(nearer: impl Fn(usize, usize) -> bool, hidden: impl Fn(usize, usize) -> bool) -> Level {
     let mut rows = Rows::<PLANES>::new(WIDTH, HEIGHT, 0);
     let (stride, row_len) = (rows.stride, rows.row_len());
@@ -21,7 +21,7 @@ fn level(nearer: impl Fn(usize, usize) -> bool, hidden: impl Fn(usize, usize) ->
     Level { width: WIDTH, height: HEIGHT, rows }
 }
 
-/// Silhouettes that uncover every pixel.
+/// Makes silhouettes that uncover every pixel.
 fn everywhere() -> Silhouettes {
     let mut silhouettes = Silhouettes::new(PIXEL * WIDTH, PIXEL * HEIGHT);
     let marks = silhouettes.marks(PIXEL * HEIGHT);
@@ -42,7 +42,7 @@ fn straight_outlines_run_on_behind_a_bar() {
         let (sin, cos) = f32::to_radians(degrees as f32).sin_cos();
         let (middle_x, middle_y) = (WIDTH as f32 / 2.0, HEIGHT as f32 / 2.0);
         let outline_px = |x: usize, y: usize| (x as f32 + 0.5 - middle_x) * cos + (y as f32 + 0.5 - middle_y) * sin;
-        // The bar crosses the outline at right angles, or as the outline lies nearer to.
+        // The bar crosses the outline at a right angle, or at the axis nearest to that.
         let hidden = |x: usize, y: usize| match cos.abs() < sin.abs() {
             true => (28..36).contains(&x),
             false => (20..28).contains(&y),
@@ -60,7 +60,7 @@ fn straight_outlines_run_on_behind_a_bar() {
             let truth_px = if outline_px(x, y) < 0.0 { NEAR_PX } else { FAR_PX };
             wrong += usize::from((at(&level, 3, x, y) - truth_px).abs() > 1.0);
         }
-        // Beside the outline lines disagree: one pixel each way, on average, of the eight that it is hidden for.
+        // Next to the outline, lines disagree: on average one pixel per side, of the eight that it is hidden for.
         assert!(wrong <= 16, "{degrees} degrees: {wrong} pixels are of the other surface or of neither");
     }
 }

@@ -1,8 +1,8 @@
 //! Motion JPEG as cameras send it.
 //!
-//! The library decodes what is there and, told to be strict, still fills up what is not: it reads zeros after the end
-//! marker. So each file is copied into one that it cannot misread (see [`repair`]): a picture that ends too early runs
-//! into bits that are no code, and the decoder says so.
+//! Even in strict mode, the library decodes truncated data and fills in the rest: it reads zeros after the end marker.
+//! So each file is copied into one that it cannot misread (see [`repair`]): a truncated picture runs into bits that are
+//! no valid code, and the decoder reports the error.
 
 mod repair;
 mod tables;
@@ -18,14 +18,14 @@ use super::PixelError;
 use crate::frame::ColorImage;
 use crate::layout::Layout;
 
-/// Decodes JPEGs; keeps the memory for the repaired file.
+/// Decodes JPEGs; keeps the buffer for the repaired file.
 #[derive(Debug, Default)]
 pub(super) struct Jpeg {
     file: Vec<u8>,
 }
 
 impl Jpeg {
-    /// Decodes the JPEG in `bytes` into `out` (resized to fit), if it is whole and of the layout's size.
+    /// Decodes the JPEG in `bytes` into `out` (resized to fit), if it is complete and of the layout's size.
     pub(super) fn decode(&mut self, layout: &Layout, bytes: &[u8], out: &mut ColorImage) -> Result<(), PixelError> {
         let expected = (layout.width as usize, layout.height as usize);
         let found = repair::repair(bytes, &mut self.file).map_err(|fault| PixelError::Jpeg(fault.to_string()))?;

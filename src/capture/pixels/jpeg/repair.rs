@@ -1,10 +1,10 @@
-//! Copies what a camera sends into a JPEG of which the decoder notices any missing part.
+//! Copies a camera's JPEG into one in which the decoder detects any missing part.
 //!
-//! - What comes before the start marker and after the end is left out, and so are notes and thumbnails.
-//! - Missing Huffman tables are put in.
-//! - Restart markers must count up, and be as many as the picture has.
-//! - After each stretch of coded bits come bits that are no code, the stuffed ones that no table may assign, where a
-//!   good picture is never read. A missing end marker is put in.
+//! - Data before the start marker and after the end are dropped, and so are comments and thumbnails.
+//! - Missing Huffman tables are inserted.
+//! - Restart markers must count up, and match the number that the picture needs.
+//! - Each run of entropy-coded data is followed by bits that are no valid code (all ones, which no table may assign),
+//!   where the decoder of a complete picture never reads. A missing end marker is added.
 
 use super::tables;
 
@@ -14,7 +14,7 @@ mod marker {
     pub const EXTENDED: u8 = 0xC1;
     pub const PROGRESSIVE: u8 = 0xC2;
     pub const DHT: u8 = 0xC4;
-    /// For private use in arithmetic coding; without content.
+    /// Temporary private use in arithmetic coding; without content.
     pub const TEM: u8 = 0x01;
     pub const JPG: u8 = 0xC8;
     pub const DAC: u8 = 0xCC;
@@ -24,12 +24,12 @@ mod marker {
     pub const SOS: u8 = 0xDA;
     pub const DQT: u8 = 0xDB;
     pub const DRI: u8 = 0xDD;
-    /// Adobe's mark, which says how colours are coded.
+    /// Adobe's marker, which defines the colour coding.
     pub const APP14: u8 = 0xEE;
 }
 
-/// One bits, as stuffed bytes FF 00, which no Huffman table may use as a code: more than the decoder reads ahead.
-const NO_CODE: [u8; 32] = {
+/// One bits, as stuffed bytes FF 00, which no Huffman table may use as a code: more than the decoder prefetches.
+const INVALID_CODE: [u8; 32] = {
     let mut ones = [0; 32];
     let mut at = 0;
     while at < ones.len() {
@@ -39,7 +39,7 @@ const NO_CODE: [u8; 32] = {
     ones
 };
 
-/// Why a file cannot be a whole picture.
+/// Why a file cannot be a complete picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub(super) enum Fault {
     #[error("there is no start marker")]
@@ -54,17 +54,17 @@ pub(super) enum Fault {
     Restart,
 }
 
-/// Writes the JPEG in `bytes` to `file`, repaired as above; returns its columns and rows.
+/// Writes the JPEG in `bytes` to `file`, repaired as above; returns its width and height.
 pub(super) fn repair(bytes: &[u8], file: &mut Vec<u8>) -> Result<(usize, usize), Fault> {
     let start = bytes.windows(3).position(|three| three == [0xFF, marker::SOI, 0xFF]).ok_or(Fault::NoStart)?;
-    let mut rest = without_padding(&bytes[start + 2..]);
+    let mut rest = strip_padding(&bytes[start + 2..]);
     file.clear();
     file.extend([0xFF, marker::SOI]);
-    let (mut frame, mut has_tables, mut has_scan, mut interval) = (None::<Frame>, false, false, 0);
+    let (mut frame, mut has_huffman_tables, mut has_scan, mut interval) = (None::<Frame>, false, false, 0);
     while let Some((code, segment, after)) = next_segment(rest) {
         match code {
             marker::EOI | marker::SOI => break,
-            marker::DHT => has_tables = true,
+            marker::DHT => has_huffman_tables = true,
             marker::BASELINE | marker::EXTENDED | marker::PROGRESSIVE => {
                 frame = Some(Frame::parse(segment).ok_or(Fault::Header)?);
             }
@@ -78,15 +78,15 @@ pub(super) fn repair(bytes: &[u8], file: &mut Vec<u8>) -> Result<(usize, usize),
         }
         if code == marker::SOS {
             let frame = frame.as_ref().ok_or(Fault::NoSize)?;
-            if !has_tables {
+            if !has_huffman_tables {
                 tables::append(file);
-                has_tables = true;
+                has_huffman_tables = true;
             }
             has_scan = true;
             file.extend(segment);
             let restarts;
             (rest, restarts) = copy_scan(after, !frame.progressive, file)?;
-            // One scan for all components: others have units of their own, and no camera sends them.
+            // Only a scan of all components: others have units of their own, and no camera sends them.
             if !frame.progressive && segment.get(4) == Some(&frame.components) {
                 let expected = if interval == 0 { 0 } else { frame.units.div_ceil(interval) - 1 };
                 // Some cameras end the last interval with a restart, too.
@@ -108,34 +108,34 @@ pub(super) fn repair(bytes: &[u8], file: &mut Vec<u8>) -> Result<(usize, usize),
     frame.map(|frame| frame.size).ok_or(Fault::NoSize)
 }
 
-/// Without the zeros that a driver puts after a picture, which would count as code where its end is lost.
-fn without_padding(bytes: &[u8]) -> &[u8] {
-    /// Coded bits end with fewer.
+/// Strips the zeros that a driver appends to a picture, which would count as coded data if its end is missing.
+fn strip_padding(bytes: &[u8]) -> &[u8] {
+    /// Coded data end with fewer zeros.
     const PADDING_BYTES: usize = 8;
     let used = bytes.iter().rposition(|&byte| byte != 0).map_or(0, |last| last + 1);
     if bytes.len() - used < PADDING_BYTES { bytes } else { &bytes[..used] }
 }
 
-/// What the frame's header says.
+/// Contents of the frame header.
 struct Frame {
     size: (usize, usize),
     components: u8,
-    /// Coded units in a scan of all components.
+    /// Minimum coded units (MCUs) in a scan of all components.
     units: usize,
     progressive: bool,
 }
 
 impl Frame {
-    /// Parses a frame header segment with its marker; `None` where it is too short, or a size or sampling is 0.
+    /// Parses a frame header segment with its marker; `None` if it is too short, or a size or sampling factor is 0.
     fn parse(segment: &[u8]) -> Option<Self> {
         let (&[_, code, _, _, _, height_high, height_low, width_high, width_low, components], sampling) =
             segment.split_first_chunk()?;
         let number = |high, low| usize::from(u16::from_be_bytes([high, low]));
         let (width, height) = (number(width_high, width_low), number(height_high, height_low));
         let sampling = sampling.as_chunks::<3>().0.get(..usize::from(components))?;
-        // Sampling factors are two numbers of 4 bits, across and down; the largest ones make a coded unit.
+        // Sampling factors are two 4-bit numbers, horizontal and vertical; the largest ones define the coded unit.
         let largest = |shift: u8| sampling.iter().map(|&[_, factors, _]| usize::from(factors >> shift & 15)).max();
-        // The only component has units of one block.
+        // A single component has units of one block.
         let (across, down) = if components == 1 { (1, 1) } else { (largest(4)?, largest(0)?) };
         if width == 0 || height == 0 || across == 0 || down == 0 {
             return None;
@@ -145,8 +145,8 @@ impl Frame {
     }
 }
 
-/// The next marker in `rest`, whatever comes before it: its code, the segment with the marker, and what follows. `None`
-/// if there is none or it is cut short.
+/// Finds the next marker in `rest`, skipping other data; returns its code, the segment with the marker, and the
+/// remaining data. `None` if there is no marker or its segment is truncated.
 fn next_segment(rest: &[u8]) -> Option<(u8, &[u8], &[u8])> {
     let at = rest.windows(2).position(|pair| pair[0] == 0xFF && !matches!(pair[1], 0 | 0xFF))?;
     let (code, after) = (rest[at + 1], &rest[at + 2..]);
@@ -160,8 +160,8 @@ fn next_segment(rest: &[u8]) -> Option<(u8, &[u8], &[u8])> {
     Some((code, &rest[at..at + 2 + length], following))
 }
 
-/// Copies coded bits up to the next marker that ends them, with [`NO_CODE`] after each stretch if `sequential`; returns
-/// what follows, from that marker on, and the number of restarts.
+/// Copies coded data up to the next marker that ends them, with [`INVALID_CODE`] after each run if `sequential`.
+/// Returns the remaining data, from that marker on, and the number of restarts.
 fn copy_scan<'a>(bytes: &'a [u8], sequential: bool, file: &mut Vec<u8>) -> Result<(&'a [u8], usize), Fault> {
     let (mut from, mut at, mut restarts) = (0, 0, 0);
     loop {
@@ -183,7 +183,7 @@ fn copy_scan<'a>(bytes: &'a [u8], sequential: bool, file: &mut Vec<u8>) -> Resul
             _ => file.extend(&bytes[from..end]),
         }
         if sequential {
-            file.extend(NO_CODE);
+            file.extend(INVALID_CODE);
         }
         match code {
             Some(code) if marker::RST.contains(&code) => {
@@ -194,7 +194,7 @@ fn copy_scan<'a>(bytes: &'a [u8], sequential: bool, file: &mut Vec<u8>) -> Resul
                 file.extend([0xFF, code]);
                 (from, at) = (end + 2, end + 2);
             }
-            // The end of the file, perhaps in the middle of a marker.
+            // The end of the file, possibly in the middle of a marker.
             _ => return Ok((&bytes[end..], restarts)),
         }
     }

@@ -1,6 +1,6 @@
-//! The Huffman tables that Motion JPEG leaves out: those of the JPEG standard, annex K.3.
+//! The Huffman tables that Motion JPEG omits: those of the JPEG standard (ITU-T T.81), annex K.3.
 
-/// For DC and AC of luma, then of chroma: class and number, codes of each length from 1 to 16 bits, values.
+/// DC and AC of luma, then of chroma: class and number, code counts for each length from 1 to 16 bits, values.
 const TABLES: [(u8, [u8; 16], &[u8]); 4] = [
     (0x00, [0, 1, 5, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0], &[0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11]),
     (0x10, [0, 2, 1, 3, 3, 2, 4, 3, 5, 5, 4, 4, 0, 0, 1, 0x7D], &AC_LUMA),
@@ -22,7 +22,7 @@ const AC_LUMA: [u8; 162] = [
     0xF1, 0xF2, 0xF3, 0xF4, 0xF5, 0xF6, 0xF7, 0xF8, 0xF9, 0xFA,
 ];
 
-/// As [`AC_LUMA`].
+/// Runs of zeros (upper half) and sizes (lower half).
 #[rustfmt::skip]
 const AC_CHROMA: [u8; 162] = [
     0x00, 0x01, 0x02, 0x03, 0x11, 0x04, 0x05, 0x21, 0x31, 0x06, 0x12, 0x41, 0x51, 0x07, 0x61, 0x71, 0x13, 0x22, 0x32,

@@ -1,5 +1,5 @@
 //! JPEGs of one picture by another encoder (ffmpeg 5.1, `-c:v mjpeg -huffman default -q:v 4`; with restarts by
-//! `-thread_type slice -slices 4`), as they are and as cameras spoil them.
+//! `-thread_type slice -slices 4`), unchanged and with the defects that cameras cause.
 
 use super::super::tests::Random;
 use super::super::{Decoder, PixelError};
@@ -26,7 +26,7 @@ fn decode(bytes: &[u8]) -> Result<Vec<u8>, PixelError> {
     Ok(out.rgb)
 }
 
-/// Where the segment with this marker starts, and where it ends.
+/// Range of the segment with this marker.
 fn segment(bytes: &[u8], marker: u8) -> std::ops::Range<usize> {
     let at = bytes.windows(2).position(|pair| pair == [0xFF, marker]).unwrap();
     at..at + 2 + usize::from(u16::from_be_bytes([bytes[at + 2], bytes[at + 3]]))
@@ -36,7 +36,7 @@ fn without(bytes: &[u8], range: std::ops::Range<usize>) -> Vec<u8> {
     [&bytes[..range.start], &bytes[range.end..]].concat()
 }
 
-/// Where coded bits start.
+/// Start of the coded data.
 fn coded(bytes: &[u8]) -> usize {
     segment(bytes, 0xDA).end
 }
@@ -47,7 +47,7 @@ fn the_picture_comes_back_whatever_the_sampling() {
     let (width, height) = (SIZE.0 as usize, SIZE.1 as usize);
     for (name, bytes) in FILES {
         let rgb = decode(bytes).unwrap();
-        // The picture is noisy, and its chroma is coded coarsely: patches of 10 x 10 pixels keep their colour.
+        // The picture is noisy, and its chroma is coded coarsely: the mean colours of 10 x 10 patches are compared.
         for (top, left) in (0..height).step_by(10).flat_map(|top| (0..width).step_by(10).map(move |left| (top, left))) {
             let mean = |rgb: &[u8]| {
                 let mut sum = [0.0; 3];
@@ -101,7 +101,7 @@ fn a_picture_that_ends_too_early_is_refused_wherever_it_ends() {
                 }
             }
         }
-        // No more than the last symbol may lack.
+        // At most the last symbol may be missing.
         assert!(passed.iter().all(|&lacking| lacking <= 3), "{name}: {passed:?}");
     }
 }
@@ -118,7 +118,7 @@ fn most_pictures_that_lost_a_piece_are_refused() {
             tried += 1;
             found += usize::from(decode(&without(bytes, from..from + length)).is_err());
         }
-        // What is left may by chance code as many units, or more: often so in a picture as small as this.
+        // The remaining data may by chance code the same number of units, or more: often so in a picture this small.
         assert!(found * 100 >= tried * 60, "{name}: {found} of {tried}");
     }
 }
@@ -146,7 +146,7 @@ fn what_is_no_such_picture_is_refused_in_one_line() {
         let text = decode(file).unwrap_err().to_string();
         assert!(!text.contains('\n') && text.len() < 160, "{text}");
     }
-    // A lost stretch with its restart marker, and one marker of all.
+    // A lost run with its restart marker, and one of the markers.
     let restarts = FILES[4].1;
     let markers: Vec<usize> = (coded(restarts)..restarts.len() - 2)
         .filter(|&k| restarts[k] == 0xFF && restarts[k + 1] & 0xF8 == 0xD0)
@@ -169,22 +169,22 @@ fn no_bytes_make_it_panic() {
         let (_, bytes) = FILES[round % FILES.len()];
         let mut file = bytes.to_vec();
         match round % 4 {
-            // All from a generator, behind a start.
+            // Pseudo-random bytes behind a start marker.
             0 => {
                 let length = random.next() as usize % 600;
                 file = [&[0xFF, 0xD8, 0xFF][..], &random.bytes(length)].concat();
             }
-            // Bytes of the header changed.
+            // Changed header bytes.
             1 => (0..1 + random.next() % 4).for_each(|_| {
                 let at = random.next() as usize % coded(bytes);
                 file[at] = random.next() as u8;
             }),
-            // Bytes anywhere changed.
+            // Changed bytes anywhere.
             2 => (0..1 + random.next() % 16).for_each(|_| {
                 let at = random.next() as usize % file.len();
                 file[at] = random.next() as u8;
             }),
-            // Pieces exchanged, and cut.
+            // Exchanged and truncated pieces.
             _ => {
                 let at = random.next() as usize % file.len();
                 file.rotate_left(at);

@@ -1,4 +1,5 @@
-//! What is around the edge pixels of a cell: the same for all of them that lie between the same surfaces.
+//! Colour models around edge pixels: pixels of one cell between the same surfaces share one model.
+//! twin: shaders/matte_surfaces.wgsl, matte_enter.wgsl
 
 use std::ops::Range;
 
@@ -11,84 +12,86 @@ use super::{CELL_PX, Cluster, FRINGE, Sums, Surfaces, View, contrast};
 use crate::compute::bands;
 use crate::compute::thread_pool::ThreadPool;
 
-/// So many cells in every direction are looked at; more where they have nothing of a surface, as at the tips of hair.
-pub(in super::super) const REACHES_CELLS: [usize; 3] = [1, 2, 5];
-/// A cluster's weight falls to an eighth at this distance, in pixels; its long tail reaches hair.
+/// Search radii in cells: the next one is used if a surface has no pixels, as at the tips of hair.
+pub(in super::super) const RADII_CELLS: [usize; 3] = [1, 2, 5];
+/// Distance, in pixels, at which a cluster's weight falls to an eighth; its long tail covers hair.
 pub(in super::super) const HALF_PX: f32 = 6.0;
-/// So many pixels of the fringe, near ones above all, tell nothing, as a lone hair is mostly what is behind it; so many are enough.
+/// Weights of the fringe from which it starts to count, and from which it counts fully: a lone hair is mostly
+/// background.
 pub(in super::super) const FRINGE_PIXELS: [f32; 2] = [6.0, 14.0];
-/// Fewer cells, and answers, are not worth another thread.
-const LEAST_CELLS: usize = 16;
-const LEAST_ANSWERS: usize = 32;
+/// Minimum number of cells, and of models, per thread.
+const MIN_CELLS: usize = 16;
+const MIN_MODELS: usize = 32;
 
-/// The clusters near edges, made once an answer needs them.
+/// The clusters near edges, created on demand, and the colour models.
 #[derive(Debug, Default)]
 pub struct Clusters {
     across: usize,
     down: usize,
-    /// Per cell, the place of its clusters plus one; 0 where none were made yet.
+    /// Per cell, the index of its clusters plus one; 0 if not created.
     place: Vec<u32>,
-    /// Near, far, and what of the near surface is at edges.
+    /// Clusters of the near surface, of the far one, and of the near one's edge pixels.
     clusters: Vec<[Cluster; 3]>,
-    /// The cells of the clusters.
+    /// The cell of each entry of `clusters`.
     cells: Vec<u32>,
-    /// Per cell, the place of its last answer plus one: pixels side by side ask for the same.
-    answered: Vec<u32>,
-    answers: Vec<Answer>,
+    /// Per cell, the index of its latest model plus one; neighbouring pixels mostly share it.
+    latest_model: Vec<u32>,
+    models: Vec<ColorModel>,
 }
 
-/// What is around the cell of an edge pixel, between its near and its far surface; none where one of these has no pixels, not
-/// even further away.
+/// The colour model around the cell of an edge pixel; `contrast` is `None` if one of the surfaces has no pixels in any
+/// radius.
 #[derive(Clone, Copy, Debug)]
-struct Answer {
+struct ColorModel {
     edge: EdgePixel,
     contrast: Option<Contrast>,
 }
 
 impl Clusters {
-    /// Forgets the frame before.
+    /// Removes the models of the previous frame.
     pub(in super::super) fn clear(&mut self, (width, height): (usize, usize)) {
         (self.across, self.down) = (width.div_ceil(CELL_PX), height.div_ceil(CELL_PX));
-        for places in [&mut self.place, &mut self.answered] {
+        for places in [&mut self.place, &mut self.latest_model] {
             places.clear();
             places.resize(self.across * self.down, 0);
         }
         self.clusters.clear();
         self.cells.clear();
-        self.answers.clear();
+        self.models.clear();
     }
 
-    /// The place of the answer for an edge pixel: that of the pixels before it in its cell, where its surfaces are as far, or a
-    /// new one, for [`Self::find`].
+    /// Returns the index of the model for an edge pixel: the latest one of its cell if the surfaces are as far, or a
+    /// new one, to be fitted by [`Self::find`].
     #[inline(always)]
-    pub(in super::super) fn ask(&mut self, jump: f32, edge: &EdgePixel) -> u32 {
-        let answered = &mut self.answered[edge.y as usize / CELL_PX * self.across + edge.x as usize / CELL_PX];
-        let same =
-            |Answer { edge: e, .. }: &Answer| (e.near - edge.near).abs() <= jump && (e.far - edge.far).abs() <= jump;
-        if let Some(last) = answered.checked_sub(1).filter(|&last| same(&self.answers[last as usize])) {
+    pub(in super::super) fn request_model(&mut self, depth_step: f32, edge: &EdgePixel) -> u32 {
+        let latest_model = &mut self.latest_model[edge.y as usize / CELL_PX * self.across + edge.x as usize / CELL_PX];
+        let same = |ColorModel { edge: e, .. }: &ColorModel| {
+            (e.near - edge.near).abs() <= depth_step && (e.far - edge.far).abs() <= depth_step
+        };
+        if let Some(last) = latest_model.checked_sub(1).filter(|&last| same(&self.models[last as usize])) {
             return last;
         }
-        self.answers.push(Answer { edge: *edge, contrast: None });
-        *answered = self.answers.len() as u32;
-        *answered - 1
+        self.models.push(ColorModel { edge: *edge, contrast: None });
+        *latest_model = self.models.len() as u32;
+        *latest_model - 1
     }
 
-    /// How many answers there are.
-    pub(in super::super) fn asked(&self) -> usize {
-        self.answers.len()
+    /// Returns the number of models.
+    pub(in super::super) fn model_count(&self) -> usize {
+        self.models.len()
     }
 
-    /// Finds the contrasts of all answers from a place on.
+    /// Fits all models from index `from` on.
     pub(in super::super) fn find(&mut self, (arch, workers): (Arch, &mut ThreadPool), view: &View, from: usize) {
-        let Self { across, down, place, clusters, cells, answers, .. } = self;
-        let (across, down, answers) = (*across, *down, &mut answers[from..]);
-        for reach in REACHES_CELLS {
-            if answers.iter().all(|answer| answer.contrast.is_some()) {
+        let Self { across, down, place, clusters, cells, models, .. } = self;
+        let (across, down, models) = (*across, *down, &mut models[from..]);
+        for radius in RADII_CELLS {
+            if models.iter().all(|model| model.contrast.is_some()) {
                 break;
             }
             let made = clusters.len();
-            for Answer { edge, .. } in answers.iter().filter(|answer| answer.contrast.is_none()) {
-                let (columns, rows) = cells_around(edge, reach, (across, down));
+            for ColorModel { edge, .. } in models.iter().filter(|model| model.contrast.is_none()) {
+                let (columns, rows) = cells_around(edge, radius, (across, down));
                 for cell in rows.flat_map(|row| columns.clone().map(move |column| row * across + column)) {
                     if place[cell] == 0 {
                         cells.push(cell as u32);
@@ -98,36 +101,36 @@ impl Clusters {
             }
             clusters.resize(cells.len(), Default::default());
             let new = &cells[made..];
-            let each = bands::share(new.len(), LEAST_CELLS);
+            let each = bands::share(new.len(), MIN_CELLS);
             workers.run_each(new.chunks(each).zip(clusters[made..].chunks_mut(each)), &|(cells, clusters)| {
                 arch.dispatch(SplitCells { view, across, cells, clusters });
             });
             let surroundings = Surroundings { across, down, place, clusters };
-            let each = bands::share(answers.len(), LEAST_ANSWERS);
-            workers.run_each(answers.chunks_mut(each), &|answers| {
-                arch.dispatch(FindContrasts { surroundings, view, reach, answers });
+            let each = bands::share(models.len(), MIN_MODELS);
+            workers.run_each(models.chunks_mut(each), &|models| {
+                arch.dispatch(FindContrasts { surroundings, view, radius, models });
             });
         }
     }
 
-    /// The contrast of an answer, if one was found.
+    /// Returns the contrast of a model, if it has one.
     #[inline(always)]
-    pub(in super::super) fn at(&self, answer: u32) -> Option<&Contrast> {
-        self.answers[answer as usize].contrast.as_ref()
+    pub(in super::super) fn at(&self, model: u32) -> Option<&Contrast> {
+        self.models[model as usize].contrast.as_ref()
     }
 }
 
-/// The columns and rows of the cells around that of an edge pixel, so many in every direction.
+/// Returns the columns and rows of the cells within `radius` cells of an edge pixel's cell.
 #[inline(always)]
-fn cells_around(edge: &EdgePixel, reach: usize, (across, down): (usize, usize)) -> (Range<usize>, Range<usize>) {
+fn cells_around(edge: &EdgePixel, radius: usize, (across, down): (usize, usize)) -> (Range<usize>, Range<usize>) {
     let (column, row) = (edge.x as usize / CELL_PX, edge.y as usize / CELL_PX);
     (
-        column.saturating_sub(reach)..(column + reach + 1).min(across),
-        row.saturating_sub(reach)..(row + reach + 1).min(down),
+        column.saturating_sub(radius)..(column + radius + 1).min(across),
+        row.saturating_sub(radius)..(row + radius + 1).min(down),
     )
 }
 
-/// Makes the clusters of cells.
+/// Creates the clusters of cells.
 struct SplitCells<'a> {
     view: &'a View<'a>,
     across: usize,
@@ -146,31 +149,31 @@ impl WithSimd for SplitCells<'_> {
     }
 }
 
-/// Finds the contrasts that answers lack, in cells that were made.
+/// Fits the models without a contrast, from clusters that exist.
 struct FindContrasts<'a> {
     surroundings: Surroundings<'a>,
     view: &'a View<'a>,
-    reach: usize,
-    answers: &'a mut [Answer],
+    radius: usize,
+    models: &'a mut [ColorModel],
 }
 
 impl WithSimd for FindContrasts<'_> {
     type Output = ();
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, _: S) {
-        let Self { surroundings, view, reach, answers } = self;
-        for answer in answers {
-            if answer.contrast.is_none() {
-                // A closure would not have the vectors of what calls it.
-                if let Some(surfaces) = surroundings.within(view, reach, &answer.edge) {
-                    answer.contrast = Some(contrast(surfaces));
+        let Self { surroundings, view, radius, models } = self;
+        for model in models {
+            if model.contrast.is_none() {
+                // No closure: it would not be compiled for the caller's instruction set.
+                if let Some(surfaces) = surroundings.within(view, radius, &model.edge) {
+                    model.contrast = Some(contrast(surfaces));
                 }
             }
         }
     }
 }
 
-/// Clusters that were made.
+/// Existing clusters around a cell.
 #[derive(Clone, Copy)]
 struct Surroundings<'a> {
     across: usize,
@@ -180,15 +183,15 @@ struct Surroundings<'a> {
 }
 
 impl Surroundings<'_> {
-    /// The surfaces around an edge pixel in so many cells in every direction.
+    /// Returns the surfaces around an edge pixel, within `radius` cells.
     #[inline(always)]
-    fn within(&self, view: &View, reach: usize, edge: &EdgePixel) -> Option<Surfaces> {
-        // A surface's inverse depth may change on the way, but by less than would make it the other one.
-        let tolerance = (2.0 * view.jump).max(0.25 * (edge.near - edge.far));
+    fn within(&self, view: &View, radius: usize, edge: &EdgePixel) -> Option<Surfaces> {
+        // A surface's inverse depth may vary around, but not as far as to the other surface.
+        let tolerance = (2.0 * view.depth_step).max(0.25 * (edge.near - edge.far));
         let (column, row) = (edge.x as usize / CELL_PX, edge.y as usize / CELL_PX);
         let [x, y] = [column, row].map(|cell| (cell * CELL_PX) as f32 + 0.5 * (CELL_PX - 1) as f32);
         let mut sums = [Sums::default(); 3];
-        let (columns, rows) = cells_around(edge, reach, (self.across, self.down));
+        let (columns, rows) = cells_around(edge, radius, (self.across, self.down));
         for row in rows {
             for column in columns.clone() {
                 let place = self.place[row * self.across + column] as usize - 1;

@@ -1,4 +1,5 @@
-//! The clusters of one cell.
+//! Clusters of one cell: weighted sums over its near and its far surface.
+//! twin: shaders/matte_clusters.wgsl
 
 #![allow(clippy::needless_range_loop)] // Pixels and planes index several arrays at once.
 
@@ -6,23 +7,23 @@ use pulp::Simd;
 
 use super::{CELL_PX, Cluster, FRINGE, Sums, View};
 use crate::compute::simd::load;
-use crate::depth::bits::places;
+use crate::depth::bits::set_bits;
 use crate::depth::matting::symmetric::outer;
 use crate::frame::DepthMap;
 
-/// Pixels at an edge may be mixed themselves. They count so little that they matter only where nothing is pure.
+/// Weight of edge pixels, which may be mixed themselves: so small that they only matter without pure pixels.
 pub(in super::super) const AT_EDGE_WEIGHT: f32 = 4e-4;
-/// So many pixels beside an edge, too, the map may be wrong: they count less than those further away.
+/// Distance from an edge within which the map may be wrong, in pixels, and the weight of pixels there.
 pub(in super::super) const CLOSE_PX: usize = 3;
 pub(in super::super) const CLOSE_WEIGHT: f32 = 0.02;
 
-/// Pixels of a cell, and every other of them, as on a chessboard, which tells enough.
+/// Pixels of a cell. Every other one is sampled, as on a chessboard, which suffices.
 const PIXELS: usize = CELL_PX * CELL_PX;
 const SAMPLES: usize = PIXELS / 2;
-/// Numbers of the samples.
+/// One number per sample.
 type Lanes = [f32; SAMPLES];
 
-/// The places of the samples in their cell, in its order, and their columns and rows.
+/// Indices of the samples in their cell, and their columns and rows.
 const PLACES: [usize; SAMPLES] = {
     let (mut places, mut k) = ([0; SAMPLES], 0);
     while k < SAMPLES {
@@ -44,14 +45,14 @@ const fn along(step: usize) -> Lanes {
     along
 }
 
-/// Samples of a cell: inverse depth and light.
+/// Samples of a cell: inverse depth in 1/m, and linear light.
 struct Samples {
     inverse: Lanes,
     light: [Lanes; 3],
 }
 
 impl Samples {
-    /// The cluster of those that are chosen, with these weights, in a cell that begins there.
+    /// Computes the cluster of the samples with these weights, in a cell whose top left pixel is `corner`.
     #[inline(always)]
     fn cluster(&self, weight: &Lanes, corner: (usize, usize)) -> Cluster {
         let Self { inverse, light: [r, g, b] } = self;
@@ -74,7 +75,7 @@ fn product(a: &Lanes, b: &Lanes) -> Lanes {
     products
 }
 
-/// The sum of all, in the same order on every processor.
+/// Sums all values, in the same order on every processor.
 #[inline(always)]
 fn total(values: &Lanes) -> f32 {
     let mut quarters = [0.0; SAMPLES / 4];
@@ -87,14 +88,14 @@ fn total(values: &Lanes) -> f32 {
     ((a + e) + (c + g)) + ((b + f) + (d + h))
 }
 
-/// The clusters of a cell: one where inverse depths differ by no more than `jump`, or else those of its nearest and of its
-/// farthest surface.
+/// Computes the clusters of a cell: one if its inverse depths differ by at most `depth_step`, or else those of the
+/// nearest and the farthest surface; and that of the near surface's edge pixels.
 #[inline(always)]
 pub fn split<S: Simd>(simd: S, view: &View, column: usize, row: usize) -> [Cluster; 3] {
-    let View { size: (width, height), jump, at_edge, .. } = *view;
+    let View { size: (width, height), depth_step, at_edge, .. } = *view;
     let corner @ (left, top) = (column * CELL_PX, row * CELL_PX);
     let (across, down) = ((width - left).min(CELL_PX), (height - top).min(CELL_PX));
-    // What is beyond the picture is as its last column and row.
+    // Beyond the picture, the last column and row are replicated.
     let mut values = [0.0; PIXELS];
     let mut codes = [[0; 3]; PIXELS];
     let (mut edges, mut beyond) = (0, 0);
@@ -106,12 +107,13 @@ pub fn split<S: Simd>(simd: S, view: &View, column: usize, row: usize) -> [Clust
         values[..across].copy_from_slice(metres);
         values[across..].fill(metres[across - 1]);
         let missing = if k < down { ROW & !0 << across } else { ROW };
-        edges |= (at_edge.from(left, y) & ROW & !missing) << (k * CELL_PX);
+        edges |= (at_edge.word_from(left, y) & ROW & !missing) << (k * CELL_PX);
         beyond |= missing << (k * CELL_PX);
     }
     for value in &mut values {
         *value = DepthMap::inverse_of(*value);
     }
+    // Weights: pixels at or near edges count little, replicated ones nothing.
     let close = close_to_edge(view, left, top);
     let (mut weights, mut is_edge) = ([0.0; PIXELS], [0.0; PIXELS]);
     for k in 0..PIXELS {
@@ -121,10 +123,11 @@ pub fn split<S: Simd>(simd: S, view: &View, column: usize, row: usize) -> [Clust
         weights[k] = if is(edges) { AT_EDGE_WEIGHT } else { weight };
         weights[k] = if is(beyond) { 0.0 } else { weights[k] };
     }
+    // One surface or two, by the pure pixels if there are any.
     let (pure, all) = ends(simd, &values, &is_edge);
     let (high, low) = if pure.0 >= pure.1 { pure } else { all };
-    let is_one = high - low <= jump;
-    let tolerance = if is_one { 2.0 * jump } else { jump };
+    let is_one = high - low <= depth_step;
+    let tolerance = if is_one { 2.0 * depth_step } else { depth_step };
     let zeros = [0.0; SAMPLES];
     let mut samples = Samples { inverse: zeros, light: [zeros; 3] };
     let [mut near, mut far] = [zeros; 2];
@@ -144,9 +147,9 @@ pub fn split<S: Simd>(simd: S, view: &View, column: usize, row: usize) -> [Clust
     }
     let far = if is_one { Cluster::default() } else { samples.cluster(&far, corner) };
     let mut clusters = [samples.cluster(&near, corner), far, Cluster::default()];
-    if all.0 - all.1 > jump {
+    if all.0 - all.1 > depth_step {
         let (mut sums, mut of_place) = (Sums::default(), [0.0; 3]);
-        for place in places(edges) {
+        for place in set_bits(edges) {
             let value = values[place];
             if value > 0.5 * (all.0 + all.1) {
                 let (x, y) = (place % CELL_PX, place / CELL_PX);
@@ -161,10 +164,10 @@ pub fn split<S: Simd>(simd: S, view: &View, column: usize, row: usize) -> [Clust
     clusters
 }
 
-/// The bits of a row of a cell.
+/// Bits of one row of a cell.
 const ROW: u64 = (1 << CELL_PX) - 1;
 
-/// The largest and the smallest of those values that are not at an edge, and of all.
+/// Returns the largest and the smallest value of those not at an edge, and of all.
 #[inline(always)]
 fn ends<S: Simd>(simd: S, values: &[f32; PIXELS], is_edge: &[f32; PIXELS]) -> ((f32, f32), (f32, f32)) {
     let (zero, beyond) = (simd.splat_f32s(0.0), simd.splat_f32s(f32::INFINITY));
@@ -181,7 +184,7 @@ fn ends<S: Simd>(simd: S, values: &[f32; PIXELS], is_edge: &[f32; PIXELS]) -> ((
     (pure, all)
 }
 
-/// Which pixels of a cell are at an edge or close to one, a bit for each.
+/// Returns a bit for each pixel of a cell that is at an edge or within [`CLOSE_PX`] of one.
 #[inline(always)]
 fn close_to_edge(view: &View, left: usize, top: usize) -> u64 {
     let first = left.saturating_sub(CLOSE_PX);
@@ -189,8 +192,8 @@ fn close_to_edge(view: &View, left: usize, top: usize) -> u64 {
     for (k, row) in rows.iter_mut().enumerate() {
         let y = top + k;
         if (CLOSE_PX..view.size.1 + CLOSE_PX).contains(&y) {
-            let edges = view.at_edge.from(first, y - CLOSE_PX) << (first + CLOSE_PX - left);
-            // The bit of column `left` of the cell is that of its first `2 CLOSE_PX + 1` columns.
+            let edges = view.at_edge.word_from(first, y - CLOSE_PX) << (first + CLOSE_PX - left);
+            // Bit 0, column `left` of the cell, covers the first `2 CLOSE_PX + 1` columns.
             for by in 0..=2 * CLOSE_PX {
                 *row |= edges >> by;
             }

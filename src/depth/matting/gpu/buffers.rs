@@ -1,4 +1,4 @@
-//! The memory for pictures of one size.
+//! GPU buffers for one picture size.
 
 use super::shaders::{BLOCK, CELL, COLORS, COUNTS, ENTRY, Frame, LANES, MOST_BUFFERS, TURNS, Turn, WORD};
 use crate::compute::GpuError;
@@ -7,66 +7,66 @@ use crate::depth::matting::clusters::CELL_PX;
 use crate::depth::matting::share::PRIOR_ROUNDS;
 use crate::frame::{Matte, MixedPixel};
 
-/// Buffers for a picture.
+/// All buffers of a picture.
 pub struct Buffers {
     pub frame: wgpu::Buffer,
     turns: wgpu::Buffer,
-    /// For each code its linear light, and that of what is remembered in each channel.
+    /// Per code, its linear light, and that of a remembered code in each channel.
     pub lights: wgpu::Buffer,
     pub metres: wgpu::Buffer,
     pub rgb: wgpu::Buffer,
-    /// What is remembered: sRGB, rounds, and inverse depth.
+    /// The remembered background: sRGB, rounds, and inverse depth.
     pub known: wgpu::Buffer,
-    /// Bits of pixels, and how many are set before each word: of edges, and of what is mixed.
+    /// Bitmaps with the number of set bits before each word: of edges, and of mixed pixels.
     pub edges: wgpu::Buffer,
     pub marks: wgpu::Buffer,
     pub counts: wgpu::Buffer,
     pub clusters: wgpu::Buffer,
     pub cells: wgpu::Buffer,
-    /// Per pixel, its entry, or what claims it.
+    /// Per pixel, its entry, or the directions it was claimed from.
     pub places: wgpu::Buffer,
     pub entries: wgpu::Buffer,
-    /// The colours of both surfaces of answers.
+    /// Both colours of each model.
     pub colors: wgpu::Buffer,
-    /// Of each round of expectation maximisation, what each workgroup has found.
+    /// Per round of expectation maximisation, the partial sums of each workgroup.
     pub partials: wgpu::Buffer,
-    /// How many pixels are mixed, and these.
+    /// The number of mixed pixels, and the pixels.
     pub mixed: wgpu::Buffer,
     pub readback: Readback,
 }
 
-/// What a picture of one size has.
+/// Dimensions that follow from the picture size.
 #[derive(Clone, Copy)]
 pub struct Extent {
     pub pixels: usize,
-    /// Entries, and mixed pixels, at most.
-    pub most: usize,
-    /// Words of bits, of 32 pixels of a row, and cells of clusters, each way.
+    /// Maximum number of entries, and of mixed pixels.
+    pub max_entries: usize,
+    /// Words of the bitmap, each of 32 pixels of a row; cells in each direction.
     pub words: usize,
     pub cells: [u32; 2],
 }
 
 impl Extent {
     pub fn new((width, height): (u32, u32)) -> Self {
-        let (pixels, most) = (width as usize * height as usize, Matte::most(width as usize, height as usize));
+        let (pixels, max_entries) = (width as usize * height as usize, Matte::most(width as usize, height as usize));
         let words = width.div_ceil(WORD) as usize * height as usize;
-        Self { pixels, most, words, cells: [width, height].map(|side| side.div_ceil(CELL_PX as u32)) }
+        Self { pixels, max_entries, words, cells: [width, height].map(|side| side.div_ceil(CELL_PX as u32)) }
     }
 }
 
 impl Buffers {
-    /// For pictures of `size` pixels.
+    /// Allocates the buffers for pictures of `size` pixels.
     ///
     /// # Errors
-    /// The device has no room for that.
+    /// The device has too little memory, or allows too few buffers per shader.
     pub fn new(device: &Device, size: (u32, u32)) -> Result<Self, GpuError> {
         use wgpu::BufferUsages as Usage;
-        let Extent { pixels, most, words, cells } = Extent::new(size);
-        // No buffer is empty.
-        let most = most.max(1);
+        let Extent { pixels, max_entries, words, cells } = Extent::new(size);
+        // Buffers must not be empty.
+        let max_entries = max_entries.max(1);
         let cells: usize = cells.iter().map(|&side| side as usize).product();
-        // Colours of surfaces are the largest.
-        device.has_room(size, (COLORS * most) as u64, "matted")?;
+        // The colours of surfaces are the largest buffer.
+        device.has_room(size, (COLORS * max_entries) as u64, "matted")?;
         if device.device.limits().max_storage_buffers_per_shader_stage < MOST_BUFFERS {
             return Err(GpuError::Failed(format!("{}: a shader may have too few buffers to find mattes", device.name)));
         }
@@ -87,11 +87,11 @@ impl Buffers {
             clusters: storage("clusters", 12 * 16 * cells),
             cells: storage("cells", CELL * cells),
             places: storage("places", 4 * pixels),
-            entries: storage("entries", ENTRY * most),
-            colors: storage("colors of surfaces", COLORS * most),
+            entries: storage("entries", ENTRY * max_entries),
+            colors: storage("colors of surfaces", COLORS * max_entries),
             partials: storage("partials", 16 * LANES as usize * PRIOR_ROUNDS),
-            mixed: buffer("mixed", record * (1 + most), Usage::STORAGE | Usage::COPY_SRC),
-            readback: Readback::new(device, "mixed back", record * (1 + most)),
+            mixed: buffer("mixed", record * (1 + max_entries), Usage::STORAGE | Usage::COPY_SRC),
+            readback: Readback::new(device, "mixed back", record * (1 + max_entries)),
         })?;
         for turn in 0..TURNS {
             device.upload(&buffers.turns, turn as u64 * UNIFORM_STRIDE, bytemuck::bytes_of(&Turn { at: turn as u32 }));
@@ -99,13 +99,13 @@ impl Buffers {
         Ok(buffers)
     }
 
-    /// The uniform of a turn.
+    /// Returns the uniform of the given run of a pass.
     pub fn turn(&self, turn: usize) -> wgpu::BufferBinding<'_> {
         uniform_at::<Turn>(&self.turns, turn)
     }
 }
 
-/// Where in `known` the sRGB, the rounds, and the inverse depth of so many pixels are, in bytes.
+/// Returns the byte offsets of the sRGB, the rounds, and the inverse depth in `known`.
 pub fn known_at(pixels: usize) -> [u64; 3] {
     let rounds = (3 * pixels).next_multiple_of(4);
     [0, rounds as u64, (rounds + pixels.next_multiple_of(4)) as u64]

@@ -1,11 +1,10 @@
-//! The GPU executor of matting: what [`super::Matting`] does on the processor, as wgpu compute passes, one WGSL file each under
-//! `shaders/`. The map and its picture go up, or are copied where they are, on the device that has refined the map; the mixed
-//! pixels come down, as many as there are; nothing is read back in between. What is remembered to lie behind goes up when it has
-//! changed.
+//! GPU implementation of matting: the algorithm of [`super::Matting`] as wgpu compute passes, one WGSL file each under
+//! `shaders/`. The map and its picture are uploaded, or copied on the device if it has refined the map; the mixed
+//! pixels are read back, and nothing in between. The remembered background is uploaded when it has changed.
 //!
-//! It does what the processor does but for two things. Whether a number is above a limit may fall either way where rounding decides
-//! it. And of several pixels that trace the same one in a step, the first in the picture counts, where the processor has the
-//! first that was traced.
+//! It differs from the CPU in two ways. A comparison with a threshold may go either way where rounding decides it. And
+//! if several pixels trace the same one in a step, the first in raster order counts here; on the CPU, the first one
+//! traced.
 
 mod buffers;
 mod passes;
@@ -27,12 +26,12 @@ use crate::compute::device::{Device, DeviceFrame, Recorder, Stamps};
 use crate::compute::{GpuError, PassTimes};
 use crate::frame::{ColorImage, DepthMap, MixedPixel};
 
-/// Finds the mattes of frame after frame on a device; owns the memory for it.
+/// Finds the mattes of frame after frame on a GPU; owns the memory for it.
 pub struct GpuMatting {
     device: Arc<Device>,
-    /// As the shaders read it: for each code its light, and that of what is remembered, by channel.
+    /// In the shaders' layout: per code its linear light, and that of a remembered code in each channel.
     lights: Box<[[f32; 4]; 256]>,
-    /// For pictures of the last one's size.
+    /// Resources for the last picture size.
     work: Option<Work>,
 }
 
@@ -42,51 +41,51 @@ impl fmt::Debug for GpuMatting {
     }
 }
 
-/// What pictures of one size take.
+/// GPU resources for one picture size.
 struct Work {
     size: (u32, u32),
     buffers: Buffers,
     passes: Passes,
-    /// What is remembered, on the device.
+    /// Revision of the remembered background on the device.
     revision: Option<u64>,
-    /// So many mixed pixels are fetched at once: some more than the last frame had.
+    /// Number of mixed pixels to read back at once: somewhat more than in the last frame.
     expected: usize,
     stamps: Option<Stamps>,
 }
 
-/// More passes than a frame has.
-const MOST_PASSES: usize = 64;
+/// Upper bound of the passes per frame.
+const MAX_PASSES: usize = 64;
 
 impl GpuMatting {
-    /// On a device, whether it does it right or not.
+    /// Creates it for a device, without a trial.
     pub fn new(device: &Arc<Device>) -> Self {
         let of_codes = light_of_codes();
         let lights = Box::new(std::array::from_fn(|code| [of_codes[code], 0.0, 0.0, 0.0]));
         Self { device: Arc::clone(device), lights, work: None }
     }
 
-    /// The time of each pass over the last frame; of none where the device has no timestamps.
+    /// Returns the time of each pass over the last frame; empty if the device has no timestamps.
     pub fn pass_times(&self) -> PassTimes {
         self.work.as_ref().and_then(|work| work.stamps.as_ref()).map(Stamps::last).unwrap_or_default()
     }
 
-    /// Finds the mixed pixels of a map as large as its picture, as [`super::Matting::find_before`] does. What is `on_device` is
-    /// that map and picture; where another device has them, they go up. How many edges there are; with more than
-    /// [`Matte::most`], none of them was looked at.
+    /// Finds the mixed pixels of a map as large as its picture, as [`super::Matting::find_before`] does. `on_device`
+    /// has the map and the picture already; they are uploaded if it is on another device. Returns the number of edge
+    /// pixels; if that exceeds [`Matte::most`], none were evaluated.
     ///
     /// # Errors
-    /// The device failed, or has no room; the map has no mixed pixels.
+    /// The device failed or has too little memory; the map then has no mixed pixels.
     pub fn find(
         &mut self,
         (map, color): (&mut DepthMap, &ColorImage),
         on_device: Option<DeviceFrame>,
-        jump: f32,
+        depth_step: f32,
         behind: Option<&Behind>,
     ) -> Result<usize, GpuError> {
         let Self { device, lights, work } = self;
         device.check()?;
         if work.as_ref().is_none_or(|work| work.size != map.size()) {
-            // The memory of before is free before that for the new size is taken.
+            // Free the old buffers before allocating the new ones.
             *work = None;
             *work = Some(Work::new(device, map.size())?);
         }
@@ -97,7 +96,7 @@ impl GpuMatting {
             }
         }
         device.upload(&work.buffers.lights, 0, bytemuck::cast_slice(&**lights));
-        work.find(device, (map, color, on_device.filter(|frame| frame.is_on(device))), jump, behind)
+        work.find(device, (map, color, on_device.filter(|frame| frame.is_on(device))), depth_step, behind)
     }
 }
 
@@ -105,7 +104,7 @@ impl Work {
     fn new(device: &Arc<Device>, size: (u32, u32)) -> Result<Self, GpuError> {
         let buffers = Buffers::new(device, size)?;
         let passes = Passes::new(device, size, &buffers);
-        let stamps = Stamps::new(device, MOST_PASSES);
+        let stamps = Stamps::new(device, MAX_PASSES);
         Ok(Self { size, buffers, passes, revision: None, expected: 0, stamps })
     }
 
@@ -113,12 +112,12 @@ impl Work {
         &mut self,
         device: &Device,
         (map, color, on_device): (&mut DepthMap, &ColorImage, Option<DeviceFrame>),
-        jump: f32,
+        depth_step: f32,
         behind: Option<&Behind>,
     ) -> Result<usize, GpuError> {
-        let (b, Extent { pixels, most, .. }) = (&self.buffers, Extent::new(self.size));
+        let (b, Extent { pixels, max_entries: most, .. }) = (&self.buffers, Extent::new(self.size));
         let (known, other) = behind.map_or((0, 0.0), |behind| (behind.known.into(), behind.other));
-        let frame = Frame { size: [self.size.0, self.size.1], most: most as u32, known, jump, other };
+        let frame = Frame { size: [self.size.0, self.size.1], most: most as u32, known, jump: depth_step, other };
         device.upload(&b.frame, 0, bytemuck::bytes_of(&frame));
         if let Some(behind) = behind.filter(|behind| self.revision != Some(behind.revision)) {
             let [rgb, rounds, inverse] = known_at(pixels);
@@ -150,7 +149,8 @@ impl Work {
     }
 }
 
-/// Takes the mixed pixels, up to so many, once what is recorded has run; how many there are, and how many edges.
+/// Runs the recorded passes and reads back at most `most` mixed pixels. Returns the numbers of mixed and of edge
+/// pixels.
 fn fetch(
     b: &mut Buffers,
     device: &Device,
@@ -160,7 +160,7 @@ fn fetch(
 ) -> Result<[usize; 2], GpuError> {
     const EACH: usize = size_of::<MixedPixel>();
     recorder.fetch(device, &mut b.readback, (&b.mixed, ((1 + most) * EACH) as u64), |bytes| {
-        // Their number is where one more would be.
+        // The first record has the counts.
         let (head, bytes) = bytes.split_at(EACH);
         let [found, edges] =
             [0, 4].map(|at| u32::from_le_bytes([head[at], head[at + 1], head[at + 2], head[at + 3]]) as usize);

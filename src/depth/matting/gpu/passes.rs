@@ -1,17 +1,17 @@
-//! The passes in their order: bind groups made once for pictures of one size, one `record` a frame.
+//! The passes in order: bind groups are created once per picture size, and recorded once per frame.
 
 use super::buffers::{Buffers, Extent};
 use super::shaders::{self, BLOCK, LANES, ROWS, TURNS, WORD, turns};
 use crate::compute::device::{Device, Pass, Recorder, Shader};
 use crate::depth::matting::share::PRIOR_ROUNDS;
 
-/// Everything that a frame runs.
+/// All passes of a frame.
 pub struct Passes(Vec<Pass>);
 
 impl Passes {
-    /// The passes over the buffers of pictures of `size` pixels.
+    /// Creates the passes over the buffers for pictures of `size` pixels.
     pub fn new(device: &Device, size: (u32, u32), b: &Buffers) -> Self {
-        let Extent { most, words, cells, .. } = Extent::new(size);
+        let Extent { max_entries, words, cells, .. } = Extent::new(size);
         let over = |shader: Shader, again, turn: Option<usize>, buffers: &[&wgpu::Buffer], [across, down]: [u32; 2]| {
             let first = std::iter::once(b.frame.as_entire_buffer_binding()).chain(turn.map(|turn| b.turn(turn)));
             let all = first.chain(buffers.iter().map(|buffer| buffer.as_entire_buffer_binding()));
@@ -25,7 +25,7 @@ impl Passes {
                 over(shaders::TOTAL, again, None, &[&b.counts, &b.mixed], [1, 1]),
             ]
         };
-        let of_entries = [turns(most.div_ceil(LANES as usize)), 1];
+        let of_entries = [turns(max_entries.div_ceil(LANES as usize)), 1];
         let of_cells = [turns((cells[0] * cells[1]) as usize / 4), 1];
 
         let survey = [size.0.div_ceil(WORD), size.1.div_ceil(ROWS)];
@@ -52,7 +52,7 @@ impl Passes {
         Self(passes)
     }
 
-    /// All passes of a frame.
+    /// Records all passes of a frame.
     pub fn record(&self, recorder: &mut Recorder) {
         self.0.iter().for_each(|pass| recorder.run(pass));
     }

@@ -1,4 +1,4 @@
-//! Whether a device finds mattes as the processor does.
+//! A trial of a device: whether it finds the same mattes as the CPU.
 
 use std::sync::Arc;
 
@@ -11,11 +11,11 @@ use crate::depth::matting::Behind;
 use crate::frame::{ColorImage, DepthMap, MixedPixel};
 
 const SIZE: (u32, u32) = (96, 64);
-const JUMP: f32 = 0.05;
-/// A share that differs by more is wrong, as is a mixed pixel on one side only.
-const SHARE: f32 = 0.01;
+const STEP: f32 = 0.05;
+/// Tolerance of alpha; a mixed pixel on one side only is wrong, too.
+const TOLERANCE: f32 = 0.01;
 
-/// Finds the mattes of two small pictures on the device and on the processor.
+/// Finds the mattes of a small picture on the device and on the CPU, without and with a background, and compares them.
 ///
 /// # Errors
 /// The device failed.
@@ -27,18 +27,18 @@ pub fn trial(device: &Arc<Device>) -> Result<Trial, GpuError> {
     let light: Box<[[f32; 256]; 3]> = Box::new([[0.5; 256]; 3]);
     let (rgb, inverse, rounds) = (vec![0; 3 * pixels], vec![0.25; pixels], vec![1; pixels]);
     let behind =
-        Behind { rgb: &rgb, inverse: &inverse, rounds: &rounds, known: 1, light: &light, other: JUMP, revision: 0 };
+        Behind { rgb: &rgb, inverse: &inverse, rounds: &rounds, known: 1, light: &light, other: STEP, revision: 0 };
     let (mut wrong, mut all) = (0, 0);
     for behind in [None, Some(&behind)] {
         let [mut expected, mut made] = [map.clone(), map.clone()];
-        cpu.find_before(&mut workers, (&mut expected, &color), JUMP, behind);
-        gpu.find((&mut made, &color), None, JUMP, behind)?;
+        cpu.find_before(&mut workers, (&mut expected, &color), STEP, behind);
+        gpu.find((&mut made, &color), None, STEP, behind)?;
         let (expected, made) = (&expected.matte.pixels, &made.matte.pixels);
-        let is_same = |a: &MixedPixel, b: &MixedPixel| (a.share - b.share).abs() <= SHARE;
+        let is_same = |a: &MixedPixel, b: &MixedPixel| (a.share - b.share).abs() <= TOLERANCE;
         let same = expected.iter().filter(|pixel| {
             made.binary_search_by_key(&pixel.at, |made| made.at).is_ok_and(|k| is_same(&made[k], pixel))
         });
-        // In order, and each once.
+        // In order, without duplicates.
         let is_sorted = made.is_sorted_by(|a, b| a.at < b.at);
         wrong += if is_sorted { expected.len().max(made.len()) - same.count() } else { expected.len() + 1 };
         all += expected.len();
@@ -46,7 +46,7 @@ pub fn trial(device: &Arc<Device>) -> Result<Trial, GpuError> {
     Ok(Trial { wrong, all, one_in: 50, results: "mixed pixels of a trial" })
 }
 
-/// Somebody with a soft outline before a wall, whose hair the map has in part.
+/// A person with a soft outline before a wall; the map has part of the hair.
 fn scene() -> (ColorImage, DepthMap) {
     let chance = |k: usize| ((k as u32).wrapping_mul(0x9e37_79b1) >> 24) as u8;
     let (mut color, mut map) = (ColorImage::new(SIZE.0, SIZE.1), DepthMap::new(SIZE.0, SIZE.1));
@@ -54,8 +54,8 @@ fn scene() -> (ColorImage, DepthMap) {
         let (x, y) = ((k as u32 % SIZE.0) as f32, (k as u32 / SIZE.0) as f32);
         let off = (x - 40.0).hypot(y - 40.0) - 20.3;
         let hair = if (y as u32).is_multiple_of(9) && x > 55.0 && x < 80.0 { 0.4 } else { 0.0 };
-        let share = (0.5 - off).clamp(hair, 1.0);
-        let code = |p: usize| share * [60.0, 50.0, 40.0][p] + (1.0 - share) * [180.0, 190.0, 200.0][p];
+        let alpha = (0.5 - off).clamp(hair, 1.0);
+        let code = |p: usize| alpha * [60.0, 50.0, 40.0][p] + (1.0 - alpha) * [180.0, 190.0, 200.0][p];
         pixel.copy_from_slice(&[0, 1, 2].map(|p| code(p) as u8 + chance(k + 7 * p) % 9));
         *metres = if off < 0.0 || (hair > 0.0 && (x as u32).is_multiple_of(7)) { 1.0 } else { 3.0 + 0.01 * x };
     }

@@ -1,20 +1,20 @@
-//! What is behind a subject, known from a picture of the same place without it.
+//! A known background of the subject: a picture of the same place without it.
 
 use crate::frame::ColorImage;
 
-/// A picture of what is behind, and how it differs from that of now.
+/// A background picture, and its exposure and shift relative to the current picture.
 #[derive(Clone, Copy, Debug)]
 pub struct Backdrop<'a> {
-    /// As large as the picture of now.
+    /// A picture of the size of the current one.
     pub color: &'a ColorImage,
-    /// The light of each code, by channel, as the camera exposes now.
+    /// Linear light of each code, by channel, at the camera's current exposure.
     pub light: &'a [[f32; 256]; 3],
-    /// Where its points are now, less where they were: to the right, and down.
+    /// Current position of its points minus their original one, in pixels: right, down.
     pub shift_px: [isize; 2],
 }
 
 impl Backdrop<'_> {
-    /// The light behind the pixels of a row; beyond the picture's edges, it is as there.
+    /// Returns a function from the column to the background light in a row; the border is replicated.
     #[inline(always)]
     pub fn row(&self, y: usize) -> impl Fn(usize) -> [f32; 3] {
         let place = |at: usize, shift: isize, count: usize| at.saturating_add_signed(-shift).min(count - 1);

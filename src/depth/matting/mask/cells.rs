@@ -1,4 +1,4 @@
-//! The cells of a picture: what its mask says of each, and the colours of both surfaces around it.
+//! Cells of a picture: their trimap label from the mask, and the colours of both surfaces around.
 
 use std::ops::Range;
 
@@ -9,35 +9,35 @@ use crate::depth::matting::symmetric::{Symmetric, outer};
 use crate::depth::tap::Tap;
 use crate::frame::{ColorImage, Mask};
 
-/// From here on the mask is sure that a pixel is of the nearer surface, and below 1 less this, that it is not.
+/// Mask value from which a pixel is surely near; below 1 minus this, it is surely far.
 const SURE: f32 = 0.95;
-/// So many cells in every direction tell the colours around one.
-pub const REACH: usize = 5;
-/// Less weight of pixels than this, of either surface, tells no colour.
-const LEAST_WEIGHT: f32 = 0.5;
+/// Radius in cells within which colours are gathered.
+pub const RADIUS: usize = 5;
+/// Minimum weight of a surface's pixels for its colour to be known.
+const MIN_WEIGHT: f32 = 0.5;
 
-/// Variance of the light of a picture of what is behind: noise, and half a pixel of shift.
+/// Variance of a background picture's light: noise, and half a pixel of shift.
 const NOISE: f32 = 2e-4;
 
-/// The weights of the cells around one, by row and column.
-pub type Kernel = [[f32; 2 * REACH + 1]; 2 * REACH + 1];
+/// Weights of the cells around one, by row and column.
+pub type Kernel = [[f32; 2 * RADIUS + 1]; 2 * RADIUS + 1];
 
-/// What a mask says of a cell of the picture.
+/// Trimap label of a cell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Cell {
     Near,
     Far,
-    /// In the band, or beside it.
+    /// The unknown region: mask undecided, in the cell or beside it.
     Band,
 }
 
-/// Pixels of both surfaces in a cell, [`SURFACE`] sums each: how many, their light, and the products of that.
+/// Sums over the pixels of both surfaces in a cell, [`SURFACE`] numbers each: count, light, products of light.
 #[derive(Clone, Copy, Debug)]
 pub struct Sums([f32; 2 * SURFACE]);
 
-/// Sums of a surface: ten, and up to whole vectors.
+/// Numbers per surface: padded from ten to whole vectors.
 const SURFACE: usize = 12;
-/// Places of the near and of the far surface.
+/// Indices of the near and the far surface.
 const NEAR: usize = 0;
 const FAR: usize = 1;
 
@@ -57,7 +57,8 @@ impl Sums {
         self.0.iter_mut().zip(&other.0).for_each(|(sum, value)| *sum += weight * value);
     }
 
-    /// The colours of both; `None` where there are too few pixels of one. What is `behind` anyway is known but for noise.
+    /// Returns both surfaces' colours; `None` if one has too few pixels. With a known background (`behind`), the far
+    /// colour is just its noise.
     fn colors(&self, behind: bool) -> Option<[Color; 2]> {
         let noise = Color { mean: [0.0; 3], covariance: [NOISE, 0.0, 0.0, NOISE, 0.0, NOISE] };
         let weights = [self.0[0], self.0[SURFACE]];
@@ -66,7 +67,7 @@ impl Sums {
             let squares: Symmetric = std::array::from_fn(|k| sums[3 + k]);
             Color::of_sums(weights[k], std::array::from_fn(|k| sums[k]), squares)
         };
-        match weights.map(|weight| weight > LEAST_WEIGHT) {
+        match weights.map(|weight| weight > MIN_WEIGHT) {
             [true, _] if behind => Some([color(NEAR), noise]),
             [true, true] => Some([color(NEAR), color(FAR)]),
             _ => None,
@@ -74,13 +75,13 @@ impl Sums {
     }
 }
 
-/// A picture, and what is sought in it.
+/// The input of matting, and the layout of its cells.
 pub struct View<'a> {
     pub mask: &'a Mask,
     pub color: &'a ColorImage,
     pub light: &'a [f32; 256],
     pub backdrop: Option<&'a Backdrop<'a>>,
-    /// Per column of the picture, those of the mask on both sides.
+    /// Per column of the picture, the mask columns on both sides.
     pub columns: &'a [Tap],
     pub cell_px: usize,
     pub across: usize,
@@ -88,27 +89,27 @@ pub struct View<'a> {
 }
 
 impl View<'_> {
-    /// Columns of the pixels of a column of cells.
+    /// Returns the pixel columns of a column of cells.
     #[inline(always)]
     pub fn columns_of(&self, column: usize) -> Range<usize> {
         column * self.cell_px..((column + 1) * self.cell_px).min(self.color.width as usize)
     }
 
-    /// Rows of the pixels of a row of cells.
+    /// Returns the pixel rows of a row of cells.
     #[inline(always)]
     pub fn rows_of(&self, row: usize) -> Range<usize> {
         row * self.cell_px..((row + 1) * self.cell_px).min(self.color.height as usize)
     }
 
-    /// The colour of a pixel in linear light.
+    /// Returns the linear light of a pixel.
     #[inline(always)]
     pub fn light_at(&self, at: usize) -> [f32; 3] {
         [0, 1, 2].map(|p| self.light[usize::from(self.color.rgb[3 * at + p])])
     }
 
-    /// The mask in a row of pixels, linear between its own.
+    /// Returns a function from the column to the mask value in a row of pixels, bilinearly interpolated.
     #[inline(always)]
-    pub fn shares_in(&self, y: usize) -> impl Fn(usize) -> f32 {
+    pub fn mask_row(&self, y: usize) -> impl Fn(usize) -> f32 {
         let width = self.mask.width as usize;
         let Tap { first, second, share } = Tap::new(y, self.color.height as usize, self.mask.height as usize);
         let row = |row: usize| &self.mask.share[row * width..][..width];
@@ -121,12 +122,12 @@ impl View<'_> {
         }
     }
 
-    /// What the mask says of every cell: it is sure of all of it, or not. `ends` is memory for that.
+    /// Computes the trimap label of each cell. `ends` is scratch memory.
     #[inline(always)]
     pub fn classify(&self, cells: &mut Vec<Cell>, ends: &mut Vec<[f32; 2]>) {
         let (across, down, mask) = (self.across, self.down, self.mask);
         let range = |of: usize, count: usize, side: usize| {
-            // The pixels of the mask around a cell, with those beside them: the band is a cell wider than it needs be.
+            // The mask pixels of a cell plus one on each side: the unknown region is up to a cell wider than necessary.
             let scale = side as f32 / count as f32;
             let start = (of as f32 * scale - 1.0).max(0.0) as usize;
             start.min(side - 1)..(((of + 1) as f32 * scale + 1.0).ceil() as usize).min(side)
@@ -134,12 +135,12 @@ impl View<'_> {
         let width = mask.width as usize;
         cells.clear();
         for row in 0..down {
-            // Lowest and highest of each column of the mask first: neighbouring cells share them.
+            // Column-wise extremes first, since neighbouring cells share them.
             ends.clear();
             ends.resize(width, [1.0, 0.0]);
             for y in range(row, down, mask.height as usize) {
-                for ([low, high], &share) in ends.iter_mut().zip(&mask.share[y * width..][..width]) {
-                    (*low, *high) = (low.min(share), high.max(share));
+                for ([low, high], &alpha) in ends.iter_mut().zip(&mask.share[y * width..][..width]) {
+                    (*low, *high) = (low.min(alpha), high.max(alpha));
                 }
             }
             cells.extend((0..across).map(|column| {
@@ -154,35 +155,35 @@ impl View<'_> {
         }
     }
 
-    /// The colours of the cells that are in the band, or in reach of it.
+    /// Gathers the colours of the cells in the unknown region, and within [`RADIUS`] of it.
     #[inline(always)]
-    pub fn gather(&self, cells: &[Cell], wanted: &mut Vec<bool>, sums: &mut Vec<Sums>) {
+    pub fn gather(&self, cells: &[Cell], needed: &mut Vec<bool>, sums: &mut Vec<Sums>) {
         let (across, down) = (self.across, self.down);
         sums.clear();
         sums.resize(across * down, Sums::NONE);
-        wanted.clear();
-        wanted.resize(across * down, false);
+        needed.clear();
+        needed.resize(across * down, false);
         for row in 0..down {
             for column in (0..across).filter(|column| cells[row * across + column] == Cell::Band) {
-                for row in row.saturating_sub(REACH)..(row + REACH + 1).min(down) {
-                    let columns = column.saturating_sub(REACH)..(column + REACH + 1).min(across);
-                    wanted[row * across..][columns].fill(true);
+                for row in row.saturating_sub(RADIUS)..(row + RADIUS + 1).min(down) {
+                    let columns = column.saturating_sub(RADIUS)..(column + RADIUS + 1).min(across);
+                    needed[row * across..][columns].fill(true);
                 }
             }
         }
         for row in 0..down {
             for y in self.rows_of(row) {
-                let (share_at, first) = (self.shares_in(y), y * self.color.width as usize);
-                for column in (0..across).filter(|column| wanted[row * across + column]) {
+                let (alpha_at, first) = (self.mask_row(y), y * self.color.width as usize);
+                for column in (0..across).filter(|column| needed[row * across + column]) {
                     let (sums, cell) = (&mut sums[row * across + column], cells[row * across + column]);
-                    // Every other one is enough.
+                    // Every other pixel suffices.
                     for x in self.columns_of(column).filter(|x| (x + y) % 2 == 0) {
                         match cell {
                             Cell::Near => sums.add(NEAR, self.light_at(first + x)),
                             Cell::Far => sums.add(FAR, self.light_at(first + x)),
-                            Cell::Band => match share_at(x) {
-                                share if share > SURE => sums.add(NEAR, self.light_at(first + x)),
-                                share if share < 1.0 - SURE => sums.add(FAR, self.light_at(first + x)),
+                            Cell::Band => match alpha_at(x) {
+                                alpha if alpha > SURE => sums.add(NEAR, self.light_at(first + x)),
+                                alpha if alpha < 1.0 - SURE => sums.add(FAR, self.light_at(first + x)),
                                 _ => {}
                             },
                         }
@@ -192,24 +193,24 @@ impl View<'_> {
         }
     }
 
-    /// How the colours around a cell differ; `None` where one of the surfaces has none.
+    /// Computes the colour contrast around a cell; `None` if a surface has too few pixels.
     #[inline(always)]
     pub fn contrast(&self, kernel: &Kernel, sums: &[Sums], (row, column): (usize, usize)) -> Option<Contrast> {
         let mut around = Sums::NONE;
-        for other_row in row.saturating_sub(REACH)..(row + REACH + 1).min(self.down) {
-            let weights = &kernel[other_row + REACH - row];
-            for other in column.saturating_sub(REACH)..(column + REACH + 1).min(self.across) {
-                around.add_all(&sums[other_row * self.across + other], weights[other + REACH - column]);
+        for other_row in row.saturating_sub(RADIUS)..(row + RADIUS + 1).min(self.down) {
+            let weights = &kernel[other_row + RADIUS - row];
+            for other in column.saturating_sub(RADIUS)..(column + RADIUS + 1).min(self.across) {
+                around.add_all(&sums[other_row * self.across + other], weights[other + RADIUS - column]);
             }
         }
-        around.colors(self.backdrop.is_some()).map(Contrast::of)
+        around.colors(self.backdrop.is_some()).map(Contrast::new)
     }
 
-    /// The cells up to so many away from one, and itself.
-    pub fn around(&self, at: usize, reach: usize) -> impl Iterator<Item = usize> + use<> {
+    /// Iterates over the cells within `radius` of a cell, including itself.
+    pub fn cells_within(&self, at: usize, radius: usize) -> impl Iterator<Item = usize> + use<> {
         let (across, row, column) = (self.across, at / self.across, at % self.across);
-        let columns = column.saturating_sub(reach)..(column + reach + 1).min(across);
-        let rows = row.saturating_sub(reach)..(row + reach + 1).min(self.down);
+        let columns = column.saturating_sub(radius)..(column + radius + 1).min(across);
+        let rows = row.saturating_sub(radius)..(row + radius + 1).min(self.down);
         rows.flat_map(move |row| columns.clone().map(move |column| row * across + column))
     }
 }

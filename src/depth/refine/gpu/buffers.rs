@@ -1,54 +1,54 @@
-//! The memory for pictures of one size.
+//! Buffers for pictures of one size.
 
 use super::super::align::ROUNDS;
 use super::super::votes;
-use super::shaders::{ASKED, COUNTS, Frame, MEASURES, SAMPLES, WAVES, Wave};
+use super::shaders::{COUNTS, Frame, MEASURES, PROCESSED, SAMPLES, WAVES, Wave};
 use crate::compute::GpuError;
 use crate::compute::device::{Device, Readback, UNIFORM_STRIDE, uniform_at};
 
-/// Buffers for a picture; some serve one pass after the other, which says what is in them then.
+/// Buffers of a picture; some are reused by several passes with different content.
 pub struct Buffers {
     pub frame: wgpu::Buffer,
     waves: wgpu::Buffer,
-    /// The map as it came; grows to the largest that did.
+    /// The map as measured; grows to the largest so far.
     pub map: wgpu::Buffer,
-    /// Where each pixel's samples are in it.
+    /// Indices and weights of the samples for each column and row.
     pub taps: wgpu::Buffer,
     pub rgb: wgpu::Buffer,
-    /// The picture, and the one before.
+    /// The packed picture, and the last one.
     pub colors: wgpu::Buffer,
     pub before: wgpu::Buffer,
     pub flags: wgpu::Buffer,
-    /// The map without holes, kept for a frame of which nothing is known.
+    /// The map without holes, kept for frames without any known depth.
     pub filled: wgpu::Buffer,
-    /// What is beside holes; then the map smoothed along rows; then the pixels to ask in the second round; then the change of
-    /// colours.
-    pub lent: wgpu::Buffer,
-    /// What is claimed along rows; then inverse depth.
+    /// Depths beside holes; then the map smoothed along rows; then the worklist of the second round; then the colour
+    /// change.
+    pub scratch: wgpu::Buffer,
+    /// Claims along rows; then inverse depth.
     pub inverse: wgpu::Buffer,
-    /// What is claimed along columns; then the pixels to ask in the first round.
+    /// Claims along columns; then the worklist of the first round.
     pub front: wgpu::Buffer,
     pub votes: wgpu::Buffer,
     pub nearby: wgpu::Buffer,
     pub counts: wgpu::Buffer,
     pub measures: wgpu::Buffer,
     pub samples: wgpu::Buffer,
-    /// What is remembered of earlier frames.
+    /// State of the temporal filter.
     pub memory: wgpu::Buffer,
     pub refined: wgpu::Buffer,
     pub readback: Readback,
 }
 
 impl Buffers {
-    /// For pictures of `size` pixels.
+    /// Allocates for pictures of `size` pixels.
     ///
     /// # Errors
-    /// The device has no room for that.
+    /// Fails if the device lacks memory.
     pub fn new(device: &Device, size: (u32, u32)) -> Result<Self, GpuError> {
         use wgpu::BufferUsages as Usage;
         let (width, height) = (size.0 as usize, size.1 as usize);
         let pixels = width * height;
-        // What is remembered is the largest: three numbers a pixel.
+        // The temporal state is the largest buffer: three numbers per pixel.
         device.has_room(size, pixels as u64 * 12, "refined")?;
         let buffer = |label, bytes, usage| device.buffer(label, bytes, usage);
         let words = |label, count: usize| buffer(label, 4 * count, Usage::STORAGE | Usage::COPY_DST);
@@ -62,7 +62,7 @@ impl Buffers {
             before: words("colors before", pixels),
             flags: words("flags", pixels),
             filled: words("filled", pixels),
-            lent: words("lent", pixels),
+            scratch: words("lent", pixels),
             inverse: words("inverse", pixels),
             front: words("front", pixels),
             votes: words("votes", 2 * pixels),
@@ -78,7 +78,7 @@ impl Buffers {
         for round in 0..ROUNDS {
             for wave in 0..=WAVES {
                 let first = (1 + round * (WAVES + 2)) as u32;
-                let marks = if round == 0 { ASKED } else { 0 };
+                let marks = if round == 0 { PROCESSED } else { 0 };
                 let uniform = Wave { first, at: first + wave as u32, marks };
                 device.upload(
                     &buffers.waves,
@@ -90,12 +90,12 @@ impl Buffers {
         Ok(buffers)
     }
 
-    /// A buffer for a map of so many samples, in metres.
+    /// Creates a buffer for a map of `samples` samples, in metres.
     pub fn map(device: &Device, samples: usize) -> wgpu::Buffer {
         device.buffer("measured", 4 * samples, wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST)
     }
 
-    /// The uniform of a wave.
+    /// Returns the uniform of a wave.
     pub fn wave(&self, round: usize, wave: usize) -> wgpu::BufferBinding<'_> {
         uniform_at::<Wave>(&self.waves, wave_index(round, wave))
     }

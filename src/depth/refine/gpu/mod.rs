@@ -1,10 +1,9 @@
-//! The GPU executor of refinement: what [`super::Refiner`] does on the processor, as wgpu compute passes, one WGSL file each
-//! under `shaders/`. The picture and its map go up, the refined map comes down; nothing is read back in between, as what is
-//! measured stays on the device. So does what is remembered of earlier frames.
+//! The GPU executor of refinement: wgpu compute passes, one WGSL file each under `shaders/`. Picture and map are
+//! uploaded and the refined map is read back; measurements and the temporal state stay on the device.
 //!
-//! It does what the processor does but for two things. Whether a number is above a limit may fall either way where rounding
-//! decides it. And pixels that are left between two surfaces decide by their neighbours as the votes have left them, where
-//! the processor lets them decide one after the other.
+//! Results differ from those of [`super::Refiner`] on the CPU in two cases only: a comparison with a limit may turn out
+//! differently by rounding; and pixels between two surfaces are decided in parallel from their neighbours after the
+//! votes, where the CPU decides them one after the other.
 
 mod buffers;
 mod passes;
@@ -28,10 +27,10 @@ use crate::depth::tap::Tap;
 use crate::frame::{ColorImage, DepthMap};
 use crate::link::pool::{Pool, Pooled};
 
-/// Refines the depth of frame after frame on a device; owns the memory for it, and remembers the last frame.
+/// Refines the depth of consecutive frames on a device; owns its buffers and the state of the last frame.
 pub struct GpuRefiner {
     device: Arc<Device>,
-    /// For pictures of the last one's size.
+    /// State for pictures of the last size.
     work: Option<Work>,
 }
 
@@ -41,67 +40,67 @@ impl fmt::Debug for GpuRefiner {
     }
 }
 
-/// What pictures of one size take.
+/// Resources for pictures of one size.
 struct Work {
     size: (u32, u32),
     buffers: Buffers,
     passes: Passes,
-    /// Where the samples of columns and rows are, in a map of this size.
+    /// Size of the maps that the sample positions of columns and rows are for.
     from: (u32, u32),
     columns: Vec<Tap>,
     rows: Vec<Tap>,
     /// Whether a map without holes is on the device.
     has_filled: bool,
-    /// What is remembered is of a frame at this time, with this distance in focus.
+    /// Time and focus distance of the frame of the temporal state.
     last: Option<(u64, f32)>,
-    /// Whether the last refined map, and its picture, are on the device.
-    is_there: bool,
+    /// Whether the last refined map and its picture are on the device.
+    is_on_device: bool,
     /// Copies of refined maps with their pictures, for the blur, and that of the last one.
     copies: Pool<DeviceFrame>,
     copy: Option<Pooled<DeviceFrame>>,
     stamps: Option<Stamps>,
 }
 
-/// Copies that may be on their way at once; when all are, frames go up again.
+/// Maximum number of copies in use; without a free one the frame is uploaded again.
 const COPIES: usize = 4;
 
-/// More passes than a frame has.
-const MOST_PASSES: usize = 48;
+/// Upper bound for the passes of a frame.
+const MAX_PASSES: usize = 48;
 
 impl GpuRefiner {
-    /// On a device, whether it does it right or not.
+    /// Creates a refiner on a device, without testing it.
     pub fn new(device: &Arc<Device>) -> Self {
         Self { device: Arc::clone(device), work: None }
     }
 
-    /// Forgets all frames.
+    /// Discards the state of all frames.
     pub fn forget(&mut self) {
         if let Some(work) = &mut self.work {
             (work.has_filled, work.last) = (false, None);
         }
     }
 
-    /// The time of each pass over the last frame; of none where the device has no timestamps.
+    /// Returns the time of each pass over the last frame; empty if the device has no timestamps.
     pub fn pass_times(&self) -> PassTimes {
         self.work.as_ref().and_then(|work| work.stamps.as_ref()).map(Stamps::last).unwrap_or_default()
     }
 
-    /// The map that was refined last, and its picture, where they are on the device, until the next one is.
+    /// Returns the last refined map and its picture on the device, if they are there; valid until the next frame.
     pub fn refined(&self) -> Option<DeviceFrame> {
         let Work { size, buffers: Buffers { refined, rgb, .. }, .. } =
-            self.work.as_ref().filter(|work| work.is_there)?;
+            self.work.as_ref().filter(|work| work.is_on_device)?;
         Some(DeviceFrame::of(&self.device, *size, refined, rgb))
     }
 
-    /// A copy of that, once for each.
+    /// Returns a copy of the last refined map and its picture, once per frame.
     pub fn take_copy(&mut self) -> Option<Pooled<DeviceFrame>> {
         self.work.as_mut()?.copy.take()
     }
 
-    /// Refines the depth `map` of the picture `color` at `time_ns`, with this distance in focus.
+    /// Refines the depth `map` of the picture `color` at `time_ns`, with this focus distance in metres.
     ///
     /// # Errors
-    /// The device failed, or has no room; the map is as it was.
+    /// Fails if the device fails or lacks memory; the map is then unchanged.
     pub fn refine(
         &mut self,
         map: &mut DepthMap,
@@ -112,7 +111,7 @@ impl GpuRefiner {
         let Self { device, work } = self;
         device.check()?;
         if work.as_ref().is_none_or(|work| work.size != color.size()) {
-            // The memory of before is free before that for the new size is taken.
+            // Frees the old buffers before the new ones are allocated.
             *work = None;
             *work = Some(Work::new(device, color.size())?);
         }
@@ -136,15 +135,15 @@ impl Work {
             rows,
             has_filled: false,
             last: None,
-            is_there: false,
+            is_on_device: false,
             copies,
             copy: None,
-            stamps: Stamps::new(device, MOST_PASSES),
+            stamps: Stamps::new(device, MAX_PASSES),
         })
     }
 
-    /// Takes maps of another size.
-    fn take_maps(&mut self, device: &Device, from: (u32, u32)) -> Result<(), GpuError> {
+    /// Prepares for maps of another size.
+    fn set_map_size(&mut self, device: &Device, from: (u32, u32)) -> Result<(), GpuError> {
         let Self { size, buffers, passes, columns, rows, .. } = self;
         for (taps, to, from) in [(&mut *columns, size.0, from.0), (rows, size.1, from.1)] {
             taps.clear();
@@ -165,8 +164,8 @@ impl Work {
         Ok(())
     }
 
-    /// Whether anything is known of a map, once it has the picture's size.
-    fn knows_any(&self, map: &DepthMap) -> bool {
+    /// Whether the resampled map has any known depth.
+    fn has_known_depth(&self, map: &DepthMap) -> bool {
         self.rows.iter().any(|row| {
             let samples = &map.metres[row.nearest() * map.width as usize..][..map.width as usize];
             self.columns.iter().any(|column| DepthMap::is_known(samples[column.nearest()]))
@@ -181,17 +180,19 @@ impl Work {
         time_ns: u64,
         focus_m: f32,
     ) -> Result<(), GpuError> {
-        (self.is_there, self.copy) = (false, None);
+        (self.is_on_device, self.copy) = (false, None);
         if !map.metres.is_empty() && self.from != map.size() {
-            self.take_maps(device, map.size())?;
+            self.set_map_size(device, map.size())?;
         }
-        let is_empty = map.metres.is_empty() || !self.knows_any(map);
+        let is_empty = map.metres.is_empty() || !self.has_known_depth(map);
+        // Without any depth now or before, the map is unknown everywhere, as on the CPU.
         if is_empty && !self.has_filled {
             map.resize(color.width, color.height);
             map.metres.fill(0.0);
             self.last = None;
             return Ok(());
         }
+        // The temporal state is in units of its own focus distance, hence the factor.
         let last = self.last.filter(|(before_ns, _)| temporal::follows(*before_ns, time_ns));
         let frame = Frame {
             size: [color.width, color.height],
@@ -209,12 +210,12 @@ impl Work {
             device.upload(&self.buffers.map, 0, bytemuck::cast_slice(&map.metres));
         }
         self.run(device, map, is_empty, last.is_none())?;
-        (self.has_filled, self.is_there) = (true, true);
+        (self.has_filled, self.is_on_device) = (true, true);
         self.last = Some((time_ns, focus_m));
         Ok(())
     }
 
-    /// Runs the passes, and takes the refined map.
+    /// Runs the passes and reads the refined map back.
     fn run(&mut self, device: &Device, map: &mut DepthMap, is_empty: bool, is_fresh: bool) -> Result<(), GpuError> {
         let Buffers { counts, rgb, refined, readback, .. } = &mut self.buffers;
         let mut recorder = Recorder::new(device, self.stamps.as_mut());

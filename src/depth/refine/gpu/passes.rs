@@ -1,23 +1,23 @@
-//! The passes in their order: bind groups made once for pictures of one size, one `encode` a frame.
+//! The passes in their order: bind groups are created once for pictures of one size.
 
 use super::super::align::ROUNDS;
 use super::buffers::Buffers;
 use super::shaders::{self, COLUMNS, STRIP, TILE, WAVES};
 use crate::compute::device::{Device, Pass, Recorder, Shader};
 
-/// Everything that a frame runs.
+/// All passes of a frame.
 pub struct Passes {
     prepare: Pass,
-    /// Holes are filled, of a map of which anything is known.
+    /// Hole filling, for maps with any known depth.
     fill: Vec<Pass>,
-    /// The noise, and less of it; edges, and where they belong.
+    /// Noise, smoothing, and edge alignment.
     align: Vec<Pass>,
-    /// What changed since the frame before, if there is one.
+    /// Colour change since the last frame, if there is one.
     change: [Pass; 2],
     steady: Pass,
 }
 
-/// Makes the passes for pictures of one size.
+/// Creates the passes for pictures of one size.
 struct Maker<'a> {
     device: &'a Device,
     size: [u32; 2],
@@ -25,7 +25,7 @@ struct Maker<'a> {
 }
 
 impl<'a> Maker<'a> {
-    /// A pass, in its second run where it runs `again`, over these buffers after the frame.
+    /// Creates a pass over the frame's uniform and `buffers`; `again` selects its second variant.
     fn pass(
         &self,
         shader: Shader,
@@ -38,7 +38,7 @@ impl<'a> Maker<'a> {
         Pass::new(self.device, shader, &shaders::constants(again), buffers, [across, down, 1])
     }
 
-    fn over<const N: usize>(
+    fn tiled<const N: usize>(
         &self,
         shader: Shader,
         again: bool,
@@ -49,7 +49,7 @@ impl<'a> Maker<'a> {
         self.pass(shader, again, buffers.map(wgpu::Buffer::as_entire_buffer_binding), [across, down])
     }
 
-    /// A pass that is one workgroup.
+    /// Creates a pass of a single workgroup.
     fn single<const N: usize>(&self, shader: Shader, again: bool, buffers: [&'a wgpu::Buffer; N]) -> Pass {
         self.pass(shader, again, buffers.map(wgpu::Buffer::as_entire_buffer_binding), [1, 1])
     }
@@ -66,8 +66,8 @@ impl<'a> Maker<'a> {
         let b = self.b;
         let [width, height] = self.size;
         [
-            self.over(shaders::BESIDE, again, [width, 1], [&b.counts, &b.filled, &b.lent]),
-            self.over(shaders::FILL, again, [COLUMNS, height], [&b.counts, &b.filled, &b.lent]),
+            self.tiled(shaders::BESIDE, again, [width, 1], [&b.counts, &b.filled, &b.scratch]),
+            self.tiled(shaders::FILL, again, [COLUMNS, height], [&b.counts, &b.filled, &b.scratch]),
         ]
     }
 
@@ -75,8 +75,8 @@ impl<'a> Maker<'a> {
         let b = self.b;
         let claims = if again { &b.front } else { &b.inverse };
         [
-            self.over(shaders::CLAIM, again, TILE, [&b.flags, &b.filled, &b.colors, claims]),
-            self.over(shaders::AGREE, again, TILE, [claims, &b.flags, &b.filled]),
+            self.tiled(shaders::CLAIM, again, TILE, [&b.flags, &b.filled, &b.colors, claims]),
+            self.tiled(shaders::AGREE, again, TILE, [claims, &b.flags, &b.filled]),
         ]
     }
 
@@ -88,58 +88,58 @@ impl<'a> Maker<'a> {
 
     fn round(&self, round: usize) -> impl Iterator<Item = Pass> {
         let b = self.b;
-        let front = if round == 0 { &b.front } else { &b.lent };
+        let front = if round == 0 { &b.front } else { &b.scratch };
         let band = [&b.measures, &b.inverse, &b.colors, &b.flags, &b.votes, front, &b.counts];
-        let band = self.over(shaders::BAND, round > 0, TILE, band);
+        let band = self.tiled(shaders::BAND, round > 0, TILE, band);
         let vote = move |wave: usize| {
             let buffers = [&b.measures, &b.nearby, &b.votes, &b.inverse, &b.flags, front, &b.counts];
             let buffers = buffers.map(wgpu::Buffer::as_entire_buffer_binding);
             let uniform = b.wave(round, wave);
-            let [first, other] = shaders::turns(self.size.map(|side| side as usize).iter().product());
-            let turns = match wave {
+            let [first, other] = shaders::vote_workgroups(self.size.map(|side| side as usize).iter().product());
+            let workgroups = match wave {
                 0 => first,
                 WAVES => 1,
                 _ => other,
             };
-            self.pass(shaders::VOTE, wave == WAVES, std::iter::once(uniform).chain(buffers), [turns, 1])
+            self.pass(shaders::VOTE, wave == WAVES, std::iter::once(uniform).chain(buffers), [workgroups, 1])
         };
         std::iter::once(band).chain((0..=WAVES).map(vote))
     }
 }
 
 impl Passes {
-    /// The passes over the buffers of pictures of `size` pixels.
+    /// Creates the passes over the buffers of pictures of `size` pixels.
     pub fn new(device: &Device, size: (u32, u32), b: &Buffers) -> Self {
         let maker = Maker { device, size: [size.0, size.1], b };
-        let smooth = |again, from, to| maker.over(shaders::SMOOTH, again, STRIP, [&b.measures, from, to]);
-        let steady = [&b.measures, &b.flags, &b.inverse, &b.colors, &b.lent, &b.memory, &b.before, &b.refined];
+        let smooth = |again, from, to| maker.tiled(shaders::SMOOTH, again, STRIP, [&b.measures, from, to]);
+        let steady = [&b.measures, &b.flags, &b.inverse, &b.colors, &b.scratch, &b.memory, &b.before, &b.refined];
         Self {
             prepare: maker.prepare(),
-            // What is left after the first time crosses rows that are full then.
+            // Holes left after the first run cross rows or columns that are then full.
             fill: [false, true]
                 .into_iter()
                 .flat_map(|again| maker.fill(again))
                 .chain([false, true].into_iter().flat_map(|again| maker.claim(again)))
                 .collect(),
-            align: [maker.noise(false), smooth(false, &b.filled, &b.lent), smooth(true, &b.lent, &b.inverse)]
+            align: [maker.noise(false), smooth(false, &b.filled, &b.scratch), smooth(true, &b.scratch, &b.inverse)]
                 .into_iter()
                 .chain([maker.noise(true)])
                 .chain((0..ROUNDS).flat_map(|round| maker.round(round)))
                 .collect(),
             change: [
-                maker.over(shaders::CHANGE, false, TILE, [&b.colors, &b.before, &b.lent]),
-                maker.single(shaders::MEDIAN, false, [&b.lent, &b.samples, &b.measures]),
+                maker.tiled(shaders::CHANGE, false, TILE, [&b.colors, &b.before, &b.scratch]),
+                maker.single(shaders::MEDIAN, false, [&b.scratch, &b.samples, &b.measures]),
             ],
-            steady: maker.over(shaders::STEADY, false, STRIP, steady),
+            steady: maker.tiled(shaders::STEADY, false, STRIP, steady),
         }
     }
 
-    /// Takes another buffer for the map as it comes.
+    /// Rebinds the passes after the map's buffer was replaced.
     pub fn set_map(&mut self, device: &Device, size: (u32, u32), b: &Buffers) {
         self.prepare = Maker { device, size: [size.0, size.1], b }.prepare();
     }
 
-    /// All passes of a frame; whether nothing is known of its map, and whether no frame before counts.
+    /// Records all passes of a frame; `is_empty` if its map has no known depth, `is_fresh` without a last frame.
     pub fn record(&self, recorder: &mut Recorder, is_empty: bool, is_fresh: bool) {
         let fill = self.fill.iter().filter(|_| !is_empty);
         let change = self.change.iter().filter(|_| !is_fresh);

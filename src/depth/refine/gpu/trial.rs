@@ -1,4 +1,4 @@
-//! Whether a device refines as the processor does.
+//! Checks that a device refines like the CPU.
 
 use std::sync::Arc;
 
@@ -12,13 +12,13 @@ const SIZE: (u32, u32) = (96, 64);
 const MAP_SIZE: (u32, u32) = (60, 40);
 const FRAMES: u32 = 3;
 const FRAME_NS: u64 = 33_000_000;
-/// A depth that differs by a larger share is wrong.
-const SHARE: f32 = 1e-3;
+/// Largest relative error of a correct depth.
+const MAX_ERROR: f32 = 1e-3;
 
-/// Refines a few small frames on the device and on the processor.
+/// Refines a few small frames on the device and on the CPU, and compares them.
 ///
 /// # Errors
-/// The device failed.
+/// Fails if the device fails.
 pub fn trial(device: &Arc<Device>) -> Result<Trial, GpuError> {
     let (mut cpu, mut gpu) = (Refiner::new(), GpuRefiner::new(device));
     let mut wrong = 0;
@@ -28,15 +28,15 @@ pub fn trial(device: &Arc<Device>) -> Result<Trial, GpuError> {
         let time_ns = u64::from(frame) * FRAME_NS;
         cpu.refine(&mut expected, &color, time_ns);
         gpu.refine(&mut made, &color, time_ns, 1.0)?;
-        // What is no number is not the same.
-        let is_same = |(a, b): &(&f32, &f32)| (*a - *b).abs() <= SHARE * *b;
+        // NaN counts as wrong.
+        let is_same = |(a, b): &(&f32, &f32)| (*a - *b).abs() <= MAX_ERROR * *b;
         wrong += expected.metres.len() - made.metres.iter().zip(&expected.metres).filter(is_same).count();
     }
     let all = (SIZE.0 * SIZE.1 * FRAMES) as usize;
     Ok(Trial { wrong, all, one_in: 100, results: "depths of a trial" })
 }
 
-/// Somebody before a wall, with noise and a shadow, whose outline in the map is off.
+/// Returns a person before a wall, with noise and an occlusion shadow, whose outline in the map is misplaced.
 fn scene(frame: u32) -> (ColorImage, DepthMap) {
     let chance = |k: usize| ((k as u32 ^ (frame << 20)).wrapping_mul(0x9e37_79b1) >> 24) as u8;
     let is_near = |x: u32, y: u32, (width, height): (u32, u32), wider: u32| {

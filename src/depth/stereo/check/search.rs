@@ -1,33 +1,33 @@
-//! Finds distinctive points of a picture, and the same points in another picture.
+//! Detects distinctive points in a picture, and finds them in another picture.
 
 use pulp::{Simd, WithSimd};
 
 use crate::frame::GrayImage;
 use crate::frame::scale::halve_rows;
 
-/// Rows above and below that are searched, in pixels of half resolution.
-const ROWS: i32 = 12;
-/// One point is taken from each square of this side, in pixels of half resolution.
+/// Search range in rows, up and down, at half resolution.
+const SEARCH_ROWS: i32 = 12;
+/// Side of the squares of which each yields one point, in pixels at half resolution.
 const CELL: usize = 16;
 /// Side of the compared windows at half resolution.
 const COARSE: usize = 8;
 /// Side of the compared windows at full resolution.
 const FINE: usize = 13;
-/// How far the place found at half resolution may be wrong at full resolution, in pixels.
-const STEP: i32 = 2;
-/// Half the side of the window in which a point's gradients are summed.
-const CORNER_REACH: usize = 2;
-/// Least squared gradient per pixel, across the direction in which it is least, of a distinctive point.
-const LEAST_CORNER: f32 = 16.0;
-/// Least correlation of a match.
-const LEAST_SCORE: f32 = 0.8;
-/// A match is unique if it lacks less than this part of what the second best place lacks to a correlation of 1.
-const UNIQUE: f32 = 0.6;
-/// Places this near to the best one belong to it, in pixels of half resolution.
-const SAME_PEAK: i32 = 3;
+/// Search radius around the match of half resolution, in pixels at full resolution.
+const FINE_RADIUS: i32 = 2;
+/// Radius of the window in which a point's gradients are summed.
+const CORNER_RADIUS: usize = 2;
+/// Minimum corner strength, per pixel: the smaller eigenvalue of the structure tensor.
+const MIN_CORNER_STRENGTH: f32 = 16.0;
+/// Minimum correlation of a match.
+const MIN_SCORE: f32 = 0.8;
+/// A match is unique if its distance to correlation 1 is at most this fraction of that of the second best place.
+const UNIQUENESS_RATIO: f32 = 0.6;
+/// Places this near to the best one belong to its peak, in pixels at half resolution.
+const PEAK_RADIUS: i32 = 3;
 
-/// A picture of half as many columns and rows.
-pub(super) fn halved(image: &GrayImage) -> GrayImage {
+/// Returns a picture with half as many columns and rows, averaged.
+pub(super) fn halve(image: &GrayImage) -> GrayImage {
     let (width, height, stride) = (image.width / 2, image.height / 2, image.width as usize);
     let mut luma = vec![0; width as usize * height as usize];
     let rows = image.luma.chunks_exact(2 * stride.max(1)).map(|rows| rows.split_at(stride));
@@ -37,30 +37,30 @@ pub(super) fn halved(image: &GrayImage) -> GrayImage {
     GrayImage { width, height, luma }
 }
 
-/// The most distinctive point of each cell, if it is distinctive at all, away from the border.
-pub(super) fn corners(image: &GrayImage) -> Vec<(i32, i32)> {
+/// Returns the strongest corner of each cell above the minimum strength, away from the border.
+pub(super) fn find_corners(image: &GrayImage) -> Vec<(i32, i32)> {
     let (width, height) = (image.width as usize, image.height as usize);
     let value = |x: usize, y: usize| f32::from(image.luma[y * width + x]);
-    // Shi and Tomasi's strength: the smaller eigenvalue of the structure tensor, the summed products of the gradients.
+    // The smaller eigenvalue of the structure tensor, which sums the products of the gradients (Shi and Tomasi).
     let strength_at = |x: usize, y: usize| {
         let (mut across, mut down, mut both) = (0.0, 0.0, 0.0);
-        for y in y - CORNER_REACH..=y + CORNER_REACH {
-            for x in x - CORNER_REACH..=x + CORNER_REACH {
+        for y in y - CORNER_RADIUS..=y + CORNER_RADIUS {
+            for x in x - CORNER_RADIUS..=x + CORNER_RADIUS {
                 let (gx, gy) = (value(x + 1, y) - value(x - 1, y), value(x, y + 1) - value(x, y - 1));
                 (across, down, both) = (across + gx * gx, down + gy * gy, both + gx * gy);
             }
         }
-        // The factor 4, as differences span two pixels.
+        // The factor 4 is there because differences span two pixels.
         let half: f32 = (across - down) / 2.0;
-        let pixels = ((2 * CORNER_REACH + 1) * (2 * CORNER_REACH + 1) * 4) as f32;
+        let pixels = ((2 * CORNER_RADIUS + 1) * (2 * CORNER_RADIUS + 1) * 4) as f32;
         ((across + down) / 2.0 - half.hypot(both)) / pixels
     };
-    // Both the compared windows and the gradients' stay inside.
+    // Keeps the compared windows and those of the gradients inside.
     let border = COARSE;
     let mut found = Vec::new();
     for top in (border..height.saturating_sub(border)).step_by(CELL) {
         for first in (border..width.saturating_sub(border)).step_by(CELL) {
-            let mut best = (LEAST_CORNER, 0, 0);
+            let mut best = (MIN_CORNER_STRENGTH, 0, 0);
             for y in top..(top + CELL).min(height - border) {
                 for x in (first..(first + CELL).min(width - border)).step_by(2) {
                     let strength = strength_at(x, y);
@@ -69,7 +69,7 @@ pub(super) fn corners(image: &GrayImage) -> Vec<(i32, i32)> {
                     }
                 }
             }
-            if best.0 > LEAST_CORNER {
+            if best.0 > MIN_CORNER_STRENGTH {
                 found.push((best.1 as i32, best.2 as i32));
             }
         }
@@ -77,20 +77,20 @@ pub(super) fn corners(image: &GrayImage) -> Vec<(i32, i32)> {
     found
 }
 
-/// A picture at half resolution, prepared to be searched.
+/// A picture at half resolution, prepared for searching.
 pub(super) struct Coarse {
     width: usize,
     height: usize,
     values: Vec<f32>,
-    /// For the window that begins at each pixel, 1 over the root of its squared deviations.
+    /// For the window that begins at each pixel, 1 over the root of its squared deviations; 0 without texture.
     inverse_norm: Vec<f32>,
-    /// Greatest disparity, either way.
-    reach: i32,
+    /// Largest disparity, either way.
+    max_disparity: i32,
 }
 
 impl Coarse {
-    /// Of a picture at half resolution; `reach` is the greatest disparity there.
-    pub fn new(image: &GrayImage, reach: i32) -> Self {
+    /// Prepares a picture at half resolution; `max_disparity` is the largest disparity there.
+    pub fn new(image: &GrayImage, max_disparity: i32) -> Self {
         let (width, height) = (image.width as usize, image.height as usize);
         let values: Vec<f32> = image.luma.iter().map(|&luma| f32::from(luma)).collect();
         let mut inverse_norm = vec![0.0; values.len()];
@@ -103,22 +103,22 @@ impl Coarse {
                     }
                 }
                 let variance = squares - sum * sum / (COARSE * COARSE) as f32;
-                // Below one level per pixel there is but noise.
+                // Variations below one level per pixel are only noise.
                 let is_textured = variance > (COARSE * COARSE) as f32;
                 inverse_norm[y * width + x] = if is_textured { variance.sqrt().recip() } else { 0.0 };
             }
         }
-        Self { width, height, values, inverse_norm, reach }
+        Self { width, height, values, inverse_norm, max_disparity }
     }
 }
 
-/// Finds the point `at` of the picture `from` in the picture `into`, at half resolution, by normalised correlation.
-/// Outputs how far across and down it moved; `None` where no match is good and unique.
+/// Finds the point `at` of the picture `from` in the picture `into`, at half resolution, by normalised
+/// cross-correlation. Outputs its displacement across and down; `None` without a good and unique match.
 pub(super) struct Search<'a> {
     pub from: &'a GrayImage,
     pub into: &'a Coarse,
     pub at: (i32, i32),
-    /// Memory for the scores of all places.
+    /// Buffer for the scores of all places.
     pub scores: &'a mut Vec<f32>,
 }
 
@@ -126,8 +126,8 @@ impl WithSimd for Search<'_> {
     type Output = Option<(i32, i32)>;
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) -> Option<(i32, i32)> {
-        let &Coarse { width, height, reach, .. } = self.into;
-        // Windows are named by their upper left pixel.
+        let &Coarse { width, height, max_disparity, .. } = self.into;
+        // Windows are identified by their upper left pixel.
         let (x, y) = (self.at.0 - COARSE as i32 / 2, self.at.1 - COARSE as i32 / 2);
         let mut patch = [0.0_f32; COARSE * COARSE];
         for (row, patch) in patch.chunks_exact_mut(COARSE).enumerate() {
@@ -135,15 +135,15 @@ impl WithSimd for Search<'_> {
             patch.iter_mut().zip(from).for_each(|(patch, &luma)| *patch = f32::from(luma));
         }
         let mean = patch.iter().sum::<f32>() / patch.len() as f32;
-        // The patch sums to 0 from here on, so that the mean of the window it is compared with cancels out.
+        // Zero mean: the mean of the compared window then cancels out.
         patch.iter_mut().for_each(|value| *value -= mean);
         let norm = patch.iter().map(|value| value * value).sum::<f32>().sqrt();
         if norm == 0.0 {
             return None;
         }
-        let first_x = (x - reach).max(0);
-        let places = ((x + reach).min((width - COARSE) as i32) - first_x + 1) as usize;
-        let rows = (y - ROWS).max(0)..(y + ROWS).min((height - COARSE) as i32) + 1;
+        let first_x = (x - max_disparity).max(0);
+        let places = ((x + max_disparity).min((width - COARSE) as i32) - first_x + 1) as usize;
+        let rows = (y - SEARCH_ROWS).max(0)..(y + SEARCH_ROWS).min((height - COARSE) as i32) + 1;
         self.scores.clear();
         self.scores.resize(places * rows.len(), 0.0);
         for (scores, top) in self.scores.chunks_exact_mut(places).zip(rows.clone()) {
@@ -161,45 +161,45 @@ impl WithSimd for Search<'_> {
                 *score *= inverse_norm / norm;
             }
         }
-        let move_of = |k: usize| (first_x + (k % places) as i32 - x, rows.start + (k / places) as i32 - y);
+        let displacement_of = |k: usize| (first_x + (k % places) as i32 - x, rows.start + (k / places) as i32 - y);
         let (mut best, mut score) = (0, 0.0);
         for (k, &other) in self.scores.iter().enumerate() {
             if other > score {
                 (best, score) = (k, other);
             }
         }
-        let (dx, dy) = move_of(best);
+        let (dx, dy) = displacement_of(best);
         let is_elsewhere = |k: usize| {
-            let (other_dx, other_dy) = move_of(k);
-            (other_dx - dx).abs() > SAME_PEAK || (other_dy - dy).abs() > SAME_PEAK
+            let (other_dx, other_dy) = displacement_of(k);
+            (other_dx - dx).abs() > PEAK_RADIUS || (other_dy - dy).abs() > PEAK_RADIUS
         };
-        // A score above this elsewhere comes too near to the best.
-        let rival = 1.0 - (1.0 - score) / UNIQUE;
+        // A higher score elsewhere would make the match ambiguous.
+        let rival = 1.0 - (1.0 - score) / UNIQUENESS_RATIO;
         let is_unique = !self.scores.iter().enumerate().any(|(k, &other)| other > rival && is_elsewhere(k));
-        (score > LEAST_SCORE && is_unique).then_some((dx, dy))
+        (score > MIN_SCORE && is_unique).then_some((dx, dy))
     }
 }
 
-/// Refines the move (across, down) of the point `at`, about `moved`, at full resolution to parts of a pixel; `None`
-/// where no score around it peaks.
-pub(super) fn refined(left: &GrayImage, right: &GrayImage, at: (i32, i32), moved: (i32, i32)) -> Option<(f32, f32)> {
-    const SIDE: usize = (2 * STEP + 1) as usize;
-    let patch = window(left, at)?;
+/// Refines the displacement (across, down) of the point `at`, about `moved`, at full resolution with subpixel accuracy;
+/// `None` without a peak.
+pub(super) fn refine(left: &GrayImage, right: &GrayImage, at: (i32, i32), moved: (i32, i32)) -> Option<(f32, f32)> {
+    const SIDE: usize = (2 * FINE_RADIUS + 1) as usize;
+    let patch = normalized_window(left, at)?;
     let mut scores = [[0.0; SIDE]; SIDE];
-    let (mut score, mut peak) = (LEAST_SCORE, None);
-    for (dy, scores) in (-STEP..).zip(&mut scores) {
-        for (dx, place) in (-STEP..).zip(scores) {
-            let other = window(right, (at.0 + moved.0 + dx, at.1 + moved.1 + dy))?;
+    let (mut score, mut peak) = (MIN_SCORE, None);
+    for (dy, scores) in (-FINE_RADIUS..).zip(&mut scores) {
+        for (dx, place) in (-FINE_RADIUS..).zip(scores) {
+            let other = normalized_window(right, (at.0 + moved.0 + dx, at.1 + moved.1 + dy))?;
             *place = patch.iter().zip(&other).map(|(a, b)| a * b).sum::<f32>();
             if *place > score {
                 (score, peak) = (*place, Some((dx, dy)));
             }
         }
     }
-    // At the rim of the searched square the peak may lie beyond, and the parabola lacks a score.
-    let (dx, dy) = peak.filter(|(dx, dy)| dx.abs() < STEP && dy.abs() < STEP)?;
-    let (column, row) = ((dx + STEP) as usize, (dy + STEP) as usize);
-    // The top of the parabola through three scores.
+    // At the rim of the search square the peak may lie beyond, and the parabola lacks a score.
+    let (dx, dy) = peak.filter(|(dx, dy)| dx.abs() < FINE_RADIUS && dy.abs() < FINE_RADIUS)?;
+    let (column, row) = ((dx + FINE_RADIUS) as usize, (dy + FINE_RADIUS) as usize);
+    // Vertex of the parabola through three scores.
     let top = |before: f32, after: f32| {
         let bend = before - 2.0 * score + after;
         if bend < 0.0 { (before - after) / (2.0 * bend) } else { 0.0 }
@@ -209,8 +209,8 @@ pub(super) fn refined(left: &GrayImage, right: &GrayImage, at: (i32, i32), moved
     Some(((moved.0 + dx) as f32 + across, (moved.1 + dy) as f32 + down))
 }
 
-/// The window around a pixel, scaled to mean 0 and norm 1; `None` where it leaves the picture or is of one grey.
-fn window(image: &GrayImage, (x, y): (i32, i32)) -> Option<[f32; FINE * FINE]> {
+/// Returns the window around a pixel, scaled to mean 0 and norm 1; `None` if it leaves the picture or has no texture.
+fn normalized_window(image: &GrayImage, (x, y): (i32, i32)) -> Option<[f32; FINE * FINE]> {
     let (x, y) = (x - FINE as i32 / 2, y - FINE as i32 / 2);
     let is_inside = x >= 0 && y >= 0 && x + FINE as i32 <= image.width as i32 && y + FINE as i32 <= image.height as i32;
     let mut values = [0.0; FINE * FINE];
@@ -232,7 +232,7 @@ fn window(image: &GrayImage, (x, y): (i32, i32)) -> Option<[f32; FINE * FINE]> {
 mod tests {
     use super::*;
 
-    /// Two rows or columns that are brighter by `step`, then two that are not, both ways.
+    /// Returns a grid whose every other two rows and two columns are brighter by `step`.
     fn squares(step: u8) -> GrayImage {
         let brighter = |at: usize| if at % 4 / 2 == 1 { step } else { 0 };
         let luma = (0..48 * 48).map(|at| 100 + brighter(at % 48) + brighter(at / 48)).collect();
@@ -241,9 +241,9 @@ mod tests {
 
     #[test]
     fn a_point_is_distinctive_from_the_stated_gradient_on() {
-        // Gradients of half a step across and down at each pixel; over 5x5 of them, the least direction has 0.24
+        // Gradients of half a step across and down at each pixel; over 5x5 of them, the smaller eigenvalue is 0.24
         // step^2.
-        assert!(corners(&squares(8)).is_empty(), "15.4 is less than 16");
-        assert_eq!(corners(&squares(9)).len(), 4, "one of each cell away from the border");
+        assert!(find_corners(&squares(8)).is_empty(), "15.4 is less than 16");
+        assert_eq!(find_corners(&squares(9)).len(), 4, "one of each cell away from the border");
     }
 }

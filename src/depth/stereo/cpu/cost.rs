@@ -1,24 +1,25 @@
-//! The matching cost of a disparity at a pixel: the bits in which the census codes of both eyes differ (their Hamming
-//! distance), averaged over 3x3 pixels.
+//! The matching cost: Hamming distance of the census codes of a left and a right pixel, aggregated over 3x3 pixels.
+//!
+//! twin: shaders/stereo_cost.wgsl
 
 use super::super::fixed::{BONUS, OUTSIDE};
 use super::GROUP;
 use super::census::PLANES;
 use crate::compute::aligned::Line;
 
-/// Rows whose differences the costs of a group are made of: one more above and one below.
+/// Rows of codes that the costs of a group need: one more above and one below.
 pub const ROWS: usize = GROUP + 2;
 
-/// Census of a left row, and of the right one from its last column to its first.
+/// Census planes of a left row, and of the right one in mirrored order.
 pub type Codes<'a> = [[&'a [u8]; PLANES]; 2];
 
-/// Makes the costs of a group of rows, 0 to 27, column by column from the last one: an eighth of the sum of the
-/// differences over three rows and columns.
+/// Computes the costs of a group of rows, 0 to 27, from the last column to the first: an eighth of the sum of the
+/// distances over three rows and columns.
 pub struct Costs<'a, const N: usize> {
     /// From the row above the group to the one below it.
     codes: [Codes<'a>; ROWS],
     width: usize,
-    /// Differences summed over three rows: of the column whose costs are next, and of it and the one right of it.
+    /// Distances summed over three rows: of the column whose costs are next, and of it plus the one right of it.
     here: Line<[[u8; N]; GROUP]>,
     two: Line<[[u8; N]; GROUP]>,
 }
@@ -26,7 +27,7 @@ pub struct Costs<'a, const N: usize> {
 impl<'a, const N: usize> Costs<'a, N> {
     #[inline(always)]
     pub fn new(mut codes: [Codes<'a>; ROWS], width: usize) -> Self {
-        // Slices of one length need one bounds check.
+        // Slices of equal length need only one bounds check.
         for [left, right] in &mut codes {
             for plane in 0..PLANES {
                 left[plane] = &left[plane][..width];
@@ -35,20 +36,20 @@ impl<'a, const N: usize> Costs<'a, N> {
         }
         let mut first = Self { codes, width, here: Line([[0; N]; GROUP]), two: Line([[0; N]; GROUP]) };
         // Beyond the borders the outermost columns repeat.
-        first.go_on(width - 1);
-        first.go_on(width - 1);
+        first.advance(width - 1);
+        first.advance(width - 1);
         first
     }
 
-    /// The costs of column `x` of each row, which is the next one.
+    /// Returns the costs of column `x` in each row; columns must be requested from the last to the first.
     #[inline(always)]
-    pub fn of_column(&mut self, x: usize) -> Line<[[u8; N]; GROUP]> {
-        self.go_on(x.saturating_sub(1))
+    pub fn next_column(&mut self, x: usize) -> Line<[[u8; N]; GROUP]> {
+        self.advance(x.saturating_sub(1))
     }
 
-    /// Takes the differences of column `x`; returns the costs of the one before.
+    /// Adds the distances of column `x` to the running sums; returns the costs of the column right of it.
     #[inline(always)]
-    fn go_on(&mut self, x: usize) -> Line<[[u8; N]; GROUP]> {
+    fn advance(&mut self, x: usize) -> Line<[[u8; N]; GROUP]> {
         // The partner at disparity d is in column x - d, which is this one plus d in the mirrored row.
         let first = self.width - 1 - x;
         let mut left = [[0; PLANES]; ROWS];
@@ -80,16 +81,16 @@ impl<'a, const N: usize> Costs<'a, N> {
     }
 }
 
-/// Bits of three bytes, 0 to 24.
+/// Counts the bits of three bytes, 0 to 24.
 #[inline(always)]
 fn bits(a: u8, b: u8, c: u8) -> u8 {
-    // They add up to ones and twos, so that two bytes are counted for three.
+    // A carry-save adder: the population counts of two bytes suffice for three.
     let (ones, twos) = (a ^ b ^ c, (a & b) | (c & (a | b)));
     ones.count_ones() as u8 + 2 * twos.count_ones() as u8
 }
 
-/// What a pixel's cost at disparity `d` is lowered by: [`BONUS`] if its disparity is likely to be that or one beside it.
-/// `likely` is one more than the likely disparity, or 0 where none is.
+/// Returns the reduction of a pixel's cost by disparity: [`BONUS`] for the likely disparity and those one above and
+/// below it. `likely` is one more than the likely disparity, or 0 without one.
 #[inline(always)]
 pub fn bonus(likely: u16) -> impl Fn(u8) -> u8 {
     let (near, bonus) = (likely.wrapping_sub(1) as u8, if likely > 0 { BONUS } else { 0 });
@@ -97,13 +98,14 @@ pub fn bonus(likely: u16) -> impl Fn(u8) -> u8 {
     move |d| if d.max(near) - d.min(near) <= 1 { bonus } else { 0 }
 }
 
-/// The first `N` values.
+/// Returns the first `N` values.
 #[inline(always)]
 pub fn array<const N: usize>(values: &[u8]) -> &[u8; N] {
     values.first_chunk().expect("rows are long enough")
 }
 
-/// The disparities as bytes. From memory: the compiler compares an index in 64 bits, whatever it is converted to.
+/// Returns the disparities as bytes. They are read from memory, because the compiler compares a loop index in 64 bits,
+/// whatever it is converted to.
 #[inline(always)]
 pub fn numbers<const N: usize>() -> &'static [u8; N] {
     static NUMBERS: Line<[u8; 256]> = {

@@ -1,4 +1,4 @@
-//! The CPU executor: every core, the best vector instructions that the machine has, nothing allocated per pair.
+//! The CPU executor: multithreaded vector code, without allocations per pair.
 
 mod census;
 mod cost;
@@ -20,13 +20,13 @@ use crate::compute::GpuError;
 use crate::compute::bands::Bands;
 use crate::compute::thread_pool::ThreadPool;
 
-/// Rows whose values lie side by side, `[column][row][disparity]`, as one part of the work.
+/// Rows that are processed together as one work item, with values stored as `[column][row][disparity]`.
 const GROUP: usize = 4;
 
 /// Matches pairs of one size on the CPU.
 pub struct CpuExecutor {
     width: usize,
-    /// Islands of up to so many pixels are dropped.
+    /// Islands of at most this many pixels are removed.
     island: u32,
     prior: Prior,
     semi_global: SemiGlobal,
@@ -34,7 +34,8 @@ pub struct CpuExecutor {
 }
 
 impl CpuExecutor {
-    /// For pairs of this size, and at least as many disparities, at most 256; drops islands of up to `island` pixels.
+    /// Creates an executor for pairs of this size and at least `disparities` candidates, at most 256, that removes
+    /// islands of up to `island` pixels.
     pub fn new(size: (usize, usize), disparities: usize, island: u32, threads: usize) -> Self {
         Self {
             width: size.0,
@@ -51,13 +52,13 @@ impl Executor for CpuExecutor {
         self.semi_global.describe()
     }
 
-    fn disparities(&mut self, eyes: [&[u8]; 2], workers: &mut ThreadPool, out: &mut [u16]) -> Result<(), GpuError> {
+    fn disparities(&mut self, pair: [&[u8]; 2], workers: &mut ThreadPool, out: &mut [u16]) -> Result<(), GpuError> {
         let Self { width, prior, semi_global, speckles, .. } = self;
         let width = *width;
-        semi_global.winners(eyes, prior.likely(eyes[0], workers), workers, out);
+        semi_global.winners(pair, prior.likely(pair[0], workers), workers, out);
         speckles.remove(out, width, self.island, workers);
-        // Before filling: what was not matched says nothing about the next pair.
-        prior.keep(eyes[0], out);
+        // Before filling: filled disparities are no evidence for the next pair.
+        prior.keep(pair[0], out);
         let bands = Bands::new(out.len() / width, 1, workers).split(out, width);
         workers.run_each(bands, &|band: &mut [u16]| {
             for row in band.chunks_exact_mut(width) {

@@ -1,8 +1,10 @@
-//! Temporal prior: where the picture has not changed since the last pair, its disparity is likely what it was.
+//! Temporal prior: where the picture has not changed since the last pair, the last disparity is likely.
 //!
-//! A blank wall costs much the same at any disparity, and noise decides anew for every frame. There a small bonus for
-//! the last disparity decides instead. Where there is texture, the right disparity is better by more than the bonus, so
-//! that nothing that moved keeps its old one.
+//! A textureless wall costs about the same at any disparity, so that noise decides anew in every frame. There a small
+//! bonus for the last disparity decides instead. In textured areas the correct disparity is better by more than the
+//! bonus, so that moving objects do not keep an old one.
+//!
+//! twin: shaders/stereo_likely.wgsl
 
 use pulp::{Arch, WithSimd};
 
@@ -10,28 +12,28 @@ use super::super::fixed::{NOISE, ONE, UNKNOWN};
 use crate::compute::bands::Bands;
 use crate::compute::thread_pool::{MOST_ITEMS, ThreadPool};
 
-/// Remembers the last pair.
+/// Stores the last pair.
 #[derive(Debug, Default)]
 pub struct Prior {
     width: usize,
     /// The last left picture; empty before the first.
     luma: Vec<u8>,
-    /// The last disparities that both eyes agreed on, in fixed point.
+    /// The last disparities that passed the left-right consistency check, in fixed point.
     map: Vec<u16>,
-    /// A row for each band: sums of the changes of three neighbours in a column.
+    /// One row per band: changes summed over three rows.
     changes: Vec<u16>,
-    /// One more than the whole disparity that is likely, or 0.
+    /// One more than the likely disparity in whole pixels, or 0.
     likely: Vec<u16>,
 }
 
 impl Prior {
-    /// No memory yet of pictures of so many columns.
+    /// Creates a prior without a last pair, for pictures of `width` columns.
     pub fn new(width: usize) -> Self {
         Self { width, ..Self::default() }
     }
 
-    /// One more than the whole disparity that is likely for each pixel of the left picture `luma`, or 0; nothing before
-    /// the first pair.
+    /// Returns one more than the likely disparity of each pixel of the left picture `luma`, in whole pixels, or 0;
+    /// `None` before the first pair.
     pub fn likely(&mut self, luma: &[u8], workers: &mut ThreadPool) -> Option<&[u16]> {
         if self.luma.len() != luma.len() {
             return None;
@@ -54,7 +56,7 @@ impl Prior {
         Some(likely)
     }
 
-    /// Remembers a pair: its left picture, and its disparities in fixed point or [`UNKNOWN`].
+    /// Stores a pair: its left picture, and its disparities in fixed point or [`UNKNOWN`].
     pub fn keep(&mut self, luma: &[u8], map: &[u16]) {
         self.luma.clear();
         self.luma.extend_from_slice(luma);
@@ -63,9 +65,9 @@ impl Prior {
     }
 }
 
-/// What is likely in a row.
+/// Computes the likely disparities of a row.
 struct Likely<'a> {
-    /// The present and the last picture, in it and the rows above and below.
+    /// Current and last picture, in this row and those above and below.
     rows: [[&'a [u8]; 2]; 3],
     /// The last disparities.
     map: &'a [u16],
@@ -95,7 +97,7 @@ impl WithSimd for Likely<'_> {
             let change = changes[x.saturating_sub(1)] + changes[x] + changes[(x + 1).min(last)];
             likely[x] = pick(map[x], change);
         }
-        // Slices of one length need no bounds checks: vector code.
+        // Slices of equal length need no bounds checks, so that this loop becomes vector code.
         let inner = width.saturating_sub(2);
         let (before, here, after) =
             (&changes[..inner], &changes[width - inner - 1..][..inner], &changes[width - inner..]);

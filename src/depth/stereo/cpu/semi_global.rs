@@ -1,8 +1,8 @@
-//! Semi-global matching: the disparities that both eyes agree on.
+//! Semi-global matching with a left-right consistency check.
 //!
-//! The picture is worked on from the top, some rows at a time: a group of rows is one thread's, from the census to the
-//! winners, so that what is made of them stays in the cache of one core. Only the paths down the columns go from group
-//! to group, and so from thread to thread.
+//! Each work item is a group of rows: one thread computes everything from the costs to the winners, so that
+//! intermediate results stay in the cache of one core. Only the paths down the columns pass from group to group, and so
+//! from thread to thread.
 
 use std::sync::atomic::AtomicBool;
 use std::{array, iter};
@@ -14,8 +14,8 @@ use super::super::penalty::Penalties;
 use super::GROUP;
 use super::census::{self, Census};
 use super::path::{Paths, StepPenalties};
-use super::sweep::{Agreed, BLOCK, Cells, Down, FromLeft, FromRight};
-use super::winner::Eyes;
+use super::sweep::{BLOCK, Cells, ConsistencyCheck, DownPaths, FromLeft, FromRight};
+use super::winner::Winners;
 use crate::compute::simd;
 use crate::compute::thread_pool::relay::Relay;
 use crate::compute::thread_pool::{DisjointParts, ThreadPool};
@@ -29,30 +29,30 @@ pub struct SemiGlobal {
     penalties: Penalties,
     left: Census,
     right: Census,
-    /// The paths down the columns.
-    down: Relay<Down>,
-    members: Vec<Member>,
-    /// Flags with which [`DisjointParts`] hands each part to one thread only.
+    /// The paths down the columns, by block.
+    down: Relay<DownPaths>,
+    scratch: Vec<Scratch>,
+    /// Flags with which [`DisjointParts`] ensures that only one thread writes each part.
     taken: Vec<AtomicBool>,
 }
 
-/// Memory of one thread.
-struct Member {
+/// Buffers of one thread.
+struct Scratch {
     p2: StepPenalties,
     cells: Cells,
     paths: Paths,
-    eyes: Eyes,
+    winners: Winners,
 }
 
 impl SemiGlobal {
-    /// For pairs of this size, and at least as many disparities, at most 256.
+    /// Allocates for pairs of this size and at least `disparities` candidates, at most 256.
     pub fn new((width, height): (usize, usize), disparities: usize, threads: usize) -> Self {
         let disparities = fixed::range(disparities);
-        let member = || Member {
+        let new_scratch = || Scratch {
             p2: StepPenalties::new(width),
             cells: Cells::new(width, disparities),
             paths: Paths::new(),
-            eyes: Eyes::new(width, disparities),
+            winners: Winners::new(width, disparities),
         };
         Self {
             width,
@@ -62,14 +62,14 @@ impl SemiGlobal {
             penalties: Penalties::new(),
             left: Census::new((width, height), false, 0),
             right: Census::new((width, height), true, disparities),
-            down: Relay::new((0..width.div_ceil(BLOCK)).map(|_| Down::new(disparities))),
-            members: iter::repeat_with(member).take(threads).collect(),
-            // The census shares out padded rows.
-            taken: iter::repeat_with(AtomicBool::default).take(height + 2 * census::REACH).collect(),
+            down: Relay::new((0..width.div_ceil(BLOCK)).map(|_| DownPaths::new(disparities))),
+            scratch: iter::repeat_with(new_scratch).take(threads).collect(),
+            // The census transform distributes padded rows.
+            taken: iter::repeat_with(AtomicBool::default).take(height + 2 * census::RADIUS).collect(),
         }
     }
 
-    /// Matches a pair, whose census is known, with `N` disparities.
+    /// Matches a pair whose census codes are computed, with `N` disparities.
     fn match_range<const N: usize>(
         &mut self,
         left: &[u8],
@@ -78,37 +78,37 @@ impl SemiGlobal {
         out: &mut [u16],
     ) {
         let Self { width, height, arch, ref penalties, .. } = *self;
-        self.down.begin(Down::clear);
+        self.down.begin(DownPaths::clear);
         let (down, census) = (&self.down, [&self.left, &self.right]);
         let out = DisjointParts::new(out, GROUP * width, &mut self.taken);
-        workers.run_with(&mut self.members, height.div_ceil(GROUP), &|Member { p2, cells, paths, eyes }, part| {
+        workers.run_with(&mut self.scratch, height.div_ceil(GROUP), &|Scratch { p2, cells, paths, winners }, part| {
             let mut blocks = down.runner(part);
-            // The row `k` below the one above the group; beyond the borders the outermost ones repeat.
+            // Row 0 is the one above the group; beyond the borders the outermost rows repeat.
             let row = |k: usize| (part * GROUP + k).saturating_sub(1).min(height - 1);
             let pixels = |y: usize| y * width..(y + 1) * width;
             p2.compute(array::from_fn(|k| &left[pixels(row(k))]), penalties);
-            // Costs are sums over three rows, so one above and one below the group are read, too.
+            // Costs are sums over three rows, so that one row above and one below the group are needed, too.
             let codes = array::from_fn(|k| census.map(|census| census.row(row(k))));
             let likely = likely.map(|likely| array::from_fn(|k| &likely[pixels(row(k + 1))]));
             paths.clear::<N>();
             arch.dispatch(FromRight::<N> { codes, p2, likely, cells, paths });
             paths.clear::<N>();
-            eyes.clear();
+            winners.clear();
             for first in (0..width).step_by(BLOCK) {
                 let Some(mut down) = blocks.next_block() else { break };
-                arch.dispatch(FromLeft::<N> { p2, cells, first, paths, down: &mut down, eyes });
+                arch.dispatch(FromLeft::<N> { p2, cells, first, paths, down: &mut down, winners });
             }
-            arch.dispatch(Agreed { eyes, out: out.part(part) });
+            arch.dispatch(ConsistencyCheck { winners, out: out.part(part) });
         });
     }
 
-    /// What runs it.
+    /// Describes the executor.
     pub fn describe(&self) -> String {
-        format!("cpu, {} threads, {}", self.members.len(), simd::name(self.arch))
+        format!("cpu, {} threads, {}", self.scratch.len(), simd::name(self.arch))
     }
 
     /// Writes the disparities of the left picture to `out`, in fixed point, or unknown. `likely` has one more than the
-    /// whole disparity that is likely for a pixel, or 0: that one and those beside it cost less by [`fixed::BONUS`].
+    /// likely disparity of each pixel, or 0: that one and those beside it cost [`fixed::BONUS`] less.
     pub fn winners(
         &mut self,
         [left, right]: [&[u8]; 2],

@@ -1,4 +1,6 @@
-//! The speckle filter: small islands whose disparity differs from all around them are mismatches, and become unknown.
+//! The speckle filter: removes small islands whose disparity differs from their surroundings, which are mismatches.
+//!
+//! twin: shaders/stereo_runs.wgsl, shaders/stereo_join.wgsl, shaders/stereo_sizes.wgsl, shaders/stereo_gaps.wgsl
 
 use std::ops::Range;
 
@@ -6,20 +8,20 @@ use super::super::fixed::{STEP, UNKNOWN};
 use crate::compute::bands::Bands;
 use crate::compute::thread_pool::{MOST_ITEMS, ThreadPool};
 
-/// Removes islands, found by union-find over runs of rows; owns the memory for it.
+/// Removes islands, which are connected components found by union-find over runs of rows; owns its buffers.
 ///
-/// Each band of rows has as many places for runs as it has pixels, and fills the first ones: so threads find the runs of
-/// bands, and the islands within each, before those that cross from band to band are joined.
+/// Each band of rows has room for as many runs as it has pixels, and fills the first entries: so threads find the runs
+/// and the islands of their bands in parallel, before islands that cross bands are joined.
 #[derive(Debug, Default)]
 pub struct Speckles {
     runs: Vec<Run>,
-    /// Of each run, the place of another run of its island, or its own.
+    /// For each run, the index of another run of its island, or its own.
     parents: Vec<u32>,
-    /// Of each run that is its own parent, the pixels of the island.
+    /// For each run that is its own parent, the number of pixels of the island.
     pixels: Vec<u32>,
 }
 
-/// Columns `start` to `end` (exclusive) of row `y`, whose neighbours belong together.
+/// Connected pixels of row `y`: columns `start` to `end` (exclusive).
 #[derive(Clone, Copy, Debug, Default)]
 struct Run {
     y: u32,
@@ -27,23 +29,23 @@ struct Run {
     end: u32,
 }
 
-/// The runs of a band of rows, and the islands that they are of.
+/// The runs and islands of a band of rows.
 struct Band<'a> {
     rows: Range<usize>,
     runs: &'a mut [Run],
     parents: &'a mut [u32],
     pixels: &'a mut [u32],
-    /// Takes the places of its first run and of one past its last.
+    /// Receives the index of the first run and of one past the last.
     places: &'a mut Range<usize>,
 }
 
 impl Speckles {
-    /// For maps of this many pixels: no memory is taken later.
+    /// Allocates for maps of this many pixels; nothing is allocated later.
     pub fn new(pixels: usize) -> Self {
         Self { runs: vec![Run::default(); pixels], parents: vec![0; pixels], pixels: vec![0; pixels] }
     }
 
-    /// Makes all islands of `map`, `width` columns, unknown that have at most `max_pixels`.
+    /// Sets all islands of `map`, `width` columns wide, that have at most `max_pixels` to unknown.
     pub fn remove(&mut self, map: &mut [u16], width: usize, max_pixels: u32, workers: &mut ThreadPool) {
         let bands = Bands::new(map.len() / width, 1, workers);
         let mut places: [Range<usize>; MOST_ITEMS] = std::array::from_fn(|_| 0..0);
@@ -68,14 +70,14 @@ impl Speckles {
         });
     }
 
-    /// Joins the islands of a band and of the one below it, whose runs have these places.
+    /// Joins the islands of a band and of the one below it, whose runs have these indices.
     fn join_bands(&mut self, above: &Range<usize>, below: &Range<usize>, map: &[u16], width: usize) {
         let Self { runs, parents, pixels } = self;
         let (upper, lower) = (&runs[above.clone()], &runs[below.clone()]);
         let Some(first) = lower.first() else { return };
         let first_row = &lower[..lower.partition_point(|run| run.y == first.y)];
         let skipped = upper.partition_point(|run| run.y + 1 < first.y);
-        each_touching(&upper[skipped..], first_row, map, width, |a, b| {
+        for_each_touching(&upper[skipped..], first_row, map, width, |a, b| {
             let (a, b) = (root(parents, above.start + skipped + a), root(parents, below.start + b));
             if a != b {
                 parents[a.max(b)] = a.min(b) as u32;
@@ -93,15 +95,15 @@ impl Band<'_> {
         let count = find_runs(rows, map, width, runs);
         *places = first..first + count;
         let (runs, parents, pixels) = (&runs[..count], &mut parents[..count], &mut pixels[..count]);
-        // By their numbers in the band.
+        // Parents are indices within the band at first.
         for (number, parent) in parents.iter_mut().enumerate() {
             *parent = number as u32;
         }
-        each_touching(runs, runs, map, width, |a, b| {
+        for_each_touching(runs, runs, map, width, |a, b| {
             let (a, b) = (shortened_root(parents, a), shortened_root(parents, b));
             parents[a.max(b)] = a.min(b) as u32;
         });
-        // From here on by their places. Parents have lower numbers, so that theirs are known.
+        // From here on parents are global indices. They precede their children, so that theirs are already converted.
         pixels.fill(0);
         for number in 0..count {
             let parent = parents[number] as usize;
@@ -112,7 +114,7 @@ impl Band<'_> {
     }
 }
 
-/// Splits rows into runs of known pixels without a step; returns how many there are.
+/// Splits rows into runs of known pixels without a step; returns their number.
 fn find_runs(rows: Range<usize>, map: &[u16], width: usize, runs: &mut [Run]) -> usize {
     let mut count = 0;
     for y in rows {
@@ -132,10 +134,10 @@ fn find_runs(rows: Range<usize>, map: &[u16], width: usize, runs: &mut [Run]) ->
     count
 }
 
-/// Calls `join` with the numbers of a run of `above` and one of `below` that are in neighbouring rows and touch without a
-/// step, for all such pairs. Runs are in the order of the rows, and of the columns in them.
-fn each_touching(above: &[Run], below: &[Run], map: &[u16], width: usize, mut join: impl FnMut(usize, usize)) {
-    // The first run that may touch the present one.
+/// Calls `join` with the indices of each run of `above` and run of `below` that are in adjacent rows and touch without
+/// a step. Runs are sorted by row, then column.
+fn for_each_touching(above: &[Run], below: &[Run], map: &[u16], width: usize, mut join: impl FnMut(usize, usize)) {
+    // The first run that may touch the current one.
     let mut first = 0;
     for (number, run) in below.iter().enumerate() {
         while above.get(first).is_some_and(|a| a.y + 1 < run.y || (a.y + 1 == run.y && a.end <= run.start)) {
@@ -155,7 +157,7 @@ fn each_touching(above: &[Run], below: &[Run], map: &[u16], width: usize, mut jo
     }
 }
 
-/// The run that stands for the island of `run`.
+/// Returns the root of the island of `run`.
 fn root(parents: &[u32], mut run: usize) -> usize {
     while parents[run] as usize != run {
         run = parents[run] as usize;
@@ -163,7 +165,7 @@ fn root(parents: &[u32], mut run: usize) -> usize {
     run
 }
 
-/// The same; shortens the way to it for the next time.
+/// Returns the root of the island of `run`, and halves the path to it.
 fn shortened_root(parents: &mut [u32], mut run: usize) -> usize {
     while parents[run] as usize != run {
         let parent = parents[run] as usize;
@@ -203,7 +205,7 @@ mod tests {
         speckles.remove(&mut map, width, 28, &mut workers);
         assert_eq!(map.iter().filter(|&&d| d == UNKNOWN).count(), 12 + 16 + 28);
     }
-    /// The same, pixel by pixel.
+    /// Reference implementation by flood fill.
     fn removed(map: &[u16], width: usize, max_pixels: usize) -> Vec<u16> {
         let mut out = map.to_vec();
         let mut seen = vec![false; map.len()];
@@ -239,7 +241,7 @@ mod tests {
             state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
             (state >> 16) % below
         };
-        // Three levels and what is unknown, in patches; some rows have nothing.
+        // Three levels and unknown pixels, in patches; some rows are empty.
         let mut map = vec![0; width * height];
         for k in 0..map.len() {
             let other = if next(3) == 0 { k.saturating_sub(width) } else { k.saturating_sub(1) };
@@ -252,7 +254,7 @@ mod tests {
             for threads in [1, 2, 5] {
                 let mut workers = ThreadPool::new("test", threads);
                 let mut speckles = Speckles::new(map.len());
-                // Memory that another map has left.
+                // Fills the buffers with the remains of another map.
                 speckles.remove(&mut map.clone(), width, 3, &mut workers);
                 let mut ours = map.clone();
                 speckles.remove(&mut ours, width, max_pixels, &mut workers);

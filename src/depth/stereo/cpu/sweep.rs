@@ -1,23 +1,23 @@
-//! The sweeps over a group of rows: from the right with the costs and one path, then from the left with the other two
-//! paths and the winners. What the first leaves to the second stays in the cache of the core that makes both.
+//! The two sweeps over a group of rows: from the right with the costs and one path, then from the left with the other
+//! two paths and the winners. The output of the first stays in the cache of the core for the second.
 
 use pulp::WithSimd;
 
 use super::GROUP;
 use super::cost::{self, Codes, Costs};
 use super::path::{Paths, StepPenalties, Values};
-use super::winner::{Eyes, Row};
+use super::winner::{Row, Winners};
 use crate::compute::aligned::{Aligned, Line};
 
-/// What the sweep from the right leaves of a group, `[column][row]`: costs, and half of the values of the path from the
-/// right.
+/// Output of the sweep from the right for a group, `[column][row]`: the costs, and half of the values of the path from
+/// the right.
 pub struct Cells(Aligned<u8>);
 
-/// Of the rows of a column.
+/// Costs and halved path values of the rows of a column.
 type Cell<const N: usize> = [[[u8; N]; 2]; GROUP];
 
 impl Cells {
-    /// Of `width` columns.
+    /// Allocates for `width` columns.
     pub fn new(width: usize, disparities: usize) -> Self {
         Self(Aligned::zeros(width * GROUP * 2 * disparities))
     }
@@ -33,15 +33,15 @@ impl Cells {
     }
 }
 
-/// The costs of a group, and the path from the right.
+/// Computes the costs of a group, and the path from the right.
 pub struct FromRight<'a, const N: usize> {
     /// From the row above the group to the one below it.
     pub codes: [Codes<'a>; cost::ROWS],
     pub p2: &'a StepPenalties,
-    /// Of each row, one more than the likely disparity, or 0.
+    /// For each row, one more than the likely disparity of each pixel, or 0.
     pub likely: Option<[&'a [u16]; GROUP]>,
     pub cells: &'a mut Cells,
-    /// Before the first pixels.
+    /// The path values before the first pixels.
     pub paths: &'a mut Paths,
 }
 
@@ -54,15 +54,15 @@ impl<const N: usize> WithSimd for FromRight<'_, N> {
         let mut column = Column { p2, likely, costs: Costs::<N>::new(codes, width), cells: cells.columns_mut() };
         let [one, two] = &mut paths.along;
         for x in (0..width).rev().step_by(2) {
-            column.go_on(x, one, two);
+            column.advance(x, one, two);
             if x > 0 {
-                column.go_on(x - 1, two, one);
+                column.advance(x - 1, two, one);
             }
         }
     }
 }
 
-/// What each column of a sweep from the right needs.
+/// State of a sweep from the right.
 struct Column<'a, const N: usize> {
     p2: &'a StepPenalties,
     likely: Option<[&'a [u16]; GROUP]>,
@@ -71,37 +71,37 @@ struct Column<'a, const N: usize> {
 }
 
 impl<const N: usize> Column<'_, N> {
-    /// Takes the paths to column `x`.
+    /// Advances the paths to column `x`.
     #[inline(always)]
-    fn go_on(&mut self, x: usize, before: &[Values; GROUP], now: &mut [Values; GROUP]) {
-        let made = self.costs.of_column(x);
+    fn advance(&mut self, x: usize, before: &[Values; GROUP], now: &mut [Values; GROUP]) {
+        let raw_costs = self.costs.next_column(x);
         let along = &self.p2.along;
         let p2 = along[(x + 1).min(along.len() - 1)];
         let likely = self.likely.map_or([0; GROUP], |likely| likely.map(|row| row[x]));
         let cells = &mut self.cells[x];
         for row in 0..GROUP {
             let mut cell = Line([[0; N]; 2]);
-            step(&before[row], p2[row], likely[row], &made.0[row], &mut now[row], &mut cell.0);
+            step(&before[row], p2[row], likely[row], &raw_costs.0[row], &mut now[row], &mut cell.0);
             cells[row] = cell.0;
         }
     }
 }
 
-/// A step of a path: `made` are the costs without the bonus for the likely disparity.
+/// Computes a step of a path; `raw_costs` are the costs without the bonus for the likely disparity.
 #[inline(always)]
 fn step<const N: usize>(
     before: &Values,
     p2: u8,
     likely: u16,
-    made: &[u8; N],
+    raw_costs: &[u8; N],
     now: &mut Values,
     [costs, halves]: &mut [[u8; N]; 2],
 ) {
     let (step, bonus, numbers) = (before.step::<N>(p2), cost::bonus(likely), cost::numbers::<N>());
-    let values = now.of_mut::<N>();
+    let values = now.as_array_mut::<N>();
     let mut least = u8::MAX;
     for d in 0..N {
-        let cost = made[d].saturating_sub(bonus(numbers[d]));
+        let cost = raw_costs[d].saturating_sub(bonus(numbers[d]));
         let value = step.value(d, cost);
         costs[d] = cost;
         values[d] = value;
@@ -111,62 +111,62 @@ fn step<const N: usize>(
     now.least = least;
 }
 
-/// Columns of a block: an even number, so that the paths along the rows go on in the buffer that they left off in.
+/// Columns of a block: an even number, so that the paths along the rows continue in the buffer in which they stopped.
 pub const BLOCK: usize = 64;
 
-/// The paths down the columns of a block, at the last row so far.
-pub struct Down {
+/// The paths down the columns of a block, at the last row that was processed.
+pub struct DownPaths {
     /// `[column][disparity]`.
     values: Aligned<u8>,
     least: [u8; BLOCK],
 }
 
-impl Down {
+impl DownPaths {
     pub fn new(disparities: usize) -> Self {
         Self { values: Aligned::zeros(BLOCK * disparities), least: [0; BLOCK] }
     }
 
-    /// Back before the first row.
+    /// Resets the paths to before the first row.
     pub fn clear(&mut self) {
         self.values.fill(0);
         self.least.fill(0);
     }
 }
 
-/// The paths from the left and from above, in a block of columns, and the winners of the sums of all paths.
+/// Computes the paths from the left and from above in a block of columns, and the winners of the sums of all paths.
 pub struct FromLeft<'a, const N: usize> {
     pub p2: &'a StepPenalties,
     pub cells: &'a Cells,
     /// First column of the block.
     pub first: usize,
     pub paths: &'a mut Paths,
-    pub down: &'a mut Down,
-    pub eyes: &'a mut Eyes,
+    pub down: &'a mut DownPaths,
+    pub winners: &'a mut Winners,
 }
 
 impl<const N: usize> WithSimd for FromLeft<'_, N> {
     type Output = ();
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, _: S) {
-        let Self { p2, cells, first, paths, down, eyes } = self;
+        let Self { p2, cells, first, paths, down, winners } = self;
         let end = (first + BLOCK).min(p2.along.len());
         let mut block = Block::<N> {
             p2: [&p2.along[first..end], &p2.down[first..end]],
             cells: &cells.columns()[first..end],
             columns: end - first,
-            rows: eyes.rows(first..end),
+            rows: winners.rows(first..end),
         };
         let Paths { along: [one, two], down: between } = paths;
         between[0].set(&down.values.as_chunks::<N>().0[0], down.least[0]);
-        // Each row is a column behind the one above, so that no step waits for what was made just before it.
+        // Each row is one column behind the row above, so that consecutive steps do not depend on each other.
         for k in (0..block.columns + GROUP).step_by(2) {
-            block.go_on(k, down, between, one, two);
-            block.go_on(k + 1, down, between, two, one);
+            block.advance(k, down, between, one, two);
+            block.advance(k + 1, down, between, two, one);
         }
     }
 }
 
-/// What each step of a sweep from the left through a block needs.
+/// State of a sweep from the left through a block.
 struct Block<'a, const N: usize> {
     /// Along the rows and down the columns.
     p2: [&'a [[u8; GROUP]]; 2],
@@ -176,12 +176,12 @@ struct Block<'a, const N: usize> {
 }
 
 impl<const N: usize> Block<'_, N> {
-    /// Takes row 0 to column `k`, row 1 to the one before, and so on.
+    /// Advances row 0 to column `k`, row 1 to the one before, and so on.
     #[inline(always)]
-    fn go_on(
+    fn advance(
         &mut self,
         k: usize,
-        down: &mut Down,
+        down: &mut DownPaths,
         between: &mut [Values; GROUP + 1],
         before: &[Values; GROUP],
         now: &mut [Values; GROUP],
@@ -189,20 +189,20 @@ impl<const N: usize> Block<'_, N> {
         let states = &mut down.values.as_chunks_mut::<N>().0[..self.columns];
         let past = k.wrapping_sub(GROUP);
         if past < self.columns {
-            states[past] = *between[GROUP].of::<N>();
+            states[past] = *between[GROUP].as_array::<N>();
             down.least[past] = between[GROUP].least;
         }
         self.row::<3>(k, between, before, now);
         self.row::<2>(k, between, before, now);
         self.row::<1>(k, between, before, now);
         self.row::<0>(k, between, before, now);
-        // One step before it is read, too.
+        // Loaded one step ahead of its use.
         if k + 1 < self.columns {
             between[0].set(&states[k + 1], down.least[k + 1]);
         }
     }
 
-    /// Takes a row to its column; does nothing where that is outside the block.
+    /// Advances a row to its column, if that is inside the block.
     #[inline(always)]
     fn row<const ROW: usize>(
         &mut self,
@@ -220,11 +220,11 @@ impl<const N: usize> Block<'_, N> {
         let cell = Line(self.cells[x][ROW]);
         let (above, below) = between.split_at_mut(ROW + 1);
         step_two(&before[ROW], &above[ROW], p2, &cell.0, &mut now[ROW], &mut below[0], &mut sums.0);
-        self.rows[ROW].take(x, &sums.0);
+        self.rows[ROW].update(x, &sums.0);
     }
 }
 
-/// Steps of the path along a row and of the one down a column, and the sums of all three paths.
+/// Computes a step of the path along a row and of the one down a column, and the sums of all three paths.
 #[inline(always)]
 fn step_two<const N: usize>(
     before: &Values,
@@ -236,7 +236,7 @@ fn step_two<const N: usize>(
     sums: &mut [u8; N],
 ) {
     let (along, down) = (before.step::<N>(p2[0]), above.step::<N>(p2[1]));
-    let (along_values, down_values) = (now.of_mut::<N>(), below.of_mut::<N>());
+    let (along_values, down_values) = (now.as_array_mut::<N>(), below.as_array_mut::<N>());
     let (mut along_least, mut down_least) = (u8::MAX, u8::MAX);
     for d in 0..N {
         let (along, down) = (along.value(d, costs[d]), down.value(d, costs[d]));
@@ -247,16 +247,16 @@ fn step_two<const N: usize>(
     (now.least, below.least) = (along_least, down_least);
 }
 
-/// Writes what both eyes agree on to `out`.
-pub struct Agreed<'a> {
-    pub eyes: &'a Eyes,
+/// Writes the disparities that pass the left-right consistency check to `out`.
+pub struct ConsistencyCheck<'a> {
+    pub winners: &'a Winners,
     pub out: &'a mut [u16],
 }
 
-impl WithSimd for Agreed<'_> {
+impl WithSimd for ConsistencyCheck<'_> {
     type Output = ();
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, _: S) {
-        self.eyes.agreed(self.out);
+        self.winners.write_consistent(self.out);
     }
 }

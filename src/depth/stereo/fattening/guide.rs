@@ -1,35 +1,35 @@
-//! The picture whose colours say where surfaces end, channel by channel.
+//! The guide image whose colours show outlines, as separate channels.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::compute::thread_pool::{DisjointParts, ThreadPool};
 use crate::depth::stereo::color_similarity::Colors;
 
-/// Memory for the channels of a picture.
+/// Buffer of the channels of a picture.
 pub struct Guide {
     /// `[row][channel][column]`.
     channels: Vec<u8>,
     pixels: usize,
 }
 
-/// A picture of the size of a map.
+/// The channels of a picture of the size of a map.
 #[derive(Clone, Copy)]
 pub struct Channels<'a> {
     /// `[row][channel][column]`.
     values: &'a [u8],
     width: usize,
-    /// Rows have three channels, or one.
+    /// Whether rows have three channels instead of one.
     pub is_color: bool,
 }
 
 impl Guide {
-    /// For maps of so many pixels.
+    /// Allocates for maps of `pixels` pixels.
     pub fn new(pixels: usize) -> Self {
         Self { channels: Vec::with_capacity(3 * pixels), pixels }
     }
 
-    /// The channels of `colors`, or `luma` where there are none or all are alike.
-    pub fn of<'a>(
+    /// Returns the channels of `colors`, or `luma` if there are no colours or all pixels are grey.
+    pub fn fill_channels<'a>(
         &'a mut self,
         luma: &'a [u8],
         colors: Option<Colors>,
@@ -44,17 +44,17 @@ impl Guide {
         let rows = DisjointParts::new(&mut self.channels, 3 * width, taken);
         workers.run(self.pixels / width, &|y| {
             let row = &image.rgb[3 * image.width as usize * every * y..];
-            let [red, green, blue] = split(rows.part(y), width);
+            let [red, green, blue] = split_channels(rows.part(y), width);
             let mut differ = 0;
-            let mut take = |x: usize, pixel: &[u8]| {
+            let mut store = |x: usize, pixel: &[u8]| {
                 (red[x], green[x], blue[x]) = (pixel[0], pixel[1], pixel[2]);
                 differ |= (pixel[0] ^ pixel[1]) | (pixel[1] ^ pixel[2]);
             };
-            // Steps of a known length are a third of the time.
+            // With a constant step this takes a third of the time.
             if every == 1 {
-                row[..3 * width].as_chunks::<3>().0.iter().enumerate().for_each(|(x, pixel)| take(x, pixel));
+                row[..3 * width].as_chunks::<3>().0.iter().enumerate().for_each(|(x, pixel)| store(x, pixel));
             } else {
-                row.chunks(3 * every).take(width).enumerate().for_each(|(x, pixel)| take(x, pixel));
+                row.chunks(3 * every).take(width).enumerate().for_each(|(x, pixel)| store(x, pixel));
             }
             if differ != 0 {
                 is_color.store(true, Ordering::Relaxed);
@@ -64,14 +64,14 @@ impl Guide {
     }
 }
 
-fn split(row: &mut [u8], width: usize) -> [&mut [u8]; 3] {
+fn split_channels(row: &mut [u8], width: usize) -> [&mut [u8]; 3] {
     let (red, others) = row.split_at_mut(width);
     let (green, blue) = others.split_at_mut(width);
     [red, green, &mut blue[..width]]
 }
 
 impl<'a> Channels<'a> {
-    /// The channels of row `y`: red, green and blue, or three times the brightness.
+    /// Returns the channels of row `y`: red, green and blue, or the brightness three times.
     #[inline(always)]
     pub fn row(&self, y: usize) -> [&'a [u8]; 3] {
         let Self { values, width, .. } = *self;

@@ -7,16 +7,16 @@ const NEAR: u16 = 20 * ONE;
 const FAR: u16 = 4 * ONE;
 const SKIN: [u8; 3] = [200, 140, 110];
 const WALL: [u8; 3] = [60, 90, 120];
-/// As far as windows reach.
+/// Radius of the matching window.
 const FAT_PX: isize = 4;
 
-/// Whether a pixel is of a near rectangle, `more` px wider on every side than what stands there.
+/// Whether a pixel is in a near rectangle, enlarged by `more` px on every side.
 fn is_near(x: usize, y: usize, more: isize) -> bool {
     let (x, y) = (x as isize, y as isize);
     (30 - more..60 + more).contains(&x) && (20 - more..44 + more).contains(&y)
 }
 
-/// The picture of the rectangle, its colours changed a little from pixel to pixel, and its disparities, `fat` px too wide.
+/// Returns a picture of the rectangle with slightly varying colours, and its disparities, `fat` px too wide.
 fn scene([near, far]: [[u8; 3]; 2], fat: isize) -> (ColorImage, Vec<u16>) {
     let (width, height) = SIZE;
     let mut image = ColorImage::new(width as u32, height as u32);
@@ -36,7 +36,7 @@ fn corrected(image: &ColorImage, map: &[u16], has_color: bool, threads: usize) -
     into
 }
 
-/// Pixels whose disparity is not that of what stands there.
+/// Counts the pixels with a wrong disparity.
 fn wrong(map: &[u16]) -> usize {
     map.iter().enumerate().filter(|&(k, &d)| (d == NEAR) != is_near(k % SIZE.0, k / SIZE.0, 0)).count()
 }
@@ -46,7 +46,7 @@ fn a_fat_thing_gets_the_outline_of_its_colour() {
     let (image, map) = scene([SKIN, WALL], FAT_PX);
     assert!(wrong(&map) > 400);
     assert_eq!(wrong(&corrected(&image, &map, true, 1)), 0);
-    // Grey says less, and does no harm.
+    // Grey is less distinctive, and must do no harm.
     assert!(wrong(&corrected(&image, &map, false, 1)) <= wrong(&map));
 }
 
@@ -55,7 +55,7 @@ fn a_thin_thing_grows_to_the_outline_of_its_colour() {
     let (image, map) = scene([SKIN, WALL], -2);
     assert!(wrong(&map) > 180);
     for has_color in [true, false] {
-        // The 2x2 pixels of its corners are beside no jump of their row or column.
+        // The 2x2 pixels of its corners are beside no discontinuity in their row or column.
         assert!(wrong(&corrected(&image, &map, has_color, 1)) <= 16, "color: {has_color}");
     }
 }

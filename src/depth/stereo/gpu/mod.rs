@@ -1,12 +1,12 @@
-//! The GPU executor: wgpu compute passes, one WGSL file each under `shaders/`. It finds what the CPU executor finds,
-//! to the bit.
+//! The GPU executor: wgpu compute passes, one WGSL file each under `shaders/`. It agrees with the CPU executor to the
+//! bit.
 //!
-//! Costs and sums are bytes, four disparities a word, in volumes on the device: their traffic is little beside the
-//! steps of the paths, which wait for each other. So each path is a workgroup of its own with four disparities in each
-//! invocation, and what lies ahead is fetched while it goes.
+//! Costs and sums are bytes, four disparities per word, in volumes on the device: their traffic is small compared with
+//! the sequential steps of the paths. So each path has a workgroup of its own, with four disparities per invocation,
+//! and prefetches the next pixels.
 //!
-//! What has one number for each pixel has a word for it, so that no two invocations write to one. Both eyes go up and one
-//! map comes back; what the next pair needs of this one stays.
+//! Per-pixel values take one word each, so that no two invocations write the same word. Only two pictures are uploaded
+//! and one map is read back per pair; the state for the next pair stays on the device.
 
 pub mod rectifier;
 pub mod shaders;
@@ -14,7 +14,7 @@ pub mod tidying;
 
 use std::sync::Arc;
 
-use shaders::in_line;
+use shaders::linear_workgroups;
 
 use super::executor::Executor;
 use super::fixed::{self, UNKNOWN};
@@ -23,37 +23,37 @@ use crate::compute::device::{Device, Pass, Readback, Recorder, Stamps};
 use crate::compute::thread_pool::ThreadPool;
 use crate::compute::{GpuError, PassTimes, bands};
 
-/// What a workgroup does, as the shaders declare it: pixels a side of `stereo_census`, and columns of `stereo_cost`.
+/// Sizes declared in the shaders: side of a workgroup's tile in `stereo_census`, and its columns in `stereo_cost`.
 const TILE: u32 = 16;
 const STRIP: u32 = 16;
-/// So many pixels of the map that comes back are worth a thread.
-const LEAST_PIXELS: usize = 1 << 14;
+/// Minimum number of map pixels per thread that unpacks the result.
+const MIN_PIXELS_PER_THREAD: usize = 1 << 14;
 
 /// Matches pairs of one size on a GPU.
 pub struct GpuExecutor {
     device: Arc<Device>,
     pixels: usize,
-    /// Grey values, left and right; the right ones begin at a multiple of 4 bytes, as uploads must.
+    /// Grey values, left and right; the right ones begin at a multiple of 4 bytes, as uploads require.
     luma: wgpu::Buffer,
-    /// Those of the last pair.
+    /// Left grey values of the last pair.
     last_luma: wgpu::Buffer,
     passes: [Pass; 12],
-    /// The map, two pixels a word.
+    /// The map, two pixels per word.
     words: wgpu::Buffer,
     readback: Readback,
     stamps: Option<Stamps>,
 }
 
 impl GpuExecutor {
-    /// For pairs of this size (columns, rows), and at least as many disparities, at most 256; drops islands of up to
-    /// `island` pixels.
+    /// Creates an executor for pairs of this size (columns, rows) and at least `disparities` candidates, at most 256,
+    /// that removes islands of up to `island` pixels.
     ///
     /// # Errors
-    /// The device has no room for that, or failed.
+    /// Fails if the device lacks memory or fails.
     pub fn new(device: &Arc<Device>, size: (usize, usize), disparities: usize, island: u32) -> Result<Self, GpuError> {
         let ((width, height), disparities) = (size, fixed::range(disparities));
         let pixels = width * height;
-        has_room(device, size, disparities)?;
+        check_limits(device, size, disparities)?;
 
         use wgpu::BufferUsages as Usage;
         let buffer = |label, bytes, usage| device.buffer(label, bytes, usage);
@@ -67,7 +67,7 @@ impl GpuExecutor {
         let [costs, sums, totals] =
             ["costs", "sums", "totals"].map(|label| buffer(label, pixels * disparities, Usage::STORAGE));
         let map = buffer("map", pixels * 4, Usage::STORAGE | Usage::COPY_DST);
-        // Before the first pair nothing is likely.
+        // Before the first pair no disparity is likely.
         device.queue.write_buffer(&map, 0, bytemuck::cast_slice(&vec![u32::from(UNKNOWN); pixels]));
         let words = buffer("words", pixels * 2, Usage::STORAGE | Usage::COPY_SRC);
         let readback = Readback::new(device, "words back", pixels * 2);
@@ -83,18 +83,18 @@ impl GpuExecutor {
             let buffers = [&costs, &penalties, &sums].map(wgpu::Buffer::as_entire_buffer_binding);
             Pass::new(device, shaders::ROWS, &constants(from_right), buffers, [rows, 1, 1])
         };
-        // After the winners nobody needs the volumes and the penalties.
+        // The volumes and penalties are not needed after the winners and serve as scratch memory.
         let scratch = tidying::Scratch { labels: &costs, sizes: &sums, filled: &penalties };
         let [runs, join, sizes, gaps, pack] = tidying::passes(device, size, &forwards, &map, scratch, &words);
         let tiles = [columns.div_ceil(TILE), rows.div_ceil(TILE), 2];
         let passes = [
-            pass(shaders::LIKELY, &[&luma, &last_luma, &map, &likely], in_line(pixels)),
+            pass(shaders::LIKELY, &[&luma, &last_luma, &map, &likely], linear_workgroups(pixels)),
             pass(shaders::CENSUS, &[&luma, &table, &census, &penalties], tiles),
             pass(shaders::COST, &[&census, &likely, &costs], [columns.div_ceil(STRIP), rows, 1]),
             along_rows(false),
             along_rows(true),
             pass(shaders::COLUMNS, &[&costs, &penalties, &sums, &totals], [columns, 1, 1]),
-            pass(shaders::WINNERS, &[&totals, &map], in_line(pixels)),
+            pass(shaders::WINNERS, &[&totals, &map], linear_workgroups(pixels)),
             runs,
             join,
             sizes,
@@ -106,15 +106,15 @@ impl GpuExecutor {
         Ok(Self { device: Arc::clone(device), pixels, luma, last_luma, passes, words, readback, stamps })
     }
 
-    /// The time of each pass over the last pair; of none where the device has no timestamps.
+    /// Returns the time of each pass over the last pair; empty if the device has no timestamps.
     pub fn pass_times(&self) -> PassTimes {
         self.stamps.as_ref().map(Stamps::last).unwrap_or_default()
     }
 }
 
-/// Refuses sizes whose volume of costs, or whose number of workgroups (one for each row or column), exceeds the limits
-/// of the device.
-fn has_room(device: &Device, (width, height): (usize, usize), disparities: usize) -> Result<(), GpuError> {
+/// Refuses sizes whose cost volume, or whose number of workgroups (one for each row or column), exceeds the limits of
+/// the device.
+fn check_limits(device: &Device, (width, height): (usize, usize), disparities: usize) -> Result<(), GpuError> {
     let limits = device.device.limits();
     let bytes = (width * height * disparities) as u64;
     let most = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
@@ -159,7 +159,7 @@ impl Executor for GpuExecutor {
         passes.iter().for_each(|pass| recorder.run(pass));
         recorder.encoder.copy_buffer_to_buffer(luma, 0, last_luma, 0, last_luma.size());
         recorder.fetch(device, readback, (words, words.size()), |bytes| {
-            let each = bands::share(out.len(), LEAST_PIXELS);
+            let each = bands::share(out.len(), MIN_PIXELS_PER_THREAD);
             workers.run_each(out.chunks_mut(each).zip(bytes.chunks(2 * each)), &|(out, bytes): (&mut [u16], &[u8])| {
                 for (out, bytes) in out.iter_mut().zip(bytes.as_chunks().0) {
                     *out = u16::from_le_bytes(*bytes);

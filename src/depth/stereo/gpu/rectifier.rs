@@ -1,8 +1,8 @@
-//! Rectification on a device: pictures of both eyes become on it what [`Map`] makes of them, to the bit.
+//! Rectification on a device. Its results equal those of the twin [`Map`] to the bit.
 
 use std::sync::Arc;
 
-use super::shaders::{self, in_line};
+use super::shaders::{self, linear_workgroups};
 use crate::calibration::map::Map;
 use crate::compute::GpuError;
 use crate::compute::device::{Device, Pass, Readback, Recorder};
@@ -12,19 +12,19 @@ use crate::frame::{ColorImage, GrayImage};
 pub struct GpuRectifier {
     device: Arc<Device>,
     size: (u32, u32),
-    /// The left eye's, in colour, and the right eye's, in grey.
-    eyes: [Eye; 2],
+    /// Left in colour, right in grey.
+    cameras: [Camera; 2],
 }
 
-/// What an eye's pictures take.
-struct Eye {
+/// Resources for the pictures of one camera.
+struct Camera {
     raw: wgpu::Buffer,
     pass: Pass,
     rectified: wgpu::Buffer,
     readback: Readback,
 }
 
-impl Eye {
+impl Camera {
     fn new(device: &Device, map: &Map, channels: usize) -> Self {
         use wgpu::BufferUsages as Usage;
         let (width, height) = map.size();
@@ -38,7 +38,7 @@ impl Eye {
         let rectified = device.buffer("rectified", bytes, Usage::STORAGE | Usage::COPY_SRC);
         let constants = shaders::rectify_constants(bytes, stride, channels);
         let buffers = [&starts, &fractions, &raw, &rectified].map(wgpu::Buffer::as_entire_buffer_binding);
-        let pass = Pass::new(device, shaders::RECTIFY, &constants, buffers, in_line(bytes.div_ceil(4)));
+        let pass = Pass::new(device, shaders::RECTIFY, &constants, buffers, linear_workgroups(bytes.div_ceil(4)));
         Self { raw, pass, readback: Readback::new(device, "rectified back", bytes), rectified }
     }
 
@@ -55,20 +55,20 @@ impl Eye {
 }
 
 impl GpuRectifier {
-    /// The maps of the left and of the right eye on a device.
+    /// Uploads the maps of the left and the right camera.
     ///
     /// # Errors
-    /// It has no room for them, failed, or resamples a picture otherwise than the processor.
+    /// Fails if the device lacks memory, fails, or its result differs from the CPU's.
     pub fn new(device: &Arc<Device>, maps: &[Map; 2]) -> Result<Self, GpuError> {
-        let eyes = device.attempt(|| [Eye::new(device, &maps[0], 3), Eye::new(device, &maps[1], 1)])?;
-        let mut made = Self { device: Arc::clone(device), size: maps[0].size(), eyes };
-        made.try_out(&maps[1])?;
+        let cameras = device.attempt(|| [Camera::new(device, &maps[0], 3), Camera::new(device, &maps[1], 1)])?;
+        let mut made = Self { device: Arc::clone(device), size: maps[0].size(), cameras };
+        made.self_test(&maps[1])?;
         device.check()?;
         Ok(made)
     }
 
-    /// Drivers have faults, and none is to be found out by whoever is looked at.
-    fn try_out(&mut self, map: &Map) -> Result<(), GpuError> {
+    /// Rectifies a test picture and compares it with the CPU's result, to detect driver faults before the first frame.
+    fn self_test(&mut self, map: &Map) -> Result<(), GpuError> {
         let (width, height) = map.size();
         let luma = (0..width * height).map(|k| (k.wrapping_mul(0x9e37_79b1) >> 24) as u8).collect();
         let from = GrayImage { width, height, luma };
@@ -83,29 +83,29 @@ impl GpuRectifier {
         }
     }
 
-    /// The left picture, rectified, into `into`.
+    /// Rectifies the left picture into `into`.
     ///
     /// # Errors
-    /// The device failed.
+    /// Fails if the device fails.
     ///
     /// # Panics
-    /// When `from` has not the size of the maps.
+    /// Panics if `from` does not have the size of the maps.
     pub fn left(&mut self, from: &ColorImage, into: &mut ColorImage) -> Result<(), GpuError> {
         assert_eq!(from.size(), self.size, "pictures are resampled at one size");
         into.resize(from.width, from.height);
-        self.eyes[0].rectify(&self.device, &from.rgb, &mut into.rgb)
+        self.cameras[0].rectify(&self.device, &from.rgb, &mut into.rgb)
     }
 
-    /// The right picture, rectified, into `into`.
+    /// Rectifies the right picture into `into`.
     ///
     /// # Errors
-    /// The device failed.
+    /// Fails if the device fails.
     ///
     /// # Panics
-    /// When `from` has not the size of the maps.
+    /// Panics if `from` does not have the size of the maps.
     pub fn right(&mut self, from: &GrayImage, into: &mut GrayImage) -> Result<(), GpuError> {
         assert_eq!(from.size(), self.size, "pictures are resampled at one size");
         into.resize(from.width, from.height);
-        self.eyes[1].rectify(&self.device, &from.luma, &mut into.luma)
+        self.cameras[1].rectify(&self.device, &from.luma, &mut into.luma)
     }
 }

@@ -1,21 +1,22 @@
-//! The passes that tidy up a map: islands are dropped and gaps filled.
+//! The passes that post-process a map: remove islands and fill gaps.
 //!
-//! Islands are found by label equivalence, with union-find in the labels: runs of rows first, which are then joined from
-//! row to row by atomic minima (after Komura, *GPU-based cluster-labeling algorithm without the use of conventional
-//! iteration*, Computer Physics Communications, 2015). Whatever the order, the root of an island is its first pixel that
-//! begins a run.
+//! Islands are connected components, found by label equivalence with union-find in the labels: runs of rows first,
+//! which are then joined from row to row by atomic minima (after Komura, *GPU-based cluster-labeling algorithm without
+//! the use of conventional iteration*, Computer Physics Communications, 2015). Whatever the order, the root of an
+//! island is its first pixel that begins a run.
 
-use super::shaders::{self, Constants, in_line};
+use super::shaders::{self, Constants, linear_workgroups};
 use crate::compute::device::{Device, Pass};
 
-/// Four bytes a pixel each, of any content.
+/// Buffers of four bytes per pixel each, with any content.
 pub struct Scratch<'a> {
     pub labels: &'a wgpu::Buffer,
     pub sizes: &'a wgpu::Buffer,
     pub filled: &'a wgpu::Buffer,
 }
 
-/// Passes that drop the islands of `map`, a word a pixel, and leave it without its gaps in `words`, two pixels a word.
+/// Returns the passes that remove the islands of `map`, a word per pixel, and write it with its gaps filled to `words`,
+/// two pixels per word.
 pub fn passes(
     device: &Device,
     (width, height): (usize, usize),
@@ -30,9 +31,9 @@ pub fn passes(
     };
     [
         pass(shaders::RUNS, &[map, labels, sizes], rows),
-        pass(shaders::JOIN, &[map, labels], in_line(pixels)),
-        pass(shaders::SIZES, &[map, labels, sizes], in_line(pixels)),
+        pass(shaders::JOIN, &[map, labels], linear_workgroups(pixels)),
+        pass(shaders::SIZES, &[map, labels, sizes], linear_workgroups(pixels)),
         pass(shaders::GAPS, &[labels, sizes, map, filled], rows),
-        pass(shaders::PACK, &[filled, words], in_line(pixels.div_ceil(2))),
+        pass(shaders::PACK, &[filled, words], linear_workgroups(pixels.div_ceil(2))),
     ]
 }

@@ -1,4 +1,4 @@
-//! Writes FlatBuffers: what refers to something comes before it, as offsets lead forwards.
+//! Writes FlatBuffers for tests: offsets lead forwards, so a table precedes its content.
 
 /// A field of a table.
 #[derive(Clone)]
@@ -11,7 +11,7 @@ pub enum Value {
     Tables(Vec<Vec<(usize, Value)>>),
 }
 
-/// A TFLite file whose root has these fields, by their numbers.
+/// Returns a TFLite file whose root has these fields, by number.
 pub fn table_file(fields: &[(usize, Value)]) -> Vec<u8> {
     let mut out = b"\0\0\0\0TFL3".to_vec();
     let root = table(&mut out, fields);
@@ -19,7 +19,7 @@ pub fn table_file(fields: &[(usize, Value)]) -> Vec<u8> {
     out
 }
 
-/// Appends a table and what belongs to it; where the table is.
+/// Appends a table and its content; returns the position of the table.
 fn table(out: &mut Vec<u8>, fields: &[(usize, Value)]) -> usize {
     let entries = fields.iter().map(|(number, _)| number + 1).max().unwrap_or(0);
     let back = 4 + 2 * entries;
@@ -46,7 +46,7 @@ fn table(out: &mut Vec<u8>, fields: &[(usize, Value)]) -> usize {
     at
 }
 
-/// Appends what a field refers to, if it does.
+/// Appends the content that a field refers to, if any.
 fn refer(out: &mut Vec<u8>, field: usize, value: &Value) {
     let mut to = out.len();
     match value {

@@ -1,15 +1,16 @@
-//! The operators as they are defined, pixel by pixel and channel by channel.
+//! Reference implementation of the operators in `f64`, pixel by pixel and channel by channel. Twin: `../filters.rs`,
+//! `../kernels.rs`.
 
 use crate::network::tflite::model::{Activation, Kind, Model, Operator, Steps};
 
-/// What a network makes of a picture `[rows][columns][channels]`.
+/// Runs a network on a picture `[rows][columns][channels]`.
 pub fn reference(model: &Model, input: &[f32]) -> Vec<f32> {
     let mut values: Vec<Vec<f64>> =
         model.tensors.iter().map(|tensor| wide(tensor.constant.as_deref().unwrap_or_default())).collect();
     values[model.input] = wide(input);
     for operator in &model.operators {
         let made = made(model, operator, &values);
-        values[operator.output] = made.into_iter().map(|value| activated(operator.activation, value)).collect();
+        values[operator.output] = made.into_iter().map(|value| activate(operator.activation, value)).collect();
     }
     values[model.output].iter().map(|&value| value as f32).collect()
 }
@@ -18,7 +19,7 @@ fn wide(values: &[f32]) -> Vec<f64> {
     values.iter().map(|&value| f64::from(value)).collect()
 }
 
-fn activated(activation: Activation, value: f64) -> f64 {
+fn activate(activation: Activation, value: f64) -> f64 {
     match activation {
         Activation::None => value,
         Activation::Relu => value.max(0.0),
@@ -42,7 +43,7 @@ fn made(model: &Model, operator: &Operator, values: &[Vec<f64>]) -> Vec<f64> {
         Kind::Convolution(steps) | Kind::Depthwise(steps) => {
             let is_dense = matches!(operator.kind, Kind::Convolution(_));
             let [_, down, across, _] = shape(1);
-            let before = |count: usize, step: usize, taps: usize, pixels: usize| match steps.beyond {
+            let before = |count: usize, step: usize, taps: usize, pixels: usize| match steps.is_padded {
                 true => ((count - 1) * step + taps).saturating_sub(pixels) / 2,
                 false => 0,
             };
@@ -70,13 +71,13 @@ fn made(model: &Model, operator: &Operator, values: &[Vec<f64>]) -> Vec<f64> {
                 })
                 .collect()
         }
-        Kind::Doubling => places
+        Kind::TransposedConvolution => places
             .map(|(y, x, _)| {
                 let four = (y % 2 * 2 + x % 2) * channels;
                 of(2)[0] + (0..channels).map(|k| source[at(y / 2, x / 2, k)] * of(1)[four + k]).sum::<f64>()
             })
             .collect(),
-        Kind::Activation(activation) => source.iter().map(|&value| activated(activation, value)).collect(),
+        Kind::Activation(activation) => source.iter().map(|&value| activate(activation, value)).collect(),
         Kind::Mean => (0..channels)
             .map(|channel| {
                 source.iter().skip(channel).step_by(channels).sum::<f64>() / (source.len() / channels) as f64
@@ -84,7 +85,7 @@ fn made(model: &Model, operator: &Operator, values: &[Vec<f64>]) -> Vec<f64> {
             .collect(),
         Kind::Scale => source.iter().zip(of(1).iter().cycle()).map(|(a, b)| a * b).collect(),
         Kind::Sum => source.iter().zip(of(1)).map(|(a, b)| a + b).collect(),
-        Kind::Enlarge => places
+        Kind::Upsample => places
             .map(|(y, x, channel)| {
                 let near = |at: usize, count: usize| {
                     let place = (at as f64 + 0.5) / 2.0 - 0.5;

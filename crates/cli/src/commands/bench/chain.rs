@@ -1,4 +1,4 @@
-//! `bench --chain`: what a frame of a stream costs on this machine, stage by stage, and which quality that affords.
+//! `bench --chain`: the cost of a stream's frame on this machine, stage by stage, and the quality it affords.
 
 use std::fmt::Write;
 
@@ -25,40 +25,40 @@ use bokehcam::look::{BackgroundMemory, Look, Strength};
 use bokehcam::sink::yuyv::Encoder;
 use bokehcam::source::{self, DepthFrom, Frames, Kind, Source, SourceName};
 
-/// Frames before those that are measured: caches fill, and what lies behind begins to be known.
+/// Unmeasured frames at the start: caches fill, and the background memory builds up.
 const WARM_UP_FRAMES: u64 = 8;
-/// Frame rates that are asked for.
+/// Frame rates for which the finest affordable quality is reported.
 const RATES: [u32; 2] = [30, 60];
 
-/// Processor time of all threads, and wall time, in milliseconds: medians of a frame.
+/// Processor time of all threads, and wall time, in milliseconds: medians over the frames.
 #[derive(Clone, Copy, Default, Serialize)]
 struct Cost {
     cpu_ms: f64,
     wall_ms: f64,
 }
 
-/// A stage, or a part of one.
+/// A stage, or a step of one.
 #[derive(Serialize)]
 struct Stage {
     name: &'static str,
-    /// Stages run beside each other on frames that follow each other; the parts of a stage do not.
+    /// Name of the thread. Threads work on successive frames in parallel; the steps of one thread run in sequence.
     thread: &'static str,
     #[serde(flatten)]
     cost: Cost,
 }
 
-/// What a level of quality costs.
+/// Cost of a quality level.
 #[derive(Serialize)]
 struct Level {
     quality: &'static str,
     blur: Cost,
     /// Processor time of the whole chain.
     cpu_ms: f64,
-    /// Frames a second, as far as the slowest thread and all cores together go.
+    /// Frames a second, limited by the slowest thread and by all cores together.
     frames_per_s: f64,
 }
 
-/// What was measured of a source.
+/// Result for one source.
 #[derive(Serialize)]
 struct Chain {
     source: String,
@@ -68,14 +68,14 @@ struct Chain {
     frames: u32,
     stages: Vec<Stage>,
     levels: Vec<Level>,
-    /// For each of some frame rates, the finest level that keeps it.
+    /// The finest quality level that sustains each frame rate, `None` if none does.
     affords: Vec<(u32, Option<&'static str>)>,
 }
 
-/// Measures the chain from `name`, for every number of threads that was asked for.
+/// Measures the chain from source `name`, once per `--threads` value.
 ///
 /// # Errors
-/// The source cannot be read or is a camera, or a stage failed.
+/// Fails if the source is unreadable or a camera, or a stage fails.
 pub(super) fn run(command: &BenchCommand, name: &SourceName, given: &Given) -> Result<(), CliError> {
     if !name.devices().is_empty() || matches!(name.kind(), Kind::Camera) {
         let what =
@@ -84,50 +84,50 @@ pub(super) fn run(command: &BenchCommand, name: &SourceName, given: &Given) -> R
     }
     for (k, computing) in command.computings().into_iter().enumerate() {
         let chain = measure(command, name, computing, (k == 0).then_some(given))?;
-        // Numbers and texts always have a form in JSON.
+        // Numbers and strings always serialise.
         let text = if command.json { serde_json::to_string(&chain).unwrap_or_default() + "\n" } else { chain.table() };
         print(text.as_bytes())?;
     }
     Ok(())
 }
 
-/// Where a frame's parts are noted while it goes through the chain.
-struct Notes {
+/// Stopwatch for the steps of a frame on its way through the chain.
+struct StepTimer {
     clock: Clock,
     since: [u64; 2],
-    parts: Vec<Part>,
-    measures: bool,
+    steps: Vec<StepTimes>,
+    is_recording: bool,
 }
 
-/// The times of a part in each frame, in nanoseconds.
-struct Part {
+/// Times of a step in each frame, in nanoseconds.
+struct StepTimes {
     name: &'static str,
     thread: &'static str,
     cpu_ns: Vec<u64>,
     wall_ns: Vec<u64>,
 }
 
-impl Notes {
+impl StepTimer {
     fn now(&self) -> [u64; 2] {
         [cpu_ns(), self.clock.now_ns()]
     }
 
-    /// What was done since the last note, or since [`Notes::begin`], was `name`.
-    fn note(&mut self, name: &'static str, thread: &'static str) {
+    /// Records the time since the last call, or since [`StepTimer::restart`], as step `name`.
+    fn record(&mut self, name: &'static str, thread: &'static str) {
         let [cpu_ns, wall_ns] = self.now();
-        if self.measures {
-            let place = self.parts.iter().position(|part| part.name == name).unwrap_or_else(|| {
-                self.parts.push(Part { name, thread, cpu_ns: Vec::new(), wall_ns: Vec::new() });
-                self.parts.len() - 1
+        if self.is_recording {
+            let place = self.steps.iter().position(|step| step.name == name).unwrap_or_else(|| {
+                self.steps.push(StepTimes { name, thread, cpu_ns: Vec::new(), wall_ns: Vec::new() });
+                self.steps.len() - 1
             });
             let [cpu_before_ns, wall_before_ns] = self.since;
-            self.parts[place].cpu_ns.push(cpu_ns - cpu_before_ns);
-            self.parts[place].wall_ns.push(wall_ns - wall_before_ns);
+            self.steps[place].cpu_ns.push(cpu_ns - cpu_before_ns);
+            self.steps[place].wall_ns.push(wall_ns - wall_before_ns);
         }
-        self.begin();
+        self.restart();
     }
 
-    fn begin(&mut self) {
+    fn restart(&mut self) {
         self.since = self.now();
     }
 
@@ -137,8 +137,8 @@ impl Notes {
             times_ns[times_ns.len() / 2] as f64 / 1e6
         };
         let cost =
-            |part: &mut Part| Cost { cpu_ms: median_ms(&mut part.cpu_ns), wall_ms: median_ms(&mut part.wall_ns) };
-        self.parts.iter_mut().map(|part| Stage { name: part.name, thread: part.thread, cost: cost(part) }).collect()
+            |step: &mut StepTimes| Cost { cpu_ms: median_ms(&mut step.cpu_ns), wall_ms: median_ms(&mut step.wall_ns) };
+        self.steps.iter_mut().map(|step| Stage { name: step.name, thread: step.thread, cost: cost(step) }).collect()
     }
 }
 
@@ -152,7 +152,7 @@ fn measure(
     let wanted = command.frames.unwrap_or(super::FRAMES);
     let frames = WARM_UP_FRAMES + u64::from(wanted);
     let options = source::Options {
-        // The demonstration and the synthetic scene have no end of their own.
+        // The demonstration and the synthetic scene are endless.
         frames: Frames {
             repeat: !matches!(name.kind(), Kind::Demo | Kind::Synthetic),
             frames: Some(frames),
@@ -166,12 +166,13 @@ fn measure(
     let mut source = Source::open(name, &options, Some(&look))?;
     let look = source.fitting_look(&look, &options)?;
     if let Some(given) = given {
-        warn(command, name, &source, &look, given);
+        warn_of_unused(command, name, &source, &look, given);
     }
     let info = source.camera.info();
     let size = info.size;
     let levels = if command.quality.is_empty() { &Quality::ALL[..] } else { &command.quality };
-    let mut on_one_device = Executors::new(computing.clone());
+    // The levels share one device, as in a stream that changes its quality.
+    let mut shared_device = Executors::new(computing.clone());
     let mut executors: Vec<(Quality, Box<dyn Bokeh>)> = Vec::new();
     for &quality in levels {
         let look = Look { quality: Some(quality), ..look.clone() };
@@ -179,7 +180,7 @@ fn measure(
             let what = "--effect none leaves nothing to measure: use dof, tilt-shift or blur";
             return Err(CliError::Usage(what.to_string()));
         };
-        executors.push((quality, on_one_device.blur(&settings, size)?));
+        executors.push((quality, shared_device.blur(&settings, size)?));
     }
     let executor = executors.first().map(|(_, executor)| executor.describe()).unwrap_or_default();
 
@@ -187,9 +188,9 @@ fn measure(
     let coc = CocMaker::new(look.coc_rule(size), Finish::measured(look.refines(measured)));
     let mut coc = coc.on_threads(computing.threads());
     coc.compute_on(executors.first().and_then(|(_, executor)| executor.device()));
-    let is_known = source.depth.as_ref().is_some_and(|source| source.knows_background());
-    coc.remember(look.background_memory == BackgroundMemory::On && !is_known);
-    let mut notes = Notes { clock: Clock::system(), since: [0; 2], parts: Vec::new(), measures: false };
+    let knows_background = source.depth.as_ref().is_some_and(|source| source.knows_background());
+    coc.remember(look.background_memory == BackgroundMemory::On && !knows_background);
+    let mut timer = StepTimer { clock: Clock::system(), since: [0; 2], steps: Vec::new(), is_recording: false };
     let mut buffers = Buffers {
         color: Pooled::detached(ColorImage::new(size.0, size.1)),
         depth: Pooled::detached(DepthMap::default()),
@@ -199,18 +200,18 @@ fn measure(
         yuyv: vec![0; size.0 as usize * size.1 as usize / 2 * 4],
     };
     for frame in 0..frames {
-        notes.measures = frame >= WARM_UP_FRAMES;
-        if !buffers.frame(&mut source, &mut coc, &mut executors, &mut notes)? {
+        timer.is_recording = frame >= WARM_UP_FRAMES;
+        if !buffers.process_frame(&mut source, &mut coc, &mut executors, &mut timer)? {
             break;
         }
     }
-    if notes.parts.is_empty() {
+    if timer.steps.is_empty() {
         return Err(CliError::Usage(format!("--chain: {name} has too few frames to measure")));
     }
-    Ok(Chain::of(info.name, size, executor, wanted, notes.costs()))
+    Ok(Chain::from_stages(info.name, size, executor, wanted, timer.costs()))
 }
 
-/// What a frame needs on its way.
+/// Buffers of one frame, reused for the next.
 struct Buffers {
     color: Pooled<ColorImage>,
     depth: Pooled<DepthMap>,
@@ -221,15 +222,15 @@ struct Buffers {
 }
 
 impl Buffers {
-    /// Takes a frame through the chain, its blur at every level; `false` when there are no more.
-    fn frame(
+    /// Runs one frame through the chain and blurs it at every level. Returns `false` at the end of the source.
+    fn process_frame(
         &mut self,
         source: &mut Source,
         coc: &mut CocMaker,
         executors: &mut [(Quality, Box<dyn Bokeh>)],
-        notes: &mut Notes,
+        timer: &mut StepTimer,
     ) -> Result<bool, CliError> {
-        notes.begin();
+        timer.restart();
         let shot = Shot { color: &mut self.color, depth: &mut self.depth, right: &mut self.right };
         let stamp = match source.camera.next(shot)? {
             Captured::Frame(stamp) => stamp,
@@ -237,34 +238,35 @@ impl Buffers {
             Captured::End => return Ok(false),
             Captured::Lost(..) | Captured::Waiting => return Ok(true),
         };
-        notes.note("decode", "capture");
+        timer.record("decode", "capture");
         let field = match coc.fixed() {
             Some(field) => field,
             None => {
                 if source.depth.is_some() {
                     self.read_depth(source, stamp)?;
-                    notes.note("read depth", "depth");
+                    timer.record("read depth", "depth");
                 }
-                coc.make_noting(&mut self.depth, &self.color, stamp.time_ns, |part| notes.note(part, "depth"))
+                coc.make_noting(&mut self.depth, &self.color, stamp.time_ns, |step| timer.record(step, "depth"))
             }
         };
         for (quality, executor) in executors {
-            let taken =
+            let take_buffer =
                 |buffer: &mut Pooled<ColorImage>| std::mem::replace(buffer, Pooled::detached(ColorImage::default()));
-            let (color, out) = (taken(&mut self.color), taken(&mut self.out));
+            // The job owns its buffers; they come back with the result.
+            let (color, out) = (take_buffer(&mut self.color), take_buffer(&mut self.out));
             let depth = std::mem::replace(&mut self.depth, Pooled::detached(DepthMap::default()));
             let depth = coc.fixed().is_none().then_some(depth);
-            notes.begin();
+            timer.restart();
             executor.submit(Job { quality: *quality, out, ..Job::new(color, depth, field) })?;
             let finished = executor.collect(true)?.ok_or(BokehError::Lost)?;
-            notes.note(quality.name(), "blur");
+            timer.record(quality.name(), "blur");
             self.color = finished.color;
             self.depth = finished.depth.unwrap_or(Pooled::detached(DepthMap::default()));
             self.out = finished.picture.into_memory().ok_or(BokehError::Lost)?;
         }
-        notes.begin();
+        timer.restart();
         self.encoder.encode(&self.out, &mut self.yuyv);
-        notes.note("encode", "sink");
+        timer.record("encode", "sink");
         Ok(true)
     }
 
@@ -278,14 +280,15 @@ impl Buffers {
 }
 
 impl Chain {
-    fn of(source: String, size_px: (u32, u32), executor: String, frames: u32, mut stages: Vec<Stage>) -> Self {
+    fn from_stages(source: String, size_px: (u32, u32), executor: String, frames: u32, mut stages: Vec<Stage>) -> Self {
         let (blurs, rest) = stages.drain(..).partition::<Vec<_>, _>(|stage| stage.thread == "blur");
         let cores = cores();
         let cpu_ms: f64 = rest.iter().map(|stage| stage.cost.cpu_ms).sum();
-        let of_thread = |thread: &str| -> f64 {
+        let thread_ms = |thread: &str| -> f64 {
             rest.iter().filter(|stage| stage.thread == thread).map(|stage| stage.cost.wall_ms).sum()
         };
-        let slowest_ms = ["capture", "depth", "sink"].into_iter().map(of_thread).fold(0.0, f64::max);
+        // Throughput of a pipeline: its slowest thread, or all of its work over all cores.
+        let slowest_ms = ["capture", "depth", "sink"].into_iter().map(thread_ms).fold(0.0, f64::max);
         let level = |stage: &Stage| {
             let (blur, cpu_ms) = (stage.cost, cpu_ms + stage.cost.cpu_ms);
             let period_ms = slowest_ms.max(blur.wall_ms).max(cpu_ms / cores as f64);
@@ -329,7 +332,7 @@ impl Chain {
     }
 }
 
-fn warn(command: &BenchCommand, name: &SourceName, source: &Source, look: &Look, given: &Given) {
+fn warn_of_unused(command: &BenchCommand, name: &SourceName, source: &Source, look: &Look, given: &Given) {
     unused::warn(
         &given.settings,
         &unused::Run {

@@ -8,7 +8,7 @@ use std::time::Instant;
 use clap::{Args, value_parser};
 
 use crate::error::CliError;
-use crate::files::{make_folder_of, refuse_overwrite, refuse_source, tell_of_leftovers};
+use crate::files::{make_folder_of, refuse_overwrite, refuse_source, report_leftovers};
 use crate::log;
 use crate::options;
 use crate::plausible;
@@ -29,7 +29,7 @@ use bokehcam::source::options::DEPTH_SCALE;
 
 use preview::preview;
 
-/// Disparities that are tried where neither the user nor the calibration says how many.
+/// Default search range, if neither `--max-disparity` nor the calibration sets it.
 const DEFAULT_DISPARITIES: u32 = 64;
 
 /// Find the disparity of a rectified stereo pair, or its depth
@@ -51,7 +51,7 @@ pub struct DepthCommand {
     #[arg(long, alias = "to", value_name = "FILE")]
     out: PathBuf,
     /// Disparities that are tried, from 0, in pixels; rounded up to a multiple of 16 [default: the calibration's, else 64]
-    // Ids of their own: the settings of the same names are about live sources.
+    // Distinct ids: the settings of the same names belong to live sources.
     #[arg(id = "pair_max_disparity", long = "max-disparity", value_name = "PX",
           value_parser = value_parser!(u32).range(1..=i64::from(Settings::MOST_DISPARITIES)))]
     max_disparity: Option<u32>,
@@ -97,7 +97,8 @@ pub struct DepthCommand {
 /// Runs the command.
 ///
 /// # Errors
-/// A file cannot be read or written, the pictures are no pair, the options do not fit them, or there is no such GPU.
+/// Fails if a file cannot be read or written, the pictures differ in size, the options do not fit them, or no GPU
+/// matches.
 pub fn run(command: &DepthCommand, global: &options::Global) -> Result<(), CliError> {
     command.check()?;
     let note = |text: String| {
@@ -106,7 +107,7 @@ pub fn run(command: &DepthCommand, global: &options::Global) -> Result<(), CliEr
         }
     };
     let mut color = still::read_color(&command.left)?;
-    let mut right = luma_of(&still::read_color(&command.right)?);
+    let mut right = to_luma(&still::read_color(&command.right)?);
     let size = color.size();
     if right.size() != size {
         return Err(DepthError::from(MatchError::Sizes { left: size, right: right.size() }).into());
@@ -118,7 +119,7 @@ pub fn run(command: &DepthCommand, global: &options::Global) -> Result<(), CliEr
         note("the pictures are rectified by the calibration: the result is that of the rectified left picture".into());
     }
     plausible::warn_of_baseline(geometry.map(|geometry| geometry.rig));
-    let left = luma_of(&color);
+    let left = to_luma(&color);
     let disparities = command.disparity_range(geometry.and_then(|geometry| geometry.disparities), size.0, &note)?;
     let (adapter, threads) = (command.adapter.clone(), command.threads);
     let computing = Computing { backend: command.backend, adapter, threads };
@@ -129,6 +130,7 @@ pub fn run(command: &DepthCommand, global: &options::Global) -> Result<(), CliEr
     matcher.disparity(pair, &mut disparity).map_err(DepthError::from)?;
     let took_ms = start.elapsed().as_secs_f64() * 1e3;
 
+    // A wrong rectification or order of the pictures shows in the images; the result alone looks plausible.
     match check(&left, &right, disparities).map_err(DepthError::from)?.verdict() {
         verdict @ Verdict::RowsOff { .. } => note(format!(
             "{verdict}, and the disparity is wrong; {}",
@@ -144,11 +146,11 @@ pub fn run(command: &DepthCommand, global: &options::Global) -> Result<(), CliEr
 
     let force = command.output.force;
     make_folder_of(&command.out)?;
-    tell_of_leftovers([command.out.as_path()]);
+    report_leftovers([command.out.as_path()]);
     match geometry.filter(|_| command.metres) {
         Some(Geometry { rig, .. }) => {
             let depth = disparity.depth(|px| rig.depth_m(px));
-            note_what_is_too_far(&command.out, &depth, &note)?;
+            note_out_of_range_depth(&command.out, &depth, &note)?;
             still::write_depth(&command.out, &depth, DEPTH_SCALE, force)?;
         }
         None => {
@@ -172,7 +174,7 @@ pub fn run(command: &DepthCommand, global: &options::Global) -> Result<(), CliEr
 }
 
 impl DepthCommand {
-    /// Refuses options and files that cannot go together, before any picture is read.
+    /// Rejects conflicting options and files before reading any picture.
     fn check(&self) -> Result<(), CliError> {
         let usage = |text: &str| Err(CliError::Usage(text.to_string()));
         if self.metres && self.calib.is_empty() && self.focal_px.is_none() {
@@ -195,18 +197,18 @@ impl DepthCommand {
         refuse_overwrite([self.out.as_path()].into_iter().chain(self.preview.as_deref()), self.output.force)
     }
 
-    /// The stereo geometry for pictures of `size`, where options or calibration give it, and the rectifier that raw
-    /// pictures need.
+    /// Returns the stereo geometry for pictures of `size`, if options or calibration define it, and the rectifier for
+    /// raw pictures.
     fn geometry(
         &self,
         size: (u32, u32),
         note: &dyn Fn(String),
     ) -> Result<(Option<Geometry>, Option<Rectifier>), CliError> {
-        let of_rig = |rig| Geometry { rig, size: None, disparities: None };
+        let from_rig = |rig| Geometry { rig, size: None, disparities: None };
         if self.calib.is_empty() {
             let doffs_px = self.doffs_px.unwrap_or(0.0);
             let rig = |(focal_px, baseline_m)| StereoRig { focal_px, baseline_m, doffs_px, metric: true };
-            return Ok((self.focal_px.zip(self.baseline_m).map(rig).map(of_rig), None));
+            return Ok((self.focal_px.zip(self.baseline_m).map(rig).map(from_rig), None));
         }
         match calib::read(&self.calib, &self.left, size)? {
             Eyes::Rectified { geometry, made_for } => {
@@ -219,15 +221,14 @@ impl DepthCommand {
             Eyes::Raw(calibration) => {
                 let rectifier = Rectifier::new(&calibration, size)?;
                 calibration.notes(size).into_iter().for_each(note);
-                Ok((Some(of_rig(rectifier.rig())), Some(rectifier)))
+                Ok((Some(from_rig(rectifier.rig())), Some(rectifier)))
             }
         }
     }
 
-    /// How many disparities are searched in pictures `width` px wide: those of `--max-disparity`, else those that the
-    /// calibration has `stated`, else [`DEFAULT_DISPARITIES`]; at most as many as fit. The matcher needs a multiple
-    /// of 16.
-    fn disparity_range(&self, stated: Option<u32>, width: u32, note: &dyn Fn(String)) -> Result<u32, CliError> {
+    /// Returns the search range for pictures `width` px wide: `--max-disparity`, else the `calibrated` one, else
+    /// [`DEFAULT_DISPARITIES`], limited by the width. The matcher needs a multiple of 16.
+    fn disparity_range(&self, calibrated: Option<u32>, width: u32, note: &dyn Fn(String)) -> Result<u32, CliError> {
         // A disparity is less than the width.
         let limit = (width.saturating_sub(1) / 16 * 16).min(Settings::MOST_DISPARITIES);
         if limit == 0 {
@@ -245,8 +246,8 @@ impl DepthCommand {
             }
             return Ok(rounded);
         }
-        let (wanted, whose) = match stated {
-            Some(stated) => (stated, "the calibration's"),
+        let (wanted, whose) = match calibrated {
+            Some(calibrated) => (calibrated, "the calibration's"),
             None => (DEFAULT_DISPARITIES, "assumed: --max-disparity says how many"),
         };
         let tried = wanted.min(limit);
@@ -259,14 +260,14 @@ impl DepthCommand {
     }
 }
 
-fn luma_of(color: &ColorImage) -> GrayImage {
+fn to_luma(color: &ColorImage) -> GrayImage {
     let mut luma = GrayImage::default();
     luma.set_luma_of(color);
     luma
 }
 
-/// Notes how many percent of the pixels are farther than a 16-bit PNG can hold.
-fn note_what_is_too_far(out: &Path, depth: &DepthMap, note: &dyn Fn(String)) -> Result<(), CliError> {
+/// Notes the percentage of pixels beyond the range of a 16-bit PNG.
+fn note_out_of_range_depth(out: &Path, depth: &DepthMap, note: &dyn Fn(String)) -> Result<(), CliError> {
     let limit_m = f32::from(u16::MAX) / DEPTH_SCALE;
     let beyond = depth.metres.iter().filter(|&&metres| metres > limit_m).count();
     if still::map_format(out)? == MapFormat::Png && beyond > 0 {

@@ -2,8 +2,8 @@
 
 use bokehcam::frame::{ColorImage, DepthMap, DisparityMap};
 
-/// The colours span the disparities without this share at either end, so that outliers do not take the contrast.
-const OUTLIER_SHARE: f32 = 0.01;
+/// Fraction of disparities clipped at either end of the colour scale, so that outliers do not compress the contrast.
+const OUTLIER_FRACTION: f32 = 0.01;
 
 /// Coefficients of red, green and blue in powers of the value, 0 to 1: A. Mikhailov's polynomial for his colour map
 /// Turbo, from dark blue by green and yellow to dark red (Google AI blog, 2019).
@@ -17,8 +17,8 @@ const TURBO: [[f32; 6]; 3] = [
 pub fn preview(disparity: &DisparityMap) -> ColorImage {
     let mut known: Vec<f32> = disparity.px.iter().copied().filter(|&px| DepthMap::is_known(px)).collect();
     known.sort_unstable_by(f32::total_cmp);
-    let quantile = |share: f32| known.get((share * known.len() as f32) as usize).copied().unwrap_or(0.0);
-    let (far_px, near_px) = (quantile(OUTLIER_SHARE), quantile(1.0 - OUTLIER_SHARE));
+    let quantile = |fraction: f32| known.get((fraction * known.len() as f32) as usize).copied().unwrap_or(0.0);
+    let (far_px, near_px) = (quantile(OUTLIER_FRACTION), quantile(1.0 - OUTLIER_FRACTION));
     let span_px = (near_px - far_px).max(f32::MIN_POSITIVE);
     let mut image = ColorImage::new(disparity.width, disparity.height);
     for (pixel, &px) in image.rgb.as_chunks_mut::<3>().0.iter_mut().zip(&disparity.px) {
@@ -48,7 +48,7 @@ mod tests {
         assert!(near[0] > 100 && near[2] == 0, "{near:?}");
         assert!(far[2] > far[0].max(20) - 20 && far[1] < 60, "{far:?}");
         assert!(middle[1] > 240, "{middle:?}");
-        // Nothing but known disparities counts, even none or one.
+        // Only known disparities count, even if there are none or one.
         for px in [vec![], vec![0.0; 4], vec![3.0; 4]] {
             preview(&DisparityMap { width: 2, height: px.len() as u32 / 2, px });
         }

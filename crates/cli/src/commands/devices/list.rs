@@ -1,4 +1,4 @@
-//! The list of devices, for people and for programs.
+//! The list of devices, as text and as JSON.
 
 use std::fmt::Write as _;
 
@@ -15,7 +15,7 @@ use bokehcam::v4l2::modes::{FormatModes, modes};
 use bokehcam::v4l2::node::{self, Kind, Node};
 use bokehcam::v4l2::{Device, controls::Value};
 
-/// What is shown of a device.
+/// A device as it is listed.
 #[derive(Serialize)]
 struct DeviceInfo {
     #[serde(flatten)]
@@ -26,15 +26,15 @@ struct DeviceInfo {
     controls: Option<Vec<Control>>,
 }
 
-/// All devices shown, in groups.
+/// The listed devices, in groups.
 #[derive(Default, Serialize)]
 struct List {
     cameras: Vec<DeviceInfo>,
     virtual_cameras: Vec<DeviceInfo>,
-    /// Cameras of PipeWire's; among them may be those above.
+    /// PipeWire's cameras; these may include V4L2 cameras listed above.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pipewire: Vec<SharedCamera>,
-    /// Neither of both: shown only when asked for by name.
+    /// Other nodes, listed only if named on the command line.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     others: Vec<DeviceInfo>,
 }
@@ -42,17 +42,17 @@ struct List {
 /// Runs the command.
 ///
 /// # Errors
-/// There is no such device.
+/// Fails if no device matches.
 pub fn run(command: &DevicesCommand, global: &Global) -> Result<(), CliError> {
     let list = match &command.device {
-        None => List { pipewire: shared::all(), ..List::of(node::nodes(), false, command.controls) },
+        None => List { pipewire: shared::list_cameras(), ..List::from_nodes(node::nodes(), false, command.controls) },
         Some(name) => match name.strip_prefix("pipewire:") {
-            Some(name) => List { pipewire: shared::named(name)?, ..List::default() },
-            None => List::of(find(name)?, true, command.controls),
+            Some(name) => List { pipewire: shared::find_cameras(name)?, ..List::default() },
+            None => List::from_nodes(find(name)?, true, command.controls),
         },
     };
     if command.json {
-        // Numbers and texts always have a form in JSON.
+        // Numbers and strings always serialise.
         return print((serde_json::to_string_pretty(&list).unwrap_or_default() + "\n").as_bytes());
     }
     if list.to_string().is_empty() {
@@ -67,13 +67,13 @@ pub fn run(command: &DevicesCommand, global: &Global) -> Result<(), CliError> {
 /// See [`super::formats`].
 pub fn formats(nodes: &[Node]) -> String {
     let nodes = nodes.iter().map(|node| Node { links: Vec::new(), ..node.clone() });
-    let list = List { pipewire: shared::all(), ..List::of(nodes.collect(), false, false) };
+    let list = List { pipewire: shared::list_cameras(), ..List::from_nodes(nodes.collect(), false, false) };
     let listed = list.to_string();
     if listed.is_empty() { "none".to_owned() } else { listed }
 }
 
-/// The node that `name` means (see [`node::resolve`]), else all whose card's name contains it: these may be nodes that
-/// give no pictures.
+/// Finds the node that `name` resolves to (see [`node::resolve`]), else all nodes whose card name contains it, even
+/// those that give no pictures.
 fn find(name: &str) -> Result<Vec<Node>, CliError> {
     let nodes = node::nodes();
     let path = match node::resolve(name) {
@@ -85,34 +85,34 @@ fn find(name: &str) -> Result<Vec<Node>, CliError> {
             return if found.is_empty() { Err(error.into()) } else { Ok(found) };
         }
     };
-    // Nodes are listed by their own paths, and this may be a link.
+    // Nodes are listed by their real paths, and this may be a link.
     let real_path = path.canonicalize().unwrap_or_else(|_| path.clone());
     let found: Vec<Node> = nodes.into_iter().filter(|node| node.path == real_path).collect();
     if found.is_empty() { Err(CliError::NotVideo(path)) } else { Ok(found) }
 }
 
 impl List {
-    /// Sorts nodes into groups; `asked_for` by name are even those that are no cameras.
-    fn of(nodes: Vec<Node>, asked_for: bool, with_controls: bool) -> Self {
+    /// Sorts nodes into groups; `by_name` keeps nodes that are no cameras, too.
+    fn from_nodes(nodes: Vec<Node>, by_name: bool, with_controls: bool) -> Self {
         let mut list = Self::default();
         for node in nodes {
             let group = match node.kind {
                 Kind::Capture => &mut list.cameras,
                 Kind::Virtual => &mut list.virtual_cameras,
-                // It may be a camera: this user cannot know.
+                // Possibly a camera: without permission its kind is unknown.
                 _ if node.denied => &mut list.cameras,
-                _ if asked_for => &mut list.others,
+                _ if by_name => &mut list.others,
                 _ => continue,
             };
-            group.push(DeviceInfo::of(node, with_controls));
+            group.push(DeviceInfo::read(node, with_controls));
         }
         list
     }
 }
 
 impl DeviceInfo {
-    fn of(node: Node, with_controls: bool) -> Self {
-        // Before this program opens it and is one of them.
+    fn read(node: Node, with_controls: bool) -> Self {
+        // Before this program opens the node and becomes a holder.
         let holders = holders(&node.path);
         let device = Device::open(&node.path).ok();
         let formats = device.as_ref().and_then(|device| modes(device).ok()).unwrap_or_default();
@@ -141,7 +141,7 @@ impl std::fmt::Display for List {
 }
 
 impl DeviceInfo {
-    /// The device for people: a line of names, then indented its problem, links, state, holders, formats and controls.
+    /// Formats the device as a line of names, then indented its problem, links, state, holders, formats and controls.
     fn lines(&self) -> String {
         let Self { node, holders, formats, controls } = self;
         let mut out = String::new();
@@ -149,7 +149,7 @@ impl DeviceInfo {
         let mut attachment = vec![node.driver.clone(), node.bus.clone()];
         attachment.extend(node.usb.as_ref().map(|usb| format!("USB {}, {} Mbit/s", usb.id, usb.mbit_per_s)));
         attachment.retain(|part| !part.is_empty());
-        // Writing to a string does not fail.
+        // Writing to a string cannot fail.
         let _ = writeln!(out, "  {}  {card}  ({})", node.path.display(), attachment.join(", "));
         let mut line = |text: String| {
             let _ = writeln!(out, "    {text}");
@@ -161,7 +161,7 @@ impl DeviceInfo {
             line(link.display().to_string());
         }
         if node.kind == Kind::Virtual {
-            line(state(node).to_owned());
+            line(loopback_state(node).to_owned());
         }
         if !holders.is_empty() {
             let names: Vec<_> = holders.iter().map(ToString::to_string).collect();
@@ -183,8 +183,8 @@ impl DeviceInfo {
     }
 }
 
-/// The state of a virtual camera, told by its capabilities: with `exclusive_caps=1` these change with its first writer.
-fn state(node: &Node) -> &'static str {
+/// Describes a virtual camera's state by its capabilities: with `exclusive_caps=1` they change with its first writer.
+fn loopback_state(node: &Node) -> &'static str {
     match (node.captures, node.outputs) {
         (true, true) => "can be written to and read from",
         (false, true) => "can be written to",
@@ -193,7 +193,7 @@ fn state(node: &Node) -> &'static str {
     }
 }
 
-/// A control as `name=value  (accepted values), flags`.
+/// Formats a control as `name=value  (accepted values), flags`.
 fn control_line(control: &Control) -> String {
     let Control { name, value, minimum, maximum, step, default, items, .. } = control;
     let mut line = name.clone();

@@ -1,4 +1,4 @@
-//! `devices`: which cameras there are, and what they can do.
+//! `devices`: lists cameras, their formats and controls.
 
 #[cfg(feature = "camera")]
 mod list;
@@ -35,8 +35,8 @@ pub struct DevicesCommand {
     json: bool,
 }
 
-/// Cameras, and what may be some, with their formats, as the command lists them; without links, in whose names serial
-/// numbers are.
+/// Formats cameras, and nodes that may be cameras, as the command lists them; without links, whose names contain serial
+/// numbers.
 #[cfg(feature = "camera")]
 pub fn formats(nodes: &[Node]) -> String {
     list::formats(nodes)
@@ -45,7 +45,7 @@ pub fn formats(nodes: &[Node]) -> String {
 /// Runs the command.
 ///
 /// # Errors
-/// There is no such device, or this program was built without cameras.
+/// Fails if no device matches, or this program was built without cameras.
 pub fn run(command: &DevicesCommand, global: &Global) -> Result<(), CliError> {
     #[cfg(feature = "camera")]
     return list::run(command, global);

@@ -1,4 +1,4 @@
-//! Cameras that PipeWire has, for whoever asks.
+//! Cameras that PipeWire shares between programs.
 
 use std::fmt::Write as _;
 
@@ -7,19 +7,19 @@ use serde::Serialize;
 use crate::error::CliError;
 use bokehcam::v4l2::modes::FormatModes;
 
-/// A camera of PipeWire's.
+/// A PipeWire camera.
 #[derive(Serialize)]
 pub struct SharedCamera {
-    /// As the command line calls it.
+    /// Source name on the command line, `pipewire:NAME`.
     pub name: String,
-    /// As people call it.
+    /// Human-readable name.
     pub label: String,
     pub formats: Vec<FormatModes>,
 }
 
-/// All of them; none where there is no PipeWire.
+/// Lists all cameras of PipeWire; empty if PipeWire is not running.
 #[cfg(feature = "pipewire")]
-pub fn all() -> Vec<SharedCamera> {
+pub fn list_cameras() -> Vec<SharedCamera> {
     use bokehcam::capture::pipewire::format_modes;
     use bokehcam::pipewire::graph::Graph;
     let graph = Graph::look_closely().unwrap_or_else(|error| {
@@ -35,34 +35,34 @@ pub fn all() -> Vec<SharedCamera> {
     camera.collect()
 }
 
-/// All of them: this program was built without PipeWire.
+/// Returns an empty list: this program was built without PipeWire.
 #[cfg(not(feature = "pipewire"))]
-pub fn all() -> Vec<SharedCamera> {
+pub fn list_cameras() -> Vec<SharedCamera> {
     Vec::new()
 }
 
-/// Those that `name`, which follows `pipewire:`, means or is a part of.
+/// Finds cameras whose name or label contains `name`, the text after `pipewire:`.
 ///
 /// # Errors
-/// There is none.
-pub fn named(name: &str) -> Result<Vec<SharedCamera>, CliError> {
+/// [`CliError::NoPipeWireCamera`] if none matches.
+pub fn find_cameras(name: &str) -> Result<Vec<SharedCamera>, CliError> {
     let wanted = name.to_lowercase();
-    let is_meant = |camera: &SharedCamera| {
+    let is_match = |camera: &SharedCamera| {
         [&camera.name["pipewire:".len()..], &camera.label].into_iter().any(|text| text.to_lowercase().contains(&wanted))
     };
-    let found: Vec<SharedCamera> = all().into_iter().filter(is_meant).collect();
+    let found: Vec<SharedCamera> = list_cameras().into_iter().filter(is_match).collect();
     match found.is_empty() {
-        true => Err(CliError::NoShared(name.to_owned())),
+        true => Err(CliError::NoPipeWireCamera(name.to_owned())),
         false => Ok(found),
     }
 }
 
 impl SharedCamera {
-    /// The camera for people: a line of names, then indented its formats.
+    /// Formats the camera as a line of names, then indented its formats.
     pub fn lines(&self) -> String {
         let mut out = format!("  {}  {}\n", self.name, self.label);
         for format in &self.formats {
-            // Writing to a string does not fail.
+            // Writing to a string cannot fail.
             let _ = writeln!(out, "    {:4}  {}", format.fourcc.to_string(), format.sizes);
         }
         out

@@ -1,4 +1,4 @@
-//! Cameras: connection, formats, who has them, and what makes them slow.
+//! Checks of cameras: connection, formats, current holders, low-light frame rate.
 
 use super::finding::Finding;
 use super::system::System;
@@ -11,10 +11,10 @@ use bokehcam::v4l2::{Device, controls::Control};
 
 pub const ABOUT: &str = "camera";
 
-/// The rate of USB 2 (high speed).
+/// Data rate of USB 2 (high speed).
 const USB2_MBIT_PER_S: f32 = 480.0;
 
-/// Drivers of sensors that give raw data, which only libcamera makes pictures of.
+/// Drivers of raw sensors, which only libcamera can turn into pictures.
 const RAW_DRIVERS: [&str; 4] = ["isys", "intel-ipu6-isys", "intel-ipu7-isys", "ipu3-cio2"];
 
 /// Checks the cameras, and the nodes that could be cameras.
@@ -25,7 +25,7 @@ pub fn findings(nodes: &[Node], system: &System) -> Vec<Finding> {
         .partition(|node| RAW_DRIVERS.contains(&node.driver.as_str()));
     let mut findings: Vec<Finding> = cameras.iter().flat_map(|node| check_camera(node)).collect();
     for node in nodes.iter().filter(|node| node.denied && node.kind == Kind::Other) {
-        findings.push(denied(ABOUT, node));
+        findings.push(report_denied(ABOUT, node));
     }
     if let Some(node) = raw.first() {
         let found = format!("{} nodes such as {node} give raw sensor data, which only libcamera can use", raw.len());
@@ -41,15 +41,15 @@ pub fn findings(nodes: &[Node], system: &System) -> Vec<Finding> {
     findings
 }
 
-/// A node that this user may not open.
-pub fn denied(about: &'static str, node: &Node) -> Finding {
+/// Reports a node that this user may not open.
+pub fn report_denied(about: &'static str, node: &Node) -> Finding {
     let fix = "run `sudo usermod -aG video \"$USER\"`, then log out and in again";
     Finding::missing(about, format!("{node}: this user may not open it"), fix)
 }
 
-/// Checks one camera: whether it opens, its best mode, its USB connection, who else has it open, its rate in the dark.
+/// Checks one camera: whether it opens, its best mode, its USB connection, its other holders, its rate in low light.
 fn check_camera(node: &Node) -> Vec<Finding> {
-    // Before this program opens it and is one of them.
+    // Before this program opens the node and becomes a holder.
     let holders = holders(&node.path);
     let device = match Device::open(&node.path) {
         Ok(device) => device,
@@ -80,7 +80,7 @@ fn check_camera(node: &Node) -> Vec<Finding> {
     findings
 }
 
-/// Notes that the camera lowers its frame rate in the dark, so as to expose longer, if it is set to do so.
+/// Notes that the camera is set to lower its frame rate in the dark for a longer exposure.
 fn low_light(node: &Node, controls: &[Control]) -> Option<Finding> {
     let control = controls::find(controls, LOW_LIGHT)?;
     (control.value == Some(Value::Number(1)) && !control.inactive).then(|| {
@@ -89,9 +89,9 @@ fn low_light(node: &Node, controls: &[Control]) -> Option<Finding> {
     })
 }
 
-/// Describes the largest mode that moves smoothly, else the fastest one.
+/// Describes the largest mode with a smooth rate, else the fastest mode.
 fn best_mode(modes: &[FormatModes]) -> String {
-    /// From this rate on motion looks smooth; it takes in the 25 and 29.97 fps of some cameras.
+    /// Motion looks smooth from here on; includes the 25 and 29.97 fps of some cameras.
     const SMOOTH_FPS: f64 = 24.0;
     let readable = modes.iter().filter(|format| format.fourcc.content() == Some(Content::Color));
     let all = readable.flat_map(|format| sizes(&format.sizes).into_iter().map(move |size| (format, size)));
@@ -109,7 +109,7 @@ fn best_mode(modes: &[FormatModes]) -> String {
     }
 }
 
-/// Each size with its shortest frame interval, where that is known; of a range of sizes only the largest.
+/// Returns each size with its shortest frame interval, if known; only the largest of a range.
 fn sizes(sizes: &Sizes) -> Vec<((u32, u32), Option<Interval>)> {
     let fastest = |rates: &Rates| match rates {
         Rates::Unknown => None,

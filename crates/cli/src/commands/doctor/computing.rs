@@ -1,4 +1,4 @@
-//! What computes the blur, and programs that this one uses.
+//! Checks of the blur's executor, the networks' runtime, and external programs.
 
 use std::process::{Command, Stdio};
 
@@ -12,7 +12,7 @@ const BLUR: &str = "blur";
 const NETWORKS: &str = "networks";
 const PROGRAMS: &str = "programs";
 
-/// Checks what runs the blur, and whether other programs are installed.
+/// Checks the blur's executor, the networks, and external programs.
 pub fn findings() -> Vec<Finding> {
     let mut findings = vec![check_blur()];
     #[cfg(feature = "networks")]
@@ -21,14 +21,14 @@ pub fn findings() -> Vec<Finding> {
     findings
 }
 
-/// Whether one camera alone gives a portrait, and how fast its network is run.
+/// Checks whether a single camera can give a portrait, and how fast networks run.
 #[cfg(feature = "networks")]
 fn check_networks() -> Vec<Finding> {
     use bokehcam::network::{self, Task};
     let installed = network::installed();
     let names: Vec<&str> = installed.iter().map(|(known, _)| known.file).collect();
     let persons = installed.iter().any(|(known, _)| known.task == Task::Matte);
-    let of_networks = match persons {
+    let models = match persons {
         true => Finding::good(NETWORKS, format!("one camera alone gives a portrait: {}", names.join(", "))),
         false => Finding::note(
             NETWORKS,
@@ -36,16 +36,16 @@ fn check_networks() -> Vec<Finding> {
             "`bokehcam models get` brings one (250 kB); --depth plate needs none",
         ),
     };
-    let of_runtime = match network::onnx_runtime_installed() {
+    let runtime = match network::onnx_runtime_installed() {
         Ok(name) => Finding::good(NETWORKS, format!("run by {name}")),
         Err(why) => {
             Finding::note(NETWORKS, "networks of your own are run by what is built in; ONNX Runtime is faster", why)
         }
     };
-    vec![of_networks, of_runtime]
+    vec![models, runtime]
 }
 
-/// Which executor `--backend auto` chooses here.
+/// Reports the executor that `--backend auto` chooses here.
 fn check_blur() -> Finding {
     /// Any size will do.
     const SIZE: (u32, u32) = (64, 64);
@@ -67,7 +67,7 @@ fn check_blur() -> Finding {
     }
 }
 
-/// The version of ffmpeg, if it is installed.
+/// Reports the version of ffmpeg, if installed.
 fn check_ffmpeg() -> Finding {
     let output = Command::new("ffmpeg").arg("-version").stdin(Stdio::null()).stderr(Stdio::null()).output();
     let text = output.ok().filter(|output| output.status.success()).map(|output| output.stdout);

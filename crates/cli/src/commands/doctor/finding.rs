@@ -2,13 +2,13 @@
 
 use serde::Serialize;
 
-/// How good a finding is.
+/// Severity of a finding.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Level {
-    /// As it should be.
+    /// No problem.
     Good,
-    /// Works, and could be better.
+    /// Works, but could be better.
     Note,
     /// Something essential is missing.
     Missing,
@@ -17,12 +17,12 @@ pub enum Level {
 /// The result of one check.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Finding {
-    /// What it is about.
+    /// Topic, and heading of its group.
     pub about: &'static str,
-    /// How good it is.
+    /// Severity.
     pub level: Level,
     pub found: String,
-    /// What to do about it.
+    /// Recommended action, if any.
     pub fix: Option<String>,
 }
 
@@ -31,12 +31,12 @@ impl Finding {
         Self { about, level: Level::Good, found: found.into(), fix: None }
     }
 
-    /// It works, and could be better.
+    /// Returns a finding that works, but could be better.
     pub fn note(about: &'static str, found: impl Into<String>, fix: impl Into<String>) -> Self {
         Self { about, level: Level::Note, found: found.into(), fix: Some(fix.into()) }
     }
 
-    /// It does not work.
+    /// Returns a finding that does not work.
     pub fn missing(about: &'static str, found: impl Into<String>, fix: impl Into<String>) -> Self {
         Self { about, level: Level::Missing, found: found.into(), fix: Some(fix.into()) }
     }

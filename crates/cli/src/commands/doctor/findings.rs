@@ -1,4 +1,4 @@
-//! Findings: what is collected, and how it is told.
+//! Runs all checks, and prints their findings.
 
 use std::fmt::Write as _;
 
@@ -20,16 +20,16 @@ struct Report<'a> {
     findings: &'a [Finding],
 }
 
-/// What all checks found.
-pub struct Examined {
+/// Results of all checks.
+pub struct CheckResults {
     pub system: System,
     pub nodes: Vec<Node>,
     findings: Vec<Finding>,
 }
 
-impl Examined {
+impl CheckResults {
     /// Runs all checks.
-    pub fn here() -> Self {
+    pub fn collect() -> Self {
         let system = System::detect();
         let nodes = nodes();
         let mut findings = cameras::findings(&nodes, &system);
@@ -37,10 +37,11 @@ impl Examined {
         #[cfg(feature = "pipewire")]
         {
             let verdict = pipewire_camera::check(&system);
-            // One way to a camera will do, and one way to be one.
+            // One kind of camera source is enough, and one kind of virtual camera.
             for finding in findings.iter_mut().filter(|finding| finding.level == Level::Missing) {
-                let will_do = if finding.about == cameras::ABOUT { verdict.has_cameras } else { verdict.takes_cameras };
-                finding.level = if will_do { Level::Note } else { Level::Missing };
+                let is_camera = finding.about == cameras::ABOUT;
+                let is_optional = if is_camera { verdict.has_cameras } else { verdict.can_publish };
+                finding.level = if is_optional { Level::Note } else { Level::Missing };
             }
             findings.extend(verdict.findings);
         }
@@ -54,13 +55,13 @@ impl Examined {
         Self { system, nodes, findings }
     }
 
-    /// What is essential and missing.
+    /// Returns the essential topics with something missing.
     fn missing(&self) -> Vec<&'static str> {
         let is_missing = |about: &&str| self.findings.iter().any(|f| f.about == *about && f.level == Level::Missing);
         [cameras::ABOUT, loopback::ABOUT].into_iter().filter(is_missing).collect()
     }
 
-    /// The findings for people.
+    /// Formats the findings as text.
     pub fn text(&self) -> String {
         text(&self.findings)
     }
@@ -69,9 +70,9 @@ impl Examined {
 /// Runs all checks and prints the findings.
 ///
 /// # Errors
-/// Something essential is missing.
+/// [`CliError::NotReady`] if something essential is missing.
 pub fn run(json: bool) -> Result<(), CliError> {
-    let examined = Examined::here();
+    let examined = CheckResults::collect();
     let missing = examined.missing();
     if json {
         let report = Report { ready: missing.is_empty(), system: &examined.system, findings: &examined.findings };
@@ -82,14 +83,14 @@ pub fn run(json: bool) -> Result<(), CliError> {
     if missing.is_empty() { Ok(()) } else { Err(CliError::NotReady(missing.join(" and no "))) }
 }
 
-/// The findings for people, each group under a heading.
+/// Formats findings as text, each group under a heading.
 fn text(findings: &[Finding]) -> String {
     let mut out = String::new();
     let mut about = "";
     for finding in findings {
         if finding.about != about {
             about = finding.about;
-            // Writing to a string does not fail.
+            // Writing to a string cannot fail.
             let _ = write!(out, "\n{about}\n");
         }
         let mark = match finding.level {

@@ -1,15 +1,15 @@
-//! The machine's parts, by names that all of its model have.
+//! The machine's model, processor, memory and graphics, without serial numbers.
 
 use std::fs;
 use std::path::Path;
 
 use bokehcam::compute::thread_pool::cores;
 
-/// What the machine, its processor, its memory and its graphics are called, a line each.
-pub fn lines() -> Vec<String> {
+/// Returns a line each for the machine, its processor, its memory and its graphics.
+pub fn describe() -> Vec<String> {
     let read = |path: &str| fs::read_to_string(path).unwrap_or_default().trim_matches(['\0', '\n', ' ']).to_owned();
-    let told = ["sys_vendor", "product_name"].map(|name| read(&format!("/sys/class/dmi/id/{name}"))).join(" ");
-    let model = if told.trim().is_empty() { read("/proc/device-tree/model") } else { told };
+    let dmi_name = ["sys_vendor", "product_name"].map(|name| read(&format!("/sys/class/dmi/id/{name}"))).join(" ");
+    let model = if dmi_name.trim().is_empty() { read("/proc/device-tree/model") } else { dmi_name };
     let processors = read("/proc/cpuinfo");
     let processor = value(&processors, "model name").unwrap_or(std::env::consts::ARCH);
     let memory_kib = value(&read("/proc/meminfo"), "MemTotal").and_then(|text| text.split(' ').next()?.parse().ok());
@@ -28,23 +28,23 @@ pub fn lines() -> Vec<String> {
     lines
 }
 
-/// The value of the first line such as `key : value`.
+/// Returns the value of the first line of the form `key : value`.
 fn value<'a>(text: &'a str, key: &str) -> Option<&'a str> {
-    let of_line = |line: &'a str| line.strip_prefix(key)?.trim_start().strip_prefix(':').map(str::trim);
-    text.lines().find_map(of_line)
+    let parse_line = |line: &'a str| line.strip_prefix(key)?.trim_start().strip_prefix(':').map(str::trim);
+    text.lines().find_map(parse_line)
 }
 
-/// Driver, and number of the vendor and the model, of each graphics card that the kernel knows.
+/// Returns the driver and the PCI vendor and model ids of each graphics card that the kernel lists.
 fn graphics(class: &Path) -> Vec<String> {
     let entries = fs::read_dir(class).into_iter().flatten().flatten();
     let mut names: Vec<String> = entries.filter_map(|entry| entry.file_name().into_string().ok()).collect();
-    // Beside cards there are their connectors, such as card0-DP-1.
+    // The class also holds connectors, such as card0-DP-1.
     names.retain(|name| name.strip_prefix("card").is_some_and(|number| number.bytes().all(|b| b.is_ascii_digit())));
     names.sort();
     let card = |name: &String| {
-        let told = fs::read_to_string(class.join(name).join("device/uevent")).ok()?;
-        let of = |key: &str| told.lines().find_map(|line| line.strip_prefix(key)).unwrap_or("unknown");
-        Some(format!("driver {}, PCI {}", of("DRIVER="), of("PCI_ID=")))
+        let uevent = fs::read_to_string(class.join(name).join("device/uevent")).ok()?;
+        let field = |key: &str| uevent.lines().find_map(|line| line.strip_prefix(key)).unwrap_or("unknown");
+        Some(format!("driver {}, PCI {}", field("DRIVER="), field("PCI_ID=")))
     };
     names.iter().filter_map(card).collect()
 }
@@ -67,11 +67,11 @@ mod tests {
     #[test]
     fn cards_have_a_driver_and_connectors_are_none() {
         let class = tempfile::tempdir().unwrap();
-        for (name, told) in
+        for (name, uevent) in
             [("card1", "DRIVER=i915\nPCI_ID=8086:9A49\n"), ("card1-DP-1", ""), ("renderD128", "DRIVER=i915\n")]
         {
             fs::create_dir_all(class.path().join(name).join("device")).unwrap();
-            fs::write(class.path().join(name).join("device/uevent"), told).unwrap();
+            fs::write(class.path().join(name).join("device/uevent"), uevent).unwrap();
         }
         assert_eq!(graphics(class.path()), ["driver i915, PCI 8086:9A49"]);
         assert_eq!(graphics(&class.path().join("none")), Vec::<String>::new());

@@ -1,9 +1,9 @@
-//! The virtual camera: the module v4l2loopback, its options, its nodes.
+//! Checks of the virtual camera: the module v4l2loopback, its options, its nodes.
 
 use std::fs;
 use std::path::Path;
 
-use super::cameras::denied;
+use super::cameras::report_denied;
 use super::finding::Finding;
 use super::system::System;
 use bokehcam::v4l2::holders::holders;
@@ -14,12 +14,12 @@ pub const ABOUT: &str = "virtual camera";
 
 const LOADED: &str = "/sys/module/v4l2loopback";
 
-/// The command that loads the module so that browsers list its camera.
+/// Returns the command that loads the module so that browsers list its camera.
 fn load_command() -> String {
     modprobe("/dev/video10".as_ref())
 }
 
-/// PipeWire asks for this many buffers, and refuses a node that has fewer.
+/// Number of buffers that PipeWire requests; it refuses a node with fewer.
 const PIPEWIRE_BUFFERS: u32 = 16;
 
 /// Checks the module v4l2loopback and each of its nodes.
@@ -29,7 +29,7 @@ pub fn findings(nodes: &[Node], system: &System) -> Vec<Finding> {
     if !loaded && nodes.is_empty() {
         return vec![not_loaded(system)];
     }
-    let mut findings = vec![Finding::good(ABOUT, format!("module v4l2loopback {} is loaded", version()))];
+    let mut findings = vec![Finding::good(ABOUT, format!("module v4l2loopback {} is loaded", module_version()))];
     if nodes.is_empty() {
         findings.push(Finding::missing(ABOUT, "the module has no device here", load_command()));
     }
@@ -38,9 +38,9 @@ pub fn findings(nodes: &[Node], system: &System) -> Vec<Finding> {
     findings
 }
 
-/// Says how to install or load the module.
+/// Reports how to install or load the module.
 fn not_loaded(system: &System) -> Finding {
-    if !installed(&system.kernel) {
+    if !is_installed(&system.kernel) {
         let fix = format!(
             "install it (`sudo apt install v4l2loopback-dkms`, `dnf install akmod-v4l2loopback` of RPM Fusion, \
              `pacman -S v4l2loopback-dkms`, with the kernel's headers), then `{}`",
@@ -64,8 +64,8 @@ fn not_loaded(system: &System) -> Finding {
     Finding::missing(ABOUT, "module v4l2loopback is installed and not loaded", fix)
 }
 
-/// Whether the kernel's list of modules has v4l2loopback, wherever the distribution keeps that list.
-fn installed(kernel: &str) -> bool {
+/// Whether the kernel's module list contains v4l2loopback, in any of the distributions' folders.
+fn is_installed(kernel: &str) -> bool {
     ["/lib/modules", "/usr/lib/modules", "/run/booted-system/kernel-modules/lib/modules"].iter().any(|folder| {
         let list = fs::read_to_string(Path::new(folder).join(kernel).join("modules.dep"));
         list.is_ok_and(|list| list.lines().any(|line| line.split(".ko").next().is_some_and(is_loopback)))
@@ -76,17 +76,17 @@ fn is_loopback(path: &str) -> bool {
     path.rsplit('/').next() == Some("v4l2loopback")
 }
 
-/// The version of the loaded module; those before 0.13 do not tell it.
-fn version() -> String {
-    let told = fs::read_to_string(Path::new(LOADED).join("version"));
-    told.map_or_else(|_| "(before 0.13, or of unknown version)".into(), |version| version.trim().to_owned())
+/// Returns the version of the loaded module; those before 0.13 do not publish it.
+fn module_version() -> String {
+    let text = fs::read_to_string(Path::new(LOADED).join("version"));
+    text.map_or_else(|_| "(before 0.13, or of unknown version)".into(), |version| version.trim().to_owned())
 }
 
-/// Whether a node can be written to now, told by its capabilities: with `exclusive_caps=1` it is an output until it has
-/// a writer, and a capture device from then on.
+/// Checks by its capabilities whether a node can be written to now: with `exclusive_caps=1` it is an output until it
+/// has a writer, and a capture device from then on.
 fn check_node(node: &Node) -> Finding {
     if node.denied {
-        return denied(ABOUT, node);
+        return report_denied(ABOUT, node);
     }
     let holders: Vec<_> = holders(&node.path).iter().map(ToString::to_string).collect();
     let by = if holders.is_empty() { "nobody this user can see".to_owned() } else { holders.join(", ") };
@@ -107,7 +107,7 @@ fn check_node(node: &Node) -> Finding {
     }
 }
 
-/// Notes that the module has too few buffers for PipeWire, where PipeWire is running.
+/// Notes that the module has too few buffers for a running PipeWire.
 fn check_buffers(system: &System) -> Option<Finding> {
     let buffers = loopback::buffers()?;
     let fix = "load the module with max_buffers=16 if programs that get their cameras from PipeWire do not list it";

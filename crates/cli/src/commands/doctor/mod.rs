@@ -1,4 +1,4 @@
-//! `doctor`: what this machine has and lacks for a camera in, a virtual camera out.
+//! `doctor`: checks this machine for camera input and virtual camera output.
 
 #[cfg(feature = "camera")]
 mod cameras;
@@ -52,7 +52,7 @@ pub struct DoctorCommand {
 /// Runs the command.
 ///
 /// # Errors
-/// Something essential is missing, or this program was built without cameras.
+/// Fails if something essential is missing, or this program was built without cameras.
 pub fn run(command: &DoctorCommand) -> Result<(), CliError> {
     #[cfg(feature = "camera")]
     match &command.report {

@@ -1,4 +1,4 @@
-//! Cameras of PipeWire: the daemon, who connects readers, the desktop portal that browsers ask, and what these allow.
+//! Checks of PipeWire cameras: the daemon, the session manager, the desktop portal that browsers use, and permissions.
 
 use std::path::Path;
 use std::process::{Command, Stdio};
@@ -12,7 +12,7 @@ use bokehcam::pipewire::graph::Graph;
 
 pub const ABOUT: &str = "PipeWire";
 
-/// Browsers by their programs, with the switch that makes them list cameras of PipeWire.
+/// Browsers: program names, display name, and the switch that makes them list PipeWire's cameras.
 const BROWSERS: [(&[&str], &str, &str); 2] = [
     (
         &["chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "brave-browser", "microsoft-edge"],
@@ -22,22 +22,22 @@ const BROWSERS: [(&[&str], &str, &str); 2] = [
     (&["firefox", "firefox-esr"], "Firefox", "about:config, media.webrtc.camera.allow-pipewire = true"),
 ];
 
-/// What PipeWire is good for here.
+/// Results of the PipeWire checks.
 pub struct Verdict {
     pub findings: Vec<Finding>,
-    /// Whether other programs can be given a camera.
-    pub takes_cameras: bool,
+    /// Whether this program can publish a camera that others can read.
+    pub can_publish: bool,
     /// Whether there is a camera to read from.
     pub has_cameras: bool,
 }
 
-/// Checks what a camera of PipeWire's needs, from the daemon to the browsers.
+/// Checks the requirements of a PipeWire camera, from the daemon to the browsers.
 pub fn check(system: &System) -> Verdict {
     let graph = match Graph::look() {
         Ok(graph) => graph,
         Err(error) => {
             let findings = vec![unreachable(&error)];
-            return Verdict { findings, takes_cameras: false, has_cameras: false };
+            return Verdict { findings, can_publish: false, has_cameras: false };
         }
     };
     let all: Vec<_> = graph.sources.iter().filter(|source| source.is_camera).collect();
@@ -60,20 +60,21 @@ pub fn check(system: &System) -> Verdict {
             "install xdg-desktop-portal and the part for this desktop (-gtk, -gnome, -kde, -wlr), and log in again";
         Finding::note(ABOUT, "no desktop portal: browsers list no camera of PipeWire's, other programs do", fix)
     });
+    // A portal that started before the session manager never sees its cameras.
     if system.portal && !cameras.is_empty() && portal_sees_a_camera() == Some(false) {
         let fix = "their order of start: `systemctl --user restart wireplumber xdg-desktop-portal`";
         findings.push(Finding::note(ABOUT, "the desktop portal sees no camera, although PipeWire has one", fix));
     }
-    findings.extend(refusals());
+    findings.extend(check_refusals());
     findings.extend(
         BROWSERS.iter().filter(|(programs, ..)| programs.iter().any(|name| is_installed(name))).map(
             |(_, name, switch)| Finding::note(ABOUT, format!("{name} lists its cameras only when told to"), *switch),
         ),
     );
-    Verdict { findings, takes_cameras: has_manager, has_cameras: has_manager && has_cameras }
+    Verdict { findings, can_publish: has_manager, has_cameras: has_manager && has_cameras }
 }
 
-/// Whether a process is this program, run by somebody: what it gives is no camera to begin with.
+/// Whether a process is an instance of this program: its output does not count as a camera.
 fn is_bokehcam(process: u32) -> bool {
     std::fs::read_to_string(format!("/proc/{process}/comm")).is_ok_and(|name| name.trim_end() == "bokehcam")
 }
@@ -84,41 +85,42 @@ fn unreachable(error: &PipeWireError) -> Finding {
     Finding::note(ABOUT, error.to_string(), fix)
 }
 
-/// Whether the portal would show a camera; `None` where it cannot be asked.
+/// Whether the portal reports a camera; `None` if it does not answer.
 fn portal_sees_a_camera() -> Option<bool> {
     let camera = ["org.freedesktop.portal.Camera", "IsCameraPresent"];
     let place = ["get-property", "org.freedesktop.portal.Desktop", "/org/freedesktop/portal/desktop"];
-    bus(&[&place[..], &camera].concat())?["data"].as_bool()
+    call_bus(&[&place[..], &camera].concat())?["data"].as_bool()
 }
 
-/// Programs that were refused the camera once, and never ask again.
-fn refusals() -> Option<Finding> {
+/// Reports programs whose camera access was once denied; the portal never asks about them again.
+fn check_refusals() -> Option<Finding> {
     let store = "org.freedesktop.impl.portal.PermissionStore";
     let place = ["call", store, "/org/freedesktop/impl/portal/PermissionStore", store, "Lookup", "ss"];
-    let names = refused(&bus(&[&place[..], &["devices", "camera"]].concat())?);
+    let names = refused_programs(&call_bus(&[&place[..], &["devices", "camera"]].concat())?);
     (!names.is_empty()).then(|| {
         let found = format!("the desktop refuses cameras to {}, as it was told once", names.join(", "));
         Finding::note(ABOUT, found, "`flatpak permission-remove devices camera`, and answer yes the next time")
     })
 }
 
-/// Names in the permission store's answer that were told "no"; programs outside of sandboxes have the empty name.
-fn refused(answer: &Value) -> Vec<String> {
+/// Returns the programs with the answer "no" in the permission store; programs outside sandboxes have an empty name.
+fn refused_programs(answer: &Value) -> Vec<String> {
     let permissions = answer["data"][0].as_object().into_iter().flatten();
-    let no = permissions.filter(|(_, told)| told.as_array().is_some_and(|told| told.iter().any(|word| word == "no")));
+    let is_refused = |answers: &Value| answers.as_array().is_some_and(|list| list.iter().any(|word| word == "no"));
+    let no = permissions.filter(|(_, answers)| is_refused(answers));
     no.map(|(name, _)| if name.is_empty() { "all programs outside of sandboxes".into() } else { name.clone() })
         .collect()
 }
 
-/// Asks somebody on the session's message bus who is there already; `None` where nobody can be asked.
-fn bus(question: &[&str]) -> Option<Value> {
-    let asked = Command::new("busctl")
+/// Calls a running service on the session bus without starting it; `None` if the call fails.
+fn call_bus(question: &[&str]) -> Option<Value> {
+    let output = Command::new("busctl")
         .args(["--user", "--auto-start=no", "--timeout=3", "--json=short"])
         .args(question)
         .stdin(Stdio::null())
         .stderr(Stdio::null())
         .output();
-    serde_json::from_slice(&asked.ok().filter(|answer| answer.status.success())?.stdout).ok()
+    serde_json::from_slice(&output.ok().filter(|answer| answer.status.success())?.stdout).ok()
 }
 
 fn is_installed(program: &str) -> bool {
@@ -133,8 +135,9 @@ mod tests {
     #[test]
     fn who_was_refused_is_named() {
         let answer = r#"{"type":"a{sas}v","data":[{"":["no"],"org.a":["yes"],"org.b":["no"]},{"type":"y","data":0}]}"#;
-        assert_eq!(refused(&serde_json::from_str(answer).unwrap()), ["all programs outside of sandboxes", "org.b"]);
-        assert_eq!(refused(&serde_json::json!({ "data": [{}] })), Vec::<String>::new());
-        assert_eq!(refused(&Value::Null), Vec::<String>::new());
+        let expected = ["all programs outside of sandboxes", "org.b"];
+        assert_eq!(refused_programs(&serde_json::from_str(answer).unwrap()), expected);
+        assert_eq!(refused_programs(&serde_json::json!({ "data": [{}] })), Vec::<String>::new());
+        assert_eq!(refused_programs(&Value::Null), Vec::<String>::new());
     }
 }

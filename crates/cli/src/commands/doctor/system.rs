@@ -1,4 +1,4 @@
-//! The machine and the session: what someone who is asked for help wants to know first.
+//! The operating system and the session: the first facts needed to help a user.
 
 use std::fmt;
 use std::fs;
@@ -6,24 +6,24 @@ use std::path::Path;
 
 use serde::Serialize;
 
-/// What this program runs on.
+/// Environment of this program.
 #[derive(Debug, Serialize)]
 pub struct System {
     /// Version of this program.
     pub bokehcam: &'static str,
     /// Release of the kernel.
     pub kernel: String,
-    /// Name of the distribution.
+    /// Name of the Linux distribution.
     pub distribution: String,
-    /// How the desktop session shows windows: wayland, x11, tty, or none.
+    /// Type of the desktop session: wayland, x11, tty, or none.
     pub session: String,
-    /// The sandbox or container that this program runs in, if any.
+    /// The sandbox or container around this program, if any.
     pub sandbox: Option<String>,
-    /// Whether Secure Boot is on: then the kernel takes signed modules only. `None` where the firmware does not tell.
+    /// Whether Secure Boot is on: then the kernel loads signed modules only. `None` if the firmware does not report it.
     pub secure_boot: Option<bool>,
-    /// Whether PipeWire, which many programs get their cameras from, has a socket in this session.
+    /// Whether PipeWire, the source of cameras for many programs, has a socket in this session.
     pub pipewire: bool,
-    /// Whether a desktop portal, which programs in sandboxes ask for cameras, is running.
+    /// Whether a desktop portal, through which sandboxed programs access cameras, is running.
     pub portal: bool,
 }
 
@@ -38,7 +38,7 @@ impl System {
             sandbox: sandbox(),
             secure_boot: secure_boot(),
             pipewire: pipewire(),
-            // xdg-desktop-portal, as cut by the kernel.
+            // xdg-desktop-portal, cut to 15 bytes by the kernel.
             portal: is_running("xdg-desktop-por"),
         }
     }
@@ -81,7 +81,7 @@ fn sandbox() -> Option<String> {
     } else if exists("/run/.containerenv") || exists("/.dockerenv") {
         Some("container".into())
     } else {
-        // Set by systemd-nspawn, LXC and others for what runs in them.
+        // Set by systemd-nspawn, LXC and others in their containers.
         variable("container")
     }
 }
@@ -92,7 +92,7 @@ fn secure_boot() -> Option<bool> {
         return Some(false);
     }
     let variable = "/sys/firmware/efi/efivars/SecureBoot-8be4df61-93ca-11d2-aa0d-00e098032b8c";
-    // Four bytes of attributes before the value.
+    // The value follows four bytes of attributes.
     fs::read(variable).ok()?.get(4).map(|on| *on == 1)
 }
 
@@ -101,7 +101,7 @@ fn pipewire() -> bool {
     folder.is_some_and(|folder| Path::new(&folder).join("pipewire-0").exists())
 }
 
-/// Whether a process has this name, which the kernel cuts to 15 bytes.
+/// Whether a process of this name runs; the kernel cuts names to 15 bytes.
 fn is_running(name: &str) -> bool {
     let processes = fs::read_dir("/proc").into_iter().flatten().flatten();
     processes.into_iter().any(|process| {

@@ -1,4 +1,4 @@
-//! `preview`: a window that shows a source in portrait mode, live.
+//! `preview`: shows a source in portrait mode in a window, live.
 
 mod store;
 
@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use clap::Args;
 
-use crate::controlled::{self, AsCommandLine};
+use crate::controlled::{self, CommandLineRules};
 use crate::error::CliError;
 use crate::options::{Global, Streaming, Window};
 use crate::report;
@@ -64,29 +64,29 @@ pub struct PreviewCommand {
     parts: Streaming,
 }
 
-/// Runs the command; `given` is for warnings and for the commands that the window composes.
+/// Runs the command; `given` serves warnings and the commands that the window composes.
 ///
 /// # Errors
-/// The options do not fit each other, there is no display, or there never was a frame.
+/// Fails if the options conflict, there is no display, or no frame ever arrived.
 pub fn run(command: &PreviewCommand, global: &Global, given: Given) -> Result<(), CliError> {
     let mut parts = command.parts.clone();
-    // Finding a look takes longer than most recordings last.
+    // Choosing a look takes longer than most recordings last.
     parts.frames.repeat = true;
     let source = command.source.as_deref().unwrap_or_default();
     show(source, &command.to, &command.window, &parts, (global, given), command.name.as_ref())
 }
 
-/// Shows a source in a window, and writes it to `to`. `called` is what it is called by those who control it.
+/// Shows a source in a window, and writes it to `to`. `run_name` is its name for `bokehcam ctl`.
 ///
 /// # Errors
-/// As for [`run`].
+/// See [`run`].
 pub fn show(
     name: &str,
     to: &[Target],
     window: &Window,
     parts: &Streaming,
     (global, given): (&Global, Given),
-    called: Option<&Name>,
+    run_name: Option<&Name>,
 ) -> Result<(), CliError> {
     let Streaming { frames, stream, output, computing, .. } = parts;
     report::check(stream.report.as_deref(), output.force, to)?;
@@ -110,19 +110,20 @@ pub fn show(
         target => Ok(Output { name: target.to_string(), is_camera: target.is_camera() }),
     });
     let outputs = outputs.collect::<Result<Vec<_>, _>>()?;
-    report::try_out(stream.report.as_deref())?;
+    report::check_writable(stream.report.as_deref())?;
     let look = look::look(&parts.blur, &computing.quality)?;
-    // As if there were depth: what the source lacks is known only when it is open, and a window may open others.
+    // Assumes depth: the source's depth is known only once it is open, and the window may open others.
     let look = source::fitting_look(&look, &parts.blur.depth, true)?;
     let effect = if look.effect.follows_depth() { Effect::Auto } else { look.effect };
     let look = Look { effect, ..look };
     let memory_file = file::state_folder().map(|folder| folder.join("window.toml"));
-    // What begins afresh leaves alone what was there.
+    // `--fresh` neither reads nor overwrites the remembered state.
     let memory_file = memory_file.filter(|_| !window.fresh);
     let memory = memory_file.as_deref().and_then(Memory::read).unwrap_or_default();
-    let mut gone = Vec::new();
-    let before = Some(&memory).filter(|_| !given.has_look()).and_then(|memory| memory.look(|line| gone.push(line)));
-    let before = before.filter(|before| *before != look);
+    let mut dropped = Vec::new();
+    let restored = Some(&memory).filter(|_| !given.has_look());
+    let restored = restored.and_then(|memory| memory.look(|line| dropped.push(line)));
+    let restored = restored.filter(|restored| *restored != look);
     let source = if name.is_empty() { memory.source().unwrap_or_default() } else { name.to_owned() };
     let texts =
         texts::chosen(window.language.as_deref()).map_err(|line| CliError::Usage(format!("--language: {line}")))?;
@@ -130,12 +131,12 @@ pub fn show(
     let mirror_chosen = given.stated.iter().any(|name| name == "mirror");
     let store = FileStore { chosen: global.config.clone(), given };
     let mut state = first_state(look, &source, window, stream.mirror, &memory);
-    if let Some(before) = before {
-        state.look = before;
-        state.note(AS_IT_WAS);
+    if let Some(restored) = restored {
+        state.look = restored;
+        state.note(RESTORED_LOOK);
     }
-    gone.into_iter().for_each(|line| state.note(line));
-    let rules = AsCommandLine {
+    dropped.into_iter().for_each(|line| state.note(line));
+    let rules = CommandLineRules {
         config: global.config.clone(),
         unused: unused::Run {
             cpu_only: computing.backend == Backend::Cpu,
@@ -144,7 +145,7 @@ pub fn show(
             ..unused::Run::default()
         },
     };
-    let control = controlled::claim(called, "preview")?.map(|claim| Control { claim, rules: Arc::new(rules) });
+    let control = controlled::claim(run_name, "preview")?.map(|claim| Control { claim, rules: Arc::new(rules) });
     let look = state.look.clone();
     let mut system = System::new(parts.source_options(), look.clone(), Box::new(store));
     let device = system.executors.device()?;
@@ -177,6 +178,7 @@ pub fn show(
         control,
         stop,
     })?;
+    // A report is written even if the preview failed.
     let written = match (&stream.report, &ended.report) {
         (Some(path), Some(report)) => report::write(path, report, output.force),
         _ => Ok(()),
@@ -188,10 +190,10 @@ pub fn show(
     }
 }
 
-/// Shown where the look is not the usual one from the start.
-const AS_IT_WAS: &str = "This is the look that you left. R goes back to the usual one.";
+/// Shown at the start if the previous session's look is restored.
+const RESTORED_LOOK: &str = "This is the look that you left. R goes back to the usual one.";
 
-/// What the window shows first.
+/// Returns the initial state of the window.
 fn first_state(look: Look, source: &str, window: &Window, mirror: bool, memory: &Memory) -> State {
     let mut state = State::new(look, source.to_owned());
     state.shown = window.show;

@@ -1,4 +1,4 @@
-//! The settings file, as the window uses it.
+//! The settings file as the window's storage of presets.
 
 use std::path::{Path, PathBuf};
 
@@ -8,26 +8,25 @@ use crate::settings::file::SettingsFile;
 use crate::settings::layers::Given;
 use crate::settings::presets;
 use crate::settings::save;
-use crate::settings::table::GIVEN_TO_WINDOW;
+use crate::settings::table::WINDOW_START;
 use crate::terminal::print;
 use bokehcam::look::Value;
 use bokehcam::look::presets::Preset;
 use bokehcam::look::{Effect, Look, Patch};
 use bokehcam_window::services::{SettingsStore, Switch};
 
-/// The settings file, and what the command line gave.
+/// The settings file, and the settings of the command line.
 pub(super) struct FileStore {
-    /// The settings file, where one was chosen.
+    /// The settings file chosen by `--config`, if any.
     pub chosen: Option<PathBuf>,
-    /// Of the command line, what the window does not state by itself.
+    /// The command line's settings, except those that the window states by itself.
     pub given: Given,
 }
 
 impl FileStore {
-    /// The preset that makes this look, wherever that is focused, in a command without anything else: nothing that is stated
-    /// elsewhere comes between.
-    fn preset_of(&self, look: &Look) -> Option<Preset> {
-        if !self.given.behind.is_empty() || self.given.switches.iter().any(|(name, _)| name == "like") {
+    /// Returns the preset that alone, with any focus, makes this look: none if other layers set something.
+    fn find_preset(&self, look: &Look) -> Option<Preset> {
+        if !self.given.from_layers.is_empty() || self.given.switches.iter().any(|(name, _)| name == "like") {
             return None;
         }
         let all = SettingsFile::load(self.chosen.as_deref()).unwrap_or_default().all_presets();
@@ -37,7 +36,7 @@ impl FileStore {
         })
     }
 
-    /// Changes the file that presets are saved in.
+    /// Applies `change` to the settings file.
     fn change(&self, change: impl FnOnce(&Path) -> Result<(), CliError>) -> Result<(), String> {
         let file = save::file_to_save(self.chosen.as_deref());
         file.and_then(|file| change(&file)).map_err(|error| error.to_string())
@@ -68,16 +67,17 @@ impl SettingsStore for FileStore {
     fn command(&self, look: &Look, source: &str, outputs: &[String], switches: &[Switch]) -> String {
         let mut switches = switches.to_vec();
         let is_new = |(name, _): &&Switch| !switches.iter().any(|(other, _)| other == name);
-        // What writes to outputs is `stream`, which has no window.
-        let has_effect = |(name, _): &&Switch| outputs.is_empty() || !GIVEN_TO_WINDOW.contains(&name.as_str());
+        // A command with outputs is a `stream`, which has no window.
+        let has_effect = |(name, _): &&Switch| outputs.is_empty() || !WINDOW_START.contains(&name.as_str());
         let given: Vec<Switch> = self.given.switches.iter().filter(is_new).filter(has_effect).cloned().collect();
-        // The window's own switches override those of the command line; controls of the camera come last.
+        // The window's own switches override those of the command line; camera controls come last.
         let at = switches.iter().position(|(name, _)| name == "control").unwrap_or(switches.len());
         switches.splice(at..at, given);
-        let preset = self.preset_of(look);
+        let preset = self.find_preset(look);
         let changed = Patch::of(look).beside(&Patch::of(&Look::default())).values();
-        // A default is left out, unless another layer (see `Given::behind`) would set the value instead.
-        let is_stated = |value: &Value| changed.contains(value) || self.given.behind.iter().any(|name| name == value.0);
+        // Defaults are left out, unless another layer (see `Given::from_layers`) would override them.
+        let is_layered = |name: &str| self.given.from_layers.iter().any(|other| other == name);
+        let is_stated = |value: &Value| changed.contains(value) || is_layered(value.0);
         let has_effect = |value: &Value| value.0 != "tilt" || look.effect == Effect::TiltShift;
         let all = Patch::of(look).values().into_iter();
         let flags: Vec<Value> = match preset {
@@ -90,8 +90,8 @@ impl SettingsStore for FileStore {
                 [("preset", name)].into_iter().chain(all.filter(is_own)).collect()
             }
         };
-        let command = command_line::equivalent(source, outputs, &flags, &switches);
-        // A closed standard output is no reason to fail.
+        let command = command_line::shell_command(source, outputs, &flags, &switches);
+        // A closed standard output is no failure.
         let _ = print(format!("{command}\n").as_bytes());
         command
     }

@@ -1,4 +1,4 @@
-//! `render --debug-dir`: every intermediate result of a blur as a picture, and its plan in numbers.
+//! `render --debug-dir`: writes every intermediate result of a blur as a picture, and its plan as numbers.
 
 use std::fs;
 use std::io;
@@ -6,7 +6,7 @@ use std::path::Path;
 
 use serde::Serialize;
 
-use super::debug_pictures::{coc, grey, light};
+use super::debug_pictures::{draw_coc, draw_grey, draw_light};
 use crate::error::CliError;
 use crate::files::{refuse_overwrite, write_whole};
 use bokehcam::bokeh::cpu::CpuBokeh;
@@ -21,54 +21,55 @@ use bokehcam::look::Look;
 use bokehcam::optics::CocField;
 use bokehcam::recording::still;
 
-/// The file of numbers, which is always written, even where nothing is blurred.
+/// Name of the file of numbers, which is written even if nothing is blurred.
 pub const PLAN: &str = "plan.json";
 
-/// How the picture was blurred.
+/// Contents of `plan.json`: how the picture was blurred.
 #[derive(Serialize)]
 struct PlanFile {
-    /// Columns and rows of the picture.
+    /// Width and height of the picture, in pixels.
     size: (u32, u32),
     executor: String,
     /// `layers`, `select`, `gather` or `none`.
     compositing: &'static str,
-    /// Separable terms of the filters.
+    /// Number of separable terms of the filters.
     rank: usize,
-    /// Distance of the focal plane in metres, and the radius at infinity, where the blur follows depth.
+    /// Distance of the focal plane in metres, and CoC radius at infinity, if the blur follows depth.
     focus_m: Option<f32>,
     coc_at_infinity_px: Option<f32>,
-    /// Lowest and highest CoC of the picture.
+    /// Lowest and highest CoC of the picture, in pixels; negative in front of the focal plane.
     coc_px: Option<Range>,
-    /// The CoC whose colour is full in the pictures of CoC.
+    /// CoC at full saturation in the pictures of CoC, in pixels.
     coc_full_color_px: f32,
-    /// Whether what near objects hide was filled in.
+    /// Whether the background hidden by near objects was filled in.
     filled: bool,
-    /// Share of the picture in tiles where nothing behind is blurred.
+    /// Fraction of the picture in tiles whose background is sharp.
     still_share: f32,
     bins: Vec<BinEntry>,
-    /// What was written beside this file.
+    /// Names of the pictures in the same folder.
     files: Vec<String>,
 }
 
-/// One bin. A border that is `null` is open.
+/// A CoC bin. A border of `null` is open.
 #[derive(Serialize)]
 struct BinEntry {
     index: usize,
-    /// Borders of the CoC, in pixels of the picture.
+    /// CoC limits, in pixels of the picture.
     low_px: Option<f32>,
     high_px: Option<f32>,
-    /// Pixels of the picture that a bin pixel covers, each way.
+    /// Picture pixels per bin pixel, in each direction.
     scale: usize,
     width: usize,
     height: usize,
-    /// Largest radius of its filters, in bin pixels: white in the picture of the radius.
+    /// Largest filter radius, in bin pixels: white in the picture of the radius.
     max_radius_px: f32,
     near: bool,
-    /// Which of the executor's buffers it uses.
+    /// Index of the executor's buffer.
     slot: usize,
-    /// Whether anything was in it; if not, its passes were left out.
+    /// Whether the bin had content; if not, its passes were skipped.
     present: bool,
-    /// The pixels that are in this bin by more than half: their share of the picture, their ranges of CoC and depth.
+    /// The pixels with over half of their weight in this bin: their fraction of the picture, and their CoC and depth
+    /// ranges.
     picture_share: f32,
     content_coc_px: Option<Range>,
     content_depth_m: Option<Range>,
@@ -79,7 +80,7 @@ struct BinEntry {
 struct Range(f32, f32);
 
 impl Range {
-    fn of(values: impl Iterator<Item = f32>) -> Option<Self> {
+    fn from_values(values: impl Iterator<Item = f32>) -> Option<Self> {
         values.fold(None, |range, value| {
             let Range(low, high) = range.unwrap_or(Range(value, value));
             Some(Range(low.min(value), high.max(value)))
@@ -87,12 +88,12 @@ impl Range {
     }
 }
 
-/// Blurs a picture on the CPU and writes every intermediate result into the folder `dir`; with `force`, files of the
-/// same names are overwritten. Returns the blurred picture and a description of the executor.
+/// Blurs a picture on the CPU and writes every intermediate result into the folder `dir`; `force` overwrites existing
+/// files. Returns the blurred picture and a description of the executor.
 ///
 /// # Errors
-/// As without a folder; the folder or a file in it cannot be written, or exists and may not be overwritten.
-pub fn blurred(
+/// Fails like the blur itself, or if a file in the folder exists without `force` or cannot be written.
+pub fn blur_and_dump(
     mut color: ColorImage,
     depth: Option<Depth>,
     look: &Look,
@@ -100,7 +101,7 @@ pub fn blurred(
     (dir, force): (&Path, bool),
 ) -> Result<(ColorImage, String), CliError> {
     let size = color.size();
-    let mut output = DebugOutput { pictures: Vec::new(), plan: PlanFile::of(size) };
+    let mut output = DebugOutput { pictures: Vec::new(), plan: PlanFile::unblurred(size) };
     let mut result = ColorImage::default();
     match look.settings(size, false) {
         None => result = color,
@@ -110,6 +111,7 @@ pub fn blurred(
                 return Err(CliError::Usage(text.to_string()));
             }
             settings.check(size)?;
+            // Always the CPU executor: only its intermediates can be read.
             let mut bokeh = CpuBokeh::new(Plan::new(&settings, size.0, size.1), computing.threads);
             let (coc, depth) = coc_and_depth(look, &mut color, depth)?;
             bokeh.blur(&color, depth.as_ref(), &coc, &mut result)?;
@@ -120,15 +122,15 @@ pub fn blurred(
     Ok((result, output.plan.executor))
 }
 
-/// The pictures, by file name, and the numbers that are to be written.
+/// The pictures with their file names, and the numbers.
 struct DebugOutput {
     pictures: Vec<(String, ColorImage)>,
     plan: PlanFile,
 }
 
 impl PlanFile {
-    /// The plan of a picture that is not blurred.
-    fn of(size: (u32, u32)) -> Self {
+    /// Returns the plan of an unblurred picture.
+    fn unblurred(size: (u32, u32)) -> Self {
         Self {
             size,
             executor: "not blurred".to_string(),
@@ -147,13 +149,13 @@ impl PlanFile {
 }
 
 impl DebugOutput {
-    /// Collects everything about the frame that an executor has just blurred.
+    /// Collects everything about the frame that the executor has just blurred.
     fn collect(&mut self, bokeh: &CpuBokeh, color: &ColorImage, depth: Option<&DepthMap>, field: &CocField) {
         let (plan, width) = (bokeh.plan(), color.width as usize);
         let position = |k: usize| (k % width, k / width);
         let scene = bokeh.scene(color, depth, field, false);
         let coc_px: Vec<f32> = scene.iter().map(|pixel| pixel[3]).collect();
-        let range = Range::of(coc_px.iter().copied());
+        let range = Range::from_values(coc_px.iter().copied());
         let full_px = range.map_or(0.0, |Range(low, high)| high.max(-low));
         let still = (0..scene.len()).map(|k| f32::from(u8::from(bokeh.is_still(position(k)))));
         let still_share = still.clone().sum::<f32>() / scene.len().max(1) as f32;
@@ -175,19 +177,19 @@ impl DebugOutput {
             coc_full_color_px: full_px,
             filled: bokeh.filled(),
             still_share,
-            ..PlanFile::of(color.size())
+            ..PlanFile::unblurred(color.size())
         };
-        self.add("coc", coc(width, coc_px.iter().copied(), full_px));
+        self.add("coc", draw_coc(width, coc_px.iter().copied(), full_px));
         if plan.compositing == Compositing::Layers {
-            self.add("still", grey(width, still, 1.0));
+            self.add("still", draw_grey(width, still, 1.0));
         }
         if bokeh.filled() {
             let mut behind = bokeh.scene(color, depth, field, true);
-            self.add("behind_coc", coc(width, behind.iter().map(|pixel| pixel[3]), full_px));
-            // From CoC to full coverage, as `light` takes it.
+            self.add("behind_coc", draw_coc(width, behind.iter().map(|pixel| pixel[3]), full_px));
+            // Channel 3 changes from CoC to full coverage, for `draw_light`.
             behind.iter_mut().for_each(|pixel| pixel[3] = 1.0);
-            self.add("behind", light(width, &behind, plan.expansion, 1));
-            self.add("hidden", grey(width, coc_px.iter().map(|&coc_px| bokeh.hidden(coc_px)), 1.0));
+            self.add("behind", draw_light(width, &behind, plan.expansion, 1));
+            self.add("hidden", draw_grey(width, coc_px.iter().map(|&coc_px| bokeh.hidden(coc_px)), 1.0));
         }
         for (k, bin) in plan.bins.iter().enumerate() {
             self.collect_bin(bokeh, k, bin);
@@ -195,21 +197,21 @@ impl DebugOutput {
         }
     }
 
-    /// Collects the pictures of bin `k` before and after its filters, and of its filter radii.
+    /// Collects pictures of bin `k` before and after its filters, and of its filter radii.
     fn collect_bin(&mut self, bokeh: &CpuBokeh, k: usize, bin: &Bin) {
         let plan = bokeh.plan();
         let mut show = |name: &str, pixels: &[[f32; 4]]| {
             let coverage = pixels.iter().map(|pixel| pixel[3]);
-            let picture = light(bin.width, pixels, plan.expansion, bin.scale);
+            let picture = draw_light(bin.width, pixels, plan.expansion, bin.scale);
             self.add(&format!("{name}_{k}"), picture);
             let name = if name == "bin" { "coverage" } else { "blur_coverage" };
-            self.add(&format!("{name}_{k}"), grey(bin.width, coverage, 1.0));
+            self.add(&format!("{name}_{k}"), draw_grey(bin.width, coverage, 1.0));
         };
         show("bin", &bokeh.probe(Probe::Bin(k)));
-        // A gather blurs straight into the picture, without a filtered bin.
+        // The gather writes to the picture directly: it has no filtered bin.
         if plan.compositing != Compositing::Gather {
             show("blur", &bokeh.probe(Probe::Blur(k)));
-            let radius = grey(bin.width, bokeh.radius_px(k).into_iter(), bin.max_radius_px);
+            let radius = draw_grey(bin.width, bokeh.radius_px(k).into_iter(), bin.max_radius_px);
             self.add(&format!("radius_{k}"), radius);
         }
     }
@@ -218,18 +220,18 @@ impl DebugOutput {
         self.pictures.push((format!("{name}.png"), picture));
     }
 
-    /// Writes everything, or nothing where something would be overwritten unasked.
+    /// Writes everything, or nothing if a file exists without `force`.
     fn write(&mut self, dir: &Path, force: bool) -> Result<(), CliError> {
         self.plan.files = self.pictures.iter().map(|(name, _)| name.clone()).collect();
         let paths: Vec<_> = self.plan.files.iter().map(|name| dir.join(name)).collect();
         let plan_path = dir.join(PLAN);
         let json = serde_json::to_vec_pretty(&self.plan).map_err(|error| CliError::io(&plan_path)(error.into()))?;
         refuse_overwrite(paths.iter().chain([&plan_path]).map(|path| path.as_path()), force)?;
-        let not_a_folder = |error| match dir.exists() && !dir.is_dir() {
+        let name_fault = |error| match dir.exists() && !dir.is_dir() {
             true => io::Error::new(io::ErrorKind::NotADirectory, "not a folder; name one for --debug-dir"),
             false => error,
         };
-        fs::create_dir_all(dir).map_err(not_a_folder).map_err(CliError::io(dir))?;
+        fs::create_dir_all(dir).map_err(name_fault).map_err(CliError::io(dir))?;
         for (path, (_, picture)) in paths.iter().zip(&self.pictures) {
             still::write_color(path, picture, force)?;
         }
@@ -237,7 +239,7 @@ impl DebugOutput {
     }
 }
 
-/// The statistics of bin `k` for `plan.json`.
+/// Returns the statistics of bin `k` for `plan.json`.
 fn bin_entry(
     bokeh: &CpuBokeh,
     (k, bin): (usize, &Bin),
@@ -245,14 +247,14 @@ fn bin_entry(
     depth: Option<&DepthMap>,
     field: &CocField,
 ) -> BinEntry {
-    let share = bokeh.plan().share(k);
-    // The only bin of the gather has every pixel; elsewhere a pixel belongs to the bin that has most of it.
-    let belongs = |coc_px: f32| bokeh.plan().compositing == Compositing::Gather || share.at(coc_px) > 0.5;
+    let weight = bokeh.plan().share(k);
+    // The gather's only bin has every pixel; elsewhere a pixel belongs to the bin with over half of its weight.
+    let belongs = |coc_px: f32| bokeh.plan().compositing == Compositing::Gather || weight.at(coc_px) > 0.5;
     let content = || coc_px.iter().copied().filter(|&coc_px| belongs(coc_px));
     let depth_m = match (field, depth) {
         (CocField::Depth(lens), Some(map)) => {
             let known = map.metres.iter().copied().filter(|&metres| DepthMap::is_known(metres));
-            Range::of(known.filter(|&metres| belongs(lens.coc_px(metres))))
+            Range::from_values(known.filter(|&metres| belongs(lens.coc_px(metres))))
         }
         _ => None,
     };
@@ -269,7 +271,7 @@ fn bin_entry(
         slot: bin.slot,
         present: bokeh.is_present(k),
         picture_share: content().count() as f32 / coc_px.len().max(1) as f32,
-        content_coc_px: Range::of(content()),
+        content_coc_px: Range::from_values(content()),
         content_depth_m: depth_m,
     }
 }

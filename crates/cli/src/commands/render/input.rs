@@ -1,4 +1,4 @@
-//! What `render` blurs: the picture, and the depth that was given, is made, or is found.
+//! Input of `render`: the picture, and its depth, which is given, computed, or found in the photo.
 
 use std::path::Path;
 
@@ -18,24 +18,24 @@ use bokehcam::source::options::DepthUnit;
 use bokehcam::source::photo::{self, PhotoDepth};
 use bokehcam::source::{self, DepthChoice, DepthFrom};
 
-/// What is blurred.
+/// Input of the blur.
 pub(super) struct Input {
     pub color: ColorImage,
     pub extras: Extras,
     pub depth: Option<Depth>,
-    /// What the depth is, where nobody said and it was found.
+    /// Origin of depth that was found in or beside the photo.
     pub found: Option<Found>,
 }
 
-/// Depth that a photo has without anybody's saying so.
+/// Origin of depth that the photo brings without an option for it.
 pub(super) struct Found {
     pub from: DepthFrom,
     pub measured: bool,
     pub by: String,
 }
 
-/// Reads the picture, its metadata, and its depth if there is any. What the command does not name comes from the files
-/// of the snapshot of `--like`, whose depth was refined before and is not refined again.
+/// Reads the picture, its metadata, and its depth, if any. Inputs not named in the command come from the snapshot of
+/// `--like`; its depth is already refined and is not refined again.
 pub(super) fn read(command: &RenderCommand, look: &Look) -> Result<Input, CliError> {
     let sources = command.like.as_ref().map(|like| snapshot::sources(like));
     let given =
@@ -51,11 +51,13 @@ pub(super) fn read(command: &RenderCommand, look: &Look) -> Result<Input, CliErr
         (image, _) => {
             // clap requires an image without `--like`.
             let image = image.as_deref().unwrap_or(Path::new(""));
-            let is_open = given.is_none() && command.mask.is_none();
-            let is_open = is_open && matches!(command.blur.depth, DepthChoice::Auto | DepthChoice::Recorded);
-            let image = if is_open { photo::original(image) } else { image.to_owned() };
+            let searches_depth = given.is_none() && command.mask.is_none();
+            let is_automatic = matches!(command.blur.depth, DepthChoice::Auto | DepthChoice::Recorded);
+            let searches_depth = searches_depth && is_automatic;
+            // A snapshot stands for the picture that it was made from.
+            let image = if searches_depth { photo::original(image) } else { image.to_owned() };
             let (color, extras) = still::read_photo(&image)?;
-            let is_wanted = is_open && look.effect.follows_depth();
+            let is_wanted = searches_depth && look.effect.follows_depth();
             let depth =
                 if is_wanted { photo::depth_of(&image, &color, &command.source_options(), look)? } else { None };
             let depth = depth.map(|PhotoDepth { map, from, measured, by }| {
@@ -73,12 +75,12 @@ pub(super) fn read(command: &RenderCommand, look: &Look) -> Result<Input, CliErr
         still::check_depth_size(file, map.size(), color.size())?;
         source::find_person(&command.source_options(), look, &color, map);
     }
-    let made = made_depth(command, look, &color)?;
+    let made = make_depth(command, look, &color)?;
     Ok(Input { color, extras, depth: made.or(depth), found })
 }
 
-/// The depth that is made for the picture: from a mask, or by networks; `None` where nothing of that is asked for.
-fn made_depth(command: &RenderCommand, look: &Look, color: &ColorImage) -> Result<Option<Depth>, CliError> {
+/// Computes depth from a mask or by networks; returns `None` if neither is requested.
+fn make_depth(command: &RenderCommand, look: &Look, color: &ColorImage) -> Result<Option<Depth>, CliError> {
     let is_given = command.depth_map.is_some() || command.mask.is_some();
     match (&command.mask, &command.blur.depth) {
         (_, DepthChoice::OneCamera(_) | DepthChoice::Defocus) if is_given => {
@@ -96,7 +98,7 @@ fn made_depth(command: &RenderCommand, look: &Look, color: &ColorImage) -> Resul
         (None, DepthChoice::OneCamera(chosen)) => {
             let map = source::one_camera::depth_of_picture(chosen, &command.source_options(), look, color)?;
             plausible::warn_of_subject(Some(chosen), &map, command.image.as_deref());
-            // Around a subject it has its matte already; else its outlines are soft, and are fitted to the picture.
+            // Depth with a subject includes its matte; other depth has soft outlines and is refined.
             Ok(Some(if map.subject_m.is_some() { Depth::Final(map) } else { Depth::Measured(map) }))
         }
         (None, DepthChoice::Defocus) => {
@@ -111,7 +113,7 @@ fn made_depth(command: &RenderCommand, look: &Look, color: &ColorImage) -> Resul
     }
 }
 
-/// Reads relative inverse depth as distances in units of the nearest one.
+/// Reads relative inverse depth as distances, in units of the nearest distance.
 fn read_inverse_depth(file: &Path, invert: bool) -> Result<DepthMap, CliError> {
     let (width, height, mut nearness) = match still::map_format(file) {
         Ok(MapFormat::Pfm) => match still::read_map(file, None, None)? {
@@ -132,7 +134,7 @@ fn read_inverse_depth(file: &Path, invert: bool) -> Result<DepthMap, CliError> {
 }
 
 /// Reads depth in metres from a file of depth or disparity. Disparity without stereo geometry gives depth of unknown
-/// scale, which is an error where the look needs real metres.
+/// scale, which is an error if the look needs metres.
 fn read_depth(file: &Path, command: &RenderCommand, look: &Look) -> Result<DepthMap, CliError> {
     let name = file.display();
     if command.depth.depth_unit == DepthUnit::Inverse {

@@ -1,4 +1,4 @@
-//! `render`: one still picture.
+//! `render`: blurs a still picture.
 
 mod debug;
 mod debug_pictures;
@@ -12,7 +12,7 @@ use clap::Args;
 use input::{Found, Input, read};
 
 use crate::error::CliError;
-use crate::files::{make_folder_of, refuse_overwrite, refuse_source, tell_of_leftovers};
+use crate::files::{make_folder_of, refuse_overwrite, refuse_source, report_leftovers};
 use crate::focus;
 use crate::log;
 use crate::options;
@@ -85,14 +85,14 @@ pub struct RenderCommand {
 /// Runs the command.
 ///
 /// # Errors
-/// A picture cannot be read or written, the options do not fit it, or the blur failed.
+/// Fails if a picture cannot be read or written, the options do not fit it, or the blur fails.
 pub fn run(command: &RenderCommand, global: &options::Global, given: &Given) -> Result<(), CliError> {
     let plan_file = command.debug_dir.as_ref().map(|dir| dir.join(debug::PLAN));
     refuse_overwrite([command.out.as_path()].into_iter().chain(plan_file.as_deref()), command.output.force)?;
-    let sources = sources(command);
+    let sources = input_files(command);
     for source in &sources {
         refuse_source("--out", &command.out, source)?;
-        // The files in that folder have fixed names, of which the source may have one.
+        // That folder's files have fixed names, which may match a source.
         if let Some(dir) = command.debug_dir.as_ref().filter(|_| command.output.force)
             && source.parent().is_some_and(|folder| place::resolved(folder) == place::resolved(dir))
         {
@@ -118,7 +118,7 @@ pub fn run(command: &RenderCommand, global: &options::Global, given: &Given) -> 
     plausible::warn_of_lens(&look);
     plausible::warn_of_depth_scale(command.depth.depth_scale);
     command.warn(&look, &color, (depth.as_ref(), found.as_ref()), given);
-    // As a stream of it does.
+    // As in a stream of this photo: only measured depth is refined.
     let look = match &found {
         Some(found) if look.refine == Refine::Auto => {
             Look { refine: if found.measured { Refine::On } else { Refine::Off }, ..look }
@@ -127,12 +127,12 @@ pub fn run(command: &RenderCommand, global: &options::Global, given: &Given) -> 
     };
     let computing = command.computing.choice();
     make_folder_of(&command.out)?;
-    tell_of_leftovers([command.out.as_path()]);
+    report_leftovers([command.out.as_path()]);
     let (result, executor) = match &command.debug_dir {
-        Some(dir) => debug::blurred(color, depth, &look, &computing, (dir, command.output.force))?,
+        Some(dir) => debug::blur_and_dump(color, depth, &look, &computing, (dir, command.output.force))?,
         None => engine::still::blur(&look, color, depth, &computing)?,
     };
-    // The thumbnail in the photo's metadata would show what the blur hides.
+    // The metadata's thumbnail would show the unblurred picture.
     let mut extras = extras.without_thumbnail();
     if still::photo_format(&command.out)? == PhotoFormat::Jpeg {
         extras = extras.for_jpeg();
@@ -149,10 +149,10 @@ pub fn run(command: &RenderCommand, global: &options::Global, given: &Given) -> 
 }
 
 impl RenderCommand {
-    /// How the picture's depth is found, if at all.
+    /// Returns the options for finding or computing the picture's depth.
     fn source_options(&self) -> source::Options {
         source::Options {
-            // A depth camera's.
+            // Only depth cameras have a calibration file.
             depth: options::Depth { depth_calibration: None, ..self.depth.clone() },
             networks: self.networks.clone(),
             depth_choice: self.blur.depth.clone(),
@@ -161,7 +161,7 @@ impl RenderCommand {
         }
     }
 
-    /// Warns of settings without effect, and of a focus outside the depth of the picture.
+    /// Warns of settings without effect, and of a focus outside the picture's depth.
     fn warn(&self, look: &Look, color: &ColorImage, (depth, found): (Option<&Depth>, Option<&Found>), given: &Given) {
         let in_units = |file: &PathBuf| still::map_format(file).is_ok_and(|format| format == MapFormat::Png);
         let in_units = self.depth_map.as_ref().is_some_and(in_units);
@@ -188,7 +188,7 @@ impl RenderCommand {
             },
         );
         match depth {
-            None if self.blur.takes_whatever_depth() => unused::warn_of_no_depth(From::Picture),
+            None if self.blur.accepts_any_depth() => unused::warn_of_no_depth(From::Picture),
             Some(_) if self.depth_map.is_some() && !uses_depth => {
                 log::warn("--depth-map has no effect: the effect does not use depth");
             }
@@ -198,16 +198,16 @@ impl RenderCommand {
             Some(Depth::Measured(map) | Depth::Final(map)) => focus::warn_of_focus(look, color.size(), map, in_units),
             None => {}
         }
-        let of_file = self.depth_map.as_ref().map(|file| file.display().to_string());
-        let file = of_file.or_else(|| found.filter(|found| found.measured).map(|found| found.by.clone()));
+        let map_name = self.depth_map.as_ref().map(|file| file.display().to_string());
+        let file = map_name.or_else(|| found.filter(|found| found.measured).map(|found| found.by.clone()));
         if let (Some(Depth::Measured(map)), Some(file), true) = (depth, file, uses_depth) {
-            say_of_misfit(&file, look, map, color);
+            report_misalignment(&file, look, map, color);
         }
     }
 }
 
 impl RenderCommand {
-    /// Warns of a depth map that cannot be meant; whether it did.
+    /// Warns of an implausible depth map; returns whether it did.
     fn warn_of_map(&self, name: &dyn Display, map: &DepthMap, color: &ColorImage) -> bool {
         let file = self.depth_map.as_deref();
         let is_scaled = file.is_some_and(|file| still::map_format(file).is_ok_and(|format| format == MapFormat::Pfm));
@@ -218,8 +218,8 @@ impl RenderCommand {
     }
 }
 
-/// Says how a depth map does not fit its picture, and what is done about it.
-fn say_of_misfit(file: &dyn Display, look: &Look, map: &DepthMap, color: &ColorImage) {
+/// Reports a misalignment between a depth map and its picture, and its correction.
+fn report_misalignment(file: &dyn Display, look: &Look, map: &DepthMap, color: &ColorImage) {
     let Some(misfit) = Misfit::of(map, color) else { return };
     if misfit.outlines == Agreement::Unrelated {
         log::warn(&format!(
@@ -231,9 +231,9 @@ fn say_of_misfit(file: &dyn Display, look: &Look, map: &DepthMap, color: &ColorI
     }
 }
 
-/// All files that are read, which the outputs must not replace.
-fn sources(command: &RenderCommand) -> Vec<PathBuf> {
-    let of_snapshot = command.like.iter().flat_map(|like| {
+/// Lists all input files, which the outputs must not replace.
+fn input_files(command: &RenderCommand) -> Vec<PathBuf> {
+    let snapshot_files = command.like.iter().flat_map(|like| {
         let (color, depth) = snapshot::sources(like);
         [like.clone(), color, depth]
     });
@@ -252,6 +252,6 @@ fn sources(command: &RenderCommand) -> Vec<PathBuf> {
         .chain(aperture)
         .cloned()
         .chain(command.image.iter().flat_map(|image| photo::files_of(image)))
-        .chain(of_snapshot)
+        .chain(snapshot_files)
         .collect()
 }

@@ -1,4 +1,4 @@
-//! systemd's manager of the user's session, by its own program.
+//! Client of systemd's user manager, through `systemctl`.
 
 use std::collections::HashMap;
 use std::io::ErrorKind;
@@ -7,53 +7,53 @@ use std::process::{Command, Output, Stdio};
 
 use crate::error::CliError;
 
-/// The unit.
+/// Name of the unit.
 pub const NAME: &str = "bokehcam.service";
-/// What a desktop starts that tells systemd of itself.
+/// Target that a desktop with systemd support starts.
 const DESKTOP: &str = "graphical-session.target";
 
-/// Whether the service runs.
+/// Run state of the service.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum State {
-    /// There is no unit.
+    /// The unit does not exist.
     Missing,
     Stopped,
-    Runs,
-    /// It ended, and is started again soon.
-    Waits,
-    /// It ended, and is not started again.
+    Running,
+    /// It ended, and restarts soon.
+    Restarting,
+    /// It ended, and does not restart.
     Failed,
 }
 
-/// The unit as systemd knows it.
+/// State and settings of the unit.
 #[derive(Debug)]
 pub struct Unit {
     pub state: State,
     /// Whether it starts with the session.
     pub is_enabled: bool,
     pub file: PathBuf,
-    /// What it starts.
+    /// The program that it starts.
     pub program: Option<PathBuf>,
-    /// What it streams where no file of settings says otherwise.
-    pub streams: String,
+    /// Default arguments of `bokehcam stream`, without a settings file.
+    pub arguments: String,
 }
 
 impl Unit {
-    /// Asks systemd.
+    /// Queries systemd.
     ///
     /// # Errors
-    /// It is not there, or the unit is one that it cannot use.
-    pub fn ask() -> Result<Self, CliError> {
-        let told = told_of(NAME)?;
-        let of = |name: &str| told.get(name).map_or("", String::as_str);
-        let file = PathBuf::from(of("FragmentPath"));
-        let state = match (of("LoadState"), of("ActiveState")) {
+    /// Fails without systemd, or if systemd cannot use the unit.
+    pub fn query() -> Result<Self, CliError> {
+        let properties = properties(NAME)?;
+        let value = |name: &str| properties.get(name).map_or("", String::as_str);
+        let file = PathBuf::from(value("FragmentPath"));
+        let state = match (value("LoadState"), value("ActiveState")) {
             ("not-found", _) => State::Missing,
             ("masked", _) => {
                 return Err(CliError::Service(format!("{NAME} is masked: `systemctl --user unmask bokehcam` first")));
             }
-            ("loaded", "active" | "reloading") => State::Runs,
-            ("loaded", "activating") => State::Waits,
+            ("loaded", "active" | "reloading") => State::Running,
+            ("loaded", "activating") => State::Restarting,
             ("loaded", "failed") => State::Failed,
             ("loaded", _) => State::Stopped,
             (other, _) => {
@@ -63,22 +63,24 @@ impl Unit {
             }
         };
         // `{ path=/usr/bin/bokehcam ; argv[]=... }`
-        let program = of("ExecStart").split_once("path=").and_then(|(_, rest)| Some(rest.split_once(" ;")?.0.into()));
-        let streams = of("Environment").split_once("STREAM=").map_or("", |(_, rest)| rest.trim_end_matches('"'));
-        let is_enabled = of("UnitFileState").starts_with("enabled");
-        Ok(Self { state, is_enabled, file, program, streams: streams.to_owned() })
+        let program = value("ExecStart").split_once("path=");
+        let program = program.and_then(|(_, rest)| Some(rest.split_once(" ;")?.0.into()));
+        let arguments = value("Environment").split_once("STREAM=");
+        let arguments = arguments.map_or("", |(_, rest)| rest.trim_end_matches('"'));
+        let is_enabled = value("UnitFileState").starts_with("enabled");
+        Ok(Self { state, is_enabled, file, program, arguments: arguments.to_owned() })
     }
 }
 
-/// Whether the desktop has told systemd that it runs.
+/// Whether the desktop has started its systemd target.
 ///
 /// # Errors
-/// systemd is not there.
+/// Fails without systemd.
 pub fn has_graphical_session() -> Result<bool, CliError> {
-    Ok(told_of(DESKTOP)?.get("ActiveState").is_some_and(|state| state == "active"))
+    Ok(properties(DESKTOP)?.get("ActiveState").is_some_and(|state| state == "active"))
 }
 
-/// What the service's program said last.
+/// Returns the last log line of the service's program.
 pub fn last_line() -> Option<String> {
     let args =
         ["--user", "--unit", NAME, "--identifier=bokehcam", "--lines=1", "--output=cat", "--no-pager", "--quiet"];
@@ -87,27 +89,27 @@ pub fn last_line() -> Option<String> {
     (!said.is_empty()).then_some(said)
 }
 
-/// Has systemd do something.
+/// Runs a `systemctl --user` command.
 ///
 /// # Errors
-/// It is not there, or refuses.
-pub fn tell(args: &[&str]) -> Result<(), CliError> {
-    asked(args).map(drop)
+/// Fails without systemd, or if systemd refuses.
+pub fn run(args: &[&str]) -> Result<(), CliError> {
+    systemctl(args).map(drop)
 }
 
-fn told_of(unit: &str) -> Result<HashMap<String, String>, CliError> {
+fn properties(unit: &str) -> Result<HashMap<String, String>, CliError> {
     const PROPERTIES: &str = "--property=LoadState,ActiveState,UnitFileState,FragmentPath,ExecStart,Environment";
-    let told = asked(&["show", PROPERTIES, unit])?;
-    let lines = told.lines().filter_map(|line| line.split_once('='));
+    let output = systemctl(&["show", PROPERTIES, unit])?;
+    let lines = output.lines().filter_map(|line| line.split_once('='));
     Ok(lines.map(|(name, value)| (name.to_owned(), value.to_owned())).collect())
 }
 
-/// Runs `systemctl --user`, and gives what it printed.
-fn asked(args: &[&str]) -> Result<String, CliError> {
+/// Runs `systemctl --user` and returns its output.
+fn systemctl(args: &[&str]) -> Result<String, CliError> {
     const INSTEAD: &str =
         "have your desktop start `bokehcam stream 0 --to pipewire --on-demand` with the session instead";
-    let asked = Command::new("systemctl").arg("--user").args(args).stdin(Stdio::null()).output();
-    let Output { status, stdout, stderr } = asked.map_err(|error| match error.kind() {
+    let output = Command::new("systemctl").arg("--user").args(args).stdin(Stdio::null()).output();
+    let Output { status, stdout, stderr } = output.map_err(|error| match error.kind() {
         ErrorKind::NotFound => CliError::Service(format!("there is no systemd here: {INSTEAD}")),
         _ => CliError::io("systemctl".as_ref())(error),
     })?;
@@ -117,7 +119,7 @@ fn asked(args: &[&str]) -> Result<String, CliError> {
     let said = String::from_utf8_lossy(&stderr);
     let said = said.lines().find(|line| !line.trim().is_empty()).unwrap_or("it does not say why").to_owned();
     Err(CliError::Service(match args {
-        // Asking fails only where nobody can be asked.
+        // Queries fail only without a user session.
         ["show", ..] => format!("this user has no session of systemd's ({said}): {INSTEAD}"),
         _ => format!("systemctl --user {}: {said}", args.join(" ")),
     }))

@@ -1,4 +1,4 @@
-//! A stream, as others control it.
+//! Remote control of a running stream: status, switching, looks, snapshots.
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU8, Ordering};
@@ -7,7 +7,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
-use crate::controlled::{AsCommandLine, refused};
+use crate::controlled::{CommandLineRules, to_answer};
 use crate::error::CliError;
 use crate::files::make_folder_of;
 use crate::log;
@@ -26,105 +26,106 @@ use bokehcam::recording::still;
 use bokehcam::sink::Release;
 use bokehcam::stats::Pulse;
 
-/// How long a picture that is to be saved is waited for.
-const PATIENCE: Duration = Duration::from_secs(2);
+/// Maximum wait for a picture to save.
+const PICTURE_TIMEOUT: Duration = Duration::from_secs(2);
 
-/// The look at the start, and how it is changed.
-pub(super) struct Looks {
+/// The initial look, and the means to change it.
+pub(super) struct LookChanger {
     pub look: Look,
     pub changes: Changes,
     pub executors: Executors,
 }
 
-/// A stream that answers until this is dropped.
-pub(super) struct Served {
-    /// Gone first: others on the bus ask no more.
+/// Control server of a stream; stops when dropped.
+pub(super) struct ControlServer {
+    /// Dropped first, so that no further bus calls arrive.
     #[cfg(feature = "desktop")]
     bus: Option<bus::Bus>,
     server: Option<Server>,
-    /// Makes executors, which takes longer than anybody should wait for an answer.
+    /// Thread that creates executors, which is too slow for an answer.
     looks: Option<JoinHandle<()>>,
 }
 
-impl Drop for Served {
+impl Drop for ControlServer {
     fn drop(&mut self) {
         #[cfg(feature = "desktop")]
         drop(self.bus.take());
-        // With it goes the sender that the thread waits for.
+        // Dropping the server drops the sender that the thread waits for.
         drop(self.server.take());
-        // A panic was printed.
+        // A panic has already been printed.
         let _ = self.looks.take().map(JoinHandle::join);
     }
 }
 
-/// A stream as those see it who control it.
-pub(super) struct Running {
-    /// What does not change.
+/// Run state that the control interface exposes.
+pub(super) struct RunInfo {
+    /// Constant part of the status.
     pub status: Status,
     pub facts: Facts,
-    /// Whether somebody watches, where that is noticed.
+    /// Watchers of the outputs, if they are counted.
     pub demand: Option<Demand>,
-    /// Keeps pictures away, and takes one.
+    /// Closes the outputs, and captures pictures.
     pub release: Release,
-    pub beat: Arc<Beat>,
+    pub stats: Arc<RunStats>,
 }
 
-/// A stream and its look.
+/// A stream and its current look.
 struct Stream {
-    run: Running,
-    /// The look that was asked for last. Locked by those who ask and by who makes executors, never on a frame's way.
+    run: RunInfo,
+    /// The latest requested look. Locked by requests and by the thread that creates executors, never by the frame path.
     look: Arc<Mutex<Look>>,
-    /// Where it goes to be adopted.
-    adopt: Sender<Look>,
+    /// Queue of looks to apply.
+    new_looks: Sender<Look>,
 }
 
-/// What a frame leaves behind for those who ask.
-pub(super) struct Beat {
+/// Frame statistics for the status, updated without locks.
+pub(super) struct RunStats {
     clock: Clock,
     pulse: Pulse,
-    /// The rung of the last frame, counted from 1; 0 where it was not blurred.
-    rung: AtomicU8,
+    /// Quality level of the last frame, as its index plus 1; 0 if it was not blurred.
+    level: AtomicU8,
 }
 
-impl Default for Beat {
+impl Default for RunStats {
     fn default() -> Self {
-        Self { clock: Clock::system(), pulse: Pulse::default(), rung: AtomicU8::new(0) }
+        Self { clock: Clock::system(), pulse: Pulse::default(), level: AtomicU8::new(0) }
     }
 }
 
-impl Beat {
-    /// Takes note of a frame that was delivered.
-    pub fn note(&self, progress: &Progress) {
+impl RunStats {
+    /// Records a delivered frame.
+    pub fn record(&self, progress: &Progress) {
         self.pulse.beat(self.clock.now_ns());
-        let rung = progress.quality.and_then(|quality| Quality::ALL.iter().position(|other| *other == quality));
-        self.rung.store(rung.map_or(0, |rung| rung as u8 + 1), Ordering::Relaxed);
+        let level = progress.quality.and_then(|quality| Quality::ALL.iter().position(|other| *other == quality));
+        self.level.store(level.map_or(0, |level| level as u8 + 1), Ordering::Relaxed);
     }
 
     fn quality(&self) -> Option<Quality> {
-        let rung = usize::from(self.rung.load(Ordering::Relaxed)).checked_sub(1)?;
-        Quality::ALL.get(rung).copied()
+        let level = usize::from(self.level.load(Ordering::Relaxed)).checked_sub(1)?;
+        Quality::ALL.get(level).copied()
     }
 }
 
-/// Answers those who ask from now on, as the rules say. With names of presets to show, it is on the session's message bus as
-/// well, and in the tray.
+/// Starts the control server with `rules`. With `tray`, the names of presets to show, it also serves the session's
+/// message bus and the tray icon.
 ///
 /// # Errors
-/// The system gives no thread.
+/// Fails if a thread cannot be created.
 pub(super) fn serve(
     claim: Claim,
-    run: Running,
-    looks: Looks,
-    rules: AsCommandLine,
+    run: RunInfo,
+    looks: LookChanger,
+    rules: CommandLineRules,
     tray: Option<Vec<String>>,
-) -> Result<Served, CliError> {
+) -> Result<ControlServer, CliError> {
     let no_thread = |error| CliError::io("a thread that answers `bokehcam ctl`".as_ref())(error);
     let look = Arc::new(Mutex::new(looks.look.clone()));
-    let (adopt, asked) = mpsc::channel();
-    let (size, stated) = (run.facts.size, Arc::clone(&look));
-    let follow = move || follow(looks, size, &asked, &stated);
-    let looks = thread::Builder::new().name("looks".into()).spawn(follow).map_err(no_thread)?;
-    let handler = Controller::begin(claim.name().clone(), "stream", Arc::new(rules), Stream { run, look, adopt });
+    let (new_looks, requests) = mpsc::channel();
+    let (size, requested) = (run.facts.size, Arc::clone(&look));
+    let apply = move || apply_looks(looks, size, &requests, &requested);
+    let looks = thread::Builder::new().name("looks".into()).spawn(apply).map_err(no_thread)?;
+    // The bus wraps the handler, so it has to start before the socket's server.
+    let handler = Controller::begin(claim.name().clone(), "stream", Arc::new(rules), Stream { run, look, new_looks });
     #[cfg(feature = "desktop")]
     let (bus, handler) = match tray.map(|presets| bus::serve(Arc::clone(&handler), presets)) {
         Some(Ok((bus, handler))) => (Some(bus), handler),
@@ -139,7 +140,7 @@ pub(super) fn serve(
         tracing::warn!("--tray: this program was built without it; build it with the feature desktop");
     }
     let server = claim.serve(handler).map_err(no_thread)?;
-    Ok(Served {
+    Ok(ControlServer {
         #[cfg(feature = "desktop")]
         bus,
         server: Some(server),
@@ -147,22 +148,22 @@ pub(super) fn serve(
     })
 }
 
-/// Adopts the looks that are asked for, until nobody can any more.
-fn follow(looks: Looks, size: (u32, u32), asked: &Receiver<Look>, stated: &Mutex<Look>) {
-    let Looks { look: mut holds, mut changes, mut executors, .. } = looks;
+/// Applies requested looks until all senders are gone.
+fn apply_looks(looks: LookChanger, size: (u32, u32), requests: &Receiver<Look>, requested: &Mutex<Look>) {
+    let LookChanger { look: mut applied, mut changes, mut executors, .. } = looks;
     let mut number = 0;
-    while let Ok(look) = asked.recv() {
-        // Of several that wait only the last counts.
-        let look = asked.try_iter().last().unwrap_or(look);
+    while let Ok(look) = requests.recv() {
+        // Only the last queued look counts.
+        let look = requests.try_iter().last().unwrap_or(look);
         number += 1;
         match changes.adopt(look.clone(), number, |settings| executors.blur(settings, size)) {
-            Ok(()) => holds = look,
+            Ok(()) => applied = look,
             Err(error) => {
                 log::error(&format!("the look stays as it was: {error}"));
-                let mut stated = lock(stated);
-                // Not where another was asked for meanwhile.
-                if *stated == look {
-                    stated.clone_from(&holds);
+                let mut requested = lock(requested);
+                // Keep a newer request.
+                if *requested == look {
+                    requested.clone_from(&applied);
                 }
             }
         }
@@ -175,12 +176,12 @@ fn lock(look: &Mutex<Look>) -> MutexGuard<'_, Look> {
 
 impl Controlled for Stream {
     fn status(&self) -> Result<Status, Answer> {
-        let Running { status, demand, release, beat, .. } = &self.run;
+        let RunInfo { status, demand, release, stats, .. } = &self.run;
         Ok(Status {
             on: !release.is_closed(),
             watched: demand.as_ref().map(Demand::has_watchers),
-            quality: beat.quality().map(|quality| quality.name().to_owned()),
-            fps: beat.pulse.per_second(beat.clock.now_ns()),
+            quality: stats.quality().map(|quality| quality.name().to_owned()),
+            fps: stats.pulse.per_second(stats.clock.now_ns()),
             look: Patch::described(&lock(&self.look)),
             ..status.clone()
         })
@@ -198,12 +199,12 @@ impl Controlled for Stream {
     }
 
     fn change(&self, patch: Patch, rules: &Arc<dyn Rules>) -> Result<Option<String>, Answer> {
-        let mut stated = lock(&self.look);
-        let (look, note) = rules.changed(&patch, &stated, &self.run.facts)?;
-        if look != *stated {
-            // Nobody takes it where the stream has just ended.
-            let _ = self.adopt.send(look.clone());
-            *stated = look;
+        let mut requested = lock(&self.look);
+        let (look, note) = rules.changed(&patch, &requested, &self.run.facts)?;
+        if look != *requested {
+            // Sending fails only if the stream has just ended.
+            let _ = self.new_looks.send(look.clone());
+            *requested = look;
         }
         Ok(note)
     }
@@ -218,14 +219,14 @@ impl Controlled for Stream {
         if self.run.demand.as_ref().is_some_and(|demand| !demand.is_watched()) {
             return Err(Answer::failed("nobody watches, so the camera is closed: there is no picture"));
         }
-        let picture = self.run.release.picture(PATIENCE);
+        let picture = self.run.release.picture(PICTURE_TIMEOUT);
         let picture =
-            picture.ok_or_else(|| Answer::failed(format!("no picture came for {} s", PATIENCE.as_secs())))?;
+            picture.ok_or_else(|| Answer::failed(format!("no picture came for {} s", PICTURE_TIMEOUT.as_secs())))?;
         let path = to.map_or_else(|| Folders::of_user().free_picture(), Path::to_owned);
         let write = || -> Result<(), CliError> {
             make_folder_of(&path)?;
             Ok(still::write_color(&path, &picture, false)?)
         };
-        write().map(|()| path.clone()).map_err(|error| refused(&error))
+        write().map(|()| path.clone()).map_err(|error| to_answer(&error))
     }
 }

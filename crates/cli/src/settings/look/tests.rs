@@ -54,8 +54,8 @@ fn the_strength_is_a_share_of_the_height_a_radius_or_a_lens() {
     assert!((depth(&lens).0 - 5.698).abs() < 1e-2);
     assert!(refusal(&lens[..2], true).contains("--sensor-width"));
     assert!(refusal(&lens, false).contains("--focus METRES"));
-    let even = CocRule::Fixed(CocField::Uniform { radius_px: 7.0 });
-    assert_eq!(rule(&["--effect=blur", "--coc-at-infinity=7"]), even);
+    let uniform = CocRule::Fixed(CocField::Uniform { radius_px: 7.0 });
+    assert_eq!(rule(&["--effect=blur", "--coc-at-infinity=7"]), uniform);
 }
 
 #[test]
@@ -75,8 +75,8 @@ fn tilt_shift_is_sharp_in_its_band_and_strongest_in_the_farthest_corner() {
         let CocRule::Fixed(CocField::Ramp(ramp)) = blur.coc_rule(SIZE) else { panic!("no ramp") };
         assert_eq!(ramp.coc_px(320.0, 112.5), 0.0);
         let corners = [(0.0, 0.0), (640.0, 0.0), (0.0, 450.0), (640.0, 450.0)];
-        let most = corners.map(|(x, y)| ramp.coc_px(x, y)).into_iter().fold(0.0, f32::max);
-        assert!((most - 8.0).abs() < 1e-3, "{angle}: {most}");
+        let max_px = corners.map(|(x, y)| ramp.coc_px(x, y)).into_iter().fold(0.0, f32::max);
+        assert!((max_px - 8.0).abs() < 1e-3, "{angle}: {max_px}");
     }
 }
 
@@ -95,7 +95,7 @@ fn the_range_of_focus_reaches_the_lens() {
     assert_eq!(field(&["--focus-range=100"]).near_m(), 0.2);
 }
 
-/// Looks that differ from the plain one in every field, in every form that it has.
+/// Returns looks that differ from the default in one field each, in every form of that field.
 fn looks(picture: &std::path::Path) -> Vec<Look> {
     let plain = Look::default();
     let mut looks = vec![plain.clone()];
@@ -108,7 +108,7 @@ fn looks(picture: &std::path::Path) -> Vec<Look> {
     for effect in [Effect::None, Effect::Blur, Effect::TiltShift, Effect::Dof] {
         add(&|look| look.effect = effect);
     }
-    // Numbers that have no short form in binary, large ones and small ones.
+    // Numbers without a short binary form, large and small ones.
     for number in [0.1, 1.0 / 3.0, 1e-7, 0.3 - 0.1, 1e-40, 0.999_999_94] {
         add(&|look| look.rim = number);
         add(&|look| look.aperture.intensity = -number);
@@ -179,7 +179,7 @@ fn the_flags_of_a_look_give_the_look() {
         // One change, one setting; a lens is three.
         let count = if matches!(look.strength, Strength::Lens(_)) { 3 } else { flags.len().min(2) };
         assert_eq!(flags.len(), count, "{flags:?}");
-        // From any look to any other, by what is unlike.
+        // The difference between any two looks leads from one to the other.
         let other = &looks[(k * 7 + 3) % looks.len()];
         assert_eq!(Patch::of(look).beside(&Patch::of(other)).on(other).unwrap(), *look);
         assert_eq!(serde_json::from_str::<Look>(&serde_json::to_string(look).unwrap()).unwrap(), *look);

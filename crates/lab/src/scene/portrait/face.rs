@@ -1,5 +1,5 @@
-//! The face as a form, and its skin. The head's frame has the middle of the head at the origin and the face towards
-//! negative `z`.
+//! The form of the face, and its skin. In the head's frame the origin is the middle of the head, and the face looks
+//! towards negative `z`.
 
 use glam::Vec3;
 
@@ -7,12 +7,12 @@ use super::form::{ball, blend, carve, egg, fold, hex, rod, step};
 use crate::scene::noise::fractal;
 use crate::scene::part::{Spot, Surface};
 
-/// Right eye (of the picture) in the head's frame.
+/// Position of the right eye (in the picture) in the head's frame.
 pub const EYE: Vec3 = Vec3::new(0.0315, 0.004, -0.0625);
 /// Radius of an eye.
 pub const EYE_RADIUS_M: f32 = 0.0168;
 
-/// Signed distance to the bare head and neck, eyes open: skull and jaw, then feature by feature.
+/// Returns the signed distance to the bare head and neck with open eyes: skull and jaw, then feature by feature.
 pub fn face(p: Vec3) -> f32 {
     let q = fold(p);
     let skull = egg(p - Vec3::new(0.0, 0.028, 0.018), Vec3::new(0.078, 0.094, 0.094));
@@ -25,7 +25,7 @@ pub fn face(p: Vec3) -> f32 {
     d = carve(d, ball(q - Vec3::new(0.0315, 0.004, -0.098), 0.021), 0.018);
     d = blend(d, rod(p, Vec3::new(0.0, 0.012, -0.077), Vec3::new(0.0, -0.024, -0.0955), 0.006, 0.0105), 0.016);
     d = blend(d, ball(q - Vec3::new(0.0095, -0.028, -0.0870), 0.0068), 0.008);
-    // The mouth: two lips that meet in a smile, round in the middle.
+    // The mouth: two lips in a smile, rounded in the middle.
     let m = Vec3::new((p.x * p.x + 2e-5).sqrt(), p.y, p.z);
     d = blend(d, rod(m, Vec3::new(0.0, -0.0545, -0.0855), Vec3::new(0.0245, -0.0485, -0.0725), 0.0040, 0.0022), 0.006);
     d = blend(d, rod(m, Vec3::new(0.0, -0.0625, -0.0835), Vec3::new(0.0200, -0.0550, -0.0745), 0.0050, 0.0025), 0.006);
@@ -36,7 +36,7 @@ pub fn face(p: Vec3) -> f32 {
     blend(d, rod(p, Vec3::new(0.0, -0.08, 0.03), Vec3::new(0.0, -0.23, 0.045), 0.044, 0.050), 0.03)
 }
 
-/// Upper and lower eyelid: what a slightly larger ball shows above and below the opening.
+/// Returns the distance to upper and lower eyelid: the parts of a slightly larger ball above and below the opening.
 fn lid(q: Vec3) -> f32 {
     let p = q - EYE;
     let shell = ball(p, EYE_RADIUS_M + 0.0013);
@@ -45,7 +45,7 @@ fn lid(q: Vec3) -> f32 {
     shell.max(above.min(below))
 }
 
-/// Depth of the front of the face at (`x`, `y`), by sphere tracing from before it along `z`.
+/// Returns the depth of the front of the face at (`x`, `y`), by sphere tracing along `z`.
 pub fn surface_z(x: f32, y: f32) -> f32 {
     let mut z = -0.13;
     for _ in 0..40 {
@@ -54,21 +54,21 @@ pub fn surface_z(x: f32, y: f32) -> f32 {
     z
 }
 
-/// Skin: flushed cheeks, nose and ears, red lips.
+/// Skin with flushed cheeks, nose and ears, and red lips.
 pub fn skin(spot: &Spot) -> Surface {
     let (p, q) = (spot.p, fold(spot.p));
-    let near = |centre: Vec3, reach_m: f32| (-(q - centre).length_squared() / (reach_m * reach_m)).exp();
+    let near = |centre: Vec3, radius_m: f32| (-(q - centre).length_squared() / (radius_m * radius_m)).exp();
     let mut color = spot.tint * (0.96 + 0.08 * fractal(180.0 * p, 2));
     let flush = 0.75 * near(Vec3::new(0.042, -0.030, -0.066), 0.021)
         + 0.40 * near(Vec3::new(0.0, -0.024, -0.105), 0.015)
         + 0.40 * near(Vec3::new(0.085, 0.0, 0.02), 0.025);
     color = color.lerp(hex(0xd9705c), 0.55 * flush.min(1.0));
-    // Where the lips meet, curved upwards, and the width of the lips, which narrows to the corners.
+    // The curved line between the lips, and the width of the lips, which narrows towards the corners.
     let middle = -0.0588 + 12.0 * p.x * p.x;
     let width = (1.0 - (p.x / 0.0285).powi(2)).max(0.0).sqrt();
     let (over, under) = (p.y - middle, middle - p.y);
     let lip = step(0.0, 0.0016, 0.0068 * width - over) * step(0.0, 0.0016, 0.0092 * width - under);
-    // At the front only: the back of the head has the same x and y.
+    // Only at the front: the back of the head has the same x and y.
     if p.z < -0.05 && lip > 0.0 {
         let seam = 0.6 * (-(over / 0.0010).powi(2)).exp();
         color = color.lerp(hex(0xb8453f), 0.8 * lip).lerp(hex(0x4a1512), seam * lip);

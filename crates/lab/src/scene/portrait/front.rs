@@ -1,4 +1,4 @@
-//! What stands before the subject: the table with a cup and a notebook, and a twig near the lens.
+//! Objects in front of the subject: the table with a cup and a notebook, and a twig near the lens.
 
 use std::f32::consts::TAU;
 use std::sync::Arc;
@@ -17,7 +17,7 @@ use crate::scene::shape::Shape;
 const TABLE_Y: f32 = -0.232;
 const CUP: Vec3 = Vec3::new(0.300, TABLE_Y, 0.93);
 
-/// The table and what is on it.
+/// Creates the table with the objects on it.
 pub fn desk() -> Part {
     let mut part = Part::still();
     let top = Shape::Cuboid {
@@ -43,7 +43,7 @@ pub fn desk() -> Part {
     part
 }
 
-/// Signed distance to the cup: a hollow body with a handle, and coffee in it.
+/// Returns the signed distance to the cup: a hollow body with a handle, and coffee in it.
 fn cup(p: Vec3) -> f32 {
     let q = p - CUP;
     let radial = Vec2::new(q.x, q.z).length();
@@ -54,7 +54,7 @@ fn cup(p: Vec3) -> f32 {
     let handle = Vec2::new(Vec2::new(q.x - 0.038, q.y - 0.046).length() - 0.021, q.z).length() - 0.0048;
     let shell = carve(blend(body, handle, 0.006), hollow, 0.0025);
     let coffee = (side + 0.002).max((q.y - 0.066).abs() - 0.003);
-    // Blends are no true distances: scaled so that they are not too long.
+    // Blends are no exact distances: scale them so that they do not overestimate.
     shell.min(coffee) * 0.9
 }
 
@@ -71,7 +71,7 @@ fn glaze(spot: &Spot) -> Surface {
     Surface::matt(spot, color).glossy(0.30, 50.0)
 }
 
-/// A twig with round leaves that leans into the picture from the lower left.
+/// Creates a twig with round leaves that leans into the picture from the lower left.
 pub fn twig() -> Part {
     let mut part = Part::moving(|phase| {
         let sway = Mat3::from_rotation_z(0.020 * (TAU * phase + 1.2).sin())
@@ -105,7 +105,7 @@ pub fn twig() -> Part {
     part
 }
 
-/// A stem along a cubic curve with leaves in pairs.
+/// Adds a stem along a cubic Bézier curve with leaves in pairs.
 fn add_arm(part: &mut Part, dice: &mut Dice, [a, b, c, d]: [Vec3; 4]) {
     let at = |s: f32| {
         let r = 1.0 - s;
@@ -127,7 +127,7 @@ fn add_arm(part: &mut Part, dice: &mut Dice, [a, b, c, d]: [Vec3; 4]) {
     }
 }
 
-/// A leaf as two halves folded along its midrib.
+/// Adds a leaf as two halves folded along its midrib.
 fn add_leaf(part: &mut Part, dice: &mut Dice, root: Vec3, out: Vec3, half_length: f32) {
     let facing = (Vec3::new(-0.35, 0.45, -1.0) + 0.65 * dice.direction()).normalize_or(Vec3::NEG_Z);
     let across = out.cross(facing).normalize_or(Vec3::X);
@@ -144,7 +144,7 @@ fn add_leaf(part: &mut Part, dice: &mut Dice, root: Vec3, out: Vec3, half_length
     }
 }
 
-/// Outline of one half of a leaf: `u` from stalk to tip, `v` from the midrib out.
+/// The outline of one half of a leaf: `u` from stalk to tip, `v` outwards from the midrib.
 pub fn half_leaf(uv: Vec2) -> bool {
     let round = (1.0 - uv.x * uv.x).max(0.0);
     uv.y >= 0.0 && uv.y <= round.powf(0.62) * (1.0 - 0.22 * uv.x)

@@ -1,4 +1,4 @@
-//! Hair: a combed mass tied into a bun, strands over it, and several hundred fine hairs that stand off.
+//! Hair: a combed mass tied into a bun, strands on it, and several hundred fine hairs that stand off.
 
 use std::sync::Arc;
 
@@ -12,14 +12,14 @@ use crate::scene::part::{Material, Part, Spot, Surface};
 use crate::scene::ray::Bounds;
 use crate::scene::shape::Shape;
 
-/// Where the hair is tied.
+/// Position of the bun.
 const BUN: Vec3 = Vec3::new(0.006, 0.158, 0.045);
 const BUN_RADIUS_M: f32 = 0.043;
-/// Strands that lie on the mass.
+/// Number of strands that lie on the mass.
 const COMBED: usize = 900;
-/// Fine hairs that stand off the outline.
+/// Number of fine hairs that stand off the outline.
 const FLYAWAY: usize = 330;
-/// Middle of the light that the hair shines back.
+/// Mean colour of the hair, as an sRGB code.
 const HAIR: u32 = 0x8a4a24;
 
 /// Adds the hair to the head.
@@ -42,7 +42,7 @@ pub fn grow(part: &mut Part, form: &Arc<Grid>) {
             step_m: dice.between(0.004, 0.0095),
         };
         let points = strand(&mut dice, root, lie, 8, 0.00042);
-        // None may grow into the face.
+        // No hair may grow into the face.
         if points.iter().skip(2).any(|(p, _)| face(*p) < 0.002) {
             continue;
         }
@@ -55,11 +55,11 @@ pub fn grow(part: &mut Part, form: &Arc<Grid>) {
     }
 }
 
-/// Signed distance to the combed mass with its bun.
+/// Returns the signed distance to the combed mass with its bun.
 pub fn mass(p: Vec3) -> f32 {
     let q = fold(p);
     let cap = egg(p - Vec3::new(0.0, 0.036, 0.030), Vec3::new(0.0895, 0.100, 0.100));
-    // Round over the forehead, to the ears, and open to the neck.
+    // Rounded over the forehead, down to the ears, and open at the neck.
     let window = egg(p - Vec3::new(0.010, -0.052, -0.105), Vec3::new(0.074, 0.112, 0.098));
     let mut d = carve(cap, window, 0.012);
     d = carve(d, ball(q - Vec3::new(0.0, -0.155, 0.02), 0.105), 0.02);
@@ -69,23 +69,23 @@ pub fn mass(p: Vec3) -> f32 {
     d = blend(d, rod(p, Vec3::new(-0.052, 0.064, -0.056), Vec3::new(-0.082, 0.012, -0.016), 0.011, 0.006), 0.014);
     d = blend(d, rod(p, Vec3::new(0.048, 0.090, -0.050), Vec3::new(0.083, 0.014, -0.012), 0.013, 0.006), 0.016);
     let bun = p - BUN;
-    // Wound hair. Here and at the end the scale keeps what is no true distance from being too long.
+    // Wound hair. Here and at the end the scale keeps inexact distances from overestimating.
     let coil = 0.0022 * (3.0 * bun.z.atan2(bun.x) + 150.0 * bun.y).sin();
     d = blend(d, (egg(bun, Vec3::new(1.08, 0.86, 1.0) * BUN_RADIUS_M) + coil) * 0.8, 0.016);
     d * 0.9
 }
 
-/// Coordinate that is constant along the combed hair: the angle about the line through the bun.
+/// Returns a coordinate that is constant along the combed hair: the angle around the line through the bun.
 fn comb(p: Vec3) -> f32 {
     let away = p - Vec3::new(BUN.x, 0.0, BUN.z - 0.03);
     away.z.atan2(away.x)
 }
 
-/// The mass: streaks along the combed or wound hair.
+/// The mass, with streaks along the combed or wound hair.
 fn combed(spot: &Spot) -> Surface {
     let p = spot.p;
     let is_bun = (p - BUN).length() < BUN_RADIUS_M * 1.25;
-    // Changes from hair to hair, and is constant along one.
+    // Varies from hair to hair, and is constant along a hair.
     let across = if is_bun {
         let b = p - BUN;
         90.0 * b.y + 5.0 * (b.z.atan2(b.x)).sin() + 40.0 * b.x
@@ -107,8 +107,8 @@ fn fibre(spot: &Spot) -> Surface {
     Surface { wrap: 0.5, fibre: spot.tangent, ..Surface::matt(spot, color) }.glossy(0.14, 22.0)
 }
 
-/// A random point on the mass, over the head or on the bun; `None` where no hair grows. Found by sphere tracing from
-/// outside.
+/// Returns a random point on the mass, over the head or on the bun, by sphere tracing from outside; `None` where no
+/// hair grows.
 fn sample_root(dice: &mut Dice) -> Option<Vec3> {
     let from = if dice.next() < 0.22 { BUN } else { Vec3::new(0.0, 0.045, 0.02) };
     let direction = dice.direction();
@@ -127,18 +127,19 @@ fn sample_root(dice: &mut Dice) -> Option<Vec3> {
     None
 }
 
-/// How a strand lies.
+/// The shape of a strand.
 struct Lie {
-    /// Least distance from the mass.
+    /// Minimum distance from the mass.
     lift_m: f32,
     /// 0 along the mass, 1 straight up from it.
     rise: f32,
-    /// How much each step strays.
+    /// Random deviation per step.
     wild: f32,
     step_m: f32,
 }
 
-/// A chain of `steps` cones from `root`: combed to the bun (or around it), lifted and straying by `lie`.
+/// Returns a chain of `steps` cones from `root`: combed towards the bun (or around it), with the lift and deviation of
+/// `lie`.
 fn strand(dice: &mut Dice, root: Vec3, lie: Lie, steps: usize, radius_m: f32) -> Vec<(Vec3, f32)> {
     let gradient = |p: Vec3| {
         let e = 1e-3;
@@ -166,8 +167,8 @@ fn strand(dice: &mut Dice, root: Vec3, lie: Lie, steps: usize, radius_m: f32) ->
     points
 }
 
-/// Adds one hair of the loose lock that falls beside the face, on the left (`side` -1) or right (1): all follow one
-/// wavy curve, and spread from it.
+/// Adds one hair of the loose lock beside the face, on the left (`side` -1) or right (1): all follow one wavy curve
+/// with a small spread.
 fn add_lock(part: &mut Part, dice: &mut Dice, side: f32, k: u32) {
     let spread = 0.0045 * Vec3::new(dice.next() - 0.5, 0.0, dice.next() - 0.5) * 2.0;
     let end = 0.6 + 0.4 * dice.next();

@@ -13,7 +13,7 @@ use crate::scene::part::{Material, Part, Spot, Surface};
 use crate::scene::ray::{Bounds, Pose};
 use crate::scene::shape::Shape;
 
-/// The head with its hair.
+/// Creates the head with its hair.
 pub fn part(motion: fn(f32) -> Pose) -> Part {
     let mut part = Part::moving(motion);
     let around = Bounds { low: Vec3::new(-0.13, -0.24, -0.13), high: Vec3::new(0.13, 0.22, 0.15) };
@@ -35,7 +35,7 @@ pub fn part(motion: fn(f32) -> Pose) -> Part {
     part
 }
 
-/// Upper lashes along the edge of the lid, and the brow on the skin above. `mirror` puts them on either side.
+/// Adds upper lashes along the edge of the lid, and the brow on the skin above. `mirror` selects the side.
 fn add_lashes_and_brow(part: &mut Part, mirror: Vec3) {
     let dark = Material::new(satin, hex(0x2a1710));
     let lash: Vec<_> = (0..9)
@@ -75,8 +75,8 @@ fn add_glasses(part: &mut Part, mirror: Vec3) {
     part.add_chain(&temple.map(|p| (p * mirror, 0.0013)), tortoise);
 }
 
-/// An eye that looks at the camera: white, iris with its dark rim, pupil, and the reflection of a lamp. The seed tells
-/// the side.
+/// An eye that looks at the camera: white, iris with its dark rim, pupil, and the reflection of a lamp. The seed
+/// selects the side.
 fn eyeball(spot: &Spot) -> Surface {
     let side = if spot.seed == 1 { 1.0 } else { -1.0 };
     let gaze = Mat3::from_rotation_y(-0.17) * Vec3::NEG_Z;
@@ -84,12 +84,12 @@ fn eyeball(spot: &Spot) -> Surface {
     // Distance from the axis of the gaze, in radii of the eye.
     let off = (local - gaze * local.dot(gaze)).length();
     let streak = fractal(Vec3::new(local.y.atan2(local.x) * 9.0, off * 3.0, 4.0), 2);
-    let iris_share = step(0.53, 0.46, off);
+    let iris_alpha = step(0.53, 0.46, off);
     let color = (spot.tint * (0.5 + 1.1 * streak)).lerp(hex(0x7a5a2e), step(0.40, 0.22, off));
     let color = color.lerp(hex(0x10100c), step(0.40, 0.52, off)).lerp(Vec3::splat(0.006), step(0.235, 0.205, off));
     let white = hex(0xf0e9e2) * (1.0 - 0.25 * step(0.2, 0.9, local.x.abs()));
     let catchlight = step(0.13, 0.07, (local - Vec3::new(-0.25, 0.28, -0.93)).length());
-    let surface = Surface { wrap: 0.2, ..Surface::matt(spot, white.lerp(color, iris_share)) };
+    let surface = Surface { wrap: 0.2, ..Surface::matt(spot, white.lerp(color, iris_alpha)) };
     Surface { emission: Vec3::splat(0.9 * catchlight), ..surface }.glossy(0.5, 300.0)
 }
 

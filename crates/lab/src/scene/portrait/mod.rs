@@ -1,4 +1,4 @@
-//! The portrait scene, put together.
+//! Assembles the portrait scene.
 
 mod face;
 mod form;
@@ -26,19 +26,19 @@ use super::ray::Pose;
 const FOCUS_M: f32 = 1.2;
 /// The middle of the head at rest; the face is 7 cm nearer.
 const HEAD: Vec3 = Vec3::new(0.035, 0.045, FOCUS_M + 0.072);
-/// Where the head turns on the neck, in its own frame.
+/// Pivot of the head on the neck, in its own frame.
 const NAPE: Vec3 = Vec3::new(0.0, -0.15, 0.04);
-/// About which the body sways, in its own frame.
+/// Pivot of the swaying body, in its own frame.
 const HIP: Vec3 = Vec3::new(0.0, -0.75, 0.06);
 
-/// A person with what stands in front of them.
+/// Returns a person with objects in front.
 pub fn with_front() -> Scene {
     let mut scene = of(Some(Situation::Sits), Situation::Sits);
     scene.parts.extend([front::desk(), front::twig()].map(Part::built));
     scene
 }
 
-/// A person in a situation, or the room of a situation without anybody.
+/// Returns a person in a situation, or the empty room of a situation.
 pub fn of(person: Option<Situation>, room: Situation) -> Scene {
     let own = person.map(|person| [vec![head::part(nod), torso::part(sway)], person.own()].concat());
     let own: Vec<Part> = own.unwrap_or_default().into_iter().map(|part| Part { is_subject: true, ..part }).collect();
@@ -62,27 +62,27 @@ fn lights() -> Vec<Light> {
         casts_within_m,
     };
     vec![
-        // The key, high on the left in front: a large warm lamp.
+        // Key light, high on the left in front: a large warm lamp.
         lamp([-0.75, 0.75, 0.25], [1.55, 1.34, 1.10], 0.22, 1.9),
-        // The fill, from a screen low on the right.
+        // Fill light, from a screen low on the right.
         lamp([0.55, -0.05, 0.15], [0.16, 0.18, 0.22], 0.5, 0.0),
-        // The rims: the room's lamp on the right, the evening on the left.
+        // Rim lights: the room's lamp on the right, dusk on the left.
         lamp([0.95, 0.75, 2.05], [1.5, 0.95, 0.50], 0.15, 0.0),
         lamp([-1.05, 0.60, 2.3], [0.75, 0.95, 1.45], 0.15, 0.0),
-        // The lamp on the sideboard, and a ceiling light out of sight.
+        // The lamp on the sideboard, and a ceiling light outside the picture.
         lamp([1.42, 0.02, 3.72], [0.42, 0.25, 0.11], 0.25, 1.3),
         lamp([0.3, 1.25, 2.9], [0.95, 0.76, 0.54], 0.25, 2.1),
     ]
 }
 
-/// The body sways a little, once per loop.
+/// Returns the pose of the body, which sways once per loop.
 fn sway(phase: f32) -> Pose {
     let turn =
         Mat3::from_rotation_z(0.012 * (TAU * phase).sin()) * Mat3::from_rotation_y(0.06 + 0.02 * (TAU * phase).cos());
     Pose { turn: Mat3::IDENTITY, place: HEAD }.over(Pose::about(HIP, turn))
 }
 
-/// The head turns and tilts on the swaying body.
+/// Returns the pose of the head, which turns and tilts on the swaying body.
 fn nod(phase: f32) -> Pose {
     let yaw = 0.11 + 0.10 * (TAU * phase + 0.6).sin();
     let pitch = 0.02 + 0.018 * (2.0 * TAU * phase).sin();

@@ -1,4 +1,4 @@
-//! What is seen through the window: dusk, houses with lit windows, a street with its lights.
+//! The view through the window: dusk, houses with lit windows, a street with its lights.
 
 use glam::{Mat3, Vec3};
 
@@ -8,7 +8,7 @@ use crate::scene::noise::{Dice, cell, fractal};
 use crate::scene::part::{Material, Part, Spot, Surface};
 use crate::scene::shape::{Shape, whole};
 
-/// The view, all of which shines by itself: the room's lamps do not light it.
+/// Creates the view, which is self-luminous: the room's lamps do not light it.
 pub fn part() -> Part {
     let mut part = Part::still();
     let sky = Shape::Quad { centre: Vec3::new(-3.0, 1.0, 12.8), right: 8.0 * Vec3::X, up: 5.0 * Vec3::Y, cut: whole };
@@ -58,7 +58,7 @@ fn add_trees(part: &mut Part) {
     }
 }
 
-/// Street lamps in two rows, and small lights between them: the highlights that become discs in the blur.
+/// Adds street lamps in two rows, and small lights between them: the highlights that become discs in the blur.
 fn add_lights(part: &mut Part) {
     let warm = Vec3::new(1.0, 0.52, 0.13);
     let amber = Vec3::new(1.0, 0.36, 0.05);
@@ -75,14 +75,14 @@ fn add_lights(part: &mut Part) {
     }
     let mut dice = Dice::new(5);
     let palette = [(warm, 6.0), (white, 9.0), (amber, 5.0), (red, 4.0), (teal, 3.5), (rose, 4.0), (warm, 12.0)];
-    // Shop signs, signals and cars: one to a cell of a loose grid, so that their discs seldom pile up.
+    // Shop signs, signals and cars: one per cell of a loose grid, so that their discs seldom overlap.
     for row in 0..4 {
         for column in 0..8 {
             if dice.next() < 0.22 {
                 continue;
             }
             let z = dice.between(6.5, 10.2);
-            // Slopes of the ray: spaced evenly in the picture, whatever the depth.
+            // Slopes of rays: evenly spaced in the picture, at any depth.
             let u = -0.455 + 0.052 * (column as f32 + dice.between(0.15, 0.85));
             let v = -0.135 + 0.062 * (row as f32 + dice.between(0.15, 0.85));
             let (color, power) = palette[(dice.next() * palette.len() as f32) as usize % palette.len()];
@@ -103,7 +103,7 @@ fn dusk(spot: &Spot) -> Surface {
     Surface { emission: 0.62 * color.lerp(hex(0xf3b79a), 0.35 * cloud), ..Surface::matt(spot, Vec3::ZERO) }
 }
 
-/// A front in the haze with rows of windows, two of five of which are lit.
+/// A hazy front with rows of windows, two of five of which are lit.
 fn house(spot: &Spot) -> Surface {
     let p = spot.p;
     let haze = 0.55 * hex(0x4a4a72) * (0.55 + 0.25 * fractal(1.5 * p, 2));
@@ -121,7 +121,7 @@ fn house(spot: &Spot) -> Surface {
 
 fn asphalt(spot: &Spot) -> Surface {
     let p = spot.p;
-    // Wet: the sky and the lamps lie on it in streaks.
+    // Wet asphalt: sky and lamps are reflected in streaks.
     let streak = fractal(Vec3::new(4.5 * p.x, 0.0, 0.5 * p.z), 3);
     let light = spot.tint + 0.55 * hex(0xd08a58) * step(0.48, 0.78, streak) + 0.10 * hex(0x5a6aa0);
     Surface { emission: light, ..Surface::matt(spot, Vec3::ZERO) }

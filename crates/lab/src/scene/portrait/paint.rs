@@ -1,4 +1,4 @@
-//! Paints of the things in the room.
+//! Paints of the objects in the room.
 
 use glam::Vec3;
 
@@ -10,7 +10,7 @@ pub fn plain(spot: &Spot) -> Surface {
     Surface::matt(spot, spot.tint)
 }
 
-/// Light of the material's colour, whatever falls on it.
+/// Emission in the material's colour.
 pub fn glow(spot: &Spot) -> Surface {
     Surface { emission: spot.tint, ..Surface::matt(spot, Vec3::ZERO) }
 }
@@ -31,7 +31,7 @@ pub fn wood(spot: &Spot) -> Surface {
     grain(spot, spot.p)
 }
 
-/// Wood of rings along `x` that a noise warps, and fine pores.
+/// Wood with rings along `x`, warped by noise, and fine pores.
 fn grain(spot: &Spot, p: Vec3) -> Surface {
     let offset = 31.0 * unit(spot.seed);
     let warp = fractal(Vec3::new(1.6 * p.x + offset, 9.0 * p.y, 9.0 * p.z), 3);
@@ -51,14 +51,14 @@ pub fn boards(spot: &Spot) -> Surface {
     Surface { albedo: surface.albedo * (0.4 + 0.6 * joint), ..surface }.glossy(0.16, 30.0)
 }
 
-/// A papered wall that faces the camera: rows of small leaves, and panelling with a rail below.
+/// A papered wall that faces the camera: rows of small leaves, with panelling and a rail below.
 pub fn wallpaper(spot: &Spot) -> Surface {
     let p = spot.p;
     let mottle = 0.93 + 0.14 * fractal(7.0 * p, 3);
     if p.y < -0.47 {
         return panelling(spot, mottle);
     }
-    // Tiles of 10.5 x 11.5 cm, every other row shifted by half; `u`, `v` in -1..1 within one.
+    // Tiles of 10.5 x 11.5 cm, every other row shifted by half; `u`, `v` are -1..1 within a tile.
     let row = (p.y / 0.115).floor();
     let x = p.x / 0.105 + 0.5 * (row - 2.0 * (0.5 * row).floor());
     let (u, v) = (2.0 * (x - x.floor()) - 1.0, 2.0 * (p.y / 0.115 - row) - 1.0);
@@ -86,7 +86,7 @@ fn panelling(spot: &Spot, mottle: f32) -> Surface {
 /// A book's spine and boards: a title, two bands.
 pub fn book(spot: &Spot) -> Surface {
     let band = (spot.p.y * (70.0 + 40.0 * unit(spot.seed)) + 6.0 * unit(spot.seed ^ 5)).sin();
-    // On the spine alone, which faces the camera.
+    // Only on the spine, which faces the camera.
     let gilt = step(0.93, 0.97, band) * step(-0.5, -0.8, spot.normal.z);
     let worn = 0.85 + 0.3 * fractal(40.0 * spot.p, 2);
     Surface::matt(spot, (spot.tint * worn).lerp(hex(0xd8b878), 0.8 * gilt)).glossy(0.05, 20.0)
@@ -105,13 +105,13 @@ pub fn stripes(spot: &Spot) -> Surface {
     cloth(&Spot { tint: color, ..*spot })
 }
 
-/// A curtain: cloth that the evening shines through.
+/// A curtain: translucent cloth in front of the evening light.
 pub fn curtain(spot: &Spot) -> Surface {
     let surface = cloth(spot);
     Surface { emission: 0.05 * spot.tint * Vec3::new(0.5, 0.62, 1.0), wrap: 0.45, ..surface }
 }
 
-/// A lamp's shade, lit from inside: brightest at the height of the bulb.
+/// A lamp shade, lit from inside: brightest at the height of the bulb.
 pub fn lamp_shade(spot: &Spot) -> Surface {
     let middle = (-((spot.uv.y - 0.45) / 0.42).powi(2)).exp();
     let thread = 0.92 + 0.16 * value(Vec3::new(10.0 * spot.uv.x, 160.0 * spot.p.y, 1.0));
@@ -119,7 +119,7 @@ pub fn lamp_shade(spot: &Spot) -> Surface {
     Surface { emission: glow, ..Surface::matt(spot, hex(0xe8d9b8)) }
 }
 
-/// A leaf on a quad: a lighter midrib and side ribs, and some of the light shines through.
+/// A leaf on a quad: a lighter midrib and side ribs, slightly translucent.
 pub fn leaf(spot: &Spot) -> Surface {
     let (u, v) = (spot.uv.x, spot.uv.y);
     let rib = step(0.06, 0.02, v.abs()) + 0.5 * step(0.16, 0.04, ((9.0 * (u - 0.55 * v.abs())).sin()).abs());

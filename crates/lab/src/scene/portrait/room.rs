@@ -21,7 +21,7 @@ const FLOOR_Y: f32 = -1.02;
 const SOFA: Vec3 = Vec3::new(-0.98, -0.40, 2.35);
 const TABLE: Vec3 = Vec3::new(1.10, -0.50, 2.45);
 
-/// All of the room behind the subject.
+/// Creates the room behind the subject.
 pub fn part() -> Part {
     let mut part = Part::still();
     let around = Bounds { low: Vec3::new(-2.2, FLOOR_Y - 0.02, 1.75), high: Vec3::new(2.3, 1.1, WALL_M + 0.05) };
@@ -36,8 +36,8 @@ pub fn part() -> Part {
     part
 }
 
-/// Adds an upright box between two opposite corners.
-fn solid(part: &mut Part, low: [f32; 3], high: [f32; 3], material: Material) {
+/// Adds an axis-aligned box between two opposite corners.
+fn add_box(part: &mut Part, low: [f32; 3], high: [f32; 3], material: Material) {
     let (low, high) = (Vec3::from(low), Vec3::from(high));
     let shape = Shape::Cuboid { centre: 0.5 * (low + high), axes: Mat3::IDENTITY, half: 0.5 * (high - low) };
     part.add(shape, material);
@@ -50,28 +50,28 @@ fn paint(paint: Paint, code: u32) -> Material {
 fn add_walls(part: &mut Part) {
     let wall = paint(paint::wallpaper, 0x3d6663);
     let (low, high) = WINDOW;
-    solid(part, [-4.0, -1.4, WALL_M], [low.x, 1.8, WALL_M + 0.12], wall);
-    solid(part, [high.x, -1.4, WALL_M], [4.0, 1.8, WALL_M + 0.12], wall);
-    solid(part, [low.x, -1.4, WALL_M], [high.x, low.y, WALL_M + 0.12], wall);
+    add_box(part, [-4.0, -1.4, WALL_M], [low.x, 1.8, WALL_M + 0.12], wall);
+    add_box(part, [high.x, -1.4, WALL_M], [4.0, 1.8, WALL_M + 0.12], wall);
+    add_box(part, [low.x, -1.4, WALL_M], [high.x, low.y, WALL_M + 0.12], wall);
     let floor =
         Shape::Quad { centre: Vec3::new(0.0, FLOOR_Y, 3.0), right: 4.0 * Vec3::X, up: 2.0 * Vec3::Z, cut: whole };
     part.add(floor, paint(paint::boards, 0x7a5233));
-    solid(part, [-4.0, FLOOR_Y, WALL_M - 0.02], [4.0, FLOOR_Y + 0.09, WALL_M], paint(paint::plain, 0x2a4442));
+    add_box(part, [-4.0, FLOOR_Y, WALL_M - 0.02], [4.0, FLOOR_Y + 0.09, WALL_M], paint(paint::plain, 0x2a4442));
 }
 
-/// Frame and sill, curtains, and pots on the sill.
+/// Adds frame and sill, curtains, and pots on the sill.
 fn add_window(part: &mut Part) {
     let white = paint(paint::plain, 0xd9d2c4);
     let (low, high) = WINDOW;
     let bar = 0.028;
     let across = 0.5 * (low.x + high.x);
     for x in [low.x, across, high.x] {
-        solid(part, [x - bar, low.y, WALL_M - 0.02], [x + bar, high.y, WALL_M + 0.06], white);
+        add_box(part, [x - bar, low.y, WALL_M - 0.02], [x + bar, high.y, WALL_M + 0.06], white);
     }
     for y in [low.y, 0.42] {
-        solid(part, [low.x, y - bar, WALL_M - 0.015], [high.x, y + bar, WALL_M + 0.05], white);
+        add_box(part, [low.x, y - bar, WALL_M - 0.015], [high.x, y + bar, WALL_M + 0.05], white);
     }
-    solid(part, [low.x - 0.08, low.y - 0.06, WALL_M - 0.20], [high.x + 0.08, low.y - 0.02, WALL_M], white);
+    add_box(part, [low.x - 0.08, low.y - 0.06, WALL_M - 0.20], [high.x + 0.08, low.y - 0.02, WALL_M], white);
     // Curtains hang in pleats.
     let linen = paint(paint::curtain, 0xcdb892);
     for (from, count) in [(low.x - 0.30, 9), (high.x - 0.06, 6)] {
@@ -90,7 +90,7 @@ fn add_window(part: &mut Part) {
     }
 }
 
-/// A pot with a tuft of leaves, each of two halves.
+/// Adds a pot with a tuft of leaves of two halves each.
 fn add_pot(part: &mut Part, foot: Vec3, radius: f32, color: u32, seed: u32, spread: f32) {
     let height = 1.7 * radius;
     let pot = Shape::Frustum { base: foot, height, low_radius: 0.75 * radius, high_radius: radius };
@@ -122,14 +122,14 @@ fn add_pot(part: &mut Part, foot: Vec3, radius: f32, color: u32, seed: u32, spre
 
 const BOOKS: [u32; 9] = [0x9c3b34, 0x2f5d73, 0xd8a24a, 0x54734f, 0x7d4b63, 0xc9bda3, 0x33415e, 0xb5643c, 0x8a8f5c];
 
-/// Two boards with books and pots, and a picture on the wall.
+/// Adds two boards with books and pots, and a picture on the wall.
 fn add_shelves(part: &mut Part) {
     let board = paint(paint::wood, 0x8a5a33);
     let mut dice = Dice::new(3);
     for (y, from, to) in [(0.20f32, 0.66f32, 2.16f32), (0.66, 0.84, 2.16)] {
-        solid(part, [from, y - 0.032, 3.93], [to, y, WALL_M], board);
+        add_box(part, [from, y - 0.032, 3.93], [to, y, WALL_M], board);
         for x in [from + 0.12, to - 0.3] {
-            solid(part, [x, y - 0.13, 4.0], [x + 0.025, y - 0.032, WALL_M], paint(paint::metal, 0x4a3a28));
+            add_box(part, [x, y - 0.13, 4.0], [x + 0.025, y - 0.032, WALL_M], paint(paint::metal, 0x4a3a28));
         }
         let mut x = from + 0.06;
         while x < to - 0.10 {
@@ -161,20 +161,20 @@ fn add_shelves(part: &mut Part) {
         }
     }
     // A framed picture between the window and the shelves.
-    solid(part, [0.02, 0.44, 4.165], [0.52, 0.84, WALL_M], paint(paint::wood, 0x5d3b22));
+    add_box(part, [0.02, 0.44, 4.165], [0.52, 0.84, WALL_M], paint(paint::wood, 0x5d3b22));
     let canvas =
         Shape::Quad { centre: Vec3::new(0.27, 0.64, 4.163), right: 0.225 * Vec3::X, up: 0.175 * Vec3::Y, cut: whole };
     part.add(canvas, paint(paint::landscape, 0xffffff));
 }
 
-/// Sideboard with three doors; on it a lamp, a pot and a pile of books.
+/// Adds a sideboard with three doors; on it a lamp, a pot and a pile of books.
 fn add_sideboard(part: &mut Part) {
     let walnut = paint(paint::wood, 0x6d4527);
-    solid(part, [0.62, -0.455, 3.70], [2.30, -0.42, WALL_M], paint(paint::wood, 0x8a5a33).seeded(4));
-    solid(part, [0.65, -0.95, 3.73], [2.27, -0.455, WALL_M], walnut);
+    add_box(part, [0.62, -0.455, 3.70], [2.30, -0.42, WALL_M], paint(paint::wood, 0x8a5a33).seeded(4));
+    add_box(part, [0.65, -0.95, 3.73], [2.27, -0.455, WALL_M], walnut);
     for k in 0..3 {
         let x = 0.68 + 0.53 * k as f32;
-        solid(part, [x, -0.92, 3.715], [x + 0.50, -0.48, 3.735], walnut.seeded(9 + k));
+        add_box(part, [x, -0.92, 3.715], [x + 0.50, -0.48, 3.735], walnut.seeded(9 + k));
         let knob = Shape::Sphere { centre: Vec3::new(x + 0.44, -0.66, 3.705), radius: 0.016 };
         part.add(knob, paint(paint::metal, 0xc59a4a));
     }
@@ -191,11 +191,11 @@ fn add_sideboard(part: &mut Part) {
         let shift = 0.02 * unit(k) - 0.01;
         let code = BOOKS[(2 * k as usize + 1) % 9];
         let low = [1.82 + shift, y, 3.80];
-        solid(part, low, [2.08 + shift, y + 0.032, 3.98], paint(paint::book, code).seeded(k));
+        add_box(part, low, [2.08 + shift, y + 0.032, 3.98], paint(paint::book, code).seeded(k));
     }
 }
 
-/// Strings of bulbs along the wall.
+/// Adds strings of bulbs along the wall.
 fn add_fairy_lights(part: &mut Part) {
     let wire = paint(paint::plain, 0x2c2a26);
     let drapes = [
@@ -204,7 +204,7 @@ fn add_fairy_lights(part: &mut Part) {
         (Vec3::new(0.64, 0.19, 3.925), Vec3::new(2.18, 0.19, 3.925), 0.085, 18),
     ];
     for (from, to, sag, count) in drapes {
-        // A parabola instead of a catenary.
+        // A parabola approximates the catenary.
         let at = |s: f32| from + (to - from) * s - 4.0 * sag * s * (1.0 - s) * Vec3::Y;
         let line: Vec<_> = (0..=24).map(|i| (at(i as f32 / 24.0), 0.0025)).collect();
         part.add_chain(&line, wire);
@@ -218,13 +218,13 @@ fn add_fairy_lights(part: &mut Part) {
     }
 }
 
-/// Sofa with a pillow, and the low table before it.
+/// Adds a sofa with a pillow, and the low table in front of it.
 fn add_seats(part: &mut Part, form: &Arc<Grid>) {
     let bounds = Bounds { low: SOFA - Vec3::new(0.75, 0.65, 0.45), high: SOFA + Vec3::new(0.75, 0.25, 0.5) };
     part.add(Shape::Field { distance: sofa, bounds, guide: form.clone() }, paint(paint::cloth, 0x8c4a52));
     let cushion = Bounds { low: SOFA - Vec3::new(0.55, 0.2, 0.4), high: SOFA + Vec3::new(0.1, 0.25, 0.1) };
     part.add(Shape::Field { distance: pillow, bounds: cushion, guide: form.clone() }, paint(paint::stripes, 0x35606b));
-    solid(
+    add_box(
         part,
         [TABLE.x - 0.62, TABLE.y - 0.03, TABLE.z - 0.55],
         [TABLE.x + 0.75, TABLE.y, TABLE.z + 0.55],
@@ -237,7 +237,7 @@ fn add_seats(part: &mut Part, form: &Arc<Grid>) {
     add_still_life(part);
 }
 
-/// On the low table: candles in glasses, a vase with twigs, a bowl of oranges.
+/// Adds the objects on the low table: candles in glasses, a vase with twigs, a bowl of oranges.
 fn add_still_life(part: &mut Part) {
     for (x, z, height) in [(-0.36, -0.22, 0.07), (-0.22, -0.36, 0.05)] {
         let foot = TABLE + Vec3::new(x, 0.0, z);
@@ -278,7 +278,7 @@ fn add_still_life(part: &mut Part) {
     }
 }
 
-/// Signed distance to the sofa: back, seat and two arms.
+/// Returns the signed distance to the sofa: back, seat and two arms.
 fn sofa(p: Vec3) -> f32 {
     let q = p - SOFA;
     let back = brick(q - Vec3::new(0.0, -0.12, 0.26), Vec3::new(0.62, 0.26, 0.10), 0.09);
@@ -287,14 +287,15 @@ fn sofa(p: Vec3) -> f32 {
     blend(back, seat, 0.03).min(brick(side, Vec3::new(0.085, 0.21, 0.33), 0.08))
 }
 
-/// Signed distance to a turned pillow, thinner towards its edges (scaled, since that is no true distance).
+/// Returns the signed distance to a rotated pillow, thinner towards its edges (scaled, as it is not an exact distance).
 fn pillow(p: Vec3) -> f32 {
     let q = Mat3::from_rotation_x(0.35) * Mat3::from_rotation_z(-0.2) * (p - SOFA - Vec3::new(-0.16, -0.07, 0.04));
     let edge = (q.x / 0.19).powi(2).max((q.y / 0.19).powi(2)).min(1.0);
     brick(q, Vec3::new(0.19, 0.19, 0.075 - 0.045 * edge), 0.03) * 0.8
 }
 
-/// Signed distance to the large things of the room, for shadow and occlusion; also the guide of sofa and pillow.
+/// Returns the signed distance to the large objects of the room, for shadow and occlusion; also the guide of sofa and
+/// pillow.
 fn form(p: Vec3) -> f32 {
     let wall = WALL_M - p.z;
     let (low, high) = WINDOW;

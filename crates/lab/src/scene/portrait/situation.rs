@@ -1,4 +1,4 @@
-//! What makes a portrait hard that is made of one picture alone: what is worn and held, furniture, others, the light.
+//! Situations that are hard for depth from a single picture: worn and held objects, furniture, other people, lighting.
 
 use glam::{Mat3, Vec3};
 
@@ -10,10 +10,10 @@ use crate::scene::part::{Material, Part};
 use crate::scene::ray::Pose;
 use crate::scene::shape::Shape;
 
-/// What a person before a webcam does, besides sitting there with glasses on.
+/// What a person in front of a webcam does or has, besides glasses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Situation {
-    /// Nothing more.
+    /// Just sits.
     Sits,
     /// Wears a headset with a microphone.
     Headset,
@@ -21,20 +21,20 @@ pub enum Situation {
     Hand,
     /// Holds a mug towards the camera.
     Mug,
-    /// Sits in an office chair, whose back is wider than theirs.
+    /// Sits in an office chair whose back is wider than the person.
     Chair,
-    /// Somebody else stands further back.
+    /// Another person stands farther back.
     Visitor,
-    /// A lamp behind was switched on since the room was empty.
+    /// A lamp in the background was switched on after the empty room was captured.
     Lamp,
 }
 
 impl Situation {
-    /// All of them.
+    /// All situations.
     pub const ALL: [Self; 7] =
         [Self::Sits, Self::Headset, Self::Hand, Self::Mug, Self::Chair, Self::Visitor, Self::Lamp];
 
-    /// What it is called.
+    /// Returns its name.
     pub fn name(self) -> &'static str {
         match self {
             Self::Sits => "sits",
@@ -47,7 +47,7 @@ impl Situation {
         }
     }
 
-    /// What belongs to the person.
+    /// Returns the parts that belong to the person.
     pub(super) fn own(self) -> Vec<Part> {
         match self {
             Self::Headset => vec![headset()],
@@ -57,20 +57,20 @@ impl Situation {
         }
     }
 
-    /// What comes and goes with the person, and is not theirs.
+    /// Returns the parts that come and go with the person, but are not part of them.
     pub(super) fn others(self) -> Vec<Part> {
         match self {
-            Self::Visitor => vec![head::part(stands), torso::part(stands)],
+            Self::Visitor => vec![head::part(visitor_pose), torso::part(visitor_pose)],
             _ => Vec::new(),
         }
     }
 
-    /// What is there without the person, too.
+    /// Returns the parts that are also in the empty room.
     pub(super) fn furniture(self) -> Vec<Part> {
         if self == Self::Chair { vec![chair()] } else { Vec::new() }
     }
 
-    /// What is lit while the person is there.
+    /// Returns the additional lights while the person is present.
     pub(super) fn lights(self) -> Vec<Light> {
         let lamp = Light {
             position: Vec3::new(-1.1, 0.9, 3.4),
@@ -85,7 +85,7 @@ impl Situation {
 const SKIN: u32 = 0xe3ab8c;
 const WOOL: u32 = 0xd99a2b;
 
-/// Two cups, a bow over the hair and a microphone on an arm; in the frame of the head.
+/// Creates a headset of two cups, a bow over the hair and a microphone on an arm, in the frame of the head.
 fn headset() -> Part {
     let mut part = Part::moving(nod);
     let dark = Material::new(paint::metal, hex(0x202226));
@@ -106,7 +106,7 @@ fn headset() -> Part {
     part
 }
 
-/// A lower arm with an open hand beside the face, a little nearer than that.
+/// Creates a lower arm with an open hand beside the face, slightly nearer than the face.
 fn hand() -> Part {
     let mut part = Part::still();
     let (wool, skin) = (Material::new(paint::cloth, hex(WOOL)), Material::new(paint::plain, hex(SKIN)));
@@ -126,7 +126,7 @@ fn hand() -> Part {
     part
 }
 
-/// A mug in a hand, held out towards the camera.
+/// Creates a mug in a hand, held out towards the camera.
 fn mug() -> Part {
     let mut part = Part::still();
     let (wool, skin) = (Material::new(paint::cloth, hex(WOOL)), Material::new(paint::plain, hex(SKIN)));
@@ -144,7 +144,7 @@ fn mug() -> Part {
     part
 }
 
-/// The back of an office chair, a hand's breadth behind the person.
+/// Creates the back of an office chair, a hand's breadth behind the person.
 fn chair() -> Part {
     let mut part = Part::still();
     let dark = Material::new(paint::cloth, hex(0x25282c));
@@ -156,7 +156,7 @@ fn chair() -> Part {
     part
 }
 
-/// Where the other one stands.
-fn stands(_: f32) -> Pose {
+/// Returns the pose of the other person.
+fn visitor_pose(_: f32) -> Pose {
     Pose { turn: Mat3::from_rotation_y(-0.3), place: Vec3::new(-0.80, 0.12, 2.85) }
 }

@@ -1,4 +1,4 @@
-//! The shoulders in a knitted sweater with a rolled collar. Same frame as the head.
+//! The shoulders, in a knitted sweater with a rolled collar. The frame is that of the head.
 
 use std::sync::Arc;
 
@@ -21,7 +21,7 @@ pub fn part(motion: fn(f32) -> Pose) -> Part {
     part
 }
 
-/// Signed distance to the sweater: chest, shoulders, arms and collar.
+/// Returns the signed distance to the sweater: chest, shoulders, arms and collar.
 fn form(p: Vec3) -> f32 {
     let q = fold(p);
     let chest = egg(p - Vec3::new(0.0, -0.42, 0.045), Vec3::new(0.180, 0.215, 0.112));
@@ -37,11 +37,11 @@ fn form(p: Vec3) -> f32 {
     d * 0.92
 }
 
-/// Relief of the knit at a point, 0 to 1: ribs, each a column of V-shaped loops.
+/// Returns the relief of the knit at a point, 0 to 1: ribs, each a column of V-shaped loops.
 fn stitch(p: Vec3) -> f32 {
     let collar = step(-0.212, -0.204, p.y);
     let around = (p.z - 0.044).atan2(p.x);
-    // Columns go around the neck in the collar and down the body below.
+    // Columns run around the neck in the collar, and down the body below.
     let column = (p.x / 0.0125) * (1.0 - collar) + (around * 9.5) * collar;
     let across = (column - column.floor()) * 2.0 - 1.0;
     let row = p.y / 0.0085 + 0.55 * across.abs();

@@ -1,4 +1,4 @@
-//! The shape of the aperture, chosen from thumbnails of the bokeh of a point of light.
+//! The aperture's shape, selected from thumbnails of its bokeh for a point light.
 
 use egui::{
     Color32, ColorImage, CornerRadius, Rect, Sense, Stroke, StrokeKind, TextureHandle, TextureOptions, Ui, Vec2,
@@ -11,22 +11,22 @@ use crate::panel::theme::Colors;
 use crate::texts::tr;
 use bokehcam::bokeh::aperture::{Aperture, Shape};
 
-/// Pixels along a side of a thumbnail's picture, which is smoothed where it is shown larger.
-const CELLS: usize = 56;
-/// Side of a thumbnail, in points.
+/// Side of a thumbnail's texture in pixels; filtered when displayed larger.
+const TEXTURE_SIDE_PX: usize = 56;
+/// Side of a displayed thumbnail, in points.
 const SIDE: f32 = 40.0;
 
 const SHAPES: [&str; 6] = ["Disc", "Ring", "Blades", "Heart", "Star", "Picture"];
 
-/// Thumbnails of apertures, each with the aperture and the rim that it was made of.
+/// Cached thumbnail textures, each with the aperture and the rim it was rendered for.
 #[derive(Default)]
-pub struct Thumbs {
-    made: [Option<(Aperture, f32, TextureHandle)>; SHAPES.len()],
+pub struct Thumbnails {
+    cached: [Option<(Aperture, f32, TextureHandle)>; SHAPES.len()],
 }
 
-/// The shape, its numbers, and the highlights that show it.
-pub fn show(ui: &mut Ui, sheet: &mut Sheet, thumbs: &mut Thumbs) {
-    shape_row(ui, sheet, thumbs);
+/// Adds the shape, its parameters, and the highlights that reveal it.
+pub fn show(ui: &mut Ui, sheet: &mut Sheet, thumbnails: &mut Thumbnails) {
+    shape_row(ui, sheet, thumbnails);
     let mut shape = sheet.look.aperture.shape.clone();
     let changed = match &mut shape {
         Shape::Disc | Shape::Heart | Shape::Picture(_) => false,
@@ -34,14 +34,14 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet, thumbs: &mut Thumbs) {
         Shape::Polygon { blades, rotation_deg, curvature } => {
             let turn = Number::new("Rotation", "Clockwise", -180.0..=180.0, 0).unit("", "°");
             let curve = Number::new("Curvature", "Straight blades to a circle", 0.0..=1.0, 2);
-            // All of them are drawn, whichever changed.
-            whole(ui, "Blades", blades) | number(ui, &turn, rotation_deg) | number(ui, &curve, curvature)
+            // `|` instead of `||`, so that every number is drawn.
+            integer(ui, "Blades", blades) | number(ui, &turn, rotation_deg) | number(ui, &curve, curvature)
         }
-        Shape::Star { points } => whole(ui, "Points", points),
+        Shape::Star { points } => integer(ui, "Points", points),
     };
     if changed {
         sheet.look.aperture.shape = shape;
-        sheet.changed(true, "aperture");
+        sheet.mark_changed(true, "aperture");
     }
     let hint = "-1: soap bubbles; 1: bright in the middle, soft at the rim";
     let (intensity, rim, highlights) = (sheet.look.aperture.intensity, sheet.look.rim, sheet.look.highlights);
@@ -54,16 +54,16 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet, thumbs: &mut Thumbs) {
     sheet.number(ui, &how, highlights, |look, highlights| look.highlights = highlights);
 }
 
-/// A number of edges or points, without a fraction.
-fn whole(ui: &mut Ui, label: &str, value: &mut u32) -> bool {
+/// Adds an integer number of blades or points. Returns whether it changed.
+fn integer(ui: &mut Ui, label: &str, value: &mut u32) -> bool {
     let mut real = *value as f32;
     let changed = number(ui, &Number::new(label, "How many", 3.0..=16.0, 0), &mut real);
     *value = real.round() as u32;
     changed
 }
 
-/// The shapes to choose from, side by side, as thumbnails.
-fn shape_row(ui: &mut Ui, sheet: &mut Sheet, thumbs: &mut Thumbs) {
+/// Adds the row of shape thumbnails.
+fn shape_row(ui: &mut Ui, sheet: &mut Sheet, thumbnails: &mut Thumbnails) {
     let chosen = index_of(&sheet.look.aperture.shape);
     let no_drag = !ui.input(|input| input.pointer.any_down());
     let mut shapes = Group::default();
@@ -75,20 +75,20 @@ fn shape_row(ui: &mut Ui, sheet: &mut Sheet, thumbs: &mut Thumbs) {
             let is_chosen = index == chosen;
             response.widget_info(|| WidgetInfo::selected(Role::RadioButton, true, is_chosen, tr(name)));
             let aperture = Aperture { shape, intensity: sheet.look.aperture.intensity };
-            // Thumbnails take a while to make: during a drag only that of the chosen shape is made anew.
-            let texture = thumbs.of(ui, index, &aperture, sheet.look.rim, no_drag || is_chosen);
-            thumbnail(ui, rect, texture, is_chosen, response.hovered());
+            // Rendering thumbnails is slow: during a drag, only the selected shape's is updated.
+            let texture = thumbnails.get_or_render(ui, index, &aperture, sheet.look.rim, no_drag || is_chosen);
+            draw_thumbnail(ui, rect, texture, is_chosen, response.hovered());
             shapes.add(response.hint(name), aperture);
         }
     });
     if let Some(aperture) = shapes.chosen(ui) {
         sheet.look.aperture = aperture;
-        sheet.changed(true, "shape");
+        sheet.mark_changed(true, "shape");
     }
 }
 
-/// Draws a thumbnail on its field, marked where it is chosen or under the pointer.
-fn thumbnail(ui: &Ui, rect: Rect, texture: Option<egui::TextureId>, chosen: bool, hovered: bool) {
+/// Draws a thumbnail, highlighted while it is selected or hovered.
+fn draw_thumbnail(ui: &Ui, rect: Rect, texture: Option<egui::TextureId>, chosen: bool, hovered: bool) {
     let colors = Colors::here(ui);
     let painter = ui.painter();
     painter.rect_filled(rect, CornerRadius::same(8), colors.fill(false, hovered));
@@ -102,7 +102,7 @@ fn thumbnail(ui: &Ui, rect: Rect, texture: Option<egui::TextureId>, chosen: bool
     }
 }
 
-/// The index of a shape's kind in [`SHAPES`].
+/// Returns the index of a shape's kind in [`SHAPES`].
 fn index_of(shape: &Shape) -> usize {
     match shape {
         Shape::Disc => 0,
@@ -114,8 +114,8 @@ fn index_of(shape: &Shape) -> usize {
     }
 }
 
-/// The shape that is offered at an index of [`SHAPES`]: the chosen one as it is, others with default numbers. A picture
-/// is offered only where the look has one.
+/// Returns the shape offered at an index of [`SHAPES`]: the current one unchanged, others with default parameters. A
+/// picture is offered only if the look has one.
 fn shape_at(index: usize, look: &bokehcam::look::Look) -> Option<Shape> {
     if index == index_of(&look.aperture.shape) {
         return Some(look.aperture.shape.clone());
@@ -130,38 +130,45 @@ fn shape_at(index: usize, look: &bokehcam::look::Look) -> Option<Shape> {
     })
 }
 
-impl Thumbs {
-    /// The thumbnail of an aperture, by the index of its shape. An outdated one is made anew only with `renew`.
-    fn of(&mut self, ui: &Ui, index: usize, aperture: &Aperture, rim: f32, renew: bool) -> Option<egui::TextureId> {
-        let made = &mut self.made[index];
-        let is_current = made.as_ref().is_some_and(|(of, made_rim, _)| of == aperture && *made_rim == rim);
-        if !is_current && (renew || made.is_none()) {
-            let image = picture(aperture, rim);
-            match made {
-                Some((of, made_rim, texture)) => {
+impl Thumbnails {
+    /// Returns the thumbnail for the shape at `index`. An outdated one is re-rendered only if `renew` is set.
+    fn get_or_render(
+        &mut self,
+        ui: &Ui,
+        index: usize,
+        aperture: &Aperture,
+        rim: f32,
+        renew: bool,
+    ) -> Option<egui::TextureId> {
+        let cached = &mut self.cached[index];
+        let is_current = cached.as_ref().is_some_and(|(of, cached_rim, _)| of == aperture && *cached_rim == rim);
+        if !is_current && (renew || cached.is_none()) {
+            let image = render_thumbnail(aperture, rim);
+            match cached {
+                Some((of, cached_rim, texture)) => {
                     texture.set(image, TextureOptions::LINEAR);
-                    (*of, *made_rim) = (aperture.clone(), rim);
+                    (*of, *cached_rim) = (aperture.clone(), rim);
                 }
                 None => {
                     let texture = ui.ctx().load_texture(SHAPES[index], image, TextureOptions::LINEAR);
-                    *made = Some((aperture.clone(), rim, texture));
+                    *cached = Some((aperture.clone(), rim, texture));
                 }
             }
         }
-        made.as_ref().map(|(.., texture)| texture.id())
+        cached.as_ref().map(|(.., texture)| texture.id())
     }
 }
 
-/// A thumbnail: white, as opaque as the aperture is bright there.
-fn picture(aperture: &Aperture, rim: f32) -> ColorImage {
-    let mask = aperture.mask(CELLS, rim);
+/// Renders a thumbnail: white, with the aperture's brightness as opacity.
+fn render_thumbnail(aperture: &Aperture, rim: f32) -> ColorImage {
+    let mask = aperture.mask(TEXTURE_SIDE_PX, rim);
     let brightest = mask.values.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
     let pixel = |light: &f64| {
-        // About the gamma of a display, so that the opacity looks like the light.
+        // Approximates a display's gamma, so that the opacity looks like the light.
         let opacity = ((light / brightest).powf(1.0 / 1.8) * 255.0).round() as u8;
         Color32::from_rgba_premultiplied(opacity, opacity, opacity, opacity)
     };
-    ColorImage::new([CELLS, CELLS], mask.values.iter().map(pixel).collect())
+    ColorImage::new([TEXTURE_SIDE_PX, TEXTURE_SIDE_PX], mask.values.iter().map(pixel).collect())
 }
 
 #[cfg(test)]
@@ -171,12 +178,12 @@ mod tests {
     #[test]
     fn pictures_show_the_shape() {
         let light = |shape: Shape, intensity: f32, (x, y): (usize, usize)| {
-            picture(&Aperture { shape, intensity }, 0.1).pixels[y * CELLS + x].a()
+            render_thumbnail(&Aperture { shape, intensity }, 0.1).pixels[y * TEXTURE_SIDE_PX + x].a()
         };
-        let middle = (CELLS / 2, CELLS / 2);
+        let middle = (TEXTURE_SIDE_PX / 2, TEXTURE_SIDE_PX / 2);
         assert_eq!((light(Shape::Disc, 0.0, middle), light(Shape::Disc, 0.0, (0, 0))), (255, 0));
         assert_eq!(light(Shape::Ring { inner: 0.5 }, 0.0, middle), 0);
-        let rim = (4, CELLS / 2);
+        let rim = (4, TEXTURE_SIDE_PX / 2);
         assert!(light(Shape::Disc, -1.0, rim) > light(Shape::Disc, -1.0, middle), "a soap bubble is bright at its rim");
     }
 }

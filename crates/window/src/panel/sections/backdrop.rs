@@ -1,9 +1,9 @@
-//! What is behind the subject, and whether the picture follows it.
+//! The virtual background, and auto-framing.
 
 use egui::{Role, Ui, WidgetInfo};
 
 use super::Sheet;
-use crate::panel::parts::{Hinted, Number, list, path, remark, switch};
+use crate::panel::parts::{Hinted, Number, dropdown, path, remark, switch};
 use crate::services::Browse;
 use crate::state::Action;
 use crate::texts::{tr, tr_with};
@@ -22,14 +22,14 @@ const KINDS: [(&str, &str, Kind); 3] = [
     ("Colour", "One colour, for a page of your own, or for programs that put something in its place", Kind::Color),
     ("Picture", "A picture of yours, as large as the frame", Kind::Picture),
 ];
-/// The green of screens that are replaced later.
+/// Chroma-key green.
 const GREEN: [u8; 3] = [0, 177, 64];
-/// Room to move, and little loss of detail.
-const ZOOM: f32 = 1.5;
-/// Below, there is none.
-const LEAST_ZOOM: f32 = 1.1;
+/// Default zoom of auto-framing: room to move with little loss of detail.
+const DEFAULT_ZOOM: f32 = 1.5;
+/// Minimum zoom of auto-framing; below, the crop could hardly move.
+const MIN_ZOOM: f32 = 1.1;
 
-/// A list of what may be behind.
+/// Adds the list of backgrounds.
 pub fn kinds(ui: &mut Ui, sheet: &mut Sheet) {
     let kind = match sheet.look.behind {
         Behind::Blur => Kind::Blurred,
@@ -44,7 +44,7 @@ pub fn kinds(ui: &mut Ui, sheet: &mut Sheet) {
     let shown = tr_with("Background: {}", &[&shown]);
     let all = KINDS.map(|(name, hint, kind)| (tr(name).to_owned(), hint, kind));
     let enabled = sheet.follows_depth();
-    let chosen = ui.add_enabled_ui(enabled, |ui| list(ui, "Background", &shown, all, &kind)).inner;
+    let chosen = ui.add_enabled_ui(enabled, |ui| dropdown(ui, "Background", &shown, all, &kind)).inner;
     if let Some(chosen) = chosen {
         match (chosen, named) {
             (Kind::Blurred, _) => sheet.look.behind = Behind::Blur,
@@ -52,11 +52,11 @@ pub fn kinds(ui: &mut Ui, sheet: &mut Sheet) {
             (Kind::Picture, Some(named)) => sheet.look.behind = named,
             (Kind::Picture, None) => sheet.act(Action::Browse(Browse::Behind)),
         }
-        sheet.changed(true, "behind");
+        sheet.mark_changed(true, "behind");
     }
 }
 
-/// More of what is behind, and whether the picture follows.
+/// Adds the options of the selected background, and auto-framing.
 pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
     match sheet.look.behind.clone() {
         Behind::Blur => {}
@@ -70,19 +70,20 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
             picker.widget_info(|| WidgetInfo::labeled(Role::ColorWell, true, tr("Colour")));
             if picker.hint("Another colour").changed() {
                 sheet.look.behind = Behind::Color(color);
-                sheet.changed(true, "colour behind");
+                sheet.mark_changed(true, "colour behind");
             }
         })),
     }
     let zoom = sheet.look.follow.zoom();
     let hint = "What goes out is a part of the picture, with the subject in its middle";
     if switch(ui, "Follow the subject", hint, zoom.is_some()) {
-        sheet.look.follow = if zoom.is_some() { Follow::OFF } else { Follow::to(ZOOM) };
-        sheet.changed(true, "follow");
+        sheet.look.follow = if zoom.is_some() { Follow::OFF } else { Follow::to(DEFAULT_ZOOM) };
+        sheet.mark_changed(true, "follow");
     }
+    // `zoom` is from before the click, so the slider appears in the next pass.
     if let Some(zoom) = zoom {
         let how =
-            Number::new("Largest zoom", "So much larger the subject becomes, at most", LEAST_ZOOM..=Follow::MOST, 1);
+            Number::new("Largest zoom", "So much larger the subject becomes, at most", MIN_ZOOM..=Follow::MOST, 1);
         sheet.number(ui, &how.unit("", "×"), zoom, |look, zoom| look.follow = Follow::to(zoom));
         remark(ui, "In what goes out, within the dashed line; this window shows the whole picture.");
     }

@@ -1,4 +1,4 @@
-//! The effect: what the blur follows.
+//! The effect, which determines where the blur is applied.
 
 use egui::Ui;
 
@@ -14,7 +14,7 @@ const EFFECTS: [(&str, &str, Effect); 4] = [
     ("No blur", "The picture as it is", Effect::None),
 ];
 
-/// The effect, and the band of tilt-shift.
+/// Adds the effect, and the parameters of the tilt-shift band.
 pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
     let chosen = EFFECTS.iter().find(|effect| effect.2 == sheet.look.effect).map_or(Effect::Auto, |effect| effect.2);
     let has_depth = sheet.has_depth();

@@ -1,19 +1,19 @@
-//! What everybody needs: the camera, the portrait, how strong it is, what is behind, what is kept and where it goes.
+//! The first screen, with the essential controls: camera, portrait, blur strength, background, recording, and calls.
 
 use egui::{Align, Button, Layout, Role, Sense, Slider, TextStyle, Ui, Vec2, WidgetInfo, WidgetText, vec2};
 
 use super::{Sheet, backdrop};
 use crate::panel::dock::{CELL, CELL_GAP, CELLS};
-use crate::panel::parts::{Hinted, list, switch};
+use crate::panel::parts::{Hinted, dropdown, switch};
 use crate::panel::{icons, theme::Colors};
 use crate::state::{Action, tweak};
 use crate::texts::{tr, tr_with};
 use bokehcam::look::{Effect, MAX_COC_PER_HEIGHT};
 
-/// The section that all else is in.
+/// Name of the section with all other settings.
 pub const MORE: &str = "More";
 
-/// Draws them in so many columns.
+/// Draws the controls in `columns` columns.
 pub fn show(ui: &mut Ui, sheet: &mut Sheet, columns: usize) {
     let width = ((ui.available_width() - CELL_GAP * (columns - 1) as f32) / columns as f32).max(20.0);
     let cells: [fn(&mut Ui, &mut Sheet); CELLS] = [camera, portrait, blur, backdrop::kinds, keep, calls, more];
@@ -35,7 +35,7 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet, columns: usize) {
     });
 }
 
-/// The source, and others to choose.
+/// Adds the list of sources.
 fn camera(ui: &mut Ui, sheet: &mut Sheet) {
     let state = sheet.state;
     let shown = match state.title() {
@@ -43,12 +43,12 @@ fn camera(ui: &mut Ui, sheet: &mut Sheet) {
         title => title,
     };
     let sources = state.sources.iter().map(|choice| (choice.label.clone(), &choice.name[..], &choice.name[..]));
-    if let Some(name) = list(ui, "Camera", shown, sources, &&state.source_name[..]) {
+    if let Some(name) = dropdown(ui, "Camera", shown, sources, &&state.source_name[..]) {
         sheet.act(Action::Open(name.to_owned()));
     }
 }
 
-/// Whether what is not in focus is blurred.
+/// Adds the switch for blur by depth.
 fn portrait(ui: &mut Ui, sheet: &mut Sheet) {
     let on = sheet.follows_depth() && sheet.has_depth();
     let hint = "The farther from who is in focus, the more blur";
@@ -57,26 +57,26 @@ fn portrait(ui: &mut Ui, sheet: &mut Sheet) {
     }
 }
 
-/// How strong the blur is.
+/// Adds the slider for the blur strength.
 fn blur(ui: &mut Ui, sheet: &mut Sheet) {
     let focus_m = sheet.state.distance_m();
-    let share = tweak::share_of(&sheet.look, focus_m, sheet.size);
+    let fraction = tweak::blur_fraction(&sheet.look, focus_m, sheet.size);
     let enabled = sheet.look.effect != Effect::None;
     ui.add_enabled_ui(enabled, |ui| {
         let name = ui.label(tr("Blur"));
         ui.spacing_mut().slider_width = ui.available_width().max(10.0);
         ui.spacing_mut().interact_size.y = 20.0;
-        let most = MAX_COC_PER_HEIGHT * 100.0;
-        let mut percent = (share * 100.0).min(most);
-        let slider = ui.add(Slider::new(&mut percent, 0.0..=most).show_value(false)).labelled_by(name.id);
+        let max_percent = MAX_COC_PER_HEIGHT * 100.0;
+        let mut percent = (fraction * 100.0).min(max_percent);
+        let slider = ui.add(Slider::new(&mut percent, 0.0..=max_percent).show_value(false)).labelled_by(name.id);
         if slider.hint("How much what is out of focus is blurred. The wheel over the picture does the same").changed() {
-            tweak::set_share(&mut sheet.look, percent / 100.0, focus_m, sheet.size);
-            sheet.changed(true, "Amount of blur");
+            tweak::set_blur_fraction(&mut sheet.look, percent / 100.0, focus_m, sheet.size);
+            sheet.mark_changed(true, "Amount of blur");
         }
     });
 }
 
-/// A video, or a picture.
+/// Adds the buttons for recordings and snapshots.
 fn keep(ui: &mut Ui, sheet: &mut Sheet) {
     let recording = sheet.state.recording().is_some();
     let snapshot = icons::SIDE + 18.0;
@@ -88,13 +88,13 @@ fn keep(ui: &mut Ui, sheet: &mut Sheet) {
     response.widget_info(|| WidgetInfo::labeled(Role::Button, true, tr("Snapshot")));
     let colors = Colors::here(ui);
     ui.painter().rect_filled(rect, 8, colors.fill(false, response.hovered()));
-    icons::camera(ui.painter(), rect.center(), colors.text);
+    icons::draw_camera(ui.painter(), rect.center(), colors.text);
     if response.hint("Snapshot: save this picture (S)").clicked() {
         sheet.act(Action::Snapshot);
     }
 }
 
-/// Draws the button that starts and stops a recording. Whether it was clicked.
+/// Adds the button that starts and stops a recording. Returns whether it was clicked.
 fn record_button(ui: &mut Ui, on: bool, size: Vec2) -> bool {
     let colors = Colors::here(ui);
     let (rect, response) = ui.allocate_exact_size(size, Sense::click());
@@ -108,12 +108,12 @@ fn record_button(ui: &mut Ui, on: bool, size: Vec2) -> bool {
     let room = (rect.width() - 40.0).max(10.0);
     let name = text.into_galley(ui, Some(egui::TextWrapMode::Truncate), room, TextStyle::Button);
     let left = rect.center().x - (name.size().x + 22.0) / 2.0;
-    icons::record(ui.painter(), egui::pos2(left + 7.0, rect.center().y), on, colors.alarm);
+    icons::draw_record(ui.painter(), egui::pos2(left + 7.0, rect.center().y), on, colors.alarm);
     ui.painter().galley(egui::pos2(left + 22.0, rect.center().y - name.size().y / 2.0), name, colors.text);
     response.hint("A video beside the window, until you stop it (V)").clicked()
 }
 
-/// Whether calls have the picture.
+/// Adds the switch for the virtual camera.
 fn calls(ui: &mut Ui, sheet: &mut Sheet) {
     let state = sheet.state;
     let current = state.virtual_camera();
@@ -124,7 +124,7 @@ fn calls(ui: &mut Ui, sheet: &mut Sheet) {
     }
 }
 
-/// Whether all else is shown.
+/// Adds the button that expands the panel.
 fn more(ui: &mut Ui, sheet: &mut Sheet) {
     let open = sheet.state.shows_more();
     let text = tr_with(if open { "{} Less" } else { "{} More" }, &[&if open { "−" } else { "+" }]);

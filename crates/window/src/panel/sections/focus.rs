@@ -1,4 +1,4 @@
-//! The focus: distance of the focal plane, and depth of the focal range.
+//! The focus: distance of the focal plane, and focus range.
 
 use egui::Ui;
 
@@ -8,10 +8,10 @@ use crate::state::tweak::{DISTANCES_M, FOCUS_RANGES_M};
 use crate::texts::tr_with;
 use bokehcam::depth::focus::FocusRule;
 
-/// The rule of focus, its distance, and the focal range.
+/// Adds the focus rule, its distance, and the focus range.
 pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
     let focus = sheet.look.focus;
-    // Without depth in the frame yet, something to start from.
+    // A default if no frame with depth has arrived yet.
     let now_m = sheet.state.distance_m();
     let (is_point, metres) = match focus {
         FocusRule::Metres(metres) => (false, metres),
@@ -33,9 +33,9 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
     sheet.choose(ui, "Focus on", rules, focus, |look, rule| look.focus = rule);
     if in_metres {
         let hint = "Distance of what is sharpest. Move it to focus at a distance of your own";
-        let how = Number::new("Distance", hint, DISTANCES_M, 2).unit("", " m").ratios();
+        let how = Number::new("Distance", hint, DISTANCES_M, 2).unit("", " m").logarithmic();
         sheet.number(ui, &how, metres, |look, metres| look.focus = FocusRule::Metres(metres));
-        // Shown as half of it on either side of the focal plane.
+        // Displayed as half the range on either side of the focal plane.
         let half_m = *FOCUS_RANGES_M.start() / 2.0..=*FOCUS_RANGES_M.end() / 2.0;
         let hint = "What stays as sharp as the focal plane, in front of it and behind";
         let how = Number::new("Depth of what is sharp", hint, half_m, 2).unit("±", " m");

@@ -1,4 +1,4 @@
-//! Presets: looks by name.
+//! Presets: named looks.
 
 use egui::{
     Align2, CornerRadius, FontFamily, FontId, Key, Label, Rect, Response, Role, Sense, TextEdit, Ui, Vec2, WidgetInfo,
@@ -6,52 +6,53 @@ use egui::{
 };
 
 use super::Sheet;
-use crate::panel::parts::{Group, Hinted, button, called, remark};
+use crate::panel::parts::{Group, Hinted, button, remark, set_accessible_name};
 use crate::panel::theme::{Colors, medium};
 use crate::state::Action;
 use crate::texts::{tr, tr_with};
 use bokehcam::look::Effect;
 use bokehcam::look::presets::Preset;
 
-/// What is being done with presets.
+/// State of the preset dialog.
 #[derive(Debug, Default, PartialEq)]
-enum Doing {
+enum Dialog {
     #[default]
     Nothing,
-    /// The look is being saved under a name.
+    /// Enter a name to save the look.
     Saving,
-    /// One's own are listed, to be renamed or deleted.
+    /// List the user's presets, to rename or delete them.
     Listing,
     Renaming(String),
     Deleting(String),
 }
 
-/// What is being done with presets, and the name that is being typed for it.
+/// The preset dialog, and the name that is being typed.
 #[derive(Debug, Default)]
 pub struct Editing {
-    doing: Doing,
+    dialog: Dialog,
     name: String,
-    /// Whether the text field is new and still needs the focus.
-    ask_focus: bool,
+    /// Whether the text field is new and must request the focus.
+    needs_focus: bool,
 }
 
 impl Editing {
-    /// Whether something is being done that Esc gives up.
+    /// Whether a dialog is open that Esc cancels.
     pub fn is_asking(&self) -> bool {
-        self.doing != Doing::Nothing
+        self.dialog != Dialog::Nothing
     }
 
-    fn begin(&mut self, ui: &Ui, doing: Doing, name: &str) {
-        *self = Self { doing, name: name.to_owned(), ask_focus: true };
-        // In the pass of the click, the button has the focus itself.
+    fn begin(&mut self, ui: &Ui, dialog: Dialog, name: &str) {
+        *self = Self { dialog, name: name.to_owned(), needs_focus: true };
+        // During this pass, the clicked button still has the focus.
         ui.ctx().request_repaint();
     }
 }
 
-/// The presets, and ways to save, rename and delete one's own.
+/// Adds the presets, and the dialogs to save, rename and delete the user's own.
 pub fn show(ui: &mut Ui, sheet: &mut Sheet, editing: &mut Editing) {
     let state = sheet.state;
-    let was = std::mem::take(&mut editing.doing);
+    // Each dialog returns its next state; the buttons above it take effect in the next pass.
+    let current = std::mem::take(&mut editing.dialog);
     let mut next = None;
     ui.scope(|ui| {
         ui.spacing_mut().item_spacing = vec2(6.0, 6.0);
@@ -60,51 +61,51 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet, editing: &mut Editing) {
             for (index, preset) in state.presets.iter().enumerate() {
                 let needs_depth = preset.patch.effect.is_some_and(Effect::follows_depth);
                 let possible = !needs_depth || sheet.has_depth();
-                chips.add(chip(ui, index, preset, lit == Some(index), possible), preset);
+                chips.add(draw_chip(ui, index, preset, lit == Some(index), possible), preset);
             }
             if let Some(preset) = chips.chosen(ui) {
                 sheet.act(Action::Preset(preset.name.clone()));
             }
-            if was != Doing::Saving && button(ui, "Save as…", "Save this look under a name") {
-                next = Some(Doing::Saving);
+            if current != Dialog::Saving && button(ui, "Save as…", "Save this look under a name") {
+                next = Some(Dialog::Saving);
             }
             let has_own = state.presets.iter().any(|preset| preset.own);
             if has_own && button(ui, "Edit…", "Rename or delete looks of your own") {
-                next = Some(if was == Doing::Listing { Doing::Nothing } else { Doing::Listing });
+                next = Some(if current == Dialog::Listing { Dialog::Nothing } else { Dialog::Listing });
             }
         });
     });
-    editing.doing = match was {
-        Doing::Nothing => Doing::Nothing,
-        Doing::Saving => save(ui, sheet, editing),
-        Doing::Listing => list(ui, sheet, editing),
-        Doing::Renaming(name) => rename(ui, sheet, editing, name),
-        Doing::Deleting(name) => delete(ui, sheet, name),
+    editing.dialog = match current {
+        Dialog::Nothing => Dialog::Nothing,
+        Dialog::Saving => save(ui, sheet, editing),
+        Dialog::Listing => list(ui, sheet, editing),
+        Dialog::Renaming(name) => rename(ui, sheet, editing, name),
+        Dialog::Deleting(name) => delete(ui, sheet, name),
     };
     if let Some(next) = next {
         editing.begin(ui, next, "");
     }
 }
 
-/// Asks for the name of a new preset. One that is there is replaced only by the button that says so.
-fn save(ui: &mut Ui, sheet: &mut Sheet, editing: &mut Editing) -> Doing {
+/// Asks for the name of a new preset. An existing preset is replaced only by an explicit button press, not by Enter.
+fn save(ui: &mut Ui, sheet: &mut Sheet, editing: &mut Editing) -> Dialog {
     let is_there = sheet.state.presets.iter().any(|preset| preset.own && preset.name == editing.name.trim());
     let (verb, by_enter) = if is_there { ("Replace", false) } else { ("Save", true) };
-    match named(ui, editing, verb, (by_enter, sheet.gives_up(ui))) {
+    match name_field(ui, editing, verb, (by_enter, sheet.is_cancelled(ui))) {
         Some(true) => sheet.act(Action::SavePreset(editing.name.trim().to_owned())),
         Some(false) => {}
         None => {
             if is_there {
                 remark(ui, "There is a look of this name already.");
             }
-            return Doing::Saving;
+            return Dialog::Saving;
         }
     }
-    Doing::Nothing
+    Dialog::Nothing
 }
 
-/// Lists one's own presets, each with what can be done with it.
-fn list(ui: &mut Ui, sheet: &Sheet, editing: &mut Editing) -> Doing {
+/// Lists the user's presets with their actions.
+fn list(ui: &mut Ui, sheet: &Sheet, editing: &mut Editing) -> Dialog {
     for preset in sheet.state.presets.iter().filter(|preset| preset.own) {
         let row = ui.horizontal(|ui| {
             let [rename, delete] = ["Rename", "Delete"].map(|verb| {
@@ -117,47 +118,47 @@ fn list(ui: &mut Ui, sheet: &Sheet, editing: &mut Editing) -> Doing {
         });
         match row.inner {
             (true, _) => {
-                editing.begin(ui, Doing::Nothing, &preset.name);
-                return Doing::Renaming(preset.name.clone());
+                editing.begin(ui, Dialog::Nothing, &preset.name);
+                return Dialog::Renaming(preset.name.clone());
             }
-            (_, true) => return Doing::Deleting(preset.name.clone()),
+            (_, true) => return Dialog::Deleting(preset.name.clone()),
             _ => {}
         }
     }
-    if sheet.gives_up(ui) { Doing::Nothing } else { Doing::Listing }
+    if sheet.is_cancelled(ui) { Dialog::Nothing } else { Dialog::Listing }
 }
 
-fn rename(ui: &mut Ui, sheet: &mut Sheet, editing: &mut Editing, old: String) -> Doing {
+fn rename(ui: &mut Ui, sheet: &mut Sheet, editing: &mut Editing, old: String) -> Dialog {
     let new = editing.name.trim().to_owned();
-    match named(ui, editing, "Rename", (true, sheet.gives_up(ui))) {
+    match name_field(ui, editing, "Rename", (true, sheet.is_cancelled(ui))) {
         Some(true) if new != old => sheet.act(Action::RenamePreset(old, new)),
         Some(_) => {}
-        None => return Doing::Renaming(old),
+        None => return Dialog::Renaming(old),
     }
-    Doing::Listing
+    Dialog::Listing
 }
 
-/// Asks before a preset is deleted, as nothing brings it back.
-fn delete(ui: &mut Ui, sheet: &mut Sheet, name: String) -> Doing {
+/// Asks before deleting a preset, because this cannot be undone.
+fn delete(ui: &mut Ui, sheet: &mut Sheet, name: String) -> Dialog {
     ui.label(tr_with("Delete “{}” for good?", &[&name]));
     let (delete, keep) =
         ui.horizontal_wrapped(|ui| (ui.button(tr("Delete it")).clicked(), ui.button(tr("Keep it")).clicked())).inner;
     if delete {
         sheet.act(Action::DeletePreset(name));
-    } else if !keep && !sheet.gives_up(ui) {
-        return Doing::Deleting(name);
+    } else if !keep && !sheet.is_cancelled(ui) {
+        return Dialog::Deleting(name);
     }
-    Doing::Listing
+    Dialog::Listing
 }
 
-/// A field for a name and buttons. Whether the name holds or is given up, once one of them is so.
-fn named(ui: &mut Ui, editing: &mut Editing, verb: &str, (by_enter, gives_up): (bool, bool)) -> Option<bool> {
+/// Adds a name field with buttons. Returns true if confirmed, false if cancelled, `None` while open.
+fn name_field(ui: &mut Ui, editing: &mut Editing, verb: &str, (by_enter, is_cancelled): (bool, bool)) -> Option<bool> {
     ui.horizontal_wrapped(|ui| {
         let width = ui.available_width().min(140.0);
         let edit = TextEdit::singleline(&mut editing.name).hint_text(tr("name")).desired_width(width).char_limit(40);
         let edit = ui.add(edit);
-        called(&edit, "Name of the preset", Role::TextInput);
-        if std::mem::take(&mut editing.ask_focus) {
+        set_accessible_name(&edit, "Name of the preset", Role::TextInput);
+        if std::mem::take(&mut editing.needs_focus) {
             edit.request_focus();
         }
         let entered = edit.lost_focus() && ui.input(|input| input.key_pressed(Key::Enter));
@@ -168,20 +169,20 @@ fn named(ui: &mut Ui, editing: &mut Editing, verb: &str, (by_enter, gives_up): (
         if holds && !editing.name.trim().is_empty() {
             return Some(true);
         }
-        (ui.button(tr("Cancel")).clicked() || gives_up).then_some(false)
+        (ui.button(tr("Cancel")).clicked() || is_cancelled).then_some(false)
     })
     .inner
 }
 
 /// Draws a preset with the number of its key.
-fn chip(ui: &mut Ui, index: usize, preset: &Preset, chosen: bool, possible: bool) -> Response {
+fn draw_chip(ui: &mut Ui, index: usize, preset: &Preset, chosen: bool, possible: bool) -> Response {
     let colors = Colors::here(ui);
-    // One's own are called as one called them.
+    // Names of user presets are displayed verbatim.
     let shown = if preset.own { preset.name.clone() } else { capitalized(&preset.name) };
     let text = colors.on_fill(chosen, possible);
     let number_color = if possible && !chosen { colors.weak } else { text };
     let name = ui.painter().layout_no_wrap(shown, FontId::new(13.0, medium()), text);
-    // The keys 1 to 9.
+    // The keys 1 to 9 select presets.
     let has_key = index < 9;
     let room = if has_key { 14.0 } else { 0.0 };
     let size = vec2((name.size().x + room + 20.0).min(ui.max_rect().width()), 28.0);

@@ -12,7 +12,7 @@ mod quality;
 mod source;
 mod view;
 
-pub use aperture::Thumbs;
+pub use aperture::Thumbnails;
 pub use looks::Editing;
 
 use egui::{Key, Ui};
@@ -21,24 +21,24 @@ use super::parts::{Number, button, choose, number, section, switch};
 use super::state::{Action, State};
 use bokehcam::look::{Effect, Look};
 
-/// What the sections read and change while they are drawn.
+/// Data that the sections read and change while they are drawn.
 pub struct Sheet<'a> {
-    /// The state as it is.
+    /// The current state.
     pub state: &'a State,
     /// A copy of the look, which the controls change.
     pub look: Look,
     /// The control that changed it, if any.
     pub stroke: Option<&'static str>,
-    /// Columns and rows of the picture.
+    /// Width and height of the picture, in pixels.
     pub size: (u32, u32),
-    /// What the person did other than change the look.
+    /// Collects actions other than look changes.
     pub actions: &'a mut Vec<Action>,
 }
 
 impl Sheet<'_> {
-    /// Remembers that the control `stroke` changed the look, if it did.
-    fn changed(&mut self, is: bool, stroke: &'static str) {
-        if is {
+    /// Records that the control `stroke` changed the look, if `has_changed`.
+    fn mark_changed(&mut self, has_changed: bool, stroke: &'static str) {
+        if has_changed {
             self.stroke = Some(stroke);
         }
     }
@@ -47,7 +47,7 @@ impl Sheet<'_> {
         self.actions.push(action);
     }
 
-    /// Draws a number of the look, which `set` changes; the number's name is the stroke.
+    /// Adds a number of the look, which `set` writes; its label is the undo stroke.
     fn number(&mut self, ui: &mut Ui, how: &Number<'static>, mut value: f32, set: impl FnOnce(&mut Look, f32)) {
         if number(ui, how, &mut value) {
             set(&mut self.look, value);
@@ -55,7 +55,7 @@ impl Sheet<'_> {
         }
     }
 
-    /// Draws options of the look side by side; `set` takes the one that is chosen.
+    /// Adds radio buttons for a setting of the look, which `set` writes.
     fn choose<T: PartialEq + Copy>(
         &mut self,
         ui: &mut Ui,
@@ -70,22 +70,22 @@ impl Sheet<'_> {
         }
     }
 
-    /// Draws a switch, which the action of its new state changes.
+    /// Adds a switch; a click triggers `act` with the new state.
     fn switch(&mut self, ui: &mut Ui, label: &str, hint: &str, on: bool, act: impl FnOnce(bool) -> Action) {
         if switch(ui, label, hint, on) {
             self.act(act(!on));
         }
     }
 
-    /// Draws a button that does this.
+    /// Adds a button that triggers `action`.
     fn button(&mut self, ui: &mut Ui, text: &str, hint: &str, action: Action) {
         if button(ui, text, hint) {
             self.act(action);
         }
     }
 
-    /// Whether Esc gives up what is asked here: nothing else is open over it.
-    fn gives_up(&self, ui: &Ui) -> bool {
+    /// Whether Esc cancels a dialog of the panel: no modal is open over it.
+    fn is_cancelled(&self, ui: &Ui) -> bool {
         !self.state.help && !self.state.closing && ui.input(|input| input.key_pressed(Key::Escape))
     }
 
@@ -93,7 +93,7 @@ impl Sheet<'_> {
         self.state.may_have_depth()
     }
 
-    /// Whether nothing of depth is known in metres.
+    /// Whether depth is relative, without metres.
     fn is_relative(&self) -> bool {
         self.state.known().is_relative
     }
@@ -103,30 +103,31 @@ impl Sheet<'_> {
     }
 }
 
-/// Draws the sections that the look and the source call for: the look, what pictures come from and go to, the window.
-pub fn show(ui: &mut Ui, sheet: &mut Sheet, editing: &mut Editing, thumbs: &mut Thumbs) {
+/// Draws the sections that apply to the look and the source, in the order look, input and output, window.
+pub fn show(ui: &mut Ui, sheet: &mut Sheet, editing: &mut Editing, thumbnails: &mut Thumbnails) {
     ui.add_space(4.0);
     looks::show(ui, sheet, editing);
     ui.add_space(2.0);
     effect::show(ui, sheet);
     if sheet.follows_depth() {
-        part(ui, sheet, "Focus", true, focus::show);
+        add_section(ui, sheet, "Focus", true, focus::show);
     }
+    // Sections without effect on the current look are omitted.
     let blurs = sheet.look.effect != Effect::None;
     if blurs {
-        part(ui, sheet, "Blur", true, blur::show);
-        part(ui, sheet, "Aperture", true, |ui, sheet| aperture::show(ui, sheet, thumbs));
+        add_section(ui, sheet, "Blur", true, blur::show);
+        add_section(ui, sheet, "Aperture", true, |ui, sheet| aperture::show(ui, sheet, thumbnails));
     }
     if sheet.follows_depth() {
-        part(ui, sheet, "Background", false, backdrop::show);
+        add_section(ui, sheet, "Background", false, backdrop::show);
     }
-    part(ui, sheet, "Source", true, source::show);
-    part(ui, sheet, "Record and call", true, output::show);
-    part(ui, sheet, "View", true, view::show);
+    add_section(ui, sheet, "Source", true, source::show);
+    add_section(ui, sheet, "Record and call", true, output::show);
+    add_section(ui, sheet, "View", true, view::show);
     if !sheet.state.controls.is_empty() {
-        part(ui, sheet, "Controls of the camera", false, source::controls);
+        add_section(ui, sheet, "Controls of the camera", false, source::controls);
     }
-    part(ui, sheet, "For experts", false, |ui, sheet| {
+    add_section(ui, sheet, "For experts", false, |ui, sheet| {
         view::internals(ui, sheet);
         if blurs {
             quality::show(ui, sheet);
@@ -135,8 +136,8 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet, editing: &mut Editing, thumbs: &mut 
     });
 }
 
-/// Draws a section: open or folded as the person left it, at first as `open` says.
-fn part(ui: &mut Ui, sheet: &mut Sheet, name: &'static str, open: bool, body: impl FnOnce(&mut Ui, &mut Sheet)) {
+/// Draws a section, folded as the user left it; `open` is the default.
+fn add_section(ui: &mut Ui, sheet: &mut Sheet, name: &'static str, open: bool, body: impl FnOnce(&mut Ui, &mut Sheet)) {
     let open = sheet.state.habits.sections.get(name).copied().unwrap_or(open);
     if section(ui, name, open, |ui| body(ui, sheet)) {
         sheet.act(Action::Section(name, !open));

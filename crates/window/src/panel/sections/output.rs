@@ -1,13 +1,13 @@
-//! Where pictures go besides the window.
+//! Outputs besides the window.
 
 use egui::Ui;
 
 use super::Sheet;
-use crate::panel::parts::{Hinted, list, path, remark};
+use crate::panel::parts::{Hinted, dropdown, path, remark};
 use crate::state::{Action, NO_VIRTUAL_CAMERA};
 use crate::texts::tr;
 
-/// The self-timer, the camera off, what is kept with a snapshot, the command, and which virtual camera.
+/// Adds the self-timer, camera off, snapshot options, the command line, and the virtual camera.
 pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
     let state = sheet.state;
     if let Some(output) = state.recording().filter(|output| !output.name.is_empty()) {
@@ -38,11 +38,12 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
     let cameras =
         state.virtual_cameras.iter().map(|camera| (camera.label.clone(), &camera.name[..], Some(&camera.name[..])));
     let all: Vec<_> = [off].into_iter().chain(cameras).collect();
+    // The active camera may have left the list: then its name is shown.
     let shown = all
         .iter()
         .find(|camera| camera.2 == current)
         .map_or_else(|| current.unwrap_or_default().to_owned(), |camera| camera.0.clone());
-    if let Some(camera) = list(ui, "Camera for calls", &shown, all, &current) {
+    if let Some(camera) = dropdown(ui, "Camera for calls", &shown, all, &current) {
         sheet.act(Action::VirtualCamera(camera.map(str::to_owned)));
     }
 }

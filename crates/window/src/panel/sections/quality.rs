@@ -1,13 +1,13 @@
-//! The quality of the blur.
+//! The quality level of the blur.
 
 use egui::Ui;
 
 use super::Sheet;
-use crate::panel::parts::list;
+use crate::panel::parts::dropdown;
 use crate::texts::tr;
 use bokehcam::budget::Quality;
 
-/// How good it is, and how long that may take.
+/// Adds the list of quality levels; automatic selection follows the time budget.
 pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
     let name = |quality: Option<Quality>| match quality {
         None => tr("Auto: as the time allows").to_owned(),
@@ -16,8 +16,8 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
     ui.label(tr("Quality"));
     let quality = sheet.look.quality;
     let levels = [None].into_iter().chain(Quality::ALL.map(Some)).map(|level| (name(level), "", level));
-    if let Some(quality) = list(ui, "Quality", &name(quality), levels, &quality) {
+    if let Some(quality) = dropdown(ui, "Quality", &name(quality), levels, &quality) {
         sheet.look.quality = quality;
-        sheet.changed(true, "quality");
+        sheet.mark_changed(true, "quality");
     }
 }

@@ -3,13 +3,13 @@
 use egui::Ui;
 
 use super::Sheet;
-use crate::panel::parts::{Number, choose, list, number, remark, switch};
+use crate::panel::parts::{Number, choose, dropdown, number, remark, switch};
 use crate::services::Browse;
 use crate::state::{Action, Source, Way};
 use crate::texts::{tr, tr_with};
 use bokehcam::knob::Knob;
 
-/// The ways to depth, with a hint.
+/// The depth methods with their tooltips.
 const WAYS: [(&str, &str, Way); 5] = [
     ("Measured", "By a depth camera, or as it was recorded", Way::Measured),
     ("Two eyes", "What two cameras side by side see", Way::Stereo),
@@ -18,7 +18,7 @@ const WAYS: [(&str, &str, Way); 5] = [
     ("Empty room", "A picture of the room without you: step out for four seconds (T)", Way::Plate),
 ];
 
-/// What is known of the source, where its depth comes from, and ways to open others.
+/// Adds the source's properties, its depth methods, and buttons to open another source.
 pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
     let state = sheet.state;
     match &state.source {
@@ -39,6 +39,7 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
                 },
             );
             let ways: Vec<_> = WAYS.into_iter().filter(|(.., way)| running.ways.contains(way)).collect();
+            // Offered only if there is a choice: several methods, or one that is off.
             if ways.len() > 1 || running.way.is_none() && !ways.is_empty() {
                 ui.label(tr("Depth from"));
                 let chosen = choose(
@@ -68,14 +69,14 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
     });
 }
 
-/// What blurs.
+/// Adds a description of the executor that blurs.
 pub fn executor(ui: &mut Ui, sheet: &Sheet) {
     if let Source::Running(running) = &sheet.state.source {
         remark(ui, &running.executor);
     }
 }
 
-/// The camera's sizes and rates.
+/// Adds lists of the camera's frame sizes and rates.
 fn modes(ui: &mut Ui, sheet: &mut Sheet) {
     let (state, Source::Running(running)) = (sheet.state, &sheet.state.source) else { return };
     let Some(mode) = state.camera.modes.iter().find(|mode| mode.size == running.size) else { return };
@@ -90,10 +91,10 @@ fn modes(ui: &mut Ui, sheet: &mut Sheet) {
     let [size, rate] = ui
         .horizontal(|ui| {
             ui.spacing_mut().combo_width = (ui.available_width() - 6.0) / 2.0;
-            let size = list(ui, "Size", &size_text(mode.size), sizes, &mode.size);
+            let size = dropdown(ui, "Size", &size_text(mode.size), sizes, &mode.size);
             let size = size.and_then(|size| state.camera.modes.iter().find(|mode| mode.size == size));
             let size = size.map(|mode| (mode.size, nearest(&mode.fps).unwrap_or(now_fps)));
-            [size, list(ui, "Frame rate", &fps_text(now_fps), rates, &rate).map(|fps| (mode.size, fps))]
+            [size, dropdown(ui, "Frame rate", &fps_text(now_fps), rates, &rate).map(|fps| (mode.size, fps))]
         })
         .inner;
     if let Some((size, fps)) = size.or(rate) {
@@ -101,7 +102,7 @@ fn modes(ui: &mut Ui, sheet: &mut Sheet) {
     }
 }
 
-/// The camera's own controls.
+/// Adds the camera's driver controls.
 pub fn controls(ui: &mut Ui, sheet: &mut Sheet) {
     let state = sheet.state;
     for control in &state.controls {
@@ -112,7 +113,7 @@ pub fn controls(ui: &mut Ui, sheet: &mut Sheet) {
     }
 }
 
-/// Draws a control of the camera: a switch, a menu or a number. Its new value, if it was changed.
+/// Adds a driver control as a switch, a menu or a number. Returns its new value if it changed.
 fn knob(ui: &mut Ui, control: &Knob) -> Option<i64> {
     let label = title(&control.name);
     let hint = format!("--control {}={}", control.name, control.value);
@@ -124,21 +125,21 @@ fn knob(ui: &mut Ui, control: &Knob) -> Option<i64> {
         let text = chosen.map_or("?", |(_, name)| name.as_str());
         ui.label(&label);
         let options = control.menu.iter().map(|(value, name)| (name.clone(), "", *value));
-        return list(ui, &label, text, options, &control.value);
+        return dropdown(ui, &label, text, options, &control.value);
     }
-    let (least, most, step) = control.range;
+    let (min, max, step) = control.range;
     let mut value = control.value as f32;
-    let range = least as f32..=(most.max(least)) as f32;
+    let range = min as f32..=(max.max(min)) as f32;
     if !number(ui, &Number::new(&label, &hint, range, 0), &mut value) {
         return None;
     }
-    // The driver takes only whole steps from the least value.
-    let steps = ((f64::from(value) - least as f64) / step.max(1) as f64).round() as i64;
-    let value = least.saturating_add(steps.saturating_mul(step.max(1)));
+    // Drivers accept only multiples of the step from the minimum.
+    let steps = ((f64::from(value) - min as f64) / step.max(1) as f64).round() as i64;
+    let value = min.saturating_add(steps.saturating_mul(step.max(1)));
     (value != control.value).then_some(value)
 }
 
-/// `exposure_auto_priority` as a person would write it.
+/// Returns a control's name in readable form: `exposure_auto_priority` becomes "Exposure auto priority".
 fn title(name: &str) -> String {
     let mut letters = name.chars().map(|c| if c == '_' { ' ' } else { c });
     letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())

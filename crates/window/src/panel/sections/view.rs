@@ -1,4 +1,4 @@
-//! What of a frame is shown.
+//! The displayed view of a frame.
 
 use egui::Ui;
 
@@ -17,7 +17,7 @@ const INTERNALS: Views = [
     ("Layers", "The layers that are blurred on their own (N)", Shown::Bins),
 ];
 
-/// Draws views to choose from; one that is shown already is left for the picture.
+/// Adds radio buttons for views; clicking the active one returns to the picture.
 fn choose_view(ui: &mut Ui, sheet: &mut Sheet, what: &str, views: Views) {
     let (now, has_depth) = (sheet.state.shown, sheet.has_depth());
     if let Some(shown) = choose(ui, what, &views, now, |shown| has_depth || shown != Shown::Depth) {
@@ -25,13 +25,13 @@ fn choose_view(ui: &mut Ui, sheet: &mut Sheet, what: &str, views: Views) {
     }
 }
 
-/// What the blur is made of, and the instruments.
+/// Adds the views of the blur's internals, and the instruments.
 pub fn internals(ui: &mut Ui, sheet: &mut Sheet) {
     choose_view(ui, sheet, "Show of the blur", INTERNALS);
     sheet.switch(ui, "Instruments", "Times, rates and drops (I)", sheet.state.instruments, Action::Instruments);
 }
 
-/// The view, and how it is shown.
+/// Adds the view, and options for its display.
 pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
     let state = sheet.state;
     choose_view(ui, sheet, "Show", VIEWS);

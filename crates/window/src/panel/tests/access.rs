@@ -1,4 +1,4 @@
-//! What a screen reader is told of the controls.
+//! Accessibility: the names and states that a screen reader gets.
 
 use egui::Role;
 use egui::accesskit::{Node, NodeId, Toggled};
@@ -7,7 +7,7 @@ use super::super::super::state::State;
 use super::{Window, sample};
 use bokehcam::look::{Effect, Strength};
 
-/// The tree of a window, as a screen reader gets it.
+/// The accessibility tree of a window.
 struct Tree(Vec<(NodeId, Node)>);
 
 impl Tree {
@@ -27,7 +27,7 @@ impl Tree {
         Self(update.nodes)
     }
 
-    /// What a control is called: by itself, or by another control beside it.
+    /// Returns a control's accessible name, from its own label or a label widget.
     fn name(&self, node: &Node) -> Option<String> {
         let own = node.label().map(str::to_owned);
         let beside = node.labelled_by().iter().find_map(|id| {

@@ -1,4 +1,4 @@
-//! What covers the window for a while: the help, and the question before it closes.
+//! Modals over the window: the help, and the dialog that confirms closing.
 
 use egui::{Event, Key, Modifiers, pos2};
 
@@ -23,7 +23,7 @@ fn closing_asks_once_while_something_is_recorded() {
     window.press(Key::Q, Modifiers::NONE);
     window.wait(0.2);
     assert!(window.place_of("Stop recording and close?").is_some());
-    // It keeps its keys and clicks to itself.
+    // It captures keys and clicks.
     let look = window.state.look.clone();
     for key in [Key::M, Key::Num2, Key::OpenBracket, Key::V] {
         window.press(key, Modifiers::NONE);
@@ -83,7 +83,7 @@ fn it_does_not_ask_who_said_so_nor_when_nothing_would_be_lost() {
     assert!(!window.state.closing && window.state.habits.ask_before_closing, "who does not close has decided nothing");
     window.state.apply(Action::Close);
     window.wait(0.2);
-    // Enter loses nothing.
+    // Enter activates the safe choice.
     window.press(Key::Enter, Modifiers::NONE);
     assert!(!window.state.closing);
     window.state.apply(Action::Close);
@@ -94,7 +94,7 @@ fn it_does_not_ask_who_said_so_nor_when_nothing_would_be_lost() {
     let mut state = recording();
     state.apply(Action::Close);
     assert!(state.closing);
-    state.hear(crate::state::Update::Outputs(Vec::new()));
+    state.apply_update(crate::state::Update::Outputs(Vec::new()));
     assert!(!state.closing, "the recording has ended by itself");
 }
 

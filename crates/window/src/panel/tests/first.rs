@@ -1,4 +1,4 @@
-//! The first screen: few controls, all of them whole, beside the picture or below it.
+//! The first screen: few controls, all fully visible, beside the picture or below it.
 
 use std::collections::HashMap;
 
@@ -11,7 +11,7 @@ use crate::state::{Output, Source, State, Way};
 use crate::texts;
 use bokehcam::look::Effect;
 
-/// Sizes of windows, and of pictures.
+/// Sizes of windows.
 const WINDOWS: [(u32, u32); 7] =
     [(1280, 720), (1920, 1200), (800, 600), (640, 480), (500, 700), (480, 320), (360, 640)];
 
@@ -21,7 +21,7 @@ fn first() -> State {
     state
 }
 
-/// What a screen reader can work with: roles, names, places in points.
+/// Returns the accessible controls: roles, names, and rectangles in points.
 fn controls(window: &mut Window) -> Vec<(Role, String, Rect)> {
     window.ctx.enable_accesskit();
     window.pass(Vec::new());
@@ -82,7 +82,7 @@ fn they_do_what_they_say() {
 #[test]
 fn without_depth_the_switch_asks_how_it_may_be_known() {
     let mut state = first();
-    state.hear(crate::state::Update::Source(sample::running(false)));
+    state.apply_update(crate::state::Update::Source(sample::running(false)));
     assert_eq!(state.look.effect, Effect::Blur, "nobody knows whom to keep sharp");
     state.declined_plate = true;
     let mut window = Window::of(state, (1280, 720));
@@ -108,7 +108,7 @@ fn the_panel_is_never_on_the_picture() {
             }
         }
     }
-    // A tall window has it below, a wide one beside, and where the picture leaves room nothing is lost.
+    // Below in a tall window, beside in a wide one, without cost where the picture leaves room.
     let dock = |width: f32, height: f32, picture| {
         Dock::of(Rect::from_min_size(pos2(0.0, 0.0), egui::vec2(width, height)), picture, false)
     };
@@ -133,7 +133,7 @@ fn messages_and_badges_are_in_the_pictures_room() {
     }
 }
 
-/// The languages that come with the program.
+/// Returns the built-in German translation.
 fn german() -> texts::Table {
     texts::built_in("de").expect("German")
 }
@@ -164,7 +164,7 @@ fn in_german_nothing_is_cut_off_at_any_size() {
             running.ways = vec![Way::Measured, Way::Stereo, Way::Person, Way::PersonAndDistance, Way::Plate];
             state.look.strength = bokehcam::look::Strength::Lens(crate::state::tweak::LENS);
             (state.mirror, state.split) = (true, Some(0.5));
-            // All of it at once, as far as the panel goes down.
+            // As much as fits the panel's height.
             let mut window = Window::of(state, size);
             window.wait(0.5);
             let panel = window.panel.sheet.rect().expect("the panel");

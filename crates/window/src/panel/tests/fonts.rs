@@ -1,4 +1,4 @@
-//! Names in scripts that the program's own fonts lack.
+//! Characters in scripts that the built-in fonts lack.
 
 use std::path::Path;
 use std::process::Command;
@@ -19,7 +19,7 @@ fn signs_of_other_scripts_come_from_the_systems_fonts_once_a_name_has_them() {
     if Command::new("fc-match").arg("--version").output().is_err() {
         return eprintln!("left out, as fc-match is not installed");
     }
-    // A configuration of fontconfig's with one font, of three signs.
+    // A fontconfig configuration with a single font of three characters.
     let folder = tempfile::tempdir().unwrap();
     let config = folder.path().join("fonts.conf");
     let fonts = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fonts");
@@ -31,11 +31,11 @@ fn signs_of_other_scripts_come_from_the_systems_fonts_once_a_name_has_them() {
     std::fs::write(&config, text).unwrap();
 
     let mut window = Window::new();
-    let (tell, told) = mpsc::channel();
-    let system = SystemFonts::with(Some(config), move || tell.send(()).unwrap_or_default());
+    let (sender, receiver) = mpsc::channel();
+    let system = SystemFonts::with_config(Some(config), move || sender.send(()).unwrap_or_default());
     system.install(&window.ctx);
     window.wait(0.2);
-    assert!(told.try_recv().is_err(), "nothing is looked for before it is missed");
+    assert!(receiver.try_recv().is_err(), "nothing is looked for before it is missed");
     let has = |window: &Window, sign: char| {
         let families = [FontFamily::Proportional, super::super::theme::medium()];
         window.ctx.fonts_mut(|fonts| families.map(|family| fonts.has_glyph(&FontId::new(13.0, family), sign)))
@@ -44,7 +44,7 @@ fn signs_of_other_scripts_come_from_the_systems_fonts_once_a_name_has_them() {
     let Source::Running(running) = &mut window.state.source else { unreachable!() };
     running.label = "ДΩ中한".into();
     window.pass(Vec::new());
-    told.recv_timeout(PATIENCE).expect("fonts are found");
+    receiver.recv_timeout(PATIENCE).expect("fonts are found");
     system.install(&window.ctx);
     window.wait(0.1);
     for sign in "ДΩ中".chars() {

@@ -1,4 +1,4 @@
-//! What one does to the picture.
+//! Gestures on the picture.
 
 use egui::{Event, Modifiers, Pos2, pos2};
 
@@ -11,7 +11,7 @@ use bokehcam::look::Effect;
 fn a_click_focuses_there() {
     let mut window = Window::new();
     assert!(close(point(&window.click(pos2(320.0, 180.0))), [0.25, 0.25]));
-    // In a mirror, left is right.
+    // Mirrored, left is right.
     window.wait(1.0);
     window.state.mirror = true;
     assert!(close(point(&window.click(pos2(320.0, 540.0))), [0.75, 0.75]));
@@ -19,7 +19,7 @@ fn a_click_focuses_there() {
 
 #[test]
 fn a_click_is_where_the_picture_is() {
-    // A window with borders, of a display with twice the pixels, and larger text.
+    // A letterboxed picture on a display with twice the pixel density, and larger text.
     let mut window = Window::new();
     window.native = 2.0;
     window.canvas.area = Area { x: 100, y: 60, width: 800, height: 450 };

@@ -1,4 +1,4 @@
-//! The panel by keyboard alone, and when it hides.
+//! The panel by keyboard alone, and automatic hiding.
 
 use std::collections::HashSet;
 
@@ -15,23 +15,23 @@ use bokehcam::optics::Lens;
 fn every_key_reaches_the_window() {
     for (group, binding) in GROUPS.iter().flat_map(|group| group.bindings.iter().map(move |b| (group.name, b))) {
         let mut window = Window::new();
-        // Something to undo and to redo, and some range to take back.
+        // Something to undo, to redo and to reset.
         window.state.look.focus_range_m = 0.5;
         window.state.look.focus = FocusRule::Metres(2.0);
-        // A recording to go back and forth in.
+        // A recording, to seek in.
         window.state.transport = Some(Transport { frames: 9, ..Transport::default() });
         for chord in binding.chords.iter().take(6) {
             let mut modifiers = if chord.ctrl { Modifiers::CTRL | Modifiers::COMMAND } else { Modifiers::NONE };
             modifiers.shift = chord.shift;
             let actions = window.press(chord.key, modifiers);
             let done = actions.iter().any(|action| *action != Action::Settle);
-            // The panel's own key is pressed twice: Esc then has nothing to close.
+            // The panel's own key is pressed twice, so Esc then has nothing to close.
             assert!(done || chord.key == Key::Escape, "{group}: {} gave {actions:?}", binding.keys);
         }
     }
 }
 
-/// All that can be focused, by pressing Tab until it comes round.
+/// Returns the number of Tab stops, by pressing Tab until the focus repeats.
 fn stops(window: &mut Window) -> usize {
     let mut seen = HashSet::new();
     for _ in 0..400 {
@@ -51,7 +51,7 @@ fn tab_reaches_the_controls() {
     let mut window = Window::new();
     let all = stops(&mut window);
     assert!(all > 40, "only {all}");
-    // Without frames there is a button more, and fewer presets are no stops.
+    // Without frames there is one more button, and more presets are Tab stops.
     window.state.source = Source::Lost("gone".into());
     assert!(stops(&mut window) > all);
 }
@@ -64,20 +64,20 @@ fn a_control_in_focus_is_worked_by_the_keyboard() {
         window.press(Key::Tab, Modifiers::NONE);
         let focused = window.ctx.memory(|memory| memory.focused());
         done.extend(window.press(Key::ArrowRight, Modifiers::NONE));
-        // Where a control has no use for it, an arrow goes to another one.
+        // Controls without use for an arrow key move the focus: restore it.
         focused.into_iter().for_each(|id| window.ctx.memory_mut(|memory| memory.request_focus(id)));
-        // What is given up takes the focus with it.
+        // Cancelling a dialog would remove the focused field.
         if window.place_of("Cancel").is_some() {
             continue;
         }
         let before = window.state.clone();
         done.extend(window.press(Key::Space, Modifiers::NONE));
-        // What closes the panel, folds it or can be undone is as it was.
+        // Restores whatever closes or folds the panel, or can be undone.
         let state = &mut window.state;
         (state.panel, state.help, state.habits) = (before.panel, before.help, before.habits);
         (state.history, state.look) = (before.history, before.look);
         window.pass(Vec::new());
-        // What closed the panel took the focus with it.
+        // Closing the panel removed the focus: restore it.
         if window.ctx.memory(|memory| memory.focused().is_none()) {
             focused.into_iter().for_each(|id| window.ctx.memory_mut(|memory| memory.request_focus(id)));
         }
@@ -87,7 +87,7 @@ fn a_control_in_focus_is_worked_by_the_keyboard() {
 }
 
 impl Window {
-    /// Presses Tab until the focus is on what has this text.
+    /// Presses Tab until the focus is on the control with this text.
     fn tab_to(&mut self, text: &str) {
         let has_it = |_: &usize| {
             self.press(Key::Tab, Modifiers::NONE);
@@ -115,7 +115,7 @@ fn arrows_choose_among_options_as_in_any_group() {
     assert_eq!(window.ctx.memory(|memory| memory.focused()), last, "at the end it stays");
     window.press(Key::ArrowLeft, Modifiers::NONE);
     assert!(matches!(window.state.look.focus, FocusRule::Point { .. }));
-    // Presets and apertures are such groups, too.
+    // Presets and apertures are radio groups as well.
     window.tab_to("Cinematic");
     assert_eq!(window.press(Key::ArrowRight, Modifiers::NONE), [Action::Preset("dreamy".into())]);
     assert_eq!(window.press(Key::ArrowRight, Modifiers::NONE), [Action::Preset("product".into())]);
@@ -125,7 +125,7 @@ fn arrows_choose_among_options_as_in_any_group() {
 fn tab_alone_changes_nothing() {
     let mut window = Window::new();
     window.state.focus_m = Some(1.2345);
-    // Numbers that are shown rounded.
+    // Values that are displayed rounded.
     let look = &mut window.state.look;
     (look.strength, look.focus_range_m) = (Strength::Percent(2.2468), 0.1234);
     (look.aperture.intensity, look.rim, look.highlights) = (0.1234, 0.1234, 3.4567);
@@ -160,7 +160,7 @@ fn a_name_is_typed_whatever_way_it_is_asked_for_and_presses_no_keys() {
                 (window.state.panel, window.state.help) = (true, false);
                 window.state.apply(Action::Section("More", true));
                 window.wait(0.1);
-                // What closed the panel took the focus with it.
+                // Closing the panel removed the focus: restore it.
                 if window.ctx.memory(|memory| memory.focused().is_none()) {
                     focused.into_iter().for_each(|id| window.ctx.memory_mut(|memory| memory.request_focus(id)));
                 }
@@ -221,7 +221,7 @@ fn the_panel_scrolls_to_what_has_the_focus() {
     assert!(scrolled > 0, "nothing was ever at the end of the panel");
 }
 
-/// Whether the panel is seen: whether a click in its place reaches something else than the picture.
+/// Whether the panel is visible: whether a click in its place hits a layer above the picture.
 fn is_seen(window: &Window) -> bool {
     window.ctx.layer_id_at(on_panel()).is_some_and(|layer| layer.order != egui::Order::Background)
 }
@@ -250,7 +250,7 @@ fn in_full_screen_the_panel_hides_itself_and_comes_back() {
     window.pass(vec![Event::PointerMoved(pos2(300.0, 300.0))]);
     window.wait(5.0);
     assert!(!is_seen(&window));
-    // While one of its controls has the focus, it stays, too.
+    // While one of its controls has the focus, it stays as well.
     window.press(Key::Tab, Modifiers::NONE);
     window.wait(20.0);
     assert!(is_seen(&window));

@@ -1,11 +1,11 @@
-//! Pictures of the window in several states, to look at, and contrasts, to compute.
+//! Screenshots of the window in several states, for inspection, and contrast checks.
 
 use std::path::Path;
 
 use egui::{Color32, Event, Key, Modifiers, Theme, pos2};
 
 use super::{Window, button, pressed, scrolled};
-use crate::panel::theme::{Colors, rung};
+use crate::panel::theme::{Colors, quality_color};
 use crate::present::soft::Painter;
 use crate::present::{Controls, Drawing, Image};
 use crate::state::{Action, Source, State, Transport, sample};
@@ -15,7 +15,7 @@ use bokehcam::frame::ColorImage;
 use bokehcam::look::Effect;
 use bokehcam::recording::still::{read_color, write_color};
 
-/// The picture as large as the window.
+/// Returns a test picture in the given size.
 fn backdrop((width, height): (u32, u32)) -> ColorImage {
     let recorded = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../recordings/portrait/rgb/000000.png"));
     let source = read_color(recorded).unwrap();
@@ -23,7 +23,7 @@ fn backdrop((width, height): (u32, u32)) -> ColorImage {
     for y in 0..height {
         for x in 0..width {
             let from = |at: u32, of: u32, to: u32| (at * to / of) as usize;
-            // As much of it as has the window's shape.
+            // Crops to the window's aspect ratio.
             let rows = (source.width * height / width).min(source.height);
             let row = from(y, height, rows) + (source.height - rows) as usize / 2;
             let pixel = (row * source.width as usize + from(x, width, source.width)) * 3;
@@ -34,7 +34,7 @@ fn backdrop((width, height): (u32, u32)) -> ColorImage {
     image
 }
 
-/// A window, and what draws it from its first pass on.
+/// A window and its painter, fed from the first pass on because textures are incremental.
 struct Seen {
     window: Window,
     painter: Painter,
@@ -90,7 +90,7 @@ fn pictures() {
     let shot = |name: &str, theme: Theme, change: &dyn Fn(&mut State)| Seen::new(theme, size, change).save(name);
     shot("dark", Theme::Dark, &|_| {});
     shot("light", Theme::Light, &|_| {});
-    // The first screen, and more, in sizes of windows and languages.
+    // The first screen, folded and expanded, in several window sizes and languages.
     for (language, table) in [("en", None), ("de", crate::texts::built_in("de"))] {
         table.into_iter().for_each(crate::texts::speak);
         for size in [(1280, 720), (500, 700), (480, 320)] {
@@ -109,7 +109,7 @@ fn pictures() {
     crate::texts::speak(crate::texts::Table::new());
     shot("instruments", Theme::Dark, &|state| {
         state.instruments = true;
-        state.meters.fill_for_looks();
+        state.meters.fill_with_samples();
         state.split = Some(0.4);
         state.note("Saved snapshot-0001.png");
     });
@@ -124,7 +124,7 @@ fn pictures() {
         state.apply(Action::Record(true));
         state.apply(Action::VirtualCamera(Some("/dev/video9".into())));
     });
-    // From the offer to the portrait.
+    // From the offer of depth methods to the capture.
     for (name, step) in [("offer", None), ("step-out", Some(Step::StepOut(3))), ("taking", Some(Step::Taking(60)))] {
         shot(&format!("plate-{name}"), Theme::Dark, &|state| {
             (state.source, state.plate, state.panel) = (sample::running(false), step, false);
@@ -152,15 +152,15 @@ fn pictures() {
         state.panel = false;
     });
     shot("coc", Theme::Light, &|state| {
-        state.legend = Some(Legend::Coc { most_px: 43.0 });
+        state.legend = Some(Legend::Coc { max_px: 43.0 });
         state.panel = false;
     });
     shot("bins", Theme::Dark, &|state| {
-        let mut high_px = [f32::INFINITY; crate::views::MOST_BINS];
+        let mut high_px = [f32::INFINITY; crate::views::MAX_BINS];
         high_px[..4].copy_from_slice(&[-9.0, -2.5, 2.0, 11.5]);
         state.legend = Some(Legend::Bins { count: 5, high_px });
         state.instruments = true;
-        state.meters.fill_for_looks();
+        state.meters.fill_with_samples();
     });
     let mut seen = Seen::new(Theme::Dark, size, |state| {
         state.look.aperture.shape =
@@ -180,7 +180,7 @@ fn pictures() {
     seen.save("clicked");
 }
 
-/// Relative luminance (WCAG 2) of an sRGB colour, 0 to 255.
+/// Returns the relative luminance (WCAG 2) of an sRGB colour, 0 to 255 per channel.
 fn luminance(color: [f32; 3]) -> f32 {
     let [r, g, b] = color.map(|channel| {
         let value = channel / 255.0;
@@ -194,7 +194,7 @@ fn contrast(text: [f32; 3], behind: [f32; 3]) -> f32 {
     (a.max(b) + 0.05) / (a.min(b) + 0.05)
 }
 
-/// A colour over a grey picture, as it comes out.
+/// Composites a colour over a grey picture.
 fn over(color: Color32, grey: u8) -> [f32; 3] {
     let [r, g, b, a] = color.to_array().map(f32::from);
     [r, g, b].map(|channel| channel + f32::from(grey) * (1.0 - a / 255.0))
@@ -214,7 +214,7 @@ fn text_can_be_read_over_any_picture() {
                 assert!(contrast >= 4.5, "{theme:?} {name} over {picture}: {contrast}");
             }
             for quality in [None].into_iter().chain(bokehcam::budget::Quality::ALL.map(Some)) {
-                let contrast = contrast(solid(rung(quality, theme).0), card);
+                let contrast = contrast(solid(quality_color(quality, theme).0), card);
                 assert!(contrast >= 4.5, "{theme:?} {quality:?} over {picture}: {contrast}");
             }
         }

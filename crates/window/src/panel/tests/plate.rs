@@ -1,4 +1,4 @@
-//! What is said of the source at the bottom: the plate, and that it is a demonstration.
+//! Cards about the source: the background plate, and the demonstration notice.
 
 use super::super::super::state::{Source, State, Way, sample};
 use super::Window;

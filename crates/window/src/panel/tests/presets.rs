@@ -1,4 +1,4 @@
-//! One's own presets: saved, replaced, renamed, deleted; and what is typed.
+//! User presets: save, replace, rename, delete; and typed numbers.
 
 use egui::{Event, Key, Modifiers};
 
@@ -9,7 +9,7 @@ fn done(actions: Vec<Action>) -> Vec<Action> {
 }
 
 impl Window {
-    /// Clicks on what has this text.
+    /// Clicks on the control with this text.
     #[track_caller]
     pub fn click_on(&mut self, text: &str) -> Vec<Action> {
         let at = self.place_of(text).unwrap_or_else(|| panic!("{text} is not in {:?}", self.texts()));
@@ -18,7 +18,7 @@ impl Window {
         done(actions)
     }
 
-    /// Types over what is in the field.
+    /// Replaces the text in the focused field.
     pub fn type_over(&mut self, text: &str) {
         self.pass(vec![pressed(Key::A, Modifiers::CTRL | Modifiers::COMMAND, true)]);
         self.pass(vec![Event::Text(text.into())]);
@@ -41,7 +41,7 @@ fn a_preset_of_the_same_name_is_replaced_only_by_the_button_that_says_so() {
     assert_eq!(window.enter(), []);
     assert_eq!(window.click_on("Replace"), [Action::SavePreset("my desk".into())]);
     assert!(window.place_of("Replace").is_none());
-    // A built-in one is refused where it is saved.
+    // A built-in preset's name is rejected when saving.
     window.click_on("Save as…");
     window.type_over("mine");
     assert_eq!(window.enter(), [Action::SavePreset("mine".into())]);
@@ -81,7 +81,7 @@ fn escape_gives_up_what_is_asked_and_closes_nothing_else() {
     escape(&mut window);
     assert!(window.place_of("Delete").is_none());
     window.click_on("Save as…");
-    // The help is over it, and goes first.
+    // The help is above it, and closes first.
     window.state.help = true;
     window.wait(0.2);
     escape(&mut window);

@@ -1,4 +1,4 @@
-//! The panel's sections: their order, what is folded, the way back, and one ring for the focus.
+//! The panel's sections: their order and folding, reopening the panel, and a single focus ring.
 
 use std::sync::Arc;
 
@@ -45,7 +45,7 @@ fn what_is_behind_is_a_colour_or_a_picture_that_is_asked_for() {
         let list = window.places().into_iter().find(|(text, _)| text.starts_with("Background: ")).unwrap().1;
         window.click(list);
         window.wait(0.2);
-        // The list lies over all else, and is drawn last.
+        // The popup is above everything else, and is drawn last.
         let at = window.places().into_iter().rev().find(|(text, _)| text == kind).unwrap().1;
         let done = window.click(at);
         window.wait(0.2);
@@ -56,9 +56,8 @@ fn what_is_behind_is_a_colour_or_a_picture_that_is_asked_for() {
     choose(&mut window, "Colour");
     assert!(matches!(window.state.look.behind, Behind::Color(_)));
     let wall = Behind::Picture(Arc::new(BehindPicture { file: Some("wall.jpg".into()), image: ColorImage::new(2, 2) }));
-    assert!(
-        matches!(window.state.hear(Update::Behind(wall.clone())), Some(Request::Look(look)) if look.behind == wall)
-    );
+    let request = window.state.apply_update(Update::Behind(wall.clone()));
+    assert!(matches!(request, Some(Request::Look(look)) if look.behind == wall));
     window.wait(0.1);
     assert!(window.place_of("wall.jpg").is_some());
     assert_eq!(window.click_on("Choose picture…"), [Action::Browse(Browse::Behind)]);
@@ -94,7 +93,7 @@ fn its_first_seconds_count_from_the_first_picture() {
     assert!(window.place_of("Use in calls").is_none());
 }
 
-/// The rectangles that are drawn with a stroke as wide as the ring's.
+/// Counts the rectangles drawn with the ring's stroke.
 fn rings(window: &mut Window) -> usize {
     let (_, output) = window.pass_with_output(Vec::new());
     let color = super::super::theme::Colors::of(window.ctx.theme()).text;

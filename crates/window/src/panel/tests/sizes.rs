@@ -1,4 +1,4 @@
-//! Windows of all sizes, texts of all sizes, everything open: nothing panics, and nothing is nowhere.
+//! Windows and texts of all sizes, with everything open: nothing panics, and nothing is out of sight.
 
 use egui::Rect;
 
@@ -11,14 +11,14 @@ fn states() -> Vec<State> {
     let base = sample::state();
     let mut all = vec![base.clone()];
     let mut full = base.clone();
-    full.meters.fill_for_looks();
+    full.meters.fill_with_samples();
     (full.instruments, full.help, full.split) = (true, true, Some(0.5));
     full.legend = Some(Legend::Depth { near_m: 0.5, far_m: 0.50001 });
     full.note("A long line for the person ".repeat(30));
     all.push(full);
     let mut tilt = base.clone();
     (tilt.look.effect, tilt.mirror, tilt.source) = (Effect::TiltShift, true, sample::running(false));
-    tilt.legend = Some(Legend::Coc { most_px: 0.0 });
+    tilt.legend = Some(Legend::Coc { max_px: 0.0 });
     all.push(tilt);
     let mut off = base.clone();
     (off.look.effect, off.shown, off.source) = (Effect::None, state::Shown::Bins, Source::Lost("why ".repeat(200)));
@@ -57,7 +57,7 @@ fn the_panel_is_within_the_window() {
     }
 }
 
-/// What is done to a window, and what then has to be seen in it.
+/// A change of the state, and the texts that must be visible then.
 type Shown<'a> = (&'a dyn Fn(&mut State), &'a [&'a str]);
 
 #[test]
@@ -111,7 +111,7 @@ fn the_scroll_bar_covers_no_control() {
     let mut window = Window::new();
     window.wait(0.3);
     let panel = window.panel.sheet.rect().unwrap();
-    // Over the bar, which is at its widest then.
+    // Hovering the bar makes it its widest.
     window.pass(vec![egui::Event::PointerMoved(panel.right_center() - egui::vec2(16.0, -40.0))]);
     window.wait(0.5);
     let (_, output) = window.pass_with_output(Vec::new());
@@ -129,7 +129,7 @@ fn the_scroll_bar_covers_no_control() {
         window.wait(0.1);
         let Some(id) = window.ctx.memory(|memory| memory.focused()) else { continue };
         let rect = window.ctx.read_response(id).unwrap().rect;
-        // The buttons beside the title are above it.
+        // The buttons next to the title are above the bar.
         if rect.top() > panel.top() + 60.0 {
             assert!(rect.right() <= left, "{rect} under the bar at {left}");
             seen += 1;
@@ -143,7 +143,7 @@ fn where_a_control_is_scrolled_out_of_sight_it_gives_no_hint() {
     let mut window = Window::of(sample::state(), (1280, 500));
     window.pass(vec![egui::Event::PointerMoved(super::on_panel())]);
     window.wait(0.5);
-    // What is scrolled begins under the panel's margin.
+    // The scroll area begins below the panel's margin.
     let top = window.panel.sheet.rect().unwrap().top() + crate::panel::theme::PAD;
     let scroll = |window: &mut Window, by: f32| {
         window.pass(vec![super::scrolled(egui::MouseWheelUnit::Point, by, egui::Modifiers::NONE)]);
@@ -180,7 +180,7 @@ fn in_the_instruments_no_text_runs_over_another() {
     for text_scale in [1.0, 1.6] {
         let mut state = sample::state();
         (state.instruments, state.panel, state.habits.text_scale) = (true, false, text_scale);
-        state.meters.fill_for_looks();
+        state.meters.fill_with_samples();
         let mut window = Window::of(state, (1280, 720));
         window.wait(0.5);
         let texts = window.boxes();

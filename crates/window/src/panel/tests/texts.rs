@@ -1,4 +1,4 @@
-//! The table of texts: complete, without what is not there, and used for all that is drawn.
+//! The table of texts: complete, without unused entries, and used for everything that is drawn.
 
 use std::path::Path;
 
@@ -11,7 +11,7 @@ use bokehcam::depth::backdrop::Behind;
 use bokehcam::depth::plate::Step;
 use bokehcam::look::{Effect, Follow, Strength};
 
-/// Windows that together show about all that can be shown.
+/// Creates windows that together show nearly every text.
 fn windows() -> Vec<Window> {
     let changes: [&dyn Fn(&mut State); 17] = [
         &|_| {},
@@ -49,19 +49,19 @@ fn windows() -> Vec<Window> {
         },
         &|state| {
             (state.closing, state.frozen, state.instruments) = (true, true, true);
-            state.meters.fill_for_looks();
+            state.meters.fill_with_samples();
         },
         &|state| {
             (state.source, state.legend) = (sample::running(false), Some(Legend::Depth { near_m: 0.5, far_m: 5.0 }))
         },
         &|state| {
             (state.source, state.plate) = (sample::running(false), Some(Step::Unlike));
-            state.legend = Some(Legend::Coc { most_px: 9.0 });
+            state.legend = Some(Legend::Coc { max_px: 9.0 });
         },
         &|state| (state.source, state.plate) = (sample::running(false), Some(Step::StepOut(3))),
         &|state| {
             state.source = Source::Lost("gone".into());
-            state.legend = Some(Legend::Bins { count: 2, high_px: [2.0; crate::views::MOST_BINS] });
+            state.legend = Some(Legend::Bins { count: 2, high_px: [2.0; crate::views::MAX_BINS] });
         },
         &|state| (state.source, state.trouble) = (Source::Ended, Some("gone".into())),
         &|state| (state.source, state.virtual_cameras) = (Source::Opening, Vec::new()),
@@ -79,7 +79,7 @@ fn windows() -> Vec<Window> {
     windows
 }
 
-/// The window's own code, each literal in one line.
+/// Returns the crate's source code, with continued string literals joined.
 fn sources(folder: &Path) -> String {
     let mut all = String::new();
     for entry in std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()) {
@@ -107,7 +107,7 @@ fn the_table_has_all_texts_and_no_others() {
             }
         }
     }
-    for (does, keys) in GROUPS.iter().flat_map(|group| group.bindings).map(|binding| (binding.does, binding.keys)) {
+    for (does, keys) in GROUPS.iter().flat_map(|group| group.bindings).map(|binding| (binding.help, binding.keys)) {
         texts::tr(does);
         texts::tr(keys);
     }
@@ -138,7 +138,7 @@ fn what_is_said_while_it_runs_is_in_the_table_too() {
 
 #[test]
 fn all_that_is_drawn_is_translated() {
-    // What is a name, an error's reason or a number is the same in every language.
+    // Names, error reasons and numbers are the same in every language.
     let names = [
         "Desk camera",
         "portrait",
@@ -161,7 +161,7 @@ fn all_that_is_drawn_is_translated() {
         for text in window.texts() {
             let has_word =
                 text.split(|c: char| !c.is_alphabetic()).any(|word| word.len() > 1 && !units.contains(&word));
-            // The blur's passes are called as in the report.
+            // The blur's passes have the names used in reports.
             let is_name = text.starts_with("     ")
                 || names.iter().chain(&controls).any(|name| text.contains(name))
                 || presets.contains(&text.to_lowercase())

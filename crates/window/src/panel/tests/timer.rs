@@ -1,4 +1,4 @@
-//! The self-timer, and the folder that files went to.
+//! The self-timer, and the folder of saved files.
 
 use egui::{Key, Modifiers};
 
@@ -45,7 +45,7 @@ fn the_folder_is_offered_once_something_is_in_it() {
     window.pass(vec![egui::Event::PointerMoved(super::on_panel())]);
     assert!(window.texts().contains(&"Timer".to_owned()) && !window.texts().contains(&"Open folder".to_owned()));
     let folder = std::path::PathBuf::from("/home/me/Bilder");
-    window.state.hear(crate::state::Update::Kept(folder.clone()));
+    window.state.apply_update(crate::state::Update::Kept(folder.clone()));
     window.wait(0.2);
     assert!(window.texts().contains(&"Open folder".to_owned()), "{:?}", window.texts());
     let requests = window.state.apply(Action::OpenFolder);

@@ -1,11 +1,11 @@
-//! Fingers, as the window system tells of them, and the pointer that rests.
+//! Touch input, as the window system reports it, and hiding the idle pointer.
 
 use egui::{CursorIcon, Event, Pos2, TouchDeviceId, TouchId, TouchPhase, pos2};
 
 use super::{Action, Window, button};
 use bokehcam::depth::focus::FocusRule;
 
-/// What egui is told of a finger: the touch itself, and the pointer that stands for it.
+/// Returns egui's events for a finger: the touch itself, and the emulated pointer.
 fn finger(at: Pos2, phase: TouchPhase) -> Vec<Event> {
     let touch = Event::Touch { device_id: TouchDeviceId(1), id: TouchId(7), phase, pos: at, force: None };
     match phase {
@@ -37,14 +37,14 @@ fn a_tap_focuses_unless_it_wakes_the_panel() {
     window.state.full_screen = true;
     let at = pos2(320.0, 180.0);
     assert_eq!(focused(&tap(&mut window, at)), [FocusRule::Point { x: 0.25, y: 0.25 }]);
-    // The panel has gone: the first tap brings it back, and only the next one focuses.
+    // The panel has hidden: the first tap reopens it, and only the next one focuses.
     window.wait(5.0);
     assert!(window.panel.sheet.rect().is_none());
     assert_eq!(focused(&tap(&mut window, pos2(640.0, 360.0))), []);
     window.wait(0.5);
     assert!(window.panel.sheet.rect().is_some());
     assert_eq!(focused(&tap(&mut window, pos2(640.0, 360.0))), [FocusRule::Point { x: 0.5, y: 0.5 }]);
-    // Where there is no panel to wake, every tap focuses.
+    // Without a panel to reopen, every tap focuses.
     window.state.panel = false;
     window.wait(6.0);
     assert_eq!(focused(&tap(&mut window, at)).len(), 1);
@@ -99,7 +99,7 @@ fn a_pointer_that_rests_is_hidden_in_full_screen_until_it_moves() {
     assert_ne!(icon(&mut window, Vec::new()), CursorIcon::None);
     window.wait(1.5);
     assert_eq!(icon(&mut window, Vec::new()), CursorIcon::None);
-    // Over the panel, which it keeps there, it is seen.
+    // Over the panel, the pointer stays visible.
     window.pass(vec![Event::PointerMoved(super::on_panel())]);
     window.wait(10.0);
     assert_ne!(icon(&mut window, Vec::new()), CursorIcon::None);

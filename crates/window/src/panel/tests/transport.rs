@@ -1,4 +1,4 @@
-//! The bar under a recording.
+//! The playback bar of a recording.
 
 use egui::{Key, Modifiers, pos2};
 
@@ -57,7 +57,7 @@ fn keys_step_pause_and_go_to_the_start() {
     window.press(Key::PageUp, Modifiers::NONE);
     assert_eq!(window.state.transport.unwrap().place, 2);
     assert_eq!(window.press(Key::Home, Modifiers::NONE), [Action::Seek(0)]);
-    // The first frame follows the last.
+    // The step before the first frame wraps around to the last.
     window.press(Key::PageUp, Modifiers::NONE);
     assert_eq!(window.state.transport.unwrap().place, 100);
     window.press(Key::Z, Modifiers::NONE);
@@ -82,7 +82,7 @@ fn the_line_is_dragged_while_the_recording_stands_still_and_plays_on_after() {
     let freezes: Vec<&Action> = actions.iter().filter(|action| matches!(action, Action::Freeze(_))).collect();
     assert_eq!(freezes, [&Action::Freeze(true), &Action::Freeze(false)]);
     assert!(!actions.iter().any(|action| matches!(action, Action::Look { .. })), "no click on the picture");
-    // What stood still before stands still after.
+    // A paused recording stays paused.
     window.state.frozen = true;
     let actions = window.drag(pos2(700.0, 688.0), pos2(500.0, 688.0));
     assert!(!actions.iter().any(|action| matches!(action, Action::Freeze(_))), "{actions:?}");

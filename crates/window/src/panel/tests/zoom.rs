@@ -1,4 +1,4 @@
-//! An enlarged picture: by keys, wheel and fingers, dragged, clicked; and what is said of the pixel under the pointer.
+//! Zooming: by keys, wheel and pinch; dragging and clicking the zoomed picture; and the probe under the pointer.
 
 use egui::{Event, Key, Modifiers, Pos2, pos2};
 
@@ -7,7 +7,7 @@ use super::{Window, button, close, point, scrolled};
 use crate::present::enlarged;
 use crate::views::Probe;
 
-/// Puts the picture where the window puts it.
+/// Lays the picture out as the window does.
 fn place(window: &mut Window) {
     let Zoom { factor, center: [x, y] } = window.state.zoom;
     let center = [if window.state.mirror { 1.0 - x } else { x }, y];
@@ -17,7 +17,7 @@ fn place(window: &mut Window) {
     window.pass(Vec::new());
 }
 
-/// A window at 400 % around a point right of and above the middle.
+/// Creates a window at 400 % around a point right of and above the middle.
 fn enlarged_window(mirror: bool) -> Window {
     let mut window = Window::new();
     window.state.mirror = mirror;
@@ -57,7 +57,7 @@ fn a_key_pressed_as_the_window_gets_smaller_counts_with_the_window_as_it_is_then
 fn a_small_picture_is_never_made_smaller_by_a_key() {
     let mut window = Window::new();
     window.press(Key::P, Modifiers::NONE);
-    // All of it is seen at 4.2 pixels of the window for one of its own.
+    // Fit to the window, it has 4.2 window pixels per picture pixel.
     window.canvas.size = (300, 170);
     window.pass(vec![Event::PointerMoved(pos2(320.0, 180.0))]);
     for key in [Key::X, Key::Plus] {
@@ -66,7 +66,7 @@ fn a_small_picture_is_never_made_smaller_by_a_key() {
         window.press(if key == Key::X { key } else { Key::Minus }, Modifiers::NONE);
         assert_eq!(window.state.zoom.factor, 0, "all of it again");
     }
-    // What was chosen in the panel goes on from there.
+    // A factor chosen otherwise steps on from there.
     window.state.zoom.factor = 2;
     window.press(Key::Plus, Modifiers::NONE);
     assert_eq!(window.state.zoom.factor, 8);
@@ -76,7 +76,7 @@ fn a_small_picture_is_never_made_smaller_by_a_key() {
 fn a_click_focuses_on_what_is_seen_there() {
     for mirror in [false, true] {
         let mut window = enlarged_window(mirror);
-        // The middle of the window, and a hundred pixels of it to the right: 25 of the picture.
+        // The middle of the window, and 100 window pixels to the right: 25 picture pixels.
         assert!(close(point(&window.click(pos2(640.0, 360.0))), [0.6, 0.3]));
         window.wait(1.0);
         let right = 25.0 / 1280.0 * if mirror { -1.0 } else { 1.0 };
@@ -93,7 +93,7 @@ fn dragging_moves_it_and_no_further_than_its_edges() {
         let Some(Action::Pan(_)) = actions.iter().find(|action| matches!(action, Action::Pan(_))) else {
             panic!("{actions:?}")
         };
-        // The panel is told where the picture is once a pass: here it stays where it was.
+        // The panel gets the picture's position once per pass: here it stays unchanged.
         let step = window.state.zoom.center[0] - 0.6;
         assert!((step > 0.0) != mirror && step.abs() < 0.03, "{step}");
         window.state.zoom.center = [9.0, -9.0];

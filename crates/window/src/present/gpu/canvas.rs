@@ -1,4 +1,4 @@
-//! Draws the picture and the controls to a texture: everything but the way to the screen.
+//! Draws the picture and the controls to a texture, independent of the surface.
 
 use std::sync::Arc;
 
@@ -9,13 +9,13 @@ use crate::present::{Controls, Drawing, Image, Tone};
 use bokehcam::compute::device::{Device, Shader};
 use bokehcam::frame::ColorImage;
 
-/// The picture in its area, and the background.
+/// Shader that draws the picture in its area, and the background.
 pub const PRESENT: Shader = Shader { name: "present", source: include_str!("present.wgsl") };
 
-/// Bind groups that are kept, one for each pair of buffers seen.
-const MOST_BOUND: usize = 16;
+/// Maximum number of cached bind groups, one per pair of buffers.
+const MAX_BIND_GROUPS: usize = 16;
 
-/// `Window` of `present.wgsl`, where each field is explained.
+/// Mirrors `Window` of `present.wgsl`, which documents the fields.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[allow(missing_docs)]
@@ -34,24 +34,24 @@ pub struct Window {
 /// Draws to textures of one format.
 pub struct Canvas {
     device: Arc<Device>,
-    /// Whether the target takes what the shader writes as linear light and encodes it itself.
+    /// Whether the target format is sRGB: the shader then writes linear light, which the hardware encodes.
     linear: bool,
     pipeline: wgpu::RenderPipeline,
     window: wgpu::Buffer,
-    /// Pictures from memory go here: the picture, and the one before the blur.
+    /// Buffers for pictures from memory: the picture, and the one before the blur.
     uploads: [wgpu::Buffer; 2],
-    bound: Vec<Bound>,
+    bind_groups: Vec<Bound>,
     overlay: Overlay,
 }
 
-/// A bind group and the pictures that it binds.
+/// A bind group and the pictures it binds.
 struct Bound {
     pictures: [wgpu::Buffer; 2],
     bindings: wgpu::BindGroup,
 }
 
 impl Canvas {
-    /// A canvas for textures of `format`.
+    /// Creates a canvas for textures of `format`.
     pub fn new(device: Arc<Device>, format: wgpu::TextureFormat) -> Self {
         let module = device.device.create_shader_module(wgpu::ShaderModuleDescriptor {
             label: Some(PRESENT.name),
@@ -81,11 +81,12 @@ impl Canvas {
         use wgpu::BufferUsages as Usage;
         let window = device.buffer("window", size_of::<Window>(), Usage::UNIFORM | Usage::COPY_DST);
         let uploads = [upload_buffer(&device, 0), upload_buffer(&device, 0)];
+        // egui's renderer draws the controls in the same render pass.
         let overlay = Overlay::new(&device, format);
-        Self { device, linear: format.is_srgb(), pipeline, window, uploads, bound: Vec::new(), overlay }
+        Self { device, linear: format.is_srgb(), pipeline, window, uploads, bind_groups: Vec::new(), overlay }
     }
 
-    /// Controls to paint from now on.
+    /// Replaces the controls.
     pub fn set_controls(&mut self, controls: Controls) {
         self.overlay.set(&self.device, controls);
     }
@@ -96,14 +97,14 @@ impl Canvas {
         let picture = match drawing.picture {
             Image::Memory(picture) => self.upload(0, picture),
             Image::Device(picture) if picture.is_on(&self.device) => picture.buffer().clone(),
-            // Not shown, but something has to be bound.
+            // Not shown, but the bind group needs a buffer.
             Image::Device(_) => self.uploads[0].clone(),
         };
         let before = split.map(|(before, _)| self.upload(1, before));
         let pictures = [picture, before.unwrap_or_else(|| self.uploads[1].clone())];
         let window = self.window_uniform(drawing);
         self.device.queue.write_buffer(&self.window, 0, bytemuck::bytes_of(&window));
-        let bound = self.bind_group_index(pictures);
+        let bind_group = self.bind_group_index(pictures);
 
         let mut encoder = self.device.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         let mut submitted = self.overlay.upload(&self.device, &mut encoder, size);
@@ -127,7 +128,7 @@ impl Canvas {
                 })
                 .forget_lifetime();
             pass.set_pipeline(&self.pipeline);
-            pass.set_bind_group(0, &self.bound[bound].bindings, &[]);
+            pass.set_bind_group(0, &self.bind_groups[bind_group].bindings, &[]);
             pass.draw(0..3, 0..1);
             self.overlay.draw(&mut pass);
         }
@@ -135,13 +136,13 @@ impl Canvas {
         self.device.queue.submit(submitted);
     }
 
-    /// The shader's parameters for a drawing.
+    /// Returns the shader's parameters for a drawing.
     fn window_uniform(&self, drawing: &Drawing) -> Window {
         let color = |[r, g, b]: [u8; 3], w: f32| [f32::from(r) / 255.0, f32::from(g) / 255.0, f32::from(b) / 255.0, w];
         let flag = |on: bool| f32::from(u8::from(on));
         let area = drawing.area;
         let (width, height) = drawing.picture.size();
-        // Neither a picture without pixels nor one of another device is drawn.
+        // Pictures without pixels or on another device are not drawn.
         let shown = match drawing.picture {
             Image::Memory(picture) => !picture.rgb.is_empty(),
             Image::Device(picture) => picture.is_on(&self.device),
@@ -167,7 +168,7 @@ impl Canvas {
         window
     }
 
-    /// Uploads a picture to `uploads[k]`, which grows where it is too small.
+    /// Uploads a picture to `uploads[k]`, which grows if it is too small.
     fn upload(&mut self, k: usize, picture: &ColorImage) -> wgpu::Buffer {
         if (self.uploads[k].size() as usize) < picture.rgb.len() {
             self.uploads[k] = upload_buffer(&self.device, picture.rgb.len());
@@ -176,26 +177,26 @@ impl Canvas {
         self.uploads[k].clone()
     }
 
-    /// The index in `bound` of the bind group of these buffers, made if it is not there yet. Valid until the next call,
-    /// which may empty a full list.
+    /// Returns the index in `bind_groups` of the bind group of these buffers, creating it if needed. Valid until the
+    /// next call, which may clear a full cache.
     fn bind_group_index(&mut self, pictures: [wgpu::Buffer; 2]) -> usize {
-        if let Some(bound) = self.bound.iter().position(|bound| bound.pictures == pictures) {
-            return bound;
+        if let Some(bind_group) = self.bind_groups.iter().position(|bind_group| bind_group.pictures == pictures) {
+            return bind_group;
         }
-        // Bind groups keep their buffers alive, even of pictures that are gone.
-        if self.bound.len() >= MOST_BOUND {
-            self.bound.clear();
+        // Bind groups keep their buffers alive, even those of dropped pictures.
+        if self.bind_groups.len() >= MAX_BIND_GROUPS {
+            self.bind_groups.clear();
         }
         let buffers = [&self.window, &pictures[0], &pictures[1]].map(|buffer| buffer.as_entire_buffer_binding());
         let bindings = self.device.bound(&self.pipeline.get_bind_group_layout(0), buffers.into_iter());
-        self.bound.push(Bound { pictures, bindings });
-        self.bound.len() - 1
+        self.bind_groups.push(Bound { pictures, bindings });
+        self.bind_groups.len() - 1
     }
 }
 
-/// A buffer for a picture of so many bytes.
+/// Creates a buffer for a picture of this size in bytes.
 fn upload_buffer(device: &Device, bytes: usize) -> wgpu::Buffer {
     use wgpu::BufferUsages as Usage;
-    // The shader reads whole words, also for the last pixel.
+    // The shader reads whole words, even for the last pixel.
     device.buffer("picture to present", bytes.next_multiple_of(4) + 16, Usage::STORAGE | Usage::COPY_DST)
 }

@@ -7,23 +7,23 @@ use egui_wgpu::{Renderer, RendererOptions, ScreenDescriptor};
 use crate::present::Controls;
 use bokehcam::compute::device::Device;
 
-/// The controls over a window.
+/// The overlay with the controls.
 pub struct Overlay {
     renderer: Renderer,
     primitives: Vec<ClippedPrimitive>,
     pixels_per_point: f32,
-    /// Textures to free when these controls are replaced.
+    /// Textures to free when the controls are replaced.
     freed: Vec<TextureId>,
-    /// Whether these controls have yet to be uploaded.
+    /// Whether the controls must be uploaded.
     outdated: bool,
-    /// What they were uploaded for, in pixels.
+    /// Size of the target at the last upload, in pixels.
     size: (u32, u32),
 }
 
 impl Overlay {
-    /// An overlay for textures of `format`.
+    /// Creates an overlay for textures of `format`.
     pub fn new(device: &Device, format: wgpu::TextureFormat) -> Self {
-        // Without noise, so that a picture that stays stays the same.
+        // Without dithering, so that a still picture stays identical.
         let options = RendererOptions { dithering: false, ..RendererOptions::default() };
         Self {
             renderer: Renderer::new(&device.device, format, options),
@@ -38,7 +38,7 @@ impl Overlay {
     /// Replaces the controls.
     pub fn set(&mut self, device: &Device, controls: Controls) {
         let Controls { primitives, mut textures, pixels_per_point } = controls;
-        // Only the controls so far still needed these.
+        // Only the replaced controls still used these.
         self.freed.drain(..).for_each(|id| self.renderer.free_texture(&id));
         for (&id, changes) in &textures.set {
             for change in changes {
@@ -50,7 +50,7 @@ impl Overlay {
         (self.primitives, self.pixels_per_point, self.outdated) = (primitives, pixels_per_point, true);
     }
 
-    /// Uploads the controls, if they or the size changed; gives back what to submit before the commands of `encoder`.
+    /// Uploads the controls if they or the size changed. Returns the commands to submit before those of `encoder`.
     pub fn upload(
         &mut self,
         device: &Device,

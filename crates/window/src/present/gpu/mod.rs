@@ -11,27 +11,27 @@ use winit::window::Window;
 use super::{Controls, Drawing, PresentError, Presenter};
 use bokehcam::compute::device::{Device, DevicePicture};
 
-/// Presents with a GPU.
+/// The GPU presenter.
 pub struct Gpu {
     device: Arc<Device>,
     window: Arc<Window>,
-    /// `None` only while it is dropped.
+    /// `None` only during `drop`.
     surface: Option<wgpu::Surface<'static>>,
     config: wgpu::SurfaceConfiguration,
-    /// Whether the surface is configured; a window without pixels has none.
+    /// Whether the surface is configured; false while the window has zero size.
     configured: bool,
     canvas: Canvas,
 }
 
 impl Gpu {
-    /// A presenter for this window.
+    /// Creates a presenter for a window.
     ///
     /// # Errors
-    /// The device cannot draw to it.
+    /// Fails if the device cannot draw to it.
     pub fn new(window: Arc<Window>, device: Arc<Device>) -> Result<Self, PresentError> {
         let surface = new_surface(&window, &device)?;
         let capabilities = surface.get_capabilities(&device.adapter);
-        // Pictures and controls are sRGB-encoded already: the surface should not encode them again.
+        // Pictures and controls are already sRGB-encoded: prefer a format that does not encode them again.
         let plain = |format: &wgpu::TextureFormat| {
             matches!(format, wgpu::TextureFormat::Bgra8Unorm | wgpu::TextureFormat::Rgba8Unorm)
         };
@@ -51,7 +51,7 @@ impl Gpu {
             alpha_mode: wgpu::CompositeAlphaMode::Auto,
             view_formats: Vec::new(),
         };
-        // A refusal here must not be taken for a failure of the device, which goes on blurring while the CPU draws.
+        // An error here must not count as a device failure: the device continues to blur while the CPU draws.
         let made = device.attempt(|| {
             let canvas = Canvas::new(Arc::clone(&device), format);
             let size = window.inner_size();
@@ -60,10 +60,10 @@ impl Gpu {
             gpu.resize((size.width, size.height));
             gpu
         });
-        made.map_err(fault)
+        made.map_err(present_error)
     }
 
-    /// Fits the surface to `config`; a window without pixels leaves it as it is.
+    /// Configures the surface with `config`, unless the window has zero size.
     fn configure(&mut self) {
         self.configured = self.config.width > 0 && self.config.height > 0;
         if let Some(surface) = self.surface.as_ref().filter(|_| self.configured) {
@@ -71,10 +71,10 @@ impl Gpu {
         }
     }
 
-    /// The next texture to draw to; `None` while nothing of the window is visible.
+    /// Returns the next texture to draw to; `None` while the window is not visible.
     fn next_texture(&mut self) -> Result<Option<wgpu::SurfaceTexture>, PresentError> {
         use wgpu::CurrentSurfaceTexture as Current;
-        // The second time after the surface was configured or made anew.
+        // A second attempt after the surface was reconfigured or recreated.
         for _ in 0..2 {
             let Some(surface) = &self.surface else { return Ok(None) };
             match surface.get_current_texture() {
@@ -82,24 +82,24 @@ impl Gpu {
                 Current::Timeout | Current::Occluded => return Ok(None),
                 Current::Outdated => self.configure(),
                 Current::Lost => {
-                    self.device.check().map_err(fault)?;
+                    self.device.check().map_err(present_error)?;
                     self.surface = Some(new_surface(&self.window, &self.device)?);
                     self.configure();
                 }
-                Current::Validation => self.device.check().map_err(fault)?,
+                Current::Validation => self.device.check().map_err(present_error)?,
             }
         }
         Ok(None)
     }
 }
 
-fn fault(error: impl std::fmt::Display) -> PresentError {
+fn present_error(error: impl std::fmt::Display) -> PresentError {
     PresentError(error.to_string())
 }
 
 impl Drop for Gpu {
     fn drop(&mut self) {
-        // To free the surface of a device that hangs would block forever: it is leaked.
+        // Freeing the surface of a hung device would block forever, so it is leaked.
         if self.device.check().is_err() {
             std::mem::forget(self.surface.take());
         }
@@ -107,7 +107,7 @@ impl Drop for Gpu {
 }
 
 fn new_surface(window: &Arc<Window>, device: &Device) -> Result<wgpu::Surface<'static>, PresentError> {
-    let surface = device.instance.create_surface(Arc::clone(window)).map_err(fault)?;
+    let surface = device.instance.create_surface(Arc::clone(window)).map_err(present_error)?;
     if !device.adapter.is_surface_supported(&surface) {
         return Err(PresentError(format!("{} cannot draw to windows of this display", device.name)));
     }
@@ -129,7 +129,7 @@ impl Presenter for Gpu {
     }
 
     fn present(&mut self, drawing: &Drawing) -> Result<(), PresentError> {
-        self.device.check().map_err(fault)?;
+        self.device.check().map_err(present_error)?;
         if !self.configured {
             return Ok(());
         }
@@ -138,14 +138,14 @@ impl Presenter for Gpu {
         self.canvas.draw(&view, (self.config.width, self.config.height), drawing);
         self.window.pre_present_notify();
         self.device.queue.present(texture);
-        self.device.check().map_err(fault)
+        self.device.check().map_err(present_error)
     }
 
     fn has_device(&self) -> bool {
         true
     }
 
-    fn takes(&self, picture: &DevicePicture) -> bool {
+    fn supports(&self, picture: &DevicePicture) -> bool {
         picture.is_on(&self.device)
     }
 }

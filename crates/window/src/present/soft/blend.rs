@@ -1,37 +1,38 @@
-//! Blending of premultiplied colours, one to a word: `0xAARRGGBB`.
+//! Blending of premultiplied colours in words `0xAARRGGBB`.
 
-/// Two channels are computed at once, each in the low half of 16 bits. `ONE` is 256 and `HALF` 128 in both.
+/// Two channels are computed at once, in the low bytes of two 16-bit halves. `ONE` is 256 and `HALF` 128 in both.
 const PAIR: u32 = 0x00ff_00ff;
 const ONE: u32 = 0x0100_0100;
 const HALF: u32 = 0x0080_0080;
 
-/// `color` over `below`, each channel rounded. A colour brighter than its alpha adds light; channels saturate at 255.
+/// Composites `color` over `below` (Porter-Duff), rounding each channel. A colour brighter than its alpha adds light;
+/// channels saturate at 255.
 #[inline(always)]
 pub fn over(color: u32, below: u32) -> u32 {
     let rest = 255 - (color >> 24);
-    let low = sum(color & PAIR, share(below & PAIR, rest));
-    let high = sum((color >> 8) & PAIR, share((below >> 8) & PAIR, rest));
+    let low = add_saturating(color & PAIR, scale_pair(below & PAIR, rest));
+    let high = add_saturating((color >> 8) & PAIR, scale_pair((below >> 8) & PAIR, rest));
     low | high << 8
 }
 
-/// Two channels times `by` / 255, rounded.
+/// Multiplies two channels by `by` / 255, rounded.
 #[inline(always)]
-fn share(pair: u32, by: u32) -> u32 {
+fn scale_pair(pair: u32, by: u32) -> u32 {
     let product = pair * by + HALF;
     // Division by 255, exact for every product of two bytes.
     ((product + ((product >> 8) & PAIR)) >> 8) & PAIR
 }
 
-/// The sum of two pairs of channels, each saturated at 255.
+/// Adds two pairs of channels, saturating each at 255.
 #[inline(always)]
-fn sum(a: u32, b: u32) -> u32 {
+fn add_saturating(a: u32, b: u32) -> u32 {
     let sum = a + b;
     let overflow = sum & ONE;
     // 256 - 1 sets all bits of a channel that overflowed.
     (sum | (overflow - (overflow >> 8))) & PAIR
 }
 
-/// A texel times a colour (red, green, blue, alpha), channel by channel: rounded products / 255.
+/// Multiplies a texel by a colour (red, green, blue, alpha) per channel: products / 255, rounded.
 #[inline(always)]
 pub fn scaled_by(texel: u32, color: [u8; 4]) -> u32 {
     let [a, r, g, b] = texel.to_be_bytes();

@@ -1,4 +1,4 @@
-//! The controls as a picture of their own: painted when they change, blended over every frame.
+//! The controls as a cached overlay: painted when they change, blended over every frame.
 
 use std::ops::Range;
 
@@ -11,27 +11,28 @@ use super::texture::{Texture, Textures};
 use super::triangle::{self, Clip, Corner};
 use crate::present::Controls;
 
-/// Most cells that a row is divided into: one bit each.
+/// Maximum number of cells per row: one bit each.
 const CELLS: usize = u64::BITS as usize;
-/// Fewest columns of a cell.
-const LEAST_CELL_PX: usize = 16;
+/// Minimum width of a cell, in pixels.
+const MIN_CELL_PX: usize = 16;
 
-/// The controls over a window.
+/// The overlay with the controls.
 #[derive(Debug, Default)]
 pub struct Overlay {
     size: (usize, usize),
     /// Premultiplied, `0xAARRGGBB`.
     pixels: Vec<u32>,
-    /// Columns of a cell.
+    /// Width of a cell, in pixels.
     cell_px: usize,
-    /// For each row, a bit per cell, the leftmost lowest: 0 where all `pixels` of the cell are 0.
+    /// Per row, a bit mask of cells, leftmost lowest: 0 where all `pixels` of the cell are 0. Blending skips such
+    /// cells.
     cells: Vec<u64>,
     textures: Textures,
     primitives: Vec<ClippedPrimitive>,
     pixels_per_point: f32,
-    /// Textures to free when these controls are replaced.
+    /// Textures to free when the controls are replaced.
     freed: Vec<TextureId>,
-    /// Whether `pixels` has yet to be painted with these controls.
+    /// Whether `pixels` must be repainted.
     outdated: bool,
 }
 
@@ -42,7 +43,7 @@ impl Overlay {
             return;
         }
         self.size = size;
-        self.cell_px = size.0.div_ceil(CELLS).max(LEAST_CELL_PX);
+        self.cell_px = size.0.div_ceil(CELLS).max(MIN_CELL_PX);
         self.pixels.clear();
         self.pixels.resize(size.0 * size.1, 0);
         self.cells.clear();
@@ -50,10 +51,10 @@ impl Overlay {
         self.outdated = true;
     }
 
-    /// Replaces the controls, from the next [`Overlay::paint`] on.
+    /// Replaces the controls, effective from the next [`Overlay::paint`].
     pub fn set(&mut self, controls: Controls) {
         let Controls { primitives, mut textures, pixels_per_point } = controls;
-        // Only the controls so far still needed these.
+        // Only the replaced controls still used these.
         self.freed.drain(..).for_each(|id| drop(self.textures.0.remove(&id)));
         self.textures.set(&textures);
         self.freed.extend(&textures.free);
@@ -61,13 +62,13 @@ impl Overlay {
         (self.primitives, self.pixels_per_point, self.outdated) = (primitives, pixels_per_point, true);
     }
 
-    /// Paints the controls into `pixels`, if they or the size changed.
+    /// Paints the controls into `pixels` if they or the size changed.
     pub fn paint(&mut self) {
         if !std::mem::take(&mut self.outdated) {
             return;
         }
         let width = self.size.0;
-        // Only what was painted before has to be cleared.
+        // Clears only the cells painted before.
         for (row, cells) in self.pixels.chunks_exact_mut(width.max(1)).zip(&mut self.cells) {
             for columns in runs(std::mem::take(cells), self.cell_px, width) {
                 row[columns].fill(0);
@@ -75,7 +76,7 @@ impl Overlay {
         }
         let primitives = std::mem::take(&mut self.primitives);
         for ClippedPrimitive { clip_rect, primitive } in &primitives {
-            // Callbacks draw with a GPU; no control of ours has one.
+            // Callbacks need a GPU; none of the controls uses one.
             if let Primitive::Mesh(mesh) = primitive {
                 let clip = self.clip_px(*clip_rect);
                 self.fill_mesh(mesh, clip);
@@ -84,9 +85,9 @@ impl Overlay {
         self.primitives = primitives;
     }
 
-    /// A clip rectangle in points as whole pixels within the window.
+    /// Converts a clip rectangle from points to whole pixels, clamped to the window.
     fn clip_px(&self, rect: egui::Rect) -> Clip {
-        let at = |points: f32, most: usize| (points * self.pixels_per_point).round().clamp(0.0, most as f32) as usize;
+        let at = |points: f32, side_px: usize| (points * self.pixels_per_point).round().clamp(0.0, side_px as f32) as usize;
         let (width, height) = self.size;
         let (left, top) = (at(rect.min.x, width), at(rect.min.y, height));
         Clip { left, top, right: at(rect.max.x, width).max(left), bottom: at(rect.max.y, height).max(top) }
@@ -102,7 +103,7 @@ impl Overlay {
         }
     }
 
-    /// Blends the controls over the row `y`.
+    /// Blends the controls over row `y`.
     pub fn blend(&self, arch: Arch, y: usize, row: &mut [u32]) {
         let Some(&cells) = self.cells.get(y) else { return };
         let from = &self.pixels[y * self.size.0..][..self.size.0];
@@ -112,7 +113,7 @@ impl Overlay {
     }
 }
 
-/// The corners of a triangle from its indices into the mesh; `None` if one of them is out of range.
+/// Returns the corners of a triangle from its vertex indices; `None` if one of them is out of range.
 fn corners_of(mesh: &Mesh, corners: [u32; 3], pixels_per_point: f32) -> Option<[Corner; 3]> {
     let corner = |index: u32| {
         let &Vertex { pos, uv, color } = mesh.vertices.get(index as usize)?;
@@ -123,7 +124,7 @@ fn corners_of(mesh: &Mesh, corners: [u32; 3], pixels_per_point: f32) -> Option<[
     Some([a?, b?, c?])
 }
 
-/// Fills a triangle in `pixels`, rows of `width`, and sets the bits of all `cells` that it touches.
+/// Fills a triangle in `pixels` (rows of `width`), and sets the bits of the `cells` it touches.
 fn fill_triangle(
     corners: [Corner; 3],
     clip: Clip,
@@ -141,10 +142,10 @@ fn fill_triangle(
     });
 }
 
-/// The runs of set bits of a row's `cells`, as ranges of its `width` columns.
+/// Returns the runs of set bits in a row's `cells` as column ranges.
 fn runs(mut cells: u64, cell_px: usize, width: usize) -> impl Iterator<Item = Range<usize>> {
-    // Cells that were shifted out of `cells` so far.
-    let mut passed = 0;
+    // Cells already shifted out of `cells`.
+    let mut shifted = 0;
     std::iter::from_fn(move || {
         if cells == 0 {
             return None;
@@ -152,15 +153,15 @@ fn runs(mut cells: u64, cell_px: usize, width: usize) -> impl Iterator<Item = Ra
         let skipped = cells.trailing_zeros() as usize;
         cells >>= skipped;
         let count = cells.trailing_ones() as usize;
-        // In two shifts, because a shift by all 64 bits would overflow.
+        // Two shifts, because a shift by 64 bits would overflow.
         cells = cells >> (count - 1) >> 1;
-        let first = passed + skipped;
-        passed = first + count;
-        Some((first * cell_px).min(width)..(passed * cell_px).min(width))
+        let first = shifted + skipped;
+        shifted = first + count;
+        Some((first * cell_px).min(width)..(shifted * cell_px).min(width))
     })
 }
 
-/// Blends one run of the controls over the picture's pixels.
+/// Blends one run of the overlay over the picture.
 struct Blend<'a> {
     from: &'a [u32],
     to: &'a mut [u32],
@@ -171,7 +172,7 @@ impl WithSimd for Blend<'_> {
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) {
         for (to, &from) in self.to.iter_mut().zip(self.from) {
-            // The window's pixels have no alpha.
+            // The window's pixel format has no alpha.
             *to = over(from, *to) & 0x00ff_ffff;
         }
     }

@@ -1,4 +1,4 @@
-//! Presents on the CPU, into memory that is shared with the display server.
+//! Presents on the CPU, through memory shared with the display server.
 
 mod blend;
 mod controls;
@@ -16,23 +16,23 @@ use winit::window::Window;
 
 use super::{Controls, Drawing, PresentError, Presenter};
 
-/// Presents without a GPU.
+/// The CPU presenter.
 pub struct Soft {
     window: Arc<Window>,
     surface: Surface<Arc<Window>, Arc<Window>>,
-    /// `None` while the window has no pixels.
+    /// `None` while the window has zero size.
     size: Option<(NonZeroU32, NonZeroU32)>,
     painter: Painter,
 }
 
 impl Soft {
-    /// A presenter for this window; `painter` may have been given controls already.
+    /// Creates a presenter for a window; `painter` may already have controls.
     ///
     /// # Errors
-    /// The display server takes no pictures from memory.
+    /// Fails if the display server does not support shared-memory buffers.
     pub fn new(window: Arc<Window>, painter: Painter) -> Result<Self, PresentError> {
-        let context = Context::new(Arc::clone(&window)).map_err(fault)?;
-        let surface = Surface::new(&context, Arc::clone(&window)).map_err(fault)?;
+        let context = Context::new(Arc::clone(&window)).map_err(present_error)?;
+        let surface = Surface::new(&context, Arc::clone(&window)).map_err(present_error)?;
         let size = window.inner_size();
         let mut soft = Self { window, surface, size: None, painter };
         soft.resize((size.width, size.height));
@@ -40,7 +40,7 @@ impl Soft {
     }
 }
 
-fn fault(error: SoftBufferError) -> PresentError {
+fn present_error(error: SoftBufferError) -> PresentError {
     PresentError(error.to_string())
 }
 
@@ -56,14 +56,14 @@ impl Presenter for Soft {
 
     fn present(&mut self, drawing: &Drawing) -> Result<(), PresentError> {
         let Some((width, height)) = self.size else { return Ok(()) };
-        self.surface.resize(width, height).map_err(fault)?;
-        let mut buffer = self.surface.buffer_mut().map_err(fault)?;
+        self.surface.resize(width, height).map_err(present_error)?;
+        let mut buffer = self.surface.buffer_mut().map_err(present_error)?;
         // The buffer may be longer than the window.
         let pixels = width.get() as usize * height.get() as usize;
         if let Some(pixels) = buffer.get_mut(..pixels) {
             self.painter.paint(pixels, drawing);
         }
         self.window.pre_present_notify();
-        buffer.present().map_err(fault)
+        buffer.present().map_err(present_error)
     }
 }

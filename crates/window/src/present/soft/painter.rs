@@ -1,4 +1,4 @@
-//! Paints the picture and the controls into memory: everything but the way to the screen.
+//! Paints the picture and the controls into memory, independent of the display server.
 
 use std::sync::atomic::AtomicBool;
 
@@ -10,31 +10,31 @@ use crate::present::{Area, Controls, Drawing, Image};
 use bokehcam::compute::thread_pool::{self, DisjointParts, ThreadPool};
 use bokehcam::frame::ColorImage;
 
-/// Rows that one thread paints at a time.
-const BAND: usize = 16;
-/// Above this many pixels several threads are faster than one: where they are copied, and where they are scaled.
-const MANY_COPIED: u64 = 3_000_000;
-const MANY_SCALED: u64 = 700_000;
-/// At most this many threads, and half of the cores. The blur needs the others: waiting for a thread that gets no core
-/// takes longer than to paint alone.
-const MOST_THREADS: usize = 4;
+/// Rows per band, the unit of parallel work.
+const BAND_ROWS: usize = 16;
+/// Pixel counts above which several threads are faster than one: for copied and for scaled pictures.
+const MIN_SHARED_COPY_PX: u64 = 3_000_000;
+const MIN_SHARED_SCALE_PX: u64 = 700_000;
+/// Maximum number of threads, besides the limit of half the cores. The blur needs the others: waiting for a thread
+/// without a core takes longer than painting on one thread.
+const MAX_THREADS: usize = 4;
 
-/// Paints a window's content.
+/// Paints the content of a window.
 pub struct Painter {
     arch: Arch,
     size: (usize, usize),
     overlay: Overlay,
     scaler: Scaler,
-    /// The threads, once they are needed.
+    /// Created on first use.
     workers: Option<ThreadPool>,
-    /// One for each thread.
+    /// One per thread.
     scratch: Vec<Scratch>,
-    /// A flag for each band, for [`DisjointParts`].
+    /// One flag per band, for [`DisjointParts`].
     taken: Vec<AtomicBool>,
 }
 
 impl Painter {
-    /// A painter of a window without pixels.
+    /// Creates a painter for a window of zero size.
     pub fn new() -> Self {
         Self {
             arch: Arch::new(),
@@ -47,19 +47,19 @@ impl Painter {
         }
     }
 
-    /// Changes the size of the window, in pixels.
+    /// Changes the window's size, in pixels.
     pub fn resize(&mut self, size: (u32, u32)) {
         self.size = (size.0 as usize, size.1 as usize);
         self.overlay.resize(self.size);
-        self.taken.resize_with(self.size.1.div_ceil(BAND), AtomicBool::default);
+        self.taken.resize_with(self.size.1.div_ceil(BAND_ROWS), AtomicBool::default);
     }
 
-    /// Controls to paint from now on.
+    /// Replaces the controls.
     pub fn set_controls(&mut self, controls: Controls) {
         self.overlay.set(controls);
     }
 
-    /// Paints the window into `pixels`: rows of `0x00RRGGBB` without gaps, of the window's size.
+    /// Paints the window into `pixels`: tightly packed rows of `0x00RRGGBB`, of the window's size.
     pub fn paint(&mut self, pixels: &mut [u32], drawing: &Drawing) {
         if pixels.len() != self.size.0 * self.size.1 || pixels.is_empty() {
             return;
@@ -77,20 +77,21 @@ impl Painter {
         let Self { arch, size: (width, _), overlay, scaler, workers, scratch, taken, .. } = self;
         let (arch, width, overlay, scaler) = (*arch, *width, &*overlay, &*scaler);
         let window = Window { arch, width, overlay, scaler, drawing, picture };
-        let bands = pixels.len().div_ceil(width * BAND);
+        let bands = pixels.len().div_ceil(width * BAND_ROWS);
         let paint_band = |scratch: &mut Scratch, band: usize, pixels: &mut [u32]| {
-            for (y, row) in (band * BAND..).zip(pixels.chunks_exact_mut(width)) {
+            for (y, row) in (band * BAND_ROWS..).zip(pixels.chunks_exact_mut(width)) {
                 window.paint_row(y, scratch, row);
             }
         };
+        // Small windows are painted on this thread: waking others would take longer.
         if needs_threads(drawing) {
             let workers =
-                workers.get_or_insert_with(|| ThreadPool::new("present", (thread_pool::cores() / 2).min(MOST_THREADS)));
+                workers.get_or_insert_with(|| ThreadPool::new("present", (thread_pool::cores() / 2).min(MAX_THREADS)));
             scratch.resize_with(workers.thread_count(), Scratch::default);
-            let parts = DisjointParts::new(pixels, width * BAND, taken);
+            let parts = DisjointParts::new(pixels, width * BAND_ROWS, taken);
             workers.run_with(scratch, bands, &|scratch, band| paint_band(scratch, band, parts.part(band)));
         } else {
-            for (band, pixels) in pixels.chunks_mut(width * BAND).enumerate() {
+            for (band, pixels) in pixels.chunks_mut(width * BAND_ROWS).enumerate() {
                 paint_band(&mut scratch[0], band, pixels);
             }
         }
@@ -103,26 +104,26 @@ impl Default for Painter {
     }
 }
 
-/// Whether there is so much to paint that several threads are worth waking.
+/// Whether there is enough work to justify waking several threads.
 fn needs_threads(drawing: &Drawing) -> bool {
     let area = drawing.area;
     let scaled = drawing.picture.size() != (area.width, area.height);
-    u64::from(area.width) * u64::from(area.height) > if scaled { MANY_SCALED } else { MANY_COPIED }
+    u64::from(area.width) * u64::from(area.height) > if scaled { MIN_SHARED_SCALE_PX } else { MIN_SHARED_COPY_PX }
 }
 
-/// What the threads share while they paint a frame.
+/// Data that the threads share while they paint a frame.
 struct Window<'a> {
     arch: Arch,
     width: usize,
     overlay: &'a Overlay,
     scaler: &'a Scaler,
     drawing: &'a Drawing<'a>,
-    /// The picture, where there is one in memory.
+    /// The picture, if it is in memory.
     picture: Option<&'a ColorImage>,
 }
 
 impl Window<'_> {
-    /// Paints row `y` of the window: picture and background, and the controls over them.
+    /// Paints row `y` of the window: picture and background, then the controls over them.
     fn paint_row(&self, y: usize, scratch: &mut Scratch, row: &mut [u32]) {
         let Self { arch, width, overlay, scaler, drawing, picture } = *self;
         let Area { x, y: top, width: area_width, height } = drawing.area;

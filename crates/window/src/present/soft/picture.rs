@@ -1,4 +1,4 @@
-//! The picture as pixels of the window, row by row.
+//! Paints the picture into the window, row by row. twin: crates/window/src/present/gpu/present.wgsl
 
 use std::ops::Range;
 
@@ -8,23 +8,23 @@ use crate::present::{Area, Drawing, Tone};
 use bokehcam::frame::ColorImage;
 use bokehcam::frame::scale::Scale;
 
-/// Paints pictures into an area, scaled where they have another size; keeps the scaling weights from frame to frame.
+/// Paints pictures into an area, scaling them if needed; caches the scaling weights between frames.
 #[derive(Debug, Default)]
 pub struct Scaler {
     scale: Scale,
 }
 
-/// Memory for one thread.
+/// Buffers for one thread.
 #[derive(Debug, Default)]
 pub struct Scratch {
-    /// For [`Scale::row`].
+    /// Buffer for [`Scale::row`].
     row: Vec<u16>,
     /// A scaled row, RGB.
     line: Vec<u8>,
 }
 
 impl Scaler {
-    /// Prepares for pictures of this size in this area; neither may be without pixels.
+    /// Prepares for a picture and an area; both must have pixels.
     pub fn adapt(&mut self, picture: &ColorImage, area: Area) {
         let [from, to] =
             [picture.size(), (area.width, area.height)].map(|(width, height)| (width as usize, height as usize));
@@ -33,8 +33,8 @@ impl Scaler {
         }
     }
 
-    /// Paints row `y` of the area into `row`, which is shorter where the window cuts the area off: the picture before
-    /// the blur left of the split, `picture` right of it, and the divider.
+    /// Paints row `y` of the area into `row`, which is shorter if the window cuts the area off: the picture before the
+    /// blur left of the split, `picture` right of it, and the divider.
     pub fn paint_row(
         &self,
         arch: Arch,
@@ -47,11 +47,11 @@ impl Scaler {
             let columns = columns.start..columns.end.min(row.len());
             let Some(row) = row.get_mut(columns.clone()).filter(|row| !row.is_empty()) else { return };
             let width = drawing.area.width as usize;
-            // Of how many columns the area shows those from which on.
+            // Full width of the zoomed picture, and its first visible column.
             let (whole, first) =
                 drawing.part.map_or((width, 0), |part| ((part.factor * picture.width) as usize, part.at.0 as usize));
             let (start, end) = (first + columns.start, first + columns.end);
-            // Mirrored, columns come from the other side, and are reversed below.
+            // If mirrored, reads columns from the other side, and reverses them below.
             let from = if drawing.mirror { whole - end..whole - start } else { start..end };
             let rgb = if let Some(part) = drawing.part {
                 scratch.line.resize(3 * from.len(), 0);
@@ -90,7 +90,7 @@ impl Scaler {
     }
 }
 
-/// Packed bytes to words, `0x00RRGGBB`.
+/// Converts packed RGB bytes to words `0x00RRGGBB`.
 struct Expand<'a> {
     rgb: &'a [u8],
     row: &'a mut [u32],
@@ -106,7 +106,7 @@ impl WithSimd for Expand<'_> {
     }
 }
 
-/// Makes pixels grey and dim, as [`Tone`] says.
+/// Makes pixels grey and dim, with the weights of [`Tone`].
 struct Stale<'a> {
     row: &'a mut [u32],
 }
@@ -118,7 +118,7 @@ impl WithSimd for Stale<'_> {
         for pixel in self.row {
             let [r, g, b] = [*pixel >> 16 & 0xff, *pixel >> 8 & 0xff, *pixel & 0xff];
             let [red, green, blue] = Tone::STALE_WEIGHTS;
-            // The sum is rounded, and the last factor copies it to all three channels.
+            // Rounds the sum, and copies it to all three channels with the last factor.
             *pixel =
                 ((red * r + green * g + blue * b + (1 << (Tone::STALE_BITS - 1))) >> Tone::STALE_BITS) * 0x0001_0101;
         }

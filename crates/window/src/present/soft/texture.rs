@@ -1,32 +1,32 @@
-//! The textures of the controls: glyphs and pictures.
+//! Textures of the controls: glyphs and images.
 
 use std::collections::HashMap;
 
 use egui::epaint::ImageDelta;
 use egui::{Color32, ImageData, TextureId, TexturesDelta};
 
-/// Positions are rounded to this fraction of a texel: 8 bits of weight.
-const PARTS: f32 = 256.0;
+/// Subtexel steps per texel: 8 bits of interpolation weight.
+const SUBTEXELS: f32 = 256.0;
 
-/// A texture as egui set it. It is interpolated, and ends with its edge: no control of ours has another kind.
+/// A texture set by egui. Filtering is bilinear with clamp to edge; the controls use no other mode.
 #[derive(Debug)]
 pub struct Texture {
     size: [usize; 2],
-    /// Row by row, premultiplied `0xAARRGGBB`.
+    /// Row-major, premultiplied `0xAARRGGBB`.
     texels: Vec<u32>,
 }
 
-/// The textures by egui's ids.
+/// Textures by egui's ids.
 #[derive(Debug, Default)]
 pub struct Textures(pub HashMap<TextureId, Texture>);
 
 impl Textures {
-    /// Adds new textures and changes others.
+    /// Adds and updates textures.
     pub fn set(&mut self, delta: &TexturesDelta) {
         delta.set.iter().for_each(|(id, changes)| changes.iter().for_each(|change| self.apply(*id, change)));
     }
 
-    /// Replaces a texture, or the part of it at `change.pos`. What has no texels, or does not fit, is ignored.
+    /// Replaces a texture, or its region at `change.pos`. Empty or out-of-range changes are ignored.
     fn apply(&mut self, id: TextureId, change: &ImageDelta) {
         let ImageData::Color(image) = &change.image;
         let texels = image.pixels.iter().map(|&color| packed(color));
@@ -50,34 +50,34 @@ impl Textures {
     }
 }
 
-/// A colour as `0xAARRGGBB`.
+/// Packs a colour as `0xAARRGGBB`.
 fn packed(color: Color32) -> u32 {
     let [r, g, b, a] = color.to_array();
     u32::from_be_bytes([a, r, g, b])
 }
 
 impl Texture {
-    /// The position `uv` (0 to 1) in texels.
+    /// Converts a position `uv` (0 to 1) to texels.
     pub fn to_texels(&self, uv: [f32; 2]) -> [f32; 2] {
         [uv[0] * self.size[0] as f32, uv[1] * self.size[1] as f32]
     }
 
-    /// The colour at a position in texels, whose centres lie at halves: bilinear.
+    /// Samples bilinearly at a position in texels, whose centres lie at half-integers.
     #[inline]
     pub fn sample(&self, [x, y]: [f32; 2]) -> u32 {
-        let (x, y) = (((x - 0.5) * PARTS).round() as i64, ((y - 0.5) * PARTS).round() as i64);
-        let (parts, part_x, part_y) = (PARTS as i64, x & 255, y & 255);
+        let (x, y) = (((x - 0.5) * SUBTEXELS).round() as i64, ((y - 0.5) * SUBTEXELS).round() as i64);
+        let (parts, weight_x, weight_y) = (SUBTEXELS as i64, x & 255, y & 255);
         let (x, y) = (x.div_euclid(parts), y.div_euclid(parts));
-        if part_x == 0 && part_y == 0 {
+        if weight_x == 0 && weight_y == 0 {
             // At a texel's centre, as always in text.
             return self.texel(x, y);
         }
-        let upper = mix(self.texel(x, y), self.texel(x + 1, y), part_x as u32);
-        let lower = mix(self.texel(x, y + 1), self.texel(x + 1, y + 1), part_x as u32);
-        mix_rows(upper, lower, part_y as u32)
+        let upper = lerp(self.texel(x, y), self.texel(x + 1, y), weight_x as u32);
+        let lower = lerp(self.texel(x, y + 1), self.texel(x + 1, y + 1), weight_x as u32);
+        lerp_rows(upper, lower, weight_y as u32)
     }
 
-    /// The texel of a column and row, that of the edge beyond it.
+    /// Returns the texel at a column and row, clamped to the edge.
     #[inline]
     fn texel(&self, x: i64, y: i64) -> u32 {
         let [x, y] = [(x, self.size[0]), (y, self.size[1])].map(|(at, side)| at.clamp(0, side as i64 - 1) as usize);
@@ -85,19 +85,19 @@ impl Texture {
     }
 }
 
-/// From `a` to `b` by `part` / 256. Each channel gains 8 fractional bits, so there are two to a word: blue and red, and
-/// green and alpha.
-fn mix(a: u32, b: u32, part: u32) -> [u64; 2] {
+/// Interpolates from `a` to `b` by `weight` / 256. Each channel gains 8 fractional bits, so two fit a word: blue and red,
+/// and green and alpha.
+fn lerp(a: u32, b: u32, weight: u32) -> [u64; 2] {
     let pair = |color: u32| u64::from(color & 0xff) | u64::from(color >> 16 & 0xff) << 32;
-    let (rest, part) = (u64::from(256 - part), u64::from(part));
-    [pair(a) * rest + pair(b) * part, pair(a >> 8) * rest + pair(b >> 8) * part]
+    let (rest, weight) = (u64::from(256 - weight), u64::from(weight));
+    [pair(a) * rest + pair(b) * weight, pair(a >> 8) * rest + pair(b >> 8) * weight]
 }
 
-/// From one result of [`mix`] to another by `part` / 256, rounded to `0xAARRGGBB`.
-fn mix_rows(upper: [u64; 2], lower: [u64; 2], part: u32) -> u32 {
-    let (rest, part) = (u64::from(256 - part), u64::from(part));
+/// Interpolates between two results of [`lerp`] by `weight` / 256, rounded to `0xAARRGGBB`.
+fn lerp_rows(upper: [u64; 2], lower: [u64; 2], weight: u32) -> u32 {
+    let (rest, weight) = (u64::from(256 - weight), u64::from(weight));
     let [low, high] = std::array::from_fn(|k| {
-        let sum = upper[k] * rest + lower[k] * part + 0x0000_8000_0000_8000;
+        let sum = upper[k] * rest + lower[k] * weight + 0x0000_8000_0000_8000;
         (sum >> 16 & 0xff) as u32 | ((sum >> 48 & 0xff) as u32) << 16
     });
     low | high << 8

@@ -1,30 +1,30 @@
-//! Fills triangles as a GPU does: the pixels whose centres they cover, with colours and texture interpolated between
-//! the corners.
+//! Triangle rasterisation by edge functions (Pineda 1988) with the top-left rule, like a GPU's: fills the pixels whose
+//! centres are covered, interpolating colours and texture positions between the corners.
 
 use std::ops::Range;
 
 use super::blend::{over, scaled_by};
 use super::texture::Texture;
 
-/// Corners are rounded to this fraction of a pixel, so that shared edges are exact: without overlaps and gaps.
+/// Subpixel steps per pixel. Corners are rounded to them, so that shared edges are exact, without overlaps or gaps.
 const SUBPIXELS: f32 = 256.0;
 /// A pixel in subpixels.
 const PIXEL: i64 = SUBPIXELS as i64;
-/// Coordinates are clamped to this, in pixels, so that products of two of them do not overflow.
-const FURTHEST_PX: f32 = 1e6;
+/// Limit of coordinates, in pixels, so that products of two of them do not overflow.
+const MAX_PX: f32 = 1e6;
 
 /// A vertex of a triangle.
 #[derive(Clone, Copy, Debug)]
 pub struct Corner {
     /// Position in pixels.
     pub at: [f32; 2],
-    /// Position in the texture, from 0 to 1.
+    /// Texture position, from 0 to 1.
     pub uv: [f32; 2],
     /// Red, green, blue and alpha, premultiplied.
     pub color: [u8; 4],
 }
 
-/// The rectangle that may be drawn to, in pixels; `right` and `bottom` are excluded.
+/// The clip rectangle, in pixels; `right` and `bottom` are exclusive.
 #[derive(Clone, Copy, Debug)]
 pub struct Clip {
     pub left: usize,
@@ -33,7 +33,7 @@ pub struct Clip {
     pub bottom: usize,
 }
 
-/// Fills a triangle. Calls `on_row(y, columns, paint)` for each row that it covers; that has to call `paint` with the
+/// Fills a triangle. Calls `on_row(y, columns, paint)` for each covered row; the callback must call `paint` with the
 /// pixels of these columns.
 pub fn fill(
     corners: [Corner; 3],
@@ -43,7 +43,7 @@ pub fn fill(
 ) {
     let Some(shape) = Shape::new(corners.map(|corner| corner.at)) else { return };
     let paint = Paint::new(corners, texture);
-    if paint.is_nothing() {
+    if paint.is_invisible() {
         return;
     }
     for y in shape.rows(clip) {
@@ -55,15 +55,15 @@ pub fn fill(
     }
 }
 
-/// Which pixels a triangle covers, in exact integers.
+/// Coverage of a triangle, in exact integer arithmetic.
 struct Shape {
     edges: [Edge; 3],
-    /// The highest and the lowest corner, in subpixels.
+    /// y of the highest and of the lowest corner, in subpixels.
     top: i64,
     bottom: i64,
 }
 
-/// A pixel in column `x` and row `y` is on the inner side of an edge if `start + x * across + y * down >= 0`.
+/// Edge function: the pixel in column `x` and row `y` is on the inner side if `start + x * across + y * down >= 0`.
 #[derive(Clone, Copy)]
 struct Edge {
     start: i64,
@@ -72,23 +72,23 @@ struct Edge {
 }
 
 impl Shape {
-    /// `None` if the triangle has no area, or a corner that is not finite.
+    /// Returns `None` if the triangle has no area or a corner is not finite.
     fn new(corners: [[f32; 2]; 3]) -> Option<Self> {
         if corners.as_flattened().iter().any(|value| !value.is_finite()) {
             return None;
         }
         let mut corners =
-            corners.map(|corner| corner.map(|v| (v.clamp(-FURTHEST_PX, FURTHEST_PX) * SUBPIXELS).round() as i64));
+            corners.map(|corner| corner.map(|v| (v.clamp(-MAX_PX, MAX_PX) * SUBPIXELS).round() as i64));
         let [a, b, c] = corners;
         match (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]) {
             0 => return None,
-            // Now clockwise on the screen, so that the inner side of each edge is the positive one.
+            // Makes the corners clockwise on the screen, so that the inner side of each edge is positive.
             area if area < 0 => corners.swap(1, 2),
             _ => {}
         }
         let edge = |from: [i64; 2], to: [i64; 2]| {
             let (dx, dy) = (to[0] - from[0], to[1] - from[1]);
-            // The top-left rule: a centre on a shared edge belongs to the triangle below it or right of it.
+            // Top-left rule: a centre on a shared edge belongs to the triangle below it or right of it.
             let is_top_left = dy < 0 || (dy == 0 && dx > 0);
             let side = |x: i64, y: i64| dx * (y - from[1]) - dy * (x - from[0]);
             let start = side(PIXEL / 2, PIXEL / 2) - i64::from(!is_top_left);
@@ -100,13 +100,13 @@ impl Shape {
         Some(Self { edges: [edge(a, b), edge(b, c), edge(c, a)], top, bottom })
     }
 
-    /// The rows that may be covered.
+    /// Returns the rows that may be covered.
     fn rows(&self, clip: Clip) -> Range<usize> {
         let within = |row: i64| row.clamp(clip.top as i64, clip.bottom as i64) as usize;
         within(self.top.div_euclid(PIXEL))..within(self.bottom.div_euclid(PIXEL) + 1)
     }
 
-    /// The columns of row `y` whose centres lie inside all three edges.
+    /// Returns the columns of row `y` whose centres lie inside all three edges.
     fn columns(&self, y: usize, clip: Clip) -> Range<usize> {
         let (mut left, mut right) = (clip.left as i64, clip.right as i64);
         for edge in &self.edges {
@@ -114,9 +114,9 @@ impl Shape {
             match edge.across {
                 0 if start < 0 => return 0..0,
                 0 => {}
-                // Inside from the first column on whose value is not negative: the quotient rounded up.
+                // Inside from the first non-negative column on: the quotient, rounded up.
                 across if across > 0 => left = left.max(-start.div_euclid(across)),
-                // Inside up to the last such column.
+                // Inside up to the last non-negative column.
                 across => right = right.min(start.div_euclid(-across) + 1),
             }
         }
@@ -124,7 +124,7 @@ impl Shape {
     }
 }
 
-/// A value that changes linearly over the picture.
+/// A value that varies linearly over the picture.
 #[derive(Clone, Copy, Default)]
 struct Plane {
     start: f32,
@@ -133,7 +133,7 @@ struct Plane {
 }
 
 impl Plane {
-    /// The plane with these values at these three points; if they are all but on a line, the first value everywhere.
+    /// Returns the plane with these values at three points; constant if the points are nearly collinear.
     fn through(at: [[f32; 2]; 3], values: [f32; 3]) -> Self {
         let (ab, ac) = ([at[1][0] - at[0][0], at[1][1] - at[0][1]], [at[2][0] - at[0][0], at[2][1] - at[0][1]]);
         let area = ab[0] * ac[1] - ab[1] * ac[0];
@@ -145,36 +145,36 @@ impl Plane {
         Self { start: values[0] - at[0][0] * across - at[0][1] * down, across, down }
     }
 
-    /// The value at the centre of a pixel.
+    /// Evaluates the plane at the centre of a pixel.
     fn at(&self, x: usize, y: usize) -> f32 {
         self.start + self.across * (x as f32 + 0.5) + self.down * (y as f32 + 0.5)
     }
 }
 
-/// What a triangle is filled with.
+/// Colour and texture of a triangle, prepared for interpolation.
 struct Paint {
-    /// The colour of all corners, if they have the same.
-    plain: Option<[u8; 4]>,
-    /// Red, green, blue and alpha otherwise.
+    /// The colour of all corners, if it is the same.
+    flat_color: Option<[u8; 4]>,
+    /// Planes of red, green, blue and alpha otherwise.
     colors: [Plane; 4],
-    /// The texel at all corners, as in [`over`], if they have the same texture position.
+    /// The texel of all corners, as in [`over`], if they have the same texture position.
     texel: Option<u32>,
-    /// The texture position otherwise, in texels.
+    /// Planes of the texture position otherwise, in texels.
     texel_at: [Plane; 2],
 }
 
 impl Paint {
-    /// Prepares to interpolate between the corners what is not the same at all of them.
+    /// Prepares interpolation of the attributes that differ between the corners.
     fn new(corners: [Corner; 3], texture: &Texture) -> Self {
         let [a, b, c] = corners;
         let at = corners.map(|corner| corner.at);
         let mut paint = Self {
-            plain: (a.color == b.color && b.color == c.color).then_some(a.color),
+            flat_color: (a.color == b.color && b.color == c.color).then_some(a.color),
             colors: [Plane::default(); 4],
             texel: None,
             texel_at: [Plane::default(); 2],
         };
-        if paint.plain.is_none() {
+        if paint.flat_color.is_none() {
             paint.colors =
                 std::array::from_fn(|k| Plane::through(at, corners.map(|corner| f32::from(corner.color[k]))));
         }
@@ -187,14 +187,14 @@ impl Paint {
         paint
     }
 
-    fn is_nothing(&self) -> bool {
-        self.plain == Some([0; 4]) || self.texel == Some(0)
+    fn is_invisible(&self) -> bool {
+        self.flat_color == Some([0; 4]) || self.texel == Some(0)
     }
 
-    /// Blends the triangle over `pixels`, which begin in column `x` of row `y`. The first two cases are shortcuts for
+    /// Blends the triangle over `pixels`, which begin at column `x` of row `y`. The first two cases are fast paths for
     /// the most frequent triangles.
     fn fill(&self, x: usize, y: usize, pixels: &mut [u32], texture: &Texture) {
-        match (self.plain, self.texel) {
+        match (self.flat_color, self.texel) {
             (Some(color), Some(texel)) => {
                 let color = scaled_by(texel, color);
                 if color >> 24 == 255 {
@@ -203,21 +203,21 @@ impl Paint {
                     pixels.iter_mut().for_each(|pixel| *pixel = over(color, *pixel));
                 }
             }
-            // A white texel leaves the colours as they are.
+            // A white texel leaves the colours unchanged.
             (None, Some(u32::MAX)) => {
-                let (mut color, step) = self.color_from(x, y);
+                let (mut color, step) = self.color_at(x, y);
                 for pixel in pixels {
                     *pixel = over(packed(color), *pixel);
                     color = std::array::from_fn(|k| color[k] + step[k]);
                 }
             }
-            (plain, texel) => {
-                let (mut color, step) = self.color_from(x, y);
+            (flat_color, texel) => {
+                let (mut color, step) = self.color_at(x, y);
                 let mut at = self.texel_at.map(|plane| plane.at(x, y));
                 for pixel in pixels {
                     let texel = texel.unwrap_or_else(|| texture.sample(at));
                     if texel != 0 {
-                        let color = plain.unwrap_or_else(|| rounded(color));
+                        let color = flat_color.unwrap_or_else(|| rounded(color));
                         *pixel = over(scaled_by(texel, color), *pixel);
                     }
                     color = std::array::from_fn(|k| color[k] + step[k]);
@@ -227,18 +227,18 @@ impl Paint {
         }
     }
 
-    /// The colour at a pixel, and how it changes to the next.
-    fn color_from(&self, x: usize, y: usize) -> ([f32; 4], [f32; 4]) {
+    /// Returns the colour at a pixel, and its increment per column.
+    fn color_at(&self, x: usize, y: usize) -> ([f32; 4], [f32; 4]) {
         (self.colors.map(|plane| plane.at(x, y)), self.colors.map(|plane| plane.across))
     }
 }
 
-/// Rounded to bytes; the cast saturates.
+/// Rounds to bytes; the cast saturates.
 fn rounded(color: [f32; 4]) -> [u8; 4] {
     color.map(|value| (value + 0.5) as u8)
 }
 
-/// A colour (red, green, blue, alpha) as `0xAARRGGBB`.
+/// Packs a colour (red, green, blue, alpha) as `0xAARRGGBB`.
 fn packed(color: [f32; 4]) -> u32 {
     let [r, g, b, a] = rounded(color);
     u32::from_be_bytes([a, r, g, b])
@@ -260,7 +260,7 @@ mod tests {
 
     #[test]
     fn triangles_that_share_edges_cover_each_pixel_once() {
-        // A fan around a point, closed by the canvas's own corners.
+        // A triangle fan around a point, closed by the canvas's corners.
         for middle in [[20.0, 20.0], [20.5, 20.5], [3.13, 37.77], [39.996, 0.004], [20.0, 0.5]] {
             let n = SIZE as f32;
             let rim = [[0.0, 0.0], [13.5, 0.0], [n, 0.0], [n, 20.25], [n, n], [0.5, n], [0.0, n], [0.0, 11.1]];
@@ -277,7 +277,7 @@ mod tests {
         let mut counts = vec![0; SIZE * SIZE];
         covered([[2.5, 3.5], [10.5, 3.5], [2.5, 11.5]], &mut counts);
         for (x, y) in (0..SIZE).flat_map(|y| (0..SIZE).map(move |x| (x, y))) {
-            // The edges at the left and on top are the triangle's own, the slanted one is not.
+            // The left and top edges are inclusive, the slanted one is not.
             let inside = x >= 2 && y >= 3 && (x - 2) + (y - 3) < 8;
             assert_eq!(counts[y * SIZE + x], u32::from(inside), "{x}, {y}");
         }

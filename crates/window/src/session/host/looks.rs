@@ -1,6 +1,6 @@
-//! The looks of a session: those to come, and those that frames on the screen are of.
+//! Looks of a session: applying new ones, and finding the one of a displayed frame.
 
-use super::super::{Saving, SessionEvent, Still, held};
+use super::super::{SaveOptions, SessionEvent, Still, held};
 use super::Host;
 use bokehcam::control::Answer;
 use bokehcam::engine::Images;
@@ -9,11 +9,11 @@ use bokehcam::look::{Look, Patch};
 use bokehcam::recording::snapshot::{self, Snapshot};
 use bokehcam::recording::still::write_color;
 
-/// Looks that are kept for snapshots: frames that come are of one of the last few.
+/// Number of recent looks kept for snapshots: a frame in flight has one of the last few.
 const KEPT_LOOKS: usize = 512;
 
 impl Host {
-    /// Blurs with another look from now on, and remembers it by its number for snapshots.
+    /// Blurs with another look from now on, and records it with its change number for snapshots.
     pub(super) fn adopt(&mut self, look: Look) {
         self.start.look = look;
         let number = self.looks.back().map_or(0, |(last, _)| last + 1);
@@ -22,21 +22,21 @@ impl Host {
         if self.looks.len() > KEPT_LOOKS {
             self.looks.pop_front();
         }
-        // What is on the screen comes first.
+        // The held frame is on the screen, so it comes first.
         self.blur_held();
         if let Some(live) = &mut self.live
             && let Err(line) = live.adopt(look, number, &mut *self.start.services)
         {
-            self.news.note(line);
+            self.events.note(line);
         }
     }
 
-    /// The look as far as the source allows it.
+    /// Returns the look as far as the source supports it.
     pub(super) fn effective_look(&self) -> Look {
         self.live.as_ref().map_or_else(|| self.start.look.clone(), |live| live.effective(&self.start.look))
     }
 
-    /// Keeps the frame that stays from now on.
+    /// Holds a frame on the screen.
     pub(super) fn hold(&mut self, still: Still, is_behind: bool) {
         self.held = Some(held::HeldBlur::new(still, self.start.look.focus));
         if is_behind {
@@ -44,27 +44,27 @@ impl Host {
         }
     }
 
-    /// Blurs the frame that stays as the last look says.
+    /// Blurs the held frame with the latest look.
     fn blur_held(&mut self) {
         if let (Some(held), Some((number, look))) = (&mut self.held, self.looks.back()) {
             match held.blur(look, *number, &mut *self.start.services) {
-                Ok(blurred) => self.news.send(SessionEvent::Blurred(Box::new(blurred))),
-                Err(line) => self.news.note(line),
+                Ok(blurred) => self.events.send(SessionEvent::Blurred(Box::new(blurred))),
+                Err(line) => self.events.note(line),
             }
         }
     }
 
-    /// Saves a snapshot with the settings that repeat it: those of the look that its frame was blurred with.
-    pub(super) fn save(&self, still: &Still, Saving { with_sources, order }: &Saving) {
+    /// Saves a snapshot with the settings that reproduce it: those of the look that blurred the frame.
+    pub(super) fn save(&self, still: &Still, SaveOptions { with_sources, request }: &SaveOptions) {
         let its_look = self.looks.iter().rev().find(|(number, _)| *number <= still.change);
         let look = its_look.map_or(&self.start.look, |(_, look)| look);
         let settings = Patch::of(&look.of_frame(&still.coc, still.quality)).values();
         let Images { color, depth, blurred: picture } = &still.images;
         let sources = with_sources.then_some((color, depth.as_ref()));
         let snapshot = Snapshot { picture, sources, settings: &settings };
-        let saved = match order.as_ref().and_then(|order| order.to.as_deref()) {
+        let saved = match request.as_ref().and_then(|request| request.to.as_deref()) {
             Some(path) => {
-                // If that fails, writing says why.
+                // If that fails, writing reports the error.
                 let _ = path.parent().map(std::fs::create_dir_all);
                 write_color(path, picture, false).map(|()| path.to_owned())
             }
@@ -72,16 +72,16 @@ impl Host {
         };
         let answer = match saved {
             Ok(path) => {
-                self.news.note(format!("Saved {}", folders::shown(&path)));
-                self.news.kept(&path);
+                self.events.note(format!("Saved {}", folders::shown(&path)));
+                self.events.report_saved(&path);
                 Ok(path)
             }
             Err(error) => {
-                self.news.note(error.to_string());
+                self.events.note(error.to_string());
                 Err(Answer::failed(error.to_string()))
             }
         };
-        // Who gave up waiting sees the note.
-        order.iter().for_each(|order| drop(order.answer.try_send(answer.clone())));
+        // Fails if the caller has timed out; the note remains.
+        request.iter().for_each(|request| drop(request.answer.try_send(answer.clone())));
     }
 }

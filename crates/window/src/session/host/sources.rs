@@ -1,86 +1,86 @@
-//! Sources that are found, offered and chosen while the session goes on.
+//! Sources that appear, are offered, or are chosen during the session.
 
 use std::sync::mpsc;
 use std::time::Duration;
 
 use super::Host;
 use crate::services::Browse;
-use crate::session::Order;
+use crate::session::Command;
 use crate::state::{Request, Update};
 use bokehcam::files::whole;
 use bokehcam::look::BehindName;
 
-/// So often, at most, it is seen which devices there are, and how large a recording is.
-const LOOK_PERIOD: Duration = Duration::from_secs(1);
+/// Interval of checks for new devices and of the recording's size.
+const CHECK_PERIOD: Duration = Duration::from_secs(1);
 
 impl Host {
-    /// The next order; meanwhile, looks which devices there are. `None` where nobody is left to give orders.
-    pub(super) fn next(&mut self, inbox: &mpsc::Receiver<Order>) -> Option<Order> {
+    /// Waits for the next command, and meanwhile checks for device changes. `None` if all senders are gone.
+    pub(super) fn next_command(&mut self, inbox: &mpsc::Receiver<Command>) -> Option<Command> {
         loop {
-            match inbox.recv_timeout(LOOK_PERIOD) {
-                Ok(order) => return Some(order),
+            match inbox.recv_timeout(CHECK_PERIOD) {
+                Ok(command) => return Some(command),
                 Err(mpsc::RecvTimeoutError::Timeout) => {
-                    self.tell_size();
-                    self.look_for_devices();
+                    self.report_size();
+                    self.check_devices();
                 }
                 Err(mpsc::RecvTimeoutError::Disconnected) => return None,
             }
         }
     }
 
-    /// Tells how large the recording is by now.
-    fn tell_size(&self) {
+    /// Reports the current size of the recording.
+    fn report_size(&self) {
         let recording = self.start.outputs.iter().find(|output| !output.is_camera);
         let bytes = recording.and_then(|output| whole::bytes_so_far(output.name.as_ref()));
-        bytes.into_iter().for_each(|bytes| self.news.tell(Update::Recorded(bytes)));
+        bytes.into_iter().for_each(|bytes| self.events.send_update(Update::Recorded(bytes)));
     }
 
-    pub(super) fn tell_choices(&mut self) {
+    pub(super) fn report_choices(&mut self) {
         let sources = self.start.services.sources();
         let virtual_cameras = self.start.services.virtual_cameras();
-        self.news.tell(Update::Choices { sources, virtual_cameras });
-        self.news.tell(Update::Presets(self.start.services.settings().presets()));
+        self.events.send_update(Update::Choices { sources, virtual_cameras });
+        self.events.send_update(Update::Presets(self.start.services.settings().presets()));
     }
 
-    /// Tells which sources there are, if those of the system are others by now, and opens the one that was missing.
-    fn look_for_devices(&mut self) {
+    /// Reports device changes, and reopens a missing source that has come back.
+    fn check_devices(&mut self) {
         if !self.start.services.devices_changed() {
             return;
         }
-        self.tell_choices();
+        self.report_choices();
         let is_there = self.start.services.sources().iter().any(|choice| choice.name == self.start.source);
         if self.live.is_none() && is_there && self.start.source.starts_with("/dev/") {
             self.open();
         }
     }
 
-    /// Tells the window to open a source that somebody offers, unless that cannot be one: then what runs goes on.
+    /// Reports an offered source as valid, or else why not; the current source continues.
     pub(super) fn offer(&self, name: String) {
         match self.start.services.check(&name) {
-            Ok(()) => self.news.tell(Update::Offered(name)),
-            Err(line) => self.news.note(line),
+            Ok(()) => self.events.send_update(Update::Offered(name)),
+            Err(line) => self.events.note(line),
         }
     }
 
-    /// Asks the person for a file or folder, on a thread of its own.
+    /// Opens a file chooser on its own thread.
     pub(super) fn browse(&self, what: Browse) {
-        let (orders, news) = (self.orders.clone(), self.news.clone());
+        let (commands, events) = (self.commands.clone(), self.events.clone());
         let pick = self.start.services.browse(what);
-        let asked = std::thread::Builder::new().name("dialog".into()).spawn(move || match pick() {
+        let spawned = std::thread::Builder::new().name("dialog".into()).spawn(move || match pick() {
             Ok(Some(file)) if what == Browse::Behind => match BehindName::Image(file.into()).load() {
-                Ok(behind) => news.tell(Update::Behind(behind)),
-                Err(error) => news.note(error.to_string()),
+                Ok(behind) => events.send_update(Update::Behind(behind)),
+                Err(error) => events.note(error.to_string()),
             },
-            Ok(Some(name)) => drop(orders.send(Order::Do(Request::Offer(name)))),
+            Ok(Some(name)) => drop(commands.send(Command::Request(Request::Offer(name)))),
             Ok(None) => {}
-            Err(line) => news.note(line),
+            Err(line) => events.note(line),
         });
-        if let Err(error) = asked {
-            self.news.note(format!("there is no dialog: {error}"));
+        if let Err(error) = spawned {
+            self.events.note(format!("there is no dialog: {error}"));
         }
     }
 
-    /// Opens the camera again with other pictures.
+    /// Reopens the camera with another frame size and rate.
     pub(super) fn set_mode(&mut self, size: (u32, u32), fps: f64) {
         self.start.services.choose_mode(&self.start.source, size, fps);
         self.stop();

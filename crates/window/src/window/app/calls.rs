@@ -1,4 +1,4 @@
-//! What the window's thread is called for: the session, screen readers, the desktop's colours, fonts.
+//! User events of the event loop: from the session, remote control, screen readers, the desktop's theme, and fonts.
 
 use std::time::Instant;
 
@@ -8,27 +8,31 @@ use winit::event_loop::{ActiveEventLoop, EventLoopProxy};
 use super::App;
 use super::hold::focus_m;
 use crate::panel::SystemFonts;
-use crate::window::{Call, ThemeChoice, desktop};
+use crate::window::{ThemeChoice, UserEvent, desktop};
 use bokehcam::pipeline::View;
 
-/// Gives the controls their colours and the system's fonts, now and as soon as others are known. An event loop that is
-/// gone need not know them.
-pub(super) fn follow(ctx: &egui::Context, theme: ThemeChoice, proxy: &EventLoopProxy<Call>) -> SystemFonts {
+/// Sets the theme and the system fonts, and subscribes to their changes. Sends after the event loop has ended are
+/// ignored.
+pub(super) fn init_appearance(
+    ctx: &egui::Context,
+    theme: ThemeChoice,
+    proxy: &EventLoopProxy<UserEvent>,
+) -> SystemFonts {
     let to_fonts = proxy.clone();
-    let fonts = SystemFonts::new(move || drop(to_fonts.send_event(Call::Fonts)));
+    let fonts = SystemFonts::new(move || drop(to_fonts.send_event(UserEvent::Fonts)));
     fonts.install(ctx);
-    // Dark until the desktop says otherwise: it may take its time, or have nothing to say.
+    // Dark until the desktop reports its theme, which may take long or never happen.
     ctx.set_theme(if theme == ThemeChoice::Light { egui::Theme::Light } else { egui::Theme::Dark });
     if theme == ThemeChoice::Auto {
         let to_theme = proxy.clone();
-        desktop::follow(move |theme| to_theme.send_event(Call::Theme(theme)).is_ok());
+        desktop::watch_theme(move |theme| to_theme.send_event(UserEvent::Theme(theme)).is_ok());
     }
     fonts
 }
 
 impl App {
-    /// Takes note of what the controls show of a frame.
-    pub(super) fn learn_from(&mut self, view: &View) {
+    /// Updates the state with a new frame's properties.
+    pub(super) fn update_from_frame(&mut self, view: &View) {
         self.state.focus_m = focus_m(&view.coc);
         let (between, part) = (view.is_between, view.part);
         if (self.state.between, self.state.part) != (between, part) {
@@ -37,12 +41,12 @@ impl App {
         }
     }
 
-    /// Does what the thread was called for, and lays the controls out anew where they may have changed.
-    pub(super) fn answer(&mut self, call: Call, events: &ActiveEventLoop) {
+    /// Handles a user event, and schedules a layout of the controls.
+    pub(super) fn handle_user_event(&mut self, call: UserEvent, events: &ActiveEventLoop) {
         match call {
-            Call::Session => return self.receive(events),
-            Call::Control => self.listen(events),
-            Call::Access(event) => match (event.window_event, &mut self.gfx) {
+            UserEvent::Session => return self.receive(events),
+            UserEvent::Control => self.run_remote_tasks(events),
+            UserEvent::Access(event) => match (event.window_event, &mut self.gfx) {
                 (Access::InitialTreeRequested, _) => {
                     self.panel.stays = true;
                     self.ctx.enable_accesskit();
@@ -54,10 +58,10 @@ impl App {
                 (Access::ActionRequested(request), Some(gfx)) => gfx.input.on_accesskit_action_request(request),
                 (Access::ActionRequested(_), None) => {}
             },
-            Call::Theme(theme) => self.ctx.set_theme(theme),
-            Call::Fonts => self.fonts.install(&self.ctx),
+            UserEvent::Theme(theme) => self.ctx.set_theme(theme),
+            UserEvent::Fonts => self.fonts.install(&self.ctx),
         }
         self.layout_at = Some(Instant::now());
-        self.ask_for_redraw();
+        self.request_redraw();
     }
 }

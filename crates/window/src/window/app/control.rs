@@ -1,4 +1,4 @@
-//! What others ask of the window from outside: its own thread does it, as if the person had done it here.
+//! Remote control of the window: its requests run on the window's thread, like user actions.
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
@@ -9,86 +9,86 @@ use std::time::{Duration, Instant};
 use winit::event_loop::{ActiveEventLoop, EventLoopProxy};
 
 use super::App;
-use crate::lent::Lent;
-use crate::session::{CurrentRelease, StillOrder};
+use crate::lent::RemoteChanges;
+use crate::session::{CurrentRelease, SnapshotRequest};
 use crate::state::{Action, Running, Source, Way};
-use crate::window::{Call, Control};
+use crate::window::{Control, UserEvent};
 use bokehcam::control::{Answer, Server, Status};
 use bokehcam::controller::{Controlled, Controller, Facts, Rules};
 use bokehcam::look::{Look, Patch};
 use bokehcam::sink::Release;
 use bokehcam::source::DepthChoice;
 
-/// How long the window, and who saves pictures, may take to answer.
-const PATIENCE: Duration = Duration::from_secs(3);
+/// Timeout for replies of the window's thread, and for saving pictures.
+const REPLY_TIMEOUT: Duration = Duration::from_secs(3);
 
-/// Something that the window's thread is to do for somebody else.
-type Errand = Box<dyn FnOnce(&mut App, &ActiveEventLoop) + Send>;
+/// A closure that the window's thread runs for remote control.
+type Task = Box<dyn FnOnce(&mut App, &ActiveEventLoop) + Send>;
 
-/// The window as those see it who control it.
+/// Handle with which remote control reaches the window.
 struct Remote {
-    errands: Sender<Errand>,
-    proxy: EventLoopProxy<Call>,
+    tasks: Sender<Task>,
+    proxy: EventLoopProxy<UserEvent>,
     release: CurrentRelease,
 }
 
-/// Listens to those who ask, until it is dropped.
-pub(super) struct Served {
-    /// Gone first, so that nobody waits for what is not done any more.
-    errands: Receiver<Errand>,
+/// The control server, and its state on the window's side.
+pub(super) struct RemoteControl {
+    /// The first field, so that it is dropped first: pending requests then fail instead of timing out.
+    tasks: Receiver<Task>,
     _server: Server,
-    /// What of the look is not the person's own.
-    lent: Lent,
-    /// A snapshot that waits for its frame.
-    order: Option<StillOrder>,
+    /// Look changes by remote control, which are not saved.
+    remote_changes: RemoteChanges,
+    /// A requested snapshot that waits for its frame.
+    request: Option<SnapshotRequest>,
 }
 
-impl Served {
+impl RemoteControl {
     pub fn begin(
         Control { claim, rules }: Control,
         release: CurrentRelease,
-        proxy: &EventLoopProxy<Call>,
+        proxy: &EventLoopProxy<UserEvent>,
     ) -> std::io::Result<Self> {
-        let (to, errands) = mpsc::channel();
-        let remote = Remote { errands: to, proxy: proxy.clone(), release };
+        let (to, tasks) = mpsc::channel();
+        let remote = Remote { tasks: to, proxy: proxy.clone(), release };
         let handler = Controller::begin(claim.name().clone(), "preview", rules, remote);
-        Ok(Self { errands, _server: claim.serve(handler)?, lent: Lent::default(), order: None })
+        Ok(Self { tasks, _server: claim.serve(handler)?, remote_changes: RemoteChanges::default(), request: None })
     }
 
-    /// The snapshot that was asked for from outside, for who saves it.
-    pub fn take_order(&mut self) -> Option<StillOrder> {
-        self.order.take()
+    /// Takes the pending snapshot request.
+    pub fn take_request(&mut self) -> Option<SnapshotRequest> {
+        self.request.take()
     }
 }
 
 impl Remote {
-    /// Has the window's thread do this.
-    fn ask<T: Send + 'static>(
+    /// Runs a closure on the window's thread, and waits for its result.
+    fn run_on_window<T: Send + 'static>(
         &self,
         what: impl FnOnce(&mut App, &ActiveEventLoop) -> T + Send + 'static,
     ) -> Result<T, Answer> {
         let (to, done) = mpsc::sync_channel(1);
-        // Whoever gave up waiting needs no answer.
-        let errand: Errand = Box::new(move |app, events| drop(to.try_send(what(app, events))));
-        self.errands.send(errand).map_err(|_| Answer::failed("the window is closed"))?;
-        // An event loop that is gone needs no waking.
-        let _ = self.proxy.send_event(Call::Control);
-        taken(&done)
+        // Ignored if the requester has timed out.
+        let task: Task = Box::new(move |app, events| drop(to.try_send(what(app, events))));
+        self.tasks.send(task).map_err(|_| Answer::failed("the window is closed"))?;
+        // Fails only if the event loop has ended.
+        let _ = self.proxy.send_event(UserEvent::Control);
+        receive_reply(&done)
     }
 }
 
-/// What somebody else gives, in time.
-fn taken<T>(from: &Receiver<T>) -> Result<T, Answer> {
-    from.recv_timeout(PATIENCE).map_err(|_| Answer::failed("the window does not answer in time"))
+/// Receives a reply, with a timeout.
+fn receive_reply<T>(from: &Receiver<T>) -> Result<T, Answer> {
+    from.recv_timeout(REPLY_TIMEOUT).map_err(|_| Answer::failed("the window does not answer in time"))
 }
 
 impl Controlled for Remote {
     fn status(&self) -> Result<Status, Answer> {
-        self.ask(|app, _| app.status())
+        self.run_on_window(|app, _| app.status())
     }
 
     fn switch(&self, on: Option<bool>) -> Result<bool, Answer> {
-        self.ask(move |app, events| {
+        self.run_on_window(move |app, events| {
             let on = on.unwrap_or(app.state.off);
             app.perform(Action::Off(!on), events);
             on
@@ -101,13 +101,13 @@ impl Controlled for Remote {
 
     fn change(&self, patch: Patch, rules: &Arc<dyn Rules>) -> Result<Option<String>, Answer> {
         let rules = Arc::clone(rules);
-        self.ask(move |app, events| app.change(&patch, &*rules, events))?
+        self.run_on_window(move |app, events| app.change(&patch, &*rules, events))?
     }
 
     fn make_depth_by(&self, way: &str) -> Result<(), Answer> {
         let way = way.parse().map_err(Answer::usage)?;
-        self.ask(move |app, events| {
-            app.can_make_depth_by(way)?;
+        self.run_on_window(move |app, events| {
+            app.check_depth_method(way)?;
             app.perform(Action::DepthBy(way), events);
             Ok(())
         })?
@@ -116,20 +116,20 @@ impl Controlled for Remote {
     fn save(&self, to: Option<&Path>) -> Result<PathBuf, Answer> {
         let to = to.map(Path::to_owned);
         let (answer, saved) = mpsc::sync_channel(1);
-        self.ask(move |app, _| app.snapshot_for(to, answer))??;
-        taken(&saved)?
+        self.run_on_window(move |app, _| app.snapshot_for_remote(to, answer))??;
+        receive_reply(&saved)?
     }
 }
 
 impl App {
-    /// Does what others ask for.
-    pub(super) fn listen(&mut self, events: &ActiveEventLoop) {
-        while let Some(errand) = self.served.as_ref().and_then(|served| served.errands.try_recv().ok()) {
-            errand(self, events);
+    /// Runs the queued requests of remote control.
+    pub(super) fn run_remote_tasks(&mut self, events: &ActiveEventLoop) {
+        while let Some(task) = self.remote_control.as_ref().and_then(|remote| remote.tasks.try_recv().ok()) {
+            task(self, events);
         }
     }
 
-    /// Changes the look for others, who lend it; gives back what of the change has no effect.
+    /// Applies a temporary look change. Returns a note about settings without effect.
     fn change(
         &mut self,
         patch: &Patch,
@@ -144,12 +144,12 @@ impl App {
         let before = self.state.chosen_look();
         self.perform(Action::Look { look: Box::new(look), stroke: None }, events);
         let after = self.state.chosen_look();
-        self.served.iter_mut().for_each(|served| served.lent.change(&before, &after));
+        self.remote_control.iter_mut().for_each(|remote| remote.remote_changes.record(&before, &after));
         Ok(note)
     }
 
-    /// Refuses a way to depth that the source has not; the answer names those that it has.
-    fn can_make_depth_by(&self, way: Way) -> Result<(), Answer> {
+    /// Checks that the source supports this depth method; the error lists those it supports.
+    fn check_depth_method(&self, way: Way) -> Result<(), Answer> {
         let ways = self.state.ways();
         if ways.contains(&way) {
             return Ok(());
@@ -161,14 +161,14 @@ impl App {
         Err(Answer::usage(format!("this source has no depth by {way}: {there}")))
     }
 
-    /// The look to be remembered: without what others have lent it.
-    pub(super) fn own_look(&self) -> Look {
+    /// Returns the look to be saved: without changes by remote control.
+    pub(super) fn look_to_save(&self) -> Look {
         let look = self.state.chosen_look();
-        self.served.as_ref().map_or_else(|| look.clone(), |served| served.lent.without(&look))
+        self.remote_control.as_ref().map_or_else(|| look.clone(), |remote| remote.remote_changes.without(&look))
     }
 
-    /// Saves the frame that is shown for somebody who waits for that.
-    fn snapshot_for(
+    /// Saves the displayed frame, and sends the result to `answer`.
+    fn snapshot_for_remote(
         &mut self,
         to: Option<PathBuf>,
         answer: SyncSender<Result<PathBuf, Answer>>,
@@ -176,17 +176,17 @@ impl App {
         if self.view.is_none() {
             return Err(Answer::failed("there is no picture yet"));
         }
-        if let Some(served) = &mut self.served {
-            served.order = Some(StillOrder { to, answer });
+        if let Some(remote_control) = &mut self.remote_control {
+            remote_control.request = Some(SnapshotRequest { to, answer });
             self.snapshot();
         }
         Ok(())
     }
 
-    /// Lets no picture pass, to the screen neither, or lets them again.
+    /// Blocks or unblocks pictures, both for the screen and the outputs.
     pub(super) fn switch_off(&mut self, off: bool) {
         self.off.store(off, Ordering::Release);
-        self.heard_at = Instant::now();
+        self.last_frame_at = Instant::now();
         if off {
             (self.view, self.held, self.snapshot_due) = (None, None, false);
             self.session.let_go();
@@ -217,7 +217,8 @@ impl App {
     }
 }
 
-/// What decides which looks a source can have. Depth that was declined is none of it.
+/// Returns the source's properties that decide which looks it supports. `DepthChoice::Auto` because declined depth does
+/// not matter here.
 fn facts(&Running { kind, size, has_depth, depth_from, .. }: &Running) -> Facts {
     Facts { kind, size, has_depth, depth_from, depth_choice: DepthChoice::Auto }
 }

@@ -1,4 +1,4 @@
-//! Files and folders that are dropped on the window.
+//! Files and folders dropped on the window.
 
 use std::path::Path;
 
@@ -7,14 +7,14 @@ use crate::dialog::name_of;
 use crate::state::Request;
 
 impl App {
-    /// Offers what was dropped as a source; of several, the first.
+    /// Offers a dropped path as a source; only the first of several.
     pub(super) fn on_drop(&mut self, path: &Path) {
         if std::mem::replace(&mut self.has_dropped, true) {
             self.state.note(format!("One source at a time: {} is left out.", path.display()));
             return self.on_input();
         }
         match name_of(path) {
-            Ok(name) => self.session.order(Request::Offer(name)),
+            Ok(name) => self.session.send(Request::Offer(name)),
             Err(line) => self.state.note(line),
         }
         self.on_input();

@@ -1,4 +1,5 @@
-//! The picture that stays: the session blurs it anew with every look; and whether the source rests, or is silent.
+//! Holds a still picture, which the session blurs again with every look, and decides whether the source is paused or
+//! silent.
 
 use std::time::{Duration, Instant};
 
@@ -12,15 +13,15 @@ use bokehcam::look::Look;
 use bokehcam::optics::CocField;
 use bokehcam::pipeline::View;
 
-/// A window that was hidden for less than this is only passed by.
-const REST_AFTER: Duration = Duration::from_secs(2);
-/// After this long without a frame, and this many periods of the source, the person is told.
-const SILENCE: Duration = Duration::from_secs(2);
-const SILENT_PERIODS: u32 = 10;
+/// Time a window must be hidden before the source pauses, so that switching windows does not pause it.
+const PAUSE_DELAY: Duration = Duration::from_secs(2);
+/// Time without a frame after which the user is notified: at least this, and at least this number of frame periods.
+const MIN_SILENCE: Duration = Duration::from_secs(2);
+const MIN_SILENT_PERIODS: u32 = 10;
 
 impl App {
-    /// Has the session blur the picture that stays, if one does, with every look.
-    pub(super) fn hold(&mut self) {
+    /// Starts or ends holding the displayed picture, so that the session blurs it with every new look.
+    pub(super) fn update_held(&mut self) {
         if !self.state.keeps_picture() {
             if self.held.take().is_some() {
                 self.session.let_go();
@@ -28,25 +29,25 @@ impl App {
             return;
         }
         let Some(view) = self.view.as_ref().filter(|_| self.held.is_none()) else { return };
-        // Frames that are only on the GPU are replaced until one is not, while they come.
+        // While frames arrive, those that are only on the GPU are replaced, because a held frame must be in memory.
         if view.picture.memory().is_none() && matches!(self.state.source, Source::Running(_)) {
             return;
         }
         let Some(still) = still(view, self.holds + 1) else { return };
         self.holds = still.number;
         self.held = Some(still.number);
-        // A photo was blurred as well as the time between frames allows.
+        // A settled photo is blurred again because live frames use a lower quality level.
         let is_behind = view.is_between || self.snapshot_due || self.state.settled;
         self.session.hold(still, is_behind);
     }
 
-    /// Whether a frame was made without the depth that a look follows, and others would have it.
+    /// Whether a frame lacks the depth that `look` needs, although the source can provide it.
     pub(super) fn lacks_depth(&self, view: &View, look: &Look) -> bool {
         view.depth.is_none() && look.effect.follows_depth() && self.state.may_have_depth()
     }
 
-    /// Shows the picture that stays in another look; whether it is still the one that stays.
-    pub(super) fn show_again(&mut self, still: Still) -> bool {
+    /// Shows the held picture with another look. Returns false if another picture is held by now.
+    pub(super) fn show_reblurred(&mut self, still: Still) -> bool {
         let Still { number, images: Images { depth, blurred, .. }, coc, change, quality } = still;
         let Some(view) = self.view.as_mut().filter(|_| self.held == Some(number)) else { return false };
         if view.color.is_none() {
@@ -63,30 +64,31 @@ impl App {
         true
     }
 
-    /// Updates how long a running source has been silent. A camera that is gone reports no error, as it may come back.
+    /// Updates how long a running source has been silent. An unplugged camera reports no error, because it may come
+    /// back.
     pub(super) fn check_silence(&mut self) {
         let silent = match &self.state.source {
             Source::Running(running) if self.watch.is_some() && !self.state.off => {
-                let patience = SILENCE.max(Duration::from_nanos(running.period_ns) * SILENT_PERIODS);
-                Some(self.heard_at.elapsed()).filter(|silent| *silent > patience)
+                let patience = MIN_SILENCE.max(Duration::from_nanos(running.period_ns) * MIN_SILENT_PERIODS);
+                Some(self.last_frame_at.elapsed()).filter(|silent| *silent > patience)
             }
             _ => None,
         };
         let silent_s = silent.map(|silent| silent.as_secs());
         if std::mem::replace(&mut self.state.silent_s, silent_s) != silent_s {
             self.layout_at = Some(Instant::now());
-            self.ask_for_redraw();
+            self.request_redraw();
         }
     }
 
-    /// Lets the source rest while the window is hidden or has stopped it, unless something is written.
-    pub(super) fn watch(&mut self) {
+    /// Pauses the source while the window is hidden or stands still, unless an output is active.
+    pub(super) fn update_watch(&mut self) {
         self.hidden_at = if self.is_hidden() { self.hidden_at.or_else(|| Some(Instant::now())) } else { None };
-        let is_passed_by = self.hidden_at.is_none_or(|at| at.elapsed() < REST_AFTER);
-        match (&self.watch, is_passed_by && !self.state.stands_still()) {
+        let is_watched = self.hidden_at.is_none_or(|at| at.elapsed() < PAUSE_DELAY);
+        match (&self.watch, is_watched && !self.state.stands_still()) {
             (None, true) => {
                 self.watch = Some(self.demand.watch());
-                self.heard_at = Instant::now();
+                self.last_frame_at = Instant::now();
                 self.state.meters.restart();
             }
             (Some(_), false) => self.watch = None,
@@ -95,7 +97,7 @@ impl App {
     }
 }
 
-/// A frame as data, to be known by this number; `None` where it is only on a device.
+/// Copies a frame to memory as still number `number`; `None` if it is only on a device.
 pub(super) fn still(view: &View, number: u64) -> Option<Still> {
     let blurred = view.picture.memory();
     let color = view.color.as_deref().or(blurred)?.clone();
@@ -103,7 +105,7 @@ pub(super) fn still(view: &View, number: u64) -> Option<Still> {
     Some(Still { number, images, coc: view.coc, change: view.change, quality: view.trace.quality })
 }
 
-/// Distance of the focal plane of a frame, where its blur follows depth.
+/// Returns the distance of the focal plane in metres, if the blur follows depth.
 pub(super) fn focus_m(coc: &CocField) -> Option<f32> {
     match coc {
         CocField::Depth(coc) => Some(coc.focus_m),

@@ -1,4 +1,4 @@
-//! The window's events.
+//! The window's event loop.
 
 mod calls;
 mod control;
@@ -20,7 +20,7 @@ use winit::window::WindowId;
 
 use super::gfx::Gfx;
 use super::memory::Memory;
-use super::{Call, Ended, Preview, WindowError};
+use super::{Ended, Preview, UserEvent, WindowError};
 use crate::meters::Totals;
 use crate::panel::{Panel, SystemFonts};
 use crate::session::{Closed, Session, Wake};
@@ -36,95 +36,95 @@ use bokehcam::link::demand::{Demand, Watch};
 use bokehcam::pipeline::{View, Wanted};
 use bokehcam::stats::WindowUse;
 
-/// While frames come, instruments are laid out anew this often.
+/// Layout interval of the instruments while frames arrive.
 const INSTRUMENTS_PERIOD: Duration = Duration::from_millis(200);
-/// The stop flag is polled at least this often.
+/// Maximum interval of polling the stop flag.
 const STOP_POLL: Duration = Duration::from_millis(250);
 
 pub(super) struct App {
     state: State,
     wanted: Arc<Wanted>,
-    /// Whether a snapshot waits for the next frame that can be saved.
+    /// Whether a snapshot waits for a frame that can be saved.
     snapshot_due: bool,
     panel: Panel,
     ctx: egui::Context,
     fonts: SystemFonts,
-    proxy: EventLoopProxy<Call>,
+    proxy: EventLoopProxy<UserEvent>,
     gfx: Option<Gfx>,
     device: Option<Arc<Device>>,
     session: Session,
-    /// Whether a wake-up is already on its way, so that a busy session does not fill the event queue.
+    /// Whether a wake-up is pending, so that a busy session does not flood the event queue.
     wake_pending: Arc<AtomicBool>,
     frames: Option<Receiver<View>>,
-    /// How far the plate is, where that makes the depth.
+    /// Progress of the background plate, if depth comes from it.
     guide: Option<Arc<Guide>>,
     seeking: seek::Seeking,
     view: Option<View>,
-    /// Whether `view` was not on the screen yet.
+    /// Whether `view` has not been displayed yet.
     view_is_new: bool,
     false_colors: Views,
-    /// The view that `false_colors` drew last, if the frame is still the same.
+    /// The view that `false_colors` drew last; `None` after a new frame.
     drawn: Option<Shown>,
-    /// The number of the frame that the session blurs anew, and of all of them so far.
+    /// Number of the held frame, and the highest number so far.
     held: Option<u64>,
     holds: u64,
-    /// While it is held, the source does not rest.
+    /// Keeps the source running.
     watch: Option<Watch>,
     demand: Demand,
-    /// What frames are blurred with, once the present look has reached them.
+    /// Settings of the current look's blur.
     settings: Option<bokeh::Settings>,
     blank: ColorImage,
-    /// What others see while it is off.
+    /// The still card, shown while the picture is off.
     card: ColorImage,
     clock: Clock,
-    /// When the last frame came, or its source was opened.
-    heard_at: Instant,
-    /// When controls are to be laid out next, and when they were last.
+    /// Time of the last frame, or of opening its source.
+    last_frame_at: Instant,
+    /// Time of the next layout of the controls, and of the last one.
     layout_at: Option<Instant>,
     laid_out: Instant,
-    /// The oldest input whose effect is not on the screen yet.
+    /// Time of the oldest input whose effect is not displayed yet.
     input_at: Option<Instant>,
-    /// Whether something was dropped on the window just now: files of one drop come one after the other.
+    /// Whether a path was dropped in this event batch: files of one drop arrive one after the other.
     has_dropped: bool,
-    /// Whether the window is hidden completely, and whether it has no pixels.
+    /// Whether the window is fully covered; `empty` is whether it has zero size.
     covered: bool,
-    /// Since when nobody can see it.
+    /// Time since which the window is invisible.
     hidden_at: Option<Instant>,
     empty: bool,
-    /// What is remembered of the window, and where.
+    /// Persistent state of the window, and its file.
     memory: Memory,
     memory_file: Option<PathBuf>,
     close_at_end: bool,
-    /// Those who ask from outside, if they can.
-    served: Option<control::Served>,
-    /// Whether outputs have the still card: for who hands pictures to them.
+    /// Remote control, if it is enabled.
+    remote_control: Option<control::RemoteControl>,
+    /// Whether outputs get the still card; shared with the session.
     off: Arc<AtomicBool>,
     stop: Arc<AtomicBool>,
     failed: Option<WindowError>,
 }
 
 impl App {
-    /// Starts the session at once, so that the source opens while the window does.
-    pub fn new(preview: Preview, proxy: EventLoopProxy<Call>) -> Result<Self, WindowError> {
+    /// Starts the session immediately, so that the source opens in parallel with the window.
+    pub fn new(preview: Preview, proxy: EventLoopProxy<UserEvent>) -> Result<Self, WindowError> {
         let Preview { mut state, session, theme, device, close_at_end, memory, memory_file, control, stop } = preview;
         let wake_pending = Arc::new(AtomicBool::new(false));
         let pending = Arc::clone(&wake_pending);
-        // An event loop that is gone needs no waking.
+        // Fails only if the event loop has ended.
         let to_wake = proxy.clone();
         let wake: Wake = Arc::new(move || {
             if !pending.swap(true, Ordering::AcqRel) {
-                let _ = to_wake.send_event(Call::Session);
+                let _ = to_wake.send_event(UserEvent::Session);
             }
         });
         let control = control.inspect_err(|why| tracing::warn!("{why}")).ok();
-        let served = control.map(|control| control::Served::begin(control, Arc::clone(&session.release), &proxy));
-        let served = served.transpose()?;
+        let begin = |control| control::RemoteControl::begin(control, Arc::clone(&session.release), &proxy);
+        let remote_control = control.map(begin).transpose()?;
         let off = Arc::clone(&session.off);
         let (wanted, demand) = (Arc::clone(&session.wanted), session.demand.clone());
         let clock = Clock::system();
         state.meters.begin(clock.now_ns());
         let ctx = egui::Context::default();
-        let fonts = calls::follow(&ctx, theme, &proxy);
+        let fonts = calls::init_appearance(&ctx, theme, &proxy);
         Ok(Self {
             state,
             wanted,
@@ -152,7 +152,7 @@ impl App {
             blank: ColorImage::new(16, 9),
             card: ColorImage::new(0, 0),
             clock,
-            heard_at: Instant::now(),
+            last_frame_at: Instant::now(),
             layout_at: Some(Instant::now()),
             laid_out: Instant::now(),
             input_at: None,
@@ -163,22 +163,23 @@ impl App {
             memory,
             memory_file,
             close_at_end,
-            served,
+            remote_control,
             off,
             stop,
             failed: None,
         })
     }
 
-    /// Closes the window, then the session, and adds what was shown to the report.
+    /// Closes the window and then the session, and adds display statistics to the report.
     pub fn end(self) -> Result<Ended, WindowError> {
-        let Self { gfx, view, frames, session, state, failed, served, .. } = self;
-        // Nobody can ask any more.
-        drop(served);
-        // The window goes at once; outputs may take a while to be completed.
+        let Self { gfx, view, frames, session, state, failed, remote_control, .. } = self;
+        // Stops remote control first.
+        drop(remote_control);
+        // Closes the window immediately; completing the outputs may take a while.
         drop((gfx, view));
         let Closed { mut report, failed: unwritten } = session.close();
-        // Only now: without a receiver, the last frames would be counted neither as delivered nor as dropped.
+        // Only after the session: without a receiver, the last frames would be counted as neither delivered nor
+        // dropped.
         drop(frames);
         if let Some(report) = &mut report {
             report.window = Some(window_use(&state));
@@ -209,7 +210,7 @@ impl App {
             self.input_at.get_or_insert(now);
         }
         self.layout_at = Some(now);
-        self.ask_for_redraw();
+        self.request_redraw();
     }
 }
 
@@ -218,7 +219,7 @@ fn window_use(state: &State) -> WindowUse {
     WindowUse::new(*presented, *first_frame_ns, [latency, reaction, present])
 }
 
-impl ApplicationHandler<Call> for App {
+impl ApplicationHandler<UserEvent> for App {
     fn resumed(&mut self, events: &ActiveEventLoop) {
         if self.gfx.is_some() {
             return;
@@ -235,11 +236,11 @@ impl ApplicationHandler<Call> for App {
             }
         }
         self.receive(events);
-        self.ask_for_redraw();
+        self.request_redraw();
     }
 
-    fn user_event(&mut self, events: &ActiveEventLoop, call: Call) {
-        self.answer(call, events);
+    fn user_event(&mut self, events: &ActiveEventLoop, call: UserEvent) {
+        self.handle_user_event(call, events);
     }
 
     fn window_event(&mut self, events: &ActiveEventLoop, _: WindowId, event: WindowEvent) {
@@ -259,9 +260,9 @@ impl ApplicationHandler<Call> for App {
             WindowEvent::DroppedFile(path) => return self.on_drop(path),
             WindowEvent::Occluded(hidden) => {
                 self.covered = *hidden;
-                // Waiting while nobody can see the window is no latency.
+                // Time while the window is invisible does not count as latency.
                 self.input_at = None;
-                return self.ask_for_redraw();
+                return self.request_redraw();
             }
             WindowEvent::Resized(size) => {
                 gfx.presenter.resize((size.width, size.height));
@@ -273,7 +274,7 @@ impl ApplicationHandler<Call> for App {
         if gfx.input.on_window_event(&gfx.window, &event).repaint {
             self.on_input();
         }
-        // egui takes a press to be where the pointer is when controls are laid out: before it moves on.
+        // egui locates a press at the pointer's position during layout, so lay out before the pointer moves on.
         let is_press = match &event {
             WindowEvent::Touch(touch) => touch.phase != TouchPhase::Moved,
             other => matches!(other, WindowEvent::MouseInput { .. }),
@@ -288,13 +289,13 @@ impl ApplicationHandler<Call> for App {
         if self.stop.load(Ordering::Relaxed) {
             return events.exit();
         }
-        self.watch();
+        self.update_watch();
         self.check_silence();
         let now = Instant::now();
         if self.layout_at.is_some_and(|at| at <= now) {
-            self.ask_for_redraw();
+            self.request_redraw();
         }
-        // A layout that is due needs no timer: it waits for its redraw, which the display may hold back.
+        // A layout that is already due needs no timer: it waits for its redraw, which the display may throttle.
         let layout_at = self.layout_at.filter(|at| !self.is_hidden() && *at > now);
         let layout_at = layout_at.map_or(now + STOP_POLL, |at| at.min(now + STOP_POLL));
         events.set_control_flow(ControlFlow::WaitUntil(layout_at));
@@ -305,7 +306,7 @@ impl ApplicationHandler<Call> for App {
         self.memory.size = self.gfx.as_ref().and_then(Gfx::size).or(self.memory.size);
         self.memory.habits = self.state.habits.clone();
         self.memory.set_source(&self.state.source_name);
-        self.memory.set_look(&self.own_look());
+        self.memory.set_look(&self.look_to_save());
         self.memory.write(path);
     }
 }

@@ -1,4 +1,4 @@
-//! What comes from the session: news, and frames.
+//! Receives updates and frames from the session.
 
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
@@ -12,13 +12,13 @@ use crate::state::Source;
 use bokehcam::link::Receiver;
 use bokehcam::pipeline::View;
 
-/// Where a recording is, is shown anew so often while it plays.
-const BAR_EVERY: Duration = Duration::from_millis(250);
+/// Update interval of the playback position.
+const POSITION_PERIOD: Duration = Duration::from_millis(250);
 
 impl App {
-    /// Handles what the session sent, and takes the newest frame.
+    /// Handles the session's events, and takes the newest frame.
     pub(super) fn receive(&mut self, events: &ActiveEventLoop) {
-        // First of all, so that what comes after the queue was read wakes this thread again.
+        // Before reading the queue, so that later events wake this thread again.
         self.wake_pending.swap(false, Ordering::AcqRel);
         let mut changed = false;
         while let Some(event) = self.session.hear() {
@@ -26,22 +26,22 @@ impl App {
                 SessionEvent::Views(frames, guide, seeker) => {
                     self.guide = guide;
                     (self.seeking, self.state.transport, self.state.settled) = (Seeking::of(seeker), None, false);
-                    changed |= self.state.guide(None);
-                    self.heard_at = Instant::now();
-                    // It was meant for the source before.
+                    changed |= self.state.set_plate_step(None);
+                    self.last_frame_at = Instant::now();
+                    // A pending snapshot was meant for the previous source.
                     self.snapshot_due = false;
                     self.frames = Some(frames);
                     self.state.meters.restart();
                 }
-                SessionEvent::Blurred(blurred) => changed |= self.show_again(*blurred),
+                SessionEvent::Blurred(blurred) => changed |= self.show_reblurred(*blurred),
                 SessionEvent::Copy(text) => {
                     if let Some(gfx) = &mut self.gfx {
                         gfx.input.set_clipboard_text(text);
                     }
                 }
-                SessionEvent::Update(told) => {
-                    if let Some(look) = self.state.hear(told) {
-                        self.session.order(look);
+                SessionEvent::Update(update) => {
+                    if let Some(look) = self.state.apply_update(update) {
+                        self.session.send(look);
                     }
                     changed = true;
                 }
@@ -56,31 +56,31 @@ impl App {
                 events.exit();
             }
         }
-        // What was on its way when it was switched off is not for the screen either.
+        // Discards frames that were in flight when the picture was switched off.
         let newest = self.frames.as_mut().and_then(Receiver::try_recv).filter(|_| !self.state.off);
         if newest.is_some() {
-            self.heard_at = Instant::now();
+            self.last_frame_at = Instant::now();
             self.check_silence();
-            if self.state.guide(self.guide.as_ref().map(|guide| guide.step())) {
+            if self.state.set_plate_step(self.guide.as_ref().map(|guide| guide.step())) {
                 self.layout_at = Some(Instant::now());
                 changed = true;
             }
         }
-        // A frozen frame has to be in memory, to be saved, and have depth of its own: frames are replaced until one is.
+        // A frozen frame must be in memory, to be saved, and have its own depth: frames are replaced until both hold.
         let stays = self.state.frozen || self.state.settled;
         let may_stay = |view: &View| view.picture.memory().is_some() && !view.trace.depth_held;
         let stays = stays && self.view.as_ref().is_some_and(may_stay);
         if let Some(view) = newest.filter(|view| !stays || self.seeking.is_answer(view)) {
-            self.note_place(&view);
-            if self.state.transport.is_some() && self.laid_out.elapsed() > BAR_EVERY {
+            self.update_position(&view);
+            if self.state.transport.is_some() && self.laid_out.elapsed() > POSITION_PERIOD {
                 self.layout_at = Some(Instant::now());
             }
-            self.learn_from(&view);
+            self.update_from_frame(&view);
             let is_whole = view.picture.memory().is_some() && !view.is_between && !view.trace.depth_held;
-            // A number of frames that was asked for is shown.
+            // With `close_at_end`, all requested frames are shown.
             let may_settle = self.state.is_photo() && !self.close_at_end;
             self.state.settled = may_settle && is_whole && !self.lacks_depth(&view, &self.state.look);
-            // Another frame stays now.
+            // The new frame must be held anew.
             self.held = None;
             self.view = Some(view);
             self.view_is_new = true;
@@ -89,10 +89,10 @@ impl App {
                 self.snapshot();
             }
         }
-        self.hold();
-        self.watch();
+        self.update_held();
+        self.update_watch();
         if changed {
-            self.ask_for_redraw();
+            self.request_redraw();
         }
     }
 }

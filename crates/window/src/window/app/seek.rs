@@ -1,4 +1,4 @@
-//! Going back and forth in a recording.
+//! Seeking in a recording.
 
 use std::sync::Arc;
 
@@ -7,45 +7,45 @@ use crate::state::Transport;
 use bokehcam::capture::Seeker;
 use bokehcam::pipeline::View;
 
-/// What the window knows of wishes for frames.
+/// State of seek requests.
 #[derive(Default)]
 pub(super) struct Seeking {
     seeker: Option<Arc<Seeker>>,
-    /// The numbers of the newest wish and of the last one that was answered.
-    asked: u64,
-    answered: u64,
+    /// Numbers of the newest request and of the last one whose frame was displayed.
+    requested: u64,
+    displayed: u64,
 }
 
 impl Seeking {
-    /// Of another source.
+    /// Creates the state for a new source.
     pub fn of(seeker: Option<Arc<Seeker>>) -> Self {
-        Self { seeker, asked: 0, answered: 0 }
+        Self { seeker, requested: 0, displayed: 0 }
     }
 
-    /// Whether a frame answers a wish that no frame before it did: it is shown though the picture is frozen.
+    /// Whether a frame is the first one for a newer request: it is displayed even while the picture is frozen.
     pub fn is_answer(&self, view: &View) -> bool {
-        view.seek > self.answered
+        view.seek > self.displayed
     }
 }
 
 impl App {
     pub(super) fn seek(&mut self, place: usize) {
         if let Some(seeker) = &self.seeking.seeker {
-            self.seeking.asked = seeker.go_to(place);
-            self.tell_place(place);
+            self.seeking.requested = seeker.go_to(place);
+            self.set_position(place);
         }
     }
 
-    /// Takes note of where the frame is that is shown now.
-    pub(super) fn note_place(&mut self, view: &View) {
-        self.seeking.answered = view.seek;
-        let is_behind = self.seeking.answered < self.seeking.asked;
+    /// Updates the playback position with that of the displayed frame.
+    pub(super) fn update_position(&mut self, view: &View) {
+        self.seeking.displayed = view.seek;
+        let is_behind = self.seeking.displayed < self.seeking.requested;
         if let Some(seeker) = self.seeking.seeker.as_ref().filter(|_| !is_behind) {
-            self.tell_place(seeker.place_of(view.stamp));
+            self.set_position(seeker.place_of(view.stamp));
         }
     }
 
-    fn tell_place(&mut self, place: usize) {
+    fn set_position(&mut self, place: usize) {
         let transport = |seeker: &Arc<Seeker>| Transport {
             place,
             frames: seeker.frames(),

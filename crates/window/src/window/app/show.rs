@@ -1,4 +1,4 @@
-//! Drawing the window: the controls are laid out, what the person did with them is carried out, and the frame is shown.
+//! Draws the window: lays out the controls, performs the resulting actions, and presents the frame.
 
 use std::time::{Duration, Instant};
 
@@ -9,24 +9,24 @@ use super::hold::still;
 use super::{App, control};
 use crate::panel::{self, Canvas};
 use crate::present::{Area, Controls, Drawing, Image};
-use crate::session::Saving;
+use crate::session::SaveOptions;
 use crate::state::{Action, Request, Source, State};
 use crate::views::Probe;
 use bokehcam::compute::Place;
 use bokehcam::frame::ColorImage;
 use bokehcam::sink::card;
 
-/// Shown when there is nothing to save.
+/// Shown if there is nothing to save.
 const NO_PICTURE: &str = "There is no picture to save.";
 
-/// Shown when another presenter took over.
+/// Shown when the CPU presenter takes over.
 const GPU_FAILED: &str = "The GPU failed: the CPU takes over, more slowly.";
 
-/// The picture's size until the source tells it.
-const USUAL_SIZE: (u32, u32) = (1280, 720);
+/// Assumed picture size until the source is open.
+const DEFAULT_SIZE: (u32, u32) = (1280, 720);
 
 impl App {
-    pub(super) fn ask_for_redraw(&self) {
+    pub(super) fn request_redraw(&self) {
         if let Some(gfx) = self.gfx.as_ref().filter(|_| !self.is_hidden()) {
             gfx.window.request_redraw();
         }
@@ -40,11 +40,11 @@ impl App {
         match (&self.view, &self.state.source) {
             (Some(view), _) => view.picture.size(),
             (None, Source::Running(running)) => running.size,
-            (None, _) => USUAL_SIZE,
+            (None, _) => DEFAULT_SIZE,
         }
     }
 
-    /// Lays out the controls and carries out what the person did with them.
+    /// Lays out the controls and performs the resulting actions.
     pub(super) fn lay_out(&mut self, events: &ActiveEventLoop) {
         let size = self.picture_size();
         let Some(gfx) = &mut self.gfx else { return };
@@ -67,20 +67,20 @@ impl App {
             self.layout_at = Some(self.laid_out);
             gfx.window.request_redraw();
         }
-        // The picture makes room for the panel, and what is drawn over the picture goes along.
+        // A change of the panel's size moves the picture and its overlays: lay out again.
         if panel::room_px(&self.ctx) != room {
             self.layout_at = Some(self.laid_out);
             gfx.window.request_redraw();
         }
         if !actions.is_empty() {
-            // Another layout right away shows what they changed.
+            // Lays out again immediately, to show their effect.
             self.layout_at = Some(self.laid_out);
             actions.into_iter().for_each(|action| self.perform(action, events));
-            self.ask_for_redraw();
+            self.request_redraw();
         }
     }
 
-    /// Applies an action to the state; what this thread cannot do itself goes to the session.
+    /// Applies an action to the state, and carries out its requests or forwards them to the session.
     pub(super) fn perform(&mut self, action: Action, events: &ActiveEventLoop) {
         for request in self.state.apply(action) {
             match request {
@@ -95,22 +95,21 @@ impl App {
                 Request::Off(off) => self.switch_off(off),
                 Request::Close => events.exit(),
                 Request::Look(look) => {
-                    // Before the look, so that nobody tries it on a photo's picture without depth.
+                    // Before the look, so that it is not applied to a photo's picture without depth.
                     self.state.settled &= !self.view.as_ref().is_some_and(|view| self.lacks_depth(view, &look));
-                    self.hold();
-                    self.session.order(Request::Look(look));
+                    self.update_held();
+                    self.session.send(Request::Look(look));
                     self.update_settings();
                 }
-                other => self.session.order(other),
+                other => self.session.send(other),
             }
         }
         self.update_wanted();
-        self.hold();
-        self.watch();
+        self.update_held();
+        self.update_watch();
     }
 
-    /// Tells the pipeline where pictures are needed from now on. They are read back from the GPU only where something
-    /// other than drawing uses them.
+    /// Sets where the pipeline must deliver pictures. They are read back from the GPU only for uses other than drawing.
     pub(super) fn update_wanted(&self) {
         let drawn_on_gpu = self.gfx.as_ref().is_some_and(|gfx| gfx.presenter.has_device());
         let used_in_memory =
@@ -120,12 +119,12 @@ impl App {
             (true, false) => Place::Device,
             (true, true) => Place::Both,
         });
-        // What one looks at for long, or keeps, has depth of its own.
+        // Saved or frozen frames must have their own depth map.
         self.wanted.want_own_depth(self.snapshot_due || self.state.frozen);
     }
 
-    /// Saves the frame that is shown. If it is only on the GPU, was blurred between two looks so that no settings could repeat
-    /// it, or has the depth of an earlier frame, the next frame that has none of that is saved instead.
+    /// Saves the displayed frame. If it is only on the GPU, was blurred between two looks (no settings could reproduce
+    /// it), or reuses an earlier frame's depth, saves the next frame without these defects instead.
     pub(super) fn snapshot(&mut self) {
         let Some(view) = &self.view else { return self.state.note(NO_PICTURE) };
         let is_running = matches!(self.state.source, Source::Running(_));
@@ -137,11 +136,11 @@ impl App {
         self.snapshot_due = view.picture.memory().is_none() || is_running && (between || depth_held && !is_frozen);
         self.update_wanted();
         let Some(still) = still(view, 0).filter(|_| !self.snapshot_due) else { return };
-        let order = self.served.as_mut().and_then(control::Served::take_order);
-        self.session.save(still, Saving { with_sources: self.state.habits.keep_sources, order });
+        let request = self.remote_control.as_mut().and_then(control::RemoteControl::take_request);
+        self.session.save(still, SaveOptions { with_sources: self.state.habits.keep_sources, request });
     }
 
-    /// Shows the frame, or the view of it that is chosen, under the controls as they were laid out last.
+    /// Presents the frame, or the selected view of it, below the controls of the last layout.
     pub(super) fn draw(&mut self, events: &ActiveEventLoop) {
         let size = self.picture_size();
         let hidden = self.is_hidden();
@@ -155,16 +154,16 @@ impl App {
         let false_colors = self.state.legend.map(|_| self.false_colors.image());
         let State { mirror, split, source, .. } = &self.state;
         let view = self.view.as_ref();
-        // Off, the person sees what others see.
+        // While off, the window shows the same card as the outputs.
         if self.state.off && self.card.size() != size {
             self.card = ColorImage::new(size.0, size.1);
             card::draw(&mut self.card);
         }
         let none = if self.state.off { &self.card } else { &self.blank };
         let in_memory = view.and_then(|view| view.picture.memory()).unwrap_or(none);
-        let on_device = view.and_then(|view| view.picture.device()).filter(|there| gfx.presenter.takes(there));
+        let on_device = view.and_then(|view| view.picture.device()).filter(|there| gfx.presenter.supports(there));
         let picture = on_device.map_or(Image::Memory(in_memory), Image::Device);
-        // Where nothing was blurred, before and after are the same.
+        // If nothing was blurred, before and after are identical.
         let before = view.map(|view| view.color.as_deref().unwrap_or(in_memory));
         let background = if self.ctx.theme() == egui::Theme::Dark { [18, 18, 20] } else { [232, 232, 236] };
         let (area, part) = gfx.area(size, panel::room_px(&self.ctx), self.state.zoom, *mirror);
@@ -188,12 +187,12 @@ impl App {
             self.state.note(GPU_FAILED);
         }
         let now_ns = self.clock.now_ns();
-        // A frame counts once, however often it is drawn.
+        // Counts each frame once, even if it is drawn repeatedly.
         if let Some(view) = self.view.as_ref().filter(|_| std::mem::take(&mut self.view_is_new)) {
-            self.state.meters.presented(view, now_ns, now_ns - began_ns);
+            self.state.meters.add_frame(view, now_ns, now_ns - began_ns);
         }
         if let Some(input_at) = self.input_at.take() {
-            self.state.meters.reacted(input_at.elapsed().as_nanos() as u64);
+            self.state.meters.add_reaction(input_at.elapsed().as_nanos() as u64);
         }
     }
 }

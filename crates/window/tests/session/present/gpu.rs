@@ -1,4 +1,4 @@
-//! The same by a GPU.
+//! The window's content, drawn by a GPU.
 
 use std::sync::Arc;
 
@@ -20,7 +20,7 @@ fn device() -> Arc<Device> {
     Arc::new(Device::open(false, None).expect("a Vulkan adapter, software included"))
 }
 
-/// What the GPU draws, as words of the window.
+/// Returns the GPU's output as window pixels.
 fn drawn(device: &Arc<Device>, canvas: &mut Canvas, (width, height): (u32, u32), drawing: &Drawing) -> Vec<u32> {
     let gpu = &device.device;
     let size = wgpu::Extent3d { width, height, depth_or_array_layers: 1 };
@@ -59,7 +59,7 @@ fn read(device: &Device, buffer: &wgpu::Buffer) -> Vec<u8> {
     buffer.get_mapped_range(..).expect("it is mapped").to_vec()
 }
 
-/// Equal up to `limit` codes, but for one channel in `but_one_in` that may be off by up to `worst`.
+/// Compares channels: equal up to `limit` codes, except one in `but_one_in` that may differ by up to `worst`.
 fn close(ours: &[u32], theirs: &[u32], (limit, but_one_in, worst): (u8, usize, u8), what: &str) {
     assert_eq!(ours.len(), theirs.len(), "{what}");
     let bytes = |pixels: &[u32]| pixels.iter().flat_map(|pixel| pixel.to_be_bytes()).collect::<Vec<u8>>();
@@ -76,7 +76,7 @@ fn what_was_only_attempted_leaves_the_device_sound() {
     let refused = wgpu::BufferDescriptor {
         label: None,
         size: 16,
-        // Both at once is never allowed.
+        // This combination is never valid.
         usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::MAP_WRITE | wgpu::BufferUsages::STORAGE,
         mapped_at_creation: false,
     };
@@ -96,7 +96,7 @@ fn both_presenters_show_the_same_pictures() {
             let ours = paint(size, &shown, None);
             let theirs = drawn(&device, &mut canvas, size, &shown);
             let what = format!("{layout}, {manner}");
-            // Where nothing is computed, nothing is rounded.
+            // An unscaled picture is copied exactly.
             let limit = if from == (place.width, place.height) && !shown.stale { 0 } else { 1 };
             close(&ours, &theirs, (limit, usize::MAX, limit), &what);
         }
@@ -113,13 +113,14 @@ fn both_presenters_show_the_same_controls() {
     for pixels_per_point in [1.0, 1.5] {
         let (ours, theirs) = (context(), context());
         let (mut painter, mut pixels) = (painter((500, 500), None), vec![0; 500 * 500]);
-        // A window grows to its content in its first frames; textures of the first ones are needed later, too.
+        // An egui window grows to its content during the first frames; textures of the first ones are needed later,
+        // too.
         for frame in 0..3 {
             painter.set_controls(controls(&ours, (500, 500), pixels_per_point));
             canvas.set_controls(controls(&theirs, (500, 500), pixels_per_point));
             painter.paint(&mut pixels, &shown);
             let drawn = drawn(&device, &mut canvas, (500, 500), &shown);
-            // Shadows are laid over each other, and rounded, in another order.
+            // Shadows are composited, and rounded, in another order.
             close(&pixels, &drawn, (3, 500, 24), &format!("frame {frame} at {pixels_per_point}"));
         }
     }
@@ -182,7 +183,7 @@ fn results_go_to_memory_when_the_device_has_no_more_room_for_them() {
     kept.clear();
 }
 
-/// The bytes of a picture on the device.
+/// Reads back a picture from the device.
 fn bytes(device: &Device, picture: &DevicePicture) -> Vec<u8> {
     let buffer = device.device.create_buffer(&wgpu::BufferDescriptor {
         label: None,

@@ -1,4 +1,4 @@
-//! Sources behind the preview's window: back and forth in a recording, photos, what is offered, and devices that come and go.
+//! Sources of the preview's session: seeking in a recording, photos, offered sources, and hot-plugged devices.
 #![allow(missing_docs)]
 
 use crate::heard;
@@ -26,7 +26,7 @@ fn a_recording_is_sought_in_while_it_plays_and_what_is_written_stays_whole() {
     assert_eq!((seeker.frames(), seeker.length_ns()), (FRAMES, FRAMES as u64 * 40_000_000));
     let film = folder.path().join("film.y4m");
     let output = Output { name: film.display().to_string(), is_camera: false };
-    watched.session.order(Request::Begin(output.clone()));
+    watched.session.send(Request::Begin(output.clone()));
     let mut last_ns = 0;
     for place in [8, 3, 11, 0, 11] {
         let number = seeker.go_to(place);
@@ -35,7 +35,7 @@ fn a_recording_is_sought_in_while_it_plays_and_what_is_written_stays_whole() {
         let rgb = asked.picture.memory().unwrap().rgb[0];
         assert!(rgb.abs_diff(20 * place as u8) <= 1, "{rgb} of frame {place}");
         let metres = asked.depth.as_ref().unwrap().metres[5];
-        // Refined, but of no other frame.
+        // Refined, but from this frame alone.
         assert!((metres - 2.0 - 0.1 * place as f32).abs() < 0.02, "{metres} m of frame {place}");
         assert!(asked.stamp.time_ns > last_ns, "media time goes on");
         drop(asked);
@@ -43,7 +43,7 @@ fn a_recording_is_sought_in_while_it_plays_and_what_is_written_stays_whole() {
         last_ns = after.stamp.time_ns;
         assert!((seeker.place_of(after.stamp) + FRAMES - place) % FRAMES <= 6, "{:?}", after.stamp);
     }
-    watched.session.order(Request::End(output));
+    watched.session.send(Request::End(output));
     let closed = watched.heard.session.close();
     assert_eq!(closed.failed, None);
     assert!(closed.report.unwrap().frames.balance());
@@ -85,11 +85,11 @@ fn a_photo_is_opened_with_the_depth_beside_it_and_follows_the_look() {
     let change = first.change;
     drop(first);
     let stronger = Look { strength: Strength::AtInfinity(5.0), ..Look::default() };
-    watched.session.order(Request::Look(Box::new(stronger)));
+    watched.session.send(Request::Look(Box::new(stronger)));
     watched.frame("another look", |view| view.change > change && !view.is_between);
     assert!(watched.heard.session.close().report.unwrap().frames.balance());
 
-    // Other names, a snapshot, and what is no photo.
+    // Other names, a snapshot, and files that are no photos.
     let open = |path: &Path| {
         let name: SourceName =
             path.display().to_string().parse().map_err(|error: source::SourceError| error.to_string())?;
@@ -128,15 +128,15 @@ fn what_is_offered_is_opened_only_if_it_can_be_and_stays_on_the_list() {
     watched.until("it runs", is_running);
     let name = recording.path().display().to_string();
     for nothing in [empty.path().display().to_string(), format!("{name}/missing"), format!("{name}/rgb.txt")] {
-        watched.session.order(Request::Offer(nothing.clone()));
+        watched.session.send(Request::Offer(nothing.clone()));
         watched.until("why not", |told| matches!(told, Update::Note(line) if line.contains(&nothing)));
     }
     watched.frame("what ran goes on", |view| view.picture.size().0 == 640);
     assert!(!watched.told.iter().any(|told| matches!(told, Update::Source(_))));
-    watched.session.order(Request::Offer(name.clone()));
+    watched.session.send(Request::Offer(name.clone()));
     watched.until("it is good", |told| *told == Update::Offered(name.clone()));
-    // As the window does then.
-    watched.session.order(Request::Open(name.clone()));
+    // The window requests this in response.
+    watched.session.send(Request::Open(name.clone()));
     let listed = |told: &Update, first: &str| match told {
         Update::Choices { sources, .. } => sources.first().is_some_and(|choice| choice.name == first),
         _ => false,
@@ -144,9 +144,9 @@ fn what_is_offered_is_opened_only_if_it_can_be_and_stays_on_the_list() {
     watched.until("it is listed", |told| listed(told, &name));
     watched.until("it runs", is_running);
     let again = recording.path().join(".").display().to_string();
-    watched.session.order(Request::Open(again.clone()));
+    watched.session.send(Request::Open(again.clone()));
     watched.until("the last one is first", |told| listed(told, &again));
-    watched.session.order(Request::Open("synthetic".into()));
+    watched.session.send(Request::Open("synthetic".into()));
     let told = watched.until("both stay", |told| matches!(told, Update::Choices { .. }));
     let Update::Choices { sources, .. } = told else { unreachable!() };
     let names: Vec<&str> =
@@ -165,12 +165,12 @@ fn a_camera_that_comes_is_offered_and_opened_where_it_was_missing_and_its_pictur
         Update::Choices { sources, .. } => sources.iter().any(|choice| choice.name == CAMERA),
         _ => false,
     };
-    // As long as a test has patience: nobody has to ask for it.
+    // Within the test's timeout, without any request.
     watched.until("it is offered", has_it);
     watched.until("its sizes", |told| matches!(told, Update::Camera(camera) if camera.modes.len() == 2));
     watched.until("it runs", is_running);
     watched.frame("a frame", |view| view.picture.size() == (64, 48));
-    watched.session.order(Request::Mode((32, 24), 60.0));
+    watched.session.send(Request::Mode((32, 24), 60.0));
     let Update::Source(Source::Running(running)) = watched.until("it runs", is_running) else { unreachable!() };
     assert_eq!((running.size, running.period_ns), ((32, 24), 16_666_667));
     watched.frame("a frame of the other size", |view| view.picture.size() == (32, 24));

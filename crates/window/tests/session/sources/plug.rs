@@ -1,4 +1,4 @@
-//! A session on the system, with a camera that can be plugged in.
+//! A session with real services and a pluggable fake camera.
 
 use std::ops::{Deref, DerefMut};
 use std::path::Path;
@@ -25,7 +25,7 @@ use super::store::NoStore;
 
 pub const FRAMES: usize = 12;
 
-/// Frames as bright as twenty times their number, each 2 m away and a decimetre more than the one before.
+/// Records frames of brightness 20 times their index, and of depth 2 m plus 0.1 m per frame.
 pub fn record(dir: &Path) {
     let mut writer = Writer::create(dir, &WriterOptions { depth_scale: 5000.0, overwrite: false }).unwrap();
     for frame in 0..FRAMES {
@@ -37,7 +37,7 @@ pub fn record(dir: &Path) {
     writer.finish().unwrap();
 }
 
-/// The system, with a camera that can be plugged in, and a note of the pictures that are chosen of it.
+/// The system's services with a pluggable camera; records the chosen mode.
 pub struct Plug {
     system: System,
     is_in: Arc<AtomicBool>,
@@ -106,7 +106,7 @@ impl Services for Plug {
     }
 }
 
-/// A session on them.
+/// A session on these services.
 pub struct Watched {
     pub heard: Heard,
     pub is_in: Arc<AtomicBool>,
