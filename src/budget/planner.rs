@@ -189,17 +189,7 @@ impl Planner {
 
     fn choose(&mut self) {
         let Self {
-            governor,
-            plans,
-            cheapest_blur,
-            budget_ns,
-            period_ns,
-            ages,
-            own,
-            reused,
-            max_frames,
-            may_share,
-            ..
+            governor, plans, cheapest_blur, budget_ns, period_ns, ages, own, reused, max_frames, may_share, ..
         } = self;
         let budget_ns = *budget_ns as f64;
         let Some(period_ns) = period_ns.map(|period_ns| period_ns as f64) else {

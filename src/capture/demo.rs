@@ -106,7 +106,8 @@ impl Demo {
     pub fn new(frames: Option<u64>) -> Result<Self, CaptureError> {
         let moving = decode_image(MOVING, ImageFormat::Png)?.into_luma8();
         let layout = Layout::new(moving.iter().map(|&moves| moves != 0));
-        let [color, depth] = [(COLOR, JPEG_SIGNATURE), (DEPTH, PNG_SIGNATURE)].map(|(file, signature)| split_pictures(file, signature));
+        let [color, depth] =
+            [(COLOR, JPEG_SIGNATURE), (DEPTH, PNG_SIGNATURE)].map(|(file, signature)| split_pictures(file, signature));
         if [&color, &depth].iter().any(|pictures| pictures.len() != 1 + FRAMES as usize) {
             return Err(CaptureError::Demo("pictures are missing".into()));
         }

@@ -146,9 +146,8 @@ fn accept_clients(listener: &UnixListener, handler: &Handler, over: &AtomicBool)
 
 /// Refuses a client above the limit, after reading its request: closing with unread data may discard the answer.
 fn refuse(stream: UnixStream) {
-    let read = stream
-        .set_read_timeout(Some(REFUSAL_TIMEOUT))
-        .and_then(|()| (&stream).read(&mut [0; MAX_REQUEST_BYTES]));
+    let read =
+        stream.set_read_timeout(Some(REFUSAL_TIMEOUT)).and_then(|()| (&stream).read(&mut [0; MAX_REQUEST_BYTES]));
     if let Err(error) = read {
         tracing::debug!("control: refused before it asked: {error}");
     }

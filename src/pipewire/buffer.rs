@@ -18,7 +18,12 @@ pub struct Header {
 /// Returns whether a buffer was available: readers may hold them all.
 ///
 /// Must be called on the thread of the stream's loop.
-pub fn write_frame(stream: &Stream, frame_bytes: usize, stride: i32, fill: impl FnOnce(&mut [u8]) -> (usize, Header)) -> bool {
+pub fn write_frame(
+    stream: &Stream,
+    frame_bytes: usize,
+    stride: i32,
+    fill: impl FnOnce(&mut [u8]) -> (usize, Header),
+) -> bool {
     // SAFETY: the buffer, if it is not null, and all that it points to belong to this program from here to
     // `queue_raw_buffer`: only the stream's loop removes buffers, and it is busy with this call. PipeWire has mapped
     // `maxsize` bytes at `data` (flag MAP_BUFFERS) or left `data` null; `chunk` and the header lie in memory that it

@@ -121,7 +121,10 @@ impl Graph {
 
     /// Lists the objects of the daemon that a session is connected to, with the modes of the sources for which
     /// `wants_modes` is true.
-    pub(super) fn read(session: &Session, wants_modes: impl Fn(&Source) -> bool + 'static) -> Result<Self, PipeWireError> {
+    pub(super) fn read(
+        session: &Session,
+        wants_modes: impl Fn(&Source) -> bool + 'static,
+    ) -> Result<Self, PipeWireError> {
         let registry = session.core.get_registry_rc().map_err(PipeWireError::refused("its registry"))?;
         let found: Rc<RefCell<Listing>> = Rc::default();
         let (finder, objects) = (Rc::clone(&found), registry.downgrade());
@@ -225,7 +228,9 @@ impl Listing {
 
     /// Requests the formats of the last recorded source, if `wants_modes` is true for it.
     fn request_modes(&mut self, bind: impl FnOnce() -> Option<Node>, wants_modes: &impl Fn(&Source) -> bool) {
-        let Some(video_node) = self.sources.last_mut().filter(|video_node| wants_modes(&video_node.source)) else { return };
+        let Some(video_node) = self.sources.last_mut().filter(|video_node| wants_modes(&video_node.source)) else {
+            return;
+        };
         let Some(node) = bind() else { return };
         let formats = Rc::clone(&video_node.formats);
         let listener = node

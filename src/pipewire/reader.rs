@@ -101,7 +101,8 @@ impl Reader {
             is_away: Cell::new(None),
             filters,
         };
-        let (waker_handle, end, wanted, owned_name) = (waker.clone(), Arc::clone(&stop), Arc::clone(&is_wanted), name.to_owned());
+        let (waker_handle, end, wanted, owned_name) =
+            (waker.clone(), Arc::clone(&stop), Arc::clone(&is_wanted), name.to_owned());
         let run = move || Rc::new(listener).run(&owned_name, &waker_handle, [&end, &wanted]);
         let thread = Some(thread::Builder::new().name("pipewire".into()).spawn(run).map_err(PipeWireError::Thread)?);
         let reader = Self { waker, stop, is_wanted, thread };

@@ -24,7 +24,8 @@ pub fn draw(picture: &mut ColorImage) {
     let (columns, rows) = (pixel_range(middle.0, HALF_SIZE.0), pixel_range(middle.1, HALF_SIZE.1));
     for (y, row) in picture.rgb.chunks_exact_mut((3 * width).max(1)).enumerate() {
         let down = (y as f32 + 0.5) / height as f32;
-        let background: [f32; 3] = std::array::from_fn(|channel| TOP[channel] + (BOTTOM[channel] - TOP[channel]) * down);
+        let background: [f32; 3] =
+            std::array::from_fn(|channel| TOP[channel] + (BOTTOM[channel] - TOP[channel]) * down);
         let pixels = row.as_chunks_mut::<3>().0;
         pixels.fill(background.map(|value| value.round() as u8));
         if !rows.contains(&y) {

@@ -41,7 +41,10 @@ impl Pipe {
     }
 
     /// Wraps the end of a pipe that only this program uses, and makes it non-blocking.
-    pub(super) fn from_owned(end: OwnedFd, keep_waiting: impl FnMut(Duration) -> bool + Send + 'static) -> io::Result<Self> {
+    pub(super) fn from_owned(
+        end: OwnedFd,
+        keep_waiting: impl FnMut(Duration) -> bool + Send + 'static,
+    ) -> io::Result<Self> {
         fcntl_setfl(&end, fcntl_getfl(&end)? | OFlags::NONBLOCK)?;
         Ok(Self { file: File::from(end), chunk_bytes: Some(usize::MAX), keep_waiting: Box::new(keep_waiting) })
     }

@@ -137,7 +137,17 @@ impl PipeWire {
         let node = Node::new(settings, screen)?;
         let pictures = Pool::new(PICTURES, || Picture { format: first, bytes: vec![0; bytes] });
         let description = String::new();
-        Ok(Self { node, description, size: options.size, sender, pictures, format, encoder, is_watched, captured_ns: 0 })
+        Ok(Self {
+            node,
+            description,
+            size: options.size,
+            sender,
+            pictures,
+            format,
+            encoder,
+            is_watched,
+            captured_ns: 0,
+        })
     }
 
     fn negotiated_format(&self) -> Format {

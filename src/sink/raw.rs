@@ -93,7 +93,9 @@ impl WithSimd for Frame<'_, '_> {
             match (family, second, third) {
                 (Family::SemiPlanar420 { swapped, .. }, Some(pairs), _) => {
                     load_sums(sums, upper, Some(lower));
-                    for (pair, sum) in row_mut(planes, &pairs, y).as_chunks_mut::<2>().0.iter_mut().zip(chroma_sums(sums)) {
+                    for (pair, sum) in
+                        row_mut(planes, &pairs, y).as_chunks_mut::<2>().0.iter_mut().zip(chroma_sums(sums))
+                    {
                         let [cb, cr] = converter.chroma(sum, 3);
                         *pair = if swapped { [cr, cb] } else { [cb, cr] };
                     }

@@ -124,7 +124,9 @@ mod tests {
         assert_eq!(steady.schedule(5 * SECOND_NS), Action::Repeat(0));
         assert_eq!(steady.schedule(7 * SECOND_NS), Action::Repeat(19));
         let hour = Duration::from_secs(3600);
-        let Action::RepeatAfterGap(20, gap) = steady.schedule(3607 * SECOND_NS + SECOND_NS / 10) else { panic!("{steady:?}") };
+        let Action::RepeatAfterGap(20, gap) = steady.schedule(3607 * SECOND_NS + SECOND_NS / 10) else {
+            panic!("{steady:?}")
+        };
         assert!(gap.abs_diff(hour) < Duration::from_millis(1), "{gap:?}");
         assert_eq!(steady.schedule(3607 * SECOND_NS + SECOND_NS / 5), Action::Repeat(0));
         assert_eq!(steady.schedule(3607 * SECOND_NS + SECOND_NS / 5 + 1), Action::Skip);

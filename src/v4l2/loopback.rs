@@ -115,7 +115,8 @@ impl Output {
         }
         let has_caps = |any: u32| capability.device_caps & any != 0;
         // With exclusive_caps, a node that reports capture but no output has a writer, unless its format is kept.
-        let has_writer = has_caps(sys::V4L2_CAP_VIDEO_CAPTURE) && !has_caps(sys::V4L2_CAP_VIDEO_OUTPUT) && !keeps_format(&device);
+        let has_writer =
+            has_caps(sys::V4L2_CAP_VIDEO_CAPTURE) && !has_caps(sys::V4L2_CAP_VIDEO_OUTPUT) && !keeps_format(&device);
         // Versions before 0.14 let several programs write, and without exclusive_caps do not show it: the lock at least
         // keeps out another instance of this program.
         let locked = flock(&device, FlockOperation::NonBlockingLockExclusive);
@@ -199,7 +200,9 @@ impl Output {
                     // Space, a timeout or an error: the next write shows which.
                     let _ = poll(&mut fds, Some(&WRITE_TIMEOUT));
                 }
-                Err(Errno::BUSY) => return Err(operation_error(&self.device, "a frame cannot be written", Errno::BUSY.into())),
+                Err(Errno::BUSY) => {
+                    return Err(operation_error(&self.device, "a frame cannot be written", Errno::BUSY.into()));
+                }
                 Err(error) => return Err(failed(error.into())),
             }
         }
@@ -250,7 +253,9 @@ fn set_format(device: &Device, size: (u32, u32)) -> Result<(Layout, (u32, u32)),
     #[allow(unsafe_code)]
     let pix = unsafe { format.fmt.pix };
     let size = (pix.width, pix.height);
-    match Layout::from_fourcc(pix.pixelformat).filter(|layout| layout.fits_size(size) && pix.width > 0 && pix.height > 0) {
+    match Layout::from_fourcc(pix.pixelformat)
+        .filter(|layout| layout.fits_size(size) && pix.width > 0 && pix.height > 0)
+    {
         Some(layout) if layout.frame_bytes(size) == pix.sizeimage as usize => Ok((layout, size)),
         _ => Err(LoopbackError::Frozen {
             path: device.path().to_owned(),

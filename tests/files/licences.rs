@@ -90,7 +90,8 @@ fn dependencies_are_under_licences_and_from_sources_that_are_allowed() {
     for package in packages {
         let licence = package["license"].as_str().unwrap_or_default();
         let of_it = exceptions.iter().filter(|exception| exception["crate"].as_str() == package["name"].as_str());
-        let excepted = of_it.flat_map(|exception| exception["allow"].as_array().unwrap()).filter_map(toml::Value::as_str);
+        let excepted =
+            of_it.flat_map(|exception| exception["allow"].as_array().unwrap()).filter_map(toml::Value::as_str);
         let allowed: Vec<&str> = licences.iter().map(String::as_str).chain(excepted).collect();
         assert!(is_met(licence, &allowed), "{} is under {licence:?}, which deny.toml does not allow", package["id"]);
         let source = package["source"].as_str().unwrap_or_default();

@@ -24,7 +24,12 @@ fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
 
 /// The comment that a line is or ends with.
 fn comment(line: &str) -> &str {
-    ["// ", "//! ", "/// ", "# "].iter().filter_map(|begin| line.split_once(begin)).map(|(_, said)| said).next().unwrap_or("")
+    ["// ", "//! ", "/// ", "# "]
+        .iter()
+        .filter_map(|begin| line.split_once(begin))
+        .map(|(_, said)| said)
+        .next()
+        .unwrap_or("")
 }
 
 #[test]
@@ -50,7 +55,8 @@ fn comments_are_in_plain_english() {
 
 #[test]
 fn comments_are_found_in_lines() {
-    for (line, said) in [("let x = 1; // one", "one"), ("/// Fills.", "Fills."), ("x = 1  # one", "one"), ("a / b", "")] {
+    for (line, said) in [("let x = 1; // one", "one"), ("/// Fills.", "Fills."), ("x = 1  # one", "one"), ("a / b", "")]
+    {
         assert_eq!(comment(line), said);
     }
 }

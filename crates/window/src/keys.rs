@@ -149,10 +149,15 @@ pub const GROUPS: [Group; 5] = [
                 "the preset of that number",
                 |state, context| state.presets.get(context.chord).map(|preset| Action::Preset(preset.name.clone())),
             ),
-            repeat(&[key(Key::OpenBracket), key(Key::CloseBracket)], "[  ]", "less blur, more blur", |state, context| {
-                let factor = THIRD_STOP.powf(sign(context));
-                edit_look(state, "key blur", |look| tweak::blur_by(look, factor, context.size.1))
-            }),
+            repeat(
+                &[key(Key::OpenBracket), key(Key::CloseBracket)],
+                "[  ]",
+                "less blur, more blur",
+                |state, context| {
+                    let factor = THIRD_STOP.powf(sign(context));
+                    edit_look(state, "key blur", |look| tweak::blur_by(look, factor, context.size.1))
+                },
+            ),
             repeat(
                 &[key(Key::Semicolon), key(Key::Quote)],
                 ";  '",

@@ -12,7 +12,9 @@ use std::ops::Range;
 
 use pulp::{Simd, WithSimd};
 
-use super::filter::{BLOCK_ROWS, Taps, along_column, along_column_block, along_row, keep_in_range, max_row_len, row_len};
+use super::filter::{
+    BLOCK_ROWS, Taps, along_column, along_column_block, along_row, keep_in_range, max_row_len, row_len,
+};
 use super::rows::{Cells, EDGE_VALUES, Edges, PIECE, STRIP, STRIP_EDGES, STRIP_ROW, Strips};
 use crate::bokeh::bank::Bank;
 use crate::bokeh::plan::{CELL, Plan, SEGMENT};

@@ -4,7 +4,9 @@ use std::ops::Range;
 
 use super::buffers::{Buffers, Filters, work_count};
 use super::layout::{self, Layout, tiles};
-use super::shaders::{self, Bin, EDGES_TILE, LINE, MAX_TILE_WORKGROUPS, RESULT_TILE, ROWS_TILE, SMALL_TILE, TILE, Work};
+use super::shaders::{
+    self, Bin, EDGES_TILE, LINE, MAX_TILE_WORKGROUPS, RESULT_TILE, ROWS_TILE, SMALL_TILE, TILE, Work,
+};
 use crate::bokeh::ladder::Compositing;
 use crate::bokeh::occlusion::{GRAIN, MAX_LAYERS};
 use crate::bokeh::plan::{MAX_BINS, Plan};

@@ -63,7 +63,12 @@ fn to_byte(color: i16) -> u8 {
 
 /// Converts a row of pixels. All slices are as long as `luma`; chroma is relative to grey, times 256.
 #[inline(always)]
-pub(super) fn convert(coefficients: &Coefficients, luma: &[u8], [cb, cr]: [&[i16]; 2], [red, green, blue]: [&mut [u8]; 3]) {
+pub(super) fn convert(
+    coefficients: &Coefficients,
+    luma: &[u8],
+    [cb, cr]: [&[i16]; 2],
+    [red, green, blue]: [&mut [u8]; 3],
+) {
     let coefficients = *coefficients;
     let pixels = luma.iter().zip(cb).zip(cr).zip(red).zip(green).zip(blue);
     for (((((&luma, &cb), &cr), red), green), blue) in pixels {

@@ -70,8 +70,12 @@ impl<E: Eye> TwoEyes<E> {
                 right_info.name
             );
         }
-        let info =
-            SourceInfo { name: format!("{} and {}", left_info.name, right_info.name), frames, brings: Brings::RightEye, ..left_info };
+        let info = SourceInfo {
+            name: format!("{} and {}", left_info.name, right_info.name),
+            frames,
+            brings: Brings::RightEye,
+            ..left_info
+        };
         Ok(Self {
             pairing: Pairing::new(info.period_ns),
             left,

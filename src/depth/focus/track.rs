@@ -55,9 +55,8 @@ impl Track {
                 let radius = was.spread.map(|spread| SPREADS * spread + MARGIN);
                 // First finds the mean distance within the motion tolerance, then the object around that distance.
                 let near = measure(map, was, (radius, tolerance(was.time_ns, time_ns)));
-                let now = near.and_then(|near| {
-                    measure(map, Object { center: was.center, ..near }, (radius, tolerance(0, 0)))
-                });
+                let now = near
+                    .and_then(|near| measure(map, Object { center: was.center, ..near }, (radius, tolerance(0, 0))));
                 now.filter(|now| now.fraction >= MIN_LEFT * was.fraction).map(|now| {
                     let fraction = was.fraction + (now.fraction - was.fraction) * SIZE_EASE;
                     let spread = [0, 1].map(|k| was.spread[k] + (now.spread[k] - was.spread[k]) * SIZE_EASE);

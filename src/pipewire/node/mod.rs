@@ -110,7 +110,8 @@ impl Node {
         let (ready, is_ready) = mpsc::channel();
         let provider = Provider::new(settings, Box::new(show), Arc::clone(&counts));
         let (waker_handle, end) = (waker.clone(), Arc::clone(&stop));
-        let thread = thread::Builder::new().name("pipewire".into()).spawn(move || provider.run(&waker_handle, &end, &ready));
+        let thread =
+            thread::Builder::new().name("pipewire".into()).spawn(move || provider.run(&waker_handle, &end, &ready));
         let thread = Some(thread.map_err(PipeWireError::Thread)?);
         let mut node = Self { name: String::new(), waker, stop, counts, thread };
         node.name = is_ready.recv_timeout(TIMEOUT).map_err(|_| PipeWireError::Silent)??;

@@ -135,7 +135,9 @@ impl Control {
         let number = number(text);
         find_item(&|item| Some(item.index) == number)
             .or_else(|| find_item(&|item| item.name.eq_ignore_ascii_case(text)))
-            .or_else(|| find_item(&|item| !item.name.is_empty() && super::tool_name(&item.name) == super::tool_name(text)))
+            .or_else(|| {
+                find_item(&|item| !item.name.is_empty() && super::tool_name(&item.name) == super::tool_name(text))
+            })
     }
 
     fn refuse(&self, text: &str) -> ControlError {

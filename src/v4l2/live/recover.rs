@@ -6,7 +6,7 @@ use std::time::Duration;
 use super::error::{self, OpenError};
 use super::session::Session;
 use super::watchdog::Remedy;
-use super::{ERROR_PAUSE_NS, RETRY_NS, Live, SEARCH_PERIOD_NS, State};
+use super::{ERROR_PAUSE_NS, Live, RETRY_NS, SEARCH_PERIOD_NS, State};
 use crate::v4l2::queue::QueueError;
 
 impl Live {

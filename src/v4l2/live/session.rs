@@ -75,8 +75,7 @@ impl Session {
         let writer = if is_loopback(&capability) { Writer::Program } else { Writer::Driver };
         let kernel = DeviceKernel::new(device, agreed.choice.queue, writer);
         let refused = |error| OpenError::queue(path, error);
-        let mut queue =
-            Queue::new(kernel, &min_bytes, agreed.interval.period_ns(), clock.clone()).map_err(refused)?;
+        let mut queue = Queue::new(kernel, &min_bytes, agreed.interval.period_ns(), clock.clone()).map_err(refused)?;
         queue.start().map_err(refused)?;
         Ok(Self { queue, agreed, capability })
     }
@@ -213,7 +212,11 @@ fn with_rate(device: &Device, choice: Choice, layout: Layout) -> Agreed {
         #[allow(unsafe_code)]
         Interval::new(unsafe { reported.parm.capture.timeperframe })
     });
-    Agreed { choice, layout, interval: reported.filter(|reported| reported.period_ns() < MAX_PERIOD_NS).unwrap_or(choice.interval) }
+    Agreed {
+        choice,
+        layout,
+        interval: reported.filter(|reported| reported.period_ns() < MAX_PERIOD_NS).unwrap_or(choice.interval),
+    }
 }
 
 /// A rate below one frame in ten seconds is a driver's mistake.

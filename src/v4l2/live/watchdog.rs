@@ -51,7 +51,9 @@ impl Watchdog {
     pub fn on_frame(&mut self, now_ns: u64) -> Option<Duration> {
         self.silent_since_ns = now_ns;
         (self.tried, self.errors) = (0, 0);
-        self.failing_since_ns.take().map(|failing_since_ns| Duration::from_nanos(now_ns.saturating_sub(failing_since_ns)))
+        self.failing_since_ns
+            .take()
+            .map(|failing_since_ns| Duration::from_nanos(now_ns.saturating_sub(failing_since_ns)))
     }
 
     /// Returns the remedy after a wait without a frame.

@@ -158,7 +158,8 @@ impl Layers {
                 || absolute_file_in(value).is_some_and(|file| message.contains(file))
         };
         let place = |(name, (value, origin)): (&String, &(String, &str))| {
-            let path = file.path.as_ref().filter(|_| ["file", "preset"].contains(origin) && is_mentioned(name, value))?;
+            let path =
+                file.path.as_ref().filter(|_| ["file", "preset"].contains(origin) && is_mentioned(name, value))?;
             let of_preset = if *origin == "preset" { " of the preset" } else { "" };
             Some(format!("{name}{of_preset} in {}", path.display()))
         };

@@ -7,7 +7,9 @@ use super::super::noise::{self, LAG_PX, NO_NOISE, SMOOTH_FRACTION, SMOOTH_QUANTI
 use super::super::planes::LANES;
 use super::super::smooth::{self, PAIRS_PX};
 use super::super::temporal::{self, HOLD_FRAMES, MAX_FRAMES, MOVED, MOVED_BOUNDS};
-use super::super::votes::{HYSTERESIS, LOW_CONTRAST_HYSTERESIS, MIN_SIMILARITY, QUARTER_T, RELATIVE_DEPTH_STEP, Weights};
+use super::super::votes::{
+    HYSTERESIS, LOW_CONTRAST_HYSTERESIS, MIN_SIMILARITY, QUARTER_T, RELATIVE_DEPTH_STEP, Weights,
+};
 use super::super::{CHANGE_SIGMAS, DEPTH_STEP_SIGMAS, MIN_CHANGE, MIN_DEPTH_STEP, upsample};
 use crate::compute::device::{Shader, shader};
 use crate::depth::guided_fill::{self, FOLLOW, PREFERENCE, SAMPLE_PX};

@@ -87,7 +87,8 @@ impl Overlay {
 
     /// Converts a clip rectangle from points to whole pixels, clamped to the window.
     fn clip_px(&self, rect: egui::Rect) -> Clip {
-        let at = |points: f32, side_px: usize| (points * self.pixels_per_point).round().clamp(0.0, side_px as f32) as usize;
+        let at =
+            |points: f32, side_px: usize| (points * self.pixels_per_point).round().clamp(0.0, side_px as f32) as usize;
         let (width, height) = self.size;
         let (left, top) = (at(rect.min.x, width), at(rect.min.y, height));
         Clip { left, top, right: at(rect.max.x, width).max(left), bottom: at(rect.max.y, height).max(top) }

@@ -77,8 +77,7 @@ impl Shape {
         if corners.as_flattened().iter().any(|value| !value.is_finite()) {
             return None;
         }
-        let mut corners =
-            corners.map(|corner| corner.map(|v| (v.clamp(-MAX_PX, MAX_PX) * SUBPIXELS).round() as i64));
+        let mut corners = corners.map(|corner| corner.map(|v| (v.clamp(-MAX_PX, MAX_PX) * SUBPIXELS).round() as i64));
         let [a, b, c] = corners;
         match (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]) {
             0 => return None,

@@ -130,12 +130,7 @@ impl App {
     }
 
     /// Applies a temporary look change. Returns a note about settings without effect.
-    fn change(
-        &mut self,
-        patch: &Patch,
-        rules: &dyn Rules,
-        events: &ActiveEventLoop,
-    ) -> Result<Option<String>, Answer> {
+    fn change(&mut self, patch: &Patch, rules: &dyn Rules, events: &ActiveEventLoop) -> Result<Option<String>, Answer> {
         let note = match &self.state.source {
             Source::Running(running) => rules.changed(patch, &self.state.look, &facts(running))?.1,
             _ => None,
