@@ -17,7 +17,6 @@ use bokehcam::capture::{Camera, Captured, Shot};
 use bokehcam::depth::plate::{Capture, Step, Taken};
 use bokehcam::depth::{DepthSource, Seen};
 use bokehcam::frame::{ColorImage, DepthMap, GrayImage, Stamp};
-use bokehcam::look::Effect;
 use bokehcam::recording::still;
 use bokehcam::source::{DepthChoice, Kind, Options, Source, SourceName, one_camera};
 

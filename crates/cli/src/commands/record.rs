@@ -14,7 +14,6 @@ use crate::terminal;
 use bokehcam::capture::{Brings, Captured, Shot};
 use bokehcam::depth::Seen;
 use bokehcam::frame::{ColorImage, DepthMap, GrayImage};
-use bokehcam::look::Effect;
 use bokehcam::recording::tum::{Writer, WriterOptions, Written};
 use bokehcam::source::{Options, Source, SourceName};
 

@@ -43,13 +43,13 @@ impl Place {
     }
 
     /// Converts a point of the picture, as fractions of its width and height, to a screen position.
-    pub fn to_screen(&self, [x, y]: [f32; 2]) -> Pos2 {
+    pub fn to_screen(self, [x, y]: [f32; 2]) -> Pos2 {
         let x = if self.mirror { 1.0 - x } else { x };
         self.rect.min + Vec2::new(x, y) * self.rect.size()
     }
 
     /// Converts a screen position to fractions of the picture, clamped to 0 to 1.
-    pub fn to_fractions(&self, at: Pos2) -> [f32; 2] {
+    pub fn to_fractions(self, at: Pos2) -> [f32; 2] {
         let at = (at - self.rect.min) / self.rect.size();
         let x = if self.mirror { 1.0 - at.x } else { at.x };
         [x, at.y].map(|fraction| fraction.clamp(0.0, 1.0))
