@@ -1,13 +1,13 @@
 //! Uses a custom depth source in the pipeline: here the middle of the picture is near.
 use std::sync::atomic::AtomicBool;
 
-use bokehcam::depth::{DepthError, DepthSource, Seen};
+use bokehcam::depth::{DepthError, DepthSource, FrameInput};
 use bokehcam::{frame::DepthMap, look::Look, pipeline, sink::Null, source::Options, source::Source};
 
 struct Middle;
 
 impl DepthSource for Middle {
-    fn read(&mut self, seen: Seen, map: &mut DepthMap) -> Result<(), DepthError> {
+    fn read(&mut self, seen: FrameInput, map: &mut DepthMap) -> Result<(), DepthError> {
         let (width, height) = seen.color.size();
         map.resize(width, height);
         let is_near = |k: usize| (k as u32 % width).abs_diff(width / 2) < width / 6;

@@ -17,7 +17,7 @@ fn base(pixel: vec2<u32>) -> Known {
     for (var sub = 0u; sub < 4u; sub++) {
         let at = min(2u * pixel + vec2(sub % 2u, sub / 2u), frame.size - 1u);
         let index = at.y * frame.size.x + at.x;
-        var seen = scene_unpacked(scene[index], frame.most_px);
+        var seen = scene_unpacked(scene[index], frame.max_px);
         // A mixed pixel counts as the composite it shows: its farther surface is not in front of the subject.
         if is_mixed(scene[index]) {
             let k = first_mixed(index);

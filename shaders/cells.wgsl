@@ -7,5 +7,5 @@ fn cells_of(size: vec2<u32>) -> vec2<u32> {
 
 // Largest radius of any silhouette, in cells.
 fn max_radius_cells() -> u32 {
-    return u32(2.0 * frame.most_px + MARGIN_PX) / GRAIN + 1u;
+    return u32(2.0 * frame.max_px + MARGIN_PX) / GRAIN + 1u;
 }

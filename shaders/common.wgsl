@@ -48,7 +48,7 @@ struct Frame {
     reach: u32,                 // half-width of the bank
     nodes: u32,
     groups: u32,                // groups of four terms
-    most_px: f32,               // upper bound of |CoC|
+    max_px: f32,               // upper bound of |CoC|
     coc: vec4<f32>,             // uniform: radius; ramp: normal, offset, half band; depth: c_inf, sharp range, max
     ramp: vec2<f32>,            // slope, max
     expansion: f32,             // highlight expansion 1 + 1/M; 0: off
@@ -84,7 +84,7 @@ struct Bin {
     behind: vec2<f32>,
     max_radius_px: f32,
     sigma_cells: f32,
-    reach_cells: u32,
+    radius_cells: u32,
     pixels_at: u32,             // offset of its pixels
     rows_at: u32,               // offset of its pixels in the batch
     edges_at: u32,
@@ -129,15 +129,15 @@ fn bin_weight(front: vec2<f32>, behind: vec2<f32>, coc_px: f32) -> f32 {
 
 // Packs a pixel of the scene: light, and CoC as a signed square root, which is finest where bins cross-fade. Light is
 // never negative, so the sign of blue marks the farther surface of a mixed pixel.
-fn scene_packed(light: vec3<f32>, coc_px: f32, most_px: f32) -> vec2<u32> {
-    let root = sign(coc_px) * sqrt(abs(coc_px) / most_px);
+fn scene_packed(light: vec3<f32>, coc_px: f32, max_px: f32) -> vec2<u32> {
+    let root = sign(coc_px) * sqrt(abs(coc_px) / max_px);
     let blue = pack2x16float(vec2(light.b, 0.0)) & ~MIXED & 0xffffu;
     return vec2(pack2x16float(light.rg), blue | (pack2x16snorm(vec2(0.0, root)) & 0xffff0000u));
 }
 
-fn scene_unpacked(value: vec2<u32>, most_px: f32) -> vec4<f32> {
+fn scene_unpacked(value: vec2<u32>, max_px: f32) -> vec4<f32> {
     let root = unpack2x16snorm(value.y).y;
-    return vec4(unpack2x16float(value.x), unpack2x16float(value.y & ~MIXED).x, root * abs(root) * most_px);
+    return vec4(unpack2x16float(value.x), unpack2x16float(value.y & ~MIXED).x, root * abs(root) * max_px);
 }
 
 // Luminance; all channels share the highlight factor, which preserves the hue.

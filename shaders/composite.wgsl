@@ -36,7 +36,7 @@ fn sample_bin(k: u32, pixel: vec2<u32>) -> vec4<f32> {
 }
 
 fn selected_color(pixel: vec2<u32>) -> vec3<f32> {
-    let coc_px = scene_unpacked(scene[pixel.y * frame.size.x + pixel.x], frame.most_px).w;
+    let coc_px = scene_unpacked(scene[pixel.y * frame.size.x + pixel.x], frame.max_px).w;
     var color = vec3(0.0);
     for (var k = 0u; k < frame.bins; k++) {
         let weight = bin_weight(bins[k].front, bins[k].behind, coc_px);

@@ -56,7 +56,7 @@ fn filled(value: vec2<u32>, behind: Known, reach: vec4<f32>) -> vec2<u32> {
     if reach.z <= 0.0 {
         return value;
     }
-    let own = scene_unpacked(value, frame.most_px);
+    let own = scene_unpacked(value, frame.max_px);
     let unhidden = step_at(work.unhidden, own.w);
     // A pixel that a silhouette only touches keeps its colour: it is visible, and inpainting would smear it. If
     // something near touches every pixel, nothing is known, and there is no background.
@@ -74,7 +74,7 @@ fn filled(value: vec2<u32>, behind: Known, reach: vec4<f32>) -> vec2<u32> {
         return value;
     }
     let mixture = mix(own, vec4(behind.value.rgb, max(behind.value.w, work.nearest_px)), hidden);
-    return scene_packed(mixture.rgb, mixture.w, frame.most_px) | vec2(0u, value.y & MIXED);
+    return scene_packed(mixture.rgb, mixture.w, frame.max_px) | vec2(0u, value.y & MIXED);
 }
 
 // Four pixels per thread.
@@ -121,7 +121,7 @@ fn fill(@builtin(global_invocation_id) id: vec3<u32>, @builtin(local_invocation_
             let cell = at.y / GRAIN * cells_of(frame.size).x + at.x / GRAIN;
             let value = filled(scene[pixel], hidden, reached[cell]);
             behind[pixel] = value;
-            range = union_of(range, vec2(scene_unpacked(value, frame.most_px).w));
+            range = union_of(range, vec2(scene_unpacked(value, frame.max_px).w));
         }
     }
     list_binned(tile, range_of_tile(thread, SMALL_TILE * SMALL_TILE, range), thread);

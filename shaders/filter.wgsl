@@ -45,7 +45,7 @@ fn taps_at(k: u32, pixel: vec2<u32>, corner: Corner) -> Taps {
     var turned = bins[k].turned == 1u;
     if frame.compositing == 2u {
         // The only bin of a gather has the picture's scale; every pixel has a radius of its own.
-        let coc_px = scene_unpacked(scene[pixel.y * frame.size.x + pixel.x], frame.most_px).w;
+        let coc_px = scene_unpacked(scene[pixel.y * frame.size.x + pixel.x], frame.max_px).w;
         radii = vec2(abs(coc_px));
         turned = coc_px < 0.0;
     }

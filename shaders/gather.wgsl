@@ -5,7 +5,7 @@
 @group(0) @binding(1) var<storage, read> kernel_starts: array<u32>;
 @group(0) @binding(2) var<storage, read> kernels: array<f32>;
 @group(0) @binding(3) var<storage, read> scene: array<vec2<u32>>;
-@group(0) @binding(4) var<storage, read> node_reach: array<u32>;
+@group(0) @binding(4) var<storage, read> node_half_width: array<u32>;
 @group(0) @binding(5) var<storage, read_write> blurred: array<vec2<u32>>;
 
 @compute @workgroup_size(TILE, TILE)
@@ -14,9 +14,9 @@ fn gather(@builtin(global_invocation_id) id: vec3<u32>) {
         return;
     }
     let pixel = id.y * frame.size.x + id.x;
-    let coc_px = scene_unpacked(scene[pixel], frame.most_px).w;
+    let coc_px = scene_unpacked(scene[pixel], frame.max_px).w;
     let node = node_at(abs(coc_px), frame.steps_per_px, frame.nodes);
-    let reach = i32(node_reach[node]);
+    let reach = i32(node_half_width[node]);
     // In front of the focal plane the aperture is rotated by 180 degrees.
     let sign = select(1, -1, coc_px < 0.0);
     var tap = kernel_starts[node];
@@ -25,7 +25,7 @@ fn gather(@builtin(global_invocation_id) id: vec3<u32>) {
         let y = u32(clamp(i32(id.y) + sign * j, 0, i32(frame.size.y) - 1));
         for (var i = -reach; i <= reach; i++) {
             let x = u32(clamp(i32(id.x) + sign * i, 0, i32(frame.size.x) - 1));
-            sum += kernels[tap] * scene_unpacked(scene[y * frame.size.x + x], frame.most_px).rgb;
+            sum += kernels[tap] * scene_unpacked(scene[y * frame.size.x + x], frame.max_px).rgb;
             tap++;
         }
     }

@@ -20,7 +20,7 @@ fn hide(@builtin(global_invocation_id) id: vec3<u32>) {
         let at = min(2u * id.xy + vec2(sub % 2u, sub / 2u), frame.size - 1u);
         let pixel = at.y * frame.size.x + at.x;
         let value = scene[pixel];
-        nearest = min(nearest, scene_unpacked(value, frame.most_px).w);
+        nearest = min(nearest, scene_unpacked(value, frame.max_px).w);
         // A pixel that a near surface covers partly is not known either.
         if is_mixed(value) {
             nearest = min(nearest, near_surface(first_mixed(pixel)).w);

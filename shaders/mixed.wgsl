@@ -33,5 +33,5 @@ fn is_mixed(value: vec2<u32>) -> bool {
 
 // The nearer surface of a mixed pixel.
 fn near_surface(index: u32) -> vec4<f32> {
-    return scene_unpacked(vec2(mixed[index].near, mixed[index].far), frame.most_px);
+    return scene_unpacked(vec2(mixed[index].near, mixed[index].far), frame.max_px);
 }

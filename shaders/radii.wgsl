@@ -23,7 +23,7 @@ fn radius_at(index: u32) -> f32 {
     }
     let roots = unpack2x16snorm(radii[index / 2u]);
     let root = select(roots.x, roots.y, index % 2u == 1u);
-    return root * abs(root) * frame.most_px;
+    return root * abs(root) * frame.max_px;
 }
 
 fn coc_of_depth(metres: f32) -> f32 {

@@ -38,8 +38,8 @@ fn bin_radius_px(k: u32, coc_px: f32) -> f32 {
 }
 
 fn around(k: u32, cell: vec2<u32>) -> Around {
-    let first = cell - min(cell, vec2(bins[k].reach_cells));
-    let last = min(cell + bins[k].reach_cells, bins[k].cells - 1u);
+    let first = cell - min(cell, vec2(bins[k].radius_cells));
+    let last = min(cell + bins[k].radius_cells, bins[k].cells - 1u);
     var sums = vec2(0.0);
     var low = vec3(HUGE);
     var high = vec3(-HUGE);

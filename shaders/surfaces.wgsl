@@ -48,7 +48,7 @@ fn own_weight(k: u32, coc_px: f32) -> f32 {
 // Away from all silhouettes a pixel shows only one surface, which is opaque: the bins that it spans fill the pixel
 // together.
 fn layers(pixel: vec2<u32>) -> vec3<f32> {
-    let coc_px = scene_unpacked(scene[pixel.y * frame.size.x + pixel.x], frame.most_px).w;
+    let coc_px = scene_unpacked(scene[pixel.y * frame.size.x + pixel.x], frame.max_px).w;
     let shows = shown[tile_of(pixel, frame.size.x, vec2(TILE))];
     let is_alone = countOneBits(shows) == 1u;
     var own = Stack(vec3(0.0), 1.0, vec3(0.0), 0.0);

@@ -31,7 +31,7 @@ fn seen(pixel: vec2<u32>, at: u32) -> vec2<u32> {
 fn weighted_at(k: u32, pixel: vec2<u32>, weight: f32) -> Pixel {
     let at = pixel.y * frame.size.x + pixel.x;
     let value = seen(pixel, at);
-    let surface = scene_unpacked(value, frame.most_px);
+    let surface = scene_unpacked(value, frame.max_px);
     if !is_mixed(value) {
         return weighted(k, surface, weight);
     }

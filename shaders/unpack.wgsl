@@ -58,8 +58,8 @@ fn separate_surfaces(k: u32, light: vec3<f32>) -> vec2<u32> {
     // Depth may be that of another frame with other colours: light is clamped to 0.
     let near_light = max(light + (1.0 - own.share) * difference, vec3(0.0));
     let far_light = max(light - own.share * difference, vec3(0.0));
-    let near = scene_packed(near_light, coc_of_depth(bitcast<f32>(own.near)), frame.most_px);
-    let far = scene_packed(far_light, coc_of_depth(bitcast<f32>(own.far)), frame.most_px);
+    let near = scene_packed(near_light, coc_of_depth(bitcast<f32>(own.near)), frame.max_px);
+    let far = scene_packed(far_light, coc_of_depth(bitcast<f32>(own.far)), frame.max_px);
     mixed[k].near = near.x;
     mixed[k].far = near.y;
     return vec2(far.x, far.y | MIXED);
@@ -90,7 +90,7 @@ fn unpack(@builtin(local_invocation_id) local: vec3<u32>, @builtin(local_invocat
         if frame.expansion > 0.0 {
             light *= frame.expansion / (frame.expansion - luminance(light));
         }
-        var value = scene_packed(light, coc_of(first.x + n, first.y), frame.most_px);
+        var value = scene_packed(light, coc_of(first.x + n, first.y), frame.max_px);
         if frame.compositing == 0u {
             mark = max(mark, mark_at(first.x + n, first.y, min_step_px));
         }
@@ -99,14 +99,14 @@ fn unpack(@builtin(local_invocation_id) local: vec3<u32>, @builtin(local_invocat
             if place > 0u {
                 value = separate_surfaces(place - 1u, light);
                 let near_px = near_surface(place - 1u).w;
-                let far_px = scene_unpacked(value, frame.most_px).w;
+                let far_px = scene_unpacked(value, frame.max_px).w;
                 range = union_of(range, vec2(near_px));
                 mark = max(mark, silhouette(near_px, far_px, min_step_px));
             }
         }
         scene[pixel] = value;
         // The value that other passes read, rounding included.
-        range = union_of(range, vec2(scene_unpacked(value, frame.most_px).w));
+        range = union_of(range, vec2(scene_unpacked(value, frame.max_px).w));
     }
     marked[thread] = mark;
     range = range_of_tile(thread, TILE * TILE / PIXELS_PER_THREAD, range);

@@ -8,7 +8,7 @@ mod quality;
 mod window;
 
 pub use governor::{Governor, Times};
-pub use load::{MAX_RUNGS, Sample};
+pub use load::{MAX_LEVELS, Sample};
 #[cfg(feature = "files")]
 pub(crate) use planner::DEADLINE_PERIODS;
 pub use planner::{DepthTimes, Plan, Planner};

@@ -6,8 +6,8 @@ use std::time::Instant;
 
 use crate::control::{Answer, Handler, Name, Request, Status};
 use crate::look::{Look, Patch};
-use crate::sink::Release;
-use crate::source::{DepthChoice, DepthFrom, Kind};
+use crate::sink::ShutterControl;
+use crate::source::{DepthChoice, DepthOrigin, Kind};
 
 /// Interprets requests according to the run's command line. A refusal is returned as the answer.
 #[allow(clippy::missing_errors_doc)]
@@ -30,7 +30,7 @@ pub struct Facts {
     pub size: (u32, u32),
     /// Whether its frames have depth; `depth_from` says from where.
     pub has_depth: bool,
-    pub depth_from: DepthFrom,
+    pub depth_from: DepthOrigin,
     pub depth_choice: DepthChoice,
 }
 
@@ -44,7 +44,7 @@ pub trait Controlled: Send + Sync {
     fn switch(&self, on: Option<bool>) -> Result<bool, Answer>;
 
     /// Returns the release that holds pictures back from the outputs, while there are outputs.
-    fn release(&self) -> Option<Release>;
+    fn release(&self) -> Option<ShutterControl>;
 
     /// Changes the look as far as the rules allow; returns their note.
     fn change(&self, patch: Patch, rules: &Arc<dyn Rules>) -> Result<Option<String>, Answer>;

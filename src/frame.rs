@@ -173,8 +173,8 @@ impl DisparityMap {
     }
 }
 
-/// Depth along the optical axis: `height` x `width` metres, row-major. Values outside [`DepthMap::LEAST_M`] to
-/// [`DepthMap::MOST_M`] and non-finite values are unknown; 0 is written for them. It covers the same view as its colour
+/// Depth along the optical axis: `height` x `width` metres, row-major. Values outside [`DepthMap::MIN_M`] to
+/// [`DepthMap::MAX_M`] and non-finite values are unknown; 0 is written for them. It covers the same view as its colour
 /// picture, possibly at a lower resolution.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct DepthMap {
@@ -204,14 +204,14 @@ impl DepthMap {
     /// Converts relative inverse depth to metres: 1 is nearest; 0 and NaN are farthest.
     #[inline(always)]
     pub fn relative_m(nearness: f32) -> f32 {
-        const LEAST: f32 = DepthMap::SUBJECT_M / DepthMap::FAR_M;
-        Self::SUBJECT_M / if nearness > LEAST { nearness } else { LEAST }
+        const MIN_NEARNESS: f32 = DepthMap::SUBJECT_M / DepthMap::FAR_M;
+        Self::SUBJECT_M / if nearness > MIN_NEARNESS { nearness } else { MIN_NEARNESS }
     }
 
     /// Smallest valid depth in metres: no scene is nearer, and its reciprocal squared is still finite.
-    pub const LEAST_M: f32 = 1e-6;
+    pub const MIN_M: f32 = 1e-6;
     /// Largest valid depth in metres: files that must write a number for infinity use a smaller one.
-    pub const MOST_M: f32 = 1e12;
+    pub const MAX_M: f32 = 1e12;
 
     /// Creates a map with unknown depth everywhere.
     pub fn new(width: u32, height: u32) -> Self {
@@ -235,7 +235,7 @@ impl DepthMap {
     #[inline]
     pub fn is_known(metres: f32) -> bool {
         // Both comparisons are false for NaN; branch-free, so that loops over maps vectorise.
-        let (is_beyond_least, is_below_most) = (metres >= Self::LEAST_M, metres <= Self::MOST_M);
+        let (is_beyond_least, is_below_most) = (metres >= Self::MIN_M, metres <= Self::MAX_M);
         is_beyond_least & is_below_most
     }
 

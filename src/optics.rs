@@ -152,9 +152,9 @@ impl DepthCoc {
         let far = if far < 1.0 { far } else { 1.0 };
         let ratio = if near > far { near } else { far };
         let coc_px = self.coc_at_infinity_px * (1.0 - ratio);
-        let most_px = self.max_coc_px;
-        let coc_px = if coc_px < -most_px { -most_px } else { coc_px };
-        if coc_px > most_px { most_px } else { coc_px }
+        let max_px = self.max_coc_px;
+        let coc_px = if coc_px < -max_px { -max_px } else { coc_px };
+        if coc_px > max_px { max_px } else { coc_px }
     }
 }
 

@@ -29,7 +29,7 @@ use std::thread;
 pub use change::{Change, Changes, Executor};
 pub use error::{Fault, PipelineError};
 pub use places::check_room;
-use places::{MOST_IN_FLIGHT, Places, Pools};
+use places::{MAX_IN_FLIGHT, Places, Pools};
 pub use start::{Blurring, Pace, Run};
 use threads::{guard, join, spawn};
 pub use view::{Progress, Trace, View};
@@ -68,7 +68,7 @@ impl Shared {
     fn new(run: &Run, blur: &Blur) -> Self {
         let info = run.camera.info();
         let in_blur = match (&run.changes, blur.executor()) {
-            (Some(_), _) => MOST_IN_FLIGHT,
+            (Some(_), _) => MAX_IN_FLIGHT,
             (None, executor) => executor.map_or(0, |executor| executor.capacity()),
         };
         let is_viewed = run.view.is_some();

@@ -11,9 +11,9 @@ mod tally;
 
 pub use histogram::{Histogram, PassHistograms};
 pub use node_use::{NodeUse, OutputUse};
-pub use pulse::Pulse;
+pub use pulse::FrameRateMeter;
 pub use report::{About, QualityUse, Report, Spread, StageMs, StagesMs, Versions, WindowUse};
-pub use rungs::RungCounts;
+pub use rungs::QualityCounts;
 pub use tally::{Cause, Dropped, Frames, Tally, Ticket};
 
 /// What the stages measure while they run; each stage fills a part of its own.
@@ -50,7 +50,7 @@ pub struct BlurTimings {
     /// The blur's passes.
     pub passes: PassHistograms,
     /// Frames blurred at each rung of the quality ladder.
-    pub rungs: RungCounts,
+    pub rungs: QualityCounts,
     /// Frames whose blur took longer than the budget.
     pub misses: u64,
     /// On what it ran, `cpu`, `gpu`, `gpu, then cpu` or `none`, and how that describes itself.

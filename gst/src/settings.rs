@@ -5,7 +5,7 @@ use std::sync::LazyLock;
 use bokehcam::computing::Computing;
 use bokehcam::frame::DepthMap;
 use bokehcam::look::settings::{SETTINGS, Setting};
-use bokehcam::look::{Look, MOST_RADIUS_PX, Patch};
+use bokehcam::look::{Look, MAX_RADIUS_PX, Patch};
 use gst::glib;
 use gst::prelude::*;
 
@@ -32,8 +32,8 @@ pub enum Property {
 
 /// Settings with numeric and other forms: name, property of the number, its unit, and its maximum.
 const NUMBERS: [(&str, &str, &str, f32); 2] = [
-    ("focus", "focus-m", "metres", DepthMap::MOST_M),
-    ("coc-at-infinity", "coc-at-infinity-px", "pixels", MOST_RADIUS_PX),
+    ("focus", "focus-m", "metres", DepthMap::MAX_M),
+    ("coc-at-infinity", "coc-at-infinity-px", "pixels", MAX_RADIUS_PX),
 ];
 /// Value of a number property while the setting is not a number.
 const NO_NUMBER: f32 = -1.0;

@@ -40,7 +40,7 @@ pub struct Bank {
     /// Distance of the aperture's outermost point from the centre, in radii.
     pub extent: f64,
     /// Half-width of each node: its outermost tap.
-    pub node_reach: Vec<u32>,
+    pub node_half_width: Vec<u32>,
     /// Horizontal taps, `[node][reach + j][term]`, for content behind the focal plane.
     pub horizontal: Vec<f32>,
     /// Vertical taps in the same layout, with singular values and normalisation included.
@@ -87,7 +87,7 @@ impl Bank {
             nodes,
             is_symmetric: symmetry == (true, true),
             extent: mask.extent,
-            node_reach: (0..nodes).map(|k| reach_at(k) as u32).collect(),
+            node_half_width: (0..nodes).map(|k| reach_at(k) as u32).collect(),
             horizontal: Vec::with_capacity(nodes * (2 * reach + 1) * terms),
             vertical: Vec::with_capacity(nodes * (2 * reach + 1) * terms),
         };
@@ -122,10 +122,10 @@ impl Bank {
         nearest_node(radius_px).min(self.nodes - 1)
     }
 
-    /// Returns the 2-D kernel of a node: `(2 r + 1)^2` taps with `r = node_reach[node]`, row-major. With `turned`, the
+    /// Returns the 2-D kernel of a node: `(2 r + 1)^2` taps with `r = node_half_width[node]`, row-major. With `turned`, the
     /// aperture is rotated by 180 degrees, as content in front of the focal plane shows it.
     pub fn kernel(&self, node: usize, turned: bool) -> Vec<f32> {
-        let reach = self.node_reach[node] as isize;
+        let reach = self.node_half_width[node] as isize;
         let sign = if turned { -1 } else { 1 };
         let at = |taps: &[f32], j: isize, t: usize| f64::from(taps[self.tap(node, sign * j) + t]);
         let range = move || -reach..=reach;
@@ -198,7 +198,7 @@ mod tests {
         let bank = Bank::new(&mask, Rank::Full, 10.0);
         for node in [5, 40, 101, 160] {
             let radius_px = node as f64 / f64::from(STEPS_PER_PX) * mask.extent;
-            let reach = bank.node_reach[node] as i64;
+            let reach = bank.node_half_width[node] as i64;
             let side = 2 * reach + 1;
             // Fraction of the mask's light that falls on each pixel, summed over the mask's cells.
             let mut direct = vec![0.0; (side * side) as usize];
@@ -234,8 +234,8 @@ mod tests {
         for node in 0..3000 {
             let radius_px = node_radius_px(node);
             let step_px = radius_px - before_px;
-            let most_px = (radius_px / OCTAVES_FROM_PX).max(1.0) / STEPS_PER_PX;
-            assert!(step_px > most_px / 2.01 && step_px <= most_px, "{radius_px}: {step_px}");
+            let max_px = (radius_px / OCTAVES_FROM_PX).max(1.0) / STEPS_PER_PX;
+            assert!(step_px > max_px / 2.01 && step_px <= max_px, "{radius_px}: {step_px}");
             for aside_px in [-0.49 * step_px, 0.0, 0.24 * step_px] {
                 assert_eq!(nearest_node((radius_px + aside_px).max(0.0)), node, "{radius_px} {aside_px}");
             }
@@ -260,7 +260,7 @@ mod tests {
     fn no_shift_and_the_second_moment_grows_with_the_radius() {
         let bank = bank(Shape::Disc, Rank::Terms(3));
         for node in (32..bank.nodes).step_by(16) {
-            let (kernel, reach) = (bank.kernel(node, false), bank.node_reach[node] as i64);
+            let (kernel, reach) = (bank.kernel(node, false), bank.node_half_width[node] as i64);
             let side = 2 * reach + 1;
             let moment = |power: i32| -> f64 {
                 kernel
@@ -280,7 +280,7 @@ mod tests {
     fn far_content_shows_the_aperture_upright_and_near_content_turns_it() {
         let bank = bank(Shape::Heart, Rank::Terms(8));
         let node = 160;
-        let (reach, side) = (bank.node_reach[node] as usize, 2 * bank.node_reach[node] as usize + 1);
+        let (reach, side) = (bank.node_half_width[node] as usize, 2 * bank.node_half_width[node] as usize + 1);
         let upper = |kernel: &[f32]| kernel[..reach * side].iter().sum::<f32>();
         // A kernel that gathers draws a point rotated by 180 degrees: for an upright heart its weight is below.
         assert!(upper(&bank.kernel(node, false)) < 0.45);

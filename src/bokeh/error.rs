@@ -18,14 +18,14 @@ pub enum BokehError {
     },
     /// The blur is wider than the picture, or than the method supports.
     #[error(
-        "a blur radius of {radius_px} px is too large: {} at most {most_px} px; lower --max-coc or --blur",
+        "a blur radius of {radius_px} px is too large: {} at most {max_px} px; lower --max-coc or --blur",
         if *by_method { "--method gather bears".to_owned() } else { format!("for pictures of {}x{}, use", size.0, size.1) }
     )]
     TooWide {
         /// Largest radius of the settings, in pixels.
         radius_px: f32,
-        /// [`most_radius_px`](super::Settings::most_radius_px).
-        most_px: f32,
+        /// [`max_radius_px`](super::Settings::max_radius_px).
+        max_px: f32,
         /// Width and height of the pictures.
         size: (u32, u32),
         /// True if the method sets the limit.

@@ -19,7 +19,7 @@ const UNCHECKED_PIXELS: u64 = 16 << 20;
 impl Settings {
     /// Returns the largest CoC radius that makes a difference to pictures of `size` (width, height), in pixels: their
     /// diagonal, or the method's limit if that is lower.
-    pub fn most_radius_px(&self, size: (u32, u32)) -> f32 {
+    pub fn max_radius_px(&self, size: (u32, u32)) -> f32 {
         let diagonal_px = (size.0 as f32).hypot(size.1 as f32).ceil();
         diagonal_px.min(match (self.coc, self.method, self.rank) {
             (CocKind::Depth, Method::Gather, Some(Rank::Full)) => MAX_EXACT_PX,
@@ -28,11 +28,11 @@ impl Settings {
         })
     }
 
-    /// Returns these settings with radii clamped to [`Settings::most_radius_px`].
+    /// Returns these settings with radii clamped to [`Settings::max_radius_px`].
     pub(super) fn within(&self, size: (u32, u32)) -> Self {
-        let most_px = self.most_radius_px(size);
+        let max_px = self.max_radius_px(size);
         // `max` turns NaN into 0.
-        let clamped = |radius_px: f32| radius_px.max(0.0).min(most_px);
+        let clamped = |radius_px: f32| radius_px.max(0.0).min(max_px);
         Self { far_max_px: clamped(self.far_max_px), near_max_px: clamped(self.near_max_px), ..self.clone() }
     }
 
@@ -56,11 +56,11 @@ impl Settings {
     /// [`BokehError::Memory`], [`BokehError::TooWide`].
     pub fn check(&self, size: (u32, u32)) -> Result<(), BokehError> {
         Self::check_room(size, 0)?;
-        let most_px = self.most_radius_px(size);
+        let max_px = self.max_radius_px(size);
         // NaN is refused as well.
-        let is_beyond = |radius_px: &f32| radius_px.partial_cmp(&most_px).is_none_or(|order| order.is_gt());
+        let is_beyond = |radius_px: &f32| radius_px.partial_cmp(&max_px).is_none_or(|order| order.is_gt());
         let Some(radius_px) = [self.far_max_px, self.near_max_px].into_iter().find(is_beyond) else { return Ok(()) };
         let by_method = (self.coc, self.method) == (CocKind::Depth, Method::Gather);
-        Err(BokehError::TooWide { radius_px, most_px, size, by_method })
+        Err(BokehError::TooWide { radius_px, max_px, size, by_method })
     }
 }

@@ -108,7 +108,7 @@ pub struct Plan {
 
 impl Plan {
     /// Plans frames of `width` x `height` pixels, at first at the quality of the settings. Radii are clamped to
-    /// [`Settings::most_radius_px`].
+    /// [`Settings::max_radius_px`].
     pub fn new(settings: &Settings, width: u32, height: u32) -> Self {
         let settings = &settings.within((width, height));
         let compositing = match (settings.coc, settings.method) {
@@ -250,7 +250,7 @@ impl Plan {
     /// Whether truncation makes a bin's filters overshoot visibly. Small filters keep nearly all of their terms: a
     /// symmetric kernel has `reach + 1`, any other `2 reach + 1`.
     pub fn has_lobes(&self, bin: &Bin) -> bool {
-        let reach = self.bin_reach(bin);
+        let reach = self.bin_half_width(bin);
         self.bank.terms < if self.bank.is_symmetric { reach } else { 2 * reach }
     }
 
@@ -274,8 +274,8 @@ impl Plan {
     }
 
     /// Returns the outermost tap of a bin's filters, in bin pixels.
-    pub fn bin_reach(&self, bin: &Bin) -> usize {
-        self.bank.node_reach[self.bank.node(bin.max_radius_px)] as usize
+    pub fn bin_half_width(&self, bin: &Bin) -> usize {
+        self.bank.node_half_width[self.bank.node(bin.max_radius_px)] as usize
     }
 
     /// Returns the index of the bin in a slot, in this frame.
@@ -285,8 +285,8 @@ impl Plan {
 
     /// Returns the radius of the neighbourhood of a cell, in cells: the filter support and one segment, for which a
     /// radius is read.
-    pub fn reach_cells(&self, bin: &Bin) -> usize {
-        (self.bin_reach(bin) + SEGMENT).div_ceil(CELL)
+    pub fn radius_cells(&self, bin: &Bin) -> usize {
+        (self.bin_half_width(bin) + SEGMENT).div_ceil(CELL)
     }
 
     /// Returns the radius in bin pixels for a CoC radius in pixels of the picture.

@@ -97,9 +97,9 @@ pub const COSTS: [f64; LADDER.len()] = {
     costs
 };
 
-/// Returns the finest scale at which a radius has at most `most_px` bin pixels, or the coarsest scale.
-pub fn scale_within(radius_px: f32, most_px: f32) -> usize {
-    let fits = SCALES.into_iter().find(|&scale| radius_px <= most_px * scale as f32);
+/// Returns the finest scale at which a radius has at most `max_px` bin pixels, or the coarsest scale.
+pub fn scale_within(radius_px: f32, max_px: f32) -> usize {
+    let fits = SCALES.into_iter().find(|&scale| radius_px <= max_px * scale as f32);
     fits.unwrap_or(SCALES[SCALES.len() - 1])
 }
 

@@ -52,7 +52,7 @@ impl Governor<1> {
     /// Creates a governor of one ladder with these relative costs, cheapest first, that starts at level `start`.
     ///
     /// # Panics
-    /// There is no rung, there are more than [`super::MAX_RUNGS`], or the costs are not positive and ascending.
+    /// There is no rung, there are more than [`super::MAX_LEVELS`], or the costs are not positive and ascending.
     pub fn new(ladder: &[f64], start: usize) -> Self {
         Self::with_stages([ladder], (0..ladder.len()).map(|rung| [rung]).collect(), start)
     }
@@ -86,7 +86,7 @@ impl<const STAGES: usize> Governor<STAGES> {
     /// stage; the cheapest comes first and is allowed at any load.
     ///
     /// # Panics
-    /// A ladder has no level or more than [`super::MAX_RUNGS`], or its costs are not positive and ascending; there is
+    /// A ladder has no level or more than [`super::MAX_LEVELS`], or its costs are not positive and ascending; there is
     /// no plan.
     pub fn with_stages(ladders: [&[f64]; STAGES], plans: Vec<[usize; STAGES]>, start: usize) -> Self {
         let rungs = plans[start];

@@ -3,7 +3,7 @@
 use super::window::Window;
 
 /// Largest number of quality levels of a ladder.
-pub const MAX_RUNGS: usize = 8;
+pub const MAX_LEVELS: usize = 8;
 
 /// Frames in the history of loads: 1.5 s at 30 fps.
 const LOADS: usize = 45;
@@ -40,8 +40,8 @@ pub struct Sample {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Load {
     /// Learnt costs, ascending; infinite from `rungs` on.
-    costs: [f64; MAX_RUNGS],
-    initial_costs: [f64; MAX_RUNGS],
+    costs: [f64; MAX_LEVELS],
+    initial_costs: [f64; MAX_LEVELS],
     rungs: usize,
     rung: usize,
     /// Time divided by cost, in nanoseconds, of the last frames of any level.
@@ -68,9 +68,9 @@ pub(super) enum SampleKind {
 impl Load {
     /// Creates the model of a stage with these relative costs, cheapest first, that starts at level `start`.
     pub fn new(ladder: &[f64], start: usize) -> Self {
-        assert!((1..=MAX_RUNGS).contains(&ladder.len()) && start < ladder.len(), "1 to {MAX_RUNGS} rungs");
+        assert!((1..=MAX_LEVELS).contains(&ladder.len()) && start < ladder.len(), "1 to {MAX_LEVELS} rungs");
         assert!(ladder[0] > 0.0 && ladder.is_sorted(), "costs ascend from above 0: {ladder:?}");
-        let mut costs = [f64::INFINITY; MAX_RUNGS];
+        let mut costs = [f64::INFINITY; MAX_LEVELS];
         costs[..ladder.len()].copy_from_slice(ladder);
         Self {
             costs,

@@ -39,7 +39,7 @@ impl File {
     /// Reads and parses the file `path`.
     pub fn open(path: &Path) -> Result<Self, CalibrationError> {
         let fail = |source| CalibrationError::Io { path: path.to_owned(), source };
-        let bytes = input::read(path, input::MOST_CALIBRATION_BYTES).map_err(fail)?;
+        let bytes = input::read(path, input::MAX_CALIBRATION_BYTES).map_err(fail)?;
         Self::parse(path, &String::from_utf8_lossy(&bytes))
     }
 

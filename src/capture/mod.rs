@@ -18,7 +18,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 pub use error::CaptureError;
-pub use seek::{Seeker, Wish};
+pub use seek::{SeekRequest, Seeker};
 
 use crate::frame::{ColorImage, DepthMap, GrayImage, Stamp};
 use crate::stats::Cause;
@@ -84,7 +84,7 @@ pub enum Brings {
     /// The picture and its ground-truth depth.
     Depth,
     /// The left and the right camera's pictures.
-    RightEye,
+    RightCamera,
 }
 
 /// Longest wait of a live camera in [`Camera::next`] before it returns [`Captured::Waiting`].

@@ -13,7 +13,7 @@ use crate::link::{self, Received, Receiver, Sender};
 use crate::pipewire::mode::{Agreed, Mode, Offer};
 use crate::pipewire::reader::{Frame, Reader, Take};
 use crate::stats::Cause;
-use crate::v4l2::live::Wish;
+use crate::v4l2::live::ModeRequest;
 use crate::v4l2::live::negotiate::{self, LinkSpeed};
 use crate::v4l2::modes::{FormatModes, Interval, QueueKind, Rates, SizeModes, Sizes};
 use crate::v4l2::queue::Losses;
@@ -52,7 +52,7 @@ impl PipeWireCamera {
     ///
     /// # Errors
     /// The camera does not exist, or cannot be used.
-    pub fn open(name: &str, filters: bool, wish: Wish, frames: Option<u64>) -> Result<Self, CaptureError> {
+    pub fn open(name: &str, filters: bool, wish: ModeRequest, frames: Option<u64>) -> Result<Self, CaptureError> {
         let (sender, receiver) = link::live();
         let picture_decoder = PictureDecoder {
             wish,
@@ -136,7 +136,7 @@ fn next_loss(Losses { missed, stale, corrupt }: &mut Losses) -> Option<Captured>
 
 /// Decodes pictures on the reader's thread.
 struct PictureDecoder {
-    wish: Wish,
+    wish: ModeRequest,
     sender: Sender<Picture>,
     pictures: Pool<ColorImage>,
     decoder: Option<Decoder>,
@@ -279,7 +279,7 @@ mod tests {
             mode(b"YUYV", Offer::These(vec![(640, 480), (1280, 720)]), Offer::These(vec![(15, 1), (30, 1)])),
             mode(b"NV12", Offer::Range { min: (2, 2), max: (4096, 4096) }, Offer::Range { min: (0, 1), max: (120, 1) }),
         ];
-        let chosen = |wish: Wish| {
+        let chosen = |wish: ModeRequest| {
             let (sender, _receiver) = link::live();
             let mut picture_decoder = PictureDecoder {
                 wish,
@@ -296,14 +296,14 @@ mod tests {
             let Agreed { fourcc, size, rate } = picture_decoder.choose(&modes).unwrap();
             format!("{} {size:?} {}/{}", FourCc(fourcc), rate.0, rate.1)
         };
-        let any = Wish::any(crate::layout::Content::Color);
-        let format = |fourcc: &str| Wish { fourcc: Some(fourcc.parse().unwrap()), ..any };
+        let any = ModeRequest::any(crate::layout::Content::Color);
+        let format = |fourcc: &str| ModeRequest { fourcc: Some(fourcc.parse().unwrap()), ..any };
         assert_eq!(chosen(format("YUYV")), "YUYV (1280, 720) 30/1");
         assert_eq!(chosen(format("NV12")), "NV12 (1280, 720) 30/1");
         assert_eq!(
-            chosen(Wish { size_px: Some((1920, 1080)), fps: Some(60.0), ..format("MJPG") }),
+            chosen(ModeRequest { size_px: Some((1920, 1080)), fps: Some(60.0), ..format("MJPG") }),
             "MJPG (1920, 1080) 60/1"
         );
-        assert_eq!(chosen(Wish { size_px: Some((640, 360)), ..any }), "NV12 (640, 360) 30/1");
+        assert_eq!(chosen(ModeRequest { size_px: Some((640, 360)), ..any }), "NV12 (640, 360) 30/1");
     }
 }

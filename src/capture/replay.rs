@@ -30,7 +30,7 @@ pub struct Replay {
     /// Media time of one lap.
     lap_ns: u64,
     /// Whether the right camera's pictures are read, too.
-    right_eye: bool,
+    right_camera: bool,
     looped: bool,
     limit: Option<u64>,
     seeker: Arc<Seeker>,
@@ -73,7 +73,7 @@ impl Replay {
             name: name.to_owned(),
             lap,
             lap_ns,
-            right_eye: false,
+            right_camera: false,
             looped: part.looped,
             limit: part.frames,
             seeker: Arc::new(seeker),
@@ -87,7 +87,7 @@ impl Replay {
     /// Reads the right camera's pictures, too. Frames of a monocular recording are then corrupt.
     #[must_use]
     pub fn with_right_eye(self) -> Self {
-        Self { right_eye: true, ..self }
+        Self { right_camera: true, ..self }
     }
 
     /// Total number of frames, over all laps; `None` if endless.
@@ -130,7 +130,7 @@ impl Camera for Replay {
             period_ns: self.recording.period_ns(),
             frames: self.total(),
             live: false,
-            brings: if self.right_eye { Brings::RightEye } else { Brings::Color },
+            brings: if self.right_camera { Brings::RightCamera } else { Brings::Color },
         }
     }
 
@@ -146,7 +146,7 @@ impl Camera for Replay {
         self.advance();
         let Shot { color, right, .. } = shot;
         let mut read = self.recording.read_color(stamp.index, &mut self.scratch, color);
-        if self.right_eye && read.is_ok() {
+        if self.right_camera && read.is_ok() {
             read = self.recording.read_right(stamp.index, &mut self.scratch, right);
         }
         Ok(match read {

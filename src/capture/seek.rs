@@ -23,7 +23,7 @@ pub struct Seeker {
 
 /// A request to show a frame next.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Wish {
+pub struct SeekRequest {
     /// Number of the request, from 1.
     pub number: u64,
     /// Position of the frame, from 0.
@@ -72,9 +72,9 @@ impl Seeker {
     }
 
     /// Returns the newest request, if its number is above `last`.
-    pub fn wish_after(&self, last: u64) -> Option<Wish> {
+    pub fn request_after(&self, last: u64) -> Option<SeekRequest> {
         let wish = self.wish.load(Ordering::Relaxed);
-        let wish = Wish { number: wish >> POSITION_BITS, place: (wish & u64::from(u32::MAX)) as usize };
+        let wish = SeekRequest { number: wish >> POSITION_BITS, place: (wish & u64::from(u32::MAX)) as usize };
         Some(wish).filter(|wish| wish.number > last)
     }
 

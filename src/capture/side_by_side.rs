@@ -27,7 +27,7 @@ impl SideBySide {
             return Err(CaptureError::NotOnePicture { source_name: info.name });
         }
         info.size = (width / 2, height);
-        info.brings = Brings::RightEye;
+        info.brings = Brings::RightCamera;
         Ok(Self { camera, info, wide: ColorImage::default() })
     }
 }
@@ -104,7 +104,7 @@ mod tests {
     #[test]
     fn the_left_half_is_the_picture_and_the_right_half_the_other_eye() {
         let mut camera = SideBySide::new(Box::new(Wide((6, 2), Brings::Color))).unwrap();
-        assert_eq!((camera.info().size, camera.info().brings), ((3, 2), Brings::RightEye));
+        assert_eq!((camera.info().size, camera.info().brings), ((3, 2), Brings::RightCamera));
         let (mut color, mut depth, mut right) = Default::default();
         let _: (&ColorImage, &DepthMap, &GrayImage) = (&color, &depth, &right);
         let shot = Shot { color: &mut color, depth: &mut depth, right: &mut right };
@@ -120,7 +120,7 @@ mod tests {
         let refusal = |size, brings| SideBySide::new(Box::new(Wide(size, brings))).err().unwrap().to_string();
         let odd = refusal((7, 2), Brings::Color);
         assert!(odd.contains("wide") && odd.contains("7x2") && odd.contains("even"), "{odd}");
-        for brings in [Brings::RightEye, Brings::Depth] {
+        for brings in [Brings::RightCamera, Brings::Depth] {
             assert!(refusal((6, 2), brings).contains("--side-by-side"));
         }
     }

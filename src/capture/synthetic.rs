@@ -26,7 +26,7 @@ pub type Make = fn(Format) -> Result<Box<dyn Camera>, CaptureError>;
 static MAKE: OnceLock<Make> = OnceLock::new();
 
 /// Registers `make` as the implementation of `synthetic`. Only the first call has an effect.
-pub fn bring(make: Make) {
+pub fn register(make: Make) {
     // Later callers register the same function.
     let _ = MAKE.set(make);
 }

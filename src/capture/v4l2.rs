@@ -9,7 +9,7 @@ use crate::clock::Clock;
 use crate::frame::fit::Fit;
 use crate::frame::{ColorImage, Stamp};
 use crate::stats::Cause;
-use crate::v4l2::live::{Live, Next, Setting, Wish};
+use crate::v4l2::live::{Live, ModeRequest, Next, Setting};
 use crate::v4l2::queue::Losses;
 
 /// A V4L2 camera. All its frames have one size: if the camera comes back with another one, its pictures are scaled into
@@ -38,7 +38,12 @@ impl V4l2Camera {
     ///
     /// # Errors
     /// The camera does not exist, or cannot be used.
-    pub fn open(name: &str, wish: Wish, settings: Vec<Setting>, frames: Option<u64>) -> Result<Self, CaptureError> {
+    pub fn open(
+        name: &str,
+        wish: ModeRequest,
+        settings: Vec<Setting>,
+        frames: Option<u64>,
+    ) -> Result<Self, CaptureError> {
         let clock = Clock::system();
         let live = Live::open(name, wish, settings, clock.clone())?;
         // The first layout fixes the size for the whole run.

@@ -108,7 +108,7 @@ impl<T: 'static> Backed<Option<T>> {
         make: fn(&Arc<Device>) -> T,
     ) -> Self {
         let is_passed = |device: &&Arc<Device>| {
-            let fault = device.fault_of::<T, GpuError>(|| {
+            let fault = device.find_fault::<T, GpuError>(|| {
                 let fault = trial(device).map_or_else(Some, |trial| trial.fault(device));
                 fault.iter().for_each(|fault| tracing::warn!("{fault}; the CPU {does}"));
                 Ok(fault)

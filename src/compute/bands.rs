@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::thread_pool::{MOST_ITEMS, ThreadPool};
+use super::thread_pool::{MAX_ITEMS, ThreadPool};
 
 /// Bands per thread: if one thread is delayed, the others take over its bands.
 const BANDS_PER_THREAD: usize = 4;
@@ -21,7 +21,7 @@ impl Bands {
     /// Splits `height` rows for these threads, a multiple of `unit` rows in each band; one band for one thread.
     pub fn new(height: usize, unit: usize, workers: &ThreadPool) -> Self {
         let threads = workers.thread_count();
-        let max_bands = if threads > 1 { (BANDS_PER_THREAD * threads).min(MOST_ITEMS) } else { 1 };
+        let max_bands = if threads > 1 { (BANDS_PER_THREAD * threads).min(MAX_ITEMS) } else { 1 };
         let rows = height.div_ceil(max_bands).max(MIN_ROWS).next_multiple_of(unit);
         Self { height, rows }
     }
@@ -44,7 +44,7 @@ impl Bands {
 
 /// Returns the number of values per item of a pass over `count` values: at least `least`, to be worth a thread.
 pub fn share(count: usize, least: usize) -> usize {
-    count.div_ceil(MOST_ITEMS).max(least)
+    count.div_ceil(MAX_ITEMS).max(least)
 }
 
 #[cfg(test)]
@@ -64,7 +64,7 @@ mod tests {
                     assert!(rows.start.is_multiple_of(unit) && values[0] == rows.start);
                     (next, count) = (rows.end, count + 1);
                 }
-                assert!(next == height && count <= MOST_ITEMS && (threads > 1 || count <= 1));
+                assert!(next == height && count <= MAX_ITEMS && (threads > 1 || count <= 1));
             }
         }
     }

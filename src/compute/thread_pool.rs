@@ -52,7 +52,7 @@ impl<S> Base<S> {
 }
 
 /// Largest number of items of a pass: they are kept on the stack.
-pub const MOST_ITEMS: usize = 32;
+pub const MAX_ITEMS: usize = 32;
 const OPEN: u64 = 1 << 15;
 const AT_WORK: u64 = OPEN - 1;
 const EPOCH: u64 = 1 << 16;
@@ -121,7 +121,7 @@ impl ThreadPool {
         });
     }
 
-    /// Calls `work` once with each of at most [`MOST_ITEMS`] items, spread over the threads.
+    /// Calls `work` once with each of at most [`MAX_ITEMS`] items, spread over the threads.
     ///
     /// # Panics
     /// Panics like [`ThreadPool::run`], and if there are more items.
@@ -139,7 +139,7 @@ impl ThreadPool {
         mut items: impl Iterator<Item = T>,
         work: &(dyn Fn(&mut S, T) + Sync),
     ) {
-        let mut waiting: [Option<T>; MOST_ITEMS] = std::array::from_fn(|_| items.next());
+        let mut waiting: [Option<T>; MAX_ITEMS] = std::array::from_fn(|_| items.next());
         assert!(items.next().is_none(), "more items than places");
         let count = waiting.iter().flatten().count();
         let base = Base(waiting.as_mut_ptr());

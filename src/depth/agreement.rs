@@ -32,7 +32,7 @@ const MIDDLE_FRACTION: f32 = 0.8;
 
 /// How the depth edges of a map and the edges of its picture are aligned.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Agreement {
+pub enum EdgeAlignment {
     /// There are too few discontinuities for a conclusion.
     Unknown,
     /// They coincide.
@@ -62,7 +62,7 @@ struct Reduced {
     known: Vec<bool>,
 }
 
-impl Agreement {
+impl EdgeAlignment {
     /// Compares the depth `map`, of any size, with the picture `color`, of the same aspect.
     pub fn of(map: &DepthMap, color: &ColorImage) -> Self {
         if map.metres.is_empty() || color.rgb.is_empty() {

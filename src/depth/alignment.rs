@@ -1,12 +1,12 @@
 //! Photometric and geometric alignment of an earlier picture of the same background, such as a plate, with the current
 //! one: a gain per channel for exposure and white balance, and a shift for small movements of the camera.
 
-use super::reduced::MOST;
+use super::reduced;
 use super::tap::Tap;
 
 /// Darker or brighter pixels are not used for gains.
 const MIN_VALUE: f32 = 24.0;
-const MAX_VALUE: f32 = MOST - 8.0;
+const MAX_VALUE: f32 = reduced::MAX_VALUE - 8.0;
 /// Number of bins of the histogram of ratios, and bins per factor of two.
 const BINS: usize = 512;
 const PER_OCTAVE: f32 = 128.0;

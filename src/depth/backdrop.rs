@@ -28,12 +28,12 @@ pub enum Behind {
     /// A colour, as sRGB codes.
     Color([u8; 3]),
     /// A picture, scaled to cover the frame and cropped equally on both sides.
-    Picture(Arc<BehindPicture>),
+    Picture(Arc<BackgroundPicture>),
 }
 
 /// A picture for a virtual background.
 #[derive(Debug)]
-pub struct BehindPicture {
+pub struct BackgroundPicture {
     /// The file it was loaded from, if any.
     pub file: Option<PathBuf>,
     /// Its pixels.
@@ -54,7 +54,7 @@ impl PartialEq for Behind {
 
 /// Replaces the background of frame after frame; owns the memory for it.
 #[derive(Debug)]
-pub struct Backdrop {
+pub struct VirtualBackground {
     behind: Behind,
     light: Box<[f32; 256]>,
     /// Lookup table to sRGB: [`CODES`] entries, uniform in the square root of linear light.
@@ -79,7 +79,7 @@ const CODES: usize = 4096;
 /// Pixels processed together: mostly all or none of them are replaced.
 const CHUNK: usize = 32;
 
-impl Backdrop {
+impl VirtualBackground {
     /// Creates a virtual background; `None` for [`Behind::Blur`].
     pub fn new(behind: &Behind) -> Option<Self> {
         if *behind == Behind::Blur {
@@ -245,12 +245,12 @@ mod tests {
     }
 
     fn lay(behind: &Behind, color: &mut ColorImage, map: &mut DepthMap) {
-        Backdrop::new(behind).unwrap().lay(color, map, &LENS);
+        VirtualBackground::new(behind).unwrap().lay(color, map, &LENS);
     }
 
     #[test]
     fn only_what_is_well_behind_the_focal_plane_is_replaced_and_is_in_focus_then() {
-        assert!(Backdrop::new(&Behind::Blur).is_none());
+        assert!(VirtualBackground::new(&Behind::Blur).is_none());
         let (mut color, mut map) = row([0.4, 1.0, 1.2, 2.0, 50.0, 0.0]);
         lay(&GREEN, &mut color, &mut map);
         let pixels = color.rgb.as_chunks::<3>().0;
@@ -314,7 +314,7 @@ mod tests {
         }
         let mut color = ColorImage::new(20, 20);
         let mut map = DepthMap { metres: vec![9.0; 400], ..DepthMap::new(20, 20) };
-        lay(&Behind::Picture(Arc::new(BehindPicture { file: None, image: wide })), &mut color, &mut map);
+        lay(&Behind::Picture(Arc::new(BackgroundPicture { file: None, image: wide })), &mut color, &mut map);
         let at = |x: usize, y: usize| color.rgb.as_chunks::<3>().0[20 * y + x];
         // Columns 20 to 60 of the picture are left, two to a pixel.
         for x in [2, 7, 12, 17] {

@@ -1,6 +1,6 @@
 //! Depth of a recording for colour frames of another source: paired by media time, played in a loop.
 
-use super::{DepthError, DepthSource, Seen};
+use super::{DepthError, DepthSource, FrameInput};
 use crate::frame::DepthMap;
 use crate::recording::{Recording, Scratch};
 
@@ -43,7 +43,7 @@ impl Beside {
 }
 
 impl DepthSource for Beside {
-    fn read(&mut self, Seen { stamp, .. }: Seen, map: &mut DepthMap) -> Result<(), DepthError> {
+    fn read(&mut self, FrameInput { stamp, .. }: FrameInput, map: &mut DepthMap) -> Result<(), DepthError> {
         let index = self.index_at(stamp.time_ns.saturating_add_signed(self.ahead_ns));
         // At a higher colour frame rate, one depth image serves several frames: it is decoded once.
         if self.last != Some(index) {

@@ -30,7 +30,7 @@ const MAX_GAP_NS: u64 = 2_000_000_000;
 
 /// Computes the crop that follows the subject, frame after frame.
 #[derive(Debug)]
-pub struct Follower {
+pub struct AutoFraming {
     max_zoom: f32,
     columns: Vec<u32>,
     rows: Vec<u32>,
@@ -42,7 +42,7 @@ pub struct Follower {
     time_ns: Option<u64>,
 }
 
-impl Follower {
+impl AutoFraming {
     /// Creates a follower that zooms by at most `max_zoom`.
     pub fn new(max_zoom: f32) -> Self {
         Self {
@@ -179,7 +179,7 @@ mod tests {
     #[test]
     fn the_first_frame_shows_the_subject_at_once_and_no_larger_than_was_said() {
         for most in [1.2, 1.5, 3.0] {
-            let part = Follower::new(most).part(&person(0.4), &LENS, 7);
+            let part = AutoFraming::new(most).part(&person(0.4), &LENS, 7);
             assert!((part.center[0] - 0.4).abs() < 0.02 || part.zoom < 1.3, "{part:?}");
             assert!(part.zoom <= most + 1e-5 && part.zoom > 1.1);
             let top = part.center[1] - 0.5 / part.zoom;
@@ -190,7 +190,7 @@ mod tests {
 
     #[test]
     fn it_glides_to_where_the_subject_went_without_passing_it_and_rests() {
-        let mut follower = Follower::new(1.6);
+        let mut follower = AutoFraming::new(1.6);
         let (before, after) = (person(0.44), person(0.56));
         let first = follower.part(&before, &LENS, 0);
         let places: Vec<f32> = (1..90).map(|k| follower.part(&after, &LENS, k * PERIOD_NS).center[0]).collect();
@@ -204,20 +204,20 @@ mod tests {
 
     #[test]
     fn small_movements_and_frames_without_a_subject_leave_it_where_it_is() {
-        let mut follower = Follower::new(1.6);
+        let mut follower = AutoFraming::new(1.6);
         let first = follower.part(&person(0.5), &LENS, 0);
         let empty = DepthMap { metres: vec![9.0; 320 * 180], ..DepthMap::new(320, 180) };
         for k in 1..60 {
             let map = if k % 7 == 0 { empty.clone() } else { person(0.5 + 0.02 * ((k % 3) as f32 - 1.0)) };
             assert_eq!(follower.part(&map, &LENS, k * PERIOD_NS), first);
         }
-        assert_eq!(Follower::new(2.0).part(&empty, &LENS, 0), Crop::WHOLE);
+        assert_eq!(AutoFraming::new(2.0).part(&empty, &LENS, 0), Crop::WHOLE);
     }
 
     #[test]
     fn how_many_frames_there_are_makes_no_difference() {
         let places = |every: u64| {
-            let mut follower = Follower::new(1.6);
+            let mut follower = AutoFraming::new(1.6);
             follower.part(&person(0.4), &LENS, 0);
             (1..=12 / every).map(|k| follower.part(&person(0.6), &LENS, k * every * PERIOD_NS)).last().unwrap()
         };

@@ -2,36 +2,36 @@
 
 use std::fmt;
 
-use super::agreement::Agreement;
-use super::refine::{Mending, Outlines};
+use super::agreement::EdgeAlignment;
+use super::refine::{MapCorrection, Outlines};
 use crate::frame::{ColorImage, DepthMap};
 
 /// Why a depth map does not fit its picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Misfit {
+pub struct Misalignment {
     /// Columns and rows of the map, if it has fewer columns than the picture.
     pub smaller: Option<(u32, u32)>,
     /// How depth edges and picture edges are aligned.
-    pub outlines: Agreement,
+    pub outlines: EdgeAlignment,
 }
 
-impl Misfit {
+impl Misalignment {
     /// Measures the depth `map` against its picture; `None` if it fits.
     pub fn of(map: &DepthMap, color: &ColorImage) -> Option<Self> {
-        Self::with(Agreement::of(map, color), map, color)
+        Self::with(EdgeAlignment::of(map, color), map, color)
     }
 
-    /// Like [`Misfit::of`] with a known alignment of the outlines.
-    pub fn with(outlines: Agreement, map: &DepthMap, color: &ColorImage) -> Option<Self> {
+    /// Like [`Misalignment::of`] with a known alignment of the outlines.
+    pub fn with(outlines: EdgeAlignment, map: &DepthMap, color: &ColorImage) -> Option<Self> {
         let smaller = (map.width < color.width).then(|| map.size());
-        let fits = smaller.is_none() && matches!(outlines, Agreement::Meets | Agreement::Unknown);
+        let fits = smaller.is_none() && matches!(outlines, EdgeAlignment::Meets | EdgeAlignment::Unknown);
         (!fits).then_some(Self { smaller, outlines })
     }
 
     /// Returns the required correction; `None` if the picture has no edges near the depth edges.
-    pub fn mending(self, map: &DepthMap, color: &ColorImage) -> Option<Mending> {
+    pub fn mending(self, map: &DepthMap, color: &ColorImage) -> Option<MapCorrection> {
         let (mut outlines, mut distance_px) = (self.outlines, 0);
-        if let Agreement::Beside { distance_px: picture_px } = outlines {
+        if let EdgeAlignment::Beside { distance_px: picture_px } = outlines {
             // The last pixel is left to the colours, so that thin structures are not lost.
             distance_px = picture_px - picture_px.signum();
             let mut moved = map.clone();
@@ -41,34 +41,34 @@ impl Misfit {
             Outlines::default().shift(&mut moved.metres, &unknown, map.width as usize, map_px, 0.0);
             // Back to metres: 0 is unknown in both units.
             moved.metres.iter_mut().filter(|value| **value > 0.0).for_each(|value| *value = value.recip());
-            outlines = Agreement::of(&moved, color);
+            outlines = EdgeAlignment::of(&moved, color);
         }
         // At each scale, edges move by about three pixels.
         let of_size = self.smaller.map_or(1, |(width, _)| color.width.div_ceil(width.max(1)));
         let coarsest = match outlines {
-            Agreement::Unrelated => return None,
-            Agreement::Soft { width_px } => width_px.div_ceil(3).max(of_size),
-            Agreement::Meets | Agreement::Unknown | Agreement::Beside { .. } if distance_px == 0 => of_size,
-            Agreement::Meets | Agreement::Unknown | Agreement::Beside { .. } => of_size.max(2),
+            EdgeAlignment::Unrelated => return None,
+            EdgeAlignment::Soft { width_px } => width_px.div_ceil(3).max(of_size),
+            EdgeAlignment::Meets | EdgeAlignment::Unknown | EdgeAlignment::Beside { .. } if distance_px == 0 => of_size,
+            EdgeAlignment::Meets | EdgeAlignment::Unknown | EdgeAlignment::Beside { .. } => of_size.max(2),
         };
-        Some(Mending { distance_px, coarsest })
+        Some(MapCorrection { distance_px, coarsest })
     }
 }
 
-impl fmt::Display for Misfit {
+impl fmt::Display for Misalignment {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         if let Some((width, height)) = self.smaller {
             write!(f, "it has {width} x {height} pixels")?;
         }
         let and = if self.smaller.is_some() { " and " } else { "" };
         match self.outlines {
-            Agreement::Beside { distance_px } => {
+            EdgeAlignment::Beside { distance_px } => {
                 let side = if distance_px < 0 { "outside" } else { "inside" };
                 write!(f, "{and}its outlines lie about {} px {side} those of the picture", distance_px.abs())
             }
-            Agreement::Soft { width_px } => write!(f, "{and}its outlines are about {width_px} px wide"),
-            Agreement::Unrelated => write!(f, "{and}nowhere do its outlines meet those of the picture"),
-            Agreement::Meets | Agreement::Unknown => Ok(()),
+            EdgeAlignment::Soft { width_px } => write!(f, "{and}its outlines are about {width_px} px wide"),
+            EdgeAlignment::Unrelated => write!(f, "{and}nowhere do its outlines meet those of the picture"),
+            EdgeAlignment::Meets | EdgeAlignment::Unknown => Ok(()),
         }
     }
 }

@@ -51,7 +51,7 @@ pub trait DepthSource: Send {
     ///
     /// # Errors
     /// No depth is available for this frame, or it cannot be read; `map` is then unspecified.
-    fn read(&mut self, seen: Seen, map: &mut DepthMap) -> Result<(), DepthError>;
+    fn read(&mut self, seen: FrameInput, map: &mut DepthMap) -> Result<(), DepthError>;
 
     /// Returns the relative cost of a map at each effort level, ascending; the last and finest level is 1. A source
     /// without a choice has one level.
@@ -67,7 +67,7 @@ pub trait DepthSource: Send {
 
     /// Whether later frames may reuse a map, warped by the picture's motion. False for maps whose outlines come from a
     /// mask: a mask is valid for its own frame only, and the person it shows is what moves most.
-    fn may_be_shared(&self) -> bool {
+    fn is_reusable(&self) -> bool {
         true
     }
 
@@ -78,7 +78,7 @@ pub trait DepthSource: Send {
     }
 
     /// Sets whether the lens focuses on persons, from the next map on. If not, the source may skip person detection.
-    fn look_for_persons(&mut self, on: bool) {
+    fn set_focus_on_persons(&mut self, on: bool) {
         let _ = on;
     }
 
@@ -95,7 +95,7 @@ pub trait DepthSource: Send {
 
 /// The part of a frame that its depth may depend on.
 #[derive(Clone, Copy, Debug)]
-pub struct Seen<'a> {
+pub struct FrameInput<'a> {
     /// Index and times of the frame.
     pub stamp: Stamp,
     /// The picture; of a stereo pair, that of the left camera.

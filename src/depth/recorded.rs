@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{DepthError, DepthSource, Seen};
+use super::{DepthError, DepthSource, FrameInput};
 use crate::frame::DepthMap;
 use crate::recording::{Recording, Scratch};
 
@@ -27,7 +27,7 @@ impl Recorded {
 }
 
 impl DepthSource for Recorded {
-    fn read(&mut self, Seen { stamp, .. }: Seen, map: &mut DepthMap) -> Result<(), DepthError> {
+    fn read(&mut self, FrameInput { stamp, .. }: FrameInput, map: &mut DepthMap) -> Result<(), DepthError> {
         Ok(self.recording.read_depth(stamp.index, &mut self.scratch, map)?)
     }
 }

@@ -9,7 +9,7 @@ use crate::frame::ColorImage;
 /// Approximate number of columns of a reduced picture.
 const COLUMNS: u32 = 320;
 /// Largest value; values start at 0.
-pub const MOST: f32 = 255.0;
+pub const MAX_VALUE: f32 = 255.0;
 
 /// Reduces pictures.
 #[derive(Debug)]
@@ -23,7 +23,7 @@ pub struct Reducer {
 impl Default for Reducer {
     fn default() -> Self {
         let light = light_of_codes();
-        let roots = Box::new(std::array::from_fn(|code| MOST * light[code.min(255)].sqrt()));
+        let roots = Box::new(std::array::from_fn(|code| MAX_VALUE * light[code.min(255)].sqrt()));
         Self { roots, sums: Vec::new() }
     }
 }
@@ -40,7 +40,7 @@ pub fn reduced_size(color: &ColorImage) -> (usize, usize) {
 }
 
 impl Reducer {
-    /// Returns the square root of the linear light of a code, 0 to 255, scaled to [`MOST`].
+    /// Returns the square root of the linear light of a code, 0 to 255, scaled to [`MAX_VALUE`].
     #[inline(always)]
     pub fn root(&self, code: f32) -> f32 {
         let first = code as u8;
@@ -59,14 +59,14 @@ impl Reducer {
     /// Returns the code before multiplication of its root by `gain`.
     #[inline(always)]
     pub fn without_gain(&self, code: u8, gain: f32) -> u8 {
-        (self.code((self.root(f32::from(code)) / gain).min(MOST)) + 0.5) as u8
+        (self.code((self.root(f32::from(code)) / gain).min(MAX_VALUE)) + 0.5) as u8
     }
 
     /// Computes the linear light of each code, by channel, after multiplication of the root by a gain per channel.
     pub fn expose(&self, gain: [f32; 3], light: &mut [[f32; 256]; 3]) {
         for (light, gain) in light.iter_mut().zip(gain) {
             // The gain applies to roots of light.
-            let exposed = |code: usize| (gain * self.root(code as f32) / MOST).powi(2).min(1.0);
+            let exposed = |code: usize| (gain * self.root(code as f32) / MAX_VALUE).powi(2).min(1.0);
             light.iter_mut().enumerate().for_each(|(code, light)| *light = exposed(code));
         }
     }

@@ -8,7 +8,7 @@ use crate::depth::background::Background;
 use crate::depth::fill::Filler;
 use crate::depth::focus::{Focus, FocusRule};
 use crate::depth::matting::{self, Matting};
-use crate::depth::refine::{Mending, Refiner};
+use crate::depth::refine::{MapCorrection, Refiner};
 use crate::frame::{ColorImage, DepthMap};
 use crate::link::pool::Pooled;
 use crate::look::CocRule;
@@ -16,7 +16,7 @@ use crate::optics::CocField;
 
 /// How a depth map is postprocessed before it is used.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Finish {
+pub enum Postprocess {
     /// Not at all: it is complete already.
     Keep,
     /// Fills holes.
@@ -25,7 +25,7 @@ pub enum Finish {
     Refine,
 }
 
-impl Finish {
+impl Postprocess {
     /// Returns the postprocessing of measured depth.
     pub fn measured(refine: bool) -> Self {
         if refine { Self::Refine } else { Self::Fill }
@@ -37,7 +37,7 @@ pub struct CocMaker {
     rule: CocRule,
     focus: Focus,
     finisher: Finisher,
-    mending: Mending,
+    mending: MapCorrection,
     /// The GPU that refines depth and estimates mattes; `None` is the CPU.
     device: Option<Arc<Device>>,
     matting: Matting,
@@ -54,19 +54,19 @@ enum Finisher {
 }
 
 impl Finisher {
-    fn new(finish: Finish, mending: Mending, device: Option<&Arc<Device>>) -> Self {
+    fn new(finish: Postprocess, mending: MapCorrection, device: Option<&Arc<Device>>) -> Self {
         match finish {
-            Finish::Keep => Self::Keep,
-            Finish::Fill => Self::Fill(Box::default()),
-            Finish::Refine => Self::Refine(Box::new(Refiner::mending(mending).on(device))),
+            Postprocess::Keep => Self::Keep,
+            Postprocess::Fill => Self::Fill(Box::default()),
+            Postprocess::Refine => Self::Refine(Box::new(Refiner::mending(mending).on(device))),
         }
     }
 
-    fn finish(&self) -> Finish {
+    fn finish(&self) -> Postprocess {
         match self {
-            Self::Keep => Finish::Keep,
-            Self::Fill(_) => Finish::Fill,
-            Self::Refine(_) => Finish::Refine,
+            Self::Keep => Postprocess::Keep,
+            Self::Fill(_) => Postprocess::Fill,
+            Self::Refine(_) => Postprocess::Refine,
         }
     }
 }
@@ -80,8 +80,8 @@ fn focus_rule(rule: CocRule) -> FocusRule {
 
 impl CocMaker {
     /// Creates a maker without history, which works on the caller's thread.
-    pub fn new(rule: CocRule, finish: Finish) -> Self {
-        let (focus, mending) = (Focus::new(focus_rule(rule)), Mending::default());
+    pub fn new(rule: CocRule, finish: Postprocess) -> Self {
+        let (focus, mending) = (Focus::new(focus_rule(rule)), MapCorrection::default());
         let (finisher, matting) = (Finisher::new(finish, mending, None), Matting::default());
         Self {
             rule,
@@ -102,7 +102,7 @@ impl CocMaker {
     }
 
     /// Uses `threads` threads, the caller's included; the results are bit-identical.
-    pub fn on_threads(self, threads: usize) -> Self {
+    pub fn with_threads(self, threads: usize) -> Self {
         Self { workers: ThreadPool::new("depth", threads), ..self }
     }
 
@@ -113,7 +113,7 @@ impl CocMaker {
             self.device = Some(device);
             self.has_matted = false;
             if matches!(self.finisher, Finisher::Refine(_)) {
-                self.reset_finisher(Finish::Refine);
+                self.reset_finisher(Postprocess::Refine);
             }
         }
     }
@@ -140,7 +140,7 @@ impl CocMaker {
     }
 
     /// Replaces the finisher by one without history.
-    fn reset_finisher(&mut self, finish: Finish) {
+    fn reset_finisher(&mut self, finish: Postprocess) {
         let uses_depth = matches!(self.rule, CocRule::Depth { .. });
         // The old finisher's buffers on the device do not belong to the next map.
         self.matting.take_from(None);
@@ -148,16 +148,16 @@ impl CocMaker {
     }
 
     /// Sets the correction of misaligned depth edges; returns whether maps are refined, so that it takes effect.
-    pub fn set_mending(&mut self, mending: Mending) -> bool {
+    pub fn set_mending(&mut self, mending: MapCorrection) -> bool {
         let refines = matches!(self.finisher, Finisher::Refine(_));
         if std::mem::replace(&mut self.mending, mending) != mending && refines {
-            self.reset_finisher(Finish::Refine);
+            self.reset_finisher(Postprocess::Refine);
         }
         refines
     }
 
     /// Sets how maps are postprocessed.
-    pub fn set_finish(&mut self, finish: Finish) {
+    pub fn set_finish(&mut self, finish: Postprocess) {
         if self.finisher.finish() != finish {
             self.reset_finisher(finish);
         }
@@ -182,7 +182,7 @@ impl CocMaker {
     }
 
     /// Follows another rule; the focus moves on from its present distance.
-    pub fn follow(&mut self, rule: CocRule, finish: Finish) {
+    pub fn follow(&mut self, rule: CocRule, finish: Postprocess) {
         match (std::mem::replace(&mut self.rule, rule), rule) {
             (CocRule::Depth { .. }, CocRule::Depth { focus, .. }) => {
                 self.focus.follow(focus);
@@ -206,12 +206,12 @@ impl CocMaker {
     /// Computes the CoC of the frame at `time_ns` and finishes `map`. The focus is measured on the raw map, before
     /// holes are filled.
     pub fn make(&mut self, map: &mut DepthMap, color: &ColorImage, time_ns: u64) -> CocField {
-        self.make_noting(map, color, time_ns, |_| ())
+        self.make_with_steps(map, color, time_ns, |_| ())
     }
 
     /// Does the same as [`CocMaker::make`], and calls `done` with the name of each finished step: for benchmarks.
     #[doc(hidden)]
-    pub fn make_noting(
+    pub fn make_with_steps(
         &mut self,
         map: &mut DepthMap,
         color: &ColorImage,
@@ -304,9 +304,9 @@ mod tests {
     fn depth_is_refined_while_that_is_wanted_and_by_one_refiner() {
         let focus = FocusRule::Point { x: 0.5, y: 0.5 };
         let rule = CocRule::Depth { focus, lens: CocAtInfinity::Px(8.0), range_m: 0.0, max_coc_px: 20.0 };
-        let mut coc = CocMaker::new(rule, Finish::Fill);
+        let mut coc = CocMaker::new(rule, Postprocess::Fill);
         let mut refiner_after = |refine| {
-            coc.follow(rule, Finish::measured(refine));
+            coc.follow(rule, Postprocess::measured(refine));
             match &coc.finisher {
                 Finisher::Refine(refiner) => Some(std::ptr::from_ref(&**refiner)),
                 Finisher::Fill(_) | Finisher::Keep => None,

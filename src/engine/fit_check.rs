@@ -1,8 +1,8 @@
 //! Checks, in some of the first frames, whether the depth of a stream is aligned with its pictures.
 
-use crate::depth::agreement::Agreement;
-use crate::depth::misfit::Misfit;
-use crate::depth::refine::Mending;
+use crate::depth::agreement::EdgeAlignment;
+use crate::depth::misfit::Misalignment;
+use crate::depth::refine::MapCorrection;
 use crate::frame::{ColorImage, DepthMap};
 
 /// Every fifth frame is checked, as neighbouring frames are alike.
@@ -18,7 +18,7 @@ pub enum Verdict {
     /// Depth and colour are not registered.
     Unrelated,
     /// The edges are misaligned; this correction aligns them.
-    Mend(Misfit, Mending),
+    Mend(Misalignment, MapCorrection),
 }
 
 /// Checks frames until it reaches a verdict or gives up.
@@ -28,7 +28,7 @@ pub struct FitCheck {
     required: usize,
     frames: u32,
     unrelated: usize,
-    mendings: Vec<(Misfit, Mending)>,
+    mendings: Vec<(Misalignment, MapCorrection)>,
     is_aligned: bool,
 }
 
@@ -53,12 +53,12 @@ impl FitCheck {
         if self.frames % FRAME_STEP != 1 {
             return None;
         }
-        let outlines = Agreement::of(map, color);
-        let misfit = Misfit::with(outlines, map, color);
+        let outlines = EdgeAlignment::of(map, color);
+        let misfit = Misalignment::with(outlines, map, color);
         match misfit.and_then(|misfit| Some((misfit, misfit.mending(map, color)?))) {
             Some(mending) => self.mendings.push(mending),
             None if misfit.is_some() => self.unrelated += 1,
-            None if outlines == Agreement::Meets => (self.frames, self.is_aligned) = (MAX_FRAMES, true),
+            None if outlines == EdgeAlignment::Meets => (self.frames, self.is_aligned) = (MAX_FRAMES, true),
             None => {}
         }
         let verdict = match () {

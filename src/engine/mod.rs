@@ -1,6 +1,6 @@
 //! The engine: colour and depth in, blurred picture out, for every caller.
 //!
-//! A `Preparation` preprocesses a frame: it fills or refines depth, focuses the lens, estimates the matte, and
+//! A `Preprocessor` preprocesses a frame: it fills or refines depth, focuses the lens, estimates the matte, and
 //! applies virtual background and auto-framing. A [`Blur`] blurs it, as finely as time allows. In a run each of them
 //! has its own thread; a [`Stepper`] runs both on the caller's thread, frame by frame, and [`still`] does so for a
 //! single picture.
@@ -19,8 +19,8 @@ pub mod still;
 
 pub(crate) use blur::Time;
 pub use blur::{Blur, Images};
-pub use coc::{CocMaker, Finish};
-pub(crate) use preparation::{Input, Origin, Preparation, Staged};
+pub use coc::{CocMaker, Postprocess};
+pub(crate) use preparation::{Input, Origin, Preprocessor, Staged};
 pub(crate) use staging::OriginalFrame;
 pub use stepper::Stepper;
 
@@ -28,7 +28,7 @@ use crate::look::{Effect, Look};
 
 /// Both halves of the engine, on the same device.
 pub(crate) struct Engine {
-    pub preparation: Preparation,
+    pub preparation: Preprocessor,
     pub blur: Blur,
 }
 
@@ -37,7 +37,7 @@ impl Engine {
     pub fn new(look: &Look, input: Input, blur: Blur) -> Self {
         // Without a blur no depth is needed.
         let plain = blur.executor().is_none().then(|| Look::plain(Effect::None));
-        let mut preparation = Preparation::new(plain.as_ref().unwrap_or(look), input);
+        let mut preparation = Preprocessor::new(plain.as_ref().unwrap_or(look), input);
         preparation.beside(blur.executor());
         Self { preparation, blur }
     }

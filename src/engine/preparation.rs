@@ -1,12 +1,12 @@
 //! The first half of the engine: computes CoC and matte from a frame's raw depth, then applies virtual background
 //! and auto-framing.
 
-use super::coc::{CocMaker, Finish};
+use super::coc::{CocMaker, Postprocess};
 use super::fit_check::{FitCheck, Verdict};
 use super::staging::{OriginalFrame, Staging};
 use crate::bokeh::{Bokeh, BokehError};
 use crate::compute::DeviceFrame;
-use crate::depth::refine::Exactness;
+use crate::depth::refine::ExactnessDetector;
 use crate::frame::crop::Crop;
 use crate::frame::{ColorImage, DepthMap};
 use crate::link::pool::{Pool, Pooled};
@@ -32,11 +32,11 @@ pub(crate) enum Origin {
 
 impl Origin {
     /// Returns the postprocessing that `look` asks for.
-    fn finish(self, look: &Look) -> Finish {
+    fn finish(self, look: &Look) -> Postprocess {
         match self {
-            Self::Finished => Finish::Keep,
-            Self::Single | Self::Made => Finish::measured(look.refines(false)),
-            Self::Measured => Finish::measured(look.refines(true)),
+            Self::Finished => Postprocess::Keep,
+            Self::Single | Self::Made => Postprocess::measured(look.refines(false)),
+            Self::Measured => Postprocess::measured(look.refines(true)),
         }
     }
 }
@@ -67,13 +67,13 @@ pub(crate) struct Staged {
 }
 
 /// Preprocesses frames one after another.
-pub(crate) struct Preparation {
+pub(crate) struct Preprocessor {
     input: Input,
     /// The postprocessing that the look asks for.
-    finish: Finish,
+    finish: Postprocess,
     coc: CocMaker,
     /// Detects exact depth, which is refined only on request; `None` if the look decides that.
-    exactness: Option<Exactness>,
+    exactness: Option<ExactnessDetector>,
     staging: Staging,
     /// Detects depth that does not fit the pictures; `None` if the result would not be used.
     check: Option<FitCheck>,
@@ -81,7 +81,7 @@ pub(crate) struct Preparation {
     remark: Option<String>,
 }
 
-impl Preparation {
+impl Preprocessor {
     /// Creates the preparation for `look`.
     pub fn new(look: &Look, input: Input) -> Self {
         let finish = input.depth.finish(look);
@@ -93,7 +93,7 @@ impl Preparation {
         let mut new = Self {
             input,
             finish,
-            coc: CocMaker::new(look.coc_rule(input.size), finish).on_threads(input.threads),
+            coc: CocMaker::new(look.coc_rule(input.size), finish).with_threads(input.threads),
             exactness: exactness(look, finish),
             staging: Staging::new(look),
             check: checks.then(|| FitCheck::new(input.frames)),
@@ -125,15 +125,15 @@ impl Preparation {
 
     /// Returns the postprocessing to use now: exact depth is aligned already, and refinement would erase thin
     /// structures.
-    fn finish_now(&self) -> Finish {
+    fn finish_now(&self) -> Postprocess {
         let is_aligned = self.check.as_ref().is_some_and(FitCheck::is_aligned);
-        let is_exact = self.exactness.as_ref().is_some_and(Exactness::is_exact) && is_aligned;
-        if is_exact { Finish::Fill } else { self.finish }
+        let is_exact = self.exactness.as_ref().is_some_and(ExactnessDetector::is_exact) && is_aligned;
+        if is_exact { Postprocess::Fill } else { self.finish }
     }
 
     /// Returns what refines depth ([`CocMaker::refined_by`]), or why refinement stopped, for the report.
     pub fn refined_by(&self) -> Option<&'static str> {
-        let is_left_alone = self.finish == Finish::Refine && self.finish_now() == Finish::Fill;
+        let is_left_alone = self.finish == Postprocess::Refine && self.finish_now() == Postprocess::Fill;
         if is_left_alone { Some(EXACT) } else { self.coc.refined_by() }
     }
 
@@ -149,7 +149,7 @@ impl Preparation {
 
     /// Drops all history, because another scene comes.
     pub fn forget(&mut self) {
-        self.exactness.iter_mut().for_each(Exactness::forget);
+        self.exactness.iter_mut().for_each(ExactnessDetector::forget);
         self.coc.forget();
     }
 
@@ -179,8 +179,8 @@ impl Preparation {
                     let line = format!("depth is brought to the pictures, as {misfit}; --refine off takes it as it is");
                     self.remark = Some(line);
                 } else if self.input.depth == Origin::Single {
-                    self.finish = Finish::Refine;
-                    self.coc.set_finish(Finish::Refine);
+                    self.finish = Postprocess::Refine;
+                    self.coc.set_finish(Postprocess::Refine);
                 }
             }
         }
@@ -237,8 +237,8 @@ impl Preparation {
 }
 
 /// Creates the detector of exact depth if depth is refined by default, not on request.
-fn exactness(look: &Look, finish: Finish) -> Option<Exactness> {
-    (look.refine == Refine::Auto && finish == Finish::Refine).then(Exactness::default)
+fn exactness(look: &Look, finish: Postprocess) -> Option<ExactnessDetector> {
+    (look.refine == Refine::Auto && finish == Postprocess::Refine).then(ExactnessDetector::default)
 }
 
 #[cfg(test)]
@@ -259,7 +259,7 @@ mod tests {
         let look = Look { refine, background_memory: BackgroundMemory::Off, ..Look::default() };
         let (size, depth) = (color.size(), Origin::Measured);
         let input = Input { size, frames: None, depth, knows_background: false, threads: 1 };
-        let mut preparation = Preparation::new(&look, input);
+        let mut preparation = Preprocessor::new(&look, input);
         let mut last = map.clone();
         for frame in 0..6 {
             last.clone_from(map);

@@ -1,7 +1,7 @@
 //! Composes the subject: virtual background and auto-framing.
 
-use crate::depth::backdrop::{Backdrop, Behind};
-use crate::depth::follow::Follower;
+use crate::depth::backdrop::{Behind, VirtualBackground};
+use crate::depth::follow::AutoFraming;
 use crate::frame::crop::Crop;
 use crate::frame::{ColorImage, DepthMap};
 use crate::look::Look;
@@ -35,8 +35,8 @@ impl OriginalFrame {
 /// Replaces the background of frames and crops them around the subject.
 #[derive(Default)]
 pub(super) struct Staging {
-    backdrop: Option<Backdrop>,
-    follower: Option<Follower>,
+    backdrop: Option<VirtualBackground>,
+    follower: Option<AutoFraming>,
 }
 
 impl Staging {
@@ -48,12 +48,12 @@ impl Staging {
 
     /// Follows another look.
     pub fn follow(&mut self, look: &Look) {
-        if self.backdrop.as_ref().map_or(&Behind::Blur, Backdrop::behind) != &look.behind {
-            self.backdrop = Backdrop::new(&look.behind);
+        if self.backdrop.as_ref().map_or(&Behind::Blur, VirtualBackground::behind) != &look.behind {
+            self.backdrop = VirtualBackground::new(&look.behind);
         }
         match (&mut self.follower, look.follow.zoom()) {
             (Some(follower), Some(zoom)) => follower.limit(zoom),
-            (follower, zoom) => *follower = zoom.map(Follower::new),
+            (follower, zoom) => *follower = zoom.map(AutoFraming::new),
         }
     }
 

@@ -1,6 +1,6 @@
 //! Blurs a single picture, in the same way as a stream.
 
-use super::{Blur, Images, Input, Origin, Preparation};
+use super::{Blur, Images, Input, Origin, Preprocessor};
 use crate::bokeh::BokehError;
 use crate::computing::Computing;
 use crate::frame::{ColorImage, DepthMap};
@@ -33,7 +33,7 @@ pub fn coc_and_depth(
     };
     let input = Input { size: color.size(), frames: Some(1), depth, knows_background: true, threads: 1 };
     // A single picture is never cropped.
-    let (field, _) = Preparation::new(look, input).prepare(color, map.as_mut(), 0)?;
+    let (field, _) = Preprocessor::new(look, input).prepare(color, map.as_mut(), 0)?;
     Ok((field, map.filter(|_| matches!(field, CocField::Depth(_)))))
 }
 

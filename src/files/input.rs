@@ -11,10 +11,10 @@ use rustix::fs::OFlags;
 pub const MAX_TEXT_BYTES: u64 = 64 << 20;
 
 /// Maximum size of a calibration; they have a few thousand bytes.
-pub const MOST_CALIBRATION_BYTES: u64 = 1 << 20;
+pub const MAX_CALIBRATION_BYTES: u64 = 1 << 20;
 
 /// Maximum size of a settings file: enough for every setting in a thousand presets.
-pub const MOST_SETTINGS_BYTES: u64 = 1 << 20;
+pub const MAX_SETTINGS_BYTES: u64 = 1 << 20;
 
 /// The message for a missing file.
 pub const NO_FILE: &str = "there is no such file";
@@ -74,7 +74,7 @@ fn check_size(most_bytes: u64, bytes: u64) -> io::Result<()> {
 
 /// Returns the kind of an existing special file or folder at an output path, which must not be replaced; `None` for a
 /// regular file, or none at all.
-pub fn no_file_at(path: &Path) -> Option<&'static str> {
+pub fn special_file_kind(path: &Path) -> Option<&'static str> {
     special_kind(path.metadata().ok()?.file_type())
 }
 

@@ -34,7 +34,7 @@ impl Folders {
         let home = absolute("HOME");
         let config = absolute("XDG_CONFIG_HOME").or_else(|| Some(home.as_ref()?.join(".config")));
         let named =
-            config.and_then(|config| input::read_text(&config.join("user-dirs.dirs"), input::MOST_SETTINGS_BYTES).ok());
+            config.and_then(|config| input::read_text(&config.join("user-dirs.dirs"), input::MAX_SETTINGS_BYTES).ok());
         let folder = |variable: &str, usual: &str| {
             let home = home.as_deref();
             let named = named.as_deref().zip(home).and_then(|(text, home)| parse_user_dir(text, variable, home));

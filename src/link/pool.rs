@@ -15,7 +15,7 @@ use super::bell::Bell;
 use super::sync::{Arc, AtomicU64, Ordering, UnsafeCell};
 
 /// Largest number of buffers of a [`Pool`]: the bits of a word.
-pub const MOST_BUFFERS: usize = u64::BITS as usize;
+pub const MAX_BUFFERS: usize = u64::BITS as usize;
 
 /// A fixed set of equal buffers. Nothing is allocated after [`Pool::new`]. A buffer is moved when it is taken and
 /// returned, so it should be a handle of its memory, such as a `Vec`.
@@ -40,12 +40,12 @@ impl<T> Pool<T> {
     /// Creates a pool of `count` buffers, each made by `make`.
     ///
     /// # Panics
-    /// `count` is more than [`MOST_BUFFERS`].
+    /// `count` is more than [`MAX_BUFFERS`].
     pub fn new(count: usize, make: impl FnMut() -> T) -> Self {
-        assert!(count <= MOST_BUFFERS, "a pool holds at most {MOST_BUFFERS} buffers, not {count}");
+        assert!(count <= MAX_BUFFERS, "a pool holds at most {MAX_BUFFERS} buffers, not {count}");
         let buffers = std::iter::repeat_with(make).take(count);
         let cells = buffers.map(|buffer| UnsafeCell::new(Some(buffer))).collect();
-        let all = if count == 0 { 0 } else { u64::MAX >> (MOST_BUFFERS - count) };
+        let all = if count == 0 { 0 } else { u64::MAX >> (MAX_BUFFERS - count) };
         Self { shared: Arc::new(Shared { free: AtomicU64::new(all), cells, bell: Bell::new() }) }
     }
 
@@ -194,7 +194,7 @@ mod tests {
 
     #[test]
     fn a_pool_holds_as_many_as_it_was_made_with() {
-        for count in [0, 1, MOST_BUFFERS] {
+        for count in [0, 1, MAX_BUFFERS] {
             let pool = Pool::new(count, || ());
             assert_eq!(pool.free(), count);
             let loans: Vec<_> = std::iter::from_fn(|| pool.try_take()).collect();

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use std::sync::Arc;
 
-use crate::depth::backdrop::{Behind, BehindPicture};
+use crate::depth::backdrop::{BackgroundPicture, Behind};
 use crate::recording::RecordingError;
 use crate::recording::still::read_color;
 
@@ -93,7 +93,7 @@ impl BehindName {
         Ok(match self {
             Self::Known(behind) => behind.clone(),
             Self::Image(file) => {
-                Behind::Picture(Arc::new(BehindPicture { file: Some(file.clone()), image: read_color(file)? }))
+                Behind::Picture(Arc::new(BackgroundPicture { file: Some(file.clone()), image: read_color(file)? }))
             }
         })
     }

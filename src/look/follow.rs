@@ -5,7 +5,7 @@ use std::str::FromStr;
 
 use super::number::number_in;
 
-/// The largest zoom to keep the subject centred: 1, which is off, to [`Follow::MOST`].
+/// The largest zoom to keep the subject centred: 1, which is off, to [`Follow::MAX_ZOOM`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Follow(f32);
 
@@ -13,11 +13,11 @@ impl Follow {
     /// No zoom.
     pub const OFF: Self = Self(1.0);
     /// Maximum zoom: beyond it too few of a camera's pixels remain.
-    pub const MOST: f32 = 4.0;
+    pub const MAX_ZOOM: f32 = 4.0;
 
-    /// Creates it from a zoom, clamped from 1 (off) to [`Follow::MOST`].
+    /// Creates it from a zoom, clamped from 1 (off) to [`Follow::MAX_ZOOM`].
     pub fn to(zoom: f32) -> Self {
-        Self(if zoom > 1.0 { zoom.min(Self::MOST) } else { 1.0 })
+        Self(if zoom > 1.0 { zoom.min(Self::MAX_ZOOM) } else { 1.0 })
     }
 
     /// Returns the largest zoom; `None` if it is off.
@@ -29,8 +29,8 @@ impl Follow {
 impl FromStr for Follow {
     type Err = String;
     fn from_str(text: &str) -> Result<Self, String> {
-        let zoom = if text == "off" { Some(1.0) } else { number_in(text, 1.0, Self::MOST) };
-        zoom.map(Self::to).ok_or_else(|| format!("use off, or the largest zoom: a number from 1 to {}", Self::MOST))
+        let zoom = if text == "off" { Some(1.0) } else { number_in(text, 1.0, Self::MAX_ZOOM) };
+        zoom.map(Self::to).ok_or_else(|| format!("use off, or the largest zoom: a number from 1 to {}", Self::MAX_ZOOM))
     }
 }
 

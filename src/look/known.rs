@@ -29,7 +29,7 @@ impl Look {
         if known.has_depth && known.is_relative {
             if let Strength::Lens(lens) = look.strength {
                 let (width, height) = known.size;
-                look.strength = Strength::of_share(lens.coc_at_infinity_px(NEAREST_M, width) / height.max(1) as f32);
+                look.strength = Strength::of_fraction(lens.coc_at_infinity_px(NEAREST_M, width) / height.max(1) as f32);
             }
             if matches!(look.focus, FocusRule::Metres(_)) {
                 look.focus = FocusRule::Auto;
@@ -43,7 +43,7 @@ impl Look {
 impl Strength {
     /// Returns the strength for a CoC at infinity as a fraction of the picture's height; the default if it is close to
     /// that.
-    pub fn of_share(share: f32) -> Self {
+    pub fn of_fraction(share: f32) -> Self {
         // In percent with two decimals: finer differences are invisible.
         let percent = |share: f32| (share * 1e4).round() / 1e2;
         match percent(share) {

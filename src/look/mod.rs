@@ -48,7 +48,7 @@ pub const COC_AT_INFINITY_PER_HEIGHT: f32 = 1.0 / 45.0;
 pub const MAX_COC_PER_HEIGHT: f32 = 0.06;
 /// Largest CoC radius that settings accept, in pixels: pictures have sides of up to 16384 px, and a radius above the
 /// diagonal makes no difference.
-pub const MOST_RADIUS_PX: f32 = 20_000.0;
+pub const MAX_RADIUS_PX: f32 = 20_000.0;
 
 /// The quality levels at which frames are blurred.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -150,7 +150,7 @@ impl Look {
 
     /// Returns the look that reproduces the blur of one frame from its colours and depth. `coc` is the frame's, with
     /// its focus distance; `quality` is its level, if it was blurred.
-    pub fn of_frame(&self, coc: &CocField, quality: Option<Quality>) -> Self {
+    pub fn for_frame(&self, coc: &CocField, quality: Option<Quality>) -> Self {
         let focus = match coc {
             CocField::Depth(lens) => FocusRule::Metres(lens.focus_m),
             CocField::Uniform { .. } | CocField::Ramp(_) => self.focus,

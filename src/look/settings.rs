@@ -5,7 +5,7 @@ use std::ops::RangeInclusive;
 use std::str::FromStr;
 
 use super::number::{OrAuto, above_zero, not_negative, within};
-use super::{ApertureName, BackgroundMemory, BehindName, Effect, Follow, Look, MOST_RADIUS_PX, Refine, Strength, Tilt};
+use super::{ApertureName, BackgroundMemory, BehindName, Effect, Follow, Look, MAX_RADIUS_PX, Refine, Strength, Tilt};
 use crate::bokeh::{Method, Rank};
 use crate::budget::Quality;
 use crate::depth::focus::FocusRule;
@@ -116,7 +116,7 @@ settings! {
     /// Width of the sensor behind that lens, in millimetres
     sensor_width_mm: f32 = "sensor-width" "MM" Blur above_zero, in ABOVE_ZERO, is computed;
     /// Largest blur radius, in pixels [default: auto, which is 0.06 x height]
-    max_coc_px: OrAuto<f32> = "max-coc" "PX" Blur OrAuto::parser(within(0.0..=MOST_RADIUS_PX)), is computed;
+    max_coc_px: OrAuto<f32> = "max-coc" "PX" Blur OrAuto::parser(within(0.0..=MAX_RADIUS_PX)), is computed;
     /// Whether depth is fitted to the picture: edges onto colour edges, less noise and flicker
     refine: Refine = "refine" "WHEN" Blur Refine::from_str, one of names_of::<Refine>();
     /// What a stream shows of what things hide, where blur lets it through

@@ -3,7 +3,7 @@
 use std::fmt;
 use std::str::FromStr;
 
-use super::MOST_RADIUS_PX;
+use super::MAX_RADIUS_PX;
 use super::number::number_in;
 use crate::optics::Lens;
 
@@ -25,11 +25,11 @@ impl FromStr for Strength {
     fn from_str(text: &str) -> Result<Self, String> {
         let strength = match text.strip_suffix('%') {
             None if text == "auto" => Some(Self::Default),
-            None => number_in(text, 0.0, MOST_RADIUS_PX).map(Self::AtInfinity),
+            None => number_in(text, 0.0, MAX_RADIUS_PX).map(Self::AtInfinity),
             Some(percent) => number_in(percent, 0.0, 100.0).map(Self::Percent),
         };
         strength
-            .ok_or_else(|| format!("use pixels from 0 to {MOST_RADIUS_PX}, a share of the height such as 3%, or auto"))
+            .ok_or_else(|| format!("use pixels from 0 to {MAX_RADIUS_PX}, a share of the height such as 3%, or auto"))
     }
 }
 

@@ -26,7 +26,7 @@ use crate::files::input;
 use crate::names::named;
 
 /// Maximum size of a file: networks that a CPU can run live have less than 100 MB.
-pub const MOST_BYTES: u64 = 200 << 20;
+pub const MAX_BYTES: u64 = 200 << 20;
 /// Maximum number of values of an input or output: more than any picture that a network receives.
 pub const MAX_VALUES: usize = 4 << 20;
 
@@ -144,7 +144,7 @@ pub struct Loaded {
 /// The file is unreadable, not a network, has loops or operators that the runtime does not support, or the requested
 /// runtime is not available.
 pub fn load(path: &Path, runtime: Runtime) -> Result<Loaded, NetworkError> {
-    let bytes = input::read(path, MOST_BYTES).map_err(|source| NetworkError::Read { path: path.into(), source })?;
+    let bytes = input::read(path, MAX_BYTES).map_err(|source| NetworkError::Read { path: path.into(), source })?;
     let known = Known::of(&bytes);
     let refused = |why: String| NetworkError::Refused { path: path.into(), why };
     if !tflite::is_tflite(&bytes) {

@@ -3,7 +3,7 @@
 use std::env;
 use std::path::PathBuf;
 
-use super::{Known, MOST_BYTES, Task};
+use super::{Known, MAX_BYTES, Task};
 use crate::files::{data, input};
 
 /// Returns the folders, the user's own first: `bokehcam/models` in `$XDG_DATA_HOME`, in `share` next to the folder of
@@ -40,7 +40,7 @@ fn known_in(folders: Vec<PathBuf>) -> Vec<(&'static Known, PathBuf)> {
     };
     let mut found: Vec<(&'static Known, PathBuf)> = files
         .filter(may_be_known)
-        .filter_map(|file| Some((Known::of(&input::read(&file, MOST_BYTES).ok()?)?, file)))
+        .filter_map(|file| Some((Known::of(&input::read(&file, MAX_BYTES).ok()?)?, file)))
         .collect();
     let rank = |known: &Known| super::KNOWN.iter().position(|other| std::ptr::eq(other, known));
     found.sort_by_key(|(known, _)| rank(known));

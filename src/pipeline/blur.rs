@@ -8,7 +8,7 @@ use super::depth::Ready;
 use super::frame::Frame;
 use super::late::LateRule;
 use super::wanted::Wanted;
-use super::{Ended, Fault, MOST_IN_FLIGHT, Shared};
+use super::{Ended, Fault, MAX_IN_FLIGHT, Shared};
 use crate::bokeh::{Finished, Job, PassTimes, Picture};
 use crate::compute::Place;
 use crate::engine::{Blur, OriginalFrame, Staged};
@@ -65,7 +65,7 @@ impl<'a> Stage<'a> {
     ) -> Self {
         times.by = blur.describe_executor();
         let late = shared.live_ns.map(LateRule::new);
-        let in_hand = VecDeque::with_capacity(MOST_IN_FLIGHT);
+        let in_hand = VecDeque::with_capacity(MAX_IN_FLIGHT);
         Self { blur, late, wanted, budget_ns, shared, times, in_hand, last_swap: 0 }
     }
 
@@ -198,7 +198,7 @@ impl<'a> Stage<'a> {
 
     /// Returns whether a frame is too late if its blur takes `expected_ns`; a frame that was sought never is.
     fn is_late(&mut self, frame: &Frame<()>, expected_ns: u64) -> bool {
-        let late = self.late.as_mut().filter(|_| !frame.is_wished);
+        let late = self.late.as_mut().filter(|_| !frame.is_seek_target);
         late.is_some_and(|late| late.is_late(frame.ticket.captured_ns, frame.since_ns, expected_ns))
     }
 

@@ -60,7 +60,7 @@ impl<'a> Stage<'a> {
         }
         let (mut seek, mut ahead_ns) = (0, 0);
         while !stopped() {
-            let wish = seeker.as_ref().and_then(|seeker| seeker.wish_after(seek));
+            let wish = seeker.as_ref().and_then(|seeker| seeker.request_after(seek));
             if let Some(wish) = wish {
                 (seek, ahead_ns) = (wish.number, self.camera.seek(wish.place));
                 self.pacer.restart();
@@ -75,7 +75,7 @@ impl<'a> Stage<'a> {
             tally.lost(self.pacer.skip(&mut *self.camera), Cause::Driver);
             let mut color = pools.colors.take();
             let mut depth = (brings == Brings::Depth).then(|| pools.depths.take());
-            let mut right = (brings == Brings::RightEye).then(|| pools.rights.take());
+            let mut right = (brings == Brings::RightCamera).then(|| pools.rights.take());
             let shot = capture::Shot {
                 color: &mut color,
                 depth: depth.as_deref_mut().unwrap_or(&mut no_depth),
@@ -87,7 +87,7 @@ impl<'a> Stage<'a> {
                     let read_ns = (clock.now_ns() - began_ns).saturating_sub(self.camera.waited_ns());
                     self.times.add(read_ns);
                     // A live camera stamps its frames; stored ones are captured when they are due.
-                    let has_wish = || seeker.as_ref().is_some_and(|seeker| seeker.wish_after(seek).is_some());
+                    let has_wish = || seeker.as_ref().is_some_and(|seeker| seeker.request_after(seek).is_some());
                     let captured_ns = match stamp.captured_ns {
                         Some(captured_ns) => captured_ns,
                         None => self.pacer.wait(stamp.time_ns, read_ns, || stopped() || has_wish()),
@@ -101,7 +101,7 @@ impl<'a> Stage<'a> {
                         ticket,
                         stamp,
                         seek,
-                        is_wished: wish.is_some(),
+                        is_seek_target: wish.is_some(),
                         change: 0,
                         is_between: false,
                         trace: Trace { decode_ns: read_ns, between_ns, ..Trace::default() },

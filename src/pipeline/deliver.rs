@@ -93,7 +93,7 @@ impl<'a> Stage<'a> {
             let quality = frame.trace.quality;
             // A frame that the sink does not keep counts as delivered once the viewer took it.
             let kept = was_given && self.sink.keeps();
-            let Frame { ticket, stamp, seek, is_wished, change, is_between, trace, .. } = frame;
+            let Frame { ticket, stamp, seek, is_seek_target, change, is_between, trace, .. } = frame;
             let (done, open) = if self.view.is_none() || kept { (Some(ticket), None) } else { (None, Some(ticket)) };
             done.into_iter().for_each(|ticket| tally.delivered(ticket));
             if let Some(view) = &mut self.view {
@@ -110,7 +110,7 @@ impl<'a> Stage<'a> {
                     change,
                     is_between,
                     seek,
-                    is_wished,
+                    is_seek_target,
                     trace,
                     frames,
                 };

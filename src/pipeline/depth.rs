@@ -10,8 +10,8 @@ use super::frame::Frame;
 use super::rate::Rate;
 use super::{Ended, Fault, Shared};
 use crate::budget::DepthTimes;
-use crate::depth::{DepthError, DepthSource, Seen};
-use crate::engine::{Preparation, Staged};
+use crate::depth::{DepthError, DepthSource, FrameInput};
+use crate::engine::{Preprocessor, Staged};
 use crate::frame::{ColorImage, DepthMap, GrayImage, Stamp};
 use crate::link::pool::Pooled;
 use crate::link::{Received, Receiver, Sender};
@@ -34,7 +34,7 @@ pub(super) struct Ready {
 }
 
 pub(super) struct Stage<'a> {
-    preparation: Preparation,
+    preparation: Preprocessor,
     source: Option<Box<dyn DepthSource>>,
     /// The changes of the blur, and whether executors support every quality.
     changes: (Option<mpsc::Receiver<Change>>, bool),
@@ -54,7 +54,7 @@ type Made = (Option<Pooled<DepthMap>>, CocField);
 
 impl<'a> Stage<'a> {
     pub(super) fn new(
-        preparation: Preparation,
+        preparation: Preprocessor,
         source: Option<Box<dyn DepthSource>>,
         changes: (Option<mpsc::Receiver<Change>>, bool),
         shared: &'a Shared,
@@ -126,7 +126,7 @@ impl<'a> Stage<'a> {
             }
         }
         let finds_subject = self.preparation.focuses_on_subject();
-        self.source.iter_mut().for_each(|source| source.look_for_persons(finds_subject));
+        self.source.iter_mut().for_each(|source| source.set_focus_on_persons(finds_subject));
     }
 
     /// Drops all history after a seek in the source.
@@ -185,7 +185,7 @@ impl<'a> Stage<'a> {
             self.times.held += 1;
             return Ok((Some(map), field));
         }
-        let seen = Seen { stamp, color, right: right.as_deref() };
+        let seen = FrameInput { stamp, color, right: right.as_deref() };
         let mut map = brought.map_or_else(|| self.read_map(seen), Ok)?;
         let field = self.preparation.make(&mut map, color, stamp.time_ns);
         self.preparation.remark().into_iter().for_each(|remark| tracing::warn!("{}: {remark}", info.name));
@@ -197,7 +197,7 @@ impl<'a> Stage<'a> {
     }
 
     /// Reads a depth map from the source, with the effort that the time allows.
-    fn read_map(&mut self, seen: Seen) -> Result<Pooled<DepthMap>, Fault> {
+    fn read_map(&mut self, seen: FrameInput) -> Result<Pooled<DepthMap>, Fault> {
         let Shared { pools, info, .. } = self.shared;
         let source = self.source.as_mut().ok_or_else(|| Fault::NoDepth { source_name: info.name.clone() })?;
         if let Some(rate) = &self.rate {

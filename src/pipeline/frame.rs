@@ -12,7 +12,7 @@ pub(super) struct Frame<T> {
     /// The number of the last seek ([`Seeker`](crate::capture::Seeker)) before it; 0 if there was none.
     pub seek: u64,
     /// Whether it is the target of that seek: it is shown however late it is.
-    pub is_wished: bool,
+    pub is_seek_target: bool,
     /// The number of the last change before it; 0 if there was none.
     pub change: u64,
     /// Whether the previous look's executor blurs it, because its own is still being created.
@@ -26,9 +26,9 @@ pub(super) struct Frame<T> {
 impl<T> Frame<T> {
     /// Starts the next stage: adds the time waited until now, and separates the frame's data from the rest.
     pub fn take_item(self, now_ns: u64) -> (Frame<()>, T) {
-        let Self { ticket, stamp, seek, is_wished, change, is_between, mut trace, since_ns, item } = self;
+        let Self { ticket, stamp, seek, is_seek_target, change, is_between, mut trace, since_ns, item } = self;
         trace.between_ns += now_ns.saturating_sub(since_ns);
-        (Frame { ticket, stamp, seek, is_wished, change, is_between, trace, since_ns: now_ns, item: () }, item)
+        (Frame { ticket, stamp, seek, is_seek_target, change, is_between, trace, since_ns: now_ns, item: () }, item)
     }
 
     /// Sends it to the next stage, and counts an older frame that it displaced; returns whether the output is still
@@ -49,7 +49,7 @@ impl<T> Frame<T> {
 impl Frame<()> {
     /// Returns the frame with its new data.
     pub fn with<T>(self, item: T) -> Frame<T> {
-        let Self { ticket, stamp, seek, is_wished, change, is_between, trace, since_ns, item: () } = self;
-        Frame { ticket, stamp, seek, is_wished, change, is_between, trace, since_ns, item }
+        let Self { ticket, stamp, seek, is_seek_target, change, is_between, trace, since_ns, item: () } = self;
+        Frame { ticket, stamp, seek, is_seek_target, change, is_between, trace, since_ns, item }
     }
 }

@@ -27,7 +27,7 @@ impl Pools {
         Self {
             colors: Pool::new(places.colors(), picture),
             depths: Pool::new(places.depths(), DepthMap::default),
-            rights: Pool::new(if brings == Brings::RightEye { places.rights() } else { 0 }, GrayImage::default),
+            rights: Pool::new(if brings == Brings::RightCamera { places.rights() } else { 0 }, GrayImage::default),
             original: Pool::new(places.original(), OriginalFrame::default),
             outs: Pool::new(places.outs(), picture),
             yuyvs: Pool::new(places.outs(), YuyvImage::default),
@@ -44,7 +44,7 @@ pub(super) struct Places {
 }
 
 /// Maximum number of frames that any executor has in flight.
-pub(super) const MOST_IN_FLIGHT: usize = 4;
+pub(super) const MAX_IN_FLIGHT: usize = 4;
 
 /// Checks that the memory suffices for a run over `frames` pictures of `size` (width, height): for blurring one, and
 /// for those in flight.
@@ -52,7 +52,7 @@ pub(super) const MOST_IN_FLIGHT: usize = 4;
 /// # Errors
 /// [`BokehError::Memory`].
 pub fn check_room(size: (u32, u32), frames: Option<u64>) -> Result<(), BokehError> {
-    let places = Places { in_blur: MOST_IN_FLIGHT, viewed: false };
+    let places = Places { in_blur: MAX_IN_FLIGHT, viewed: false };
     // All colour buffers exist from the start; depth buffers are created as frames come.
     let depths = frames.map_or(places.depths() as u64, |frames| frames.min(places.depths() as u64));
     Settings::check_room(size, 3 * (places.colors() + places.outs()) as u64 + 4 * depths)

@@ -172,7 +172,7 @@ impl<'a> Run<'a> {
             budget_ns: self.budget_ns,
             period_ns: self.live_ns(),
             efforts: depth.map_or(&[1.0], |depth| depth.efforts()),
-            shares_depth: depth.is_none_or(|depth| depth.may_be_shared()),
+            shares_depth: depth.is_none_or(|depth| depth.is_reusable()),
         };
         let blur = Blur::new(self.bokeh.take(), self.look.quality_rule(self.adaptive), time);
         Engine::new(&self.look, input, blur)

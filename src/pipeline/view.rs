@@ -46,7 +46,7 @@ pub struct View {
     /// The number of the last seek ([`Seeker`](crate::capture::Seeker)) before it; 0 if there was none.
     pub seek: u64,
     /// Whether it is the target of that seek: it is shown however late it is.
-    pub is_wished: bool,
+    pub is_seek_target: bool,
     /// Its processing times.
     pub trace: Trace,
     /// The counts of the run up to this frame.
@@ -67,7 +67,7 @@ impl View {
             change: 0,
             is_between: false,
             seek: 0,
-            is_wished: false,
+            is_seek_target: false,
             trace: Trace::default(),
             frames: Frames::default(),
         }

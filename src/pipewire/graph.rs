@@ -69,7 +69,7 @@ impl Graph {
     ///
     /// # Errors
     /// The daemon does not run, or does not answer.
-    pub fn look_closely() -> Result<Self, PipeWireError> {
+    pub fn list_with_modes() -> Result<Self, PipeWireError> {
         Self::read(&Session::open()?, |_| true)
     }
 

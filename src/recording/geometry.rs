@@ -30,7 +30,7 @@ impl Geometry {
         file: &Path,
         parse: impl Fn(&str) -> Result<Self, GeometryError>,
     ) -> Result<Self, RecordingError> {
-        let text = input::read_text(file, input::MOST_CALIBRATION_BYTES)
+        let text = input::read_text(file, input::MAX_CALIBRATION_BYTES)
             .map_err(RecordingError::io("read the calibration", file))?;
         parse(&text).map_err(|(line, fault)| RecordingError::Geometry { file: file.to_owned(), line, fault })
     }

@@ -43,7 +43,7 @@ pub use output::recover_all;
 pub use output_thread::Backpressure;
 pub use pipe::Pipe;
 pub use png::PngFolder;
-pub use shutter::{NotCovered, Release, Shutter};
+pub use shutter::{CardNotShown, Shutter, ShutterControl};
 pub use switch::Switchboard;
 pub use target::Target;
 pub use tee::Tee;
@@ -217,7 +217,7 @@ pub struct Options {
     /// Receives whether a virtual camera is watched.
     pub demand: Option<Demand>,
     /// For a filter: the name of the PipeWire camera whose readers get the pictures, or a part of it.
-    pub stands_for: Option<String>,
+    pub filter_target: Option<String>,
     /// Set when the run has to end: from then on, stalled processes and readers are no longer waited for.
     pub stop: Arc<AtomicBool>,
 }
@@ -234,7 +234,7 @@ impl Options {
             out_size: None,
             threads: None,
             demand: None,
-            stands_for: None,
+            filter_target: None,
             stop,
         }
     }

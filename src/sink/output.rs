@@ -5,7 +5,7 @@ use std::io::{self, ErrorKind};
 use std::path::{Path, PathBuf};
 
 use super::{Ending, SinkError};
-use crate::files::input::no_file_at;
+use crate::files::input::special_file_kind;
 use crate::files::whole::{self, Part};
 
 /// A file under construction that holds frames. A file with frames is never removed: if it cannot get its name, it is
@@ -24,7 +24,7 @@ impl Output {
     /// Prepares to write `path`, creating missing parent folders. Unfinished files of a killed run are kept, which is
     /// logged.
     pub(super) fn create(path: &Path, force: bool) -> Result<Self, SinkError> {
-        if let Some(what) = no_file_at(path) {
+        if let Some(what) = special_file_kind(path) {
             return Err(SinkError::NoFile { path: path.to_owned(), what });
         }
         if !force && path.symlink_metadata().is_ok() {

@@ -241,7 +241,7 @@ fn put_picture(sink: &mut dyn Sink, picture: &Picture, shared: &Shared) -> Resul
     let flow = if *is_card { sink.cover(image, *time_ns)? } else { sink.put(image, *time_ns)? };
     if flow.is_continue() {
         shared.frames.fetch_add(1, Ordering::Relaxed);
-        // Release: a reader that sees the card here also sees that the sink has received it.
+        // ShutterControl: a reader that sees the card here also sees that the sink has received it.
         shared.shows_card.store(*is_card, Ordering::Release);
     }
     Ok(flow)

@@ -77,13 +77,13 @@ impl PipeWire {
         Ok(Self { description, ..camera })
     }
 
-    /// Creates a filter for the camera that the options [name](Options::stands_for): all clients that request the
+    /// Creates a filter for the camera that the options [name](Options::filter_target): all clients that request the
     /// camera get the pictures of this sink, in the formats of that camera.
     ///
     /// # Errors
     /// Those of [`PipeWire::open`]; the camera does not exist, or the session manager does not support filters.
     pub fn filter(options: &Options) -> Result<Self, SinkError> {
-        let camera_name = options.stands_for.as_deref().ok_or(SinkError::Filter)?;
+        let camera_name = options.filter_target.as_deref().ok_or(SinkError::Filter)?;
         let camera = Graph::filterable(camera_name)?;
         let modes = writable_modes(&camera.modes);
         if modes.is_empty() {
@@ -101,7 +101,7 @@ impl PipeWire {
     /// mode.
     fn new(
         label: &str,
-        (name, stands_for): (String, Option<String>),
+        (name, filter_target): (String, Option<String>),
         modes: impl FnOnce(&Agreed) -> Vec<Mode>,
         options: &Options,
     ) -> Result<Self, SinkError> {
@@ -116,7 +116,7 @@ impl PipeWire {
             label: label.to_owned(),
             modes: modes(&best),
             best,
-            stands_for,
+            filter_target,
             hold: (2 * Duration::from_nanos(options.period_ns)).clamp(HOLD.0, HOLD.1),
         };
         let (sender, receiver) = link::live();

@@ -13,7 +13,7 @@ use crate::frame::{ColorImage, YuyvImage};
 use crate::link::demand::Demand;
 use crate::stats::{NodeUse, OutputUse};
 
-/// A sink whose pictures can be blocked through its [`Release`]. The card is shown at once, also between two frames;
+/// A sink whose pictures can be blocked through its [`ShutterControl`]. The card is shown at once, also between two frames;
 /// from then on the camera is released: no client counts as watching. After reopening, the card is repeated at the
 /// frame rate until the next picture.
 pub struct Shutter {
@@ -52,7 +52,7 @@ const COVER_TIMEOUT: Duration = Duration::from_secs(1);
 
 /// Closes and opens a [`Shutter`], and copies pictures behind it, from any thread.
 #[derive(Clone)]
-pub struct Release {
+pub struct ShutterControl {
     closed: Arc<AtomicBool>,
     request_sender: Sender<Request>,
     /// The whole sink as one output.
@@ -68,7 +68,7 @@ enum Request {
 /// These live outputs may still show a picture instead of the card.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("no more pictures come, but {0} may still show the last one: it does not take the card")]
-pub struct NotCovered(pub String);
+pub struct CardNotShown(pub String);
 
 impl Shutter {
     /// Creates a shutter before `sink`, for pictures of `size` pixels every `period`. It is closed while `closed` is
@@ -80,7 +80,7 @@ impl Shutter {
         demand: Demand,
         clock: Clock,
         closed: Arc<AtomicBool>,
-    ) -> (Self, Release) {
+    ) -> (Self, ShutterControl) {
         let (request_sender, requests) = mpsc::channel();
         let whole_sink = Uncovered { output: sink.describe(), is_live: sink.is_live() };
         let shutter = Self {
@@ -100,7 +100,7 @@ impl Shutter {
             sent_ns: 0,
             offset_ns: 0,
         };
-        (shutter, Release { closed, request_sender, whole_sink })
+        (shutter, ShutterControl { closed, request_sender, whole_sink })
     }
 
     /// Whether it is closed. Once the card is shown, the camera is released.
@@ -283,7 +283,7 @@ impl Sink for Shutter {
     }
 }
 
-impl Release {
+impl ShutterControl {
     /// Blocks pictures from now on, or lets them pass again.
     pub fn close(&self, closed: bool) {
         self.closed.store(closed, Ordering::Release);
@@ -301,12 +301,12 @@ impl Release {
         reply.recv_timeout(timeout).ok()
     }
 
-    /// Waits until every output shows the card, after [`Release::close`]. Returns a note about outputs that do not yet,
+    /// Waits until every output shows the card, after [`ShutterControl::close`]. Returns a note about outputs that do not yet,
     /// if they are not live.
     ///
     /// # Errors
     /// A live output may still show a picture.
-    pub fn wait_covered(&self) -> Result<Option<String>, NotCovered> {
+    pub fn wait_covered(&self) -> Result<Option<String>, CardNotShown> {
         let (to, reply) = mpsc::sync_channel(1);
         // A run that has ended shows nothing.
         let sent = self.request_sender.send(Request::Covered(to, Instant::now() + COVER_TIMEOUT));
@@ -321,7 +321,7 @@ impl Release {
             names.collect::<Vec<_>>().join(", ")
         };
         match [names(true), names(false)] {
-            [live, _] if !live.is_empty() => Err(NotCovered(live)),
+            [live, _] if !live.is_empty() => Err(CardNotShown(live)),
             [_, others] if !others.is_empty() => Ok(Some(format!("{others}: busy, so the card comes there later"))),
             _ => Ok(None),
         }

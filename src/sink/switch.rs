@@ -22,12 +22,12 @@ pub struct Notice {
     /// The name under which it was added.
     pub member: String,
     /// Its new state.
-    pub fate: Fate,
+    pub fate: MemberState,
 }
 
 /// States of a member: first it begins, then it is completed or fails.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Fate {
+pub enum MemberState {
     /// It gets the frames from now on.
     Began,
     /// It is complete.
@@ -101,7 +101,7 @@ impl NewMember {
     /// Starts its thread; `None` if the system refuses the thread, and the member is reported as failed.
     pub fn start(self) -> Option<OutputThread> {
         let Self { sink, reporter } = self;
-        reporter.report(Fate::Began);
+        reporter.report(MemberState::Began);
         OutputThread::start(sink, Backpressure::DropOldest, |frames, outcome| reporter.report_end(frames, outcome)).ok()
     }
 }
@@ -115,7 +115,7 @@ struct Reporter {
 }
 
 impl Reporter {
-    fn report(&self, fate: Fate) {
+    fn report(&self, fate: MemberState) {
         (self.report)(Notice { member: self.name.clone(), fate });
     }
 
@@ -123,8 +123,10 @@ impl Reporter {
     fn report_end(mut self, frames: u64, outcome: &Outcome) {
         self.is_reported = true;
         self.report(match outcome {
-            Outcome::Ended(Ok(())) => Fate::Completed { frames },
-            Outcome::Failed(error) | Outcome::Ended(Err(error)) => Fate::Failed { frames, why: error.to_string() },
+            Outcome::Ended(Ok(())) => MemberState::Completed { frames },
+            Outcome::Failed(error) | Outcome::Ended(Err(error)) => {
+                MemberState::Failed { frames, why: error.to_string() }
+            }
         });
     }
 }
@@ -132,7 +134,7 @@ impl Reporter {
 impl Drop for Reporter {
     fn drop(&mut self) {
         if !self.is_reported {
-            self.report(Fate::Failed { frames: 0, why: "it was given up".into() });
+            self.report(MemberState::Failed { frames: 0, why: "it was given up".into() });
         }
     }
 }

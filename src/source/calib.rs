@@ -7,7 +7,7 @@ use crate::calibration::{self, CalibrationError, Fault, StereoCalibration};
 use crate::recording::geometry::Geometry;
 
 /// A calibration of two cameras.
-pub enum Eyes {
+pub enum PairCalibration {
     /// Their pictures are rectified: a `calib.txt` of Middlebury, ETH3D or KITTI.
     Rectified {
         /// Their geometry, scaled to the given pictures.
@@ -24,14 +24,14 @@ pub enum Eyes {
 ///
 /// # Errors
 /// The file is of another format, lacks an entry, has invalid numbers, or is for pictures of another aspect ratio.
-pub fn read(files: &[PathBuf], pictures: &Path, size: (u32, u32)) -> Result<Eyes, SourceError> {
+pub fn read(files: &[PathBuf], pictures: &Path, size: (u32, u32)) -> Result<PairCalibration, SourceError> {
     let paths: Vec<&Path> = files.iter().map(PathBuf::as_path).collect();
     match (calibration::load(&paths), &paths[..]) {
-        (Ok(calibration), _) => Ok(Eyes::Raw(Box::new(calibration))),
+        (Ok(calibration), _) => Ok(PairCalibration::Raw(Box::new(calibration))),
         // Not recognised and without a YAML extension: try `calib.txt`. A broken `.yml` keeps its own error.
         (Err(error), [file]) if !is_yaml(file) && is_unrecognized(&error) => {
             let stated = Geometry::read(file, pictures)?;
-            Ok(Eyes::Rectified { geometry: stated.fitted(file, size)?, made_for: stated.size })
+            Ok(PairCalibration::Rectified { geometry: stated.fitted(file, size)?, made_for: stated.size })
         }
         (Err(error), _) => Err(error.into()),
     }

@@ -1,7 +1,7 @@
 //! External depth for a source, from another recording or a depth camera.
 
 use super::opened::recorded_depth_from;
-use super::{DepthChoice, DepthFrom, Options, Source, SourceError, SourceName, Wanted, one_camera, options};
+use super::{DepthChoice, DepthOrigin, Options, Source, SourceError, SourceName, Wanted, one_camera, options};
 use crate::capture::Brings;
 use crate::clock::Clock;
 use crate::depth::DepthSource;
@@ -43,7 +43,7 @@ pub(super) fn with_external_depth(
             first_depth = wanted.first_depth(&recording);
             (Box::new(Beside::new(recording, &folder.display().to_string())?), depth_from)
         }
-        DepthChoice::Device(name) => (open_depth_camera(name, depth, clock)?, DepthFrom::Units),
+        DepthChoice::Device(name) => (open_depth_camera(name, depth, clock)?, DepthOrigin::Units),
         DepthChoice::OneCamera(chosen) => return one_camera::add_depth(source, chosen, name, wanted),
         DepthChoice::Defocus => {
             return SourceError::usage("--depth defocus is for a photograph: bokehcam render PHOTO --depth defocus");

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::calib::{self, Eyes};
+use super::calib::{self, PairCalibration};
 use super::{SourceError, options};
 use crate::calibration::rectification::Rectification;
 use crate::calibration::rectifier::Rectifier;
@@ -70,8 +70,8 @@ impl options::Stereo {
         let from_file = match self.calib.is_empty() {
             true => None,
             false => Some(match calib::read(&self.calib, Path::new(source_name), size)? {
-                Eyes::Rectified { geometry, .. } => Pair::Rectified(geometry.rig),
-                Eyes::Raw(calibration) => Pair::Raw(calibration),
+                PairCalibration::Rectified { geometry, .. } => Pair::Rectified(geometry.rig),
+                PairCalibration::Raw(calibration) => Pair::Raw(calibration),
             }),
         };
         match from_file.as_ref().unwrap_or(pair) {
@@ -149,7 +149,7 @@ pub fn check_focus(rig: &StereoRig, look: &Look) -> Result<(), SourceError> {
 
 /// Returns the number of disparities to search: the known number, or else a tenth of the picture's width.
 fn default_disparities(known: Option<u32>, width_px: u32) -> u32 {
-    known.unwrap_or(width_px.div_ceil(10)).next_multiple_of(16).clamp(16, Settings::MOST_DISPARITIES)
+    known.unwrap_or(width_px.div_ceil(10)).next_multiple_of(16).clamp(16, Settings::MAX_DISPARITIES)
 }
 
 #[cfg(test)]

@@ -53,7 +53,7 @@ use crate::sink::Sink;
 
 /// The origin of depth.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum DepthFrom {
+pub enum DepthOrigin {
     /// No depth, or it is not used.
     #[default]
     Nothing,
@@ -71,7 +71,7 @@ pub enum DepthFrom {
     Plate,
 }
 
-impl DepthFrom {
+impl DepthOrigin {
     /// Returns whether distances are relative, not in metres.
     pub fn is_relative(self) -> bool {
         matches!(self, Self::Relative | Self::Networks | Self::Plate)
@@ -92,7 +92,7 @@ pub struct Source {
     /// The stereo geometry, if depth is matched.
     pub rig: Option<StereoRig>,
     /// The origin of depth.
-    pub depth_from: DepthFrom,
+    pub depth_from: DepthOrigin,
     /// Describes the networks that infer depth, if any.
     pub networks: Option<String>,
     /// Describes the network that detects the person in focus, if depth is measured.
@@ -155,7 +155,7 @@ impl Source {
     /// Creates a source from a camera that the caller has opened; `depth` provides depth in metres for its frames.
     pub fn of(camera: Box<dyn Camera>, depth: Option<Box<dyn DepthSource>>) -> Self {
         let has_depth = depth.is_some() || camera.info().brings == Brings::Depth;
-        let depth_from = if has_depth { DepthFrom::Metres } else { DepthFrom::Nothing };
+        let depth_from = if has_depth { DepthOrigin::Metres } else { DepthOrigin::Nothing };
         Self { camera, depth, rig: None, depth_from, networks: None, persons: None, guide: None, first_depth: None }
     }
 
@@ -171,7 +171,7 @@ impl Source {
             source.camera = Box::new(SideBySide::new(source.camera).map_err(usage)?);
         }
         let info = source.camera.info();
-        let depth_from = if info.brings == Brings::Depth { DepthFrom::Metres } else { source.depth_from };
+        let depth_from = if info.brings == Brings::Depth { DepthOrigin::Metres } else { source.depth_from };
         if stereo.side_by_side
             && source.depth.is_some()
             && matches!(depth_choice, DepthChoice::Auto | DepthChoice::Recorded)
@@ -182,7 +182,7 @@ impl Source {
                 info.name
             )));
         }
-        if info.brings != Brings::RightEye {
+        if info.brings != Brings::RightCamera {
             if *depth_choice == DepthChoice::Stereo {
                 return Err(SourceError::Usage(format!(
                     "--depth stereo: {} has one eye; use two cameras LEFT,RIGHT, a recording with both eyes, or \
@@ -198,7 +198,7 @@ impl Source {
                 eyes::check_focus(&rig, look)?;
             }
             let depth: Option<Box<dyn DepthSource>> = Some(Box::new(depth));
-            let depth_from = DepthFrom::Eyes;
+            let depth_from = DepthOrigin::Eyes;
             return Ok(Self { rig: Some(rig), depth_from, ..Self::of(source.camera, depth) });
         }
         let Opened { camera, depth, first_depth, .. } = source;
@@ -220,7 +220,7 @@ impl Source {
 
     /// Returns whether its depth is measured (not computed exactly), so that refinement improves it.
     pub fn is_measured(&self) -> bool {
-        let is_made = matches!(self.depth_from, DepthFrom::Networks | DepthFrom::Plate);
+        let is_made = matches!(self.depth_from, DepthOrigin::Networks | DepthOrigin::Plate);
         self.depth.is_some() && !is_made && (self.rig.is_none() || REFINES_STEREO)
     }
 
@@ -259,8 +259,8 @@ impl Wanted<'_> {
     }
 
     /// Rejects a look that needs real distances if depth is relative.
-    fn check_relative(&self, depth_from: DepthFrom) -> Result<(), SourceError> {
-        let is_used = depth_from == DepthFrom::Relative && self.uses_depth();
+    fn check_relative(&self, depth_from: DepthOrigin) -> Result<(), SourceError> {
+        let is_used = depth_from == DepthOrigin::Relative && self.uses_depth();
         self.look.filter(|_| is_used).map_or(Ok(()), |look| refuse_metres(look, INVERSE_TELLS))
     }
 

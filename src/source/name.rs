@@ -5,7 +5,7 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
-use super::{DepthFrom, Frames, Source, SourceError, near, photo};
+use super::{DepthOrigin, Frames, Source, SourceError, near, photo};
 use crate::capture::demo;
 
 /// The name of the synthetic scene.
@@ -271,8 +271,8 @@ impl SourceName {
     pub fn note(&self, source: &Source) -> Option<String> {
         let SourceName::Photo(path) = self else { return None };
         let depth = match source.depth_from {
-            DepthFrom::Nothing => "without depth: a map NAME-depth.png beside it would be taken",
-            DepthFrom::Networks | DepthFrom::Plate => "with depth that is made of it",
+            DepthOrigin::Nothing => "without depth: a map NAME-depth.png beside it would be taken",
+            DepthOrigin::Networks | DepthOrigin::Plate => "with depth that is made of it",
             _ => "with the depth beside it",
         };
         Some(format!(

@@ -1,9 +1,9 @@
 //! Depth from a single camera by networks, either named by the user or installed.
 
-use super::{DepthFrom, OneCamera, Options, Source, SourceError, Wanted};
-use crate::depth::focus::{FocusRule, OnPersons, Persons};
+use super::{DepthOrigin, OneCamera, Options, Source, SourceError, Wanted};
+use crate::depth::focus::{FocusRule, PersonFocus, Persons};
 use crate::depth::plate::Companion;
-use crate::depth::{DepthSource, Seen};
+use crate::depth::{DepthSource, FrameInput};
 use crate::frame::{ColorImage, DepthMap, Stamp};
 use crate::look::Look;
 
@@ -91,7 +91,7 @@ pub(super) fn add_network_depth(source: Source, wanted: &Wanted) -> Source {
     match open(&chosen, wanted) {
         Ok((depth, about)) => {
             let depth: Option<Box<dyn DepthSource>> = Some(depth);
-            Source { depth, depth_from: DepthFrom::Networks, networks: Some(about), ..source }
+            Source { depth, depth_from: DepthOrigin::Networks, networks: Some(about), ..source }
         }
         // The networks were not requested explicitly.
         Err(error) => {
@@ -123,8 +123,8 @@ pub(super) fn add_person_detection(mut source: Source, wanted: &Wanted) -> Sourc
         && is_used
         && let Some((persons, about)) = open_person_detector(wanted)
     {
-        let is_matched = source.depth_from == DepthFrom::Eyes;
-        let on_persons = |depth| Box::new(OnPersons::new(depth, persons, is_matched)) as Box<dyn DepthSource>;
+        let is_matched = source.depth_from == DepthOrigin::Eyes;
+        let on_persons = |depth| Box::new(PersonFocus::new(depth, persons, is_matched)) as Box<dyn DepthSource>;
         source.depth = source.depth.map(on_persons);
         source.persons = Some(about);
     }
@@ -136,7 +136,7 @@ pub fn find_person(options: &Options, look: &Look, color: &ColorImage, map: &mut
     let is_used = look.effect.follows_depth() && look.focus == FocusRule::Auto;
     if is_used && let Some((mut persons, _)) = open_person_detector(&Wanted { options, look: Some(look) }) {
         let stamp = Stamp { index: 0, time_ns: 0, captured_ns: None };
-        persons.mark(Seen { stamp, color, right: None }, map);
+        persons.mark(FrameInput { stamp, color, right: None }, map);
     }
 }
 

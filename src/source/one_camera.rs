@@ -4,10 +4,10 @@ use std::path::Path;
 use std::sync::Arc;
 
 use super::{
-    DepthFrom, OneCamera, Options, PlateFile, Source, SourceError, SourceName, Wanted, networks, refuse_metres,
+    DepthOrigin, OneCamera, Options, PlateFile, Source, SourceError, SourceName, Wanted, networks, refuse_metres,
 };
 use crate::depth::plate::{Guide, Lock, PlateDepth, Step};
-use crate::depth::{DepthError, DepthSource, Seen};
+use crate::depth::{DepthError, DepthSource, FrameInput};
 use crate::frame::{ColorImage, DepthMap, Stamp};
 use crate::look::Look;
 use crate::recording::still;
@@ -30,7 +30,7 @@ pub(super) fn add_depth(
     let plate = match &chosen.plate {
         None => {
             let depth = companion.map(|networks| networks as Box<dyn DepthSource>);
-            return Ok(Source { depth, depth_from: DepthFrom::Networks, networks: about, ..source });
+            return Ok(Source { depth, depth_from: DepthOrigin::Networks, networks: about, ..source });
         }
         Some(PlateFile::At(file)) => Some(read_plate(file, info.size)?),
         Some(PlateFile::Taken) if info.live => None,
@@ -44,7 +44,7 @@ pub(super) fn add_depth(
     let depth = PlateDepth::new(plate, create_lock(name), companion);
     let guide = Some(depth.guide());
     let depth: Option<Box<dyn DepthSource>> = Some(Box::new(depth));
-    let depth_from = if about.is_some() { DepthFrom::Networks } else { DepthFrom::Plate };
+    let depth_from = if about.is_some() { DepthOrigin::Networks } else { DepthOrigin::Plate };
     Ok(Source { depth, depth_from, networks: about, guide, ..source })
 }
 
@@ -60,7 +60,7 @@ pub fn depth_of_picture(
 ) -> Result<DepthMap, SourceError> {
     refuse_metres(look, "one picture tells")?;
     let wanted = Wanted { options, look: Some(look) };
-    let seen = Seen { stamp: Stamp { index: 0, time_ns: 0, captured_ns: None }, color, right: None };
+    let seen = FrameInput { stamp: Stamp { index: 0, time_ns: 0, captured_ns: None }, color, right: None };
     let networks =
         chosen.has_networks().then(|| networks::open(chosen, &wanted)).transpose()?.map(|(networks, _)| networks);
     let mut map = DepthMap::default();

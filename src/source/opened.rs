@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{DepthFrom, Options, SourceError, SourceName, Wanted, photo};
+use super::{DepthOrigin, Options, SourceError, SourceName, Wanted, photo};
 #[cfg(feature = "camera")]
 use super::{Frames, name};
 use crate::capture::Camera;
@@ -13,7 +13,7 @@ use crate::capture::pipewire::PipeWireCamera;
 use crate::capture::replay::{Part, Replay};
 use crate::capture::synthetic::{self, Format};
 #[cfg(feature = "camera")]
-use crate::capture::two_eyes::TwoEyes;
+use crate::capture::two_eyes::StereoPair;
 #[cfg(feature = "camera")]
 use crate::capture::v4l2::V4l2Camera;
 #[cfg(feature = "camera")]
@@ -27,7 +27,7 @@ use crate::frame::DepthMap;
 use crate::layout::Content;
 use crate::recording::{Pair, Recording};
 #[cfg(feature = "camera")]
-use crate::v4l2::live::Wish;
+use crate::v4l2::live::ModeRequest;
 
 /// Picture size of the synthetic scene.
 const SYNTHETIC_SIZE: (u32, u32) = (640, 480);
@@ -38,7 +38,7 @@ const SYNTHETIC_FPS: f64 = 30.0;
 pub(super) struct Opened {
     pub camera: Box<dyn Camera>,
     pub depth: Option<Box<dyn DepthSource>>,
-    pub depth_from: DepthFrom,
+    pub depth_from: DepthOrigin,
     pub first_depth: Option<DepthMap>,
     /// The stereo geometry that the source states.
     pub pair: Pair,
@@ -53,7 +53,7 @@ impl Opened {
         let without_depth = |camera| Self {
             camera,
             depth: None,
-            depth_from: DepthFrom::Nothing,
+            depth_from: DepthOrigin::Nothing,
             first_depth: None,
             pair: Pair::Unstated,
             disparities: None,
@@ -130,7 +130,7 @@ impl Opened {
                 let open = |eye: &name::Named| {
                     V4l2Camera::open(&eye.name, camera_request(frames), frames.control.clone(), None)
                 };
-                let eyes = TwoEyes::new(open(left)?, open(right)?, Clock::system(), frames.frames)?;
+                let eyes = StereoPair::new(open(left)?, open(right)?, Clock::system(), frames.frames)?;
                 Ok(without_depth(Box::new(eyes)))
             }
         }
@@ -138,18 +138,18 @@ impl Opened {
 }
 
 /// Returns the kind of a recording's depth.
-pub(super) fn recorded_depth_from(recording: &Recording) -> DepthFrom {
+pub(super) fn recorded_depth_from(recording: &Recording) -> DepthOrigin {
     match recording.has_depth() {
-        false => DepthFrom::Nothing,
-        true if recording.has_relative_depth() => DepthFrom::Relative,
-        true if recording.has_depth_in_units() => DepthFrom::Units,
-        true => DepthFrom::Metres,
+        false => DepthOrigin::Nothing,
+        true if recording.has_relative_depth() => DepthOrigin::Relative,
+        true if recording.has_depth_in_units() => DepthOrigin::Units,
+        true => DepthOrigin::Metres,
     }
 }
 
 #[cfg(feature = "camera")]
-fn camera_request(frames: &Frames) -> Wish {
-    Wish {
+fn camera_request(frames: &Frames) -> ModeRequest {
+    ModeRequest {
         content: Content::Color,
         size_px: frames.size.map(|size| (size.width, size.height)),
         fps: frames.fps,

@@ -256,7 +256,7 @@ fn depth_unit(text: &str) -> Result<DepthUnit, String> {
 
 #[cfg(feature = "clap")]
 fn disparities(text: &str) -> Result<u32, String> {
-    const MAX: u32 = Settings::MOST_DISPARITIES;
+    const MAX: u32 = Settings::MAX_DISPARITIES;
     let good = |disparities: &u32| (16..=MAX).contains(disparities) && disparities.is_multiple_of(16);
     text.parse().ok().filter(good).ok_or_else(|| format!("use a multiple of 16 from 16 to {MAX}"))
 }

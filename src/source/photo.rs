@@ -4,8 +4,8 @@ use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
-use super::{DepthChoice, DepthFrom, Options, Source, SourceError, SourceName};
-use crate::depth::Seen;
+use super::{DepthChoice, DepthOrigin, Options, Source, SourceError, SourceName};
+use crate::depth::FrameInput;
 use crate::frame::{ColorImage, DepthMap, Stamp};
 use crate::look::Look;
 use crate::optics::StereoRig;
@@ -34,7 +34,7 @@ pub struct PhotoDepth {
     /// The map, as measured or finished around a subject.
     pub map: DepthMap,
     /// Its origin.
-    pub from: DepthFrom,
+    pub from: DepthOrigin,
     /// Whether refinement improves it.
     pub measured: bool,
     /// A short description of its source.
@@ -55,7 +55,8 @@ pub fn depth_of(
     let measured = source.is_measured();
     let Source { depth: Some(depth), depth_from: from, networks, .. } = &mut source else { return Ok(None) };
     let mut map = DepthMap::default();
-    depth.read(Seen { stamp: Stamp { index: 0, time_ns: 0, captured_ns: None }, color, right: None }, &mut map)?;
+    depth
+        .read(FrameInput { stamp: Stamp { index: 0, time_ns: 0, captured_ns: None }, color, right: None }, &mut map)?;
     let describe_file = || depth_file(path).map(|file| format!("{}, beside it", file.display()));
     let by = networks.take().or_else(describe_file).unwrap_or_default();
     Ok(Some(PhotoDepth { map, from: *from, measured, by }))
@@ -69,7 +70,7 @@ pub fn files_of(path: &Path) -> impl Iterator<Item = PathBuf> {
 }
 
 /// A photo, its depth if there is any, and the origin of the depth.
-pub(super) type Photo = (ColorImage, Option<DepthMap>, DepthFrom);
+pub(super) type Photo = (ColorImage, Option<DepthMap>, DepthOrigin);
 
 /// Reads a photo, rotated upright; for a snapshot, its picture before the blur. Its depth is the `.pfm` or `.png` file
 /// `NAME-depth` or `NAME.depth` next to it, unless the options request another origin.
@@ -80,19 +81,19 @@ pub(super) fn read(path: &Path, options: &Options) -> Result<Photo, SourceError>
     let path = &original(path);
     let color = still::read_color(path)?;
     let is_wanted = matches!(options.depth_choice, DepthChoice::Auto | DepthChoice::Recorded);
-    let Some(file) = depth_file(path).filter(|_| is_wanted) else { return Ok((color, None, DepthFrom::Nothing)) };
+    let Some(file) = depth_file(path).filter(|_| is_wanted) else { return Ok((color, None, DepthOrigin::Nothing)) };
     let depth = &options.depth;
     let (map, from) = match depth.file_unit() {
         DepthUnit::Inverse { white_is_far } => {
-            (still::read_inverse_depth(&file, white_is_far, color.size())?, DepthFrom::Relative)
+            (still::read_inverse_depth(&file, white_is_far, color.size())?, DepthOrigin::Relative)
         }
         DepthUnit::Metres => {
             let (map, from) = match still::read_map(&file, depth.depth_scale, Some(depth.depth_invalid))? {
-                Map::Depth(map) => (map, DepthFrom::Units),
-                Map::Disparity(map, Some(rig)) => (map.depth(|px| rig.depth_m(px)), DepthFrom::Metres),
+                Map::Depth(map) => (map, DepthOrigin::Units),
+                Map::Disparity(map, Some(rig)) => (map.depth(|px| rig.depth_m(px)), DepthOrigin::Metres),
                 Map::Disparity(map, None) => {
                     let rig = StereoRig::assumed(map.width);
-                    (map.depth(|px| rig.depth_m(px)), DepthFrom::Relative)
+                    (map.depth(|px| rig.depth_m(px)), DepthOrigin::Relative)
                 }
             };
             still::check_depth_size(&file, map.size(), color.size())?;

@@ -51,7 +51,7 @@ impl Camera {
 pub fn load(path: &Path) -> Result<Registration, SourceError> {
     parse(
         path,
-        &input::read_text(path, input::MOST_CALIBRATION_BYTES)
+        &input::read_text(path, input::MAX_CALIBRATION_BYTES)
             .map_err(|source| SourceError::Io { path: path.to_owned(), source })?,
     )
 }

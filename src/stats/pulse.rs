@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 /// The current frame rate of a run, an exponential moving average. One thread records frames; any may read, without
 /// locks.
 #[derive(Debug, Default)]
-pub struct Pulse {
+pub struct FrameRateMeter {
     /// The time of the last frame, and the mean interval; both 0 before there is one.
     last_ns: AtomicU64,
     mean_ns: AtomicU64,
@@ -16,9 +16,9 @@ const WEIGHT: f64 = 0.1;
 /// A frame that is this much later than usual is a pause, not a slow frame.
 const STOPPED_NS: u64 = 500_000_000;
 
-impl Pulse {
+impl FrameRateMeter {
     /// Records a frame at `now_ns`.
-    pub fn beat(&self, now_ns: u64) {
+    pub fn record_frame(&self, now_ns: u64) {
         let last_ns = self.last_ns.swap(now_ns, Ordering::Relaxed);
         let mean_ns = self.mean_ns.load(Ordering::Relaxed);
         let took_ns = now_ns.saturating_sub(last_ns);
@@ -46,22 +46,22 @@ mod tests {
 
     #[test]
     fn the_rate_is_that_of_the_last_frames_and_ends_with_them() {
-        let pulse = Pulse::default();
+        let pulse = FrameRateMeter::default();
         assert!(pulse.per_second(1) == 0.0);
         let mut now_ns = 1_000;
         for _ in 0..100 {
-            pulse.beat(now_ns);
+            pulse.record_frame(now_ns);
             now_ns += 20_000_000;
         }
         assert!((pulse.per_second(now_ns) - 50.0).abs() < 0.1);
         for _ in 0..100 {
-            pulse.beat(now_ns);
+            pulse.record_frame(now_ns);
             now_ns += 40_000_000;
         }
         assert!((pulse.per_second(now_ns) - 25.0).abs() < 0.1);
         assert!(pulse.per_second(now_ns + 1_000_000_000) == 0.0);
         // A pause does not count as a slow frame.
-        pulse.beat(now_ns + 3_000_000_000);
+        pulse.record_frame(now_ns + 3_000_000_000);
         assert!((pulse.per_second(now_ns + 3_000_000_000) - 25.0).abs() < 0.1);
     }
 }

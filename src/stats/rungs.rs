@@ -2,13 +2,13 @@ use super::QualityUse;
 
 /// Counts frames per quality level, by the levels' names.
 #[derive(Clone, Debug, Default)]
-pub struct RungCounts {
+pub struct QualityCounts {
     frames: Vec<(&'static str, u64)>,
     last: Option<&'static str>,
     switches: u64,
 }
 
-impl RungCounts {
+impl QualityCounts {
     /// Counts one frame at `rung`. Allocates only when a level is seen for the first time.
     pub fn add(&mut self, rung: &'static str) {
         match self.frames.iter_mut().find(|seen| seen.0 == rung) {

@@ -35,7 +35,7 @@ pub enum ReaderEvent {
 
 /// Watches for readers of one node.
 #[derive(Debug)]
-pub struct Audience {
+pub struct ReaderMonitor {
     device: Arc<Device>,
     /// An inotify watch for the node being opened or closed, if the module sends no events.
     open_watch: Option<OwnedFd>,
@@ -54,7 +54,7 @@ impl Drop for Stop {
     }
 }
 
-impl Audience {
+impl ReaderMonitor {
     /// Starts to watch.
     ///
     /// # Errors
@@ -153,8 +153,8 @@ mod tests {
     use super::*;
 
     /// A device that is not a virtual camera sends no events; the holders of any file can be looked up.
-    fn listen(file: &std::path::Path) -> (Audience, Stop) {
-        Audience::new(Arc::new(Device::open(file).unwrap())).unwrap()
+    fn listen(file: &std::path::Path) -> (ReaderMonitor, Stop) {
+        ReaderMonitor::new(Arc::new(Device::open(file).unwrap())).unwrap()
     }
 
     #[test]

@@ -286,7 +286,7 @@ fn number(name: &str) -> Option<u32> {
 }
 
 /// Returns the USB connection of the camera behind a node, if it has one.
-pub fn usb_of(node: &Path) -> Option<Usb> {
+pub fn usb_connection(node: &Path) -> Option<Usb> {
     let node = fs::canonicalize(node).ok()?;
     usb(&SystemPaths::default().class.join(node.file_name()?))
 }

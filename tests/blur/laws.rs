@@ -48,7 +48,7 @@ fn a_constant_picture_stays_constant() {
 /// A plain two-dimensional convolution with the bank's own kernel, borders repeated.
 fn convolve(image: &ColorImage, plan: &Plan, radius_px: f32) -> Vec<f32> {
     let node = plan.bank.node(radius_px);
-    let (kernel, reach) = (plan.bank.kernel(node, false), plan.bank.node_reach[node] as i64);
+    let (kernel, reach) = (plan.bank.kernel(node, false), plan.bank.node_half_width[node] as i64);
     let (width, height) = (i64::from(image.width), i64::from(image.height));
     let mut out = Vec::new();
     for y in 0..height {

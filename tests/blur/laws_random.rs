@@ -177,7 +177,7 @@ fn what_is_in_focus_stays_as_it_is() {
 fn nothing_shines_through_a_slope(make: Make) {
     each_case(|random| {
         let slope = Slope::new(random);
-        let most_px = slope.lens.max_coc_px;
+        let max_px = slope.lens.max_coc_px;
         let settings = Settings {
             method: Method::Layered,
             // What few terms of a ring or a picture overshoot is cut to the colours around, the wall's included.
@@ -185,8 +185,8 @@ fn nothing_shines_through_a_slope(make: Make) {
             rank: None,
             // With two bins behind the focal plane, a slope there shares one with the wall.
             quality: random.of(if slope.is_in_front { &Quality::ALL } else { &Quality::ALL[2..] }),
-            far_max_px: most_px,
-            near_max_px: most_px,
+            far_max_px: max_px,
+            near_max_px: max_px,
             ..random.settings(CocKind::Depth)
         };
         let mut executor = make(&settings, SLOPE);

@@ -56,7 +56,7 @@ fn same_but(light_in: f32, settings: &Settings, image: &ColorImage, map: &DepthM
     assert_eq!(finished.picture.memory().unwrap().size(), image.size());
 
     for k in (0..plan.bins.len()).filter(|&k| cpu.is_present(k) && plan.compositing != Compositing::Gather) {
-        let (bin, around) = (&plan.bins[k], (plan.reach_cells(&plan.bins[k]) + 1) * CELL);
+        let (bin, around) = (&plan.bins[k], (plan.radius_cells(&plan.bins[k]) + 1) * CELL);
         let edges = bin.width.next_multiple_of(64) / SEGMENT + 1;
         for probe in [Probe::Bin(k), Probe::Reach(k), Probe::Blur(k)] {
             // Where a value is, in bin pixels, what of the bin it depends on, and how far it may be off.

@@ -78,7 +78,7 @@ fn structs_have_the_same_layout_in_rust_and_wgsl() {
             reach,
             nodes,
             groups,
-            most_px,
+            max_px,
             coc,
             ramp,
             expansion,
@@ -101,7 +101,7 @@ fn structs_have_the_same_layout_in_rust_and_wgsl() {
             behind,
             max_radius_px,
             sigma_cells,
-            reach_cells,
+            radius_cells,
             pixels_at,
             rows_at,
             edges_at,
@@ -142,7 +142,7 @@ fn no_pass_of_the_matte_has_more_buffers_than_a_device_is_asked_for() {
     let count = |shader: Shader| {
         parse(shader.source).global_variables.iter().filter(|(_, variable)| is_storage(&variable.space)).count()
     };
-    assert_eq!(matte::ALL.map(count).into_iter().max(), Some(matte::MOST_BUFFERS as usize));
+    assert_eq!(matte::ALL.map(count).into_iter().max(), Some(matte::MAX_BUFFERS as usize));
 }
 
 /// A struct's name, size, and the places of its fields.

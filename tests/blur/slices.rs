@@ -94,7 +94,7 @@ fn linear_light_has_no_white_and_no_highlights_to_recover() {
     let flat = vec![6.0; map.metres.len()];
     for light in [odd, lone] {
         let out = blurred(&mut slices, &light, Radii::Each(&flat));
-        assert!(out.iter().all(|light| (0.0..=Pixels::MOST_LIGHT).contains(light)));
+        assert!(out.iter().all(|light| (0.0..=Pixels::MAX_LIGHT).contains(light)));
     }
 }
 

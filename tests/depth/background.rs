@@ -10,7 +10,7 @@ use bokehcam::color::srgb_to_linear;
 use bokehcam::compute::thread_pool::ThreadPool;
 use bokehcam::depth::background::Background;
 use bokehcam::depth::focus::FocusRule;
-use bokehcam::engine::{CocMaker, Finish};
+use bokehcam::engine::{CocMaker, Postprocess};
 use bokehcam::frame::{ColorImage, DepthMap};
 use bokehcam::look::{CocAtInfinity, CocRule};
 use bokehcam::optics::DepthCoc;
@@ -224,7 +224,7 @@ fn of_smooth_depth_nothing_is_remembered() {
     let (focus, lens) = (FocusRule::Metres(1.0), CocAtInfinity::Px(10.0));
     let rule = CocRule::Depth { focus, lens, range_m: 0.0, max_coc_px: 20.0 };
     for is_smooth in [false, true] {
-        let mut coc = CocMaker::new(rule, Finish::Keep);
+        let mut coc = CocMaker::new(rule, Postprocess::Keep);
         coc.remember(true);
         let mut hidden = 0;
         for frame in 0..44 {

@@ -200,7 +200,7 @@ fn depths_of_no_scene_are_unknown() {
             }
         }
     }
-    assert!(DepthMap::is_known(DepthMap::LEAST_M) && DepthMap::is_known(DepthMap::MOST_M));
+    assert!(DepthMap::is_known(DepthMap::MIN_M) && DepthMap::is_known(DepthMap::MAX_M));
     for text in ["1e-38", "3e38"] {
         assert!(text.parse::<FocusRule>().is_err());
     }

@@ -43,7 +43,7 @@ fn matched([left, right]: &[GrayImage; 2], disparities: u32, effort: Effort, thr
         .disparity(Pair { left, color: None, right }, &mut map)
         .expect("a pair of one size");
     assert_eq!(map.size(), left.size());
-    assert!(map.px.iter().all(|&d| d > 0.0 && d <= Settings::MOST_DISPARITIES as f32), "every pixel has an answer");
+    assert!(map.px.iter().all(|&d| d > 0.0 && d <= Settings::MAX_DISPARITIES as f32), "every pixel has an answer");
     map
 }
 

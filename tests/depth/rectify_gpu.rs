@@ -13,7 +13,7 @@ use bokehcam::compute::{Backend, Device};
 use bokehcam::depth::stereo::gpu::rectifier::GpuRectifier;
 use bokehcam::depth::stereo::source::StereoDepth;
 use bokehcam::depth::stereo::{self, Effort, Settings};
-use bokehcam::depth::{DepthSource, Seen};
+use bokehcam::depth::{DepthSource, FrameInput};
 use bokehcam::frame::{ColorImage, DepthMap, GrayImage, Stamp};
 use common::Numbers;
 use glam::{DMat3, DVec2, DVec3};
@@ -95,7 +95,7 @@ fn a_source_goes_on_when_the_device_is_gone() {
         let found = sources.each_mut().map(|source| {
             let (mut color, mut map) = (color.clone(), DepthMap::default());
             source.rectify(&mut color);
-            let seen = Seen { stamp, color: &color, right: Some(&right) };
+            let seen = FrameInput { stamp, color: &color, right: Some(&right) };
             source.read(seen, &mut map).expect("a fault costs no frame");
             (color, map)
         });

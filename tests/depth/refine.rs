@@ -4,7 +4,7 @@ use std::path::Path;
 
 use bokehcam::depth::focus::FocusRule;
 use bokehcam::depth::refine::Refiner;
-use bokehcam::engine::{CocMaker, Finish};
+use bokehcam::engine::{CocMaker, Postprocess};
 use bokehcam::frame::{ColorImage, DepthMap};
 use bokehcam::look::{CocAtInfinity, CocRule};
 use bokehcam::recording::{Options, Recording, Scratch};
@@ -315,7 +315,7 @@ fn any_number_of_threads_makes_the_same_depth_and_the_same_matte() {
         let made_by = |threads: usize| {
             let lens = CocAtInfinity::Px(14.0);
             let rule = CocRule::Depth { focus: FocusRule::Auto, lens, range_m: 0.0, max_coc_px: 20.0 };
-            let mut coc = CocMaker::new(rule, Finish::Refine).on_threads(threads);
+            let mut coc = CocMaker::new(rule, Postprocess::Refine).with_threads(threads);
             coc.remember(true);
             let mut made = Vec::new();
             for ((color, measured), time_ns) in frames.iter().zip((0..).step_by(FRAME_NS as usize)) {

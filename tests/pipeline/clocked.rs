@@ -13,7 +13,7 @@ use bokehcam::capture::{Brings, Camera, CaptureError, Captured, Shot, SourceInfo
 use bokehcam::clock::Clock;
 use bokehcam::compute::Backend;
 use bokehcam::depth::focus::FocusRule;
-use bokehcam::depth::{DepthError, DepthSource, Seen};
+use bokehcam::depth::{DepthError, DepthSource, FrameInput};
 use bokehcam::frame::{ColorImage, DepthMap, Stamp};
 use bokehcam::link::live;
 use bokehcam::look::Look;
@@ -83,7 +83,7 @@ impl Camera for Lockstep {
 struct Wall(Clock, u64);
 
 impl DepthSource for Wall {
-    fn read(&mut self, _: Seen, map: &mut DepthMap) -> Result<(), DepthError> {
+    fn read(&mut self, _: FrameInput, map: &mut DepthMap) -> Result<(), DepthError> {
         self.0.advance_ns(self.1);
         map.resize(SIZE.0, SIZE.1);
         map.metres.fill(1.0);

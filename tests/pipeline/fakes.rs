@@ -11,7 +11,7 @@ use bokehcam::bokeh::{Bokeh, BokehError, Finished, Job, PassTimes, Picture};
 use bokehcam::capture::{Brings, Camera, CaptureError, Captured, Shot, SourceInfo};
 use bokehcam::compute::Backend;
 use bokehcam::compute::GpuError;
-use bokehcam::depth::{DepthError, DepthSource, Seen};
+use bokehcam::depth::{DepthError, DepthSource, FrameInput};
 use bokehcam::frame::{ColorImage, DepthMap, Stamp};
 use bokehcam::optics::CocField;
 use bokehcam::sink::{Ending, Sink, SinkError};
@@ -93,7 +93,7 @@ impl Camera for FakeCamera {
             depth.resize(SIZE.0, SIZE.1);
             depth.metres.fill(1.0 + index as f32);
         }
-        if self.brings == Brings::RightEye {
+        if self.brings == Brings::RightCamera {
             right.resize(SIZE.0, SIZE.1);
             right.luma.fill(index as u8);
         }
@@ -111,7 +111,7 @@ impl Camera for FakeCamera {
 pub struct FakeDepth(pub Trouble);
 
 impl DepthSource for FakeDepth {
-    fn read(&mut self, Seen { stamp, .. }: Seen, map: &mut DepthMap) -> Result<(), DepthError> {
+    fn read(&mut self, FrameInput { stamp, .. }: FrameInput, map: &mut DepthMap) -> Result<(), DepthError> {
         let index = stamp.index;
         if self.0.strikes(index) {
             return Err(DepthError::NoDepth { source_name: format!("frame {index}") });

@@ -11,7 +11,7 @@ use bokehcam::capture::synthetic::Format;
 use bokehcam::capture::{Brings, Camera, CaptureError, Captured, Shot};
 use bokehcam::depth::beside::Beside;
 use bokehcam::depth::recorded::Recorded;
-use bokehcam::depth::{DepthError, DepthSource, Seen};
+use bokehcam::depth::{DepthError, DepthSource, FrameInput};
 use bokehcam::frame::{ColorImage, DepthMap, GrayImage, Stamp};
 use bokehcam::pipeline::{Pace, Run, run};
 use bokehcam::recording::tum::{Writer, WriterOptions};
@@ -140,9 +140,9 @@ pub fn sink_options() -> bokehcam::sink::Options {
 }
 
 /// A frame of which only the stamp counts.
-pub fn seen(stamp: Stamp) -> Seen<'static> {
+pub fn seen(stamp: Stamp) -> FrameInput<'static> {
     static BLACK: ColorImage = ColorImage { width: 0, height: 0, rgb: Vec::new() };
-    Seen { stamp, color: &BLACK, right: None }
+    FrameInput { stamp, color: &BLACK, right: None }
 }
 
 #[test]
@@ -184,7 +184,7 @@ fn depth_beside_other_colours_follows_their_time_in_a_loop() {
 struct Late(usize);
 
 impl DepthSource for Late {
-    fn read(&mut self, Seen { stamp, .. }: Seen, map: &mut DepthMap) -> Result<(), DepthError> {
+    fn read(&mut self, FrameInput { stamp, .. }: FrameInput, map: &mut DepthMap) -> Result<(), DepthError> {
         if stamp.index < self.0 {
             return Err(DepthError::Unpaired { source_name: "a depth camera".to_owned() });
         }

@@ -9,7 +9,7 @@ use bokehcam::capture::replay::{Part, Replay};
 use bokehcam::capture::{Brings, Camera, Captured, Shot};
 use bokehcam::depth::beside::Beside;
 use bokehcam::depth::recorded::Recorded;
-use bokehcam::depth::{DepthError, DepthSource, Seen};
+use bokehcam::depth::{DepthError, DepthSource, FrameInput};
 use bokehcam::frame::{ColorImage, DepthMap, GrayImage, Stamp};
 use bokehcam::link::demand::Demand;
 use bokehcam::link::{self, Receiver};
@@ -75,10 +75,10 @@ fn the_newest_wish_counts_and_each_counts_once() {
     let folder = tempfile::tempdir().unwrap();
     record(folder.path(), false);
     let seeker = looped(folder.path(), 0.0).seeker().unwrap();
-    assert_eq!(seeker.wish_after(0), None);
+    assert_eq!(seeker.request_after(0), None);
     assert_eq!([3, 8, 99].map(|place| seeker.go_to(place)), [1, 2, 3]);
-    let wish = seeker.wish_after(0).unwrap();
-    assert_eq!((wish.number, wish.place, seeker.wish_after(3)), (3, 9, None));
+    let wish = seeker.request_after(0).unwrap();
+    assert_eq!((wish.number, wish.place, seeker.request_after(3)), (3, 9, None));
 }
 
 #[test]
@@ -87,7 +87,7 @@ fn the_right_eye_is_that_of_the_frame() {
     let recording = Arc::new(Recording::open(&folder, &Options::default()).unwrap());
     let part = Part { looped: true, ..Part::default() };
     let mut camera = Replay::new(Arc::clone(&recording), "stereo", &part).unwrap().with_right_eye();
-    assert_eq!(camera.info().brings, Brings::RightEye);
+    assert_eq!(camera.info().brings, Brings::RightCamera);
     let (mut color, mut depth, mut right) = (ColorImage::default(), DepthMap::default(), GrayImage::default());
     let (mut scratch, mut own_color, mut own_right) = (Scratch::default(), ColorImage::default(), GrayImage::default());
     let last = recording.len() - 1;
@@ -125,7 +125,7 @@ fn depth_of_another_recording_stays_beside_the_colours() {
 struct Told(Recorded, Arc<std::sync::atomic::AtomicUsize>);
 
 impl DepthSource for Told {
-    fn read(&mut self, seen: Seen, map: &mut DepthMap) -> Result<(), DepthError> {
+    fn read(&mut self, seen: FrameInput, map: &mut DepthMap) -> Result<(), DepthError> {
         self.0.read(seen, map)
     }
     fn jump(&mut self, _: i64) {
@@ -163,7 +163,7 @@ fn while_nobody_watches_each_wish_brings_its_one_frame_with_its_depth() {
             assert!(began.elapsed() < Duration::from_secs(60), "frame {place} never came");
             std::thread::sleep(Duration::from_millis(1));
         };
-        assert_eq!((view.stamp.index, view.seek, view.is_wished), (place, number, true));
+        assert_eq!((view.stamp.index, view.seek, view.is_seek_target), (place, number, true));
         assert_eq!(usize::from(view.color.as_ref().unwrap().rgb[0]), place);
         let depth = view.depth.as_ref().unwrap();
         assert!(depth.metres.iter().all(|&m| (m - 1.0 - 0.1 * place as f32).abs() < 1e-3));
@@ -183,7 +183,7 @@ fn while_nobody_watches_each_wish_brings_its_one_frame_with_its_depth() {
         let began = Instant::now();
         while began.elapsed() < Duration::from_secs(60) {
             if let Some(view) = views.try_recv() {
-                return assert!(view.stamp.index < 9 && view.seek == 4 && !view.is_wished, "{:?}", view.stamp);
+                return assert!(view.stamp.index < 9 && view.seek == 4 && !view.is_seek_target, "{:?}", view.stamp);
             }
         }
         panic!("it never went on");

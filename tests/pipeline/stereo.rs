@@ -11,7 +11,7 @@ use bokehcam::capture::{Brings, Camera, CaptureError, Captured, Shot, SourceInfo
 use bokehcam::depth::focus::FocusRule;
 use bokehcam::depth::stereo::source::StereoDepth;
 use bokehcam::depth::stereo::{self, Effort, Matcher, Settings};
-use bokehcam::depth::{DepthError, DepthSource, Seen};
+use bokehcam::depth::{DepthError, DepthSource, FrameInput};
 use bokehcam::frame::{ColorImage, DepthMap, Stamp};
 use bokehcam::optics::CocKind;
 use bokehcam::optics::StereoRig;
@@ -31,7 +31,7 @@ fn fake_sink(received: &Received) -> Box<FakeSink> {
 struct OfTheRight;
 
 impl DepthSource for OfTheRight {
-    fn read(&mut self, seen: Seen, map: &mut DepthMap) -> Result<(), DepthError> {
+    fn read(&mut self, seen: FrameInput, map: &mut DepthMap) -> Result<(), DepthError> {
         let right = seen.right.expect("a right eye");
         assert_eq!((right.luma[0], right.size()), (seen.stamp.index as u8, SIZE));
         assert_eq!(seen.color.rgb[0], right.luma[0], "picture and right eye are of one frame");
@@ -61,7 +61,7 @@ impl Camera for LosesPartners {
 }
 
 fn two_eyes(frames: usize) -> FakeCamera {
-    FakeCamera { brings: Brings::RightEye, ..fake_camera(frames) }
+    FakeCamera { brings: Brings::RightCamera, ..fake_camera(frames) }
 }
 
 /// A matcher of small pictures.
@@ -117,7 +117,7 @@ impl DepthSource for Slow {
     fn rectify(&mut self, color: &mut ColorImage) {
         color.rgb[BLURRED] = MARK;
     }
-    fn read(&mut self, seen: Seen, map: &mut DepthMap) -> Result<(), DepthError> {
+    fn read(&mut self, seen: FrameInput, map: &mut DepthMap) -> Result<(), DepthError> {
         assert_eq!(seen.color.rgb[BLURRED], MARK, "straightened before it is matched");
         std::thread::sleep(Duration::from_millis(1 + self.most as u64));
         map.resize(SIZE.0, SIZE.1);
@@ -163,7 +163,7 @@ impl Camera for TwoPlanes {
             period_ns: 33_000_000,
             frames: Some(self.0 as u64),
             live: false,
-            brings: Brings::RightEye,
+            brings: Brings::RightCamera,
         }
     }
 

@@ -7,7 +7,7 @@ use crate::settings::{changes, unused};
 use bokehcam::control::{self, Answer, Claim, ControlError, Name};
 use bokehcam::controller::{Facts, Rules};
 use bokehcam::look::{Look, Patch, Strength};
-use bokehcam::source::{self, DepthFrom};
+use bokehcam::source::{self, DepthOrigin};
 
 /// Claims a name for a run. Without a folder for sockets the run continues, and the inner error is the line to log
 /// later.
@@ -71,13 +71,13 @@ fn apply_patch(
     let look = source::fitting_look(&patch.on(look)?, &facts.depth_choice, facts.has_depth)?;
     let uses_depth = look.effect.follows_depth();
     match facts.depth_from {
-        DepthFrom::Networks | DepthFrom::Plate if uses_depth => source::refuse_metres(&look, "one camera knows")?,
-        DepthFrom::Relative if uses_depth => source::refuse_metres(&look, source::INVERSE_TELLS)?,
+        DepthOrigin::Networks | DepthOrigin::Plate if uses_depth => source::refuse_metres(&look, "one camera knows")?,
+        DepthOrigin::Relative if uses_depth => source::refuse_metres(&look, source::INVERSE_TELLS)?,
         _ => {}
     }
     let run = unused::Run {
         source: unused::From::Source(facts.kind),
-        depth: if facts.has_depth { facts.depth_from } else { DepthFrom::Nothing },
+        depth: if facts.has_depth { facts.depth_from } else { DepthOrigin::Nothing },
         uses_depth,
         effect: look.effect,
         lens: matches!(look.strength, Strength::Lens(_)),

@@ -7,7 +7,7 @@ use std::path::Path;
 
 use super::error::CliError;
 use super::log;
-use bokehcam::files::input::no_file_at;
+use bokehcam::files::input::special_file_kind;
 use bokehcam::files::{place, whole};
 
 /// Refuses to replace files without `--force`.
@@ -16,7 +16,7 @@ use bokehcam::files::{place, whole};
 /// [`CliError::Exists`] if one of `paths` exists and `force` is not set; [`CliError::Usage`] if it is not a file.
 pub fn refuse_overwrite<'a>(paths: impl IntoIterator<Item = &'a Path>, force: bool) -> Result<(), CliError> {
     for path in paths {
-        if let Some(what) = no_file_at(path) {
+        if let Some(what) = special_file_kind(path) {
             return Err(CliError::Usage(format!(
                 "{} is {what}, and is not replaced by a file; choose another name",
                 path.display()

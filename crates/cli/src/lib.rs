@@ -40,7 +40,7 @@ pub fn run(args: impl IntoIterator<Item = OsString>) -> ExitCode {
     }
     let args = arguments::join_negative_numbers(args);
     #[cfg(feature = "lab")]
-    bokehcam_lab::synthetic::bring();
+    bokehcam_lab::synthetic::register();
     log::install_panic_hook();
     log::set_format(arguments::log_format(&args));
     let code = run_command(&args);

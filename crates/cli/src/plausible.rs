@@ -13,7 +13,7 @@ use bokehcam::frame::{ColorImage, DepthMap, Mask};
 use bokehcam::look::{Look, Strength};
 use bokehcam::optics::{Lens, StereoRig};
 use bokehcam::source::options::DEPTH_SCALE;
-use bokehcam::source::{DepthFrom, OneCamera, Options, PlateFile, Source};
+use bokehcam::source::{DepthOrigin, OneCamera, Options, PlateFile, Source};
 
 /// Tolerance below which grey values (0 to 1) count as equal.
 const TOLERANCE: f32 = 0.02;
@@ -170,9 +170,9 @@ fn correlation(values: &[f32], others: &[f32]) -> f64 {
 pub fn warn_of_source(source: &Source, look: &Look, options: &Options) -> bool {
     warn_of_lens(look);
     warn_of_depth_scale(options.depth.depth_scale);
-    let is_unit_known = source.depth_from != DepthFrom::Units || options.depth.depth_scale.is_some();
+    let is_unit_known = source.depth_from != DepthOrigin::Units || options.depth.depth_scale.is_some();
     warn_of_baseline(source.rig);
-    let has_metres = matches!(source.depth_from, DepthFrom::Units | DepthFrom::Metres);
+    let has_metres = matches!(source.depth_from, DepthOrigin::Units | DepthOrigin::Metres);
     source.first_depth.as_ref().filter(|_| has_metres).is_some_and(|map| {
         warn_of_map(&format!("the first depth picture of {}", source.camera.info().name), map, is_unit_known)
     })

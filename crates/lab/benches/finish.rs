@@ -12,18 +12,18 @@ use std::process::ExitCode;
 
 use bokehcam::clock::cpu_ns;
 use bokehcam::depth::focus::FocusRule;
-use bokehcam::engine::{CocMaker, Finish};
+use bokehcam::engine::{CocMaker, Postprocess};
 use bokehcam::frame::{ColorImage, DepthMap};
 use bokehcam::look::{CocAtInfinity, CocRule};
 use bokehcam::recording::{Options as Reading, Recording, Scratch};
 use clap::Parser;
 
 /// What is done, and whether the background is remembered. Each has all of the one before.
-const WAYS: [(&str, Finish, bool); 4] = [
-    ("matte", Finish::Keep, false),
-    ("+ holes", Finish::Fill, false),
-    ("+ refinement", Finish::Refine, false),
-    ("+ memory", Finish::Refine, true),
+const WAYS: [(&str, Postprocess, bool); 4] = [
+    ("matte", Postprocess::Keep, false),
+    ("+ holes", Postprocess::Fill, false),
+    ("+ refinement", Postprocess::Refine, false),
+    ("+ memory", Postprocess::Refine, true),
 ];
 
 #[derive(Parser)]

@@ -13,7 +13,7 @@ use std::time::Instant;
 use bokehcam::clock::cpu_ns;
 use bokehcam::depth::plate::{Companion, PlateDepth};
 use bokehcam::depth::single_camera::{Hints, SingleCamera};
-use bokehcam::depth::{DepthSource, Seen};
+use bokehcam::depth::{DepthSource, FrameInput};
 use bokehcam::frame::{ColorImage, DepthMap, Stamp};
 use bokehcam::network::{Runtime, Task, best_in};
 use bokehcam::recording::{self, Recording, Scratch};
@@ -104,7 +104,7 @@ fn measure(options: &Options, data: &Path) -> Result<(), Box<dyn std::error::Err
             for (k, color) in pictures.iter().chain(pictures.iter().rev()).enumerate() {
                 let index = round as usize * 2 * pictures.len() + k;
                 let stamp = Stamp { index, time_ns: index as u64 * 33_333_333, captured_ns: None };
-                case.source.read(Seen { stamp, color, right: None }, &mut map)?;
+                case.source.read(FrameInput { stamp, color, right: None }, &mut map)?;
             }
             if round > 0 {
                 case.frames += 2 * pictures.len() as u32;

@@ -43,8 +43,8 @@ impl Synthetic {
 }
 
 /// Registers this camera as the source `synthetic`.
-pub fn bring() {
-    synthetic::bring(|format| Ok(Box::new(Synthetic::new(format)?)));
+pub fn register() {
+    synthetic::register(|format| Ok(Box::new(Synthetic::new(format)?)));
 }
 
 impl Camera for Synthetic {

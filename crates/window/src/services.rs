@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-use super::state::{Camera, Way};
+use super::state::{Camera, DepthMethod};
 use bokehcam::bokeh::{self, Bokeh};
 use bokehcam::knob::Knob;
 use bokehcam::look::{Look, presets::Preset};
@@ -37,8 +37,8 @@ pub struct Opened {
     /// Whether its depth is used: it has depth, and the user did not decline it.
     pub has_depth: bool,
     /// Depth methods it supports, and the active one.
-    pub ways: Vec<Way>,
-    pub way: Option<Way>,
+    pub ways: Vec<DepthMethod>,
+    pub way: Option<DepthMethod>,
     /// Messages to the user: assumptions, and missing parts with where to get them.
     pub notes: Vec<String>,
     /// The camera's driver controls, such as exposure.
@@ -60,13 +60,13 @@ pub trait Services: Send {
     ///
     /// # Errors
     /// Fails if it cannot be opened.
-    fn open(&mut self, name: &str, way: Option<Way>) -> Result<Opened, String>;
+    fn open(&mut self, name: &str, way: Option<DepthMethod>) -> Result<Opened, String>;
 
     /// Checks that the source supports this depth method now.
     ///
     /// # Errors
     /// Returns a one-line message with advice if it does not.
-    fn can(&mut self, name: &str, way: Way) -> Result<(), String> {
+    fn can(&mut self, name: &str, way: DepthMethod) -> Result<(), String> {
         let _ = (name, way);
         Ok(())
     }

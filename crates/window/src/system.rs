@@ -7,7 +7,7 @@ use std::sync::atomic::AtomicBool;
 
 use super::dialog;
 use super::services::{Browse, Opened, Pick, Services, SettingsStore, Switch};
-use super::state::{Camera, Way};
+use super::state::{Camera, DepthMethod};
 use bokehcam::bokeh::{self, Bokeh};
 use bokehcam::capture::demo;
 use bokehcam::computing::Executors;
@@ -53,9 +53,9 @@ pub struct System {
     /// Device of the camera opened last, if it has driver controls.
     camera: Option<String>,
     /// Depth method that the user chose in the window.
-    way: Option<Way>,
+    way: Option<DepthMethod>,
     /// Name of the source opened last with its default method, and the methods it supports itself.
-    own_ways: (String, Vec<Way>),
+    own_ways: (String, Vec<DepthMethod>),
 }
 
 impl System {
@@ -96,7 +96,7 @@ impl System {
     }
 
     /// Opens a source for continuous playback, with depth even if the current look does not need it.
-    fn open_source(&self, name: &str, way: Option<Way>) -> Result<(Source, SourceName), String> {
+    fn open_source(&self, name: &str, way: Option<DepthMethod>) -> Result<(Source, SourceName), String> {
         let source_name = SourceName::from_str(name).map_err(|error| error.of(name).to_string())?;
         let mut options = self.options.clone();
         if let Some(way) = way {
@@ -120,16 +120,16 @@ impl System {
     }
 
     /// Returns the depth choice of a method. Depth from elsewhere on the command line counts as the source's own.
-    fn depth_choice_for(&self, way: Way) -> DepthChoice {
+    fn depth_choice_for(&self, way: DepthMethod) -> DepthChoice {
         match (way, &self.options.depth_choice) {
-            (Way::Measured, choice @ (DepthChoice::Folder(_) | DepthChoice::Device(_) | DepthChoice::Auto)) => {
+            (DepthMethod::Measured, choice @ (DepthChoice::Folder(_) | DepthChoice::Device(_) | DepthChoice::Auto)) => {
                 choice.clone()
             }
-            (Way::Person, DepthChoice::OneCamera(OneCamera { plate: None, matte: Some(file), .. })) => {
+            (DepthMethod::Person, DepthChoice::OneCamera(OneCamera { plate: None, matte: Some(file), .. })) => {
                 DepthChoice::OneCamera(OneCamera { matte: Some(file.clone()), ..OneCamera::default() })
             }
             (
-                Way::PersonAndDistance,
+                DepthMethod::PersonAndDistance,
                 choice @ DepthChoice::OneCamera(OneCamera { mono: Some(_), matte: Some(_), .. }),
             ) => choice.clone(),
             _ => way.choice(),
@@ -137,7 +137,7 @@ impl System {
     }
 
     /// Returns the depth methods of a source opened with `way`, its own ones first.
-    fn ways(&mut self, source: &Source, name: &SourceName, way: Option<Way>) -> Vec<Way> {
+    fn ways(&mut self, source: &Source, name: &SourceName, way: Option<DepthMethod>) -> Vec<DepthMethod> {
         let called = name.to_string();
         if way.is_none() || self.own_ways.0 != called {
             let mut own = Vec::new();
@@ -145,13 +145,13 @@ impl System {
                 // Checks the recording itself, because the opened source reveals only the method in use.
                 SourceName::Folder(folder) => {
                     let recording = Recording::open(folder, &Reading { keep_going: true, ..Reading::default() }).ok();
-                    let has = |own: &mut Vec<Way>, is: bool, way: Way| own.extend(is.then_some(way));
-                    has(&mut own, recording.as_ref().is_some_and(Recording::has_depth), Way::Measured);
-                    has(&mut own, recording.is_some_and(|recording| recording.pair().is_some()), Way::Stereo);
+                    let has = |own: &mut Vec<DepthMethod>, is: bool, way: DepthMethod| own.extend(is.then_some(way));
+                    has(&mut own, recording.as_ref().is_some_and(Recording::has_depth), DepthMethod::Measured);
+                    has(&mut own, recording.is_some_and(|recording| recording.pair().is_some()), DepthMethod::Stereo);
                 }
                 _ => own.extend(
-                    Way::of(source.depth_from, &OneCamera::default(), false)
-                        .filter(|way| matches!(way, Way::Measured | Way::Stereo)),
+                    DepthMethod::of(source.depth_from, &OneCamera::default(), false)
+                        .filter(|way| matches!(way, DepthMethod::Measured | DepthMethod::Stereo)),
                 ),
             }
             self.own_ways = (called, own);
@@ -159,12 +159,14 @@ impl System {
         let mut ways = self.own_ways.1.clone();
         if matches!(name.kind(), Kind::Camera | Kind::Recording | Kind::Photo) {
             let installed = source::installed_networks();
-            ways.extend(installed.matte.is_some().then_some(Way::Person));
-            ways.extend((installed.matte.is_some() && installed.mono.is_some()).then_some(Way::PersonAndDistance));
+            ways.extend(installed.matte.is_some().then_some(DepthMethod::Person));
+            ways.extend(
+                (installed.matte.is_some() && installed.mono.is_some()).then_some(DepthMethod::PersonAndDistance),
+            );
         }
         // A plate is for live cameras without depth of their own.
         let is_alone = name.kind() == Kind::Camera && self.own_ways.1.is_empty();
-        ways.extend(is_alone.then_some(Way::Plate));
+        ways.extend(is_alone.then_some(DepthMethod::Plate));
         ways
     }
 }
@@ -185,12 +187,12 @@ impl Services for System {
         devices::virtual_cameras()
     }
 
-    fn can(&mut self, name: &str, way: Way) -> Result<(), String> {
+    fn can(&mut self, name: &str, way: DepthMethod) -> Result<(), String> {
         let installed = source::installed_networks();
         let lacks = match way {
-            Way::Person => installed.matte.is_none(),
-            Way::PersonAndDistance => installed.matte.is_none() || installed.mono.is_none(),
-            Way::Measured | Way::Stereo | Way::Plate => false,
+            DepthMethod::Person => installed.matte.is_none(),
+            DepthMethod::PersonAndDistance => installed.matte.is_none() || installed.mono.is_none(),
+            DepthMethod::Measured | DepthMethod::Stereo | DepthMethod::Plate => false,
         };
         if lacks {
             return Err(NO_NETWORK.to_owned());
@@ -200,7 +202,7 @@ impl Services for System {
         if is_file { self.open_source(name, Some(way)).map(drop) } else { Ok(()) }
     }
 
-    fn open(&mut self, name: &str, way: Option<Way>) -> Result<Opened, String> {
+    fn open(&mut self, name: &str, way: Option<DepthMethod>) -> Result<Opened, String> {
         let mut notes = Vec::new();
         let first_camera = || devices::cameras().into_iter().chain(devices::shared_cameras()).next();
         let name = match name {
@@ -241,7 +243,7 @@ impl Services for System {
             DepthChoice::OneCamera(chosen) if chosen.has_networks() => chosen.clone(),
             _ => source::installed_networks(),
         };
-        let usual = || Way::of(source.depth_from, &networks, source.guide.is_some());
+        let usual = || DepthMethod::of(source.depth_from, &networks, source.guide.is_some());
         let way = way.or_else(usual).filter(|_| has_depth);
         ways.extend(way.filter(|way| !ways.contains(way)));
         Ok(Opened { name, source, has_depth, ways, way, notes, controls, camera })

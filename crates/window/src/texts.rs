@@ -131,7 +131,7 @@ pub fn built_in(language: &str) -> Option<Table> {
 /// Returns a one-line message if it cannot be read or is no list of texts.
 fn read(path: &Path) -> Result<Table, String> {
     let at = |what: &dyn Display| format!("{}: {what}", path.display()).replace('\n', ", ");
-    let text = input::read_text(path, input::MOST_SETTINGS_BYTES).map_err(|error| at(&error))?;
+    let text = input::read_text(path, input::MAX_SETTINGS_BYTES).map_err(|error| at(&error))?;
     toml::from_str(&text).map_err(|error: toml::de::Error| at(&error.message()))
 }
 

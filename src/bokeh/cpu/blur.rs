@@ -304,7 +304,7 @@ impl Strip<'_> {
             left: self.bank.tap(left, 0) + first,
             right: self.bank.tap(right, 0) + first,
             step: if self.turned { -(self.bank.terms as isize) } else { self.bank.terms as isize },
-            reach: self.bank.node_reach[left.max(right)] as usize,
+            reach: self.bank.node_half_width[left.max(right)] as usize,
             lane: x % SEGMENT,
             steady: left == right,
         }

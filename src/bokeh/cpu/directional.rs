@@ -13,7 +13,7 @@ use pulp::{Arch, Simd, WithSimd};
 use super::levels::{Level, PLANES};
 use super::silhouettes::Silhouettes;
 use crate::bokeh::occlusion::{DIRECTIONS, GRAIN, MAX_STEPS, ONE_ENDED, ONE_SURFACE_PX, TRUSTED_STEPS, likeness};
-use crate::compute::thread_pool::{MOST_ITEMS, ThreadPool};
+use crate::compute::thread_pool::{MAX_ITEMS, ThreadPool};
 
 /// Padding columns beside a row of steps, so that a sideways step stays inside it.
 const PAD: usize = 2;
@@ -53,7 +53,7 @@ impl Directional {
     /// Fills the unknown pixels of a level that silhouettes uncover and whose lines reach a known pixel.
     pub fn fill(&mut self, level: &mut Level, silhouettes: &Silhouettes, workers: &mut ThreadPool, arch: Arch) {
         let (width, stride) = (self.width, self.stride());
-        let each = self.height.div_ceil(MOST_ITEMS);
+        let each = self.height.div_ceil(MAX_ITEMS);
         let rows = self.ends.chunks_mut(each * width).zip(self.open.chunks_mut(each * stride));
         workers.run_each(rows.enumerate(), &|(part, (ends, open))| {
             arch.dispatch(Survey { level, first: part * each, ends, open });
@@ -237,7 +237,7 @@ impl Directional {
         if trust <= 0.0 {
             return None;
         }
-        // Agreement of a line with the others counts to the fourth power: a mean of two surfaces would be neither.
+        // EdgeAlignment of a line with the others counts to the fourth power: a mean of two surfaces would be neither.
         let mut scores = Lines::default();
         for e in 0..DIRECTIONS.len() {
             for d in 0..DIRECTIONS.len() {

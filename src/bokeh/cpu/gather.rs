@@ -132,7 +132,7 @@ impl WithSimd for Exact<'_> {
         // Each pixel has its own kernel, so the vectors run along the kernel's rows and not over pixels.
         for x in 0..width {
             let node = self.bank.node(self.coc[x].abs());
-            let reach = self.bank.node_reach[node] as usize;
+            let reach = self.bank.node_half_width[node] as usize;
             let kernel = &self.kernels[node][usize::from(self.coc[x] < 0.0 && !self.bank.is_symmetric)];
             let side = 2 * reach + 1;
             let mut sums = [simd.splat_f32s(0.0); 3];
@@ -179,7 +179,7 @@ impl WithSimd for GatherRow<'_> {
         let row = self.source.row(self.y);
         for x in 0..self.width {
             let node = self.bank.node(self.coc[x].abs());
-            let reach = self.bank.node_reach[node] as isize;
+            let reach = self.bank.node_half_width[node] as isize;
             // In front of the focal plane a lens rotates its aperture by 180 degrees.
             let sign = if self.coc[x] < 0.0 { -1 } else { 1 };
             for t in 0..self.bank.terms {
@@ -217,7 +217,7 @@ impl WithSimd for GatherColumn<'_> {
         let terms = self.bank.terms;
         for x in 0..width {
             let node = self.bank.node(self.coc[x].abs());
-            let reach = self.bank.node_reach[node] as isize;
+            let reach = self.bank.node_half_width[node] as isize;
             let sign = if self.coc[x] < 0.0 { -1 } else { 1 };
             let mut sum = [0.0f32; 3];
             for j in -reach..=reach {

@@ -292,7 +292,7 @@ impl CpuBokeh {
                 bank: &plan.bank,
                 whole: plan.compositing != Compositing::Layers,
                 turned: bin.near,
-                reach: plan.bin_reach(bin),
+                reach: plan.bin_half_width(bin),
                 strip,
                 out: shelf.out.part(strip),
                 active: shelf.active.part(strip),

@@ -10,19 +10,19 @@ pub enum Pixels<'a> {
     /// 8-bit sRGB.
     Srgb(&'a [u8]),
     /// Linear light, 1 = sRGB white, with the primaries of sRGB. Before blurring, values are clamped to the range from
-    /// 0 to [`Pixels::MOST_LIGHT`].
+    /// 0 to [`Pixels::MAX_LIGHT`].
     Linear(&'a [f32]),
 }
 
 impl Pixels<'_> {
     /// The brightest light: the largest half float. Sums of products in the filters stay finite.
-    pub const MOST_LIGHT: f32 = 65_504.0;
+    pub const MAX_LIGHT: f32 = 65_504.0;
 
     /// Clamps linear light to the range that can be blurred.
     #[inline(always)]
     pub fn light(value: f32) -> f32 {
         let value = if value > 0.0 { value } else { 0.0 };
-        if value < Self::MOST_LIGHT { value } else { Self::MOST_LIGHT }
+        if value < Self::MAX_LIGHT { value } else { Self::MAX_LIGHT }
     }
 }
 

@@ -37,7 +37,7 @@ impl WithSimd for Reach<'_> {
 
 #[inline(always)]
 fn reach<S: Simd>(simd: S, plan: &Plan, bin: &Bin, cells: &Cells, edges: &mut Edges, scratch: &mut Vec<f32>) {
-    let (width, height, radius) = (cells.width, cells.height, plan.reach_cells(bin));
+    let (width, height, radius) = (cells.width, cells.height, plan.radius_cells(bin));
     // Only blurs of thousands of pixels have a larger radius; they are clamped.
     let mut weights = [0.0; 64];
     let radius = radius.min(weights.len() - 1);

@@ -64,7 +64,7 @@ pub struct Filters {
     /// Horizontal and vertical taps, four terms per vector.
     pub taps: [wgpu::Buffer; 2],
     /// Outermost tap of each node.
-    pub node_reach: wgpu::Buffer,
+    pub node_half_width: wgpu::Buffer,
 }
 
 /// Returns the bytes of a packed picture, in whole words of whole groups of four pixels.
@@ -82,7 +82,7 @@ pub fn work_count(plan: &Plan) -> usize {
 pub fn filter_bytes(plan: &Plan) -> u64 {
     let of_bank = |bank: &Bank| (bank.horizontal.len() / bank.terms * bank.terms.div_ceil(4) * 16) as u64;
     let of_node = |&reach: &u32| u64::from(2 * reach + 1).pow(2) * 4;
-    let kernels = if plan.exact { plan.bank.node_reach.iter().map(of_node).sum() } else { 0 };
+    let kernels = if plan.exact { plan.bank.node_half_width.iter().map(of_node).sum() } else { 0 };
     plan.ladder.banks.iter().map(|bank| of_bank(bank)).fold(kernels, u64::max)
 }
 
@@ -144,7 +144,11 @@ impl Buffers {
                     taps: [&bank.horizontal, &bank.vertical].map(|taps| {
                         with_data("bank", bytemuck::cast_slice(&pad_to_fours(taps, bank.terms)), Usage::STORAGE)
                     }),
-                    node_reach: with_data("node reach", bytemuck::cast_slice(&bank.node_reach), Usage::STORAGE),
+                    node_half_width: with_data(
+                        "node reach",
+                        bytemuck::cast_slice(&bank.node_half_width),
+                        Usage::STORAGE,
+                    ),
                 })
                 .collect(),
             kernels: [

@@ -146,7 +146,7 @@ impl Layout {
                 behind: weight.behind.into(),
                 max_radius_px: bin.max_radius_px,
                 sigma_cells: bin.sigma_cells(),
-                reach_cells: plan.reach_cells(bin) as u32,
+                radius_cells: plan.radius_cells(bin) as u32,
                 pixels_at: used.pixels as u32,
                 rows_at: batch_pixels as u32,
                 edges_at: used.edges as u32,
@@ -155,7 +155,7 @@ impl Layout {
                 reach: match plan.compositing {
                     // Each pixel has its own radius, which no bin limits.
                     Compositing::Gather => plan.bank.reach as u32,
-                    _ => plan.bin_reach(bin) as u32,
+                    _ => plan.bin_half_width(bin) as u32,
                 },
                 filtered_at: used.filtered as u32,
                 active_at: used.active as u32,

@@ -120,7 +120,7 @@ impl GpuBokeh {
             reach: plan.bank.reach as u32,
             nodes: plan.bank.nodes as u32,
             groups: plan.bank.terms.div_ceil(4) as u32,
-            most_px: most_px(&job.coc),
+            max_px: max_px(&job.coc),
             coc,
             ramp,
             even: u32::from(plan.bank.is_symmetric),
@@ -137,13 +137,13 @@ impl GpuBokeh {
 }
 
 /// Returns an upper bound > 0 of |CoC| in a frame, in pixels: the shaders divide by it.
-fn most_px(coc: &CocField) -> f32 {
-    let most_px = match coc {
+fn max_px(coc: &CocField) -> f32 {
+    let max_px = match coc {
         CocField::Uniform { radius_px } => *radius_px,
         CocField::Ramp(ramp) => ramp.max_px,
         CocField::Depth(lens) => lens.max_coc_px,
     };
-    most_px.max(1e-3)
+    max_px.max(1e-3)
 }
 
 impl Bokeh for GpuBokeh {
@@ -184,7 +184,7 @@ impl Bokeh for GpuBokeh {
                 self.passes.set_radii(&self.device, &self.buffers, &self.radii);
             }
             if shared_metres.is_none() {
-                radii::upload(&self.device.queue, &self.radii, map, lens, most_px(&job.coc));
+                radii::upload(&self.device.queue, &self.radii, map, lens, max_px(&job.coc));
             }
         }
         if let Some(matte) = self.plan.matte(job.depth.as_deref(), &job.coc) {

@@ -148,7 +148,7 @@ impl Passes {
         let blur = blur.collect();
         let gather = plan.exact.then(|| {
             let [starts, kernels] = &b.kernels;
-            let buffers = [&b.frame, starts, kernels, &b.scene, &b.banks[plan.bank_index].node_reach, &b.blurred];
+            let buffers = [&b.frame, starts, kernels, &b.scene, &b.banks[plan.bank_index].node_half_width, &b.blurred];
             maker.pass(shaders::GATHER, &[], &buffers, over(picture, TILE))
         });
         let composite = [&b.frame, &b.bins, &b.blurred, &b.scene, &b.result, &b.active, &b.shown, &b.reached];

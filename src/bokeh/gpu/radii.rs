@@ -18,20 +18,20 @@ pub fn radii_bytes(pixels: usize) -> u64 {
     (2 * pixels).next_multiple_of(4) as u64
 }
 
-/// Writes the CoC of a map to `buffer`, as signed square roots of its fraction of `most_px`, an upper bound: the same
+/// Writes the CoC of a map to `buffer`, as signed square roots of its fraction of `max_px`, an upper bound: the same
 /// 16 bits as in the scene (`scene_packed` of `common.wgsl`), so that no extra rounding occurs.
-pub fn upload(queue: &Queue, buffer: &wgpu::Buffer, map: &DepthMap, lens: DepthCoc, most_px: f32) {
+pub fn upload(queue: &Queue, buffer: &wgpu::Buffer, map: &DepthMap, lens: DepthCoc, max_px: f32) {
     let Some(size) = wgpu::BufferSize::new(radii_bytes(map.metres.len())) else { return };
     // A failed device returns no memory; the failure is reported later.
     if let Some(to) = queue.write_buffer_with(buffer, 0, size) {
-        Arch::new().dispatch(Radii { lens, metres: &map.metres, most_px, to });
+        Arch::new().dispatch(Radii { lens, metres: &map.metres, max_px, to });
     }
 }
 
 struct Radii<'a> {
     lens: DepthCoc,
     metres: &'a [f32],
-    most_px: f32,
+    max_px: f32,
     /// Mapped memory, written once and in order.
     to: QueueWriteBufferView,
 }
@@ -43,7 +43,7 @@ impl WithSimd for Radii<'_> {
     fn with_simd<S: Simd>(mut self, _: S) {
         let (mut codes, mut at) = ([0; BLOCK], 0);
         for metres in self.metres.chunks(BLOCK) {
-            to_codes(&self.lens, self.most_px, metres, &mut codes);
+            to_codes(&self.lens, self.max_px, metres, &mut codes);
             // The last word of an odd number of pixels is padded with a stale code.
             let bytes: &[u8] = bytemuck::cast_slice(&codes[..metres.len().next_multiple_of(2)]);
             self.to.slice(at..at + bytes.len()).copy_from_slice(bytes);
@@ -54,8 +54,8 @@ impl WithSimd for Radii<'_> {
 
 /// Converts depth to CoC in 16 bits.
 #[inline(always)]
-fn to_codes(lens: &DepthCoc, most_px: f32, metres: &[f32], codes: &mut [u16; BLOCK]) {
-    let fraction_per_px = 1.0 / most_px;
+fn to_codes(lens: &DepthCoc, max_px: f32, metres: &[f32], codes: &mut [u16; BLOCK]) {
+    let fraction_per_px = 1.0 / max_px;
     for (code, &metres) in codes.iter_mut().zip(metres) {
         let coc_px = lens.coc_px(metres);
         let root = (coc_px.abs() * fraction_per_px).sqrt().copysign(coc_px);

@@ -25,7 +25,7 @@ const CODES: u8 = 4;
 /// # Errors
 /// The device failed, or its result differs from the CPU's.
 pub fn try_out(device: &Arc<Device>) -> Result<(), BokehError> {
-    match device.fault_of::<GpuBokeh, BokehError>(|| Ok(trial(device)?.fault(device)))? {
+    match device.find_fault::<GpuBokeh, BokehError>(|| Ok(trial(device)?.fault(device)))? {
         Some(GpuError::Failed(fault)) => {
             Err(GpuError::Failed(format!("{fault} (--backend cpu does without it)")).into())
         }

@@ -26,7 +26,7 @@ pub trait Eye: Send {
 }
 
 /// Two cameras as one stereo camera.
-pub struct TwoEyes<E> {
+pub struct StereoPair<E> {
     left: E,
     right: E,
     clock: Clock,
@@ -48,7 +48,7 @@ const FIRST_PAIRS: u64 = 30;
 /// Consecutive polls of the right camera: a camera that always has frames must not delay the left one.
 const MAX_POLLS: usize = 8;
 
-impl<E: Eye> TwoEyes<E> {
+impl<E: Eye> StereoPair<E> {
     /// Pairs the frames of `left` and `right`, two endless cameras; ends after `frames` pairs, never with `None`.
     ///
     /// # Errors
@@ -73,7 +73,7 @@ impl<E: Eye> TwoEyes<E> {
         let info = SourceInfo {
             name: format!("{} and {}", left_info.name, right_info.name),
             frames,
-            brings: Brings::RightEye,
+            brings: Brings::RightCamera,
             ..left_info
         };
         Ok(Self {
@@ -138,7 +138,7 @@ impl<E: Eye> TwoEyes<E> {
     }
 }
 
-impl<E: Eye> Camera for TwoEyes<E> {
+impl<E: Eye> Camera for StereoPair<E> {
     fn info(&self) -> SourceInfo {
         self.info.clone()
     }
@@ -174,7 +174,7 @@ impl<E: Eye> Camera for TwoEyes<E> {
     }
 }
 
-impl<E> Drop for TwoEyes<E> {
+impl<E> Drop for StereoPair<E> {
     fn drop(&mut self) {
         let ms = |ns: u64| ns as f64 / 1e6;
         tracing::info!(

@@ -46,10 +46,10 @@ impl Eye for FakeEye {
     fn rest(&mut self) {}
 }
 
-fn eyes(left_ns: Vec<u64>, right_ns: Vec<u64>) -> (TwoEyes<FakeEye>, Clock) {
+fn eyes(left_ns: Vec<u64>, right_ns: Vec<u64>) -> (StereoPair<FakeEye>, Clock) {
     let clock = Clock::manual();
     let eye = |captured_ns| FakeEye { clock: clock.clone(), captured_ns, next: 0, size: (4, 2) };
-    (TwoEyes::new(eye(left_ns), eye(right_ns), clock.clone(), None).unwrap(), clock)
+    (StereoPair::new(eye(left_ns), eye(right_ns), clock.clone(), None).unwrap(), clock)
 }
 
 fn times(frames: impl Iterator<Item = u64>, skew_ns: u64) -> Vec<u64> {
@@ -58,7 +58,7 @@ fn times(frames: impl Iterator<Item = u64>, skew_ns: u64) -> Vec<u64> {
 
 /// Returns the indices of the pairs, and the numbers of frames lost without a partner and otherwise; the reader takes
 /// `takes_ns` per pair.
-fn play(camera: &mut TwoEyes<FakeEye>, clock: &Clock, takes_ns: u64) -> (Vec<(u8, u8)>, u64, u64) {
+fn play(camera: &mut StereoPair<FakeEye>, clock: &Clock, takes_ns: u64) -> (Vec<(u8, u8)>, u64, u64) {
     let (mut color, mut depth, mut right) = (ColorImage::default(), DepthMap::default(), GrayImage::default());
     let (mut pairs, mut unpaired, mut lost) = (Vec::new(), 0, 0);
     loop {
@@ -81,7 +81,7 @@ fn play(camera: &mut TwoEyes<FakeEye>, clock: &Clock, takes_ns: u64) -> (Vec<(u8
 fn frames_of_one_time_come_together_whichever_camera_leads() {
     for (left_skew, right_skew) in [(0, 0), (0, 15 * MS), (15 * MS, 0)] {
         let (mut camera, clock) = eyes(times(0..50, left_skew), times(0..50, right_skew));
-        assert_eq!(camera.info().brings, Brings::RightEye);
+        assert_eq!(camera.info().brings, Brings::RightCamera);
         let (pairs, unpaired, lost) = play(&mut camera, &clock, 3 * MS);
         assert!(pairs.into_iter().eq((0..50).map(|k| (k, k))), "{left_skew} {right_skew}");
         assert_eq!((unpaired, lost), (0, 0));
@@ -125,6 +125,6 @@ fn who_reads_slowly_gets_fewer_pairs_and_every_left_frame_is_accounted_for() {
 fn eyes_of_two_sizes_are_refused() {
     let clock = Clock::manual();
     let eye = |size| FakeEye { clock: clock.clone(), captured_ns: Vec::new(), next: 0, size };
-    let error = TwoEyes::new(eye((640, 480)), eye((1280, 720)), clock.clone(), None).err().unwrap().to_string();
+    let error = StereoPair::new(eye((640, 480)), eye((1280, 720)), clock.clone(), None).err().unwrap().to_string();
     assert!(error.contains("640x480") && error.contains("1280x720") && error.contains("--size"), "{error}");
 }

@@ -34,7 +34,7 @@ impl Device {
     ///
     /// # Errors
     /// The trial could not be completed.
-    pub fn fault_of<T: 'static, E>(
+    pub fn find_fault<T: 'static, E>(
         &self,
         trial: impl FnOnce() -> Result<Option<GpuError>, E>,
     ) -> Result<Option<GpuError>, E> {

@@ -20,7 +20,7 @@ fn every_part_is_done_once() {
 fn every_item_goes_to_one_thread_with_scratch_of_its_own() {
     for threads in [1, 2, 5] {
         let mut workers = ThreadPool::new("test", threads);
-        for count in [0, 1, 2, MOST_ITEMS] {
+        for count in [0, 1, 2, MAX_ITEMS] {
             let (mut scratch, mut data) = (vec![0; threads], vec![0; 3 * count]);
             workers.run_each_with(&mut scratch, data.chunks_mut(3).zip(1..), &|seen, (item, k)| {
                 *seen += 1;

@@ -7,7 +7,7 @@ use pulp::{Arch, WithSimd};
 
 use super::MIN_ROUNDS;
 use crate::compute::bands::Bands;
-use crate::compute::thread_pool::{MOST_ITEMS, ThreadPool};
+use crate::compute::thread_pool::{MAX_ITEMS, ThreadPool};
 use crate::frame::DepthMap;
 
 /// Side of a cell, and the sampling step in it, in pixels.
@@ -41,7 +41,7 @@ impl Cells {
         self.cells.clear();
         self.cells.resize(across * height.div_ceil(CELL), Cell::default());
         let bands = Bands::new(height, CELL, workers);
-        let mut nearest = [0.0f32; MOST_ITEMS];
+        let mut nearest = [0.0f32; MAX_ITEMS];
         let cells = bands.split_tiles(&mut self.cells, CELL, across);
         workers.run_each(bands.rows().zip(cells).zip(&mut nearest), &|((rows, cells), nearest)| {
             *nearest = Arch::new().dispatch(Survey { known, width, rows, cells });

@@ -8,7 +8,7 @@ use pulp::{Arch, WithSimd};
 
 use super::{Background, OTHER_PX};
 use crate::compute::bands::Bands;
-use crate::compute::thread_pool::{MOST_ITEMS, ThreadPool};
+use crate::compute::thread_pool::{MAX_ITEMS, ThreadPool};
 use crate::frame::{ColorImage, DepthMap};
 use crate::optics::DepthCoc;
 
@@ -21,7 +21,7 @@ impl Background {
         }
         let (width, other) = (self.size.0, lens.inverse_depth_of_px(OTHER_PX));
         let bands = Bands::new(self.size.1, 1, workers);
-        let mut forgets = [false; MOST_ITEMS];
+        let mut forgets = [false; MAX_ITEMS];
         let Self { inverse, rounds, cover, .. } = self;
         let planes = bands.split(rounds, width).zip(bands.split(cover, width));
         workers.run_each(bands.rows().zip(planes).zip(&mut forgets), &|((rows, (rounds, cover)), forgets)| {

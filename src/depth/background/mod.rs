@@ -21,7 +21,7 @@ use crate::optics::DepthCoc;
 use super::alignment::{Aligner, Alignment};
 use super::bits::Bits;
 use super::matting::{Behind, FROM_PX, Matting};
-use super::reduced::{MOST, Reducer, block_px, reduced_size};
+use super::reduced::{MAX_VALUE, Reducer, block_px, reduced_size};
 use cells::Cells;
 use doubt::Witness;
 
@@ -32,7 +32,7 @@ const FRAMES_PER_UPDATE: usize = 4;
 /// Number of rounds from which on a pixel is known; each round updates every row once.
 const MIN_ROUNDS: u8 = 2;
 /// The camera counts as moved if the alignment is off by more than this, in pixels, or if a larger fraction of the
-/// remembered pixels differs by more than `UNLIKE` (of [`MOST`]).
+/// remembered pixels differs by more than `UNLIKE` (of [`MAX_VALUE`]).
 const MOVED_PX: f32 = 1.0;
 const MAX_UNLIKE: f32 = 0.25;
 const UNLIKE: f32 = 24.0;
@@ -234,7 +234,7 @@ impl Background {
         let mut counts = [0usize; 2];
         for (((now, then), hidden), unlike) in now.iter().zip(&*reduced).zip(&*hidden).zip(&mut self.unlike) {
             let is_unlike =
-                (0..3).any(|p| then[p] * self.gain[p] < MOST && (now[p] - then[p] * self.gain[p]).abs() > UNLIKE);
+                (0..3).any(|p| then[p] * self.gain[p] < MAX_VALUE && (now[p] - then[p] * self.gain[p]).abs() > UNLIKE);
             *unlike = is_unlike & !hidden;
             counts[usize::from(is_unlike)] += usize::from(!hidden);
         }

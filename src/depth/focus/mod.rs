@@ -11,7 +11,7 @@ use std::fmt;
 use std::str::FromStr;
 
 use loyalty::Hysteresis;
-pub use persons::{OnPersons, Persons};
+pub use persons::{PersonFocus, Persons};
 use subject::Subject;
 use track::Track;
 

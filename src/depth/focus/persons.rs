@@ -2,7 +2,7 @@
 
 use crate::depth::dilation::dilate;
 use crate::depth::plate::Companion;
-use crate::depth::{DepthError, DepthSource, Seen};
+use crate::depth::{DepthError, DepthSource, FrameInput};
 use crate::frame::{ColorImage, DepthMap, Mask};
 
 /// Interval of the person detection in media time; in between, the last mask is used on the new maps.
@@ -45,7 +45,7 @@ impl Persons {
     }
 
     /// Sets [`DepthMap::person_m`], the person's distance in the frame `seen`.
-    pub fn mark(&mut self, seen: Seen, map: &mut DepthMap) {
+    pub fn mark(&mut self, seen: FrameInput, map: &mut DepthMap) {
         let time_ns = seen.stamp.time_ns;
         if self.last_ns.is_none_or(|last_ns| time_ns.abs_diff(last_ns) >= EVERY_NS) {
             self.last_ns = Some(time_ns);
@@ -57,7 +57,7 @@ impl Persons {
     /// Sets [`DepthMap::person_m`] like [`Self::mark`], and repairs stereo mismatches: within the outline in this
     /// frame, depth that is unknown or far behind the person is set to the person's distance, in rows where enough has
     /// it.
-    pub fn mend(&mut self, seen: Seen, map: &mut DepthMap) {
+    pub fn mend(&mut self, seen: FrameInput, map: &mut DepthMap) {
         self.detect(seen);
         map.person_m = self.distance_m(map);
         let Some(person_m) = map.person_m else { return };
@@ -85,7 +85,7 @@ impl Persons {
         }
     }
 
-    fn detect(&mut self, seen: Seen) {
+    fn detect(&mut self, seen: FrameInput) {
         self.places.clear();
         let Some(Mask { width, height, share }) = self.finder.persons(seen) else { return };
         let (columns, rows) = (*width as usize, *height as usize);
@@ -130,14 +130,14 @@ impl Persons {
 }
 
 /// A depth source that adds the person's distance to the maps of another one.
-pub struct OnPersons {
+pub struct PersonFocus {
     depth: Box<dyn DepthSource>,
     persons: Persons,
     is_wanted: bool,
     is_matched: bool,
 }
 
-impl OnPersons {
+impl PersonFocus {
     /// Creates it from the maps of `depth`; if they are from stereo matching (`is_matched`), they are repaired
     /// ([`Persons::mend`]).
     pub fn new(depth: Box<dyn DepthSource>, persons: Persons, is_matched: bool) -> Self {
@@ -145,12 +145,12 @@ impl OnPersons {
     }
 }
 
-impl DepthSource for OnPersons {
+impl DepthSource for PersonFocus {
     fn rectify(&mut self, color: &mut ColorImage) {
         self.depth.rectify(color);
     }
 
-    fn read(&mut self, seen: Seen, map: &mut DepthMap) -> Result<(), DepthError> {
+    fn read(&mut self, seen: FrameInput, map: &mut DepthMap) -> Result<(), DepthError> {
         self.depth.read(seen, map)?;
         map.person_m = None;
         if self.is_matched {
@@ -169,15 +169,15 @@ impl DepthSource for OnPersons {
         self.depth.set_effort(effort);
     }
 
-    fn may_be_shared(&self) -> bool {
-        self.depth.may_be_shared()
+    fn is_reusable(&self) -> bool {
+        self.depth.is_reusable()
     }
 
     fn knows_background(&self) -> bool {
         self.depth.knows_background()
     }
 
-    fn look_for_persons(&mut self, on: bool) {
+    fn set_focus_on_persons(&mut self, on: bool) {
         self.is_wanted = on;
     }
 
@@ -220,7 +220,7 @@ mod tests {
     }
 
     impl DepthSource for Room {
-        fn read(&mut self, seen: Seen, map: &mut DepthMap) -> Result<(), DepthError> {
+        fn read(&mut self, seen: FrameInput, map: &mut DepthMap) -> Result<(), DepthError> {
             map.resize(SIZE.0, SIZE.1);
             for (at, metres) in map.metres.iter_mut().enumerate() {
                 *metres = match at as u32 % SIZE.0 {
@@ -236,7 +236,7 @@ mod tests {
     }
 
     impl Companion for Room {
-        fn persons(&mut self, _: Seen) -> Option<&Mask> {
+        fn persons(&mut self, _: FrameInput) -> Option<&Mask> {
             self.looks += 1;
             assert!(self.looks < 20, "not with every frame");
             Some(&self.mask)
@@ -249,13 +249,14 @@ mod tests {
 
     /// Returns the focus distance after two seconds, with or without a person.
     fn focus_m(person: bool, is_wanted: bool) -> f32 {
-        let mut source = OnPersons::new(Box::new(Room::new(person)), Persons::new(Box::new(Room::new(person))), false);
-        source.look_for_persons(is_wanted);
+        let mut source =
+            PersonFocus::new(Box::new(Room::new(person)), Persons::new(Box::new(Room::new(person))), false);
+        source.set_focus_on_persons(is_wanted);
         let (mut map, mut focus, color) =
             (DepthMap::default(), Focus::new(FocusRule::Auto), ColorImage::new(SIZE.0, SIZE.1));
         let focused = (0..60).map(|index| {
             let time_ns = index as u64 * 33_000_000;
-            let seen = Seen { stamp: Stamp { index, time_ns, captured_ns: None }, color: &color, right: None };
+            let seen = FrameInput { stamp: Stamp { index, time_ns, captured_ns: None }, color: &color, right: None };
             source.read(seen, &mut map).unwrap();
             focus.focus_m(&map, time_ns)
         });
@@ -274,7 +275,7 @@ mod tests {
     fn what_is_matched_far_behind_a_person_is_theirs_within_their_outlines() {
         struct Holes(Room);
         impl DepthSource for Holes {
-            fn read(&mut self, seen: Seen, map: &mut DepthMap) -> Result<(), DepthError> {
+            fn read(&mut self, seen: FrameInput, map: &mut DepthMap) -> Result<(), DepthError> {
                 self.0.read(seen, map)?;
                 for (at, metres) in map.metres.iter_mut().enumerate() {
                     let (x, y) = (at as u32 % SIZE.0, at as u32 / SIZE.0);
@@ -291,9 +292,9 @@ mod tests {
             }
         }
         let (color, mut map) = (ColorImage::new(SIZE.0, SIZE.1), DepthMap::default());
-        let seen = Seen { stamp: Stamp { index: 0, time_ns: 0, captured_ns: None }, color: &color, right: None };
+        let seen = FrameInput { stamp: Stamp { index: 0, time_ns: 0, captured_ns: None }, color: &color, right: None };
         let mut source =
-            OnPersons::new(Box::new(Holes(Room::new(true))), Persons::new(Box::new(Room::new(true))), true);
+            PersonFocus::new(Box::new(Holes(Room::new(true))), Persons::new(Box::new(Room::new(true))), true);
         source.read(seen, &mut map).unwrap();
         let at = |x: u32, y: u32| map.metres[(y * SIZE.0 + x) as usize];
         assert!((at(10, 25) - 1.6).abs() < 0.05 && (at(15, 25) - 1.6).abs() < 0.05, "{} {}", at(10, 25), at(15, 25));

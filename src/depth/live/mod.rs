@@ -13,11 +13,11 @@ use std::time::Duration;
 pub use units::Units;
 
 use super::registration::Registration;
-use super::{DepthError, DepthSource, Seen};
+use super::{DepthError, DepthSource, FrameInput};
 use crate::clock::Clock;
 use crate::frame::DepthMap;
 use crate::layout::Content;
-use crate::v4l2::live::{Live, Next, OpenError, Wish};
+use crate::v4l2::live::{Live, ModeRequest, Next, OpenError};
 use pairing::Pairing;
 
 /// Age of the newest map in ns from which a warning is logged.
@@ -46,7 +46,7 @@ impl LiveDepth {
     /// # Errors
     /// Fails if the camera does not exist, is busy, or does not deliver depth.
     pub fn open(name: &str, units: Units, registration: Option<Registration>, clock: Clock) -> Result<Self, OpenError> {
-        let live = Live::open(name, Wish::any(Content::Depth), Vec::new(), clock.clone())?;
+        let live = Live::open(name, ModeRequest::any(Content::Depth), Vec::new(), clock.clone())?;
         if registration.is_none() {
             tracing::info!(
                 "{}: taken to see what the colour camera sees; --depth-calibration says how it stands beside it",
@@ -91,7 +91,7 @@ impl LiveDepth {
 }
 
 impl DepthSource for LiveDepth {
-    fn read(&mut self, Seen { stamp, .. }: Seen, map: &mut DepthMap) -> Result<(), DepthError> {
+    fn read(&mut self, FrameInput { stamp, .. }: FrameInput, map: &mut DepthMap) -> Result<(), DepthError> {
         self.take_maps(Duration::ZERO);
         let now_ns = self.clock.now_ns();
         // Colour frames without a capture time get the newest map.

@@ -135,7 +135,7 @@ impl WithSimd for FindEdges<'_> {
 #[inline(always)]
 fn ends<S: Simd>(simd: S, metres: &[f32]) -> [f32; 2] {
     // Inverse depth decreases with depth, so one division per extreme is enough.
-    let [least, most] = [DepthMap::LEAST_M, DepthMap::MOST_M].map(|metres| simd.splat_f32s(metres));
+    let [least, most] = [DepthMap::MIN_M, DepthMap::MAX_M].map(|metres| simd.splat_f32s(metres));
     let [mut nearest, mut farthest] = [simd.splat_f32s(f32::INFINITY), simd.splat_f32s(0.0)];
     let (head, tail) = S::as_simd_f32s(metres);
     for &metres in head {

@@ -58,13 +58,13 @@ impl Capture {
         }
         if self.last_ns.is_none_or(|last_ns| time_ns >= last_ns + APART_NS) {
             self.last_ns = Some(time_ns);
-            return self.add_any(color);
+            return self.add_unchecked(color);
         }
         Taken::More(self.progress())
     }
 
     /// Adds a picture unconditionally, without the checks of [`Self::add`].
-    pub fn add_any(&mut self, color: &ColorImage) -> Taken {
+    pub fn add_unchecked(&mut self, color: &ColorImage) -> Taken {
         self.pictures.push(color.clone());
         match self.pictures.len() {
             Self::PICTURES => Taken::Whole(self.finish()),

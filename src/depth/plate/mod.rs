@@ -16,7 +16,7 @@ use learning::{Learning, Lesson};
 use subject::Subject;
 
 use crate::depth::alignment::{Aligner, Alignment};
-use crate::depth::matting::mask::Backdrop;
+use crate::depth::matting::mask::BackgroundPlate;
 use crate::depth::reduced::{Reducer, block_px, reduced_size};
 use crate::frame::{ColorImage, Mask};
 
@@ -71,10 +71,10 @@ impl Plate {
     }
 
     /// Returns the plate as a background at the current exposure and shift.
-    pub fn backdrop(&self) -> Backdrop<'_> {
+    pub fn backdrop(&self) -> BackgroundPlate<'_> {
         let block_px = block_px(self.color.width) as f32;
         let shift_px = self.alignment.shift.map(|shift| (shift * block_px).round() as isize);
-        Backdrop { color: &self.color, light: &self.light, shift_px }
+        BackgroundPlate { color: &self.color, light: &self.light, shift_px }
     }
 
     /// Columns and rows.

@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
 use super::{Capture, Plate, Taken};
 use crate::depth::matting::mask::MaskMatting;
-use crate::depth::{DepthError, DepthSource, Seen};
+use crate::depth::{DepthError, DepthSource, FrameInput};
 use crate::frame::{ColorImage, DepthMap, Mask};
 
 /// Time for a person to step out of the picture.
@@ -23,7 +23,7 @@ pub type Lock = Box<dyn FnOnce() -> Option<Box<dyn Any + Send>> + Send>;
 /// A second source that sees the same pictures and knows more than a plate.
 pub trait Companion: DepthSource {
     /// Returns a mask of the persons in the picture `seen`, which is the next one; `None` if unknown.
-    fn persons(&mut self, seen: Seen) -> Option<&Mask>;
+    fn persons(&mut self, seen: FrameInput) -> Option<&Mask>;
 
     /// Fills `map` with the distances behind the subject, which `mask` has, in the same picture.
     fn measure_behind(&mut self, color: &ColorImage, mask: &Mask, map: &mut DepthMap);
@@ -91,7 +91,7 @@ impl Guide {
     }
 
     /// Requests the capture of a new plate.
-    pub fn take_again(&self) {
+    pub fn request_capture(&self) {
         self.again.store(true, Ordering::Relaxed);
     }
 
@@ -154,8 +154,8 @@ impl PlateDepth {
     }
 
     /// Advances the capture by a picture, or compares it with the plate. Returns the new step.
-    fn advance(&mut self, seen: Seen) -> Step {
-        let Seen { stamp, color, .. } = seen;
+    fn advance(&mut self, seen: FrameInput) -> Step {
+        let FrameInput { stamp, color, .. } = seen;
         let now_ns = stamp.time_ns;
         if self.guide.again.swap(false, Ordering::Relaxed) {
             self.state = State::Waiting(None);
@@ -200,7 +200,7 @@ impl PlateDepth {
 }
 
 impl DepthSource for PlateDepth {
-    fn read(&mut self, seen: Seen, map: &mut DepthMap) -> Result<(), DepthError> {
+    fn read(&mut self, seen: FrameInput, map: &mut DepthMap) -> Result<(), DepthError> {
         let (step, color) = (self.advance(seen), seen.color);
         self.guide.set_step(step);
         // Without a usable plate, the companion's depth is better than none.
@@ -228,7 +228,7 @@ impl DepthSource for PlateDepth {
         self.companion.as_ref().map_or(&[1.0], |companion| companion.efforts())
     }
 
-    fn may_be_shared(&self) -> bool {
+    fn is_reusable(&self) -> bool {
         false
     }
 

@@ -2,7 +2,7 @@
 
 use crate::depth::alignment::Alignment;
 use crate::depth::dilation::dilate;
-use crate::depth::reduced::MOST;
+use crate::depth::reduced::MAX_VALUE;
 use crate::depth::tap::nearest;
 use crate::frame::Mask;
 
@@ -65,7 +65,7 @@ fn differences(now: &[f32], own: &[f32], beside: [&[f32]; 2], gain: &[f32], off:
         let low = halves.into_iter().fold(own, f32::min);
         let high = halves.into_iter().fold(own, f32::max);
         // The plate may be clipped at white: brighter values are no difference.
-        ((gain * low).min(MOST) - value).max(value - (gain * high).min(MOST))
+        ((gain * low).min(MAX_VALUE) - value).max(value - (gain * high).min(MAX_VALUE))
     };
     let [above, below] = beside.map(|row| &row[..count]);
     let (now, own, gain) = (&now[..count], &own[..count], &gain[..count]);

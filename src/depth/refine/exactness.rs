@@ -44,7 +44,7 @@ impl Faults {
 
 /// Decides frame by frame; owns its buffers.
 #[derive(Debug, Default)]
-pub struct Exactness {
+pub struct ExactnessDetector {
     is_exact: bool,
     /// Whether depth was ever found to be inexact.
     was_inexact: bool,
@@ -69,7 +69,7 @@ struct Sample {
     inverse: f32,
 }
 
-impl Exactness {
+impl ExactnessDetector {
     /// Whether the depth is considered exact.
     pub fn is_exact(&self) -> bool {
         self.is_exact
@@ -195,7 +195,7 @@ mod tests {
     const UNSTEADY: Damage = |at, frame, z_m| if at % 13 == frame % 2 { z_m * 1.01 } else { z_m };
 
     /// Returns the decision after each frame, for a number of frames of each kind.
-    fn decisions(exactness: &mut Exactness, kinds: &[(Damage, u32)]) -> Vec<bool> {
+    fn decisions(exactness: &mut ExactnessDetector, kinds: &[(Damage, u32)]) -> Vec<bool> {
         let mut looks = Vec::new();
         for &(damage, count) in kinds {
             for number in 0..count {
@@ -209,7 +209,7 @@ mod tests {
 
     #[test]
     fn exact_depth_is_known_after_a_few_frames() {
-        let looks = decisions(&mut Exactness::default(), &[(EXACT, 200)]);
+        let looks = decisions(&mut ExactnessDetector::default(), &[(EXACT, 200)]);
         assert_eq!(looks.iter().position(|&exact| exact), Some(DECISION as usize));
         assert!(looks[DECISION as usize..].iter().all(|&exact| exact));
     }
@@ -217,13 +217,13 @@ mod tests {
     #[test]
     fn depth_with_holes_or_noise_or_that_flickers_is_not_exact() {
         for damage in [HOLES, NOISE, UNSTEADY] {
-            assert!(decisions(&mut Exactness::default(), &[(damage, 300)]).iter().all(|&exact| !exact));
+            assert!(decisions(&mut ExactnessDetector::default(), &[(damage, 300)]).iter().all(|&exact| !exact));
         }
     }
 
     #[test]
     fn a_single_frame_decides_nothing_and_a_sensor_is_believed_late() {
-        let exactness = &mut Exactness::default();
+        let exactness = &mut ExactnessDetector::default();
         assert!(decisions(exactness, &[(EXACT, 20), (HOLES, 3), (EXACT, 40)])[10..].iter().all(|&exact| exact));
         let looks = decisions(exactness, &[(HOLES, 4 * PERIOD * DECISION), (EXACT, PERIOD * (LONG_DECISION - 1))]);
         assert!(looks[(2 * PERIOD * DECISION) as usize..].iter().all(|&exact| !exact), "held back for long");
@@ -232,7 +232,7 @@ mod tests {
 
     #[test]
     fn of_another_size_nothing_is_told() {
-        let (mut exactness, (color, _)) = (Exactness::default(), frame(0, EXACT));
+        let (mut exactness, (color, _)) = (ExactnessDetector::default(), frame(0, EXACT));
         for _ in 0..100 {
             exactness.look(&DepthMap { metres: vec![1.0; 64 * 48], ..DepthMap::new(64, 48) }, &color);
         }

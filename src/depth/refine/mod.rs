@@ -24,7 +24,7 @@ use std::sync::Arc;
 
 use pulp::Arch;
 
-pub use self::exactness::Exactness;
+pub use self::exactness::ExactnessDetector;
 pub use self::outlines::Outlines;
 
 use self::align::Aligner;
@@ -52,7 +52,7 @@ const CHANGE_SIGMAS: f32 = 4.0;
 
 /// Corrections of a map whose outlines are too far off for the colour-guided alignment.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Mending {
+pub struct MapCorrection {
     /// How far all outlines are moved first, in pixels of the picture: outwards, seen from the nearer surface; inwards
     /// if negative.
     pub distance_px: i32,
@@ -61,7 +61,7 @@ pub struct Mending {
     pub coarsest: u32,
 }
 
-impl Default for Mending {
+impl Default for MapCorrection {
     /// No correction.
     fn default() -> Self {
         Self { distance_px: 0, coarsest: 1 }
@@ -83,7 +83,7 @@ pub struct Refiner {
     aligner: Aligner,
     temporal: TemporalFilter,
     focus: Focus,
-    mending: Mending,
+    mending: MapCorrection,
     outlines: Outlines,
     /// The downsampled picture.
     reduced: ColorImage,
@@ -110,9 +110,9 @@ impl Refiner {
     }
 
     /// Creates a refiner that corrects misaligned maps first.
-    pub fn mending(mending: Mending) -> Self {
+    pub fn mending(mending: MapCorrection) -> Self {
         let coarsest = mending.coarsest.clamp(1, 1 << 5).next_power_of_two();
-        Self { mending: Mending { coarsest, ..mending }, ..Self::default() }
+        Self { mending: MapCorrection { coarsest, ..mending }, ..Self::default() }
     }
 
     /// Moves refinement to `device` if it passes its trial and maps need no correction. When it fails, the CPU takes
@@ -121,7 +121,7 @@ impl Refiner {
     pub fn on(self, device: Option<&Arc<Device>>) -> Self {
         #[cfg(feature = "gpu")]
         {
-            let device = device.filter(|_| self.mending == Mending::default());
+            let device = device.filter(|_| self.mending == MapCorrection::default());
             Self { gpu: Backed::tried(device, "refines", gpu::trial, gpu::GpuRefiner::new), ..self }
         }
         #[cfg(not(feature = "gpu"))]
@@ -187,7 +187,7 @@ impl Refiner {
         if self.gpu.did("refines", |gpu| gpu.refine(map, color, time_ns, self.focus.0)) {
             return;
         }
-        let Mending { mut distance_px, coarsest: mut scale } = self.mending;
+        let MapCorrection { mut distance_px, coarsest: mut scale } = self.mending;
         while scale > 1 {
             let size = |side: u32| side.div_ceil(scale);
             let mut reduced = std::mem::take(&mut self.reduced);

@@ -27,7 +27,7 @@ use relief::Relief;
 use super::matting::mask::MaskMatting;
 use super::plate::Companion;
 use super::tap::Tap;
-use super::{DepthError, DepthSource, Seen};
+use super::{DepthError, DepthSource, FrameInput};
 use crate::compute::thread_pool::cores;
 use crate::frame::{ColorImage, DepthMap, Mask};
 use crate::network::{self, Runtime, Task};
@@ -177,7 +177,7 @@ struct Turn {
 }
 
 impl DepthSource for SingleCamera {
-    fn read(&mut self, Seen { stamp, color, .. }: Seen, map: &mut DepthMap) -> Result<(), DepthError> {
+    fn read(&mut self, FrameInput { stamp, color, .. }: FrameInput, map: &mut DepthMap) -> Result<(), DepthError> {
         self.begin_picture(stamp.time_ns);
         self.run_person_network(color, stamp.time_ns);
         let Self { name, person, absence, relief, held, spread, matting, turn, .. } = self;
@@ -211,7 +211,7 @@ impl DepthSource for SingleCamera {
         if self.relief.is_some() { &EFFORTS } else { &EFFORTS[EFFORTS.len() - 1..] }
     }
 
-    fn may_be_shared(&self) -> bool {
+    fn is_reusable(&self) -> bool {
         !self.has_subject
     }
 
@@ -227,7 +227,7 @@ impl DepthSource for SingleCamera {
 }
 
 impl Companion for SingleCamera {
-    fn persons(&mut self, Seen { stamp, color, .. }: Seen) -> Option<&Mask> {
+    fn persons(&mut self, FrameInput { stamp, color, .. }: FrameInput) -> Option<&Mask> {
         self.begin_picture(stamp.time_ns);
         self.run_person_network(color, stamp.time_ns);
         self.person.as_ref().map(Person::mask)

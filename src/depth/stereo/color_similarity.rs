@@ -14,7 +14,7 @@ use crate::frame::ColorImage;
 /// Disparities this far apart, in fixed point, belong to different surfaces.
 const MIN_GAP: u16 = 8 * ONE;
 /// Number of disparity bins, each [`MIN_GAP`] wide.
-const BINS: usize = Settings::MOST_DISPARITIES as usize * ONE as usize / MIN_GAP as usize + 1;
+const BINS: usize = Settings::MAX_DISPARITIES as usize * ONE as usize / MIN_GAP as usize + 1;
 /// Number of colour bins.
 const COLORS: usize = 1 << 12;
 /// Colours are learned from this many times as many columns as the border has at its widest.

@@ -43,7 +43,7 @@ pub struct Settings {
     /// Columns and rows of both pictures.
     pub size: (u32, u32),
     /// Number of candidate disparities, from 0 on: rounded up ([`fixed::range`]), at most
-    /// [`Settings::MOST_DISPARITIES`].
+    /// [`Settings::MAX_DISPARITIES`].
     pub disparities: u32,
     /// Resolution at which pairs are matched.
     pub effort: Effort,
@@ -53,7 +53,7 @@ pub struct Settings {
 
 impl Settings {
     /// The largest number of candidate disparities.
-    pub const MOST_DISPARITIES: u32 = 256;
+    pub const MAX_DISPARITIES: u32 = 256;
 }
 
 named! {

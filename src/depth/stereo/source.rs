@@ -9,7 +9,7 @@ use super::check::{Verdict, check};
 use super::rectify::PairRectifier;
 use super::{Effort, Matcher, Pair, Settings};
 use crate::calibration::rectifier::Rectifier;
-use crate::depth::{DepthError, DepthSource, Seen};
+use crate::depth::{DepthError, DepthSource, FrameInput};
 use crate::frame::{ColorImage, DepthMap, DisparityMap, GrayImage};
 use crate::optics::StereoRig;
 
@@ -90,10 +90,10 @@ impl StereoDepth {
         let right = right.unwrap_or(&self.right);
         let (source_name, calibrated) = (&self.source_name, self.rectifier.is_some());
         // Twice the range, so that objects nearer than expected are found, too.
-        let found = check(&self.left, right, (2 * self.disparities).min(Settings::MOST_DISPARITIES))?;
+        let found = check(&self.left, right, (2 * self.disparities).min(Settings::MAX_DISPARITIES))?;
         let clear = log_check((source_name, calibrated), found.verdict());
         self.checks_left = if clear { 0 } else { self.checks_left - 1 };
-        let needed = (found.largest_px.ceil() as u32 + MARGIN_PX).next_multiple_of(16).min(Settings::MOST_DISPARITIES);
+        let needed = (found.largest_px.ceil() as u32 + MARGIN_PX).next_multiple_of(16).min(Settings::MAX_DISPARITIES);
         if found.verdict() != Verdict::Rectified || found.largest_px < self.disparities as f32 {
             return Ok(());
         }
@@ -152,7 +152,7 @@ impl DepthSource for StereoDepth {
         }
     }
 
-    fn read(&mut self, seen: Seen, map: &mut DepthMap) -> Result<(), DepthError> {
+    fn read(&mut self, seen: FrameInput, map: &mut DepthMap) -> Result<(), DepthError> {
         let Some(right) = seen.right else {
             return Err(DepthError::OneEye { source_name: self.source_name.clone() });
         };
@@ -272,12 +272,12 @@ mod tests {
         source.rectify(&mut picture);
         assert_eq!(picture, color(&[25, 55, 10]));
         let right = gray(&[20, 40, 10]);
-        source.read(Seen { stamp: STAMP, color: &picture, right: Some(&right) }, &mut map).unwrap();
+        source.read(FrameInput { stamp: STAMP, color: &picture, right: Some(&right) }, &mut map).unwrap();
         assert_eq!(map.metres, [1.0, 0.5, 0.0]);
         let efforts = source.efforts();
         assert!(efforts.is_sorted() && efforts.last() == Some(&1.0));
         source.set_effort(0);
-        source.read(Seen { stamp: STAMP, color: &picture, right: Some(&right) }, &mut map).unwrap();
+        source.read(FrameInput { stamp: STAMP, color: &picture, right: Some(&right) }, &mut map).unwrap();
         assert_eq!(map.metres[1], 10.0 / 12.5);
     }
 
@@ -311,7 +311,7 @@ mod tests {
         let (mut picture, mut map) = (raw.clone(), DepthMap::default());
         source.rectify(&mut picture);
         assert_eq!(picture, left);
-        source.read(Seen { stamp: STAMP, color: &picture, right: Some(&raw_right) }, &mut map).unwrap();
+        source.read(FrameInput { stamp: STAMP, color: &picture, right: Some(&raw_right) }, &mut map).unwrap();
         let middle = 24 * 64 + 32;
         let difference_px = f32::from(left.rgb[3 * middle]) - f32::from(right.luma[middle]);
         assert_eq!(map.metres[middle], if difference_px > 0.0 { source.rig().depth_m(difference_px) } else { 0.0 });
@@ -322,10 +322,11 @@ mod tests {
     fn one_eye_and_unequal_eyes_are_named() {
         let mut source = StereoDepth::of_rectified("two eyes", RIG, Box::new(Difference(Effort::Full)), 16);
         let (picture, mut map) = (color(&[25, 55]), DepthMap::default());
-        let error = source.read(Seen { stamp: STAMP, color: &picture, right: None }, &mut map).unwrap_err();
+        let error = source.read(FrameInput { stamp: STAMP, color: &picture, right: None }, &mut map).unwrap_err();
         assert!(matches!(&error, DepthError::OneEye { .. }) && error.to_string().contains("two eyes"), "{error}");
         let right = gray(&[1, 2, 3]);
-        let error = source.read(Seen { stamp: STAMP, color: &picture, right: Some(&right) }, &mut map).unwrap_err();
+        let error =
+            source.read(FrameInput { stamp: STAMP, color: &picture, right: Some(&right) }, &mut map).unwrap_err();
         assert!(error.to_string().contains("2x1") && error.to_string().contains("3x1"), "{error}");
     }
 }

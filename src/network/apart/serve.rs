@@ -57,7 +57,7 @@ fn handle_requests(mut stream: UnixStream) -> io::Result<()> {
     loop {
         match (receive(&mut stream)?, &mut network) {
             (Request::Load { runtime, bytes }, None) => {
-                let mut content = vec![0; bytes.min(network::MOST_BYTES as usize)];
+                let mut content = vec![0; bytes.min(network::MAX_BYTES as usize)];
                 stream.read_exact(&mut content)?;
                 let runtime = names::parse(&runtime).map_err(|why| io::Error::new(ErrorKind::InvalidData, why))?;
                 let reply = match load_in_process(content, runtime) {

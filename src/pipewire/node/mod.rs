@@ -35,7 +35,7 @@ pub struct Settings {
     /// The format for readers without a preference.
     pub best: Agreed,
     /// The name of the camera that the node stands in for.
-    pub stands_for: Option<String>,
+    pub filter_target: Option<String>,
     /// Longest time without a picture for a reader: then the last one is repeated.
     pub hold: Duration,
 }

@@ -140,14 +140,14 @@ impl Provider {
         ready: &mut Option<&Ready>,
     ) -> Result<(), PipeWireError> {
         let session = Session::open()?;
-        let Settings { name, label, modes, best, stands_for, .. } = &self.settings;
+        let Settings { name, label, modes, best, filter_target, .. } = &self.settings;
         let mut props = properties! {
             *pipewire::keys::MEDIA_CLASS => "Video/Source",
             *pipewire::keys::MEDIA_ROLE => "Camera",
             *pipewire::keys::NODE_NAME => name.as_str(),
             *pipewire::keys::NODE_DESCRIPTION => label.as_str(),
         };
-        if let Some(camera) = stands_for {
+        if let Some(camera) = filter_target {
             props.insert("node.link-group", crate::pipewire::group());
             props.insert("filter.smart", "true");
             props.insert("filter.smart.target", serde_json::json!({ "node.name": camera }).to_string());
@@ -176,7 +176,7 @@ impl Provider {
         let formats: Vec<Vec<u8>> = modes.iter().map(|mode| param::build_offer(mode, best)).collect();
         let mut formats: Vec<&Pod> = formats.iter().filter_map(|format| Pod::from_bytes(format)).collect();
         // A filter runs at the pace of the camera, which drives both.
-        let driver_flag = if stands_for.is_none() { StreamFlags::DRIVER } else { StreamFlags::empty() };
+        let driver_flag = if filter_target.is_none() { StreamFlags::DRIVER } else { StreamFlags::empty() };
         let flags = driver_flag | StreamFlags::MAP_BUFFERS;
         stream.connect(Direction::Output, None, flags, &mut formats).map_err(PipeWireError::refused("a node"))?;
 

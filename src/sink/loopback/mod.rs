@@ -18,7 +18,7 @@ use super::{Ending, Options, Sink, SinkError, card, check_size};
 use crate::frame::fit::Fit;
 use crate::frame::{ColorImage, YuyvImage};
 use crate::link::demand::Demand;
-use crate::v4l2::audience::Audience;
+use crate::v4l2::audience::ReaderMonitor;
 use crate::v4l2::loopback::{Layout, LoopbackError, Output};
 
 /// Shortest time after which a picture is repeated.
@@ -100,7 +100,7 @@ fn start_watcher(path: &Path, output: &Output, demand: Demand) -> Result<Watcher
         doing: "it cannot be known whether somebody watches; leave --on-demand out",
         cause,
     };
-    let (audience, stop) = Audience::new(output.device().clone()).map_err(refused)?;
+    let (audience, stop) = ReaderMonitor::new(output.device().clone()).map_err(refused)?;
     if !audience.has_module_events() {
         tracing::info!(
             "{}: this version of v4l2loopback does not tell of its readers; whoever has it open counts as one",

@@ -6,7 +6,7 @@ use std::{io, mem};
 
 use crate::clock::Clock;
 use crate::link::demand::Demand;
-use crate::v4l2::audience::{Audience, ReaderEvent, Stop};
+use crate::v4l2::audience::{ReaderEvent, ReaderMonitor, Stop};
 
 /// Time for which a camera still counts as watched after its last reader left: call programs close and reopen it
 /// repeatedly.
@@ -19,7 +19,7 @@ pub(super) struct Watcher {
 }
 
 impl Watcher {
-    pub(super) fn start((mut audience, stop): (Audience, Stop), demand: Demand) -> io::Result<Self> {
+    pub(super) fn start((mut audience, stop): (ReaderMonitor, Stop), demand: Demand) -> io::Result<Self> {
         let listen = move || follow_readers(&demand, &Clock::system(), |timeout| audience.wait(timeout));
         let thread = thread::Builder::new().name("audience".into()).spawn(listen)?;
         Ok(Self { stop: Some(stop), thread: Some(thread) })

@@ -32,7 +32,7 @@ impl Sink for Witness {
     }
 }
 
-fn shutter() -> (Shutter, Release, Demand, Clock, Got) {
+fn shutter() -> (Shutter, ShutterControl, Demand, Clock, Got) {
     let (demand, clock, got) = (Demand::new(), Clock::manual(), Got::default());
     let sink = Box::new(Witness(Arc::clone(&got)));
     let (shutter, release) = Shutter::new(sink, (32, 18), PERIOD, demand.clone(), clock.clone(), Arc::default());

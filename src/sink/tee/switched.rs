@@ -7,7 +7,7 @@ use std::thread;
 use std::time::Instant;
 
 use super::*;
-use crate::sink::switch::{Fate, Over};
+use crate::sink::switch::{MemberState, Over};
 
 /// No step takes this long: detects a hang.
 const HANG: Duration = Duration::from_secs(120);
@@ -93,22 +93,22 @@ fn put(switch: &mut Tee, numbers: std::ops::Range<u8>) {
 }
 
 /// Returns all notices so far, sorted by member.
-fn all(told: &Receiver<Notice>) -> Vec<(String, Fate)> {
+fn all(told: &Receiver<Notice>) -> Vec<(String, MemberState)> {
     let mut all: Vec<_> = told.try_iter().map(|told| (told.member, told.fate)).collect();
     all.sort_by(|a, b| a.0.cmp(&b.0));
     all
 }
 
-fn began(name: &str) -> (String, Fate) {
-    (name.into(), Fate::Began)
+fn began(name: &str) -> (String, MemberState) {
+    (name.into(), MemberState::Began)
 }
 
-fn completed(name: &str, frames: u64) -> (String, Fate) {
-    (name.into(), Fate::Completed { frames })
+fn completed(name: &str, frames: u64) -> (String, MemberState) {
+    (name.into(), MemberState::Completed { frames })
 }
 
-fn failed(name: &str, frames: u64, why: &str) -> (String, Fate) {
-    (name.into(), Fate::Failed { frames, why: why.into() })
+fn failed(name: &str, frames: u64, why: &str) -> (String, MemberState) {
+    (name.into(), MemberState::Failed { frames, why: why.into() })
 }
 
 #[test]

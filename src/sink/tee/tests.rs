@@ -8,7 +8,7 @@ use super::*;
 use crate::clock::Clock;
 use crate::link::demand::Demand;
 use crate::sink::Shutter;
-use crate::sink::shutter::NotCovered;
+use crate::sink::shutter::CardNotShown;
 
 /// No step takes this long: detects a hang.
 const HANG: Duration = Duration::from_secs(120);
@@ -180,7 +180,7 @@ fn files_that_are_to_miss_nothing_get_all_and_what_is_live_waits_for_none_of_the
 fn driven(
     sinks: impl IntoIterator<Item = Fake>,
     backpressure: Backpressure,
-    test: impl FnOnce(&crate::sink::Release, &dyn Fn()),
+    test: impl FnOnce(&crate::sink::ShutterControl, &dyn Fn()),
 ) {
     let closed = Arc::new(AtomicBool::new(false));
     let tee = tee(sinks, backpressure, &closed);
@@ -246,7 +246,7 @@ fn off_is_no_success_while_something_live_keeps_the_picture() {
         may.send(()).unwrap();
         assert_eq!((next(&shown), next(&written)), ("7".into(), "7".into()));
         release.close(true);
-        assert_eq!(release.wait_covered(), Err(NotCovered("camera".into())));
+        assert_eq!(release.wait_covered(), Err(CardNotShown("camera".into())));
         assert!(written.try_iter().any(|what| what == "card"), "the file has it");
         drop(may);
         until("the camera has the card", || shown.try_iter().last().is_some_and(|last| last == "card"));

@@ -14,7 +14,7 @@ mod watchdog;
 use std::time::Duration;
 
 pub use error::OpenError;
-pub use negotiate::Wish;
+pub use negotiate::ModeRequest;
 pub use session::{Agreed, Setting};
 
 use address::Address;
@@ -32,7 +32,7 @@ use crate::v4l2::queue::{Losses, Planes};
 pub struct Live {
     address: Address,
     name: String,
-    wish: Wish,
+    wish: ModeRequest,
     settings: Vec<Setting>,
     clock: Clock,
     agreed: Agreed,
@@ -93,7 +93,7 @@ impl Live {
     ///
     /// # Errors
     /// No device matches, or it cannot be used; a busy or failing one is retried for about a second.
-    pub fn open(name: &str, wish: Wish, settings: Vec<Setting>, clock: Clock) -> Result<Self, OpenError> {
+    pub fn open(name: &str, wish: ModeRequest, settings: Vec<Setting>, clock: Clock) -> Result<Self, OpenError> {
         let path = node::resolve(name)?;
         let mut tries = 1;
         let session = loop {

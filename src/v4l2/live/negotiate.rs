@@ -8,7 +8,7 @@ use crate::v4l2::modes::{FormatModes, Interval, QueueKind, Rates, SizeModes, Siz
 
 /// Constraints on a camera's mode. Open ones are chosen automatically.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Wish {
+pub struct ModeRequest {
     pub content: Content,
     /// Width and height, in pixels.
     pub size_px: Option<(u32, u32)>,
@@ -16,7 +16,7 @@ pub struct Wish {
     pub fourcc: Option<FourCc>,
 }
 
-impl Wish {
+impl ModeRequest {
     /// Constrains only the content.
     pub fn any(content: Content) -> Self {
         Self { content, size_px: None, fps: None, fourcc: None }
@@ -72,7 +72,7 @@ const SAME_RATE: f64 = 0.1;
 ///
 /// # Errors
 /// No mode is usable.
-pub fn ranked(modes: &[FormatModes], wish: &Wish, link_speed: LinkSpeed) -> Result<Vec<Choice>, NoMode> {
+pub fn ranked(modes: &[FormatModes], wish: &ModeRequest, link_speed: LinkSpeed) -> Result<Vec<Choice>, NoMode> {
     let readable = |fourcc: FourCc| fourcc.content() == Some(wish.content);
     let suits = |format: &&FormatModes| readable(format.fourcc) && wish.fourcc.is_none_or(|f| f == format.fourcc);
     let mut best: Vec<(Rank, Choice)> =
@@ -102,7 +102,7 @@ fn compare(a: &Rank, b: &Rank) -> Ordering {
 }
 
 /// Finds the mode of a format that is nearest to the request.
-fn best_mode(format: &FormatModes, wish: &Wish, link_speed: LinkSpeed) -> Option<(Rank, Choice)> {
+fn best_mode(format: &FormatModes, wish: &ModeRequest, link_speed: LinkSpeed) -> Option<(Rank, Choice)> {
     let wanted_px = wish.size_px.unwrap_or(DEFAULT_SIZE_PX);
     let modes: Vec<((u32, u32), &Rates)> = match &format.sizes {
         Sizes::Unknown => vec![(wanted_px, &Rates::Unknown)],
@@ -129,7 +129,7 @@ fn rank(
     size_px: (u32, u32),
     rates: &Rates,
     wanted_px: (u32, u32),
-    wish: &Wish,
+    wish: &ModeRequest,
     link_speed: LinkSpeed,
 ) -> (Rank, Choice) {
     let wanted = Interval::from_fps(wish.fps.unwrap_or(DEFAULT_FPS));
@@ -222,11 +222,11 @@ mod tests {
         ]
     }
 
-    fn wish(size_px: Option<(u32, u32)>, fps: Option<f64>, fourcc: Option<&[u8; 4]>) -> Wish {
-        Wish { content: Content::Color, size_px, fps, fourcc: fourcc.map(|f| FourCc(*f)) }
+    fn wish(size_px: Option<(u32, u32)>, fps: Option<f64>, fourcc: Option<&[u8; 4]>) -> ModeRequest {
+        ModeRequest { content: Content::Color, size_px, fps, fourcc: fourcc.map(|f| FourCc(*f)) }
     }
 
-    fn chosen(modes: &[FormatModes], wish: Wish, link_speed: LinkSpeed) -> String {
+    fn chosen(modes: &[FormatModes], wish: ModeRequest, link_speed: LinkSpeed) -> String {
         let best = ranked(modes, &wish, link_speed).unwrap()[0];
         format!("{}x{} {} {}", best.size_px.0, best.size_px.1, best.fourcc, best.interval)
     }
@@ -294,7 +294,7 @@ mod tests {
         let unreadable = refusal(&[format(b"H264", &[(640, 480, &[30])])], wish(None, None, None));
         assert!(unreadable.starts_with("it offers H264, of which none"), "{unreadable}");
         assert!(refusal(&[], wish(None, None, None)).contains("virtual camera"));
-        let depth = Wish::any(Content::Depth);
+        let depth = ModeRequest::any(Content::Depth);
         assert!(refusal(&office(), depth).contains("as depth; readable are Z16, Y16"));
     }
 }

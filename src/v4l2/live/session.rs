@@ -6,7 +6,7 @@ use std::path::Path;
 use v4l::v4l_sys as sys;
 
 use super::error::OpenError;
-use super::negotiate::{Choice, LinkSpeed, Wish, ranked};
+use super::negotiate::{Choice, LinkSpeed, ModeRequest, ranked};
 use crate::clock::Clock;
 use crate::layout::{Layout, LayoutError};
 use crate::v4l2::device::{Device, own_caps, zeroed};
@@ -54,7 +54,7 @@ impl Session {
     /// Any of these steps is refused.
     pub fn open(
         path: &Path,
-        wish: &Wish,
+        wish: &ModeRequest,
         settings: &[Setting],
         previous: Option<&Agreed>,
         clock: &Clock,
@@ -134,7 +134,7 @@ const ENOTTY: i32 = rustix::io::Errno::NOTTY.raw_os_error();
 fn negotiate(
     device: &Device,
     capability: &sys::v4l2_capability,
-    wish: &Wish,
+    wish: &ModeRequest,
     previous: Option<&Agreed>,
 ) -> Result<Agreed, OpenError> {
     if let Some(previous) = previous {
@@ -228,14 +228,14 @@ fn link_speed(path: &Path, capability: &sys::v4l2_capability) -> LinkSpeed {
     if !text(&capability.bus_info).starts_with("usb-") {
         return LinkSpeed::Fast;
     }
-    match node::usb_of(path) {
+    match node::usb_connection(path) {
         Some(usb) if usb.mbit_per_s > USB_2_MBIT_PER_S => LinkSpeed::Fast,
         _ => LinkSpeed::Slow,
     }
 }
 
 /// Warns if the size or the rate (by more than 2 %) differs from the requested one.
-fn warn_of_differences(device: &Device, agreed: &Agreed, wish: &Wish) {
+fn warn_of_differences(device: &Device, agreed: &Agreed, wish: &ModeRequest) {
     let size = (agreed.layout.width, agreed.layout.height);
     let other_size = wish.size_px.is_some_and(|wanted| wanted != size);
     let other_rate = wish.fps.is_some_and(|wanted| (agreed.interval.fps() / wanted).ln().abs() > 0.02);

@@ -27,25 +27,25 @@ impl Slope {
     /// A slope with waves, in front of the focus, behind it, or through it.
     pub fn new(random: &mut Random) -> Self {
         let (width, height) = (SIZE.0 as f32, SIZE.1 as f32);
-        let most_px = 6.0 + 20.0 * random.share();
+        let max_px = 6.0 + 20.0 * random.share();
         // Tilted any way, with waves: of gradients that sum up to less than one.
         let tilt = glam::Vec2::from_angle(7.0 * random.share()) * 0.45 * random.share();
         let wave = glam::Vec2::from_angle(7.0 * random.share()) * (0.03 + 0.1 * random.share());
         let steep = 0.5 * random.share();
-        let (middle_px, phase) = (most_px * (1.6 * random.share() - 1.0), 7.0 * random.share());
+        let (middle_px, phase) = (max_px * (1.6 * random.share() - 1.0), 7.0 * random.share());
         let coc_px = |x: u32, y: u32| {
             let at = glam::Vec2::new(x as f32 - width / 2.0, y as f32 - height / 2.0);
             (middle_px + tilt.dot(at) + steep / wave.length() * (wave.dot(at) + phase).sin())
-                .clamp(-most_px, 0.6 * most_px)
+                .clamp(-max_px, 0.6 * max_px)
         };
         let (edge, sway) = (height * (0.15 + 0.25 * random.share()), 12.0 * random.share());
         let is_wall = |x: u32, y: u32| (y as f32) < edge + sway * (x as f32 / 25.0).sin();
         // Beyond all of the surface, by more than what goes on would be.
         let pixels = || (0..SIZE.1).flat_map(|y| (0..SIZE.0).map(move |x| (x, y)));
         let farthest_px = pixels().map(|(x, y)| coc_px(x, y)).fold(f32::MIN, f32::max);
-        let wall_px = if farthest_px < -3.0 { 0.0 } else { farthest_px + 2.0 + 0.2 * most_px };
-        let lens = DepthCoc { coc_at_infinity_px: 2.0 * most_px, focus_m: 2.0, range_m: 0.0, max_coc_px: most_px };
-        let metres = |coc_px: f32| lens.focus_m / (1.0 - coc_px.min(most_px) / lens.coc_at_infinity_px);
+        let wall_px = if farthest_px < -3.0 { 0.0 } else { farthest_px + 2.0 + 0.2 * max_px };
+        let lens = DepthCoc { coc_at_infinity_px: 2.0 * max_px, focus_m: 2.0, range_m: 0.0, max_coc_px: max_px };
+        let metres = |coc_px: f32| lens.focus_m / (1.0 - coc_px.min(max_px) / lens.coc_at_infinity_px);
         let map = depth(SIZE.0, SIZE.1, |x, y| metres(if is_wall(x, y) { wall_px } else { coc_px(x, y) }));
         let edges: Vec<_> = pixels()
             .filter(|&(x, y)| !is_wall(x, y) && y > 0 && is_wall(x, y - 1))

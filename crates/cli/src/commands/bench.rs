@@ -23,7 +23,7 @@ use bokehcam::engine::still::{Depth, coc_and_depth};
 use bokehcam::frame::{ColorImage, DepthMap};
 use bokehcam::link::pool::Pool;
 use bokehcam::look::number::within;
-use bokehcam::look::{COC_AT_INFINITY_PER_HEIGHT, Look, MOST_RADIUS_PX, Strength};
+use bokehcam::look::{COC_AT_INFINITY_PER_HEIGHT, Look, MAX_RADIUS_PX, Strength};
 use bokehcam::optics::CocField;
 use bokehcam::source::{self, DepthChoice, Size, SourceName};
 
@@ -55,7 +55,7 @@ pub struct BenchCommand {
     #[arg(long, value_name = "WxH", value_delimiter = ',', default_value = "640x480,1280x720,1920x1080")]
     sizes: Vec<Size>,
     /// Blur radii at infinity, in pixels [default: height / 45]
-    #[arg(long, value_name = "PX", value_delimiter = ',', value_parser = within(0.0..=MOST_RADIUS_PX))]
+    #[arg(long, value_name = "PX", value_delimiter = ',', value_parser = within(0.0..=MAX_RADIUS_PX))]
     coc: Vec<f32>,
     /// Quality levels [default: balanced; with --chain all]
     #[arg(id = "benched_quality", long = "quality", value_name = "LEVELS", value_delimiter = ',',
@@ -127,7 +127,7 @@ pub fn run(command: &BenchCommand, global: &options::Global, given: &Given) -> R
         &given.settings,
         &unused::Run {
             source: unused::From::Bench,
-            depth: source::DepthFrom::Metres,
+            depth: source::DepthOrigin::Metres,
             uses_depth: true,
             effect: look.effect,
             cpu_only: command.backend == Backend::Cpu,

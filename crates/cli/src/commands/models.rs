@@ -87,7 +87,7 @@ fn add_file(file: &Path) -> Result<(), CliError> {
         let what = "this is no file that is here: `bokehcam models get NAME` fetches a known network";
         return Err(CliError::Usage(format!("{}: {what}", file.display())));
     }
-    let bytes = input::read(file, network::MOST_BYTES).map_err(io_error(file))?;
+    let bytes = input::read(file, network::MAX_BYTES).map_err(io_error(file))?;
     let known = Known::of(&bytes).ok_or_else(|| {
         let what = "it is none of the networks that are known (`bokehcam models` lists them), or not whole: one of your own is \
                     used from where it is, by --depth matte:FILE or mono:FILE";
@@ -107,7 +107,7 @@ fn install(known: &Known, bytes: &[u8]) -> Result<(), CliError> {
     let folder = network::folders().into_iter().next().ok_or_else(no_home)?;
     let target = folder.join(known.file);
     std::fs::create_dir_all(&folder).map_err(io_error(&folder))?;
-    match input::read(&target, network::MOST_BYTES) {
+    match input::read(&target, network::MAX_BYTES) {
         Ok(there) if there == bytes => {}
         Ok(_) => {
             let what = "another file is there under this name: move it away";

@@ -15,7 +15,7 @@ use crate::settings::unused;
 use crate::terminal::{self, Guidance};
 use bokehcam::capture::{Camera, Captured, Shot};
 use bokehcam::depth::plate::{Capture, Step, Taken};
-use bokehcam::depth::{DepthSource, Seen};
+use bokehcam::depth::{DepthSource, FrameInput};
 use bokehcam::frame::{ColorImage, DepthMap, GrayImage, Stamp};
 use bokehcam::recording::still;
 use bokehcam::source::{DepthChoice, Kind, Options, Source, SourceName, one_camera};
@@ -114,7 +114,7 @@ fn plate_from_camera(frames: &mut Frames, name: &SourceName, global: &options::G
     let guidance = Guidance::new(Some(guide), global);
     let mut map = DepthMap::default();
     while let Some(stamp) = frames.next()? {
-        source.read(Seen { stamp, color: &frames.color, right: None }, &mut map)?;
+        source.read(FrameInput { stamp, color: &frames.color, right: None }, &mut map)?;
         guidance.print_step();
         match (source.plate(), guidance.step()) {
             (Some(plate), _) => return Ok(plate.clone()),
@@ -132,7 +132,7 @@ fn plate_from_recording(frames: &mut Frames) -> Result<ColorImage, CliError> {
     let (mut capture, mut index) = (Capture::default(), 0);
     while frames.next()?.is_some() {
         if index % every == 0
-            && let Taken::Whole(plate) = capture.add_any(&frames.color)
+            && let Taken::Whole(plate) = capture.add_unchecked(&frames.color)
         {
             return Ok(plate);
         }

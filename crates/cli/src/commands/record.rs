@@ -12,7 +12,7 @@ use crate::settings::layers::Given;
 use crate::settings::unused;
 use crate::terminal;
 use bokehcam::capture::{Brings, Captured, Shot};
-use bokehcam::depth::Seen;
+use bokehcam::depth::FrameInput;
 use bokehcam::frame::{ColorImage, DepthMap, GrayImage};
 use bokehcam::recording::tum::{Writer, WriterOptions, Written};
 use bokehcam::source::{Options, Source, SourceName};
@@ -103,8 +103,8 @@ pub fn run(command: &RecordCommand, global: &options::Global, given: &Given) -> 
             };
             if let Some(source) = &mut source {
                 source.rectify(&mut color);
-                let right = (info.brings == Brings::RightEye).then_some(&right);
-                source.read(Seen { stamp, color: &color, right }, &mut depth)?;
+                let right = (info.brings == Brings::RightCamera).then_some(&right);
+                source.read(FrameInput { stamp, color: &color, right }, &mut depth)?;
             }
             let has_depth = source.is_some() || info.brings == Brings::Depth;
             let doubt = describe_implausible(&depth, writer.max_depth_m());

@@ -36,8 +36,8 @@ use bokehcam::depth::focus::FocusRule;
 use bokehcam::link::demand::Demand;
 use bokehcam::look::{Look, Strength};
 use bokehcam::pipeline::{self, Blurring, Pace, PipelineError, Run};
-use bokehcam::sink::{self, Backpressure, Release, Shutter, Sink, Target};
-use bokehcam::source::{self, DepthChoice, DepthFrom, Source, SourceName};
+use bokehcam::sink::{self, Backpressure, Shutter, ShutterControl, Sink, Target};
+use bokehcam::source::{self, DepthChoice, DepthOrigin, Source, SourceName};
 use bokehcam::stats::Report;
 
 /// Blur a camera, a recording, the demonstration or the synthetic scene, frame by frame
@@ -155,7 +155,7 @@ impl Opened {
         if !plausible::warn_of_source(&source, &look, &options)
             && let Some(map) = source.first_depth.as_ref()
         {
-            focus::warn_of_focus(&look, info.size, map, source.depth_from == DepthFrom::Units);
+            focus::warn_of_focus(&look, info.size, map, source.depth_from == DepthOrigin::Units);
         }
         Ok(Self { source, options, info, look, pace, unused })
     }
@@ -188,7 +188,7 @@ impl StreamCommand {
             out_size: stream.out_size.map(|size| (size.width, size.height)),
             threads: options.computing.threads,
             demand: demand.cloned(),
-            stands_for: self.source.shared().map(str::to_owned),
+            filter_target: self.source.shared().map(str::to_owned),
             stop: Arc::clone(stop),
             ..sink::Options::new(info.size, info.period_ns)
         };
@@ -226,7 +226,7 @@ impl StreamCommand {
         &self,
         claim: Result<Claim, String>,
         opened: &Opened,
-        (demand, release, stats): (Option<Demand>, Release, Arc<RunStats>),
+        (demand, release, stats): (Option<Demand>, ShutterControl, Arc<RunStats>),
         looks: LookChanger,
         config: Option<&Path>,
     ) -> Result<Option<ControlServer>, CliError> {

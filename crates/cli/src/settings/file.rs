@@ -39,7 +39,7 @@ impl SettingsFile {
             (None, Some(user)) if user.is_file() => user,
             _ => return Ok(Self::default()),
         };
-        let text = input::read_text(&path, input::MOST_SETTINGS_BYTES).map_err(CliError::io(&path))?;
+        let text = input::read_text(&path, input::MAX_SETTINGS_BYTES).map_err(CliError::io(&path))?;
         Self::parse(&path, &text)
     }
 

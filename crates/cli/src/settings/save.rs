@@ -67,7 +67,7 @@ pub fn file_to_save(chosen: Option<&Path>) -> Result<PathBuf, CliError> {
 pub fn edit(path: &Path, change: impl FnOnce(&mut DocumentMut) -> Option<()>) -> Result<(), CliError> {
     // A symbolic link, for example into a repository of settings, is followed and not replaced.
     let path = &link_target(path)?;
-    let text = match input::read_text(path, input::MOST_SETTINGS_BYTES) {
+    let text = match input::read_text(path, input::MAX_SETTINGS_BYTES) {
         Err(error) if error.kind() == io::ErrorKind::NotFound => String::new(),
         read => read.map_err(CliError::io(path))?,
     };

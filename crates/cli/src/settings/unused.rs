@@ -6,7 +6,7 @@ use super::layers::Setting;
 use super::table::{WINDOW_START, WINDOW_STATE, given_variable};
 use crate::log;
 use bokehcam::look::{Effect, Value};
-use bokehcam::source::{DepthFrom, Kind};
+use bokehcam::source::{DepthOrigin, Kind};
 
 /// Facts of a run that decide which settings have an effect.
 #[derive(Clone, Copy, Debug)]
@@ -14,7 +14,7 @@ pub struct Run {
     /// Origin of the frames.
     pub source: From,
     /// Origin of the depth.
-    pub depth: DepthFrom,
+    pub depth: DepthOrigin,
     /// Whether the effect uses depth.
     pub uses_depth: bool,
     /// Effect of the blur.
@@ -36,7 +36,7 @@ impl Default for Run {
     fn default() -> Self {
         Self {
             source: From::Picture,
-            depth: DepthFrom::Nothing,
+            depth: DepthOrigin::Nothing,
             uses_depth: false,
             effect: Effect::None,
             lens: false,
@@ -78,34 +78,34 @@ const NEEDS_OF_SOURCE: &[Need] = &[
 /// Other conditions.
 const NEEDS: &[Need] = &[
     (&["depth-scale", "depth-invalid"], |run| match run.depth {
-        DepthFrom::Nothing => Some(NO_DEPTH),
-        DepthFrom::Metres | DepthFrom::Eyes => Some("this depth is in metres already"),
-        DepthFrom::Relative => Some("relative depth has no scale"),
-        DepthFrom::Networks => Some("networks give no depth pictures"),
-        DepthFrom::Plate => Some("a plate gives no depth pictures"),
-        DepthFrom::Units if run.uses_depth => None,
-        DepthFrom::Units => Some(DEPTH_UNUSED),
+        DepthOrigin::Nothing => Some(NO_DEPTH),
+        DepthOrigin::Metres | DepthOrigin::Eyes => Some("this depth is in metres already"),
+        DepthOrigin::Relative => Some("relative depth has no scale"),
+        DepthOrigin::Networks => Some("networks give no depth pictures"),
+        DepthOrigin::Plate => Some("a plate gives no depth pictures"),
+        DepthOrigin::Units if run.uses_depth => None,
+        DepthOrigin::Units => Some(DEPTH_UNUSED),
     }),
     (&["depth-unit"], |run| match run.depth {
-        DepthFrom::Units | DepthFrom::Relative | DepthFrom::Metres => None,
-        DepthFrom::Nothing => Some(NO_DEPTH),
+        DepthOrigin::Units | DepthOrigin::Relative | DepthOrigin::Metres => None,
+        DepthOrigin::Nothing => Some(NO_DEPTH),
         _ => Some("depth comes from no pictures of it"),
     }),
     (&["depth-invert"], |run| {
-        (run.depth != DepthFrom::Relative).then_some("only inverse depth is inverted: add --depth-unit inverse")
+        (run.depth != DepthOrigin::Relative).then_some("only inverse depth is inverted: add --depth-unit inverse")
     }),
     (&["max-disparity", "rectified", "calib", "focal-px", "baseline-m", "doffs-px"], |run| {
-        (run.depth != DepthFrom::Eyes).then_some("depth is not taken from two eyes")
+        (run.depth != DepthOrigin::Eyes).then_some("depth is not taken from two eyes")
     }),
     (&["network-runtime", "network-range", "network-order"], |run| {
-        (run.depth != DepthFrom::Networks).then_some("no network makes the depth")
+        (run.depth != DepthOrigin::Networks).then_some("no network makes the depth")
     }),
     (&["focus"], |run| if run.lens { None } else { needs_dof(run) }),
     (&["focus-range", "method"], needs_dof),
     (&["refine"], |run| if run.source == From::Bench { Some("the scene's depth is exact") } else { needs_dof(run) }),
     (&["background-memory"], |run| match (run.source, run.depth) {
         (From::Picture | From::Bench, _) => Some("a picture on its own has nothing to remember"),
-        (_, DepthFrom::Plate) => Some("the plate has what lies behind"),
+        (_, DepthOrigin::Plate) => Some("the plate has what lies behind"),
         _ => needs_dof(run),
     }),
     (&["behind"], |run| if run.source == From::Bench { Some("the scene is its own") } else { needs_dof(run) }),
@@ -136,7 +136,7 @@ const DEPTH_UNUSED: &str = "the effect does not use depth";
 fn needs_dof(run: &Run) -> Option<&'static str> {
     match (run.effect, run.depth) {
         (effect, _) if effect.follows_depth() => None,
-        (_, DepthFrom::Nothing) => Some(NO_DEPTH),
+        (_, DepthOrigin::Nothing) => Some(NO_DEPTH),
         _ => Some(DEPTH_UNUSED),
     }
 }
@@ -148,7 +148,7 @@ fn needs_blur(run: &Run) -> Option<&'static str> {
 
 /// Condition of executor settings: a blur or a stereo match to compute.
 fn needs_executor(run: &Run) -> Option<&'static str> {
-    needs_blur(run).filter(|_| run.depth != DepthFrom::Eyes)
+    needs_blur(run).filter(|_| run.depth != DepthOrigin::Eyes)
 }
 
 /// Condition of window settings: a window.
@@ -254,7 +254,7 @@ mod tests {
 
     const RUN: Run = Run {
         source: From::Picture,
-        depth: DepthFrom::Nothing,
+        depth: DepthOrigin::Nothing,
         uses_depth: false,
         effect: Effect::Blur,
         lens: false,
@@ -283,12 +283,12 @@ mod tests {
         let why = |name: &str, run: &Run| unused(&[setting(name)], run).first().map(|(_, why)| *why);
         assert_eq!(why("focus", &RUN), Some(NO_DEPTH));
         assert_eq!(why("focus", &Run { lens: true, ..RUN }), None);
-        let dof = Run { depth: DepthFrom::Units, uses_depth: true, effect: Effect::Dof, ..RUN };
+        let dof = Run { depth: DepthOrigin::Units, uses_depth: true, effect: Effect::Dof, ..RUN };
         for name in ["focus", "refine", "focus-range", "depth-scale", "method"] {
             assert_eq!(why(name, &dof), None, "{name}");
-            assert_eq!(why(name, &Run { depth: DepthFrom::Nothing, ..RUN }), Some(NO_DEPTH), "{name}");
+            assert_eq!(why(name, &Run { depth: DepthOrigin::Nothing, ..RUN }), Some(NO_DEPTH), "{name}");
         }
-        assert!(why("depth-scale", &Run { depth: DepthFrom::Eyes, ..dof }).is_some());
+        assert!(why("depth-scale", &Run { depth: DepthOrigin::Eyes, ..dof }).is_some());
         assert!(why("tilt", &dof).is_some() && why("tilt", &Run { effect: Effect::TiltShift, ..RUN }).is_none());
         assert!(why("budget-ms", &dof).is_some() && why("budget-ms", &Run { realtime: true, ..dof }).is_none());
         assert!(why("rim", &Run { effect: Effect::None, ..dof }).is_some() && why("rim", &dof).is_none());

@@ -13,7 +13,7 @@ use bokehcam::capture::v4l2::V4l2Camera;
 use bokehcam::capture::{Captured, PATIENCE};
 use bokehcam::frame::ColorImage;
 use bokehcam::layout::Content;
-use bokehcam::v4l2::live::Wish;
+use bokehcam::v4l2::live::ModeRequest;
 use bokehcam::v4l2::node::nodes;
 use bokehcam::v4l2::{Device, FourCc, controls};
 
@@ -211,12 +211,12 @@ pub fn until(what: &str, mut is: impl FnMut() -> bool) {
 }
 
 /// What is asked of a camera.
-pub fn wish(size_px: (u32, u32), fps: f64, fourcc: Option<FourCc>) -> Wish {
-    Wish { size_px: Some(size_px), fps: Some(fps), fourcc, ..Wish::any(Content::Color) }
+pub fn wish(size_px: (u32, u32), fps: f64, fourcc: Option<FourCc>) -> ModeRequest {
+    ModeRequest { size_px: Some(size_px), fps: Some(fps), fourcc, ..ModeRequest::any(Content::Color) }
 }
 
 /// Opens a camera, in a mode that it has.
-pub fn open(node: &str, wish: Wish) -> V4l2Camera {
+pub fn open(node: &str, wish: ModeRequest) -> V4l2Camera {
     V4l2Camera::open(node, wish, Vec::new(), None).unwrap()
 }
 

@@ -20,11 +20,11 @@ use tempfile::TempDir;
 struct Counting;
 
 static TAKEN: AtomicUsize = AtomicUsize::new(0);
-static MOST: AtomicUsize = AtomicUsize::new(0);
+static PEAK: AtomicUsize = AtomicUsize::new(0);
 
 fn took(bytes: usize) {
     let taken = TAKEN.fetch_add(bytes, Ordering::Relaxed) + bytes;
-    MOST.fetch_max(taken, Ordering::Relaxed);
+    PEAK.fetch_max(taken, Ordering::Relaxed);
 }
 
 // SAFETY: every call goes to the system's allocator as it is; counting touches nothing of it.
@@ -61,9 +61,9 @@ fn alone() -> MutexGuard<'static, ()> {
 /// The most bytes that `work` took at once.
 fn most_bytes<T>(work: impl FnOnce() -> T) -> (usize, T) {
     let before = TAKEN.load(Ordering::Relaxed);
-    MOST.store(before, Ordering::Relaxed);
+    PEAK.store(before, Ordering::Relaxed);
     let result = work();
-    (MOST.load(Ordering::Relaxed).saturating_sub(before), result)
+    (PEAK.load(Ordering::Relaxed).saturating_sub(before), result)
 }
 
 const MIB: usize = 1 << 20;

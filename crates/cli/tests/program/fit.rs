@@ -4,7 +4,7 @@
 use std::path::Path;
 use std::process::{Command, Stdio};
 
-use bokehcam::depth::agreement::Agreement;
+use bokehcam::depth::agreement::EdgeAlignment;
 use bokehcam::engine::still::{Depth, coc_and_depth};
 use bokehcam::frame::{ColorImage, DepthMap};
 use bokehcam::look::{Look, Refine};
@@ -65,22 +65,22 @@ fn quarter(map: &DepthMap) -> DepthMap {
 #[test]
 fn it_is_seen_how_outlines_lie() {
     let (color, map) = portrait();
-    assert_eq!(Agreement::of(&map, &color), Agreement::Meets);
+    assert_eq!(EdgeAlignment::of(&map, &color), EdgeAlignment::Meets);
     for reach in [4, 8] {
-        let found = Agreement::of(&fat(&map, reach), &color);
-        let Agreement::Beside { distance_px } = found else { panic!("fat by {reach} px: {found:?}") };
+        let found = EdgeAlignment::of(&fat(&map, reach), &color);
+        let EdgeAlignment::Beside { distance_px } = found else { panic!("fat by {reach} px: {found:?}") };
         assert!((distance_px + reach as i32).abs() <= 1, "fat by {reach} px: {distance_px}");
     }
-    let found = Agreement::of(&soft(&map, 4), &color);
-    assert!(matches!(found, Agreement::Soft { width_px: 6..=14 }), "{found:?}");
-    assert_eq!(Agreement::of(&mirrored(&map), &color), Agreement::Unrelated);
+    let found = EdgeAlignment::of(&soft(&map, 4), &color);
+    assert!(matches!(found, EdgeAlignment::Soft { width_px: 6..=14 }), "{found:?}");
+    assert_eq!(EdgeAlignment::of(&mirrored(&map), &color), EdgeAlignment::Unrelated);
     // Nothing to compare.
     let wall = DepthMap { metres: vec![3.0; map.metres.len()], ..map.clone() };
     let unknown = DepthMap { metres: vec![0.0; map.metres.len()], ..map.clone() };
     for map in [&wall, &unknown, &DepthMap::default()] {
-        assert_eq!(Agreement::of(map, &color), Agreement::Unknown);
+        assert_eq!(EdgeAlignment::of(map, &color), EdgeAlignment::Unknown);
     }
-    assert_eq!(Agreement::of(&map, &ColorImage::new(640, 360)), Agreement::Unknown);
+    assert_eq!(EdgeAlignment::of(&map, &ColorImage::new(640, 360)), EdgeAlignment::Unknown);
 }
 
 /// How far the CoC is off, on average, in pixels.

@@ -6,7 +6,7 @@ use std::process::{Command, Output};
 
 use bokehcam::color::{linear_to_srgb, srgb_to_linear};
 use bokehcam::depth::plate::{PlateDepth, Step};
-use bokehcam::depth::{DepthSource, Seen};
+use bokehcam::depth::{DepthSource, FrameInput};
 use bokehcam::frame::{ColorImage, DepthMap, Stamp};
 use bokehcam::recording::still;
 
@@ -121,7 +121,7 @@ impl Watched {
         let (color, covered) = Shown { frame: self.frame, ..shown }.picture();
         let time_ns = u64::from(self.frame) * FRAME_NS;
         let stamp = Stamp { index: self.frame as usize, time_ns, captured_ns: None };
-        self.source.read(Seen { stamp, color: &color, right: None }, &mut self.map).unwrap();
+        self.source.read(FrameInput { stamp, color: &color, right: None }, &mut self.map).unwrap();
         let share = |of: bool| {
             let near = |at: &usize| self.map.metres[*at] <= 1.0;
             let all: Vec<usize> = (0..covered.len()).filter(|&at| covered[at] == of).collect();
@@ -191,7 +191,7 @@ fn another_picture_is_said_and_all_is_blurred() {
         pixel.copy_from_slice(&[code, 255 - code, code / 2]);
     });
     let stamp = Stamp { index: 0, time_ns: 0, captured_ns: None };
-    watched.source.read(Seen { stamp, color: &picture, right: None }, &mut watched.map).unwrap();
+    watched.source.read(FrameInput { stamp, color: &picture, right: None }, &mut watched.map).unwrap();
     assert_eq!(watched.source.guide().step(), Step::Unlike);
     assert!(watched.map.metres.iter().all(|&metres| metres > 100.0) && watched.map.matte.pixels.is_empty());
     // It is the room again.
@@ -219,7 +219,7 @@ fn a_plate_is_taken_once_the_person_has_gone() {
     assert_eq!(steps.last(), Some(&Step::Ready));
     let (step, found, mistaken) = watched.see(PERSON);
     assert!(step == Step::Ready && found > 0.99 && mistaken < 0.002, "{found} {mistaken}");
-    watched.source.guide().take_again();
+    watched.source.guide().request_capture();
     assert_eq!(watched.see(PERSON).0, Step::StepOut(3));
 }
 

@@ -35,10 +35,10 @@ pub fn middle(image: &ColorImage) -> ColorImage {
 
 /// Whether there is a photograph in the middle, not an empty window nor text: by how many colours there are.
 pub fn is_photograph(image: &ColorImage) -> bool {
-    const LEAST: usize = 150;
+    const MIN_COLOURS: usize = 150;
     let middle = middle(image);
     let colours: HashSet<[u8; 3]> = middle.rgb.as_chunks::<3>().0.iter().map(|rgb| rgb.map(|byte| byte / 8)).collect();
-    colours.len() > LEAST
+    colours.len() > MIN_COLOURS
 }
 
 /// How far two pictures of one size are from each other: the mean over all bytes, 0 to 255.

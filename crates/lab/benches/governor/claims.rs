@@ -7,9 +7,9 @@ use super::rivals::{Ours, Picker, Pid};
 /// Time for one frame, in units of the load.
 pub const BUDGET: f64 = 5.0;
 /// Share of the frames that may be over the budget.
-const MOST_MISSES: f64 = 0.015;
+const MAX_MISSES: f64 = 0.015;
 /// Changes of rung a minute.
-const MOST_SWITCHES: f64 = 6.0;
+const MAX_SWITCHES: f64 = 6.0;
 
 /// A machine, how well its costs are known, and within how many frames a step of the load is settled.
 #[derive(Clone, Copy)]
@@ -91,9 +91,9 @@ impl Case {
     pub fn broken(&self, Outcome { ours, equal, .. }: &Outcome) -> Vec<String> {
         let settled = [("rise", false, 0.95, self.rise_frames), ("fall", true, 0.5, self.fall_frames)];
         let claims = [
-            (ours.misses() <= MOST_MISSES, format!("{:.2} % misses", 100.0 * ours.misses())),
+            (ours.misses() <= MAX_MISSES, format!("{:.2} % misses", 100.0 * ours.misses())),
             (
-                ours.switches_per_minute() <= MOST_SWITCHES,
+                ours.switches_per_minute() <= MAX_SWITCHES,
                 format!("{:.1} switches a minute", ours.switches_per_minute()),
             ),
             (

@@ -9,7 +9,7 @@
 use bokehcam::bokeh::BokehError;
 use bokehcam::budget::Quality;
 use bokehcam::color::light_of_codes;
-use bokehcam::depth::matting::mask::{Backdrop, MaskMatting};
+use bokehcam::depth::matting::mask::{BackgroundPlate, MaskMatting};
 use bokehcam::frame::{ColorImage, DepthMap, Mask, luma_of};
 use bokehcam::optics::DepthCoc;
 use serde::Serialize;
@@ -238,13 +238,13 @@ fn guided(given: &Given, image: &ColorImage) -> Plane<f32> {
         };
         line(&line(&own, 1, 0), 0, 1)
     };
-    let (of_luma, of_share) = (mean(&|k| luma.data[k]), mean(&|k| share.data[k]));
+    let (of_luma, of_fraction) = (mean(&|k| luma.data[k]), mean(&|k| share.data[k]));
     let (product, square) = (mean(&|k| luma.data[k] * share.data[k]), mean(&|k| luma.data[k] * luma.data[k]));
     let slope = |k: usize| {
-        (product.data[k] - of_luma.data[k] * of_share.data[k])
+        (product.data[k] - of_luma.data[k] * of_fraction.data[k])
             / (square.data[k] - of_luma.data[k] * of_luma.data[k] + GUIDED)
     };
-    let (slopes, offsets) = (mean(&slope), mean(&|k| of_share.data[k] - slope(k) * of_luma.data[k]));
+    let (slopes, offsets) = (mean(&slope), mean(&|k| of_fraction.data[k] - slope(k) * of_luma.data[k]));
     Plane::from_fn(width, height, |x, y| {
         let k = y * width + x;
         (slopes.data[k] * luma.data[k] + offsets.data[k]).clamp(0.0, 1.0)
@@ -254,7 +254,7 @@ fn guided(given: &Given, image: &ColorImage) -> Plane<f32> {
 fn matte(given: &Given, behind: Option<&ColorImage>, image: &ColorImage) -> DepthMap {
     let light = light_of_codes();
     let light = [*light; 3];
-    let backdrop = behind.map(|color| Backdrop { color, light: &light, shift_px: [0; 2] });
+    let backdrop = behind.map(|color| BackgroundPlate { color, light: &light, shift_px: [0; 2] });
     let mut map = DepthMap::new(image.width, image.height);
     map.metres.fill(DepthMap::FAR_M);
     MaskMatting::default().find(&given.mask, image, backdrop.as_ref(), &mut map);

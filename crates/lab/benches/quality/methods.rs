@@ -9,8 +9,8 @@ use bokehcam::compute::thread_pool::ThreadPool;
 use bokehcam::depth::background::Background;
 use bokehcam::depth::fill::Filler;
 use bokehcam::depth::matting::{self, Matting};
-use bokehcam::depth::misfit::Misfit;
-use bokehcam::depth::refine::{Mending, Refiner};
+use bokehcam::depth::misfit::Misalignment;
+use bokehcam::depth::refine::{MapCorrection, Refiner};
 use bokehcam::frame::{ColorImage, DepthMap};
 use bokehcam::link::pool::Pooled;
 use bokehcam::optics::CocKind;
@@ -126,7 +126,7 @@ pub struct Blurrer {
     bokeh: Option<Box<dyn Bokeh>>,
     filler: Filler,
     refiner: Refiner,
-    mending: Mending,
+    mending: MapCorrection,
     matting: Matting,
     background: Background,
     time_ns: u64,
@@ -167,7 +167,7 @@ impl Blurrer {
     fn of(method: Method, bokeh: Option<Box<dyn Bokeh>>) -> Self {
         let (filler, refiner) = (Filler::new(), Refiner::new());
         let (matting, background) = (Matting::default(), Background::default());
-        let mending = Mending::default();
+        let mending = MapCorrection::default();
         Self { method, bokeh, filler, refiner, mending, matting, background, time_ns: 0 }
     }
 
@@ -202,7 +202,8 @@ impl Blurrer {
             }
             Method::Refined => {
                 let mut depth = shot.depth.clone();
-                let mending = Misfit::of(&depth, &shot.image).and_then(|misfit| misfit.mending(&depth, &shot.image));
+                let mending =
+                    Misalignment::of(&depth, &shot.image).and_then(|misfit| misfit.mending(&depth, &shot.image));
                 let mending = mending.unwrap_or_default();
                 if self.mending != mending {
                     (self.mending, self.refiner) = (mending, Refiner::mending(mending));

@@ -13,13 +13,13 @@ use super::picture::{Plane, Rgb, by_rows};
 /// The classical renderer of BokehMe (Peng et al., CVPR 2022), with its weight
 /// `(0.5 + 0.5 tanh(4 (R - d))) / (R^2 + 0.2)` at distance d; for a polygon d is taken relative to the outline.
 pub fn scatter(image: &Plane<Rgb>, coc_px: &Plane<f32>, shape: &Shape) -> Plane<Rgb> {
-    let most_px = coc_px.data.iter().fold(0f32, |most, c| most.max(c.abs())) as i32 + 1;
+    let max_px = coc_px.data.iter().fold(0f32, |most, c| most.max(c.abs())) as i32 + 1;
     let (width, height) = (image.width as i32, image.height as i32);
     let mut out = vec![[0.0; 3]; image.data.len()];
     by_rows(&mut out, image.width, |y, row| {
         let mut sums = vec![[0f32; 4]; row.len()];
         let y = y as i32;
-        for from_y in (y - most_px).max(0)..=(y + most_px).min(height - 1) {
+        for from_y in (y - max_px).max(0)..=(y + max_px).min(height - 1) {
             for from_x in 0..width {
                 let at = (from_y * width + from_x) as usize;
                 let (radius_px, [r, g, b]) = (coc_px.data[at].abs(), image.data[at]);
@@ -64,10 +64,10 @@ pub fn golden_angle(image: &Plane<Rgb>, coc_px: &Plane<f32>) -> Plane<Rgb> {
     /// Distance between samples; the smaller, the denser. At 1/3 there are more samples than pixels.
     const PITCH: f32 = 1.0 / 3.0;
     let golden = PI * (3.0 - 5f32.sqrt());
-    let most_px = coc_px.data.iter().fold(0f32, |most, c| most.max(c.abs()));
+    let max_px = coc_px.data.iter().fold(0f32, |most, c| most.max(c.abs()));
     let mut spiral = Vec::new();
     let (mut radius_px, mut angle) = (PITCH, 0f32);
-    while radius_px < most_px {
+    while radius_px < max_px {
         spiral.push((angle.cos() * radius_px, angle.sin() * radius_px, radius_px));
         angle += golden;
         radius_px += PITCH / radius_px;
@@ -109,14 +109,14 @@ pub fn gaussian(image: &Plane<Rgb>, coc_px: &Plane<f32>) -> Plane<Rgb> {
 /// the blending weights that a network makes of it.
 pub fn blended(image: &Plane<Rgb>, coc_px: &Plane<f32>) -> Plane<Rgb> {
     const COPIES: usize = 3;
-    let most_px = coc_px.data.iter().fold(0f32, |most, c| most.max(c.abs())).max(1e-3);
-    let radius_px = |copy: usize| most_px * copy as f32 / COPIES as f32;
+    let max_px = coc_px.data.iter().fold(0f32, |most, c| most.max(c.abs())).max(1e-3);
+    let radius_px = |copy: usize| max_px * copy as f32 / COPIES as f32;
     let copies: Vec<Plane<Rgb>> = (0..=COPIES)
         .map(|copy| if copy == 0 { image.clone() } else { smoothed(image, 0.5 * radius_px(copy)) })
         .collect();
     Plane::from_fn(image.width, image.height, |x, y| {
         let at = y * image.width + x;
-        let place = coc_px.data[at].abs() / most_px * COPIES as f32;
+        let place = coc_px.data[at].abs() / max_px * COPIES as f32;
         let below = (place as usize).min(COPIES - 1);
         let (a, b, share) = (copies[below].data[at], copies[below + 1].data[at], place - below as f32);
         [0, 1, 2].map(|k| a[k] + share * (b[k] - a[k]))

@@ -12,7 +12,7 @@ use bokehcam::budget::Quality;
 use bokehcam::compute::thread_pool::cores;
 use bokehcam::depth::plate::{Capture, Companion, PlateDepth, Taken};
 use bokehcam::depth::single_camera::{Hints, SingleCamera};
-use bokehcam::depth::{DepthSource, Seen};
+use bokehcam::depth::{DepthSource, FrameInput};
 use bokehcam::frame::{ColorImage, DepthMap, Mask, Stamp};
 use bokehcam::network::{self, Runtime, Task};
 use bokehcam_lab::scene::{Scene, Situation, ThinLens, View};
@@ -143,7 +143,7 @@ fn depths(staged: &Staged) -> Vec<(&'static str, DepthMap)> {
             let color = with_noise(&staged.color, staged.noise, 100 + frame);
             let stamp = Stamp { index: frame as usize, time_ns: frame * 33_333_333, captured_ns: None };
             // A source that fails has nothing to be measured.
-            if source.read(Seen { stamp, color: &color, right: None }, &mut map).is_err() {
+            if source.read(FrameInput { stamp, color: &color, right: None }, &mut map).is_err() {
                 break;
             }
         }
@@ -156,7 +156,7 @@ fn depths(staged: &Staged) -> Vec<(&'static str, DepthMap)> {
 fn plate(staged: &Staged) -> ColorImage {
     let mut capture = Capture::default();
     (0..)
-        .find_map(|frame| match capture.add_any(&with_noise(&staged.room, staged.noise, frame)) {
+        .find_map(|frame| match capture.add_unchecked(&with_noise(&staged.room, staged.noise, frame)) {
             Taken::Whole(plate) => Some(plate),
             Taken::More(_) | Taken::Moved => None,
         })

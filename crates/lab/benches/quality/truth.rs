@@ -33,8 +33,8 @@ pub struct Views {
 /// The cache cannot be written.
 pub fn views(scene: &Scene, name: &str, cache: &Path) -> io::Result<Views> {
     let views = without_truth(scene);
-    let most_px = views.coc_px.data.iter().fold(0f32, |most, c| most.max(c.abs()));
-    let rays = (RAYS.1 * most_px * most_px).clamp(RAYS.0, RAYS.2) as usize;
+    let max_px = views.coc_px.data.iter().fold(0f32, |most, c| most.max(c.abs()));
+    let rays = (RAYS.1 * max_px * max_px).clamp(RAYS.0, RAYS.2) as usize;
     let file = cache.join(format!("{name}-{:016x}.png", key(scene, rays)));
     let truth = match sheet::read(&file) {
         Some(truth) => truth,

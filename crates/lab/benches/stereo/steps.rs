@@ -34,9 +34,9 @@ pub fn run(out: &Path, options: &Options) -> Outcome {
     fs::create_dir_all(out)?;
     keep(out, "left", &frame.left)?;
     keep(out, "right", &frame.right)?;
-    let most_px = sequence.disparities as f32;
+    let max_px = sequence.disparities as f32;
     if let Some(truth) = &frame.truth {
-        keep(out, "true", &painted(&truth.data, (width, height), most_px))?;
+        keep(out, "true", &painted(&truth.data, (width, height), max_px))?;
     }
     for effort in [Effort::Fast, Effort::Full] {
         let mut matcher = matcher::create(options, effort, sequence.disparities, (width, height), None)?;
@@ -50,9 +50,9 @@ pub fn run(out: &Path, options: &Options) -> Outcome {
                 continue;
             }
             let refined: Vec<f32> = depth.metres.iter().map(|&z_m| sequence.rig.disparity_px(z_m)).collect();
-            keep(out, &format!("matched-{}", name(effort)), &painted(&map.px, (width, height), most_px))?;
+            keep(out, &format!("matched-{}", name(effort)), &painted(&map.px, (width, height), max_px))?;
             if effort == Effort::Full {
-                keep(out, "refined", &painted(&refined, (width, height), most_px))?;
+                keep(out, "refined", &painted(&refined, (width, height), max_px))?;
                 let shot = shot(&frame.left, &depth);
                 keep(out, "blurred", &Blurrer::new(Method::Layered(Quality::default()), &shot)?.blur(&shot)?)?;
             }
@@ -73,12 +73,12 @@ fn keep(out: &Path, name: &str, image: &ColorImage) -> Outcome {
 
 /// A picture of disparities: from blue, far, over green to red, near; black is unknown. By square root, as most of a
 /// room lies far away.
-fn painted(px: &[f32], (width, height): (u32, u32), most_px: f32) -> ColorImage {
+fn painted(px: &[f32], (width, height): (u32, u32), max_px: f32) -> ColorImage {
     let color = |&px: &f32| {
         if !(px > 0.0 && px.is_finite()) {
             return [0; 3];
         }
-        let nearness = (px / most_px).min(1.0).sqrt();
+        let nearness = (px / max_px).min(1.0).sqrt();
         // Three ramps: red rises last, green is highest in the middle, blue falls first.
         [nearness * 2.0 - 0.7, 1.0 - (nearness - 0.5).abs() * 2.2, 1.3 - nearness * 2.0]
             .map(|light| (255.0 * light.clamp(0.05, 1.0)) as u8)

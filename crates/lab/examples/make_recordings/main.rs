@@ -42,9 +42,9 @@ const HEXAGON_FRAMES: [u32; 1] = [0];
 /// Of the colours of the demonstration.
 const JPEG_QUALITY: u8 = 82;
 /// What the demonstration may lose by that.
-const LEAST_PSNR_DB: f64 = 34.0;
+const MIN_PSNR_DB: f64 = 34.0;
 /// What changes less in the demonstration, in parts of 255, stands still.
-const LEAST_CHANGE: u8 = 2;
+const MIN_CHANGE: u8 = 2;
 
 type Outcome = Result<(), Box<dyn Error>>;
 
@@ -100,7 +100,7 @@ fn make_portrait(folder: &mut Folder) -> Outcome {
 fn make_stereo(folder: &mut Folder) -> Outcome {
     let scene = Scene::portrait();
     let left = View::new(SIZE_PX.0, SIZE_PX.1);
-    let right = left.right_eye(BASELINE_M);
+    let right = left.right_camera(BASELINE_M);
     folder.text("calib.txt", &calibration_text(&left))?;
     let mut times = String::new();
     let (mut picture, mut map) = (ColorImage::default(), DepthMap::default());
@@ -143,8 +143,7 @@ fn make_demo(folder: &mut Folder) -> Outcome {
         .map(|(pixel, level)| {
             let rgb = &frames[0].0[3 * pixel..][..3];
             frames.iter().any(|(other, levels)| {
-                levels[pixel] != *level
-                    || rgb.iter().zip(&other[3 * pixel..]).any(|(a, b)| a.abs_diff(*b) > LEAST_CHANGE)
+                levels[pixel] != *level || rgb.iter().zip(&other[3 * pixel..]).any(|(a, b)| a.abs_diff(*b) > MIN_CHANGE)
             })
         })
         .collect();
@@ -192,7 +191,7 @@ fn check_demo(folder: &mut Folder, render: impl Fn(u32) -> (ColorImage, DepthMap
         let psnr_db = 10.0 * (255.0f64.powi(2) * color.rgb.len() as f64 / squares.sum::<f64>()).log10();
         let levels = |map: &DepthMap| map.metres.iter().map(|&z_m| i32::from(demo::level(z_m))).collect::<Vec<_>>();
         let name = format!("frame {frame}, {psnr_db:.1} dB");
-        folder.compare(&name, psnr_db >= LEAST_PSNR_DB, levels(&depth).iter().zip(levels(&map)).map(|(a, b)| a - b));
+        folder.compare(&name, psnr_db >= MIN_PSNR_DB, levels(&depth).iter().zip(levels(&map)).map(|(a, b)| a - b));
     }
     Ok(())
 }

@@ -19,18 +19,18 @@ pub struct View {
     /// Focal length in pixels, for this width.
     pub focal_px: f32,
     /// Position of the camera along `x`: 0 for the left (or only) one, the baseline in metres for the right one.
-    pub eye_offset_m: f32,
+    pub camera_offset_m: f32,
 }
 
 impl View {
     /// Creates the view that the portrait was composed for: the focal length equals the picture's width (53 degrees).
     pub fn new(width: u32, height: u32) -> Self {
-        Self { width, height, focal_px: width as f32, eye_offset_m: 0.0 }
+        Self { width, height, focal_px: width as f32, camera_offset_m: 0.0 }
     }
 
     /// Returns this camera moved to the right by `baseline_m`.
-    pub fn right_eye(self, baseline_m: f32) -> Self {
-        Self { eye_offset_m: self.eye_offset_m + baseline_m, ..self }
+    pub fn right_camera(self, baseline_m: f32) -> Self {
+        Self { camera_offset_m: self.camera_offset_m + baseline_m, ..self }
     }
 
     /// Returns column and row of the optical axis; pixel centres are at integers.
@@ -45,7 +45,7 @@ impl View {
     }
 
     fn eye(&self) -> Vec3 {
-        self.eye_offset_m * Vec3::X
+        self.camera_offset_m * Vec3::X
     }
 
     fn pinhole_ray(&self, p_px: Vec2) -> Ray {

@@ -239,8 +239,8 @@ fn holes_take_the_nearest_depth() {
 fn every_scene_fits_its_lens() {
     for kind in &scenes::KINDS {
         let scene = (kind.at)(0);
-        let most_px = scene.coc().data.iter().fold(f32::NEG_INFINITY, |most, &c| most.max(c));
-        assert!(most_px < scene.coc_at_infinity_px, "{}: {most_px}", kind.name);
+        let max_px = scene.coc().data.iter().fold(f32::NEG_INFINITY, |most, &c| most.max(c));
+        assert!(max_px < scene.coc_at_infinity_px, "{}: {max_px}", kind.name);
         assert_eq!(scene.size(), scenes::SIZE);
     }
     let moving = scenes::KINDS.iter().filter(|kind| kind.moves);

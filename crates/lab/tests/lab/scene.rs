@@ -11,7 +11,7 @@ const COC_AT_INFINITY_PX: f32 = 14.0;
 const FOCUS_M: f32 = 1.2;
 
 fn view() -> View {
-    View { width: 97, height: 81, focal_px: 600.0, eye_offset_m: 0.0 }
+    View { width: 97, height: 81, focal_px: 600.0, camera_offset_m: 0.0 }
 }
 
 /// A light on the ray of the picture's middle, `radius_px` wide to either side when sharp.
@@ -99,12 +99,12 @@ fn light_is_neither_made_nor_lost_and_clipping_comes_before_the_lens() {
 #[test]
 fn the_right_eye_sees_a_plane_shifted_by_focal_length_times_baseline_over_depth() {
     let (depth_m, baseline_m) = (2.0, 0.06);
-    let view = View { width: 160, height: 60, focal_px: 400.0, eye_offset_m: 0.0 };
+    let view = View { width: 160, height: 60, focal_px: 400.0, camera_offset_m: 0.0 };
     let disparity_px = (view.focal_px * baseline_m / depth_m) as usize;
     assert_eq!(disparity_px, 12);
     let scene = Scene::wall(depth_m);
     let (left, depth) = pinhole(&scene, &view, 0.0, 4);
-    let (right, _) = pinhole(&scene, &view.right_eye(baseline_m), 0.0, 4);
+    let (right, _) = pinhole(&scene, &view.right_camera(baseline_m), 0.0, 4);
     assert!(depth.metres.iter().all(|z_m| (z_m - depth_m).abs() < 1e-5));
     let mut contrast = 0;
     for y in 0..60usize {

@@ -48,7 +48,7 @@ impl HeldBlur {
     /// fails.
     pub fn blur(&mut self, look: &Look, change: u64, services: &mut dyn Services) -> Result<Still, String> {
         let Still { number, images, coc, .. } = &self.held;
-        let fixed = if look.focus == self.focus { look.of_frame(coc, None) } else { look.clone() };
+        let fixed = if look.focus == self.focus { look.for_frame(coc, None) } else { look.clone() };
         let size = images.color.size();
         let plain = |error: BokehError| match error {
             BokehError::NoDepth => NO_DEPTH.to_owned(),

@@ -10,12 +10,12 @@ use std::sync::mpsc;
 use super::live::Live;
 use super::{Closed, Command, EventSender, SessionEvent, Start, held};
 use crate::services::Switch;
-use crate::state::{Output, Request, Source, Update, Way};
+use crate::state::{DepthMethod, Output, Request, Source, Update};
 use bokehcam::files::user_folders as folders;
 use bokehcam::link::demand::Watch;
 use bokehcam::look::Look;
 use bokehcam::pipeline::PipelineError;
-use bokehcam::sink::switch::{Fate, Notice};
+use bokehcam::sink::switch::{MemberState, Notice};
 use bokehcam::sink::{self, Target};
 use bokehcam::stats::Report;
 
@@ -24,7 +24,7 @@ pub(super) struct Host {
     /// Configuration; look, source and outputs are kept current.
     start: Start,
     /// Depth method that the user requested; `None` for the default.
-    way: Option<Way>,
+    way: Option<DepthMethod>,
     /// Held while an output is active, to keep the source from pausing.
     watch: Option<Watch>,
     events: EventSender,
@@ -87,7 +87,7 @@ impl Host {
                     Command::Request(request) => self.carry_out(request),
                     Command::Save(still, saving) => self.save(&still, &saving),
                     Command::Hold(still, is_behind) => self.hold(*still, is_behind),
-                    Command::Release => self.held = None,
+                    Command::ShutterControl => self.held = None,
                     Command::Copy(switches) => self.copy(&switches),
                     Command::OutputEvent(run, notice) => self.handle_output_event(run, &notice),
                     Command::Ended(run, ended) => self.handle_run_end(run, *ended),
@@ -127,8 +127,8 @@ impl Host {
                 self.open();
             }
             Request::TakePlate => match self.live.as_ref().and_then(|live| live.guide.as_ref()) {
-                Some(guide) => guide.take_again(),
-                None => self.set_depth_method(Way::Plate),
+                Some(guide) => guide.request_capture(),
+                None => self.set_depth_method(DepthMethod::Plate),
             },
             Request::DepthBy(way) => self.set_depth_method(way),
             Request::Begin(output) => {
@@ -169,7 +169,7 @@ impl Host {
     }
 
     /// Reopens the source with another depth method, if it supports that.
-    fn set_depth_method(&mut self, way: Way) {
+    fn set_depth_method(&mut self, way: DepthMethod) {
         if let Err(line) = self.start.services.can(&self.start.source, way) {
             return self.events.note(line);
         }
@@ -279,17 +279,17 @@ impl Host {
     /// Handles an event of an output of the run with number `run`.
     fn handle_output_event(&mut self, run: u64, Notice { member, fate }: &Notice) {
         match fate {
-            Fate::Began => self.events.note(match virtual_camera_name(member) {
+            MemberState::Began => self.events.note(match virtual_camera_name(member) {
                 Some(camera) => format!("Calls have this picture now: choose the camera {camera}"),
                 None => format!("Recording to {}", folders::shown_output(member)),
             }),
             // A virtual camera leaves no file to report.
-            Fate::Completed { .. } if virtual_camera_name(member).is_some() => {}
-            Fate::Completed { frames } => {
+            MemberState::Completed { .. } if virtual_camera_name(member).is_some() => {}
+            MemberState::Completed { frames } => {
                 self.events.note(format!("Complete: {}, {frames} frames", folders::shown_output(member)));
                 self.events.report_saved(Path::new(member));
             }
-            Fate::Failed { why, .. } => {
+            MemberState::Failed { why, .. } => {
                 tracing::error!("{why}");
                 self.failed.get_or_insert_with(|| why.clone());
                 self.events.send_update(Update::Trouble(why.clone()));

@@ -25,7 +25,7 @@ use bokehcam::link::Receiver;
 use bokehcam::link::demand::Demand;
 use bokehcam::look::Look;
 use bokehcam::pipeline::{PipelineError, View, Wanted};
-use bokehcam::sink::Release;
+use bokehcam::sink::ShutterControl;
 use bokehcam::sink::switch::Notice;
 use bokehcam::stats::Report;
 
@@ -59,12 +59,12 @@ pub struct Start {
     /// Whether outputs get the still card instead of the picture.
     pub off: Arc<AtomicBool>,
     /// Handle of the current run's outputs, to switch that.
-    pub release: CurrentRelease,
+    pub release: CurrentShutter,
 }
 
 /// The current run's switch that withholds pictures from the outputs. Set when a run begins; remote control locks it,
 /// too.
-pub type CurrentRelease = Arc<Mutex<Option<Release>>>;
+pub type CurrentShutter = Arc<Mutex<Option<ShutterControl>>>;
 
 /// Events from a session to the window.
 pub enum SessionEvent {
@@ -106,7 +106,7 @@ enum Command {
     Request(Request),
     Save(Box<Still>, SaveOptions),
     Hold(Box<Still>, bool),
-    Release,
+    ShutterControl,
     Copy(Vec<Switch>),
     /// An event of an output of the run with this number.
     OutputEvent(u64, Notice),
@@ -155,7 +155,7 @@ impl Session {
 
     /// Releases the held frame.
     pub fn let_go(&self) {
-        let _ = self.commands.send(Command::Release);
+        let _ = self.commands.send(Command::ShutterControl);
     }
 
     /// Requests the equivalent command for the clipboard; `switches` are the window's options.

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use super::{Camera, Output, Shown, Source, Way};
+use super::{Camera, DepthMethod, Output, Shown, Source};
 use crate::services::Browse;
 use bokehcam::depth::backdrop::Behind;
 use bokehcam::knob::Knob;
@@ -100,7 +100,7 @@ pub enum Action {
     /// Switches blur by depth on or off.
     Portrait(bool),
     /// Switches the depth method.
-    DepthBy(Way),
+    DepthBy(DepthMethod),
     /// Refreshes the lists of sources and virtual cameras.
     Refresh,
     /// Copies the equivalent command to the clipboard.
@@ -142,7 +142,7 @@ pub enum Request {
     /// Captures a background plate, and uses it for depth.
     TakePlate,
     /// Switches the depth method.
-    DepthBy(Way),
+    DepthBy(DepthMethod),
     /// Seeks to this frame of the recording.
     Seek(usize),
     /// Refreshes the lists of sources and virtual cameras.

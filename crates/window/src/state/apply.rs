@@ -1,6 +1,6 @@
 //! Applies actions to the state.
 
-use super::{Action, Output, Request, Shown, Source, State, Way};
+use super::{Action, DepthMethod, Output, Request, Shown, Source, State};
 use bokehcam::depth::focus::FocusRule;
 use bokehcam::look::{Effect, Look, Patch, Strength};
 
@@ -95,7 +95,7 @@ impl State {
             }
             Action::TakePlate => self.note(NO_PLATE),
             Action::DeclinePlate => self.declined_plate = true,
-            Action::FindMe => return vec![Request::DepthBy(Way::Person)],
+            Action::FindMe => return vec![Request::DepthBy(DepthMethod::Person)],
             Action::DepthBy(way) => return vec![Request::DepthBy(way)],
             Action::Portrait(on) => return self.set_portrait(on),
             Action::Refresh => return vec![Request::Refresh],

@@ -62,7 +62,7 @@ mod tests {
         for focus_m in [0.7, 1.24, 3.0] {
             look.strength = Strength::Lens(tweak::lens_of(&look, focus_m, size));
             let Strength::Lens(lens) = look.strength else { unreachable!() };
-            look.strength = Strength::of_share(tweak::lens_fraction(lens, focus_m, size));
+            look.strength = Strength::of_fraction(tweak::lens_fraction(lens, focus_m, size));
             assert_eq!(look, Look::default(), "focused at {focus_m} m");
         }
     }

@@ -28,7 +28,7 @@ pub use camera::Camera;
 pub use habits::{Habits, TEXT_SCALES};
 pub use history::History;
 pub use transport::Transport;
-pub use way::Way;
+pub use way::DepthMethod;
 pub use zoom::Zoom;
 
 use super::meters::Meters;
@@ -43,7 +43,7 @@ use bokehcam::look::Look;
 use bokehcam::look::presets::Preset;
 
 use bokehcam::source::devices::Choice;
-use bokehcam::source::{DepthFrom, Kind};
+use bokehcam::source::{DepthOrigin, Kind};
 
 /// Status of the source.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -75,10 +75,10 @@ pub struct Running {
     /// Kind of source; a photo is a single still frame.
     pub kind: Kind,
     /// Origin of its depth.
-    pub depth_from: DepthFrom,
+    pub depth_from: DepthOrigin,
     /// Depth methods the source supports, and the active one.
-    pub ways: Vec<Way>,
-    pub way: Option<Way>,
+    pub ways: Vec<DepthMethod>,
+    pub way: Option<DepthMethod>,
     pub executor: String,
     /// Time budget for the blur of a frame.
     pub budget_ns: u64,
@@ -229,7 +229,7 @@ impl State {
     }
 
     /// Returns the depth methods that the source supports.
-    pub fn ways(&self) -> &[Way] {
+    pub fn ways(&self) -> &[DepthMethod] {
         match &self.source {
             Source::Running(running) => &running.ways,
             Source::Opening | Source::Lost(_) | Source::Ended => &[],
@@ -237,19 +237,19 @@ impl State {
     }
 
     /// Returns the active depth method.
-    pub fn way(&self) -> Option<Way> {
+    pub fn way(&self) -> Option<DepthMethod> {
         if let Source::Running(running) = &self.source { running.way } else { None }
     }
 
     /// Whether a background plate can be captured.
     pub fn can_capture_plate(&self) -> bool {
-        self.ways().contains(&Way::Plate)
+        self.ways().contains(&DepthMethod::Plate)
     }
 
     /// Returns person segmentation as a fallback while the plate is missing or does not match the picture.
-    pub fn way_without_plate(&self) -> Option<Way> {
+    pub fn way_without_plate(&self) -> Option<DepthMethod> {
         let lacks_plate = self.plate.is_some_and(|step| step != Step::Ready);
-        Some(Way::Person).filter(|way| lacks_plate && self.ways().contains(way))
+        Some(DepthMethod::Person).filter(|way| lacks_plate && self.ways().contains(way))
     }
 
     /// Whether the source has no depth and the user is offered methods to get it.
@@ -260,7 +260,8 @@ impl State {
 
     /// Whether the source could measure its own depth, but the user turned that off.
     fn declines_own_depth(&self) -> bool {
-        !self.may_have_depth() && self.ways().iter().any(|way| matches!(way, Way::Measured | Way::Stereo))
+        !self.may_have_depth()
+            && self.ways().iter().any(|way| matches!(way, DepthMethod::Measured | DepthMethod::Stereo))
     }
 
     /// Returns a short display name of the source; empty if unknown.

@@ -1,11 +1,11 @@
 //! Sample states for tests.
 
-use super::{Running, Source, State, Way};
+use super::{DepthMethod, Running, Source, State};
 use bokehcam::knob::Knob;
 use bokehcam::look::presets::Preset;
 use bokehcam::look::{Effect, Look, Patch, Strength, Tilt};
 use bokehcam::source::devices::Choice;
-use bokehcam::source::{DepthFrom, Kind};
+use bokehcam::source::{DepthOrigin, Kind};
 
 /// Returns a typical look.
 pub fn look() -> Look {
@@ -27,9 +27,9 @@ pub fn running(has_depth: bool) -> Source {
         has_depth,
         is_live: true,
         kind: Kind::Camera,
-        depth_from: if has_depth { DepthFrom::Metres } else { DepthFrom::Nothing },
-        ways: if has_depth { vec![Way::Measured] } else { vec![Way::Plate] },
-        way: has_depth.then_some(Way::Measured),
+        depth_from: if has_depth { DepthOrigin::Metres } else { DepthOrigin::Nothing },
+        ways: if has_depth { vec![DepthMethod::Measured] } else { vec![DepthMethod::Plate] },
+        way: has_depth.then_some(DepthMethod::Measured),
         executor: "cpu, 2 threads, AVX2".into(),
         budget_ns: 33_333_333,
     })

@@ -3,11 +3,11 @@
 use std::fmt;
 use std::str::FromStr;
 
-use bokehcam::source::{DepthChoice, DepthFrom, NetworkFile, OneCamera, PlateFile};
+use bokehcam::source::{DepthChoice, DepthOrigin, NetworkFile, OneCamera, PlateFile};
 
 /// A depth method.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Way {
+pub enum DepthMethod {
     /// Measured by a depth camera, or recorded.
     Measured,
     /// Stereo matching of two cameras.
@@ -20,7 +20,7 @@ pub enum Way {
     Plate,
 }
 
-impl Way {
+impl DepthMethod {
     /// Returns the corresponding choice of `--depth`, with the installed networks.
     pub fn choice(self) -> DepthChoice {
         let installed = Some(NetworkFile::Installed);
@@ -56,27 +56,27 @@ impl Way {
     }
 
     /// Returns the method that provided a source's depth; `None` without depth.
-    pub fn of(depth_from: DepthFrom, networks: &OneCamera, has_plate: bool) -> Option<Self> {
+    pub fn of(depth_from: DepthOrigin, networks: &OneCamera, has_plate: bool) -> Option<Self> {
         match depth_from {
-            DepthFrom::Nothing => None,
-            DepthFrom::Units | DepthFrom::Metres | DepthFrom::Relative => Some(Self::Measured),
-            DepthFrom::Eyes => Some(Self::Stereo),
+            DepthOrigin::Nothing => None,
+            DepthOrigin::Units | DepthOrigin::Metres | DepthOrigin::Relative => Some(Self::Measured),
+            DepthOrigin::Eyes => Some(Self::Stereo),
             _ if has_plate => Some(Self::Plate),
-            DepthFrom::Networks if networks.mono.is_some() => Some(Self::PersonAndDistance),
-            DepthFrom::Networks => Some(Self::Person),
-            DepthFrom::Plate => Some(Self::Plate),
+            DepthOrigin::Networks if networks.mono.is_some() => Some(Self::PersonAndDistance),
+            DepthOrigin::Networks => Some(Self::Person),
+            DepthOrigin::Plate => Some(Self::Plate),
         }
     }
 }
 
-impl fmt::Display for Way {
+impl fmt::Display for DepthMethod {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let name = Self::NAMES.iter().find(|(way, _)| way == self).map_or("", |(_, name)| name);
         f.write_str(name)
     }
 }
 
-impl FromStr for Way {
+impl FromStr for DepthMethod {
     type Err = String;
     fn from_str(text: &str) -> Result<Self, String> {
         let way = Self::NAMES.iter().find(|(_, name)| *name == text).map(|(way, _)| *way);

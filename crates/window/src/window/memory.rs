@@ -46,7 +46,7 @@ const MAX_SIDE: f64 = 16_384.0;
 impl Memory {
     /// Reads the file; `None` if it is missing or invalid, without an error, because users do not edit it.
     pub fn read(path: &Path) -> Option<Self> {
-        let memory: Self = toml::from_str(&input::read_text(path, input::MOST_SETTINGS_BYTES).ok()?).ok()?;
+        let memory: Self = toml::from_str(&input::read_text(path, input::MAX_SETTINGS_BYTES).ok()?).ok()?;
         let sides = MIN_SIDE..=MAX_SIDE;
         let size = memory.size.filter(|size| sides.contains(&size.width) && sides.contains(&size.height));
         Some(Self { size, habits: memory.habits.checked(), ..memory })

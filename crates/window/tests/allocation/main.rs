@@ -23,7 +23,7 @@ use bokehcam::depth::matting::Matting;
 use bokehcam::depth::refine::Refiner;
 use bokehcam::depth::stereo::source::StereoDepth;
 use bokehcam::depth::stereo::{self, Effort};
-use bokehcam::depth::{DepthSource, Seen};
+use bokehcam::depth::{DepthSource, FrameInput};
 use bokehcam::frame::{ColorImage, DepthMap, GrayImage, Stamp};
 use bokehcam::link::live;
 use bokehcam::link::pool::{Pool, Pooled};
@@ -231,7 +231,7 @@ fn two_eyes() {
         depth.rectify(&mut color);
         let stamp = Stamp { index, time_ns: index as u64, captured_ns: None };
         depth.set_effort(index % 2);
-        depth.read(Seen { stamp, color: &color, right: Some(&right) }, &mut map).expect("depth");
+        depth.read(FrameInput { stamp, color: &color, right: Some(&right) }, &mut map).expect("depth");
     };
     // The first frames are checked for being rectified already.
     (0..6).for_each(&mut frame);

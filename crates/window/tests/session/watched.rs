@@ -19,7 +19,7 @@ use bokehcam::sink::{Ending, Sink, SinkError};
 use bokehcam::source::{self, devices::Choice};
 use bokehcam_lab::synthetic::Synthetic;
 use bokehcam_window::services::{Opened, Services, SettingsStore, Switch};
-use bokehcam_window::state::{Camera, Source, Update, Way};
+use bokehcam_window::state::{Camera, DepthMethod, Source, Update};
 
 use super::heard::Heard;
 
@@ -72,8 +72,8 @@ impl Services for Small {
     fn virtual_cameras(&mut self) -> Vec<Choice> {
         Vec::new()
     }
-    fn open(&mut self, name: &str, way: Option<Way>) -> Result<Opened, String> {
-        let with_plate = way == Some(Way::Plate);
+    fn open(&mut self, name: &str, way: Option<DepthMethod>) -> Result<Opened, String> {
+        let with_plate = way == Some(DepthMethod::Plate);
         let width =
             name.split(' ').next().and_then(|width| width.parse().ok()).ok_or(format!("no such source: {name}"))?;
         let frames = name.ends_with("no more").then_some(2);
@@ -88,7 +88,16 @@ impl Services for Small {
             source.depth = Some(Box::new(plate));
         }
         let has_depth = source.has_depth();
-        Ok(Opened { name, source, has_depth, ways: vec![Way::Plate], way, notes, controls, camera: Camera::default() })
+        Ok(Opened {
+            name,
+            source,
+            has_depth,
+            ways: vec![DepthMethod::Plate],
+            way,
+            notes,
+            controls,
+            camera: Camera::default(),
+        })
     }
     fn turn(&mut self, _: &str, _: i64) -> Result<Vec<Knob>, String> {
         Err("it has no controls".into())

@@ -1,6 +1,6 @@
 //! GPU buffers for one picture size.
 
-use super::shaders::{BLOCK, CELL, COLORS, COUNTS, ENTRY, Frame, LANES, MOST_BUFFERS, TURNS, Turn, WORD};
+use super::shaders::{BLOCK, CELL, COLORS, COUNTS, ENTRY, Frame, LANES, MAX_BUFFERS, TURNS, Turn, WORD};
 use crate::compute::GpuError;
 use crate::compute::device::{Device, Readback, UNIFORM_STRIDE, uniform_at};
 use crate::depth::matting::clusters::CELL_PX;
@@ -67,7 +67,7 @@ impl Buffers {
         let cells: usize = cells.iter().map(|&side| side as usize).product();
         // The colours of surfaces are the largest buffer.
         device.has_room(size, (COLORS * max_entries) as u64, "matted")?;
-        if device.device.limits().max_storage_buffers_per_shader_stage < MOST_BUFFERS {
+        if device.device.limits().max_storage_buffers_per_shader_stage < MAX_BUFFERS {
             return Err(GpuError::Failed(format!("{}: a shader may have too few buffers to find mattes", device.name)));
         }
         let buffer = |label, bytes, usage| device.buffer(label, bytes, usage);

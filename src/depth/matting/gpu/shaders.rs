@@ -48,7 +48,7 @@ pub const COUNTS: usize = 64;
 /// Maximum number of runs of a pass, plus one.
 pub const TURNS: usize = MAX_STEPS + 1;
 /// Maximum number of storage buffers of a pass.
-pub const MOST_BUFFERS: u32 = 10;
+pub const MAX_BUFFERS: u32 = 10;
 /// Returns the number of workgroups that loop over `count` entries or cells: no more than any device runs at once.
 pub fn turns(count: usize) -> u32 {
     count.clamp(1, 512) as u32
@@ -61,8 +61,8 @@ const _: () = assert!(CELL_PX == 8 && CLOSE_PX == 3 && STEPS == 9 && MAX_STEPS <
 pub fn constants(again: bool) -> [(&'static str, f64); 31] {
     [
         ("AGAIN", u8::from(again).into()),
-        ("MIN_DEPTH_BITS", DepthMap::LEAST_M.to_bits().into()),
-        ("MAX_DEPTH_BITS", DepthMap::MOST_M.to_bits().into()),
+        ("MIN_DEPTH_BITS", DepthMap::MIN_M.to_bits().into()),
+        ("MAX_DEPTH_BITS", DepthMap::MAX_M.to_bits().into()),
         ("AT_EDGE_WEIGHT", AT_EDGE_WEIGHT.into()),
         ("CLOSE_WEIGHT", CLOSE_WEIGHT.into()),
         ("RADIUS", RADII_CELLS[0] as f64),

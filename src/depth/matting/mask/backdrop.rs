@@ -4,7 +4,7 @@ use crate::frame::ColorImage;
 
 /// A background picture, and its exposure and shift relative to the current picture.
 #[derive(Clone, Copy, Debug)]
-pub struct Backdrop<'a> {
+pub struct BackgroundPlate<'a> {
     /// A picture of the size of the current one.
     pub color: &'a ColorImage,
     /// Linear light of each code, by channel, at the camera's current exposure.
@@ -13,7 +13,7 @@ pub struct Backdrop<'a> {
     pub shift_px: [isize; 2],
 }
 
-impl Backdrop<'_> {
+impl BackgroundPlate<'_> {
     /// Returns a function from the column to the background light in a row; the border is replicated.
     #[inline(always)]
     pub fn row(&self, y: usize) -> impl Fn(usize) -> [f32; 3] {

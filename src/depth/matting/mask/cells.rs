@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::Backdrop;
+use super::BackgroundPlate;
 use crate::depth::matting::clusters::Color;
 use crate::depth::matting::contrast::Contrast;
 use crate::depth::matting::symmetric::{Symmetric, outer};
@@ -80,7 +80,7 @@ pub struct View<'a> {
     pub mask: &'a Mask,
     pub color: &'a ColorImage,
     pub light: &'a [f32; 256],
-    pub backdrop: Option<&'a Backdrop<'a>>,
+    pub backdrop: Option<&'a BackgroundPlate<'a>>,
     /// Per column of the picture, the mask columns on both sides.
     pub columns: &'a [Tap],
     pub cell_px: usize,

@@ -10,7 +10,7 @@ mod posterior;
 
 use std::ops::Range;
 
-pub use backdrop::Backdrop;
+pub use backdrop::BackgroundPlate;
 
 use crate::color::light_of_codes;
 use crate::depth::tap::Tap;
@@ -87,7 +87,7 @@ impl MaskMatting {
     /// mixed pixels between both. On entry, `map` is as large as its picture, and has the distance of the background
     /// everywhere. With a known background (`backdrop`), covered pixels near the outline become mixed pixels, too, with
     /// all of the background behind them.
-    pub fn find(&mut self, mask: &Mask, color: &ColorImage, backdrop: Option<&Backdrop>, map: &mut DepthMap) {
+    pub fn find(&mut self, mask: &Mask, color: &ColorImage, backdrop: Option<&BackgroundPlate>, map: &mut DepthMap) {
         map.matte.pixels.clear();
         let (width, height) = (color.width as usize, color.height as usize);
         let backdrop = backdrop.filter(|backdrop| backdrop.color.size() == color.size());
@@ -103,7 +103,7 @@ struct Finding<'a> {
     matting: &'a mut MaskMatting,
     mask: &'a Mask,
     color: &'a ColorImage,
-    backdrop: Option<&'a Backdrop<'a>>,
+    backdrop: Option<&'a BackgroundPlate<'a>>,
     map: &'a mut DepthMap,
 }
 
@@ -316,7 +316,7 @@ impl View<'_> {
 
     /// Adds the known background behind covered pixels.
     #[inline(always)]
-    fn add_background(&self, backdrop: &Backdrop, (xs, y): (Range<usize>, usize), map: &mut DepthMap) {
+    fn add_background(&self, backdrop: &BackgroundPlate, (xs, y): (Range<usize>, usize), map: &mut DepthMap) {
         let (row, behind) = (y * self.color.width as usize, backdrop.row(y));
         let metres = &map.metres[row..];
         map.matte.pixels.extend(xs.map(|x| {

@@ -68,8 +68,8 @@ const _: () =
 pub fn constants(again: bool) -> [(&'static str, f64); 36] {
     [
         ("DOWN", u8::from(again).into()),
-        ("MIN_BITS", DepthMap::LEAST_M.to_bits().into()),
-        ("MAX_BITS", DepthMap::MOST_M.to_bits().into()),
+        ("MIN_BITS", DepthMap::MIN_M.to_bits().into()),
+        ("MAX_BITS", DepthMap::MAX_M.to_bits().into()),
         ("MAP_SURFACE", upsample::SAME_SURFACE.into()),
         ("HOLE_SURFACE", guided_fill::SAME_SURFACE.into()),
         ("SAMPLE_PX", SAMPLE_PX as f64),

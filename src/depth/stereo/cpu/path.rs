@@ -17,7 +17,7 @@ use super::GROUP;
 
 /// Padding of 255 on both sides of the disparities, so that d - 1 and d + 1 need no bounds test: a cache line.
 const GUARD: usize = 64;
-const LENGTH: usize = 2 * GUARD + Settings::MOST_DISPARITIES as usize;
+const LENGTH: usize = 2 * GUARD + Settings::MAX_DISPARITIES as usize;
 
 /// The values L(q, d) of a path at a pixel, between padding that is never the minimum, and their minimum.
 #[derive(Clone, Copy)]

@@ -10,7 +10,7 @@ use pulp::{Arch, WithSimd};
 
 use super::super::fixed::{NOISE, ONE, UNKNOWN};
 use crate::compute::bands::Bands;
-use crate::compute::thread_pool::{MOST_ITEMS, ThreadPool};
+use crate::compute::thread_pool::{MAX_ITEMS, ThreadPool};
 
 /// Stores the last pair.
 #[derive(Debug, Default)]
@@ -41,7 +41,7 @@ impl Prior {
         let Self { width, luma: last, map, changes, likely } = self;
         let (width, last, map) = (*width, &**last, &**map);
         let height = luma.len() / width;
-        changes.resize(MOST_ITEMS * width, 0);
+        changes.resize(MAX_ITEMS * width, 0);
         likely.resize(luma.len(), 0);
         let bands = Bands::new(height, 1, workers);
         let items = bands.rows().zip(bands.split(likely, width)).zip(changes.chunks_exact_mut(width));

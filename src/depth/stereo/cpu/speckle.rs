@@ -6,7 +6,7 @@ use std::ops::Range;
 
 use super::super::fixed::{STEP, UNKNOWN};
 use crate::compute::bands::Bands;
-use crate::compute::thread_pool::{MOST_ITEMS, ThreadPool};
+use crate::compute::thread_pool::{MAX_ITEMS, ThreadPool};
 
 /// Removes islands, which are connected components found by union-find over runs of rows; owns its buffers.
 ///
@@ -48,7 +48,7 @@ impl Speckles {
     /// Sets all islands of `map`, `width` columns wide, that have at most `max_pixels` to unknown.
     pub fn remove(&mut self, map: &mut [u16], width: usize, max_pixels: u32, workers: &mut ThreadPool) {
         let bands = Bands::new(map.len() / width, 1, workers);
-        let mut places: [Range<usize>; MOST_ITEMS] = std::array::from_fn(|_| 0..0);
+        let mut places: [Range<usize>; MAX_ITEMS] = std::array::from_fn(|_| 0..0);
         let (runs, parents) = (bands.split(&mut self.runs, width), bands.split(&mut self.parents, width));
         let items = bands.rows().zip(runs.zip(parents)).zip(bands.split(&mut self.pixels, width)).zip(&mut places);
         let items =

@@ -17,13 +17,13 @@ use bokehcam::capture::{Captured, Shot};
 use bokehcam::clock::{Clock, cpu_ns};
 use bokehcam::compute::{Backend, thread_pool::cores};
 use bokehcam::computing::{Computing, Executors};
-use bokehcam::depth::Seen;
-use bokehcam::engine::{CocMaker, Finish};
+use bokehcam::depth::FrameInput;
+use bokehcam::engine::{CocMaker, Postprocess};
 use bokehcam::frame::{ColorImage, DepthMap, GrayImage, Stamp};
 use bokehcam::link::pool::Pooled;
 use bokehcam::look::{BackgroundMemory, Look, Strength};
 use bokehcam::sink::yuyv::Encoder;
-use bokehcam::source::{self, DepthFrom, Frames, Kind, Source, SourceName};
+use bokehcam::source::{self, DepthOrigin, Frames, Kind, Source, SourceName};
 
 /// Unmeasured frames at the start: caches fill, and the background memory builds up.
 const WARM_UP_FRAMES: u64 = 8;
@@ -185,8 +185,8 @@ fn measure(
     let executor = executors.first().map(|(_, executor)| executor.describe()).unwrap_or_default();
 
     let measured = source.is_measured();
-    let coc = CocMaker::new(look.coc_rule(size), Finish::measured(look.refines(measured)));
-    let mut coc = coc.on_threads(computing.threads());
+    let coc = CocMaker::new(look.coc_rule(size), Postprocess::measured(look.refines(measured)));
+    let mut coc = coc.with_threads(computing.threads());
     coc.compute_on(executors.first().and_then(|(_, executor)| executor.device()));
     let knows_background = source.depth.as_ref().is_some_and(|source| source.knows_background());
     coc.remember(look.background_memory == BackgroundMemory::On && !knows_background);
@@ -246,7 +246,7 @@ impl Buffers {
                     self.read_depth(source, stamp)?;
                     timer.record("read depth", "depth");
                 }
-                coc.make_noting(&mut self.depth, &self.color, stamp.time_ns, |step| timer.record(step, "depth"))
+                coc.make_with_steps(&mut self.depth, &self.color, stamp.time_ns, |step| timer.record(step, "depth"))
             }
         };
         for (quality, executor) in executors {
@@ -274,7 +274,7 @@ impl Buffers {
         let Some(depth) = &mut source.depth else { return Ok(()) };
         depth.rectify(&mut self.color);
         let right = Some(&self.right).filter(|right| right.width > 0);
-        depth.read(Seen { stamp, color: &self.color, right }, &mut self.depth)?;
+        depth.read(FrameInput { stamp, color: &self.color, right }, &mut self.depth)?;
         Ok(())
     }
 }
@@ -337,7 +337,7 @@ fn warn_of_unused(command: &BenchCommand, name: &SourceName, source: &Source, lo
         &given.settings,
         &unused::Run {
             source: unused::From::Source(name.kind()),
-            depth: if source.has_depth() { source.depth_from } else { DepthFrom::Nothing },
+            depth: if source.has_depth() { source.depth_from } else { DepthOrigin::Nothing },
             uses_depth: look.effect.follows_depth(),
             effect: look.effect,
             lens: matches!(look.strength, Strength::Lens(_)),

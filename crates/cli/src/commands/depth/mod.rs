@@ -24,7 +24,7 @@ use bokehcam::look::number::{above_zero, within};
 use bokehcam::optics::StereoRig;
 use bokehcam::recording::geometry::Geometry;
 use bokehcam::recording::still::{self, MapFormat};
-use bokehcam::source::calib::{self, Eyes};
+use bokehcam::source::calib::{self, PairCalibration};
 use bokehcam::source::options::DEPTH_SCALE;
 
 use preview::preview;
@@ -53,7 +53,7 @@ pub struct DepthCommand {
     /// Disparities that are tried, from 0, in pixels; rounded up to a multiple of 16 [default: the calibration's, else 64]
     // Distinct ids: the settings of the same names belong to live sources.
     #[arg(id = "pair_max_disparity", long = "max-disparity", value_name = "PX",
-          value_parser = value_parser!(u32).range(1..=i64::from(Settings::MOST_DISPARITIES)))]
+          value_parser = value_parser!(u32).range(1..=i64::from(Settings::MAX_DISPARITIES)))]
     max_disparity: Option<u32>,
     /// Calibration of the two eyes: OpenCV's, Kalibr's or EuRoC's, by which the pictures are rectified first, or the
     /// calib.txt of a rectified pair from Middlebury, ETH3D or KITTI; may be given more than once, or as a list with
@@ -211,14 +211,14 @@ impl DepthCommand {
             return Ok((self.focal_px.zip(self.baseline_m).map(rig).map(from_rig), None));
         }
         match calib::read(&self.calib, &self.left, size)? {
-            Eyes::Rectified { geometry, made_for } => {
+            PairCalibration::Rectified { geometry, made_for } => {
                 if let Some((width, height)) = made_for.filter(|&made_for| made_for != size) {
                     let file = self.calib[0].display();
                     note(format!("{file} is for pictures of {width}x{height}: scaled to {}x{}", size.0, size.1));
                 }
                 Ok((Some(geometry), None))
             }
-            Eyes::Raw(calibration) => {
+            PairCalibration::Raw(calibration) => {
                 let rectifier = Rectifier::new(&calibration, size)?;
                 calibration.notes(size).into_iter().for_each(note);
                 Ok((Some(from_rig(rectifier.rig())), Some(rectifier)))
@@ -230,7 +230,7 @@ impl DepthCommand {
     /// [`DEFAULT_DISPARITIES`], limited by the width. The matcher needs a multiple of 16.
     fn disparity_range(&self, calibrated: Option<u32>, width: u32, note: &dyn Fn(String)) -> Result<u32, CliError> {
         // A disparity is less than the width.
-        let limit = (width.saturating_sub(1) / 16 * 16).min(Settings::MOST_DISPARITIES);
+        let limit = (width.saturating_sub(1) / 16 * 16).min(Settings::MAX_DISPARITIES);
         if limit == 0 {
             return Err(CliError::Usage(format!("the pictures are {width} px wide, and matching needs 17 or more")));
         }

@@ -22,7 +22,7 @@ pub struct SharedCamera {
 pub fn list_cameras() -> Vec<SharedCamera> {
     use bokehcam::capture::pipewire::format_modes;
     use bokehcam::pipewire::graph::Graph;
-    let graph = Graph::look_closely().unwrap_or_else(|error| {
+    let graph = Graph::list_with_modes().unwrap_or_else(|error| {
         tracing::info!("{error}");
         Graph::default()
     });

@@ -16,7 +16,7 @@ use bokehcam::recording::still::{self, MapFormat};
 use bokehcam::recording::{Extras, snapshot};
 use bokehcam::source::options::DepthUnit;
 use bokehcam::source::photo::{self, PhotoDepth};
-use bokehcam::source::{self, DepthChoice, DepthFrom};
+use bokehcam::source::{self, DepthChoice, DepthOrigin};
 
 /// Input of the blur.
 pub(super) struct Input {
@@ -29,7 +29,7 @@ pub(super) struct Input {
 
 /// Origin of depth that the photo brings without an option for it.
 pub(super) struct Found {
-    pub from: DepthFrom,
+    pub from: DepthOrigin,
     pub measured: bool,
     pub by: String,
 }
@@ -61,7 +61,7 @@ pub(super) fn read(command: &RenderCommand, look: &Look) -> Result<Input, CliErr
             let depth =
                 if is_wanted { photo::depth_of(&image, &color, &command.source_options(), look)? } else { None };
             let depth = depth.map(|PhotoDepth { map, from, measured, by }| {
-                if from == DepthFrom::Networks {
+                if from == DepthOrigin::Networks {
                     plausible::warn_of_subject(None, &map, None);
                 }
                 found = Some(Found { from, measured, by });

@@ -23,8 +23,8 @@ use crate::settings::unused;
 use crate::settings::unused::From;
 use crate::terminal;
 use bokehcam::compute::Backend;
-use bokehcam::depth::agreement::Agreement;
-use bokehcam::depth::misfit::Misfit;
+use bokehcam::depth::agreement::EdgeAlignment;
+use bokehcam::depth::misfit::Misalignment;
 use bokehcam::engine::{self, still::Depth};
 use bokehcam::files::place;
 use bokehcam::frame::{ColorImage, DepthMap};
@@ -33,7 +33,7 @@ use bokehcam::recording::snapshot;
 use bokehcam::recording::still::{self, MapFormat, PhotoFormat};
 use bokehcam::source::options::DepthUnit;
 use bokehcam::source::photo;
-use bokehcam::source::{self, DepthChoice, DepthFrom, OneCamera, PlateFile};
+use bokehcam::source::{self, DepthChoice, DepthOrigin, OneCamera, PlateFile};
 
 /// Blur one still picture
 #[derive(Args, Debug)]
@@ -172,11 +172,11 @@ impl RenderCommand {
             &unused::Run {
                 source: From::Picture,
                 depth: match (depth, found) {
-                    (None, _) => DepthFrom::Nothing,
+                    (None, _) => DepthOrigin::Nothing,
                     (_, Some(found)) => found.from,
-                    (Some(Depth::Measured(_)), _) if is_inverse => DepthFrom::Relative,
-                    (Some(Depth::Measured(_)), _) if in_units => DepthFrom::Units,
-                    (Some(_), _) => DepthFrom::Metres,
+                    (Some(Depth::Measured(_)), _) if is_inverse => DepthOrigin::Relative,
+                    (Some(Depth::Measured(_)), _) if in_units => DepthOrigin::Units,
+                    (Some(_), _) => DepthOrigin::Metres,
                 },
                 uses_depth,
                 effect: look.effect,
@@ -220,8 +220,8 @@ impl RenderCommand {
 
 /// Reports a misalignment between a depth map and its picture, and its correction.
 fn report_misalignment(file: &dyn Display, look: &Look, map: &DepthMap, color: &ColorImage) {
-    let Some(misfit) = Misfit::of(map, color) else { return };
-    if misfit.outlines == Agreement::Unrelated {
+    let Some(misfit) = Misalignment::of(map, color) else { return };
+    if misfit.outlines == EdgeAlignment::Unrelated {
         log::warn(&format!(
             "{file}: nowhere do its outlines meet those of the picture: it may be the depth of another one, or of a camera beside \
              it that is not registered to the colours"

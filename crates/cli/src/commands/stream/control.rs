@@ -23,8 +23,8 @@ use bokehcam::link::demand::Demand;
 use bokehcam::look::{Look, Patch};
 use bokehcam::pipeline::{Changes, Progress};
 use bokehcam::recording::still;
-use bokehcam::sink::Release;
-use bokehcam::stats::Pulse;
+use bokehcam::sink::ShutterControl;
+use bokehcam::stats::FrameRateMeter;
 
 /// Maximum wait for a picture to save.
 const PICTURE_TIMEOUT: Duration = Duration::from_secs(2);
@@ -65,7 +65,7 @@ pub(super) struct RunInfo {
     /// Watchers of the outputs, if they are counted.
     pub demand: Option<Demand>,
     /// Closes the outputs, and captures pictures.
-    pub release: Release,
+    pub release: ShutterControl,
     pub stats: Arc<RunStats>,
 }
 
@@ -81,21 +81,21 @@ struct Stream {
 /// Frame statistics for the status, updated without locks.
 pub(super) struct RunStats {
     clock: Clock,
-    pulse: Pulse,
+    pulse: FrameRateMeter,
     /// Quality level of the last frame, as its index plus 1; 0 if it was not blurred.
     level: AtomicU8,
 }
 
 impl Default for RunStats {
     fn default() -> Self {
-        Self { clock: Clock::system(), pulse: Pulse::default(), level: AtomicU8::new(0) }
+        Self { clock: Clock::system(), pulse: FrameRateMeter::default(), level: AtomicU8::new(0) }
     }
 }
 
 impl RunStats {
     /// Records a delivered frame.
     pub fn record(&self, progress: &Progress) {
-        self.pulse.beat(self.clock.now_ns());
+        self.pulse.record_frame(self.clock.now_ns());
         let level = progress.quality.and_then(|quality| Quality::ALL.iter().position(|other| *other == quality));
         self.level.store(level.map_or(0, |level| level as u8 + 1), Ordering::Relaxed);
     }
@@ -194,7 +194,7 @@ impl Controlled for Stream {
         Ok(on)
     }
 
-    fn release(&self) -> Option<Release> {
+    fn release(&self) -> Option<ShutterControl> {
         Some(self.run.release.clone())
     }
 

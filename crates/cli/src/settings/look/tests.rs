@@ -112,7 +112,7 @@ fn looks(picture: &std::path::Path) -> Vec<Look> {
     for number in [0.1, 1.0 / 3.0, 1e-7, 0.3 - 0.1, 1e-40, 0.999_999_94] {
         add(&|look| look.rim = number);
         add(&|look| look.aperture.intensity = -number);
-        add(&|look| look.focus = FocusRule::Metres(number.max(DepthMap::LEAST_M)));
+        add(&|look| look.focus = FocusRule::Metres(number.max(DepthMap::MIN_M)));
         add(&|look| look.focus = FocusRule::Point { x: number, y: 1.0 - number });
         add(&|look| look.focus = FocusRule::Track { x: 1.0 - number, y: number });
         add(&|look| look.strength = Strength::Percent(number));

@@ -14,7 +14,7 @@ use std::process::{Command, Output};
 use std::time::Duration;
 
 use bokehcam::depth::single_camera::{Hints, SingleCamera};
-use bokehcam::depth::{DepthSource, Seen};
+use bokehcam::depth::{DepthSource, FrameInput};
 use bokehcam::frame::{ColorImage, DepthMap, Stamp};
 use bokehcam::network::{self, Runtime, Tensor};
 use onnx::{Side, constant, conv, matte, model, node, port};
@@ -36,7 +36,7 @@ fn camera(file: &Path, runtime: Runtime) -> SingleCamera {
 fn read(camera: &mut dyn DepthSource, color: &ColorImage, frame: u64) -> DepthMap {
     let mut map = DepthMap::default();
     let stamp = Stamp { index: frame as usize, time_ns: frame * 33_000_000, captured_ns: None };
-    camera.read(Seen { stamp, color, right: None }, &mut map).unwrap();
+    camera.read(FrameInput { stamp, color, right: None }, &mut map).unwrap();
     map
 }
 
@@ -133,9 +133,9 @@ fn each_frame_has_a_mask_of_its_own_at_every_effort() {
         let (color, _) = disc(320, 240, (80.0 + 20.0 * frame as f32, 118.0), 60.0);
         assert!(read(&mut least, &color, frame) == read(&mut finest, &color, frame), "frame {frame}");
     }
-    assert!(!least.may_be_shared() && !open(Some(&*depth)).may_be_shared());
+    assert!(!least.is_reusable() && !open(Some(&*depth)).is_reusable());
     let alone = SingleCamera::open(None, Some(&depth), &Hints::default(), Runtime::BuiltIn).unwrap();
-    assert!(alone.may_be_shared(), "what is near and far is no mask");
+    assert!(alone.is_reusable(), "what is near and far is no mask");
 }
 
 #[test]

@@ -5,7 +5,7 @@ use std::fs;
 use bokehcam::look::Look;
 use bokehcam::source::{DepthChoice, Options};
 use bokehcam_window::services::Services;
-use bokehcam_window::state::Way;
+use bokehcam_window::state::DepthMethod;
 use bokehcam_window::system::System;
 use tempfile::TempDir;
 
@@ -49,20 +49,21 @@ fn the_window_says_in_one_line_why_a_network_cannot_be_used_and_goes_on() {
 fn a_source_has_the_ways_to_depth_that_it_brings_and_the_command_names_the_one_that_was_chosen() {
     let at = |name: &str| format!("{}/recordings/{name}", concat!(env!("CARGO_MANIFEST_DIR"), "/../.."));
     let mut system = System::new(Options::default(), Look::default(), Box::new(NoStore));
-    for (name, usual) in [("portrait", Way::Measured), ("stereo", Way::Stereo)] {
+    for (name, usual) in [("portrait", DepthMethod::Measured), ("stereo", DepthMethod::Stereo)] {
         let opened = system.open(&at(name), None).unwrap();
         assert_eq!((opened.way, opened.ways.first(), opened.has_depth), (Some(usual), Some(&usual), true), "{name}");
-        assert!(!opened.ways.contains(&Way::Plate), "nobody in a recording steps aside");
+        assert!(!opened.ways.contains(&DepthMethod::Plate), "nobody in a recording steps aside");
         assert!(!opened.camera.is_relative);
         // By its own name it is the same.
         let again = system.open(&at(name), Some(usual)).unwrap();
         assert_eq!((again.way, &again.ways), (Some(usual), &opened.ways), "{name}");
     }
-    let none = system.can(&at("portrait"), Way::PersonAndDistance);
-    let is_installed = system.open(&at("portrait"), None).unwrap().ways.contains(&Way::PersonAndDistance);
+    let none = system.can(&at("portrait"), DepthMethod::PersonAndDistance);
+    let is_installed = system.open(&at("portrait"), None).unwrap().ways.contains(&DepthMethod::PersonAndDistance);
     assert_eq!(none.is_ok(), is_installed);
     assert!(is_installed || none.unwrap_err().contains("`bokehcam models get`"));
-    assert!(system.can(&at("portrait"), Way::Stereo).is_err(), "it has one eye");
-    let flags = [Way::Measured, Way::Stereo, Way::Person, Way::PersonAndDistance].map(Way::flag);
+    assert!(system.can(&at("portrait"), DepthMethod::Stereo).is_err(), "it has one eye");
+    let flags = [DepthMethod::Measured, DepthMethod::Stereo, DepthMethod::Person, DepthMethod::PersonAndDistance]
+        .map(DepthMethod::flag);
     assert_eq!(flags, ["recorded", "stereo", "matte", "matte,mono"]);
 }

@@ -67,16 +67,16 @@ fn the_library_refuses_what_the_command_line_does() {
         near_max_px: 0.0,
     };
     let create = |settings: &Settings| bokeh::create(settings, (640, 360), None, Some(1)).map(|_| ());
-    for (coc, method, rank, most_px) in [
+    for (coc, method, rank, max_px) in [
         (CocKind::Uniform, Method::Layered, None, 735.0),
         (CocKind::Ramp, Method::Layered, None, 735.0),
         (CocKind::Depth, Method::Layered, Some(Rank::Full), 735.0),
         (CocKind::Depth, Method::Gather, None, 512.0),
         (CocKind::Depth, Method::Gather, Some(Rank::Full), 128.0),
     ] {
-        for radius_px in [most_px + 1.0, 1e9, f32::INFINITY, f32::NAN] {
+        for radius_px in [max_px + 1.0, 1e9, f32::INFINITY, f32::NAN] {
             let refused = create(&settings(coc, method, rank, radius_px)).unwrap_err();
-            assert!(matches!(refused, BokehError::TooWide { most_px: most, .. } if most == most_px), "{refused}");
+            assert!(matches!(refused, BokehError::TooWide { max_px: most, .. } if most == max_px), "{refused}");
             assert!(!refused.to_string().contains('\n'), "{refused}");
         }
         // Where nobody asks, radii are cut, and nothing grows without a bound.

@@ -83,7 +83,7 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
     // `zoom` is from before the click, so the slider appears in the next pass.
     if let Some(zoom) = zoom {
         let how =
-            Number::new("Largest zoom", "So much larger the subject becomes, at most", MIN_ZOOM..=Follow::MOST, 1);
+            Number::new("Largest zoom", "So much larger the subject becomes, at most", MIN_ZOOM..=Follow::MAX_ZOOM, 1);
         sheet.number(ui, &how.unit("", "×"), zoom, |look, zoom| look.follow = Follow::to(zoom));
         remark(ui, "In what goes out, within the dashed line; this window shows the whole picture.");
     }

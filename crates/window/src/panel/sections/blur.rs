@@ -25,7 +25,7 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
         match (chosen, sheet.look.strength) {
             (Some(true), _) => sheet.look.strength = Strength::Lens(lens_of(&sheet.look, focus_m, sheet.size)),
             (Some(false), Strength::Lens(lens)) => {
-                sheet.look.strength = Strength::of_share(lens_fraction(lens, focus_m, sheet.size));
+                sheet.look.strength = Strength::of_fraction(lens_fraction(lens, focus_m, sheet.size));
             }
             _ => {}
         }

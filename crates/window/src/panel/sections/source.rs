@@ -5,17 +5,17 @@ use egui::Ui;
 use super::Sheet;
 use crate::panel::parts::{Number, choose, dropdown, number, remark, switch};
 use crate::services::Browse;
-use crate::state::{Action, Source, Way};
+use crate::state::{Action, DepthMethod, Source};
 use crate::texts::{tr, tr_with};
 use bokehcam::knob::Knob;
 
 /// The depth methods with their tooltips.
-const WAYS: [(&str, &str, Way); 5] = [
-    ("Measured", "By a depth camera, or as it was recorded", Way::Measured),
-    ("Two eyes", "What two cameras side by side see", Way::Stereo),
-    ("Person", "A network finds who is in the picture", Way::Person),
-    ("Person and distance", "That, and another one tells how far the rest is", Way::PersonAndDistance),
-    ("Empty room", "A picture of the room without you: step out for four seconds (T)", Way::Plate),
+const WAYS: [(&str, &str, DepthMethod); 5] = [
+    ("Measured", "By a depth camera, or as it was recorded", DepthMethod::Measured),
+    ("Two eyes", "What two cameras side by side see", DepthMethod::Stereo),
+    ("Person", "A network finds who is in the picture", DepthMethod::Person),
+    ("Person and distance", "That, and another one tells how far the rest is", DepthMethod::PersonAndDistance),
+    ("Empty room", "A picture of the room without you: step out for four seconds (T)", DepthMethod::Plate),
 ];
 
 /// Adds the source's properties, its depth methods, and buttons to open another source.
@@ -28,7 +28,7 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
             let rate = 1e9 / running.period_ns.max(1) as f64;
             let depth = tr(match running.way {
                 _ if !running.has_depth => "without depth",
-                Some(Way::Person) => "the person by a network",
+                Some(DepthMethod::Person) => "the person by a network",
                 _ => "with depth",
             });
             remark(

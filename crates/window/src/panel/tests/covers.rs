@@ -4,7 +4,7 @@ use egui::{Event, Key, Modifiers, pos2};
 
 use super::{Action, Window, pressed, sample};
 use crate::keys::GROUPS;
-use crate::state::{Output, Source, State, Way};
+use crate::state::{DepthMethod, Output, Source, State};
 use bokehcam::depth::plate::Step;
 
 fn recording() -> State {
@@ -63,11 +63,11 @@ fn esc_leaves_a_plate_that_is_not_there_yet() {
     let mut state = sample::state();
     state.source = sample::running(false);
     let Source::Running(running) = &mut state.source else { unreachable!("it runs") };
-    running.ways = vec![Way::Person, Way::Plate];
+    running.ways = vec![DepthMethod::Person, DepthMethod::Plate];
     state.plate = Some(Step::Restless);
     let mut window = Window::of(state, (1280, 720));
     assert!(window.place_of("Find me without it").is_some());
-    assert!(window.press(Key::Escape, Modifiers::NONE).contains(&Action::DepthBy(Way::Person)));
+    assert!(window.press(Key::Escape, Modifiers::NONE).contains(&Action::DepthBy(DepthMethod::Person)));
     assert!(window.state.panel, "the panel stays");
     window.state.plate = Some(Step::Ready);
     assert!(window.press(Key::Escape, Modifiers::NONE).contains(&Action::Panel(false)));

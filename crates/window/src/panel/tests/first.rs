@@ -7,7 +7,7 @@ use egui::{Key, Modifiers, Rect, Role, pos2};
 
 use super::{Action, Window, sample};
 use crate::panel::dock::{Dock, room};
-use crate::state::{Output, Source, State, Way};
+use crate::state::{DepthMethod, Output, Source, State};
 use crate::texts;
 use bokehcam::look::Effect;
 
@@ -161,7 +161,13 @@ fn in_german_nothing_is_cut_off_at_any_size() {
                 state.apply(Action::Section(section, true));
             }
             let Source::Running(running) = &mut state.source else { panic!("it runs") };
-            running.ways = vec![Way::Measured, Way::Stereo, Way::Person, Way::PersonAndDistance, Way::Plate];
+            running.ways = vec![
+                DepthMethod::Measured,
+                DepthMethod::Stereo,
+                DepthMethod::Person,
+                DepthMethod::PersonAndDistance,
+                DepthMethod::Plate,
+            ];
             state.look.strength = bokehcam::look::Strength::Lens(crate::state::tweak::LENS);
             (state.mirror, state.split) = (true, Some(0.5));
             // As much as fits the panel's height.

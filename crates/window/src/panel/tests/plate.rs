@@ -1,6 +1,6 @@
 //! Cards about the source: the background plate, and the demonstration notice.
 
-use super::super::super::state::{Source, State, Way, sample};
+use super::super::super::state::{DepthMethod, Source, State, sample};
 use super::Window;
 use bokehcam::depth::plate::Step;
 
@@ -19,7 +19,7 @@ fn a_lone_camera_is_offered_a_plate_and_what_to_do_for_it_is_shown() {
     }
     let declined = |state: &mut State| {
         let Source::Running(running) = &mut state.source else { panic!("it runs") };
-        running.ways.push(Way::Measured);
+        running.ways.push(DepthMethod::Measured);
     };
     assert!(!texts(&declined).contains("Not now"), "it has depth, which was declined");
     texts(&|state| state.source = sample::running(false));

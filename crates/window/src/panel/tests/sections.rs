@@ -7,7 +7,7 @@ use egui::{Key, Modifiers, pos2};
 use super::{Action, Window, sample};
 use crate::services::Browse;
 use crate::state::{Request, Shown, Source, State, Update};
-use bokehcam::depth::backdrop::{Behind, BehindPicture};
+use bokehcam::depth::backdrop::{BackgroundPicture, Behind};
 use bokehcam::frame::ColorImage;
 
 #[test]
@@ -55,7 +55,8 @@ fn what_is_behind_is_a_colour_or_a_picture_that_is_asked_for() {
     assert_eq!(window.state.look, sample::look(), "nothing changes until there is one");
     choose(&mut window, "Colour");
     assert!(matches!(window.state.look.behind, Behind::Color(_)));
-    let wall = Behind::Picture(Arc::new(BehindPicture { file: Some("wall.jpg".into()), image: ColorImage::new(2, 2) }));
+    let wall =
+        Behind::Picture(Arc::new(BackgroundPicture { file: Some("wall.jpg".into()), image: ColorImage::new(2, 2) }));
     let request = window.state.apply_update(Update::Behind(wall.clone()));
     assert!(matches!(request, Some(Request::Look(look)) if look.behind == wall));
     window.wait(0.1);

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::{Window, sample};
 use crate::keys::GROUPS;
-use crate::state::{Action, Output, Source, State, Transport, Way, tweak};
+use crate::state::{Action, DepthMethod, Output, Source, State, Transport, tweak};
 use crate::texts::{self, tests as table};
 use crate::views::Legend;
 use bokehcam::depth::backdrop::Behind;
@@ -37,7 +37,13 @@ fn windows() -> Vec<Window> {
         &|state| state.help = true,
         &|state| {
             let Source::Running(running) = &mut state.source else { return };
-            running.ways = vec![Way::Measured, Way::Stereo, Way::Person, Way::PersonAndDistance, Way::Plate];
+            running.ways = vec![
+                DepthMethod::Measured,
+                DepthMethod::Stereo,
+                DepthMethod::Person,
+                DepthMethod::PersonAndDistance,
+                DepthMethod::Plate,
+            ];
             (state.camera.is_relative, state.look.focus_range_m) = (true, 0.5);
             state.legend = Some(Legend::Depth { near_m: 0.5, far_m: 5.0 });
         },

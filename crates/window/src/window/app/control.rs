@@ -10,13 +10,13 @@ use winit::event_loop::{ActiveEventLoop, EventLoopProxy};
 
 use super::App;
 use crate::lent::RemoteChanges;
-use crate::session::{CurrentRelease, SnapshotRequest};
-use crate::state::{Action, Running, Source, Way};
+use crate::session::{CurrentShutter, SnapshotRequest};
+use crate::state::{Action, DepthMethod, Running, Source};
 use crate::window::{Control, UserEvent};
 use bokehcam::control::{Answer, Server, Status};
 use bokehcam::controller::{Controlled, Controller, Facts, Rules};
 use bokehcam::look::{Look, Patch};
-use bokehcam::sink::Release;
+use bokehcam::sink::ShutterControl;
 use bokehcam::source::DepthChoice;
 
 /// Timeout for replies of the window's thread, and for saving pictures.
@@ -29,7 +29,7 @@ type Task = Box<dyn FnOnce(&mut App, &ActiveEventLoop) + Send>;
 struct Remote {
     tasks: Sender<Task>,
     proxy: EventLoopProxy<UserEvent>,
-    release: CurrentRelease,
+    release: CurrentShutter,
 }
 
 /// The control server, and its state on the window's side.
@@ -46,7 +46,7 @@ pub(super) struct RemoteControl {
 impl RemoteControl {
     pub fn begin(
         Control { claim, rules }: Control,
-        release: CurrentRelease,
+        release: CurrentShutter,
         proxy: &EventLoopProxy<UserEvent>,
     ) -> std::io::Result<Self> {
         let (to, tasks) = mpsc::channel();
@@ -95,7 +95,7 @@ impl Controlled for Remote {
         })
     }
 
-    fn release(&self) -> Option<Release> {
+    fn release(&self) -> Option<ShutterControl> {
         self.release.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 
@@ -144,14 +144,14 @@ impl App {
     }
 
     /// Checks that the source supports this depth method; the error lists those it supports.
-    fn check_depth_method(&self, way: Way) -> Result<(), Answer> {
+    fn check_depth_method(&self, way: DepthMethod) -> Result<(), Answer> {
         let ways = self.state.ways();
         if ways.contains(&way) {
             return Ok(());
         }
         let there = match ways {
             [] => "it has none".to_owned(),
-            ways => format!("use {}", ways.iter().map(Way::to_string).collect::<Vec<_>>().join(", ")),
+            ways => format!("use {}", ways.iter().map(DepthMethod::to_string).collect::<Vec<_>>().join(", ")),
         };
         Err(Answer::usage(format!("this source has no depth by {way}: {there}")))
     }

@@ -30,7 +30,7 @@ fn a_recording_is_sought_in_while_it_plays_and_what_is_written_stays_whole() {
     let mut last_ns = 0;
     for place in [8, 3, 11, 0, 11] {
         let number = seeker.go_to(place);
-        let asked = watched.frame("the frame that was asked for", |view| view.is_wished && view.seek == number);
+        let asked = watched.frame("the frame that was asked for", |view| view.is_seek_target && view.seek == number);
         assert_eq!(seeker.place_of(asked.stamp), place);
         let rgb = asked.picture.memory().unwrap().rgb[0];
         assert!(rgb.abs_diff(20 * place as u8) <= 1, "{rgb} of frame {place}");
@@ -39,7 +39,7 @@ fn a_recording_is_sought_in_while_it_plays_and_what_is_written_stays_whole() {
         assert!((metres - 2.0 - 0.1 * place as f32).abs() < 0.02, "{metres} m of frame {place}");
         assert!(asked.stamp.time_ns > last_ns, "media time goes on");
         drop(asked);
-        let after = watched.frame("those after it", |view| !view.is_wished && view.seek == number);
+        let after = watched.frame("those after it", |view| !view.is_seek_target && view.seek == number);
         last_ns = after.stamp.time_ns;
         assert!((seeker.place_of(after.stamp) + FRAMES - place) % FRAMES <= 6, "{:?}", after.stamp);
     }

@@ -17,7 +17,7 @@ use bokehcam::source::modes::Mode;
 use bokehcam::source::{self, Frames, Options};
 use bokehcam_lab::synthetic::Synthetic;
 use bokehcam_window::services::{Opened, Services, SettingsStore, Switch};
-use bokehcam_window::state::{Camera, Way};
+use bokehcam_window::state::{Camera, DepthMethod};
 use bokehcam_window::system::System;
 
 use super::heard::{Heard, look};
@@ -55,7 +55,7 @@ impl Services for Plug {
     fn virtual_cameras(&mut self) -> Vec<Choice> {
         Vec::new()
     }
-    fn open(&mut self, name: &str, way: Option<Way>) -> Result<Opened, String> {
+    fn open(&mut self, name: &str, way: Option<DepthMethod>) -> Result<Opened, String> {
         match (name, self.is_in.load(Ordering::SeqCst)) {
             (CAMERA, false) => Err("no such camera".into()),
             (CAMERA, true) => {
@@ -114,7 +114,7 @@ pub struct Watched {
 
 impl Watched {
     pub fn begin(source: &str, folder: &Path) -> Self {
-        bokehcam_lab::synthetic::bring();
+        bokehcam_lab::synthetic::register();
         let options = Options { frames: Frames { repeat: true, ..Frames::default() }, ..Options::default() };
         let system = System::new(options, look(), Box::new(NoStore));
         let is_in = Arc::<AtomicBool>::default();
