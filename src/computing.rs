@@ -29,8 +29,8 @@ impl Computing {
     ///
     /// # Errors
     /// The requested GPU is missing, or the picture needs more memory than is free.
-    pub fn blur(&self, settings: &bokeh::Settings, size: (u32, u32)) -> Result<Box<dyn Bokeh>, BokehError> {
-        Executors::new(self.clone()).blur(settings, size)
+    pub fn create_blur(&self, settings: &bokeh::Settings, size: (u32, u32)) -> Result<Box<dyn Bokeh>, BokehError> {
+        Executors::new(self.clone()).create_blur(settings, size)
     }
 
     /// Creates a stereo matcher for pairs of `size` pixels with `disparities` disparities.
@@ -95,7 +95,7 @@ impl Executors {
     ///
     /// # Errors
     /// Fails like [`Computing::blur`].
-    pub fn blur(&mut self, settings: &bokeh::Settings, size: (u32, u32)) -> Result<Box<dyn Bokeh>, BokehError> {
+    pub fn create_blur(&mut self, settings: &bokeh::Settings, size: (u32, u32)) -> Result<Box<dyn Bokeh>, BokehError> {
         let threads = self.computing.threads;
         // A device that failed does not recover.
         if let Some(device) = self.device()?.filter(|device| device.check().is_ok()) {

@@ -1,6 +1,6 @@
 //! The governor, a controller with hysteresis: picks the finest plan for a frame that fits the time budget.
 //!
-//! A plan has a quality level (rung) for each stage. A stage's time is modelled as `load * cost(rung)`: the current
+//! A plan has a quality level (level) for each stage. A stage's time is modelled as `load * cost(level)`: the current
 //! load times the level's relative cost. Loads of frames of different levels are therefore comparable, and the time of
 //! any level can be predicted before it is tried. A step down is immediate; a step up needs a run of frames with time
 //! to spare, and a longer run after each step up that was soon reverted. The costs are learnt: if the load seems to
@@ -52,13 +52,13 @@ impl Governor<1> {
     /// Creates a governor of one ladder with these relative costs, cheapest first, that starts at level `start`.
     ///
     /// # Panics
-    /// There is no rung, there are more than [`super::MAX_LEVELS`], or the costs are not positive and ascending.
+    /// There is no level, there are more than [`super::MAX_LEVELS`], or the costs are not positive and ascending.
     pub fn new(ladder: &[f64], start: usize) -> Self {
-        Self::with_stages([ladder], (0..ladder.len()).map(|rung| [rung]).collect(), start)
+        Self::with_stages([ladder], (0..ladder.len()).map(|level| [level]).collect(), start)
     }
 
     /// Returns the quality level for the next frame.
-    pub fn rung(&self) -> usize {
+    pub fn level(&self) -> usize {
         self.plan
     }
 

@@ -29,21 +29,21 @@ pub(super) const IDLE_NS: u64 = 2_000_000_000;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Sample {
     /// Quality level of the frame.
-    pub rung: usize,
+    pub level: usize,
     /// Its time; 0 if it was not measured.
     pub took_ns: u64,
     /// Time at which it was finished.
     pub at_ns: u64,
 }
 
-/// Model of a stage's time per frame: `load * cost(rung)`. Fixed size.
+/// Model of a stage's time per frame: `load * cost(level)`. Fixed size.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Load {
     /// Learnt costs, ascending; infinite from `rungs` on.
     costs: [f64; MAX_LEVELS],
     initial_costs: [f64; MAX_LEVELS],
     rungs: usize,
-    rung: usize,
+    level: usize,
     /// Time divided by cost, in nanoseconds, of the last frames of any level.
     loads: Window<LOADS>,
     /// Same, only for frames at the present level since it was set.
@@ -76,7 +76,7 @@ impl Load {
             costs,
             initial_costs: costs,
             rungs: ladder.len(),
-            rung: start,
+            level: start,
             loads: Window::default(),
             rung_loads: Window::default(),
             load_before: None,
@@ -91,7 +91,7 @@ impl Load {
 
     /// Returns the expected time of the next frame, in nanoseconds; `None` before the first sample.
     pub fn expected_ns(&self) -> Option<u64> {
-        (!self.loads.is_empty()).then(|| (self.loads.median(5) * self.costs[self.rung]) as u64)
+        (!self.loads.is_empty()).then(|| (self.loads.median(5) * self.costs[self.level]) as u64)
     }
 
     /// Whether the pause before `at_ns` was so long that the old loads are invalid.
@@ -100,17 +100,17 @@ impl Load {
     }
 
     /// Adds a frame's time.
-    pub fn note(&mut self, Sample { rung, took_ns, at_ns }: Sample) -> SampleKind {
-        if took_ns == 0 || rung >= self.rungs {
+    pub fn note(&mut self, Sample { level, took_ns, at_ns }: Sample) -> SampleKind {
+        if took_ns == 0 || level >= self.rungs {
             return SampleKind::Nothing;
         }
         if self.was_idle(at_ns) {
             self.forget();
         }
         self.last_ns = self.last_ns.max(at_ns);
-        let load = took_ns as f64 / self.costs[rung];
+        let load = took_ns as f64 / self.costs[level];
         self.loads.push(load);
-        if rung != self.rung {
+        if level != self.level {
             return SampleKind::Other;
         }
         self.rung_loads.push(load);
@@ -136,7 +136,7 @@ impl Load {
     pub fn switch_to(&mut self, to: usize) {
         self.learn();
         self.load_before = (!self.rung_loads.is_empty()).then(|| self.rung_loads.median(5));
-        self.rung = to;
+        self.level = to;
         self.rung_loads.clear();
     }
 
@@ -147,12 +147,12 @@ impl Load {
             return;
         }
         let Some(before) = self.load_before.take() else { return };
-        let (rung, ratio) = (self.rung, self.rung_loads.median(LEARN_FROM) / before);
-        let (low, high) = (self.initial_costs[rung] / MAX_COST_RATIO, self.initial_costs[rung] * MAX_COST_RATIO);
+        let (level, ratio) = (self.level, self.rung_loads.median(LEARN_FROM) / before);
+        let (low, high) = (self.initial_costs[level] / MAX_COST_RATIO, self.initial_costs[level] * MAX_COST_RATIO);
         // The costs must stay ascending.
-        let below = if rung > 0 { self.costs[rung - 1] } else { 0.0 };
-        let above = if rung + 1 < self.rungs { self.costs[rung + 1] } else { f64::INFINITY };
-        self.costs[rung] = (self.costs[rung] * ratio.powf(LEARN_EXPONENT)).clamp(low.max(below), high.min(above));
+        let below = if level > 0 { self.costs[level - 1] } else { 0.0 };
+        let above = if level + 1 < self.rungs { self.costs[level + 1] } else { f64::INFINITY };
+        self.costs[level] = (self.costs[level] * ratio.powf(LEARN_EXPONENT)).clamp(low.max(below), high.min(above));
     }
 
     /// Forgets the loads; keeps the level and the costs.

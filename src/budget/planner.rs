@@ -46,7 +46,7 @@ pub struct Plan {
     /// Index of the depth source's effort.
     pub effort: usize,
     /// Index of the blur's quality level.
-    pub rung: usize,
+    pub level: usize,
 }
 
 /// Timing of depth for a frame.
@@ -103,21 +103,21 @@ impl Planner {
         let max_frames = if period_ns.is_some() && may_share { MAX_FRAMES } else { 1 };
         let min_effort = if period_ns.is_some() { 0 } else { efforts.len() - 1 };
         let mut plans = Vec::new();
-        for rung in 0..rungs.len() {
+        for level in 0..rungs.len() {
             let full = efforts.len() - 1;
-            plans.extend((min_effort..=full).map(|effort| Plan { frames: 1, effort, rung }));
-            plans.extend((2..=max_frames).map(|frames| Plan { frames, effort: 0, rung }));
+            plans.extend((min_effort..=full).map(|effort| Plan { frames: 1, effort, level }));
+            plans.extend((2..=max_frames).map(|frames| Plan { frames, effort: 0, level }));
         }
         // Sum of the penalties; sorted so that the cheapest plan comes first.
         let penalty = |plan: &Plan| {
-            let blur = match usual.checked_sub(plan.rung) {
+            let blur = match usual.checked_sub(plan.level) {
                 Some(below) => COARSER_BLUR[below.min(COARSER_BLUR.len() - 1)],
-                None => FINER_BLUR * (plan.rung - usual) as f64,
+                None => FINER_BLUR * (plan.level - usual) as f64,
             };
             LESS_EFFORT * (efforts.len() - 1 - plan.effort) as f64 + SHARED[plan.frames - 1] + blur
         };
         plans.sort_by(|a, b| penalty(b).total_cmp(&penalty(a)));
-        let first = Plan { frames: 1, effort: efforts.len() - 1, rung: start };
+        let first = Plan { frames: 1, effort: efforts.len() - 1, level: start };
         Self {
             governor: governor(efforts, rungs, &plans, first),
             plans,
@@ -138,7 +138,7 @@ impl Planner {
     pub fn with_blur(&self, rungs: &[f64], [usual, start]: [usize; 2]) -> Self {
         let mut planner =
             Self::new((self.budget_ns, self.period_ns), (&self.efforts, self.may_share), rungs, [usual, start]);
-        let now = Plan { rung: start, ..self.plan() };
+        let now = Plan { level: start, ..self.plan() };
         planner.governor = governor(&self.efforts, rungs, &planner.plans, now);
         planner.governor.copy_learnt(DEPTH, &self.governor);
         let Self { ages, own, reused, max_frames, begun, .. } = *self;
@@ -163,11 +163,11 @@ impl Planner {
 
     /// Adds the timing of depth for a frame.
     pub fn note_depth(&mut self, DepthTimes { effort, took_ns, age_ns, at_ns }: DepthTimes) {
-        let Some(rung) = effort else { return self.reused.push(took_ns as f64) };
+        let Some(level) = effort else { return self.reused.push(took_ns as f64) };
         self.begun = (self.begun + 1).min(WARMING_UP);
         // The first one includes memory allocation.
         if self.begun > 1 {
-            self.governor.add_sample(DEPTH, Sample { rung, took_ns, at_ns });
+            self.governor.add_sample(DEPTH, Sample { level, took_ns, at_ns });
             self.own.push(took_ns as f64);
         }
         if self.begun == WARMING_UP {
@@ -203,11 +203,11 @@ impl Planner {
         let (max_frames, may_share) = (*max_frames, *may_share);
         let late_ns = DEADLINE_PERIODS as f64 * period_ns;
         governor.choose(|plan, Times { high_ns: [depth_ns, blur_ns], usual_ns, fraction }| {
-            let Plan { frames, rung, .. } = plans[plan];
+            let Plan { frames, level, .. } = plans[plan];
             let frames = frames.min(max_frames);
             // Also true if sharing saves nothing.
-            let (is_cheapest, is_shared) = (rung == 0, frames > 1 || max_frames == 1);
-            let saved_ns = usual_ns[BLUR] * (1.0 - cheapest_blur[rung]);
+            let (is_cheapest, is_shared) = (level == 0, frames > 1 || max_frames == 1);
+            let saved_ns = usual_ns[BLUR] * (1.0 - cheapest_blur[level]);
             let depth_per_frame_ns = (depth_ns + (frames - 1) as f64 * reused_ns) / frames as f64;
             let depth_keeps_up = match may_share {
                 true => depth_per_frame_ns <= MAX_DEPTH_FRACTION * frame_ns || frames == max_frames,
@@ -236,7 +236,7 @@ impl Planner {
 
 /// Creates a governor that starts with a plan.
 fn governor(efforts: &[f64], rungs: &[f64], plans: &[Plan], start: Plan) -> Governor<2> {
-    let stages = plans.iter().map(|plan| [plan.effort, plan.rung]).collect();
+    let stages = plans.iter().map(|plan| [plan.effort, plan.level]).collect();
     Governor::with_stages([efforts, rungs], stages, plans.iter().position(|&plan| plan == start).unwrap_or(0))
 }
 

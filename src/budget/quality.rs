@@ -3,7 +3,7 @@
 use crate::names::named;
 
 named! {
-    /// A rung of the ladder, from cheapest to finest.
+    /// A level of the ladder, from cheapest to finest.
     pub enum Quality default Balanced {
         /// The floor: nothing is filled in behind near objects. A blur always stays, whatever the load.
         Draft = "draft",

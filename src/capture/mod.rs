@@ -62,7 +62,7 @@ pub trait Camera: Send {
     }
 
     /// Releases the device, if there is one, until [`Camera::next`] is called again: no client watches.
-    fn rest(&mut self) {}
+    fn suspend(&mut self) {}
 }
 
 /// Buffers for a frame. Those that the camera does not deliver stay unchanged.

@@ -119,7 +119,7 @@ impl Camera for PipeWireCamera {
         self.waited_ns
     }
 
-    fn rest(&mut self) {
+    fn suspend(&mut self) {
         self.reader.want(false);
         // Pictures from before the pause are outdated when a client watches again.
         self.pending = None;

@@ -70,8 +70,8 @@ impl Camera for SideBySide {
         self.camera.seek(place)
     }
 
-    fn rest(&mut self) {
-        self.camera.rest();
+    fn suspend(&mut self) {
+        self.camera.suspend();
     }
 }
 

@@ -161,8 +161,8 @@ impl Camera for V4l2Camera {
         self.waited_ns
     }
 
-    fn rest(&mut self) {
-        self.live.rest();
+    fn suspend(&mut self) {
+        self.live.suspend();
     }
 }
 
@@ -175,8 +175,8 @@ impl Eye for V4l2Camera {
         V4l2Camera::next_within(self, timeout, color)
     }
 
-    fn rest(&mut self) {
-        self.live.rest();
+    fn suspend(&mut self) {
+        self.live.suspend();
     }
 }
 

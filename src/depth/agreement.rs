@@ -64,7 +64,7 @@ struct Reduced {
 
 impl EdgeAlignment {
     /// Compares the depth `map`, of any size, with the picture `color`, of the same aspect.
-    pub fn of(map: &DepthMap, color: &ColorImage) -> Self {
+    pub fn measure(map: &DepthMap, color: &ColorImage) -> Self {
         if map.metres.is_empty() || color.rgb.is_empty() {
             return Self::Unknown;
         }

@@ -72,10 +72,10 @@ impl Aligner {
             return;
         }
         for y in 0..height {
-            let Tap { first, second, share: down } = Tap::at(y as f32 - shift[1], height);
+            let Tap { first, second, weight: down } = Tap::at(y as f32 - shift[1], height);
             let (above, below) = (&plate[first * width..][..width], &plate[second * width..][..width]);
             for x in 0..width {
-                let Tap { first: left, second: right, share: along } = Tap::at(x as f32 - shift[0], width);
+                let Tap { first: left, second: right, weight: along } = Tap::at(x as f32 - shift[0], width);
                 self.shifted.push(std::array::from_fn(|p| {
                     let first = above[left][p] + (above[right][p] - above[left][p]) * along;
                     let second = below[left][p] + (below[right][p] - below[left][p]) * along;

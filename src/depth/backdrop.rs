@@ -104,7 +104,7 @@ impl VirtualBackground {
 
     /// Replaces the background of a picture. The map has no holes, has its matte and is as large as the picture; a map
     /// of another size is left unchanged.
-    pub fn lay(&mut self, color: &mut ColorImage, map: &mut DepthMap, lens: &DepthCoc) {
+    pub fn replace_background(&mut self, color: &mut ColorImage, map: &mut DepthMap, lens: &DepthCoc) {
         if color.size() != map.size() {
             return;
         }
@@ -160,17 +160,17 @@ impl VirtualBackground {
             let (light, behind) =
                 (self.light[usize::from(color.rgb[3 * at + p])], self.light[usize::from(self.scaled.rgb[3 * at + p])]);
             let surfaces =
-                [light + (1.0 - pixel.share) * pixel.difference[p], light - pixel.share * pixel.difference[p]];
+                [light + (1.0 - pixel.alpha) * pixel.difference[p], light - pixel.alpha * pixel.difference[p]];
             let [near, far] = [0, 1].map(|k| surfaces[k] + fractions[k] * (behind - surfaces[k]));
             pixel.difference[p] = near - far;
-            *code = self.encode(far + pixel.share * (near - far));
+            *code = self.encode(far + pixel.alpha * (near - far));
         }
         pixel.behind = 1.0;
         let surfaces = [(pixel.near_m, fractions[0]), (pixel.far_m, fractions[1])];
         let [near_m, far_m] = surfaces.map(|(metres, fraction)| pull_to_focus(metres, fraction, lens));
         let is_in_front = lens.coc_px(near_m) < -SHARP_PX && near_m < far_m;
         (pixel.near_m, pixel.far_m) = (near_m, far_m);
-        let seen_m = if pixel.share > 0.5 { near_m } else { far_m };
+        let seen_m = if pixel.alpha > 0.5 { near_m } else { far_m };
         // A pixel with nothing in front of the background is fully composited now, and moves to the focal plane.
         let metres = if is_in_front { seen_m } else { lens.focus_m };
         self.mixed.push(Mixed { at, rgb, metres });
@@ -245,7 +245,7 @@ mod tests {
     }
 
     fn lay(behind: &Behind, color: &mut ColorImage, map: &mut DepthMap) {
-        VirtualBackground::new(behind).unwrap().lay(color, map, &LENS);
+        VirtualBackground::new(behind).unwrap().replace_background(color, map, &LENS);
     }
 
     #[test]
@@ -279,7 +279,7 @@ mod tests {
         let own = encode_srgb(0.6 * near + 0.4 * far);
         color.rgb[6..9].fill(own);
         let pixel =
-            |near_m, far_m| MixedPixel { at: 2, near_m, far_m, share: 0.6, behind: 0.4, difference: [near - far; 3] };
+            |near_m, far_m| MixedPixel { at: 2, near_m, far_m, alpha: 0.6, behind: 0.4, difference: [near - far; 3] };
         let before = (color.clone(), map.clone());
         map.matte.pixels = vec![pixel(1.0, 3.0)];
         lay(&GREEN, &mut color, &mut map);
@@ -293,7 +293,7 @@ mod tests {
         map.matte.pixels = vec![pixel(0.5, 3.0)];
         lay(&GREEN, &mut color, &mut map);
         let [left] = map.matte.pixels[..] else { panic!("it shows two surfaces") };
-        assert_eq!((left.near_m, left.far_m, left.share, left.behind), (0.5, 1.0, 0.6, 1.0));
+        assert_eq!((left.near_m, left.far_m, left.alpha, left.behind), (0.5, 1.0, 0.6, 1.0));
         for (p, code) in [0, 177, 64].into_iter().enumerate() {
             assert!((left.difference[p] - (near - light[code])).abs() < 0.02);
         }

@@ -56,7 +56,7 @@ impl DepthSource for Beside {
         Ok(())
     }
 
-    fn jump(&mut self, ahead_ns: i64) {
+    fn seek(&mut self, ahead_ns: i64) {
         self.ahead_ns = ahead_ns;
     }
 }

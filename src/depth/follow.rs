@@ -58,13 +58,13 @@ impl AutoFraming {
     }
 
     /// Sets the maximum zoom from now on; the crop moves there from its current place.
-    pub fn limit(&mut self, max_zoom: f32) {
+    pub fn set_max_zoom(&mut self, max_zoom: f32) {
         self.max_zoom = max_zoom;
     }
 
     /// Returns the crop for the frame at `time_ns` of media time, whose depth map has no holes. The first frame sets it
     /// at once.
-    pub fn part(&mut self, map: &DepthMap, lens: &DepthCoc, time_ns: u64) -> Crop {
+    pub fn crop(&mut self, map: &DepthMap, lens: &DepthCoc, time_ns: u64) -> Crop {
         let seen = self.find_target(map, lens);
         let follows = self.time_ns.filter(|&last_ns| (last_ns..=last_ns + MAX_GAP_NS).contains(&time_ns));
         let wanted = seen.unwrap_or(if follows.is_some() { self.target } else { state_of(Crop::WHOLE) });
@@ -179,7 +179,7 @@ mod tests {
     #[test]
     fn the_first_frame_shows_the_subject_at_once_and_no_larger_than_was_said() {
         for most in [1.2, 1.5, 3.0] {
-            let part = AutoFraming::new(most).part(&person(0.4), &LENS, 7);
+            let part = AutoFraming::new(most).crop(&person(0.4), &LENS, 7);
             assert!((part.center[0] - 0.4).abs() < 0.02 || part.zoom < 1.3, "{part:?}");
             assert!(part.zoom <= most + 1e-5 && part.zoom > 1.1);
             let top = part.center[1] - 0.5 / part.zoom;
@@ -192,8 +192,8 @@ mod tests {
     fn it_glides_to_where_the_subject_went_without_passing_it_and_rests() {
         let mut follower = AutoFraming::new(1.6);
         let (before, after) = (person(0.44), person(0.56));
-        let first = follower.part(&before, &LENS, 0);
-        let places: Vec<f32> = (1..90).map(|k| follower.part(&after, &LENS, k * PERIOD_NS).center[0]).collect();
+        let first = follower.crop(&before, &LENS, 0);
+        let places: Vec<f32> = (1..90).map(|k| follower.crop(&after, &LENS, k * PERIOD_NS).center[0]).collect();
         assert!(places.is_sorted(), "{places:?}");
         let last = *places.last().unwrap();
         assert!((last - 0.56).abs() < 0.01 && first.center[0] < 0.45);
@@ -205,21 +205,21 @@ mod tests {
     #[test]
     fn small_movements_and_frames_without_a_subject_leave_it_where_it_is() {
         let mut follower = AutoFraming::new(1.6);
-        let first = follower.part(&person(0.5), &LENS, 0);
+        let first = follower.crop(&person(0.5), &LENS, 0);
         let empty = DepthMap { metres: vec![9.0; 320 * 180], ..DepthMap::new(320, 180) };
         for k in 1..60 {
             let map = if k % 7 == 0 { empty.clone() } else { person(0.5 + 0.02 * ((k % 3) as f32 - 1.0)) };
-            assert_eq!(follower.part(&map, &LENS, k * PERIOD_NS), first);
+            assert_eq!(follower.crop(&map, &LENS, k * PERIOD_NS), first);
         }
-        assert_eq!(AutoFraming::new(2.0).part(&empty, &LENS, 0), Crop::WHOLE);
+        assert_eq!(AutoFraming::new(2.0).crop(&empty, &LENS, 0), Crop::WHOLE);
     }
 
     #[test]
     fn how_many_frames_there_are_makes_no_difference() {
         let places = |every: u64| {
             let mut follower = AutoFraming::new(1.6);
-            follower.part(&person(0.4), &LENS, 0);
-            (1..=12 / every).map(|k| follower.part(&person(0.6), &LENS, k * every * PERIOD_NS)).last().unwrap()
+            follower.crop(&person(0.4), &LENS, 0);
+            (1..=12 / every).map(|k| follower.crop(&person(0.6), &LENS, k * every * PERIOD_NS)).last().unwrap()
         };
         let (often, rarely) = (places(1), places(3));
         assert!((often.center[0] - rarely.center[0]).abs() < 1e-3, "{often:?} {rarely:?}");

@@ -17,19 +17,19 @@ pub struct Misalignment {
 
 impl Misalignment {
     /// Measures the depth `map` against its picture; `None` if it fits.
-    pub fn of(map: &DepthMap, color: &ColorImage) -> Option<Self> {
-        Self::with(EdgeAlignment::of(map, color), map, color)
+    pub fn measure(map: &DepthMap, color: &ColorImage) -> Option<Self> {
+        Self::from_alignment(EdgeAlignment::measure(map, color), map, color)
     }
 
     /// Like [`Misalignment::of`] with a known alignment of the outlines.
-    pub fn with(outlines: EdgeAlignment, map: &DepthMap, color: &ColorImage) -> Option<Self> {
+    pub fn from_alignment(outlines: EdgeAlignment, map: &DepthMap, color: &ColorImage) -> Option<Self> {
         let smaller = (map.width < color.width).then(|| map.size());
         let fits = smaller.is_none() && matches!(outlines, EdgeAlignment::Meets | EdgeAlignment::Unknown);
         (!fits).then_some(Self { smaller, outlines })
     }
 
     /// Returns the required correction; `None` if the picture has no edges near the depth edges.
-    pub fn mending(self, map: &DepthMap, color: &ColorImage) -> Option<MapCorrection> {
+    pub fn correction(self, map: &DepthMap, color: &ColorImage) -> Option<MapCorrection> {
         let (mut outlines, mut distance_px) = (self.outlines, 0);
         if let EdgeAlignment::Beside { distance_px: picture_px } = outlines {
             // The last pixel is left to the colours, so that thin structures are not lost.
@@ -41,7 +41,7 @@ impl Misalignment {
             Outlines::default().shift(&mut moved.metres, &unknown, map.width as usize, map_px, 0.0);
             // Back to metres: 0 is unknown in both units.
             moved.metres.iter_mut().filter(|value| **value > 0.0).for_each(|value| *value = value.recip());
-            outlines = EdgeAlignment::of(&moved, color);
+            outlines = EdgeAlignment::measure(&moved, color);
         }
         // At each scale, edges move by about three pixels.
         let of_size = self.smaller.map_or(1, |(width, _)| color.width.div_ceil(width.max(1)));

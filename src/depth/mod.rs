@@ -84,13 +84,13 @@ pub trait DepthSource: Send {
 
     /// Handles a seek in the source: from now on, the source's own time is ahead of media time by `ahead_ns`
     /// nanoseconds, and the scene may be a different one.
-    fn jump(&mut self, ahead_ns: i64) {
+    fn seek(&mut self, ahead_ns: i64) {
         let _ = ahead_ns;
     }
 
     /// Releases the device, if there is one, until the next [`DepthSource::read`]. Called when no frame came for a
     /// while.
-    fn rest(&mut self) {}
+    fn suspend(&mut self) {}
 }
 
 /// The part of a frame that its depth may depend on.

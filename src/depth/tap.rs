@@ -5,7 +5,7 @@
 pub struct Tap {
     pub first: usize,
     pub second: usize,
-    pub share: f32,
+    pub weight: f32,
 }
 
 impl Tap {
@@ -17,7 +17,7 @@ impl Tap {
     /// Returns the nearer sample.
     #[cfg(feature = "gpu")]
     pub fn nearest(self) -> usize {
-        if self.share >= 0.5 { self.second } else { self.first }
+        if self.weight >= 0.5 { self.second } else { self.first }
     }
 
     /// Returns the samples around `place` among `count`; clamps at both ends.
@@ -25,7 +25,7 @@ impl Tap {
     pub fn at(place: f32, count: usize) -> Self {
         let place = place.clamp(0.0, (count - 1) as f32);
         let first = place as usize;
-        Self { first, second: (first + 1).min(count - 1), share: place - first as f32 }
+        Self { first, second: (first + 1).min(count - 1), weight: place - first as f32 }
     }
 }
 

@@ -53,9 +53,9 @@ impl FitCheck {
         if self.frames % FRAME_STEP != 1 {
             return None;
         }
-        let outlines = EdgeAlignment::of(map, color);
-        let misfit = Misalignment::with(outlines, map, color);
-        match misfit.and_then(|misfit| Some((misfit, misfit.mending(map, color)?))) {
+        let outlines = EdgeAlignment::measure(map, color);
+        let misfit = Misalignment::from_alignment(outlines, map, color);
+        match misfit.and_then(|misfit| Some((misfit, misfit.correction(map, color)?))) {
             Some(mending) => self.mendings.push(mending),
             None if misfit.is_some() => self.unrelated += 1,
             None if outlines == EdgeAlignment::Meets => (self.frames, self.is_aligned) = (MAX_FRAMES, true),

@@ -52,7 +52,7 @@ impl Picker {
 
     /// Returns the quality of the next frame.
     pub fn quality(&self) -> Quality {
-        self.rungs[self.plan().rung]
+        self.rungs[self.plan().level]
     }
 
     /// Returns the expected blur time of the next frame; 0 if unknown.
@@ -73,7 +73,7 @@ impl Picker {
     /// Records that a blur at `quality` took `took_ns` and finished at `at_ns`.
     pub fn note(&mut self, quality: Quality, took_ns: u64, at_ns: u64) {
         if let Some(rung) = self.rungs.iter().position(|&rung| rung == quality) {
-            self.planner.note_blur(Sample { rung, took_ns, at_ns });
+            self.planner.note_blur(Sample { level: rung, took_ns, at_ns });
         }
     }
 }

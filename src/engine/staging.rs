@@ -52,7 +52,7 @@ impl Staging {
             self.backdrop = VirtualBackground::new(&look.behind);
         }
         match (&mut self.follower, look.follow.zoom()) {
-            (Some(follower), Some(zoom)) => follower.limit(zoom),
+            (Some(follower), Some(zoom)) => follower.set_max_zoom(zoom),
             (follower, zoom) => *follower = zoom.map(AutoFraming::new),
         }
     }
@@ -72,9 +72,9 @@ impl Staging {
         time_ns: u64,
     ) -> Option<Crop> {
         let CocField::Depth(lens) = field else { return None };
-        let part = self.follower.as_mut().map(|follower| follower.part(map, lens, time_ns));
+        let part = self.follower.as_mut().map(|follower| follower.crop(map, lens, time_ns));
         if let Some(backdrop) = &mut self.backdrop {
-            backdrop.lay(color, map, lens);
+            backdrop.replace_background(color, map, lens);
         }
         part
     }

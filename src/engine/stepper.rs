@@ -43,7 +43,7 @@ impl Stepper {
         let mut executors = Executors::new(computing);
         // Until a budget is set, time is unlimited.
         let mut blur = Blur::default();
-        blur.follow(look, (size, adaptive), |settings| executors.blur(settings, size))?;
+        blur.follow(look, (size, adaptive), |settings| executors.create_blur(settings, size))?;
         Ok(Self {
             size,
             adaptive,
@@ -67,7 +67,7 @@ impl Stepper {
     /// Same as for [`Stepper::new`]; the current look stays in use.
     pub fn follow(&mut self, look: &Look) -> Result<(), BokehError> {
         let Self { engine: Engine { preparation, blur }, executors, size, .. } = self;
-        blur.follow(look, (*size, self.adaptive), |settings| executors.blur(settings, *size))?;
+        blur.follow(look, (*size, self.adaptive), |settings| executors.create_blur(settings, *size))?;
         preparation.follow(look);
         preparation.beside(blur.executor());
         Ok(())

@@ -54,7 +54,7 @@ pub fn blur(
     }
     let (coc, depth) = coc_and_depth(look, &mut color, depth)?;
     let (mut blur, mut images) = (Blur::default(), Images { color, depth, ..Images::default() });
-    blur.follow(look, (size, false), |settings| computing.blur(settings, size))?;
+    blur.follow(look, (size, false), |settings| computing.create_blur(settings, size))?;
     blur.blur(&mut images, coc)?;
     let [_, by] = blur.describe_executor();
     Ok((images.blurred, by))

@@ -4,8 +4,8 @@ use std::ops::Range;
 
 /// A mixed pixel on an outline: partly a nearer surface, the rest a farther one.
 ///
-/// With alpha `share`, `D` the difference of the two colours in linear light, and `I` the pixel's own colour, the
-/// nearer surface is `I + (1 - share) D` and the farther one `I - share D`, so that they composite exactly to the
+/// With alpha `alpha`, `D` the difference of the two colours in linear light, and `I` the pixel's own colour, the
+/// nearer surface is `I + (1 - alpha) D` and the farther one `I - alpha D`, so that they composite exactly to the
 /// pixel.
 // The shaders read this memory layout.
 #[repr(C)]
@@ -19,7 +19,7 @@ pub struct MixedPixel {
     /// Distance of the farther surface, in metres; unknown counts as infinite.
     pub far_m: f32,
     /// Alpha of the nearer surface, 0 to 1.
-    pub share: f32,
+    pub alpha: f32,
     /// Known fraction of the farther surface, 0 to 1: its visible fraction, or 1 if it is known from elsewhere.
     pub behind: f32,
     /// Colour of the nearer surface minus that of the farther one: linear light, red, green and blue.
@@ -35,14 +35,14 @@ pub struct Mask {
     /// Rows.
     pub height: u32,
     /// `height * width` alphas.
-    pub share: Vec<f32>,
+    pub alpha: Vec<f32>,
 }
 
 impl Mask {
     /// Resizes the mask, reusing its memory if possible. The content is unspecified afterwards.
     pub fn resize(&mut self, width: u32, height: u32) {
         (self.width, self.height) = (width, height);
-        super::make_room(&mut self.share, width as usize * height as usize);
+        super::make_room(&mut self.alpha, width as usize * height as usize);
     }
 }
 

@@ -25,7 +25,7 @@ pub enum LookError {
 
 impl Patch {
     /// Returns all settings of a look, so that the patch makes it from any other.
-    pub fn of(look: &Look) -> Self {
+    pub fn from_look(look: &Look) -> Self {
         let (coc_at_infinity, lens) = match look.strength {
             Strength::Lens(lens) => (None, Some(lens)),
             strength => (Some(strength), None),
@@ -74,7 +74,7 @@ impl Patch {
     }
 
     /// Removes the settings that have the same value in `other`.
-    pub fn beside(mut self, other: &Self) -> Self {
+    pub fn without_equal(mut self, other: &Self) -> Self {
         let is_same = |setting: &&Setting| (setting.get)(&self) == (setting.get)(other);
         let same: Vec<&Setting> = SETTINGS.iter().filter(is_same).collect();
         same.into_iter().for_each(|setting| (setting.clear)(&mut self));
@@ -95,12 +95,12 @@ impl Patch {
     }
 
     /// Returns all settings of a look under all their names, for the status of a run.
-    pub fn described(look: &Look) -> BTreeMap<String, String> {
+    pub fn describe(look: &Look) -> BTreeMap<String, String> {
         let named = |(name, value): Value| {
             let alias = setting(name).and_then(Setting::alias);
             [Some(name), alias].into_iter().flatten().map(move |name| (name.to_owned(), value.clone()))
         };
-        Self::of(look).values().into_iter().flat_map(named).collect()
+        Self::from_look(look).values().into_iter().flat_map(named).collect()
     }
 
     /// Reads the pictures it names, so that [`Patch::on`] need not.
@@ -121,7 +121,7 @@ impl Patch {
     ///
     /// # Errors
     /// A lens lacks a number, or a picture cannot be read.
-    pub fn on(&self, base: &Look) -> Result<Look, LookError> {
+    pub fn apply_to(&self, base: &Look) -> Result<Look, LookError> {
         let mut look = base.clone();
         macro_rules! set {
             ($($field:ident),+) => { $(if let Some(value) = self.$field { look.$field = value; })+ };
@@ -195,13 +195,13 @@ impl<'de> Deserialize<'de> for Patch {
 
 impl Serialize for Look {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        Patch::of(self).serialize(serializer)
+        Patch::from_look(self).serialize(serializer)
     }
 }
 
 impl<'de> Deserialize<'de> for Look {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        Patch::deserialize(deserializer)?.on(&Self::default()).map_err(de::Error::custom)
+        Patch::deserialize(deserializer)?.apply_to(&Self::default()).map_err(de::Error::custom)
     }
 }
 
@@ -232,15 +232,15 @@ mod tests {
     #[test]
     fn a_lens_is_known_by_three_numbers_or_changed_by_one() {
         let one = Patch::parse([("f-number", "2")]).unwrap();
-        assert!(matches!(one.on(&Look::default()), Err(LookError::Lens)));
+        assert!(matches!(one.apply_to(&Look::default()), Err(LookError::Lens)));
         let lens = Patch::parse([("f-number", "4"), ("focal-length", "50"), ("sensor-width", "36")]).unwrap();
-        let by_lens = lens.on(&Look::default()).unwrap();
-        let wider = one.on(&by_lens).unwrap();
+        let by_lens = lens.apply_to(&Look::default()).unwrap();
+        let wider = one.apply_to(&by_lens).unwrap();
         assert_eq!(
             wider.strength,
             Strength::Lens(Lens { f_number: 2.0, focal_length_mm: 50.0, sensor_width_mm: 36.0 })
         );
         let at_infinity = Patch::parse([("coc-at-infinity", "auto")]).unwrap();
-        assert_eq!(at_infinity.on(&wider).unwrap(), Look::default());
+        assert_eq!(at_infinity.apply_to(&wider).unwrap(), Look::default());
     }
 }

@@ -182,7 +182,7 @@ impl Setting {
 
     /// Returns its default value; `None` if that is [computed](Setting::computed).
     pub fn default(&self) -> Option<String> {
-        (self.get)(&Patch::of(&Look::default())).filter(|_| !self.computed)
+        (self.get)(&Patch::from_look(&Look::default())).filter(|_| !self.computed)
     }
 
     /// Parses a value into a patch.

@@ -66,7 +66,7 @@ impl<'a> Stage<'a> {
                 self.pacer.restart();
             // A seek is served even if there are no viewers; otherwise the camera pauses until one comes.
             } else if let Some(demand) = self.demand.as_ref().filter(|demand| !demand.is_watched()) {
-                self.camera.rest();
+                self.camera.suspend();
                 let rest_began_ns = clock.now_ns();
                 demand.wait(PATIENCE);
                 self.pacer.shift(clock.now_ns() - rest_began_ns);

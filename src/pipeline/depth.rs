@@ -73,7 +73,7 @@ impl<'a> Stage<'a> {
                 Received::Item(frame) => frame,
                 Received::Ended => return Ok(()),
                 Received::Nothing => {
-                    self.source.iter_mut().for_each(|source| source.rest());
+                    self.source.iter_mut().for_each(|source| source.suspend());
                     continue;
                 }
             };
@@ -133,7 +133,7 @@ impl<'a> Stage<'a> {
     fn handle_seek(&mut self, ahead_ns: i64) {
         self.preparation.forget();
         self.rate.iter_mut().for_each(Rate::forget);
-        self.source.iter_mut().for_each(|source| source.jump(ahead_ns));
+        self.source.iter_mut().for_each(|source| source.seek(ahead_ns));
     }
 
     /// Applies virtual background and auto-framing, the last step here, and stamps the frame's depth time.

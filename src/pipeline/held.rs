@@ -34,14 +34,14 @@ impl HeldMap {
         copy_map(map, &mut self.map);
         let depth_step =
             if let CocField::Depth(lens) = field { lens.inverse_depth_of_px(APART_PX) } else { f32::INFINITY };
-        self.motion.keep(map, color, depth_step);
+        self.motion.set_reference(map, color, depth_step);
         let matte = &mut self.map.matte.pixels;
         matte.clear();
         if map.subject_m.is_some() && map.size() == color.size() {
             matte.extend(map.matte.pixels.iter().map(|pixel| {
                 // Compositing solved for the background: own = far + alpha * difference.
                 let own = linear_rgb(&self.light, color, pixel);
-                let far = |p: usize| own[p] - pixel.share * pixel.difference[p];
+                let far = |p: usize| own[p] - pixel.alpha * pixel.difference[p];
                 MixedPixel { difference: std::array::from_fn(far), ..*pixel }
             }));
         }
@@ -51,7 +51,7 @@ impl HeldMap {
     pub fn warp_to(&mut self, map: &mut DepthMap, color: &ColorImage) {
         copy_map(&self.map, map);
         let Self { map: held, light, motion } = self;
-        let moved = motion.find(held, color);
+        let moved = motion.estimate(held, color);
         if moved {
             motion.warp(held, map);
         }
@@ -61,7 +61,7 @@ impl HeldMap {
         }
         let (width, height) = (color.width as i32, color.height as i32);
         map.matte.pixels.extend(held.matte.pixels.iter().filter_map(|pixel| {
-            let [right, down] = if moved { motion.of(pixel.at as usize, pixel.near_m) } else { [0; 2] };
+            let [right, down] = if moved { motion.vector_at(pixel.at as usize, pixel.near_m) } else { [0; 2] };
             let (x, y) = (pixel.at as i32 % width + right, pixel.at as i32 / width + down);
             let pixel = MixedPixel { at: (y * width + x) as u32, ..*pixel };
             ((0..width).contains(&x) && (0..height).contains(&y)).then(|| with_colors(light, color, &pixel))
@@ -69,7 +69,7 @@ impl HeldMap {
         if moved {
             // If two pixels moved to one place, the one with the larger alpha stays.
             let pixels = &mut map.matte.pixels;
-            pixels.sort_unstable_by(|a, b| a.at.cmp(&b.at).then(b.share.total_cmp(&a.share)));
+            pixels.sort_unstable_by(|a, b| a.at.cmp(&b.at).then(b.alpha.total_cmp(&a.alpha)));
             pixels.dedup_by_key(|pixel| pixel.at);
         }
     }
@@ -78,7 +78,7 @@ impl HeldMap {
 /// Returns a held pixel with the colour difference for a picture: own = far + alpha * difference, solved for it.
 fn with_colors(light: &[f32; 256], color: &ColorImage, pixel: &MixedPixel) -> MixedPixel {
     let own = linear_rgb(light, color, pixel);
-    let (share, rest) = (pixel.share.max(MIN_ALPHA), (1.0 - pixel.share).max(1e-3));
+    let (share, rest) = (pixel.alpha.max(MIN_ALPHA), (1.0 - pixel.alpha).max(1e-3));
     let difference = |p: usize| {
         let difference = (own[p] - pixel.difference[p]) / share;
         // The light of both surfaces stays within black and white.
@@ -120,7 +120,7 @@ mod tests {
             color.rgb[3 * at as usize..][..3].copy_from_slice(&if near { [luma, 40, 40] } else { [40, luma, 200] });
             map.metres[at as usize] = if near { 1.0 } else { 9.0 };
             if near && x == 240 {
-                let pixel = MixedPixel { at, near_m: 1.0, far_m: 9.0, share: 0.5, behind: 0.5, difference: [0.1; 3] };
+                let pixel = MixedPixel { at, near_m: 1.0, far_m: 9.0, alpha: 0.5, behind: 0.5, difference: [0.1; 3] };
                 map.matte.pixels.push(pixel);
             }
         }
@@ -150,7 +150,7 @@ mod tests {
             let own = [0, 1, 2].map(|p| light[usize::from(color.rgb[3 * at as usize + p])]);
             let far = [light[30], light[60], light[200]];
             let difference = std::array::from_fn(|p| (own[p] - far[p]) / share);
-            MixedPixel { at, near_m: 1.0, far_m: 9.0, share, behind, difference }
+            MixedPixel { at, near_m: 1.0, far_m: 9.0, alpha: share, behind, difference }
         };
         let mut map = DepthMap { subject_m: Some(1.0), ..DepthMap::new(3, 1) };
         map.matte.pixels = vec![pixel(0, 1.0, 1.0), pixel(1, 0.5, 1.0)];

@@ -88,7 +88,7 @@ mod tests {
 
     #[test]
     fn so_many_frames_share_a_map_until_that_is_forgotten() {
-        let plan = |frames| Plan { frames, effort: 1, rung: 0 };
+        let plan = |frames| Plan { frames, effort: 1, level: 0 };
         let order = Order::new(plan(1));
         let mut rate = Rate::new(&order);
         let map = DepthMap { metres: vec![1.0; 4], ..DepthMap::new(2, 2) };

@@ -116,7 +116,7 @@ impl<'a> Run<'a> {
     ) -> Result<Self, BokehError> {
         let size = camera.info().size;
         let bokeh =
-            look.settings(size, false).map(|settings| Computing::default().blur(&settings, size)).transpose()?;
+            look.settings(size, false).map(|settings| Computing::default().create_blur(&settings, size)).transpose()?;
         let blurring = Blurring { look, bokeh, adaptive: false, changes: None };
         Ok(Self { measured: depth.is_some(), ..Self::of(camera, depth, blurring, sink, stop) })
     }

@@ -136,7 +136,7 @@ pub fn find_person(options: &Options, look: &Look, color: &ColorImage, map: &mut
     let is_used = look.effect.follows_depth() && look.focus == FocusRule::Auto;
     if is_used && let Some((mut persons, _)) = open_person_detector(&Wanted { options, look: Some(look) }) {
         let stamp = Stamp { index: 0, time_ns: 0, captured_ns: None };
-        persons.mark(FrameInput { stamp, color, right: None }, map);
+        persons.set_distance(FrameInput { stamp, color, right: None }, map);
     }
 }
 

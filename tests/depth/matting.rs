@@ -65,18 +65,18 @@ fn shares_and_colours_of_a_soft_outline_are_found() {
         assert_eq!((pixel.near_m, pixel.far_m), (NEAR_M, FAR_M));
         let own = light(std::array::from_fn(|p| picture.rgb[3 * pixel.at as usize + p]));
         for p in 0..3 {
-            let near = own[p] + (1.0 - pixel.share) * pixel.difference[p];
-            let far = own[p] - pixel.share * pixel.difference[p];
-            assert!((pixel.share * near + (1.0 - pixel.share) * far - own[p]).abs() < 1e-5, "both add up to the pixel");
+            let near = own[p] + (1.0 - pixel.alpha) * pixel.difference[p];
+            let far = own[p] - pixel.alpha * pixel.difference[p];
+            assert!((pixel.alpha * near + (1.0 - pixel.alpha) * far - own[p]).abs() < 1e-5, "both add up to the pixel");
             // A share of little tells little of the surface's colour.
-            let tolerance = 0.01 / pixel.share;
+            let tolerance = 0.01 / pixel.alpha;
             assert!(
                 (near - light(RED)[p]).abs() < 0.06 + tolerance
-                    && (far - light(BLUE)[p]).abs() < 0.06 + 0.01 / (1.0 - pixel.share),
+                    && (far - light(BLUE)[p]).abs() < 0.06 + 0.01 / (1.0 - pixel.alpha),
                 "{pixel:?}: {own:?}, plane {p}, {near}, {far}"
             );
         }
-        found[pixel.at as usize] = Some(pixel.share);
+        found[pixel.at as usize] = Some(pixel.alpha);
     }
     assert!(map.matte.pixels.is_sorted_by(|a, b| a.at < b.at));
     for y in 0..SIZE.1 {
@@ -100,7 +100,7 @@ fn a_hard_outline_of_textures_stays_hard() {
     Matting::default().find(&mut map, &picture, JUMP);
     let shifted = |pixel: &&MixedPixel| {
         let (x, y) = place(pixel);
-        (pixel.share - f32::from(u8::from(disc(x as f32 + 0.5, y as f32 + 0.5)))).abs() > 0.1
+        (pixel.alpha - f32::from(u8::from(disc(x as f32 + 0.5, y as f32 + 0.5)))).abs() > 0.1
     };
     let count = map.matte.pixels.iter().filter(shifted).count();
     assert!(count <= 3, "{count} pixels of a hard outline are taken for mixed ones");
@@ -122,13 +122,13 @@ fn hair_is_followed_where_the_depth_map_has_none_of_it() {
     let mut map = depth(SIZE.0, SIZE.1, |x, y| if seen(x, y) { NEAR_M } else { FAR_M });
     Matting::default().find(&mut map, &picture, JUMP);
     let share_at =
-        |x: u32, y: u32| map.matte.pixels.iter().find(|pixel| place(pixel) == (x, y)).map(|pixel| pixel.share);
+        |x: u32, y: u32| map.matte.pixels.iter().find(|pixel| place(pixel) == (x, y)).map(|pixel| pixel.alpha);
     for x in 61..84 {
         let share = share_at(x, 20).unwrap_or(0.0);
         assert!((share - 1.0 / 3.0).abs() < 0.1, "at {x}: {share}");
     }
     let beside = map.matte.pixels.iter().filter(|pixel| place(pixel).0 > 61 && place(pixel).1 != 20);
-    assert!(beside.clone().all(|pixel| pixel.share < 0.1), "the wall beside a hair is no hair");
+    assert!(beside.clone().all(|pixel| pixel.alpha < 0.1), "the wall beside a hair is no hair");
 }
 
 /// A bar on the wall has the colour of a hair's pixels, and goes on from the outline.
@@ -149,7 +149,7 @@ fn what_is_wider_than_hair_and_far_is_none() {
     let on_outline = map.matte.pixels.iter().filter(|pixel| place(pixel).0 == 60).count();
     assert_eq!(on_outline, SIZE.1 as usize);
     for pixel in map.matte.pixels.iter().filter(|pixel| place(pixel).0 > 61) {
-        assert!(pixel.share < 0.1, "{pixel:?} at {:?}", place(pixel));
+        assert!(pixel.alpha < 0.1, "{pixel:?} at {:?}", place(pixel));
     }
 }
 
@@ -164,7 +164,7 @@ fn what_cannot_have_a_matte_has_none() {
             at: 3,
             near_m: 1.0,
             far_m: 2.0,
-            share: 0.5,
+            alpha: 0.5,
             behind: 0.5,
             difference: [0.1; 3],
         });
@@ -255,7 +255,7 @@ fn what_is_known_to_be_behind_a_subject_shows_beside_it() {
     let known = |at: u32| {
         let (near, far) = (light(RED), wall(at % SIZE.0, at / SIZE.0));
         let difference = std::array::from_fn(|p| near[p] - far[p]);
-        MixedPixel { at, near_m: NEAR_M, far_m: FAR_M, share: 1.0, behind: 1.0, difference }
+        MixedPixel { at, near_m: NEAR_M, far_m: FAR_M, alpha: 1.0, behind: 1.0, difference }
     };
     map.matte.pixels = (0..SIZE.0 * SIZE.1).filter(|at| (20..44).contains(&(at % SIZE.0))).map(known).collect();
     let only_wall = color(SIZE.0, SIZE.1, |x, y| codes(wall(x, y)));
@@ -286,7 +286,7 @@ fn what_is_hidden_everywhere_is_never_seen() {
         for factor in [1.03, 1.1, 1.3, 4.0] {
             let mut map = depth(SIZE.0, SIZE.1, |_, _| near_m);
             let difference = std::array::from_fn(|p| own[p] - far[p]);
-            let pixel = |at| MixedPixel { at, near_m, far_m: factor * near_m, share: 1.0, behind: 1.0, difference };
+            let pixel = |at| MixedPixel { at, near_m, far_m: factor * near_m, alpha: 1.0, behind: 1.0, difference };
             map.matte.pixels = hiding.clone().map(pixel).collect();
             for quality in Quality::ALL {
                 let out = blur(&map, &picture, &field, quality);
@@ -314,5 +314,5 @@ fn mixed(picture: &ColorImage, at: u32, numbers: &mut Numbers) -> MixedPixel {
     let share = 0.05 + 0.9 * numbers.next();
     let own = light(std::array::from_fn(|p| picture.rgb[3 * at as usize + p]));
     let difference = own.map(|own| (2.0 * numbers.next() - 1.0) * own.min(1.0 - own));
-    MixedPixel { at, near_m: 0.8, far_m: 3.0, share, behind: 1.0 - share, difference }
+    MixedPixel { at, near_m: 0.8, far_m: 3.0, alpha: share, behind: 1.0 - share, difference }
 }

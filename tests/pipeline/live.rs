@@ -40,7 +40,7 @@ impl Camera for Sleeper {
         Ok(Captured::Frame(Stamp { index, time_ns, captured_ns: Some(Clock::system().now_ns()) }))
     }
 
-    fn rest(&mut self) {
+    fn suspend(&mut self) {
         self.open = false;
     }
 }

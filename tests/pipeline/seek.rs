@@ -111,7 +111,7 @@ fn depth_of_another_recording_stays_beside_the_colours() {
     let (mut color, mut map, mut right) = (ColorImage::default(), DepthMap::default(), GrayImage::default());
     for place in [None, Some(6), None, Some(2), Some(9), None, None, Some(5)] {
         if let Some(place) = place {
-            depth.jump(camera.seek(place));
+            depth.seek(camera.seek(place));
         }
         let shot = Shot { color: &mut color, depth: &mut DepthMap::default(), right: &mut right };
         let Captured::Frame(stamp) = camera.next(shot).unwrap() else { panic!("{place:?}") };
@@ -128,7 +128,7 @@ impl DepthSource for Told {
     fn read(&mut self, seen: FrameInput, map: &mut DepthMap) -> Result<(), DepthError> {
         self.0.read(seen, map)
     }
-    fn jump(&mut self, _: i64) {
+    fn seek(&mut self, _: i64) {
         self.1.fetch_add(1, Ordering::SeqCst);
     }
 }

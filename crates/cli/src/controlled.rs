@@ -68,7 +68,7 @@ fn apply_patch(
             "--effect {effect} follows depth, and this run has none: use --effect blur or tilt-shift"
         )));
     }
-    let look = source::fitting_look(&patch.on(look)?, &facts.depth_choice, facts.has_depth)?;
+    let look = source::fitting_look(&patch.apply_to(look)?, &facts.depth_choice, facts.has_depth)?;
     let uses_depth = look.effect.follows_depth();
     match facts.depth_from {
         DepthOrigin::Networks | DepthOrigin::Plate if uses_depth => source::refuse_metres(&look, "one camera knows")?,

@@ -78,14 +78,14 @@ pub fn warn_of_mask(file: &Path, mask: &Mask, color: &ColorImage) {
 }
 
 fn check_mask(mask: &Mask, color: &ColorImage) -> Option<&'static str> {
-    let (low, high) = value_range(&mask.share)?;
+    let (low, high) = value_range(&mask.alpha)?;
     match () {
         () if low > 1.0 - TOLERANCE => {
             Some("the mask is white all over: all of the picture is the subject, and stays sharp")
         }
         () if high < TOLERANCE => Some("the mask is black all over: there is no subject, and all is blurred"),
         () if high - low < TOLERANCE => Some("the mask is one grey all over: it tells no subject from what is behind"),
-        () if is_picture(&mask.share, mask.width, color) => Some("this is the picture itself, and no mask of it"),
+        () if is_picture(&mask.alpha, mask.width, color) => Some("this is the picture itself, and no mask of it"),
         () => None,
     }
 }

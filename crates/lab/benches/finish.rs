@@ -87,7 +87,7 @@ fn measure(options: &Options) -> Result<(), Box<dyn std::error::Error>> {
             taken_ms.push((cpu_ns() - began_ns) as f64 / 1e6);
             map.metres.iter().for_each(|metres| metres.to_bits().hash(sum));
             for pixel in &map.matte.pixels {
-                (pixel.at, pixel.share.to_bits(), pixel.difference.map(f32::to_bits)).hash(sum);
+                (pixel.at, pixel.alpha.to_bits(), pixel.difference.map(f32::to_bits)).hash(sum);
             }
         }
     }

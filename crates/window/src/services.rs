@@ -66,7 +66,7 @@ pub trait Services: Send {
     ///
     /// # Errors
     /// Returns a one-line message with advice if it does not.
-    fn can(&mut self, name: &str, way: DepthMethod) -> Result<(), String> {
+    fn check_depth_method(&mut self, name: &str, way: DepthMethod) -> Result<(), String> {
         let _ = (name, way);
         Ok(())
     }
@@ -100,7 +100,7 @@ pub trait Services: Send {
     ///
     /// # Errors
     /// Fails if the camera rejects the value.
-    fn turn(&mut self, knob: &str, value: i64) -> Result<Vec<Knob>, String>;
+    fn set_control(&mut self, knob: &str, value: i64) -> Result<Vec<Knob>, String>;
 
     /// Creates an executor for pictures of `size` pixels.
     ///

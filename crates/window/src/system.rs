@@ -187,7 +187,7 @@ impl Services for System {
         devices::virtual_cameras()
     }
 
-    fn can(&mut self, name: &str, way: DepthMethod) -> Result<(), String> {
+    fn check_depth_method(&mut self, name: &str, way: DepthMethod) -> Result<(), String> {
         let installed = source::installed_networks();
         let lacks = match way {
             DepthMethod::Person => installed.matte.is_none(),
@@ -276,7 +276,7 @@ impl Services for System {
         self.mode = Some((name.to_owned(), Size { width, height }, fps));
     }
 
-    fn turn(&mut self, knob: &str, value: i64) -> Result<Vec<Knob>, String> {
+    fn set_control(&mut self, knob: &str, value: i64) -> Result<Vec<Knob>, String> {
         let Some(camera) = &self.camera else { return Err("this source has no controls".to_owned()) };
         let controls = devices::turn(camera, knob, value)?;
         self.control_values.insert(knob.to_owned(), value);
@@ -284,7 +284,7 @@ impl Services for System {
     }
 
     fn executor(&mut self, settings: &bokeh::Settings, size: (u32, u32)) -> Result<Box<dyn Bokeh>, String> {
-        self.executors.blur(settings, size).map_err(|error| error.to_string())
+        self.executors.create_blur(settings, size).map_err(|error| error.to_string())
     }
 
     fn output(

@@ -209,12 +209,12 @@ impl<'a> Source<'a> {
                 true => compress(luminance(back.0[0][x], back.0[1][x], back.0[2][x]), self.expansion).recip(),
                 false => 1.0,
             };
-            (alpha.0[x], behind.0[x]) = (pixel.share, pixel.behind);
+            (alpha.0[x], behind.0[x]) = (pixel.alpha, pixel.behind);
             for p in 0..3 {
                 let own = back.0[p][x];
                 // Depth may be that of another frame with other colours: light is clamped to 0.
-                front.0[p][x] = (own + (1.0 - pixel.share) * factor * pixel.difference[p]).max(0.0);
-                back.0[p][x] = (own - pixel.share * factor * pixel.difference[p]).max(0.0);
+                front.0[p][x] = (own + (1.0 - pixel.alpha) * factor * pixel.difference[p]).max(0.0);
+                back.0[p][x] = (own - pixel.alpha * factor * pixel.difference[p]).max(0.0);
             }
             (front.0[3][x], back.0[3][x]) = (lens.coc_px(pixel.near_m), lens.coc_px(pixel.far_m));
         }

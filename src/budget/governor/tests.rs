@@ -27,17 +27,17 @@ impl Machine {
     fn play(&mut self, load_ns: f64, frames: usize, spike: impl Fn(usize) -> bool) -> Vec<usize> {
         let mut rungs = Vec::new();
         for frame in 0..frames {
-            let rung = self.governor.rung();
+            let rung = self.governor.level();
             rungs.push(rung);
             let took_ns = load_ns * self.costs[rung] * if spike(frame) { 10.0 } else { 1.0 };
             self.under_way.push_back((rung, took_ns));
             self.now_ns += PERIOD_NS;
             if self.under_way.len() > self.late {
                 let (rung, took_ns) = self.under_way.pop_front().unwrap();
-                let sample = Sample { rung, took_ns: took_ns as u64, at_ns: self.now_ns };
+                let sample = Sample { level: rung, took_ns: took_ns as u64, at_ns: self.now_ns };
                 self.governor.note(sample, BUDGET_NS);
             }
-            self.switches += usize::from(self.governor.rung() != rung);
+            self.switches += usize::from(self.governor.level() != rung);
         }
         rungs
     }
@@ -49,9 +49,9 @@ fn the_finest_rung_that_fits_is_found_in_one_step_and_kept() {
         for (load_ns, fits) in [(200_000.0, 4), (250_000.0, 3), (400_000.0, 2), (550_000.0, 1), (900_000.0, 0)] {
             let mut machine = Machine::new(late);
             machine.play(load_ns, 100, |_| false);
-            assert_eq!((machine.governor.rung(), machine.switches <= 1), (fits, true), "{load_ns} {late}");
+            assert_eq!((machine.governor.level(), machine.switches <= 1), (fits, true), "{load_ns} {late}");
             machine.play(load_ns, 1000, |_| false);
-            assert_eq!((machine.governor.rung(), machine.switches <= 1), (fits, true), "{load_ns} {late}");
+            assert_eq!((machine.governor.level(), machine.switches <= 1), (fits, true), "{load_ns} {late}");
         }
     }
 }
@@ -61,7 +61,7 @@ fn down_at_once_up_after_a_while() {
     for late in [0, 3] {
         let mut machine = Machine::new(late);
         machine.play(200_000.0, 200, |_| false);
-        assert_eq!(machine.governor.rung(), 4);
+        assert_eq!(machine.governor.level(), 4);
         let down = machine.play(550_000.0, 60, |_| false);
         assert!(down.iter().position(|&rung| rung == 1).is_some_and(|frame| frame <= 3 + late), "{down:?}");
         let up = machine.play(200_000.0, 200, |_| false);
@@ -85,7 +85,7 @@ fn rare_spikes_change_nothing() {
 fn the_floor_is_the_floor() {
     let mut machine = Machine::new(0);
     machine.play(50_000_000.0, 50, |_| false);
-    assert_eq!(machine.governor.rung(), 0);
+    assert_eq!(machine.governor.level(), 0);
     assert_eq!(machine.governor.expected_ns(), Some(50_000_000));
 }
 
@@ -109,54 +109,54 @@ fn costs_are_learnt_until_a_ladder_that_was_misjudged_does_not_pump() {
 fn a_sample_that_measures_nothing_is_none() {
     let mut governor = Governor::new(&COSTS, 3);
     for at_ns in [5, 3, 0, 9] {
-        governor.note(Sample { rung: 3, took_ns: 0, at_ns }, BUDGET_NS);
-        governor.note(Sample { rung: 77, took_ns: 9_000_000, at_ns }, BUDGET_NS);
+        governor.note(Sample { level: 3, took_ns: 0, at_ns }, BUDGET_NS);
+        governor.note(Sample { level: 77, took_ns: 9_000_000, at_ns }, BUDGET_NS);
     }
-    assert_eq!((governor.rung(), governor.expected_ns()), (3, None));
+    assert_eq!((governor.level(), governor.expected_ns()), (3, None));
     // Decreasing timestamps are accepted.
-    (0..5).for_each(|k| governor.note(Sample { rung: 3, took_ns: 9_000_000, at_ns: 50 - k }, BUDGET_NS));
-    assert_eq!(governor.rung(), 0);
+    (0..5).for_each(|k| governor.note(Sample { level: 3, took_ns: 9_000_000, at_ns: 50 - k }, BUDGET_NS));
+    assert_eq!(governor.level(), 0);
 }
 
 #[test]
 fn after_a_long_pause_only_what_is_new_counts() {
     let mut machine = Machine::new(0);
     machine.play(550_000.0, 100, |_| false);
-    assert_eq!(machine.governor.rung(), 1);
+    assert_eq!(machine.governor.level(), 1);
     machine.now_ns += 10 * IDLE_NS;
     // A slow first frame (CPU clocks must rise) changes nothing, and the load before the pause is forgotten.
     let rungs = machine.play(200_000.0, 60, |frame| frame < 1);
     assert!(rungs.iter().all(|&rung| rung >= 1));
-    assert_eq!(machine.governor.rung(), 4);
+    assert_eq!(machine.governor.level(), 4);
 }
 
 #[test]
 fn late_samples_of_another_rung_decide_nothing() {
     let mut governor = Governor::new(&COSTS, 4);
     for at_ns in 1..=20 {
-        governor.note(Sample { rung: 2, took_ns: 50_000_000, at_ns }, BUDGET_NS);
+        governor.note(Sample { level: 2, took_ns: 50_000_000, at_ns }, BUDGET_NS);
     }
-    assert_eq!(governor.rung(), 4);
+    assert_eq!(governor.level(), 4);
     // Its own first samples do, together with those of the others.
-    (21..24).for_each(|at_ns| governor.note(Sample { rung: 4, took_ns: 90_000_000, at_ns }, BUDGET_NS));
-    assert_eq!(governor.rung(), 0);
+    (21..24).for_each(|at_ns| governor.note(Sample { level: 4, took_ns: 90_000_000, at_ns }, BUDGET_NS));
+    assert_eq!(governor.level(), 0);
 }
 
 #[test]
 fn a_smaller_budget_is_heeded_at_once() {
     let mut machine = Machine::new(0);
     machine.play(240_000.0, 200, |_| false);
-    assert_eq!(machine.governor.rung(), 3);
-    let sample = Sample { rung: 3, took_ns: 720_000, at_ns: machine.now_ns };
+    assert_eq!(machine.governor.level(), 3);
+    let sample = Sample { level: 3, took_ns: 720_000, at_ns: machine.now_ns };
     machine.governor.note(sample, BUDGET_NS / 2);
-    assert_eq!(machine.governor.rung(), 1);
+    assert_eq!(machine.governor.level(), 1);
 }
 
 /// Simulates a load light enough for the finest level. Returns the number of frames until it is reached.
 fn frames_to_the_top(machine: &mut Machine) -> u32 {
     let rises = |_: &u32| {
         machine.play(200_000.0, 1, |_| false);
-        machine.governor.rung() == 4
+        machine.governor.level() == 4
     };
     (1..5000).find(rises).expect("it rises")
 }
@@ -165,7 +165,7 @@ fn frames_to_the_top(machine: &mut Machine) -> u32 {
 fn take_back(machine: &mut Machine) {
     machine.play(200_000.0, LEARN_FROM, |_| false);
     machine.play(400_000.0, 10, |_| false);
-    assert_eq!(machine.governor.rung(), 2);
+    assert_eq!(machine.governor.level(), 2);
 }
 
 /// Whether a step up after `frames` frames had this patience: the earlier loads must be forgotten first.
@@ -215,14 +215,14 @@ fn a_load_that_is_too_high_now_and_then_is_too_high() {
 fn a_step_up_goes_no_further_than_was_allowed_all_the_while() {
     let mut machine = Machine::new(0);
     machine.play(550_000.0, 100, |_| false);
-    assert_eq!(machine.governor.rung(), 1);
+    assert_eq!(machine.governor.level(), 1);
     // At first the fourth level fits, then the fifth.
     machine.play(280_000.0, 25, |_| false);
     let up = machine.play(200_000.0, 40, |_| false);
     let rose: Vec<usize> = up.chunk_by(|a, b| a == b).map(|rungs| rungs[0]).collect();
     assert_eq!(rose, [1, 3], "{up:?}");
     machine.play(200_000.0, 40, |_| false);
-    assert_eq!(machine.governor.rung(), 4);
+    assert_eq!(machine.governor.level(), 4);
 }
 
 #[test]
@@ -237,8 +237,8 @@ fn no_cost_is_learnt_beyond_what_is_credible() {
 /// Returns the expected time after ten equal frames, a pause, and one faster frame.
 fn expected_after(pause_ns: u64) -> Option<u64> {
     let mut governor = Governor::new(&[1.0], 0);
-    (1..=10).for_each(|at_ns| governor.note(Sample { rung: 0, took_ns: 500, at_ns }, BUDGET_NS));
-    governor.note(Sample { rung: 0, took_ns: 50, at_ns: 10 + pause_ns }, BUDGET_NS);
+    (1..=10).for_each(|at_ns| governor.note(Sample { level: 0, took_ns: 500, at_ns }, BUDGET_NS));
+    governor.note(Sample { level: 0, took_ns: 50, at_ns: 10 + pause_ns }, BUDGET_NS);
     governor.expected_ns()
 }
 
@@ -251,8 +251,8 @@ fn only_a_pause_that_is_long_enough_is_one() {
 fn the_first_step_up_comes_with_the_last_frame_of_the_patience() {
     let mut governor = Governor::new(&COSTS, 0);
     let mut rungs = (1..=PATIENCE).map(|frame| {
-        governor.note(Sample { rung: 0, took_ns: 200_000, at_ns: u64::from(frame) }, BUDGET_NS);
-        governor.rung()
+        governor.note(Sample { level: 0, took_ns: 200_000, at_ns: u64::from(frame) }, BUDGET_NS);
+        governor.level()
     });
     assert_eq!((rungs.by_ref().take(PATIENCE as usize - 1).max(), rungs.next()), (Some(0), Some(4)));
 }
@@ -263,7 +263,7 @@ fn a_load_that_is_about_the_budget_changes_nothing() {
     for (share_of_budget, kept) in [(0.92, true), (0.95, false)] {
         let mut machine = Machine::new(0);
         machine.play(share_of_budget * BUDGET_NS as f64 / COSTS[2], 300, |_| false);
-        assert_eq!(machine.governor.rung() == 2, kept, "{share_of_budget}");
+        assert_eq!(machine.governor.level() == 2, kept, "{share_of_budget}");
     }
 }
 

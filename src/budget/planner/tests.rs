@@ -29,7 +29,7 @@ fn play_held(planner: &mut Planner, (depth_ms, blur_ms): (f64, f64), held_ms: f6
             let took_ns = if is_own { ns(depth_ms * planner.efforts[plan.effort]) } else { ns(held_ms) };
             let effort = is_own.then_some(plan.effort);
             planner.note_depth(DepthTimes { effort, took_ns, age_ns: 4 * MS, at_ns });
-            planner.note_blur(Sample { rung: plan.rung, took_ns: ns(blur_ms * RUNGS[plan.rung]), at_ns });
+            planner.note_blur(Sample { level: plan.level, took_ns: ns(blur_ms * RUNGS[plan.level]), at_ns });
             plan
         })
         .collect()
@@ -45,7 +45,7 @@ fn settled(efforts: &[f64], times_ms: (f64, f64)) -> (Plan, usize) {
 
 #[test]
 fn with_less_time_effort_goes_first_then_the_blur_then_depth_of_its_own() {
-    let plan = |frames, effort, rung| Plan { frames, effort, rung };
+    let plan = |frames, effort, rung| Plan { frames, effort, level: rung };
     for (depth_ms, blur_ms, expected) in [
         (12.0, 12.0, plan(1, 1, 2)),
         (24.0, 18.0, plan(1, 1, 2)),
@@ -70,7 +70,7 @@ fn with_less_time_effort_goes_first_then_the_blur_then_depth_of_its_own() {
 fn a_blur_that_fits_is_not_lowered_where_depth_does_not() {
     for depth_ms in [30.0, 35.0, 60.0, 100.0] {
         let (plan, _) = settled(&[1.0], (depth_ms, 15.0));
-        assert!(plan.rung == BALANCED && plan.frames > 1, "{depth_ms} ms: {plan:?}");
+        assert!(plan.level == BALANCED && plan.frames > 1, "{depth_ms} ms: {plan:?}");
     }
 }
 
@@ -78,7 +78,7 @@ fn a_blur_that_fits_is_not_lowered_where_depth_does_not() {
 #[test]
 fn the_blur_is_lowered_where_that_keeps_frames_from_being_dropped() {
     let (plan, _) = settled(&[1.0], (43.0, 16.0));
-    assert!(plan.rung < BALANCED && plan.frames == 2, "{plan:?}");
+    assert!(plan.level < BALANCED && plan.frames == 2, "{plan:?}");
 }
 
 #[test]
@@ -89,11 +89,11 @@ fn all_the_time_there_is_is_taken_and_no_more() {
             let (plan, changes) = settled(&EFFORTS, times_ms);
             assert!(changes <= 2, "{times_ms:?}: {changes} changes in half a minute");
             let finer = [
-                (plan.rung < BALANCED).then_some(Plan { rung: plan.rung + 1, ..plan }),
+                (plan.level < BALANCED).then_some(Plan { level: plan.level + 1, ..plan }),
                 (plan.frames > 1).then(|| Plan { frames: plan.frames - 1, ..plan }),
                 (plan.frames == 1 && plan.effort == 0).then_some(Plan { effort: 1, ..plan }),
             ];
-            let took = |plan: Plan| (times_ms.0 * EFFORTS[plan.effort], times_ms.1 * RUNGS[plan.rung]);
+            let took = |plan: Plan| (times_ms.0 * EFFORTS[plan.effort], times_ms.1 * RUNGS[plan.level]);
             for finer in finer.into_iter().flatten() {
                 let (depth_ms, blur_ms) = took(finer);
                 // Half of its time is guaranteed to each stage; more fits only if both are in time.
@@ -110,14 +110,14 @@ fn without_a_pace_depth_is_as_good_as_it_gets() {
     let mut planner = Planner::new((PERIOD_NS, None), (&EFFORTS, true), &RUNGS, [BALANCED, BALANCED]);
     let plans = play(&mut planner, (500.0, 60.0), 100);
     assert!(plans.iter().all(|plan| plan.frames == 1 && plan.effort == 1));
-    assert_eq!(plans[99].rung, 0);
+    assert_eq!(plans[99].level, 0);
 }
 
 #[test]
 fn a_gpu_takes_a_finer_blur_while_depth_is_shared() {
     let mut planner = Planner::new((PERIOD_NS, Some(PERIOD_NS)), (&[1.0], true), &[0.7, 1.0, 2.0], [1, 1]);
     let plan = play(&mut planner, (45.0, 3.0), 300)[299];
-    assert_eq!((plan.frames, plan.rung), (2, 2));
+    assert_eq!((plan.frames, plan.level), (2, 2));
 }
 
 #[test]
@@ -139,7 +139,7 @@ fn depth_is_shared_only_where_that_saves_something_and_costs_the_blur_nothing_wh
             let plans = play_held(&mut planner, (depth_ms, 8.0), held * depth_ms, 600);
             assert_eq!(plans[300].frames > 1, shares, "{depth_ms} ms, held {held}: {:?}", plans[300]);
             assert!(plans[300..].windows(2).all(|pair| pair[0].frames == pair[1].frames), "it stays so");
-            assert!(shares || plans[599].rung == BALANCED, "{depth_ms} ms: {:?}", plans[599]);
+            assert!(shares || plans[599].level == BALANCED, "{depth_ms} ms: {:?}", plans[599]);
         }
     }
 }
@@ -152,10 +152,10 @@ fn played_with_spikes(planner: &mut Planner, (depth_ms, spike_ms, blur_ms): (u64
         let (plan, at_ns) = (planner.plan(), frame * PERIOD_NS);
         let took_ns = MS * if frame % 8 == 0 { spike_ms } else { depth_ms };
         planner.note_depth(DepthTimes { effort: Some(plan.effort), took_ns, age_ns: 5 * MS, at_ns });
-        let blur_ns = (blur_ms * MS as f64 * RUNGS[plan.rung]) as u64;
-        planner.note_blur(Sample { rung: plan.rung, took_ns: blur_ns, at_ns });
+        let blur_ns = (blur_ms * MS as f64 * RUNGS[plan.level]) as u64;
+        planner.note_blur(Sample { level: plan.level, took_ns: blur_ns, at_ns });
         if frame >= 300 {
-            usual += usize::from(plan.rung == BALANCED);
+            usual += usize::from(plan.level == BALANCED);
             shared += usize::from(plan.frames > 1);
         }
     }
@@ -184,6 +184,6 @@ fn depth_that_may_not_be_shared_never_is_and_the_blur_gives_way_first() {
         let mut planner = Planner::new((PERIOD_NS, Some(PERIOD_NS)), (&[1.0], false), &RUNGS, start);
         let plans = play(&mut planner, (depth_ms, 9.0), 600);
         assert!(plans.iter().all(|plan| plan.frames == 1), "{depth_ms} ms");
-        assert_eq!(plans[599].rung, rung, "{depth_ms} ms");
+        assert_eq!(plans[599].level, rung, "{depth_ms} ms");
     }
 }

@@ -21,8 +21,8 @@ pub trait Eye: Send {
     /// Reads a frame like [`Camera::next`], waiting for at most `timeout`; sets the frame's `captured_ns`.
     fn next_within(&mut self, timeout: Duration, color: &mut ColorImage) -> Captured;
 
-    /// Releases the device, like [`Camera::rest`].
-    fn rest(&mut self);
+    /// Releases the device, like [`Camera::suspend`].
+    fn suspend(&mut self);
 }
 
 /// Two cameras as one stereo camera.
@@ -167,9 +167,9 @@ impl<E: Eye> Camera for StereoPair<E> {
         self.waited_ns
     }
 
-    fn rest(&mut self) {
-        self.left.rest();
-        self.right.rest();
+    fn suspend(&mut self) {
+        self.left.suspend();
+        self.right.suspend();
         self.pairing.clear();
     }
 }

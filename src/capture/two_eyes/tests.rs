@@ -43,7 +43,7 @@ impl Eye for FakeEye {
         }
     }
 
-    fn rest(&mut self) {}
+    fn suspend(&mut self) {}
 }
 
 fn eyes(left_ns: Vec<u64>, right_ns: Vec<u64>) -> (StereoPair<FakeEye>, Clock) {

@@ -37,7 +37,7 @@ impl Background {
             others.iter().for_each(|pixels| map.matte.pixels.extend_from_slice(pixels));
         }
         if map.matte.pixels.len() > Matte::most(size.0, size.1) {
-            map.matte.pixels.retain(|pixel| pixel.share < 1.0);
+            map.matte.pixels.retain(|pixel| pixel.alpha < 1.0);
         }
         self.pixels = pixels;
     }
@@ -51,7 +51,7 @@ impl Background {
             difference[p] = self.own_light[usize::from(own[p])] - light[p];
         }
         let far_m = self.inverse[at].recip();
-        MixedPixel { at: at as u32, near_m: metres, far_m, share: 1.0, behind: 1.0, difference }
+        MixedPixel { at: at as u32, near_m: metres, far_m, alpha: 1.0, behind: 1.0, difference }
     }
 }
 

@@ -45,7 +45,7 @@ impl Persons {
     }
 
     /// Sets [`DepthMap::person_m`], the person's distance in the frame `seen`.
-    pub fn mark(&mut self, seen: FrameInput, map: &mut DepthMap) {
+    pub fn set_distance(&mut self, seen: FrameInput, map: &mut DepthMap) {
         let time_ns = seen.stamp.time_ns;
         if self.last_ns.is_none_or(|last_ns| time_ns.abs_diff(last_ns) >= EVERY_NS) {
             self.last_ns = Some(time_ns);
@@ -57,7 +57,7 @@ impl Persons {
     /// Sets [`DepthMap::person_m`] like [`Self::mark`], and repairs stereo mismatches: within the outline in this
     /// frame, depth that is unknown or far behind the person is set to the person's distance, in rows where enough has
     /// it.
-    pub fn mend(&mut self, seen: FrameInput, map: &mut DepthMap) {
+    pub fn fill_holes(&mut self, seen: FrameInput, map: &mut DepthMap) {
         self.detect(seen);
         map.person_m = self.distance_m(map);
         let Some(person_m) = map.person_m else { return };
@@ -87,7 +87,7 @@ impl Persons {
 
     fn detect(&mut self, seen: FrameInput) {
         self.places.clear();
-        let Some(Mask { width, height, share }) = self.finder.persons(seen) else { return };
+        let Some(Mask { width, height, alpha: share }) = self.finder.persons(seen) else { return };
         let (columns, rows) = (*width as usize, *height as usize);
         self.size = (columns, rows);
         let head = (HEAD * rows as f32).ceil() as usize;
@@ -154,9 +154,9 @@ impl DepthSource for PersonFocus {
         self.depth.read(seen, map)?;
         map.person_m = None;
         if self.is_matched {
-            self.persons.mend(seen, map);
+            self.persons.fill_holes(seen, map);
         } else if self.is_wanted {
-            self.persons.mark(seen, map);
+            self.persons.set_distance(seen, map);
         }
         Ok(())
     }
@@ -181,14 +181,14 @@ impl DepthSource for PersonFocus {
         self.is_wanted = on;
     }
 
-    fn jump(&mut self, ahead_ns: i64) {
+    fn seek(&mut self, ahead_ns: i64) {
         self.persons.last_ns = None;
-        self.persons.finder.jump(ahead_ns);
-        self.depth.jump(ahead_ns);
+        self.persons.finder.seek(ahead_ns);
+        self.depth.seek(ahead_ns);
     }
 
-    fn rest(&mut self) {
-        self.depth.rest();
+    fn suspend(&mut self) {
+        self.depth.suspend();
     }
 }
 
@@ -211,7 +211,7 @@ mod tests {
         fn new(person: bool) -> Self {
             let mut mask = Mask::default();
             mask.resize(24, 12);
-            for (at, share) in mask.share.iter_mut().enumerate() {
+            for (at, share) in mask.alpha.iter_mut().enumerate() {
                 let (x, y) = (at % 24, at / 24);
                 *share = if person && (x < 8 && y > 1 || x < 9 && y > 7) { 1.0 } else { 0.3 };
             }

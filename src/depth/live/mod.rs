@@ -117,8 +117,8 @@ impl DepthSource for LiveDepth {
         Ok(())
     }
 
-    fn rest(&mut self) {
-        self.live.rest();
+    fn suspend(&mut self) {
+        self.live.suspend();
         // The scene may be different afterwards, so that an old map would be wrong.
         self.pairing.clear();
         self.stale = false;

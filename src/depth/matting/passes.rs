@@ -112,7 +112,7 @@ impl WithSimd for Mix<'_> {
                 let behind = if behind.is_some() { 1.0 } else { 1.0 - alpha };
                 let (near_m, far_m) = (edge.near.recip(), edge.far.recip());
                 let difference = [differences[0][k], differences[1][k], differences[2][k]];
-                *mixed = MixedPixel { at: pixel.at(width) as u32, near_m, far_m, share: alpha, behind, difference };
+                *mixed = MixedPixel { at: pixel.at(width) as u32, near_m, far_m, alpha, behind, difference };
             }
         }
     }

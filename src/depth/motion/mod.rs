@@ -39,7 +39,7 @@ pub struct Motion {
 impl Motion {
     /// Sets the reference picture and its depth map, which has no holes. A step of inverse depth above `depth_step`, in
     /// 1/m, separates surfaces.
-    pub fn keep(&mut self, map: &DepthMap, color: &ColorImage, depth_step: f32) {
+    pub fn set_reference(&mut self, map: &DepthMap, color: &ColorImage, depth_step: f32) {
         self.grid = Grid { size: (color.width as usize, color.height as usize), cell_px: CELL * block_px(color.width) };
         self.cells.clear();
         let is_known = map.metres.first().is_some_and(|&metres| DepthMap::is_known(metres));
@@ -51,7 +51,7 @@ impl Motion {
 
     /// Estimates the motion from the reference picture, with its depth `map`, to a later one. Returns whether anything
     /// moved.
-    pub fn find(&mut self, map: &DepthMap, color: &ColorImage) -> bool {
+    pub fn estimate(&mut self, map: &DepthMap, color: &ColorImage) -> bool {
         let is_alike = (color.width as usize, color.height as usize) == self.grid.size;
         is_alike && !self.cells.is_empty() && self.arch.dispatch(Find { motion: self, map, color })
     }
@@ -64,7 +64,7 @@ impl Motion {
     }
 
     /// Returns the motion of the surface at `metres` in pixel `at`.
-    pub fn of(&self, at: usize, metres: f32) -> Vector {
+    pub fn vector_at(&self, at: usize, metres: f32) -> Vector {
         let (across, down) = self.grid.cells();
         let place = (at % self.grid.size.0 / self.grid.cell_px, at / self.grid.size.0 / self.grid.cell_px);
         let cells = [place].into_iter().chain(layers::around(place, (across, down)));

@@ -32,9 +32,9 @@ fn seen(of: impl Fn(i32, i32) -> (u8, f32)) -> (ColorImage, DepthMap) {
 /// Returns the depth of `then`, warped by the motion to `now`.
 fn moved(then: &(ColorImage, DepthMap), now: &ColorImage) -> DepthMap {
     let mut motion = Motion::default();
-    motion.keep(&then.1, &then.0, DEPTH_STEP);
+    motion.set_reference(&then.1, &then.0, DEPTH_STEP);
     let mut map = then.1.clone();
-    if motion.find(&then.1, now) {
+    if motion.estimate(&then.1, now) {
         motion.warp(&then.1, &mut map);
     }
     map
@@ -150,11 +150,11 @@ fn what_cannot_be_compared_stays() {
 fn a_surface_is_asked_for_by_its_depth() {
     let (then, now) = (square([0; 2], [0; 2], false), square([10, 0], [-4, 0], false));
     let mut motion = Motion::default();
-    motion.keep(&then.1, &then.0, DEPTH_STEP);
-    assert!(motion.find(&then.1, &now.0));
+    motion.set_reference(&then.1, &then.0, DEPTH_STEP);
+    assert!(motion.estimate(&then.1, &now.0));
     // On both sides of the square's left outline.
     for x in [246, 250, 253] {
         let at = 180 * SIZE.0 + x;
-        assert_eq!([NEAR_M, FAR_M].map(|metres| motion.of(at, metres)), [[10, 0], [-4, 0]], "{x}");
+        assert_eq!([NEAR_M, FAR_M].map(|metres| motion.vector_at(at, metres)), [[10, 0], [-4, 0]], "{x}");
     }
 }

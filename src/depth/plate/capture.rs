@@ -42,8 +42,8 @@ impl Capture {
     pub fn add(&mut self, color: &ColorImage, time_ns: u64, persons: Option<&Mask>) -> Taken {
         self.reducer.reduce(color, &mut self.now);
         let are_there = persons.is_some_and(|persons| {
-            let count = persons.share.iter().filter(|alpha| **alpha > 0.5).count();
-            count as f32 > MIN_PERSON * persons.share.len() as f32
+            let count = persons.alpha.iter().filter(|alpha| **alpha > 0.5).count();
+            count as f32 > MIN_PERSON * persons.alpha.len() as f32
         });
         if are_there {
             self.reset();

@@ -132,7 +132,7 @@ impl Plate {
                 let rows = y.saturating_sub(1)..(y + 2).min(height);
                 let pixels = rows.len() * columns.len();
                 let count = |y: usize| foreign[y * width..][columns.clone()].iter().filter(|foreign| **foreign).count();
-                self.mask.share[y * width + x] = rows.map(count).sum::<usize>() as f32 / pixels as f32;
+                self.mask.alpha[y * width + x] = rows.map(count).sum::<usize>() as f32 / pixels as f32;
             }
         }
     }

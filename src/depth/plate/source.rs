@@ -236,7 +236,7 @@ impl DepthSource for PlateDepth {
         self.companion.iter_mut().for_each(|companion| companion.set_effort(effort));
     }
 
-    fn jump(&mut self, ahead_ns: i64) {
-        self.companion.iter_mut().for_each(|companion| companion.jump(ahead_ns));
+    fn seek(&mut self, ahead_ns: i64) {
+        self.companion.iter_mut().for_each(|companion| companion.seek(ahead_ns));
     }
 }

@@ -239,11 +239,11 @@ impl Subject {
     /// in a component that is connected to them and small enough to be held.
     pub fn keep_persons(&mut self, persons: &Mask, size: (usize, usize)) {
         let of_mask = (persons.width as usize, persons.height as usize);
-        if persons.share.is_empty() {
+        if persons.alpha.is_empty() {
             return;
         }
         self.seen.clear();
-        self.seen.extend(persons.share.iter().map(|alpha| *alpha > PERSON));
+        self.seen.extend(persons.alpha.iter().map(|alpha| *alpha > PERSON));
         let mut near = std::mem::take(&mut self.near);
         near.clone_from(&self.seen);
         dilate(&mut near, &mut self.flags, of_mask.0, (CLOSE * of_mask.0 as f32).ceil() as usize);

@@ -19,7 +19,7 @@ impl Absence {
     /// Returns whether a long absence is to be reported, given the current mask of persons: true only once per source,
     /// since the same network in the same place would not do better.
     pub fn should_report(&mut self, mask: &Mask, now_ns: u64) -> bool {
-        if mask.share.iter().any(|alpha| *alpha > PERSON) {
+        if mask.alpha.iter().any(|alpha| *alpha > PERSON) {
             self.since_ns = None;
             return false;
         }
@@ -36,7 +36,7 @@ mod tests {
 
     #[test]
     fn a_long_absence_is_told_once() {
-        let mask = |share: f32| Mask { width: 2, height: 1, share: vec![0.1, share] };
+        let mask = |share: f32| Mask { width: 2, height: 1, alpha: vec![0.1, share] };
         let mut absence = Absence::default();
         // A person leaves after four seconds, and returns for a moment after eight.
         let is_there = |second: u64| second < 4 || second == 8;

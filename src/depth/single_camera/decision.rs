@@ -49,20 +49,20 @@ impl Decision {
     /// Writes the decided mask of a picture at `now_ns` to `decided`.
     pub fn decide(&mut self, mask: &Mask, now_ns: u64, decided: &mut Mask) {
         decided.clone_from(mask);
-        self.classify(&mask.share);
+        self.classify(&mask.alpha);
         let width = mask.width as usize;
         let Self { persons, before, components, .. } = self;
         components.find(persons, width, |at| match persons[at] {
-            true => mask.share[at] > SURE,
-            false => mask.share[at] < SURE_HOLE[usize::from(before[at])],
+            true => mask.alpha[at] > SURE,
+            false => mask.alpha[at] < SURE_HOLE[usize::from(before[at])],
         });
         if !self.is_person_present(now_ns) {
-            decided.share.fill(0.0);
+            decided.alpha.fill(0.0);
             self.before.clear();
             return;
         }
         self.fill_holes();
-        self.settle(width, &mut decided.share);
+        self.settle(width, &mut decided.alpha);
         std::mem::swap(&mut self.persons, &mut self.before);
     }
 
@@ -146,7 +146,7 @@ mod tests {
     /// Creates a mask from a function of column and row.
     fn mask(share: impl Fn(usize, usize) -> f32) -> Mask {
         let share = (0..SIZE.0 * SIZE.1).map(|at| share(at % SIZE.0, at / SIZE.0)).collect();
-        Mask { width: SIZE.0 as u32, height: SIZE.1 as u32, share }
+        Mask { width: SIZE.0 as u32, height: SIZE.1 as u32, alpha: share }
     }
 
     fn is_body(x: usize, y: usize) -> bool {
@@ -163,7 +163,7 @@ mod tests {
         let mut decided = Mask::default();
         let mask = mask(|x, y| if is_hole(x, y) { share } else { body(x, y) });
         Decision::default().decide(&mask, 0, &mut decided);
-        (0..SIZE.0 * SIZE.1).filter(|at| is_hole(at % SIZE.0, at / SIZE.0)).map(|at| decided.share[at]).collect()
+        (0..SIZE.0 * SIZE.1).filter(|at| is_hole(at % SIZE.0, at / SIZE.0)).map(|at| decided.alpha[at]).collect()
     }
 
     #[test]
@@ -183,7 +183,7 @@ mod tests {
             _ => body(x, y),
         };
         Decision::default().decide(&mask(share), 0, &mut decided);
-        let at = |x: usize, y: usize| decided.share[y * SIZE.0 + x];
+        let at = |x: usize, y: usize| decided.alpha[y * SIZE.0 + x];
         assert_eq!((at(4, 40), at(54, 40)), (0.0, 1.0));
         assert_eq!((at(59, 40), at(60, 40)), (0.7, 0.0), "at the outline, it is as it was");
     }
@@ -196,7 +196,7 @@ mod tests {
             let hand = if frame % 2 == 0 { 0.55 } else { 0.45 };
             let share = |x: usize, y: usize| if (48..60).contains(&x) && y >= 20 { hand } else { body(x, y) };
             decision.decide(&mask(share), frame * FRAME_NS, &mut decided);
-            seen.push(decided.share[40 * SIZE.0 + 54]);
+            seen.push(decided.alpha[40 * SIZE.0 + 54]);
         }
         assert!(seen.iter().all(|share| *share == seen[0]), "{seen:?}");
     }
@@ -212,7 +212,7 @@ mod tests {
         });
         let mut sharp = |mask: &Mask, frame: u64| {
             decision.decide(mask, frame * FRAME_NS, &mut decided);
-            decided.share.iter().any(|share| *share > 0.0)
+            decided.alpha.iter().any(|share| *share > 0.0)
         };
         assert!((0..60).all(|frame| !sharp(&room, frame) || frame * FRAME_NS < 500_000_000));
         assert!(sharp(&mask(body), 60), "in the frame in which they come");

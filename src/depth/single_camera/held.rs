@@ -46,22 +46,22 @@ impl Held {
         self.nearness.clear();
         self.nearness.extend((0..width * height).map(near));
         self.remove_others();
-        self.belongings.add(&mut self.mask.share, &self.nearness, width, THRESHOLD);
+        self.belongings.add(&mut self.mask.alpha, &self.nearness, width, THRESHOLD);
     }
 
     /// Removes regions of the mask whose mean nearness is low: other persons.
     fn remove_others(&mut self) {
-        let count = self.mask.share.len();
+        let count = self.mask.alpha.len();
         self.seen.clear();
         self.seen.resize(count, false);
         let is_first = self.others.len() != count;
         self.others.resize(count, false);
-        for start in 0..self.mask.share.len() {
-            if self.seen[start] || self.mask.share[start] < THRESHOLD {
+        for start in 0..self.mask.alpha.len() {
+            if self.seen[start] || self.mask.alpha[start] < THRESHOLD {
                 continue;
             }
             self.front.clear();
-            self.flood(start, |held, at| held.mask.share[at] >= THRESHOLD);
+            self.flood(start, |held, at| held.mask.alpha[at] >= THRESHOLD);
             let near: f32 = self.front.iter().map(|&at| self.nearness[at as usize]).sum();
             let were_others = self.front.iter().filter(|&&at| self.others[at as usize]).count();
             let least = match () {
@@ -116,7 +116,7 @@ impl Held {
                 // Keeps the pixels of a subject beside them.
                 let at = y * width + x;
                 if self.others[at] || self.nearness[at] < OTHERS {
-                    self.mask.share[at] = 0.0;
+                    self.mask.alpha[at] = 0.0;
                 }
             }
         }
@@ -141,14 +141,14 @@ mod tests {
             mask: Mask {
                 width: SIZE.0 as u32,
                 height: SIZE.1 as u32,
-                share: (0..SIZE.0 * SIZE.1).map(|at| f32::from(u8::from(persons[at % SIZE.0]))).collect(),
+                alpha: (0..SIZE.0 * SIZE.1).map(|at| f32::from(u8::from(persons[at % SIZE.0]))).collect(),
             },
             nearness: (0..SIZE.0 * SIZE.1).map(|at| inside(at).map_or(0.1, |(_, nearness)| *nearness)).collect(),
             ..Held::default()
         };
         held.remove_others();
-        held.belongings.add(&mut held.mask.share, &held.nearness, SIZE.0, THRESHOLD);
-        held.mask.share[8 * SIZE.0..][..SIZE.0].iter().map(|share| *share > 0.5).collect()
+        held.belongings.add(&mut held.mask.alpha, &held.nearness, SIZE.0, THRESHOLD);
+        held.mask.alpha[8 * SIZE.0..][..SIZE.0].iter().map(|share| *share > 0.5).collect()
     }
 
     fn columns(ranges: &[Columns]) -> Vec<bool> {
@@ -166,10 +166,10 @@ mod tests {
         let persons = |at: usize| (4..10).contains(&(at % SIZE.0)) || (20..26).contains(&(at % SIZE.0));
         let is_there = |held: &mut Held, nearness: f32| {
             let share = (0..SIZE.0 * SIZE.1).map(|at| f32::from(u8::from(persons(at)))).collect();
-            held.mask = Mask { width: SIZE.0 as u32, height: SIZE.1 as u32, share };
+            held.mask = Mask { width: SIZE.0 as u32, height: SIZE.1 as u32, alpha: share };
             held.nearness = (0..SIZE.0 * SIZE.1).map(|at| if at % SIZE.0 < 16 { 1.0 } else { nearness }).collect();
             held.remove_others();
-            held.mask.share[8 * SIZE.0 + 23] > 0.5
+            held.mask.alpha[8 * SIZE.0 + 23] > 0.5
         };
         for first in [OTHERS - 0.02, OTHERS + 0.02] {
             let mut held = Held::default();

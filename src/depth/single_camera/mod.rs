@@ -221,7 +221,7 @@ impl DepthSource for SingleCamera {
         self.is_live = true;
     }
 
-    fn jump(&mut self, _: i64) {
+    fn seek(&mut self, _: i64) {
         self.last_ns = None;
     }
 }
@@ -255,13 +255,13 @@ impl Spread {
         self.columns.clear();
         self.columns.extend((0..to_width).map(|x| Tap::new(x, to_width, width)));
         for (y, row) in map.metres.chunks_exact_mut(to_width.max(1)).enumerate() {
-            let Tap { first, second, share: down } = Tap::new(y, to_height, height);
+            let Tap { first, second, weight: down } = Tap::new(y, to_height, height);
             let (above, below) = (&nearness[first * width..][..width], &nearness[second * width..][..width]);
             self.row.clear();
             self.row.extend(above.iter().zip(below).map(|(a, b)| a + (b - a) * down));
             for (metres, tap) in row.iter_mut().zip(&self.columns) {
                 let (left, right) = (self.row[tap.first], self.row[tap.second]);
-                let nearness = left + (right - left) * tap.share;
+                let nearness = left + (right - left) * tap.weight;
                 *metres = DepthMap::relative_m(nearness);
             }
         }

@@ -59,7 +59,7 @@ impl Person {
         let before_ns = self.seen_ns.filter(|_| (self.steady.width, self.steady.height) == size);
         let steadiness = before_ns.map_or(0.0, |before_ns| steadiness(time_ns.abs_diff(before_ns)));
         self.steady.resize(size.0, size.1);
-        for (pixel, alpha) in self.steady.share.iter_mut().enumerate() {
+        for (pixel, alpha) in self.steady.alpha.iter_mut().enumerate() {
             let new = alpha_of(&answer, pixel, self.is_raw);
             let keeps = steadiness * uncertainty(new);
             *alpha = new + (*alpha - new) * keeps;

@@ -165,7 +165,7 @@ impl Finder {
         nearness.extend((0..pixels).map(|pixel| answer.at(pixel, 0)));
         subject.clear();
         let of_mask = (mask.width as usize, mask.height as usize);
-        let alpha = |at: usize| if of_mask.0 == 0 { 0.0 } else { mask.share[nearest(at, answer.size, of_mask)] };
+        let alpha = |at: usize| if of_mask.0 == 0 { 0.0 } else { mask.alpha[nearest(at, answer.size, of_mask)] };
         subject.extend((0..pixels).map(alpha));
         self.measure();
         self.extrapolate_behind();

@@ -220,7 +220,7 @@ impl Live {
     }
 
     /// Closes the device until [`Live::next`] is called again.
-    pub fn rest(&mut self) {
+    pub fn suspend(&mut self) {
         if matches!(self.state, State::Streaming(_)) {
             tracing::debug!("{}: closed, nobody watches", self.name);
         }

@@ -229,7 +229,7 @@ fn measure(
     let mut color = color.clone();
     let (coc, depth) = coc_and_depth(&look, &mut color, Some(Depth::Measured(depth.clone())))?;
     // One frame at a time: the latency is measured, not the throughput.
-    let mut bokeh = computing.blur(&settings, size)?;
+    let mut bokeh = computing.create_blur(&settings, size)?;
     let buffers = Buffers {
         colors: Pool::new(bokeh.capacity(), || color.clone()),
         depths: depth.map(|depth| Pool::new(bokeh.capacity(), || depth.clone())),

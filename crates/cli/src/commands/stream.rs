@@ -278,7 +278,7 @@ fn stream_opened(
     let adaptive = opened.is_adaptive();
     // Executors for later looks run on the same device.
     let mut executors = Executors::new(computing.clone());
-    let create_blur = |settings: &_| executors.blur(settings, info.size);
+    let create_blur = |settings: &_| executors.create_blur(settings, info.size);
     let (blurring, changes) = Blurring::begin(opened.look.clone(), (info.size, adaptive), create_blur)?;
     // Outputs are opened last: none is begun if the run cannot start.
     let demand = Demand::new();

@@ -10,7 +10,7 @@ use bokehcam::look::{Look, Patch};
 /// Fails if a lens lacks some of its numbers, or the aperture's picture cannot be read.
 pub fn look(blur: &options::Blur, quality: &options::LookSettings<true>) -> Result<Look, CliError> {
     let patch = Patch { quality: quality.0.quality, ..blur.look.0.clone() };
-    Ok(patch.on(&Look::default())?)
+    Ok(patch.apply_to(&Look::default())?)
 }
 
 #[cfg(test)]

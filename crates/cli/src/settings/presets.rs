@@ -114,7 +114,7 @@ mod tests {
         let names: Vec<_> = all.iter().map(|preset| (preset.name.as_str(), preset.own)).collect();
         let built_in = ["portrait", "cinematic", "dreamy", "product", "miniature"].map(|name| (name, false));
         assert_eq!(names, [&built_in[..], &[("lens", true), ("no", true)]].concat());
-        let looks: Vec<Look> = all.iter().map(|preset| preset.patch.on(&base).unwrap()).collect();
+        let looks: Vec<Look> = all.iter().map(|preset| preset.patch.apply_to(&base).unwrap()).collect();
         assert!(looks.iter().all(|look| look.focus == base.focus && look.rank == base.rank));
         assert_eq!(looks[0], Look { focus: base.focus, rank: base.rank, ..Look::default() });
         assert_eq!(looks[6], base);
@@ -123,7 +123,7 @@ mod tests {
         // Changing from any preset to another gives the same look as from the default.
         for from in &looks[..5] {
             for (to, straight) in all.iter().zip(&looks[..5]) {
-                let look = to.patch.on(from).unwrap();
+                let look = to.patch.apply_to(from).unwrap();
                 assert_eq!(Look { tilt: straight.tilt, ..look }, *straight, "to {}", to.name);
             }
         }
@@ -143,7 +143,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("deep/er/config.toml");
         let look = Look { rim: 0.3, ..Look::default() };
-        save(&path, "first", &Patch::of(&look).values()).unwrap();
+        save(&path, "first", &Patch::from_look(&look).values()).unwrap();
         let text = "# mine\nrim   = 0.9 # wide\n\n[presets.old] # dear\n# soft\nrim = 0.8 # so\nrank = 3\n\n[presets.z]\nrim = 0\n";
         fs::write(&path, text).unwrap();
         let look = Look {
@@ -151,13 +151,13 @@ mod tests {
             aperture: Aperture { shape: Shape::Heart, intensity: -0.5 },
             ..look
         };
-        save(&path, "Abend, \"warm\"", &Patch::of(&look).values()).unwrap();
+        save(&path, "Abend, \"warm\"", &Patch::from_look(&look).values()).unwrap();
         let saved = fs::read_to_string(&path).unwrap();
         assert!(saved.starts_with(text), "{saved}");
         assert!(saved.contains("rim = 0.3\n") && saved.contains("blur = \"3.5%\"\n"), "{saved}");
         let all = parse(&saved).all_presets();
         let preset = all.iter().find(|preset| preset.name.starts_with("Abend")).unwrap();
-        assert_eq!(preset.patch.on(&Look::plain(Effect::Blur)).unwrap(), look);
+        assert_eq!(preset.patch.apply_to(&Look::plain(Effect::Blur)).unwrap(), look);
 
         save(&path, "old", &[("rim", "0.5".to_string()), ("aperture", "heart".to_string())]).unwrap();
         let again = fs::read_to_string(&path).unwrap();

@@ -65,22 +65,22 @@ fn quarter(map: &DepthMap) -> DepthMap {
 #[test]
 fn it_is_seen_how_outlines_lie() {
     let (color, map) = portrait();
-    assert_eq!(EdgeAlignment::of(&map, &color), EdgeAlignment::Meets);
+    assert_eq!(EdgeAlignment::measure(&map, &color), EdgeAlignment::Meets);
     for reach in [4, 8] {
-        let found = EdgeAlignment::of(&fat(&map, reach), &color);
+        let found = EdgeAlignment::measure(&fat(&map, reach), &color);
         let EdgeAlignment::Beside { distance_px } = found else { panic!("fat by {reach} px: {found:?}") };
         assert!((distance_px + reach as i32).abs() <= 1, "fat by {reach} px: {distance_px}");
     }
-    let found = EdgeAlignment::of(&soft(&map, 4), &color);
+    let found = EdgeAlignment::measure(&soft(&map, 4), &color);
     assert!(matches!(found, EdgeAlignment::Soft { width_px: 6..=14 }), "{found:?}");
-    assert_eq!(EdgeAlignment::of(&mirrored(&map), &color), EdgeAlignment::Unrelated);
+    assert_eq!(EdgeAlignment::measure(&mirrored(&map), &color), EdgeAlignment::Unrelated);
     // Nothing to compare.
     let wall = DepthMap { metres: vec![3.0; map.metres.len()], ..map.clone() };
     let unknown = DepthMap { metres: vec![0.0; map.metres.len()], ..map.clone() };
     for map in [&wall, &unknown, &DepthMap::default()] {
-        assert_eq!(EdgeAlignment::of(map, &color), EdgeAlignment::Unknown);
+        assert_eq!(EdgeAlignment::measure(map, &color), EdgeAlignment::Unknown);
     }
-    assert_eq!(EdgeAlignment::of(&map, &ColorImage::new(640, 360)), EdgeAlignment::Unknown);
+    assert_eq!(EdgeAlignment::measure(&map, &ColorImage::new(640, 360)), EdgeAlignment::Unknown);
 }
 
 /// How far the CoC is off, on average, in pixels.

@@ -303,7 +303,7 @@ fn mattes_are_found_whatever_becomes_of_the_device() {
         matting.find(&mut made, &color, 0.05);
         cpu.find(&mut expected, &color, 0.05);
         let (made, expected) = (made.matte.pixels, expected.matte.pixels);
-        let is_same = |(a, b): &(&MixedPixel, &MixedPixel)| a.at == b.at && (a.share - b.share).abs() < 1e-3;
+        let is_same = |(a, b): &(&MixedPixel, &MixedPixel)| a.at == b.at && (a.alpha - b.alpha).abs() < 1e-3;
         let same = made.iter().zip(&expected).filter(is_same).count();
         assert!(same > 50 && same == made.len() && same == expected.len(), "frame {frame}: {same}");
     }

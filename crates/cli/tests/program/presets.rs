@@ -184,7 +184,7 @@ fn a_snapshot_is_repeated_to_the_bit_whatever_the_settings_around() {
     for (name, look, quality) in [("a", &dof, Quality::Fast), ("a", &dof, Quality::High), ("b.c", &tilt, Quality::Best)]
     {
         let (picture, field) = blurred(look, &color, &map, 1.123_456_7, quality);
-        let settings = Patch::of(&look.for_frame(&field, Some(quality))).values();
+        let settings = Patch::from_look(&look.for_frame(&field, Some(quality))).values();
         let depth = matches!(field, CocField::Depth(_)).then_some(&map);
         let shot = Snapshot { picture: &picture, sources: Some((&color, depth)), settings: &settings };
         let path = snapshot::save(&shots, name, &shot).unwrap();
@@ -225,7 +225,7 @@ fn a_snapshots_settings_can_be_given_to_another_picture() {
     let (color, map) = (noise(40, 30), three_depths(40, 30));
     let look = Look::plain(Effect::Blur);
     let (picture, field) = blurred(&look, &color, &map, 1.0, Quality::Balanced);
-    let settings = Patch::of(&look.for_frame(&field, None)).values();
+    let settings = Patch::from_look(&look.for_frame(&field, None)).values();
     let shot = Snapshot { picture: &picture, sources: Some((&color, None)), settings: &settings };
     let like = snapshot::save(home.path(), "x", &shot).unwrap();
     let other = home.path().join("other.png");
@@ -254,7 +254,7 @@ fn a_snapshot_that_cannot_be_repeated_costs_one_line() {
     fs::write(at("text.png"), "no picture").unwrap();
     save("alien", &[("mirror", "true".to_string())]);
     save("bad", &[("rim", "7".to_string())]);
-    save("good", &Patch::of(&Look::default().for_frame(&common::DOF, None)).values());
+    save("good", &Patch::from_look(&Look::default().for_frame(&common::DOF, None)).values());
     save("lone", &[("effect", "blur".to_string())]);
     fs::remove_file(at("lone-color.png")).unwrap();
     fs::copy(at("good.png"), at("depthless.png")).unwrap();

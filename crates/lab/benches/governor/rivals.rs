@@ -30,10 +30,10 @@ impl Ours {
 impl Picker for Ours {
     fn note(&mut self, rung: usize, took: f64, now: usize) {
         let at_ns = now as u64 * PERIOD_NS;
-        self.governor.note(Sample { rung, took_ns: (took * UNIT_NS) as u64, at_ns }, self.budget_ns);
+        self.governor.note(Sample { level: rung, took_ns: (took * UNIT_NS) as u64, at_ns }, self.budget_ns);
     }
     fn rung(&mut self, _: f64) -> usize {
-        self.governor.rung()
+        self.governor.level()
     }
 }
 

@@ -165,7 +165,7 @@ fn as_network(truth: &Plane<f32>) -> Mask {
     });
     let soft = smoothed(&small.map(|share| [share; 3]), SOFT_PX);
     let share = soft.map(|[share, _, _]| 1.0 / (1.0 + (-HARD * (share - 0.5)).exp())).data;
-    Mask { width: SIZE.0 as u32, height: SIZE.1 as u32, share }
+    Mask { width: SIZE.0 as u32, height: SIZE.1 as u32, alpha: share }
 }
 
 /// Where the mask is undecided, or the truth is.
@@ -206,7 +206,7 @@ pub fn with_noise(image: &ColorImage, codes: f32, seed: u64) -> ColorImage {
 }
 
 fn upscaled(given: &Given, image: &ColorImage) -> Plane<f32> {
-    let small = Plane { width: SIZE.0, height: SIZE.1, data: given.mask.share.clone() };
+    let small = Plane { width: SIZE.0, height: SIZE.1, data: given.mask.alpha.clone() };
     let (width, height) = (image.width as usize, image.height as usize);
     Plane::from_fn(width, height, |x, y| {
         let place = |at: usize, of: usize, from: usize| (at as f32 + 0.5) * from as f32 / of as f32 - 0.5;
@@ -265,7 +265,7 @@ fn ours(given: &Given, behind: Option<&ColorImage>, image: &ColorImage) -> Plane
     let map = matte(given, behind, image);
     let mut share: Vec<f32> =
         map.metres.iter().map(|&metres| f32::from(u8::from(metres <= DepthMap::SUBJECT_M))).collect();
-    map.matte.pixels.iter().for_each(|pixel| share[pixel.at as usize] = pixel.share);
+    map.matte.pixels.iter().for_each(|pixel| share[pixel.at as usize] = pixel.alpha);
     Plane { width: image.width as usize, height: image.height as usize, data: share }
 }
 

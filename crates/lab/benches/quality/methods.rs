@@ -202,8 +202,8 @@ impl Blurrer {
             }
             Method::Refined => {
                 let mut depth = shot.depth.clone();
-                let mending =
-                    Misalignment::of(&depth, &shot.image).and_then(|misfit| misfit.mending(&depth, &shot.image));
+                let mending = Misalignment::measure(&depth, &shot.image)
+                    .and_then(|misfit| misfit.correction(&depth, &shot.image));
                 let mending = mending.unwrap_or_default();
                 if self.mending != mending {
                     (self.mending, self.refiner) = (mending, Refiner::mending(mending));

@@ -178,7 +178,7 @@ fn outcome(staged: &Staged, source: &'static str, depth: DepthMap) -> Result<Out
         _ => Shot::lens(COC_AT_INFINITY_PX, DepthMap::SUBJECT_M, height),
     };
     let (mut counts, mut wrong) = ([0.0; 2], [0.0; 2]);
-    for ((metres, true_m), share) in depth.metres.iter().zip(&staged.depth.metres).zip(&staged.coverage.share) {
+    for ((metres, true_m), share) in depth.metres.iter().zip(&staged.depth.metres).zip(&staged.coverage.alpha) {
         let is_sharp = lens.coc_px(*metres).abs() < SHARP_PX;
         let is_person = *share > 0.5;
         if !is_person && real.coc_px(*true_m).abs() < SHARP_PX {

@@ -181,7 +181,7 @@ fn replay(options: &Options, frames: u64) -> Result<(Report, Deliveries), Box<dy
     let backend = if options.gpu { Backend::Auto } else { Backend::Cpu };
     let computing = Computing { backend, ..Computing::default() };
     let make = |settings: &_| -> Result<Box<dyn Bokeh>, BokehError> {
-        Ok(Box::new(Slowed::new(computing.blur(settings, size)?, options.slow)))
+        Ok(Box::new(Slowed::new(computing.create_blur(settings, size)?, options.slow)))
     };
     let (blurring, _) = Blurring::begin(look, (size, true), make)?;
     let clock = Clock::system();

@@ -166,7 +166,7 @@ impl Scene {
         }
         let moment = self.at(time_s);
         let jitter: Vec<Vec2> = (0..samples_per_pixel.max(1)).map(pinhole_jitter).collect();
-        let rows = mask.share.chunks_exact_mut(view.width as usize).enumerate();
+        let rows = mask.alpha.chunks_exact_mut(view.width as usize).enumerate();
         for_each_parallel(rows, threads, |(row, alphas)| {
             for (column, alpha) in alphas.iter_mut().enumerate() {
                 let centre = Vec2::new(column as f32, row as f32);

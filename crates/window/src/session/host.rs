@@ -142,7 +142,7 @@ impl Host {
                 }
                 self.report_outputs();
             }
-            Request::Control(name, value) => match self.start.services.turn(&name, value) {
+            Request::Control(name, value) => match self.start.services.set_control(&name, value) {
                 Ok(controls) => self.events.send_update(Update::Controls(controls)),
                 Err(line) => self.events.note(line),
             },
@@ -170,7 +170,7 @@ impl Host {
 
     /// Reopens the source with another depth method, if it supports that.
     fn set_depth_method(&mut self, way: DepthMethod) {
-        if let Err(line) = self.start.services.can(&self.start.source, way) {
+        if let Err(line) = self.start.services.check_depth_method(&self.start.source, way) {
             return self.events.note(line);
         }
         self.way = Some(way);

@@ -200,7 +200,7 @@ impl State {
         if patch.effect.is_some_and(Effect::follows_depth) && !self.may_have_depth() {
             return Err(self.no_depth().to_owned());
         }
-        let look = patch.on(&self.look).map_err(|error| error.to_string())?;
+        let look = patch.apply_to(&self.look).map_err(|error| error.to_string())?;
         let is_lens = |look: &Look| matches!(look.strength, Strength::Lens(_));
         let asks = matches!(patch.focus, Some(FocusRule::Metres(_)))
             || patch.focus_range_m.is_some_and(|range_m| range_m > 0.0)

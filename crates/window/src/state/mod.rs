@@ -324,7 +324,7 @@ impl State {
     /// that was chosen or saved last, else the first.
     pub fn preset_in_use(&self) -> Option<usize> {
         let is_in_use = |preset: &Preset| {
-            let used = preset.patch.on(&self.look);
+            let used = preset.patch.apply_to(&self.look);
             used.is_ok_and(|look| Look { focus: self.look.focus, ..look } == self.look)
         };
         let all = self.presets.iter().enumerate().filter(|(_, preset)| is_in_use(preset));

@@ -43,7 +43,7 @@ pub fn state() -> State {
     let choice = |name: &str, label: &str| Choice { name: name.into(), label: label.into() };
     state.sources = vec![choice("portrait", "Recording: portrait"), choice("/dev/video0", "Desk camera")];
     state.virtual_cameras = vec![choice("/dev/video9", "bokehcam (/dev/video9)")];
-    let preset = |name: &str, look: Look, own: bool| Preset { name: name.into(), patch: Patch::of(&look), own };
+    let preset = |name: &str, look: Look, own: bool| Preset { name: name.into(), patch: Patch::from_look(&look), own };
     state.presets = vec![
         preset("portrait", look(), false),
         preset("cinematic", blurred(30.0), false),

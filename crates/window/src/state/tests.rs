@@ -285,7 +285,7 @@ fn numbers_are_as_one_would_write_them() {
         tweak::blur_by(&mut look, factor, 720);
         tweak::move_focus(&mut look, 0.017, 0.003);
     }
-    for (name, value) in bokehcam::look::Patch::of(&look).values() {
+    for (name, value) in bokehcam::look::Patch::from_look(&look).values() {
         let digits = value.split([',', ' ', ':']).map(|number| number.chars().filter(char::is_ascii_digit).count());
         assert!(digits.max().unwrap_or(0) <= 5, "{name} = {value}");
     }

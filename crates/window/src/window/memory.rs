@@ -73,7 +73,7 @@ impl Memory {
         let mut is_gone = |read: Result<(), RecordingError>| read.map_err(|error| gone(error.to_string())).is_err();
         patch.behind = patch.behind.filter(|name| !is_gone(name.load().map(drop)));
         patch.aperture = patch.aperture.filter(|name| !is_gone(name.load().map(drop)));
-        patch.on(&Look::default()).ok()
+        patch.apply_to(&Look::default()).ok()
     }
 
     /// Sets the look.
@@ -82,7 +82,7 @@ impl Memory {
             Some(file) => format!("image:{}", absolute_name(file)),
             None => value,
         };
-        let values = Patch::of(look).values().into_iter();
+        let values = Patch::from_look(look).values().into_iter();
         self.look = values.map(|(name, value)| (name.to_owned(), kept(value))).collect();
     }
 

@@ -298,7 +298,7 @@ fn levels() {
     let before = ALLOCATIONS.load(Ordering::Relaxed);
     for at_ns in 0..2000 {
         let took_ns = if at_ns / 500 % 2 == 0 { 3_000 } else { 300 };
-        governor.note(Sample { rung: governor.rung(), took_ns, at_ns }, 1_000);
+        governor.note(Sample { level: governor.level(), took_ns, at_ns }, 1_000);
     }
     assert_eq!(ALLOCATIONS.load(Ordering::Relaxed), before, "governor");
 }

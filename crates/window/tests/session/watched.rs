@@ -99,7 +99,7 @@ impl Services for Small {
             camera: Camera::default(),
         })
     }
-    fn turn(&mut self, _: &str, _: i64) -> Result<Vec<Knob>, String> {
+    fn set_control(&mut self, _: &str, _: i64) -> Result<Vec<Knob>, String> {
         Err("it has no controls".into())
     }
     fn executor(&mut self, settings: &bokeh::Settings, size: (u32, u32)) -> Result<Box<dyn Bokeh>, String> {

@@ -34,7 +34,7 @@ pub fn trial(device: &Arc<Device>) -> Result<Trial, GpuError> {
         cpu.find_before(&mut workers, (&mut expected, &color), STEP, behind);
         gpu.find((&mut made, &color), None, STEP, behind)?;
         let (expected, made) = (&expected.matte.pixels, &made.matte.pixels);
-        let is_same = |a: &MixedPixel, b: &MixedPixel| (a.share - b.share).abs() <= TOLERANCE;
+        let is_same = |a: &MixedPixel, b: &MixedPixel| (a.alpha - b.alpha).abs() <= TOLERANCE;
         let same = expected.iter().filter(|pixel| {
             made.binary_search_by_key(&pixel.at, |made| made.at).is_ok_and(|k| is_same(&made[k], pixel))
         });

@@ -111,12 +111,12 @@ impl View<'_> {
     #[inline(always)]
     pub fn mask_row(&self, y: usize) -> impl Fn(usize) -> f32 {
         let width = self.mask.width as usize;
-        let Tap { first, second, share } = Tap::new(y, self.color.height as usize, self.mask.height as usize);
-        let row = |row: usize| &self.mask.share[row * width..][..width];
+        let Tap { first, second, weight: share } = Tap::new(y, self.color.height as usize, self.mask.height as usize);
+        let row = |row: usize| &self.mask.alpha[row * width..][..width];
         let (above, below, columns) = (row(first), row(second), self.columns);
         move |x| {
             let across = &columns[x];
-            let between = |row: &[f32]| row[across.first] + (row[across.second] - row[across.first]) * across.share;
+            let between = |row: &[f32]| row[across.first] + (row[across.second] - row[across.first]) * across.weight;
             let above = between(above);
             above + (between(below) - above) * share
         }
@@ -139,7 +139,7 @@ impl View<'_> {
             ends.clear();
             ends.resize(width, [1.0, 0.0]);
             for y in range(row, down, mask.height as usize) {
-                for ([low, high], &alpha) in ends.iter_mut().zip(&mask.share[y * width..][..width]) {
+                for ([low, high], &alpha) in ends.iter_mut().zip(&mask.alpha[y * width..][..width]) {
                     (*low, *high) = (low.min(alpha), high.max(alpha));
                 }
             }

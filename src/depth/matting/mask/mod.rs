@@ -91,7 +91,7 @@ impl MaskMatting {
         map.matte.pixels.clear();
         let (width, height) = (color.width as usize, color.height as usize);
         let backdrop = backdrop.filter(|backdrop| backdrop.color.size() == color.size());
-        if map.size() != color.size() || mask.share.is_empty() || width * height == 0 {
+        if map.size() != color.size() || mask.alpha.is_empty() || width * height == 0 {
             return;
         }
         pulp::Arch::new().dispatch(Finding { matting: self, mask, color, backdrop, map });
@@ -155,7 +155,7 @@ impl pulp::WithSimd for Finding<'_> {
             }
         }
         if map.matte.pixels.len() > Matte::most(width, height) {
-            map.matte.pixels.retain(|pixel| pixel.share < 1.0);
+            map.matte.pixels.retain(|pixel| pixel.alpha < 1.0);
         }
     }
 }
@@ -198,13 +198,13 @@ impl View<'_> {
                     (Some(line), _) => line,
                     (None, [x, y, z, offset, _]) => [x, y, z, offset, 0.0],
                 };
-                let lines = unknown.map(|any| Sides::new(corners.map(|corner| line_of(any, corner)), down.share));
+                let lines = unknown.map(|any| Sides::new(corners.map(|corner| line_of(any, corner)), down.weight));
                 let front_of = |any, corner: Option<&Contrast>| corner.unwrap_or(any).front();
-                let fronts = known.map(|any| Sides::new(corners.map(|corner| front_of(any, corner)), down.share));
+                let fronts = known.map(|any| Sides::new(corners.map(|corner| front_of(any, corner)), down.weight));
                 for x in xs {
                     let place = y * self.color.width as usize + x;
                     let (mask, light) = (mask_at(x), self.light_at(place));
-                    let along = self.cells_around(x, self.across).share;
+                    let along = self.cells_around(x, self.across).weight;
                     // With a known background, each pixel has its own discriminant.
                     let discriminant: Option<Discriminant> = match (&behind, &lines, &fronts) {
                         (None, Some(lines), _) => Some(lines.between(along).into()),
@@ -236,8 +236,8 @@ impl View<'_> {
     ) -> Option<[Color; 2]> {
         let (across, down) = (self.cells_around(x, self.across), self.cells_around(y, self.down));
         let (mut sum, mut total) = ([Color::default(); 2], 0.0);
-        for (row, of_row) in [(down.first, 1.0 - down.share), (down.second, down.share)] {
-            for (column, of_column) in [(across.first, 1.0 - across.share), (across.second, across.share)] {
+        for (row, of_row) in [(down.first, 1.0 - down.weight), (down.second, down.weight)] {
+            for (column, of_column) in [(across.first, 1.0 - across.weight), (across.second, across.weight)] {
                 if let Some(contrast) = &contrasts[row * self.across + column] {
                     let weight = of_row * of_column;
                     total += weight;
@@ -310,7 +310,7 @@ impl View<'_> {
                 }
             };
             let (at, near_m) = (at as u32, DepthMap::SUBJECT_M);
-            map.matte.pixels.push(MixedPixel { at, near_m, far_m, share: alpha, behind, difference });
+            map.matte.pixels.push(MixedPixel { at, near_m, far_m, alpha, behind, difference });
         }
     }
 
@@ -323,7 +323,7 @@ impl View<'_> {
             let (own, light) = (self.light_at(row + x), behind(x));
             let difference = std::array::from_fn(|p| own[p] - light[p]);
             let (at, near_m, far_m) = ((row + x) as u32, DepthMap::SUBJECT_M, metres[x]);
-            MixedPixel { at, near_m, far_m, share: 1.0, behind: 1.0, difference }
+            MixedPixel { at, near_m, far_m, alpha: 1.0, behind: 1.0, difference }
         }));
     }
 }

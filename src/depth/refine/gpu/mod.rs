@@ -147,12 +147,12 @@ impl Work {
         let Self { size, buffers, passes, columns, rows, .. } = self;
         for (taps, to, from) in [(&mut *columns, size.0, from.0), (rows, size.1, from.1)] {
             taps.clear();
-            let same = |at| Tap { first: at, second: at, share: 0.0 };
+            let same = |at| Tap { first: at, second: at, weight: 0.0 };
             let tap = |at| if to == from { same(at) } else { Tap::new(at, to as usize, from as usize) };
             taps.extend((0..to as usize).map(tap));
         }
         let words: Vec<[u32; 2]> =
-            columns.iter().chain(&*rows).map(|tap| [tap.first as u32, tap.share.to_bits()]).collect();
+            columns.iter().chain(&*rows).map(|tap| [tap.first as u32, tap.weight.to_bits()]).collect();
         device.upload(&buffers.taps, 0, bytemuck::cast_slice(&words));
         let samples = from.0 as usize * from.1 as usize;
         if 4 * samples as u64 > buffers.map.size() {

@@ -180,7 +180,7 @@ fn measure(
             let what = "--effect none leaves nothing to measure: use dof, tilt-shift or blur";
             return Err(CliError::Usage(what.to_string()));
         };
-        executors.push((quality, shared_device.blur(&settings, size)?));
+        executors.push((quality, shared_device.create_blur(&settings, size)?));
     }
     let executor = executors.first().map(|(_, executor)| executor.describe()).unwrap_or_default();
 

@@ -51,7 +51,7 @@ fn check_blur() -> Finding {
     const SIZE: (u32, u32) = (64, 64);
     let settings = Look::plain(Effect::Blur).settings(SIZE, false);
     let computing = Computing::default();
-    match settings.as_ref().map(|settings| computing.blur(settings, SIZE)).transpose() {
+    match settings.as_ref().map(|settings| computing.create_blur(settings, SIZE)).transpose() {
         Err(error) => Finding::note(BLUR, error.to_string(), "report this"),
         Ok(None) => Finding::note(BLUR, "nothing is blurred".to_string(), "report this"),
         Ok(Some(bokeh)) => {

@@ -31,7 +31,7 @@ impl FileStore {
         }
         let all = SettingsFile::load(self.chosen.as_deref()).unwrap_or_default().all_presets();
         all.into_iter().find(|preset| {
-            let made = preset.patch.on(&Look::default());
+            let made = preset.patch.apply_to(&Look::default());
             preset.patch.focus.is_none() && made.is_ok_and(|made| Look { focus: look.focus, ..made } == *look)
         })
     }
@@ -53,7 +53,7 @@ impl SettingsStore for FileStore {
     }
 
     fn save_preset(&mut self, name: &str, look: &Look) -> Result<(), String> {
-        self.change(|file| presets::save(file, name, &Patch::of(look).values()))
+        self.change(|file| presets::save(file, name, &Patch::from_look(look).values()))
     }
 
     fn rename_preset(&mut self, name: &str, new: &str) -> Result<(), String> {
@@ -74,12 +74,12 @@ impl SettingsStore for FileStore {
         let at = switches.iter().position(|(name, _)| name == "control").unwrap_or(switches.len());
         switches.splice(at..at, given);
         let preset = self.find_preset(look);
-        let changed = Patch::of(look).beside(&Patch::of(&Look::default())).values();
+        let changed = Patch::from_look(look).without_equal(&Patch::from_look(&Look::default())).values();
         // Defaults are left out, unless another layer (see `Given::from_layers`) would override them.
         let is_layered = |name: &str| self.given.from_layers.iter().any(|other| other == name);
         let is_stated = |value: &Value| changed.contains(value) || is_layered(value.0);
         let has_effect = |value: &Value| value.0 != "tilt" || look.effect == Effect::TiltShift;
-        let all = Patch::of(look).values().into_iter();
+        let all = Patch::from_look(look).values().into_iter();
         let flags: Vec<Value> = match preset {
             None => all.filter(is_stated).filter(has_effect).collect(),
             Some(Preset { name, patch, .. }) => {
@@ -108,7 +108,7 @@ mod tests {
         let store = FileStore { chosen: None, given: Given::default() };
         let presets = SettingsFile::default().all_presets();
         for preset in &presets {
-            let made = preset.patch.on(&Look::default()).unwrap();
+            let made = preset.patch.apply_to(&Look::default()).unwrap();
             let focus = FocusRule::Point { x: 0.25, y: 0.5 };
             let fresh = [("fresh".to_owned(), "true".to_owned())];
             let command = store.command(&Look { focus, ..made.clone() }, "demo", &[], &fresh);

@@ -91,7 +91,7 @@ fn make_depth(command: &RenderCommand, look: &Look, color: &ColorImage) -> Resul
             source::refuse_metres(look, "a mask tells")?;
             let (width, height, share) = still::read_grey(file)?;
             still::check_mask_size(file, (width, height), color.size())?;
-            let mask = Mask { width, height, share };
+            let mask = Mask { width, height, alpha: share };
             plausible::warn_of_mask(file, &mask, color);
             Ok(Some(Depth::Final(mask::depth_around(&mask, color))))
         }

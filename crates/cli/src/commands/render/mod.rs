@@ -220,7 +220,7 @@ impl RenderCommand {
 
 /// Reports a misalignment between a depth map and its picture, and its correction.
 fn report_misalignment(file: &dyn Display, look: &Look, map: &DepthMap, color: &ColorImage) {
-    let Some(misfit) = Misalignment::of(map, color) else { return };
+    let Some(misfit) = Misalignment::measure(map, color) else { return };
     if misfit.outlines == EdgeAlignment::Unrelated {
         log::warn(&format!(
             "{file}: nowhere do its outlines meet those of the picture: it may be the depth of another one, or of a camera beside \

@@ -156,7 +156,7 @@ fn apply_looks(looks: LookChanger, size: (u32, u32), requests: &Receiver<Look>, 
         // Only the last queued look counts.
         let look = requests.try_iter().last().unwrap_or(look);
         number += 1;
-        match changes.adopt(look.clone(), number, |settings| executors.blur(settings, size)) {
+        match changes.adopt(look.clone(), number, |settings| executors.create_blur(settings, size)) {
             Ok(()) => applied = look,
             Err(error) => {
                 log::error(&format!("the look stays as it was: {error}"));
@@ -182,7 +182,7 @@ impl Controlled for Stream {
             watched: demand.as_ref().map(Demand::has_watchers),
             quality: stats.quality().map(|quality| quality.name().to_owned()),
             fps: stats.pulse.per_second(stats.clock.now_ns()),
-            look: Patch::described(&lock(&self.look)),
+            look: Patch::describe(&lock(&self.look)),
             ..status.clone()
         })
     }

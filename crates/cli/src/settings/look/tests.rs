@@ -169,22 +169,22 @@ fn the_flags_of_a_look_give_the_look() {
         resolve(&written.iter().map(String::as_str).collect::<Vec<_>>(), true).unwrap()
     };
     let looks = looks(&picture);
-    let usual = Patch::of(&looks[0]);
-    let unusual = |look: &Look| Patch::of(look).beside(&usual);
+    let usual = Patch::from_look(&looks[0]);
+    let unusual = |look: &Look| Patch::from_look(look).without_equal(&usual);
     assert_eq!(resolve(&[], true).unwrap(), looks[0]);
     for (k, look) in looks.iter().enumerate() {
         let flags = unusual(look).values();
         assert_eq!(parsed(&unusual(look)), *look, "{flags:?}");
-        assert_eq!(parsed(&Patch::of(look)), *look);
+        assert_eq!(parsed(&Patch::from_look(look)), *look);
         // One change, one setting; a lens is three.
         let count = if matches!(look.strength, Strength::Lens(_)) { 3 } else { flags.len().min(2) };
         assert_eq!(flags.len(), count, "{flags:?}");
         // The difference between any two looks leads from one to the other.
         let other = &looks[(k * 7 + 3) % looks.len()];
-        assert_eq!(Patch::of(look).beside(&Patch::of(other)).on(other).unwrap(), *look);
+        assert_eq!(Patch::from_look(look).without_equal(&Patch::from_look(other)).apply_to(other).unwrap(), *look);
         assert_eq!(serde_json::from_str::<Look>(&serde_json::to_string(look).unwrap()).unwrap(), *look);
     }
-    let names: Vec<_> = looks.iter().flat_map(|look| Patch::of(look).values()).map(|(name, _)| name).collect();
+    let names: Vec<_> = looks.iter().flat_map(|look| Patch::from_look(look).values()).map(|(name, _)| name).collect();
     assert!(SETTINGS.iter().all(|setting| names.contains(&setting.name)));
     assert_eq!(written(&unusual(&Look { rim: 0.1, ..looks[0].clone() })), ["--rim=0.1"]);
 }

@@ -84,7 +84,7 @@ fn a_coarse_mask_becomes_the_share_of_every_pixel() {
     assert_eq!(map.subject_m, Some(1.0));
     let mut found: Vec<f32> = map.metres.iter().map(|&metres| f32::from(u8::from(metres <= 1.0))).collect();
     for pixel in &map.matte.pixels {
-        found[pixel.at as usize] = pixel.share;
+        found[pixel.at as usize] = pixel.alpha;
     }
     let mixed = |share: &f32| *share > 0.02 && *share < 0.98;
     let error: f32 = found.iter().zip(&shares).map(|(found, share)| (found - share).abs()).sum();

@@ -74,7 +74,7 @@ fn a_real_person_is_found_and_what_rests_rests() {
         let (person, wall) = sure(&depth);
         let map = read(&mut both, &color, index as u64);
         let mut shares: Vec<f32> = map.metres.iter().map(|&metres| f32::from(u8::from(metres <= 1.0))).collect();
-        map.matte.pixels.iter().for_each(|pixel| shares[pixel.at as usize] = pixel.share);
+        map.matte.pixels.iter().for_each(|pixel| shares[pixel.at as usize] = pixel.alpha);
         for at in 0..shares.len() {
             joint += u64::from(person[at] && shares[at] > 0.5);
             any += u64::from(person[at] || wall[at] && shares[at] > 0.5);

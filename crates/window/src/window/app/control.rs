@@ -206,7 +206,7 @@ impl App {
             watched: Some(self.demand.has_watchers()),
             quality: self.view.as_ref().and_then(|view| Some(view.trace.quality?.name().to_owned())),
             fps: if is_moving { state.meters.summary().fps } else { 0.0 },
-            look: Patch::described(&state.look),
+            look: Patch::describe(&state.look),
             ..Status::default()
         }
     }

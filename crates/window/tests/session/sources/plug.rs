@@ -83,8 +83,8 @@ impl Services for Plug {
     fn check(&self, name: &str) -> Result<(), String> {
         self.system.check(name)
     }
-    fn turn(&mut self, knob: &str, value: i64) -> Result<Vec<Knob>, String> {
-        self.system.turn(knob, value)
+    fn set_control(&mut self, knob: &str, value: i64) -> Result<Vec<Knob>, String> {
+        self.system.set_control(knob, value)
     }
     fn executor(&mut self, settings: &bokeh::Settings, size: (u32, u32)) -> Result<Box<dyn Bokeh>, String> {
         self.system.executor(settings, size)
