@@ -5,7 +5,7 @@ use std::fs;
 use bokehcam::frame::ColorImage;
 use bokehcam::recording::still::{read_disparity, write_color};
 
-use super::program::Home;
+use crate::program::Home;
 
 const SIZE: (u32, u32) = (160, 96);
 
