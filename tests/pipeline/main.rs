@@ -5,6 +5,7 @@ mod changes;
 mod clocked;
 #[path = "../common/mod.rs"]
 mod common;
+#[path = "../common/fakes.rs"]
 mod fakes;
 mod fallback;
 mod faults;

@@ -180,20 +180,6 @@ fn depth_beside_other_colours_follows_their_time_in_a_loop() {
     assert!(matches!(Beside::new(recording, "test recording"), Err(DepthError::NoDepth { .. })));
 }
 
-/// A depth camera whose first map comes late.
-struct Late(usize);
-
-impl DepthSource for Late {
-    fn read(&mut self, Seen { stamp, .. }: Seen, map: &mut DepthMap) -> Result<(), DepthError> {
-        if stamp.index < self.0 {
-            return Err(DepthError::Unpaired { source_name: "a depth camera".to_owned() });
-        }
-        map.resize(SIZE.0, SIZE.1);
-        map.metres.fill(1.0);
-        Ok(())
-    }
-}
-
 #[test]
 fn frames_before_the_first_depth_are_counted_and_the_run_goes_on() {
     let folder = tempfile::tempdir().unwrap();
@@ -201,8 +187,16 @@ fn frames_before_the_first_depth_are_counted_and_the_run_goes_on() {
     let stop = AtomicBool::new(false);
     let camera = replay(folder.path(), Part::default()).unwrap();
     let sink = Target::Null.open(&sink_options()).unwrap();
+    // Of a depth camera.
+    let late = depth_by(|Seen { stamp, .. }, map| {
+        map.metres.fill(1.0);
+        match stamp.index {
+            0..4 => Err(DepthError::Unpaired { source_name: "a depth camera".to_owned() }),
+            _ => Ok(()),
+        }
+    });
     let frames = run(Run {
-        depth: Some(Box::new(Late(4))),
+        depth: Some(late),
         bokeh: Some(Box::new(fake_bokeh(2, Trouble::default()))),
         look: dof(),
         changes: None,

@@ -17,6 +17,7 @@ use bokehcam::pipeline::{Pace, Run, View, run};
 use bokehcam::recording::{Options, Recording, Scratch};
 use bokehcam::sink::Target;
 
+use crate::fakes::fake_bokeh;
 use crate::replay::{FRAMES, STEP_NS, open, play, record, seen, sink_options};
 use crate::setup::*;
 

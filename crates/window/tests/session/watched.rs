@@ -11,8 +11,7 @@ use bokehcam::capture::{Brings, Camera as Capture, CaptureError, Captured, Shot,
 use bokehcam::depth::plate::PlateDepth;
 use bokehcam::frame::ColorImage;
 use bokehcam::knob::Knob;
-use bokehcam::look::presets::Preset;
-use bokehcam::look::{Look, Patch};
+use bokehcam::look::Look;
 use bokehcam::optics::CocField;
 use bokehcam::pipeline::View;
 use bokehcam::sink::{Ending, Sink, SinkError};
@@ -22,12 +21,13 @@ use bokehcam_window::services::{Opened, Services, SettingsStore, Switch};
 use bokehcam_window::state::{Camera, Source, Update, Way};
 
 use super::heard::Heard;
+use super::store::NoStore;
 
 /// Opens small synthetic scenes: the name is their width, `24 then no more` has two frames, and `nothing` is not there.
 struct Small {
     executors: Arc<AtomicUsize>,
     written: Arc<Mutex<Vec<String>>>,
-    settings: NoSettings,
+    settings: NoStore,
 }
 
 struct Film(Arc<Mutex<Vec<String>>>, String);
@@ -111,27 +111,6 @@ impl Services for Small {
     }
 }
 
-/// Settings that hold nothing: of presets there is one.
-struct NoSettings;
-
-impl SettingsStore for NoSettings {
-    fn presets(&mut self) -> Vec<Preset> {
-        vec![Preset { name: "same".into(), patch: Patch::default(), own: false }]
-    }
-    fn save_preset(&mut self, name: &str, _: &Look) -> Result<(), String> {
-        if name.is_empty() { Err("no name".into()) } else { Ok(()) }
-    }
-    fn rename_preset(&mut self, _: &str, _: &str) -> Result<(), String> {
-        Err("none of that name".into())
-    }
-    fn delete_preset(&mut self, _: &str) -> Result<(), String> {
-        Err("none of that name".into())
-    }
-    fn command(&self, _: &Look, source: &str, outputs: &[String], switches: &[Switch]) -> String {
-        format!("show {source} {outputs:?} {switches:?}")
-    }
-}
-
 /// A session on these services.
 pub struct Watched {
     pub heard: Heard,
@@ -145,7 +124,7 @@ impl Watched {
     }
 
     pub fn begin_in(source: &str, folder: &Path) -> Self {
-        let small = Small { executors: Arc::default(), written: Arc::default(), settings: NoSettings };
+        let small = Small { executors: Arc::default(), written: Arc::default(), settings: NoStore };
         let (executors, written) = (Arc::clone(&small.executors), Arc::clone(&small.written));
         Self { heard: Heard::begin(Box::new(small), source, folder), executors, written }
     }
