@@ -20,6 +20,7 @@ use bokehcam::sink::{Sink, Target};
 use bokehcam_lab::scene::{Scene, View};
 use bokehcam_lab::synthetic::Synthetic;
 
+use crate::common::psnr_db;
 use crate::fakes::*;
 use crate::setup::*;
 
@@ -291,7 +292,7 @@ fn the_demonstration_is_the_rendered_scene_as_nearly_as_it_is_coded() {
         let time_s = index as f64 / f64::from(demo::FRAMES_PER_SECOND);
         scene.render_pinhole(&view, time_s, 16, 2, &mut picture, &mut map);
         let (_, color, depth) = &frames[index];
-        let psnr_db = 10.0 * (255.0f64.powi(2) / apart(color, &picture)).log10();
+        let psnr_db = psnr_db(color, &picture);
         assert!(psnr_db > 34.0, "frame {index}: {psnr_db} dB");
         // Half a level; the mathematical functions of another machine may send a ray past an edge.
         let is_off = |(a, b): &(&f32, &f32)| (a.recip() - b.recip()).abs() > 0.0044;

@@ -1,6 +1,5 @@
 //! A stepper makes, on its caller's thread, what a run makes with its own.
 
-use std::path::Path;
 use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex};
 
@@ -13,10 +12,11 @@ use bokehcam::recording::{Options, Recording, Scratch};
 use bokehcam::source::{self, Source};
 
 use crate::fakes::sink_by;
+use crate::portrait;
 
 #[test]
 fn every_frame_is_that_of_a_run() {
-    let dir = Path::new(env!("CARGO_MANIFEST_DIR")).join("recordings/portrait");
+    let dir = portrait::folder();
     let recording = Recording::open(&dir, &Options::default()).unwrap();
     let followed = Look {
         follow: "1.5".parse().unwrap(),

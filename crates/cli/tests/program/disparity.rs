@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use bokehcam::recording::still::{read_depth, read_disparity};
 use image::GrayImage;
 
+use crate::common::grain;
 use crate::program::{Home, Ran, STEREO};
 
 const SIZE: (u32, u32) = (160, 64);
@@ -30,11 +31,8 @@ impl Desk {
     }
 
     fn save(&self, name: &str, (width, height): (u32, u32), shift_px: u32) {
-        let noise = |x: u32, y: u32| {
-            let mixed = (x.wrapping_mul(0x9E37_79B9) ^ y.wrapping_mul(0x85EB_CA6B)).wrapping_mul(0xC2B2_AE35);
-            [(mixed ^ (mixed >> 15)).wrapping_mul(0x27D4_EB2F).to_be_bytes()[0]].into()
-        };
-        GrayImage::from_fn(width, height, |x, y| noise(x + shift_px, y)).save(self.path(name)).unwrap();
+        let noise = GrayImage::from_fn(width, height, |x, y| [grain(x + shift_px, y)].into());
+        noise.save(self.path(name)).unwrap();
     }
 
     /// Runs `depth left.png right.png` on the CPU with `more`, in the folder.

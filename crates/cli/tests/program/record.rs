@@ -8,10 +8,12 @@ use std::process::Stdio;
 use std::time::Duration;
 
 use bokehcam::frame::{ColorImage, DepthMap};
+use bokehcam::recording::still::write_color;
 use bokehcam::recording::tum::{Writer, WriterOptions};
 use bokehcam::recording::{Options, Recording, Scratch};
 use rustix::process::Signal;
 
+use crate::common::noise;
 use crate::program::{Beside, Home, Ran, until};
 
 /// What takes longer hangs.
@@ -207,13 +209,7 @@ fn a_full_disk_leaves_no_half_picture() {
     let at = |name: &str| home.path(name);
     recording(&at("source"), 3, 50, 1.0);
     // One that is hard to compress.
-    let mut state = 1_u32;
-    let mut noise = image::RgbImage::new(24, 16);
-    noise.iter_mut().for_each(|byte| {
-        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-        *byte = (state >> 24) as u8;
-    });
-    noise.save(at("source/rgb/000002.png")).unwrap();
+    write_color(&at("source/rgb/000002.png"), &noise(24, 16), true).unwrap();
     for (target, kept) in [("new", "new"), ("old", "old.incomplete")] {
         if target != kept {
             recording(&at(target), 1, 200, 2.0);

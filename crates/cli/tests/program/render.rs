@@ -8,6 +8,7 @@ use bokehcam::recording::Extras;
 use bokehcam::recording::still::{read_photo, write_photo};
 use image::{ImageBuffer, Rgba};
 
+use crate::common::color;
 use crate::program::{Home, Ran, STEREO};
 
 /// Runs a command with these arguments on the CPU.
@@ -27,13 +28,10 @@ fn render(home: &Home, image: &str, out: &str) -> String {
 
 /// Checks of 8 by 8 pixels, light on the left half and dark on the right.
 fn halves(home: &Home) -> ColorImage {
-    let mut picture = ColorImage::new(160, 96);
-    for (k, pixel) in picture.rgb.chunks_exact_mut(3).enumerate() {
-        let (x, y) = (k % 160, k / 160);
+    let picture = color(160, 96, |x, y| {
         let check = if (x / 8 + y / 8) % 2 == 0 { 60 } else { 0 };
-        let code = if x < 80 { 180 + check } else { 20 + check };
-        pixel.fill(code as u8);
-    }
+        [if x < 80 { 180 + check } else { 20 + check }; 3]
+    });
     write_photo(&home.path("in.png"), &picture, &Extras::default(), false).unwrap();
     picture
 }

@@ -1,6 +1,6 @@
 //! A session as the window has it, on sources and outputs of the tests' own.
 
-use std::ops::{ControlFlow, Deref, DerefMut};
+use std::ops::ControlFlow;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
@@ -20,7 +20,7 @@ use bokehcam_lab::synthetic::Synthetic;
 use bokehcam_window::services::{Opened, Services, SettingsStore, Switch};
 use bokehcam_window::state::{Camera, Source, Update, Way};
 
-use super::heard::Heard;
+use super::heard::{self, Heard};
 use super::store::NoStore;
 
 /// Opens small synthetic scenes: the name is their width, `24 then no more` has two frames, and `nothing` is not there.
@@ -111,12 +111,14 @@ impl Services for Small {
     }
 }
 
-/// A session on these services.
-pub struct Watched {
-    pub heard: Heard,
+/// What a test sees of these services.
+pub struct Seen {
     pub executors: Arc<AtomicUsize>,
     pub written: Arc<Mutex<Vec<String>>>,
 }
+
+/// A session on them.
+pub type Watched = heard::Watched<Seen>;
 
 impl Watched {
     pub fn begin(source: &str) -> Self {
@@ -125,21 +127,8 @@ impl Watched {
 
     pub fn begin_in(source: &str, folder: &Path) -> Self {
         let small = Small { executors: Arc::default(), written: Arc::default(), settings: NoStore };
-        let (executors, written) = (Arc::clone(&small.executors), Arc::clone(&small.written));
-        Self { heard: Heard::begin(Box::new(small), source, folder), executors, written }
-    }
-}
-
-impl Deref for Watched {
-    type Target = Heard;
-    fn deref(&self) -> &Heard {
-        &self.heard
-    }
-}
-
-impl DerefMut for Watched {
-    fn deref_mut(&mut self) -> &mut Heard {
-        &mut self.heard
+        let services = Seen { executors: Arc::clone(&small.executors), written: Arc::clone(&small.written) };
+        Self { heard: Heard::begin(Box::new(small), source, folder), services }
     }
 }
 

@@ -5,10 +5,10 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::Duration;
 
-use bokehcam::frame::{ColorImage, DepthMap};
 use bokehcam::recording::tum::{Writer, WriterOptions};
 use rustix::process::Signal;
 
+use crate::common::{Numbers, color, depth};
 use crate::program;
 pub use crate::program::{Beside, Home, Ran, json};
 
@@ -36,13 +36,9 @@ impl Home {
     pub fn record(&self, name: &str, frames: u64, period_s: f64) {
         let mut writer = Writer::create(&self.path(name), &WriterOptions::default()).unwrap();
         for frame in 0..frames {
-            let mut color = ColorImage::new(64, 48);
-            let mut state = frame as u32 + 1;
-            color.rgb.iter_mut().for_each(|byte| {
-                state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-                *byte = (state >> 24) as u8;
-            });
-            let depth = DepthMap { width: 64, height: 48, metres: vec![2.0; 64 * 48], ..DepthMap::default() };
+            let mut numbers = Numbers(frame + 1);
+            let color = color(64, 48, |_, _| std::array::from_fn(|_| (numbers.next() * 256.0) as u8));
+            let depth = depth(64, 48, |_, _| 2.0);
             writer.add((frame as f64 * period_s * 1e9) as u64, &color, Some(&depth)).unwrap();
         }
         writer.finish().unwrap();
