@@ -1,7 +1,7 @@
 //! One executor for all quality levels does at each what an executor made for that one does, whatever came before.
 #![allow(missing_docs)]
 
-use crate::common;
+use crate::{common, portrait};
 
 use bokehcam::bokeh::cpu::CpuBokeh;
 use bokehcam::bokeh::plan::Plan;
@@ -14,9 +14,8 @@ use bokehcam::depth::refine::Refiner;
 use bokehcam::frame::{ColorImage, DepthMap, GrayImage};
 use bokehcam::optics::CocKind;
 use bokehcam::optics::{CocField, DepthCoc};
-use bokehcam::recording::{Options, Recording, Scratch};
 use bokehcam_lab::synthetic::Synthetic;
-use common::{COC_KINDS, Numbers, coc, depth, noise, settings, three_depths};
+use common::{COC_KINDS, Numbers, coc, depth, noise, psnr_db, settings, three_depths};
 
 const SIZE: (u32, u32) = (150, 110);
 
@@ -103,15 +102,11 @@ type Frames = Vec<(ColorImage, DepthMap, u64)>;
 /// Frames of the recording that comes with the project and of the synthetic scene, with their depth and time.
 fn scenes() -> [(&'static str, Frames); 2] {
     const FRAMES: usize = 6;
-    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("recordings/portrait");
-    let recording = Recording::open(&folder, &Options::default()).expect("the recording");
     let mut refiner = Refiner::new();
-    let recorded = (0..FRAMES).map(|frame| {
-        let (mut color, mut map) = (ColorImage::default(), DepthMap::default());
-        recording.read_color(frame, &mut Scratch::default(), &mut color).expect("a picture");
-        recording.read_depth(frame, &mut Scratch::default(), &mut map).expect("a depth map");
-        refiner.refine(&mut map, &color, recording.time_ns(frame));
-        (color, map, recording.time_ns(frame))
+    let recorded = (0..FRAMES).map(|index| {
+        let (color, mut map, time_ns) = portrait::frame(index);
+        refiner.refine(&mut map, &color, time_ns);
+        (color, map, time_ns)
     });
     let recorded = recorded.collect();
     let format = Format { size: (640, 360), fps: 30.0, frames: None, threads: 2 };
@@ -125,12 +120,6 @@ fn scenes() -> [(&'static str, Frames); 2] {
         (color, map, stamp.time_ns)
     });
     [("recording", recorded), ("synthetic", synthetic.collect())]
-}
-
-fn psnr_db(a: &ColorImage, b: &ColorImage) -> f64 {
-    let squares = a.rgb.iter().zip(&b.rgb).map(|(&a, &b)| f64::from(a.abs_diff(b)).powi(2));
-    let mean = squares.sum::<f64>() / a.rgb.len() as f64;
-    10.0 * (255.0 * 255.0 / mean.max(1e-9)).log10()
 }
 
 /// A change of level shows no more than one frame differs from the next.

@@ -18,7 +18,7 @@ use bokehcam::frame::{ColorImage, DepthMap};
 use bokehcam::optics::CocKind;
 use bokehcam::optics::{CocField, DepthCoc};
 use cases::each_case;
-use common::{COC_KINDS, color, depth};
+use common::{COC_KINDS, codes_apart, color, depth};
 use slopes::{SIZE as SLOPE, Slope};
 
 /// What blurs a sequence of frames.
@@ -168,8 +168,8 @@ fn what_is_in_focus_stays_as_it_is() {
         let map = depth(size.0, size.1, |_, _| lens.near_m() + (lens.far_m() - lens.near_m()) * random.share());
         let image = color(size.0, size.1, |_, _| [random.code(), random.code(), random.code()]);
         let out = cpu(&settings, size, 2).blur(settings.quality, &image, &map, &CocField::Depth(lens));
-        let worst = out.rgb.iter().zip(&image.rgb).map(|(a, b)| a.abs_diff(*b)).max();
-        assert!(worst <= Some(1), "{worst:?}: {size:?} {settings:?} {lens:?}");
+        let worst = codes_apart(&out, &image);
+        assert!(worst <= 1, "{worst}: {size:?} {settings:?} {lens:?}");
     });
 }
 
@@ -210,7 +210,6 @@ mod on_the_gpu {
     use bokehcam::bokeh::gpu::GpuBokeh;
     use bokehcam::bokeh::{Bokeh, Job};
 
-    use bokehcam::compute::device::Device;
     use bokehcam::link::pool::Pooled;
     use std::sync::Arc;
 
@@ -225,7 +224,7 @@ mod on_the_gpu {
 
     /// Executors on one device.
     fn gpu() -> impl Fn(&Settings, (u32, u32)) -> Box<dyn Blurs> {
-        let device = Arc::new(Device::open(false, None).expect("a Vulkan adapter, software included"));
+        let device = crate::on_gpu::device();
         move |settings, (width, height)| {
             let plan = Plan::new(settings, width, height);
             Box::new(GpuBokeh::on(&plan, Arc::clone(&device)).expect("such a picture fits"))

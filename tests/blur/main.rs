@@ -3,6 +3,11 @@
 
 #[path = "../common/mod.rs"]
 mod common;
+#[cfg(feature = "gpu")]
+#[path = "../common/on_gpu.rs"]
+mod on_gpu;
+#[path = "../common/portrait.rs"]
+mod portrait;
 
 mod ladder;
 mod laws;

@@ -17,7 +17,7 @@ use bokehcam::frame::{ColorImage, DepthMap, MixedPixel};
 use bokehcam::link::pool::Pooled;
 use bokehcam::optics::CocKind;
 use bokehcam::optics::{CocField, DepthCoc};
-use common::{COC_KINDS, Numbers, coc, color, depth, noise, settings, shapes, three_depths};
+use common::{COC_KINDS, Numbers, coc, codes_apart, color, depth, noise, settings, shapes, three_depths};
 
 /// Difference of an 8-bit value that at most one in a thousand may exceed, and that none may exceed twice over: a
 /// radius that falls between two nodes of the bank may round to either.
@@ -304,10 +304,7 @@ fn frames_in_flight_come_back_in_order_and_whole() {
         assert_eq!(finished.ticket, back);
         let mut expected = ColorImage::default();
         cpu.blur(&image, Some(&map(back)), &field, &mut expected).expect("a blur");
-        assert!(
-            finished.picture.memory().unwrap().rgb.iter().zip(&expected.rgb).all(|(a, b)| a.abs_diff(*b) <= CODES),
-            "frame {back}"
-        );
+        assert!(codes_apart(finished.picture.memory().unwrap(), &expected) <= CODES, "frame {back}");
         assert!(finished.times.iter().count() > 0);
         back += 1;
     }

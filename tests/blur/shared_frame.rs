@@ -3,6 +3,7 @@
 #![allow(missing_docs)]
 
 use crate::common;
+use crate::on_gpu::device;
 
 use std::sync::Arc;
 
@@ -14,7 +15,7 @@ use bokehcam::depth::refine::Refiner;
 use bokehcam::frame::{ColorImage, DepthMap};
 use bokehcam::link::pool::Pooled;
 use bokehcam::optics::CocKind;
-use common::{coc, color, noise, settings, three_depths};
+use common::{coc, codes_apart, color, noise, settings, three_depths};
 
 /// What the device works out from metres may be rounded otherwise: divisions of hardware are exact to some units only.
 const CODES: u8 = 1;
@@ -32,12 +33,6 @@ fn blurred(
     finished.picture.memory().expect("in memory").clone()
 }
 
-/// Most that two pictures are apart.
-fn codes_apart(a: &ColorImage, b: &ColorImage) -> u8 {
-    assert_eq!(a.size(), b.size());
-    a.rgb.iter().zip(&b.rgb).map(|(a, b)| a.abs_diff(*b)).max().unwrap_or_default()
-}
-
 /// A frame that is on the executor's device is taken from there, and one of another size or device is not: told by another
 /// picture and other depths there.
 #[test]
@@ -45,7 +40,6 @@ fn codes_apart(a: &ColorImage, b: &ColorImage) -> u8 {
 fn a_frame_on_the_device_need_not_go_up() {
     let (width, height) = (97, 71);
     let plan = Plan::new(&settings(CocKind::Depth), width, height);
-    let device = || Arc::new(Device::open(false, None).expect("a Vulkan adapter, software included"));
     let (own, other) = (device(), device());
     let mut gpu = GpuBokeh::on(&plan, Arc::clone(&own)).expect("room for the picture");
     let given = (color(width, height, |x, y| [x as u8, 200, y as u8]), three_depths(width, height));
@@ -79,7 +73,7 @@ fn a_frame_on_the_device_need_not_go_up() {
 #[test]
 #[ignore = "needs a Vulkan adapter (software will do)"]
 fn a_refined_frame_is_given_once() {
-    let device = Arc::new(Device::open(false, None).expect("a Vulkan adapter, software included"));
+    let device = device();
     let (width, height) = (97, 71);
     let plan = Plan::new(&settings(CocKind::Depth), width, height);
     let mut gpu = GpuBokeh::on(&plan, Arc::clone(&device)).expect("room for the picture");

@@ -1,6 +1,7 @@
 //! A session as the window has it: what it said so far, and where its frames come from.
 #![allow(dead_code)]
 
+use std::ops::{Deref, DerefMut};
 use std::path::Path;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -34,6 +35,25 @@ pub struct Heard {
     /// Somebody watches while it is held.
     pub watch: Option<Watch>,
     pub demand: Demand,
+}
+
+/// A session, and what a test holds of its services.
+pub struct Watched<T> {
+    pub heard: Heard,
+    pub services: T,
+}
+
+impl<T> Deref for Watched<T> {
+    type Target = Heard;
+    fn deref(&self) -> &Heard {
+        &self.heard
+    }
+}
+
+impl<T> DerefMut for Watched<T> {
+    fn deref_mut(&mut self) -> &mut Heard {
+        &mut self.heard
+    }
 }
 
 impl Heard {

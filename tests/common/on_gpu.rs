@@ -1,7 +1,6 @@
-//! What the tests of depth on a GPU share: a device, the bundled recording, and the times of passes.
-#![allow(missing_docs)]
+//! What tests on a GPU share: a device, numbers of chance, and the times of passes.
+#![allow(dead_code, missing_docs)]
 
-use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -11,8 +10,10 @@ pub fn device() -> Arc<Device> {
     Arc::new(Device::open(false, None).expect("a Vulkan adapter, software included"))
 }
 
-pub fn portrait() -> PathBuf {
-    PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/recordings/portrait"))
+/// Numbers of chance, 0 to 1, the same for the same place.
+pub fn chance(k: usize, frame: usize) -> f32 {
+    let mixed = (k as u32 ^ (frame as u32).rotate_left(18)).wrapping_mul(0x9e37_79b1);
+    ((mixed ^ (mixed >> 15)).wrapping_mul(0x85eb_ca6b) >> 8) as f32 / (1 << 24) as f32
 }
 
 /// The size of pictures whose passes are timed: `BOKEHCAM_SIZE=1280x720`, or a small one.

@@ -3,7 +3,7 @@
 use bokehcam::look::{Look, presets::Preset};
 use bokehcam_window::services::{SettingsStore, Switch};
 
-/// Has no presets, and takes none; a command is its source.
+/// Has no presets, and takes none; a command shows what it is made of.
 pub struct NoStore;
 
 impl SettingsStore for NoStore {
@@ -19,7 +19,7 @@ impl SettingsStore for NoStore {
     fn delete_preset(&mut self, _: &str) -> Result<(), String> {
         Err("no file".into())
     }
-    fn command(&self, _: &Look, source: &str, _: &[String], _: &[Switch]) -> String {
-        source.to_owned()
+    fn command(&self, _: &Look, source: &str, outputs: &[String], switches: &[Switch]) -> String {
+        format!("show {source} {outputs:?} {switches:?}")
     }
 }

@@ -5,6 +5,8 @@
 mod common;
 #[path = "../common/on_gpu.rs"]
 mod on_gpu;
+#[path = "../common/portrait.rs"]
+mod portrait;
 
 mod background;
 mod calibration;

@@ -6,8 +6,7 @@
 #![cfg(feature = "gpu")]
 #![allow(missing_docs)]
 
-use crate::common;
-use crate::on_gpu;
+use crate::{common, on_gpu, portrait};
 
 use std::sync::Arc;
 use std::time::Instant;
@@ -22,9 +21,8 @@ use bokehcam::depth::matting::{Behind, FROM_PX, Matting};
 use bokehcam::depth::refine::Refiner;
 use bokehcam::frame::{ColorImage, DepthMap, Matte, MixedPixel};
 use bokehcam::optics::{CocField, CocKind, DepthCoc};
-use bokehcam::recording::{Options, Recording, Scratch};
-use common::{coc, settings};
-use on_gpu::{device, portrait, size_of_timed, tell_of_passes};
+use common::{coc, psnr_db, settings};
+use on_gpu::{chance, device, size_of_timed, tell_of_passes};
 
 const JUMP: f32 = 0.05;
 const FRAME_NS: u64 = 33_000_000;
@@ -32,12 +30,6 @@ const ONE_IN: usize = 200;
 const ONE_IN_OF_FEW: usize = 40;
 
 type Frame = (ColorImage, DepthMap);
-
-/// Numbers of chance, 0 to 1, the same for the same place.
-fn chance(k: usize, frame: usize) -> f32 {
-    let mixed = (k as u32 ^ (frame as u32).rotate_left(18)).wrapping_mul(0x9e37_79b1);
-    ((mixed ^ (mixed >> 15)).wrapping_mul(0x85eb_ca6b) >> 8) as f32 / (1 << 24) as f32
-}
 
 /// Somebody with a soft outline, and hair of which the map has some, who moves before a slanted wall and beside a pole. The depth has
 /// `noise`, as a share of it, and is unknown here and there.
@@ -232,22 +224,13 @@ fn what_is_remembered_of_a_sequence_counts_as_on_the_processor() {
     assert!(known > 100, "behind {known} pixels it is known");
 }
 
-fn psnr_db(a: &ColorImage, b: &ColorImage) -> f64 {
-    let square = |(a, b): (&u8, &u8)| f64::from(a.abs_diff(*b)).powi(2);
-    let mean = a.rgb.iter().zip(&b.rgb).map(square).sum::<f64>() / a.rgb.len() as f64;
-    10.0 * (255.0 * 255.0 / mean).log10()
-}
-
 #[test]
 #[ignore = "needs a Vulkan adapter (software will do)"]
 fn blurred_pictures_are_alike() {
     let device = device();
-    let recording = Recording::open(&portrait(), &Options::default()).expect("it is bundled");
-    let (mut scratch, mut refiner) = (Scratch::default(), Refiner::new());
+    let mut refiner = Refiner::new();
     let mut recorded = |index: usize| {
-        let (mut color, mut map) = (ColorImage::default(), DepthMap::default());
-        recording.read_color(index, &mut scratch, &mut color).expect("a picture");
-        recording.read_depth(index, &mut scratch, &mut map).expect("its depth");
+        let (color, mut map, _) = portrait::frame(index);
         refiner.refine(&mut map, &color, index as u64 * FRAME_NS);
         (color, map)
     };

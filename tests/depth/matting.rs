@@ -10,7 +10,7 @@ use bokehcam::color::{linear_to_srgb, srgb_to_linear};
 use bokehcam::depth::matting::Matting;
 use bokehcam::frame::{ColorImage, DepthMap, MixedPixel};
 use bokehcam::optics::{CocField, CocKind, DepthCoc};
-use common::{Numbers, coc, color, depth, noise, settings, three_depths};
+use common::{Numbers, coc, codes_apart, color, depth, noise, settings, three_depths};
 
 const SIZE: (u32, u32) = (96, 80);
 const NEAR_M: f32 = 1.0;
@@ -290,7 +290,7 @@ fn what_is_hidden_everywhere_is_never_seen() {
             map.matte.pixels = hiding.clone().map(pixel).collect();
             for quality in Quality::ALL {
                 let out = blur(&map, &picture, &field, quality);
-                let off = out.rgb.iter().zip(&picture.rgb).map(|(a, b)| a.abs_diff(*b)).max().unwrap();
+                let off = codes_apart(&out, &picture);
                 assert!(off <= 2, "{quality}, {near_m} m before {} m: {off} codes", factor * near_m);
             }
         }
@@ -306,7 +306,7 @@ fn in_focus_a_mixed_pixel_is_the_pixel() {
     let mut numbers = Numbers(9);
     map.matte.pixels = (0..SIZE.0 * SIZE.1).step_by(7).map(|at| mixed(&picture, at, &mut numbers)).collect();
     let after = blur(&map, &picture, &field, Quality::default());
-    assert!(before.rgb.iter().zip(&after.rgb).all(|(a, b)| a.abs_diff(*b) <= 1));
+    assert!(codes_apart(&before, &after) <= 1);
 }
 
 /// Any two surfaces that add up to a pixel.

@@ -3,13 +3,12 @@
 #![allow(missing_docs)]
 
 use crate::common;
-
-use std::sync::Arc;
+use crate::on_gpu::device;
 
 use bokehcam::calibration::rectification::Rectification;
 use bokehcam::calibration::rectifier::Rectifier;
 use bokehcam::calibration::{Distortion, Eye, StereoCalibration};
-use bokehcam::compute::{Backend, Device};
+use bokehcam::compute::Backend;
 use bokehcam::depth::stereo::gpu::rectifier::GpuRectifier;
 use bokehcam::depth::stereo::source::StereoDepth;
 use bokehcam::depth::stereo::{self, Effort, Settings};
@@ -17,10 +16,6 @@ use bokehcam::depth::{DepthSource, FrameInput};
 use bokehcam::frame::{ColorImage, DepthMap, GrayImage, Stamp};
 use common::Numbers;
 use glam::{DMat3, DVec2, DVec3};
-
-fn device() -> Arc<Device> {
-    Arc::new(Device::open(false, None).expect("a Vulkan adapter, software included"))
-}
 
 /// Eyes that stand askew and bend pictures, and are wanted to see more than they do, so that corners see nothing.
 fn rectifier(size: (u32, u32)) -> Rectifier {

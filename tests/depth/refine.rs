@@ -1,36 +1,25 @@
 //! Measured depth fitted to its picture: edges, noise, size, and steadiness in time.
 
-use std::path::Path;
-
 use bokehcam::depth::focus::FocusRule;
 use bokehcam::depth::refine::Refiner;
 use bokehcam::engine::{CocMaker, Postprocess};
 use bokehcam::frame::{ColorImage, DepthMap};
 use bokehcam::look::{CocAtInfinity, CocRule};
-use bokehcam::recording::{Options, Recording, Scratch};
+
+use crate::common::{color, depth as map};
+use crate::portrait;
 
 const WALL_M: f32 = 3.0;
 const PERSON_M: f32 = 1.2;
 const FRAME_NS: u64 = 33_000_000;
 const SIZE: (u32, u32) = (120, 90);
 
-fn map(width: u32, height: u32, depth_m: impl Fn(u32, u32) -> f32) -> DepthMap {
-    let mut map = DepthMap::new(width, height);
-    for (k, z_m) in (0..).zip(&mut map.metres) {
-        *z_m = depth_m(k % width, k / width);
-    }
-    map
-}
-
 /// A picture of a textured dark person before a textured light wall.
 fn picture(is_person: impl Fn(u32, u32) -> bool) -> ColorImage {
-    let mut image = ColorImage::new(SIZE.0, SIZE.1);
-    for (k, pixel) in (0..).zip(image.rgb.chunks_exact_mut(3)) {
-        let (x, y) = (k % SIZE.0, k / SIZE.0);
+    color(SIZE.0, SIZE.1, |x, y| {
         let grain = ((x * 7 + y * 13) % 5) as u8 * 3;
-        pixel.copy_from_slice(&if is_person(x, y) { [50 + grain, 40, 30 + grain] } else { [180, 190 - grain, 200] });
-    }
-    image
+        if is_person(x, y) { [50 + grain, 40, 30 + grain] } else { [180, 190 - grain, 200] }
+    })
 }
 
 /// A picture that says nothing.
@@ -280,12 +269,8 @@ fn any_size_and_any_value_is_handled() {
 
 /// A recording of a real camera, and what no camera gives: edges all over, in noise, with holes.
 fn takes() -> [Vec<(ColorImage, DepthMap)>; 2] {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("recordings/portrait");
-    let (recording, mut scratch) = (Recording::open(&folder, &Options::default()).unwrap(), Scratch::default());
-    let mut real = |frame| {
-        let (mut color, mut map) = (ColorImage::default(), DepthMap::default());
-        recording.read_color(frame, &mut scratch, &mut color).unwrap();
-        recording.read_depth(frame, &mut scratch, &mut map).unwrap();
+    let real = |index| {
+        let (color, map, _) = portrait::frame(index);
         (color, map)
     };
     let made = |frame: u32| {
@@ -306,7 +291,7 @@ fn takes() -> [Vec<(ColorImage, DepthMap)>; 2] {
         }
         (color, map)
     };
-    [(0..9).map(&mut real).collect(), (0..5).map(made).collect()]
+    [(0..9).map(real).collect(), (0..5).map(made).collect()]
 }
 
 #[test]

@@ -6,7 +6,7 @@
 #![cfg(feature = "gpu")]
 #![allow(missing_docs)]
 
-use crate::on_gpu;
+use crate::{on_gpu, portrait};
 
 use std::sync::Arc;
 use std::time::Instant;
@@ -15,8 +15,7 @@ use bokehcam::compute::Device;
 use bokehcam::depth::refine::Refiner;
 use bokehcam::depth::refine::gpu::GpuRefiner;
 use bokehcam::frame::{ColorImage, DepthMap};
-use bokehcam::recording::{Options, Recording, Scratch};
-use on_gpu::{device, portrait, size_of_timed, tell_of_passes};
+use on_gpu::{chance, device, size_of_timed, tell_of_passes};
 
 const FRAME_NS: u64 = 33_000_000;
 const SAME: f32 = 1e-4;
@@ -24,12 +23,6 @@ const ONE_IN: usize = 500;
 
 /// A frame: picture, map, media time, and what is in focus.
 type Frame = (ColorImage, DepthMap, u64, f32);
-
-/// Numbers of chance, 0 to 1, the same for the same place.
-fn chance(k: usize, frame: usize) -> f32 {
-    let mixed = (k as u32 ^ (frame as u32).rotate_left(18)).wrapping_mul(0x9e37_79b1);
-    ((mixed ^ (mixed >> 15)).wrapping_mul(0x85eb_ca6b) >> 8) as f32 / (1 << 24) as f32
-}
 
 /// Somebody before a slanted wall and beside a pole, who moves, with colours that change at other places than depth does. Holes are
 /// shadows beside the near, a frame around, some at chance, and all that chance has less than `missing`.
@@ -242,12 +235,8 @@ fn a_device_that_is_gone_is_followed_by_the_processor() {
 #[test]
 #[ignore = "needs a Vulkan adapter (software will do)"]
 fn the_bundled_recording_agrees() {
-    let recording = Recording::open(&portrait(), &Options::default()).expect("it is bundled");
-    let mut scratch = Scratch::default();
     let frame = |index: usize| {
-        let (mut color, mut map) = (ColorImage::default(), DepthMap::default());
-        recording.read_color(index, &mut scratch, &mut color).expect("a picture");
-        recording.read_depth(index, &mut scratch, &mut map).expect("its depth");
+        let (color, map, _) = portrait::frame(index);
         (color, map, index as u64 * FRAME_NS, 1.0)
     };
     same(&device(), "portrait", &(0..6).map(frame).collect::<Vec<_>>());

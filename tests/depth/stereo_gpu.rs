@@ -3,6 +3,7 @@
 #![allow(missing_docs)]
 
 use crate::common;
+use crate::on_gpu::device;
 
 use std::sync::Arc;
 
@@ -16,10 +17,6 @@ use bokehcam::depth::stereo::gpu::GpuExecutor;
 use bokehcam::depth::stereo::{self, Effort, Pair, Settings};
 use bokehcam::frame::{DisparityMap, GrayImage};
 use common::Numbers;
-
-fn device() -> Arc<Device> {
-    Arc::new(Device::open(false, None).expect("a Vulkan adapter, software included"))
-}
 
 fn picture(width: usize, height: usize, mut luma: impl FnMut(usize, usize) -> u8) -> Vec<u8> {
     (0..width * height).map(|k| luma(k % width, k / width)).collect()

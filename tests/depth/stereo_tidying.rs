@@ -4,6 +4,7 @@
 #![allow(missing_docs)]
 
 use crate::common;
+use crate::on_gpu::device;
 
 use bokehcam::compute::device::{Device, Readback, Recorder};
 use bokehcam::depth::stereo::fixed::{FILLED, STEP, UNKNOWN};
@@ -148,7 +149,7 @@ fn assert_tidied(device: &Device, size: Place, island: u32, map: &[u16], what: &
 #[test]
 #[ignore = "needs a Vulkan adapter (software will do)"]
 fn islands_of_any_shape_are_found() {
-    let device = Device::open(false, None).expect("a Vulkan adapter, software included");
+    let device = device();
     for size in [(1, 1), (1, 70), (70, 1), (2, 5), (3, 3), (37, 41), (64, 64), (127, 9), (129, 140), (300, 69)] {
         let made = MADE
             .map(|(what, made)| (what, (0..size.0 * size.1).map(|k| made((k % size.0, k / size.0), size)).collect()));
@@ -164,7 +165,7 @@ fn islands_of_any_shape_are_found() {
 #[test]
 #[ignore = "needs a Vulkan adapter (software will do)"]
 fn islands_of_chance_are_found_every_time() {
-    let device = Device::open(false, None).expect("a Vulkan adapter, software included");
+    let device = device();
     let mut numbers = Numbers(3);
     for size in [(1, 200), (200, 1), (53, 61), (128, 90), (511, 200)] {
         // About where islands begin to reach across a picture, and where there are many or few.

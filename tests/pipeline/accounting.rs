@@ -1,8 +1,10 @@
 //! Every frame has a fate, whatever is slow or broken.
 
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicUsize};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::time::Duration;
 
+use bokehcam::capture::{Camera, SourceInfo};
 use bokehcam::pipeline::{Fault, Pace, run};
 use bokehcam::sink::{Ending, Null};
 
@@ -53,10 +55,21 @@ fn live_accounts_for_every_frame_however_slow_a_stage_is() {
 #[test]
 fn a_live_link_evicts_behind_a_sink_that_stands_still() {
     let asked = Arc::new(AtomicUsize::new(0));
-    let camera = LiveCamera(fake_camera(200), asked.clone());
+    let (counts, mut fake) = (Arc::clone(&asked), fake_camera(200));
+    // So slow that no frame is ever late.
+    let info = SourceInfo { live: true, period_ns: 3_600_000_000_000, ..fake.info() };
+    let camera = camera_by(info, move |before, shot| {
+        counts.store(before + 1, Ordering::SeqCst);
+        fake.next(shot).unwrap()
+    });
+    // It waits with its first frame until the camera is through with all of its own.
+    let sink = sink_by(move |_| {
+        while asked.load(Ordering::SeqCst) < 200 {
+            std::thread::sleep(Duration::from_millis(1));
+        }
+    });
     let stop = AtomicBool::new(false);
-    let sink = GatedSink(asked, 200);
-    let report = run(simple(Box::new(camera), Box::new(sink), &stop, Pace::Realtime)).unwrap();
+    let report = run(simple(camera, sink, &stop, Pace::Realtime)).unwrap();
     assert!(report.frames.balance());
     assert!(report.frames.dropped.evicted > 180, "{:?}", report.frames);
     assert_eq!(report.frames.dropped.driver, 0, "a live camera is not asked to skip");

@@ -1,112 +1,29 @@
 //! What may change while a run goes on, and who looks on.
 
-use std::collections::VecDeque;
-use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, mpsc};
 use std::thread;
 use std::time::Duration;
 
-use bokehcam::bokeh::{Bokeh, BokehError, Finished, Job, PassTimes, Picture};
-use bokehcam::compute::{Backend, Place};
-use bokehcam::frame::ColorImage;
+use bokehcam::bokeh::{Bokeh, Job, PassTimes};
+use bokehcam::compute::Place;
 use bokehcam::link;
 use bokehcam::optics::CocField;
 use bokehcam::pipeline::{Change, Executor, Pace, Run, View, Wanted, run};
-use bokehcam::sink::{Ending, Sink, SinkError};
+use bokehcam::sink::{Null, Sink};
 
-use crate::fakes::{FakeSink, Received, SIZE, Trouble};
-use crate::setup::{fake_camera, simple, uniform};
+use crate::fakes::{FakeBokeh, Received, Trouble, changed, fake_bokeh, fake_camera, fake_sink, nobody};
+use crate::setup::{simple, uniform};
+
+fn radius_of(job: &Job) -> f32 {
+    let CocField::Uniform { radius_px } = job.coc else { panic!("no such rule was given") };
+    radius_px
+}
 
 /// Blurs nothing, but knows the one radius that it was made for.
-struct Made {
-    radius_px: f32,
-    held: VecDeque<Job>,
-    blurred: Arc<AtomicU64>,
-    wrong: Arc<AtomicU64>,
-}
-
-impl Bokeh for Made {
-    fn submit(&mut self, job: Job) -> Result<(), BokehError> {
-        let CocField::Uniform { radius_px } = job.coc else { panic!("no such rule was given") };
-        self.wrong.fetch_add(u64::from(radius_px != self.radius_px), Ordering::SeqCst);
-        self.blurred.fetch_add(1, Ordering::SeqCst);
-        self.held.push_back(job);
-        Ok(())
-    }
-
-    fn collect(&mut self, wait: bool) -> Result<Option<Finished>, BokehError> {
-        if !wait && self.held.len() < self.capacity() {
-            return Ok(None);
-        }
-        Ok(self.held.pop_front().map(|mut job| {
-            job.out.resize(SIZE.0, SIZE.1);
-            job.out.rgb.copy_from_slice(&job.color.rgb);
-            job.out.rgb[0] = self.radius_px as u8;
-            let times = PassTimes::new();
-            let Job { ticket, out, color, depth, .. } = job;
-            Finished { ticket, picture: Picture::in_memory(out), color, depth, times }
-        }))
-    }
-
-    fn in_flight(&self) -> usize {
-        self.held.len()
-    }
-    fn capacity(&self) -> usize {
-        2
-    }
-    fn backend(&self) -> Backend {
-        Backend::Cpu
-    }
-    fn describe(&self) -> String {
-        "made".into()
-    }
-}
-
-/// Remembers where pictures were wanted.
-struct Placed {
-    made: Made,
-    places: Arc<Mutex<Vec<Place>>>,
-}
-
-impl Bokeh for Placed {
-    fn submit(&mut self, job: Job) -> Result<(), BokehError> {
-        self.places.lock().unwrap().push(job.place);
-        self.made.submit(job)
-    }
-    fn collect(&mut self, wait: bool) -> Result<Option<Finished>, BokehError> {
-        self.made.collect(wait)
-    }
-    fn in_flight(&self) -> usize {
-        self.made.in_flight()
-    }
-    fn capacity(&self) -> usize {
-        self.made.capacity()
-    }
-    fn backend(&self) -> Backend {
-        self.made.backend()
-    }
-    fn describe(&self) -> String {
-        self.made.describe()
-    }
-}
-
-/// Takes frames and says that nothing becomes of them.
-struct Nobody;
-
-impl Sink for Nobody {
-    fn put(&mut self, _: &ColorImage, _: u64) -> Result<ControlFlow<()>, SinkError> {
-        Ok(ControlFlow::Continue(()))
-    }
-    fn keeps(&self) -> bool {
-        false
-    }
-    fn finish(self: Box<Self>, _: Ending) -> Result<(), SinkError> {
-        Ok(())
-    }
-    fn describe(&self) -> String {
-        "nobody".into()
-    }
+fn made(radius_px: f32) -> FakeBokeh {
+    let makes = move |job| changed(job, PassTimes::new(), |job| job.out.rgb[0] = radius_px as u8);
+    FakeBokeh { makes: Box::new(makes), ..fake_bokeh(2, Trouble::default()) }
 }
 
 #[test]
@@ -115,16 +32,15 @@ fn every_frame_has_the_radius_and_the_executor_of_one_change() {
         let (blurred, wrong) = (Arc::<AtomicU64>::default(), Arc::<AtomicU64>::default());
         let made = |radius_px| {
             let (blurred, wrong) = (Arc::clone(&blurred), Arc::clone(&wrong));
-            Box::new(Made { radius_px, held: VecDeque::new(), blurred, wrong }) as Box<dyn Bokeh>
+            let looks = move |job: &Job| {
+                wrong.fetch_add(u64::from(radius_of(job) != radius_px), Ordering::SeqCst);
+                blurred.fetch_add(1, Ordering::SeqCst);
+            };
+            Box::new(FakeBokeh { looks: Box::new(looks), ..made(radius_px) }) as Box<dyn Bokeh>
         };
         let (send, changes) = mpsc::channel();
         let (stop, received) = (AtomicBool::new(false), Received::default());
-        let sink = FakeSink {
-            received: received.clone(),
-            trouble: Trouble::default(),
-            closes_at: usize::MAX,
-            finish_fails: false,
-        };
+        let sink = fake_sink(&received);
         let to_come: Vec<_> = (1..=40u8)
             .map(|k| {
                 // Now and then frames pass through.
@@ -159,7 +75,6 @@ fn every_frame_has_the_radius_and_the_executor_of_one_change() {
 
 #[test]
 fn the_first_change_is_known_by_its_number_and_frames_without_one_by_none() {
-    let made = |radius_px| Made { radius_px, held: VecDeque::new(), blurred: Arc::default(), wrong: Arc::default() };
     for (number, radius_px) in [(0, 5.0), (9, 6.0)] {
         let (send, changes) = mpsc::channel();
         if number > 0 {
@@ -176,7 +91,7 @@ fn the_first_change_is_known_by_its_number_and_frames_without_one_by_none() {
                 look: uniform(5.0),
                 changes: Some(changes),
                 view: Some(view),
-                ..simple(Box::new(fake_camera(3)), Box::new(bokehcam::sink::Null), &stop, Pace::Asap)
+                ..simple(Box::new(fake_camera(3)), Box::new(Null), &stop, Pace::Asap)
             });
             assert_eq!(report.unwrap().frames.delivered, 3);
             looking.join().unwrap()
@@ -193,7 +108,7 @@ fn a_viewer_sees_what_pictures_were_made_of_and_counts_where_the_sink_does_not()
     for (keeps, patience_ms) in [(false, 0), (false, 5), (true, 5)] {
         let (view, mut views) = link::live::<View>();
         let stop = AtomicBool::new(false);
-        let sink: Box<dyn Sink> = if keeps { Box::new(bokehcam::sink::Null) } else { Box::new(Nobody) };
+        let sink: Box<dyn Sink> = if keeps { Box::new(Null) } else { nobody() };
         let (report, seen) = thread::scope(|scope| {
             let looking = scope.spawn(move || {
                 let mut seen = 0;
@@ -208,9 +123,8 @@ fn a_viewer_sees_what_pictures_were_made_of_and_counts_where_the_sink_does_not()
                 }
                 seen
             });
-            let made = Made { radius_px: 7.0, held: VecDeque::new(), blurred: Arc::default(), wrong: Arc::default() };
             let report = run(Run {
-                bokeh: Some(Box::new(made)),
+                bokeh: Some(Box::new(made(7.0))),
                 look: uniform(7.0),
                 view: Some(view),
                 ..simple(Box::new(fake_camera(300)), sink, &stop, Pace::Asap)
@@ -235,14 +149,13 @@ fn a_viewer_that_leaves_ends_the_run() {
     drop(views);
     let stop = AtomicBool::new(false);
     let report =
-        run(Run { view: Some(view), ..simple(Box::new(fake_camera(usize::MAX)), Box::new(Nobody), &stop, Pace::Asap) });
+        run(Run { view: Some(view), ..simple(Box::new(fake_camera(usize::MAX)), nobody(), &stop, Pace::Asap) });
     let frames = report.unwrap().frames;
     assert!(frames.balance() && frames.delivered == 0, "{frames:?}");
 }
 
 #[test]
 fn frames_between_two_looks_are_known() {
-    let made = |radius_px| Made { radius_px, held: VecDeque::new(), blurred: Arc::default(), wrong: Arc::default() };
     for (bokeh, between) in [
         (Executor::Keep, false),
         (Executor::Meanwhile, true),
@@ -259,7 +172,7 @@ fn frames_between_two_looks_are_known() {
                 look: uniform(5.0),
                 changes: Some(changes),
                 view: Some(view),
-                ..simple(Box::new(fake_camera(3)), Box::new(bokehcam::sink::Null), &stop, Pace::Asap)
+                ..simple(Box::new(fake_camera(3)), Box::new(Null), &stop, Pace::Asap)
             })
             .unwrap();
             looking.join().unwrap()
@@ -272,12 +185,13 @@ fn frames_between_two_looks_are_known() {
 fn pictures_are_made_where_they_are_wanted_but_mirrored_ones_in_memory() {
     for (mirror, place) in [(false, Place::Both), (true, Place::Memory)] {
         let (places, stop) = (Arc::<Mutex<Vec<Place>>>::default(), AtomicBool::new(false));
-        let made = Made { radius_px: 3.0, held: VecDeque::new(), blurred: Arc::default(), wrong: Arc::default() };
+        let noted = Arc::clone(&places);
+        let looks = Box::new(move |job: &Job| noted.lock().unwrap().push(job.place));
         run(Run {
-            bokeh: Some(Box::new(Placed { made, places: Arc::clone(&places) })),
+            bokeh: Some(Box::new(FakeBokeh { looks, ..made(3.0) })),
             mirror,
             wanted: Some(Arc::new(Wanted::new(Place::Both))),
-            ..simple(Box::new(fake_camera(3)), Box::new(bokehcam::sink::Null), &stop, Pace::Asap)
+            ..simple(Box::new(fake_camera(3)), Box::new(Null), &stop, Pace::Asap)
         })
         .unwrap();
         assert_eq!(*places.lock().unwrap(), [place; 3], "mirror {mirror}");

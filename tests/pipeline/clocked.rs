@@ -2,27 +2,24 @@
 //! no say in it.
 
 use std::cell::RefCell;
-use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, mpsc};
 use std::thread;
 use std::time::Duration;
 
-use bokehcam::bokeh::{Bokeh, BokehError, Finished, Job, PassTimes, Picture};
+use bokehcam::bokeh::{Job, PassTimes};
 use bokehcam::capture::{Brings, Camera, CaptureError, Captured, Shot, SourceInfo};
 use bokehcam::clock::Clock;
-use bokehcam::compute::Backend;
 use bokehcam::depth::focus::FocusRule;
-use bokehcam::depth::{DepthError, DepthSource, FrameInput};
-use bokehcam::frame::{ColorImage, DepthMap, Stamp};
+use bokehcam::frame::Stamp;
 use bokehcam::link::live;
 use bokehcam::look::Look;
 use bokehcam::optics::CocField;
 use bokehcam::pipeline::{Change, Executor, Pace, Run, Trace, Wanted, run};
-use bokehcam::sink::{Ending, Sink, SinkError};
+use bokehcam::sink::Null;
 use bokehcam::stats::{Cause, Report};
 
-use crate::fakes::SIZE;
+use crate::fakes::{FakeBokeh, SIZE, Trouble, camera_by, changed, depth_by, fake_bokeh, sink_by};
 use crate::setup::{dof_with, simple};
 
 const MS: u64 = 1_000_000;
@@ -33,6 +30,11 @@ const READ_NS: u64 = 2 * MS;
 const DEPTH_NS: u64 = 5 * MS;
 const BLUR_NS: u64 = 7 * MS;
 const SINK_NS: u64 = 3 * MS;
+
+fn info(name: &str) -> SourceInfo {
+    let (name, brings) = (name.into(), Brings::Color);
+    SourceInfo { name, size: SIZE, period_ns: PERIOD_NS, frames: None, live: true, brings }
+}
 
 /// A camera that takes its next frame once the one before has been delivered.
 struct Lockstep {
@@ -47,14 +49,7 @@ struct Lockstep {
 
 impl Camera for Lockstep {
     fn info(&self) -> SourceInfo {
-        SourceInfo {
-            name: "lockstep".into(),
-            size: SIZE,
-            period_ns: PERIOD_NS,
-            frames: None,
-            live: true,
-            brings: Brings::Color,
-        }
+        info("lockstep")
     }
 
     fn next(&mut self, Shot { color, .. }: Shot) -> Result<Captured, CaptureError> {
@@ -76,68 +71,6 @@ impl Camera for Lockstep {
 
     fn waited_ns(&self) -> u64 {
         self.waited_ns
-    }
-}
-
-/// A wall at one metre.
-struct Wall(Clock, u64);
-
-impl DepthSource for Wall {
-    fn read(&mut self, _: FrameInput, map: &mut DepthMap) -> Result<(), DepthError> {
-        self.0.advance_ns(self.1);
-        map.resize(SIZE.0, SIZE.1);
-        map.metres.fill(1.0);
-        Ok(())
-    }
-}
-
-/// Writes down by what each frame was to be blurred.
-struct Recorder {
-    clock: Clock,
-    job: Option<Job>,
-    fields: Arc<Mutex<Vec<CocField>>>,
-}
-
-impl Bokeh for Recorder {
-    fn submit(&mut self, job: Job) -> Result<(), BokehError> {
-        self.clock.advance_ns(BLUR_NS);
-        self.fields.lock().unwrap().push(job.coc);
-        self.job = Some(job);
-        Ok(())
-    }
-    fn collect(&mut self, _: bool) -> Result<Option<Finished>, BokehError> {
-        Ok(self.job.take().map(|Job { ticket, mut out, color, depth, .. }| {
-            out.resize(SIZE.0, SIZE.1);
-            let times = PassTimes::new();
-            Finished { ticket, picture: Picture::in_memory(out), color, depth, times }
-        }))
-    }
-    fn in_flight(&self) -> usize {
-        usize::from(self.job.is_some())
-    }
-    fn capacity(&self) -> usize {
-        1
-    }
-    fn backend(&self) -> Backend {
-        Backend::Cpu
-    }
-    fn describe(&self) -> String {
-        "cpu, recorder".into()
-    }
-}
-
-struct Slow(Clock);
-
-impl Sink for Slow {
-    fn put(&mut self, _: &ColorImage, _: u64) -> Result<ControlFlow<()>, SinkError> {
-        self.0.advance_ns(SINK_NS);
-        Ok(ControlFlow::Continue(()))
-    }
-    fn finish(self: Box<Self>, _: Ending) -> Result<(), SinkError> {
-        Ok(())
-    }
-    fn describe(&self) -> String {
-        "slow".into()
     }
 }
 
@@ -167,7 +100,7 @@ fn play_seen(
 ) -> (Report, Vec<CocField>, Vec<Trace>) {
     let (view, views) = live();
     let (views, traces) = (RefCell::new(views), RefCell::new(Vec::new()));
-    let (clock, fields, delivered) = (Clock::manual(), Arc::default(), Arc::<AtomicU64>::default());
+    let (clock, delivered) = (Clock::manual(), Arc::<AtomicU64>::default());
     let camera = Lockstep {
         clock: clock.clone(),
         delivered: delivered.clone(),
@@ -176,21 +109,41 @@ fn play_seen(
         waited_ns: 0,
         before: Box::new(before),
     };
+    // A wall at one metre.
+    let depth_clock = clock.clone();
+    let depth = depth_by(move |_, map| {
+        depth_clock.advance_ns(depth_ns);
+        map.metres.fill(1.0);
+        Ok(())
+    });
+    // By what each frame was to be blurred.
+    let fields = Arc::<Mutex<Vec<CocField>>>::default();
+    let (noted, blur_clock) = (Arc::clone(&fields), clock.clone());
+    let bokeh = FakeBokeh {
+        looks: Box::new(move |job: &Job| {
+            blur_clock.advance_ns(BLUR_NS);
+            noted.lock().unwrap().push(job.coc);
+        }),
+        makes: Box::new(|job| changed(job, PassTimes::new(), |_| {})),
+        ..fake_bokeh(1, Trouble::default())
+    };
+    let sink_clock = clock.clone();
+    let sink = sink_by(move |_| sink_clock.advance_ns(SINK_NS));
     let stop = AtomicBool::new(false);
     let report = run(Run {
-        depth: Some(Box::new(Wall(clock.clone(), depth_ns))),
-        bokeh: Some(Box::new(Recorder { clock: clock.clone(), job: None, fields: Arc::clone(&fields) })),
+        depth: Some(depth),
+        bokeh: Some(Box::new(bokeh)),
         look: dof(10.0),
         changes,
         budget_ns,
         wanted,
         view: Some(view),
-        clock: clock.clone(),
+        clock,
         progress: &|progress| {
             traces.borrow_mut().extend(views.borrow_mut().try_recv().map(|view| view.trace));
             delivered.store(progress.delivered, Ordering::SeqCst);
         },
-        ..simple(Box::new(camera), Box::new(Slow(clock)), &stop, pace)
+        ..simple(Box::new(camera), sink, &stop, pace)
     })
     .unwrap();
     assert!(report.frames.balance(), "{:?}", report.frames);
@@ -281,33 +234,22 @@ fn whoever_asks_for_depth_of_its_own_gets_it_with_the_next_frame() {
     assert_eq!(held[34..40].iter().filter(|held| **held).count(), 3);
 }
 
-/// Loses frames between those that it gives: as many as their number, of each cause.
-struct Loser(usize);
-
 const LOSSES: [Cause; 3] = [Cause::Driver, Cause::Corrupt, Cause::Evicted];
 
-impl Camera for Loser {
-    fn info(&self) -> SourceInfo {
-        let name = "loser".into();
-        SourceInfo { name, size: SIZE, period_ns: PERIOD_NS, frames: None, live: true, brings: Brings::Color }
-    }
-    fn next(&mut self, Shot { color, .. }: Shot) -> Result<Captured, CaptureError> {
-        let index = self.0;
-        self.0 += 1;
+#[test]
+fn what_a_camera_says_is_lost_counts_as_many_times_as_it_says() {
+    // Between those that it gives it loses as many as their number, and three, of each cause.
+    let camera = camera_by(info("loser"), |index, Shot { color, .. }| {
         color.resize(SIZE.0, SIZE.1);
-        Ok(match index {
+        match index {
             0..6 if index.is_multiple_of(2) => Captured::Lost(index as u64 + 3, LOSSES[index / 2]),
             0..6 => Captured::Frame(Stamp { index, time_ns: 0, captured_ns: Some(0) }),
             6 => Captured::Waiting,
             _ => Captured::End,
-        })
-    }
-}
-
-#[test]
-fn what_a_camera_says_is_lost_counts_as_many_times_as_it_says() {
-    let (stop, sink) = (AtomicBool::new(false), Box::new(Slow(Clock::manual())));
-    let frames = run(simple(Box::new(Loser(0)), sink, &stop, Pace::Asap)).unwrap().frames;
+        }
+    });
+    let stop = AtomicBool::new(false);
+    let frames = run(simple(camera, Box::new(Null), &stop, Pace::Asap)).unwrap().frames;
     assert!(frames.balance());
     let dropped = frames.dropped;
     assert_eq!((dropped.driver, dropped.corrupt, dropped.evicted, dropped.total()), (3, 5, 7, 15));

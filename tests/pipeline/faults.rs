@@ -157,12 +157,7 @@ fn a_failed_run_replaces_nothing() {
 
 #[test]
 fn of_several_sinks_the_good_ones_go_on_to_the_end() {
-    let fake = |received: &Received, trouble| FakeSink {
-        received: received.clone(),
-        trouble,
-        closes_at: NEVER,
-        finish_fails: false,
-    };
+    let fake = |received: &Received, trouble| FakeSink { trouble, ..fake_sink(received) };
     let stop = AtomicBool::new(false);
     for trouble in [Trouble::fails_at(2), Trouble::panics_at(2)] {
         let (good, bad) = (Received::default(), Received::default());

@@ -5,8 +5,8 @@ use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
 use bokehcam::bokeh::rung::COSTS;
-use bokehcam::bokeh::{Bokeh, BokehError, Finished, Job, PassTimes, Picture};
-use bokehcam::capture::{Brings, Camera, CaptureError, Captured, Shot, SourceInfo};
+use bokehcam::bokeh::{Job, PassTimes};
+use bokehcam::capture::{Brings, Camera, Captured, Shot};
 use bokehcam::compute::Backend;
 use bokehcam::frame::Stamp;
 use bokehcam::look::Look;
@@ -84,38 +84,14 @@ fn the_report_tells_what_ran() {
 }
 
 /// Says that it takes so long at the default quality, and in proportion at the others.
-struct Paced(Duration, Option<Finished>);
-
-impl Bokeh for Paced {
-    fn submit(&mut self, mut job: Job) -> Result<(), BokehError> {
-        job.out.resize(SIZE.0, SIZE.1);
-        job.out.rgb.copy_from_slice(&job.color.rgb);
+fn paced(took: Duration) -> FakeBokeh {
+    let makes = move |job: Job| {
         let mut times = PassTimes::new();
-        times.add("all", self.0.mul_f64(COSTS[job.quality as usize]));
-        self.1 = Some(Finished {
-            ticket: job.ticket,
-            picture: Picture::in_memory(job.out),
-            color: job.color,
-            depth: job.depth,
-            times,
-        });
-        Ok(())
-    }
-    fn collect(&mut self, _: bool) -> Result<Option<Finished>, BokehError> {
-        Ok(self.1.take())
-    }
-    fn in_flight(&self) -> usize {
-        usize::from(self.1.is_some())
-    }
-    fn capacity(&self) -> usize {
-        1
-    }
-    fn backend(&self) -> Backend {
-        Backend::Gpu
-    }
-    fn describe(&self) -> String {
-        "a GPU, paced".into()
-    }
+        times.add("all", took.mul_f64(COSTS[job.quality as usize]));
+        changed(job, times, |_| {})
+    };
+    let fake = fake_bokeh(1, Trouble::default());
+    FakeBokeh { backend: Backend::Gpu, name: "a GPU, paced", makes: Box::new(makes), ..fake }
 }
 
 #[test]
@@ -123,7 +99,7 @@ fn quality_follows_the_time_there_is() {
     let stop = AtomicBool::new(false);
     for (took_us, quality) in [(1000, "best"), (3300, "balanced"), (4500, "fast"), (90_000, "draft")] {
         let report = run(Run {
-            bokeh: Some(Box::new(Paced(Duration::from_micros(took_us), None))),
+            bokeh: Some(Box::new(paced(Duration::from_micros(took_us)))),
             look: Look { quality: None, ..uniform(3.0) },
             adaptive: true,
             budget_ns: 4_000_000,
@@ -135,30 +111,18 @@ fn quality_follows_the_time_there_is() {
     }
 }
 
-/// A picture whose columns differ.
-struct Columns(bool);
-
-impl Camera for Columns {
-    fn info(&self) -> SourceInfo {
-        fake_camera(1).info()
-    }
-    fn next(&mut self, Shot { color, .. }: Shot) -> Result<Captured, CaptureError> {
-        if std::mem::replace(&mut self.0, true) {
-            return Ok(Captured::End);
-        }
-        color.resize(SIZE.0, SIZE.1);
-        (0..).zip(&mut color.rgb).for_each(|(index, byte)| *byte = index);
-        Ok(Captured::Frame(Stamp { index: 0, time_ns: 0, captured_ns: None }))
-    }
-}
-
 #[test]
 fn mirror_flips_pixels_and_keeps_channels() {
-    let received = Received::default();
-    let sink =
-        FakeSink { received: received.clone(), trouble: Trouble::default(), closes_at: NEVER, finish_fails: false };
-    let stop = AtomicBool::new(false);
-    run(Run { mirror: true, ..simple(Box::new(Columns(false)), Box::new(sink), &stop, Pace::Asap) }).unwrap();
+    // One picture, whose columns differ.
+    let camera = camera_by(fake_camera(1).info(), |index, Shot { color, .. }| {
+        color.resize(SIZE.0, SIZE.1);
+        (0..).zip(&mut color.rgb).for_each(|(value, byte)| *byte = value);
+        let stamp = Stamp { index, time_ns: 0, captured_ns: None };
+        if index == 0 { Captured::Frame(stamp) } else { Captured::End }
+    });
+    let (received, stop) = (Received::default(), AtomicBool::new(false));
+    let sink = fake_sink(&received);
+    run(Run { mirror: true, ..simple(camera, Box::new(sink), &stop, Pace::Asap) }).unwrap();
     let rgb = &received.pictures.lock().unwrap()[0];
     assert_eq!(rgb[..6], [15, 16, 17, 12, 13, 14]);
     assert_eq!(rgb[18..21], [33, 34, 35]);

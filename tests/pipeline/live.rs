@@ -10,7 +10,7 @@ use bokehcam::clock::Clock;
 use bokehcam::frame::{ColorImage, Stamp};
 use bokehcam::link::demand::{Demand, Watch};
 use bokehcam::pipeline::{Pace, Run, run};
-use bokehcam::sink::{Ending, Sink, SinkError};
+use bokehcam::sink::{Sink, SinkError};
 
 use crate::fakes::{PERIOD_NS, SIZE};
 use crate::setup::dof;
@@ -81,14 +81,6 @@ impl Sink for Screen {
     fn repeat(&mut self) -> Result<ControlFlow<(), bool>, SinkError> {
         assert!(self.watch.is_none(), "the camera's pictures come before the hold is over");
         Ok(self.show().map_continue(|()| true))
-    }
-
-    fn finish(self: Box<Self>, _: Ending) -> Result<(), SinkError> {
-        Ok(())
-    }
-
-    fn describe(&self) -> String {
-        "screen".into()
     }
 }
 

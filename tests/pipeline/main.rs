@@ -5,6 +5,7 @@ mod changes;
 mod clocked;
 #[path = "../common/mod.rs"]
 mod common;
+#[path = "../common/fakes.rs"]
 mod fakes;
 mod fallback;
 mod faults;
@@ -13,10 +14,14 @@ mod handover;
 mod live;
 #[path = "../common/planes.rs"]
 mod planes;
+#[path = "../common/portrait.rs"]
+mod portrait;
 mod replay;
 mod seek;
 mod setup;
 mod staging;
 mod stepper;
 mod stereo;
+#[path = "../common/until.rs"]
+mod until;
 mod yuyv;

@@ -20,6 +20,7 @@ use bokehcam::sink::{Sink, Target};
 use bokehcam_lab::scene::{Scene, View};
 use bokehcam_lab::synthetic::Synthetic;
 
+use crate::common::psnr_db;
 use crate::fakes::*;
 use crate::setup::*;
 
@@ -180,20 +181,6 @@ fn depth_beside_other_colours_follows_their_time_in_a_loop() {
     assert!(matches!(Beside::new(recording, "test recording"), Err(DepthError::NoDepth { .. })));
 }
 
-/// A depth camera whose first map comes late.
-struct Late(usize);
-
-impl DepthSource for Late {
-    fn read(&mut self, FrameInput { stamp, .. }: FrameInput, map: &mut DepthMap) -> Result<(), DepthError> {
-        if stamp.index < self.0 {
-            return Err(DepthError::Unpaired { source_name: "a depth camera".to_owned() });
-        }
-        map.resize(SIZE.0, SIZE.1);
-        map.metres.fill(1.0);
-        Ok(())
-    }
-}
-
 #[test]
 fn frames_before_the_first_depth_are_counted_and_the_run_goes_on() {
     let folder = tempfile::tempdir().unwrap();
@@ -201,8 +188,16 @@ fn frames_before_the_first_depth_are_counted_and_the_run_goes_on() {
     let stop = AtomicBool::new(false);
     let camera = replay(folder.path(), Part::default()).unwrap();
     let sink = Target::Null.open(&sink_options()).unwrap();
+    // Of a depth camera.
+    let late = depth_by(|Seen { stamp, .. }, map| {
+        map.metres.fill(1.0);
+        match stamp.index {
+            0..4 => Err(DepthError::Unpaired { source_name: "a depth camera".to_owned() }),
+            _ => Ok(()),
+        }
+    });
     let frames = run(Run {
-        depth: Some(Box::new(Late(4))),
+        depth: Some(late),
         bokeh: Some(Box::new(fake_bokeh(2, Trouble::default()))),
         look: dof(),
         changes: None,
@@ -297,7 +292,7 @@ fn the_demonstration_is_the_rendered_scene_as_nearly_as_it_is_coded() {
         let time_s = index as f64 / f64::from(demo::FRAMES_PER_SECOND);
         scene.render_pinhole(&view, time_s, 16, 2, &mut picture, &mut map);
         let (_, color, depth) = &frames[index];
-        let psnr_db = 10.0 * (255.0f64.powi(2) / apart(color, &picture)).log10();
+        let psnr_db = psnr_db(color, &picture);
         assert!(psnr_db > 34.0, "frame {index}: {psnr_db} dB");
         // Half a level; the mathematical functions of another machine may send a ray past an edge.
         let is_off = |(a, b): &(&f32, &f32)| (a.recip() - b.recip()).abs() > 0.0044;

@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use bokehcam::capture::replay::{Part, Replay};
 use bokehcam::capture::{Brings, Camera, Captured, Shot};
@@ -17,8 +17,13 @@ use bokehcam::pipeline::{Pace, Run, View, run};
 use bokehcam::recording::{Options, Recording, Scratch};
 use bokehcam::sink::Target;
 
+use crate::fakes::fake_bokeh;
 use crate::replay::{FRAMES, STEP_NS, open, play, record, seen, sink_options};
 use crate::setup::*;
+use crate::until::found;
+
+/// What takes longer hangs.
+const PATIENCE: Duration = Duration::from_secs(60);
 
 fn looped(dir: &Path, start_s: f64) -> Replay {
     Replay::new(open(dir), "test recording", &Part { start_s, looped: true, ..Part::default() }).unwrap()
@@ -155,15 +160,8 @@ fn while_nobody_watches_each_wish_brings_its_one_frame_with_its_depth() {
         ..simple
     };
     let next = |views: &mut Receiver<View>, number: u64, place: usize| {
-        let began = Instant::now();
-        let view = loop {
-            if let Some(view) = views.try_recv() {
-                break view;
-            }
-            assert!(began.elapsed() < Duration::from_secs(60), "frame {place} never came");
-            std::thread::sleep(Duration::from_millis(1));
-        };
-        assert_eq!((view.stamp.index, view.seek, view.is_seek_target), (place, number, true));
+        let view = found(&format!("frame {place}"), PATIENCE, || views.try_recv());
+        assert_eq!((view.stamp.index, view.seek, view.is_wished), (place, number, true));
         assert_eq!(usize::from(view.color.as_ref().unwrap().rgb[0]), place);
         let depth = view.depth.as_ref().unwrap();
         assert!(depth.metres.iter().all(|&m| (m - 1.0 - 0.1 * place as f32).abs() < 1e-3));
@@ -180,13 +178,8 @@ fn while_nobody_watches_each_wish_brings_its_one_frame_with_its_depth() {
         }
         // Once somebody watches it goes on from there, over the seam.
         let _watch = demand.watch();
-        let began = Instant::now();
-        while began.elapsed() < Duration::from_secs(60) {
-            if let Some(view) = views.try_recv() {
-                return assert!(view.stamp.index < 9 && view.seek == 4 && !view.is_seek_target, "{:?}", view.stamp);
-            }
-        }
-        panic!("it never went on");
+        let view = found("it goes on", PATIENCE, || views.try_recv());
+        assert!(view.stamp.index < 9 && view.seek == 4 && !view.is_wished, "{:?}", view.stamp);
     };
     let report = std::thread::scope(|scope| {
         let checked = scope.spawn(checked);

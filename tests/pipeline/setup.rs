@@ -1,7 +1,6 @@
 //! A run of fakes, and looks for it.
 
 use std::cell::Cell;
-use std::collections::VecDeque;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use bokehcam::budget::Quality;
@@ -51,10 +50,6 @@ pub fn uniform(radius_px: f32) -> Look {
     Look { strength: Strength::AtInfinity(radius_px), quality: Some(Quality::Fast), ..Look::plain(Effect::Blur) }
 }
 
-pub fn fake_bokeh(capacity: usize, trouble: Trouble) -> FakeBokeh {
-    FakeBokeh { capacity, held: VecDeque::new(), submitted: 0, trouble, collect_fails: false, loses_frames: false }
-}
-
 impl Setup {
     pub fn new(frames: usize, pace: Pace) -> Self {
         Self {
@@ -79,22 +74,13 @@ impl Setup {
         let received = Received::default();
         let stop = AtomicBool::new(false);
         let last = Cell::new(None::<Progress>);
-        let camera = FakeCamera {
-            frames: self.frames,
-            next: 0,
-            corrupt_every: self.corrupt_every,
-            brings: self.brings,
-            trouble: self.camera,
-        };
-        let depth = self.depth.map(|trouble| Box::new(FakeDepth(trouble)) as _);
+        let (corrupt_every, brings, trouble) = (self.corrupt_every, self.brings, self.camera);
+        let camera = FakeCamera { corrupt_every, brings, trouble, ..fake_camera(self.frames) };
+        let depth = self.depth.map(fake_depth);
         let bokeh = self.bokeh.map(|bokeh| Box::new(bokeh) as _);
         let blurring = Blurring { look: self.look, bokeh, adaptive: false, changes: None };
-        let sink = FakeSink {
-            received: received.clone(),
-            trouble: self.sink,
-            closes_at: self.closes_at,
-            finish_fails: self.finish_fails,
-        };
+        let (trouble, closes_at, finish_fails) = (self.sink, self.closes_at, self.finish_fails);
+        let sink = FakeSink { trouble, closes_at, finish_fails, ..fake_sink(&received) };
         let result = run(Run {
             threads: 2,
             pace: self.pace,
@@ -124,8 +110,4 @@ impl Setup {
 pub fn simple<'a>(camera: Box<dyn Camera>, sink: Box<dyn Sink>, stop: &'a AtomicBool, pace: Pace) -> Run<'a> {
     let run = Run::new(camera, None, Look::plain(Effect::None), sink, stop).unwrap();
     Run { look: uniform(3.0), pace, budget_ns: PERIOD_NS, ..run }
-}
-
-pub fn fake_camera(frames: usize) -> FakeCamera {
-    FakeCamera { frames, next: 0, corrupt_every: NEVER, brings: Brings::Color, trouble: Trouble::default() }
 }

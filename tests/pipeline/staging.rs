@@ -3,19 +3,20 @@
 
 use crate::common;
 
-use std::ops::ControlFlow;
 use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex};
 
-use bokehcam::capture::{Brings, Camera, CaptureError, Captured, Shot, SourceInfo};
+use bokehcam::capture::{Brings, Camera, Captured, SourceInfo};
 use bokehcam::depth::backdrop::Behind;
 use bokehcam::depth::focus::FocusRule;
 use bokehcam::frame::{ColorImage, DepthMap, Stamp};
 use bokehcam::link;
 use bokehcam::look::{Effect, Follow, Look, Strength};
 use bokehcam::pipeline::{Run, View, run};
-use bokehcam::sink::{Ending, Sink, SinkError};
+use bokehcam::sink::Null;
 use common::{color, depth};
+
+use crate::fakes::{camera_by, sink_by};
 
 const SIZE: (u32, u32) = (320, 180);
 const FRAMES: u32 = 90;
@@ -23,9 +24,7 @@ const PERSON: [u8; 3] = [200, 170, 40];
 const WALL: [u8; 3] = [190, 30, 160];
 
 /// Somebody who walks from the left to the right before a wall.
-struct Walk {
-    next: u32,
-}
+struct Walk;
 
 impl Walk {
     /// The middle of the person, as a fraction of the width: there are two seconds to get used to it.
@@ -44,54 +43,27 @@ impl Walk {
         let image = color(SIZE.0, SIZE.1, |x, y| light(x, y, if is(x, y) { PERSON } else { WALL }));
         (image, depth(SIZE.0, SIZE.1, |x, y| if is(x, y) { 1.0 } else { 3.0 }))
     }
-}
 
-impl Camera for Walk {
-    fn info(&self) -> SourceInfo {
-        let frames = Some(u64::from(FRAMES));
-        SourceInfo {
-            name: "walk".into(),
-            size: SIZE,
-            period_ns: 33_333_333,
-            frames,
-            live: false,
-            brings: Brings::Depth,
-        }
-    }
-
-    fn next(&mut self, shot: Shot) -> Result<Captured, CaptureError> {
-        if self.next == FRAMES {
-            return Ok(Captured::End);
-        }
-        (*shot.color, *shot.depth) = Self::taken(self.next);
-        let (index, time_ns) = (self.next as usize, u64::from(self.next) * 33_333_333);
-        let stamp = Stamp { index, time_ns, captured_ns: None };
-        self.next += 1;
-        Ok(Captured::Frame(stamp))
-    }
-}
-
-#[derive(Clone, Default)]
-struct Kept(Arc<Mutex<Vec<ColorImage>>>);
-
-impl Sink for Kept {
-    fn put(&mut self, picture: &ColorImage, _: u64) -> Result<ControlFlow<()>, SinkError> {
-        self.0.lock().unwrap().push(picture.clone());
-        Ok(ControlFlow::Continue(()))
-    }
-    fn finish(self: Box<Self>, _: Ending) -> Result<(), SinkError> {
-        Ok(())
-    }
-    fn describe(&self) -> String {
-        "kept".into()
+    fn camera() -> Box<dyn Camera> {
+        let (name, frames) = ("walk".into(), Some(u64::from(FRAMES)));
+        let info = SourceInfo { name, size: SIZE, period_ns: 33_333_333, frames, live: false, brings: Brings::Depth };
+        camera_by(info, |index, shot| {
+            if index == FRAMES as usize {
+                return Captured::End;
+            }
+            (*shot.color, *shot.depth) = Self::taken(index as u32);
+            Captured::Frame(Stamp { index, time_ns: index as u64 * 33_333_333, captured_ns: None })
+        })
     }
 }
 
 fn stream(look: &Look, mirror: bool) -> Vec<ColorImage> {
-    let (kept, stop) = (Kept::default(), AtomicBool::new(false));
-    let made = Run::new(Box::new(Walk { next: 0 }), None, look.clone(), Box::new(kept.clone()), &stop).unwrap();
+    let (kept, stop) = (Arc::<Mutex<Vec<ColorImage>>>::default(), AtomicBool::new(false));
+    let keeps = Arc::clone(&kept);
+    let sink = sink_by(move |picture| keeps.lock().unwrap().push(picture.clone()));
+    let made = Run::new(Walk::camera(), None, look.clone(), sink, &stop).unwrap();
     run(Run { mirror, ..made }).unwrap();
-    let kept = std::mem::take(&mut *kept.0.lock().unwrap());
+    let kept = std::mem::take(&mut *kept.lock().unwrap());
     assert_eq!(kept.len(), FRAMES as usize);
     kept
 }
@@ -129,7 +101,7 @@ fn who_looks_on_sees_what_was_taken_beside_what_became_of_it() {
     let (green, stop) = ([0, 177, 64], AtomicBool::new(false));
     let (sender, mut views) = link::lossless::<View>();
     let look = Look { behind: Behind::Color(green), ..dof() };
-    let made = Run::new(Box::new(Walk { next: 0 }), None, look, Box::new(Kept::default()), &stop).unwrap();
+    let made = Run::new(Walk::camera(), None, look, Box::new(Null), &stop).unwrap();
     let seen = std::thread::scope(|scope| {
         let seen = scope.spawn(move || {
             let mut count = 0;

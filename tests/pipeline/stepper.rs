@@ -1,7 +1,5 @@
 //! A stepper makes, on its caller's thread, what a run makes with its own.
 
-use std::ops::ControlFlow;
-use std::path::Path;
 use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex};
 
@@ -11,21 +9,14 @@ use bokehcam::frame::ColorImage;
 use bokehcam::look::{Effect, Look};
 use bokehcam::pipeline::{self, Run};
 use bokehcam::recording::{Options, Recording, Scratch};
-use bokehcam::sink::{Sink, SinkError};
 use bokehcam::source::{self, Source};
 
-struct Kept(Arc<Mutex<Vec<ColorImage>>>);
-
-impl Sink for Kept {
-    fn put(&mut self, frame: &ColorImage, _: u64) -> Result<ControlFlow<()>, SinkError> {
-        self.0.lock().unwrap().push(frame.clone());
-        Ok(ControlFlow::Continue(()))
-    }
-}
+use crate::fakes::sink_by;
+use crate::portrait;
 
 #[test]
 fn every_frame_is_that_of_a_run() {
-    let dir = Path::new(env!("CARGO_MANIFEST_DIR")).join("recordings/portrait");
+    let dir = portrait::folder();
     let recording = Recording::open(&dir, &Options::default()).unwrap();
     let followed = Look {
         follow: "1.5".parse().unwrap(),
@@ -35,9 +26,10 @@ fn every_frame_is_that_of_a_run() {
     for look in [Look::default(), followed, Look::plain(Effect::TiltShift), Look::plain(Effect::None)] {
         let source =
             Source::open(&dir.to_str().unwrap().parse().unwrap(), &source::Options::default(), Some(&look)).unwrap();
-        let (kept, stop) = (Arc::default(), AtomicBool::new(false));
-        let run =
-            Run::new(source.camera, source.depth, look.clone(), Box::new(Kept(Arc::clone(&kept))), &stop).unwrap();
+        let (kept, stop) = (Arc::<Mutex<Vec<ColorImage>>>::default(), AtomicBool::new(false));
+        let keeps = Arc::clone(&kept);
+        let sink = sink_by(move |frame| keeps.lock().unwrap().push(frame.clone()));
+        let run = Run::new(source.camera, source.depth, look.clone(), sink, &stop).unwrap();
         pipeline::run(run).unwrap();
         let kept = kept.lock().unwrap();
         assert_eq!(kept.len(), recording.len());

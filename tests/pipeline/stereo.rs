@@ -7,7 +7,7 @@ use std::time::Duration;
 use bokehcam::bokeh::aperture::Aperture;
 use bokehcam::bokeh::{self, Backend, Method};
 use bokehcam::budget::Quality;
-use bokehcam::capture::{Brings, Camera, CaptureError, Captured, Shot, SourceInfo};
+use bokehcam::capture::{Brings, Camera, Captured, Shot, SourceInfo};
 use bokehcam::depth::focus::FocusRule;
 use bokehcam::depth::stereo::source::StereoDepth;
 use bokehcam::depth::stereo::{self, Effort, Matcher, Settings};
@@ -16,49 +16,10 @@ use bokehcam::frame::{ColorImage, DepthMap, Stamp};
 use bokehcam::optics::CocKind;
 use bokehcam::optics::StereoRig;
 use bokehcam::pipeline::{Fault, Pace, Run, run};
-use bokehcam::stats::Cause;
 
 use crate::fakes::*;
 use crate::planes;
 use crate::setup::*;
-
-fn fake_sink(received: &Received) -> Box<FakeSink> {
-    let (received, trouble) = (received.clone(), Trouble::default());
-    Box::new(FakeSink { received, trouble, closes_at: NEVER, finish_fails: false })
-}
-
-/// Depth that is what the right eye saw, which must be of the same frame as the picture.
-struct OfTheRight;
-
-impl DepthSource for OfTheRight {
-    fn read(&mut self, seen: FrameInput, map: &mut DepthMap) -> Result<(), DepthError> {
-        let right = seen.right.expect("a right eye");
-        assert_eq!((right.luma[0], right.size()), (seen.stamp.index as u8, SIZE));
-        assert_eq!(seen.color.rgb[0], right.luma[0], "picture and right eye are of one frame");
-        map.resize(SIZE.0, SIZE.1);
-        map.metres.fill(1.0 + f32::from(right.luma[0]));
-        Ok(())
-    }
-}
-
-/// A camera with two eyes, of whose frames every third has no partner.
-struct LosesPartners(FakeCamera);
-
-impl Camera for LosesPartners {
-    fn info(&self) -> SourceInfo {
-        self.0.info()
-    }
-    fn next(&mut self, shot: Shot) -> Result<Captured, CaptureError> {
-        if self.0.next % 3 == 2 {
-            self.0.next += 1;
-            return Ok(Captured::Lost(1, Cause::Unpaired));
-        }
-        self.0.next(shot)
-    }
-    fn skip(&mut self, until_ns: u64) -> u64 {
-        self.0.skip(until_ns)
-    }
-}
 
 fn two_eyes(frames: usize) -> FakeCamera {
     FakeCamera { brings: Brings::RightCamera, ..fake_camera(frames) }
@@ -74,11 +35,20 @@ fn the_right_eye_comes_with_its_picture_and_unpaired_frames_are_counted() {
     let stop = AtomicBool::new(false);
     for pace in [Pace::Asap, Pace::Realtime] {
         let received = Received::default();
+        // What the right eye saw, which must be of the same frame as the picture.
+        let depth = depth_by(|seen, map| {
+            let right = seen.right.expect("a right eye");
+            assert_eq!((right.luma[0], right.size()), (seen.stamp.index as u8, SIZE));
+            assert_eq!(seen.color.rgb[0], right.luma[0], "picture and right eye are of one frame");
+            map.metres.fill(1.0 + f32::from(right.luma[0]));
+            Ok(())
+        });
+        let camera = FakeCamera { unpaired_every: 3, ..two_eyes(60) };
         let frames = run(Run {
-            depth: Some(Box::new(OfTheRight)),
+            depth: Some(depth),
             bokeh: Some(Box::new(fake_bokeh(2, Trouble::default()))),
             look: dof(),
-            ..simple(Box::new(LosesPartners(two_eyes(60))), fake_sink(&received), &stop, pace)
+            ..simple(Box::new(camera), Box::new(fake_sink(&received)), &stop, pace)
         })
         .unwrap()
         .frames;
@@ -99,7 +69,7 @@ fn depth_from_two_eyes_of_a_camera_with_one_is_an_error() {
         depth: Some(Box::new(StereoDepth::of_rectified("fake camera", StereoRig::assumed(SIZE.0), matcher, 16))),
         bokeh: Some(Box::new(fake_bokeh(2, Trouble::default()))),
         look: dof(),
-        ..simple(Box::new(fake_camera(5)), fake_sink(&Received::default()), &stop, Pace::Asap)
+        ..simple(Box::new(fake_camera(5)), Box::new(fake_sink(&Received::default())), &stop, Pace::Asap)
     })
     .unwrap_err();
     assert!(matches!(error.fault, Fault::Depth(DepthError::OneEye { .. })), "{error}");
@@ -143,7 +113,7 @@ fn without_time_depth_is_made_with_less_effort_and_every_picture_is_straightened
             depth: Some(Box::new(Slow { effort: last.clone(), most: 1 })),
             bokeh: Some(Box::new(fake_bokeh(2, Trouble::default()))),
             look: dof(),
-            ..simple(Box::new(two_eyes(400)), fake_sink(&received), &stop, pace)
+            ..simple(Box::new(two_eyes(400)), Box::new(fake_sink(&received)), &stop, pace)
         })
         .unwrap();
         assert_eq!((report.depth_held > 0, last.load(Ordering::SeqCst)), (held, effort), "{pace:?}");
@@ -152,27 +122,15 @@ fn without_time_depth_is_made_with_less_effort_and_every_picture_is_straightened
     }
 }
 
-/// The square before the wall, so many times.
-struct TwoPlanes(usize);
-
-impl Camera for TwoPlanes {
-    fn info(&self) -> SourceInfo {
-        SourceInfo {
-            name: "two planes".into(),
-            size: planes::SIZE,
-            period_ns: 33_000_000,
-            frames: Some(self.0 as u64),
-            live: false,
-            brings: Brings::RightCamera,
-        }
-    }
-
-    fn next(&mut self, Shot { color, right, .. }: Shot) -> Result<Captured, CaptureError> {
-        let Some(left) = self.0.checked_sub(1) else { return Ok(Captured::End) };
-        self.0 = left;
+/// The square before the wall, once.
+fn two_planes() -> Box<dyn Camera> {
+    let (name, frames, brings) = ("two planes".into(), Some(1), Brings::RightEye);
+    let info = SourceInfo { name, size: planes::SIZE, period_ns: 33_000_000, frames, live: false, brings };
+    camera_by(info, |index, Shot { color, right, .. }| {
         (*color, *right) = planes::seen();
-        Ok(Captured::Frame(Stamp { index: left, time_ns: 0, captured_ns: None }))
-    }
+        let stamp = Stamp { index, time_ns: 0, captured_ns: None };
+        if index == 0 { Captured::Frame(stamp) } else { Captured::End }
+    })
 }
 
 #[test]
@@ -201,7 +159,7 @@ fn what_has_the_disparity_of_the_focus_is_sharp_and_the_rest_is_not() {
                 depth: Some(Box::new(StereoDepth::of_rectified("two planes", rig, matcher, 16))),
                 bokeh: Some(bokeh::create(&settings, (width, height), None, Some(1)).unwrap()),
                 look: dof_with(FocusRule::Point { x: focus.0, y: focus.1 }, 16.0),
-                ..simple(Box::new(TwoPlanes(1)), fake_sink(&received), &stop, Pace::Asap)
+                ..simple(two_planes(), Box::new(fake_sink(&received)), &stop, Pace::Asap)
             })
             .unwrap();
             let pictures = received.pictures.lock().unwrap();

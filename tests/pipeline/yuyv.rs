@@ -1,11 +1,10 @@
 //! Pictures that are YUYV already: only for a sink that wants them, alone, and whole.
 
-use std::collections::VecDeque;
 use std::ops::ControlFlow;
 use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex};
 
-use bokehcam::bokeh::{Bokeh, BokehError, Finished, Job, PassTimes, Picture};
+use bokehcam::bokeh::{Finished, Job, PassTimes, Picture};
 use bokehcam::capture::Brings;
 use bokehcam::compute::Backend;
 use bokehcam::depth::focus::FocusRule;
@@ -19,49 +18,24 @@ use crate::fakes::*;
 use crate::setup::*;
 
 /// Makes YUYV where it may, of the frame's number.
-#[derive(Default)]
-struct Ready(VecDeque<Job>);
-
-impl Bokeh for Ready {
-    fn submit(&mut self, job: Job) -> Result<(), BokehError> {
-        self.0.push_back(job);
-        Ok(())
-    }
-
-    fn collect(&mut self, wait: bool) -> Result<Option<Finished>, BokehError> {
-        if !wait && self.0.len() < self.capacity() {
-            return Ok(None);
-        }
-        Ok(self.0.pop_front().map(|Job { ticket, color, depth, mut out, yuyv, .. }| {
-            out.resize(SIZE.0, SIZE.1);
-            let &[low, high] = color.rgb.last_chunk::<2>().unwrap();
-            let picture = match yuyv {
-                Some(mut yuyv) => {
-                    yuyv.resize(SIZE.0, SIZE.1);
-                    yuyv.bytes.as_chunks_mut().0.fill([low, high]);
-                    Picture::as_yuyv(yuyv, out)
-                }
-                None => {
-                    out.rgb.as_chunks_mut().0.fill([low, high, 0]);
-                    Picture::in_memory(out)
-                }
-            };
-            Finished { ticket, picture, color, depth, times: PassTimes::new() }
-        }))
-    }
-
-    fn in_flight(&self) -> usize {
-        self.0.len()
-    }
-    fn capacity(&self) -> usize {
-        3
-    }
-    fn backend(&self) -> Backend {
-        Backend::Gpu
-    }
-    fn describe(&self) -> String {
-        "ready".into()
-    }
+fn ready() -> FakeBokeh {
+    let makes = |Job { ticket, color, depth, mut out, yuyv, .. }| {
+        out.resize(SIZE.0, SIZE.1);
+        let &[low, high] = color.rgb.last_chunk::<2>().unwrap();
+        let picture = match yuyv {
+            Some(mut yuyv) => {
+                yuyv.resize(SIZE.0, SIZE.1);
+                yuyv.bytes.as_chunks_mut().0.fill([low, high]);
+                Picture::as_yuyv(yuyv, out)
+            }
+            None => {
+                out.rgb.as_chunks_mut().0.fill([low, high, 0]);
+                Picture::in_memory(out)
+            }
+        };
+        Finished { ticket, picture, color, depth, times: PassTimes::new() }
+    };
+    FakeBokeh { backend: Backend::Gpu, makes: Box::new(makes), ..fake_bokeh(3, Trouble::default()) }
 }
 
 /// The frames that came, and whether as YUYV.
@@ -106,11 +80,10 @@ const FRAMES: usize = 400;
 /// What comes of all frames where the camera wants YUYV once so many have come, in a run that `change` changes.
 fn came(look: Look, wants: fn(usize) -> bool, change: impl FnOnce(&mut Run)) -> Vec<(bool, u16)> {
     let (came, stop) = (Came::default(), AtomicBool::new(false));
-    let (brings, trouble) = (Brings::Depth, Trouble::default());
-    let camera = FakeCamera { frames: FRAMES, next: 0, corrupt_every: NEVER, brings, trouble };
+    let camera = FakeCamera { brings: Brings::Depth, ..fake_camera(FRAMES) };
     let sink = Camera { came: Arc::clone(&came), last: vec![0; 2 * (SIZE.0 * SIZE.1) as usize], wants };
     let mut blurred = Run::new(Box::new(camera), None, look, Box::new(sink), &stop).unwrap();
-    blurred.bokeh = Some(Box::new(Ready::default()));
+    blurred.bokeh = Some(Box::new(ready()));
     change(&mut blurred);
     let report = run(blurred).unwrap();
     assert_eq!(report.frames.delivered, FRAMES as u64);

@@ -8,11 +8,7 @@ use bokehcam::v4l2::controls::{self, Value};
 use bokehcam::v4l2::holders::holders;
 use bokehcam::v4l2::node::{NodeError, resolve};
 
-use super::machine::{Beside, CAMERA, Machine, VERSIONS, VIRTUAL, bokehcam, sh, until};
-
-fn json(arguments: &str) -> serde_json::Value {
-    serde_json::from_slice(&bokehcam(arguments).output().unwrap().stdout).unwrap()
-}
+use super::machine::{CAMERA, Machine, VERSIONS, VIRTUAL, beside, run, sh, until};
 
 #[test]
 #[ignore = "needs the camera VM (tests/vm/run)"]
@@ -21,7 +17,7 @@ fn only_nodes_that_give_pictures_are_listed() {
     let _machine = Machine::with("n_devs=1 node_types=0xe1d3d vid_cap_nr=0", VERSIONS[0]);
     let nodes = fs::read_dir("/sys/class/video4linux").unwrap().count();
     assert!(nodes > 6, "{nodes} nodes");
-    let list = json("devices --json");
+    let list = run("devices --json").json();
     let paths = |group: &str| -> Vec<String> {
         list[group].as_array().unwrap().iter().map(|device| device["path"].as_str().unwrap().to_owned()).collect()
     };
@@ -47,16 +43,12 @@ fn a_camera_has_several_names() {
     }
     // The virtual camera gives no pictures while nobody writes to it.
     assert!(matches!(resolve("bokehcam-test"), Err(NodeError::None { .. })));
-    let listed = bokehcam("devices bokehcam-test").output().unwrap();
-    assert!(String::from_utf8(listed.stdout).unwrap().contains(VIRTUAL));
+    assert!(run("devices bokehcam-test").stdout.contains(VIRTUAL));
     drop(machine);
 
     let _machine = Machine::with("n_devs=2 node_types=0x1,0x1 vid_cap_nr=0,1", VERSIONS[0]);
-    let refused = bokehcam("stream vivid --to null").output().unwrap();
-    let said = String::from_utf8(refused.stderr).unwrap();
     // Which cameras share a name is the machine's.
-    assert_eq!(refused.status.code(), Some(1), "{said}");
-    assert!(said.lines().count() == 1 && said.contains("/dev/video0") && said.contains("/dev/video1"), "{said}");
+    run("stream vivid --to null").refused(1, &["/dev/video0", "/dev/video1"]);
 }
 
 /// What another program says a control is set to.
@@ -113,7 +105,7 @@ fn controls_of_every_type_are_set_by_name() {
 #[ignore = "needs the camera VM (tests/vm/run)"]
 fn controls_are_listed_as_another_program_lists_them() {
     let _machine = Machine::new();
-    let list = json("devices --controls --json vivid");
+    let list = run("devices --controls --json vivid").json();
     let ours: Vec<String> = list["cameras"][0]["controls"]
         .as_array()
         .unwrap()
@@ -135,14 +127,9 @@ fn controls_are_listed_as_another_program_lists_them() {
 #[ignore = "needs the camera VM (tests/vm/run)"]
 fn options_set_controls() {
     let _machine = Machine::new();
-    let ran = bokehcam("stream 0 --to null --frames 1 --effect none --control brightness=7 --control menu=4")
-        .output()
-        .unwrap();
-    super::machine::succeeded(&ran);
+    run("stream 0 --to null --frames 1 --effect none --control brightness=7 --control menu=4").done();
     assert_eq!((told("brightness").as_str(), told("menu").as_str()), ("7", "4 (Menu Item 4)"));
-    let refused = bokehcam("stream 0 --to null --frames 1 --control brightness=999").output().unwrap();
-    let said = String::from_utf8(refused.stderr).unwrap();
-    assert!(refused.status.code() == Some(1) && said.lines().count() == 1 && said.contains("use 0 to 255"), "{said}");
+    run("stream 0 --to null --frames 1 --control brightness=999").refused(1, &["use 0 to 255"]);
 }
 
 #[test]
@@ -151,27 +138,24 @@ fn a_busy_camera_names_who_has_it() {
     let _machine = Machine::new();
     let mut other = Command::new("v4l2-ctl");
     other.args(["-d", CAMERA, "--stream-mmap", "--stream-count=1000"]);
-    let other = Beside::start(other);
+    let other = beside(other);
     until("the other program has it", || !holders(CAMERA.as_ref()).is_empty());
-    let refused = bokehcam("stream 0 --to null --frames 1").output().unwrap();
-    let said = String::from_utf8(refused.stderr).unwrap();
-    let name = format!("v4l2-ctl (process {})", other.id());
-    assert!(refused.status.code() == Some(1) && said.lines().count() == 1 && said.contains(&name), "{said}");
-    let list = json("devices --json 0");
-    assert_eq!(list["cameras"][0]["holders"][0]["pid"], other.id());
+    let name = format!("v4l2-ctl (process {})", other.0.id());
+    run("stream 0 --to null --frames 1").refused(1, &[&name]);
+    let list = run("devices --json 0").json();
+    assert_eq!(list["cameras"][0]["holders"][0]["pid"], other.0.id());
 }
 
 #[test]
 #[ignore = "needs the camera VM (tests/vm/run)"]
 fn the_doctor_knows_a_machine_that_is_ready_from_one_that_is_not() {
     let _machine = Machine::new();
-    let ready = bokehcam("doctor").output().unwrap();
-    let said = String::from_utf8(ready.stdout).unwrap();
-    assert!(ready.status.success() && said.contains("/dev/video20 (bokehcam-test): free"), "{said}");
+    let said = run("doctor").printed();
+    assert!(said.contains("/dev/video20 (bokehcam-test): free"), "{said}");
     sh("rmmod v4l2loopback");
-    let without = bokehcam("doctor").output().unwrap();
-    let said = String::from_utf8(without.stdout).unwrap();
-    assert_eq!(without.status.code(), Some(1), "{said}");
+    let without = run("doctor");
+    let said = &without.stdout;
+    assert_eq!(without.code, 1, "{said}");
     assert!(
         said.contains("MISSING") && said.contains("modprobe v4l2loopback") && said.contains("exclusive_caps=1"),
         "{said}"

@@ -4,7 +4,7 @@ use bokehcam::layout::Content;
 use bokehcam::v4l2::modes::{QueueKind, modes};
 use bokehcam::v4l2::{Device, FourCc};
 
-use super::machine::{BARS, CAMERA, Machine, distance_from, frame, open, wish};
+use super::machine::{BARS, CAMERA, Machine, distance_from, frame, open, run, wish};
 
 const SIZE: (u32, u32) = (320, 180);
 /// Colours in 8 bits of YCbCr with a limited range lie up to so far apart.
@@ -72,12 +72,8 @@ fn a_camera_of_several_planes_gives_the_same_picture() {
 #[ignore = "needs the camera VM (tests/vm/run)"]
 fn what_the_camera_cannot_do_is_refused_or_said() {
     let _machine = Machine::new();
-    let refused = super::machine::bokehcam("stream 0 --to null --frames 1 --format MJPG").output().unwrap();
-    let said = String::from_utf8(refused.stderr).unwrap();
-    assert_eq!(refused.status.code(), Some(1), "{said}");
-    assert!(said.lines().count() == 1 && said.contains("MJPG") && said.contains("YUYV"), "{said}");
+    run("stream 0 --to null --frames 1 --format MJPG").refused(1, &["MJPG", "YUYV"]);
 
-    let near = super::machine::bokehcam("stream 0 --to null --frames 1 --effect none --size 500x400").output().unwrap();
-    let said = String::from_utf8(near.stderr).unwrap();
-    assert!(near.status.success() && said.contains("cannot do exactly"), "{said}");
+    let near = run("stream 0 --to null --frames 1 --effect none --size 500x400");
+    assert!(near.done().contains("cannot do exactly"), "{}", near.stderr);
 }

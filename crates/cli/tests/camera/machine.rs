@@ -1,9 +1,8 @@
 //! The machine's devices, loaded anew for each test, and what tests do with them.
 
-use std::fs;
 use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
-use std::process::{Child, Command, Output, Stdio};
+use std::process::{Command, Stdio};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{self, Receiver};
 use std::sync::{Mutex, MutexGuard};
@@ -16,6 +15,9 @@ use bokehcam::layout::Content;
 use bokehcam::v4l2::live::ModeRequest;
 use bokehcam::v4l2::node::nodes;
 use bokehcam::v4l2::{Device, FourCc, controls};
+use rustix::process::Signal;
+
+use super::program::{self, Beside, Ran, assert_accounted, json};
 
 /// The camera.
 pub const CAMERA: &str = "/dev/video0";
@@ -91,17 +93,26 @@ fn unload(module: &str) {
 
 /// Runs a line of shell, which must succeed; gives its standard output.
 pub fn sh(line: &str) -> String {
-    let output = Command::new("sh").arg("-c").arg(line).stdin(Stdio::null()).output().unwrap();
-    assert!(output.status.success(), "{line}: {}", String::from_utf8_lossy(&output.stderr));
-    String::from_utf8(output.stdout).unwrap()
+    let ran = Ran::of(Command::new("sh").args(["-c", line]).stdin(Stdio::null()));
+    assert_eq!(ran.code, 0, "{line}: {}", ran.stderr);
+    ran.stdout
 }
 
 /// The program itself, without settings of anybody.
 pub fn bokehcam(arguments: &str) -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_bokehcam"));
-    command.args(arguments.split_whitespace()).env("XDG_CONFIG_HOME", "/nowhere").stdin(Stdio::null());
-    command.env("XDG_RUNTIME_DIR", RUNTIME);
+    let mut command = program::bokehcam(&arguments.split_whitespace().collect::<Vec<_>>());
+    command.env("XDG_CONFIG_HOME", "/nowhere").env("XDG_RUNTIME_DIR", RUNTIME);
     command
+}
+
+/// Runs it.
+pub fn run(arguments: &str) -> Ran {
+    Ran::of(&mut bokehcam(arguments))
+}
+
+/// Starts a program beside the test, which may read what comes out of it.
+pub fn beside(mut command: Command) -> Beside {
+    Beside::start(command.stdout(Stdio::piped()).stderr(Stdio::piped()))
 }
 
 /// A stream of the program's that runs beside the test.
@@ -110,7 +121,7 @@ pub struct Stream(Beside);
 impl Stream {
     /// Starts one.
     pub fn start(arguments: &str) -> Self {
-        Self(Beside::start(bokehcam(&format!("stream {arguments} --force --report {REPORT}"))))
+        Self(beside(bokehcam(&format!("stream {arguments} --force --report {REPORT}"))))
     }
 
     /// Starts one to the virtual camera, and waits until that shows something.
@@ -125,7 +136,7 @@ impl Stream {
 
     /// Its frames, of this size, where it writes them to standard output: each as it is asked for, none kept ready.
     pub fn frames(&mut self, (width, height): (usize, usize)) -> Receiver<()> {
-        let mut stdout = BufReader::new(self.0.0.as_mut().unwrap().stdout.take().unwrap());
+        let mut stdout = BufReader::new(self.0.0.stdout.take().unwrap());
         let (told, frames) = mpsc::sync_channel(0);
         std::thread::spawn(move || {
             stdout.read_until(b'\n', &mut Vec::new()).unwrap();
@@ -141,73 +152,19 @@ impl Stream {
 
     /// Waits for its end, or ends it with Ctrl-C; it must have done well. Gives its report.
     pub fn report(self, interrupted: bool) -> serde_json::Value {
-        let ended = if interrupted { self.0.interrupt() } else { self.0.end() };
-        succeeded(&ended);
-        let report: serde_json::Value = serde_json::from_slice(&fs::read(REPORT).unwrap()).unwrap();
-        let frames = &report["frames"];
-        let dropped: u64 = frames["dropped"].as_object().unwrap().values().map(|count| count.as_u64().unwrap()).sum();
-        let accounted = frames["delivered"].as_u64().unwrap() + dropped + frames["in_flight"].as_u64().unwrap();
-        assert_eq!(frames["captured"].as_u64().unwrap(), accounted, "{frames}");
+        let ended = if interrupted { self.0.end_by(Signal::INT, HANG) } else { self.0.end(HANG) };
+        ended.done();
+        let report = json(REPORT);
+        assert_accounted(&report);
         report
     }
 }
 
 const REPORT: &str = "/tmp/report.json";
 
-/// Fails the test unless the program did well.
-pub fn succeeded(ran: &Output) {
-    assert!(ran.status.success(), "{}: {}", ran.status, String::from_utf8_lossy(&ran.stderr));
-}
-
-/// A program that runs beside the test, and ends with it.
-pub struct Beside(Option<Child>);
-
-impl Beside {
-    /// Starts it.
-    pub fn start(mut command: Command) -> Self {
-        Self(Some(command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap()))
-    }
-
-    /// Its number.
-    pub fn id(&self) -> u32 {
-        self.0.as_ref().unwrap().id()
-    }
-
-    /// Whether it still runs.
-    pub fn runs(&mut self) -> bool {
-        self.0.as_mut().unwrap().try_wait().unwrap().is_none()
-    }
-
-    /// Waits for its end.
-    pub fn end(mut self) -> Output {
-        until("the program ends", || !self.runs());
-        self.0.take().unwrap().wait_with_output().unwrap()
-    }
-
-    /// Asks it to end, as Ctrl-C does, and waits for that.
-    pub fn interrupt(self) -> Output {
-        sh(&format!("kill -INT {}", self.id()));
-        self.end()
-    }
-}
-
-impl Drop for Beside {
-    fn drop(&mut self) {
-        if let Some(mut child) = self.0.take() {
-            let _ = child.kill();
-            let _ = child.wait();
-        }
-    }
-}
-
 /// Waits until something is so; says how long that took.
-pub fn until(what: &str, mut is: impl FnMut() -> bool) {
-    let began = Instant::now();
-    while !is() {
-        assert!(began.elapsed() < HANG, "not within {HANG:?}: {what}");
-        std::thread::sleep(Duration::from_millis(5));
-    }
-    println!("{what}: after {:?}", began.elapsed());
+pub fn until(what: &str, is: impl FnMut() -> bool) {
+    println!("{what}: after {:?}", program::until(what, HANG, is));
 }
 
 /// What is asked of a camera.

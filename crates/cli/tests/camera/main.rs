@@ -15,5 +15,7 @@ mod knobs;
 mod machine;
 mod modes;
 mod plate;
+#[path = "../common/program.rs"]
+mod program;
 mod two_eyes;
 mod virtual_camera;

@@ -15,7 +15,10 @@ use bokehcam::sink::{Ending, Options, Target};
 use bokehcam::v4l2::live::hold::Held;
 use bokehcam::v4l2::node::nodes;
 
-use super::machine::{CAMERA, Ends, Machine, VIRTUAL, bokehcam, sh, until};
+use rustix::process::Signal;
+
+use super::machine::{CAMERA, Ends, HANG, Machine, VIRTUAL, bokehcam, sh, until};
+use super::program::Beside;
 
 #[test]
 #[ignore = "needs the camera VM (tests/vm/run)"]
@@ -74,8 +77,8 @@ fn a_stream_tells_a_person_to_step_out_and_makes_a_portrait() {
         });
         let arguments =
             format!("stream {VIRTUAL} --depth plate --coc-at-infinity 6 --quality draft --to {}/", folder.display());
-        let mut program = bokehcam(&arguments).stderr(Stdio::piped()).spawn().unwrap();
-        let mut said = BufReader::new(program.stderr.take().unwrap()).lines().map_while(Result::ok);
+        let mut program = Beside::start(bokehcam(&arguments).stderr(Stdio::piped()));
+        let mut said = BufReader::new(program.0.stderr.take().unwrap()).lines().map_while(Result::ok);
         let mut hears = |part: &str| {
             assert!(
                 said.by_ref().inspect(|line| println!("{line}")).any(|line| line.contains(part)),
@@ -97,8 +100,7 @@ fn a_stream_tells_a_person_to_step_out_and_makes_a_portrait() {
             };
             newest().as_ref().and_then(count) > before.as_ref().and_then(count).map(|count| count + 20)
         });
-        sh(&format!("kill -INT {}", program.id()));
-        assert!(program.wait().unwrap().success());
+        program.end_by(Signal::INT, HANG).done();
         let blurred = still::read_color(&newest().unwrap()).unwrap();
         let shown = picture(true);
         let change = |of: bool| {

@@ -2,7 +2,7 @@
 
 use bokehcam::v4l2::{Device, controls};
 
-use super::machine::{HANG, Machine, Stream, VERSIONS, bokehcam, sh};
+use super::machine::{HANG, Machine, Stream, VERSIONS, run, sh};
 
 const RIGHT: &str = "/dev/video1";
 /// Two cameras, each with an HDMI input that has 30 frames per second at any size.
@@ -65,7 +65,6 @@ fn cameras_without_a_size_in_common_are_refused() {
     let _machine = machine();
     // A webcam's sizes beside one that gives what its cable carries.
     sh("v4l2-ctl -d /dev/video0 -i 0 && v4l2-ctl -d /dev/video0 --set-fmt-video width=640,height=360");
-    let ran = bokehcam("stream 0,1 --rectified --effect none --size 333x177 --frames 3 --to null").output().unwrap();
-    let said = String::from_utf8_lossy(&ran.stderr).into_owned();
-    assert!(!ran.status.success() && said.contains("both eyes need one size"), "{said}");
+    let ran = run("stream 0,1 --rectified --effect none --size 333x177 --frames 3 --to null");
+    assert!(ran.code != 0 && ran.stderr.contains("both eyes need one size"), "{}", ran.stderr);
 }

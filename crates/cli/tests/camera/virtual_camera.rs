@@ -11,8 +11,8 @@ use bokehcam::v4l2::FourCc;
 use bokehcam::v4l2::node::nodes;
 
 use super::machine::{
-    BARS, Beside, CAMERA, Lost, Machine, Stream, VERSIONS, VIRTUAL, bokehcam, distance_from, frame, frame_now, open,
-    sh, succeeded, until, wish,
+    BARS, CAMERA, Lost, Machine, Stream, VERSIONS, VIRTUAL, beside, distance_from, frame, frame_now, open, run, sh,
+    until, wish,
 };
 
 /// Through two conversions of colours.
@@ -182,13 +182,16 @@ fn readers_come_and_go() {
         machine.loopback(version);
         machine.at_30_fps();
         let stream = Stream::show("0 --size 320x180 --fps 30 --effect none");
-        let mut read = Command::new("v4l2-ctl");
-        read.args(["-d", VIRTUAL, "--stream-mmap", "--stream-count=1000"]);
+        let read = || {
+            let mut read = Command::new("v4l2-ctl");
+            read.args(["-d", VIRTUAL, "--stream-mmap", "--stream-count=1000"]);
+            read
+        };
         let mut lost = Lost::default();
         for _ in 0..3 {
             sh(&format!("timeout 120 v4l2-ctl -d {VIRTUAL} --stream-mmap --stream-count=10 2>&1"));
             // Killed in the middle, as a browser is.
-            let killed = Beside::start(clone(&read));
+            let killed = beside(read());
             std::thread::sleep(Duration::from_millis(600));
             drop(killed);
             let mut reader = open(VIRTUAL, wish((320, 180), 30.0, yuyv()));
@@ -216,21 +219,14 @@ fn off_is_off_for_readers_while_nobody_reads_another_output() {
     let mut reader = open(VIRTUAL, wish((320, 180), 30.0, yuyv()));
     let mut shows_bars = || distance_from(&frame(&mut reader).0, &BARS, MARGIN_PX) <= STEP;
     until("the camera's picture", &mut shows_bars);
-    let off = bokehcam("ctl off").output().unwrap();
-    let said = String::from_utf8_lossy(&off.stderr);
-    assert!(off.status.success() && said.contains("standard output: busy"), "{said}");
+    let off = run("ctl off");
+    assert!(off.done().contains("standard output: busy"), "{}", off.stderr);
     // What was under way to the reader when the answer came.
     until("the card", || !shows_bars());
     assert!((0..20).all(|_| !shows_bars()), "a picture after the card");
-    assert!(bokehcam("ctl on").output().unwrap().status.success());
+    run("ctl on").done();
     until("the camera's picture again", &mut shows_bars);
     stream.report(true);
-}
-
-fn clone(command: &Command) -> Command {
-    let mut other = Command::new(command.get_program());
-    other.args(command.get_args());
-    other
 }
 
 #[test]
@@ -243,7 +239,7 @@ fn jpegs_of_a_camera_are_decoded() {
     let mut ffmpeg = Command::new("ffmpeg");
     let arguments = "-v error -re -loop 1 -framerate 30 -i /tmp/bars.ppm -c:v mjpeg -huffman default -pix_fmt yuvj422p -q:v 2 -f v4l2";
     ffmpeg.args(arguments.split(' ')).arg(VIRTUAL);
-    let mut ffmpeg = Beside::start(ffmpeg);
+    let mut ffmpeg = beside(ffmpeg);
     until("ffmpeg writes", || {
         assert!(ffmpeg.runs());
         nodes().iter().any(|node| node.path.to_str() == Some(VIRTUAL) && node.captures)
@@ -258,10 +254,7 @@ fn jpegs_of_a_camera_are_decoded() {
     }
     assert!(lost.corrupt <= 1, "all but perhaps the first, which may be an old one: {lost:?}");
     drop(camera);
-    let ran = super::machine::bokehcam(&format!("stream {VIRTUAL} --format MJPG --effect none --frames 10 --to null"))
-        .output()
-        .unwrap();
-    succeeded(&ran);
+    run(&format!("stream {VIRTUAL} --format MJPG --effect none --frames 10 --to null")).done();
     assert!(resolve_is_real(), "the camera goes before the virtual one");
 }
 

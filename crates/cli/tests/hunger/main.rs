@@ -1,12 +1,14 @@
 //! What files of others may cost: memory stays within what is stated, whatever they claim, and nothing but files is read.
 #![allow(missing_docs, unsafe_code)]
 
+#[path = "../common/program.rs"]
+mod program;
+
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::fs::{self, File};
 use std::io::Write;
 use std::os::unix::fs::symlink;
 use std::path::Path;
-use std::process::{Command, Stdio};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, MutexGuard};
 
@@ -15,6 +17,8 @@ use bokehcam::recording::still::{read_color, read_depth, read_grey, write_color}
 use bokehcam::recording::{Options, Recording, RecordingError};
 use bokehcam::{calibration, recording::geometry::Geometry};
 use tempfile::TempDir;
+
+use program::{Home, Ran};
 
 /// Counts what is taken, and the most that was taken at once.
 struct Counting;
@@ -212,8 +216,8 @@ fn only_files_are_read() {
 #[test]
 fn settings_are_a_file_of_a_sensible_size() {
     let _alone = alone();
-    let dir = TempDir::new().unwrap();
-    let at = |name: &str| dir.path().join(name);
+    let home = Home::new();
+    let at = |name: &str| home.path(name);
     let presets: String = (0..60_000).map(|n| format!("[presets.p{n}]\nrim = 0.1\n")).collect();
     fs::write(at("long.toml"), presets).unwrap();
     rustix::fs::mkfifoat(rustix::fs::CWD, at("pipe.toml"), rustix::fs::Mode::RUSR | rustix::fs::Mode::WUSR).unwrap();
@@ -221,12 +225,9 @@ fn settings_are_a_file_of_a_sensible_size() {
     for (file, says) in
         [("long.toml", "it is too large"), ("pipe.toml", "it is a pipe"), ("zeros.toml", "it is a device")]
     {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_bokehcam"));
-        command.env_clear().env("XDG_CONFIG_HOME", dir.path()).current_dir(dir.path()).stdin(Stdio::null());
-        let output = command.args(["config", "dump", "--config", file]).output().unwrap();
-        let stderr = String::from_utf8(output.stderr).unwrap();
-        assert!(!output.status.success() && stderr.lines().count() == 1, "{stderr}");
-        assert!(stderr.contains(file) && stderr.contains(says), "{stderr}");
+        let ran = home.run(&["config", "dump", "--config", file]);
+        assert_ne!(ran.code, 0);
+        ran.refused(ran.code, &[file, says]);
     }
 }
 
@@ -234,21 +235,16 @@ fn settings_are_a_file_of_a_sensible_size() {
 #[test]
 fn a_picture_that_is_larger_than_memory_is_refused() {
     let _alone = alone();
-    let dir = TempDir::new().unwrap();
-    save_wide(&dir.path().join("wide.png"), 5000, png::ColorType::Grayscale);
+    let home = Home::new();
+    save_wide(&home.path("wide.png"), 5000, png::ColorType::Grayscale);
     let blur = "--effect blur --coc-at-infinity 2 --backend cpu";
     for (limit_kb, size, command) in [
         (1_500_000, "5000x5000", format!("render wide.png {blur} --out out.png")),
         // More than the blur of a picture takes, and less than a stream of them.
         (3_000_000, "5000x5000", format!("stream synthetic --size 5000x5000 {blur} --frames 1 --to out.y4m")),
     ] {
-        let line = format!("ulimit -v {limit_kb}; exec '{}' {command}", env!("CARGO_BIN_EXE_bokehcam"));
-        let mut shell = Command::new("sh");
-        shell.args(["-c", &line]).env("XDG_CONFIG_HOME", dir.path()).current_dir(dir.path()).stdin(Stdio::null());
-        let output = shell.output().unwrap();
-        let stderr = String::from_utf8(output.stderr).unwrap();
-        assert_eq!((output.status.code(), stderr.lines().count()), (Some(1), 1), "{stderr}");
-        assert!(stderr.contains(size) && stderr.contains("MB are free"), "{stderr}");
-        assert!(!dir.path().join("out.png").exists() && !dir.path().join("out.y4m").exists());
+        let ran = Ran::of(&mut home.shell(&format!("ulimit -v {limit_kb};"), &command));
+        ran.refused(1, &[size, "MB are free"]);
+        assert!(!home.path("out.png").exists() && !home.path("out.y4m").exists());
     }
 }

@@ -9,6 +9,7 @@ use bokehcam::sink::{Options, PipeWire, Sink};
 use rustix::fs::inotify;
 use serde_json::Value;
 
+use super::program::{Ran, bokehcam};
 use super::readers::GStreamer;
 use super::session::{FPS, PICTURES, Player, SIZE, folder, kill, node, picture, state, until, yuyv};
 
@@ -233,9 +234,8 @@ fn off_is_off_for_readers_while_another_output_hangs() {
     for _ in 0..8 {
         last = until("another picture", || reader.frames().pop().filter(|frame| *frame != last));
     }
-    let off = Command::new(env!("CARGO_BIN_EXE_bokehcam")).args(["ctl", "--name", "hung", "off"]).output().unwrap();
-    let said = String::from_utf8_lossy(&off.stderr);
-    assert!(off.status.success() && said.contains("call.mp4: busy"), "{said}");
+    let off = Ran::of(&mut bokehcam(&["ctl", "--name", "hung", "off"]));
+    assert!(off.done().contains("call.mp4: busy"), "{}", off.stderr);
     let before = reader.frames().len();
     // What the reader was about to write when the answer came may be a picture still.
     let after = until("more pictures", || Some(reader.frames()).filter(|frames| frames.len() > before + 4));

@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 use std::io::{BufRead, BufReader};
-use std::process::{Child, Command, Stdio};
+use std::process::{Command, Stdio};
 use std::sync::mpsc;
 use std::time::Duration;
 
@@ -12,6 +12,7 @@ use bokehcam::pipewire::mode::{Agreed, Mode, Offer};
 use bokehcam::pipewire::reader::{Frame, Reader, Take};
 use bokehcam::sink::{Options, PipeWire, Sink};
 
+use super::program::Beside;
 use super::session::{folder, until};
 
 const SIZE: (u32, u32) = (1280, 720);
@@ -52,7 +53,7 @@ fn the_other_program() {
 
 /// The other program at work; dropped, it is ended.
 struct Other {
-    child: Child,
+    _program: Beside,
     told: mpsc::Receiver<(u64, u64)>,
     /// What was heard and not asked for yet.
     heard: VecDeque<(u64, u64)>,
@@ -60,14 +61,11 @@ struct Other {
 
 impl Other {
     fn start(camera: &str) -> Self {
-        let mut child = Command::new(std::env::current_exe().unwrap())
-            .args(["--ignored", "--exact", "delay::the_other_program", "--nocapture"])
-            .env("CAMERA_TO_TIME", camera)
-            .stdout(Stdio::piped())
-            .spawn()
-            .unwrap();
+        let mut command = Command::new(std::env::current_exe().unwrap());
+        command.args(["--ignored", "--exact", "delay::the_other_program", "--nocapture"]);
+        let mut program = Beside::start(command.env("CAMERA_TO_TIME", camera).stdout(Stdio::piped()));
         let (to, told) = mpsc::channel();
-        let lines = BufReader::new(child.stdout.take().unwrap()).lines().map_while(Result::ok);
+        let lines = BufReader::new(program.0.stdout.take().unwrap()).lines().map_while(Result::ok);
         std::thread::spawn(move || {
             let numbers = lines.filter_map(|line| {
                 let (captured, delay) = line.split_once(' ')?;
@@ -75,20 +73,13 @@ impl Other {
             });
             numbers.for_each(|told| to.send(told).unwrap_or_default());
         });
-        Self { child, told, heard: VecDeque::new() }
+        Self { _program: program, told, heard: VecDeque::new() }
     }
 
     /// Whether it has got the picture of this time, and then how long that took.
     fn got(&mut self, captured_ns: u64) -> Option<u64> {
         self.heard.extend(self.told.try_iter());
         self.heard.iter().find(|told| told.0 == captured_ns).map(|told| told.1)
-    }
-}
-
-impl Drop for Other {
-    fn drop(&mut self) {
-        let _ = self.child.kill();
-        let _ = self.child.wait();
     }
 }
 

@@ -4,6 +4,7 @@ use std::process::Command;
 
 use bokehcam::frame::ColorImage;
 
+use super::program::run;
 use super::readers::GStreamer;
 use super::session::{PICTURES, Player, Run, graph, node, picture, state, until, yuyv};
 
@@ -83,8 +84,7 @@ fn who_asks_for_the_camera_is_given_the_filter() {
 #[test]
 fn a_filter_is_for_a_camera_as_pipewire_has_it() {
     for arguments in [&["demo", "--to", "filter"][..], &["pipewire:cam", "--to", "filter", "--to", "filter"]] {
-        let ran = Command::new(env!("CARGO_BIN_EXE_bokehcam")).arg("stream").args(arguments).output().unwrap();
-        let said = String::from_utf8(ran.stderr).unwrap();
-        assert!(ran.status.code() == Some(2) && said.starts_with("error: --to filter: "), "{said}");
+        let ran = run(&[&["stream"], arguments].concat());
+        assert!(ran.code == 2 && ran.stderr.starts_with("error: --to filter: "), "{}", ran.stderr);
     }
 }

@@ -11,6 +11,8 @@ mod camera;
 mod delay;
 #[cfg(feature = "camera")]
 mod filter;
+#[path = "../common/program.rs"]
+mod program;
 mod readers;
 mod session;
 #[cfg(feature = "camera")]

@@ -1,7 +1,8 @@
 //! Programs that read from a camera of PipeWire's.
 
-use std::process::{Child, Command, Stdio};
+use std::process::{Command, Stdio};
 
+use super::program::Beside;
 use super::session::{SIZE, until};
 
 const FRAME_BYTES: usize = 2 * (SIZE.0 * SIZE.1) as usize;
@@ -18,7 +19,7 @@ pub struct Got {
 
 /// GStreamer, which reads some pictures and ends.
 pub struct GStreamer {
-    child: Child,
+    program: Beside,
     folder: tempfile::TempDir,
 }
 
@@ -27,19 +28,18 @@ impl GStreamer {
     pub fn start(node: &str, pictures: usize) -> Self {
         let folder = tempfile::tempdir().unwrap();
         let caps = format!("video/x-raw,format=YUY2,width={},height={}", SIZE.0, SIZE.1);
-        let child = Command::new("gst-launch-1.0")
+        let mut command = Command::new("gst-launch-1.0");
+        command
             .args(["-v", "pipewiresrc", &format!("target-object={node}"), &format!("num-buffers={pictures}")])
             .args(["!", &caps, "!", "identity", "silent=false", "!", "filesink"])
             .arg(format!("location={}", folder.path().join("frames").display()))
             .stdout(std::fs::File::create(folder.path().join("said")).unwrap())
-            .stderr(Stdio::null())
-            .spawn()
-            .unwrap();
-        Self { child, folder }
+            .stderr(Stdio::null());
+        Self { program: Beside::start(&mut command), folder }
     }
 
     pub fn is_reading(&mut self) -> bool {
-        self.child.try_wait().unwrap().is_none()
+        self.program.runs()
     }
 
     /// What it has got so far.
@@ -64,13 +64,6 @@ impl GStreamer {
             sequence: chained.iter().map(|line| field(line, "offset: ").parse().unwrap()).collect(),
             times_ns: chained.iter().map(|line| nanoseconds(&field(line, "pts: "))).collect(),
         }
-    }
-}
-
-impl Drop for GStreamer {
-    fn drop(&mut self) {
-        let _ = self.child.kill();
-        let _ = self.child.wait();
     }
 }
 

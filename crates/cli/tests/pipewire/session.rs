@@ -2,11 +2,14 @@
 
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Stdio};
-use std::time::{Duration, Instant};
+use std::process::{Command, Stdio};
+use std::time::Duration;
 
 use bokehcam::frame::ColorImage;
+use rustix::process::Signal;
 use serde_json::Value;
+
+use super::program::{Beside, assert_accounted, bokehcam, found, json};
 
 /// Nothing takes so long, on a busy machine neither: this is against a hang.
 pub const PATIENCE: Duration = Duration::from_secs(120);
@@ -22,15 +25,9 @@ pub fn folder() -> PathBuf {
 }
 
 /// Waits until `is` gives something.
-pub fn until<T>(what: &str, mut is: impl FnMut() -> Option<T>) -> T {
-    let began = Instant::now();
-    loop {
-        if let Some(found) = is() {
-            return found;
-        }
-        assert!(began.elapsed() < PATIENCE, "this took too long: {what}");
-        std::thread::sleep(Duration::from_millis(20));
-    }
+#[track_caller]
+pub fn until<T>(what: &str, is: impl FnMut() -> Option<T>) -> T {
+    found(what, PATIENCE, is)
 }
 
 /// Everything in the graph, as PipeWire's own program tells it.
@@ -93,7 +90,7 @@ pub fn recording(folder: &Path) -> PathBuf {
 
 /// This program at work.
 pub struct Run {
-    child: Child,
+    program: Beside,
     folder: tempfile::TempDir,
 }
 
@@ -103,15 +100,10 @@ impl Run {
     }
 
     fn start_in(folder: tempfile::TempDir, arguments: &[&str]) -> Self {
-        let child = Command::new(env!("CARGO_BIN_EXE_bokehcam"))
-            .args(arguments)
-            .args(["--quiet", "--report"])
-            .arg(folder.path().join("report.json"))
-            .stdout(Stdio::null())
-            .stderr(fs::File::create(folder.path().join("said")).unwrap())
-            .spawn()
-            .unwrap();
-        Self { child, folder }
+        let mut command = bokehcam(arguments);
+        command.args(["--quiet", "--report"]).arg(folder.path().join("report.json")).stdout(Stdio::null());
+        let said = fs::File::create(folder.path().join("said")).unwrap();
+        Self { program: Beside::start(command.stderr(said)), folder }
     }
 
     fn said(&self) -> String {
@@ -120,26 +112,23 @@ impl Run {
 
     /// Whether it has ended.
     pub fn is_over(&mut self) -> bool {
-        self.child.try_wait().unwrap().is_some()
+        !self.program.runs()
     }
 
     /// Waits for its end by an error of run time or of usage; returns what it said.
     pub fn refused(mut self) -> String {
-        let ended = until("the refusal", || self.child.try_wait().unwrap());
+        let ended = until("the refusal", || self.program.0.try_wait().unwrap());
         assert!(matches!(ended.code(), Some(1 | 2)), "{ended}");
         self.said()
     }
 
     /// Waits for its own end; returns its report.
     pub fn ended(mut self) -> Value {
-        let ended = until("the end of the run", || self.child.try_wait().unwrap());
+        let ended = until("the end of the run", || self.program.0.try_wait().unwrap());
         assert!(ended.success(), "{ended}: {}", self.said());
-        let report: Value = serde_json::from_slice(&fs::read(self.folder.path().join("report.json")).unwrap()).unwrap();
-        let frames = &report["frames"];
-        let number = |value: &Value| value.as_u64().unwrap();
-        let dropped: u64 = frames["dropped"].as_object().unwrap().values().map(number).sum();
-        let balanced = number(&frames["delivered"]) + dropped + number(&frames["in_flight"]);
-        assert_eq!(number(&frames["captured"]), balanced, "{frames}");
+        let report = json(self.folder.path().join("report.json"));
+        assert_accounted(&report);
+        let (frames, number) = (&report["frames"], |value: &Value| value.as_u64().unwrap());
         for node in report["pipewire"].as_array().into_iter().flatten() {
             let put: u64 = ["shown", "unwatched", "overtaken", "no_buffer"].iter().map(|key| number(&node[key])).sum();
             // The last one may be on its way.
@@ -150,15 +139,8 @@ impl Run {
 
     /// Ends it as Ctrl-C does; returns its report.
     pub fn end(self) -> Value {
-        assert!(Command::new("kill").args(["-INT", &self.child.id().to_string()]).status().unwrap().success());
+        self.program.signal(Signal::INT);
         self.ended()
-    }
-}
-
-impl Drop for Run {
-    fn drop(&mut self) {
-        let _ = self.child.kill();
-        let _ = self.child.wait();
     }
 }
 
@@ -178,9 +160,7 @@ impl Player {
 
     /// The program that it has started.
     pub fn child(&self) -> String {
-        let tasks = fs::read_dir(format!("/proc/{}/task", self.0.child.id())).unwrap().flatten();
-        let children = tasks.filter_map(|task| fs::read_to_string(task.path().join("children")).ok());
-        children.collect::<String>().split_whitespace().next().expect("a child").to_owned()
+        self.0.program.children()[0].as_raw_nonzero().to_string()
     }
 
     /// Where the recording lies.

@@ -1,15 +1,16 @@
 //! This program as a reader: GStreamer stands for the camera.
 
-use std::process::{Child, Command, Stdio};
+use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
 use serde_json::Value;
 
+use super::program::{Beside, Ran, bokehcam};
 use super::session::{Run, folder, node, until};
 
 /// A camera that another program gives.
 struct Camera {
-    program: Child,
+    program: Beside,
     caps: String,
     color: u32,
 }
@@ -22,8 +23,9 @@ impl Camera {
         camera
     }
 
-    fn program(caps: &str, color: u32) -> Child {
-        Command::new("gst-launch-1.0")
+    fn program(caps: &str, color: u32) -> Beside {
+        let mut command = Command::new("gst-launch-1.0");
+        command
             .args(["-q", "videotestsrc", "is-live=true", "pattern=solid-color"])
             .arg(format!("foreground-color={color}"))
             .args(["!", caps, "!", "pipewiresink", "mode=provide"])
@@ -31,9 +33,8 @@ impl Camera {
                 "stream-properties=p,media.class=Video/Source,media.role=Camera,node.name=cam,node.description=Front-camera",
             )
             .stdout(Stdio::null())
-            .stderr(Stdio::null())
-            .spawn()
-            .unwrap()
+            .stderr(Stdio::null());
+        Beside::start(&mut command)
     }
 
     /// Waits until `is` gives something of what is read from it. GStreamer's camera stands still for good once a busy machine
@@ -42,20 +43,13 @@ impl Camera {
         let mut began = Instant::now();
         until(what, || {
             if began.elapsed() > Duration::from_secs(20) {
-                let _ = self.program.kill();
-                let _ = self.program.wait();
+                self.program.0.kill().unwrap();
+                self.program.0.wait().unwrap();
                 self.program = Self::program(&self.caps, self.color);
                 began = Instant::now();
             }
             is()
         })
-    }
-}
-
-impl Drop for Camera {
-    fn drop(&mut self) {
-        let _ = self.program.kill();
-        let _ = self.program.wait();
     }
 }
 
@@ -112,8 +106,7 @@ fn every_format_is_read_in_its_colours() {
 fn a_camera_is_listed_and_read_at_its_rate() {
     folder();
     let mut camera = Camera::start(RAW, BLUE);
-    let listed = Command::new(env!("CARGO_BIN_EXE_bokehcam")).args(["devices", "--json"]).output().unwrap();
-    let listed: Value = serde_json::from_slice(&listed.stdout).unwrap();
+    let listed = Ran::of(&mut bokehcam(&["devices", "--json"])).json();
     let told = &listed["pipewire"][0];
     assert_eq!((&told["name"], &told["label"]), (&"pipewire:cam".into(), &"Front-camera".into()));
     assert_eq!(told["formats"][0]["fourcc"], "YUYV");

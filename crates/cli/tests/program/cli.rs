@@ -1,46 +1,13 @@
 //! The program as its user meets it: what it prints, what it refuses, and with which exit code.
 
 use std::fs;
-use std::path::Path;
-use std::process::{Command, Output, Stdio};
+
+use crate::program::{Home, Ran, run};
 
 mod commands;
 #[cfg(feature = "camera")]
 mod report;
 mod service;
-
-/// The program in an empty world: no settings of whoever runs the tests reach it.
-fn bokehcam(home: &Path, args: &[&str]) -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_bokehcam"));
-    for (name, _) in std::env::vars_os() {
-        if name.to_string_lossy().starts_with("BOKEHCAM_") {
-            command.env_remove(name);
-        }
-    }
-    command.env("XDG_CONFIG_HOME", home).env_remove("RUST_LOG").args(args).stdin(Stdio::null());
-    command
-}
-
-struct Ran {
-    code: i32,
-    stdout: String,
-    stderr: String,
-}
-
-impl From<Output> for Ran {
-    fn from(output: Output) -> Self {
-        Self {
-            code: output.status.code().expect("ended by itself"),
-            stdout: String::from_utf8(output.stdout).unwrap(),
-            stderr: String::from_utf8(output.stderr).unwrap(),
-        }
-    }
-}
-
-fn run(args: &[&str]) -> Ran {
-    let home = tempfile::tempdir().unwrap();
-    bokehcam(home.path(), args).output().unwrap().into()
-}
 
 /// The value of a setting, and where it comes from, as `config dump` prints them.
 fn dumped(dump: &str, name: &str) -> (String, String) {
@@ -87,7 +54,10 @@ fn the_version_is_the_packages() {
 #[test]
 fn wrong_arguments_cost_one_line_and_exit_code_2() {
     let cases: [(&[&str], &str); 31] = [
-        (&["stream", "Cargo.toml", "--to", "null"], "a folder with a recording, demo or synthetic"),
+        (
+            &["stream", concat!(env!("CARGO_MANIFEST_DIR"), "/Cargo.toml"), "--to", "null"],
+            "a folder with a recording, demo or synthetic",
+        ),
         (&["stream", "synthetic", "--to", "film.avi"], "FILE.mp4"),
         (&["stream", "synthetic", "--to", "null", "--loop", "--frames", "1"], "--loop are for recordings"),
         (&["stream", "demo", "--to", "null", "--start", "1", "--frames", "1"], "demo never ends"),
@@ -120,10 +90,8 @@ fn wrong_arguments_cost_one_line_and_exit_code_2() {
         (&["config", "dump", "--coc-at-infinity", "9", "--f-number", "2"], "--f-number"),
     ];
     for (args, accepted) in cases {
-        let refused = run(args);
-        assert_eq!((refused.code, refused.stdout.as_str()), (2, ""), "{args:?}: {}", refused.stderr);
-        assert!(refused.stderr.starts_with("error: ") && refused.stderr.contains(accepted), "{}", refused.stderr);
-        assert_eq!(refused.stderr.lines().count(), 1, "{}", refused.stderr);
+        println!("{args:?}");
+        run(args).refused(2, &[accepted]);
     }
 }
 
@@ -140,31 +108,29 @@ fn what_a_camera_cannot_do_is_said_in_one_line() {
         (&["--control", "a=1,b=2", "--format", "YUYV", "--size", "640x480"], 1, "/dev/null: this is no camera"),
     ];
     for (more, code, told) in cases {
-        let refused = run(&[&["stream", "/dev/null", "--to", "null"], more].concat());
-        assert_eq!((refused.code, refused.stdout.as_str()), (code, ""), "{more:?}: {}", refused.stderr);
-        assert!(refused.stderr.starts_with("error: ") && refused.stderr.contains(told), "{}", refused.stderr);
-        assert_eq!(refused.stderr.lines().count(), 1, "{}", refused.stderr);
+        println!("{more:?}");
+        run(&[&["stream", "/dev/null", "--to", "null"], more].concat()).refused(code, &[told]);
     }
 }
 
 #[test]
 fn a_flag_goes_before_the_environment_before_the_file_before_the_default() {
-    let home = tempfile::tempdir().unwrap();
+    let home = Home::new();
     let dump = |flags: &[&str], environment: bool| {
-        let mut command = bokehcam(home.path(), &[&["config", "dump"], flags].concat());
+        let mut command = home.command(&[&["config", "dump"], flags].concat());
         if environment {
             command.env("BOKEHCAM_RIM", "0.3").env("BOKEHCAM_LOOP", "true");
         }
-        let ran = Ran::from(command.output().unwrap());
-        assert_eq!((ran.code, ran.stderr.as_str()), (0, ""));
+        let ran = Ran::of(&mut command);
+        assert_eq!(ran.done(), "");
         ran.stdout
     };
     let pair = |value: &str, origin: &str| (value.to_string(), origin.to_string());
     assert_eq!(dumped(&dump(&[], false), "rim").1, "default");
     assert_eq!(dumped(&dump(&[], false), "quality"), ("\"auto\"".to_string(), "default".to_string()));
 
-    fs::create_dir(home.path().join("bokehcam")).unwrap();
-    fs::write(home.path().join("bokehcam/config.toml"), "rim = 0.4\nrank = \"full\"\n").unwrap();
+    fs::create_dir_all(home.settings().parent().unwrap()).unwrap();
+    fs::write(home.settings(), "rim = 0.4\nrank = \"full\"\n").unwrap();
     assert_eq!(dumped(&dump(&[], false), "rim"), pair("0.4", "file"));
     assert_eq!(dumped(&dump(&[], false), "rank"), pair("\"full\"", "file"));
     assert_eq!(dumped(&dump(&[], true), "rim"), pair("0.3", "environment"));
@@ -176,26 +142,22 @@ fn a_flag_goes_before_the_environment_before_the_file_before_the_default() {
 
 #[test]
 fn a_flag_sets_aside_what_it_excludes_in_the_file() {
-    let home = tempfile::tempdir().unwrap();
-    let file = home.path().join("mine.toml");
-    fs::write(&file, "coc-at-infinity = 20\n").unwrap();
-    let args = ["config", "dump", "--config", file.to_str().unwrap(), "--f-number", "2"];
-    let ran = Ran::from(bokehcam(home.path(), &args).output().unwrap());
-    assert_eq!((ran.code, ran.stderr.as_str()), (0, ""));
+    let home = Home::new();
+    fs::write(home.path("mine.toml"), "coc-at-infinity = 20\n").unwrap();
+    let ran = home.run(&["config", "dump", "--config", "mine.toml", "--f-number", "2"]);
+    assert_eq!(ran.done(), "");
     assert_eq!(dumped(&ran.stdout, "f-number"), ("2".to_string(), "flag".to_string()));
     assert!(!ran.stdout.contains("\nblur = "), "{}", ran.stdout);
 }
 
 #[test]
 fn the_dump_is_a_settings_file_that_dumps_the_same() {
-    let home = tempfile::tempdir().unwrap();
+    let home = Home::new();
     let flags = ["config", "dump", "--aperture", "polygon:6:15", "--focus", "0.5,0.25", "--force", "--intensity=-0.5"];
-    let first = Ran::from(bokehcam(home.path(), &flags).output().unwrap());
-    let file = home.path().join("saved.toml");
-    fs::write(&file, &first.stdout).unwrap();
-    let again = bokehcam(home.path(), &["--config", file.to_str().unwrap(), "config", "dump"]);
-    let second = Ran::from({ again }.output().unwrap());
-    assert_eq!((second.code, second.stderr.as_str()), (0, ""));
+    let first = home.run(&flags);
+    fs::write(home.path("saved.toml"), &first.stdout).unwrap();
+    let second = home.run(&["--config", "saved.toml", "config", "dump"]);
+    assert_eq!(second.done(), "");
     let values = |dump: &str| {
         let lines = dump.lines().filter(|line| !line.starts_with('#') && !line.is_empty());
         lines.map(|line| line.rsplit_once(" # ").unwrap().0.to_string()).collect::<Vec<_>>()
@@ -207,15 +169,10 @@ fn the_dump_is_a_settings_file_that_dumps_the_same() {
 
 #[test]
 fn an_unknown_key_in_the_file_is_named_with_its_line() {
-    let home = tempfile::tempdir().unwrap();
-    let file = home.path().join("mine.toml");
-    fs::write(&file, "rim = 0.1\n\napertur = \"disc\"\n").unwrap();
-    let ran: Ran =
-        bokehcam(home.path(), &["config", "dump", "--config", file.to_str().unwrap()]).output().unwrap().into();
-    assert_eq!((ran.code, ran.stdout.as_str()), (2, ""));
-    assert!(ran.stderr.contains("mine.toml:3: ") && ran.stderr.contains("did you mean aperture?"), "{}", ran.stderr);
-    assert_eq!(ran.stderr.lines().count(), 1);
-
-    let ran: Ran = bokehcam(home.path(), &["config", "dump", "--config", "/nowhere.toml"]).output().unwrap().into();
+    let home = Home::new();
+    fs::write(home.path("mine.toml"), "rim = 0.1\n\napertur = \"disc\"\n").unwrap();
+    let dump = |file: &str| home.run(&["config", "dump", "--config", file]);
+    dump("mine.toml").refused(2, &["mine.toml:3: ", "did you mean aperture?"]);
+    let ran = dump("/nowhere.toml");
     assert!(ran.code != 0 && ran.stderr.contains("/nowhere.toml"), "{}", ran.stderr);
 }

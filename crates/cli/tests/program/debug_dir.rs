@@ -1,55 +1,48 @@
 //! `render --debug-dir`: a blur's intermediates, as their reader finds them.
 
 use std::fs;
-use std::path::Path;
-use std::process::{Command, Stdio};
+use std::path::{Path, PathBuf};
 
 use serde_json::Value;
-use tempfile::TempDir;
+
+use crate::program::{Home, Ran, json};
 
 /// A small picture with its depth: a person in focus, something in front, a room behind.
 struct Still {
-    home: TempDir,
+    home: Home,
 }
+
+const IMAGE: &str = "recording/rgb/000000.png";
+const DEPTH: &str = "recording/depth/000000.png";
 
 impl Still {
     fn new() -> Self {
-        let still = Self { home: tempfile::tempdir().unwrap() };
-        let folder = still.path("recording");
-        let (code, error) = still.run(&["record", "synthetic", "--size", "96x56", "--frames", "1", "--to", &folder]);
-        assert_eq!(code, 0, "{error}");
+        let still = Self { home: Home::new() };
+        still.run(&["record", "synthetic", "--size", "96x56", "--frames", "1", "--to", "recording"]).done();
         still
     }
 
-    fn path(&self, name: &str) -> String {
-        self.home.path().join(name).to_str().unwrap().to_string()
+    fn path(&self, name: &str) -> PathBuf {
+        self.home.path(name)
     }
 
-    /// Exit code and standard error, in an empty world.
-    fn run(&self, args: &[&str]) -> (i32, String) {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_bokehcam"));
-        for (name, _) in std::env::vars_os().filter(|(name, _)| name.to_string_lossy().starts_with("BOKEHCAM_")) {
-            command.env_remove(name);
-        }
-        command.env("XDG_CONFIG_HOME", self.home.path()).env_remove("RUST_LOG").args(args).stdin(Stdio::null());
-        let output = command.output().unwrap();
-        assert_eq!(output.stdout, b"");
-        (output.status.code().unwrap(), String::from_utf8(output.stderr).unwrap())
+    fn run(&self, args: &[&str]) -> Ran {
+        let ran = self.home.run(args);
+        assert_eq!(ran.stdout, "");
+        ran
     }
 
     /// Renders it into `out.png` with its insides in the folder `dir`.
-    fn render(&self, dir: &str, more: &[&str]) -> (i32, String) {
-        let [image, out, dir] = ["recording/rgb/000000.png", "out.png", dir].map(|name| self.path(name));
-        self.run(&[&["render", &image, "--out", &out, "--debug-dir", &dir], more].concat())
+    fn render(&self, dir: &str, more: &[&str]) -> Ran {
+        self.run(&[&["render", IMAGE, "--out", "out.png", "--debug-dir", dir], more].concat())
     }
 
-    fn render_depth(&self, dir: &str, more: &[&str]) -> (i32, String) {
-        let depth = self.path("recording/depth/000000.png");
-        self.render(dir, &[&["--depth-map", &depth, "--coc-at-infinity", "6", "--max-coc", "9"], more].concat())
+    fn render_depth(&self, dir: &str, more: &[&str]) -> Ran {
+        self.render(dir, &[&["--depth-map", DEPTH, "--coc-at-infinity", "6", "--max-coc", "9"], more].concat())
     }
 
     fn plan(&self, dir: &str) -> Value {
-        serde_json::from_slice(&fs::read(self.home.path().join(dir).join("plan.json")).unwrap()).unwrap()
+        json(self.path(dir).join("plan.json"))
     }
 
     fn picture(&self, name: &str) -> image::RgbImage {
@@ -72,10 +65,9 @@ fn names(dir: &Path, plan: &Value) -> [Vec<String>; 2] {
 #[test]
 fn every_intermediate_of_a_layered_blur_is_there_in_its_size() {
     let still = Still::new();
-    let (code, error) = still.render_depth("a/within", &[]);
-    assert_eq!(code, 0, "{error}");
+    still.render_depth("a/within", &[]).done();
     let plan = still.plan("a/within");
-    let [found, told] = names(&still.home.path().join("a/within"), &plan);
+    let [found, told] = names(&still.path("a/within"), &plan);
     assert_eq!(found, told);
 
     let bins = plan["bins"].as_array().unwrap();
@@ -111,7 +103,7 @@ fn every_intermediate_of_a_layered_blur_is_there_in_its_size() {
     }
     // What is hidden is replaced, all else stays.
     let [before, behind, hidden] =
-        ["recording/rgb/000000.png", "a/within/behind.png", "a/within/hidden.png"].map(|name| still.picture(name));
+        [IMAGE, "a/within/behind.png", "a/within/hidden.png"].map(|name| still.picture(name));
     let mut replaced = 0;
     for ((before, behind), hidden) in before.pixels().zip(behind.pixels()).zip(hidden.pixels()) {
         match hidden.0[0] {
@@ -123,10 +115,9 @@ fn every_intermediate_of_a_layered_blur_is_there_in_its_size() {
 
     // What is looked at is what is done without looking.
     let looked = still.picture("out.png");
-    let [image, depth, out] =
-        ["recording/rgb/000000.png", "recording/depth/000000.png", "plain.png"].map(|name| still.path(name));
-    let args = ["render", &image, "--depth-map", &depth, "--coc-at-infinity", "6", "--max-coc", "9", "--out", &out];
-    assert_eq!(still.run(&[&args[..], &["--backend", "cpu"]].concat()).0, 0);
+    let args =
+        ["render", IMAGE, "--depth-map", DEPTH, "--coc-at-infinity", "6", "--max-coc", "9", "--out", "plain.png"];
+    still.run(&[&args[..], &["--backend", "cpu"]].concat()).done();
     assert!(looked == still.picture("plain.png"));
 }
 
@@ -135,11 +126,10 @@ fn pictures_of_light_are_encoded_as_the_result_is() {
     let still = Still::new();
     for highlights in ["0", "8"] {
         let more = ["--effect", "blur", "--coc-at-infinity", "5", "--highlights", highlights, "--force"];
-        let (code, error) = still.render("within", &more);
-        assert_eq!(code, 0, "{error}");
+        still.render("within", &more).done();
         let plan = still.plan("within");
         assert_eq!((&plan["compositing"], &plan["filled"]), (&"select".into(), &false.into()));
-        let [found, told] = names(&still.home.path().join("within"), &plan);
+        let [found, told] = names(&still.path("within"), &plan);
         assert_eq!(found, told);
         let all = ["bin_0", "blur_0", "blur_coverage_0", "coc", "coverage_0", "radius_0"].map(|n| format!("{n}.png"));
         assert_eq!(
@@ -147,7 +137,7 @@ fn pictures_of_light_are_encoded_as_the_result_is() {
             all.iter().collect::<Vec<_>>()
         );
         // One bin at full scale with everything in it: before the filters it is the picture, after them the result.
-        for (inside, outside) in [("bin_0", "recording/rgb/000000.png"), ("blur_0", "out.png")] {
+        for (inside, outside) in [("bin_0", IMAGE), ("blur_0", "out.png")] {
             let [a, b] = [still.picture(&format!("within/{inside}.png")), still.picture(outside)];
             let most = a.iter().zip(b.iter()).map(|(a, b)| a.abs_diff(*b)).max();
             assert!(most <= Some(1), "{inside}, highlights {highlights}: {most:?}");
@@ -161,21 +151,19 @@ fn pictures_of_light_are_encoded_as_the_result_is() {
 #[test]
 fn what_is_in_focus_all_over_is_still_and_stays_bit_for_bit() {
     let still = Still::new();
-    let depth = still.path("plane.png");
-    image::ImageBuffer::from_pixel(96, 56, image::Luma([5000u16])).save(&depth).unwrap();
-    let (code, error) = still.render("within", &["--depth-map", &depth, "--focus", "1"]);
-    assert_eq!(code, 0, "{error}");
+    image::ImageBuffer::from_pixel(96, 56, image::Luma([5000u16])).save(still.path("plane.png")).unwrap();
+    still.render("within", &["--depth-map", "plane.png", "--focus", "1"]).done();
     assert_eq!(still.plan("within")["still_share"], 1.0);
     assert!(still.picture("within/still.png").iter().all(|&value| value == 255));
-    assert!(still.picture("out.png") == still.picture("recording/rgb/000000.png"));
+    assert!(still.picture("out.png") == still.picture(IMAGE));
 }
 
 #[test]
 fn methods_without_bins_have_what_there_is() {
     let still = Still::new();
-    let found = |dir: &str, (code, error): (i32, String)| {
-        assert_eq!(code, 0, "{error}");
-        names(&still.home.path().join(dir), &still.plan(dir))[0].clone()
+    let found = |dir: &str, ran: Ran| {
+        ran.done();
+        names(&still.path(dir), &still.plan(dir))[0].clone()
     };
     let gathered = found("gather", still.render_depth("gather", &["--method", "gather"]));
     assert_eq!(gathered, ["bin_0.png", "coc.png", "coverage_0.png", "plan.json"]);
@@ -191,10 +179,9 @@ fn methods_without_bins_have_what_there_is() {
 fn what_cannot_be_written_is_told_in_one_line_and_nothing_is() {
     let still = Still::new();
     fs::write(still.path("file"), "mine").unwrap();
-    let refused = |(code, error): (i32, String), expected: i32, told: &str| {
-        assert_eq!(code, expected, "{error}");
-        assert!(error.starts_with("error: ") && error.contains(told) && error.lines().count() == 1, "{error}");
-        assert!(!still.home.path().join("out.png").exists());
+    let refused = |ran: Ran, code: i32, told: &str| {
+        ran.refused(code, &[told]);
+        assert!(!still.path("out.png").exists());
     };
     refused(still.render_depth("file", &[]), 1, "file: not a folder");
     refused(still.render_depth("file/within", &[]), 1, "file/within");
@@ -205,8 +192,7 @@ fn what_cannot_be_written_is_told_in_one_line_and_nothing_is() {
     refused(still.render_depth("within", &[]), 1, "--force");
     assert_eq!(fs::read(still.path("within/coc.png")).unwrap(), b"mine");
     assert_eq!(fs::read_dir(still.path("within")).unwrap().count(), 1);
-    let (code, error) = still.render_depth("within", &["--force"]);
-    assert_eq!(code, 0, "{error}");
+    still.render_depth("within", &["--force"]).done();
     assert_eq!(still.picture("within/coc.png").dimensions(), (96, 56));
     fs::remove_file(still.path("out.png")).unwrap();
     refused(still.render_depth("within", &[]), 1, "plan.json");

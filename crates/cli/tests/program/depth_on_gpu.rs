@@ -1,25 +1,15 @@
 //! A stream's depth is refined and matted where its pictures are blurred.
 
-use std::process::Command;
-
 use serde_json::Value;
+
+use crate::program::{Home, PORTRAIT, Ran, json};
 
 /// Streams the recording to nowhere, with these arguments; what the program said, and its report.
 fn streamed(arguments: &[&str]) -> (String, Value) {
-    let folder = tempfile::tempdir().expect("a folder");
-    let report = folder.path().join("report.json");
-    let mut command = Command::new(env!("CARGO_BIN_EXE_bokehcam"));
-    command
-        .env("XDG_CONFIG_HOME", folder.path())
-        .arg("stream")
-        .arg(concat!(env!("CARGO_MANIFEST_DIR"), "/../../recordings/portrait"))
-        .args(arguments);
-    let output = command.args(["--pace", "asap", "--to", "null", "--report"]).arg(&report).output();
-    let output = output.expect("the program");
-    let told = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert!(output.status.success(), "{told}");
-    let report = std::fs::read_to_string(report).expect("a report");
-    (told, serde_json::from_str(&report).expect("JSON"))
+    let home = Home::new();
+    let stream = ["stream", PORTRAIT, "--pace", "asap", "--to", "null", "--report", "report.json"];
+    let ran = Ran::of(&mut home.with_drivers(&[&stream, arguments].concat()));
+    (ran.done().to_owned(), json(home.path("report.json")))
 }
 
 #[test]

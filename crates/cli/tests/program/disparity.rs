@@ -2,11 +2,12 @@
 
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
 
 use bokehcam::recording::still::{read_depth, read_disparity};
 use image::GrayImage;
-use tempfile::TempDir;
+
+use crate::common::grain;
+use crate::program::{Home, Ran, STEREO};
 
 const SIZE: (u32, u32) = (160, 64);
 /// Columns between the eyes' pictures of the wall.
@@ -14,32 +15,24 @@ const WALL_PX: u32 = 8;
 
 /// A folder with a pair: a wall of noise, 8 px nearer in the right eye.
 struct Desk {
-    dir: TempDir,
-}
-
-struct Ran {
-    code: i32,
-    stderr: String,
+    home: Home,
 }
 
 impl Desk {
     fn new() -> Self {
-        let desk = Self { dir: TempDir::new().unwrap() };
+        let desk = Self { home: Home::new() };
         desk.save("left.png", SIZE, 0);
         desk.save("right.png", SIZE, WALL_PX);
         desk
     }
 
     fn path(&self, name: &str) -> PathBuf {
-        self.dir.path().join(name)
+        self.home.path(name)
     }
 
     fn save(&self, name: &str, (width, height): (u32, u32), shift_px: u32) {
-        let noise = |x: u32, y: u32| {
-            let mixed = (x.wrapping_mul(0x9E37_79B9) ^ y.wrapping_mul(0x85EB_CA6B)).wrapping_mul(0xC2B2_AE35);
-            [(mixed ^ (mixed >> 15)).wrapping_mul(0x27D4_EB2F).to_be_bytes()[0]].into()
-        };
-        GrayImage::from_fn(width, height, |x, y| noise(x + shift_px, y)).save(self.path(name)).unwrap();
+        let noise = GrayImage::from_fn(width, height, |x, y| [grain(x + shift_px, y)].into());
+        noise.save(self.path(name)).unwrap();
     }
 
     /// Runs `depth left.png right.png` on the CPU with `more`, in the folder.
@@ -49,24 +42,14 @@ impl Desk {
 
     /// Runs any command.
     fn run_any(&self, args: &[&str]) -> Ran {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_bokehcam"));
-        for (name, _) in std::env::vars_os() {
-            if name.to_string_lossy().starts_with("BOKEHCAM_") {
-                command.env_remove(name);
-            }
-        }
-        command.current_dir(self.dir.path()).env("XDG_CONFIG_HOME", self.dir.path()).env_remove("RUST_LOG");
-        command.args(args).stdin(Stdio::null());
-        let output = command.output().unwrap();
-        assert!(output.stdout.is_empty(), "results go to files");
-        Ran { code: output.status.code().unwrap(), stderr: String::from_utf8(output.stderr).unwrap() }
+        let ran = self.home.run(args);
+        assert!(ran.stdout.is_empty(), "results go to files");
+        ran
     }
 
     #[track_caller]
     fn assert_written(&self, more: &[&str]) -> String {
-        let ran = self.run(more);
-        assert_eq!(ran.code, 0, "{}", ran.stderr);
-        ran.stderr
+        self.run(more).done().to_owned()
     }
 
     #[track_caller]
@@ -252,9 +235,7 @@ fn what_does_not_fit_is_refused_in_one_line() {
 #[test]
 fn a_pair_that_is_none_is_said() {
     let desk = Desk::new();
-    let bundled = |eye: &str| {
-        Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("recordings/stereo").join(eye).join("000000.png")
-    };
+    let bundled = |eye: &str| Path::new(STEREO).join(eye).join("000000.png");
     let save = |left: &str, right: &str, rows: i64| {
         fs::copy(bundled(left), desk.path("left.png")).unwrap();
         let eye = image::open(bundled(right)).unwrap().into_luma8();
@@ -269,11 +250,10 @@ fn a_pair_that_is_none_is_said() {
     ] {
         save(left, right, rows);
         let ran = desk.run(&["--out", "out.pfm", "--max-disparity", "96", "--force"]);
-        assert_eq!(ran.code, 0, "{}", ran.stderr);
         match said {
-            Some(said) => assert!(ran.stderr.contains(said), "{said}: {}", ran.stderr),
+            Some(said) => assert!(ran.done().contains(said), "{said}: {}", ran.stderr),
             None => {
-                assert!(!ran.stderr.contains("note: the pair") && !ran.stderr.contains("exchanged"), "{}", ran.stderr)
+                assert!(!ran.done().contains("note: the pair") && !ran.stderr.contains("exchanged"), "{}", ran.stderr)
             }
         }
     }

@@ -9,8 +9,10 @@ mod pages;
 use std::fs;
 use std::os::unix::fs::{PermissionsExt, symlink};
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Output, Stdio};
-use std::time::{Duration, Instant};
+use std::process::{Command, Output};
+use std::time::Duration;
+
+use crate::program::{Beside, PROGRAM, ROOT, in_session, until, without};
 
 /// What is another program's, or builds: a part of the command, and why it is left out.
 const LEFT_OUT: [(&str, &str); 19] = [
@@ -58,22 +60,13 @@ const NO_SETTINGS: &str = "no-settings.toml";
 struct Follower {
     folder: tempfile::TempDir,
     /// What `bokehcam ctl` speaks to.
-    running: Option<Child>,
-}
-
-impl Drop for Follower {
-    fn drop(&mut self) {
-        if let Some(mut running) = self.running.take() {
-            let _ = running.kill();
-            let _ = running.wait();
-        }
-    }
+    running: Option<Beside>,
 }
 
 impl Follower {
     fn new() -> Self {
         let follower = Self { folder: tempfile::tempdir().unwrap(), running: None };
-        let repository = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."));
+        let repository = Path::new(ROOT);
         symlink(repository.join("recordings"), follower.path("recordings")).unwrap();
         let copy = |from: &str, to: &str| {
             fs::copy(repository.join("recordings").join(from), follower.path(to)).unwrap();
@@ -101,7 +94,7 @@ impl Follower {
             fs::create_dir(follower.path(folder)).unwrap();
         }
         fs::set_permissions(follower.path("session"), PermissionsExt::from_mode(0o700)).unwrap();
-        symlink(env!("CARGO_BIN_EXE_bokehcam"), follower.path("programs/bokehcam")).unwrap();
+        symlink(PROGRAM, follower.path("programs/bokehcam")).unwrap();
         fs::write(follower.path("programs/ffplay"), "#!/bin/sh\nexec cat >/dev/null\n").unwrap();
         fs::set_permissions(follower.path("programs/ffplay"), PermissionsExt::from_mode(0o755)).unwrap();
         follower
@@ -112,14 +105,8 @@ impl Follower {
     }
 
     fn shell(&self, command: &str) -> Command {
-        let mut shell = Command::new("bash");
-        for (name, _) in std::env::vars_os() {
-            let text = name.to_string_lossy();
-            if ["BOKEHCAM_", "XDG_", "RUST_LOG"].iter().any(|begin| text.starts_with(begin)) {
-                shell.env_remove(name);
-            }
-        }
-        shell.args(["-o", "pipefail", "-c", command]).current_dir(&self.folder).stdin(Stdio::null());
+        let mut shell = without(in_session(Command::new("bash")), &["XDG_"]);
+        shell.args(["-o", "pipefail", "-c", command]).current_dir(&self.folder);
         let path = format!("{}:{}", self.path("programs").display(), std::env::var("PATH").unwrap());
         shell.env("PATH", path).env("HOME", self.path("home")).env("XDG_RUNTIME_DIR", self.path("session"));
         // As wide as help becomes.
@@ -137,12 +124,9 @@ impl Follower {
             return;
         }
         let stream = "exec bokehcam --quiet stream demo --pace realtime --to null --name desk";
-        self.running = Some(self.shell(stream).spawn().unwrap());
-        let began = Instant::now();
-        while !self.output("bokehcam ctl status").status.success() {
-            assert!(began.elapsed() < Duration::from_secs(60), "the stream does not answer");
-            std::thread::sleep(Duration::from_millis(50));
-        }
+        self.running = Some(Beside::start(&mut self.shell(stream)));
+        let answers = || self.output("bokehcam ctl status").status.success();
+        until("the stream answers", Duration::from_secs(60), answers);
     }
 
     /// Whether the program takes the arguments of a command that cannot be run; what is no source here has another's place.
@@ -200,7 +184,7 @@ fn named(word: &str, task: &str, file: &str) -> String {
 
 /// Follows a page; at least `least` of its commands run, so that none is left out by mistake.
 fn follow(page: &str, least: usize) {
-    let repository = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."));
+    let repository = Path::new(ROOT);
     let text = fs::read_to_string(repository.join(page)).unwrap();
     let mut follower = Follower::new();
     let mut done: Vec<String> = Vec::new();
@@ -289,15 +273,8 @@ fn the_readme_can_be_followed_line_by_line() {
 
 #[test]
 fn the_pages_can_be_followed_line_by_line() {
-    let least = [
-        ("algorithm.md", 1),
-        ("settings.md", 5),
-        ("stereo.md", 2),
-        ("ctl.md", 6),
-        ("photos.md", 5),
-        ("recordings.md", 4),
-    ];
-    for page in fs::read_dir(Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("docs")).unwrap() {
+    let least = [("algorithm.md", 1), ("settings.md", 5), ("stereo.md", 2), ("ctl.md", 6)];
+    for page in fs::read_dir(Path::new(ROOT).join("docs")).unwrap() {
         let name = page.unwrap().file_name().into_string().unwrap();
         if name.ends_with(".md") {
             let least = least.iter().find(|(page, _)| *page == name).map_or(0, |(_, least)| *least);

@@ -2,14 +2,14 @@
 #![allow(missing_docs)]
 
 use std::path::Path;
-use std::process::{Command, Stdio};
 
 use bokehcam::depth::agreement::EdgeAlignment;
 use bokehcam::engine::still::{Depth, coc_and_depth};
 use bokehcam::frame::{ColorImage, DepthMap};
 use bokehcam::look::{Look, Refine};
 use bokehcam::recording::still::{read_color, read_depth, write_color, write_depth};
-use tempfile::TempDir;
+
+use crate::program::Home;
 
 const PICTURE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../recordings/portrait/rgb/000000.png");
 const DEPTH: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../recordings/portrait/depth/000000.png");
@@ -115,18 +115,9 @@ fn what_does_not_fit_is_mended_and_what_fits_stays() {
     assert_eq!(coc_error_px(Refine::Auto, &color, other.clone(), &other), 0.0);
 }
 
-fn bokehcam(dir: &Path, arguments: &[&str]) -> String {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_bokehcam"));
-    command.env_clear().env("XDG_CONFIG_HOME", dir).current_dir(dir).stdin(Stdio::null()).args(arguments);
-    let output = command.output().unwrap();
-    let stderr = String::from_utf8(output.stderr).unwrap();
-    assert_eq!(output.status.code(), Some(0), "{stderr}");
-    stderr
-}
-
 #[test]
 fn render_says_what_it_does_about_it() {
-    let dir = TempDir::new().unwrap();
+    let home = Home::new();
     let (_, map) = portrait();
     for (name, map) in [
         ("fat.png", fat(&map, 6)),
@@ -134,11 +125,11 @@ fn render_says_what_it_does_about_it() {
         ("soft.png", soft(&map, 4)),
         ("other.png", mirrored(&map)),
     ] {
-        write_depth(&dir.path().join(name), &map, 5000.0, false).unwrap();
+        write_depth(&home.path(name), &map, 5000.0, false).unwrap();
     }
     let render = |map: &str, more: &[&str]| {
         let command = ["render", PICTURE, "--depth-map", map, "--out", "out.png", "--force", "--backend", "cpu"];
-        bokehcam(dir.path(), &[&command, more].concat())
+        home.run(&[&command, more].concat()).done().to_owned()
     };
     for (map, begin) in [
         ("fat.png", "note: fat.png: refined, as its outlines lie about "),
@@ -159,10 +150,10 @@ fn render_says_what_it_does_about_it() {
 
 #[test]
 fn a_stream_says_once_how_its_depth_does_not_fit_and_mends_it() {
-    let dir = TempDir::new().unwrap();
+    let home = Home::new();
     let (color, map) = portrait();
     let record = |name: &str, map: &DepthMap| {
-        let folder = dir.path().join(name);
+        let folder = home.path(name);
         let (mut rgb, mut depth) = (String::new(), String::new());
         std::fs::create_dir_all(folder.join("rgb")).unwrap();
         std::fs::create_dir_all(folder.join("depth")).unwrap();
@@ -178,17 +169,18 @@ fn a_stream_says_once_how_its_depth_does_not_fit_and_mends_it() {
     record("fits", &map);
     record("other", &mirrored(&map));
     record("fat", &fat(&map, 6));
-    let stream =
-        |name: &str| bokehcam(dir.path(), &["stream", name, "--to", "null", "--backend", "cpu", "--quality", "draft"]);
+    let stream = |name: &str, to: &str| {
+        let ran = home.run(&["stream", name, "--to", to, "--backend", "cpu", "--quality", "draft"]);
+        ran.done().to_owned()
+    };
     let about =
         |said: &str| said.lines().filter(|line| line.contains("nowhere do the outlines of its depth meet")).count();
-    assert_eq!(about(&stream("fits")), 0);
-    assert_eq!(about(&stream("other")), 1);
+    assert_eq!(about(&stream("fits", "null")), 0);
+    assert_eq!(about(&stream("other", "null")), 1);
     let pictures = |name: &str| {
         let out = format!("{name}-out/");
-        let to = ["stream", name, "--to", &out, "--backend", "cpu", "--quality", "draft"];
-        let said = bokehcam(dir.path(), &to);
-        let of = |frame: &str| read_color(&dir.path().join(&out).join(frame)).unwrap();
+        let said = stream(name, &out);
+        let of = |frame: &str| read_color(&home.path(&out).join(frame)).unwrap();
         (said, [of("000000.png"), of("000024.png")])
     };
     let ((_, fitting), (said, mended)) = (pictures("fits"), pictures("fat"));

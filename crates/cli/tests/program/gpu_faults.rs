@@ -8,7 +8,7 @@ mod signal;
 
 use std::fs;
 use std::path::Path;
-use std::process::{Command, Output};
+use std::process::Command;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -27,6 +27,8 @@ use bokehcam::optics::CocKind;
 use bokehcam::sink::yuyv;
 use common::{coc, noise, settings, three_depths};
 use tempfile::TempDir;
+
+use crate::program::{Home, PORTRAIT, Ran, json};
 
 const SIZE: (u32, u32) = (96, 64);
 /// The executors may differ by so much.
@@ -59,16 +61,16 @@ fn layer() -> TempDir {
     folder
 }
 
-fn under(layer: &TempDir, fault: &str, command: &mut Command) -> Output {
+fn under<'a>(layer: &TempDir, fault: &str, command: &'a mut Command) -> &'a mut Command {
     command.env("VK_LAYER_PATH", layer.path()).env("VK_INSTANCE_LAYERS", "VK_LAYER_bokehcam_faults");
-    command.env("FAULT", fault).output().unwrap()
+    command.env("FAULT", fault)
 }
 
 /// Runs a test of this file in a process of its own, under the layer; gives back what it told.
 fn test_under(layer: &TempDir, fault: &str, test: &str) -> String {
     let mut command = Command::new(std::env::current_exe().unwrap());
-    let output =
-        under(layer, fault, command.args(["--ignored", "--exact", &format!("gpu_faults::{test}"), "--nocapture"]));
+    command.args(["--ignored", "--exact", &format!("gpu_faults::{test}"), "--nocapture"]);
+    let output = under(layer, fault, &mut command).output().unwrap();
     let told = String::from_utf8_lossy(&output.stdout).into_owned() + &String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success(), "{fault}: {told}");
     told
@@ -332,18 +334,13 @@ fn matting_goes_on_after_the_gpu() {
 #[test]
 #[ignore = "needs a Vulkan adapter (software will do)"]
 fn a_run_ends_whole_and_says_in_one_line_what_happened() {
-    let (layer, folder) = (layer(), tempfile::tempdir().unwrap());
-    let report = folder.path().join("report.json");
-    let recording = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("recordings/portrait");
-    let mut command = Command::new(env!("CARGO_BIN_EXE_bokehcam"));
-    command.env("XDG_CONFIG_HOME", folder.path()).env_remove("RUST_LOG").arg("stream").arg(recording);
-    command.args(["--backend", "gpu", "--pace", "asap", "--to", "null", "--report"]).arg(&report);
-    let output = under(&layer, "submit:6", &mut command);
-    let told = String::from_utf8_lossy(&output.stderr);
-    assert!(output.status.success(), "{told}");
+    let (layer, home) = (layer(), Home::new());
+    let stream = ["stream", PORTRAIT, "--backend", "gpu", "--pace", "asap", "--to", "null", "--report", "report.json"];
+    let ran = Ran::of(under(&layer, "submit:6", &mut home.with_drivers(&stream)));
+    let told = ran.done();
     assert_eq!(told.matches("the CPU blurs from here on").count(), 1, "{told}");
     assert!(!told.contains("panicked"), "{told}");
-    let report: serde_json::Value = serde_json::from_str(&fs::read_to_string(report).unwrap()).unwrap();
+    let report = json(home.path("report.json"));
     assert_eq!((&report["frames"]["captured"], &report["frames"]["delivered"]), (&24.into(), &24.into()), "{report}");
     assert_eq!(report["backend"], "gpu, then cpu");
     assert!(report["adapter"].as_str().unwrap().contains("; then cpu, "), "{report}");

@@ -7,6 +7,8 @@ mod common;
 mod onnx;
 #[path = "../../../../tests/common/planes.rs"]
 mod planes;
+#[path = "../common/program.rs"]
+mod program;
 #[path = "../../../../tests/common/store.rs"]
 mod store;
 

@@ -4,17 +4,13 @@ use std::fs;
 use std::path::Path;
 use std::process::Command;
 
+use crate::program::{Home, PORTRAIT, PROGRAM, ROOT, Ran, STEREO, run};
+
 mod layout;
 
 fn here(path: &str) -> String {
-    let path = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join(path);
+    let path = Path::new(ROOT).join(path);
     fs::read_to_string(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
-}
-
-fn printed(args: &[&str]) -> String {
-    let output = Command::new(env!("CARGO_BIN_EXE_bokehcam")).args(args).output().unwrap();
-    assert!(output.status.success(), "{args:?}: {}", String::from_utf8_lossy(&output.stderr));
-    String::from_utf8(output.stdout).unwrap()
 }
 
 /// The names at the beginning of the lines of a section of a help text, or none.
@@ -36,7 +32,7 @@ fn commands() -> Vec<(Vec<String>, String)> {
     let (mut found, mut waiting) = (Vec::new(), vec![Vec::new()]);
     while let Some(command) = waiting.pop() {
         let args: Vec<&str> = command.iter().map(String::as_str).chain(["--help-all"]).collect();
-        let help = printed(&args);
+        let help = run(&args).printed();
         for below in listed(&help, "Commands:").into_iter().filter(|name| name != "help") {
             waiting.push([command.as_slice(), &[below]].concat());
         }
@@ -49,7 +45,7 @@ fn commands() -> Vec<(Vec<String>, String)> {
 fn there_is_a_manual_page_of_every_command_with_every_flag() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("man1");
-    printed(&["manual", "--out", out.to_str().unwrap()]);
+    run(&["manual", "--out", out.to_str().unwrap()]).done();
     let commands = commands();
     assert!(commands.len() > 12, "help lists only {} commands", commands.len());
     for (command, help) in &commands {
@@ -72,15 +68,11 @@ fn there_is_a_manual_page_of_every_command_with_every_flag() {
 fn manual_pages_are_not_overwritten_unasked() {
     let folder = tempfile::tempdir().unwrap();
     fs::write(folder.path().join("bokehcam.1"), "mine").unwrap();
-    let manual = |more: &[&str]| {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_bokehcam"));
-        command.args(["manual", "--out"]).arg(folder.path()).args(more).output().unwrap()
-    };
-    let refused = manual(&[]);
-    assert!(refused.status.code() == Some(1) && String::from_utf8_lossy(&refused.stderr).contains("--force"));
+    let manual = |more: &[&str]| run(&[&["manual", "--out", folder.path().to_str().unwrap()], more].concat());
+    manual(&[]).failed(1, &["--force"]);
     assert_eq!(fs::read(folder.path().join("bokehcam.1")).unwrap(), b"mine");
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1, "others were written");
-    assert!(manual(&["--force"]).status.success());
+    manual(&["--force"]).done();
     assert_ne!(fs::read(folder.path().join("bokehcam.1")).unwrap(), b"mine");
 }
 
@@ -88,7 +80,7 @@ fn manual_pages_are_not_overwritten_unasked() {
 fn completions_know_every_command_and_flag() {
     let commands = commands();
     for shell in ["bash", "zsh", "fish"] {
-        let script = printed(&["completions", shell]);
+        let script = run(&["completions", shell]).printed();
         for (command, help) in &commands {
             for name in command {
                 assert!(script.contains(name), "{shell}: {name}");
@@ -113,10 +105,7 @@ fn help_names_only_what_a_package_brings() {
         assert!(!help.contains("recordings/portrait") && !help.contains("recordings/stereo"), "{command:?}: {help}");
         for (at, _) in help.match_indices("docs/") {
             let name = help[at..].split(|c: char| c.is_whitespace() || "),;:".contains(c)).next().unwrap();
-            assert!(
-                Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join(name).is_file(),
-                "{command:?}: {name}"
-            );
+            assert!(Path::new(ROOT).join(name).is_file(), "{command:?}: {name}");
         }
     }
 }
@@ -175,7 +164,7 @@ fn libraries(program: &[u8]) -> Vec<String> {
 
 /// What of `found` the program is linked with: its packages depend on these by themselves.
 fn linked() -> Vec<String> {
-    let output = Command::new("ldd").arg(env!("CARGO_BIN_EXE_bokehcam")).output().unwrap();
+    let output = Command::new("ldd").arg(PROGRAM).output().unwrap();
     let lines = String::from_utf8(output.stdout).unwrap();
     lines.lines().filter_map(|line| line.split_whitespace().next().map(str::to_owned)).collect()
 }
@@ -195,7 +184,7 @@ fn packages_ask_for_every_library_that_is_loaded() {
         .collect();
     asked.sort_unstable();
     let linked = linked();
-    let mut loaded = libraries(&fs::read(env!("CARGO_BIN_EXE_bokehcam")).unwrap());
+    let mut loaded = libraries(&fs::read(PROGRAM).unwrap());
     loaded.retain(|library| !linked.contains(library));
     assert_eq!(asked, loaded);
 }
@@ -213,16 +202,11 @@ fn examples_and_the_unit_are_those_of_the_page_on_calls() {
 
 /// What the program says of these arguments, where no daemon runs and nothing is installed: its exit code, and the line.
 fn exit_code(args: &[&str]) -> (i32, String) {
-    let folder = tempfile::tempdir().unwrap();
-    fs::write(folder.path().join("text.txt"), "text").unwrap();
-    let photo = concat!(env!("CARGO_MANIFEST_DIR"), "/../../recordings/portrait/rgb/000000.png");
-    fs::copy(photo, folder.path().join("photo.png")).unwrap();
-    let mut command = Command::new(env!("CARGO_BIN_EXE_bokehcam"));
-    for name in ["HOME", "XDG_RUNTIME_DIR", "XDG_CONFIG_HOME", "XDG_DATA_HOME", "PIPEWIRE_RUNTIME_DIR"] {
-        command.env(name, folder.path());
-    }
-    let output = command.args(args).current_dir(&folder).env_remove("PIPEWIRE_REMOTE").output().unwrap();
-    (output.status.code().unwrap(), String::from_utf8_lossy(&output.stderr).into_owned())
+    let home = Home::new();
+    fs::write(home.path("text.txt"), "text").unwrap();
+    fs::copy(format!("{PORTRAIT}/rgb/000000.png"), home.path("photo.png")).unwrap();
+    let ran = Ran::of(home.command(args).env("HOME", home.0.path()));
+    (ran.code, ran.stderr)
 }
 
 /// The unit tries again after what may be there later, and gives up where only other words would help.
@@ -232,11 +216,10 @@ fn the_unit_gives_up_on_wrong_arguments_alone() {
     assert_eq!((value(&unit, "Restart"), value(&unit, "RestartPreventExitStatus")), ("on-failure", "2"));
     assert_eq!(value(&unit, "StartLimitIntervalSec"), "0", "it is to be tried for as long as it takes");
 
-    let two_eyes = concat!(env!("CARGO_MANIFEST_DIR"), "/../../recordings/stereo");
     let mut may_come = vec![
         vec!["./folder/of/a/disk", "--to", "null"],
         vec!["photo.png", "--depth", "./folder/of/a/disk", "--to", "null"],
-        vec![two_eyes, "--depth", "stereo", "--calib", "nothing.yml", "--to", "null"],
+        vec![STEREO, "--depth", "stereo", "--calib", "nothing.yml", "--to", "null"],
     ];
     if cfg!(feature = "camera") {
         let by_id = "/dev/v4l/by-id/usb-Nobody_s_camera-video-index0";

@@ -1,14 +1,13 @@
 //! Who stands before a plate: found whatever the light and the camera do, as far as that can be told.
 #![allow(missing_docs)]
 
-use std::path::Path;
-use std::process::{Command, Output};
-
 use bokehcam::color::{linear_to_srgb, srgb_to_linear};
 use bokehcam::depth::plate::{PlateDepth, Step};
 use bokehcam::depth::{DepthSource, FrameInput};
 use bokehcam::frame::{ColorImage, DepthMap, Stamp};
 use bokehcam::recording::still;
+
+use crate::program::Home;
 
 const SIZE: (u32, u32) = (640, 360);
 const FRAME_NS: u64 = 33_333_333;
@@ -223,27 +222,16 @@ fn a_plate_is_taken_once_the_person_has_gone() {
     assert_eq!(watched.see(PERSON).0, Step::StepOut(3));
 }
 
-fn bokehcam(folder: &Path, arguments: &[&str]) -> Output {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_bokehcam"));
-    command.args(arguments).current_dir(folder).env("XDG_CONFIG_HOME", "/nowhere").env("XDG_DATA_HOME", "/nowhere");
-    command.output().unwrap()
-}
-
 #[test]
 fn commands_take_plates_and_use_them() {
-    let folder = tempfile::tempdir().unwrap();
-    let at = |name: &str| folder.path().join(name);
-    let run = |arguments: &[&str]| {
-        let done = bokehcam(folder.path(), arguments);
-        (done.status.code(), String::from_utf8(done.stderr).unwrap())
-    };
+    let home = Home::new();
+    let at = |name: &str| home.path(name);
     let (color, covered) = PERSON.picture();
     still::write_color(&at("me.png"), &color, false).unwrap();
     still::write_color(&at("room.png"), &ROOM.picture().0, false).unwrap();
     still::write_color(&at("small.png"), &ColorImage::new(64, 36), false).unwrap();
     let options = ["--depth", "plate:room.png", "--coc-at-infinity", "12", "--out", "out.png"];
-    let (code, said) = run(&[&["render", "me.png"], &options[..]].concat());
-    assert_eq!(code, Some(0), "{said}");
+    home.run(&[&["render", "me.png"], &options[..]].concat()).done();
     let out = still::read_color(&at("out.png")).unwrap();
     let change = |of: bool| {
         let differ = |at: &usize| out.rgb[3 * at].abs_diff(color.rgb[3 * at]) as f32;
@@ -269,20 +257,20 @@ fn commands_take_plates_and_use_them() {
         (&["plate", "synthetic", "--frames", "3", "--to", "room.png"], 1, "exists"),
         (&["plate", "synthetic", "--frames", "3", "--to", "room.gif"], 1, "room.gif"),
     ] {
-        let (came, said) = run(arguments);
-        assert!(came == Some(code) && said.contains(part) && !at("a.png").exists(), "{arguments:?}: {came:?} {said}");
-        assert_eq!(said.trim().lines().count(), 1, "{said}");
+        home.run(arguments).refused(code, &[part]);
+        assert!(!at("a.png").exists(), "{arguments:?}");
     }
     // Where nobody stands before it, that is said.
     for (plate, expected) in [("me.png", "the plate is the picture itself"), ("copy.png", "nobody stands before it")] {
         std::fs::copy(at("me.png"), at("copy.png")).unwrap();
         let plate = format!("plate:{plate}");
-        let (code, said) = run(&["render", "me.png", "--depth", &plate, "--force", "--out", "b.png"]);
-        assert!(code == Some(0) && said.contains(expected) && said.matches("warning").count() == 1, "{said}");
+        let ran = home.run(&["render", "me.png", "--depth", &plate, "--force", "--out", "b.png"]);
+        let said = ran.done();
+        assert!(said.contains(expected) && said.matches("warning").count() == 1, "{said}");
     }
-    let (code, said) = run(&["plate", "me.png", "--to", "photo.png"]);
-    assert!(code == Some(0) && said.contains("whoever is in it is in the plate"), "{said}");
-    let (code, said) = run(&["plate", "synthetic", "--frames", "24", "--size", "160x120", "--to", "new/plate.png"]);
-    assert!(code == Some(0) && said.contains("--depth plate:new/plate.png"), "{code:?} {said}");
+    let ran = home.run(&["plate", "me.png", "--to", "photo.png"]);
+    assert!(ran.done().contains("whoever is in it is in the plate"), "{}", ran.stderr);
+    let ran = home.run(&["plate", "synthetic", "--frames", "24", "--size", "160x120", "--to", "new/plate.png"]);
+    assert!(ran.done().contains("--depth plate:new/plate.png"), "{}", ran.stderr);
     assert_eq!(still::read_color(&at("new/plate.png")).unwrap().size(), (160, 120));
 }

@@ -4,8 +4,6 @@
 use crate::common;
 
 use std::fs;
-use std::path::Path;
-use std::process::{Command, Stdio};
 
 use bokehcam::bokeh::cpu::CpuBokeh;
 use bokehcam::bokeh::plan::Plan;
@@ -18,38 +16,14 @@ use bokehcam::link::pool::Pooled;
 use bokehcam::look::{CocRule, Effect, Look, Patch, Strength};
 use bokehcam::optics::CocField;
 use bokehcam::recording::snapshot::{self, Snapshot};
-use bokehcam::recording::still::{read_color, write_color};
+use bokehcam::recording::still::{read_color, write_color, write_depth};
 use common::{noise, three_depths};
 
-struct Ran {
-    code: i32,
-    stdout: String,
-    stderr: String,
-}
+use crate::program::{Home, Ran};
 
-/// Runs the program in a world that has nothing but `home` and `environment`.
-fn run(home: &Path, environment: &[(&str, &str)], args: &[&str]) -> Ran {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_bokehcam"));
-    for (name, _) in std::env::vars_os() {
-        if name.to_string_lossy().starts_with("BOKEHCAM_") {
-            command.env_remove(name);
-        }
-    }
-    command.env("XDG_CONFIG_HOME", home).env_remove("RUST_LOG").envs(environment.iter().copied());
-    let output = command.args(args).stdin(Stdio::null()).output().unwrap();
-    Ran {
-        code: output.status.code().expect("ended by itself"),
-        stdout: String::from_utf8(output.stdout).unwrap(),
-        stderr: String::from_utf8(output.stderr).unwrap(),
-    }
-}
-
-/// A home with this settings file.
-fn home_with(settings: &str) -> tempfile::TempDir {
-    let home = tempfile::tempdir().unwrap();
-    fs::create_dir(home.path().join("bokehcam")).unwrap();
-    fs::write(home.path().join("bokehcam/config.toml"), settings).unwrap();
-    home
+/// Runs the program with these variables.
+fn run(home: &Home, environment: &[(&str, &str)], args: &[&str]) -> Ran {
+    Ran::of(home.command(args).envs(environment.iter().copied()))
 }
 
 /// The line of a setting in `config dump`.
@@ -63,10 +37,10 @@ const MINE: &str =
 
 #[test]
 fn a_preset_goes_before_the_file_and_behind_the_environment() {
-    let home = home_with(MINE);
+    let home = Home::new().with_settings(MINE);
     let dump = |environment: &[(&str, &str)], args: &[&str]| {
-        let ran = run(home.path(), environment, &[&["config", "dump"], args].concat());
-        assert_eq!((ran.code, ran.stderr.as_str()), (0, ""));
+        let ran = run(&home, environment, &[&["config", "dump"], args].concat());
+        assert_eq!(ran.done(), "");
         ran.stdout
     };
     assert_eq!(line(&dump(&[], &[]), "rim"), "rim = 0.4 # file");
@@ -85,18 +59,18 @@ fn a_preset_goes_before_the_file_and_behind_the_environment() {
     assert_eq!(line(&lens, "f-number"), "# f-number = # default", "a flag sets the preset's lens aside");
     assert_eq!(line(&lens, "blur"), "blur = \"5%\" # flag");
 
-    let home = home_with(&format!("preset = \"mine\"\n{MINE}"));
-    let dump = run(home.path(), &[], &["config", "dump"]).stdout;
+    let home = Home::new().with_settings(&format!("preset = \"mine\"\n{MINE}"));
+    let dump = home.run(&["config", "dump"]).stdout;
     assert_eq!((line(&dump, "rim"), line(&dump, "preset")), ("rim = 0.6 # preset", "# preset = \"mine\" # file"));
 }
 
 #[test]
 fn the_dump_with_a_preset_is_a_file_that_dumps_the_same() {
-    let home = home_with(MINE);
-    let first = run(home.path(), &[], &["config", "dump", "--preset", "mine", "--rim", "0.9"]).stdout;
-    let again = home_with(&first);
-    let second = run(again.path(), &[], &["config", "dump"]);
-    assert_eq!((second.code, second.stderr.as_str()), (0, ""));
+    let home = Home::new().with_settings(MINE);
+    let first = home.run(&["config", "dump", "--preset", "mine", "--rim", "0.9"]).stdout;
+    let again = Home::new().with_settings(&first);
+    let second = again.run(&["config", "dump"]);
+    assert_eq!(second.done(), "");
     let values = |dump: &str| -> Vec<String> {
         let lines = dump.lines().filter(|line| !line.starts_with('#') && !line.is_empty());
         lines.map(|line| line.split(" # ").next().unwrap().to_string()).collect()
@@ -114,31 +88,26 @@ fn wrong_presets_cost_one_line_that_names_those_there_are() {
         (MINE, None, &["stream", "synthetic", "--to", "null", "--preset", ""], "there is no preset ''"),
         ("preset = \"nope\"\n[presets.mine]\n", None, &["config", "dump"], "config.toml:1: there is no preset 'nope'"),
     ] {
-        let home = home_with(settings);
+        let home = Home::new().with_settings(settings);
         let environment: Vec<_> = environment.map(|name| ("BOKEHCAM_PRESET", name)).into_iter().collect();
-        let ran = run(home.path(), &environment, args);
-        assert_eq!((ran.code, ran.stdout.as_str(), ran.stderr.lines().count()), (2, "", 1), "{}", ran.stderr);
-        assert!(ran.stderr.contains(said) && ran.stderr.contains(all), "{}", ran.stderr);
+        let ran = run(&home, &environment, args);
+        ran.refused(2, &[said, all]);
     }
-    let home = home_with("[presets.mine]\nrim = 0.1\nto = \"null\"\n");
-    let ran = run(home.path(), &[], &["devices"]);
+    let home = Home::new().with_settings("[presets.mine]\nrim = 0.1\nto = \"null\"\n");
+    let ran = home.run(&["devices"]);
     assert!(ran.code == 2 && ran.stderr.contains("config.toml:3: there is no setting 'to'"), "{}", ran.stderr);
 }
 
 #[test]
 fn every_built_in_preset_blurs_in_its_own_way() {
-    let home = home_with("");
-    let (image, depth) = (home.path().join("a.png"), home.path().join("a.pfm"));
-    write_color(&image, &noise(96, 72), false).unwrap();
-    bokehcam::recording::still::write_depth(&depth, &three_depths(96, 72), 1.0, false).unwrap();
+    let home = Home::new();
+    write_color(&home.path("a.png"), &noise(96, 72), false).unwrap();
+    write_depth(&home.path("a.pfm"), &three_depths(96, 72), 1.0, false).unwrap();
     let mut seen: Vec<ColorImage> = Vec::new();
     for preset in ["portrait", "cinematic", "dreamy", "product", "miniature"] {
-        let out = home.path().join(format!("{preset}.png"));
-        let (image, depth) = (image.to_str().unwrap(), depth.to_str().unwrap());
-        let args = ["render", image, "--depth-map", depth, "--preset", preset, "--backend", "cpu", "-q", "--out"];
-        let ran = run(home.path(), &[], &[&args[..], &[out.to_str().unwrap()]].concat());
-        assert_eq!((ran.code, ran.stderr.as_str()), (0, ""));
-        let picture = read_color(&out).unwrap();
+        let args = ["render", "a.png", "--depth-map", "a.pfm", "--preset", preset, "--backend", "cpu", "-q"];
+        assert_eq!(home.run(&[&args[..], &["--force", "--out", "out.png"]].concat()).done(), "");
+        let picture = read_color(&home.path("out.png")).unwrap();
         assert!(!seen.contains(&picture), "{preset} is something of its own");
         seen.push(picture);
     }
@@ -165,8 +134,8 @@ fn blurred(look: &Look, color: &ColorImage, map: &DepthMap, focus_m: f32, qualit
 
 #[test]
 fn a_snapshot_is_repeated_to_the_bit_whatever_the_settings_around() {
-    let home =
-        home_with("rim = 0.9\neffect = \"blur\"\nrefine = \"on\"\nmax-coc = 3\npreset = \"dreamy\"\nf-number = 2\n");
+    let settings = "rim = 0.9\neffect = \"blur\"\nrefine = \"on\"\nmax-coc = 3\npreset = \"dreamy\"\nf-number = 2\n";
+    let home = Home::new().with_settings(settings);
     let environment = [("BOKEHCAM_FOCUS", "7"), ("BOKEHCAM_F_NUMBER", "2"), ("BOKEHCAM_QUALITY", "draft")];
     let color = noise(101, 77);
     // Some of it unknown: what a blur had is not made up again.
@@ -180,7 +149,7 @@ fn a_snapshot_is_repeated_to_the_bit_whatever_the_settings_around() {
         ..Look::default()
     };
     let tilt = Look { strength: Strength::Default, rim: 0.1, ..Look::plain(Effect::TiltShift) };
-    let shots = home.path().join("shots");
+    let shots = home.path("shots");
     for (name, look, quality) in [("a", &dof, Quality::Fast), ("a", &dof, Quality::High), ("b.c", &tilt, Quality::Best)]
     {
         let (picture, field) = blurred(look, &color, &map, 1.123_456_7, quality);
@@ -192,15 +161,15 @@ fn a_snapshot_is_repeated_to_the_bit_whatever_the_settings_around() {
         let out = path.with_extension("again.png");
         let (like, to) = (path.to_str().unwrap(), out.to_str().unwrap());
         let args = ["render", "--like", like, "--out", to, "--backend", "cpu", "--threads", "3", "-q"];
-        let ran = run(home.path(), &environment, &args);
-        assert_eq!((ran.code, ran.stderr.as_str()), (0, ""), "{like}");
+        let ran = run(&home, &environment, &args);
+        assert_eq!(ran.done(), "", "{like}");
         assert!(read_color(&out).unwrap() == picture, "{like} {quality}");
         // Flags beside it change it.
-        let ran = run(home.path(), &environment, &[&args[..], &["--force", "--aperture", "heart"]].concat());
-        assert_eq!((ran.code, ran.stderr.as_str()), (0, ""));
+        let ran = run(&home, &environment, &[&args[..], &["--force", "--aperture", "heart"]].concat());
+        assert_eq!(ran.done(), "");
         assert!(read_color(&out).unwrap() != picture);
-        let ran = run(home.path(), &environment, &[&args[..], &["--force", "--preset", "product"]].concat());
-        assert_eq!((ran.code, ran.stderr.as_str()), (0, ""));
+        let ran = run(&home, &environment, &[&args[..], &["--force", "--preset", "product"]].concat());
+        assert_eq!(ran.done(), "");
         assert!(read_color(&out).unwrap() != picture, "a preset that is asked for goes before it");
         fs::remove_file(out).unwrap();
     }
@@ -221,20 +190,16 @@ fn a_snapshot_is_repeated_to_the_bit_whatever_the_settings_around() {
 
 #[test]
 fn a_snapshots_settings_can_be_given_to_another_picture() {
-    let home = home_with("");
+    let home = Home::new();
     let (color, map) = (noise(40, 30), three_depths(40, 30));
     let look = Look::plain(Effect::Blur);
     let (picture, field) = blurred(&look, &color, &map, 1.0, Quality::Balanced);
     let settings = Patch::from_look(&look.for_frame(&field, None)).values();
     let shot = Snapshot { picture: &picture, sources: Some((&color, None)), settings: &settings };
-    let like = snapshot::save(home.path(), "x", &shot).unwrap();
-    let other = home.path().join("other.png");
-    write_color(&other, &three_depths_as_picture(), false).unwrap();
-    let out = home.path().join("out.png");
-    let args = ["render", other.to_str().unwrap(), "--like", like.to_str().unwrap(), "--backend", "cpu", "--out"];
-    let ran = run(home.path(), &[], &[&args[..], &[out.to_str().unwrap()]].concat());
-    assert_eq!(ran.code, 0, "{}", ran.stderr);
-    assert_eq!(read_color(&out).unwrap().size(), (20, 10));
+    let like = snapshot::save(home.0.path(), "x", &shot).unwrap();
+    write_color(&home.path("other.png"), &three_depths_as_picture(), false).unwrap();
+    home.run(&["render", "other.png", "--like", like.to_str().unwrap(), "--backend", "cpu", "--out", "out.png"]).done();
+    assert_eq!(read_color(&home.path("out.png")).unwrap().size(), (20, 10));
 }
 
 fn three_depths_as_picture() -> ColorImage {
@@ -243,12 +208,12 @@ fn three_depths_as_picture() -> ColorImage {
 
 #[test]
 fn a_snapshot_that_cannot_be_repeated_costs_one_line() {
-    let home = home_with("");
-    let at = |name: &str| home.path().join(name);
+    let home = Home::new();
+    let at = |name: &str| home.path(name);
     let (color, map) = (noise(24, 18), three_depths(24, 18));
     let save = |name: &str, settings: &[(&'static str, String)]| {
         let shot = Snapshot { picture: &color, sources: Some((&color, Some(&map))), settings };
-        snapshot::save(home.path(), name, &shot).unwrap();
+        snapshot::save(home.0.path(), name, &shot).unwrap();
     };
     write_color(&at("plain.png"), &color, false).unwrap();
     fs::write(at("text.png"), "no picture").unwrap();
@@ -271,38 +236,29 @@ fn a_snapshot_that_cannot_be_repeated_costs_one_line() {
         ("lone.png", 1, "lone-color.png: there is no such file"),
         ("depthless.png", 2, "needs depth"),
     ] {
-        let (like, out) = (at(name), at("out.png"));
-        let args = ["render", "--like", like.to_str().unwrap(), "--out", out.to_str().unwrap()];
-        let ran = run(home.path(), &[], &args);
-        assert_eq!(
-            (ran.code, ran.stdout.as_str(), ran.stderr.lines().count()),
-            (code, "", 1),
-            "{name}: {}",
-            ran.stderr
-        );
-        assert!(ran.stderr.starts_with("error: ") && ran.stderr.contains(said), "{name}: {}", ran.stderr);
-        assert!(!out.exists());
+        home.run(&["render", "--like", name, "--out", "out.png"]).refused(code, &[said]);
+        assert!(!at("out.png").exists());
     }
 }
 
 #[test]
 fn a_snapshot_is_whole_or_not_there() {
-    let home = home_with("");
+    let home = Home::new().with_settings("");
     let color = noise(8, 6);
     let shot = Snapshot { picture: &color, sources: Some((&color, None)), settings: &[] };
     for (dir, stem, shot) in [
-        (home.path().join("a"), "../x", shot),
-        (home.path().join("a"), "", shot),
-        (home.path().join("bokehcam/config.toml"), "x", shot),
-        (home.path().join("a"), "x", Snapshot { settings: &[("aperture", "image:a\nb".to_string())], ..shot }),
+        (home.path("a"), "../x", shot),
+        (home.path("a"), "", shot),
+        (home.settings(), "x", shot),
+        (home.path("a"), "x", Snapshot { settings: &[("aperture", "image:a\nb".to_string())], ..shot }),
     ] {
         let refused = snapshot::save(&dir, stem, &shot).unwrap_err().to_string();
         assert!(!refused.contains('\n'), "{refused}");
     }
-    assert!(!home.path().join("a").exists() && !home.path().join("x.png").exists());
+    assert!(!home.path("a").exists() && !home.path("x.png").exists());
 
     // A name of one of its files that is taken is as good as all of them.
-    let dir = home.path().join("shots");
+    let dir = home.path("shots");
     fs::create_dir(&dir).unwrap();
     fs::write(dir.join("x-depth.pfm"), "mine").unwrap();
     assert_eq!(snapshot::save(&dir, "x", &shot).unwrap(), dir.join("x-2.png"));

@@ -2,16 +2,22 @@
 #![allow(missing_docs)]
 
 use std::fs;
-use std::io::Read;
 use std::os::unix::fs::symlink;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
+use std::process::Stdio;
 use std::time::Duration;
 
 use bokehcam::frame::{ColorImage, DepthMap};
+use bokehcam::recording::still::write_color;
 use bokehcam::recording::tum::{Writer, WriterOptions};
 use bokehcam::recording::{Options, Recording, Scratch};
-use tempfile::TempDir;
+use rustix::process::Signal;
+
+use crate::common::noise;
+use crate::program::{Beside, Home, Ran, until};
+
+/// What takes longer hangs.
+const HANG: Duration = Duration::from_secs(120);
 
 /// What a folder holds: names and content, links not followed, without our own list of files.
 fn all(dir: &Path) -> Vec<(String, Vec<u8>)> {
@@ -36,23 +42,6 @@ fn names(dir: &Path) -> Vec<String> {
     all(dir).into_iter().map(|(name, _)| name).collect()
 }
 
-struct Ran {
-    code: Option<i32>,
-    stderr: String,
-}
-
-fn program(home: &Path, args: &[&str]) -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_bokehcam"));
-    command.env_clear().env("XDG_CONFIG_HOME", home).env("PATH", std::env::var_os("PATH").unwrap());
-    command.args(args).current_dir(home).stdin(Stdio::null());
-    command
-}
-
-fn run(home: &Path, args: &[&str]) -> Ran {
-    let output = program(home, args).output().unwrap();
-    Ran { code: output.status.code(), stderr: String::from_utf8(output.stderr).unwrap() }
-}
-
 /// A recording of `frames` frames as `dir`, all of `shade`, with depth.
 fn recording(dir: &Path, frames: u64, shade: u8, metres: f32) {
     let mut writer = Writer::create(dir, &WriterOptions::default()).unwrap();
@@ -75,23 +64,22 @@ fn read(dir: &Path) -> (usize, u8) {
 
 #[test]
 fn a_source_is_never_the_target() {
-    let home = TempDir::new().unwrap();
-    let take = home.path().join("take");
+    let home = Home::new();
+    let take = home.path("take");
     recording(&take, 3, 50, 1.0);
-    symlink(&take, home.path().join("link")).unwrap();
-    let before = all(home.path());
+    symlink(&take, home.path("link")).unwrap();
+    let before = all(home.0.path());
     for target in ["take", "./take/", "link", "take/rgb", "take/new", "link/new", "."] {
-        let ran = run(home.path(), &["record", "take", "--to", target, "--force"]);
-        assert_eq!((ran.code, ran.stderr.lines().count()), (Some(2), 1), "{target}: {}", ran.stderr);
-        assert!(ran.stderr.contains(&format!("--to {target}: this ")), "{}", ran.stderr);
+        let ran = home.run(&["record", "take", "--to", target, "--force"]);
+        ran.refused(2, &[&format!("--to {target}: this ")]);
     }
-    assert_eq!(all(home.path()), before);
+    assert_eq!(all(home.0.path()), before);
 }
 
 #[test]
 fn a_source_that_fails_leaves_the_old_recording() {
-    let home = TempDir::new().unwrap();
-    let at = |name: &str| home.path().join(name);
+    let home = Home::new();
+    let at = |name: &str| home.path(name);
     recording(&at("source"), 4, 50, 1.0);
     recording(&at("old"), 2, 200, 2.0);
     let before = all(&at("old"));
@@ -99,34 +87,27 @@ fn a_source_that_fails_leaves_the_old_recording() {
     // At its first frame: nothing was recorded, and nothing is left.
     let first = fs::read(at("source/rgb/000000.png")).unwrap();
     fs::write(at("source/rgb/000000.png"), &first[..first.len() - 20]).unwrap();
-    let ran = run(home.path(), &["record", "source", "--to", "old", "--force"]);
-    assert_eq!(ran.code, Some(1));
-    assert!(ran.stderr.contains("000000.png: ") && ran.stderr.contains("error: "), "{}", ran.stderr);
+    let ran = home.run(&["record", "source", "--to", "old", "--force"]);
+    ran.failed(1, &["000000.png: "]);
     assert_eq!((all(&at("old")), at("old.incomplete").exists()), (before.clone(), false));
 
     // Later: what was recorded until then is kept beside.
     fs::write(at("source/rgb/000000.png"), first).unwrap();
     fs::write(at("source/rgb/000003.png"), "").unwrap();
-    let ran = run(home.path(), &["record", "source", "--to", "old", "--force"]);
-    assert_eq!(ran.code, Some(1));
-    assert!(
-        ran.stderr.contains("old: as it was") && ran.stderr.contains("3 frames are in old.incomplete"),
-        "{}",
-        ran.stderr
-    );
+    let ran = home.run(&["record", "source", "--to", "old", "--force"]);
+    ran.failed(1, &["old: as it was", "3 frames are in old.incomplete"]);
     assert_eq!((all(&at("old")), read(&at("old.incomplete"))), (before, (3, 50)));
 
     // Where nothing is replaced it has its own name.
-    let ran = run(home.path(), &["record", "source", "--to", "new"]);
-    assert_eq!(ran.code, Some(1));
-    assert!(ran.stderr.contains("new: cut short; the 3 frames until then can be read"), "{}", ran.stderr);
+    let ran = home.run(&["record", "source", "--to", "new"]);
+    ran.failed(1, &["new: cut short; the 3 frames until then can be read"]);
     assert_eq!(read(&at("new")), (3, 50));
 }
 
 #[test]
 fn only_what_the_old_lists_name_goes() {
-    let home = TempDir::new().unwrap();
-    let at = |name: &str| home.path().join(name);
+    let home = Home::new();
+    let at = |name: &str| home.path(name);
     recording(&at("source"), 2, 50, 1.0);
     // As others write them: by time, with lists and files of their own.
     recording(&at("old"), 3, 200, 2.0);
@@ -137,11 +118,11 @@ fn only_what_the_old_lists_name_goes() {
     let foreign = ["old/rgb/1234.png", "old/notes.txt", "old/groundtruth.txt", "outside.png"];
     foreign.iter().for_each(|name| fs::write(at(name), "mine").unwrap());
 
-    let ran = run(home.path(), &["record", "source", "--to", "old"]);
-    assert!(ran.code == Some(1) && ran.stderr.contains("--force"), "{}", ran.stderr);
+    let ran = home.run(&["record", "source", "--to", "old"]);
+    assert!(ran.code == 1 && ran.stderr.contains("--force"), "{}", ran.stderr);
     assert_eq!(read_sloppily(&at("old")), 3);
-    let ran = run(home.path(), &["record", "source", "--to", "old", "--force"]);
-    assert_eq!(ran.code, Some(0), "{}", ran.stderr);
+    let ran = home.run(&["record", "source", "--to", "old", "--force"]);
+    ran.done();
     // Three pictures, three maps, two lists.
     assert!(ran.stderr.contains("2 frames recorded") && ran.stderr.contains("in place of 8 files"), "{}", ran.stderr);
     assert_eq!(read(&at("old")), (2, 50));
@@ -155,8 +136,8 @@ fn only_what_the_old_lists_name_goes() {
     // A picture that would be in the way is nobody's to take.
     fs::write(at("old/rgb/000002.png"), "mine").unwrap();
     recording(&at("longer"), 3, 70, 1.0);
-    let ran = run(home.path(), &["record", "longer", "--to", "old", "--force"]);
-    assert!(ran.code == Some(1) && ran.stderr.contains("old/rgb/000002.png was not written by"), "{}", ran.stderr);
+    let ran = home.run(&["record", "longer", "--to", "old", "--force"]);
+    assert!(ran.code == 1 && ran.stderr.contains("old/rgb/000002.png was not written by"), "{}", ran.stderr);
     assert_eq!(read(&at("old")), (2, 50));
 }
 
@@ -167,47 +148,43 @@ fn read_sloppily(dir: &Path) -> usize {
     (0..recording.len()).filter(|&frame| recording.read_color(frame, &mut scratch, &mut image).is_ok()).count()
 }
 
-/// Runs `record` until it has some frames in `place`, and sends it `signal`.
-fn interrupted(home: &Path, args: &[&str], place: PathBuf, signal: &str) -> Ran {
-    let mut child = program(home, args).stderr(Stdio::piped()).spawn().unwrap();
-    while fs::read_dir(&place).map_or(0, |entries| entries.count()) < 4 {
-        assert!(child.try_wait().unwrap().is_none(), "it ends only when told to");
-        std::thread::sleep(Duration::from_millis(5));
-    }
-    let id = child.id().to_string();
-    assert!(Command::new("kill").args([signal, &id]).status().unwrap().success());
-    let mut stderr = String::new();
-    child.stderr.take().unwrap().read_to_string(&mut stderr).unwrap();
-    Ran { code: child.wait().unwrap().code(), stderr }
+/// Runs `record` until it has some frames in `place`.
+fn begun(home: &Home, args: &[&str], place: PathBuf) -> Beside {
+    let mut run = Beside::start(home.command(args).stderr(Stdio::piped()));
+    until("some frames", HANG, || {
+        assert!(run.runs(), "it ends only when told to");
+        fs::read_dir(&place).map_or(0, |entries| entries.count()) >= 4
+    });
+    run
 }
 
 #[test]
 fn a_recording_that_is_cut_short_is_readable() {
-    let home = TempDir::new().unwrap();
-    let at = |name: &str| home.path().join(name);
+    let home = Home::new();
+    let at = |name: &str| home.path(name);
     recording(&at("old"), 2, 200, 2.0);
     let before = all(&at("old"));
     let endless = ["record", "synthetic", "--size", "64x48", "--to", "old", "--force"];
     let long = [&endless[..], &["--frames", "1000000"]].concat();
 
-    let ran = interrupted(home.path(), &long, at("old/.bokehcam.part/rgb"), "-INT");
-    assert_eq!(ran.code, Some(0), "{}", ran.stderr);
+    let ran = begun(&home, &long, at("old/.bokehcam.part/rgb")).end_by(Signal::INT, HANG);
+    ran.done();
     assert!(ran.stderr.contains("old: as it was") && ran.stderr.contains("are in old.incomplete"), "{}", ran.stderr);
     assert_eq!(all(&at("old")), before);
     assert!(read(&at("old.incomplete")).0 >= 3);
 
     // Killed: the next one keeps what there is.
-    interrupted(home.path(), &long, at("old/.bokehcam.part/rgb"), "-KILL");
+    drop(begun(&home, &long, at("old/.bokehcam.part/rgb")));
     let once = [&endless[..], &["--frames", "1"]].concat();
-    let ran = run(home.path(), &once);
-    assert_eq!(ran.code, Some(0), "{}", ran.stderr);
+    let ran = home.run(&once);
+    ran.done();
     assert!(ran.stderr.contains("is kept as old.incomplete.2"), "{}", ran.stderr);
     assert!(read(&at("old.incomplete.2")).0 >= 2);
     assert_eq!(read(&at("old")).0, 1);
 
     // Without an end of its own it ends where it is told to.
-    let ran = interrupted(home.path(), &endless, at("old/.bokehcam.part/rgb"), "-INT");
-    assert_eq!(ran.code, Some(0), "{}", ran.stderr);
+    let ran = begun(&home, &endless, at("old/.bokehcam.part/rgb")).end_by(Signal::INT, HANG);
+    ran.done();
     assert!(ran.stderr.contains("in place of 4 files"), "{}", ran.stderr);
     assert!(read(&at("old")).0 >= 3);
     assert!(!names(&at("old")).iter().any(|name| name.contains("part")));
@@ -215,12 +192,12 @@ fn a_recording_that_is_cut_short_is_readable() {
 
 #[test]
 fn a_killed_recording_gets_its_lists() {
-    let home = TempDir::new().unwrap();
-    let at = |name: &str| home.path().join(name);
+    let home = Home::new();
+    let at = |name: &str| home.path(name);
     let args = ["record", "synthetic", "--size", "64x48", "--to", "new"];
-    interrupted(home.path(), &args, at("new/rgb"), "-KILL");
-    let ran = run(home.path(), &args);
-    assert!(ran.code == Some(1) && ran.stderr.contains("rgb.txt: completed, as far as"), "{}", ran.stderr);
+    drop(begun(&home, &args, at("new/rgb")));
+    let ran = home.run(&args);
+    assert!(ran.code == 1 && ran.stderr.contains("rgb.txt: completed, as far as"), "{}", ran.stderr);
     assert!(read(&at("new")).0 >= 2);
     assert!(!names(&at("new")).iter().any(|name| name.ends_with(".part")), "{:?}", names(&at("new")));
 }
@@ -228,32 +205,19 @@ fn a_killed_recording_gets_its_lists() {
 /// No file may be larger than a limit, as on a disk that is full.
 #[test]
 fn a_full_disk_leaves_no_half_picture() {
-    let home = TempDir::new().unwrap();
-    let at = |name: &str| home.path().join(name);
+    let home = Home::new();
+    let at = |name: &str| home.path(name);
     recording(&at("source"), 3, 50, 1.0);
     // One that is hard to compress.
-    let mut state = 1_u32;
-    let mut noise = image::RgbImage::new(24, 16);
-    noise.iter_mut().for_each(|byte| {
-        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-        *byte = (state >> 24) as u8;
-    });
-    noise.save(at("source/rgb/000002.png")).unwrap();
+    write_color(&at("source/rgb/000002.png"), &noise(24, 16), true).unwrap();
     for (target, kept) in [("new", "new"), ("old", "old.incomplete")] {
         if target != kept {
             recording(&at(target), 1, 200, 2.0);
         }
-        let line = format!(
-            "trap '' XFSZ; ulimit -f 1; exec {} record source --to {target} --force",
-            env!("CARGO_BIN_EXE_bokehcam")
-        );
-        let mut shell = Command::new("sh");
-        shell.args(["-c", &line]).current_dir(home.path()).env("XDG_CONFIG_HOME", home.path());
-        let output = shell.output().unwrap();
-        let stderr = String::from_utf8(output.stderr).unwrap();
-        assert_eq!(output.status.code(), Some(1), "{stderr}");
-        assert!(stderr.contains("rgb/000002.png") && stderr.contains("large"), "{stderr}");
-        assert_eq!(read(&at(kept)), (2, 50), "{stderr}");
+        let limit = "trap '' XFSZ; ulimit -f 1;";
+        let ran = Ran::of(&mut home.shell(limit, &format!("record source --to {target} --force")));
+        ran.failed(1, &["rgb/000002.png", "large"]);
+        assert_eq!(read(&at(kept)), (2, 50), "{}", ran.stderr);
         assert!(
             !names(&at(kept)).iter().any(|name| name.contains("part") || name == "rgb/000002.png"),
             "{:?}",
@@ -265,16 +229,16 @@ fn a_full_disk_leaves_no_half_picture() {
 
 #[test]
 fn depth_that_a_wrong_scale_makes_is_doubted() {
-    let home = TempDir::new().unwrap();
-    let at = |name: &str| home.path().join(name);
+    let home = Home::new();
+    let at = |name: &str| home.path(name);
     recording(&at("source"), 2, 50, 1.5);
     for (scale, says) in [("5", "all depth is 1500.0 m away or more"), ("1e7", "all depth is nearer than 0.8 mm")] {
-        let ran = run(home.path(), &["record", "source", "--depth-scale", scale, "--to", "new", "--force"]);
-        assert_eq!(ran.code, Some(0), "{}", ran.stderr);
+        let ran = home.run(&["record", "source", "--depth-scale", scale, "--to", "new", "--force"]);
+        ran.done();
         assert_eq!(ran.stderr.matches(says).count(), 1, "{}", ran.stderr);
         assert_eq!(ran.stderr.matches("--depth-scale").count(), 1, "{}", ran.stderr);
         assert_eq!(ran.stderr.contains("100.0 % of the depth lies beyond 13.1 m"), scale == "5", "{}", ran.stderr);
     }
-    let ran = run(home.path(), &["record", "source", "--to", "new", "--force", "-v"]);
-    assert!(ran.code == Some(0) && !ran.stderr.contains("depth-scale"), "{}", ran.stderr);
+    let ran = home.run(&["record", "source", "--to", "new", "--force", "-v"]);
+    assert!(ran.code == 0 && !ran.stderr.contains("depth-scale"), "{}", ran.stderr);
 }

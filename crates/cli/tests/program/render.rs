@@ -2,44 +2,37 @@
 #![allow(missing_docs)]
 
 use std::path::Path;
-use std::process::{Command, Stdio};
 
 use bokehcam::frame::ColorImage;
 use bokehcam::recording::Extras;
 use bokehcam::recording::still::{read_photo, write_photo};
 use image::{ImageBuffer, Rgba};
-use tempfile::TempDir;
 
-/// Runs a command with these arguments in `dir`; gives the exit code, and what was said.
-fn bokehcam(dir: &Path, command: &[&str], arguments: &[&str]) -> (Option<i32>, String) {
-    let mut program = Command::new(env!("CARGO_BIN_EXE_bokehcam"));
-    program.env_clear().env("XDG_CONFIG_HOME", dir).current_dir(dir).stdin(Stdio::null());
-    let output = program.args(command).args(arguments).args(["--backend", "cpu"]).output().unwrap();
-    (output.status.code(), String::from_utf8(output.stderr).unwrap())
+use crate::common::color;
+use crate::program::{Home, Ran, STEREO};
+
+/// Runs a command with these arguments on the CPU.
+fn on_cpu(home: &Home, command: &[&str], arguments: &[&str]) -> Ran {
+    home.run(&[command, arguments, &["--backend", "cpu"]].concat())
 }
 
 /// Runs `render`.
-fn run(dir: &Path, arguments: &[&str]) -> (Option<i32>, String) {
-    bokehcam(dir, &["render"], arguments)
+fn run(home: &Home, arguments: &[&str]) -> Ran {
+    on_cpu(home, &["render"], arguments)
 }
 
-/// Blurs `image` in `dir`; gives what was said.
-fn render(dir: &Path, image: &str, out: &str) -> String {
-    let (code, said) = run(dir, &[image, "--effect", "blur", "--coc-at-infinity", "3", "--out", out]);
-    assert_eq!(code, Some(0), "{said}");
-    said
+/// Blurs `image`; gives what was said.
+fn render(home: &Home, image: &str, out: &str) -> String {
+    run(home, &[image, "--effect", "blur", "--coc-at-infinity", "3", "--out", out]).done().to_owned()
 }
 
 /// Checks of 8 by 8 pixels, light on the left half and dark on the right.
-fn halves(dir: &Path) -> ColorImage {
-    let mut picture = ColorImage::new(160, 96);
-    for (k, pixel) in picture.rgb.chunks_exact_mut(3).enumerate() {
-        let (x, y) = (k % 160, k / 160);
+fn halves(home: &Home) -> ColorImage {
+    let picture = color(160, 96, |x, y| {
         let check = if (x / 8 + y / 8) % 2 == 0 { 60 } else { 0 };
-        let code = if x < 80 { 180 + check } else { 20 + check };
-        pixel.fill(code as u8);
-    }
-    write_photo(&dir.join("in.png"), &picture, &Extras::default(), false).unwrap();
+        [if x < 80 { 180 + check } else { 20 + check }; 3]
+    });
+    write_photo(&home.path("in.png"), &picture, &Extras::default(), false).unwrap();
     picture
 }
 
@@ -54,7 +47,7 @@ fn difference(a: &ColorImage, b: &ColorImage, columns: std::ops::Range<usize>) -
 
 #[test]
 fn what_goes_with_a_picture_stays_with_it() {
-    let dir = TempDir::new().unwrap();
+    let home = Home::new();
     let mut profile = vec![7; 200];
     profile[16..20].copy_from_slice(b"RGB ");
     // One entry, the name of the camera.
@@ -62,33 +55,33 @@ fn what_goes_with_a_picture_stays_with_it() {
     let xmp =
         "<x:xmpmeta xmlns:x=\"adobe:ns:meta/\"><rdf:Description dc:rights=\"Mine, \u{e4}\"/></x:xmpmeta>".to_owned();
     let extras = Extras { icc_profile: Some(profile), exif: Some(exif), xmp: Some(xmp), ..Extras::default() };
-    write_photo(&dir.path().join("in.jpg"), &ColorImage::new(40, 30), &extras, false).unwrap();
+    write_photo(&home.path("in.jpg"), &ColorImage::new(40, 30), &extras, false).unwrap();
     for out in ["out.png", "out.jpg"] {
-        let said = render(dir.path(), "in.jpg", out);
+        let said = render(&home, "in.jpg", out);
         assert_eq!(said.lines().count(), 1, "{said}");
-        assert_eq!(read_photo(&dir.path().join(out)).unwrap().1, extras, "{out}");
+        assert_eq!(read_photo(&home.path(out)).unwrap().1, extras, "{out}");
     }
 }
 
 #[test]
 fn what_does_not_fit_is_said_once() {
-    let dir = TempDir::new().unwrap();
-    ImageBuffer::<Rgba<u16>, _>::from_pixel(40, 30, [1, 2, 3, 4].into()).save(dir.path().join("in.png")).unwrap();
-    let said = render(dir.path(), "in.png", "out.png");
+    let home = Home::new();
+    ImageBuffer::<Rgba<u16>, _>::from_pixel(40, 30, [1, 2, 3, 4].into()).save(home.path("in.png")).unwrap();
+    let said = render(&home, "in.png", "out.png");
     assert_eq!(said.lines().count(), 2, "{said}");
     assert!(said.starts_with("note: not in out.png: transparency, 16 bits a channel\n"), "{said}");
 }
 
 #[test]
 fn a_mask_says_what_stays_sharp_in_any_size() {
-    let dir = TempDir::new().unwrap();
-    let picture = halves(dir.path());
+    let home = Home::new();
+    let picture = halves(&home);
     // A twentieth of the picture's size, and its first column and a half white.
     let mask = image::GrayImage::from_fn(10, 6, |x, _| [if x < 5 { 255 } else { 0 }].into());
-    mask.save(dir.path().join("mask.png")).unwrap();
-    let (code, said) = run(dir.path(), &["in.png", "--mask", "mask.png", "--coc-at-infinity", "8", "--out", "out.png"]);
-    assert_eq!((code, said.lines().count()), (Some(0), 1), "{said}");
-    let out = read_photo(&dir.path().join("out.png")).unwrap().0;
+    mask.save(home.path("mask.png")).unwrap();
+    let ran = run(&home, &["in.png", "--mask", "mask.png", "--coc-at-infinity", "8", "--out", "out.png"]);
+    assert_eq!(ran.done().lines().count(), 1, "{}", ran.stderr);
+    let out = read_photo(&home.path("out.png")).unwrap().0;
     assert_eq!(difference(&picture, &out, 0..70), 0.0, "the subject is not touched");
     assert!(difference(&picture, &out, 90..160) > 10.0);
     // The outline lies where the colours have it, though the mask is coarse.
@@ -100,42 +93,39 @@ fn a_mask_says_what_stays_sharp_in_any_size() {
             "leave --depth-map and --mask out",
         ),
     ] {
-        let (code, said) = run(dir.path(), &arguments);
-        assert_eq!(code, Some(2), "{said}");
-        assert!(said.contains(expected), "{said}");
+        run(&home, &arguments).failed(2, &[expected]);
     }
 }
 
 #[test]
 fn relative_inverse_depth_has_white_near_or_far() {
-    let dir = TempDir::new().unwrap();
-    let picture = halves(dir.path());
+    let home = Home::new();
+    let picture = halves(&home);
     let near_left = image::GrayImage::from_fn(160, 96, |x, _| [if x < 80 { 200 } else { 40 }].into());
-    near_left.save(dir.path().join("near.png")).unwrap();
+    near_left.save(home.path("near.png")).unwrap();
     let mut far_left = near_left;
     far_left.pixels_mut().for_each(|pixel| pixel.0[0] = 240 - pixel.0[0]);
-    far_left.save(dir.path().join("far.png")).unwrap();
+    far_left.save(home.path("far.png")).unwrap();
     let blur = |map: &str, out: &str, more: &[&str]| {
         let arguments =
             [&["in.png", "--depth-map", map, "--depth-unit", "inverse", "--focus", "0.2,0.5", "--out", out], more]
                 .concat();
-        let (code, said) = run(dir.path(), &arguments);
-        assert_eq!(code, Some(0), "{said}");
-        read_photo(&dir.path().join(out)).unwrap().0
+        run(&home, &arguments).done();
+        read_photo(&home.path(out)).unwrap().0
     };
     let (near, inverted) = (blur("near.png", "a.png", &[]), blur("far.png", "b.png", &["--depth-invert"]));
     assert_eq!(near, inverted);
     assert_eq!(difference(&picture, &near, 0..70), 0.0);
     assert!(difference(&picture, &near, 90..160) > 5.0);
-    let (code, said) = run(dir.path(), &["in.png", "--depth-map", "near.png", "--out", "no.png"]);
-    assert_eq!(code, Some(1), "8 bits are too few for metres: {said}");
+    let ran = run(&home, &["in.png", "--depth-map", "near.png", "--out", "no.png"]);
+    assert_eq!(ran.code, 1, "8 bits are too few for metres: {}", ran.stderr);
 }
 
 #[test]
 fn a_recording_may_have_relative_inverse_depth() {
-    let dir = TempDir::new().unwrap();
-    let picture = halves(dir.path());
-    let at = |name: &str| dir.path().join(name);
+    let home = Home::new();
+    let picture = halves(&home);
+    let at = |name: &str| home.path(name);
     std::fs::create_dir_all(at("rec/rgb")).unwrap();
     std::fs::rename(at("in.png"), at("rec/rgb/0.png")).unwrap();
     std::fs::create_dir(at("rec/depth")).unwrap();
@@ -144,9 +134,8 @@ fn a_recording_may_have_relative_inverse_depth() {
     near_left.save(at("rec/depth/0.png")).unwrap();
     std::fs::write(at("rec/rgb.txt"), "0 rgb/0.png\n").unwrap();
     std::fs::write(at("rec/depth.txt"), "0 depth/0.png\n").unwrap();
-    let stream = |more: &[&str]| bokehcam(dir.path(), &["stream", "rec", "--to", "out/", "--force"], more);
-    let (code, said) = stream(&["--depth-unit", "inverse", "--focus", "0.2,0.5", "--coc-at-infinity", "8"]);
-    assert_eq!(code, Some(0), "{said}");
+    let stream = |more: &[&str]| on_cpu(&home, &["stream", "rec", "--to", "out/", "--force"], more);
+    stream(&["--depth-unit", "inverse", "--focus", "0.2,0.5", "--coc-at-infinity", "8"]).done();
     let mut written = std::fs::read_dir(at("out")).unwrap().map(|entry| entry.unwrap().path());
     let first = written.find(|path| path.extension().is_some_and(|extension| extension == "png"));
     let blurred = read_photo(&first.unwrap()).unwrap().0;
@@ -157,30 +146,29 @@ fn a_recording_may_have_relative_inverse_depth() {
         (&["--depth-unit", "inverse", "--depth-scale", "1000"], 0, "relative depth has no scale"),
         (&["--depth-invert"], 1, "depth.txt:1"),
     ] {
-        let (came, said) = stream(arguments);
-        assert!(came == Some(code) && said.contains(part), "{arguments:?}: {came:?} {said}");
+        let ran = stream(arguments);
+        assert!(ran.code == code && ran.stderr.contains(part), "{arguments:?}: {ran:?}");
     }
 }
 
 /// What is valid and hardly meant is said in one line, and done.
-fn warned(dir: &Path, command: &[&str], arguments: &[&str], expected: &str) {
-    let (code, said) = bokehcam(dir, command, &[arguments, &["--force"]].concat());
-    let warnings: Vec<&str> = said.lines().filter(|line| line.contains("warning") || line.contains("WARN")).collect();
-    assert_eq!((code, warnings.len()), (Some(0), 1), "{arguments:?}: {said}");
-    assert!(warnings[0].contains(expected), "{arguments:?}: {said}");
+#[track_caller]
+fn warned(home: &Home, command: &[&str], arguments: &[&str], expected: &str) {
+    let ran = on_cpu(home, command, &[arguments, &["--force"]].concat());
+    assert!(ran.warning().contains(expected), "{arguments:?}: {}", ran.stderr);
 }
 
 #[test]
 fn pictures_in_the_wrong_place_are_said() {
-    let dir = TempDir::new().unwrap();
-    halves(dir.path());
+    let home = Home::new();
+    halves(&home);
     for (name, code) in [("white.png", 255), ("black.png", 0), ("grey.png", 128)] {
-        image::GrayImage::from_pixel(16, 9, [code].into()).save(dir.path().join(name)).unwrap();
+        image::GrayImage::from_pixel(16, 9, [code].into()).save(home.path(name)).unwrap();
     }
-    image::GrayImage::new(90, 160).save(dir.path().join("tall.png")).unwrap();
+    image::GrayImage::new(90, 160).save(home.path("tall.png")).unwrap();
     let units = |name: &str, at: fn(u32) -> u16| {
         let map = ImageBuffer::<image::Luma<u16>, _>::from_fn(160, 96, |x, _| [at(x)].into());
-        map.save(dir.path().join(name)).unwrap();
+        map.save(home.path(name)).unwrap();
     };
     units("unknown.png", |_| 0);
     units("flat.png", |_| 5000);
@@ -194,27 +182,26 @@ fn pictures_in_the_wrong_place_are_said() {
         ("--depth-map", "flat.png", "1.000 m away"),
         ("--depth-map", "mm.png", "add --depth-scale 1000"),
     ] {
-        warned(dir.path(), &["render"], &["in.png", option, file, "--refine", "off", "--out", "out.png"], expected);
+        warned(&home, &["render"], &["in.png", option, file, "--refine", "off", "--out", "out.png"], expected);
     }
     for (map, expected) in [("in.png", "the picture itself, and no depth"), ("grey.png", "one value all over")] {
         let inverse = ["in.png", "--depth-map", map, "--depth-unit", "inverse", "--refine", "off", "--out", "out.png"];
-        let (_, said) = run(dir.path(), &[&inverse[..], &["--force"]].concat());
-        assert!(said.contains(expected), "{said}");
+        let ran = run(&home, &[&inverse[..], &["--force"]].concat());
+        assert!(ran.stderr.contains(expected), "{}", ran.stderr);
     }
-    let (code, said) = run(dir.path(), &["in.png", "--mask", "tall.png", "--out", "no.png"]);
-    assert!(code == Some(1) && said.contains("tall.png: the mask is 90x160"), "{said}");
+    run(&home, &["in.png", "--mask", "tall.png", "--out", "no.png"]).failed(1, &["tall.png: the mask is 90x160"]);
     // What is meant is not warned of.
     let meant = ["in.png", "--depth-map", "mm.png", "--depth-scale", "1000", "--refine", "off", "--out", "meant.png"];
-    let (code, said) = run(dir.path(), &meant);
-    assert_eq!((code, said.lines().count()), (Some(0), 1), "{said}");
+    let ran = run(&home, &meant);
+    assert_eq!(ran.done().lines().count(), 1, "{}", ran.stderr);
 }
 
 #[test]
 fn numbers_in_the_wrong_unit_are_said() {
-    let dir = TempDir::new().unwrap();
-    halves(dir.path());
+    let home = Home::new();
+    halves(&home);
     let map = ImageBuffer::<image::Luma<u16>, _>::from_fn(160, 96, |x, _| [if x < 80 { 5000 } else { 15000 }].into());
-    map.save(dir.path().join("map.png")).unwrap();
+    map.save(home.path("map.png")).unwrap();
     let lens = |focal: &'static str, sensor: &'static str| {
         ["--f-number", "2", "--focal-length", focal, "--sensor-width", sensor, "--focus", "1"]
     };
@@ -224,35 +211,27 @@ fn numbers_in_the_wrong_unit_are_said() {
         (&lens("5000", "36"), "a lens of 5000 mm"),
     ] {
         let picture = ["in.png", "--depth-map", "map.png", "--refine", "off", "--out", "out.png"];
-        warned(dir.path(), &["render"], &[&picture[..], numbers].concat(), expected);
+        warned(&home, &["render"], &[&picture[..], numbers].concat(), expected);
     }
-    let (_, said) = run(
-        dir.path(),
-        &["in.png", "--depth-map", "map.png", "--depth-scale", "0.001", "--refine", "off", "--out", "s.png"],
-    );
-    assert!(said.contains("there are 1000 to a metre"), "{said}");
+    let scaled = ["in.png", "--depth-map", "map.png", "--depth-scale", "0.001", "--refine", "off", "--out", "s.png"];
+    let ran = run(&home, &scaled);
+    assert!(ran.stderr.contains("there are 1000 to a metre"), "{}", ran.stderr);
 }
 
 #[test]
 fn one_picture_for_both_eyes_and_eyes_far_apart_are_said() {
-    let dir = TempDir::new().unwrap();
-    let pair = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("recordings/stereo");
+    let home = Home::new();
     let eye = |folder: &str| {
         let mut files: Vec<_> =
-            std::fs::read_dir(pair.join(folder)).unwrap().map(|entry| entry.unwrap().path()).collect();
+            std::fs::read_dir(Path::new(STEREO).join(folder)).unwrap().map(|entry| entry.unwrap().path()).collect();
         files.sort();
         files[0].to_str().unwrap().to_owned()
     };
     let (left, right) = (eye("image_2"), eye("image_3"));
     let out = ["--out", "d.pfm"];
-    warned(dir.path(), &["depth", &left, &left], &out, "left and right are one picture");
+    warned(&home, &["depth", &left, &left], &out, "left and right are one picture");
     let apart = ["--focal-px", "700", "--baseline-m", "60", "--metres", "--out", "d.pfm"];
-    warned(
-        dir.path(),
-        &["depth", &left, &right],
-        &apart,
-        "60 m between the eyes; if that is in millimetres, it is 0.06 m",
-    );
-    let (code, said) = bokehcam(dir.path(), &["depth", &left, &right, "--force"], &out);
-    assert!(code == Some(0) && !said.contains("warning"), "{said}");
+    warned(&home, &["depth", &left, &right], &apart, "60 m between the eyes; if that is in millimetres, it is 0.06 m");
+    let ran = on_cpu(&home, &["depth", &left, &right, "--force"], &out);
+    assert!(!ran.done().contains("warning"), "{}", ran.stderr);
 }

@@ -2,31 +2,14 @@
 //! refused.
 
 use crate::planes;
+use crate::program::{PORTRAIT, STEREO, run};
 
 use std::fs;
 use std::path::Path;
-use std::process::{Command, Stdio};
 
 use bokehcam::frame::{ColorImage, DepthMap, GrayImage};
 use bokehcam::recording::tum::{Writer, WriterOptions};
 use bokehcam::recording::{Options, Recording, Scratch};
-
-struct Ran {
-    code: i32,
-    stderr: String,
-}
-
-fn bokehcam(args: &[&str]) -> Ran {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_bokehcam"));
-    for (name, _) in std::env::vars_os() {
-        if name.to_string_lossy().starts_with("BOKEHCAM_") {
-            command.env_remove(name);
-        }
-    }
-    let command = command.env("XDG_CONFIG_HOME", "/nowhere").env_remove("RUST_LOG").args(args).stdin(Stdio::null());
-    let output = command.output().unwrap();
-    Ran { code: output.status.code().expect("ended by itself"), stderr: String::from_utf8(output.stderr).unwrap() }
-}
 
 fn path(folder: &Path) -> &str {
     folder.to_str().unwrap()
@@ -58,8 +41,7 @@ fn side_by_side(more: u32) -> tempfile::TempDir {
 /// A photograph as both eyes would see it 12 pixels from infinity: what a pair is can be told by many points only.
 fn photograph() -> (ColorImage, GrayImage) {
     const DISPARITY_PX: usize = 12;
-    let folder = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("recordings/portrait");
-    let recording = Recording::open(&folder, &Options::default()).unwrap();
+    let recording = Recording::open(Path::new(PORTRAIT), &Options::default()).unwrap();
     let (mut left, mut right) = (ColorImage::default(), GrayImage::default());
     recording.read_color(0, &mut Scratch::default(), &mut left).unwrap();
     right.set_luma_of(&left);
@@ -93,8 +75,7 @@ fn blurred(source: &Path, more: &[&str]) -> (f64, f64) {
     let out = tempfile::tempdir().unwrap();
     let to = format!("{}/", path(&out.path().join("out")));
     let args = ["stream", path(source), "--to", &to, "--frames", "1", "--focus", "0.5,0.5", "--coc-at-infinity", "8"];
-    let ran = bokehcam(&[&args[..], &["--backend", "cpu"], more].concat());
-    assert_eq!(ran.code, 0, "{}", ran.stderr);
+    run(&[&args[..], &["--backend", "cpu"], more].concat()).done();
     let written = Path::new(&to).join("000000.png");
     let picture = image::open(written).unwrap().into_rgb8();
     assert_eq!(picture.dimensions(), planes::SIZE);
@@ -130,9 +111,8 @@ fn a_pair_that_is_not_what_it_was_said_to_be_is_said_in_one_line() {
         let folder = recording_of(&left, &right, 0);
         let source = folder.path().join("wide");
         let args = ["stream", path(&source), "--side-by-side", "--rectified", "--to", "null", "--backend", "cpu"];
-        let ran = bokehcam(&args);
-        assert_eq!(ran.code, 0, "{}", ran.stderr);
-        ran.stderr.lines().filter(|line| line.starts_with("warning: ")).map(str::to_owned).collect::<Vec<_>>()
+        let ran = run(&args);
+        ran.done().lines().filter(|line| line.starts_with("warning: ")).map(str::to_owned).collect::<Vec<_>>()
     };
     assert_eq!(said(&|_, _| {}), Vec::<String>::new());
     // The right eye looks 5 rows lower.
@@ -152,16 +132,14 @@ fn metres_are_those_of_the_rig() {
     let focused = |focus: &str| {
         let out = tempfile::tempdir().unwrap();
         let to = path(&out.path().join("out.y4m")).to_owned();
-        let ran = bokehcam(&["stream", path(pair.path()), "--to", &to, "--focus", focus, "--backend", "cpu"]);
-        assert_eq!(ran.code, 0, "{}", ran.stderr);
+        run(&["stream", path(pair.path()), "--to", &to, "--focus", focus, "--backend", "cpu"]).done();
         fs::read(to).unwrap()
     };
     assert_ne!(focused("2.5"), focused("10"));
 
     let out = tempfile::tempdir().unwrap();
     let to = out.path().join("recorded");
-    let ran = bokehcam(&["record", path(pair.path()), "--to", path(&to)]);
-    assert_eq!(ran.code, 0, "{}", ran.stderr);
+    run(&["record", path(pair.path()), "--to", path(&to)]).done();
     let recorded = Recording::open(&to, &Options::default()).unwrap();
     let mut map = DepthMap::default();
     recorded.read_depth(0, &mut Scratch::default(), &mut map).unwrap();
@@ -198,10 +176,7 @@ fn what_does_not_fit_two_eyes_costs_one_line_and_exit_code_2() {
         (pair, &["--depth", "stereo", "--effect", "blur"], "--effect dof"),
     ];
     for (source, more, said) in cases {
-        let ran = bokehcam(&[&["stream", path(source), "--to", "null"], *more].concat());
-        assert_eq!(ran.code, 2, "{more:?}: {}", ran.stderr);
-        assert!(ran.stderr.starts_with("error: ") && ran.stderr.contains(said), "{more:?}: {}", ran.stderr);
-        assert_eq!(ran.stderr.lines().count(), 1, "{}", ran.stderr);
+        run(&[&["stream", path(source), "--to", "null"], *more].concat()).refused(2, &[said]);
     }
 }
 
@@ -210,12 +185,11 @@ fn what_does_not_fit_two_eyes_costs_one_line_and_exit_code_2() {
 fn near_things_beyond_the_range_are_found_or_said() {
     let out = tempfile::tempdir().unwrap();
     let stream = |name: &str, more: &[&str]| {
-        let (source, to) =
-            (concat!(env!("CARGO_MANIFEST_DIR"), "/../../recordings/stereo"), out.path().join(name).join(""));
-        let all = ["stream", source, "--depth", "stereo", "--frames", "2", "--backend", "cpu", "--to", path(&to)];
-        let ran = bokehcam(&[&all, more].concat());
-        assert_eq!(ran.code, 0, "{}", ran.stderr);
-        (fs::read(to.join("000001.png")).unwrap(), ran.stderr)
+        let to = out.path().join(name).join("");
+        let all = ["stream", STEREO, "--depth", "stereo", "--frames", "2", "--backend", "cpu", "--to", path(&to)];
+        let ran = run(&[&all, more].concat());
+        let said = ran.done().to_owned();
+        (fs::read(to.join("000001.png")).unwrap(), said)
     };
     let (found, said) = stream("default", &[]);
     let (wide, _) = stream("wide", &["--max-disparity", "96"]);
@@ -229,8 +203,8 @@ fn near_things_beyond_the_range_are_found_or_said() {
 fn a_calibration_that_cannot_be_read_is_named() {
     let wide = side_by_side(0);
     let wide = wide.path().join("wide");
-    let ran = bokehcam(&["stream", path(&wide), "--to", "null", "--side-by-side", "--calib", "nowhere.yml"]);
-    assert!(ran.code == 1 && ran.stderr.contains("nowhere.yml") && ran.stderr.lines().count() == 1, "{}", ran.stderr);
+    let nowhere = ["stream", path(&wide), "--to", "null", "--side-by-side", "--calib", "nowhere.yml"];
+    run(&nowhere).refused(1, &["nowhere.yml"]);
     // Eyes that are exchanged, in millimetres of unknown pictures: one line all the same.
     let calib = wide.with_file_name("calib.yml");
     let camera =
@@ -241,13 +215,11 @@ fn a_calibration_that_cannot_be_read_is_named() {
         let place = format!("!!opencv-matrix\n   rows: 3\n   cols: 1\n   dt: d\n   data: [{x_mm}., 0., 0.]\n");
         let text = format!("%YAML:1.0\n---\nM1: {camera}D1: {none}M2: {camera}D2: {none}R: {rotation}T: {place}");
         fs::write(&calib, text).unwrap();
-        bokehcam(&["stream", path(&wide), "--to", "null", "--side-by-side", "--calib", path(&calib), "--focus", "2"])
+        run(&["stream", path(&wide), "--to", "null", "--side-by-side", "--calib", path(&calib), "--focus", "2"])
     };
-    let exchanged = with(100);
-    assert!(exchanged.code == 1 && exchanged.stderr.contains("exchange"), "{}", exchanged.stderr);
-    assert_eq!(exchanged.stderr.lines().count(), 1, "{}", exchanged.stderr);
+    with(100).refused(1, &["exchange"]);
     let good = with(-100);
-    assert!(good.code == 0 && good.stderr.contains("taken as millimetres"), "{}", good.stderr);
+    assert!(good.done().contains("taken as millimetres"), "{}", good.stderr);
 }
 
 #[test]
@@ -262,9 +234,7 @@ fn two_cameras_are_two_cameras() {
         (&["/dev/null,/dev/zero", "--rectified"], 1, "/dev/null: this is no camera"),
     ];
     for (args, code, said) in cases {
-        let ran = bokehcam(&[&["stream", "--to", "null"], *args].concat());
-        assert_eq!(ran.code, *code, "{args:?}: {}", ran.stderr);
-        assert!(ran.stderr.contains(said) && ran.stderr.lines().count() == 1, "{args:?}: {}", ran.stderr);
+        run(&[&["stream", "--to", "null"], *args].concat()).refused(*code, &[said]);
     }
 }
 
@@ -278,6 +248,5 @@ fn a_folder_with_a_comma_is_a_folder() {
         let entry = entry.unwrap().path();
         fs::copy(&entry, with_comma.join(entry.file_name().unwrap())).unwrap();
     }
-    let ran = bokehcam(&["stream", path(&with_comma), "--to", "null", "--quiet"]);
-    assert_eq!(ran.code, 0, "{}", ran.stderr);
+    run(&["stream", path(&with_comma), "--to", "null", "--quiet"]).done();
 }

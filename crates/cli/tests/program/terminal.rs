@@ -6,26 +6,18 @@ use std::io::{BufRead, BufReader, ErrorKind, Read, Write};
 use std::os::fd::{AsFd, OwnedFd};
 use std::os::unix::fs::OpenOptionsExt;
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, ExitStatus, Stdio};
+use std::process::Stdio;
 use std::thread;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use rustix::fs::OFlags;
 use rustix::ioctl::{Getter, Setter, ioctl, opcode};
-use rustix::process::{Pid, Signal, kill_process};
+use rustix::process::Signal;
+
+use crate::program::{Beside, Home, PORTRAIT};
 
 /// What takes longer hangs.
 const HANG: Duration = Duration::from_secs(60);
-
-fn portrait() -> PathBuf {
-    Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("recordings/portrait")
-}
-
-fn bokehcam(args: &[&str]) -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_bokehcam"));
-    command.env("XDG_CONFIG_HOME", "/nonexistent").env_remove("RUST_LOG").args(args).stdin(Stdio::null());
-    command
-}
 
 /// A terminal: its screen, from which can be read what is printed, and its name for programs.
 fn terminal() -> (File, PathBuf) {
@@ -70,20 +62,6 @@ fn fill_up(mut file: impl Write) -> usize {
     written
 }
 
-/// Waits for the end; ends what hangs.
-fn ended(child: &mut Child) -> Option<ExitStatus> {
-    let began = Instant::now();
-    while began.elapsed() < HANG {
-        if let Some(status) = child.try_wait().unwrap() {
-            return Some(status);
-        }
-        thread::sleep(Duration::from_millis(5));
-    }
-    child.kill().unwrap();
-    child.wait().unwrap();
-    None
-}
-
 /// Counts the frames of a y4m stream of 320 x 240 pixels as they come.
 fn frames(stream: impl Read + Send + 'static) -> std::sync::mpsc::Receiver<()> {
     let (told, frames) = std::sync::mpsc::channel();
@@ -107,20 +85,14 @@ fn a_terminal_that_is_not_read_stops_no_frame_and_no_end() {
     let (_screen, name) = terminal();
     let slave = open_terminal(&name);
     fill(&name);
-    let source = portrait();
-    let args =
-        ["stream", source.to_str().unwrap(), "--loop", "--effect", "none", "--pace", "realtime", "--to", "-", "-vv"];
-    let mut child = bokehcam(&args).stdout(Stdio::piped()).stderr(slave).spawn().unwrap();
-    let frames = frames(child.stdout.take().unwrap());
+    let home = Home::new();
+    let args = ["stream", PORTRAIT, "--loop", "--effect", "none", "--pace", "realtime", "--to", "-", "-vv"];
+    let mut run = Beside::start(home.command(&args).stdout(Stdio::piped()).stderr(slave));
+    let frames = frames(run.0.stdout.take().unwrap());
     for frame in 0..30 {
-        if frames.recv_timeout(HANG).is_err() {
-            child.kill().unwrap();
-            panic!("frame {frame} does not come");
-        }
+        frames.recv_timeout(HANG).unwrap_or_else(|_| panic!("frame {frame} does not come"));
     }
-    kill_process(Pid::from_child(&child), Signal::TERM).unwrap();
-    let status = ended(&mut child).expect("a termination signal ends it");
-    assert!(status.success(), "{status}");
+    run.end_by(Signal::TERM, HANG).done();
 }
 
 #[test]
@@ -130,22 +102,23 @@ fn a_reader_of_errors_that_stands_still_stops_no_end() {
     rustix::fs::fcntl_setfl(&writer, flags | OFlags::NONBLOCK).unwrap();
     fill_up(File::from(writer.try_clone().unwrap()));
     rustix::fs::fcntl_setfl(writer.as_fd(), flags).unwrap();
-    let mut child = bokehcam(&["stream", "/no/such/folder", "--to", "null"]).stderr(writer).spawn().unwrap();
-    let status = ended(&mut child).expect("nobody waits for the reader");
-    assert!(matches!(status.code(), Some(1 | 2)), "{status}");
+    let home = Home::new();
+    let run = Beside::start(home.command(&["stream", "/no/such/folder", "--to", "null"]).stderr(writer));
+    let code = run.end(HANG).code;
+    assert!(matches!(code, 1 | 2), "{code}");
 }
 
 #[test]
 fn a_warning_has_a_line_of_its_own_beside_the_bar() {
-    let folder = tempfile::tempdir().unwrap();
-    let own = folder.path();
+    let home = Home::new();
+    let own = home.path("own");
     for part in ["rgb", "depth"] {
-        fs::create_dir(own.join(part)).unwrap();
-        for picture in fs::read_dir(portrait().join(part)).unwrap().flatten() {
+        fs::create_dir_all(own.join(part)).unwrap();
+        for picture in fs::read_dir(Path::new(PORTRAIT).join(part)).unwrap().flatten() {
             fs::copy(picture.path(), own.join(part).join(picture.file_name())).unwrap();
         }
     }
-    for list in fs::read_dir(portrait()).unwrap().flatten().filter(|entry| entry.path().is_file()) {
+    for list in fs::read_dir(PORTRAIT).unwrap().flatten().filter(|entry| entry.path().is_file()) {
         fs::copy(list.path(), own.join(list.file_name())).unwrap();
     }
     // Late enough for the bar to be there; and all of them, as some are passed over on a machine that is late.
@@ -156,16 +129,15 @@ fn a_warning_has_a_line_of_its_own_beside_the_bar() {
 
     let (mut screen, name) = terminal();
     let slave = open_terminal(&name);
-    let args =
-        ["stream", own.to_str().unwrap(), "--effect", "none", "--pace", "realtime", "--to", "null", "--keep-going"];
-    let mut child = bokehcam(&args).stdout(Stdio::null()).stderr(slave).spawn().unwrap();
+    let args = ["stream", "own", "--effect", "none", "--pace", "realtime", "--to", "null", "--keep-going"];
+    let run = Beside::start(home.command(&args).stdout(Stdio::null()).stderr(slave));
     let reader = thread::spawn(move || {
         let mut told = Vec::new();
         // Reading fails once the program has closed the terminal.
         let _ = screen.read_to_end(&mut told);
         String::from_utf8_lossy(&told).into_owned()
     });
-    assert!(ended(&mut child).is_some_and(|status| status.success()));
+    run.end(HANG).done();
     let told = reader.join().unwrap();
     assert!(told.contains(" frames, "), "a bar: {told:?}");
     let warning = told.find("going on without such frames").unwrap_or_else(|| panic!("{told:?}"));

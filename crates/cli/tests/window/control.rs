@@ -3,29 +3,20 @@
 use std::fs::{self, File};
 use std::os::unix::fs::FileExt;
 use std::path::Path;
-use std::process::Command;
 
 use bokehcam::recording::still::read_color;
 use serde_json::Value;
 
 use super::picture::{distance, is_photograph};
-use super::program::{PORTRAIT, Program};
+use super::preview::Program;
+use super::program::{Home, PORTRAIT};
 use super::screen::{Screen, until};
 use super::window::PATIENCE;
 
-/// What `bokehcam ctl` says: its exit code, and what it prints.
-fn ctl(program: &Program, args: &[&str]) -> (i32, String) {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_bokehcam"));
-    command.arg("ctl").args(args).env("XDG_RUNTIME_DIR", program.home().join("run")).current_dir(program.home());
-    let output = command.env("XDG_CONFIG_HOME", program.home().join("config")).output().unwrap();
-    let said = if output.status.success() { output.stdout } else { output.stderr };
-    (output.status.code().unwrap(), String::from_utf8(said).unwrap())
-}
-
 fn status(program: &Program) -> Value {
-    let (code, said) = ctl(program, &["status", "--json"]);
-    assert_eq!(code, 0, "{said}");
-    serde_json::from_str(&said).unwrap()
+    let ran = program.ctl(&["status", "--json"]);
+    ran.done();
+    ran.json()
 }
 
 const LUMA: usize = 640 * 360;
@@ -58,37 +49,36 @@ fn what_is_asked_from_outside_shows_here_and_what_is_done_here_shows_there() {
     assert_eq!(told["sinks"][0], "window");
     assert_eq!(told["look"]["coc-at-infinity"], "auto");
 
-    assert_eq!(ctl(&program, &["set", "effect=none"]).0, 0);
+    program.ctl(&["set", "effect=none"]).done();
     let sharp = window.until("no blur", |image| distance(image, &before) > 1.0);
-    assert_eq!(ctl(&program, &["preset", "dreamy"]).0, 0);
+    program.ctl(&["preset", "dreamy"]).done();
     window.until("another look", |image| distance(image, &sharp) > 1.0 && distance(image, &before) > 0.5);
-    let (code, said) = ctl(&program, &["set", "rim=0.7", "highlights=-1"]);
-    assert!(code == 2 && said.contains("--highlights"), "{said}");
+    program.ctl(&["set", "rim=0.7", "highlights=-1"]).failed(2, &["--highlights"]);
     assert_eq!(status(&program)["look"]["rim"], "0.5");
     // The person turns the wheel here, and undoes what came from there.
     window.wheel((0.5, 0.5), -3);
     until("the wheel shows outside", PATIENCE, || status(&program)["look"]["coc-at-infinity"] != "4.5%");
 
-    assert_eq!(ctl(&program, &["snapshot", "--to", "me.png"]).0, 0);
+    program.ctl(&["snapshot", "--to", "me.png"]).done();
     assert_eq!(read_color(&program.home().join("me.png")).unwrap().size(), (640, 360));
 
-    assert_eq!(ctl(&program, &["off"]).0, 0);
+    program.ctl(&["off"]).done();
     window.until("nothing of the person", |image| !is_photograph(image));
     assert_eq!(status(&program)["on"], false);
-    assert!(ctl(&program, &["snapshot", "--to", "no.png"]).1.contains("it is off"));
+    program.ctl(&["snapshot", "--to", "no.png"]).failed(1, &["it is off"]);
     std::thread::sleep(std::time::Duration::from_secs(1));
     window.until("still nothing", |image| !is_photograph(image));
-    assert_eq!(ctl(&program, &["toggle"]).0, 0);
+    program.ctl(&["toggle"]).done();
     window.until("the person again", is_photograph);
-    assert_eq!(ctl(&program, &["off"]).0, 0);
+    program.ctl(&["off"]).done();
     let is_part = |file: &fs::DirEntry| file.file_name().to_string_lossy().starts_with(".out.y4m.");
     let part = fs::read_dir(program.home()).unwrap().flatten().find(is_part).expect("it is being written").path();
     until("the card is recorded", PATIENCE, || ends_with_the_card(&part));
     program.interrupt();
     let ended = program.end();
     ended.succeeded();
-    assert!(ends_with_the_card(&ended.home.path().join("out.y4m")), "what was recorded ends with the card");
-    assert!(!ended.home.path().join("run/bokehcam/preview.sock").exists());
+    assert!(ends_with_the_card(&ended.home.path("out.y4m")), "what was recorded ends with the card");
+    assert!(!ended.home.path("run/bokehcam/preview.sock").exists());
 }
 
 #[test]
@@ -97,29 +87,23 @@ fn what_others_change_is_judged_as_in_a_stream_and_is_not_remembered() {
     let screen = Screen::new();
     let mut program = Program::start(&screen, &[PORTRAIT, "--depth", "none", "--panel=false"]);
     program.window().until("the first picture", is_photograph);
-    let said = |args: &[&str]| {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_bokehcam"));
-        command.arg("ctl").args(args).env("XDG_RUNTIME_DIR", program.home().join("run")).current_dir(program.home());
-        let output = command.env("XDG_CONFIG_HOME", program.home().join("config")).output().unwrap();
-        (output.status.code().unwrap(), String::from_utf8(output.stderr).unwrap())
-    };
-    let (code, line) = said(&["set", "focus=1.0", "rim=0.7"]);
-    assert!(code == 0 && line.contains("warning: without effect here: --focus 1 (there is no depth)"), "{line}");
-    let (code, line) = said(&["set", "effect=dof"]);
-    assert!(code == 2 && line.contains("--effect dof follows depth, and this run has none"), "{line}");
+    let set = program.ctl(&["set", "focus=1.0", "rim=0.7"]);
+    let warning = "warning: without effect here: --focus 1 (there is no depth)";
+    assert!(set.done().contains(warning), "{}", set.stderr);
+    program.ctl(&["set", "effect=dof"]).failed(2, &["--effect dof follows depth, and this run has none"]);
     assert_eq!(status(&program)["look"]["rim"], "0.7");
     program.interrupt();
     let ended = program.end();
     ended.succeeded();
-    let remembered = fs::read_to_string(ended.home.path().join("state/bokehcam/window.toml")).unwrap();
+    let remembered = fs::read_to_string(ended.home.path("state/bokehcam/window.toml")).unwrap();
     assert!(remembered.contains("rim = \"0.2\""), "{remembered}");
 }
 
 #[test]
 #[ignore = "needs an X server and the network for persons, as `scripts/setup models` brings it"]
 fn where_depth_comes_from_is_changed_from_outside() {
-    let home = tempfile::tempdir().unwrap();
-    let models = home.path().join(".local/share/bokehcam/models");
+    let home = Home::new();
+    let models = home.path("data/bokehcam/models");
     fs::create_dir_all(&models).unwrap();
     let built = std::env::var("TEST_MODELS").expect("TEST_MODELS names the folder of networks");
     for file in fs::read_dir(built).unwrap().flatten() {
@@ -130,13 +114,11 @@ fn where_depth_comes_from_is_changed_from_outside() {
     let window = program.window();
     let measured = window.until("the first picture", is_photograph);
     assert_eq!(status(&program)["depth"], "recorded");
-    assert_eq!(ctl(&program, &["depth", "matte"]).0, 0);
+    program.ctl(&["depth", "matte"]).done();
     until("by the mask", PATIENCE, || status(&program)["depth"] == "matte");
     window.until("another blur", |image| is_photograph(image) && distance(image, &measured) > 1.0);
-    let (code, said) = ctl(&program, &["depth", "stereo"]);
-    assert!(code == 2 && said.contains("use recorded, matte"), "{said}");
-    let (code, said) = ctl(&program, &["depth", "sonar"]);
-    assert!(code == 2 && said.contains("'sonar'") && said.contains("matte,mono"), "{said}");
-    assert_eq!(ctl(&program, &["depth", "recorded"]).0, 0);
+    program.ctl(&["depth", "stereo"]).failed(2, &["use recorded, matte"]);
+    program.ctl(&["depth", "sonar"]).failed(2, &["'sonar'", "matte,mono"]);
+    program.ctl(&["depth", "recorded"]).done();
     until("measured again", PATIENCE, || status(&program)["depth"] == "recorded");
 }

@@ -2,7 +2,7 @@
 
 use std::fs;
 use std::io::{BufRead, BufReader};
-use std::process::{Command, Stdio};
+use std::process::Stdio;
 use std::time::Duration;
 
 use bokehcam::frame::ColorImage;
@@ -11,8 +11,9 @@ use zbus::blocking::{Connection, Proxy, proxy};
 use zbus::proxy::CacheProperties;
 use zbus::zvariant::{OwnedObjectPath, OwnedValue, Value};
 
-use super::program::{PORTRAIT, Program};
-use super::screen::{Beside, Screen, until};
+use super::preview::Program;
+use super::program::{Beside, Home, PORTRAIT};
+use super::screen::{Screen, tied, until};
 use super::window::PATIENCE;
 
 /// A session bus, which ends with it.
@@ -23,8 +24,8 @@ struct Bus {
 
 impl Bus {
     fn new() -> Self {
-        let mut daemon = Command::new("setpriv");
-        daemon.args(["--pdeathsig", "KILL", "dbus-daemon", "--session", "--nofork", "--nopidfile", "--print-address"]);
+        let mut daemon = tied("dbus-daemon");
+        daemon.args(["--session", "--nofork", "--nopidfile", "--print-address"]);
         // No service of this machine's desktop is started for it.
         daemon.env_remove("DISPLAY").env_remove("WAYLAND_DISPLAY");
         let mut daemon = Beside::start(daemon.stdout(Stdio::piped()).stderr(Stdio::null()));
@@ -81,7 +82,7 @@ fn light_and_dark_follow_the_desktop() {
     };
     let start = |bus: &str, more: &[&str]| {
         let arguments: Vec<&str> = [PORTRAIT, "--panel=false"].iter().chain(more).copied().collect();
-        let mut program = Program::start_on(&screen, tempfile::tempdir().unwrap(), bus, &arguments);
+        let mut program = Program::start_on(&screen, Home::new(), bus, &arguments);
         let window = program.window();
         // A window of another shape than the picture, whose upper left corner is so beside it.
         window.resize(640, 640);
@@ -140,8 +141,7 @@ fn a_screen_reader_finds_the_controls_and_works_them() {
     let address: String = launcher.call("GetAddress", &()).unwrap();
     let access = Builder::address(address.as_str()).unwrap().build().unwrap();
 
-    let mut program =
-        Program::start_on(&screen, tempfile::tempdir().unwrap(), &bus.address, &[PORTRAIT, "--mirror", "--blur", "4%"]);
+    let mut program = Program::start_on(&screen, Home::new(), &bus.address, &[PORTRAIT, "--mirror", "--blur", "4%"]);
     program.window();
     // Longer than the panel stays where nobody needs it.
     std::thread::sleep(Duration::from_secs(6));

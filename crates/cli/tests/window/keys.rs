@@ -8,7 +8,8 @@ use egui::Key;
 
 use super::input::sym;
 use super::picture::{distance, is_photograph};
-use super::program::{PORTRAIT, Program};
+use super::preview::Program;
+use super::program::{PORTRAIT, run};
 use super::screen::{Screen, until};
 use super::window::{PATIENCE, Window};
 
@@ -105,11 +106,10 @@ fn what_is_seen_follows_the_keys_and_comes_back() {
     // One frame over and over, at one quality: what is seen stands still on a machine of any speed.
     let folder = tempfile::tempdir().unwrap();
     let frame = folder.path().join("frame");
-    let mut record = std::process::Command::new(env!("CARGO_BIN_EXE_bokehcam"));
-    let recorded = record.args(["record", PORTRAIT, "--frames", "1", "--to"]).arg(&frame).output().unwrap();
-    assert!(recorded.status.success(), "{}", String::from_utf8_lossy(&recorded.stderr));
+    let frame = frame.to_str().unwrap();
+    run(&["record", PORTRAIT, "--frames", "1", "--to", frame]).done();
     let screen = Screen::new();
-    let still = [frame.to_str().unwrap(), "--quality", "fast", "--panel=false"];
+    let still = [frame, "--quality", "fast", "--panel=false"];
     let mut program = Program::start(&screen, &still);
     let window = program.window();
     window.until("the first picture", is_photograph);

@@ -1,7 +1,8 @@
 //! From the start to the end: the first picture, and closing at any time.
 
 use super::picture::is_photograph;
-use super::program::{PORTRAIT, Program};
+use super::preview::Program;
+use super::program::PORTRAIT;
 use super::screen::Screen;
 
 #[test]
@@ -30,7 +31,7 @@ fn it_can_be_closed_while_it_loads() {
         let ended = program.end();
         assert_eq!(ended.status.code(), Some(0), "{source}: {}", ended.said);
         assert!(!ended.said.contains("panicked"), "{}", ended.said);
-        if ended.home.path().join("report.json").exists() {
+        if ended.home.path("report.json").exists() {
             ended.succeeded();
         }
     }

@@ -2,14 +2,14 @@
 
 use std::fs;
 use std::path::Path;
-use std::process::Command;
 use std::time::Duration;
 
 use bokehcam::frame::ColorImage;
 use bokehcam::recording::still::read_color;
 
 use super::picture::{distance, is_photograph, middle, part};
-use super::program::{PORTRAIT, Program};
+use super::preview::Program;
+use super::program::{Home, PORTRAIT, Ran};
 use super::screen::{Screen, until};
 use super::window::{PATIENCE, Window};
 
@@ -92,8 +92,8 @@ fn the_line_between_before_and_after_is_dragged() {
 fn a_snapshot_is_repeated_by_render_and_a_copied_command_runs() {
     let screen = Screen::new();
     // Somebody who keeps what a snapshot was made of.
-    let home = tempfile::tempdir().unwrap();
-    let state = home.path().join("state/bokehcam");
+    let home = Home::new();
+    let state = home.path("state/bokehcam");
     fs::create_dir_all(&state).unwrap();
     fs::write(state.join("window.toml"), "[habits]\nkeep-sources = true\n").unwrap();
     let arguments: Vec<&str> =
@@ -115,23 +115,21 @@ fn a_snapshot_is_repeated_by_render_and_a_copied_command_runs() {
     let picture = picture.unwrap();
     until("the command", PATIENCE, || program.said().contains("Copied: bokehcam preview"));
     let ended = program.close();
-    let home = ended.home.path();
-    let bokehcam = |arguments: &[&str]| {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_bokehcam"));
-        command.args(arguments).current_dir(home).env("XDG_CONFIG_HOME", home).env("DISPLAY", &screen.display);
-        command
+    // By somebody who has no settings.
+    let other = Home::new();
+    let run = |arguments: &[&str]| {
+        Ran::of(other.with_drivers(arguments).current_dir(&ended.home.0).env("DISPLAY", &screen.display))
     };
-    let arguments = ["render", "--like", &picture, "--out", "again.png", "--backend", "cpu"];
-    assert!(bokehcam(&arguments).status().unwrap().success());
-    let read = |name: &str| read_color(&home.join(name)).unwrap();
+    run(&["render", "--like", &picture, "--out", "again.png", "--backend", "cpu"]).done();
+    let read = |name: &str| read_color(&ended.home.path(name)).unwrap();
     assert_eq!(read(&picture), read("again.png"), "to the bit");
 
     let copied = ended.said.split("Copied: bokehcam ").nth(1).and_then(|rest| rest.lines().next()).unwrap();
     assert!(copied.contains("--aperture polygon") && copied.contains("--start=0"), "{copied}");
     let arguments: Vec<&str> = copied.split(' ').chain(["--frames=3", "--report=again.json"]).collect();
-    let ran = bokehcam(&arguments).output().unwrap();
-    assert!(ran.status.success(), "{copied}: {}", String::from_utf8_lossy(&ran.stderr));
-    assert!(home.join("again.json").exists());
+    println!("{copied}");
+    run(&arguments).done();
+    assert!(ended.home.path("again.json").exists());
 }
 
 #[test]

@@ -8,6 +8,8 @@ mod desktop;
 mod harness;
 mod input;
 mod picture;
+mod preview;
+#[path = "../common/program.rs"]
 mod program;
 mod screen;
 mod wayland;

@@ -9,7 +9,8 @@ use bokehcam::frame::ColorImage;
 use image::codecs::jpeg::JpegEncoder;
 
 use super::picture::{distance, is_photograph};
-use super::program::{PORTRAIT, Program};
+use super::preview::Program;
+use super::program::{Home, PORTRAIT};
 use super::screen::Screen;
 
 /// Where they go: `BOKEHCAM_SCREENSHOTS`, else beside other pictures of tests.
@@ -38,9 +39,9 @@ fn pictures_for_the_docs() {
     let mut seen: Vec<ColorImage> = Vec::new();
     for (name, more, keys) in scenes {
         let screen = Screen::new();
-        let home = tempfile::tempdir().unwrap();
+        let home = Home::new();
         // What is shown of it is its name, not where this project lies.
-        symlink(Path::new(PORTRAIT).parent().unwrap(), home.path().join("recordings")).unwrap();
+        symlink(Path::new(PORTRAIT).parent().unwrap(), home.path("recordings")).unwrap();
         let arguments: Vec<&str> = ["recordings/portrait"].iter().chain(&look).chain(more).copied().collect();
         let mut program = Program::start_at(&screen, home, &arguments);
         let window = program.window();

@@ -2,14 +2,15 @@
 
 use std::fs;
 use std::io::{BufRead, BufReader};
-use std::process::{Child, Command, Stdio};
-use std::time::{Duration, Instant};
+use std::process::{Command, Stdio};
 
 use tempfile::TempDir;
 use x11rb::connection::Connection;
 use x11rb::protocol::xproto::{Atom, AtomEnum, ClientMessageEvent, ConnectionExt, EventMask, Window};
 use x11rb::rust_connection::RustConnection;
 
+use super::program::Beside;
+pub use super::program::until;
 use super::window::PATIENCE;
 
 /// Size of the screen, in pixels.
@@ -42,9 +43,9 @@ const OPENBOX: &str = r#"<?xml version="1.0"?>
 impl Screen {
     /// Starts both, and waits until windows are managed.
     pub fn new() -> Self {
-        let mut xvfb = Command::new("setpriv");
+        let mut xvfb = tied("Xvfb");
         let size = format!("{}x{}x24", SIZE.0, SIZE.1);
-        xvfb.args(["--pdeathsig", "KILL", "Xvfb", "-displayfd", "1", "-screen", "0", &size, "-nolisten", "tcp"]);
+        xvfb.args(["-displayfd", "1", "-screen", "0", &size, "-nolisten", "tcp"]);
         let mut server = Beside::start(xvfb.stdout(Stdio::piped()).stderr(Stdio::null()));
         let mut number = String::new();
         BufReader::new(server.0.stdout.as_mut().unwrap()).read_line(&mut number).unwrap();
@@ -54,8 +55,8 @@ impl Screen {
         let settings = tempfile::tempdir().unwrap();
         let (rules, ready) = (settings.path().join("openbox.xml"), settings.path().join("ready"));
         fs::write(&rules, OPENBOX).unwrap();
-        let mut openbox = Command::new("setpriv");
-        openbox.args(["--pdeathsig", "KILL", "openbox", "--sm-disable", "--config-file"]).arg(rules);
+        let mut openbox = tied("openbox");
+        openbox.args(["--sm-disable", "--config-file"]).arg(rules);
         openbox.arg("--startup").arg(format!("touch {}", ready.display()));
         openbox.env("DISPLAY", &display).env("HOME", settings.path()).env_remove("XDG_CONFIG_HOME");
         let manager = Beside::start(openbox.stdout(Stdio::null()).stderr(Stdio::null()));
@@ -89,36 +90,9 @@ impl Screen {
     }
 }
 
-/// A program that runs beside the test, and ends with it.
-pub struct Beside(pub Child);
-
-impl Beside {
-    /// Starts it.
-    pub fn start(command: &mut Command) -> Self {
-        let started = command.stdin(Stdio::null()).spawn();
-        Self(started.unwrap_or_else(|error| panic!("{command:?}: {error}")))
-    }
-
-    /// Asks it to end, as Ctrl-C in a terminal does.
-    pub fn interrupt(&self) {
-        let sent = Command::new("kill").args(["-INT", &self.0.id().to_string()]).status().unwrap();
-        assert!(sent.success());
-    }
-}
-
-impl Drop for Beside {
-    fn drop(&mut self) {
-        let _ = self.0.kill();
-        let _ = self.0.wait();
-    }
-}
-
-/// Waits until something is so; gives back for how long.
-pub fn until(what: &str, within: Duration, mut is: impl FnMut() -> bool) -> Duration {
-    let began = Instant::now();
-    while !is() {
-        assert!(began.elapsed() < within, "not within {within:?}: {what}");
-        std::thread::sleep(Duration::from_millis(5));
-    }
-    began.elapsed()
+/// A program that is killed with the test, however that ends.
+pub fn tied(program: &str) -> Command {
+    let mut command = Command::new("setpriv");
+    command.args(["--pdeathsig", "KILL", program]);
+    command
 }

@@ -5,7 +5,8 @@ use std::time::Duration;
 
 use super::input::sym;
 use super::picture::is_photograph;
-use super::program::{PORTRAIT, Program};
+use super::preview::Program;
+use super::program::PORTRAIT;
 use super::screen::{SIZE, Screen, until};
 use super::window::PATIENCE;
 

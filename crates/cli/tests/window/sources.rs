@@ -12,7 +12,8 @@ use x11rb::protocol::xproto::{
 use x11rb::wrapper::ConnectionExt as _;
 
 use super::picture::{distance, is_photograph, keep, part};
-use super::program::{PORTRAIT, Program};
+use super::preview::Program;
+use super::program::PORTRAIT;
 use super::screen::{Screen, until};
 use super::window::{PATIENCE, Window};
 

@@ -6,7 +6,8 @@ use std::time::Duration;
 
 use super::input::sym;
 use super::picture::{distance, is_photograph};
-use super::program::{PORTRAIT, Program};
+use super::preview::Program;
+use super::program::PORTRAIT;
 use super::screen::{Screen, until};
 use super::window::PATIENCE;
 

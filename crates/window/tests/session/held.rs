@@ -15,6 +15,7 @@ use bokehcam_window::session::Still;
 use bokehcam_window::state::{Output, Request, Update};
 
 use super::heard::{PATIENCE, look};
+use super::until::found;
 use super::watched::{Watched, is_running};
 
 const GREEN: [u8; 3] = [0, 177, 64];
@@ -39,16 +40,11 @@ fn still(number: u64, images: Images, coc: CocField) -> Still {
 
 /// Returns the held frame blurred with another look.
 fn in_look(watched: &mut Watched, look: &Look) -> Still {
-    watched.session.send(Request::Look(Box::new(look.clone())));
-    let began = Instant::now();
-    loop {
+    watched.session.order(Request::Look(Box::new(look.clone())));
+    found("it is blurred anew", PATIENCE, || {
         watched.hear();
-        if let Some(blurred) = watched.blurred.pop() {
-            return blurred;
-        }
-        assert!(began.elapsed() < PATIENCE, "never blurred anew: {:?}", watched.told);
-        std::thread::sleep(Duration::from_millis(2));
-    }
+        watched.blurred.pop()
+    })
 }
 
 #[test]

@@ -6,16 +6,19 @@ mod common;
 #[path = "../../../../tests/common/heard.rs"]
 mod heard;
 mod held;
+#[path = "../../../../tests/common/on_gpu.rs"]
+mod on_gpu;
 mod present;
 mod shader;
 mod sources;
 #[path = "../../../../tests/common/store.rs"]
 mod store;
+#[path = "../../../../tests/common/until.rs"]
+mod until;
 mod watched;
 
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
-use std::time::{Duration, Instant};
 
 use bokehcam::depth::plate::Step;
 use bokehcam::files::user_folders::is_video;
@@ -25,6 +28,7 @@ use bokehcam::optics::CocField;
 use bokehcam_window::state::{Output, Request, Source, Update};
 
 use heard::{PATIENCE, look};
+use until::until;
 use watched::{Watched, is_running, radius_px};
 
 #[test]
@@ -34,7 +38,7 @@ fn a_look_takes_effect_while_frames_go_on() {
     watched.until("the note", |told| *told == Update::Note("a note".into()) || matches!(told, Update::Outputs(_)));
     let first = watched.frame("a frame", |view| radius_px(view) == 2.0);
     assert!(first.picture.memory().is_some() && first.color.is_some() && first.depth.is_some());
-    let made = watched.executors.load(Ordering::SeqCst);
+    let made = watched.services.executors.load(Ordering::SeqCst);
 
     let stronger = Look { strength: Strength::AtInfinity(5.0), ..look() };
     watched.session.send(Request::Look(Box::new(stronger.clone())));
@@ -42,7 +46,7 @@ fn a_look_takes_effect_while_frames_go_on() {
     let near = Look { focus: bokehcam::depth::focus::FocusRule::Metres(0.7), ..stronger };
     watched.session.send(Request::Look(Box::new(near.clone())));
     watched.frame("another focus", |view| matches!(view.coc, CocField::Depth(coc) if (coc.focus_m - 0.7).abs() < 0.02));
-    assert!(watched.executors.load(Ordering::SeqCst) <= made + 1, "another focus needs no other executor");
+    assert!(watched.services.executors.load(Ordering::SeqCst) <= made + 1, "another focus needs no other executor");
 
     let even = Look { effect: Effect::Blur, ..near.clone() };
     watched.session.send(Request::Look(Box::new(even)));
@@ -117,24 +121,18 @@ fn outputs_are_begun_and_completed_and_one_that_cannot_be_is_told() {
     let (copied, end) = (watched.copied.clone().unwrap(), r#"", "camera"] [("split", "0.5")]"#);
     let film = copied.strip_prefix("show 32 [\"").and_then(|rest| rest.strip_suffix(end));
     assert!(film.is_some_and(|film| is_video(film.rsplit('/').next().unwrap())), "{copied}");
-    let has = |watched: &Watched, line: &str| watched.written.lock().unwrap().iter().any(|written| written == line);
-    let began = Instant::now();
-    while !has(&watched, "film 32") || !has(&watched, "camera 32") {
-        assert!(began.elapsed() < PATIENCE);
-        std::thread::sleep(Duration::from_millis(5));
-    }
-    watched.session.send(Request::End(output("film", false)));
+    let has =
+        |watched: &Watched, line: &str| watched.services.written.lock().unwrap().iter().any(|written| written == line);
+    until("both are written", PATIENCE, || has(&watched, "film 32") && has(&watched, "camera 32"));
+    watched.session.order(Request::End(output("film", false)));
     watched
         .until("the film is complete", |told| matches!(told, Update::Note(line) if line.starts_with("Complete: film")));
     // A recording ends with its source, and a virtual camera continues with the next one.
     watched.session.send(Request::Open("48".into()));
     watched.until("the other runs", |told| is_running(told, 48));
     watched.until("one", |told| *told == Update::Outputs(vec![output("camera", true)]));
-    while !has(&watched, "camera 48") {
-        assert!(began.elapsed() < 2 * PATIENCE);
-        std::thread::sleep(Duration::from_millis(5));
-    }
-    let written = Arc::clone(&watched.written);
+    until("the camera goes on", PATIENCE, || has(&watched, "camera 48"));
+    let written = Arc::clone(&watched.services.written);
     watched.heard.session.close().report.unwrap();
     let complete = written.lock().unwrap().iter().filter(|line| *line == "camera complete").count();
     assert_eq!(complete, 2, "once for each source");

@@ -1,6 +1,6 @@
 //! A session with fake sources and outputs.
 
-use std::ops::{ControlFlow, Deref, DerefMut};
+use std::ops::ControlFlow;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
@@ -11,8 +11,7 @@ use bokehcam::capture::{Brings, Camera as Capture, CaptureError, Captured, Shot,
 use bokehcam::depth::plate::PlateDepth;
 use bokehcam::frame::ColorImage;
 use bokehcam::knob::Knob;
-use bokehcam::look::presets::Preset;
-use bokehcam::look::{Look, Patch};
+use bokehcam::look::Look;
 use bokehcam::optics::CocField;
 use bokehcam::pipeline::View;
 use bokehcam::sink::{Ending, Sink, SinkError};
@@ -21,14 +20,15 @@ use bokehcam_lab::synthetic::Synthetic;
 use bokehcam_window::services::{Opened, Services, SettingsStore, Switch};
 use bokehcam_window::state::{Camera, DepthMethod, Source, Update};
 
-use super::heard::Heard;
+use super::heard::{self, Heard};
+use super::store::NoStore;
 
 /// Opens small synthetic scenes: the name is their width, `24 then no more` has two frames, and `nothing` does not
 /// exist.
 struct Small {
     executors: Arc<AtomicUsize>,
     written: Arc<Mutex<Vec<String>>>,
-    settings: NoSettings,
+    settings: NoStore,
 }
 
 struct Film(Arc<Mutex<Vec<String>>>, String);
@@ -121,33 +121,14 @@ impl Services for Small {
     }
 }
 
-/// An empty settings store with a single preset.
-struct NoSettings;
-
-impl SettingsStore for NoSettings {
-    fn presets(&mut self) -> Vec<Preset> {
-        vec![Preset { name: "same".into(), patch: Patch::default(), own: false }]
-    }
-    fn save_preset(&mut self, name: &str, _: &Look) -> Result<(), String> {
-        if name.is_empty() { Err("no name".into()) } else { Ok(()) }
-    }
-    fn rename_preset(&mut self, _: &str, _: &str) -> Result<(), String> {
-        Err("none of that name".into())
-    }
-    fn delete_preset(&mut self, _: &str) -> Result<(), String> {
-        Err("none of that name".into())
-    }
-    fn command(&self, _: &Look, source: &str, outputs: &[String], switches: &[Switch]) -> String {
-        format!("show {source} {outputs:?} {switches:?}")
-    }
-}
-
-/// A session on these services.
-pub struct Watched {
-    pub heard: Heard,
+/// What a test sees of these services.
+pub struct Seen {
     pub executors: Arc<AtomicUsize>,
     pub written: Arc<Mutex<Vec<String>>>,
 }
+
+/// A session on them.
+pub type Watched = heard::Watched<Seen>;
 
 impl Watched {
     pub fn begin(source: &str) -> Self {
@@ -155,22 +136,9 @@ impl Watched {
     }
 
     pub fn begin_in(source: &str, folder: &Path) -> Self {
-        let small = Small { executors: Arc::default(), written: Arc::default(), settings: NoSettings };
-        let (executors, written) = (Arc::clone(&small.executors), Arc::clone(&small.written));
-        Self { heard: Heard::begin(Box::new(small), source, folder), executors, written }
-    }
-}
-
-impl Deref for Watched {
-    type Target = Heard;
-    fn deref(&self) -> &Heard {
-        &self.heard
-    }
-}
-
-impl DerefMut for Watched {
-    fn deref_mut(&mut self) -> &mut Heard {
-        &mut self.heard
+        let small = Small { executors: Arc::default(), written: Arc::default(), settings: NoStore };
+        let services = Seen { executors: Arc::clone(&small.executors), written: Arc::clone(&small.written) };
+        Self { heard: Heard::begin(Box::new(small), source, folder), services }
     }
 }
 

@@ -1,29 +1,29 @@
 //! The report of a machine for others.
 
-use super::*;
+use std::fs;
+
+use crate::program::{Home, Ran};
 
 /// Who is named in what doctor looks at is not named in its report.
 #[test]
 fn a_report_names_no_user_and_no_machine() {
-    let home = tempfile::Builder::new().prefix("planted-user").tempdir().unwrap();
-    let user = home.path().file_name().unwrap().to_str().unwrap();
+    let home = Home::at(tempfile::Builder::new().prefix("planted-user").tempdir().unwrap());
+    let user = home.0.path().file_name().unwrap().to_str().unwrap();
     let host = fs::read_to_string("/proc/sys/kernel/hostname").unwrap();
     // The session's kind is printed as it is found.
-    let planted = format!("x11 {} {user} {} /home/somebody/x", home.path().display(), host.trim());
-    let file = home.path().join("report.md");
+    let planted = format!("x11 {} {user} {} /home/somebody/x", home.0.path().display(), host.trim());
+    let file = home.path("report.md");
     let report = |args: &[&str]| {
-        let mut command = bokehcam(home.path(), args);
-        command.env("HOME", home.path()).env("USER", user).env("XDG_SESSION_TYPE", &planted).current_dir(home.path());
-        Ran::from(command.output().unwrap())
+        let mut command = home.command(args);
+        Ran::of(command.env("HOME", home.0.path()).env("USER", user).env("XDG_SESSION_TYPE", &planted))
     };
     assert!(report(&["doctor"]).stdout.contains(&planted), "it is not where it would be told");
 
     let written = report(&["doctor", "--report", "report.md"]);
-    assert_eq!(written.code, 0, "{}", written.stderr);
-    assert!(written.stderr.contains("report.md"), "{}", written.stderr);
+    assert!(written.done().contains("report.md"), "{}", written.stderr);
     assert_eq!(fs::read_to_string(&file).unwrap(), written.stdout);
     assert!(written.stdout.contains("session x11 ~ (user)"), "{}", written.stdout);
-    for name in [home.path().to_str().unwrap(), user, "somebody"] {
+    for name in [home.0.path().to_str().unwrap(), user, "somebody"] {
         assert!(!written.stdout.contains(name), "{name}: {}", written.stdout);
     }
     // A machine that is called as its distribution is keeps that name.

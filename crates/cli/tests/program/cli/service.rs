@@ -1,13 +1,12 @@
 //! The one switch, before a `systemctl` that only notes what it is told.
 
 use std::fs;
-use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 
-use super::{Ran, bokehcam};
+use crate::program::{Home, PROGRAM, ROOT, Ran};
 
 /// Knows a unit by its file, whether it is enabled, and how it is; files in its folder hold all that.
-const SYSTEMCTL: &str = r#"#!/bin/sh
+const SYSTEMCTL: &str = r#"
 here=$(dirname "$0")
 echo "$*" >>"$here/told"
 [ "$1" = --user ] && [ -e "$here/session" ] || { echo "Failed to connect to bus: No medium found" >&2; exit 1; }
@@ -30,33 +29,27 @@ esac
 "#;
 
 struct Session {
-    home: tempfile::TempDir,
+    home: Home,
 }
 
 impl Session {
     /// A session in which what is started becomes `becomes`.
     fn new(becomes: &str) -> Self {
-        let session = Self { home: tempfile::tempdir().unwrap() };
-        fs::create_dir(session.home.path().join("bin")).unwrap();
-        session.program("systemctl", SYSTEMCTL);
-        session.program("journalctl", "#!/bin/sh\necho 'error: 0: no such camera'\n");
+        let session = Self { home: Home::new() };
+        session.home.add_program("systemctl", SYSTEMCTL);
+        session.home.add_program("journalctl", "echo 'error: 0: no such camera'");
         for (name, text) in [("session", ""), ("desktop", "active"), ("becomes", becomes), ("told", "")] {
             fs::write(session.at(name), text).unwrap();
         }
         session
     }
 
-    fn program(&self, name: &str, text: &str) {
-        fs::write(self.at(name), text).unwrap();
-        fs::set_permissions(self.at(name), fs::Permissions::from_mode(0o755)).unwrap();
-    }
-
     fn at(&self, name: &str) -> PathBuf {
-        self.home.path().join("bin").join(name)
+        self.home.path("bin").join(name)
     }
 
     fn unit(&self) -> PathBuf {
-        self.home.path().join("systemd/user/bokehcam.service")
+        self.home.path("config/systemd/user/bokehcam.service")
     }
 
     fn put_unit(&self, text: &str) {
@@ -66,7 +59,7 @@ impl Session {
 
     fn service(&self, what: &str) -> Ran {
         let path = format!("{}:/usr/bin:/bin", self.at("").display());
-        bokehcam(self.home.path(), &["service", what]).env("PATH", path).output().unwrap().into()
+        Ran::of(self.home.command(&["service", what]).env("PATH", path))
     }
 
     /// What systemd was told to change.
@@ -91,17 +84,15 @@ fn one_word_starts_it_with_every_session_and_one_ends_that() {
     assert!(on.stdout.starts_with("on: it runs\n  streams   0 --to /dev/video10 --on-demand\n"), "{}", on.stdout);
     assert!(on.stdout.contains("bokehcam/stream.conf"), "{}", on.stdout);
     // What was written is the package's unit with this program in it.
-    let packaged =
-        fs::read_to_string(Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("packaging/bokehcam.service"))
-            .unwrap();
-    let start = format!("ExecStart=\"{}\" stream", env!("CARGO_BIN_EXE_bokehcam"));
+    let packaged = fs::read_to_string(Path::new(ROOT).join("packaging/bokehcam.service")).unwrap();
+    let start = format!("ExecStart=\"{PROGRAM}\" stream");
     assert_eq!(
         fs::read_to_string(session.unit()).unwrap(),
         packaged.replace("ExecStart=/usr/bin/bokehcam stream", &start)
     );
 
-    fs::create_dir_all(session.home.path().join("bokehcam")).unwrap();
-    let conf = session.home.path().join("bokehcam/stream.conf");
+    let conf = session.home.settings().with_file_name("stream.conf");
+    fs::create_dir_all(conf.parent().unwrap()).unwrap();
     fs::write(&conf, "# mine\nSTREAM=\"C920 --to pipewire --on-demand\"\n").unwrap();
     let status = session.service("status");
     let named = format!("  streams   C920 --to pipewire --on-demand\n  settings  {}\n", conf.display());
@@ -159,8 +150,7 @@ fn what_keeps_it_from_running_is_said_in_plain_words() {
         assert!(ran.stderr.contains("no session of systemd's (Failed to connect to bus"), "{}", ran.stderr);
     }
     fs::remove_file(none.at("systemctl")).unwrap();
-    let path = none.at("");
-    let ran: Ran = bokehcam(none.home.path(), &["service", "on"]).env("PATH", path).output().unwrap().into();
+    let ran = Ran::of(none.home.command(&["service", "on"]).env("PATH", none.at("")));
     assert!(ran.code == 1 && ran.stderr.contains("there is no systemd here"), "{}", ran.stderr);
     assert!(!none.unit().exists(), "a unit that nobody reads");
 }

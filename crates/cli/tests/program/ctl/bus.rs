@@ -1,7 +1,7 @@
 //! A stream on a message bus of the tests' own: methods, signals, and the icon in a tray that only takes note.
 
 use std::io::{BufRead, BufReader};
-use std::process::{Child, Command, Stdio};
+use std::process::{Command, Stdio};
 use std::sync::mpsc::{self, Receiver, Sender};
 use std::time::{Duration, Instant};
 
@@ -9,7 +9,9 @@ use zbus::blocking::connection::Builder;
 use zbus::blocking::{Connection, Proxy};
 use zbus::zvariant::OwnedValue;
 
-use super::world::{HANG, Running, World, until};
+use crate::program::{Beside, PORTRAIT, Ran};
+
+use super::world::{HANG, World, until};
 
 const NAME: &str = "io.github.bokehcam.bokehcam";
 const PATH: &str = "/io/github/bokehcam/bokehcam";
@@ -18,32 +20,22 @@ const ITEM: &str = "org.kde.StatusNotifierItem";
 const WATCHER: &str = "org.kde.StatusNotifierWatcher";
 
 struct Daemon {
-    child: Child,
     address: String,
+    _daemon: Beside,
 }
 
 impl Daemon {
     fn start() -> Self {
-        let mut child = Command::new("dbus-daemon")
-            .args(["--session", "--nofork", "--print-address"])
-            .stdout(Stdio::piped())
-            .stderr(Stdio::null())
-            .spawn()
-            .expect("dbus-daemon");
+        let mut daemon = Command::new("dbus-daemon");
+        daemon.args(["--session", "--nofork", "--print-address"]).stdout(Stdio::piped()).stderr(Stdio::null());
+        let mut daemon = Beside::start(&mut daemon);
         let mut address = String::new();
-        BufReader::new(child.stdout.take().unwrap()).read_line(&mut address).unwrap();
-        Self { child, address: address.trim().to_owned() }
+        BufReader::new(daemon.0.stdout.take().unwrap()).read_line(&mut address).unwrap();
+        Self { address: address.trim().to_owned(), _daemon: daemon }
     }
 
     fn connect(&self) -> Builder<'_> {
         Builder::address(self.address.as_str()).unwrap()
-    }
-}
-
-impl Drop for Daemon {
-    fn drop(&mut self) {
-        let _ = self.child.kill();
-        let _ = self.child.wait();
     }
 }
 
@@ -64,11 +56,9 @@ fn watcher(daemon: &Daemon) -> (Connection, Receiver<String>) {
 }
 
 /// A stream with an icon, once it is on the bus.
-fn stream(world: &World, daemon: &Daemon, bus: &Connection) -> Running {
-    let recording = concat!(env!("CARGO_MANIFEST_DIR"), "/../../recordings/portrait");
-    let args = ["stream", recording, "--loop", "--pace", "realtime", "--quiet", "--to", "null", "--tray"];
-    let stream = world.bokehcam(&args).env("DBUS_SESSION_BUS_ADDRESS", &daemon.address).spawn().unwrap();
-    let running = Running(stream);
+fn stream(world: &World, daemon: &Daemon, bus: &Connection) -> Beside {
+    let args = ["stream", PORTRAIT, "--loop", "--pace", "realtime", "--quiet", "--to", "null", "--tray"];
+    let running = Beside::start(world.bokehcam(&args).env("DBUS_SESSION_BUS_ADDRESS", &daemon.address));
     until("it is on the bus", || {
         let asked = bus.call_method(
             Some("org.freedesktop.DBus"),
@@ -161,7 +151,6 @@ fn without_a_bus_it_runs() {
     let world = World::new();
     let mut command =
         world.bokehcam(&["stream", "synthetic", "--size", "64x48", "--frames", "2", "--to", "null", "--tray"]);
-    let ran = command.env("DBUS_SESSION_BUS_ADDRESS", "unix:path=/nowhere").output().unwrap();
-    let said = String::from_utf8(ran.stderr).unwrap();
-    assert!(ran.status.success() && said.contains("warning: --tray: the session's message bus: "), "{said}");
+    let ran = Ran::of(command.env("DBUS_SESSION_BUS_ADDRESS", "unix:path=/nowhere"));
+    assert!(ran.done().contains("warning: --tray: the session's message bus: "), "{}", ran.stderr);
 }

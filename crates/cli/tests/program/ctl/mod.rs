@@ -13,6 +13,8 @@ use std::time::{Duration, Instant};
 use bokehcam::budget::Quality;
 use bokehcam::recording::still::read_color;
 use serde_json::json;
+
+use crate::program::PORTRAIT;
 use world::{Pictures, World, until};
 
 #[test]
@@ -23,7 +25,7 @@ fn off_shows_the_card_and_nothing_else_until_it_is_on_again() {
     pictures.wait_for("the person", |picture| !picture.is_card());
     assert_eq!(world.status(&[])["on"], true);
 
-    assert!(world.ctl(&["off"]).done().stderr.contains("stream is off"));
+    assert!(world.ctl(&["off"]).done().contains("stream is off"));
     pictures.wait_for("the card", |picture| picture.is_card());
     let covered = pictures.cards().len();
     assert_eq!(world.status(&[])["on"], false);
@@ -43,7 +45,7 @@ fn off_shows_the_card_and_nothing_else_until_it_is_on_again() {
     pictures.wait_for("the person again", |picture| !picture.is_card());
     world.ctl(&["toggle"]).done();
     pictures.wait_for("the card again", |picture| picture.is_card());
-    assert!(world.ctl(&["toggle"]).done().stderr.contains("stream is on"));
+    assert!(world.ctl(&["toggle"]).done().contains("stream is on"));
     pictures.wait_for("the person at last", |picture| !picture.is_card());
     assert_eq!(stream.interrupt(), 0);
 }
@@ -81,16 +83,15 @@ fn presets_and_settings_change_the_blur_of_what_goes_out() {
     world.ctl(&["set", "effect=none"]).done();
     assert!(detail(&pictures) > 1.2 * little);
     // What has no effect is said.
-    let ran = world.ctl(&["set", "tilt=0.5"]).done();
-    assert!(ran.stderr.starts_with("warning: without effect here: --tilt 0.5"), "{}", ran.stderr);
+    let ran = world.ctl(&["set", "tilt=0.5"]);
+    assert!(ran.done().starts_with("warning: without effect here: --tilt 0.5"), "{}", ran.stderr);
 }
 
 #[test]
 fn what_follows_depth_is_refused_where_there_is_none() {
     let world = World::new();
     let _stream = world.stream("stream", &["--to", "null", "--effect", "tilt-shift", "--depth", "none"]);
-    let refused = world.ctl(&["preset", "dreamy"]).refused(2);
-    assert!(refused.contains("--effect auto follows depth") && refused.contains("tilt-shift"), "{refused}");
+    world.ctl(&["preset", "dreamy"]).refused(2, &["--effect auto follows depth", "tilt-shift"]);
     assert_eq!(world.status(&[])["look"]["rim"], "0.2", "nothing of it is done");
     world.ctl(&["preset", "miniature"]).done();
 }
@@ -118,14 +119,13 @@ fn the_status_says_how_it_is() {
     let began = Instant::now();
     let stream = world.stream("desk", &["--to", "null", "--to", "out.y4m", "--name", "desk"]);
     let answers = Instant::now();
-    let recording = concat!(env!("CARGO_MANIFEST_DIR"), "/../../recordings/portrait");
     // There is a rate once two frames have come.
     until("frames come", || world.status(&[])["fps"] != 0.0);
     let least_s = answers.elapsed().as_secs_f64();
     let status = world.status(&[]);
     let most_s = began.elapsed().as_secs_f64();
     let told = json!({
-        "name": "desk", "pid": stream.0.id(), "command": "stream", "on": true, "source": recording, "size": [640, 360],
+        "name": "desk", "pid": stream.0.id(), "command": "stream", "on": true, "source": PORTRAIT, "size": [640, 360],
         "sinks": ["null", "out.y4m"], "watched": null,
     });
     for (name, value) in told.as_object().unwrap() {
@@ -137,7 +137,7 @@ fn the_status_says_how_it_is() {
     let uptime_s = status["uptime_s"].as_f64().unwrap();
     assert!((least_s - 0.1..most_s + 0.1).contains(&uptime_s), "{uptime_s} of {least_s} to {most_s}");
     assert_eq!(status["look"]["effect"], "auto");
-    let text = world.ctl(&["status"]).done().stdout;
+    let text = world.ctl(&["status"]).printed();
     for part in ["desk is on\n", "640x360", "null, out.y4m", "a second, quality", "rim=0.2"] {
         assert!(text.contains(part), "{text}");
     }
@@ -147,21 +147,21 @@ fn the_status_says_how_it_is() {
 fn a_picture_is_saved_where_it_was_asked_for() {
     let world = World::new();
     let _stream = world.stream("stream", &["--to", "null", "--effect", "blur"]);
-    let saved = world.ctl(&["snapshot", "--to", "me.png"]).done().stdout;
+    let saved = world.ctl(&["snapshot", "--to", "me.png"]).printed();
     assert_eq!(saved.trim_end(), world.path("here/me.png").to_str().unwrap());
     let picture = read_color(&world.path("here/me.png")).unwrap();
     assert_eq!(picture.size(), (640, 360));
     assert!(picture.rgb.iter().any(|&value| value > 100), "not the card");
     let before = std::fs::read(world.path("here/me.png")).unwrap();
-    assert!(world.ctl(&["snapshot", "--to", "me.png"]).refused(1).contains("me.png exists: choose another name"));
+    world.ctl(&["snapshot", "--to", "me.png"]).refused(1, &["me.png exists: choose another name"]);
     assert_eq!(std::fs::read(world.path("here/me.png")).unwrap(), before);
-    assert!(world.ctl(&["snapshot", "--to", "me.txt"]).refused(1).contains("me.txt"));
+    world.ctl(&["snapshot", "--to", "me.txt"]).refused(1, &["me.txt"]);
     if cfg!(feature = "window") {
-        let by_date = world.ctl(&["snapshot"]).done().stdout;
+        let by_date = world.ctl(&["snapshot"]).printed();
         assert!(by_date.starts_with(world.path("pictures/bokehcam ").to_str().unwrap()), "{by_date}");
     }
     world.ctl(&["off"]).done();
-    assert!(world.ctl(&["snapshot", "--to", "no.png"]).refused(1).contains("it is off"));
+    world.ctl(&["snapshot", "--to", "no.png"]).refused(1, &["it is off"]);
     assert!(!world.path("here/no.png").exists());
 }
 

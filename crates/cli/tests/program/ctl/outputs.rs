@@ -13,13 +13,6 @@ fn bytes_in(folder: &Path) -> u64 {
     files.filter_map(|file| file.metadata().ok()).map(|file| file.len()).sum()
 }
 
-/// The program that a run has started.
-fn child_of(run: &Running) -> Pid {
-    let tasks = fs::read_dir(format!("/proc/{}/task", run.0.id())).unwrap().flatten();
-    let children = tasks.filter_map(|task| fs::read_to_string(task.path().join("children")).ok()).collect::<String>();
-    Pid::from_raw(children.split_whitespace().next().expect("a child").parse().unwrap()).unwrap()
-}
-
 /// The state of a process, such as `T` for one that was stopped.
 fn state(process: Pid) -> Option<char> {
     let stat = fs::read_to_string(format!("/proc/{}/stat", process.as_raw_nonzero())).ok()?;
@@ -36,8 +29,8 @@ fn a_reader_that_stops_holds_up_no_file_and_off_is_off_there() {
         until("the file grows", || bytes_in(&world.path("here")) > before);
         before = bytes_in(&world.path("here"));
     }
-    let off = world.ctl(&["off"]).done();
-    assert!(off.stderr.contains("standard output: busy, so the card comes there later"), "{}", off.stderr);
+    let off = world.ctl(&["off"]);
+    assert!(off.done().contains("standard output: busy, so the card comes there later"), "{}", off.stderr);
     let before = bytes_in(&world.path("here"));
     until("the card goes on in the file", || bytes_in(&world.path("here")) > before + 1_000_000);
     assert_eq!(run.interrupt(), 0);
@@ -53,14 +46,14 @@ fn an_encoder_that_hangs_holds_up_no_other_output_and_off_is_off_there() {
     let mut run = world.stream("stream", &["--to", "call.mp4", "--to", "-"]);
     let pictures = run.watch();
     pictures.wait_for("it runs", |_| true);
-    let ffmpeg = child_of(&run);
+    let ffmpeg = run.children()[0];
     kill_process(ffmpeg, Signal::STOP).unwrap();
     // Far fewer than come until it is given up.
     for _ in 0..8 {
         pictures.wait_for("the other output goes on", |picture| !picture.is_card());
     }
-    let off = world.ctl(&["off"]).done();
-    assert!(off.stderr.contains("ffmpeg to call.mp4: busy, so the card comes there later"), "{}", off.stderr);
+    let off = world.ctl(&["off"]);
+    assert!(off.done().contains("ffmpeg to call.mp4: busy, so the card comes there later"), "{}", off.stderr);
     pictures.wait_for("the card", Picture::is_card);
     assert_eq!(state(ffmpeg), Some('T'), "it still hangs");
     kill_process(ffmpeg, Signal::CONT).unwrap();

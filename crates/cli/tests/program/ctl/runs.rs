@@ -4,24 +4,25 @@ use std::fs::{self, Permissions};
 use std::os::unix::fs::{FileTypeExt, PermissionsExt};
 use std::os::unix::net::UnixListener;
 
+use crate::program::{PORTRAIT, Ran};
+
 use super::world::World;
 
 #[test]
 fn several_runs_are_told_apart_by_name() {
     let world = World::new();
-    assert!(world.ctl(&["on"]).refused(1).contains("nothing runs that can be controlled"));
+    world.ctl(&["on"]).refused(1, &["nothing runs that can be controlled"]);
     for list in [&[][..], &["list"]] {
-        let ran = world.ctl(list).done();
-        assert!(ran.stdout.is_empty() && ran.stderr.contains("nothing runs"), "{}", ran.stderr);
+        let ran = world.ctl(list);
+        assert!(ran.stdout.is_empty() && ran.done().contains("nothing runs"), "{}", ran.stderr);
     }
     let first = world.stream("stream", &["--to", "null"]);
     let second = world.stream("stream-2", &["--to", "null"]);
     let _third = world.stream("desk", &["--to", "null", "--name", "desk"]);
-    let refused = world.ctl(&["off"]).refused(2);
-    assert!(refused.contains("several run: desk, stream, stream-2; choose one with --name"), "{refused}");
+    world.ctl(&["off"]).refused(2, &["several run: desk, stream, stream-2; choose one with --name"]);
     world.ctl(&["off", "--name", "stream-2"]).done();
     for list in [&[][..], &["list"]] {
-        let listed = world.ctl(list).done().stdout;
+        let listed = world.ctl(list).printed();
         let [desk, stream, second] = listed.lines().collect::<Vec<_>>()[..] else { panic!("{listed}") };
         assert!(
             desk.starts_with("desk ") && stream.starts_with("stream ") && second.starts_with("stream-2 "),
@@ -32,18 +33,12 @@ fn several_runs_are_told_apart_by_name() {
             "{listed}"
         );
     }
-    assert_eq!(world.ctl(&["--name", "desk"]).done().stdout.lines().count(), 1);
+    assert_eq!(world.ctl(&["--name", "desk"]).printed().lines().count(), 1);
     let on = |name: &str| world.status(&["--name", name])["on"].clone();
     assert_eq!([on("desk"), on("stream"), on("stream-2")], [true, true, false]);
-    assert!(
-        world
-            .ctl(&["on", "--name", "sofa"])
-            .refused(1)
-            .contains("no run is called sofa: there is desk, stream, stream-2")
-    );
-    let recording = concat!(env!("CARGO_MANIFEST_DIR"), "/../../recordings/portrait");
-    let taken = world.run(&["stream", recording, "--to", "out/", "--frames", "3", "--name", "desk"]).refused(2);
-    assert!(taken.contains("another run is called desk already: choose another --name"), "{taken}");
+    world.ctl(&["on", "--name", "sofa"]).refused(1, &["no run is called sofa: there is desk, stream, stream-2"]);
+    let taken = world.run(&["stream", PORTRAIT, "--to", "out/", "--frames", "3", "--name", "desk"]);
+    taken.refused(2, &["another run is called desk already: choose another --name"]);
     assert!(!world.path("here/out").exists());
 
     let mode = |path: &str| fs::metadata(world.path(path)).unwrap().permissions().mode() & 0o777;
@@ -60,8 +55,8 @@ fn what_a_dead_run_left_is_swept_and_nothing_else_is_touched() {
     killed.0.kill().unwrap();
     killed.0.wait().unwrap();
     assert!(world.socket("stream").symlink_metadata().unwrap().file_type().is_socket());
-    assert!(world.ctl(&["off"]).refused(1).contains("nothing runs that can be controlled"));
-    assert!(world.ctl(&["off", "--name", "stream"]).refused(1).contains("no run is called stream: nothing runs"));
+    world.ctl(&["off"]).refused(1, &["nothing runs that can be controlled"]);
+    world.ctl(&["off", "--name", "stream"]).refused(1, &["no run is called stream: nothing runs"]);
 
     let foreign = [world.path("run/bokehcam/notes.txt"), world.socket("stream-2"), world.socket("desk")];
     for file in &foreign {
@@ -71,8 +66,8 @@ fn what_a_dead_run_left_is_swept_and_nothing_else_is_touched() {
     // The dead one's name is free again; that of a file is not.
     let first = world.stream("stream", &["--to", "null"]);
     let second = world.stream("stream-3", &["--to", "null"]);
-    let refused = world.run(&["stream", "demo", "--frames", "1", "--to", "null", "--name", "desk"]).refused(2);
-    assert!(refused.contains("desk.sock is in the way"), "{refused}");
+    let refused = world.run(&["stream", "demo", "--frames", "1", "--to", "null", "--name", "desk"]);
+    refused.refused(2, &["desk.sock is in the way"]);
     assert_eq!((first.interrupt(), second.interrupt()), (0, 0));
     for file in &foreign {
         assert_eq!(fs::read_to_string(file).unwrap(), "mine");
@@ -91,21 +86,16 @@ fn what_a_dead_run_left_is_swept_and_nothing_else_is_touched() {
 #[test]
 fn without_a_folder_of_the_users_own_a_run_goes_on_and_says_so() {
     let world = World::new();
-    let recording = concat!(env!("CARGO_MANIFEST_DIR"), "/../../recordings/portrait");
-    let args = ["stream", recording, "--frames", "3", "--to", "null", "--pace", "realtime"];
-    let lines = |stderr: &[u8]| {
-        let text = String::from_utf8_lossy(stderr).into_owned();
-        text.lines().filter(|line| line.contains("bokehcam ctl")).map(str::to_owned).collect::<Vec<_>>()
-    };
+    let args = ["stream", PORTRAIT, "--frames", "3", "--to", "null", "--pace", "realtime"];
     let said = |world: &World, folder: Option<&str>, more: &[&str]| {
         let mut command = world.bokehcam(&[&args, more].concat());
         match folder {
             Some(folder) => command.env("XDG_RUNTIME_DIR", folder),
             None => command.env_remove("XDG_RUNTIME_DIR"),
         };
-        let output = command.output().unwrap();
-        assert!(output.status.success());
-        lines(&output.stderr)
+        let ran = Ran::of(&mut command);
+        let lines = ran.done().lines().filter(|line| line.contains("bokehcam ctl"));
+        lines.map(str::to_owned).collect::<Vec<_>>()
     };
     let none = said(&world, None, &[]);
     assert!(none.len() == 1 && none[0].contains("XDG_RUNTIME_DIR names no whole path"), "{none:?}");
@@ -119,7 +109,7 @@ fn without_a_folder_of_the_users_own_a_run_goes_on_and_says_so() {
     fs::set_permissions(world.path("run/bokehcam"), Permissions::from_mode(0o755)).unwrap();
     let open = said(&world, world.path("run").to_str(), &[]);
     assert!(open.len() == 1 && open[0].contains("is open to others: `chmod 700"), "{open:?}");
-    assert!(world.ctl(&["status"]).refused(1).contains("is open to others"));
+    world.ctl(&["status"]).refused(1, &["is open to others"]);
     fs::remove_dir(world.path("run/bokehcam")).unwrap();
     std::os::unix::fs::symlink(world.path("here"), world.path("run/bokehcam")).unwrap();
     assert!(said(&world, world.path("run").to_str(), &[])[0].contains("is no folder"));

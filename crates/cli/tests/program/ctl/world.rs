@@ -2,60 +2,40 @@
 
 use std::fs;
 use std::io::{BufRead, BufReader, Read, Write};
-use std::os::unix::fs::PermissionsExt;
 use std::os::unix::net::UnixStream;
-use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Stdio};
+use std::path::PathBuf;
+use std::process::{Command, Stdio};
 use std::sync::{Arc, Mutex};
 use std::thread;
 use std::time::{Duration, Instant};
+
+use rustix::process::Signal;
+use serde_json::Value;
+
+use crate::program::{self, Beside, Home, PORTRAIT, Ran};
 
 /// Nothing here takes so long: against a hang.
 pub const HANG: Duration = Duration::from_secs(60);
 
 /// Waits until something is so.
 #[track_caller]
-pub fn until(what: &str, mut is: impl FnMut() -> bool) {
-    let began = Instant::now();
-    while !is() {
-        assert!(began.elapsed() < HANG, "never: {what}");
-        thread::sleep(Duration::from_millis(20));
-    }
+pub fn until(what: &str, is: impl FnMut() -> bool) {
+    program::until(what, HANG, is);
 }
 
-pub struct Ran {
-    pub code: i32,
-    pub stdout: String,
-    pub stderr: String,
-}
-
-impl Ran {
-    pub fn done(self) -> Self {
-        assert_eq!(self.code, 0, "{}", self.stderr);
-        self
-    }
-
-    /// The one line that it was refused with.
-    pub fn refused(self, code: i32) -> String {
-        assert_eq!((self.code, self.stderr.lines().count()), (code, 1), "{}{}", self.stdout, self.stderr);
-        self.stderr
-    }
-}
-
-pub struct World(tempfile::TempDir);
+pub struct World(Home);
 
 impl World {
     pub fn new() -> Self {
-        let world = Self(tempfile::tempdir().unwrap());
-        for folder in ["run", "config/bokehcam", "pictures", "here"] {
-            fs::create_dir_all(world.path(folder)).unwrap();
+        let home = Home::new();
+        for folder in ["config/bokehcam", "pictures", "here"] {
+            fs::create_dir_all(home.path(folder)).unwrap();
         }
-        fs::set_permissions(world.path("run"), fs::Permissions::from_mode(0o700)).unwrap();
-        world
+        Self(home)
     }
 
     pub fn path(&self, name: &str) -> PathBuf {
-        self.0.path().join(name)
+        self.0.path(name)
     }
 
     pub fn socket(&self, name: &str) -> PathBuf {
@@ -63,35 +43,24 @@ impl World {
     }
 
     pub fn bokehcam(&self, args: &[&str]) -> Command {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_bokehcam"));
-        for (name, _) in std::env::vars_os() {
-            if name.to_string_lossy().starts_with("BOKEHCAM_") {
-                command.env_remove(name);
-            }
-        }
-        command.env("XDG_RUNTIME_DIR", self.path("run")).env("XDG_CONFIG_HOME", self.path("config"));
-        command.env("XDG_PICTURES_DIR", self.path("pictures")).env_remove("RUST_LOG");
-        command.args(args).current_dir(self.path("here")).stdin(Stdio::null());
+        let mut command = self.0.command(args);
+        command.env("XDG_PICTURES_DIR", self.path("pictures")).current_dir(self.path("here"));
         command
     }
 
     pub fn run(&self, args: &[&str]) -> Ran {
-        let output = self.bokehcam(args).output().unwrap();
-        Ran {
-            code: output.status.code().expect("ended by itself"),
-            stdout: String::from_utf8(output.stdout).unwrap(),
-            stderr: String::from_utf8(output.stderr).unwrap(),
-        }
+        Ran::of(&mut self.bokehcam(args))
     }
 
     pub fn ctl(&self, args: &[&str]) -> Ran {
         self.run(&[&["ctl"], args].concat())
     }
 
-    pub fn status(&self, args: &[&str]) -> serde_json::Value {
-        let ran = self.ctl(&[&["status", "--json"], args].concat()).done();
+    pub fn status(&self, args: &[&str]) -> Value {
+        let ran = self.ctl(&[&["status", "--json"], args].concat());
+        ran.done();
         assert_eq!(ran.stdout.lines().count(), 1, "{}", ran.stdout);
-        serde_json::from_str(&ran.stdout).unwrap()
+        ran.json()
     }
 
     /// What a run answers to these bytes, sent as they are; the connection stays open from this side.
@@ -103,16 +72,10 @@ impl World {
     }
 
     /// A looped recording in real time, with these arguments, once it answers.
-    pub fn stream(&self, name: &str, args: &[&str]) -> Running {
-        let recording = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("recordings/portrait");
-        let first = ["stream", recording.to_str().unwrap(), "--loop", "--pace", "realtime", "--quiet"];
-        let child = self.bokehcam(&[&first, args].concat()).stdout(Stdio::piped()).spawn().unwrap();
-        let running = Running(child);
-        let began = Instant::now();
-        while self.ctl(&["status", "--name", name]).code != 0 {
-            assert!(began.elapsed() < HANG, "{name} does not answer");
-            thread::sleep(Duration::from_millis(20));
-        }
+    pub fn stream(&self, name: &str, args: &[&str]) -> Beside {
+        let first = ["stream", PORTRAIT, "--loop", "--pace", "realtime", "--quiet"];
+        let running = Beside::start(self.bokehcam(&[&first, args].concat()).stdout(Stdio::piped()));
+        until(&format!("{name} answers"), || self.ctl(&["status", "--name", name]).code == 0);
         running
     }
 }
@@ -124,27 +87,16 @@ pub fn answer(stream: &UnixStream) -> String {
     line
 }
 
-/// A run; dropped, it is killed.
-pub struct Running(pub Child);
-
-impl Running {
-    /// Ends it as Ctrl-C does; gives back its exit code.
+impl Beside {
+    /// Ends it as Ctrl-C does, whether or not somebody reads its pictures; gives back its exit code.
     pub fn interrupt(mut self) -> i32 {
-        let pid = rustix::process::Pid::from_child(&self.0);
-        rustix::process::kill_process(pid, rustix::process::Signal::INT).unwrap();
+        self.signal(Signal::INT);
         self.0.wait().unwrap().code().unwrap()
     }
 
     /// What it writes to its standard output.
     pub fn watch(&mut self) -> Pictures {
         Pictures::of(self.0.stdout.take().unwrap())
-    }
-}
-
-impl Drop for Running {
-    fn drop(&mut self) {
-        let _ = self.0.kill();
-        let _ = self.0.wait();
     }
 }
 

@@ -1,26 +1,22 @@
 //! Networks that are known: fetched, checked, installed.
 
 use std::fs;
-use std::os::unix::fs::PermissionsExt;
 use std::path::Path;
-use std::process::Command;
 
 use bokehcam::depth::single_camera::{Hints, SingleCamera};
 use bokehcam::frame::DepthMap;
 use bokehcam::network::{KNOWN, Known, Runtime, Task};
-use tempfile::TempDir;
 
 use super::onnx::matte;
-use super::{WEIGHTS, bokehcam, disc, read, real, written};
+use super::{WEIGHTS, disc, read, real, written};
+use crate::program::{Home, Ran};
 
 #[test]
 fn only_known_networks_are_installed_and_nothing_of_others_is_replaced() {
-    let folder = TempDir::new().unwrap();
-    let file = written(&folder, "m.onnx", &matte(8, 4, WEIGHTS, 0.0));
-    let ran = bokehcam(&["models", "add", file.to_str().unwrap()], folder.path());
-    assert_eq!(ran.status.code(), Some(1));
-    assert!(String::from_utf8_lossy(&ran.stderr).contains("none of the networks that are known"));
-    let listed = String::from_utf8(bokehcam(&["models"], folder.path()).stdout).unwrap();
+    let home = Home::new();
+    written(&home.0, "m.onnx", &matte(8, 4, WEIGHTS, 0.0));
+    home.run(&["models", "add", "m.onnx"]).failed(1, &["none of the networks that are known"]);
+    let listed = home.run(&["models"]).stdout;
     for known in &KNOWN {
         assert!(listed.contains(known.address) && listed.contains(known.sha256), "{}", known.file);
     }
@@ -28,33 +24,26 @@ fn only_known_networks_are_installed_and_nothing_of_others_is_replaced() {
 }
 
 /// A client that brings what a test wants, and says how it was called.
-fn client(folder: &Path, content: &Path) {
-    let program = folder.join("curl");
-    fs::write(&program, format!("#!/bin/sh\necho \"called with $*\" >&2\ncat {}\n", content.display())).unwrap();
-    fs::set_permissions(&program, fs::Permissions::from_mode(0o755)).unwrap();
+fn client(home: &Home, content: &Path) {
+    home.add_program("curl", &format!("echo \"called with $*\" >&2\ncat {}", content.display()));
 }
 
 #[test]
 fn what_is_fetched_is_checked_and_how_is_shown() {
-    let folder = TempDir::new().unwrap();
+    let home = Home::new();
     let get = |arguments: &[&str]| {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_bokehcam"));
-        command.args(["models", "get"]).args(arguments).env("XDG_DATA_HOME", folder.path().join("data"));
-        let path = format!("{}:/usr/bin:/bin", folder.path().display());
-        let ran = command.env("XDG_DATA_DIRS", folder.path()).env("PATH", path).output().unwrap();
-        (ran.status.code(), String::from_utf8_lossy(&ran.stderr).into_owned())
+        let path = format!("{}:/usr/bin:/bin", home.arg("bin"));
+        Ran::of(home.command(&[&["models", "get"], arguments].concat()).env("PATH", path))
     };
-    client(folder.path(), &written(&folder, "other", b"<html>not found</html>"));
-    let (code, said) = get(&[]);
-    assert!(code == Some(1) && said.contains("is not kept") && said.contains(KNOWN[0].address), "{said}");
+    client(&home, &written(&home.0, "other", b"<html>not found</html>"));
+    let ran = get(&[]);
+    let said = ran.failed(1, &["is not kept", KNOWN[0].address]);
     assert!(said.find("curl --fail").unwrap() < said.find("called with").unwrap(), "{said}");
     // Endless, and far too much.
-    client(folder.path(), Path::new("/dev/zero"));
-    let (code, said) = get(&["tcmonodepth-small"]);
-    assert!(code == Some(1) && said.contains("is not kept"), "{said}");
-    assert!(!folder.path().join("data").exists());
-    let (code, said) = get(&["nothing"]);
-    assert!(code == Some(2) && said.contains(KNOWN[0].file), "{said}");
+    client(&home, Path::new("/dev/zero"));
+    get(&["tcmonodepth-small"]).failed(1, &["is not kept"]);
+    assert!(!home.path("data").exists());
+    get(&["nothing"]).failed(2, &[KNOWN[0].file]);
 }
 
 /// The networks that users are pointed to.
@@ -63,7 +52,8 @@ fn what_is_fetched_is_checked_and_how_is_shown() {
 fn the_known_networks_run_and_are_installed() {
     let data = std::env::var_os("BOKEHCAM_DATA").expect("BOKEHCAM_DATA names the folder of the data");
     let files = || fs::read_dir(Path::new(&data).join("models")).unwrap().flatten().map(|entry| entry.path());
-    let home = TempDir::new().unwrap();
+    let home = Home::new();
+    let add = |file: &Path| home.run(&["models", "add", file.to_str().unwrap()]);
     let (color, _) = disc(320, 240, (160.0, 120.0), 70.0);
     for file in files() {
         let Some(known) = Known::of(&fs::read(&file).unwrap()) else { continue };
@@ -71,16 +61,14 @@ fn the_known_networks_run_and_are_installed() {
         let mut camera = SingleCamera::open(matte, mono, &Hints::default(), Runtime::BuiltIn)
             .unwrap_or_else(|error| panic!("{}: {error}", known.file));
         assert!(read(&mut camera, &color, 0).metres.iter().all(|&metres| DepthMap::is_known(metres)));
-        let ran = bokehcam(&["models", "add", file.to_str().unwrap()], home.path());
-        assert!(ran.status.success(), "{}", String::from_utf8_lossy(&ran.stderr));
-        assert!(home.path().join("bokehcam/models").join(known.file).is_file());
+        add(&file).done();
+        assert!(home.path("data/bokehcam/models").join(known.file).is_file());
         // Again changes nothing; and not over what is another's.
-        assert!(bokehcam(&["models", "add", file.to_str().unwrap()], home.path()).status.success());
+        add(&file).done();
     }
     let best = real::model(Task::Matte);
     let known = Known::of(&fs::read(&best).unwrap()).unwrap();
-    let foreign = home.path().join("bokehcam/models").join(known.file);
+    let foreign = home.path("data/bokehcam/models").join(known.file);
     fs::write(&foreign, "mine").unwrap();
-    let ran = bokehcam(&["models", "add", best.to_str().unwrap()], home.path());
-    assert_eq!((ran.status.code(), fs::read_to_string(&foreign).unwrap().as_str()), (Some(1), "mine"));
+    assert_eq!((add(&best).code, fs::read_to_string(&foreign).unwrap().as_str()), (1, "mine"));
 }

@@ -10,7 +10,6 @@ mod window;
 
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
 use std::time::Duration;
 
 use bokehcam::depth::single_camera::{Hints, SingleCamera};
@@ -19,6 +18,8 @@ use bokehcam::frame::{ColorImage, DepthMap, Stamp};
 use bokehcam::network::{self, Runtime, Tensor};
 use onnx::{Side, constant, conv, matte, model, node, port};
 use tempfile::TempDir;
+
+use crate::program::{Home, PORTRAIT, Ran};
 
 /// Red is the person, and blue is not: codes of 255 and 0 leave no doubt.
 const WEIGHTS: [f32; 3] = [12.0, 0.0, -12.0];
@@ -202,20 +203,18 @@ fn a_network_with_a_memory_gets_back_what_it_gave() {
     assert!(read(&mut camera, &red, 1000).metres[0] > 1.0);
 }
 
-fn bokehcam(arguments: &[&str], data: &Path) -> Output {
-    let program = Command::new(env!("CARGO_BIN_EXE_bokehcam"))
-        .args(arguments)
-        .current_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."))
-        .env("XDG_DATA_HOME", data)
-        .env("XDG_DATA_DIRS", data)
-        .env("XDG_CONFIG_HOME", data)
-        .output();
-    program.unwrap()
+/// Streams some frames of the portrait with a network of the test's own as its mask.
+fn streamed(home: &Home, name: &str, bytes: &[u8], frames: &str) -> Ran {
+    let file = format!("{name}.onnx");
+    written(&home.0, &file, bytes);
+    let matte = format!("matte:{file}");
+    let stream = ["stream", PORTRAIT, "--depth", &matte, "--network-runtime", "built-in", "--to", "null"];
+    home.run(&[&stream[..], &["--frames", frames]].concat())
 }
 
 #[test]
 fn a_bad_file_is_refused_in_one_line() {
-    let folder = TempDir::new().unwrap();
+    let home = Home::new();
     let good = matte(8, 4, WEIGHTS, 0.0);
     let sides = |channels, side| [Side::Is(1), Side::Is(channels), Side::Is(side), Side::Is(side)];
     let plain = |input: &[Side], output: &[Side]| {
@@ -241,82 +240,33 @@ fn a_bad_file_is_refused_in_one_line() {
         ("unknown", unknown, "Magic"),
     ];
     for (name, bytes, expected) in &cases {
-        let file = written(&folder, &format!("{name}.onnx"), bytes);
-        let choice = format!("matte:{}", file.display());
-        let ran = bokehcam(
-            &[
-                "stream",
-                "recordings/portrait",
-                "--depth",
-                &choice,
-                "--network-runtime",
-                "built-in",
-                "--frames",
-                "1",
-                "--to",
-                "null",
-            ],
-            folder.path(),
-        );
-        let said = String::from_utf8_lossy(&ran.stderr);
-        assert_eq!(ran.status.code(), Some(1), "{name}: {said}");
-        assert_eq!(said.lines().count(), 1, "{name}: {said}");
-        assert!(said.contains(expected) && said.contains(name), "{name}: {said}");
+        streamed(&home, name, bytes, "1").refused(1, &[expected, name]);
     }
-    let missing =
-        bokehcam(&["stream", "recordings/portrait", "--depth", "matte:nowhere.onnx", "--to", "null"], folder.path());
-    assert_eq!(missing.status.code(), Some(1));
-    assert!(String::from_utf8_lossy(&missing.stderr).contains("nowhere.onnx: No such file"));
-    let none = bokehcam(&["stream", "recordings/portrait", "--depth", "matte", "--to", "null"], folder.path());
-    assert_eq!(none.status.code(), Some(1));
-    assert!(String::from_utf8_lossy(&none.stderr).contains("`bokehcam models get"));
+    for (depth, said) in [("matte:nowhere.onnx", "nowhere.onnx: No such file"), ("matte", "`bokehcam models get")] {
+        home.run(&["stream", PORTRAIT, "--depth", depth, "--to", "null"]).failed(1, &[said]);
+    }
 }
 
 #[test]
 fn without_onnx_runtime_what_is_built_in_is_used_and_what_was_asked_for_is_missed() {
-    let folder = TempDir::new().unwrap();
-    let file = written(&folder, "m.onnx", &matte(8, 4, WEIGHTS, 0.0));
+    let home = Home::new();
+    written(&home.0, "m.onnx", &matte(8, 4, WEIGHTS, 0.0));
     // A library that is none.
-    let library = written(&folder, "libonnxruntime.so", b"nothing");
-    let choice = format!("matte:{}", file.display());
+    let library = written(&home.0, "libonnxruntime.so", b"nothing");
     let run = |runtime: &str| {
-        Command::new(env!("CARGO_BIN_EXE_bokehcam"))
-            .args([
-                "stream",
-                "recordings/portrait",
-                "--frames",
-                "2",
-                "--depth",
-                &choice,
-                "--network-runtime",
-                runtime,
-                "--to",
-                "null",
-            ])
-            .current_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."))
-            .env("ORT_DYLIB_PATH", &library)
-            .env("XDG_CONFIG_HOME", folder.path())
-            .output()
-            .unwrap()
+        let stream = ["stream", PORTRAIT, "--frames", "2", "--depth", "matte:m.onnx", "--to", "null"];
+        let stream = [&stream[..], &["--network-runtime", runtime]].concat();
+        Ran::of(home.command(&stream).env("ORT_DYLIB_PATH", &library))
     };
-    let (auto, asked) = (run("auto"), run("onnx-runtime"));
-    let said = String::from_utf8_lossy(&auto.stderr);
-    assert!(auto.status.success() && said.contains("run by the built-in runtime"), "{said}");
-    let said = String::from_utf8_lossy(&asked.stderr);
-    assert_eq!(asked.status.code(), Some(1), "{said}");
-    assert!(said.contains("ONNX Runtime") && said.lines().count() == 1, "{said}");
+    let auto = run("auto");
+    assert!(auto.done().contains("run by the built-in runtime"), "{}", auto.stderr);
+    run("onnx-runtime").refused(1, &["ONNX Runtime"]);
 }
 
 #[test]
 fn relative_depth_refuses_metres() {
-    let folder = TempDir::new().unwrap();
-    let file = written(&folder, "m.onnx", &matte(8, 4, WEIGHTS, 0.0));
-    let choice = format!("matte:{}", file.display());
-    let ran = bokehcam(
-        &["stream", "recordings/portrait", "--depth", &choice, "--focus", "1.2", "--frames", "1", "--to", "null"],
-        folder.path(),
-    );
-    let said = String::from_utf8_lossy(&ran.stderr);
-    assert_eq!(ran.status.code(), Some(2), "{said}");
-    assert!(said.contains("--focus 1.2 needs distances"), "{said}");
+    let home = Home::new();
+    written(&home.0, "m.onnx", &matte(8, 4, WEIGHTS, 0.0));
+    let stream = ["stream", PORTRAIT, "--depth", "matte:m.onnx", "--focus", "1.2", "--frames", "1", "--to", "null"];
+    home.run(&stream).failed(2, &["--focus 1.2 needs distances"]);
 }

@@ -8,6 +8,7 @@ use bokehcam::network::{KNOWN, Runtime, Task, Tensor, best_in};
 use bokehcam::recording::{Options, Recording, Scratch};
 
 use super::read;
+use crate::program::Home;
 
 /// Pixels of a real sequence that a sensor knows to be of a person, and of the wall, three pixels away from all else.
 pub fn sure(depth: &DepthMap) -> (Vec<bool>, Vec<bool>) {
@@ -112,21 +113,15 @@ fn a_real_person_is_found_and_what_rests_rests() {
 #[test]
 #[ignore = "needs BOKEHCAM_DATA, a folder with models and rgbd/person_turning"]
 fn a_photo_alone_has_the_depth_of_the_installed_network_in_every_command() {
-    let home = tempfile::TempDir::new().unwrap();
-    let path = |name: &str| home.path().join(name).to_str().unwrap().to_owned();
-    let done = |args: &[&str]| {
-        let ran = super::bokehcam(args, home.path());
-        let said = String::from_utf8_lossy(&ran.stderr).into_owned();
-        assert!(ran.status.success(), "{said}");
-        said
-    };
-    done(&["models", "add", model(Task::Matte).to_str().unwrap()]);
+    let home = Home::new();
+    home.run(&["models", "add", model(Task::Matte).to_str().unwrap()]).done();
     let (color, _) = Sequence::open().frame(0);
-    bokehcam::recording::still::write_color(&home.path().join("photo.png"), &color, false).unwrap();
-    let said = done(&["render", &path("photo.png"), "--out", &path("r.png"), "--backend", "cpu"]);
+    bokehcam::recording::still::write_color(&home.path("photo.png"), &color, false).unwrap();
+    let ran = home.run(&["render", "photo.png", "--out", "r.png", "--backend", "cpu"]);
+    let said = ran.done();
     assert!(said.contains("depth by selfie-landscape") && !said.contains("warning"), "{said}");
-    done(&["stream", &path("photo.png"), "--to", &path("s/"), "--backend", "cpu"]);
-    let read = |name: &str| bokehcam::recording::still::read_color(&home.path().join(name)).unwrap();
+    home.run(&["stream", "photo.png", "--to", "s/", "--backend", "cpu"]).done();
+    let read = |name: &str| bokehcam::recording::still::read_color(&home.path(name)).unwrap();
     assert!(read("r.png") == read("s/000000.png"));
 }
 
@@ -142,10 +137,9 @@ fn load(file: &Path) -> bokehcam::network::Network {
 #[test]
 #[ignore = "needs the network for persons, as `scripts/setup models` brings it"]
 fn what_the_package_brings_is_installed_and_sees_nobody_in_a_grey_wall() {
-    let home = tempfile::TempDir::new().unwrap();
-    let ran = super::bokehcam(&["models", "add", shipped().to_str().unwrap()], home.path());
-    assert!(ran.status.success(), "{}", String::from_utf8_lossy(&ran.stderr));
-    let mut network = load(&home.path().join("bokehcam/models").join(KNOWN[0].file));
+    let home = Home::new();
+    home.run(&["models", "add", shipped().to_str().unwrap()]).done();
+    let mut network = load(&home.path("data/bokehcam/models").join(KNOWN[0].file));
     let shape = vec![1, 144, 256, 3];
     let mut mask = Vec::new();
     network.run(&[Tensor { values: vec![0.5; 144 * 256 * 3], shape }], &mut mask).unwrap();

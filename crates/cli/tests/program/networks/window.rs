@@ -9,6 +9,7 @@ use bokehcam_window::state::DepthMethod;
 use bokehcam_window::system::System;
 use tempfile::TempDir;
 
+use crate::program::{PORTRAIT, STEREO};
 use crate::store;
 
 use super::onnx::{Side, matte, model, node, port};
@@ -30,12 +31,11 @@ fn the_window_says_in_one_line_why_a_network_cannot_be_used_and_goes_on() {
         huge,
         written(&folder, "good.onnx", &good),
     ];
-    let recording = concat!(env!("CARGO_MANIFEST_DIR"), "/../../recordings/portrait");
     for file in files {
         let depth_choice: DepthChoice = format!("matte:{}", file.display()).parse().unwrap();
         let options = Options { depth_choice, ..Options::default() };
         let mut system = System::new(options, Look::default(), Box::new(NoStore));
-        match system.open(recording, None) {
+        match system.open(PORTRAIT, None) {
             Ok(opened) => assert!(file.ends_with("good.onnx") && opened.source.has_depth(), "{}", file.display()),
             Err(line) => {
                 let name = file.file_name().unwrap().to_str().unwrap();
@@ -47,23 +47,21 @@ fn the_window_says_in_one_line_why_a_network_cannot_be_used_and_goes_on() {
 
 #[test]
 fn a_source_has_the_ways_to_depth_that_it_brings_and_the_command_names_the_one_that_was_chosen() {
-    let at = |name: &str| format!("{}/recordings/{name}", concat!(env!("CARGO_MANIFEST_DIR"), "/../.."));
     let mut system = System::new(Options::default(), Look::default(), Box::new(NoStore));
-    for (name, usual) in [("portrait", DepthMethod::Measured), ("stereo", DepthMethod::Stereo)] {
-        let opened = system.open(&at(name), None).unwrap();
+    for (name, usual) in [(PORTRAIT, Way::Measured), (STEREO, Way::Stereo)] {
+        let opened = system.open(name, None).unwrap();
         assert_eq!((opened.way, opened.ways.first(), opened.has_depth), (Some(usual), Some(&usual), true), "{name}");
         assert!(!opened.ways.contains(&DepthMethod::Plate), "nobody in a recording steps aside");
         assert!(!opened.camera.is_relative);
         // By its own name it is the same.
-        let again = system.open(&at(name), Some(usual)).unwrap();
+        let again = system.open(name, Some(usual)).unwrap();
         assert_eq!((again.way, &again.ways), (Some(usual), &opened.ways), "{name}");
     }
-    let none = system.check_depth_method(&at("portrait"), DepthMethod::PersonAndDistance);
-    let is_installed = system.open(&at("portrait"), None).unwrap().ways.contains(&DepthMethod::PersonAndDistance);
+    let none = system.can(PORTRAIT, Way::PersonAndDistance);
+    let is_installed = system.open(PORTRAIT, None).unwrap().ways.contains(&Way::PersonAndDistance);
     assert_eq!(none.is_ok(), is_installed);
     assert!(is_installed || none.unwrap_err().contains("`bokehcam models get`"));
-    assert!(system.check_depth_method(&at("portrait"), DepthMethod::Stereo).is_err(), "it has one eye");
-    let flags = [DepthMethod::Measured, DepthMethod::Stereo, DepthMethod::Person, DepthMethod::PersonAndDistance]
-        .map(DepthMethod::flag);
+    assert!(system.can(PORTRAIT, Way::Stereo).is_err(), "it has one eye");
+    let flags = [Way::Measured, Way::Stereo, Way::Person, Way::PersonAndDistance].map(Way::flag);
     assert_eq!(flags, ["recorded", "stereo", "matte", "matte,mono"]);
 }

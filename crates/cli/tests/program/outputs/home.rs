@@ -1,103 +1,59 @@
-//! A folder for each test, and the program in it.
+//! What a user of the outputs has and does, by way of a shell.
 
 use std::fs;
-use std::io::Read;
-use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Output, Stdio};
-use std::time::{Duration, Instant};
+use std::process::{Command, Stdio};
+use std::time::Duration;
 
-use bokehcam::frame::{ColorImage, DepthMap};
 use bokehcam::recording::tum::{Writer, WriterOptions};
+use rustix::process::Signal;
 
-/// A folder of its own for each test, and the program in it, with no settings of whoever runs the tests.
-pub struct Home(pub tempfile::TempDir);
+use crate::common::{Numbers, color, depth};
+use crate::program;
+pub use crate::program::{Beside, Home, Ran, json};
+
+/// Nothing is changed, so that what comes out is known.
+pub const BLUR: &str = "--effect none";
 
 impl Home {
-    pub fn new() -> Self {
-        Self(tempfile::tempdir().unwrap())
+    /// Runs it with arguments as a shell has them.
+    pub fn sh(&self, args: &str) -> Ran {
+        Ran::of(&mut self.shell("", args))
     }
 
-    pub fn at(&self, name: &str) -> PathBuf {
-        self.0.path().join(name)
-    }
-
-    /// By way of a shell, whose limits (`ulimit`) the program has.
-    pub fn command(&self, limits: &str, args: &str) -> Command {
-        let mut command = Command::new("sh");
-        let program = env!("CARGO_BIN_EXE_bokehcam");
-        command.args(["-c", &format!("{limits} exec '{program}' {args}")]);
-        for (name, _) in std::env::vars_os() {
-            if name.to_string_lossy().starts_with("BOKEHCAM_") {
-                command.env_remove(name);
-            }
-        }
-        command.env("XDG_CONFIG_HOME", self.at("config")).env_remove("RUST_LOG").current_dir(self.0.path());
-        command.stdin(Stdio::null());
-        command
-    }
-
-    pub fn run(&self, args: &str) -> Ran {
-        self.command("", args).output().unwrap().into()
+    /// Starts it beside the test, in a shell that has done `before`.
+    pub fn start(&self, before: &str, args: &str) -> Beside {
+        Beside::start(self.shell(before, args).stderr(Stdio::piped()))
     }
 
     /// As on a disk where no file has room for more than so much.
-    pub fn run_on_full_disk(&self, most_kb: u32, args: &str) -> Ran {
+    pub fn sh_on_full_disk(&self, most_kb: u32, args: &str) -> Ran {
         // A signal would end it; ignored, writing fails as on a full disk.
-        self.command(&format!("trap '' XFSZ; ulimit -f {};", most_kb * 2), args).output().unwrap().into()
+        Ran::of(&mut self.shell(&format!("trap '' XFSZ; ulimit -f {};", most_kb * 2), args))
     }
 
     /// A recording of `frames` noisy pictures, `period_s` apart.
     pub fn record(&self, name: &str, frames: u64, period_s: f64) {
-        let mut writer = Writer::create(&self.at(name), &WriterOptions::default()).unwrap();
+        let mut writer = Writer::create(&self.path(name), &WriterOptions::default()).unwrap();
         for frame in 0..frames {
-            let mut color = ColorImage::new(64, 48);
-            let mut state = frame as u32 + 1;
-            color.rgb.iter_mut().for_each(|byte| {
-                state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-                *byte = (state >> 24) as u8;
-            });
-            let depth = DepthMap { width: 64, height: 48, metres: vec![2.0; 64 * 48], ..DepthMap::default() };
+            let mut numbers = Numbers(frame + 1);
+            let color = color(64, 48, |_, _| std::array::from_fn(|_| (numbers.next() * 256.0) as u8));
+            let depth = depth(64, 48, |_, _| 2.0);
             writer.add((frame as f64 * period_s * 1e9) as u64, &color, Some(&depth)).unwrap();
         }
         writer.finish().unwrap();
     }
 
     pub fn damage(&self, picture: &str) {
-        let bytes = fs::read(self.at(picture)).unwrap();
-        fs::write(self.at(picture), &bytes[..bytes.len() / 2]).unwrap();
+        let bytes = fs::read(self.path(picture)).unwrap();
+        fs::write(self.path(picture), &bytes[..bytes.len() / 2]).unwrap();
     }
 
-    /// Puts a program of our own in place of ffmpeg.
+    /// Puts a program of our own in place of ffmpeg; gives what a shell has to do for that.
     pub fn fake_ffmpeg(&self, script: &str) -> String {
-        fs::create_dir_all(self.at("bin")).unwrap();
-        let program = self.at("bin/ffmpeg");
         // The file is its last argument, with a prefix.
-        let text = format!("#!/bin/sh\nfor last; do :; done\nout=${{last#file:}}\n{script}\n");
-        fs::write(&program, text).unwrap();
-        fs::set_permissions(&program, fs::Permissions::from_mode(0o755)).unwrap();
-        format!("PATH='{}':$PATH;", self.at("bin").display())
-    }
-}
-
-#[derive(Debug)]
-pub struct Ran {
-    pub code: Option<i32>,
-    pub said: String,
-}
-
-impl From<Output> for Ran {
-    fn from(output: Output) -> Self {
-        Self { code: output.status.code(), said: String::from_utf8(output.stderr).unwrap() }
-    }
-}
-
-impl Ran {
-    /// It failed with one line that says so.
-    #[track_caller]
-    pub fn failed(&self, code: i32, what: &str) {
-        assert!(self.code == Some(code) && self.said.contains(what), "{self:?}");
-        assert_eq!(self.said.lines().filter(|line| line.starts_with("error: ")).count(), 1, "{}", self.said);
+        let path = self.add_program("ffmpeg", &format!("for last; do :; done\nout=${{last#file:}}\n{script}"));
+        format!("PATH='{path}';")
     }
 }
 
@@ -126,20 +82,24 @@ pub fn pngs(folder: &Path) -> usize {
 pub const LONG: Duration = Duration::from_secs(120);
 
 #[track_caller]
-pub fn until(what: &str, mut is: impl FnMut() -> bool) {
-    let began = Instant::now();
-    while !is() {
-        assert!(began.elapsed() < LONG, "never: {what}");
-        std::thread::sleep(Duration::from_millis(5));
-    }
+pub fn until(what: &str, is: impl FnMut() -> bool) {
+    program::until(what, LONG, is);
 }
 
 /// Ends a program by a signal; it must end by itself then.
-pub fn terminate(mut child: Child) -> Ran {
-    assert!(Command::new("kill").arg(child.id().to_string()).status().unwrap().success());
-    until("the end", || child.try_wait().unwrap().is_some());
-    let code = child.wait().unwrap().code();
-    let mut said = String::new();
-    child.stderr.take().map(|mut stderr| stderr.read_to_string(&mut said).unwrap());
-    Ran { code, said }
+#[track_caller]
+pub fn terminate(program: Beside) -> Ran {
+    program.end_by(Signal::TERM, LONG)
+}
+
+/// What ffprobe says of a video, asked for in this way.
+pub fn probed(video: &Path, how: &str) -> String {
+    let mut probe = Command::new("ffprobe");
+    probe.args(["-v", "error", "-of", "csv=p=0"]).args(how.split(' ')).arg(video);
+    Ran::of(&mut probe).stdout.trim().trim_end_matches(',').to_owned()
+}
+
+/// Frames of a video that can be played.
+pub fn played(video: &Path) -> u32 {
+    probed(video, "-count_frames -show_entries stream=nb_read_frames").parse().unwrap()
 }

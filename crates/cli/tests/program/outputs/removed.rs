@@ -3,21 +3,20 @@
 use std::fs;
 use std::io::{BufRead, BufReader};
 use std::path::Path;
-use std::process::{Child, ChildStderr, Stdio};
+use std::process::ChildStderr;
 
 use super::home::*;
 
-const BLUR: &str = "--effect none";
-
 /// A run into `d/NAME` and a folder, once there is something of both.
-fn run(home: &Home, path: &str, name: &str) -> (Child, BufReader<ChildStderr>) {
+fn run(home: &Home, path: &str, name: &str) -> (Beside, BufReader<ChildStderr>) {
     let args = format!("stream self {BLUR} --loop --pace realtime --to d/{name} --to out/");
-    let mut child = home.command(path, &args).stderr(Stdio::piped()).spawn().unwrap();
-    let stderr = BufReader::new(child.stderr.take().unwrap());
+    let mut run = home.start(path, &args);
+    let stderr = BufReader::new(run.0.stderr.take().unwrap());
     until("pictures", || {
-        home.at("out/000001.png").exists() && part(&home.at("d")).is_some_and(|part| part.metadata().unwrap().len() > 0)
+        home.path("out/000001.png").exists()
+            && part(&home.path("d")).is_some_and(|part| part.metadata().unwrap().len() > 0)
     });
-    (child, stderr)
+    (run, stderr)
 }
 
 /// The file under construction in a folder.
@@ -39,26 +38,26 @@ fn an_output_that_is_removed_is_told_of_while_the_others_go_on_and_what_there_is
     // It writes into the file that it has opened, as ffmpeg does.
     let path = home.fake_ffmpeg("[ \"$1\" = -version ] && exit\nexec cat > \"$out\"");
     for (name, whole_folder) in [("x.y4m", true), ("x.y4m", false), ("x.mkv", true), ("x.mp4", true)] {
-        let (child, mut stderr) = run(&home, &path, name);
+        let (run, mut stderr) = run(&home, &path, name);
         match whole_folder {
-            true => fs::remove_dir_all(home.at("d")).unwrap(),
-            false => fs::remove_file(part(&home.at("d")).unwrap()).unwrap(),
+            true => fs::remove_dir_all(home.path("d")).unwrap(),
+            false => fs::remove_file(part(&home.path("d")).unwrap()).unwrap(),
         }
         let told = line_with(&mut stderr, "was removed while it was written");
-        let kept = home.at(if whole_folder { "" } else { "d" }).join(name.replace('.', ".incomplete."));
+        let kept = home.path(if whole_folder { "" } else { "d" }).join(name.replace('.', ".incomplete."));
         let kept_at = format!("kept as {}", kept.canonicalize().unwrap().display());
         assert!(told.contains(&kept_at) && told.contains("going on without it"), "{told}");
-        assert_eq!(home.at("d").exists(), !whole_folder, "it is not made anew");
-        let so_far = pngs(&home.at("out"));
-        until("more pictures of the other", || pngs(&home.at("out")) > so_far);
-        assert_eq!(terminate(child).code, Some(1));
+        assert_eq!(home.path("d").exists(), !whole_folder, "it is not made anew");
+        let so_far = pngs(&home.path("out"));
+        until("more pictures of the other", || pngs(&home.path("out")) > so_far);
+        assert_eq!(terminate(run).code, 1);
         line_with(&mut stderr, "error: d/x.");
         assert!(fs::metadata(&kept).unwrap().len() > 4608);
         if name == "x.y4m" {
             assert!(frames(&kept) > 0);
         }
         fs::remove_file(&kept).unwrap();
-        fs::remove_dir_all(home.at("out")).unwrap();
+        fs::remove_dir_all(home.path("out")).unwrap();
     }
 }
 
@@ -66,16 +65,16 @@ fn an_output_that_is_removed_is_told_of_while_the_others_go_on_and_what_there_is
 fn an_output_whose_folder_is_moved_is_kept_where_it_is() {
     let home = Home::new();
     home.record("self", 4, 0.03);
-    let (child, mut stderr) = run(&home, "", "x.y4m");
-    fs::rename(home.at("d"), home.at("e")).unwrap();
+    let (run, mut stderr) = run(&home, "", "x.y4m");
+    fs::rename(home.path("d"), home.path("e")).unwrap();
     // Another folder of the name is another folder.
-    fs::create_dir(home.at("d")).unwrap();
-    assert_eq!(terminate(child).code, Some(1));
+    fs::create_dir(home.path("d")).unwrap();
+    assert_eq!(terminate(run).code, 1);
     let told = line_with(&mut stderr, "error: ");
     assert!(told.contains("e/x.incomplete.y4m"), "{told}");
-    assert!(frames(&home.at("e/x.incomplete.y4m")) > 0);
-    assert_eq!(fs::read_dir(home.at("e")).unwrap().count(), 1, "nothing hidden is left");
-    assert_eq!(fs::read_dir(home.at("d")).unwrap().count(), 0);
+    assert!(frames(&home.path("e/x.incomplete.y4m")) > 0);
+    assert_eq!(fs::read_dir(home.path("e")).unwrap().count(), 1, "nothing hidden is left");
+    assert_eq!(fs::read_dir(home.path("d")).unwrap().count(), 0);
 }
 
 #[test]
@@ -83,12 +82,12 @@ fn a_folder_that_is_removed_ends_the_run() {
     let home = Home::new();
     home.record("self", 4, 0.05);
     let args = format!("stream self {BLUR} --loop --pace realtime --to out/");
-    let child = home.command("", &args).stderr(Stdio::piped()).spawn().unwrap();
-    until("a picture", || home.at("out/000001.png").exists());
-    fs::rename(home.at("out"), home.at("away")).unwrap();
-    fs::remove_dir_all(home.at("away")).unwrap();
-    Ran::from(child.wait_with_output().unwrap()).failed(1, "out");
-    assert!(!home.at("out").exists());
+    let run = home.start("", &args);
+    until("a picture", || home.path("out/000001.png").exists());
+    fs::rename(home.path("out"), home.path("away")).unwrap();
+    fs::remove_dir_all(home.path("away")).unwrap();
+    run.end(LONG).failed(1, &["out"]);
+    assert!(!home.path("out").exists());
 }
 
 #[test]
@@ -97,17 +96,12 @@ fn a_video_that_is_removed_can_be_played_up_to_there() {
     let home = Home::new();
     home.record("self", 4, 0.03);
     for name in ["x.mp4", "x.mkv", "x.webm"] {
-        let (child, mut stderr) = run(&home, "", name);
-        fs::remove_dir_all(home.at("d")).unwrap();
+        let (run, mut stderr) = run(&home, "", name);
+        fs::remove_dir_all(home.path("d")).unwrap();
         line_with(&mut stderr, "was removed while it was written");
-        assert_eq!(terminate(child).code, Some(1));
-        let probe = std::process::Command::new("ffprobe")
-            .args(["-v", "error", "-count_frames", "-of", "csv=p=0", "-show_entries", "stream=nb_read_frames"])
-            .arg(home.at(&name.replace('.', ".incomplete.")))
-            .output()
-            .unwrap();
-        let frames = String::from_utf8(probe.stdout).unwrap();
-        assert!(frames.trim().trim_end_matches(',').parse::<u32>().unwrap() >= 2, "{name}: {frames}");
-        fs::remove_dir_all(home.at("out")).unwrap();
+        assert_eq!(terminate(run).code, 1);
+        let frames = played(&home.path(name.replace('.', ".incomplete.")));
+        assert!(frames >= 2, "{name}: {frames}");
+        fs::remove_dir_all(home.path("out")).unwrap();
     }
 }

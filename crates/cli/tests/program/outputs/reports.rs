@@ -2,66 +2,59 @@
 
 use std::fs;
 use std::os::unix::fs::symlink;
-use std::process::Stdio;
 
 use super::home::*;
-
-const BLUR: &str = "--effect none";
-
-fn report(json: &[u8]) -> serde_json::Value {
-    serde_json::from_slice(json).unwrap()
-}
 
 #[test]
 fn a_report_and_a_sink_never_share_a_place() {
     let home = Home::new();
     home.record("self", 3, 0.1);
     for (to, report) in [("x.y4m", "x.y4m"), ("x.y4m", "./self/../x.y4m"), ("x.mkv", "x.mkv")] {
-        home.run(&format!("stream self --to {to} --report {report}")).failed(2, "goes there, too");
+        home.sh(&format!("stream self --to {to} --report {report}")).failed(2, &["goes there, too"]);
     }
-    home.run(&format!("stream self {BLUR} --to x.y4m --report nowhere/r.json")).failed(1, "nowhere/r.json");
-    assert!(!home.at("x.y4m").exists(), "it is known before the run");
+    home.sh(&format!("stream self {BLUR} --to x.y4m --report nowhere/r.json")).failed(1, &["nowhere/r.json"]);
+    assert!(!home.path("x.y4m").exists(), "it is known before the run");
 }
 
 #[test]
 fn a_report_never_lies_among_the_pictures_of_an_output() {
     let home = Home::new();
     home.record("self", 3, 0.1);
-    fs::create_dir_all(home.at("out/sub")).unwrap();
-    symlink(home.at("out/sub"), home.at("link")).unwrap();
+    fs::create_dir_all(home.path("out/sub")).unwrap();
+    symlink(home.path("out/sub"), home.path("link")).unwrap();
     let before = tree(home.0.path());
     for report in
         ["out/000001.png", "out/.bokehcam", "out/r.json", "out/sub/new/r.json", "link/r.json", "link/../r.json"]
     {
         for force in ["", "--force"] {
-            let ran = home.run(&format!("stream self {BLUR} --to null --to out/ --report {report} {force}"));
-            ran.failed(2, "the pictures of --to out/ lie there");
+            let ran = home.sh(&format!("stream self {BLUR} --to null --to out/ --report {report} {force}"));
+            ran.failed(2, &["the pictures of --to out/ lie there"]);
             assert!(tree(home.0.path()) == before, "{report}");
         }
     }
-    let ran = home.run(&format!("stream self {BLUR} --to null --to out/sub/ --report out/r.json -q"));
-    assert_eq!(ran.code, Some(0), "beside them is no harm: {ran:?}");
+    let ran = home.sh(&format!("stream self {BLUR} --to null --to out/sub/ --report out/r.json -q"));
+    assert_eq!(ran.code, 0, "beside them is no harm: {ran:?}");
 }
 
 #[test]
 fn a_report_replaces_no_other_file_whatever_is_forced() {
     let home = Home::new();
     home.record("self", 3, 0.1);
-    assert_eq!(home.run(&format!("stream self {BLUR} --to old/ -q")).code, Some(0));
-    fs::create_dir(home.at("folder.json")).unwrap();
-    symlink(home.at("self/rgb.txt"), home.at("list.txt")).unwrap();
+    home.sh(&format!("stream self {BLUR} --to old/ -q")).done();
+    fs::create_dir(home.path("folder.json")).unwrap();
+    symlink(home.path("self/rgb.txt"), home.path("list.txt")).unwrap();
     let before = tree(home.0.path());
     for report in ["self/rgb.txt", "self", "old/000001.png", "old/.bokehcam", "folder.json", "list.txt", "/dev/null"] {
-        let is_file = home.at(report).is_file();
+        let is_file = home.path(report).is_file();
         let (forced, plain) = if is_file { ("is no report", "exists") } else { ("is not replaced", "is not replaced") };
-        home.run(&format!("stream self {BLUR} --to null --report {report} --force")).failed(2, forced);
-        let plainly = home.run(&format!("stream self {BLUR} --to null --report {report}"));
-        plainly.failed(if is_file { 1 } else { 2 }, plain);
+        home.sh(&format!("stream self {BLUR} --to null --report {report} --force")).failed(2, &[forced]);
+        let plainly = home.sh(&format!("stream self {BLUR} --to null --report {report}"));
+        plainly.failed(if is_file { 1 } else { 2 }, &[plain]);
         assert!(tree(home.0.path()) == before, "{report}");
     }
     for force in ["", "--force"] {
-        assert_eq!(home.run(&format!("stream self {BLUR} --to null --report r.json -q {force}")).code, Some(0));
-        assert_eq!(report(&fs::read(home.at("r.json")).unwrap())["frames"]["delivered"], 3);
+        home.sh(&format!("stream self {BLUR} --to null --report r.json -q {force}")).done();
+        assert_eq!(json(home.path("r.json"))["frames"]["delivered"], 3);
     }
 }
 
@@ -71,18 +64,17 @@ fn what_came_to_the_name_of_a_report_during_the_run_stays() {
     home.record("self", 4, 0.05);
     for (force, to) in [("", "out/"), ("--force", "other/")] {
         let args = format!("stream self {BLUR} --loop --pace realtime --to {to} --report r.json {force}");
-        let child = home.command("", &args).stderr(Stdio::piped()).spawn().unwrap();
-        until("a picture", || home.at(to).join("000001.png").exists());
-        fs::write(home.at("r.json"), "precious").unwrap();
-        let ran = terminate(child);
-        let there = fs::read(home.at("r.json")).unwrap();
+        let run = home.start("", &args);
+        until("a picture", || home.path(to).join("000001.png").exists());
+        fs::write(home.path("r.json"), "precious").unwrap();
+        let ran = terminate(run);
         if force.is_empty() {
-            ran.failed(1, "r.json exists: choose another name, or give --force to overwrite it; the report is kept as r.incomplete.json");
-            assert_eq!(there, b"precious");
-            assert!(report(&fs::read(home.at("r.incomplete.json")).unwrap())["frames"]["delivered"].as_u64() > Some(1));
+            ran.failed(1, &["r.json exists: choose another name, or give --force to overwrite it; the report is kept as r.incomplete.json"]);
+            assert_eq!(fs::read(home.path("r.json")).unwrap(), b"precious");
+            assert!(json(home.path("r.incomplete.json"))["frames"]["delivered"].as_u64() > Some(1));
         } else {
-            assert_eq!(ran.code, Some(0), "{}", ran.said);
-            assert!(report(&there)["frames"]["delivered"].as_u64() > Some(1));
+            ran.done();
+            assert!(json(home.path("r.json"))["frames"]["delivered"].as_u64() > Some(1));
         }
     }
 }
@@ -92,15 +84,15 @@ fn a_report_that_fails_is_printed_and_does_not_hide_why_the_run_ended() {
     let home = Home::new();
     home.record("self", 4, 0.5);
     home.damage("self/rgb/000003.png");
-    fs::create_dir(home.at("reports")).unwrap();
+    fs::create_dir(home.path("reports")).unwrap();
     let args = format!("stream self {BLUR} --pace realtime --to out/ --report reports/r.json");
-    let child = home.command("", &args).stderr(Stdio::piped()).spawn().unwrap();
-    until("a picture", || home.at("out/000000.png").exists());
-    fs::remove_dir_all(home.at("reports")).unwrap();
-    let ran = Ran::from(child.wait_with_output().unwrap());
-    ran.failed(1, "000003.png");
-    assert!(ran.said.contains("the report is not written"), "{}", ran.said);
-    let (_, printed) = ran.said.split_once("the report has no other place:\n").expect("the report");
+    let run = home.start("", &args);
+    until("a picture", || home.path("out/000000.png").exists());
+    fs::remove_dir_all(home.path("reports")).unwrap();
+    let ran = run.end(LONG);
+    ran.failed(1, &["000003.png"]);
+    assert!(ran.stderr.contains("the report is not written"), "{}", ran.stderr);
+    let (_, printed) = ran.stderr.split_once("the report has no other place:\n").expect("the report");
     let printed = serde_json::Deserializer::from_str(printed).into_iter::<serde_json::Value>().next();
     assert!(printed.unwrap().unwrap()["frames"]["delivered"].is_u64());
 }

@@ -34,7 +34,7 @@ fn networks_are_given_to_others_with_their_licence() {
     let copy = |path: &str| {
         let to = tree.path().join(path);
         fs::create_dir_all(to.parent().unwrap()).unwrap();
-        fs::copy(Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join(path), to).unwrap();
+        fs::copy(Path::new(ROOT).join(path), to).unwrap();
     };
     for path in ["packaging/install", "packaging/licences.py", "README.md", "CHANGELOG.md", "LICENSE-MIT"] {
         copy(path);
@@ -51,16 +51,14 @@ fn networks_are_given_to_others_with_their_licence() {
     fs::write(models.join("person.tflite"), "network").unwrap();
     let install = || {
         let mut command = Command::new(tree.path().join("packaging/install"));
-        command.arg(env!("CARGO_BIN_EXE_bokehcam")).arg(tree.path().join("root")).arg("/usr/local");
-        command.env_remove("CARGO_TARGET_DIR").output().unwrap()
+        command.arg(PROGRAM).arg(tree.path().join("root")).arg("/usr/local");
+        Ran::of(command.env_remove("CARGO_TARGET_DIR"))
     };
     let refused = install();
-    let said = String::from_utf8_lossy(&refused.stderr).into_owned();
-    assert!(refused.status.code() == Some(1) && said.contains("person.licence.txt"), "{said}");
+    assert!(refused.code == 1 && refused.stderr.contains("person.licence.txt"), "{}", refused.stderr);
 
     fs::write(models.join("person.licence.txt"), "Apache-2.0").unwrap();
-    let done = install();
-    assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
+    install().done();
     let share = tree.path().join("root/usr/local/share");
     assert_eq!(fs::read(share.join("bokehcam/models/person.tflite")).unwrap(), b"network");
     assert_eq!(fs::read(share.join("licenses/bokehcam/person.licence.txt")).unwrap(), b"Apache-2.0");

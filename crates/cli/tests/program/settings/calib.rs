@@ -5,7 +5,8 @@ use std::fs;
 use bokehcam::frame::ColorImage;
 use bokehcam::recording::still::{read_disparity, write_color};
 
-use super::program::Home;
+use crate::common::{color, grain};
+use crate::program::Home;
 
 const SIZE: (u32, u32) = (160, 96);
 
@@ -29,13 +30,7 @@ fn opencv(lower_px: f64) -> String {
 
 /// A wall that the right eye sees `shift` columns to the left and `lower` rows higher.
 fn eye(shift: u32, lower: u32) -> ColorImage {
-    let mut image = ColorImage::new(SIZE.0, SIZE.1);
-    for (k, pixel) in image.rgb.chunks_exact_mut(3).enumerate() {
-        let (x, y) = (k as u32 % SIZE.0 + shift, k as u32 / SIZE.0 + lower);
-        let mixed = (x.wrapping_mul(0x9E37_79B9) ^ y.wrapping_mul(0x85EB_CA6B)).wrapping_mul(0xC2B2_AE35);
-        pixel.fill((mixed ^ (mixed >> 15)).wrapping_mul(0x27D4_EB2F).to_be_bytes()[0]);
-    }
-    image
+    color(SIZE.0, SIZE.1, |x, y| [grain(x + shift, y + lower); 3])
 }
 
 #[test]

@@ -4,9 +4,9 @@ use std::fs;
 
 use bokehcam::recording::still;
 
-use super::program::{Home, depth};
+use crate::program::{Home, Ran};
 
-fn render(home: &Home, more: &[&str]) -> super::program::Ran {
+fn render(home: &Home, more: &[&str]) -> Ran {
     home.run(&[&["render", "photo.png", "--out", "out.png", "--force", "--backend", "cpu"], more].concat())
 }
 
@@ -14,11 +14,11 @@ fn render(home: &Home, more: &[&str]) -> super::program::Ran {
 fn depth_of_another_aspect_or_orientation_is_refused() {
     let home = Home::new().with_photo();
     for (name, (width, height)) in [("tall.png", (48, 64)), ("square.pfm", (48, 48))] {
-        still::write_depth(&home.path(name), &depth(width, height), 5000.0, false).unwrap();
+        home.add_depth(name, (width, height));
         let said = format!("{name}: the depth map is {width}x{height}, which does not cover a colour picture of 64x48");
         render(&home, &["--depth-map", name]).refused(1, &[&said]);
     }
-    still::write_depth(&home.path("half.png"), &depth(32, 24), 5000.0, false).unwrap();
+    home.add_depth("half.png", (32, 24));
     assert_eq!(render(&home, &["--depth-map", "half.png"]).warning(), "");
 }
 
@@ -118,7 +118,7 @@ fn a_photo_has_the_depth_beside_it_in_every_command() {
     assert!(picture("r.png") == picture("s/000000.png"));
 }
 
-fn render_of(home: &Home, more: &[&str]) -> super::program::Ran {
+fn render_of(home: &Home, more: &[&str]) -> Ran {
     let out: &[&str] = if more.contains(&"--out") { &[] } else { &["--out", "r.png"] };
     home.run(&[&["render", "ph.png", "--force", "--backend", "cpu"], out, more].concat())
 }

@@ -1,10 +1,9 @@
 //! Settings from the environment.
 
-use super::program::{Home, Ran};
+use crate::program::{Home, Ran};
 
 fn with(variables: &[(&str, &str)], args: &[&str]) -> Ran {
-    let home = Home::new();
-    home.command(args).envs(variables.iter().copied()).output().unwrap().into()
+    Ran::of(Home::new().command(args).envs(variables.iter().copied()))
 }
 
 #[test]
@@ -27,7 +26,7 @@ fn switches_are_whatever_people_write() {
         let home = Home::new().with_photo();
         std::fs::write(home.path("there.png"), "").unwrap();
         let args = ["render", "photo.png", "--out", "there.png", "--effect", "none"];
-        let ran: Ran = home.command(&args).env("BOKEHCAM_FORCE", value).output().unwrap().into();
+        let ran = Ran::of(home.command(&args).env("BOKEHCAM_FORCE", value));
         assert_eq!(ran.code == 0, expected, "{value}: {}", ran.stderr);
     }
     with(&[("BOKEHCAM_FORCE", "perhaps")], &["config", "dump"]).refused(2, &["perhaps", "BOKEHCAM_FORCE=perhaps"]);

@@ -1,6 +1,6 @@
 //! The pages of help.
 
-use super::program::Home;
+use crate::program::{Home, Ran};
 
 /// The long options that a page explains.
 fn options(page: &str) -> Vec<&str> {
@@ -40,8 +40,7 @@ fn the_first_page_has_what_most_people_need_and_another_has_all() {
 #[test]
 fn a_page_that_cannot_be_written_is_a_failure() {
     let full = std::fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
-    let ran: super::program::Ran = Home::new().command(&["stream", "--help"]).stdout(full).output().unwrap().into();
-    ran.refused(1, &["standard output"]);
+    Ran::of(Home::new().command(&["stream", "--help"]).stdout(full)).refused(1, &["standard output"]);
 }
 
 #[test]

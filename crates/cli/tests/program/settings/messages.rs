@@ -4,7 +4,7 @@ use std::ffi::OsStr;
 use std::fs;
 use std::os::unix::ffi::OsStrExt;
 
-use super::program::{Home, Ran};
+use crate::program::{Home, Ran};
 
 #[test]
 fn numbers_below_zero_reach_the_option_that_they_are_for() {
@@ -49,12 +49,11 @@ fn a_mistyped_folder_is_a_folder_and_the_right_one_is_named() {
 fn a_folder_whose_name_is_no_text_works_and_other_arguments_are_named() {
     let home = Home::new().with_recording();
     let name = OsStr::from_bytes(b"caf\xe9");
-    fs::rename(home.path("recording"), home.0.path().join(name)).unwrap();
+    fs::rename(home.path("recording"), home.path(name)).unwrap();
     for args in [&["stream", "--to", "null", "--backend", "cpu"][..], &["record", "--to", "other"]] {
-        let ran: Ran = home.command(args).arg(name).output().unwrap().into();
-        ran.done();
+        Ran::of(home.command(args).arg(name)).done();
     }
-    let ran: Ran = home.command(&["stream", "synthetic", "--to"]).arg(name).output().unwrap().into();
+    let ran = Ran::of(home.command(&["stream", "synthetic", "--to"]).arg(name));
     ran.refused(2, &["'caf\\xe9' is no text in UTF-8"]);
 }
 
@@ -197,8 +196,7 @@ fn a_report_can_go_to_standard_output() {
     let args = ["stream", "synthetic", "--size", "32x24", "--frames", "2", "--effect", "none", "--report", "-", "--to"];
     let ran = home.run(&[&args[..], &["null"]].concat());
     ran.done();
-    let report: serde_json::Value = serde_json::from_str(&ran.stdout).unwrap();
-    assert_eq!(report["frames"]["delivered"], 2);
+    assert_eq!(ran.json()["frames"]["delivered"], 2);
     assert!(!home.path("-").exists());
     home.run(&[&args[..], &["-"]].concat()).refused(2, &["--report - and --to -"]);
 }

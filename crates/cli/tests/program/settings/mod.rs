@@ -8,7 +8,7 @@ mod environment;
 mod help;
 mod messages;
 mod names;
-mod program;
+mod pictures;
 mod radius;
 mod save;
 mod unused;

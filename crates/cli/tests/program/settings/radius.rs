@@ -8,7 +8,7 @@ use bokehcam::optics::CocKind;
 use bokehcam::recording::snapshot::{self, Snapshot};
 use bokehcam::recording::still;
 
-use super::program::Home;
+use crate::program::Home;
 
 #[test]
 fn absurd_radii_are_refused_wherever_they_come_from() {

@@ -2,8 +2,11 @@
 
 use std::fs::{self, File};
 use std::os::unix::fs::symlink;
+use std::path::Path;
 
-use super::program::{Home, Ran, text};
+use crate::program::{Home, ROOT, Ran};
+
+use super::pictures::text;
 
 #[test]
 fn settings_are_saved_among_those_that_are_there() {
@@ -23,7 +26,7 @@ fn settings_are_saved_among_those_that_are_there() {
     home.run(&["config", "save", "--preset", "mine", "--force"]).done();
     let dump = home.run(&["config", "dump"]);
     assert!(dump.stdout.contains("\nforce = true # file\n") && dump.stdout.contains("rim = 0.6 # preset"));
-    assert_eq!(fs::read_dir(home.path("bokehcam")).unwrap().count(), 1, "no leftovers");
+    assert_eq!(fs::read_dir(home.settings().parent().unwrap()).unwrap().count(), 1, "no leftovers");
 }
 
 #[test]
@@ -39,7 +42,7 @@ fn pictures_are_saved_by_their_whole_paths_and_those_in_the_file_count_from_it()
     let render = |home: &Home| {
         home.run(&["render", "photo.png", "--depth-map", "depth.png", "--out", "out.png", "--backend", "cpu"])
     };
-    let wall = home.path("bokehcam/wall.png");
+    let wall = home.settings().with_file_name("wall.png");
     render(&home).refused(1, &[wall.to_str().unwrap(), "there is no such file", "(behind in ", "config.toml)"]);
     fs::copy(home.path("photo.png"), &wall).unwrap();
     render(&home).done();
@@ -54,8 +57,8 @@ fn pictures_are_saved_by_their_whole_paths_and_those_in_the_file_count_from_it()
 #[test]
 fn a_link_stays_a_link_even_one_to_nothing_yet() {
     let home = Home::new();
-    fs::create_dir_all(home.path("bokehcam")).unwrap();
-    symlink("../dotfiles/bokehcam.toml", home.settings()).unwrap();
+    fs::create_dir_all(home.settings().parent().unwrap()).unwrap();
+    symlink("../../dotfiles/bokehcam.toml", home.settings()).unwrap();
     home.run(&["config", "save", "--rim", "0.1"]).done();
     home.run(&["config", "save", "--rank", "3"]).done();
     assert!(home.settings().symlink_metadata().unwrap().is_symlink());
@@ -79,17 +82,14 @@ fn what_cannot_be_saved_changes_nothing() {
 #[test]
 fn a_dump_onto_the_file_that_it_reads_is_told() {
     let home = Home::new().with_settings("rim = 0.4\n");
-    let onto = |path: &str| -> Ran {
-        let file = File::create(home.path(path)).unwrap();
-        home.command(&["config", "dump"]).stdout(file).output().unwrap().into()
-    };
-    onto("bokehcam/config.toml").refused(2, &["config.toml: this is the settings file", "`bokehcam config save`"]);
-    assert_eq!(onto("elsewhere.toml").done(), "");
+    let onto = |path: &Path| Ran::of(home.command(&["config", "dump"]).stdout(File::create(path).unwrap()));
+    onto(&home.settings()).refused(2, &["config.toml: this is the settings file", "`bokehcam config save`"]);
+    assert_eq!(onto(&home.path("elsewhere.toml")).done(), "");
 }
 
 #[test]
 fn no_document_shows_a_redirect_onto_the_settings() {
-    let root = std::path::Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."));
+    let root = Path::new(ROOT);
     let files = fs::read_dir(root.join("docs")).unwrap().map(|entry| entry.unwrap().path());
     for path in files.chain([root.join("README.md")]).filter(|path| path.extension().is_some_and(|e| e == "md")) {
         let shown = text(&path);

@@ -1,6 +1,6 @@
 //! What was given and has no effect is said in one line.
 
-use super::program::Home;
+use crate::program::Home;
 
 #[test]
 fn a_picture_without_depth_says_what_that_costs() {

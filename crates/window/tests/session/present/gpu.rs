@@ -13,14 +13,11 @@ use bokehcam_window::present::gpu::Canvas;
 use bokehcam_window::present::{Drawing, Image};
 
 use super::*;
+use crate::on_gpu::device;
 
 const FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
 
-fn device() -> Arc<Device> {
-    Arc::new(Device::open(false, None).expect("a Vulkan adapter, software included"))
-}
-
-/// Returns the GPU's output as window pixels.
+/// What the GPU draws, as words of the window.
 fn drawn(device: &Arc<Device>, canvas: &mut Canvas, (width, height): (u32, u32), drawing: &Drawing) -> Vec<u32> {
     let gpu = &device.device;
     let size = wgpu::Extent3d { width, height, depth_or_array_layers: 1 };
@@ -72,7 +69,7 @@ fn close(ours: &[u32], theirs: &[u32], (limit, but_one_in, worst): (u8, usize, u
 #[test]
 #[ignore = "needs a Vulkan adapter (software will do)"]
 fn what_was_only_attempted_leaves_the_device_sound() {
-    let device = Device::open(false, None).unwrap();
+    let device = device();
     let refused = wgpu::BufferDescriptor {
         label: None,
         size: 16,

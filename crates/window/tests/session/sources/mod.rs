@@ -160,7 +160,7 @@ fn a_camera_that_comes_is_offered_and_opened_where_it_was_missing_and_its_pictur
     let folder = tempfile::tempdir().unwrap();
     let mut watched = Watched::begin(CAMERA, folder.path());
     watched.until("it is not there", |told| matches!(told, Update::Source(Source::Lost(_))));
-    watched.is_in.store(true, Ordering::SeqCst);
+    watched.services.store(true, Ordering::SeqCst);
     let has_it = |told: &Update| match told {
         Update::Choices { sources, .. } => sources.iter().any(|choice| choice.name == CAMERA),
         _ => false,
@@ -174,7 +174,7 @@ fn a_camera_that_comes_is_offered_and_opened_where_it_was_missing_and_its_pictur
     let Update::Source(Source::Running(running)) = watched.until("it runs", is_running) else { unreachable!() };
     assert_eq!((running.size, running.period_ns), ((32, 24), 16_666_667));
     watched.frame("a frame of the other size", |view| view.picture.size() == (32, 24));
-    watched.is_in.store(false, Ordering::SeqCst);
+    watched.services.store(false, Ordering::SeqCst);
     watched.until("it has gone", |told| matches!(told, Update::Choices { .. }) && !has_it(told));
     watched.heard.session.close();
 }

@@ -1,6 +1,5 @@
 //! A session with real services and a pluggable fake camera.
 
-use std::ops::{Deref, DerefMut};
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -20,7 +19,7 @@ use bokehcam_window::services::{Opened, Services, SettingsStore, Switch};
 use bokehcam_window::state::{Camera, DepthMethod};
 use bokehcam_window::system::System;
 
-use super::heard::{Heard, look};
+use super::heard::{self, Heard, look};
 use super::store::NoStore;
 
 pub const FRAMES: usize = 12;
@@ -106,11 +105,8 @@ impl Services for Plug {
     }
 }
 
-/// A session on these services.
-pub struct Watched {
-    pub heard: Heard,
-    pub is_in: Arc<AtomicBool>,
-}
+/// A session on them, and whether the camera is plugged in.
+pub type Watched = heard::Watched<Arc<AtomicBool>>;
 
 impl Watched {
     pub fn begin(source: &str, folder: &Path) -> Self {
@@ -119,19 +115,6 @@ impl Watched {
         let system = System::new(options, look(), Box::new(NoStore));
         let is_in = Arc::<AtomicBool>::default();
         let plug = Plug { system, is_in: Arc::clone(&is_in), was_in: false, mode: None };
-        Self { heard: Heard::begin(Box::new(plug), source, folder), is_in }
-    }
-}
-
-impl Deref for Watched {
-    type Target = Heard;
-    fn deref(&self) -> &Heard {
-        &self.heard
-    }
-}
-
-impl DerefMut for Watched {
-    fn deref_mut(&mut self) -> &mut Heard {
-        &mut self.heard
+        Self { heard: Heard::begin(Box::new(plug), source, folder), services: is_in }
     }
 }

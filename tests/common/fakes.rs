@@ -1,8 +1,8 @@
-//! Stages that do little, and that badly when told so; and a run of them.
+//! Stages that do little, and that badly when told so, or what a test says.
+#![allow(dead_code, missing_docs)]
 
 use std::collections::VecDeque;
 use std::ops::ControlFlow;
-use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
 use std::thread::sleep;
 use std::time::Duration;
@@ -15,6 +15,7 @@ use bokehcam::depth::{DepthError, DepthSource, FrameInput};
 use bokehcam::frame::{ColorImage, DepthMap, Stamp};
 use bokehcam::optics::CocField;
 use bokehcam::sink::{Ending, Sink, SinkError};
+use bokehcam::stats::Cause;
 
 pub const SIZE: (u32, u32) = (6, 4);
 pub const PERIOD_NS: u64 = 1_000_000;
@@ -53,8 +54,14 @@ pub struct FakeCamera {
     pub frames: usize,
     pub next: usize,
     pub corrupt_every: usize,
+    pub unpaired_every: usize,
     pub brings: Brings,
     pub trouble: Trouble,
+}
+
+pub fn fake_camera(frames: usize) -> FakeCamera {
+    let trouble = Trouble::default();
+    FakeCamera { frames, next: 0, corrupt_every: NEVER, unpaired_every: NEVER, brings: Brings::Color, trouble }
 }
 
 fn size_error() -> CaptureError {
@@ -85,6 +92,9 @@ impl Camera for FakeCamera {
         if index % self.corrupt_every == self.corrupt_every - 1 {
             return Ok(Captured::Corrupt(size_error()));
         }
+        if index % self.unpaired_every == self.unpaired_every - 1 {
+            return Ok(Captured::Lost(1, Cause::Unpaired));
+        }
         let Shot { color, depth, right } = shot;
         color.resize(SIZE.0, SIZE.1);
         color.rgb.fill(index as u8);
@@ -107,30 +117,108 @@ impl Camera for FakeCamera {
     }
 }
 
-/// Depth of 1 m plus the frame's number, with a hole.
-pub struct FakeDepth(pub Trouble);
+struct CameraBy<F>(SourceInfo, usize, F);
 
-impl DepthSource for FakeDepth {
-    fn read(&mut self, FrameInput { stamp, .. }: FrameInput, map: &mut DepthMap) -> Result<(), DepthError> {
-        let index = stamp.index;
-        if self.0.strikes(index) {
-            return Err(DepthError::NoDepth { source_name: format!("frame {index}") });
-        }
-        map.resize(SIZE.0, SIZE.1);
-        map.metres.fill(1.0 + index as f32);
-        map.metres[3] = 0.0;
-        Ok(())
+impl<F: FnMut(usize, Shot) -> Captured + Send> Camera for CameraBy<F> {
+    fn info(&self) -> SourceInfo {
+        self.0.clone()
+    }
+    fn next(&mut self, shot: Shot) -> Result<Captured, CaptureError> {
+        let asked = self.1;
+        self.1 += 1;
+        Ok((self.2)(asked, shot))
     }
 }
 
-/// Adds 100 to the first bytes of the picture, and the focus distance to its first byte; holds as many frames as it may.
+/// A camera of which `next` says what comes, given how often it was asked before.
+pub fn camera_by(info: SourceInfo, next: impl FnMut(usize, Shot) -> Captured + Send + 'static) -> Box<dyn Camera> {
+    Box::new(CameraBy(info, 0, next))
+}
+
+struct DepthBy<F>(F);
+
+impl<F: FnMut(Seen, &mut DepthMap) -> Result<(), DepthError> + Send> DepthSource for DepthBy<F> {
+    fn read(&mut self, seen: Seen, map: &mut DepthMap) -> Result<(), DepthError> {
+        map.resize(SIZE.0, SIZE.1);
+        (self.0)(seen, map)
+    }
+}
+
+/// Depth as `read` says.
+pub fn depth_by(
+    read: impl FnMut(Seen, &mut DepthMap) -> Result<(), DepthError> + Send + 'static,
+) -> Box<dyn DepthSource> {
+    Box::new(DepthBy(read))
+}
+
+/// Depth of 1 m plus the frame's number, with a hole.
+pub fn fake_depth(trouble: Trouble) -> Box<dyn DepthSource> {
+    depth_by(move |Seen { stamp, .. }, map| {
+        let index = stamp.index;
+        if trouble.strikes(index) {
+            return Err(DepthError::NoDepth { source_name: format!("frame {index}") });
+        }
+        map.metres.fill(1.0 + index as f32);
+        map.metres[3] = 0.0;
+        Ok(())
+    })
+}
+
+/// Holds as many frames as it may.
 pub struct FakeBokeh {
     pub capacity: usize,
+    pub backend: Backend,
+    pub name: &'static str,
     pub held: VecDeque<Job>,
     pub submitted: usize,
     pub trouble: Trouble,
     pub collect_fails: bool,
+    pub gives_back: bool,
     pub loses_frames: bool,
+    /// Looks at each frame as it is submitted.
+    pub looks: Box<dyn FnMut(&Job) + Send>,
+    /// Makes of a frame what comes back.
+    pub makes: Box<dyn FnMut(Job) -> Finished + Send>,
+}
+
+/// Adds 100 to the first bytes of a picture, and makes the first one the focus distance where there is one.
+pub fn fake_bokeh(capacity: usize, trouble: Trouble) -> FakeBokeh {
+    FakeBokeh {
+        capacity,
+        backend: Backend::Cpu,
+        name: "cpu, fake",
+        held: VecDeque::new(),
+        submitted: 0,
+        trouble,
+        collect_fails: false,
+        gives_back: false,
+        loses_frames: false,
+        looks: Box::new(|_| {}),
+        makes: Box::new(brightened),
+    }
+}
+
+fn brightened(job: Job) -> Finished {
+    let mut times = PassTimes::new();
+    times.add("rows", Duration::from_micros(400));
+    times.add("columns", Duration::from_micros(300));
+    changed(job, times, |job| {
+        job.out.rgb[..BLURRED].iter_mut().for_each(|byte| *byte = byte.wrapping_add(100));
+        if let CocField::Depth(coc) = job.coc {
+            let map = job.depth.as_ref().expect("dof has depth");
+            assert!(map.metres.iter().all(|&z_m| z_m == map.metres[0]), "holes are filled");
+            job.out.rgb[0] = coc.focus_m.round() as u8;
+        }
+    })
+}
+
+/// The frame itself, but for what `change` changes of it.
+pub fn changed(mut job: Job, times: PassTimes, change: impl FnOnce(&mut Job)) -> Finished {
+    job.out.resize(job.color.width, job.color.height);
+    job.out.rgb.copy_from_slice(&job.color.rgb);
+    change(&mut job);
+    let Job { ticket, out, color, depth, .. } = job;
+    Finished { ticket, picture: Picture::in_memory(out), color, depth, times }
 }
 
 impl Bokeh for FakeBokeh {
@@ -141,6 +229,7 @@ impl Bokeh for FakeBokeh {
         if self.trouble.strikes(index) && !self.collect_fails {
             return Err(GpuError::Failed("lost".into()).into());
         }
+        (self.looks)(&job);
         self.held.push_back(job);
         Ok(())
     }
@@ -152,28 +241,12 @@ impl Bokeh for FakeBokeh {
         if self.loses_frames || !wait && self.held.len() < self.capacity {
             return Ok(None);
         }
-        Ok(self.held.pop_front().map(|mut job| {
-            job.out.resize(job.color.width, job.color.height);
-            job.out.rgb.copy_from_slice(&job.color.rgb);
-            job.out.rgb[..BLURRED].iter_mut().for_each(|byte| *byte = byte.wrapping_add(100));
-            if let CocField::Depth(coc) = job.coc {
-                let map = job.depth.as_ref().expect("dof has depth");
-                assert!(map.metres.iter().all(|&z_m| z_m == map.metres[0]), "holes are filled");
-                job.out.rgb[0] = coc.focus_m.round() as u8;
-            }
-            let mut times = PassTimes::new();
-            times.add("rows", Duration::from_micros(400));
-            times.add("columns", Duration::from_micros(300));
-            Finished {
-                ticket: job.ticket,
-                picture: Picture::in_memory(job.out),
-                color: job.color,
-                depth: job.depth,
-                times,
-            }
-        }))
+        Ok(self.held.pop_front().map(&mut self.makes))
     }
 
+    fn take_back(&mut self) -> Option<Job> {
+        if self.gives_back { self.held.pop_front() } else { None }
+    }
     fn in_flight(&self) -> usize {
         self.held.len()
     }
@@ -181,10 +254,10 @@ impl Bokeh for FakeBokeh {
         self.capacity
     }
     fn backend(&self) -> Backend {
-        Backend::Cpu
+        self.backend
     }
     fn describe(&self) -> String {
-        "cpu, fake".into()
+        self.name.into()
     }
 }
 
@@ -216,6 +289,10 @@ pub struct FakeSink {
     pub finish_fails: bool,
 }
 
+pub fn fake_sink(received: &Received) -> FakeSink {
+    FakeSink { received: received.clone(), trouble: Trouble::default(), closes_at: NEVER, finish_fails: false }
+}
+
 fn exists() -> SinkError {
     SinkError::Exists { path: "fake".into() }
 }
@@ -242,34 +319,24 @@ impl Sink for FakeSink {
     }
 }
 
-/// Waits with its first frame until the camera is through with all of its own.
-pub struct GatedSink(pub Arc<AtomicUsize>, pub usize);
+struct SinkBy<F>(bool, F);
 
-impl Sink for GatedSink {
-    fn put(&mut self, _: &ColorImage, _: u64) -> Result<ControlFlow<()>, SinkError> {
-        while self.0.load(Ordering::SeqCst) < self.1 {
-            sleep(Duration::from_millis(1));
-        }
+impl<F: FnMut(&ColorImage) + Send> Sink for SinkBy<F> {
+    fn put(&mut self, frame: &ColorImage, _: u64) -> Result<ControlFlow<()>, SinkError> {
+        (self.1)(frame);
         Ok(ControlFlow::Continue(()))
     }
-    fn finish(self: Box<Self>, _: Ending) -> Result<(), SinkError> {
-        Ok(())
-    }
-    fn describe(&self) -> String {
-        "gated".into()
+    fn keeps(&self) -> bool {
+        self.0
     }
 }
 
-/// Comes live, and counts what was asked of it.
-pub struct LiveCamera(pub FakeCamera, pub Arc<AtomicUsize>);
+/// A sink that does this with each frame.
+pub fn sink_by(put: impl FnMut(&ColorImage) + Send + 'static) -> Box<dyn Sink> {
+    Box::new(SinkBy(true, put))
+}
 
-impl Camera for LiveCamera {
-    fn info(&self) -> SourceInfo {
-        // So slow that no frame is ever late.
-        SourceInfo { live: true, period_ns: 3_600_000_000_000, ..self.0.info() }
-    }
-    fn next(&mut self, shot: Shot) -> Result<Captured, CaptureError> {
-        self.1.fetch_add(1, Ordering::SeqCst);
-        self.0.next(shot)
-    }
+/// Takes frames and says that nothing becomes of them.
+pub fn nobody() -> Box<dyn Sink> {
+    Box::new(SinkBy(false, |_: &ColorImage| {}))
 }

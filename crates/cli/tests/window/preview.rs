@@ -2,77 +2,66 @@
 
 use std::fs;
 use std::path::Path;
-use std::process::{Command, ExitStatus, Stdio};
+use std::process::{ExitStatus, Stdio};
 use std::time::{Duration, Instant};
 
-use tempfile::TempDir;
+use rustix::process::Signal;
 
-use super::screen::{Beside, Screen, until};
+use super::program::{Beside, Home, PROGRAM, Ran, assert_accounted, found, json};
+use super::screen::{Screen, tied};
 use super::window::{PATIENCE, Window};
 
 /// `bokehcam preview`, running.
 pub struct Program<'a> {
     screen: &'a Screen,
     process: Beside,
-    home: TempDir,
+    home: Home,
     /// When it was started.
     pub began: Instant,
 }
 
-/// The recording that comes with the project.
-pub const PORTRAIT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../recordings/portrait");
-
 impl<'a> Program<'a> {
     /// Starts it with these arguments, as somebody who has never used it.
     pub fn start(screen: &'a Screen, arguments: &[&str]) -> Self {
-        Self::start_at(screen, tempfile::tempdir().unwrap(), arguments)
+        Self::start_at(screen, Home::new(), arguments)
     }
 
     /// Starts it as somebody who has used it before: `home` is what [`Program::end`] gave.
-    pub fn start_at(screen: &'a Screen, home: TempDir, arguments: &[&str]) -> Self {
+    pub fn start_at(screen: &'a Screen, home: Home, arguments: &[&str]) -> Self {
         Self::start_on(screen, home, "unix:path=/none", arguments)
     }
 
     /// Starts it in a session that has this bus.
-    pub fn start_on(screen: &'a Screen, home: TempDir, bus: &str, arguments: &[&str]) -> Self {
-        let said = fs::File::create(home.path().join("said")).unwrap();
-        let runtime = home.path().join("run");
-        fs::create_dir_all(&runtime).unwrap();
-        let mut command = Command::new("setpriv");
-        command
-            .args(["--pdeathsig", "KILL", env!("CARGO_BIN_EXE_bokehcam"), "preview"])
-            .args(arguments)
-            .arg("--report")
-            .arg(home.path().join("report.json"))
-            .env("DISPLAY", &screen.display)
-            .env("DBUS_SESSION_BUS_ADDRESS", bus)
-            .env("XDG_RUNTIME_DIR", runtime)
-            .env("HOME", home.path())
-            .env("XDG_CONFIG_HOME", home.path().join("config"))
-            .env("XDG_STATE_HOME", home.path().join("state"))
-            .env("RUST_BACKTRACE", "1")
-            .env_remove("WAYLAND_DISPLAY")
-            .env_remove("WAYLAND_SOCKET")
-            .current_dir(home.path())
-            .stdout(Stdio::null())
-            .stderr(said);
+    pub fn start_on(screen: &'a Screen, home: Home, bus: &str, arguments: &[&str]) -> Self {
+        let said = fs::File::create(home.path("said")).unwrap();
+        let mut command = home.within(tied(PROGRAM));
+        command.arg("preview").args(arguments).args(["--report", "report.json"]);
+        command.env("DISPLAY", &screen.display).env_remove("WAYLAND_DISPLAY").env_remove("WAYLAND_SOCKET");
+        command.env("DBUS_SESSION_BUS_ADDRESS", bus).env("HOME", home.0.path()).env("RUST_BACKTRACE", "1");
+        // Drivers of GPUs are found there.
+        command.env_remove("XDG_DATA_DIRS").stdout(Stdio::null()).stderr(said);
         let began = Instant::now();
         Self { screen, process: Beside::start(&mut command), home, began }
     }
 
     /// Its folder: `config/` and `state/` are its settings, and files that it writes come here.
     pub fn home(&self) -> &Path {
-        self.home.path()
+        self.home.0.path()
     }
 
     /// What it has written to standard error.
     pub fn said(&self) -> String {
-        String::from_utf8_lossy(&fs::read(self.home().join("said")).unwrap()).into_owned()
+        String::from_utf8_lossy(&fs::read(self.home.path("said")).unwrap()).into_owned()
+    }
+
+    /// What `bokehcam ctl` says to it.
+    pub fn ctl(&self, args: &[&str]) -> Ran {
+        self.home.run(&[&["ctl"], args].concat())
     }
 
     /// Whether it runs.
     pub fn runs(&mut self) -> bool {
-        self.process.0.try_wait().unwrap().is_none()
+        self.process.runs()
     }
 
     /// Processor time that it has used, in the kernel's ticks.
@@ -85,7 +74,7 @@ impl<'a> Program<'a> {
 
     /// Asks it to end, as Ctrl-C in a terminal does.
     pub fn interrupt(&self) {
-        self.process.interrupt();
+        self.process.signal(Signal::INT);
     }
 
     /// Its window, as soon as it is on the screen.
@@ -106,13 +95,9 @@ impl<'a> Program<'a> {
     /// Waits for its end.
     #[track_caller]
     pub fn end(mut self) -> Ended {
-        let said = self.home().join("said");
-        let mut status = None;
-        until(&format!("the program ends; see {}", said.display()), PATIENCE, || {
-            status = self.process.0.try_wait().unwrap();
-            status.is_some()
-        });
-        Ended { status: status.unwrap(), said: self.said(), home: self.home }
+        let what = format!("the program ends; see {}", self.home.path("said").display());
+        let status = found(&what, PATIENCE, || self.process.0.try_wait().unwrap());
+        Ended { status, said: self.said(), home: self.home }
     }
 
     /// Closes its window, after which it must end well.
@@ -132,7 +117,7 @@ pub struct Ended {
     /// What it wrote to standard error.
     pub said: String,
     /// Its folder.
-    pub home: TempDir,
+    pub home: Home,
 }
 
 impl Ended {
@@ -141,19 +126,14 @@ impl Ended {
     pub fn succeeded(&self) {
         assert_eq!(self.status.code(), Some(0), "{}: {}", self.status, self.said);
         assert!(!self.said.contains("panicked"), "{}", self.said);
-        let report = self.report();
-        let frames = &report["frames"];
-        let count = |value: &serde_json::Value| value.as_u64().unwrap_or_else(|| panic!("{report}"));
-        let dropped: u64 = frames["dropped"].as_object().unwrap().values().map(count).sum();
-        let accounted = count(&frames["delivered"]) + dropped + count(&frames["in_flight"]);
-        assert_eq!(count(&frames["captured"]), accounted, "{report}");
+        assert_accounted(&self.report());
     }
 
     /// The report.
     #[track_caller]
     pub fn report(&self) -> serde_json::Value {
-        let path = self.home.path().join("report.json");
-        let text = fs::read(&path).unwrap_or_else(|error| panic!("no report ({error}): {}", self.said));
-        serde_json::from_slice(&text).unwrap()
+        let path = self.home.path("report.json");
+        assert!(path.exists(), "no report: {}", self.said);
+        json(path)
     }
 }
