@@ -137,8 +137,8 @@ pub fn camera_by(info: SourceInfo, next: impl FnMut(usize, Shot) -> Captured + S
 
 struct DepthBy<F>(F);
 
-impl<F: FnMut(Seen, &mut DepthMap) -> Result<(), DepthError> + Send> DepthSource for DepthBy<F> {
-    fn read(&mut self, seen: Seen, map: &mut DepthMap) -> Result<(), DepthError> {
+impl<F: FnMut(FrameInput, &mut DepthMap) -> Result<(), DepthError> + Send> DepthSource for DepthBy<F> {
+    fn read(&mut self, seen: FrameInput, map: &mut DepthMap) -> Result<(), DepthError> {
         map.resize(SIZE.0, SIZE.1);
         (self.0)(seen, map)
     }
@@ -146,14 +146,14 @@ impl<F: FnMut(Seen, &mut DepthMap) -> Result<(), DepthError> + Send> DepthSource
 
 /// Depth as `read` says.
 pub fn depth_by(
-    read: impl FnMut(Seen, &mut DepthMap) -> Result<(), DepthError> + Send + 'static,
+    read: impl FnMut(FrameInput, &mut DepthMap) -> Result<(), DepthError> + Send + 'static,
 ) -> Box<dyn DepthSource> {
     Box::new(DepthBy(read))
 }
 
 /// Depth of 1 m plus the frame's number, with a hole.
 pub fn fake_depth(trouble: Trouble) -> Box<dyn DepthSource> {
-    depth_by(move |Seen { stamp, .. }, map| {
+    depth_by(move |FrameInput { stamp, .. }, map| {
         let index = stamp.index;
         if trouble.strikes(index) {
             return Err(DepthError::NoDepth { source_name: format!("frame {index}") });

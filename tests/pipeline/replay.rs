@@ -189,7 +189,7 @@ fn frames_before_the_first_depth_are_counted_and_the_run_goes_on() {
     let camera = replay(folder.path(), Part::default()).unwrap();
     let sink = Target::Null.open(&sink_options()).unwrap();
     // Of a depth camera.
-    let late = depth_by(|Seen { stamp, .. }, map| {
+    let late = depth_by(|FrameInput { stamp, .. }, map| {
         map.metres.fill(1.0);
         match stamp.index {
             0..4 => Err(DepthError::Unpaired { source_name: "a depth camera".to_owned() }),

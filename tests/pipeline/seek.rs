@@ -161,7 +161,7 @@ fn while_nobody_watches_each_wish_brings_its_one_frame_with_its_depth() {
     };
     let next = |views: &mut Receiver<View>, number: u64, place: usize| {
         let view = found(&format!("frame {place}"), PATIENCE, || views.try_recv());
-        assert_eq!((view.stamp.index, view.seek, view.is_wished), (place, number, true));
+        assert_eq!((view.stamp.index, view.seek, view.is_seek_target), (place, number, true));
         assert_eq!(usize::from(view.color.as_ref().unwrap().rgb[0]), place);
         let depth = view.depth.as_ref().unwrap();
         assert!(depth.metres.iter().all(|&m| (m - 1.0 - 0.1 * place as f32).abs() < 1e-3));
@@ -179,7 +179,7 @@ fn while_nobody_watches_each_wish_brings_its_one_frame_with_its_depth() {
         // Once somebody watches it goes on from there, over the seam.
         let _watch = demand.watch();
         let view = found("it goes on", PATIENCE, || views.try_recv());
-        assert!(view.stamp.index < 9 && view.seek == 4 && !view.is_wished, "{:?}", view.stamp);
+        assert!(view.stamp.index < 9 && view.seek == 4 && !view.is_seek_target, "{:?}", view.stamp);
     };
     let report = std::thread::scope(|scope| {
         let checked = scope.spawn(checked);

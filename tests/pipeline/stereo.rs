@@ -124,7 +124,7 @@ fn without_time_depth_is_made_with_less_effort_and_every_picture_is_straightened
 
 /// The square before the wall, once.
 fn two_planes() -> Box<dyn Camera> {
-    let (name, frames, brings) = ("two planes".into(), Some(1), Brings::RightEye);
+    let (name, frames, brings) = ("two planes".into(), Some(1), Brings::RightCamera);
     let info = SourceInfo { name, size: planes::SIZE, period_ns: 33_000_000, frames, live: false, brings };
     camera_by(info, |index, Shot { color, right, .. }| {
         (*color, *right) = planes::seen();

@@ -122,13 +122,13 @@ impl Services for Small {
 }
 
 /// What a test sees of these services.
-pub struct Seen {
+pub struct FrameInput {
     pub executors: Arc<AtomicUsize>,
     pub written: Arc<Mutex<Vec<String>>>,
 }
 
 /// A session on them.
-pub type Watched = heard::Watched<Seen>;
+pub type Watched = heard::Watched<FrameInput>;
 
 impl Watched {
     pub fn begin(source: &str) -> Self {
@@ -137,7 +137,7 @@ impl Watched {
 
     pub fn begin_in(source: &str, folder: &Path) -> Self {
         let small = Small { executors: Arc::default(), written: Arc::default(), settings: NoStore };
-        let services = Seen { executors: Arc::clone(&small.executors), written: Arc::clone(&small.written) };
+        let services = FrameInput { executors: Arc::clone(&small.executors), written: Arc::clone(&small.written) };
         Self { heard: Heard::begin(Box::new(small), source, folder), services }
     }
 }

@@ -48,7 +48,7 @@ fn the_window_says_in_one_line_why_a_network_cannot_be_used_and_goes_on() {
 #[test]
 fn a_source_has_the_ways_to_depth_that_it_brings_and_the_command_names_the_one_that_was_chosen() {
     let mut system = System::new(Options::default(), Look::default(), Box::new(NoStore));
-    for (name, usual) in [(PORTRAIT, Way::Measured), (STEREO, Way::Stereo)] {
+    for (name, usual) in [(PORTRAIT, DepthMethod::Measured), (STEREO, DepthMethod::Stereo)] {
         let opened = system.open(name, None).unwrap();
         assert_eq!((opened.way, opened.ways.first(), opened.has_depth), (Some(usual), Some(&usual), true), "{name}");
         assert!(!opened.ways.contains(&DepthMethod::Plate), "nobody in a recording steps aside");
@@ -57,11 +57,11 @@ fn a_source_has_the_ways_to_depth_that_it_brings_and_the_command_names_the_one_t
         let again = system.open(name, Some(usual)).unwrap();
         assert_eq!((again.way, &again.ways), (Some(usual), &opened.ways), "{name}");
     }
-    let none = system.can(PORTRAIT, Way::PersonAndDistance);
-    let is_installed = system.open(PORTRAIT, None).unwrap().ways.contains(&Way::PersonAndDistance);
+    let none = system.can(PORTRAIT, DepthMethod::PersonAndDistance);
+    let is_installed = system.open(PORTRAIT, None).unwrap().ways.contains(&DepthMethod::PersonAndDistance);
     assert_eq!(none.is_ok(), is_installed);
     assert!(is_installed || none.unwrap_err().contains("`bokehcam models get`"));
-    assert!(system.can(PORTRAIT, Way::Stereo).is_err(), "it has one eye");
-    let flags = [Way::Measured, Way::Stereo, Way::Person, Way::PersonAndDistance].map(Way::flag);
+    assert!(system.can(PORTRAIT, DepthMethod::Stereo).is_err(), "it has one eye");
+    let flags = [DepthMethod::Measured, DepthMethod::Stereo, DepthMethod::Person, DepthMethod::PersonAndDistance].map(DepthMethod::flag);
     assert_eq!(flags, ["recorded", "stereo", "matte", "matte,mono"]);
 }
