@@ -13,6 +13,8 @@ mod paint;
 #[path = "../../tests/window/picture.rs"]
 #[allow(dead_code)]
 mod picture;
+#[path = "../../tests/common/program.rs"]
+mod program;
 mod reaction;
 #[path = "../../tests/window/screen.rs"]
 #[allow(dead_code)]

@@ -8,7 +8,8 @@ use std::time::{Duration, Instant};
 use x11rb::protocol::xproto::{ConnectionExt, ImageFormat};
 
 use super::Result;
-use super::screen::{Beside, Screen, until};
+use super::program::Beside;
+use super::screen::{Screen, until};
 use super::window::{PATIENCE, Window};
 
 /// Keys pressed in each case.

@@ -6,7 +6,8 @@ use std::process::{Command, Stdio};
 use std::time::Duration;
 
 use super::Result;
-use super::screen::{Beside, Screen, until};
+use super::program::Beside;
+use super::screen::{Screen, until};
 use super::window::{PATIENCE, Window};
 
 /// Own presets get the keys after the five that come with the program.

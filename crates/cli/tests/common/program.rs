@@ -13,6 +13,7 @@ use serde_json::Value;
 
 #[path = "../../../../tests/common/until.rs"]
 mod waiting;
+#[allow(unused_imports)] // Not every test waits.
 pub use waiting::{found, until};
 
 pub const PROGRAM: &str = env!("CARGO_BIN_EXE_bokehcam");

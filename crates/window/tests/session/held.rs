@@ -40,7 +40,7 @@ fn still(number: u64, images: Images, coc: CocField) -> Still {
 
 /// Returns the held frame blurred with another look.
 fn in_look(watched: &mut Watched, look: &Look) -> Still {
-    watched.session.order(Request::Look(Box::new(look.clone())));
+    watched.session.send(Request::Look(Box::new(look.clone())));
     found("it is blurred anew", PATIENCE, || {
         watched.hear();
         watched.blurred.pop()

@@ -124,7 +124,7 @@ fn outputs_are_begun_and_completed_and_one_that_cannot_be_is_told() {
     let has =
         |watched: &Watched, line: &str| watched.services.written.lock().unwrap().iter().any(|written| written == line);
     until("both are written", PATIENCE, || has(&watched, "film 32") && has(&watched, "camera 32"));
-    watched.session.order(Request::End(output("film", false)));
+    watched.session.send(Request::End(output("film", false)));
     watched
         .until("the film is complete", |told| matches!(told, Update::Note(line) if line.starts_with("Complete: film")));
     // A recording ends with its source, and a virtual camera continues with the next one.

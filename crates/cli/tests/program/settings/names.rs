@@ -22,13 +22,13 @@ fn both_names_are_read_everywhere_and_one_is_written() {
         let variable = format!("BOKEHCAM_{}", name.replace('-', "_").to_uppercase());
         let dump = Ran::of(Home::new().command(&["config", "dump"]).env(variable, "3%"));
         assert_eq!(strength(&dump), "blur = \"3%\" # environment");
-        let text = format!("{name} = \"3%\"\n[presets.mine]\n{name} = 7\n");
-        let home = Home::new().with_settings(&text);
+        let settings = format!("{name} = \"3%\"\n[presets.mine]\n{name} = 7\n");
+        let home = Home::new().with_settings(&settings);
         assert_eq!(strength(&home.run(&["config", "dump"])), "blur = \"3%\" # file");
         assert_eq!(strength(&home.run(&["config", "dump", "--preset", "mine"])), "blur = 7 # preset");
         // It is changed where it stands.
         home.run(&["config", "save", "--blur", "5"]).done();
-        assert_eq!(text(&home.settings()), text.replacen("\"3%\"", "5", 1));
+        assert_eq!(text(&home.settings()), settings.replacen("\"3%\"", "5", 1));
         let bad = Home::new().run(&["config", "dump", &format!("--{name}"), "much"]);
         bad.refused(2, &["use pixels from 0 to 20000"]);
     }
