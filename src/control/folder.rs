@@ -38,7 +38,7 @@ pub(super) fn path() -> Result<PathBuf, ControlError> {
         Err(error) => Err(refuse(format!("{}: {error}", folder.display()))),
         Ok(found) if !found.is_dir() => Err(refuse(format!("{} is no folder", folder.display()))),
         Ok(found) if found.uid() != geteuid().as_raw() => {
-            Err(refuse(format!("{} belongs to somebody else", folder.display())))
+            Err(refuse(format!("{} belongs to another user", folder.display())))
         }
         Ok(found) if found.mode() & 0o077 != 0 => {
             Err(refuse(format!("{0} is open to others: `chmod 700 {0}`", folder.display())))

@@ -61,7 +61,7 @@ impl Patch {
     pub fn parse<'a>(settings: impl IntoIterator<Item = (&'a str, &'a str)>) -> Result<Self, (String, String)> {
         let mut patch = Self::default();
         for (name, text) in settings {
-            let found = setting(name).ok_or_else(|| "it is none of a look".to_string());
+            let found = setting(name).ok_or_else(|| "it is not a setting of the look".to_string());
             found.and_then(|setting| setting.set(&mut patch, text)).map_err(|what| (name.to_string(), what))?;
         }
         Ok(patch)

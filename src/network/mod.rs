@@ -33,7 +33,7 @@ pub const MAX_VALUES: usize = 4 << 20;
 named! {
     /// What runs networks.
     pub enum Runtime default Auto {
-        /// ONNX Runtime where it is installed, else what is built in
+        /// ONNX Runtime where it is installed, else the built-in runtime
         Auto = "auto",
         /// What is built in: slower, and nothing to install
         BuiltIn = "built-in",
@@ -185,7 +185,7 @@ fn load_in_process(bytes: Vec<u8>, runtime: Runtime) -> Result<Network, Failure>
     if tflite::is_tflite(&bytes) {
         return match runtime {
             Runtime::OnnxRuntime => {
-                Err(Failure::Refused("a .tflite is run by what is built in: leave --network-runtime out".to_owned()))
+                Err(Failure::Refused("a .tflite runs on the built-in runtime: leave --network-runtime out".to_owned()))
             }
             _ => run_guarded(|| tflite::Tflite::load(&bytes)).map_err(Failure::Refused),
         };

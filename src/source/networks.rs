@@ -21,7 +21,7 @@ pub fn refuse_metres(look: &Look, who: &str) -> Result<(), SourceError> {
     match look.needs_metres() {
         None => Ok(()),
         Some(needs) => SourceError::usage(format!(
-            "{needs} needs distances, and {who} only what is nearer than what: use --focus auto or X,Y, and --blur"
+            "{needs} needs distances, and {who} only the order of depth: use --focus auto or X,Y, and --blur"
         )),
     }
 }

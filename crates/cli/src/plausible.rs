@@ -55,7 +55,7 @@ fn check_lens(lens: &Lens, focus: FocusRule) -> Option<String> {
     }
     match focus {
         FocusRule::Metres(focus_m) if focus_m * 1e3 <= focal_length_mm => Some(format!(
-            "--focus {focus_m}: a lens of {focal_length_mm} mm has no sharp picture of what is nearer than {} m",
+            "--focus {focus_m}: a lens of {focal_length_mm} mm cannot focus nearer than {} m",
             focal_length_mm / 1e3
         )),
         _ => None,
@@ -84,7 +84,9 @@ fn check_mask(mask: &Mask, color: &ColorImage) -> Option<&'static str> {
             Some("the mask is white all over: all of the picture is the subject, and stays sharp")
         }
         () if high < TOLERANCE => Some("the mask is black all over: there is no subject, and all is blurred"),
-        () if high - low < TOLERANCE => Some("the mask is one grey all over: it tells no subject from what is behind"),
+        () if high - low < TOLERANCE => {
+            Some("the mask is one grey all over: it separates no subject from the background")
+        }
         () if is_picture(&mask.alpha, mask.width, color) => Some("this is the picture itself, and no mask of it"),
         () => None,
     }
@@ -195,12 +197,12 @@ fn check_subject(map: &DepthMap, plate: Option<&Path>, image: Option<&Path>) -> 
     let is_itself = plate.zip(image).is_some_and(|(plate, image)| place::overlap(plate, image));
     match plate.map(Path::display) {
         Some(plate) if is_itself => {
-            Some(format!("{plate}: the plate is the picture itself: nobody is found, and all is blurred"))
+            Some(format!("{plate}: the plate is the picture itself: no person is found, and all is blurred"))
         }
         Some(plate) if near == 0 => Some(format!(
-            "{plate}: nobody stands before it, and all is blurred; a plate shows the place without the person"
+            "{plate}: no person stands before it, and all is blurred; a plate shows the place without the person"
         )),
-        None if near == 0 => Some("nobody was found in the picture, and all of it is blurred".to_owned()),
+        None if near == 0 => Some("no person was found in the picture, so all of it is blurred".to_owned()),
         Some(plate) if near as f32 > MAX_FOREGROUND * count as f32 && raggedness(map, is_near) > MAX_RAGGEDNESS => {
             Some(format!(
                 "{plate}: {} % of the picture differs from it, in shreds, and stays sharp: it was taken from elsewhere; a plate \

@@ -180,7 +180,7 @@ pub const GROUPS: [Group; 5] = [
     Group {
         name: "Focus",
         bindings: &[
-            once(&[key(Key::T)], "T", "take a plate of what is behind you", |_, _| Some(Action::TakePlate)),
+            once(&[key(Key::T)], "T", "take a plate of the empty room", |_, _| Some(Action::TakePlate)),
             once(&[key(Key::A)], "A", "focus on the subject", |state, _| {
                 edit_look(state, "key auto", |look| look.focus = FocusRule::Auto)
             }),
@@ -280,7 +280,9 @@ pub const GROUPS: [Group; 5] = [
             once(&[key(Key::F1), key(Key::Questionmark)], "F1, ?", "these keys", |state, _| {
                 Some(Action::Help(!state.help))
             }),
-            once(&[key(Key::Escape)], "Esc", "close what is open, leave full screen", |state, _| close_topmost(state)),
+            once(&[key(Key::Escape)], "Esc", "close the open dialog, leave full screen", |state, _| {
+                close_topmost(state)
+            }),
             once(&[key(Key::Q), ctrl(Key::Q), ctrl(Key::W)], "Q, Ctrl+Q", "close the window", |_, _| {
                 Some(Action::Close)
             }),

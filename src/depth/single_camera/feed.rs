@@ -160,7 +160,7 @@ impl Feed {
         let answer = picture_of(answer).ok_or_else(|| format!("its answer is no picture: {:?}", answer.shape))?;
         match answer.values.iter().all(|value| value.is_finite()) {
             true => Ok(answer),
-            false => Err("its answer has what is no number".to_owned()),
+            false => Err("its output has a value that is not a number".to_owned()),
         }
     }
 

@@ -183,7 +183,7 @@ impl DepthSource for SingleCamera {
         let Self { name, person, absence, relief, held, spread, matting, turn, .. } = self;
         let mask = person.as_ref().map(Person::mask);
         if mask.is_some_and(|mask| absence.should_report(mask, stamp.time_ns)) {
-            tracing::warn!("{name}: nobody was found for {} s, and all is blurred", Absence::LONG_NS / 1_000_000_000);
+            tracing::warn!("{name}: no person was found for {} s, so all is blurred", Absence::LONG_NS / 1_000_000_000);
         }
         run_depth(relief, (name, *turn), color, mask);
         if let (Some(mask), Some(relief)) = (mask, &relief) {

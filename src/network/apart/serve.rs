@@ -87,7 +87,7 @@ fn handle_requests(mut stream: UnixStream) -> io::Result<()> {
                     Err(why) => send(&mut stream, &Reply::Failed(why))?,
                 }
             }
-            _ => return Err(io::Error::new(ErrorKind::InvalidData, "what is asked for comes out of turn")),
+            _ => return Err(io::Error::new(ErrorKind::InvalidData, "a request came out of turn")),
         }
     }
 }

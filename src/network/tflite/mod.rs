@@ -41,7 +41,7 @@ impl Tflite {
         };
         let (inputs, outputs) = (port(model.input), port(model.output));
         let engine = Box::new(Self::of(&model)?);
-        Ok(Network { engine, inputs, outputs, runtime: "what is built in for TFLite".to_owned() })
+        Ok(Network { engine, inputs, outputs, runtime: "the built-in TFLite runtime".to_owned() })
     }
 
     fn of(model: &Model) -> Result<Self, String> {

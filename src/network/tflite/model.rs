@@ -87,7 +87,7 @@ impl Model {
         let root = Table::root(bytes)?;
         let codes = root.tables(1)?.iter().map(code).collect::<Result<Vec<_>, String>>()?;
         let buffers = root.tables(4)?;
-        let [graph] = root.tables(2)?[..] else { return Err("it has not one graph".to_owned()) };
+        let [graph] = root.tables(2)?[..] else { return Err("it does not have exactly one graph".to_owned()) };
         let tables = graph.tables(0)?;
         let steps = graph.tables(3)?;
         if tables.len().max(steps.len()) > MAX_PARTS {
@@ -120,7 +120,7 @@ impl Model {
         }
         let port = |ports: Vec<i32>| match ports[..] {
             [port] if (port as usize) < tensors.len() => Ok(port as usize),
-            _ => Err("it has not one input and one output".to_owned()),
+            _ => Err("it does not have exactly one input and one output".to_owned()),
         };
         Ok(Self { input: port(graph.ints(1)?)?, output: port(graph.ints(2)?)?, operators, tensors })
     }
@@ -164,7 +164,7 @@ fn kind((code, name): &(i32, String), step: &Table<'_>) -> Result<Option<(Kind, 
     let activation = |number: usize| match byte(number)? {
         0 => Ok(Activation::None),
         1 => Ok(Activation::Relu),
-        other => Err(format!("activation {other} of an operator is none of those that are built in")),
+        other => Err(format!("activation {other} of an operator is not supported")),
     };
     Ok(Some(match code {
         0 => (Kind::Sum, activation(0)?),
@@ -178,6 +178,6 @@ fn kind((code, name): &(i32, String), step: &Table<'_>) -> Result<Option<(Kind, 
         32 if name == "Convolution2DTransposeBias" => (Kind::TransposedConvolution, Activation::None),
         40 => (Kind::Mean, Activation::None),
         117 => (Kind::Activation(Activation::HardSwish), Activation::None),
-        _ => return Err(format!("operator {code} {name:?} is none of those that are built in")),
+        _ => return Err(format!("operator {code} {name:?} is not supported")),
     }))
 }

@@ -123,7 +123,7 @@ impl Provider {
             tracing::info!(
                 "{}: {}",
                 self.settings.name,
-                if is_watched { "somebody watches" } else { "nobody watches" }
+                if is_watched { "a program reads the camera" } else { "no program reads the camera" }
             );
             self.show.borrow_mut().watched(is_watched);
         }

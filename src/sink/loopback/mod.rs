@@ -97,13 +97,13 @@ impl Loopback {
 fn start_watcher(path: &Path, output: &Output, demand: Demand) -> Result<Watcher, SinkError> {
     let refused = |cause| LoopbackError::System {
         path: path.to_owned(),
-        doing: "it cannot be known whether somebody watches; leave --on-demand out",
+        doing: "it cannot be known whether a program reads it; leave --on-demand out",
         cause,
     };
     let (audience, stop) = ReaderMonitor::new(output.device().clone()).map_err(refused)?;
     if !audience.has_module_events() {
         tracing::info!(
-            "{}: this version of v4l2loopback does not tell of its readers; whoever has it open counts as one",
+            "{}: this version of v4l2loopback does not report its readers; every program that has it open counts as one",
             path.display()
         );
     }

@@ -45,7 +45,7 @@ fn follow_readers(demand: &Demand, clock: &Clock, mut wait: impl FnMut(Option<Du
             ReaderEvent::Readers(true) => {
                 release_at_ns = None;
                 if watch.is_none() {
-                    tracing::info!("somebody watches");
+                    tracing::info!("a program reads the camera");
                     watch = Some(demand.watch());
                 }
             }
@@ -57,7 +57,7 @@ fn follow_readers(demand: &Demand, clock: &Clock, mut wait: impl FnMut(Option<Du
             ReaderEvent::Stopped => return,
         }
         if release_at_ns.is_some_and(|at_ns| clock.now_ns() >= at_ns) {
-            tracing::info!("nobody watches");
+            tracing::info!("no program reads the camera");
             release_at_ns = None;
             drop(mem::take(&mut watch));
         }

@@ -222,7 +222,7 @@ impl Live {
     /// Closes the device until [`Live::next`] is called again.
     pub fn suspend(&mut self) {
         if matches!(self.state, State::Streaming(_)) {
-            tracing::debug!("{}: closed, nobody watches", self.name);
+            tracing::debug!("{}: closed, as no program reads it", self.name);
         }
         self.close(State::Resting);
         self.last_warning.clear();

@@ -181,7 +181,7 @@ fn status_text(status: &Status) -> String {
     let size = size.map_or_else(String::new, |(width, height)| format!(", {width}x{height}"));
     let watched = match watched {
         Some(true) => "; watched",
-        Some(false) => "; nobody watches",
+        Some(false) => "; not watched",
         None => "",
     };
     let sinks = if sinks.is_empty() { "nowhere else".to_owned() } else { sinks.join(", ") };

@@ -74,9 +74,11 @@ fn format_list() -> String {
     let folders: Vec<String> = network::folders().iter().map(|folder| folder.display().to_string()).collect();
     text += &format!("\nlooked for in {}\n", folders.join(", "));
     match network::onnx_runtime_installed() {
-        Ok(name) => text += &format!(".tflite is run by what is built in, .onnx by {name}\n"),
+        Ok(name) => text += &format!(".tflite runs on the built-in runtime, .onnx on {name}\n"),
         Err(why) => {
-            text += &format!(".onnx is run by what is built in, and 1.5 to 3 times as fast with ONNX Runtime: {why}\n")
+            text += &format!(
+                ".onnx runs on the built-in runtime, and would be 1.5 to 3 times as fast with ONNX Runtime: {why}\n"
+            )
         }
     }
     text

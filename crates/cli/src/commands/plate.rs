@@ -74,7 +74,7 @@ pub fn run(command: &PlateCommand, global: &options::Global, given: &Given) -> R
         false => plate_from_recording(&mut frames)?,
     };
     if name.kind() == Kind::Photo {
-        log::warn("a photo stands still: whoever is in it is in the plate, and is not found before it");
+        log::warn("a photo stands still: a person in it becomes part of the plate, and is not found");
     }
     make_folder_of(to)?;
     report_leftovers([to.as_path()]);

@@ -119,7 +119,7 @@ pub struct Stream {
     /// Picture size of a virtual camera; pictures of another size are fitted into it [default: the source's]
     #[arg(long, value_name = "WxH")]
     pub out_size: Option<Size>,
-    /// Close the source's camera while nobody watches the virtual one
+    /// Close the source's camera while no program reads the virtual one
     #[arg(long, value_name = "YES", num_args = 0..=1, require_equals = true, default_value_t = false,
           default_missing_value = "true", value_parser = BoolishValueParser::new(), hide_default_value = true,
           hide_possible_values = true)]

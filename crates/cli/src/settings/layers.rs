@@ -229,7 +229,7 @@ fn read_snapshot(path: &Path) -> Result<Values, CliError> {
     let values: Values = written.map(|(name, value)| (settings::name_of(&name).to_owned(), value)).collect();
     if let Some(unknown) = values.keys().find(|name| settings::setting(name).is_none()) {
         return Err(refuse(format!(
-            "its setting '{unknown}' is none of a look: it is of another version, or was edited"
+            "its setting '{unknown}' is not a setting of the look: the file is of another version, or was edited"
         )));
     }
     parse_flags(&values).map_err(|error| refuse(one_line(&error)))?;

@@ -261,7 +261,8 @@ fn commands_take_plates_and_use_them() {
         assert!(!at("a.png").exists(), "{arguments:?}");
     }
     // Where nobody stands before it, that is said.
-    for (plate, expected) in [("me.png", "the plate is the picture itself"), ("copy.png", "nobody stands before it")] {
+    for (plate, expected) in [("me.png", "the plate is the picture itself"), ("copy.png", "no person stands before it")]
+    {
         std::fs::copy(at("me.png"), at("copy.png")).unwrap();
         let plate = format!("plate:{plate}");
         let ran = home.run(&["render", "me.png", "--depth", &plate, "--force", "--out", "b.png"]);

@@ -231,7 +231,7 @@ fn a_snapshot_that_cannot_be_repeated_costs_one_line() {
         ("plain.png", 1, "plain.png: no snapshot"),
         ("text.png", 1, "text.png: not a PNG file"),
         ("short.png", 1, "short.png: "),
-        ("alien.png", 2, "alien.png: its setting 'mirror' is none of a look"),
+        ("alien.png", 2, "alien.png: its setting 'mirror' is not a setting of the look"),
         ("bad.png", 2, "from 0 to 1"),
         ("lone.png", 1, "lone-color.png: there is no such file"),
         ("depthless.png", 2, "needs depth"),

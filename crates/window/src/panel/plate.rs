@@ -17,7 +17,7 @@ pub fn offer(stack: &mut Stack, state: &State, actions: &mut Vec<Action>) {
     if !state.offers_depth() || state.bare {
         return;
     }
-    let network = ("Find me by a small network", "It tells a person from what is behind", Action::FindMe);
+    let network = ("Find me by a small network", "It separates a person from the background", Action::FindMe);
     let plate =
         ("Show me the empty room", "Step out for four seconds; the camera has to stand still (T)", Action::TakePlate);
     let plate = Some(plate).filter(|_| state.can_capture_plate());
@@ -33,7 +33,7 @@ pub fn show(stack: &mut Stack, state: &State, actions: &mut Vec<Action>) {
     let Some(step) = state.plate.filter(|step| *step != Step::Ready) else { return };
     let (title, why) = match step {
         Step::StepOut(_) => ("Step out of the picture", ""),
-        Step::Taking(_) => ("Stay out", "What is behind you is being learned."),
+        Step::Taking(_) => ("Stay out", "The room behind you is being learned."),
         Step::Moves => ("Something moves", "Stay out of the picture, and let the camera stand still."),
         Step::Restless => {
             ("No plate so far", "Something keeps moving: let the camera stand on something firm, and step out.")
@@ -41,7 +41,7 @@ pub fn show(stack: &mut Stack, state: &State, actions: &mut Vec<Action>) {
         // `Step::Unlike`: the plate does not match the picture.
         _ => (
             "Another picture",
-            "The camera was moved, or the light has changed: nobody can be told from what is behind, so all is blurred.",
+            "The camera was moved, or the light has changed: you cannot be separated from the background, so all is blurred.",
         ),
     };
     stack.add_card("plate", WIDTH, |ui, colors| {

@@ -43,7 +43,7 @@ impl Bar {
                 let (play, hint) = match (state.frozen, state.can_pause()) {
                     (true, _) => (Icon::Play, "Play (Z)"),
                     (false, true) => (Icon::Pause, "Pause (Z)"),
-                    (false, false) => (Icon::Pause, "Freeze the window; what is written goes on (Z)"),
+                    (false, false) => (Icon::Pause, "Freeze the window; outputs go on (Z)"),
                 };
                 let buttons = [
                     (Icon::Back, "One frame back (Page Up)", Action::Step(-1)),

@@ -21,7 +21,7 @@ pub const NO_PLATE: &str = "Open a camera first: a plate needs one that stands s
 pub const NO_METRES: &str = "Nothing is known in metres here: the subject is in focus, and blur is given as an amount.";
 /// Shown when the window is frozen while an output is active.
 pub const OUTPUTS_CONTINUE: &str =
-    "Only this window is frozen. What is recorded or sent goes on live, and in every look that you choose here.";
+    "Only this window is frozen. Recordings and calls go on live, in every look that you choose here.";
 /// Shown when there is no virtual camera.
 pub const NO_VIRTUAL_CAMERA: &str = "No camera for calls is set up yet: `bokehcam doctor` says how.";
 

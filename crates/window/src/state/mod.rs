@@ -192,7 +192,7 @@ pub struct State {
 }
 
 /// Shown once the background plate is captured.
-const PLATE_TAKEN: &str = "Come back: what is behind you is known now. Keep the camera where it is.";
+const PLATE_TAKEN: &str = "Come back: the room behind you is known now. Keep the camera where it is.";
 /// Maximum number of notes that are kept.
 const MAX_NOTES: usize = 6;
 

@@ -252,7 +252,9 @@ impl DepthCommand {
         };
         let tried = wanted.min(limit);
         if tried < wanted {
-            note(format!("{wanted} disparities ({whose}), and at most {limit} can be tried: what is nearer is missed"));
+            note(format!(
+                "{wanted} disparities ({whose}), and at most {limit} can be tried: nearer surfaces are missed"
+            ));
         } else {
             note(format!("{tried} disparities ({whose})"));
         }

@@ -39,7 +39,7 @@ fn check_networks() -> Vec<Finding> {
     let runtime = match network::onnx_runtime_installed() {
         Ok(name) => Finding::good(NETWORKS, format!("run by {name}")),
         Err(why) => {
-            Finding::note(NETWORKS, "networks of your own are run by what is built in; ONNX Runtime is faster", why)
+            Finding::note(NETWORKS, "your own networks run on the built-in runtime; ONNX Runtime is faster", why)
         }
     };
     vec![models, runtime]

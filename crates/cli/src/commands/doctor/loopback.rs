@@ -89,7 +89,7 @@ fn check_node(node: &Node) -> Finding {
         return report_denied(ABOUT, node);
     }
     let holders: Vec<_> = holders(&node.path).iter().map(ToString::to_string).collect();
-    let by = if holders.is_empty() { "nobody this user can see".to_owned() } else { holders.join(", ") };
+    let by = if holders.is_empty() { "a process that this user cannot see".to_owned() } else { holders.join(", ") };
     match (node.captures, node.outputs) {
         (false, true) => Finding::good(ABOUT, format!("{node}: free; opened by {by}")),
         (true, true) => {

@@ -152,7 +152,7 @@ fn read_depth(file: &Path, command: &RenderCommand, look: &Look) -> Result<Depth
     let rig = match (rig, look.needs_metres()) {
         (Some(rig), _) => rig,
         (None, None) => {
-            tracing::warn!("{name}: holds disparity without distances: what is near and far is known, and not how far");
+            tracing::warn!("{name}: holds disparity without distances: the order of depth is known, metres are not");
             StereoRig::assumed(map.width)
         }
         (None, Some(needs)) => {

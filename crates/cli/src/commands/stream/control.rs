@@ -217,7 +217,7 @@ impl Controlled for Stream {
 
     fn save(&self, to: Option<&Path>) -> Result<PathBuf, Answer> {
         if self.run.demand.as_ref().is_some_and(|demand| !demand.is_watched()) {
-            return Err(Answer::failed("nobody watches, so the camera is closed: there is no picture"));
+            return Err(Answer::failed("no program reads it, so the camera is closed: there is no picture"));
         }
         let picture = self.run.release.picture(PICTURE_TIMEOUT);
         let picture =

@@ -236,7 +236,7 @@ fn a_bad_file_is_refused_in_one_line() {
         ("grey", plain(&sides(1, 8), &sides(1, 8)), "three channels"),
         ("three", plain(&sides(3, 8), &sides(3, 8)), "its answer is no picture"),
         ("huge", plain(&sides(3, 8192), &sides(1, 8192)), "more than"),
-        ("nan", zero, "no number"),
+        ("nan", zero, "not a number"),
         ("unknown", unknown, "Magic"),
     ];
     for (name, bytes, expected) in &cases {

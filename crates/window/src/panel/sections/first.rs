@@ -69,7 +69,7 @@ fn blur(ui: &mut Ui, sheet: &mut Sheet) {
         let max_percent = MAX_COC_PER_HEIGHT * 100.0;
         let mut percent = (fraction * 100.0).min(max_percent);
         let slider = ui.add(Slider::new(&mut percent, 0.0..=max_percent).show_value(false)).labelled_by(name.id);
-        if slider.hint("How much what is out of focus is blurred. The wheel over the picture does the same").changed() {
+        if slider.hint("How much the background is blurred. The mouse wheel over the picture does the same").changed() {
             tweak::set_blur_fraction(&mut sheet.look, percent / 100.0, focus_m, sheet.size);
             sheet.mark_changed(true, "Amount of blur");
         }

@@ -25,20 +25,20 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
     };
     let rules = [
         ("Subject", "Follows a person, or the nearest large subject", FocusRule::Auto),
-        ("Point", "What is at a point of the picture: click there. Double-click on something to follow it", point),
+        ("Point", "A point of the picture: click there. Double-click on a thing to follow it", point),
         ("Distance", "A distance in metres", distance),
     ];
     let in_metres = !sheet.is_relative();
     let rules = if in_metres { &rules[..] } else { &rules[..2] };
     sheet.choose(ui, "Focus on", rules, focus, |look, rule| look.focus = rule);
     if in_metres {
-        let hint = "Distance of what is sharpest. Move it to focus at a distance of your own";
+        let hint = "Distance of the focal plane. Move it to focus at a distance of your own";
         let how = Number::new("Distance", hint, DISTANCES_M, 2).unit("", " m").logarithmic();
         sheet.number(ui, &how, metres, |look, metres| look.focus = FocusRule::Metres(metres));
         // Displayed as half the range on either side of the focal plane.
         let half_m = *FOCUS_RANGES_M.start() / 2.0..=*FOCUS_RANGES_M.end() / 2.0;
         let hint = "What stays as sharp as the focal plane, in front of it and behind";
-        let how = Number::new("Depth of what is sharp", hint, half_m, 2).unit("±", " m");
+        let how = Number::new("Depth of the sharp range", hint, half_m, 2).unit("±", " m");
         sheet.number(ui, &how, sheet.look.focus_range_m / 2.0, |look, half_m| look.focus_range_m = half_m * 2.0);
         let half_m = sheet.look.focus_range_m / 2.0;
         if half_m > 0.0 {

@@ -198,7 +198,7 @@ fn draw_chip(ui: &mut Ui, index: usize, preset: &Preset, chosen: bool, possible:
     }
     painter.galley(rect.left_center() + vec2(10.0 + room, -name.size().y / 2.0), name, text);
     response.hint(match (possible, preset.own) {
-        (false, _) => "needs depth, which this source has not",
+        (false, _) => "needs depth, and this source has none",
         (true, true) => "your own look",
         (true, false) => "a ready-made look",
     })

@@ -63,7 +63,7 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
         sheet.button(ui, "Open folder…", hint, Action::Browse(Browse::Folder));
         sheet.button(ui, "Open photo…", hint, Action::Browse(Browse::Photo));
         if state.plate.is_some() {
-            let hint = "A picture of what is behind you, without you; the camera has to stand still (T)";
+            let hint = "A picture of the room without you; the camera has to stand still (T)";
             sheet.button(ui, "Take another plate", hint, Action::TakePlate);
         }
     });

@@ -35,7 +35,7 @@ pub fn internals(ui: &mut Ui, sheet: &mut Sheet) {
 pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
     let state = sheet.state;
     choose_view(ui, sheet, "Show", VIEWS);
-    let hint = "Like a mirror; what is recorded or sent on is not (M)";
+    let hint = "Like a mirror; recordings and calls are not mirrored (M)";
     sheet.switch(ui, "Mirror", hint, state.mirror, Action::Mirror);
     if state.mirror {
         remark(ui, "In this window alone: what goes out is not mirrored.");

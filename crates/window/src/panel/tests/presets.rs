@@ -101,7 +101,7 @@ fn a_number_that_cannot_be_is_told() {
     window.enter();
     assert_eq!(window.state.look.focus_range_m, 2.0 * 0.5 * *crate::state::tweak::FOCUS_RANGES_M.end());
     assert!(
-        said(&window).iter().any(|line| line.starts_with("Depth of what is sharp goes from ±0.00 m to ±")),
+        said(&window).iter().any(|line| line.starts_with("Depth of the sharp range goes from ±0.00 m to ±")),
         "{:?}",
         said(&window)
     );
