@@ -1,4 +1,4 @@
-//! Files of users: written whole or not at all, and read within bounds.
+//! User files: written atomically (whole or not at all), and read within limits.
 
 pub mod data;
 pub mod folder;

@@ -1,8 +1,9 @@
-//! The one place that knows all stages: the thread graph of a run, and what becomes of a failure.
+//! The only module that knows all stages: the thread graph of a run, and the handling of failures.
 //!
-//! Three named threads and the caller's, joined by three links; all end because their input ended. Stop is one flag
-//! that only capture reads: what is under way then drains, and the output is completed. A stage that fails drops both
-//! its ends, so that its neighbours end as well: quietly, since only the cause is an error; its output is completed.
+//! Three named threads and the caller's, joined by three links; each ends when its input ends. Stop is one flag that
+//! only capture reads: frames in flight then drain, and the output is completed. A stage that fails drops both its
+//! ends, so that its neighbours end as well, without an error of their own, since only the cause is reported; the
+//! output is completed.
 
 mod blur;
 mod capture;
@@ -42,25 +43,25 @@ use crate::link::{self, Receiver, Sender};
 use crate::sink::{self, Ending};
 use crate::stats::{About, Report, Tally, Timings};
 
-/// What all stages of a run have in common.
+/// State shared by all stages of a run.
 struct Shared {
     clock: Clock,
     tally: Tally,
     pools: Pools,
-    /// Where the frames come from.
+    /// Description of the camera.
     info: SourceInfo,
-    /// From frame to frame, where they come in real time.
+    /// The frame period, if frames come in real time.
     live_ns: Option<u64>,
     keep_going: bool,
-    /// Whether somebody looks at what the pictures were made of.
+    /// Whether the run has a view, which receives the unblurred pictures and depth, too.
     is_viewed: bool,
-    /// Where pictures are wanted, and whether with depth of their own.
+    /// Requested place of the pictures, and whether each needs its own depth.
     wanted: Option<Arc<Wanted>>,
-    /// How depth is to be made, as the blur has planned.
+    /// The plan for depth, set by the blur stage.
     order: rate::Order,
-    /// Whether the sink takes pictures as YUYV, and nobody else is given them.
+    /// Whether the sink takes YUYV, and no other reader gets the pictures.
     wants_yuyv: AtomicBool,
-    /// Set when any stage ends, so that capture does, too.
+    /// Set when any stage ends, so that capture ends, too.
     over: AtomicBool,
 }
 
@@ -88,11 +89,11 @@ impl Shared {
     }
 }
 
-/// Runs the pipeline until its frames or its sink end or the stop flag is set, and completes the output in any case.
+/// Runs the pipeline until the frames end, the sink ends or the stop flag is set, and completes the output in any case.
 ///
 /// # Errors
-/// The fault of the stage that failed; a panic is one. The output then has the frames until there. The error has the
-/// report.
+/// Returns the fault of the stage that failed, a panic included, with the report. The output then has the frames
+/// delivered so far.
 pub fn run(mut run: Run) -> Result<Report, PipelineError> {
     let (began_ns, cpu_ns) = (run.clock.now_ns(), clock::cpu_ns());
     let Engine { preparation, blur } = run.engine();
@@ -119,12 +120,12 @@ pub fn run(mut run: Run) -> Result<Report, PipelineError> {
         upstream.into_iter().map(join).chain([delivered]).collect::<Result<(), Fault>>()
     });
 
-    // A source that has an end of its own was broken off before it.
+    // A source with a known number of frames was stopped before its end.
     let is_cut = stop.load(Ordering::Relaxed) && info.frames.is_some_and(|frames| tally.frames().captured < frames);
     let ending = if ended.is_err() || is_cut { Ending::Cut } else { Ending::Whole };
     let (outputs, nodes) = (sink.outputs(), sink.nodes());
     let finished = guard("sink", over, move || Ok(sink.finish(ending)?));
-    // Only now have the outputs taken all that was under way.
+    // Only now have the outputs written all frames.
     let about = About {
         outputs: sink::read(&outputs),
         pipewire: sink::read(&nodes),
@@ -133,7 +134,7 @@ pub fn run(mut run: Run) -> Result<Report, PipelineError> {
         ..about
     };
     let report = Report::new(tally.frames(), &timings, about);
-    // What came first is the cause.
+    // The earlier fault is the cause.
     match ended.and(finished) {
         Ok(()) => Ok(report),
         Err(fault) => Err(PipelineError { fault, report: Box::new(report) }),

@@ -1,6 +1,6 @@
-//! The accounting and the report: what became of every frame, how long it took, at which quality.
+//! Accounting and report: the fate of every frame, its times, and its quality level.
 //!
-//! Memory is fixed, however long the run, and counting a frame allocates nothing.
+//! Memory is bounded for a run of any length, and counting a frame does not allocate.
 
 mod histogram;
 mod node_use;
@@ -16,58 +16,58 @@ pub use report::{About, QualityUse, Report, Spread, StageMs, StagesMs, Versions,
 pub use rungs::QualityCounts;
 pub use tally::{Cause, Dropped, Frames, Tally, Ticket};
 
-/// What the stages measure while they run; each stage fills a part of its own.
+/// Measurements of the stages during a run; each stage fills its own part.
 #[derive(Clone, Debug, Default)]
 pub struct Timings {
     /// Reading and decoding a picture, waits excluded.
     pub decode: Histogram,
-    /// Of depth.
+    /// Depth stage.
     pub depth: DepthTimings,
-    /// Of the blur.
+    /// Blur stage.
     pub blur: BlurTimings,
-    /// Of delivery.
+    /// Delivery.
     pub sink: SinkTimings,
 }
 
-/// What is measured of depth.
+/// Measurements of the depth stage.
 #[derive(Clone, Debug, Default)]
 pub struct DepthTimings {
     /// Reading depth, focusing and filling holes.
     pub took: Histogram,
-    /// Frames that took over the depth of the one before, to save time.
+    /// Frames that reused the previous depth map, to save time.
     pub held: u64,
-    /// What refined it: `cpu`, `gpu` or `gpu, then cpu`.
+    /// The backend that refined depth: `cpu`, `gpu` or `gpu, then cpu`.
     pub refined_by: Option<&'static str>,
-    /// What found mattes, as that.
+    /// The backend that found mattes, with the same values.
     pub matted_by: Option<&'static str>,
 }
 
-/// What is measured of the blur.
+/// Measurements of the blur stage.
 #[derive(Clone, Debug, Default)]
 pub struct BlurTimings {
-    /// The blur of a frame: the sum of its passes, or the wall time where an executor times none.
+    /// Time of the blur of a frame: the sum of its passes, or the wall time if the executor does not time passes.
     pub took: Histogram,
-    /// The blur's passes.
+    /// Times of the blur's passes.
     pub passes: PassHistograms,
-    /// Frames blurred at each rung of the quality ladder.
+    /// Frames blurred at each quality level.
     pub rungs: QualityCounts,
     /// Frames whose blur took longer than the budget.
     pub misses: u64,
-    /// On what it ran, `cpu`, `gpu`, `gpu, then cpu` or `none`, and how that describes itself.
+    /// The backend, `cpu`, `gpu`, `gpu, then cpu` or `none`, and the executor's description.
     pub by: [String; 2],
 }
 
-/// What is measured of delivery.
+/// Measurements of the delivery stage.
 #[derive(Clone, Debug, Default)]
 pub struct SinkTimings {
-    /// Writing or showing a picture.
+    /// Time to write or show a picture.
     pub took: Histogram,
-    /// Waits of finished pictures for their turn, in real time.
+    /// Time that finished pictures waited for their playout, in real time.
     pub playout: Histogram,
-    /// From capture to delivery.
+    /// Time from capture to delivery.
     pub latency: Histogram,
-    /// From one delivery to the next.
+    /// Time from one delivery to the next.
     pub frame: Histogram,
-    /// Pictures that were shown again because no new one came.
+    /// Pictures that were repeated because no new one came.
     pub repeats: u64,
 }

@@ -1,4 +1,4 @@
-//! What the element allocates: nothing of its own for a picture, and nothing that stays from one start to the next.
+//! Allocations of the element: none for a picture, and none that remain from one start to the next.
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -12,17 +12,17 @@ struct Counting;
 static LARGE: AtomicU64 = AtomicU64::new(0);
 const LARGE_BYTES: usize = 4096;
 
-// SAFETY: everything is left to the system's allocator.
+// SAFETY: every call is forwarded to the system's allocator.
 #[allow(unsafe_code)]
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         LARGE.fetch_add(u64::from(layout.size() >= LARGE_BYTES), Ordering::Relaxed);
-        // SAFETY: as the caller has it.
+        // SAFETY: the caller upholds the contract of `GlobalAlloc`.
         unsafe { System.alloc(layout) }
     }
 
     unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        // SAFETY: as the caller has it.
+        // SAFETY: the caller upholds the contract of `GlobalAlloc`.
         unsafe { System.dealloc(pointer, layout) }
     }
 }
@@ -30,7 +30,7 @@ unsafe impl GlobalAlloc for Counting {
 #[global_allocator]
 static ALLOCATOR: Counting = Counting;
 
-/// One test at a time: they look at the whole process.
+/// Runs one test at a time, because they measure the whole process.
 static ALONE: Mutex<()> = Mutex::new(());
 
 fn pipeline(line: &str) -> gst::Pipeline {
@@ -45,7 +45,7 @@ fn wait_for(pipeline: &gst::Pipeline, kind: gst::MessageType) {
     assert_eq!(message.type_(), kind, "{message:?}");
 }
 
-/// Whether depth fits the pictures is looked at in some of the first 300, and takes memory.
+/// The check whether depth fits the pictures runs in some of the first 300, and allocates.
 const SETTLED: usize = 300;
 const PICTURES: usize = 350;
 
@@ -76,8 +76,8 @@ fn a_picture_allocates_nothing_of_its_size() {
     }
 }
 
-/// Bytes that all of this process has of `malloc`, and its threads. What is resident tells less: the C library keeps what was
-/// returned, in a pool for each thread.
+/// Returns the bytes that the process has from `malloc`, and its number of threads. Resident memory says less: the C
+/// library keeps freed memory in a pool for each thread.
 fn held() -> (usize, usize) {
     // SAFETY: it only reads the allocator's own counts.
     #[allow(unsafe_code)]
@@ -97,7 +97,7 @@ fn a_thousand_changes_of_state_leave_nothing_behind() {
     ));
     let mut before = (0, 0);
     for start in 0..250 {
-        // To a first picture and back: four changes of state.
+        // To a first picture and back: four state changes.
         pipeline.set_state(gst::State::Paused).unwrap();
         wait_for(&pipeline, gst::MessageType::AsyncDone);
         pipeline.set_state(gst::State::Null).unwrap();
@@ -108,8 +108,8 @@ fn a_thousand_changes_of_state_leave_nothing_behind() {
     let after = held();
     let grown = after.0.saturating_sub(before.0);
     println!("200 starts: {before:?}, then {after:?}");
-    // 1 kB a start: a picture of each would be 58.
+    // 1 kB a start, where a leaked picture each would be 58.
     assert!(grown < 200_000, "200 starts left {grown} bytes");
-    // GLib keeps some idle ones for a while.
+    // GLib keeps idle threads for a while.
     assert!(after.1 < before.1 + 20, "{} threads, then {}", before.1, after.1);
 }

@@ -1,4 +1,4 @@
-//! One executor for all quality levels does at each what an executor made for that one does, whatever came before.
+//! One executor for all quality levels gives, at each level, the result of an executor made for that level alone.
 #![allow(missing_docs)]
 
 use crate::{common, portrait};
@@ -19,7 +19,7 @@ use common::{COC_KINDS, Numbers, coc, depth, noise, psnr_db, settings, three_dep
 
 const SIZE: (u32, u32) = (150, 110);
 
-/// Maps that ask for different bins: three depths, only far, all in focus, a slope, near and far.
+/// Maps that need different bins: three depths, only far, all in focus, a slope, near and far.
 fn maps() -> Vec<DepthMap> {
     let (width, height) = SIZE;
     let slope = depth(width, height, |x, _| 0.5 + 4.0 * x as f32 / width as f32);
@@ -37,7 +37,7 @@ fn blurred(cpu: &mut CpuBokeh, image: &ColorImage, map: &DepthMap, settings: &Se
 fn check(settings: Settings, what: &str) {
     let (image, maps) = (noise(SIZE.0, SIZE.1), maps());
     let plan = |settings: &Settings| Plan::new(settings, SIZE.0, SIZE.1);
-    // What each level alone makes of each map, on its own.
+    // The result of each map at each level, by an executor of its own.
     let alone: Vec<Vec<ColorImage>> = Quality::ALL
         .iter()
         .map(|&quality| {
@@ -99,7 +99,7 @@ fn one_level_takes_no_memory_for_others() {
 /// Pictures with their depth and time.
 type Frames = Vec<(ColorImage, DepthMap, u64)>;
 
-/// Frames of the recording that comes with the project and of the synthetic scene, with their depth and time.
+/// Returns frames of the bundled recording and of the synthetic scene, with their depth and time.
 fn scenes() -> [(&'static str, Frames); 2] {
     const FRAMES: usize = 6;
     let mut refiner = Refiner::new();
@@ -122,7 +122,7 @@ fn scenes() -> [(&'static str, Frames); 2] {
     [("recording", recorded), ("synthetic", synthetic.collect())]
 }
 
-/// A change of level shows no more than one frame differs from the next.
+/// A change of level changes the picture no more than the step from one frame to the next does.
 #[test]
 fn a_change_of_level_is_no_jump() {
     let lens =

@@ -45,7 +45,7 @@ fn a_constant_picture_stays_constant() {
     }
 }
 
-/// A plain two-dimensional convolution with the bank's own kernel, borders repeated.
+/// Convolves directly in two dimensions with the bank's own kernel, borders repeated.
 fn convolve(image: &ColorImage, plan: &Plan, radius_px: f32) -> Vec<f32> {
     let node = plan.bank.node(radius_px);
     let (kernel, reach) = (plan.bank.kernel(node, false), plan.bank.node_half_width[node] as i64);
@@ -102,7 +102,7 @@ fn the_exact_gather_is_the_two_dimensional_convolution_too() {
     }
 }
 
-/// Centroid, and root mean square distance from it, of light above the background.
+/// Returns the centroid of the light above the background, and the root mean square distance from it.
 fn spot(image: &ColorImage, background: f32) -> (f64, f64, f64) {
     let (mut sum, mut sum_x, mut sum_y, mut sum_xx) = (0.0, 0.0, 0.0, 0.0);
     for (k, pixel) in image.rgb.chunks_exact(3).enumerate() {
@@ -117,7 +117,7 @@ fn spot(image: &ColorImage, background: f32) -> (f64, f64, f64) {
     (x, y, (sum_xx / sum - x * x - y * y).max(0.0).sqrt())
 }
 
-/// A bright square on black, `size` pixels wide, and where its middle is.
+/// Returns a bright square on black, `size` pixels wide, and its centre.
 fn bright_square(size: u32) -> (ColorImage, f64) {
     let image = color(101, 101, |x, y| {
         let inside = |v: u32| (50..50 + size).contains(&v);
@@ -294,7 +294,7 @@ fn a_range_of_focus_is_sharp_as_a_whole_and_its_ends_are_focal_planes() {
     let worst = codes_apart(&out, &image);
     assert!(worst <= 1, "{worst}");
     assert!(out != blur(&settings, &image, &within, &lens(1.0, 0.0)), "without a range some of it is blurred");
-    // Behind the range it is as if the focus were at its far end, in front of it as if at its near one.
+    // Behind the focus range the blur equals that of a focus at its far end; in front of it, at its near end.
     let behind = depth(width, height, |x, _| [1.2, 1.9, 6.0, 0.0][x as usize / 10 % 4]);
     assert_eq!(blur(&settings, &image, &behind, &lens(1.0, 0.4)), blur(&settings, &image, &behind, &lens(far_m, 0.0)));
     let before = depth(width, height, |x, _| [0.8, 0.6, 0.3][x as usize / 10 % 3]);

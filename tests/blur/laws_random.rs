@@ -1,7 +1,7 @@
 //! The laws of the blur on random settings, sizes and fields, on both executors.
 //!
-//! `BOKEHCAM_TEST_CASES=5000` plays as many cases of each law, `BOKEHCAM_TEST_SEED=7` begins with that seed: what a test
-//! says when it fails plays that one case again.
+//! `BOKEHCAM_TEST_CASES=5000` runs that number of cases of each law, `BOKEHCAM_TEST_SEED=7` begins with that seed; the
+//! message of a failed test says how to run that one case again.
 #![allow(missing_docs)]
 
 mod cases;
@@ -21,7 +21,7 @@ use cases::each_case;
 use common::{COC_KINDS, codes_apart, color, depth};
 use slopes::{SIZE as SLOPE, Slope};
 
-/// What blurs a sequence of frames.
+/// An executor that blurs a sequence of frames.
 trait Blurs {
     fn blur(&mut self, quality: Quality, image: &ColorImage, map: &DepthMap, field: &CocField) -> ColorImage;
 }
@@ -69,7 +69,7 @@ fn a_constant_picture_stays_constant_on_the_cpu() {
     a_constant_picture_stays_constant(&|settings, size| cpu(settings, size, 2));
 }
 
-/// Grey pictures: a highlight's colours are brought back by their luminance, and not one by one.
+/// Grey pictures, because highlights are recovered by their luminance, not channel by channel.
 fn nothing_is_darker_or_brighter_than_all_there_was(make: Make) {
     each_case(|random| {
         let (effect, size) = (random.of(&COC_KINDS), random.size());
@@ -180,10 +180,11 @@ fn nothing_shines_through_a_slope(make: Make) {
         let max_px = slope.lens.max_coc_px;
         let settings = Settings {
             method: Method::Layered,
-            // What few terms of a ring or a picture overshoot is cut to the colours around, the wall's included.
+            // Only apertures without overshoot: that of a ring or a picture (few terms) is clamped to the surrounding
+            // colours, which include the wall's.
             aperture: Aperture { shape: random.blades(), intensity: 2.0 * random.share() - 1.0 },
             rank: None,
-            // With two bins behind the focal plane, a slope there shares one with the wall.
+            // Lower levels have two bins behind the focal plane, where a slope would share one with the wall.
             quality: random.of(if slope.is_in_front { &Quality::ALL } else { &Quality::ALL[2..] }),
             far_max_px: max_px,
             near_max_px: max_px,

@@ -1,4 +1,4 @@
-//! What the blur promises: laws, on the processor and on a GPU.
+//! Properties of the blur, on the CPU and on a GPU.
 #![allow(missing_docs)]
 
 #[path = "../common/mod.rs"]

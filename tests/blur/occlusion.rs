@@ -1,4 +1,4 @@
-//! What near things look like, and what is seen through their rims, at every quality.
+//! The appearance of near objects, and of the background through their rims, at every quality level.
 #![allow(missing_docs)]
 
 use crate::common;
@@ -13,7 +13,7 @@ use bokehcam::optics::{CocField, CocKind, DepthCoc};
 use common::{color, depth, settings};
 
 const SIZE: (u32, u32) = (320, 200);
-/// The focus is on the farthest of all.
+/// Focus is on the farthest depth.
 const LENS: DepthCoc = DepthCoc { coc_at_infinity_px: 5.0, focus_m: 10.0, range_m: 0.0, max_coc_px: 30.0 };
 
 fn blur(quality: Quality, color: &ColorImage, map: &DepthMap) -> ColorImage {
@@ -25,7 +25,7 @@ fn blur(quality: Quality, color: &ColorImage, map: &DepthMap) -> ColorImage {
     out
 }
 
-/// The CoC at a depth, in pixels.
+/// Returns the CoC at a depth, in pixels.
 fn coc_px(metres: f32) -> f32 {
     LENS.coc_px(metres)
 }
@@ -37,7 +37,7 @@ fn light(image: &ColorImage, x: u32, y: u32) -> [f32; 3] {
 
 #[test]
 fn the_edge_of_a_near_thing_is_soft_inside_and_outside_at_every_quality() {
-    // White on black, both even: along a row, light rises over the diameter of the CoC, and nowhere in a step.
+    // A uniform white object on uniform black: along a row, light rises over the diameter of the CoC, without a step.
     let near_m = 2.2;
     let radius_px = -coc_px(near_m);
     let inside = |x: u32| (110..210).contains(&x);
@@ -51,7 +51,7 @@ fn the_edge_of_a_near_thing_is_soft_inside_and_outside_at_every_quality() {
         let steepest = 2.0 / (std::f32::consts::PI * radius_px) * span;
         let worst = row.windows(2).map(|pair| (pair[1] - pair[0]).abs()).fold(0.0, f32::max);
         assert!(worst < 1.6 * steepest, "{quality}: a step of {worst}, at most {steepest} of light");
-        // It is as transparent inside its outline as it is spread outside.
+        // Coverage lost inside the outline equals coverage gained outside.
         let [out_there, in_here] = [110 - 6, 110 + 6].map(|x| (row[x] - row[20]) / span);
         assert!((out_there + in_here - 1.0).abs() < 0.12, "{quality}: {out_there} outside, {in_here} inside");
         assert!((0.1..0.4).contains(&out_there), "{quality}: {out_there} outside");
@@ -60,7 +60,8 @@ fn the_edge_of_a_near_thing_is_soft_inside_and_outside_at_every_quality() {
 
 #[test]
 fn behind_a_near_thing_lies_what_is_just_behind_it() {
-    // Red before a large green thing before the blue background, which is in focus; a bright white thing far away from them.
+    // Red before a large green object before the blue background, which is in focus; a bright white object far from
+    // both.
     let (near_m, middle_m) = (1.6, 4.0);
     assert!(coc_px(near_m) < 3.0 * coc_px(middle_m), "they are in different bins");
     let is_near = |x: u32, y: u32| (120..200).contains(&x) && (70..140).contains(&y);
@@ -81,15 +82,15 @@ fn behind_a_near_thing_lies_what_is_just_behind_it() {
         for (x, y) in (70..250).flat_map(|x| (40..170).map(move |y| (x, y))) {
             let [red, green, blue] = light(&out, x, y);
             assert!(blue < 0.01, "{quality}: the background is seen through the near thing at {x}, {y}: {blue}");
-            // Red and green are all there is, and together they are whole.
+            // The scene here has only red and green, and their coverages add up to one.
             let whole = red / srgb_to_linear(220.0 / 255.0) + green / srgb_to_linear(150.0 / 255.0);
             assert!((whole - 1.0).abs() < 0.06, "{quality}: {whole} at {x}, {y}");
         }
     }
 }
 
-/// A subject in focus before a wall that is known behind it (a plate, the memory of the background), and something blurred
-/// before the subject: through its rim shows the subject.
+/// A subject in focus before a wall that is known behind it (from a background plate or the background memory), and a
+/// blurred object before the subject: the object's rim shows the subject.
 #[test]
 fn a_near_thing_before_the_subject_shows_the_subject_and_not_the_wall_behind_it() {
     let near_m = 2.2;
@@ -100,7 +101,7 @@ fn a_near_thing_before_the_subject_shows_the_subject_and_not_the_wall_behind_it(
     let subject = light(&image, 0, 0);
     let wall = [0.02, 0.7, 0.9];
     let known = (0..SIZE.1).flat_map(|y| (0..SIZE.0).map(move |x| (x, y))).filter(|&(x, y)| {
-        // All around the near thing, but no more than a picture has room for.
+        // All around the near object, but within the capacity of a frame's matte.
         !is_near(x, y) && (110..210).contains(&x) && (60..140).contains(&y)
     });
     map.matte.pixels = known

@@ -1,4 +1,4 @@
-//! The GPU executor does what the CPU executor does, pass by pass and as a whole.
+//! The GPU executor agrees with the CPU executor, pass by pass and as a whole.
 #![cfg(feature = "gpu")]
 #![allow(missing_docs)]
 
@@ -19,14 +19,14 @@ use bokehcam::optics::CocKind;
 use bokehcam::optics::{CocField, DepthCoc};
 use common::{COC_KINDS, Numbers, coc, codes_apart, color, depth, noise, settings, shapes, three_depths};
 
-/// Difference of an 8-bit value that at most one in a thousand may exceed, and that none may exceed twice over: a
-/// radius that falls between two nodes of the bank may round to either.
+/// Limit of the difference of an 8-bit value, in codes: at most one in a thousand may exceed it, none may exceed its
+/// double. A radius between two nodes of the bank may round to either.
 const CODES: u8 = 2;
-/// Largest difference of a radius: a node of the bank.
+/// Limit of the difference of a radius: one node of the bank.
 const RADIUS_PX: f32 = 1.0 / STEPS_PER_PX;
-/// Largest difference of a bin before it is filtered, in linear light or coverage: the GPU keeps half precision.
+/// Limit of the difference of a bin before filtering, in linear light or coverage: the GPU stores half precision.
 const LIGHT_IN: f32 = 5e-4;
-/// Largest difference of a filtered bin.
+/// Limit of the difference of a filtered bin.
 const LIGHT: f32 = 2e-3;
 
 fn gpu(plan: &Plan) -> GpuBokeh {
@@ -42,7 +42,7 @@ fn same(settings: &Settings, image: &ColorImage, map: &DepthMap, field: &CocFiel
     same_but(LIGHT_IN, settings, image, map, field, what);
 }
 
-/// The same, with bins that may differ by `light_in` before they are filtered.
+/// Checks both executors, with bins that may differ by `light_in` before filtering.
 fn same_but(light_in: f32, settings: &Settings, image: &ColorImage, map: &DepthMap, field: &CocField, what: &str) {
     let mut plan = Plan::new(settings, image.width, image.height);
     let mut cpu = CpuBokeh::new(plan.clone(), Some(2));
@@ -59,7 +59,7 @@ fn same_but(light_in: f32, settings: &Settings, image: &ColorImage, map: &DepthM
         let (bin, around) = (&plan.bins[k], (plan.radius_cells(&plan.bins[k]) + 1) * CELL);
         let edges = bin.width.next_multiple_of(64) / SEGMENT + 1;
         for probe in [Probe::Bin(k), Probe::Reach(k), Probe::Blur(k)] {
-            // Where a value is, in bin pixels, what of the bin it depends on, and how far it may be off.
+            // The position of a value in bin pixels, the radius of bin pixels that it depends on, and its limit.
             let (at, around, limit): (&dyn Fn(usize) -> (usize, usize), usize, f32) = match probe {
                 Probe::Bin(_) => (&|n| (n % bin.width, n / bin.width), 0, light_in),
                 Probe::Reach(_) => (&|n| (n / 2 % edges * SEGMENT, n / 2 / edges * CELL), around, RADIUS_PX),
@@ -67,7 +67,7 @@ fn same_but(light_in: f32, settings: &Settings, image: &ColorImage, map: &DepthM
             };
             let (mut ours, mut theirs) = (cpu.probe(probe), gpu.probe(probe).expect("a probe"));
             assert_eq!(ours.len(), theirs.len(), "{what}: {probe:?}");
-            // The CPU leaves bins empty where all around is in focus.
+            // The CPU leaves bins empty where the whole neighbourhood is in focus.
             for (n, (a, b)) in ours.iter_mut().zip(&mut theirs).enumerate() {
                 if cpu.is_idle_around(at(n), around, bin.scale) {
                     (*a, *b) = ([0.0; 4], [0.0; 4]);
@@ -116,12 +116,12 @@ fn every_effect_and_quality_agrees() {
 fn near_layers_agree() {
     let (width, height) = (150, 80);
     let image = noise(width, height);
-    // Staircases towards the camera, which hide each other and the wall.
+    // Staircases towards the camera, which occlude each other and the wall.
     let near_m = [0.25, 0.36, 0.5, 0.66, 0.8, 1.0, 4.0];
     let map = depth(width, height, |x, y| near_m[((x + y / 3) / 12 % 7) as usize]);
     for quality in Quality::ALL {
         let settings = Settings { quality, near_max_px: 24.0, ..settings(CocKind::Depth) };
-        // The GPU keeps CoC to a thousandth of a pixel, and small differences of it tell what is another surface.
+        // The GPU stores CoC to a thousandth of a pixel, and small differences of CoC separate surfaces.
         same_but(5.0 * LIGHT_IN, &settings, &image, &map, &coc(CocKind::Depth, height), &format!("{quality}"));
     }
 }
@@ -150,7 +150,7 @@ fn the_comparison_methods_agree() {
     }
 }
 
-/// Beyond 16 px the radii of the filters lie evenly in each octave, and no longer in each pixel.
+/// Above 16 px the filter radii are spaced evenly per octave, no longer per pixel.
 #[test]
 #[ignore = "needs a Vulkan adapter (software will do)"]
 fn wide_radii_agree() {
@@ -177,7 +177,7 @@ fn a_range_of_focus_agrees() {
     }
 }
 
-/// Pixels that show two surfaces, some of which lie in front of the focal plane and hide others.
+/// Pixels that mix two surfaces, some of which lie in front of the focal plane and occlude others.
 #[test]
 #[ignore = "needs a Vulkan adapter (software will do)"]
 fn mixed_pixels_agree() {
@@ -198,7 +198,7 @@ fn mixed_pixels_agree() {
     let CocField::Depth(lens) = field else { panic!("asked for depth") };
     Matting::default().find(&mut map, &image, lens.inverse_depth_of_px(matting::FROM_PX));
     assert!(map.matte.pixels.len() > 100, "{} mixed pixels", map.matte.pixels.len());
-    // Behind some of what is in focus it is known what there is.
+    // The hidden background is known behind some of the in-focus pixels.
     let of_others: Vec<u32> = (0..width * height).filter(|at| at % 5 < 2 && map.metres[*at as usize] == 1.0).collect();
     for at in of_others {
         if let Err(place) = map.matte.pixels.binary_search_by_key(&at, |pixel| pixel.at) {
@@ -244,7 +244,7 @@ fn odd_inputs_agree() {
     }
 }
 
-/// Much in focus, far from all else: the CPU leaves out what nothing needs, and the result is the same.
+/// Most of the picture is in focus, far from the rest: the CPU skips the unneeded work, with an equal result.
 #[test]
 #[ignore = "needs a Vulkan adapter (software will do)"]
 fn what_the_cpu_leaves_out_makes_no_difference() {
@@ -256,7 +256,7 @@ fn what_the_cpu_leaves_out_makes_no_difference() {
     }
 }
 
-/// One executor for all levels does at each what one made for that level does, to the bit.
+/// One executor for all levels gives, at each level, the result of an executor made for that level, to the bit.
 #[test]
 #[ignore = "needs a Vulkan adapter (software will do)"]
 fn any_sequence_of_levels_agrees() {

@@ -1,4 +1,4 @@
-//! Every shader is valid, and what Rust shares with it is the same on both sides. Needs no adapter.
+//! Every shader is valid, and the structs that it shares with Rust have equal layouts. Needs no adapter.
 #![cfg(feature = "gpu")]
 #![allow(missing_docs)]
 
@@ -145,7 +145,7 @@ fn no_pass_of_the_matte_has_more_buffers_than_a_device_is_asked_for() {
     assert_eq!(matte::ALL.map(count).into_iter().max(), Some(matte::MAX_BUFFERS as usize));
 }
 
-/// A struct's name, size, and the places of its fields.
+/// A struct's name, size, and the offsets of its fields.
 type Layout = (&'static str, usize, Vec<(&'static str, usize)>);
 
 fn have_layouts<const N: usize>(shaders: &[Shader], expected: [Layout; N]) {

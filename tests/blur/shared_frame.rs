@@ -1,4 +1,4 @@
-//! What refinement has on a device, the blur takes from there.
+//! The blur reads a refined frame from the copy on the device.
 #![cfg(feature = "gpu")]
 #![allow(missing_docs)]
 
@@ -17,7 +17,7 @@ use bokehcam::link::pool::Pooled;
 use bokehcam::optics::CocKind;
 use common::{coc, codes_apart, color, noise, settings, three_depths};
 
-/// What the device works out from metres may be rounded otherwise: divisions of hardware are exact to some units only.
+/// CoC computed on the device from metres may round differently: GPU divisions are accurate to a few ULPs only.
 const CODES: u8 = 1;
 
 fn blurred(
@@ -33,8 +33,8 @@ fn blurred(
     finished.picture.memory().expect("in memory").clone()
 }
 
-/// A frame that is on the executor's device is taken from there, and one of another size or device is not: told by another
-/// picture and other depths there.
+/// The executor uses a frame on its own device, but not one of another size or device: the test puts another picture
+/// and other depths there to tell them apart.
 #[test]
 #[ignore = "needs a Vulkan adapter (software will do)"]
 fn a_frame_on_the_device_need_not_go_up() {
@@ -45,7 +45,7 @@ fn a_frame_on_the_device_need_not_go_up() {
     let given = (color(width, height, |x, y| [x as u8, 200, y as u8]), three_depths(width, height));
     let mut there = (noise(width, height), three_depths(width, height));
     there.1.metres.reverse();
-    // What has no number is infinitely far, there as well.
+    // Depths that are not positive finite numbers count as infinitely far on the device, too.
     there.1.metres[5 * width as usize..][..4].copy_from_slice(&[0.0, -1.0, f32::NAN, f32::INFINITY]);
     let mut made = |(color, map): &(ColorImage, DepthMap), on_device: Option<(&Device, (u32, u32))>| {
         let on_device = on_device.map(|(device, size)| {
@@ -79,7 +79,7 @@ fn a_refined_frame_is_given_once() {
     let mut gpu = GpuBokeh::on(&plan, Arc::clone(&device)).expect("room for the picture");
     let mut refiner = Refiner::new().on(Some(&device));
     assert!(refiner.take_copy().is_none());
-    // More frames than there are copies, all of which come home.
+    // More frames than there are copies: every copy returns to the pool.
     for frame in 0..9 {
         let color = color(width, height, |x, y| [(x * 3 + frame * 20) as u8, (y * 2) as u8, frame as u8]);
         let mut map = three_depths(width, height);

@@ -1,4 +1,4 @@
-//! Pictures in memory of somebody else's: the same blur as of the executor's own pictures.
+//! Pictures in memory of the caller: the blur equals that of the executor's own pictures.
 #![allow(missing_docs)]
 
 use crate::common;
@@ -64,7 +64,7 @@ fn given_radii_are_those_of_a_rule_over_depth() {
     }
 }
 
-/// Nothing between the two but the curve of sRGB, which for codes is a polynomial that is off by 0.004 of a code.
+/// Both differ by the sRGB curve alone, whose polynomial for codes is off by 0.004 of a code.
 #[test]
 fn linear_light_is_blurred_as_its_codes_are() {
     let (image, map) = (noise(SIZE.0, SIZE.1), three_depths(SIZE.0, SIZE.1));
@@ -98,7 +98,7 @@ fn linear_light_has_no_white_and_no_highlights_to_recover() {
     }
 }
 
-/// What was near in one picture is far in the next, and the other way round.
+/// Regions that were near in one picture are far in the next, and the reverse.
 #[test]
 fn a_picture_is_the_same_whatever_came_before() {
     let image = noise(SIZE.0, SIZE.1);

@@ -1,4 +1,4 @@
-//! The GPU executor gives cameras what they take: YUYV.
+//! The GPU executor encodes YUYV for sinks that are cameras.
 #![cfg(feature = "gpu")]
 #![allow(missing_docs)]
 
@@ -15,7 +15,7 @@ use bokehcam::optics::CocKind;
 use bokehcam::sink::yuyv;
 use common::{coc, noise, settings, three_depths};
 
-/// Where YUYV is as good, the result is that of its picture, to the bit; and the picture where it is not, or cannot be.
+/// Returns the picture encoded as YUYV, to the bit, where YUYV is allowed and possible; elsewhere the picture.
 #[test]
 #[ignore = "needs a Vulkan adapter (software will do)"]
 fn yuyv_is_the_picture_encoded() {
@@ -41,7 +41,7 @@ fn yuyv_is_the_picture_encoded() {
         if is_even {
             yuyv::Encoder::new().encode(&expected, &mut bytes);
         }
-        // Twice, and with other pictures between them.
+        // Twice, with other pictures in between.
         for _ in 0..2 {
             let mut picture = made(&mut gpu, job(Place::Memory, true));
             assert_eq!(picture.yuyv_mut().is_some(), is_even);

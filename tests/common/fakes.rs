@@ -1,4 +1,4 @@
-//! Stages that do little, and that badly when told so, or what a test says.
+//! Minimal stages, which fail or stall on request, or run a test's closure.
 #![allow(dead_code, missing_docs)]
 
 use std::collections::VecDeque;
@@ -23,7 +23,7 @@ pub const NEVER: usize = usize::MAX;
 /// Bytes of a picture that the fake blur changes.
 pub const BLURRED: usize = 12;
 
-/// What a fake stage does at one of its frames.
+/// Faults of a fake stage, and their frames.
 #[derive(Clone, Copy, Default)]
 pub struct Trouble {
     pub stall: Duration,
@@ -41,7 +41,7 @@ impl Trouble {
     pub fn panics_at(frame: usize) -> Self {
         Self { panics_at: Some(frame), ..Self::default() }
     }
-    /// Whether this frame fails.
+    /// Stalls and panics as asked; returns whether this frame fails.
     fn strikes(&self, frame: usize) -> bool {
         sleep(self.stall);
         assert!(self.panics_at != Some(frame), "out of order at frame {frame}");
@@ -49,7 +49,7 @@ impl Trouble {
     }
 }
 
-/// Frames whose every byte is the lowest of their number, and the last two bytes all of it.
+/// Frames filled with the low byte of their number; the last two bytes hold the whole number.
 pub struct FakeCamera {
     pub frames: usize,
     pub next: usize,
@@ -130,7 +130,7 @@ impl<F: FnMut(usize, Shot) -> Captured + Send> Camera for CameraBy<F> {
     }
 }
 
-/// A camera of which `next` says what comes, given how often it was asked before.
+/// Creates a camera whose results come from `next`, given the number of earlier calls.
 pub fn camera_by(info: SourceInfo, next: impl FnMut(usize, Shot) -> Captured + Send + 'static) -> Box<dyn Camera> {
     Box::new(CameraBy(info, 0, next))
 }
@@ -144,14 +144,14 @@ impl<F: FnMut(FrameInput, &mut DepthMap) -> Result<(), DepthError> + Send> Depth
     }
 }
 
-/// Depth as `read` says.
+/// Creates a depth source from a closure.
 pub fn depth_by(
     read: impl FnMut(FrameInput, &mut DepthMap) -> Result<(), DepthError> + Send + 'static,
 ) -> Box<dyn DepthSource> {
     Box::new(DepthBy(read))
 }
 
-/// Depth of 1 m plus the frame's number, with a hole.
+/// Creates a depth source that gives 1 m plus the frame's number, with a hole.
 pub fn fake_depth(trouble: Trouble) -> Box<dyn DepthSource> {
     depth_by(move |FrameInput { stamp, .. }, map| {
         let index = stamp.index;
@@ -164,7 +164,7 @@ pub fn fake_depth(trouble: Trouble) -> Box<dyn DepthSource> {
     })
 }
 
-/// Holds as many frames as it may.
+/// Holds up to `capacity` frames.
 pub struct FakeBokeh {
     pub capacity: usize,
     pub backend: Backend,
@@ -175,13 +175,13 @@ pub struct FakeBokeh {
     pub collect_fails: bool,
     pub gives_back: bool,
     pub loses_frames: bool,
-    /// Looks at each frame as it is submitted.
+    /// Called with each frame as it is submitted.
     pub looks: Box<dyn FnMut(&Job) + Send>,
-    /// Makes of a frame what comes back.
+    /// Makes the result from a frame.
     pub makes: Box<dyn FnMut(Job) -> Finished + Send>,
 }
 
-/// Adds 100 to the first bytes of a picture, and makes the first one the focus distance where there is one.
+/// Adds 100 to the first bytes of a picture, and sets the first one to the focus distance where there is one.
 pub fn fake_bokeh(capacity: usize, trouble: Trouble) -> FakeBokeh {
     FakeBokeh {
         capacity,
@@ -212,7 +212,7 @@ fn brightened(job: Job) -> Finished {
     })
 }
 
-/// The frame itself, but for what `change` changes of it.
+/// Returns the frame itself, with the changes that `change` makes.
 pub fn changed(mut job: Job, times: PassTimes, change: impl FnOnce(&mut Job)) -> Finished {
     job.out.resize(job.color.width, job.color.height);
     job.out.rgb.copy_from_slice(&job.color.rgb);
@@ -261,7 +261,7 @@ impl Bokeh for FakeBokeh {
     }
 }
 
-/// What a sink received, seen from outside.
+/// Everything that a sink received, readable by the test.
 #[derive(Clone, Default)]
 pub struct Received {
     pub pictures: Arc<Mutex<Vec<Vec<u8>>>>,
@@ -276,7 +276,7 @@ impl Received {
     pub fn numbers(&self) -> Vec<usize> {
         self.pictures.lock().unwrap().iter().map(|rgb| u16::from_le_bytes(*rgb.last_chunk().unwrap()).into()).collect()
     }
-    /// How it was finished, if it was.
+    /// Returns how the sink was finished, if it was.
     pub fn ending(&self) -> Option<Ending> {
         *self.ending.lock().unwrap()
     }
@@ -331,12 +331,12 @@ impl<F: FnMut(&ColorImage) + Send> Sink for SinkBy<F> {
     }
 }
 
-/// A sink that does this with each frame.
+/// Creates a sink that calls `put` with each frame.
 pub fn sink_by(put: impl FnMut(&ColorImage) + Send + 'static) -> Box<dyn Sink> {
     Box::new(SinkBy(true, put))
 }
 
-/// Takes frames and says that nothing becomes of them.
+/// Creates a sink that accepts frames and reports that it has no viewers.
 pub fn nobody() -> Box<dyn Sink> {
     Box::new(SinkBy(false, |_: &ColorImage| {}))
 }

@@ -1,4 +1,4 @@
-//! A session as the window has it: what it said so far, and where its frames come from.
+//! A session as the window has it: its updates so far, and the source of its frames.
 #![allow(dead_code)]
 
 use std::ops::{Deref, DerefMut};
@@ -30,14 +30,14 @@ pub struct Heard {
     pub seeker: Option<Arc<Seeker>>,
     pub told: Vec<Update>,
     pub copied: Option<String>,
-    /// The frames that stay, in other looks.
+    /// Stills in other looks.
     pub blurred: Vec<Still>,
-    /// Somebody watches while it is held.
+    /// Counts as a viewer while it is held.
     pub watch: Option<Watch>,
     pub demand: Demand,
 }
 
-/// A session, and what a test holds of its services.
+/// A session, and the test's ends of its services.
 pub struct Watched<T> {
     pub heard: Heard,
     pub services: T,
@@ -92,7 +92,7 @@ impl Heard {
         }
     }
 
-    /// Waits until something was said; what was said before it is forgotten.
+    /// Waits for an update that satisfies `is`; drops the earlier ones.
     #[track_caller]
     pub fn until(&mut self, what: &str, is: impl Fn(&Update) -> bool) -> Update {
         let began = Instant::now();
@@ -106,7 +106,7 @@ impl Heard {
         }
     }
 
-    /// Waits for a frame.
+    /// Waits for a frame that satisfies `is`.
     #[track_caller]
     pub fn frame(&mut self, what: &str, is: impl Fn(&View) -> bool) -> View {
         let began = Instant::now();

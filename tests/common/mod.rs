@@ -8,7 +8,7 @@ use bokehcam::frame::{ColorImage, DepthMap};
 use bokehcam::optics::CocKind;
 use bokehcam::optics::{CocField, DepthCoc, Ramp};
 
-/// A small generator of numbers that look random: the same everywhere.
+/// A small pseudorandom generator, reproducible on every machine.
 pub struct Numbers(pub u64);
 
 impl Numbers {
@@ -39,13 +39,13 @@ pub fn noise(width: u32, height: u32) -> ColorImage {
     color(width, height, |_, _| std::array::from_fn(|_| (numbers.next() * 256.0) as u8))
 }
 
-/// Bytes that look random, the same for the same place.
+/// Returns a pseudorandom byte that depends on the position alone.
 pub fn grain(x: u32, y: u32) -> u8 {
     let mixed = (x.wrapping_mul(0x9E37_79B9) ^ y.wrapping_mul(0x85EB_CA6B)).wrapping_mul(0xC2B2_AE35);
     (mixed ^ (mixed >> 15)).wrapping_mul(0x27D4_EB2F).to_be_bytes()[0]
 }
 
-/// Most that two pictures are apart.
+/// Returns the largest difference of two pictures, in codes.
 pub fn codes_apart(a: &ColorImage, b: &ColorImage) -> u8 {
     assert_eq!(a.size(), b.size());
     a.rgb.iter().zip(&b.rgb).map(|(a, b)| a.abs_diff(*b)).max().unwrap_or_default()
@@ -58,7 +58,7 @@ pub fn psnr_db(a: &ColorImage, b: &ColorImage) -> f64 {
     10.0 * (255.0 * 255.0 / mean.max(1e-9)).log10()
 }
 
-/// Three depths with sharp edges between them: a wall, a subject in focus, something in front of it.
+/// Returns three depths with sharp edges between them: a wall, a subject in focus, an object in front of it.
 pub fn three_depths(width: u32, height: u32) -> DepthMap {
     depth(width, height, |x, y| {
         let (u, v) = (x as f32 / width as f32, y as f32 / height as f32);

@@ -1,6 +1,6 @@
-//! Small ONNX files, written by hand: networks of a layer or two, whose output is known exactly.
+//! Small ONNX files, encoded by hand: networks of a layer or two, whose output is known exactly.
 
-/// A field of Protocol Buffers with content of a length.
+/// Encodes a length-delimited field of Protocol Buffers.
 fn field(number: u64, content: &[u8]) -> Vec<u8> {
     [varint(number << 3 | 2), varint(content.len() as u64), content.to_vec()].concat()
 }
@@ -19,7 +19,7 @@ fn varint(mut value: u64) -> Vec<u8> {
     bytes
 }
 
-/// A size of a port: a number, or one that the caller chooses.
+/// A dimension of a port: fixed, or chosen by the caller.
 #[derive(Clone, Copy)]
 pub enum Side {
     Is(u64),
@@ -72,12 +72,12 @@ pub fn always(name: &str) -> Vec<u8> {
     [number(2, 9), field(8, name.as_bytes()), field(9, &[1])].concat()
 }
 
-/// What gives `input` again after so many rounds that there is no end to them: as long as `condition` is true.
+/// Encodes a loop that returns `input` after a practically endless number of iterations, while `condition` is true.
 pub fn endless_loop(condition: &str, input: &str, output: &str) -> Vec<u8> {
     let value = |name: &str, kind: u64, shape: &[u8]| {
         [field(1, name.as_bytes()), field(2, &field(1, &[number(1, kind), shape.to_vec()].concat()))].concat()
     };
-    // The number of the round and the condition are scalars.
+    // The iteration number and the condition are scalars.
     let scalar = field(2, &[]);
     let nodes = [node("Identity", &["c"], "c2", &[]), node("Identity", &["x"], "x2", &[])];
     let all = |number: u64, parts: &[Vec<u8>]| parts.iter().flat_map(|part| field(number, part)).collect::<Vec<u8>>();
@@ -91,21 +91,22 @@ pub fn endless_loop(condition: &str, input: &str, output: &str) -> Vec<u8> {
     [node("Loop", &["", condition, input], output, &[]), field(5, &attribute)].concat()
 }
 
-/// A convolution of single pixels.
+/// Encodes a 1x1 convolution.
 pub fn conv(inputs: &[&str], output: &str) -> Vec<u8> {
     let attributes: [(&str, &[u64]); 4] =
         [("kernel_shape", &[1, 1]), ("strides", &[1, 1]), ("dilations", &[1, 1]), ("pads", &[0; 4])];
     node("Conv", inputs, output, &attributes)
 }
 
-/// A file: its inputs, constants, nodes and outputs.
+/// Encodes a file: its inputs, constants, nodes and outputs.
 pub fn model(inputs: &[Vec<u8>], constants: &[Vec<u8>], nodes: &[Vec<u8>], outputs: &[Vec<u8>]) -> Vec<u8> {
     let all = |number: u64, parts: &[Vec<u8>]| parts.iter().flat_map(|part| field(number, part)).collect::<Vec<u8>>();
     let graph = [all(1, nodes), field(2, b"test"), all(5, constants), all(11, inputs), all(12, outputs)].concat();
     [number(1, 8), field(7, &graph), field(8, &[field(1, b""), number(2, 13)].concat())].concat()
 }
 
-/// Shown a picture in planes, 0 to 1, it answers with the sigmoid of `weights` times red, green and blue, plus `bias`.
+/// Encodes a matting network: for planes of 0 to 1 it returns the sigmoid of `weights` times red, green and blue, plus
+/// `bias`.
 pub fn matte(width: u64, height: u64, weights: [f32; 3], bias: f32) -> Vec<u8> {
     let sides = |channels| [Side::Is(1), Side::Is(channels), Side::Is(height), Side::Is(width)];
     model(

@@ -1,4 +1,4 @@
-//! A square before a wall, both with a texture of dots, seen by two eyes whose pictures are rectified.
+//! A square before a wall, both textured with dots, as a rectified pair of pictures.
 
 use bokehcam::frame::{ColorImage, GrayImage};
 
@@ -14,7 +14,7 @@ fn is_near(x: usize, y: usize) -> bool {
     (50..110).contains(&x) && (30..90).contains(&y)
 }
 
-/// Within the square, and beside it, both away from its edges.
+/// Returns whether a pixel lies within the square, or beside it, away from the edges.
 pub fn is_well_inside(x: usize, y: usize) -> bool {
     (60..100).contains(&x) && (40..80).contains(&y)
 }
@@ -22,14 +22,14 @@ pub fn is_well_outside(x: usize, y: usize) -> bool {
     (115..150).contains(&x) && (10..110).contains(&y)
 }
 
-/// Dots of 2 pixels, the same wherever they are asked for.
+/// Returns a texture of 2-pixel dots that depends on the position alone.
 fn texture(x: usize, y: usize, plane: usize) -> u8 {
     let mut hash = ((x / 2) * 7919 + (y / 2) * 104_729 + plane * 1_299_709) as u64;
     hash = (hash ^ (hash >> 7)).wrapping_mul(0x9E37_79B9_7F4A_7C15);
     40 + ((hash >> 40) % 176) as u8
 }
 
-/// What the two eyes see.
+/// Returns the pictures of both cameras.
 pub fn seen() -> (ColorImage, GrayImage) {
     let mut left = ColorImage::new(SIZE.0, SIZE.1);
     let mut right = GrayImage::default();
@@ -47,7 +47,7 @@ pub fn seen() -> (ColorImage, GrayImage) {
     (left, right)
 }
 
-/// How much a part of a picture differs from the sharp one, in codes, on average.
+/// Returns the mean difference of a region from the sharp picture, in codes.
 pub fn difference(blurred: &[u8], sharp: &[u8], inside: fn(usize, usize) -> bool) -> f64 {
     let (mut sum, mut count) = (0.0, 0.0);
     for y in 0..HEIGHT {

@@ -1,4 +1,4 @@
-//! The portrait that comes with the project.
+//! The bundled portrait.
 #![allow(dead_code, missing_docs)]
 
 use std::path::PathBuf;
@@ -10,7 +10,7 @@ pub fn folder() -> PathBuf {
     PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/recordings/portrait"))
 }
 
-/// A picture, its depth and its time.
+/// Reads a picture, its depth and its time.
 pub fn frame(index: usize) -> (ColorImage, DepthMap, u64) {
     let recording = Recording::open(&folder(), &Options::default()).expect("it is bundled");
     let (mut scratch, mut color, mut map) = (Scratch::default(), ColorImage::default(), DepthMap::default());

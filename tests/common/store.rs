@@ -1,9 +1,9 @@
-//! A settings file that is none.
+//! A settings store without a file.
 
 use bokehcam::look::{Look, presets::Preset};
 use bokehcam_window::services::{SettingsStore, Switch};
 
-/// Has no presets, and takes none; a command shows what it is made of.
+/// Has no presets and saves none; a command lists its own parts.
 pub struct NoStore;
 
 impl SettingsStore for NoStore {

@@ -1,10 +1,10 @@
-//! Waiting for something, with an end against a hang.
+//! Polling with a timeout.
 #![allow(dead_code, missing_docs)]
 
 use std::thread;
 use std::time::{Duration, Instant};
 
-/// Waits until `is` gives something.
+/// Polls until `is` returns a value.
 #[track_caller]
 pub fn found<T>(what: &str, within: Duration, mut is: impl FnMut() -> Option<T>) -> T {
     let began = Instant::now();
@@ -17,7 +17,7 @@ pub fn found<T>(what: &str, within: Duration, mut is: impl FnMut() -> Option<T>)
     }
 }
 
-/// Waits until something is so; gives back for how long.
+/// Polls until a condition holds; returns how long that took.
 #[track_caller]
 pub fn until(what: &str, within: Duration, mut is: impl FnMut() -> bool) -> Duration {
     let began = Instant::now();

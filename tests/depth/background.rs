@@ -1,4 +1,4 @@
-//! What lies behind things is remembered where it was seen, and forgotten where it is not what it was.
+//! The background memory keeps a surface where it was seen, and drops it where the scene contradicts it.
 #![allow(missing_docs)]
 
 use crate::common;
@@ -20,12 +20,12 @@ const SIZE: (u32, u32) = (160, 96);
 const PERIOD_NS: u64 = 33_333_333;
 const LENS: DepthCoc = DepthCoc { coc_at_infinity_px: 10.0, focus_m: 1.0, range_m: 0.0, max_coc_px: 20.0 };
 const PERSON: [u8; 3] = [200, 90, 60];
-/// The person's columns, and where they stand after a step to the right.
+/// Width of the person in columns, and the step to the right that they take.
 const WIDE: u32 = 50;
 const STEP: u32 = 20;
 
-/// A person before a wall that is `brightness` times as bright as at first, both `shift` columns further right; and, behind the
-/// person, a thing.
+/// A person before a wall that is `brightness` times its first brightness, both `shift` columns further right; and,
+/// behind the person, an object.
 struct Shot {
     person: u32,
     shift: u32,
@@ -33,7 +33,7 @@ struct Shot {
     thing: Option<Thing>,
 }
 
-/// Something green, from the row [`THING_ROW`] down.
+/// A green object, from the row [`THING_ROW`] down.
 struct Thing {
     columns: Range<u32>,
     metres: f32,
@@ -47,11 +47,11 @@ impl Shot {
         static GRAIN: LazyLock<ColorImage> = LazyLock::new(|| noise(SIZE.0, SIZE.1));
         let (x, y) = ((x + SIZE.0 - self.shift) % SIZE.0 / 4 * 4, y / 4 * 4);
         let code = GRAIN.rgb[3 * (y * SIZE.0 + x) as usize];
-        // Exposure is a factor of the light: of the root of it here, nearly that of the codes.
+        // Exposure scales light, which is about its square root in codes.
         [60 + code / 3, 80 + code / 4, 100 + code / 5].map(|code| (f32::from(code) * self.brightness) as u8)
     }
 
-    /// How far the thing is, where there is one.
+    /// Returns the depth of the object at a pixel, if it is there.
     fn thing_m(&self, x: u32, y: u32) -> Option<f32> {
         self.thing.as_ref().filter(|thing| y >= THING_ROW && thing.columns.contains(&x)).map(|thing| thing.metres)
     }
@@ -85,7 +85,7 @@ impl Seer {
         Self { background: Background::default(), time_ns: 0 }
     }
 
-    /// Sees a shot for some frames; the last one's map, with what is behind.
+    /// Passes a shot for some frames; returns the last map, with the known background.
     fn see(&mut self, shot: &Shot, frames: usize) -> DepthMap {
         let (picture, map) = shot.taken();
         let mut last = map.clone();
@@ -101,7 +101,7 @@ impl Seer {
     }
 }
 
-/// How far the light behind is off that of a shot's wall, over the mean pixel of those that have one; and how many do.
+/// Returns the mean error of the known background against the wall of a shot, and the number of pixels that have one.
 fn off(map: &DepthMap, shot: &Shot) -> (f32, usize) {
     let (picture, _) = shot.taken();
     let (mut sum, count) = (0.0, map.matte.pixels.len());
@@ -126,7 +126,7 @@ fn what_a_step_covers_is_known_and_nothing_else_is() {
     let after = Shot { person: BEFORE.person + STEP, ..BEFORE };
     let (off, count) = off(&seer.see(&after, 1), &after);
     assert!(off < 0.004, "{off}");
-    // All that was the wall, but for what is close to the outline of then.
+    // Everything that was seen as wall, but for a margin at the earlier outline.
     let covered = (STEP * (SIZE.1 - 20)) as usize;
     assert!(count <= covered && count * 5 >= covered * 4, "{count} of {covered}");
 }
@@ -140,7 +140,7 @@ fn another_exposure_makes_what_is_hidden_another_one_too() {
     assert!(off < 0.015 && count > 1000, "{off}, {count}");
 }
 
-/// How many pixels of the person have something known behind them, above the rows that a thing is close to and where it is.
+/// Counts the person's pixels with a known background, above the rows of the object and in them.
 fn known_above_and_beside(map: &DepthMap, columns: Range<u32>) -> [usize; 2] {
     let count = |rows: Range<u32>| {
         let is_within = |at: u32| rows.contains(&(at / SIZE.0)) && columns.contains(&(at % SIZE.0));
@@ -156,7 +156,7 @@ fn behind_who_steps_before_a_thing_is_not_the_wall_that_it_hides() {
     let thing = || Some(Thing { columns: 120..150, metres: 2.0 });
     let hidden = seer.see(&Shot { thing: thing(), ..BEFORE }, 12);
     assert!(known_above_and_beside(&hidden, 120..150)[1] > 800, "the wall is behind the thing");
-    // At once, in the first frame; and the wall does not show where the thing goes on, either.
+    // Dropped in the first frame already; and the wall does not show where the object continues, either.
     let after = seer.see(&Shot { person: 90, thing: thing(), ..BEFORE }, 1);
     let [above, beside] = known_above_and_beside(&after, 120..140);
     assert!(above > 150 && beside == 0, "{above} pixels before the wall, and {beside} before the thing");
@@ -171,7 +171,7 @@ fn what_is_seen_beside_somebody_tells_of_what_is_behind_them() {
         let before = Shot { person: BEFORE.person + STEP, ..BEFORE };
         let [above, beside] = known_above_and_beside(&seer.see(&before, 4), 90..110);
         assert!(above > 150 && beside > 400, "{above}, {beside}");
-        // Half of the thing is behind the person: where it is, the wall is not, or looks otherwise.
+        // Half of the object is behind the person: there the wall is hidden, or looks different.
         let after = Shot { thing: Some(Thing { columns: 100..150, metres }), ..before };
         let [above, beside] = known_above_and_beside(&seer.see(&after, 8), 94..110);
         assert!(above > 100 && beside == 0, "{metres} m: {above} pixels before the wall, {beside} before the thing");
@@ -184,7 +184,7 @@ fn a_camera_that_moves_remembers_nothing() {
     seer.see(&BEFORE, 40);
     let after = Shot { person: BEFORE.person + STEP, shift: 4, ..BEFORE };
     assert!(seer.see(&after, 4).matte.pixels.is_empty());
-    // It stands again, and what it sees now is learned.
+    // The camera is still again, and learns the new view.
     seer.see(&after, 60);
     let back = Shot { person: after.person + STEP, ..after };
     let (off, count) = off(&seer.see(&back, 1), &back);
@@ -203,7 +203,7 @@ fn what_was_seen_shortly_and_is_hidden_for_long_fades() {
 fn another_place_or_size_is_begun_anew() {
     let mut seer = Seer::new();
     seer.see(&BEFORE, 40);
-    // A cut in a recording: time goes back.
+    // A cut in a recording: time jumps back.
     seer.time_ns = 0;
     let after = Shot { person: BEFORE.person + STEP, ..BEFORE };
     assert!(seer.see(&after, 2).matte.pixels.is_empty());
@@ -218,7 +218,7 @@ fn another_place_or_size_is_begun_anew() {
     assert!(map.matte.pixels.is_empty(), "a map of another size");
 }
 
-/// The outlines of such depth are slopes: what is behind them cannot be told from what is in front.
+/// Smooth depth has slopes for outlines: there the background cannot be separated from the foreground.
 #[test]
 fn of_smooth_depth_nothing_is_remembered() {
     let (focus, lens) = (FocusRule::Metres(1.0), CocAtInfinity::Px(10.0));

@@ -1,4 +1,4 @@
-//! Calibrations: their files, the geometry of rectified pairs, and the pictures.
+//! Calibrations: their files, the geometry of rectified pairs, and resampled pictures.
 #![allow(missing_docs)]
 
 mod files;
@@ -14,7 +14,8 @@ const RADTAN: Distortion = Distortion::RadialTangential([-0.28, 0.074, 0.0002, -
 const FISHEYE: Distortion = Distortion::Equidistant([0.0034, 0.0007, -0.0020, 0.0002]);
 const NONE: Distortion = Distortion::RadialTangential([0.0; 8]);
 
-/// Eyes 11 cm apart of one focal length, not quite alike, the right one turned by `turn_deg` about x, y and z.
+/// Creates cameras 11 cm apart with slightly different focal lengths, the right one turned by `turn_deg` about x, y and
+/// z.
 fn rig(distortion: Distortion, focal_px: f64, turn_deg: [f64; 3]) -> StereoCalibration {
     let eye = |dx: f64, scale: f64| Eye {
         size: Some(SIZE),
@@ -32,7 +33,7 @@ fn rig(distortion: Distortion, focal_px: f64, turn_deg: [f64; 3]) -> StereoCalib
     }
 }
 
-/// Rigs of all kinds.
+/// Returns rigs of all kinds.
 fn rigs() -> Vec<StereoCalibration> {
     vec![
         rig(RADTAN, 460.0, [0.0; 3]),

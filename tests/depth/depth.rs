@@ -1,4 +1,4 @@
-//! Holes in depth maps, and where the lens is focused.
+//! Holes in depth maps, and the focus distance.
 
 use bokehcam::depth::fill::Filler;
 use bokehcam::depth::focus::{Focus, FocusRule};
@@ -9,7 +9,7 @@ const WALL_M: f32 = 3.0;
 const PERSON_M: f32 = 1.2;
 const MS: u64 = 1_000_000;
 
-/// A map from a rule on its columns and rows.
+/// Creates a map from a function of column and row.
 fn map(width: u32, height: u32, depth_m: impl Fn(u32, u32) -> f32) -> DepthMap {
     let mut map = DepthMap::new(width, height);
     for y in 0..height {
@@ -20,7 +20,7 @@ fn map(width: u32, height: u32, depth_m: impl Fn(u32, u32) -> f32) -> DepthMap {
     map
 }
 
-/// A person of 40 x 60 pixels before a wall, in a picture of 120 x 90, at `person_m`.
+/// Returns a person of 40 x 60 pixels before a wall, in a picture of 120 x 90, at `person_m`.
 fn portrait(person_m: f32) -> DepthMap {
     map(120, 90, |x, y| if (40..80).contains(&x) && y >= 30 { person_m } else { WALL_M })
 }
@@ -37,7 +37,7 @@ fn a_depth_shadow_becomes_wall_and_a_hole_in_the_person_stays_person() {
         for x in 0..120 {
             let shadow = (80..95).contains(&x) && y >= 30;
             let button = (55..60).contains(&x) && (50..55).contains(&y);
-            // Unknown has many spellings.
+            // Unknown depth has several encodings.
             if shadow || button {
                 holed.metres[(y * 120 + x) as usize] = [0.0, f32::NAN, -1.0, f32::INFINITY][(x % 4) as usize];
             }
@@ -95,7 +95,7 @@ fn auto_focus_finds_the_nearest_large_subject() {
     assert!((focus(&portrait(PERSON_M)) / PERSON_M - 1.0).abs() < 0.02);
     assert!((focus(&map(120, 90, |_, _| WALL_M)) / WALL_M - 1.0).abs() < 0.02, "with nobody there, the wall");
 
-    // A twig at the border, near but small, is not meant.
+    // A twig at the border, near but small, is not the subject.
     let twig = map(120, 90, |x, y| if x < 8 && y > 40 { 0.5 } else { at(&portrait(PERSON_M), x, y) });
     assert!((focus(&twig) / PERSON_M - 1.0).abs() < 0.02);
 
@@ -119,7 +119,7 @@ fn point_focus_is_robust_and_looks_around_in_holes() {
     assert_eq!(focus(0.1, 0.1, &noisy), WALL_M);
     let hole = map(120, 90, |x, y| if x.abs_diff(60) < 10 && y.abs_diff(60) < 10 { 0.0 } else { at(&noisy, x, y) });
     assert_eq!(focus(0.5, 60.0 / 90.0, &hole), PERSON_M);
-    // The very corners, and beyond them.
+    // The very corners, and positions outside.
     for (x, y) in [(0.0, 0.0), (1.0, 1.0), (-3.0, 9.0), (f32::NAN, f32::INFINITY)] {
         assert_eq!(focus(x, y, &portrait(PERSON_M)), WALL_M);
     }
@@ -140,12 +140,12 @@ fn the_focus_moves_like_a_lens() {
     assert_eq!(focus.focus_m(&portrait(1.0), 25 * MS), first_m);
     assert_eq!(focus.focus_m(&portrait(1.0), 50 * MS), first_m);
 
-    // The person steps back, and that is no slip of a single map: a smooth, monotonic way, 63 % of it (in dioptres) within a
-    // quarter of a second.
+    // The person steps back, and more than one map says so: focus moves smoothly and monotonically, 63 % of the way (in
+    // dioptres) within a quarter of a second.
     let far = |frame: u64| (portrait(2.0), (2 + frame) * 25 * MS);
     let sets_out = (1..).find(|&frame| focus.focus_m(&far(frame).0, far(frame).1) > first_m).unwrap();
     assert!((3..=17).contains(&sets_out), "{sets_out} frames");
-    // It has passed the first of its frames then.
+    // By then the focus has passed the first frame of its way.
     let mut way_m = vec![first_m];
     way_m.extend((sets_out..sets_out + 60).map(|frame| focus.focus_m(&far(frame).0, far(frame).1)));
     assert!(way_m.is_sorted(), "no overshoot");
@@ -153,14 +153,14 @@ fn the_focus_moves_like_a_lens() {
     assert!((covered(way_m[10]) - 0.632).abs() < 0.03, "after 250 ms: {}", covered(way_m[10]));
     assert!((way_m[60] - 2.0).abs() < 0.04);
 
-    // Breathing does not move it at all.
+    // Movements as small as breathing do not move the focus at all.
     let rest_m = way_m[60];
     for (frame, person_m) in [(61, 1.98), (62, 2.02), (63, 1.99)] {
         assert_eq!(focus.focus_m(&portrait(person_m), (20 + frame) * 25 * MS), rest_m);
     }
     // Nor does a frame without depth.
     assert_eq!(focus.focus_m(&DepthMap::new(120, 90), 84 * 25 * MS), rest_m);
-    // Many small steps of time give the same way as few large ones.
+    // Many small time steps give the same movement as few large ones.
     let settle = |step_ms: u64| {
         let mut focus = Focus::new(FocusRule::Metres(1.0));
         focus.focus_m(&portrait(1.0), 0);
@@ -176,7 +176,7 @@ fn nothing_to_focus_on_gives_a_usable_distance() {
     assert!(focus_m > 0.0 && focus_m.is_finite());
 }
 
-/// Numbers that are no distances, among those that are, end in no number that is none.
+/// Values that are not valid distances, among valid ones, never produce an invalid result.
 #[test]
 fn depths_of_no_scene_are_unknown() {
     let odd = [1e-38, 1e-45, f32::MIN_POSITIVE, 9e-7, 3e38, f32::MAX, 2e12, f32::NAN, f32::INFINITY, -0.0];

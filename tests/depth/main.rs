@@ -1,4 +1,4 @@
-//! What depth and its mattes promise, on the processor and on a GPU.
+//! Properties of depth and mattes, on the CPU and on a GPU.
 #![allow(missing_docs)]
 
 #[path = "../common/mod.rs"]

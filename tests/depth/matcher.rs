@@ -1,4 +1,4 @@
-//! The stereo matcher: laws on made pairs, and what it reaches on pairs with truth.
+//! The stereo matcher: laws on synthetic pairs, and its accuracy on pairs with ground truth.
 
 use std::path::{Path, PathBuf};
 
@@ -9,7 +9,7 @@ use bokehcam::recording::still::{read_color, read_disparity};
 
 const EFFORTS: [Effort; 2] = [Effort::Fast, Effort::Full];
 
-/// Numbers that look random, 0 to 255.
+/// Pseudorandom numbers, 0 to 255.
 struct Noise(u32);
 
 impl Noise {
@@ -19,7 +19,8 @@ impl Noise {
     }
 }
 
-/// A texture of blots of two pixels, of which the left eye sees column `x` and the right one column `x + disparity`.
+/// Creates a texture of blots of two pixels, whose column `x` of the left picture is column `x + disparity` of the
+/// right one.
 fn pair((width, height): (u32, u32), disparity: impl Fn(usize, usize) -> usize) -> [GrayImage; 2] {
     let (columns, rows) = (width as usize, height as usize);
     let stride = columns + 256;
@@ -47,7 +48,7 @@ fn matched([left, right]: &[GrayImage; 2], disparities: u32, effort: Effort, thr
     map
 }
 
-/// Percent of the pixels with a truth whose answer is off by more than 2 px.
+/// Returns the percentage of pixels with ground truth whose disparity is off by more than 2 px.
 fn bad_2(map: &DisparityMap, truth: &DisparityMap) -> f32 {
     assert_eq!(map.size(), truth.size());
     let known: Vec<_> = map.px.iter().zip(&truth.px).filter(|(_, t)| t.is_finite() && **t > 0.0).collect();
@@ -62,7 +63,7 @@ fn a_shifted_texture_has_its_shift() {
         for effort in EFFORTS {
             let map = matched(&pair, disparities, effort, 2);
             let off = map.px.iter().map(|d| (d - shift as f32).abs());
-            // Blots of two pixels are as coarse as that.
+            // At lower effort, blots of two pixels are at the limit of the resolution.
             let most = if effort == Effort::Full { 0.3 } else { 1.1 };
             let wrong = off.filter(|&off| off > most).count();
             assert!(wrong * 50 < map.px.len(), "{shift} of {disparities}, {effort:?}: {wrong} of {}", map.px.len());
@@ -72,7 +73,7 @@ fn a_shifted_texture_has_its_shift() {
 
 #[test]
 fn something_near_stands_out_with_its_outline() {
-    // What is right of it in the right picture hides its surroundings: the square is at columns 160 to 240.
+    // The square's right image hides its surroundings there: it is at columns 160 to 240.
     let pair = pair((360, 120), |x, y| if (130..210).contains(&x) && (30..90).contains(&y) { 30 } else { 8 });
     let map = matched(&pair, 64, Effort::Full, 2);
     let at = |x: usize, y: usize| map.px[y * 360 + x];
@@ -81,7 +82,7 @@ fn something_near_stands_out_with_its_outline() {
     {
         assert!((at(x, y) - expected).abs() < 0.2, "{x},{y}: {}", at(x, y));
     }
-    // The gap left of it is filled from behind.
+    // The gap to its left is filled from the background.
     assert!((at(148, 60) - 8.0).abs() < 0.5, "{}", at(148, 60));
 }
 
@@ -89,7 +90,7 @@ fn something_near_stands_out_with_its_outline() {
 fn the_exposure_of_an_eye_does_not_matter() {
     let mut pair = pair((200, 50), |x, _| 4 + x / 40);
     let before = matched(&pair, 32, Effort::Full, 1);
-    // Darker, and with less contrast.
+    // The right picture is darker and has less contrast.
     pair[1].luma.iter_mut().for_each(|luma| *luma = 10 + *luma / 2);
     let mut coarse = pair.clone();
     coarse[0].luma.iter_mut().for_each(|luma| *luma &= !1);
@@ -131,7 +132,7 @@ fn a_blank_pair_is_answered_alike_everywhere() {
 #[test]
 fn what_rests_is_steady_and_what_moves_is_new() {
     let (width, height) = (240, 80);
-    // Texture weaker than the noise: the disparity is anybody's guess, and shall be one guess.
+    // The texture is weaker than the noise, so the disparity is ambiguous; with memory it shall not flicker.
     let noisy = |seed: u32, near: usize| {
         let mut pair = pair((width, height), |x, _| if (100..160).contains(&x) { near } else { 6 });
         let mut noise = Noise(seed);
@@ -159,7 +160,7 @@ fn what_rests_is_steady_and_what_moves_is_new() {
     let (with, without) = (changes(true), changes(false));
     assert!(with < 0.7 * without, "{with} against {without}");
 
-    // What comes nearer is not held back.
+    // A surface that comes nearer is followed without lag.
     let mut matcher = matcher((width, height), 32, Effort::Full, 1);
     let mut map = DisparityMap::default();
     for (seed, near) in [(1, 12), (2, 12), (3, 24)] {

@@ -1,8 +1,9 @@
 //! The GPU finds the mixed pixels that the CPU finds.
 //!
-//! The law: of what either finds, all but one in 200 are mixed on both, between the same surfaces, with shares within 0.001 and colours
-//! within 0.01 (of a picture with few, one in 40). The others are near a limit where rounding decides, and so may a blob be that was
-//! traced there, or were traced from another pixel. On a device the matte of a picture is always the same, to the bit.
+//! The law: of the mixed pixels that either finds, all but one in 200 are mixed on both, between the same surfaces,
+//! with alphas within 0.001 and colours within 0.01 (one in 40 for a picture with few). The others are near a limit
+//! where rounding decides, and so may a blob be that was traced there, or was traced from another pixel. On one device
+//! the matte of a picture is always the same, to the bit.
 #![cfg(feature = "gpu")]
 #![allow(missing_docs)]
 
@@ -31,8 +32,8 @@ const ONE_IN_OF_FEW: usize = 40;
 
 type Frame = (ColorImage, DepthMap);
 
-/// Somebody with a soft outline, and hair of which the map has some, who moves before a slanted wall and beside a pole. The depth has
-/// `noise`, as a share of it, and is unknown here and there.
+/// Returns a moving person with a soft outline, and with hair that the map has in part, before a slanted wall and
+/// beside a pole. The depth has relative noise of `noise`, and is unknown here and there.
 fn scene(size: (u32, u32), frame: usize, noise: f32) -> Frame {
     const HAIRS: usize = 24;
     let (width, height) = (size.0 as f32, size.1 as f32);
@@ -51,7 +52,7 @@ fn scene(size: (u32, u32), frame: usize, noise: f32) -> Frame {
             if (0.0..*length).contains(&along) { 0.6 * (1.0 - beside).max(0.0) } else { 0.0 }
         });
         let hair = hair.fold(0.0, f32::max);
-        // Something far that looks like hair, but is wide.
+        // A far patch of a hair's colour, but wide.
         let is_patch = dx > 0.0 && (dy + 0.3 * radius).abs() < 5.0 && off < 0.6 * radius && chance(k, 41) > 0.15;
         let share = (0.5 - 0.7 * off).clamp(if is_patch { 0.4 } else { hair }, 1.0);
         let is_pole = (x as f32 - 0.85 * width).abs() < 2.2;
@@ -99,7 +100,7 @@ fn assert_same(made: &DepthMap, expected: &DepthMap, one_in: usize, name: &str) 
     assert!(off * one_in <= all, "{name}: {off} of {all} are off, {} on one of both", all - both);
 }
 
-/// The law holds of all these frames, one after the other. Returns how many mixed pixels there are.
+/// Checks the law on all these frames, one after the other. Returns the number of mixed pixels.
 fn same(device: &Arc<Device>, name: &str, one_in: usize, frames: &[Frame]) -> usize {
     let (mut cpu, mut gpu) = (Matting::default(), Matting::default().on(Some(device)));
     let mut all = 0;
@@ -172,7 +173,7 @@ fn what_is_known_behind_counts_as_on_the_processor() {
     for (k, size) in [(160, 120), (160, 120), (161, 77), (161, 77), (161, 77)].into_iter().enumerate() {
         let frame = scene(size, k, 0.01);
         let pixels = frame.1.metres.len();
-        // The wall, as far as chance has let it be seen; the camera exposes otherwise now.
+        // The wall, as far as it was randomly seen; the camera's exposure has changed since.
         let rgb: Vec<_> = (0..3 * pixels).map(|n| (165.0 + 20.0 * chance(n, k)) as u8).collect();
         let inverse: Vec<_> = (0..pixels).map(|n| 0.29 + 0.4 * (chance(n, 8) - 0.5).max(0.0)).collect();
         let rounds: Vec<_> = (0..pixels).map(|n| (4.0 * chance(n / 5, 9)) as u8).collect();
@@ -212,7 +213,7 @@ fn what_is_remembered_of_a_sequence_counts_as_on_the_processor() {
     let (mut background, lens) = (Background::default(), lens(size));
     let mut known = 0;
     for k in 0..60 {
-        // Who does not stand still uncovers something.
+        // A moving person uncovers background.
         let (color, map) = scene(size, k / 2, 0.0);
         let [mut expected, mut made] = [map.clone(), map];
         background.find_matte(&mut cpu, &mut workers, (&mut expected, &color), &lens);
@@ -265,7 +266,7 @@ fn a_map_that_was_refined_there_need_not_go_up() {
     for (k, size) in [(160, 120), (160, 120), (91, 63), (160, 120)].into_iter().enumerate() {
         let (color, mut map) = scene(size, 4 * k, 0.01);
         if k == 3 {
-            // Nothing is refined of it.
+            // The refiner has nothing to refine.
             refiner.forget();
             map.metres.fill(0.0);
         }
@@ -274,7 +275,7 @@ fn a_map_that_was_refined_there_need_not_go_up() {
         let frame = (color, map);
         matting.take_from(refiner.on_device());
         let of_device = matted(&mut matting, &frame, None).matte;
-        // Once only: this one goes up.
+        // The device copy can be used once only: this frame is uploaded.
         let of_memory = matted(&mut matting, &frame, None).matte;
         assert!(of_device == of_memory && (of_device.pixels.len() > 300) == (k < 3), "frame {k}");
         let unknown = (frame.0.clone(), DepthMap::new(size.0, size.1));
@@ -305,7 +306,7 @@ fn a_device_that_is_gone_is_followed_by_the_processor() {
     }
 }
 
-/// Prints the times, of frames of any size: `BOKEHCAM_SIZE=1280x720 cargo test --release --test depth -- --ignored
+/// Prints the pass times, of frames of any size: `BOKEHCAM_SIZE=1280x720 cargo test --release --test depth -- --ignored
 /// --nocapture matte_gpu::the_passes`.
 #[test]
 #[ignore = "needs a Vulkan adapter (software will do)"]

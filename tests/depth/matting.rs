@@ -1,4 +1,4 @@
-//! Mixed pixels: they are found where outlines are soft, and each of their two surfaces is blurred as what it is.
+//! Mixed pixels are found where outlines are soft, and each of their two surfaces is blurred by its own CoC.
 #![allow(missing_docs)]
 
 use crate::common;
@@ -15,7 +15,7 @@ use common::{Numbers, coc, codes_apart, color, depth, noise, settings, three_dep
 const SIZE: (u32, u32) = (96, 80);
 const NEAR_M: f32 = 1.0;
 const FAR_M: f32 = 5.0;
-/// Half a pixel of CoC under the lens of the tests.
+/// Half a pixel of CoC under the lens of these tests, in 1/m.
 const JUMP: f32 = 0.05;
 
 type Light = [f32; 3];
@@ -28,7 +28,7 @@ fn codes(light: Light) -> [u8; 3] {
     light.map(|light| (linear_to_srgb(light) * 255.0).round() as u8)
 }
 
-/// How much of a pixel lies inside an outline.
+/// Returns the fraction of a pixel inside an outline.
 fn coverage(x: u32, y: u32, inside: impl Fn(f32, f32) -> bool) -> f32 {
     const SAMPLES: u32 = 16;
     let at = |pixel: u32, k: u32| pixel as f32 + (k as f32 + 0.5) / SAMPLES as f32;
@@ -40,7 +40,7 @@ fn disc(x: f32, y: f32) -> bool {
     (x - 44.3).hypot(y - 38.6) < 21.7
 }
 
-/// Both surfaces in every pixel as far as they cover it, and the depth at the middle of each pixel.
+/// Mixes both surfaces in every pixel by coverage; the depth is that of each pixel's centre.
 fn scene(near: impl Fn(u32, u32) -> Light, far: impl Fn(u32, u32) -> Light) -> (ColorImage, DepthMap) {
     let picture = color(SIZE.0, SIZE.1, |x, y| {
         let (share, near, far) = (coverage(x, y, disc), near(x, y), far(x, y));
@@ -68,7 +68,7 @@ fn shares_and_colours_of_a_soft_outline_are_found() {
             let near = own[p] + (1.0 - pixel.alpha) * pixel.difference[p];
             let far = own[p] - pixel.alpha * pixel.difference[p];
             assert!((pixel.alpha * near + (1.0 - pixel.alpha) * far - own[p]).abs() < 1e-5, "both add up to the pixel");
-            // A share of little tells little of the surface's colour.
+            // A small alpha determines the surface's colour poorly.
             let tolerance = 0.01 / pixel.alpha;
             assert!(
                 (near - light(RED)[p]).abs() < 0.06 + tolerance
@@ -114,7 +114,7 @@ fn hair_is_followed_where_the_depth_map_has_none_of_it() {
     let (near, far) = (light(RED), light(BLUE));
     let picture = color(SIZE.0, SIZE.1, |x, y| {
         let share = if body(x) { 1.0 } else { f32::from(u8::from(hair(x, y))) / 3.0 };
-        // An outline that is soft elsewhere: hard masks have no hair.
+        // The outline is soft elsewhere: hard masks have no hair.
         let share = if x == 60 && y > 30 { 0.5 } else { share };
         codes(std::array::from_fn(|p| share * near[p] + (1.0 - share) * far[p]))
     });
@@ -131,7 +131,7 @@ fn hair_is_followed_where_the_depth_map_has_none_of_it() {
     assert!(beside.clone().all(|pixel| pixel.alpha < 0.1), "the wall beside a hair is no hair");
 }
 
-/// A bar on the wall has the colour of a hair's pixels, and goes on from the outline.
+/// A bar on the wall has the colour of a hair's pixels, and continues from the outline.
 #[test]
 fn what_is_wider_than_hair_and_far_is_none() {
     let bar = |x: u32, y: u32| (40..45).contains(&y) && (60..84).contains(&x);
@@ -203,8 +203,8 @@ fn blur(map: &DepthMap, picture: &ColorImage, field: &CocField, quality: Quality
     out
 }
 
-/// The outline of a subject in focus before a wall that changes from row to row: by the thin lens each pixel is the subject
-/// as far as that covers it, and for the rest the blurred wall.
+/// A subject in focus before a wall that changes from row to row: by the thin-lens model each pixel is the subject,
+/// weighted by its coverage, over the blurred wall.
 #[test]
 fn the_blurred_background_shows_through_a_soft_outline() {
     let wall = |_: u32, y: u32| light(if (y / 4).is_multiple_of(2) { [240, 220, 160] } else { [10, 30, 70] });
@@ -242,7 +242,7 @@ fn the_blurred_background_shows_through_a_soft_outline() {
     }
 }
 
-/// A light on the wall that a subject in focus hides: through a lens its disc is seen beside the subject, all the same.
+/// A light on the wall behind an in-focus subject: through a lens, its disc is still seen beside the subject.
 #[test]
 fn what_is_known_to_be_behind_a_subject_shows_beside_it() {
     let wall =
@@ -275,7 +275,7 @@ fn what_is_known_to_be_behind_a_subject_shows_beside_it() {
     }
 }
 
-/// However close behind: bins that take both surfaces of a pixel show the nearer one.
+/// However close the surface behind is: bins that hold both surfaces of a pixel show the nearer one.
 #[test]
 fn what_is_hidden_everywhere_is_never_seen() {
     let picture = color(SIZE.0, SIZE.1, |_, _| RED);
@@ -309,7 +309,7 @@ fn in_focus_a_mixed_pixel_is_the_pixel() {
     assert!(codes_apart(&before, &after) <= 1);
 }
 
-/// Any two surfaces that add up to a pixel.
+/// Returns two random surfaces that add up to a pixel.
 fn mixed(picture: &ColorImage, at: u32, numbers: &mut Numbers) -> MixedPixel {
     let share = 0.05 + 0.9 * numbers.next();
     let own = light(std::array::from_fn(|p| picture.rgb[3 * at as usize + p]));

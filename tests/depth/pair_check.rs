@@ -1,4 +1,4 @@
-//! Whether a pair is rectified, on pictures made for it and on real ones.
+//! The check whether a pair is rectified, on synthetic and on real pictures.
 #![allow(missing_docs)]
 
 use std::path::PathBuf;
@@ -10,7 +10,7 @@ use bokehcam::frame::GrayImage;
 
 const SIZE: (u32, u32) = (320, 240);
 
-/// Smooth noise that is the same at the same place.
+/// Returns smooth noise that depends on the position alone.
 fn texture(x: f32, y: f32) -> f32 {
     let corner = |x: i32, y: i32| {
         let mut bits = (x as u32).wrapping_mul(0x9E37_79B9) ^ (y as u32).wrapping_mul(0x85EB_CA6B);
@@ -31,7 +31,7 @@ fn texture(x: f32, y: f32) -> f32 {
     0.6 * octave(x / 5.0, y / 5.0) + 0.4 * octave(x / 17.0, y / 13.0)
 }
 
-/// A picture whose pixel (x, y) shows the texture at `place(x, y)`.
+/// Creates a picture whose pixel (x, y) shows the texture at `place(x, y)`.
 fn picture(place: impl Fn(f32, f32) -> (f32, f32)) -> GrayImage {
     let (width, height) = SIZE;
     let pixels = (0..width * height).map(|k| ((k % width) as f32, (k / width) as f32));
@@ -39,7 +39,8 @@ fn picture(place: impl Fn(f32, f32) -> (f32, f32)) -> GrayImage {
     GrayImage { width, height, luma }
 }
 
-/// Of the upper half the disparity is `near_px`, below 3 pixels less; the right picture's rows are `down_px` lower.
+/// Creates a pair with a disparity of `near_px` in the upper half and 3 pixels less below; the right picture is lower
+/// by `down_px`.
 fn pair(near_px: f32, down_px: f32) -> [GrayImage; 2] {
     let disparity_px = move |y: f32| if y < 120.0 { near_px } else { near_px - 3.0 };
     [picture(|x, y| (x, y)), picture(move |x, y| (x + disparity_px(y - down_px), y - down_px))]
@@ -96,7 +97,7 @@ fn brightness_does_not_matter() {
 #[test]
 fn where_nothing_is_nothing_is_said() {
     let flat = GrayImage { width: 320, height: 240, luma: vec![90; 320 * 240] };
-    // Stripes look the same everywhere along the rows, and every eighth pixel.
+    // Stripes look the same everywhere along the rows, and repeat every eight pixels.
     let stripes = picture(|x, _| (if x as u32 % 8 < 4 { 0.0 } else { 40.0 }, 0.0));
     let other = picture(|x, y| (y + 3000.0, x + 5000.0));
     let left = picture(|x, y| (x, y));
@@ -158,7 +159,7 @@ fn real_pairs() {
     }
 }
 
-/// The check of a pair after rectification.
+/// Checks a pair after rectification.
 fn rectified(calibration: &StereoCalibration, pair: [GrayImage; 2]) -> PairCheck {
     let rectifier = Rectifier::new(calibration, pair[0].size()).unwrap();
     let mut into = [GrayImage::default(), GrayImage::default()];

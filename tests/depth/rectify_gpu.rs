@@ -1,4 +1,4 @@
-//! The GPU rectifies pairs as the CPU does, to the bit.
+//! The GPU rectifies pairs like the CPU, to the bit.
 #![cfg(feature = "gpu")]
 #![allow(missing_docs)]
 
@@ -17,7 +17,8 @@ use bokehcam::frame::{ColorImage, DepthMap, GrayImage, Stamp};
 use common::Numbers;
 use glam::{DMat3, DVec2, DVec3};
 
-/// Eyes that stand askew and bend pictures, and are wanted to see more than they do, so that corners see nothing.
+/// Creates misaligned cameras with lens distortion, whose rectified window exceeds the field of view, so that its
+/// corners have no source.
 fn rectifier(size: (u32, u32)) -> Rectifier {
     let [width, height] = [size.0, size.1].map(f64::from);
     let eye = |shift: f64| Eye {
@@ -63,7 +64,7 @@ fn both_eyes_are_the_same_to_the_bit() {
             assert!(made_left == left && made_right == right, "{size:?}, frame {frame}");
         }
     }
-    // What sees nothing was among them.
+    // Pixels without a source were among them.
     let askew = rectifier((64, 48));
     let sees_nothing = |k: u32| askew.maps().iter().any(|map| map.source_px(k % 64, k / 64).is_none());
     assert!((0..64 * 48).any(sees_nothing));
@@ -95,7 +96,7 @@ fn a_source_goes_on_when_the_device_is_gone() {
             (color, map)
         });
         let [cpu, gpu] = found;
-        // Nothing is likely after the fault, as the last map was on the device.
+        // After the fault there is no prior, as the last map was on the device.
         assert_eq!(cpu.0, gpu.0, "frame {frame}");
         assert!(frame >= 2 || cpu.1 == gpu.1, "frame {frame}");
     }

@@ -1,4 +1,4 @@
-//! Measured depth fitted to its picture: edges, noise, size, and steadiness in time.
+//! Measured depth aligned to its picture: edges, noise, size, and temporal stability.
 
 use bokehcam::depth::focus::FocusRule;
 use bokehcam::depth::refine::Refiner;
@@ -14,7 +14,7 @@ const PERSON_M: f32 = 1.2;
 const FRAME_NS: u64 = 33_000_000;
 const SIZE: (u32, u32) = (120, 90);
 
-/// A picture of a textured dark person before a textured light wall.
+/// Returns a picture of a textured dark person before a textured light wall.
 fn picture(is_person: impl Fn(u32, u32) -> bool) -> ColorImage {
     color(SIZE.0, SIZE.1, |x, y| {
         let grain = ((x * 7 + y * 13) % 5) as u8 * 3;
@@ -22,7 +22,7 @@ fn picture(is_person: impl Fn(u32, u32) -> bool) -> ColorImage {
     })
 }
 
-/// A picture that says nothing.
+/// Returns a picture without any detail.
 fn flat() -> ColorImage {
     ColorImage::new(SIZE.0, SIZE.1)
 }
@@ -31,7 +31,7 @@ fn is_person(x: u32, y: u32) -> bool {
     (40..80).contains(&x) && y >= 30
 }
 
-/// Its depth, with all edges of the person `wider` pixels further out (or in, if negative).
+/// Returns its depth, with all edges of the person `wider` pixels further out (or in, if negative).
 fn depth(wider: i32) -> DepthMap {
     map(SIZE.0, SIZE.1, |x, y| {
         let (x, y) = (x as i32, y as i32);
@@ -44,7 +44,7 @@ fn refined(mut map: DepthMap, color: &ColorImage) -> DepthMap {
     map
 }
 
-/// How many pixels are not (nearly) what they should be.
+/// Counts the pixels that differ from the truth.
 fn wrong(map: &DepthMap, truth: &DepthMap) -> usize {
     assert_eq!(map.size(), truth.size());
     let is_off =
@@ -52,7 +52,7 @@ fn wrong(map: &DepthMap, truth: &DepthMap) -> usize {
     map.metres.iter().zip(&truth.metres).filter(is_off).count()
 }
 
-/// Noise from -1 to 1, another one for every pixel and frame; its variance is 1/3.
+/// Returns noise from -1 to 1 that depends on pixel and frame; its variance is 1/3.
 fn noise(k: u32, frame: u32) -> f32 {
     let mut bits = k.wrapping_mul(0x9E37_79B9) ^ frame.wrapping_mul(0x85EB_CA6B);
     for _ in 0..2 {
@@ -76,7 +76,7 @@ fn constant_depth_stays() {
 #[test]
 fn exact_edges_are_not_moved() {
     assert_eq!(wrong(&refined(depth(0), &picture(is_person)), &depth(0)), 0);
-    // Nor where the colours say nothing at all.
+    // Nor where the colours carry no information.
     assert_eq!(wrong(&refined(depth(0), &flat()), &depth(0)), 0);
     // A fence of bars two pixels wide.
     let bar = |x: u32, _: u32| x % 12 < 2;
@@ -97,7 +97,7 @@ fn edges_beside_the_colours_edges_are_moved_onto_them() {
 
 #[test]
 fn a_ramp_between_two_depths_becomes_a_step() {
-    // What a bilinear filter makes of the edge: five pixels of depths that are nowhere.
+    // A bilinear filter turns the edge into five pixels of depths that do not exist in the scene.
     let side = |x: i32| ((x - 37) as f32 / 6.0).clamp(0.0, 1.0);
     let ramp = map(SIZE.0, SIZE.1, |x, _| 1.0 / (1.0 / WALL_M + (1.0 / PERSON_M - 1.0 / WALL_M) * side(x as i32)));
     let step = map(SIZE.0, SIZE.1, |x, _| if x < 40 { WALL_M } else { PERSON_M });
@@ -113,10 +113,10 @@ fn a_smaller_map_takes_the_pictures_size_and_edges() {
         let out = refined(coarse, &picture(is_person));
         assert!(wrong(&out, &truth) <= 12, "1/{share}: {} pixels wrong", wrong(&out, &truth));
     }
-    // A larger one, too.
+    // A larger map, too.
     let large = map(2 * SIZE.0, 2 * SIZE.1, |x, y| if is_person(x / 2, y / 2) { PERSON_M } else { WALL_M });
     assert_eq!(wrong(&refined(large, &picture(is_person)), &depth(0)), 0);
-    // A slanted plane is interpolated, not made of steps; the border has nothing to interpolate with.
+    // A slanted plane is interpolated without steps; the border has no neighbours to interpolate with.
     let slanted = |x: f32| 1.0 / (0.4 + 0.002 * x);
     let coarse = map(SIZE.0 / 4, SIZE.1 / 4, |x, _| slanted(x as f32 * 4.0 + 1.5));
     let out = refined(coarse, &picture(|_, _| false));
@@ -142,7 +142,7 @@ fn a_slanted_plane_stays_where_it_is() {
     let inverse = |x: u32, y: u32| 0.4 + 0.002 * x as f32 + 0.001 * y as f32;
     let plane = map(SIZE.0, SIZE.1, |x, y| 1.0 / inverse(x, y));
     assert_eq!(wrong(&refined(plane, &picture(is_person)), &map(SIZE.0, SIZE.1, |x, y| 1.0 / inverse(x, y))), 0);
-    // Under noise: no bias, in the middle or at the rims, and less noise.
+    // Under noise: no bias, in the middle or at the borders, and less noise.
     let noisy = map(SIZE.0, SIZE.1, |x, y| 1.0 / (inverse(x, y) + 0.01 * noise(y * SIZE.0 + x, 0)));
     let out = refined(noisy, &picture(|_, _| false));
     for columns in [0..12, 50..70, 108..120] {
@@ -209,7 +209,7 @@ fn a_moving_edge_is_followed_at_once() {
         refiner.refine(&mut out, &picture(is_here), u64::from(frame) * FRAME_NS);
         assert_eq!(wrong(&out, &truth), 0, "frame {frame}");
     }
-    // A surface that comes nearer while its colours rest: no lag above what is noise (0.01/m).
+    // A surface that approaches while its colours stay constant: no lag above the noise (0.01/m).
     let mut refiner = Refiner::new();
     for frame in 0..12_u32 {
         let inverse = 0.5 + 0.008 * frame as f32;
@@ -261,13 +261,13 @@ fn any_size_and_any_value_is_handled() {
         Refiner::new().refine(&mut unknown, &color, 0);
         assert!(unknown.metres.iter().all(|&z_m| z_m == 0.0), "nothing known stays unknown");
     }
-    // A map without pixels for a picture that has some.
+    // An empty map for a picture with pixels.
     let mut empty = DepthMap::default();
     Refiner::new().refine(&mut empty, &ColorImage::new(4, 3), 0);
     assert_eq!(empty.metres, vec![0.0; 12]);
 }
 
-/// A recording of a real camera, and what no camera gives: edges all over, in noise, with holes.
+/// Returns a recording of a real camera, and a synthetic stress case: edges all over, in noise, with holes.
 fn takes() -> [Vec<(ColorImage, DepthMap)>; 2] {
     let real = |index| {
         let (color, map, _) = portrait::frame(index);
@@ -280,7 +280,7 @@ fn takes() -> [Vec<(ColorImage, DepthMap)>; 2] {
             let (x, y) = (k % width + 3 * frame, k / width);
             let is_near = |x: u32, y: u32| (x / 61 + y / 83).is_multiple_of(3);
             let near = is_near(x, y);
-            // A soft picture: what is mixed is found in it.
+            // A soft picture, in which mixed pixels are found.
             let seen = (0..9u32).filter(|k| is_near((x + k % 3).saturating_sub(1), (y + k / 3).saturating_sub(1)));
             let (share, grain) = (seen.count() as f32 / 9.0, 8.0 * noise(k, frame));
             let mix = |near: f32, far: f32| (far + share * (near - far) + grain) as u8;

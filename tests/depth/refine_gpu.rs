@@ -1,8 +1,8 @@
-//! The GPU refines depth as the CPU does.
+//! The GPU refines depth like the CPU.
 //!
-//! The law, for every frame of a sequence: what is unknown on one is on the other; and all depths but one in 500 are the same
-//! to a share of 1e-4, as a comparison may fall either way where rounding decides it, and takes a pixel, or the end of a row of
-//! them, to another surface.
+//! The law, for every frame of a sequence: pixels are unknown on both or on neither; and all depths but one in 500
+//! agree to a relative difference of 1e-4, as a comparison may fall either way where rounding decides it, and moves a
+//! pixel, or the end of a row of them, to another surface.
 #![cfg(feature = "gpu")]
 #![allow(missing_docs)]
 
@@ -21,13 +21,14 @@ const FRAME_NS: u64 = 33_000_000;
 const SAME: f32 = 1e-4;
 const ONE_IN: usize = 500;
 
-/// A frame: picture, map, media time, and what is in focus.
+/// A frame: picture, map, media time, and focus distance.
 type Frame = (ColorImage, DepthMap, u64, f32);
 
-/// Somebody before a slanted wall and beside a pole, who moves, with colours that change at other places than depth does. Holes are
-/// shadows beside the near, a frame around, some at chance, and all that chance has less than `missing`.
+/// Returns a moving person before a slanted wall and beside a pole, with colours that change at other places than depth
+/// does. Holes are shadows beside near objects, a frame at the border, and random pixels and runs with the probability
+/// `missing`.
 fn scene(size: (u32, u32), from: (u32, u32), frame: usize, missing: f32) -> (ColorImage, DepthMap) {
-    // 2 the pole, 1 the person, 0 the wall; places are shares of the picture.
+    // 2 is the pole, 1 the person, 0 the wall; positions are fractions of the picture.
     let surface = |x: f32, y: f32, wider: f32| {
         let (dx, dy) = (x - 0.45 - 0.004 * frame as f32, y - 0.6);
         let is_person = dx * dx * 2.0 + dy * dy < (0.3 + wider).powi(2);
@@ -82,7 +83,7 @@ fn assert_same(made: &DepthMap, expected: &DepthMap, name: &str) {
     assert!(off * ONE_IN <= expected.metres.len(), "{name}: {off} of {} are off", expected.metres.len());
 }
 
-/// The law holds of all these frames, one after the other. Returns the maps of the last.
+/// Checks the law on all these frames, one after the other. Returns the maps of the last.
 fn same(device: &Arc<Device>, name: &str, frames: &[Frame]) -> DepthMap {
     let (mut cpu, mut gpu) = (Refiner::new(), Refiner::new().on(Some(device)));
     let mut last = DepthMap::default();
@@ -220,7 +221,7 @@ fn a_device_that_is_gone_is_followed_by_the_processor() {
         for (k, frame) in scenes((90, 60), (45, 30), 6, 0.02).iter().enumerate() {
             if k == gone_before {
                 device.device.destroy();
-                // What is remembered is gone, too.
+                // The remembered frames are gone, too.
                 cpu = Refiner::new();
             }
             let [expected, made] = [&mut cpu, &mut refiner].map(|refiner| refined(refiner, frame));
@@ -242,7 +243,7 @@ fn the_bundled_recording_agrees() {
     same(&device(), "portrait", &(0..6).map(frame).collect::<Vec<_>>());
 }
 
-/// Prints the times, of frames of any size: `BOKEHCAM_SIZE=1280x720 cargo test --release --test depth -- --ignored
+/// Prints the pass times, of frames of any size: `BOKEHCAM_SIZE=1280x720 cargo test --release --test depth -- --ignored
 /// --nocapture refine_gpu::the_passes`.
 #[test]
 #[ignore = "needs a Vulkan adapter (software will do)"]

@@ -1,4 +1,4 @@
-//! The GPU finds the disparities that the CPU finds, to the bit.
+//! The GPU finds the same disparities as the CPU, to the bit.
 #![cfg(feature = "gpu")]
 #![allow(missing_docs)]
 
@@ -22,8 +22,8 @@ fn picture(width: usize, height: usize, mut luma: impl FnMut(usize, usize) -> u8
     (0..width * height).map(|k| luma(k % width, k / width)).collect()
 }
 
-/// A texture of chance, smooth in places and with edges, as two eyes see it: stripes of rows at different disparities,
-/// up to `most`, with a little noise of each eye's own.
+/// Creates a pair of a random texture, smooth in places and with edges: stripes of rows at different disparities, up to
+/// `most`, with a little independent noise in each picture.
 fn pair(width: usize, height: usize, most: usize) -> [Vec<u8>; 2] {
     let mut numbers = Numbers(11);
     let mut level = 0.5;
@@ -41,8 +41,8 @@ fn pair(width: usize, height: usize, most: usize) -> [Vec<u8>; 2] {
     noise.collect::<Vec<_>>().try_into().expect("two eyes")
 }
 
-/// Both executors find the same in the pairs, one after the other, and drop islands of up to `island` pixels; returns what
-/// they find in the last.
+/// Checks that both executors find the same disparities in the pairs, one after the other, with islands of up to
+/// `island` pixels dropped; returns the last disparities.
 fn same(
     device: &Arc<Device>,
     size: (usize, usize),
@@ -54,7 +54,8 @@ fn same(
     let mut cpu = CpuExecutor::new(size, disparities, island, 2);
     let mut gpu = GpuExecutor::new(device, size, disparities, island).expect("room for a small picture");
     let mut found = [vec![1; size.0 * size.1], vec![2; size.0 * size.1]];
-    // With nothing likely, what was found in the same pair, and what another right eye had: anything the range has.
+    // The priors: none, the disparities of the same pair, and those of another right picture, which can be any in the
+    // range.
     let other = &pairs[pairs.len() - 1][1];
     let rounds = pairs.iter().flat_map(|[left, right]| [[left, right], [left, right], [left, other], [left, right]]);
     for (number, [left, right]) in rounds.enumerate() {
@@ -158,7 +159,7 @@ fn what_the_device_cannot_hold_is_an_error() {
     assert!(error.to_string().contains("60000 x 60000"), "{error}");
 }
 
-/// Prints the times, of a pair of any size: `BOKEHCAM_PAIR=1280x720x128 cargo test --release --test stereo_gpu --
+/// Prints the pass times, of a pair of any size: `BOKEHCAM_PAIR=1280x720x128 cargo test --release --test stereo_gpu --
 /// --ignored --nocapture the_passes`.
 #[test]
 #[ignore = "needs a Vulkan adapter (software will do)"]

@@ -1,5 +1,5 @@
-//! The GPU's passes that drop islands and fill gaps do what is written down here pixel by pixel, on maps that are made to
-//! be hard for whoever joins islands.
+//! The GPU's passes that drop islands and fill gaps agree with a plain per-pixel reference, on maps that are hard for
+//! connected-component labelling.
 #![cfg(feature = "gpu")]
 #![allow(missing_docs)]
 
@@ -12,7 +12,7 @@ use bokehcam::depth::stereo::gpu::shaders;
 use bokehcam::depth::stereo::gpu::tidying::{Scratch, passes};
 use common::Numbers;
 
-/// What the GPU makes of a map.
+/// Runs the GPU's passes on a map.
 fn tidied(device: &Device, size: (usize, usize), island: u32, map: &[u16]) -> Vec<u16> {
     use wgpu::BufferUsages as Usage;
     let buffer = |bytes, usage| device.buffer("test", bytes, usage);
@@ -20,7 +20,7 @@ fn tidied(device: &Device, size: (usize, usize), island: u32, map: &[u16]) -> Ve
     let words: Vec<u32> = map.iter().map(|&disparity| disparity.into()).collect();
     let on_device = buffer(pixels * 4, Usage::STORAGE | Usage::COPY_DST);
     device.queue.write_buffer(&on_device, 0, bytemuck::cast_slice(&words));
-    // The executor's has all sorts of numbers in it.
+    // The executor's buffers hold leftover values.
     let used = [1, 2, 3].map(|number: u32| {
         let used = buffer(pixels * 4, Usage::STORAGE | Usage::COPY_DST);
         device.queue.write_buffer(&used, 0, bytemuck::cast_slice(&vec![number * 0x0123_4567; pixels]));
@@ -36,7 +36,7 @@ fn tidied(device: &Device, size: (usize, usize), island: u32, map: &[u16]) -> Ve
     recorder.fetch(device, &mut back, (&out, out.size()), take).expect("the device is there")
 }
 
-/// The same, pixel by pixel.
+/// The reference: the same result, pixel by pixel.
 fn expected((width, height): (usize, usize), island: u32, map: &[u16]) -> Vec<u16> {
     let mut out = map.to_vec();
     let mut seen = vec![false; map.len()];
@@ -77,7 +77,7 @@ type Place = (usize, usize);
 const LOW: u16 = 500;
 const HIGH: u16 = 9000;
 
-/// A spiral of one pixel, with as much between its arms, from the first pixel inwards.
+/// Draws a spiral one pixel wide, with one-pixel gaps between its arms, from the first pixel inwards.
 fn spiral((width, height): Place) -> Vec<u16> {
     let mut map = vec![UNKNOWN; width * height];
     let inside = |x: isize, y: isize| (0..width as isize).contains(&x) && (0..height as isize).contains(&y);
@@ -85,7 +85,7 @@ fn spiral((width, height): Place) -> Vec<u16> {
     let (mut x, mut y, mut ahead) = (0, 0, (1, 0));
     map[0] = LOW;
     loop {
-        // Neither the next pixel nor the one after it is taken.
+        // Neither the next pixel nor the one after it is set.
         let is_free = |map: &[u16], (dx, dy): (isize, isize)| {
             let is_empty = |x: isize, y: isize| map[place(x, y)] == UNKNOWN;
             let (next, after) = ((x + dx, y + dy), (x + 2 * dx, y + 2 * dy));
@@ -104,7 +104,7 @@ fn spiral((width, height): Place) -> Vec<u16> {
     }
 }
 
-/// A disparity for every pixel of a picture of some size.
+/// A disparity for every pixel, given its place and the size of the picture.
 type Made = fn(Place, Place) -> u16;
 
 const MADE: [(&str, Made); 15] = [
@@ -128,7 +128,7 @@ const MADE: [(&str, Made); 15] = [
     }),
     ("stairs", |(x, y), _| if (x + y) % 5 < 2 { LOW } else { HIGH }),
     ("stairs to the left", |(x, y), (width, _)| if (width - x + y) % 7 < 2 { LOW } else { UNKNOWN }),
-    // Bars of 1 to 32 pixels that lie, and in other rows ones that stand.
+    // Horizontal bars of 1 to 32 pixels, and in other rows vertical ones.
     ("islands of many sizes", |(x, y), _| {
         let (column, row) = (x % 34, y % 34);
         let lies = y / 34 % 2 == 0 && row % 2 == 0 && column <= row;
@@ -168,9 +168,9 @@ fn islands_of_chance_are_found_every_time() {
     let device = device();
     let mut numbers = Numbers(3);
     for size in [(1, 200), (200, 1), (53, 61), (128, 90), (511, 200)] {
-        // About where islands begin to reach across a picture, and where there are many or few.
+        // About the percolation threshold, where islands begin to span the picture, and at few and many known pixels.
         for known in [0.1, 0.5, 0.593, 0.65, 0.9] {
-            // Equal ones touch alone, or some of those beside them, too.
+            // Only equal disparities connect, or some of their neighbours, too.
             for (levels, apart) in [(1.0, 170), (2.0, 170), (90.0, 170), (6.0, 60), (100.0, 20)] {
                 let mut one =
                     || if numbers.next() < known { (numbers.next() * levels) as u16 * apart } else { UNKNOWN };

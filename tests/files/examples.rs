@@ -1,11 +1,11 @@
-//! The programs in `examples/`: short enough to be read at once, and they run.
+//! The programs in `examples/` are short enough to be read at once, and they run.
 #![allow(missing_docs)]
 
 use std::fs;
 use std::path::Path;
 use std::process::Command;
 
-/// Where cargo puts the examples that it builds for the tests.
+/// Returns the path at which cargo builds an example for the tests.
 fn built(name: &str) -> std::path::PathBuf {
     let deps = std::env::current_exe().unwrap();
     deps.parent().and_then(Path::parent).unwrap().join("examples").join(name)

@@ -1,4 +1,5 @@
-//! Imports go down only, siblings do not know each other, and a crate has one door: a scan of the source text.
+//! Imports only point to lower layers, siblings do not import each other, and a crate is used at one place: a scan of
+//! the source text.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -21,7 +22,7 @@ const LAYERS: [&[&str]; 13] = [
     &["cli"],
 ];
 
-/// Crates of others, and the only places that may name them: modules of the library, or folders of a crate above it.
+/// External crates, and the only places that may name them: modules of the library, or folders of a crate above it.
 const DOORS: [(&str, &[&str]); 30] = [
     ("clap", &["cli", "source/options"]),
     ("clap_complete", &["cli"]),
@@ -79,14 +80,15 @@ fn layer(module: &str) -> Option<usize> {
     LAYERS.iter().position(|modules| modules.contains(&module))
 }
 
-/// What is wrong in the source file `path` (relative to `src/`, or the name of a crate and relative to its `src/`), one line each.
+/// Returns the violations in the source file `path` (relative to `src/`, or the name of a crate and relative to its
+/// `src/`), one line each.
 fn violations(path: &str, source: &str) -> Vec<String> {
     let module = path.split(['/', '.']).next().unwrap_or_default();
     let mut found = Vec::new();
     let Some(own) = layer(module) else {
         return if module == "lib" { found } else { vec![format!("{path}: module {module} has no layer")] };
     };
-    // Tests may reach wherever they need to; they are the last thing in a file, or a file of their own.
+    // Tests may import anything; they are last in a file, or a file of their own.
     let source = source.split("#[cfg(test)]\nmod tests {").next().unwrap_or_default();
     for (number, line) in (1..).zip(source.lines()) {
         let code = line.split("//").next().unwrap_or_default();
@@ -115,7 +117,7 @@ fn violations(path: &str, source: &str) -> Vec<String> {
     found
 }
 
-/// What follows each `path_root` in a line, where that begins a path.
+/// Returns the text after each `path_root` in a line, where that begins a path.
 fn after<'a>(code: &'a str, path_root: &'a str) -> impl Iterator<Item = &'a str> {
     code.match_indices(path_root).filter_map(move |(at, _)| {
         let before = code[..at].chars().last();
@@ -124,7 +126,7 @@ fn after<'a>(code: &'a str, path_root: &'a str) -> impl Iterator<Item = &'a str>
     })
 }
 
-/// The first name of a path, or of each path in braces.
+/// Returns the first name of a path, or of each path in braces.
 fn names(path: &str) -> Vec<String> {
     let first = |text: &str| text.trim().chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect::<String>();
     let Some(list) = path.strip_prefix('{') else { return vec![first(path)] };

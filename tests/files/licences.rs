@@ -1,12 +1,12 @@
-//! Dependencies are under licences that deny.toml allows, and from the registry that it names: what `cargo deny` checks
-//! where it is installed.
+//! Dependencies have licences that deny.toml allows, and come from the registry that it names: the checks of `cargo
+//! deny`, which is not installed everywhere.
 
 use std::path::Path;
 use std::process::Command;
 
 use serde_json::Value;
 
-/// Whether a licence expression (SPDX; `/` is an old way to write OR) can be met by what is allowed.
+/// Returns whether the allowed licences satisfy an expression (SPDX; `/` is an old way to write OR).
 fn is_met(expression: &str, allowed: &[&str]) -> bool {
     let spaced = expression.replace('/', " OR ").replace('(', " ( ").replace(')', " ) ");
     let words: Vec<&str> = spaced.split_whitespace().collect();
@@ -65,7 +65,7 @@ fn licence_expressions_are_understood() {
     }
 }
 
-/// All packages of the lock file, as far as they were fetched, are allowed by deny.toml.
+/// All packages of the lock file that were fetched are allowed by deny.toml.
 #[test]
 #[ignore = "needs all crates: cargo fetch"]
 fn dependencies_are_under_licences_and_from_sources_that_are_allowed() {

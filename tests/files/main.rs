@@ -1,4 +1,4 @@
-//! Files that are read and written, and what holds for the source itself.
+//! Files that are read and written, and rules for the source itself.
 #![allow(missing_docs)]
 
 mod examples;

@@ -1,4 +1,4 @@
-//! Recordings and single pictures: what is written is read again, what is wrong is told.
+//! Recordings and single pictures: a written file is read back, and faults are reported.
 
 mod euroc;
 mod faults;
@@ -20,7 +20,7 @@ use tempfile::TempDir;
 
 const SIZE: (u32, u32) = (24, 16);
 
-/// A folder in which recordings are put together by hand.
+/// A folder in which a test assembles a recording.
 struct Scene {
     dir: TempDir,
 }
@@ -33,7 +33,7 @@ impl Scene {
         Self { dir }
     }
 
-    /// `count` pairs at times 1.0, 1.1, ... s, pictures numbered from 0, with their lists.
+    /// Creates `count` pairs at times 1.0, 1.1, ... s, pictures numbered from 0, with their lists.
     fn with_pairs(count: u8) -> Self {
         let scene = Self::new();
         for index in 0..count {
@@ -58,7 +58,7 @@ impl Scene {
         fs::remove_file(self.path(name)).unwrap();
     }
 
-    /// A picture of the one colour (`shade`, 100, 200).
+    /// Writes a picture of the single colour (`shade`, 100, 200).
     fn color(&self, name: &str, (width, height): (u32, u32), shade: u8) {
         RgbImage::from_pixel(width, height, [shade, 100, 200].into()).save(self.path(name)).unwrap();
     }
@@ -99,7 +99,7 @@ fn times_ns(recording: &Recording) -> Vec<u64> {
     (0..recording.len()).map(|index| recording.time_ns(index)).collect()
 }
 
-/// Asserts that the message is one line that has every one of `parts`.
+/// Asserts that the message is one line that contains all `parts`.
 #[track_caller]
 fn assert_says<T>(result: Result<T, RecordingError>, parts: &[&str]) {
     let Err(error) = result else { panic!("no error, where one should say {parts:?}") };
@@ -110,7 +110,7 @@ fn assert_says<T>(result: Result<T, RecordingError>, parts: &[&str]) {
     }
 }
 
-/// A PNG that claims `width` x `height` pixels and has none, its checksum right.
+/// Returns a PNG that claims `width` x `height` pixels and has none, with a valid checksum.
 fn png_that_claims(width: u32, height: u32) -> Vec<u8> {
     let mut header = b"IHDR".to_vec();
     header.extend(width.to_be_bytes());

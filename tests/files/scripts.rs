@@ -1,4 +1,4 @@
-//! The scripts as they are called.
+//! The scripts, called as users call them.
 
 use std::path::Path;
 use std::process::{Command, Output};
@@ -14,7 +14,8 @@ fn said(output: &Output) -> String {
     String::from_utf8_lossy(&output.stderr).into_owned()
 }
 
-/// What hangs is ended with all that it started: else the pipe of its output would stay open, and this test wait.
+/// A hanging command is killed with all its child processes: else its output pipe would stay open, and this test would
+/// wait.
 #[test]
 fn a_command_that_hangs_is_ended_and_named() {
     let output = script("within").args(["1s", "sh", "-c", "sleep 1000000 & wait"]).output().unwrap();
@@ -30,7 +31,7 @@ fn a_command_that_ends_keeps_its_exit_code_and_output() {
     }
 }
 
-/// Clang's runtime has libclang in its name, and the build cannot use it.
+/// Clang's runtime has libclang in its name, but the build cannot use it.
 #[test]
 fn setup_looks_for_the_library_that_the_build_needs() {
     let folder = tempfile::tempdir().unwrap();
@@ -44,7 +45,7 @@ fn setup_looks_for_the_library_that_the_build_needs() {
     assert!(found.status.success(), "{}", said(&found));
 }
 
-/// Asked for help, what builds or tests for long says what it would do, and does not begin.
+/// With `--help`, scripts that build or test for long print what they would do, and do not start.
 #[test]
 fn scripts_tell_what_they_do() {
     let here = Path::new(env!("CARGO_MANIFEST_DIR"));
@@ -60,7 +61,7 @@ fn scripts_tell_what_they_do() {
     let mut tried = 0;
     for path in of_scripts.chain(elsewhere.map(|name| here.join(name))) {
         let text = std::fs::read_to_string(&path).unwrap();
-        // What is run by others alone has a usage line.
+        // A script that only other scripts run has a usage line instead.
         let Some(first) = text.strip_prefix("#!/usr/bin/env bash\n# ").filter(|_| !path.ends_with("scripts/within"))
         else {
             continue;
@@ -77,7 +78,7 @@ fn scripts_tell_what_they_do() {
     assert_eq!(refused.status.code(), Some(2), "{}", said(&refused));
 }
 
-/// What is released has one version, and an output is not made of another.
+/// All parts of a release have one version, and a build from another version is refused.
 #[test]
 fn a_release_has_the_version_of_the_source() {
     let release = |args: &[&str]| script("within").args(["20s", "scripts/release"]).args(args).output().unwrap();

@@ -1,4 +1,4 @@
-//! Every frame has a fate, whatever is slow or broken.
+//! Every frame is accounted for, whatever stage is slow or broken.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
@@ -56,13 +56,13 @@ fn live_accounts_for_every_frame_however_slow_a_stage_is() {
 fn a_live_link_evicts_behind_a_sink_that_stands_still() {
     let asked = Arc::new(AtomicUsize::new(0));
     let (counts, mut fake) = (Arc::clone(&asked), fake_camera(200));
-    // So slow that no frame is ever late.
+    // The period is so long that no frame is ever late.
     let info = SourceInfo { live: true, period_ns: 3_600_000_000_000, ..fake.info() };
     let camera = camera_by(info, move |before, shot| {
         counts.store(before + 1, Ordering::SeqCst);
         fake.next(shot).unwrap()
     });
-    // It waits with its first frame until the camera is through with all of its own.
+    // The sink holds its first frame until the camera has delivered all of its own.
     let sink = sink_by(move |_| {
         while asked.load(Ordering::SeqCst) < 200 {
             std::thread::sleep(Duration::from_millis(1));

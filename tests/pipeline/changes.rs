@@ -1,4 +1,4 @@
-//! What may change while a run goes on, and who looks on.
+//! Changes during a run, and viewers of it.
 
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, mpsc};
@@ -20,7 +20,7 @@ fn radius_of(job: &Job) -> f32 {
     radius_px
 }
 
-/// Blurs nothing, but knows the one radius that it was made for.
+/// Does not blur, but writes the one radius that it was made for.
 fn made(radius_px: f32) -> FakeBokeh {
     let makes = move |job| changed(job, PassTimes::new(), |job| job.out.rgb[0] = radius_px as u8);
     FakeBokeh { makes: Box::new(makes), ..fake_bokeh(2, Trouble::default()) }
@@ -43,7 +43,7 @@ fn every_frame_has_the_radius_and_the_executor_of_one_change() {
         let sink = fake_sink(&received);
         let to_come: Vec<_> = (1..=40u8)
             .map(|k| {
-                // Now and then frames pass through.
+                // Every fifth change lets frames pass through unblurred.
                 let executor = (k % 5 != 0).then(|| made(f32::from(k)));
                 Change { number: u64::from(k), look: uniform(f32::from(k)), bokeh: Executor::To(executor) }
             })

@@ -1,5 +1,5 @@
-//! Runs on a clock that only the stages here move, one frame at a time: what is measured is exact, and the machine has
-//! no say in it.
+//! Runs on a clock that only the stages here advance, one frame at a time: measurements are exact, and do not depend on
+//! the machine.
 
 use std::cell::RefCell;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -24,7 +24,7 @@ use crate::setup::{dof_with, simple};
 
 const MS: u64 = 1_000_000;
 const PERIOD_NS: u64 = 40 * MS;
-/// What each stage moves the clock on for a frame, and how old a frame is when the camera hands it out.
+/// Time by which each stage advances the clock for a frame, and the age of a frame when the camera delivers it.
 const AGE_NS: u64 = 4 * MS;
 const READ_NS: u64 = 2 * MS;
 const DEPTH_NS: u64 = 5 * MS;
@@ -36,7 +36,7 @@ fn info(name: &str) -> SourceInfo {
     SourceInfo { name, size: SIZE, period_ns: PERIOD_NS, frames: None, live: true, brings }
 }
 
-/// A camera that takes its next frame once the one before has been delivered.
+/// A camera that captures its next frame once the previous one is delivered.
 struct Lockstep {
     clock: Clock,
     delivered: Arc<AtomicU64>,
@@ -78,7 +78,7 @@ fn dof(max_coc_px: f32) -> Look {
     dof_with(FocusRule::Metres(1.0), max_coc_px)
 }
 
-/// Runs some frames, of which depth takes `depth_ns`; gives the report and what each frame was to be blurred by.
+/// Runs some frames, whose depth takes `depth_ns`; returns the report and the CoC field of each frame.
 fn play(
     (frames, pace): (usize, Pace),
     depth_ns: u64,
@@ -90,7 +90,7 @@ fn play(
     (report, fields)
 }
 
-/// The same; gives what the frames took, too.
+/// Like [`play`]; returns the trace of each frame, too.
 fn play_seen(
     (frames, pace): (usize, Pace),
     (depth_ns, budget_ns): (u64, u64),
@@ -116,7 +116,7 @@ fn play_seen(
         map.metres.fill(1.0);
         Ok(())
     });
-    // By what each frame was to be blurred.
+    // The CoC field of each frame.
     let fields = Arc::<Mutex<Vec<CocField>>>::default();
     let (noted, blur_clock) = (Arc::clone(&fields), clock.clone());
     let bokeh = FakeBokeh {
@@ -152,7 +152,7 @@ fn play_seen(
     (report, fields, traces.into_inner())
 }
 
-/// Within what a histogram rounds by.
+/// Returns whether two times agree to within the rounding of a histogram.
 fn is_about(measured_ms: f64, time_ns: u64) -> bool {
     (measured_ms * MS as f64 / time_ns as f64 - 1.0).abs() < 0.01
 }
@@ -177,10 +177,10 @@ fn each_time_is_that_of_its_own_stage_and_latency_is_all_since_the_capture() {
 
 #[test]
 fn a_change_of_the_look_holds_from_its_frame_on_where_depth_is_held_too() {
-    // Depth has 9 ms a frame and takes 14: each is for two frames.
+    // Depth has 9 ms a frame and takes 14: each map serves two frames.
     let (send, changes) = mpsc::channel();
     let before = move |frame: usize| {
-        // In both places of such two.
+        // Changes come at both positions within such a pair.
         if frame >= 30 && frame.is_multiple_of(5) {
             let look = dof(10.0 + frame as f32);
             let _ = send.send(Change { number: frame as u64, look, bokeh: Executor::Keep });
@@ -203,14 +203,14 @@ fn the_stages_and_the_waits_are_all_of_a_frames_age() {
         for trace in &traces {
             let Trace { decode_ns, depth_ns, blur_ns, between_ns, playout_ns, age_ns, .. } = *trace;
             assert_eq!((decode_ns, depth_ns, blur_ns), (READ_NS, DEPTH_NS, BLUR_NS));
-            // The driver had it for a while.
+            // The time that the driver held the frame.
             assert_eq!(between_ns, AGE_NS - READ_NS, "nothing else waits where there is one frame at a time");
             assert_eq!(age_ns, decode_ns + depth_ns + blur_ns + between_ns + playout_ns);
         }
         let waited = report.stages_ms.0.iter().any(|(name, _)| name == "playout");
         assert_eq!(waited, pace == Pace::Realtime);
     }
-    // A blur that is sometimes late makes the others wait.
+    // Where every other frame takes longer, the faster ones wait for their playout.
     let before = |_: usize| {};
     let (_, _, traces) = play_seen((60, Pace::Realtime), (14 * MS, 10 * MS), None, None, before);
     let held = traces.iter().filter(|trace| trace.depth_held);
@@ -238,7 +238,7 @@ const LOSSES: [Cause; 3] = [Cause::Driver, Cause::Corrupt, Cause::Evicted];
 
 #[test]
 fn what_a_camera_says_is_lost_counts_as_many_times_as_it_says() {
-    // Between those that it gives it loses as many as their number, and three, of each cause.
+    // Between the frames that it delivers it loses, for each cause, their number plus three.
     let camera = camera_by(info("loser"), |index, Shot { color, .. }| {
         color.resize(SIZE.0, SIZE.1);
         match index {

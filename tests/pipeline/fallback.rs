@@ -16,7 +16,7 @@ fn a_run_goes_on_without_its_gpu_and_the_report_says_so() {
     const FRAMES: usize = 40;
     for fails_at in [0, 1, 17] {
         let gpu = fake_bokeh(3, Trouble::fails_at(fails_at));
-        // It gives back what it has when it fails.
+        // A failing GPU returns the frames that it holds.
         let gpu = FakeBokeh { backend: Backend::Gpu, name: "a GPU", collect_fails: true, gives_back: true, ..gpu };
         let cpu = || Box::new(fake_bokeh(1, Trouble::default())) as Box<dyn Bokeh>;
         let (received, stop) = (Received::default(), AtomicBool::new(false));
@@ -32,7 +32,7 @@ fn a_run_goes_on_without_its_gpu_and_the_report_says_so() {
         assert_eq!(received.numbers(), (0..FRAMES).collect::<Vec<_>>());
         let ran = (report.backend.as_str(), report.adapter.as_str());
         assert_eq!(ran, ("gpu, then cpu", "GPU: lost; then cpu, fake"));
-        // Finer is more than the CPU is given.
+        // The CPU is not given the levels `high` and `best`.
         assert!(report.quality.share.iter().all(|(level, _)| !["high", "best"].contains(level)) || fails_at > 1);
     }
 }

@@ -1,4 +1,4 @@
-//! How a run ends: by a fault, a panic, a reader that goes, or the stop flag.
+//! How a run ends: by a fault, a panic, a reader that closes, or the stop flag.
 
 use std::fs;
 use std::sync::Arc;
@@ -28,8 +28,8 @@ fn the_fault_of_a_stage_is_the_error_of_the_run() {
                 ("sink", Setup { sink: trouble, ..setup() }, |fault| matches!(fault, Fault::Sink(_))),
             ];
             for (stage, setup, expected) in cases {
-                // In real time a frame may be passed over: only the first of a stage is sure to come, and depth goes
-                // by the frame's number.
+                // In real time a frame may be skipped: only a stage's first frame is certain, and depth counts by the
+                // frame's number.
                 let certain = pace == Pace::Asap || frame == 0 && stage != "depth";
                 let (result, received) = setup.run();
                 let Err(error) = result else {

@@ -1,4 +1,4 @@
-//! What arrives: the right depth, the right pixels, the same every time, and a report of it.
+//! Frames that arrive have the right depth and pixels, reproducibly, and are reported.
 
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -18,7 +18,7 @@ use crate::setup::*;
 
 #[test]
 fn depth_comes_with_the_frame_it_belongs_to() {
-    // Focus is eased over media time, and all of these frames come within 20 ms: the first one rules.
+    // Focus is eased over media time, and all of these frames come within 20 ms: the first one determines it.
     for (brings, depth) in [(Brings::Color, Some(Trouble::default())), (Brings::Depth, None)] {
         let (result, received) = Setup { brings, depth, ..Setup::new(20, Pace::Asap) }.run();
         result.unwrap();
@@ -83,7 +83,7 @@ fn the_report_tells_what_ran() {
     assert!(report.latency_ms.is_some() && report.frame_ms.is_some());
 }
 
-/// Says that it takes so long at the default quality, and in proportion at the others.
+/// Creates a blur that reports the time `took` at the default quality, and in proportion at the others.
 fn paced(took: Duration) -> FakeBokeh {
     let makes = move |job: Job| {
         let mut times = PassTimes::new();

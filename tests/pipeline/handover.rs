@@ -1,4 +1,4 @@
-//! A million frames through the links and pools of a live run, under random stalls: none is lost track of.
+//! A million frames through the links and pools of a live run, under random stalls: no frame is lost track of.
 #![allow(missing_docs)]
 
 use std::thread;
@@ -9,7 +9,7 @@ use bokehcam::link::{Receiver, Sender, live};
 
 const FRAMES: u64 = if cfg!(miri) { 200 } else { 1_000_000 };
 
-/// Repeatable stalls: short turns of the processor, yields, and now and then a sleep.
+/// Reproducible stalls: short spins, yields, and now and then a sleep.
 struct Stalls(u64);
 
 impl Stalls {
@@ -38,7 +38,7 @@ impl Frame {
     }
 }
 
-/// Reads all frames of a link, in order; gives back how many, and the last one's number.
+/// Receives all frames of a link, in order; returns their count, and the number of the last one.
 fn receive(from: &mut Receiver<Frame>, mut each: impl FnMut(Frame)) -> (u64, Option<u64>) {
     let (mut count, mut last) = (0, None);
     while let Some(frame) = from.recv() {
@@ -50,7 +50,7 @@ fn receive(from: &mut Receiver<Frame>, mut each: impl FnMut(Frame)) -> (u64, Opt
     (count, last)
 }
 
-/// Sends a frame; gives back how many it displaced.
+/// Sends a frame; returns the number of frames that it displaced.
 fn send(to: &mut Sender<Frame>, frame: Frame) -> u64 {
     let id = frame.id;
     to.send(frame).expect("nobody goes early").map_or(0, |older| {
@@ -62,7 +62,7 @@ fn send(to: &mut Sender<Frame>, frame: Frame) -> u64 {
 
 #[test]
 fn a_million_frames_are_each_delivered_or_displaced_once() {
-    // What the stages hold, and what lies between them, as in a live run.
+    // The buffers that the stages hold, and those between them, as in a live run.
     let (colors, depths, outs) = (Pool::new(10, || 0), Pool::new(8, || 0), Pool::new(5, || 0));
     let (mut to_depth, mut from_capture) = live();
     let (mut to_blur, mut from_depth) = live();

@@ -1,4 +1,4 @@
-//! Live sources and outputs: the camera rests while nobody watches, and the output goes on.
+//! Live sources and outputs: without viewers the camera stops, and the output continues.
 
 use std::ops::ControlFlow;
 use std::sync::Arc;
@@ -15,7 +15,7 @@ use bokehcam::sink::{Sink, SinkError};
 use crate::fakes::{PERIOD_NS, SIZE};
 use crate::setup::dof;
 
-/// A camera that is opened by asking for a frame; it counts how often.
+/// A camera that opens when a frame is requested, and counts how often.
 struct Sleeper {
     opened: Arc<AtomicUsize>,
     open: bool,
@@ -45,11 +45,11 @@ impl Camera for Sleeper {
     }
 }
 
-/// What happens at an output that is watched twice: nobody, somebody, nobody, somebody.
+/// An output with four phases: without a viewer, watched, without, watched.
 struct Screen {
     demand: Demand,
     watch: Option<Watch>,
-    /// Pictures and repetitions since somebody came or went.
+    /// Pictures and repetitions since the last change of phase.
     shown: usize,
     phases: Arc<AtomicUsize>,
 }
@@ -70,7 +70,7 @@ impl Screen {
 
 impl Sink for Screen {
     fn put(&mut self, _: &ColorImage, _: u64) -> Result<ControlFlow<()>, SinkError> {
-        // What was under way when the last one left comes to nobody.
+        // Frames under way when the last viewer left are not shown.
         Ok(if self.watch.is_some() { self.show() } else { ControlFlow::Continue(()) })
     }
 
@@ -114,7 +114,7 @@ fn the_camera_rests_while_nobody_watches_and_the_output_goes_on() {
     assert_eq!(phases.load(Ordering::SeqCst), 4);
     assert_eq!(opened.load(Ordering::SeqCst), 2, "once for each time that somebody came");
     assert!(report.frames.balance(), "{:?}", report.frames);
-    // The one that met the end was not delivered.
+    // The frame at which the sink ended the run was not delivered.
     assert!(report.frames.delivered >= 2 * IN_A_PHASE as u64 - 1, "{:?}", report.frames);
     assert!(began.elapsed() < Duration::from_secs(300), "a hold is asked for anew each time");
 }

@@ -27,7 +27,7 @@ use crate::setup::*;
 pub const FRAMES: usize = 10;
 pub const STEP_NS: u64 = 40_000_000;
 
-/// Ten frames at 25 per second; their bytes are their numbers, their depth 1 m plus as many decimetres.
+/// Writes ten frames at 25 per second; frame `n` has bytes of value `n` and a depth of 1 m plus `n` decimetres.
 pub fn record(dir: &Path, with_depth: bool) {
     let mut writer = Writer::create(dir, &WriterOptions { depth_scale: 5000.0, overwrite: false }).unwrap();
     for frame in 0..FRAMES {
@@ -48,7 +48,7 @@ fn replay(dir: &Path, part: Part) -> Result<Replay, CaptureError> {
     Replay::new(open(dir), "test recording", &part)
 }
 
-/// Index, media time in milliseconds and first byte of all frames; at most `limit`.
+/// Returns index, media time in milliseconds and first byte of all frames, at most `limit`.
 pub fn play(camera: &mut dyn Camera, limit: usize) -> Vec<(usize, u64, u8)> {
     let (mut color, mut depth, mut right) = (ColorImage::default(), DepthMap::default(), GrayImage::default());
     let mut frames = Vec::new();
@@ -140,7 +140,7 @@ pub fn sink_options() -> bokehcam::sink::Options {
     bokehcam::sink::Options::new(SIZE, STEP_NS)
 }
 
-/// A frame of which only the stamp counts.
+/// Returns a frame that has only a stamp.
 pub fn seen(stamp: Stamp) -> FrameInput<'static> {
     static BLACK: ColorImage = ColorImage { width: 0, height: 0, rgb: Vec::new() };
     FrameInput { stamp, color: &BLACK, right: None }
@@ -169,7 +169,7 @@ fn depth_beside_other_colours_follows_their_time_in_a_loop() {
     let recording = Recording::open(folder.path(), &Options::default()).unwrap();
     let mut depth = Beside::new(recording, "test recording").unwrap();
     let mut map = DepthMap::default();
-    // A lap lasts 400 ms; the camera counts its frames as it likes.
+    // A lap lasts 400 ms; the camera's own frame count does not matter.
     for (time_ms, frame) in [(0, 0), (39, 0), (40, 1), (41, 1), (399, 9), (400, 0), (850, 1), (40_000_120, 3), (0, 0)] {
         depth.read(seen(Stamp { index: 77, time_ns: time_ms * 1_000_000, captured_ns: Some(5) }), &mut map).unwrap();
         assert_eq!(map.size(), SIZE);
@@ -188,7 +188,7 @@ fn frames_before_the_first_depth_are_counted_and_the_run_goes_on() {
     let stop = AtomicBool::new(false);
     let camera = replay(folder.path(), Part::default()).unwrap();
     let sink = Target::Null.open(&sink_options()).unwrap();
-    // Of a depth camera.
+    // Live depth, as from a depth camera.
     let late = depth_by(|FrameInput { stamp, .. }, map| {
         map.metres.fill(1.0);
         match stamp.index {
@@ -209,7 +209,7 @@ fn frames_before_the_first_depth_are_counted_and_the_run_goes_on() {
     assert_eq!((frames.captured, frames.dropped.unpaired, frames.delivered), (10, 4, 6));
 }
 
-/// The recording through depth and blur into a file; its bytes.
+/// Renders the recording through depth and blur into a file; returns its bytes.
 fn rendered(dir: &Path, file: &Path) -> Vec<u8> {
     let recording = open(dir);
     let stop = AtomicBool::new(false);
@@ -263,7 +263,7 @@ fn the_synthetic_camera_knows_its_depth() {
     }
 }
 
-/// The next frames of the demonstration, as many as come.
+/// Returns the next frames of the demonstration, at most `most`.
 fn demonstrated(camera: &mut Demo, most: usize) -> Vec<(Stamp, ColorImage, DepthMap)> {
     let mut frames = Vec::new();
     while frames.len() < most {
@@ -277,7 +277,7 @@ fn demonstrated(camera: &mut Demo, most: usize) -> Vec<(Stamp, ColorImage, Depth
     frames
 }
 
-/// The mean square of the differences of two pictures.
+/// Returns the mean squared difference of two pictures.
 fn apart(a: &ColorImage, b: &ColorImage) -> f64 {
     let squares = a.rgb.iter().zip(&b.rgb).map(|(a, b)| f64::from(a.abs_diff(*b)).powi(2));
     squares.sum::<f64>() / a.rgb.len() as f64
@@ -294,7 +294,7 @@ fn the_demonstration_is_the_rendered_scene_as_nearly_as_it_is_coded() {
         let (_, color, depth) = &frames[index];
         let psnr_db = psnr_db(color, &picture);
         assert!(psnr_db > 34.0, "frame {index}: {psnr_db} dB");
-        // Half a level; the mathematical functions of another machine may send a ray past an edge.
+        // Half a quantisation level; another machine's mathematical functions may send a ray past an edge.
         let is_off = |(a, b): &(&f32, &f32)| (a.recip() - b.recip()).abs() > 0.0044;
         let off = depth.metres.iter().zip(&map.metres).filter(is_off).count();
         assert!(off * 1000 <= map.metres.len(), "frame {index}: {off} depths");
@@ -315,7 +315,7 @@ fn the_demonstration_goes_round_without_a_jump_until_its_end() {
     let steps: Vec<f64> = frames.windows(2).map(|pair| apart(&pair[0].1, &pair[1].1)).collect();
     let most = steps[..lap - 1].iter().copied().fold(0.0, f64::max);
     assert!(steps.iter().all(|step| *step > 0.2 * most) && steps[lap - 1] <= most, "even steps: {steps:?}");
-    // Two that are read, some that are passed over, and the end.
+    // Two frames are read, some are skipped, then comes the end.
     let mut camera = Demo::new(Some(9)).unwrap();
     assert_eq!(demonstrated(&mut camera, 2).len(), 2);
     assert_eq!(camera.skip(200_000_000), 3);

@@ -1,4 +1,4 @@
-//! Back and forth in a recording: picture, depth and right eye of the frame that was asked for, in times that only go on.
+//! Seeking in a recording: picture, depth and right picture of the requested frame, with times that only increase.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -22,7 +22,7 @@ use crate::replay::{FRAMES, STEP_NS, open, play, record, seen, sink_options};
 use crate::setup::*;
 use crate::until::found;
 
-/// What takes longer hangs.
+/// Timeout: longer counts as a hang.
 const PATIENCE: Duration = Duration::from_secs(60);
 
 fn looped(dir: &Path, start_s: f64) -> Replay {
@@ -37,7 +37,7 @@ fn the_frame_that_is_asked_for_comes_next_and_media_time_only_goes_on() {
     let seeker = camera.seeker().unwrap();
     assert_eq!((seeker.frames(), seeker.length_ns(), seeker.time_ns(3)), (FRAMES, 10 * STEP_NS, 3 * STEP_NS));
     let mut frames = play(&mut camera, 2);
-    // On, back, across the seam, to the same frame again, and beyond the end.
+    // Forward, backward, across the seam, to the same frame again, and beyond the end.
     for place in [7, 3, 9, 9, 0, 99] {
         camera.seek(place);
         frames.extend(play(&mut camera, 2));
@@ -46,7 +46,7 @@ fn the_frame_that_is_asked_for_comes_next_and_media_time_only_goes_on() {
     assert!(frames.iter().map(|frame| frame.0).eq(indices), "{frames:?}");
     assert!(frames.iter().map(|frame| usize::from(frame.2)).eq(indices), "the pictures are those of the frames");
     assert!(frames.iter().map(|frame| frame.1).eq((0..14).map(|k| 40 * k)), "a period after each other: {frames:?}");
-    // Nothing that was asked for is passed over, and what comes after it is.
+    // A requested frame is never skipped; later ones may be.
     camera.seek(2);
     assert_eq!(camera.skip(14 * STEP_NS), 0);
     assert_eq!(camera.skip(16 * STEP_NS), 2);
@@ -67,7 +67,7 @@ fn a_part_is_sought_in_by_its_own_places_and_ends_where_it_did() {
     assert_eq!(play(&mut camera, 9), [(6, 0, 6)]);
     camera.seek(1);
     assert_eq!(play(&mut camera, 9).len(), 4, "from the second to the last");
-    // A number of frames is kept to, wherever they are.
+    // The limit on the number of frames holds across seeks.
     let mut few = Replay::new(open(folder.path()), "test recording", &Part { frames: Some(3), ..part }).unwrap();
     few.seek(4);
     assert_eq!(play(&mut few, 9).len(), 1);
@@ -126,7 +126,7 @@ fn depth_of_another_recording_stays_beside_the_colours() {
     }
 }
 
-/// Recorded depth that counts the scenes it was told of.
+/// Recorded depth that counts scene changes.
 struct Told(Recorded, Arc<std::sync::atomic::AtomicUsize>);
 
 impl DepthSource for Told {
@@ -170,13 +170,13 @@ fn while_nobody_watches_each_wish_brings_its_one_frame_with_its_depth() {
         assert!(views.try_recv().is_none(), "no other frame comes");
     };
     let checked = || {
-        // Also where a check fails.
+        // Stops the run even if a check fails.
         let _end = SetAtEnd(&stop);
         for (number, place) in [(1, 6), (2, 7), (3, 0), (4, 9)] {
             assert_eq!(seeker.go_to(place), number);
             next(&mut views, number, place);
         }
-        // Once somebody watches it goes on from there, over the seam.
+        // With a viewer, playback continues from there, across the seam.
         let _watch = demand.watch();
         let view = found("it goes on", PATIENCE, || views.try_recv());
         assert!(view.stamp.index < 9 && view.seek == 4 && !view.is_seek_target, "{:?}", view.stamp);

@@ -1,4 +1,4 @@
-//! A run of fakes, and looks for it.
+//! A run of fake stages, and looks for it.
 
 use std::cell::Cell;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -13,7 +13,7 @@ use bokehcam::stats::Report;
 
 use super::fakes::*;
 
-/// A run of fakes, good in every way until told otherwise.
+/// A run of fake stages without faults by default.
 pub struct Setup {
     pub frames: usize,
     pub corrupt_every: usize,
@@ -30,7 +30,7 @@ pub struct Setup {
     pub stop_after: u64,
 }
 
-/// A blur that follows depth, cut at `max_coc_px`.
+/// Returns a blur that follows depth, limited to `max_coc_px`.
 pub fn dof_with(focus: FocusRule, max_coc_px: f32) -> Look {
     Look {
         focus,
@@ -45,7 +45,7 @@ pub fn dof() -> Look {
     dof_with(FocusRule::Point { x: 0.0, y: 0.0 }, 20.0)
 }
 
-/// One radius everywhere.
+/// Returns a blur of one radius everywhere.
 pub fn uniform(radius_px: f32) -> Look {
     Look { strength: Strength::AtInfinity(radius_px), quality: Some(Quality::Fast), ..Look::plain(Effect::Blur) }
 }
@@ -69,7 +69,7 @@ impl Setup {
         }
     }
 
-    /// Runs, and checks what holds for every run.
+    /// Runs, and checks the invariants of every run.
     pub fn run(self) -> (Result<Report, PipelineError>, Received) {
         let received = Received::default();
         let stop = AtomicBool::new(false);

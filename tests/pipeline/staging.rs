@@ -1,4 +1,4 @@
-//! The subject of a stream is put before something else, and kept in the middle.
+//! The subject of a stream is put before a virtual background, and kept in the middle.
 #![allow(missing_docs)]
 
 use crate::common;
@@ -23,11 +23,11 @@ const FRAMES: u32 = 90;
 const PERSON: [u8; 3] = [200, 170, 40];
 const WALL: [u8; 3] = [190, 30, 160];
 
-/// Somebody who walks from the left to the right before a wall.
+/// A person who walks from the left to the right before a wall.
 struct Walk;
 
 impl Walk {
-    /// The middle of the person, as a fraction of the width: there are two seconds to get used to it.
+    /// Returns the person's centre, as a fraction of the width; the last frames stand still to let the framing settle.
     fn place(frame: u32) -> f32 {
         0.35 + 0.3 * (frame.saturating_sub(10) as f32 / 40.0).min(1.0)
     }
@@ -82,7 +82,7 @@ fn the_wall_is_gone_to_the_last_trace_and_the_person_is_as_they_were() {
         for (at, (pixel, own)) in picture.rgb.as_chunks::<3>().0.iter().zip(taken.rgb.as_chunks::<3>().0).enumerate() {
             let (x, y) = (at as u32 % SIZE.0, at as u32 / SIZE.0);
             let off = |of: [u8; 3]| (0..3).map(|p| pixel[p].abs_diff(of[p])).max().unwrap();
-            // Of a pixel on the outline it is not known to a code how much the person has.
+            // The alpha of a pixel on the outline is not known to within a code.
             let near = |dx: i32| Walk::is_person(frame, (x as i32 + dx).clamp(0, 319) as u32, y);
             let above = [90, 91, 130, 131].contains(&y);
             if near(-2) != near(2) || above {
@@ -120,7 +120,8 @@ fn who_looks_on_sees_what_was_taken_beside_what_became_of_it() {
     assert_eq!(seen, FRAMES);
 }
 
-/// The middle of what has the person's colour, as a fraction of the width, and how much of the picture that is.
+/// Returns the centre of the pixels of the person's colour, as a fraction of the width, and their fraction of the
+/// picture.
 fn seen(picture: &ColorImage) -> (f32, f32) {
     let is_person = |pixel: &[u8; 3]| pixel[1] > 120 && pixel[2] < 90;
     let pixels = picture.rgb.as_chunks::<3>().0;
@@ -138,7 +139,7 @@ fn who_walks_stays_in_the_middle_and_is_no_larger_than_was_said() {
         (before.0 - 0.35).abs() < 0.02 && after.0 > 0.36 && after.0 < 0.5,
         "as far as the border lets it: {after:?}"
     );
-    // In the middle of the way it lags by a part of a second of it.
+    // While the person walks, the framing lags by a fraction of a second of the way.
     let most = (20..50).map(|k| (seen(&followed[k]).0 - 0.5).abs()).fold(0.0, f32::max);
     assert!(most < 0.15, "{most}");
     let last = seen(&followed[FRAMES as usize - 1]);

@@ -1,4 +1,4 @@
-//! A stepper makes, on its caller's thread, what a run makes with its own.
+//! A stepper on its caller's thread gives the results of a run with its own threads.
 
 use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex};
@@ -34,7 +34,7 @@ fn every_frame_is_that_of_a_run() {
         let kept = kept.lock().unwrap();
         assert_eq!(kept.len(), recording.len());
         let mut stepper = Stepper::new(&look, recording.size(), true, true, Computing::default()).unwrap();
-        // Who asks for it reads depth for nothing where no blur follows it.
+        // Asking for depth would be wasted work where the effect does not follow it.
         assert_eq!(stepper.needs_depth(), look.effect.follows_depth(), "{:?}", look.effect);
         let mut scratch = Scratch::default();
         for (index, wanted) in kept.iter().enumerate() {

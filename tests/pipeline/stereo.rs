@@ -1,4 +1,4 @@
-//! Two eyes through the pipeline: what the right one saw comes with its picture, and the blur follows the disparity.
+//! Stereo pairs through the pipeline: the right picture stays with its left one, and the blur follows the disparity.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
@@ -25,7 +25,7 @@ fn two_eyes(frames: usize) -> FakeCamera {
     FakeCamera { brings: Brings::RightCamera, ..fake_camera(frames) }
 }
 
-/// A matcher of small pictures.
+/// Creates a matcher of small pictures.
 fn matcher(size: (u32, u32)) -> Box<dyn Matcher> {
     stereo::create(&Settings { size, disparities: 16, effort: Effort::Full, threads: 1 }, Backend::Cpu, None).unwrap()
 }
@@ -35,7 +35,7 @@ fn the_right_eye_comes_with_its_picture_and_unpaired_frames_are_counted() {
     let stop = AtomicBool::new(false);
     for pace in [Pace::Asap, Pace::Realtime] {
         let received = Received::default();
-        // What the right eye saw, which must be of the same frame as the picture.
+        // The right picture must be of the same frame as the left one.
         let depth = depth_by(|seen, map| {
             let right = seen.right.expect("a right eye");
             assert_eq!((right.luma[0], right.size()), (seen.stamp.index as u8, SIZE));
@@ -75,7 +75,7 @@ fn depth_from_two_eyes_of_a_camera_with_one_is_an_error() {
     assert!(matches!(error.fault, Fault::Depth(DepthError::OneEye { .. })), "{error}");
 }
 
-/// Depth that takes long, less with less effort; it marks the pictures that it straightens.
+/// Depth that takes long, less at lower effort; it marks the pictures that it rectifies.
 struct Slow {
     effort: Arc<AtomicUsize>,
     most: usize,
@@ -149,7 +149,7 @@ fn what_has_the_disparity_of_the_focus_is_sharp_and_the_rest_is_not() {
         far_max_px: 8.0,
         near_max_px: 16.0,
     };
-    // Whatever the rig: it says nothing of the blur.
+    // For any rig: it does not determine the blur.
     for rig in [StereoRig::assumed(width), StereoRig { focal_px: 300.0, baseline_m: 0.5, doffs_px: 0.0, metric: true }]
     {
         for (focus, near_is_sharp) in [((0.5, 0.5), true), ((0.85, 0.1), false)] {

@@ -1,4 +1,4 @@
-//! Pictures that are YUYV already: only for a sink that wants them, alone, and whole.
+//! YUYV pictures are only for a sink that wants them, without other readers, and uncropped.
 
 use std::ops::ControlFlow;
 use std::sync::atomic::AtomicBool;
@@ -17,7 +17,7 @@ use bokehcam::sink::{Sink, SinkError};
 use crate::fakes::*;
 use crate::setup::*;
 
-/// Makes YUYV where it may, of the frame's number.
+/// Creates a blur that encodes the frame's number as YUYV where it may.
 fn ready() -> FakeBokeh {
     let makes = |Job { ticket, color, depth, mut out, yuyv, .. }| {
         out.resize(SIZE.0, SIZE.1);
@@ -38,10 +38,10 @@ fn ready() -> FakeBokeh {
     FakeBokeh { backend: Backend::Gpu, makes: Box::new(makes), ..fake_bokeh(3, Trouble::default()) }
 }
 
-/// The frames that came, and whether as YUYV.
+/// The received frames: whether each was YUYV, and its number.
 type Came = Arc<Mutex<Vec<(bool, u16)>>>;
 
-/// A camera that wants YUYV but now and then, and keeps the memory of its last frame.
+/// A camera that wants YUYV intermittently, and keeps the memory of its last frame.
 struct Camera {
     came: Came,
     last: Vec<u8>,
@@ -49,7 +49,7 @@ struct Camera {
 }
 
 impl Camera {
-    /// Notes a frame of `N` bytes a pixel.
+    /// Records a frame of `N` bytes a pixel.
     fn note<const N: usize>(&self, bytes: &[u8]) {
         let pixels = bytes.as_chunks::<N>().0;
         assert!(pixels.iter().all(|pixel| *pixel == pixels[0]), "a frame of one piece");
@@ -77,7 +77,8 @@ impl Sink for Camera {
 
 const FRAMES: usize = 400;
 
-/// What comes of all frames where the camera wants YUYV once so many have come, in a run that `change` changes.
+/// Runs with the changes of `change`, and returns all frames; `wants` decides from the number received whether the
+/// camera wants YUYV.
 fn came(look: Look, wants: fn(usize) -> bool, change: impl FnOnce(&mut Run)) -> Vec<(bool, u16)> {
     let (came, stop) = (Came::default(), AtomicBool::new(false));
     let camera = FakeCamera { brings: Brings::Depth, ..fake_camera(FRAMES) };
@@ -96,7 +97,7 @@ fn came(look: Look, wants: fn(usize) -> bool, change: impl FnOnce(&mut Run)) -> 
 fn a_camera_alone_gets_yuyv_and_no_frame_is_lost_where_it_wants_something_else() {
     let turns = |came: usize| came / 40 % 2 == 1;
     let came = came(uniform(4.0), turns, |_| {});
-    // With three frames at the executor, a few more are under way in the form of before.
+    // With three frames at the executor, a few more are under way in the previous format.
     const UNDER_WAY: usize = 12;
     for (k, (is_yuyv, _)) in came.into_iter().enumerate().filter(|(k, _)| k % 40 >= UNDER_WAY) {
         assert_eq!(is_yuyv, turns(k), "frame {k}");

@@ -1,4 +1,4 @@
-//! Decoding of camera pictures beside plainer ways, in turns: their ratios hold on a busy machine, too.
+//! Decoding of camera pictures against plain implementations, interleaved: the ratios hold on a busy machine, too.
 #![allow(missing_docs)]
 
 use std::time::Instant;
@@ -10,7 +10,7 @@ use bokehcam::v4l2::{FourCc, Layout};
 const SIZE: (u32, u32) = (1280, 720);
 const ROUNDS: usize = 60;
 
-/// Median milliseconds of each, run in turns.
+/// Returns the median milliseconds of each, run in turns.
 fn medians<const N: usize>(mut runs: [&mut dyn FnMut(); N]) -> [f64; N] {
     let mut times = [const { Vec::new() }; N];
     for _ in 0..ROUNDS {
@@ -26,7 +26,7 @@ fn medians<const N: usize>(mut runs: [&mut dyn FnMut(); N]) -> [f64; N] {
     })
 }
 
-/// The usual way: each pixel in floating point, its chroma that of its pair.
+/// The usual way: each pixel in floating point, with the chroma of its pair.
 fn plain(yuyv: &[u8], rgb: &mut [u8]) {
     for (bytes, pixels) in yuyv.chunks_exact(4).zip(rgb.chunks_exact_mut(6)) {
         let (cb, cr) = (f32::from(bytes[1]) - 128.0, f32::from(bytes[3]) - 128.0);
@@ -71,7 +71,7 @@ fn main() {
         jpeg.len() / 1000,
         image / ours
     );
-    // Pictures that lost a piece, as over a bad cable.
+    // JPEGs that lost a piece, as over a bad cable.
     let (mut refused, mut tried) = (0, 0);
     for piece in [512, 3072, 24_000] {
         for at in (1000..jpeg.len() - piece - 1000).step_by(jpeg.len() / 60) {

@@ -1,8 +1,8 @@
-//! `cargo bench --bench finish -- RECORDING [OPTIONS]`: what it costs a frame to finish depth that was measured: holes,
-//! refinement, matte, and the memory of what lies behind. One thread; reading the recording is not counted.
+//! `cargo bench --bench finish -- RECORDING [OPTIONS]`: the cost per frame of postprocessing measured depth: holes,
+//! refinement, matte, and background memory. One thread; reading the recording is not counted.
 //!
-//! The ways of finishing take turns, so that what else the machine does strikes all alike. The checksum tells whether another
-//! build makes the same of the same frames, to the bit.
+//! The variants take turns, so that other load on the machine affects all alike. An equal checksum shows that another
+//! build gives the same result for the same frames, to the bit.
 
 mod common;
 
@@ -18,7 +18,7 @@ use bokehcam::look::{CocAtInfinity, CocRule};
 use bokehcam::recording::{Options as Reading, Recording, Scratch};
 use clap::Parser;
 
-/// What is done, and whether the background is remembered. Each has all of the one before.
+/// The variants: the postprocessing, and whether the background is remembered. Each includes all of the previous one.
 const WAYS: [(&str, Postprocess, bool); 4] = [
     ("matte", Postprocess::Keep, false),
     ("+ holes", Postprocess::Fill, false),

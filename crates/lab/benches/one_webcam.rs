@@ -1,8 +1,8 @@
-//! `cargo bench --bench one_webcam -- [OPTIONS]`: what depth and matte of one webcam cost a frame: processor time of all
-//! threads, without decoding and without blur.
+//! `cargo bench --bench one_webcam -- [OPTIONS]`: the cost per frame of depth and matte from one webcam: processor time
+//! of all threads, without decoding and without blur.
 //!
-//! The pictures are a real sequence, `rgbd/person_turning` in the folder BOKEHCAM_DATA, enlarged; networks come from its
-//! folder `models`. Sources take turns, so that what else the machine does strikes all alike.
+//! The pictures are a real sequence, `rgbd/person_turning` in the folder BOKEHCAM_DATA, enlarged; networks come from
+//! its folder `models`. Sources take turns, so that other load on the machine affects all alike.
 
 mod common;
 
@@ -20,9 +20,9 @@ use bokehcam::recording::{self, Recording, Scratch};
 use clap::Parser;
 use image::imageops::{FilterType, resize};
 
-/// Frames of the sequence that are shown, forth and back.
+/// Frames of the sequence that are played, back and forth.
 const FRAMES: usize = 24;
-/// What is behind the person of the sequence is farther than this.
+/// The background of the sequence is farther than this, in metres.
 const BEHIND_M: f32 = 1.8;
 
 #[derive(Parser)]
@@ -64,7 +64,7 @@ fn main() -> ExitCode {
     }
 }
 
-/// A source at work, and what it has taken so far.
+/// A source, and its times so far.
 struct Case {
     name: &'static str,
     source: Box<dyn DepthSource>,
@@ -97,7 +97,7 @@ fn measure(options: &Options, data: &Path) -> Result<(), Box<dyn std::error::Err
         cases.push(Case { name, source, frames: 0, wall_ms: 0.0, processor_ms: 0.0 });
     }
     let mut map = DepthMap::default();
-    // The first round finds its memory.
+    // The first round allocates, and is not counted.
     for round in 0..=options.rounds {
         for case in &mut cases {
             let (began, before_ns) = (Instant::now(), cpu_ns());
@@ -122,7 +122,8 @@ fn measure(options: &Options, data: &Path) -> Result<(), Box<dyn std::error::Err
     Ok(())
 }
 
-/// Pictures of the sequence in this size, and what is behind the person: of each pixel, the farthest that was seen.
+/// Returns the pictures of the sequence in this size, and its background: for each pixel, the colour at its farthest
+/// depth.
 fn pictures(data: &Path, size: (u32, u32)) -> Result<(Vec<ColorImage>, ColorImage), Box<dyn std::error::Error>> {
     let options = recording::Options { depth_scale: 1000.0, ..recording::Options::default() };
     let recording = Recording::open(&data.join("rgbd/person_turning"), &options)?;
@@ -143,14 +144,14 @@ fn pictures(data: &Path, size: (u32, u32)) -> Result<(Vec<ColorImage>, ColorImag
         }
         pictures.push(enlarged(&color, size));
     }
-    // What nobody ever saw is as beside it.
+    // Pixels that no frame uncovered are filled from the left neighbour.
     for at in (1..farthest_m.len()).filter(|&at| farthest_m[at] < BEHIND_M) {
         plate.rgb.copy_within(3 * (at - 1)..3 * at, 3 * at);
     }
     Ok((pictures, enlarged(&plate, size)))
 }
 
-/// The middle of a picture, in another size.
+/// Crops the middle of a picture and scales it to another size.
 fn enlarged(color: &ColorImage, (width, height): (u32, u32)) -> ColorImage {
     let rows = (color.width * height / width).min(color.height);
     let first = ((color.height - rows) / 2 * color.width * 3) as usize;
@@ -159,7 +160,7 @@ fn enlarged(color: &ColorImage, (width, height): (u32, u32)) -> ColorImage {
     ColorImage { width, height, rgb: resize(&picture, width, height, FilterType::CatmullRom).into_raw() }
 }
 
-/// The file of the first known network for a task that is there.
+/// Returns the file of the first known network for a task that exists.
 fn model(data: &Path, task: Task) -> Result<PathBuf, Box<dyn std::error::Error>> {
     let folder = data.join("models");
     best_in(vec![folder.clone()], task)

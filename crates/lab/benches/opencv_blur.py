@@ -108,7 +108,7 @@ def main():
         low_rank = rank_sum(kernel, 4)
         exact = lambda picture: cv2.filter2D(picture, -1, kernel, borderType=cv2.BORDER_REPLICATE)
         truth = srgb8(exact(light))
-        # A lone white light on dark grey, 7 px wide so that its disc is bright enough for 8 bits.
+        # A single white light on dark grey, 7 px wide so that its disc is bright enough for 8 bits.
         spot = np.full((h, w, 3), 40, np.uint8)
         cv2.circle(spot, (w // 2, h // 2), 5, (255,) * 3, -1)
         spot_light = linear(spot.astype(np.float32) / 255)

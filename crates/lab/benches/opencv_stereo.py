@@ -35,7 +35,7 @@ EDGE_PX, EDGE_BAND_PX, OFF_PX = 1.5, 5, 2
 EFFORTS = 'full', 'fast'
 
 
-# What is compared: each takes the grey pair and the range, and gives disparities, NaN where there is none.
+# The methods: each takes the grey pair and the range, and returns disparities, NaN where unknown.
 def block_matching(block):
     def make(disparities):
         matcher = cv2.StereoBM_create(disparities, block)

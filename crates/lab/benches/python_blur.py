@@ -79,7 +79,7 @@ def with_depth_map(image, coc):
     """BlurGenerator's own: grey 0..255 stands for its radii from 1, the least it has, to the largest."""
     radii = np.abs(coc)
     grey = np.clip(np.round(1 + 254 * radii / radii.max()), 1, 255).astype(np.uint8)
-    # It leaves the least grey black: one pixel has it.
+    # The function leaves the darkest grey black: one pixel has it.
     grey[0, 0] = 0
     most = int(np.ceil(radii.max()))
     return lens_blur_with_depth_map(

@@ -1,4 +1,4 @@
-//! A harness around the element, and pictures and maps to push into it.
+//! A harness for the element, and pictures and maps to push into it.
 
 use std::sync::Once;
 
@@ -21,7 +21,7 @@ pub fn caps(format: &str, (width, height): (u32, u32)) -> gst::Caps {
     text.parse().unwrap()
 }
 
-/// The element with a picture's pad, whose source waits as long as it has to.
+/// Creates the element with a picture pad, whose source blocks as long as needed.
 pub fn harness() -> Harness {
     init();
     let mut harness = Harness::with_padnames("bokeh", Some("sink"), Some("src"));
@@ -29,7 +29,7 @@ pub fn harness() -> Harness {
     harness
 }
 
-/// A pad for depth of the same element.
+/// Adds a depth pad of the same element.
 pub fn depth_of(harness: &Harness, size: (u32, u32)) -> Harness {
     let mut depth = Harness::with_element(&harness.element().unwrap(), Some("depth"), None);
     depth.set_live(false);
@@ -37,7 +37,7 @@ pub fn depth_of(harness: &Harness, size: (u32, u32)) -> Harness {
     depth
 }
 
-/// A buffer for the time of the frame `index`, of frames that last `frames` each.
+/// Creates a buffer at the time of frame `index`, which lasts `frames` frame periods.
 pub fn timed(bytes: Vec<u8>, index: u64, frames: u64) -> gst::Buffer {
     let mut buffer = gst::Buffer::from_slice(bytes);
     let inside = buffer.get_mut().unwrap();
@@ -46,7 +46,7 @@ pub fn timed(bytes: Vec<u8>, index: u64, frames: u64) -> gst::Buffer {
     buffer
 }
 
-/// Stripes that move, in RGB whose rows are whole words.
+/// Returns moving stripes in RGB, with rows that are multiples of 4 bytes.
 pub fn stripes((width, height): (u32, u32), index: u64) -> Vec<u8> {
     assert_eq!(width % 4, 0);
     let pixel = |at: u32| {
@@ -56,7 +56,7 @@ pub fn stripes((width, height): (u32, u32), index: u64) -> Vec<u8> {
     (0..width * height).flat_map(pixel).collect()
 }
 
-/// Millimetres: something near in the middle, before a wall.
+/// Returns a depth map in millimetres: a near object in the middle, before a wall.
 pub fn map((width, height): (u32, u32)) -> Vec<u8> {
     assert_eq!(width % 2, 0);
     let number = |at: u32| -> u16 {
@@ -70,7 +70,7 @@ pub fn bytes(buffer: &gst::BufferRef) -> Vec<u8> {
     buffer.map_readable().unwrap().to_vec()
 }
 
-/// A number of the element's statistics.
+/// Returns a number of the element's statistics.
 pub fn stat(element: &gst::Element, name: &str) -> u64 {
     element.property::<gst::Structure>("stats").get(name).unwrap()
 }

@@ -1,4 +1,4 @@
-//! Formats and their colours: what goes out is what the library's conversions make of what came in, to the bit.
+//! Formats and their colours: the output equals the library's conversions of the input, to the bit.
 
 use bokehcam::capture::pixels::Decoder;
 use bokehcam::color::Matrix;
@@ -23,7 +23,7 @@ fn noise(count: usize) -> Vec<u8> {
     (0..count).map(|_| byte()).collect()
 }
 
-/// What the element makes of a picture with the effect `blur`.
+/// Passes a picture through the element with the effect `blur`.
 fn through(caps: &gst::Caps, picture: Vec<u8>) -> Vec<u8> {
     let mut harness = harness();
     harness.element().unwrap().set_property_from_str("effect", "blur");
@@ -58,7 +58,7 @@ fn every_format_and_colorimetry_is_converted_as_the_library_does() {
         caps.make_mut().set("colorimetry", colorimetry);
         let info = VideoInfo::from_caps(&caps).unwrap();
         let picture = noise(info.size());
-        // Where planes lie, as GStreamer says; and in layouts of the library's.
+        // Plane offsets as GStreamer gives them, and in the library's layouts.
         let planes = info.n_planes() as usize;
         let given: Vec<Plane> =
             (0..planes).map(|at| Plane { stride_bytes: info.stride()[at] as usize, size_bytes: 0 }).collect();
@@ -72,7 +72,7 @@ fn every_format_and_colorimetry_is_converted_as_the_library_does() {
         let found = through(&caps, picture.clone());
         let mut wanted: Vec<Vec<u8>> = (0..planes).map(|at| found[info.offset()[at]..].to_vec()).collect();
         let mut slices: Vec<&mut [u8]> = wanted.iter_mut().map(Vec::as_mut_slice).collect();
-        // What lies between rows is nobody's.
+        // The padding between rows is undefined, so only the pixels are compared.
         Encoder::new(&layout).unwrap().encode(&blurred, &mut slices);
         for (at, wanted) in wanted.iter().enumerate() {
             assert!(found[info.offset()[at]..] == **wanted, "{format} {colorimetry} plane {at}");

@@ -1,4 +1,4 @@
-//! The element as GStreamer and its users meet it.
+//! The element as GStreamer and its users see it.
 
 mod common;
 mod formats;

@@ -1,4 +1,4 @@
-//! Two pads: which map goes with which picture, what ends first, what is late, and what changes.
+//! Two pads: which map pairs with which picture, the end of either stream, late buffers, and changes.
 
 use gst::prelude::*;
 
@@ -58,10 +58,10 @@ fn maps_that_come_twice_as_often_are_passed_over() {
         inside.set_duration(PERIOD / 2);
         buffer
     };
-    // Who gives more maps than are needed waits for the pictures.
+    // Pushing maps ahead of the pictures blocks.
     let maps = std::thread::spawn(move || {
         for index in 0..12 {
-            // The last one may come after the end.
+            // The last one may come after the end of the stream.
             let _ = depth.push(half(index));
         }
         depth
@@ -122,7 +122,7 @@ fn the_end_of_pictures_is_the_end_though_depth_goes_on() {
     assert!(ends(&mut harness));
 }
 
-/// Whether the end comes out.
+/// Returns whether the element sends end-of-stream.
 fn ends(harness: &mut gst_check::Harness) -> bool {
     std::iter::from_fn(|| harness.pull_event().ok()).take(20).any(|event| event.type_() == gst::EventType::Eos)
 }

@@ -1,4 +1,4 @@
-//! Properties are the library's settings: their names, defaults and ranges; what is not possible is refused.
+//! Properties are the library's settings: their names, defaults and ranges; impossible values are refused.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
@@ -16,7 +16,7 @@ fn element() -> gst::Element {
 fn every_setting_is_a_property_with_its_default_and_its_choices() {
     let element = element();
     for setting in &SETTINGS {
-        // Pipelines are written with a setting's other name where it has one.
+        // Pipelines use a setting's alias where it has one.
         let name = setting.alias().unwrap_or(setting.name);
         let spec = element.find_property(name).unwrap_or_else(|| panic!("no property {name}"));
         let flags = spec.flags();
@@ -74,7 +74,7 @@ fn text_that_means_nothing_keeps_the_element_from_starting_and_says_why() {
     element.set_property("aperture", "polygon:6");
     assert!(element.set_state(gst::State::Paused).is_ok());
     element.set_state(gst::State::Null).unwrap();
-    // Two numbers are no lens.
+    // Two numbers do not determine a lens.
     element.set_property("f-number", 2.0_f32);
     assert!(element.set_state(gst::State::Paused).is_err());
     element.set_state(gst::State::Null).unwrap();

@@ -1,4 +1,4 @@
-//! A recording through `gst-launch-1.0` is what `bokehcam stream` makes of it, to the bit.
+//! A recording through `gst-launch-1.0` gives the output of `bokehcam stream`, to the bit.
 
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
@@ -10,17 +10,17 @@ fn repository() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap().to_owned()
 }
 
-/// A folder with the plugin alone.
+/// Creates a folder with only the plugin.
 fn plugins(home: &Path) -> PathBuf {
     let (name, folder) = ("libgstbokehcam.so", home.join("plugins"));
-    // It is built beside this program.
+    // Cargo builds it beside this program.
     let built = std::env::current_exe().unwrap().with_file_name(name);
     std::fs::create_dir_all(&folder).unwrap();
     std::fs::copy(built, folder.join(name)).unwrap();
     folder
 }
 
-/// Runs a command of GStreamer's in the folder `home`, as one writes it, and returns what it says.
+/// Runs a GStreamer command line in the folder `home`, and returns its output.
 fn run(command: &str, home: &Path) -> String {
     let mut shell = Command::new("bash");
     shell.args(["-c", command]).current_dir(home);
@@ -35,7 +35,7 @@ fn run(command: &str, home: &Path) -> String {
 fn a_recording_is_what_stream_makes_of_it() {
     let (dir, recording) = (tempfile::tempdir().unwrap(), repository().join("recordings/portrait"));
     let (streamed, launched) = (dir.path().join("streamed"), dir.path().join("launched"));
-    // What the user has set up is none of the test's.
+    // An empty file keeps the user's settings out of the test.
     let settings = dir.path().join("config.toml");
     std::fs::write(&settings, "").unwrap();
     let mut arguments: Vec<OsString> =
@@ -92,7 +92,7 @@ fn the_pipelines_of_the_pages_run() {
     let page = std::fs::read_to_string(repository().join("docs/gstreamer.md")).unwrap();
     let text = page.replace("\\\n", " ");
     let commands = text.lines().filter(|line| line.starts_with("gst-launch-1.0 "));
-    // Cameras and screens are not everywhere.
+    // Not every machine has cameras and screens.
     let (left_out, ran): (Vec<&str>, Vec<&str>) =
         commands.partition(|line| ["/dev/video", "autovideosink"].iter().any(|part| line.contains(part)));
     ran.iter().for_each(|command| drop(run(command, home.path())));

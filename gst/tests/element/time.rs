@@ -1,4 +1,4 @@
-//! Flushes, seeks, latency, and what happens when the pipeline is late or live.
+//! Flushes, seeks, latency, and the behaviour when the pipeline is late or live.
 
 use std::sync::{Arc, Mutex};
 
@@ -23,7 +23,7 @@ fn after_a_flush_nothing_is_left_of_before() {
         bytes(&blurred)
     };
     let first: Vec<_> = (0..3).map(|index| next(index, map(SIZE), index)).collect();
-    // Another scene, so that focus and what was learned are others.
+    // Another scene, which changes the focus and the learned state.
     (3..9).for_each(|index| drop(next(index, near.clone(), index)));
     let flush = |harness: &mut gst_check::Harness| {
         harness.push_event(gst::event::FlushStart::new());
@@ -42,7 +42,7 @@ fn after_a_flush_nothing_is_left_of_before() {
     }
 }
 
-/// A pipeline that ends in `fakesink name=end`, and the times of what arrives there.
+/// Starts a pipeline that ends in `fakesink name=end`; returns the times of the buffers that arrive there, too.
 fn pipeline(line: &str) -> (gst::Pipeline, Arc<Mutex<Vec<gst::ClockTime>>>) {
     init();
     let pipeline = gst::parse::launch(line).unwrap().downcast::<gst::Pipeline>().unwrap();
@@ -104,7 +104,7 @@ fn a_live_source_has_a_period_more_of_latency() {
 #[test]
 fn live_pictures_do_not_wait_for_maps_that_are_late() {
     let raw = "width=64,height=48,framerate=25/1";
-    // Every map comes a fifth of a second later than the one before it, and so ever later.
+    // Every map is later than the previous one by a fifth of a second, so the delay accumulates.
     let (pipeline, times) = pipeline(&format!(
         "bokeh name=b ! fakesink name=end sync=true \
          videotestsrc is-live=true num-buffers=30 ! video/x-raw,format=RGB,{raw} ! queue ! b.sink \
@@ -118,7 +118,7 @@ fn live_pictures_do_not_wait_for_maps_that_are_late() {
     let element = pipeline.by_name("b").unwrap();
     let [pictures, maps, shared, late, without] =
         ["pictures", "maps", "shared-maps", "late", "without-map"].map(|name| stat(&element, name));
-    // Thirty maps would take six seconds.
+    // Thirty maps alone would take six seconds.
     assert!(took.as_millis() < 4000, "{took:?}");
     assert_eq!(pictures, 30);
     assert!((1..10).contains(&maps) && shared > 10 && without < 15, "{maps} {shared} {without}");
@@ -126,8 +126,8 @@ fn live_pictures_do_not_wait_for_maps_that_are_late() {
     pipeline.set_state(gst::State::Null).unwrap();
 }
 
-/// Pictures, so many a second, through an element whose sink says that they take `load` of the time there is; returns the
-/// qualities.
+/// Pushes pictures at `fps` through an element whose sink reports that they use the fraction `load` of the available
+/// time; returns the quality levels.
 fn qualities(harness: &mut gst_check::Harness, fps: i32, load: f64) -> Vec<String> {
     let size = (256, 192);
     let mut caps = caps("RGB", size);
@@ -145,7 +145,7 @@ fn qualities(harness: &mut gst_check::Harness, fps: i32, load: f64) -> Vec<Strin
 
 #[test]
 fn who_hears_that_it_is_late_blurs_more_coarsely_if_it_may() {
-    // A millisecond for each, of which other things take four: nothing is left for the blur.
+    // A millisecond for each picture, of which other work takes four: nothing is left for the blur.
     let mut late = harness();
     late.element().unwrap().set_property_from_str("effect", "blur");
     let found = qualities(&mut late, 1000, 4.0);
@@ -153,7 +153,7 @@ fn who_hears_that_it_is_late_blurs_more_coarsely_if_it_may() {
     let mut fixed = harness();
     fixed.element().unwrap().set_property_from_str("quality", "high");
     assert!(qualities(&mut fixed, 1000, 4.0).iter().all(|quality| quality == "high"));
-    // A second for each: also on a machine that has much else to do.
+    // A second for each picture: enough on a busy machine, too.
     let mut in_time = harness();
     assert!(qualities(&mut in_time, 1, 0.5).iter().all(|quality| quality == "balanced"));
     let mut deaf = harness();

@@ -30,7 +30,7 @@ pub trait Kernel {
     }
     /// Passes a buffer to the driver.
     fn queue(&mut self, index: u32) -> io::Result<()>;
-    /// Dequeues the oldest filled buffer; [`io::ErrorKind::WouldBlock`] when there is none.
+    /// Dequeues the oldest filled buffer; fails with [`io::ErrorKind::WouldBlock`] if no buffer is filled.
     fn dequeue(&mut self) -> io::Result<Dequeued>;
     fn stream_on(&mut self) -> io::Result<()>;
     /// Stops the stream; all buffers are returned.

@@ -8,7 +8,7 @@ use bokehcam::frame::DepthMap;
 use bokehcam::optics::CocKind;
 use bokehcam::optics::{CocField, DepthCoc, Ramp};
 
-/// Cases of each law where nobody asks for more.
+/// Default number of cases of each law.
 const CASES: u64 = 40;
 
 fn number(variable: &str, default: u64) -> u64 {
@@ -18,7 +18,7 @@ fn number(variable: &str, default: u64) -> u64 {
     }
 }
 
-/// Says how to play a case again, should it panic.
+/// Prints how to run a case again if it panics.
 struct Again(u64);
 
 impl Drop for Again {
@@ -29,7 +29,7 @@ impl Drop for Again {
     }
 }
 
-/// Plays the cases of a law.
+/// Runs the cases of a law.
 pub fn each_case(law: impl Fn(&mut Random)) {
     let first = number("BOKEHCAM_TEST_SEED", 1);
     for seed in first..first + number("BOKEHCAM_TEST_CASES", CASES) {
@@ -132,7 +132,7 @@ impl Random {
         }
     }
 
-    /// A field of an effect, no larger than the settings say, and depth for it.
+    /// Returns a field of an effect, within the limits of the settings, and a depth map for it.
     pub fn field(&mut self, settings: &Settings, (width, height): (u32, u32)) -> (CocField, DepthMap) {
         let (far_px, base_m) = (settings.far_max_px, 0.3 + 3.0 * self.share());
         let map = self.depth(base_m, (width, height));

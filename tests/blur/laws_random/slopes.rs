@@ -1,4 +1,5 @@
-//! Slopes before a wall: random surfaces whose CoC changes by less than a pixel a pixel, and what lies behind their edge.
+//! Slopes before a wall: random surfaces whose CoC changes by less than a pixel per pixel, and the wall behind their
+//! edge.
 
 use super::cases::Random;
 use super::common::{color, depth};
@@ -7,7 +8,8 @@ use bokehcam::optics::DepthCoc;
 
 /// Columns and rows.
 pub const SIZE: (u32, u32) = (240, 180);
-/// Pixels beyond the reach of a silhouette that may still show what is behind: it is noted on a coarse grid.
+/// Margin in pixels beyond the blur radius of a silhouette that may still show the background: the grid of bounds is
+/// coarse.
 const BESIDE_PX: f32 = 17.0;
 
 /// A surface in the lower part of the picture, and a wall behind it.
@@ -16,9 +18,9 @@ pub struct Slope {
     pub map: DepthMap,
     /// Whether all of it lies in front of the focal plane.
     pub is_in_front: bool,
-    /// Whether the surface is all that a pixel can see.
+    /// Whether the surface covers all that a pixel gathers from.
     pub alone: Vec<bool>,
-    /// Dark, with a texture, where the surface is.
+    /// Dark and textured where the surface is.
     texture: Vec<u8>,
     is_wall: Vec<bool>,
 }
@@ -28,7 +30,7 @@ impl Slope {
     pub fn new(random: &mut Random) -> Self {
         let (width, height) = (SIZE.0 as f32, SIZE.1 as f32);
         let max_px = 6.0 + 20.0 * random.share();
-        // Tilted any way, with waves: of gradients that sum up to less than one.
+        // Tilted in any direction, with waves; their gradients sum up to less than one.
         let tilt = glam::Vec2::from_angle(7.0 * random.share()) * 0.45 * random.share();
         let wave = glam::Vec2::from_angle(7.0 * random.share()) * (0.03 + 0.1 * random.share());
         let steep = 0.5 * random.share();
@@ -40,7 +42,7 @@ impl Slope {
         };
         let (edge, sway) = (height * (0.15 + 0.25 * random.share()), 12.0 * random.share());
         let is_wall = |x: u32, y: u32| (y as f32) < edge + sway * (x as f32 / 25.0).sin();
-        // Beyond all of the surface, by more than what goes on would be.
+        // The wall lies behind all of the surface, by a larger step than within a continuous surface.
         let pixels = || (0..SIZE.1).flat_map(|y| (0..SIZE.0).map(move |x| (x, y)));
         let farthest_px = pixels().map(|(x, y)| coc_px(x, y)).fold(f32::MIN, f32::max);
         let wall_px = if farthest_px < -3.0 { 0.0 } else { farthest_px + 2.0 + 0.2 * max_px };
@@ -70,13 +72,13 @@ impl Slope {
         }
     }
 
-    /// The picture, with a wall of this code.
+    /// Returns the picture, with the wall in this code.
     pub fn image(&self, wall: u8) -> ColorImage {
         let at = |x: u32, y: u32| (y * SIZE.0 + x) as usize;
         color(SIZE.0, SIZE.1, |x, y| [if self.is_wall[at(x, y)] { wall } else { self.texture[at(x, y)] }; 3])
     }
 
-    /// The largest difference of two pictures where the surface is alone, as codes, and where that is.
+    /// Returns the largest difference, in codes, of two pictures where the surface is alone, and its position.
     pub fn differ(&self, a: &ColorImage, b: &ColorImage) -> (u8, usize) {
         let pixels = a.rgb.chunks_exact(3).zip(b.rgb.chunks_exact(3)).enumerate().filter(|(at, _)| self.alone[*at]);
         pixels.map(|(at, (a, b))| (a[1].abs_diff(b[1]), at)).max().unwrap_or_default()

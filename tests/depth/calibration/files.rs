@@ -1,4 +1,4 @@
-//! Files of all kinds become the same rig, and what is wrong with one is told in a line.
+//! Files of all formats give the same rig, and every fault is reported in one line.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -87,7 +87,7 @@ cam1:
   rostopic: /cam1/image_raw
 ";
 
-/// A folder with files of these names and contents.
+/// Creates a folder with files of these names and contents.
 fn folder(files: &[(&str, &str)]) -> (TempDir, Vec<PathBuf>) {
     let dir = TempDir::new().unwrap();
     let paths: Vec<_> = files.iter().map(|(name, _)| dir.path().join(name)).collect();
@@ -125,7 +125,7 @@ fn opencv_in_one_file_or_two() {
     assert_eq!(one.eyes[1].center_px, DVec2::new(327.5, 261.5));
     let lens = Distortion::RadialTangential([-0.055, 0.078, 0.001, 0.002, -0.14, 0.0, 0.0, 0.0]);
     assert_eq!(one.eyes[0].distortion, lens);
-    // OpenCV writes 8, 12 or 14 coefficients where its models have as many.
+    // OpenCV writes 8, 12 or 14 coefficients, depending on the model.
     let rational = whole.replace("rows: 5\n   cols: 1", "rows: 14\n   cols: 1");
     let rational = rational.replace("-0.2 ]", "-0.2, 0., 0., -.1, 0., 0., 0., 0., 0., 0. ]");
     let lens = Distortion::RadialTangential([-0.08, 0.2, 0.0, 0.0, -0.2, 0.0, 0.0, -0.1]);
@@ -247,7 +247,7 @@ fn half_a_file_is_refused_in_one_line_too() {
     let whole = format!("{INTRINSICS}{}", EXTRINSICS.replace("%YAML:1.0\n", ""));
     for text in [whole.as_str(), CAMCHAIN, &sensor("0.1")] {
         for end in (0..text.len()).step_by(3) {
-            // Whether it is whole enough or not, it is told in a line.
+            // A truncated file either still suffices, or is refused in one line.
             match load(&[("s.yml", &text[..end])]) {
                 Ok(_) => assert!(end * 10 > text.len() * 7, "{}", &text[..end]),
                 Err(refusal) => assert!(refusal.contains("s.yml") && !refusal.contains('\n'), "{refusal}"),
@@ -256,7 +256,7 @@ fn half_a_file_is_refused_in_one_line_too() {
     }
 }
 
-/// A second change to what was broken once.
+/// Replaces a second part of an already changed file.
 trait ReplaceAll {
     fn replace_all(self, from: &str, to: &str) -> Self;
 }

@@ -1,4 +1,4 @@
-//! A point in space lies in one row of both rectified pictures, and its disparity tells its depth.
+//! A point in space lies in one row of both rectified pictures, and its disparity gives its depth.
 
 use bokehcam::calibration::StereoCalibration;
 use bokehcam::calibration::rectification::Rectification;
@@ -7,7 +7,7 @@ use glam::{DMat3, DVec2, DVec3};
 
 use super::{FISHEYE, NONE, RADTAN, SIZE, rig, rigs};
 
-/// Where the raw pictures of both eyes show `point` of the left camera's axes.
+/// Returns where the raw pictures of both cameras show `point`, given in the left camera's axes.
 fn raw_px(calibration: &StereoCalibration, point: DVec3) -> Option<[DVec2; 2]> {
     let seen = [point, calibration.rotation * point + calibration.translation_m];
     let [left, right] = [0, 1].map(|side| {
@@ -17,11 +17,11 @@ fn raw_px(calibration: &StereoCalibration, point: DVec3) -> Option<[DVec2; 2]> {
     Some([left?, right?])
 }
 
-/// The pixel of an eye's rectified picture that comes from `raw_px`, through the map as it is stored.
+/// Returns the pixel of a rectified picture that is sampled from `raw_px`, through the stored map.
 fn mapped_px(rectifier: &Rectifier, side: usize, raw_px: DVec2) -> Option<DVec2> {
     let map = &rectifier.maps()[side];
     let source = |x: u32, y: u32| map.source_px(x, y);
-    // Newton on the map: it bends little from pixel to pixel.
+    // Newton's method on the map, which is nearly linear between pixels.
     let mut guess = rectifier.rectification().centers_px[side];
     for _ in 0..40 {
         let corner = guess.floor();
@@ -39,7 +39,7 @@ fn mapped_px(rectifier: &Rectifier, side: usize, raw_px: DVec2) -> Option<DVec2>
     Some(guess)
 }
 
-/// Points before the cameras, near and far.
+/// Returns points before the cameras, near and far.
 fn points() -> impl Iterator<Item = DVec3> {
     (0..2000).map(|k: u32| {
         let part = |prime: f64| (f64::from(k) * prime).fract() * 2.0 - 1.0;
@@ -121,7 +121,7 @@ fn half_the_size_is_the_same_rays() {
         let half = calibration.at((320, 240)).unwrap();
         for (whole, half) in calibration.eyes.iter().zip(&half.eyes) {
             for (x, y) in [(0.0, 0.0), (100.0, 37.0), (318.0, 238.0)] {
-                // The centre of a pixel of half the resolution is that of four of the whole one.
+                // The centre of a pixel at half the resolution is that of four pixels at full resolution.
                 let pixel_px = DVec2::new(x, y);
                 let ray = half.ray(pixel_px, half.distortion.reach());
                 let expected = whole.ray(pixel_px * 2.0 + 0.5, whole.distortion.reach());

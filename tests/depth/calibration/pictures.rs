@@ -7,7 +7,7 @@ use glam::{DVec2, DVec3};
 
 use super::{NONE, RADTAN, SIZE, rig};
 
-/// Noise of a size.
+/// Returns noise of a size.
 fn noise((width, height): (u32, u32)) -> (ColorImage, GrayImage) {
     let mut bits = 1_u64;
     let mut byte = || {
@@ -20,7 +20,7 @@ fn noise((width, height): (u32, u32)) -> (ColorImage, GrayImage) {
     (color, GrayImage { width, height, luma })
 }
 
-/// A rig whose pictures of `size` are rectified already.
+/// Returns a rig whose pictures of `size` are already rectified.
 fn rectified(size: (u32, u32)) -> StereoCalibration {
     let mut calibration = rig(NONE, 500.0, [0.0; 3]);
     for eye in &mut calibration.eyes {
@@ -92,7 +92,7 @@ fn parts_make_the_whole() {
 fn what_no_eye_saw_is_black() {
     let mut calibration = rectified(SIZE);
     let mut given = *Rectifier::new(&calibration, SIZE).unwrap().rectification();
-    // The window moves 100 pixels to the left and 50 up, where no picture is.
+    // The window moves 100 pixels to the left and 50 up, beyond the picture.
     given.centers_px = given.centers_px.map(|center_px| center_px + DVec2::new(100.0, 50.0));
     calibration.given = Some(given);
     let rectifier = Rectifier::new(&calibration, SIZE).unwrap();

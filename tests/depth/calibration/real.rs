@@ -1,4 +1,4 @@
-//! Calibrations and pictures of real rigs, where they are at hand.
+//! Calibrations and pictures of real rigs, where available.
 
 use std::path::PathBuf;
 
@@ -10,7 +10,7 @@ fn data() -> PathBuf {
     PathBuf::from(std::env::var_os("BOKEHCAM_DATA").expect("BOKEHCAM_DATA names the folder of the data"))
 }
 
-/// Greatest angle in degrees between two rotations.
+/// Returns the angle in degrees between two rotations.
 fn apart_deg(a: DMat3, b: DMat3) -> f64 {
     glam::DQuat::from_mat3(&(a * b.transpose())).to_scaled_axis().length().to_degrees()
 }
@@ -29,7 +29,7 @@ fn opencvs_own_rectification_is_ours() {
         assert!(apart_deg(ours, theirs) < 1e-5, "{} degrees", apart_deg(ours, theirs));
     }
     assert!((ours.baseline_m - given.baseline_m).abs() < 1e-6);
-    // The file's window shows black corners, so that it has more in it.
+    // The file's window includes black corners, so it covers more.
     assert!((1.0..1.5).contains(&(ours.focal_px.x / given.focal_px.x)), "{} {}", ours.focal_px, given.focal_px);
 }
 

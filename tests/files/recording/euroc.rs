@@ -6,7 +6,7 @@ use bokehcam::recording::{Options, Pair, Recording, Unpaired};
 
 use super::{SIZE, Scene, assert_says, color_of, right_of, save_grey, times_ns};
 
-/// A time whose last digits `f64` would lose.
+/// A time whose last digits do not fit an `f64`.
 const START_NS: u64 = 1_403_715_276_262_142_977;
 const PERIOD_NS: u64 = 50_000_001;
 
@@ -14,7 +14,7 @@ fn time_ns(index: u64) -> u64 {
     START_NS + index * PERIOD_NS
 }
 
-/// `count` pairs, left shade 10 + index, right 100 + index, with their lists.
+/// Creates `count` pairs, left shade 10 + index, right 100 + index, with their lists.
 fn with_cameras(count: u64) -> Scene {
     let scene = Scene::new();
     for (camera, shade) in [("cam0", 10), ("cam1", 100)] {
@@ -54,7 +54,8 @@ fn every_nanosecond_counts_from_the_lists_or_the_names() {
 #[test]
 fn cameras_are_paired_by_time_and_what_is_left_over_is_counted() {
     let scene = with_cameras(4);
-    // The right camera missed the second frame, saw the third a little late, and one that the left one missed.
+    // The right camera missed the second frame, delivered the third slightly late, and has one that the left camera
+    // missed.
     let late_ns = time_ns(2) + 3_000_000;
     let between_ns = time_ns(3) + PERIOD_NS / 2 + 1_000_000;
     let name = |index: u64| format!("{}.png", time_ns(index));

@@ -1,4 +1,4 @@
-//! Every way in which a recording can be wrong is told in one line: what, where, what to do.
+//! Every fault of a recording is reported in one line: what, where, what to do.
 
 use std::fs;
 use std::os::unix::fs::symlink;
@@ -42,7 +42,7 @@ fn streams_that_never_meet_are_told() {
     assert_says(scene.open(), &["no depth map lies within 20 ms", "of one clock"]);
 }
 
-/// Lines that are wrong, and what is said of them.
+/// Invalid lines, and the error of each.
 const WRONG_LINES: [(&[u8], &str); 14] = [
     (b"1.1", "expected `time file`, found 1 column(s)"),
     (b"1.1 rgb/1.png 1.1 depth/1.png", "found 4 column(s)"),
@@ -83,7 +83,7 @@ fn a_wrong_line_stays_a_frame_when_going_on() {
         for index in [0, 2, 3] {
             depth_of(&recording, index).unwrap();
         }
-        // A line whose time is good still has its depth.
+        // A line with a valid time still has its depth.
         match depth_of(&recording, 1) {
             Ok(depth) => assert_eq!(depth.metres[0], 2.0),
             error => assert_says(error, &["rgb.txt:3: ", says]),
@@ -97,7 +97,7 @@ fn wrong_lines_of_the_depth_list_are_told_where_they_are() {
     scene.write("depth.txt", "1.0 depth/0.png\n1.1 /depth/1.png\nsoon depth/2.png\n");
     assert_says(scene.open(), &["depth.txt:2: ", "points outside"]);
     let recording = scene.open_keep_going();
-    // The second pairs by its time; the third has none to pair by.
+    // The second pairs by its time; the third has no time to pair by.
     assert_eq!((recording.len(), recording.unpaired().color, recording.unpaired().depth), (2, 1, 1));
     assert!(color_of(&recording, 1).is_ok());
     assert_says(depth_of(&recording, 1), &["depth.txt:2: ", "points outside"]);
@@ -120,7 +120,7 @@ fn wrong_lines_of_the_associations_are_told_where_they_are() {
     assert!(depth_of(&recording, 3).is_ok());
 }
 
-/// Times count in 64 bits of nanoseconds; what is reckoned with them stays far from their end.
+/// Times are 64-bit nanoseconds; sums of them must not overflow.
 #[test]
 fn a_time_of_another_age_is_a_fault() {
     let scene = Scene::with_pairs(3);
@@ -150,7 +150,7 @@ fn one_wrong_date_does_not_cost_the_frames_after_it() {
     assert_eq!(times_ns(&recording), [0, 100_000_000, 200_000_000, 300_000_000]);
 }
 
-/// Asserts what reading picture 1 says, which a fault of the file must not make the opening say.
+/// Asserts the error of reading picture 1, a fault that opening the recording does not report.
 fn assert_color_fault(scene: &Scene, says: &str) {
     assert_says(color_of(&scene.open().unwrap(), 1), &["rgb.txt:2: rgb/1.png: ", says, ";"]);
     assert!(color_of(&scene.open().unwrap(), 2).is_ok());
@@ -187,7 +187,7 @@ fn a_link_out_of_the_recording_is_refused_and_one_inside_is_followed() {
     scene.remove("rgb/1.png");
     symlink("2.png", scene.path("rgb/1.png")).unwrap();
     assert_eq!(color_of(&scene.open().unwrap(), 1).unwrap().rgb[0], 2);
-    // The recording itself may be reached through a link.
+    // The recording itself may be reached through a symbolic link.
     symlink(scene.dir.path(), elsewhere.path("linked")).unwrap();
     let recording = Recording::open(&elsewhere.path("linked"), &Options::default()).unwrap();
     assert_eq!(color_of(&recording, 0).unwrap().size(), SIZE);
@@ -228,7 +228,7 @@ fn a_cut_jpeg_is_told_at_every_length() {
         scene.write("rgb/1.jpg", &whole[..length]);
         assert_says(color_of(&scene.open().unwrap(), 1), &["rgb.txt:2: rgb/1.jpg: the file ends before"]);
     }
-    // Rubbish after the end does no harm.
+    // Trailing garbage is harmless.
     scene.write("rgb/1.jpg", [&whole[..], b"rubbish"].concat());
     assert!(color_of(&scene.open().unwrap(), 1).is_ok());
 }
@@ -254,7 +254,7 @@ fn a_bomb_is_refused_from_its_header() {
         scene.write("depth/1.png", png_that_claims(width, height));
         assert_depth_fault(&scene, &format!("claims {width}x{height} pixels"));
     }
-    // A JPEG has its size in the frame header.
+    // A JPEG stores its size in the frame header.
     scene.color("rgb/bomb.jpg", SIZE, 0);
     let mut file = fs::read(scene.path("rgb/bomb.jpg")).unwrap();
     let header = file.windows(2).position(|pair| pair == [0xFF, 0xC0]).unwrap();

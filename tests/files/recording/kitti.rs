@@ -1,4 +1,4 @@
-//! The layouts of KITTI, and what people make of them.
+//! The layouts of KITTI, and common variants.
 
 use std::fs;
 
@@ -9,7 +9,7 @@ use super::{SIZE, Scene, assert_says, color_of, right_of, save_grey, times_ns};
 const CALIBRATION: &str = "P0: 700 0 600 0 0 700 180 0 0 0 1 0\nP1: 700 0 600 -350 0 700 180 0 0 0 1 0\n\
                            P2: 700 0 610 42 0 700 180 0 0 0 1 0\nP3: 700 0 612 -343 0 700 180 0 0 0 1 0\n";
 
-/// `count` pairs in the folders `left` and `right`: colour of the shade of their number, right grey 100 more.
+/// Creates `count` pairs in the folders `left` and `right`: colour of the shade of their number, right grey 100 more.
 fn with_eyes(left: &str, right: &str, count: u8) -> Scene {
     let scene = Scene::new();
     add_eyes(&scene, left, right, count);
@@ -36,7 +36,7 @@ fn odometry() -> Scene {
 #[test]
 fn a_sequence_has_two_rectified_eyes_and_its_times() {
     let scene = odometry();
-    // Grey is there, too, and colour goes first.
+    // Grey pictures are there, too, and colour takes precedence.
     add_eyes(&scene, "image_0", "image_1", 1);
     let recording = scene.open().unwrap();
     assert_eq!((recording.layout(), recording.len(), recording.has_depth()), ("KITTI", 3, false));
@@ -62,7 +62,7 @@ fn the_folders_that_people_have_are_known() {
     ] {
         let scene = with_eyes(left, right, 2);
         let recording = scene.open().unwrap();
-        // Nothing is said: ten frames a second, of eyes that stand anyhow.
+        // Without a calibration: ten frames a second, of cameras in unknown positions.
         assert_eq!(times_ns(&recording), [0, 100_000_000]);
         assert_eq!(recording.pair(), Some(&Pair::Unstated));
         scene.write("calib_cam_to_cam.txt", CALIBRATION.replace('P', "P_rect_0"));

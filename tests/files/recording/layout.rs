@@ -1,4 +1,4 @@
-//! What the lists mean: pairs, columns, times.
+//! The meaning of the lists: pairs, columns, times.
 
 use bokehcam::recording::{Options, Unpaired};
 
@@ -58,7 +58,7 @@ fn colour_alone_is_a_recording() {
     assert_says(depth_of(&recording, 0), &["the recording has no depth"]);
 }
 
-/// The columns are told by the pictures, and where these tell nothing by the other lists.
+/// The columns are recognised by the pictures, and where these are ambiguous by the other lists.
 #[test]
 fn associations_are_read_in_either_order() {
     let color_first = "1.0 rgb/0.png 1.01 depth/0.png\n1.1 rgb/1.png 1.11 depth/1.png\n";

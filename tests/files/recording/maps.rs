@@ -44,7 +44,7 @@ fn disparity_survives_png_within_half_a_unit_and_pfm_exactly() {
     let read = read_disparity(&png).unwrap();
     assert_eq!(read.size(), (7, 5));
     assert!(disparity.px.iter().zip(&read.px).all(|(a, b)| (a - b).abs() <= 0.5 / 256.0));
-    // As others read the files: KITTI's 0 and Middlebury's infinity are unknown.
+    // Unknown values as other tools expect them: KITTI's 0 and Middlebury's infinity.
     let raw = image::open(&png).unwrap().into_luma16();
     assert_eq!((raw.get_pixel(0, 0)[0], raw.get_pixel(1, 0)[0]), (0, 1874));
     // The first value is the bottom row's.
@@ -67,7 +67,7 @@ fn a_pfm_is_read_from_its_bottom_row_in_either_byte_order() {
     let big: Vec<u8> = values.iter().flat_map(|value| value.to_be_bytes()).collect();
     for (scale, data) in [("-1.0", little), ("1", big)] {
         let content = [format!("Pf\n2 2\n{scale}\n").as_bytes(), &data].concat();
-        // What is no depth is unknown.
+        // Invalid depths become unknown.
         assert_eq!(read_pfm(dir.path(), &content).unwrap().metres, [1.0, 0.0, 3.0, 0.0]);
         assert_says(read_pfm(dir.path(), &content[..content.len() - 1]), &["map.pfm: the file ends before"]);
     }
@@ -99,7 +99,7 @@ fn a_map_says_what_it_holds() {
         write_depth(&path(name), &depth, 1000.0, false).unwrap();
         assert_eq!(read_map(&path(name), None, None).unwrap(), Map::Depth(depth.clone()), "{name}");
     }
-    // Who says otherwise has it so.
+    // An explicit scale overrides the file's.
     let Map::Depth(other) = read_map(&path("z.png"), Some(500.0), None).unwrap() else { panic!("it is depth") };
     assert_eq!(other.metres, [1.0, 8.0]);
 
@@ -114,7 +114,7 @@ fn a_map_says_what_it_holds() {
             None => assert_says(read_depth(&path(name), 5000.0, None), &[name, "disparity is not depth"]),
         }
     }
-    // What others write says nothing, and is taken for metres.
+    // Files of other tools have no unit, and count as metres.
     let other = [&b"Pf\n1 1\n-1.0\n"[..], &3.0_f32.to_le_bytes()].concat();
     assert_eq!(read_pfm(dir.path(), &other).unwrap().metres, [3.0]);
 }

@@ -49,7 +49,7 @@ fn nothing_but_the_pictures_is_needed() {
         assert_eq!((recording.pair(), recording.has_depth()), (Some(&Pair::Unstated), false));
         assert_eq!(recording.disparities(), None);
     }
-    // Disparity without a calibration is no depth.
+    // Disparity without a calibration gives no depth.
     let scene = with_pair();
     scene.remove("calib.txt");
     assert!(!scene.open().unwrap().has_depth());
@@ -94,7 +94,7 @@ fn what_is_wrong_is_told() {
     assert_says(depth_of(&scene.open().unwrap(), 0), &["disp0.pfm: the file ends before"]);
 }
 
-/// One picture of a pair is none.
+/// A single picture of a pair is not a recording.
 #[test]
 fn a_folder_that_is_nothing_is_told_all_layouts() {
     let scene = with_pair();

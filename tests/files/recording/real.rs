@@ -1,4 +1,4 @@
-//! Pictures from a real camera, where they are at hand.
+//! Pictures from real cameras, where available.
 
 use std::path::{Path, PathBuf};
 
@@ -51,7 +51,7 @@ fn sequences_of_two_eyes() {
 
     let euroc = open("stereo_seq/MicroEurocDataset");
     assert_eq!((euroc.layout(), euroc.len(), euroc.size()), ("EuRoC/ASL", 6, (752, 480)));
-    // By the names of the pictures: there is no list.
+    // Times come from the names of the pictures: there is no list.
     assert_eq!((euroc.time_ns(1), euroc.time_ns(5)), (50_000_128, 250_000_128));
     let Some(Pair::Raw(calibration)) = euroc.pair() else { panic!("{:?}", euroc.pair()) };
     assert!((calibration.translation_m.length() - 0.110).abs() < 1e-3, "{calibration:?}");
@@ -74,7 +74,7 @@ fn pairs_with_and_without_a_calibration() {
     assert_eq!(right_of(&terrace, 0).unwrap().size(), (713, 434));
     let mut known: Vec<f32> = depth_of(&terrace, 0).unwrap().metres;
     known.retain(|metres| *metres > 0.0);
-    // A terrace, measured by a laser: half of it, from 1.5 to 30 m.
+    // A terrace, measured by a laser: half of the pixels, from 1.5 to 30 m.
     assert!((0.5..0.56).contains(&(known.len() as f32 / (713.0 * 434.0))), "{}", known.len());
     assert!(known.iter().all(|metres| (1.0..100.0).contains(metres)));
     assert_eq!(open("stereo/cones").pair(), Some(&Pair::Unstated));

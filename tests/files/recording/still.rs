@@ -60,7 +60,7 @@ fn png_keeps_colour_exactly_and_jpeg_nearly() {
         let worst = image.rgb.iter().zip(&read.rgb).map(|(a, b)| a.abs_diff(*b)).max();
         assert!(worst <= Some(tolerance), "{name}: off by {worst:?}");
     }
-    // Nothing is left beside the four.
+    // No other file is left besides the four.
     assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 4);
 }
 
@@ -90,7 +90,7 @@ fn what_cannot_be_written_leaves_nothing() {
     }
     assert_says(write_depth(&dir.path().join("a.jpg"), &DepthMap::new(2, 2), 1.0, false), &["`.png` or `.pfm`"]);
     assert_says(write_color(&dir.path().join("none/a.png"), &gradient(), false), &["cannot write", "none/a.png"]);
-    // A folder is in the way, which only the last step notices.
+    // A folder is in the way, which only the last step detects.
     fs::create_dir_all(dir.path().join("b.png/inside")).unwrap();
     assert_says(write_color(&dir.path().join("b.png"), &gradient(), true), &["cannot write", "b.png"]);
     assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 1);
@@ -128,7 +128,7 @@ fn grey_is_luma_as_stored() {
     assert!((read(RgbaImage::from_pixel(3, 2, [255, 255, 255, 51].into()).into()) - 0.2).abs() < 1e-6);
 }
 
-/// A photograph says how the camera was held; the blur must not lose that.
+/// A photograph records the camera's orientation; the blur must not lose that.
 #[test]
 fn a_turned_photograph_is_read_upright() {
     let dir = TempDir::new().unwrap();
@@ -148,7 +148,7 @@ fn a_turned_photograph_is_read_upright() {
     assert!(upright.rgb[0] > 250 && upright.rgb[16 * 31 * 3] < 5);
 }
 
-/// A file of these chunks, each with its checksum.
+/// Builds a PNG of these chunks, each with its checksum.
 fn png(chunks: &[(&[u8; 4], Vec<u8>)]) -> Vec<u8> {
     let mut file = b"\x89PNG\r\n\x1a\n".to_vec();
     for (name, data) in chunks {
@@ -160,7 +160,7 @@ fn png(chunks: &[(&[u8; 4], Vec<u8>)]) -> Vec<u8> {
     file
 }
 
-/// Not compressed, in the format of the compressed.
+/// Returns a zlib stream of stored (uncompressed) blocks.
 fn stored(data: &[u8]) -> Vec<u8> {
     let (mut a, mut b) = (1_u32, 0_u32);
     for &byte in data {
@@ -171,7 +171,7 @@ fn stored(data: &[u8]) -> Vec<u8> {
     [&[0x78, 1, 1][..], &length.to_le_bytes(), &(!length).to_le_bytes(), data, &(b << 16 | a).to_be_bytes()].concat()
 }
 
-/// Rows of an interlaced picture come in seven passes over all of it, of which a small one has fewer.
+/// Rows of an interlaced picture come in seven passes, of which a small picture has fewer.
 #[test]
 fn an_interlaced_picture_is_put_together() {
     let dir = TempDir::new().unwrap();
@@ -198,7 +198,7 @@ fn an_interlaced_picture_is_put_together() {
     }
 }
 
-/// EXIF of a camera held upright (orientation 6), with a name of the camera and a thumbnail.
+/// Returns EXIF data of a camera held upright (orientation 6), with a camera name and a thumbnail.
 fn exif() -> Vec<u8> {
     let entry = |tag: u16, kind: u16, count: u32, value: [u8; 4]| {
         [&tag.to_be_bytes()[..], &kind.to_be_bytes(), &count.to_be_bytes(), &value].concat()
@@ -236,7 +236,7 @@ fn profile_and_exif_go_with_the_picture() {
         let (upright, extras) = read_photo(&path(from)).unwrap();
         assert_eq!((upright.size(), extras.icc_profile.as_ref()), ((16, 32), Some(&profile)), "{from}");
         write_photo(&path(to), &upright, &extras.without_thumbnail().for_jpeg(), false).unwrap();
-        // Turned once, and not again.
+        // Rotated once, not twice.
         let (again, extras) = read_photo(&path(to)).unwrap();
         assert_eq!((again.size(), extras.icc_profile, extras.left_behind.len()), ((16, 32), Some(profile.clone()), 0));
         let kept = extras.exif.unwrap();
@@ -245,7 +245,7 @@ fn profile_and_exif_go_with_the_picture() {
         assert_eq!(kept[30..32], [0, 1], "it says that it is upright");
     }
 
-    // What RGB of 8 bits cannot hold is named.
+    // `left_behind` names the properties that 8-bit RGB cannot hold.
     let wide = ImageBuffer::<image::Rgba<u16>, _>::from_pixel(2, 2, [1, 2, 3, 4].into());
     DynamicImage::from(wide).save(path("wide.png")).unwrap();
     assert_eq!(read_photo(&path("wide.png")).unwrap().1.left_behind, ["transparency", "16 bits a channel"]);

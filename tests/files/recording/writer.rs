@@ -1,4 +1,4 @@
-//! What is written is read again.
+//! A written recording is read back.
 
 use std::fs;
 
@@ -11,7 +11,7 @@ use super::{SIZE, assert_says, color_of, depth_of, times_ns};
 
 const SCALE: f32 = 5000.0;
 
-/// A picture and a depth map of `SIZE` with something different in each pixel; every seventh depth is unknown.
+/// Returns a picture and a depth map of `SIZE` with different values in each pixel; every seventh depth is unknown.
 fn frame(seed: u32) -> (ColorImage, DepthMap) {
     let (mut color, mut depth) = (ColorImage::new(SIZE.0, SIZE.1), DepthMap::new(SIZE.0, SIZE.1));
     for (index, byte) in (0..).zip(&mut color.rgb) {
@@ -100,12 +100,12 @@ fn an_existing_recording_is_kept_unless_asked() {
     let mut writer = Writer::create(dir.path(), &WriterOptions::default()).unwrap();
     writer.add(0, &color, Some(&depth)).unwrap();
     writer.add(1, &color, Some(&depth)).unwrap();
-    // While it is written nobody else writes it.
+    // While it is being written, no other run may write it.
     let overwrite = WriterOptions { overwrite: true, ..WriterOptions::default() };
     assert_says(Writer::create(dir.path(), &overwrite).map(drop), &["is being written by another run"]);
     writer.finish().unwrap();
     assert_says(Writer::create(dir.path(), &WriterOptions::default()).map(drop), &["already there"]);
-    // And so are pictures without lists.
+    // Pictures without lists count as a recording, too.
     for list in ["rgb.txt", "depth.txt"] {
         fs::remove_file(dir.path().join(list)).unwrap();
     }

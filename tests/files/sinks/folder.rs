@@ -34,7 +34,7 @@ fn a_folder_is_replaced_only_by_force_and_only_what_was_written_by_us() {
     }
     let not_empty = open(&out.join(""), &options((6, 4))).err().unwrap();
     assert!(matches!(not_empty, SinkError::Folder(FolderError::NotEmpty { .. })), "{not_empty}");
-    // A name that a frame may have, in a run of any number of frames.
+    // A name that a frame may have, in a run of unlimited length.
     let foreign = open(&out.join(""), &forced((6, 4))).err().unwrap();
     assert!(matches!(foreign, SinkError::Folder(FolderError::Foreign { .. })), "{foreign}");
     let two = Options { frames: Some(2), ..forced((6, 4)) };
@@ -58,7 +58,7 @@ fn a_folder_is_replaced_only_by_force_and_only_what_was_written_by_us() {
 #[test]
 fn a_failed_picture_leaves_no_partial_name() {
     let folder = tempfile::tempdir().unwrap();
-    // Fewer bytes than its size says: the encoder refuses after the file was made. Or the next name is taken.
+    // Fewer bytes than its size claims: the encoder fails after the file was created. Or the next name is taken.
     let broken = ColorImage { width: 0, height: 4, rgb: Vec::new() };
     for (name, next, taken) in [("broken", &broken, false), ("taken", &picture(6, 4, 1), true)] {
         let out = folder.path().join(name);

@@ -1,4 +1,4 @@
-//! Sinks: what they write, and that it appears whole or not at all.
+//! Sinks: their output, and that it appears whole or not at all.
 #![allow(missing_docs)]
 
 mod folder;
@@ -26,7 +26,7 @@ pub fn flat(width: u32, height: u32, rgb: [u8; 3]) -> ColorImage {
     image
 }
 
-/// Smooth colours that change from frame to frame.
+/// Returns smooth colours that change from frame to frame.
 pub fn picture(width: u32, height: u32, frame: u32) -> ColorImage {
     let mut image = ColorImage::new(width, height);
     for (index, pixel) in image.rgb.chunks_exact_mut(3).enumerate() {
@@ -41,7 +41,7 @@ pub fn open(name: &Path, options: &Options) -> Result<Box<dyn Sink>, SinkError> 
     name.to_str().unwrap().parse::<Target>()?.open(options)
 }
 
-/// Frames that come as evenly as they were announced.
+/// Puts frames at exactly the announced period.
 pub fn put_all(sink: &mut dyn Sink, frames: &[ColorImage]) {
     for (frame, at) in frames.iter().zip(0..) {
         assert_eq!(sink.put(frame, at * PERIOD_NS).unwrap(), ControlFlow::Continue(()));
@@ -52,7 +52,7 @@ pub fn forced(size: (u32, u32)) -> Options {
     Options { force: true, ..options(size) }
 }
 
-/// Names in a folder, hidden ones included, sorted.
+/// Returns the names in a folder, hidden ones included, sorted.
 pub fn listing(folder: &Path) -> Vec<String> {
     let mut names: Vec<_> =
         fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();

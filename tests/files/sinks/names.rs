@@ -41,7 +41,7 @@ fn names_become_sinks() {
     }
 }
 
-/// A slip in the name of a camera must not fill the disk with pictures.
+/// A typo in the name of a camera must not fill the disk with pictures.
 #[test]
 fn what_is_nothing_else_is_no_folder_and_what_was_meant_is_said() {
     for (name, meant) in [
@@ -60,7 +60,7 @@ fn what_is_nothing_else_is_no_folder_and_what_was_meant_is_said() {
         let error = name.parse::<Target>().unwrap_err().to_string();
         assert!(error.starts_with(&format!("no sink '{name}': ")) && error.contains("with the slash"), "{error}");
     }
-    // A folder that is there: by the slash, or if we wrote it.
+    // An existing folder is accepted with a trailing slash, or if a run wrote it.
     let folder = tempfile::tempdir().unwrap();
     let name = folder.path().to_str().unwrap().to_owned();
     let error = name.parse::<Target>().unwrap_err().to_string();

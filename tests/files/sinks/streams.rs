@@ -12,7 +12,7 @@ use bokehcam::sink::{Ending, Sink, Y4m};
 
 use super::{PERIOD_NS, flat, open, options, picture};
 
-/// Back from limited-range planes to RGB by the definition of the matrix, in floating point.
+/// Converts limited-range planes to RGB by the definition of the matrix, in floating point.
 fn decode(matrix: Matrix, width: usize, height: usize, planes: &[u8]) -> Vec<[f64; 3]> {
     let [kr, _, kb] = matrix.weights();
     let half = width.div_ceil(2);
@@ -28,7 +28,7 @@ fn decode(matrix: Matrix, width: usize, height: usize, planes: &[u8]) -> Vec<[f6
     (0..width * height).map(|index| rgb_at(index % width, index / width)).collect()
 }
 
-/// Pictures go into a pipe one by one; each is whole at its other end before the next one comes.
+/// Pictures go into a pipe one by one; each is complete at the reader before the next one comes.
 #[test]
 fn a_picture_is_not_held_back() {
     let (mut reader, writer) = io::pipe().unwrap();
@@ -36,7 +36,7 @@ fn a_picture_is_not_held_back() {
     let mut bytes = [0; 1024];
     for frame in 0..3 {
         stream.write(&picture(16, 12, frame), u64::from(frame) * PERIOD_NS).unwrap();
-        // Less than a pipe holds: all that was written is there, or it never comes.
+        // Less than a pipe's capacity: all that was written is readable now, or never.
         let read = io::Read::read(&mut reader, &mut bytes).unwrap();
         let whole = b"FRAME\n".len() + 16 * 12 * 3 / 2;
         let header = bytes[..read].windows(6).position(|bytes| bytes == b"FRAME\n").unwrap();
@@ -89,7 +89,7 @@ fn chroma_is_the_mean_of_its_four_pixels() {
     assert_eq!((mixed[0], mixed[1]), (63, 16));
 }
 
-/// Pictures in a y4m, by the luma of their first pixel.
+/// Returns the luma of the first pixel of each picture of a y4m.
 fn lumas(stream: &[u8], frame_bytes: usize) -> Vec<u8> {
     let header = stream.iter().position(|byte| *byte == b'\n').unwrap() + 1;
     stream[header..].chunks(6 + frame_bytes).map(|frame| frame[6]).collect()
@@ -98,7 +98,7 @@ fn lumas(stream: &[u8], frame_bytes: usize) -> Vec<u8> {
 #[test]
 fn a_stream_of_one_rate_takes_as_long_as_its_frames_did() {
     let mut stream = Y4m::new(Vec::new(), Path::new("memory"), &options((2, 2)));
-    // Every other one is missing, then one comes too soon, then half a second is missing.
+    // Every second frame is missing, then one comes too early, then half a second is missing.
     for (grey, at) in [(0, 0), (50, 2), (100, 4), (150, 5), (200, 18)] {
         stream.write(&flat(2, 2, [grey; 3]), 5 + at * PERIOD_NS).unwrap();
         if at == 5 {
@@ -140,7 +140,7 @@ fn a_stream_keeps_its_size() {
     stream.write(&flat(6, 4, [0; 3]), 0).unwrap();
 }
 
-/// Takes some bytes, then has nobody to read them.
+/// Accepts some bytes, then fails like a pipe whose reader has closed.
 struct ClosedPipe(usize);
 
 impl Write for ClosedPipe {

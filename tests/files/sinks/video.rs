@@ -1,4 +1,4 @@
-//! Video through ffmpeg: whole, tagged, at the times of its frames, and never lost.
+//! Video through ffmpeg: complete, tagged, at the times of its frames, and never lost.
 
 use std::fs;
 use std::io;
@@ -13,7 +13,7 @@ use super::{PERIOD_NS, flat, forced, listing, open, options, picture, put_all};
 #[test]
 #[ignore = "needs ffmpeg"]
 fn a_player_shows_pictures_as_they_come() {
-    // Decodes each picture as soon as it has it, and writes it on.
+    // Decodes each picture as soon as it arrives, and writes it out.
     let mut player = Command::new("ffmpeg")
         .args(["-v", "error", "-probesize", "32", "-analyzeduration", "0"])
         .args(["-threads", "1", "-f", "yuv4mpegpipe", "-i", "pipe:0"])
@@ -25,7 +25,7 @@ fn a_player_shows_pictures_as_they_come() {
     let mut stream = Y4m::new(player.stdin.take().unwrap(), Path::new("player"), &options((64, 48)));
     let mut shown = player.stdout.take().unwrap();
     let mut picture_shown = vec![0; 64 * 48 * 3 / 2];
-    // It may keep a few in hand; what it does not have, it cannot show: the second half would never come.
+    // The decoder may hold a few; a picture that has not reached it would never come out.
     const IN_HAND: u32 = 4;
     for frame in 0..20 {
         stream.write(&picture(64, 48, frame), u64::from(frame) * PERIOD_NS).unwrap();
@@ -40,7 +40,7 @@ fn a_player_shows_pictures_as_they_come() {
     assert!(player.wait().unwrap().success());
 }
 
-/// What `ffprobe` says of a file.
+/// Returns the output of `ffprobe` for a file.
 fn probe(name: &Path, entries: &str) -> String {
     let probe = Command::new("ffprobe")
         .args(["-v", "error", "-count_frames", "-of", "csv=p=0", "-show_entries", entries])
@@ -50,7 +50,7 @@ fn probe(name: &Path, entries: &str) -> String {
     String::from_utf8(probe.stdout).unwrap().trim().to_owned()
 }
 
-/// When each picture is shown, and how long the whole takes, in milliseconds.
+/// Returns the time of each picture and the total duration, in milliseconds.
 fn times(name: &Path) -> (Vec<u64>, u64) {
     let ms = |line: &str| (line.trim_end_matches(',').parse::<f64>().unwrap() * 1e3).round() as u64;
     let mut shown: Vec<u64> = probe(name, "packet=pts_time").lines().map(ms).collect();
@@ -91,7 +91,7 @@ fn files_are_whole_and_tagged() {
 #[ignore = "needs ffmpeg"]
 fn frames_keep_their_times() {
     let folder = tempfile::tempdir().unwrap();
-    // Half the rate in the dark, two that come almost at once, and a camera that was unplugged for an hour.
+    // Half the rate in the dark, two frames almost at once, and a camera that was unplugged for an hour.
     let at_ms = [0, 40, 80, 160, 240, 333, 334, 413, 3_600_413, 3_600_453];
     for extension in ["mp4", "mkv", "webm"] {
         let name = folder.path().join(format!("clip.{extension}"));
@@ -135,7 +135,7 @@ fn colours_are_kept() {
 #[ignore = "needs ffmpeg"]
 fn a_failing_ffmpeg_is_the_error_and_leaves_nothing() {
     let folder = tempfile::tempdir().unwrap();
-    // One column cannot be encoded as 4:2:0, which ffmpeg finds when the first frame comes.
+    // One column cannot be encoded as 4:2:0, which ffmpeg detects at the first frame.
     let mut sink = open(&folder.path().join("clip.mp4"), &options((1, 1000))).unwrap();
     let mut frames = (0..).map(|at| sink.put(&picture(1, 1000, 0), at * PERIOD_NS));
     let error = frames.find_map(Result::err).unwrap();
@@ -153,7 +153,7 @@ fn no_frame_is_no_file() {
     assert!(listing(folder.path()).is_empty());
 }
 
-/// The process of ffmpeg that writes into `folder`.
+/// Returns the process id of the ffmpeg that writes into `folder`.
 fn encoder(folder: &Path) -> String {
     let began = Instant::now();
     loop {
@@ -175,7 +175,7 @@ fn signal(name: &str, process: &str) {
     assert!(Command::new("kill").args([name, process]).status().unwrap().success());
 }
 
-/// Puts noise until `enough` says so, or it fails; gives back the number of frames.
+/// Puts noise until `enough` returns true, or until it fails; returns the number of frames.
 fn put_until(sink: &mut dyn Sink, enough: impl Fn(u32) -> bool) -> (u32, Result<(), SinkError>) {
     for number in 0.. {
         if enough(number) {
@@ -196,7 +196,7 @@ fn what_a_killed_ffmpeg_had_written_can_be_played() {
         let folder = tempfile::tempdir().unwrap();
         let mut sink = open(&folder.path().join(format!("clip.{extension}")), &options((320, 240))).unwrap();
         let part = || fs::read_dir(folder.path()).unwrap().next().unwrap().unwrap().path();
-        // Ten seconds of video, of which the last few may still be in its hands.
+        // Ten seconds of video, of which ffmpeg may still hold the last few.
         let (_, put) = put_until(&mut *sink, |number| number >= 250 && fs::metadata(part()).unwrap().len() > 20_000);
         put.unwrap();
         signal("-KILL", &encoder(folder.path()));

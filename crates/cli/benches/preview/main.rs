@@ -1,8 +1,8 @@
-//! `cargo bench --bench preview -- [OPTIONS] [FOLDER]`: what a window costs beyond the same stream without one.
+//! `cargo bench --bench preview -- [OPTIONS] [FOLDER]`: the cost of a window over the same stream without one.
 //!
-//! The same recording, once as `bokehcam stream --to null` and once as `bokehcam preview`, in turns, each as a program of
-//! its own: the processor time of the whole program per delivered frame, and the difference. The windows are on an X
-//! server without a screen, as those of `tests/window` are.
+//! Alternates `bokehcam stream --to null` and `bokehcam preview` on one recording, each in its own process, and
+//! compares the process's processor time per delivered frame. The windows are on an X server without hardware, as in
+//! `tests/window`.
 
 #[path = "../../../lab/benches/common/mod.rs"]
 mod common;
@@ -83,7 +83,7 @@ struct Options {
     bench: bool,
 }
 
-/// Frames of the recording that is made; it is played again and again.
+/// Length of the generated recording, in frames; it is looped.
 const RECORDED: u32 = 16;
 
 fn main() -> ExitCode {

@@ -1,4 +1,4 @@
-//! What a frame costs that is painted on the CPU: pixel for pixel, scaled, and with the panel over it.
+//! Time to paint a frame on the CPU: unscaled, scaled, and with the panel over it.
 
 use std::time::Instant;
 
@@ -13,7 +13,7 @@ use egui::{Event, Pos2, RawInput, Rect, pos2, vec2};
 const SIZE: (u32, u32) = (1280, 720);
 const FRAMES: usize = 60;
 
-/// Measures and prints: the median of many, and the best, in which others on the machine do not count.
+/// Prints the median and the minimum, which is the least affected by other programs.
 pub fn measure() {
     let [same, small, large] = [SIZE, (640, 360), (1920, 1080)].map(|(width, height)| {
         let mut picture = ColorImage::new(width, height);
@@ -50,7 +50,7 @@ pub fn measure() {
     for (name, drawing) in &cases {
         time(name, &mut painter, drawing, &mut |_, _| {});
     }
-    // The pointer goes to and fro over the panel, so that something changes in every pass.
+    // The pointer moves to and fro over the panel, so that every pass changes something.
     let mut passes = Passes::default();
     for frame in 0..WARM_UP {
         painter.set_controls(passes.next(frame, area));
@@ -61,10 +61,10 @@ pub fn measure() {
     });
 }
 
-/// Passes until fonts, measures and animations hold.
+/// Number of passes until fonts, layout and animations are stable.
 const WARM_UP: usize = 30;
 
-/// The panel, as a window has it.
+/// The panel of a window, laid out once per pass.
 struct Passes {
     context: egui::Context,
     panel: Panel,

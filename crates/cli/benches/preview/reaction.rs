@@ -1,4 +1,4 @@
-//! How soon the window answers a key: measured from outside, on the screen, while the pipeline is busy or stuck.
+//! Latency from a key press to its effect on the screen, while the pipeline is busy or blocked.
 
 use std::fs;
 use std::path::Path;
@@ -12,14 +12,14 @@ use super::program::Beside;
 use super::screen::{Screen, until};
 use super::window::{PATIENCE, Window};
 
-/// Keys pressed in each case.
+/// Number of key presses per case.
 const PRESSES: usize = 120;
-/// A corner where the instruments come and go, in pixels of the window.
+/// An area that the instruments cover when shown: left, top, width and height, in window pixels.
 const CORNER: (i16, i16, u16, u16) = (60, 30, 60, 60);
-/// The picture that is never read.
+/// The picture whose read blocks for ever.
 const STUCK: &str = "rgb/stuck.png";
 
-/// Measures and prints; `recording` has depth.
+/// Runs the measurement and prints its result; `recording` must have depth.
 pub fn measure(recording: &Path, scratch: &Path) -> Result<()> {
     let stuck = scratch.join("stuck");
     make_stuck(recording, &stuck)?;
@@ -58,7 +58,7 @@ pub fn measure(recording: &Path, scratch: &Path) -> Result<()> {
     Ok(())
 }
 
-/// A copy of a recording in which the third picture is a pipe that nobody writes to.
+/// Copies a recording, with a pipe that has no writer as its third picture.
 fn make_stuck(recording: &Path, folder: &Path) -> Result<()> {
     fs::create_dir_all(folder.join("rgb"))?;
     fs::create_dir_all(folder.join("depth"))?;
@@ -80,7 +80,7 @@ fn make_stuck(recording: &Path, folder: &Path) -> Result<()> {
     if made.success() { Ok(()) } else { Err("mkfifo failed".into()) }
 }
 
-/// What is in the corner now.
+/// Captures the corner's current pixels.
 fn corner(window: &Window) -> Option<Vec<u8>> {
     let (x, y, width, height) = CORNER;
     let asked = window.screen.x.get_image(ImageFormat::Z_PIXMAP, window.id, x, y, width, height, u32::MAX).ok()?;
@@ -91,8 +91,8 @@ fn brightness(bytes: &[u8]) -> f64 {
     bytes.iter().map(|byte| f64::from(*byte)).sum::<f64>() / bytes.len().max(1) as f64
 }
 
-/// Presses the key of the instruments, and waits until they come or go. The first part of the time is the harness's own
-/// rest after a key, so that no answer seems quicker than that.
+/// Toggles the instruments by key, and waits until they appear or disappear. The result includes the harness's pause
+/// after a key, which is its lower bound.
 fn react(window: &Window, press: usize) -> Option<f64> {
     std::thread::sleep(Duration::from_millis(90 + 37 * (press as u64 % 7)));
     let before = brightness(&corner(window)?);

@@ -1,4 +1,4 @@
-//! How long another aperture is worked on until frames can be blurred with it, by the window's own word.
+//! Time to prepare another aperture until frames can be blurred with it, from the window's log.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -10,17 +10,17 @@ use super::program::Beside;
 use super::screen::{Screen, until};
 use super::window::{PATIENCE, Window};
 
-/// Own presets get the keys after the five that come with the program.
+/// The key of the first user preset, after the five built-in ones.
 const FIRST_KEY: u8 = b'6';
-/// Apertures, and the first of them once more: it may be remembered.
+/// The apertures, measured in this order; the first one is repeated at the end, as it may be cached.
 const SHAPES: [&str; 4] = ["heart", "star:5", "polygon:6", "polygon:7:10"];
 const DISC: &str = "aperture = \"disc\"\ncoc-at-infinity = \"3%\"\nhighlights = 8\n";
-/// Runs of each program: nothing is remembered from one to the next.
+/// Number of runs of each program; no cache survives a run.
 const ROUNDS: usize = 7;
-/// What the window says, before how long it took.
+/// The log text before the duration.
 const MADE: &str = "an executor was made in ";
 
-/// Measures and prints, with each of `programs` in turn; `recording` has depth.
+/// Measures each of `programs` in turn, and prints the results; `recording` must have depth.
 pub fn measure(recording: &Path, scratch: &Path, programs: &[PathBuf]) -> Result<()> {
     let config = scratch.join("bokehcam");
     fs::create_dir_all(&config)?;
@@ -43,7 +43,7 @@ pub fn measure(recording: &Path, scratch: &Path, programs: &[PathBuf]) -> Result
     Ok(())
 }
 
-/// The time for each shape, in milliseconds, in a program that was started anew.
+/// Measures the time for each shape, in milliseconds, in a new process.
 fn shapes(program: &Path, recording: &Path, scratch: &Path) -> Result<Vec<f64>> {
     let (screen, said) = (Screen::new(), scratch.join("said"));
     let mut command = Command::new(program);
@@ -74,7 +74,7 @@ fn shapes(program: &Path, recording: &Path, scratch: &Path) -> Result<Vec<f64>> 
     Ok(took_ms)
 }
 
-/// A duration as Rust's `Debug` writes it.
+/// Parses a duration in Rust's `Debug` format; returns milliseconds.
 fn milliseconds(text: &str) -> Option<f64> {
     let (number, factor) = match text.trim() {
         text if text.ends_with("µs") => (text.trim_end_matches("µs"), 1e-3),

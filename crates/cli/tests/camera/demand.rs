@@ -1,4 +1,4 @@
-//! The camera is closed while nobody watches.
+//! The camera is closed while the virtual camera has no reader.
 
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -21,8 +21,8 @@ fn the_camera_is_open_only_while_somebody_watches() {
         let stream = Stream::show("0 --size 320x180 --fps 30 --effect none --on-demand");
         for turn in 0..4 {
             until("nobody watches: the camera is closed", || !camera_is_open());
-            // Both buffers hold the card by then. What was last seen of the camera is for nobody: it sees something
-            // else now.
+            // By then, both buffers hold the card. The camera's picture changes, so that a stale frame would be
+            // detected.
             std::thread::sleep(Duration::from_millis(2500));
             machine.control("test_pattern", if turn % 2 == 0 { "100% White" } else { "75% Colorbar" });
             assert!(!camera_is_open());

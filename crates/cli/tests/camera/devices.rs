@@ -1,4 +1,4 @@
-//! Finding devices, their controls, and what is said of them.
+//! Device discovery, controls, and messages.
 
 use std::fs;
 use std::process::Command;
@@ -13,7 +13,7 @@ use super::machine::{CAMERA, Machine, VERSIONS, VIRTUAL, beside, run, sh, until}
 #[test]
 #[ignore = "needs the camera VM (tests/vm/run)"]
 fn only_nodes_that_give_pictures_are_listed() {
-    // All nodes that the driver can make: outputs, metadata, touch, radio and teletext among them.
+    // All node types of the driver, including outputs, metadata, touch, radio and teletext.
     let _machine = Machine::with("n_devs=1 node_types=0xe1d3d vid_cap_nr=0", VERSIONS[0]);
     let nodes = fs::read_dir("/sys/class/video4linux").unwrap().count();
     assert!(nodes > 6, "{nodes} nodes");
@@ -41,17 +41,17 @@ fn a_camera_has_several_names() {
     for name in ["0", "video0", CAMERA, "vivid", "VIV"] {
         assert_eq!(resolve(name).unwrap().to_str(), Some(CAMERA), "{name}");
     }
-    // The virtual camera gives no pictures while nobody writes to it.
+    // Without a writer, the virtual camera is not a source.
     assert!(matches!(resolve("bokehcam-test"), Err(NodeError::None { .. })));
     assert!(run("devices bokehcam-test").stdout.contains(VIRTUAL));
     drop(machine);
 
     let _machine = Machine::with("n_devs=2 node_types=0x1,0x1 vid_cap_nr=0,1", VERSIONS[0]);
-    // Which cameras share a name is the machine's.
+    // The name is ambiguous here, so the message lists both cameras.
     run("stream vivid --to null").refused(1, &["/dev/video0", "/dev/video1"]);
 }
 
-/// What another program says a control is set to.
+/// Reads a control's value with another program.
 fn told(name: &str) -> String {
     let line = sh(&format!("v4l2-ctl -d {CAMERA} -C {name}"));
     line.trim().split_once(": ").unwrap().1.to_owned()
@@ -95,7 +95,7 @@ fn controls_of_every_type_are_set_by_name() {
         assert!(error.contains(said) && error.lines().count() == 1, "{error}");
     }
     assert_eq!(controls::get(&device, "brightness").unwrap(), Value::Number(200), "a refused value changes nothing");
-    // What overrides it may be set first.
+    // First turn off the control that overrides it.
     controls::set(&device, "gain_automatic", "no").unwrap();
     controls::set(&device, "gain", "3").unwrap();
     assert_eq!(told("gain"), "3");

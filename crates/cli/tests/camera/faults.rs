@@ -1,4 +1,4 @@
-//! What goes wrong with cameras: each fault that the test camera can inject, counted or recovered from.
+//! Camera faults: each fault that the test camera can inject is counted or recovered from.
 
 use std::time::Instant;
 
@@ -14,7 +14,7 @@ fn camera() -> V4l2Camera {
     open(CAMERA, wish(SIZE, 60.0, Some("YUYV".parse().unwrap())))
 }
 
-/// Reads so many frames, all of them good; gives what was lost.
+/// Reads `frames` frames; asserts that all are intact, and returns the losses.
 fn read(camera: &mut V4l2Camera, frames: usize) -> Lost {
     let mut lost = Lost::default();
     for _ in 0..frames {
@@ -46,7 +46,7 @@ fn frames_that_the_driver_drops_are_counted() {
     machine.control("percentage_of_dropped_buffers", "50");
     let mut camera = camera();
     read(&mut camera, 5);
-    // How many frames there were until each, and when it was taken.
+    // For each frame, its index, counting lost ones, and its capture time.
     let (mut lost, mut came) = (Lost::default(), Vec::new());
     for frame in 0..120 {
         let (image, taken_ns, before) = stamped(&mut camera);
@@ -54,15 +54,15 @@ fn frames_that_the_driver_drops_are_counted() {
         assert!(distance_from(&image, &BARS, 3) <= 3);
         came.push((frame + lost.driver + lost.evicted, taken_ns as f64 / 1e9));
     }
-    // The driver's clock and the counter agree on how many frames there were. A driver that the machine lets wait is late
-    // with some, and early with none: what counts is the least that it was late in each half.
+    // The driver's clock and the loss counter must agree on the number of frames. A delayed driver is late with some
+    // frames and never early, so the minimum delay of each half is compared.
     let late_s = |frames: &[(u64, f64)]| {
         frames.iter().map(|(number, taken_s)| taken_s - *number as f64 / 60.0).fold(f64::INFINITY, f64::min)
     };
     let due_s = (came[119].0 - came[0].0) as f64 / 60.0;
     let off_s = late_s(&came[60..]) - late_s(&came[..60]);
     assert!(off_s.abs() < 0.1 * due_s, "{off_s} s off where {due_s} were due: {lost:?}");
-    // More than it was told to where nobody is in time to give it buffers.
+    // The driver drops more than requested if the program is late in returning buffers.
     let share = lost.driver as f64 / (120 + lost.driver + lost.evicted) as f64;
     println!("{share:.2} dropped: {lost:?}");
     assert!(share > 0.3, "{share} dropped: {lost:?}");
@@ -79,7 +79,7 @@ fn a_buffer_that_is_refused_once_does_not_stop_the_stream() {
         began.elapsed()
     };
     let before = timed(&mut camera);
-    // More refusals than there are buffers: were each to stay away, no frame would come any more.
+    // More refusals than buffers: if each lost its buffer, no more frames would arrive.
     for _ in 0..8 {
         machine.control("inject_vidioc_qbuf_error", "1");
         read(&mut camera, 5);
@@ -119,7 +119,7 @@ fn a_start_that_fails_after_a_fault_is_tried_again() {
         machine.control(control, "1");
         machine.control("inject_fatal_streaming_error", "1");
         let began = Instant::now();
-        // Those on the way are still good.
+        // Frames in flight are still intact.
         let lost = read(&mut camera, 30);
         println!("{control}: 30 frames after {:?}, {lost:?}", began.elapsed());
     }
@@ -168,7 +168,7 @@ fn the_output_goes_on_while_the_camera_is_unplugged() {
             assert!(distance_from(&frame(&mut reader).0, &BARS, 4) <= 5, "the last picture");
         }
         sh("echo vivid.0 > /sys/bus/platform/drivers/vivid/bind");
-        // Other colours tell that the camera is back: the same bars would not.
+        // Different colours prove that the camera is back.
         until("the node is back", || std::path::Path::new(CAMERA).exists());
         machine.control("osd_text_mode", "None");
         machine.control("test_pattern", "100% White");

@@ -1,4 +1,4 @@
-//! Each format of the camera, and its picture.
+//! Decoding of each format of the camera.
 
 use bokehcam::layout::Content;
 use bokehcam::v4l2::modes::{QueueKind, modes};
@@ -7,12 +7,12 @@ use bokehcam::v4l2::{Device, FourCc};
 use super::machine::{BARS, CAMERA, Machine, distance_from, frame, open, run, wish};
 
 const SIZE: (u32, u32) = (320, 180);
-/// Colours in 8 bits of YCbCr with a limited range lie up to so far apart.
+/// Rounding error of 8-bit YCbCr with limited range, in RGB codes.
 const STEP: u8 = 3;
-/// Where colours are interpolated, bars run into each other.
+/// Chroma interpolation mixes colours at the bars' edges.
 const MARGIN_PX: u32 = 3;
 
-/// Formats of colours that the camera offers on this kind of queue, in its order.
+/// Returns the camera's colour formats on a kind of queue, in the driver's order.
 fn offered(queue: QueueKind) -> Vec<FourCc> {
     let modes = modes(&Device::open(CAMERA.as_ref()).unwrap()).unwrap();
     assert!(modes.iter().all(|mode| mode.queue == queue));
@@ -28,13 +28,13 @@ fn check(fourcc: FourCc) {
     assert!(first.rgb == second.rgb, "{name}: two frames of a picture that stands still");
     let luma_only = first.rgb.chunks_exact(3).all(|pixel| pixel[0] == pixel[1] && pixel[1] == pixel[2]);
     let greys = BARS.map(|[r, g, b]| {
-        // The driver's grey is that of BT.709.
+        // The driver computes grey by BT.709.
         let luma = 0.2126 * f64::from(r) + 0.7152 * f64::from(g) + 0.0722 * f64::from(b);
         [luma.round() as u8; 3]
     });
     let bars = if luma_only { &greys } else { &BARS };
     let step = distance_from(&first, bars, MARGIN_PX);
-    // Fewer bits, coarser steps.
+    // Formats with five bits per channel have coarser steps.
     let coarse = match name.as_str() {
         "RGBP" | "RGBR" | "RGBO" | "AR15" | "XR15" => 5,
         _ => STEP,

@@ -1,4 +1,4 @@
-//! Turning a camera's controls while it streams.
+//! Changing a camera's controls while it streams.
 
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::thread;
@@ -12,7 +12,7 @@ fn knob<'a>(knobs: &'a [Knob], name: &str) -> &'a Knob {
     knobs.iter().find(|knob| knob.name == name).unwrap_or_else(|| panic!("no {name} in {knobs:?}"))
 }
 
-/// What another program says a control is set to.
+/// Reads a control's value with another program.
 fn told(name: &str) -> i64 {
     sh(&format!("v4l2-ctl -d {CAMERA} -C {name}")).trim().rsplit_once(' ').unwrap().1.parse().unwrap()
 }
@@ -22,7 +22,7 @@ fn told(name: &str) -> i64 {
 fn knobs_are_listed_turned_and_read_back_while_the_camera_streams() {
     let _machine = Machine::new();
     let mut camera = open(CAMERA, wish((320, 180), 25.0, None));
-    // The mean of the newest picture's bytes, in thousandths, and how many pictures there were.
+    // The mean byte of the latest picture, in thousandths, and the number of pictures.
     let (mean, count, over) = (AtomicU64::new(0), AtomicU64::new(0), AtomicBool::new(false));
     thread::scope(|scope| {
         scope.spawn(|| {
@@ -51,7 +51,7 @@ fn knobs_are_listed_turned_and_read_back_while_the_camera_streams() {
         assert_eq!((knob(&all, "brightness").value, told("brightness")), (200, 200));
         wait("a lighter picture", &mut || mean.load(Ordering::SeqCst) > before + 30_000);
 
-        // What has no effect says so, and comes back when what overrides it is turned off.
+        // An overridden control is reported as inactive, and becomes active when the overriding one is turned off.
         let all = knobs::turn("0", "gain_automatic", 1).unwrap();
         assert!(!knob(&all, "gain").active);
         let said = knobs::turn("0", "gain", 3).unwrap_err().to_string();

@@ -1,4 +1,4 @@
-//! The machine's devices, loaded anew for each test, and what tests do with them.
+//! The virtual machine's devices, reloaded for each test, and helpers.
 
 use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
@@ -19,64 +19,63 @@ use rustix::process::Signal;
 
 use super::program::{self, Beside, Ran, assert_accounted, json};
 
-/// The camera.
+/// The test camera (`vivid`).
 pub const CAMERA: &str = "/dev/video0";
-/// The virtual camera.
+/// The virtual camera (`v4l2loopback`).
 pub const VIRTUAL: &str = "/dev/video20";
-/// The versions of v4l2loopback that there are: without events, with, and with the present rules.
+/// Tested versions of v4l2loopback: without events, with events, and with the current rules.
 pub const VERSIONS: [&str; 3] = ["0.12.7", "0.13.2", "0.15.0"];
 
-/// Where runs listen to `ctl`.
+/// The runtime folder with the sockets for `ctl`.
 const RUNTIME: &str = "/run/bokehcam-test";
 
-/// One camera with two inputs: 0 is a webcam, 1 is HDMI, whose signal gives the rate.
+/// One camera with two inputs: 0 is a webcam, 1 is HDMI, whose signal determines the frame rate.
 const VIVID: &str = "n_devs=1 node_types=0x1 num_inputs=2 input_types=0xc vid_cap_nr=0";
 
-/// Nothing takes so long: this is against a hang. How long things do take is printed, and no test asks for less: the
-/// machine is emulated, and others use it as well.
+/// Timeout against hangs. Durations are printed but not asserted, because the machine is emulated and shared.
 pub const HANG: Duration = Duration::from_secs(300);
 
 static ALONE: Mutex<()> = Mutex::new(());
 
-/// The devices, for one test at a time.
+/// Exclusive access to the devices.
 pub struct Machine {
     _alone: MutexGuard<'static, ()>,
 }
 
 impl Machine {
-    /// A camera, and a virtual camera of v4l2loopback 0.12.7.
+    /// Loads a camera, and a virtual camera of v4l2loopback 0.12.7.
     pub fn new() -> Self {
         Self::with(VIVID, VERSIONS[0])
     }
 
-    /// A camera loaded with these arguments, and a virtual camera of this version.
+    /// Loads a camera with module arguments, and a virtual camera of a version.
     pub fn with(vivid: &str, version: &str) -> Self {
         assert!(std::env::var_os("BOKEHCAM_VM").is_some(), "not in the virtual machine: see tests/vm/run");
-        // A test that failed leaves nothing behind that the next one does not load anew.
+        // A failed test poisons the lock, but all its state is reloaded here.
         let machine = Self { _alone: ALONE.lock().unwrap_or_else(|poisoned| poisoned.into_inner()) };
         sh(&format!("mkdir -p -m 700 {RUNTIME}"));
         unload("vivid");
         sh(&format!("modprobe vivid {vivid}"));
         machine.loopback(version);
         let camera = Device::open(CAMERA.as_ref()).unwrap();
-        // Without text, which changes, all frames are equal.
+        // Without the changing text, all frames are equal.
         controls::set(&camera, "osd_text_mode", "None").unwrap();
         machine
     }
 
-    /// Loads the virtual camera anew.
+    /// Reloads the virtual camera.
     pub fn loopback(&self, version: &str) {
         unload("v4l2loopback");
         let arguments = "devices=1 video_nr=20 exclusive_caps=1 card_label=bokehcam-test";
         sh(&format!("insmod /run/vm/v4l2loopback/{version}.ko {arguments}"));
     }
 
-    /// Sets one of the camera's controls, from outside as it were.
+    /// Sets a control of the camera, as another program would.
     pub fn control(&self, name: &str, value: &str) {
         controls::set(&Device::open(CAMERA.as_ref()).unwrap(), name, value).unwrap();
     }
 
-    /// Makes the camera one of 30 frames per second at any size.
+    /// Selects the HDMI input at 30 frames per second, for any size.
     pub fn at_30_fps(&self) {
         sh(&format!("v4l2-ctl -d {CAMERA} -i 1 && v4l2-ctl -d {CAMERA} --set-dv-bt-timings index=5"));
     }
@@ -91,40 +90,40 @@ fn unload(module: &str) {
     }
 }
 
-/// Runs a line of shell, which must succeed; gives its standard output.
+/// Runs a shell command; asserts success, and returns stdout.
 pub fn sh(line: &str) -> String {
     let ran = Ran::of(Command::new("sh").args(["-c", line]).stdin(Stdio::null()));
     assert_eq!(ran.code, 0, "{line}: {}", ran.stderr);
     ran.stdout
 }
 
-/// The program itself, without settings of anybody.
+/// Returns a command that runs the program without user settings.
 pub fn bokehcam(arguments: &str) -> Command {
     let mut command = program::bokehcam(&arguments.split_whitespace().collect::<Vec<_>>());
     command.env("XDG_CONFIG_HOME", "/nowhere").env("XDG_RUNTIME_DIR", RUNTIME);
     command
 }
 
-/// Runs it.
+/// Runs the program to its end.
 pub fn run(arguments: &str) -> Ran {
     Ran::of(&mut bokehcam(arguments))
 }
 
-/// Starts a program beside the test, which may read what comes out of it.
+/// Starts a background process with piped stdout and stderr.
 pub fn beside(mut command: Command) -> Beside {
     Beside::start(command.stdout(Stdio::piped()).stderr(Stdio::piped()))
 }
 
-/// A stream of the program's that runs beside the test.
+/// A `bokehcam stream` in the background.
 pub struct Stream(Beside);
 
 impl Stream {
-    /// Starts one.
+    /// Starts a stream.
     pub fn start(arguments: &str) -> Self {
         Self(beside(bokehcam(&format!("stream {arguments} --force --report {REPORT}"))))
     }
 
-    /// Starts one to the virtual camera, and waits until that shows something.
+    /// Starts a stream to the virtual camera, and waits for its first picture.
     pub fn show(arguments: &str) -> Self {
         let mut stream = Self::start(&format!("{arguments} --to {VIRTUAL}"));
         until("the virtual camera shows something", || {
@@ -134,14 +133,14 @@ impl Stream {
         stream
     }
 
-    /// Its frames, of this size, where it writes them to standard output: each as it is asked for, none kept ready.
+    /// Receives the frames on its standard output, of this size; each is read on demand, without a queue.
     pub fn frames(&mut self, (width, height): (usize, usize)) -> Receiver<()> {
         let mut stdout = BufReader::new(self.0.0.stdout.take().unwrap());
         let (told, frames) = mpsc::sync_channel(0);
         std::thread::spawn(move || {
             stdout.read_until(b'\n', &mut Vec::new()).unwrap();
             let mut frame = vec![0; "FRAME\n".len() + width * height + 2 * width.div_ceil(2) * height.div_ceil(2)];
-            // Who asks for no more lets the program go on to its end.
+            // Without a receiver, the output is still drained, so that the program can end.
             let mut asked = true;
             while stdout.read_exact(&mut frame).is_ok() {
                 asked = asked && told.send(()).is_ok();
@@ -150,7 +149,7 @@ impl Stream {
         frames
     }
 
-    /// Waits for its end, or ends it with Ctrl-C; it must have done well. Gives its report.
+    /// Waits for its end, or interrupts it; asserts success, and returns the report.
     pub fn report(self, interrupted: bool) -> serde_json::Value {
         let ended = if interrupted { self.0.end_by(Signal::INT, HANG) } else { self.0.end(HANG) };
         ended.done();
@@ -162,28 +161,28 @@ impl Stream {
 
 const REPORT: &str = "/tmp/report.json";
 
-/// Waits until something is so; says how long that took.
+/// Waits until a condition holds, and prints the duration.
 pub fn until(what: &str, is: impl FnMut() -> bool) {
     println!("{what}: after {:?}", program::until(what, HANG, is));
 }
 
-/// What is asked of a camera.
+/// Creates a mode request for a colour camera.
 pub fn wish(size_px: (u32, u32), fps: f64, fourcc: Option<FourCc>) -> ModeRequest {
     ModeRequest { size_px: Some(size_px), fps: Some(fps), fourcc, ..ModeRequest::any(Content::Color) }
 }
 
-/// Opens a camera, in a mode that it has.
+/// Opens a camera in a mode that it must have.
 pub fn open(node: &str, wish: ModeRequest) -> V4l2Camera {
     V4l2Camera::open(node, wish, Vec::new(), None).unwrap()
 }
 
-/// The next frame, and what was lost before it.
+/// Returns the next frame, and the losses before it.
 pub fn frame(camera: &mut V4l2Camera) -> (ColorImage, Lost) {
     let (image, _, lost) = stamped(camera);
     (image, lost)
 }
 
-/// The next frame, when it was taken, and what was lost before it.
+/// Returns the next frame, its capture time in nanoseconds, and the losses before it.
 pub fn stamped(camera: &mut V4l2Camera) -> (ColorImage, u64, Lost) {
     let (mut color, mut lost) = (ColorImage::default(), Lost::default());
     let began = Instant::now();
@@ -198,7 +197,7 @@ pub fn stamped(camera: &mut V4l2Camera) -> (ColorImage, u64, Lost) {
     panic!("no frame for {HANG:?}");
 }
 
-/// The next frame, if there is one now.
+/// Returns the next frame if it arrives within `PATIENCE`.
 pub fn frame_now(camera: &mut V4l2Camera) -> Option<ColorImage> {
     let mut color = ColorImage::default();
     match camera.next_within(PATIENCE, &mut color) {
@@ -207,16 +206,16 @@ pub fn frame_now(camera: &mut V4l2Camera) -> Option<ColorImage> {
     }
 }
 
-/// Frames that were lost, by cause.
+/// Lost frames by cause.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Lost {
-    /// The driver had no buffer, or said so.
+    /// Frames dropped by the driver for lack of a buffer.
     pub driver: u64,
-    /// A newer one was there.
+    /// Frames replaced by a newer one.
     pub evicted: u64,
-    /// Damaged.
+    /// Damaged frames.
     pub corrupt: u64,
-    /// How often there was none.
+    /// Number of timeouts without a frame.
     pub waits: u64,
 }
 
@@ -230,7 +229,7 @@ impl Lost {
         }
     }
 
-    /// Both together.
+    /// Adds another count.
     pub fn add(&mut self, other: Self) {
         self.driver += other.driver;
         self.evicted += other.evicted;
@@ -239,11 +238,11 @@ impl Lost {
     }
 }
 
-/// The camera's picture: eight bars of one width, at three quarters of full intensity.
+/// The camera's test pattern: eight bars of equal width at 75 % intensity, in RGB.
 pub const BARS: [[u8; 3]; 8] =
     [[191, 191, 191], [191, 191, 0], [0, 191, 191], [0, 191, 0], [191, 0, 191], [191, 0, 0], [0, 0, 191], [0, 0, 0]];
 
-/// How far a picture is from these bars, at most, in codes; `margin_px` around their edges does not count.
+/// Returns the maximum difference between a picture and the bars, in codes, except `margin_px` around their edges.
 pub fn distance_from(image: &ColorImage, bars: &[[u8; 3]; 8], margin_px: u32) -> u8 {
     let width = image.size().0;
     let mut most = 0;
@@ -260,7 +259,7 @@ pub fn distance_from(image: &ColorImage, bars: &[[u8; 3]; 8], margin_px: u32) ->
     most
 }
 
-/// Ends the other thread, also when the test fails.
+/// Sets a flag when dropped, which ends the other thread even if the test fails.
 pub struct Ends<'a>(pub &'a AtomicBool);
 
 impl Drop for Ends<'_> {

@@ -1,10 +1,11 @@
-//! Tests on real drivers: the kernel's test camera `vivid` and `v4l2loopback`, in the virtual machine of `tests/vm/run`.
+//! Tests with real drivers: the kernel's test camera `vivid` and `v4l2loopback`, in the virtual machine of
+//! `tests/vm/run`.
 //!
-//! `scripts/test` runs them where there can be such a machine. By hand:
+//! `scripts/test` runs them if that machine can run. By hand:
 //! `CARGO_TARGET_X86_64_UNKNOWN_LINUX_GNU_RUNNER="$PWD/tests/vm/run --" cargo test --test camera -- --include-ignored`
 //!
-//! Software emulation computes with floating point some fifty times slower than the processor: no speed of the blur is
-//! measured here, and it is on for a few small frames only.
+//! Emulated floating point is about 50 times slower than the processor's, so the blur's speed is not measured, and the
+//! blur runs on a few small frames only.
 #![cfg(feature = "camera")]
 
 mod demand;

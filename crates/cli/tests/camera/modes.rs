@@ -1,4 +1,4 @@
-//! The sizes and rates that the window offers of a camera, and which way it looks.
+//! Sizes and frame rates of a camera offered in the window, and the direction it faces.
 
 use bokehcam::capture::Camera;
 use bokehcam::source::modes::{faces_user, modes};

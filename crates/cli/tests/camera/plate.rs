@@ -1,4 +1,4 @@
-//! A plate, from a camera whose controls are held, and taken by the program itself with a person who steps aside.
+//! Background plates: with locked camera controls, and captured by the program while the person steps aside.
 
 use std::fs;
 use std::io::{BufRead, BufReader};
@@ -37,7 +37,7 @@ fn what_a_camera_decides_by_itself_is_held_and_given_back() {
 
 const SIZE: (u32, u32) = (160, 96);
 
-/// A wall with a pattern, and a striped person before it.
+/// Draws a wall with a pattern, optionally with a striped person before it.
 fn picture(with_person: bool) -> ColorImage {
     let mut picture = ColorImage::new(SIZE.0, SIZE.1);
     for (at, pixel) in picture.rgb.chunks_exact_mut(3).enumerate() {
@@ -87,7 +87,7 @@ fn a_stream_tells_a_person_to_step_out_and_makes_a_portrait() {
         };
         (1..=3).rev().for_each(|seconds| {
             hears(&format!("step out of the picture: {seconds}"));
-            // At once, so that the last picture of the person has gone by when the plate begins.
+            // Remove the person at once, so that no picture of them is in flight when the capture begins.
             is_there.store(false, Ordering::SeqCst);
         });
         hears("come back");

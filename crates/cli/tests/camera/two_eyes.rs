@@ -1,14 +1,14 @@
-//! Two cameras as two eyes.
+//! Two cameras as a stereo pair.
 
 use bokehcam::v4l2::{Device, controls};
 
 use super::machine::{HANG, Machine, Stream, VERSIONS, run, sh};
 
 const RIGHT: &str = "/dev/video1";
-/// Two cameras, each with an HDMI input that has 30 frames per second at any size.
+/// Module arguments: two cameras, each with an HDMI input of 30 frames per second at any size.
 const TWO: &str = "n_devs=2 node_types=0x1,0x1 num_inputs=2,2 input_types=0xc,0xc vid_cap_nr=0,1";
 
-/// Two cameras of 30 frames per second.
+/// Loads two cameras of 30 frames per second.
 fn machine() -> Machine {
     let machine = Machine::with(TWO, VERSIONS[0]);
     machine.at_30_fps();
@@ -25,7 +25,7 @@ fn two_cameras_give_pairs_and_every_frame_is_accounted_for() {
     let report = stream.report(false);
     let frames = &report["frames"];
     println!("{frames}");
-    // A frame that the machine had no time for leaves its partner alone; how many those are is its affair.
+    // A dropped frame leaves its partner unpaired; the number depends on the machine's speed.
     assert!((1..=60).contains(&frames["delivered"].as_u64().unwrap()), "{frames}");
     let source = report["source"].as_str().unwrap();
     assert!(source.contains("/dev/video0") && source.contains(RIGHT), "{source}");
@@ -50,7 +50,7 @@ fn while_one_camera_is_away_its_partner_s_frames_are_unpaired_and_then_it_goes_o
     let come = |count: u32| (0..count).for_each(|_| frames.recv_timeout(HANG).expect("a frame"));
     come(5);
     controls::set(&Device::open(RIGHT.as_ref()).unwrap(), "disconnect", "1").unwrap();
-    // More than can be on the way.
+    // More frames than can be in flight.
     come(40);
     drop(frames);
     let report = stream.report(true);
@@ -63,7 +63,7 @@ fn while_one_camera_is_away_its_partner_s_frames_are_unpaired_and_then_it_goes_o
 #[ignore = "needs the camera VM (tests/vm/run)"]
 fn cameras_without_a_size_in_common_are_refused() {
     let _machine = machine();
-    // A webcam's sizes beside one that gives what its cable carries.
+    // A webcam's fixed sizes do not match the other camera's HDMI size.
     sh("v4l2-ctl -d /dev/video0 -i 0 && v4l2-ctl -d /dev/video0 --set-fmt-video width=640,height=360");
     let ran = run("stream 0,1 --rectified --effect none --size 333x177 --frames 3 --to null");
     assert!(ran.code != 0 && ran.stderr.contains("both eyes need one size"), "{}", ran.stderr);

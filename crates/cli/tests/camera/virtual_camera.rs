@@ -1,4 +1,4 @@
-//! Into the virtual camera, and out of it by other programs.
+//! Writing to the virtual camera, and reading from it by other programs.
 
 use std::fs;
 use std::process::Command;
@@ -15,7 +15,7 @@ use super::machine::{
     until, wish,
 };
 
-/// Through two conversions of colours.
+/// Tolerance after two colour conversions, in codes.
 const STEP: u8 = 5;
 const MARGIN_PX: u32 = 4;
 
@@ -23,13 +23,13 @@ fn yuyv() -> Option<FourCc> {
     Some("YUYV".parse().unwrap())
 }
 
-/// How far the picture moved in each frame, by the place where the black bar ends and the white one begins.
+/// Measures the picture's shift from frame to frame in pixels, by the edge between the black and the white bar.
 fn steps(frames: &[u8], (width, height): (usize, usize)) -> Vec<usize> {
     let places: Vec<usize> = frames.chunks_exact(2 * width * height).map(|frame| place(&frame[..2 * width])).collect();
     places.windows(2).map(|pair| (pair[1] + width - pair[0]) % width).collect()
 }
 
-/// How far a YUYV picture is from the bars, wherever they stand, in codes of BT.601 with limited range.
+/// Returns the maximum difference between a YUYV picture and the shifted bars, in codes of limited-range BT.601.
 fn codes_from_bars(frame: &[u8], width: usize) -> u8 {
     let codes = BARS.map(|rgb| {
         let [r, g, b] = rgb.map(|code| f64::from(code) / 255.0);
@@ -51,7 +51,7 @@ fn codes_from_bars(frame: &[u8], width: usize) -> u8 {
     most.ceil() as u8
 }
 
-/// Where in a row of YUYV the black bar ends and the white one begins.
+/// Finds the column in a YUYV row where the black bar ends and the white one begins.
 fn place(row: &[u8]) -> usize {
     let luma: Vec<u8> = row.iter().step_by(2).copied().collect();
     let width = luma.len();
@@ -70,7 +70,7 @@ fn what_goes_in_at_30_frames_per_second_comes_out_for_other_programs() {
         let began = Instant::now();
         let stream = Stream::show(&format!("0 --size {width}x{height} --fps 30 --effect none"));
         let mut moved = Vec::new();
-        // On a machine that stood still for long, all of them may be one picture that was shown again.
+        // After a long stall of the machine, all pictures may be repeats of one.
         until("a picture that moves", || {
             sh(&format!(
                 "timeout 120 v4l2-ctl -d {VIRTUAL} --stream-mmap --stream-skip=5 --stream-count=60 --stream-to=/tmp/frames 2>&1"
@@ -95,10 +95,10 @@ fn what_goes_in_at_30_frames_per_second_comes_out_for_other_programs() {
         let frames = &report["frames"];
         let (captured, delivered) = (frames["captured"].as_f64().unwrap(), frames["delivered"].as_f64().unwrap());
         println!("{width}x{height}: {frames} {}", report["stages_ms"]);
-        // The picture moves by a whole number of frames from each to the next, and no more pass than are captured.
+        // Each shift is a whole number of frame steps, and their total is at most the number of captured frames.
         let least = *steps.iter().filter(|step| **step > 0).min().unwrap();
-        // Where frames were left out each time, the least of what passed is more than one frame's; and it may be short by a
-        // pixel, as the camera moves by parts of one.
+        // If frames were always skipped, the smallest shift is a multiple of the step; subpixel motion may make it a
+        // pixel short.
         let fits = |step: usize| steps.iter().all(|passed| passed % step <= 1 || passed % step + 1 >= step);
         let step = (4..=least + 1).rev().find(|&step| fits(step));
         let step = step.unwrap_or_else(|| panic!("not in steps of one length: {steps:?}"));
@@ -106,14 +106,14 @@ fn what_goes_in_at_30_frames_per_second_comes_out_for_other_programs() {
         assert!(frames_passed as f64 <= captured, "{report}: steps {steps:?}");
         let per_second = captured / report["elapsed_s"].as_f64().unwrap();
         println!("{per_second:.1} frames per second captured, {:.1} % delivered", 100.0 * delivered / captured);
-        // How many of them there is time for is the machine's affair. Counting begins with the camera's own start, which
-        // is before the run's.
+        // The number of frames depends on the machine's speed. The count starts with the camera, before the run's own
+        // start.
         assert!(captured <= 31.0 * runs_s + 1.0, "no more than the camera takes: {runs_s} s, {report}");
-        // The camera repeats its last picture where none comes in time, so other programs may have more pictures than
-        // were delivered, but no more that differ.
+        // The virtual camera repeats its last picture if none arrives in time, so readers may get more pictures than
+        // were delivered, but not more distinct ones.
         let differ = 1 + steps.iter().filter(|step| **step > 0).count();
         assert!(differ > 1 && differ as f64 <= delivered, "{differ} pictures that differ: {frames}");
-        // And none comes twice unless it was shown again.
+        // Every duplicate is a reported repeat.
         let again = steps.len() + 1 - differ;
         assert!(again as u64 <= report["repeats"].as_u64().unwrap(), "{again} pictures again: {report}");
         assert_eq!(frames["dropped"]["corrupt"], 0, "{frames}");
@@ -128,7 +128,7 @@ fn a_few_small_frames_are_blurred_on_the_way() {
     let stream = Stream::show("0 --size 320x180 --fps 30 --effect blur --coc-at-infinity 6 --backend cpu");
     let mut reader = open(VIRTUAL, wish((320, 180), 30.0, yuyv()));
     let soft = |image: &ColorImage| {
-        // Between the yellow bar and the cyan one, red goes down over some pixels.
+        // Between the yellow and the cyan bar, red decreases gradually.
         let red = |x: usize| image.rgb[3 * (90 * 320 + x)];
         (30..160).contains(&red(80)) && red(68) > 170 && red(92) < 25
     };
@@ -154,12 +154,12 @@ fn a_hundred_writers_come_and_go() {
                 .unwrap_or_else(|error| panic!("{version}, {turn}: {error}"));
             let _ = sink.put(&picture, 0).unwrap();
             let mut reader = open(VIRTUAL, wish((64, 48), 30.0, yuyv()));
-            // Every other one goes on with another picture, which is YUYV already.
+            // Every other writer sends a picture that is already YUYV.
             let is_yuyv = turn % 2 == 1;
             assert!(sink.wants_yuyv());
             let code = if is_yuyv { 235 - 2 * turn } else { 2 * turn + 20 };
             let seen = |image: ColorImage| image.rgb.iter().all(|seen| seen.abs_diff(code) <= 2);
-            // What was written before may come first.
+            // Earlier pictures may arrive first.
             until("the reader sees it", || {
                 ready.resize(64, 48);
                 ready.bytes.as_chunks_mut().0.fill([(u32::from(code) * 220 / 256 + 16) as u8, 128]);
@@ -190,7 +190,7 @@ fn readers_come_and_go() {
         let mut lost = Lost::default();
         for _ in 0..3 {
             sh(&format!("timeout 120 v4l2-ctl -d {VIRTUAL} --stream-mmap --stream-count=10 2>&1"));
-            // Killed in the middle, as a browser is.
+            // A reader killed while reading, as a browser may be.
             let killed = beside(read());
             std::thread::sleep(Duration::from_millis(600));
             drop(killed);
@@ -200,7 +200,7 @@ fn readers_come_and_go() {
             }
             assert!(distance_from(&frame(&mut reader).0, &BARS, MARGIN_PX) <= STEP, "{version}");
         }
-        // How many get through is the machine's affair; that each is accounted for, the report's.
+        // The number delivered depends on the machine's speed, but the report accounts for each frame.
         let report = stream.report(true);
         let frames = &report["frames"];
         println!("{version}: {frames}, of the reader {lost:?}");
@@ -214,14 +214,14 @@ fn readers_come_and_go() {
 fn off_is_off_for_readers_while_nobody_reads_another_output() {
     let machine = Machine::new();
     machine.at_30_fps();
-    // Its standard output is a pipe that nobody reads.
+    // The standard output is a pipe without a reader.
     let stream = Stream::show("0 --size 320x180 --fps 30 --effect none --to -");
     let mut reader = open(VIRTUAL, wish((320, 180), 30.0, yuyv()));
     let mut shows_bars = || distance_from(&frame(&mut reader).0, &BARS, MARGIN_PX) <= STEP;
     until("the camera's picture", &mut shows_bars);
     let off = run("ctl off");
     assert!(off.done().contains("standard output: busy"), "{}", off.stderr);
-    // What was under way to the reader when the answer came.
+    // Pictures may have been in flight to the reader when the answer came.
     until("the card", || !shows_bars());
     assert!((0..20).all(|_| !shows_bars()), "a picture after the card");
     run("ctl on").done();
@@ -258,7 +258,7 @@ fn jpegs_of_a_camera_are_decoded() {
     assert!(resolve_is_real(), "the camera goes before the virtual one");
 }
 
-/// A name that fits both means the camera.
+/// Whether a name that matches both devices resolves to the camera.
 fn resolve_is_real() -> bool {
     bokehcam::v4l2::node::resolve("i").unwrap().to_str() == Some(CAMERA)
 }

@@ -1,4 +1,4 @@
-//! The program: how tests start it, and what comes out of it.
+//! Starts the `bokehcam` program in an isolated environment, and collects its output.
 #![allow(dead_code, missing_docs)]
 
 use std::fs::{self, DirBuilder};
@@ -13,17 +13,17 @@ use serde_json::Value;
 
 #[path = "../../../../tests/common/until.rs"]
 mod waiting;
-#[allow(unused_imports)] // Not every test waits.
+#[allow(unused_imports)] // Not every test binary uses them.
 pub use waiting::{found, until};
 
 pub const PROGRAM: &str = env!("CARGO_BIN_EXE_bokehcam");
-/// The repository.
+/// The repository's root folder.
 pub const ROOT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../..");
-/// The recordings that come with it.
+/// The recordings bundled with the repository.
 pub const PORTRAIT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../recordings/portrait");
 pub const STEREO: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../recordings/stereo");
 
-/// Takes the variables whose names begin so from a command.
+/// Removes the environment variables whose names start with one of the prefixes `begins`.
 pub fn without(mut command: Command, begins: &[&str]) -> Command {
     for (name, _) in std::env::vars_os() {
         if begins.iter().any(|begin| name.as_encoded_bytes().starts_with(begin.as_bytes())) {
@@ -33,26 +33,26 @@ pub fn without(mut command: Command, begins: &[&str]) -> Command {
     command
 }
 
-/// What starts the program in the session of whoever runs the tests, without what they have set for it.
+/// Runs the command in the tester's session, but without their settings for the program, and with an empty stdin.
 pub fn in_session(command: Command) -> Command {
     let mut command = without(command, &["BOKEHCAM_", "RUST_LOG", "NO_COLOR"]);
     command.stdin(Stdio::null());
     command
 }
 
-/// The program itself in that session.
+/// Returns a command that runs the program in that session.
 pub fn bokehcam(args: &[&str]) -> Command {
     let mut command = in_session(Command::new(PROGRAM));
     command.args(args);
     command
 }
 
-/// Runs it as somebody new.
+/// Runs the program as a new user, in an empty home.
 pub fn run(args: &[&str]) -> Ran {
     Home::new().run(args)
 }
 
-/// Somebody with folders of their own, in which there is nothing yet, and the folder where they are.
+/// A new user: a temporary folder that is both the working directory and the parent of empty XDG folders.
 pub struct Home(pub tempfile::TempDir);
 
 impl Home {
@@ -61,7 +61,7 @@ impl Home {
     }
 
     pub fn at(folder: tempfile::TempDir) -> Self {
-        // Nobody else may reach a runtime folder.
+        // A runtime folder must be private to its user.
         DirBuilder::new().recursive(true).mode(0o700).create(folder.path().join("run")).unwrap();
         Self(folder)
     }
@@ -70,12 +70,12 @@ impl Home {
         self.0.path().join(name)
     }
 
-    /// A path as an argument.
+    /// Returns a path in the home as a command-line argument.
     pub fn arg(&self, name: &str) -> String {
         self.path(name).into_os_string().into_string().unwrap()
     }
 
-    /// The settings file, where nothing else is chosen.
+    /// Returns the path of the default settings file.
     pub fn settings(&self) -> PathBuf {
         self.path("config/bokehcam/config.toml")
     }
@@ -86,7 +86,7 @@ impl Home {
         self
     }
 
-    /// A program of our own, as others find it in the folder `bin`; gives a `PATH` where it comes first.
+    /// Adds a shell script as a program in the folder `bin`; returns a `PATH` that finds it first.
     pub fn add_program(&self, name: &str, script: &str) -> String {
         fs::create_dir_all(self.path("bin")).unwrap();
         let program = self.path("bin").join(name);
@@ -95,7 +95,7 @@ impl Home {
         format!("{}:{}", self.arg("bin"), std::env::var("PATH").unwrap())
     }
 
-    /// What starts the program, with nothing but what is here.
+    /// Confines a command to this home, by its XDG folders and working directory.
     pub fn within(&self, command: Command) -> Command {
         let mut command = without(in_session(command), &["PIPEWIRE_", "XDG_"]);
         for (variable, folder) in [
@@ -117,14 +117,14 @@ impl Home {
         command
     }
 
-    /// By way of a shell, which has done `before`, such as `ulimit -v 1000;`.
+    /// Returns a shell command that runs `before`, such as `ulimit -v 1000;`, and then becomes the program.
     pub fn shell(&self, before: &str, args: &str) -> Command {
         let mut command = self.within(Command::new("sh"));
         command.args(["-c", &format!("{before} exec '{PROGRAM}' {args}")]);
         command
     }
 
-    /// The same where drivers of GPUs are found, which lie where networks of the system's would.
+    /// Returns a command that finds GPU drivers: they are in the system's data folders, as are installed networks.
     pub fn with_drivers(&self, args: &[&str]) -> Command {
         let mut command = self.command(args);
         command.env_remove("XDG_DATA_DIRS");
@@ -136,7 +136,7 @@ impl Home {
     }
 }
 
-/// What came out of a program that has ended by itself.
+/// Exit code and output of a program that has ended.
 #[derive(Debug)]
 pub struct Ran {
     pub code: i32,
@@ -161,14 +161,14 @@ impl Ran {
         command.output().unwrap_or_else(|error| panic!("{command:?}: {error}")).into()
     }
 
-    /// It was refused with this exit code, in one line that has all of `said`; gives the line.
+    /// Asserts this exit code and a single line of output, on stderr, that contains all of `said`; returns the line.
     #[track_caller]
     pub fn refused(&self, code: i32, said: &[&str]) -> &str {
         assert_eq!((self.code, self.stdout.as_str(), self.stderr.lines().count()), (code, "", 1), "{}", self.stderr);
         self.failed(code, said)
     }
 
-    /// It failed with this exit code and one line of an error, perhaps after others, in which there is all of `said`.
+    /// Asserts this exit code and exactly one error line, possibly among other lines, that contains all of `said`.
     #[track_caller]
     pub fn failed(&self, code: i32, said: &[&str]) -> &str {
         let errors = self.stderr.lines().filter(|line| line.starts_with("error: ")).count();
@@ -177,21 +177,21 @@ impl Ran {
         &self.stderr
     }
 
-    /// It did what it was asked for; gives what was said.
+    /// Asserts success; returns stderr.
     #[track_caller]
     pub fn done(&self) -> &str {
         assert_eq!(self.code, 0, "{}", self.stderr);
         &self.stderr
     }
 
-    /// It did what it was asked for; gives what it printed.
+    /// Asserts success; returns stdout.
     #[track_caller]
     pub fn printed(self) -> String {
         self.done();
         self.stdout
     }
 
-    /// The one warning, if there is any.
+    /// Asserts success and at most one warning; returns the warning, or an empty string.
     #[track_caller]
     pub fn warning(&self) -> &str {
         let mut warnings = self.done().lines().filter(|line| line.starts_with("warning: "));
@@ -200,14 +200,14 @@ impl Ran {
         first
     }
 
-    /// What it printed, as JSON.
+    /// Parses stdout as JSON.
     #[track_caller]
     pub fn json(&self) -> Value {
         serde_json::from_str(&self.stdout).unwrap_or_else(|error| panic!("{error}: {}{}", self.stdout, self.stderr))
     }
 }
 
-/// A program that runs beside the test, and is killed with it.
+/// A background process, killed when dropped.
 pub struct Beside(pub Child);
 
 impl Beside {
@@ -225,14 +225,14 @@ impl Beside {
         self.0.try_wait().unwrap().is_none()
     }
 
-    /// The programs that it has started.
+    /// Returns the process ids of its children.
     pub fn children(&self) -> Vec<Pid> {
         let tasks = fs::read_dir(format!("/proc/{}/task", self.0.id())).into_iter().flatten().flatten();
         let listed = tasks.filter_map(|task| fs::read_to_string(task.path().join("children")).ok()).collect::<String>();
         listed.split_whitespace().filter_map(|id| Pid::from_raw(id.parse().ok()?)).collect()
     }
 
-    /// Waits for its end; gives what came out of it that nobody has read, of which the first may be pictures.
+    /// Waits for the process to end; returns the unread output. Stdout may be binary.
     #[track_caller]
     pub fn end(mut self, within: Duration) -> Ran {
         let status = found("the program ends", within, || self.0.try_wait().unwrap());
@@ -243,7 +243,7 @@ impl Beside {
         Ran { code: status.code().expect("ended by itself"), stdout, stderr }
     }
 
-    /// Asks it to end, and waits for that.
+    /// Sends a signal, and waits for the process to end.
     #[track_caller]
     pub fn end_by(self, signal: Signal, within: Duration) -> Ran {
         self.signal(signal);
@@ -258,7 +258,7 @@ impl Drop for Beside {
     }
 }
 
-/// A file of JSON.
+/// Reads a JSON file.
 #[track_caller]
 pub fn json(path: impl AsRef<Path>) -> Value {
     let path = path.as_ref();
@@ -266,7 +266,7 @@ pub fn json(path: impl AsRef<Path>) -> Value {
     serde_json::from_slice(&text).unwrap()
 }
 
-/// Each frame of a report was delivered, dropped for a reason, or under way at the end.
+/// Asserts that a report accounts for each captured frame: delivered, dropped with a cause, or in flight at the end.
 #[track_caller]
 pub fn assert_accounted(report: &Value) {
     let frames = &report["frames"];

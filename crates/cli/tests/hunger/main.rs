@@ -1,4 +1,4 @@
-//! What files of others may cost: memory stays within what is stated, whatever they claim, and nothing but files is read.
+//! Resource limits for untrusted files: memory stays within the stated bounds, and only regular files are read.
 #![allow(missing_docs, unsafe_code)]
 
 #[path = "../common/program.rs"]
@@ -20,7 +20,7 @@ use tempfile::TempDir;
 
 use program::{Home, Ran};
 
-/// Counts what is taken, and the most that was taken at once.
+/// An allocator that tracks current and peak usage, in bytes.
 struct Counting;
 
 static TAKEN: AtomicUsize = AtomicUsize::new(0);
@@ -31,24 +31,24 @@ fn took(bytes: usize) {
     PEAK.fetch_max(taken, Ordering::Relaxed);
 }
 
-// SAFETY: every call goes to the system's allocator as it is; counting touches nothing of it.
+// SAFETY: every call is forwarded to the system's allocator; the counters do not touch its memory.
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         took(layout.size());
-        // SAFETY: the caller's promises are passed on.
+        // SAFETY: the caller upholds the contract of the forwarded call.
         unsafe { System.alloc(layout) }
     }
 
     unsafe fn dealloc(&self, memory: *mut u8, layout: Layout) {
         TAKEN.fetch_sub(layout.size(), Ordering::Relaxed);
-        // SAFETY: the caller's promises are passed on.
+        // SAFETY: the caller upholds the contract of the forwarded call.
         unsafe { System.dealloc(memory, layout) }
     }
 
     unsafe fn realloc(&self, memory: *mut u8, layout: Layout, size: usize) -> *mut u8 {
         took(size);
         TAKEN.fetch_sub(layout.size(), Ordering::Relaxed);
-        // SAFETY: the caller's promises are passed on.
+        // SAFETY: the caller upholds the contract of the forwarded call.
         unsafe { System.realloc(memory, layout, size) }
     }
 }
@@ -56,13 +56,13 @@ unsafe impl GlobalAlloc for Counting {
 #[global_allocator]
 static COUNTING: Counting = Counting;
 
-/// Tests come one after the other, for what another one takes would be counted with its own.
+/// Serialises the tests, because parallel allocations would be counted as well.
 fn alone() -> MutexGuard<'static, ()> {
     static ALONE: Mutex<()> = Mutex::new(());
     ALONE.lock().unwrap_or_else(|poisoned| poisoned.into_inner())
 }
 
-/// The most bytes that `work` took at once.
+/// Returns the peak memory that `work` allocates, in bytes, and its result.
 fn most_bytes<T>(work: impl FnOnce() -> T) -> (usize, T) {
     let before = TAKEN.load(Ordering::Relaxed);
     PEAK.store(before, Ordering::Relaxed);
@@ -78,7 +78,7 @@ fn assert_says<T>(result: Result<T, impl ToString>, says: &str) {
     assert!(said.contains(says) && !said.contains('\n'), "{said}");
 }
 
-/// A picture of one value in `channels` of 16 bits, small on the disk.
+/// Saves a uniform 16-bit picture, which is small on disk.
 fn save_wide(path: &Path, side_px: u32, color: png::ColorType) {
     let mut encoder = png::Encoder::new(File::create(path).unwrap(), side_px, side_px);
     encoder.set_color(color);
@@ -123,7 +123,7 @@ fn a_file_is_known_by_its_first_bytes() {
         let path = dir.path().join(name);
         let mut file = File::create(&path).unwrap();
         file.write_all(start).unwrap();
-        // Sparse: it takes no room on the disk.
+        // A sparse file, which uses no disk space.
         file.set_len(1 << 30).unwrap();
         path
     };
@@ -176,7 +176,7 @@ fn lists_have_a_length_that_recordings_have() {
     }
 }
 
-/// Only headers are read, and what cannot be read once is not tried again.
+/// Only headers are read, and an unreadable file is not tried again.
 #[test]
 fn a_file_that_many_lines_name_is_looked_at_once() {
     let _alone = alone();
@@ -192,7 +192,7 @@ fn a_file_that_many_lines_name_is_looked_at_once() {
     assert!(open(&dir).is_err());
 }
 
-/// A pipe would be waited for, and a device never ends.
+/// Reading a pipe would block, and a device never ends.
 #[test]
 fn only_files_are_read() {
     let _alone = alone();
@@ -231,7 +231,7 @@ fn settings_are_a_file_of_a_sensible_size() {
     }
 }
 
-/// The blur takes many times what the picture takes, and a stream has several pictures under way.
+/// The blur needs many times the picture's memory, and a stream has several pictures in flight.
 #[test]
 fn a_picture_that_is_larger_than_memory_is_refused() {
     let _alone = alone();
@@ -240,7 +240,7 @@ fn a_picture_that_is_larger_than_memory_is_refused() {
     let blur = "--effect blur --coc-at-infinity 2 --backend cpu";
     for (limit_kb, size, command) in [
         (1_500_000, "5000x5000", format!("render wide.png {blur} --out out.png")),
-        // More than the blur of a picture takes, and less than a stream of them.
+        // A limit above the memory of one blur, and below that of a stream.
         (3_000_000, "5000x5000", format!("stream synthetic --size 5000x5000 {blur} --frames 1 --to out.y4m")),
     ] {
         let ran = Ran::of(&mut home.shell(&format!("ulimit -v {limit_kb};"), &command));

@@ -1,4 +1,4 @@
-//! This program as a camera in real browsers, which ask the desktop portal for it.
+//! The PipeWire output as a camera in real browsers, by way of the desktop portal.
 
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpListener;
@@ -10,7 +10,7 @@ use serde_json::Value;
 
 use super::session::{Run, folder, node, state, until};
 
-/// Patches of the picture from left to right: black, white, greys and colours that are not at the rim of what YUV can say.
+/// The picture's patches from left to right: black, white, greys, and colours well within the YUV gamut.
 const PATCHES: [[u8; 3]; 8] = [
     [0, 0, 0],
     [255, 255, 255],
@@ -22,14 +22,14 @@ const PATCHES: [[u8; 3]; 8] = [
     [230, 180, 140],
 ];
 const SIZE: (usize, usize) = (640, 360);
-/// Codes of 8 bits.
+/// Tolerance in 8-bit codes.
 const NEAR: u8 = 3;
-/// Nothing takes so long, a browser's first start on a busy machine neither.
+/// Timeout against hangs; longer than a browser's first start on a busy machine.
 const PATIENCE: Duration = Duration::from_secs(120);
-/// How often a browser is started.
+/// Maximum number of browser starts.
 const STARTS: usize = 3;
 
-/// A program that is ended when this is dropped.
+/// A background process, ended when dropped.
 struct Beside(Child);
 
 impl Beside {
@@ -50,7 +50,7 @@ impl Drop for Beside {
     }
 }
 
-/// What a desktop has for browsers: a screen, and a portal that lets them have cameras.
+/// A desktop for browsers: a screen, and a portal that grants access to cameras.
 struct Desktop {
     display: String,
     _screen: Beside,
@@ -101,7 +101,7 @@ impl Desktop {
         desktop
     }
 
-    /// What a page in the browser saw. A browser that stays silent is started anew, as a person does it with one that hangs.
+    /// Returns the measurements of the page in a browser; restarts a browser that does not respond.
     fn page(&self, browser: impl Fn(&Path, &str) -> Command) -> Value {
         let server = TcpListener::bind("127.0.0.1:0").unwrap();
         server.set_nonblocking(true).unwrap();
@@ -130,7 +130,7 @@ impl Desktop {
     }
 }
 
-/// Gives the page, or takes what it saw.
+/// Serves the page, or receives its measurements.
 fn answer(mut stream: std::net::TcpStream) -> Option<Value> {
     stream.set_nonblocking(false).unwrap();
     stream.set_read_timeout(Some(Duration::from_secs(10))).unwrap();
@@ -155,7 +155,7 @@ fn answer(mut stream: std::net::TcpStream) -> Option<Value> {
     request.starts_with("POST").then(|| serde_json::from_slice(&body).unwrap())
 }
 
-/// A recording of one picture with the patches, which is played round and round.
+/// Creates a recording of one picture with the patches, to be looped.
 fn patches(folder: &Path) -> std::path::PathBuf {
     let row: Vec<u8> = (0..SIZE.0).flat_map(|x| PATCHES[x * PATCHES.len() / SIZE.0]).collect();
     std::fs::create_dir_all(folder.join("rgb")).unwrap();
@@ -171,7 +171,7 @@ fn patches(folder: &Path) -> std::path::PathBuf {
     folder.to_owned()
 }
 
-/// Has a browser look at the camera.
+/// Checks the camera's picture in a browser.
 fn see(browser: impl Fn(&Path, &str) -> Command) {
     let recording = tempfile::tempdir().unwrap();
     let recording = patches(recording.path()).display().to_string();
@@ -223,12 +223,12 @@ fn firefox_shows_the_camera_as_it_is() {
             ("media.autoplay.default", "0"),
             ("datareporting.policy.dataSubmissionEnabled", "false"),
             ("browser.shell.checkDefaultBrowser", "false"),
-            // No page of its own before ours: what is not seen is not shown.
+            // Disables welcome pages, because a hidden page gets no frames.
             ("browser.aboutwelcome.enabled", "false"),
             ("browser.startup.homepage_override.mstone", "\"ignore\""),
             ("datareporting.policy.firstRunURL", "\"\""),
             ("startup.homepage_welcome_url", "\"\""),
-            // Else what a canvas tells is noise.
+            // Fingerprinting protection would return noise from the canvas.
             ("privacy.resistFingerprinting", "false"),
         ];
         let lines = settings.map(|(name, value)| format!("user_pref(\"{name}\", {value});\n")).concat();

@@ -1,4 +1,4 @@
-//! This program as a camera.
+//! The PipeWire output as a camera for other programs.
 
 use std::collections::HashMap;
 use std::process::Command;
@@ -13,7 +13,7 @@ use super::program::{Ran, bokehcam};
 use super::readers::GStreamer;
 use super::session::{FPS, PICTURES, Player, SIZE, folder, kill, node, picture, state, until, yuyv};
 
-/// The numbers of the pictures that readers got; before the first one there may be the still card.
+/// Identifies the received pictures by their number; skips the still card before the first one.
 fn numbers(frames: &[Vec<u8>]) -> Vec<usize> {
     let known: HashMap<Vec<u8>, usize> = (0..PICTURES).map(|number| (yuyv(&picture(number)), number)).collect();
     let is_card = |frame: &&Vec<u8>| !known.contains_key(*frame);
@@ -41,7 +41,7 @@ fn the_node_is_what_browsers_and_obs_list() {
     assert_eq!(format["size"], serde_json::json!({ "width": SIZE.0, "height": SIZE.1 }), "one size, and no choice");
     assert_eq!(format["framerate"], serde_json::json!({ "num": FPS, "denom": 1 }));
     assert_eq!(state("desk-left").as_deref(), Some("suspended"));
-    // Another one of that name is told apart, and both go when their programs do.
+    // A second node of the same name gets a suffix, and nodes disappear with their programs.
     let other = Player::start("desk-left-2", &["--to", "pipewire:Desk, left"]);
     assert_eq!(other.end()["pipewire"][0]["node"], "desk-left-2");
     let report = player.end();
@@ -50,13 +50,13 @@ fn the_node_is_what_browsers_and_obs_list() {
     until("the nodes to go", || (node("desk-left").is_none() && node("desk-left-2").is_none()).then_some(()));
 }
 
-/// How far each picture is behind the one before it; the recording is played round and round.
+/// Returns the distance from each picture to the previous one, modulo the loop length.
 fn steps(numbers: &[usize]) -> Vec<usize> {
     numbers.windows(2).map(|pair| (pair[1] + PICTURES - pair[0]) % PICTURES).collect()
 }
 
-/// A reader gets every picture once, in order: what it was given twice the report counts as shown again, and what it missed
-/// as lost on the way. How many those are is the machine's affair.
+/// Asserts that a reader gets the pictures in order, and that the report counts repeats and losses. Their number
+/// depends on the machine's speed.
 fn is_accounted_for(report: &Value, frames: &[Vec<u8>]) {
     let (numbers, count) = (numbers(frames), |value: &Value| value.as_u64().unwrap() as usize);
     let (node, steps) = (&report["pipewire"][0], steps(&numbers));
@@ -80,7 +80,7 @@ fn readers_get_each_picture_as_it_is_in_order_and_with_its_time() {
     let numbers = numbers(&got.frames);
     let times_ns = &got.times_ns[got.frames.len() - numbers.len()..];
     assert!(times_ns.windows(2).all(|pair| pair[0] < pair[1]), "{times_ns:?}");
-    // A picture's time is when it was due. Behind one that was shown again, as it did not come in time, it is later.
+    // A picture's time stamp is its due time. After a repeat of a late picture, it is later.
     let steps = steps(&numbers);
     let is_new = |at: usize| at == 0 || steps[at - 1] > 0;
     let own: Vec<usize> = (1..numbers.len()).filter(|&at| is_new(at) && is_new(at - 1)).collect();
@@ -88,7 +88,7 @@ fn readers_get_each_picture_as_it_is_in_order_and_with_its_time() {
     for pair in own.windows(2) {
         let due = (numbers[pair[1]] + PICTURES - numbers[pair[0]]) % PICTURES;
         let periods = (times_ns[pair[1]] - times_ns[pair[0]]) as f64 / period_ns;
-        // It may have been more than once round.
+        // The recording may have looped several times.
         let off = (periods - due as f64 + 0.5).rem_euclid(PICTURES as f64) - 0.5;
         assert!(off.abs() < 0.15, "{off} periods off: {numbers:?}, {times_ns:?}");
     }
@@ -129,14 +129,14 @@ fn pictures_that_are_yuyv_already_come_as_they_are_between_others() {
 fn two_readers_at_once_get_every_picture() {
     folder();
     let player = Player::start("bokehcam", &["--to", "pipewire"]);
-    // More than it reads while the other one does.
+    // More pictures than it reads during the other reader's run.
     let mut first = GStreamer::start("bokehcam", 100_000);
     until("the first one reads", || (first.frames().len() > 20).then_some(()));
     let before = first.frames().len();
     let second = GStreamer::start("bokehcam", 90).end();
     assert!(first.is_reading(), "they read at the same time");
     let frames = first.frames();
-    // Neither is kept waiting for the other.
+    // Neither reader delays the other.
     assert!(frames.len() >= before + 60, "{} pictures and {}", frames.len() - before, second.frames.len());
     drop(first);
     let report = player.end();
@@ -180,13 +180,13 @@ fn a_program_of_before_pipewire_reads_by_pw_v4l2() {
 fn the_camera_outlives_the_daemon() {
     folder();
     let player = Player::start("bokehcam", &["--to", "pipewire"]);
-    // This reader waits for ever when the daemon goes, and is ended.
+    // This reader would wait for ever after the daemon's end, so it is killed.
     let reader = GStreamer::start("bokehcam", 1000);
     until("a reader", || (state("bokehcam")? == "running").then_some(()));
     kill("pipewire");
     drop(reader);
     until("the node again", || node("bokehcam"));
-    // Who connects readers has to be back as well.
+    // The session manager, which connects readers, must be back, too.
     until("the session manager", || {
         let told = Command::new("pw-cli").args(["ls", "Client"]).output().unwrap();
         String::from_utf8_lossy(&told.stdout).contains("WirePlumber").then_some(())
@@ -196,7 +196,7 @@ fn the_camera_outlives_the_daemon() {
     assert_eq!(report["pipewire"][0]["returns"], 1, "{}", report["pipewire"]);
 }
 
-/// Tells when pictures of a recording are opened.
+/// Watches a recording's pictures for being opened (inotify).
 struct Openings(std::os::fd::OwnedFd);
 
 impl Openings {
@@ -206,7 +206,7 @@ impl Openings {
         Self(watch)
     }
 
-    /// Whether any was opened since the last question.
+    /// Whether any picture was opened since the last call.
     fn any(&self) -> bool {
         let mut events = [0; 4096];
         let mut any = false;
@@ -237,13 +237,13 @@ fn off_is_off_for_readers_while_another_output_hangs() {
     let off = Ran::of(&mut bokehcam(&["ctl", "--name", "hung", "off"]));
     assert!(off.done().contains("call.mp4: busy"), "{}", off.stderr);
     let before = reader.frames().len();
-    // What the reader was about to write when the answer came may be a picture still.
+    // The reader may still have been writing a picture when the answer came.
     let after = until("more pictures", || Some(reader.frames()).filter(|frames| frames.len() > before + 4));
     assert!(after[before + 2..].iter().all(|frame| !known.contains(frame) && *frame == after[before + 2]));
     let stat = std::fs::read_to_string(format!("/proc/{ffmpeg}/stat")).unwrap();
     assert!(stat.contains(" T "), "it still hangs: {stat}");
     assert!(signal("-CONT", &ffmpeg).success());
-    // The card is no frame of the source: the node was given more than was delivered.
+    // The card is not a frame of the source, so the node got more pictures than were delivered.
     drop(player);
 }
 
@@ -261,7 +261,7 @@ fn the_source_is_read_only_while_somebody_watches() {
         let reader = GStreamer::start("bokehcam", 45);
         until("a picture", || opened.any().then_some(()));
         read += steps(&numbers(&reader.end().frames)).iter().filter(|step| **step > 0).count() as u64;
-        // What is on its way is still read.
+        // Frames in flight are still read.
         let mut last = Instant::now();
         until("nobody watches any more", || {
             if opened.any() {

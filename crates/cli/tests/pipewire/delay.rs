@@ -1,4 +1,4 @@
-//! How long a picture takes from our hand-over to another program's callback.
+//! Latency from the output of a picture to another program's callback.
 
 use std::collections::VecDeque;
 use std::io::{BufRead, BufReader};
@@ -19,7 +19,7 @@ const SIZE: (u32, u32) = (1280, 720);
 const PERIOD: Duration = Duration::from_micros(33_333);
 const PICTURES: usize = 300;
 
-/// Tells of each picture its time, and how long it took.
+/// Sends each picture's time stamp and latency, in nanoseconds.
 struct Stopwatch(mpsc::Sender<(u64, u64)>);
 
 impl Take for Stopwatch {
@@ -33,29 +33,29 @@ impl Take for Stopwatch {
     fn begin(&mut self, _: &Agreed) {}
 
     fn frame(&mut self, frame: &Frame) {
-        // Who measures may have seen enough.
+        // The receiver may have ended.
         let _ = self.0.send((frame.captured_ns, Clock::system().now_ns() - frame.captured_ns));
     }
 
     fn lost(&mut self, _: u64, _: u64, _: u64) {}
 }
 
-/// The other program: this one would not read its own camera.
+/// The reader process: a program does not read its own camera.
 #[test]
 #[ignore = "needs PipeWire (tests/pipewire/session), and who starts it"]
 fn the_other_program() {
     let Ok(camera) = std::env::var("CAMERA_TO_TIME") else { return };
     let (to, from) = mpsc::channel();
     let (_reader, ..) = Reader::new(&camera, false, Stopwatch(to)).unwrap();
-    // It is ended once it has told of enough.
+    // The parent test kills this process when it has enough samples.
     from.iter().for_each(|(captured_ns, delay_ns)| println!("\n{captured_ns} {delay_ns}"));
 }
 
-/// The other program at work; dropped, it is ended.
+/// The reader process, ended when dropped.
 struct Other {
     _program: Beside,
     told: mpsc::Receiver<(u64, u64)>,
-    /// What was heard and not asked for yet.
+    /// Samples received so far.
     heard: VecDeque<(u64, u64)>,
 }
 
@@ -76,7 +76,7 @@ impl Other {
         Self { _program: program, told, heard: VecDeque::new() }
     }
 
-    /// Whether it has got the picture of this time, and then how long that took.
+    /// Returns the latency of the picture with this time stamp, if received.
     fn got(&mut self, captured_ns: u64) -> Option<u64> {
         self.heard.extend(self.told.try_iter());
         self.heard.iter().find(|told| told.0 == captured_ns).map(|told| told.1)
@@ -97,7 +97,7 @@ fn a_picture_comes_to_the_reader_without_the_next_one() {
         let _ = sink.put(&picture, 0).unwrap();
         now_ns
     };
-    // Who reads has to be there.
+    // Wait for the reader.
     until("a reader", || {
         let put_ns = put(&mut sink);
         std::thread::sleep(PERIOD);
@@ -108,7 +108,7 @@ fn a_picture_comes_to_the_reader_without_the_next_one() {
         let count = sink.nodes().remove(0);
         let before = count();
         let put_ns = put(&mut sink);
-        // None comes after it, but for one that is shown again where this one is late.
+        // The next picture follows only after this one; only a repeat may come between, if it is late.
         let delay_ns = until("the picture", || {
             let now = count();
             let is_lost = now.overtaken + now.no_buffer > before.overtaken + before.no_buffer;
@@ -120,7 +120,7 @@ fn a_picture_comes_to_the_reader_without_the_next_one() {
     let times: Vec<u64> = reader.heard.iter().map(|told| told.0).collect();
     assert!(times.is_sorted_by(|a, b| a < b), "in order, and none twice");
     assert!(by_itself > 0, "each waits until it is shown again");
-    // How soon is the machine's affair.
+    // The latency depends on the machine, so it is only printed.
     delays_ns.sort_unstable();
     let ms = |share: f64| delays_ns[(share * (PICTURES - 1) as f64) as usize] as f64 / 1e6;
     println!("delay ms: p50 {:.2}, p99 {:.2}, max {:.2}; {by_itself} by themselves", ms(0.5), ms(0.99), ms(1.0));

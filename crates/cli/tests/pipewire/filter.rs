@@ -1,4 +1,4 @@
-//! This program in the place of a camera that others ask for: WirePlumber gives it to them from 0.5 on.
+//! The program as a PipeWire filter that replaces a camera for other programs; needs WirePlumber 0.5 or later.
 
 use std::process::Command;
 
@@ -8,7 +8,7 @@ use super::program::run;
 use super::readers::GStreamer;
 use super::session::{PICTURES, Player, Run, graph, node, picture, state, until, yuyv};
 
-/// Codes that a picture may be off by on average after it was decoded and encoded once more.
+/// Maximum mean error after another decoding and encoding, in codes.
 const NEAR: f64 = 4.0;
 
 fn mirrored(picture: &ColorImage) -> ColorImage {
@@ -19,7 +19,7 @@ fn mirrored(picture: &ColorImage) -> ColorImage {
     mirrored
 }
 
-/// How far a frame is from the nearest of some, in codes on average.
+/// Returns the mean absolute difference between a frame and the nearest of several, in codes.
 fn off(frame: &[u8], of: &[Vec<u8>]) -> f64 {
     let off = |other: &Vec<u8>| {
         let sum: u64 = frame.iter().zip(other).map(|(one, other)| u64::from(one.abs_diff(*other))).sum();
@@ -28,7 +28,7 @@ fn off(frame: &[u8], of: &[Vec<u8>]) -> f64 {
     of.iter().map(off).fold(f64::INFINITY, f64::min)
 }
 
-/// Whether the session manager is of those that know filters; then waits until it has begun to.
+/// Whether the session manager supports filters; waits until it is ready for them.
 fn has_filters() -> bool {
     let told = Command::new("wireplumber").arg("--version").output().unwrap().stdout;
     let told = String::from_utf8(told).unwrap();
@@ -42,8 +42,8 @@ fn has_filters() -> bool {
     knows
 }
 
-/// Who asks for a camera by its own name has the pictures of the filter; nobody else has the camera open, and it rests while
-/// there is nobody. Once the filter has ended, the camera's own pictures come.
+/// A reader of a camera gets the filter's pictures. Only the filter opens the camera, which is idle without readers.
+/// After the filter's end, readers get the camera's own pictures.
 #[test]
 #[ignore = "needs PipeWire"]
 fn who_asks_for_the_camera_is_given_the_filter() {
@@ -64,7 +64,7 @@ fn who_asks_for_the_camera_is_given_the_filter() {
     let turned: Vec<Vec<u8>> = (0..PICTURES).map(|number| yuyv(&mirrored(&picture(number)))).collect();
     let reader = GStreamer::start("cam", 90);
     let frames = reader.end().frames;
-    // The card comes first.
+    // The still card comes first.
     let first = frames.iter().position(|frame| off(frame, &turned) < NEAR).expect("a picture of the filter's");
     assert!(first < 60, "{first} frames before");
     for (at, frame) in frames.iter().enumerate() {

@@ -1,8 +1,7 @@
-//! Cameras of PipeWire, with its daemons in a session of their own, and other programs as readers.
+//! PipeWire cameras, with the daemons in a private session, and other programs as readers.
 //!
-//! `scripts/test` runs them where there are such daemons. By hand:
-//! `tests/pipewire/session cargo test --test pipewire -- --include-ignored --test-threads=1`, with `--skip browsers::` where
-//! there are none.
+//! `scripts/test` runs them if the daemons are installed. By hand: `tests/pipewire/session cargo test --test pipewire
+//! -- --include-ignored --test-threads=1`, with `--skip browsers::` if there are no browsers.
 #![cfg(feature = "pipewire")]
 #![allow(missing_docs)]
 

@@ -1,4 +1,4 @@
-//! Programs that read from a camera of PipeWire's.
+//! Programs that read from a PipeWire camera.
 
 use std::process::{Command, Stdio};
 
@@ -7,24 +7,24 @@ use super::session::{SIZE, until};
 
 const FRAME_BYTES: usize = 2 * (SIZE.0 * SIZE.1) as usize;
 
-/// What GStreamer got.
+/// The pictures that GStreamer received.
 pub struct Got {
-    /// Pictures, encoded as they came.
+    /// YUYV data of each picture.
     pub frames: Vec<Vec<u8>>,
-    /// Their numbers.
+    /// Sequence numbers.
     pub sequence: Vec<u64>,
-    /// Their times.
+    /// Time stamps in nanoseconds.
     pub times_ns: Vec<u64>,
 }
 
-/// GStreamer, which reads some pictures and ends.
+/// A GStreamer process that reads some pictures and ends.
 pub struct GStreamer {
     program: Beside,
     folder: tempfile::TempDir,
 }
 
 impl GStreamer {
-    /// Starts to read so many pictures of a node.
+    /// Starts to read `pictures` pictures of a node.
     pub fn start(node: &str, pictures: usize) -> Self {
         let folder = tempfile::tempdir().unwrap();
         let caps = format!("video/x-raw,format=YUY2,width={},height={}", SIZE.0, SIZE.1);
@@ -42,14 +42,14 @@ impl GStreamer {
         self.program.runs()
     }
 
-    /// What it has got so far.
+    /// Returns the complete pictures received so far.
     pub fn frames(&self) -> Vec<Vec<u8>> {
         let bytes = std::fs::read(self.folder.path().join("frames")).unwrap_or_default();
-        // The last one may be on its way into the file.
+        // The last one may be incomplete in the file.
         bytes.chunks_exact(FRAME_BYTES).map(<[u8]>::to_vec).collect()
     }
 
-    /// Waits for its end.
+    /// Waits for the process to end.
     pub fn end(mut self) -> Got {
         until("the reader's end", || (!self.is_reading()).then_some(()));
         let bytes = std::fs::read(self.folder.path().join("frames")).unwrap();
@@ -67,7 +67,7 @@ impl GStreamer {
     }
 }
 
-/// A time as GStreamer prints it: hours, minutes and seconds with nine decimals.
+/// Parses a time in GStreamer's format: hours, minutes, and seconds with nine decimals.
 fn nanoseconds(text: &str) -> u64 {
     let seconds = text.split(':').fold(0.0, |sum, part| 60.0 * sum + part.parse::<f64>().unwrap());
     (seconds * 1e9).round() as u64

@@ -1,4 +1,4 @@
-//! The session, what is in it, and this program in it.
+//! The PipeWire session, its graph, and the program in it.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -11,45 +11,45 @@ use serde_json::Value;
 
 use super::program::{Beside, assert_accounted, bokehcam, found, json};
 
-/// Nothing takes so long, on a busy machine neither: this is against a hang.
+/// Timeout against hangs; far longer than needed even on a busy machine.
 pub const PATIENCE: Duration = Duration::from_secs(120);
 pub const SIZE: (u32, u32) = (320, 180);
 pub const FPS: u32 = 30;
-/// Pictures of the recording, which is played round and round.
+/// Number of pictures in the looped recording.
 pub const PICTURES: usize = 40;
 
-/// The folder of the session that `tests/pipewire/session` made.
+/// Returns the folder of the session created by `tests/pipewire/session`.
 pub fn folder() -> PathBuf {
     assert!(std::env::var_os("PIPEWIRE_TEST_SESSION").is_some(), "not in a session of tests/pipewire/session");
     PathBuf::from(std::env::var_os("XDG_RUNTIME_DIR").unwrap())
 }
 
-/// Waits until `is` gives something.
+/// Waits until `is` returns a value.
 #[track_caller]
 pub fn until<T>(what: &str, is: impl FnMut() -> Option<T>) -> T {
     found(what, PATIENCE, is)
 }
 
-/// Everything in the graph, as PipeWire's own program tells it.
+/// Returns all objects of the graph, by `pw-dump`.
 pub fn graph() -> Vec<Value> {
     let told = Command::new("pw-dump").output().unwrap();
-    // While the daemon is away it says nothing, or half of it.
+    // Without the daemon, the output is empty or incomplete.
     serde_json::from_slice(&told.stdout).unwrap_or_default()
 }
 
-/// The node of this name.
+/// Finds a node by name.
 pub fn node(name: &str) -> Option<Value> {
     graph()
         .into_iter()
         .find(|object| object["info"]["props"]["node.name"] == name && object["info"]["state"].is_string())
 }
 
-/// The state of a node, such as `suspended`.
+/// Returns the state of a node, such as `suspended`.
 pub fn state(name: &str) -> Option<String> {
     node(name)?["info"]["state"].as_str().map(str::to_owned)
 }
 
-/// Picture number `number` of the recording: no two are alike.
+/// Draws picture `number` of the recording; all are different.
 pub fn picture(number: usize) -> ColorImage {
     let mut picture = ColorImage::new(SIZE.0, SIZE.1);
     for (at, pixel) in picture.rgb.as_chunks_mut::<3>().0.iter_mut().enumerate() {
@@ -59,7 +59,7 @@ pub fn picture(number: usize) -> ColorImage {
     picture
 }
 
-/// A picture as readers are to get it, by the formula of BT.601 in limited range with 8 bits.
+/// Returns the picture that readers should get: 8-bit YUYV, limited-range BT.601.
 pub fn yuyv(picture: &ColorImage) -> Vec<u8> {
     let codes = |pair: &[u8; 6]| {
         let [left, right] = [[pair[0], pair[1], pair[2]], [pair[3], pair[4], pair[5]]].map(|rgb| rgb.map(i32::from));
@@ -72,7 +72,7 @@ pub fn yuyv(picture: &ColorImage) -> Vec<u8> {
     picture.rgb.as_chunks::<6>().0.iter().flat_map(codes).collect()
 }
 
-/// A recording of [`PICTURES`] pictures, 30 a second.
+/// Creates a recording of [`PICTURES`] pictures at 30 per second.
 pub fn recording(folder: &Path) -> PathBuf {
     let folder = folder.join("recording");
     fs::create_dir_all(folder.join("rgb")).unwrap();
@@ -88,7 +88,7 @@ pub fn recording(folder: &Path) -> PathBuf {
     folder
 }
 
-/// This program at work.
+/// A running `bokehcam`.
 pub struct Run {
     program: Beside,
     folder: tempfile::TempDir,
@@ -110,19 +110,19 @@ impl Run {
         fs::read_to_string(self.folder.path().join("said")).unwrap()
     }
 
-    /// Whether it has ended.
+    /// Whether the program has ended.
     pub fn is_over(&mut self) -> bool {
         !self.program.runs()
     }
 
-    /// Waits for its end by an error of run time or of usage; returns what it said.
+    /// Waits for a failure, of usage or at run time; returns its message.
     pub fn refused(mut self) -> String {
         let ended = until("the refusal", || self.program.0.try_wait().unwrap());
         assert!(matches!(ended.code(), Some(1 | 2)), "{ended}");
         self.said()
     }
 
-    /// Waits for its own end; returns its report.
+    /// Waits for the program to end by itself; returns its report.
     pub fn ended(mut self) -> Value {
         let ended = until("the end of the run", || self.program.0.try_wait().unwrap());
         assert!(ended.success(), "{ended}: {}", self.said());
@@ -131,24 +131,24 @@ impl Run {
         let (frames, number) = (&report["frames"], |value: &Value| value.as_u64().unwrap());
         for node in report["pipewire"].as_array().into_iter().flatten() {
             let put: u64 = ["shown", "unwatched", "overtaken", "no_buffer"].iter().map(|key| number(&node[key])).sum();
-            // The last one may be on its way.
+            // The last frame may be in flight.
             assert!(put.abs_diff(number(&frames["delivered"])) <= 1, "{node} of {frames}");
         }
         report
     }
 
-    /// Ends it as Ctrl-C does; returns its report.
+    /// Sends SIGINT, as Ctrl-C does; returns the report.
     pub fn end(self) -> Value {
         self.program.signal(Signal::INT);
         self.ended()
     }
 }
 
-/// This program, which plays the recording into something.
+/// A run that plays the recording into an output.
 pub struct Player(Run);
 
 impl Player {
-    /// Starts it with more arguments, and waits until the node `name` is there.
+    /// Starts a run with more arguments, and waits for the node `name`.
     pub fn start(name: &str, arguments: &[&str]) -> Self {
         let folder = tempfile::tempdir().unwrap();
         let recording = recording(folder.path());
@@ -158,23 +158,23 @@ impl Player {
         player
     }
 
-    /// The program that it has started.
+    /// Returns the process id of its child.
     pub fn child(&self) -> String {
         self.0.program.children()[0].as_raw_nonzero().to_string()
     }
 
-    /// Where the recording lies.
+    /// Returns the folder of the recording's pictures.
     pub fn pictures(&self) -> PathBuf {
         self.0.folder.path().join("recording/rgb")
     }
 
-    /// Ends it as Ctrl-C does; returns its report.
+    /// Sends SIGINT, as Ctrl-C does; returns the report.
     pub fn end(self) -> Value {
         self.0.end()
     }
 }
 
-/// Kills a daemon of the session at once; it comes back after a second.
+/// Kills a daemon of the session, which restarts after a second.
 pub fn kill(daemon: &str) {
     let process = fs::read_to_string(folder().join(format!("{daemon}.pid"))).unwrap();
     assert!(Command::new("kill").args(["-KILL", process.trim()]).status().unwrap().success());

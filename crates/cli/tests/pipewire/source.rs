@@ -1,4 +1,4 @@
-//! This program as a reader: GStreamer stands for the camera.
+//! PipeWire sources, with GStreamer as the camera.
 
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
@@ -8,7 +8,7 @@ use serde_json::Value;
 use super::program::{Beside, Ran, bokehcam};
 use super::session::{Run, folder, node, until};
 
-/// A camera that another program gives.
+/// A camera provided by GStreamer.
 struct Camera {
     program: Beside,
     caps: String,
@@ -16,7 +16,7 @@ struct Camera {
 }
 
 impl Camera {
-    /// Gives pictures of one colour as the camera `cam`.
+    /// Starts the camera `cam` with pictures of one colour.
     fn start(caps: &str, color: u32) -> Self {
         let camera = Self { program: Self::program(caps, color), caps: caps.to_owned(), color };
         until("the camera", || node("cam"));
@@ -37,8 +37,8 @@ impl Camera {
         Beside::start(&mut command)
     }
 
-    /// Waits until `is` gives something of what is read from it. GStreamer's camera stands still for good once a busy machine
-    /// has let it wait; after a while without a result it comes anew, as one that was unplugged does.
+    /// Waits until `is` returns a value. GStreamer's camera may stall for good on a busy machine, so it is restarted
+    /// after a while without a result, like a camera that is plugged in again.
     fn until<T>(&mut self, what: &str, mut is: impl FnMut() -> Option<T>) -> T {
         let mut began = Instant::now();
         until(what, || {
@@ -61,7 +61,7 @@ fn count(report: &Value, key: &str) -> u64 {
     report["frames"][key].as_u64().unwrap()
 }
 
-/// The colour in the middle of a picture that was written.
+/// Reads the colour in the middle of a written picture.
 fn middle(path: &std::path::Path) -> [u8; 3] {
     let mut reader =
         png::Decoder::new(std::io::BufReader::new(std::fs::File::open(path).unwrap())).read_info().unwrap();
@@ -110,7 +110,7 @@ fn a_camera_is_listed_and_read_at_its_rate() {
     let told = &listed["pipewire"][0];
     assert_eq!((&told["name"], &told["label"]), (&"pipewire:cam".into(), &"Front-camera".into()));
     assert_eq!(told["formats"][0]["fourcc"], "YUYV");
-    // By its own name, by what people see, and by a part of that.
+    // By node name, by description, and by a part of the description.
     for name in ["pipewire:cam", "pipewire:Front-camera", "pipewire:FRONT"] {
         let began = Instant::now();
         let mut run = Run::start(&["stream", name, "--effect", "none", "--frames", "60", "--to", "null"]);
@@ -118,7 +118,7 @@ fn a_camera_is_listed_and_read_at_its_rate() {
         let report = run.ended();
         let seconds = began.elapsed().as_secs_f64();
         assert!(report["source"].as_str().unwrap().starts_with("pipewire:cam (Front-camera), 320x180 YUYV at 30 fps"));
-        // Sixty are read, of as many as the camera can have given; how many of them get through is the machine's affair.
+        // At least sixty frames are read, and at most the camera's output; the number delivered depends on the machine.
         let captured = count(&report, "captured");
         assert!(captured >= 60 && captured as f64 <= 31.0 * seconds + 10.0, "{} in {seconds} s", report["frames"]);
         assert!(count(&report, "delivered") > 0, "{}", report["frames"]);
@@ -170,13 +170,13 @@ fn pictures_go_from_camera_to_camera_on_demand() {
     let began = Instant::now();
     let run = Run::start(&arguments);
     until("our camera", || node("blurred"));
-    // Nobody watches us: the camera is let go of.
+    // Without viewers, the camera is released.
     let links = || super::session::graph().iter().filter(|object| object["type"] == "PipeWire:Interface:Link").count();
     until("the camera to be let go of", || (links() == 0).then_some(()));
     let start_s = began.elapsed().as_secs_f64();
     let began = Instant::now();
     let reader = super::readers::GStreamer::start("blurred", 100_000);
-    // BT.601, limited range. Before the first picture there is the still card.
+    // Blue in limited-range BT.601. The still card precedes the first picture.
     let is_blue = |frame: &Vec<u8>| {
         let [y, u, v] = [0, 1, 3].map(|at| frame[frame.len() / 2 + at]);
         y.abs_diff(81) < 4 && u.abs_diff(216) < 4 && v.abs_diff(101) < 4
@@ -187,6 +187,6 @@ fn pictures_go_from_camera_to_camera_on_demand() {
     let watched_s = began.elapsed().as_secs_f64();
     std::thread::sleep(Duration::from_secs(3));
     let report = run.end();
-    // No more than came while somebody watched, and at the start.
+    // Frames are captured only at the start and while there is a viewer.
     assert!(count(&report, "captured") as f64 <= 31.0 * (watched_s + start_s) + 10.0, "{}", report["frames"]);
 }

@@ -1,4 +1,4 @@
-//! What is said where there is no PipeWire, or where it is asked for wrongly.
+//! Messages without PipeWire, and for invalid PipeWire arguments.
 
 use super::program::{Ran, run};
 

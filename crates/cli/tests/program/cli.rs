@@ -1,4 +1,4 @@
-//! The program as its user meets it: what it prints, what it refuses, and with which exit code.
+//! The command line: output, refusals and exit codes.
 
 use std::fs;
 
@@ -9,7 +9,7 @@ mod commands;
 mod report;
 mod service;
 
-/// The value of a setting, and where it comes from, as `config dump` prints them.
+/// Returns the value of a setting and its origin, as `config dump` prints them.
 fn dumped(dump: &str, name: &str) -> (String, String) {
     let line = dump.lines().find(|line| line.starts_with(&format!("{name} = "))).unwrap_or_else(|| panic!("{dump}"));
     let (value, origin) = line[name.len() + 3..].rsplit_once(" # ").unwrap();
@@ -104,7 +104,7 @@ fn what_a_camera_cannot_do_is_said_in_one_line() {
         (&["--control", "exposure"], 2, "NAME=VALUE"),
         (&["--format", "MJPEG"], 2, "such as MJPG"),
         (&["--fps", "0"], 2, "from 0.1 to 1000"),
-        // A device, but no camera.
+        // A device that is not a camera.
         (&["--control", "a=1,b=2", "--format", "YUYV", "--size", "640x480"], 1, "/dev/null: this is no camera"),
     ];
     for (more, code, told) in cases {

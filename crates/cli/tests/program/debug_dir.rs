@@ -1,4 +1,4 @@
-//! `render --debug-dir`: a blur's intermediates, as their reader finds them.
+//! `render --debug-dir`: the files of a blur's intermediate results.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -7,7 +7,7 @@ use serde_json::Value;
 
 use crate::program::{Home, Ran, json};
 
-/// A small picture with its depth: a person in focus, something in front, a room behind.
+/// A small picture with depth: a person in focus, an object in front, a room behind.
 struct Still {
     home: Home,
 }
@@ -32,7 +32,7 @@ impl Still {
         ran
     }
 
-    /// Renders it into `out.png` with its insides in the folder `dir`.
+    /// Renders the picture into `out.png`, and its intermediate results into the folder `dir`.
     fn render(&self, dir: &str, more: &[&str]) -> Ran {
         self.run(&[&["render", IMAGE, "--out", "out.png", "--debug-dir", dir], more].concat())
     }
@@ -50,7 +50,7 @@ impl Still {
     }
 }
 
-/// The names in a folder, and those that its plan says.
+/// Returns the file names in a folder, and those listed in its plan.
 fn names(dir: &Path, plan: &Value) -> [Vec<String>; 2] {
     let mut found: Vec<String> =
         fs::read_dir(dir).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
@@ -92,7 +92,7 @@ fn every_intermediate_of_a_layered_blur_is_there_in_its_size() {
             let picture = still.picture(&format!("a/within/{part}_{k}.png"));
             assert_eq!(<[u32; 2]>::from(picture.dimensions()), size, "{part} {k}");
         }
-        // Depth grows with CoC, so its ranges are in the same order.
+        // Depth increases with the signed CoC, so the bins' depth ranges are in the same order.
         let depth = |k: usize, end: usize| bins[k]["content_depth_m"][end].as_f64();
         if let (Some(before), Some(here)) = (k.checked_sub(1).and_then(|before| depth(before, 1)), depth(k, 0)) {
             assert!(before <= here, "{k}: {before} {here}");
@@ -101,7 +101,7 @@ fn every_intermediate_of_a_layered_blur_is_there_in_its_size() {
     for name in ["coc", "behind", "behind_coc", "hidden", "still"] {
         assert_eq!(still.picture(&format!("a/within/{name}.png")).dimensions(), (96, 56));
     }
-    // What is hidden is replaced, all else stays.
+    // Hidden pixels are replaced; all others are unchanged.
     let [before, behind, hidden] =
         [IMAGE, "a/within/behind.png", "a/within/hidden.png"].map(|name| still.picture(name));
     let mut replaced = 0;
@@ -113,7 +113,7 @@ fn every_intermediate_of_a_layered_blur_is_there_in_its_size() {
     }
     assert!(replaced > 0);
 
-    // What is looked at is what is done without looking.
+    // Writing intermediate results does not change the output.
     let looked = still.picture("out.png");
     let args =
         ["render", IMAGE, "--depth-map", DEPTH, "--coc-at-infinity", "6", "--max-coc", "9", "--out", "plain.png"];
@@ -136,7 +136,8 @@ fn pictures_of_light_are_encoded_as_the_result_is() {
             found.iter().filter(|name| *name != "plan.json").collect::<Vec<_>>(),
             all.iter().collect::<Vec<_>>()
         );
-        // One bin at full scale with everything in it: before the filters it is the picture, after them the result.
+        // A single bin at full resolution contains the whole picture: the input before the filters, the output after
+        // them.
         for (inside, outside) in [("bin_0", IMAGE), ("blur_0", "out.png")] {
             let [a, b] = [still.picture(&format!("within/{inside}.png")), still.picture(outside)];
             let most = a.iter().zip(b.iter()).map(|(a, b)| a.abs_diff(*b)).max();
@@ -170,7 +171,7 @@ fn methods_without_bins_have_what_there_is() {
     assert_eq!(found("none", still.render("none", &["--effect", "none", "--force"])), ["plan.json"]);
     let tilted = found("tilt", still.render("tilt", &["--effect", "tilt-shift", "--coc-at-infinity", "6", "--force"]));
     assert!(tilted.contains(&"radius_1.png".to_string()) && !tilted.contains(&"behind.png".to_string()), "{tilted:?}");
-    // Nothing in front: nothing is hidden.
+    // Without a foreground, nothing is hidden.
     let far = found("far", still.render_depth("far", &["--focus", "0.1", "--force"]));
     assert!(far.contains(&"bin_0.png".to_string()) && !far.contains(&"hidden.png".to_string()), "{far:?}");
 }

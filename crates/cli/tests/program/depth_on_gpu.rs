@@ -1,10 +1,10 @@
-//! A stream's depth is refined and matted where its pictures are blurred.
+//! Depth refinement and matting run on the device that blurs.
 
 use serde_json::Value;
 
 use crate::program::{Home, PORTRAIT, Ran, json};
 
-/// Streams the recording to nowhere, with these arguments; what the program said, and its report.
+/// Streams the recording to `null` with these arguments; returns stderr and the report.
 fn streamed(arguments: &[&str]) -> (String, Value) {
     let home = Home::new();
     let stream = ["stream", PORTRAIT, "--pace", "asap", "--to", "null", "--report", "report.json"];

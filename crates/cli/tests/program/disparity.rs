@@ -1,4 +1,4 @@
-//! The command `depth`: what it writes, says and refuses.
+//! The command `depth`: output, messages and refusals.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -10,10 +10,10 @@ use crate::common::grain;
 use crate::program::{Home, Ran, STEREO};
 
 const SIZE: (u32, u32) = (160, 64);
-/// Columns between the eyes' pictures of the wall.
+/// Disparity of the wall, in pixels.
 const WALL_PX: u32 = 8;
 
-/// A folder with a pair: a wall of noise, 8 px nearer in the right eye.
+/// A folder with a stereo pair of a wall of noise at a disparity of 8 px.
 struct Desk {
     home: Home,
 }
@@ -60,7 +60,7 @@ impl Desk {
     }
 }
 
-/// The median of what both eyes see, away from the borders.
+/// Returns the median of the area that both cameras see, away from the borders.
 fn median(values: &[f32]) -> f32 {
     let rows = values.chunks_exact(SIZE.0 as usize).skip(8).take(48);
     let mut inner: Vec<f32> = rows.flat_map(|row| row[40..150].iter().copied()).collect();
@@ -92,7 +92,7 @@ fn a_wall_has_the_disparity_that_it_was_given() {
     assert!((median(&units) / 256.0 - WALL_PX as f32).abs() < 0.5);
 }
 
-/// What one command writes the other one reads for what it is.
+/// `render` reads the output of `depth` with the right meaning.
 #[test]
 fn render_takes_disparity_for_what_it_is() {
     let desk = Desk::new();
@@ -149,13 +149,13 @@ fn metres_follow_the_geometry_however_it_is_given() {
             assert!((metres - 1.0).abs() < tolerance_m, "{geometry:?}: {metres} m");
         }
     }
-    // Twice as large a calibration is that of these pictures, scaled.
+    // A calibration for twice the picture size is scaled to these pictures.
     let double = "cam0=[200 0 160; 0 200 64; 0 0 1]\ndoffs=4\nbaseline=100\nwidth=320\nheight=128\nndisp=60\n";
     fs::write(desk.path("double.txt"), double).unwrap();
     let said = desk.assert_written(&["--calib", "double.txt", "--metres", "--out", "z.pfm", "--force"]);
     assert!(said.contains("double.txt is for pictures of 320x128: scaled to 160x64"), "{said}");
     assert!((median(&read_depth(&desk.path("z.pfm"), 5000.0, None).unwrap().metres) - 1.0).abs() < 0.05);
-    // What a PNG cannot hold is said.
+    // Depths beyond a PNG's range are reported.
     let said = desk.assert_written(&["--focal-px", "2000", "--baseline-m", "9", "--metres", "--out", "far.png"]);
     assert!(said.contains("beyond 13.1 m"), "{said}");
 }

@@ -1,8 +1,8 @@
-//! The commands of README.md and docs/, those in blocks and those within sentences, one after the other as somebody
-//! follows them, each page in a fresh folder.
+//! Runs the commands of README.md and docs/, in code blocks and in sentences, in their order, each page in a new
+//! folder.
 #![allow(missing_docs)]
 
-#[allow(dead_code)] // Of the networks that it makes, one is wanted here.
+#[allow(dead_code)] // Only one of its networks is used here.
 use crate::onnx;
 mod pages;
 
@@ -14,7 +14,7 @@ use std::time::Duration;
 
 use crate::program::{Beside, PROGRAM, ROOT, in_session, until, without};
 
-/// What is another program's, or builds: a part of the command, and why it is left out.
+/// Commands of other programs, and builds, that are skipped: a part of the command, and the reason.
 const LEFT_OUT: [(&str, &str); 19] = [
     ("sudo ", "needs root"),
     ("systemctl ", "needs a session, and starts something in it"),
@@ -37,7 +37,7 @@ const LEFT_OUT: [(&str, &str); 19] = [
     ("git clone", "needs a network"),
 ];
 
-/// What of this program a test cannot run: a part of the command, and why. Its arguments are checked all the same.
+/// Commands of this program whose arguments are only checked: a part of the command, and the reason.
 const ONLY_CHECKED: [(&str, &str); 11] = [
     ("bokehcam models add", "needs a file from elsewhere"),
     ("bokehcam models get", "needs a network"),
@@ -52,14 +52,13 @@ const ONLY_CHECKED: [(&str, &str); 11] = [
     ("bokehcam bench", "measures this machine, for minutes"),
 ];
 
-/// A file of settings that is not there: who names it has all other arguments read, and is then refused.
+/// A missing settings file: the program parses all other arguments before it refuses this one.
 const NO_SETTINGS: &str = "no-settings.toml";
 
-/// A page that is being followed: a folder as its owner has it, with the repository's recordings, and pictures by the
-/// names that the pages use.
+/// The state of a page's run: a user's folder with the repository's recordings, and pictures by the pages' file names.
 struct Follower {
     folder: tempfile::TempDir,
-    /// What `bokehcam ctl` speaks to.
+    /// The stream for `bokehcam ctl`, once started.
     running: Option<Beside>,
 }
 
@@ -87,7 +86,7 @@ impl Follower {
         let mut snapshot = png::Encoder::new(fs::File::create(follower.path("NAME.png")).unwrap(), 1, 1);
         snapshot.add_itxt_chunk("bokehcam".to_string(), "--effect=blur\n--rim=0.5\n".to_string()).unwrap();
         snapshot.write_header().unwrap().write_image_data(&[0]).unwrap();
-        // What is light is the person, or near.
+        // A network that takes bright pixels for the person, or for near ones.
         fs::write(follower.path("small.onnx"), onnx::matte(64, 36, [4.0, 4.0, 4.0], -6.0)).unwrap();
 
         for folder in ["programs", "home", "session"] {
@@ -109,7 +108,7 @@ impl Follower {
         shell.args(["-o", "pipefail", "-c", command]).current_dir(&self.folder);
         let path = format!("{}:{}", self.path("programs").display(), std::env::var("PATH").unwrap());
         shell.env("PATH", path).env("HOME", self.path("home")).env("XDG_RUNTIME_DIR", self.path("session"));
-        // As wide as help becomes.
+        // The maximum width of help texts.
         shell.env("COLUMNS", "110");
         shell
     }
@@ -118,7 +117,7 @@ impl Follower {
         self.shell(command).output().unwrap()
     }
 
-    /// Has something run that `bokehcam ctl` can speak to.
+    /// Starts a stream for `bokehcam ctl`, once.
     fn start_a_stream(&mut self) {
         if self.running.is_some() {
             return;
@@ -129,7 +128,8 @@ impl Follower {
         until("the stream answers", Duration::from_secs(60), answers);
     }
 
-    /// Whether the program takes the arguments of a command that cannot be run; what is no source here has another's place.
+    /// Checks that the program accepts the arguments of a command that cannot run here; unavailable sources become
+    /// `demo`.
     fn check(&self, command: &str) -> Result<(), String> {
         let command = command.split(['>', '|']).next().unwrap_or_default().trim_end();
         let mut words: Vec<&str> = command.split(' ').collect();
@@ -148,9 +148,9 @@ impl Follower {
         }
     }
 
-    /// Runs a command, or checks its arguments; gives whether it ran.
+    /// Runs a command, or only checks its arguments; returns whether it ran.
     fn follow(&mut self, command: &str) -> Result<bool, String> {
-        // Those that are known are found by their content, which is not here.
+        // The known networks are not installed here, so the small one replaces them.
         let command = ["matte", "mono"].iter().fold(command.to_owned(), |command, task| {
             let of_our_own = format!("{task}:small.onnx");
             command.split(' ').map(|word| named(word, task, &of_our_own)).collect::<Vec<_>>().join(" ")
@@ -176,13 +176,13 @@ impl Follower {
     }
 }
 
-/// A word of a list such as `plate,matte`, with a file for the network of a task.
+/// Replaces a task in a list such as `plate,matte` by its network's file.
 fn named(word: &str, task: &str, file: &str) -> String {
     let parts: Vec<&str> = word.split(',').map(|part| if part == task { file } else { part }).collect();
     parts.join(",")
 }
 
-/// Follows a page; at least `least` of its commands run, so that none is left out by mistake.
+/// Runs a page's commands; asserts that at least `least` of them ran, so that none is skipped by mistake.
 fn follow(page: &str, least: usize) {
     let repository = Path::new(ROOT);
     let text = fs::read_to_string(repository.join(page)).unwrap();
@@ -190,7 +190,7 @@ fn follow(page: &str, least: usize) {
     let mut done: Vec<String> = Vec::new();
     let (mut ran, mut faults) = (0, Vec::new());
     for command in pages::commands(&text) {
-        // What is named again is not done again.
+        // A repeated command runs once.
         if done.contains(&command) {
             continue;
         }
@@ -228,7 +228,7 @@ fn arguments_are_checked_without_what_they_need() {
     }
 }
 
-/// What the help of a command lists of the commands below it, such as `config dump`, and its examples.
+/// Returns the examples in the help of a command and of its subcommands, such as `config dump`.
 fn help_of(follower: &Follower, command: &str) -> Vec<(String, Vec<String>)> {
     let output = follower.output(&format!("{command} --help"));
     let help = String::from_utf8(output.stdout).unwrap();
@@ -238,13 +238,13 @@ fn help_of(follower: &Follower, command: &str) -> Vec<(String, Vec<String>)> {
     };
     let below = section("Commands:").filter_map(|line| line.split(' ').next()).filter(|name| *name != "help");
     let below = below.flat_map(|name| help_of(follower, &format!("{command} {name}")));
-    // What is beside a command may go on below it.
+    // The text beside an example may continue on the next line.
     let examples = section("Example").filter(|line| line.starts_with("bokehcam "));
     let examples = examples.map(|line| line.split_once("  ").map_or(line, |(code, _)| code).to_owned());
     [(command.to_owned(), examples.collect())].into_iter().chain(below).collect()
 }
 
-/// With nothing beside the program, as where it is installed.
+/// Runs without the repository, as an installed program does.
 #[test]
 fn the_examples_of_help_are_right() {
     let mut follower = Follower::new();
@@ -255,7 +255,8 @@ fn the_examples_of_help_are_right() {
     for (command, examples) in help {
         assert!(!examples.is_empty() || command.split(' ').count() > 2, "{command} has no examples");
         for example in examples {
-            // Of the program as a whole, each is run; what is saved is saved in a file that need not be there.
+            // The program's own examples all run; others are only checked, except `config save`, whose file need not
+            // exist.
             let done = match command == "bokehcam" || example.contains("config save") {
                 true => follower.follow(&example).map(drop),
                 false => follower.check(&example),

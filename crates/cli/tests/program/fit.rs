@@ -1,4 +1,4 @@
-//! Depth maps that do not fit their pictures: how that is measured, said and mended.
+//! Edge misalignment between depth maps and pictures: measurement, messages and correction.
 #![allow(missing_docs)]
 
 use std::path::Path;
@@ -18,10 +18,10 @@ fn portrait() -> (ColorImage, DepthMap) {
     (read_color(Path::new(PICTURE)).unwrap(), read_depth(Path::new(DEPTH), 5000.0, None).unwrap())
 }
 
-/// The map with, at each pixel, what `pick` makes of all depths within `reach` pixels.
+/// Applies `pick` to the depths within `reach` pixels of each pixel, separably.
 fn around(map: &DepthMap, reach: i64, pick: impl Fn(&mut dyn Iterator<Item = f32>) -> f32) -> DepthMap {
     let (width, height) = (i64::from(map.width), i64::from(map.height));
-    // One axis after the other.
+    // One pass per axis.
     let along = |from: &[f32], (dx, dy): (i64, i64)| -> Vec<f32> {
         let pixels = (0..height).flat_map(|y| (0..width).map(move |x| (x, y)));
         pixels
@@ -39,7 +39,7 @@ fn fat(map: &DepthMap, reach: i64) -> DepthMap {
     around(map, reach, |depths_m| depths_m.fold(f32::INFINITY, f32::min))
 }
 
-/// Inverse depth, averaged twice.
+/// Blurs the map's inverse depth by a box filter, applied twice.
 fn soft(map: &DepthMap, reach: i64) -> DepthMap {
     let mean = |map: &DepthMap| {
         around(map, reach, |depths_m| (2 * reach + 1) as f32 / depths_m.map(|depth_m| 1.0 / depth_m).sum::<f32>())
@@ -74,7 +74,7 @@ fn it_is_seen_how_outlines_lie() {
     let found = EdgeAlignment::measure(&soft(&map, 4), &color);
     assert!(matches!(found, EdgeAlignment::Soft { width_px: 6..=14 }), "{found:?}");
     assert_eq!(EdgeAlignment::measure(&mirrored(&map), &color), EdgeAlignment::Unrelated);
-    // Nothing to compare.
+    // Without depth edges there is nothing to compare.
     let wall = DepthMap { metres: vec![3.0; map.metres.len()], ..map.clone() };
     let unknown = DepthMap { metres: vec![0.0; map.metres.len()], ..map.clone() };
     for map in [&wall, &unknown, &DepthMap::default()] {
@@ -83,7 +83,7 @@ fn it_is_seen_how_outlines_lie() {
     assert_eq!(EdgeAlignment::measure(&map, &ColorImage::new(640, 360)), EdgeAlignment::Unknown);
 }
 
-/// How far the CoC is off, on average, in pixels.
+/// Returns the mean absolute error of the CoC radius, in pixels.
 fn coc_error_px(refine: Refine, color: &ColorImage, map: DepthMap, truth: &DepthMap) -> f32 {
     let look = Look { refine, focus: "1.2".parse().unwrap(), ..Look::default() };
     let (field, map) = coc_and_depth(&look, &mut color.clone(), Some(Depth::Measured(map))).unwrap();
@@ -110,7 +110,7 @@ fn what_does_not_fit_is_mended_and_what_fits_stays() {
         assert!(auto < most * off, "{name}: the CoC is off by {auto} px, and by {off} px as it came");
     }
     assert_eq!(coc_error_px(Refine::Auto, &color, map.clone(), &map), 0.0);
-    // Colours of another picture say nothing.
+    // Another picture's colours give no evidence.
     let other = mirrored(&map);
     assert_eq!(coc_error_px(Refine::Auto, &color, other.clone(), &other), 0.0);
 }
@@ -139,7 +139,7 @@ fn render_says_what_it_does_about_it() {
     ] {
         let said = render(map, &[]);
         assert!(said.starts_with(begin) && said.lines().count() == 2, "{map}: {said}");
-        // Whoever says how it is to be is told nothing, unless it makes no sense.
+        // An explicit `--refine` suppresses the warning, except for a map of another picture.
         for refine in ["on", "off"] {
             let said = render(map, &["--refine", refine]);
             assert_eq!(said.starts_with("warning"), map == "other.png", "{map}: {said}");
@@ -187,7 +187,7 @@ fn a_stream_says_once_how_its_depth_does_not_fit_and_mends_it() {
     let about =
         said.lines().filter(|line| line.contains("depth is brought to the pictures, as its outlines lie about"));
     assert_eq!(about.count(), 1, "{said}");
-    // The first frames are not judged yet.
+    // The first frames are used for the measurement, and not corrected yet.
     let off = |k: usize| {
         let values = fitting[k].rgb.iter().zip(&mended[k].rgb);
         values.map(|(a, b)| f64::from(a.abs_diff(*b)).powi(2)).sum::<f64>()

@@ -1,5 +1,5 @@
-//! The fuzz targets over their seeds and some hundred mutations of each, the same in every run: what a plain toolchain can
-//! repeat of `scripts/fuzz`.
+//! Runs the fuzz targets on their seeds and 200 deterministic mutations of each: the part of `scripts/fuzz` that needs
+//! no nightly toolchain.
 #![allow(missing_docs)]
 
 #[path = "../../../../fuzz/src/lib.rs"]
@@ -8,10 +8,10 @@ mod promises;
 use std::fs;
 use std::path::Path;
 
-/// How often each seed is mutated.
+/// Mutations per seed.
 const MUTATIONS: u64 = 200;
 
-/// Bytes that mean something to some parser.
+/// Tokens that are significant to at least one parser.
 const TELLING: [&[u8]; 16] = [
     b"\n",
     b" ",
@@ -31,7 +31,7 @@ const TELLING: [&[u8]; 16] = [
     b"[[",
 ];
 
-/// Numbers that look random, the same everywhere (SplitMix64).
+/// A deterministic pseudo-random generator (SplitMix64).
 struct Numbers(u64);
 
 impl Numbers {
@@ -43,7 +43,7 @@ impl Numbers {
     }
 }
 
-/// One to four changes of the kinds that files suffer.
+/// Applies one to four typical corruptions.
 fn mutation(seed: &[u8], other: &[u8], numbers: &mut Numbers) -> Vec<u8> {
     let mut data = seed.to_vec();
     for _ in 0..=numbers.below(4) {
@@ -73,7 +73,7 @@ fn mutation(seed: &[u8], other: &[u8], numbers: &mut Numbers) -> Vec<u8> {
     data
 }
 
-/// Runs a target over its seeds and their mutations; the input at which it panics is named, and kept for looking at.
+/// Runs a target on its seeds and their mutations; saves and names the input of a panic.
 fn holds(name: &str) {
     let (_, target) = promises::TARGETS.into_iter().find(|target| target.0 == name).unwrap();
     let folder = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../fuzz/seeds")).join(name);

@@ -1,5 +1,5 @@
-//! A GPU that is lost, hangs or has no more memory in the middle of a run: the CPU goes on, and no frame is missing.
-//! The faults come from a Vulkan layer (tests/gpu_faults/layer.c); a test under it runs in a process of its own.
+//! GPU device loss, hangs and out-of-memory during a run: the CPU takes over, and no frame is lost. A Vulkan layer
+//! (gpu_faults/layer.c) injects the faults; a test under it runs in a separate process.
 #![cfg(feature = "gpu")]
 #![allow(missing_docs)]
 
@@ -31,7 +31,7 @@ use tempfile::TempDir;
 use crate::program::{Home, PORTRAIT, Ran, json};
 
 const SIZE: (u32, u32) = (96, 64);
-/// The executors may differ by so much.
+/// Maximum difference between the executors, in 8-bit codes.
 const CODES: u8 = 4;
 const FRAMES: u64 = 8;
 
@@ -66,7 +66,7 @@ fn under<'a>(layer: &TempDir, fault: &str, command: &'a mut Command) -> &'a mut 
     command.env("FAULT", fault)
 }
 
-/// Runs a test of this file in a process of its own, under the layer; gives back what it told.
+/// Runs a test of this file in a separate process under the layer; returns its output.
 fn test_under(layer: &TempDir, fault: &str, test: &str) -> String {
     let mut command = Command::new(std::env::current_exe().unwrap());
     command.args(["--ignored", "--exact", &format!("gpu_faults::{test}"), "--nocapture"]);
@@ -76,21 +76,21 @@ fn test_under(layer: &TempDir, fault: &str, test: &str) -> String {
     told
 }
 
-/// The test, under the layer with this fault, says what it ran on.
+/// Asserts which executors a test reports when run under the layer with this fault.
 fn assert_ran(layer: &TempDir, fault: &str, test: &str, ran: &str) {
     let told = test_under(layer, fault, test);
     let line = told.lines().find_map(|line| line.find("ran on").map(|at| &line[at..]));
     assert_eq!(line, Some(ran), "{fault}: {told}");
 }
 
-/// A device on which this was tried, as that compiles the shaders, which may take longer than the second that it has after.
+/// Opens a device, runs `try_out` on it, and then sets a timeout of 1 s, which compiling the shaders could exceed.
 fn tried(try_out: impl FnOnce(&Arc<Device>)) -> Arc<Device> {
     let device = Arc::new(device());
     try_out(&device);
     Arc::new(Arc::into_inner(device).expect("nobody else has it").with_patience(Duration::from_secs(1)))
 }
 
-/// A frame; every other one may be YUYV.
+/// Creates a frame; every other one requests YUYV output.
 fn job(ticket: u64) -> Job {
     let (color, depth) = (noise(SIZE.0, SIZE.1), three_depths(SIZE.0, SIZE.1));
     let yuyv = (ticket % 2 == 1).then(|| Pooled::detached(YuyvImage::default()));
@@ -98,7 +98,7 @@ fn job(ticket: u64) -> Job {
     Job { ticket, yuyv, ..job }
 }
 
-/// Blurs frames, each of which is what the CPU makes of it; `before` is called before each.
+/// Blurs frames, and compares each with the CPU's result; calls `before` before each.
 fn blur(bokeh: &mut dyn Bokeh, mut before: impl FnMut(u64)) {
     let mut expected = ColorImage::default();
     let Job { color, depth, coc, .. } = job(0);
@@ -146,7 +146,7 @@ fn a_destroyed_device_is_followed_by_the_cpu() {
     }
 }
 
-/// As often as somebody who tries apertures for an hour needs it.
+/// Creates and drops as many executors as an hour of trying apertures does.
 #[test]
 #[ignore = "needs a Vulkan adapter (software will do)"]
 fn executors_come_and_go() {
@@ -155,13 +155,13 @@ fn executors_come_and_go() {
     }
 }
 
-/// Under the layer, the faults are its.
+/// Also run under the layer, which then injects faults.
 #[test]
 #[ignore = "needs a Vulkan adapter (software will do)"]
 fn frames_are_blurred_whatever_becomes_of_the_device() {
     let made = Device::open(false, None).map_err(BokehError::from).and_then(|device| {
         let device = Arc::new(device);
-        // The trial compiles the shaders, which may take longer than a second.
+        // The self-test compiles the shaders, which may take longer than a second.
         try_out(&device)?;
         let device = Arc::into_inner(device).expect("nobody else has it").with_patience(Duration::from_secs(1));
         bokeh::create(&settings(CocKind::Depth), SIZE, Some(Arc::new(device)), Some(1))
@@ -186,7 +186,7 @@ fn a_gpu_that_is_lost_or_hangs_is_followed_by_the_cpu() {
         ("hang:3", "no answer for 1 s"),
     ] {
         let told = test_under(&layer, fault, "frames_are_blurred_whatever_becomes_of_the_device");
-        // On one core the line begins with the test's name.
+        // On a single core, the line starts with the test's name.
         let ran = told.lines().find_map(|line| line.find("ran on").map(|at| &line[at..]));
         let ran = ran.unwrap_or_else(|| panic!("{fault}: {told}"));
         assert!(ran.starts_with("ran on gpu, then cpu: ") && ran.to_lowercase().contains(reason), "{fault}: {ran}");
@@ -199,7 +199,7 @@ fn a_gpu_that_is_lost_or_hangs_is_followed_by_the_cpu() {
 #[ignore = "needs a Vulkan adapter (software will do)"]
 fn a_gpu_that_blurs_wrongly_is_not_used() {
     let layer = layer();
-    // Without any pass, and without those from the fifth on.
+    // All passes are skipped, or those from the fifth on.
     for fault in ["idle:1", "idle:5"] {
         let told = test_under(&layer, fault, "frames_are_blurred_whatever_becomes_of_the_device");
         assert!(told.contains("not made: GPU: ") && told.contains("values of a trial picture are wrong"), "{told}");
@@ -218,7 +218,7 @@ fn memory_that_ends_is_followed_by_the_cpu_or_said_at_the_start() {
     }
 }
 
-/// Under the layer, the faults are its.
+/// Also run under the layer, which then injects faults.
 #[test]
 #[ignore = "needs a Vulkan adapter (software will do)"]
 fn pairs_are_matched_whatever_becomes_of_the_device() {
@@ -254,7 +254,7 @@ fn matching_goes_on_after_the_gpu() {
     }
 }
 
-/// Under the layer, the faults are its.
+/// Also run under the layer, which then injects faults.
 #[test]
 #[ignore = "needs a Vulkan adapter (software will do)"]
 fn depth_is_refined_whatever_becomes_of_the_device() {
@@ -278,12 +278,12 @@ fn depth_is_refined_whatever_becomes_of_the_device() {
 fn refining_goes_on_after_the_gpu() {
     let layer = layer();
     for (fault, ran) in [
-        // In the trial, and later.
+        // During the self-test, and later.
         ("submit:2", "ran on cpu"),
         ("submit:6", "ran on gpu, then cpu"),
         ("wait:6", "ran on gpu, then cpu"),
         ("hang:6", "ran on gpu, then cpu"),
-        // Passes that are not run.
+        // Skipped passes.
         ("idle:1", "ran on cpu"),
         ("idle:30", "ran on cpu"),
         ("submit:1000000", "ran on gpu"),
@@ -292,7 +292,7 @@ fn refining_goes_on_after_the_gpu() {
     }
 }
 
-/// Under the layer, the faults are its.
+/// Also run under the layer, which then injects faults.
 #[test]
 #[ignore = "needs a Vulkan adapter (software will do)"]
 fn mattes_are_found_whatever_becomes_of_the_device() {
@@ -317,12 +317,12 @@ fn mattes_are_found_whatever_becomes_of_the_device() {
 fn matting_goes_on_after_the_gpu() {
     let layer = layer();
     for (fault, ran) in [
-        // In the trial, and later.
+        // During the self-test, and later.
         ("submit:2", "ran on cpu"),
         ("submit:6", "ran on gpu, then cpu"),
         ("wait:7", "ran on gpu, then cpu"),
         ("hang:7", "ran on gpu, then cpu"),
-        // Passes that are not run.
+        // Skipped passes.
         ("idle:1", "ran on cpu"),
         ("idle:40", "ran on cpu"),
         ("submit:1000000", "ran on gpu"),

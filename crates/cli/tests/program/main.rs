@@ -1,4 +1,4 @@
-//! The program, started as a user starts it.
+//! End-to-end tests of the `bokehcam` program.
 #![allow(missing_docs)]
 
 #[path = "../../../../tests/common/mod.rs"]

@@ -1,4 +1,4 @@
-//! What becomes of a user's files when something goes wrong, seen from outside the program.
+//! The user's files after failures and interruptions.
 
 mod home;
 mod removed;
@@ -52,7 +52,7 @@ fn what_was_good_before_a_fault_is_there() {
     home.sh(&format!("stream self {BLUR} --to x.y4m --to out/ --report r.json")).failed(1, &["000005.png"]);
     assert_eq!((frames(&home.path("x.y4m")), pngs(&home.path("out"))), (5, 5));
     assert_eq!(json(home.path("r.json"))["frames"]["delivered"], 5);
-    // What is there already stays.
+    // Existing files are unchanged.
     let before = tree(&home.path("out"));
     home.sh(&format!("stream self {BLUR} --to x.y4m --to out/ --force -q")).failed(1, &["000005.png"]);
     assert!(tree(&home.path("out")) == before);
@@ -104,7 +104,7 @@ fn a_reader_that_never_reads_does_not_keep_the_program() {
         let args = format!("stream self {BLUR} --loop --pace {pace} --to - --report {pace}.json");
         let mut run = Beside::start(home.shell("", &args).stdout(Stdio::piped()).stderr(Stdio::piped()));
         let mut stdout = BufReader::new(run.0.stdout.take().unwrap());
-        // The first line says that it runs; what follows fills the pipe.
+        // The first line shows that the run has started; then the pipe fills up.
         stdout.read_line(&mut String::new()).unwrap_or_default();
         std::thread::sleep(Duration::from_millis(300));
         terminate(run).done();
@@ -141,13 +141,13 @@ fn an_encoder_that_says_all_is_well_is_not_believed() {
 fn an_encoder_that_is_slow_to_begin_costs_no_frames() {
     let home = Home::new();
     home.record("self", 75, 0.02);
-    // It keeps what there was of the other output when it began. What it leaves passes for an mp4.
+    // The fake encoder records the other output's files at its own start; its result passes for an mp4.
     let path = home.fake_ffmpeg(
         "[ \"$1\" = -version ] && exit\nsleep 0.5; [ -e before ] || ls out > before\ncat > /dev/null; \
          printf '\\000\\000\\000\\010moov' > \"$out\"",
     );
     let args = format!("stream self {BLUR} --pace realtime --to out/ --to x.mp4 --report report.json --force");
-    // Two seconds are waited for it, which a busy machine may take to start it.
+    // The program waits 2 s for the encoder, which may be too short on a busy machine; then the test repeats.
     until("no frame comes before it begins", || {
         let _ = fs::remove_file(home.path("before"));
         let _ = fs::remove_dir_all(home.path("out"));
@@ -168,7 +168,7 @@ fn each_output_that_fails_says_what_is_kept_of_it() {
     assert!(["x.incomplete.y4m", "z.incomplete.y4m"].iter().all(|kept| ran.stderr.contains(kept)), "{}", ran.stderr);
 }
 
-/// As `timeout` sends them, to a program and then to its group.
+/// `timeout` signals a program and then its process group.
 #[test]
 fn two_signals_at_once_are_one_wish() {
     let home = Home::new();
@@ -188,7 +188,7 @@ fn two_signals_at_once_are_one_wish() {
 fn an_encoder_that_hangs_does_not_keep_the_program() {
     let home = Home::new();
     home.record("self", 4, 0.01);
-    // It takes nothing, or all and never ends.
+    // The encoder either reads nothing, or reads everything and never ends.
     let hangs = ["echo half > \"$out\"; sleep 1000", "echo half > \"$out\"; cat > /dev/null; sleep 1000"];
     for (script, kept) in hangs.into_iter().zip(["x.incomplete.mkv", "x.incomplete.2.mkv"]) {
         let path = home.fake_ffmpeg(&format!("[ \"$1\" = -version ] && exit\n{script}"));
@@ -238,12 +238,12 @@ fn a_video_on_a_full_disk_is_an_error_and_kept() {
 #[ignore = "needs ffmpeg"]
 fn a_video_of_a_loaded_machine_is_as_long_as_the_take() {
     let home = Home::new();
-    // So many frames a second that some are dropped anywhere.
+    // A frame rate that no machine sustains, so that frames are dropped.
     home.record("self", 50, 0.001);
     for name in ["x.mp4", "x.mkv", "x.y4m"] {
         home.sh(&format!("stream self {BLUR} --loop --frames 3000 --pace realtime --to {name} -q")).done();
         let duration_s: f64 = probed(&home.path(name), "-show_entries format=duration").parse().unwrap();
-        // Its first and its last frames may be among those that were dropped.
+        // The first and the last frames may be dropped, too.
         assert!((2.0..=3.1).contains(&duration_s), "{name}: {duration_s} s");
     }
 }
@@ -258,7 +258,7 @@ fn what_a_killed_run_left_is_told_by_a_run_of_any_name() {
         let parts = names.filter(|entry| entry.file_name().to_string_lossy().ends_with(".part"));
         parts.map(|entry| entry.path()).collect::<Vec<_>>()
     };
-    // In the place of the shell: the program itself is killed.
+    // The program replaces the shell, so the kill reaches it directly.
     let args = format!("stream self {BLUR} --loop --pace realtime --to takes/a.y4m");
     let killed = Beside::start(home.shell("", &args).stderr(Stdio::null()));
     until("frames", || parts().iter().any(|part| part.metadata().is_ok_and(|part| part.len() > 10_000)));

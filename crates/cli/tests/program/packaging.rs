@@ -1,4 +1,4 @@
-//! What packages are made of: manual pages, completions, and files that desktops read.
+//! Contents of packages: manual pages, completions, and desktop files.
 
 use std::fs;
 use std::path::Path;
@@ -13,21 +13,21 @@ fn here(path: &str) -> String {
     fs::read_to_string(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
 }
 
-/// The names at the beginning of the lines of a section of a help text, or none.
+/// Returns the names that start the entries of a help text's section; empty without such a section.
 fn listed(help: &str, section: &str) -> Vec<String> {
     let lines = help.lines().skip_while(|line| *line != section).skip(1).take_while(|line| !line.is_empty());
     let entries = lines.filter(|line| line.starts_with("  ") && !line.starts_with("   "));
     entries.filter_map(|line| line.split_whitespace().next().map(str::to_owned)).collect()
 }
 
-/// The long flags that a help text explains.
+/// Returns the long flags in a help text.
 fn flags(help: &str) -> Vec<String> {
     let explained = help.lines().filter(|line| line.starts_with("  -") || line.starts_with("      --"));
     let words = explained.filter_map(|line| line.split([' ', '=', '[', ',', '.']).find(|word| word.starts_with("--")));
     words.map(str::to_owned).collect()
 }
 
-/// Every command that help lists, such as `config dump`, and what it says of itself.
+/// Returns every command in the help, such as `config dump`, with its own help text.
 fn commands() -> Vec<(Vec<String>, String)> {
     let (mut found, mut waiting) = (Vec::new(), vec![Vec::new()]);
     while let Some(command) = waiting.pop() {
@@ -52,7 +52,7 @@ fn there_is_a_manual_page_of_every_command_with_every_flag() {
         let name = [&["bokehcam".to_owned()], command.as_slice()].concat().join("-");
         let page = fs::read_to_string(out.join(format!("{name}.1"))).unwrap_or_else(|error| panic!("{name}: {error}"));
         let page = page.replace("\\-", "-");
-        // What lies below a command may leave them to it.
+        // Subcommands may have no examples of their own.
         assert!(command.len() > 1 || page.contains(".SH EXAMPLES"), "{name} has no examples");
         assert!(page.contains(env!("CARGO_PKG_VERSION")), "{name} does not say its version");
         let flags = flags(help);
@@ -86,7 +86,7 @@ fn completions_know_every_command_and_flag() {
                 assert!(script.contains(name), "{shell}: {name}");
             }
             for flag in flags(help) {
-                // Fish has them without dashes.
+                // Fish lists long flags without dashes.
                 let flag = if shell == "fish" { flag.replacen("--", "-l ", 1) } else { flag };
                 assert!(script.contains(&flag), "{shell}: {command:?} {flag}");
             }
@@ -94,7 +94,7 @@ fn completions_know_every_command_and_flag() {
     }
 }
 
-/// An installed program has no repository beside it.
+/// An installed program cannot refer to files of the repository.
 #[test]
 fn help_names_only_what_a_package_brings() {
     let install = here("packaging/install");
@@ -110,7 +110,7 @@ fn help_names_only_what_a_package_brings() {
     }
 }
 
-/// The value of a key in a file of lines such as `key=value`.
+/// Returns the value of a key in a text of `key=value` lines.
 fn value<'a>(file: &'a str, key: &str) -> &'a str {
     let found = file.lines().find_map(|line| line.strip_prefix(key)?.strip_prefix('='));
     found.unwrap_or_else(|| panic!("there is no {key}"))
@@ -125,7 +125,7 @@ fn desktops_find_the_program_its_icon_and_its_version() {
     assert!(
         roxmltree::Document::parse(&icon).unwrap().root_element().has_tag_name(("http://www.w3.org/2000/svg", "svg"))
     );
-    // What a running window calls itself leads back to this file.
+    // The window's class must match this desktop file.
     let class = format!("const CLASS: &str = \"{}\";", value(&entry, "StartupWMClass"));
     assert!(here("crates/window/src/window/gfx.rs").contains(&class), "{class}");
 
@@ -143,12 +143,12 @@ fn desktops_find_the_program_its_icon_and_its_version() {
     assert_eq!((&flatpak["id"], &flatpak["rename-desktop-file"]), (&id.into(), &"bokehcam.desktop".into()));
 }
 
-/// Names of libraries with their version, such as `libX11.so.6`, anywhere in a program.
+/// Finds versioned library names, such as `libX11.so.6`, anywhere in an executable.
 fn libraries(program: &[u8]) -> Vec<String> {
     let text: String = program.iter().map(|&byte| if byte.is_ascii_graphic() { byte as char } else { ' ' }).collect();
     let mut found: Vec<String> = Vec::new();
     for (at, _) in text.match_indices(".so.") {
-        // Texts in a program have no end of their own: the name begins at the last `lib` before.
+        // Strings in an executable are not delimited, so the name starts at the last preceding `lib`.
         let before = &text[at.saturating_sub(40)..at];
         let Some(begin) = before.rfind("lib") else { continue };
         let name = &before[begin..];
@@ -162,7 +162,7 @@ fn libraries(program: &[u8]) -> Vec<String> {
     found
 }
 
-/// What of `found` the program is linked with: its packages depend on these by themselves.
+/// Returns the libraries that the program is linked with; packaging tools add these dependencies automatically.
 fn linked() -> Vec<String> {
     let output = Command::new("ldd").arg(PROGRAM).output().unwrap();
     let lines = String::from_utf8(output.stdout).unwrap();
@@ -200,7 +200,7 @@ fn examples_and_the_unit_are_those_of_the_page_on_calls() {
     assert!(page.contains(&format!("bokehcam stream {stream}\n")), "{stream}");
 }
 
-/// What the program says of these arguments, where no daemon runs and nothing is installed: its exit code, and the line.
+/// Runs the program without daemons and installed files; returns its exit code and its message.
 fn exit_code(args: &[&str]) -> (i32, String) {
     let home = Home::new();
     fs::write(home.path("text.txt"), "text").unwrap();
@@ -209,7 +209,7 @@ fn exit_code(args: &[&str]) -> (i32, String) {
     (ran.code, ran.stderr)
 }
 
-/// The unit tries again after what may be there later, and gives up where only other words would help.
+/// The unit restarts after errors that may disappear, and gives up after usage errors.
 #[test]
 fn the_unit_gives_up_on_wrong_arguments_alone() {
     let unit = here("packaging/bokehcam.service");
@@ -262,7 +262,7 @@ fn the_unit_gives_up_on_wrong_arguments_alone() {
     }
 }
 
-/// What holds in the unit of a user's manager: nothing that makes namespaces, which not every user may.
+/// A user unit must not use options that need namespaces, which some systems deny to users.
 #[test]
 fn the_unit_is_confined_by_what_a_user_may_ask_for() {
     let unit = here("packaging/bokehcam.service");
@@ -285,7 +285,7 @@ fn the_unit_is_confined_by_what_a_user_may_ask_for() {
     );
     let needs_namespaces =
         ["Private", "Protect", "ReadWritePaths=", "ReadOnlyPaths=", "InaccessiblePaths=", "TemporaryFileSystem="];
-    // PipeWire is given real time, and drivers compile.
+    // PipeWire needs real-time scheduling, and GPU drivers compile code at run time.
     let would_break = ["MemoryDenyWriteExecute=", "RestrictRealtime="];
     for line in unit.lines() {
         let bad = needs_namespaces.iter().chain(&would_break).find(|begin| line.starts_with(*begin));

@@ -1,4 +1,4 @@
-//! Who stands before a plate: found whatever the light and the camera do, as far as that can be told.
+//! Segmentation by background plate, under changes of light and camera position.
 #![allow(missing_docs)]
 
 use bokehcam::color::{linear_to_srgb, srgb_to_linear};
@@ -12,7 +12,7 @@ use crate::program::Home;
 const SIZE: (u32, u32) = (640, 360);
 const FRAME_NS: u64 = 33_333_333;
 
-/// A number from 0 to 1 for three whole ones.
+/// Hashes three integers to a number from 0 to 1.
 fn random(x: u32, y: u32, seed: u32) -> f32 {
     let mut bits = x.wrapping_mul(0x9e37_79b1) ^ y.wrapping_mul(0x85eb_ca77) ^ seed.wrapping_mul(0xc2b2_ae3d);
     for _ in 0..3 {
@@ -21,22 +21,22 @@ fn random(x: u32, y: u32, seed: u32) -> f32 {
     (bits >> 8) as f32 / (1u32 << 24) as f32
 }
 
-/// What a camera before a room sees.
+/// A synthetic camera picture of a room.
 #[derive(Clone, Copy)]
 struct Shown {
-    /// Columns and rows of the middle of a person, whose head it is.
+    /// Centre of the person's head: column and row, in pixels.
     person: Option<(f32, f32)>,
-    /// What the light of each channel is multiplied by.
+    /// Factor of the light, per channel.
     light: [f32; 3],
-    /// How far the camera was nudged, in pixels.
+    /// Displacement of the camera, in pixels.
     nudge_px: (f32, f32),
-    /// How dark the shadow of the person is: 1 is none.
+    /// Light in the person's shadow, as a fraction; 1 disables the shadow.
     shadow: f32,
-    /// How much brighter than the room a lamp is, which is warm and lights the wall on the left.
+    /// Brightness of a warm lamp that lights the wall on the left, relative to the room.
     lamp: f32,
-    /// Something on the sideboard.
+    /// Whether a vase is on the sideboard.
     vase: bool,
-    /// Which noise.
+    /// Seed of the noise.
     frame: u32,
 }
 
@@ -44,7 +44,7 @@ const ROOM: Shown =
     Shown { person: None, light: [1.0; 3], nudge_px: (0.0, 0.0), shadow: 1.0, lamp: 0.0, vase: false, frame: 0 };
 
 impl Shown {
-    /// Codes of the room: a wall with a pattern, a shelf, a bright window.
+    /// Returns the room's colour codes at a point: a wall with a pattern, a shelf, a bright window.
     fn room(x: f32, y: f32) -> [f32; 3] {
         let wave = (x * 0.045).sin() * (y * 0.06).cos() + 0.4 * (x * 0.21 + y * 0.13).sin();
         let wall = [120.0 + 22.0 * wave, 105.0 + 20.0 * wave, 90.0 + 15.0 * wave];
@@ -75,7 +75,7 @@ impl Shown {
                     () if vase => [60.0, 120.0, 70.0],
                     () => Self::room(fx - self.nudge_px.0, fy - self.nudge_px.1),
                 };
-                // A shadow on the wall beside the person, soft at its edge.
+                // A soft-edged shadow on the wall beside the person.
                 let beside =
                     self.person.map_or(9.0, |(px, py)| ((fx - px - 110.0) / 90.0).hypot((fy - py - 60.0) / 120.0));
                 let depth = ((1.6 - beside) / 1.2).clamp(0.0, 1.0);
@@ -96,7 +96,7 @@ impl Shown {
     }
 }
 
-/// A plate source, and the time.
+/// A plate depth source with a frame counter.
 struct Watched {
     source: PlateDepth,
     frame: u32,
@@ -108,13 +108,13 @@ impl Watched {
         Self { source: PlateDepth::new(plate, None, None), frame: 0, map: DepthMap::default() }
     }
 
-    /// A source with the plate of the room.
+    /// Creates a source with a plate of the room.
     fn before_room() -> Self {
         Self::new(Some(ROOM.picture().0))
     }
 
-    /// Shows a picture; how far the plate is then, and the shares of the pixels that were found and of the others that
-    /// were mistaken for the person.
+    /// Processes a picture; returns the plate's state, the fraction of the person's pixels detected (recall), and the
+    /// fraction of other pixels detected as the person (false positives).
     fn see(&mut self, shown: Shown) -> (Step, f32, f32) {
         self.frame += 1;
         let (color, covered) = Shown { frame: self.frame, ..shown }.picture();
@@ -174,7 +174,7 @@ fn what_was_put_down_is_learned_and_who_sits_still_is_not() {
     });
     let (_, found, mistaken) = watched.see(sits);
     assert!(found > 0.99 && mistaken < 0.002, "after 8 s: {found} {mistaken}");
-    // It is known for good, and so is the place where it stood, once it is seen.
+    // The vase remains background, and so does its former place, once seen.
     assert!(watched.see(Shown { vase: true, ..ROOM }).2 < 0.001);
 }
 
@@ -184,7 +184,7 @@ fn another_picture_is_said_and_all_is_blurred() {
     let mut watched = Watched::before_room();
     let moved = Shown { nudge_px: (160.0, 75.0), ..other((160.0, 75.0)) };
     let mut picture = moved.picture().0;
-    // Another room altogether.
+    // A different room.
     picture.rgb.chunks_exact_mut(3).enumerate().for_each(|(at, pixel)| {
         let code = (128.0 + 100.0 * (at as f32 * 0.013).sin()) as u8;
         pixel.copy_from_slice(&[code, 255 - code, code / 2]);
@@ -193,7 +193,7 @@ fn another_picture_is_said_and_all_is_blurred() {
     watched.source.read(FrameInput { stamp, color: &picture, right: None }, &mut watched.map).unwrap();
     assert_eq!(watched.source.guide().step(), Step::Unlike);
     assert!(watched.map.metres.iter().all(|&metres| metres > 100.0) && watched.map.matte.pixels.is_empty());
-    // It is the room again.
+    // The known room is back.
     assert_eq!(watched.see(PERSON).0, Step::Ready);
 }
 
@@ -202,7 +202,7 @@ fn a_plate_is_taken_once_the_person_has_gone() {
     let mut watched = Watched::new(None);
     let mut steps = Vec::new();
     for frame in 0..240 {
-        // They dawdle: still in the picture after the countdown.
+        // The person is slow, and still in the picture after the countdown.
         let person = (frame < 120).then_some((300.0 + 4.0 * frame as f32, 150.0)).filter(|(x, _)| *x < 760.0);
         let (step, ..) = watched.see(Shown { person, ..ROOM });
         if steps.last() != Some(&step) {
@@ -260,7 +260,7 @@ fn commands_take_plates_and_use_them() {
         home.run(arguments).refused(code, &[part]);
         assert!(!at("a.png").exists(), "{arguments:?}");
     }
-    // Where nobody stands before it, that is said.
+    // A plate without a person before it is reported.
     for (plate, expected) in [("me.png", "the plate is the picture itself"), ("copy.png", "no person stands before it")]
     {
         std::fs::copy(at("me.png"), at("copy.png")).unwrap();

@@ -1,4 +1,4 @@
-//! Presets and snapshots, as the user of the program meets them.
+//! Presets and snapshots on the command line.
 #![allow(missing_docs)]
 
 use crate::common;
@@ -21,12 +21,12 @@ use common::{noise, three_depths};
 
 use crate::program::{Home, Ran};
 
-/// Runs the program with these variables.
+/// Runs the program with these environment variables.
 fn run(home: &Home, environment: &[(&str, &str)], args: &[&str]) -> Ran {
     Ran::of(home.command(args).envs(environment.iter().copied()))
 }
 
-/// The line of a setting in `config dump`.
+/// Returns the line of a setting in `config dump`.
 fn line<'a>(dump: &'a str, name: &str) -> &'a str {
     let is_it = |line: &&str| line.trim_start_matches("# ").starts_with(&format!("{name} = "));
     dump.lines().find(is_it).unwrap_or_else(|| panic!("no {name} in {dump}"))
@@ -113,7 +113,7 @@ fn every_built_in_preset_blurs_in_its_own_way() {
     }
 }
 
-/// A frame as a window would show it, and the radius of every pixel.
+/// Blurs a frame as the window does; also returns each pixel's CoC radius.
 fn blurred(look: &Look, color: &ColorImage, map: &DepthMap, focus_m: f32, quality: Quality) -> (ColorImage, CocField) {
     let size = color.size();
     let field = match look.coc_rule(size) {
@@ -124,7 +124,7 @@ fn blurred(look: &Look, color: &ColorImage, map: &DepthMap, focus_m: f32, qualit
     if let CocField::Depth(lens) = &field {
         Matting::default().find(&mut map, color, lens.inverse_depth_of_px(matting::FROM_PX));
     }
-    // As a live run does it: one executor for all levels.
+    // A live run uses one executor for all quality levels.
     let settings = look.settings(size, true).unwrap();
     let mut cpu = CpuBokeh::new(Plan::new(&settings, size.0, size.1), Some(2));
     let job = Job::new(Pooled::detached(color.clone()), Some(Pooled::detached(map)), field);
@@ -138,7 +138,7 @@ fn a_snapshot_is_repeated_to_the_bit_whatever_the_settings_around() {
     let home = Home::new().with_settings(settings);
     let environment = [("BOKEHCAM_FOCUS", "7"), ("BOKEHCAM_F_NUMBER", "2"), ("BOKEHCAM_QUALITY", "draft")];
     let color = noise(101, 77);
-    // Some of it unknown: what a blur had is not made up again.
+    // With some unknown depths: `--like` must not estimate them a second time.
     let mut map = three_depths(101, 77);
     map.metres.iter_mut().step_by(13).for_each(|metres| *metres = 0.0);
     let dof = Look {
@@ -164,7 +164,7 @@ fn a_snapshot_is_repeated_to_the_bit_whatever_the_settings_around() {
         let ran = run(&home, &environment, &args);
         assert_eq!(ran.done(), "", "{like}");
         assert!(read_color(&out).unwrap() == picture, "{like} {quality}");
-        // Flags beside it change it.
+        // Additional flags override the snapshot's settings.
         let ran = run(&home, &environment, &[&args[..], &["--force", "--aperture", "heart"]].concat());
         assert_eq!(ran.done(), "");
         assert!(read_color(&out).unwrap() != picture);
@@ -257,7 +257,7 @@ fn a_snapshot_is_whole_or_not_there() {
     }
     assert!(!home.path("a").exists() && !home.path("x.png").exists());
 
-    // A name of one of its files that is taken is as good as all of them.
+    // One existing file blocks the whole snapshot name.
     let dir = home.path("shots");
     fs::create_dir(&dir).unwrap();
     fs::write(dir.join("x-depth.pfm"), "mine").unwrap();

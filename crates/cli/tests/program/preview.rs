@@ -1,4 +1,4 @@
-//! The command `preview` where there can be no window, and with arguments that do not fit.
+//! The command `preview` without a display, and with invalid arguments.
 #![cfg(feature = "window")]
 #![allow(missing_docs)]
 

@@ -1,4 +1,4 @@
-//! `record` never costs a recording: neither its source, nor the old one in its place, nor what it has when it is cut short.
+//! `record` never loses a recording: neither its source, nor a replaced one, nor its own frames when interrupted.
 #![allow(missing_docs)]
 
 use std::fs;
@@ -16,10 +16,10 @@ use rustix::process::Signal;
 use crate::common::noise;
 use crate::program::{Beside, Home, Ran, until};
 
-/// What takes longer hangs.
+/// Timeout against hangs.
 const HANG: Duration = Duration::from_secs(120);
 
-/// What a folder holds: names and content, links not followed, without our own list of files.
+/// Returns names and contents of a folder's files, without following links and without the program's own file list.
 fn all(dir: &Path) -> Vec<(String, Vec<u8>)> {
     fn add(dir: &Path, below: &Path, found: &mut Vec<(String, Vec<u8>)>) {
         for entry in fs::read_dir(below).unwrap() {
@@ -42,7 +42,7 @@ fn names(dir: &Path) -> Vec<String> {
     all(dir).into_iter().map(|(name, _)| name).collect()
 }
 
-/// A recording of `frames` frames as `dir`, all of `shade`, with depth.
+/// Creates a recording of `frames` frames in `dir`, of a uniform `shade` and depth.
 fn recording(dir: &Path, frames: u64, shade: u8, metres: f32) {
     let mut writer = Writer::create(dir, &WriterOptions::default()).unwrap();
     let color = ColorImage { width: 24, height: 16, rgb: vec![shade; 24 * 16 * 3] };
@@ -51,7 +51,7 @@ fn recording(dir: &Path, frames: u64, shade: u8, metres: f32) {
     writer.finish().unwrap();
 }
 
-/// Frames that can be read, and the first byte of the first.
+/// Returns the number of readable frames, and the first byte of the first one.
 fn read(dir: &Path) -> (usize, u8) {
     let recording = Recording::open(dir, &Options::default()).unwrap();
     let (mut scratch, mut image, mut depth) = (Scratch::default(), ColorImage::default(), DepthMap::default());
@@ -84,21 +84,21 @@ fn a_source_that_fails_leaves_the_old_recording() {
     recording(&at("old"), 2, 200, 2.0);
     let before = all(&at("old"));
 
-    // At its first frame: nothing was recorded, and nothing is left.
+    // The source fails at its first frame: nothing is recorded, and no files remain.
     let first = fs::read(at("source/rgb/000000.png")).unwrap();
     fs::write(at("source/rgb/000000.png"), &first[..first.len() - 20]).unwrap();
     let ran = home.run(&["record", "source", "--to", "old", "--force"]);
     ran.failed(1, &["000000.png: "]);
     assert_eq!((all(&at("old")), at("old.incomplete").exists()), (before.clone(), false));
 
-    // Later: what was recorded until then is kept beside.
+    // The source fails later: the recorded frames are kept under another name.
     fs::write(at("source/rgb/000000.png"), first).unwrap();
     fs::write(at("source/rgb/000003.png"), "").unwrap();
     let ran = home.run(&["record", "source", "--to", "old", "--force"]);
     ran.failed(1, &["old: as it was", "3 frames are in old.incomplete"]);
     assert_eq!((all(&at("old")), read(&at("old.incomplete"))), (before, (3, 50)));
 
-    // Where nothing is replaced it has its own name.
+    // Without an old recording, they keep the requested name.
     let ran = home.run(&["record", "source", "--to", "new"]);
     ran.failed(1, &["new: cut short; the 3 frames until then can be read"]);
     assert_eq!(read(&at("new")), (3, 50));
@@ -109,7 +109,7 @@ fn only_what_the_old_lists_name_goes() {
     let home = Home::new();
     let at = |name: &str| home.path(name);
     recording(&at("source"), 2, 50, 1.0);
-    // As others write them: by time, with lists and files of their own.
+    // A recording by another program: named by time, with additional lists and files.
     recording(&at("old"), 3, 200, 2.0);
     fs::remove_file(at("old/.bokehcam")).unwrap();
     fs::rename(at("old/rgb/000002.png"), at("old/rgb/0.2.png")).unwrap();
@@ -123,7 +123,7 @@ fn only_what_the_old_lists_name_goes() {
     assert_eq!(read_sloppily(&at("old")), 3);
     let ran = home.run(&["record", "source", "--to", "old", "--force"]);
     ran.done();
-    // Three pictures, three maps, two lists.
+    // The 8 files are three pictures, three depth maps and two lists.
     assert!(ran.stderr.contains("2 frames recorded") && ran.stderr.contains("in place of 8 files"), "{}", ran.stderr);
     assert_eq!(read(&at("old")), (2, 50));
     let ours = ["depth.txt", "depth/000000.png", "depth/000001.png", "rgb.txt", "rgb/000000.png", "rgb/000001.png"];
@@ -133,7 +133,7 @@ fn only_what_the_old_lists_name_goes() {
     assert_eq!(names(&at("old")), expected);
     assert!(foreign.iter().all(|name| fs::read(at(name)).unwrap() == b"mine"));
 
-    // A picture that would be in the way is nobody's to take.
+    // A foreign file with the name of a new picture is not overwritten.
     fs::write(at("old/rgb/000002.png"), "mine").unwrap();
     recording(&at("longer"), 3, 70, 1.0);
     let ran = home.run(&["record", "longer", "--to", "old", "--force"]);
@@ -141,14 +141,14 @@ fn only_what_the_old_lists_name_goes() {
     assert_eq!(read(&at("old")), (2, 50));
 }
 
-/// Frames of a recording whose lists have faults.
+/// Counts the readable frames of a recording with faulty lists.
 fn read_sloppily(dir: &Path) -> usize {
     let recording = Recording::open(dir, &Options { keep_going: true, ..Options::default() }).unwrap();
     let (mut scratch, mut image) = (Scratch::default(), ColorImage::default());
     (0..recording.len()).filter(|&frame| recording.read_color(frame, &mut scratch, &mut image).is_ok()).count()
 }
 
-/// Runs `record` until it has some frames in `place`.
+/// Starts `record`, and waits for some frames in `place`.
 fn begun(home: &Home, args: &[&str], place: PathBuf) -> Beside {
     let mut run = Beside::start(home.command(args).stderr(Stdio::piped()));
     until("some frames", HANG, || {
@@ -173,7 +173,7 @@ fn a_recording_that_is_cut_short_is_readable() {
     assert_eq!(all(&at("old")), before);
     assert!(read(&at("old.incomplete")).0 >= 3);
 
-    // Killed: the next one keeps what there is.
+    // After a kill, the next run keeps the frames of the killed one.
     drop(begun(&home, &long, at("old/.bokehcam.part/rgb")));
     let once = [&endless[..], &["--frames", "1"]].concat();
     let ran = home.run(&once);
@@ -182,7 +182,7 @@ fn a_recording_that_is_cut_short_is_readable() {
     assert!(read(&at("old.incomplete.2")).0 >= 2);
     assert_eq!(read(&at("old")).0, 1);
 
-    // Without an end of its own it ends where it is told to.
+    // An endless source ends by a signal.
     let ran = begun(&home, &endless, at("old/.bokehcam.part/rgb")).end_by(Signal::INT, HANG);
     ran.done();
     assert!(ran.stderr.contains("in place of 4 files"), "{}", ran.stderr);
@@ -202,13 +202,13 @@ fn a_killed_recording_gets_its_lists() {
     assert!(!names(&at("new")).iter().any(|name| name.ends_with(".part")), "{:?}", names(&at("new")));
 }
 
-/// No file may be larger than a limit, as on a disk that is full.
+/// A file size limit acts like a full disk.
 #[test]
 fn a_full_disk_leaves_no_half_picture() {
     let home = Home::new();
     let at = |name: &str| home.path(name);
     recording(&at("source"), 3, 50, 1.0);
-    // One that is hard to compress.
+    // A picture that is hard to compress exceeds the limit.
     write_color(&at("source/rgb/000002.png"), &noise(24, 16), true).unwrap();
     for (target, kept) in [("new", "new"), ("old", "old.incomplete")] {
         if target != kept {

@@ -1,4 +1,4 @@
-//! The command `render` on pictures as cameras and programs write them.
+//! The command `render` on pictures in the formats of cameras and other programs.
 #![allow(missing_docs)]
 
 use std::path::Path;
@@ -16,17 +16,17 @@ fn on_cpu(home: &Home, command: &[&str], arguments: &[&str]) -> Ran {
     home.run(&[command, arguments, &["--backend", "cpu"]].concat())
 }
 
-/// Runs `render`.
+/// Runs `render` on the CPU.
 fn run(home: &Home, arguments: &[&str]) -> Ran {
     on_cpu(home, &["render"], arguments)
 }
 
-/// Blurs `image`; gives what was said.
+/// Blurs `image`; returns stderr.
 fn render(home: &Home, image: &str, out: &str) -> String {
     run(home, &[image, "--effect", "blur", "--coc-at-infinity", "3", "--out", out]).done().to_owned()
 }
 
-/// Checks of 8 by 8 pixels, light on the left half and dark on the right.
+/// Creates a checkerboard of 8 by 8 pixels, light in the left half and dark in the right.
 fn halves(home: &Home) -> ColorImage {
     let picture = color(160, 96, |x, y| {
         let check = if (x / 8 + y / 8) % 2 == 0 { 60 } else { 0 };
@@ -36,7 +36,7 @@ fn halves(home: &Home) -> ColorImage {
     picture
 }
 
-/// The mean difference of two pictures in some columns, in codes.
+/// Returns the mean absolute difference of two pictures in some columns, in 8-bit codes.
 fn difference(a: &ColorImage, b: &ColorImage, columns: std::ops::Range<usize>) -> f32 {
     let width = a.width as usize;
     let bytes = (0..a.rgb.len()).filter(|byte| columns.contains(&(byte / 3 % width)));
@@ -50,7 +50,7 @@ fn what_goes_with_a_picture_stays_with_it() {
     let home = Home::new();
     let mut profile = vec![7; 200];
     profile[16..20].copy_from_slice(b"RGB ");
-    // One entry, the name of the camera.
+    // EXIF with one entry, the camera's name.
     let exif = b"MM\0\x2a\0\0\0\x08\0\x01\x01\x10\0\x02\0\0\0\x04CAM\0\0\0\0\0".to_vec();
     let xmp =
         "<x:xmpmeta xmlns:x=\"adobe:ns:meta/\"><rdf:Description dc:rights=\"Mine, \u{e4}\"/></x:xmpmeta>".to_owned();
@@ -76,7 +76,7 @@ fn what_does_not_fit_is_said_once() {
 fn a_mask_says_what_stays_sharp_in_any_size() {
     let home = Home::new();
     let picture = halves(&home);
-    // A twentieth of the picture's size, and its first column and a half white.
+    // The mask has a sixteenth of the picture's size; its left half is white.
     let mask = image::GrayImage::from_fn(10, 6, |x, _| [if x < 5 { 255 } else { 0 }].into());
     mask.save(home.path("mask.png")).unwrap();
     let ran = run(&home, &["in.png", "--mask", "mask.png", "--coc-at-infinity", "8", "--out", "out.png"]);
@@ -84,7 +84,7 @@ fn a_mask_says_what_stays_sharp_in_any_size() {
     let out = read_photo(&home.path("out.png")).unwrap().0;
     assert_eq!(difference(&picture, &out, 0..70), 0.0, "the subject is not touched");
     assert!(difference(&picture, &out, 90..160) > 10.0);
-    // The outline lies where the colours have it, though the mask is coarse.
+    // The outline follows the picture's colours, although the mask is coarse.
     assert!(difference(&picture, &out, 76..80) < 2.0, "{}", difference(&picture, &out, 76..80));
     for (arguments, expected) in [
         (vec!["in.png", "--mask", "mask.png", "--focus", "2", "--out", "no.png"], "--focus 2 needs distances"),
@@ -129,7 +129,7 @@ fn a_recording_may_have_relative_inverse_depth() {
     std::fs::create_dir_all(at("rec/rgb")).unwrap();
     std::fs::rename(at("in.png"), at("rec/rgb/0.png")).unwrap();
     std::fs::create_dir(at("rec/depth")).unwrap();
-    // As networks' pictures are: 8 bits, here of colours that are grey.
+    // Depth as networks write it: 8 bits, here as grey RGB.
     let near_left = image::RgbImage::from_fn(160, 96, |x, _| [if x < 80 { 250 } else { 20 }; 3].into());
     near_left.save(at("rec/depth/0.png")).unwrap();
     std::fs::write(at("rec/rgb.txt"), "0 rgb/0.png\n").unwrap();
@@ -151,7 +151,7 @@ fn a_recording_may_have_relative_inverse_depth() {
     }
 }
 
-/// What is valid and hardly meant is said in one line, and done.
+/// Asserts that valid but probably unintended arguments give a one-line warning and still work.
 #[track_caller]
 fn warned(home: &Home, command: &[&str], arguments: &[&str], expected: &str) {
     let ran = on_cpu(home, command, &[arguments, &["--force"]].concat());
@@ -190,7 +190,7 @@ fn pictures_in_the_wrong_place_are_said() {
         assert!(ran.stderr.contains(expected), "{}", ran.stderr);
     }
     run(&home, &["in.png", "--mask", "tall.png", "--out", "no.png"]).failed(1, &["tall.png: the mask is 90x160"]);
-    // What is meant is not warned of.
+    // Arguments that resolve the ambiguity give no warning.
     let meant = ["in.png", "--depth-map", "mm.png", "--depth-scale", "1000", "--refine", "off", "--out", "meant.png"];
     let ran = run(&home, &meant);
     assert_eq!(ran.done().lines().count(), 1, "{}", ran.stderr);

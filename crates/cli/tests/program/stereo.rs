@@ -1,5 +1,4 @@
-//! Two eyes as the user meets them: recordings and side-by-side pictures blurred by their own disparity, and what is
-//! refused.
+//! Stereo sources on the command line: recordings and side-by-side pictures blurred by their disparity, and refusals.
 
 use crate::planes;
 use crate::program::{PORTRAIT, STEREO, run};
@@ -19,7 +18,7 @@ fn save(image: &ColorImage, to: &Path) {
     image::save_buffer(to, &image.rgb, image.width, image.height, image::ColorType::Rgb8).unwrap();
 }
 
-/// A folder in Middlebury's layout: the square at 2.5 m before the wall at 10 m.
+/// Creates a folder in Middlebury's layout: a square at 2.5 m before a wall at 10 m.
 fn rectified_pair() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     let (left, right) = planes::seen();
@@ -32,13 +31,13 @@ fn rectified_pair() -> tempfile::TempDir {
     folder
 }
 
-/// A recording whose pictures show both eyes of the scene beside each other; with `more` columns that belong to none.
+/// Creates a recording of side-by-side pictures of the scene, with `more` additional columns.
 fn side_by_side(more: u32) -> tempfile::TempDir {
     let (left, right) = planes::seen();
     recording_of(&left, &right, more)
 }
 
-/// A photograph as both eyes would see it 12 pixels from infinity: what a pair is can be told by many points only.
+/// Returns a photograph as a stereo pair with a disparity of 12 px; rectification checks need its many features.
 fn photograph() -> (ColorImage, GrayImage) {
     const DISPARITY_PX: usize = 12;
     let recording = Recording::open(Path::new(PORTRAIT), &Options::default()).unwrap();
@@ -70,7 +69,7 @@ fn recording_of(left: &ColorImage, right: &GrayImage, more: u32) -> tempfile::Te
     folder
 }
 
-/// Streams one frame to a picture, sharp where the square is; how far that and the wall are from sharp.
+/// Streams one frame in focus on the square; returns the blur of the square and of the wall.
 fn blurred(source: &Path, more: &[&str]) -> (f64, f64) {
     let out = tempfile::tempdir().unwrap();
     let to = format!("{}/", path(&out.path().join("out")));
@@ -91,7 +90,7 @@ fn a_recording_with_two_eyes_is_blurred_by_their_disparity() {
         let (near, far) = blurred(pair.path(), more);
         assert!(near < 3.0 && far > 15.0, "{more:?}: {near} in focus, {far} behind");
     }
-    // Nothing is matched where nothing asks for it.
+    // Without a need for depth, nothing is matched.
     let (near, far) = blurred(pair.path(), &["--depth", "none", "--effect", "blur"]);
     assert!(near > 15.0 && far > 15.0, "{near}, {far}");
 }
@@ -115,7 +114,7 @@ fn a_pair_that_is_not_what_it_was_said_to_be_is_said_in_one_line() {
         ran.done().lines().filter(|line| line.starts_with("warning: ")).map(str::to_owned).collect::<Vec<_>>()
     };
     assert_eq!(said(&|_, _| {}), Vec::<String>::new());
-    // The right eye looks 5 rows lower.
+    // The right camera is 5 rows lower.
     let lower = said(&|_, right| right.luma.rotate_left(5 * right.width as usize));
     assert!(lower.len() == 1 && lower[0].contains("not rectified") && lower[0].contains("--calib"), "{lower:?}");
     let exchanged = said(&|left, right| {
@@ -180,7 +179,8 @@ fn what_does_not_fit_two_eyes_costs_one_line_and_exit_code_2() {
     }
 }
 
-/// The leaves before the portrait have disparities of up to 84 pixels, and a tenth of the width is 64.
+/// The leaves before the portrait have disparities of up to 84 px, beyond the default range of a tenth of the width, 64
+/// px.
 #[test]
 fn near_things_beyond_the_range_are_found_or_said() {
     let out = tempfile::tempdir().unwrap();
@@ -205,7 +205,7 @@ fn a_calibration_that_cannot_be_read_is_named() {
     let wide = wide.path().join("wide");
     let nowhere = ["stream", path(&wide), "--to", "null", "--side-by-side", "--calib", "nowhere.yml"];
     run(&nowhere).refused(1, &["nowhere.yml"]);
-    // Eyes that are exchanged, in millimetres of unknown pictures: one line all the same.
+    // Exchanged cameras, millimetres, and an unknown picture size still give a single line.
     let calib = wide.with_file_name("calib.yml");
     let camera =
         "!!opencv-matrix\n   rows: 3\n   cols: 3\n   dt: d\n   data: [300., 0., 80., 0., 300., 60., 0., 0., 1.]\n";
@@ -230,7 +230,7 @@ fn two_cameras_are_two_cameras() {
         (&["/dev/null,/dev/nothing", "--rectified"], 1, "/dev/nothing"),
         (&["nowhere,elsewhere"], 1, "LEFT,RIGHT"),
         (&["/dev/null,/dev/zero", "--rectified", "--pace", "asap"], 2, "leave --pace out"),
-        // Devices, but no cameras.
+        // Devices that are not cameras.
         (&["/dev/null,/dev/zero", "--rectified"], 1, "/dev/null: this is no camera"),
     ];
     for (args, code, said) in cases {

@@ -1,4 +1,4 @@
-//! Standard error: nobody waits for a terminal that takes nothing, and lines and the bar keep apart.
+//! Standard error: a blocked terminal does not block the program, and messages do not mix with the progress bar.
 #![allow(unsafe_code)]
 
 use std::fs::{self, File, OpenOptions};
@@ -16,10 +16,10 @@ use rustix::process::Signal;
 
 use crate::program::{Beside, Home, PORTRAIT};
 
-/// What takes longer hangs.
+/// Timeout against hangs.
 const HANG: Duration = Duration::from_secs(60);
 
-/// A terminal: its screen, from which can be read what is printed, and its name for programs.
+/// Opens a pseudo-terminal; returns the master side, which reads the output, and the path of the slave side.
 fn terminal() -> (File, PathBuf) {
     const UNLOCK: u32 = opcode::write::<i32>(b'T', 0x31);
     const NUMBER: u32 = opcode::read::<u32>(b'T', 0x30);
@@ -37,11 +37,11 @@ fn open_terminal(name: &Path) -> File {
     OpenOptions::new().read(true).write(true).custom_flags(no_controlling).open(name).unwrap()
 }
 
-/// Writes until nothing more is taken.
+/// Writes until the terminal's buffer is full.
 fn fill(name: &Path) {
     let flags = (OFlags::NOCTTY | OFlags::NONBLOCK).bits() as i32;
     let mut terminal = OpenOptions::new().write(true).custom_flags(flags).open(name).unwrap();
-    // The kernel makes room once more, in its own time.
+    // The kernel may free buffer space later.
     while fill_up(&mut terminal) > 0 {
         thread::sleep(Duration::from_millis(100));
     }
@@ -62,7 +62,7 @@ fn fill_up(mut file: impl Write) -> usize {
     written
 }
 
-/// Counts the frames of a y4m stream of 320 x 240 pixels as they come.
+/// Sends a message per frame of a y4m stream of 320 x 240 pixels.
 fn frames(stream: impl Read + Send + 'static) -> std::sync::mpsc::Receiver<()> {
     let (told, frames) = std::sync::mpsc::channel();
     thread::spawn(move || {
@@ -121,7 +121,7 @@ fn a_warning_has_a_line_of_its_own_beside_the_bar() {
     for list in fs::read_dir(PORTRAIT).unwrap().flatten().filter(|entry| entry.path().is_file()) {
         fs::copy(list.path(), own.join(list.file_name())).unwrap();
     }
-    // Late enough for the bar to be there; and all of them, as some are passed over on a machine that is late.
+    // From a frame at which the bar is visible; all later frames are broken, as a slow machine skips some.
     for picture in fs::read_dir(own.join("rgb")).unwrap().flatten().filter(|entry| *entry.file_name() >= *"000012.png")
     {
         fs::write(picture.path(), "no picture").unwrap();
@@ -133,7 +133,7 @@ fn a_warning_has_a_line_of_its_own_beside_the_bar() {
     let run = Beside::start(home.command(&args).stdout(Stdio::null()).stderr(slave));
     let reader = thread::spawn(move || {
         let mut told = Vec::new();
-        // Reading fails once the program has closed the terminal.
+        // Reading fails after the program has closed the terminal.
         let _ = screen.read_to_end(&mut told);
         String::from_utf8_lossy(&told).into_owned()
     });
@@ -141,7 +141,7 @@ fn a_warning_has_a_line_of_its_own_beside_the_bar() {
     let told = reader.join().unwrap();
     assert!(told.contains(" frames, "), "a bar: {told:?}");
     let warning = told.find("going on without such frames").unwrap_or_else(|| panic!("{told:?}"));
-    // What stands on its line before the word it begins with.
+    // The text on the warning's line before the warning.
     let line = told[..warning].rsplit('\n').next().unwrap();
     let shown = line.rsplit("\x1b[2K").next().unwrap();
     assert!(!shown.contains(" frames, "), "{line:?}");

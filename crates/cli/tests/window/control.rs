@@ -1,4 +1,4 @@
-//! Others ask the window from outside: what they change shows in it, and what the person changes shows to them.
+//! Control of the window by `bokehcam ctl`: changes are synchronised in both directions.
 
 use std::fs::{self, File};
 use std::os::unix::fs::FileExt;
@@ -22,7 +22,7 @@ fn status(program: &Program) -> Value {
 const LUMA: usize = 640 * 360;
 const FRAME: usize = "FRAME\n".len() + LUMA * 3 / 2;
 
-/// Whether the last whole picture of a video is the card: dark, the same from side to side.
+/// Whether the last complete frame of a video is the still card, judged by its luma at the top and at the bottom.
 fn ends_with_the_card(video: &Path) -> bool {
     let file = File::open(video).unwrap();
     let mut first = [0; 200];
@@ -55,7 +55,7 @@ fn what_is_asked_from_outside_shows_here_and_what_is_done_here_shows_there() {
     window.until("another look", |image| distance(image, &sharp) > 1.0 && distance(image, &before) > 0.5);
     program.ctl(&["set", "rim=0.7", "highlights=-1"]).failed(2, &["--highlights"]);
     assert_eq!(status(&program)["look"]["rim"], "0.5");
-    // The person turns the wheel here, and undoes what came from there.
+    // The user turns the wheel in the window, which overrides the strength set by `ctl`.
     window.wheel((0.5, 0.5), -3);
     until("the wheel shows outside", PATIENCE, || status(&program)["look"]["coc-at-infinity"] != "4.5%");
 

@@ -1,4 +1,4 @@
-//! The desktop around the window: its colours, and a screen reader. Both come over a session bus of the test's own.
+//! Desktop integration: colour scheme and screen reader, over a private session bus.
 
 use std::fs;
 use std::io::{BufRead, BufReader};
@@ -16,7 +16,7 @@ use super::program::{Beside, Home, PORTRAIT};
 use super::screen::{Screen, tied, until};
 use super::window::PATIENCE;
 
-/// A session bus, which ends with it.
+/// A private session bus, which ends when dropped.
 struct Bus {
     address: String,
     _daemon: Beside,
@@ -26,7 +26,7 @@ impl Bus {
     fn new() -> Self {
         let mut daemon = tied("dbus-daemon");
         daemon.args(["--session", "--nofork", "--nopidfile", "--print-address"]);
-        // No service of this machine's desktop is started for it.
+        // Prevents bus activation of the machine's own desktop services.
         daemon.env_remove("DISPLAY").env_remove("WAYLAND_DISPLAY");
         let mut daemon = Beside::start(daemon.stdout(Stdio::piped()).stderr(Stdio::null()));
         let mut address = String::new();
@@ -40,7 +40,7 @@ impl Bus {
     }
 }
 
-/// A desktop's portal as far as its colours go, with the scheme that it begins with.
+/// A fake desktop portal with only the colour scheme; holds the initial value.
 struct Portal(u32);
 
 const APPEARANCE: &str = "org.freedesktop.appearance";
@@ -49,7 +49,7 @@ const SETTINGS: &str = "org.freedesktop.portal.Settings";
 
 #[zbus::interface(name = "org.freedesktop.portal.Settings")]
 impl Portal {
-    /// As old portals have it: the value within another.
+    /// The deprecated `Read` method, which wraps the value in a second variant.
     fn read(&self, namespace: &str, key: &str) -> zbus::fdo::Result<OwnedValue> {
         if (namespace, key) != (APPEARANCE, "color-scheme") {
             return Err(zbus::fdo::Error::Failed("there is no such setting".into()));
@@ -61,7 +61,7 @@ impl Portal {
 const DARK: u32 = 1;
 const LIGHT: u32 = 2;
 
-/// Whether what is beside the picture is light.
+/// Whether the background beside the picture is light.
 fn is_light(image: &ColorImage) -> bool {
     image.rgb[..3].iter().all(|byte| *byte > 200)
 }
@@ -84,7 +84,7 @@ fn light_and_dark_follow_the_desktop() {
         let arguments: Vec<&str> = [PORTRAIT, "--panel=false"].iter().chain(more).copied().collect();
         let mut program = Program::start_on(&screen, Home::new(), bus, &arguments);
         let window = program.window();
-        // A window of another shape than the picture, whose upper left corner is so beside it.
+        // The window's aspect ratio differs from the picture's, so that its upper left corner shows the background.
         window.resize(640, 640);
         (program, window)
     };
@@ -104,11 +104,11 @@ fn light_and_dark_follow_the_desktop() {
     assert!(!ended.said.contains("scheme"), "{}", ended.said);
 }
 
-/// Roles, by AT-SPI's numbers.
+/// Role numbers of AT-SPI.
 const BUTTON: u32 = 43;
 const SLIDER: u32 = 51;
 
-/// What a screen reader is told of a control.
+/// A control as a screen reader sees it.
 #[derive(Debug)]
 struct Told {
     name: String,
@@ -117,7 +117,7 @@ struct Told {
     path: OwnedObjectPath,
 }
 
-/// All that a screen reader finds below a place.
+/// Collects the accessible objects below a node, recursively.
 fn read(access: &Connection, (bus, path): (&str, &str), found: &mut Vec<Told>) -> zbus::Result<()> {
     let place = proxy::Builder::<Proxy>::new(access).destination(bus.to_owned())?.path(path.to_owned())?;
     let place = place.interface("org.a11y.atspi.Accessible")?.cache_properties(CacheProperties::No).build()?;
@@ -143,13 +143,13 @@ fn a_screen_reader_finds_the_controls_and_works_them() {
 
     let mut program = Program::start_on(&screen, Home::new(), &bus.address, &[PORTRAIT, "--mirror", "--blur", "4%"]);
     program.window();
-    // Longer than the panel stays where nobody needs it.
+    // Longer than an unused panel stays visible.
     std::thread::sleep(Duration::from_secs(6));
     let registry = ("org.a11y.atspi.Registry", "/org/a11y/atspi/accessible/root");
     let mut told = Vec::new();
     until("the controls are told", PATIENCE, || {
         told.clear();
-        // What is going away while one asks is asked for again.
+        // An object may disappear during the query; then the query is repeated.
         read(&access, registry, &mut told).is_ok() && told.iter().any(|told| told.name == "Snapshot")
     });
     let by_name = |name: &str| {

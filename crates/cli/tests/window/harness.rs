@@ -1,4 +1,4 @@
-//! Whether the harness does what it says: on a window of this test's own, which writes down what it is told.
+//! Tests of the harness itself, on a window that records its events.
 
 use x11rb::connection::Connection;
 use x11rb::protocol::Event;
@@ -13,7 +13,7 @@ use super::picture::{distance, is_photograph, middle, part};
 use super::screen::{Screen, until};
 use super::window::{PATIENCE, Window};
 
-/// A client with one window, yellow, with a blue corner.
+/// An X client with one window: yellow, with a blue corner.
 struct Own {
     x: RustConnection,
     id: Id,
@@ -49,7 +49,7 @@ impl Own {
         Self { x, id, seen: Vec::new() }
     }
 
-    /// Takes the events that there are.
+    /// Records all pending events.
     fn live(&mut self) {
         while let Some(event) = self.x.poll_for_event().unwrap() {
             self.seen.push(match event {
@@ -76,7 +76,7 @@ impl Own {
         self.x.flush().unwrap();
     }
 
-    /// What it was told since the last time, once that begins with as many lines as `count`.
+    /// Waits for at least `count` events since the last call, and returns them.
     fn told(&mut self, count: usize) -> Vec<String> {
         until("events", PATIENCE, || {
             self.live();

@@ -1,4 +1,4 @@
-//! A person's hands: keys and pointer, as the X server gives them to whoever has the focus.
+//! Synthetic keyboard and pointer input, which the X server delivers to the focused window.
 
 use std::thread;
 use std::time::Duration;
@@ -13,15 +13,15 @@ use x11rb::protocol::xtest::ConnectionExt as _;
 use super::screen::until;
 use super::window::{PATIENCE, Window};
 
-/// The buttons of a pointer.
+/// Pointer button numbers.
 pub const LEFT: u8 = 1;
 const WHEEL_UP: u8 = 4;
 const WHEEL_DOWN: u8 = 5;
 
-/// What a person does between two events.
+/// The pause between two events.
 const BLINK: Duration = Duration::from_millis(15);
 
-/// The key symbols that tests name; a character's is its Latin-1 number.
+/// X keysyms of the keys used in tests; a character's keysym is its Latin-1 code.
 pub mod sym {
     pub const SHIFT: u32 = 0xffe1;
     pub const CONTROL: u32 = 0xffe3;
@@ -31,7 +31,7 @@ pub mod sym {
 }
 
 impl Window<'_> {
-    /// Presses a key and lets it go, with others held meanwhile.
+    /// Presses and releases a key while the modifiers `held` are down.
     pub fn key(&self, held: &[u32], symbol: u32) {
         until("keys go to the window", PATIENCE, || self.is_active());
         let (code, shifted) = self.keycode(symbol);
@@ -46,12 +46,12 @@ impl Window<'_> {
         thread::sleep(BLINK);
     }
 
-    /// Types a text, character by character.
+    /// Types a text, one character at a time.
     pub fn write(&self, text: &str) {
         text.chars().for_each(|c| self.key(&[], u32::from(c)));
     }
 
-    /// Moves the pointer to a place in the window, as a fraction of its width and height.
+    /// Moves the pointer to a position in the window, as fractions of its width and height.
     pub fn point(&self, at: (f64, f64)) {
         let ((left, top), (width, height)) = (self.place(), self.size());
         let (x, y) = (left + (at.0 * f64::from(width)) as i32, top + (at.1 * f64::from(height)) as i32);
@@ -59,7 +59,7 @@ impl Window<'_> {
         thread::sleep(BLINK);
     }
 
-    /// Clicks there, so many times in quick succession.
+    /// Clicks `times` times in quick succession.
     pub fn click(&self, at: (f64, f64), times: u32) {
         self.point(at);
         for _ in 0..times {
@@ -67,7 +67,7 @@ impl Window<'_> {
         }
     }
 
-    /// Drags from one place to another in small steps.
+    /// Drags from one position to another in small steps.
     pub fn drag(&self, from: (f64, f64), to: (f64, f64)) {
         const STEPS: i32 = 20;
         self.point(from);
@@ -80,7 +80,7 @@ impl Window<'_> {
         thread::sleep(BLINK);
     }
 
-    /// Turns the wheel by so many clicks, up where positive, with the pointer there.
+    /// Turns the wheel by `clicks`, up if positive, with the pointer at a position.
     pub fn wheel(&self, at: (f64, f64), clicks: i32) {
         self.point(at);
         for _ in 0..clicks.abs() {
@@ -100,7 +100,7 @@ impl Window<'_> {
         screen.x.flush().unwrap();
     }
 
-    /// The key that has this symbol, and whether with shift.
+    /// Returns the keycode of a keysym, and whether it needs Shift.
     fn keycode(&self, symbol: u32) -> (u8, bool) {
         let x = &self.screen.x;
         let (first, last) = (x.setup().min_keycode, x.setup().max_keycode);

@@ -1,4 +1,4 @@
-//! Every key there is.
+//! Every key binding.
 
 use std::thread;
 use std::time::Duration;
@@ -13,7 +13,7 @@ use super::program::{PORTRAIT, run};
 use super::screen::{Screen, until};
 use super::window::{PATIENCE, Window};
 
-/// The key symbol of a key in the table.
+/// Returns the X keysym of a key in the table of bindings.
 fn symbol(key: Key) -> u32 {
     match key {
         Key::ArrowLeft => 0xff51,
@@ -65,7 +65,7 @@ fn every_key_leaves_it_alive() {
     let mut program = Program::start(&screen, &[PORTRAIT]);
     let window = program.window();
     window.until("the first picture", is_photograph);
-    // Twice, so that what was turned on is turned off.
+    // Twice, so that toggles return to their initial state.
     for _ in 0..2 {
         for binding in GROUPS.iter().flat_map(|group| group.bindings) {
             for chord in binding.chords.iter().filter(|chord| !closes(chord)) {
@@ -103,7 +103,7 @@ fn keys_that_close_close() {
 #[test]
 #[ignore = "needs an X server"]
 fn what_is_seen_follows_the_keys_and_comes_back() {
-    // One frame over and over, at one quality: what is seen stands still on a machine of any speed.
+    // A looped single frame at a fixed quality level gives a static picture on a machine of any speed.
     let folder = tempfile::tempdir().unwrap();
     let frame = folder.path().join("frame");
     let frame = frame.to_str().unwrap();
@@ -115,7 +115,7 @@ fn what_is_seen_follows_the_keys_and_comes_back() {
     window.until("the first picture", is_photograph);
     let mut last = None;
     let before = window.until("the notes and the controls of the start are gone", |image| {
-        // Longer than controls stay, or two looks in a row would show them.
+        // Longer than controls stay visible, or two consecutive pictures would both show them.
         thread::sleep(Duration::from_secs(6));
         let same = last.as_ref().is_some_and(|last| distance(last, image) < 0.01);
         last = Some(image.clone());

@@ -1,4 +1,4 @@
-//! From the start to the end: the first picture, and closing at any time.
+//! Start and end: the first picture, and closing at any time.
 
 use super::picture::is_photograph;
 use super::preview::Program;
@@ -25,7 +25,7 @@ fn it_can_be_closed_while_it_loads() {
     let screen = Screen::new();
     for source in ["synthetic", PORTRAIT] {
         let mut program = Program::start(&screen, &[source]);
-        // As soon as there is anything to close.
+        // Close as soon as the window exists.
         let window = program.window();
         window.close();
         let ended = program.end();

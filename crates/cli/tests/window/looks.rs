@@ -1,4 +1,4 @@
-//! Finding a look: gestures on the picture, and what is kept of it.
+//! Changing the look by gestures on the picture, and saving the result.
 
 use std::fs;
 use std::path::Path;
@@ -13,7 +13,7 @@ use super::program::{Home, PORTRAIT, Ran};
 use super::screen::{Screen, until};
 use super::window::{PATIENCE, Window};
 
-/// Begins with one frame, again and again, and nothing over it, in which the person is sharp.
+/// Loops one frame, in which the person is in focus, without controls over it.
 const ONE_FRAME: [&str; 7] = ["--start", "0", "--end", "0.05", "--panel=false", "--quality", "balanced"];
 
 fn start<'a>(screen: &'a Screen, more: &[&str]) -> (Program<'a>, Window<'a>) {
@@ -24,12 +24,12 @@ fn start<'a>(screen: &'a Screen, more: &[&str]) -> (Program<'a>, Window<'a>) {
     (program, window)
 }
 
-/// Where something is in the recording: middle and size, as fractions of width and height.
+/// An area of the recording: centre and size, as fractions of width and height.
 type Place = ((f64, f64), (f64, f64));
 const LEAVES: Place = ((0.18, 0.80), (0.14, 0.20));
 const FACE: Place = ((0.53, 0.45), (0.12, 0.16));
 
-/// How much detail there is: the mean step from pixel to pixel.
+/// Measures detail: the mean difference between adjacent pixels.
 fn detail(image: &ColorImage, ((x, y), (width, height)): Place) -> f64 {
     let px = |share: f64, all: u32| (share * f64::from(all)).round() as u32;
     let size = (px(width, image.width), px(height, image.height));
@@ -91,7 +91,7 @@ fn the_line_between_before_and_after_is_dragged() {
 #[ignore = "needs an X server"]
 fn a_snapshot_is_repeated_by_render_and_a_copied_command_runs() {
     let screen = Screen::new();
-    // Somebody who keeps what a snapshot was made of.
+    // A user whose snapshots keep their sources.
     let home = Home::new();
     let state = home.path("state/bokehcam");
     fs::create_dir_all(&state).unwrap();
@@ -103,7 +103,7 @@ fn a_snapshot_is_repeated_by_render_and_a_copied_command_runs() {
     window.until("the first picture", is_photograph);
     window.key(&[], u32::from('2'));
     until("its executor", PATIENCE, || program.said().contains("an executor was made"));
-    // And a frame of it.
+    // Wait for a frame in the new look, too.
     std::thread::sleep(Duration::from_millis(500));
     window.key(&[], u32::from('s'));
     window.key(&[], u32::from('k'));
@@ -115,7 +115,7 @@ fn a_snapshot_is_repeated_by_render_and_a_copied_command_runs() {
     let picture = picture.unwrap();
     until("the command", PATIENCE, || program.said().contains("Copied: bokehcam preview"));
     let ended = program.close();
-    // By somebody who has no settings.
+    // Repeat it as a user without settings.
     let other = Home::new();
     let run = |arguments: &[&str]| {
         Ran::of(other.with_drivers(arguments).current_dir(&ended.home.0).env("DISPLAY", &screen.display))
@@ -136,7 +136,7 @@ fn a_snapshot_is_repeated_by_render_and_a_copied_command_runs() {
 #[ignore = "needs an X server"]
 fn a_recording_is_begun_and_ended_by_a_key() {
     let screen = Screen::new();
-    // From a GPU, pictures come back only while somebody needs them.
+    // On a GPU, pictures are read back only on demand.
     for backend in [&["--backend", "cpu"][..], &["--backend", "gpu", "--adapter", "llvmpipe"]] {
         let (program, window) = start(&screen, backend);
         window.key(&[], u32::from('s'));
@@ -144,7 +144,7 @@ fn a_recording_is_begun_and_ended_by_a_key() {
         let picture = program.home().join(kept(program.home(), ".png").unwrap());
         let is_part = |file: fs::DirEntry| file.file_name().as_encoded_bytes().starts_with(b".bokehcam 20");
         let is_recorded = || fs::read_dir(program.home()).unwrap().flatten().any(is_part);
-        // On a busy machine there may be no frame in a short while, of which there is no file.
+        // On a busy machine, a short recording may contain no frame, and then no file is written.
         let mut longer = [2500, 10_000, 40_000].iter();
         until("the video is whole", PATIENCE, || {
             window.key(&[], u32::from('v'));
@@ -159,14 +159,14 @@ fn a_recording_is_begun_and_ended_by_a_key() {
     }
 }
 
-/// The name of a file of the window's own in a folder, but for those beside a snapshot.
+/// Finds a file that the window wrote in a folder, except the sources of a snapshot.
 fn kept(folder: &Path, ending: &str) -> Option<String> {
     let names = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap());
     let mut ours = names.filter(|name| name.starts_with("bokehcam 20") && !name.ends_with("-color.png"));
     ours.find(|name| name.ends_with(ending))
 }
 
-/// The recording without its depth, in a folder of its own; also one with a picture that is broken, and which.
+/// Copies the first six frames of the recording, without depth, into `folder`.
 fn without_depth(folder: &Path) {
     fs::create_dir_all(folder.join("rgb")).unwrap();
     let list = fs::read_to_string(Path::new(PORTRAIT).join("rgb.txt")).unwrap();
@@ -177,7 +177,7 @@ fn without_depth(folder: &Path) {
     fs::write(folder.join("rgb.txt"), lines.join("\n") + "\n").unwrap();
 }
 
-/// How colourful a picture is: the mean distance of red from blue.
+/// Measures colourfulness: the mean absolute difference between red and blue.
 fn colour(image: &ColorImage) -> f64 {
     let pixels = image.rgb.as_chunks::<3>().0;
     let sum: f64 = pixels.iter().map(|rgb| f64::from(rgb[0].abs_diff(rgb[2]))).sum();
@@ -199,7 +199,7 @@ fn a_band_alone_is_sharp_and_a_lost_camera_is_shown_in_grey_until_it_is_back() {
     const BAND: Place = ((0.5, 0.55), (0.3, 0.10));
     assert!(detail(&shown, BAND) > 1.5 * detail(&shown, TOP), "sharp in the band alone");
 
-    // The next picture that is read is broken: the source is lost.
+    // The next picture to be read is truncated, so the source fails.
     let last = fs::read_dir(folder.path().join("rgb")).unwrap().map(|entry| entry.unwrap().path()).max().unwrap();
     let whole = fs::read(&last).unwrap();
     fs::write(&last, &whole[..whole.len() / 2]).unwrap();
@@ -234,7 +234,8 @@ fn a_gpu_shows_the_same_as_the_processor() {
         program.close();
         image
     });
-    // The bar of a recording hides after a while, which one that is slow may have waited for.
+    // The recording's bar hides after a while, perhaps before a slow machine takes the picture; compare the middle
+    // only.
     let off = distance(&middle(&shown[0]), &middle(&shown[1]));
     assert!(off < 1.0, "{off}");
 }

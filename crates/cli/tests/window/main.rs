@@ -1,8 +1,7 @@
-//! The preview's window as a person has it: a real one on an X server of its own, driven by real keys and pointers, and
-//! seen by what is on the screen.
+//! End-to-end tests of the preview window on a private X server, with synthetic input and screen captures.
 //!
-//! `scripts/test` runs them where there is `Xvfb` and `openbox` (`scripts/setup window` installs both). By hand:
-//! `cargo test --test window -- --include-ignored --test-threads=1`; what a failed test saw lies in `target/tmp/`.
+//! `scripts/test` runs them if `Xvfb` and `openbox` are installed (`scripts/setup window`). By hand: `cargo test --test
+//! window -- --include-ignored --test-threads=1`; a failed test saves its screen in `target/tmp/`.
 
 mod desktop;
 mod harness;

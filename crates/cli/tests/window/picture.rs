@@ -1,11 +1,11 @@
-//! What is in a picture of the screen.
+//! Measurements on pictures of the screen.
 
 use std::collections::HashSet;
 use std::path::Path;
 
 use bokehcam::frame::ColorImage;
 
-/// Writes a picture down for whoever looks why a test failed; says where.
+/// Saves a picture for the diagnosis of a failed test; returns a note with its path.
 pub fn keep(image: &ColorImage, name: &str) -> String {
     let name: String = name.chars().map(|c| if c.is_alphanumeric() { c } else { '-' }).collect();
     let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("{name}.png"));
@@ -16,7 +16,7 @@ pub fn keep(image: &ColorImage, name: &str) -> String {
     }
 }
 
-/// A part of a picture: from this column and row on, so many of them.
+/// Crops a picture to a rectangle: upper left corner and size, in pixels.
 pub fn part(image: &ColorImage, (left, top): (u32, u32), (width, height): (u32, u32)) -> ColorImage {
     let mut cut = ColorImage::new(width, height);
     let row_bytes = 3 * width as usize;
@@ -27,13 +27,13 @@ pub fn part(image: &ColorImage, (left, top): (u32, u32), (width, height): (u32, 
     cut
 }
 
-/// The middle quarter, where no control is.
+/// Crops a picture to its middle quarter, which no control covers.
 pub fn middle(image: &ColorImage) -> ColorImage {
     let (width, height) = image.size();
     part(image, (width / 4, height / 4), (width / 2, height / 2))
 }
 
-/// Whether there is a photograph in the middle, not an empty window nor text: by how many colours there are.
+/// Whether the middle shows a photograph, judged by its number of colours; an empty window and text have fewer.
 pub fn is_photograph(image: &ColorImage) -> bool {
     const MIN_COLOURS: usize = 150;
     let middle = middle(image);
@@ -41,7 +41,7 @@ pub fn is_photograph(image: &ColorImage) -> bool {
     colours.len() > MIN_COLOURS
 }
 
-/// How far two pictures of one size are from each other: the mean over all bytes, 0 to 255.
+/// Returns the mean absolute difference of two pictures of one size, 0 to 255.
 pub fn distance(a: &ColorImage, b: &ColorImage) -> f64 {
     assert_eq!(a.size(), b.size());
     let sum: u64 = a.rgb.iter().zip(&b.rgb).map(|(a, b)| u64::from(a.abs_diff(*b))).sum();

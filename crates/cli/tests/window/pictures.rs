@@ -1,4 +1,4 @@
-//! The pictures of the window in the documentation. `scripts/screenshots` writes them where they belong.
+//! Screenshots for the documentation; `scripts/screenshots` writes them into the repository.
 
 use std::os::unix::fs::symlink;
 use std::path::{Path, PathBuf};
@@ -13,7 +13,7 @@ use super::preview::Program;
 use super::program::{Home, PORTRAIT};
 use super::screen::Screen;
 
-/// Where they go: `BOKEHCAM_SCREENSHOTS`, else beside other pictures of tests.
+/// Returns the output folder: `BOKEHCAM_SCREENSHOTS`, or else the folder for test pictures.
 fn folder() -> PathBuf {
     std::env::var_os("BOKEHCAM_SCREENSHOTS").map_or_else(|| env!("CARGO_TARGET_TMPDIR").into(), PathBuf::from)
 }
@@ -28,7 +28,7 @@ fn save(image: &ColorImage, path: &Path) {
 #[ignore = "needs an X server"]
 fn pictures_for_the_docs() {
     let look = ["--highlights", "12", "--coc-at-infinity", "3%", "--save-to", "."];
-    // What is written down there, and how it comes to be seen.
+    // File name, arguments and keys of each screenshot.
     let scenes: [(&str, &[&str], &[char]); 4] = [
         ("panel", &[], &[]),
         ("split", &["--split", "0.52", "--panel=false"], &[]),
@@ -40,14 +40,14 @@ fn pictures_for_the_docs() {
     for (name, more, keys) in scenes {
         let screen = Screen::new();
         let home = Home::new();
-        // What is shown of it is its name, not where this project lies.
+        // The window shows the relative name instead of the project's path.
         symlink(Path::new(PORTRAIT).parent().unwrap(), home.path("recordings")).unwrap();
         let arguments: Vec<&str> = ["recordings/portrait"].iter().chain(&look).chain(more).copied().collect();
         let mut program = Program::start_at(&screen, home, &arguments);
         let window = program.window();
         window.until("the first picture", |image| name == "depth" || is_photograph(image));
         keys.iter().for_each(|key| window.key(&[], u32::from(*key)));
-        // Until notes are gone and the graph is full; the panel stays while the pointer is on it.
+        // Wait until notes are gone and the graph is full; the panel stays visible while the pointer is on it.
         for step in 0..12 {
             if name == "panel" {
                 window.point((0.80 + 0.002 * f64::from(step), 0.04));

@@ -1,4 +1,4 @@
-//! A screen of the test's own: an X server without hardware, and a window manager.
+//! A private screen: an X server without hardware, and a window manager.
 
 use std::fs;
 use std::io::{BufRead, BufReader};
@@ -13,23 +13,23 @@ use super::program::Beside;
 pub use super::program::until;
 use super::window::PATIENCE;
 
-/// Size of the screen, in pixels.
+/// Screen size in pixels.
 pub const SIZE: (u16, u16) = (1600, 1000);
 
-/// An X server with a window manager; both end with it.
+/// An X server with a window manager; both end when dropped.
 pub struct Screen {
-    /// The server, as a client of it sees it.
+    /// A client connection to the server.
     pub x: RustConnection,
-    /// The window that has all others.
+    /// The root window.
     pub root: Window,
-    /// What `DISPLAY` has to be.
+    /// The value of `DISPLAY`.
     pub display: String,
     _manager: Beside,
     _server: Beside,
     _settings: TempDir,
 }
 
-/// The window manager without keys of its own, so that all of them come to the program.
+/// A window manager without key bindings, so that all keys reach the program.
 const OPENBOX: &str = r#"<?xml version="1.0"?>
 <openbox_config xmlns="http://openbox.org/3.4/rc">
   <focus><focusNew>yes</focusNew></focus>
@@ -41,7 +41,7 @@ const OPENBOX: &str = r#"<?xml version="1.0"?>
 "#;
 
 impl Screen {
-    /// Starts both, and waits until windows are managed.
+    /// Starts both, and waits until the window manager is ready.
     pub fn new() -> Self {
         let mut xvfb = tied("Xvfb");
         let size = format!("{}x{}x24", SIZE.0, SIZE.1);
@@ -64,24 +64,24 @@ impl Screen {
         let (x, number) = x11rb::connect(Some(&display)).unwrap();
         let root = x.setup().roots[number].root;
         let screen = Self { x, root, display, _manager: manager, _server: server, _settings: settings };
-        // A window that opens before that may stay unmanaged.
+        // A window that opens earlier may stay unmanaged.
         until("a window manager", PATIENCE, || ready.exists());
         screen
     }
 
-    /// The number of a name.
+    /// Returns the X atom of a name.
     pub fn atom(&self, name: &str) -> Atom {
         self.x.intern_atom(false, name.as_bytes()).unwrap().reply().unwrap().atom
     }
 
-    /// A window's property of 32-bit values; empty where there is none, or no such window any more.
+    /// Reads a window's property of 32-bit values; empty if the property or the window does not exist.
     pub fn property(&self, window: Window, name: &str) -> Vec<u32> {
         let asked = self.x.get_property(false, window, self.atom(name), AtomEnum::ANY, 0, 1024).unwrap();
         let Ok(reply) = asked.reply() else { return Vec::new() };
         reply.value32().map(Iterator::collect).unwrap_or_default()
     }
 
-    /// Asks the window manager something about a window.
+    /// Sends the window manager a client message about a window.
     pub fn ask_manager(&self, window: Window, what: &str, data: [u32; 5]) {
         let message = ClientMessageEvent::new(32, window, self.atom(what), data);
         let to = EventMask::SUBSTRUCTURE_REDIRECT | EventMask::SUBSTRUCTURE_NOTIFY;
@@ -90,7 +90,7 @@ impl Screen {
     }
 }
 
-/// A program that is killed with the test, however that ends.
+/// Returns a command whose process is killed when the test ends for any reason.
 pub fn tied(program: &str) -> Command {
     let mut command = Command::new("setpriv");
     command.args(["--pdeathsig", "KILL", program]);

@@ -1,4 +1,4 @@
-//! The window large, small, away and back.
+//! Resizing, minimising and restoring the window.
 
 use std::thread;
 use std::time::Duration;
@@ -42,7 +42,7 @@ fn it_can_be_put_away_and_brought_back() {
         window.bring_back();
         window.until("a picture again", is_photograph);
     }
-    // Closed while it is away, it ends as well.
+    // The program also ends when closed while minimised.
     window.minimise();
     program.close();
 }

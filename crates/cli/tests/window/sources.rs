@@ -1,4 +1,4 @@
-//! Other sources while the window is open: dropped on it; and what one does with a recording and the size of the picture.
+//! Changing the source by drag and drop, playback of a recording, and zoom.
 
 use std::time::Instant;
 
@@ -17,7 +17,7 @@ use super::program::PORTRAIT;
 use super::screen::{Screen, until};
 use super::window::{PATIENCE, Window};
 
-/// Drags these files from another program onto the window, as XDND has it, and lets go.
+/// Drops files from another program onto the window, by the XDND protocol.
 fn drop_on(window: &Window, files: &[String]) {
     let screen = window.screen;
     let (x, number) = x11rb::connect(Some(&screen.display)).unwrap();
@@ -87,7 +87,7 @@ fn a_photo_or_folder_dropped_on_the_window_is_opened_and_nonsense_changes_nothin
     drop_on(&window, &[path("red%20one.png"), path("letter.txt")]);
     until("the photo", PATIENCE, || window.title().contains("red one.png"));
     let is_red = |image: &ColorImage| {
-        // Above the marks of tilt-shift.
+        // An area above the tilt-shift markers.
         let clear = part(image, (300, 100), (200, 150));
         clear.rgb.as_chunks::<3>().0.iter().all(|rgb| rgb[0] > 150 && rgb[1] < 90)
     };
@@ -114,7 +114,7 @@ fn a_recording_is_stepped_through_and_its_pixels_are_shown_as_they_are() {
         let file = format!("{PORTRAIT}/rgb/{name}.png");
         bokehcam::recording::still::read_color(file.as_ref()).unwrap()
     };
-    // In a window that shows it smaller, the recording's own pixels are in the middle at 100 %.
+    // In a smaller window, 100 % zoom shows the recording's pixels unscaled in the middle.
     window.resize(600, 400);
     until("another size", PATIENCE, || window.size() == (600, 400));
     window.point((0.5, 0.5));

@@ -1,4 +1,4 @@
-//! What stays: a frozen picture, a recording that one is about to break off, a window that nobody sees, a look.
+//! State that persists: a frozen picture, a recording in progress, a hidden window, and the look across restarts.
 
 use std::fs;
 use std::thread;
@@ -28,7 +28,7 @@ fn a_frozen_picture_follows_the_look() {
     });
     (0..12).for_each(|_| window.key(&[], u32::from(']')));
     let more = window.until("more blur, in the same picture", |image| distance(image, &frozen) > 0.3);
-    // All of them at once, as they were one stroke.
+    // One undo reverts all of them, because they were one stroke.
     window.key(&[sym::CONTROL], u32::from('z'));
     window.until("as before", |image| distance(image, &frozen) < 0.2 * distance(&more, &frozen));
     program.close();
@@ -70,14 +70,14 @@ fn a_window_that_nobody_sees_computes_nothing() {
         thread::sleep(Duration::from_secs(3));
         program.cpu_ticks() - before
     };
-    // On a machine with other work, it may be given little of it for a while.
+    // On a busy machine, the program may get little processor time for a while.
     let mut seen = 0;
     until("it computes", PATIENCE, || {
         seen = seen.max(used(&program));
         seen > 20
     });
     window.minimise();
-    // It could be back at once, so it goes on for a while.
+    // The window could return at once, so the program continues to compute for a while.
     until("it computes nothing", PATIENCE, || used(&program) * 5 < seen);
     let mut again = 0;
     let unseen = (0..2).map(|_| used(&program)).sum::<u64>() / 2;
@@ -99,7 +99,7 @@ fn a_photo_that_nobody_changes_is_computed_once() {
     let mut program = Program::start(&screen, &[&photo, "--panel=false"]);
     let window = program.window();
     let first = window.until("the photo", is_photograph);
-    // Once all is there, and its notes are gone.
+    // Wait until everything is drawn and the notes are gone.
     let mut used = 0;
     until("it computes nothing", PATIENCE, || {
         let before = program.cpu_ticks();
@@ -108,7 +108,7 @@ fn a_photo_that_nobody_changes_is_computed_once() {
         used <= 12
     });
     println!("{used} ticks in 4 s");
-    // It still follows what one does.
+    // The program still reacts to input.
     (0..12).for_each(|_| window.key(&[], u32::from(']')));
     window.until("more blur", |image| distance(image, &first) > 0.3);
     program.close();
@@ -127,7 +127,7 @@ fn a_photo_gets_its_depth_once_a_look_follows_it() {
     let window = program.window();
     let first = window.until("the photo", is_photograph);
     thread::sleep(Duration::from_secs(2));
-    // A preset that follows depth, and a view of that.
+    // A preset that uses depth, and the depth view.
     window.key(&[], u32::from('1'));
     window.key(&[], u32::from('d'));
     window.until("depth in colours", |image| distance(image, &first) > 25.0);
@@ -143,13 +143,13 @@ fn a_look_is_there_again_unless_one_begins_afresh() {
     let window = program.window();
     window.until("the first picture", is_photograph);
     let first = program.home().to_owned();
-    // The preset that has six blades.
+    // The preset with a six-blade aperture.
     window.key(&[], u32::from('2'));
     thread::sleep(Duration::from_secs(1));
     let ended = program.close();
     assert!(remembered(&first).contains("polygon:6"), "{}", remembered(&first));
     fs::remove_file(first.join("report.json")).unwrap();
-    // Without a name, the source is the one that was left; and so is the look.
+    // Without a source argument, the last source and look are restored.
     let mut program = Program::start_at(&screen, ended.home, &[]);
     program.window().until("a picture of the recording", is_photograph);
     let ended = program.close();

@@ -1,4 +1,4 @@
-//! The same window on Wayland: a compositor in a window of an X server, and what that shows.
+//! The window on Wayland: in a compositor that itself draws into an X window, which is captured.
 
 use std::path::Path;
 use std::process::Stdio;
@@ -12,7 +12,7 @@ use super::window::{PATIENCE, Window};
 
 const SOCKET: &str = "wayland-of-the-test";
 
-/// A compositor on this screen, whose socket is in this folder.
+/// Starts a Wayland compositor on the screen, with its socket in `folder`.
 fn compositor(screen: &Screen, folder: &Path) -> Beside {
     let mut weston = tied("weston");
     weston.args(["--backend=x11-backend.so", "--use-pixman"]);
@@ -32,7 +32,7 @@ fn a_window_on_wayland_shows_the_picture_by_processor_and_by_gpu() {
         let mut command = home.within(tied(PROGRAM));
         command.args(["preview", PORTRAIT, "--panel=false", "--report", "report.json"]).args(backend);
         command.env("WAYLAND_DISPLAY", SOCKET).env_remove("DISPLAY").env("HOME", home.0.path());
-        // Drivers of GPUs are found there.
+        // GPU drivers are found there.
         command.env_remove("XDG_DATA_DIRS");
         let program = Beside::start(command.stdout(Stdio::null()).stderr(Stdio::null()));
         Window { screen: &screen, id: screen.root }.until("a photograph", is_photograph);

@@ -1,4 +1,4 @@
-//! A program's window on the screen.
+//! A program's window on the private screen.
 
 use std::time::{Duration, Instant};
 
@@ -11,71 +11,71 @@ use x11rb::protocol::xproto::{
 use super::picture;
 use super::screen::{Screen, until};
 
-/// How long anything on the screen may take; a machine with other work is slow, a program that hangs takes for ever.
+/// The timeout for anything on the screen: long, because the machine may be busy; only a hang exceeds it.
 pub const PATIENCE: Duration = Duration::from_secs(120);
 
-/// A window.
+/// A top-level X window.
 pub struct Window<'a> {
-    /// Where it is.
+    /// The screen that contains the window.
     pub screen: &'a Screen,
-    /// Its number.
+    /// The X window id.
     pub id: Id,
 }
 
 impl<'a> Window<'a> {
-    /// The window of a process, if it has one.
+    /// Finds the window of a process.
     pub fn of(screen: &'a Screen, pid: u32) -> Option<Self> {
         let windows = screen.property(screen.root, "_NET_CLIENT_LIST");
         let id = windows.into_iter().find(|window| screen.property(*window, "_NET_WM_PID") == [pid])?;
         Some(Self { screen, id })
     }
 
-    /// What is written above it.
+    /// Returns the window title.
     pub fn title(&self) -> String {
         let (x, title) = (&self.screen.x, self.screen.atom("_NET_WM_NAME"));
         let asked = x.get_property(false, self.id, title, self.screen.atom("UTF8_STRING"), 0, 1024).unwrap();
         asked.reply().map(|reply| String::from_utf8(reply.value).unwrap()).unwrap_or_default()
     }
 
-    /// Width and height of what the program draws, in pixels.
+    /// Returns width and height of the client area, in pixels.
     pub fn size(&self) -> (u32, u32) {
         let geometry = self.screen.x.get_geometry(self.id).unwrap().reply().unwrap();
         (geometry.width.into(), geometry.height.into())
     }
 
-    /// Where its upper left corner is on the screen.
+    /// Returns the screen position of the upper left corner, in pixels.
     pub fn place(&self) -> (i32, i32) {
         let at = self.screen.x.translate_coordinates(self.id, self.screen.root, 0, 0).unwrap().reply().unwrap();
         (at.dst_x.into(), at.dst_y.into())
     }
 
-    /// Asks for another size, and does not wait for it.
+    /// Requests another size without waiting for it.
     pub fn resize(&self, width: u32, height: u32) {
         let size = ConfigureWindowAux::new().width(width).height(height);
         self.screen.x.configure_window(self.id, &size).unwrap();
         self.screen.x.flush().unwrap();
     }
 
-    /// Puts it away.
+    /// Minimises the window.
     pub fn minimise(&self) {
         const ICONIC: u32 = 3;
         self.screen.ask_manager(self.id, "WM_CHANGE_STATE", [ICONIC, 0, 0, 0, 0]);
         until("the window is put away", PATIENCE, || self.has_state("_NET_WM_STATE_HIDDEN"));
     }
 
-    /// Brings it back, and to the front.
+    /// Restores and raises the window.
     pub fn bring_back(&self) {
         const BY_A_PERSON: u32 = 2;
         self.screen.ask_manager(self.id, "_NET_ACTIVE_WINDOW", [BY_A_PERSON, 0, 0, 0, 0]);
         until("the window is back", PATIENCE, || !self.has_state("_NET_WM_STATE_HIDDEN") && self.is_active());
     }
 
-    /// Whether keys go to it.
+    /// Whether the window has the keyboard focus.
     pub fn is_active(&self) -> bool {
         self.screen.property(self.screen.root, "_NET_ACTIVE_WINDOW") == [self.id]
     }
 
-    /// Whether it fills the screen.
+    /// Whether the window is in full-screen mode.
     pub fn is_full_screen(&self) -> bool {
         self.has_state("_NET_WM_STATE_FULLSCREEN")
     }
@@ -84,7 +84,7 @@ impl<'a> Window<'a> {
         self.screen.property(self.id, "_NET_WM_STATE").contains(&self.screen.atom(name))
     }
 
-    /// Asks the program to close it, as the button in its frame does.
+    /// Requests a close, as the button in the window's frame does.
     pub fn close(&self) {
         let (protocols, delete) = (self.screen.atom("WM_PROTOCOLS"), self.screen.atom("WM_DELETE_WINDOW"));
         let message = ClientMessageEvent::new(32, self.id, protocols, [delete, 0, 0, 0, 0]);
@@ -92,12 +92,12 @@ impl<'a> Window<'a> {
         self.screen.x.flush().unwrap();
     }
 
-    /// What is seen of it now; nothing while it is not on the screen.
+    /// Captures the window's content; `None` while it is not on the screen.
     pub fn look(&self) -> Option<ColorImage> {
         let (width, height) = self.size();
         let (wide, high) = (u16::try_from(width).unwrap(), u16::try_from(height).unwrap());
         let asked = self.screen.x.get_image(ImageFormat::Z_PIXMAP, self.id, 0, 0, wide, high, u32::MAX).unwrap();
-        // Resized meanwhile, or put away.
+        // The capture fails if the window was resized or minimised meanwhile.
         let reply = asked.reply().ok()?;
         let mut image = ColorImage::new(width, height);
         for (rgb, bgrx) in image.rgb.as_chunks_mut::<3>().0.iter_mut().zip(reply.data.as_chunks::<4>().0) {
@@ -106,13 +106,13 @@ impl<'a> Window<'a> {
         Some(image)
     }
 
-    /// Waits until it looks so; a picture of what it looked like is kept otherwise.
+    /// Waits until the captured window satisfies `is`; saves the last picture on timeout.
     #[track_caller]
     pub fn until(&self, what: &str, is: impl FnMut(&ColorImage) -> bool) -> ColorImage {
         self.until_within(what, PATIENCE, is)
     }
 
-    /// As [`Window::until`].
+    /// Like [`Window::until`], with another timeout.
     #[track_caller]
     pub fn until_within(&self, what: &str, within: Duration, mut is: impl FnMut(&ColorImage) -> bool) -> ColorImage {
         let began = Instant::now();

@@ -1,8 +1,8 @@
-//! What the benches share.
+//! Helpers of all benches.
 
 use std::process::ExitCode;
 
-/// The options that were given, or how to end: help is printed, and what is wrong with them in one line.
+/// Returns the parsed options, or the exit code after printing help or a one-line error.
 pub fn options<O: clap::Parser>() -> Result<O, ExitCode> {
     match O::try_parse() {
         Ok(options) => Ok(options),

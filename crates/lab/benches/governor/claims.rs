@@ -1,27 +1,28 @@
-//! The machines that the governor is measured on, and what is claimed of it there.
+//! The machines that the governor is measured on, and the claims about it there.
 
 use super::load::{Numbers, WEATHER, Weather};
 use super::play::{Score, play};
 use super::rivals::{Ours, Picker, Pid};
 
-/// Time for one frame, in units of the load.
+/// Time budget of a frame, in units of the load.
 pub const BUDGET: f64 = 5.0;
-/// Share of the frames that may be over the budget.
+/// Maximum fraction of the frames over the budget.
 const MAX_MISSES: f64 = 0.015;
-/// Changes of rung a minute.
+/// Maximum number of quality level changes a minute.
 const MAX_SWITCHES: f64 = 6.0;
 
-/// A machine, how well its costs are known, and within how many frames a step of the load is settled.
+/// A machine, how well its costs are known, and the number of frames within which a step of the load is settled.
 #[derive(Clone, Copy)]
 pub struct Case {
-    /// For people.
+    /// Name in the tables.
     pub name: &'static str,
     rungs: usize,
     weather: Weather,
     misjudged: f64,
-    /// 95 of 100 rises.
+    /// Limit for the 95th percentile of the rises, in frames.
     rise_frames: usize,
-    /// Half of the falls: going up waits for 30 good frames on purpose, and for longer where that was taken back.
+    /// Limit for the median of the falls, in frames: an upward change waits for 30 good frames on purpose, and longer
+    /// after a revoked one.
     fall_frames: usize,
 }
 
@@ -46,24 +47,24 @@ pub fn cases() -> [Case; 5] {
     ]
 }
 
-/// What the governor reached, and the quality of the PID where it misses as many frames; `None` where it never misses
-/// so few.
+/// The governor's score, and the quality of the PID controller at an equal rate of misses; `None` where the PID never
+/// misses as rarely.
 pub struct Outcome {
-    /// The governor's.
+    /// The governor's score.
     pub ours: Score,
-    /// The PID's, by headroom.
+    /// The PID's scores, each with its headroom.
     pub pids: Vec<(f64, Score)>,
-    /// Of the PID.
+    /// The PID's quality at the governor's rate of misses.
     pub equal: Option<f64>,
 }
 
 impl Case {
-    /// The true costs of its rungs: 1 to 8, in equal ratios.
+    /// Returns the true costs of its quality levels: 1 to 8, in equal ratios.
     pub fn costs(&self) -> Vec<f64> {
         (0..self.rungs).map(|rung| 8f64.powf(rung as f64 / (self.rungs - 1) as f64)).collect()
     }
 
-    /// Plays seeds of so many minutes by a rule, which is made of the costs as they are known.
+    /// Plays each seed for `minutes` by a rule, which is created from the costs as they are known.
     pub fn play(
         &self,
         seeds: std::ops::RangeInclusive<u64>,
@@ -78,7 +79,7 @@ impl Case {
         score
     }
 
-    /// Plays the governor and the PID.
+    /// Plays the governor and the PID controller.
     pub fn measure(&self, seeds: std::ops::RangeInclusive<u64>, minutes: u32) -> Outcome {
         let ours = self.play(seeds.clone(), minutes, |known| Box::new(Ours::new(known, BUDGET)));
         let pid = |room: f64| self.play(seeds.clone(), minutes, move |known| Box::new(Pid::new(known, BUDGET, room)));
@@ -87,7 +88,7 @@ impl Case {
         Outcome { ours, pids, equal }
     }
 
-    /// The claims that an outcome breaks.
+    /// Returns the claims that an outcome breaks.
     pub fn broken(&self, Outcome { ours, equal, .. }: &Outcome) -> Vec<String> {
         let settled = [("rise", false, 0.95, self.rise_frames), ("fall", true, 0.5, self.fall_frames)];
         let claims = [
@@ -109,7 +110,7 @@ impl Case {
     }
 }
 
-/// The ladder with every cost but the first off by up to `most` times, either way, and still ascending.
+/// Returns the costs with all but the first off by a factor of up to `most`, either way, and still ascending.
 fn misjudged(costs: &[f64], most: f64, seed: u64) -> Vec<f64> {
     let mut numbers = Numbers::new(seed ^ 0x5eed);
     let mut wrong: Vec<f64> = costs.iter().map(|cost| cost * most.powf(2.0 * numbers.even() - 1.0)).collect();
@@ -119,7 +120,7 @@ fn misjudged(costs: &[f64], most: f64, seed: u64) -> Vec<f64> {
     wrong
 }
 
-/// The quality of the PID at this share of misses, between its two nearest headrooms.
+/// Returns the PID's quality at this fraction of misses, interpolated between the two nearest headrooms.
 fn at_equal_misses(pids: &[(f64, Score)], misses: f64) -> Option<f64> {
     pids.windows(2).find_map(|pair| {
         let [(a, qa), (b, qb)] = [0, 1].map(|k| (pair[k].1.misses(), pair[k].1.quality()));

@@ -1,10 +1,10 @@
-//! The load of a simulated machine: what a frame takes at each rung.
+//! The load of a simulated machine: the time of a frame at each quality level.
 
-/// Numbers that look random: the same everywhere.
+/// Pseudorandom numbers, reproducible on every machine.
 pub struct Numbers(u64);
 
 impl Numbers {
-    /// Numbers of a seed of their own.
+    /// Creates the sequence of a seed.
     pub fn new(seed: u64) -> Self {
         let mut numbers = Self(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ 0x2545_f491_4f6c_dd1d);
         for _ in 0..8 {
@@ -13,20 +13,20 @@ impl Numbers {
         numbers
     }
 
-    /// A number from 0 to 1, each as likely.
+    /// Returns a uniformly distributed number from 0 to 1.
     pub fn even(&mut self) -> f64 {
         self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         ((self.0 >> 11) as f64 + 0.5) / (1u64 << 53) as f64
     }
 
-    /// A number of the normal distribution.
+    /// Returns a standard normal number.
     pub fn normal(&mut self) -> f64 {
         let (a, b) = (self.even(), self.even());
         (-2.0 * a.ln()).sqrt() * (std::f64::consts::TAU * b).cos()
     }
 }
 
-/// What happens to a machine.
+/// The load profile of a machine.
 #[derive(Clone, Copy, Debug)]
 pub struct Weather {
     /// Lowest and highest load.
@@ -35,16 +35,16 @@ pub struct Weather {
     pub step_frames: usize,
     /// Standard deviation of the logarithm of the noise.
     pub noise: f64,
-    /// Share of the frames that take longer for no reason, and how many times as long.
+    /// The fraction of the frames that are outliers, and the factor by which they take longer.
     pub spikes: (f64, f64),
-    /// Frames that are under way before a time is known.
+    /// Frames under way before a frame's time is known.
     pub late: usize,
 }
 
-/// The issue's own weather: steps every 20 s of 30 frames each.
+/// The default profile: steps every 20 s at 30 frames a second.
 pub const WEATHER: Weather = Weather { loads: (0.6, 1.8), step_frames: 600, noise: 0.06, spikes: (0.01, 2.0), late: 3 };
 
-/// What every frame takes at the cheapest rung, and the load without noise.
+/// Returns the time of every frame at the cheapest level, and the load without noise.
 pub fn trace(weather: &Weather, frames: usize, seed: u64) -> Vec<(f64, f64)> {
     let mut numbers = Numbers::new(seed);
     let (low, high) = weather.loads;

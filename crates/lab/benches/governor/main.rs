@@ -1,4 +1,4 @@
-//! `cargo bench --bench governor -- [OPTIONS]`: the governor on a simulated machine, beside other rules.
+//! `cargo bench --bench governor -- [OPTIONS]`: the governor on a simulated machine, against other rules.
 //!
 //! | file | what |
 //! |---|---|
@@ -7,7 +7,7 @@
 //! | `play` | one run of one of them, and what is counted |
 //! | `claims` | the machines, and what is claimed of the governor on each |
 //!
-//! Exit code 1 where a claim is broken; `tests/governor.rs` holds all that need no rival.
+//! Exit code 1 if a claim is broken; `tests/governor.rs` checks all claims that need no rival.
 
 mod claims;
 #[path = "../common/mod.rs"]
@@ -66,7 +66,7 @@ fn main() -> ExitCode {
     if met { ExitCode::SUCCESS } else { ExitCode::FAILURE }
 }
 
-/// Plays a case by every rule and prints its table; tells whether the governor keeps what is claimed of it.
+/// Plays a case by every rule and prints its table; returns whether the governor meets its claims.
 fn measure(case: &Case, options: &Options) -> bool {
     let costs = case.costs();
     let run = |make: &dyn Fn(&[f64]) -> Box<dyn Picker>| case.play(options.seeds.clone(), options.minutes, make);

@@ -5,34 +5,34 @@ use std::collections::VecDeque;
 use super::load::{Weather, trace};
 use super::rivals::Picker;
 
-/// What is counted, over all runs.
+/// Totals over all runs.
 #[derive(Clone, Debug, Default)]
 pub struct Score {
     frames: usize,
     missed: usize,
     quality: f64,
     switches: usize,
-    /// Frames until the rung had settled, per step upwards and downwards of the load.
+    /// Frames until the quality level settled, per step upwards and downwards of the load.
     settled: [Vec<usize>; 2],
 }
 
 impl Score {
-    /// Share of the frames over the budget.
+    /// Returns the fraction of the frames over the budget.
     pub fn misses(&self) -> f64 {
         self.missed as f64 / self.frames as f64
     }
 
-    /// Mean quality.
+    /// Returns the mean quality.
     pub fn quality(&self) -> f64 {
         self.quality / self.frames as f64
     }
 
-    /// Changes of rung in 1800 frames.
+    /// Returns the quality level changes per 1800 frames.
     pub fn switches_per_minute(&self) -> f64 {
         self.switches as f64 * 1800.0 / self.frames as f64
     }
 
-    /// Frames that at most the share `p` of the steps took longer than to settle; of those where the load `fell`.
+    /// Returns the `p` quantile of the frames that a step took to settle, over the steps where the load fell or rose.
     pub fn settled(&self, fell: bool, p: f64) -> usize {
         let mut frames = self.settled[usize::from(fell)].clone();
         frames.sort_unstable();
@@ -41,8 +41,8 @@ impl Score {
     }
 }
 
-/// Plays `frames` frames of a seed: each is made at the rung picked when it begins, and its time is known when so many
-/// more have begun as the weather is late.
+/// Plays `frames` frames of a seed: each has the level picked when it begins, and its time is known after
+/// `weather.late` more frames have begun.
 pub fn play(
     picker: &mut dyn Picker,
     costs: &[f64],
@@ -74,10 +74,10 @@ pub fn play(
     for (step, rungs) in rungs.chunks(weather.step_frames).enumerate().skip(1) {
         let first = step * weather.step_frames;
         let (before, after) = (trace[first - 1].1, trace[first].1);
-        // Settled: within one of the rung that most of the step's frames are made at, from there on for two seconds.
+        // Settled: within one of the level that most of the step's frames have, from there on for two seconds.
         let most = most_frequent(rungs, costs.len());
         let near = |rungs: &[usize]| rungs.iter().all(|rung| rung.abs_diff(most) <= 1);
-        // A step that asks for no other rung says nothing.
+        // A step that needs no other level says nothing.
         if near(&[started]) {
             started = most;
             continue;

@@ -1,27 +1,27 @@
-//! What picks the rung: the governor, the rules it is measured against, and one that sees the future.
+//! Rules that pick the quality level: the governor, its rivals, and an oracle.
 
 use bokehcam::budget::{Governor, Sample, Window};
 
-/// One frame's time at the cheapest rung is the load; this many nanoseconds of it are one unit.
+/// A frame's time at the cheapest level is the load; this number of nanoseconds is one unit of it.
 const UNIT_NS: f64 = 1e6;
 const PERIOD_NS: u64 = 33_333_333;
 
-/// Picks rungs.
+/// A rule that picks quality levels.
 pub trait Picker {
-    /// A frame made at `rung` took `took`; frame `now` comes next.
+    /// Notes that a frame at `rung` took `took`; frame `now` comes next.
     fn note(&mut self, rung: usize, took: f64, now: usize);
-    /// The rung of the next frame, which would take `load` times a rung's cost: for those that see the future.
+    /// Returns the level of the next frame; `load` is its true load, for the oracle alone.
     fn rung(&mut self, load: f64) -> usize;
 }
 
-/// The project's own.
+/// The project's own governor.
 pub struct Ours {
     governor: Governor<1>,
     budget_ns: u64,
 }
 
 impl Ours {
-    /// With these costs in mind, whatever they really are.
+    /// Creates it with assumed costs, which may differ from the true ones.
     pub fn new(costs: &[f64], budget: f64) -> Self {
         Self { governor: Governor::new(costs, costs.len() / 2), budget_ns: (budget * UNIT_NS) as u64 }
     }
@@ -37,7 +37,7 @@ impl Picker for Ours {
     }
 }
 
-/// One rung down above the budget, one up below three quarters of it.
+/// One level down above the budget, one up below three quarters of it.
 pub struct Threshold {
     rung: usize,
     rungs: usize,
@@ -45,7 +45,7 @@ pub struct Threshold {
 }
 
 impl Threshold {
-    /// Begins in the middle.
+    /// Begins at the middle level.
     pub fn new(rungs: usize, budget: f64) -> Self {
         Self { rung: rungs / 2, rungs, budget }
     }
@@ -65,7 +65,7 @@ impl Picker for Threshold {
 }
 
 /// The controller of Filament's dynamic resolution, with its gains: a scale follows the error of the median of nine
-/// frames against the budget less a headroom, and the rung is the finest that costs no more than the scale.
+/// frames against the budget less a headroom, and the level is the finest that costs no more than the scale.
 pub struct Pid {
     costs: Vec<f64>,
     target: f64,
@@ -80,10 +80,10 @@ impl Pid {
     const I: f64 = 0.002;
     const D: f64 = 0.0;
     const INTEGRAL: f64 = 100.0;
-    /// Errors in this band do nothing: a little too slow, somewhat too fast.
+    /// Dead band of the error: a little too slow, somewhat too fast.
     const BAND: (f64, f64) = (-0.01, 0.05);
 
-    /// With this share of the budget kept free.
+    /// Creates it with the fraction `headroom` of the budget kept free.
     pub fn new(costs: &[f64], budget: f64, headroom: f64) -> Self {
         let scale = costs[costs.len() / 2];
         let target = budget * (1.0 - headroom);
@@ -110,7 +110,7 @@ impl Picker for Pid {
     }
 }
 
-/// Knows what each frame will take, noise and all: no rule can do better.
+/// Knows the time of each frame in advance, noise included: the upper bound for any rule.
 pub struct Oracle {
     /// The true costs.
     pub costs: Vec<f64>,

@@ -1,4 +1,4 @@
-//! What is measured, and one turn of it.
+//! The cases of the bench, and one turn of each.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
@@ -20,16 +20,16 @@ pub enum Case {
 }
 
 const POLLED_RATE: u32 = 1000;
-/// At full speed, one send and one hand-over in so many are kept.
+/// At full speed, one send and one hand-over in this number is recorded.
 const KEPT: u64 = 64;
-/// The reader of [`Case::Polled`].
+/// Niceness of the reader in [`Case::Polled`].
 const LOWEST_PRIORITY: i32 = 19;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Link {
-    /// This project's.
+    /// This project's link.
     LockFree,
-    /// The other one.
+    /// The link with a mutex.
     Locked,
 }
 
@@ -41,7 +41,7 @@ pub struct Times {
     pub send_ns: Vec<u64>,
 }
 
-/// What is handed over: about as much as a frame's handles.
+/// The item handed over: about as large as a frame's handles.
 struct Item {
     sent: Instant,
     last: bool,
@@ -133,7 +133,7 @@ fn run(
                 break;
             }
         }
-        // The slowest is told in any case.
+        // The slowest send is always recorded.
         send_ns.push(slowest.as_nanos() as u64);
     });
 }
@@ -146,7 +146,7 @@ fn yield_to_all() {
     }
 }
 
-/// Threads that keep cores busy until they are dropped.
+/// Threads that keep cores busy until this is dropped.
 pub struct Load {
     over: std::sync::Arc<AtomicBool>,
     threads: Vec<thread::JoinHandle<u64>>,

@@ -1,4 +1,4 @@
-//! The same link with a mutex and a condition variable: what one writes without thinking of it.
+//! The link with a mutex and a condition variable: the obvious implementation, to compare with.
 
 use std::sync::{Arc, Condvar, Mutex};
 
@@ -16,7 +16,7 @@ impl<T> Locked<T> {
         (Self(slot.clone()), Self(slot))
     }
 
-    /// Gives back the older item that `item` displaced.
+    /// Sends an item; returns the older one that it displaced.
     pub fn send(&self, item: T) -> Option<T> {
         let displaced = self.0.item.lock().expect("no thread panics").replace(item);
         self.0.filled.notify_one();

@@ -1,4 +1,5 @@
-//! `cargo bench --bench handover -- [OPTIONS]`: how long the hand-over between threads takes, beside a link with a lock.
+//! `cargo bench --bench handover -- [OPTIONS]`: the latency of the hand-over between threads, against a link with a
+//! lock.
 //!
 //! | file | what |
 //! |---|---|
@@ -84,7 +85,7 @@ fn line(case: Case, loaded: bool, link: Link, times: Times) -> [String; 10] {
     ]
 }
 
-/// The time that this share of the sorted times does not exceed, in microseconds.
+/// Returns the quantile `share` of the sorted times, in microseconds.
 fn share_us(sorted_ns: &[u64], share: f64) -> String {
     let time_ns = sorted_ns[((sorted_ns.len() - 1) as f64 * share).round() as usize];
     format!("{:.2}", time_ns as f64 / 1e3)

@@ -1,20 +1,20 @@
-//! Depth maps as sensors give them.
+//! Depth maps with the errors of real sensors.
 
 use super::picture::Plane;
 use super::texture::Dice;
 
-/// What is wrong with a depth map.
+/// The error of a depth map.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Damage {
     /// Normal noise of 0.8 px CoC, correlated over 2 px.
     Noise,
-    /// Near objects are 3 px fatter than they are.
+    /// Near objects are dilated by 3 px.
     Fat,
     /// A quarter of the resolution, up again bilinearly.
     Coarse,
     /// 5 % of the pixels are unknown, in blots, half of them at depth edges.
     Holes,
-    /// All of these.
+    /// All of these together.
     All,
 }
 
@@ -22,20 +22,20 @@ pub enum Damage {
 const NOISE_PX: f32 = 0.8;
 /// Standard deviation of the Gaussian that correlates the noise, in pixels.
 const CORRELATION_PX: f32 = 2.0;
-/// By how much near objects grow, in pixels.
+/// Dilation of near objects, in pixels.
 const FAT_PX: i32 = 3;
-/// Columns and rows that become one.
+/// Downsampling factor in each direction.
 const COARSE: usize = 4;
-/// Share of pixels that become unknown.
+/// Fraction of pixels that become unknown.
 const HOLES: f32 = 0.05;
-/// A difference in CoC between neighbours that is an edge, in pixels.
+/// Difference in CoC between neighbours that counts as an edge, in pixels.
 const EDGE_PX: f32 = 1.0;
 
 impl Damage {
     /// All kinds.
     pub const KINDS: [Damage; 5] = [Damage::Noise, Damage::Fat, Damage::Coarse, Damage::Holes, Damage::All];
 
-    /// As in the tables.
+    /// Returns the name in the tables.
     pub fn name(self) -> &'static str {
         match self {
             Damage::Noise => "noise",
@@ -46,7 +46,7 @@ impl Damage {
         }
     }
 
-    /// The damaged CoC, and whether each pixel is known.
+    /// Returns the damaged CoC, and whether each pixel is known.
     pub fn apply(self, coc_px: &Plane<f32>, seed: u64) -> (Plane<f32>, Plane<bool>) {
         let is = |damage| self == damage || self == Damage::All;
         let mut damaged = coc_px.clone();
@@ -65,14 +65,14 @@ impl Damage {
     }
 }
 
-/// Normal noise, correlated, with the standard deviation [`NOISE_PX`].
+/// Returns normal noise, correlated, with the standard deviation [`NOISE_PX`].
 pub fn noise(width: usize, height: usize, seed: u64) -> Plane<f32> {
     let mut dice = Dice::new(seed);
     let white = Plane { width, height, data: (0..width * height).map(|_| dice.normal()).collect::<Vec<_>>() };
     let reach = (3.0 * CORRELATION_PX) as i32;
     let taps: Vec<(i32, f32)> =
         (-reach..=reach).map(|d| (d, (-0.5 * (d as f32 / CORRELATION_PX).powi(2)).exp())).collect();
-    // Independent values keep this variance under the taps, along each axis.
+    // The filter reduces the variance of independent values by this factor, along each axis.
     let scale = 1.0 / taps.iter().map(|tap| tap.1 * tap.1).sum::<f32>();
     let along = |of: &Plane<f32>, dx: i32, dy: i32| {
         Plane::from_fn(width, height, |x, y| {
@@ -105,14 +105,14 @@ fn coarsened(coc_px: &Plane<f32>) -> Plane<f32> {
     })
 }
 
-/// Whether two pixels around a place differ by an edge.
+/// Returns whether the 3x3 neighbourhood of a pixel contains an edge.
 pub fn is_edge(coc_px: &Plane<f32>, x: i32, y: i32) -> bool {
     let around = (-1..=1).flat_map(|dy| (-1..=1).map(move |dx| (dx, dy))).map(|(dx, dy)| coc_px.at(x + dx, y + dy));
     let (low, high) = around.fold((f32::INFINITY, f32::NEG_INFINITY), |(low, high), c| (low.min(c), high.max(c)));
     high - low > EDGE_PX
 }
 
-/// Which pixels are known.
+/// Returns which pixels are known.
 fn holes(coc_px: &Plane<f32>, seed: u64) -> Plane<bool> {
     let (width, height) = (coc_px.width as i32, coc_px.height as i32);
     let mut dice = Dice::new(seed ^ 0x00C0_FFEE);
@@ -141,7 +141,7 @@ fn holes(coc_px: &Plane<f32>, seed: u64) -> Plane<bool> {
     known
 }
 
-/// A map whose unknown pixels (0) have the value of the nearest known one, by two chamfer sweeps (Borgefors 1986).
+/// Fills unknown pixels (0) with the value of the nearest known one, by two chamfer sweeps (Borgefors 1986).
 pub fn filled_nearest(metres: &Plane<f32>) -> Plane<f32> {
     const FAR: f32 = 1e9;
     let (width, height) = (metres.width as i32, metres.height as i32);

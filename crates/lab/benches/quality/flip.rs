@@ -13,10 +13,10 @@ use super::picture::Plane;
 
 /// Pixels per degree of the visual field.
 const PIXELS_PER_DEGREE: f32 = 0.7 * (3840.0 / 0.7) * (PI / 180.0);
-/// Exponent of the colour difference, and the knee by which it is spread over 0 to 1.
+/// Exponent of the colour difference, and the point (fraction of the maximum, result) where its scale has a knee.
 const COLOR_EXPONENT: f32 = 0.7;
 const KNEE: (f32, f32) = (0.4, 0.95);
-/// Width of the feature detectors in degrees, and the exponent of what they find.
+/// Width of the feature detectors in degrees, and the exponent of the feature difference.
 const FEATURE_DEG: f32 = 0.082;
 const FEATURE_EXPONENT: f32 = 0.5;
 /// Reference white D65.
@@ -35,7 +35,7 @@ const RGB: [[f32; 3]; 3] = [
 
 type Vec3 = [f32; 3];
 
-/// Mean FLIP over the picture.
+/// Returns the mean FLIP over the picture.
 pub fn flip(a: &ColorImage, b: &ColorImage) -> f64 {
     let (a, b) = (opponent(a), opponent(b));
     let (lab_a, lab_b) = (perceived(&a), perceived(&b));
@@ -62,7 +62,7 @@ fn times(matrix: &[[f32; 3]; 3], v: Vec3) -> Vec3 {
     matrix.map(|row| row[0] * v[0] + row[1] * v[1] + row[2] * v[2])
 }
 
-/// The picture in the linear opponent space YCxCz.
+/// Converts the picture to the linear opponent space YCxCz.
 fn opponent(image: &ColorImage) -> Plane<Vec3> {
     let light: Vec<f32> = (0..256).map(|code| srgb_to_linear(code as f32 / 255.0)).collect();
     let pixel = |p: &[u8]| {
@@ -74,7 +74,7 @@ fn opponent(image: &ColorImage) -> Plane<Vec3> {
     Plane { width: image.width as usize, height: image.height as usize, data }
 }
 
-/// What the eye resolves at that distance, in L*a*b* with Hunt's adjustment.
+/// Filters by the contrast sensitivity of the eye at that distance; the result is L*a*b* with Hunt's adjustment.
 fn perceived(image: &Plane<Vec3>) -> Plane<Vec3> {
     // Contrast sensitivity: Gaussians a sqrt(pi/b) exp(-pi^2 x^2 / b); yellow-blue is the sum of two.
     let radius = (3.0 * (0.04 / (2.0 * PI * PI)).sqrt() * PIXELS_PER_DEGREE).ceil() as i32;
@@ -96,14 +96,14 @@ fn perceived(image: &Plane<Vec3>) -> Plane<Vec3> {
     })
 }
 
-/// Strength of edges and of points in the luminance.
+/// Returns the strength of edges and of points in the luminance.
 fn features(image: &Plane<Vec3>) -> Plane<[f32; 2]> {
     let sigma = 0.5 * FEATURE_DEG * PIXELS_PER_DEGREE;
     let radius = (3.0 * sigma).ceil() as i32;
     let places = || (-radius..=radius).map(|d| d as f32);
     let bell: Vec<f32> = places().map(|d| (-d * d / (2.0 * sigma * sigma)).exp()).collect();
     let total: f32 = bell.iter().sum();
-    // What is positive in a detector sums to 1, what is negative to -1.
+    // Normalises the positive taps of a detector to a sum of 1, the negative ones to -1.
     let balanced = |raw: Vec<f32>| -> Vec<f32> {
         let sum = |sign: f32| raw.iter().map(|tap| (sign * tap).max(0.0)).sum::<f32>();
         let (positive, negative) = (sum(1.0), sum(-1.0));
@@ -122,7 +122,7 @@ fn features(image: &Plane<Vec3>) -> Plane<[f32; 2]> {
         .map(|[edge_x, point_x, edge_y, point_y]| [edge_x.hypot(edge_y), point_x.hypot(point_y)])
 }
 
-/// A 1-D filter for each of four channels, the border repeated.
+/// Applies a 1-D filter to each of four channels, the border repeated.
 fn convolve(
     of: &Plane<[f32; 4]>,
     dx: i32,
@@ -141,7 +141,7 @@ fn convolve(
     })
 }
 
-/// L*a*b* of linear light.
+/// Converts linear light to L*a*b*.
 fn lab(rgb: Vec3) -> Vec3 {
     let delta = 6.0f32 / 29.0;
     let xyz = times(&XYZ, rgb);
@@ -152,12 +152,12 @@ fn lab(rgb: Vec3) -> Vec3 {
     [116.0 * y - 16.0, 500.0 * (x - y), 200.0 * (y - z)]
 }
 
-/// Dark colours look less colourful.
+/// Applies Hunt's adjustment: dark colours look less colourful.
 fn hunt([l, a, b]: Vec3) -> Vec3 {
     [l, 0.01 * l * a, 0.01 * l * b]
 }
 
-/// Distance: city block between lightness and chroma, Euclidean within chroma.
+/// Returns the HyAB distance: city block between lightness and chroma, Euclidean within chroma.
 fn hyab(p: Vec3, q: Vec3) -> f32 {
     (p[0] - q[0]).abs() + (p[1] - q[1]).hypot(p[2] - q[2])
 }

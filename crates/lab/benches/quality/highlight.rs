@@ -1,4 +1,4 @@
-//! One lone light on a plain wall: what its disc looks like.
+//! A single light on a plain wall, and the profile of its disc.
 
 use bokehcam::color::srgb_to_linear;
 use bokehcam::frame::ColorImage;
@@ -24,11 +24,11 @@ pub struct Profile {
     pub ripple_percent: f64,
     /// Distance over which the rim falls from 90 to 10 % of the plateau, in pixels.
     pub rim_px: f64,
-    /// Lowest pixel below the wall, in per cent of the wall, less what rounding to 8 bits explains.
+    /// Darkest pixel below the wall, in per cent of the wall, beyond what rounding to 8 bits explains.
     pub lowest_percent: f64,
 }
 
-/// A white light on a dark wall.
+/// Returns a white light on a dark wall.
 pub fn scene() -> Scene {
     let wall = srgb_to_linear(f32::from(WALL) / 255.0);
     let middle = Vec2::new((SIZE.0 - 1) as f32, (SIZE.1 - 1) as f32) / 2.0;
@@ -65,7 +65,7 @@ pub fn profile(image: &ColorImage) -> Profile {
         .filter(|&k| profile[k].1 > 0.0)
         .map(|k| ((k as f64 + 0.5) * f64::from(RING_PX), profile[k].0 / profile[k].1 / plateau))
         .collect();
-    // The outermost place where the profile still has a level, linear between rings.
+    // The outermost radius where the profile still has a level, linear between rings.
     let falls_to = |level: f64| {
         let pair = means.windows(2).rev().find(|pair| pair[0].1 >= level && pair[1].1 < level);
         pair.map_or(0.0, |pair| {

@@ -1,4 +1,4 @@
-//! A thin-lens renderer that is exact for layers: the truth.
+//! A thin-lens renderer that is exact for layers: the ground truth.
 //!
 //! For a planar surface 1/z, and with it the CoC c, is affine in picture coordinates p: c(p) = a + b.p. The ray
 //! through pixel p and the lens point u (unit disc) meets the surface at p' = p + c(p') u, so
@@ -13,9 +13,9 @@ use super::picture::{Plane, Rgb};
 /// Colour times alpha in linear light, and alpha.
 pub type Rgba = [f32; 4];
 
-/// Light that gets through to what lies behind is neglected below this.
+/// Transmitted light below this fraction is neglected.
 const OPAQUE: f32 = 1e-3;
-/// The most surfaces that a scene may have.
+/// Maximum number of surfaces in a scene.
 const MAX_SURFACES: usize = 16;
 /// Samples per pixel and axis of the pinhole picture.
 const PINHOLE_SAMPLES: usize = 4;
@@ -23,17 +23,17 @@ const PINHOLE_SAMPLES: usize = 4;
 /// A textured plane.
 #[derive(Clone, Debug)]
 pub struct Surface {
-    /// CoC radius in pixels at the picture's middle.
+    /// CoC radius in pixels at the picture's centre.
     pub coc_px: f32,
-    /// Its change per pixel to the right and downwards.
+    /// Change of the CoC radius per pixel to the right and downwards.
     pub slope: Vec2,
-    /// Premultiplied texture; the surface goes on with its border.
+    /// Premultiplied texture; the surface continues with its border.
     pub texture: Plane<Rgba>,
-    /// Texels by which the texture reaches beyond the picture on every side.
+    /// Texels by which the texture extends beyond the picture on every side.
     pub margin_px: usize,
 }
 
-/// A scene: surfaces in any order, and the lens that looks at them.
+/// A scene: surfaces in any order, and the lens.
 #[derive(Clone, Debug)]
 pub struct Scene {
     /// Columns.
@@ -44,11 +44,11 @@ pub struct Scene {
     pub coc_at_infinity_px: f32,
     /// The opening of the lens.
     pub aperture: Aperture,
-    /// What there is to be seen.
+    /// The surfaces, in any order.
     pub surfaces: Vec<Surface>,
 }
 
-/// A surface made ready for rays.
+/// A surface prepared for ray intersection.
 struct Target<'a> {
     surface: &'a Surface,
     /// CoC at pixel (0, 0).
@@ -58,7 +58,7 @@ struct Target<'a> {
 }
 
 impl Surface {
-    /// CoC radius at a place of the picture.
+    /// Returns the CoC radius at a position of the picture.
     pub fn coc_at(&self, p: Vec2, size: (usize, usize)) -> f32 {
         let middle = Vec2::new((size.0 - 1) as f32, (size.1 - 1) as f32) / 2.0;
         self.coc_px + self.slope.dot(p - middle)
@@ -71,7 +71,7 @@ impl Surface {
             (low, high) = (low.min(at), high.max(at));
             debug_assert!(texel[3] <= 1.0);
         }
-        // What touches the border of the texture goes on beyond it.
+        // A texture that is not empty at its border continues beyond it.
         let last = Vec2::new((self.texture.width - 1) as f32, (self.texture.height - 1) as f32);
         let far = f32::INFINITY;
         let below = |low: f32| if low <= 0.0 { -far } else { low - 1.0 };
@@ -82,7 +82,7 @@ impl Surface {
 }
 
 impl Target<'_> {
-    /// Bilinear lookup at a place of the picture; nothing where the surface is empty.
+    /// Samples the texture bilinearly; `None` where the surface is empty.
     #[inline]
     fn sample(&self, p: Vec2) -> Option<Rgba> {
         let texture = &self.surface.texture;
@@ -105,12 +105,12 @@ impl Target<'_> {
 }
 
 impl Scene {
-    /// Columns and rows.
+    /// Returns columns and rows.
     pub fn size(&self) -> (usize, usize) {
         (self.width, self.height)
     }
 
-    /// What an ideal pinhole camera sees: sharp everywhere, antialiased by a box of one pixel.
+    /// Renders an ideal pinhole picture: sharp everywhere, antialiased by a box of one pixel.
     pub fn pinhole(&self) -> Plane<Rgb> {
         let places = (0..PINHOLE_SAMPLES * PINHOLE_SAMPLES).map(|k| {
             let within = |k: usize| (k as f32 + 0.5) / PINHOLE_SAMPLES as f32 - 0.5;
@@ -119,9 +119,10 @@ impl Scene {
         self.render(&places.collect::<Vec<_>>())
     }
 
-    /// What the lens sees: the mean over about `rays` points of the aperture, each with its own place in the pixel.
+    /// Renders through the lens: the mean over about `rays` points of the aperture, each with its own offset in the
+    /// pixel.
     pub fn through_lens(&self, rays: usize) -> Plane<Rgb> {
-        // Places in the pixel follow the R2 sequence (M. Roberts, 2018), which is even for any number of them.
+        // Offsets in the pixel follow the R2 sequence (M. Roberts, 2018), which is evenly distributed at any length.
         let within = |k: usize, step: f64| ((k as f64 + 0.5) * step).fract() as f32 - 0.5;
         let point = |(k, u): (usize, glam::DVec2)| {
             (Vec2::new(within(k, 0.754_877_666_246_692_7), within(k, 0.569_840_290_998_053_3)), u.as_vec2())
@@ -130,7 +131,7 @@ impl Scene {
         self.render(&points.into_iter().enumerate().map(point).collect::<Vec<_>>())
     }
 
-    /// The mean over rays, each a place in the pixel and a point of the lens.
+    /// Averages over rays, each an offset in the pixel and a point of the lens.
     fn render(&self, rays: &[(Vec2, Vec2)]) -> Plane<Rgb> {
         assert!(self.surfaces.len() <= MAX_SURFACES, "a scene has at most {MAX_SURFACES} surfaces");
         let targets: Vec<Target> = self.surfaces.iter().map(|surface| surface.target(self.size())).collect();
@@ -146,7 +147,7 @@ impl Scene {
         })
     }
 
-    /// The CoC of the first surface that covers at least half of each pixel's middle.
+    /// Returns the CoC of the first surface that covers at least half of each pixel's centre.
     pub fn coc(&self) -> Plane<f32> {
         let targets: Vec<Target> = self.surfaces.iter().map(|surface| surface.target(self.size())).collect();
         Plane::from_fn(self.width, self.height, |x, y| {
@@ -158,7 +159,8 @@ impl Scene {
     }
 }
 
-/// Light along one ray: surfaces front to back. `order` is that of the ray before, which is nearly that of this one.
+/// Returns the light along one ray, front to back. `order` starts as the previous ray's depth order, which is nearly
+/// sorted.
 #[inline]
 fn trace(targets: &[Target], order: &mut [usize], p: Vec2, u: Vec2) -> Rgb {
     let mut coc_px = [0.0; MAX_SURFACES];

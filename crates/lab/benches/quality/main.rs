@@ -1,4 +1,4 @@
-//! `cargo bench --bench quality -- [OPTIONS]`: how near the blur comes to a real lens, beside other methods.
+//! `cargo bench --bench quality -- [OPTIONS]`: how close the blur comes to a real lens, against other methods.
 //!
 //! | file | what |
 //! |---|---|
@@ -9,7 +9,7 @@
 //! | `metrics`, `flip`, `highlight` | how it is measured |
 //! | `report`, `markdown`, `sheet` | what comes out |
 //!
-//! Every method gets the same 8-bit picture and the same depth map. `tests/quality.rs` holds the laws of all this.
+//! Every method gets the same 8-bit picture and the same depth map. `tests/quality.rs` tests the bench itself.
 
 #[path = "../common/mod.rs"]
 mod common;
@@ -46,20 +46,20 @@ use report::{Flicker, Highlight, Record, Results};
 use scenes::{KINDS, Kind};
 use truth::{Views, views};
 
-/// Scenes whose depth is damaged, too.
+/// Scenes that are also measured with damaged depth.
 const DAMAGED: [&str; 3] = ["hair", "fence", "depths"];
 /// Scenes that are portraits, with nothing in front of the subject.
 const MASKED: [&str; 3] = ["slant", "hair", "pentagon"];
-/// The scene that is looked at for flicker, and for how many frames.
+/// The scene in which flicker is measured, and its number of frames.
 const STATIC: &str = "depths";
 const STATIC_FRAMES: u64 = 8;
-/// What moves is watched for so many frames; then every so many count, of so many in all.
+/// Moving scenes: frames before the first that counts, step between those that count, and their number.
 const PLAYED: usize = 60;
 const PLAYED_STEP: usize = 10;
 const PLAYED_FRAMES: usize = 6;
 /// Seed of all damage.
 const SEED: u64 = 1;
-/// Where truths are kept.
+/// Folder in which truths are cached.
 const CACHE: &str = concat!(env!("CARGO_TARGET_TMPDIR"), "/quality");
 
 type Outcome<T> = Result<T, Box<dyn Error>>;
@@ -138,7 +138,7 @@ fn run(options: &Options) -> Outcome<()> {
     Ok(())
 }
 
-/// Shows what has just been measured.
+/// Prints a measurement.
 fn say(options: &Options, line: String, record: Option<&impl serde::Serialize>) -> Outcome<()> {
     match record {
         Some(record) if options.json => println!("{}", serde_json::to_string(record)?),
@@ -149,7 +149,7 @@ fn say(options: &Options, line: String, record: Option<&impl serde::Serialize>) 
     Ok(())
 }
 
-/// Measures every method on a scene's frames; the mean over frames counts.
+/// Measures every method on a scene's frames, and keeps the mean over the frames.
 fn scene(
     options: &Options,
     kind: &Kind,
@@ -180,7 +180,7 @@ fn scene(
     show(options, rival, &out.join(folder), frames, &pictures)
 }
 
-/// Measures what memory is worth where something moves: of a sequence, some later frames count.
+/// Measures the benefit of background memory in a moving scene: some later frames of a sequence count.
 fn moving(options: &Options, kind: &Kind, results: &mut Results) -> Outcome<()> {
     let counts = |frame: usize| frame >= PLAYED && (frame - PLAYED).is_multiple_of(PLAYED_STEP);
     let methods = [Method::Layered(Quality::default()), Method::Remembered];
@@ -243,7 +243,7 @@ fn show(
     Ok(sheet::write(&out.join(format!("crops-{ours}-truth-{rival}.png")), &sheet::stacked(&crops))?)
 }
 
-/// The same views with a damaged depth map.
+/// Returns the same views with a damaged depth map.
 fn damaged(views: &Views, damage: Damage, seed: u64) -> Views {
     let (coc_px, known) = damage.apply(&views.coc_px, seed);
     let mut depth: DepthMap = truth::depth(&coc_px, views.shot.lens.coc_at_infinity_px);
@@ -257,7 +257,7 @@ fn flicker(options: &Options, views: &Views, results: &mut Results) -> Outcome<(
         let mut blurrer = Blurrer::new(method, &views.shot)?;
         let frame = |seed| blurrer.blur(&damaged(views, Damage::Noise, SEED + seed).shot);
         let frames = (0..STATIC_FRAMES).map(frame).collect::<Result<Vec<_>, _>>()?;
-        // The outline is in the picture as in the map: a camera's has noise.
+        // Camera noise on the picture, too: the outline is found in the picture as well as in the map.
         let mut blurrer = Blurrer::new(method, &views.shot)?;
         let noisy = |seed| {
             let shot = damaged(views, Damage::Noise, SEED + seed).shot;

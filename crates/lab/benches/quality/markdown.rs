@@ -1,4 +1,4 @@
-//! Tables for the documentation, and whether the targets are met.
+//! Tables for the documentation, and the verdict on the targets.
 
 use std::fmt::Write;
 
@@ -8,9 +8,10 @@ use super::masks::Portrait;
 use super::methods::Method;
 use super::report::{Case, Flicker, Record, Results};
 
-/// Where the error is one code value (RMS): what is better than that counts as this in the verdict, as nobody sees it.
+/// PSNR at an error of one code value (RMS): better results count as this in the verdict, as the difference is
+/// invisible.
 const ONE_CODE_DB: f64 = 48.13;
-/// The targets, in dB where nothing else is said.
+/// The targets, in dB unless the name has another unit.
 const ABOVE_GATHER_DB: f64 = 4.0;
 const ABOVE_BEST_RIVAL_DB: f64 = 1.0;
 const BELOW_RIVAL_DB: f64 = 0.3;
@@ -19,7 +20,7 @@ const LOWEST_PERCENT: f64 = -2.0;
 const BALANCED: Method = Method::Layered(Quality::Balanced);
 const BEST: Method = Method::Layered(Quality::Best);
 
-/// All tables and the verdict.
+/// Returns all tables and the verdict.
 pub fn markdown(results: &Results) -> String {
     let mut text = String::new();
     // Writing to a string cannot fail.
@@ -121,7 +122,7 @@ fn tables(results: &Results, text: &mut String) -> std::fmt::Result {
     Ok(())
 }
 
-/// Whether `ours` meets each target.
+/// Writes whether `ours` meets each target.
 fn verdict(results: &Results, ours: Method, text: &mut String) -> std::fmt::Result {
     writeln!(
         text,
@@ -171,7 +172,7 @@ fn verdict(results: &Results, ours: Method, text: &mut String) -> std::fmt::Resu
     writeln!(text)
 }
 
-/// Whether no margin is below `least`, and those that are, or the smallest one.
+/// Returns whether no margin is below `least`, and a list of those below, or the smallest one.
 fn listed(margins: Vec<(String, f64)>, least: f64, unit: &str) -> (bool, String) {
     let show =
         |(name, margin): &(String, f64)| format!("{name} {margin:+.*} {unit}", if unit.is_empty() { 4 } else { 2 });

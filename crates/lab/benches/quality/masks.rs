@@ -1,10 +1,10 @@
-//! Portraits from a coarse mask alone, as one camera and a network give it: this crate's outlines and blur beside what
-//! programs for video calls do with the same mask.
+//! Portraits from a coarse mask alone, as from one camera and a network: this crate's outlines and blur against the
+//! methods of video-call programs on the same mask.
 //!
-//! The mask is the subject's true coverage, shrunk to a network's size, softened and hardened. What lies behind counts as
-//! being at one distance, for everybody. `with plate` is given a picture of what is behind, too. Rivals, after their own descriptions: `threshold` cuts the mask at one half and
-//! feathers it (OBS plugins); `guided` filters it by the picture's luma (live-backgroundremoval-lite); both blend the
-//! picture with a Gaussian blur of all of it.
+//! The mask is the subject's true coverage, downsampled to a network's size, softened and hardened. All methods take
+//! the background to be at one distance; `with plate` gets a picture of it, too. Rivals, after their own descriptions:
+//! `threshold` cuts the mask at one half and feathers it (OBS plugins); `guided` filters it by the picture's luma
+//! (live-backgroundremoval-lite); both blend the picture with a Gaussian blur of all of it.
 
 use bokehcam::bokeh::BokehError;
 use bokehcam::budget::Quality;
@@ -24,26 +24,26 @@ use super::truth::{Views, depth};
 
 /// Columns and rows of the mask.
 const SIZE: (usize, usize) = (256, 144);
-/// Standard deviation that the network blurs with, in its pixels, and slope with which it hardens.
+/// Standard deviation of the network's blur, in its pixels, and slope of the hardening.
 const SOFT_PX: f32 = 0.85;
 const HARD: f32 = 8.0;
-/// Reach of the guided filter in pixels, and its regularisation.
+/// Radius of the guided filter in pixels, and its regularisation.
 const GUIDED_PX: i32 = 8;
 const GUIDED: f32 = 1e-4;
-/// Noise of the camera for the flicker, in codes, and frames.
+/// Standard deviation of the camera noise for the flicker, in codes.
 pub const NOISE_CODES: f32 = 2.0;
 const FRAMES: u64 = 6;
 
-/// What was measured of a scene and a way to make a portrait from a mask.
+/// The scores of a method that makes a portrait of a scene from a mask.
 #[derive(Clone, Debug, Serialize)]
 pub struct Portrait {
     pub scene: &'static str,
     pub method: &'static str,
-    /// Mean error of the share in the band around the outline, in thousandths.
+    /// Mean error of alpha in the band around the outline, in thousandths.
     pub share_error: f64,
-    /// Mean change of the share in that band from frame to frame, with a noisy camera, in thousandths.
+    /// Mean change of alpha in that band from frame to frame, with a noisy camera, in thousandths.
     pub share_flicker: f64,
-    /// Of the picture to what the lens sees, in sRGB; whole, and around outlines.
+    /// PSNR against the true lens, in sRGB, over the whole picture; `edge_db` is that around outlines.
     pub psnr_db: f64,
     pub edge_db: f64,
 }
@@ -57,18 +57,18 @@ impl Portrait {
     }
 }
 
-/// What all ways are given: the mask, and what is behind the subject, which only one makes use of.
+/// The input of all methods: the mask, and the background, which only one method uses.
 struct Given {
     mask: Mask,
     behind: ColorImage,
-    /// Depth of what is behind, the subject's being [`DepthMap::SUBJECT_M`].
+    /// Depth of the background; the subject is at [`DepthMap::SUBJECT_M`].
     behind_m: Vec<f32>,
 }
 
-/// A way to get the share of every pixel.
+/// A method that computes alpha for every pixel.
 type Refine = fn(&Given, &ColorImage) -> Plane<f32>;
 
-/// Measures all ways on a scene.
+/// Measures all methods on a scene.
 ///
 /// # Errors
 /// This crate's executor failed.
@@ -103,7 +103,7 @@ pub fn measure(name: &'static str, scene: &Scene, views: &Views) -> Result<Vec<P
         let picture = match method {
             "bokehcam" => portrait(&given, None, &views.shot, behind_px)?,
             "with plate" => portrait(&given, Some(&given.behind), &views.shot, behind_px)?,
-            // As from a network for depth beside the mask, which knows the room exactly.
+            // Like depth from a network beside the mask, with an exact map of the room.
             "room's depth" => {
                 let lens = Shot::lens(coc_at_infinity_px, DepthMap::SUBJECT_M, views.shot.image.height as usize);
                 let mut depth = DepthMap::new(views.shot.image.width, views.shot.image.height);
@@ -112,7 +112,7 @@ pub fn measure(name: &'static str, scene: &Scene, views: &Views) -> Result<Vec<P
                 let shot = Shot { depth, lens, ..views.shot.clone() };
                 Blurrer::new(Method::Layered(Quality::default()), &shot)?.blur_as_is(&shot)?
             }
-            // Of everything, without a matte; the share is not its own.
+            // Exact depth everywhere, without a matte; its alpha is not measured.
             "exact depth" => Blurrer::new(Method::Layered(Quality::default()), &views.shot)?.blur_as_is(&views.shot)?,
             _ => encode(&blended(&decode(&views.shot.image), &share, behind_px)),
         };
@@ -128,7 +128,7 @@ pub fn measure(name: &'static str, scene: &Scene, views: &Views) -> Result<Vec<P
     Ok(measured)
 }
 
-/// Whether a surface is in focus.
+/// Returns whether a surface is in focus.
 fn is_subject(surface: &Surface) -> bool {
     surface.coc_px == 0.0 && surface.slope == glam::Vec2::ZERO
 }
@@ -139,7 +139,7 @@ fn without_subject(scene: &Scene) -> Scene {
     scene
 }
 
-/// How much of each pixel what is in focus covers.
+/// Returns the coverage of each pixel by in-focus surfaces.
 fn coverage(scene: &Scene) -> Plane<f32> {
     let mut scene = scene.clone();
     for surface in &mut scene.surfaces {
@@ -152,7 +152,7 @@ fn coverage(scene: &Scene) -> Plane<f32> {
     scene.pinhole().map(|[share, _, _]| share)
 }
 
-/// The mask that a network would give.
+/// Returns the mask that a network would give.
 fn as_network(truth: &Plane<f32>) -> Mask {
     let small = Plane::from_fn(SIZE.0, SIZE.1, |x, y| {
         let edge = |at: usize, small: usize, size: usize| at * size / small;
@@ -168,7 +168,7 @@ fn as_network(truth: &Plane<f32>) -> Mask {
     Mask { width: SIZE.0 as u32, height: SIZE.1 as u32, alpha: share }
 }
 
-/// Where the mask is undecided, or the truth is.
+/// Returns where the mask or the truth is fractional.
 fn band(given: &Given, truth: &Plane<f32>) -> Plane<bool> {
     let wide = upscaled(given, &ColorImage::new(truth.width as u32, truth.height as u32));
     let undecided = |share: f32| share > 0.02 && share < 0.98;
@@ -191,14 +191,14 @@ fn error(a: &Plane<f32>, b: &Plane<f32>, band: &Plane<bool>) -> f64 {
     1000.0 * sum / count
 }
 
-/// The mean CoC of what is behind.
+/// Returns the mean CoC of the background.
 fn behind_px(views: &Views, truth: &Plane<f32>) -> f32 {
     let behind: Vec<f32> =
         views.coc_px.data.iter().zip(&truth.data).filter(|(_, share)| **share < 0.5).map(|(coc, _)| *coc).collect();
     behind.iter().sum::<f32>() / behind.len() as f32
 }
 
-/// The picture of a camera whose noise has this standard deviation.
+/// Adds camera noise of this standard deviation to a picture.
 pub fn with_noise(image: &ColorImage, codes: f32, seed: u64) -> ColorImage {
     let mut dice = Dice::new(seed + 1);
     let noisy = |code: &u8| (f32::from(*code) + codes * dice.normal()).round().clamp(0.0, 255.0) as u8;
@@ -269,14 +269,14 @@ fn ours(given: &Given, behind: Option<&ColorImage>, image: &ColorImage) -> Plane
     Plane { width: image.width as usize, height: image.height as usize, data: share }
 }
 
-/// This crate's portrait, at the default quality.
+/// Blurs by this crate's portrait mode, at the default quality.
 fn portrait(given: &Given, behind: Option<&ColorImage>, shot: &Shot, behind_px: f32) -> Result<ColorImage, BokehError> {
     let lens = Shot::lens(behind_px, DepthMap::SUBJECT_M, shot.image.height as usize);
     let shot = Shot { depth: matte(given, behind, &shot.image), lens, ..shot.clone() };
     Blurrer::new(Method::Layered(Quality::default()), &shot)?.blur_as_is(&shot)
 }
 
-/// The picture, and behind the subject a Gaussian blur of all of it.
+/// Blends the picture, by alpha, over a Gaussian blur of all of it.
 fn blended(image: &Plane<Rgb>, share: &Plane<f32>, behind_px: f32) -> Plane<Rgb> {
     let blurred = smoothed(image, 0.5 * behind_px);
     Plane::from_fn(image.width, image.height, |x, y| {

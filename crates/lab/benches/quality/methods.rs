@@ -1,4 +1,4 @@
-//! What is compared: this crate's methods and the rivals, all from the same 8-bit picture and depth map.
+//! The methods: this crate's and the rivals, all from the same 8-bit picture and depth map.
 
 use std::fmt;
 
@@ -19,15 +19,15 @@ use bokehcam::optics::{CocField, DepthCoc};
 use super::picture::{Plane, decode, encode};
 use super::{damage, rivals};
 
-/// The soft rim that is the product's default.
+/// The product's default softness of the aperture's rim.
 const RIM: f32 = 0.2;
-/// The largest CoC that the product's command line allows for unless it is told more, as a fraction of the height.
+/// The product's default limit of the CoC, as a fraction of the height.
 const MAX_COC_PER_HEIGHT: f32 = 0.06;
 
-/// A way to blur.
+/// A blur method.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Method {
-    /// The picture as it is.
+    /// No blur.
     None,
     /// This crate's exact 2-D gather: the reference that the paper's form approximates.
     Gather,
@@ -43,16 +43,16 @@ pub enum Method {
     Gaussian,
     /// See [`rivals::blended`].
     Blended,
-    /// This crate's layers, by default on the depth map as it is but for its holes.
+    /// This crate's layers, by default on the unrefined depth map with filled holes.
     Layered(Quality),
-    /// This crate's layers at the default quality, on depth that was refined first: what a recording gets.
+    /// This crate's layers at the default quality on refined depth, as for recordings.
     Refined,
-    /// The same on depth as it is, with what was seen before behind what moved: what a stream gets.
+    /// This crate's layers on unrefined depth, with background memory, as for streams.
     Remembered,
 }
 
 impl Method {
-    /// All methods, in the order in which they are shown.
+    /// Returns all methods, in the order of the tables.
     pub fn all() -> Vec<Method> {
         use Method::{Blended, Gather, Gather3, Gaussian, GoldenAngle, NearFocusFar, None, Scatter};
         let others = [None, Gaussian, Blended, Gather3, Gather, NearFocusFar, GoldenAngle, Scatter];
@@ -63,7 +63,7 @@ impl Method {
             .collect()
     }
 
-    /// As on the command line.
+    /// Returns the name on the command line.
     pub fn name(self) -> &'static str {
         match self {
             Method::None => "none",
@@ -80,7 +80,7 @@ impl Method {
         }
     }
 
-    /// Whether it competes with the layers.
+    /// Returns whether it competes with the layers.
     pub fn is_rival(self) -> bool {
         !matches!(self, Method::None | Method::Layered(_) | Method::Refined | Method::Remembered)
     }
@@ -92,27 +92,27 @@ impl fmt::Display for Method {
     }
 }
 
-/// What every method is given.
+/// The input of every method.
 #[derive(Clone, Debug)]
 pub struct Shot {
     /// The sharp picture.
     pub image: ColorImage,
     /// Depth in metres, 0 where unknown.
     pub depth: DepthMap,
-    /// From depth to CoC.
+    /// Converts depth to CoC.
     pub lens: DepthCoc,
     /// The opening of the lens.
     pub aperture: Aperture,
 }
 
 impl Shot {
-    /// The lens for a scene, as the product's command line sets it up from `--coc-at-infinity` and `--focus`.
+    /// Returns the lens for a scene, as the product's command line sets it up from `--coc-at-infinity` and `--focus`.
     pub fn lens(coc_at_infinity_px: f32, focus_m: f32, height: usize) -> DepthCoc {
         let max_coc_px = coc_at_infinity_px.max(height as f32 * MAX_COC_PER_HEIGHT);
         DepthCoc { coc_at_infinity_px, focus_m, range_m: 0.0, max_coc_px }
     }
 
-    /// The CoC that the rivals see: unknown depth is that of the nearest known pixel.
+    /// Returns the CoC for the rivals: unknown depth is that of the nearest known pixel.
     pub fn coc(&self) -> Plane<f32> {
         let (width, height) = (self.depth.width as usize, self.depth.height as usize);
         let metres = Plane { width, height, data: self.depth.metres.clone() };
@@ -132,14 +132,14 @@ pub struct Blurrer {
     time_ns: u64,
 }
 
-/// Time between two frames.
+/// Frame period.
 const PERIOD_NS: u64 = 33_333_333;
 
 impl Blurrer {
-    /// A method for shots like this one.
+    /// Creates the blur for shots like this one.
     ///
     /// # Errors
-    /// This crate's executor cannot be made.
+    /// Fails if this crate's executor cannot be created.
     pub fn new(method: Method, shot: &Shot) -> Result<Self, BokehError> {
         let (layers, rank, rim, quality) = match method {
             Method::Gather => (bokeh::Method::Gather, Some(Rank::Full), 0.0, Quality::Best),
@@ -171,10 +171,10 @@ impl Blurrer {
         Self { method, bokeh, filler, refiner, mending, matting, background, time_ns: 0 }
     }
 
-    /// The blurred picture.
+    /// Returns the blurred picture.
     ///
     /// # Errors
-    /// This crate's executor failed.
+    /// Fails if this crate's executor fails.
     pub fn blur(&mut self, shot: &Shot) -> Result<ColorImage, BokehError> {
         let rival = |blur: &dyn Fn() -> Plane<_>| Ok(encode(&blur()));
         let light = || decode(&shot.image);
@@ -185,7 +185,7 @@ impl Blurrer {
             Method::Blended => rival(&|| rivals::blended(&light(), &shot.coc())),
             Method::Gaussian => rival(&|| rivals::gaussian(&light(), &shot.coc())),
             Method::Scatter => rival(&|| rivals::scatter(&light(), &shot.coc(), &shot.aperture.shape)),
-            // The gathers get what the other rivals get, the layers what the product makes of the depth map.
+            // The gathers get the rivals' input, the layers the product's processed depth map.
             Method::Gather | Method::Gather3 => {
                 let (width, height) = (shot.depth.width as usize, shot.depth.height as usize);
                 let metres = damage::filled_nearest(&Plane { width, height, data: shot.depth.metres.clone() }).data;
@@ -215,20 +215,20 @@ impl Blurrer {
         }
     }
 
-    /// The layers, with the matte that every source gets.
+    /// Blurs by the layers, with the matte that every source gets.
     fn layered(&mut self, shot: &Shot, mut depth: DepthMap) -> Result<ColorImage, BokehError> {
         self.matting.find(&mut depth, &shot.image, shot.lens.inverse_depth_of_px(matting::FROM_PX));
         self.run(shot, depth)
     }
 
-    /// Sees a frame whose picture nobody needs.
+    /// Updates the memory with a frame that is not blurred.
     pub fn watch(&mut self, shot: &Shot) {
         if self.method == Method::Remembered {
             self.remember(shot);
         }
     }
 
-    /// The depth of a frame with its matte and what lies behind, as far as it was seen in this frame and those before.
+    /// Returns the depth of a frame with its matte and the background seen so far.
     fn remember(&mut self, shot: &Shot) -> DepthMap {
         let mut depth = shot.depth.clone();
         self.filler.fill_guided(&mut depth, &shot.image);
@@ -240,10 +240,10 @@ impl Blurrer {
         depth
     }
 
-    /// The blurred picture, with the depth and matte that the shot has.
+    /// Returns the blurred picture, with the shot's own depth and matte.
     ///
     /// # Errors
-    /// As for [`Self::blur`].
+    /// Fails like [`Self::blur`].
     pub fn blur_as_is(&mut self, shot: &Shot) -> Result<ColorImage, BokehError> {
         self.run(shot, shot.depth.clone())
     }

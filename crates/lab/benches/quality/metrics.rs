@@ -1,19 +1,20 @@
-//! How far a picture is from the truth: PSNR and SSIM in sRGB, and how far one frame is from the next.
+//! Metrics against the truth, PSNR and SSIM in sRGB, and the flicker between frames.
 
 use bokehcam::frame::ColorImage;
 
 use super::damage::is_edge;
 use super::picture::Plane;
 
-/// Pixels this near a depth edge count as edge.
+/// Pixels within this distance of a depth edge count as edge.
 const EDGE_BAND_PX: i32 = 12;
-/// Standard deviation and reach of SSIM's window.
+/// Standard deviation and radius of SSIM's window.
 const SSIM_SIGMA: f64 = 1.5;
 const SSIM_REACH: i32 = 5;
-/// Blurred by more than this counts as blurred, in pixels of CoC.
+/// CoC radius above which a pixel counts as blurred, in pixels.
 const BLURRED_PX: f32 = 2.0;
 
-/// Peak signal-to-noise ratio in dB over the pixels that `counts`; infinite for equal pictures, and NaN over none.
+/// Returns the peak signal-to-noise ratio in dB over the pixels set in `counts`; infinite for equal pictures, NaN for
+/// no pixels.
 pub fn psnr(a: &ColorImage, b: &ColorImage, counts: Option<&Plane<bool>>) -> f64 {
     let (mut sum, mut values) = (0.0, 0.0);
     for (k, (a, b)) in a.rgb.iter().zip(&b.rgb).enumerate() {
@@ -25,7 +26,7 @@ pub fn psnr(a: &ColorImage, b: &ColorImage, counts: Option<&Plane<bool>>) -> f64
     10.0 * (255.0 * 255.0 / (sum / values)).log10()
 }
 
-/// Structural similarity (Wang et al., 2004): Gaussian window of 1.5 px, mean over pixels and channels.
+/// Returns the structural similarity (Wang et al., 2004): Gaussian window of 1.5 px, mean over pixels and channels.
 pub fn ssim(a: &ColorImage, b: &ColorImage) -> f64 {
     const C1: f64 = (0.01 * 255.0) * (0.01 * 255.0);
     const C2: f64 = (0.03 * 255.0) * (0.03 * 255.0);
@@ -64,7 +65,7 @@ pub fn ssim(a: &ColorImage, b: &ColorImage) -> f64 {
     sum / (3 * width * height) as f64
 }
 
-/// Pixels within 12 px (a square) of a jump of the CoC by more than a pixel.
+/// Returns the pixels within 12 px (a square) of a step of the CoC by more than a pixel.
 pub fn edge_band(coc_px: &Plane<f32>) -> Plane<bool> {
     let (width, height) = (coc_px.width, coc_px.height);
     let grown = |of: &Plane<bool>, dx: i32, dy: i32| {
@@ -76,12 +77,12 @@ pub fn edge_band(coc_px: &Plane<f32>) -> Plane<bool> {
     grown(&grown(&edges, 1, 0), 0, 1)
 }
 
-/// Whether a pixel is blurred.
+/// Returns whether a pixel is blurred.
 pub fn is_blurred(coc_px: &Plane<f32>, at: usize) -> bool {
     coc_px.data[at].abs() > BLURRED_PX
 }
 
-/// Mean difference of consecutive frames in code values, over the pixels that count.
+/// Returns the mean difference of consecutive frames in code values, over the pixels that count.
 pub fn flicker(frames: &[ColorImage], counts: impl Fn(usize) -> bool) -> f64 {
     let (mut sum, mut values) = (0.0, 0.0);
     for pair in frames.windows(2) {

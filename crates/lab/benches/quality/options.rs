@@ -15,7 +15,7 @@ pub enum Part {
     Exact,
     /// Some of them with damaged depth
     Damaged,
-    /// What moves, with and without memory of what lies behind
+    /// Moving scenes, with and without background memory
     Moving,
     /// One light on a plain wall
     Highlight,
@@ -23,7 +23,7 @@ pub enum Part {
     Flicker,
     /// Portraits from a coarse mask alone
     Masks,
-    /// What is hard for one camera, by a plate and by networks
+    /// Scenes that are hard for one camera, with a plate and with networks
     Situations,
 }
 
@@ -77,17 +77,17 @@ pub struct Options {
 }
 
 impl Options {
-    /// The methods to measure, in the order in which they are shown.
+    /// Returns the methods to measure, in the order of the tables.
     pub fn methods(&self) -> Vec<Method> {
         Method::all().into_iter().filter(|method| self.methods.is_empty() || self.methods.contains(method)).collect()
     }
 
-    /// Whether a scene is to be measured.
+    /// Returns whether a scene is to be measured.
     pub fn wants(&self, scene: &str) -> bool {
         self.scenes.is_empty() || self.scenes.contains(&scene)
     }
 
-    /// The method that the crops are of, if it is measured.
+    /// Returns the method that the crops show, if it is measured.
     pub fn shown(&self) -> Option<Method> {
         let default = Method::Layered(Quality::default());
         let methods = self.methods();

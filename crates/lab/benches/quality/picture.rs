@@ -1,4 +1,4 @@
-//! Pictures in linear light, and rows of them in parallel.
+//! Pictures in linear light, with rows processed in parallel.
 
 use std::sync::Mutex;
 use std::thread;
@@ -6,10 +6,10 @@ use std::thread;
 use bokehcam::color::{linear_to_srgb, srgb_to_linear};
 use bokehcam::frame::ColorImage;
 
-/// Red, green, blue in linear light, 1 = white; more is light that an 8-bit picture clips.
+/// Red, green, blue in linear light, 1 = white; values above 1 are clipped in an 8-bit picture.
 pub type Rgb = [f32; 3];
 
-/// A value a pixel, row-major.
+/// One value per pixel, row-major.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plane<T> {
     /// Columns.
@@ -21,7 +21,7 @@ pub struct Plane<T> {
 }
 
 impl<T: Copy + Send + Sync> Plane<T> {
-    /// The plane whose value at column `x`, row `y` is `of(x, y)`; rows are made in parallel.
+    /// Creates the plane whose value at column `x`, row `y` is `of(x, y)`; rows are computed in parallel.
     pub fn from_fn(width: usize, height: usize, of: impl Fn(usize, usize) -> T + Sync) -> Self
     where
         T: Default,
@@ -31,14 +31,14 @@ impl<T: Copy + Send + Sync> Plane<T> {
         Self { width, height, data }
     }
 
-    /// The value at a place; outside, that of the nearest pixel inside.
+    /// Returns the value at a position; outside, that of the nearest pixel inside.
     #[inline]
     pub fn at(&self, x: i32, y: i32) -> T {
         let (x, y) = (x.clamp(0, self.width as i32 - 1) as usize, y.clamp(0, self.height as i32 - 1) as usize);
         self.data[y * self.width + x]
     }
 
-    /// Another value for every value.
+    /// Maps every value.
     pub fn map<U>(&self, of: impl Fn(T) -> U) -> Plane<U> {
         Plane { width: self.width, height: self.height, data: self.data.iter().map(|&value| of(value)).collect() }
     }
@@ -59,14 +59,14 @@ pub fn by_rows<T: Send>(data: &mut [T], width: usize, work: impl Fn(usize, &mut 
     });
 }
 
-/// An 8-bit picture in linear light.
+/// Converts an 8-bit picture to linear light.
 pub fn decode(image: &ColorImage) -> Plane<Rgb> {
     let light: Vec<f32> = (0..256).map(|code| srgb_to_linear(code as f32 / 255.0)).collect();
     let data = image.rgb.chunks_exact(3).map(|p| [0, 1, 2].map(|k| light[usize::from(p[k])])).collect();
     Plane { width: image.width as usize, height: image.height as usize, data }
 }
 
-/// The 8-bit sRGB picture of light, clipped at white as a camera does.
+/// Encodes light as 8-bit sRGB, clipped at white like a camera.
 pub fn encode(light: &Plane<Rgb>) -> ColorImage {
     let code = |light: f32| (linear_to_srgb(light.clamp(0.0, 1.0)) * 255.0 + 0.5) as u8;
     let rgb = light.data.iter().flat_map(|pixel| pixel.map(code)).collect();

@@ -1,4 +1,4 @@
-//! What was measured: lines of a table, JSON, and what follows from it.
+//! The results: table lines, JSON, and derived values.
 
 use bokehcam::frame::ColorImage;
 use serde::Serialize;
@@ -9,22 +9,22 @@ use super::methods::Method;
 use super::picture::Plane;
 use super::{flip, metrics};
 
-/// Name of a scene, and what was done to its depth map, if anything.
+/// The name of a scene, and the damage of its depth map, if any.
 pub type Case<'a> = (&'a str, Option<&'a str>);
 
-/// A method on a scene.
+/// The scores of a method on a scene.
 #[derive(Clone, Debug, Serialize)]
 pub struct Record {
     /// Name of the scene.
     pub scene: &'static str,
-    /// What was done to its depth map, if anything.
+    /// The damage of its depth map, if any.
     pub damage: Option<&'static str>,
     /// The method.
     #[serde(serialize_with = "name")]
     pub method: Method,
     /// PSNR in dB, sRGB.
     pub psnr_db: f64,
-    /// The same within 12 px of depth edges; none where there are no edges.
+    /// PSNR within 12 px of depth edges; `None` without edges.
     pub edge_db: Option<f64>,
     /// Structural similarity.
     pub ssim: f64,
@@ -36,49 +36,49 @@ fn name<S: serde::Serializer>(method: &Method, serializer: S) -> Result<S::Ok, S
     serializer.serialize_str(method.name())
 }
 
-/// A method's picture of a lone light.
+/// The profile of a method's picture of a single light.
 #[derive(Clone, Debug, Serialize)]
 pub struct Highlight {
-    /// The method; none for the truth.
+    /// The method; `None` for the truth.
     pub method: Option<&'static str>,
-    /// Its disc.
+    /// The profile of its disc.
     #[serde(flatten)]
     pub profile: Profile,
 }
 
-/// A method's restlessness on a static scene with noisy depth.
+/// The flicker of a method on a static scene with noisy depth.
 #[derive(Clone, Debug, Serialize)]
 pub struct Flicker {
     /// The method.
     pub method: &'static str,
     /// Mean difference of consecutive frames in code values, where the picture is blurred.
     pub flicker_codes: f64,
-    /// The same within 12 px of depth edges, where the picture has a camera's noise, too.
+    /// Flicker within 12 px of depth edges, with camera noise on the picture, too.
     pub outline_codes: f64,
 }
 
-/// Everything that was measured.
+/// All results.
 #[derive(Default)]
 pub struct Results {
-    /// Methods on scenes.
+    /// Methods on static scenes.
     pub records: Vec<Record>,
-    /// Methods on what moves.
+    /// Methods on moving scenes.
     pub moving: Vec<Record>,
-    /// The lone light.
+    /// The single light.
     pub highlights: Vec<Highlight>,
     /// The static scene.
     pub flicker: Vec<Flicker>,
     /// Portraits from a coarse mask.
     pub portraits: Vec<Portrait>,
-    /// What was made of what is hard for one camera.
+    /// Scenes that are hard for one camera.
     pub situations: Vec<super::situations::Outcome>,
 }
 
 impl Record {
-    /// The table's head.
+    /// The head of the table.
     pub const HEAD: &'static str = "scene     depth   method            PSNR dB  edge dB    SSIM    FLIP";
 
-    /// A line of the table.
+    /// Returns a line of the table.
     pub fn line(&self) -> String {
         let edge = self.edge_db.map_or("-".to_owned(), |edge_db| format!("{edge_db:.2}"));
         format!(
@@ -92,7 +92,7 @@ impl Record {
         )
     }
 
-    /// Of a method's picture of a scene with its damage, whose truth has edges in `band`.
+    /// Measures a method's picture of a scene with its damage; `band` has the edges of the truth.
     pub fn of(
         (scene, damage): Case<'static>,
         method: Method,
@@ -111,7 +111,7 @@ impl Record {
         }
     }
 
-    /// The mean of records of one method, under the first one's names.
+    /// Returns the mean of records of one method, under the first one's names.
     pub fn mean(records: &[&Record]) -> Option<Record> {
         let first = *records.first()?;
         let mean = |of: &dyn Fn(&Record) -> Option<f64>| {
@@ -129,7 +129,7 @@ impl Record {
 }
 
 impl Highlight {
-    /// A line of the table.
+    /// Returns a line of the table.
     pub fn line(&self) -> String {
         let Profile { ripple_percent, rim_px, lowest_percent } = self.profile;
         let method = self.method.unwrap_or("truth");
@@ -140,7 +140,7 @@ impl Highlight {
 }
 
 impl Flicker {
-    /// A line of the table.
+    /// Returns a line of the table.
     pub fn line(&self) -> String {
         let Self { method, flicker_codes, outline_codes } = self;
         format!("flicker   {method:16} {flicker_codes:6.3} codes, outlines of a noisy picture {outline_codes:6.3}")
@@ -148,7 +148,7 @@ impl Flicker {
 }
 
 impl Results {
-    /// The scenes, each with its damage, in the order measured.
+    /// Returns the scenes, each with its damage, in the order measured.
     pub fn cases(&self, damaged: bool) -> Vec<Case<'static>> {
         let mut cases = Vec::new();
         for record in self.records.iter().filter(|record| record.damage.is_some() == damaged) {
@@ -159,17 +159,17 @@ impl Results {
         cases
     }
 
-    /// A method on a case.
+    /// Returns the record of a method on a case.
     pub fn of(&self, case: Case, method: Method) -> Option<&Record> {
         self.on(case).find(|record| record.method == method)
     }
 
-    /// Every method on a case.
+    /// Returns the records of every method on a case.
     pub fn on(&self, case: Case) -> impl Iterator<Item = &Record> {
         self.records.iter().filter(move |record| (record.scene, record.damage) == case)
     }
 
-    /// The rival with the highest PSNR on a case.
+    /// Returns the rival with the highest PSNR on a case.
     pub fn best_rival(&self, case: Case) -> Option<&Record> {
         let rivals = self.on(case).filter(|record| record.method.is_rival());
         rivals.max_by(|a, b| a.psnr_db.total_cmp(&b.psnr_db))

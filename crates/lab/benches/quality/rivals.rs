@@ -1,4 +1,4 @@
-//! Other methods, each in its plain published form and at full sampling density: no cost was spared for them.
+//! Other methods, each in its plain published form and at full sampling density, regardless of cost.
 //!
 //! All take linear light and the signed CoC of every pixel, and repeat the picture's border.
 
@@ -46,8 +46,8 @@ pub fn scatter(image: &Plane<Rgb>, coc_px: &Plane<f32>, shape: &Shape) -> Plane<
     Plane { data: out, ..*image }
 }
 
-/// Distance from the middle in units in which the outline of a radius R lies at R. A near point shows the shape turned
-/// by 180 degrees.
+/// Returns the distance from the centre in units in which the outline of a radius R lies at R. A near point shows the
+/// shape rotated by 180 degrees.
 fn reach_px(shape: &Shape, dx: f32, dy: f32, near: bool) -> f32 {
     let distance_px = (dx * dx + dy * dy).sqrt();
     let Shape::Polygon { blades, rotation_deg, .. } = *shape else { return distance_px };
@@ -56,12 +56,12 @@ fn reach_px(shape: &Shape, dx: f32, dy: f32, near: bool) -> f32 {
     distance_px * (from_corner - half).cos() / half.cos()
 }
 
-/// Golden-angle gathering: along a spiral over the largest disc, every sample counts as far as its own CoC reaches; a
-/// sample behind the pixel reaches at most twice the pixel's CoC.
+/// Golden-angle gathering: along a spiral over the largest disc, a sample counts if its own CoC covers the pixel; for a
+/// sample behind the pixel the CoC is limited to twice the pixel's.
 ///
 /// D. Gustafsson, *Bokeh depth of field in a single pass* (2018), also Godot's circular bokeh.
 pub fn golden_angle(image: &Plane<Rgb>, coc_px: &Plane<f32>) -> Plane<Rgb> {
-    /// Distance between samples; the smaller, the denser. At 1/3 there are more samples than pixels.
+    /// Distance between samples, in pixels. At 1/3 there are more samples than pixels.
     const PITCH: f32 = 1.0 / 3.0;
     let golden = PI * (3.0 - 5f32.sqrt());
     let max_px = coc_px.data.iter().fold(0f32, |most, c| most.max(c.abs()));
@@ -90,7 +90,7 @@ pub fn golden_angle(image: &Plane<Rgb>, coc_px: &Plane<f32>) -> Plane<Rgb> {
     })
 }
 
-/// Gathering with a Gaussian of the disc's variance, sigma = R/2, cut at 3 sigma: what a soft background blur does.
+/// Gathering with a Gaussian of the disc's variance, sigma = R/2, cut at 3 sigma: the usual soft background blur.
 pub fn gaussian(image: &Plane<Rgb>, coc_px: &Plane<f32>) -> Plane<Rgb> {
     gather(
         image,
@@ -105,8 +105,8 @@ pub fn gaussian(image: &Plane<Rgb>, coc_px: &Plane<f32>) -> Plane<Rgb> {
 /// Depth-aware blending of smoothed images: the picture and three Gaussian-smoothed copies of it, up to the largest CoC;
 /// each pixel is a blend of the two between which its own CoC lies.
 ///
-/// S. Dutta, *Depth-aware blending of smoothed images for bokeh effect generation* (2021), with the exact depth in place of
-/// the blending weights that a network makes of it.
+/// S. Dutta, *Depth-aware blending of smoothed images for bokeh effect generation* (2021), with exact depth in place of
+/// the blending weights that a network derives from it.
 pub fn blended(image: &Plane<Rgb>, coc_px: &Plane<f32>) -> Plane<Rgb> {
     const COPIES: usize = 3;
     let max_px = coc_px.data.iter().fold(0f32, |most, c| most.max(c.abs())).max(1e-3);
@@ -123,7 +123,7 @@ pub fn blended(image: &Plane<Rgb>, coc_px: &Plane<f32>) -> Plane<Rgb> {
     })
 }
 
-/// A Gaussian of `sigma_px`, cut at three of them, one axis after the other.
+/// Applies a separable Gaussian of `sigma_px`, cut at 3 sigma.
 pub fn smoothed(image: &Plane<Rgb>, sigma_px: f32) -> Plane<Rgb> {
     let reach = (3.0 * sigma_px).ceil() as i32;
     let taps: Vec<f32> = (-reach..=reach).map(|d| (-0.5 * (d as f32 / sigma_px).powi(2)).exp()).collect();
@@ -164,8 +164,8 @@ pub fn near_focus_far(image: &Plane<Rgb>, coc_px: &Plane<f32>) -> Plane<Rgb> {
     })
 }
 
-/// A gather: the mean colour by `share(x, y)` of the sample times `weight(distance, radius)` out to `extent` radii, and
-/// the share of that weight which was used.
+/// Gathers: returns the mean colour, weighted by `share(x, y)` of the sample times `weight(distance, radius)` out to
+/// `extent` radii, and the fraction of the total weight that was used.
 fn gather(
     image: &Plane<Rgb>,
     radius_px: impl Fn(i32, i32) -> f32 + Sync,
@@ -193,7 +193,7 @@ fn gather(
     })
 }
 
-/// The largest value within the square around a pixel that the largest value of all reaches.
+/// Returns the largest value in a square around each pixel, whose radius is the largest value of all.
 fn largest_around(values: &Plane<f32>) -> Plane<f32> {
     let reach = values.data.iter().copied().fold(0.0, f32::max).ceil() as i32;
     let rows = Plane::from_fn(values.width, values.height, |x, y| {

@@ -1,8 +1,8 @@
-//! The scenes: layers with CoC in pixels, made by code, so that nothing has to be shipped.
+//! Synthetic scenes: procedural layers with CoC in pixels, so that no files have to be shipped.
 //!
-//! Beyond the picture a surface goes on with its border, as nothing in one picture tells what is there; the scene
-//! `frame` alone really goes on. Lights brighter than white are clipped in the picture, as a camera clips them, and in
-//! the truth only after they have been spread.
+//! Beyond the picture a surface continues with its border, as a single picture cannot show more; the scene `frame`
+//! alone has real content there. Lights brighter than white are clipped in the picture, as by a camera, and in the
+//! truth only after they have been spread.
 
 use bokehcam::bokeh::aperture::{Aperture, Shape};
 use glam::Vec2;
@@ -13,18 +13,18 @@ use super::texture::{Dice, Lights, Pattern, coverage, disc, ellipse, paint, prem
 
 /// Columns and rows of every scene.
 pub const SIZE: (usize, usize) = (640, 360);
-/// Distance of the focal plane in metres: it only gives the depth map its unit.
+/// Distance of the focal plane in metres: it only sets the scale of the depth map.
 pub const FOCUS_M: f32 = 1.5;
 
 /// A scene by name.
 pub struct Kind {
-    /// As on the command line.
+    /// Name on the command line.
     pub name: &'static str,
-    /// What it shows.
+    /// Description.
     pub what: &'static str,
     /// Whether it changes from frame to frame.
     pub moves: bool,
-    /// The scene at a frame.
+    /// Returns the scene at a frame.
     pub at: fn(usize) -> Scene,
 }
 
@@ -78,13 +78,13 @@ impl Stage {
         Self { scene }
     }
 
-    /// Adds a plane with its CoC at the picture's middle and the change of it per pixel.
+    /// Adds a plane with its CoC at the picture's centre and the change of the CoC per pixel.
     fn plane(mut self, coc_px: f32, slope: Vec2, of: impl Fn(Vec2) -> Rgba + Sync) -> Self {
         self.scene.surfaces.push(Surface { coc_px, slope, texture: texture(SIZE, 0, of), margin_px: 0 });
         self
     }
 
-    /// Adds a plane that faces the camera: what is inside of an outline (signed distance, negative inside).
+    /// Adds a plane that faces the camera, cut to an outline (signed distance, negative inside).
     fn cutout(self, coc_px: f32, outline: impl Fn(Vec2) -> f32 + Sync, color: impl Fn(Vec2) -> Rgb + Sync) -> Self {
         self.plane(coc_px, Vec2::ZERO, |p| {
             let alpha = coverage(outline(p));
@@ -97,12 +97,12 @@ impl Stage {
         self.cutout(coc_px, |_| -1.0, |p| paint(p, tint, pattern, seed))
     }
 
-    /// A head and shoulders in focus.
+    /// Adds a head and shoulders in focus.
     fn bust(self, x: f32, seed: u32) -> Self {
         self.moved_bust(x, 0.0, seed)
     }
 
-    /// The same, moved to the right.
+    /// Adds the same, moved to the right.
     fn moved_bust(self, x: f32, by: f32, seed: u32) -> Self {
         let own = move |p: Vec2| p - Vec2::new(by, 0.0);
         self.cutout(0.0, |p| bust(own(p), x), |p| if p.y < 255.0 { face(own(p), seed) } else { coat(own(p), seed) })
@@ -127,7 +127,7 @@ fn polygon(blades: u32) -> Shape {
     Shape::Polygon { blades, rotation_deg: 20.0, curvature: 0.0 }
 }
 
-/// Something with a pattern, in the colours of its seed.
+/// Returns the colour of a patterned object, in the tint of its seed.
 fn thing(p: Vec2, seed: u32) -> Rgb {
     let tint = [BRICK, LEAF, SKY, GREY, SKIN][seed as usize % 5];
     paint(p, tint, if seed.is_multiple_of(2) { Pattern::Noise } else { Pattern::Stripes(6.0) }, seed)
@@ -144,7 +144,8 @@ fn ground() -> Scene {
     Stage::new(14.0).plane(0.0, Vec2::new(0.0, -22.0 / 360.0), floor).scene
 }
 
-/// A string of lights before a subject and lights behind it, up to `brightest` times white and `radius_px` wide.
+/// Returns a string of lights before a subject and lights behind it, up to `brightest` times white and `radius_px`
+/// wide.
 fn lights(shape: Shape, seed: u64, brightest: f32, radius_px: (f32, f32)) -> Scene {
     let size = Vec2::new(SIZE.0 as f32, SIZE.1 as f32);
     let behind = Lights::scattered(seed, 40, size, radius_px, (0.2 * brightest, brightest));
@@ -173,7 +174,7 @@ fn hair() -> Scene {
     moved_hair(0.0)
 }
 
-/// To and fro in two seconds.
+/// Moves back and forth in two seconds.
 fn sway(frame: usize) -> Scene {
     moved_hair(24.0 * (frame as f32 * std::f32::consts::TAU / 60.0).sin())
 }
@@ -234,7 +235,7 @@ fn depths() -> Scene {
         .scene
 }
 
-/// A person before a hedge before a far hill in focus, and something bright elsewhere in the frame.
+/// Returns a person before a hedge before a far hill in focus, and a bright object elsewhere in the frame.
 fn overlook() -> Scene {
     let hedge = |p: Vec2| 190.0 + 14.0 * (p.x / 37.0).sin() + 9.0 * (p.x / 11.0).sin() - p.y;
     Stage::new(3.0)

@@ -1,4 +1,4 @@
-//! Picture files, and crops side by side to be looked at.
+//! Picture files, and side-by-side crops for visual comparison.
 
 use std::io;
 use std::path::Path;
@@ -6,15 +6,15 @@ use std::path::Path;
 use bokehcam::frame::ColorImage;
 use image::RgbImage;
 
-/// Columns and rows of a crop, and by how much it is enlarged.
+/// Columns and rows of a crop, and its magnification.
 const CROP: (usize, usize) = (160, 120);
 const ZOOM: usize = 2;
 /// Columns between two crops.
 const GAP: usize = 4;
-/// Pixels by which the search for the worst crop steps.
+/// Step of the search for the worst crop, in pixels.
 const STEP: usize = 20;
 
-/// A PNG file, if there is one that can be read.
+/// Reads a PNG file; `None` if it is missing or unreadable.
 pub fn read(file: &Path) -> Option<ColorImage> {
     let image = image::open(file).ok()?.into_rgb8();
     Some(ColorImage { width: image.width(), height: image.height(), rgb: image.into_raw() })
@@ -23,7 +23,7 @@ pub fn read(file: &Path) -> Option<ColorImage> {
 /// Writes a PNG file.
 ///
 /// # Errors
-/// It cannot be written.
+/// Fails if the file cannot be written.
 pub fn write(file: &Path, image: &ColorImage) -> io::Result<()> {
     let picture = RgbImage::from_raw(image.width, image.height, image.rgb.clone());
     picture
@@ -32,7 +32,7 @@ pub fn write(file: &Path, image: &ColorImage) -> io::Result<()> {
         .map_err(|error| io::Error::other(format!("{}: {error}", file.display())))
 }
 
-/// Column and row of the crop where `ours` is farthest from the truth.
+/// Returns column and row of the crop where `ours` differs most from the truth.
 fn worst(ours: &ColorImage, truth: &ColorImage) -> (usize, usize) {
     let (width, height) = (ours.width as usize, ours.height as usize);
     let error = |(left, top): (usize, usize)| -> u64 {
@@ -49,7 +49,7 @@ fn worst(ours: &ColorImage, truth: &ColorImage) -> (usize, usize) {
     places.max_by_key(|&place| error(place)).unwrap_or_default()
 }
 
-/// The crop where `ours` is worst, enlarged: ours, the truth, the rival.
+/// Returns the crop where `ours` is worst, enlarged: ours, the truth, the rival.
 pub fn crops(ours: &ColorImage, truth: &ColorImage, rival: &ColorImage) -> ColorImage {
     let (left, top) = worst(ours, truth);
     let column = CROP.0 * ZOOM + GAP;
@@ -66,7 +66,7 @@ pub fn crops(ours: &ColorImage, truth: &ColorImage, rival: &ColorImage) -> Color
     sheet
 }
 
-/// Pictures of one width below each other.
+/// Stacks pictures of one width vertically.
 pub fn stacked(pictures: &[ColorImage]) -> ColorImage {
     let width = pictures.iter().map(|picture| picture.width).max().unwrap_or(0);
     let rgb: Vec<u8> = pictures

@@ -1,7 +1,7 @@
-//! What is hard for one camera: the portraits that a plate and networks make of a person who wears, holds and sits on
-//! things, beside what a lens sees of the same scene.
+//! Scenes that are hard for one camera: the portraits that a plate and networks give of a person who wears, holds and
+//! sits on objects, against a true lens.
 //!
-//! Networks are those in the folder `models` of `BOKEHCAM_DATA`, else those that are installed; without any, the plate is
+//! Networks come from the folder `models` of `BOKEHCAM_DATA`, else from the installed ones; without any, the plate is
 //! measured alone. The plate is the median of noisy pictures of the same room without the person.
 
 use std::path::PathBuf;
@@ -28,23 +28,23 @@ const SIZE: (u32, u32) = (640, 360);
 const PINHOLE_RAYS: u32 = 16;
 const LENS_RAYS: usize = 160;
 const COC_AT_INFINITY_PX: f32 = 10.0;
-/// Radii below this are sharp.
+/// Radii below this count as sharp.
 const SHARP_PX: f32 = 2.0;
 /// Noise of a camera by day, and in low light, in codes.
 const NOISE: f32 = 2.0;
 const LOW_LIGHT_NOISE: f32 = 10.0;
-/// Frames that a source sees before its picture counts.
+/// Frames that a source gets before its picture counts.
 const FRAMES: u64 = 8;
 
-/// What a source made of a situation.
+/// The scores of a source in a situation.
 #[derive(Clone, Debug, Serialize)]
 pub struct Outcome {
     pub situation: String,
     pub source: &'static str,
-    /// Shares of the person's pixels that are blurred, and of others that are not, in percent.
+    /// Percentages of the person's pixels that are blurred, and of the others that are not.
     pub missed: f64,
     pub mistaken: f64,
-    /// Of the picture to what the lens sees, in sRGB; whole, and around outlines.
+    /// PSNR against the true lens, in sRGB, over the whole picture; `edge_db` is that around outlines.
     pub psnr_db: f64,
     pub edge_db: f64,
 }
@@ -58,7 +58,7 @@ impl Outcome {
     }
 }
 
-/// A situation as everything sees it.
+/// A situation, rendered.
 #[derive(Clone)]
 struct Staged {
     name: String,
@@ -75,7 +75,7 @@ struct Staged {
 /// Measures every source in every situation.
 ///
 /// # Errors
-/// This crate's executor failed.
+/// Fails if this crate's executor fails.
 pub fn measure(mut tell: impl FnMut(Outcome)) -> Result<(), BokehError> {
     for situation in Situation::ALL {
         let staged = stage(situation);
@@ -112,7 +112,7 @@ fn stage(situation: Situation) -> Staged {
     }
 }
 
-/// The depth that every source gives, and the exact one.
+/// Returns the depth of every source, and the exact one.
 fn depths(staged: &Staged) -> Vec<(&'static str, DepthMap)> {
     let [matte, mono] = [Task::Matte, Task::Mono].map(model);
     let networks = |matte: &Option<PathBuf>, mono: &Option<PathBuf>| {
@@ -142,7 +142,7 @@ fn depths(staged: &Staged) -> Vec<(&'static str, DepthMap)> {
         for frame in 0..FRAMES {
             let color = with_noise(&staged.color, staged.noise, 100 + frame);
             let stamp = Stamp { index: frame as usize, time_ns: frame * 33_333_333, captured_ns: None };
-            // A source that fails has nothing to be measured.
+            // A source that fails is not measured.
             if source.read(FrameInput { stamp, color: &color, right: None }, &mut map).is_err() {
                 break;
             }
@@ -152,7 +152,7 @@ fn depths(staged: &Staged) -> Vec<(&'static str, DepthMap)> {
     depths
 }
 
-/// The plate as the program takes it.
+/// Captures the plate in the product's way.
 fn plate(staged: &Staged) -> ColorImage {
     let mut capture = Capture::default();
     (0..)
@@ -163,7 +163,7 @@ fn plate(staged: &Staged) -> ColorImage {
         .unwrap_or_default()
 }
 
-/// A known network for a task.
+/// Returns a known network for a task.
 fn model(task: Task) -> Option<PathBuf> {
     let data = std::env::var_os("BOKEHCAM_DATA").map(PathBuf::from);
     data.and_then(|data| network::best_in(vec![data.join("models")], task)).or_else(|| network::best(task))
@@ -174,7 +174,7 @@ fn outcome(staged: &Staged, source: &'static str, depth: DepthMap) -> Result<Out
     let real = Shot::lens(COC_AT_INFINITY_PX, staged.focus_m, height);
     let lens = match depth.subject_m {
         _ if source == "exact depth" => real,
-        // Alone, the nearest of what a network for depth sees is the subject.
+        // Without a mask, the nearest object of a depth network is the subject.
         _ => Shot::lens(COC_AT_INFINITY_PX, DepthMap::SUBJECT_M, height),
     };
     let (mut counts, mut wrong) = ([0.0; 2], [0.0; 2]);

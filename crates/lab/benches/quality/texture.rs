@@ -1,40 +1,40 @@
-//! Textures and outlines that scenes are made of, by distance and by hash: the same everywhere.
+//! Procedural textures and outlines of the scenes, from distances and hashes: reproducible on every machine.
 
 use glam::Vec2;
 
 use super::lens::Rgba;
 use super::picture::{Plane, Rgb};
 
-/// A small generator of numbers that look random (PCG's multiplier; the high bits are used).
+/// A small pseudorandom generator (PCG's multiplier; the high bits are used).
 pub struct Dice(u64);
 
 impl Dice {
-    /// The sequence of a seed.
+    /// Creates the sequence of a seed.
     pub fn new(seed: u64) -> Self {
         let mut dice = Self(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) ^ 0x1234_5678_9ABC_DEF1);
         dice.roll();
         dice
     }
 
-    /// Evenly distributed from 0 to below 1.
+    /// Returns a uniformly distributed number from 0 to below 1.
     pub fn roll(&mut self) -> f32 {
         self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         (self.0 >> 40) as f32 / (1u64 << 24) as f32
     }
 
-    /// Evenly distributed from `low` to `high`.
+    /// Returns a uniformly distributed number from `low` to `high`.
     pub fn between(&mut self, low: f32, high: f32) -> f32 {
         low + (high - low) * self.roll()
     }
 
-    /// Normally distributed (Box and Muller).
+    /// Returns a standard normal number (Box and Muller).
     pub fn normal(&mut self) -> f32 {
         let radius = (-2.0 * (1.0 - self.roll()).ln()).sqrt();
         radius * (std::f32::consts::TAU * self.roll()).cos()
     }
 }
 
-/// Random value of a lattice point, 0 to 1.
+/// Returns the random value of a lattice point, 0 to 1.
 fn lattice(x: i32, y: i32, seed: u32) -> f32 {
     let mut h =
         (x as u32).wrapping_mul(0x85EB_CA6B) ^ (y as u32).wrapping_mul(0xC2B2_AE35) ^ seed.wrapping_mul(0x27D4_EB2F);
@@ -43,7 +43,7 @@ fn lattice(x: i32, y: i32, seed: u32) -> f32 {
     (h ^ (h >> 15)) as f32 / u32::MAX as f32
 }
 
-/// Smooth noise with a feature every `pitch` pixels, 0 to 1.
+/// Returns smooth noise with a feature every `pitch` pixels, 0 to 1.
 fn value_noise(p: Vec2, pitch: f32, seed: u32) -> f32 {
     let q = p / pitch;
     let cell = q.floor();
@@ -56,7 +56,7 @@ fn value_noise(p: Vec2, pitch: f32, seed: u32) -> f32 {
     mix(top, bottom, f.y)
 }
 
-/// Noise of six octaves from 96 to 3 pixels, 0 to 1, mean about one half.
+/// Returns noise of six octaves from 96 to 3 pixels, 0 to 1, mean about one half.
 pub fn fractal(p: Vec2, seed: u32) -> f32 {
     let (mut sum, mut weights, mut weight, mut pitch) = (0.0, 0.0, 1.0, 96.0);
     for octave in 0..6 {
@@ -67,7 +67,7 @@ pub fn fractal(p: Vec2, seed: u32) -> f32 {
     ((sum / weights - 0.5) * 1.9 + 0.5).clamp(0.0, 1.0)
 }
 
-/// How a surface is patterned.
+/// The pattern of a surface.
 #[derive(Clone, Copy, Debug)]
 pub enum Pattern {
     /// Noise alone.
@@ -78,7 +78,7 @@ pub enum Pattern {
     Stripes(f32),
 }
 
-/// A tinted pattern in linear light, about 0.03 to 0.9.
+/// Returns a tinted pattern in linear light, about 0.03 to 0.9.
 pub fn paint(p: Vec2, tint: Rgb, pattern: Pattern, seed: u32) -> Rgb {
     let noise = fractal(p, seed);
     // A border one pixel wide between light and dark, so that the pattern is band-limited.
@@ -98,47 +98,47 @@ pub fn paint(p: Vec2, tint: Rgb, pattern: Pattern, seed: u32) -> Rgb {
     [0, 1, 2].map(|k| ((0.08 + 0.85 * noise * noise) * shade * tint[k] * (1.0 + 0.5 * hue * (k as f32 - 1.0))).max(0.0))
 }
 
-/// Signed distance to a disc, negative inside.
+/// Returns the signed distance to a disc, negative inside.
 pub fn disc(p: Vec2, centre: Vec2, radius: f32) -> f32 {
     p.distance(centre) - radius
 }
 
-/// Signed distance to an ellipse, exact on its axes and near its outline.
+/// Returns the signed distance to an ellipse, exact on its axes and near its outline.
 pub fn ellipse(p: Vec2, centre: Vec2, radii: Vec2) -> f32 {
     let q = (p - centre) / radii;
     let length = q.length();
     if length < 1e-6 { -radii.min_element() } else { (length - 1.0) * length / (q / radii).length() }
 }
 
-/// Signed distance to an axis-parallel box.
+/// Returns the signed distance to an axis-parallel box.
 pub fn rect(p: Vec2, low: Vec2, high: Vec2) -> f32 {
     let q = (p - (low + high) / 2.0).abs() - (high - low) / 2.0;
     q.max(Vec2::ZERO).length() + q.max_element().min(0.0)
 }
 
-/// Signed distance to a line of a given thickness with round ends.
+/// Returns the signed distance to a line of a given thickness with round ends.
 pub fn stroke(p: Vec2, from: Vec2, to: Vec2, thickness: f32) -> f32 {
     let along = ((p - from).dot(to - from) / (to - from).length_squared()).clamp(0.0, 1.0);
     p.distance(from + along * (to - from)) - thickness / 2.0
 }
 
-/// Coverage of a pixel by the inside of an outline at a signed distance.
+/// Returns the coverage of a pixel by the inside of an outline at a signed distance.
 pub fn coverage(distance: f32) -> f32 {
     (0.5 - distance).clamp(0.0, 1.0)
 }
 
-/// Colour times alpha, and alpha.
+/// Returns colour times alpha, and alpha.
 pub fn premultiplied(color: Rgb, alpha: f32) -> Rgba {
     [color[0] * alpha, color[1] * alpha, color[2] * alpha, alpha]
 }
 
-/// Small lights, at the same places wherever they are asked for.
+/// Small lights at fixed positions.
 pub struct Lights {
     places: Vec<(Vec2, f32, Rgb)>,
 }
 
 impl Lights {
-    /// `count` lights in a `size` picture with radii in pixels and radiances between the given limits.
+    /// Scatters `count` lights in a `size` picture, with radii in pixels and radiances between the given limits.
     pub fn scattered(seed: u64, count: usize, size: Vec2, radius_px: (f32, f32), radiance: (f32, f32)) -> Self {
         let mut dice = Dice::new(seed);
         let mut light = || {
@@ -150,7 +150,7 @@ impl Lights {
         Self { places: (0..count).map(|_| light()).collect() }
     }
 
-    /// The colour at a place: a light's, or `behind`.
+    /// Returns the colour at a position: a light's, or `behind`.
     pub fn over(&self, p: Vec2, behind: Rgb) -> Rgb {
         self.places.iter().fold(behind, |below, &(at, radius_px, light)| {
             let alpha = coverage(disc(p, at, radius_px));
@@ -159,7 +159,7 @@ impl Lights {
     }
 }
 
-/// A texture of `of`'s values at the places of a picture of `size`, `margin_px` beyond it on every side.
+/// Samples `of` at the pixels of a picture of `size`, and `margin_px` beyond it on every side.
 pub fn texture(size: (usize, usize), margin_px: usize, of: impl Fn(Vec2) -> Rgba + Sync) -> Plane<Rgba> {
     let margin = margin_px as f32;
     Plane::from_fn(size.0 + 2 * margin_px, size.1 + 2 * margin_px, |x, y| {

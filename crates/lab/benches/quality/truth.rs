@@ -1,4 +1,4 @@
-//! Pictures of a scene, the truth kept between runs: it takes longest to make and never changes.
+//! Pictures of a scene; the truth is cached between runs, as it is slow to render and never changes.
 
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::path::{Path, PathBuf};
@@ -12,25 +12,25 @@ use super::picture::{Plane, encode};
 use super::scenes::FOCUS_M;
 use super::sheet;
 
-/// To be raised when the renderer changes.
+/// Version of the renderer: increase it when the renderer changes.
 const RENDERER: u32 = 1;
-/// Rays per pixel: at least the first, else this many per square pixel of the largest disc, at most the last.
+/// Rays per pixel: the minimum, the number per square pixel of the largest disc, and the maximum.
 const RAYS: (f32, f32, f32) = (768.0, 2.0, 2048.0);
 
-/// A scene as everything sees it.
+/// A scene, rendered.
 pub struct Views {
-    /// What the methods are given: the pinhole picture and exact depth.
+    /// The input of the methods: the pinhole picture and exact depth.
     pub shot: Shot,
     /// CoC of each pixel.
     pub coc_px: Plane<f32>,
-    /// What the lens sees.
+    /// The picture of the true lens.
     pub truth: ColorImage,
 }
 
 /// Renders a scene, or reads its truth from `cache`.
 ///
 /// # Errors
-/// The cache cannot be written.
+/// Fails if the cache cannot be written.
 pub fn views(scene: &Scene, name: &str, cache: &Path) -> io::Result<Views> {
     let views = without_truth(scene);
     let max_px = views.coc_px.data.iter().fold(0f32, |most, c| most.max(c.abs()));
@@ -47,7 +47,7 @@ pub fn views(scene: &Scene, name: &str, cache: &Path) -> io::Result<Views> {
     Ok(Views { truth, ..views })
 }
 
-/// What the methods are given of a scene; what the lens sees is left out.
+/// Returns the input of the methods, without the truth.
 pub fn without_truth(scene: &Scene) -> Views {
     let coc_px = scene.coc();
     let shot = Shot {
@@ -59,7 +59,7 @@ pub fn without_truth(scene: &Scene) -> Views {
     Views { shot, coc_px, truth: ColorImage::default() }
 }
 
-/// The depth map whose CoC is `coc_px`.
+/// Returns the depth map whose CoC is `coc_px`.
 pub fn depth(coc_px: &Plane<f32>, coc_at_infinity_px: f32) -> DepthMap {
     let metres = |coc_px: f32| FOCUS_M / (1.0 - coc_px / coc_at_infinity_px).max(1e-3);
     DepthMap {
@@ -70,7 +70,7 @@ pub fn depth(coc_px: &Plane<f32>, coc_at_infinity_px: f32) -> DepthMap {
     }
 }
 
-/// A number that changes with everything that the truth depends on.
+/// Returns a hash of everything that the truth depends on.
 fn key(scene: &Scene, rays: usize) -> u64 {
     let mut hasher = DefaultHasher::new();
     (RENDERER, rays, scene.size(), format!("{:?}", scene.aperture)).hash(&mut hasher);
@@ -83,7 +83,7 @@ fn key(scene: &Scene, rays: usize) -> u64 {
     hasher.finish()
 }
 
-/// Writes under another name first, so that a picture that is there is whole.
+/// Writes to a temporary name first, so that an existing picture is complete.
 fn keep(image: &ColorImage, file: &Path) -> io::Result<()> {
     fs::create_dir_all(file.parent().unwrap_or(Path::new(".")))?;
     let part: PathBuf = file.with_extension("part.png");

@@ -1,10 +1,10 @@
-//! What a process holds of the system.
+//! Resources that a process holds.
 
 use std::fmt;
 use std::fs;
 use std::io;
 
-/// By this share may memory grow: allocators keep some.
+/// Allowed relative growth of the memory: allocators keep some.
 const GROWTH: f64 = 0.05;
 
 /// Descriptors, threads and memory.
@@ -15,10 +15,10 @@ pub struct Footprint {
 }
 
 impl Footprint {
-    /// What this process holds now.
+    /// Returns the current footprint of this process.
     ///
     /// # Errors
-    /// There is no /proc.
+    /// Fails without /proc.
     pub fn now() -> io::Result<Self> {
         let status = fs::read_to_string("/proc/self/status")?;
         let resident = status.lines().find_map(|line| line.strip_prefix("VmRSS:"));
@@ -29,7 +29,7 @@ impl Footprint {
         })
     }
 
-    /// Whether it is no more than before.
+    /// Returns whether the footprint is no larger than before, but for the allowed growth.
     pub fn is_as_flat_as(&self, before: &Self) -> bool {
         self.descriptors <= before.descriptors
             && self.threads <= before.threads

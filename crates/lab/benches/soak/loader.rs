@@ -1,4 +1,4 @@
-//! Another process that wants a core for itself, now and then: this program once more, by a hidden argument.
+//! Another process that occupies a core at intervals: this program once more, by a hidden argument.
 
 use std::io::{self, Read};
 use std::process::{Child, Command, Stdio};
@@ -8,17 +8,17 @@ use std::time::{Duration, Instant};
 /// First argument of the other process.
 pub const ARGUMENT: &str = "--load-one-core";
 const BUSY: Duration = Duration::from_secs(10);
-/// From one busy phase to the next.
+/// Time from one busy phase to the next.
 pub const CYCLE: Duration = Duration::from_secs(20);
 
-/// The other process; it ends with this value, or with this process, however that ends.
+/// The other process; it ends when this value is dropped, or when this process ends for any reason.
 pub struct Loader(Child);
 
 impl Loader {
-    /// Starts it: the first quiet phase begins.
+    /// Starts it with a quiet phase.
     ///
     /// # Errors
-    /// The system gives no process.
+    /// Fails if the system cannot create a process.
     pub fn start() -> io::Result<Self> {
         let program = std::env::current_exe()?;
         Command::new(program).arg(ARGUMENT).stdin(Stdio::piped()).spawn().map(Self)
@@ -33,7 +33,7 @@ impl Drop for Loader {
     }
 }
 
-/// The other process itself.
+/// Runs as the other process.
 pub fn load() -> ! {
     // Its standard input ends when the process that started it does.
     thread::spawn(|| {

@@ -1,5 +1,5 @@
-//! `cargo bench --bench soak -- [OPTIONS] [FOLDER]`: a recording as a live camera, for as long as one likes, and whether
-//! its pictures come out evenly, in time, and no later in the end than in the beginning.
+//! `cargo bench --bench soak -- [OPTIONS] [FOLDER]`: plays a recording as a live camera for any length of time, and
+//! checks that pictures come at even intervals and in time, without growing delay.
 //!
 //! | file | what |
 //! |---|---|
@@ -60,7 +60,7 @@ struct Options {
     /// How long to run
     #[arg(long, value_name = "M", default_value_t = 1.0)]
     minutes: f64,
-    /// Before that, start and stop so many times, and tell what the process holds then
+    /// First start and stop this number of times, and print the resources that the process then holds
     #[arg(long, value_name = "N", default_value_t = 0)]
     starts: u32,
     /// Let the blur take this many times as long, busy all the while
@@ -117,7 +117,7 @@ fn main() -> ExitCode {
     }
 }
 
-/// Runs it; tells whether the criteria are met.
+/// Runs the bench; returns whether the criteria are met.
 fn run(options: &Options) -> Result<bool, Box<dyn Error>> {
     let begun = options.starts == 0 || starts(options)?;
     let frames = (options.minutes * 60e9 / PERIOD_NS as f64).round().max(2.0) as u64;
@@ -139,7 +139,7 @@ fn run(options: &Options) -> Result<bool, Box<dyn Error>> {
     Ok(verdict(&shown, &report) && begun)
 }
 
-/// Starts and stops; tells whether the process holds no more in the end than after a tenth of it.
+/// Starts and stops repeatedly; returns whether the process holds no more at the end than after a tenth of the starts.
 fn starts(options: &Options) -> Result<bool, Box<dyn Error>> {
     const FRAMES: u64 = 4;
     let (mut warm, mut frames) = (Footprint::now()?, 0);
@@ -159,10 +159,10 @@ fn starts(options: &Options) -> Result<bool, Box<dyn Error>> {
     Ok(flat)
 }
 
-/// When each frame came out, and how old, in nanoseconds.
+/// The delivery time of each frame since the camera began, and its age, in nanoseconds.
 type Deliveries = Vec<(u64, u64)>;
 
-/// Frames of the recording in real time.
+/// Plays frames of the recording in real time.
 fn replay(options: &Options, frames: u64) -> Result<(Report, Deliveries), Box<dyn Error>> {
     let name = options.folder.display().to_string();
     let reading = Reading { depth_scale: options.depth_scale, ..Reading::default() };

@@ -1,4 +1,4 @@
-//! The ends of the pipeline, made to be measured.
+//! The instrumented ends of the pipeline.
 
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -14,21 +14,21 @@ use bokehcam::recording::{Recording, Scratch};
 use bokehcam::sink::{Ending, Sink, SinkError};
 use bokehcam::stats::Cause;
 
-/// From frame to frame.
+/// Frame period.
 pub const PERIOD_NS: u64 = 33_333_333;
 
-/// When pictures were shown.
+/// The delivery times of the pictures.
 #[derive(Clone, Default)]
 pub struct Stamps {
-    /// When the camera began.
+    /// The time when the camera began.
     epoch_ns: Arc<AtomicU64>,
-    /// Time since then, and age.
+    /// Time since then, and age of each picture.
     shown: Arc<Mutex<Vec<(u64, u64)>>>,
 }
 
 impl Stamps {
     pub fn with_room_for(frames: usize) -> Self {
-        // Written to, so that the system gives the memory now and not as frames come.
+        // Written once, so that the system commits the memory now and not during the run.
         let mut shown = vec![(1, 1); frames];
         shown.clear();
         Self { shown: Arc::new(Mutex::new(shown)), ..Self::default() }
@@ -39,8 +39,8 @@ impl Stamps {
     }
 }
 
-/// A recording over and over as a live camera of 30 frames a second: a frame is taken when it is due and decoded then;
-/// one that nobody reads for a whole period is overwritten.
+/// Loops a recording as a live camera of 30 frames a second: a frame is captured when it is due, and decoded then; a
+/// frame that is not read within a period is overwritten.
 pub struct Looped {
     recording: Arc<Recording>,
     scratch: Scratch,
@@ -94,7 +94,7 @@ impl Camera for Looped {
     }
 }
 
-/// An executor that takes so many times as long, and writes into each picture which frame it is.
+/// An executor that is slower by `factor`, and writes the frame's number into each picture.
 pub struct Slowed {
     inner: Box<dyn Bokeh>,
     factor: f64,
@@ -146,7 +146,7 @@ impl Bokeh for Slowed {
     }
 }
 
-/// Forgets the pictures and keeps when they came.
+/// Discards the pictures and records their times.
 pub struct Stamping {
     clock: Clock,
     stamps: Stamps,
@@ -165,7 +165,7 @@ impl Sink for Stamping {
         let ticket = picture.rgb.first_chunk().map_or(0, |bytes| u64::from_le_bytes(*bytes));
         let age_ns = now_ns.saturating_sub(ticket * PERIOD_NS);
         self.stamps.shown.lock().unwrap_or_else(PoisonError::into_inner).push((now_ns, age_ns));
-        // As much as handing it to a device costs.
+        // Costs as much as handing the picture to a device.
         self.shown.clone_from(picture);
         Ok(ControlFlow::Continue(()))
     }

@@ -1,25 +1,25 @@
-//! What came out, against what should.
+//! The criteria, and the results against them.
 
 use bokehcam::stats::Report;
 
 use crate::loader;
 use crate::stages::PERIOD_NS;
 
-/// From one picture to the next, for 99 of 100, in periods.
+/// Limit for the interval between pictures (99th percentile), in periods.
 const INTERVAL_PERIODS: f64 = 1.25;
-/// From capture to output, for 99 of 100, in periods.
+/// Limit for the age from capture to output (99th percentile), in periods.
 const AGE_PERIODS: f64 = 2.0;
-/// By this much may the median age of the last minute be higher than that of the first, in periods.
+/// Limit for the growth of the median age from the first minute to the last, in periods.
 const GROWTH_PERIODS: f64 = 0.1;
 const MINUTE_NS: u64 = 60_000_000_000;
 
-/// Prints it; tells whether all criteria are met. Pictures are times since the beginning, and ages.
+/// Prints the results; returns whether all criteria are met. `shown` has times since the beginning, and ages.
 pub fn verdict(shown: &[(u64, u64)], report: &Report) -> bool {
     let period_ms = PERIOD_NS as f64 / 1e6;
     let mut intervals: Vec<f64> = shown.windows(2).map(|pair| ms(pair[1].0 - pair[0].0)).collect();
     let mut ages: Vec<f64> = shown.iter().map(|shown| ms(shown.1)).collect();
     let end_ns = shown.last().map_or(0, |last| last.0);
-    // A minute, or up to half of a shorter run, in whole turns of the other process.
+    // A minute, or up to half of a shorter run, in whole cycles of the load process.
     let half_ns = MINUTE_NS.min(end_ns / 2);
     let turn_ns = loader::CYCLE.as_nanos() as u64;
     let part_ns = if half_ns < turn_ns { half_ns } else { half_ns - half_ns % turn_ns };
@@ -61,7 +61,7 @@ pub fn verdict(shown: &[(u64, u64)], report: &Report) -> bool {
     met
 }
 
-/// How a criterion is told of.
+/// Returns the word for a criterion's result.
 pub fn word(fine: bool) -> &'static str {
     if fine { "met" } else { "MISSED" }
 }
@@ -70,7 +70,7 @@ fn ms(ns: u64) -> f64 {
     ns as f64 / 1e6
 }
 
-/// The value that the share `p` of the values does not exceed; NaN without values.
+/// Returns the `p` quantile of the values; NaN without values.
 fn at(values: &mut [f64], p: f64) -> f64 {
     values.sort_unstable_by(f64::total_cmp);
     let rank = ((p * values.len() as f64).ceil() as usize).clamp(1, values.len().max(1));

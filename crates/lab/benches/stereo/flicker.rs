@@ -1,5 +1,5 @@
-//! How steady the disparity is where nothing moves, and how right where something does: with the memory of earlier
-//! frames, and without.
+//! Stability of the disparity in static regions, and its accuracy at moving edges: with the memory of earlier frames,
+//! and without.
 
 use bokehcam::depth::focus::{Focus, FocusRule};
 use bokehcam::depth::refine::Refiner;
@@ -13,38 +13,38 @@ use super::quality::picture::Plane;
 use super::sequence::{Frame, Sequence, bundled, euroc, kitti};
 use super::{Outcome, matcher, print};
 
-/// The first frames of a sequence are not looked at: what remembers has little to remember there.
+/// Frames at the start of a sequence that are not measured: the memory has little content there.
 const WARM_UP: usize = 2;
-/// With truth, a pixel is still when its true disparity changes by no more than this, in pixels, and each colour by no
-/// more than so many codes (before noise is put on), within so many columns and rows.
+/// With ground truth, a pixel is static if, in the square of radius `STILL_REACH` around it, the true disparity changes
+/// by no more than `STILL_PX` pixels, and each colour by no more than `STILL_CODES` (before noise is added).
 const STILL_PX: f32 = 1.0 / 128.0;
 const STILL_CODES: u8 = 1;
 const STILL_REACH: i32 = 3;
-/// Without, when the mean over that square of the change of its grey is no more than this, in codes.
+/// Without ground truth, a pixel is static if the mean change of grey over that square is no more than this, in codes.
 const STILL_MEAN_CODES: f32 = 3.0;
-/// A change of more than this, in pixels, is a jump.
+/// A change of more than this, in pixels, counts as a jump.
 const JUMP_PX: f32 = 1.0;
-/// A moving edge is where the true disparity changes by more than this, in pixels, and so many columns and rows around;
-/// but not in the leftmost columns, as many as the range, which the right eye may not see.
+/// A moving edge is where the true disparity changes by more than `EDGE_PX` pixels, grown by `EDGE_REACH` pixels;
+/// without the leftmost columns, as wide as the disparity range, which the right camera may not see.
 const EDGE_PX: f32 = 1.5;
 const EDGE_REACH: i32 = 5;
 
-/// One way to make the disparity of one sequence.
+/// The scores of one method on one sequence.
 #[derive(Serialize)]
 struct Record {
     sequence: &'static str,
     effort: &'static str,
-    /// After which step.
+    /// The processing step.
     step: &'static str,
     /// Whether earlier frames were remembered.
     memory: bool,
-    /// Share of pixels that are still.
+    /// Percentage of static pixels.
     still_percent: f64,
     /// Mean absolute change from frame to frame of still pixels, in pixels of disparity.
     still_change_px: f64,
-    /// Share of still pixels that jump from one frame to the next.
+    /// Percentage of static pixels that jump from one frame to the next.
     still_jumps_percent: f64,
-    /// Share of pixels around moving edges that are off by more than 1 px.
+    /// Percentage of pixels around moving edges that are off by more than 1 px.
     moving_bad1_percent: Option<f64>,
     /// Their mean error.
     moving_error_px: Option<f64>,
@@ -53,7 +53,7 @@ struct Record {
 /// Measures and prints.
 ///
 /// # Errors
-/// A recording cannot be read; a matcher cannot be made or fails.
+/// Fails if a recording is unreadable, or a matcher cannot be created or fails.
 pub fn run(flicker: &Flicker, options: &Options) -> Outcome {
     let mut sequences = vec![bundled()?];
     if let Some(data) = &flicker.data {
@@ -82,7 +82,8 @@ pub fn run(flicker: &Flicker, options: &Options) -> Outcome {
     Ok(())
 }
 
-/// Disparities of all frames, as matched and as refined. Without memory, every frame is the first one.
+/// Returns the disparities of all frames, as matched and as refined. Without memory, every frame is treated as the
+/// first.
 fn maps(sequence: &Sequence, options: &Options, effort: Effort, memory: bool) -> Outcome<[Vec<Plane<f32>>; 2]> {
     let create = || {
         let size = sequence.frames[0].left.size();
@@ -109,20 +110,20 @@ fn maps(sequence: &Sequence, options: &Options, effort: Effort, memory: bool) ->
     Ok([matched, refined])
 }
 
-/// The depth of a disparity map, as a stream has it.
+/// Converts a disparity map to depth, in a stream's way.
 pub fn metres(map: &DisparityMap, rig: &StereoRig) -> DepthMap {
     let mut depth = DepthMap::default();
     source::metres(map, rig, &mut depth);
     depth
 }
 
-/// Of a frame and the one before: pixels that are still, and those around moving edges.
+/// Static pixels of a frame against the previous one, and pixels around moving edges.
 struct Regions {
     still: Plane<bool>,
     moving: Option<Plane<bool>>,
 }
 
-/// For every frame but the first.
+/// Returns the regions of every frame but the first.
 fn regions(sequence: &Sequence) -> Vec<Regions> {
     sequence.frames.windows(2).map(|pair| Regions { still: still(&pair[0], &pair[1]), moving: moving(pair) }).collect()
 }
@@ -146,7 +147,7 @@ fn still(before: &Frame, now: &Frame) -> Plane<bool> {
             sum / reach(STILL_REACH).count() as f32
         })
     };
-    // The mean of the change's size, not of the change: texture that moves has none of the latter.
+    // The mean of the absolute change: the signed mean is near zero where texture moves.
     mean(&mean(&change.map(f32::abs), 1, 0), 0, 1).map(|codes| codes <= STILL_MEAN_CODES)
 }
 
@@ -160,7 +161,7 @@ fn reach(px: i32) -> std::ops::RangeInclusive<i32> {
     -px..=px
 }
 
-/// Pixels within a square of `px` to each side of those that are set.
+/// Dilates by a square of radius `px`.
 fn grown(of: &Plane<bool>, px: i32) -> Plane<bool> {
     let along = |of: &Plane<bool>, dx: i32, dy: i32| {
         Plane::from_fn(of.width, of.height, |x, y| reach(px).any(|d| of.at(x as i32 + d * dx, y as i32 + d * dy)))
@@ -168,7 +169,7 @@ fn grown(of: &Plane<bool>, px: i32) -> Plane<bool> {
     along(&along(of, 1, 0), 0, 1)
 }
 
-/// Everything but the step and the memory.
+/// Computes all scores; the caller sets the step and the memory.
 fn measure(sequence: &Sequence, regions: &[Regions], effort: Effort, maps: &[Plane<f32>]) -> Record {
     let (mut share, mut change, mut jumps) = <(Mean, Mean, Mean)>::default();
     let (mut bad, mut error) = <(Mean, Mean)>::default();

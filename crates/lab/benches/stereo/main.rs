@@ -1,5 +1,4 @@
-//! `cargo bench --bench stereo -- COMMAND [OPTIONS]`: what depth from two eyes costs, how steady it is, and what the blur
-//! makes of it.
+//! `cargo bench --bench stereo -- COMMAND [OPTIONS]`: the cost of stereo depth, its stability, and the blur from it.
 //!
 //! | file | what |
 //! |---|---|
@@ -11,7 +10,7 @@
 //! | `sequence` | recordings of two eyes |
 //! | `quality` | parts of the bench of that name |
 //!
-//! Its disparity is scored, beside OpenCV's, by `benches/opencv_stereo.py`.
+//! `benches/opencv_stereo.py` scores its disparity against OpenCV's.
 
 #[path = "../common/mod.rs"]
 mod common;
@@ -55,7 +54,7 @@ fn main() -> ExitCode {
     }
 }
 
-/// A line of a table, or of JSON.
+/// Prints a line of a table, or of JSON.
 fn print(options: &Options, line: &str, record: &impl serde::Serialize) -> Outcome {
     if options.json {
         println!("{}", serde_json::to_string(record)?);

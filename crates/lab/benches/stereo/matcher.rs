@@ -7,10 +7,10 @@ use bokehcam::depth::stereo::{self, Effort, Matcher, Settings};
 use super::Outcome;
 use super::options::Options;
 
-/// A matcher of pictures of this size that remembers no frame; `threads` of the CPU, all cores when `None`.
+/// Creates a matcher of pictures of this size without memory; `threads` of the CPU, all cores when `None`.
 ///
 /// # Errors
-/// It cannot be made.
+/// Fails if the matcher cannot be created.
 pub fn create(
     options: &Options,
     effort: Effort,

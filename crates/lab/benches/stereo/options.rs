@@ -36,7 +36,7 @@ pub struct Options {
     pub bench: bool,
 }
 
-/// What is measured.
+/// The measurements.
 #[derive(Subcommand, Debug)]
 pub enum Command {
     /// Time of the matcher, in this process, one pair after the other
@@ -95,7 +95,7 @@ pub struct Picture {
     pub out: Option<PathBuf>,
 }
 
-/// As on the product's command line.
+/// Returns the name on the product's command line.
 pub fn name(effort: Effort) -> &'static str {
     match effort {
         Effort::Fast => "fast",

@@ -1,4 +1,4 @@
-//! The blur from stereo depth, from true depth and from others' depth, against the pictures of a real lens.
+//! The blur from stereo depth, from true depth and from rivals' depth, against a true lens.
 
 use std::fs;
 use std::path::Path;
@@ -18,22 +18,22 @@ use super::quality::sheet;
 use super::sequence::{Sequence, bundled, pfm, recordings};
 use super::{Outcome, matcher, print};
 
-/// The lens of `recordings/portrait/truth`, as its `camera.txt` has it.
+/// The lens of `recordings/portrait/truth`, from its `camera.txt`.
 const COC_AT_INFINITY_PX: f32 = 14.0;
 const FOCUS_M: f32 = 1.2;
 
-/// A blur on all frames with truth.
+/// The scores of a blur over all frames with truth.
 #[derive(Serialize)]
 struct Record {
-    /// Where depth is from.
+    /// The source of the depth.
     depth: String,
-    /// Whether it was refined, with the memory of the frames before, as a stream's is; else only its holes are filled.
+    /// Whether depth was refined, with memory, as a stream's is; else only its holes are filled.
     refined: bool,
     /// PSNR in sRGB, mean over the frames.
     psnr_db: f64,
-    /// The same within 12 px of depth edges.
+    /// PSNR within 12 px of depth edges.
     edge_db: f64,
-    /// PSNR without the leftmost columns, as many as the range, which the right eye may not see.
+    /// PSNR without the leftmost columns, as wide as the disparity range, which the right camera may not see.
     inner_db: f64,
     /// Frames with truth.
     frames: usize,
@@ -42,7 +42,7 @@ struct Record {
 /// Measures and prints.
 ///
 /// # Errors
-/// A recording or a rival's map cannot be read; the matcher or the blur fails.
+/// Fails if a recording or a rival's map is unreadable, or the matcher or the blur fails.
 pub fn run(picture: &Picture, options: &Options) -> Outcome {
     let sequence = bundled()?;
     let mut sources = vec![("true".to_owned(), truth(&sequence))];
@@ -87,12 +87,12 @@ fn truth(sequence: &Sequence) -> Vec<DepthMap> {
     sequence.frames.iter().filter_map(|frame| frame.truth.as_ref().map(map)).collect()
 }
 
-/// What a lens saw of a frame, if it is known.
+/// Returns the true lens's picture of a frame, if it exists.
 pub fn seen_by_a_lens(index: usize) -> Option<ColorImage> {
     sheet::read(&recordings(&format!("portrait/truth/disc_clipped_{index:06}.png")))
 }
 
-/// A frame with this depth, for that lens.
+/// Returns a shot with this depth, for that lens.
 pub fn shot(image: &ColorImage, depth: &DepthMap) -> Shot {
     let lens = Shot::lens(COC_AT_INFINITY_PX, FOCUS_M, image.height as usize);
     let aperture = Aperture { shape: Shape::Disc, intensity: 0.0 };

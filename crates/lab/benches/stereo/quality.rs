@@ -1,4 +1,4 @@
-//! What the bench `quality` measures with.
+//! Modules of the bench `quality` that are used here.
 #![allow(dead_code)]
 
 #[path = "../quality/damage.rs"]

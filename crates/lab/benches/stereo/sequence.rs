@@ -1,4 +1,4 @@
-//! Recordings of two eyes, rectified and in memory.
+//! Stereo recordings, rectified and in memory.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -12,13 +12,13 @@ use super::quality::picture::Plane;
 use super::quality::sheet;
 use super::quality::texture::Dice;
 
-/// One moment.
+/// A stereo pair.
 pub struct Frame {
     /// Media time.
     pub time_ns: u64,
-    /// What the left eye sees.
+    /// The left picture.
     pub left: ColorImage,
-    /// What the right eye sees.
+    /// The right picture.
     pub right: ColorImage,
     /// The true disparity of the left picture in pixels, where it is known.
     pub truth: Option<Plane<f32>>,
@@ -26,18 +26,18 @@ pub struct Frame {
 
 /// A recording.
 pub struct Sequence {
-    /// For the tables.
+    /// Name in the tables.
     pub name: &'static str,
-    /// Its geometry.
+    /// The rig's geometry.
     pub rig: StereoRig,
-    /// The range that holds it.
+    /// A disparity range that covers the sequence.
     pub disparities: u32,
-    /// In the order of time.
+    /// Frames in temporal order.
     pub frames: Vec<Frame>,
 }
 
 impl Frame {
-    /// Both eyes in grey, as matchers take them.
+    /// Returns both pictures in grey, the input of matchers.
     pub fn gray(&self) -> [GrayImage; 2] {
         [&self.left, &self.right].map(|color| {
             let mut gray = GrayImage::default();
@@ -46,7 +46,7 @@ impl Frame {
         })
     }
 
-    /// Puts normal noise on both eyes, another one for every seed.
+    /// Adds normal noise to both pictures; each seed gives another noise.
     pub fn add_noise(&mut self, codes: f32, seed: u64) {
         let mut dice = Dice::new(seed);
         for code in self.left.rgb.iter_mut().chain(&mut self.right.rgb) {
@@ -55,15 +55,16 @@ impl Frame {
     }
 }
 
-/// A file of the source tree's recordings.
+/// Returns the path of a file in `recordings/`.
 pub fn recordings(path: &str) -> PathBuf {
     Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("recordings").join(path)
 }
 
-/// The project's own recording, `recordings/stereo`: 640x360, 12 frames a second, disparities of 3 to 85 px, with truth.
+/// Reads the project's own recording, `recordings/stereo`: 640x360, 12 frames a second, disparities of 3 to 85 px, with
+/// truth.
 ///
 /// # Errors
-/// It is not there.
+/// Fails if it is missing.
 pub fn bundled() -> Outcome<Sequence> {
     const PERIOD_NS: u64 = 83_333_333;
     let folder = recordings("stereo");
@@ -80,10 +81,10 @@ pub fn bundled() -> Outcome<Sequence> {
     Ok(Sequence { name: "portrait", rig, disparities: 96, frames: frames.collect::<Outcome<_>>()? })
 }
 
-/// 20 pairs of KITTI's from a driving car, at 10 Hz, if they are there.
+/// Reads 20 pairs of KITTI from a driving car, at 10 Hz, if they are there.
 ///
 /// # Errors
-/// A picture cannot be read.
+/// Fails if a picture is unreadable.
 pub fn kitti(data: &Path) -> Outcome<Option<Sequence>> {
     const PERIOD_NS: u64 = 100_000_000;
     let folder = data.join("stereo_seq/KITTI_sequence_1");
@@ -99,10 +100,10 @@ pub fn kitti(data: &Path) -> Outcome<Option<Sequence>> {
     Ok(Some(Sequence { name: "kitti", rig, disparities: 128, frames: frames.collect::<Outcome<_>>()? }))
 }
 
-/// 6 pairs of EuRoC's, at 20 Hz, almost still, rectified by their calibration, if they are there.
+/// Reads 6 pairs of EuRoC, at 20 Hz, almost static, rectified by their calibration, if they are there.
 ///
 /// # Errors
-/// A picture or the calibration cannot be read.
+/// Fails if a picture or the calibration is unreadable.
 pub fn euroc(data: &Path) -> Outcome<Option<Sequence>> {
     const PERIOD_NS: u64 = 50_000_000;
     let folder = data.join("stereo_seq/MicroEurocDataset/mav0");
@@ -127,10 +128,10 @@ pub fn euroc(data: &Path) -> Outcome<Option<Sequence>> {
     Ok(Some(Sequence { name: "euroc", rig: rectifier.rig(), disparities: 96, frames }))
 }
 
-/// A disparity map in a PFM file: what is not finite is unknown, and becomes 0.
+/// Reads a disparity map from a PFM file: values that are not finite are unknown, and become 0.
 ///
 /// # Errors
-/// There is none, or it is something else.
+/// Fails if the file is missing or not a little-endian PFM of one channel.
 pub fn pfm(path: &Path) -> Outcome<DisparityMap> {
     let wrong = || format!("{}: not a little-endian PFM of one channel", path.display());
     let bytes = fs::read(path).map_err(|error| format!("{}: {error}", path.display()))?;
@@ -142,7 +143,7 @@ pub fn pfm(path: &Path) -> Outcome<DisparityMap> {
     if !scale.starts_with(b"-") || data.len() != 4 * width as usize * height as usize || data.is_empty() {
         return Err(wrong().into());
     }
-    // The lowest row comes first.
+    // PFM stores the bottom row first.
     let rows = data.chunks_exact(4 * width as usize).rev();
     let values = rows.flat_map(|row| row.as_chunks::<4>().0).map(|&bytes| f32::from_le_bytes(bytes));
     let px = values.map(|px| if px.is_finite() { px.max(0.0) } else { 0.0 }).collect();
@@ -153,14 +154,14 @@ fn read(path: &Path) -> Outcome<ColorImage> {
     sheet::read(path).ok_or_else(|| format!("{}: no picture that can be read", path.display()).into())
 }
 
-/// A disparity map of 16-bit grey, pixels times 256.
+/// Reads a disparity map of 16-bit grey, pixels times 256.
 fn disparity_file(path: &Path) -> Outcome<Plane<f32>> {
     let map = image::open(path).map_err(|error| format!("{}: {error}", path.display()))?.into_luma16();
     let (width, height) = (map.width() as usize, map.height() as usize);
     Ok(Plane { width, height, data: map.iter().map(|&units| f32::from(units) / 256.0).collect() })
 }
 
-/// Names of the files in a folder, sorted.
+/// Returns the names of the files in a folder, sorted.
 fn numbered(folder: &Path) -> Outcome<Vec<String>> {
     let entries = fs::read_dir(folder).map_err(|error| format!("{}: {error}", folder.display()))?;
     let mut names = entries

@@ -18,7 +18,7 @@ use super::quality::methods::{Blurrer, Method};
 use super::sequence::bundled;
 use super::{Outcome, matcher};
 
-/// The frame that is shown: by then there is a memory of others.
+/// The frame that is shown, late enough for the memory to have content.
 const FRAME: usize = 8;
 /// Columns of a picture.
 const WIDTH: u32 = 288;
@@ -26,7 +26,7 @@ const WIDTH: u32 = 288;
 /// Writes the pictures.
 ///
 /// # Errors
-/// The recording cannot be read; the matcher or the blur fails; the folder cannot be written.
+/// Fails if the recording is unreadable, the matcher or the blur fails, or the folder cannot be written.
 pub fn run(out: &Path, options: &Options) -> Outcome {
     let sequence = bundled()?;
     let frame = &sequence.frames[FRAME];
@@ -71,8 +71,8 @@ fn keep(out: &Path, name: &str, image: &ColorImage) -> Outcome {
     Ok(())
 }
 
-/// A picture of disparities: from blue, far, over green to red, near; black is unknown. By square root, as most of a
-/// room lies far away.
+/// Colours disparities: from blue (far) over green to red (near); black is unknown. Uses the square root, as most of a
+/// room is far away.
 fn painted(px: &[f32], (width, height): (u32, u32), max_px: f32) -> ColorImage {
     let color = |&px: &f32| {
         if !(px > 0.0 && px.is_finite()) {

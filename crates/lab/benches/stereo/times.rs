@@ -13,7 +13,7 @@ use super::options::{Options, Times, name};
 use super::sequence::bundled;
 use super::{Outcome, matcher, print};
 
-/// A matcher on a pair.
+/// The times of a matcher on a pair.
 #[derive(Serialize)]
 struct Record {
     size: (u32, u32),
@@ -30,7 +30,7 @@ struct Record {
 /// Measures and prints.
 ///
 /// # Errors
-/// A picture cannot be read; a matcher cannot be made or fails.
+/// Fails if a picture is unreadable, or a matcher cannot be created or fails.
 pub fn run(times: &Times, options: &Options) -> Outcome {
     if !options.json {
         println!("size       disparities effort threads  median ms    best ms  matcher");
@@ -55,7 +55,7 @@ pub fn run(times: &Times, options: &Options) -> Outcome {
     Ok(())
 }
 
-/// All efforts and threads in turn.
+/// Measures all efforts and thread counts in turn.
 fn measure(pair: &[GrayImage; 2], disparities: u32, times: &Times, options: &Options) -> Outcome<Vec<Record>> {
     let size = pair[0].size();
     let mut cases: Vec<(Box<dyn Matcher>, Record)> = Vec::new();
@@ -74,7 +74,7 @@ fn measure(pair: &[GrayImage; 2], disparities: u32, times: &Times, options: &Opt
     for round in 0..=times.rounds {
         for (matcher, record) in &mut cases {
             let time_ms = turn(matcher.as_mut())?;
-            // The first one takes its memory.
+            // The first round allocates, and is not counted.
             if round > 0 {
                 record.times_ms.push(time_ms);
             }

@@ -10,17 +10,17 @@ use image::{ExtendedColorType, ImageEncoder};
 
 use super::Outcome;
 
-/// Where files are written, or compared.
+/// The folder in which files are written, or compared.
 pub struct Folder {
     pub root: PathBuf,
-    /// Whether they are only compared.
+    /// Whether files are only compared.
     pub check: bool,
-    /// So many differ.
+    /// Number of files that differ.
     pub differing: usize,
 }
 
-/// Bytes, depth or disparity units may differ by this much, and a thousandth of them by more: the mathematical functions of
-/// two machines round differently, and a ray at an edge may then fall on its other side.
+/// Depth or disparity units, or bytes, may differ by this much, and a thousandth of them by more: mathematical
+/// functions round differently on another machine, and a ray at an edge may then fall on its other side.
 const TOLERANCE: i32 = 2;
 
 impl Folder {
@@ -34,7 +34,7 @@ impl Folder {
         self.encode(name, &image.rgb, image.size(), ExtendedColorType::Rgb8)
     }
 
-    /// A depth map in units that are made of its metres.
+    /// Writes or compares a depth map, converted from metres by `units`.
     pub fn gray16(&mut self, name: &str, map: &DepthMap, units: impl Fn(f32) -> f32) -> Outcome {
         let units: Vec<u16> = map.metres.iter().map(|&z_m| units(z_m).round() as u16).collect();
         if self.check {

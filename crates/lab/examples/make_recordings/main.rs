@@ -1,7 +1,7 @@
 //! Renders everything in `recordings/` again: `cargo run --release --example make_recordings`.
 //!
-//! With the name of a recording it renders that one alone; with `--check` it writes nothing and compares what is there
-//! with what it renders.
+//! With the name of a recording it renders that one alone; with `--check` it writes nothing and compares the existing
+//! files with its renderings.
 
 mod folder;
 
@@ -26,12 +26,12 @@ use folder::Folder;
 const SIZE_PX: (u32, u32) = (640, 360);
 const FRAMES_PER_SECOND: u32 = 12;
 const SAMPLES_PER_PIXEL: u32 = 16;
-/// As in the TUM benchmark.
+/// Scale of the TUM benchmark.
 const DEPTH_UNITS_PER_METRE: f32 = 5000.0;
 const BASELINE_M: f32 = 0.06;
-/// As in the KITTI benchmarks.
+/// Scale of the KITTI benchmarks.
 const DISPARITY_UNITS_PER_PX: f32 = 256.0;
-/// So many of the portrait's frames have a right eye's picture.
+/// Number of the portrait's frames that have a right picture.
 const STEREO_FRAMES: u32 = 12;
 const COC_AT_INFINITY_PX: f32 = 14.0;
 /// Rays per pixel of the true blur: more than half the pixels of the widest disc.
@@ -39,11 +39,11 @@ const LENS_RAYS: usize = 720;
 const DISC_FRAMES: [u32; 3] = [0, 8, 16];
 const HEXAGON_FRAMES: [u32; 1] = [0];
 
-/// Of the colours of the demonstration.
+/// JPEG quality of the demonstration's colour pictures.
 const JPEG_QUALITY: u8 = 82;
-/// What the demonstration may lose by that.
+/// Minimum PSNR of the demonstration's JPEGs.
 const MIN_PSNR_DB: f64 = 34.0;
-/// What changes less in the demonstration, in parts of 255, stands still.
+/// Changes below this many codes count as static in the demonstration.
 const MIN_CHANGE: u8 = 2;
 
 type Outcome = Result<(), Box<dyn Error>>;
@@ -51,7 +51,7 @@ type Outcome = Result<(), Box<dyn Error>>;
 /// Renders a recording into its folder.
 type Make = fn(&mut Folder) -> Outcome;
 
-/// The recordings, and what makes each.
+/// The recordings, and the function that renders each.
 const RECORDINGS: [(&str, Make); 3] = [("portrait", make_portrait), ("stereo", make_stereo), ("demo", make_demo)];
 
 fn main() -> ExitCode {
@@ -96,7 +96,8 @@ fn make_portrait(folder: &mut Folder) -> Outcome {
     make_truth(folder, &scene, &view)
 }
 
-/// Both eyes and the true disparity of the portrait's first frames, in the layout of the KITTI odometry benchmark.
+/// Renders both pictures and the true disparity of the portrait's first frames, in the layout of the KITTI odometry
+/// benchmark.
 fn make_stereo(folder: &mut Folder) -> Outcome {
     let scene = Scene::portrait();
     let left = View::new(SIZE_PX.0, SIZE_PX.1);
@@ -119,7 +120,7 @@ fn make_stereo(folder: &mut Folder) -> Outcome {
     folder.text("times.txt", &times)
 }
 
-/// The loop that is in the program: a whole picture, then tiles as [`demo::Layout`] has them.
+/// Renders the loop that is built into the program: a whole picture, then tiles as in [`demo::Layout`].
 fn make_demo(folder: &mut Folder) -> Outcome {
     let (scene, view) = (Scene::portrait(), View::new(demo::SIZE_PX.0, demo::SIZE_PX.1));
     let render = |frame: u32| {
@@ -180,7 +181,7 @@ fn make_demo(folder: &mut Folder) -> Outcome {
     Ok(())
 }
 
-/// Compares the demonstration, as it is played, with what is rendered.
+/// Compares the demonstration, as it is played, with the renderings.
 fn check_demo(folder: &mut Folder, render: impl Fn(u32) -> (ColorImage, DepthMap)) -> Outcome {
     let mut camera = Demo::new(None)?;
     let (mut color, mut depth, mut right) = (ColorImage::default(), DepthMap::default(), GrayImage::default());
@@ -208,8 +209,8 @@ fn threads() -> usize {
     thread::available_parallelism().map_or(1, |n| n.get())
 }
 
-/// The left eye's colour and depth, and the lists that make the folder a TUM recording. Not through the crate's own
-/// writer, which compresses for speed: these pictures travel with the source.
+/// Writes the left picture and depth, and the lists that make the folder a TUM recording. Does not use the crate's own
+/// writer, which compresses for speed: these pictures are shipped with the source.
 fn make_sequence(folder: &mut Folder, scene: &Scene, view: &View) -> Outcome {
     let mut rgb = String::from("# colour pictures, 8-bit RGB PNG\n# timestamp filename\n");
     let mut depth =
@@ -230,7 +231,7 @@ fn make_sequence(folder: &mut Folder, scene: &Scene, view: &View) -> Outcome {
     folder.text("associations.txt", &pairs)
 }
 
-/// Frames through a true thin lens.
+/// Renders frames through a true thin lens.
 fn make_truth(folder: &mut Folder, scene: &Scene, view: &View) -> Outcome {
     let hexagon = Shape::Polygon { blades: 6, rotation_deg: 0.0, curvature: 0.0 };
     let sets = [("disc", Shape::Disc, &DISC_FRAMES[..]), ("hexagon", hexagon, &HEXAGON_FRAMES[..])];
@@ -264,7 +265,7 @@ fn camera_text(scene: &Scene, view: &View) -> String {
     )
 }
 
-/// The pair's geometry as KITTI writes it: projections of the left and the right colour camera, row by row.
+/// Returns the pair's geometry in KITTI's format: projections of the left and the right colour camera, row by row.
 fn calibration_text(view: &View) -> String {
     let centre = view.principal_point_px();
     let row = |eye_px: f32| {

@@ -1,4 +1,4 @@
-//! What is claimed of the governor, on the simulated machines of `cargo bench --bench governor`.
+//! The claims about the governor, on the simulated machines of `cargo bench --bench governor`.
 #![allow(missing_docs, dead_code)]
 
 #[path = "../../benches/governor/claims.rs"]
@@ -13,7 +13,7 @@ mod rivals;
 use claims::{BUDGET, Outcome, cases};
 use rivals::Ours;
 
-/// All but what compares it with others: those take twelve times as long.
+/// All claims but the comparisons with rivals, which take twelve times as long.
 #[test]
 fn the_governor_keeps_what_is_claimed_of_it_on_every_machine() {
     for case in cases() {

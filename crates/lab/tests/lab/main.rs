@@ -1,4 +1,4 @@
-//! The scene, and what benches measure with.
+//! The scene, and the modules that the benches measure with.
 #![allow(missing_docs)]
 
 mod governor;

@@ -53,7 +53,7 @@ fn scene(shape: Shape, surfaces: Vec<Surface>) -> Scene {
     Scene { width, height, coc_at_infinity_px: 20.0, aperture: Aperture { shape, intensity: 0.0 }, surfaces }
 }
 
-/// Three surfaces with edges, one of them slanted, with the CoC scaled by `strength`.
+/// Returns three surfaces with edges, one of them slanted, with the CoC scaled by `strength`.
 fn layers(strength: f32, of: impl Fn(Vec2) -> Rgb + Copy + Sync) -> Scene {
     let cut = |p: Vec2, radius: f32| texture::coverage(texture::disc(p, Vec2::new(30.0, 25.0), radius));
     scene(
@@ -90,7 +90,7 @@ fn psnr_is_that_of_its_formula_and_of_its_region() {
 
 #[test]
 fn flip_agrees_with_its_authors_program() {
-    // Means by the C++ reference, version 1.2 (crate nv-flip 0.1.2), for the same pictures.
+    // Means of the C++ reference, version 1.2 (crate nv-flip 0.1.2), for the same pictures.
     let ramp = color(|x, y| [(x * 4) as u8, (y * 5) as u8, (x * y % 256) as u8]);
     let checked =
         color(|x, y| [((x * 4) ^ ((x / 8 + y / 8) % 2 * 24)) as u8, (y * 5) as u8, ((x + 3) * y % 256) as u8]);
@@ -146,7 +146,7 @@ fn a_far_point_of_light_shows_the_aperture_and_a_near_one_the_same_turned() {
             };
             let centroid = Vec2::new(mean(&|p| p.x), mean(&|p| p.y));
             assert!(centroid.distance(middle) < 0.1, "{shape:?}: {centroid}");
-            // Where it is brighter than half its plateau is as large as the aperture.
+            // The area brighter than half the plateau equals that of the aperture.
             let plateau = seen.at(35, 27)[0];
             let found = seen.data.iter().filter(|p| p[0] > 0.5 * plateau).count() as f32;
             let expected = area * coc_px * coc_px;

@@ -14,19 +14,19 @@ fn view() -> View {
     View { width: 97, height: 81, focal_px: 600.0, camera_offset_m: 0.0 }
 }
 
-/// A light on the ray of the picture's middle, `radius_px` wide to either side when sharp.
+/// Returns a light on the optical axis, of radius `radius_px` when sharp.
 fn light_at(depth_m: f32, radius_px: f32) -> PointLight {
     let radius_m = radius_px * depth_m / view().focal_px;
     PointLight { centre_m: depth_m * Vec3::Z, radius_m, radiance: Vec3::splat(50.0) }
 }
 
-/// The light's picture through an aperture.
+/// Renders the light through an aperture.
 fn blurred(light: PointLight, points: &[DVec2]) -> LinearImage {
     let lens = ThinLens { coc_at_infinity_px: COC_AT_INFINITY_PX, focus_m: FOCUS_M, aperture: points };
     Scene::lights(&[light]).render_thin_lens(&view(), 0.0, &lens, 2).hdr
 }
 
-/// Moments of a picture about the optical axis: the mean position and the mean of the squared distance from it.
+/// Returns the moments of a picture about the optical axis: the mean position and the mean squared distance.
 fn moments_px(image: &LinearImage) -> (DVec2, f64) {
     let axis = view().principal_point_px().as_dvec2();
     let pixels = || {
@@ -51,7 +51,7 @@ fn a_point_becomes_a_disc_of_the_thin_lens_radius() {
     let coc = DepthCoc { coc_at_infinity_px: COC_AT_INFINITY_PX, focus_m: FOCUS_M, range_m: 0.0, max_coc_px: 100.0 };
     for depth_m in [0.5, 0.8, 2.0, 4.0, 12.0] {
         let (mean, spread) = moments_px(&blurred(light_at(depth_m, 3.0), &disc));
-        // A disc of radius r spreads by r^2 / 2; the light itself, 3 px, and the pixel, a square, add theirs.
+        // A disc of radius r spreads by r^2 / 2; the light itself, 3 px, and the square pixel add theirs.
         let radius_px = (2.0 * (spread - 4.5 - 1.0 / 6.0)).sqrt();
         let expected_px = f64::from(coc.coc_px(depth_m).abs());
         assert!((radius_px - expected_px).abs() < 0.1, "{depth_m} m: radius {radius_px}, expected {expected_px}");
@@ -169,7 +169,7 @@ fn empty_pictures_and_apertures_are_answered() {
 #[test]
 fn encoding_follows_the_srgb_formula() {
     assert_eq!([0.0, 1.0, 7.0, -1.0].map(encode_srgb), [0, 255, 255, 0]);
-    // 0.0031308 is the end of the linear part; 0.21586 is 128; a NaN is black.
+    // 0.0031308 is the end of the linear part; 0.21586 encodes to 128; NaN becomes black.
     assert_eq!([0.003_130_8, 0.215_860_5, f32::NAN].map(encode_srgb), [10, 128, 0]);
 }
 
@@ -179,7 +179,7 @@ fn a_bundled_frame_is_what_the_renderer_makes() {
     let (color, depth) = pinhole(&Scene::portrait(), &View::new(640, 360), 5.0 / 12.0, 16);
     let there = image::open(folder.join("rgb/000005.png")).expect("bundled picture").into_rgb8();
     assert_eq!(there.dimensions(), color.size());
-    // Another machine's mathematical functions round differently: a thousandth of the values may be off.
+    // Mathematical functions round differently on another machine: a thousandth of the values may be off.
     let off = there.iter().zip(&color.rgb).filter(|(a, b)| a.abs_diff(**b) > 2).count();
     assert!(off * 1000 <= color.rgb.len(), "{off} bytes differ");
     let there = image::open(folder.join("depth/000005.png")).expect("bundled depth map").into_luma16();

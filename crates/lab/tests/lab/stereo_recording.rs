@@ -1,4 +1,4 @@
-//! The bundled stereo recording: calibration, pictures and true disparity belong together.
+//! The bundled stereo recording: calibration, pictures and true disparity are consistent.
 
 use std::fs;
 use std::path::PathBuf;
@@ -38,8 +38,8 @@ fn disparity_px(frame: usize) -> Vec<f32> {
     gray16(&format!("stereo/disp/{frame:06}.png")).iter().map(|&units| f32::from(units) / UNITS_PER_PX).collect()
 }
 
-/// Pixels of a row that the right eye sees, too: nothing nearer lands within a pixel of where they land, and they land
-/// in its picture.
+/// Returns which pixels of a row the right camera sees, too: those that land in its picture, and no nearer surface
+/// lands within a pixel of them.
 fn visible(row: &[f32]) -> Vec<bool> {
     let width = row.len();
     let mut nearest = vec![0.0f32; width];
@@ -58,8 +58,8 @@ fn visible(row: &[f32]) -> Vec<bool> {
     row.iter().enumerate().map(seen).collect()
 }
 
-/// The mean difference, in codes, of the left picture and the right one carried over by the disparity and `off_px`
-/// more, and the share of the pixels that counted: those that both eyes see, on surfaces.
+/// Returns the mean difference, in codes, of the left picture and the right one warped by the disparity plus `off_px`,
+/// and the fraction of the pixels that counted: those that both cameras see, on surfaces.
 fn warped_difference(frame: usize, off_px: f32) -> (f64, f64) {
     let (left, right) =
         (luma(&format!("stereo/image_2/{frame:06}.png")), luma(&format!("stereo/image_3/{frame:06}.png")));
@@ -126,7 +126,7 @@ fn the_left_eye_is_the_portrait_and_its_depth_gives_the_disparity() {
         assert_eq!(color(&format!("stereo/image_2/{frame:06}.png")), color(&format!("portrait/rgb/{frame:06}.png")));
         let depth = gray16(&format!("portrait/depth/{frame:06}.png"));
         for (d, units) in disparity_px(frame).into_iter().zip(depth) {
-            // Half a unit of either, and what the depth's half unit makes of the disparity.
+            // Half a unit of either, and the effect of the depth's half unit on the disparity.
             let z_m = f32::from(units) / 5000.0;
             let expected_px = DISPARITY_AT_1_M_PX / z_m;
             let rounding_px = 0.5 / UNITS_PER_PX + 1e-4 * expected_px / z_m;

@@ -1,11 +1,11 @@
-//! What each command does with good arguments.
+//! Each command with valid arguments.
 
 use std::fs;
 use std::process::Stdio;
 
 use crate::program::{Home, Ran, json, run};
 
-/// A home with `recording`, three small frames.
+/// Creates a home with `recording`, three small frames.
 fn recorded() -> Home {
     let home = Home::new();
     let ran = home.run(&["record", "synthetic", "--size", "64x48", "--frames", "3", "--to", "recording"]);
@@ -16,7 +16,7 @@ fn recorded() -> Home {
 #[test]
 fn a_recording_becomes_pictures_and_a_report_that_adds_up() {
     let home = recorded();
-    // A driver asked for a GPU may write to stderr itself.
+    // On the CPU, as a GPU driver may write to stderr itself.
     let args = ["stream", "recording", "--backend", "cpu", "--to", "out/", "--report", "report.json"];
     let ran = home.run(&args);
     assert_eq!((ran.code, ran.stdout.as_str()), (0, ""), "{}", ran.stderr);
@@ -202,7 +202,7 @@ fn the_aperture_analysis_is_whole_and_is_not_overwritten_unasked() {
     files.sort();
     assert_eq!(files, ["aperture.json", "disc.png", "errors.svg", "star-5.png"]);
     let table = json(out.join("aperture.json"));
-    // McGraw's kernels: 33 taps, hard rim; the disc has 18.7 % at rank 2.
+    // McGraw 2015: kernels of 33 taps with a hard rim; the disc has an error of 18.7 % at rank 2.
     let disc = &table["apertures"][0];
     assert_eq!(disc["aperture"], "disc");
     assert_eq!(disc["singular_values"].as_array().unwrap().len(), 33);

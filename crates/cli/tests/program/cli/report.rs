@@ -1,16 +1,16 @@
-//! The report of a machine for others.
+//! The machine report of `doctor`, meant for publication.
 
 use std::fs;
 
 use crate::program::{Home, Ran};
 
-/// Who is named in what doctor looks at is not named in its report.
+/// The report contains neither user nor host names, even if they occur in the collected information.
 #[test]
 fn a_report_names_no_user_and_no_machine() {
     let home = Home::at(tempfile::Builder::new().prefix("planted-user").tempdir().unwrap());
     let user = home.0.path().file_name().unwrap().to_str().unwrap();
     let host = fs::read_to_string("/proc/sys/kernel/hostname").unwrap();
-    // The session's kind is printed as it is found.
+    // The session type is printed verbatim.
     let planted = format!("x11 {} {user} {} /home/somebody/x", home.0.path().display(), host.trim());
     let file = home.path("report.md");
     let report = |args: &[&str]| {
@@ -26,7 +26,7 @@ fn a_report_names_no_user_and_no_machine() {
     for name in [home.0.path().to_str().unwrap(), user, "somebody"] {
         assert!(!written.stdout.contains(name), "{name}: {}", written.stdout);
     }
-    // A machine that is called as its distribution is keeps that name.
+    // A host name that equals a common word, such as the distribution's name, is not redacted.
     let is_common = ["localhost", "linux", "debian", "ubuntu", "fedora"].contains(&host.trim());
     let is_told = written.stdout.split_whitespace().any(|word| word == host.trim());
     assert!(is_common || !is_told, "{}", written.stdout);

@@ -1,11 +1,11 @@
-//! The one switch, before a `systemctl` that only notes what it is told.
+//! The command `service`, with a fake `systemctl` that records its calls.
 
 use std::fs;
 use std::path::{Path, PathBuf};
 
 use crate::program::{Home, PROGRAM, ROOT, Ran};
 
-/// Knows a unit by its file, whether it is enabled, and how it is; files in its folder hold all that.
+/// A fake `systemctl`: files in its folder hold the unit's load, enablement and activity state.
 const SYSTEMCTL: &str = r#"
 here=$(dirname "$0")
 echo "$*" >>"$here/told"
@@ -33,7 +33,7 @@ struct Session {
 }
 
 impl Session {
-    /// A session in which what is started becomes `becomes`.
+    /// Creates a session in which a started unit enters the state `becomes`.
     fn new(becomes: &str) -> Self {
         let session = Self { home: Home::new() };
         session.home.add_program("systemctl", SYSTEMCTL);
@@ -62,7 +62,7 @@ impl Session {
         Ran::of(self.home.command(&["service", what]).env("PATH", path))
     }
 
-    /// What systemd was told to change.
+    /// Returns the recorded calls, except queries.
     fn told(&self) -> Vec<String> {
         let told = fs::read_to_string(self.at("told")).unwrap();
         told.lines().filter(|line| !line.starts_with("--user show ")).map(str::to_owned).collect()
@@ -83,7 +83,7 @@ fn one_word_starts_it_with_every_session_and_one_ends_that() {
     );
     assert!(on.stdout.starts_with("on: it runs\n  streams   0 --to /dev/video10 --on-demand\n"), "{}", on.stdout);
     assert!(on.stdout.contains("bokehcam/stream.conf"), "{}", on.stdout);
-    // What was written is the package's unit with this program in it.
+    // The written unit is the packaged one with the path of this program.
     let packaged = fs::read_to_string(Path::new(ROOT).join("packaging/bokehcam.service")).unwrap();
     let start = format!("ExecStart=\"{PROGRAM}\" stream");
     assert_eq!(
@@ -118,7 +118,7 @@ fn a_unit_that_is_there_is_left_as_it_is() {
     assert_eq!(fs::read_to_string(session.unit()).unwrap(), "nothing\n");
     assert_eq!(session.told(), ["--user daemon-reload"]);
 
-    // Of a program that has moved.
+    // The unit of a program that has moved.
     let session = Session::new("active");
     session.put_unit("[Service]\nExecStart=/gone/bokehcam stream $STREAM\n");
     fs::write(session.at("loaded"), "loaded").unwrap();

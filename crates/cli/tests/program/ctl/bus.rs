@@ -1,4 +1,4 @@
-//! A stream on a message bus of the tests' own: methods, signals, and the icon in a tray that only takes note.
+//! A stream on a private D-Bus: methods, signals, and the icon in a fake tray.
 
 use std::io::{BufRead, BufReader};
 use std::process::{Command, Stdio};
@@ -39,7 +39,7 @@ impl Daemon {
     }
 }
 
-/// Collects icons.
+/// A fake tray that records registered icons.
 struct Watcher(Sender<String>);
 
 #[zbus::interface(name = "org.kde.StatusNotifierWatcher")]
@@ -55,7 +55,7 @@ fn watcher(daemon: &Daemon) -> (Connection, Receiver<String>) {
     (served.name(WATCHER).unwrap().build().unwrap(), items)
 }
 
-/// A stream with an icon, once it is on the bus.
+/// Starts a stream with a tray icon, and waits until it is on the bus.
 fn stream(world: &World, daemon: &Daemon, bus: &Connection) -> Beside {
     let args = ["stream", PORTRAIT, "--loop", "--pace", "realtime", "--quiet", "--to", "null", "--tray"];
     let running = Beside::start(world.bokehcam(&args).env("DBUS_SESSION_BUS_ADDRESS", &daemon.address));
@@ -100,7 +100,7 @@ fn desktops_switch_it_and_are_told() {
     assert!(presets.iter().any(|name| name == "dreamy"), "{presets:?}");
     camera.call_method("Toggle", &()).unwrap();
     assert_eq!((next().as_str(), &world.status(&[])["on"]), ("Active false", &false.into()));
-    // Whoever asks, all are told.
+    // Signals are sent for changes made by any client.
     world.ctl(&["on"]).done();
     assert_eq!(next(), "Active true");
     camera.call_method("SetPreset", &"dreamy").unwrap();
@@ -109,7 +109,7 @@ fn desktops_switch_it_and_are_told() {
     assert_eq!((next().as_str(), &world.status(&[])["look"]["rim"]), ("Preset ", &"0.5".into()));
     let refused = camera.call_method("SetPreset", &"nosuch").unwrap_err().to_string();
     assert!(refused.contains("nosuch"), "{refused}");
-    // What asks and changes nothing is no news.
+    // A query changes nothing and sends no signal.
     world.status(&[]);
     assert!(told.recv_timeout(Duration::from_millis(300)).is_err());
     assert_eq!(stream.interrupt(), 0);
@@ -138,14 +138,14 @@ fn an_icon_is_in_the_tray_and_a_click_switches() {
     while camera.get_property::<String>("Preset").unwrap() != presets[0] {
         assert!(began.elapsed() < HANG, "the first preset");
     }
-    // A desktop that starts its tray anew has the icon again.
+    // A restarted tray gets the icon again.
     drop((tray, items));
     let (_tray, items) = watcher(&daemon);
     assert_eq!(items.recv_timeout(HANG).expect("the icon again"), service);
     assert_eq!(stream.interrupt(), 0);
 }
 
-/// Without a bus the stream runs, and one line says what is missing.
+/// Without a bus the stream still runs, and one line reports the missing bus.
 #[test]
 fn without_a_bus_it_runs() {
     let world = World::new();

@@ -1,4 +1,4 @@
-//! `bokehcam ctl` against streams that run: what goes out changes, nobody else is listened to, and nobody holds it up.
+//! `bokehcam ctl` on running streams: the output changes, other users are refused, and no client blocks the stream.
 #![allow(missing_docs)]
 
 #[cfg(feature = "desktop")]
@@ -29,13 +29,13 @@ fn off_shows_the_card_and_nothing_else_until_it_is_on_again() {
     pictures.wait_for("the card", |picture| picture.is_card());
     let covered = pictures.cards().len();
     assert_eq!(world.status(&[])["on"], false);
-    // It goes on, though the camera rests: no frames, and yet pictures.
+    // The output continues with the card while the source is paused.
     until("no frames come any more", || world.status(&[])["fps"] == 0.0);
     let still = pictures.cards().len();
     until("a viewer goes on to be given pictures", || pictures.cards().len() > still + 10);
     assert_eq!(world.status(&[])["fps"], 0.0);
     assert!(pictures.cards()[covered..].iter().all(|(_, is_card)| *is_card), "nothing of the person is shown");
-    // Another look changes nothing about that; twice off is off.
+    // Neither another look nor a second `off` turns it on.
     world.ctl(&["set", "effect=none"]).done();
     world.ctl(&["off"]).done();
     std::thread::sleep(Duration::from_millis(500));
@@ -50,7 +50,7 @@ fn off_shows_the_card_and_nothing_else_until_it_is_on_again() {
     assert_eq!(stream.interrupt(), 0);
 }
 
-/// The mean detail of the next pictures: of a loop that all of them see.
+/// Measures the mean detail of the next 13 pictures, about a second of the recording.
 fn detail(pictures: &Pictures) -> f64 {
     let (mut sum, mut count) = (0.0, 0);
     pictures.wait_for("a second of them", |picture| {
@@ -77,12 +77,12 @@ fn presets_and_settings_change_the_blur_of_what_goes_out() {
     let status = world.status(&[]);
     let look = &status["look"];
     assert_eq!(json!([look["coc-at-infinity"], look["effect"]]), json!(["4%", "blur"]));
-    // Which of them is up to the machine and what else it does.
+    // The level depends on the machine's speed and load.
     let quality = status["quality"].as_str().expect("it is blurred");
     assert!(Quality::ALL.iter().any(|level| level.name() == quality), "{quality}");
     world.ctl(&["set", "effect=none"]).done();
     assert!(detail(&pictures) > 1.2 * little);
-    // What has no effect is said.
+    // A setting without effect is reported.
     let ran = world.ctl(&["set", "tilt=0.5"]);
     assert!(ran.done().starts_with("warning: without effect here: --tilt 0.5"), "{}", ran.stderr);
 }
@@ -119,7 +119,7 @@ fn the_status_says_how_it_is() {
     let began = Instant::now();
     let stream = world.stream("desk", &["--to", "null", "--to", "out.y4m", "--name", "desk"]);
     let answers = Instant::now();
-    // There is a rate once two frames have come.
+    // The frame rate is known from the second frame on.
     until("frames come", || world.status(&[])["fps"] != 0.0);
     let least_s = answers.elapsed().as_secs_f64();
     let status = world.status(&[]);
@@ -132,7 +132,7 @@ fn the_status_says_how_it_is() {
         assert_eq!(status[name], *value, "{name}");
     }
     let fps = status["fps"].as_f64().unwrap();
-    // How many of the recording's twelve there is time for is the machine's affair.
+    // The rate depends on the machine's speed; the recording has twelve frames per second.
     assert!(fps > 0.0 && fps < 40.0, "{fps}");
     let uptime_s = status["uptime_s"].as_f64().unwrap();
     assert!((least_s - 0.1..most_s + 0.1).contains(&uptime_s), "{uptime_s} of {least_s} to {most_s}");
@@ -196,7 +196,7 @@ fn it_reacts_at_once() {
     for (what, mut times) in all {
         times.sort();
         println!("{what}: median {:.1?}, longest {:.1?}", times[5], times[9]);
-        // What waits out somebody's patience does so each time, and a busy machine now and then.
+        // A timeout in the code would delay every run, a busy machine only some: the shortest run decides.
         assert!(times[0] < Duration::from_secs(1), "{what}: {times:?}");
     }
 }

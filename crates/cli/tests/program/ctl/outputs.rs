@@ -1,4 +1,4 @@
-//! Several outputs at once, of which one takes nothing.
+//! Several outputs, one of which is blocked.
 
 use std::fs;
 use std::path::Path;
@@ -7,13 +7,13 @@ use rustix::process::{Pid, Signal, kill_process};
 
 use super::world::*;
 
-/// Bytes of all files in a folder, also of those that have no name of their own yet.
+/// Returns the total size of all files in a folder, unfinished ones included.
 fn bytes_in(folder: &Path) -> u64 {
     let files = fs::read_dir(folder).unwrap().flatten();
     files.filter_map(|file| file.metadata().ok()).map(|file| file.len()).sum()
 }
 
-/// The state of a process, such as `T` for one that was stopped.
+/// Returns the state of a process, such as `T` if stopped.
 fn state(process: Pid) -> Option<char> {
     let stat = fs::read_to_string(format!("/proc/{}/stat", process.as_raw_nonzero())).ok()?;
     stat.rsplit_once(") ")?.1.chars().next()
@@ -22,7 +22,7 @@ fn state(process: Pid) -> Option<char> {
 #[test]
 fn a_reader_that_stops_holds_up_no_file_and_off_is_off_there() {
     let world = World::new();
-    // Nobody reads its standard output.
+    // The standard output has no reader.
     let run = world.stream("stream", &["--to", "-", "--to", "call.y4m"]);
     let mut before = 0;
     for _ in 0..5 {
@@ -48,7 +48,7 @@ fn an_encoder_that_hangs_holds_up_no_other_output_and_off_is_off_there() {
     pictures.wait_for("it runs", |_| true);
     let ffmpeg = run.children()[0];
     kill_process(ffmpeg, Signal::STOP).unwrap();
-    // Far fewer than come until it is given up.
+    // Far fewer frames than pass before the blocked output is abandoned.
     for _ in 0..8 {
         pictures.wait_for("the other output goes on", |picture| !picture.is_card());
     }

@@ -1,4 +1,4 @@
-//! What is refused: nothing is changed by it, and nothing else waits for it.
+//! Refused requests change nothing and do not delay others.
 
 use std::io::Write;
 use std::os::unix::net::UnixStream;
@@ -31,7 +31,7 @@ fn a_setting_that_cannot_be_changes_none() {
         world.ctl(args).refused(if said.contains("no.png") { 1 } else { 2 }, &[said]);
         assert_eq!(world.status(&[])["look"], before, "{args:?}");
     }
-    // The same words as those of the command line.
+    // The message is that of the command line.
     let flag = world.run(&["stream", "demo", "--to", "null", "--rim", "2"]);
     assert_eq!(world.ctl(&["set", "rim=2"]).refused(2, &[]), flag.refused(2, &[]));
     for args in [&["dance"][..], &["set"], &["status", "--name", "../x"]] {
@@ -59,7 +59,7 @@ fn what_is_no_request_is_answered_so() {
         assert_eq!(value["usage"], true, "{answer}");
         assert!(value["error"].as_str().unwrap().contains(said), "{answer}");
     }
-    // The longest request, and one byte more.
+    // The longest valid request, and one byte more.
     let longest = |bytes: usize| {
         let mut request = br#"{"do":"status"}"#.to_vec();
         request.resize(bytes - 1, b' ');
@@ -68,7 +68,7 @@ fn what_is_no_request_is_answered_so() {
     };
     assert!(longest(16_384).contains("\"status\""));
     assert!(longest(16_385).contains("too long"));
-    // An end without a line.
+    // End of file without a newline.
     let mut stream = UnixStream::connect(world.socket("stream")).unwrap();
     stream.write_all(b"{\"do\":\"off\"}").unwrap();
     stream.shutdown(std::net::Shutdown::Write).unwrap();
@@ -81,8 +81,8 @@ fn who_says_nothing_holds_nobody_up() {
     let world = World::new();
     let _stream = world.stream("stream", &["--to", "null"]);
     let connect = || UnixStream::connect(world.socket("stream")).unwrap();
-    // Each of them has a second, so that one after the other would take six. One of the eight places may be held for a
-    // moment by somebody of before, and a busy machine may need another try.
+    // Each client has a timeout of 1 s, so that serial handling would take 6 s. An earlier client may still occupy one
+    // of the eight slots, and a busy machine may need another try.
     until("six say nothing, and a seventh is served all the same", || {
         let began = Instant::now();
         let silent: Vec<UnixStream> = (0..6).map(|_| connect()).collect();
@@ -94,8 +94,7 @@ fn who_says_nothing_holds_nobody_up() {
         }
         took < Duration::from_secs(1)
     });
-    // More than there is room for are told so at once, and served once there is: for those who come when the first ones have
-    // had their second, there is room again.
+    // Clients above the limit are refused at once. Slots become free when the first clients time out after 1 s.
     until("most are told at once that there is no room", || {
         let silent: Vec<UnixStream> = (0..20).map(|_| connect()).collect();
         let answers: Vec<String> = silent.iter().map(answer).collect();
@@ -105,7 +104,7 @@ fn who_says_nothing_holds_nobody_up() {
         refused >= 12 && late >= 7
     });
     assert_eq!(world.status(&[])["on"], true);
-    // A request in pieces comes in time, or does not.
+    // A request in pieces must still be complete within 1 s.
     let mut slow = connect();
     let began = Instant::now();
     for byte in b"{\"do\":\"off\"}            " {
@@ -193,7 +192,7 @@ fn another_user_is_refused_even_where_the_folder_is_open() {
     let _stream = world.stream("stream", &["--to", "null"]);
     let nobody = rustix::process::Uid::from_raw(65534);
     let socket = world.socket("stream");
-    // The identity of one thread alone changes.
+    // Changes the user id of this thread only.
     let ask = move || {
         std::thread::spawn(move || {
             rustix::thread::set_thread_res_uid(nobody, nobody, nobody).unwrap();

@@ -1,4 +1,4 @@
-//! Runs and their names: several, dead ones, and none.
+//! Names of runs: several runs, killed ones, and none.
 
 use std::fs::{self, Permissions};
 use std::os::unix::fs::{FileTypeExt, PermissionsExt};
@@ -63,7 +63,7 @@ fn what_a_dead_run_left_is_swept_and_nothing_else_is_touched() {
         fs::write(file, "mine").unwrap();
     }
     let alive = UnixListener::bind(world.socket("other")).unwrap();
-    // The dead one's name is free again; that of a file is not.
+    // The name of a killed run is free again; one taken by a regular file is not.
     let first = world.stream("stream", &["--to", "null"]);
     let second = world.stream("stream-3", &["--to", "null"]);
     let refused = world.run(&["stream", "demo", "--frames", "1", "--to", "null", "--name", "desk"]);
@@ -75,7 +75,7 @@ fn what_a_dead_run_left_is_swept_and_nothing_else_is_touched() {
     assert!(world.socket("other").exists(), "somebody listens there");
     drop(alive);
 
-    // What came to have its name meanwhile is not the run's own.
+    // A run does not remove a file that has replaced its socket.
     let stream = world.stream("stream", &["--to", "null"]);
     fs::remove_file(world.socket("stream")).unwrap();
     fs::write(world.socket("stream"), "mine").unwrap();

@@ -1,4 +1,4 @@
-//! A user with a runtime folder and settings of their own, streams that run there, and what comes out of them.
+//! A user with private runtime folder and settings, running streams, and their output.
 
 use std::fs;
 use std::io::{BufRead, BufReader, Read, Write};
@@ -14,10 +14,10 @@ use serde_json::Value;
 
 use crate::program::{self, Beside, Home, PORTRAIT, Ran};
 
-/// Nothing here takes so long: against a hang.
+/// Timeout against hangs; far longer than any test takes.
 pub const HANG: Duration = Duration::from_secs(60);
 
-/// Waits until something is so.
+/// Waits until a condition holds.
 #[track_caller]
 pub fn until(what: &str, is: impl FnMut() -> bool) {
     program::until(what, HANG, is);
@@ -63,15 +63,15 @@ impl World {
         ran.json()
     }
 
-    /// What a run answers to these bytes, sent as they are; the connection stays open from this side.
+    /// Sends raw bytes to a run, leaving the connection open; returns its answer.
     pub fn tell(&self, name: &str, request: &[u8]) -> String {
         let mut stream = UnixStream::connect(self.socket(name)).unwrap();
-        // Refused before all was sent.
+        // The run may refuse the request before all of it is sent.
         let _ = stream.write_all(request);
         answer(&stream)
     }
 
-    /// A looped recording in real time, with these arguments, once it answers.
+    /// Starts a stream of the looped recording in real time, and waits until it answers.
     pub fn stream(&self, name: &str, args: &[&str]) -> Beside {
         let first = ["stream", PORTRAIT, "--loop", "--pace", "realtime", "--quiet"];
         let running = Beside::start(self.bokehcam(&[&first, args].concat()).stdout(Stdio::piped()));
@@ -88,19 +88,19 @@ pub fn answer(stream: &UnixStream) -> String {
 }
 
 impl Beside {
-    /// Ends it as Ctrl-C does, whether or not somebody reads its pictures; gives back its exit code.
+    /// Sends SIGINT, as Ctrl-C does, and returns the exit code; also works with an unread output.
     pub fn interrupt(mut self) -> i32 {
         self.signal(Signal::INT);
         self.0.wait().unwrap().code().unwrap()
     }
 
-    /// What it writes to its standard output.
+    /// Reads the pictures on its standard output.
     pub fn watch(&mut self) -> Pictures {
         Pictures::of(self.0.stdout.take().unwrap())
     }
 }
 
-/// The brightness of a picture, 16 to 235.
+/// The luma plane of a picture, 16 to 235.
 #[derive(Clone)]
 pub struct Picture {
     pub width: usize,
@@ -109,7 +109,7 @@ pub struct Picture {
 }
 
 impl Picture {
-    /// Whether it is the still card: dark, from the top to the bottom and nothing else at its sides.
+    /// Whether this is the still card: a dark vertical gradient, constant along the first eighth of each row.
     pub fn is_card(&self) -> bool {
         let rows: Vec<&[u8]> = self.luma.chunks_exact(self.width).collect();
         let (first, last) = (rows[0][0], rows[rows.len() - 1][0]);
@@ -117,14 +117,14 @@ impl Picture {
         first.abs_diff(57) <= 3 && last.abs_diff(38) <= 3 && rows.iter().all(is_even)
     }
 
-    /// How much its rows vary from pixel to pixel: blur takes it away.
+    /// Measures detail, which blur removes: the mean difference between adjacent pixels of a row.
     pub fn detail(&self) -> f64 {
         let pairs = self.luma.windows(2).map(|pair| f64::from(pair[0].abs_diff(pair[1])));
         pairs.sum::<f64>() / self.luma.len() as f64
     }
 }
 
-/// The pictures of a y4m stream, of which the last is kept, and for each whether it was the card.
+/// The pictures of a y4m stream: the last one, and for each one whether it was the card.
 #[derive(Clone)]
 pub struct Pictures(Arc<Mutex<Seen>>);
 
@@ -159,12 +159,12 @@ impl Pictures {
         }
     }
 
-    /// For each picture so far when it came, and whether it was the card.
+    /// Returns the arrival time of each picture so far, and whether it was the card.
     pub fn cards(&self) -> Vec<(Instant, bool)> {
         self.0.lock().unwrap().0.clone()
     }
 
-    /// The first picture from now on that is like this.
+    /// Waits for the next picture that satisfies `is_it`.
     pub fn wait_for(&self, what: &str, mut is_it: impl FnMut(&Picture) -> bool) -> Picture {
         let began = Instant::now();
         let mut last = None;

@@ -1,9 +1,9 @@
-//! The commands that a page has.
+//! Extracts the commands of a page.
 
-/// What a sentence leaves open, and what stands there when it is tried.
+/// Commands with placeholders, and the commands that run instead.
 const OPEN: [(&str, &str); 18] = [
     ("bokehcam COMMAND", "bokehcam render"),
-    // Another than the one that runs.
+    // Another name than that of the running stream.
     ("bokehcam stream ... --name desk", "bokehcam stream demo --frames 1 --to null --name other"),
     ("bokehcam stream ...", "bokehcam stream demo --frames 1 --to null"),
     ("bokehcam render ...", "bokehcam render photo.jpg --depth-map depth.png --out any.png"),
@@ -23,7 +23,7 @@ const OPEN: [(&str, &str); 18] = [
     ("--debug-dir DIR", "--debug-dir steps/"),
 ];
 
-/// The commands of a page, without their comments, in its order; one that goes on in the next line is whole.
+/// Returns the commands of a page in order, without comments and with continuation lines joined.
 pub fn commands(page: &str) -> Vec<String> {
     let mut commands: Vec<String> = Vec::new();
     let (mut block, mut goes_on, mut sentences) = (None, false, String::new());
@@ -47,7 +47,7 @@ pub fn commands(page: &str) -> Vec<String> {
                     *last = format!("{} ", last.trim_end_matches('\\').trim_end());
                 }
             }
-            // What the session's unit runs.
+            // The command in the systemd user unit.
             (Some(_), None) => {
                 let stream = line.strip_prefix("STREAM=\"").and_then(|line| line.strip_suffix('"'));
                 commands.extend(stream.map(|stream| format!("bokehcam stream {stream}")));
@@ -57,7 +57,7 @@ pub fn commands(page: &str) -> Vec<String> {
     commands
 }
 
-/// The commands that sentences name. One without any argument is only meant: that there is help of it is all there is to try.
+/// Returns the commands named in sentences. For one without arguments, only its help is tried.
 fn within_sentences(text: &str) -> Vec<String> {
     let code = text.split('`').skip(1).step_by(2).filter(|code| code.starts_with("bokehcam "));
     let tried = code.map(|code| {

@@ -1,11 +1,10 @@
-/* A Vulkan layer under which a GPU fails as hardware does. FAULT is KIND:N, and the Nth call that it strikes and all
- * after that fail:
- *   submit     the device is lost when work is submitted
- *   wait       the device is lost while its work is waited for
- *   hang       work is never done: waiting for it takes as long as was asked for
- *   memory     there is no more memory
- *   idle       work is reported as done that was not done
- * Needs no header of Vulkan's: what is used of it is declared here, as its specification has it. */
+/* A Vulkan layer that injects GPU faults. FAULT is KIND:N; the Nth call of that kind and all later ones fail:
+ *   submit     device loss at submission
+ *   wait       device loss during a wait
+ *   hang       work never completes: each wait lasts until its timeout
+ *   memory     out of memory
+ *   idle       work is skipped but reported as complete
+ * Needs no Vulkan headers: the required declarations are repeated here, as in the specification. */
 #include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
@@ -19,7 +18,7 @@ typedef int32_t Result;
 typedef void (*Function)(void);
 typedef Function (*GetProc)(void *object, const char *name);
 
-/* The loader's chain of layers. */
+/* The loader's chain of layers (VkLayerInstanceCreateInfo, VkLayerDeviceCreateInfo). */
 struct link {
     struct link *next;
     GetProc instance_proc, device_proc;
@@ -39,7 +38,7 @@ struct interface {
 
 static GetProc next_of_instance, next_of_device;
 
-/* Whether the calls of this kind fail from now on. */
+/* Counts a call of this kind; whether it fails. */
 static int strikes(const char *kind) {
     static int calls, struck;
     const char *fault = getenv("FAULT");
@@ -51,7 +50,7 @@ static int strikes(const char *kind) {
     return struck;
 }
 
-/* Whether the device is lost already, by whatever call. */
+/* Whether any call has lost the device. */
 static int lost;
 static Result lose(void) {
     lost = 1;
@@ -78,7 +77,7 @@ static Result hang(uint64_t timeout_ns) {
     return TIMEOUT;
 }
 
-/* Who waits looks now and then: only waits that find the work done count, however many looks there were. */
+/* The program polls with short timeouts, so only waits that succeed are counted. */
 static Result waited(Result found, uint64_t timeout_ns) {
     if (found == TIMEOUT)
         return found;
@@ -160,7 +159,7 @@ static Function of_device(void *device, const char *name) {
     return next;
 }
 
-/* Ours in the chain; the next layer finds its own there. */
+/* Returns this layer's link, and advances the chain to the next layer. */
 static struct link *take_link(const void *info, int32_t type) {
     struct chain *chain = ((const struct chain *)info)->next;
     while (chain->type != type || chain->kind != 0)

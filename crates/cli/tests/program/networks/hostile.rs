@@ -1,4 +1,4 @@
-//! Networks that would do harm: none hangs the program, aborts it, or has the terminal obey it.
+//! Malicious networks can neither hang nor abort the program, nor send control sequences to the terminal.
 
 use std::fs;
 use std::os::unix::fs::PermissionsExt;
@@ -13,14 +13,14 @@ use super::onnx::{Side, always, constant, conv, endless_loop, integers, matte, m
 use super::{WEIGHTS, streamed, written};
 use crate::program::{Beside, Home, PORTRAIT, found, until};
 
-/// What takes longer hangs.
+/// Timeout against hangs.
 const HANG: Duration = Duration::from_secs(120);
 
 fn sides(channels: u64) -> [Side; 4] {
     [Side::Is(1), Side::Is(channels), Side::Is(12), Side::Is(16)]
 }
 
-/// A network that takes a picture, with these constants and nodes, whose last one gives `out`.
+/// Builds a network with a picture as its input; the last node must write `out`.
 fn network(constants: &[Vec<u8>], nodes: &[Vec<u8>]) -> Vec<u8> {
     model(&[port("in", &sides(3))], constants, nodes, &[port("out", &sides(1))])
 }
@@ -57,7 +57,7 @@ fn what_would_run_for_ever_or_take_all_memory_is_refused_in_one_line() {
     }
 }
 
-/// It passes the trial, whose picture is grey, and asks for 100 GB once there is something to see.
+/// The network passes the self-test on a grey picture, but allocates 100 GB on a real one.
 #[test]
 fn a_network_that_fails_in_the_run_blurs_all_and_no_frame_is_lost() {
     let home = Home::new();
@@ -81,7 +81,7 @@ fn a_network_that_fails_in_the_run_blurs_all_and_no_frame_is_lost() {
     assert!(told.len() == 1 && told[0].contains("more than 4 GiB of memory"), "{said}");
 }
 
-/// A stream without an end by a network of the test's own, and the process that runs that.
+/// Starts an endless stream with a network; returns it and the worker process that runs the network.
 fn endless(home: &Home) -> (Beside, Pid) {
     written(&home.0, "good.onnx", &matte(16, 12, WEIGHTS, 0.0));
     let stream = ["stream", PORTRAIT, "--loop", "--pace", "realtime", "--network-runtime", "built-in"];
@@ -125,13 +125,13 @@ fn a_signal_ends_a_run_whose_network_hangs_and_its_output_is_whole() {
 fn the_process_of_a_network_goes_with_the_program() {
     let home = Home::new();
     let (program, worker) = endless(&home);
-    // It gets no chance to clean up.
+    // The program is killed without a chance to clean up.
     drop(program);
     let state = || fs::read_to_string(format!("/proc/{}/stat", worker.as_raw_nonzero())).ok();
     until("the network's process goes", HANG, || state().is_none_or(|stat| stat.contains(") Z ")));
 }
 
-/// A named pipe in the place of ONNX Runtime: who opens it waits for ever.
+/// Puts a named pipe in the place of ONNX Runtime; opening it blocks for ever.
 fn trap(root: &Path) {
     let capi = root.join("lib/python3/site-packages/onnxruntime/capi");
     fs::create_dir_all(&capi).unwrap();

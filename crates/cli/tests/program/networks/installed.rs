@@ -1,4 +1,4 @@
-//! Networks that are known: fetched, checked, installed.
+//! Known networks: download, verification and installation.
 
 use std::fs;
 use std::path::Path;
@@ -23,7 +23,7 @@ fn only_known_networks_are_installed_and_nothing_of_others_is_replaced() {
     assert!(!listed.contains("here     /"));
 }
 
-/// A client that brings what a test wants, and says how it was called.
+/// Adds a fake `curl` that outputs `content` and logs its arguments.
 fn client(home: &Home, content: &Path) {
     home.add_program("curl", &format!("echo \"called with $*\" >&2\ncat {}", content.display()));
 }
@@ -39,14 +39,14 @@ fn what_is_fetched_is_checked_and_how_is_shown() {
     let ran = get(&[]);
     let said = ran.failed(1, &["is not kept", KNOWN[0].address]);
     assert!(said.find("curl --fail").unwrap() < said.find("called with").unwrap(), "{said}");
-    // Endless, and far too much.
+    // An endless download.
     client(&home, Path::new("/dev/zero"));
     get(&["tcmonodepth-small"]).failed(1, &["is not kept"]);
     assert!(!home.path("data").exists());
     get(&["nothing"]).failed(2, &[KNOWN[0].file]);
 }
 
-/// The networks that users are pointed to.
+/// The networks recommended to users.
 #[test]
 #[ignore = "needs BOKEHCAM_DATA, a folder with models"]
 fn the_known_networks_run_and_are_installed() {
@@ -63,7 +63,7 @@ fn the_known_networks_run_and_are_installed() {
         assert!(read(&mut camera, &color, 0).metres.iter().all(|&metres| DepthMap::is_known(metres)));
         add(&file).done();
         assert!(home.path("data/bokehcam/models").join(known.file).is_file());
-        // Again changes nothing; and not over what is another's.
+        // Adding a network again changes nothing.
         add(&file).done();
     }
     let best = real::model(Task::Matte);

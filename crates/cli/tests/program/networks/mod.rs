@@ -1,4 +1,4 @@
-//! Networks of the user's own: loaded, run, and kept from doing harm; and what depth they give one camera.
+//! User-supplied networks: loading, running, sandboxing, and their depth for a single camera.
 
 mod hostile;
 mod installed;
@@ -21,7 +21,7 @@ use tempfile::TempDir;
 
 use crate::program::{Home, PORTRAIT, Ran};
 
-/// Red is the person, and blue is not: codes of 255 and 0 leave no doubt.
+/// Weights that classify red as the person and blue as background, with certainty at codes of 255 and 0.
 const WEIGHTS: [f32; 3] = [12.0, 0.0, -12.0];
 
 fn written(folder: &TempDir, name: &str, bytes: &[u8]) -> PathBuf {
@@ -41,7 +41,7 @@ fn read(camera: &mut dyn DepthSource, color: &ColorImage, frame: u64) -> DepthMa
     map
 }
 
-/// A red disc before blue, each pixel the mean of what it shows.
+/// Draws an antialiased red disc on blue; returns the picture and the disc's coverage per pixel.
 fn disc(width: u32, height: u32, (x, y): (f32, f32), radius_px: f32) -> (ColorImage, Vec<f32>) {
     let mut color = ColorImage::new(width, height);
     let mut shares = Vec::new();
@@ -78,7 +78,7 @@ fn a_network_gives_what_its_layers_say() {
 #[test]
 fn a_coarse_mask_becomes_the_share_of_every_pixel() {
     let folder = TempDir::new().unwrap();
-    // A tenth of the picture's size.
+    // The network's input has a tenth of the picture's size.
     let file = written(&folder, "matte.onnx", &matte(32, 24, WEIGHTS, 0.0));
     let (color, shares) = disc(320, 240, (163.0, 118.0), 70.0);
     let map = read(&mut camera(&file, Runtime::BuiltIn), &color, 0);
@@ -91,14 +91,14 @@ fn a_coarse_mask_becomes_the_share_of_every_pixel() {
     let error: f32 = found.iter().zip(&shares).map(|(found, share)| (found - share).abs()).sum();
     let count = shares.iter().filter(|share| mixed(share)).count() as f32;
     assert!(error / count < 0.03, "mean error over {count} mixed pixels: {}", error / count);
-    // Both colours together are the pixel: with the surfaces' own, each is pure.
+    // Unmixed foreground and background colours are pure, so that their difference is nearly one.
     for pixel in &map.matte.pixels {
         let red = pixel.difference[0];
         assert!((0.7..1.0).contains(&red), "{pixel:?}");
     }
 }
 
-/// Live, a network for depth may take longer than a frame: what it saw is told some frames later, and is the same.
+/// In a live run, a depth network may take longer than a frame; its result arrives some frames later, unchanged.
 #[test]
 fn what_is_seen_aside_is_what_is_seen_at_once() {
     let folder = TempDir::new().unwrap();
@@ -111,7 +111,7 @@ fn what_is_seen_aside_is_what_is_seen_at_once() {
     let finest = live.efforts().len() - 1;
     live.set_effort(finest);
     assert!(read(&mut live, &first, 0) == read(&mut at_once, &first, 0), "the first one has its own depth");
-    // By then undecided pixels have settled.
+    // After 199 frames, pixels near the threshold have settled.
     let expected = (1..200).map(|frame| read(&mut at_once, &second, frame)).last();
     let is_there = (1..2000).any(|frame| {
         std::thread::sleep(Duration::from_millis(1));
@@ -120,7 +120,7 @@ fn what_is_seen_aside_is_what_is_seen_at_once() {
     assert!(is_there, "the thread never told");
 }
 
-/// However little time there is, nobody wears the outlines of a frame before.
+/// Even at the lowest effort, a frame never reuses the mask of the previous one.
 #[test]
 fn each_frame_has_a_mask_of_its_own_at_every_effort() {
     let folder = TempDir::new().unwrap();
@@ -144,7 +144,7 @@ fn what_a_network_is_shown_may_lie_any_way_and_be_of_any_size() {
     let folder = TempDir::new().unwrap();
     let (color, _) = disc(64, 48, (32.0, 24.0), 15.0);
     let planes = matte(16, 12, WEIGHTS, 0.0);
-    // Colours beside each other: a product by place, and a sum over them.
+    // Interleaved channels (NHWC): a product with the weights, summed over the channels.
     let beside = |channels| [Side::Is(1), Side::Is(12), Side::Is(16), Side::Is(channels)];
     let beside = model(
         &[port("picture", &beside(3))],
@@ -159,7 +159,7 @@ fn what_a_network_is_shown_may_lie_any_way_and_be_of_any_size() {
         &[conv(&["picture", "w"], "sum"), node("Sigmoid", &["sum"], "out", &[])],
         &[port("out", &any(1))],
     );
-    // Numbers before the last step, and two of them: what is no person, and what is.
+    // Two logits, before softmax: background and person.
     let two = model(
         &[port("picture", &any(3))],
         &[constant("w", &[2, 3, 1, 1], &[-6.0, 0.0, 6.0, 6.0, 0.0, -6.0])],
@@ -176,7 +176,7 @@ fn what_a_network_is_shown_may_lie_any_way_and_be_of_any_size() {
 fn a_network_with_a_memory_gets_back_what_it_gave() {
     let folder = TempDir::new().unwrap();
     let sides = |channels| [Side::Is(1), Side::Is(channels), Side::Is(4), Side::Is(4)];
-    // It adds up what it sees, and is sure from half on.
+    // A recurrent network that accumulates its input, and detects a person from 0.5 on.
     let recurrent = model(
         &[port("src", &sides(3)), port("r1i", &sides(1))],
         &[
@@ -196,14 +196,14 @@ fn a_network_with_a_memory_gets_back_what_it_gave() {
     let mut red = ColorImage::new(16, 16);
     red.rgb.chunks_mut(3).for_each(|pixel| pixel[0] = 255);
     let mut camera = camera(&written(&folder, "r.onnx", &recurrent), Runtime::BuiltIn);
-    // Five tenths are not yet half, six are.
+    // The sixth frame is the first above the threshold.
     let near: Vec<bool> = (0..7).map(|frame| read(&mut camera, &red, frame).metres[0] <= 1.0).collect();
     assert_eq!(near.iter().position(|near| *near), Some(5), "{near:?}");
-    // Another scene, long after: it begins anew.
+    // A long gap between frames resets the state.
     assert!(read(&mut camera, &red, 1000).metres[0] > 1.0);
 }
 
-/// Streams some frames of the portrait with a network of the test's own as its mask.
+/// Streams some frames of the portrait with a network as its mask.
 fn streamed(home: &Home, name: &str, bytes: &[u8], frames: &str) -> Ran {
     let file = format!("{name}.onnx");
     written(&home.0, &file, bytes);
@@ -251,7 +251,7 @@ fn a_bad_file_is_refused_in_one_line() {
 fn without_onnx_runtime_what_is_built_in_is_used_and_what_was_asked_for_is_missed() {
     let home = Home::new();
     written(&home.0, "m.onnx", &matte(8, 4, WEIGHTS, 0.0));
-    // A library that is none.
+    // A file that is not a library.
     let library = written(&home.0, "libonnxruntime.so", b"nothing");
     let run = |runtime: &str| {
         let stream = ["stream", PORTRAIT, "--frames", "2", "--depth", "matte:m.onnx", "--to", "null"];

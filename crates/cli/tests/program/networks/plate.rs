@@ -1,4 +1,4 @@
-//! Who stands before a plate: with networks beside it, and in a real sequence beside what a depth sensor saw.
+//! Segmentation by background plate: combined with networks, and compared with a depth sensor on a real sequence.
 
 use bokehcam::depth::plate::{PlateDepth, Step};
 use bokehcam::depth::single_camera::{Hints, SingleCamera};
@@ -11,11 +11,12 @@ use super::onnx::matte;
 use super::real::{Sequence, model, sure};
 use super::{WEIGHTS, disc, read, written};
 
-/// Of a pixel, what it was in so many frames, if nobody was so near.
+/// Maximum samples per background pixel; each must be more than `AWAY_PX` from the person.
 const SAMPLES: usize = 15;
 const AWAY_PX: usize = 10;
 
-/// The background of a sequence, from the frames in which the person of the network is elsewhere, and where it is known.
+/// Estimates the background of a sequence as the median over frames in which the network sees the person elsewhere;
+/// also returns where it is known.
 fn background(sequence: &Sequence) -> (ColorImage, Vec<bool>) {
     let matte = model(Task::Matte);
     let mut person = SingleCamera::open(Some(&matte), None, &Hints::default(), Runtime::Auto).unwrap();
@@ -57,7 +58,7 @@ fn background(sequence: &Sequence) -> (ColorImage, Vec<bool>) {
                 values[values.len() / 2]
             });
         }
-        // Where it is never seen, as beside it: nothing is counted there.
+        // Unseen pixels take their neighbour's colour; they are excluded from the evaluation.
         plate.rgb[3 * at..3 * at + 3].copy_from_slice(&last);
     }
     (plate, known)
@@ -97,8 +98,8 @@ fn a_real_person_before_a_plate_is_found() {
     assert!(found >= 0.99 && mistaken <= 0.01, "{found} {mistaken}");
 }
 
-/// A plate beside networks: none is taken with a person in the picture, however still they sit; and what changes without
-/// being theirs, as a wall in the light of a lamp, is background.
+/// With networks, no plate is captured while a person is in the picture, however still they sit, and other changes,
+/// such as a lamp's light on the wall, remain background.
 #[test]
 fn a_plate_and_networks_know_more_together() {
     let folder = TempDir::new().unwrap();
@@ -123,7 +124,7 @@ fn a_plate_and_networks_know_more_together() {
     let taken = taken.expect("a plate of the room");
     let mut lit = person.clone();
     for at in (0..320 * 180).filter(|at| at % 320 < 110) {
-        // Green: neither the person's nor the wall's.
+        // Green occurs neither in the person nor in the wall.
         lit.rgb[3 * at + 1] = 200;
     }
     for (picture, what) in [(&person, "as it was"), (&lit, "in another light")] {

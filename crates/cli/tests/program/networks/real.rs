@@ -1,4 +1,4 @@
-//! What the open networks find in a real sequence, beside what a depth sensor saw.
+//! Compares the open networks with a depth sensor on a real sequence.
 
 use std::path::{Path, PathBuf};
 
@@ -10,7 +10,7 @@ use bokehcam::recording::{Options, Recording, Scratch};
 use super::read;
 use crate::program::Home;
 
-/// Pixels of a real sequence that a sensor knows to be of a person, and of the wall, three pixels away from all else.
+/// Returns masks of the person's and the wall's pixels by sensor depth, at least three pixels from anything else.
 pub fn sure(depth: &DepthMap) -> (Vec<bool>, Vec<bool>) {
     let (width, height) = (depth.width as usize, depth.height as usize);
     let within = |range: std::ops::Range<f32>| {
@@ -31,12 +31,12 @@ fn data() -> PathBuf {
     PathBuf::from(std::env::var_os("BOKEHCAM_DATA").expect("BOKEHCAM_DATA names the folder of the data"))
 }
 
-/// The file of the best known network for a task that is in the data.
+/// Returns the file of the best known network for a task in the test data.
 pub fn model(task: Task) -> PathBuf {
     best_in(vec![data().join("models")], task).unwrap()
 }
 
-/// A person who turns, as colours and depth.
+/// A real RGB-D sequence of a turning person.
 pub struct Sequence(Recording);
 
 impl Sequence {
@@ -109,7 +109,7 @@ fn a_real_person_is_found_and_what_rests_rests() {
     assert!(overlap >= 0.998 && flicker[0] <= 0.3 && order >= 0.99, "{overlap} {flicker:?} {order}");
 }
 
-/// A photo of a person is a portrait in every command, as soon as a network is installed.
+/// With an installed network, every command blurs a photo of a person as a portrait.
 #[test]
 #[ignore = "needs BOKEHCAM_DATA, a folder with models and rgbd/person_turning"]
 fn a_photo_alone_has_the_depth_of_the_installed_network_in_every_command() {
@@ -147,7 +147,7 @@ fn what_the_package_brings_is_installed_and_sees_nobody_in_a_grey_wall() {
     assert!(mask[0].values.iter().all(|share| (0.0..0.5).contains(share)));
 }
 
-/// What the package brings runs by itself, and finds what the library finds in the ONNX file of the same weights.
+/// The packaged network runs without ONNX Runtime, and matches ONNX Runtime's result for the same weights.
 #[test]
 #[ignore = "needs BOKEHCAM_DATA and the network for persons, as `scripts/setup models` brings it"]
 fn the_mask_of_what_the_package_brings_is_that_of_the_library() {

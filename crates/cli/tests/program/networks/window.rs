@@ -1,4 +1,4 @@
-//! Networks that the window is given.
+//! Networks in the preview window.
 
 use std::fs;
 
@@ -53,7 +53,7 @@ fn a_source_has_the_ways_to_depth_that_it_brings_and_the_command_names_the_one_t
         assert_eq!((opened.way, opened.ways.first(), opened.has_depth), (Some(usual), Some(&usual), true), "{name}");
         assert!(!opened.ways.contains(&DepthMethod::Plate), "nobody in a recording steps aside");
         assert!(!opened.camera.is_relative);
-        // By its own name it is the same.
+        // Selecting the default method by name gives the same result.
         let again = system.open(name, Some(usual)).unwrap();
         assert_eq!((again.way, &again.ways), (Some(usual), &opened.ways), "{name}");
     }

@@ -1,4 +1,4 @@
-//! What a user of the outputs has and does, by way of a shell.
+//! Helpers that run the program by a shell.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -12,27 +12,27 @@ use crate::common::{Numbers, color, depth};
 use crate::program;
 pub use crate::program::{Beside, Home, Ran, json};
 
-/// Nothing is changed, so that what comes out is known.
+/// Arguments that disable the blur, so that the output equals the input.
 pub const BLUR: &str = "--effect none";
 
 impl Home {
-    /// Runs it with arguments as a shell has them.
+    /// Runs the program with shell arguments.
     pub fn sh(&self, args: &str) -> Ran {
         Ran::of(&mut self.shell("", args))
     }
 
-    /// Starts it beside the test, in a shell that has done `before`.
+    /// Starts the program in the background, from a shell that has run `before`.
     pub fn start(&self, before: &str, args: &str) -> Beside {
         Beside::start(self.shell(before, args).stderr(Stdio::piped()))
     }
 
-    /// As on a disk where no file has room for more than so much.
+    /// Runs the program with a file size limit of `most_kb`, which acts like a full disk.
     pub fn sh_on_full_disk(&self, most_kb: u32, args: &str) -> Ran {
-        // A signal would end it; ignored, writing fails as on a full disk.
+        // SIGXFSZ would end the program; ignored, writing fails as on a full disk.
         Ran::of(&mut self.shell(&format!("trap '' XFSZ; ulimit -f {};", most_kb * 2), args))
     }
 
-    /// A recording of `frames` noisy pictures, `period_s` apart.
+    /// Creates a recording of `frames` noisy pictures at intervals of `period_s`.
     pub fn record(&self, name: &str, frames: u64, period_s: f64) {
         let mut writer = Writer::create(&self.path(name), &WriterOptions::default()).unwrap();
         for frame in 0..frames {
@@ -49,15 +49,15 @@ impl Home {
         fs::write(self.path(picture), &bytes[..bytes.len() / 2]).unwrap();
     }
 
-    /// Puts a program of our own in place of ffmpeg; gives what a shell has to do for that.
+    /// Adds a fake ffmpeg; returns the shell code that selects it.
     pub fn fake_ffmpeg(&self, script: &str) -> String {
-        // The file is its last argument, with a prefix.
+        // The output file is the last argument, with the prefix `file:`.
         let path = self.add_program("ffmpeg", &format!("for last; do :; done\nout=${{last#file:}}\n{script}"));
         format!("PATH='{path}';")
     }
 }
 
-/// All files and links under a folder, with what is in them.
+/// Returns all files and links under a folder, with their content.
 pub fn tree(folder: &Path) -> Vec<(PathBuf, Vec<u8>)> {
     let mut all = Vec::new();
     for entry in fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()) {
@@ -86,20 +86,20 @@ pub fn until(what: &str, is: impl FnMut() -> bool) {
     program::until(what, LONG, is);
 }
 
-/// Ends a program by a signal; it must end by itself then.
+/// Sends SIGTERM; the program must then end by itself.
 #[track_caller]
 pub fn terminate(program: Beside) -> Ran {
     program.end_by(Signal::TERM, LONG)
 }
 
-/// What ffprobe says of a video, asked for in this way.
+/// Returns ffprobe's output for a video with the options `how`.
 pub fn probed(video: &Path, how: &str) -> String {
     let mut probe = Command::new("ffprobe");
     probe.args(["-v", "error", "-of", "csv=p=0"]).args(how.split(' ')).arg(video);
     Ran::of(&mut probe).stdout.trim().trim_end_matches(',').to_owned()
 }
 
-/// Frames of a video that can be played.
+/// Counts the decodable frames of a video.
 pub fn played(video: &Path) -> u32 {
     probed(video, "-count_frames -show_entries stream=nb_read_frames").parse().unwrap()
 }

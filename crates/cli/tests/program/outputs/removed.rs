@@ -1,4 +1,4 @@
-//! Outputs that somebody removes or moves away while they are written.
+//! Outputs that are removed or moved while they are written.
 
 use std::fs;
 use std::io::{BufRead, BufReader};
@@ -7,7 +7,7 @@ use std::process::ChildStderr;
 
 use super::home::*;
 
-/// A run into `d/NAME` and a folder, once there is something of both.
+/// Starts a run into `d/NAME` and a folder; waits until both have content.
 fn run(home: &Home, path: &str, name: &str) -> (Beside, BufReader<ChildStderr>) {
     let args = format!("stream self {BLUR} --loop --pace realtime --to d/{name} --to out/");
     let mut run = home.start(path, &args);
@@ -19,13 +19,13 @@ fn run(home: &Home, path: &str, name: &str) -> (Beside, BufReader<ChildStderr>) 
     (run, stderr)
 }
 
-/// The file under construction in a folder.
+/// Finds the unfinished file in a folder.
 fn part(folder: &Path) -> Option<std::path::PathBuf> {
     let mut there = fs::read_dir(folder).ok()?.map(|entry| entry.unwrap().path());
     there.find(|path| path.extension().is_some_and(|extension| extension == "part"))
 }
 
-/// Reads on to a line with this in it.
+/// Reads up to a line that contains `what`.
 #[track_caller]
 fn line_with(stderr: &mut impl BufRead, what: &str) -> String {
     stderr.lines().map(Result::unwrap).find(|line| line.contains(what)).unwrap_or_else(|| panic!("never said: {what}"))
@@ -35,7 +35,7 @@ fn line_with(stderr: &mut impl BufRead, what: &str) -> String {
 fn an_output_that_is_removed_is_told_of_while_the_others_go_on_and_what_there_is_is_kept() {
     let home = Home::new();
     home.record("self", 4, 0.03);
-    // It writes into the file that it has opened, as ffmpeg does.
+    // The fake encoder keeps writing into its open file, as ffmpeg does.
     let path = home.fake_ffmpeg("[ \"$1\" = -version ] && exit\nexec cat > \"$out\"");
     for (name, whole_folder) in [("x.y4m", true), ("x.y4m", false), ("x.mkv", true), ("x.mp4", true)] {
         let (run, mut stderr) = run(&home, &path, name);
@@ -67,7 +67,7 @@ fn an_output_whose_folder_is_moved_is_kept_where_it_is() {
     home.record("self", 4, 0.03);
     let (run, mut stderr) = run(&home, "", "x.y4m");
     fs::rename(home.path("d"), home.path("e")).unwrap();
-    // Another folder of the name is another folder.
+    // A new folder of the same name does not receive the output.
     fs::create_dir(home.path("d")).unwrap();
     assert_eq!(terminate(run).code, 1);
     let told = line_with(&mut stderr, "error: ");

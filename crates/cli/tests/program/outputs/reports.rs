@@ -1,4 +1,4 @@
-//! Where the report of a run may go, and what becomes of it where it cannot go there.
+//! Valid paths for a run's report, and failures to write it.
 
 use std::fs;
 use std::os::unix::fs::symlink;

@@ -1,8 +1,8 @@
-//! What packages are called, and what lies in them.
+//! Names of packages, and the files in them.
 
 use super::*;
 
-/// `cargo binstall` looks for the archive, and the program in it, by names of its own.
+/// `cargo binstall` expects certain names of the archive and of the program in it.
 #[test]
 fn binstall_finds_the_archive_that_is_made() {
     let manifest: toml::Table = here("crates/cli/Cargo.toml").parse().unwrap();
@@ -27,7 +27,7 @@ fn binstall_finds_the_archive_that_is_made() {
     assert_eq!(binstall["pkg-fmt"].as_str(), Some("tgz"));
 }
 
-/// A package has the networks that are in the build tree, and none without its licence.
+/// A package contains the networks of the build tree, each with its licence.
 #[test]
 fn networks_are_given_to_others_with_their_licence() {
     let tree = tempfile::tempdir().unwrap();
@@ -44,7 +44,7 @@ fn networks_are_given_to_others_with_their_licence() {
     }
     copy("packaging/examples/udev.rules");
     copy("docs/call.md");
-    // Its own is asked of cargo, and is not what this is about.
+    // The script for the crates' licences needs cargo, so a fake replaces it here.
     fs::write(tree.path().join("packaging/licences.py"), "#!/bin/sh\necho licences\n").unwrap();
     let models = tree.path().join("target/models");
     fs::create_dir_all(&models).unwrap();
@@ -62,7 +62,7 @@ fn networks_are_given_to_others_with_their_licence() {
     let share = tree.path().join("root/usr/local/share");
     assert_eq!(fs::read(share.join("bokehcam/models/person.tflite")).unwrap(), b"network");
     assert_eq!(fs::read(share.join("licenses/bokehcam/person.licence.txt")).unwrap(), b"Apache-2.0");
-    // Where it lies, it is found.
+    // The unit names the installed program.
     let unit = fs::read_to_string(tree.path().join("root/usr/local/lib/systemd/user/bokehcam.service")).unwrap();
     assert!(unit.contains("ExecStart=/usr/local/bin/bokehcam "), "{unit}");
 }

@@ -1,4 +1,4 @@
-//! `--calib` means the same in every command.
+//! `--calib` has the same meaning in every command.
 
 use std::fs;
 
@@ -10,7 +10,7 @@ use crate::program::Home;
 
 const SIZE: (u32, u32) = (160, 96);
 
-/// As OpenCV writes it: two eyes 0.1 m apart of 200 px, the right one of which looks so many pixels lower.
+/// Writes OpenCV stereo calibration: 0.1 m baseline, 200 px focal length, the right camera `lower_px` pixels lower.
 fn opencv(lower_px: f64) -> String {
     let matrix = |name: &str, rows: usize, columns: usize, data: &str| {
         format!("{name}: !!opencv-matrix\n   rows: {rows}\n   cols: {columns}\n   dt: d\n   data: [ {data} ]\n")
@@ -28,7 +28,7 @@ fn opencv(lower_px: f64) -> String {
     .concat()
 }
 
-/// A wall that the right eye sees `shift` columns to the left and `lower` rows higher.
+/// Draws a wall that the right camera sees `shift` columns to the left and `lower` rows higher.
 fn eye(shift: u32, lower: u32) -> ColorImage {
     color(SIZE.0, SIZE.1, |x, y| [grain(x + shift, y + lower); 3])
 }
@@ -46,7 +46,7 @@ fn raw_pictures_are_rectified_by_the_calibration_that_says_how() {
     let map = read_disparity(&home.path("new/disparity.pfm")).unwrap();
     let right = map.px.iter().filter(|&&px| (px - 8.0).abs() < 0.75).count();
     assert!(right * 10 > map.px.len() * 6, "{right} of {}", map.px.len());
-    // In metres, by the same file: 200 px * 0.1 m / 8 px.
+    // Depth in metres from the same file: 200 px * 0.1 m / 8 px.
     home.run(&[&args[..], &["--metres", "--out", "depth.pfm"]].concat()).done();
 }
 

@@ -1,4 +1,4 @@
-//! The depth map of a picture.
+//! Depth maps of photos.
 
 use std::fs;
 
@@ -22,7 +22,7 @@ fn depth_of_another_aspect_or_orientation_is_refused() {
     assert_eq!(render(&home, &["--depth-map", "half.png"]).warning(), "");
 }
 
-/// Puts an EXIF block that says "turn me a quarter clockwise" behind the header of a PNG.
+/// Inserts EXIF orientation 6 (rotate 90° clockwise) after the header of a PNG.
 fn turn(path: &std::path::Path) {
     const ORIENTATION_6: &[u8] =
         b"eXIfMM\x00\x2a\x00\x00\x00\x08\x00\x01\x01\x12\x00\x03\x00\x00\x00\x01\x00\x06\x00\x00\x00\x00\x00\x00";
@@ -47,7 +47,7 @@ fn a_picture_that_was_held_upright_needs_depth_that_was() {
     turn(&home.path("depth.png"));
     let turned = still::read_depth(&home.path("depth.png"), 5000.0, None).unwrap();
     assert_eq!(turned.size(), (48, 64));
-    // What was left is above.
+    // The left side is at the top after the rotation.
     assert!(turned.metres[0] < 0.6 && turned.metres[63 * 48] > 4.0);
     assert_eq!(render(&home, &["--depth-map", "depth.png"]).warning(), "");
 }
@@ -102,14 +102,14 @@ fn a_photo_has_the_depth_beside_it_in_every_command() {
             home.run(&[&stream[..], more].concat()).done();
             assert!(picture("r.png") == picture("s/000000.png"), "{name} {more:?}");
         }
-        // What is said goes before what is found.
+        // Explicit options take precedence over a depth map found beside the photo.
         let said = render_of(&home, &["--mask", "photo.png"]);
         assert!(!said.stderr.contains("beside it"), "{}", said.stderr);
         assert!(render_of(&home, &["--depth", "none"]).stderr.contains("written"));
         render_of(&home, &["--out", name]).refused(2, &["which is read"]);
         fs::remove_file(home.path(name)).unwrap();
     }
-    // A snapshot stands for the picture that it was made of.
+    // A snapshot's name refers to its sources.
     fs::rename(home.path("ph.png"), home.path("shot-color.png")).unwrap();
     fs::copy(home.path("depth.pfm"), home.path("shot-depth.pfm")).unwrap();
     still::write_color(&home.path("shot.png"), &bokehcam::frame::ColorImage::new(64, 48), false).unwrap();

@@ -1,8 +1,8 @@
-//! The pages of help.
+//! Help texts.
 
 use crate::program::{Home, Ran};
 
-/// The long options that a page explains.
+/// Returns the long options in a help text.
 fn options(page: &str) -> Vec<&str> {
     let explained = page.lines().filter(|line| line.starts_with("  -") || line.starts_with("      --"));
     explained.filter_map(|line| line.split([' ', '=', '[', ',']).find(|word| word.starts_with("--"))).collect()
@@ -33,7 +33,7 @@ fn the_first_page_has_what_most_people_need_and_another_has_all() {
         assert!(!render.contains(word), "{word}: {render}");
     }
     assert!(options(&page(&["ctl", "on", "--help"])).len() <= 5);
-    // What is not shown is taken.
+    // Hidden options are accepted.
     home.run(&["config", "dump", "--rank", "3", "--method", "gather"]).done();
 }
 

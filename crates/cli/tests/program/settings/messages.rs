@@ -1,4 +1,4 @@
-//! How messages look: in one line, as JSON where that was asked for, and with nothing that a terminal would obey.
+//! Format of messages: one line, JSON if requested, without control characters.
 
 use std::ffi::OsStr;
 use std::fs;
@@ -154,7 +154,7 @@ fn what_is_not_understood_is_answered_in_the_words_of_who_asked() {
     assert!(!home.path("rec.mp4").exists());
 }
 
-/// A warning of the library's, and one of the command line's.
+/// Warnings of the library and of the command line have the same format.
 #[test]
 fn all_warnings_look_alike() {
     let home = Home::new().with_photo();

@@ -1,5 +1,4 @@
-//! Settings as the user of the program meets them: which have an effect, where they come from, how they are saved, and
-//! how what is said of them looks.
+//! Settings: effects, origins, saving, and messages.
 #![allow(missing_docs)]
 
 mod calib;

@@ -1,4 +1,4 @@
-//! The strength of the blur has two names, which mean the same wherever settings are written.
+//! The blur strength has two names, which are equivalent in all settings.
 
 use crate::program::{Home, Ran};
 
@@ -6,7 +6,7 @@ use super::pictures::text;
 
 const NAMES: [&str; 2] = ["blur", "coc-at-infinity"];
 
-/// The line of the dump that has the strength.
+/// Returns the dump's line of the blur strength.
 fn strength(ran: &Ran) -> String {
     assert_eq!(ran.done(), "");
     let is_it = |line: &&str| NAMES.iter().any(|name| line.starts_with(&format!("{name} =")));
@@ -26,7 +26,7 @@ fn both_names_are_read_everywhere_and_one_is_written() {
         let home = Home::new().with_settings(&settings);
         assert_eq!(strength(&home.run(&["config", "dump"])), "blur = \"3%\" # file");
         assert_eq!(strength(&home.run(&["config", "dump", "--preset", "mine"])), "blur = 7 # preset");
-        // It is changed where it stands.
+        // Saving changes the existing line in place.
         home.run(&["config", "save", "--blur", "5"]).done();
         assert_eq!(text(&home.settings()), settings.replacen("\"3%\"", "5", 1));
         let bad = Home::new().run(&["config", "dump", &format!("--{name}"), "much"]);

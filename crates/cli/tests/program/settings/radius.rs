@@ -1,4 +1,4 @@
-//! A blur has a largest useful radius: the picture's diagonal.
+//! The maximum useful blur radius is the picture's diagonal.
 
 use std::fs;
 
@@ -42,7 +42,7 @@ fn a_radius_beyond_the_diagonal_is_refused_once_the_size_is_known() {
     for more in [
         &["--effect", "blur", "--coc-at-infinity", "80"][..],
         &["--effect", "tilt-shift", "--coc-at-infinity", "80"],
-        // The slope is steep, and what it reaches is cut.
+        // A large CoC at infinity, limited by `--max-coc`.
         &["--depth-map", "depth.png", "--coc-at-infinity", "1000", "--max-coc", "20"],
         &["--depth-map", "depth.png", "--max-coc", "80", "--rank", "full"],
         &["--depth-map", "depth.png", "--max-coc", "80", "--method", "gather"],
@@ -79,7 +79,7 @@ fn the_library_refuses_what_the_command_line_does() {
             assert!(matches!(refused, BokehError::TooWide { max_px: most, .. } if most == max_px), "{refused}");
             assert!(!refused.to_string().contains('\n'), "{refused}");
         }
-        // Where nobody asks, radii are cut, and nothing grows without a bound.
+        // Without a request, radii are clamped, so memory stays bounded.
         let plan = bokeh::plan::Plan::new(&settings(coc, method, rank, 1e30), 640, 360);
         let bytes: usize = plan.ladder.banks.iter().map(|bank| (bank.horizontal.len() * 2) * 4).sum();
         assert!(bytes < 200 << 20, "{coc:?} {method:?} {rank:?}: {bytes} bytes");

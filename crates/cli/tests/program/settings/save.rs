@@ -1,4 +1,4 @@
-//! `config save`, and the redirect that empties what it reads.
+//! `config save`, and a shell redirect that truncates the settings file before it is read.
 
 use std::fs::{self, File};
 use std::os::unix::fs::symlink;
@@ -46,7 +46,7 @@ fn pictures_are_saved_by_their_whole_paths_and_those_in_the_file_count_from_it()
     render(&home).refused(1, &[wall.to_str().unwrap(), "there is no such file", "(behind in ", "config.toml)"]);
     fs::copy(home.path("photo.png"), &wall).unwrap();
     render(&home).done();
-    // A wrong value names its key, too, once it is known to be wrong.
+    // An invalid value that is only detected later also names its key.
     let home = Home::new().with_photo().with_settings("effect = \"dof\"\n");
     let ran = home.run(&["render", "photo.png", "--out", "out.png"]);
     ran.refused(2, &["--effect dof needs depth", "(effect in ", "config.toml)"]);

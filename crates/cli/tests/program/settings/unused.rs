@@ -1,4 +1,4 @@
-//! What was given and has no effect is said in one line.
+//! Settings without effect are reported in one line.
 
 use crate::program::Home;
 
@@ -33,7 +33,8 @@ fn a_picture_without_depth_says_what_that_costs() {
     assert!(tilt.warning().contains("--tilt 0.5 (the effect is not tilt-shift)"), "{}", tilt.stderr);
     assert!(tilt.warning().contains("--focus 1 (there is no depth)"), "{}", tilt.stderr);
     render(&["--depth", "stereo"]).refused(2, &["stereo", "--depth-map"]);
-    // With depth, all of that has an effect; the settings file is a wish for all runs.
+    // With depth, all of these settings have an effect. The settings file applies to all runs, so its unused settings
+    // are not reported.
     let all = ["--depth-map", "depth.png", "--focus", "1.2", "--refine", "on", "--focus-range", "0.3", "--depth-scale"];
     assert_eq!(render(&[&all[..], &["5000"]].concat()).warning(), "");
     assert_eq!(render(&["--effect", "blur"]).warning(), "");
