@@ -82,6 +82,7 @@ impl Background {
     pub(super) fn forget_changed(&mut self, map: &DepthMap, color: &ColorImage, other: f32) {
         let ((width, height), block_px) = (self.size, block_px(color.width));
         let across = width.div_ceil(block_px);
+        let mut forgets = false;
         for block in 0..self.unlike.len() {
             if !self.unlike[block] {
                 continue;
@@ -95,11 +96,14 @@ impl Background {
                 DepthMap::inverse_of(map.metres[at]) - self.inverse[at] <= other
             };
             if around.into_iter().all(is_open) {
-                self.has[block] = false;
+                (self.has[block], forgets) = (false, true);
                 for y in y..(y + block_px).min(height) {
                     self.rounds[y * width + x..y * width + (x + block_px).min(width)].fill(0);
                 }
             }
+        }
+        if forgets {
+            self.assign_revision();
         }
     }
 }

@@ -15,7 +15,8 @@ const JPEG_QUALITY: u8 = 90;
 /// Upper bound for a noise picture as JPEG, and for its header.
 const JPEG_BYTES_PER_PX: usize = 3;
 const JPEG_HEAD_BYTES: usize = 4096;
-/// Largest picture side offered where a camera leaves it open.
+/// Picture sides that are offered: from one block of JPEG's subsampled chroma to a size that fits the node's memory.
+const MIN_SIDE_PX: u32 = 16;
 const MAX_SIDE_PX: u32 = 4096;
 
 /// Encodes pictures of any size into one format of one size.
@@ -134,22 +135,32 @@ impl Encoder {
     }
 }
 
-/// Returns those of a camera's modes that can be written, with sizes within bounds.
+/// Returns the modes of a camera that [`Encoder`] can write, with sizes from `MIN_SIDE_PX` to `MAX_SIDE_PX` a side.
 pub(super) fn writable_modes(modes: &[Mode]) -> Vec<Mode> {
-    let is_written = |mode: &&Mode| Encoder::new(Format { fourcc: mode.fourcc, size: (16, 16) }).is_some();
-    let within = |(width, height): (u32, u32)| width.max(height) <= MAX_SIDE_PX && width.min(height) > 0;
-    let bounded = |mode: &Mode| {
-        let sizes = match &mode.sizes {
-            Offer::These(sizes) => Offer::These(sizes.iter().copied().filter(|size| within(*size)).collect()),
-            Offer::Range { min, max } => Offer::Range {
-                min: (min.0.max(16), min.1.max(16)),
-                max: (max.0.min(MAX_SIDE_PX), max.1.min(MAX_SIDE_PX)),
-            },
-            Offer::Unknown => Offer::Range { min: (16, 16), max: (MAX_SIDE_PX, MAX_SIDE_PX) },
-        };
-        Mode { sizes, ..mode.clone() }
-    };
-    modes.iter().filter(is_written).map(bounded).filter(|mode| mode.sizes != Offer::These(Vec::new())).collect()
+    let is_written =
+        |mode: &&Mode| Encoder::new(Format { fourcc: mode.fourcc, size: (MIN_SIDE_PX, MIN_SIDE_PX) }).is_some();
+    let bounded = |mode: &Mode| Some(Mode { sizes: bounded(&mode.sizes)?, ..mode.clone() });
+    modes.iter().filter(is_written).filter_map(bounded).collect()
+}
+
+/// Returns the sizes within bounds; `None` if there are none.
+fn bounded(sizes: &Offer<(u32, u32)>) -> Option<Offer<(u32, u32)>> {
+    let sides = MIN_SIDE_PX..=MAX_SIDE_PX;
+    match sizes {
+        Offer::These(sizes) => {
+            let is_within = |(width, height): &(u32, u32)| sides.contains(width) && sides.contains(height);
+            let within: Vec<_> = sizes.iter().copied().filter(is_within).collect();
+            (!within.is_empty()).then_some(Offer::These(within))
+        }
+        Offer::Range { min, max } => {
+            let min = (min.0.max(MIN_SIDE_PX), min.1.max(MIN_SIDE_PX));
+            let max = (max.0.min(MAX_SIDE_PX), max.1.min(MAX_SIDE_PX));
+            (min.0 <= max.0 && min.1 <= max.1).then_some(Offer::Range { min, max })
+        }
+        Offer::Unknown => {
+            Some(Offer::Range { min: (MIN_SIDE_PX, MIN_SIDE_PX), max: (MAX_SIDE_PX, MAX_SIDE_PX) })
+        }
+    }
 }
 
 #[cfg(test)]
@@ -205,6 +216,9 @@ mod tests {
             mode(b"MJPG", Offer::These(vec![(640, 480), (10_000, 8)])),
             mode(b"NV12", Offer::Range { min: (1, 1), max: (1 << 31, 1 << 31) }),
             mode(b"YUYV", Offer::These(vec![(10_000, 8)])),
+            // Ranges that lie outside of the bounds as a whole.
+            mode(b"UYVY", Offer::Range { min: (8000, 4000), max: (10_000, 5000) }),
+            mode(b"YVYU", Offer::Range { min: (1, 1), max: (640, 8) }),
         ]);
         let expected = [
             mode(b"MJPG", Offer::These(vec![(640, 480)])),
