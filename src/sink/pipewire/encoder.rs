@@ -157,9 +157,7 @@ fn bounded(sizes: &Offer<(u32, u32)>) -> Option<Offer<(u32, u32)>> {
             let max = (max.0.min(MAX_SIDE_PX), max.1.min(MAX_SIDE_PX));
             (min.0 <= max.0 && min.1 <= max.1).then_some(Offer::Range { min, max })
         }
-        Offer::Unknown => {
-            Some(Offer::Range { min: (MIN_SIDE_PX, MIN_SIDE_PX), max: (MAX_SIDE_PX, MAX_SIDE_PX) })
-        }
+        Offer::Unknown => Some(Offer::Range { min: (MIN_SIDE_PX, MIN_SIDE_PX), max: (MAX_SIDE_PX, MAX_SIDE_PX) }),
     }
 }
 
