@@ -94,7 +94,7 @@ impl Executors {
     /// Creates an executor for pictures of `size` pixels.
     ///
     /// # Errors
-    /// Fails like [`Computing::blur`].
+    /// Fails like [`Computing::create_blur`].
     pub fn create_blur(&mut self, settings: &bokeh::Settings, size: (u32, u32)) -> Result<Box<dyn Bokeh>, BokehError> {
         let threads = self.computing.threads;
         // A device that failed does not recover.

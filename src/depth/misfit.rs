@@ -21,7 +21,7 @@ impl Misalignment {
         Self::from_alignment(EdgeAlignment::measure(map, color), map, color)
     }
 
-    /// Like [`Misalignment::of`] with a known alignment of the outlines.
+    /// Like [`Misalignment::measure`] with a known alignment of the outlines.
     pub fn from_alignment(outlines: EdgeAlignment, map: &DepthMap, color: &ColorImage) -> Option<Self> {
         let smaller = (map.width < color.width).then(|| map.size());
         let fits = smaller.is_none() && matches!(outlines, EdgeAlignment::Meets | EdgeAlignment::Unknown);

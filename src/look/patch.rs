@@ -103,7 +103,7 @@ impl Patch {
         Self::from_look(look).values().into_iter().flat_map(named).collect()
     }
 
-    /// Reads the pictures it names, so that [`Patch::on`] need not.
+    /// Reads the pictures it names, so that [`Patch::apply_to`] need not.
     ///
     /// # Errors
     /// A picture cannot be read.

@@ -54,7 +54,7 @@ impl Persons {
         map.person_m = self.distance_m(map);
     }
 
-    /// Sets [`DepthMap::person_m`] like [`Self::mark`], and repairs stereo mismatches: within the outline in this
+    /// Sets [`DepthMap::person_m`] like [`Self::set_distance`], and repairs stereo mismatches: within the outline in this
     /// frame, depth that is unknown or far behind the person is set to the person's distance, in rows where enough has
     /// it.
     pub fn fill_holes(&mut self, seen: FrameInput, map: &mut DepthMap) {
@@ -139,7 +139,7 @@ pub struct PersonFocus {
 
 impl PersonFocus {
     /// Creates it from the maps of `depth`; if they are from stereo matching (`is_matched`), they are repaired
-    /// ([`Persons::mend`]).
+    /// ([`Persons::fill_holes`]).
     pub fn new(depth: Box<dyn DepthSource>, persons: Persons, is_matched: bool) -> Self {
         Self { depth, persons, is_wanted: true, is_matched }
     }

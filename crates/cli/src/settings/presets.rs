@@ -10,7 +10,7 @@ use super::save;
 use crate::error::CliError;
 use bokehcam::look::{Value, settings as table};
 
-/// Saves settings ([`Patch::of`] a look, so that the preset is self-contained) as the preset `name` in the file at
+/// Saves settings ([`Patch::from_look`] a look, so that the preset is self-contained) as the preset `name` in the file at
 /// `path`, replacing one of that name. The rest of the file stays; the file is replaced atomically, and created with
 /// its folder if missing.
 ///

@@ -166,7 +166,7 @@ pub struct State {
     pub focus_m: Option<f32>,
     /// Colour legend of a diagnostic view.
     pub legend: Option<Legend>,
-    /// Messages to the user, newest last, at most [`MAX_NOTES`].
+    /// Messages to the user, newest last, at most `MAX_NOTES`.
     pub notes: Vec<Note>,
     /// Progress of the background plate, if depth comes from it.
     pub plate: Option<Step>,
