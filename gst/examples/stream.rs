@@ -1,5 +1,5 @@
 //! The program `bokehcam` on this crate's build of the library, for `gst/bench` to compare the element with.
 
 fn main() -> std::process::ExitCode {
-    bokehcam::cli::run(std::env::args_os())
+    bokehcam_cli::run(std::env::args_os())
 }

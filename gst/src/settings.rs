@@ -299,7 +299,7 @@ impl Values {
             .collect();
         let patch = Patch::parse(values.iter().map(|(name, text)| (*name, text.as_str())));
         let patch = patch.map_err(|(name, accepted)| format!("{name}: {}", as_properties(&accepted)))?;
-        patch.on(before).map_err(|error| as_properties(&error.to_string()))
+        patch.apply_to(before).map_err(|error| as_properties(&error.to_string()))
     }
 
     /// Returns the executor options.

@@ -39,5 +39,5 @@ pub fn look(settings: &[(String, String)]) -> Result<Look, PyErr> {
         }
     }
     let patch = Patch::parse(pairs).map_err(|(name, what)| value(format!("--{name}: {what}")))?;
-    patch.on(&Look::default()).map_err(value)
+    patch.apply_to(&Look::default()).map_err(value)
 }

@@ -13,7 +13,7 @@ fn values_make_the_look_that_the_command_line_makes_of_them() {
     for (name, text) in given {
         values.set_text(place(name), Some(text.to_owned())).unwrap();
     }
-    let look = Patch::parse(given).unwrap().on(&Look::default()).unwrap();
+    let look = Patch::parse(given).unwrap().apply_to(&Look::default()).unwrap();
     assert_eq!(values.look(&Look::default()), Ok(look.clone()));
     for (name, _) in given {
         values.set_text(place(name), None).unwrap();
@@ -30,10 +30,10 @@ fn a_lens_takes_the_place_of_a_radius_and_the_other_way_round() {
         values.set_text(place(name), Some(number.into())).unwrap();
     }
     let lens = Patch::parse([("f-number", "2"), ("focal-length", "50"), ("sensor-width", "36")]).unwrap();
-    let look = lens.on(&Look::default()).unwrap();
+    let look = lens.apply_to(&Look::default()).unwrap();
     assert_eq!(values.look(&Look::default()), Ok(look.clone()));
     values.set_text(place("coc-at-infinity"), Some("3%".into())).unwrap();
-    let percent = Patch::parse([("coc-at-infinity", "3%")]).unwrap().on(&Look::default()).unwrap();
+    let percent = Patch::parse([("coc-at-infinity", "3%")]).unwrap().apply_to(&Look::default()).unwrap();
     assert_eq!(values.look(&look), Ok(percent));
 }
 

@@ -43,7 +43,7 @@ fn a_recording_is_what_stream_makes_of_it() {
     arguments.extend(["--coc-at-infinity", "14", "--to"].map(OsString::from));
     arguments.extend([format!("{}/", streamed.display()).into(), recording.clone().into()]);
     arguments.extend(["--config".into(), settings.into()]);
-    let code = bokehcam::cli::run(arguments);
+    let code = bokehcam_cli::run(arguments);
     assert_eq!(format!("{code:?}"), format!("{:?}", ExitCode::SUCCESS));
 
     std::fs::create_dir(&launched).unwrap();
