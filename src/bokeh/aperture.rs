@@ -197,6 +197,7 @@ pub fn lens_points(aperture: &Aperture, count: usize) -> Vec<glam::DVec2> {
     };
     // Fraction of the disc that is open: the spiral must be denser by its inverse to leave `count` points.
     let open_fraction = spiral(4096).filter(open).count().max(1) as f64 / 4096.0;
+    // Negated: the blur of a far point is the aperture turned by 180 degrees.
     spiral((count as f64 / open_fraction).round() as usize).filter(open).map(|p| -p).collect()
 }
 

@@ -153,8 +153,8 @@ impl Plan {
         self.lay_out_pieces();
     }
 
-    /// Lays out the bins of a uniform radius or of a ramp; with depth there is one bin until [`Plan::split`] has seen a
-    /// frame.
+    /// Resets the bins to those known without a frame: of a uniform radius or a ramp. With depth there is one bin until
+    /// [`Plan::split`] has seen a frame.
     fn lay_out_pieces(&mut self) {
         let [far_px, near_px] = self.max_px;
         let [far, near] = &mut self.pieces;

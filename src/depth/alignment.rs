@@ -100,7 +100,8 @@ impl Aligner {
         }
     }
 
-    /// Returns the median ratio of a channel: foreground is a minority.
+    /// Returns the median of now / plate in channel `p`, which a minority of foreground does not change; `None` if too
+    /// little background is visible.
     fn estimate_gain(&mut self, now: &[[f32; 3]], foreign: &[bool], p: usize) -> Option<f32> {
         self.bins.clear();
         self.bins.resize(BINS, 0);

@@ -17,7 +17,7 @@ pub fn build_format(agreed: &Agreed) -> Vec<u8> {
     build_offer(&agreed.mode(), agreed)
 }
 
-/// Builds a mode, with `best` as the default if the other side has no preference.
+/// Builds the EnumFormat pod that offers `mode`; `best` is the default of each choice.
 pub fn build_offer(mode: &Mode, best: &Agreed) -> Vec<u8> {
     let id = |key: FormatProperties, value: u32| Property::new(key.as_raw(), Value::Id(Id(value)));
     let raw = mode::video_format(mode.fourcc);

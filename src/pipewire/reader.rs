@@ -271,7 +271,7 @@ impl Listener {
         self.agreed.get().map_or(min_ns, |agreed| (TIMEOUT_PERIODS * period_ns(agreed)).max(min_ns))
     }
 
-    /// Handles the camera's announcement of its format.
+    /// Accepts the negotiated format (PipeWire's `param_changed`), and answers with the buffers that are needed.
     fn handle_format(&self, stream: &Stream, format: &[u8]) {
         let Some(agreed) = mode::parse_agreed(format) else {
             return tracing::warn!("{}: its pictures cannot be read", self.name());

@@ -118,7 +118,7 @@ fn parse(text: &str) -> Result<Vec<(String, String)>, PictureFault> {
     text.lines().filter(|line| !line.trim().is_empty()).map(parsed).collect()
 }
 
-/// Reads the settings from a PNG as text.
+/// Reads the settings from a PNG as text. Other programs may have rewritten the iTXt chunk as tEXt or zTXt.
 fn read_text(path: &Path) -> Result<String, PictureFault> {
     let info = coded::png_info(path)?;
     let fault = coded::png_fault;

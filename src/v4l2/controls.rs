@@ -86,7 +86,7 @@ pub const LOW_LIGHT: &str = "exposure_dynamic_framerate";
 /// Lists all controls of a device with their values, in the driver's order; empty if it has none.
 ///
 /// # Errors
-/// The system error that interrupted the enumeration, except the one that ends it.
+/// Fails with the driver's error; EINVAL and ENOTTY mark the end of the list.
 pub fn list(device: &Device) -> io::Result<Vec<Control>> {
     const NEXT: u32 = sys::V4L2_CTRL_FLAG_NEXT_CTRL | sys::V4L2_CTRL_FLAG_NEXT_COMPOUND;
     let (mut controls, mut last, mut faults) = (Vec::new(), 0, 0);

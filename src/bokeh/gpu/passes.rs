@@ -217,6 +217,7 @@ impl Passes {
                 self.silhouettes.iter().for_each(|pass| recorder.run(pass));
             }
             for ((index, bins), layer) in plan.layers().enumerate().zip(&self.layers) {
+                // Nothing hides the foremost layer.
                 if index == 1 {
                     recorder.run(&self.hide);
                 }

@@ -49,7 +49,7 @@ const FIRST_PAIRS: u64 = 30;
 const MAX_POLLS: usize = 8;
 
 impl<E: Eye> StereoPair<E> {
-    /// Pairs the frames of `left` and `right`, two endless cameras; ends after `frames` pairs, never with `None`.
+    /// Pairs the frames of `left` and `right`; `frames` limits the number of pairs, `None` means no limit.
     ///
     /// # Errors
     /// Their pictures differ in size.

@@ -47,7 +47,7 @@ const NEARLY_PURE: f32 = 0.98;
 
 /// Maximum distance of traced pixels from an edge, in pixels.
 const MAX_STEPS: usize = 16;
-/// If there are too many edges, the minimum depth step is doubled, at most this often.
+/// Number of minimum depth steps that are tried if there are too many edges, each twice the previous one.
 const MAX_DOUBLINGS: usize = 8;
 /// Minimum number of pixels per thread.
 const MIN_PIXELS: usize = 256;
@@ -281,7 +281,7 @@ impl Matting {
             let trace =
                 Trace { arch, workers, size, metres, depth_step, rgb, light, at_edge, clusters, compared, pixels };
             marked += arch.dispatch(trace);
-            // Noise: hair is not that long.
+            // More traced pixels than hair has: the map is noise.
             if marked > most {
                 pixels.truncate(found_until);
                 break;

@@ -1,7 +1,7 @@
-//! Joint bilateral upsampling: resamples a depth map to the size of its picture.
+//! Edge-preserving upsampling: resamples a depth map to the size of its picture.
 //!
 //! Smooth surfaces are interpolated bilinearly in inverse depth, in which planes are linear. Across a discontinuity or
-//! beside a hole the nearest depth is taken, so that no depth is invented; the colour-guided alignment places the edge
+//! beside a hole the nearest neighbour is taken, so that no depth is invented; the colour-guided alignment places the edge
 //! exactly later.
 //!
 //! twin: shaders/refine_prepare.wgsl

@@ -110,7 +110,8 @@ impl Belongings {
         }
     }
 
-    /// Adds regions as a whole, and keeps pixels that were held for a while.
+    /// Adds a connected region once more than half of its pixels are held, or have been connected for `JOINS` frames.
+    /// Removes a pixel after it has been disconnected for `LEAVES` frames.
     fn decide(&mut self, width: usize) {
         let Self { held, waited, may_be, joined, beyond, components, .. } = self;
         components.find(joined, width, |at| held[at] || waited[at] >= JOINS);

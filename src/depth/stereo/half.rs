@@ -22,9 +22,9 @@ pub fn downsample(from: &GrayImage, into: &mut GrayImage) {
     }
 }
 
-/// Upsamples row `y` of the disparities `px` of `small`, which is `whole` at half size, into `out`. Each pixel takes
-/// the disparity of that one of the four nearest small pixels whose brightness is closest, so that edges follow the
-/// picture; doubled, as a small pixel is as wide as two.
+/// Upsamples row `y` of `px`, the disparities of `small`, to the size of `whole`, into `out`. Each pixel takes, of the
+/// four nearest small pixels, the disparity of the one closest in brightness, so that edges follow the picture. Values
+/// are doubled, because a small pixel is two pixels wide.
 pub fn upsample_row(whole: &GrayImage, small: &GrayImage, px: &[f32], y: usize, out: &mut [f32]) {
     let (columns, rows) = (small.width as usize, small.height as usize);
     // The second nearest small row or column is the previous one for even pixels, and the next one for odd ones.

@@ -171,7 +171,7 @@ impl Level {
     fn new(settings: &Settings, effort: Effort, executors: &Executors) -> Result<Self, GpuError> {
         let whole = (settings.size.0 as usize, settings.size.1 as usize);
         let (size, disparities, island) = match effort {
-            // An island has a quarter of its pixels at half resolution.
+            // At half resolution a speckle has a quarter of its pixels.
             Effort::Fast => (half::size(whole), settings.disparities.div_ceil(2), SPECKLE / 4),
             Effort::Full => (whole, settings.disparities, SPECKLE),
         };

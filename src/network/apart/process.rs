@@ -64,7 +64,8 @@ impl Process {
         }
     }
 
-    /// Exchanges messages within a time limit. A process that does not answer is killed and not used again.
+    /// Exchanges messages within `patience`. Any failure, not only a timeout, kills the process, and later calls return the
+    /// same error.
     fn exchange<T>(
         &mut self,
         patience: Duration,

@@ -158,7 +158,8 @@ impl<const N: usize> WithSimd for FromLeft<'_, N> {
         };
         let Paths { along: [one, two], down: between } = paths;
         between[0].set(&down.values.as_chunks::<N>().0[0], down.least[0]);
-        // Each row is one column behind the row above, so that consecutive steps do not depend on each other.
+        // A wavefront: each row is one column behind the row above, so that consecutive steps do not depend on each
+        // other. `GROUP` more steps let the last row finish.
         for k in (0..block.columns + GROUP).step_by(2) {
             block.advance(k, down, between, one, two);
             block.advance(k + 1, down, between, two, one);
