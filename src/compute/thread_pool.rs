@@ -1,8 +1,8 @@
 //! The thread pool: a fixed number of threads that share the parts of one pass at a time.
 //!
 //! A pass is over when every part is done; sleeping members are not waited for. Nothing is allocated and no lock is
-//! taken. It needs `unsafe` because the threads outlive the borrow of the work they run; `run_members` guarantees that they
-//! never use it afterwards, even after a panic.
+//! taken. It needs `unsafe` because the threads outlive the borrow of the work they run; `run_members` guarantees that
+//! they never use it afterwards, even after a panic.
 #![allow(unsafe_code)]
 
 pub mod relay;
@@ -59,9 +59,9 @@ const EPOCH: u64 = 1 << 16;
 /// Spins before a member sleeps: about the time between two passes of a frame.
 const SPINS: u32 = 4_000;
 
-// SAFETY: `work` is written only by the thread in `run_members` (`&mut self`: there is only one) while the gate is closed and
-// no member is at work, and read only by members that entered through the open gate; its release/acquire pairs order
-// the two.
+// SAFETY: `work` is written only by the thread in `run_members` (`&mut self`: there is only one) while the gate is
+// closed and no member is at work, and read only by members that entered through the open gate; its release/acquire
+// pairs order the two.
 unsafe impl Sync for Shared {}
 
 /// Returns the number of hardware threads, at least 1.
@@ -158,8 +158,8 @@ impl ThreadPool {
             return (0..parts).for_each(|part| work(0, part));
         }
         let shared = &*self.shared;
-        // SAFETY: only the lifetime changes. The reference is removed from `shared.work` below, before `run_members` returns
-        // and only once no member is at work; no member can enter after the gate is closed.
+        // SAFETY: only the lifetime changes. The reference is removed from `shared.work` below, before `run_members`
+        // returns and only once no member is at work; no member can enter after the gate is closed.
         let work: Work<'static> = unsafe { std::mem::transmute::<Work<'_>, Work<'static>>(work) };
         shared.next.store(0, Ordering::Relaxed);
         // SAFETY: the gate is closed and no member is at work (see the wait below), so no other thread touches the
@@ -210,8 +210,8 @@ impl Shared {
                 continue;
             }
             last_epoch = gate / EPOCH;
-            // SAFETY: entered through the open gate, so `run_members` neither writes the cell nor returns until this member
-            // leaves.
+            // SAFETY: entered through the open gate, so `run_members` neither writes the cell nor returns until this
+            // member leaves.
             if let Some(pass) = unsafe { *self.work.get() } {
                 self.run_parts(member, pass);
             }
@@ -232,8 +232,8 @@ impl Shared {
             }
         });
         if let Err(thrown) = catch_unwind(work) {
-            // Dropping the payload may panic: a member would then never leave, or `run_members` would return with members at
-            // work.
+            // Dropping the payload may panic: a member would then never leave, or `run_members` would return with
+            // members at work.
             if let Err(again) = catch_unwind(AssertUnwindSafe(|| drop(thrown))) {
                 std::mem::forget(again);
             }

@@ -171,8 +171,8 @@ impl Finder {
         self.extrapolate_behind();
     }
 
-    /// Maps the network's values linearly to nearness: the farthest surface (a low quantile outside of the person) to 0,
-    /// the subject (the median of the person, else a high quantile) to 1.
+    /// Maps the network's values linearly to nearness: the farthest surface (a low quantile outside of the person) to
+    /// 0, the subject (the median of the person, else a high quantile) to 1.
     fn measure(&mut self) {
         let Self { found: Found { nearness, .. }, subject: alphas, sorted, .. } = self;
         let mut anchor = |quantile: f32, counts: &dyn Fn(usize) -> bool| {

@@ -64,8 +64,8 @@ impl Process {
         }
     }
 
-    /// Exchanges messages within `patience`. Any failure, not only a timeout, kills the process, and later calls return the
-    /// same error.
+    /// Exchanges messages within `patience`. Any failure, not only a timeout, kills the process, and later calls return
+    /// the same error.
     fn exchange<T>(
         &mut self,
         patience: Duration,
