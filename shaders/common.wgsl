@@ -8,7 +8,7 @@ override FAR_WEIGHT: f32;           // smallest weight of a cell in the local ra
 override OTHER_FROM: f32;           // relative CoC step of a near pixel: below this, the same surface is behind it,
 override OTHER_TO: f32;             // from this on, a different one
 override HIDING_WEIGHT: f32;         // a bin with this weight of a nearer surface hides the farther one
-override HINDMOST_COVERAGE: f32;    // coverage from which a bin fully counts as the hindmost
+override FARTHEST_COVERAGE: f32;    // coverage from which a bin fully counts as the hindmost
 override GRAIN: u32;                // side of a cell of the silhouettes' grid in pixels
 override MARGIN_PX: f32;            // added to silhouette distances, because that grid is coarse
 override HAND_OVER: f32;            // half the width of a cross-fade of bins, relative to the border's CoC

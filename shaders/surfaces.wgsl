@@ -14,7 +14,7 @@ struct Stack {
 fn add(stack: Stack, layer: vec4<f32>) -> Stack {
     let newly_covered = min(layer.a, stack.open);
     let own = layer.rgb * (1.0 / max(layer.a, 1.0e-6));
-    let counts = min(layer.a * (1.0 / HINDMOST_COVERAGE), 1.0);
+    let counts = min(layer.a * (1.0 / FARTHEST_COVERAGE), 1.0);
     return Stack(stack.color + own * newly_covered, stack.open - newly_covered,
                  mix(stack.hindmost, own, counts), mix(stack.known, 1.0, counts));
 }

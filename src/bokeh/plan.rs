@@ -37,7 +37,7 @@ pub const COVERAGE_FLOOR: f32 = 1e-3;
 pub const HIDING_WEIGHT: f32 = 0.25;
 
 /// Coverage from which a bin counts fully when the colour of the hindmost bin is computed.
-pub const HINDMOST_COVERAGE: f32 = 0.8;
+pub const FARTHEST_COVERAGE: f32 = 0.8;
 
 /// Larger than any colour: a colour range that clamps nothing, for bins whose filters do not overshoot.
 pub const ANY_COLOR: f32 = 1e20;

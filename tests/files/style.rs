@@ -32,6 +32,12 @@ fn comment(line: &str) -> &str {
         .unwrap_or("")
 }
 
+/// Whether a name in a line begins so.
+fn begins_a_name(line: &str, beginning: &str) -> bool {
+    let is_part = |before: char| before.is_alphanumeric() || before == '_';
+    line.match_indices(beginning).any(|(at, _)| !line[..at].ends_with(is_part))
+}
+
 #[test]
 fn comments_are_in_plain_english() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
@@ -45,7 +51,7 @@ fn comments_are_in_plain_english() {
         for (number, line) in fs::read_to_string(file).unwrap().lines().enumerate() {
             let said = comment(line).to_lowercase();
             let habits = HABITS.iter().filter(|habit| said.contains(*habit));
-            let names = NAMES.iter().filter(|name| line.contains(*name));
+            let names = NAMES.iter().filter(|name| begins_a_name(line, name));
             let place = format!("{}:{}", file.strip_prefix(root).unwrap().display(), number + 1);
             faults.extend(habits.chain(names).map(|fault| format!("{place}: {fault}")));
         }
@@ -59,4 +65,5 @@ fn comments_are_found_in_lines() {
     {
         assert_eq!(comment(line), said);
     }
+    assert!(begins_a_name("a(MAX_PX)", "MAX_") && !begins_a_name("CLIMAX_PX", "MAX_"));
 }

@@ -14,7 +14,7 @@ use pulp::Simd;
 use super::encode::CHUNK;
 use super::silhouettes::Reaching;
 use crate::bokeh::occlusion::{FADE, MARGIN_PX, OWN_COVERAGE};
-use crate::bokeh::plan::{Bin, HINDMOST_COVERAGE, MAX_BINS};
+use crate::bokeh::plan::{Bin, FARTHEST_COVERAGE, MAX_BINS};
 use crate::compute::aligned::Line;
 use crate::compute::simd::{fma, load, store};
 
@@ -49,7 +49,7 @@ impl<S: Simd> Stack<S> {
         }
         let covered = simd.min_f32s(layer[3], self.open);
         let inverse = simd.div_f32s(one, simd.max_f32s(layer[3], simd.splat_f32s(1e-6)));
-        let weight = simd.min_f32s(simd.mul_f32s(layer[3], simd.splat_f32s(1.0 / HINDMOST_COVERAGE)), one);
+        let weight = simd.min_f32s(simd.mul_f32s(layer[3], simd.splat_f32s(1.0 / FARTHEST_COVERAGE)), one);
         for p in 0..3 {
             let straight = simd.mul_f32s(layer[p], inverse);
             self.color[p] = fma(simd, straight, covered, self.color[p]);

@@ -8,7 +8,7 @@ use crate::bokeh::occlusion::{
     OWN_COVERAGE, TRUSTED_STEPS,
 };
 use crate::bokeh::plan::{
-    ANY_COLOR, CELL, COVERAGE_FLOOR, FAR_WEIGHT, HAND_OVER, HIDING_WEIGHT, HINDMOST_COVERAGE, SEGMENT,
+    ANY_COLOR, CELL, COVERAGE_FLOOR, FAR_WEIGHT, FARTHEST_COVERAGE, HAND_OVER, HIDING_WEIGHT, SEGMENT,
 };
 use crate::compute::device::{Shader, shader};
 
@@ -104,7 +104,7 @@ pub const CONSTANTS: [(&str, f64); 31] = [
     ("OTHER_FROM", OTHER_FROM as f64),
     ("OTHER_TO", OTHER_TO as f64),
     ("HIDING_WEIGHT", HIDING_WEIGHT as f64),
-    ("HINDMOST_COVERAGE", HINDMOST_COVERAGE as f64),
+    ("FARTHEST_COVERAGE", FARTHEST_COVERAGE as f64),
     ("GRAIN", GRAIN as f64),
     ("MARGIN_PX", MARGIN_PX as f64),
     ("HAND_OVER", HAND_OVER as f64),
