@@ -259,7 +259,7 @@ mod tests {
         assert!(said.starts_with("room.png: ") && said.contains("as on a tripod"), "{said}");
         // A network's result is not compared with a plate.
         assert_eq!(check_subject(&map(shreds), None, None), None);
-        assert!(check_subject(&map(|_, _| false), None, None).unwrap().contains("nobody was found"));
+        assert!(check_subject(&map(|_, _| false), None, None).unwrap().contains("no person was found"));
     }
 
     #[test]

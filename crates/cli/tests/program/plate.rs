@@ -270,7 +270,7 @@ fn commands_take_plates_and_use_them() {
         assert!(said.contains(expected) && said.matches("warning").count() == 1, "{said}");
     }
     let ran = home.run(&["plate", "me.png", "--to", "photo.png"]);
-    assert!(ran.done().contains("whoever is in it is in the plate"), "{}", ran.stderr);
+    assert!(ran.done().contains("a person in it becomes part of the plate"), "{}", ran.stderr);
     let ran = home.run(&["plate", "synthetic", "--frames", "24", "--size", "160x120", "--to", "new/plate.png"]);
     assert!(ran.done().contains("--depth plate:new/plate.png"), "{}", ran.stderr);
     assert_eq!(still::read_color(&at("new/plate.png")).unwrap().size(), (160, 120));
