@@ -43,7 +43,7 @@ pub trait Controlled: Send + Sync {
     /// Shows pictures, or the still card in their place; `None` toggles. Returns whether pictures are shown now.
     fn switch(&self, on: Option<bool>) -> Result<bool, Answer>;
 
-    /// Returns the release that holds pictures back from the outputs, while there are outputs.
+    /// Returns the control of the shutter before the outputs, while there are outputs.
     fn release(&self) -> Option<ShutterControl>;
 
     /// Changes the look as far as the rules allow; returns their note.

@@ -8,7 +8,7 @@ const HABITS: [&str; 8] =
     ["nobody", "whoever", "somebody", "anybody", "so many", "as many as there", "is none", "has not,"];
 
 /// Beginnings of names that have a usual one.
-const NAMES: [&str; 2] = [concat!("MO", "ST_"), concat!("LEA", "ST_")];
+const NAMES: [&str; 2] = ["MOST_", "LEAST_"];
 
 fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
     for entry in fs::read_dir(folder).unwrap() {
@@ -24,12 +24,7 @@ fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
 
 /// The comment that a line is or ends with.
 fn comment(line: &str) -> &str {
-    ["// ", "//! ", "/// ", "# "]
-        .iter()
-        .filter_map(|begin| line.split_once(begin))
-        .map(|(_, said)| said)
-        .next()
-        .unwrap_or("")
+    ["// ", "//! ", "/// ", "# "].iter().find_map(|begin| line.split_once(begin)).map_or("", |(_, said)| said)
 }
 
 /// Whether a name in a line begins so.

@@ -341,10 +341,8 @@ fn warn_of_unused(command: &BenchCommand, name: &SourceName, source: &Source, lo
             uses_depth: look.effect.follows_depth(),
             effect: look.effect,
             lens: matches!(look.strength, Strength::Lens(_)),
-            realtime: false,
             cpu_only: command.backend == Backend::Cpu,
-            compresses: false,
-            window: false,
+            ..unused::Run::default()
         },
     );
 }

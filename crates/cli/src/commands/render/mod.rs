@@ -181,10 +181,8 @@ impl RenderCommand {
                 uses_depth,
                 effect: look.effect,
                 lens: matches!(look.strength, Strength::Lens(_)),
-                realtime: false,
                 cpu_only: self.computing.backend == Backend::Cpu,
-                compresses: false,
-                window: false,
+                ..unused::Run::default()
             },
         );
         match depth {
