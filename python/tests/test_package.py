@@ -6,18 +6,17 @@ import os
 import re
 from pathlib import Path
 
-import pytest
-
 import bokehcam as bc
 from bokehcam import _core
 
 
-def version_in(manifest):
-    return re.search(r'^version = "(.*)"', manifest.read_text(), re.M).group(1)
+def workspace_version(repository):
+    manifest = (repository / "Cargo.toml").read_text()
+    return re.search(r'^version = "(.*)"', manifest, re.M).group(1)
 
 
 def test_it_has_the_version_of_the_program(repository):
-    assert bc.__version__ == version_in(repository / "Cargo.toml") == version_in(repository / "python" / "Cargo.toml")
+    assert bc.__version__ == workspace_version(repository)
 
 
 def test_a_wheel_brings_the_licences_of_what_is_built_in():
@@ -57,9 +56,9 @@ def test_the_stubs_are_those_of_the_native_half():
             assert names == found, f"{name}.{method}"
 
 
-@pytest.mark.parametrize("page", ["README.md", "docs/python.md"])
-def test_the_examples_of_the_documents_run(repository, tmp_path, monkeypatch, page):
-    """Runs a page's Python blocks in order, in a folder with the recordings."""
+def test_the_examples_of_the_documentation_run(repository, tmp_path, monkeypatch):
+    """Runs the page's Python blocks in order, in a folder with the recordings."""
+    page = "docs/python.md"
     monkeypatch.chdir(tmp_path)
     os.symlink(repository / "recordings", tmp_path / "recordings")
     blocks = re.findall(r"^```python\n(.*?)^```", (repository / page).read_text(), re.M | re.S)
