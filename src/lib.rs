@@ -29,7 +29,7 @@
 //! | 6 | [`computing`]: CPU or GPU, for blur and matching |
 //! | 5 | [`look`]: everything about the blur, for pictures of any size |
 //! | 4 | [`capture`], [`depth`], [`bokeh`], [`sink`] |
-//! | 3 | `link`, [`budget`], [`network`], [`stats`], [`recording`], `v4l2`, `pipewire`, `control` |
+//! | 3 | `link` (the crate `bokehcam-link`), [`budget`], [`network`], [`stats`], [`recording`], `v4l2`, `pipewire`, `control` |
 //! | 2 | `compute`, [`calibration`], [`layout`] |
 //! | 1 | [`color`], [`frame`], [`optics`], [`clock`], [`knob`], `files` |
 //! | 0 | `names` |
@@ -39,9 +39,11 @@
 //! of a monotonic clock; blurring happens in linear light.
 //!
 //! `unsafe` is allowed in `compute/thread_pool.rs` and its `relay`, for a prefetch in `compute/simd.rs`, in
-//! `link/slot.rs`, `link/pool.rs`, `pipewire/buffer.rs`, `pipewire/quiet.rs`, `pipewire/session.rs` and under `v4l2`,
-//! where each block has its safety argument (and in `link/bell.rs` under Miri alone). `scripts/prove-link` checks it
-//! with loom, Miri and ThreadSanitizer.
+//! `pipewire/buffer.rs`, `pipewire/quiet.rs`, `pipewire/session.rs`, under `v4l2`, and in the crate `bokehcam-link`,
+//! where each block has its safety argument. `scripts/prove-link` checks it with loom, Miri and ThreadSanitizer.
+
+#[doc(hidden)]
+pub use bokehcam_link as link;
 
 pub mod bokeh;
 pub mod budget;
@@ -67,8 +69,6 @@ pub mod files;
 pub mod frame;
 pub mod knob;
 pub mod layout;
-#[doc(hidden)]
-pub mod link;
 pub mod look;
 #[doc(hidden)]
 pub mod names;

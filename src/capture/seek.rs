@@ -66,7 +66,7 @@ impl Seeker {
         let wish = |previous: u64| Some((((previous >> POSITION_BITS) + 1) << POSITION_BITS) | position);
         let previous = self.wish.fetch_update(Ordering::Relaxed, Ordering::Relaxed, wish).unwrap_or_else(|same| same);
         if let Some(demand) = self.demand.get() {
-            demand.ring();
+            demand.notify();
         }
         (previous >> POSITION_BITS) + 1
     }

@@ -46,7 +46,7 @@ const DOORS: [(&str, &[&str]); 30] = [
             "clock",
             "control",
             "files",
-            "link/bell",
+            "link/event",
             "network/apart",
             "pipewire",
             "sink/ffmpeg",
@@ -73,8 +73,8 @@ const DOORS: [(&str, &[&str]); 30] = [
     ("zune_jpeg", &["capture"]),
 ];
 
-/// Crates of the workspace above the library.
-const CRATES: [&str; 3] = ["cli", "lab", "window"];
+/// Crates of the workspace beside the library.
+const CRATES: [&str; 4] = ["cli", "lab", "link", "window"];
 
 fn layer(module: &str) -> Option<usize> {
     LAYERS.iter().position(|modules| modules.contains(&module))
@@ -158,7 +158,7 @@ fn imports_go_down_and_crates_have_one_door() {
     let mut found = Vec::new();
     for (name, root) in crates.into_iter().chain([(String::new(), top.join("src"))]) {
         let files = sources(&root);
-        assert!(files.len() > 20, "the scan found only {} files in {}", files.len(), root.display());
+        assert!(files.len() > 5, "the scan found only {} files in {}", files.len(), root.display());
         for file in files {
             let path = format!("{name}{}", file.strip_prefix(&root).unwrap().to_str().unwrap());
             found.extend(violations(&path, &fs::read_to_string(file).unwrap()));

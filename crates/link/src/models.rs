@@ -2,8 +2,7 @@
 //! model lets them read, up to a number of preemptions. A data race, a leak, or a lost wake-up (a deadlock) fails a
 //! model, as does an assertion.
 //!
-//! `RUSTFLAGS="--cfg loom" cargo test --no-default-features --release --lib link::models`, with a separate target
-//! folder; `LOOM_MAX_PREEMPTIONS` sets another bound.
+//! `scripts/prove-link loom` runs them; `LOOM_MAX_PREEMPTIONS` sets another bound.
 
 use std::time::Duration;
 
@@ -12,8 +11,8 @@ use loom::model::Builder;
 use loom::sync::atomic::{AtomicBool, Ordering};
 use loom::thread;
 
-use super::bell::Bell;
 use super::demand::Demand;
+use super::event::AutoResetEvent;
 use super::pool::Pool;
 use super::sync::Arc;
 use super::{Abandoned, Received, Receiver, live};
@@ -187,21 +186,21 @@ fn frames_of_a_pool_go_through_a_link_and_come_home() {
 #[test]
 fn what_was_done_before_a_ring_is_seen_by_who_hears_it() {
     model(|| {
-        let shared = Arc::new((Bell::new(), AtomicBool::new(false), AtomicBool::new(false)));
+        let shared = Arc::new((AutoResetEvent::new(), AtomicBool::new(false), AtomicBool::new(false)));
         let ringer = {
             let shared = shared.clone();
             thread::spawn(move || {
-                let (bell, first, second) = &*shared;
+                let (event, first, second) = &*shared;
                 first.store(true, Ordering::Relaxed);
-                bell.ring();
+                event.set();
                 second.store(true, Ordering::Relaxed);
-                bell.ring();
+                event.set();
             })
         };
-        let (bell, first, second) = &*shared;
+        let (event, first, second) = &*shared;
         while !second.load(Ordering::Relaxed) {
-            bell.wait();
-            assert!(first.load(Ordering::Relaxed), "the flags are ordered by the bell alone");
+            event.wait();
+            assert!(first.load(Ordering::Relaxed), "the flags are ordered by the event alone");
         }
         ringer.join().unwrap();
     });
@@ -210,7 +209,7 @@ fn what_was_done_before_a_ring_is_seen_by_who_hears_it() {
 #[test]
 fn a_patient_waiter_is_woken_although_another_gave_up() {
     model(|| {
-        let shared = Arc::new((Bell::new(), AtomicBool::new(false)));
+        let shared = Arc::new((AutoResetEvent::new(), AtomicBool::new(false)));
         let patient = {
             let shared = shared.clone();
             thread::spawn(move || {
@@ -224,13 +223,13 @@ fn a_patient_waiter_is_woken_although_another_gave_up() {
             thread::spawn(move || {
                 if shared.0.wait_timeout(Duration::ZERO) {
                     assert!(shared.1.load(Ordering::Relaxed));
-                    // The other thread still has a ring to receive.
-                    shared.0.ring();
+                    // The other thread still has a wake-up to receive.
+                    shared.0.set();
                 }
             })
         };
         shared.1.store(true, Ordering::Relaxed);
-        shared.0.ring();
+        shared.0.set();
         hasty.join().unwrap();
         patient.join().unwrap();
     });

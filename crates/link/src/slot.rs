@@ -61,7 +61,7 @@ impl<T> Reader<T> {
     /// Takes the newest item, unless it was taken before. Wait-free.
     pub(super) fn take(&mut self) -> Option<T> {
         // Relaxed: only a hint; the swap orders. Only this end clears FRESH, so it still holds at the swap, and an item
-        // that happened before this call (the bell, the end of the writer) is never missed.
+        // that happened before this call (the event, the end of the writer) is never missed.
         if self.end.slot.middle.load(Ordering::Relaxed) & FRESH == 0 {
             return None;
         }

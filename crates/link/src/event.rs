@@ -1,73 +1,73 @@
-//! An event count (an auto-reset event on a futex): lets a thread sleep until another one signals it.
+//! An auto-reset event on a futex: lets a thread sleep until another one signals it.
 //!
 //! One atomic word, and the kernel's `futex` on it: sleep if the word still has the expected value, wake the sleepers.
 //! There is no mutex, so a thread that is suspended while it goes to sleep or wakes others blocks no other thread, and
 //! signalling without sleepers is one atomic swap. Wake-ups are not lost, for three reasons:
 //!
-//! - A signalled bell stays signalled until one waiter resets it, and no thread falls asleep on a signalled bell: the
+//! - A set event stays set until one waiter resets it, and no thread falls asleep on a set event: the
 //!   kernel compares the word again, under the lock that the waker also takes, and returns at once if it has changed.
-//! - Sleepers are covered by the value [`ASLEEP`], which only [`Bell::ring`] replaces, and the thread that replaces it
-//!   wakes them all. So while the bell is [`RUNG`] or [`SILENT`], every waiter is awake or being woken, and will check
+//! - Sleepers are covered by the value [`ASLEEP`], which only [`AutoResetEvent::set`] replaces, and the thread that replaces it
+//!   wakes them all. So while the event is [`SET`] or [`UNSET`], every waiter is awake or being woken, and will check
 //!   the word.
-//! - Writes before a ring are visible to the waiter that resets this ring or a later one: each ring is a release, the
-//!   reset an acquire, and rings in between are read-modify-writes, which continue the release sequence. So a ring that
-//!   finds the bell rung already needs no further action.
+//! - Writes before a `set` are visible to the waiter that resets it or a later one: each `set` is a release, the reset an
+//!   acquire, and those in between are read-modify-writes, which continue the release sequence. So a `set` that finds
+//!   the event set already needs no further action.
 //!
-//! Only the waiter that resets the bell returns; if there is work left for others, it rings again. A waiter checks its
-//! condition before each wait, and must expect spurious wake-ups: a bell may still be rung for an item that was found
+//! Only the waiter that resets the event returns; if there is work left for others, it sets the event again. A waiter checks its
+//! condition before each wait, and must expect spurious wake-ups: an event may still be set for an item that was found
 //! without waiting.
 
 use std::time::{Duration, Instant};
 
 use super::sync::{AtomicU32, Ordering};
 
-/// Not rung, and no thread sleeps.
-const SILENT: u32 = 0;
-/// Rung, and not yet reset by a waiter.
-const RUNG: u32 = 1;
-/// Not rung, and a thread may be asleep.
+/// Not set, and no thread sleeps.
+const UNSET: u32 = 0;
+/// Set, and not yet reset by a waiter.
+const SET: u32 = 1;
+/// Not set, and a thread may be asleep.
 const ASLEEP: u32 = 2;
 
 #[derive(Debug)]
-pub(super) struct Bell {
+pub(super) struct AutoResetEvent {
     state: AtomicU32,
     sleepers: Sleepers,
 }
 
-impl Bell {
+impl AutoResetEvent {
     pub(super) fn new() -> Self {
-        Self { state: AtomicU32::new(SILENT), sleepers: Sleepers::new() }
+        Self { state: AtomicU32::new(UNSET), sleepers: Sleepers::new() }
     }
 
-    /// Signals the bell and wakes the sleepers. Never waits.
-    pub(super) fn ring(&self) {
-        // Release: the waiter that resets this ring sees all writes before it.
-        if self.state.swap(RUNG, Ordering::Release) == ASLEEP {
+    /// Sets the event and wakes the sleepers. Never waits.
+    pub(super) fn set(&self) {
+        // Release: the waiter that resets it sees all writes before it.
+        if self.state.swap(SET, Ordering::Release) == ASLEEP {
             self.sleepers.wake(&self.state);
         }
     }
 
-    /// Sleeps until the bell is rung, and resets it.
+    /// Sleeps until the event is set, and resets it.
     pub(super) fn wait(&self) {
         self.wait_until(None);
     }
 
-    /// Same as [`Bell::wait`] with a timeout; returns whether the bell was rung.
+    /// Same as [`AutoResetEvent::wait`] with a timeout; returns whether the event was set.
     pub(super) fn wait_timeout(&self, patience: Duration) -> bool {
         // A deadline beyond the range of the clock never comes.
         self.wait_until(Instant::now().checked_add(patience))
     }
 
-    /// Sleeps until the bell is rung, and resets it, but not past `deadline`; returns whether the bell was rung.
+    /// Sleeps until the event is set, and resets it, but not past `deadline`; returns whether the event was set.
     pub(super) fn wait_until(&self, deadline: Option<Instant>) -> bool {
         loop {
-            // Acquire: sees the writes before the ring that is reset here. A failure reads no shared data.
-            if self.state.compare_exchange(RUNG, SILENT, Ordering::Acquire, Ordering::Relaxed).is_ok() {
+            // Acquire: sees the writes before the `set` that is undone here. A failure reads no shared data.
+            if self.state.compare_exchange(SET, UNSET, Ordering::Acquire, Ordering::Relaxed).is_ok() {
                 return true;
             }
-            // Relaxed: only announces a sleeper. If the bell was rung in between, reset it instead.
-            let announced = self.state.compare_exchange(SILENT, ASLEEP, Ordering::Relaxed, Ordering::Relaxed);
-            if announced == Err(RUNG) {
+            // Relaxed: only announces a sleeper. If the event was set in between, reset it instead.
+            let announced = self.state.compare_exchange(UNSET, ASLEEP, Ordering::Relaxed, Ordering::Relaxed);
+            if announced == Err(SET) {
                 continue;
             }
             let patience = deadline.map(|deadline| deadline.saturating_duration_since(Instant::now()));
@@ -179,63 +179,66 @@ mod tests {
     const PATIENCE: Duration = Duration::from_millis(20);
 
     #[test]
-    fn a_rung_bell_stays_rung_until_it_is_heard_once() {
-        let bell = Bell::new();
-        assert!(!bell.wait_timeout(Duration::ZERO));
-        bell.ring();
-        bell.ring();
-        bell.wait();
-        assert!(!bell.wait_timeout(Duration::ZERO), "two rings that nobody heard are one");
-        bell.ring();
-        assert!(bell.wait_timeout(Duration::ZERO), "a ring is heard without patience");
+    fn an_event_stays_set_until_one_waiter_resets_it() {
+        let event = AutoResetEvent::new();
+        assert!(!event.wait_timeout(Duration::ZERO));
+        event.set();
+        event.set();
+        event.wait();
+        assert!(!event.wait_timeout(Duration::ZERO), "two sets without a waiter are one");
+        event.set();
+        assert!(event.wait_timeout(Duration::ZERO), "a set event ends a wait without patience");
     }
 
     #[test]
     fn waiting_ends_in_time_and_not_before() {
-        let (bell, began) = (Bell::new(), Instant::now());
-        assert!(!bell.wait_timeout(PATIENCE));
+        let (event, began) = (AutoResetEvent::new(), Instant::now());
+        assert!(!event.wait_timeout(PATIENCE));
         assert!(began.elapsed() >= PATIENCE);
-        bell.ring();
-        assert!(bell.wait_timeout(Duration::MAX), "a bell is heard after somebody gave up on it, and for any patience");
+        event.set();
+        assert!(
+            event.wait_timeout(Duration::MAX),
+            "an event ends a wait after an earlier one timed out, and for any patience"
+        );
     }
 
     #[test]
     fn a_waiter_without_a_deadline_wakes_although_others_give_up() {
         const ROUNDS: usize = if cfg!(miri) { 10 } else { 2_000 };
-        let bell = Arc::new(Bell::new());
-        let heard = Arc::new(AtomicUsize::new(0));
+        let event = Arc::new(AutoResetEvent::new());
+        let received = Arc::new(AtomicUsize::new(0));
         let patient = [(); 2].map(|()| {
-            let (bell, heard) = (bell.clone(), heard.clone());
+            let (event, received) = (event.clone(), received.clone());
             thread::spawn(move || {
-                while heard.load(Ordering::Acquire) < ROUNDS {
-                    bell.wait();
-                    heard.fetch_add(1, Ordering::AcqRel);
+                while received.load(Ordering::Acquire) < ROUNDS {
+                    event.wait();
+                    received.fetch_add(1, Ordering::AcqRel);
                 }
                 // The other one may be asleep.
-                bell.ring();
+                event.set();
             })
         });
         let hasty = {
-            let (bell, heard) = (bell.clone(), heard.clone());
+            let (event, received) = (event.clone(), received.clone());
             thread::spawn(move || {
-                while heard.load(Ordering::Acquire) < ROUNDS {
-                    if bell.wait_timeout(Duration::from_micros(20)) {
-                        heard.fetch_add(1, Ordering::AcqRel);
+                while received.load(Ordering::Acquire) < ROUNDS {
+                    if event.wait_timeout(Duration::from_micros(20)) {
+                        received.fetch_add(1, Ordering::AcqRel);
                     }
                 }
-                bell.ring();
+                event.set();
             })
         };
-        let mut rung = 0;
-        while heard.load(Ordering::Acquire) < ROUNDS {
-            bell.ring();
-            rung += 1;
-            // A lost ring would make this loop endless.
-            while heard.load(Ordering::Acquire) < rung.min(ROUNDS) {
+        let mut sent = 0;
+        while received.load(Ordering::Acquire) < ROUNDS {
+            event.set();
+            sent += 1;
+            // A lost wake-up would make this loop endless.
+            while received.load(Ordering::Acquire) < sent.min(ROUNDS) {
                 thread::yield_now();
             }
         }
-        bell.ring();
+        event.set();
         patient.into_iter().chain([hasty]).for_each(|thread| thread.join().unwrap());
     }
 }

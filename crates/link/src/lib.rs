@@ -13,11 +13,11 @@
 //! On a live link and in a pool, no thread ever holds a lock that another one has to wait for:
 //!
 //! - Sending and polling for an item are *wait-free*: a fixed number of steps, one atomic swap that moves the item and
-//!   one for the bell, independent of the other end and of the scheduler (`slot.rs`).
+//!   one for the event, independent of the other end and of the scheduler (`slot.rs`).
 //! - Taking and returning a buffer are *lock-free*: a buffer's bit is cleared by a compare-and-swap that is retried
 //!   only if another thread has just succeeded, and set by one instruction ([`pool`]).
 //! - None of this allocates, and none calls the kernel, with one exception: sending an item, or returning a buffer, to
-//!   a sleeping thread makes one system call to wake it (`bell.rs`). There is no mutex on that path either.
+//!   a sleeping thread makes one system call to wake it (`event.rs`). There is no mutex on that path either.
 //!
 //! Two operations wait by design: a reader without an item and a taker without a buffer sleep in the kernel (`futex`)
 //! until there is one. A live run has buffers for every place along its way, so its capture never waits.
@@ -29,12 +29,13 @@
 //!
 //! # Verification
 //! Each memory order has its reason beside it. The models in `models.rs` are run by loom in every order of the threads
-//! up to a number of preemptions; `tests/handover.rs` counts a million frames; `tests/allocation.rs` counts
-//! allocations; `scripts/prove-link` runs these, and Miri and ThreadSanitizer where the toolchain has them.
+//! up to a number of preemptions; `tests/pipeline/handover.rs` counts a million frames, and the window's
+//! `tests/allocation` counts allocations. `scripts/prove-link` runs loom, and Miri and ThreadSanitizer where the
+//! toolchain has them.
 //! `cargo bench --bench handover` compares with a mutex and a condition variable.
 
-mod bell;
 pub mod demand;
+mod event;
 mod mailbox;
 pub mod pool;
 mod slot;
@@ -55,6 +56,7 @@ pub const LOSSLESS_ITEMS: usize = 2;
 /// Result of waiting for an item.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Received<T> {
+    /// The next item.
     Item(T),
     /// Timed out.
     Nothing,
@@ -65,6 +67,7 @@ pub enum Received<T> {
 /// Result of sending an item.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Sent<T> {
+    /// Sent.
     Taken,
     /// Sent, and displaced this older item (live links only).
     Displaced(T),

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use super::bell::Bell;
+use super::event::AutoResetEvent;
 use super::sync::{Arc, AtomicBool, AtomicUsize, Ordering};
 
 /// Number of watched outputs, which a thread can wait for. Clones share it.
@@ -13,19 +13,24 @@ pub struct Demand(Arc<Shared>);
 struct Shared {
     watched: AtomicUsize,
     withheld: AtomicBool,
-    bell: Bell,
+    event: AutoResetEvent,
 }
 
 impl Demand {
+    /// Demand without watchers.
     pub fn new() -> Self {
-        Self(Arc::new(Shared { watched: AtomicUsize::new(0), withheld: AtomicBool::new(false), bell: Bell::new() }))
+        Self(Arc::new(Shared {
+            watched: AtomicUsize::new(0),
+            withheld: AtomicBool::new(false),
+            event: AutoResetEvent::new(),
+        }))
     }
 
     /// Counts one more watched output, until the returned [`Watch`] is dropped.
     pub fn watch(&self) -> Watch {
         self.0.watched.fetch_add(1, Ordering::Release);
         // After the count, or the waiter could wake, see no watcher and sleep on.
-        self.0.bell.ring();
+        self.0.event.set();
         Watch(self.clone())
     }
 
@@ -43,19 +48,19 @@ impl Demand {
     pub fn withhold(&self, withheld: bool) {
         self.0.withheld.store(withheld, Ordering::Release);
         // After the flag, for the same reason.
-        self.0.bell.ring();
+        self.0.event.set();
     }
 
     /// Wakes a waiting thread, even without a watcher.
-    pub fn ring(&self) {
-        self.0.bell.ring();
+    pub fn notify(&self) {
+        self.0.event.set();
     }
 
     /// Sleeps until an output is watched, for at most `patience`; may also wake spuriously.
     pub fn wait(&self, patience: Duration) {
         if !self.is_watched() {
             // The result does not matter: the caller checks again.
-            self.0.bell.wait_timeout(patience);
+            self.0.event.wait_timeout(patience);
         }
     }
 }
@@ -112,7 +117,7 @@ mod tests {
         assert!(began.elapsed() >= Duration::from_millis(20));
         let watch = demand.watch();
         demand.wait(Duration::ZERO);
-        // The bell is silent by now.
+        // The event is silent by now.
         demand.wait(Duration::from_secs(3600));
         drop(watch);
     }

@@ -2,7 +2,7 @@
 //!
 //! One atomic word has a bit for each free buffer. Taking clears it, returning sets it: a bit only says whether that
 //! buffer is free, so a word that has changed and changed back (the ABA problem) is harmless. Both are lock-free and
-//! neither allocates; returning never waits. A taker without a free buffer sleeps on a bell.
+//! neither allocates; returning never waits. A taker without a free buffer sleeps on an event.
 //!
 //! # Memory orders
 //! Returning is a *release*, taking an *acquire* of the same word: all writes to a buffer, and its return to its cell,
@@ -11,7 +11,7 @@
 
 use std::ops::{Deref, DerefMut};
 
-use super::bell::Bell;
+use super::event::AutoResetEvent;
 use super::sync::{Arc, AtomicU64, Ordering, UnsafeCell};
 
 /// Largest number of buffers of a [`Pool`]: the bits of a word.
@@ -27,7 +27,7 @@ struct Shared<T> {
     /// Bit `n` is set while cell `n` holds its buffer.
     free: AtomicU64,
     cells: Box<[UnsafeCell<Option<T>>]>,
-    bell: Bell,
+    event: AutoResetEvent,
 }
 
 // SAFETY: the cells are the only part that is not `Sync` by itself. A cell is accessed by the one thread that cleared
@@ -46,7 +46,7 @@ impl<T> Pool<T> {
         let buffers = std::iter::repeat_with(make).take(count);
         let cells = buffers.map(|buffer| UnsafeCell::new(Some(buffer))).collect();
         let all = if count == 0 { 0 } else { u64::MAX >> (MAX_BUFFERS - count) };
-        Self { shared: Arc::new(Shared { free: AtomicU64::new(all), cells, bell: Bell::new() }) }
+        Self { shared: Arc::new(Shared { free: AtomicU64::new(all), cells, event: AutoResetEvent::new() }) }
     }
 
     /// Takes a free buffer; sleeps until one is returned. A pool without buffers waits forever.
@@ -55,13 +55,13 @@ impl<T> Pool<T> {
         loop {
             if let Some((loan, left)) = self.claim() {
                 // However many buffers were returned, the rings before this one woke only one of several takers.
-                // Buffers returned later ring again.
+                // Buffers returned later set the event again.
                 if woken && left != 0 {
-                    self.shared.bell.ring();
+                    self.shared.event.set();
                 }
                 return loan;
             }
-            self.shared.bell.wait();
+            self.shared.event.wait();
             woken = true;
         }
     }
@@ -78,7 +78,7 @@ impl<T> Pool<T> {
 
     /// Takes a free buffer; also returns the bits of the remaining ones.
     fn claim(&self) -> Option<(Pooled<T>, u64)> {
-        // Relaxed: only a hint of which one to claim. A buffer whose ring woke this thread is visible.
+        // Relaxed: only a hint of which one to claim. The buffer whose return woke this thread is visible.
         let mut free = self.shared.free.load(Ordering::Relaxed);
         while free != 0 {
             let left = free & (free - 1);
@@ -148,10 +148,10 @@ impl<T> Drop for Pooled<T> {
     fn drop(&mut self) {
         if let Some(Origin { shared, index }) = &self.origin {
             shared.cell(*index, |cell| *cell = self.value.take());
-            // Release: the buffer is in its cell before it is free. Then the bell, or a taker could wake and find
+            // Release: the buffer is in its cell before it is free. Then the event, or a taker could wake and find
             // nothing.
             shared.free.fetch_or(1 << index, Ordering::Release);
-            shared.bell.ring();
+            shared.event.set();
         }
     }
 }

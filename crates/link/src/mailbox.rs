@@ -1,15 +1,15 @@
-//! A one-slot mailbox: the newest item wins, and the receiver sleeps on a bell.
+//! A one-slot mailbox: the newest item wins, and the receiver sleeps on an event.
 
 use std::time::{Duration, Instant};
 
-use super::bell::Bell;
+use super::event::AutoResetEvent;
 use super::slot::{Reader, Writer, slot};
 use super::sync::{Arc, AtomicBool, Ordering};
 use super::{Abandoned, Received};
 
 /// State shared by both ends, besides items.
 struct Ends {
-    bell: Bell,
+    event: AutoResetEvent,
     /// The sender is gone.
     ended: AtomicBool,
     /// The receiver is gone.
@@ -18,7 +18,7 @@ struct Ends {
 
 pub(super) fn mailbox<T>() -> (Sender<T>, Receiver<T>) {
     let (writer, reader) = slot();
-    let ends = Ends { bell: Bell::new(), ended: AtomicBool::new(false), abandoned: AtomicBool::new(false) };
+    let ends = Ends { event: AutoResetEvent::new(), ended: AtomicBool::new(false), abandoned: AtomicBool::new(false) };
     let ends = Arc::new(ends);
     (Sender { writer, ends: ends.clone() }, Receiver { reader, ends })
 }
@@ -37,16 +37,16 @@ impl<T> Sender<T> {
         }
         let displaced = self.writer.put(item);
         // Only after the item is in the slot, or the receiver could wake, find nothing and sleep on.
-        self.ends.bell.ring();
+        self.ends.event.set();
         Ok(displaced)
     }
 }
 
 impl<T> Drop for Sender<T> {
     fn drop(&mut self) {
-        // Release: a thread that sees the flag sees the last item, too. The bell is last, as for an item.
+        // Release: a thread that sees the flag sees the last item, too. The event is last, as for an item.
         self.ends.ended.store(true, Ordering::Release);
-        self.ends.bell.ring();
+        self.ends.event.set();
     }
 }
 
@@ -82,7 +82,7 @@ impl<T> Receiver<T> {
             if self.ends.ended.load(Ordering::Acquire) {
                 return self.reader.take().map_or(Received::Ended, Received::Item);
             }
-            if !self.ends.bell.wait_until(deadline) {
+            if !self.ends.event.wait_until(deadline) {
                 return Received::Nothing;
             }
         }
