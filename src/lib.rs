@@ -31,21 +31,22 @@
 //! | 4 | [`capture`], [`depth`], [`bokeh`], [`sink`] |
 //! | 3 | `link`, [`budget`], [`network`], [`stats`], [`recording`], `v4l2`, `pipewire`, `control` |
 //! | 2 | `compute`, [`calibration`], [`layout`] |
-//! | 1 | [`color`], [`frame`], [`optics`], [`clock`], [`knob`], `files` |
+//! | 1 | [`color`], [`frame`], [`optics`], [`clock`], [`camera_control`], `files` |
 //! | 0 | `names` |
 //!
 //! Conventions: a *circle of confusion* (CoC) is a **signed radius in pixels** of the input picture, positive behind
 //! the focal plane; *disparity* is in pixels of the rectified left picture; depth is in metres; time is in nanoseconds
 //! of a monotonic clock; blurring happens in linear light.
 //!
-//! `unsafe` is allowed in `compute/thread_pool.rs` and its `relay`, for a prefetch in `compute/simd.rs`, in
-//! `link/slot.rs`, `link/pool.rs`, `pipewire/buffer.rs`, `pipewire/quiet.rs`, `pipewire/session.rs` and under `v4l2`,
+//! `unsafe` is allowed in `compute/thread_pool.rs` and its `wavefront`, for a prefetch in `compute/simd.rs`, in
+//! `link/slot.rs`, `link/pool.rs`, `pipewire/buffer.rs`, `pipewire/log.rs`, `pipewire/session.rs` and under `v4l2`,
 //! where each block has its safety argument (and in `link/bell.rs` under Miri alone). `scripts/prove-link` checks it
 //! with loom, Miri and ThreadSanitizer.
 
 pub mod bokeh;
 pub mod budget;
 pub mod calibration;
+pub mod camera_control;
 #[cfg(feature = "files")]
 pub mod capture;
 pub mod clock;
@@ -65,7 +66,6 @@ pub mod engine;
 #[doc(hidden)]
 pub mod files;
 pub mod frame;
-pub mod knob;
 pub mod layout;
 #[doc(hidden)]
 pub mod link;
