@@ -1,5 +1,5 @@
 //! Computes the disparity of a rectified stereo pair.
-use bokehcam::computing::Computing;
+use bokehcam::computing::ComputeOptions;
 use bokehcam::depth::stereo::{Effort, Pair};
 use bokehcam::frame::{DisparityMap, GrayImage};
 use bokehcam::recording::still::read_color;
@@ -7,9 +7,9 @@ use bokehcam::recording::still::read_color;
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let [mut left, mut right] = [GrayImage::default(), GrayImage::default()];
     let color = read_color("recordings/stereo/image_2/000000.png".as_ref())?;
-    left.set_luma_of(&color);
-    right.set_luma_of(&read_color("recordings/stereo/image_3/000000.png".as_ref())?);
-    let mut matcher = Computing::default().matcher(64, Effort::Full, color.size())?;
+    left.set_luma_from(&color);
+    right.set_luma_from(&read_color("recordings/stereo/image_3/000000.png".as_ref())?);
+    let mut matcher = ComputeOptions::default().create_matcher(64, Effort::Full, color.size())?;
     let mut disparity = DisparityMap::default();
     matcher.disparity(Pair { left: &left, color: Some(&color), right: &right }, &mut disparity)?;
     let nearest_px = disparity.px.iter().copied().fold(0.0, f32::max);

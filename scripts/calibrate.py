@@ -98,9 +98,9 @@ def main():
         f"rows agree within {np.mean(np.abs(level[0] - level[1])):.3f} px; baseline {np.linalg.norm(t) * 1000:.1f} mm"
     )
     if rms > 1:
-        print("that is too much: leave out blurred pictures, and check that the board is flat", file=sys.stderr)
+        print("the RMS error is too large: leave out blurred pictures, and check that the board is flat", file=sys.stderr)
     if t[0, 0] > 0:
-        print("the left camera stands on the right: exchange --left and --right", file=sys.stderr)
+        print("the left camera stands on the right: swap --left and --right", file=sys.stderr)
 
     file = cv2.FileStorage(args.out, cv2.FILE_STORAGE_WRITE | cv2.FILE_STORAGE_FORMAT_YAML)
     file.write("image_width", size[0])

@@ -2,8 +2,8 @@
 // occluded by something in front of the layer. Such a pass binds `work`, `frame`, `scene`, `mixed` and `nearest_px`.
 // twin: src/bokeh/cpu/levels.rs (`Base`)
 
-fn base(pixel: vec2<u32>) -> Known {
-    let size = finest();
+fn base_pixel(pixel: vec2<u32>) -> Known {
+    let size = finest_size();
     let first = pixel - min(pixel, vec2(1u));
     let last = min(pixel + 1u, size - 1u);
     var nearest = 0.0;
@@ -12,19 +12,19 @@ fn base(pixel: vec2<u32>) -> Known {
             nearest = min(nearest, nearest_px[y * size.x + x]);
         }
     }
-    let knows = step_at(work.unhidden, nearest);
+    let known_weight = linear_step(work.visible_weight, nearest);
     var sum = vec4(0.0);
     for (var sub = 0u; sub < 4u; sub++) {
         let at = min(2u * pixel + vec2(sub % 2u, sub / 2u), frame.size - 1u);
         let index = at.y * frame.size.x + at.x;
-        var seen = scene_unpacked(scene[index], frame.max_px);
+        var seen = unpack_scene(scene[index], frame.max_px);
         // A mixed pixel counts as the composite it shows: its farther surface is not in front of the subject.
         if is_mixed(scene[index]) {
-            let k = first_mixed(index);
-            let near = near_surface(k);
-            seen = vec4(mix(seen.rgb, near.rgb, mixed[k].share), select(seen.w, near.w, mixed[k].share > 0.5));
+            let k = find_mixed_index(index);
+            let near = load_near_surface(k);
+            seen = vec4(mix(seen.rgb, near.rgb, mixed[k].alpha), select(seen.w, near.w, mixed[k].alpha > 0.5));
         }
         sum += 0.25 * seen;
     }
-    return Known(sum * knows, knows);
+    return Known(sum * known_weight, known_weight);
 }

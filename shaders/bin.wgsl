@@ -8,7 +8,7 @@
 @group(0) @binding(1) var<uniform> bins: array<Bin, MAX_BINS>;
 @group(0) @binding(2) var<uniform> frame: Frame;
 @group(0) @binding(3) var<storage, read> scene: array<vec2<u32>>;
-@group(0) @binding(4) var<storage, read> behind: array<vec2<u32>>;
+@group(0) @binding(4) var<storage, read> inpainted: array<vec2<u32>>;
 @group(0) @binding(5) var<storage, read> ranges: array<vec2<f32>>;
 @group(0) @binding(6) var<storage, read_write> source: array<vec2<u32>>;
 @group(0) @binding(7) var<storage, read_write> grid: array<vec4<f32>>;
@@ -31,18 +31,18 @@ var<workgroup> rows: array<Cell, TILE * TILE / CELL>;
 // Whether any pixel has coverage: the tile was listed by its CoC range alone.
 var<workgroup> some: atomic<u32>;
 
-fn list_at(k: u32) -> u32 {
+fn list_offset(k: u32) -> u32 {
     return bins[k].binned_at;
 }
 
 // Lists the row tiles whose filters reach a square of the bin at `corner`.
-fn list_filtered(k: u32, corner: vec2<u32>, side: u32, thread: u32) {
-    let first = vec2(corner.x - min(corner.x, bins[k].reach), corner.y) / rows_tile();
-    let end = min(corner + side - 1u + vec2(bins[k].reach, 0u), bins[k].size - 1u) / rows_tile();
+fn list_row_tiles(k: u32, corner: vec2<u32>, side: u32, thread: u32) {
+    let first = vec2(corner.x - min(corner.x, bins[k].half_width), corner.y) / rows_tile();
+    let end = min(corner + side - 1u + vec2(bins[k].half_width, 0u), bins[k].size - 1u) / rows_tile();
     let count = end - first + 1u;
     for (var n = thread; n < count.x * count.y; n += TILE * TILE) {
         let tile = first + vec2(n % count.x, n / count.x);
-        list_tile(k, bins[k].filtered_at, tile.y * filtered_across(k) + tile.x);
+        list_tile(k, bins[k].filtered_at, tile.y * row_tiles_across(k) + tile.x);
     }
 }
 
@@ -53,9 +53,9 @@ fn write_cell(k: u32, cell: vec2<u32>, all: Cell) {
 }
 
 fn bin_tile(k: u32, tile: u32, local: vec2<u32>, thread: u32) {
-    let step = sharing(k);
+    let step = threads_per_axis(k);
     let side = TILE / step;
-    let across = binned_across(k);
+    let across = bin_tiles_across(k);
     let corner = vec2(tile % across, tile / across) * side;
     if thread == 0u {
         atomicStore(&some, 0u);
@@ -67,7 +67,7 @@ fn bin_tile(k: u32, tile: u32, local: vec2<u32>, thread: u32) {
     let averaging = corner + local / step;
     var own = Pixel(vec4(0.0), 0.0);
     if all(averaging < bins[k].size) {
-        own = averaged(k, averaging, local % step, step);
+        own = average_tent(k, averaging, local % step, step);
     }
     // Four threads share a pixel: adds up their partial averages.
     if step > 1u {
@@ -81,8 +81,8 @@ fn bin_tile(k: u32, tile: u32, local: vec2<u32>, thread: u32) {
     }
     let pixel = corner + vec2(thread % side, thread / side);
     if thread < side * side {
-        let value = packed(own.value);
-        pixels[thread] = Pixel(unpacked(value), own.coc);
+        let value = pack_half4(own.value);
+        pixels[thread] = Pixel(unpack_half4(value), own.coc);
         if own.value.a > 0.0 {
             atomicStore(&some, 1u);
         }
@@ -94,7 +94,7 @@ fn bin_tile(k: u32, tile: u32, local: vec2<u32>, thread: u32) {
     if workgroupUniformLoad(&some) == 0u {
         return;
     }
-    list_filtered(k, corner, side, thread);
+    list_row_tiles(k, corner, side, thread);
     if thread < cells * cells * CELL {
         // A row of a cell. Neighbouring threads start at different pixels to avoid bank conflicts.
         let first = (thread / (cells * CELL) * CELL + thread % CELL) * side + thread / CELL % cells * CELL;
@@ -102,7 +102,7 @@ fn bin_tile(k: u32, tile: u32, local: vec2<u32>, thread: u32) {
         for (var j = 0u; j < CELL; j++) {
             let at = pixels[first + (j + thread) % CELL];
             row.sums += vec2(at.value.a, at.coc);
-            if bins[k].has_lobes == 1u && at.value.a > COVERAGE_FLOOR {
+            if bins[k].has_overshoot == 1u && at.value.a > MIN_COVERAGE {
                 let own = at.value.rgb * (1.0 / at.value.a);
                 row.low = min(row.low, own);
                 row.high = max(row.high, own);
@@ -125,7 +125,7 @@ fn bin_tile(k: u32, tile: u32, local: vec2<u32>, thread: u32) {
 fn bin(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgroups) workgroups: vec3<u32>,
        @builtin(local_invocation_id) local: vec3<u32>, @builtin(local_invocation_index) thread: u32) {
     for (var n = workgroup.x;; n += workgroups.x) {
-        let place = place_of(n);
+        let place = find_tile(n);
         if !place.some {
             break;
         }

@@ -5,16 +5,16 @@
 @group(0) @binding(2) var<storage, read_write> active_tiles: array<u32>;
 @group(0) @binding(3) var<storage, read_write> grid: array<vec4<f32>>;
 
-@compute @workgroup_size(LINE)
+@compute @workgroup_size(WORKGROUP_1D)
 fn clear(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) workgroups: vec3<u32>) {
-    let step = workgroups.x * LINE;
-    for (var k = id.x; k < places_at(arrayLength(&binned)); k += step) {
+    let step = workgroups.x * WORKGROUP_1D;
+    for (var k = id.x; k < listed_offset(arrayLength(&binned)); k += step) {
         binned[k] = 0u;
     }
-    for (var k = id.x; k < places_at(arrayLength(&filtered)); k += step) {
+    for (var k = id.x; k < listed_offset(arrayLength(&filtered)); k += step) {
         filtered[k] = 0u;
     }
-    for (var k = id.x; k < places_at(arrayLength(&active_tiles)); k += step) {
+    for (var k = id.x; k < listed_offset(arrayLength(&active_tiles)); k += step) {
         active_tiles[k] = 0u;
     }
     for (var k = id.x; k < arrayLength(&grid); k += step) {

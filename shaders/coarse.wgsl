@@ -6,8 +6,8 @@
 @group(0) @binding(1) var<storage, read_write> pyramid: array<vec4<f32>>;
 @group(0) @binding(2) var<storage, read_write> known: array<f32>;
 
-fn at(level: Level, pixel: vec2<u32>) -> Known {
-    let index = index_of(level, pixel);
+fn load_known(level: Level, pixel: vec2<u32>) -> Known {
+    let index = pixel_index(level, pixel);
     return Known(pyramid[index], known[index]);
 }
 
@@ -16,34 +16,34 @@ fn pull(fine: Level, coarse: Level, pixel: vec2<u32>) {
     for (var sub = 0u; sub < 4u; sub++) {
         let below = 2u * pixel + vec2(sub % 2u, sub / 2u);
         if all(below < fine.size) {
-            sum = plus(sum, at(fine, below));
+            sum = plus(sum, load_known(fine, below));
         }
     }
-    let index = index_of(coarse, pixel);
-    pyramid[index] = pulled(sum).value;
-    known[index] = pulled(sum).known;
+    let index = pixel_index(coarse, pixel);
+    pyramid[index] = pull_sum(sum).value;
+    known[index] = pull_sum(sum).known;
 }
 
 fn push(fine: Level, coarse: Level, pixel: vec2<u32>) {
-    let own = at(fine, pixel);
+    let own = load_known(fine, pixel);
     if own.known >= 1.0 {
         return;
     }
-    let b = between(pixel, coarse.size);
-    let near = plus(times(at(coarse, b.xz), 0.75), times(at(coarse, b.yz), 0.25));
-    let far = plus(times(at(coarse, b.xw), 0.75), times(at(coarse, b.yw), 0.25));
-    let index = index_of(fine, pixel);
-    let all = pushed(own, plus(times(near, 0.75), times(far, 0.25)));
+    let b = neighbour_pixels(pixel, coarse.size);
+    let near = plus(times(load_known(coarse, b.xz), 0.75), times(load_known(coarse, b.yz), 0.25));
+    let far = plus(times(load_known(coarse, b.xw), 0.75), times(load_known(coarse, b.yw), 0.25));
+    let index = pixel_index(fine, pixel);
+    let all = push_into(own, plus(times(near, 0.75), times(far, 0.25)));
     pyramid[index] = all.value;
     known[index] = all.known;
 }
 
 @compute @workgroup_size(TILE, TILE)
 fn coarse(@builtin(local_invocation_index) thread: u32) {
-    let first = level_of(BY_TILES);
+    let first = pyramid_level(TILED_LEVELS);
     var levels = 0u;
-    for (var fine = first; !is_coarsest(fine.size); fine = coarser(fine)) {
-        let above = coarser(fine);
+    for (var fine = first; !is_coarsest(fine.size); fine = coarser_level(fine)) {
+        let above = coarser_level(fine);
         for (var k = thread; k < above.size.x * above.size.y; k += TILE * TILE) {
             pull(fine, above, vec2(k % above.size.x, k / above.size.x));
         }
@@ -51,8 +51,8 @@ fn coarse(@builtin(local_invocation_index) thread: u32) {
         levels++;
     }
     for (var k = levels; k > 0u; k--) {
-        let fine = level_of(BY_TILES + k - 1u);
-        let above = coarser(fine);
+        let fine = pyramid_level(TILED_LEVELS + k - 1u);
+        let above = coarser_level(fine);
         for (var k = thread; k < fine.size.x * fine.size.y; k += TILE * TILE) {
             push(fine, above, vec2(k % fine.size.x, k / fine.size.x));
         }

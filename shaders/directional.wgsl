@@ -5,7 +5,7 @@
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<storage, read_write> pyramid: array<vec4<f32>>;
 @group(0) @binding(2) var<storage, read_write> known: array<f32>;
-@group(0) @binding(3) var<storage, read> reached: array<vec4<f32>>;
+@group(0) @binding(3) var<storage, read> dilated: array<vec4<f32>>;
 
 const LINES = 8u;
 
@@ -22,15 +22,15 @@ struct Line {
     span_px: vec2<f32>,     // lowest and highest CoC of its ends
 }
 
-fn likeness(a_px: f32, b_px: f32) -> f32 {
-    let apart = (a_px - b_px) / HALF_ALIKE_PX;
+fn coc_similarity(a_px: f32, b_px: f32) -> f32 {
+    let apart = (a_px - b_px) / HALF_SIMILAR_PX;
     return 1.0 / (1.0 + apart * apart);
 }
 
-fn end_of(level: Level, pixel: vec2<u32>, step: vec2<i32>) -> End {
+fn find_end(level: Level, pixel: vec2<u32>, step: vec2<i32>) -> End {
     var at = vec2<i32>(pixel) + step;
     for (var steps = 1u; steps <= MAX_STEPS && all(at >= vec2(0)) && all(at < vec2<i32>(level.size)); steps++) {
-        let index = index_of(level, vec2<u32>(at));
+        let index = pixel_index(level, vec2<u32>(at));
         if known[index] > 0.0 {
             return End(pyramid[index] / max(known[index], 1.0e-6), f32(steps));
         }
@@ -39,10 +39,10 @@ fn end_of(level: Level, pixel: vec2<u32>, step: vec2<i32>) -> End {
     return End(vec4(0.0), 0.0);
 }
 
-fn line_through(level: Level, pixel: vec2<u32>, direction: u32) -> Line {
+fn evaluate_line(level: Level, pixel: vec2<u32>, direction: u32) -> Line {
     let step = vec2<i32>((vec2(STEPS_ACROSS, STEPS_DOWN) >> vec2(4u * direction)) & vec2(15u)) - 8;
-    let a = end_of(level, pixel, -step);
-    let b = end_of(level, pixel, step);
+    let a = find_end(level, pixel, -step);
+    let b = find_end(level, pixel, step);
     let length = sqrt(f32(step.x * step.x + step.y * step.y));
     let sum = a.steps + b.steps;
     if sum == 0.0 {
@@ -50,31 +50,31 @@ fn line_through(level: Level, pixel: vec2<u32>, direction: u32) -> Line {
     }
     if a.steps == 0.0 || b.steps == 0.0 {
         let value = select(a.value, b.value, a.steps == 0.0);
-        return Line(value, 1.0 / (ONE_ENDED * length * sum), ONE_ENDED * length * sum, vec2(value.w));
+        return Line(value, 1.0 / (ONE_ENDED_FACTOR * length * sum), ONE_ENDED_FACTOR * length * sum, vec2(value.w));
     }
-    let alike = likeness(a.value.w, b.value.w);
+    let similarity = coc_similarity(a.value.w, b.value.w);
     let span_px = vec2(min(a.value.w, b.value.w), max(a.value.w, b.value.w));
-    return Line(mix(a.value, b.value, a.steps / sum), alike * alike / (length * sum), length * sum, span_px);
+    return Line(mix(a.value, b.value, a.steps / sum), similarity * similarity / (length * sum), length * sum, span_px);
 }
 
 @compute @workgroup_size(SMALL_TILE, SMALL_TILE)
 fn directional(@builtin(global_invocation_id) id: vec3<u32>) {
-    let level = level_of(1u);
+    let level = pyramid_level(1u);
     if any(id.xy >= level.size) {
         return;
     }
-    let index = index_of(level, id.xy);
-    let found = directional_at() + index;
+    let index = pixel_index(level, id.xy);
+    let found = directional_offset() + index;
     known[found] = 0.0;
     // Pixels of level 1 are the cells of the silhouettes' grid.
-    if known[index] > 0.0 || reached[id.y * level.size.x + id.x].x <= 0.0 {
+    if known[index] > 0.0 || dilated[id.y * level.size.x + id.x].x <= 0.0 {
         return;
     }
     var lines: array<Line, LINES>;
     var span_px = vec2(1.0e30, -1.0e30);
     var shortest = 1.0e30;
     for (var d = 0u; d < LINES; d++) {
-        lines[d] = line_through(level, id.xy, d);
+        lines[d] = evaluate_line(level, id.xy, d);
         shortest = min(shortest, select(1.0e30, lines[d].steps, lines[d].steps > 0.0));
         span_px = vec2(min(span_px.x, lines[d].span_px.x), max(span_px.y, lines[d].span_px.y));
     }
@@ -88,7 +88,7 @@ fn directional(@builtin(global_invocation_id) id: vec3<u32>) {
     for (var d = 0u; d < LINES; d++) {
         var score = 0.0;
         for (var e = 0u; e < LINES; e++) {
-            score += lines[e].weight * likeness(lines[d].value.w, lines[e].value.w);
+            score += lines[e].weight * coc_similarity(lines[d].value.w, lines[e].value.w);
         }
         scores[d] = score;
         best = max(best, score);

@@ -13,10 +13,10 @@ struct Taps {
     left: i32,      // table index of tap 0 at the left edge
     right: i32,
     step: i32,      // table step from one tap to the next
-    reach: i32,
+    half_width: i32,
 }
 
-fn corner_of(k: u32, pixel: vec2<u32>) -> Corner {
+fn find_corner(k: u32, pixel: vec2<u32>) -> Corner {
     let down = max((f32(pixel.y) - (f32(CELL) - 1.0) / 2.0) / f32(CELL), 0.0);
     let above = min(u32(down), bins[k].cells.y - 1u);
     let below = min(above + 1u, bins[k].cells.y - 1u);
@@ -26,12 +26,12 @@ fn corner_of(k: u32, pixel: vec2<u32>) -> Corner {
 }
 
 // A vector of the left edge (0, 1) or right edge (2, 3) of a pixel's segment.
-fn edge_at(corner: Corner, index: u32) -> vec4<f32> {
+fn interpolate_edge(corner: Corner, index: u32) -> vec4<f32> {
     return mix(edges[corner.above + index], edges[corner.below + index], corner.down);
 }
 
 // Outermost tap of a node.
-fn reach_of(node: u32) -> i32 {
+fn half_width_of_node(node: u32) -> i32 {
     let first = u32(OCTAVES_FROM_PX * frame.steps_per_px);
     var radius_px = f32(node) / frame.steps_per_px;
     if node > first {
@@ -40,29 +40,29 @@ fn reach_of(node: u32) -> i32 {
     return i32(ceil(max(radius_px * frame.extent - 0.5, 0.0)));
 }
 
-fn taps_at(k: u32, pixel: vec2<u32>, corner: Corner) -> Taps {
-    var radii = vec2(edge_at(corner, 0u).x, edge_at(corner, 2u).x);
+fn find_taps(k: u32, pixel: vec2<u32>, corner: Corner) -> Taps {
+    var radii = vec2(interpolate_edge(corner, 0u).x, interpolate_edge(corner, 2u).x);
     var turned = bins[k].turned == 1u;
     if frame.compositing == 2u {
         // The only bin of a gather has the picture's scale; every pixel has a radius of its own.
-        let coc_px = scene_unpacked(scene[pixel.y * frame.size.x + pixel.x], frame.max_px).w;
+        let coc_px = unpack_scene(scene[pixel.y * frame.size.x + pixel.x], frame.max_px).w;
         radii = vec2(abs(coc_px));
         turned = coc_px < 0.0;
     }
-    let left = node_at(radii.x, frame.steps_per_px, frame.nodes);
-    let right = node_at(radii.y, frame.steps_per_px, frame.nodes);
-    let origin = (vec2(left, right) * (2u * frame.reach + 1u) + frame.reach) * frame.groups + work.group;
+    let left = nearest_node(radii.x, frame.steps_per_px, frame.nodes);
+    let right = nearest_node(radii.y, frame.steps_per_px, frame.nodes);
+    let origin = (vec2(left, right) * (2u * frame.half_width + 1u) + frame.half_width) * frame.groups + work.group;
     let step = select(i32(frame.groups), -i32(frame.groups), turned);
     // Clamped to the bin's outermost tap, however the device rounds.
-    return Taps(i32(origin.x), i32(origin.y), step, min(reach_of(max(left, right)), i32(bins[k].reach)));
+    return Taps(i32(origin.x), i32(origin.y), step, min(half_width_of_node(max(left, right)), i32(bins[k].half_width)));
 }
 
 // Tap `j` of four terms.
-fn tap_at(taps: Taps, along: f32, j: i32) -> vec4<f32> {
+fn interpolate_tap(taps: Taps, along: f32, j: i32) -> vec4<f32> {
     return mix(bank[u32(taps.left + j * taps.step)], bank[u32(taps.right + j * taps.step)], along);
 }
 
 // Whether the equal taps at -j and j can share a multiplication: all `length` pixels of a line must be loaded.
-fn is_mirrored(length: i32, held: u32) -> bool {
-    return frame.even == 1u && length <= i32(held);
+fn can_mirror_taps(length: i32, held: u32) -> bool {
+    return frame.symmetric == 1u && length <= i32(held);
 }

@@ -3,6 +3,6 @@
 
 const HEAD = 16u;
 
-fn places_at(length: u32) -> u32 {
+fn listed_offset(length: u32) -> u32 {
     return HEAD + (length - HEAD) / 2u;
 }

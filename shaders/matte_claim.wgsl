@@ -5,16 +5,16 @@
 const ALL_DIRECTIONS = (1u << DIRECTIONS) - 1u;
 
 // Bit position of a step's claims in `places`: even and odd steps alternate.
-fn shift_of(step: u32) -> u32 {
+fn claim_shift(step: u32) -> u32 {
     return DIRECTIONS * (step % 2u);
 }
 
 // Claims the neighbours of a pixel for the next step, if they are as far as its far surface. Skips those of this step,
 // and those that already have an entry.
-fn claim(at: u32, far: f32, step: u32) {
+fn claim_neighbours(at: u32, far: f32, step: u32) {
     let pixel = vec2(at % frame.size.x, at / frame.size.x);
-    let taken = ENTERED | (ALL_DIRECTIONS << shift_of(step));
-    let next = shift_of(step + 1u);
+    let taken = ENTERED | (ALL_DIRECTIONS << claim_shift(step));
+    let next = claim_shift(step + 1u);
     for (var k = 0u; k < DIRECTIONS; k++) {
         // At the first column or row, the subtraction wraps, so that the check below fails.
         let other = pixel + vec2(k % 3u, k / 3u) - 1u;
@@ -22,7 +22,7 @@ fn claim(at: u32, far: f32, step: u32) {
             continue;
         }
         let place = other.y * frame.size.x + other.x;
-        if (atomicLoad(&places[place]) & taken) != 0u || abs(inverse_of(metres[place]) - far) > frame.jump {
+        if (atomicLoad(&places[place]) & taken) != 0u || abs(inverse_depth(metres[place]) - far) > frame.depth_step {
             continue;
         }
         // Seen from the neighbour, the direction is the opposite one.

@@ -26,7 +26,7 @@ var<workgroup> least: array<atomic<u32>, 2>;
 var<workgroup> sums: array<f32, 39>;
 
 // Edge bits of a row of a cell, with `CLOSE_PX` columns on both sides.
-fn edges_from(left: u32, y: u32) -> u32 {
+fn edge_bits(left: u32, y: u32) -> u32 {
     let k = y * words_across() + left / WORD;
     let shift = left % WORD;
     let word = words[k].x;
@@ -53,7 +53,7 @@ fn matte_clusters(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invoca
     let inside = min(pixel, frame.size - 1u);
     let at = inside.y * frame.size.x + inside.x;
     let bits = metres[at];
-    let inverse = inverse_of(bits);
+    let inverse = inverse_depth(bits);
     let light = light_at(at);
     if thread < 2u {
         atomicStore(&largest[thread], 0u);
@@ -63,7 +63,7 @@ fn matte_clusters(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invoca
         let y = corner.y + thread;
         edges[thread] = 0u;
         if y >= CLOSE_PX && y < frame.size.y + CLOSE_PX {
-            edges[thread] = edges_from(corner.x, y - CLOSE_PX);
+            edges[thread] = edge_bits(corner.x, y - CLOSE_PX);
         }
     }
     workgroupBarrier();
@@ -87,14 +87,14 @@ fn matte_clusters(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invoca
     let pure_ends = vec2(atomicLoad(&least[0]), atomicLoad(&largest[0]));
     let all_ends = vec2(atomicLoad(&least[1]), atomicLoad(&largest[1]));
     let ends = bitcast<vec2<f32>>(select(all_ends, pure_ends, pure_ends.x <= pure_ends.y));
-    let is_one = ends.y - ends.x <= frame.jump;
+    let is_one = ends.y - ends.x <= frame.depth_step;
     let is_far = !is_one && inverse <= 0.5 * (ends.x + ends.y);
     let off = abs(inverse - select(ends.y, ends.x, is_far));
     // Every other pixel, as on a chessboard, suffices.
-    let counts = is_there && (local.x + local.y) % 2u == 0u && off <= select(1.0, 2.0, is_one) * frame.jump;
+    let counts = is_there && (local.x + local.y) % 2u == 0u && off <= select(1.0, 2.0, is_one) * frame.depth_step;
     let weight = select(0.0, select(select(1.0, CLOSE_WEIGHT, is_close), AT_EDGE_WEIGHT, is_edge), counts);
     let wide = bitcast<vec2<f32>>(all_ends);
-    let is_fringe = is_there && is_edge && wide.y - wide.x > frame.jump && inverse > 0.5 * (wide.x + wide.y);
+    let is_fringe = is_there && is_edge && wide.y - wide.x > frame.depth_step && inverse > 0.5 * (wide.x + wide.y);
     values[thread] = array<f32, 7>(1.0, light.x, light.y, light.z, f32(local.x), f32(local.y), inverse);
     weights[thread] = array<f32, 3>(select(weight, 0.0, is_far), select(0.0, weight, is_far), select(0.0, 1.0, is_fringe));
     workgroupBarrier();

@@ -3,10 +3,10 @@
 
 struct Frame {
     size: vec2<u32>,        // picture size, in pixels
-    most: u32,              // maximum number of entries; with more edges there is no matte
-    known: u32,             // rounds from which on the background is known; 0: no background
-    jump: f32,              // depth discontinuity: a larger step of inverse depth, in 1/m, separates two surfaces
-    other: f32,             // minimum step of inverse depth from a surface to the background behind it, in 1/m
+    max_entries: u32,       // maximum number of entries; with more edges there is no matte
+    min_rounds: u32,        // rounds from which on the background is known; 0: no background
+    depth_step: f32,        // depth discontinuity: a larger step of inverse depth, in 1/m, separates two surfaces
+    surface_step: f32,      // minimum step of inverse depth from a surface to the background behind it, in 1/m
 }
 
 @group(0) @binding(0) var<uniform> frame: Frame;
@@ -19,7 +19,7 @@ override CLOSE_WEIGHT: f32;
 override RADIUS: u32;           // search radii in cells: the next one if a surface has no pixels
 override RADIUS_FURTHER: u32;
 override RADIUS_FARTHEST: u32;
-override HALF_PX: f32;
+override FALLOFF_PX: f32;
 override FRINGE_FEW: f32;       // weight of the fringe from which it starts to count, and from which it counts fully
 override FRINGE_ENOUGH: f32;
 override FRINGE_ALPHA: f32;
@@ -40,7 +40,7 @@ override MAX_WRONG: f32;
 override PRIOR_ROUNDS: u32;
 override TINY: f32;             // smaller likelihoods are zero
 override NEARLY_PURE: f32;
-override TRACED_FROM: f32;
+override MIN_TRACED_ALPHA: f32;
 override STEPS_TRACED: u32;
 
 // Side of a cell in pixels; pixels in a word of bits, all of one row; words in a block.
@@ -69,7 +69,7 @@ const BORDERS = 2u;     // it shares a side with the other surface
 const THIN = 4u;        // it is part of something thin
 const FOUND = 8u;       // of a model: both surfaces have pixels
 const LONE = 16u;       // its model lacks pixels of a surface
-const BEHIND = 32u;     // the background behind it is known
+const KNOWN_BACKGROUND = 32u;  // the background behind it is known
 const MIXED = 64u;
 const WIDE = 128u;      // it is part of something wide
 const SEEN = 256u;      // a traced pixel with some alpha, or part of the outline of something wide
@@ -86,9 +86,9 @@ struct Entry {
     model: u32,             // the entry whose colour model it shares; both colours are at twice that index
     flags: atomic<u32>,
     alpha: f32,             // coverage by the near surface, 0 to 1
-    clean: f32,             // likelihood of a pure pixel, as the map says
+    pure: f32,              // likelihood of a pure pixel, as the map says
     sided: vec2<f32>,       // mean of the likelihood over alphas on the map's side, and of likelihood times alpha
-    every: vec2<f32>,       // the same over all alphas
+    any_alpha: vec2<f32>,   // the same over all alphas
 }
 
 struct Cell {
@@ -98,7 +98,7 @@ struct Cell {
 }
 
 // Inverse depth, in 1/m, of the bits of a distance in metres; 0 if the distance is unknown.
-fn inverse_of(bits: u32) -> f32 {
+fn inverse_depth(bits: u32) -> f32 {
     let is_known = bits >= MIN_DEPTH_BITS && bits <= MAX_DEPTH_BITS;
     return select(0.0, 1.0 / bitcast<f32>(clamp(bits, MIN_DEPTH_BITS, MAX_DEPTH_BITS)), is_known);
 }

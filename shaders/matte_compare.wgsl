@@ -1,5 +1,5 @@
 // Included by passes that evaluate entries against their colour models. They bind `entries` and `colors`.
-// twin: src/depth/matting/share.rs and passes.rs
+// twin: src/depth/matting/alpha.rs and passes.rs
 
 // Alpha is sampled in steps of an eighth.
 const STEPS = 8u;
@@ -18,32 +18,32 @@ const ALPHA_PRIORS = array(
 );
 
 // Computes the likelihoods of an entry's colour, whose model has both surfaces.
-fn compare(k: u32, labels: u32) {
+fn evaluate_color(k: u32, labels: u32) {
     let at = entries[k].at;
     let near = colors[2u * entries[k].model];
     let far = colors[2u * entries[k].model + 1u];
     let own = light_at(at);
-    let spread = spread_of(near, far);
+    let spread = inverse_scatter(near, far);
     var before = far.mean;
     // A remembered colour unlike the far surface here is of another surface.
-    var is_behind = is_known_behind(at, entries[k].near);
-    if is_behind {
-        let light = light_behind(at);
-        is_behind = is_like(far, light);
-        before = select(far.mean, light, is_behind);
+    var has_background = is_background_known(at, entries[k].near);
+    if has_background {
+        let light = background_light(at);
+        has_background = is_plausible_far(far, light);
+        before = select(far.mean, light, has_background);
     }
-    let d = discriminant_of(near.mean, spread, before);
-    let alpha = alpha_of(d, own);
+    let d = create_discriminant(near.mean, spread, before);
+    let alpha = discriminant_alpha(d, own);
     var off_line = 0.0;
-    if is_behind {
+    if has_background {
         let off = own - before - clamp(alpha, 0.0, 1.0) * (near.mean - before);
-        off_line = dot(off, times(spread, off));
+        off_line = dot(off, multiply(spread, off));
     }
     let is_near = (labels & NEAR) != 0u;
     // A colour off the line between both surfaces is no mixture of them, such as a lone hair beside a face.
     let fits = max(exp(-min(off_line, 80.0)), MIN_OFF_LINE);
     let outline = labels / OUTLINE % 8u;
-    var every = vec2(0.0);
+    var any_alpha = vec2(0.0);
     var sided = vec2(0.0);
     var pure = 0.0;
     for (var step = 0u; step <= STEPS; step++) {
@@ -54,15 +54,15 @@ fn compare(k: u32, labels: u32) {
         // Coverage by its own surface; below one half, it is not on the map's side.
         let own = select(STEPS - step, step, is_near);
         let likely = select(0.0, ALPHA_PRIORS[outline][max(own, STEPS / 2u) - STEPS / 2u], own >= STEPS / 2u);
-        every += both;
+        any_alpha += both;
         sided += likely * both;
         pure = select(pure, likelihood, own == STEPS);
     }
     // If the background is known, a far pixel is no outlier.
-    let outlier = select(OUTLIER, 0.0, is_behind && !is_near);
-    every /= f32(STEPS + 1u);
-    entries[k].clean = max(pure, outlier / sqrt(d.certainty));
-    entries[k].sided = select(sided, every, (labels & THIN) != 0u);
-    entries[k].every = every;
-    atomicOr(&entries[k].flags, select(0u, BEHIND, is_behind));
+    let outlier = select(OUTLIER, 0.0, has_background && !is_near);
+    any_alpha /= f32(STEPS + 1u);
+    entries[k].pure = max(pure, outlier / sqrt(d.certainty));
+    entries[k].sided = select(sided, any_alpha, (labels & THIN) != 0u);
+    entries[k].any_alpha = any_alpha;
+    atomicOr(&entries[k].flags, select(0u, KNOWN_BACKGROUND, has_background));
 }

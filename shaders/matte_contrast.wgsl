@@ -15,13 +15,13 @@ struct Color {
     rest: vec3<f32>,
 }
 
-fn times(m: Symmetric, v: vec3<f32>) -> vec3<f32> {
+fn multiply(m: Symmetric, v: vec3<f32>) -> vec3<f32> {
     let middle = vec3(m.row.y, m.rest.xy);
     return vec3(dot(m.row, v), dot(middle, v), dot(vec3(m.row.z, m.rest.yz), v));
 }
 
 // Inverse by the adjugate; zeros for a singular matrix.
-fn inverted(m: Symmetric) -> Symmetric {
+fn invert(m: Symmetric) -> Symmetric {
     let row = vec3(
         m.rest.x * m.rest.z - m.rest.y * m.rest.y,
         m.row.z * m.rest.y - m.row.y * m.rest.z,
@@ -38,14 +38,14 @@ fn inverted(m: Symmetric) -> Symmetric {
 }
 
 // Regularised covariance: `kept` of it, plus an isotropic part, since covariances of few pixels are too narrow.
-fn widened(m: Symmetric, kept: f32) -> Symmetric {
+fn regularize(m: Symmetric, kept: f32) -> Symmetric {
     let floor = SHRINKAGE / 3.0 * (m.row.x + m.rest.x + m.rest.z) + QUANTISATION;
     return Symmetric(kept * m.row + vec3(floor, 0.0, 0.0), kept * m.rest + vec3(floor, 0.0, floor));
 }
 
 // Inverse of the within-class scatter, the sum of both covariances.
-fn spread_of(near: Color, far: Color) -> Symmetric {
-    return inverted(widened(Symmetric(near.row + far.row, near.rest + far.rest), 1.0 - SHRINKAGE));
+fn inverse_scatter(near: Color, far: Color) -> Symmetric {
+    return invert(regularize(Symmetric(near.row + far.row, near.rest + far.rest), 1.0 - SHRINKAGE));
 }
 
 // Alpha is the dot product of a colour and `direction`, less `offset`; `certainty` is the reciprocal variance of that
@@ -56,20 +56,20 @@ struct Discriminant {
     certainty: f32,
 }
 
-fn discriminant_of(near: vec3<f32>, spread: Symmetric, far: vec3<f32>) -> Discriminant {
+fn create_discriminant(near: vec3<f32>, spread: Symmetric, far: vec3<f32>) -> Discriminant {
     let difference = near - far;
-    let product = times(spread, difference);
+    let product = multiply(spread, difference);
     let contrast = max(dot(product, difference), 1e-9);
     let direction = product / contrast;
     return Discriminant(direction, dot(direction, far), min(2.0 * contrast, MAX_CERTAINTY));
 }
 
-fn alpha_of(d: Discriminant, light: vec3<f32>) -> f32 {
+fn discriminant_alpha(d: Discriminant, light: vec3<f32>) -> f32 {
     return dot(d.direction, light) - d.offset;
 }
 
 // Whether the light is plausible for the far surface, by its Mahalanobis distance.
-fn is_like(far: Color, light: vec3<f32>) -> bool {
+fn is_plausible_far(far: Color, light: vec3<f32>) -> bool {
     let off = light - far.mean;
-    return dot(off, times(inverted(widened(Symmetric(far.row, far.rest), 1.0)), off)) < MAX_DEVIATION * MAX_DEVIATION;
+    return dot(off, multiply(invert(regularize(Symmetric(far.row, far.rest), 1.0)), off)) < MAX_DEVIATION * MAX_DEVIATION;
 }

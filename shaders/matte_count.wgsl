@@ -11,7 +11,7 @@ fn matte_count(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocatio
     if is_there {
         own = countOneBits(words[k].x);
     }
-    let before = sum_before(own, thread);
+    let before = exclusive_prefix_sum(own, thread);
     if is_there {
         words[k].y = before;
     }

@@ -1,6 +1,6 @@
 // Included by passes that create the entries of a cell, one workgroup a cell: entries of one cell between the same
 // surfaces share one colour model. The passes bind `cells`, `places`, `entries` and `colors`.
-// twin: src/depth/matting/clusters/answers.rs
+// twin: src/depth/matting/clusters/color_models.rs
 
 const PIXELS = CELL * CELL;
 
@@ -11,7 +11,7 @@ var<workgroup> ends: array<vec2<f32>, PIXELS>;
 var<workgroup> models: array<u32, PIXELS>;
 
 // Number of chosen pixels; every thread calls it for its own pixel.
-fn choose(thread: u32, is_chosen: bool) -> u32 {
+fn count_chosen(thread: u32, is_chosen: bool) -> u32 {
     if thread < 2u {
         atomicStore(&chosen[thread], 0u);
     }
@@ -24,7 +24,7 @@ fn choose(thread: u32, is_chosen: bool) -> u32 {
 }
 
 // Number of chosen pixels before that of a thread.
-fn chosen_before(thread: u32) -> u32 {
+fn rank_among_chosen(thread: u32) -> u32 {
     let before = countOneBits(atomicLoad(&chosen[thread / WORD]) & ((1u << (thread % WORD)) - 1u));
     return before + select(0u, countOneBits(atomicLoad(&chosen[0])), thread >= WORD);
 }
@@ -37,7 +37,7 @@ fn assign_models(cell: u32, latest_model: u32, count: u32) {
         surfaces = vec2(entries[last - 1u].near, entries[last - 1u].far);
     }
     for (var k = 0u; k < count; k++) {
-        if last == 0u || any(abs(surfaces - ends[k]) > vec2(frame.jump)) {
+        if last == 0u || any(abs(surfaces - ends[k]) > vec2(frame.depth_step)) {
             last = own_entries[k] + 1u;
             surfaces = ends[k];
         }
@@ -48,9 +48,9 @@ fn assign_models(cell: u32, latest_model: u32, count: u32) {
 
 // Creates the entries of the chosen pixels of a cell; every thread calls it, with the entry, the pixel, its surfaces
 // and its labels if it is chosen. Returns whether both surfaces have pixels nearby.
-fn enter(cell: vec2<u32>, latest_model: u32, count: u32, thread: u32,
-         is_chosen: bool, entry: u32, at: u32, surfaces: vec2<f32>, labels: u32) -> bool {
-    let rank = chosen_before(thread);
+fn create_entries(cell: vec2<u32>, latest_model: u32, count: u32, thread: u32,
+                  is_chosen: bool, entry: u32, at: u32, surfaces: vec2<f32>, labels: u32) -> bool {
+    let rank = rank_among_chosen(thread);
     if is_chosen {
         own_entries[rank] = entry;
         ends[rank] = surfaces;
@@ -83,6 +83,6 @@ fn enter(cell: vec2<u32>, latest_model: u32, count: u32, thread: u32,
         atomicOr(&entries[entry].flags, LONE);
         return false;
     }
-    compare(entry, labels);
+    evaluate_color(entry, labels);
     return true;
 }

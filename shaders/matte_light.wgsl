@@ -2,7 +2,7 @@
 // code in each channel; and the picture as `rgb`, 3 bytes a pixel.
 
 // Extracts three bytes from byte offset `byte` on, of the `word` that contains it and the `next` one.
-fn codes_of(word: u32, next: u32, byte: u32) -> vec3<u32> {
+fn unpack_codes(word: u32, next: u32, byte: u32) -> vec3<u32> {
     let first = 8u * (byte % 4u);
     let bits = (word >> first) | select(0u, next << ((32u - first) % 32u), first > 8u);
     return vec3(bits, bits >> 8u, bits >> 16u) & vec3(255u);
@@ -10,6 +10,6 @@ fn codes_of(word: u32, next: u32, byte: u32) -> vec3<u32> {
 
 fn light_at(at: u32) -> vec3<f32> {
     let word = 3u * at / 4u;
-    let codes = codes_of(rgb[word], rgb[min(word + 1u, arrayLength(&rgb) - 1u)], 3u * at);
+    let codes = unpack_codes(rgb[word], rgb[min(word + 1u, arrayLength(&rgb) - 1u)], 3u * at);
     return vec3(lights[codes.x].x, lights[codes.y].x, lights[codes.z].x);
 }

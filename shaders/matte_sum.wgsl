@@ -3,7 +3,7 @@
 var<workgroup> sums: array<u32, BLOCK>;
 
 // Exclusive prefix sum: the sum of `own` of all threads before this one.
-fn sum_before(own: u32, thread: u32) -> u32 {
+fn exclusive_prefix_sum(own: u32, thread: u32) -> u32 {
     sums[thread] = own;
     workgroupBarrier();
     for (var by = 1u; by < BLOCK; by *= 2u) {

@@ -1,5 +1,5 @@
 // Included by passes that fit colour models. They bind `clusters`, and `colors`, two a model.
-// twin: src/depth/matting/clusters/answers.rs
+// twin: src/depth/matting/clusters/color_models.rs
 
 // Sums of clusters, in the layout of `clusters`.
 struct Sums {
@@ -8,23 +8,23 @@ struct Sums {
     c: vec2<f32>,
 }
 
-fn color_of(s: Sums) -> Color {
+fn color_from_sums(s: Sums) -> Color {
     let mean = s.a.yzw / s.a.x;
     return Color(mean, s.b.xyz / s.a.x - mean.x * mean, vec3(s.b.w, s.c) / s.a.x - mean.yyz * mean.yzz);
 }
 
-fn plus(s: Sums, weight: f32, k: u32) -> Sums {
+fn add_cluster(s: Sums, weight: f32, k: u32) -> Sums {
     return Sums(s.a + weight * clusters[k], s.b + weight * clusters[k + 1u], s.c + weight * clusters[k + 2u].xy);
 }
 
 // If the near surface looks different at edges, such as hair beside a face, its fringe replaces its colour in part.
-fn with_fringe(near: Color, far: Color, sums: Sums) -> Color {
+fn blend_fringe(near: Color, far: Color, sums: Sums) -> Color {
     let counts = clamp((sums.a.x - FRINGE_FEW) / (FRINGE_ENOUGH - FRINGE_FEW), 0.0, 1.0);
     if counts <= 0.0 {
         return near;
     }
-    let fringe = color_of(sums);
-    let alpha = alpha_of(discriminant_of(near.mean, spread_of(near, far), far.mean), fringe.mean);
+    let fringe = color_from_sums(sums);
+    let alpha = discriminant_alpha(create_discriminant(near.mean, inverse_scatter(near, far), far.mean), fringe.mean);
     let other = counts * clamp((FRINGE_SAME - alpha) / (FRINGE_SAME - FRINGE_OTHER), 0.0, 1.0);
     if other <= 0.0 {
         return near;
@@ -37,12 +37,12 @@ fn with_fringe(near: Color, far: Color, sums: Sums) -> Color {
 // pixels.
 fn find_colors(cell: vec2<u32>, near: f32, far: f32, model: u32) -> bool {
     // A surface's inverse depth may vary around, but not as far as to the other surface.
-    let tolerance = max(2.0 * frame.jump, 0.25 * (near - far));
+    let tolerance = max(2.0 * frame.depth_step, 0.25 * (near - far));
     let across = cells_across();
     let last = vec2(across, (frame.size.y + CELL - 1u) / CELL) - 1u;
     let middle = vec2<f32>(cell * CELL) + 0.5 * f32(CELL - 1u);
-    for (var turn = 0u; turn < 3u; turn++) {
-        let radius = select(select(RADIUS_FARTHEST, RADIUS_FURTHER, turn == 1u), RADIUS, turn == 0u);
+    for (var attempt = 0u; attempt < 3u; attempt++) {
+        let radius = select(select(RADIUS_FARTHEST, RADIUS_FURTHER, attempt == 1u), RADIUS, attempt == 0u);
         let from_cell = cell - min(cell, vec2(radius));
         let to_cell = min(cell + radius, last);
         var of_near = Sums();
@@ -57,20 +57,20 @@ fn find_colors(cell: vec2<u32>, near: f32, far: f32, model: u32) -> bool {
                     continue;
                 }
                 let off = clusters[k + 2u].zw - middle;
-                let falloff = 1.0 / (1.0 + dot(off, off) / (HALF_PX * HALF_PX));
+                let falloff = 1.0 / (1.0 + dot(off, off) / (FALLOFF_PX * FALLOFF_PX));
                 let weight = falloff * falloff * falloff;
                 if is_fringe {
-                    of_fringe = plus(of_fringe, weight, k);
+                    of_fringe = add_cluster(of_fringe, weight, k);
                 } else if is_near {
-                    of_near = plus(of_near, weight, k);
+                    of_near = add_cluster(of_near, weight, k);
                 } else {
-                    of_far = plus(of_far, weight, k);
+                    of_far = add_cluster(of_far, weight, k);
                 }
             }
         }
         if of_near.a.x > 0.0 && of_far.a.x > 0.0 {
-            let color = color_of(of_far);
-            colors[2u * model] = with_fringe(color_of(of_near), color, of_fringe);
+            let color = color_from_sums(of_far);
+            colors[2u * model] = blend_fringe(color_from_sums(of_near), color, of_fringe);
             colors[2u * model + 1u] = color;
             return true;
         }

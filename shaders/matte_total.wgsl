@@ -14,13 +14,13 @@ fn matte_total(@builtin(local_invocation_index) thread: u32) {
     for (var k = begin; k < end; k++) {
         own += counts[TOTALS + k];
     }
-    var before = sum_before(own, thread);
+    var before = exclusive_prefix_sum(own, thread);
     if thread == BLOCK - 1u {
         let all = before + own;
         if AGAIN == 0u {
             // Only noise has more edges; the caller retries with a larger depth step.
             counts[FOUND_EDGES] = all;
-            counts[EDGES] = select(all, 0u, all > frame.most);
+            counts[EDGES] = select(all, 0u, all > frame.max_entries);
             counts[NEXT] = counts[EDGES];
         } else {
             mixed[0] = vec4(all, counts[FOUND_EDGES], 0u, 0u);

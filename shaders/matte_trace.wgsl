@@ -3,11 +3,11 @@
 // Workgroups loop over the listed cells.
 // twin: src/depth/matting/trace.rs
 
-@group(0) @binding(1) var<uniform> turn: Turn;      // the step, from 1
+@group(0) @binding(1) var<uniform> run: PassRun;      // the step, from 1
 @group(0) @binding(2) var<uniform> lights: array<vec4<f32>, 256>;
 @group(0) @binding(3) var<storage, read> metres: array<u32>;
 @group(0) @binding(4) var<storage, read> rgb: array<u32>;
-@group(0) @binding(5) var<storage, read> known: array<u32>;
+@group(0) @binding(5) var<storage, read> background: array<u32>;
 @group(0) @binding(6) var<storage, read> partials: array<vec4<f32>>;
 @group(0) @binding(7) var<storage, read> clusters: array<vec4<f32>>;
 @group(0) @binding(8) var<storage, read_write> counts: array<atomic<u32>>;
@@ -21,19 +21,19 @@ var<workgroup> own_cell: u32;
 var<workgroup> first: u32;
 
 // Number of cells listed for this step; 0 if there is no room for its pixels.
-fn cells_to_do() -> u32 {
+fn listed_cell_count() -> u32 {
     var all = atomicLoad(&counts[EDGES]);
-    for (var step = 1u; step <= turn.at; step++) {
+    for (var step = 1u; step <= run.index; step++) {
         all += atomicLoad(&counts[CLAIMED + step]);
     }
-    return select(atomicLoad(&counts[LISTED + turn.at]), 0u, all > frame.most);
+    return select(atomicLoad(&counts[LISTED + run.index]), 0u, all > frame.max_entries);
 }
 
 @compute @workgroup_size(LANES)
 fn matte_trace(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
                @builtin(local_invocation_index) thread: u32) {
     if thread == 0u {
-        listed = cells_to_do();
+        listed = listed_cell_count();
     }
     let end = workgroupUniformLoad(&listed);
     if group.x >= end {
@@ -42,7 +42,7 @@ fn matte_trace(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups)
     let prior = prior_after(PRIOR_ROUNDS, thread);
     for (var k = group.x; k < end; k += groups.x) {
         if thread == 0u {
-            own_cell = cells[k].list[turn.at % 2u];
+            own_cell = cells[k].list[run.index % 2u];
         }
         let number = workgroupUniformLoad(&own_cell);
         let cell = vec2(number % cells_across(), number / cells_across());
@@ -51,14 +51,14 @@ fn matte_trace(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups)
         var claims = 0u;
         if all(pixel < frame.size) {
             let place = atomicLoad(&places[at]);
-            claims = select((place >> shift_of(turn.at)) & ALL_DIRECTIONS, 0u, (place & ENTERED) != 0u);
+            claims = select((place >> claim_shift(run.index)) & ALL_DIRECTIONS, 0u, (place & ENTERED) != 0u);
         }
         let is_chosen = claims != 0u;
-        let count = choose(thread, is_chosen);
+        let count = count_chosen(thread, is_chosen);
         if thread == 0u {
             first = atomicAdd(&counts[NEXT], count);
         }
-        let entry = workgroupUniformLoad(&first) + chosen_before(thread);
+        let entry = workgroupUniformLoad(&first) + rank_among_chosen(thread);
         var surfaces = vec2(0.0);
         if is_chosen {
             let direction = firstTrailingBit(claims);
@@ -66,14 +66,14 @@ fn matte_trace(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups)
             let parent = atomicLoad(&places[other.y * frame.size.x + other.x]) & ~ENTERED;
             surfaces = vec2(entries[parent].near, entries[parent].far);
         }
-        if enter(cell, cells[number].latest_model, count, thread, is_chosen, entry, at, surfaces,
-                 OUTLINE * BEYOND + STEP * turn.at) {
-            let alpha = alpha_at(entry, prior, 0u);
+        if create_entries(cell, cells[number].latest_model, count, thread, is_chosen, entry, at, surfaces,
+                          OUTLINE * BEYOND + STEP * run.index) {
+            let alpha = posterior_alpha(entry, prior, 0u);
             entries[entry].alpha = alpha;
-            if alpha >= TRACED_FROM {
+            if alpha >= MIN_TRACED_ALPHA {
                 atomicOr(&entries[entry].flags, SEEN);
-                if turn.at < STEPS_TRACED {
-                    claim(at, surfaces.y, turn.at);
+                if run.index < STEPS_TRACED {
+                    claim_neighbours(at, surfaces.y, run.index);
                 }
             }
         }

@@ -1,5 +1,5 @@
 // Pass matte_weigh: computes alpha of the entries at edges, which claim the first pixels to trace.
-// twin: `Weigh` in src/depth/matting/passes.rs
+// twin: `ComputeAlphas` in src/depth/matting/passes.rs
 
 @group(0) @binding(1) var<storage, read> metres: array<u32>;
 @group(0) @binding(2) var<storage, read> partials: array<vec4<f32>>;
@@ -18,10 +18,10 @@ fn matte_weigh(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups)
         if (labels & LONE) != 0u {
             continue;
         }
-        let alpha = alpha_at(k, prior, labels);
+        let alpha = posterior_alpha(k, prior, labels);
         entries[k].alpha = alpha;
-        if (labels & NEAR) == 0u && alpha >= TRACED_FROM {
-            claim(entries[k].at, entries[k].far, 0u);
+        if (labels & NEAR) == 0u && alpha >= MIN_TRACED_ALPHA {
+            claim_neighbours(entries[k].at, entries[k].far, 0u);
         }
     }
 }

@@ -5,7 +5,7 @@ struct MixedPixel {
     at: u32,            // pixel index: row times columns plus column
     near: u32,          // uploaded: metres of the nearer and the farther surface; after unpack: the nearer
     far: u32,           // surface as a scene pixel (the farther one is in the scene)
-    share: f32,         // alpha of the nearer surface
+    alpha: f32,         // alpha of the nearer surface
     behind: f32,        // known fraction of the farther surface
     red: f32,           // colour of the nearer surface minus that of the farther one
     green: f32,
@@ -13,7 +13,7 @@ struct MixedPixel {
 }
 
 // Index of the first mixed pixel at or after a pixel (binary search).
-fn first_mixed(pixel: u32) -> u32 {
+fn find_mixed_index(pixel: u32) -> u32 {
     var first = 0u;
     var end = frame.mixed;
     while first < end {
@@ -28,10 +28,10 @@ fn first_mixed(pixel: u32) -> u32 {
 }
 
 fn is_mixed(value: vec2<u32>) -> bool {
-    return (value.y & MIXED) != 0u;
+    return (value.y & MIXED_FLAG) != 0u;
 }
 
 // The nearer surface of a mixed pixel.
-fn near_surface(index: u32) -> vec4<f32> {
-    return scene_unpacked(vec2(mixed[index].near, mixed[index].far), frame.max_px);
+fn load_near_surface(index: u32) -> vec4<f32> {
+    return unpack_scene(vec2(mixed[index].near, mixed[index].far), frame.max_px);
 }

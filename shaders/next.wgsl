@@ -5,6 +5,6 @@ fn list_tile(k: u32, first: u32, tile: u32) {
     let flag = HEAD + first + tile;
     if atomicLoad(&next[flag]) == 0u && atomicExchange(&next[flag], 1u) == 0u {
         let place = atomicAdd(&next[k], 1u);
-        atomicStore(&next[places_at(arrayLength(&next)) + first + place], tile);
+        atomicStore(&next[listed_offset(arrayLength(&next)) + first + place], tile);
     }
 }

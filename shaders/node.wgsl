@@ -1,7 +1,7 @@
 // Shared by the filter passes.
 
 // The node of the bank nearest to a radius. twin: src/bokeh/bank.rs
-fn node_at(radius_px: f32, steps_per_px: f32, nodes: u32) -> u32 {
+fn nearest_node(radius_px: f32, steps_per_px: f32, nodes: u32) -> u32 {
     var node = u32(radius_px * steps_per_px + 0.5);
     if radius_px >= OCTAVES_FROM_PX {
         // The bits of a float are linear within each octave.

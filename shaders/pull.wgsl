@@ -13,7 +13,7 @@
 var<workgroup> tile: array<Known, TILE * TILE>;
 
 fn store_known(level: Level, pixel: vec2<u32>, own: Known) {
-    let index = index_of(level, pixel);
+    let index = pixel_index(level, pixel);
     pyramid[index] = own.value;
     known[index] = own.known;
 }
@@ -26,20 +26,20 @@ fn pull(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(local_invocation_i
     var sum = Known(vec4(0.0), 0.0);
     for (var sub = 0u; sub < 4u; sub++) {
         let at = 2u * pixel + vec2(sub % 2u, sub / 2u);
-        if all(at < finest()) {
-            sum = plus(sum, base(at));
+        if all(at < finest_size()) {
+            sum = plus(sum, base_pixel(at));
         }
     }
-    var level = level_of(1u);
-    var more = !is_coarsest(finest());
+    var level = pyramid_level(1u);
+    var more = !is_coarsest(finest_size());
     var side = TILE;
-    for (var k = 1u; k <= BY_TILES; k++) {
-        let own = pulled(sum);
+    for (var k = 1u; k <= TILED_LEVELS; k++) {
+        let own = pull_sum(sum);
         if more && all(local.xy < vec2(side)) && all(pixel < level.size) {
             store_known(level, pixel, own);
         }
         more = more && !is_coarsest(level.size);
-        level = coarser(level);
+        level = coarser_level(level);
         workgroupBarrier();
         // The next level is computed from this one in shared memory.
         tile[thread] = own;

@@ -4,7 +4,7 @@
 // twin: src/bokeh/cpu/levels.rs
 
 // Levels above level 0 that are computed tile by tile; one workgroup does all others.
-const BY_TILES = 5u;
+const TILED_LEVELS = 5u;
 
 struct Level {
     size: vec2<u32>,
@@ -17,19 +17,19 @@ struct Known {
 }
 
 // Size of level 0.
-fn finest() -> vec2<u32> {
+fn finest_size() -> vec2<u32> {
     return (frame.size + 1u) / 2u;
 }
 
-fn coarser(level: Level) -> Level {
+fn coarser_level(level: Level) -> Level {
     return Level((level.size + 1u) / 2u, level.at + level.size.x * level.size.y);
 }
 
 // A level, from 1 on.
-fn level_of(number: u32) -> Level {
-    var level = Level((finest() + 1u) / 2u, 0u);
+fn pyramid_level(number: u32) -> Level {
+    var level = Level((finest_size() + 1u) / 2u, 0u);
     for (var k = 1u; k < number; k++) {
-        level = coarser(level);
+        level = coarser_level(level);
     }
     return level;
 }
@@ -38,15 +38,15 @@ fn is_coarsest(size: vec2<u32>) -> bool {
     return all(size == vec2(1u));
 }
 
-fn index_of(level: Level, pixel: vec2<u32>) -> u32 {
+fn pixel_index(level: Level, pixel: vec2<u32>) -> u32 {
     return level.at + pixel.y * level.size.x + pixel.x;
 }
 
 // Offset of the result of `directional` for level 1: behind all levels.
-fn directional_at() -> u32 {
-    var level = level_of(1u);
+fn directional_offset() -> u32 {
+    var level = pyramid_level(1u);
     while !is_coarsest(level.size) {
-        level = coarser(level);
+        level = coarser_level(level);
     }
     return level.at + 1u;
 }
@@ -60,22 +60,22 @@ fn times(a: Known, factor: f32) -> Known {
 }
 
 // Pull: combines four pixels into one of the coarser level, divided by the known weight if that is above 1.
-fn pulled(sum: Known) -> Known {
+fn pull_sum(sum: Known) -> Known {
     return times(sum, 1.0 / max(sum.known, 1.0));
 }
 
 // Push: fills the unknown part of a pixel from the coarser level.
-fn pushed(own: Known, around: Known) -> Known {
+fn push_into(own: Known, around: Known) -> Known {
     return plus(own, times(around, (1.0 - own.known) / max(around.known, 1.0e-6)));
 }
 
 // The coarse neighbour that a fine pixel is interpolated with, along one axis.
-fn neighbour(at: u32, limit: u32) -> u32 {
+fn coarse_neighbour(at: u32, limit: u32) -> u32 {
     let half = at / 2u;
     return select(min(half + 1u, limit - 1u), half - min(half, 1u), at % 2u == 0u);
 }
 
 // The four coarse pixels for bilinear interpolation: near and far column, near and far row.
-fn between(pixel: vec2<u32>, coarse: vec2<u32>) -> vec4<u32> {
-    return vec4(pixel.x / 2u, neighbour(pixel.x, coarse.x), pixel.y / 2u, neighbour(pixel.y, coarse.y));
+fn neighbour_pixels(pixel: vec2<u32>, coarse: vec2<u32>) -> vec4<u32> {
+    return vec4(pixel.x / 2u, coarse_neighbour(pixel.x, coarse.x), pixel.y / 2u, coarse_neighbour(pixel.y, coarse.y));
 }

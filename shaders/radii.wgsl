@@ -1,7 +1,7 @@
 // Shared by passes that compute the CoC of any pixel. Such a pass binds `frame`, and the depth map as `radii`.
 // twin: src/optics.rs
 
-fn coc_of(x: u32, y: u32) -> f32 {
+fn coc_at(x: u32, y: u32) -> f32 {
     if frame.coc_kind == 0u {
         return frame.coc.x;
     }
@@ -10,23 +10,23 @@ fn coc_of(x: u32, y: u32) -> f32 {
         return min(max(distance_px, 0.0) * frame.ramp.x, frame.ramp.y);
     }
     if all(frame.depth_size == frame.size) {
-        return radius_at(y * frame.size.x + x);
+        return load_coc(y * frame.size.x + x);
     }
     let column = min((2u * x + 1u) * frame.depth_size.x / (2u * frame.size.x), frame.depth_size.x - 1u);
     let row = min((2u * y + 1u) * frame.depth_size.y / (2u * frame.size.y), frame.depth_size.y - 1u);
-    return radius_at(row * frame.depth_size.x + column);
+    return load_coc(row * frame.depth_size.x + column);
 }
 
-fn radius_at(index: u32) -> f32 {
+fn load_coc(index: u32) -> f32 {
     if frame.coc_kind == 3u {
-        return coc_of_depth(bitcast<f32>(radii[index]));
+        return depth_to_coc(bitcast<f32>(radii[index]));
     }
     let roots = unpack2x16snorm(radii[index / 2u]);
     let root = select(roots.x, roots.y, index % 2u == 1u);
     return root * abs(root) * frame.max_px;
 }
 
-fn coc_of_depth(metres: f32) -> f32 {
+fn depth_to_coc(metres: f32) -> f32 {
     // Unknown depth counts as infinite. The largest finite number stands in for infinity.
     var inverse_m = 0.0;
     if metres > 0.0 && metres < 3.0e38 {

@@ -10,21 +10,21 @@
 const HUGE: f32 = 3.0e38;
 
 // The neighbourhoods of the cells on both sides of each edge.
-var<workgroup> sides: array<Around, TILE * SMALL_TILE>;
+var<workgroup> sides: array<Neighbourhood, TILE * SMALL_TILE>;
 
-struct Around {
+struct Neighbourhood {
     radius_px: f32,
     low: vec3<f32>,
     high: vec3<f32>,
 }
 
-fn extent_of(k: u32) -> vec2<u32> {
+fn work_size(k: u32) -> vec2<u32> {
     return vec2(2u * bins[k].edges, bins[k].cells.y);
 }
 
-fn nearness(k: u32, distance: u32) -> f32 {
+fn cell_weight(k: u32, distance: u32) -> f32 {
     let d = f32(distance) / bins[k].sigma_cells;
-    return exp(-0.5 * d * d) + FAR_WEIGHT;
+    return exp(-0.5 * d * d) + MIN_CELL_WEIGHT;
 }
 
 // The radius that blurs as much at the bin's scale as `coc_px` does at full size (plan.rs has the derivation).
@@ -37,19 +37,19 @@ fn bin_radius_px(k: u32, coc_px: f32) -> f32 {
     return min(radius_px, bins[k].max_radius_px);
 }
 
-fn around(k: u32, cell: vec2<u32>) -> Around {
+fn combine_neighbourhood(k: u32, cell: vec2<u32>) -> Neighbourhood {
     let first = cell - min(cell, vec2(bins[k].radius_cells));
     let last = min(cell + bins[k].radius_cells, bins[k].cells - 1u);
     var sums = vec2(0.0);
     var low = vec3(HUGE);
     var high = vec3(-HUGE);
     for (var y = first.y; y <= last.y; y++) {
-        let weight_y = nearness(k, max(y, cell.y) - min(y, cell.y));
+        let weight_y = cell_weight(k, max(y, cell.y) - min(y, cell.y));
         for (var x = first.x; x <= last.x; x++) {
             let index = 2u * (bins[k].cells_at + y * bins[k].cells.x + x);
             let a = grid[index];
-            sums += a.xy * weight_y * nearness(k, max(x, cell.x) - min(x, cell.x));
-            if bins[k].has_lobes == 1u && a.x > 0.0 {
+            sums += a.xy * weight_y * cell_weight(k, max(x, cell.x) - min(x, cell.x));
+            if bins[k].has_overshoot == 1u && a.x > 0.0 {
                 let b = grid[index + 1u];
                 low = min(low, vec3(a.zw, b.x));
                 high = max(high, b.yzw);
@@ -57,30 +57,30 @@ fn around(k: u32, cell: vec2<u32>) -> Around {
         }
     }
     let coc_px = select(0.0, sums.y / sums.x, sums.x > 0.0);
-    if bins[k].has_lobes == 0u {
-        return Around(bin_radius_px(k, coc_px), vec3(-ANY_COLOR), vec3(ANY_COLOR));
+    if bins[k].has_overshoot == 0u {
+        return Neighbourhood(bin_radius_px(k, coc_px), vec3(-UNBOUNDED_COLOR), vec3(UNBOUNDED_COLOR));
     }
     // Without content in the support there is no range to clamp to.
     let some = low.r < HUGE;
-    return Around(bin_radius_px(k, coc_px), select(vec3(0.0), low, some), select(vec3(0.0), high, some));
+    return Neighbourhood(bin_radius_px(k, coc_px), select(vec3(0.0), low, some), select(vec3(0.0), high, some));
 }
 
 // Two threads per edge: one for the cell on its left, one for the cell on its right.
 @compute @workgroup_size(TILE, SMALL_TILE)
 fn reach(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgroups) workgroups: vec3<u32>,
          @builtin(local_invocation_id) local: vec3<u32>, @builtin(local_invocation_index) thread: u32) {
-    let place = place_of(workgroup, workgroups, vec2(TILE, SMALL_TILE));
+    let place = find_tile(workgroup, workgroups, vec2(TILE, SMALL_TILE));
     if !place.some {
         return;
     }
     let k = place.bin;
     let at = place.tile * vec2(TILE, SMALL_TILE) + local.xy;
-    let inside = all(at < extent_of(k));
+    let inside = all(at < work_size(k));
     let edge = at.x / 2u;
     let right = edge * SEGMENT / CELL;
     if inside {
         let cell = select(right - min(right, 1u), min(right, bins[k].cells.x - 1u), at.x % 2u == 1u);
-        sides[thread] = around(k, vec2(cell, at.y));
+        sides[thread] = combine_neighbourhood(k, vec2(cell, at.y));
     }
     workgroupBarrier();
     if inside && at.x % 2u == 0u {

@@ -7,7 +7,7 @@
 @group(0) @binding(3) var<storage, read> colors: array<u32>;
 @group(0) @binding(4) var<storage, read_write> flags: array<u32>;
 @group(0) @binding(5) var<storage, read_write> votes: array<vec2<u32>>; // bits of inverse depth; colour and confidence
-@group(0) @binding(6) var<storage, read_write> front: array<u32>;
+@group(0) @binding(6) var<storage, read_write> worklist: array<u32>;
 @group(0) @binding(7) var<storage, read_write> counts: array<atomic<u32>>;
 
 const TILE = 16u;
@@ -68,6 +68,6 @@ fn refine_band(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocatio
     votes[k] = vec2(bitcast<u32>(depths[(local.y + SIDE_PX + 1u) * DEPTHS + local.x + SIDE_PX + 1u]),
                     colors[k] | (confidence << 24u));
     if is_listed {
-        front[atomicAdd(&counts[1u + DOWN * (WAVES + 2u)], 1u)] = k;
+        worklist[atomicAdd(&counts[1u + DOWN * (WAVES + 2u)], 1u)] = k;
     }
 }

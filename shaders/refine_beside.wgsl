@@ -21,7 +21,7 @@ fn refine_beside(@builtin(workgroup_id) row: vec3<u32>, @builtin(local_invocatio
     let each = (width + THREADS - 1u) / THREADS;
     let start = row.y * width + min(thread * each, width);
     let end = row.y * width + min((thread + 1u) * each, width);
-    let ends = known_ends(start, end - start, 1u);
+    let ends = find_known_ends(start, end - start, 1u);
     firsts[thread] = ends.x;
     lasts[thread] = ends.y;
     workgroupBarrier();

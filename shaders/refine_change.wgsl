@@ -1,6 +1,6 @@
 // Pass refine_change: the colour change around each pixel since the last frame, summed over 3x3 pixels; the border
 // repeats.
-// twin: `Change` in src/depth/refine/temporal.rs
+// twin: `ColorChange` in src/depth/refine/temporal.rs
 
 @group(0) @binding(1) var<storage, read> colors: array<u32>;
 @group(0) @binding(2) var<storage, read> before: array<u32>;

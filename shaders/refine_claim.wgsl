@@ -15,7 +15,7 @@ fn is_hole(k: u32) -> bool {
 fn mean_color(start: u32, step: u32, count: u32) -> vec3<f32> {
     var sum = vec3(0.0);
     for (var n = 0u; n < count; n++) {
-        sum += color_of(colors[start + n * step]);
+        sum += unpack_color(colors[start + n * step]);
     }
     return sum / f32(count);
 }
@@ -34,10 +34,10 @@ fn refine_claim(@builtin(global_invocation_id) id: vec3<u32>) {
     }
     // Counts one pixel more than the limit, to detect holes that are too long.
     var count = 1u;
-    while count <= frame.longest && place + count < length && is_hole(start + count * step) {
+    while count <= frame.max_hole_px && place + count < length && is_hole(start + count * step) {
         count++;
     }
-    if count > frame.longest || place + count == length {
+    if count > frame.max_hole_px || place + count == length {
         return;
     }
     let end = start + count * step;
@@ -55,7 +55,7 @@ fn refine_claim(@builtin(global_invocation_id) id: vec3<u32>) {
     let near_m = select(after_m, before_m, is_before);
     for (var n = 0u; n < count; n++) {
         let k = start + select(count - 1u - n, n, is_before) * step;
-        let own = color_of(colors[k]);
+        let own = unpack_color(colors[k]);
         if distance(own, near) * PREFERENCE >= distance(own, far) {
             break;
         }

@@ -4,10 +4,10 @@ struct Frame {
     size: vec2<u32>,        // of the picture, in pixels
     map_size: vec2<u32>,    // of the map as measured
     focus_m: f32,           // inverse depth is this over the depth
-    times: f32,             // factor for the stored inverse depth, whose unit has changed
-    longest: u32,           // largest hole that may be the near side's, in pixels
-    empty: u32,             // 1 without any known depth: the last filled map is used
-    fresh: u32,             // 1 without a last frame
+    rescale: f32,           // factor for the stored inverse depth, whose unit has changed
+    max_hole_px: u32,       // largest hole that may be the near side's, in pixels
+    is_empty: u32,          // 1 without any known depth: the last filled map is used
+    is_fresh: u32,          // 1 without a last frame
 }
 
 @group(0) @binding(0) var<uniform> frame: Frame;
@@ -68,6 +68,6 @@ fn depth_step_at(depth_step: f32, v: f32) -> f32 {
 }
 
 // Unpacks red, green and blue, 0 to 255.
-fn color_of(word: u32) -> vec3<f32> {
+fn unpack_color(word: u32) -> vec3<f32> {
     return vec3<f32>(vec3(word, word >> 8u, word >> 16u) & vec3(255u));
 }

@@ -2,7 +2,7 @@
 // `metres`.
 
 // Returns the first and the last known depth of `count` pixels, `step` apart; 0 without any.
-fn known_ends(start: u32, count: u32, step: u32) -> vec2<f32> {
+fn find_known_ends(start: u32, count: u32, step: u32) -> vec2<f32> {
     var ends = vec2(0.0);
     for (var n = 0u; n < count; n++) {
         let depth_m = metres[start + n * step];

@@ -33,7 +33,7 @@ fn refine_fill(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocatio
     let start = min(local.y * each, height);
     // Threads beyond the last column have an empty strip.
     let end = select(start, min((local.y + 1u) * each, height), x < width);
-    let ends = known_ends(start * width + x, end - start, width);
+    let ends = find_known_ends(start * width + x, end - start, width);
     firsts[thread] = ends.x;
     lasts[thread] = ends.y;
     workgroupBarrier();

@@ -7,7 +7,7 @@ var<workgroup> sums: array<vec4<f32>, PIXELS * LANES>;
 var<workgroup> ends: array<vec2<f32>, PIXELS * LANES>;
 
 // Adds halves to halves, in the order of the CPU's vector code.
-fn sum_of(first: u32) -> vec4<f32> {
+fn sum_lanes(first: u32) -> vec4<f32> {
     var four: array<vec4<f32>, 4>;
     for (var n = 0u; n < 4u; n++) {
         four[n] = (sums[first + n] + sums[first + n + 8u]) + (sums[first + n + 4u] + sums[first + n + 12u]);
@@ -15,7 +15,7 @@ fn sum_of(first: u32) -> vec4<f32> {
     return (four[0] + four[2]) + (four[1] + four[3]);
 }
 
-fn ends_of(first: u32) -> vec2<f32> {
+fn min_max_lanes(first: u32) -> vec2<f32> {
     var both = ends[first];
     for (var n = 1u; n < LANES; n++) {
         let other = ends[first + n];

@@ -14,7 +14,7 @@ fn refine_median(@builtin(local_invocation_index) thread: u32) {
     for (var n = thread; n < length; n += THREADS) {
         samples[n] = change[n / grid.x * step.y * frame.size.x + n % grid.x * step.x];
     }
-    let median = f32(sample_of_rank(length / 2u, length, thread)) / 9.0;
+    let median = f32(select_rank(length / 2u, length, thread)) / 9.0;
     if thread == 0u {
         measures[CHANGED] = clamp(MOVED * median, MOVED_MIN, MOVED_MAX);
     }

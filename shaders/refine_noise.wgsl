@@ -23,7 +23,7 @@ fn refine_noise(@builtin(local_invocation_index) thread: u32) {
         samples[n] = select(NONE, bitcast<u32>(difference), is_unknown == 0u);
     }
     let count = count_below(NONE, length, thread);
-    let quantile = bitcast<f32>(sample_of_rank(u32(f32(count) * SMOOTH_FRACTION), length, thread));
+    let quantile = bitcast<f32>(select_rank(u32(f32(count) * SMOOTH_FRACTION), length, thread));
     // The second difference has 1 + 4 + 1 times the variance of a depth.
     let noise = select(0.0, quantile / SMOOTH_QUANTILE / sqrt(6.0), count > 0u);
     if thread == 0u {

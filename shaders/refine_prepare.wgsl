@@ -13,22 +13,22 @@
 @group(0) @binding(7) var<storage, read_write> row_claims: array<f32>;
 @group(0) @binding(8) var<storage, read_write> column_claims: array<f32>;
 
-fn known(bits: vec4<u32>) -> vec4<bool> {
+fn is_known(bits: vec4<u32>) -> vec4<bool> {
     return (bits >= vec4(MIN_BITS)) & (bits <= vec4(MAX_BITS));
 }
 
 // Returns the depth at a pixel, or 0.
-fn depth_at(pixel: vec2<u32>) -> f32 {
+fn resample_depth(pixel: vec2<u32>) -> f32 {
     let column = taps[pixel.x];
     let row = taps[frame.size.x + pixel.y];
     let first = vec2(column.x, row.x);
     let second = min(first + 1u, frame.map_size - 1u);
     let rows = vec2(first.y, second.y) * frame.map_size.x;
     let four = vec4(map[rows.x + first.x], map[rows.x + second.x], map[rows.y + first.x], map[rows.y + second.x]);
-    let share = bitcast<vec2<f32>>(vec2(column.y, row.y));
-    let nearest = four[select(0u, 1u, share.x >= 0.5) + select(0u, 2u, share.y >= 0.5)];
-    let nearest_m = select(0.0, bitcast<f32>(nearest), known(vec4(nearest)).x);
-    if !all(known(four)) || all(share == vec2(0.0)) {
+    let fraction = bitcast<vec2<f32>>(vec2(column.y, row.y));
+    let nearest = four[select(0u, 1u, fraction.x >= 0.5) + select(0u, 2u, fraction.y >= 0.5)];
+    let nearest_m = select(0.0, bitcast<f32>(nearest), is_known(vec4(nearest)).x);
+    if !all(is_known(four)) || all(fraction == vec2(0.0)) {
         return nearest_m;
     }
     let inverse = 1.0 / bitcast<vec4<f32>>(four);
@@ -37,11 +37,11 @@ fn depth_at(pixel: vec2<u32>) -> f32 {
     if high - low > MAP_SURFACE * high {
         return nearest_m;
     }
-    let lines = inverse.xz + (inverse.yw - inverse.xz) * share.x;
-    return 1.0 / (lines.x + (lines.y - lines.x) * share.y);
+    let lines = inverse.xz + (inverse.yw - inverse.xz) * fraction.x;
+    return 1.0 / (lines.x + (lines.y - lines.x) * fraction.y);
 }
 
-fn color_at(k: u32) -> u32 {
+fn pack_color(k: u32) -> u32 {
     let at = 3u * k;
     let shift = 8u * (at % 4u);
     // The rest of the pixel is in the next word; the last pixel of the picture may end with the last word.
@@ -55,12 +55,12 @@ fn refine_prepare(@builtin(global_invocation_id) id: vec3<u32>) {
         return;
     }
     let k = id.y * frame.size.x + id.x;
-    colors[k] = color_at(k);
-    if frame.empty == 1u {
+    colors[k] = pack_color(k);
+    if frame.is_empty == 1u {
         flags[k] = UNKNOWN;
         return;
     }
-    let depth_m = depth_at(id.xy);
+    let depth_m = resample_depth(id.xy);
     metres[k] = depth_m;
     flags[k] = select(0u, UNKNOWN | HOLE, depth_m == 0.0);
     row_claims[k] = 0.0;

@@ -22,7 +22,7 @@ fn count_below(value: u32, length: u32, thread: u32) -> u32 {
 }
 
 // Returns the sample of a rank by radix selection: the largest value with at most `rank` samples below it, bit by bit.
-fn sample_of_rank(rank: u32, length: u32, thread: u32) -> u32 {
+fn select_rank(rank: u32, length: u32, thread: u32) -> u32 {
     var value = 0u;
     for (var bit = 31u; bit > 0u; bit--) {
         let larger = value | (1u << (bit - 1u));

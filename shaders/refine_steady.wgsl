@@ -1,6 +1,6 @@
 // Pass refine_steady: snaps pixels between two surfaces to the one with the more similar colour; then the temporal
 // filter moves the mean of each pixel towards its inverse depth, and outputs it in metres.
-// twin: `snap_to_surfaces` in src/depth/refine/align.rs, `Average` in src/depth/refine/temporal.rs
+// twin: `snap_to_surfaces` in src/depth/refine/align.rs, `UpdateMean` in src/depth/refine/temporal.rs
 
 struct Remembered {
     mean: f32,      // filtered inverse depth
@@ -26,22 +26,22 @@ fn is_between(here: f32, a: u32, b: u32) -> bool {
 }
 
 // Returns the depth of a processed pixel. Its neighbours are those after the votes, whatever they become here.
-fn snapped(pixel: vec2<u32>, k: u32) -> f32 {
+fn snap_to_surface(pixel: vec2<u32>, k: u32) -> f32 {
     let here = inverse[k];
     for (var n = 0u; n < 2u; n++) {
         let axis = 1u - n;
         let step = select(1u, frame.size.x, axis == 1u);
         if pixel[axis] > 0u && pixel[axis] + 1u < frame.size[axis] && is_between(here, k - step, k + step) {
-            let own = color_of(colors[k]);
-            let a = color_of(colors[k - step]) - own;
-            let b = color_of(colors[k + step]) - own;
+            let own = unpack_color(colors[k]);
+            let a = unpack_color(colors[k - step]) - own;
+            let b = unpack_color(colors[k + step]) - own;
             return inverse[select(k + step, k - step, dot(a, a) <= dot(b, b))];
         }
     }
     return here;
 }
 
-fn filtered(now: f32, old: Remembered, changed: f32) -> Remembered {
+fn update_mean(now: f32, old: Remembered, changed: f32) -> Remembered {
     // Weight of the past: 1 up to the bound, falling to 0 at twice the bound.
     let past_weight = saturate(2.0 - changed / 9.0 / measures[CHANGED]);
     let step = now - old.mean;
@@ -65,13 +65,13 @@ fn refine_steady(@builtin(global_invocation_id) id: vec3<u32>) {
     let k = id.y * frame.size.x + id.x;
     var now = inverse[k];
     if (flags[k] & PROCESSED) != 0u {
-        now = snapped(id.xy, k);
+        now = snap_to_surface(id.xy, k);
     }
     var next = Remembered(now, 1.0, 0u);
-    if frame.fresh == 0u {
+    if frame.is_fresh == 0u {
         var old = memory[k];
-        old.mean *= frame.times;
-        next = filtered(now, old, f32(change[k]));
+        old.mean *= frame.rescale;
+        next = update_mean(now, old, f32(change[k]));
     }
     memory[k] = next;
     before[k] = colors[k];

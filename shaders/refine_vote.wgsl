@@ -1,7 +1,7 @@
 // Pass refine_vote: finds the surface of the next pixels of the worklist by the votes around each. Pixels that change
 // append their neighbours in the band. 16 threads process a pixel, each a column of its window. Workgroups share a
 // wave; in the last run, a single one goes on until the worklist is empty.
-// twin: `vote` in src/depth/refine/align.rs, src/depth/refine/votes.rs
+// twin: `move_edges` in src/depth/refine/align.rs, src/depth/refine/votes.rs
 
 struct Wave {
     first: u32,     // index in `counts` of the length of the round's first wave
@@ -11,11 +11,11 @@ struct Wave {
 
 @group(0) @binding(1) var<uniform> wave: Wave;
 @group(0) @binding(2) var<storage, read> measures: array<f32>;
-@group(0) @binding(3) var<storage, read> nearby: array<f32>;            // spatial weights of votes, row by row
+@group(0) @binding(3) var<storage, read> spatial_weights: array<f32>;            // spatial weights of votes, row by row
 @group(0) @binding(4) var<storage, read> votes: array<vec2<u32>>;       // as packed by `refine_band`
 @group(0) @binding(5) var<storage, read_write> inverse: array<f32>;
 @group(0) @binding(6) var<storage, read_write> flags: array<atomic<u32>>;
-@group(0) @binding(7) var<storage, read_write> front: array<u32>;
+@group(0) @binding(7) var<storage, read_write> worklist: array<u32>;
 @group(0) @binding(8) var<storage, read_write> counts: array<atomic<u32>>;
 
 // The range of votes is halved until it is one surface, which takes fewer iterations for any range of depths.
@@ -26,10 +26,10 @@ var<workgroup> count: u32;
 var<workgroup> more: atomic<u32>;
 
 // Appends a neighbour to the next wave.
-fn append(k: u32, next: u32) {
+fn append_to_wave(k: u32, next: u32) {
     if (atomicAnd(&flags[k], ~BAND) & BAND) != 0u {
         atomicOr(&flags[k], wave.marks);
-        front[next + atomicAdd(&counts[wave.at + 1u], 1u)] = k;
+        worklist[next + atomicAdd(&counts[wave.at + 1u], 1u)] = k;
     }
 }
 
@@ -39,15 +39,15 @@ fn process_pixel(k: u32, is_listed: bool, next: u32, thread: u32) {
     let x = k % frame.size.x;
     let y = k / frame.size.x;
     let center = votes[k];
-    let own = column_of(vec2(x, y), color_of(center.y), lane);
+    let own = compute_column(vec2(x, y), unpack_color(center.y), lane);
     sums[thread] = vec4(own.total, 0.0, 0.0);
     ends[thread] = own.range;
     workgroupBarrier();
-    let totals = sum_of(first);
-    var low = ends_of(first).x;
-    var high = ends_of(first).y;
-    let share = totals.y / totals.x;
-    let fourth = share * share * share * share;
+    let totals = sum_lanes(first);
+    var low = min_max_lanes(first).x;
+    var high = min_max_lanes(first).y;
+    let similar_fraction = totals.y / totals.x;
+    let fourth = similar_fraction * similar_fraction * similar_fraction * similar_fraction;
     let hysteresis = HYSTERESIS + LOW_CONTRAST_HYSTERESIS * fourth * fourth;
     let current = bitcast<f32>(center.x);
     var mean = current;
@@ -79,8 +79,8 @@ fn process_pixel(k: u32, is_listed: bool, next: u32, thread: u32) {
         sums[thread] = halves;
         ends[thread] = inner;
         workgroupBarrier();
-        let all = sum_of(first);
-        let middles = ends_of(first);
+        let all = sum_lanes(first);
+        let middles = min_max_lanes(first);
         let near = all.x * select(1.0, hysteresis, current > middle && current <= high);
         let far = all.y * select(1.0, hysteresis, current <= middle && current >= low);
         if is_split {
@@ -104,13 +104,13 @@ fn process_pixel(k: u32, is_listed: bool, next: u32, thread: u32) {
     }
     let last = frame.size - 1u;
     if lane == 1u && x > 0u {
-        append(k - 1u, next);
+        append_to_wave(k - 1u, next);
     } else if lane == 2u && x < last.x {
-        append(k + 1u, next);
+        append_to_wave(k + 1u, next);
     } else if lane == 3u && y > 0u {
-        append(k - frame.size.x, next);
+        append_to_wave(k - frame.size.x, next);
     } else if lane == 4u && y < last.y {
-        append(k + frame.size.x, next);
+        append_to_wave(k + frame.size.x, next);
     }
 }
 
@@ -130,7 +130,7 @@ fn refine_vote(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups)
     loop {
         for (var first = start + group.x * PIXELS; first < end; first += groups.x * PIXELS) {
             let number = first + thread / LANES;
-            process_pixel(front[min(number, end - 1u)], number < end, next, thread);
+            process_pixel(worklist[min(number, end - 1u)], number < end, next, thread);
             workgroupBarrier();
         }
         if DOWN == 0u {

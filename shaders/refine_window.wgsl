@@ -1,4 +1,4 @@
-// Included by the pass that evaluates windows: the votes of one column. It binds `votes` and `nearby`.
+// Included by the pass that evaluates windows: the votes of one column. It binds `votes` and `spatial_weights`.
 // twin: src/depth/refine/votes.rs
 
 const ROWS = 9u;
@@ -13,12 +13,12 @@ struct Column {
     range: vec2<f32>,           // smallest and largest inverse depth that has a vote
 }
 
-fn confidence_of(word: u32) -> f32 {
+fn unpack_confidence(word: u32) -> f32 {
     return select(select(1.0, UNCERTAIN, (word >> 24u) == 1u), FILLED, (word >> 24u) == 2u);
 }
 
 // Computes column number `lane` of the window around a pixel of this colour.
-fn column_of(pixel: vec2<u32>, color: vec3<f32>, lane: u32) -> Column {
+fn compute_column(pixel: vec2<u32>, color: vec3<f32>, lane: u32) -> Column {
     var own: Column;
     own.total = vec2(0.0);
     own.range = vec2(3.0e38, 0.0);
@@ -31,10 +31,10 @@ fn column_of(pixel: vec2<u32>, color: vec3<f32>, lane: u32) -> Column {
             continue;
         }
         let vote = votes[u32(y) * frame.size.x + u32(x)];
-        let off = color_of(vote.y) - color;
+        let off = unpack_color(vote.y) - color;
         var similarity = max(1.0 - dot(off, off) * QUARTER_T, 0.0);
         similarity *= similarity;
-        let without_color = confidence_of(vote.y) * nearby[row * LANES + lane];
+        let without_color = unpack_confidence(vote.y) * spatial_weights[row * LANES + lane];
         let weight = without_color * (similarity * similarity + MIN_SIMILARITY);
         let v = bitcast<f32>(vote.x);
         own.total += vec2(without_color, weight);

@@ -2,7 +2,7 @@
 // picture a bit mask of the bins with content there.
 
 // Marks the bin in the tiles of the picture that a tile of the bin overlaps or touches.
-fn show(k: u32, tile: vec2<u32>, thread: u32) {
+fn mark_shown_tiles(k: u32, tile: vec2<u32>, thread: u32) {
     let across = (frame.size + TILE - 1u) / TILE;
     let corner = tile * result_tile() * bins[k].scale;
     let first = (corner - min(corner, vec2(bins[k].scale))) / TILE;

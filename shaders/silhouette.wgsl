@@ -6,20 +6,20 @@
 const NO_SILHOUETTE = vec4(-1.0);
 
 // The mark of two adjacent surfaces.
-fn silhouette(a_px: f32, b_px: f32, min_step_px: f32) -> vec4<f32> {
+fn silhouette_between(a_px: f32, b_px: f32, min_step_px: f32) -> vec4<f32> {
     let near_px = min(a_px, b_px);
     let far_px = max(a_px, b_px);
-    if far_px - near_px < max(min_step_px, OTHER_FROM * abs(near_px)) {
+    if far_px - near_px < max(min_step_px, OTHER_SURFACE_FROM * abs(near_px)) {
         return NO_SILHOUETTE;
     }
-    let shows_px = abs(near_px) + MARGIN_PX;
-    return vec4(shows_px, select(-1.0, shows_px, far_px > frame.front_px), shows_px + abs(far_px), -1.0);
+    let visible_px = abs(near_px) + MARGIN_PX;
+    return vec4(visible_px, select(-1.0, visible_px, far_px > frame.front_px), visible_px + abs(far_px), -1.0);
 }
 
 // The mark of a pixel: its discontinuities to the right and below.
-fn mark_at(x: u32, y: u32, min_step_px: f32) -> vec4<f32> {
-    let own = coc_of(x, y);
-    let right = coc_of(min(x + 1u, frame.size.x - 1u), y);
-    let below = coc_of(x, min(y + 1u, frame.size.y - 1u));
-    return max(silhouette(own, right, min_step_px), silhouette(own, below, min_step_px));
+fn mark_pixel(x: u32, y: u32, min_step_px: f32) -> vec4<f32> {
+    let own = coc_at(x, y);
+    let right = coc_at(min(x + 1u, frame.size.x - 1u), y);
+    let below = coc_at(x, min(y + 1u, frame.size.y - 1u));
+    return max(silhouette_between(own, right, min_step_px), silhouette_between(own, below, min_step_px));
 }

@@ -1,5 +1,5 @@
 // Shared by passes that average the scene down to the scale of a bin with a tent filter. Such a pass binds `work`,
-// `bins`, `frame`, `scene`, `behind`, `ranges` and `mixed`.
+// `bins`, `frame`, `scene`, `inpainted`, `ranges` and `mixed`.
 // twin: src/bokeh/cpu/tent.rs
 
 // Premultiplied colour and coverage, and coverage times |CoC|.
@@ -9,7 +9,7 @@ struct Pixel {
 }
 
 // A surface times its weight in a bin.
-fn weighted(k: u32, surface: vec4<f32>, weight: f32) -> Pixel {
+fn weigh_surface(k: u32, surface: vec4<f32>, weight: f32) -> Pixel {
     let total = weight * select(bin_weight(bins[k].front, bins[k].behind, surface.w), 1.0, bins[k].whole == 1u);
     return Pixel(total * vec4(surface.rgb, 1.0), total * abs(surface.w));
 }
@@ -19,39 +19,40 @@ fn plus(a: Pixel, b: Pixel) -> Pixel {
 }
 
 // A pixel of the scene as the layer sees it. Only tiles with hidden pixels were inpainted.
-fn seen(pixel: vec2<u32>, at: u32) -> vec2<u32> {
-    let nearest_px = ranges[tile_of(pixel, frame.size.x, vec2(TILE))].x;
-    if step_at(work.unhidden, nearest_px) < 1.0 {
-        return behind[at];
+fn load_scene_pixel(pixel: vec2<u32>, at: u32) -> vec2<u32> {
+    let nearest_px = ranges[tile_index(pixel, frame.size.x, vec2(TILE))].x;
+    if linear_step(work.visible_weight, nearest_px) < 1.0 {
+        return inpainted[at];
     }
     return scene[at];
 }
 
 // A pixel of the scene times its weight in a bin.
-fn weighted_at(k: u32, pixel: vec2<u32>, weight: f32) -> Pixel {
+fn weigh_pixel(k: u32, pixel: vec2<u32>, weight: f32) -> Pixel {
     let at = pixel.y * frame.size.x + pixel.x;
-    let value = seen(pixel, at);
-    let surface = scene_unpacked(value, frame.max_px);
+    let value = load_scene_pixel(pixel, at);
+    let surface = unpack_scene(value, frame.max_px);
     if !is_mixed(value) {
-        return weighted(k, surface, weight);
+        return weigh_surface(k, surface, weight);
     }
-    let place = first_mixed(at);
-    let near = near_surface(place);
+    let place = find_mixed_index(at);
+    let near = load_near_surface(place);
     // If the nearer surface is in front of the layer, the farther one is behind it.
-    let before = step_at(work.unhidden, near.w);
-    let alpha = mixed[place].share * before;
+    let before = linear_step(work.visible_weight, near.w);
+    let alpha = mixed[place].alpha * before;
     let known = 1.0 - (1.0 - mixed[place].behind) * before;
-    let front = weighted(k, near, 1.0);
+    let front = weigh_surface(k, near, 1.0);
     // Parts of the farther surface that are known but not visible count only in bins without the nearer one.
     let behind = known - (known + alpha - 1.0) * min(front.value.a / HIDING_WEIGHT, 1.0);
-    return plus(weighted(k, surface, weight * behind), Pixel(weight * alpha * front.value, weight * alpha * front.coc));
+    return plus(weigh_surface(k, surface, weight * behind),
+                Pixel(weight * alpha * front.value, weight * alpha * front.coc));
 }
 
 // Average over every `step`th tap of a bin pixel and axis, from `first` on.
-fn averaged(k: u32, pixel: vec2<u32>, first: vec2<u32>, step: u32) -> Pixel {
+fn average_tent(k: u32, pixel: vec2<u32>, first: vec2<u32>, step: u32) -> Pixel {
     let scale = bins[k].scale;
     if scale == 1u {
-        return weighted_at(k, pixel, 1.0);
+        return weigh_pixel(k, pixel, 1.0);
     }
     // A tent of twice the scale, which preserves the centroid.
     let inverse = 1.0 / f32(scale);
@@ -62,7 +63,7 @@ fn averaged(k: u32, pixel: vec2<u32>, first: vec2<u32>, step: u32) -> Pixel {
         for (var i = first.x; i < 2u * scale; i += step) {
             let x = u32(clamp(i32(pixel.x * scale + i) - i32(scale / 2u), 0, i32(frame.size.x) - 1));
             let weight_x = (1.0 - abs((f32(i) + 0.5) * inverse - 1.0)) * inverse;
-            sum = plus(sum, weighted_at(k, vec2(x, y), weight_x * weight_y));
+            sum = plus(sum, weigh_pixel(k, vec2(x, y), weight_x * weight_y));
         }
     }
     return sum;

@@ -7,7 +7,7 @@ mod planner;
 mod quality;
 mod window;
 
-pub use governor::{Governor, Times};
+pub use governor::{Governor, PredictedTimes};
 pub use load::{MAX_LEVELS, Sample};
 #[cfg(feature = "files")]
 pub(crate) use planner::DEADLINE_PERIODS;

@@ -8,16 +8,16 @@ use rustix::time::{ClockId, clock_gettime};
 
 /// A monotonic clock in nanoseconds. Clones show the same time.
 #[derive(Clone, Debug)]
-pub struct Clock(Kind);
+pub struct Clock(TimeSource);
 
 #[derive(Clone, Debug)]
-enum Kind {
+enum TimeSource {
     System,
     Manual(Arc<AtomicU64>),
 }
 
 /// Returns the CPU time that this process has used so far, all of its threads together, in nanoseconds.
-pub fn cpu_ns() -> u64 {
+pub fn process_cpu_ns() -> u64 {
     let used = clock_gettime(ClockId::ProcessCPUTime);
     used.tv_sec.unsigned_abs() * 1_000_000_000 + used.tv_nsec.unsigned_abs()
 }
@@ -25,36 +25,36 @@ pub fn cpu_ns() -> u64 {
 impl Clock {
     /// Returns the system's monotonic clock (`CLOCK_MONOTONIC`), which drivers also use for a camera's timestamps.
     pub fn system() -> Self {
-        Self(Kind::System)
+        Self(TimeSource::System)
     }
 
     /// Creates a clock that starts at 0 and moves only by [`Clock::advance_ns`] and by sleeping on it.
     pub fn manual() -> Self {
-        Self(Kind::Manual(Arc::default()))
+        Self(TimeSource::Manual(Arc::default()))
     }
 
     /// Returns the current time in nanoseconds.
     pub fn now_ns(&self) -> u64 {
         match &self.0 {
-            Kind::System => {
+            TimeSource::System => {
                 let now = clock_gettime(ClockId::Monotonic);
                 // It starts at 0 at boot: neither part is negative.
                 now.tv_sec.unsigned_abs() * 1_000_000_000 + now.tv_nsec.unsigned_abs()
             }
-            Kind::Manual(now_ns) => now_ns.load(Ordering::SeqCst),
+            TimeSource::Manual(now_ns) => now_ns.load(Ordering::SeqCst),
         }
     }
 
     /// Sleeps until `until_ns`; returns at once if that has passed. A manual clock jumps there.
     pub fn sleep_until_ns(&self, until_ns: u64) {
         match &self.0 {
-            Kind::System => {
+            TimeSource::System => {
                 let wait_ns = until_ns.saturating_sub(self.now_ns());
                 if wait_ns > 0 {
                     std::thread::sleep(Duration::from_nanos(wait_ns));
                 }
             }
-            Kind::Manual(now_ns) => {
+            TimeSource::Manual(now_ns) => {
                 now_ns.fetch_max(until_ns, Ordering::SeqCst);
             }
         }
@@ -62,7 +62,7 @@ impl Clock {
 
     /// Advances a manual clock; has no effect on the system's clock.
     pub fn advance_ns(&self, by_ns: u64) {
-        if let Kind::Manual(now_ns) = &self.0 {
+        if let TimeSource::Manual(now_ns) = &self.0 {
             now_ns.fetch_add(by_ns, Ordering::SeqCst);
         }
     }

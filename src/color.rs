@@ -6,7 +6,7 @@ pub fn srgb_to_linear(code: f32) -> f32 {
 }
 
 /// Returns a table of the linear light of every 8-bit code.
-pub fn light_of_codes() -> Box<[f32; 256]> {
+pub fn srgb_to_linear_table() -> Box<[f32; 256]> {
     Box::new(std::array::from_fn(|code| srgb_to_linear(code as f32 / 255.0)))
 }
 
@@ -28,7 +28,7 @@ pub fn luminance(r: f32, g: f32, b: f32) -> f32 {
 
 /// Standard that defines the luma weights of red, green and blue.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Matrix {
+pub enum YcbcrMatrix {
     /// Standard definition, JPEG, and cameras that do not declare a matrix.
     #[default]
     Bt601,
@@ -38,14 +38,14 @@ pub enum Matrix {
     Bt2020,
 }
 
-impl Matrix {
+impl YcbcrMatrix {
     /// Returns the matrix that players assume if none is declared: BT.709 from 720 rows on.
     pub fn for_height(height: u32) -> Self {
         if height >= 720 { Self::Bt709 } else { Self::Bt601 }
     }
 
     /// Returns the luma weights of red, green and blue.
-    pub fn weights(self) -> [f64; 3] {
+    pub fn luma_weights(self) -> [f64; 3] {
         let (red, blue) = match self {
             Self::Bt601 => (0.299, 0.114),
             Self::Bt709 => (0.2126, 0.0722),

@@ -3,14 +3,14 @@
 use std::sync::Arc;
 
 use crate::bokeh::{self, Backend, Bokeh, BokehError};
-use crate::compute::thread_pool::cores;
+use crate::compute::thread_pool::core_count;
 use crate::compute::{Device, GpuError};
 use crate::depth::DepthError;
 use crate::depth::stereo::{self, Matcher};
 
 /// Backend, GPU and threads for blur and stereo matching.
 #[derive(Clone, Debug, Default)]
-pub struct Computing {
+pub struct ComputeOptions {
     /// Backend to use.
     pub backend: Backend,
     /// Part of the name of the GPU to use.
@@ -19,10 +19,10 @@ pub struct Computing {
     pub threads: Option<usize>,
 }
 
-impl Computing {
+impl ComputeOptions {
     /// Returns the number of CPU threads.
-    pub fn threads(&self) -> usize {
-        self.threads.unwrap_or_else(cores)
+    pub fn thread_count(&self) -> usize {
+        self.threads.unwrap_or_else(core_count)
     }
 
     /// Creates an executor for pictures of `size` pixels.
@@ -30,40 +30,40 @@ impl Computing {
     /// # Errors
     /// The requested GPU is missing, or the picture needs more memory than is free.
     pub fn create_blur(&self, settings: &bokeh::Settings, size: (u32, u32)) -> Result<Box<dyn Bokeh>, BokehError> {
-        Executors::new(self.clone()).create_blur(settings, size)
+        ExecutorFactory::new(self.clone()).create_blur(settings, size)
     }
 
     /// Creates a stereo matcher for pairs of `size` pixels with `disparities` disparities.
     ///
     /// # Errors
     /// The requested GPU is missing.
-    pub fn matcher(
+    pub fn create_matcher(
         &self,
         disparities: u32,
         effort: stereo::Effort,
         size: (u32, u32),
     ) -> Result<Box<dyn Matcher>, DepthError> {
-        let settings = stereo::Settings { size, disparities, effort, threads: self.threads() };
+        let settings = stereo::Settings { size, disparities, effort, threads: self.thread_count() };
         Ok(stereo::create(&settings, self.backend, self.adapter.as_deref())?)
     }
 }
 
 /// Creates executors one after the other on the same device.
-pub struct Executors {
-    computing: Computing,
+pub struct ExecutorFactory {
+    computing: ComputeOptions,
     /// The GPU, if there is one; opened at the first use.
     device: Option<Option<Arc<Device>>>,
 }
 
-impl Executors {
+impl ExecutorFactory {
     /// Creates executors with these settings.
-    pub fn new(computing: Computing) -> Self {
+    pub fn new(computing: ComputeOptions) -> Self {
         Self { computing, device: None }
     }
 
     /// Whether a GPU is required.
     fn needs_gpu(&self) -> bool {
-        let Computing { backend, adapter, .. } = &self.computing;
+        let ComputeOptions { backend, adapter, .. } = &self.computing;
         *backend == Backend::Gpu || (*backend == Backend::Auto && adapter.is_some())
     }
 
@@ -72,7 +72,7 @@ impl Executors {
     /// # Errors
     /// A GPU is required and none fits.
     #[doc(hidden)]
-    pub fn device(&mut self) -> Result<Option<Arc<Device>>, BokehError> {
+    pub fn open_device(&mut self) -> Result<Option<Arc<Device>>, BokehError> {
         if let Some(device) = &self.device {
             return Ok(device.clone());
         }
@@ -82,8 +82,8 @@ impl Executors {
             Err(error) if self.needs_gpu() => return Err(error.into()),
             Err(error) => {
                 match error {
-                    GpuError::NoAdapter { .. } => tracing::info!("the CPU does all: {error}"),
-                    GpuError::Failed(_) => tracing::warn!("the CPU does all: {error}"),
+                    GpuError::NoAdapter { .. } => tracing::info!("everything runs on the CPU: {error}"),
+                    GpuError::Failed(_) => tracing::warn!("everything runs on the CPU: {error}"),
                 }
                 None
             }
@@ -94,12 +94,12 @@ impl Executors {
     /// Creates an executor for pictures of `size` pixels.
     ///
     /// # Errors
-    /// Fails like [`Computing::create_blur`].
+    /// Fails like [`ComputeOptions::create_blur`].
     pub fn create_blur(&mut self, settings: &bokeh::Settings, size: (u32, u32)) -> Result<Box<dyn Bokeh>, BokehError> {
         let threads = self.computing.threads;
         // A device that failed does not recover.
-        if let Some(device) = self.device()?.filter(|device| device.check().is_ok()) {
-            match bokeh::create(settings, size, Some(device), threads) {
+        if let Some(device) = self.open_device()?.filter(|device| device.check().is_ok()) {
+            match bokeh::create_blur(settings, size, Some(device), threads) {
                 Err(BokehError::Gpu(error)) if !self.needs_gpu() => {
                     tracing::warn!("blurring on the CPU: {error}");
                     self.device = Some(None);
@@ -107,6 +107,6 @@ impl Executors {
                 made => return made,
             }
         }
-        bokeh::create(settings, size, None, threads)
+        bokeh::create_blur(settings, size, None, threads)
     }
 }

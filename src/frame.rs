@@ -24,7 +24,7 @@ pub struct Stamp {
 
 /// Resizes `values` to `count`; the content is unspecified afterwards. New memory comes zeroed from the system, which
 /// provides pages only as they are used.
-fn make_room<T: Copy + Default>(values: &mut Vec<T>, count: usize) {
+fn resize_buffer<T: Copy + Default>(values: &mut Vec<T>, count: usize) {
     if values.capacity() < count {
         *values = vec![T::default(); count];
     } else {
@@ -54,7 +54,7 @@ impl ColorImage {
     /// Resizes the picture, reusing its memory if possible. The content is unspecified afterwards.
     pub fn resize(&mut self, width: u32, height: u32) {
         (self.width, self.height) = (width, height);
-        make_room(&mut self.rgb, width as usize * height as usize * 3);
+        resize_buffer(&mut self.rgb, width as usize * height as usize * 3);
     }
 
     /// Copies size and content of another picture, reusing its own memory if possible.
@@ -90,7 +90,7 @@ impl YuyvImage {
     /// Resizes the picture, reusing its memory if possible. The content is unspecified afterwards.
     pub fn resize(&mut self, width: u32, height: u32) {
         (self.width, self.height) = (width, height);
-        make_room(&mut self.bytes, width as usize * height as usize * 2);
+        resize_buffer(&mut self.bytes, width as usize * height as usize * 2);
     }
 
     /// Returns columns and rows.
@@ -114,7 +114,7 @@ impl GrayImage {
     /// Resizes the picture, reusing its memory if possible. The content is unspecified afterwards.
     pub fn resize(&mut self, width: u32, height: u32) {
         (self.width, self.height) = (width, height);
-        make_room(&mut self.luma, width as usize * height as usize);
+        resize_buffer(&mut self.luma, width as usize * height as usize);
     }
 
     /// Returns columns and rows.
@@ -123,14 +123,14 @@ impl GrayImage {
     }
 
     /// Computes the luma of a colour picture (BT.601 weights, as usual for matching).
-    pub fn set_luma_of(&mut self, color: &ColorImage) {
+    pub fn set_luma_from(&mut self, color: &ColorImage) {
         self.resize(color.width, color.height);
-        luma_of(&color.rgb, &mut self.luma);
+        compute_luma(&color.rgb, &mut self.luma);
     }
 }
 
-/// Computes the luma of `rgb` (interleaved R, G, B), pixel by pixel, as [`GrayImage::set_luma_of`] does.
-pub fn luma_of(rgb: &[u8], luma: &mut [u8]) {
+/// Computes the luma of `rgb` (interleaved R, G, B), pixel by pixel, as [`GrayImage::set_luma_from`] does.
+pub fn compute_luma(rgb: &[u8], luma: &mut [u8]) {
     for (luma, rgb) in luma.iter_mut().zip(rgb.as_chunks::<3>().0) {
         let [r, g, b] = rgb.map(u32::from);
         *luma = ((r * 9_798 + g * 19_235 + b * 3_735 + (1 << 14)) >> 15) as u8;
@@ -151,7 +151,7 @@ pub struct DisparityMap {
 
 impl DisparityMap {
     /// Returns the depth map, with `depth_m` converting a disparity to metres; 0 where unknown.
-    pub fn depth(&self, depth_m: impl Fn(f32) -> f32) -> DepthMap {
+    pub fn to_depth_map(&self, depth_m: impl Fn(f32) -> f32) -> DepthMap {
         let metres = |&px: &f32| if DepthMap::is_known(px) { depth_m(px) } else { 0.0 };
         DepthMap {
             width: self.width,
@@ -164,7 +164,7 @@ impl DisparityMap {
     /// Resizes the map, reusing its memory if possible. The content is unspecified afterwards.
     pub fn resize(&mut self, width: u32, height: u32) {
         (self.width, self.height) = (width, height);
-        make_room(&mut self.px, width as usize * height as usize);
+        resize_buffer(&mut self.px, width as usize * height as usize);
     }
 
     /// Returns columns and rows.
@@ -203,7 +203,7 @@ impl DepthMap {
     pub const FAR_M: f32 = 1e3;
     /// Converts relative inverse depth to metres: 1 is nearest; 0 and NaN are farthest.
     #[inline(always)]
-    pub fn relative_m(nearness: f32) -> f32 {
+    pub fn relative_to_metres(nearness: f32) -> f32 {
         const MIN_NEARNESS: f32 = DepthMap::SUBJECT_M / DepthMap::FAR_M;
         Self::SUBJECT_M / if nearness > MIN_NEARNESS { nearness } else { MIN_NEARNESS }
     }
@@ -223,7 +223,7 @@ impl DepthMap {
     /// Resizes the map, reusing its memory if possible. The content is unspecified afterwards.
     pub fn resize(&mut self, width: u32, height: u32) {
         (self.width, self.height) = (width, height);
-        make_room(&mut self.metres, width as usize * height as usize);
+        resize_buffer(&mut self.metres, width as usize * height as usize);
     }
 
     /// Returns columns and rows.
@@ -241,7 +241,7 @@ impl DepthMap {
 
     /// Returns the inverse of a stored depth, in 1/m; 0 if unknown.
     #[inline(always)]
-    pub fn inverse_of(metres: f32) -> f32 {
+    pub fn inverse_depth(metres: f32) -> f32 {
         if Self::is_known(metres) { 1.0 / metres } else { 0.0 }
     }
 }

@@ -31,15 +31,15 @@
 //! | 4 | [`capture`], [`depth`], [`bokeh`], [`sink`] |
 //! | 3 | `link` (the crate `bokehcam-link`), [`budget`], [`network`], [`stats`], [`recording`], `v4l2`, `pipewire`, `control` |
 //! | 2 | `compute`, [`calibration`], [`layout`] |
-//! | 1 | [`color`], [`frame`], [`optics`], [`clock`], [`knob`], `files` |
+//! | 1 | [`color`], [`frame`], [`optics`], [`clock`], [`camera_control`], `files` |
 //! | 0 | `names` |
 //!
 //! Conventions: a *circle of confusion* (CoC) is a **signed radius in pixels** of the input picture, positive behind
 //! the focal plane; *disparity* is in pixels of the rectified left picture; depth is in metres; time is in nanoseconds
 //! of a monotonic clock; blurring happens in linear light.
 //!
-//! `unsafe` is allowed in `compute/thread_pool.rs` and its `relay`, for a prefetch in `compute/simd.rs`, in
-//! `pipewire/buffer.rs`, `pipewire/quiet.rs`, `pipewire/session.rs`, under `v4l2`, and in the crate `bokehcam-link`,
+//! `unsafe` is allowed in `compute/thread_pool.rs` and its `wavefront`, for a prefetch in `compute/simd.rs`, in
+//! `pipewire/buffer.rs`, `pipewire/log.rs`, `pipewire/session.rs`, under `v4l2`, and in the crate `bokehcam-link`,
 //! where each block has its safety argument. `scripts/prove-link` checks it with loom, Miri and ThreadSanitizer.
 
 #[doc(hidden)]
@@ -48,6 +48,7 @@ pub use bokehcam_link as link;
 pub mod bokeh;
 pub mod budget;
 pub mod calibration;
+pub mod camera_control;
 #[cfg(feature = "files")]
 pub mod capture;
 pub mod clock;
@@ -67,7 +68,6 @@ pub mod engine;
 #[doc(hidden)]
 pub mod files;
 pub mod frame;
-pub mod knob;
 pub mod layout;
 pub mod look;
 #[doc(hidden)]

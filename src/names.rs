@@ -18,7 +18,7 @@ pub trait Named: Copy + PartialEq + 'static {
 ///
 /// # Errors
 /// No value has this name; the message lists the accepted names.
-pub fn parse<T: Named>(text: &str) -> Result<T, String> {
+pub fn parse_name<T: Named>(text: &str) -> Result<T, String> {
     T::VALUES.iter().copied().find(|value| value.name() == text).ok_or_else(|| {
         let mut accepted = String::from("use ");
         for (k, value) in T::VALUES.iter().enumerate() {
@@ -35,14 +35,16 @@ pub fn parse<T: Named>(text: &str) -> Result<T, String> {
 }
 
 /// Smallest Jaro-Winkler similarity (0 to 1) of a suggestion: one or two typos in a word of usual length.
-const SIMILAR: f64 = 0.8;
+const MIN_SIMILARITY: f64 = 0.8;
 
 /// Returns the most similar of these names, if any is similar enough to be meant.
-pub fn nearest<N: AsRef<str>>(name: &str, names: impl IntoIterator<Item = N>) -> Option<N> {
+pub fn find_similar<N: AsRef<str>>(name: &str, names: impl IntoIterator<Item = N>) -> Option<N> {
     let name = name.to_lowercase();
     let similarity = |other: &N| strsim::jaro_winkler(&name, &other.as_ref().to_lowercase());
-    let rated =
-        names.into_iter().map(|other| (similarity(&other), other)).filter(|(similarity, _)| *similarity >= SIMILAR);
+    let rated = names
+        .into_iter()
+        .map(|other| (similarity(&other), other))
+        .filter(|(similarity, _)| *similarity >= MIN_SIMILARITY);
     rated.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, other)| other)
 }
 
@@ -94,7 +96,7 @@ macro_rules! named {
         impl std::str::FromStr for $name {
             type Err = String;
             fn from_str(text: &str) -> Result<Self, String> {
-                $crate::names::parse(text)
+                $crate::names::parse_name(text)
             }
         }
     };

@@ -37,14 +37,14 @@ pub struct StereoRig {
     /// Column of the right principal point minus that of the left, in pixels: the disparity at infinity is its
     /// negative.
     pub doffs_px: f32,
-    /// True if the numbers are those of the cameras. Otherwise they are [`StereoRig::assumed`], and so are distances;
+    /// True if the numbers are those of the cameras. Otherwise they are [`StereoRig::default_for_width`], and so are distances;
     /// the blur is equally good, because its CoC is affine in the disparity.
     pub metric: bool,
 }
 
 impl StereoRig {
     /// Returns a default rig for unknown cameras: baseline 60 mm, field of view 53 degrees.
-    pub fn assumed(width_px: u32) -> Self {
+    pub fn default_for_width(width_px: u32) -> Self {
         Self { focal_px: width_px as f32, baseline_m: 0.06, doffs_px: 0.0, metric: false }
     }
 
@@ -138,7 +138,7 @@ impl DepthCoc {
     }
 
     /// Returns the step of inverse depth, in 1/m, that changes the CoC by `px`; infinite if nothing is blurred.
-    pub fn inverse_depth_of_px(&self, px: f32) -> f32 {
+    pub fn inverse_depth_step(&self, px: f32) -> f32 {
         px / (self.coc_at_infinity_px * self.focus_m)
     }
 

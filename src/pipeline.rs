@@ -6,35 +6,35 @@
 //! output is completed.
 
 mod blur;
+mod buffers;
 mod capture;
 mod change;
+mod deadline;
 mod deliver;
 mod depth;
+mod depth_schedule;
 mod error;
 mod frame;
-mod held;
-mod late;
+mod output_request;
 mod pacer;
-mod places;
 mod playout;
-mod rate;
+mod reused_depth;
 mod start;
 mod threads;
 mod view;
-mod wanted;
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 
-pub use change::{Change, Changes, Executor};
+pub use buffers::check_memory;
+use buffers::{BufferCounts, MAX_IN_FLIGHT, Pools};
+pub use change::{Change, ChangeSender, ExecutorChange};
 pub use error::{Fault, PipelineError};
-pub use places::check_room;
-use places::{MAX_IN_FLIGHT, Places, Pools};
-pub use start::{Blurring, Pace, Run};
-use threads::{guard, join, spawn};
+pub use output_request::OutputRequest;
+pub use start::{BlurSetup, Pace, Run};
+use threads::{join_stage, run_guarded, spawn_stage};
 pub use view::{Progress, Trace, View};
-pub use wanted::Wanted;
 
 use crate::capture::SourceInfo;
 use crate::clock::{self, Clock};
@@ -51,18 +51,18 @@ struct Shared {
     /// Description of the camera.
     info: SourceInfo,
     /// The frame period, if frames come in real time.
-    live_ns: Option<u64>,
+    realtime_period_ns: Option<u64>,
     keep_going: bool,
     /// Whether the run has a view, which receives the unblurred pictures and depth, too.
     is_viewed: bool,
     /// Requested place of the pictures, and whether each needs its own depth.
-    wanted: Option<Arc<Wanted>>,
+    output_request: Option<Arc<OutputRequest>>,
     /// The plan for depth, set by the blur stage.
-    order: rate::Order,
+    plan: depth_schedule::SharedPlan,
     /// Whether the sink takes YUYV, and no other reader gets the pictures.
     wants_yuyv: AtomicBool,
     /// Set when any stage ends, so that capture ends, too.
-    over: AtomicBool,
+    has_ended: AtomicBool,
 }
 
 impl Shared {
@@ -76,15 +76,15 @@ impl Shared {
         Self {
             clock: run.clock.clone(),
             tally: Tally::new(),
-            pools: Pools::new(&Places { in_blur, viewed: is_viewed }, info.size, info.brings),
-            live_ns: run.live_ns(),
+            pools: Pools::new(&BufferCounts { in_blur, is_viewed }, info.size, info.frame_data),
+            realtime_period_ns: run.realtime_period_ns(),
             info,
             keep_going: run.keep_going,
             is_viewed,
-            wanted: run.wanted.clone(),
-            order: rate::Order::new(blur.picker.plan()),
+            output_request: run.output_request.clone(),
+            plan: depth_schedule::SharedPlan::new(blur.picker.plan()),
             wants_yuyv: AtomicBool::new(false),
-            over: AtomicBool::new(false),
+            has_ended: AtomicBool::new(false),
         }
     }
 }
@@ -95,10 +95,10 @@ impl Shared {
 /// Returns the fault of the stage that failed, a panic included, with the report. The output then has the frames
 /// delivered so far.
 pub fn run(mut run: Run) -> Result<Report, PipelineError> {
-    let (began_ns, cpu_ns) = (run.clock.now_ns(), clock::cpu_ns());
-    let Engine { preparation, blur } = run.engine();
+    let (began_ns, cpu_ns) = (run.clock.now_ns(), clock::process_cpu_ns());
+    let Engine { preprocessor, blur } = run.create_engine();
     let shared = Shared::new(&run, &blur);
-    let Shared { info, tally, over, .. } = &shared;
+    let Shared { info, tally, has_ended, .. } = &shared;
     let mut timings = Timings::default();
     let Timings { decode, depth: of_depth, blur: of_blur, sink: of_sink } = &mut timings;
     let (mut sink, pace, stop) = (run.sink, run.pace, run.stop);
@@ -106,31 +106,32 @@ pub fn run(mut run: Run) -> Result<Report, PipelineError> {
         About { source: info.name.clone(), sink: sink.describe(), budget_ns: run.budget_ns, ..About::default() };
 
     let capture = capture::Stage::new(run.camera, run.demand, stop, &shared, decode);
-    let depth = depth::Stage::new(preparation, run.depth, (run.changes, run.adaptive), &shared, of_depth);
-    let blur = blur::Stage::new(blur, run.wanted.filter(|_| !run.mirror), run.budget_ns, &shared, of_blur);
+    let depth = depth::Stage::new(preprocessor, run.depth, (run.changes, run.adaptive), &shared, of_depth);
+    let blur = blur::Stage::new(blur, run.output_request.filter(|_| !run.mirror), run.budget_ns, &shared, of_blur);
     let deliver = deliver::Stage::new(&mut *sink, (run.view, run.progress), run.mirror, &shared, of_sink);
-    let ((to_depth, from_capture), (to_blur, from_depth), (to_sink, from_blur)) = (link(pace), link(pace), link(pace));
+    let ((to_depth, from_capture), (to_blur, from_depth), (to_sink, from_blur)) =
+        (create_link(pace), create_link(pace), create_link(pace));
     let ended = thread::scope(|scope| {
         let upstream = [
-            spawn(scope, "capture", over, move || capture.run(to_depth))?,
-            spawn(scope, "depth", over, move || depth.run(from_capture, to_blur))?,
-            spawn(scope, "blur", over, move || blur.run(from_depth, to_sink))?,
+            spawn_stage(scope, "capture", has_ended, move || capture.run(to_depth))?,
+            spawn_stage(scope, "depth", has_ended, move || depth.run(from_capture, to_blur))?,
+            spawn_stage(scope, "blur", has_ended, move || blur.run(from_depth, to_sink))?,
         ];
-        let delivered = guard("sink", over, move || deliver.run(from_blur));
-        upstream.into_iter().map(join).chain([delivered]).collect::<Result<(), Fault>>()
+        let delivered = run_guarded("sink", has_ended, move || deliver.run(from_blur));
+        upstream.into_iter().map(join_stage).chain([delivered]).collect::<Result<(), Fault>>()
     });
 
     // A source with a known number of frames was stopped before its end.
     let is_cut = stop.load(Ordering::Relaxed) && info.frames.is_some_and(|frames| tally.frames().captured < frames);
     let ending = if ended.is_err() || is_cut { Ending::Cut } else { Ending::Whole };
     let (outputs, nodes) = (sink.outputs(), sink.nodes());
-    let finished = guard("sink", over, move || Ok(sink.finish(ending)?));
+    let finished = run_guarded("sink", has_ended, move || Ok(sink.finish(ending)?));
     // Only now have the outputs written all frames.
     let about = About {
         outputs: sink::read(&outputs),
         pipewire: sink::read(&nodes),
         elapsed_ns: shared.clock.now_ns() - began_ns,
-        cpu_ns: clock::cpu_ns() - cpu_ns,
+        cpu_ns: clock::process_cpu_ns() - cpu_ns,
         ..about
     };
     let report = Report::new(tally.frames(), &timings, about);
@@ -141,11 +142,11 @@ pub fn run(mut run: Run) -> Result<Report, PipelineError> {
     }
 }
 
-fn link<T>(pace: Pace) -> (Sender<T>, Receiver<T>) {
+fn create_link<T>(pace: Pace) -> (Sender<T>, Receiver<T>) {
     match pace {
         Pace::Realtime => link::live(),
         Pace::Asap => link::lossless(),
     }
 }
 
-type Ended = Result<(), Fault>;
+type StageResult = Result<(), Fault>;

@@ -35,7 +35,7 @@ pub struct DepthTimings {
     /// Reading depth, focusing and filling holes.
     pub took: Histogram,
     /// Frames that reused the previous depth map, to save time.
-    pub held: u64,
+    pub reused: u64,
     /// The backend that refined depth: `cpu`, `gpu` or `gpu, then cpu`.
     pub refined_by: Option<&'static str>,
     /// The backend that found mattes, with the same values.
@@ -50,7 +50,7 @@ pub struct BlurTimings {
     /// Times of the blur's passes.
     pub passes: PassHistograms,
     /// Frames blurred at each quality level.
-    pub rungs: QualityCounts,
+    pub quality_counts: QualityCounts,
     /// Frames whose blur took longer than the budget.
     pub misses: u64,
     /// The backend, `cpu`, `gpu`, `gpu, then cpu` or `none`, and the executor's description.

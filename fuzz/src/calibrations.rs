@@ -10,8 +10,8 @@ use super::input::{assert_one_line, file_path, split_files, write_file};
 pub fn calibration(data: &[u8]) {
     let (one, two) = ("intrinsics.yml", "other.yml");
     let read = match split_files(data).as_slice() {
-        [only] => calibration::load(&[&write_file(one, only)]),
-        [left, right, ..] => calibration::load(&[&write_file(one, left), &write_file(two, right)]),
+        [only] => calibration::load_calibration(&[&write_file(one, only)]),
+        [left, right, ..] => calibration::load_calibration(&[&write_file(one, left), &write_file(two, right)]),
         [] => return,
     };
     let rig = match read {
@@ -19,10 +19,10 @@ pub fn calibration(data: &[u8]) {
         Err(error) => return assert_one_line(error),
     };
     assert!(!file_path("extrinsics.yml").exists());
-    let _ = (rig.baseline_m(), rig.is_swapped(), rig.exchanged());
-    let own = rig.eyes[0].size.unwrap_or((32, 24));
+    let _ = (rig.baseline_m(), rig.is_swapped(), rig.with_swapped_cameras());
+    let own = rig.cameras[0].size.unwrap_or((32, 24));
     for size in [(32, 24), (2, 2), (16, 16), (own.0.min(64), own.1.min(64))] {
-        let _ = rig.notes(size);
+        let _ = rig.describe_assumptions(size);
         match Rectifier::new(&rig, size) {
             Ok(rectifier) => check_rectifier(&rectifier, size),
             Err(error) => assert_one_line(error),
@@ -40,11 +40,11 @@ fn check_rectifier(rectifier: &Rectifier, (width, height): (u32, u32)) {
     }
     let (mut color, mut rectified) = (ColorImage::new(width, height), ColorImage::default());
     color.rgb.iter_mut().enumerate().for_each(|(at, byte)| *byte = at as u8);
-    rectifier.left(&color, &mut rectified);
+    rectifier.rectify_left(&color, &mut rectified);
     assert_eq!(rectified.rgb.len(), color.rgb.len());
     let (mut grey, mut rectified) = (GrayImage::default(), GrayImage::default());
     grey.resize(width, height);
-    rectifier.right(&grey, &mut rectified);
+    rectifier.rectify_right(&grey, &mut rectified);
     assert_eq!(rectified.luma.len(), grey.luma.len());
 }
 

@@ -38,7 +38,7 @@ pub fn raw_pixels(data: &[u8]) {
         Ok(layout) => layout,
         Err(error) => return assert_one_line(error),
     };
-    let needed: Vec<usize> = (0..layout.planes().len()).map(|plane| layout.needed_bytes(plane)).collect();
+    let needed: Vec<usize> = (0..layout.planes().len()).map(|plane| layout.min_size_bytes(plane)).collect();
     if needed.iter().sum::<usize>() > MAX_BYTES {
         return;
     }
@@ -77,7 +77,7 @@ pub fn raw_pixels(data: &[u8]) {
 /// Builds the kernel's structure from arbitrary numbers.
 fn build_format(numbers: &mut Numbers) -> sys::v4l2_format {
     let [multi, code, field, quantization, transfer, encoding, planes, large] = std::array::from_fn(|_| numbers.u8());
-    let codes: Vec<FourCc> = FourCc::supported().collect();
+    let codes: Vec<FourCc> = FourCc::supported_formats().collect();
     let fourcc = codes[code as usize % codes.len()].to_u32();
     let (width, height): (u32, u32) = (numbers.u16().into(), numbers.u16().into());
     let (width, height) = if large & 1 == 1 { (width, height) } else { (width % 70, height % 40) };

@@ -85,7 +85,7 @@ pub fn snapshot(data: &[u8]) {
             let flags = settings.into_iter().map(|(name, value)| format!("--{name}={value}"));
             let command = ["bokehcam", "config", "dump"].map(String::from).into_iter().chain(flags);
             let command: Vec<_> = command.map(Into::into).collect();
-            if let Err(message) = bokehcam_cli::parsers::arguments(&command) {
+            if let Err(message) = bokehcam_cli::parsers::parse_arguments(&command) {
                 assert_one_line(message);
             }
         }

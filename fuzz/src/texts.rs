@@ -10,7 +10,7 @@ use super::input::assert_one_line;
 /// Parses a settings file.
 pub fn settings(data: &[u8]) {
     let Ok(text) = std::str::from_utf8(data) else { return };
-    if let Err(error) = parsers::settings("config.toml".as_ref(), text) {
+    if let Err(error) = parsers::parse_settings("config.toml".as_ref(), text) {
         assert_one_line(error);
     }
 }
@@ -23,9 +23,9 @@ pub fn command_line(data: &[u8]) {
     let given = data.split(|byte| *byte == b'\n').take(MAX_ARGUMENTS);
     let given = given.map(|argument| OsString::from_vec(argument.iter().copied().filter(|byte| *byte != 0).collect()));
     let all: Vec<OsString> = ["bokehcam", "config", "dump"].map(OsString::from).into_iter().chain(given).collect();
-    match parsers::arguments(&all) {
+    match parsers::parse_arguments(&all) {
         Ok(dump) => {
-            if let Err(error) = parsers::settings("dump.toml".as_ref(), &dump) {
+            if let Err(error) = parsers::parse_settings("dump.toml".as_ref(), &dump) {
                 panic!("what is dumped is no settings file: {error}");
             }
         }

@@ -2,7 +2,7 @@
 //!
 //! `bokeh` is the element, `settings` its properties, generated from the library's table of settings (`enums` creates
 //! the types of those with named values); `pictures` and `maps` convert between GStreamer's memory and the library's.
-//! [`bokehcam::engine::Stepper`] processes a frame.
+//! [`bokehcam::engine::FrameProcessor`] processes a frame.
 //!
 //! `unsafe` is allowed in `enums.rs`, where each block carries its argument.
 

@@ -1,9 +1,9 @@
 //! Conversion of pictures in GStreamer's memory to sRGB and back, by the library.
 
 use bokehcam::capture::pixels::Decoder;
-use bokehcam::color::Matrix;
+use bokehcam::color::YcbcrMatrix;
 use bokehcam::frame::ColorImage;
-use bokehcam::layout::{Colors, FourCc, Layout, MAX_SIDE_PX, Plane, Range, Transfer};
+use bokehcam::layout::{ColorEncoding, FourCc, Layout, MAX_SIDE_PX, Plane, Range, Transfer};
 use bokehcam::sink::raw::Encoder;
 use gst_video::prelude::*;
 use gst_video::{VideoColorMatrix, VideoColorRange, VideoFormat, VideoFrameRef, VideoInfo};
@@ -106,10 +106,20 @@ impl Pictures {
         let layout = layout(&self.info, &strides)?;
         let encoder = match &mut self.encoder {
             Some((made_for, encoder)) if *made_for == layout => encoder,
-            other => &mut other.insert((layout, Encoder::new(&layout).ok_or("there is no way back to this format")?)).1,
+            other => {
+                &mut other
+                    .insert((
+                        layout,
+                        Encoder::new(&layout).ok_or(
+                            "pictures cannot be converted back to this \
+                                                                             format",
+                        )?,
+                    ))
+                    .1
+            }
         };
         let count = layout.planes().len();
-        if (0..count).any(|plane| planes[plane].len() < layout.needed_bytes(plane)) {
+        if (0..count).any(|plane| planes[plane].len() < layout.min_size_bytes(plane)) {
             return Err("the buffer is too small for a picture".to_owned());
         }
         encoder.encode(picture, &mut planes[..count]);
@@ -125,7 +135,7 @@ fn layout(info: &VideoInfo, strides: &[i32]) -> Result<Layout, String> {
         // The multi-planar variants: GStreamer gives each plane's memory.
         VideoFormat::Nv12 => FourCc(*b"NM12"),
         VideoFormat::I420 => FourCc(*b"YM12"),
-        other => return Err(format!("there is no way to read {other}")),
+        other => return Err(format!("{other} cannot be read")),
     };
     let plane = |&stride: &i32| Plane { stride_bytes: usize::try_from(stride).unwrap_or(0), size_bytes: 0 };
     let count = info.n_planes() as usize;
@@ -135,13 +145,13 @@ fn layout(info: &VideoInfo, strides: &[i32]) -> Result<Layout, String> {
 }
 
 /// Reads the caps' colorimetry. Transfer curves are not converted: all values are displayed as they are.
-fn colors(info: &VideoInfo) -> Colors {
+fn colors(info: &VideoInfo) -> ColorEncoding {
     let colorimetry = info.colorimetry();
     let matrix = match colorimetry.matrix() {
-        VideoColorMatrix::Bt709 | VideoColorMatrix::Smpte240m => Matrix::Bt709,
-        VideoColorMatrix::Bt2020 => Matrix::Bt2020,
-        VideoColorMatrix::Unknown => Matrix::for_height(info.height()),
-        _ => Matrix::Bt601,
+        VideoColorMatrix::Bt709 | VideoColorMatrix::Smpte240m => YcbcrMatrix::Bt709,
+        VideoColorMatrix::Bt2020 => YcbcrMatrix::Bt2020,
+        VideoColorMatrix::Unknown => YcbcrMatrix::for_height(info.height()),
+        _ => YcbcrMatrix::Bt601,
     };
     let range = match colorimetry.range() {
         VideoColorRange::Range0_255 => Range::Full,
@@ -157,7 +167,7 @@ fn colors(info: &VideoInfo) -> Colors {
 /// # Errors
 /// Fails if no pool supports the pictures.
 pub fn decide_pool(query: &mut gst::query::Allocation) -> Result<(), String> {
-    let caps = query.get_owned().0.ok_or("downstream asks for buffers without a format")?;
+    let caps = query.get_owned().0.ok_or("downstream requests buffers without a format")?;
     let info = VideoInfo::from_caps(&caps).map_err(|error| error.to_string())?;
     let takes_meta = query.find_allocation_meta::<gst_video::VideoMeta>().is_some();
     let configure = |pool: &gst::BufferPool, size: u32, min: u32, max: u32| {

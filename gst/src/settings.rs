@@ -2,7 +2,7 @@
 
 use std::sync::LazyLock;
 
-use bokehcam::computing::Computing;
+use bokehcam::computing::ComputeOptions;
 use bokehcam::frame::DepthMap;
 use bokehcam::look::settings::{SETTINGS, Setting};
 use bokehcam::look::{Look, MAX_RADIUS_PX, Patch};
@@ -63,7 +63,7 @@ fn param_spec(property: Property) -> glib::ParamSpec {
             let row = NUMBERS.iter().find(|(name, ..)| *name == property_name(setting));
             let (_, name, unit, max) = row.expect("it has a row");
             let blurb = format!(
-                "The property {} as a number of {unit}, for controllers; {NO_NUMBER} where it is no such number",
+                "The property {} as a number of {unit}, for controllers; {NO_NUMBER} if it is not such a number",
                 property_name(setting)
             );
             let nick = nick(name);
@@ -86,19 +86,22 @@ fn param_spec(property: Property) -> glib::ParamSpec {
             .build(),
         Property::Threads => glib::ParamSpecUInt::builder("threads")
             .nick("Threads")
-            .blurb("Threads that blur; 0 is one for each core")
+            .blurb("Threads for the blur; 0 is one per core")
             .maximum(1024)
             .mutable_ready()
             .build(),
         Property::Qos => glib::ParamSpecBoolean::builder("qos")
             .nick("Quality of service")
-            .blurb("Where the pipeline is late, blur more coarsely (with quality=auto), and leave out pictures that come too late")
+            .blurb("If the pipeline is late, blur more coarsely (with quality=auto), and drop late pictures")
             .default_value(true)
             .mutable_playing()
             .build(),
         Property::Stats => glib::ParamSpecBoxed::builder::<gst::Structure>("stats")
             .nick("Statistics")
-            .blurb("Pictures that came, depth maps that were used and used again, pictures left out, and the quality now")
+            .blurb(
+                "Counts of received pictures, used and reused depth maps and dropped pictures, and the present \
+                    quality",
+            )
             .read_only()
             .build(),
     }
@@ -179,7 +182,7 @@ impl Values {
     ///
     /// # Errors
     /// Returns the accepted values if `value` is invalid.
-    pub fn set(&mut self, property: Property, value: &glib::Value) -> Result<(), String> {
+    pub fn parse_into(&mut self, property: Property, value: &glib::Value) -> Result<(), String> {
         const TYPE: &str = "GObject checks types";
         match property {
             Property::Setting(place) => {
@@ -229,7 +232,7 @@ impl Values {
             return Ok(());
         }
         if let Some(text) = &text
-            && let Err(accepted) = setting.set(&mut Patch::default(), text)
+            && let Err(accepted) = setting.parse_into(&mut Patch::default(), text)
         {
             let fault = format!("{}={text}: {}", property_name(setting), as_properties(&accepted));
             self.faults[place] = Some(fault.clone());
@@ -237,7 +240,7 @@ impl Values {
         }
         if text.is_some() {
             for (other, text) in SETTINGS.iter().zip(&mut self.texts) {
-                if setting.excludes().contains(&other.name) {
+                if setting.excluded_settings().contains(&other.name) {
                     *text = None;
                 }
             }
@@ -287,9 +290,9 @@ impl Values {
         let by_lens = SETTINGS
             .iter()
             .zip(&self.texts)
-            .any(|(setting, text)| setting.is_strength() && (setting.range)().is_some() && text.is_some());
+            .any(|(setting, text)| setting.sets_strength() && (setting.range)().is_some() && text.is_some());
         let default = |setting: &Setting| match setting.default() {
-            None if (setting.range)().is_some() || by_lens && setting.is_strength() => None,
+            None if (setting.range)().is_some() || by_lens && setting.sets_strength() => None,
             default => Some(default.unwrap_or_else(|| AUTO.to_owned())),
         };
         let values: Vec<(&str, String)> = SETTINGS
@@ -303,8 +306,11 @@ impl Values {
     }
 
     /// Returns the executor options.
-    pub fn computing(&self) -> Computing {
-        Computing { threads: Some(self.threads as usize).filter(|&threads| threads > 0), ..Computing::default() }
+    pub fn computing(&self) -> ComputeOptions {
+        ComputeOptions {
+            threads: Some(self.threads as usize).filter(|&threads| threads > 0),
+            ..ComputeOptions::default()
+        }
     }
 }
 

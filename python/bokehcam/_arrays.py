@@ -96,5 +96,5 @@ def result(out: Any, like: Image) -> Image:
     if not (out.flags.c_contiguous and out.flags.writeable):
         raise ValueError("out: wanted a contiguous array that can be written")
     if np.may_share_memory(out, like):
-        raise ValueError("out: shares its memory with the image, which is read all the time")
+        raise ValueError("out: shares its memory with the image, which must not change meanwhile")
     return out

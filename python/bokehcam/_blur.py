@@ -139,7 +139,7 @@ class Renderer:
 
     def _blur(self, image: Image, coc: "_Radii", out: Optional[Image]) -> Image:
         if image.dtype == np.float32 and self.highlights:
-            raise ValueError("highlights: is for uint8 pictures, which are clipped at white; float32 has its own: use 0")
+            raise ValueError("highlights: only for uint8 pictures, which are clipped at white; use 0 for float32")
         if isinstance(coc, float):
             executor, radii = self._uniform_executor(coc), None
         else:
@@ -209,7 +209,7 @@ def _radii(coc: Coc, image: Image) -> _Radii:
     if isinstance(coc, (int, float, np.number)):
         radius_px = float(coc)
         if not (radius_px >= 0 and np.isfinite(radius_px)):
-            raise ValueError(f"coc: {radius_px:g}, wanted a radius in pixels, >= 0, or an array of signed ones")
+            raise ValueError(f"coc: {radius_px:g}, wanted a radius in pixels, >= 0, or an array of signed radii")
         return float(np.float32(radius_px))
     array = _arrays.as_array(coc, "coc")
     is_shared = image.ndim == 4 and array.ndim == 2

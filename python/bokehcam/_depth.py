@@ -33,7 +33,7 @@ def match(
         left: The left camera's picture: ``(H, W, 3)`` or ``(N, H, W, 3)``, ``uint8`` sRGB or ``float32`` linear light, which is
             matched as 8-bit sRGB; or luma ``(H, W)``, ``uint8``.
         right: The right camera's picture, of the same shape.
-        max_disparity: Disparities that are tried, from 0, in pixels; rounded up to a multiple of 16, at most 256 and less than
+        max_disparity: Range of disparities to search, from 0, in pixels; rounded up to a multiple of 16, at most 256 and less than
             the width.
         effort: ``full``, or ``fast``: half the columns and rows.
         threads: Threads to work on; all cores unless given.

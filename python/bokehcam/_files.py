@@ -33,7 +33,7 @@ def read_depth(
         depth_invalid: A value of a PNG that means unknown; 0 always does.
 
     Raises:
-        OSError: It cannot be read, or holds disparity without distances; the message names it.
+        OSError: It cannot be read, or contains disparity without a scale; the message names it.
     """
     return _core.read_depth(os.fspath(path), depth_scale, depth_invalid)
 

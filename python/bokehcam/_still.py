@@ -89,7 +89,7 @@ def render(
     if opening is None:
         settings["aperture"] = aperture
     if array.dtype == np.float32 and highlights:
-        raise ValueError("highlights: is for uint8 pictures, which are clipped at white; float32 has its own: use 0")
+        raise ValueError("highlights: only for uint8 pictures, which are clipped at white; use 0 for float32")
     if depth_m is not None and effect not in (None, "auto", "dof"):
         warnings.warn(f"depth_m has no effect: the effect {effect} does not use depth", stacklevel=2)
     depth = None if depth_m is None else maps("depth_m", depth_m, array)

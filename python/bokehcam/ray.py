@@ -82,7 +82,7 @@ class Blur:
     def blurred(self, row: dict[str, Any]) -> np.ndarray:
         picture = np.asarray(row[self.image])
         if picture.ndim != 3:
-            raise ValueError(f"a picture has the shape {picture.shape}, where (height, width, 3) is needed")
+            raise ValueError(f"a picture has the shape {picture.shape}, but (height, width, 3) is needed")
         height, width = picture.shape[:2]
         coc = row[self.coc] if isinstance(self.coc, str) else self.coc(row) if callable(self.coc) else self.coc
         return renderer((width, height), self.settings)(picture, coc)

@@ -36,7 +36,7 @@ impl Aperture {
 
     /// Returns the mask of `size` x `size` cells, normalised to sum 1.
     fn kernel<'py>(&self, py: Python<'py>, size: usize) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        let mask = py.detach(|| normalise(&self.shape.mask(size, self.rim)));
+        let mask = py.detach(|| normalise(&self.shape.to_mask(size, self.rim)));
         mask.values.to_pyarray(py).reshape([size, size])
     }
 
@@ -50,7 +50,7 @@ impl Aperture {
 
     /// Returns the first `rank` terms of the mask's singular value decomposition.
     fn low_rank<'py>(&self, py: Python<'py>, rank: usize, size: usize) -> PyResult<LowRank<'py>> {
-        let terms = py.detach(|| Decomposition::of(&normalise(&self.shape.mask(size, self.rim))));
+        let terms = py.detach(|| Decomposition::new(&normalise(&self.shape.to_mask(size, self.rim))));
         let scaled = |vectors: &[f64]| -> Vec<f64> {
             let scale_term = |(term, vector): (usize, &[f64])| -> Vec<f64> {
                 let weight = terms.sigma[term].sqrt();

@@ -23,7 +23,7 @@ impl<'py> Image<'py> {
         }
         match (read(image), write(out)) {
             (Ok(image), Ok(out)) => Ok(Self::Linear(image, out)),
-            _ => Err(PyTypeError::new_err("image and out are arrays of uint8, or of float32, that do not overlap")),
+            _ => Err(PyTypeError::new_err("image and out must be arrays of uint8, or of float32, that do not overlap")),
         }
     }
 }

@@ -40,7 +40,7 @@ impl Blur {
         let mut look = errors::look(&settings)?;
         look.effect = if uniform { Effect::Blur } else { Effect::Dof };
         (look.aperture, look.rim) = (aperture.shape.clone(), aperture.rim);
-        let mut settings = look.settings(size, false).ok_or_else(|| errors::value("nothing to blur"))?;
+        let mut settings = look.blur_settings(size, false).ok_or_else(|| errors::value("nothing to blur"))?;
         (settings.near_max_px, settings.far_max_px) = max_px;
         let executor = py.detach(|| SliceBlur::new(&settings, size, threads)).map_err(errors::value)?;
         Ok(Self { radius_px: uniform.then_some(max_px.1), executor: Mutex::new(executor) })

@@ -2,7 +2,7 @@
 
 use std::fmt::Display;
 
-use bokehcam::look::settings::setting;
+use bokehcam::look::settings::find_setting;
 use bokehcam::look::{Look, Patch};
 use pyo3::PyErr;
 use pyo3::exceptions::{PyOSError, PyValueError};
@@ -33,7 +33,7 @@ fn as_arguments(text: &str) -> String {
 pub fn look(settings: &[(String, String)]) -> Result<Look, PyErr> {
     let pairs = settings.iter().map(|(name, text)| (name.as_str(), text.as_str()));
     for (name, _) in settings {
-        let excluded = setting(name).map_or(&[][..], |setting| setting.excludes());
+        let excluded = find_setting(name).map_or(&[][..], |setting| setting.excluded_settings());
         if let Some((other, _)) = settings.iter().find(|(other, _)| excluded.contains(&other.as_str())) {
             return Err(value(format!("--{name} and --{other} exclude each other: leave one of them out")));
         }

@@ -41,7 +41,7 @@ pub fn stereo_image(image: &Bound<'_, PyAny>) -> PyResult<(GrayImage, Option<Col
         return Ok((gray, None));
     }
     let color = color(image)?;
-    gray.set_luma_of(&color);
+    gray.set_luma_from(&color);
     Ok((gray, Some(color)))
 }
 
@@ -51,7 +51,7 @@ pub fn stereo_image(image: &Bound<'_, PyAny>) -> PyResult<(GrayImage, Option<Col
 /// Fails if it is not contiguous, or not two-dimensional.
 pub fn depth(metres: &PyReadonlyArrayDyn<'_, f32>) -> PyResult<DepthMap> {
     if metres.ndim() != 2 {
-        return Err(PyTypeError::new_err("depth has rows and columns"));
+        return Err(PyTypeError::new_err("depth must have rows and columns"));
     }
     let (width, height) = size_of(metres.shape());
     Ok(DepthMap { width, height, metres: metres.as_slice()?.to_vec(), ..DepthMap::default() })

@@ -2,7 +2,7 @@
 
 use std::sync::Mutex;
 
-use bokehcam::computing::Computing;
+use bokehcam::computing::ComputeOptions;
 use bokehcam::depth::DepthError;
 use bokehcam::depth::stereo::check::{Verdict, check};
 use bokehcam::depth::stereo::{Effort, Matcher as Matching, Pair};
@@ -28,8 +28,8 @@ impl Matcher {
     #[new]
     fn new(py: Python<'_>, size: (u32, u32), disparities: u32, effort: &str, threads: Option<usize>) -> PyResult<Self> {
         let effort: Effort = effort.parse().map_err(|what| errors::value(format!("effort: {what}")))?;
-        let computing = Computing { threads, ..Computing::default() };
-        let matching = py.detach(|| computing.matcher(disparities, effort, size)).map_err(errors::value)?;
+        let computing = ComputeOptions { threads, ..ComputeOptions::default() };
+        let matching = py.detach(|| computing.create_matcher(disparities, effort, size)).map_err(errors::value)?;
         Ok(Self { disparities, matching: Mutex::new(Some(matching)) })
     }
 
@@ -43,7 +43,7 @@ impl Matcher {
         checks: bool,
     ) -> PyResult<(Bound<'py, PyArray2<f32>>, Option<String>)> {
         let ((left, color), (right, _)) = (pictures::stereo_image(left)?, pictures::stereo_image(right)?);
-        let busy = || PyRuntimeError::new_err("the matcher is at work for another thread");
+        let busy = || PyRuntimeError::new_err("the matcher is in use by another thread");
         let mut matching = self.matching.lock().map_err(errors::value)?.take().ok_or_else(busy)?;
         let disparities = self.disparities;
         let (matching, found) = wait_for(py, move || {

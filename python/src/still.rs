@@ -5,10 +5,10 @@ use std::sync::Mutex;
 
 use bokehcam::bokeh::slices::{Radii, SliceBlur};
 use bokehcam::depth::backdrop::Behind;
-use bokehcam::engine::still::{Depth, coc_and_depth};
+use bokehcam::engine::still::{Depth, compute_coc_and_depth};
 use bokehcam::look::{Look, Refine};
 use bokehcam::recording::still::check_depth_size;
-use bokehcam::source::{DepthChoice, fitting_look};
+use bokehcam::source::{DepthChoice, adapt_look};
 use numpy::{PyArray2, PyArrayMethods, PyReadonlyArrayDyn, ToPyArray};
 use pyo3::prelude::*;
 
@@ -43,8 +43,8 @@ impl Still {
         if let Some(Aperture { shape, rim }) = aperture {
             (look.aperture, look.rim) = (shape.clone(), *rim);
         }
-        let look = fitting_look(&look, &DepthChoice::Auto, has_depth).map_err(errors::value)?;
-        let executor = look.settings(size, false).map(|settings| SliceBlur::new(&settings, size, threads));
+        let look = adapt_look(&look, &DepthChoice::Auto, has_depth).map_err(errors::value)?;
+        let executor = look.blur_settings(size, false).map(|settings| SliceBlur::new(&settings, size, threads));
         let executor = py.detach(|| executor.transpose()).map_err(errors::value)?.map(Mutex::new);
         Ok(Self { look, executor })
     }
@@ -65,8 +65,8 @@ impl Still {
             return Ok(());
         };
         let arrays = Image::from_arrays(image, out)?;
-        if matches!(arrays, Image::Linear(..)) && self.look.behind != Behind::Blur {
-            return Err(errors::value("behind: what is put behind the subject is 8-bit sRGB: give a uint8 image"));
+        if matches!(arrays, Image::Linear(..)) && self.look.background != Behind::Blur {
+            return Err(errors::value("behind: a virtual background needs 8-bit sRGB: give a uint8 image"));
         }
         let mut color = match &arrays {
             Image::Srgb(image, _) => pictures::color(image.as_any())?,
@@ -78,7 +78,7 @@ impl Still {
         }
         let look = self.look.clone();
         let (color, made) = wait_for(py, move || {
-            let made = coc_and_depth(&look, &mut color, map.map(Depth::Measured));
+            let made = compute_coc_and_depth(&look, &mut color, map.map(Depth::Measured));
             (color, made)
         })?;
         let (field, map) = made.map_err(errors::value)?;
@@ -102,8 +102,8 @@ pub fn refine<'py>(
     let look = Look { refine: Refine::On, ..errors::look(&settings)? };
     let (map, mut color) = (pictures::depth(&depth)?, pictures::color(image)?);
     check_depth_size(Path::new("depth"), map.size(), color.size()).map_err(errors::value)?;
-    let made = wait_for(py, move || coc_and_depth(&look, &mut color, Some(Depth::Measured(map))))?;
+    let made = wait_for(py, move || compute_coc_and_depth(&look, &mut color, Some(Depth::Measured(map))))?;
     let (_, map) = made.map_err(errors::value)?;
-    let map = map.ok_or_else(|| errors::value("refine: the settings are of a blur without depth"))?;
+    let map = map.ok_or_else(|| errors::value("refine: the settings are for a blur without depth"))?;
     map.metres.to_pyarray(py).reshape([map.height as usize, map.width as usize])
 }

@@ -43,10 +43,10 @@ def job(tmp_path):
         (["take", "--out", "out", "--", "--bogus"], "there is no option --bogus of `stream`"),
         (["take", "--out", "out", "--", "--rim", "thick"], "invalid value 'thick' for '--rim"),
         (["take", "--out", "out", "--", "stream", "take2"], "unexpected argument 'take2'"),
-        (["take", "--out", "out", "--", "--to=b.mp4"], "--to: the farm sees to this itself"),
+        (["take", "--out", "out", "--", "--to=b.mp4"], "--to: the farm sets this itself"),
         (["take", "--out", "out", "--", "--loop"], "--loop: it would never end; add --frames N"),
         (["take", "--out", "out", "--depth-maps", "."], "--depth-maps is for `render`"),
-        (["take", "--out", "out", "--", "render"], "take: there are no pictures"),
+        (["take", "--out", "out", "--", "render"], "take: it contains no pictures"),
         (["--list", "nowhere", "--out", "out"], "--list nowhere: "),
     ],
 )
@@ -68,7 +68,7 @@ def test_a_missing_program_is_no_usage_error(take, tmp_path):
     assert "there is no program nowhere/bokehcam" in farm(
         take, "--out", tmp_path / "out", "--bokehcam", "nowhere/bokehcam", expect=1
     )
-    assert "is no bokehcam" in farm(take, "--out", tmp_path / "out", "--bokehcam", "/bin/true", expect=1)
+    assert "is not bokehcam" in farm(take, "--out", tmp_path / "out", "--bokehcam", "/bin/true", expect=1)
 
 
 def test_a_result_appears_with_its_report_and_once(job, take):
@@ -124,7 +124,7 @@ def test_results_without_their_whole_report_are_not_finished(job, take):
     whole = report.read_bytes()
     assert plan.to_do(job, [unit]) == []
     for bytes_of_report, what in (
-        (whole[: len(whole) // 2], "is no report of a farm"),
+        (whole[: len(whole) // 2], "is not a report of a farm"),
         (whole.replace(b'"delivered": 2', b'"delivered": 1'), "has changed since"),
         (whole.replace(b'"blur"', b'"none"'), "was made by `stream --frames 2 --effect none`"),
         (whole.replace(b'/take"', b'/other"'), "was made of "),

@@ -55,7 +55,7 @@ def test_a_worker_has_one_renderer_for_a_size_and_settings():
 def test_what_is_wrong_is_said():
     with pytest.raises(KeyError, match="there is no column 'coc'; there are 'image'"):
         steps.Blur()({"image": pictures(1)})
-    with pytest.raises(ValueError, match=r"\(30, 40\), where \(height, width, 3\)"):
+    with pytest.raises(ValueError, match=r"\(30, 40\), but \(height, width, 3\)"):
         steps.Blur(1.0)({"image": pictures(1)[..., 0]})
     with pytest.raises(TypeError, match="apertur"):
         steps.Blur(1.0, apertur="disc")

@@ -83,7 +83,7 @@ impl Default for Aperture {
 impl Aperture {
     /// Returns the antialiased mask of `size` x `size` cells. Its rim falls linearly over `rim` (0 to 1) of the radius,
     /// half inside and half outside the outline.
-    pub fn mask(&self, size: usize, rim: f32) -> Mask {
+    pub fn to_mask(&self, size: usize, rim: f32) -> Mask {
         let rim = f64::from(rim).clamp(0.0, 1.0);
         let extent = 1.0 + rim / 2.0;
         let cell = 2.0 * extent / size as f64;
@@ -114,15 +114,15 @@ impl Aperture {
             return picture.sample(x, y, rim) * self.radial_intensity(radius.min(1.0));
         }
         // Most points are clear of the rim in every direction.
-        let [least, most] = outline.range;
-        if radius > most + rim / 2.0 {
+        let [min, max] = outline.range;
+        if radius > max + rim / 2.0 {
             return 0.0;
         }
-        let is_flat = self.intensity == 0.0 && radius < least - rim / 2.0;
+        let is_flat = self.intensity == 0.0 && radius < min - rim / 2.0;
         let mut value = if is_flat {
             1.0
         } else {
-            let edge = outline.towards(x, y);
+            let edge = outline.radius_towards(x, y);
             ramp(radius, edge, rim) * self.radial_intensity((radius / edge).min(1.0))
         };
         if let Shape::Ring { inner } = self.shape
@@ -221,7 +221,7 @@ mod tests {
             (Shape::Polygon { blades: 7, rotation_deg: 0.0, curvature: 1.0 }, PI),
             (Shape::Star { points: 5 }, 5.0 * STAR_INNER * (PI / 5.0).sin()),
         ] {
-            let mask = of(shape.clone()).mask(128, 0.0);
+            let mask = of(shape.clone()).to_mask(128, 0.0);
             let measured = mask.sum() * (2.0 / 128f64).powi(2);
             assert!((measured - area).abs() < 0.004 * area, "{shape:?}: {measured} against {area}");
         }
@@ -229,7 +229,7 @@ mod tests {
 
     #[test]
     fn a_soft_rim_keeps_the_disc_in_its_second_moment() {
-        let (hard, soft) = (of(Shape::Disc).mask(128, 0.0), of(Shape::Disc).mask(128, 0.2));
+        let (hard, soft) = (of(Shape::Disc).to_mask(128, 0.0), of(Shape::Disc).to_mask(128, 0.2));
         let spread = |m: &Mask| {
             let at = |i: usize| (i as f64 + 0.5) / 64.0 - 1.0;
             let sum: f64 = m.values.iter().enumerate().map(|(k, v)| v * at(k % 128).powi(2)).sum();
@@ -241,27 +241,27 @@ mod tests {
 
     #[test]
     fn symmetry_and_orientation() {
-        assert_eq!(of(Shape::Disc).mask(32, 0.2).symmetry(), (true, true));
-        assert_eq!(of(Shape::Heart).mask(32, 0.0).symmetry(), (true, false));
-        let mask = of(Shape::Heart).mask(64, 0.0);
+        assert_eq!(of(Shape::Disc).to_mask(32, 0.2).symmetry(), (true, true));
+        assert_eq!(of(Shape::Heart).to_mask(32, 0.0).symmetry(), (true, false));
+        let mask = of(Shape::Heart).to_mask(64, 0.0);
         let rows = |r: std::ops::Range<usize>| mask.values[r.start * 64..r.end * 64].iter().sum::<f64>();
         assert!(rows(0..32) > 1.2 * rows(32..64), "a heart is wider above");
         let picture = Picture { file: None, width: 2, height: 1, grey: vec![1.0, 0.0] };
-        let mask = of(Shape::Picture(Arc::new(picture))).mask(64, 0.0);
+        let mask = of(Shape::Picture(Arc::new(picture))).to_mask(64, 0.0);
         assert!(mask.values[32 * 64 + 10] > 0.9 && mask.values[32 * 64 + 54] == 0.0);
     }
 
     #[test]
     fn a_black_picture_is_a_pinhole() {
         let black =
-            of(Shape::Picture(Arc::new(Picture { file: None, width: 1, height: 1, grey: vec![0.0] }))).mask(16, 0.1);
+            of(Shape::Picture(Arc::new(Picture { file: None, width: 1, height: 1, grey: vec![0.0] }))).to_mask(16, 0.1);
         assert_eq!(black.sum(), 1.0);
     }
 
     #[test]
     fn intensity_moves_light_to_the_rim_or_the_centre() {
         let centre_over_rim = |intensity: f32| {
-            let mask = Aperture { shape: Shape::Disc, intensity }.mask(64, 0.0);
+            let mask = Aperture { shape: Shape::Disc, intensity }.to_mask(64, 0.0);
             mask.values[32 * 64 + 32] / mask.values[32 * 64 + 4]
         };
         assert!(centre_over_rim(1.0) > 3.0 && centre_over_rim(-1.0) < 0.5);

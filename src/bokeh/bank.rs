@@ -28,11 +28,11 @@ pub const MASK_CELLS: usize = 128;
 /// `out(p) = sum_t sum_j vertical_t(j) sum_i horizontal_t(i) in(p + (i, j))` (McGraw, *Fast Bokeh Effects Using
 /// Low-Rank Linear Filters*, eq. 2), and its taps sum to 1 at every node.
 #[derive(Clone, Debug)]
-pub struct Bank {
+pub struct FilterBank {
     /// Number of separable terms.
     pub terms: usize,
-    /// Half-width at the largest radius: taps go from `-reach` to `reach`.
-    pub reach: usize,
+    /// Half-width at the largest radius: taps go from `-half_width` to `half_width`.
+    pub half_width: usize,
     /// Number of tabulated radii.
     pub nodes: usize,
     /// True if every profile is symmetric, so that taps at `-j` and `j` are equal.
@@ -41,20 +41,20 @@ pub struct Bank {
     pub extent: f64,
     /// Half-width of each node: its outermost tap.
     pub node_half_width: Vec<u32>,
-    /// Horizontal taps, `[node][reach + j][term]`, for content behind the focal plane.
+    /// Horizontal taps, `[node][half_width + j][term]`, for content behind the focal plane.
     pub horizontal: Vec<f32>,
     /// Vertical taps in the same layout, with singular values and normalisation included.
     pub vertical: Vec<f32>,
 }
 
-impl Bank {
+impl FilterBank {
     /// Creates the bank of a mask for radii up to `max_radius_px`.
     pub fn new(mask: &Mask, rank: Rank, max_radius_px: f32) -> Self {
-        Self::of(&Decomposition::of(mask), mask, rank, max_radius_px)
+        Self::from_decomposition(&Decomposition::new(mask), mask, rank, max_radius_px)
     }
 
-    /// Same as [`Bank::new`], given the decomposition of `mask`.
-    pub fn of(svd: &Decomposition, mask: &Mask, rank: Rank, max_radius_px: f32) -> Self {
+    /// Same as [`FilterBank::new`], given the decomposition of `mask`.
+    pub fn from_decomposition(svd: &Decomposition, mask: &Mask, rank: Rank, max_radius_px: f32) -> Self {
         let terms = match rank {
             Rank::Terms(n) => (n as usize).clamp(1, svd.numerical_rank()),
             Rank::Full => svd.numerical_rank(),
@@ -77,38 +77,43 @@ impl Bank {
             profile.iter_mut().for_each(|x| *x *= svd.sigma[t] / total);
         }
 
-        let nodes = nodes_up_to(max_radius_px.max(0.0));
-        let reach_at = |node: usize| (f64::from(node_radius_px(node)) * mask.extent - 0.5).ceil().max(0.0);
-        let reach = reach_at(nodes - 1) as usize;
+        let nodes = count_nodes(max_radius_px.max(0.0));
+        let half_width_at = |node: usize| (f64::from(node_radius_px(node)) * mask.extent - 0.5).ceil().max(0.0);
+        let half_width = half_width_at(nodes - 1) as usize;
         let symmetry = mask.symmetry();
         let mut bank = Self {
             terms,
-            reach,
+            half_width,
             nodes,
             is_symmetric: symmetry == (true, true),
             extent: mask.extent,
-            node_half_width: (0..nodes).map(|k| reach_at(k) as u32).collect(),
-            horizontal: Vec::with_capacity(nodes * (2 * reach + 1) * terms),
-            vertical: Vec::with_capacity(nodes * (2 * reach + 1) * terms),
+            node_half_width: (0..nodes).map(|k| half_width_at(k) as u32).collect(),
+            horizontal: Vec::with_capacity(nodes * (2 * half_width + 1) * terms),
+            vertical: Vec::with_capacity(nodes * (2 * half_width + 1) * terms),
         };
         for node in 0..nodes {
             // At radius 0, tap 0 covers the whole profile.
             let radius_px = (f64::from(node_radius_px(node)) * mask.extent).max(1e-6);
-            for j in -(reach as i64)..=reach as i64 {
+            for j in -(half_width as i64)..=half_width as i64 {
                 let (left, right) = ((j as f64 - 0.5) / radius_px, (j as f64 + 0.5) / radius_px);
                 for t in 0..terms {
-                    bank.horizontal.push((cumulative_at(&across[t], right) - cumulative_at(&across[t], left)) as f32);
-                    bank.vertical.push((cumulative_at(&down[t], right) - cumulative_at(&down[t], left)) as f32);
+                    bank.horizontal.push(
+                        (interpolate_cumulative(&across[t], right) - interpolate_cumulative(&across[t], left)) as f32,
+                    );
+                    bank.vertical.push(
+                        (interpolate_cumulative(&down[t], right) - interpolate_cumulative(&down[t], left)) as f32,
+                    );
                 }
             }
         }
         bank
     }
 
-    /// Returns the index of the first term of tap `j` of `node` in [`Bank::horizontal`] and [`Bank::vertical`].
+    /// Returns the index of the first term of tap `j` of `node` in [`FilterBank::horizontal`] and
+    /// [`FilterBank::vertical`].
     #[inline(always)]
-    pub fn tap(&self, node: usize, j: isize) -> usize {
-        (node * (2 * self.reach + 1) + (self.reach as isize + j) as usize) * self.terms
+    pub fn tap_index(&self, node: usize, j: isize) -> usize {
+        (node * (2 * self.half_width + 1) + (self.half_width as isize + j) as usize) * self.terms
     }
 
     /// Returns the largest tabulated radius, in pixels.
@@ -118,17 +123,17 @@ impl Bank {
 
     /// Returns the node nearest to a radius in pixels.
     #[inline(always)]
-    pub fn node(&self, radius_px: f32) -> usize {
-        nearest_node(radius_px).min(self.nodes - 1)
+    pub fn nearest_node(&self, radius_px: f32) -> usize {
+        round_to_node(radius_px).min(self.nodes - 1)
     }
 
-    /// Returns the 2-D kernel of a node: `(2 r + 1)^2` taps with `r = node_half_width[node]`, row-major. With `turned`, the
-    /// aperture is rotated by 180 degrees, as content in front of the focal plane shows it.
+    /// Returns the 2-D kernel of a node: `(2 r + 1)^2` taps with `r = node_half_width[node]`, row-major. With `turned`,
+    /// the aperture is rotated by 180 degrees, as content in front of the focal plane shows it.
     pub fn kernel(&self, node: usize, turned: bool) -> Vec<f32> {
-        let reach = self.node_half_width[node] as isize;
+        let half_width = self.node_half_width[node] as isize;
         let sign = if turned { -1 } else { 1 };
-        let at = |taps: &[f32], j: isize, t: usize| f64::from(taps[self.tap(node, sign * j) + t]);
-        let range = move || -reach..=reach;
+        let at = |taps: &[f32], j: isize, t: usize| f64::from(taps[self.tap_index(node, sign * j) + t]);
+        let range = move || -half_width..=half_width;
         range()
             .flat_map(|y| range().map(move |x| (x, y)))
             .map(|(x, y)| (0..self.terms).map(|t| at(&self.horizontal, x, t) * at(&self.vertical, y, t)).sum::<f64>())
@@ -147,7 +152,7 @@ pub fn node_radius_px(node: usize) -> f32 {
 
 /// Returns the node nearest to a radius >= 0 in pixels. The bits of a float are linear within each octave.
 #[inline(always)]
-fn nearest_node(radius_px: f32) -> usize {
+fn round_to_node(radius_px: f32) -> usize {
     if radius_px < OCTAVES_FROM_PX {
         return (radius_px * STEPS_PER_PX + 0.5) as usize;
     }
@@ -156,13 +161,13 @@ fn nearest_node(radius_px: f32) -> usize {
 }
 
 /// Returns the number of nodes needed to cover a radius.
-fn nodes_up_to(radius_px: f32) -> usize {
-    let node = nearest_node(radius_px);
+fn count_nodes(radius_px: f32) -> usize {
+    let node = round_to_node(radius_px);
     node + 1 + usize::from(node_radius_px(node) < radius_px)
 }
 
 /// Returns the cumulative profile at `x` in [-1, 1], linear between its nodes, constant outside.
-fn cumulative_at(cumulative: &[f64], x: f64) -> f64 {
+fn interpolate_cumulative(cumulative: &[f64], x: f64) -> f64 {
     let last = cumulative.len() - 1;
     let at = ((x + 1.0) * 0.5 * last as f64).clamp(0.0, last as f64);
     let index = (at as usize).min(last - 1);
@@ -175,8 +180,8 @@ mod tests {
     use super::super::aperture::{Aperture, Shape};
     use super::*;
 
-    fn bank(shape: Shape, rank: Rank) -> Bank {
-        Bank::new(&Aperture { shape, intensity: 0.0 }.mask(MASK_CELLS, 0.2), rank, 10.0)
+    fn bank(shape: Shape, rank: Rank) -> FilterBank {
+        FilterBank::new(&Aperture { shape, intensity: 0.0 }.to_mask(MASK_CELLS, 0.2), rank, 10.0)
     }
 
     #[test]
@@ -194,12 +199,12 @@ mod tests {
 
     #[test]
     fn the_full_bank_is_the_area_sampled_aperture() {
-        let mask = Aperture::default().mask(MASK_CELLS, 0.2);
-        let bank = Bank::new(&mask, Rank::Full, 10.0);
+        let mask = Aperture::default().to_mask(MASK_CELLS, 0.2);
+        let bank = FilterBank::new(&mask, Rank::Full, 10.0);
         for node in [5, 40, 101, 160] {
             let radius_px = node as f64 / f64::from(STEPS_PER_PX) * mask.extent;
-            let reach = bank.node_half_width[node] as i64;
-            let side = 2 * reach + 1;
+            let half_width = bank.node_half_width[node] as i64;
+            let side = 2 * half_width + 1;
             // Fraction of the mask's light that falls on each pixel, summed over the mask's cells.
             let mut direct = vec![0.0; (side * side) as usize];
             let (cell, sum) = (2.0 * radius_px / mask.size as f64, mask.sum());
@@ -212,7 +217,7 @@ mod tests {
             for (k, value) in mask.values.iter().enumerate() {
                 for (y, fraction_y) in overlap(k / mask.size) {
                     for (x, fraction_x) in overlap(k % mask.size) {
-                        let (x, y) = (x as i64 + reach, y as i64 + reach);
+                        let (x, y) = (x as i64 + half_width, y as i64 + half_width);
                         if fraction_x * fraction_y > 0.0 {
                             direct[(y * side + x) as usize] += value / sum * fraction_x * fraction_y;
                         }
@@ -237,10 +242,10 @@ mod tests {
             let max_px = (radius_px / OCTAVES_FROM_PX).max(1.0) / STEPS_PER_PX;
             assert!(step_px > max_px / 2.01 && step_px <= max_px, "{radius_px}: {step_px}");
             for aside_px in [-0.49 * step_px, 0.0, 0.24 * step_px] {
-                assert_eq!(nearest_node((radius_px + aside_px).max(0.0)), node, "{radius_px} {aside_px}");
+                assert_eq!(round_to_node((radius_px + aside_px).max(0.0)), node, "{radius_px} {aside_px}");
             }
-            assert_eq!(nodes_up_to(radius_px), node + 1);
-            assert_eq!(nodes_up_to(radius_px + 0.2 * step_px), node + 2);
+            assert_eq!(count_nodes(radius_px), node + 1);
+            assert_eq!(count_nodes(radius_px + 0.2 * step_px), node + 2);
             before_px = radius_px;
         }
     }
@@ -249,8 +254,8 @@ mod tests {
     #[test]
     fn a_table_of_a_wide_blur_is_no_more_than_in_proportion() {
         let taps = |radius_px| {
-            let mask = Aperture::default().mask(MASK_CELLS, 0.2);
-            Bank::new(&mask, Rank::Terms(2), radius_px).horizontal.len() as f32
+            let mask = Aperture::default().to_mask(MASK_CELLS, 0.2);
+            FilterBank::new(&mask, Rank::Terms(2), radius_px).horizontal.len() as f32
         };
         let (narrow, wide) = (taps(64.0), taps(1024.0));
         assert!(wide < 16.0 * narrow * 2.5, "{narrow} to {wide}");
@@ -260,13 +265,13 @@ mod tests {
     fn no_shift_and_the_second_moment_grows_with_the_radius() {
         let bank = bank(Shape::Disc, Rank::Terms(3));
         for node in (32..bank.nodes).step_by(16) {
-            let (kernel, reach) = (bank.kernel(node, false), bank.node_half_width[node] as i64);
-            let side = 2 * reach + 1;
+            let (kernel, half_width) = (bank.kernel(node, false), bank.node_half_width[node] as i64);
+            let side = 2 * half_width + 1;
             let moment = |power: i32| -> f64 {
                 kernel
                     .iter()
                     .enumerate()
-                    .map(|(k, w)| f64::from(*w) * ((k as i64 % side - reach) as f64).powi(power))
+                    .map(|(k, w)| f64::from(*w) * ((k as i64 % side - half_width) as f64).powi(power))
                     .sum()
             };
             let radius_px = node as f64 / f64::from(STEPS_PER_PX);
@@ -280,8 +285,8 @@ mod tests {
     fn far_content_shows_the_aperture_upright_and_near_content_turns_it() {
         let bank = bank(Shape::Heart, Rank::Terms(8));
         let node = 160;
-        let (reach, side) = (bank.node_half_width[node] as usize, 2 * bank.node_half_width[node] as usize + 1);
-        let upper = |kernel: &[f32]| kernel[..reach * side].iter().sum::<f32>();
+        let (half_width, side) = (bank.node_half_width[node] as usize, 2 * bank.node_half_width[node] as usize + 1);
+        let upper = |kernel: &[f32]| kernel[..half_width * side].iter().sum::<f32>();
         // A kernel that gathers draws a point rotated by 180 degrees: for an upright heart its weight is below.
         assert!(upper(&bank.kernel(node, false)) < 0.45);
         assert!(upper(&bank.kernel(node, true)) > 0.55);

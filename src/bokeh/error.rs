@@ -19,7 +19,8 @@ pub enum BokehError {
     /// The blur is wider than the picture, or than the method supports.
     #[error(
         "a blur radius of {radius_px} px is too large: {} at most {max_px} px; lower --max-coc or --blur",
-        if *by_method { "--method gather bears".to_owned() } else { format!("for pictures of {}x{}, use", size.0, size.1) }
+        if *by_method { "for --method gather, \
+                         use".to_owned() } else { format!("for pictures of {}x{}, use", size.0, size.1) }
     )]
     TooWide {
         /// Largest radius of the settings, in pixels.
@@ -33,8 +34,8 @@ pub enum BokehError {
     },
     /// A picture needs more memory than is free.
     #[error(
-        "a picture of {}x{} pixels takes about {needed_mb} MB to blur, and {free_mb} MB are free: make it smaller, or close \
-         other programs",
+        "a picture of {}x{} pixels takes about {needed_mb} MB to blur, and only {free_mb} MB are free: make it \
+         smaller, or close other programs",
         size.0, size.1
     )]
     Memory {
@@ -46,7 +47,7 @@ pub enum BokehError {
         free_mb: u64,
     },
     /// The lengths of slices do not match the picture.
-    #[error("slices of {lengths:?} values for pixels, result and radii are not those of a picture of {size:?}")]
+    #[error("slices of {lengths:?} values for pixels, result and radii do not fit a picture of {size:?}")]
     Lengths {
         /// Width and height in pixels.
         size: (u32, u32),
@@ -54,7 +55,7 @@ pub enum BokehError {
         lengths: [usize; 3],
     },
     /// The executor accepted a picture and returned no result.
-    #[error("the blur gave no picture back: please report this")]
+    #[error("the blur returned no picture: please report this")]
     Lost,
     /// There is no GPU, or it refused or was lost.
     #[error(transparent)]

@@ -3,32 +3,32 @@
 use std::collections::VecDeque;
 use std::sync::Arc;
 
-use super::{Bokeh, BokehError, Finished, Job};
-use crate::compute::backed::Backed;
+use super::{BlurredFrame, Bokeh, BokehError, Job};
+use crate::compute::with_fallback::WithFallback;
 use crate::compute::{Backend, Device, GpuError};
 
 /// Makes the fallback executor.
-pub type Makes = Box<dyn FnOnce() -> Box<dyn Bokeh> + Send>;
+pub type MakeFallback = Box<dyn FnOnce() -> Box<dyn Bokeh> + Send>;
 
 /// Runs one executor until its GPU fails, then another. No frame is lost: the frames in flight at the failure are
 /// blurred again by the other executor.
 pub struct Fallback {
-    executor: Backed<Box<dyn Bokeh>, Makes>,
+    executor: WithFallback<Box<dyn Bokeh>, MakeFallback>,
     /// Frames not yet submitted, oldest first: after a failure there may be more than the fallback accepts.
     waiting: VecDeque<Job>,
 }
 
 impl Fallback {
     /// Creates an executor that runs `first`, and the result of `other` once `first` fails.
-    pub fn new(first: Box<dyn Bokeh>, other: Makes) -> Self {
-        Self { executor: Backed::new(first, other), waiting: VecDeque::new() }
+    pub fn new(first: Box<dyn Bokeh>, other: MakeFallback) -> Self {
+        Self { executor: WithFallback::new(first, other), waiting: VecDeque::new() }
     }
 
     /// Switches to the other executor, or returns the error if that has happened already.
     fn switch_over(&mut self, error: GpuError) -> Result<(), BokehError> {
         let Self { executor, waiting } = self;
-        let make = |first: &mut Box<dyn Bokeh>, other: Makes| {
-            let mut all: VecDeque<Job> = std::iter::from_fn(|| first.take_back()).collect();
+        let make = |first: &mut Box<dyn Bokeh>, other: MakeFallback| {
+            let mut all: VecDeque<Job> = std::iter::from_fn(|| first.reclaim_job()).collect();
             all.append(waiting);
             *waiting = all;
             // Drops the first executor, and with it its GPU memory, before the other one allocates its own.
@@ -58,7 +58,7 @@ impl Bokeh for Fallback {
         self.submit_waiting()
     }
 
-    fn collect(&mut self, wait: bool) -> Result<Option<Finished>, BokehError> {
+    fn collect(&mut self, wait: bool) -> Result<Option<BlurredFrame>, BokehError> {
         // After a failure, the next iteration submits the frames to the other executor.
         loop {
             self.submit_waiting()?;
@@ -69,8 +69,8 @@ impl Bokeh for Fallback {
         }
     }
 
-    fn take_back(&mut self) -> Option<Job> {
-        self.executor.worker_mut().take_back().or_else(|| self.waiting.pop_front())
+    fn reclaim_job(&mut self) -> Option<Job> {
+        self.executor.worker_mut().reclaim_job().or_else(|| self.waiting.pop_front())
     }
 
     fn in_flight(&self) -> usize {
@@ -112,7 +112,7 @@ impl Bokeh for Placeholder {
         Ok(())
     }
 
-    fn collect(&mut self, _: bool) -> Result<Option<Finished>, BokehError> {
+    fn collect(&mut self, _: bool) -> Result<Option<BlurredFrame>, BokehError> {
         Ok(None)
     }
 
@@ -174,17 +174,17 @@ mod tests {
             self.step()
         }
 
-        fn collect(&mut self, _: bool) -> Result<Option<Finished>, BokehError> {
+        fn collect(&mut self, _: bool) -> Result<Option<BlurredFrame>, BokehError> {
             if self.jobs.is_empty() {
                 return Ok(None);
             }
             self.step()?;
             let Some(Job { ticket, color, depth, mut out, .. }) = self.jobs.pop_front() else { return Ok(None) };
             out.rgb.fill(self.mark);
-            Ok(Some(Finished { ticket, picture: Picture::in_memory(out), color, depth, times: PassTimes::new() }))
+            Ok(Some(BlurredFrame { ticket, picture: Picture::from_memory(out), color, depth, times: PassTimes::new() }))
         }
 
-        fn take_back(&mut self) -> Option<Job> {
+        fn reclaim_job(&mut self) -> Option<Job> {
             self.jobs.pop_front()
         }
 

@@ -29,21 +29,21 @@ impl Settings {
     }
 
     /// Returns these settings with radii clamped to [`Settings::max_radius_px`].
-    pub(super) fn within(&self, size: (u32, u32)) -> Self {
+    pub(super) fn with_clamped_radii(&self, size: (u32, u32)) -> Self {
         let max_px = self.max_radius_px(size);
         // `max` turns NaN into 0.
         let clamped = |radius_px: f32| radius_px.max(0.0).min(max_px);
         Self { far_max_px: clamped(self.far_max_px), near_max_px: clamped(self.near_max_px), ..self.clone() }
     }
 
-    /// Checks that there is memory for blurring pictures of `size` (width, height), plus `beside_per_pixel` bytes per
-    /// pixel.
+    /// Checks that there is memory for blurring pictures of `size` (width, height), plus `extra_bytes_per_pixel` bytes
+    /// per pixel.
     ///
     /// # Errors
     /// [`BokehError::Memory`].
-    pub(crate) fn check_room(size: (u32, u32), beside_per_pixel: u64) -> Result<(), BokehError> {
+    pub(crate) fn check_memory(size: (u32, u32), extra_bytes_per_pixel: u64) -> Result<(), BokehError> {
         let pixels = u64::from(size.0) * u64::from(size.1);
-        let needed = pixels * (BYTES_PER_PIXEL + beside_per_pixel);
+        let needed = pixels * (BYTES_PER_PIXEL + extra_bytes_per_pixel);
         match memory::free_bytes().filter(|&free| pixels > UNCHECKED_PIXELS && needed > free) {
             Some(free) => Err(BokehError::Memory { size, needed_mb: needed >> 20, free_mb: free >> 20 }),
             None => Ok(()),
@@ -55,7 +55,7 @@ impl Settings {
     /// # Errors
     /// [`BokehError::Memory`], [`BokehError::TooWide`].
     pub fn check(&self, size: (u32, u32)) -> Result<(), BokehError> {
-        Self::check_room(size, 0)?;
+        Self::check_memory(size, 0)?;
         let max_px = self.max_radius_px(size);
         // NaN is refused as well.
         let is_beyond = |radius_px: &f32| radius_px.partial_cmp(&max_px).is_none_or(|order| order.is_gt());

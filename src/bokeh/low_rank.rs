@@ -29,7 +29,7 @@ impl Decomposition {
     /// Decomposes a mask by one-sided Jacobi rotations (Hestenes): short, and accurate to rounding. Along a
     /// mirror-symmetric axis only half of the mask is decomposed, each value with double weight: a symmetric mask has
     /// symmetric singular vectors.
-    pub fn of(mask: &Mask) -> Self {
+    pub fn new(mask: &Mask) -> Self {
         let n = mask.size;
         let fold = |mirrored: bool| if mirrored { n.div_ceil(2) } else { n };
         let (across, down) = mask.symmetry();
@@ -141,8 +141,8 @@ mod tests {
     fn every_term_together_is_the_kernel() {
         let turned = Shape::Polygon { blades: 5, rotation_deg: 13.0, curvature: 0.0 };
         for shape in [Shape::Disc, Shape::Heart, Shape::Star { points: 5 }, Shape::Ring { inner: 0.5 }, turned] {
-            let mask = Aperture { shape, intensity: 0.0 }.mask(33, 0.1);
-            let svd = Decomposition::of(&mask);
+            let mask = Aperture { shape, intensity: 0.0 }.to_mask(33, 0.1);
+            let svd = Decomposition::new(&mask);
             let full = svd.approximation(mask.size);
             let worst = mask.values.iter().zip(&full).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
             assert!(worst < 1e-12, "{worst}");
@@ -154,8 +154,8 @@ mod tests {
         let hexagon = |rotation_deg| Shape::Polygon { blades: 6, rotation_deg, curvature: 0.1 };
         for shape in [Shape::Disc, Shape::Heart, hexagon(0.0), hexagon(13.0)] {
             for size in [40, 41] {
-                let mask = Aperture { shape: shape.clone(), intensity: 0.0 }.mask(size, 0.1);
-                let svd = Decomposition::of(&mask);
+                let mask = Aperture { shape: shape.clone(), intensity: 0.0 }.to_mask(size, 0.1);
+                let svd = Decomposition::new(&mask);
                 assert!(svd.sigma.is_sorted_by(|a, b| a >= b));
                 for vectors in [&svd.u, &svd.v] {
                     let row = |i: usize| &vectors[i * size..][..size];
@@ -170,8 +170,8 @@ mod tests {
 
     #[test]
     fn the_error_by_rank_is_the_tail_of_the_singular_values() {
-        let mask = Aperture::default().mask(33, 0.0);
-        let svd = Decomposition::of(&mask);
+        let mask = Aperture::default().to_mask(33, 0.0);
+        let svd = Decomposition::new(&mask);
         let size = mask.values.iter().map(|x| x * x).sum::<f64>().sqrt();
         let mut last = 1.0;
         for rank in 1..12 {
@@ -186,7 +186,7 @@ mod tests {
     #[test]
     fn the_disc_has_the_known_spectrum() {
         // Eigenvalues of the operator on [-1, 1] with kernel [x^2 + y^2 <= 1]; a cell is 2 / size wide.
-        let svd = Decomposition::of(&Aperture::default().mask(128, 0.0));
+        let svd = Decomposition::new(&Aperture::default().to_mask(128, 0.0));
         for (sigma, known) in svd.sigma.iter().zip([1.6802, 0.4045, 0.2310, 0.1618, 0.1245]) {
             assert!((sigma * 2.0 / 128.0 - known).abs() < 2e-3, "{} against {known}", sigma * 2.0 / 128.0);
         }
@@ -194,7 +194,7 @@ mod tests {
 
     #[test]
     fn small_discs_are_exactly_low_rank() {
-        let rank_at = |d: usize| Decomposition::of(&Aperture::default().mask(d, 0.0)).numerical_rank();
+        let rank_at = |d: usize| Decomposition::new(&Aperture::default().to_mask(d, 0.0)).numerical_rank();
         assert_eq!((rank_at(9), rank_at(17)), (4, 6));
     }
 }

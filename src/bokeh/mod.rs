@@ -7,6 +7,8 @@ pub mod aperture;
 #[doc(hidden)]
 pub mod bank;
 #[doc(hidden)]
+pub mod bin_weight;
+#[doc(hidden)]
 pub mod cpu;
 mod error;
 #[doc(hidden)]
@@ -23,9 +25,7 @@ mod picture;
 #[doc(hidden)]
 pub mod plan;
 #[doc(hidden)]
-pub mod rung;
-#[doc(hidden)]
-pub mod share;
+pub mod quality_level;
 pub mod slices;
 #[doc(hidden)]
 pub mod split;
@@ -39,7 +39,7 @@ pub use error::BokehError;
 pub use picture::Picture;
 
 pub use crate::compute::{Backend, PassTimes};
-use crate::compute::{Device, DeviceFrame, Place};
+use crate::compute::{Device, DeviceFrame, PictureLocation};
 use crate::frame::{ColorImage, DepthMap, YuyvImage};
 use crate::link::pool::Pooled;
 use crate::names::named;
@@ -50,7 +50,7 @@ named! {
     pub enum Method default Layered {
         /// Depth bins, blurred and composited front to back
         Layered = "layered",
-        /// Every pixel gathers with its own radius: the paper's plain form
+        /// Every pixel gathers with its own radius: the basic method of the paper
         Gather = "gather",
     }
 }
@@ -110,9 +110,9 @@ pub struct Settings {
     pub near_max_px: f32,
 }
 
-/// One frame to blur. The executor owns the buffers until the frame is [`Finished`].
+/// One frame to blur. The executor owns the buffers until it returns the [`BlurredFrame`].
 pub struct Job {
-    /// Chosen by the caller; returned in [`Finished`].
+    /// Chosen by the caller; returned in [`BlurredFrame`].
     pub ticket: u64,
     /// Picture to blur.
     pub color: Pooled<ColorImage>,
@@ -123,7 +123,7 @@ pub struct Job {
     /// Quality level; ignored unless the settings are [`adaptive`](Settings::adaptive).
     pub quality: Quality,
     /// Where the result is needed.
-    pub place: Place,
+    pub place: PictureLocation,
     /// Buffer for the result in memory; resized to the picture's size.
     pub out: Pooled<ColorImage>,
     /// YUYV buffer for the result, if the caller accepts YUYV: an executor that produces YUYV at no extra cost fills
@@ -137,13 +137,14 @@ pub struct Job {
 impl Job {
     /// Creates a job with ticket 0 and the default quality, whose result goes to a buffer of its own in memory.
     pub fn new(color: Pooled<ColorImage>, depth: Option<Pooled<DepthMap>>, coc: CocField) -> Self {
-        let (quality, place, out) = (Quality::default(), Place::Memory, Pooled::detached(ColorImage::default()));
+        let (quality, place, out) =
+            (Quality::default(), PictureLocation::Memory, Pooled::detached(ColorImage::default()));
         Self { ticket: 0, color, depth, coc, quality, place, out, yuyv: None, on_device: None }
     }
 }
 
 /// A blurred frame.
-pub struct Finished {
+pub struct BlurredFrame {
     /// Ticket of the job.
     pub ticket: u64,
     /// Result, at [`Job::place`]; in memory if the CPU made it or the GPU had no free picture.
@@ -174,7 +175,7 @@ pub enum Probe {
 /// # Errors
 /// The blur is too wide ([`Settings::check`]); the GPU is too small for these pictures, failed, or its results differ
 /// from those of the CPU. A later GPU failure is no error: the CPU takes over.
-pub fn create(
+pub fn create_blur(
     settings: &Settings,
     size: (u32, u32),
     device: Option<Arc<Device>>,
@@ -184,7 +185,7 @@ pub fn create(
     let plan = plan::Plan::new(settings, size.0, size.1);
     #[cfg(feature = "gpu")]
     if let Some(device) = device {
-        return gpu_with_fallback(&plan, device, threads);
+        return create_gpu_with_fallback(&plan, device, threads);
     }
     #[cfg(not(feature = "gpu"))]
     let _ = device;
@@ -194,13 +195,13 @@ pub fn create(
 /// Creates a GPU executor after checking its results against the CPU's. The fallback to the CPU allocates its buffers
 /// only when the GPU fails.
 #[cfg(feature = "gpu")]
-fn gpu_with_fallback(
+fn create_gpu_with_fallback(
     plan: &plan::Plan,
     device: Arc<Device>,
     threads: Option<usize>,
 ) -> Result<Box<dyn Bokeh>, BokehError> {
-    gpu::try_out(&device)?;
-    let gpu = gpu::GpuBokeh::on(plan, device)?;
+    gpu::run_self_test(&device)?;
+    let gpu = gpu::GpuBokeh::with_device(plan, device)?;
     let plan = plan.clone();
     let cpu = move || Box::new(cpu::CpuBokeh::new(plan, threads)) as Box<dyn Bokeh>;
     Ok(Box::new(fallback::Fallback::new(Box::new(gpu), Box::new(cpu))))
@@ -214,13 +215,13 @@ pub trait Bokeh: Send {
     /// Starts one frame.
     ///
     /// # Errors
-    /// The frame does not fit the plan, or the device failed. The frame is then lost, unless [`Bokeh::take_back`]
+    /// The frame does not fit the plan, or the device failed. The frame is then lost, unless [`Bokeh::reclaim_job`]
     /// returns it.
     fn submit(&mut self, job: Job) -> Result<(), BokehError>;
 
     /// After an error, returns the oldest frame in flight, or the frame just refused, as it was submitted, so that
     /// another executor can blur it. Returns `None` if no frame is left.
-    fn take_back(&mut self) -> Option<Job> {
+    fn reclaim_job(&mut self) -> Option<Job> {
         None
     }
 
@@ -228,7 +229,7 @@ pub trait Bokeh: Send {
     ///
     /// # Errors
     /// The device failed.
-    fn collect(&mut self, wait: bool) -> Result<Option<Finished>, BokehError>;
+    fn collect(&mut self, wait: bool) -> Result<Option<BlurredFrame>, BokehError>;
 
     /// Returns the number of frames submitted and not yet collected.
     fn in_flight(&self) -> usize;

@@ -6,57 +6,57 @@
 
 use std::ops::Range;
 
-use super::plan::{BinWeight, HAND_OVER, Plan};
+use super::plan::{BinWeight, CROSS_FADE, Plan};
 
 /// Largest number of layers of near bins; each is inpainted separately, which takes time.
 const MAX_NEAR_LAYERS: usize = 2;
 /// Largest number of layers: the near ones and the layer of all other bins.
 pub const MAX_LAYERS: usize = MAX_NEAR_LAYERS + 1;
 
-/// CoC step to the surface behind, as a fraction of a near pixel's own CoC: below `OTHER_FROM` it is the same surface,
-/// from `OTHER_TO` on a different one.
-pub const OTHER_FROM: f32 = 0.35;
-pub const OTHER_TO: f32 = 0.6;
+/// CoC step to the surface behind, as a fraction of a near pixel's own CoC: below `OTHER_SURFACE_FROM` it is the same
+/// surface, from `OTHER_SURFACE_TO` on a different one.
+pub const OTHER_SURFACE_FROM: f32 = 0.35;
+pub const OTHER_SURFACE_TO: f32 = 0.6;
 /// A pixel whose CoC is at least this many times that of the near bins' border is replaced entirely.
-const HIDDEN_FROM: f32 = 1.5;
+const FULLY_HIDDEN_FROM: f32 = 1.5;
 
 /// Side of a cell of the grid of silhouettes, in pixels.
-pub const GRAIN: usize = 4;
+pub const SILHOUETTE_CELL: usize = 4;
 /// Number of distances stored per cell: the fields of [`Silhouette`].
-pub const SHOWS: usize = 3;
+pub const DISTANCES_PER_CELL: usize = 3;
 /// Margin added to each distance, in pixels, because the grid is coarse and interpolated linearly. Not a whole number,
 /// so that both executors, which round differently, agree at whole radii.
-pub const MARGIN_PX: f32 = 2.0 * GRAIN as f32 + 0.3;
+pub const MARGIN_PX: f32 = 2.0 * SILHOUETTE_CELL as f32 + 0.3;
 /// Past a silhouette, the background is visible within its radius `r`. It fades out where `r^2` minus the squared
 /// distance is below this fraction of `r^2`, which avoids a hard edge. At that distance 5 % of the aperture sees past a
 /// straight edge.
-pub const FADE: f32 = 0.36;
+pub const FADE_FRACTION: f32 = 0.36;
 /// A surface with less coverage than this does not fill a pixel.
-pub const OWN_COVERAGE: f32 = 0.05;
+pub const MIN_OWN_COVERAGE: f32 = 0.05;
 
 /// An occlusion boundary: a CoC discontinuity between two neighbouring pixels. It bounds the nearer surface; its
 /// distances say how far from it the background matters, in pixels, -1 if not at all.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Silhouette {
     /// Distance up to which anything farther is visible through the aperture: the radius of the nearer surface.
-    pub shows_px: f32,
+    pub visible_px: f32,
     /// Same distance if the farther surface is not in front of the subject, else -1.
-    pub shows_back_px: f32,
+    pub background_visible_px: f32,
     /// Distance up to which the hidden background matters: visible background is itself blurred.
-    pub uncovers_px: f32,
+    pub needed_px: f32,
 }
 
 /// Returns the CoC above which a pixel is not in front of the subject: layers in front begin at this radius.
 #[inline(always)]
 pub fn front_px(near_from_px: f32) -> f32 {
-    -(1.0 + HAND_OVER) * near_from_px
+    -(1.0 + CROSS_FADE) * near_from_px
 }
 
-/// Returns by how much the step to a farther CoC exceeds the step within a continuous surface ([`OTHER_FROM`]) and
-/// `min_step_px`.
+/// Returns by how much the step to a farther CoC exceeds the step within a continuous surface ([`OTHER_SURFACE_FROM`])
+/// and `min_step_px`.
 #[inline(always)]
 pub fn excess_step_px(near_px: f32, far_px: f32, min_step_px: f32) -> f32 {
-    let surface_step_px = OTHER_FROM * near_px.abs();
+    let surface_step_px = OTHER_SURFACE_FROM * near_px.abs();
     far_px - near_px - if surface_step_px > min_step_px { surface_step_px } else { min_step_px }
 }
 
@@ -68,43 +68,43 @@ pub fn excess_step_px(near_px: f32, far_px: f32, min_step_px: f32) -> f32 {
 pub const DIRECTIONS: [(i32, i32); 8] = [(1, 0), (2, 1), (1, 1), (1, 2), (0, 1), (-1, 2), (-1, 1), (-2, 1)];
 /// Longest search along a line, in steps.
 pub const MAX_STEPS: u8 = 254;
-/// CoC difference at which [`likeness`] is 0.5.
-pub const HALF_ALIKE_PX: f32 = 2.0;
+/// CoC difference at which [`coc_similarity`] is 0.5.
+pub const HALF_SIMILAR_PX: f32 = 2.0;
 /// CoC range below which all ends seen from a pixel belong to one surface; pull-push averaging is then as good.
 pub const ONE_SURFACE_PX: f32 = 1.0;
 /// Line length, in steps from end to end, up to which a line is fully trusted; the trust is 0 from twice this length
 /// on. Deep inside a large hole lines from far away intersect, and pull-push averaging has no such edges.
 pub const TRUSTED_STEPS: f32 = 12.0;
 /// A line with one end counts like one with two similar ends that is this many times as long.
-pub const ONE_ENDED: f32 = 4.0;
+pub const ONE_ENDED_FACTOR: f32 = 4.0;
 
 /// Returns the similarity of two surfaces by CoC, `1 / (1 + d^2)`: 1 if equal, towards 0 far apart.
 #[inline(always)]
-pub fn likeness(a_px: f32, b_px: f32) -> f32 {
-    let apart = (a_px - b_px) * (1.0 / HALF_ALIKE_PX);
+pub fn coc_similarity(a_px: f32, b_px: f32) -> f32 {
+    let apart = (a_px - b_px) * (1.0 / HALF_SIMILAR_PX);
     1.0 / (1.0 + apart * apart)
 }
 
 impl Silhouette {
     /// Returns the silhouette between two pixels with these CoC, if their step is at least `min_step_px` and larger
-    /// than that of a continuous surface ([`OTHER_FROM`]): quantisation of depth is no silhouette. In front of the
-    /// focal plane, layers in front begin at the radius `near_from_px`.
+    /// than that of a continuous surface ([`OTHER_SURFACE_FROM`]): quantisation of depth is no silhouette. In front of
+    /// the focal plane, layers in front begin at the radius `near_from_px`.
     #[inline(always)]
     pub fn between(a_px: f32, b_px: f32, min_step_px: f32, near_from_px: f32) -> Option<Self> {
         let (near_px, far_px) = (a_px.min(b_px), a_px.max(b_px));
-        let shows_px = near_px.abs() + MARGIN_PX;
-        let shows_back_px = if far_px > front_px(near_from_px) { shows_px } else { -1.0 };
+        let visible_px = near_px.abs() + MARGIN_PX;
+        let background_visible_px = if far_px > front_px(near_from_px) { visible_px } else { -1.0 };
         (excess_step_px(near_px, far_px, min_step_px) >= 0.0).then_some(Self {
-            shows_px,
-            shows_back_px,
-            uncovers_px: shows_px + far_px.abs(),
+            visible_px,
+            background_visible_px,
+            needed_px: visible_px + far_px.abs(),
         })
     }
 }
 
 impl Plan {
     /// Returns the bins of each layer, front to back: near bins in at most [`MAX_NEAR_LAYERS`] groups, then all
-    /// others. Each layer is inpainted where the layers in front occlude it: see [`Self::unhidden`].
+    /// others. Each layer is inpainted where the layers in front occlude it: see [`Self::visible_weight`].
     pub fn layers(&self) -> impl Iterator<Item = Range<usize>> + use<> {
         let (near, all) = (self.bins.iter().filter(|bin| bin.near).count(), self.bins.len());
         let groups = near.min(MAX_NEAR_LAYERS);
@@ -114,30 +114,30 @@ impl Plan {
 
     /// Returns the signed CoC (<= 0) above which the bins before `first` have weight 0: inpainted CoC are clamped to
     /// it.
-    pub fn nearest_behind_px(&self, first: usize) -> f32 {
-        first.checked_sub(1).map_or(f32::MIN, |front| self.bins[front].high_px * (1.0 - HAND_OVER))
+    pub fn min_inpainted_px(&self, first: usize) -> f32 {
+        first.checked_sub(1).map_or(f32::MIN, |front| self.bins[front].high_px * (1.0 - CROSS_FADE))
     }
 
     /// Returns the far end of the region in front of the subject: CoC of the last near bin's border, and slope of the
     /// cross-fade. Without near bins, a border in front of everything.
-    pub fn near_end(&self) -> (f32, f32) {
+    pub fn near_border(&self) -> (f32, f32) {
         let last = self.bins.iter().rposition(|bin| bin.near);
         last.and_then(|last| self.border(last)).unwrap_or((-1e30, 1.0))
     }
 
     /// Returns the CoC above which no bin that may contain part of a surface in front begins: the far border of the bin
     /// in focus.
-    pub fn focus_end_px(&self) -> f32 {
+    pub fn focus_border_px(&self) -> f32 {
         let focus = self.bins.iter().position(|bin| !bin.near);
-        focus.map_or(f32::MAX, |focus| self.bins[focus].high_px * (1.0 + HAND_OVER))
+        focus.map_or(f32::MAX, |focus| self.bins[focus].high_px * (1.0 + CROSS_FADE))
     }
 
     /// Returns the weight of a pixel's own content in the layer of bins from `first` on. The rest is occluded by the
-    /// near bins before it and is inpainted, if the background is a different surface ([`other_surface`]).
-    pub fn unhidden(&self, first: usize) -> BinWeight {
+    /// near bins before it and is inpainted, if the background is a different surface ([`other_surface_likelihood`]).
+    pub fn visible_weight(&self, first: usize) -> BinWeight {
         let border_px = first.checked_sub(1).map(|front| self.bins[front].high_px);
         BinWeight::new(
-            border_px.map(|at_px| (at_px * (0.5 + 0.5 * HIDDEN_FROM), 1.0 / ((1.0 - HIDDEN_FROM) * at_px))),
+            border_px.map(|at_px| (at_px * (0.5 + 0.5 * FULLY_HIDDEN_FROM), 1.0 / ((1.0 - FULLY_HIDDEN_FROM) * at_px))),
             None,
         )
     }
@@ -146,7 +146,7 @@ impl Plan {
 /// Returns how likely the inpainted background is a different surface, 0 to 1, judged by CoC. A surface that comes
 /// nearer, such as the ground, hides its own continuation, which looks like it.
 #[inline(always)]
-pub fn other_surface(own_px: f32, behind_px: f32) -> f32 {
+pub fn other_surface_likelihood(own_px: f32, behind_px: f32) -> f32 {
     let step = (own_px - behind_px) / own_px.min(-1e-3);
-    ((step - OTHER_FROM) / (OTHER_TO - OTHER_FROM)).clamp(0.0, 1.0)
+    ((step - OTHER_SURFACE_FROM) / (OTHER_SURFACE_TO - OTHER_SURFACE_FROM)).clamp(0.0, 1.0)
 }

@@ -15,17 +15,17 @@ pub struct Picture {
 
 impl Picture {
     /// Wraps a picture in memory.
-    pub fn in_memory(image: Pooled<ColorImage>) -> Self {
+    pub fn from_memory(image: Pooled<ColorImage>) -> Self {
         Self { image, in_memory: true, device: None, yuyv: None }
     }
 
     /// Wraps a picture on the device, also in memory if `in_memory`; `image` has its size in any case.
-    pub fn on_device(device: Pooled<DevicePicture>, image: Pooled<ColorImage>, in_memory: bool) -> Self {
+    pub fn from_device(device: Pooled<DevicePicture>, image: Pooled<ColorImage>, in_memory: bool) -> Self {
         Self { image, in_memory, device: Some(device), yuyv: None }
     }
 
     /// Wraps a YUYV picture; `image` has its size.
-    pub fn as_yuyv(yuyv: Pooled<YuyvImage>, image: Pooled<ColorImage>) -> Self {
+    pub fn from_yuyv(yuyv: Pooled<YuyvImage>, image: Pooled<ColorImage>) -> Self {
         Self { image, in_memory: false, device: None, yuyv: Some(yuyv) }
     }
 

@@ -1,8 +1,8 @@
 //! The plan: the bins that a picture is split into, and the scale and filters of each.
 //!
 //! Filters and memory are fixed per picture size and settings. The quality may change from frame to frame if the
-//! settings are adaptive ([`Plan::set_quality`]); the bins follow each frame's depth ([`Plan::split`]). Both executors
-//! run a frame pass by pass, under these names (the CPU's `bin` unpacks the picture itself):
+//! settings are adaptive ([`Plan::set_quality`]); the bins follow each frame's depth ([`Plan::split_by_depth`]). Both
+//! executors run a frame pass by pass, under these names (the CPU's `bin` unpacks the picture itself):
 //!
 //! 1. `unpack`: 8-bit sRGB to linear light with highlights expanded; depth to signed CoC.
 //! 2. `bin`: each pixel times its weight in every bin, premultiplied, averaged down to the bin's scale.
@@ -14,11 +14,11 @@
 
 use std::sync::Arc;
 
-use super::bank::Bank;
-use super::ladder::{Compositing, Ladder};
-use super::rung::{FOCUS_BORDER_PX, MAX_FULL_RADIUS_PX, QualityLevel, scale_within};
-pub use super::share::BinWeight;
-use super::split::{Counts, MAX_PIECES, Piece};
+use super::bank::FilterBank;
+pub use super::bin_weight::BinWeight;
+use super::ladder::{Compositing, QualityLadder};
+use super::quality_level::{FOCUS_BORDER_PX, MAX_FULL_RADIUS_PX, QualityLevel, scale_within};
+use super::split::{CocHistogram, CocRange, MAX_RANGES};
 use super::{Method, Rank, Settings};
 use crate::budget::Quality;
 use crate::frame::{DepthMap, Matte};
@@ -31,20 +31,20 @@ pub const SEGMENT: usize = 16;
 /// Largest number of bins, so that both executors can use fixed arrays.
 pub const MAX_BINS: usize = 13;
 /// A bin pixel with less coverage than this has no colour of its own.
-pub const COVERAGE_FLOOR: f32 = 1e-3;
+pub const MIN_COVERAGE: f32 = 1e-3;
 
 /// A bin with at least this weight of a nearer surface shows nothing of the surface it occludes.
 pub const HIDING_WEIGHT: f32 = 0.25;
 
 /// Coverage from which a bin counts fully when the colour of the hindmost bin is computed.
-pub const FARTHEST_COVERAGE: f32 = 0.8;
+pub const HINDMOST_COVERAGE: f32 = 0.8;
 
 /// Larger than any colour: a colour range that clamps nothing, for bins whose filters do not overshoot.
-pub const ANY_COLOR: f32 = 1e20;
+pub const UNBOUNDED_COLOR: f32 = 1e20;
 
 /// Smallest weight, per axis, of a cell within the filter support in a local radius: a radius exists wherever a filter
 /// finds content.
-pub const FAR_WEIGHT: f32 = 0.02;
+pub const MIN_CELL_WEIGHT: f32 = 0.02;
 
 /// A range of signed CoC, with the scale of its picture.
 #[derive(Clone, Debug, PartialEq)]
@@ -52,7 +52,7 @@ pub struct Bin {
     /// Lower border of the CoC, in pixels of the picture; `-inf` for the first bin.
     pub low_px: f32,
     pub high_px: f32,
-    /// A bin pixel covers `scale` x `scale` pixels of the picture: one of [`super::rung::SCALES`].
+    /// A bin pixel covers `scale` x `scale` pixels of the picture: one of [`super::quality_level::SCALES`].
     pub scale: usize,
     /// Columns of the bin's picture.
     pub width: usize,
@@ -72,7 +72,7 @@ impl Bin {
     }
 }
 
-/// The plan for frames of one size. [`Plan::split`] updates the part that depends on a frame's depth.
+/// The plan for frames of one size. [`Plan::split_by_depth`] updates the part that depends on a frame's depth.
 #[derive(Clone, Debug)]
 pub struct Plan {
     /// Columns of the picture.
@@ -81,13 +81,13 @@ pub struct Plan {
     /// How the bins are composited.
     pub compositing: Compositing,
     pub quality: Quality,
-    pub rung: QualityLevel,
+    pub level: QualityLevel,
     /// All quality levels that the plan can be set to.
-    pub ladder: Arc<Ladder>,
+    pub ladder: Arc<QualityLadder>,
     /// Front to back, by ascending CoC.
     pub bins: Vec<Bin>,
     /// Filters, in bin pixels.
-    pub bank: Arc<Bank>,
+    pub bank: Arc<FilterBank>,
     /// Index of `bank` in the ladder's banks.
     pub bank_index: usize,
     /// Highlight recovery: 1 + 1/M, or infinity when off.
@@ -101,29 +101,29 @@ pub struct Plan {
     focus_px: f32,
     /// Largest CoC radius behind and in front of the focal plane, in pixels.
     max_px: [f32; 2],
-    counts: Counts,
+    histogram: CocHistogram,
     /// Pieces behind and in front of the focal plane, each outwards.
-    pieces: [Vec<Piece>; 2],
+    ranges: [Vec<CocRange>; 2],
 }
 
 impl Plan {
     /// Plans frames of `width` x `height` pixels, at first at the quality of the settings. Radii are clamped to
     /// [`Settings::max_radius_px`].
     pub fn new(settings: &Settings, width: u32, height: u32) -> Self {
-        let settings = &settings.within((width, height));
+        let settings = &settings.with_clamped_radii((width, height));
         let compositing = match (settings.coc, settings.method) {
             (CocKind::Depth, Method::Layered) => Compositing::Layers,
             (CocKind::Depth, Method::Gather) => Compositing::Gather,
             (CocKind::Uniform | CocKind::Ramp, _) => Compositing::Select,
         };
-        let ladder = Arc::new(Ladder::new(settings, compositing));
-        let level = ladder.nearest(settings.quality);
+        let ladder = Arc::new(QualityLadder::new(settings, compositing));
+        let level = ladder.nearest_level(settings.quality);
         let mut plan = Self {
             width: width as usize,
             height: height as usize,
             compositing,
             quality: level.quality,
-            rung: level.rung,
+            level: level.level,
             bins: Vec::with_capacity(MAX_BINS),
             bank: Arc::clone(&ladder.banks[level.bank]),
             bank_index: level.bank,
@@ -134,91 +134,91 @@ impl Plan {
             full_scale: settings.rank == Some(Rank::Full),
             focus_px: settings.far_max_px.max(settings.near_max_px),
             max_px: [settings.far_max_px, settings.near_max_px],
-            counts: Counts::default(),
-            pieces: std::array::from_fn(|_| Vec::with_capacity(MAX_PIECES)),
+            histogram: CocHistogram::default(),
+            ranges: std::array::from_fn(|_| Vec::with_capacity(MAX_RANGES)),
         };
-        plan.lay_out_pieces();
+        plan.reset_bins();
         plan
     }
 
     /// Plans the next frames at another quality, or at the nearest one that the settings allow. Allocates nothing.
     pub fn set_quality(&mut self, quality: Quality) {
-        let level = self.ladder.nearest(quality);
+        let level = self.ladder.nearest_level(quality);
         if level.quality == self.quality {
             return;
         }
-        (self.quality, self.rung) = (level.quality, level.rung);
+        (self.quality, self.level) = (level.quality, level.level);
         self.bank_index = level.bank;
         self.bank = Arc::clone(&self.ladder.banks[level.bank]);
-        self.lay_out_pieces();
+        self.reset_bins();
     }
 
     /// Resets the bins to those known without a frame: of a uniform radius or a ramp. With depth there is one bin until
-    /// [`Plan::split`] has seen a frame.
-    fn lay_out_pieces(&mut self) {
+    /// [`Plan::split_by_depth`] has seen a frame.
+    fn reset_bins(&mut self) {
         let [far_px, near_px] = self.max_px;
-        let [far, near] = &mut self.pieces;
+        let [far, near] = &mut self.ranges;
         far.clear();
         near.clear();
         self.focus_px = far_px.max(near_px);
         match self.coc {
             CocKind::Ramp => {
-                far.extend(geometric_pieces(far_px, self.rung.bins_per_side));
-                self.focus_px = far.first().map_or(self.focus_px, |piece| piece.border_px);
+                far.extend(geometric_ranges(far_px, self.level.bins_per_side));
+                self.focus_px = far.first().map_or(self.focus_px, |range| range.border_px);
             }
-            CocKind::Uniform => far.push(Piece { border_px: 0.0, low_px: far_px, high_px: far_px }),
+            CocKind::Uniform => far.push(CocRange { border_px: 0.0, low_px: far_px, high_px: far_px }),
             CocKind::Depth => {}
         }
-        self.lay_out_bins();
+        self.create_bins();
     }
 
     /// Splits the CoC of a frame into bins, if the CoC follows depth and bins are layers; otherwise the bins stay.
-    pub fn split(&mut self, depth: Option<&DepthMap>, coc: &CocField) {
+    pub fn split_by_depth(&mut self, depth: Option<&DepthMap>, coc: &CocField) {
         if self.compositing != Compositing::Layers {
             return;
         }
         match (coc, depth) {
-            (CocField::Depth(lens), Some(depth)) => self.counts.count(depth, lens),
-            _ => self.counts = Counts::default(),
+            (CocField::Depth(lens), Some(depth)) => self.histogram.count_depth(depth, lens),
+            _ => self.histogram = CocHistogram::default(),
         }
-        self.lay_out_layers();
+        self.plan_layers();
     }
 
-    /// Same as [`Plan::split`], given the radius of every pixel.
-    pub fn split_radii(&mut self, coc_px: &[f32]) {
+    /// Same as [`Plan::split_by_depth`], given the radius of every pixel.
+    pub fn split_by_radii(&mut self, coc_px: &[f32]) {
         if self.compositing == Compositing::Layers {
-            self.counts.count_radii(coc_px, self.width);
-            self.lay_out_layers();
+            self.histogram.count_radii(coc_px, self.width);
+            self.plan_layers();
         }
     }
 
     /// Returns the radius in front of the focal plane below which everything belongs to the bin in focus, in pixels.
     pub fn near_from_px(&self) -> f32 {
-        self.rung.near_from_px.max(self.rung.near_from_fraction * self.max_px[0])
+        self.level.near_from_px.max(self.level.near_from_fraction * self.max_px[0])
     }
 
-    fn lay_out_layers(&mut self) {
+    fn plan_layers(&mut self) {
         let near_from_px = self.near_from_px();
-        let sides = [false, true].into_iter().zip(&mut self.pieces);
-        let inner_px = sides.map(|(near, pieces)| self.counts.pieces(near, &self.rung, near_from_px, pieces));
+        let sides = [false, true].into_iter().zip(&mut self.ranges);
+        let inner_px = sides.map(|(near, ranges)| self.histogram.split_side(near, &self.level, near_from_px, ranges));
         self.focus_px = inner_px.fold(0.0, f32::max).min(self.max_px[0].max(self.max_px[1]));
-        self.lay_out_bins();
+        self.create_bins();
     }
 
-    /// Makes the bins of the current pieces, front to back. The slot of a bin depends only on its place: 0 in focus,
+    /// Makes the bins of the current ranges, front to back. The slot of a bin depends only on its place: 0 in focus,
     /// then those behind, outwards, then those in front; every quality level uses the same order.
-    fn lay_out_bins(&mut self) {
-        let [far, near] = &self.pieces;
+    fn create_bins(&mut self) {
+        let [far, near] = &self.ranges;
         let per_side = self.ladder.max_bins_per_side();
-        let inner_px = |pieces: &[Piece]| pieces.first().map_or(f32::INFINITY, |piece| piece.border_px);
-        let outer_px = |pieces: &[Piece], k: usize| pieces.get(k + 1).map_or(f32::INFINITY, |piece| piece.border_px);
+        let inner_px = |ranges: &[CocRange]| ranges.first().map_or(f32::INFINITY, |range| range.border_px);
+        let outer_px = |ranges: &[CocRange], k: usize| ranges.get(k + 1).map_or(f32::INFINITY, |range| range.border_px);
         let bin = |(low_px, high_px): (f32, f32), content: (f32, f32), slot: usize| {
             let scale = match self.compositing {
                 Compositing::Gather => 1,
                 _ if self.full_scale => scale_within(content.1, MAX_FULL_RADIUS_PX),
                 // Uniform radius.
-                Compositing::Select if content.0 == content.1 => self.rung.uniform_scale(content.0),
-                _ => self.rung.scale(content.0, content.1),
+                Compositing::Select if content.0 == content.1 => self.level.uniform_scale(content.0),
+                _ => self.level.scale(content.0, content.1),
             };
             Bin {
                 low_px,
@@ -232,41 +232,41 @@ impl Plan {
             }
         };
         self.bins.clear();
-        for (k, piece) in near.iter().enumerate().rev() {
-            let content = (piece.low_px, piece.high_px.min(self.max_px[1]));
-            self.bins.push(bin((-outer_px(near, k), -piece.border_px), content, 1 + per_side + k));
+        for (k, range) in near.iter().enumerate().rev() {
+            let content = (range.low_px, range.high_px.min(self.max_px[1]));
+            self.bins.push(bin((-outer_px(near, k), -range.border_px), content, 1 + per_side + k));
         }
         // A uniform radius has border 0, and no pixels in focus.
         if inner_px(far) > 0.0 {
             self.bins.push(bin((-inner_px(near), inner_px(far)), (0.0, self.focus_px), 0));
         }
-        for (k, piece) in far.iter().enumerate() {
-            let content = (piece.low_px, piece.high_px.min(self.max_px[0]));
-            let low_px = if piece.border_px > 0.0 { piece.border_px } else { f32::NEG_INFINITY };
+        for (k, range) in far.iter().enumerate() {
+            let content = (range.low_px, range.high_px.min(self.max_px[0]));
+            let low_px = if range.border_px > 0.0 { range.border_px } else { f32::NEG_INFINITY };
             self.bins.push(bin((low_px, outer_px(far, k)), content, 1 + k));
         }
     }
 
     /// Whether truncation makes a bin's filters overshoot visibly. Small filters keep nearly all of their terms: a
-    /// symmetric kernel has `reach + 1`, any other `2 reach + 1`.
-    pub fn has_lobes(&self, bin: &Bin) -> bool {
-        let reach = self.bin_half_width(bin);
-        self.bank.terms < if self.bank.is_symmetric { reach } else { 2 * reach }
+    /// symmetric kernel has `half_width + 1`, any other `2 half_width + 1`.
+    pub fn has_overshoot(&self, bin: &Bin) -> bool {
+        let half_width = self.bin_half_width(bin);
+        self.bank.terms < if self.bank.is_symmetric { half_width } else { 2 * half_width }
     }
 
     /// Returns the finest scale of any bin in this slot, over all levels: layers far from focus are always reduced.
-    pub fn least_scale(&self, slot: usize) -> usize {
+    pub fn min_scale(&self, slot: usize) -> usize {
         let side = self.ladder.max_bins_per_side();
         let fine = slot == 0 || (slot - 1) % side.max(1) < self.ladder.max_fine_bins();
         if self.full_scale || fine || self.compositing != Compositing::Layers { 1 } else { 2 }
     }
 
     /// Returns the number of bin slots that an executor needs, over all levels.
-    pub fn slots(&self) -> usize {
+    pub fn slot_count(&self) -> usize {
         match self.coc {
             CocKind::Depth if self.compositing == Compositing::Gather => 1,
             CocKind::Depth => 1 + 2 * self.ladder.max_bins_per_side(),
-            CocKind::Ramp if self.pieces[0].is_empty() => 1,
+            CocKind::Ramp if self.ranges[0].is_empty() => 1,
             CocKind::Ramp => 1 + self.ladder.max_bins_per_side(),
             // The only bin is in slot 1.
             CocKind::Uniform => 2,
@@ -275,11 +275,11 @@ impl Plan {
 
     /// Returns the outermost tap of a bin's filters, in bin pixels.
     pub fn bin_half_width(&self, bin: &Bin) -> usize {
-        self.bank.node_half_width[self.bank.node(bin.max_radius_px)] as usize
+        self.bank.node_half_width[self.bank.nearest_node(bin.max_radius_px)] as usize
     }
 
     /// Returns the index of the bin in a slot, in this frame.
-    pub fn bin_in(&self, slot: usize) -> Option<usize> {
+    pub fn bin_in_slot(&self, slot: usize) -> Option<usize> {
         self.bins.iter().position(|bin| bin.slot == slot)
     }
 
@@ -296,7 +296,7 @@ impl Plan {
     }
 
     /// Returns the weight function of bin `index`.
-    pub fn share(&self, index: usize) -> BinWeight {
+    pub fn bin_weight(&self, index: usize) -> BinWeight {
         BinWeight::new(index.checked_sub(1).and_then(|front| self.border(front)), self.border(index))
     }
 
@@ -312,19 +312,19 @@ impl Plan {
     /// Returns the border between bin `index` and the bin behind it: its CoC, and 1 over the width of the cross-fade.
     pub fn border(&self, index: usize) -> Option<(f32, f32)> {
         let at = self.bins[index].high_px;
-        at.is_finite().then(|| (at, 1.0 / (2.0 * HAND_OVER * at.abs())))
+        at.is_finite().then(|| (at, 1.0 / (2.0 * CROSS_FADE * at.abs())))
     }
 }
 
 /// Half the width of the cross-fade between two bins, as a fraction of the border's CoC.
-pub(super) const HAND_OVER: f32 = 0.15;
+pub(super) const CROSS_FADE: f32 = 0.15;
 
-/// Splits the radii of a ramp into pieces of equal ratio, because the look of a blur depends on the ratio. Returns none
+/// Splits the radii of a ramp into ranges of equal ratio, because the look of a blur depends on the ratio. Returns none
 /// if the largest radius is hardly above that of the bin in focus.
-fn geometric_pieces(max_px: f32, bins: u32) -> impl Iterator<Item = Piece> {
+fn geometric_ranges(max_px: f32, bins: u32) -> impl Iterator<Item = CocRange> {
     let ratio = max_px / FOCUS_BORDER_PX;
     let border_px = move |k: u32| FOCUS_BORDER_PX * ratio.powf(k as f32 / bins as f32);
-    (0..if ratio > 1.3 { bins } else { 0 }).map(move |k| Piece {
+    (0..if ratio > 1.3 { bins } else { 0 }).map(move |k| CocRange {
         border_px: border_px(k),
         low_px: border_px(k),
         high_px: border_px(k + 1),

@@ -40,7 +40,7 @@ impl SliceBlur {
 
     /// Blurs a picture into `out`. Both have `height * width * 3` samples, 8-bit sRGB or linear light ([`Pixels`]).
     /// Highlights are recovered in 8-bit pictures only. [`Radii::Each`] needs settings whose
-    /// [`CocKind`](crate::optics::CocKind) is `Depth`. Calls `go_on` after each pass, a few times per picture; on
+    /// [`CocKind`](crate::optics::CocKind) is `Depth`. Calls `check_stop` after each pass, a few times per picture; on
     /// `Break` it stops, and `out` is unspecified.
     ///
     /// # Errors
@@ -50,7 +50,7 @@ impl SliceBlur {
         pixels: &[T],
         coc: Radii<'_>,
         out: &mut [T],
-        mut go_on: impl FnMut() -> ControlFlow<()>,
+        mut check_stop: impl FnMut() -> ControlFlow<()>,
     ) -> Result<ControlFlow<()>, BokehError> {
         let count = self.size.0 as usize * self.size.1 as usize;
         let radii = match coc {
@@ -62,7 +62,7 @@ impl SliceBlur {
         if lengths != [count * 3, count * 3, count] {
             return Err(BokehError::Lengths { size: self.size, lengths });
         }
-        let flow = self.cpu.blur_pixels(pixels, coc, out, |_| go_on());
+        let flow = self.cpu.blur_pixels(pixels, coc, out, |_| check_stop());
         if flow.is_break() {
             // The buffers hold parts of two frames now.
             self.cpu = CpuBokeh::new(Plan::new(&self.settings, self.size.0, self.size.1), self.threads);

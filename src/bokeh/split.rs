@@ -1,16 +1,16 @@
 //! Depth slicing by histogram: bin borders lie where few pixels are, so that a surface stays in one bin and two
 //! surfaces do not share one. A flat background then costs one bin, however wide the possible range.
 
-use super::rung::{FOCUS_BORDER_PX, QualityLevel};
+use super::quality_level::{FOCUS_BORDER_PX, QualityLevel};
 use crate::frame::DepthMap;
 use crate::optics::DepthCoc;
 
 /// Buckets per octave of `|c|`.
-const PER_OCTAVE: usize = 16;
+const BUCKETS_PER_OCTAVE: usize = 16;
 /// Buckets on one side of the focal plane: `|c|` from 1 px to 256 px; the last bucket holds everything beyond.
-const BUCKETS: usize = 8 * PER_OCTAVE;
+const BUCKETS: usize = 8 * BUCKETS_PER_OCTAVE;
 /// Right shift that turns the bits of a float into its bucket: exponent and top bits of the mantissa remain.
-const BUCKET_SHIFT: u32 = f32::MANTISSA_DIGITS - 1 - PER_OCTAVE.ilog2();
+const BUCKET_SHIFT: u32 = f32::MANTISSA_DIGITS - 1 - BUCKETS_PER_OCTAVE.ilog2();
 /// Shifted bits of the radius at which bucket 0 begins.
 const FIRST: u32 = FOCUS_BORDER_PX.to_bits() >> BUCKET_SHIFT;
 /// Minimum of samples across a frame with enough columns; there are less than twice this number.
@@ -23,7 +23,7 @@ const STRAY_FRACTION: f32 = 0.02;
 
 /// A range of `|c|` on one side of the focal plane that contains pixels.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Piece {
+pub struct CocRange {
     /// Border towards the focal plane, in pixels.
     pub border_px: f32,
     /// Smallest radius, in pixels, ignoring strays.
@@ -34,26 +34,26 @@ pub struct Piece {
 
 /// Histogram of a frame's CoC.
 #[derive(Clone, Debug)]
-pub struct Counts {
+pub struct CocHistogram {
     /// Samples per bucket of `|c|`, behind and in front of the focal plane; pixels in focus are in no bucket.
     sides: [[u32; BUCKETS]; 2],
     /// Number of samples, including those in focus.
     samples: u32,
 }
 
-impl Default for Counts {
+impl Default for CocHistogram {
     fn default() -> Self {
         Self { sides: [[0; BUCKETS]; 2], samples: 0 }
     }
 }
 
-impl Counts {
+impl CocHistogram {
     /// Counts the pixels of a frame on a subsampled grid.
-    pub fn count(&mut self, depth: &DepthMap, lens: &DepthCoc) {
+    pub fn count_depth(&mut self, depth: &DepthMap, lens: &DepthCoc) {
         self.count_values(&depth.metres, depth.width as usize, |metres| lens.coc_px(metres));
     }
 
-    /// Same as [`Counts::count`] for radii, `width` per row.
+    /// Same as [`CocHistogram::count_depth`] for radii, `width` per row.
     pub fn count_radii(&mut self, coc_px: &[f32], width: usize) {
         self.count_values(coc_px, width, |coc_px| coc_px);
     }
@@ -75,24 +75,24 @@ impl Counts {
         }
     }
 
-    /// Splits one side into `pieces`, outwards from the focal plane, at most one per bin of the quality level, by
+    /// Splits one side into `ranges`, outwards from the focal plane, at most one per bin of the quality level, by
     /// dynamic programming over the bucket borders. Returns the largest radius that is left to the bin in focus, in
     /// pixels; in front it keeps everything up to `near_from_px`.
-    pub fn pieces(&self, near: bool, rung: &QualityLevel, near_from_px: f32, pieces: &mut Vec<Piece>) -> f32 {
-        pieces.clear();
+    pub fn split_side(&self, near: bool, level: &QualityLevel, near_from_px: f32, ranges: &mut Vec<CocRange>) -> f32 {
+        ranges.clear();
         let side = &self.sides[usize::from(near)];
-        let bins = (rung.bins_per_side as usize).min(MAX_PIECES);
+        let bins = (level.bins_per_side as usize).min(MAX_RANGES);
         let Some(last) = side.iter().rposition(|&n| n > 0) else { return FOCUS_BORDER_PX };
         // A nose is no layer of its own: slightly defocused pixels in front belong to the subject.
-        let first = if near { near_from_px.log2() * PER_OCTAVE as f32 } else { 0.0 } as usize;
+        let first = if near { near_from_px.log2() * BUCKETS_PER_OCTAVE as f32 } else { 0.0 } as usize;
         if last < first {
-            return edge_px(last + 1);
+            return bucket_edge_px(last + 1);
         }
         // Prefix sums over the buckets of w, w ln |c| and w (ln |c|)^2, where w is the fraction of the picture. A
         // constant factor on |c| (1.04: within the bucket) changes no variance.
         let mut sums = [[0.0f64; 3]; BUCKETS + 1];
         for (k, &n) in side.iter().enumerate() {
-            let (fraction, log) = (f64::from(n) / f64::from(self.samples), (f64::from(edge_px(k)) * 1.04).ln());
+            let (fraction, log) = (f64::from(n) / f64::from(self.samples), (f64::from(bucket_edge_px(k)) * 1.04).ln());
             sums[k + 1] = [sums[k][0] + fraction, sums[k][1] + fraction * log, sums[k][2] + fraction * log * log];
         }
         // Variance of ln |c| over some buckets, times their fraction of the picture.
@@ -100,16 +100,16 @@ impl Counts {
             let [fraction, sum, squares] = std::array::from_fn(|p| sums[to][p] - sums[from][p]);
             if fraction > 0.0 { (squares - sum * sum / fraction).max(0.0) } else { 0.0 }
         };
-        // best[j][to]: smallest cost of buckets first..to in j + 1 pieces, and the start of the last piece.
-        let mut best = [[(f64::INFINITY, 0usize); BUCKETS + 1]; MAX_PIECES];
+        // best[j][to]: smallest cost of buckets first..to in j + 1 ranges, and the start of the last range.
+        let mut best = [[(f64::INFINITY, 0usize); BUCKETS + 1]; MAX_RANGES];
         for (to, best) in best[0].iter_mut().enumerate().take(last + 2).skip(first + 1) {
             *best = (variance(first, to), first);
         }
         for j in 1..bins {
             for to in first + j + 1..=last + 1 {
                 for from in first + j..to {
-                    // A piece begins with pixels. Only the first pieces may need full scale, which is expensive.
-                    if side[from] == 0 || j >= rung.fine_bins() && edge_px(from) < rung.scale_from_px[1] {
+                    // A range begins with pixels. Only the first ranges may need full scale, which is expensive.
+                    if side[from] == 0 || j >= level.fine_bins() && bucket_edge_px(from) < level.scale_from_px[1] {
                         continue;
                     }
                     let cost = best[j - 1][from].0 + variance(from, to) + BIN_COST;
@@ -119,19 +119,19 @@ impl Counts {
                 }
             }
         }
-        let last_piece = (0..bins).min_by(|&a, &b| best[a][last + 1].0.total_cmp(&best[b][last + 1].0)).unwrap_or(0);
+        let last_range = (0..bins).min_by(|&a, &b| best[a][last + 1].0.total_cmp(&best[b][last + 1].0)).unwrap_or(0);
         let mut to = last + 1;
-        for j in (0..=last_piece).rev() {
+        for j in (0..=last_range).rev() {
             let from = best[j][to].1;
-            pieces.push(self.piece(side, from, to));
+            ranges.push(self.range_of_buckets(side, from, to));
             to = from;
         }
-        pieces.reverse();
-        pieces.first().map_or(FOCUS_BORDER_PX, |piece| piece.border_px)
+        ranges.reverse();
+        ranges.first().map_or(FOCUS_BORDER_PX, |range| range.border_px)
     }
 
-    /// Returns the piece of buckets `from..to`, with its border in the empty buckets before it.
-    fn piece(&self, side: &[u32; BUCKETS], from: usize, to: usize) -> Piece {
+    /// Returns the range of buckets `from..to`, with its border in the empty buckets before it.
+    fn range_of_buckets(&self, side: &[u32; BUCKETS], from: usize, to: usize) -> CocRange {
         let total: u32 = side[from..to].iter().sum();
         let first = (from..to).find(|&k| side[k] > 0).unwrap_or(from);
         let mut strays = (STRAY_FRACTION * total as f32) as u32;
@@ -144,18 +144,18 @@ impl Counts {
         let high = (from..to).rposition(|k| side[k] > 0).map_or(from, |k| from + k);
         // The border is the geometric mean of the gap's ends, but not far out if the gap is wide.
         let gap = (0..first).rev().find(|&k| side[k] > 0).map_or(0, |k| k + 1);
-        Piece {
-            border_px: (edge_px(gap) * edge_px(first)).sqrt().min(2.5 * edge_px(gap)),
-            low_px: edge_px(low.unwrap_or(first)),
-            high_px: edge_px(high + 1),
+        CocRange {
+            border_px: (bucket_edge_px(gap) * bucket_edge_px(first)).sqrt().min(2.5 * bucket_edge_px(gap)),
+            low_px: bucket_edge_px(low.unwrap_or(first)),
+            high_px: bucket_edge_px(high + 1),
         }
     }
 }
 
-/// Largest number of pieces per side.
-pub const MAX_PIECES: usize = 6;
+/// Largest number of ranges per side.
+pub const MAX_RANGES: usize = 6;
 
 /// Returns the lower edge of a bucket, in pixels.
-fn edge_px(bucket: usize) -> f32 {
+fn bucket_edge_px(bucket: usize) -> f32 {
     f32::from_bits((FIRST + bucket as u32) << BUCKET_SHIFT)
 }

@@ -5,7 +5,7 @@ use crate::names::named;
 named! {
     /// A level of the ladder, from cheapest to finest.
     pub enum Quality default Balanced {
-        /// The floor: nothing is filled in behind near objects. A blur always stays, whatever the load.
+        /// The fastest: nothing is filled in behind near objects.
         Draft = "draft",
         /// Two bins a side, two separable terms.
         Fast = "fast",
@@ -13,7 +13,7 @@ named! {
         Balanced = "balanced",
         /// More bins and terms.
         High = "high",
-        /// As good as this method gets, at several times the cost.
+        /// The best of this method, at several times the cost.
         Best = "best",
     }
 }

@@ -11,37 +11,37 @@ const ROTATION_TOLERANCE: f64 = 1e-3;
 /// Plausible focal lengths in pixels.
 const FOCALS_PX: std::ops::Range<f64> = 1.0..1e6;
 
-fn impossible(value: Value<'_>, what: &'static str) -> CalibrationError {
-    value.refuse(Fault::Impossible { key: value.key(), what })
+fn impossible_value(value: Value<'_>, what: &'static str) -> CalibrationError {
+    value.to_error(Fault::Impossible { key: value.key(), what })
 }
 
 /// Returns focal lengths and principal point in pixels; fails if they are implausible.
-pub(super) fn pinhole(value: Value<'_>, [fu, fv, cu, cv]: [f64; 4]) -> Result<(DVec2, DVec2), CalibrationError> {
+pub(super) fn parse_pinhole(value: Value<'_>, [fu, fv, cu, cv]: [f64; 4]) -> Result<(DVec2, DVec2), CalibrationError> {
     if ![fu, fv].iter().all(|focal_px| FOCALS_PX.contains(focal_px)) {
-        return Err(impossible(value, "has a focal length that is not between 1 and a million pixels"));
+        return Err(impossible_value(value, "has a focal length that is not between 1 and a million pixels"));
     }
     if ![cu, cv].iter().all(|center_px| center_px.abs() < 1e5) {
-        return Err(impossible(value, "has a principal point that is nowhere near a picture"));
+        return Err(impossible_value(value, "has a principal point far outside the picture"));
     }
     Ok((DVec2::new(fu, fv), DVec2::new(cu, cv)))
 }
 
-/// Like [`pinhole`], from a 3x3 camera matrix.
-pub(super) fn camera_matrix(value: Value<'_>) -> Result<(DVec2, DVec2), CalibrationError> {
-    let [fu, skew, cu, zero, fv, cv, below @ ..] = value.numbers::<9>(3, "3x3")?;
+/// Like [`parse_pinhole`], from a 3x3 camera matrix.
+pub(super) fn parse_camera_matrix(value: Value<'_>) -> Result<(DVec2, DVec2), CalibrationError> {
+    let [fu, skew, cu, zero, fv, cv, below @ ..] = value.parse_numbers::<9>(3, "3x3")?;
     if skew != 0.0 || zero != 0.0 || below != [0.0, 0.0, 1.0] {
-        return Err(impossible(value, "is not of the form [fx 0 cx; 0 fy cy; 0 0 1]"));
+        return Err(impossible_value(value, "is not of the form [fx 0 cx; 0 fy cy; 0 0 1]"));
     }
-    pinhole(value, [fu, fv, cu, cv])
+    parse_pinhole(value, [fu, fv, cu, cv])
 }
 
 /// Returns the distortion with the coefficients `value`, of the lens model `model`, by default radial-tangential.
-pub(super) fn distortion(model: Option<Value<'_>>, value: Value<'_>) -> Result<Distortion, CalibrationError> {
+pub(super) fn parse_distortion(model: Option<Value<'_>>, value: Value<'_>) -> Result<Distortion, CalibrationError> {
     let name = model.map(|model| model.text()).transpose()?.unwrap_or("radial-tangential");
-    let matrix = value.matrix()?;
+    let matrix = value.parse_matrix()?;
     let wrong_size = |expected| {
         let found = (matrix.rows, matrix.cols);
-        value.refuse(Fault::Dimensions { key: value.key(), found, expected })
+        value.to_error(Fault::Dimensions { key: value.key(), found, expected })
     };
     let is_vector = matrix.rows == 1 || matrix.cols == 1;
     match name.to_ascii_lowercase().replace('_', "-").as_str() {
@@ -52,7 +52,7 @@ pub(super) fn distortion(model: Option<Value<'_>>, value: Value<'_>) -> Result<D
             // The first 8 are k1 to k6, p1 and p2; any others belong to a thin prism or a tilted sensor.
             let (used, unsupported) = matrix.data.split_at(matrix.data.len().min(8));
             if unsupported.iter().any(|&coefficient| coefficient != 0.0) {
-                return Err(value.refuse(Fault::Prism { key: value.key() }));
+                return Err(value.to_error(Fault::Prism { key: value.key() }));
             }
             let mut all = [0.0; 8];
             all[..used.len()].copy_from_slice(used);
@@ -65,50 +65,50 @@ pub(super) fn distortion(model: Option<Value<'_>>, value: Value<'_>) -> Result<D
         "none" => Ok(Distortion::RadialTangential([0.0; 8])),
         _ => {
             let model = model.unwrap_or(value);
-            let known = "radial-tangential, equidistant and none";
-            Err(model.refuse(Fault::Model { key: model.key(), found: name.into(), known }))
+            let known = "radial-tangential, equidistant or none";
+            Err(model.to_error(Fault::Model { key: model.key(), found: name.into(), known }))
         }
     }
 }
 
 /// Returns the rotation closest to nine numbers, row by row, which may have rounding errors.
-pub(super) fn rotation(value: Value<'_>, rows: &[f64; 9]) -> Result<DMat3, CalibrationError> {
+pub(super) fn parse_rotation(value: Value<'_>, rows: &[f64; 9]) -> Result<DMat3, CalibrationError> {
     let matrix = DMat3::from_cols_array(rows).transpose();
     let deviation = matrix * matrix.transpose() - DMat3::IDENTITY;
     if deviation.to_cols_array().iter().any(|part| part.abs() > ROTATION_TOLERANCE) || matrix.determinant() < 0.0 {
-        return Err(impossible(value, "is not a rotation (rows of length 1, at right angles, right-handed)"));
+        return Err(impossible_value(value, "is not a rotation (rows of length 1, at right angles, right-handed)"));
     }
     Ok(DMat3::from_quat(DQuat::from_mat3(&matrix).normalize()))
 }
 
 /// Returns a pose `x -> rotation x + translation` from a 4x4 matrix.
-pub(super) fn pose(value: Value<'_>) -> Result<(DMat3, DVec3), CalibrationError> {
-    let m = value.numbers::<16>(4, "4x4")?;
+pub(super) fn parse_pose(value: Value<'_>) -> Result<(DMat3, DVec3), CalibrationError> {
+    let m = value.parse_numbers::<16>(4, "4x4")?;
     if m[12..] != [0.0, 0.0, 0.0, 1.0] {
-        return Err(impossible(value, "does not end with the row 0 0 0 1"));
+        return Err(impossible_value(value, "does not end with the row 0 0 0 1"));
     }
-    let turned = rotation(value, &[m[0], m[1], m[2], m[4], m[5], m[6], m[8], m[9], m[10]])?;
-    Ok((turned, DVec3::new(m[3], m[7], m[11])))
+    let rotation = parse_rotation(value, &[m[0], m[1], m[2], m[4], m[5], m[6], m[8], m[9], m[10]])?;
+    Ok((rotation, DVec3::new(m[3], m[7], m[11])))
 }
 
 /// Returns columns and rows of pictures.
-pub(super) fn size(value: Value<'_>) -> Result<(u32, u32), CalibrationError> {
-    let [width, height] = value.numbers::<2>(2, "a width and a height")?;
-    Ok((side(value, width)?, side(value, height)?))
+pub(super) fn parse_size(value: Value<'_>) -> Result<(u32, u32), CalibrationError> {
+    let [width, height] = value.parse_numbers::<2>(2, "a width and a height")?;
+    Ok((parse_side(value, width)?, parse_side(value, height)?))
 }
 
 /// Returns columns or rows of pictures.
-pub(super) fn side(value: Value<'_>, number: f64) -> Result<u32, CalibrationError> {
+pub(super) fn parse_side(value: Value<'_>, number: f64) -> Result<u32, CalibrationError> {
     if number.fract() != 0.0 || !(1.0..65536.0).contains(&number) {
-        return Err(impossible(value, "is no size of pictures in whole pixels"));
+        return Err(impossible_value(value, "is not a picture size in whole pixels"));
     }
     Ok(number as u32)
 }
 
 /// Returns the `translation` between the cameras; fails if it is 0.
-pub(super) fn nonzero(value: Value<'_>, translation: DVec3) -> Result<DVec3, CalibrationError> {
+pub(super) fn require_nonzero(value: Value<'_>, translation: DVec3) -> Result<DVec3, CalibrationError> {
     if translation.length() < 1e-9 {
-        return Err(impossible(value, "puts both cameras in one place (a baseline of 0)"));
+        return Err(impossible_value(value, "puts both cameras in the same place (a baseline of 0)"));
     }
     Ok(translation)
 }

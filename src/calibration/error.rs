@@ -23,13 +23,13 @@ pub enum CalibrationError {
     )]
     Unknown(PathBuf),
     /// The number of files is wrong.
-    #[error("a calibration is one or two files, and {0} were named")]
+    #[error("a calibration consists of one or two files, but {0} were given")]
     Files(usize),
     /// EuRoC has a file per camera, and one was given.
-    #[error("{}: this is the sensor.yaml of one camera; name those of both, the left one first", .0.display())]
+    #[error("{}: this is the sensor.yaml of one camera; give those of both cameras, the left one first", .0.display())]
     OneSensor(PathBuf),
     /// An entry of a file is wrong.
-    #[error("{}: {fault}", Place(path, *line))]
+    #[error("{}: {fault}", Location(path, *line))]
     File {
         path: PathBuf,
         /// Line, from 1; 0 for the whole file.
@@ -41,10 +41,10 @@ pub enum CalibrationError {
     Numbers(#[from] Fault),
     /// The calibration is for pictures of another aspect.
     #[error(
-        "the calibration is for pictures of {}x{}, and these are {}x{}: neither the same size nor the same aspect; \
-         calibrate at this size, or record at that one", calibrated.0, calibrated.1, found.0, found.1
+        "the calibration is for pictures of {}x{}, but these are {}x{}, with another aspect ratio; calibrate at this \
+         size, or record at that one", calibrated.0, calibrated.1, found.0, found.1
     )]
-    Shape {
+    AspectRatio {
         /// Columns and rows of the calibration pictures.
         calibrated: (u32, u32),
         /// Columns and rows of the pictures.
@@ -52,7 +52,7 @@ pub enum CalibrationError {
     },
     /// The calibration does not state its picture size, and does not fit the pictures.
     #[error(
-        "the calibration names no picture size, and its principal point ({:.0}, {:.0}) is not near the middle of \
+        "the calibration states no picture size, and its principal point ({:.0}, {:.0}) is not near the middle of \
          {}x{}; add `image_size: [WIDTH, HEIGHT]` to it", center_px.0, center_px.1, found.0, found.1
     )]
     NoSize {
@@ -66,16 +66,16 @@ pub enum CalibrationError {
     Size((u32, u32)),
     /// The cameras are not side by side.
     #[error(
-        "the cameras stand {0} each other: only cameras beside each other are matched; turn the rig, or its pictures \
-         and the calibration"
+        "the cameras stand {0} each other: only cameras side by side can be matched; turn the rig, or its pictures and \
+         the calibration"
     )]
-    NotBeside(&'static str),
+    NotSideBySide(&'static str),
     /// Left and right are exchanged.
-    #[error("the calibration's left camera stands on the right; exchange the two pictures and the two cameras")]
+    #[error("the calibration's left camera stands on the right; swap the two pictures and the two cameras")]
     Swapped,
     /// The views of the cameras overlap too little.
-    #[error("the cameras look in directions that are too different: they share too little of their pictures")]
-    Apart,
+    #[error("the cameras look in too different directions: their pictures overlap too little")]
+    LittleOverlap,
 }
 
 /// Fault of an entry.
@@ -92,7 +92,7 @@ pub enum Fault {
     #[error("{key} must be {expected}")]
     Kind { key: String, expected: &'static str },
     /// The entry is not a finite number.
-    #[error("{key} holds {text:?} where a finite number belongs; calibrate again")]
+    #[error("{key} has {text:?} instead of a finite number; calibrate again")]
     NotFinite { key: String, text: String },
     /// A matrix has the wrong size.
     #[error("{key} is {}x{}, and must be {expected}", found.0, found.1)]
@@ -103,7 +103,7 @@ pub enum Fault {
         expected: &'static str,
     },
     /// The data of a matrix does not fill its rows and columns.
-    #[error("{key} says {}x{}, and holds {found} numbers", said.0, said.1)]
+    #[error("{key} says {}x{}, but has {found} numbers", said.0, said.1)]
     Data {
         key: String,
         /// Rows and columns according to the file.
@@ -119,7 +119,7 @@ pub enum Fault {
         what: &'static str,
     },
     /// The model of camera or lens is not supported.
-    #[error("{key} {found:?} is not known here; known are {known}")]
+    #[error("{key} {found:?} is not supported; use {known}")]
     Model {
         key: String,
         found: String,
@@ -128,16 +128,16 @@ pub enum Fault {
     },
     /// Coefficients of unsupported terms are not 0.
     #[error(
-        "{key} has coefficients beyond k6 (thin prism, tilt) that are not 0, which are not known here; \
-         calibrate without CALIB_THIN_PRISM_MODEL and CALIB_TILTED_MODEL"
+        "{key} has nonzero coefficients beyond k6 (thin prism, tilt), which are not supported; calibrate without \
+         CALIB_THIN_PRISM_MODEL and CALIB_TILTED_MODEL"
     )]
     Prism { key: String },
 }
 
 /// A file and an optional line, for messages.
-struct Place<'a>(&'a Path, usize);
+struct Location<'a>(&'a Path, usize);
 
-impl fmt::Display for Place<'_> {
+impl fmt::Display for Location<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let &Self(path, line) = self;
         write!(f, "{}", path.display())?;

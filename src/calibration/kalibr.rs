@@ -2,9 +2,9 @@
 //! spatial calibration for multi-sensor systems*, IROS 2013); the keys are those of Kalibr's page "YAML formats".
 
 use super::error::CalibrationError;
-use super::euroc::pinhole_only;
+use super::euroc::require_pinhole;
 use super::yaml::{File, Value};
-use super::{Eye, StereoCalibration, entries};
+use super::{CameraIntrinsics, StereoCalibration, entries};
 
 /// Remedy for a missing key.
 const HINT: &str = "name the camchain that kalibr_calibrate_cameras wrote for both cameras";
@@ -14,27 +14,27 @@ pub(super) fn from_file(file: &File) -> Result<StereoCalibration, CalibrationErr
     let cameras = [file.root().require("cam0", HINT)?, file.root().require("cam1", HINT)?];
     // From the axes of cam0 ("cn minus 1") to those of cam1.
     let pose = cameras[1].require("T_cn_cnm1", HINT)?;
-    let (rotation, translation_m) = entries::pose(pose)?;
+    let (rotation, translation_m) = entries::parse_pose(pose)?;
     Ok(StereoCalibration {
-        eyes: [eye(cameras[0])?, eye(cameras[1])?],
+        cameras: [read_camera(cameras[0])?, read_camera(cameras[1])?],
         rotation,
-        translation_m: entries::nonzero(pose, translation_m)?,
-        given: None,
+        translation_m: entries::require_nonzero(pose, translation_m)?,
+        stored_rectification: None,
         assumed_mm: false,
     })
 }
 
 /// Reads the camera under `cam0` or `cam1`.
-fn eye(camera: Value<'_>) -> Result<Eye, CalibrationError> {
-    pinhole_only(camera)?;
+fn read_camera(camera: Value<'_>) -> Result<CameraIntrinsics, CalibrationError> {
+    require_pinhole(camera)?;
     let intrinsics = camera.require("intrinsics", HINT)?;
-    let numbers = intrinsics.numbers::<4>(4, "4 numbers (fu fv pu pv)")?;
-    let (focal_px, center_px) = entries::pinhole(intrinsics, numbers)?;
+    let numbers = intrinsics.parse_numbers::<4>(4, "4 numbers (fu fv pu pv)")?;
+    let (focal_px, center_px) = entries::parse_pinhole(intrinsics, numbers)?;
     let coefficients = camera.require("distortion_coeffs", HINT)?;
-    Ok(Eye {
-        size: camera.get("resolution").map(entries::size).transpose()?,
+    Ok(CameraIntrinsics {
+        size: camera.get("resolution").map(entries::parse_size).transpose()?,
         focal_px,
         center_px,
-        distortion: entries::distortion(camera.get("distortion_model"), coefficients)?,
+        distortion: entries::parse_distortion(camera.get("distortion_model"), coefficients)?,
     })
 }

@@ -5,17 +5,17 @@
 
 use glam::{DMat2, DVec2, DVec3};
 
-use super::{Distortion, Eye};
+use super::{CameraIntrinsics, Distortion};
 
 /// Largest angle of a ray to the axis: a flat picture of wider ones would be unbounded.
 const MAX_ANGLE_DEG: f64 = 80.0;
-/// Step of the angle at which [`Distortion::reach`] samples the model.
+/// Step of the angle at which [`Distortion::max_radius`] samples the model.
 const STEP_DEG: f64 = 0.1;
 
 impl Distortion {
     /// Returns the distorted distance from the axis for the undistorted distance `radius`, both on the plane at
     /// distance 1, without the tangential part.
-    fn radial(&self, radius: f64) -> f64 {
+    fn distort_radius(&self, radius: f64) -> f64 {
         match *self {
             Self::RadialTangential([k1, k2, _, _, k3, k4, k5, k6]) => {
                 let r2 = radius * radius;
@@ -33,38 +33,38 @@ impl Distortion {
     pub fn distort(&self, point: DVec2) -> DVec2 {
         let r2 = point.length_squared();
         let radius = r2.sqrt();
-        let bent = if radius > 0.0 { point * (self.radial(radius) / radius) } else { point };
-        let Self::RadialTangential([_, _, p1, p2, ..]) = *self else { return bent };
+        let distorted = if radius > 0.0 { point * (self.distort_radius(radius) / radius) } else { point };
+        let Self::RadialTangential([_, _, p1, p2, ..]) = *self else { return distorted };
         let cross = 2.0 * point.x * point.y;
         let across = p1 * cross + p2 * (r2 + 2.0 * point.x * point.x);
         let down = p1 * (r2 + 2.0 * point.y * point.y) + p2 * cross;
-        bent + DVec2::new(across, down)
+        distorted + DVec2::new(across, down)
     }
 
     /// Returns the largest distance from the axis up to which the model is one-to-one, on the plane at distance 1:
     /// polynomials turn back beyond the rays that they were fitted to. At most that of 80 degrees.
-    pub fn reach(&self) -> f64 {
+    pub fn max_radius(&self) -> f64 {
         let radius = |step: u32| (f64::from(step) * STEP_DEG).to_radians().tan();
         let last = (MAX_ANGLE_DEG / STEP_DEG) as u32;
-        let spreads = |step: &u32| self.radial(radius(step + 1)) > self.radial(radius(*step));
+        let spreads = |step: &u32| self.distort_radius(radius(step + 1)) > self.distort_radius(radius(*step));
         radius((0..last).find(|step| !spreads(step)).unwrap_or(last))
     }
 
-    /// Inverts [`Distortion::distort`]. Points beyond `reach` are clamped to it.
-    pub fn undistort(&self, point: DVec2, reach: f64) -> DVec2 {
+    /// Inverts [`Distortion::distort`]. Points beyond `max_radius` are clamped to it.
+    pub fn undistort(&self, point: DVec2, max_radius: f64) -> DVec2 {
         let length = point.length();
         if length == 0.0 && self.distort(point) == point {
             return point;
         }
-        if length >= self.radial(reach) {
-            return point * (reach / length);
+        if length >= self.distort_radius(max_radius) {
+            return point * (max_radius / length);
         }
-        // The radial part by bisection, which always converges, to a billionth of the reach; the small tangential part
-        // by Newton's method.
-        let (mut near, mut far) = (0.0, reach);
+        // The radial part by bisection, which always converges, to a billionth of the maximum; the small tangential
+        // part by Newton's method.
+        let (mut near, mut far) = (0.0, max_radius);
         for _ in 0..30 {
             let middle = (near + far) / 2.0;
-            if self.radial(middle) < length { near = middle } else { far = middle }
+            if self.distort_radius(middle) < length { near = middle } else { far = middle }
         }
         let mut guess = if length > 0.0 { point * (near / length) } else { point };
         const DELTA: f64 = 1e-6;
@@ -82,18 +82,18 @@ impl Distortion {
     }
 }
 
-impl Eye {
+impl CameraIntrinsics {
     /// Returns the pixel that sees `point` in the camera's axes (x right, y down, z forward), also outside the picture;
-    /// `None` behind the camera and beyond the lens's `reach`.
-    pub fn project(&self, point: DVec3, reach: f64) -> Option<DVec2> {
+    /// `None` behind the camera and beyond the lens's `max_radius`.
+    pub fn project(&self, point: DVec3, max_radius: f64) -> Option<DVec2> {
         let flat = point.truncate() / point.z;
-        let is_seen = point.z > 0.0 && flat.length_squared() <= reach * reach;
+        let is_seen = point.z > 0.0 && flat.length_squared() <= max_radius * max_radius;
         is_seen.then(|| self.distortion.distort(flat) * self.focal_px + self.center_px)
     }
 
-    /// Returns the ray of a pixel, on the plane at distance 1, clamped to `reach`.
-    pub fn ray(&self, pixel_px: DVec2, reach: f64) -> DVec2 {
-        self.distortion.undistort((pixel_px - self.center_px) / self.focal_px, reach)
+    /// Returns the ray of a pixel, on the plane at distance 1, clamped to `max_radius`.
+    pub fn unproject(&self, pixel_px: DVec2, max_radius: f64) -> DVec2 {
+        self.distortion.undistort((pixel_px - self.center_px) / self.focal_px, max_radius)
     }
 }
 
@@ -111,11 +111,11 @@ mod tests {
     #[test]
     fn undistorting_is_distorting_backwards() {
         for lens in LENSES {
-            let reach = lens.reach();
+            let max_radius = lens.max_radius();
             for k in 0..200 {
-                let (radius, angle) = (f64::from(k) / 200.0 * reach.min(1.0) * 0.95, f64::from(k) * 0.7);
+                let (radius, angle) = (f64::from(k) / 200.0 * max_radius.min(1.0) * 0.95, f64::from(k) * 0.7);
                 let point = DVec2::from_angle(angle) * radius;
-                let back = lens.undistort(lens.distort(point), reach);
+                let back = lens.undistort(lens.distort(point), max_radius);
                 assert!((back - point).length() < 1e-9, "{lens:?}: {point} became {back}");
             }
         }
@@ -125,17 +125,21 @@ mod tests {
     fn the_reach_is_where_a_polynomial_turns_back() {
         // r - 0.3 r^3 grows up to 1 / sqrt(0.9).
         let barrel = Distortion::RadialTangential([-0.3, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
-        assert!((barrel.reach() - 0.9_f64.powf(-0.5)).abs() < 0.01);
-        assert!((Distortion::Equidistant([0.0; 4]).reach() - 80.0_f64.to_radians().tan()).abs() < 1e-9);
-        let beyond = barrel.undistort(DVec2::new(3.0, 0.0), barrel.reach());
-        assert_eq!(beyond, DVec2::new(barrel.reach(), 0.0));
+        assert!((barrel.max_radius() - 0.9_f64.powf(-0.5)).abs() < 0.01);
+        assert!((Distortion::Equidistant([0.0; 4]).max_radius() - 80.0_f64.to_radians().tan()).abs() < 1e-9);
+        let beyond = barrel.undistort(DVec2::new(3.0, 0.0), barrel.max_radius());
+        assert_eq!(beyond, DVec2::new(barrel.max_radius(), 0.0));
     }
 
     #[test]
     fn nobody_sees_what_is_behind() {
-        let eye =
-            Eye { size: None, focal_px: DVec2::splat(100.0), center_px: DVec2::splat(50.0), distortion: LENSES[3] };
-        assert_eq!(eye.project(DVec3::new(0.1, 0.0, -1.0), eye.distortion.reach()), None);
-        assert_eq!(eye.project(DVec3::Z, eye.distortion.reach()), Some(eye.center_px));
+        let camera = CameraIntrinsics {
+            size: None,
+            focal_px: DVec2::splat(100.0),
+            center_px: DVec2::splat(50.0),
+            distortion: LENSES[3],
+        };
+        assert_eq!(camera.project(DVec3::new(0.1, 0.0, -1.0), camera.distortion.max_radius()), None);
+        assert_eq!(camera.project(DVec3::Z, camera.distortion.max_radius()), Some(camera.center_px));
     }
 }

@@ -26,7 +26,7 @@ const RGB: usize = 3;
 /// Source positions of the pixels of a picture in another one of the same size. Sources more than half a pixel outside
 /// become black; within that margin the border pixel is used.
 #[derive(Clone, Debug)]
-pub struct Map {
+pub struct RemapTable {
     size: (u32, u32),
     /// For each pixel the index of its upper left neighbour, which has others on its right and below.
     starts: Vec<u32>,
@@ -35,7 +35,7 @@ pub struct Map {
     arch: Arch,
 }
 
-impl Map {
+impl RemapTable {
     /// Computes the map of pictures of `size` (columns, rows; each at least 2) whose pixel at `p` comes from
     /// `source(p)`; pixel centres are at integers.
     pub(super) fn new(size: (u32, u32), source: impl Fn(DVec2) -> Option<DVec2>) -> Self {
@@ -69,7 +69,7 @@ impl Map {
 
     /// Returns for each pixel the index of the upper left one of its four sources, and both fractions, for the GPU.
     #[cfg(feature = "gpu")]
-    pub(crate) fn words(&self) -> [&[u32]; 2] {
+    pub(crate) fn packed_words(&self) -> [&[u32]; 2] {
         [&self.starts, &self.fractions]
     }
 
@@ -85,44 +85,44 @@ impl Map {
     /// Resamples a colour picture into `into`, in sRGB values.
     ///
     /// # Panics
-    /// Panics if `from` does not have the size [`Map::size`].
-    pub fn color(&self, from: &ColorImage, into: &mut ColorImage) {
+    /// Panics if `from` does not have the size [`RemapTable::size`].
+    pub fn remap_color(&self, from: &ColorImage, into: &mut ColorImage) {
         into.resize(self.size.0, self.size.1);
-        self.color_rows(from, 0..self.size.1 as usize, &mut into.rgb);
+        self.remap_color_rows(from, 0..self.size.1 as usize, &mut into.rgb);
     }
 
     /// Resamples a grey picture into `into`.
     ///
     /// # Panics
-    /// Panics if `from` does not have the size [`Map::size`].
-    pub fn gray(&self, from: &GrayImage, into: &mut GrayImage) {
+    /// Panics if `from` does not have the size [`RemapTable::size`].
+    pub fn remap_gray(&self, from: &GrayImage, into: &mut GrayImage) {
         into.resize(self.size.0, self.size.1);
-        self.gray_rows(from, 0..self.size.1 as usize, &mut into.luma);
+        self.remap_gray_rows(from, 0..self.size.1 as usize, &mut into.luma);
     }
 
-    /// Resamples some rows like [`Map::color`]: `into` has their bytes.
+    /// Resamples some rows like [`RemapTable::remap_color`]: `into` has their bytes.
     ///
     /// # Panics
-    /// Panics if `from` does not have the size [`Map::size`], or if `rows` exceed it.
-    pub fn color_rows(&self, from: &ColorImage, rows: Range<usize>, into: &mut [u8]) {
+    /// Panics if `from` does not have the size [`RemapTable::size`], or if `rows` exceed it.
+    pub fn remap_color_rows(&self, from: &ColorImage, rows: Range<usize>, into: &mut [u8]) {
         assert_eq!(from.size(), self.size, "pictures are resampled at one size");
-        let (starts, fractions) = self.rows(rows);
+        let (starts, fractions) = self.row_entries(rows);
         let stride = self.size.0 as usize * RGB;
         self.arch.dispatch(Color { starts, fractions, from: &from.rgb, stride, into: into.as_chunks_mut().0 });
     }
 
-    /// Resamples some rows like [`Map::gray`]: `into` has their bytes.
+    /// Resamples some rows like [`RemapTable::remap_gray`]: `into` has their bytes.
     ///
     /// # Panics
-    /// Panics if `from` does not have the size [`Map::size`], or if `rows` exceed it.
-    pub fn gray_rows(&self, from: &GrayImage, rows: Range<usize>, into: &mut [u8]) {
+    /// Panics if `from` does not have the size [`RemapTable::size`], or if `rows` exceed it.
+    pub fn remap_gray_rows(&self, from: &GrayImage, rows: Range<usize>, into: &mut [u8]) {
         assert_eq!(from.size(), self.size, "pictures are resampled at one size");
-        let (starts, fractions) = self.rows(rows);
+        let (starts, fractions) = self.row_entries(rows);
         self.arch.dispatch(Gray { starts, fractions, from: &from.luma, stride: self.size.0 as usize, into });
     }
 
     /// Returns the starts and fractions of the pixels in `rows`.
-    fn rows(&self, rows: Range<usize>) -> (&[u32], &[u32]) {
+    fn row_entries(&self, rows: Range<usize>) -> (&[u32], &[u32]) {
         let width = self.size.0 as usize;
         let pixels = rows.start * width..rows.end * width;
         (&self.starts[pixels.clone()], &self.fractions[pixels])
@@ -131,7 +131,7 @@ impl Map {
 
 /// Returns the weights of the upper left, upper right, lower left and lower right neighbour, which sum to [`ONE`].
 #[inline(always)]
-fn weights(fractions: u32) -> [u32; 4] {
+fn bilinear_weights(fractions: u32) -> [u32; 4] {
     let (across, down) = (fractions & 0x1FF, (fractions >> DOWN_SHIFT) & 0x1FF);
     let both = (across * down + ONE / 2) / ONE;
     [ONE + both - across - down, across - both, down - both, both]
@@ -139,7 +139,7 @@ fn weights(fractions: u32) -> [u32; 4] {
 
 /// Returns a mask of all bits, or 0 for [`NOWHERE`].
 #[inline(always)]
-fn seen_mask(fractions: u32) -> u32 {
+fn inside_mask(fractions: u32) -> u32 {
     !((fractions as i32 >> 31) as u32)
 }
 
@@ -165,10 +165,10 @@ impl WithSimd for Gray<'_> {
                 *corners = u32::from_le_bytes([four[0], four[1], four[self.stride], four[self.stride + 1]]);
             }
             for ((into, &corners), &fractions) in into.iter_mut().zip(&corners).zip(fractions) {
-                let [a, b, c, d] = weights(fractions);
+                let [a, b, c, d] = bilinear_weights(fractions);
                 let upper = (corners & 0xFF) * a + (corners >> 8 & 0xFF) * b;
                 let lower = (corners >> 16 & 0xFF) * c + (corners >> 24) * d;
-                *into = (((upper + lower + ONE / 2) / ONE) & seen_mask(fractions)) as u8;
+                *into = (((upper + lower + ONE / 2) / ONE) & inside_mask(fractions)) as u8;
             }
         }
     }
@@ -202,7 +202,7 @@ impl WithSimd for Color<'_> {
             }
             let neighbours = uppers.iter().zip(&lowers).zip(fractions);
             for (pixel, ((&upper, &lower), &fractions)) in pixels.iter_mut().zip(neighbours) {
-                let [a, b, c, d] = weights(fractions);
+                let [a, b, c, d] = bilinear_weights(fractions);
                 let four = [upper as u32, (upper >> 24) as u32, lower as u32, (lower >> 24) as u32];
                 let green = (four[0] >> 8 & 0xFF) * a
                     + (four[1] >> 8 & 0xFF) * b
@@ -215,7 +215,7 @@ impl WithSimd for Color<'_> {
                 // Sums are scaled by 256. Red and blue are shifted back; green belongs 8 bits higher, so it stays.
                 let green = (green + ONE / 2) & 0xFF00;
                 let others = (others + (ONE / 2 * 0x1_0001)) >> 8 & RED_BLUE;
-                *pixel = (green | others) & seen_mask(fractions);
+                *pixel = (green | others) & inside_mask(fractions);
             }
             for (into, pixel) in into.iter_mut().zip(&pixels) {
                 let [red, green, blue, _] = pixel.to_le_bytes();

@@ -1,7 +1,8 @@
 //! Stereo calibration: intrinsics and lens of both cameras, the pose between them, and the rectification of their
 //! pictures.
 //!
-//! [`load`] reads a [`StereoCalibration`]; [`rectifier::Rectifier`] turns its pictures into a rectified pair.
+//! [`load_calibration`] reads a [`StereoCalibration`]; [`rectifier::Rectifier`] turns its pictures into a rectified
+//! pair.
 
 #[cfg(feature = "files")]
 mod entries;
@@ -38,7 +39,7 @@ pub enum Distortion {
 
 /// Intrinsics and lens of a camera.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Eye {
+pub struct CameraIntrinsics {
     /// Columns and rows of the calibration pictures; `None` if the file does not state them.
     pub size: Option<(u32, u32)>,
     /// Focal lengths along columns and rows, in pixels, > 0.
@@ -53,14 +54,14 @@ pub struct Eye {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StereoCalibration {
     /// Left, then right.
-    pub eyes: [Eye; 2],
+    pub cameras: [CameraIntrinsics; 2],
     /// Rotation from the left camera's axes to the right one's.
     pub rotation: DMat3,
     /// Position of the left camera in the right one's axes; about `(-baseline, 0, 0)`.
     pub translation_m: DVec3,
     /// The rectification that the file contains; `None` to compute it.
-    pub given: Option<Rectification>,
-    /// Whether the translation, which has no unit in the file, was longer than 2 and so taken as millimetres.
+    pub stored_rectification: Option<Rectification>,
+    /// Whether the translation, which has no unit in the file, was longer than 2, so that millimetres are assumed.
     pub assumed_mm: bool,
 }
 
@@ -74,7 +75,7 @@ const ASPECT_TOLERANCE: f64 = 0.01;
 /// # Errors
 /// Fails if a file is unreadable, of unknown format, or lacks a key, or if numbers are invalid.
 #[cfg(feature = "files")]
-pub fn load(paths: &[&Path]) -> Result<StereoCalibration, CalibrationError> {
+pub fn load_calibration(paths: &[&Path]) -> Result<StereoCalibration, CalibrationError> {
     if !(1..=2).contains(&paths.len()) {
         return Err(CalibrationError::Files(paths.len()));
     }
@@ -89,10 +90,10 @@ pub fn load(paths: &[&Path]) -> Result<StereoCalibration, CalibrationError> {
         [chain, ..] if has("cam0") || has("cam1") => return kalibr::from_file(chain),
         _ => {}
     }
-    if !opencv::is_known(&files) {
+    if !opencv::is_opencv(&files) {
         return Err(CalibrationError::Unknown(paths[0].to_owned()));
     }
-    if let (true, Some(other)) = (files.len() == 1 && opencv::is_partial(&files), companion(paths[0])) {
+    if let (true, Some(other)) = (files.len() == 1 && opencv::is_partial(&files), find_companion_file(paths[0])) {
         files.push(yaml::File::open(&other)?);
     }
     opencv::from_files(&files)
@@ -100,7 +101,7 @@ pub fn load(paths: &[&Path]) -> Result<StereoCalibration, CalibrationError> {
 
 #[cfg(feature = "files")]
 /// Returns the file beside `path` with `extrinsic` for `intrinsic` in its name, or the other way round, if it exists.
-fn companion(path: &Path) -> Option<PathBuf> {
+fn find_companion_file(path: &Path) -> Option<PathBuf> {
     let name = path.file_name()?.to_str()?;
     let other = if name.contains("intrinsic") {
         name.replace("intrinsic", "extrinsic")
@@ -113,13 +114,13 @@ fn companion(path: &Path) -> Option<PathBuf> {
 impl StereoCalibration {
     /// Returns half of the rotation between the cameras: applied in the right camera's axes, and its inverse in the
     /// left one's, it makes both look in the same direction.
-    fn half_turn(&self) -> DMat3 {
+    fn half_rotation(&self) -> DMat3 {
         DMat3::from_quat(DQuat::from_scaled_axis(DQuat::from_mat3(&self.rotation).to_scaled_axis() * -0.5))
     }
 
-    /// Returns the position of the left camera in the right one's axes after [`Self::half_turn`], in metres.
-    fn halfway_m(&self) -> DVec3 {
-        self.half_turn() * self.translation_m
+    /// Returns the position of the left camera in the right one's axes after [`Self::half_rotation`], in metres.
+    fn half_rotated_translation_m(&self) -> DVec3 {
+        self.half_rotation() * self.translation_m
     }
 
     /// Returns the distance between the cameras in metres.
@@ -129,19 +130,19 @@ impl StereoCalibration {
 
     /// Whether the left camera is on the right.
     pub fn is_swapped(&self) -> bool {
-        self.halfway_m().x > 0.0
+        self.half_rotated_translation_m().x > 0.0
     }
 
     /// Returns the same rig with left and right exchanged; the pictures must be exchanged as well.
     #[must_use]
-    pub fn exchanged(&self) -> Self {
-        let [left, right] = self.eyes;
+    pub fn with_swapped_cameras(&self) -> Self {
+        let [left, right] = self.cameras;
         let rotation = self.rotation.transpose();
         Self {
-            eyes: [right, left],
+            cameras: [right, left],
             rotation,
             translation_m: -(rotation * self.translation_m),
-            given: self.given.map(|given| given.exchanged()),
+            stored_rectification: self.stored_rectification.map(|given| given.with_swapped_cameras()),
             assumed_mm: self.assumed_mm,
         }
     }
@@ -151,15 +152,15 @@ impl StereoCalibration {
     ///
     /// # Errors
     /// Fails if the aspect differs, or the principal points are elsewhere.
-    pub fn at(&self, size: (u32, u32)) -> Result<Self, CalibrationError> {
+    pub fn scale_to(&self, size: (u32, u32)) -> Result<Self, CalibrationError> {
         let mut scaled = *self;
-        for (side, eye) in scaled.eyes.iter_mut().enumerate() {
-            let scale = eye.scale_to(size)?;
-            eye.size = Some(size);
-            eye.focal_px *= scale;
-            eye.center_px = scaled_px(eye.center_px, scale);
-            if let Some(given) = &mut scaled.given {
-                given.centers_px[side] = scaled_px(given.centers_px[side], scale);
+        for (side, camera) in scaled.cameras.iter_mut().enumerate() {
+            let scale = camera.scale_factor(size)?;
+            camera.size = Some(size);
+            camera.focal_px *= scale;
+            camera.center_px = scale_point_px(camera.center_px, scale);
+            if let Some(given) = &mut scaled.stored_rectification {
+                given.centers_px[side] = scale_point_px(given.centers_px[side], scale);
                 // Both cameras share one rectified focal length: it is scaled once.
                 if side == 0 {
                     given.focal_px *= scale;
@@ -170,15 +171,18 @@ impl StereoCalibration {
     }
 
     /// Returns the assumptions made for pictures of `size` (columns, rows), one line each for the user.
-    pub fn notes(&self, size: (u32, u32)) -> Vec<String> {
+    pub fn describe_assumptions(&self, size: (u32, u32)) -> Vec<String> {
         let mut notes = Vec::new();
         if self.assumed_mm {
             let baseline_m = self.baseline_m();
-            notes.push(format!("the calibration names no unit; taken as millimetres: a baseline of {baseline_m:.3} m"));
+            notes.push(format!(
+                "the calibration states no unit; assuming millimetres: a baseline of {baseline_m:.3} \
+                                m"
+            ));
         }
         let (width, height) = size;
-        match self.eyes[0].size {
-            None => notes.push(format!("the calibration names no picture size; taken as {width}x{height}")),
+        match self.cameras[0].size {
+            None => notes.push(format!("the calibration states no picture size; assuming {width}x{height}")),
             Some(from) if from != size => {
                 notes.push(format!("the calibration is for {}x{}; scaled to {width}x{height}", from.0, from.1));
             }
@@ -189,23 +193,23 @@ impl StereoCalibration {
 }
 
 /// Scales a point with its picture, whose edges lie half a pixel outside the border pixels' centres.
-fn scaled_px(point_px: DVec2, scale: DVec2) -> DVec2 {
+fn scale_point_px(point_px: DVec2, scale: DVec2) -> DVec2 {
     (point_px + 0.5) * scale - 0.5
 }
 
-impl Eye {
+impl CameraIntrinsics {
     /// Returns the scale along columns and rows from the calibration pictures to those of `size`; 1 if their size is
     /// unknown and may be `size`.
-    fn scale_to(&self, size: (u32, u32)) -> Result<DVec2, CalibrationError> {
+    fn scale_factor(&self, size: (u32, u32)) -> Result<DVec2, CalibrationError> {
         let sides = |(width, height): (u32, u32)| DVec2::new(f64::from(width), f64::from(height));
         let Some(calibrated) = self.size else {
-            let share = self.center_px / sides(size);
-            let is_plausible = share.min_element() >= 0.25 && share.max_element() <= 0.75;
+            let fraction = self.center_px / sides(size);
+            let is_plausible = fraction.min_element() >= 0.25 && fraction.max_element() <= 0.75;
             let refusal = CalibrationError::NoSize { center_px: self.center_px.into(), found: size };
             return if is_plausible { Ok(DVec2::ONE) } else { Err(refusal) };
         };
         let scale = sides(size) / sides(calibrated);
         let is_same = (scale.x / scale.y - 1.0).abs() <= ASPECT_TOLERANCE;
-        if is_same { Ok(scale) } else { Err(CalibrationError::Shape { calibrated, found: size }) }
+        if is_same { Ok(scale) } else { Err(CalibrationError::AspectRatio { calibrated, found: size }) }
     }
 }

@@ -6,7 +6,7 @@ use glam::{DMat3, DVec2, DVec3};
 use super::error::{CalibrationError, Fault};
 use super::rectification::Rectification;
 use super::yaml::{File, Value};
-use super::{Eye, StereoCalibration, entries};
+use super::{CameraIntrinsics, StereoCalibration, entries};
 
 /// A longer baseline must be in millimetres: no rig is that many metres wide.
 const MAX_BASELINE_M: f64 = 2.0;
@@ -49,54 +49,63 @@ const SIZE: Names = &["imagesize", "size"];
 const WIDTH: Names = &["imagewidth", "width"];
 const HEIGHT: Names = &["imageheight", "height"];
 
-fn find<'a>(files: &'a [File], names: Names) -> Option<Value<'a>> {
-    let is_it = |key: &str| names.contains(&key.to_ascii_lowercase().replace(['_', '-'], "").as_str());
-    files.iter().find_map(|file| file.root().find(is_it))
+fn find_entry<'a>(files: &'a [File], names: Names) -> Option<Value<'a>> {
+    let matches_key = |key: &str| names.contains(&key.to_ascii_lowercase().replace(['_', '-'], "").as_str());
+    files.iter().find_map(|file| file.root().find(matches_key))
 }
 
-fn require<'a>(files: &'a [File], names: Names, key: &str, hint: &'static str) -> Result<Value<'a>, CalibrationError> {
-    let missing = || files[0].root().refuse(Fault::Missing { key: key.into(), hint });
-    find(files, names).ok_or_else(missing)
+fn require_entry<'a>(
+    files: &'a [File],
+    names: Names,
+    key: &str,
+    hint: &'static str,
+) -> Result<Value<'a>, CalibrationError> {
+    let missing = || files[0].root().to_error(Fault::Missing { key: key.into(), hint });
+    find_entry(files, names).ok_or_else(missing)
 }
 
 /// Whether the files have entries of this format.
-pub(super) fn is_known(files: &[File]) -> bool {
-    CAMERAS.into_iter().chain(ROTATIONS).any(|names| find(files, names).is_some())
-        || (find(files, ROTATION).is_some() && find(files, TRANSLATION).is_some())
+pub(super) fn is_opencv(files: &[File]) -> bool {
+    CAMERAS.into_iter().chain(ROTATIONS).any(|names| find_entry(files, names).is_some())
+        || (find_entry(files, ROTATION).is_some() && find_entry(files, TRANSLATION).is_some())
 }
 
 /// Whether cameras or pose are missing, which may be in a second file.
 pub(super) fn is_partial(files: &[File]) -> bool {
-    find(files, CAMERAS[0]).is_none() || (find(files, ROTATION).is_none() && find(files, ROTATIONS[0]).is_none())
+    find_entry(files, CAMERAS[0]).is_none()
+        || (find_entry(files, ROTATION).is_none() && find_entry(files, ROTATIONS[0]).is_none())
 }
 
 /// Reads the calibration in `files`, at least one. The pose is R and T, or else computed from R1 R2 P1 P2; if both are
 /// present they must agree.
 pub(super) fn from_files(files: &[File]) -> Result<StereoCalibration, CalibrationError> {
-    let size = size(files)?;
-    let eyes = [eye(files, 0, size)?, eye(files, 1, size)?];
-    let mut given = given_rectification(files)?;
+    let size = read_size(files)?;
+    let cameras = [read_camera(files, 0, size)?, read_camera(files, 1, size)?];
+    let mut given = read_rectification(files)?;
     let (rotation, translation) = match given {
-        Some((ref given, shift)) if find(files, ROTATION).is_none() => {
+        Some((ref given, shift)) if find_entry(files, ROTATION).is_none() => {
             // From the left camera to the rectified axes, and on to the right camera.
             let rectified_to_right = given.rotations[1].transpose();
             (rectified_to_right * given.rotations[0], rectified_to_right * DVec3::new(shift, 0.0, 0.0))
         }
         _ => {
-            let rotation = require(files, ROTATION, "R", POSE_HINT)?;
-            let place = require(files, TRANSLATION, "T", POSE_HINT)?;
-            let translation = DVec3::from_array(place.numbers::<3>(3, "3x1")?);
-            (entries::rotation(rotation, &rotation.numbers::<9>(3, "3x3")?)?, entries::nonzero(place, translation)?)
+            let rotation = require_entry(files, ROTATION, "R", POSE_HINT)?;
+            let place = require_entry(files, TRANSLATION, "T", POSE_HINT)?;
+            let translation = DVec3::from_array(place.parse_numbers::<3>(3, "3x1")?);
+            (
+                entries::parse_rotation(rotation, &rotation.parse_numbers::<9>(3, "3x3")?)?,
+                entries::require_nonzero(place, translation)?,
+            )
         }
     };
     if let Some((given, shift)) = &given {
-        let turn_error = given.rotations[1] * rotation - given.rotations[0];
+        let rotation_error = given.rotations[1] * rotation - given.rotations[0];
         let shift_error = given.rotations[1] * translation - DVec3::new(*shift, 0.0, 0.0);
-        let is_same = turn_error.to_cols_array().iter().all(|part| part.abs() < POSE_TOLERANCE);
+        let is_same = rotation_error.to_cols_array().iter().all(|part| part.abs() < POSE_TOLERANCE);
         if !is_same || shift_error.length() > POSE_TOLERANCE * translation.length() {
-            let value = require(files, ROTATIONS[1], "R2", POSE_HINT)?;
-            let what = "does not belong to R and T: R2 R must be R1, and R2 T along the columns by P2";
-            return Err(value.refuse(Fault::Impossible { key: value.key(), what }));
+            let value = require_entry(files, ROTATIONS[1], "R2", POSE_HINT)?;
+            let what = "does not match R and T: R2 R must equal R1, and R2 T must be the shift of P2 along the columns";
+            return Err(value.to_error(Fault::Impossible { key: value.key(), what }));
         }
     }
     let assumed_mm = translation.length() > MAX_BASELINE_M;
@@ -105,28 +114,33 @@ pub(super) fn from_files(files: &[File]) -> Result<StereoCalibration, Calibratio
         given.baseline_m *= unit_m;
     }
     Ok(StereoCalibration {
-        eyes,
+        cameras,
         rotation,
         translation_m: translation * unit_m,
-        given: given.map(|(given, _)| given),
+        stored_rectification: given.map(|(given, _)| given),
         assumed_mm,
     })
 }
 
 /// Returns columns and rows of the pictures, from either spelling; `None` if the files do not state them.
-fn size(files: &[File]) -> Result<Option<(u32, u32)>, CalibrationError> {
-    if let (Some(width), Some(height)) = (find(files, WIDTH), find(files, HEIGHT)) {
-        let side = |value: Value<'_>| entries::side(value, value.count()?.into());
+fn read_size(files: &[File]) -> Result<Option<(u32, u32)>, CalibrationError> {
+    if let (Some(width), Some(height)) = (find_entry(files, WIDTH), find_entry(files, HEIGHT)) {
+        let side = |value: Value<'_>| entries::parse_side(value, value.parse_count()?.into());
         return Ok(Some((side(width)?, side(height)?)));
     }
-    find(files, SIZE).map(entries::size).transpose()
+    find_entry(files, SIZE).map(entries::parse_size).transpose()
 }
 
-fn eye(files: &[File], side: usize, size: Option<(u32, u32)>) -> Result<Eye, CalibrationError> {
-    let camera = require(files, CAMERAS[side], ["M1", "M2"][side], CAMERA_HINT)?;
-    let (focal_px, center_px) = entries::camera_matrix(camera)?;
-    let lens = require(files, LENSES[side], ["D1", "D2"][side], LENS_HINT)?;
-    Ok(Eye { size, focal_px, center_px, distortion: entries::distortion(find(files, MODEL), lens)? })
+fn read_camera(files: &[File], side: usize, size: Option<(u32, u32)>) -> Result<CameraIntrinsics, CalibrationError> {
+    let camera = require_entry(files, CAMERAS[side], ["M1", "M2"][side], CAMERA_HINT)?;
+    let (focal_px, center_px) = entries::parse_camera_matrix(camera)?;
+    let lens = require_entry(files, LENSES[side], ["D1", "D2"][side], LENS_HINT)?;
+    Ok(CameraIntrinsics {
+        size,
+        focal_px,
+        center_px,
+        distortion: entries::parse_distortion(find_entry(files, MODEL), lens)?,
+    })
 }
 
 /// P1 or P2, decomposed.
@@ -138,38 +152,40 @@ struct Projection<'a> {
     shift: DVec2,
 }
 
-fn projection(files: &[File], side: usize) -> Result<Projection<'_>, CalibrationError> {
-    let value = require(files, PROJECTIONS[side], ["P1", "P2"][side], POSE_HINT)?;
-    let [fx, _, cx, across, _, fy, cy, down, ..] = value.numbers::<12>(3, "3x4")?;
-    let (focal_px, center_px) = entries::pinhole(value, [fx, fy, cx, cy])?;
+fn read_projection(files: &[File], side: usize) -> Result<Projection<'_>, CalibrationError> {
+    let value = require_entry(files, PROJECTIONS[side], ["P1", "P2"][side], POSE_HINT)?;
+    let [fx, _, cx, across, _, fy, cy, down, ..] = value.parse_numbers::<12>(3, "3x4")?;
+    let (focal_px, center_px) = entries::parse_pinhole(value, [fx, fy, cx, cy])?;
     Ok(Projection { value, focal_px, center_px, shift: DVec2::new(across, down) })
 }
 
 /// Reads the rectification R1 R2 P1 P2, and the position of the left camera along the rows of the right one, in the
 /// file's unit; `None` if all four are missing.
-fn given_rectification(files: &[File]) -> Result<Option<(Rectification, f64)>, CalibrationError> {
-    if ROTATIONS.into_iter().chain(PROJECTIONS).all(|names| find(files, names).is_none()) {
+fn read_rectification(files: &[File]) -> Result<Option<(Rectification, f64)>, CalibrationError> {
+    if ROTATIONS.into_iter().chain(PROJECTIONS).all(|names| find_entry(files, names).is_none()) {
         return Ok(None);
     }
-    let turn = |side: usize| {
-        let value = require(files, ROTATIONS[side], ["R1", "R2"][side], POSE_HINT)?;
-        entries::rotation(value, &value.numbers::<9>(3, "3x3")?)
+    let read_rotation = |side: usize| {
+        let value = require_entry(files, ROTATIONS[side], ["R1", "R2"][side], POSE_HINT)?;
+        entries::parse_rotation(value, &value.parse_numbers::<9>(3, "3x3")?)
     };
-    let rotations: [DMat3; 2] = [turn(0)?, turn(1)?];
-    let [left, right] = [projection(files, 0)?, projection(files, 1)?];
+    let rotations: [DMat3; 2] = [read_rotation(0)?, read_rotation(1)?];
+    let [left, right] = [read_projection(files, 0)?, read_projection(files, 1)?];
     let (focal_px, left_px, right_px) = (left.focal_px, left.center_px, right.center_px);
     let value = right.value;
-    let impossible = |what| value.refuse(Fault::Impossible { key: value.key(), what });
+    let impossible = |what| value.to_error(Fault::Impossible { key: value.key(), what });
     if right.shift.y.abs() > right.shift.x.abs() {
-        return Err(CalibrationError::NotBeside("above"));
+        return Err(CalibrationError::NotSideBySide("above"));
     }
     // P2's fourth column is in pixels: focal length times translation.
     let shift = right.shift.x / focal_px.x;
     if shift.abs() < 1e-9 {
-        return Err(impossible("puts both cameras in one place (a baseline of 0)"));
+        return Err(impossible("puts both cameras in the same place (a baseline of 0)"));
     }
     if (focal_px - right.focal_px).abs().max_element() > 1e-3 * focal_px.x || (left_px.y - right_px.y).abs() > 0.01 {
-        return Err(impossible("is not of one rectified pair with P1: focal lengths and rows must be the same"));
+        return Err(impossible(
+            "is not the partner of P1 in a rectified pair: focal lengths and rows must be the same",
+        ));
     }
     let centers_px = [left_px, right_px];
     Ok(Some((Rectification { rotations, focal_px, centers_px, baseline_m: shift.abs() }, shift)))

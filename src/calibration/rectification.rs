@@ -6,7 +6,7 @@
 
 use glam::{DMat3, DQuat, DVec2, DVec3};
 
-use super::{CalibrationError, Eye, Fault, StereoCalibration};
+use super::{CalibrationError, CameraIntrinsics, Fault, StereoCalibration};
 use crate::optics::StereoRig;
 
 /// Minimum ratio of the rectified focal length to the cameras' own: a fisheye's rim is cropped before its centre loses
@@ -42,40 +42,44 @@ impl Rectification {
     /// # Errors
     /// Fails if the pictures have another aspect; if the cameras are swapped, not side by side, or look in too
     /// different directions; or if numbers are invalid.
-    pub fn of(calibration: &StereoCalibration, size: (u32, u32)) -> Result<Self, CalibrationError> {
-        let calibration = calibration.at(size)?;
-        let halfway_m = calibration.halfway_m();
+    pub fn from_calibration(calibration: &StereoCalibration, size: (u32, u32)) -> Result<Self, CalibrationError> {
+        let calibration = calibration.scale_to(size)?;
+        let translation_m = calibration.half_rotated_translation_m();
         let impossible = |key: &str, what| Fault::Impossible { key: key.into(), what };
-        if !halfway_m.is_finite() || halfway_m.length() < 1e-9 {
-            return Err(impossible("the translation", "puts both cameras in one place").into());
+        if !translation_m.is_finite() || translation_m.length() < 1e-9 {
+            return Err(impossible("the translation", "puts both cameras in the same place").into());
         }
-        if calibration.eyes.iter().any(|eye| !(eye.focal_px.is_finite() && eye.focal_px.min_element() > 0.0)) {
+        if calibration
+            .cameras
+            .iter()
+            .any(|camera| !(camera.focal_px.is_finite() && camera.focal_px.min_element() > 0.0))
+        {
             return Err(impossible("the focal length", "is not above 0").into());
         }
-        if halfway_m.y.abs() > halfway_m.x.abs() {
-            return Err(CalibrationError::NotBeside("above"));
+        if translation_m.y.abs() > translation_m.x.abs() {
+            return Err(CalibrationError::NotSideBySide("above"));
         }
-        if halfway_m.z.abs() > halfway_m.x.abs() {
-            return Err(CalibrationError::NotBeside("behind"));
+        if translation_m.z.abs() > translation_m.x.abs() {
+            return Err(CalibrationError::NotSideBySide("behind"));
         }
         if calibration.is_swapped() {
             return Err(CalibrationError::Swapped);
         }
-        if let Some(given) = calibration.given {
+        if let Some(given) = calibration.stored_rectification {
             return Ok(given);
         }
-        let half_turn = calibration.half_turn();
+        let half_rotation = calibration.half_rotation();
         // In the right camera's axes the left camera then lies along -x.
-        let onto_rows = DMat3::from_quat(DQuat::from_rotation_arc(halfway_m.normalize(), DVec3::NEG_X));
-        let rotations = [onto_rows * half_turn.transpose(), onto_rows * half_turn];
-        let (focal_px, center_px) = common_window(&calibration.eyes, &rotations, size)?;
+        let onto_rows = DMat3::from_quat(DQuat::from_rotation_arc(translation_m.normalize(), DVec3::NEG_X));
+        let rotations = [onto_rows * half_rotation.transpose(), onto_rows * half_rotation];
+        let (focal_px, center_px) = find_common_window(&calibration.cameras, &rotations, size)?;
         let focal_px = DVec2::splat(focal_px);
         Ok(Self { rotations, focal_px, centers_px: [center_px; 2], baseline_m: calibration.baseline_m() })
     }
 
     /// Returns the rectification with left and right exchanged.
     #[must_use]
-    pub fn exchanged(&self) -> Self {
+    pub fn with_swapped_cameras(&self) -> Self {
         let ([left, right], [left_px, right_px]) = (self.rotations, self.centers_px);
         Self { rotations: [right, left], centers_px: [right_px, left_px], ..*self }
     }
@@ -92,7 +96,7 @@ impl Rectification {
     }
 
     /// Returns the direction of a pixel of a rectified picture (0 left, 1 right), in that camera's own axes.
-    pub fn direction(&self, side: usize, pixel_px: DVec2) -> DVec3 {
+    pub fn pixel_direction(&self, side: usize, pixel_px: DVec2) -> DVec3 {
         let flat = (pixel_px - self.centers_px[side]) / self.focal_px;
         self.rotations[side].transpose() * flat.extend(1.0)
     }
@@ -100,14 +104,18 @@ impl Rectification {
 
 /// Returns focal length and principal point, in pixels, of the largest window of the pictures' aspect within both
 /// views.
-fn common_window(eyes: &[Eye; 2], rotations: &[DMat3; 2], size: (u32, u32)) -> Result<(f64, DVec2), CalibrationError> {
+fn find_common_window(
+    cameras: &[CameraIntrinsics; 2],
+    rotations: &[DMat3; 2],
+    size: (u32, u32),
+) -> Result<(f64, DVec2), CalibrationError> {
     let last_px = DVec2::new(f64::from(size.0) - 1.0, f64::from(size.1) - 1.0);
     // Corners of the window on the rectified plane at distance 1: no border point of either picture may lie inside.
     let (mut low, mut high) = (DVec2::NEG_INFINITY, DVec2::INFINITY);
-    for (eye, rotation) in eyes.iter().zip(rotations) {
-        let reach = eye.distortion.reach();
+    for (camera, rotation) in cameras.iter().zip(rotations) {
+        let max_radius = camera.distortion.max_radius();
         let rectified = |pixel_px: DVec2| {
-            let direction = *rotation * eye.ray(pixel_px, reach).extend(1.0);
+            let direction = *rotation * camera.unproject(pixel_px, max_radius).extend(1.0);
             direction.truncate() / direction.z.max(MIN_RAY_Z)
         };
         for k in 0..=BORDER_POINTS {
@@ -119,11 +127,11 @@ fn common_window(eyes: &[Eye; 2], rotations: &[DMat3; 2], size: (u32, u32)) -> R
         }
     }
     let extent = high - low;
-    let mean_focal_px = eyes.iter().map(|eye| eye.focal_px.element_sum()).sum::<f64>() / 4.0;
+    let mean_focal_px = cameras.iter().map(|camera| camera.focal_px.element_sum()).sum::<f64>() / 4.0;
     // The focal length at which the picture just fits into the extent.
     let needed_px = (last_px / extent).max_element();
     if extent.min_element() <= 0.0 || needed_px > mean_focal_px * MAX_FOCAL_RATIO {
-        return Err(CalibrationError::Apart);
+        return Err(CalibrationError::LittleOverlap);
     }
     let focal_px = needed_px.max(mean_focal_px * MIN_FOCAL_RATIO);
     // Maps the window's centre to the picture's centre.

@@ -1,6 +1,6 @@
 //! Rectifies the pictures of both cameras, frame by frame.
 
-use super::map::Map;
+use super::map::RemapTable;
 use super::rectification::Rectification;
 use super::{CalibrationError, StereoCalibration};
 use crate::frame::{ColorImage, GrayImage};
@@ -13,24 +13,24 @@ const SIDES_PX: std::ops::RangeInclusive<u32> = 2..=16384;
 #[derive(Clone, Debug)]
 pub struct Rectifier {
     rectification: Rectification,
-    maps: [Map; 2],
+    maps: [RemapTable; 2],
 }
 
 impl Rectifier {
     /// Computes the maps of a calibration for pictures of `size` (columns, rows).
     ///
     /// # Errors
-    /// Fails like [`Rectification::of`], or if a side is outside 2 to 16384 pixels.
+    /// Fails like [`Rectification::from_calibration`], or if a side is outside 2 to 16384 pixels.
     pub fn new(calibration: &StereoCalibration, size: (u32, u32)) -> Result<Self, CalibrationError> {
         if ![size.0, size.1].iter().all(|side| SIDES_PX.contains(side)) {
             return Err(CalibrationError::Size(size));
         }
-        let rectification = Rectification::of(calibration, size)?;
-        let eyes = calibration.at(size)?.eyes;
+        let rectification = Rectification::from_calibration(calibration, size)?;
+        let cameras = calibration.scale_to(size)?.cameras;
         let maps = [0, 1].map(|side| {
-            let eye = &eyes[side];
-            let reach = eye.distortion.reach();
-            Map::new(size, |pixel_px| eye.project(rectification.direction(side, pixel_px), reach))
+            let camera = &cameras[side];
+            let max_radius = camera.distortion.max_radius();
+            RemapTable::new(size, |pixel_px| camera.project(rectification.pixel_direction(side, pixel_px), max_radius))
         });
         Ok(Self { rectification, maps })
     }
@@ -52,7 +52,7 @@ impl Rectifier {
 
     /// Returns the maps of the left and of the right rectified picture, for other kinds of pictures, and for parts of
     /// pictures on several threads.
-    pub fn maps(&self) -> &[Map; 2] {
+    pub fn maps(&self) -> &[RemapTable; 2] {
         &self.maps
     }
 
@@ -60,15 +60,15 @@ impl Rectifier {
     ///
     /// # Panics
     /// Panics if `from` does not have the size [`Rectifier::size`].
-    pub fn left(&self, from: &ColorImage, into: &mut ColorImage) {
-        self.maps[0].color(from, into);
+    pub fn rectify_left(&self, from: &ColorImage, into: &mut ColorImage) {
+        self.maps[0].remap_color(from, into);
     }
 
     /// Rectifies the right picture into `into`.
     ///
     /// # Panics
     /// Panics if `from` does not have the size [`Rectifier::size`].
-    pub fn right(&self, from: &GrayImage, into: &mut GrayImage) {
-        self.maps[1].gray(from, into);
+    pub fn rectify_right(&self, from: &GrayImage, into: &mut GrayImage) {
+        self.maps[1].remap_gray(from, into);
     }
 }

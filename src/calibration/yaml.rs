@@ -90,7 +90,7 @@ fn parse_tree(text: &str) -> Result<Node, (usize, String)> {
                 Some(node) => node,
                 None => continue,
             },
-            Event::Alias(_) => return Err((line, "aliases are not known here; write the value out".into())),
+            Event::Alias(_) => return Err((line, "aliases are not supported; write the value out".into())),
             Event::DocumentEnd => break,
             _ => continue,
         };
@@ -122,7 +122,7 @@ pub(super) struct Value<'a> {
 
 impl<'a> Value<'a> {
     /// Returns the error for `fault` in this file and line.
-    pub fn refuse(&self, fault: Fault) -> CalibrationError {
+    pub fn to_error(self, fault: Fault) -> CalibrationError {
         CalibrationError::File { path: self.path.to_owned(), line: self.line, fault }
     }
 
@@ -131,10 +131,10 @@ impl<'a> Value<'a> {
         self.key.to_owned()
     }
 
-    /// Returns the entry whose key satisfies `is_it`.
-    pub fn find(&self, is_it: impl Fn(&str) -> bool) -> Option<Value<'a>> {
+    /// Returns the entry whose key satisfies `matches_key`.
+    pub fn find(&self, matches_key: impl Fn(&str) -> bool) -> Option<Value<'a>> {
         let Kind::Map(map) = self.kind else { return None };
-        let (key, node) = map.iter().find(|(key, _)| is_it(key))?;
+        let (key, node) = map.iter().find(|(key, _)| matches_key(key))?;
         Some(Value { path: self.path, key, line: node.line, kind: &node.kind })
     }
 
@@ -145,32 +145,32 @@ impl<'a> Value<'a> {
 
     /// Returns the entry `key`; `hint` is the remedy if it is missing.
     pub fn require(&self, key: &str, hint: &'static str) -> Result<Value<'a>, CalibrationError> {
-        self.get(key).ok_or_else(|| self.refuse(Fault::Missing { key: key.into(), hint }))
+        self.get(key).ok_or_else(|| self.to_error(Fault::Missing { key: key.into(), hint }))
     }
 
-    fn wrong_kind(&self, expected: &'static str) -> CalibrationError {
-        self.refuse(Fault::Kind { key: self.key(), expected })
+    fn type_error(&self, expected: &'static str) -> CalibrationError {
+        self.to_error(Fault::Kind { key: self.key(), expected })
     }
 
     pub fn text(&self) -> Result<&'a str, CalibrationError> {
         match self.kind {
             Kind::Scalar(text) => Ok(text),
-            _ => Err(self.wrong_kind("one word")),
+            _ => Err(self.type_error("one word")),
         }
     }
 
-    fn number(&self) -> Result<f64, CalibrationError> {
-        let Kind::Scalar(text) = self.kind else { return Err(self.wrong_kind("a list of numbers")) };
+    fn parse_number(&self) -> Result<f64, CalibrationError> {
+        let Kind::Scalar(text) = self.kind else { return Err(self.type_error("a list of numbers")) };
         let number = text.parse().ok().filter(|number: &f64| number.is_finite());
         number.ok_or_else(|| {
             let short = text.chars().take(20).collect();
-            self.refuse(Fault::NotFinite { key: self.key(), text: short })
+            self.to_error(Fault::NotFinite { key: self.key(), text: short })
         })
     }
 
     /// Returns an integer >= 0.
-    pub fn count(&self) -> Result<u32, CalibrationError> {
-        self.text()?.trim_end_matches(".0").parse().map_err(|_| self.wrong_kind("a whole number"))
+    pub fn parse_count(&self) -> Result<u32, CalibrationError> {
+        self.text()?.trim_end_matches(".0").parse().map_err(|_| self.type_error("a whole number"))
     }
 
     fn items(&self) -> Option<impl Iterator<Item = Value<'a>>> {
@@ -180,32 +180,32 @@ impl<'a> Value<'a> {
     }
 
     /// Returns a matrix from `rows`, `cols` and `data`; from a list of rows; or from a list of numbers, as one column.
-    pub fn matrix(&self) -> Result<Matrix, CalibrationError> {
+    pub fn parse_matrix(&self) -> Result<Matrix, CalibrationError> {
         if let Kind::Map(_) = self.kind {
-            let side = |key| self.require(key, "a matrix has rows, cols and data")?.count();
+            let side = |key| self.require(key, "a matrix has rows, cols and data")?.parse_count();
             let (rows, cols) = (side("rows")? as usize, side("cols")? as usize);
             let data = self.require("data", "a matrix has rows, cols and data")?;
             // Keeps the matrix's own key for messages.
-            let data = Value { key: self.key, ..data }.matrix()?.data;
+            let data = Value { key: self.key, ..data }.parse_matrix()?.data;
             if rows.checked_mul(cols) != Some(data.len()) {
-                return Err(self.refuse(Fault::Data { key: self.key(), said: (rows, cols), found: data.len() }));
+                return Err(self.to_error(Fault::Data { key: self.key(), said: (rows, cols), found: data.len() }));
             }
             return Ok(Matrix { rows, cols, data });
         }
         let mut matrix = Matrix { rows: 0, cols: 1, data: Vec::new() };
-        for item in self.items().ok_or_else(|| self.wrong_kind("a matrix or a list of numbers"))? {
+        for item in self.items().ok_or_else(|| self.type_error("a matrix or a list of numbers"))? {
             let before = matrix.data.len();
             match item.items() {
                 Some(row) => {
                     for number in row {
-                        matrix.data.push(number.number()?);
+                        matrix.data.push(number.parse_number()?);
                     }
                 }
-                None => matrix.data.push(item.number()?),
+                None => matrix.data.push(item.parse_number()?),
             }
             let cols = matrix.data.len() - before;
             if matrix.rows > 0 && cols != matrix.cols {
-                return Err(self.wrong_kind("a matrix with rows of one length"));
+                return Err(self.type_error("a matrix with rows of one length"));
             }
             (matrix.rows, matrix.cols) = (matrix.rows + 1, cols);
         }
@@ -213,9 +213,13 @@ impl<'a> Value<'a> {
     }
 
     /// Returns exactly `N` numbers of a matrix with `rows` rows.
-    pub fn numbers<const N: usize>(&self, rows: usize, expected: &'static str) -> Result<[f64; N], CalibrationError> {
-        let Matrix { rows: found, cols, data } = self.matrix()?;
-        let wrong = || self.refuse(Fault::Dimensions { key: self.key(), found: (found, cols), expected });
+    pub fn parse_numbers<const N: usize>(
+        &self,
+        rows: usize,
+        expected: &'static str,
+    ) -> Result<[f64; N], CalibrationError> {
+        let Matrix { rows: found, cols, data } = self.parse_matrix()?;
+        let wrong = || self.to_error(Fault::Dimensions { key: self.key(), found: (found, cols), expected });
         // Accepts row and column vectors.
         let fits = found == rows || (rows == N && found == 1);
         data.try_into().ok().filter(|_| fits).ok_or_else(wrong)

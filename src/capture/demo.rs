@@ -8,7 +8,7 @@ use std::io::Cursor;
 
 use image::{DynamicImage, ImageFormat, ImageReader};
 
-use super::{Brings, Camera, CaptureError, Captured, Shot, SourceInfo};
+use super::{Camera, CaptureError, Captured, FrameBuffers, FrameData, SourceInfo};
 use crate::frame::Stamp;
 
 /// Name on the command line.
@@ -74,7 +74,7 @@ impl Layout {
 
     /// Iterates over the rows of the tiles, [`TILE_PX`] pixels each: the indices of their first pixels among the packed
     /// tiles and in the picture.
-    pub fn runs(&self) -> impl Iterator<Item = [usize; 2]> {
+    pub fn tile_rows(&self) -> impl Iterator<Item = [usize; 2]> {
         let width = SIZE_PX.0;
         self.moving.iter().zip(0..).flat_map(move |(&[column, row], tile)| {
             let start = TILE_PX * tile;
@@ -87,13 +87,13 @@ impl Layout {
 }
 
 /// Quantizes a depth in metres to a level: uniform steps of inverse depth, 0.0086 per metre.
-pub fn level(z_m: f32) -> u8 {
+pub fn quantize_depth(z_m: f32) -> u8 {
     let [far, near] = RANGE_M.map(f32::recip);
     ((z_m.recip() - far) / (near - far) * 255.0).round() as u8
 }
 
 /// Returns the depth of a level, in metres.
-pub fn metres(level: u8) -> f32 {
+pub fn depth_of_level_m(level: u8) -> f32 {
     let [far, near] = RANGE_M.map(f32::recip);
     (far + (near - far) * f32::from(level) / 255.0).recip()
 }
@@ -113,11 +113,11 @@ impl Demo {
         }
         let base = Pixels::decode(color[0], depth[0], SIZE_PX)?;
         let tiles = (0..FRAMES).map(|_| None).collect();
-        let metres = std::array::from_fn(|level| metres(level as u8));
+        let metres = std::array::from_fn(|level| depth_of_level_m(level as u8));
         Ok(Self { layout, color, depth, base, tiles, metres, frames, position: 0 })
     }
 
-    fn at_end(&self) -> bool {
+    fn is_at_end(&self) -> bool {
         self.frames.is_some_and(|frames| self.position >= frames)
     }
 }
@@ -145,7 +145,7 @@ fn decode_image(file: &[u8], format: ImageFormat) -> Result<DynamicImage, Captur
     decoded.map_err(|error| CaptureError::Demo(error.to_string()))
 }
 
-fn time_ns(position: u64) -> u64 {
+fn frame_time_ns(position: u64) -> u64 {
     (position as f64 / f64::from(FRAMES_PER_SECOND) * 1e9).round() as u64
 }
 
@@ -154,15 +154,15 @@ impl Camera for Demo {
         SourceInfo {
             name: NAME.into(),
             size: SIZE_PX,
-            period_ns: time_ns(1),
+            period_ns: frame_time_ns(1),
             frames: self.frames,
             live: false,
-            brings: Brings::Depth,
+            frame_data: FrameData::Depth,
         }
     }
 
-    fn next(&mut self, Shot { color, depth, .. }: Shot) -> Result<Captured, CaptureError> {
-        if self.at_end() {
+    fn next(&mut self, FrameBuffers { color, depth, .. }: FrameBuffers) -> Result<Captured, CaptureError> {
+        if self.is_at_end() {
             return Ok(Captured::End);
         }
         let Self { layout, base, .. } = self;
@@ -180,18 +180,18 @@ impl Camera for Demo {
         color.rgb.copy_from_slice(&base.rgb);
         copy_depth(&mut depth.metres, &base.levels);
         let side = TILE_PX as usize;
-        for [from, to] in layout.runs() {
+        for [from, to] in layout.tile_rows() {
             color.rgb[3 * to..3 * (to + side)].copy_from_slice(&tiles.rgb[3 * from..3 * (from + side)]);
             copy_depth(&mut depth.metres[to..to + side], &tiles.levels[from..from + side]);
         }
-        let stamp = Stamp { index: self.position as usize, time_ns: time_ns(self.position), captured_ns: None };
+        let stamp = Stamp { index: self.position as usize, time_ns: frame_time_ns(self.position), captured_ns: None };
         self.position += 1;
         Ok(Captured::Frame(stamp))
     }
 
-    fn skip(&mut self, until_ns: u64) -> u64 {
+    fn skip_until(&mut self, until_ns: u64) -> u64 {
         let from = self.position;
-        while !self.at_end() && time_ns(self.position) < until_ns {
+        while !self.is_at_end() && frame_time_ns(self.position) < until_ns {
             self.position += 1;
         }
         self.position - from

@@ -34,7 +34,8 @@ pub enum CaptureError {
     Format { width: u32, height: u32, fps: f64 },
     /// The program was built without a synthetic camera.
     #[error(
-        "synthetic: this program was built without that scene; build it with the feature lab, or take `demo`, a recording of it"
+        "synthetic: this program was built without that scene; build it with the feature lab, or use `demo`, a \
+         recording of it"
     )]
     NoSynthetic,
     /// The built-in demonstration cannot be decoded.
@@ -42,18 +43,19 @@ pub enum CaptureError {
     Demo(String),
     /// Side-by-side pictures need an even width.
     #[error(
-        "--side-by-side: the pictures of {source_name} are {width}x{height}; two eyes beside each other need an even width"
+        "--side-by-side: the pictures of {source_name} are {width}x{height}; left and right pictures side by side need \
+         an even width"
     )]
-    NoHalves { source_name: String, width: u32, height: u32 },
+    OddWidth { source_name: String, width: u32, height: u32 },
     /// Side-by-side needs both views in one picture.
-    #[error("--side-by-side is for a source that gives both eyes in one picture, and {source_name} does not")]
-    NotOnePicture { source_name: String },
+    #[error("--side-by-side needs pictures that show left and right side by side, and those of {source_name} do not")]
+    NotSideBySide { source_name: String },
     /// Both cameras need the same size.
     #[error(
-        "{} gives {}x{} and {} {}x{}: both eyes need one size; choose one that both have with --size",
+        "{} gives {}x{} and {} gives {}x{}: both cameras need the same size; choose one that both support with --size",
         names[0], left.0, left.1, names[1], right.0, right.1
     )]
-    EyesDiffer {
+    SizesDiffer {
         /// Left camera, then right camera.
         names: [String; 2],
         /// Width and height of the left pictures.

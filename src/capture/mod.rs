@@ -9,8 +9,8 @@ pub mod pixels;
 pub mod replay;
 mod seek;
 pub mod side_by_side;
+pub mod stereo_pair;
 pub mod synthetic;
-pub mod two_eyes;
 #[cfg(feature = "camera")]
 pub mod v4l2;
 
@@ -28,17 +28,17 @@ pub trait Camera: Send {
     /// Describes this camera; constant during a run.
     fn info(&self) -> SourceInfo;
 
-    /// Reads the next frame into the buffers of `shot`, as far as the camera [delivers them](SourceInfo::brings). A
-    /// live camera waits for the frame, but not much longer than [`PATIENCE`]; for other cameras, the caller paces the
+    /// Reads the next frame into `buffers`, as far as the camera [delivers them](SourceInfo::frame_data). A
+    /// live camera waits for the frame, but not much longer than [`MAX_WAIT`]; for other cameras, the caller paces the
     /// frames. On any result but [`Captured::Frame`] the content of the buffers is unspecified.
     ///
     /// # Errors
     /// The camera failed, and will deliver no more frames.
-    fn next(&mut self, shot: Shot) -> Result<Captured, CaptureError>;
+    fn next(&mut self, buffers: FrameBuffers) -> Result<Captured, CaptureError>;
 
     /// Skips the frames before media time `until_ns` without reading them; returns how many were skipped. Live cameras
     /// (see [`SourceInfo::live`]) cannot skip and return 0.
-    fn skip(&mut self, until_ns: u64) -> u64 {
+    fn skip_until(&mut self, until_ns: u64) -> u64 {
         let _ = until_ns;
         0
     }
@@ -56,8 +56,8 @@ pub trait Camera: Send {
     /// Seeks to a frame, by its position in the [seeker](Camera::seeker): it is read next, and media time continues as
     /// if it followed the previous frame. Returns how far, in nanoseconds, the source's own time is then ahead of media
     /// time.
-    fn seek(&mut self, place: usize) -> i64 {
-        let _ = place;
+    fn seek(&mut self, position: usize) -> i64 {
+        let _ = position;
         0
     }
 
@@ -67,7 +67,7 @@ pub trait Camera: Send {
 
 /// Buffers for a frame. Those that the camera does not deliver stay unchanged.
 #[derive(Debug)]
-pub struct Shot<'a> {
+pub struct FrameBuffers<'a> {
     /// The picture; with a stereo camera, the left one.
     pub color: &'a mut ColorImage,
     /// Its ground-truth depth.
@@ -78,7 +78,7 @@ pub struct Shot<'a> {
 
 /// The data that a camera delivers with each frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Brings {
+pub enum FrameData {
     /// The picture only.
     Color,
     /// The picture and its ground-truth depth.
@@ -88,7 +88,7 @@ pub enum Brings {
 }
 
 /// Longest wait of a live camera in [`Camera::next`] before it returns [`Captured::Waiting`].
-pub const PATIENCE: Duration = Duration::from_millis(100);
+pub const MAX_WAIT: Duration = Duration::from_millis(100);
 
 /// Properties of a camera.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -105,7 +105,7 @@ pub struct SourceInfo {
     /// waits for their media time.
     pub live: bool,
     /// The data in each frame.
-    pub brings: Brings,
+    pub frame_data: FrameData,
 }
 
 /// Result of reading a frame.

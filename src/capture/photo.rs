@@ -1,6 +1,6 @@
 //! A photo as a camera: a single, static frame.
 
-use super::{Brings, Camera, CaptureError, Captured, Shot, SourceInfo};
+use super::{Camera, CaptureError, Captured, FrameBuffers, FrameData, SourceInfo};
 use crate::frame::{ColorImage, Stamp};
 
 /// Delivers one picture repeatedly.
@@ -22,7 +22,7 @@ impl Photo {
         Self { name: name.to_owned(), color, frames, delivered: 0 }
     }
 
-    fn at_end(&self) -> bool {
+    fn is_at_end(&self) -> bool {
         self.frames.is_some_and(|frames| self.delivered >= frames)
     }
 }
@@ -35,22 +35,22 @@ impl Camera for Photo {
             period_ns: PERIOD_NS,
             frames: self.frames,
             live: false,
-            brings: Brings::Color,
+            frame_data: FrameData::Color,
         }
     }
 
-    fn next(&mut self, shot: Shot) -> Result<Captured, CaptureError> {
-        if self.at_end() {
+    fn next(&mut self, buffers: FrameBuffers) -> Result<Captured, CaptureError> {
+        if self.is_at_end() {
             return Ok(Captured::End);
         }
-        shot.color.resize(self.color.width, self.color.height);
-        shot.color.rgb.copy_from_slice(&self.color.rgb);
+        buffers.color.resize(self.color.width, self.color.height);
+        buffers.color.rgb.copy_from_slice(&self.color.rgb);
         let stamp = Stamp { index: 0, time_ns: self.delivered.saturating_mul(PERIOD_NS), captured_ns: None };
         self.delivered += 1;
         Ok(Captured::Frame(stamp))
     }
 
-    fn skip(&mut self, until_ns: u64) -> u64 {
+    fn skip_until(&mut self, until_ns: u64) -> u64 {
         let from = self.delivered;
         let until = until_ns.div_ceil(PERIOD_NS);
         self.delivered = from.max(self.frames.map_or(until, |frames| until.min(frames)));
@@ -71,10 +71,10 @@ mod tests {
             let mut photo = Photo::new(color.clone(), "photo", repeated, frames);
             let (mut into, mut depth, mut right) = (ColorImage::default(), DepthMap::default(), GrayImage::default());
             let mut times_ns = Vec::new();
-            let skipped = photo.skip(skip_ns);
+            let skipped = photo.skip_until(skip_ns);
             while times_ns.len() < 5 {
-                let shot = Shot { color: &mut into, depth: &mut depth, right: &mut right };
-                let Captured::Frame(stamp) = photo.next(shot).unwrap() else { break };
+                let buffers = FrameBuffers { color: &mut into, depth: &mut depth, right: &mut right };
+                let Captured::Frame(stamp) = photo.next(buffers).unwrap() else { break };
                 assert!(into == color && stamp.index == 0);
                 times_ns.push(stamp.time_ns / 1_000_000);
             }

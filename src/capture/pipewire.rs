@@ -4,14 +4,14 @@ use std::mem;
 
 use super::pixels::Decoder;
 use super::v4l2::MediaTime;
-use super::{Brings, Camera, CaptureError, Captured, PATIENCE, Shot, SourceInfo};
+use super::{Camera, CaptureError, Captured, FrameBuffers, FrameData, MAX_WAIT, SourceInfo};
 use crate::clock::Clock;
 use crate::frame::fit::Fit;
 use crate::frame::{ColorImage, Stamp};
 use crate::link::pool::{Pool, Pooled};
 use crate::link::{self, Received, Receiver, Sender};
-use crate::pipewire::mode::{Agreed, Mode, Offer};
-use crate::pipewire::reader::{Frame, Reader, Take};
+use crate::pipewire::mode::{Mode, NegotiatedFormat, Offer};
+use crate::pipewire::reader::{Frame, PictureHandler, Reader};
 use crate::stats::Cause;
 use crate::v4l2::live::ModeRequest;
 use crate::v4l2::live::negotiate::{self, LinkSpeed};
@@ -46,20 +46,20 @@ struct Picture {
 }
 
 impl PipeWireCamera {
-    /// Opens the camera that `name` refers to, in the mode closest to `wish`, and starts it. It ends after `frames`
+    /// Opens the camera that `name` refers to, in the mode closest to `request`, and starts it. It ends after `frames`
     /// frames, lost ones not included; never with `None`. With `filters`, its pictures go to the clients that requested
     /// this camera, and arrive while there are any.
     ///
     /// # Errors
     /// The camera does not exist, or cannot be used.
-    pub fn open(name: &str, filters: bool, wish: ModeRequest, frames: Option<u64>) -> Result<Self, CaptureError> {
+    pub fn open(name: &str, filters: bool, request: ModeRequest, frames: Option<u64>) -> Result<Self, CaptureError> {
         let (sender, receiver) = link::live();
         let picture_decoder = PictureDecoder {
-            wish,
+            request,
             sender,
             pictures: Pool::new(PICTURES, ColorImage::default),
             decoder: None,
-            agreed: None,
+            negotiated: None,
             size: None,
             scratch: ColorImage::default(),
             fit: Fit::default(),
@@ -67,16 +67,16 @@ impl PipeWireCamera {
             warned: false,
         };
         // Blocks until the camera has announced its format.
-        let (reader, camera, agreed) = Reader::new(name, filters, picture_decoder)?;
-        let interval = Interval { numerator: agreed.rate.1, denominator: agreed.rate.0 };
-        let ((width, height), fourcc) = (agreed.size, FourCc(agreed.fourcc));
+        let (reader, camera, negotiated) = Reader::new(name, filters, picture_decoder)?;
+        let interval = Interval { numerator: negotiated.rate.1, denominator: negotiated.rate.0 };
+        let ((width, height), fourcc) = (negotiated.size, FourCc(negotiated.fourcc));
         let info = SourceInfo {
             name: format!("pipewire:{} ({}), {width}x{height} {fourcc} at {interval} fps", camera.name, camera.label),
-            size: agreed.size,
+            size: negotiated.size,
             period_ns: interval.period_ns(),
             frames,
             live: true,
-            brings: Brings::Color,
+            frame_data: FrameData::Color,
         };
         let (clock, times) = (Clock::system(), MediaTime::default());
         Ok(Self { reader, receiver, pending: None, info, clock, waited_ns: 0, times, delivered: 0 })
@@ -88,14 +88,14 @@ impl Camera for PipeWireCamera {
         self.info.clone()
     }
 
-    fn next(&mut self, shot: Shot) -> Result<Captured, CaptureError> {
+    fn next(&mut self, buffers: FrameBuffers) -> Result<Captured, CaptureError> {
         if self.info.frames.is_some_and(|frames| self.delivered >= frames) {
             return Ok(Captured::End);
         }
         if self.pending.is_none() {
-            self.reader.want(true);
+            self.reader.set_wanted(true);
             let began_ns = self.clock.now_ns();
-            let received = self.receiver.recv_timeout(PATIENCE);
+            let received = self.receiver.recv_timeout(MAX_WAIT);
             self.waited_ns = self.clock.now_ns() - began_ns;
             match received {
                 Received::Item(picture) => self.pending = Some(picture),
@@ -108,7 +108,7 @@ impl Camera for PipeWireCamera {
             return Ok(lost);
         }
         let Some(mut picture) = self.pending.take() else { return Ok(Captured::Waiting) };
-        mem::swap(shot.color, &mut picture.color);
+        mem::swap(buffers.color, &mut picture.color);
         let index = self.delivered as usize;
         self.delivered += 1;
         let (captured_ns, time_ns) = (picture.captured_ns, self.times.since_first_ns(picture.captured_ns));
@@ -120,7 +120,7 @@ impl Camera for PipeWireCamera {
     }
 
     fn suspend(&mut self) {
-        self.reader.want(false);
+        self.reader.set_wanted(false);
         // Pictures from before the pause are outdated when a client watches again.
         self.pending = None;
         self.receiver.try_recv();
@@ -136,11 +136,11 @@ fn next_loss(Losses { missed, stale, corrupt }: &mut Losses) -> Option<Captured>
 
 /// Decodes pictures on the reader's thread.
 struct PictureDecoder {
-    wish: ModeRequest,
+    request: ModeRequest,
     sender: Sender<Picture>,
     pictures: Pool<ColorImage>,
     decoder: Option<Decoder>,
-    agreed: Option<Agreed>,
+    negotiated: Option<NegotiatedFormat>,
     /// Size of the first negotiated mode.
     size: Option<(u32, u32)>,
     /// Buffer for decoding pictures of another size.
@@ -155,8 +155,8 @@ struct PictureDecoder {
 impl PictureDecoder {
     /// Decodes a frame and sends it; fails if it cannot be decoded.
     fn decode(&mut self, frame: &Frame) -> Result<(), String> {
-        let Some((agreed, size)) = self.agreed.zip(self.size) else { return Ok(()) };
-        let layout = layout(&agreed, frame)?;
+        let Some((negotiated, size)) = self.negotiated.zip(self.size) else { return Ok(()) };
+        let layout = frame_layout(&negotiated, frame)?;
         let decoder = match self.decoder.take().filter(|decoder| *decoder.layout() == layout) {
             Some(decoder) => decoder,
             None => Decoder::new(&layout).map_err(|error| error.to_string())?,
@@ -167,7 +167,7 @@ impl PictureDecoder {
             self.losses.stale += 1;
             return Ok(());
         };
-        let decoded = if agreed.size == size {
+        let decoded = if negotiated.size == size {
             decoder.decode(frame.planes, &mut color)
         } else {
             decoder.decode(frame.planes, &mut self.scratch).map(|()| {
@@ -188,35 +188,35 @@ impl PictureDecoder {
     }
 }
 
-impl Take for PictureDecoder {
-    fn choose(&mut self, modes: &[Mode]) -> Result<Agreed, String> {
+impl PictureHandler for PictureDecoder {
+    fn choose_mode(&mut self, modes: &[Mode]) -> Result<NegotiatedFormat, String> {
         let modes: Vec<FormatModes> = modes.iter().map(format_modes).collect();
         // Treated as an internal connection, since the real one is unknown.
-        let best = negotiate::ranked(&modes, &self.wish, LinkSpeed::Fast).map_err(|error| error.to_string())?;
-        let best = best.first().ok_or("it offers nothing")?;
+        let best = negotiate::rank_modes(&modes, &self.request, LinkSpeed::Fast).map_err(|error| error.to_string())?;
+        let best = best.first().ok_or("it offers no mode")?;
         let Interval { numerator, denominator } = best.interval;
-        Ok(Agreed { fourcc: best.fourcc.0, size: best.size_px, rate: (denominator, numerator) })
+        Ok(NegotiatedFormat { fourcc: best.fourcc.0, size: best.size_px, rate: (denominator, numerator) })
     }
 
-    fn begin(&mut self, agreed: &Agreed) {
-        self.agreed = Some(*agreed);
-        let size = *self.size.get_or_insert(agreed.size);
-        if size != agreed.size {
-            let ((width, height), (into_width, into_height)) = (agreed.size, size);
+    fn set_format(&mut self, negotiated: &NegotiatedFormat) {
+        self.negotiated = Some(*negotiated);
+        let size = *self.size.get_or_insert(negotiated.size);
+        if size != negotiated.size {
+            let ((width, height), (into_width, into_height)) = (negotiated.size, size);
             tracing::warn!("the camera now gives {width}x{height}: fitted into {into_width}x{into_height}");
         }
     }
 
-    fn frame(&mut self, frame: &Frame) {
+    fn handle_frame(&mut self, frame: &Frame) {
         if let Err(error) = self.decode(frame) {
             self.losses.corrupt += 1;
             if !mem::replace(&mut self.warned, true) {
-                tracing::warn!("{error}; going on without such frames");
+                tracing::warn!("{error}; such frames are skipped");
             }
         }
     }
 
-    fn lost(&mut self, missed: u64, stale: u64, corrupt: u64) {
+    fn add_losses(&mut self, missed: u64, stale: u64, corrupt: u64) {
         self.losses.missed += missed;
         self.losses.stale += stale;
         self.losses.corrupt += corrupt;
@@ -224,17 +224,17 @@ impl Take for PictureDecoder {
 }
 
 /// Computes a frame's memory layout: formats of several components arrive in one plane, or in one per component.
-fn layout(agreed: &Agreed, frame: &Frame) -> Result<Layout, String> {
-    let apart = match (&agreed.fourcc, frame.planes.len()) {
-        (_, 0 | 1) => agreed.fourcc,
+fn frame_layout(negotiated: &NegotiatedFormat, frame: &Frame) -> Result<Layout, String> {
+    let apart = match (&negotiated.fourcc, frame.planes.len()) {
+        (_, 0 | 1) => negotiated.fourcc,
         (b"NV12", _) => *b"NM12",
         (b"NV21", _) => *b"NM21",
         (b"YU12", _) => *b"YM12",
         (b"YV12", _) => *b"YM21",
         (other, _) => *other,
     };
-    let (width, height) = agreed.size;
-    let layout = Layout::strided(FourCc(apart), width, height, frame.stride_bytes);
+    let (width, height) = negotiated.size;
+    let layout = Layout::with_stride(FourCc(apart), width, height, frame.stride_bytes);
     layout.map_err(|error| error.to_string())
 }
 
@@ -279,24 +279,24 @@ mod tests {
             mode(b"YUYV", Offer::These(vec![(640, 480), (1280, 720)]), Offer::These(vec![(15, 1), (30, 1)])),
             mode(b"NV12", Offer::Range { min: (2, 2), max: (4096, 4096) }, Offer::Range { min: (0, 1), max: (120, 1) }),
         ];
-        let chosen = |wish: ModeRequest| {
+        let chosen = |request: ModeRequest| {
             let (sender, _receiver) = link::live();
             let mut picture_decoder = PictureDecoder {
-                wish,
+                request,
                 sender,
                 pictures: Pool::new(0, ColorImage::default),
                 decoder: None,
-                agreed: None,
+                negotiated: None,
                 size: None,
                 scratch: ColorImage::default(),
                 fit: Fit::default(),
                 losses: Losses::default(),
                 warned: false,
             };
-            let Agreed { fourcc, size, rate } = picture_decoder.choose(&modes).unwrap();
+            let NegotiatedFormat { fourcc, size, rate } = picture_decoder.choose_mode(&modes).unwrap();
             format!("{} {size:?} {}/{}", FourCc(fourcc), rate.0, rate.1)
         };
-        let any = ModeRequest::any(crate::layout::Content::Color);
+        let any = ModeRequest::for_content(crate::layout::Content::Color);
         let format = |fourcc: &str| ModeRequest { fourcc: Some(fourcc.parse().unwrap()), ..any };
         assert_eq!(chosen(format("YUYV")), "YUYV (1280, 720) 30/1");
         assert_eq!(chosen(format("NV12")), "NV12 (1280, 720) 30/1");

@@ -3,13 +3,13 @@
 use std::ops::Range;
 use std::sync::Arc;
 
-use super::{Brings, Camera, CaptureError, Captured, Seeker, Shot, SourceInfo};
+use super::{Camera, CaptureError, Captured, FrameBuffers, FrameData, Seeker, SourceInfo};
 use crate::frame::Stamp;
 use crate::recording::{Recording, Scratch};
 
 /// The range of a recording to play.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Part {
+pub struct PlayRange {
     /// Start of the range, in seconds after the first frame.
     pub start_s: f64,
     /// End of the range, exclusive, in seconds after the first frame; `None` plays to the end.
@@ -45,20 +45,20 @@ pub struct Replay {
 }
 
 impl Replay {
-    /// Plays `part` of `recording`, which the report calls `name`.
+    /// Plays `range` of `recording`, which the report calls `name`.
     ///
     /// # Errors
     /// The range contains no frame.
-    pub fn new(recording: Arc<Recording>, name: &str, part: &Part) -> Result<Self, CaptureError> {
+    pub fn new(recording: Arc<Recording>, name: &str, range: &PlayRange) -> Result<Self, CaptureError> {
         let len = recording.len();
         let first_from = |s: f64| (0..len).find(|&frame| recording.time_ns(frame) as f64 >= s * 1e9).unwrap_or(len);
-        let lap = first_from(part.start_s)..part.end_s.map_or(len, first_from);
+        let lap = first_from(range.start_s)..range.end_s.map_or(len, first_from);
         if lap.is_empty() {
             let end_ns = len.checked_sub(1).map_or(0, |last| recording.time_ns(last) + recording.period_ns());
             return Err(CaptureError::EmptyRange {
                 source_name: name.to_owned(),
-                start_s: part.start_s,
-                end_s: part.end_s,
+                start_s: range.start_s,
+                end_s: range.end_s,
                 length_s: end_ns as f64 / 1e9,
             });
         }
@@ -74,8 +74,8 @@ impl Replay {
             lap,
             lap_ns,
             right_camera: false,
-            looped: part.looped,
-            limit: part.frames,
+            looped: range.looped,
+            limit: range.frames,
             seeker: Arc::new(seeker),
             position: 0,
             delivered: 0,
@@ -86,18 +86,18 @@ impl Replay {
 
     /// Reads the right camera's pictures, too. Frames of a monocular recording are then corrupt.
     #[must_use]
-    pub fn with_right_eye(self) -> Self {
+    pub fn with_right_camera(self) -> Self {
         Self { right_camera: true, ..self }
     }
 
     /// Total number of frames, over all laps; `None` if endless.
-    fn total(&self) -> Option<u64> {
+    fn total_frames(&self) -> Option<u64> {
         let lap = (!self.looped).then_some(self.lap.len() as u64);
         lap.into_iter().chain(self.limit).min()
     }
 
     /// Stamp of the frame at the current position; `None` at the end.
-    fn stamp(&self) -> Option<Stamp> {
+    fn current_stamp(&self) -> Option<Stamp> {
         let lap_len = self.lap.len() as u64;
         let is_over = self.limit.is_some_and(|limit| self.delivered >= limit);
         if is_over || !self.looped && self.position >= lap_len {
@@ -105,12 +105,12 @@ impl Replay {
         }
         let index = self.lap.start + (self.position % lap_len) as usize;
         // Media time beyond 64 bits ends the loop.
-        let time_ns = self.source_ns(self.position)?.checked_add_signed(self.seek_offset_ns)?;
+        let time_ns = self.source_time_ns(self.position)?.checked_add_signed(self.seek_offset_ns)?;
         Some(Stamp { index, time_ns, captured_ns: None })
     }
 
     /// Source time of a position, in playing order; `None` beyond 64 bits.
-    fn source_ns(&self, position: u64) -> Option<u64> {
+    fn source_time_ns(&self, position: u64) -> Option<u64> {
         let lap_len = self.lap.len() as u64;
         let in_lap_ns = self.seeker.time_ns((position % lap_len) as usize);
         (position / lap_len).checked_mul(self.lap_ns)?.checked_add(in_lap_ns)
@@ -128,14 +128,14 @@ impl Camera for Replay {
             name: self.name.clone(),
             size: self.recording.size(),
             period_ns: self.recording.period_ns(),
-            frames: self.total(),
+            frames: self.total_frames(),
             live: false,
-            brings: if self.right_camera { Brings::RightCamera } else { Brings::Color },
+            frame_data: if self.right_camera { FrameData::RightCamera } else { FrameData::Color },
         }
     }
 
-    fn next(&mut self, shot: Shot) -> Result<Captured, CaptureError> {
-        let Some(stamp) = self.stamp() else { return Ok(Captured::End) };
+    fn next(&mut self, buffers: FrameBuffers) -> Result<Captured, CaptureError> {
+        let Some(stamp) = self.current_stamp() else { return Ok(Captured::End) };
         if stamp.index == self.lap.start {
             // A whole lap without a readable frame.
             if self.delivered > 0 && self.readable == 0 {
@@ -144,7 +144,7 @@ impl Camera for Replay {
             self.readable = 0;
         }
         self.advance();
-        let Shot { color, right, .. } = shot;
+        let FrameBuffers { color, right, .. } = buffers;
         let mut read = self.recording.read_color(stamp.index, &mut self.scratch, color);
         if self.right_camera && read.is_ok() {
             read = self.recording.read_right(stamp.index, &mut self.scratch, right);
@@ -158,9 +158,9 @@ impl Camera for Replay {
         })
     }
 
-    fn skip(&mut self, until_ns: u64) -> u64 {
+    fn skip_until(&mut self, until_ns: u64) -> u64 {
         let from = self.delivered;
-        while self.stamp().is_some_and(|stamp| stamp.time_ns < until_ns) {
+        while self.current_stamp().is_some_and(|stamp| stamp.time_ns < until_ns) {
             self.advance();
             // Counts as readable: it is not known to be bad.
             self.readable += 1;
@@ -172,12 +172,12 @@ impl Camera for Replay {
         Some(Arc::clone(&self.seeker))
     }
 
-    fn seek(&mut self, place: usize) -> i64 {
+    fn seek(&mut self, position: usize) -> i64 {
         let lap_len = self.lap.len() as u64;
-        let next_ns = self.source_ns(self.position).unwrap_or(u64::MAX).saturating_add_signed(self.seek_offset_ns);
+        let next_ns = self.source_time_ns(self.position).unwrap_or(u64::MAX).saturating_add_signed(self.seek_offset_ns);
         let lap = if self.looped { self.position / lap_len } else { 0 };
-        self.position = lap * lap_len + (place as u64).min(lap_len - 1);
-        let source_ns = self.source_ns(self.position).unwrap_or(u64::MAX);
+        self.position = lap * lap_len + (position as u64).min(lap_len - 1);
+        let source_ns = self.source_time_ns(self.position).unwrap_or(u64::MAX);
         self.seek_offset_ns = next_ns.wrapping_sub(source_ns).cast_signed();
         // Skipped frames are not known to be bad.
         self.readable += 1;

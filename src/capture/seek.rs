@@ -16,7 +16,7 @@ pub struct Seeker {
     /// Time of the end of the last frame.
     length_ns: u64,
     /// The newest request: its number in the upper half, the frame's position in the lower half.
-    wish: AtomicU64,
+    request: AtomicU64,
     /// Wakes the camera on a request.
     demand: OnceLock<Demand>,
 }
@@ -27,7 +27,7 @@ pub struct SeekRequest {
     /// Number of the request, from 1.
     pub number: u64,
     /// Position of the frame, from 0.
-    pub place: usize,
+    pub position: usize,
 }
 
 const POSITION_BITS: u32 = 32;
@@ -36,7 +36,7 @@ impl Seeker {
     /// Creates a seeker for frames at these times after the first one, whose index is `first`; the last one ends at
     /// `length_ns`.
     pub(super) fn new(first: usize, times_ns: Box<[u64]>, length_ns: u64) -> Self {
-        Self { first, times_ns, length_ns, wish: AtomicU64::new(0), demand: OnceLock::new() }
+        Self { first, times_ns, length_ns, request: AtomicU64::new(0), demand: OnceLock::new() }
     }
 
     /// Returns the number of frames, at least 1.
@@ -55,16 +55,17 @@ impl Seeker {
     }
 
     /// Returns the position of a delivered frame.
-    pub fn place_of(&self, stamp: Stamp) -> usize {
+    pub fn position_of(&self, stamp: Stamp) -> usize {
         stamp.index.saturating_sub(self.first)
     }
 
     /// Requests the frame at this position, clamped to the last one, as the next one; it is delivered even if no client
     /// watches. A newer request replaces an older one. Returns the number of the request.
-    pub fn go_to(&self, position: usize) -> u64 {
+    pub fn request_frame(&self, position: usize) -> u64 {
         let position = position.min(self.times_ns.len() - 1) as u64;
-        let wish = |previous: u64| Some((((previous >> POSITION_BITS) + 1) << POSITION_BITS) | position);
-        let previous = self.wish.fetch_update(Ordering::Relaxed, Ordering::Relaxed, wish).unwrap_or_else(|same| same);
+        let request = |previous: u64| Some((((previous >> POSITION_BITS) + 1) << POSITION_BITS) | position);
+        let previous =
+            self.request.fetch_update(Ordering::Relaxed, Ordering::Relaxed, request).unwrap_or_else(|same| same);
         if let Some(demand) = self.demand.get() {
             demand.notify();
         }
@@ -72,14 +73,15 @@ impl Seeker {
     }
 
     /// Returns the newest request, if its number is above `last`.
-    pub fn request_after(&self, last: u64) -> Option<SeekRequest> {
-        let wish = self.wish.load(Ordering::Relaxed);
-        let wish = SeekRequest { number: wish >> POSITION_BITS, place: (wish & u64::from(u32::MAX)) as usize };
-        Some(wish).filter(|wish| wish.number > last)
+    pub fn newer_request(&self, last: u64) -> Option<SeekRequest> {
+        let request = self.request.load(Ordering::Relaxed);
+        let request =
+            SeekRequest { number: request >> POSITION_BITS, position: (request & u64::from(u32::MAX)) as usize };
+        Some(request).filter(|request| request.number > last)
     }
 
     /// Sets the demand that a request signals, which wakes its waiting thread.
-    pub fn wake(&self, demand: &Demand) {
+    pub fn set_demand(&self, demand: &Demand) {
         // Set once: a camera runs only once.
         let _ = self.demand.set(demand.clone());
     }

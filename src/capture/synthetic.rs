@@ -21,20 +21,20 @@ pub struct Format {
 ///
 /// # Errors
 /// The camera does not support this format.
-pub type Make = fn(Format) -> Result<Box<dyn Camera>, CaptureError>;
+pub type CameraFactory = fn(Format) -> Result<Box<dyn Camera>, CaptureError>;
 
-static MAKE: OnceLock<Make> = OnceLock::new();
+static FACTORY: OnceLock<CameraFactory> = OnceLock::new();
 
-/// Registers `make` as the implementation of `synthetic`. Only the first call has an effect.
-pub fn register(make: Make) {
+/// Registers `factory` as the implementation of `synthetic`. Only the first call has an effect.
+pub fn register_factory(factory: CameraFactory) {
     // Later callers register the same function.
-    let _ = MAKE.set(make);
+    let _ = FACTORY.set(factory);
 }
 
 /// Opens the synthetic camera.
 ///
 /// # Errors
 /// No implementation is registered, or it does not support this format.
-pub fn open(format: Format) -> Result<Box<dyn Camera>, CaptureError> {
-    MAKE.get().ok_or(CaptureError::NoSynthetic)?(format)
+pub fn open_camera(format: Format) -> Result<Box<dyn Camera>, CaptureError> {
+    FACTORY.get().ok_or(CaptureError::NoSynthetic)?(format)
 }

@@ -3,19 +3,19 @@
 use std::time::Duration;
 
 use super::pixels::Decoder;
-use super::two_eyes::Eye;
-use super::{Brings, Camera, CaptureError, Captured, PATIENCE, Shot, SourceInfo};
+use super::stereo_pair::PairedCamera;
+use super::{Camera, CaptureError, Captured, FrameBuffers, FrameData, MAX_WAIT, SourceInfo};
 use crate::clock::Clock;
 use crate::frame::fit::Fit;
 use crate::frame::{ColorImage, Stamp};
 use crate::stats::Cause;
-use crate::v4l2::live::{Live, ModeRequest, Next, Setting};
+use crate::v4l2::live::{LiveDevice, ModeRequest, Next, Setting};
 use crate::v4l2::queue::Losses;
 
 /// A V4L2 camera. All its frames have one size: if the camera comes back with another one, its pictures are scaled into
 /// the first size.
 pub struct V4l2Camera {
-    live: Live,
+    live: LiveDevice,
     clock: Clock,
     waited_ns: u64,
     decoder: Decoder,
@@ -33,30 +33,30 @@ pub struct V4l2Camera {
 }
 
 impl V4l2Camera {
-    /// Opens the camera that `name` refers to, in the mode closest to `wish`, with its controls set to `settings`, and
-    /// starts it. It ends after `frames` frames, lost ones not included; never with `None`.
+    /// Opens the camera that `name` refers to, in the mode closest to `request`, with its controls set to `settings`,
+    /// and starts it. It ends after `frames` frames, lost ones not included; never with `None`.
     ///
     /// # Errors
     /// The camera does not exist, or cannot be used.
     pub fn open(
         name: &str,
-        wish: ModeRequest,
+        request: ModeRequest,
         settings: Vec<Setting>,
         frames: Option<u64>,
     ) -> Result<Self, CaptureError> {
         let clock = Clock::system();
-        let live = Live::open(name, wish, settings, clock.clone())?;
+        let live = LiveDevice::open(name, request, settings, clock.clone())?;
         // The first layout fixes the size for the whole run.
         let layout = *live.layout();
         let decoder =
             Decoder::new(&layout).map_err(|source| CaptureError::NoColor { camera: live.name().to_owned(), source })?;
         let info = SourceInfo {
-            name: format!("{}, {}", live.name(), live.agreed()),
+            name: format!("{}, {}", live.name(), live.negotiated()),
             size: (layout.width, layout.height),
-            period_ns: live.agreed().interval.period_ns(),
+            period_ns: live.negotiated().interval.period_ns(),
             frames,
             live: true,
-            brings: Brings::Color,
+            frame_data: FrameData::Color,
         };
         Ok(Self {
             live,
@@ -94,7 +94,7 @@ impl V4l2Camera {
         };
         // Released at once: a driver without free buffers drops frames.
         let is_decoded = self.decode(color);
-        self.live.release();
+        self.live.release_frame();
         if !is_decoded {
             return Captured::Lost(1, Cause::Corrupt);
         }
@@ -133,7 +133,7 @@ impl V4l2Camera {
     /// Logs once why frames cannot be decoded, and returns false. Damaged frames do not end the run of a live camera.
     fn warn_undecodable(&mut self, error: &dyn std::error::Error) -> bool {
         if !self.warned {
-            tracing::warn!("{}: {error}; going on without such frames", self.live.name());
+            tracing::warn!("{}: {error}; such frames are skipped", self.live.name());
             self.warned = true;
         }
         false
@@ -153,8 +153,8 @@ impl Camera for V4l2Camera {
         self.info.clone()
     }
 
-    fn next(&mut self, shot: Shot) -> Result<Captured, CaptureError> {
-        Ok(self.next_within(PATIENCE, shot.color))
+    fn next(&mut self, buffers: FrameBuffers) -> Result<Captured, CaptureError> {
+        Ok(self.next_within(MAX_WAIT, buffers.color))
     }
 
     fn waited_ns(&self) -> u64 {
@@ -166,7 +166,7 @@ impl Camera for V4l2Camera {
     }
 }
 
-impl Eye for V4l2Camera {
+impl PairedCamera for V4l2Camera {
     fn info(&self) -> SourceInfo {
         self.info.clone()
     }

@@ -3,7 +3,7 @@
 use std::ops::{Deref, DerefMut};
 
 /// Bytes of a cache line, and of the widest vector.
-pub const LINE: usize = 64;
+pub const CACHE_LINE_BYTES: usize = 64;
 
 /// A fixed-size array aligned to a cache line.
 #[derive(Default)]
@@ -17,8 +17,8 @@ pub struct Aligned<T = f32> {
 impl<T: Copy + Default> Aligned<T> {
     pub fn zeros(length: usize) -> Self {
         // Over-allocated by one line; a Vec that is never resized does not move.
-        let memory = vec![T::default(); length + LINE / size_of::<T>()];
-        let start = memory.as_ptr().align_offset(LINE).min(LINE / size_of::<T>());
+        let memory = vec![T::default(); length + CACHE_LINE_BYTES / size_of::<T>()];
+        let start = memory.as_ptr().align_offset(CACHE_LINE_BYTES).min(CACHE_LINE_BYTES / size_of::<T>());
         Self { memory, start, length }
     }
 }
@@ -39,4 +39,4 @@ impl<T> DerefMut for Aligned<T> {
 /// A local array aligned to a cache line.
 #[derive(Clone, Copy)]
 #[repr(align(64))]
-pub struct Line<T>(pub T);
+pub struct CacheAligned<T>(pub T);

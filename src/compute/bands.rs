@@ -18,11 +18,11 @@ pub struct Bands {
 }
 
 impl Bands {
-    /// Splits `height` rows for these threads, a multiple of `unit` rows in each band; one band for one thread.
-    pub fn new(height: usize, unit: usize, workers: &ThreadPool) -> Self {
+    /// Splits `height` rows for these threads, a multiple of `row_multiple` rows in each band; one band for one thread.
+    pub fn new(height: usize, row_multiple: usize, workers: &ThreadPool) -> Self {
         let threads = workers.thread_count();
         let max_bands = if threads > 1 { (BANDS_PER_THREAD * threads).min(MAX_ITEMS) } else { 1 };
-        let rows = height.div_ceil(max_bands).max(MIN_ROWS).next_multiple_of(unit);
+        let rows = height.div_ceil(max_bands).max(MIN_ROWS).next_multiple_of(row_multiple);
         Self { height, rows }
     }
 
@@ -31,20 +31,21 @@ impl Bands {
         (0..self.height).step_by(self.rows).map(move |first| first..(first + self.rows).min(self.height))
     }
 
-    /// Splits a plane with `of_row` values per row into bands.
-    pub fn split<T>(self, plane: &mut [T], of_row: usize) -> impl Iterator<Item = &mut [T]> {
-        plane.chunks_mut((self.rows * of_row).max(1))
+    /// Splits a plane with `row_len` values per row into bands.
+    pub fn split<T>(self, plane: &mut [T], row_len: usize) -> impl Iterator<Item = &mut [T]> {
+        plane.chunks_mut((self.rows * row_len).max(1))
     }
 
-    /// Splits tiles into bands; tiles are `side` rows high, `across` per row of tiles, and `side` divides the unit.
-    pub fn split_tiles<T>(self, tiles: &mut [T], side: usize, across: usize) -> impl Iterator<Item = &mut [T]> {
-        tiles.chunks_mut((self.rows / side * across).max(1))
+    /// Splits tiles into bands; tiles are `side` rows high, `tiles_per_row` per row of tiles, and `side` divides the
+    /// unit.
+    pub fn split_tiles<T>(self, tiles: &mut [T], side: usize, tiles_per_row: usize) -> impl Iterator<Item = &mut [T]> {
+        tiles.chunks_mut((self.rows / side * tiles_per_row).max(1))
     }
 }
 
-/// Returns the number of values per item of a pass over `count` values: at least `least`, to be worth a thread.
-pub fn share(count: usize, least: usize) -> usize {
-    count.div_ceil(MAX_ITEMS).max(least)
+/// Returns the number of values per item of a pass over `count` values: at least `min_len`, to be worth a thread.
+pub fn chunk_len(count: usize, min_len: usize) -> usize {
+    count.div_ceil(MAX_ITEMS).max(min_len)
 }
 
 #[cfg(test)]
@@ -55,13 +56,13 @@ mod tests {
     fn bands_are_all_rows_in_order_and_no_more_than_a_pass_takes() {
         for threads in [1, 2, 3, 16] {
             let workers = ThreadPool::new("test", threads);
-            for (height, unit) in [(0, 1), (1, 1), (7, 20), (720, 20), (721, 8), (4320, 1)] {
-                let bands = Bands::new(height, unit, &workers);
+            for (height, row_multiple) in [(0, 1), (1, 1), (7, 20), (720, 20), (721, 8), (4320, 1)] {
+                let bands = Bands::new(height, row_multiple, &workers);
                 let mut plane: Vec<usize> = (0..3 * height).map(|at| at / 3).collect();
                 let (mut next, mut count) = (0, 0);
                 for (rows, values) in bands.rows().zip(bands.split(&mut plane, 3)) {
                     assert_eq!((rows.start, values.len()), (next, 3 * rows.len()));
-                    assert!(rows.start.is_multiple_of(unit) && values[0] == rows.start);
+                    assert!(rows.start.is_multiple_of(row_multiple) && values[0] == rows.start);
                     (next, count) = (rows.end, count + 1);
                 }
                 assert!(next == height && count <= MAX_ITEMS && (threads > 1 || count <= 1));

@@ -3,14 +3,14 @@
 mod pass;
 mod picture;
 mod readback;
-mod trial;
+mod self_test;
 mod wait;
 
-pub use pass::{Pass, Recorder, Stamps, UNIFORM_STRIDE, uniform_at, workgroups_2d};
+pub use pass::{Pass, Recorder, Timestamps, UNIFORM_STRIDE, uniform_binding, workgroups_2d};
 pub use picture::{DeviceFrame, DevicePicture};
 pub use readback::Readback;
-pub use trial::Trial;
-pub use wait::end_soon;
+pub use self_test::SelfTest;
+pub use wait::begin_shutdown;
 
 use std::any::TypeId;
 use std::collections::HashMap;
@@ -43,8 +43,8 @@ macro_rules! shader {
 pub(crate) use shader;
 
 /// Time after which a device counts as hung; a software device is slow, but does not hang.
-const PATIENCE: Duration = Duration::from_secs(10);
-const PATIENCE_WITH_SOFTWARE: Duration = Duration::from_secs(60);
+const HANG_TIMEOUT: Duration = Duration::from_secs(10);
+const SOFTWARE_HANG_TIMEOUT: Duration = Duration::from_secs(60);
 
 /// Returns the only wgpu instance of the process. Dropping the last instance unloads the drivers, and reloading may
 /// leak: NVIDIA's 580 fails after 29 reloads, or crashes if two threads do it.
@@ -59,9 +59,9 @@ fn instance() -> wgpu::Instance {
 }
 
 /// Returns name, kind and driver of every adapter, including software.
-pub fn adapters() -> Vec<String> {
+pub fn list_adapters() -> Vec<String> {
     let adapters = pollster::block_on(instance().enumerate_adapters(wgpu::Backends::VULKAN));
-    adapters.iter().map(|adapter| describe(&adapter.get_info())).collect()
+    adapters.iter().map(|adapter| describe_adapter(&adapter.get_info())).collect()
 }
 
 /// A device and its queue.
@@ -77,12 +77,12 @@ pub struct Device {
     pub name: String,
     /// Whether passes can be timed.
     pub timestamps: bool,
-    /// Results of trials of the device, by the type of the tested worker.
+    /// Results of self-tests of the device, by the type of the tested worker.
     faults: Mutex<HashMap<TypeId, Option<GpuError>>>,
     /// Pipelines made so far, by shader name and bits of the constants.
     pipelines: Mutex<HashMap<(&'static str, Vec<u64>), wgpu::ComputePipeline>>,
     /// Time after which the device counts as hung.
-    patience: Duration,
+    hang_timeout: Duration,
     /// First error of the device.
     fault: Arc<Mutex<Option<String>>>,
 }
@@ -95,7 +95,7 @@ impl Device {
     /// No adapter fits, or the device could not be created.
     pub fn open(hardware_only: bool, wanted: Option<&str>) -> Result<Self, GpuError> {
         if hardware_only && wanted.is_none() && !has_gpu_node() {
-            let found = "no device node of one under /dev".to_owned();
+            let found = "no GPU device node in /dev".to_owned();
             return Err(GpuError::NoAdapter { wanted: "in hardware".to_owned(), found });
         }
         let instance = instance();
@@ -105,9 +105,9 @@ impl Device {
             Some(wanted) => info.name.to_lowercase().contains(&wanted.to_lowercase()),
             None => !hardware_only || info.device_type != wgpu::DeviceType::Cpu,
         };
-        let best = (0..adapters.len()).filter(|&k| fits(&infos[k])).min_by_key(|&k| preference(&infos[k]));
+        let best = (0..adapters.len()).filter(|&k| fits(&infos[k])).min_by_key(|&k| adapter_rank(&infos[k]));
         let Some(best) = best else {
-            let names: Vec<_> = infos.iter().map(describe).collect();
+            let names: Vec<_> = infos.iter().map(describe_adapter).collect();
             return Err(GpuError::NoAdapter {
                 wanted: match wanted {
                     Some(name) => format!("named '{name}'"),
@@ -117,7 +117,7 @@ impl Device {
                 found: if names.is_empty() { "none".to_owned() } else { names.join("; ") },
             });
         };
-        let (adapter, name) = (adapters[best].clone(), describe(&infos[best]));
+        let (adapter, name) = (adapters[best].clone(), describe_adapter(&infos[best]));
         let timestamps = adapter.features().contains(wgpu::Features::TIMESTAMP_QUERY);
         let (device, queue) = pollster::block_on(adapter.request_device(&wgpu::DeviceDescriptor {
             label: Some("bokehcam"),
@@ -136,15 +136,16 @@ impl Device {
         device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| on_error(error.to_string())));
         // Dropping the device calls this, too; the fault is then never read.
         device.set_device_lost_callback(move |_, message| on_loss(format!("device lost: {message}")));
-        let patience = if infos[best].device_type == wgpu::DeviceType::Cpu { PATIENCE_WITH_SOFTWARE } else { PATIENCE };
+        let hang_timeout =
+            if infos[best].device_type == wgpu::DeviceType::Cpu { SOFTWARE_HANG_TIMEOUT } else { HANG_TIMEOUT };
         let (faults, pipelines) = (Mutex::default(), Mutex::default());
-        Ok(Self { instance, adapter, device, queue, name, timestamps, faults, pipelines, patience, fault })
+        Ok(Self { instance, adapter, device, queue, name, timestamps, faults, pipelines, hang_timeout, fault })
     }
 
     /// Sets the time after which the device counts as hung.
     #[must_use]
-    pub fn with_patience(self, patience: Duration) -> Self {
-        Self { patience, ..self }
+    pub fn with_hang_timeout(self, hang_timeout: Duration) -> Self {
+        Self { hang_timeout, ..self }
     }
 
     /// Returns the pipeline of a shader with its `override` constants, from a cache. Its bind group layout follows from
@@ -177,16 +178,16 @@ impl Device {
     }
 
     /// Creates bind group 0 of a pipeline: `buffers` at bindings 0, 1 and so on.
-    pub fn bindings<'a>(
+    pub fn create_bind_group<'a>(
         &self,
         pipeline: &wgpu::ComputePipeline,
         buffers: impl Iterator<Item = wgpu::BufferBinding<'a>>,
     ) -> wgpu::BindGroup {
-        self.bound(&pipeline.get_bind_group_layout(0), buffers)
+        self.create_bind_group_with_layout(&pipeline.get_bind_group_layout(0), buffers)
     }
 
     /// Creates a bind group of a layout: `buffers` at bindings 0, 1 and so on.
-    pub fn bound<'a>(
+    pub fn create_bind_group_with_layout<'a>(
         &self,
         layout: &wgpu::BindGroupLayout,
         buffers: impl Iterator<Item = wgpu::BufferBinding<'a>>,
@@ -201,7 +202,7 @@ impl Device {
     }
 
     /// Creates a buffer of `bytes` bytes, rounded up to whole words; at least 16, because a binding must not be empty.
-    pub fn buffer(&self, label: &str, bytes: usize, usage: wgpu::BufferUsages) -> wgpu::Buffer {
+    pub fn create_buffer(&self, label: &str, bytes: usize, usage: wgpu::BufferUsages) -> wgpu::Buffer {
         self.device.create_buffer(&wgpu::BufferDescriptor {
             label: Some(label),
             size: bytes.max(16).next_multiple_of(4) as u64,
@@ -214,12 +215,12 @@ impl Device {
     ///
     /// # Errors
     /// The picture is too large to be `done` on this device.
-    pub fn has_room(&self, (width, height): (u32, u32), bytes: u64, done: &str) -> Result<(), GpuError> {
+    pub fn check_picture_size(&self, (width, height): (u32, u32), bytes: u64, done: &str) -> Result<(), GpuError> {
         let limits = self.device.limits();
         let max_bytes = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
         if bytes > max_bytes || width.max(height) > limits.max_compute_workgroups_per_dimension {
             let (name, size) = (&self.name, format!("{width} x {height}"));
-            return Err(GpuError::Failed(format!("{name}: pictures of {size} are too large to be {done} there")));
+            return Err(GpuError::Failed(format!("{name}: pictures of {size} are too large to be {done} on this GPU")));
         }
         Ok(())
     }
@@ -240,7 +241,7 @@ impl Device {
     ///
     /// # Errors
     /// The device reported an error during `work`.
-    pub fn attempt<T>(&self, work: impl FnOnce() -> T) -> Result<T, GpuError> {
+    pub fn with_error_scope<T>(&self, work: impl FnOnce() -> T) -> Result<T, GpuError> {
         let memory = self.device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
         let validation = self.device.push_error_scope(wgpu::ErrorFilter::Validation);
         let done = work();
@@ -279,7 +280,7 @@ fn has_gpu_node() -> bool {
 }
 
 /// Returns the rank of an adapter, lowest first.
-fn preference(info: &wgpu::AdapterInfo) -> u32 {
+fn adapter_rank(info: &wgpu::AdapterInfo) -> u32 {
     match info.device_type {
         wgpu::DeviceType::DiscreteGpu => 0,
         wgpu::DeviceType::IntegratedGpu => 1,
@@ -289,7 +290,7 @@ fn preference(info: &wgpu::AdapterInfo) -> u32 {
 }
 
 /// Describes an adapter by name, kind and driver.
-fn describe(info: &wgpu::AdapterInfo) -> String {
+fn describe_adapter(info: &wgpu::AdapterInfo) -> String {
     let kind = match info.device_type {
         wgpu::DeviceType::Cpu => "software",
         wgpu::DeviceType::DiscreteGpu => "discrete GPU",

@@ -8,16 +8,17 @@ use rustix::process::{Resource, getrlimit};
 /// that of its control group. `None` if the system does not report it.
 pub fn free_bytes() -> Option<u64> {
     let info = fs::read_to_string("/proc/meminfo").ok()?;
-    let free = bytes_of(&info, "MemAvailable:")? + bytes_of(&info, "SwapFree:").unwrap_or(0);
+    let free = parse_kb_field(&info, "MemAvailable:")? + parse_kb_field(&info, "SwapFree:").unwrap_or(0);
     let status = fs::read_to_string("/proc/self/status").unwrap_or_default();
-    let own_limit =
-        getrlimit(Resource::As).current.map(|limit| limit.saturating_sub(bytes_of(&status, "VmSize:").unwrap_or(0)));
-    Some([own_limit, cgroup_bytes()].into_iter().flatten().fold(free, u64::min))
+    let own_limit = getrlimit(Resource::As)
+        .current
+        .map(|limit| limit.saturating_sub(parse_kb_field(&status, "VmSize:").unwrap_or(0)));
+    Some([own_limit, cgroup_free_bytes()].into_iter().flatten().fold(free, u64::min))
 }
 
 /// Returns the remainder of the limit of this process's control group (version 2). Parent groups are not read: they are
 /// rarely tighter.
-fn cgroup_bytes() -> Option<u64> {
+fn cgroup_free_bytes() -> Option<u64> {
     let groups = fs::read_to_string("/proc/self/cgroup").ok()?;
     let group = groups.lines().find_map(|line| line.strip_prefix("0::/"))?;
     let number =
@@ -26,7 +27,7 @@ fn cgroup_bytes() -> Option<u64> {
 }
 
 /// Returns the number, in bytes, in a line of /proc that begins with `name`, as in `NAME:   123 kB`.
-fn bytes_of(text: &str, name: &str) -> Option<u64> {
+fn parse_kb_field(text: &str, name: &str) -> Option<u64> {
     let line = text.lines().find_map(|line| line.strip_prefix(name))?;
     Some(line.trim().trim_end_matches(" kB").parse::<u64>().ok()? << 10)
 }

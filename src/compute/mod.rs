@@ -1,7 +1,6 @@
 //! Execution resources: a thread pool ([`thread_pool`]), vector instructions ([`simd`]), and a GPU ([`device`]).
 
 pub mod aligned;
-pub mod backed;
 pub mod bands;
 #[cfg(feature = "gpu")]
 pub mod device;
@@ -9,6 +8,7 @@ pub mod memory;
 pub mod pass_times;
 pub mod simd;
 pub mod thread_pool;
+pub mod with_fallback;
 
 use std::cell::Cell;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -48,7 +48,7 @@ named! {
 
 /// Where a picture is needed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
-pub enum Place {
+pub enum PictureLocation {
     #[default]
     Memory,
     /// In the memory of the GPU that made it; a CPU executor leaves it in memory.
@@ -74,8 +74,8 @@ pub enum GpuError {
 #[cfg(not(feature = "gpu"))]
 impl GpuError {
     /// Returns the error of a build without GPU support.
-    pub fn left_out() -> Self {
-        let wanted = "at all: this build leaves the GPU out (feature `gpu`)".to_owned();
+    pub fn without_gpu_support() -> Self {
+        let wanted = "at all: this program was built without GPU support (feature `gpu`)".to_owned();
         Self::NoAdapter { wanted, found: "none".to_owned() }
     }
 }
@@ -87,7 +87,7 @@ impl Device {
     /// # Errors
     /// Always.
     pub fn open(_: bool, _: Option<&str>) -> Result<Self, GpuError> {
-        Err(GpuError::left_out())
+        Err(GpuError::without_gpu_support())
     }
 
     /// Never called: there is no value of this type.

@@ -6,7 +6,7 @@
 
 use pulp::{Arch, Simd};
 
-use super::aligned::LINE;
+use super::aligned::CACHE_LINE_BYTES;
 
 /// Computes `a * b + c`: fused if the processor has an instruction for it, because the library call would be slow.
 #[inline(always)]
@@ -33,7 +33,7 @@ pub fn store<S: Simd>(values: &mut [f32], at: usize, vector: S::f32s) {
 }
 
 /// Returns the name of the instruction set, for the report.
-pub fn name(arch: Arch) -> &'static str {
+pub fn instruction_set(arch: Arch) -> &'static str {
     match arch {
         #[cfg(target_arch = "x86_64")]
         Arch::V4(_) => "AVX-512",
@@ -50,7 +50,7 @@ pub fn name(arch: Arch) -> &'static str {
 #[inline(always)]
 pub fn prefetch<T>(values: &[T]) {
     #[cfg(target_arch = "x86_64")]
-    for at in (0..values.len()).step_by(LINE / size_of::<T>()) {
+    for at in (0..values.len()).step_by(CACHE_LINE_BYTES / size_of::<T>()) {
         use std::arch::x86_64::{_MM_HINT_T1, _mm_prefetch};
         // SAFETY: a prefetch has no effect that a program can see, whatever the address.
         unsafe { _mm_prefetch::<_MM_HINT_T1>(values[at..].as_ptr().cast()) };

@@ -1,11 +1,11 @@
 //! The thread pool: a fixed number of threads that share the parts of one pass at a time.
 //!
-//! A pass is over when every part is done; sleeping members are not waited for. Nothing is allocated and no lock is
-//! taken. It needs `unsafe` because the threads outlive the borrow of the work they run; `run_members` guarantees that
+//! A pass is over when every part is done; sleeping workers are not waited for. Nothing is allocated and no lock is
+//! taken. It needs `unsafe` because the threads outlive the borrow of the work they run; `run_workers` guarantees that
 //! they never use it afterwards, even after a panic.
 #![allow(unsafe_code)]
 
-pub mod relay;
+pub mod wavefront;
 
 use std::cell::UnsafeCell;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
@@ -13,19 +13,19 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 use std::thread::{self, JoinHandle, Thread};
 
-/// One part of a pass: called with the numbers of the member and of the part.
+/// One part of a pass: called with the numbers of the worker and of the part.
 type Work<'a> = &'a (dyn Fn(usize, usize) + Sync + 'a);
 
-/// The threads of the pool. The thread that calls [`ThreadPool::run`] is member 0.
+/// The threads of the pool. The thread that calls [`ThreadPool::run`] is worker 0.
 pub struct ThreadPool {
     shared: Arc<Shared>,
-    members: Vec<JoinHandle<()>>,
+    workers: Vec<JoinHandle<()>>,
 }
 
 struct Shared {
-    /// `epoch << 16 | open << 15 | members at work`. Opening a pass increments the epoch.
+    /// `epoch << 16 | open << 15 | workers at work`. Opening a pass increments the epoch.
     gate: AtomicU64,
-    /// Valid from the opening of the gate until it is closed and no member is at work.
+    /// Valid from the opening of the gate until it is closed and no worker is at work.
     work: UnsafeCell<Option<Pass>>,
     next: AtomicUsize,
     panicked: AtomicBool,
@@ -40,12 +40,12 @@ struct Pass {
 }
 
 /// Start of an array of scratch memory or items.
-struct Base<S>(*mut S);
+struct BasePtr<S>(*mut S);
 
-// SAFETY: only returns addresses; each dereference has its own argument. `S: Send` as members are other threads.
-unsafe impl<S: Send> Sync for Base<S> {}
+// SAFETY: only returns addresses; each dereference has its own argument. `S: Send` as workers are other threads.
+unsafe impl<S: Send> Sync for BasePtr<S> {}
 
-impl<S> Base<S> {
+impl<S> BasePtr<S> {
     fn at(&self, place: usize) -> *mut S {
         self.0.wrapping_add(place)
     }
@@ -54,18 +54,18 @@ impl<S> Base<S> {
 /// Largest number of items of a pass: they are kept on the stack.
 pub const MAX_ITEMS: usize = 32;
 const OPEN: u64 = 1 << 15;
-const AT_WORK: u64 = OPEN - 1;
+const WORKERS_MASK: u64 = OPEN - 1;
 const EPOCH: u64 = 1 << 16;
-/// Spins before a member sleeps: about the time between two passes of a frame.
+/// Spins before a worker sleeps: about the time between two passes of a frame.
 const SPINS: u32 = 4_000;
 
-// SAFETY: `work` is written only by the thread in `run_members` (`&mut self`: there is only one) while the gate is
-// closed and no member is at work, and read only by members that entered through the open gate; its release/acquire
+// SAFETY: `work` is written only by the thread in `run_workers` (`&mut self`: there is only one) while the gate is
+// closed and no worker is at work, and read only by workers that entered through the open gate; its release/acquire
 // pairs order the two.
 unsafe impl Sync for Shared {}
 
 /// Returns the number of hardware threads, at least 1.
-pub fn cores() -> usize {
+pub fn core_count() -> usize {
     thread::available_parallelism().map_or(1, usize::from)
 }
 
@@ -80,23 +80,23 @@ impl ThreadPool {
             stop: AtomicBool::new(false),
             started: AtomicUsize::new(0),
         });
-        let members = (1..threads.max(1))
+        let workers = (1..threads.max(1))
             .map_while(|k| {
                 let shared = Arc::clone(&shared);
                 // If a thread cannot be created, the others do its share.
-                thread::Builder::new().name(format!("{name}-{k}")).spawn(move || shared.run_member(k)).ok()
+                thread::Builder::new().name(format!("{name}-{k}")).spawn(move || shared.run_worker(k)).ok()
             })
             .collect::<Vec<_>>();
         // A starting thread allocates; afterwards nothing does.
-        while shared.started.load(Ordering::Relaxed) < members.len() {
+        while shared.started.load(Ordering::Relaxed) < workers.len() {
             thread::yield_now();
         }
-        Self { shared, members }
+        Self { shared, workers }
     }
 
     /// Returns the number of threads, including the caller: fewer than requested if the system refused some.
     pub fn thread_count(&self) -> usize {
-        self.members.len() + 1
+        self.workers.len() + 1
     }
 
     /// Calls `work` once with each of `0..parts`, spread over the threads, and returns when all are done.
@@ -104,7 +104,7 @@ impl ThreadPool {
     /// # Panics
     /// Panics if a part panicked, after the others are done.
     pub fn run(&mut self, parts: usize, work: &(dyn Fn(usize) + Sync)) {
-        self.run_members(parts, &|_, part| work(part));
+        self.run_workers(parts, &|_, part| work(part));
     }
 
     /// Same as [`ThreadPool::run`], with one element of `scratch` for each thread.
@@ -113,11 +113,11 @@ impl ThreadPool {
     /// Panics like [`ThreadPool::run`], and if `scratch` is too short.
     pub fn run_with<S: Send>(&mut self, scratch: &mut [S], parts: usize, work: &(dyn Fn(&mut S, usize) + Sync)) {
         assert!(scratch.len() >= self.thread_count(), "every thread needs its scratch");
-        let base = Base(scratch.as_mut_ptr());
-        self.run_members(parts, &|member, part| {
-            // SAFETY: `member` is below the pool's size, which `scratch` covers, and each member is one thread that
+        let base = BasePtr(scratch.as_mut_ptr());
+        self.run_workers(parts, &|worker, part| {
+            // SAFETY: `worker` is below the pool's size, which `scratch` covers, and each worker is one thread that
             // does one part at a time; so no other thread uses this element, and `scratch` is borrowed throughout.
-            work(unsafe { &mut *base.at(member) }, part);
+            work(unsafe { &mut *base.at(worker) }, part);
         });
     }
 
@@ -126,7 +126,7 @@ impl ThreadPool {
     /// # Panics
     /// Panics like [`ThreadPool::run`], and if there are more items.
     pub fn run_each<T: Send>(&mut self, items: impl Iterator<Item = T>, work: &(dyn Fn(T) + Sync)) {
-        self.run_each_with(&mut [(); AT_WORK as usize], items, &|(), item| work(item));
+        self.run_each_with(&mut [(); WORKERS_MASK as usize], items, &|(), item| work(item));
     }
 
     /// Same as [`Self::run_each`], with one element of `scratch` for each thread ([`ThreadPool::run_with`]).
@@ -142,7 +142,7 @@ impl ThreadPool {
         let mut waiting: [Option<T>; MAX_ITEMS] = std::array::from_fn(|_| items.next());
         assert!(items.next().is_none(), "more items than places");
         let count = waiting.iter().flatten().count();
-        let base = Base(waiting.as_mut_ptr());
+        let base = BasePtr(waiting.as_mut_ptr());
         self.run_with(scratch, count, &|scratch, part| {
             // SAFETY: `part` is below `count`, the length of `waiting`, and runs once: no other thread uses this
             // element.
@@ -152,34 +152,34 @@ impl ThreadPool {
         });
     }
 
-    /// Opens the gate for a pass, runs parts like a member, and returns once all are done and no member is at work.
-    fn run_members(&mut self, parts: usize, work: Work<'_>) {
-        if self.members.is_empty() || parts < 2 {
+    /// Opens the gate for a pass, runs parts like a worker, and returns once all are done and no worker is at work.
+    fn run_workers(&mut self, parts: usize, work: Work<'_>) {
+        if self.workers.is_empty() || parts < 2 {
             return (0..parts).for_each(|part| work(0, part));
         }
         let shared = &*self.shared;
-        // SAFETY: only the lifetime changes. The reference is removed from `shared.work` below, before `run_members`
-        // returns and only once no member is at work; no member can enter after the gate is closed.
+        // SAFETY: only the lifetime changes. The reference is removed from `shared.work` below, before `run_workers`
+        // returns and only once no worker is at work; no worker can enter after the gate is closed.
         let work: Work<'static> = unsafe { std::mem::transmute::<Work<'_>, Work<'static>>(work) };
         shared.next.store(0, Ordering::Relaxed);
-        // SAFETY: the gate is closed and no member is at work (see the wait below), so no other thread touches the
+        // SAFETY: the gate is closed and no worker is at work (see the wait below), so no other thread touches the
         // cell.
         unsafe { *shared.work.get() = Some(Pass { work, parts }) };
-        // Release: members that see the gate open also see the pass.
+        // Release: workers that see the gate open also see the pass.
         let closed = shared.gate.load(Ordering::Relaxed);
         shared.gate.store((closed & !(EPOCH - 1)).wrapping_add(EPOCH) | OPEN, Ordering::Release);
-        let helpers = self.members.iter().take(parts - 1);
+        let helpers = self.workers.iter().take(parts - 1);
         helpers.map(JoinHandle::thread).for_each(Thread::unpark);
 
         shared.run_parts(0, Pass { work, parts });
         shared.gate.fetch_and(!OPEN, Ordering::Relaxed);
         let mut turns = 0u32;
-        // Acquire: the members' writes are visible once their leaving is.
-        while shared.gate.load(Ordering::Acquire) & AT_WORK != 0 {
+        // Acquire: the workers' writes are visible once their leaving is.
+        while shared.gate.load(Ordering::Acquire) & WORKERS_MASK != 0 {
             turns += 1;
             if turns.is_multiple_of(64) { thread::yield_now() } else { std::hint::spin_loop() }
         }
-        // SAFETY: the gate is closed and no member is at work.
+        // SAFETY: the gate is closed and no worker is at work.
         unsafe { *shared.work.get() = None };
         if shared.panicked.swap(false, Ordering::Relaxed) {
             resume_unwind(Box::new("a part of a pass panicked"));
@@ -188,8 +188,8 @@ impl ThreadPool {
 }
 
 impl Shared {
-    /// Runs a member's thread: enters each pass once, if it is awake in time, until the pool is dropped.
-    fn run_member(&self, member: usize) {
+    /// Runs a worker's thread: enters each pass once, if it is awake in time, until the pool is dropped.
+    fn run_worker(&self, worker: usize) {
         self.started.fetch_add(1, Ordering::Relaxed);
         let mut last_epoch = 0;
         loop {
@@ -205,35 +205,35 @@ impl Shared {
                 turns += 1;
                 if turns < SPINS { std::hint::spin_loop() } else { thread::park() }
             };
-            // Acquire pairs with the release in `run_members`. A failure means that the gate changed: try again.
+            // Acquire pairs with the release in `run_workers`. A failure means that the gate changed: try again.
             if self.gate.compare_exchange(gate, gate + 1, Ordering::Acquire, Ordering::Relaxed).is_err() {
                 continue;
             }
             last_epoch = gate / EPOCH;
-            // SAFETY: entered through the open gate, so `run_members` neither writes the cell nor returns until this
-            // member leaves.
+            // SAFETY: entered through the open gate, so `run_workers` neither writes the cell nor returns until this
+            // worker leaves.
             if let Some(pass) = unsafe { *self.work.get() } {
-                self.run_parts(member, pass);
+                self.run_parts(worker, pass);
             }
-            // Release: `run_members` sees this member's writes once it sees the member leave.
+            // Release: `run_workers` sees this worker's writes once it sees the worker leave.
             self.gate.fetch_sub(1, Ordering::Release);
         }
     }
 
     /// Runs parts of a pass until none is left; records a panic instead of propagating it.
-    fn run_parts(&self, member: usize, pass: Pass) {
+    fn run_parts(&self, worker: usize, pass: Pass) {
         let work = AssertUnwindSafe(|| {
             loop {
                 let part = self.next.fetch_add(1, Ordering::Relaxed);
                 if part >= pass.parts {
                     break;
                 }
-                (pass.work)(member, part);
+                (pass.work)(worker, part);
             }
         });
         if let Err(thrown) = catch_unwind(work) {
-            // Dropping the payload may panic: a member would then never leave, or `run_members` would return with
-            // members at work.
+            // Dropping the payload may panic: a worker would then never leave, or `run_workers` would return with
+            // workers at work.
             if let Err(again) = catch_unwind(AssertUnwindSafe(|| drop(thrown))) {
                 std::mem::forget(again);
             }
@@ -245,10 +245,10 @@ impl Shared {
 impl Drop for ThreadPool {
     fn drop(&mut self) {
         self.shared.stop.store(true, Ordering::Relaxed);
-        for member in self.members.drain(..) {
-            member.thread().unpark();
-            // A member catches its panics, and there is no caller left to report one to.
-            let _ = member.join();
+        for worker in self.workers.drain(..) {
+            worker.thread().unpark();
+            // A worker catches its panics, and there is no caller left to report one to.
+            let _ = worker.join();
         }
     }
 }
@@ -258,7 +258,7 @@ impl Drop for ThreadPool {
 pub struct DisjointParts<'a, T> {
     base: *mut T,
     length: usize,
-    each: usize,
+    part_len: usize,
     taken: &'a [AtomicBool],
 }
 
@@ -266,12 +266,12 @@ pub struct DisjointParts<'a, T> {
 unsafe impl<T: Send> Sync for DisjointParts<'_, T> {}
 
 impl<'a, T> DisjointParts<'a, T> {
-    /// Splits `data` into parts of `each` values (the last may be shorter); `taken` has a flag for every part.
-    pub fn new(data: &'a mut [T], each: usize, taken: &'a mut [AtomicBool]) -> Self {
-        let parts = data.len().div_ceil(each.max(1));
-        assert!(each > 0 && parts <= taken.len(), "a shelf needs a flag for every part");
+    /// Splits `data` into parts of `part_len` values (the last may be shorter); `taken` has a flag for every part.
+    pub fn new(data: &'a mut [T], part_len: usize, taken: &'a mut [AtomicBool]) -> Self {
+        let parts = data.len().div_ceil(part_len.max(1));
+        assert!(part_len > 0 && parts <= taken.len(), "a shelf needs a flag for every part");
         taken.iter_mut().for_each(|flag| *flag.get_mut() = false);
-        Self { base: data.as_mut_ptr(), length: data.len(), each, taken }
+        Self { base: data.as_mut_ptr(), length: data.len(), part_len, taken }
     }
 
     /// Returns the part `index`.
@@ -281,11 +281,11 @@ impl<'a, T> DisjointParts<'a, T> {
     #[allow(clippy::mut_from_ref)]
     pub fn part(&self, index: usize) -> &mut [T] {
         // An overflowing product would be the start of another part.
-        let start = index.checked_mul(self.each).filter(|&start| start < self.length);
+        let start = index.checked_mul(self.part_len).filter(|&start| start < self.length);
         let Some(start) = start.filter(|_| !self.taken[index].swap(true, Ordering::Relaxed)) else {
             panic!("each part is taken once");
         };
-        let length = self.each.min(self.length - start);
+        let length = self.part_len.min(self.length - start);
         // SAFETY: inside the allocation, which is borrowed for `'a`; parts do not overlap and each is returned once.
         unsafe { std::slice::from_raw_parts_mut(self.base.add(start), length) }
     }

@@ -32,12 +32,12 @@ struct State {
 }
 
 /// The request handler; `None` once the run ends.
-type Slot = Arc<Mutex<Option<Arc<Handler>>>>;
+type HandlerSlot = Arc<Mutex<Option<Arc<Handler>>>>;
 
 /// The run's D-Bus object.
 #[derive(Clone)]
-struct Camera {
-    handler: Slot,
+struct CameraObject {
+    handler: HandlerSlot,
     state: Arc<Mutex<State>>,
 }
 
@@ -45,7 +45,7 @@ fn lock<T>(what: &Mutex<T>) -> MutexGuard<'_, T> {
     what.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-impl Camera {
+impl CameraObject {
     fn state(&self) -> MutexGuard<'_, State> {
         lock(&self.state)
     }
@@ -62,7 +62,7 @@ impl Camera {
 }
 
 #[interface(name = "io.github.bokehcam.Camera")]
-impl Camera {
+impl CameraObject {
     /// Switches between on and off.
     fn toggle(&self) -> fdo::Result<()> {
         self.send_request(Request::Toggle)
@@ -98,7 +98,7 @@ impl Camera {
 
 /// A run's presence on the bus, until this is dropped.
 pub struct Bus {
-    handler: Slot,
+    handler: HandlerSlot,
 }
 
 /// Publishes a run with these presets on the bus. Returns the handler to use from now on in place of `handler`: it also
@@ -109,12 +109,12 @@ pub struct Bus {
 pub fn serve(handler: Arc<Handler>, presets: Vec<String>) -> Result<(Bus, Arc<Handler>), String> {
     let state = Arc::new(Mutex::new(State { presets, ..State::default() }));
     let (changed, changes) = mpsc::channel();
-    let noted = Arc::clone(&state);
+    let recorded_state = Arc::clone(&state);
     let handler: Arc<Handler> = Arc::new(move |request: Request| {
-        let asked = request.clone();
+        let original_request = request.clone();
         let answer = handler(request);
         if let Answer::Done { status, .. } = &answer {
-            record_change(&mut lock(&noted), &asked, status);
+            record_change(&mut lock(&recorded_state), &original_request, status);
             // The bus thread may have ended.
             let _ = changed.send(());
         }
@@ -122,8 +122,8 @@ pub fn serve(handler: Arc<Handler>, presets: Vec<String>) -> Result<(Bus, Arc<Ha
     });
     // Fills the initial state.
     handler(Request::Status);
-    let slot: Slot = Arc::new(Mutex::new(Some(Arc::clone(&handler))));
-    let camera = Camera { handler: Arc::clone(&slot), state: Arc::clone(&state) };
+    let slot: HandlerSlot = Arc::new(Mutex::new(Some(Arc::clone(&handler))));
+    let camera = CameraObject { handler: Arc::clone(&slot), state: Arc::clone(&state) };
     let refused = |error: zbus::Error| format!("the session's message bus: {error}");
     let bus = Builder::session()
         .and_then(|builder| builder.serve_at(PATH, camera.clone()))
@@ -151,9 +151,9 @@ pub fn serve(handler: Arc<Handler>, presets: Vec<String>) -> Result<(Bus, Arc<Ha
 }
 
 /// Records what a request has changed.
-fn record_change(state: &mut State, asked: &Request, status: &Status) {
+fn record_change(state: &mut State, original_request: &Request, status: &Status) {
     (state.is_on, state.source) = (status.on, status.source.clone());
-    match asked {
+    match original_request {
         Request::Preset { name } => state.preset.clone_from(name),
         Request::Set { .. } => state.preset.clear(),
         _ => {}

@@ -8,9 +8,9 @@ use std::time::{Duration, Instant};
 use super::{Answer, ControlError, Name, Request, folder, socket};
 
 /// Time limit for an answer: longer than any limit within the run.
-const PATIENCE: Duration = Duration::from_secs(5);
+const ANSWER_TIMEOUT: Duration = Duration::from_secs(5);
 /// Interval between attempts to connect.
-const TICK: Duration = Duration::from_millis(20);
+const POLL_INTERVAL: Duration = Duration::from_millis(20);
 /// Maximum length of an answer.
 const MAX_ANSWER_BYTES: u64 = 1 << 20;
 
@@ -18,58 +18,60 @@ const MAX_ANSWER_BYTES: u64 = 1 << 20;
 ///
 /// # Errors
 /// The user has no folder for sockets.
-pub fn runs() -> Result<Vec<Name>, ControlError> {
-    let folder = folder::path()?;
-    Ok(folder::names(&folder).into_iter().filter(|name| is_alive(&folder, name)).collect())
+pub fn list_run_names() -> Result<Vec<Name>, ControlError> {
+    let folder = folder::socket_folder()?;
+    Ok(folder::list_names(&folder).into_iter().filter(|name| is_alive(&folder, name)).collect())
 }
 
 /// Sends a request to the run of this name, or to the only one, and waits for its answer.
 ///
 /// # Errors
 /// There is no such run, there are several, or the run does not answer.
-pub fn ask(name: Option<&Name>, request: &Request) -> Result<Answer, ControlError> {
-    let folder = folder::path()?;
-    let there = runs()?;
+pub fn send_request(name: Option<&Name>, request: &Request) -> Result<Answer, ControlError> {
+    let folder = folder::socket_folder()?;
+    let there = list_run_names()?;
     let texts = |names: &[Name]| names.iter().map(Name::to_string).collect();
     let name = match (name, there.as_slice()) {
         (Some(name), there) if there.contains(name) => name,
-        (Some(name), there) => return Err(ControlError::NoSuch { name: name.clone(), there: texts(there) }),
+        (Some(name), there) => return Err(ControlError::NoSuchRun { name: name.clone(), there: texts(there) }),
         (None, [only]) => only,
-        (None, []) => return Err(ControlError::Nothing),
-        (None, several) => return Err(ControlError::Several(texts(several))),
+        (None, []) => return Err(ControlError::NoRuns),
+        (None, several) => return Err(ControlError::SeveralRuns(texts(several))),
     };
-    let silent = |why: String| ControlError::Silent { name: name.to_string(), why };
-    let answer = exchange(&folder::socket_of(&folder, name), request).map_err(|error| {
+    let silent = |why: String| ControlError::NoAnswer { name: name.to_string(), why };
+    let answer = send_and_receive(&folder::socket_path(&folder, name), request).map_err(|error| {
         silent(match error.kind() {
-            ErrorKind::WouldBlock | ErrorKind::TimedOut => "it hangs, or is still beginning".into(),
+            ErrorKind::WouldBlock | ErrorKind::TimedOut => "it hangs, or is still starting".into(),
             _ => error.to_string(),
         })
     })?;
     if answer.is_empty() {
-        return Err(silent("it ended just now".into()));
+        return Err(silent("it has just ended".into()));
     }
     serde_json::from_slice(&answer).map_err(|error| silent(format!("it may be of another version: {error}")))
 }
 
 /// Returns whether a run listens; a run whose queue of connections is full is alive as well.
 fn is_alive(folder: &Path, name: &Name) -> bool {
-    match socket::connect(&folder::socket_of(folder, name)) {
+    match socket::connect(&folder::socket_path(folder, name)) {
         Ok(_) => true,
         Err(error) => !matches!(error.kind(), ErrorKind::ConnectionRefused | ErrorKind::NotFound),
     }
 }
 
 /// Sends a request and reads the answer until end of file.
-fn exchange(path: &Path, request: &Request) -> io::Result<Vec<u8>> {
-    let until = Instant::now() + PATIENCE;
+fn send_and_receive(path: &Path, request: &Request) -> io::Result<Vec<u8>> {
+    let until = Instant::now() + ANSWER_TIMEOUT;
     let mut stream = loop {
         match socket::connect(path) {
             // The queue of connections is full: try again.
-            Err(error) if error.kind() == ErrorKind::WouldBlock && Instant::now() < until => thread::sleep(TICK),
+            Err(error) if error.kind() == ErrorKind::WouldBlock && Instant::now() < until => {
+                thread::sleep(POLL_INTERVAL)
+            }
             connected => break connected?,
         }
     };
-    stream.set_write_timeout(Some(PATIENCE))?;
+    stream.set_write_timeout(Some(ANSWER_TIMEOUT))?;
     let mut line = serde_json::to_vec(request)?;
     line.push(b'\n');
     match stream.write_all(&line) {

@@ -16,32 +16,35 @@ use super::{ControlError, Name, socket};
 use crate::files::trusted::absolute;
 
 /// Time limit for the folder's lock, which runs hold briefly while they start.
-const LOCK_PATIENCE: Duration = Duration::from_secs(1);
-const TICK: Duration = Duration::from_millis(10);
+const LOCK_TIMEOUT: Duration = Duration::from_secs(1);
+const POLL_INTERVAL: Duration = Duration::from_millis(10);
 /// File extension of sockets.
-const ENDING: &str = ".sock";
+const SOCKET_EXTENSION: &str = ".sock";
 
 /// Returns the folder of the sockets, which may not exist yet.
 ///
 /// # Errors
 /// The user has no runtime folder, or the folder is not private to the user.
-pub(super) fn path() -> Result<PathBuf, ControlError> {
+pub(super) fn socket_folder() -> Result<PathBuf, ControlError> {
     let refuse = |what: String| ControlError::NoFolder(what);
     let runtime = absolute("XDG_RUNTIME_DIR")
-        .ok_or_else(|| refuse("there is no runtime folder: XDG_RUNTIME_DIR names no whole path".into()))?;
+        .ok_or_else(|| refuse("there is no runtime folder: XDG_RUNTIME_DIR is not an absolute path".into()))?;
     if !runtime.is_dir() {
-        return Err(refuse(format!("there is no runtime folder: XDG_RUNTIME_DIR is {}", runtime.display())));
+        return Err(refuse(format!(
+            "there is no runtime folder: XDG_RUNTIME_DIR is {}, which is not a folder",
+            runtime.display()
+        )));
     }
     let folder = runtime.join("bokehcam");
     match folder.symlink_metadata() {
         Err(error) if error.kind() == ErrorKind::NotFound => Ok(folder),
         Err(error) => Err(refuse(format!("{}: {error}", folder.display()))),
-        Ok(found) if !found.is_dir() => Err(refuse(format!("{} is no folder", folder.display()))),
+        Ok(found) if !found.is_dir() => Err(refuse(format!("{} is not a folder", folder.display()))),
         Ok(found) if found.uid() != geteuid().as_raw() => {
             Err(refuse(format!("{} belongs to another user", folder.display())))
         }
         Ok(found) if found.mode() & 0o077 != 0 => {
-            Err(refuse(format!("{0} is open to others: `chmod 700 {0}`", folder.display())))
+            Err(refuse(format!("{0} is accessible to others: run `chmod 700 {0}`", folder.display())))
         }
         Ok(_) => Ok(folder),
     }
@@ -50,16 +53,16 @@ pub(super) fn path() -> Result<PathBuf, ControlError> {
 /// Creates the folder if it does not exist, and locks it against other starting runs until the file is dropped.
 ///
 /// # Errors
-/// Same as for [`path`]; or the folder cannot be created.
+/// Same as for [`socket_folder`]; or the folder cannot be created.
 pub(super) fn create_locked() -> Result<(PathBuf, File), ControlError> {
-    let folder = path()?;
+    let folder = socket_folder()?;
     let refuse = |error: io::Error| ControlError::NoFolder(format!("{}: {error}", folder.display()));
     match DirBuilder::new().mode(0o700).create(&folder) {
         Err(error) if error.kind() != ErrorKind::AlreadyExists => return Err(refuse(error)),
         _ => {}
     }
     let lock = File::open(&folder).map_err(refuse)?;
-    let until = Instant::now() + LOCK_PATIENCE;
+    let until = Instant::now() + LOCK_TIMEOUT;
     while let Err(error) = flock(&lock, FlockOperation::NonBlockingLockExclusive) {
         if error != Errno::WOULDBLOCK {
             return Err(refuse(error.into()));
@@ -67,40 +70,40 @@ pub(super) fn create_locked() -> Result<(PathBuf, File), ControlError> {
         if Instant::now() >= until {
             return Err(ControlError::NoFolder(format!("{} is locked by another program", folder.display())));
         }
-        thread::sleep(TICK);
+        thread::sleep(POLL_INTERVAL);
     }
     // Another user may have created it just now.
-    path()?;
+    socket_folder()?;
     Ok((folder.clone(), lock))
 }
 
 /// Returns the path of a run's socket.
-pub(super) fn socket_of(folder: &Path, name: &Name) -> PathBuf {
-    folder.join(format!("{name}{ENDING}"))
+pub(super) fn socket_path(folder: &Path, name: &Name) -> PathBuf {
+    folder.join(format!("{name}{SOCKET_EXTENSION}"))
 }
 
 /// Returns the names of all sockets in the folder that belong to this user, sorted.
-pub(super) fn names(folder: &Path) -> Vec<Name> {
+pub(super) fn list_names(folder: &Path) -> Vec<Name> {
     let entries = fs::read_dir(folder).into_iter().flatten().flatten();
     let mut names: Vec<Name> = entries
-        .filter(|entry| is_ours(&entry.path()))
-        .filter_map(|entry| entry.file_name().to_str()?.strip_suffix(ENDING)?.parse().ok())
+        .filter(|entry| is_own_socket(&entry.path()))
+        .filter_map(|entry| entry.file_name().to_str()?.strip_suffix(SOCKET_EXTENSION)?.parse().ok())
         .collect();
     names.sort_by(|one, other| one.as_str().cmp(other.as_str()));
     names
 }
 
 /// Returns whether the path is a socket of this user.
-pub(super) fn is_ours(path: &Path) -> bool {
+pub(super) fn is_own_socket(path: &Path) -> bool {
     path.symlink_metadata().is_ok_and(|found| found.file_type().is_socket() && found.uid() == geteuid().as_raw())
 }
 
 /// Removes the sockets of dead runs; the folder must be locked.
-pub(super) fn sweep(folder: &Path) {
-    for name in names(folder) {
-        let path = socket_of(folder, &name);
+pub(super) fn remove_dead_sockets(folder: &Path) {
+    for name in list_names(folder) {
+        let path = socket_path(folder, &name);
         if socket::connect(&path).is_err_and(|error| error.kind() == ErrorKind::ConnectionRefused) {
-            tracing::debug!("{}: its run is dead", path.display());
+            tracing::debug!("{}: removed, as its run has ended", path.display());
             // A socket that cannot be removed only blocks its name.
             let _ = fs::remove_file(&path);
         }

@@ -12,7 +12,7 @@ const MAX_BYTES: usize = 32;
 
 impl Name {
     /// Returns the default names, to be tried in order: `base`, `base-2` and so on.
-    pub(super) fn numbered(base: &'static str) -> impl Iterator<Item = Self> {
+    pub(super) fn default_names(base: &'static str) -> impl Iterator<Item = Self> {
         (1..=u16::MAX).map(move |number| Self(if number == 1 { base.into() } else { format!("{base}-{number}") }))
     }
 
@@ -54,7 +54,7 @@ mod tests {
         for bad in ["", ".", "..", ".hidden", "-n", "a/b", "a b", "café", "x\n", &"x".repeat(33)] {
             assert!(bad.parse::<Name>().unwrap_err().contains("letters"), "{bad:?}");
         }
-        let names: Vec<String> = Name::numbered("stream").take(3).map(|name| name.to_string()).collect();
+        let names: Vec<String> = Name::default_names("stream").take(3).map(|name| name.to_string()).collect();
         assert_eq!(names, ["stream", "stream-2", "stream-3"]);
     }
 }

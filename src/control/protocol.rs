@@ -71,7 +71,7 @@ pub enum Answer {
 
 impl Answer {
     /// Creates a refusal because the request is invalid.
-    pub fn usage(error: impl Into<String>) -> Self {
+    pub fn invalid_request(error: impl Into<String>) -> Self {
         Self::Refused { error: error.into(), usage: true }
     }
 
@@ -133,7 +133,7 @@ mod tests {
         for bad in [r#"{"do":"dance"}"#, r#"{"do":"set"}"#, r#"{"do":"preset","name":"x","y":1}"#, "[]", "off"] {
             assert!(serde_json::from_str::<Request>(bad).is_err(), "{bad}");
         }
-        let refused = Answer::usage("no");
+        let refused = Answer::invalid_request("no");
         let text = serde_json::to_string(&refused).unwrap();
         assert_eq!(text, r#"{"error":"no","usage":true}"#);
         assert_eq!(serde_json::from_str::<Answer>(&text).unwrap(), refused);

@@ -15,13 +15,13 @@ use rustix::net::{Shutdown, shutdown};
 use super::{Answer, ControlError, MAX_REQUEST_BYTES, Name, Request, folder, socket};
 
 /// Time limit for a client to send its request, and again to take the answer.
-pub const PATIENCE: Duration = Duration::from_secs(1);
+pub const CLIENT_TIMEOUT: Duration = Duration::from_secs(1);
 /// Refuses connections above this number.
 pub const MAX_CLIENTS: usize = 8;
 /// Time to wait for a request that will be refused.
 const REFUSAL_TIMEOUT: Duration = Duration::from_millis(10);
 /// Interval at which a waiting thread checks whether the run is over.
-const TICK: Duration = Duration::from_millis(50);
+const POLL_INTERVAL: Duration = Duration::from_millis(50);
 
 /// Answers requests, from several threads at once.
 pub type Handler = dyn Fn(Request) -> Answer + Send + Sync;
@@ -40,22 +40,22 @@ pub struct Claim {
 ///
 /// # Errors
 /// The user has no runtime folder, or the chosen name is taken.
-pub fn claim(chosen: Option<&Name>, base: &'static str) -> Result<Claim, ControlError> {
+pub fn claim_name(chosen: Option<&Name>, base: &'static str) -> Result<Claim, ControlError> {
     let (folder, _lock): (PathBuf, File) = folder::create_locked()?;
-    folder::sweep(&folder);
-    let free = |name: &Name| folder::socket_of(&folder, name).symlink_metadata().is_err();
+    folder::remove_dead_sockets(&folder);
+    let free = |name: &Name| folder::socket_path(&folder, name).symlink_metadata().is_err();
     let name = match chosen {
         Some(name) if free(name) => name.clone(),
         Some(name) => {
-            let path = folder::socket_of(&folder, name);
-            let is_run = folder::is_ours(&path);
-            return Err(if is_run { ControlError::Taken(name.clone()) } else { ControlError::InTheWay(path) });
+            let path = folder::socket_path(&folder, name);
+            let is_run = folder::is_own_socket(&path);
+            return Err(if is_run { ControlError::NameTaken(name.clone()) } else { ControlError::NotASocket(path) });
         }
-        None => Name::numbered(base)
+        None => Name::default_names(base)
             .find(free)
             .ok_or_else(|| ControlError::NoFolder(format!("{} is full", folder.display())))?,
     };
-    let path = folder::socket_of(&folder, &name);
+    let path = folder::socket_path(&folder, &name);
     let refuse = |error: io::Error| ControlError::NoFolder(format!("{}: {error}", path.display()));
     let listener = UnixListener::bind(&path).map_err(refuse)?;
     let made = path.symlink_metadata().map_err(refuse)?;
@@ -73,11 +73,11 @@ impl Claim {
     /// # Errors
     /// The system cannot create a thread.
     pub fn serve(self, handler: Arc<Handler>) -> io::Result<Server> {
-        let over = Arc::new(AtomicBool::new(false));
-        let (listener, seen) = (self.listener.try_clone()?, Arc::clone(&over));
+        let is_over = Arc::new(AtomicBool::new(false));
+        let (listener, seen) = (self.listener.try_clone()?, Arc::clone(&is_over));
         let thread =
             thread::Builder::new().name("control".into()).spawn(move || accept_clients(&listener, &*handler, &seen))?;
-        Ok(Server { claim: self, over, thread: Some(thread) })
+        Ok(Server { claim: self, is_over, thread: Some(thread) })
     }
 }
 
@@ -94,7 +94,7 @@ impl Drop for Claim {
 /// A run's server, which answers until it is dropped.
 pub struct Server {
     claim: Claim,
-    over: Arc<AtomicBool>,
+    is_over: Arc<AtomicBool>,
     thread: Option<JoinHandle<()>>,
 }
 
@@ -107,7 +107,7 @@ impl Server {
 
 impl Drop for Server {
     fn drop(&mut self) {
-        self.over.store(true, Ordering::Relaxed);
+        self.is_over.store(true, Ordering::Relaxed);
         // Wakes the accepting thread with an error.
         let _ = shutdown(&self.claim.listener, Shutdown::Both);
         // A panic of the thread was printed already.
@@ -116,27 +116,27 @@ impl Drop for Server {
 }
 
 /// Accepts connections until the run is over, then waits for those in progress.
-fn accept_clients(listener: &UnixListener, handler: &Handler, over: &AtomicBool) {
+fn accept_clients(listener: &UnixListener, handler: &Handler, is_over: &AtomicBool) {
     let clients = AtomicUsize::new(0);
     thread::scope(|scope| {
-        while !over.load(Ordering::Relaxed) {
+        while !is_over.load(Ordering::Relaxed) {
             let stream = match listener.accept() {
                 Ok((stream, _)) => stream,
-                Err(_) if over.load(Ordering::Relaxed) => break,
+                Err(_) if is_over.load(Ordering::Relaxed) => break,
                 Err(error) => {
                     tracing::debug!("control: {error}");
                     // For example too many open files: others may be closed meanwhile.
-                    thread::sleep(TICK);
+                    thread::sleep(POLL_INTERVAL);
                     continue;
                 }
             };
             let Some(slot) = ClientSlot::acquire(&clients) else {
-                refuse(stream);
+                refuse_client(stream);
                 continue;
             };
             let serve = move || {
                 let _slot = slot;
-                serve(&stream, handler, over);
+                serve_client(&stream, handler, is_over);
             };
             // If there is no thread, dropping the closure closes the connection.
             let _ = thread::Builder::new().name("control-client".into()).spawn_scoped(scope, serve);
@@ -145,13 +145,13 @@ fn accept_clients(listener: &UnixListener, handler: &Handler, over: &AtomicBool)
 }
 
 /// Refuses a client above the limit, after reading its request: closing with unread data may discard the answer.
-fn refuse(stream: UnixStream) {
+fn refuse_client(stream: UnixStream) {
     let read =
         stream.set_read_timeout(Some(REFUSAL_TIMEOUT)).and_then(|()| (&stream).read(&mut [0; MAX_REQUEST_BYTES]));
     if let Err(error) = read {
-        tracing::debug!("control: refused before it asked: {error}");
+        tracing::debug!("control: refused a client before its request: {error}");
     }
-    answer(&stream, &Answer::failed("too many ask at once: ask again"));
+    send_answer(&stream, &Answer::failed("too many requests at once: try again"));
 }
 
 /// A slot among the clients.
@@ -175,30 +175,32 @@ impl Drop for ClientSlot<'_> {
 }
 
 /// Reads one request and sends one answer.
-fn serve(stream: &UnixStream, handler: &Handler, over: &AtomicBool) {
+fn serve_client(stream: &UnixStream, handler: &Handler, is_over: &AtomicBool) {
     if !socket::is_own_user(stream) {
-        tracing::warn!("control: another user asked, and was refused");
-        return answer(stream, &Answer::failed("this run is another user's"));
+        tracing::warn!("control: refused a request of another user");
+        return send_answer(stream, &Answer::failed("this run belongs to another user"));
     }
-    match read_request(stream, over) {
+    match read_request(stream, is_over) {
         Ok(None) => {}
         Ok(Some(line)) => match serde_json::from_slice(&line) {
-            Ok(request) => answer(stream, &handler(request)),
-            Err(error) => answer(stream, &Answer::usage(format!("this is no request: {error}"))),
+            Ok(request) => send_answer(stream, &handler(request)),
+            Err(error) => {
+                send_answer(stream, &Answer::invalid_request(format!("this is not a valid request: {error}")))
+            }
         },
-        Err(what) => answer(stream, &Answer::usage(what)),
+        Err(what) => send_answer(stream, &Answer::invalid_request(what)),
     }
 }
 
 /// Reads a line; `None` if no answer is needed: nothing was sent, or the run is over.
-fn read_request(mut stream: &UnixStream, over: &AtomicBool) -> Result<Option<Vec<u8>>, String> {
-    let until = Instant::now() + PATIENCE;
+fn read_request(mut stream: &UnixStream, is_over: &AtomicBool) -> Result<Option<Vec<u8>>, String> {
+    let until = Instant::now() + CLIENT_TIMEOUT;
     let (mut line, mut buffer) = (Vec::new(), [0; 1024]);
-    stream.set_read_timeout(Some(TICK)).map_err(|error| error.to_string())?;
-    while !over.load(Ordering::Relaxed) {
+    stream.set_read_timeout(Some(POLL_INTERVAL)).map_err(|error| error.to_string())?;
+    while !is_over.load(Ordering::Relaxed) {
         match stream.read(&mut buffer) {
             Ok(0) if line.is_empty() => return Ok(None),
-            Ok(0) => return Err("the request has no end: it is a line".into()),
+            Ok(0) => return Err("the request is incomplete: it must be one line".into()),
             Ok(read) => {
                 let end = buffer[..read].iter().position(|&byte| byte == b'\n');
                 line.extend_from_slice(&buffer[..end.unwrap_or(read)]);
@@ -213,15 +215,15 @@ fn read_request(mut stream: &UnixStream, over: &AtomicBool) -> Result<Option<Vec
             Err(_) => return Ok(None),
         }
         if Instant::now() >= until {
-            return Err(format!("the request did not come within {} s", PATIENCE.as_secs()));
+            return Err(format!("the request did not arrive within {} s", CLIENT_TIMEOUT.as_secs()));
         }
     }
     Ok(None)
 }
 
 /// Sends an answer; errors are ignored, as the client may have gone.
-fn answer(mut stream: &UnixStream, answer: &Answer) {
+fn send_answer(mut stream: &UnixStream, answer: &Answer) {
     let Ok(mut line) = serde_json::to_vec(answer) else { return };
     line.push(b'\n');
-    let _ = stream.set_write_timeout(Some(PATIENCE)).and_then(|()| stream.write_all(&line));
+    let _ = stream.set_write_timeout(Some(CLIENT_TIMEOUT)).and_then(|()| stream.write_all(&line));
 }

@@ -125,7 +125,7 @@ impl Reduced {
         let width = from_width.min(map.width as usize).min(MAX_COLUMNS);
         let height = (from_height * width / from_width).max(1);
         let mut gray = GrayImage::default();
-        gray.set_luma_of(color);
+        gray.set_luma_from(color);
         let mut luma = Vec::with_capacity(width * height);
         let mut reduced = DepthMap { width: width as u32, height: height as u32, ..DepthMap::default() };
         let place = |at: usize, to: usize, of: usize| at * of / to..((at + 1) * of / to).max(at * of / to + 1);
@@ -143,7 +143,7 @@ impl Reduced {
         }
         let known = reduced.metres.iter().map(|&z_m| DepthMap::is_known(z_m)).collect();
         Filler::new().fill(&mut reduced);
-        let inverse = reduced.metres.iter().map(|&z_m| DepthMap::inverse_of(z_m)).collect();
+        let inverse = reduced.metres.iter().map(|&z_m| DepthMap::inverse_depth(z_m)).collect();
         Self { width, height, luma, inverse, known }
     }
 

@@ -7,7 +7,7 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use crate::color::{encode_srgb, light_of_codes};
+use crate::color::{encode_srgb, srgb_to_linear_table};
 use crate::frame::scale::Scale;
 use crate::frame::{ColorImage, DepthMap, MixedPixel};
 use crate::optics::DepthCoc;
@@ -88,7 +88,7 @@ impl VirtualBackground {
         let light_of = |step: usize| (step as f32 / (CODES - 1) as f32).powi(2);
         Some(Self {
             behind: behind.clone(),
-            light: light_of_codes(),
+            light: srgb_to_linear_table(),
             codes: Box::new(std::array::from_fn(|step| encode_srgb(light_of(step)))),
             scaled: ColorImage::default(),
             scale: Scale::default(),
@@ -202,7 +202,7 @@ impl VirtualBackground {
 #[inline(always)]
 fn background_fraction(metres: f32, lens: &DepthCoc) -> f32 {
     let [none, all] = BEHIND;
-    let nearness = lens.far_m() * DepthMap::inverse_of(metres);
+    let nearness = lens.far_m() * DepthMap::inverse_depth(metres);
     let fraction = (none - nearness) / (none - all);
     let fraction = if fraction > 0.0 { fraction } else { 0.0 };
     if fraction < 1.0 { fraction } else { 1.0 }
@@ -213,7 +213,7 @@ fn pull_to_focus(metres: f32, fraction: f32, lens: &DepthCoc) -> f32 {
     if fraction == 0.0 || fraction == 1.0 {
         return if fraction == 0.0 { metres } else { lens.focus_m };
     }
-    let inverse = DepthMap::inverse_of(metres);
+    let inverse = DepthMap::inverse_depth(metres);
     (inverse + fraction * (lens.focus_m.recip() - inverse)).recip()
 }
 
@@ -273,7 +273,7 @@ mod tests {
     #[test]
     fn a_mixed_pixel_keeps_its_share_of_the_subject() {
         let (mut color, mut map) = row([1.0, 1.0, 1.0, 3.0, 3.0, 3.0]);
-        let light = light_of_codes();
+        let light = srgb_to_linear_table();
         // Subject of code 100 before a wall of code 200: the pixel between them is 60 % subject.
         let (near, far) = (light[100], light[200]);
         let own = encode_srgb(0.6 * near + 0.4 * far);

@@ -6,7 +6,7 @@
 //! for edge-aware image and video processing", 2011). One picture does not show on which side of the focal plane a
 //! surface lies, so all blur counts as behind it.
 
-use crate::frame::{ColorImage, DepthMap, luma_of};
+use crate::frame::{ColorImage, DepthMap, compute_luma};
 
 /// Standard deviation of the Gaussian for the re-blur, and of the one that denoises gradients, in pixels of a picture
 /// of [`WIDTH`] columns.
@@ -50,7 +50,7 @@ pub fn depth(color: &ColorImage) -> Option<DepthMap> {
     let mut map = DepthMap { subject_m: Some(DepthMap::SUBJECT_M), ..DepthMap::new(color.width, color.height) };
     for (metres, soft) in map.metres.iter_mut().zip(soft) {
         let nearness = 1.0 - ((soft - sharp_px) / (soft_px - sharp_px)).clamp(0.0, 1.0);
-        *metres = DepthMap::relative_m(nearness);
+        *metres = DepthMap::relative_to_metres(nearness);
     }
     Some(map)
 }
@@ -73,7 +73,7 @@ fn downscale(color: &ColorImage, by: usize) -> ColorImage {
 fn edge_blur(color: &ColorImage) -> Vec<f32> {
     let (width, height) = (color.width as usize, color.height as usize);
     let mut codes = vec![0; width * height];
-    luma_of(&color.rgb, &mut codes);
+    compute_luma(&color.rgb, &mut codes);
     let luma: Vec<f32> = codes.iter().map(|&code| f32::from(code)).collect();
     let own = gaussian(&luma, (width, height), DENOISE_PX);
     let again = gaussian(&luma, (width, height), DENOISE_PX.hypot(REBLUR_PX));

@@ -111,7 +111,7 @@ impl AutoFraming {
         for (row, y) in self.rows.iter_mut().zip((0..height).step_by(step)) {
             let metres = map.metres[y * width..][..width].iter().step_by(step);
             for (column, &metres) in self.columns.iter_mut().zip(metres) {
-                let inverse = DepthMap::inverse_of(metres);
+                let inverse = DepthMap::inverse_depth(metres);
                 let is_in_focus =
                     lens.far_m() * inverse >= *IN_FOCUS.start() && lens.near_m() * inverse <= *IN_FOCUS.end();
                 *column += u32::from(is_in_focus);

@@ -37,7 +37,7 @@ impl Misalignment {
             let mut moved = map.clone();
             let unknown: Vec<bool> = map.metres.iter().map(|&metres| !DepthMap::is_known(metres)).collect();
             let map_px = distance_px * map.width as i32 / color.width as i32;
-            moved.metres.iter_mut().for_each(|metres| *metres = DepthMap::inverse_of(*metres));
+            moved.metres.iter_mut().for_each(|metres| *metres = DepthMap::inverse_depth(*metres));
             Outlines::default().shift(&mut moved.metres, &unknown, map.width as usize, map_px, 0.0);
             // Back to metres: 0 is unknown in both units.
             moved.metres.iter_mut().filter(|value| **value > 0.0).for_each(|value| *value = value.recip());
@@ -67,7 +67,7 @@ impl fmt::Display for Misalignment {
                 write!(f, "{and}its outlines lie about {} px {side} those of the picture", distance_px.abs())
             }
             EdgeAlignment::Soft { width_px } => write!(f, "{and}its outlines are about {width_px} px wide"),
-            EdgeAlignment::Unrelated => write!(f, "{and}nowhere do its outlines meet those of the picture"),
+            EdgeAlignment::Unrelated => write!(f, "{and}none of its outlines match those of the picture"),
             EdgeAlignment::Meets | EdgeAlignment::Unknown => Ok(()),
         }
     }

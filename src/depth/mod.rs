@@ -121,7 +121,7 @@ pub enum DepthError {
     #[error(transparent)]
     Match(#[from] stereo::MatchError),
     /// A stereo frame lacks the picture of the right camera.
-    #[error("{source_name}: this frame has no right eye")]
+    #[error("{source_name}: this frame has no right picture")]
     OneEye {
         /// Name of the frame source.
         source_name: String,

@@ -3,7 +3,7 @@
 
 use pulp::{Arch, WithSimd};
 
-use crate::color::light_of_codes;
+use crate::color::srgb_to_linear_table;
 use crate::frame::ColorImage;
 
 /// Approximate number of columns of a reduced picture.
@@ -22,7 +22,7 @@ pub struct Reducer {
 
 impl Default for Reducer {
     fn default() -> Self {
-        let light = light_of_codes();
+        let light = srgb_to_linear_table();
         let roots = Box::new(std::array::from_fn(|code| MAX_VALUE * light[code.min(255)].sqrt()));
         Self { roots, sums: Vec::new() }
     }

@@ -2,8 +2,8 @@
 
 use std::mem;
 
-use super::quality::Picker;
-use crate::bokeh::{Bokeh, BokehError, Finished, Job, Settings};
+use super::quality::QualityPicker;
+use crate::bokeh::{BlurredFrame, Bokeh, BokehError, Job, Settings};
 use crate::budget::Quality;
 use crate::compute::Backend;
 use crate::frame::{ColorImage, DepthMap};
@@ -13,7 +13,7 @@ use crate::optics::CocField;
 
 /// The time that a frame may take.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Time<'a> {
+pub(crate) struct TimeBudget<'a> {
     /// Time for the blur of one frame, in nanoseconds.
     pub budget_ns: u64,
     /// Frame period in nanoseconds if frames come in real time; then there is a deadline as well.
@@ -24,7 +24,7 @@ pub(crate) struct Time<'a> {
     pub shares_depth: bool,
 }
 
-impl Time<'static> {
+impl TimeBudget<'static> {
     /// No limit.
     pub const UNLIMITED: Self = Self { budget_ns: u64::MAX, period_ns: None, efforts: &[1.0], shares_depth: false };
 }
@@ -44,27 +44,27 @@ pub struct Images {
 pub struct Blur {
     /// `None` passes frames through.
     executor: Option<Box<dyn Bokeh>>,
-    /// The settings that the executor was created for, if [`Blur::follow`] created it for a look.
-    made_for: Option<Settings>,
-    /// The backends of the executor at the last check; compared by [`Blur::has_moved`].
+    /// The settings that the executor was created for, if [`Blur::set_look`] created it for a look.
+    executor_settings: Option<Settings>,
+    /// The backends of the executor at the last check; compared by [`Blur::has_changed_backend`].
     backends: Option<&'static str>,
     rule: QualityRule,
     /// Picks the quality of the next frame from the times of earlier ones.
-    pub(crate) picker: Picker,
+    pub(crate) picker: QualityPicker,
 }
 
 impl Default for Blur {
     fn default() -> Self {
-        Self::new(None, QualityRule::Fixed(Quality::default()), Time::UNLIMITED)
+        Self::new(None, QualityRule::Fixed(Quality::default()), TimeBudget::UNLIMITED)
     }
 }
 
 impl Blur {
     /// Creates a blur with an executor that supports all qualities of `rule`.
-    pub(crate) fn new(executor: Option<Box<dyn Bokeh>>, rule: QualityRule, time: Time) -> Self {
-        let picker = Picker::new((rule, finest_quality(executor.as_deref())), time);
+    pub(crate) fn new(executor: Option<Box<dyn Bokeh>>, rule: QualityRule, time: TimeBudget) -> Self {
+        let picker = QualityPicker::new((rule, finest_quality(executor.as_deref())), time);
         let backends = executor.as_deref().map(Bokeh::backends);
-        Self { executor, made_for: None, backends, rule, picker }
+        Self { executor, executor_settings: None, backends, rule, picker }
     }
 
     /// Blurs pictures of `size` pixels in this look from the next frame on; with `adaptive`, the quality follows the
@@ -72,25 +72,25 @@ impl Blur {
     ///
     /// # Errors
     /// Returns the error of `make`; the current executor stays in use.
-    pub fn follow<E>(
+    pub fn set_look<E>(
         &mut self,
         look: &Look,
         (size, adaptive): ((u32, u32), bool),
         make: impl FnOnce(&Settings) -> Result<Box<dyn Bokeh>, E>,
     ) -> Result<(), E> {
-        let made_for = look.settings(size, adaptive);
-        if made_for != self.made_for {
-            let executor = made_for.as_ref().map(make).transpose()?;
-            self.replace(executor, look.quality_rule(adaptive));
-            self.made_for = made_for;
+        let executor_settings = look.blur_settings(size, adaptive);
+        if executor_settings != self.executor_settings {
+            let executor = executor_settings.as_ref().map(make).transpose()?;
+            self.replace_executor(executor, look.quality_rule(adaptive));
+            self.executor_settings = executor_settings;
         }
         Ok(())
     }
 
     /// Replaces the executor. Neither the old nor the new one may have frames in flight.
-    pub(crate) fn replace(&mut self, executor: Option<Box<dyn Bokeh>>, rule: QualityRule) {
+    pub(crate) fn replace_executor(&mut self, executor: Option<Box<dyn Bokeh>>, rule: QualityRule) {
         (self.backends, self.rule) = (executor.as_deref().map(Bokeh::backends), rule);
-        self.picker = self.picker.with(rule, finest_quality(executor.as_deref()));
+        self.picker = self.picker.with_rule(rule, finest_quality(executor.as_deref()));
         self.executor = executor;
     }
 
@@ -105,13 +105,13 @@ impl Blur {
 
     /// Returns whether the executor has moved to another backend (GPU to CPU) since the last call. The finest quality
     /// and the times differ there, so the picker starts anew.
-    pub(crate) fn has_moved(&mut self) -> bool {
+    pub(crate) fn has_changed_backend(&mut self) -> bool {
         let backends = self.executor.as_deref().map(Bokeh::backends);
-        let has_moved = mem::replace(&mut self.backends, backends) != backends;
-        if has_moved {
-            self.picker = self.picker.with(self.rule, finest_quality(self.executor.as_deref()));
+        let has_changed_backend = mem::replace(&mut self.backends, backends) != backends;
+        if has_changed_backend {
+            self.picker = self.picker.with_rule(self.rule, finest_quality(self.executor.as_deref()));
         }
-        has_moved
+        has_changed_backend
     }
 
     /// Returns the executor; `None` passes frames through.
@@ -135,7 +135,7 @@ impl Blur {
     }
 
     /// [`Bokeh::collect`].
-    pub(crate) fn collect(&mut self, wait: bool) -> Result<Option<Finished>, BokehError> {
+    pub(crate) fn collect(&mut self, wait: bool) -> Result<Option<BlurredFrame>, BokehError> {
         self.executor.as_mut().map_or(Ok(None), |executor| executor.collect(wait))
     }
 
@@ -153,7 +153,7 @@ impl Blur {
         let job = Job::new(Pooled::detached(mem::take(&mut images.color)), depth, coc);
         let out = Pooled::detached(mem::take(&mut images.blurred));
         self.submit(Job { quality: self.picker.quality(), out, ..job })?;
-        let Finished { mut picture, mut color, depth, .. } = self.collect(true)?.ok_or(BokehError::Lost)?;
+        let BlurredFrame { mut picture, mut color, depth, .. } = self.collect(true)?.ok_or(BokehError::Lost)?;
         images.color = mem::take(&mut *color);
         images.blurred = mem::take(picture.memory_mut().ok_or(BokehError::Lost)?);
         images.depth = depth.map(|mut depth| mem::take(&mut *depth)).or(images.depth.take());

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use crate::compute::thread_pool::ThreadPool;
 use crate::compute::{Device, DeviceFrame};
-use crate::depth::background::Background;
+use crate::depth::background::BackgroundMemory;
 use crate::depth::fill::Filler;
 use crate::depth::focus::{Focus, FocusRule};
 use crate::depth::matting::{self, Matting};
@@ -27,42 +27,42 @@ pub enum Postprocess {
 
 impl Postprocess {
     /// Returns the postprocessing of measured depth.
-    pub fn measured(refine: bool) -> Self {
+    pub fn for_measured(refine: bool) -> Self {
         if refine { Self::Refine } else { Self::Fill }
     }
 }
 
 /// Applies a [`CocRule`] frame by frame.
-pub struct CocMaker {
+pub struct CocCalculator {
     rule: CocRule,
     focus: Focus,
-    finisher: Finisher,
-    mending: MapCorrection,
+    postprocessor: Postprocessor,
+    correction: MapCorrection,
     /// The GPU that refines depth and estimates mattes; `None` is the CPU.
     device: Option<Arc<Device>>,
     matting: Matting,
     /// Whether a matte was estimated since the device was set: the device is only tried once a matte is needed.
-    has_matted: bool,
-    background: Option<Background>,
+    has_estimated_matte: bool,
+    background: Option<BackgroundMemory>,
     workers: ThreadPool,
 }
 
-enum Finisher {
+enum Postprocessor {
     Keep,
     Fill(Box<Filler>),
     Refine(Box<Refiner>),
 }
 
-impl Finisher {
-    fn new(finish: Postprocess, mending: MapCorrection, device: Option<&Arc<Device>>) -> Self {
-        match finish {
+impl Postprocessor {
+    fn new(postprocess: Postprocess, correction: MapCorrection, device: Option<&Arc<Device>>) -> Self {
+        match postprocess {
             Postprocess::Keep => Self::Keep,
             Postprocess::Fill => Self::Fill(Box::default()),
-            Postprocess::Refine => Self::Refine(Box::new(Refiner::mending(mending).on(device))),
+            Postprocess::Refine => Self::Refine(Box::new(Refiner::with_correction(correction).with_device(device))),
         }
     }
 
-    fn finish(&self) -> Postprocess {
+    fn postprocess(&self) -> Postprocess {
         match self {
             Self::Keep => Postprocess::Keep,
             Self::Fill(_) => Postprocess::Fill,
@@ -78,19 +78,19 @@ fn focus_rule(rule: CocRule) -> FocusRule {
     }
 }
 
-impl CocMaker {
-    /// Creates a maker without history, which works on the caller's thread.
-    pub fn new(rule: CocRule, finish: Postprocess) -> Self {
-        let (focus, mending) = (Focus::new(focus_rule(rule)), MapCorrection::default());
-        let (finisher, matting) = (Finisher::new(finish, mending, None), Matting::default());
+impl CocCalculator {
+    /// Creates a calculator without history, which works on the caller's thread.
+    pub fn new(rule: CocRule, postprocess: Postprocess) -> Self {
+        let (focus, correction) = (Focus::new(focus_rule(rule)), MapCorrection::default());
+        let (postprocessor, matting) = (Postprocessor::new(postprocess, correction, None), Matting::default());
         Self {
             rule,
             focus,
-            finisher,
-            mending,
+            postprocessor,
+            correction,
             device: None,
             matting,
-            has_matted: false,
+            has_estimated_matte: false,
             background: None,
             workers: ThreadPool::new("depth", 1),
         }
@@ -107,96 +107,97 @@ impl CocMaker {
     }
 
     /// Refines depth and estimates mattes on `device` from now on. No effect if it is `None` or already in use.
-    pub fn compute_on(&mut self, device: Option<Arc<Device>>) {
+    pub fn use_device(&mut self, device: Option<Arc<Device>>) {
         let is_other = |device: &Arc<Device>| !self.device.as_ref().is_some_and(|own| Arc::ptr_eq(own, device));
         if let Some(device) = device.filter(is_other) {
             self.device = Some(device);
-            self.has_matted = false;
-            if matches!(self.finisher, Finisher::Refine(_)) {
-                self.reset_finisher(Postprocess::Refine);
+            self.has_estimated_matte = false;
+            if matches!(self.postprocessor, Postprocessor::Refine(_)) {
+                self.reset_postprocessor(Postprocess::Refine);
             }
         }
     }
 
     /// Returns what refines depth, for the report; `None` if nothing is refined.
-    pub fn refined_by(&self) -> Option<&'static str> {
-        match (&self.finisher, self.rule) {
-            (Finisher::Refine(refiner), CocRule::Depth { .. }) => Some(refiner.backends()),
+    pub fn refinement_backend(&self) -> Option<&'static str> {
+        match (&self.postprocessor, self.rule) {
+            (Postprocessor::Refine(refiner), CocRule::Depth { .. }) => Some(refiner.backends()),
             _ => None,
         }
     }
 
     /// Takes the device's copy of the last map and its picture; `None` if missing, or taken already.
-    pub fn take_copy(&mut self) -> Option<Pooled<DeviceFrame>> {
-        match &mut self.finisher {
-            Finisher::Refine(refiner) => refiner.take_copy(),
-            Finisher::Keep | Finisher::Fill(_) => None,
+    pub fn take_device_copy(&mut self) -> Option<Pooled<DeviceFrame>> {
+        match &mut self.postprocessor {
+            Postprocessor::Refine(refiner) => refiner.take_copy(),
+            Postprocessor::Keep | Postprocessor::Fill(_) => None,
         }
     }
 
     /// Returns what estimates mattes, for the report; `None` if none was needed so far.
-    pub fn matted_by(&self) -> Option<&'static str> {
-        self.has_matted.then(|| self.matting.backends())
+    pub fn matting_backend(&self) -> Option<&'static str> {
+        self.has_estimated_matte.then(|| self.matting.backends())
     }
 
-    /// Replaces the finisher by one without history.
-    fn reset_finisher(&mut self, finish: Postprocess) {
+    /// Replaces the postprocessor by one without history.
+    fn reset_postprocessor(&mut self, postprocess: Postprocess) {
         let uses_depth = matches!(self.rule, CocRule::Depth { .. });
-        // The old finisher's buffers on the device do not belong to the next map.
-        self.matting.take_from(None);
-        self.finisher = Finisher::new(finish, self.mending, self.device.as_ref().filter(|_| uses_depth));
+        // The old postprocessor's buffers on the device do not belong to the next map.
+        self.matting.set_device_frame(None);
+        self.postprocessor =
+            Postprocessor::new(postprocess, self.correction, self.device.as_ref().filter(|_| uses_depth));
     }
 
     /// Sets the correction of misaligned depth edges; returns whether maps are refined, so that it takes effect.
-    pub fn set_mending(&mut self, mending: MapCorrection) -> bool {
-        let refines = matches!(self.finisher, Finisher::Refine(_));
-        if std::mem::replace(&mut self.mending, mending) != mending && refines {
-            self.reset_finisher(Postprocess::Refine);
+    pub fn set_correction(&mut self, correction: MapCorrection) -> bool {
+        let refines = matches!(self.postprocessor, Postprocessor::Refine(_));
+        if std::mem::replace(&mut self.correction, correction) != correction && refines {
+            self.reset_postprocessor(Postprocess::Refine);
         }
         refines
     }
 
     /// Sets how maps are postprocessed.
-    pub fn set_finish(&mut self, finish: Postprocess) {
-        if self.finisher.finish() != finish {
-            self.reset_finisher(finish);
+    pub fn set_postprocess(&mut self, postprocess: Postprocess) {
+        if self.postprocessor.postprocess() != postprocess {
+            self.reset_postprocessor(postprocess);
         }
     }
 
     /// Enables or disables the background memory (disocclusion filling from earlier frames).
-    pub fn remember(&mut self, remembers: bool) {
+    pub fn set_background_memory(&mut self, remembers: bool) {
         if self.background.is_some() != remembers {
-            self.background = remembers.then(Background::default);
+            self.background = remembers.then(BackgroundMemory::default);
         }
     }
 
     /// Drops all history, because another scene comes.
-    pub fn forget(&mut self) {
+    pub fn clear_history(&mut self) {
         self.focus = Focus::new(focus_rule(self.rule));
-        match &mut self.finisher {
-            Finisher::Keep => {}
-            Finisher::Fill(filler) => **filler = Filler::new(),
-            Finisher::Refine(refiner) => refiner.forget(),
+        match &mut self.postprocessor {
+            Postprocessor::Keep => {}
+            Postprocessor::Fill(filler) => **filler = Filler::new(),
+            Postprocessor::Refine(refiner) => refiner.reset(),
         }
-        self.background = self.background.take().map(|_| Background::default());
+        self.background = self.background.take().map(|_| BackgroundMemory::default());
     }
 
     /// Follows another rule; the focus moves on from its present distance.
-    pub fn follow(&mut self, rule: CocRule, finish: Postprocess) {
+    pub fn set_rule(&mut self, rule: CocRule, postprocess: Postprocess) {
         match (std::mem::replace(&mut self.rule, rule), rule) {
             (CocRule::Depth { .. }, CocRule::Depth { focus, .. }) => {
                 self.focus.follow(focus);
-                self.set_finish(finish);
+                self.set_postprocess(postprocess);
             }
             _ => {
                 self.focus = Focus::new(focus_rule(rule));
-                self.reset_finisher(finish);
+                self.reset_postprocessor(postprocess);
             }
         }
     }
 
     /// Returns the CoC of every frame if the rule needs no depth.
-    pub fn fixed(&self) -> Option<CocField> {
+    pub fn fixed_coc(&self) -> Option<CocField> {
         match self.rule {
             CocRule::Fixed(field) => Some(field),
             CocRule::Depth { .. } => None,
@@ -205,13 +206,13 @@ impl CocMaker {
 
     /// Computes the CoC of the frame at `time_ns` and finishes `map`. The focus is measured on the raw map, before
     /// holes are filled.
-    pub fn make(&mut self, map: &mut DepthMap, color: &ColorImage, time_ns: u64) -> CocField {
-        self.make_with_steps(map, color, time_ns, |_| ())
+    pub fn compute(&mut self, map: &mut DepthMap, color: &ColorImage, time_ns: u64) -> CocField {
+        self.compute_with_steps(map, color, time_ns, |_| ())
     }
 
-    /// Does the same as [`CocMaker::make`], and calls `done` with the name of each finished step: for benchmarks.
+    /// Does the same as [`CocCalculator::compute`], and calls `done` with the name of each finished step: for benchmarks.
     #[doc(hidden)]
-    pub fn make_with_steps(
+    pub fn compute_with_steps(
         &mut self,
         map: &mut DepthMap,
         color: &ColorImage,
@@ -223,74 +224,80 @@ impl CocMaker {
             CocRule::Depth { lens, range_m, max_coc_px, .. } => (lens, range_m, max_coc_px),
         };
         let focus_m = self.focus.focus_m(map, time_ns);
-        let field = lens.field((focus_m, range_m), color.width, max_coc_px);
+        let field = lens.coc_field((focus_m, range_m), color.width, max_coc_px);
         done("focus");
         // A map made around a subject (`subject_m`) is complete already.
         if map.subject_m.is_none() {
-            match &mut self.finisher {
-                Finisher::Keep => {}
-                Finisher::Fill(filler) => filler.fill_guided(map, color),
-                Finisher::Refine(refiner) => {
+            match &mut self.postprocessor {
+                Postprocessor::Keep => {}
+                Postprocessor::Fill(filler) => filler.fill_guided(map, color),
+                Postprocessor::Refine(refiner) => {
                     refiner.set_focus(focus_m);
-                    refiner.refine_on(&mut self.workers, map, color, time_ns);
+                    refiner.refine_with_workers(&mut self.workers, map, color, time_ns);
                     map.is_smooth = false;
-                    self.matting.take_from(refiner.on_device());
+                    self.matting.set_device_frame(refiner.device_frame());
                 }
             }
-            done(if matches!(self.finisher, Finisher::Refine(_)) { "refine" } else { "fill" });
-            self.cover(map, color, &field);
-            self.find_matte(map, color, &field);
+            done(if matches!(self.postprocessor, Postprocessor::Refine(_)) { "refine" } else { "fill" });
+            self.mark_covered_background(map, color, &field);
+            self.estimate_matte(map, color, &field);
             done("matte");
         }
         // Only now, with the matte known, does the background memory learn from this frame and fill what the subject
         // hides.
-        self.reveal(map, color, &field, Some(time_ns));
+        self.fill_hidden_background(map, color, &field, Some(time_ns));
         done("memory");
         field
     }
 
     /// Adapts a depth map of an earlier frame to the picture `color`. A map with a subject brings its own matte; for
     /// any other the matte is estimated from this picture.
-    pub fn share(&mut self, map: &mut DepthMap, color: &ColorImage, field: &CocField) {
+    pub fn adapt_reused_map(&mut self, map: &mut DepthMap, color: &ColorImage, field: &CocField) {
         if map.subject_m.is_some() {
             return;
         }
-        self.find_matte(map, color, field);
-        self.reveal(map, color, field, None);
+        self.estimate_matte(map, color, field);
+        self.fill_hidden_background(map, color, field, None);
     }
 
-    fn find_matte(&mut self, map: &mut DepthMap, color: &ColorImage, field: &CocField) {
+    fn estimate_matte(&mut self, map: &mut DepthMap, color: &ColorImage, field: &CocField) {
         map.matte.pixels.clear();
         if let (CocField::Depth(lens), false) = (field, map.is_smooth) {
-            if !std::mem::replace(&mut self.has_matted, true) {
-                self.matting = std::mem::take(&mut self.matting).on(self.device.as_ref());
+            if !std::mem::replace(&mut self.has_estimated_matte, true) {
+                self.matting = std::mem::take(&mut self.matting).with_device(self.device.as_ref());
             }
             let Self { matting, workers, .. } = self;
-            let depth_step = lens.inverse_depth_of_px(matting::FROM_PX);
+            let depth_step = lens.inverse_depth_step(matting::MIN_STEP_PX);
             match &self.background {
                 Some(background) => background.find_matte(matting, workers, (map, color), lens),
-                None => matting.find_before(workers, (map, color), depth_step, None),
+                None => matting.find_with_background(workers, (map, color), depth_step, None),
             }
         }
     }
 
     /// Notes which part of the remembered background is covered in this frame, before the memory is used.
-    fn cover(&mut self, map: &DepthMap, color: &ColorImage, field: &CocField) {
+    fn mark_covered_background(&mut self, map: &DepthMap, color: &ColorImage, field: &CocField) {
         let Self { background, workers, .. } = self;
         if let (CocField::Depth(lens), Some(background), false) = (field, background, map.is_smooth) {
-            background.cover(workers, (map, color), lens);
+            background.update_covering(workers, (map, color), lens);
         }
     }
 
     /// Fills the hidden background of a map from memory. If `taken_ns` is given, the memory first learns from this
     /// frame.
-    fn reveal(&mut self, map: &mut DepthMap, color: &ColorImage, field: &CocField, taken_ns: Option<u64>) {
+    fn fill_hidden_background(
+        &mut self,
+        map: &mut DepthMap,
+        color: &ColorImage,
+        field: &CocField,
+        taken_ns: Option<u64>,
+    ) {
         let Self { background, workers, .. } = self;
         if let (CocField::Depth(lens), Some(background), false) = (field, background, map.is_smooth) {
             if let Some(taken_ns) = taken_ns {
-                background.learn(workers, (map, color), lens, taken_ns);
+                background.update(workers, (map, color), lens, taken_ns);
             }
-            background.reveal(workers, map, color, lens);
+            background.reveal_background(workers, map, color, lens);
         }
     }
 }
@@ -304,12 +311,12 @@ mod tests {
     fn depth_is_refined_while_that_is_wanted_and_by_one_refiner() {
         let focus = FocusRule::Point { x: 0.5, y: 0.5 };
         let rule = CocRule::Depth { focus, lens: CocAtInfinity::Px(8.0), range_m: 0.0, max_coc_px: 20.0 };
-        let mut coc = CocMaker::new(rule, Postprocess::Fill);
+        let mut coc = CocCalculator::new(rule, Postprocess::Fill);
         let mut refiner_after = |refine| {
-            coc.follow(rule, Postprocess::measured(refine));
-            match &coc.finisher {
-                Finisher::Refine(refiner) => Some(std::ptr::from_ref(&**refiner)),
-                Finisher::Fill(_) | Finisher::Keep => None,
+            coc.set_rule(rule, Postprocess::for_measured(refine));
+            match &coc.postprocessor {
+                Postprocessor::Refine(refiner) => Some(std::ptr::from_ref(&**refiner)),
+                Postprocessor::Fill(_) | Postprocessor::Keep => None,
             }
         };
         let [none, first, second, last] = [false, true, true, false].map(&mut refiner_after);

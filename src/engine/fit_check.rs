@@ -16,9 +16,9 @@ const MAX_FRAMES: u32 = 300;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Verdict {
     /// Depth and colour are not registered.
-    Unrelated,
+    Unregistered,
     /// The edges are misaligned; this correction aligns them.
-    Mend(Misalignment, MapCorrection),
+    Misaligned(Misalignment, MapCorrection),
 }
 
 /// Checks frames until it reaches a verdict or gives up.
@@ -27,8 +27,8 @@ pub struct FitCheck {
     /// Number of agreeing frames that make a verdict.
     required: usize,
     frames: u32,
-    unrelated: usize,
-    mendings: Vec<(Misalignment, MapCorrection)>,
+    unregistered: usize,
+    corrections: Vec<(Misalignment, MapCorrection)>,
     is_aligned: bool,
 }
 
@@ -36,7 +36,7 @@ impl FitCheck {
     /// Creates the check for a stream of `frames` frames, if known: a single picture decides alone.
     pub fn new(frames: Option<u64>) -> Self {
         let required = if frames == Some(1) { 1 } else { REQUIRED_FRAMES };
-        Self { required, frames: 0, unrelated: 0, mendings: Vec::new(), is_aligned: false }
+        Self { required, frames: 0, unregistered: 0, corrections: Vec::new(), is_aligned: false }
     }
 
     /// Returns whether a frame was seen whose depth edges and picture edges coincide.
@@ -45,7 +45,7 @@ impl FitCheck {
     }
 
     /// Checks the next frame with its raw depth; returns a verdict at most once.
-    pub fn check(&mut self, map: &DepthMap, color: &ColorImage) -> Option<Verdict> {
+    pub fn check_frame(&mut self, map: &DepthMap, color: &ColorImage) -> Option<Verdict> {
         if self.frames >= MAX_FRAMES {
             return None;
         }
@@ -56,19 +56,19 @@ impl FitCheck {
         let outlines = EdgeAlignment::measure(map, color);
         let misfit = Misalignment::from_alignment(outlines, map, color);
         match misfit.and_then(|misfit| Some((misfit, misfit.correction(map, color)?))) {
-            Some(mending) => self.mendings.push(mending),
-            None if misfit.is_some() => self.unrelated += 1,
+            Some(correction) => self.corrections.push(correction),
+            None if misfit.is_some() => self.unregistered += 1,
             None if outlines == EdgeAlignment::Meets => (self.frames, self.is_aligned) = (MAX_FRAMES, true),
             None => {}
         }
         let verdict = match () {
-            () if self.unrelated == self.required => Some(Verdict::Unrelated),
+            () if self.unregistered == self.required => Some(Verdict::Unregistered),
             // The smallest correction.
-            () if self.mendings.len() == self.required => self
-                .mendings
+            () if self.corrections.len() == self.required => self
+                .corrections
                 .iter()
-                .min_by_key(|(_, mending)| (mending.distance_px.abs(), mending.coarsest))
-                .map(|&(misfit, mending)| Verdict::Mend(misfit, mending)),
+                .min_by_key(|(_, correction)| (correction.distance_px.abs(), correction.coarsest))
+                .map(|&(misfit, correction)| Verdict::Misaligned(misfit, correction)),
             () => None,
         };
         if verdict.is_some() {

@@ -2,7 +2,7 @@
 //!
 //! A `Preprocessor` preprocesses a frame: it fills or refines depth, focuses the lens, estimates the matte, and
 //! applies virtual background and auto-framing. A [`Blur`] blurs it, as finely as time allows. In a run each of them
-//! has its own thread; a [`Stepper`] runs both on the caller's thread, frame by frame, and [`still`] does so for a
+//! has its own thread; a [`FrameProcessor`] runs both on the caller's thread, frame by frame, and [`still`] does so for a
 //! single picture.
 
 // Some items are only used by the threads of a run.
@@ -10,25 +10,25 @@
 
 mod blur;
 mod coc;
+mod composer;
 mod fit_check;
-mod preparation;
+mod frame_processor;
+mod preprocessor;
 mod quality;
-mod staging;
-mod stepper;
 pub mod still;
 
-pub(crate) use blur::Time;
+pub(crate) use blur::TimeBudget;
 pub use blur::{Blur, Images};
-pub use coc::{CocMaker, Postprocess};
-pub(crate) use preparation::{Input, Origin, Preprocessor, Staged};
-pub(crate) use staging::OriginalFrame;
-pub use stepper::Stepper;
+pub use coc::{CocCalculator, Postprocess};
+pub(crate) use composer::OriginalFrame;
+pub use frame_processor::FrameProcessor;
+pub(crate) use preprocessor::{Composed, Input, Origin, Preprocessor};
 
 use crate::look::{Effect, Look};
 
 /// Both halves of the engine, on the same device.
 pub(crate) struct Engine {
-    pub preparation: Preprocessor,
+    pub preprocessor: Preprocessor,
     pub blur: Blur,
 }
 
@@ -36,9 +36,9 @@ impl Engine {
     /// Creates the engine; `blur` has the executor for the look.
     pub fn new(look: &Look, input: Input, blur: Blur) -> Self {
         // Without a blur no depth is needed.
-        let plain = blur.executor().is_none().then(|| Look::plain(Effect::None));
-        let mut preparation = Preprocessor::new(plain.as_ref().unwrap_or(look), input);
-        preparation.beside(blur.executor());
-        Self { preparation, blur }
+        let plain = blur.executor().is_none().then(|| Look::with_effect(Effect::None));
+        let mut preprocessor = Preprocessor::new(plain.as_ref().unwrap_or(look), input);
+        preprocessor.use_blur_device(blur.executor());
+        Self { preprocessor, blur }
     }
 }

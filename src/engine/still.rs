@@ -2,7 +2,7 @@
 
 use super::{Blur, Images, Input, Origin, Preprocessor};
 use crate::bokeh::BokehError;
-use crate::computing::Computing;
+use crate::computing::ComputeOptions;
 use crate::frame::{ColorImage, DepthMap};
 use crate::look::Look;
 use crate::optics::CocField;
@@ -21,7 +21,7 @@ pub enum Depth {
 ///
 /// # Errors
 /// [`BokehError::NoDepth`] if the blur follows depth and none is given.
-pub fn coc_and_depth(
+pub fn compute_coc_and_depth(
     look: &Look,
     color: &mut ColorImage,
     depth: Option<Depth>,
@@ -33,7 +33,7 @@ pub fn coc_and_depth(
     };
     let input = Input { size: color.size(), frames: Some(1), depth, knows_background: true, threads: 1 };
     // A single picture is never cropped.
-    let (field, _) = Preprocessor::new(look, input).prepare(color, map.as_mut(), 0)?;
+    let (field, _) = Preprocessor::new(look, input).preprocess(color, map.as_mut(), 0)?;
     Ok((field, map.filter(|_| matches!(field, CocField::Depth(_)))))
 }
 
@@ -42,19 +42,19 @@ pub fn coc_and_depth(
 ///
 /// # Errors
 /// The blur follows depth and none is given, it is too wide for the picture, or the requested GPU does not exist.
-pub fn blur(
+pub fn blur_picture(
     look: &Look,
     mut color: ColorImage,
     depth: Option<Depth>,
-    computing: &Computing,
+    computing: &ComputeOptions,
 ) -> Result<(ColorImage, String), BokehError> {
     let size = color.size();
     if look.coc_kind().is_none() {
         return Ok((color, "not blurred".to_string()));
     }
-    let (coc, depth) = coc_and_depth(look, &mut color, depth)?;
+    let (coc, depth) = compute_coc_and_depth(look, &mut color, depth)?;
     let (mut blur, mut images) = (Blur::default(), Images { color, depth, ..Images::default() });
-    blur.follow(look, (size, false), |settings| computing.create_blur(settings, size))?;
+    blur.set_look(look, (size, false), |settings| computing.create_blur(settings, size))?;
     blur.blur(&mut images, coc)?;
     let [_, by] = blur.describe_executor();
     Ok((images.blurred, by))

@@ -32,7 +32,8 @@ pub enum FolderError {
     #[error("the folder {} is not empty; choose another or write into it with --force", path.display())]
     NotEmpty { path: PathBuf },
     /// A file that would be overwritten is not ours.
-    #[error("{} was not written by bokehcam, and stays: move it away, or choose another folder", path.display())]
+    #[error("{} was not written by bokehcam, so it is not replaced: move it away, or choose another \
+             folder", path.display())]
     Foreign { path: PathBuf },
     /// Another run writes the folder.
     #[error("the folder {} is being written by another run: choose another", path.display())]
@@ -93,7 +94,7 @@ impl Folder {
         fs::create_dir_all(&path).map_err(|error| {
             // The system reports `exists` or `not a directory`, but not for which part of the path.
             let in_the_way = path.ancestors().find(|part| part.exists() && !part.is_dir());
-            let no_folder = || io::Error::new(ErrorKind::NotADirectory, "it is no folder");
+            let no_folder = || io::Error::new(ErrorKind::NotADirectory, "it is not a folder");
             match in_the_way {
                 Some(part) => FolderError::write(part)(no_folder()),
                 None => FolderError::write(&path)(error),

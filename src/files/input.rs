@@ -61,14 +61,14 @@ pub fn read(path: &Path, most_bytes: u64) -> io::Result<Vec<u8>> {
 /// Same as for [`read`], or [`io::ErrorKind::InvalidData`].
 pub fn read_text(path: &Path, most_bytes: u64) -> io::Result<String> {
     let text = String::from_utf8(read(path, most_bytes)?);
-    text.map_err(|_| io::Error::new(io::ErrorKind::InvalidData, "it is no text in UTF-8"))
+    text.map_err(|_| io::Error::new(io::ErrorKind::InvalidData, "it is not UTF-8 text"))
 }
 
 fn check_size(most_bytes: u64, bytes: u64) -> io::Result<()> {
     if bytes <= most_bytes {
         return Ok(());
     }
-    let what = format!("it is too large: {bytes} bytes, where at most {most_bytes} make sense");
+    let what = format!("it is too large: {bytes} bytes, and at most {most_bytes} are accepted");
     Err(io::Error::new(io::ErrorKind::FileTooLarge, what))
 }
 

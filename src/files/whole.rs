@@ -137,7 +137,7 @@ impl Part {
         let left = folder.ancestors().find(|folder| folder.is_dir()).unwrap_or(Path::new("/"));
         let copy = Self::create(&left.join(name))?;
         // Warn first, as copying may take long.
-        tracing::warn!("{} was removed: what there is of it is copied to {}", self.path.display(), left.display());
+        tracing::warn!("{} was removed: its content so far is copied to {}", self.path.display(), left.display());
         io::copy(&mut File::open(self.descriptor_path())?, &mut copy.file())?;
         copy.keep_incomplete()
     }
@@ -258,7 +258,13 @@ pub(super) fn sync_folder(path: &Path) -> io::Result<()> {
 
 /// Splits a path into folder and file name.
 fn split_path(path: &Path) -> io::Result<(&Path, &OsStr)> {
-    let name = path.file_name().ok_or_else(|| io::Error::new(ErrorKind::InvalidInput, "this names no file"))?;
+    let name = path.file_name().ok_or_else(|| {
+        io::Error::new(
+            ErrorKind::InvalidInput,
+            "this is not the name of a \
+                                                                                       file",
+        )
+    })?;
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     Ok((folder, name))
 }

@@ -42,7 +42,7 @@ impl Mask {
     /// Resizes the mask, reusing its memory if possible. The content is unspecified afterwards.
     pub fn resize(&mut self, width: u32, height: u32) {
         (self.width, self.height) = (width, height);
-        super::make_room(&mut self.alpha, width as usize * height as usize);
+        super::resize_buffer(&mut self.alpha, width as usize * height as usize);
     }
 }
 

@@ -1,7 +1,7 @@
 //! The colour encoding of pixel values.
 
 use super::Family;
-use crate::color::Matrix;
+use crate::color::YcbcrMatrix;
 
 /// The quantisation range of pixel values.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -28,13 +28,13 @@ pub enum Transfer {
 }
 
 /// The colour encoding: weights of luma, quantisation range and transfer function.
-pub type Colors = (Matrix, Range, Transfer);
+pub type ColorEncoding = (YcbcrMatrix, Range, Transfer);
 
 /// Returns the default encoding of a format family.
-pub(super) fn default_colors(family: Family) -> Colors {
+pub(super) fn default_encoding(family: Family) -> ColorEncoding {
     let range = match family {
         Family::Rgb24 { .. } | Family::Grey | Family::Depth16 | Family::Jpeg => Range::Full,
         Family::Packed422 { .. } | Family::SemiPlanar420 { .. } | Family::Planar420 { .. } => Range::Limited,
     };
-    (Matrix::Bt601, range, Transfer::Display)
+    (YcbcrMatrix::Bt601, range, Transfer::Display)
 }

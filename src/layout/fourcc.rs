@@ -103,7 +103,7 @@ impl FourCc {
     pub const Y16: Self = Self(*b"Y16 ");
 
     /// Returns all supported formats.
-    pub fn supported() -> impl Iterator<Item = Self> {
+    pub fn supported_formats() -> impl Iterator<Item = Self> {
         TABLE.iter().map(|&(fourcc, _)| fourcc)
     }
 
@@ -151,15 +151,15 @@ impl FourCc {
 
 impl Family {
     /// Returns the number of buffers per picture.
-    pub fn memory_planes(self) -> usize {
+    pub fn memory_plane_count(self) -> usize {
         match self {
-            Self::SemiPlanar420 { apart: true, .. } | Self::Planar420 { apart: true, .. } => self.components(),
+            Self::SemiPlanar420 { apart: true, .. } | Self::Planar420 { apart: true, .. } => self.component_count(),
             _ => 1,
         }
     }
 
     /// Returns the number of planes of samples; 0 for compressed formats.
-    pub fn components(self) -> usize {
+    pub fn component_count(self) -> usize {
         match self {
             Self::Planar420 { .. } => 3,
             Self::SemiPlanar420 { .. } => 2,
@@ -170,7 +170,7 @@ impl Family {
 
     /// Returns the bytes per row and the number of rows of component `index` in a picture of `width` x `height` pixels.
     /// A packed row of odd width ends with half a pair of pixels, which has one of the two chroma samples.
-    pub(super) fn rows(self, index: usize, width: usize, height: usize) -> (usize, usize) {
+    pub(super) fn component_rows(self, index: usize, width: usize, height: usize) -> (usize, usize) {
         match (self, index) {
             (Self::Jpeg, _) => (0, 0),
             (Self::Packed422 { .. } | Self::Depth16, _) => (2 * width, height),
@@ -183,7 +183,7 @@ impl Family {
 
     /// Returns the stride of component `index` if the first component of its memory plane has a stride of
     /// `first_bytes`.
-    pub(super) fn stride_bytes(self, index: usize, first_bytes: usize) -> usize {
+    pub(super) fn component_stride_bytes(self, index: usize, first_bytes: usize) -> usize {
         match (self, index) {
             // An odd row of luma has one byte less than its chroma pairs.
             (Self::SemiPlanar420 { .. }, 1..) => first_bytes.next_multiple_of(2),

@@ -3,8 +3,8 @@
 mod color;
 mod fourcc;
 
-use crate::color::Matrix;
-pub use color::{Colors, Range, Transfer};
+use crate::color::YcbcrMatrix;
+pub use color::{ColorEncoding, Range, Transfer};
 pub use fourcc::{Content, Family, FourCc, FourCcError};
 
 /// Largest width and height accepted, in pixels, as a bound on what a driver may claim.
@@ -23,7 +23,7 @@ pub struct Layout {
     /// Rows, 1 to [`MAX_SIDE_PX`].
     pub height: u32,
     /// The luma weights.
-    pub matrix: Matrix,
+    pub matrix: YcbcrMatrix,
     /// The quantisation range.
     pub range: Range,
     /// The transfer function.
@@ -74,19 +74,19 @@ pub enum LayoutError {
     #[error("pixel format {0} is not supported")]
     FourCc(FourCc),
     /// The size is out of range.
-    #[error("the device gives pictures of {width} x {height} pixels, and 1 to {MAX_SIDE_PX} a side can be used")]
+    #[error("the device gives pictures of {width} x {height} pixels, but 1 to {MAX_SIDE_PX} per side are supported")]
     Size { width: u32, height: u32 },
-    #[error("the device says {stride_bytes} bytes a row, and {width} pixels of {fourcc} need {needed_bytes}")]
+    #[error("the device reports {stride_bytes} bytes a row, but {width} pixels of {fourcc} need {min_size_bytes}")]
     Stride {
         fourcc: FourCc,
         width: u32,
         /// As the device reports it.
         stride_bytes: usize,
-        needed_bytes: usize,
+        min_size_bytes: usize,
     },
     /// The buffer is too small for the picture.
     #[error(
-        "the device says {size_bytes} bytes a picture, and {width} x {height} pixels of {fourcc} need {needed_bytes}"
+        "the device reports {size_bytes} bytes a picture, but {width} x {height} pixels of {fourcc} need {min_size_bytes}"
     )]
     Short {
         fourcc: FourCc,
@@ -94,7 +94,7 @@ pub enum LayoutError {
         height: u32,
         /// As the device reports it.
         size_bytes: usize,
-        needed_bytes: usize,
+        min_size_bytes: usize,
     },
     /// The number of memory planes does not fit the format.
     #[error("the device gives {fourcc} in {found} memory planes instead of {expected}")]
@@ -118,15 +118,15 @@ impl Layout {
     /// # Errors
     /// The format or size is not supported.
     pub fn packed(fourcc: FourCc, width: u32, height: u32) -> Result<Self, LayoutError> {
-        Self::strided(fourcc, width, height, 0)
+        Self::with_stride(fourcc, width, height, 0)
     }
 
     /// Does the same with `stride_bytes` from row to row of each plane's first component; 0 is without padding.
     ///
     /// # Errors
     /// The format, size or stride is not supported.
-    pub fn strided(fourcc: FourCc, width: u32, height: u32, stride_bytes: usize) -> Result<Self, LayoutError> {
-        let plane_count = fourcc.family().map_or(1, Family::memory_planes);
+    pub fn with_stride(fourcc: FourCc, width: u32, height: u32, stride_bytes: usize) -> Result<Self, LayoutError> {
+        let plane_count = fourcc.family().map_or(1, Family::memory_plane_count);
         Self::new(fourcc, (width, height), &[Plane { stride_bytes, size_bytes: 0 }; MAX_PLANES][..plane_count], None)
     }
 
@@ -139,17 +139,17 @@ impl Layout {
         fourcc: FourCc,
         (width, height): (u32, u32),
         given: &[Plane],
-        colors: Option<Colors>,
+        colors: Option<ColorEncoding>,
     ) -> Result<Self, LayoutError> {
         let family = fourcc.family().ok_or(LayoutError::FourCc(fourcc))?;
         if !(1..=MAX_SIDE_PX).contains(&width) || !(1..=MAX_SIDE_PX).contains(&height) {
             return Err(LayoutError::Size { width, height });
         }
-        let plane_count = family.memory_planes();
+        let plane_count = family.memory_plane_count();
         if given.len() != plane_count {
             return Err(LayoutError::Planes { fourcc, found: given.len(), expected: plane_count });
         }
-        let (matrix, range, transfer) = colors.unwrap_or_else(|| color::default_colors(family));
+        let (matrix, range, transfer) = colors.unwrap_or_else(|| color::default_encoding(family));
         let mut planes = [Plane::default(); MAX_PLANES];
         planes[..plane_count].copy_from_slice(given);
         let mut layout = Self { fourcc, width, height, matrix, range, transfer, planes, plane_count };
@@ -158,31 +158,36 @@ impl Layout {
             return Ok(layout);
         }
         for (index, plane) in layout.planes[..plane_count].iter_mut().enumerate() {
-            let needed_bytes = family.rows(index, width as usize, height as usize).0;
+            let min_size_bytes = family.component_rows(index, width as usize, height as usize).0;
             if plane.stride_bytes == 0 {
-                plane.stride_bytes = needed_bytes;
+                plane.stride_bytes = min_size_bytes;
             }
             // The bound keeps every sum below within 64 bits, whatever the driver reports.
-            if plane.stride_bytes < needed_bytes || plane.stride_bytes > 1 << 28 {
+            if plane.stride_bytes < min_size_bytes || plane.stride_bytes > 1 << 28 {
                 let stride_bytes = plane.stride_bytes;
-                return Err(LayoutError::Stride { fourcc, width, stride_bytes, needed_bytes });
+                return Err(LayoutError::Stride { fourcc, width, stride_bytes, min_size_bytes });
             }
         }
         // Chroma strides derive from luma's: half of an odd stride must still hold a chroma row.
         for component in layout.components() {
             if component.stride_bytes < component.row_bytes {
                 let stride_bytes = layout.planes[component.plane].stride_bytes;
-                return Err(LayoutError::Stride { fourcc, width, stride_bytes, needed_bytes: 2 * component.row_bytes });
+                return Err(LayoutError::Stride {
+                    fourcc,
+                    width,
+                    stride_bytes,
+                    min_size_bytes: 2 * component.row_bytes,
+                });
             }
         }
         for index in 0..plane_count {
-            let needed_bytes = layout.needed_bytes(index);
+            let min_size_bytes = layout.min_size_bytes(index);
             let size_bytes = &mut layout.planes[index].size_bytes;
             if *size_bytes == 0 {
-                *size_bytes = needed_bytes;
+                *size_bytes = min_size_bytes;
             }
-            if *size_bytes < needed_bytes {
-                return Err(LayoutError::Short { fourcc, width, height, size_bytes: *size_bytes, needed_bytes });
+            if *size_bytes < min_size_bytes {
+                return Err(LayoutError::Short { fourcc, width, height, size_bytes: *size_bytes, min_size_bytes });
             }
         }
         Ok(layout)
@@ -190,12 +195,12 @@ impl Layout {
 
     /// Adds `extra_bytes` between rows.
     #[cfg(test)]
-    pub fn with_strides(mut self, extra_bytes: usize) -> Self {
+    pub fn with_row_padding(mut self, extra_bytes: usize) -> Self {
         for index in 0..self.plane_count {
             self.planes[index].stride_bytes += extra_bytes;
         }
         for index in 0..self.plane_count {
-            self.planes[index].size_bytes = self.needed_bytes(index) + extra_bytes;
+            self.planes[index].size_bytes = self.min_size_bytes(index) + extra_bytes;
         }
         self
     }
@@ -217,22 +222,22 @@ impl Layout {
         let family = self.family();
         let apart = self.plane_count > 1;
         let mut next = Component { plane: 0, offset_bytes: 0, stride_bytes: 0, row_bytes: 0, rows: 0 };
-        (0..family.components()).map(move |index| {
+        (0..family.component_count()).map(move |index| {
             if apart {
                 (next.plane, next.offset_bytes) = (index, 0);
             } else {
                 next.offset_bytes += next.stride_bytes * next.rows;
             }
-            (next.row_bytes, next.rows) = family.rows(index, self.width as usize, self.height as usize);
+            (next.row_bytes, next.rows) = family.component_rows(index, self.width as usize, self.height as usize);
             let first_bytes = self.planes[next.plane].stride_bytes;
-            next.stride_bytes = if apart { first_bytes } else { family.stride_bytes(index, first_bytes) };
+            next.stride_bytes = if apart { first_bytes } else { family.component_stride_bytes(index, first_bytes) };
             next
         })
     }
 
     /// Returns the minimum size of memory plane `plane`: a raw picture with fewer bytes is truncated. 1 for compressed
     /// formats.
-    pub fn needed_bytes(&self, plane: usize) -> usize {
+    pub fn min_size_bytes(&self, plane: usize) -> usize {
         self.components().filter(|component| component.plane == plane).map(|c| c.end_bytes()).max().unwrap_or(1)
     }
 }

@@ -5,53 +5,53 @@ use std::path::PathBuf;
 use std::str::FromStr;
 use std::sync::Arc;
 
-use super::number::number_in;
+use super::number::parse_in_range;
 use crate::bokeh::aperture::{Picture, Shape};
 use crate::recording::RecordingError;
 use crate::recording::still::read_aperture;
 
 /// The aperture as a setting.
 #[derive(Clone, Debug, PartialEq)]
-pub enum ApertureName {
+pub enum ApertureSetting {
     /// A shape by name and numbers, or a picture that was read.
-    Drawn(Shape),
+    Loaded(Shape),
     /// `image:FILE`, not read yet.
     Image(PathBuf),
 }
 
-impl FromStr for ApertureName {
+impl FromStr for ApertureSetting {
     type Err = String;
     fn from_str(text: &str) -> Result<Self, String> {
         const FORMS: &str = "use disc, ring:INNER (0 to below 1), polygon:N[:ROTATION_DEG[:CURVATURE]] (N 3 to 16, \
                              CURVATURE 0 to 1), heart, star:N (3 to 16) or image:FILE";
         if let Some(file) = text.strip_prefix("image:").filter(|file| !file.is_empty()) {
-            return Ok(ApertureName::Image(file.into()));
+            return Ok(ApertureSetting::Image(file.into()));
         }
         let parts: Vec<&str> = text.split(':').collect();
         let corners = |text: &str| text.parse().ok().filter(|n| (3..=16).contains(n));
         let shape = match parts[..] {
             ["disc"] => Some(Shape::Disc),
             ["heart"] => Some(Shape::Heart),
-            ["ring", inner] => number_in(inner, 0.0, 1.0).filter(|r| *r < 1.0).map(|inner| Shape::Ring { inner }),
+            ["ring", inner] => parse_in_range(inner, 0.0, 1.0).filter(|r| *r < 1.0).map(|inner| Shape::Ring { inner }),
             ["star", points] => corners(points).map(|points| Shape::Star { points }),
             ["polygon", blades, ref rest @ ..] if rest.len() <= 2 => (|| {
                 Some(Shape::Polygon {
                     blades: corners(blades)?,
-                    rotation_deg: rest.first().map_or(Some(0.0), |text| number_in(text, -360.0, 360.0))?,
-                    curvature: rest.get(1).map_or(Some(0.0), |text| number_in(text, 0.0, 1.0))?,
+                    rotation_deg: rest.first().map_or(Some(0.0), |text| parse_in_range(text, -360.0, 360.0))?,
+                    curvature: rest.get(1).map_or(Some(0.0), |text| parse_in_range(text, 0.0, 1.0))?,
                 })
             })(),
             _ => None,
         };
-        shape.map(ApertureName::Drawn).ok_or_else(|| FORMS.to_string())
+        shape.map(ApertureSetting::Loaded).ok_or_else(|| FORMS.to_string())
     }
 }
 
-impl fmt::Display for ApertureName {
+impl fmt::Display for ApertureSetting {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let shape = match self {
-            ApertureName::Image(file) => return write!(f, "image:{}", file.display()),
-            ApertureName::Drawn(shape) => shape,
+            ApertureSetting::Image(file) => return write!(f, "image:{}", file.display()),
+            ApertureSetting::Loaded(shape) => shape,
         };
         match shape {
             Shape::Disc => f.write_str("disc"),
@@ -76,12 +76,12 @@ impl fmt::Display for ApertureName {
     }
 }
 
-impl ApertureName {
+impl ApertureSetting {
     /// Returns the name of a shape; `None` for a picture without a known file.
-    pub fn of(shape: &Shape) -> Option<Self> {
+    pub fn from_shape(shape: &Shape) -> Option<Self> {
         match shape {
             Shape::Picture(picture) if picture.file.is_none() => None,
-            shape => Some(Self::Drawn(shape.clone())),
+            shape => Some(Self::Loaded(shape.clone())),
         }
     }
 
@@ -91,7 +91,7 @@ impl ApertureName {
     /// The picture of `image:FILE` cannot be read.
     pub fn load(&self) -> Result<Shape, RecordingError> {
         Ok(match self {
-            Self::Drawn(shape) => shape.clone(),
+            Self::Loaded(shape) => shape.clone(),
             Self::Image(file) => {
                 let (width, height, grey) = read_aperture(file)?;
                 Shape::Picture(Arc::new(Picture { file: Some(file.clone()), width, height, grey }))
@@ -109,7 +109,7 @@ mod tests {
         for text in
             ["disc", "ring:0.5", "polygon:5", "polygon:6:15", "polygon:8:0:0.5", "heart", "star:5", "image:a:b.png"]
         {
-            assert_eq!(text.parse::<ApertureName>().unwrap().to_string(), text);
+            assert_eq!(text.parse::<ApertureSetting>().unwrap().to_string(), text);
         }
     }
 
@@ -119,17 +119,17 @@ mod tests {
         let file = folder.path().join("black.png");
         let mut picture = crate::frame::ColorImage::new(5, 5);
         crate::recording::still::write_color(&file, &picture, false).unwrap();
-        let error = ApertureName::Image(file.clone()).load().unwrap_err().to_string();
+        let error = ApertureSetting::Image(file.clone()).load().unwrap_err().to_string();
         assert!(error.contains("black.png: it is black all over"), "{error}");
         picture.rgb[36] = 200;
         crate::recording::still::write_color(&file, &picture, true).unwrap();
-        assert!(ApertureName::Image(file).load().is_ok());
+        assert!(ApertureSetting::Image(file).load().is_ok());
     }
 
     #[test]
     fn wrong_apertures_say_what_is_accepted() {
         for text in ["", "circle", "ring", "ring:1", "ring:nan", "polygon:2", "polygon:5:0:2", "star:99", "image:"] {
-            assert!(text.parse::<ApertureName>().unwrap_err().contains("polygon:N"), "{text}");
+            assert!(text.parse::<ApertureSetting>().unwrap_err().contains("polygon:N"), "{text}");
         }
     }
 }

@@ -33,7 +33,7 @@ pub enum CocAtInfinity {
 impl CocAtInfinity {
     /// Returns the CoC as a function of depth, for a picture `width_px` wide, focused at `focus_m` metres with a sharp
     /// range of `range_m` around it.
-    pub fn field(self, (focus_m, range_m): (f32, f32), width_px: u32, max_coc_px: f32) -> CocField {
+    pub fn coc_field(self, (focus_m, range_m): (f32, f32), width_px: u32, max_coc_px: f32) -> CocField {
         let coc_at_infinity_px = match self {
             Self::Px(radius_px) => radius_px,
             Self::Lens(lens) => lens.coc_at_infinity_px(focus_m, width_px),

@@ -28,7 +28,7 @@ impl Effect {
 named! {
     /// Whether depth is refined before the blur.
     pub enum Refine default Auto {
-        /// Depth of a recording in a stream; of a picture on its own where its outlines are not those of the picture
+        /// Only the depth of a recording in a stream, and depth that does not fit its picture
         Auto = "auto",
         /// Always
         On = "on",
@@ -40,9 +40,9 @@ named! {
 named! {
     /// Whether a stream remembers what lies behind things.
     pub enum BackgroundMemory default On {
-        /// What was seen before, as far as it was; what never was is filled in from around it
+        /// The background seen in earlier frames; never seen parts are filled in from around them
         On = "on",
-        /// All is filled in from around it, in every frame anew
+        /// All of it is filled in from around it, in every frame
         Off = "off",
     }
 }

@@ -6,11 +6,10 @@
 #[cfg(feature = "files")]
 mod aperture;
 #[cfg(feature = "files")]
-mod behind;
+mod background;
 mod coc;
 mod effect;
 mod follow;
-mod known;
 pub mod number;
 #[cfg(feature = "files")]
 mod patch;
@@ -18,21 +17,22 @@ mod patch;
 pub mod presets;
 #[cfg(feature = "files")]
 pub mod settings;
+mod source_depth;
 mod strength;
 mod tilt;
 
 #[cfg(feature = "files")]
-pub use aperture::ApertureName;
+pub use aperture::ApertureSetting;
 #[cfg(feature = "files")]
-pub use behind::BehindName;
+pub use background::BackgroundSetting;
 pub use coc::{CocAtInfinity, CocRule};
 pub use effect::{BackgroundMemory, Effect, Refine};
-pub use follow::Follow;
-pub use known::Known;
+pub use follow::FramingZoom;
 #[cfg(feature = "files")]
 pub use patch::{LookError, Value};
 #[cfg(feature = "files")]
 pub use settings::{Patch, SETTINGS};
+pub use source_depth::SourceDepth;
 pub use strength::Strength;
 pub use tilt::Tilt;
 
@@ -79,9 +79,9 @@ pub struct Look {
     /// Whether a stream remembers the background that objects hide.
     pub background_memory: BackgroundMemory,
     /// The background behind the subject.
-    pub behind: Behind,
+    pub background: Behind,
     /// Whether a stream keeps the subject centred.
-    pub follow: Follow,
+    pub follow: FramingZoom,
     /// The band of the effect `tilt-shift`.
     pub tilt: Tilt,
     /// The lens opening.
@@ -107,8 +107,8 @@ impl Default for Look {
             max_coc_px: None,
             refine: Refine::Auto,
             background_memory: BackgroundMemory::On,
-            behind: Behind::Blur,
-            follow: Follow::OFF,
+            background: Behind::Blur,
+            follow: FramingZoom::OFF,
             tilt: Tilt { center_y: 0.55, band: 0.15, angle_deg: 0.0 },
             aperture: Aperture::default(),
             // With it, rank 3 is as good as rank 7 with a hard disc.
@@ -123,7 +123,7 @@ impl Default for Look {
 
 impl Look {
     /// Returns the default look with another effect.
-    pub fn plain(effect: Effect) -> Self {
+    pub fn with_effect(effect: Effect) -> Self {
         Self { effect, ..Self::default() }
     }
 
@@ -139,7 +139,7 @@ impl Look {
 
     /// Returns a setting that needs depth in metres, as a flag, for the message that depth is only relative; `None` if
     /// the look has no such setting.
-    pub fn needs_metres(&self) -> Option<String> {
+    pub fn metric_setting(&self) -> Option<String> {
         match (self.focus, self.strength) {
             (FocusRule::Metres(metres), _) => Some(format!("--focus {metres}")),
             _ if self.focus_range_m > 0.0 => Some(format!("--focus-range {}", self.focus_range_m)),
@@ -162,10 +162,10 @@ impl Look {
 
     /// Returns the executor's settings for pictures of `size` pixels; `None` if frames pass through. `adaptive` says
     /// whether the quality may follow the time available.
-    pub fn settings(&self, size: (u32, u32), adaptive: bool) -> Option<bokeh::Settings> {
+    pub fn blur_settings(&self, size: (u32, u32), adaptive: bool) -> Option<bokeh::Settings> {
         let coc = self.coc_kind()?;
         let max_px = self.max_coc_px(size);
-        let far_max_px = self.at_infinity_px(size).min(max_px);
+        let far_max_px = self.coc_at_infinity_px(size).min(max_px);
         let near_max_px = if coc == CocKind::Depth { max_px } else { 0.0 };
         Some(bokeh::Settings {
             coc,
@@ -184,7 +184,7 @@ impl Look {
     /// Returns the rule for the CoC of frames of `size` pixels.
     pub fn coc_rule(&self, size: (u32, u32)) -> CocRule {
         let max_coc_px = self.max_coc_px(size);
-        let radius_px = self.at_infinity_px(size).min(max_coc_px);
+        let radius_px = self.coc_at_infinity_px(size).min(max_coc_px);
         match self.coc_kind() {
             None => CocRule::Fixed(CocField::Uniform { radius_px: 0.0 }),
             Some(CocKind::Uniform) => CocRule::Fixed(CocField::Uniform { radius_px }),
@@ -193,7 +193,7 @@ impl Look {
                 focus: self.focus,
                 lens: match self.strength {
                     Strength::Lens(lens) => CocAtInfinity::Lens(lens),
-                    _ => CocAtInfinity::Px(self.at_infinity_px(size)),
+                    _ => CocAtInfinity::Px(self.coc_at_infinity_px(size)),
                 },
                 range_m: self.focus_range_m,
                 max_coc_px,
@@ -201,7 +201,7 @@ impl Look {
         }
     }
 
-    /// Returns the quality levels for an executor of [`Look::settings`].
+    /// Returns the quality levels for an executor of [`Look::blur_settings`].
     pub fn quality_rule(&self, adaptive: bool) -> QualityRule {
         match self.quality {
             None if adaptive => QualityRule::Auto(Quality::default()),
@@ -210,7 +210,7 @@ impl Look {
     }
 
     /// Returns whether depth is refined before the blur; `measured` says whether it was measured.
-    pub fn refines(&self, measured: bool) -> bool {
+    pub fn refines_depth(&self, measured: bool) -> bool {
         match self.refine {
             Refine::Auto => measured,
             Refine::On => true,
@@ -219,7 +219,7 @@ impl Look {
     }
 
     /// Returns the CoC radius at infinity in pixels; infinite if it depends on a focus that is not known yet.
-    fn at_infinity_px(&self, (width, height): (u32, u32)) -> f32 {
+    fn coc_at_infinity_px(&self, (width, height): (u32, u32)) -> f32 {
         match (self.strength, self.focus) {
             (Strength::Default, _) => height as f32 * COC_AT_INFINITY_PER_HEIGHT,
             (Strength::Percent(percent), _) => height as f32 * percent / 100.0,
@@ -235,7 +235,7 @@ impl Look {
     fn max_coc_px(&self, size: (u32, u32)) -> f32 {
         let by_height_px = size.1 as f32 * MAX_COC_PER_HEIGHT;
         self.max_coc_px.unwrap_or(match self.strength {
-            Strength::AtInfinity(_) | Strength::Percent(_) => by_height_px.max(self.at_infinity_px(size)),
+            Strength::AtInfinity(_) | Strength::Percent(_) => by_height_px.max(self.coc_at_infinity_px(size)),
             Strength::Default | Strength::Lens(_) => by_height_px,
         })
     }

@@ -5,8 +5,8 @@ use std::path::PathBuf;
 
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 
-use super::settings::{SETTINGS, Setting, setting};
-use super::{ApertureName, BehindName, Look, Patch, Strength};
+use super::settings::{SETTINGS, Setting, find_setting};
+use super::{ApertureSetting, BackgroundSetting, Look, Patch, Strength};
 use crate::bokeh::aperture::Shape;
 use crate::depth::backdrop::Behind;
 use crate::optics::Lens;
@@ -42,10 +42,10 @@ impl Patch {
             max_coc_px: Some(look.max_coc_px.into()),
             refine: Some(look.refine),
             background_memory: Some(look.background_memory),
-            behind: BehindName::of(&look.behind),
+            behind: BackgroundSetting::from_background(&look.background),
             follow: Some(look.follow),
             tilt: Some(look.tilt),
-            aperture: ApertureName::of(&look.aperture.shape),
+            aperture: ApertureSetting::from_shape(&look.aperture.shape),
             intensity: Some(look.aperture.intensity),
             rim: Some(look.rim),
             rank: Some(look.rank.into()),
@@ -61,8 +61,8 @@ impl Patch {
     pub fn parse<'a>(settings: impl IntoIterator<Item = (&'a str, &'a str)>) -> Result<Self, (String, String)> {
         let mut patch = Self::default();
         for (name, text) in settings {
-            let found = setting(name).ok_or_else(|| "it is not a setting of the look".to_string());
-            found.and_then(|setting| setting.set(&mut patch, text)).map_err(|what| (name.to_string(), what))?;
+            let found = find_setting(name).ok_or_else(|| "it is not a setting of the look".to_string());
+            found.and_then(|setting| setting.parse_into(&mut patch, text)).map_err(|what| (name.to_string(), what))?;
         }
         Ok(patch)
     }
@@ -74,7 +74,7 @@ impl Patch {
     }
 
     /// Removes the settings that have the same value in `other`.
-    pub fn without_equal(mut self, other: &Self) -> Self {
+    pub fn without_equal_values(mut self, other: &Self) -> Self {
         let is_same = |setting: &&Setting| (setting.get)(&self) == (setting.get)(other);
         let same: Vec<&Setting> = SETTINGS.iter().filter(is_same).collect();
         same.into_iter().for_each(|setting| (setting.clear)(&mut self));
@@ -82,13 +82,13 @@ impl Patch {
     }
 
     /// Returns the files of pictures that are not read yet.
-    pub fn files_mut(&mut self) -> impl Iterator<Item = &mut PathBuf> {
+    pub fn unread_files_mut(&mut self) -> impl Iterator<Item = &mut PathBuf> {
         let aperture = match &mut self.aperture {
-            Some(ApertureName::Image(file)) => Some(file),
+            Some(ApertureSetting::Image(file)) => Some(file),
             _ => None,
         };
         let behind = match &mut self.behind {
-            Some(BehindName::Image(file)) => Some(file),
+            Some(BackgroundSetting::Image(file)) => Some(file),
             _ => None,
         };
         aperture.into_iter().chain(behind)
@@ -97,7 +97,7 @@ impl Patch {
     /// Returns all settings of a look under all their names, for the status of a run.
     pub fn describe(look: &Look) -> BTreeMap<String, String> {
         let named = |(name, value): Value| {
-            let alias = setting(name).and_then(Setting::alias);
+            let alias = find_setting(name).and_then(Setting::alias);
             [Some(name), alias].into_iter().flatten().map(move |name| (name.to_owned(), value.clone()))
         };
         Self::from_look(look).values().into_iter().flat_map(named).collect()
@@ -107,12 +107,12 @@ impl Patch {
     ///
     /// # Errors
     /// A picture cannot be read.
-    pub fn load(&mut self) -> Result<(), RecordingError> {
+    pub fn load_pictures(&mut self) -> Result<(), RecordingError> {
         if let Some(name) = &mut self.aperture {
-            *name = ApertureName::Drawn(name.load()?);
+            *name = ApertureSetting::Loaded(name.load()?);
         }
         if let Some(name) = &mut self.behind {
-            *name = BehindName::Known(name.load()?);
+            *name = BackgroundSetting::Loaded(name.load()?);
         }
         Ok(())
     }
@@ -127,36 +127,37 @@ impl Patch {
             ($($field:ident),+) => { $(if let Some(value) = self.$field { look.$field = value; })+ };
         }
         set!(effect, method, focus, focus_range_m, refine, background_memory, follow, tilt, rim, highlights);
-        look.strength = self.strength(base.strength)?;
+        look.strength = self.merge_strength(base.strength)?;
         if let Some(max_coc_px) = self.max_coc_px {
-            look.max_coc_px = max_coc_px.chosen();
+            look.max_coc_px = max_coc_px.value();
         }
         match (&self.aperture, &look.aperture.shape) {
             (None, _) => {}
             // The base has this picture already: do not read it again.
-            (Some(ApertureName::Image(file)), Shape::Picture(picture)) if picture.file.as_ref() == Some(file) => {}
+            (Some(ApertureSetting::Image(file)), Shape::Picture(picture)) if picture.file.as_ref() == Some(file) => {}
             (Some(name), _) => look.aperture.shape = name.load()?,
         }
-        match (&self.behind, &look.behind) {
+        match (&self.behind, &look.background) {
             (None, _) => {}
-            (Some(BehindName::Image(file)), Behind::Picture(picture)) if picture.file.as_ref() == Some(file) => {}
-            (Some(name), _) => look.behind = name.load()?,
+            (Some(BackgroundSetting::Image(file)), Behind::Picture(picture)) if picture.file.as_ref() == Some(file) => {
+            }
+            (Some(name), _) => look.background = name.load()?,
         }
         if let Some(intensity) = self.intensity {
             look.aperture.intensity = intensity;
         }
         if let Some(rank) = self.rank {
-            look.rank = rank.chosen();
+            look.rank = rank.value();
         }
         if let Some(quality) = self.quality {
-            look.quality = quality.chosen();
+            look.quality = quality.value();
         }
         Ok(look)
     }
 
     /// Returns the strength after this patch: a lens if it sets any number of one (missing ones come from `before`),
     /// otherwise the CoC at infinity.
-    fn strength(&self, before: Strength) -> Result<Strength, LookError> {
+    fn merge_strength(&self, before: Strength) -> Result<Strength, LookError> {
         let (f_number, focal_length_mm, sensor_width_mm) = (self.f_number, self.focal_length_mm, self.sensor_width_mm);
         if f_number.or(focal_length_mm).or(sensor_width_mm).is_none() {
             return Ok(self.coc_at_infinity.unwrap_or(before));

@@ -10,7 +10,7 @@ pub struct Preset {
     /// Its settings.
     pub patch: Patch,
     /// Whether the user created it; otherwise it is built in.
-    pub own: bool,
+    pub is_user_defined: bool,
 }
 
 /// The built-in presets, in display order. They leave some settings as they are: focus, quality and refinement.
@@ -82,11 +82,11 @@ const BUILT_IN: [(&str, &[(&str, &str)]); 5] = [
 ];
 
 /// Returns the built-in presets, in display order.
-pub fn built_in() -> impl Iterator<Item = Preset> {
+pub fn built_in_presets() -> impl Iterator<Item = Preset> {
     BUILT_IN.iter().map(|(name, settings)| Preset {
         name: (*name).to_string(),
         patch: Patch::parse(settings.iter().copied()).unwrap_or_default(),
-        own: false,
+        is_user_defined: false,
     })
 }
 
@@ -96,7 +96,7 @@ mod tests {
 
     #[test]
     fn all_settings_of_built_in_presets_are_read() {
-        for ((_, settings), preset) in BUILT_IN.iter().zip(built_in()) {
+        for ((_, settings), preset) in BUILT_IN.iter().zip(built_in_presets()) {
             let mut values = preset.patch.values();
             let mut written: Vec<_> = settings.iter().map(|(name, text)| (*name, (*text).to_string())).collect();
             values.sort_unstable();

@@ -4,8 +4,11 @@
 use std::ops::RangeInclusive;
 use std::str::FromStr;
 
-use super::number::{OrAuto, above_zero, not_negative, within};
-use super::{ApertureName, BackgroundMemory, BehindName, Effect, Follow, Look, MAX_RADIUS_PX, Refine, Strength, Tilt};
+use super::number::{OrAuto, in_range_parser, parse_non_negative, parse_positive};
+use super::{
+    ApertureSetting, BackgroundMemory, BackgroundSetting, Effect, FramingZoom, Look, MAX_RADIUS_PX, Refine, Strength,
+    Tilt,
+};
 use crate::bokeh::{Method, Rank};
 use crate::budget::Quality;
 use crate::depth::focus::FocusRule;
@@ -18,7 +21,7 @@ pub const RIMS: RangeInclusive<f32> = 0.0..=1.0;
 /// The valid factors of highlight recovery.
 pub const HIGHLIGHTS: RangeInclusive<f32> = 0.0..=1000.0;
 
-/// The range that [`above_zero`] accepts.
+/// The range that [`parse_positive`] accepts.
 const ABOVE_ZERO: RangeInclusive<f32> = f32::from_bits(1)..=f32::MAX;
 
 /// A group of settings, with a heading of its own in the help.
@@ -89,83 +92,84 @@ macro_rules! settings {
 pub type Choice = (&'static str, &'static str);
 
 /// Returns names and help of all values of an enumeration.
-fn names_of<T: Named>() -> Vec<Choice> {
+fn list_choices<T: Named>() -> Vec<Choice> {
     T::VALUES.iter().map(|value| (value.name(), value.help())).collect()
 }
 
-fn names_with_auto<T: Named>() -> Vec<Choice> {
-    [vec![("auto", "As the time allows")], names_of::<T>()].concat()
+fn list_choices_with_auto<T: Named>() -> Vec<Choice> {
+    [vec![("auto", "The best for the available time")], list_choices::<T>()].concat()
 }
 
 settings! {
     /// What the blur follows
-    effect: Effect = "effect" "WHAT" Blur Effect::from_str, one of names_of::<Effect>();
+    effect: Effect = "effect" "WHAT" Blur Effect::from_str, one of list_choices::<Effect>();
     /// How dof is composited
-    method: Method = "method" "HOW" Blur Method::from_str, one of names_of::<Method>();
-    /// Distance of the focal plane: METRES, auto, X,Y as fractions of width and height, or track:X,Y, what is there at first
+    method: Method = "method" "HOW" Blur Method::from_str, one of list_choices::<Method>();
+    /// Distance of the focal plane: METRES, auto, X,Y as fractions of width and height, or track:X,Y, the object there
+    /// at the start
     focus: FocusRule = "focus" "WHERE" Blur FocusRule::from_str;
-    /// Distances that are sharp as a whole, in metres: half of it on either side of the focal plane
-    focus_range_m: f32 = "focus-range" "METRES" Blur not_negative, in 0.0..=f32::MAX;
-    /// How strong the blur is: the radius of a point at infinity, in pixels, or as a share of the height such as 3%
+    /// Range of distances that is completely sharp, in metres, half of it on either side of the focal plane
+    focus_range_m: f32 = "focus-range" "METRES" Blur parse_non_negative, in 0.0..=f32::MAX;
+    /// Strength of the blur: the radius of a point at infinity, in pixels, or as a share of the height such as 3%
     /// [default: auto, which is height / 45]
     coc_at_infinity: Strength = "blur" "PX" Blur Strength::from_str, is computed;
-    /// The strength by a lens instead: its f-number, with --focal-length and --sensor-width
-    f_number: f32 = "f-number" "N" Blur above_zero, in ABOVE_ZERO, is computed;
+    /// Strength of the blur by a lens instead: its f-number, with --focal-length and --sensor-width
+    f_number: f32 = "f-number" "N" Blur parse_positive, in ABOVE_ZERO, is computed;
     /// Focal length of that lens, in millimetres
-    focal_length_mm: f32 = "focal-length" "MM" Blur above_zero, in ABOVE_ZERO, is computed;
+    focal_length_mm: f32 = "focal-length" "MM" Blur parse_positive, in ABOVE_ZERO, is computed;
     /// Width of the sensor behind that lens, in millimetres
-    sensor_width_mm: f32 = "sensor-width" "MM" Blur above_zero, in ABOVE_ZERO, is computed;
+    sensor_width_mm: f32 = "sensor-width" "MM" Blur parse_positive, in ABOVE_ZERO, is computed;
     /// Largest blur radius, in pixels [default: auto, which is 0.06 x height]
-    max_coc_px: OrAuto<f32> = "max-coc" "PX" Blur OrAuto::parser(within(0.0..=MAX_RADIUS_PX)), is computed;
+    max_coc_px: OrAuto<f32> = "max-coc" "PX" Blur OrAuto::parser(in_range_parser(0.0..=MAX_RADIUS_PX)), is computed;
     /// Whether depth is fitted to the picture: edges onto colour edges, less noise and flicker
-    refine: Refine = "refine" "WHEN" Blur Refine::from_str, one of names_of::<Refine>();
-    /// What a stream shows of what things hide, where blur lets it through
-    background_memory: BackgroundMemory = "background-memory" "WHETHER" Blur BackgroundMemory::from_str, one of names_of::<BackgroundMemory>();
+    refine: Refine = "refine" "WHEN" Blur Refine::from_str, one of list_choices::<Refine>();
+    /// Background that shows through blurred outlines in a stream
+    background_memory: BackgroundMemory = "background-memory" "WHETHER" Blur BackgroundMemory::from_str, one of list_choices::<BackgroundMemory>();
     /// What is behind the subject: blur (the room), color:#RRGGBB or image:FILE
-    behind: BehindName = "behind" "WHAT" Blur BehindName::from_str;
+    behind: BackgroundSetting = "behind" "WHAT" Blur BackgroundSetting::from_str;
     /// Keep the subject in the middle by showing a part of the picture: the largest zoom, up to 4, or off
-    follow: Follow = "follow" "ZOOM" Blur Follow::from_str;
+    follow: FramingZoom = "follow" "ZOOM" Blur FramingZoom::from_str;
     /// Sharp band of tilt-shift: CENTER_Y[:BAND[:ANGLE_DEG]], the first two as fractions of the height
     tilt: Tilt = "tilt" "BAND" Blur Tilt::from_str;
     /// disc, ring:INNER, polygon:N[:ROTATION_DEG[:CURVATURE]], heart, star:N or image:FILE
-    aperture: ApertureName = "aperture" "SHAPE" Aperture ApertureName::from_str;
+    aperture: ApertureSetting = "aperture" "SHAPE" Aperture ApertureSetting::from_str;
     /// Radial intensity: -1 soap bubbles, 0 flat, 1 bright in the middle
-    intensity: f32 = "intensity" "I" Aperture within(INTENSITIES), in INTENSITIES;
+    intensity: f32 = "intensity" "I" Aperture in_range_parser(INTENSITIES), in INTENSITIES;
     /// Width of the soft rim, as a fraction of the radius
-    rim: f32 = "rim" "W" Aperture within(RIMS), in RIMS;
+    rim: f32 = "rim" "W" Aperture in_range_parser(RIMS), in RIMS;
     /// Separable terms, 1 to 16 or full [default: auto, which is the quality level's]
     rank: OrAuto<Rank> = "rank" "TERMS" Aperture OrAuto::from_str, is computed;
-    /// Take clipped white as this many times as bright; 0 is off
-    highlights: f32 = "highlights" "M" Aperture within(HIGHLIGHTS), in HIGHLIGHTS;
-    /// Quality level: changes fidelity, never the amount of blur. auto follows the time there is (--budget-ms) where
-    /// frames come in real time, up to balanced on the CPU and best on a GPU; elsewhere it is balanced
-    quality: OrAuto<Quality> = "quality" "LEVEL" Computing OrAuto::from_str, one of names_with_auto::<Quality>();
+    /// Brighten clipped white by this factor; 0 is off
+    highlights: f32 = "highlights" "M" Aperture in_range_parser(HIGHLIGHTS), in HIGHLIGHTS;
+    /// Quality level: changes fidelity, never the amount of blur. In real time, auto is the best level for the
+    /// available time (--budget-ms), up to balanced on the CPU and best on a GPU; otherwise it is balanced
+    quality: OrAuto<Quality> = "quality" "LEVEL" Computing OrAuto::from_str, one of list_choices_with_auto::<Quality>();
 }
 
 /// Returns the setting with this name or alias; `None` if a look has no such setting.
-pub fn setting(name: &str) -> Option<&'static Setting> {
-    let name = name_of(name);
+pub fn find_setting(name: &str) -> Option<&'static Setting> {
+    let name = resolve_alias(name);
     SETTINGS.iter().find(|setting| setting.name == name)
 }
 
 /// Resolves an alias to the setting's name; returns any other text unchanged.
-pub fn name_of(called: &str) -> &str {
+pub fn resolve_alias(called: &str) -> &str {
     ALIASES.iter().find(|(_, alias)| *alias == called).map_or(called, |(name, _)| name)
 }
 
 /// The settings of a lens, which exclude the strength at infinity.
 const LENS_SETTINGS: [&str; 3] = ["f-number", "focal-length", "sensor-width"];
 /// The strength at infinity, which excludes the settings of a lens.
-const AT_INFINITY: &str = "blur";
+const COC_AT_INFINITY: &str = "blur";
 /// Setting names and their aliases, valid wherever settings are written.
-const ALIASES: [(&str, &str); 1] = [(AT_INFINITY, "coc-at-infinity")];
+const ALIASES: [(&str, &str); 1] = [(COC_AT_INFINITY, "coc-at-infinity")];
 
 impl Setting {
     /// Returns the names of the settings that cannot be combined with this one.
-    pub fn excludes(&self) -> &'static [&'static str] {
+    pub fn excluded_settings(&self) -> &'static [&'static str] {
         match self.name {
-            AT_INFINITY => &LENS_SETTINGS,
-            name if LENS_SETTINGS.contains(&name) => &[AT_INFINITY],
+            COC_AT_INFINITY => &LENS_SETTINGS,
+            name if LENS_SETTINGS.contains(&name) => &[COC_AT_INFINITY],
             _ => &[],
         }
     }
@@ -176,8 +180,8 @@ impl Setting {
     }
 
     /// Returns whether it sets the strength of the blur: at infinity or by a lens, which exclude each other.
-    pub fn is_strength(&self) -> bool {
-        !self.excludes().is_empty()
+    pub fn sets_strength(&self) -> bool {
+        !self.excluded_settings().is_empty()
     }
 
     /// Returns its default value; `None` if that is [computed](Setting::computed).
@@ -189,7 +193,7 @@ impl Setting {
     ///
     /// # Errors
     /// The value is invalid: returns what is accepted.
-    pub fn set(&self, patch: &mut Patch, text: &str) -> Result<(), String> {
+    pub fn parse_into(&self, patch: &mut Patch, text: &str) -> Result<(), String> {
         (self.set)(patch, text)
     }
 }
@@ -202,7 +206,7 @@ mod tests {
     fn ranges_are_what_is_accepted() {
         let mut ranged = 0;
         for setting in &SETTINGS {
-            let accepts = |number: f32| setting.set(&mut Patch::default(), &number.to_string()).is_ok();
+            let accepts = |number: f32| setting.parse_into(&mut Patch::default(), &number.to_string()).is_ok();
             let Some(range) = (setting.range)() else { continue };
             ranged += 1;
             let (low, high) = range.into_inner();

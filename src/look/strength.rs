@@ -4,7 +4,7 @@ use std::fmt;
 use std::str::FromStr;
 
 use super::MAX_RADIUS_PX;
-use super::number::number_in;
+use super::number::parse_in_range;
 use crate::optics::Lens;
 
 /// The strength of the blur.
@@ -25,8 +25,8 @@ impl FromStr for Strength {
     fn from_str(text: &str) -> Result<Self, String> {
         let strength = match text.strip_suffix('%') {
             None if text == "auto" => Some(Self::Default),
-            None => number_in(text, 0.0, MAX_RADIUS_PX).map(Self::AtInfinity),
-            Some(percent) => number_in(percent, 0.0, 100.0).map(Self::Percent),
+            None => parse_in_range(text, 0.0, MAX_RADIUS_PX).map(Self::AtInfinity),
+            Some(percent) => parse_in_range(percent, 0.0, 100.0).map(Self::Percent),
         };
         strength
             .ok_or_else(|| format!("use pixels from 0 to {MAX_RADIUS_PX}, a share of the height such as 3%, or auto"))

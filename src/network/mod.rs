@@ -35,9 +35,9 @@ named! {
     pub enum Runtime default Auto {
         /// ONNX Runtime where it is installed, else the built-in runtime
         Auto = "auto",
-        /// What is built in: slower, and nothing to install
+        /// The built-in one: slower, but nothing to install
         BuiltIn = "built-in",
-        /// ONNX Runtime, from where ORT_DYLIB_PATH says or where it is usually installed
+        /// ONNX Runtime, from ORT_DYLIB_PATH or its usual place
         OnnxRuntime = "onnx-runtime",
     }
 }
@@ -118,7 +118,7 @@ pub enum NetworkError {
         source: std::io::Error,
     },
     /// The network cannot be run here.
-    #[error("{}: no network that can be run here: {why}", path.display())]
+    #[error("{}: this network cannot be run: {why}", path.display())]
     Refused {
         /// The file.
         path: PathBuf,

@@ -48,7 +48,7 @@ pub fn reject_loops(model: &[u8]) -> Result<(), String> {
 
 fn reject_loops_in(part: Part, message: &[u8], depth: usize) -> Result<(), String> {
     if depth > MAX_DEPTH {
-        return Err(format!("it has branches within branches, {MAX_DEPTH} deep and more"));
+        return Err(format!("it has branches within branches, {MAX_DEPTH} deep or more"));
     }
     let mut rest = message;
     while !rest.is_empty() {
@@ -58,7 +58,7 @@ fn reject_loops_in(part: Part, message: &[u8], depth: usize) -> Result<(), Strin
             && let Some(name) = LOOP_OPERATORS.iter().find(|name| **name == content)
         {
             let name = String::from_utf8_lossy(name);
-            return Err(format!("it has the operator {name}, which may run for ever; export it without loops"));
+            return Err(format!("it has the operator {name}, which may run forever; export it without loops"));
         }
         if let Some(inner) = part.field(tag >> 3) {
             reject_loops_in(inner, content, depth + usize::from(matches!(part, Part::Attribute)))?;
@@ -68,7 +68,7 @@ fn reject_loops_in(part: Part, message: &[u8], depth: usize) -> Result<(), Strin
 }
 
 fn not_onnx() -> String {
-    "it is no ONNX file, or not whole".to_owned()
+    "it is not an ONNX file, or is incomplete".to_owned()
 }
 
 /// Reads the next field of a message: its tag, and its content if length-delimited. `None` if it is truncated.

@@ -68,7 +68,7 @@ fn candidates() -> Result<Vec<PathBuf>, String> {
         return match chosen.is_absolute() || is_name {
             true => Ok(vec![chosen]),
             false => Err(format!(
-                "ORT_DYLIB_PATH is {}, which means another file in every folder: name it from the root, as /usr/lib/...",
+                "ORT_DYLIB_PATH is {}, a relative path: give an absolute path, such as /usr/lib/...",
                 chosen.display()
             )),
         };
@@ -119,7 +119,7 @@ impl OnnxRuntime {
 
 fn port(outlet: &ort::value::Outlet) -> Result<Port, String> {
     let ValueType::Tensor { shape, .. } = outlet.dtype() else {
-        return Err(format!("{} is no tensor", outlet.name()));
+        return Err(format!("{} is not a tensor", outlet.name()));
     };
     let shape = shape.iter().map(|&side| usize::try_from(side).ok()).collect();
     Ok(Port { name: outlet.name().to_owned(), shape })

@@ -4,8 +4,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::frame::Frame;
 use super::pacer::Pacer;
-use super::{Ended, Shared, Trace};
-use crate::capture::{self, Brings, Camera, Captured, PATIENCE};
+use super::{Shared, StageResult, Trace};
+use crate::capture::{self, Camera, Captured, FrameData, MAX_WAIT};
 use crate::frame::{ColorImage, DepthMap, GrayImage};
 use crate::link::Sender;
 use crate::link::demand::Demand;
@@ -13,7 +13,7 @@ use crate::link::pool::Pooled;
 use crate::stats::{Cause, Histogram};
 
 /// A picture, with the depth or right picture that the camera delivered.
-pub(super) struct Shot {
+pub(super) struct CapturedFrame {
     pub color: Pooled<ColorImage>,
     pub depth: Option<Pooled<DepthMap>>,
     /// The right camera's picture.
@@ -41,42 +41,42 @@ impl<'a> Stage<'a> {
         shared: &'a Shared,
         times: &'a mut Histogram,
     ) -> Self {
-        let Shared { clock, info, live_ns, over, .. } = shared;
-        let pacer = Pacer::new(clock.clone(), live_ns.is_some() && !info.live, info.period_ns);
-        Self { camera, pacer, demand, stop: [stop, over], shared, times }
+        let Shared { clock, info, realtime_period_ns, has_ended, .. } = shared;
+        let pacer = Pacer::new(clock.clone(), realtime_period_ns.is_some() && !info.live, info.period_ns);
+        Self { camera, pacer, demand, stop: [stop, has_ended], shared, times }
     }
 
     /// Captures until the camera ends, a stop flag is set, or the output is closed.
-    pub(super) fn run(mut self, mut to: Sender<Frame<Shot>>) -> Ended {
+    pub(super) fn run(mut self, mut to: Sender<Frame<CapturedFrame>>) -> StageResult {
         let Shared { clock, tally, pools, info, keep_going, .. } = self.shared;
-        let brings = info.brings;
+        let frame_data = info.frame_data;
         let stopped = || self.stop.iter().any(|stop| stop.load(Ordering::Relaxed));
         // Stand-ins for a camera that brings neither; they stay empty.
         let (mut no_depth, mut no_right) = (DepthMap::default(), GrayImage::default());
-        let mut complained = false;
+        let mut has_warned = false;
         let seeker = self.camera.seeker();
         if let Some((seeker, demand)) = seeker.as_ref().zip(self.demand.as_ref()) {
-            seeker.wake(demand);
+            seeker.set_demand(demand);
         }
         let (mut seek, mut ahead_ns) = (0, 0);
         while !stopped() {
-            let wish = seeker.as_ref().and_then(|seeker| seeker.request_after(seek));
-            if let Some(wish) = wish {
-                (seek, ahead_ns) = (wish.number, self.camera.seek(wish.place));
-                self.pacer.restart();
+            let request = seeker.as_ref().and_then(|seeker| seeker.newer_request(seek));
+            if let Some(request) = request {
+                (seek, ahead_ns) = (request.number, self.camera.seek(request.position));
+                self.pacer.restart_schedule();
             // A seek is served even if there are no viewers; otherwise the camera pauses until one comes.
             } else if let Some(demand) = self.demand.as_ref().filter(|demand| !demand.is_watched()) {
                 self.camera.suspend();
-                let rest_began_ns = clock.now_ns();
-                demand.wait(PATIENCE);
-                self.pacer.shift(clock.now_ns() - rest_began_ns);
+                let pause_began_ns = clock.now_ns();
+                demand.wait(MAX_WAIT);
+                self.pacer.shift_schedule(clock.now_ns() - pause_began_ns);
                 continue;
             }
-            tally.lost(self.pacer.skip(&mut *self.camera), Cause::Driver);
+            tally.lost(self.pacer.skip_late_frames(&mut *self.camera), Cause::Driver);
             let mut color = pools.colors.take();
-            let mut depth = (brings == Brings::Depth).then(|| pools.depths.take());
-            let mut right = (brings == Brings::RightCamera).then(|| pools.rights.take());
-            let shot = capture::Shot {
+            let mut depth = (frame_data == FrameData::Depth).then(|| pools.depths.take());
+            let mut right = (frame_data == FrameData::RightCamera).then(|| pools.rights.take());
+            let shot = capture::FrameBuffers {
                 color: &mut color,
                 depth: depth.as_deref_mut().unwrap_or(&mut no_depth),
                 right: right.as_deref_mut().unwrap_or(&mut no_right),
@@ -87,26 +87,26 @@ impl<'a> Stage<'a> {
                     let read_ns = (clock.now_ns() - began_ns).saturating_sub(self.camera.waited_ns());
                     self.times.add(read_ns);
                     // A live camera stamps its frames; stored ones are captured when they are due.
-                    let has_wish = || seeker.as_ref().is_some_and(|seeker| seeker.request_after(seek).is_some());
+                    let has_request = || seeker.as_ref().is_some_and(|seeker| seeker.newer_request(seek).is_some());
                     let captured_ns = match stamp.captured_ns {
                         Some(captured_ns) => captured_ns,
-                        None => self.pacer.wait(stamp.time_ns, read_ns, || stopped() || has_wish()),
+                        None => self.pacer.wait_until_due(stamp.time_ns, read_ns, || stopped() || has_request()),
                     };
                     let ticket = tally.captured(captured_ns);
                     let since_ns = clock.now_ns();
                     // A live camera's frame waited for its turn to be read; a stored one was read before it was captured.
                     let decode_ns = if stamp.captured_ns.is_some() { read_ns } else { 0 };
-                    let between_ns = since_ns.saturating_sub(captured_ns).saturating_sub(decode_ns);
+                    let queueing_ns = since_ns.saturating_sub(captured_ns).saturating_sub(decode_ns);
                     let frame = Frame {
                         ticket,
                         stamp,
                         seek,
-                        is_seek_target: wish.is_some(),
+                        is_seek_target: request.is_some(),
                         change: 0,
-                        is_between: false,
-                        trace: Trace { decode_ns: read_ns, between_ns, ..Trace::default() },
+                        is_transitional: false,
+                        trace: Trace { decode_ns: read_ns, queueing_ns, ..Trace::default() },
                         since_ns,
-                        item: Shot { color, depth, right, ahead_ns },
+                        item: CapturedFrame { color, depth, right, ahead_ns },
                     };
                     if !frame.send_to(&mut to, tally) {
                         break;
@@ -117,9 +117,9 @@ impl<'a> Stage<'a> {
                     if !keep_going {
                         return Err(error.into());
                     }
-                    if !complained {
-                        tracing::warn!("{error}; going on without such frames");
-                        complained = true;
+                    if !has_warned {
+                        tracing::warn!("{error}; such frames are skipped");
+                        has_warned = true;
                     }
                 }
                 Captured::Lost(count, cause) => tally.lost(count, cause),

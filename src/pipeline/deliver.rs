@@ -5,8 +5,8 @@ use std::sync::atomic::Ordering;
 
 use super::blur::Blurred;
 use super::frame::Frame;
-use super::playout::Playout;
-use super::{Ended, Progress, Shared, Trace, View};
+use super::playout::PlayoutDelay;
+use super::{Progress, Shared, StageResult, Trace, View};
 use crate::bokeh::Picture;
 use crate::budget::Quality;
 use crate::frame::ColorImage;
@@ -23,7 +23,7 @@ pub(super) struct Stage<'a> {
     mirror: bool,
     progress: &'a dyn Fn(Progress),
     /// When pictures are due; `None` shows them at once.
-    playout: Option<Playout>,
+    playout: Option<PlayoutDelay>,
     shared: &'a Shared,
     times: &'a mut SinkTimings,
     cropper: Cropper,
@@ -39,13 +39,13 @@ impl<'a> Stage<'a> {
         shared: &'a Shared,
         times: &'a mut SinkTimings,
     ) -> Self {
-        let playout = shared.live_ns.map(Playout::new);
+        let playout = shared.realtime_period_ns.map(PlayoutDelay::new);
         let (cropper, cropped) = (Cropper::default(), ColorImage::default());
         Self { sink, view, mirror, progress, playout, shared, times, cropper, cropped }
     }
 
     /// Delivers frames until they end, the sink is closed, or the viewer is gone.
-    pub(super) fn run(mut self, mut from: Receiver<Frame<Blurred>>) -> Ended {
+    pub(super) fn run(mut self, mut from: Receiver<Frame<Blurred>>) -> StageResult {
         let Shared { clock, tally, .. } = self.shared;
         let mut last_ns = None;
         // Ticket of the frame sent to the viewer last, if its delivery depends on the viewer.
@@ -53,7 +53,7 @@ impl<'a> Stage<'a> {
         loop {
             let wants_yuyv = self.view.is_none() && !self.mirror && self.sink.wants_yuyv();
             self.shared.wants_yuyv.store(wants_yuyv, Ordering::Relaxed);
-            let mut frame = match self.next(&mut from) {
+            let mut frame = match self.receive_next(&mut from) {
                 Received::Item(frame) => frame,
                 Received::Nothing => match self.sink.repeat()? {
                     ControlFlow::Continue(shown) => {
@@ -69,13 +69,14 @@ impl<'a> Stage<'a> {
             let captured_ns = frame.ticket.captured_ns;
             // Wait for the frame's play-out time, against jitter.
             if let Some(playout) = &mut self.playout {
-                clock.sleep_until_ns(playout.due_ns(captured_ns, frame.since_ns));
+                clock.sleep_until_ns(playout.due_time_ns(captured_ns, frame.since_ns));
                 frame.trace.playout_ns = clock.now_ns() - frame.since_ns;
                 self.times.playout.add(frame.trace.playout_ns);
             }
             let began_ns = frame.since_ns + frame.trace.playout_ns;
             frame.trace.age_ns = began_ns.saturating_sub(captured_ns);
-            let was_given = match self.put_picture(&mut blurred.picture, is_cropped, captured_ns, frame.stamp.time_ns) {
+            let was_given = match self.write_to_sink(&mut blurred.picture, is_cropped, captured_ns, frame.stamp.time_ns)
+            {
                 Ok(ControlFlow::Continue(was_given)) => was_given,
                 Ok(ControlFlow::Break(())) => break,
                 Err(error) => {
@@ -93,11 +94,11 @@ impl<'a> Stage<'a> {
             let quality = frame.trace.quality;
             // A frame that the sink does not keep counts as delivered once the viewer took it.
             let kept = was_given && self.sink.keeps();
-            let Frame { ticket, stamp, seek, is_seek_target, change, is_between, trace, .. } = frame;
+            let Frame { ticket, stamp, seek, is_seek_target, change, is_transitional, trace, .. } = frame;
             let (done, open) = if self.view.is_none() || kept { (Some(ticket), None) } else { (None, Some(ticket)) };
             done.into_iter().for_each(|ticket| tally.delivered(ticket));
             if let Some(view) = &mut self.view {
-                let Blurred { picture, color, depth, coc, part } = blurred;
+                let Blurred { picture, color, depth, coc, crop } = blurred;
                 let frames = tally.frames();
                 let view_of = View {
                     picture,
@@ -106,9 +107,9 @@ impl<'a> Stage<'a> {
                     coc,
                     stamp,
                     captured_ns,
-                    part,
+                    crop,
                     change,
-                    is_between,
+                    is_transitional,
                     seek,
                     is_seek_target,
                     trace,
@@ -142,18 +143,18 @@ impl<'a> Stage<'a> {
     }
 
     /// Crops and mirrors the picture that goes out; returns whether it was cropped.
-    fn crop_and_mirror(&mut self, Blurred { picture, part, .. }: &mut Blurred) -> bool {
-        let whole = part.zip(picture.memory());
-        let is_cropped = whole.map(|(part, whole)| self.cropper.crop(whole, &part, &mut self.cropped)).is_some();
+    fn crop_and_mirror(&mut self, Blurred { picture, crop, .. }: &mut Blurred) -> bool {
+        let whole = crop.zip(picture.memory());
+        let is_cropped = whole.map(|(crop, whole)| self.cropper.crop(whole, &crop, &mut self.cropped)).is_some();
         if self.mirror {
             let out = if is_cropped { Some(&mut self.cropped) } else { picture.memory_mut() };
-            out.map(mirror);
+            out.map(mirror_picture);
         }
         is_cropped
     }
 
     /// Passes a picture to the sink if it is in memory; `Continue` says whether it was.
-    fn put_picture(
+    fn write_to_sink(
         &mut self,
         picture: &mut Picture,
         is_cropped: bool,
@@ -183,7 +184,7 @@ impl<'a> Stage<'a> {
     }
 
     /// Receives the next frame; `Nothing` if the sink must repeat its last picture first.
-    fn next<T>(&self, from: &mut Receiver<T>) -> Received<T> {
+    fn receive_next<T>(&self, from: &mut Receiver<T>) -> Received<T> {
         match self.sink.hold() {
             Some(hold) => from.recv_timeout(hold),
             None => from.recv().map_or(Received::Ended, Received::Item),
@@ -197,12 +198,12 @@ fn log_frame(index: usize, coc: &CocField, trace: &Trace) {
     let focus_m = if let CocField::Depth(lens) = coc { Some(lens.focus_m) } else { None };
     let quality = trace.quality.map(Quality::name);
     let (depth_ms, blur_ms, age_ms, depth_held) =
-        (ms(trace.depth_ns), ms(trace.blur_ns), ms(trace.age_ns), trace.depth_held);
+        (ms(trace.depth_ns), ms(trace.blur_ns), ms(trace.age_ns), trace.is_depth_reused);
     tracing::trace!(index, focus_m, quality, depth_held, depth_ms, blur_ms, age_ms, "frame");
 }
 
 /// Mirrors a picture left to right.
-fn mirror(picture: &mut ColorImage) {
+fn mirror_picture(picture: &mut ColorImage) {
     let row_bytes = picture.width as usize * 3;
     for row in picture.rgb.chunks_exact_mut(row_bytes.max(1)) {
         row.as_chunks_mut::<3>().0.reverse();

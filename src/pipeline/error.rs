@@ -36,7 +36,7 @@ pub enum Fault {
         source_name: String,
     },
     /// The executor returned frames out of order, or none.
-    #[error("the blur executor gave back another frame than the oldest, or none: please report this")]
+    #[error("the blur executor did not return the oldest frame: please report this")]
     LostFrame,
     #[error("the {stage} stage panicked: {message}; please report this")]
     Panic { stage: &'static str, message: String },
@@ -50,7 +50,7 @@ pub enum Fault {
 }
 
 impl Fault {
-    pub(super) fn panic(stage: &'static str, payload: &(dyn Any + Send)) -> Self {
+    pub(super) fn from_panic(stage: &'static str, payload: &(dyn Any + Send)) -> Self {
         let message = match (payload.downcast_ref::<&str>(), payload.downcast_ref::<String>()) {
             (Some(text), _) => (*text).to_owned(),
             (_, Some(text)) => text.clone(),

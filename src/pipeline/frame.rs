@@ -16,7 +16,7 @@ pub(super) struct Frame<T> {
     /// The number of the last change before it; 0 if there was none.
     pub change: u64,
     /// Whether the previous look's executor blurs it, because its own is still being created.
-    pub is_between: bool,
+    pub is_transitional: bool,
     pub trace: Trace,
     /// When the previous stage finished it.
     pub since_ns: u64,
@@ -26,9 +26,12 @@ pub(super) struct Frame<T> {
 impl<T> Frame<T> {
     /// Starts the next stage: adds the time waited until now, and separates the frame's data from the rest.
     pub fn take_item(self, now_ns: u64) -> (Frame<()>, T) {
-        let Self { ticket, stamp, seek, is_seek_target, change, is_between, mut trace, since_ns, item } = self;
-        trace.between_ns += now_ns.saturating_sub(since_ns);
-        (Frame { ticket, stamp, seek, is_seek_target, change, is_between, trace, since_ns: now_ns, item: () }, item)
+        let Self { ticket, stamp, seek, is_seek_target, change, is_transitional, mut trace, since_ns, item } = self;
+        trace.queueing_ns += now_ns.saturating_sub(since_ns);
+        (
+            Frame { ticket, stamp, seek, is_seek_target, change, is_transitional, trace, since_ns: now_ns, item: () },
+            item,
+        )
     }
 
     /// Sends it to the next stage, and counts an older frame that it displaced; returns whether the output is still
@@ -48,8 +51,8 @@ impl<T> Frame<T> {
 
 impl Frame<()> {
     /// Returns the frame with its new data.
-    pub fn with<T>(self, item: T) -> Frame<T> {
-        let Self { ticket, stamp, seek, is_seek_target, change, is_between, trace, since_ns, item: () } = self;
-        Frame { ticket, stamp, seek, is_seek_target, change, is_between, trace, since_ns, item }
+    pub fn with_item<T>(self, item: T) -> Frame<T> {
+        let Self { ticket, stamp, seek, is_seek_target, change, is_transitional, trace, since_ns, item: () } = self;
+        Frame { ticket, stamp, seek, is_seek_target, change, is_transitional, trace, since_ns, item }
     }
 }

@@ -5,11 +5,11 @@ use crate::capture::Camera;
 use crate::clock::Clock;
 
 /// Longest time until a stop is noticed.
-const NAP_NS: u64 = 50_000_000;
+const POLL_INTERVAL_NS: u64 = 50_000_000;
 
 pub(super) struct Pacer {
     clock: Clock,
-    active: bool,
+    is_paced: bool,
     period_ns: u64,
     /// The time of media time 0; `None` before the first frame.
     epoch_ns: Option<u64>,
@@ -18,42 +18,42 @@ pub(super) struct Pacer {
 }
 
 impl Pacer {
-    pub(super) fn new(clock: Clock, active: bool, period_ns: u64) -> Self {
-        Self { clock, active, period_ns, epoch_ns: None, read_ns: 0 }
+    pub(super) fn new(clock: Clock, is_paced: bool, period_ns: u64) -> Self {
+        Self { clock, is_paced, period_ns, epoch_ns: None, read_ns: 0 }
     }
 
     /// Skips the frames that would be more than a period late once read; returns how many.
-    pub(super) fn skip(&self, camera: &mut dyn Camera) -> u64 {
+    pub(super) fn skip_late_frames(&self, camera: &mut dyn Camera) -> u64 {
         match self.epoch_ns {
-            Some(epoch_ns) if self.active => {
+            Some(epoch_ns) if self.is_paced => {
                 let read_ns = self.clock.now_ns() + self.read_ns;
-                camera.skip(read_ns.saturating_sub(epoch_ns + self.period_ns))
+                camera.skip_until(read_ns.saturating_sub(epoch_ns + self.period_ns))
             }
             _ => 0,
         }
     }
 
     /// Shifts the schedule by a pause, so that frames go on from where they were.
-    pub(super) fn shift(&mut self, rest_ns: u64) {
-        self.epoch_ns = self.epoch_ns.map(|epoch_ns| epoch_ns + rest_ns);
+    pub(super) fn shift_schedule(&mut self, pause_ns: u64) {
+        self.epoch_ns = self.epoch_ns.map(|epoch_ns| epoch_ns + pause_ns);
     }
 
     /// Restarts the schedule: the next frame is due at once, after a seek.
-    pub(super) fn restart(&mut self) {
+    pub(super) fn restart_schedule(&mut self) {
         self.epoch_ns = None;
     }
 
     /// Waits until the frame of media time `time_ns`, which took `read_ns` to read, is due, or until `stop` returns
     /// true. Returns its capture time: when it was due, or now if the source is not paced.
-    pub(super) fn wait(&mut self, time_ns: u64, read_ns: u64, stop: impl Fn() -> bool) -> u64 {
+    pub(super) fn wait_until_due(&mut self, time_ns: u64, read_ns: u64, stop: impl Fn() -> bool) -> u64 {
         let now_ns = self.clock.now_ns();
-        if !self.active {
+        if !self.is_paced {
             return now_ns;
         }
         self.read_ns = if self.epoch_ns.is_none() { read_ns } else { self.read_ns - self.read_ns / 4 + read_ns / 4 };
         let due_ns = *self.epoch_ns.get_or_insert(now_ns.saturating_sub(time_ns)) + time_ns;
         while !stop() && self.clock.now_ns() < due_ns {
-            self.clock.sleep_until_ns(due_ns.min(self.clock.now_ns() + NAP_NS));
+            self.clock.sleep_until_ns(due_ns.min(self.clock.now_ns() + POLL_INTERVAL_NS));
         }
         // After an early stop the frame must not be stamped with a capture time in the future.
         due_ns.min(self.clock.now_ns())
@@ -63,7 +63,7 @@ impl Pacer {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::capture::{CaptureError, Captured, Shot, SourceInfo};
+    use crate::capture::{CaptureError, Captured, FrameBuffers, SourceInfo};
 
     const PERIOD_NS: u64 = 100;
 
@@ -74,10 +74,10 @@ mod tests {
         fn info(&self) -> SourceInfo {
             unreachable!("the pacer asks for nothing but skips")
         }
-        fn next(&mut self, _: Shot) -> Result<Captured, CaptureError> {
+        fn next(&mut self, _: FrameBuffers) -> Result<Captured, CaptureError> {
             Ok(Captured::End)
         }
-        fn skip(&mut self, until_ns: u64) -> u64 {
+        fn skip_until(&mut self, until_ns: u64) -> u64 {
             let from = self.0;
             self.0 = self.0.max(until_ns.div_ceil(PERIOD_NS));
             self.0 - from
@@ -91,14 +91,14 @@ mod tests {
         let mut camera = Positions(0);
         let (mut read, mut latest_ns) = (0, 0);
         loop {
-            pacer.skip(&mut camera);
+            pacer.skip_late_frames(&mut camera);
             if camera.0 >= 40 {
                 return (read, latest_ns);
             }
             let time_ns = camera.0 * PERIOD_NS;
             camera.0 += 1;
             clock.advance_ns(read_ns);
-            let captured_ns = pacer.wait(time_ns, read_ns, || false);
+            let captured_ns = pacer.wait_until_due(time_ns, read_ns, || false);
             latest_ns = latest_ns.max(clock.now_ns() - captured_ns);
             read += 1;
         }
@@ -121,9 +121,9 @@ mod tests {
         let late = |since_ns: u64, read_ns: u64| {
             let clock = Clock::manual();
             let mut pacer = Pacer::new(clock.clone(), true, PERIOD_NS);
-            pacer.wait(0, read_ns, || false);
+            pacer.wait_until_due(0, read_ns, || false);
             clock.advance_ns(since_ns);
-            pacer.skip(&mut Positions(1))
+            pacer.skip_late_frames(&mut Positions(1))
         };
         // The next frame is due at 100.
         assert_eq!([199, 200, 201, 300, 301].map(|since_ns| late(since_ns, 0)), [0, 0, 1, 1, 2]);
@@ -135,11 +135,11 @@ mod tests {
         let clock = Clock::manual();
         let mut pacer = Pacer::new(clock.clone(), true, PERIOD_NS);
         let mut camera = Positions(1);
-        pacer.wait(0, 0, || false);
+        pacer.wait_until_due(0, 0, || false);
         clock.advance_ns(60 * PERIOD_NS);
-        pacer.shift(60 * PERIOD_NS);
-        assert_eq!(pacer.skip(&mut camera), 0);
-        assert_eq!(pacer.wait(PERIOD_NS, 0, || false), 61 * PERIOD_NS);
+        pacer.shift_schedule(60 * PERIOD_NS);
+        assert_eq!(pacer.skip_late_frames(&mut camera), 0);
+        assert_eq!(pacer.wait_until_due(PERIOD_NS, 0, || false), 61 * PERIOD_NS);
     }
 
     #[test]
@@ -147,16 +147,16 @@ mod tests {
         let clock = Clock::manual();
         let mut pacer = Pacer::new(clock.clone(), false, PERIOD_NS);
         clock.advance_ns(7);
-        assert_eq!(pacer.wait(1_000_000, 5, || false), 7);
-        assert_eq!(pacer.skip(&mut Positions(0)), 0);
+        assert_eq!(pacer.wait_until_due(1_000_000, 5, || false), 7);
+        assert_eq!(pacer.skip_late_frames(&mut Positions(0)), 0);
         assert_eq!(clock.now_ns(), 7);
     }
 
     #[test]
     fn a_stop_ends_the_wait() {
         let mut pacer = Pacer::new(Clock::system(), true, PERIOD_NS);
-        let began_ns = pacer.wait(0, 0, || false);
+        let began_ns = pacer.wait_until_due(0, 0, || false);
         let hour_ns = 3_600_000_000_000;
-        assert!(pacer.wait(hour_ns, 0, || true) < began_ns + hour_ns);
+        assert!(pacer.wait_until_due(hour_ns, 0, || true) < began_ns + hour_ns);
     }
 }

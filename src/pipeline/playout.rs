@@ -5,28 +5,28 @@
 //! pictures are ready before it has passed, and none waits until it is too old.
 
 /// Fraction of the pictures that are to be ready in time; the others are shown as soon as they are ready.
-const IN_TIME: f64 = 0.97;
+const IN_TIME_FRACTION: f64 = 0.97;
 /// Decrease of the delay per picture that was in time, in periods like all that follow.
-const FALL: f64 = 0.0006;
-/// Increase per late picture: both balance when the fraction [`IN_TIME`] is in time.
-const RISE: f64 = FALL * IN_TIME / (1.0 - IN_TIME);
+const DELAY_DECREASE: f64 = 0.0006;
+/// Increase per late picture: both balance when the fraction [`IN_TIME_FRACTION`] is in time.
+const DELAY_INCREASE: f64 = DELAY_DECREASE * IN_TIME_FRACTION / (1.0 - IN_TIME_FRACTION);
 /// If a picture was very late, the delay rises by this fraction of its lateness instead,
-const RISE_SHARE: f64 = 0.25;
+const LATENESS_FRACTION: f64 = 0.25;
 /// but never by more than this, since a single picture may be late by accident.
-const MAX_RISE: f64 = 0.09;
+const MAX_DELAY_INCREASE: f64 = 0.09;
 /// Longest delay; the rest of two periods is left for the sink.
 const MAX_DELAY: f64 = 1.85;
 /// Longest initial delay: the first picture says little about later ones.
 const MAX_FIRST_DELAY: f64 = 1.0;
 
 /// The delay from capture to output.
-pub(super) struct Playout {
+pub(super) struct PlayoutDelay {
     period_ns: f64,
     /// In periods; `None` before the first picture.
     delay: Option<f64>,
 }
 
-impl Playout {
+impl PlayoutDelay {
     /// Creates the delay for pictures that come every `period_ns`.
     pub(super) fn new(period_ns: u64) -> Self {
         Self { period_ns: period_ns as f64, delay: None }
@@ -34,13 +34,17 @@ impl Playout {
 
     /// Returns when to show the picture that was captured at `captured_ns` and is ready now, in the past if it is late.
     /// Adapts the delay.
-    pub(super) fn due_ns(&mut self, captured_ns: u64, now_ns: u64) -> u64 {
+    pub(super) fn due_time_ns(&mut self, captured_ns: u64, now_ns: u64) -> u64 {
         let age = now_ns.saturating_sub(captured_ns) as f64 / self.period_ns;
         let delay = self.delay.get_or_insert(age.min(MAX_FIRST_DELAY));
         let due_ns = captured_ns + (*delay * self.period_ns) as u64;
         let late_by = age - *delay;
-        // At least by `RISE`, but not beyond the need of this picture.
-        *delay += if late_by > 0.0 { (RISE_SHARE * late_by).clamp(RISE.min(late_by), MAX_RISE) } else { -FALL };
+        // At least by `DELAY_INCREASE`, but not beyond the need of this picture.
+        *delay += if late_by > 0.0 {
+            (LATENESS_FRACTION * late_by).clamp(DELAY_INCREASE.min(late_by), MAX_DELAY_INCREASE)
+        } else {
+            -DELAY_DECREASE
+        };
         *delay = delay.clamp(0.0, MAX_DELAY);
         due_ns
     }
@@ -56,12 +60,12 @@ mod tests {
     /// Plays pictures that are ready after the given times; returns the intervals, longest first, and the ages at
     /// output.
     fn play(ready_ns: impl Iterator<Item = u64>) -> (Vec<u64>, Vec<u64>) {
-        let mut playout = Playout::new(PERIOD_NS);
+        let mut playout = PlayoutDelay::new(PERIOD_NS);
         let (mut shown, mut ages) = (Vec::new(), Vec::new());
         for (frame, ready_ns) in ready_ns.enumerate() {
             let captured_ns = frame as u64 * PERIOD_NS;
             let ready_at_ns = (captured_ns + ready_ns).max(shown.last().copied().unwrap_or(0));
-            let shown_ns = playout.due_ns(captured_ns, ready_at_ns).max(ready_at_ns);
+            let shown_ns = playout.due_time_ns(captured_ns, ready_at_ns).max(ready_at_ns);
             shown.push(shown_ns);
             ages.push(shown_ns - captured_ns);
         }
@@ -89,7 +93,7 @@ mod tests {
     fn one_late_picture_delays_the_others_by_little() {
         let (_, ages) = play((0..300).map(|frame| if frame == 100 { 300 * MS } else { 15 * MS }));
         assert!(ages[150..].iter().all(|&age| age <= 45 * MS), "{:?}", ages.iter().max());
-        assert!(ages[299] <= 15 * MS + 10 * (MAX_RISE * PERIOD_NS as f64) as u64);
+        assert!(ages[299] <= 15 * MS + 10 * (MAX_DELAY_INCREASE * PERIOD_NS as f64) as u64);
     }
 
     #[test]

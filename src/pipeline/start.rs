@@ -3,13 +3,13 @@
 use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, mpsc};
 
-use super::{Change, Changes, Progress, View, Wanted};
+use super::{Change, ChangeSender, OutputRequest, Progress, View};
 use crate::bokeh::{self, Bokeh, BokehError};
 use crate::capture::Camera;
 use crate::clock::Clock;
-use crate::computing::Computing;
+use crate::computing::ComputeOptions;
 use crate::depth::DepthSource;
-use crate::engine::{Blur, Engine, Input, Origin, Time};
+use crate::engine::{Blur, Engine, Input, Origin, TimeBudget};
 use crate::link::Sender;
 use crate::link::demand::Demand;
 use crate::look::Look;
@@ -19,18 +19,18 @@ use crate::sink::Sink;
 named! {
     /// Whether frames wait for the program, or the program for frames.
     pub enum Pace default Asap {
-        /// As they were recorded; late frames are dropped
+        /// With their recorded timing; late frames are dropped
         Realtime = "realtime",
-        /// As fast as they are delivered; none is dropped
+        /// As fast as they can be delivered; none is dropped
         Asap = "asap",
     }
 }
 
 /// How the frames of a run are blurred.
-pub struct Blurring {
+pub struct BlurSetup {
     /// The initial look.
     pub look: Look,
-    /// The executor for the [settings](Look::settings) of that look. `None` passes frames through (effect `none`).
+    /// The executor for the [settings](Look::blur_settings) of that look. `None` passes frames through (effect `none`).
     pub bokeh: Option<Box<dyn Bokeh>>,
     /// Whether the executor supports every quality, so that it can follow the time available.
     pub adaptive: bool,
@@ -38,19 +38,19 @@ pub struct Blurring {
     pub changes: Option<mpsc::Receiver<Change>>,
 }
 
-impl Blurring {
+impl BlurSetup {
     /// Creates the initial blur for pictures of `size` pixels, and the sender of later changes. Calls `make` for the
     /// executor.
     ///
     /// # Errors
     /// Returns the error of `make`.
-    pub fn begin<E>(
+    pub fn create<E>(
         look: Look,
         (size, adaptive): ((u32, u32), bool),
         make: impl FnOnce(&bokeh::Settings) -> Result<Box<dyn Bokeh>, E>,
-    ) -> Result<(Self, Changes), E> {
-        let bokeh = look.settings(size, adaptive).as_ref().map(make).transpose()?;
-        let (changes, to_come) = Changes::new(look.clone(), size, adaptive);
+    ) -> Result<(Self, ChangeSender), E> {
+        let bokeh = look.blur_settings(size, adaptive).as_ref().map(make).transpose()?;
+        let (changes, to_come) = ChangeSender::new(look.clone(), size, adaptive);
         Ok((Self { look, bokeh, adaptive, changes: Some(to_come) }, changes))
     }
 }
@@ -63,11 +63,11 @@ pub struct Run<'a> {
     pub depth: Option<Box<dyn DepthSource>>,
     /// The executor; `None` passes frames through (effect `none`).
     pub bokeh: Option<Box<dyn Bokeh>>,
-    /// How frames are blurred; `bokeh` is an executor for its [settings](Look::settings).
+    /// How frames are blurred; `bokeh` is an executor for its [settings](Look::blur_settings).
     pub look: Look,
     /// Whether `bokeh` supports every quality, so that it can follow the time available.
     pub adaptive: bool,
-    /// Whether depth is measured, so that refinement improves it ([`Look::refines`]).
+    /// Whether depth is measured, so that refinement improves it ([`Look::refines_depth`]).
     pub measured: bool,
     /// Number of threads that finish depth.
     pub threads: usize,
@@ -88,7 +88,7 @@ pub struct Run<'a> {
     pub mirror: bool,
     /// Where blurred pictures are wanted; `None` is in memory, and a mirrored picture always is. The sink only receives
     /// pictures in memory.
-    pub wanted: Option<Arc<Wanted>>,
+    pub output_request: Option<Arc<OutputRequest>>,
     /// Receives each frame that the sink took, with its inputs; the newest wins. If the sink [keeps](Sink::keeps)
     /// nothing, a frame counts as delivered once it was received here.
     pub view: Option<Sender<View>>,
@@ -115,24 +115,26 @@ impl<'a> Run<'a> {
         stop: &'a AtomicBool,
     ) -> Result<Self, BokehError> {
         let size = camera.info().size;
-        let bokeh =
-            look.settings(size, false).map(|settings| Computing::default().create_blur(&settings, size)).transpose()?;
-        let blurring = Blurring { look, bokeh, adaptive: false, changes: None };
-        Ok(Self { measured: depth.is_some(), ..Self::of(camera, depth, blurring, sink, stop) })
+        let bokeh = look
+            .blur_settings(size, false)
+            .map(|settings| ComputeOptions::default().create_blur(&settings, size))
+            .transpose()?;
+        let blurring = BlurSetup { look, bokeh, adaptive: false, changes: None };
+        Ok(Self { measured: depth.is_some(), ..Self::with_blur(camera, depth, blurring, sink, stop) })
     }
 
     /// Creates a run like [`Run::new`] with a given blur; depth is not assumed to be measured.
-    pub fn of(
+    pub fn with_blur(
         camera: Box<dyn Camera>,
         depth: Option<Box<dyn DepthSource>>,
-        Blurring { look, bokeh, adaptive, changes }: Blurring,
+        BlurSetup { look, bokeh, adaptive, changes }: BlurSetup,
         sink: Box<dyn Sink>,
         stop: &'a AtomicBool,
     ) -> Self {
         Self {
             budget_ns: camera.info().period_ns,
             measured: false,
-            threads: Computing::default().threads(),
+            threads: ComputeOptions::default().thread_count(),
             camera,
             depth,
             bokeh,
@@ -144,7 +146,7 @@ impl<'a> Run<'a> {
             keep_going: false,
             demand: None,
             mirror: false,
-            wanted: None,
+            output_request: None,
             view: None,
             clock: Clock::system(),
             stop,
@@ -153,24 +155,24 @@ impl<'a> Run<'a> {
     }
 
     /// Returns the frame period if frames come in real time.
-    pub(super) fn live_ns(&self) -> Option<u64> {
+    pub(super) fn realtime_period_ns(&self) -> Option<u64> {
         (self.pace == Pace::Realtime).then(|| self.camera.info().period_ns)
     }
 
     /// Creates the engine; takes the executor.
-    pub(super) fn engine(&mut self) -> Engine {
+    pub(super) fn create_engine(&mut self) -> Engine {
         let info = self.camera.info();
         let depth = self.depth.as_ref();
         let input = Input {
             size: info.size,
             frames: info.frames,
-            depth: if self.measured { Origin::Measured } else { Origin::Made },
+            depth: if self.measured { Origin::Measured } else { Origin::Synthesized },
             knows_background: depth.is_some_and(|depth| depth.knows_background()),
             threads: self.threads,
         };
-        let time = Time {
+        let time = TimeBudget {
             budget_ns: self.budget_ns,
-            period_ns: self.live_ns(),
+            period_ns: self.realtime_period_ns(),
             efforts: depth.map_or(&[1.0], |depth| depth.efforts()),
             shares_depth: depth.is_none_or(|depth| depth.is_reusable()),
         };

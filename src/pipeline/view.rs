@@ -38,11 +38,11 @@ pub struct View {
     /// The capture time, on the run's clock.
     pub captured_ns: u64,
     /// The crop that goes out; `None` is the whole picture.
-    pub part: Option<Crop>,
+    pub crop: Option<Crop>,
     /// The number of the last change before it; 0 if there was none.
     pub change: u64,
     /// Whether the previous look's executor blurred it, because its own was still being created.
-    pub is_between: bool,
+    pub is_transitional: bool,
     /// The number of the last seek ([`Seeker`](crate::capture::Seeker)) before it; 0 if there was none.
     pub seek: u64,
     /// Whether it is the target of that seek: it is shown however late it is.
@@ -55,7 +55,7 @@ pub struct View {
 
 impl View {
     /// Creates a view of a blurred picture of which nothing else is known.
-    pub fn of(picture: Picture, coc: CocField) -> Self {
+    pub fn new(picture: Picture, coc: CocField) -> Self {
         Self {
             picture,
             color: None,
@@ -63,9 +63,9 @@ impl View {
             coc,
             stamp: Stamp { index: 0, time_ns: 0, captured_ns: None },
             captured_ns: 0,
-            part: None,
+            crop: None,
             change: 0,
-            is_between: false,
+            is_transitional: false,
             seek: 0,
             is_seek_target: false,
             trace: Trace::default(),
@@ -78,7 +78,7 @@ impl View {
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Trace {
     /// Whether it reuses the depth of an earlier frame.
-    pub depth_held: bool,
+    pub is_depth_reused: bool,
     /// Reading and decoding, waits excluded.
     pub decode_ns: u64,
     /// Depth and CoC.
@@ -86,7 +86,7 @@ pub struct Trace {
     /// The blur; 0 if there was none.
     pub blur_ns: u64,
     /// All waits between stages until it was ready: in links, and behind other frames in the executor.
-    pub between_ns: u64,
+    pub queueing_ns: u64,
     /// The wait for its play-out time.
     pub playout_ns: u64,
     /// Its age at output: all of the above, except a stored frame's decoding, which is over before it is captured.

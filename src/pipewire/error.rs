@@ -18,20 +18,21 @@ pub enum PipeWireError {
     Silent,
     /// No camera matches the name.
     #[error(
-        "there is no camera '{name}' in PipeWire{}; `bokehcam devices` lists what there is",
+        "there is no camera '{name}' in PipeWire{}; `bokehcam devices` lists the cameras",
         if others.is_empty() { ", and no other".to_owned() } else { format!(", but {}", others.join(", ")) }
     )]
     NoCamera { name: String, others: Vec<String> },
     /// The name is a part of several cameras' names.
-    #[error("'{name}' may be any of these cameras of PipeWire's: {}; say which", found.join(", "))]
+    #[error("'{name}' matches several PipeWire cameras: {}; give the full name of one", found.join(", "))]
     Ambiguous { name: String, found: Vec<String> },
     /// The session manager does not support filters.
     #[error(
-        "this session's manager gives no filter to who asks for a camera: it takes WirePlumber 0.5 or later (Debian 13, Fedora          40); --to pipewire is a camera of its own, which any can give"
+        "this session manager does not support filters for cameras: use WirePlumber 0.5 or later (Debian 13, Fedora    \
+         40); or use --to pipewire, a separate camera, which any session manager supports"
     )]
     NoFilters,
     /// The camera is provided by this program: a loop.
-    #[error("pipewire:{name} is what this program gives itself; take another camera")]
+    #[error("pipewire:{name} is a camera that bokehcam itself provides; use another camera")]
     Own { name: String },
     /// The camera offers no usable mode.
     #[error("pipewire:{name}: {why}")]

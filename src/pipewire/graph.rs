@@ -61,8 +61,8 @@ impl Graph {
     ///
     /// # Errors
     /// The daemon does not run, or does not answer.
-    pub fn look() -> Result<Self, PipeWireError> {
-        Self::read(&Session::open()?, |_| false)
+    pub fn list_without_modes() -> Result<Self, PipeWireError> {
+        Self::list_objects(&Session::open()?, |_| false)
     }
 
     /// Lists the objects of this session's daemon, with the cameras' modes.
@@ -70,16 +70,16 @@ impl Graph {
     /// # Errors
     /// The daemon does not run, or does not answer.
     pub fn list_with_modes() -> Result<Self, PipeWireError> {
-        Self::read(&Session::open()?, |_| true)
+        Self::list_objects(&Session::open()?, |_| true)
     }
 
     /// Finds the camera that `name` refers to, with its modes, for a filter to stand in for.
     ///
     /// # Errors
     /// No camera matches, several do, or the session manager does not support filters.
-    pub fn filterable(name: &str) -> Result<Camera, PipeWireError> {
+    pub fn find_filter_target(name: &str) -> Result<Camera, PipeWireError> {
         let session = Session::open()?;
-        if !Self::read(&session, |_| false)?.has_filters {
+        if !Self::list_objects(&session, |_| false)?.has_filters {
             return Err(PipeWireError::NoFilters);
         }
         Self::find_camera(&session, name, false)
@@ -95,7 +95,7 @@ impl Graph {
             [&source.name, &source.label].into_iter().any(|text| text.to_lowercase().contains(&wanted))
         };
         let has_name = |source: &Source| source.name == name || (!exactly && source.label == name);
-        let mut graph = Self::read(session, has_part.clone())?;
+        let mut graph = Self::list_objects(session, has_part.clone())?;
         graph.sources.retain(|source| source.is_camera);
         // An exact name takes precedence over a partial match.
         let found = match graph.sources.iter().position(has_name) {
@@ -121,7 +121,7 @@ impl Graph {
 
     /// Lists the objects of the daemon that a session is connected to, with the modes of the sources for which
     /// `wants_modes` is true.
-    pub(super) fn read(
+    pub(super) fn list_objects(
         session: &Session,
         wants_modes: impl Fn(&Source) -> bool + 'static,
     ) -> Result<Self, PipeWireError> {
@@ -133,7 +133,7 @@ impl Graph {
             .global(move |object| {
                 let mut found = finder.borrow_mut();
                 let Some(properties) = object.props else { return };
-                let is_source = found.add(object.id, &object.type_, properties);
+                let is_source = found.add_object(object.id, &object.type_, properties);
                 if let Some(registry) = objects.upgrade().filter(|_| is_source) {
                     found.request_modes(|| registry.bind(object).ok(), &wants_modes);
                 }
@@ -145,13 +145,13 @@ impl Graph {
             let started = Instant::now();
             while !session.is_synced(round_trip) {
                 let left = TIMEOUT.checked_sub(started.elapsed()).ok_or(PipeWireError::Silent)?;
-                session.serve(Some(left));
+                session.iterate(Some(left));
                 if session.is_lost() {
                     return Err(PipeWireError::Silent);
                 }
             }
         }
-        let graph = found.take().graph();
+        let graph = found.take().into_graph();
         Ok(graph)
     }
 
@@ -190,7 +190,7 @@ struct Client {
 
 impl Listing {
     /// Records an object; returns whether it is a node that provides video.
-    fn add(&mut self, id: u32, kind: &ObjectType, properties: &DictRef) -> bool {
+    fn add_object(&mut self, id: u32, kind: &ObjectType, properties: &DictRef) -> bool {
         let text = |key: &str| properties.get(key).map(str::to_owned);
         let number = |key: &str| properties.get(key).and_then(|text| text.parse().ok());
         match kind {
@@ -241,7 +241,7 @@ impl Listing {
         video_node._subscription = Some((listener, node));
     }
 
-    fn graph(self) -> Graph {
+    fn into_graph(self) -> Graph {
         let Self { sources, names, clients, has_filters } = self;
         let process = |id: Option<u32>| clients.iter().find(|client| Some(client.id) == id)?.process;
         let sources = sources.into_iter().map(|VideoNode { source, client, formats, .. }| {

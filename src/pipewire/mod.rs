@@ -7,10 +7,10 @@
 mod buffer;
 mod error;
 pub mod graph;
+mod log;
 pub mod mode;
 pub mod node;
 mod param;
-mod quiet;
 pub mod reader;
 mod session;
 mod wake;
@@ -19,11 +19,11 @@ pub use error::PipeWireError;
 
 /// Returns the link group of the nodes with which this program filters a camera: group members are not connected to the
 /// filter itself.
-fn group() -> String {
+fn link_group() -> String {
     format!("bokehcam-{}", std::process::id())
 }
 
 /// Whether the socket of this session's daemon exists.
-pub fn is_there() -> bool {
-    std::path::Path::new(&session::socket()).exists()
+pub fn is_available() -> bool {
+    std::path::Path::new(&session::socket_path()).exists()
 }

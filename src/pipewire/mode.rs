@@ -65,7 +65,7 @@ pub struct Mode {
 
 /// The negotiated format of the pictures.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Agreed {
+pub struct NegotiatedFormat {
     pub fourcc: FourCc,
     /// Width and height, in pixels.
     pub size: (u32, u32),
@@ -73,16 +73,16 @@ pub struct Agreed {
     pub rate: (u32, u32),
 }
 
-impl Agreed {
+impl NegotiatedFormat {
     /// Returns the mode that offers only this format.
-    pub fn mode(&self) -> Mode {
+    pub fn to_mode(&self) -> Mode {
         let Self { fourcc, size, rate } = *self;
         Mode { fourcc, sizes: Offer::These(vec![size]), rates: Offer::These(vec![rate]) }
     }
 }
 
 /// Reads the negotiated format; `None` if it is not supported.
-pub(super) fn parse_agreed(format: &[u8]) -> Option<Agreed> {
+pub(super) fn parse_negotiated(format: &[u8]) -> Option<NegotiatedFormat> {
     parse_modes(format).into_iter().find_map(|Mode { fourcc, sizes, rates }| {
         let Offer::These(sizes) = sizes else { return None };
         let rate = match rates {
@@ -90,7 +90,7 @@ pub(super) fn parse_agreed(format: &[u8]) -> Option<Agreed> {
             Offer::These(rates) => rates.first().copied().filter(|(num, denom)| *num > 0 && *denom > 0),
             _ => None,
         };
-        Some(Agreed { fourcc, size: *sizes.first()?, rate: rate.unwrap_or((30, 1)) })
+        Some(NegotiatedFormat { fourcc, size: *sizes.first()?, rate: rate.unwrap_or((30, 1)) })
     })
 }
 
@@ -168,9 +168,9 @@ mod tests {
     #[test]
     fn what_is_written_is_read() {
         for (fourcc, _) in FORMATS {
-            let one = Agreed { fourcc, size: (1280, 720), rate: (30_000, 1001) };
+            let one = NegotiatedFormat { fourcc, size: (1280, 720), rate: (30_000, 1001) };
             let pod = param::build_format(&one);
-            assert_eq!((parse_modes(&pod), parse_agreed(&pod)), (vec![one.mode()], Some(one)));
+            assert_eq!((parse_modes(&pod), parse_negotiated(&pod)), (vec![one.to_mode()], Some(one)));
             let several = |sizes: [(u32, u32); 2]| Mode {
                 fourcc,
                 sizes: Offer::These(sizes.to_vec()),
@@ -181,7 +181,7 @@ mod tests {
             assert_eq!(parse_modes(&param::build_offer(&several([small, large]), &one)), [several([large, small])]);
             let silent = Mode { fourcc, sizes: Offer::Unknown, rates: Offer::Unknown };
             assert_eq!(
-                (parse_modes(&param::build_offer(&silent, &one)), parse_agreed(&param::build_offer(&silent, &one))),
+                (parse_modes(&param::build_offer(&silent, &one)), parse_negotiated(&param::build_offer(&silent, &one))),
                 (vec![silent], None)
             );
         }
@@ -189,7 +189,7 @@ mod tests {
 
     #[test]
     fn what_is_no_list_of_formats_has_none() {
-        assert_eq!(parse_modes(&param::header()), []);
+        assert_eq!(parse_modes(&param::build_header_request()), []);
         assert_eq!(parse_modes(&[]), []);
         assert_eq!(parse_modes(&[8, 0, 0, 0, 15]), []);
     }

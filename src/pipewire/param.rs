@@ -7,22 +7,22 @@ use pipewire::spa::pod::{CanonicalFixedSizedPod, ChoiceValue, Object, Property, 
 use pipewire::spa::sys;
 use pipewire::spa::utils::{Choice, ChoiceEnum, ChoiceFlags, Fraction, Id, Rectangle, SpaTypes};
 
-use super::mode::{self, Agreed, Mode, Offer};
+use super::mode::{self, Mode, NegotiatedFormat, Offer};
 
 /// Number of buffers: default, minimum and maximum. Readers may hold that many at once.
 const BUFFERS: (i32, i32, i32) = (4, 2, 16);
 
 /// Builds one picture format with one size and one rate: browsers and OBS list no camera that leaves one of them open.
-pub fn build_format(agreed: &Agreed) -> Vec<u8> {
-    build_offer(&agreed.mode(), agreed)
+pub fn build_format(negotiated: &NegotiatedFormat) -> Vec<u8> {
+    build_offer(&negotiated.to_mode(), negotiated)
 }
 
 /// Builds the EnumFormat pod that offers `mode`; `best` is the default of each choice.
-pub fn build_offer(mode: &Mode, best: &Agreed) -> Vec<u8> {
+pub fn build_offer(mode: &Mode, best: &NegotiatedFormat) -> Vec<u8> {
     let id = |key: FormatProperties, value: u32| Property::new(key.as_raw(), Value::Id(Id(value)));
     let raw = mode::video_format(mode.fourcc);
     let subtype = if raw.is_some() { MediaSubtype::Raw } else { MediaSubtype::Mjpg };
-    object(
+    serialize_object(
         SpaTypes::ObjectParamFormat,
         ParamType::EnumFormat,
         [
@@ -77,44 +77,48 @@ fn value_or_choice<T: CanonicalFixedSizedPod>(
 }
 
 /// Describes buffers in memory, with the layout chosen by the other side.
-pub fn any_buffers() -> Vec<u8> {
-    object(SpaTypes::ObjectParamBuffers, ParamType::Buffers, vec![number_of_buffers(), in_memory()])
+pub fn build_any_buffers() -> Vec<u8> {
+    serialize_object(
+        SpaTypes::ObjectParamBuffers,
+        ParamType::Buffers,
+        vec![buffer_count_property(), memory_type_property()],
+    )
 }
 
 /// Describes buffers with one plane in memory, of `frame_bytes` bytes with `stride` bytes per row.
-pub fn buffers(frame_bytes: i32, stride: i32) -> Vec<u8> {
+pub fn build_buffers(frame_bytes: i32, stride: i32) -> Vec<u8> {
     let int = |key, value| Property::new(key, Value::Int(value));
-    object(
+    serialize_object(
         SpaTypes::ObjectParamBuffers,
         ParamType::Buffers,
         vec![
-            number_of_buffers(),
+            buffer_count_property(),
             int(sys::SPA_PARAM_BUFFERS_blocks, 1),
             int(sys::SPA_PARAM_BUFFERS_size, frame_bytes),
             int(sys::SPA_PARAM_BUFFERS_stride, stride),
-            in_memory(),
+            memory_type_property(),
         ],
     )
 }
 
-fn number_of_buffers() -> Property {
+fn buffer_count_property() -> Property {
     let (default, min, max) = BUFFERS;
-    choice(sys::SPA_PARAM_BUFFERS_buffers, ChoiceEnum::Range { default, min, max })
+    choice_property(sys::SPA_PARAM_BUFFERS_buffers, ChoiceEnum::Range { default, min, max })
 }
 
-fn in_memory() -> Property {
+fn memory_type_property() -> Property {
     let default = (1 << sys::SPA_DATA_MemFd) | (1 << sys::SPA_DATA_MemPtr);
-    choice(sys::SPA_PARAM_BUFFERS_dataType, ChoiceEnum::Flags { default, flags: vec![] })
+    choice_property(sys::SPA_PARAM_BUFFERS_dataType, ChoiceEnum::Flags { default, flags: vec![] })
 }
 
-fn choice(key: u32, choice: ChoiceEnum<i32>) -> Property {
+fn choice_property(key: u32, choice: ChoiceEnum<i32>) -> Property {
     Property::new(key, Value::Choice(ChoiceValue::Int(Choice(ChoiceFlags::empty(), choice))))
 }
 
 /// Requests a header with each buffer, for the picture's time stamp and sequence number.
-pub fn header() -> Vec<u8> {
+pub fn build_header_request() -> Vec<u8> {
     let bytes = size_of::<sys::spa_meta_header>() as i32;
-    object(
+    serialize_object(
         SpaTypes::ObjectParamMeta,
         ParamType::Meta,
         vec![
@@ -124,7 +128,7 @@ pub fn header() -> Vec<u8> {
     )
 }
 
-fn object(kind: SpaTypes, id: ParamType, properties: Vec<Property>) -> Vec<u8> {
+fn serialize_object(kind: SpaTypes, id: ParamType, properties: Vec<Property>) -> Vec<u8> {
     let object = Value::Object(Object { type_: kind.as_raw(), id: id.as_raw(), properties });
     let written = PodSerializer::serialize(std::io::Cursor::new(Vec::new()), &object);
     // Writing to memory does not fail.

@@ -19,7 +19,7 @@ use pipewire::stream::{Stream, StreamFlags, StreamRc, StreamState};
 
 use super::PipeWireError;
 use super::graph::{Camera, Graph};
-use super::mode::{self, Agreed, Mode};
+use super::mode::{self, Mode, NegotiatedFormat};
 use super::param;
 use super::session::Session;
 use super::wake::Waker;
@@ -50,21 +50,21 @@ pub struct Frame<'a> {
 }
 
 /// Receives a camera's pictures. All methods are called on the reader's thread.
-pub trait Take: Send + 'static {
+pub trait PictureHandler: Send + 'static {
     /// Selects the mode to request from those that the camera offers.
     ///
     /// # Errors
     /// None of them is usable: a one-line message.
-    fn choose(&mut self, modes: &[Mode]) -> Result<Agreed, String>;
+    fn choose_mode(&mut self, modes: &[Mode]) -> Result<NegotiatedFormat, String>;
 
     /// Sets the format of the following pictures.
-    fn begin(&mut self, agreed: &Agreed);
+    fn set_format(&mut self, negotiated: &NegotiatedFormat);
 
     /// Receives a picture.
-    fn frame(&mut self, frame: &Frame);
+    fn handle_frame(&mut self, frame: &Frame);
 
     /// Counts pictures that were lost unread and pictures that are damaged.
-    fn lost(&mut self, missed: u64, stale: u64, corrupt: u64);
+    fn add_losses(&mut self, missed: u64, stale: u64, corrupt: u64);
 }
 
 /// Reads from one camera until it is dropped.
@@ -77,7 +77,7 @@ pub struct Reader {
 }
 
 /// Channel that receives, once, the camera and its format, or the error.
-type Ready = mpsc::Sender<Result<(Camera, Agreed), PipeWireError>>;
+type Ready = mpsc::Sender<Result<(Camera, NegotiatedFormat), PipeWireError>>;
 
 impl Reader {
     /// Starts to read from the camera that `name` refers to: its identifying name, its label, or a part of either. With
@@ -86,19 +86,23 @@ impl Reader {
     ///
     /// # Errors
     /// The daemon does not run, no camera matches, or it offers no usable mode.
-    pub fn new(name: &str, filters: bool, take: impl Take) -> Result<(Self, Camera, Agreed), PipeWireError> {
+    pub fn new(
+        name: &str,
+        filters: bool,
+        handler: impl PictureHandler,
+    ) -> Result<(Self, Camera, NegotiatedFormat), PipeWireError> {
         let waker = Waker::new().map_err(PipeWireError::Thread)?;
         let (stop, is_wanted) = (Arc::new(AtomicBool::new(false)), Arc::new(AtomicBool::new(true)));
         let (ready, is_ready) = mpsc::channel();
         let listener = Listener {
-            take: RefCell::new(Box::new(take)),
+            handler: RefCell::new(Box::new(handler)),
             clock: Clock::system(),
             ready: RefCell::new(Some(ready)),
             camera: RefCell::new(None),
-            agreed: Cell::new(None),
+            negotiated: Cell::new(None),
             last_ns: Cell::new(0),
             sequence: Cell::new(None),
-            is_away: Cell::new(None),
+            outage_since_ns: Cell::new(None),
             filters,
         };
         let (waker_handle, end, wanted, owned_name) =
@@ -106,13 +110,13 @@ impl Reader {
         let run = move || Rc::new(listener).run(&owned_name, &waker_handle, [&end, &wanted]);
         let thread = Some(thread::Builder::new().name("pipewire".into()).spawn(run).map_err(PipeWireError::Thread)?);
         let reader = Self { waker, stop, is_wanted, thread };
-        let (camera, agreed) =
+        let (camera, negotiated) =
             is_ready.recv_timeout(TIMEOUT).map_err(|_| PipeWireError::NoPictures { name: name.to_owned() })??;
-        Ok((reader, camera, agreed))
+        Ok((reader, camera, negotiated))
     }
 
     /// Sets whether pictures are requested; while they are not, the camera is released.
-    pub fn want(&self, wanted: bool) {
+    pub fn set_wanted(&self, wanted: bool) {
         if self.is_wanted.swap(wanted, Ordering::AcqRel) != wanted {
             self.waker.wake();
         }
@@ -130,18 +134,18 @@ impl Drop for Reader {
 
 /// The thread's side of a reader.
 struct Listener {
-    take: RefCell<Box<dyn Take>>,
+    handler: RefCell<Box<dyn PictureHandler>>,
     clock: Clock,
     /// Set until the first format is negotiated.
     ready: RefCell<Option<Ready>>,
     camera: RefCell<Option<Camera>>,
-    agreed: Cell<Option<Agreed>>,
+    negotiated: Cell<Option<NegotiatedFormat>>,
     /// When the last picture arrived, or the stream started.
     last_ns: Cell<u64>,
     /// The camera's sequence number of the last picture.
     sequence: Cell<Option<u64>>,
     /// Start of the current outage, if it was reported.
-    is_away: Cell<Option<u64>>,
+    outage_since_ns: Cell<Option<u64>>,
     /// Whether the pictures go to the clients that requested the camera.
     filters: bool,
 }
@@ -154,7 +158,7 @@ impl Listener {
                 continue;
             }
             let is_first = self.ready.borrow().is_some();
-            let ended = self.serve(name, waker, [stop, wanted]);
+            let ended = self.run_connection(name, waker, [stop, wanted]);
             // The first connection of a filter only learns the format; the next one is passive.
             if self.filters && is_first && self.ready.borrow().is_none() {
                 continue;
@@ -166,8 +170,8 @@ impl Listener {
                 let error = ended.err().unwrap_or(PipeWireError::NoPictures { name: name.to_owned() });
                 return drop(ready.send(Err(error)));
             }
-            if self.is_away.get().is_none() {
-                self.is_away.set(Some(self.clock.now_ns()));
+            if self.outage_since_ns.get().is_none() {
+                self.outage_since_ns.set(Some(self.clock.now_ns()));
                 let why = ended.err().map_or_else(|| "it gives no more pictures".to_owned(), |error| error.to_string());
                 tracing::warn!("{}: {why}; waiting for it to come back", self.name());
             }
@@ -183,7 +187,7 @@ impl Listener {
     ///
     /// # Errors
     /// The daemon or the camera is absent, or refuses.
-    fn serve(
+    fn run_connection(
         self: &Rc<Self>,
         name: &str,
         waker: &Waker,
@@ -194,7 +198,7 @@ impl Listener {
         let known = self.camera.borrow().as_ref().map(|camera| camera.name.clone());
         let camera = Graph::find_camera(&session, known.as_deref().unwrap_or(name), known.is_some())?;
         let refused = |why| PipeWireError::NoMode { name: camera.name.clone(), why };
-        let requested = self.take.borrow_mut().choose(&camera.modes).map_err(refused)?;
+        let requested = self.handler.borrow_mut().choose_mode(&camera.modes).map_err(refused)?;
         // A camera states its format only to readers that keep it running.
         let is_passive = self.filters && self.ready.borrow().is_none();
         let mut props = properties! {
@@ -206,7 +210,7 @@ impl Listener {
             "target.object" => camera.serial.as_str(),
         };
         if self.filters {
-            props.insert("node.link-group", super::group());
+            props.insert("node.link-group", super::link_group());
         }
         if is_passive {
             props.insert("node.passive", "in");
@@ -231,7 +235,7 @@ impl Listener {
                     formats.handle_format(stream, format.as_bytes());
                 }
             })
-            .process(move |stream, ()| pictures.take(stream))
+            .process(move |stream, ()| pictures.receive_newest(stream))
             .register()
             .map_err(PipeWireError::refused("to be listened to"))?;
         let format = param::build_format(&requested);
@@ -239,7 +243,7 @@ impl Listener {
         let flags = StreamFlags::AUTOCONNECT | StreamFlags::DONT_RECONNECT | StreamFlags::MAP_BUFFERS;
         stream.connect(Direction::Input, None, flags, &mut formats).map_err(PipeWireError::refused("a reader"))?;
         let (waker_handle, descriptor) = (waker.clone(), waker.descriptor().map_err(PipeWireError::Thread)?);
-        let _bell = session.event_loop().add_io(descriptor, IoFlags::IN, move |_| waker_handle.clear());
+        let _wake_source = session.event_loop().add_io(descriptor, IoFlags::IN, move |_| waker_handle.clear());
 
         self.last_ns.set(self.clock.now_ns());
         self.sequence.set(None);
@@ -248,7 +252,7 @@ impl Listener {
                 break;
             }
             if is_passive && stream.state() != StreamState::Streaming {
-                session.serve(Some(IDLE_WAIT));
+                session.iterate(Some(IDLE_WAIT));
                 self.last_ns.set(self.clock.now_ns());
                 if session.is_lost() || has_ended.get() {
                     break;
@@ -256,7 +260,7 @@ impl Listener {
                 continue;
             }
             let until_ns = self.last_ns.get() + self.timeout_ns();
-            session.serve(Some(Duration::from_nanos(until_ns.saturating_sub(self.clock.now_ns()))));
+            session.iterate(Some(Duration::from_nanos(until_ns.saturating_sub(self.clock.now_ns()))));
             if session.is_lost() || has_ended.get() || self.clock.now_ns() >= until_ns.max(self.last_ns.get()) {
                 break;
             }
@@ -265,20 +269,21 @@ impl Listener {
     }
 
     fn timeout_ns(&self) -> u64 {
-        let period_ns = |Agreed { rate: (num, denom), .. }| 1_000_000_000 * u64::from(denom) / u64::from(num).max(1);
+        let period_ns =
+            |NegotiatedFormat { rate: (num, denom), .. }| 1_000_000_000 * u64::from(denom) / u64::from(num).max(1);
         // A camera needs longer for its first picture.
         let min_ns = if self.sequence.get().is_none() { 3 * MIN_TIMEOUT_NS } else { MIN_TIMEOUT_NS };
-        self.agreed.get().map_or(min_ns, |agreed| (TIMEOUT_PERIODS * period_ns(agreed)).max(min_ns))
+        self.negotiated.get().map_or(min_ns, |negotiated| (TIMEOUT_PERIODS * period_ns(negotiated)).max(min_ns))
     }
 
     /// Accepts the negotiated format (PipeWire's `param_changed`), and answers with the buffers that are needed.
     fn handle_format(&self, stream: &Stream, format: &[u8]) {
-        let Some(agreed) = mode::parse_agreed(format) else {
+        let Some(negotiated) = mode::parse_negotiated(format) else {
             return tracing::warn!("{}: its pictures cannot be read", self.name());
         };
-        self.agreed.set(Some(agreed));
-        self.take.borrow_mut().begin(&agreed);
-        let pods = [param::any_buffers(), param::header()];
+        self.negotiated.set(Some(negotiated));
+        self.handler.borrow_mut().set_format(&negotiated);
+        let pods = [param::build_any_buffers(), param::build_header_request()];
         let mut pods: Vec<&Pod> = pods.iter().filter_map(|pod| Pod::from_bytes(pod)).collect();
         if let Err(error) = stream.update_params(&mut pods) {
             tracing::warn!("{}: PipeWire refused the buffers: {error}", self.name());
@@ -286,12 +291,12 @@ impl Listener {
         let camera = self.camera.borrow().clone();
         if let Some((ready, camera)) = self.ready.take().zip(camera) {
             // The receiver may have timed out.
-            let _ = ready.send(Ok((camera, agreed)));
+            let _ = ready.send(Ok((camera, negotiated)));
         }
     }
 
     /// Dequeues the newest picture.
-    fn take(&self, stream: &Stream) {
+    fn receive_newest(&self, stream: &Stream) {
         let mut newest: Option<Buffer> = None;
         let mut stale = 0;
         while let Some(buffer) = stream.dequeue_buffer() {
@@ -300,7 +305,7 @@ impl Listener {
         let Some(mut buffer) = newest else { return };
         let now_ns = self.clock.now_ns();
         self.last_ns.set(now_ns);
-        if let Some(since_ns) = self.is_away.take() {
+        if let Some(since_ns) = self.outage_since_ns.take() {
             let away_s = (now_ns - since_ns) as f64 / 1e9;
             tracing::info!("{}: it is back after {away_s:.1} s", self.name());
         }
@@ -328,13 +333,13 @@ impl Listener {
             count += 1;
         }
         let is_empty = planes[0].is_empty();
-        let mut take = self.take.borrow_mut();
+        let mut handler = self.handler.borrow_mut();
         if missed + stale > 0 || is_corrupt || is_empty {
-            take.lost(missed, stale, u64::from(is_corrupt || is_empty));
+            handler.add_losses(missed, stale, u64::from(is_corrupt || is_empty));
         }
         if !is_corrupt && !is_empty {
             let captured_ns = stamp_ns.filter(is_plausible).unwrap_or(now_ns);
-            take.frame(&Frame { planes: &planes[..count], stride_bytes, captured_ns });
+            handler.handle_frame(&Frame { planes: &planes[..count], stride_bytes, captured_ns });
         }
     }
 }

@@ -33,10 +33,10 @@ impl Session {
     /// The daemon does not run, or refuses.
     pub fn open() -> Result<Self, PipeWireError> {
         pipewire::init();
-        super::quiet::silence();
+        super::log::disable_log();
         let main_loop = MainLoopRc::new(None).map_err(PipeWireError::refused("a loop"))?;
         let context = ContextRc::new(&main_loop, None).map_err(PipeWireError::refused("a context"))?;
-        let core = context.connect_rc(None).map_err(|_| PipeWireError::NoDaemon { socket: socket() })?;
+        let core = context.connect_rc(None).map_err(|_| PipeWireError::NoDaemon { socket: socket_path() })?;
         let is_lost = Rc::new(Cell::new(false));
         let last_sync = Rc::new(Cell::new(None));
         let (lost, done) = (Rc::clone(&is_lost), Rc::clone(&last_sync));
@@ -73,7 +73,7 @@ impl Session {
     }
 
     /// Runs one iteration of the loop, for at most `timeout` (`None`: until an event arrives).
-    pub fn serve(&self, timeout: Option<Duration>) {
+    pub fn iterate(&self, timeout: Option<Duration>) {
         // The loop counts whole milliseconds: rounded up, or it would spin until the deadline.
         let round_up = |timeout: Duration| Duration::from_millis(timeout.as_micros().div_ceil(1000).min(60_000) as u64);
         let timeout = timeout.map_or(Timeout::Infinite, |timeout| Timeout::Finite(round_up(timeout)));
@@ -91,7 +91,7 @@ impl Session {
     }
 }
 
-/// Until then, the loop belongs to this thread, also between two calls of [`Session::serve`]: PipeWire's own thread
+/// Until then, the loop belongs to this thread, also between two calls of [`Session::iterate`]: PipeWire's own thread
 /// would run the callbacks of a loop without an owner itself, concurrently with this thread.
 impl Drop for Session {
     fn drop(&mut self) {
@@ -104,7 +104,7 @@ impl Drop for Session {
 }
 
 /// Returns the path of the daemon's socket, by the rules of its library.
-pub fn socket() -> String {
+pub fn socket_path() -> String {
     let variable = |name: &str| std::env::var(name).ok().filter(|value| !value.is_empty());
     let name = variable("PIPEWIRE_REMOTE").unwrap_or_else(|| "pipewire-0".into());
     let folder = ["PIPEWIRE_RUNTIME_DIR", "XDG_RUNTIME_DIR", "USERPROFILE"].into_iter().find_map(variable);

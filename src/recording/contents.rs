@@ -115,10 +115,7 @@ impl<'a> Locator<'a> {
     pub(super) fn locate(&mut self, source: &Source) -> Result<PathBuf, RecordingError> {
         if !self.has_warned && self.began.elapsed() > SLOW_LOOKUP {
             self.has_warned = true;
-            tracing::warn!(
-                "{}: its pictures are looked through for one to begin with; this takes long",
-                self.folder.dir.display()
-            );
+            tracing::warn!("{}: searching the pictures for a readable one; this takes long", self.folder.dir.display());
         }
         let path = self.folder.root.join(source.file(&self.folder.dir)?);
         let (Some(parent), Some(name)) = (path.parent(), path.file_name()) else { return self.folder.locate(source) };

@@ -104,7 +104,7 @@ pub(super) fn right_luma(
     let mut right = std::mem::take(&mut scratch.right);
     let decoded = color(path, Some(left), scratch, &mut right);
     if decoded.is_ok() {
-        into.set_luma_of(&right);
+        into.set_luma_from(&right);
     }
     scratch.right = right;
     decoded.map(drop).map_err(|fault| match fault {
@@ -194,7 +194,7 @@ pub(super) fn inverse_depth(
     into.resize(found.0, found.1);
     decode_grey(coded, &mut scratch.pixels, &mut into.metres)?;
     for value in &mut into.metres {
-        *value = DepthMap::relative_m(if white_is_far { 1.0 - *value } else { *value });
+        *value = DepthMap::relative_to_metres(if white_is_far { 1.0 - *value } else { *value });
     }
     Ok(())
 }

@@ -13,8 +13,8 @@ use crate::files::folder::FolderError;
 pub enum RecordingError {
     /// The folder contains no list of a known layout.
     #[error(
-        "{}: not a recording: looked for {looked_for}, and found none of these; \
-         name the folder that holds them", dir.display()
+        "{}: not a recording: looked for {looked_for}, and found none of these; give the folder that contains \
+         them", dir.display()
     )]
     NotARecording {
         dir: PathBuf,
@@ -44,7 +44,7 @@ pub enum RecordingError {
     #[error("{}: no picture here has a number as its name, such as 000000.png; restore the pictures", folder.display())]
     EmptyFolder { folder: PathBuf },
     /// One camera of a pair is missing.
-    #[error("{}: {missing} is missing beside {present}; restore the pictures of the other eye", dir.display())]
+    #[error("{}: {missing} is missing beside {present}; restore the pictures of the other camera", dir.display())]
     MissingEye {
         dir: PathBuf,
         /// The missing folder.
@@ -53,14 +53,15 @@ pub enum RecordingError {
         present: &'static str,
     },
     /// A picture of one camera has no counterpart of the other.
-    #[error("{}: no picture of this name in {other}; restore it, remove this one, or keep going", path.display())]
+    #[error("{}: no picture of this name in {other}; restore it, remove this one, or use --keep-going", path.display())]
     NoPartner {
         path: PathBuf,
         /// The folder of the other camera.
         other: &'static str,
     },
     /// There are more pictures than times in the list.
-    #[error("{}: {times} times, and none for {picture}; complete the list, remove it, or keep going", list.display())]
+    #[error("{}: the list has {times} times, but none for {picture}; complete the list, remove it, or use \
+             --keep-going", list.display())]
     TooFewTimes {
         list: PathBuf,
         /// The number of times.
@@ -140,10 +141,10 @@ pub enum RecordingError {
     #[error("{}: the recording has no depth; use an effect that needs none, or another source of depth", dir.display())]
     NoDepth { dir: PathBuf },
     /// A right picture was requested, and the recording has only one camera.
-    #[error("{}: the recording has one eye, and stereo needs two; use another source of depth", dir.display())]
+    #[error("{}: the recording has one camera, and stereo needs two; use another source of depth", dir.display())]
     NoRight { dir: PathBuf },
     /// The frame number is beyond the end.
-    #[error("frame {index} was asked for, and the recording has {len}, numbered from 0")]
+    #[error("frame {index} was requested, but the recording has {len} frames, numbered from 0")]
     NoSuchFrame {
         /// The requested frame.
         index: usize,
@@ -154,7 +155,7 @@ pub enum RecordingError {
     #[error("the depth scale is {0}; give units per metre, greater than 0, such as 5000 or 1000")]
     DepthScale(f32),
     /// The output exists already.
-    #[error("{}: already there; choose another name, or ask for it to be overwritten", path.display())]
+    #[error("{}: exists already; choose another name, or allow overwriting", path.display())]
     Exists {
         /// The file or folder.
         path: PathBuf,

@@ -58,17 +58,18 @@ pub enum GeometryFault {
         found: String,
     },
     /// The baseline is 0, which gives no depth.
-    #[error("the baseline is 0: both cameras stand in one place; give the calibration of the two eyes")]
+    #[error("the baseline is 0: both cameras are in the same place; give the calibration of both cameras")]
     NoBaseline,
     /// The right camera is left of the left one.
-    #[error("the right camera stands {0} m to the left of the left one; swap the eyes")]
+    #[error("the right camera stands {0} m to the left of the left one; swap the cameras")]
     Swapped(f64),
     /// The focal lengths differ, unlike those of rectified pictures.
     #[error("the left focal length is {0} px and the right one {1} px; give the calibration of rectified pictures")]
     UnequalFocal(f64, f64),
     /// The calibration is for pictures of another aspect ratio.
     #[error(
-        "made for pictures of {}x{}, and these are {}x{}, of another aspect; give the calibration of these pictures",
+        "made for pictures of {}x{}, but these are {}x{}, with another aspect ratio; give the calibration of these \
+         pictures",
         of.0, of.1, pictures.0, pictures.1
     )]
     Size {
@@ -88,7 +89,7 @@ pub enum PictureFault {
     Missing,
     /// An aperture's picture is black, so no light would pass.
     #[error(
-        "it is black all over, and an aperture lets light through where its picture is bright; give another picture"
+        "it is black all over, but an aperture lets light through where its picture is bright; give another picture"
     )]
     Dark,
     /// A link leads outside the recording.
@@ -125,7 +126,7 @@ pub enum PictureFault {
     Damaged(String),
     /// The size differs from that of the first colour picture.
     #[error(
-        "the picture is {}x{}, and the recording began with {}x{}; all its colour pictures need one size",
+        "the picture is {}x{}, and the recording began with {}x{}; all its colour pictures need the same size",
         found.0, found.1, expected.0, expected.1
     )]
     Size {
@@ -136,7 +137,7 @@ pub enum PictureFault {
     },
     /// The size of a right picture differs from that of the left ones.
     #[error(
-        "the right picture is {}x{}, and the left one {}x{}; both eyes need one size",
+        "the right picture is {}x{}, and the left one {}x{}; both need the same size",
         found.0, found.1, left.0, left.1
     )]
     EyeSize {
@@ -175,17 +176,18 @@ pub enum PictureFault {
     #[error("cannot be encoded: {0}")]
     Encoding(String),
     /// The picture contains no settings.
-    #[error("no snapshot: it has no settings of bokehcam in it; name one, or give the settings themselves")]
+    #[error("not a snapshot: it contains no settings of bokehcam; give a snapshot, or the settings themselves")]
     NoSettings,
     /// An 8-bit grey picture: too few steps, and unknown polarity.
     #[error(
-        "an 8-bit grey picture has too few steps for depth; export it with 16 bits: dark is near there, and 0 unknown. \
-         Where white is near (inverse depth, as networks and phones make it) --depth-unit inverse reads it"
+        "an 8-bit grey picture has too few steps for depth; export it with 16 bits (dark is near, 0 is unknown). If \
+         white is near (inverse depth, as from networks and phones), use --depth-unit inverse"
     )]
     CoarseDepth,
     /// The picture is not a depth map.
     #[error(
-        "{0} is not depth; export depth as a 16-bit grey PNG; inverse depth, where white is near, is read by --depth-unit inverse"
+        "{0} is not depth; export depth as a 16-bit grey PNG; for inverse depth, where white is near, use --depth-unit \
+         inverse"
     )]
     NotDepth(&'static str),
 }

@@ -37,7 +37,7 @@ pub struct Snapshot<'a> {
 pub fn save(dir: &Path, stem: &str, snapshot: &Snapshot) -> Result<PathBuf, RecordingError> {
     let unfit = |what: &str| RecordingError::picture(&dir.join(stem))(PictureFault::Encoding(what.to_string()));
     if Path::new(stem).file_name() != Some(stem.as_ref()) {
-        return Err(unfit("its name is no file name"));
+        return Err(unfit("its name is not a file name"));
     }
     if snapshot.settings.iter().any(|(_, value)| value.contains(['\n', '\r'])) {
         return Err(unfit("a setting has a line break in it"));

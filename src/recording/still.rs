@@ -78,9 +78,7 @@ pub fn read_map(path: &Path, depth_scale: Option<f32>, invalid: Option<u16>) -> 
             (_, Some(Meaning::Disparity { .. })) => unit::DISPARITY_SCALE,
             (Some(given), Some(Meaning::Depth { per_m })) if given != per_m => {
                 let file = path.display();
-                tracing::warn!(
-                    "{file}: says that it has {per_m} units per metre, and is read with {given}, as asked for"
-                );
+                tracing::warn!("{file}: states {per_m} units per metre, but is read with {given}, as requested");
                 given
             }
             (Some(given), _) => given,
@@ -147,7 +145,7 @@ fn upright(map: DepthMap, orientation: Orientation) -> DepthMap {
 pub fn read_depth(path: &Path, depth_scale: f32, invalid: Option<u16>) -> Result<DepthMap, RecordingError> {
     match read_map(path, Some(depth_scale), invalid)? {
         Map::Depth(map) => Ok(map),
-        Map::Disparity(map, Some(rig)) => Ok(map.depth(|px| rig.depth_m(px))),
+        Map::Disparity(map, Some(rig)) => Ok(map.to_depth_map(|px| rig.depth_m(px))),
         Map::Disparity(_, None) => Err(RecordingError::picture(path)(PictureFault::NotDepth("disparity"))),
     }
 }

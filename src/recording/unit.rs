@@ -95,7 +95,7 @@ mod tests {
         assert_eq!(
             Meaning::of_text(&assumed.text()),
             Some(Meaning::Disparity { rig: None }),
-            "no distances of eyes that are assumed"
+            "no distances of cameras that are assumed"
         );
         for other in [
             "",

@@ -7,8 +7,8 @@ use crate::pipewire::PipeWireError;
 #[cfg(feature = "camera")]
 use crate::v4l2::loopback::LoopbackError;
 
-const NO_WINDOW: &str =
-    "the window is opened by who shows it, such as `bokehcam preview SOURCE`; for a folder of this name, window/";
+const NO_WINDOW: &str = "a window needs a command that shows pictures, such as `bokehcam preview SOURCE`; for a folder of this name, give \
+     window/";
 const NOT_BUILT: &str = "this program was built without a window; build it with the feature window. For a folder of \
                          this name, window/";
 
@@ -32,7 +32,7 @@ pub enum SinkError {
     #[error("no sink '{name}': it is a folder; to write numbered PNG files into it, give {name}/ (with the slash)")]
     NoSlash { name: String },
     /// Standard output is named `-`.
-    #[error("y4m on standard output is called -")]
+    #[error("for y4m on standard output, use -")]
     NameOfStdout,
     /// An existing file that is not a video.
     #[error("{} is neither a folder nor a video: give DIR/, FILE.y4m, FILE.mp4, FILE.mkv or FILE.webm", path.display())]
@@ -49,21 +49,21 @@ pub enum SinkError {
     #[error(transparent)]
     Folder(#[from] FolderError),
     /// Writing failed, but the frames until then are kept.
-    #[error("{error}; what there was until then is kept as {}", kept.display())]
+    #[error("{error}; the output until then is kept as {}", kept.display())]
     Kept {
         error: Box<SinkError>,
         /// The file or folder.
         kept: PathBuf,
     },
     /// Writing failed, and the frames until then could not be kept.
-    #[error("{error}; what there was until then is lost: {cause}")]
+    #[error("{error}; the output until then is lost: {cause}")]
     Lost {
         error: Box<SinkError>,
         /// Why they could not be kept.
         cause: io::Error,
     },
     /// The file or its folder was removed while it was written.
-    #[error("{} was removed while it was written", path.display())]
+    #[error("{} was removed while it was being written", path.display())]
     Removed { path: PathBuf },
     /// A defect of this program.
     #[error("{sink}: panicked: {what}; please report this")]
@@ -91,7 +91,7 @@ pub enum SinkError {
         got: (u32, u32),
     },
     /// A defect of this program.
-    #[error("this output was given YUYV, which it did not ask for; please report this")]
+    #[error("this output received YUYV without requesting it; please report this")]
     Yuyv,
     /// The PNG encoder refused.
     #[error("cannot write {} as PNG: {message}", path.display())]
@@ -103,7 +103,8 @@ pub enum SinkError {
     )]
     NoFfmpeg { path: PathBuf },
     /// The ffmpeg program failed.
-    #[error("ffmpeg could not write {} ({status}): {}", path.display(), if said.is_empty() { "it said nothing" } else { said })]
+    #[error("ffmpeg could not write {} ({status}): {}", path.display(), if said.is_empty() { "it gave no \
+                                                                                              reason" } else { said })]
     Ffmpeg {
         path: PathBuf,
         status: String,
@@ -129,9 +130,7 @@ pub enum SinkError {
     )]
     NoPipeWire,
     /// The name of a PipeWire camera is empty or unreadable.
-    #[error(
-        "pipewire:NAME needs a name that people can read, such as pipewire:'My camera'; without one, it is pipewire"
-    )]
+    #[error("pipewire:NAME needs a readable name, such as pipewire:'My camera'; without a name, use pipewire")]
     NoLabel,
     /// A filter without a PipeWire camera as the source.
     #[error("--to filter is for a stream of a camera that PipeWire has: bokehcam stream pipewire:NAME --to filter")]

@@ -34,7 +34,7 @@ impl Output {
             fs::create_dir_all(folder).map_err(SinkError::write(folder))?;
         }
         for kept in recover(path)? {
-            tracing::warn!("{}: what an earlier run left unfinished is kept as {}", path.display(), kept.display());
+            tracing::warn!("{}: the unfinished output of an earlier run is kept as {}", path.display(), kept.display());
         }
         let part = Part::create(path).map_err(SinkError::write(path))?;
         Ok(Self { path: path.to_owned(), force, part: Some(part), frames: 0 })
@@ -86,7 +86,7 @@ impl Output {
         // Only a truncated recording gets here with `force`; keeping the old file is not an error.
         if is_name_taken && self.force {
             let (kept, path) = (keep(part), self.path.display());
-            tracing::warn!("{path} stays as it was: what was to replace it was cut short, and {kept}");
+            tracing::warn!("{path} is unchanged: the new file is incomplete, and {kept}");
             return Ok(());
         }
         let path = self.path.clone();
@@ -127,7 +127,7 @@ impl Drop for Output {
         if let Some(part) = self.part.take().filter(|_| self.frames > 0) {
             // Done before the log call, whose arguments are not evaluated if the level is disabled.
             let kept = keep(part);
-            tracing::warn!("{}: what there is of it {kept}", self.path.display());
+            tracing::warn!("{}: the incomplete file {kept}", self.path.display());
         }
     }
 }

@@ -170,7 +170,7 @@ impl OutputThread {
         self.sender = None;
         let outcome = match self.outcome.recv_timeout(LONG_WAIT) {
             Err(RecvTimeoutError::Timeout) => {
-                tracing::warn!("{}: waiting until it is complete; Ctrl-C once more gives it up", self.name);
+                tracing::warn!("{}: waiting until it is complete; press Ctrl-C again to give up", self.name);
                 self.outcome.recv().ok()
             }
             outcome => outcome.ok(),

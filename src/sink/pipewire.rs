@@ -22,8 +22,8 @@ use crate::link::pool::{Pool, Pooled};
 use crate::link::{self, Receiver, Sender};
 use crate::pipewire::PipeWireError;
 use crate::pipewire::graph::Graph;
-use crate::pipewire::mode::{Agreed, Mode};
-use crate::pipewire::node::{Drawn, Memory, Node, Settings, Show};
+use crate::pipewire::mode::{Mode, NegotiatedFormat};
+use crate::pipewire::node::{DrawnPicture, Node, PictureMemory, PictureSource, Settings};
 use crate::stats::NodeUse;
 
 /// Default name of a camera.
@@ -71,7 +71,7 @@ impl PipeWire {
     /// PipeWire cannot be reached, or refuses.
     pub fn open(label: Option<&str>, options: &Options) -> Result<Self, SinkError> {
         let label = label.unwrap_or(NAME);
-        let camera = Self::new(label, (node_name(label), None), |best| vec![best.mode()], options)?;
+        let camera = Self::new(label, (node_name(label), None), |best| vec![best.to_mode()], options)?;
         let (width, height) = camera.encoder.format().size();
         let description = format!("PipeWire camera {} ({label}), YUY2 {width}x{height}", camera.node.name());
         Ok(Self { description, ..camera })
@@ -84,16 +84,16 @@ impl PipeWire {
     /// Those of [`PipeWire::open`]; the camera does not exist, or the session manager does not support filters.
     pub fn filter(options: &Options) -> Result<Self, SinkError> {
         let camera_name = options.filter_target.as_deref().ok_or(SinkError::Filter)?;
-        let camera = Graph::filterable(camera_name)?;
+        let camera = Graph::find_filter_target(camera_name)?;
         let modes = writable_modes(&camera.modes);
         if modes.is_empty() {
-            let why = "it gives pictures of no format that can be written".to_owned();
+            let why = "it offers no format that can be written".to_owned();
             return Err(PipeWireError::NoMode { name: camera.name, why }.into());
         }
         let label = format!("{}, blurred", camera.label);
         let name = (format!("{NAME}.{}", camera.name), Some(camera.name.clone()));
         let filter = Self::new(&label, name, |_| modes, options)?;
-        let description = format!("everybody who asks for pipewire:{} ({})", camera.name, camera.label);
+        let description = format!("all readers of pipewire:{} ({})", camera.name, camera.label);
         Ok(Self { description, ..filter })
     }
 
@@ -102,7 +102,7 @@ impl PipeWire {
     fn new(
         label: &str,
         (name, filter_target): (String, Option<String>),
-        modes: impl FnOnce(&Agreed) -> Vec<Mode>,
+        modes: impl FnOnce(&NegotiatedFormat) -> Vec<Mode>,
         options: &Options,
     ) -> Result<Self, SinkError> {
         let (width, height) = options.out_size.unwrap_or(options.size);
@@ -110,7 +110,7 @@ impl PipeWire {
         let size = ((width & !1).max(2), (height & !1).max(2));
         let (rate, scale) = frame_rate(options.period_ns);
         let saturated = |number: u64| u32::try_from(number).unwrap_or(u32::MAX);
-        let best = Agreed { fourcc: *b"YUYV", size, rate: (saturated(rate), saturated(scale)) };
+        let best = NegotiatedFormat { fourcc: *b"YUYV", size, rate: (saturated(rate), saturated(scale)) };
         let settings = Settings {
             name,
             label: label.to_owned(),
@@ -131,7 +131,7 @@ impl PipeWire {
             watch: None,
             is_watched: Arc::clone(&is_watched),
         };
-        screen.begin(&best);
+        screen.set_format(&best);
         let encoder = Encoder::new(Format::from(&best)).ok_or(SinkError::Yuyv)?;
         let (first, bytes) = (encoder.format(), encoder.memory().bytes);
         let node = Node::new(settings, screen)?;
@@ -233,7 +233,7 @@ impl Sink for PipeWire {
             unwatched: load(&counts.unwatched),
             overtaken: load(&counts.overtaken),
             no_buffer: load(&counts.no_buffer),
-            returns: load(&counts.returns),
+            returns: load(&counts.reconnections),
         })]
     }
 
@@ -258,7 +258,7 @@ struct Screen {
     is_watched: Arc<AtomicBool>,
 }
 
-impl Show for Screen {
+impl PictureSource for Screen {
     fn update(&mut self) -> bool {
         let Some(frame) = self.receiver.try_recv() else { return false };
         // A picture that arrives just after the last reader left is dropped.
@@ -267,8 +267,8 @@ impl Show for Screen {
         true
     }
 
-    fn begin(&mut self, agreed: &Agreed) -> Memory {
-        let Some(mut encoder) = Encoder::new(Format::from(agreed)) else { return Memory::default() };
+    fn set_format(&mut self, agreed: &NegotiatedFormat) -> PictureMemory {
+        let Some(mut encoder) = Encoder::new(Format::from(agreed)) else { return PictureMemory::default() };
         let mut card = ColorImage::new(agreed.size.0, agreed.size.1);
         card::draw(&mut card);
         self.card.format = encoder.format();
@@ -277,7 +277,7 @@ impl Show for Screen {
         encoder.memory()
     }
 
-    fn draw(&mut self, bytes: &mut [u8]) -> Drawn {
+    fn draw_picture(&mut self, bytes: &mut [u8]) -> DrawnPicture {
         let agreed = self.card.format;
         let fits = |frame: &&Frame| frame.picture.format == agreed && frame.picture.bytes.len() <= bytes.len();
         let frame = self.frame.as_ref().filter(fits);
@@ -285,10 +285,10 @@ impl Show for Screen {
         let used = picture.bytes.len().min(bytes.len());
         bytes[..used].copy_from_slice(&picture.bytes[..used]);
         let is_new = std::mem::take(&mut self.is_new);
-        Drawn { bytes: used, captured_ns: frame.filter(|_| is_new).map(|frame| frame.captured_ns) }
+        DrawnPicture { bytes: used, captured_ns: frame.filter(|_| is_new).map(|frame| frame.captured_ns) }
     }
 
-    fn watched(&mut self, is_watched: bool) {
+    fn set_watched(&mut self, is_watched: bool) {
         self.is_watched.store(is_watched, Ordering::Relaxed);
         self.watch = self.demand.as_ref().filter(|_| is_watched).map(Demand::watch);
         if !is_watched {

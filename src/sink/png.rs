@@ -86,7 +86,7 @@ impl Sink for PngFolder {
             Ending::Cut => {
                 if let Some(kept) = folder.cut()? {
                     tracing::warn!(
-                        "{path} stays as it was: the new files were cut short, and are kept as {}",
+                        "{path} is unchanged: the new files are incomplete, and are kept as {}",
                         kept.display()
                     );
                 }

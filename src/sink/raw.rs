@@ -43,7 +43,7 @@ impl Encoder {
     /// Encodes `picture` into the memory planes of the layout. Does not allocate.
     ///
     /// # Panics
-    /// The picture has another size, or a plane is shorter than the layout [needs](Layout::needed_bytes).
+    /// The picture has another size, or a plane is shorter than the layout [needs](Layout::min_size_bytes).
     pub fn encode(&mut self, picture: &ColorImage, planes: &mut [&mut [u8]]) {
         let Self { arch, layout, converter, sums } = self;
         assert_eq!(picture.size(), (layout.width, layout.height), "an encoder is for pictures of one size");

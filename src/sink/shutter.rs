@@ -67,7 +67,7 @@ enum Request {
 
 /// These live outputs may still show a picture instead of the card.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("no more pictures come, but {0} may still show the last one: it does not take the card")]
+#[error("no more pictures are sent, but {0} may still show the last one: it did not accept the card")]
 pub struct CardNotShown(pub String);
 
 impl Shutter {
@@ -322,7 +322,7 @@ impl ShutterControl {
         };
         match [names(true), names(false)] {
             [live, _] if !live.is_empty() => Err(CardNotShown(live)),
-            [_, others] if !others.is_empty() => Ok(Some(format!("{others}: busy, so the card comes there later"))),
+            [_, others] if !others.is_empty() => Ok(Some(format!("{others}: busy, so the card appears there later"))),
             _ => Ok(None),
         }
     }

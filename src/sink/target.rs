@@ -12,7 +12,7 @@ use super::Loopback;
 use super::PipeWire;
 use super::{Ffmpeg, Null, Options, PngFolder, Sink, SinkError, Y4m, Y4mFile};
 use crate::files::{folder, place};
-use crate::names::nearest;
+use crate::names::find_similar;
 
 /// Prefix of the name of a PipeWire camera.
 const PIPEWIRE: &str = "pipewire";
@@ -81,7 +81,7 @@ fn suggest(name: &str) -> Option<String> {
         return Some(format!("/dev/video{number}"));
     }
     let (word, label) = name.find(':').map_or((name, ""), |at| name.split_at(at));
-    nearest(word, [PIPEWIRE, FILTER, "window", "null"]).map(|sink| format!("{sink}{label}"))
+    find_similar(word, [PIPEWIRE, FILTER, "window", "null"]).map(|sink| format!("{sink}{label}"))
 }
 
 /// Whether this is a character device, or the name of a video device that does not exist yet.

@@ -173,7 +173,7 @@ impl Tee {
     fn record_error(&mut self, error: Option<SinkError>) {
         let Some(error) = error else { return };
         if !self.outputs.is_empty() {
-            tracing::warn!("{error}; going on without it");
+            tracing::warn!("{error}; continuing without it");
         } else if self.failed.is_some() {
             tracing::error!("{error}");
         }

@@ -12,7 +12,7 @@ use super::rate::frame_rate;
 use super::steady::{Action, Steady};
 use super::yuv::Converter;
 use super::{Ending, Options, Sink, SinkError, check_size};
-use crate::color::Matrix;
+use crate::color::YcbcrMatrix;
 use crate::frame::ColorImage;
 use crate::layout::Range;
 
@@ -50,7 +50,7 @@ impl<W: Write> Y4m<W> {
             writer,
             name: name.to_owned(),
             size: options.size,
-            converter: Converter::new(Matrix::for_height(height), Range::Limited),
+            converter: Converter::new(YcbcrMatrix::for_height(height), Range::Limited),
             steady: Steady::new((rate, scale), max_still),
             header: header.into_bytes(),
             picture: Vec::new(),
@@ -70,7 +70,7 @@ impl<W: Write> Y4m<W> {
             Action::Repeat(missing) => missing,
             Action::RepeatAfterGap(missing, gap) => {
                 let (name, max_s) = (self.name.display(), self.steady.max_still().as_secs());
-                tracing::warn!("{name}: there was no picture for {} s, which are {max_s} s of video", gap.as_secs());
+                tracing::warn!("{name}: there was no picture for {} s, which become {max_s} s of video", gap.as_secs());
                 missing
             }
         };
@@ -110,7 +110,7 @@ impl<W: Write> Y4m<W> {
     fn complete(&mut self) -> Result<(), SinkError> {
         if self.steady.dropped > 0 {
             let (name, dropped) = (self.name.display(), self.steady.dropped);
-            tracing::warn!("{name}: {dropped} frames came faster than its rate, and are left out");
+            tracing::warn!("{name}: {dropped} frames came faster than its frame rate, and were left out");
         }
         self.flush_header()?;
         self.writer.flush().map_err(SinkError::write(&self.name))
@@ -140,7 +140,11 @@ impl<W: Write + Send> Sink for Y4m<W> {
     fn put(&mut self, frame: &ColorImage, time_ns: u64) -> Result<ControlFlow<()>, SinkError> {
         match self.write(frame, time_ns) {
             Err(error) if reader_gone(&error) == Some(ErrorKind::TimedOut) => {
-                tracing::warn!("{}: its reader does not read, and the last picture is not whole", self.name.display());
+                tracing::warn!(
+                    "{}: its reader has stopped reading, so the last picture is \
+                                incomplete",
+                    self.name.display()
+                );
                 // The header may be truncated as well: it must not be written again at the end.
                 self.header.clear();
                 Ok(ControlFlow::Break(()))

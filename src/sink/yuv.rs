@@ -1,7 +1,7 @@
 //! R'G'B' to Y'CbCr conversion (ITU-R BT.601, BT.709, BT.2020) in 8 bits: planar 4:2:0 here, and the raw formats of
 //! cameras in [`raw`](super::raw).
 
-use crate::color::Matrix;
+use crate::color::YcbcrMatrix;
 use crate::frame::ColorImage;
 use crate::layout::Range;
 
@@ -20,8 +20,8 @@ pub struct Converter {
 
 impl Converter {
     /// Computes the coefficients of `matrix`: limited range is Y 16..235, Cb and Cr 16..240, full range is 0..255.
-    pub fn new(matrix: Matrix, range: Range) -> Self {
-        let [red, green, blue] = matrix.weights();
+    pub fn new(matrix: YcbcrMatrix, range: Range) -> Self {
+        let [red, green, blue] = matrix.luma_weights();
         let (black, white, max_chroma) = match range {
             Range::Limited => (16, 219.0, 112.0),
             Range::Full => (0, 255.0, 127.5),

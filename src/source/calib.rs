@@ -24,9 +24,13 @@ pub enum PairCalibration {
 ///
 /// # Errors
 /// The file is of another format, lacks an entry, has invalid numbers, or is for pictures of another aspect ratio.
-pub fn read(files: &[PathBuf], pictures: &Path, size: (u32, u32)) -> Result<PairCalibration, SourceError> {
+pub fn read_pair_calibration(
+    files: &[PathBuf],
+    pictures: &Path,
+    size: (u32, u32),
+) -> Result<PairCalibration, SourceError> {
     let paths: Vec<&Path> = files.iter().map(PathBuf::as_path).collect();
-    match (calibration::load(&paths), &paths[..]) {
+    match (calibration::load_calibration(&paths), &paths[..]) {
         (Ok(calibration), _) => Ok(PairCalibration::Raw(Box::new(calibration))),
         // Not recognised and without a YAML extension: try `calib.txt`. A broken `.yml` keeps its own error.
         (Err(error), [file]) if !is_yaml(file) && is_unrecognized(&error) => {

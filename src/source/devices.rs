@@ -1,10 +1,10 @@
 //! Lists the cameras, virtual cameras and camera controls of this machine. A build without cameras has none.
 
 use super::SourceName;
-use crate::knob::Knob;
+use crate::camera_control::CameraControl;
 #[cfg(feature = "camera")]
 use crate::v4l2::{
-    live::knobs,
+    live::user_controls,
     node::{self, Kind, Node},
 };
 
@@ -22,7 +22,7 @@ const MAX_LABEL_CHARS: usize = 36;
 
 impl Choice {
     /// Creates a choice that is no device: its label is its name, of which a long path keeps the end.
-    pub fn of(name: &str) -> Self {
+    pub fn from_name(name: &str) -> Self {
         let is_short = |from: &usize| name[*from..].chars().count() < MAX_LABEL_CHARS;
         let cuts = || name.match_indices('/').map(|(at, _)| at).skip(1);
         let end = cuts().find(is_short).or(cuts().last());
@@ -35,18 +35,18 @@ impl Choice {
 }
 
 /// Returns the cameras.
-pub fn cameras() -> Vec<Choice> {
+pub fn list_cameras() -> Vec<Choice> {
     #[cfg(feature = "camera")]
-    return choices(Kind::Capture);
+    return list_devices(Kind::Capture);
     #[cfg(not(feature = "camera"))]
     return Vec::new();
 }
 
-/// Returns the cameras that only PipeWire has, without this program's own and those of [`cameras`].
-pub fn shared_cameras() -> Vec<Choice> {
+/// Returns the cameras that only PipeWire has, without this program's own and those of [`list_cameras`].
+pub fn list_pipewire_cameras() -> Vec<Choice> {
     #[cfg(feature = "pipewire")]
     {
-        let graph = crate::pipewire::graph::Graph::look().unwrap_or_default();
+        let graph = crate::pipewire::graph::Graph::list_without_modes().unwrap_or_default();
         let is_other = |source: &crate::pipewire::graph::Source| {
             source.is_camera && !source.is_ours() && !source.name.starts_with("v4l2_")
         };
@@ -61,38 +61,38 @@ pub fn shared_cameras() -> Vec<Choice> {
 }
 
 /// Returns the virtual cameras that could be written to.
-pub fn virtual_cameras() -> Vec<Choice> {
+pub fn list_virtual_cameras() -> Vec<Choice> {
     #[cfg(feature = "camera")]
-    let mut found = choices(Kind::Virtual);
+    let mut found = list_devices(Kind::Virtual);
     #[cfg(not(feature = "camera"))]
     let mut found = Vec::new();
-    found.extend(pipewire());
+    found.extend(find_pipewire_output());
     found
 }
 
 /// Returns the camera that this program would offer in PipeWire, if PipeWire runs.
-fn pipewire() -> Option<Choice> {
+fn find_pipewire_output() -> Option<Choice> {
     #[cfg(feature = "pipewire")]
-    return crate::pipewire::is_there()
+    return crate::pipewire::is_available()
         .then(|| Choice { name: "pipewire".to_owned(), label: "bokehcam (PipeWire)".to_owned() });
     #[cfg(not(feature = "pipewire"))]
     return None;
 }
 
 #[cfg(feature = "camera")]
-fn choices(kind: Kind) -> Vec<Choice> {
+fn list_devices(kind: Kind) -> Vec<Choice> {
     let of_kind = |node: &Node| node.kind == kind && (kind == Kind::Virtual || node.captures);
     let choice = |node: Node| {
         let name = node.path.display().to_string();
         let label = if node.card.is_empty() { name.clone() } else { format!("{} ({name})", node.card) };
         Choice { name, label }
     };
-    node::nodes().into_iter().filter(of_kind).map(choice).collect()
+    node::list_nodes().into_iter().filter(of_kind).map(choice).collect()
 }
 
 /// Returns the camera whose controls can be changed while `source` runs; `None` for a pair, whose pictures must stay
 /// alike.
-pub fn camera_of(source: &SourceName) -> Option<String> {
+pub fn controllable_camera(source: &SourceName) -> Option<String> {
     match source {
         #[cfg(feature = "camera")]
         SourceName::Camera(camera) => Some(camera.node().display().to_string()),
@@ -101,9 +101,9 @@ pub fn camera_of(source: &SourceName) -> Option<String> {
 }
 
 /// Returns the controls of a camera; empty if it has none, or on an error (which is logged).
-pub fn knobs(camera: &str) -> Vec<Knob> {
+pub fn list_controls(camera: &str) -> Vec<CameraControl> {
     #[cfg(feature = "camera")]
-    return knobs::list(camera).unwrap_or_else(|error| {
+    return user_controls::list_user_controls(camera).unwrap_or_else(|error| {
         tracing::info!("{error}");
         Vec::new()
     });
@@ -118,15 +118,15 @@ pub fn knobs(camera: &str) -> Vec<Knob> {
 ///
 /// # Errors
 /// Returns one line for users if the camera refuses.
-pub fn turn(camera: &str, knob: &str, value: i64) -> Result<Vec<Knob>, String> {
+pub fn set_control(camera: &str, control: &str, value: i64) -> Result<Vec<CameraControl>, String> {
     #[cfg(feature = "camera")]
-    return knobs::turn(camera, knob, value).map_err(|error| error.to_string());
+    return user_controls::set_user_control(camera, control, value).map_err(|error| error.to_string());
     #[cfg(not(feature = "camera"))]
-    return Err(format!("{camera}: this build leaves cameras out (feature `camera`), so {knob} cannot be {value}"));
+    return Err(format!("{camera}: this build leaves cameras out (feature `camera`), so {control} cannot be {value}"));
 }
 
 /// Returns the device nodes that may be cameras, from a listing of `/dev`.
-pub fn nodes() -> Vec<String> {
+pub fn list_video_nodes() -> Vec<String> {
     let entries = std::fs::read_dir("/dev").into_iter().flatten().flatten();
     let mut names: Vec<String> = entries.filter_map(|entry| entry.file_name().into_string().ok()).collect();
     names.retain(|name| name.starts_with("video"));
@@ -140,11 +140,11 @@ mod tests {
 
     #[test]
     fn a_long_path_keeps_its_end() {
-        let label = |name: &str| Choice::of(name).label;
+        let label = |name: &str| Choice::from_name(name).label;
         assert_eq!(label("recordings/portrait"), "recordings/portrait");
         let long = "/home/somebody/with/many/folders/recordings/portrait";
         assert_eq!(label(long), "…/many/folders/recordings/portrait");
-        assert_eq!(Choice::of(long).name, long);
+        assert_eq!(Choice::from_name(long).name, long);
         let last = format!("/home/{}", "ü".repeat(60));
         assert_eq!(label(&last), format!("…/{}", "ü".repeat(60)));
         assert_eq!(label(&"x".repeat(50)), "x".repeat(50));

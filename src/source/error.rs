@@ -19,7 +19,7 @@ pub enum SourceError {
     /// The named thing is missing on this machine, or ambiguous: a camera that is not plugged in, a disk that is not
     /// mounted, a network that is not installed. The same name may be right later.
     #[error("{0}")]
-    NotThere(String),
+    NotFound(String),
     /// The calibration of a depth camera is invalid.
     #[error("{}:{line}: {what}", path.display())]
     Registration {
@@ -56,15 +56,15 @@ impl SourceError {
 
     /// Prefixes the message with `name`.
     #[must_use]
-    pub fn of(self, name: &str) -> Self {
+    pub fn with_prefix(self, name: &str) -> Self {
         match self {
             Self::Usage(what) => Self::Usage(format!("{name}: {what}")),
-            Self::NotThere(what) => Self::NotThere(format!("{name}: {what}")),
+            Self::NotFound(what) => Self::NotFound(format!("{name}: {what}")),
             other => other,
         }
     }
 
-    pub(super) fn usage<T>(what: impl Into<String>) -> Result<T, Self> {
+    pub(super) fn usage_error<T>(what: impl Into<String>) -> Result<T, Self> {
         Err(Self::Usage(what.into()))
     }
 }

@@ -14,40 +14,40 @@
 
 pub mod calib;
 pub mod devices;
-mod elsewhere;
 mod error;
-mod eyes;
+mod external_depth;
 pub mod modes;
 mod name;
-mod near;
 mod networks;
-pub mod one_camera;
 mod opened;
 pub mod options;
 pub mod photo;
 #[cfg(feature = "camera")]
 pub mod registration;
+pub mod single_camera;
+mod stereo;
+mod suggestion;
 
 pub use error::SourceError;
 pub use name::{Kind, SourceName};
-pub use networks::{find_person, installed as installed_networks, refuse_metres};
+pub use networks::{find_person, installed_networks, reject_metric_look};
 use opened::Opened;
-pub use options::{DepthChoice, Frames, NetworkFile, OneCamera, PlateFile, Size};
+pub use options::{DepthChoice, Frames, NetworkFile, PlateFile, SingleCameraDepth, Size};
 
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use crate::capture::side_by_side::SideBySide;
-use crate::capture::{Brings, Camera, CaptureError};
+use crate::capture::{Camera, CaptureError, FrameData};
 use crate::clock::Clock;
-use crate::computing::Computing;
+use crate::computing::ComputeOptions;
 use crate::depth::DepthSource;
 use crate::depth::focus::FocusRule;
 use crate::depth::plate::Guide;
 use crate::frame::DepthMap;
-use crate::look::{Effect, Known, Look, Strength};
+use crate::look::{Effect, Look, SourceDepth, Strength};
 use crate::optics::StereoRig;
-use crate::pipeline::{Blurring, Run};
+use crate::pipeline::{BlurSetup, Run};
 use crate::recording::{Options as Reading, Recording, Scratch};
 use crate::sink::Sink;
 
@@ -64,7 +64,7 @@ pub enum DepthOrigin {
     /// Relative inverse depth from grey pictures.
     Relative,
     /// Stereo matching.
-    Eyes,
+    Stereo,
     /// Networks; the distances are relative.
     Networks,
     /// Difference from a clean plate (a picture of the background): foreground or background.
@@ -78,7 +78,7 @@ impl DepthOrigin {
     }
 
     /// Returns whether another origin may replace it: there is no depth, or it is inferred from the pictures alone.
-    pub fn is_of_pictures(self) -> bool {
+    pub fn is_replaceable(self) -> bool {
         matches!(self, Self::Nothing | Self::Networks | Self::Plate)
     }
 }
@@ -117,7 +117,7 @@ pub struct Options {
     /// The origin of depth.
     pub depth_choice: DepthChoice,
     /// The hardware for stereo matching.
-    pub computing: Computing,
+    pub computing: ComputeOptions,
     /// Whether faulty lines in a recording's lists become frames that fail, instead of an error on opening.
     pub keep_going: bool,
     /// Whether the program acts as a filter of a PipeWire camera: pictures go only to the clients of that camera, and
@@ -126,14 +126,14 @@ pub struct Options {
 }
 
 /// The request to [`Source::open`].
-struct Wanted<'a> {
+struct OpenRequest<'a> {
     options: &'a Options,
     /// The look that the depth is for; `None` if depth is wanted as such, for example to record it.
     look: Option<&'a Look>,
 }
 
 /// Part of the message that rejects metres for relative inverse depth.
-pub const INVERSE_TELLS: &str = "inverse depth without a scale tells";
+pub const INVERSE_DEPTH_GIVES: &str = "inverse depth without a scale gives";
 
 /// Whether stereo depth is refined by default: refinement does not model the errors of stereo matching, but makes its
 /// depth steadier.
@@ -145,77 +145,77 @@ impl Source {
     /// # Errors
     /// The source cannot be read, has no frame between `--start` and `--end`, or an option does not apply to it.
     pub fn open(name: &SourceName, options: &Options, look: Option<&Look>) -> Result<Self, SourceError> {
-        let wanted = Wanted { options, look };
-        let source = Self::open_with_own_depth(name, &wanted)?;
-        let source = networks::add_network_depth(source, &wanted);
-        let source = elsewhere::with_external_depth(source, name, &wanted, &Clock::system())?;
-        Ok(networks::add_person_detection(source, &wanted))
+        let request = OpenRequest { options, look };
+        let source = Self::open_with_own_depth(name, &request)?;
+        let source = networks::add_network_depth(source, &request);
+        let source = external_depth::add_external_depth(source, name, &request, &Clock::system())?;
+        Ok(networks::add_person_detection(source, &request))
     }
 
     /// Creates a source from a camera that the caller has opened; `depth` provides depth in metres for its frames.
-    pub fn of(camera: Box<dyn Camera>, depth: Option<Box<dyn DepthSource>>) -> Self {
-        let has_depth = depth.is_some() || camera.info().brings == Brings::Depth;
+    pub fn from_camera(camera: Box<dyn Camera>, depth: Option<Box<dyn DepthSource>>) -> Self {
+        let has_depth = depth.is_some() || camera.info().frame_data == FrameData::Depth;
         let depth_from = if has_depth { DepthOrigin::Metres } else { DepthOrigin::Nothing };
         Self { camera, depth, rig: None, depth_from, networks: None, persons: None, guide: None, first_depth: None }
     }
 
     /// Opens a source with its own depth: recorded, exact, or matched. Depth from another device or recording is added
-    /// by [`elsewhere::with_external_depth`].
-    fn open_with_own_depth(name: &SourceName, wanted: &Wanted) -> Result<Self, SourceError> {
-        let Options { frames, stereo, depth_choice, computing, .. } = wanted.options;
-        name.check(frames)?;
-        wanted.check_effect()?;
-        let mut source = Opened::open(name, wanted)?;
+    /// by [`external_depth::add_external_depth`].
+    fn open_with_own_depth(name: &SourceName, request: &OpenRequest) -> Result<Self, SourceError> {
+        let Options { frames, stereo, depth_choice, computing, .. } = request.options;
+        name.check_frames(frames)?;
+        request.check_effect()?;
+        let mut source = Opened::open(name, request)?;
         if stereo.side_by_side {
             let usage = |error: CaptureError| SourceError::Usage(error.to_string());
             source.camera = Box::new(SideBySide::new(source.camera).map_err(usage)?);
         }
         let info = source.camera.info();
-        let depth_from = if info.brings == Brings::Depth { DepthOrigin::Metres } else { source.depth_from };
+        let depth_from = if info.frame_data == FrameData::Depth { DepthOrigin::Metres } else { source.depth_from };
         if stereo.side_by_side
             && source.depth.is_some()
             && matches!(depth_choice, DepthChoice::Auto | DepthChoice::Recorded)
         {
             return Err(SourceError::Usage(format!(
-                "--side-by-side: the depth of {} is that of whole pictures, not of their left halves; add --depth stereo \
-                 or --depth none",
+                "--side-by-side: the depth of {} belongs to whole pictures, not to their left halves; add --depth \
+                 stereo or --depth none",
                 info.name
             )));
         }
-        if info.brings != Brings::RightCamera {
+        if info.frame_data != FrameData::RightCamera {
             if *depth_choice == DepthChoice::Stereo {
                 return Err(SourceError::Usage(format!(
-                    "--depth stereo: {} has one eye; use two cameras LEFT,RIGHT, a recording with both eyes, or \
+                    "--depth stereo: {} has one camera; use two cameras LEFT,RIGHT, a recording of two cameras, or \
                      --side-by-side",
                     info.name
                 )));
             }
-            stereo.refuse()?;
-        } else if wanted.uses_stereo(source.depth.is_some()) {
-            let depth = eyes::open(&info, &source.pair, source.disparities, stereo, computing)?;
+            stereo.reject_options()?;
+        } else if request.uses_stereo(source.depth.is_some()) {
+            let depth = stereo::open_stereo(&info, &source.pair, source.disparities, stereo, computing)?;
             let rig = *depth.rig();
-            if let Some(look) = wanted.look {
-                eyes::check_focus(&rig, look)?;
+            if let Some(look) = request.look {
+                stereo::check_focus(&rig, look)?;
             }
             let depth: Option<Box<dyn DepthSource>> = Some(Box::new(depth));
-            let depth_from = DepthOrigin::Eyes;
-            return Ok(Self { rig: Some(rig), depth_from, ..Self::of(source.camera, depth) });
+            let depth_from = DepthOrigin::Stereo;
+            return Ok(Self { rig: Some(rig), depth_from, ..Self::from_camera(source.camera, depth) });
         }
         let Opened { camera, depth, first_depth, .. } = source;
-        Ok(Self { depth_from, first_depth, ..Self::of(camera, depth) })
+        Ok(Self { depth_from, first_depth, ..Self::from_camera(camera, depth) })
     }
 
     /// Returns whether its frames have depth.
     pub fn has_depth(&self) -> bool {
-        self.depth.is_some() || self.camera.info().brings == Brings::Depth
+        self.depth.is_some() || self.camera.info().frame_data == FrameData::Depth
     }
 
     /// Adapts a look to this source, which was opened with `options`.
     ///
     /// # Errors
-    /// Same as for [`fitting_look`].
-    pub fn fitting_look(&self, look: &Look, options: &Options) -> Result<Look, SourceError> {
-        fitting_look(look, &options.depth_choice, self.has_depth())
+    /// Same as for [`adapt_look`].
+    pub fn adapt_look(&self, look: &Look, options: &Options) -> Result<Look, SourceError> {
+        adapt_look(look, &options.depth_choice, self.has_depth())
     }
 
     /// Returns whether its depth is measured (not computed exactly), so that refinement improves it.
@@ -224,16 +224,16 @@ impl Source {
         self.depth.is_some() && !is_made && (self.rig.is_none() || REFINES_STEREO)
     }
 
-    /// Creates a run of its frames ([`Run::of`]) with this blur into `sink`, as fast as possible. `stop` ends the run.
-    pub fn into_run(self, blurring: Blurring, sink: Box<dyn Sink>, stop: &AtomicBool) -> Run<'_> {
+    /// Creates a run of its frames ([`Run::with_blur`]) with this blur into `sink`, as fast as possible. `stop` ends the run.
+    pub fn into_run(self, blurring: BlurSetup, sink: Box<dyn Sink>, stop: &AtomicBool) -> Run<'_> {
         let measured = self.is_measured();
-        Run { measured, ..Run::of(self.camera, self.depth, blurring, sink, stop) }
+        Run { measured, ..Run::with_blur(self.camera, self.depth, blurring, sink, stop) }
     }
 }
 
-impl Wanted<'_> {
+impl OpenRequest<'_> {
     /// Returns the options for reading a recording with depth pictures.
-    fn reading(&self) -> Reading {
+    fn recording_options(&self) -> Reading {
         let Options { depth, keep_going, .. } = self.options;
         Reading {
             depth_scale: depth.file_scale(),
@@ -251,7 +251,7 @@ impl Wanted<'_> {
 
     /// Reads the first depth map of a recording, to inspect its values; `None` if the look does not use depth. A faulty
     /// map is not an error here: it is reported when the frame is read.
-    pub fn first_depth(&self, recording: &Recording) -> Option<DepthMap> {
+    pub fn read_first_depth(&self, recording: &Recording) -> Option<DepthMap> {
         let mut map = DepthMap::default();
         let is_used = self.look.is_some_and(|look| look.effect.follows_depth()) && recording.has_depth();
         let read = is_used.then(|| recording.read_depth(0, &mut Scratch::default(), &mut map))?;
@@ -259,14 +259,14 @@ impl Wanted<'_> {
     }
 
     /// Rejects a look that needs real distances if depth is relative.
-    fn check_relative(&self, depth_from: DepthOrigin) -> Result<(), SourceError> {
+    fn check_relative_depth(&self, depth_from: DepthOrigin) -> Result<(), SourceError> {
         let is_used = depth_from == DepthOrigin::Relative && self.uses_depth();
-        self.look.filter(|_| is_used).map_or(Ok(()), |look| refuse_metres(look, INVERSE_TELLS))
+        self.look.filter(|_| is_used).map_or(Ok(()), |look| reject_metric_look(look, INVERSE_DEPTH_GIVES))
     }
 
     fn check_effect(&self) -> Result<(), SourceError> {
         if self.options.depth_choice == DepthChoice::Stereo && !self.uses_depth() {
-            let what = "--depth stereo: only --effect dof uses depth; leave one of them out";
+            let what = "--depth stereo: only --effect dof uses depth; leave --depth or --effect out";
             return Err(SourceError::Usage(what.to_string()));
         }
         Ok(())
@@ -287,21 +287,21 @@ impl Wanted<'_> {
 ///
 /// # Errors
 /// The look needs depth that the source lacks, or its lens needs a focus distance.
-pub fn fitting_look(look: &Look, depth: &DepthChoice, has_depth: bool) -> Result<Look, SourceError> {
+pub fn adapt_look(look: &Look, depth: &DepthChoice, has_depth: bool) -> Result<Look, SourceError> {
     let uses_depth = has_depth && *depth != DepthChoice::None;
     if look.effect == Effect::Dof && !uses_depth {
-        return SourceError::usage(match has_depth {
+        return SourceError::usage_error(match has_depth {
             true => "--effect dof needs depth: leave --depth none out, or use --effect blur or tilt-shift",
             false => "--effect dof needs depth, and the source has none: use --effect blur or tilt-shift",
         });
     }
     if *depth == DepthChoice::Recorded && !has_depth {
-        return SourceError::usage("--depth recorded: the source has no depth");
+        return SourceError::usage_error("--depth recorded: the source has no depth");
     }
-    let look = look.for_source(Known { has_depth: uses_depth, ..Known::default() });
+    let look = look.for_source(SourceDepth { has_depth: uses_depth, ..SourceDepth::default() });
     let has_distance = look.effect.follows_depth() || matches!(look.focus, FocusRule::Metres(_));
     if matches!(look.strength, Strength::Lens(_)) && !has_distance {
-        return SourceError::usage(
+        return SourceError::usage_error(
             "a lens without depth needs --focus METRES: its blur depends on the distance of focus",
         );
     }

@@ -19,13 +19,13 @@ const USUAL_FPS: [f64; 5] = [60.0, 50.0, 30.0, 25.0, 15.0];
 
 /// Returns sizes and rates of a camera over all its formats, the largest first; empty if they are unknown or on an
 /// error (which is logged).
-pub fn modes(camera: &str) -> Vec<Mode> {
+pub fn list_modes(camera: &str) -> Vec<Mode> {
     #[cfg(feature = "camera")]
     {
         use crate::v4l2::{Device, modes, node};
-        let asked = node::resolve(camera).map_err(|error| error.to_string()).and_then(|path| {
+        let asked = node::resolve_node(camera).map_err(|error| error.to_string()).and_then(|path| {
             let device = Device::open(&path).map_err(|error| error.to_string())?;
-            modes::modes(&device).map_err(|error| error.to_string())
+            modes::list_modes(&device).map_err(|error| error.to_string())
         });
         match asked {
             Ok(formats) => return merge_formats(&formats),
@@ -84,10 +84,10 @@ fn merge_formats(formats: &[crate::v4l2::modes::FormatModes]) -> Vec<Mode> {
 #[cfg(feature = "camera")]
 pub fn faces_user(camera: &str) -> bool {
     use crate::v4l2::{Device, controls, controls::Value, node};
-    let Ok(path) = node::resolve(camera) else { return false };
+    let Ok(path) = node::resolve_node(camera) else { return false };
     let path = path.canonicalize().unwrap_or(path);
-    let is_virtual = node::nodes().iter().any(|node| node.path == path && node.kind == node::Kind::Virtual);
-    let orientation = Device::open(&path).ok().and_then(|device| controls::get(&device, ORIENTATION).ok());
+    let is_virtual = node::list_nodes().iter().any(|node| node.path == path && node.kind == node::Kind::Virtual);
+    let orientation = Device::open(&path).ok().and_then(|device| controls::read_control(&device, ORIENTATION).ok());
     !is_virtual && !matches!(orientation, Some(Value::Number(ORIENTATION_BACK)))
 }
 

@@ -5,7 +5,7 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
-use super::{DepthOrigin, Frames, Source, SourceError, near, photo};
+use super::{DepthOrigin, Frames, Source, SourceError, photo, suggestion};
 use crate::capture::demo;
 
 /// The name of the synthetic scene.
@@ -33,7 +33,7 @@ pub enum Kind {
 /// A camera: the name from the user, and the device node that it resolved to.
 #[cfg(feature = "camera")]
 #[derive(Clone, Debug, PartialEq)]
-pub struct Named {
+pub struct NamedCamera {
     /// The name as written by the user.
     pub name: String,
     node: PathBuf,
@@ -52,19 +52,19 @@ pub enum SourceName {
     Photo(PathBuf),
     /// A camera.
     #[cfg(feature = "camera")]
-    Camera(Named),
+    Camera(NamedCamera),
     /// A PipeWire camera, by the name after `pipewire:`.
     #[cfg(all(feature = "camera", feature = "pipewire"))]
     PipeWire(String),
     /// Two cameras, the left one first.
     #[cfg(feature = "camera")]
-    Cameras([Named; 2]),
+    Cameras([NamedCamera; 2]),
 }
 
 impl FromStr for SourceName {
     type Err = SourceError;
     fn from_str(text: &str) -> Result<Self, SourceError> {
-        Self::from_os(text.as_ref())
+        Self::parse_os(text.as_ref())
     }
 }
 
@@ -108,21 +108,21 @@ fn accepted_sources() -> &'static str {
 }
 
 /// Creates the error for a missing folder; suggests a sibling with a similar name.
-fn missing_folder(text: &str) -> SourceError {
-    let hint = near::similar_folder(Path::new(text))
+fn missing_folder_error(text: &str) -> SourceError {
+    let hint = suggestion::find_similar_folder(Path::new(text))
         .map_or(String::new(), |near| format!(", did you mean {}?", near.display()));
-    SourceError::NotThere(format!("there is no such folder{hint}; use {}", accepted_sources()))
+    SourceError::NotFound(format!("there is no such folder{hint}; use {}", accepted_sources()))
 }
 
 /// Parses the name of one camera, or of two as `LEFT,RIGHT`; errors suggest similar names.
 #[cfg(feature = "camera")]
 fn parse_cameras(text: &str) -> Result<SourceName, SourceError> {
     let named = |name: &str| {
-        let node = crate::v4l2::node::resolve(name)?;
-        Ok(Named { name: name.to_owned(), node })
+        let node = crate::v4l2::node::resolve_node(name)?;
+        Ok(NamedCamera { name: name.to_owned(), node })
     };
     let refuse = |error: crate::v4l2::node::NodeError| {
-        Err(SourceError::NotThere(match near::similar_folder(Path::new(text)) {
+        Err(SourceError::NotFound(match suggestion::find_similar_folder(Path::new(text)) {
             Some(near) => format!("{error}; or did you mean the folder {}? Use {}", near.display(), accepted_sources()),
             None => format!("{error}; use {}", accepted_sources()),
         }))
@@ -139,10 +139,10 @@ fn parse_cameras(text: &str) -> Result<SourceName, SourceError> {
         if let (Ok(left), Ok(right)) = (named(left), named(right)) {
             let same = |a: &Path, b: &Path| a.canonicalize().ok() == b.canonicalize().ok();
             if same(&left.node, &right.node) {
-                let what = format!("the left and the right eye are one camera, {}", left.node.display());
+                let what = format!("left and right are the same camera, {}", left.node.display());
                 // If the names differ, the other camera may just not be plugged in.
                 let may_come = left.name != right.name;
-                return Err(if may_come { SourceError::NotThere(what) } else { SourceError::Usage(what) });
+                return Err(if may_come { SourceError::NotFound(what) } else { SourceError::Usage(what) });
             }
             return Ok(SourceName::Cameras([left, right]));
         }
@@ -158,11 +158,11 @@ fn parse_cameras(text: &str) -> Result<SourceName, SourceError> {
 fn parse_pipewire(name: &str) -> Result<SourceName, SourceError> {
     #[cfg(all(feature = "camera", feature = "pipewire"))]
     return match name.is_empty() {
-        true => SourceError::usage("pipewire:NAME needs the name of a camera; `bokehcam devices` lists them"),
+        true => SourceError::usage_error("pipewire:NAME needs the name of a camera; `bokehcam devices` lists them"),
         false => Ok(SourceName::PipeWire(name.to_owned())),
     };
     #[cfg(not(all(feature = "camera", feature = "pipewire")))]
-    return SourceError::usage(format!(
+    return SourceError::usage_error(format!(
         "this build leaves PipeWire's cameras out (features `camera` and `pipewire`): {name} cannot be read"
     ));
 }
@@ -172,12 +172,12 @@ fn parse_cameras(text: &str) -> Result<SourceName, SourceError> {
     let what = "this build leaves cameras out (feature `camera`)";
     Err(match text.starts_with("/dev/") || text.parse::<u32>().is_ok() {
         true => SourceError::Usage(format!("{what}: use {}", accepted_sources())),
-        false => SourceError::NotThere(format!("there is no such folder, and {what}: use {}", accepted_sources())),
+        false => SourceError::NotFound(format!("there is no such folder, and {what}: use {}", accepted_sources())),
     })
 }
 
 #[cfg(feature = "camera")]
-impl Named {
+impl NamedCamera {
     pub fn node(&self) -> &Path {
         &self.node
     }
@@ -188,7 +188,7 @@ impl SourceName {
     ///
     /// # Errors
     /// The name is not a source, or the source does not exist; the message says what is accepted.
-    pub fn from_os(name: &OsStr) -> Result<Self, SourceError> {
+    pub fn parse_os(name: &OsStr) -> Result<Self, SourceError> {
         let path = Path::new(name);
         match name.to_str() {
             Some(text) if text.starts_with(PIPEWIRE) => parse_pipewire(&text[PIPEWIRE.len()..]),
@@ -196,21 +196,22 @@ impl SourceName {
             Some(demo::NAME) => Ok(SourceName::Demo),
             _ if path.is_dir() => Ok(SourceName::Folder(path.to_owned())),
             _ if path.is_file() && photo::is_photo(path) => Ok(SourceName::Photo(path.to_owned())),
-            Some(text) if path.is_file() && is_video(path) => SourceError::usage(format!(
-                "a video is read as pictures; ffmpeg makes a folder of them, which is the source then: mkdir -p clip/rgb && \
-                 ffmpeg -i '{text}' -r 25 clip/rgb/%06d.png && (cd clip && ls rgb/* | awk '{{print NR/25, $0}}' > rgb.txt)"
+            Some(text) if path.is_file() && is_video(path) => SourceError::usage_error(format!(
+                "a video must be split into pictures first; ffmpeg makes a folder of them, which is then the source: \
+                 mkdir -p clip/rgb && ffmpeg -i '{text}' -r 25 clip/rgb/%06d.png && (cd clip && ls rgb/* | awk \
+                 '{{print NR/25, $0}}' > rgb.txt)"
             )),
             _ if path.is_file() => {
-                SourceError::usage(format!("it is neither a folder nor a photo: use {}", accepted_sources()))
+                SourceError::usage_error(format!("it is neither a folder nor a photo: use {}", accepted_sources()))
             }
-            Some(text) if is_path(text) => Err(missing_folder(text)),
+            Some(text) if is_path(text) => Err(missing_folder_error(text)),
             Some(text) => parse_cameras(text),
-            None => Err(missing_folder(&path.display().to_string())),
+            None => Err(missing_folder_error(&path.display().to_string())),
         }
     }
 
     /// Returns the name, or part of it, of a PipeWire camera.
-    pub fn shared(&self) -> Option<&str> {
+    pub fn pipewire_name(&self) -> Option<&str> {
         match self {
             #[cfg(all(feature = "camera", feature = "pipewire"))]
             Self::PipeWire(name) => Some(name),
@@ -236,7 +237,7 @@ impl SourceName {
     ///
     /// # Errors
     /// Such an option is given, and this is not a recording.
-    pub fn check(&self, frames: &Frames) -> Result<(), SourceError> {
+    pub fn check_frames(&self, frames: &Frames) -> Result<(), SourceError> {
         let what = match self {
             SourceName::Folder(_) => return Ok(()),
             SourceName::Photo(_) if frames.start.is_none() && frames.end.is_none() => return Ok(()),
@@ -260,7 +261,7 @@ impl SourceName {
     }
 
     /// Returns the folder of a recording, or the file of a photo.
-    pub fn folder(&self) -> Option<&Path> {
+    pub fn path(&self) -> Option<&Path> {
         match self {
             SourceName::Folder(path) | SourceName::Photo(path) => Some(path),
             _ => None,
@@ -268,21 +269,21 @@ impl SourceName {
     }
 
     /// Returns a note for users on a source that was opened with this name, in one line.
-    pub fn note(&self, source: &Source) -> Option<String> {
+    pub fn describe_photo(&self, source: &Source) -> Option<String> {
         let SourceName::Photo(path) = self else { return None };
         let depth = match source.depth_from {
-            DepthOrigin::Nothing => "without depth: a map NAME-depth.png beside it would be taken",
-            DepthOrigin::Networks | DepthOrigin::Plate => "with depth that is made of it",
+            DepthOrigin::Nothing => "without depth: a map NAME-depth.png beside it would be used",
+            DepthOrigin::Networks | DepthOrigin::Plate => "with depth computed from it",
             _ => "with the depth beside it",
         };
         Some(format!(
-            "{}: a photo, one frame that stands still, {depth}; its colour profile, EXIF and XMP are kept by `render` alone",
+            "{}: a photo, a single still frame, {depth}; only `render` keeps its colour profile, EXIF and XMP",
             path.display()
         ))
     }
 
     /// Returns the device nodes of its cameras.
-    pub fn devices(&self) -> Vec<&Path> {
+    pub fn device_nodes(&self) -> Vec<&Path> {
         match self {
             SourceName::Synthetic | SourceName::Demo | SourceName::Folder(_) | SourceName::Photo(_) => Vec::new(),
             #[cfg(all(feature = "camera", feature = "pipewire"))]

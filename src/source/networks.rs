@@ -1,6 +1,6 @@
 //! Depth from a single camera by networks, either named by the user or installed.
 
-use super::{DepthOrigin, OneCamera, Options, Source, SourceError, Wanted};
+use super::{DepthOrigin, OpenRequest, Options, SingleCameraDepth, Source, SourceError};
 use crate::depth::focus::{FocusRule, PersonFocus, Persons};
 use crate::depth::plate::Companion;
 use crate::depth::{DepthSource, FrameInput};
@@ -17,10 +17,10 @@ type Opened = (Box<dyn Companion>, String);
 ///
 /// # Errors
 /// The look needs real distances.
-pub fn refuse_metres(look: &Look, who: &str) -> Result<(), SourceError> {
-    match look.needs_metres() {
+pub fn reject_metric_look(look: &Look, who: &str) -> Result<(), SourceError> {
+    match look.metric_setting() {
         None => Ok(()),
-        Some(needs) => SourceError::usage(format!(
+        Some(needs) => SourceError::usage_error(format!(
             "{needs} needs distances, and {who} only the order of depth: use --focus auto or X,Y, and --blur"
         )),
     }
@@ -31,7 +31,7 @@ pub fn refuse_metres(look: &Look, who: &str) -> Result<(), SourceError> {
 /// # Errors
 /// A network is not installed or cannot be used.
 #[cfg(feature = "networks")]
-pub(super) fn open(chosen: &OneCamera, wanted: &Wanted) -> Result<Opened, SourceError> {
+pub(super) fn open_networks(chosen: &SingleCameraDepth, request: &OpenRequest) -> Result<Opened, SourceError> {
     use crate::depth::single_camera::{Hints, SingleCamera};
     use crate::network::{Task, best};
     let file = |chosen: &Option<NetworkFile>, task: Task| {
@@ -39,7 +39,7 @@ pub(super) fn open(chosen: &OneCamera, wanted: &Wanted) -> Result<Opened, Source
         None => Ok(None),
         Some(NetworkFile::At(file)) => Ok(Some(file.clone())),
         Some(NetworkFile::Installed) => best(task).map(Some).ok_or_else(|| {
-            SourceError::NotThere(format!(
+            SourceError::NotFound(format!(
                 "--depth {task}: no network for it is installed: `bokehcam models get {known}`, or name a file: --depth {task}:FILE",
                 known = crate::network::KNOWN.iter().find(|known| known.task == task).map_or("", |known| known.file),
                 task = task.name()
@@ -48,7 +48,7 @@ pub(super) fn open(chosen: &OneCamera, wanted: &Wanted) -> Result<Opened, Source
     }
     };
     let (matte, mono) = (file(&chosen.matte, Task::Matte)?, file(&chosen.mono, Task::Mono)?);
-    let options = &wanted.options.networks;
+    let options = &request.options.networks;
     let hints = Hints {
         scaling: options.network_range.map(super::options::Range::scaling),
         bgr: options.network_order.map(|order| order == super::options::Order::Bgr),
@@ -61,41 +61,41 @@ pub(super) fn open(chosen: &OneCamera, wanted: &Wanted) -> Result<Opened, Source
 
 /// Returns the best installed networks, if any.
 #[cfg(feature = "networks")]
-pub fn installed() -> OneCamera {
+pub fn installed_networks() -> SingleCameraDepth {
     use crate::network::{self, Task};
     let installed = network::installed();
     let best =
         |task| installed.iter().find(|(known, _)| known.task == task).map(|(_, file)| NetworkFile::At(file.clone()));
-    OneCamera { plate: None, matte: best(Task::Matte), mono: best(Task::Mono) }
+    SingleCameraDepth { plate: None, matte: best(Task::Matte), mono: best(Task::Mono) }
 }
 
 /// Returns none, as this build has no networks.
 #[cfg(not(feature = "networks"))]
-pub fn installed() -> OneCamera {
-    OneCamera::default()
+pub fn installed_networks() -> SingleCameraDepth {
+    SingleCameraDepth::default()
 }
 
 /// Adds depth of the installed networks to a source without depth, if there are any and no other depth was requested.
 #[cfg(feature = "networks")]
-pub(super) fn add_network_depth(source: Source, wanted: &Wanted) -> Source {
-    let is_lone = !source.has_depth() && wanted.options.depth_choice == DepthChoice::Auto;
-    let needs_metres = wanted.look.is_some_and(|look| look.needs_metres().is_some());
+pub(super) fn add_network_depth(source: Source, request: &OpenRequest) -> Source {
+    let is_lone = !source.has_depth() && request.options.depth_choice == DepthChoice::Auto;
+    let needs_metres = request.look.is_some_and(|look| look.metric_setting().is_some());
     // A source without a look is being recorded: record only what cannot be computed later.
-    if !is_lone || needs_metres || !wanted.look.is_some_and(|look| look.effect.follows_depth()) {
+    if !is_lone || needs_metres || !request.look.is_some_and(|look| look.effect.follows_depth()) {
         return source;
     }
-    let chosen = installed();
+    let chosen = installed_networks();
     if chosen.matte.is_none() {
         return source;
     }
-    match open(&chosen, wanted) {
+    match open_networks(&chosen, request) {
         Ok((depth, about)) => {
             let depth: Option<Box<dyn DepthSource>> = Some(depth);
             Source { depth, depth_from: DepthOrigin::Networks, networks: Some(about), ..source }
         }
         // The networks were not requested explicitly.
         Err(error) => {
-            tracing::warn!("{error}; going on without it");
+            tracing::warn!("{error}; continuing without it");
             source
         }
     }
@@ -103,27 +103,27 @@ pub(super) fn add_network_depth(source: Source, wanted: &Wanted) -> Source {
 
 /// Opens the network that detects the person in focus, with a short description; `None` if none is installed.
 #[cfg(feature = "networks")]
-fn open_person_detector(wanted: &Wanted) -> Option<(Persons, String)> {
-    let finder = OneCamera { mono: None, ..installed() };
+fn open_person_detector(request: &OpenRequest) -> Option<(Persons, String)> {
+    let finder = SingleCameraDepth { mono: None, ..installed_networks() };
     finder.matte.as_ref()?;
-    let opened = open(&finder, wanted);
-    let logged = opened.inspect_err(|error| tracing::warn!("{error}; the focus goes by distance alone"));
+    let opened = open_networks(&finder, request);
+    let logged = opened.inspect_err(|error| tracing::warn!("{error}; the focus uses distances only"));
     logged.ok().map(|(finder, about)| (Persons::new(finder), about))
 }
 
 #[cfg(not(feature = "networks"))]
-fn open_person_detector(_: &Wanted) -> Option<(Persons, String)> {
+fn open_person_detector(_: &OpenRequest) -> Option<(Persons, String)> {
     None
 }
 
 /// Adds person detection for the focus to a source with measured depth, if a network is installed.
-pub(super) fn add_person_detection(mut source: Source, wanted: &Wanted) -> Source {
-    let is_used = wanted.look.is_some_and(|look| look.effect.follows_depth()) && !source.depth_from.is_of_pictures();
+pub(super) fn add_person_detection(mut source: Source, request: &OpenRequest) -> Source {
+    let is_used = request.look.is_some_and(|look| look.effect.follows_depth()) && !source.depth_from.is_replaceable();
     if source.depth.is_some()
         && is_used
-        && let Some((persons, about)) = open_person_detector(wanted)
+        && let Some((persons, about)) = open_person_detector(request)
     {
-        let is_matched = source.depth_from == DepthOrigin::Eyes;
+        let is_matched = source.depth_from == DepthOrigin::Stereo;
         let on_persons = |depth| Box::new(PersonFocus::new(depth, persons, is_matched)) as Box<dyn DepthSource>;
         source.depth = source.depth.map(on_persons);
         source.persons = Some(about);
@@ -134,18 +134,18 @@ pub(super) fn add_person_detection(mut source: Source, wanted: &Wanted) -> Sourc
 /// Detects the person in focus for the map of a single picture from a file.
 pub fn find_person(options: &Options, look: &Look, color: &ColorImage, map: &mut DepthMap) {
     let is_used = look.effect.follows_depth() && look.focus == FocusRule::Auto;
-    if is_used && let Some((mut persons, _)) = open_person_detector(&Wanted { options, look: Some(look) }) {
+    if is_used && let Some((mut persons, _)) = open_person_detector(&OpenRequest { options, look: Some(look) }) {
         let stamp = Stamp { index: 0, time_ns: 0, captured_ns: None };
         persons.set_distance(FrameInput { stamp, color, right: None }, map);
     }
 }
 
 #[cfg(not(feature = "networks"))]
-pub(super) fn open(_: &OneCamera, _: &Wanted) -> Result<Opened, SourceError> {
-    SourceError::usage("--depth matte and mono: this build leaves networks out (feature `networks`)")
+pub(super) fn open_networks(_: &SingleCameraDepth, _: &OpenRequest) -> Result<Opened, SourceError> {
+    SourceError::usage_error("--depth matte and mono: this build leaves networks out (feature `networks`)")
 }
 
 #[cfg(not(feature = "networks"))]
-pub(super) fn add_network_depth(source: Source, _: &Wanted) -> Source {
+pub(super) fn add_network_depth(source: Source, _: &OpenRequest) -> Source {
     source
 }

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{DepthOrigin, Options, SourceError, SourceName, Wanted, photo};
+use super::{DepthOrigin, OpenRequest, Options, SourceError, SourceName, photo};
 #[cfg(feature = "camera")]
 use super::{Frames, name};
 use crate::capture::Camera;
@@ -10,15 +10,15 @@ use crate::capture::demo::Demo;
 use crate::capture::photo::Photo;
 #[cfg(all(feature = "camera", feature = "pipewire"))]
 use crate::capture::pipewire::PipeWireCamera;
-use crate::capture::replay::{Part, Replay};
-use crate::capture::synthetic::{self, Format};
+use crate::capture::replay::{PlayRange, Replay};
 #[cfg(feature = "camera")]
-use crate::capture::two_eyes::StereoPair;
+use crate::capture::stereo_pair::StereoPair;
+use crate::capture::synthetic::{self, Format};
 #[cfg(feature = "camera")]
 use crate::capture::v4l2::V4l2Camera;
 #[cfg(feature = "camera")]
 use crate::clock::Clock;
-use crate::compute::thread_pool::cores;
+use crate::compute::thread_pool::core_count;
 use crate::depth::DepthSource;
 use crate::depth::kept::Kept;
 use crate::depth::recorded::Recorded;
@@ -48,8 +48,8 @@ pub(super) struct Opened {
 
 impl Opened {
     /// Opens the source; right pictures are read only if stereo matching will use them.
-    pub fn open(name: &SourceName, wanted: &Wanted) -> Result<Self, SourceError> {
-        let Options { frames, .. } = wanted.options;
+    pub fn open(name: &SourceName, request: &OpenRequest) -> Result<Self, SourceError> {
+        let Options { frames, .. } = request.options;
         let without_depth = |camera| Self {
             camera,
             depth: None,
@@ -62,14 +62,14 @@ impl Opened {
             SourceName::Synthetic => {
                 let size = frames.size.map_or(SYNTHETIC_SIZE, |size| (size.width, size.height));
                 let fps = frames.fps.unwrap_or(SYNTHETIC_FPS);
-                let format = Format { size, fps, frames: frames.frames, threads: cores() };
-                Ok(without_depth(synthetic::open(format)?))
+                let format = Format { size, fps, frames: frames.frames, threads: core_count() };
+                Ok(without_depth(synthetic::open_camera(format)?))
             }
             SourceName::Demo => Ok(without_depth(Box::new(Demo::new(frames.frames)?))),
             SourceName::Folder(folder) => {
-                let recording = Arc::new(Recording::open(folder, &wanted.reading())?);
+                let recording = Arc::new(Recording::open(folder, &request.recording_options())?);
                 let name = folder.display().to_string();
-                let part = Part {
+                let part = PlayRange {
                     start_s: frames.start.unwrap_or(0.0),
                     end_s: frames.end,
                     looped: frames.repeat,
@@ -77,13 +77,13 @@ impl Opened {
                 };
                 let mut camera = Replay::new(Arc::clone(&recording), &name, &part)?;
                 let pair = recording.pair().cloned();
-                if pair.is_some() && wanted.uses_stereo(recording.has_depth()) {
-                    camera = camera.with_right_eye();
+                if pair.is_some() && request.uses_stereo(recording.has_depth()) {
+                    camera = camera.with_right_camera();
                 }
                 let disparities = recording.disparities();
-                let depth_from = recorded_depth_from(&recording);
-                wanted.check_relative(depth_from)?;
-                let first_depth = wanted.first_depth(&recording);
+                let depth_from = recorded_depth_origin(&recording);
+                request.check_relative_depth(depth_from)?;
+                let first_depth = request.read_first_depth(&recording);
                 let depth = match recording.has_depth() {
                     true => Some(Box::new(Recorded::new(recording, &name)?) as Box<dyn DepthSource>),
                     false => None,
@@ -98,8 +98,8 @@ impl Opened {
                 })
             }
             SourceName::Photo(path) => {
-                let (color, map, depth_from) = photo::read(path, wanted.options)?;
-                wanted.check_relative(depth_from)?;
+                let (color, map, depth_from) = photo::read_photo(path, request.options)?;
+                request.check_relative_depth(depth_from)?;
                 let camera = Photo::new(color, &path.display().to_string(), frames.repeat, frames.frames);
                 let depth = map.map(|map| Box::new(Kept(map)) as Box<dyn DepthSource>);
                 Ok(Self { depth, depth_from, ..without_depth(Box::new(camera)) })
@@ -113,32 +113,31 @@ impl Opened {
             #[cfg(all(feature = "camera", feature = "pipewire"))]
             SourceName::PipeWire(name) => {
                 if let Some((control, value)) = frames.control.first() {
-                    let what = format!(
-                        "--control {control}={value}: a camera of PipeWire's has no controls here; use its /dev/videoN"
-                    );
-                    return SourceError::usage(what);
+                    let what =
+                        format!("--control {control}={value}: a PipeWire camera has no controls; use its /dev/videoN");
+                    return SourceError::usage_error(what);
                 }
                 Ok(without_depth(Box::new(PipeWireCamera::open(
                     name,
-                    wanted.options.filters,
+                    request.options.filters,
                     camera_request(frames),
                     frames.frames,
                 )?)))
             }
             #[cfg(feature = "camera")]
             SourceName::Cameras([left, right]) => {
-                let open = |eye: &name::Named| {
-                    V4l2Camera::open(&eye.name, camera_request(frames), frames.control.clone(), None)
+                let open = |camera: &name::NamedCamera| {
+                    V4l2Camera::open(&camera.name, camera_request(frames), frames.control.clone(), None)
                 };
-                let eyes = StereoPair::new(open(left)?, open(right)?, Clock::system(), frames.frames)?;
-                Ok(without_depth(Box::new(eyes)))
+                let pair = StereoPair::new(open(left)?, open(right)?, Clock::system(), frames.frames)?;
+                Ok(without_depth(Box::new(pair)))
             }
         }
     }
 }
 
 /// Returns the kind of a recording's depth.
-pub(super) fn recorded_depth_from(recording: &Recording) -> DepthOrigin {
+pub(super) fn recorded_depth_origin(recording: &Recording) -> DepthOrigin {
     match recording.has_depth() {
         false => DepthOrigin::Nothing,
         true if recording.has_relative_depth() => DepthOrigin::Relative,

@@ -3,7 +3,7 @@
 // The help texts contain brackets that are not links.
 #![allow(rustdoc::broken_intra_doc_links)]
 
-mod one_camera;
+mod single_camera;
 
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
@@ -16,13 +16,13 @@ use clap::builder::{BoolishValueParser, RangedI64ValueParser};
 #[cfg(feature = "clap")]
 use crate::depth::stereo::Settings;
 #[cfg(feature = "clap")]
-use crate::look::number::{above_zero, within};
+use crate::look::number::{in_range_parser, parse_positive};
 use crate::names;
 #[cfg(feature = "camera")]
 use crate::v4l2::{FourCc, live::Setting};
-pub use one_camera::{NetworkFile, Networks, OneCamera, PlateFile};
+pub use single_camera::{NetworkFile, Networks, PlateFile, SingleCameraDepth};
 #[cfg(feature = "networks")]
-pub use one_camera::{Order, Range};
+pub use single_camera::{Order, Range};
 
 /// Units of a 16-bit depth picture per metre: the TUM convention.
 pub const DEPTH_SCALE: f32 = 5000.0;
@@ -36,12 +36,12 @@ const LIVE_DEPTH_SCALE: f32 = 1000.0;
 #[cfg_attr(feature = "clap", command(next_help_heading = "Source"))]
 pub struct Frames {
     /// Start this many seconds after the first frame
-    #[cfg_attr(feature = "clap", arg(long, value_name = "SECONDS", value_parser = seconds))]
+    #[cfg_attr(feature = "clap", arg(long, value_name = "SECONDS", value_parser = parse_seconds))]
     pub start: Option<f64>,
     /// End this many seconds after the first frame
-    #[cfg_attr(feature = "clap", arg(long, value_name = "SECONDS", value_parser = seconds))]
+    #[cfg_attr(feature = "clap", arg(long, value_name = "SECONDS", value_parser = parse_seconds))]
     pub end: Option<f64>,
-    /// Begin again at the end; only with --frames or Ctrl-C does it end
+    /// Start again at the end of the source; the run ends only by --frames or Ctrl-C
     #[cfg_attr(feature = "clap", arg(long = "loop", value_name = "YES", num_args = 0..=1, require_equals = true, default_value_t = false,
           default_missing_value = "true", value_parser = BoolishValueParser::new(), hide_default_value = true,
           hide_possible_values = true))]
@@ -49,19 +49,20 @@ pub struct Frames {
     /// Stop after this many frames
     #[cfg_attr(feature = "clap", arg(long, value_name = "N", value_parser = RangedI64ValueParser::<u64>::new().range(1..)))]
     pub frames: Option<u64>,
-    /// Picture size; of a camera, the nearest that it has [default: 1280x720 of a camera, 640x480 of `synthetic`; `demo` has its own]
+    /// Picture size; for a camera, its nearest size [default: 1280x720 for a camera, 640x480 for `synthetic`; `demo`
+    /// has its own]
     #[cfg_attr(feature = "clap", arg(long, value_name = "WxH"))]
     pub size: Option<Size>,
-    /// Frames per second; of a camera, the nearest that it has [default: 30]
-    #[cfg_attr(feature = "clap", arg(long, value_name = "RATE", value_parser = rate))]
+    /// Frames per second; for a camera, its nearest rate [default: 30]
+    #[cfg_attr(feature = "clap", arg(long, value_name = "RATE", value_parser = parse_rate))]
     pub fps: Option<f64>,
-    /// Pixel format of a camera, such as MJPG, YUYV or NV12 [default: what its cable carries best]
+    /// Pixel format of a camera, such as MJPG, YUYV or NV12 [default: the best for its connection]
     #[cfg(feature = "camera")]
     #[cfg_attr(feature = "clap", arg(long, value_name = "FOURCC"))]
     pub format: Option<FourCc>,
-    /// Set a camera's control; may be given more than once, or as a list with commas
+    /// Set a control of the camera; may be given more than once, or as a list with commas
     #[cfg(feature = "camera")]
-    #[cfg_attr(feature = "clap", arg(long, value_name = "NAME=VALUE", value_delimiter = ',', value_parser = control))]
+    #[cfg_attr(feature = "clap", arg(long, value_name = "NAME=VALUE", value_delimiter = ',', value_parser = parse_control))]
     pub control: Vec<Setting>,
 }
 
@@ -71,23 +72,23 @@ pub struct Frames {
 #[cfg_attr(feature = "clap", command(next_help_heading = "Depth"))]
 pub struct Depth {
     /// Units of a 16-bit depth picture per metre (TUM 5000, millimetres 1000) [default: 5000; 1000 from a camera]
-    #[cfg_attr(feature = "clap", arg(long, value_name = "UNITS", value_parser = above_zero))]
+    #[cfg_attr(feature = "clap", arg(long, value_name = "UNITS", value_parser = parse_positive))]
     pub depth_scale: Option<f32>,
     /// Value of a depth picture that means unknown
     #[cfg_attr(feature = "clap", arg(long, value_name = "VALUE", default_value = "0"))]
     pub depth_invalid: u16,
-    /// What the numbers of depth pictures are: metres (as --depth-scale has them), or inverse (relative inverse depth, as
-    /// networks and phones give it: 8 or 16 bits, PNG or JPEG, white is near)
-    #[cfg_attr(feature = "clap", arg(long, value_name = "UNIT", value_parser = depth_unit, default_value = "metres"))]
+    /// Meaning of the values in depth pictures: metres (scaled by --depth-scale), or inverse (relative inverse depth,
+    /// as from networks and phones: 8 or 16 bits, PNG or JPEG, white is near)
+    #[cfg_attr(feature = "clap", arg(long, value_name = "UNIT", value_parser = parse_depth_unit, default_value = "metres"))]
     pub depth_unit: DepthUnit,
-    /// White is far in pictures of inverse depth
+    /// In pictures of inverse depth, white is far
     #[cfg_attr(feature = "clap", arg(long, value_name = "YES", num_args = 0..=1, require_equals = true, default_value_t = false,
           default_missing_value = "true", value_parser = BoolishValueParser::new(), hide_default_value = true,
           hide_possible_values = true))]
     pub depth_invert: bool,
-    /// How a depth camera stands beside the colour camera: TOML with the tables [depth] and [color] (width, height, fx,
-    /// fy, cx, cy, in pixels) and [depth-to-color] (rotation: 9 numbers row by row; translation_m: 3 numbers)
-    /// [default: both see the same]
+    /// Position of the depth camera relative to the colour camera: TOML with the tables [depth] and [color] (width,
+    /// height, fx, fy, cx, cy, in pixels) and [depth-to-color] (rotation: 9 numbers row by row; translation_m: 3
+    /// numbers) [default: both have the same view]
     #[cfg_attr(feature = "clap", arg(long, value_name = "FILE.toml"))]
     pub depth_calibration: Option<PathBuf>,
 }
@@ -124,36 +125,37 @@ impl Depth {
     }
 }
 
-/// Depth from two eyes.
+/// Stereo depth from two cameras.
 #[derive(Clone, Debug, Default)]
 #[cfg_attr(feature = "clap", derive(Args))]
-#[cfg_attr(feature = "clap", command(next_help_heading = "Two eyes"))]
+#[cfg_attr(feature = "clap", command(next_help_heading = "Stereo"))]
 pub struct Stereo {
-    /// Each picture of the source shows both eyes beside each other: the left half is the left eye's
+    /// Each picture of the source shows the left and right camera side by side, the left camera in the left half
     #[cfg_attr(feature = "clap", arg(long, value_name = "YES", num_args = 0..=1, require_equals = true, default_value_t = false,
           default_missing_value = "true", value_parser = BoolishValueParser::new(), hide_default_value = true,
           hide_possible_values = true))]
     pub side_by_side: bool,
-    /// The pictures are a rectified pair already: the same point is in the same row
+    /// The pictures are already rectified: a point is in the same row of both
     #[cfg_attr(feature = "clap", arg(long, value_name = "YES", num_args = 0..=1, require_equals = true, default_value_t = false,
           default_missing_value = "true", value_parser = BoolishValueParser::new(), hide_default_value = true,
           hide_possible_values = true))]
     pub rectified: bool,
-    /// Calibration of the two eyes; may be given more than once, or as a list with commas, for one in two files
+    /// Calibration of the two cameras; may be given more than once, or as a list with commas, for a calibration in two
+    /// files
     #[cfg_attr(feature = "clap", arg(long, value_name = "FILE", value_delimiter = ','))]
     pub calib: Vec<PathBuf>,
-    /// Disparities that are tried, in pixels: a multiple of 16 up to 256 [default: the recording's, else a tenth of the
-    /// width]
-    #[cfg_attr(feature = "clap", arg(long, value_name = "PX", value_parser = disparities))]
+    /// Range of disparities to search, in pixels: a multiple of 16 up to 256 [default: the recording's, else a tenth of
+    /// the width]
+    #[cfg_attr(feature = "clap", arg(long, value_name = "PX", value_parser = parse_disparities))]
     pub max_disparity: Option<u32>,
     /// Focal length of a rectified pair, in pixels, with --baseline-m
-    #[cfg_attr(feature = "clap", arg(long, value_name = "PX", value_parser = above_zero, conflicts_with = "calib"))]
+    #[cfg_attr(feature = "clap", arg(long, value_name = "PX", value_parser = parse_positive, conflicts_with = "calib"))]
     pub focal_px: Option<f32>,
-    /// Distance of its eyes, in metres
-    #[cfg_attr(feature = "clap", arg(long, value_name = "M", value_parser = above_zero, conflicts_with = "calib"))]
+    /// Distance between the two cameras, in metres, with --focal-px
+    #[cfg_attr(feature = "clap", arg(long, value_name = "M", value_parser = parse_positive, conflicts_with = "calib"))]
     pub baseline_m: Option<f32>,
-    /// Column of its right principal point less that of the left, in pixels [default: 0]
-    #[cfg_attr(feature = "clap", arg(long, value_name = "PX", value_parser = within(-10_000.0..=10_000.0),
+    /// Column of the right principal point minus that of the left, in pixels [default: 0]
+    #[cfg_attr(feature = "clap", arg(long, value_name = "PX", value_parser = in_range_parser(-10_000.0..=10_000.0),
           conflicts_with = "calib"))]
     pub doffs_px: Option<f32>,
 }
@@ -175,21 +177,21 @@ pub enum DepthChoice {
     /// A depth camera, by its path or name.
     Device(String),
     /// A clean plate or networks, from the pictures alone.
-    OneCamera(OneCamera),
+    SingleCamera(SingleCameraDepth),
     /// Depth from the slight defocus of a photograph itself.
     Defocus,
 }
 
 impl DepthChoice {
     /// Returns whether the depth is not the source's own.
-    pub fn is_elsewhere(&self) -> bool {
-        matches!(self, Self::Folder(_) | Self::Device(_) | Self::OneCamera(_) | Self::Defocus)
+    pub fn is_external(&self) -> bool {
+        matches!(self, Self::Folder(_) | Self::Device(_) | Self::SingleCamera(_) | Self::Defocus)
     }
 
     /// Returns a hint for a message if a text resembles a keyword.
-    pub fn hint(text: &str) -> String {
+    pub fn suggest_keyword(text: &str) -> String {
         const WORDS: [&str; 8] = ["auto", "recorded", "stereo", "none", "matte", "mono", "plate", "defocus"];
-        let meant = crate::names::nearest(text, WORDS).filter(|word| *word != text);
+        let meant = crate::names::find_similar(text, WORDS).filter(|word| *word != text);
         meant.map_or(String::new(), |word| format!("did you mean {word}? "))
     }
 }
@@ -209,7 +211,7 @@ impl FromStr for DepthChoice {
                         .to_string(),
                 );
             }
-            text if let Some(chosen) = OneCamera::parse(text) => Self::OneCamera(chosen?),
+            text if let Some(chosen) = SingleCameraDepth::parse(text) => Self::SingleCamera(chosen?),
             folder if Path::new(folder).is_dir() => Self::Folder(folder.into()),
             device => Self::Device(device.to_owned()),
         })
@@ -237,7 +239,7 @@ impl FromStr for Size {
 
 /// Parses `NAME=VALUE`; whether the camera has such a control is checked when it is open.
 #[cfg(all(feature = "camera", feature = "clap"))]
-fn control(text: &str) -> Result<Setting, String> {
+fn parse_control(text: &str) -> Result<Setting, String> {
     let parts = text.split_once('=').map(|(name, value)| (name.trim(), value.trim()));
     let (name, value) = parts
         .filter(|(name, _)| !name.is_empty())
@@ -246,23 +248,23 @@ fn control(text: &str) -> Result<Setting, String> {
 }
 
 #[cfg(feature = "clap")]
-fn depth_unit(text: &str) -> Result<DepthUnit, String> {
-    names::parse(text).map_err(|accepted| match text {
-        "mm" | "millimetres" | "millimeters" => format!("{accepted}; of millimetres, --depth-scale 1000 makes metres"),
-        "disparity" => format!("{accepted}; disparity that bokehcam wrote is read as it is"),
+fn parse_depth_unit(text: &str) -> Result<DepthUnit, String> {
+    names::parse_name(text).map_err(|accepted| match text {
+        "mm" | "millimetres" | "millimeters" => format!("{accepted}; for millimetres, use --depth-scale 1000"),
+        "disparity" => format!("{accepted}; disparity written by bokehcam needs no unit"),
         _ => accepted,
     })
 }
 
 #[cfg(feature = "clap")]
-fn disparities(text: &str) -> Result<u32, String> {
+fn parse_disparities(text: &str) -> Result<u32, String> {
     const MAX: u32 = Settings::MAX_DISPARITIES;
     let good = |disparities: &u32| (16..=MAX).contains(disparities) && disparities.is_multiple_of(16);
     text.parse().ok().filter(good).ok_or_else(|| format!("use a multiple of 16 from 16 to {MAX}"))
 }
 
 #[cfg(feature = "clap")]
-fn rate(text: &str) -> Result<f64, String> {
+fn parse_rate(text: &str) -> Result<f64, String> {
     text.parse()
         .ok()
         .filter(|rate| (0.1..=1000.0).contains(rate))
@@ -270,7 +272,7 @@ fn rate(text: &str) -> Result<f64, String> {
 }
 
 /// Parses a time in seconds, from 0.
-pub fn seconds(text: &str) -> Result<f64, String> {
+pub fn parse_seconds(text: &str) -> Result<f64, String> {
     text.parse().ok().filter(|s: &f64| s.is_finite() && *s >= 0.0).ok_or_else(|| "use seconds from 0".to_string())
 }
 

@@ -24,7 +24,7 @@ pub fn is_photo(path: &Path) -> bool {
 }
 
 /// Returns the picture to use for a photo: for a snapshot, its picture before the blur.
-pub fn original(path: &Path) -> PathBuf {
+pub fn original_path(path: &Path) -> PathBuf {
     let before = snapshot::sources(path).0;
     if before.is_file() { before } else { path.to_owned() }
 }
@@ -45,7 +45,7 @@ pub struct PhotoDepth {
 ///
 /// # Errors
 /// Same as for [`Source::open`].
-pub fn depth_of(
+pub fn read_default_depth(
     path: &Path,
     color: &ColorImage,
     options: &Options,
@@ -57,15 +57,15 @@ pub fn depth_of(
     let mut map = DepthMap::default();
     depth
         .read(FrameInput { stamp: Stamp { index: 0, time_ns: 0, captured_ns: None }, color, right: None }, &mut map)?;
-    let describe_file = || depth_file(path).map(|file| format!("{}, beside it", file.display()));
+    let describe_file = || find_depth_file(path).map(|file| format!("{}, beside it", file.display()));
     let by = networks.take().or_else(describe_file).unwrap_or_default();
     Ok(Some(PhotoDepth { map, from: *from, measured, by }))
 }
 
 /// Returns the files to read for a photo: the picture, and its depth file if there is one.
-pub fn files_of(path: &Path) -> impl Iterator<Item = PathBuf> {
-    let original = original(path);
-    let depth = depth_file(&original);
+pub fn photo_files(path: &Path) -> impl Iterator<Item = PathBuf> {
+    let original = original_path(path);
+    let depth = find_depth_file(&original);
     [original].into_iter().chain(depth)
 }
 
@@ -77,11 +77,13 @@ pub(super) type Photo = (ColorImage, Option<DepthMap>, DepthOrigin);
 ///
 /// # Errors
 /// The photo or its depth file is unreadable, or the depth has another size.
-pub(super) fn read(path: &Path, options: &Options) -> Result<Photo, SourceError> {
-    let path = &original(path);
+pub(super) fn read_photo(path: &Path, options: &Options) -> Result<Photo, SourceError> {
+    let path = &original_path(path);
     let color = still::read_color(path)?;
     let is_wanted = matches!(options.depth_choice, DepthChoice::Auto | DepthChoice::Recorded);
-    let Some(file) = depth_file(path).filter(|_| is_wanted) else { return Ok((color, None, DepthOrigin::Nothing)) };
+    let Some(file) = find_depth_file(path).filter(|_| is_wanted) else {
+        return Ok((color, None, DepthOrigin::Nothing));
+    };
     let depth = &options.depth;
     let (map, from) = match depth.file_unit() {
         DepthUnit::Inverse { white_is_far } => {
@@ -90,10 +92,10 @@ pub(super) fn read(path: &Path, options: &Options) -> Result<Photo, SourceError>
         DepthUnit::Metres => {
             let (map, from) = match still::read_map(&file, depth.depth_scale, Some(depth.depth_invalid))? {
                 Map::Depth(map) => (map, DepthOrigin::Units),
-                Map::Disparity(map, Some(rig)) => (map.depth(|px| rig.depth_m(px)), DepthOrigin::Metres),
+                Map::Disparity(map, Some(rig)) => (map.to_depth_map(|px| rig.depth_m(px)), DepthOrigin::Metres),
                 Map::Disparity(map, None) => {
-                    let rig = StereoRig::assumed(map.width);
-                    (map.depth(|px| rig.depth_m(px)), DepthOrigin::Relative)
+                    let rig = StereoRig::default_for_width(map.width);
+                    (map.to_depth_map(|px| rig.depth_m(px)), DepthOrigin::Relative)
                 }
             };
             still::check_depth_size(&file, map.size(), color.size())?;
@@ -104,7 +106,7 @@ pub(super) fn read(path: &Path, options: &Options) -> Result<Photo, SourceError>
 }
 
 /// Returns the depth file next to a photo.
-fn depth_file(photo: &Path) -> Option<PathBuf> {
+fn find_depth_file(photo: &Path) -> Option<PathBuf> {
     let stem = photo.file_stem()?.to_str()?;
     let stem = stem.strip_suffix(COLOR).unwrap_or(stem);
     DEPTH.iter().map(|ending| photo.with_file_name(format!("{stem}{ending}"))).find(|file| file.is_file())

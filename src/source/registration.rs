@@ -38,7 +38,7 @@ struct Pose {
 }
 
 impl Camera {
-    fn pinhole(&self) -> Pinhole {
+    fn to_pinhole(&self) -> Pinhole {
         let &Self { width, height, fx, fy, cx, cy } = self;
         Pinhole { width, height, fx, fy, cx, cy }
     }
@@ -48,8 +48,8 @@ impl Camera {
 ///
 /// # Errors
 /// The file is unreadable, has a wrong or missing key, or invalid numbers.
-pub fn load(path: &Path) -> Result<Registration, SourceError> {
-    parse(
+pub fn load_registration(path: &Path) -> Result<Registration, SourceError> {
+    parse_registration(
         path,
         &input::read_text(path, input::MAX_CALIBRATION_BYTES)
             .map_err(|source| SourceError::Io { path: path.to_owned(), source })?,
@@ -60,7 +60,7 @@ pub fn load(path: &Path) -> Result<Registration, SourceError> {
 ///
 /// # Errors
 /// The text is not a depth calibration.
-pub fn parse(path: &Path, text: &str) -> Result<Registration, SourceError> {
+pub fn parse_registration(path: &Path, text: &str) -> Result<Registration, SourceError> {
     let refuse = |at: usize, what: String| SourceError::Registration {
         path: path.to_owned(),
         line: text[..at.min(text.len())].matches('\n').count() + 1,
@@ -71,8 +71,8 @@ pub fn parse(path: &Path, text: &str) -> Result<Registration, SourceError> {
     })?;
     let pose = file.pose.get_ref();
     let calibration = Calibration {
-        depth: file.depth.get_ref().pinhole(),
-        color: file.color.get_ref().pinhole(),
+        depth: file.depth.get_ref().to_pinhole(),
+        color: file.color.get_ref().to_pinhole(),
         rotation: Mat3::from_cols_array(&pose.rotation).transpose(),
         translation_m: Vec3::from_array(pose.translation_m),
     };
@@ -113,14 +113,14 @@ translation_m = [0.5, 0, 0]
 ";
 
     fn refusal(text: &str) -> String {
-        parse(Path::new("c.toml"), text).unwrap_err().to_string()
+        parse_registration(Path::new("c.toml"), text).unwrap_err().to_string()
     }
 
     #[test]
     fn a_calibration_is_read() {
         let from = DepthMap { width: 4, height: 2, metres: vec![1.0; 8], ..DepthMap::default() };
         let mut into = DepthMap::default();
-        parse(Path::new("c.toml"), GOOD).unwrap().register(&from, &mut into);
+        parse_registration(Path::new("c.toml"), GOOD).unwrap().register(&from, &mut into);
         assert_eq!(into.metres, [0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 1.0, 1.0], "half a metre to the right is two pixels");
         // Row by row: a quarter turn about the optical axis maps x to y.
         let turned = GOOD.replace("1, 0, 0, 0, 1, 0, 0, 0, 1", "0, -1, 0, 1, 0, 0, 0, 0, 1").replace("[0.5", "[0");
@@ -130,7 +130,7 @@ translation_m = [0.5, 0, 0]
             metres: vec![0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0],
             ..DepthMap::default()
         };
-        parse(Path::new("c.toml"), &turned).unwrap().register(&from, &mut into);
+        parse_registration(Path::new("c.toml"), &turned).unwrap().register(&from, &mut into);
         assert_eq!(into.metres, [0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 0.0]);
     }
 

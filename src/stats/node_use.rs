@@ -55,6 +55,6 @@ impl fmt::Display for OutputUse {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { output, frames, lost, .. } = self;
         write!(f, "{output}: {frames} frames")?;
-        if *lost > 0 { write!(f, ", {lost} lost as it was busy with those before") } else { Ok(()) }
+        if *lost > 0 { write!(f, ", {lost} lost while it was busy") } else { Ok(()) }
     }
 }

@@ -175,10 +175,10 @@ impl Report {
             latency_ms: Spread::of(&timings.sink.latency),
             frame_ms: Spread::of(&timings.sink.frame),
             stages_ms: StagesMs(stages),
-            quality: timings.blur.rungs.shares(),
+            quality: timings.blur.quality_counts.shares(),
             budget_ms: ms(about.budget_ns),
             misses: timings.blur.misses,
-            depth_held: timings.depth.held,
+            depth_held: timings.depth.reused,
             repeats: timings.sink.repeats + about.outputs.iter().map(|output| output.repeats).sum::<u64>(),
             backend,
             adapter,
@@ -265,7 +265,7 @@ impl fmt::Display for Report {
             write!(f, "\nquality: {}; {} changes", shares.join(", "), self.quality.switches)?;
         }
         if self.depth_held > 0 {
-            write!(f, "\ndepth: {} frames took over that of an earlier one, to save time", self.depth_held)?;
+            write!(f, "\ndepth: {} frames reused that of an earlier frame, to save time", self.depth_held)?;
         }
         // Only outputs that lost frames.
         let mut lossy = self.outputs.iter().filter(|output| output.lost > 0);
@@ -291,7 +291,7 @@ mod tests {
             tally.delivered(ticket);
         }
         for rung in ["fast", "balanced", "balanced", "balanced"] {
-            timings.blur.rungs.add(rung);
+            timings.blur.quality_counts.add(rung);
         }
         tally.lost(3, Cause::Late);
         let about = About { budget_ns: 33_333_333, elapsed_ns: 500_000_000, cpu_ns: 250_000_000, ..About::default() };

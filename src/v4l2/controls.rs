@@ -10,7 +10,7 @@ use v4l::v4l_sys as sys;
 use v4l::v4l2::vidioc;
 
 use super::device::{Device, Request, zeroed};
-use super::node::text;
+use super::node::decode_text;
 pub use value::{ControlError, Value};
 
 /// A control that a device offers.
@@ -72,7 +72,7 @@ pub struct Item {
 }
 
 /// Old and new names of the controls that Linux 5.14 renamed. Either name finds the control, whichever the device has.
-const RENAMED: [(&str, &str); 5] = [
+const RENAMED_CONTROLS: [(&str, &str); 5] = [
     ("exposure_auto", "auto_exposure"),
     ("exposure_auto_priority", "exposure_dynamic_framerate"),
     ("exposure_absolute", "exposure_time_absolute"),
@@ -81,13 +81,13 @@ const RENAMED: [(&str, &str); 5] = [
 ];
 
 /// The control that, when it is 1, lets a camera halve its frame rate in the dark.
-pub const LOW_LIGHT: &str = "exposure_dynamic_framerate";
+pub const LOW_LIGHT_CONTROL: &str = "exposure_dynamic_framerate";
 
 /// Lists all controls of a device with their values, in the driver's order; empty if it has none.
 ///
 /// # Errors
 /// Fails with the driver's error; EINVAL and ENOTTY mark the end of the list.
-pub fn list(device: &Device) -> io::Result<Vec<Control>> {
+pub fn list_controls(device: &Device) -> io::Result<Vec<Control>> {
     const NEXT: u32 = sys::V4L2_CTRL_FLAG_NEXT_CTRL | sys::V4L2_CTRL_FLAG_NEXT_COMPOUND;
     let (mut controls, mut last, mut faults) = (Vec::new(), 0, 0);
     loop {
@@ -100,7 +100,7 @@ pub fn list(device: &Device) -> io::Result<Vec<Control>> {
                     return Ok(controls);
                 }
                 last = query.id;
-                controls.extend(describe(device, &query));
+                controls.extend(build_control(device, &query));
             }
             // Some firmware fails on single controls without returning their id: continue with the next id.
             Err(error) if error.raw_os_error() == Some(EIO) && faults < MAX_FAULTS => {
@@ -120,8 +120,8 @@ const ENOTTY: i32 = 25;
 const MAX_FAULTS: u32 = 64;
 
 /// Finds the control with this name, or with its old or new equivalent.
-pub fn find<'a>(controls: &'a [Control], name: &str) -> Option<&'a Control> {
-    let renamed = RENAMED.iter().find_map(|(old, new)| match name {
+pub fn find_control<'a>(controls: &'a [Control], name: &str) -> Option<&'a Control> {
+    let renamed = RENAMED_CONTROLS.iter().find_map(|(old, new)| match name {
         _ if name == *old => Some(*new),
         _ if name == *new => Some(*old),
         _ => None,
@@ -134,9 +134,9 @@ pub fn find<'a>(controls: &'a [Control], name: &str) -> Option<&'a Control> {
 ///
 /// # Errors
 /// No control has this name, or it has no readable value.
-pub fn get(device: &Device, name: &str) -> Result<Value, ControlError> {
-    let controls = list(device).map_err(|source| ControlError::Device { name: name.to_owned(), source })?;
-    let control = find(&controls, name).ok_or_else(|| ControlError::unknown(name, &controls))?;
+pub fn read_control(device: &Device, name: &str) -> Result<Value, ControlError> {
+    let controls = list_controls(device).map_err(|source| ControlError::Device { name: name.to_owned(), source })?;
+    let control = find_control(&controls, name).ok_or_else(|| ControlError::unknown(name, &controls))?;
     control.value.clone().ok_or_else(|| ControlError::NoValue(control.name.clone()))
 }
 
@@ -145,28 +145,28 @@ pub fn get(device: &Device, name: &str) -> Result<Value, ControlError> {
 ///
 /// # Errors
 /// The control does not exist, does not accept this value, cannot be set now, or the device refuses.
-pub fn set(device: &Device, name: &str, value: &str) -> Result<Option<Value>, ControlError> {
+pub fn set_control(device: &Device, name: &str, value: &str) -> Result<Option<Value>, ControlError> {
     let failed = |source| ControlError::Device { name: name.to_owned(), source };
-    let controls = list(device).map_err(failed)?;
-    let control = find(&controls, name).ok_or_else(|| ControlError::unknown(name, &controls))?;
+    let controls = list_controls(device).map_err(failed)?;
+    let control = find_control(&controls, name).ok_or_else(|| ControlError::unknown(name, &controls))?;
     let value = control.parse(value)?;
-    write(device, control, &value).map_err(failed)?;
-    Ok(read(device, control).ok().flatten())
+    write_value(device, control, &value).map_err(failed)?;
+    Ok(read_value(device, control).ok().flatten())
 }
 
 /// Builds a control from a query's result, with its menu and current value; `None` for class headings and disabled
 /// controls.
-fn describe(device: &Device, query: &sys::v4l2_query_ext_ctrl) -> Option<Control> {
-    let label = text(&query.name.map(c_char::cast_unsigned));
+fn build_control(device: &Device, query: &sys::v4l2_query_ext_ctrl) -> Option<Control> {
+    let label = decode_text(&query.name.map(c_char::cast_unsigned));
     let has_flag = |flag| query.flags & flag != 0;
     if has_flag(sys::V4L2_CTRL_FLAG_DISABLED) || query.type_ == sys::v4l2_ctrl_type_V4L2_CTRL_TYPE_CTRL_CLASS {
         return None;
     }
     let mut control = Control {
-        name: tool_name(&label),
+        name: v4l2_ctl_name(&label),
         label,
         id: query.id,
-        kind: kind(query),
+        kind: control_kind(query),
         minimum: query.minimum,
         maximum: query.maximum,
         step: query.step.max(1),
@@ -177,15 +177,15 @@ fn describe(device: &Device, query: &sys::v4l2_query_ext_ctrl) -> Option<Control
         inactive: has_flag(sys::V4L2_CTRL_FLAG_INACTIVE),
         grabbed: has_flag(sys::V4L2_CTRL_FLAG_GRABBED),
     };
-    control.items = items(device, &control);
+    control.items = list_menu_items(device, &control);
     if !has_flag(sys::V4L2_CTRL_FLAG_WRITE_ONLY) {
         // A control that cannot be read must not keep the others from being listed.
-        control.value = read(device, &control).ok().flatten();
+        control.value = read_value(device, &control).ok().flatten();
     }
     Some(control)
 }
 
-fn kind(query: &sys::v4l2_query_ext_ctrl) -> Kind {
+fn control_kind(query: &sys::v4l2_query_ext_ctrl) -> Kind {
     let is_array = query.nr_of_dims > 0;
     match query.type_ {
         // An array's type is that of its elements.
@@ -204,13 +204,13 @@ fn kind(query: &sys::v4l2_query_ext_ctrl) -> Kind {
 
 /// Returns the name that `v4l2-ctl` derives from a driver's label: lower-case letters and digits, and one underscore
 /// for each run of other characters.
-fn tool_name(label: &str) -> String {
+fn v4l2_ctl_name(label: &str) -> String {
     let words = label.split(|c: char| !c.is_ascii_alphanumeric()).filter(|word| !word.is_empty());
     words.map(str::to_ascii_lowercase).collect::<Vec<_>>().join("_")
 }
 
 /// Lists the items of a menu; empty for other kinds. The driver refuses the indices that its menu leaves out.
-fn items(device: &Device, control: &Control) -> Vec<Item> {
+fn list_menu_items(device: &Device, control: &Control) -> Vec<Item> {
     /// More than any menu has; bounds the loop whatever range a driver states.
     const MAX_ITEMS: i64 = 1024;
     if !matches!(control.kind, Kind::Menu | Kind::IntegerMenu) {
@@ -223,7 +223,8 @@ fn items(device: &Device, control: &Control) -> Vec<Item> {
         let union = query.__bindgen_anon_1;
         // SAFETY: every bit pattern is a value of both members, and both lie within what the kernel filled.
         #[allow(unsafe_code)]
-        let name = unsafe { if control.kind == Kind::Menu { text(&union.name) } else { union.value.to_string() } };
+        let name =
+            unsafe { if control.kind == Kind::Menu { decode_text(&union.name) } else { union.value.to_string() } };
         Some(Item { index, name })
     };
     (control.minimum..=control.maximum.min(control.minimum.saturating_add(MAX_ITEMS))).filter_map(item).collect()
@@ -237,22 +238,22 @@ fn text_buffer_bytes(maximum: i64) -> Option<usize> {
 }
 
 /// Reads a control's current value; `None` for kinds without a single value.
-fn read(device: &Device, control: &Control) -> io::Result<Option<Value>> {
-    let mut exchanged: sys::v4l2_ext_control = zeroed();
-    exchanged.id = control.id;
+fn read_value(device: &Device, control: &Control) -> io::Result<Option<Value>> {
+    let mut ext_control: sys::v4l2_ext_control = zeroed();
+    ext_control.id = control.id;
     match control.kind {
         Kind::Button | Kind::Compound => return Ok(None),
         Kind::String => {
             let Some(length) = text_buffer_bytes(control.maximum) else { return Ok(None) };
             let mut bytes = vec![0u8; length];
-            exchanged.size = bytes.len() as u32;
-            exchanged.__bindgen_anon_1.string = bytes.as_mut_ptr().cast();
-            exchange(device, vidioc::VIDIOC_G_EXT_CTRLS as Request, &mut exchanged)?;
-            return Ok(Some(Value::Text(text(&bytes))));
+            ext_control.size = bytes.len() as u32;
+            ext_control.__bindgen_anon_1.string = bytes.as_mut_ptr().cast();
+            ioctl_control(device, vidioc::VIDIOC_G_EXT_CTRLS as Request, &mut ext_control)?;
+            return Ok(Some(Value::Text(decode_text(&bytes))));
         }
-        _ => exchange(device, vidioc::VIDIOC_G_EXT_CTRLS as Request, &mut exchanged)?,
+        _ => ioctl_control(device, vidioc::VIDIOC_G_EXT_CTRLS as Request, &mut ext_control)?,
     }
-    let union = exchanged.__bindgen_anon_1;
+    let union = ext_control.__bindgen_anon_1;
     // SAFETY: every bit pattern is a value of these members; the control's type says which one the kernel filled.
     #[allow(unsafe_code)]
     let number = unsafe {
@@ -265,28 +266,28 @@ fn read(device: &Device, control: &Control) -> io::Result<Option<Value>> {
     Ok(Some(Value::Number(number)))
 }
 
-fn write(device: &Device, control: &Control, value: &Value) -> io::Result<()> {
-    let mut exchanged: sys::v4l2_ext_control = zeroed();
-    exchanged.id = control.id;
+fn write_value(device: &Device, control: &Control, value: &Value) -> io::Result<()> {
+    let mut ext_control: sys::v4l2_ext_control = zeroed();
+    ext_control.id = control.id;
     // Declared here so that it outlives the call, which reads it through a pointer.
     let mut bytes = Vec::new();
     match (value, control.kind) {
         (Value::Text(text), _) => {
             bytes.extend_from_slice(text.as_bytes());
             bytes.push(0);
-            exchanged.size = bytes.len() as u32;
-            exchanged.__bindgen_anon_1.string = bytes.as_mut_ptr().cast();
+            ext_control.size = bytes.len() as u32;
+            ext_control.__bindgen_anon_1.string = bytes.as_mut_ptr().cast();
         }
-        (Value::Number(number), Kind::Integer64) => exchanged.__bindgen_anon_1.value64 = *number,
+        (Value::Number(number), Kind::Integer64) => ext_control.__bindgen_anon_1.value64 = *number,
         // Truncates as intended: bit 31 of a bit mask is the sign of the kernel's `i32`.
-        (Value::Number(number), _) => exchanged.__bindgen_anon_1.value = *number as i32,
+        (Value::Number(number), _) => ext_control.__bindgen_anon_1.value = *number as i32,
     }
-    exchange(device, vidioc::VIDIOC_S_EXT_CTRLS as Request, &mut exchanged)
+    ioctl_control(device, vidioc::VIDIOC_S_EXT_CTRLS as Request, &mut ext_control)
 }
 
 /// Reads or sets one control: `request` is `VIDIOC_G_EXT_CTRLS` or `VIDIOC_S_EXT_CTRLS`. A text lies in the caller's
 /// buffer, to which `control` points.
-fn exchange(device: &Device, request: Request, control: &mut sys::v4l2_ext_control) -> io::Result<()> {
+fn ioctl_control(device: &Device, request: Request, control: &mut sys::v4l2_ext_control) -> io::Result<()> {
     let mut controls: sys::v4l2_ext_controls = zeroed();
     controls.count = 1;
     controls.controls = control;
@@ -311,7 +312,7 @@ mod tests {
             ("S_VIDEO--2", "s_video_2"),
             ("", ""),
         ] {
-            assert_eq!(tool_name(label), name);
+            assert_eq!(v4l2_ctl_name(label), name);
         }
     }
 
@@ -324,8 +325,8 @@ mod tests {
     #[test]
     fn a_device_without_controls_has_an_empty_list() {
         let device = Device::open("/dev/null".as_ref()).unwrap();
-        assert_eq!(list(&device).unwrap(), []);
-        let error = set(&device, "brightness", "1").unwrap_err().to_string();
+        assert_eq!(list_controls(&device).unwrap(), []);
+        let error = set_control(&device, "brightness", "1").unwrap_err().to_string();
         assert_eq!(error, "control brightness: the device has no controls");
     }
 }

@@ -24,11 +24,11 @@ macro_rules! ioctls {
         $(
             $(#[$doc])*
             pub fn $name(&self, argument: &mut $type) -> io::Result<()> {
-                if !argument.is_flat() {
+                if !argument.is_pointer_free() {
                     return Err(io::ErrorKind::InvalidInput.into());
                 }
                 // SAFETY: the type is the one that the request's number was made of, and the driver follows no pointer
-                // in it, as `is_flat` has checked.
+                // in it, as `is_pointer_free` has checked.
                 #[allow(unsafe_code)]
                 unsafe { self.ioctl(vidioc::$request as Request, argument) }
             }
@@ -37,19 +37,19 @@ macro_rules! ioctls {
 }
 
 /// An ioctl argument that contains its whole result: the driver follows no pointer out of it.
-trait Flat {
+trait PointerFree {
     /// Whether the driver follows no pointer in this value.
-    fn is_flat(&self) -> bool {
+    fn is_pointer_free(&self) -> bool {
         true
     }
 }
 
-macro_rules! flat {
-    ($($type:ty),* $(,)?) => { $(impl Flat for $type {})* };
+macro_rules! pointer_free {
+    ($($type:ty),* $(,)?) => { $(impl PointerFree for $type {})* };
 }
 
 // None of these has a pointer in any member of any union.
-flat!(
+pointer_free!(
     i32,
     sys::v4l2_capability,
     sys::v4l2_control,
@@ -62,9 +62,9 @@ flat!(
     sys::v4l2_streamparm,
 );
 
-impl Flat for sys::v4l2_format {
+impl PointerFree for sys::v4l2_format {
     /// An overlay's format points to clips and a bitmap; formats of picture queues are plain numbers.
-    fn is_flat(&self) -> bool {
+    fn is_pointer_free(&self) -> bool {
         let pictures = [
             sys::v4l2_buf_type_V4L2_BUF_TYPE_VIDEO_CAPTURE,
             sys::v4l2_buf_type_V4L2_BUF_TYPE_VIDEO_CAPTURE_MPLANE,
@@ -146,7 +146,7 @@ impl Device {
 }
 
 /// Returns the capabilities of a node itself; `capabilities` has those of all nodes of its device together.
-pub fn own_caps(capability: &sys::v4l2_capability) -> u32 {
+pub fn node_caps(capability: &sys::v4l2_capability) -> u32 {
     match capability.capabilities & sys::V4L2_CAP_DEVICE_CAPS {
         0 => capability.capabilities,
         _ => capability.device_caps,
@@ -169,14 +169,14 @@ pub fn zeroed<T: KernelStruct>() -> T {
 #[allow(unsafe_code)]
 pub unsafe trait KernelStruct {}
 
-macro_rules! plain {
+macro_rules! kernel_structs {
     ($($name:ident),* $(,)?) => {
         // SAFETY: C structures of integers, arrays, unions of those, and pointers.
         $(#[allow(unsafe_code)] unsafe impl KernelStruct for sys::$name {})*
     };
 }
 
-plain!(
+kernel_structs!(
     v4l2_buffer,
     v4l2_capability,
     v4l2_event,

@@ -28,20 +28,20 @@ impl fmt::Display for Holder {
 
 /// Lists the processes that have the device node `path` open, this one included. Other users' processes are missing
 /// without the rights to see them.
-pub fn holders(path: &Path) -> Vec<Holder> {
+pub fn list_holders(path: &Path) -> Vec<Holder> {
     let Ok(device) = fs::metadata(path).map(|node| node.rdev()) else { return Vec::new() };
     let processes = fs::read_dir("/proc").into_iter().flatten().flatten();
     let pids = processes.filter_map(|entry| entry.file_name().to_str()?.parse::<u32>().ok());
-    pids.filter(|pid| has_open(*pid, device)).map(|pid| Holder { pid, name: process_name(pid) }).collect()
+    pids.filter(|pid| has_device_open(*pid, device)).map(|pid| Holder { pid, name: process_name(pid) }).collect()
 }
 
 /// Lists the holders except this program.
-pub fn other_holders(path: &Path) -> Vec<Holder> {
-    holders(path).into_iter().filter(|holder| !holder.is_this_program()).collect()
+pub fn list_other_holders(path: &Path) -> Vec<Holder> {
+    list_holders(path).into_iter().filter(|holder| !holder.is_this_program()).collect()
 }
 
 /// Whether a process has the character device with this number open.
-fn has_open(pid: u32, device: u64) -> bool {
+fn has_device_open(pid: u32, device: u64) -> bool {
     let files = fs::read_dir(format!("/proc/{pid}/fd")).into_iter().flatten().flatten();
     files.into_iter().any(|file| {
         // Read the link first: following it may block on a network mount.
@@ -61,9 +61,9 @@ mod tests {
     #[test]
     fn an_open_device_is_held_by_this_process() {
         let open = fs::File::open("/dev/zero").unwrap();
-        let own = holders(Path::new("/dev/zero")).into_iter().find(Holder::is_this_program);
+        let own = list_holders(Path::new("/dev/zero")).into_iter().find(Holder::is_this_program);
         assert!(own.is_some_and(|own| !own.name.is_empty()));
         drop(open);
-        assert_eq!(holders(Path::new("/dev/no-such-node")), []);
+        assert_eq!(list_holders(Path::new("/dev/no-such-node")), []);
     }
 }

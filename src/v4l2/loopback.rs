@@ -13,10 +13,10 @@ use rustix::fs::{FlockOperation, flock};
 use rustix::io::Errno;
 use v4l::v4l_sys as sys;
 
-pub use self::error::{LoopbackError, modprobe, nodes};
+pub use self::error::{LoopbackError, list_nodes, modprobe_command};
 
 use super::device::{Device, zeroed};
-use super::holders::other_holders;
+use super::holders::list_other_holders;
 
 // A node's reported capabilities depend on its users; its driver name does not.
 pub use super::node::LOOPBACK_DRIVER as DRIVER;
@@ -88,7 +88,7 @@ pub struct Output {
 }
 
 /// Returns how many frames each node buffers, as set when the module was loaded; `None` if it cannot be read.
-pub fn buffers() -> Option<u32> {
+pub fn read_buffer_count() -> Option<u32> {
     let text = fs::read_to_string("/sys/module/v4l2loopback/parameters/max_buffers").ok()?;
     text.trim().parse().ok().filter(|buffers| (1..=MAX_BUFFERS).contains(buffers))
 }
@@ -104,13 +104,13 @@ impl Output {
     /// # Errors
     /// It is not a free node of the module, or its fixed format cannot be written.
     pub fn open(path: &Path, size: (u32, u32), (rate, scale): (u64, u64)) -> Result<Self, LoopbackError> {
-        let device = Device::open(path).map_err(|cause| open_error(path, cause))?;
+        let device = Device::open(path).map_err(|cause| map_open_error(path, cause))?;
         let mut capability: sys::v4l2_capability = zeroed();
         if device.query_capability(&mut capability).is_err() {
-            return Err(LoopbackError::NoVideo { path: path.to_owned() });
+            return Err(LoopbackError::NotVideo { path: path.to_owned() });
         }
-        let card = text(&capability.card);
-        if text(&capability.driver) != DRIVER {
+        let card = decode_text(&capability.card);
+        if decode_text(&capability.driver) != DRIVER {
             return Err(LoopbackError::NotLoopback { path: path.to_owned(), card });
         }
         let has_caps = |any: u32| capability.device_caps & any != 0;
@@ -121,7 +121,7 @@ impl Output {
         // keeps out another instance of this program.
         let locked = flock(&device, FlockOperation::NonBlockingLockExclusive);
         if has_writer || locked.is_err_and(|error| error == Errno::WOULDBLOCK) {
-            return Err(LoopbackError::Taken { path: path.to_owned(), by: other_holders(path) });
+            return Err(LoopbackError::InUse { path: path.to_owned(), by: list_other_holders(path) });
         }
         if !has_caps(sys::V4L2_CAP_VIDEO_CAPTURE | sys::V4L2_CAP_VIDEO_OUTPUT) {
             return Err(LoopbackError::Stuck { path: path.to_owned() });
@@ -140,7 +140,7 @@ impl Output {
             // Up to 0.13, a node that was closed without this call accepts no more frames. From 0.14 on the call needs
             // buffers first (EINVAL), and the first write starts the stream.
             Err(error) if Errno::from_io_error(&error) != Some(Errno::INVAL) => {
-                return Err(operation_error(&device, "the stream cannot be started", error));
+                return Err(map_operation_error(&device, "the stream cannot be started", error));
             }
             _ => {}
         }
@@ -171,15 +171,15 @@ impl Output {
     ///
     /// # Errors
     /// A write failed.
-    pub fn overwrite(&self, frame: &[u8]) -> Result<(), LoopbackError> {
-        (0..buffers().unwrap_or(MAX_BUFFERS)).try_for_each(|_| self.write(frame))
+    pub fn fill_buffers(&self, frame: &[u8]) -> Result<(), LoopbackError> {
+        (0..read_buffer_count().unwrap_or(MAX_BUFFERS)).try_for_each(|_| self.write_frame(frame))
     }
 
     /// Writes one frame of exactly [`Layout::frame_bytes`]. Never waits for readers: a slow reader skips to this frame.
     ///
     /// # Errors
     /// The write failed.
-    pub fn write(&self, frame: &[u8]) -> Result<(), LoopbackError> {
+    pub fn write_frame(&self, frame: &[u8]) -> Result<(), LoopbackError> {
         let failed = |cause| LoopbackError::System {
             path: self.device.path().to_owned(),
             doing: "a frame cannot be written",
@@ -201,7 +201,7 @@ impl Output {
                     let _ = poll(&mut fds, Some(&WRITE_TIMEOUT));
                 }
                 Err(Errno::BUSY) => {
-                    return Err(operation_error(&self.device, "a frame cannot be written", Errno::BUSY.into()));
+                    return Err(map_operation_error(&self.device, "a frame cannot be written", Errno::BUSY.into()));
                 }
                 Err(error) => return Err(failed(error.into())),
             }
@@ -236,7 +236,7 @@ fn set_format(device: &Device, size: (u32, u32)) -> Result<(Layout, (u32, u32)),
         quantization: sys::v4l2_quantization_V4L2_QUANTIZATION_LIM_RANGE,
         xfer_func: sys::v4l2_xfer_func_V4L2_XFER_FUNC_SRGB,
     };
-    let refused = |cause| operation_error(device, "its format cannot be set", cause);
+    let refused = |cause| map_operation_error(device, "its format cannot be set", cause);
     match device.set_format(&mut format) {
         Err(error) if Errno::from_io_error(&error) == Some(Errno::BUSY) => {
             // 0.13 refuses every format except the fixed one. A node that has a writer refuses that one, too.
@@ -257,12 +257,12 @@ fn set_format(device: &Device, size: (u32, u32)) -> Result<(Layout, (u32, u32)),
         .filter(|layout| layout.fits_size(size) && pix.width > 0 && pix.height > 0)
     {
         Some(layout) if layout.frame_bytes(size) == pix.sizeimage as usize => Ok((layout, size)),
-        _ => Err(LoopbackError::Frozen {
+        _ => Err(LoopbackError::FormatFixed {
             path: device.path().to_owned(),
             fourcc: String::from_utf8_lossy(&pix.pixelformat.to_le_bytes()).into_owned(),
             width: pix.width,
             height: pix.height,
-            by: other_holders(device.path()),
+            by: list_other_holders(device.path()),
         }),
     }
 }
@@ -274,31 +274,31 @@ fn keeps_format(device: &Device) -> bool {
 }
 
 /// Maps a failed open to its error.
-fn open_error(path: &Path, cause: io::Error) -> LoopbackError {
+fn map_open_error(path: &Path, cause: io::Error) -> LoopbackError {
     let path = path.to_owned();
     match Errno::from_io_error(&cause) {
         Some(Errno::NOENT | Errno::NOTDIR | Errno::NODEV | Errno::NXIO) => LoopbackError::Missing { path },
         Some(Errno::ACCESS | Errno::PERM) => LoopbackError::Denied { path },
-        Some(Errno::ISDIR) => LoopbackError::NoVideo { path },
+        Some(Errno::ISDIR) => LoopbackError::NotVideo { path },
         // The module's limit of openers is reached.
-        Some(Errno::BUSY) => LoopbackError::Taken { by: other_holders(&path), path },
+        Some(Errno::BUSY) => LoopbackError::InUse { by: list_other_holders(&path), path },
         _ => LoopbackError::System { path, doing: "it cannot be opened", cause },
     }
 }
 
 /// Maps a failed operation (`doing`) to its error: the module has several error codes for a node with another writer.
-fn operation_error(device: &Device, doing: &'static str, cause: io::Error) -> LoopbackError {
+fn map_operation_error(device: &Device, doing: &'static str, cause: io::Error) -> LoopbackError {
     let path = device.path().to_owned();
-    let by = other_holders(&path);
+    let by = list_other_holders(&path);
     match Errno::from_io_error(&cause) {
-        Some(Errno::BUSY) => LoopbackError::Taken { path, by },
-        Some(Errno::INVAL) if !by.is_empty() => LoopbackError::Taken { path, by },
+        Some(Errno::BUSY) => LoopbackError::InUse { path, by },
+        Some(Errno::INVAL) if !by.is_empty() => LoopbackError::InUse { path, by },
         _ => LoopbackError::System { path, doing, cause },
     }
 }
 
 /// Decodes a text up to its first zero byte.
-fn text(bytes: &[u8]) -> String {
+fn decode_text(bytes: &[u8]) -> String {
     let end = bytes.iter().position(|&byte| byte == 0).unwrap_or(bytes.len());
     String::from_utf8_lossy(&bytes[..end]).into_owned()
 }

@@ -1,7 +1,6 @@
 //! Video4Linux support shared by capture, live depth and the virtual camera. The only module that names the crate
 //! `v4l`.
 
-pub mod audience;
 pub mod controls;
 pub mod device;
 pub mod events;
@@ -12,6 +11,7 @@ pub mod loopback;
 pub mod modes;
 pub mod node;
 pub mod queue;
+pub mod reader_monitor;
 
 pub use crate::layout::{FourCc, Layout};
 pub use device::Device;

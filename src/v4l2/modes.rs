@@ -6,8 +6,8 @@ use std::io;
 use serde::Serialize;
 use v4l::v4l_sys as sys;
 
-use super::device::{own_caps, zeroed};
-use super::node::text;
+use super::device::{node_caps, zeroed};
+use super::node::decode_text;
 use super::{Device, FourCc};
 
 /// The two kinds of capture queues. A device has one of them, or both.
@@ -46,7 +46,7 @@ impl QueueKind {
 pub struct FormatModes {
     /// The queue that delivers it.
     pub queue: QueueKind,
-    #[serde(serialize_with = "as_text")]
+    #[serde(serialize_with = "serialize_fourcc")]
     pub fourcc: FourCc,
     /// The driver's name for it.
     pub description: String,
@@ -197,7 +197,7 @@ impl fmt::Display for Sizes {
 
 impl Rates {
     /// Returns the offered interval nearest to `wanted`; `None` if the driver lists none.
-    pub fn nearest(&self, wanted: Interval) -> Option<Interval> {
+    pub fn nearest_interval(&self, wanted: Interval) -> Option<Interval> {
         // Compared by ratio: 1/30 and 333333/10000000 are the same rate.
         let distance = |interval: &Interval| (interval.fps() / wanted.fps()).ln().abs();
         match self {
@@ -217,10 +217,10 @@ const MAX_ENTRIES: u32 = 512;
 ///
 /// # Errors
 /// The device does not answer (it is gone).
-pub fn modes(device: &Device) -> io::Result<Vec<FormatModes>> {
+pub fn list_modes(device: &Device) -> io::Result<Vec<FormatModes>> {
     let mut capability = zeroed::<sys::v4l2_capability>();
     device.query_capability(&mut capability)?;
-    let caps = own_caps(&capability);
+    let caps = node_caps(&capability);
     let mut found = Vec::new();
     for queue in QueueKind::ALL.into_iter().filter(|queue| caps & queue.capability() != 0) {
         for index in 0..MAX_ENTRIES {
@@ -232,9 +232,9 @@ pub fn modes(device: &Device) -> io::Result<Vec<FormatModes>> {
             found.push(FormatModes {
                 queue,
                 fourcc: FourCc::from_u32(format.pixelformat),
-                description: text(&format.description),
+                description: decode_text(&format.description),
                 emulated: format.flags & sys::V4L2_FMT_FLAG_EMULATED != 0,
-                sizes: sizes(device, FourCc::from_u32(format.pixelformat)),
+                sizes: list_sizes(device, FourCc::from_u32(format.pixelformat)),
             });
         }
     }
@@ -242,7 +242,7 @@ pub fn modes(device: &Device) -> io::Result<Vec<FormatModes>> {
 }
 
 /// Lists the sizes of a format, each with its rates.
-fn sizes(device: &Device, fourcc: FourCc) -> Sizes {
+fn list_sizes(device: &Device, fourcc: FourCc) -> Sizes {
     let mut discrete = Vec::new();
     for index in 0..MAX_ENTRIES {
         let mut entry = zeroed::<sys::v4l2_frmsizeenum>();
@@ -250,12 +250,12 @@ fn sizes(device: &Device, fourcc: FourCc) -> Sizes {
         if device.enum_frame_size(&mut entry).is_err() {
             break;
         }
-        match size_entry(&entry) {
+        match parse_size_entry(&entry) {
             Some(SizeEntry::One(size_px)) => {
-                discrete.push(SizeModes { size_px, rates: rates(device, fourcc, size_px) })
+                discrete.push(SizeModes { size_px, rates: list_rates(device, fourcc, size_px) })
             }
             Some(SizeEntry::Range { min_px, max_px, step_px }) => {
-                return Sizes::Range { min_px, max_px, step_px, rates: rates(device, fourcc, max_px) };
+                return Sizes::Range { min_px, max_px, step_px, rates: list_rates(device, fourcc, max_px) };
             }
             None => {}
         }
@@ -270,7 +270,7 @@ enum SizeEntry {
 
 /// Returns the size or range of sizes in an entry of the driver's list; `None` if its type is unknown or its size is
 /// empty.
-fn size_entry(entry: &sys::v4l2_frmsizeenum) -> Option<SizeEntry> {
+fn parse_size_entry(entry: &sys::v4l2_frmsizeenum) -> Option<SizeEntry> {
     // SAFETY: every member of the union consists of integers, for which all bit patterns are valid.
     #[allow(unsafe_code)]
     let (one, range) = unsafe { (entry.__bindgen_anon_1.discrete, entry.__bindgen_anon_1.stepwise) };
@@ -293,7 +293,7 @@ fn size_entry(entry: &sys::v4l2_frmsizeenum) -> Option<SizeEntry> {
 }
 
 /// Lists the rates of a format at a size, as the driver reports them.
-pub fn rates(device: &Device, fourcc: FourCc, size_px: (u32, u32)) -> Rates {
+pub fn list_rates(device: &Device, fourcc: FourCc, size_px: (u32, u32)) -> Rates {
     let mut discrete = Vec::new();
     for index in 0..MAX_ENTRIES {
         let mut entry = zeroed::<sys::v4l2_frmivalenum>();
@@ -319,7 +319,7 @@ pub fn rates(device: &Device, fourcc: FourCc, size_px: (u32, u32)) -> Rates {
 }
 
 /// Serializes the code as its text.
-fn as_text<S: serde::Serializer>(fourcc: &FourCc, serializer: S) -> Result<S::Ok, S::Error> {
+fn serialize_fourcc<S: serde::Serializer>(fourcc: &FourCc, serializer: S) -> Result<S::Ok, S::Error> {
     serializer.collect_str(fourcc)
 }
 

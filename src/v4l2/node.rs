@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 use v4l::v4l_sys as sys;
 
-use super::device::{Device, own_caps, zeroed};
+use super::device::{Device, node_caps, zeroed};
 
 /// A V4L2 node, as it was when it was listed.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -69,17 +69,18 @@ pub struct Usb {
 #[derive(Debug, thiserror::Error, PartialEq, Eq)]
 pub enum NodeError {
     /// No device has this name.
-    #[error("there is no camera '{name}'{}", listed(.there, ": there is ", "; no camera is connected (`bokehcam doctor` tells more)"))]
-    None { name: String, there: Vec<String> },
+    #[error("there is no camera '{name}'{}", join_or(.available, ": there is ", "; no camera is connected (`bokehcam \
+                                                                                 doctor` says more)"))]
+    NotFound { name: String, available: Vec<String> },
     /// Several devices have this name.
-    #[error("'{name}' is the name of {}; use the path of one", listed(.candidates, "", "several"))]
+    #[error("'{name}' matches {}; use the path of one", join_or(.candidates, "", "several"))]
     Ambiguous { name: String, candidates: Vec<String> },
     /// The path does not lead to a device.
-    #[error("{}: this is no device node", .0.display())]
+    #[error("{}: this is not a device node", .0.display())]
     NotADevice(PathBuf),
 }
 
-fn listed(items: &[String], before: &str, none: &str) -> String {
+fn join_or(items: &[String], before: &str, none: &str) -> String {
     if items.is_empty() { none.to_owned() } else { before.to_owned() + &items.join(", ") }
 }
 
@@ -90,8 +91,8 @@ impl fmt::Display for Node {
 }
 
 /// Lists all nodes by number, also those that cannot be opened, with their [problem](Node::problem).
-pub fn nodes() -> Vec<Node> {
-    SystemPaths::default().nodes()
+pub fn list_nodes() -> Vec<Node> {
+    SystemPaths::default().list_nodes()
 }
 
 /// Resolves `name` to a node: its path, its number, the name of one of its links, or a substring of its card's name
@@ -99,8 +100,8 @@ pub fn nodes() -> Vec<Node> {
 ///
 /// # Errors
 /// No node matches, or several do.
-pub fn resolve(name: &str) -> Result<PathBuf, NodeError> {
-    SystemPaths::default().resolve(name)
+pub fn resolve_node(name: &str) -> Result<PathBuf, NodeError> {
+    SystemPaths::default().resolve_node(name)
 }
 
 /// The system folders with the nodes.
@@ -117,27 +118,27 @@ impl Default for SystemPaths {
 }
 
 impl SystemPaths {
-    /// See [`nodes`].
-    fn nodes(&self) -> Vec<Node> {
+    /// See [`list_nodes`].
+    fn list_nodes(&self) -> Vec<Node> {
         // Reads both folders: a container may lack either.
         let mut names: Vec<(u32, String)> = [&self.class, &self.dev]
             .into_iter()
-            .flat_map(|folder| names_in(folder))
-            .filter_map(|name| Some((number(&name)?, name)))
+            .flat_map(|folder| list_names(folder))
+            .filter_map(|name| Some((parse_node_number(&name)?, name)))
             .collect();
         names.sort();
         names.dedup();
         let links: Vec<(PathBuf, PathBuf)> = ["by-id", "by-path"]
             .iter()
             .map(|kind| self.dev.join("v4l").join(kind))
-            .flat_map(|folder| names_in(&folder).into_iter().map(move |name| folder.join(name)))
+            .flat_map(|folder| list_names(&folder).into_iter().map(move |name| folder.join(name)))
             .filter_map(|link| Some((fs::canonicalize(&link).ok()?, link)))
             .collect();
-        names.iter().filter_map(|(index, name)| self.node(*index, name, &links)).collect()
+        names.iter().filter_map(|(index, name)| self.read_node(*index, name, &links)).collect()
     }
 
     /// Describes the node `name`; `None` if its device has meanwhile gone. `links` are pairs of a target and its link.
-    fn node(&self, index: u32, name: &str, links: &[(PathBuf, PathBuf)]) -> Option<Node> {
+    fn read_node(&self, index: u32, name: &str, links: &[(PathBuf, PathBuf)]) -> Option<Node> {
         let (path, class) = (self.dev.join(name), self.class.join(name));
         let read = |file: &str| fs::read_to_string(class.join(file)).unwrap_or_default().trim().to_owned();
         let mut node = Node {
@@ -149,7 +150,7 @@ impl SystemPaths {
             captures: false,
             outputs: false,
             links: links.iter().filter(|(target, _)| *target == path).map(|(_, link)| link.clone()).collect(),
-            usb: usb(&class),
+            usb: read_usb(&class),
             denied: false,
             problem: None,
             path,
@@ -157,7 +158,7 @@ impl SystemPaths {
         let mut capability: sys::v4l2_capability = zeroed();
         // The driver knows more than sysfs, but the node may be unreadable.
         match Device::open(&node.path).and_then(|device| device.query_capability(&mut capability)) {
-            Ok(()) => node.describe(&capability),
+            Ok(()) => node.apply_capability(&capability),
             Err(error) if is_unplugged(&error) => return None,
             Err(error) if error.kind() == io::ErrorKind::NotFound => {
                 node.problem =
@@ -171,8 +172,8 @@ impl SystemPaths {
         Some(node)
     }
 
-    /// See [`resolve`].
-    fn resolve(&self, name: &str) -> Result<PathBuf, NodeError> {
+    /// See [`resolve_node`].
+    fn resolve_node(&self, name: &str) -> Result<PathBuf, NodeError> {
         if name.contains('/') {
             let path = PathBuf::from(name);
             return match fs::metadata(&path) {
@@ -180,7 +181,7 @@ impl SystemPaths {
                 Ok(_) => Err(NodeError::NotADevice(path)),
                 // Accepted: opening it will show why it cannot be examined.
                 Err(error) if error.kind() != io::ErrorKind::NotFound => Ok(path),
-                Err(_) => Err(not_found(name, &self.nodes())),
+                Err(_) => Err(not_found_error(name, &self.list_nodes())),
             };
         }
         let number = name.parse::<u32>().ok().map(|number| self.dev.join(format!("video{number}")));
@@ -188,18 +189,18 @@ impl SystemPaths {
         let exact = number.into_iter().chain(linked).chain([self.dev.join(name)]);
         match exact.filter(|path| !name.is_empty() && path.exists()).find(|path| !path.is_dir()) {
             Some(path) => Ok(path),
-            None => find_by_card(name, &self.nodes()).map(|node| node.path.clone()),
+            None => find_by_card(name, &self.list_nodes()).map(|node| node.path.clone()),
         }
     }
 }
 
 impl Node {
     /// Fills in what the driver reports about the node.
-    fn describe(&mut self, capability: &sys::v4l2_capability) {
-        self.card = text(&capability.card);
-        self.driver = text(&capability.driver);
-        self.bus = text(&capability.bus_info);
-        let caps = own_caps(capability);
+    fn apply_capability(&mut self, capability: &sys::v4l2_capability) {
+        self.card = decode_text(&capability.card);
+        self.driver = decode_text(&capability.driver);
+        self.bus = decode_text(&capability.bus_info);
+        let caps = node_caps(capability);
         let has_caps = |any: u32| caps & any != 0;
         let has_frames = has_caps(sys::V4L2_CAP_VIDEO_CAPTURE | sys::V4L2_CAP_VIDEO_CAPTURE_MPLANE);
         self.captures = has_frames && has_caps(sys::V4L2_CAP_STREAMING);
@@ -227,7 +228,7 @@ pub const LOOPBACK_DRIVER: &str = "v4l2 loopback";
 
 /// Decodes a text field of a kernel structure, up to its first zero byte and trimmed. Invalid UTF-8 becomes replacement
 /// characters.
-pub fn text(field: &[u8]) -> String {
+pub fn decode_text(field: &[u8]) -> String {
     let end = field.iter().position(|byte| *byte == 0).unwrap_or(field.len());
     String::from_utf8_lossy(&field[..end]).trim().to_owned()
 }
@@ -242,23 +243,23 @@ fn find_by_card<'a>(name: &str, nodes: &'a [Node]) -> Result<&'a Node, NodeError
     };
     let candidates = [Kind::Capture, Kind::Virtual].into_iter().map(named).find(|found| !found.is_empty());
     match candidates.as_deref().filter(|_| !name.is_empty()) {
-        None => Err(not_found(name, nodes)),
+        None => Err(not_found_error(name, nodes)),
         Some([only]) => Ok(only),
         Some(several) => {
-            let candidates = several.iter().map(|node| node.with_link()).collect();
+            let candidates = several.iter().map(|node| node.describe_with_link()).collect();
             Err(NodeError::Ambiguous { name: name.to_owned(), candidates })
         }
     }
 }
 
-fn not_found(name: &str, nodes: &[Node]) -> NodeError {
-    let there = nodes.iter().filter(|node| node.captures).map(ToString::to_string).collect();
-    NodeError::None { name: name.to_owned(), there }
+fn not_found_error(name: &str, nodes: &[Node]) -> NodeError {
+    let available = nodes.iter().filter(|node| node.captures).map(ToString::to_string).collect();
+    NodeError::NotFound { name: name.to_owned(), available }
 }
 
 impl Node {
     /// Formats the node with its first link, which distinguishes devices of the same name.
-    fn with_link(&self) -> String {
+    fn describe_with_link(&self) -> String {
         let mut line = self.to_string();
         if let Some(link) = self.links.first() {
             let _ = write!(line, " = {}", link.display());
@@ -274,26 +275,26 @@ fn is_unplugged(error: &io::Error) -> bool {
     matches!(error.raw_os_error(), Some(ENXIO | ENODEV))
 }
 
-fn names_in(folder: &Path) -> Vec<String> {
+fn list_names(folder: &Path) -> Vec<String> {
     let entries = fs::read_dir(folder).into_iter().flatten().flatten();
     let mut names: Vec<String> = entries.filter_map(|entry| entry.file_name().into_string().ok()).collect();
     names.sort();
     names
 }
 
-fn number(name: &str) -> Option<u32> {
+fn parse_node_number(name: &str) -> Option<u32> {
     name.strip_prefix("video")?.parse().ok()
 }
 
 /// Returns the USB connection of the camera behind a node, if it has one.
 pub fn usb_connection(node: &Path) -> Option<Usb> {
     let node = fs::canonicalize(node).ok()?;
-    usb(&SystemPaths::default().class.join(node.file_name()?))
+    read_usb(&SystemPaths::default().class.join(node.file_name()?))
 }
 
 /// Reads the USB device of the node whose folder in sysfs is `class`: `device` there links to a USB interface, whose
 /// parent folder is that of the USB device.
-fn usb(class: &Path) -> Option<Usb> {
+fn read_usb(class: &Path) -> Option<Usb> {
     let interface = fs::canonicalize(class.join("device")).ok()?;
     let read = |file: &str| Some(fs::read_to_string(interface.parent()?.join(file)).ok()?.trim().to_owned());
     let id = format!("{}:{}", read("idVendor")?, read("idProduct")?);

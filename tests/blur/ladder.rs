@@ -8,7 +8,7 @@ use bokehcam::bokeh::plan::Plan;
 use bokehcam::bokeh::{Method, Rank, Settings};
 use bokehcam::budget::Quality;
 use bokehcam::capture::synthetic::Format;
-use bokehcam::capture::{Camera, Captured, Shot};
+use bokehcam::capture::{Camera, Captured, FrameBuffers};
 use bokehcam::depth::focus::{Focus, FocusRule};
 use bokehcam::depth::refine::Refiner;
 use bokehcam::frame::{ColorImage, DepthMap, GrayImage};
@@ -92,7 +92,7 @@ fn one_level_takes_no_memory_for_others() {
         let all = Plan::new(&Settings { adaptive: true, ..settings(effect) }, SIZE.0, SIZE.1);
         assert_eq!((one.ladder.iter().count(), one.ladder.banks.len()), (1, 1));
         assert_eq!(all.ladder.iter().count(), Quality::ALL.len());
-        assert!(one.slots() <= all.slots() && all.ladder.banks.len() <= 4, "levels share filters");
+        assert!(one.slot_count() <= all.slot_count() && all.ladder.banks.len() <= 4, "levels share filters");
     }
 }
 
@@ -114,7 +114,7 @@ fn scenes() -> [(&'static str, Frames); 2] {
     let synthetic = (0..FRAMES).map(|_| {
         let (mut color, mut map) = (ColorImage::default(), DepthMap::default());
         let captured = camera
-            .next(Shot { color: &mut color, depth: &mut map, right: &mut GrayImage::default() })
+            .next(FrameBuffers { color: &mut color, depth: &mut map, right: &mut GrayImage::default() })
             .expect("a frame");
         let Captured::Frame(stamp) = captured else { panic!("{captured:?}") };
         (color, map, stamp.time_ns)

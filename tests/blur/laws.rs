@@ -47,7 +47,7 @@ fn a_constant_picture_stays_constant() {
 
 /// Convolves directly in two dimensions with the bank's own kernel, borders repeated.
 fn convolve(image: &ColorImage, plan: &Plan, radius_px: f32) -> Vec<f32> {
-    let node = plan.bank.node(radius_px);
+    let node = plan.bank.nearest_node(radius_px);
     let (kernel, reach) = (plan.bank.kernel(node, false), plan.bank.node_half_width[node] as i64);
     let (width, height) = (i64::from(image.width), i64::from(image.height));
     let mut out = Vec::new();

@@ -228,7 +228,7 @@ mod on_the_gpu {
         let device = crate::on_gpu::device();
         move |settings, (width, height)| {
             let plan = Plan::new(settings, width, height);
-            Box::new(GpuBokeh::on(&plan, Arc::clone(&device)).expect("such a picture fits"))
+            Box::new(GpuBokeh::with_device(&plan, Arc::clone(&device)).expect("such a picture fits"))
         }
     }
 

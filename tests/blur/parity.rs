@@ -47,7 +47,7 @@ fn same_but(light_in: f32, settings: &Settings, image: &ColorImage, map: &DepthM
     let mut plan = Plan::new(settings, image.width, image.height);
     let mut cpu = CpuBokeh::new(plan.clone(), Some(2));
     let mut gpu = gpu(&plan);
-    plan.split(Some(map), field);
+    plan.split_by_depth(Some(map), field);
     let mut expected = ColorImage::default();
     cpu.blur(image, Some(map), field, &mut expected).expect("the CPU blurs");
     gpu.submit(job(3, image, map, field)).expect("the GPU takes a frame");
@@ -196,7 +196,7 @@ fn mixed_pixels_agree() {
     });
     let field = coc(CocKind::Depth, 71);
     let CocField::Depth(lens) = field else { panic!("asked for depth") };
-    Matting::default().find(&mut map, &image, lens.inverse_depth_of_px(matting::FROM_PX));
+    Matting::default().find_mixed_pixels(&mut map, &image, lens.inverse_depth_step(matting::MIN_STEP_PX));
     assert!(map.matte.pixels.len() > 100, "{} mixed pixels", map.matte.pixels.len());
     // The hidden background is known behind some of the in-focus pixels.
     let of_others: Vec<u32> = (0..width * height).filter(|at| at % 5 < 2 && map.metres[*at as usize] == 1.0).collect();

@@ -46,8 +46,8 @@ fn every_file_is_a_pass_or_shared_and_short() {
         let shared = "base cells common filter list meet mixed next node pyramid radii range show silhouette surfaces tent tiles todo work \
              yuyv stereo_common stereo_line \
              stereo_path stereo_root stereo_row stereo_touch refine_common refine_ends refine_lanes refine_select \
-             refine_window matte_common matte_behind matte_claim matte_compare matte_contrast matte_enter matte_light \
-             matte_prior matte_sum matte_surfaces matte_turn matte_weights";
+             refine_window matte_common matte_background matte_claim matte_compare matte_contrast matte_enter matte_light \
+             matte_prior matte_sum matte_surfaces matte_run matte_weights";
         let known = shared.split(' ').any(|file| file == name)
             || [&ALL[..], &stereo::ALL, &refine::ALL, &matte::ALL, &[stereo::RECTIFY]]
                 .concat()
@@ -75,7 +75,7 @@ fn structs_have_the_same_layout_in_rust_and_wgsl() {
             compositing,
             bins,
             near_bins,
-            reach,
+            half_width,
             nodes,
             groups,
             max_px,
@@ -84,9 +84,9 @@ fn structs_have_the_same_layout_in_rust_and_wgsl() {
             expansion,
             steps_per_px,
             mixed,
-            even,
+            symmetric,
             extent,
-            rows_apart,
+            term_stride,
             yuyv,
             front_px
         }),
@@ -107,23 +107,23 @@ fn structs_have_the_same_layout_in_rust_and_wgsl() {
             edges_at,
             cells_at,
             binned_at,
-            reach,
+            half_width,
             filtered_at,
             active_at,
-            has_lobes
+            has_overshoot
         }),
-        layout!(Work { first, count, group, terms, last, nearest_px, unhidden }),
+        layout!(Work { first, count, group, terms, last, nearest_px, visible_weight }),
     ];
     have_layouts(&ALL, expected);
     {
         use refine::{Frame, Wave};
-        let frame = layout!(Frame { size, map_size, focus_m, times, longest, empty, fresh });
+        let frame = layout!(Frame { size, map_size, focus_m, rescale, max_hole_px, is_empty, is_fresh });
         have_layouts(&refine::ALL, [frame, layout!(Wave { first, at, marks })]);
     }
     {
-        use matte::{Frame, Turn};
-        let frame = layout!(Frame { size, most, known, jump, other });
-        have_layouts(&matte::ALL, [frame, layout!(Turn { at })]);
+        use matte::{Frame, PassRun};
+        let frame = layout!(Frame { size, max_entries, min_rounds, depth_step, surface_step });
+        have_layouts(&matte::ALL, [frame, layout!(PassRun { index })]);
     }
     let matte = matte::ALL.map(|shader| parse(shader.source));
     for (name, size) in [("Entry", matte::ENTRY), ("Cell", matte::CELL), ("Color", matte::COLORS / 2)] {

@@ -41,7 +41,7 @@ fn a_frame_on_the_device_need_not_go_up() {
     let (width, height) = (97, 71);
     let plan = Plan::new(&settings(CocKind::Depth), width, height);
     let (own, other) = (device(), device());
-    let mut gpu = GpuBokeh::on(&plan, Arc::clone(&own)).expect("room for the picture");
+    let mut gpu = GpuBokeh::with_device(&plan, Arc::clone(&own)).expect("room for the picture");
     let given = (color(width, height, |x, y| [x as u8, 200, y as u8]), three_depths(width, height));
     let mut there = (noise(width, height), three_depths(width, height));
     there.1.metres.reverse();
@@ -76,8 +76,8 @@ fn a_refined_frame_is_given_once() {
     let device = device();
     let (width, height) = (97, 71);
     let plan = Plan::new(&settings(CocKind::Depth), width, height);
-    let mut gpu = GpuBokeh::on(&plan, Arc::clone(&device)).expect("room for the picture");
-    let mut refiner = Refiner::new().on(Some(&device));
+    let mut gpu = GpuBokeh::with_device(&plan, Arc::clone(&device)).expect("room for the picture");
+    let mut refiner = Refiner::new().with_device(Some(&device));
     assert!(refiner.take_copy().is_none());
     // More frames than there are copies: every copy returns to the pool.
     for frame in 0..9 {

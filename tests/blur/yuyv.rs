@@ -8,7 +8,7 @@ use bokehcam::bokeh::cpu::CpuBokeh;
 use bokehcam::bokeh::gpu::GpuBokeh;
 use bokehcam::bokeh::plan::Plan;
 use bokehcam::bokeh::{Bokeh, Job};
-use bokehcam::compute::Place;
+use bokehcam::compute::PictureLocation;
 use bokehcam::frame::YuyvImage;
 use bokehcam::link::pool::Pooled;
 use bokehcam::optics::CocKind;
@@ -36,25 +36,27 @@ fn yuyv_is_the_picture_encoded() {
             bokeh.submit(job).expect("room for a frame");
             bokeh.collect(true).expect("a frame").expect("one is in flight").picture
         };
-        let expected = made(&mut gpu, job(Place::Memory, false)).memory().expect("in memory").clone();
+        let expected = made(&mut gpu, job(PictureLocation::Memory, false)).memory().expect("in memory").clone();
         let mut bytes = vec![0; 2 * (width * height) as usize];
         if is_even {
             yuyv::Encoder::new().encode(&expected, &mut bytes);
         }
         // Twice, with other pictures in between.
         for _ in 0..2 {
-            let mut picture = made(&mut gpu, job(Place::Memory, true));
+            let mut picture = made(&mut gpu, job(PictureLocation::Memory, true));
             assert_eq!(picture.yuyv_mut().is_some(), is_even);
             assert_eq!((picture.size(), picture.memory().is_some()), ((width, height), !is_even));
             if let Some(yuyv) = picture.yuyv_mut() {
                 assert_eq!(yuyv.size(), (width, height));
                 assert!(yuyv.bytes == bytes, "{width} x {height}");
             }
-            for picture in [made(&mut gpu, job(Place::Both, true)), made(&mut gpu, job(Place::Memory, false))] {
+            for picture in
+                [made(&mut gpu, job(PictureLocation::Both, true)), made(&mut gpu, job(PictureLocation::Memory, false))]
+            {
                 assert!(picture.memory() == Some(&expected), "{width} x {height}");
             }
         }
-        let mut picture = made(&mut cpu, job(Place::Memory, true));
+        let mut picture = made(&mut cpu, job(PictureLocation::Memory, true));
         assert!(picture.memory().is_some() && picture.yuyv_mut().is_none(), "the CPU makes pictures");
     }
 }

@@ -7,8 +7,8 @@ use std::sync::{Arc, Mutex};
 use std::thread::sleep;
 use std::time::Duration;
 
-use bokehcam::bokeh::{Bokeh, BokehError, Finished, Job, PassTimes, Picture};
-use bokehcam::capture::{Brings, Camera, CaptureError, Captured, Shot, SourceInfo};
+use bokehcam::bokeh::{BlurredFrame, Bokeh, BokehError, Job, PassTimes, Picture};
+use bokehcam::capture::{Camera, CaptureError, Captured, FrameBuffers, FrameData, SourceInfo};
 use bokehcam::compute::Backend;
 use bokehcam::compute::GpuError;
 use bokehcam::depth::{DepthError, DepthSource, FrameInput};
@@ -55,13 +55,13 @@ pub struct FakeCamera {
     pub next: usize,
     pub corrupt_every: usize,
     pub unpaired_every: usize,
-    pub brings: Brings,
+    pub frame_data: FrameData,
     pub trouble: Trouble,
 }
 
 pub fn fake_camera(frames: usize) -> FakeCamera {
     let trouble = Trouble::default();
-    FakeCamera { frames, next: 0, corrupt_every: NEVER, unpaired_every: NEVER, brings: Brings::Color, trouble }
+    FakeCamera { frames, next: 0, corrupt_every: NEVER, unpaired_every: NEVER, frame_data: FrameData::Color, trouble }
 }
 
 fn size_error() -> CaptureError {
@@ -76,11 +76,11 @@ impl Camera for FakeCamera {
             period_ns: PERIOD_NS,
             frames: Some(self.frames as u64),
             live: false,
-            brings: self.brings,
+            frame_data: self.frame_data,
         }
     }
 
-    fn next(&mut self, shot: Shot) -> Result<Captured, CaptureError> {
+    fn next(&mut self, shot: FrameBuffers) -> Result<Captured, CaptureError> {
         if self.next >= self.frames {
             return Ok(Captured::End);
         }
@@ -95,22 +95,22 @@ impl Camera for FakeCamera {
         if index % self.unpaired_every == self.unpaired_every - 1 {
             return Ok(Captured::Lost(1, Cause::Unpaired));
         }
-        let Shot { color, depth, right } = shot;
+        let FrameBuffers { color, depth, right } = shot;
         color.resize(SIZE.0, SIZE.1);
         color.rgb.fill(index as u8);
         color.rgb.last_chunk_mut::<2>().unwrap().copy_from_slice(&(index as u16).to_le_bytes());
-        if self.brings == Brings::Depth {
+        if self.frame_data == FrameData::Depth {
             depth.resize(SIZE.0, SIZE.1);
             depth.metres.fill(1.0 + index as f32);
         }
-        if self.brings == Brings::RightCamera {
+        if self.frame_data == FrameData::RightCamera {
             right.resize(SIZE.0, SIZE.1);
             right.luma.fill(index as u8);
         }
         Ok(Captured::Frame(Stamp { index, time_ns: index as u64 * PERIOD_NS, captured_ns: None }))
     }
 
-    fn skip(&mut self, until_ns: u64) -> u64 {
+    fn skip_until(&mut self, until_ns: u64) -> u64 {
         let from = self.next;
         self.next = (until_ns.div_ceil(PERIOD_NS) as usize).clamp(from, self.frames);
         (self.next - from) as u64
@@ -119,11 +119,11 @@ impl Camera for FakeCamera {
 
 struct CameraBy<F>(SourceInfo, usize, F);
 
-impl<F: FnMut(usize, Shot) -> Captured + Send> Camera for CameraBy<F> {
+impl<F: FnMut(usize, FrameBuffers) -> Captured + Send> Camera for CameraBy<F> {
     fn info(&self) -> SourceInfo {
         self.0.clone()
     }
-    fn next(&mut self, shot: Shot) -> Result<Captured, CaptureError> {
+    fn next(&mut self, shot: FrameBuffers) -> Result<Captured, CaptureError> {
         let asked = self.1;
         self.1 += 1;
         Ok((self.2)(asked, shot))
@@ -131,7 +131,10 @@ impl<F: FnMut(usize, Shot) -> Captured + Send> Camera for CameraBy<F> {
 }
 
 /// Creates a camera whose results come from `next`, given the number of earlier calls.
-pub fn camera_by(info: SourceInfo, next: impl FnMut(usize, Shot) -> Captured + Send + 'static) -> Box<dyn Camera> {
+pub fn camera_by(
+    info: SourceInfo,
+    next: impl FnMut(usize, FrameBuffers) -> Captured + Send + 'static,
+) -> Box<dyn Camera> {
     Box::new(CameraBy(info, 0, next))
 }
 
@@ -178,7 +181,7 @@ pub struct FakeBokeh {
     /// Called with each frame as it is submitted.
     pub looks: Box<dyn FnMut(&Job) + Send>,
     /// Makes the result from a frame.
-    pub makes: Box<dyn FnMut(Job) -> Finished + Send>,
+    pub makes: Box<dyn FnMut(Job) -> BlurredFrame + Send>,
 }
 
 /// Adds 100 to the first bytes of a picture, and sets the first one to the focus distance where there is one.
@@ -198,7 +201,7 @@ pub fn fake_bokeh(capacity: usize, trouble: Trouble) -> FakeBokeh {
     }
 }
 
-fn brightened(job: Job) -> Finished {
+fn brightened(job: Job) -> BlurredFrame {
     let mut times = PassTimes::new();
     times.add("rows", Duration::from_micros(400));
     times.add("columns", Duration::from_micros(300));
@@ -213,12 +216,12 @@ fn brightened(job: Job) -> Finished {
 }
 
 /// Returns the frame itself, with the changes that `change` makes.
-pub fn changed(mut job: Job, times: PassTimes, change: impl FnOnce(&mut Job)) -> Finished {
+pub fn changed(mut job: Job, times: PassTimes, change: impl FnOnce(&mut Job)) -> BlurredFrame {
     job.out.resize(job.color.width, job.color.height);
     job.out.rgb.copy_from_slice(&job.color.rgb);
     change(&mut job);
     let Job { ticket, out, color, depth, .. } = job;
-    Finished { ticket, picture: Picture::in_memory(out), color, depth, times }
+    BlurredFrame { ticket, picture: Picture::from_memory(out), color, depth, times }
 }
 
 impl Bokeh for FakeBokeh {
@@ -234,7 +237,7 @@ impl Bokeh for FakeBokeh {
         Ok(())
     }
 
-    fn collect(&mut self, wait: bool) -> Result<Option<Finished>, BokehError> {
+    fn collect(&mut self, wait: bool) -> Result<Option<BlurredFrame>, BokehError> {
         if self.collect_fails && self.trouble.fails_at.is_some_and(|frame| self.submitted > frame) {
             return Err(GpuError::Failed("lost".into()).into());
         }
@@ -244,7 +247,7 @@ impl Bokeh for FakeBokeh {
         Ok(self.held.pop_front().map(&mut self.makes))
     }
 
-    fn take_back(&mut self) -> Option<Job> {
+    fn reclaim_job(&mut self) -> Option<Job> {
         if self.gives_back { self.held.pop_front() } else { None }
     }
     fn in_flight(&self) -> usize {

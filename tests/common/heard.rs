@@ -69,7 +69,7 @@ impl Heard {
             budget_ns: None,
             threads: 1,
             folders: Folders::at(folder.to_owned()),
-            wanted: Arc::default(),
+            output_request: Arc::default(),
             demand: demand.clone(),
             off: Arc::default(),
             release: Arc::default(),

@@ -8,9 +8,9 @@ use std::sync::LazyLock;
 
 use bokehcam::color::srgb_to_linear;
 use bokehcam::compute::thread_pool::ThreadPool;
-use bokehcam::depth::background::Background;
+use bokehcam::depth::background::BackgroundMemory;
 use bokehcam::depth::focus::FocusRule;
-use bokehcam::engine::{CocMaker, Postprocess};
+use bokehcam::engine::{CocCalculator, Postprocess};
 use bokehcam::frame::{ColorImage, DepthMap};
 use bokehcam::look::{CocAtInfinity, CocRule};
 use bokehcam::optics::DepthCoc;
@@ -76,13 +76,13 @@ impl Shot {
 const BEFORE: Shot = Shot { person: 40, shift: 0, brightness: 1.0, thing: None };
 
 struct Seer {
-    background: Background,
+    background: BackgroundMemory,
     time_ns: u64,
 }
 
 impl Seer {
     fn new() -> Self {
-        Self { background: Background::default(), time_ns: 0 }
+        Self { background: BackgroundMemory::default(), time_ns: 0 }
     }
 
     /// Passes a shot for some frames; returns the last map, with the known background.
@@ -91,10 +91,10 @@ impl Seer {
         let mut last = map.clone();
         for _ in 0..frames {
             let mut workers = ThreadPool::new("background", 2);
-            self.background.cover(&mut workers, (&map, &picture), &LENS);
-            self.background.learn(&mut workers, (&map, &picture), &LENS, self.time_ns);
+            self.background.update_covering(&mut workers, (&map, &picture), &LENS);
+            self.background.update(&mut workers, (&map, &picture), &LENS, self.time_ns);
             last.clone_from(&map);
-            self.background.reveal(&mut workers, &mut last, &picture, &LENS);
+            self.background.reveal_background(&mut workers, &mut last, &picture, &LENS);
             self.time_ns += PERIOD_NS;
         }
         last
@@ -209,12 +209,12 @@ fn another_place_or_size_is_begun_anew() {
     assert!(seer.see(&after, 2).matte.pixels.is_empty());
     let (picture, mut map) = (noise(32, 24), depth(32, 24, |_, _| 1.0));
     let mut workers = ThreadPool::new("background", 2);
-    seer.background.learn(&mut workers, (&map, &picture), &LENS, seer.time_ns);
-    seer.background.reveal(&mut workers, &mut map, &picture, &LENS);
+    seer.background.update(&mut workers, (&map, &picture), &LENS, seer.time_ns);
+    seer.background.reveal_background(&mut workers, &mut map, &picture, &LENS);
     assert!(map.matte.pixels.is_empty());
     let small = depth(16, 12, |_, _| 1.0);
-    seer.background.learn(&mut workers, (&small, &picture), &LENS, seer.time_ns);
-    seer.background.reveal(&mut workers, &mut map, &picture, &LENS);
+    seer.background.update(&mut workers, (&small, &picture), &LENS, seer.time_ns);
+    seer.background.reveal_background(&mut workers, &mut map, &picture, &LENS);
     assert!(map.matte.pixels.is_empty(), "a map of another size");
 }
 
@@ -224,14 +224,14 @@ fn of_smooth_depth_nothing_is_remembered() {
     let (focus, lens) = (FocusRule::Metres(1.0), CocAtInfinity::Px(10.0));
     let rule = CocRule::Depth { focus, lens, range_m: 0.0, max_coc_px: 20.0 };
     for is_smooth in [false, true] {
-        let mut coc = CocMaker::new(rule, Postprocess::Keep);
-        coc.remember(true);
+        let mut coc = CocCalculator::new(rule, Postprocess::Keep);
+        coc.set_background_memory(true);
         let mut hidden = 0;
         for frame in 0..44 {
             let person = if frame < 40 { BEFORE.person } else { BEFORE.person + STEP };
             let (picture, mut map) = Shot { person, ..BEFORE }.taken();
             map.is_smooth = is_smooth;
-            coc.make(&mut map, &picture, frame * PERIOD_NS);
+            coc.compute(&mut map, &picture, frame * PERIOD_NS);
             hidden = map.matte.pixels.iter().filter(|pixel| pixel.alpha == 1.0).count();
         }
         assert_eq!(hidden > 0, !is_smooth, "{hidden} pixels hide something");

@@ -6,7 +6,7 @@ mod geometry;
 mod pictures;
 mod real;
 
-use bokehcam::calibration::{Distortion, Eye, StereoCalibration};
+use bokehcam::calibration::{CameraIntrinsics, Distortion, StereoCalibration};
 use glam::{DMat3, DQuat, DVec2, DVec3};
 
 const SIZE: (u32, u32) = (640, 480);
@@ -17,7 +17,7 @@ const NONE: Distortion = Distortion::RadialTangential([0.0; 8]);
 /// Creates cameras 11 cm apart with slightly different focal lengths, the right one turned by `turn_deg` about x, y and
 /// z.
 fn rig(distortion: Distortion, focal_px: f64, turn_deg: [f64; 3]) -> StereoCalibration {
-    let eye = |dx: f64, scale: f64| Eye {
+    let eye = |dx: f64, scale: f64| CameraIntrinsics {
         size: Some(SIZE),
         focal_px: DVec2::new(focal_px, focal_px * 0.997) * scale,
         center_px: DVec2::new(322.0 + dx, 236.5 - dx / 2.0),
@@ -25,10 +25,10 @@ fn rig(distortion: Distortion, focal_px: f64, turn_deg: [f64; 3]) -> StereoCalib
     };
     let turn = DVec3::from_array(turn_deg.map(f64::to_radians));
     StereoCalibration {
-        eyes: [eye(0.0, 1.0), eye(5.0, 1.004)],
+        cameras: [eye(0.0, 1.0), eye(5.0, 1.004)],
         rotation: DMat3::from_quat(DQuat::from_scaled_axis(turn)),
         translation_m: DVec3::new(-0.11, 0.004, -0.006),
-        given: None,
+        stored_rectification: None,
         assumed_mm: false,
     }
 }

@@ -187,7 +187,7 @@ fn unequal_and_unexpected_sizes_are_named() {
 
 fn luma(path: &Path) -> GrayImage {
     let mut gray = GrayImage::default();
-    gray.set_luma_of(&read_color(path).expect("a picture"));
+    gray.set_luma_from(&read_color(path).expect("a picture"));
     gray
 }
 

@@ -16,9 +16,9 @@ use bokehcam::bokeh::cpu::CpuBokeh;
 use bokehcam::bokeh::plan::Plan;
 use bokehcam::compute::Device;
 use bokehcam::compute::thread_pool::ThreadPool;
-use bokehcam::depth::background::Background;
+use bokehcam::depth::background::BackgroundMemory;
 use bokehcam::depth::matting::gpu::GpuMatting;
-use bokehcam::depth::matting::{Behind, FROM_PX, Matting};
+use bokehcam::depth::matting::{KnownBackground, MIN_STEP_PX, Matting};
 use bokehcam::depth::refine::Refiner;
 use bokehcam::frame::{ColorImage, DepthMap, Matte, MixedPixel};
 use bokehcam::optics::{CocField, CocKind, DepthCoc};
@@ -74,9 +74,9 @@ fn scene(size: (u32, u32), frame: usize, noise: f32) -> Frame {
     (color, map)
 }
 
-fn matted(matting: &mut Matting, (color, map): &Frame, behind: Option<&Behind>) -> DepthMap {
+fn matted(matting: &mut Matting, (color, map): &Frame, behind: Option<&KnownBackground>) -> DepthMap {
     let mut map = map.clone();
-    matting.find_before(&mut ThreadPool::new("matte", 1), (&mut map, color), JUMP, behind);
+    matting.find_with_background(&mut ThreadPool::new("matte", 1), (&mut map, color), JUMP, behind);
     map
 }
 
@@ -102,7 +102,7 @@ fn assert_same(made: &DepthMap, expected: &DepthMap, one_in: usize, name: &str) 
 
 /// Checks the law on all these frames, one after the other. Returns the number of mixed pixels.
 fn same(device: &Arc<Device>, name: &str, one_in: usize, frames: &[Frame]) -> usize {
-    let (mut cpu, mut gpu) = (Matting::default(), Matting::default().on(Some(device)));
+    let (mut cpu, mut gpu) = (Matting::default(), Matting::default().with_device(Some(device)));
     let mut all = 0;
     for (k, frame) in frames.iter().enumerate() {
         let [expected, made] = [&mut cpu, &mut gpu].map(|matting| matted(matting, frame, None));
@@ -148,20 +148,20 @@ fn sequences_agree_and_nothing_is_left_of_the_frame_before() {
     let sizes = [(160, 120), (160, 120), (160, 120), (90, 60), (160, 120)];
     let frames: Vec<_> = sizes.iter().enumerate().map(|(k, size)| scene(*size, 3 * k, 0.05 * (k % 3) as f32)).collect();
     same(&device, "a sequence", ONE_IN, &frames);
-    let mut busy = Matting::default().on(Some(&device));
+    let mut busy = Matting::default().with_device(Some(&device));
     for frame in frames.iter().chain(&frames) {
-        let mut fresh = Matting::default().on(Some(&device));
+        let mut fresh = Matting::default().with_device(Some(&device));
         let [again, alone] = [&mut busy, &mut fresh].map(|matting| matted(matting, frame, None).matte);
         assert!(again == alone, "to the bit");
     }
     let (color, map) = &frames[0];
     for jump in [f32::INFINITY, f32::NAN, 1e6] {
         let mut map = map.clone();
-        busy.find(&mut map, color, jump);
+        busy.find_mixed_pixels(&mut map, color, jump);
         assert!(map.matte.pixels.is_empty(), "beyond {jump} there is none");
     }
     let mut other = frames[3].1.clone();
-    busy.find(&mut other, color, JUMP);
+    busy.find_mixed_pixels(&mut other, color, JUMP);
     assert!(other.matte.pixels.is_empty(), "of another size");
 }
 
@@ -169,7 +169,7 @@ fn sequences_agree_and_nothing_is_left_of_the_frame_before() {
 #[ignore = "needs a Vulkan adapter (software will do)"]
 fn what_is_known_behind_counts_as_on_the_processor() {
     let device = device();
-    let (mut cpu, mut gpu) = (Matting::default(), Matting::default().on(Some(&device)));
+    let (mut cpu, mut gpu) = (Matting::default(), Matting::default().with_device(Some(&device)));
     for (k, size) in [(160, 120), (160, 120), (161, 77), (161, 77), (161, 77)].into_iter().enumerate() {
         let frame = scene(size, k, 0.01);
         let pixels = frame.1.metres.len();
@@ -179,13 +179,13 @@ fn what_is_known_behind_counts_as_on_the_processor() {
         let rounds: Vec<_> = (0..pixels).map(|n| (4.0 * chance(n / 5, 9)) as u8).collect();
         let light: Box<[[f32; 256]; 3]> =
             Box::new([1.0, 0.9, 1.1].map(|gain| std::array::from_fn(|n| gain * (n as f32 / 255.0).powf(2.2))));
-        let behind = Behind {
+        let behind = KnownBackground {
             rgb: &rgb,
             inverse: &inverse,
             rounds: &rounds,
-            known: 2,
+            min_rounds: 2,
             light: &light,
-            other: 2.0 * JUMP,
+            surface_step: 2.0 * JUMP,
             revision: 1000 + k as u64,
         };
         for behind in [Some(&behind), None, Some(&behind)] {
@@ -209,8 +209,8 @@ fn lens(size: (u32, u32)) -> DepthCoc {
 fn what_is_remembered_of_a_sequence_counts_as_on_the_processor() {
     let (device, size) = (device(), (160, 120));
     let mut workers = ThreadPool::new("depth", 1);
-    let (mut cpu, mut gpu) = (Matting::default(), Matting::default().on(Some(&device)));
-    let (mut background, lens) = (Background::default(), lens(size));
+    let (mut cpu, mut gpu) = (Matting::default(), Matting::default().with_device(Some(&device)));
+    let (mut background, lens) = (BackgroundMemory::default(), lens(size));
     let mut known = 0;
     for k in 0..60 {
         // A moving person uncovers background.
@@ -220,7 +220,7 @@ fn what_is_remembered_of_a_sequence_counts_as_on_the_processor() {
         background.find_matte(&mut gpu, &mut workers, (&mut made, &color), &lens);
         assert_same(&made, &expected, ONE_IN, &format!("frame {k}"));
         known += made.matte.pixels.iter().filter(|pixel| pixel.behind == 1.0 && pixel.alpha > 0.1).count();
-        background.learn(&mut workers, (&expected, &color), &lens, k as u64 * FRAME_NS);
+        background.update(&mut workers, (&expected, &color), &lens, k as u64 * FRAME_NS);
     }
     assert!(known > 100, "behind {known} pixels it is known");
 }
@@ -240,7 +240,11 @@ fn blurred_pictures_are_alike() {
         let lens = lens(color.size());
         let [expected, made] = [None, Some(&device)].map(|device| {
             let mut map = map.clone();
-            Matting::default().on(device).find(&mut map, color, lens.inverse_depth_of_px(FROM_PX));
+            Matting::default().with_device(device).find_mixed_pixels(
+                &mut map,
+                color,
+                lens.inverse_depth_step(MIN_STEP_PX),
+            );
             map
         });
         assert_same(&made, &expected, ONE_IN, &format!("frame {k}"));
@@ -262,24 +266,25 @@ fn blurred_pictures_are_alike() {
 #[ignore = "needs a Vulkan adapter (software will do)"]
 fn a_map_that_was_refined_there_need_not_go_up() {
     let device = device();
-    let (mut refiner, mut matting) = (Refiner::new().on(Some(&device)), Matting::default().on(Some(&device)));
+    let (mut refiner, mut matting) =
+        (Refiner::new().with_device(Some(&device)), Matting::default().with_device(Some(&device)));
     for (k, size) in [(160, 120), (160, 120), (91, 63), (160, 120)].into_iter().enumerate() {
         let (color, mut map) = scene(size, 4 * k, 0.01);
         if k == 3 {
             // The refiner has nothing to refine.
-            refiner.forget();
+            refiner.reset();
             map.metres.fill(0.0);
         }
         refiner.refine(&mut map, &color, k as u64 * FRAME_NS);
-        assert_eq!(refiner.on_device().is_some(), k < 3);
+        assert_eq!(refiner.device_frame().is_some(), k < 3);
         let frame = (color, map);
-        matting.take_from(refiner.on_device());
+        matting.set_device_frame(refiner.device_frame());
         let of_device = matted(&mut matting, &frame, None).matte;
         // The device copy can be used once only: this frame is uploaded.
         let of_memory = matted(&mut matting, &frame, None).matte;
         assert!(of_device == of_memory && (of_device.pixels.len() > 300) == (k < 3), "frame {k}");
         let unknown = (frame.0.clone(), DepthMap::new(size.0, size.1));
-        matting.take_from(refiner.on_device());
+        matting.set_device_frame(refiner.device_frame());
         let taken = matted(&mut matting, &unknown, None).matte;
         assert!(taken == of_device, "frame {k}: what was taken is what the device has");
         assert!(matted(&mut matting, &unknown, None).matte.pixels.is_empty(), "frame {k}: it is taken once");
@@ -291,7 +296,7 @@ fn a_map_that_was_refined_there_need_not_go_up() {
 fn a_device_that_is_gone_is_followed_by_the_processor() {
     for gone_before in [0, 1, 3] {
         let device = device();
-        let (mut cpu, mut gpu) = (Matting::default(), Matting::default().on(Some(&device)));
+        let (mut cpu, mut gpu) = (Matting::default(), Matting::default().with_device(Some(&device)));
         for k in 0..5 {
             if k == gone_before {
                 device.device.destroy();
@@ -302,7 +307,7 @@ fn a_device_that_is_gone_is_followed_by_the_processor() {
             assert!(k < gone_before || made.matte == expected.matte, "to the bit");
         }
         assert_eq!(gpu.backends(), "gpu, then cpu");
-        assert_eq!(Matting::default().on(Some(&device)).backends(), "cpu", "nobody tries that device again");
+        assert_eq!(Matting::default().with_device(Some(&device)).backends(), "cpu", "nobody tries that device again");
     }
 }
 
@@ -316,7 +321,7 @@ fn the_passes_of_a_frame_take_less_time_than_the_frame() {
     for frame in 0..5 {
         let (color, mut map) = scene(size, frame, 0.0);
         let began = Instant::now();
-        gpu.find((&mut map, &color), None, JUMP, None).expect("the GPU finds mattes");
+        gpu.find_mixed_pixels((&mut map, &color), None, JUMP, None).expect("the GPU finds mattes");
         tell_of_passes(&device, began.elapsed(), &gpu.pass_times());
     }
 }

@@ -59,7 +59,7 @@ const BLUE: [u8; 3] = [30, 80, 150];
 #[test]
 fn shares_and_colours_of_a_soft_outline_are_found() {
     let (picture, mut map) = scene(|_, _| light(RED), |_, _| light(BLUE));
-    Matting::default().find(&mut map, &picture, JUMP);
+    Matting::default().find_mixed_pixels(&mut map, &picture, JUMP);
     let mut found = vec![None; (SIZE.0 * SIZE.1) as usize];
     for pixel in &map.matte.pixels {
         assert_eq!((pixel.near_m, pixel.far_m), (NEAR_M, FAR_M));
@@ -97,7 +97,7 @@ fn a_hard_outline_of_textures_stays_hard() {
         base.map(|code| code.saturating_add(grain))
     });
     let mut map = depth(SIZE.0, SIZE.1, |x, y| if disc(x as f32 + 0.5, y as f32 + 0.5) { NEAR_M } else { FAR_M });
-    Matting::default().find(&mut map, &picture, JUMP);
+    Matting::default().find_mixed_pixels(&mut map, &picture, JUMP);
     let shifted = |pixel: &&MixedPixel| {
         let (x, y) = place(pixel);
         (pixel.alpha - f32::from(u8::from(disc(x as f32 + 0.5, y as f32 + 0.5)))).abs() > 0.1
@@ -120,7 +120,7 @@ fn hair_is_followed_where_the_depth_map_has_none_of_it() {
     });
     let seen = |x: u32, y: u32| body(x) || (hair(x, y) && x.is_multiple_of(5));
     let mut map = depth(SIZE.0, SIZE.1, |x, y| if seen(x, y) { NEAR_M } else { FAR_M });
-    Matting::default().find(&mut map, &picture, JUMP);
+    Matting::default().find_mixed_pixels(&mut map, &picture, JUMP);
     let share_at =
         |x: u32, y: u32| map.matte.pixels.iter().find(|pixel| place(pixel) == (x, y)).map(|pixel| pixel.alpha);
     for x in 61..84 {
@@ -145,7 +145,7 @@ fn what_is_wider_than_hair_and_far_is_none() {
         codes(std::array::from_fn(|p| share * near[p] + (1.0 - share) * far[p]))
     });
     let mut map = depth(SIZE.0, SIZE.1, |x, _| if x < 60 { NEAR_M } else { FAR_M });
-    Matting::default().find(&mut map, &picture, JUMP);
+    Matting::default().find_mixed_pixels(&mut map, &picture, JUMP);
     let on_outline = map.matte.pixels.iter().filter(|pixel| place(pixel).0 == 60).count();
     assert_eq!(on_outline, SIZE.1 as usize);
     for pixel in map.matte.pixels.iter().filter(|pixel| place(pixel).0 > 61) {
@@ -168,7 +168,7 @@ fn what_cannot_have_a_matte_has_none() {
             behind: 0.5,
             difference: [0.1; 3],
         });
-        Matting::default().find(map, &picture, jump);
+        Matting::default().find_mixed_pixels(map, &picture, jump);
         assert!(map.matte.pixels.is_empty());
     }
 }
@@ -187,7 +187,7 @@ fn of_more_edges_than_a_picture_has_those_of_the_largest_jumps_stay() {
             [110, 60, 66]
         }
     });
-    Matting::default().find(&mut map, &picture, JUMP);
+    Matting::default().find_mixed_pixels(&mut map, &picture, JUMP);
     assert!(map.matte.pixels.len() >= SIZE.1 as usize, "{}", map.matte.pixels.len());
     for pixel in &map.matte.pixels {
         assert!(place(pixel).0.abs_diff(SIZE.0 / 2) < 3, "{pixel:?}");
@@ -218,7 +218,7 @@ fn the_blurred_background_shows_through_a_soft_outline() {
     let field = coc(CocKind::Depth, SIZE.1);
     let hard = depth(SIZE.0, SIZE.1, |x, _| if share(x) > 0.5 { NEAR_M } else { FAR_M });
     let mut map = hard.clone();
-    Matting::default().find(&mut map, &picture, JUMP);
+    Matting::default().find_mixed_pixels(&mut map, &picture, JUMP);
     let only_wall = color(SIZE.0, SIZE.1, |x, y| codes(wall(x, y)));
     for quality in Quality::ALL {
         let behind = blur(&depth(SIZE.0, SIZE.1, |_, _| FAR_M), &only_wall, &field, quality);

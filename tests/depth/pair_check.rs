@@ -116,7 +116,7 @@ fn where_nothing_is_nothing_is_said() {
 fn two_sizes_are_refused() {
     let [left, _] = pair(0.0, 0.0);
     let other = GrayImage { width: 160, height: 480, luma: left.luma.clone() };
-    assert!(check(&left, &other, 64).unwrap_err().to_string().contains("one size"));
+    assert!(check(&left, &other, 64).unwrap_err().to_string().contains("same size"));
 }
 
 fn data(path: &str) -> PathBuf {
@@ -164,7 +164,7 @@ fn rectified(calibration: &StereoCalibration, pair: [GrayImage; 2]) -> PairCheck
     let rectifier = Rectifier::new(calibration, pair[0].size()).unwrap();
     let mut into = [GrayImage::default(), GrayImage::default()];
     for ((map, from), into) in rectifier.maps().iter().zip(&pair).zip(&mut into) {
-        map.gray(from, into);
+        map.remap_gray(from, into);
     }
     check(&into[0], &into[1], 160).unwrap()
 }
@@ -174,13 +174,13 @@ fn rectified(calibration: &StereoCalibration, pair: [GrayImage; 2]) -> PairCheck
 fn rectifying_makes_real_pairs_rectified() {
     let cameras = ["cam0", "cam1"].map(|eye| format!("stereo_seq/MicroEurocDataset/mav0/{eye}"));
     let sensors = cameras.each_ref().map(|camera| data(&format!("{camera}/sensor.yaml")));
-    let euroc = calibration::load(&[&sensors[0], &sensors[1]]).unwrap();
+    let euroc = calibration::load_calibration(&[&sensors[0], &sensors[1]]).unwrap();
     let found = rectified(&euroc, cameras.map(|camera| gray(&format!("{camera}/data/1403715276262142976.png"))));
     assert!(found.vertical_px.abs() < 0.3 && found.verdict() == Verdict::Rectified, "{found:?}");
 
     // The author's left camera stands on the right.
-    let given = calibration::load(&[&data("calib/intrinsics.yml")]).unwrap().exchanged();
-    for rig in [given, StereoCalibration { given: None, ..given }] {
+    let given = calibration::load_calibration(&[&data("calib/intrinsics.yml")]).unwrap().with_swapped_cameras();
+    for rig in [given, StereoCalibration { stored_rectification: None, ..given }] {
         let boards = [6, 9, 12].map(|k| [format!("calib/right{k:02}.jpg"), format!("calib/left{k:02}.jpg")]);
         for board in boards {
             let found = rectified(&rig, board.each_ref().map(|path| gray(path)));

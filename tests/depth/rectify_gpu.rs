@@ -7,7 +7,7 @@ use crate::on_gpu::device;
 
 use bokehcam::calibration::rectification::Rectification;
 use bokehcam::calibration::rectifier::Rectifier;
-use bokehcam::calibration::{Distortion, Eye, StereoCalibration};
+use bokehcam::calibration::{CameraIntrinsics, Distortion, StereoCalibration};
 use bokehcam::compute::Backend;
 use bokehcam::depth::stereo::gpu::rectifier::GpuRectifier;
 use bokehcam::depth::stereo::source::StereoDepth;
@@ -21,21 +21,21 @@ use glam::{DMat3, DVec2, DVec3};
 /// corners have no source.
 fn rectifier(size: (u32, u32)) -> Rectifier {
     let [width, height] = [size.0, size.1].map(f64::from);
-    let eye = |shift: f64| Eye {
+    let eye = |shift: f64| CameraIntrinsics {
         size: Some(size),
         focal_px: DVec2::splat(0.9 * width.max(height)),
         center_px: DVec2::new((0.5 + shift) * width, 0.47 * height),
         distortion: Distortion::RadialTangential([-0.2, 0.05, 1e-3, -2e-3, 0.0, 0.0, 0.0, 0.0]),
     };
     let mut calibration = StereoCalibration {
-        eyes: [eye(0.007), eye(-0.013)],
+        cameras: [eye(0.007), eye(-0.013)],
         rotation: DMat3::from_rotation_z(0.06) * DMat3::from_rotation_y(0.02),
         translation_m: DVec3::new(-0.1, 0.002, 0.001),
-        given: None,
+        stored_rectification: None,
         assumed_mm: false,
     };
-    let found = Rectification::of(&calibration, size).expect("such eyes can be");
-    calibration.given = Some(Rectification { focal_px: 0.7 * found.focal_px, ..found });
+    let found = Rectification::from_calibration(&calibration, size).expect("such eyes can be");
+    calibration.stored_rectification = Some(Rectification { focal_px: 0.7 * found.focal_px, ..found });
     Rectifier::new(&calibration, size).expect("such eyes can be")
 }
 
@@ -56,8 +56,8 @@ fn both_eyes_are_the_same_to_the_bit() {
         for frame in 0..3 {
             let (color, gray) = pictures(size, 7 + frame);
             let (mut left, mut right) = (ColorImage::default(), GrayImage::default());
-            cpu.left(&color, &mut left);
-            cpu.right(&gray, &mut right);
+            cpu.rectify_left(&color, &mut left);
+            cpu.rectify_right(&gray, &mut right);
             let (mut made_left, mut made_right) = (ColorImage::default(), GrayImage::default());
             gpu.left(&color, &mut made_left).expect("the device is sound");
             gpu.right(&gray, &mut made_right).expect("the device is sound");

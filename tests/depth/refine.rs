@@ -2,7 +2,7 @@
 
 use bokehcam::depth::focus::FocusRule;
 use bokehcam::depth::refine::Refiner;
-use bokehcam::engine::{CocMaker, Postprocess};
+use bokehcam::engine::{CocCalculator, Postprocess};
 use bokehcam::frame::{ColorImage, DepthMap};
 use bokehcam::look::{CocAtInfinity, CocRule};
 
@@ -300,14 +300,14 @@ fn any_number_of_threads_makes_the_same_depth_and_the_same_matte() {
         let made_by = |threads: usize| {
             let lens = CocAtInfinity::Px(14.0);
             let rule = CocRule::Depth { focus: FocusRule::Auto, lens, range_m: 0.0, max_coc_px: 20.0 };
-            let mut coc = CocMaker::new(rule, Postprocess::Refine).with_threads(threads);
-            coc.remember(true);
+            let mut coc = CocCalculator::new(rule, Postprocess::Refine).with_threads(threads);
+            coc.set_background_memory(true);
             let mut made = Vec::new();
             for ((color, measured), time_ns) in frames.iter().zip((0..).step_by(FRAME_NS as usize)) {
                 let mut map = measured.clone();
-                let field = coc.make(&mut map, color, time_ns);
+                let field = coc.compute(&mut map, color, time_ns);
                 let mut shared = DepthMap { metres: map.metres.clone(), ..DepthMap::new(map.width, map.height) };
-                coc.share(&mut shared, color, &field);
+                coc.adapt_reused_map(&mut shared, color, &field);
                 made.extend([map, shared]);
             }
             made

@@ -85,7 +85,7 @@ fn assert_same(made: &DepthMap, expected: &DepthMap, name: &str) {
 
 /// Checks the law on all these frames, one after the other. Returns the maps of the last.
 fn same(device: &Arc<Device>, name: &str, frames: &[Frame]) -> DepthMap {
-    let (mut cpu, mut gpu) = (Refiner::new(), Refiner::new().on(Some(device)));
+    let (mut cpu, mut gpu) = (Refiner::new(), Refiner::new().with_device(Some(device)));
     let mut last = DepthMap::default();
     for (k, frame) in frames.iter().enumerate() {
         let expected = refined(&mut cpu, frame);
@@ -198,11 +198,11 @@ fn sequences_agree_whatever_happens_in_them() {
 #[ignore = "needs a Vulkan adapter (software will do)"]
 fn a_refiner_forgets_on_a_device_as_on_the_processor() {
     let device = device();
-    let (mut cpu, mut gpu) = (Refiner::new(), Refiner::new().on(Some(&device)));
+    let (mut cpu, mut gpu) = (Refiner::new(), Refiner::new().with_device(Some(&device)));
     for (k, frame) in scenes((90, 60), (90, 60), 6, 0.02).iter_mut().enumerate() {
         if k == 3 {
-            cpu.forget();
-            gpu.forget();
+            cpu.reset();
+            gpu.reset();
             frame.1.metres.fill(0.0);
         }
         let [expected, made] = [&mut cpu, &mut gpu].map(|refiner| refined(refiner, frame));
@@ -216,7 +216,7 @@ fn a_refiner_forgets_on_a_device_as_on_the_processor() {
 fn a_device_that_is_gone_is_followed_by_the_processor() {
     for gone_before in [0, 1, 3] {
         let device = device();
-        let mut refiner = Refiner::new().on(Some(&device));
+        let mut refiner = Refiner::new().with_device(Some(&device));
         let mut cpu = Refiner::new();
         for (k, frame) in scenes((90, 60), (45, 30), 6, 0.02).iter().enumerate() {
             if k == gone_before {
@@ -229,7 +229,7 @@ fn a_device_that_is_gone_is_followed_by_the_processor() {
             assert!(k < gone_before || made.metres == expected.metres, "to the bit");
         }
         assert_eq!(refiner.backends(), "gpu, then cpu");
-        assert_eq!(Refiner::new().on(Some(&device)).backends(), "cpu", "nobody tries that device again");
+        assert_eq!(Refiner::new().with_device(Some(&device)).backends(), "cpu", "nobody tries that device again");
     }
 }
 

@@ -15,7 +15,7 @@ use common::Numbers;
 /// Runs the GPU's passes on a map.
 fn tidied(device: &Device, size: (usize, usize), island: u32, map: &[u16]) -> Vec<u16> {
     use wgpu::BufferUsages as Usage;
-    let buffer = |bytes, usage| device.buffer("test", bytes, usage);
+    let buffer = |bytes, usage| device.create_buffer("test", bytes, usage);
     let pixels = map.len();
     let words: Vec<u32> = map.iter().map(|&disparity| disparity.into()).collect();
     let on_device = buffer(pixels * 4, Usage::STORAGE | Usage::COPY_DST);
@@ -31,9 +31,9 @@ fn tidied(device: &Device, size: (usize, usize), island: u32, map: &[u16]) -> Ve
     let mut back = Readback::new(device, "words back", pixels * 2);
     let constants = shaders::constants(size, 16, island, false);
     let mut recorder = Recorder::new(device, None);
-    passes(device, size, &constants, &on_device, scratch, &out).iter().for_each(|pass| recorder.run(pass));
+    passes(device, size, &constants, &on_device, scratch, &out).iter().for_each(|pass| recorder.record(pass));
     let take = |bytes: &[u8]| bytes.as_chunks().0[..pixels].iter().map(|bytes| u16::from_le_bytes(*bytes)).collect();
-    recorder.fetch(device, &mut back, (&out, out.size()), take).expect("the device is there")
+    recorder.submit_and_read(device, &mut back, (&out, out.size()), take).expect("the device is there")
 }
 
 /// The reference: the same result, pixel by pixel.

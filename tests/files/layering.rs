@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 /// Modules of the library by layer, the lowest first, then the crates above it.
 const LAYERS: [&[&str]; 13] = [
     &["names"],
-    &["color", "frame", "optics", "clock", "files", "knob"],
+    &["color", "frame", "optics", "clock", "files", "camera_control"],
     &["compute", "calibration", "layout"],
     &["link", "budget", "network", "stats", "recording", "v4l2", "pipewire", "control"],
     &["capture", "depth", "bokeh", "sink"],

@@ -6,10 +6,10 @@ use std::thread;
 use std::time::Duration;
 
 use bokehcam::bokeh::{Bokeh, Job, PassTimes};
-use bokehcam::compute::Place;
+use bokehcam::compute::PictureLocation;
 use bokehcam::link;
 use bokehcam::optics::CocField;
-use bokehcam::pipeline::{Change, Executor, Pace, Run, View, Wanted, run};
+use bokehcam::pipeline::{Change, ExecutorChange, OutputRequest, Pace, Run, View, run};
 use bokehcam::sink::{Null, Sink};
 
 use crate::fakes::{FakeBokeh, Received, Trouble, changed, fake_bokeh, fake_camera, fake_sink, nobody};
@@ -45,7 +45,7 @@ fn every_frame_has_the_radius_and_the_executor_of_one_change() {
             .map(|k| {
                 // Every fifth change lets frames pass through unblurred.
                 let executor = (k % 5 != 0).then(|| made(f32::from(k)));
-                Change { number: u64::from(k), look: uniform(f32::from(k)), bokeh: Executor::To(executor) }
+                Change { number: u64::from(k), look: uniform(f32::from(k)), bokeh: ExecutorChange::Replace(executor) }
             })
             .collect();
         let report = thread::scope(|scope| {
@@ -79,7 +79,7 @@ fn the_first_change_is_known_by_its_number_and_frames_without_one_by_none() {
         let (send, changes) = mpsc::channel();
         if number > 0 {
             let look = uniform(radius_px);
-            let bokeh = Executor::To(Some(Box::new(made(radius_px))));
+            let bokeh = ExecutorChange::Replace(Some(Box::new(made(radius_px))));
             send.send(Change { number, look, bokeh }).unwrap();
         }
         let (view, mut views) = link::live::<View>();
@@ -157,9 +157,9 @@ fn a_viewer_that_leaves_ends_the_run() {
 #[test]
 fn frames_between_two_looks_are_known() {
     for (bokeh, between) in [
-        (Executor::Keep, false),
-        (Executor::Meanwhile, true),
-        (Executor::To(Some(Box::new(made(5.0)) as Box<dyn Bokeh>)), false),
+        (ExecutorChange::Keep, false),
+        (ExecutorChange::KeepUntilReady, true),
+        (ExecutorChange::Replace(Some(Box::new(made(5.0)) as Box<dyn Bokeh>)), false),
     ] {
         let (send, changes) = mpsc::channel();
         send.send(Change { number: 1, look: uniform(5.0), bokeh }).unwrap();
@@ -177,20 +177,20 @@ fn frames_between_two_looks_are_known() {
             .unwrap();
             looking.join().unwrap()
         });
-        assert!(!seen.is_empty() && seen.iter().all(|view| view.is_between == between));
+        assert!(!seen.is_empty() && seen.iter().all(|view| view.is_transitional == between));
     }
 }
 
 #[test]
 fn pictures_are_made_where_they_are_wanted_but_mirrored_ones_in_memory() {
-    for (mirror, place) in [(false, Place::Both), (true, Place::Memory)] {
-        let (places, stop) = (Arc::<Mutex<Vec<Place>>>::default(), AtomicBool::new(false));
+    for (mirror, place) in [(false, PictureLocation::Both), (true, PictureLocation::Memory)] {
+        let (places, stop) = (Arc::<Mutex<Vec<PictureLocation>>>::default(), AtomicBool::new(false));
         let noted = Arc::clone(&places);
         let looks = Box::new(move |job: &Job| noted.lock().unwrap().push(job.place));
         run(Run {
             bokeh: Some(Box::new(FakeBokeh { looks, ..made(3.0) })),
             mirror,
-            wanted: Some(Arc::new(Wanted::new(Place::Both))),
+            output_request: Some(Arc::new(OutputRequest::new(PictureLocation::Both))),
             ..simple(Box::new(fake_camera(3)), Box::new(Null), &stop, Pace::Asap)
         })
         .unwrap();

@@ -8,14 +8,14 @@ use std::thread;
 use std::time::Duration;
 
 use bokehcam::bokeh::{Job, PassTimes};
-use bokehcam::capture::{Brings, Camera, CaptureError, Captured, Shot, SourceInfo};
+use bokehcam::capture::{Camera, CaptureError, Captured, FrameBuffers, FrameData, SourceInfo};
 use bokehcam::clock::Clock;
 use bokehcam::depth::focus::FocusRule;
 use bokehcam::frame::Stamp;
 use bokehcam::link::live;
 use bokehcam::look::Look;
 use bokehcam::optics::CocField;
-use bokehcam::pipeline::{Change, Executor, Pace, Run, Trace, Wanted, run};
+use bokehcam::pipeline::{Change, ExecutorChange, OutputRequest, Pace, Run, Trace, run};
 use bokehcam::sink::Null;
 use bokehcam::stats::{Cause, Report};
 
@@ -32,8 +32,8 @@ const BLUR_NS: u64 = 7 * MS;
 const SINK_NS: u64 = 3 * MS;
 
 fn info(name: &str) -> SourceInfo {
-    let (name, brings) = (name.into(), Brings::Color);
-    SourceInfo { name, size: SIZE, period_ns: PERIOD_NS, frames: None, live: true, brings }
+    let (name, frame_data) = (name.into(), FrameData::Color);
+    SourceInfo { name, size: SIZE, period_ns: PERIOD_NS, frames: None, live: true, frame_data }
 }
 
 /// A camera that captures its next frame once the previous one is delivered.
@@ -52,7 +52,7 @@ impl Camera for Lockstep {
         info("lockstep")
     }
 
-    fn next(&mut self, Shot { color, .. }: Shot) -> Result<Captured, CaptureError> {
+    fn next(&mut self, FrameBuffers { color, .. }: FrameBuffers) -> Result<Captured, CaptureError> {
         let (index, asked_ns) = (self.next, self.clock.now_ns());
         while self.delivered.load(Ordering::SeqCst) < index as u64 {
             thread::sleep(Duration::from_micros(50));
@@ -95,7 +95,7 @@ fn play_seen(
     (frames, pace): (usize, Pace),
     (depth_ns, budget_ns): (u64, u64),
     changes: Option<mpsc::Receiver<Change>>,
-    wanted: Option<Arc<Wanted>>,
+    output_request: Option<Arc<OutputRequest>>,
     before: impl FnMut(usize) + Send + 'static,
 ) -> (Report, Vec<CocField>, Vec<Trace>) {
     let (view, views) = live();
@@ -136,7 +136,7 @@ fn play_seen(
         look: dof(10.0),
         changes,
         budget_ns,
-        wanted,
+        output_request,
         view: Some(view),
         clock,
         progress: &|progress| {
@@ -183,7 +183,7 @@ fn a_change_of_the_look_holds_from_its_frame_on_where_depth_is_held_too() {
         // Changes come at both positions within such a pair.
         if frame >= 30 && frame.is_multiple_of(5) {
             let look = dof(10.0 + frame as f32);
-            let _ = send.send(Change { number: frame as u64, look, bokeh: Executor::Keep });
+            let _ = send.send(Change { number: frame as u64, look, bokeh: ExecutorChange::Keep });
         }
     };
     let (report, fields) = play((60, Pace::Realtime), 14 * MS, 10 * MS, Some(changes), before);
@@ -201,11 +201,11 @@ fn the_stages_and_the_waits_are_all_of_a_frames_age() {
         let (report, _, traces) = play_seen((40, pace), (DEPTH_NS, PERIOD_NS), None, None, |_| {});
         assert_eq!(traces.len(), 40);
         for trace in &traces {
-            let Trace { decode_ns, depth_ns, blur_ns, between_ns, playout_ns, age_ns, .. } = *trace;
+            let Trace { decode_ns, depth_ns, blur_ns, queueing_ns, playout_ns, age_ns, .. } = *trace;
             assert_eq!((decode_ns, depth_ns, blur_ns), (READ_NS, DEPTH_NS, BLUR_NS));
             // The time that the driver held the frame.
-            assert_eq!(between_ns, AGE_NS - READ_NS, "nothing else waits where there is one frame at a time");
-            assert_eq!(age_ns, decode_ns + depth_ns + blur_ns + between_ns + playout_ns);
+            assert_eq!(queueing_ns, AGE_NS - READ_NS, "nothing else waits where there is one frame at a time");
+            assert_eq!(age_ns, decode_ns + depth_ns + blur_ns + queueing_ns + playout_ns);
         }
         let waited = report.stages_ms.0.iter().any(|(name, _)| name == "playout");
         assert_eq!(waited, pace == Pace::Realtime);
@@ -213,22 +213,22 @@ fn the_stages_and_the_waits_are_all_of_a_frames_age() {
     // Where every other frame takes longer, the faster ones wait for their playout.
     let before = |_: usize| {};
     let (_, _, traces) = play_seen((60, Pace::Realtime), (14 * MS, 10 * MS), None, None, before);
-    let held = traces.iter().filter(|trace| trace.depth_held);
+    let held = traces.iter().filter(|trace| trace.is_depth_reused);
     let waits: Vec<u64> = held.map(|trace| trace.playout_ns).collect();
     assert!(waits.len() > 20 && waits[10..].iter().all(|wait_ns| *wait_ns > 5 * MS), "{waits:?}");
 }
 
 #[test]
 fn whoever_asks_for_depth_of_its_own_gets_it_with_the_next_frame() {
-    let wanted = Arc::new(Wanted::default());
-    let asks = Arc::clone(&wanted);
+    let output_request = Arc::new(OutputRequest::default());
+    let asks = Arc::clone(&output_request);
     let before = move |frame: usize| match frame {
-        40 => asks.want_own_depth(true),
-        43 => asks.want_own_depth(false),
+        40 => asks.require_own_depth(true),
+        43 => asks.require_own_depth(false),
         _ => {}
     };
-    let (report, _, traces) = play_seen((60, Pace::Realtime), (14 * MS, 10 * MS), None, Some(wanted), before);
-    let held: Vec<bool> = traces.iter().map(|trace| trace.depth_held).collect();
+    let (report, _, traces) = play_seen((60, Pace::Realtime), (14 * MS, 10 * MS), None, Some(output_request), before);
+    let held: Vec<bool> = traces.iter().map(|trace| trace.is_depth_reused).collect();
     assert_eq!(held.iter().filter(|held| **held).count() as u64, report.depth_held);
     assert_eq!(held[40..46], [false, false, false, true, false, true], "{held:?}");
     assert_eq!(held[34..40].iter().filter(|held| **held).count(), 3);
@@ -239,7 +239,7 @@ const LOSSES: [Cause; 3] = [Cause::Driver, Cause::Corrupt, Cause::Evicted];
 #[test]
 fn what_a_camera_says_is_lost_counts_as_many_times_as_it_says() {
     // Between the frames that it delivers it loses, for each cause, their number plus three.
-    let camera = camera_by(info("loser"), |index, Shot { color, .. }| {
+    let camera = camera_by(info("loser"), |index, FrameBuffers { color, .. }| {
         color.resize(SIZE.0, SIZE.1);
         match index {
             0..6 if index.is_multiple_of(2) => Captured::Lost(index as u64 + 3, LOSSES[index / 2]),

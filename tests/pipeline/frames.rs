@@ -4,9 +4,9 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
-use bokehcam::bokeh::rung::COSTS;
+use bokehcam::bokeh::quality_level::COSTS;
 use bokehcam::bokeh::{Job, PassTimes};
-use bokehcam::capture::{Brings, Camera, Captured, Shot};
+use bokehcam::capture::{Camera, Captured, FrameBuffers, FrameData};
 use bokehcam::compute::Backend;
 use bokehcam::frame::Stamp;
 use bokehcam::look::Look;
@@ -19,8 +19,8 @@ use crate::setup::*;
 #[test]
 fn depth_comes_with_the_frame_it_belongs_to() {
     // Focus is eased over media time, and all of these frames come within 20 ms: the first one determines it.
-    for (brings, depth) in [(Brings::Color, Some(Trouble::default())), (Brings::Depth, None)] {
-        let (result, received) = Setup { brings, depth, ..Setup::new(20, Pace::Asap) }.run();
+    for (frame_data, depth) in [(FrameData::Color, Some(Trouble::default())), (FrameData::Depth, None)] {
+        let (result, received) = Setup { frame_data, depth, ..Setup::new(20, Pace::Asap) }.run();
         result.unwrap();
         assert!(received.pictures.lock().unwrap().iter().all(|rgb| rgb[0] == 1 && rgb[1] >= 100));
     }
@@ -114,7 +114,7 @@ fn quality_follows_the_time_there_is() {
 #[test]
 fn mirror_flips_pixels_and_keeps_channels() {
     // One picture, whose columns differ.
-    let camera = camera_by(fake_camera(1).info(), |index, Shot { color, .. }| {
+    let camera = camera_by(fake_camera(1).info(), |index, FrameBuffers { color, .. }| {
         color.resize(SIZE.0, SIZE.1);
         (0..).zip(&mut color.rgb).for_each(|(value, byte)| *byte = value);
         let stamp = Stamp { index, time_ns: 0, captured_ns: None };

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
-use bokehcam::capture::{Brings, Camera, CaptureError, Captured, Shot, SourceInfo};
+use bokehcam::capture::{Camera, CaptureError, Captured, FrameBuffers, FrameData, SourceInfo};
 use bokehcam::clock::Clock;
 use bokehcam::frame::{ColorImage, Stamp};
 use bokehcam::link::demand::{Demand, Watch};
@@ -25,10 +25,10 @@ struct Sleeper {
 impl Camera for Sleeper {
     fn info(&self) -> SourceInfo {
         let name = "sleeper".into();
-        SourceInfo { name, size: SIZE, period_ns: PERIOD_NS, frames: None, live: true, brings: Brings::Color }
+        SourceInfo { name, size: SIZE, period_ns: PERIOD_NS, frames: None, live: true, frame_data: FrameData::Color }
     }
 
-    fn next(&mut self, Shot { color, .. }: Shot) -> Result<Captured, CaptureError> {
+    fn next(&mut self, FrameBuffers { color, .. }: FrameBuffers) -> Result<Captured, CaptureError> {
         if !std::mem::replace(&mut self.open, true) {
             self.opened.fetch_add(1, Ordering::SeqCst);
             return Ok(Captured::Waiting);
@@ -104,7 +104,7 @@ fn the_camera_rests_while_nobody_watches_and_the_output_goes_on() {
         keep_going: false,
         demand: Some(demand),
         mirror: false,
-        wanted: None,
+        output_request: None,
         view: None,
         clock: Clock::system(),
         stop: &AtomicBool::new(false),

@@ -6,9 +6,9 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use bokehcam::capture::demo::{self, Demo};
-use bokehcam::capture::replay::{Part, Replay};
+use bokehcam::capture::replay::{PlayRange, Replay};
 use bokehcam::capture::synthetic::Format;
-use bokehcam::capture::{Brings, Camera, CaptureError, Captured, Shot};
+use bokehcam::capture::{Camera, CaptureError, Captured, FrameBuffers, FrameData};
 use bokehcam::depth::beside::Beside;
 use bokehcam::depth::recorded::Recorded;
 use bokehcam::depth::{DepthError, DepthSource, FrameInput};
@@ -44,7 +44,7 @@ pub fn open(dir: &Path) -> Arc<Recording> {
     Arc::new(Recording::open(dir, &Options::default()).unwrap())
 }
 
-fn replay(dir: &Path, part: Part) -> Result<Replay, CaptureError> {
+fn replay(dir: &Path, part: PlayRange) -> Result<Replay, CaptureError> {
     Replay::new(open(dir), "test recording", &part)
 }
 
@@ -53,7 +53,7 @@ pub fn play(camera: &mut dyn Camera, limit: usize) -> Vec<(usize, u64, u8)> {
     let (mut color, mut depth, mut right) = (ColorImage::default(), DepthMap::default(), GrayImage::default());
     let mut frames = Vec::new();
     while frames.len() < limit {
-        match camera.next(Shot { color: &mut color, depth: &mut depth, right: &mut right }).unwrap() {
+        match camera.next(FrameBuffers { color: &mut color, depth: &mut depth, right: &mut right }).unwrap() {
             Captured::Frame(Stamp { index, time_ns, .. }) => frames.push((index, time_ns / 1_000_000, color.rgb[0])),
             Captured::Corrupt(error) => panic!("{error}"),
             Captured::End => break,
@@ -67,18 +67,18 @@ pub fn play(camera: &mut dyn Camera, limit: usize) -> Vec<(usize, u64, u8)> {
 fn a_recording_plays_from_start_to_end() {
     let folder = tempfile::tempdir().unwrap();
     record(folder.path(), false);
-    let mut whole = replay(folder.path(), Part::default()).unwrap();
+    let mut whole = replay(folder.path(), PlayRange::default()).unwrap();
     let info = whole.info();
     assert_eq!((info.size, info.period_ns, info.frames), (SIZE, STEP_NS, Some(10)));
-    assert_eq!((info.name.as_str(), info.live, info.brings), ("test recording", false, Brings::Color));
+    assert_eq!((info.name.as_str(), info.live, info.frame_data), ("test recording", false, FrameData::Color));
     assert!(play(&mut whole, 99).into_iter().eq((0..10).map(|i| (i, 40 * i as u64, i as u8))));
 
     // From 0.08 s, that frame included, to before 0.2 s.
-    let part = Part { start_s: 0.08, end_s: Some(0.2), ..Part::default() };
+    let part = PlayRange { start_s: 0.08, end_s: Some(0.2), ..PlayRange::default() };
     let mut middle = replay(folder.path(), part).unwrap();
     assert_eq!(middle.info().frames, Some(3));
     assert_eq!(play(&mut middle, 99), [(2, 0, 2), (3, 40, 3), (4, 80, 4)]);
-    let mut few = replay(folder.path(), Part { frames: Some(2), ..part }).unwrap();
+    let mut few = replay(folder.path(), PlayRange { frames: Some(2), ..part }).unwrap();
     assert_eq!((few.info().frames, play(&mut few, 99).len()), (Some(2), 2));
 }
 
@@ -86,11 +86,11 @@ fn a_recording_plays_from_start_to_end() {
 fn a_loop_goes_on_in_media_time() {
     let folder = tempfile::tempdir().unwrap();
     record(folder.path(), false);
-    let part = Part { start_s: 0.3, end_s: None, looped: true, frames: Some(5) };
+    let part = PlayRange { start_s: 0.3, end_s: None, looped: true, frames: Some(5) };
     let mut looped = replay(folder.path(), part).unwrap();
     assert_eq!(looped.info().frames, Some(5));
     assert_eq!(play(&mut looped, 99), [(8, 0, 8), (9, 40, 9), (8, 80, 8), (9, 120, 9), (8, 160, 8)]);
-    let mut endless = replay(folder.path(), Part { frames: None, ..part }).unwrap();
+    let mut endless = replay(folder.path(), PlayRange { frames: None, ..part }).unwrap();
     assert_eq!((endless.info().frames, play(&mut endless, 31).len()), (None, 31));
 }
 
@@ -98,14 +98,14 @@ fn a_loop_goes_on_in_media_time() {
 fn frames_can_be_passed_over() {
     let folder = tempfile::tempdir().unwrap();
     record(folder.path(), false);
-    let mut camera = replay(folder.path(), Part { looped: true, ..Part::default() }).unwrap();
-    assert_eq!(camera.skip(0), 0);
-    assert_eq!(camera.skip(81_000_000), 3);
+    let mut camera = replay(folder.path(), PlayRange { looped: true, ..PlayRange::default() }).unwrap();
+    assert_eq!(camera.skip_until(0), 0);
+    assert_eq!(camera.skip_until(81_000_000), 3);
     assert_eq!(play(&mut camera, 1), [(3, 120, 3)]);
-    assert_eq!(camera.skip(500_000_000), 9);
+    assert_eq!(camera.skip_until(500_000_000), 9);
     assert_eq!(play(&mut camera, 1), [(3, 520, 3)]);
-    let mut ends = replay(folder.path(), Part::default()).unwrap();
-    assert_eq!((ends.skip(u64::MAX), play(&mut ends, 1).len()), (10, 0));
+    let mut ends = replay(folder.path(), PlayRange::default()).unwrap();
+    assert_eq!((ends.skip_until(u64::MAX), play(&mut ends, 1).len()), (10, 0));
 }
 
 #[test]
@@ -115,7 +115,8 @@ fn an_empty_part_says_how_long_the_recording_is() {
     for (start_s, end_s, range) in
         [(3.0, None, "from 3 s to its end"), (0.2, Some(0.1), "from 0.2 s to 0.1 s"), (f64::NAN, None, "NaN")]
     {
-        let error = replay(folder.path(), Part { start_s, end_s, ..Part::default() }).err().unwrap().to_string();
+        let error =
+            replay(folder.path(), PlayRange { start_s, end_s, ..PlayRange::default() }).err().unwrap().to_string();
         assert!(error.contains(range) && error.ends_with("it lasts 0.400 s"), "{error}");
     }
 }
@@ -124,7 +125,7 @@ fn an_empty_part_says_how_long_the_recording_is() {
 fn a_loop_of_nothing_but_bad_frames_ends() {
     let folder = tempfile::tempdir().unwrap();
     record(folder.path(), false);
-    let part = Part { start_s: 0.3, looped: true, ..Part::default() };
+    let part = PlayRange { start_s: 0.3, looped: true, ..PlayRange::default() };
     let camera = replay(folder.path(), part).unwrap();
     for picture in fs::read_dir(folder.path().join("rgb")).unwrap() {
         fs::write(picture.unwrap().path(), "no picture").unwrap();
@@ -186,7 +187,7 @@ fn frames_before_the_first_depth_are_counted_and_the_run_goes_on() {
     let folder = tempfile::tempdir().unwrap();
     record(folder.path(), false);
     let stop = AtomicBool::new(false);
-    let camera = replay(folder.path(), Part::default()).unwrap();
+    let camera = replay(folder.path(), PlayRange::default()).unwrap();
     let sink = Target::Null.open(&sink_options()).unwrap();
     // Live depth, as from a depth camera.
     let late = depth_by(|FrameInput { stamp, .. }, map| {
@@ -213,7 +214,7 @@ fn frames_before_the_first_depth_are_counted_and_the_run_goes_on() {
 fn rendered(dir: &Path, file: &Path) -> Vec<u8> {
     let recording = open(dir);
     let stop = AtomicBool::new(false);
-    let camera = Replay::new(recording.clone(), "test recording", &Part::default()).unwrap();
+    let camera = Replay::new(recording.clone(), "test recording", &PlayRange::default()).unwrap();
     let sink: Box<dyn Sink> = Target::Y4m(file.to_owned()).open(&sink_options()).unwrap();
     let report = run(Run {
         depth: Some(Box::new(Recorded::new(recording, "test recording").unwrap())),
@@ -243,11 +244,11 @@ fn the_synthetic_camera_knows_its_depth() {
     let mut camera = Synthetic::new(format).unwrap();
     let info = camera.info();
     assert_eq!((info.size, info.period_ns, info.frames), ((48, 27), 80_000_000, Some(3)));
-    assert!(info.brings == Brings::Depth && !info.live);
+    assert!(info.frame_data == FrameData::Depth && !info.live);
     let (mut color, mut depth, mut right) = (ColorImage::default(), DepthMap::default(), GrayImage::default());
     for index in 0..3 {
         let Captured::Frame(stamp) =
-            camera.next(Shot { color: &mut color, depth: &mut depth, right: &mut right }).unwrap()
+            camera.next(FrameBuffers { color: &mut color, depth: &mut depth, right: &mut right }).unwrap()
         else {
             panic!("frame {index}")
         };
@@ -256,7 +257,10 @@ fn the_synthetic_camera_knows_its_depth() {
         assert!(color.rgb.iter().any(|&byte| byte != color.rgb[0]));
         assert!(depth.metres.iter().any(|&z_m| DepthMap::is_known(z_m)));
     }
-    assert!(matches!(camera.next(Shot { color: &mut color, depth: &mut depth, right: &mut right }), Ok(Captured::End)));
+    assert!(matches!(
+        camera.next(FrameBuffers { color: &mut color, depth: &mut depth, right: &mut right }),
+        Ok(Captured::End)
+    ));
 
     for (size, fps) in [((0, 9), 30.0), ((9, 9000), 30.0), ((9, 9), 0.0), ((9, 9), f64::NAN)] {
         assert!(matches!(Synthetic::new(Format { size, fps, ..format }), Err(CaptureError::Format { .. })));
@@ -268,7 +272,7 @@ fn demonstrated(camera: &mut Demo, most: usize) -> Vec<(Stamp, ColorImage, Depth
     let mut frames = Vec::new();
     while frames.len() < most {
         let (mut color, mut depth, mut right) = (ColorImage::default(), DepthMap::default(), GrayImage::default());
-        match camera.next(Shot { color: &mut color, depth: &mut depth, right: &mut right }).unwrap() {
+        match camera.next(FrameBuffers { color: &mut color, depth: &mut depth, right: &mut right }).unwrap() {
             Captured::Frame(stamp) => frames.push((stamp, color, depth)),
             Captured::End => break,
             other => panic!("{other:?}"),
@@ -306,7 +310,7 @@ fn the_demonstration_goes_round_without_a_jump_until_its_end() {
     let mut camera = Demo::new(None).unwrap();
     let info = camera.info();
     assert_eq!((info.size, info.period_ns, info.frames), (demo::SIZE_PX, 41_666_667, None));
-    assert!(info.brings == Brings::Depth && !info.live);
+    assert!(info.frame_data == FrameData::Depth && !info.live);
     let lap = demo::FRAMES as usize;
     let frames = demonstrated(&mut camera, lap + 1);
     assert!(frames.iter().zip(0..).all(|((stamp, ..), index)| stamp.index == index));
@@ -318,7 +322,7 @@ fn the_demonstration_goes_round_without_a_jump_until_its_end() {
     // Two frames are read, some are skipped, then comes the end.
     let mut camera = Demo::new(Some(9)).unwrap();
     assert_eq!(demonstrated(&mut camera, 2).len(), 2);
-    assert_eq!(camera.skip(200_000_000), 3);
+    assert_eq!(camera.skip_until(200_000_000), 3);
     let rest = demonstrated(&mut camera, 100);
     assert_eq!(rest.len(), 4);
     assert!(rest[0].1 == frames[5].1 && rest[0].2 == frames[5].2);

@@ -5,8 +5,8 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-use bokehcam::capture::replay::{Part, Replay};
-use bokehcam::capture::{Brings, Camera, Captured, Shot};
+use bokehcam::capture::replay::{PlayRange, Replay};
+use bokehcam::capture::{Camera, Captured, FrameBuffers, FrameData};
 use bokehcam::depth::beside::Beside;
 use bokehcam::depth::recorded::Recorded;
 use bokehcam::depth::{DepthError, DepthSource, FrameInput};
@@ -26,7 +26,7 @@ use crate::until::found;
 const PATIENCE: Duration = Duration::from_secs(60);
 
 fn looped(dir: &Path, start_s: f64) -> Replay {
-    Replay::new(open(dir), "test recording", &Part { start_s, looped: true, ..Part::default() }).unwrap()
+    Replay::new(open(dir), "test recording", &PlayRange { start_s, looped: true, ..PlayRange::default() }).unwrap()
 }
 
 #[test]
@@ -48,8 +48,8 @@ fn the_frame_that_is_asked_for_comes_next_and_media_time_only_goes_on() {
     assert!(frames.iter().map(|frame| frame.1).eq((0..14).map(|k| 40 * k)), "a period after each other: {frames:?}");
     // A requested frame is never skipped; later ones may be.
     camera.seek(2);
-    assert_eq!(camera.skip(14 * STEP_NS), 0);
-    assert_eq!(camera.skip(16 * STEP_NS), 2);
+    assert_eq!(camera.skip_until(14 * STEP_NS), 0);
+    assert_eq!(camera.skip_until(16 * STEP_NS), 2);
     assert_eq!(play(&mut camera, 1), [(4, 640, 4)]);
 }
 
@@ -57,18 +57,18 @@ fn the_frame_that_is_asked_for_comes_next_and_media_time_only_goes_on() {
 fn a_part_is_sought_in_by_its_own_places_and_ends_where_it_did() {
     let folder = tempfile::tempdir().unwrap();
     record(folder.path(), false);
-    let part = Part { start_s: 0.08, end_s: Some(0.28), ..Part::default() };
+    let part = PlayRange { start_s: 0.08, end_s: Some(0.28), ..PlayRange::default() };
     let mut camera = Replay::new(open(folder.path()), "test recording", &part).unwrap();
     let seeker = camera.seeker().unwrap();
     assert_eq!((seeker.frames(), seeker.length_ns()), (5, 5 * STEP_NS));
     let stamp = |index| Stamp { index, time_ns: 0, captured_ns: None };
-    assert_eq!([2, 6].map(|index| seeker.place_of(stamp(index))), [0, 4]);
+    assert_eq!([2, 6].map(|index| seeker.position_of(stamp(index))), [0, 4]);
     camera.seek(4);
     assert_eq!(play(&mut camera, 9), [(6, 0, 6)]);
     camera.seek(1);
     assert_eq!(play(&mut camera, 9).len(), 4, "from the second to the last");
     // The limit on the number of frames holds across seeks.
-    let mut few = Replay::new(open(folder.path()), "test recording", &Part { frames: Some(3), ..part }).unwrap();
+    let mut few = Replay::new(open(folder.path()), "test recording", &PlayRange { frames: Some(3), ..part }).unwrap();
     few.seek(4);
     assert_eq!(play(&mut few, 9).len(), 1);
     few.seek(0);
@@ -80,26 +80,26 @@ fn the_newest_wish_counts_and_each_counts_once() {
     let folder = tempfile::tempdir().unwrap();
     record(folder.path(), false);
     let seeker = looped(folder.path(), 0.0).seeker().unwrap();
-    assert_eq!(seeker.request_after(0), None);
-    assert_eq!([3, 8, 99].map(|place| seeker.go_to(place)), [1, 2, 3]);
-    let wish = seeker.request_after(0).unwrap();
-    assert_eq!((wish.number, wish.place, seeker.request_after(3)), (3, 9, None));
+    assert_eq!(seeker.newer_request(0), None);
+    assert_eq!([3, 8, 99].map(|place| seeker.request_frame(place)), [1, 2, 3]);
+    let wish = seeker.newer_request(0).unwrap();
+    assert_eq!((wish.number, wish.position, seeker.newer_request(3)), (3, 9, None));
 }
 
 #[test]
 fn the_right_eye_is_that_of_the_frame() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("recordings/stereo");
     let recording = Arc::new(Recording::open(&folder, &Options::default()).unwrap());
-    let part = Part { looped: true, ..Part::default() };
-    let mut camera = Replay::new(Arc::clone(&recording), "stereo", &part).unwrap().with_right_eye();
-    assert_eq!(camera.info().brings, Brings::RightCamera);
+    let part = PlayRange { looped: true, ..PlayRange::default() };
+    let mut camera = Replay::new(Arc::clone(&recording), "stereo", &part).unwrap().with_right_camera();
+    assert_eq!(camera.info().frame_data, FrameData::RightCamera);
     let (mut color, mut depth, mut right) = (ColorImage::default(), DepthMap::default(), GrayImage::default());
     let (mut scratch, mut own_color, mut own_right) = (Scratch::default(), ColorImage::default(), GrayImage::default());
     let last = recording.len() - 1;
     assert!(last > 1);
     for place in [last, 0, last / 2] {
         camera.seek(place);
-        let shot = Shot { color: &mut color, depth: &mut depth, right: &mut right };
+        let shot = FrameBuffers { color: &mut color, depth: &mut depth, right: &mut right };
         let Captured::Frame(stamp) = camera.next(shot).unwrap() else { panic!("frame {place}") };
         recording.read_color(place, &mut scratch, &mut own_color).unwrap();
         recording.read_right(place, &mut scratch, &mut own_right).unwrap();
@@ -118,7 +118,7 @@ fn depth_of_another_recording_stays_beside_the_colours() {
         if let Some(place) = place {
             depth.seek(camera.seek(place));
         }
-        let shot = Shot { color: &mut color, depth: &mut DepthMap::default(), right: &mut right };
+        let shot = FrameBuffers { color: &mut color, depth: &mut DepthMap::default(), right: &mut right };
         let Captured::Frame(stamp) = camera.next(shot).unwrap() else { panic!("{place:?}") };
         depth.read(seen(stamp), &mut map).unwrap();
         let expected_m = 1.0 + 0.1 * f32::from(color.rgb[0]);
@@ -173,7 +173,7 @@ fn while_nobody_watches_each_wish_brings_its_one_frame_with_its_depth() {
         // Stops the run even if a check fails.
         let _end = SetAtEnd(&stop);
         for (number, place) in [(1, 6), (2, 7), (3, 0), (4, 9)] {
-            assert_eq!(seeker.go_to(place), number);
+            assert_eq!(seeker.request_frame(place), number);
             next(&mut views, number, place);
         }
         // With a viewer, playback continues from there, across the seam.

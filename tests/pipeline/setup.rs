@@ -4,10 +4,10 @@ use std::cell::Cell;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use bokehcam::budget::Quality;
-use bokehcam::capture::{Brings, Camera};
+use bokehcam::capture::{Camera, FrameData};
 use bokehcam::depth::focus::FocusRule;
 use bokehcam::look::{Effect, Look, Strength};
-use bokehcam::pipeline::{Blurring, Pace, PipelineError, Progress, Run, run};
+use bokehcam::pipeline::{BlurSetup, Pace, PipelineError, Progress, Run, run};
 use bokehcam::sink::Sink;
 use bokehcam::stats::Report;
 
@@ -17,7 +17,7 @@ use super::fakes::*;
 pub struct Setup {
     pub frames: usize,
     pub corrupt_every: usize,
-    pub brings: Brings,
+    pub frame_data: FrameData,
     pub camera: Trouble,
     pub depth: Option<Trouble>,
     pub bokeh: Option<FakeBokeh>,
@@ -37,7 +37,7 @@ pub fn dof_with(focus: FocusRule, max_coc_px: f32) -> Look {
         strength: Strength::AtInfinity(8.0),
         max_coc_px: Some(max_coc_px),
         quality: Some(Quality::Fast),
-        ..Look::plain(Effect::Dof)
+        ..Look::with_effect(Effect::Dof)
     }
 }
 
@@ -47,7 +47,7 @@ pub fn dof() -> Look {
 
 /// Returns a blur of one radius everywhere.
 pub fn uniform(radius_px: f32) -> Look {
-    Look { strength: Strength::AtInfinity(radius_px), quality: Some(Quality::Fast), ..Look::plain(Effect::Blur) }
+    Look { strength: Strength::AtInfinity(radius_px), quality: Some(Quality::Fast), ..Look::with_effect(Effect::Blur) }
 }
 
 impl Setup {
@@ -55,7 +55,7 @@ impl Setup {
         Self {
             frames,
             corrupt_every: NEVER,
-            brings: Brings::Color,
+            frame_data: FrameData::Color,
             camera: Trouble::default(),
             depth: Some(Trouble::default()),
             bokeh: Some(fake_bokeh(2, Trouble::default())),
@@ -74,11 +74,11 @@ impl Setup {
         let received = Received::default();
         let stop = AtomicBool::new(false);
         let last = Cell::new(None::<Progress>);
-        let (corrupt_every, brings, trouble) = (self.corrupt_every, self.brings, self.camera);
-        let camera = FakeCamera { corrupt_every, brings, trouble, ..fake_camera(self.frames) };
+        let (corrupt_every, frame_data, trouble) = (self.corrupt_every, self.frame_data, self.camera);
+        let camera = FakeCamera { corrupt_every, frame_data, trouble, ..fake_camera(self.frames) };
         let depth = self.depth.map(fake_depth);
         let bokeh = self.bokeh.map(|bokeh| Box::new(bokeh) as _);
-        let blurring = Blurring { look: self.look, bokeh, adaptive: false, changes: None };
+        let blurring = BlurSetup { look: self.look, bokeh, adaptive: false, changes: None };
         let (trouble, closes_at, finish_fails) = (self.sink, self.closes_at, self.finish_fails);
         let sink = FakeSink { trouble, closes_at, finish_fails, ..fake_sink(&received) };
         let result = run(Run {
@@ -92,7 +92,7 @@ impl Setup {
                     stop.store(true, Ordering::Relaxed);
                 }
             },
-            ..Run::of(Box::new(camera), depth, blurring, Box::new(sink), &stop)
+            ..Run::with_blur(Box::new(camera), depth, blurring, Box::new(sink), &stop)
         });
         let report = match &result {
             Ok(report) => report,
@@ -108,6 +108,6 @@ impl Setup {
 }
 
 pub fn simple<'a>(camera: Box<dyn Camera>, sink: Box<dyn Sink>, stop: &'a AtomicBool, pace: Pace) -> Run<'a> {
-    let run = Run::new(camera, None, Look::plain(Effect::None), sink, stop).unwrap();
+    let run = Run::new(camera, None, Look::with_effect(Effect::None), sink, stop).unwrap();
     Run { look: uniform(3.0), pace, budget_ns: PERIOD_NS, ..run }
 }

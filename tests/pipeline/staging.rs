@@ -6,12 +6,12 @@ use crate::common;
 use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex};
 
-use bokehcam::capture::{Brings, Camera, Captured, SourceInfo};
+use bokehcam::capture::{Camera, Captured, FrameData, SourceInfo};
 use bokehcam::depth::backdrop::Behind;
 use bokehcam::depth::focus::FocusRule;
 use bokehcam::frame::{ColorImage, DepthMap, Stamp};
 use bokehcam::link;
-use bokehcam::look::{Effect, Follow, Look, Strength};
+use bokehcam::look::{Effect, FramingZoom, Look, Strength};
 use bokehcam::pipeline::{Run, View, run};
 use bokehcam::sink::Null;
 use common::{color, depth};
@@ -46,7 +46,8 @@ impl Walk {
 
     fn camera() -> Box<dyn Camera> {
         let (name, frames) = ("walk".into(), Some(u64::from(FRAMES)));
-        let info = SourceInfo { name, size: SIZE, period_ns: 33_333_333, frames, live: false, brings: Brings::Depth };
+        let info =
+            SourceInfo { name, size: SIZE, period_ns: 33_333_333, frames, live: false, frame_data: FrameData::Depth };
         camera_by(info, |index, shot| {
             if index == FRAMES as usize {
                 return Captured::End;
@@ -70,13 +71,13 @@ fn stream(look: &Look, mirror: bool) -> Vec<ColorImage> {
 
 fn dof() -> Look {
     let strength = Strength::AtInfinity(6.0);
-    Look { focus: FocusRule::Metres(1.0), strength, ..Look::plain(Effect::Dof) }
+    Look { focus: FocusRule::Metres(1.0), strength, ..Look::with_effect(Effect::Dof) }
 }
 
 #[test]
 fn the_wall_is_gone_to_the_last_trace_and_the_person_is_as_they_were() {
     let green = [0, 177, 64];
-    let frames = stream(&Look { behind: Behind::Color(green), ..dof() }, false);
+    let frames = stream(&Look { background: Behind::Color(green), ..dof() }, false);
     for (frame, picture) in (0..FRAMES).zip(&frames) {
         let (taken, _) = Walk::taken(frame);
         for (at, (pixel, own)) in picture.rgb.as_chunks::<3>().0.iter().zip(taken.rgb.as_chunks::<3>().0).enumerate() {
@@ -100,7 +101,7 @@ fn the_wall_is_gone_to_the_last_trace_and_the_person_is_as_they_were() {
 fn who_looks_on_sees_what_was_taken_beside_what_became_of_it() {
     let (green, stop) = ([0, 177, 64], AtomicBool::new(false));
     let (sender, mut views) = link::lossless::<View>();
-    let look = Look { behind: Behind::Color(green), ..dof() };
+    let look = Look { background: Behind::Color(green), ..dof() };
     let made = Run::new(Walk::camera(), None, look, Box::new(Null), &stop).unwrap();
     let seen = std::thread::scope(|scope| {
         let seen = scope.spawn(move || {
@@ -133,7 +134,8 @@ fn seen(picture: &ColorImage) -> (f32, f32) {
 
 #[test]
 fn who_walks_stays_in_the_middle_and_is_no_larger_than_was_said() {
-    let (whole, followed) = (stream(&dof(), false), stream(&Look { follow: Follow::to(1.4), ..dof() }, false));
+    let (whole, followed) =
+        (stream(&dof(), false), stream(&Look { follow: FramingZoom::from_zoom(1.4), ..dof() }, false));
     let (before, after) = (seen(&whole[0]), seen(&followed[0]));
     assert!(
         (before.0 - 0.35).abs() < 0.02 && after.0 > 0.36 && after.0 < 0.5,
@@ -146,7 +148,7 @@ fn who_walks_stays_in_the_middle_and_is_no_larger_than_was_said() {
     assert!((last.0 - 0.5).abs() < 0.06, "{last:?}");
     let larger = (last.1 / seen(&whole[FRAMES as usize - 1]).1).sqrt();
     assert!((1.1..1.41).contains(&larger), "{larger}");
-    let mirrored = stream(&Look { follow: Follow::to(1.4), ..dof() }, true);
+    let mirrored = stream(&Look { follow: FramingZoom::from_zoom(1.4), ..dof() }, true);
     for (picture, mirrored) in followed.iter().zip(&mirrored) {
         assert!((seen(picture).0 + seen(mirrored).0 - 1.0).abs() < 0.002, "mirrored after it was cut out");
     }

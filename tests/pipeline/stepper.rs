@@ -3,8 +3,8 @@
 use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex};
 
-use bokehcam::computing::Computing;
-use bokehcam::engine::Stepper;
+use bokehcam::computing::ComputeOptions;
+use bokehcam::engine::FrameProcessor;
 use bokehcam::frame::ColorImage;
 use bokehcam::look::{Effect, Look};
 use bokehcam::pipeline::{self, Run};
@@ -20,10 +20,10 @@ fn every_frame_is_that_of_a_run() {
     let recording = Recording::open(&dir, &Options::default()).unwrap();
     let followed = Look {
         follow: "1.5".parse().unwrap(),
-        behind: bokehcam::depth::backdrop::Behind::Color([0, 99, 9]),
+        background: bokehcam::depth::backdrop::Behind::Color([0, 99, 9]),
         ..Look::default()
     };
-    for look in [Look::default(), followed, Look::plain(Effect::TiltShift), Look::plain(Effect::None)] {
+    for look in [Look::default(), followed, Look::with_effect(Effect::TiltShift), Look::with_effect(Effect::None)] {
         let source =
             Source::open(&dir.to_str().unwrap().parse().unwrap(), &source::Options::default(), Some(&look)).unwrap();
         let (kept, stop) = (Arc::<Mutex<Vec<ColorImage>>>::default(), AtomicBool::new(false));
@@ -33,18 +33,19 @@ fn every_frame_is_that_of_a_run() {
         pipeline::run(run).unwrap();
         let kept = kept.lock().unwrap();
         assert_eq!(kept.len(), recording.len());
-        let mut stepper = Stepper::new(&look, recording.size(), true, true, Computing::default()).unwrap();
+        let mut processor =
+            FrameProcessor::new(&look, recording.size(), true, true, ComputeOptions::default()).unwrap();
         // Asking for depth would be wasted work where the effect does not follow it.
-        assert_eq!(stepper.needs_depth(), look.effect.follows_depth(), "{:?}", look.effect);
+        assert_eq!(processor.needs_depth(), look.effect.follows_depth(), "{:?}", look.effect);
         let mut scratch = Scratch::default();
         for (index, wanted) in kept.iter().enumerate() {
-            let needs_depth = stepper.needs_depth();
-            let (color, depth) = stepper.frame();
+            let needs_depth = processor.needs_depth();
+            let (color, depth) = processor.frame_buffers();
             recording.read_color(index, &mut scratch, color).unwrap();
             if needs_depth {
                 recording.read_depth(index, &mut scratch, depth).unwrap();
             }
-            assert!(stepper.step(recording.time_ns(index)).unwrap() == wanted, "{:?} frame {index}", look.effect);
+            assert!(processor.process(recording.time_ns(index)).unwrap() == wanted, "{:?} frame {index}", look.effect);
         }
     }
 }
@@ -53,15 +54,15 @@ fn every_frame_is_that_of_a_run() {
 fn quality_follows_the_time_only_once_that_is_said_and_where_it_may() {
     let size = (320, 240);
     let last = |look: &Look, budget_ns: Option<u64>| {
-        let mut stepper = Stepper::new(look, size, false, true, Computing::default()).unwrap();
-        budget_ns.into_iter().for_each(|budget_ns| stepper.allow(budget_ns));
+        let mut processor = FrameProcessor::new(look, size, false, true, ComputeOptions::default()).unwrap();
+        budget_ns.into_iter().for_each(|budget_ns| processor.set_budget(budget_ns));
         for frame in 0..20 {
-            stepper.frame().0.rgb.fill(90);
-            stepper.step(frame).unwrap();
+            processor.frame_buffers().0.rgb.fill(90);
+            processor.process(frame).unwrap();
         }
-        stepper.quality().unwrap().name()
+        processor.quality().unwrap().name()
     };
-    let look = Look::plain(Effect::Blur);
+    let look = Look::with_effect(Effect::Blur);
     assert_eq!(last(&look, None), "balanced");
     assert_eq!(last(&look, Some(1)), "draft");
     assert_eq!(last(&Look { quality: Some(bokehcam::budget::Quality::High), ..look }, Some(1)), "high");

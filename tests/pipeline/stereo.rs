@@ -7,7 +7,7 @@ use std::time::Duration;
 use bokehcam::bokeh::aperture::Aperture;
 use bokehcam::bokeh::{self, Backend, Method};
 use bokehcam::budget::Quality;
-use bokehcam::capture::{Brings, Camera, Captured, Shot, SourceInfo};
+use bokehcam::capture::{Camera, Captured, FrameBuffers, FrameData, SourceInfo};
 use bokehcam::depth::focus::FocusRule;
 use bokehcam::depth::stereo::source::StereoDepth;
 use bokehcam::depth::stereo::{self, Effort, Matcher, Settings};
@@ -22,7 +22,7 @@ use crate::planes;
 use crate::setup::*;
 
 fn two_eyes(frames: usize) -> FakeCamera {
-    FakeCamera { brings: Brings::RightCamera, ..fake_camera(frames) }
+    FakeCamera { frame_data: FrameData::RightCamera, ..fake_camera(frames) }
 }
 
 /// Creates a matcher of small pictures.
@@ -66,7 +66,12 @@ fn depth_from_two_eyes_of_a_camera_with_one_is_an_error() {
     let stop = AtomicBool::new(false);
     let matcher = matcher(SIZE);
     let error = run(Run {
-        depth: Some(Box::new(StereoDepth::of_rectified("fake camera", StereoRig::assumed(SIZE.0), matcher, 16))),
+        depth: Some(Box::new(StereoDepth::of_rectified(
+            "fake camera",
+            StereoRig::default_for_width(SIZE.0),
+            matcher,
+            16,
+        ))),
         bokeh: Some(Box::new(fake_bokeh(2, Trouble::default()))),
         look: dof(),
         ..simple(Box::new(fake_camera(5)), Box::new(fake_sink(&Received::default())), &stop, Pace::Asap)
@@ -124,9 +129,9 @@ fn without_time_depth_is_made_with_less_effort_and_every_picture_is_straightened
 
 /// The square before the wall, once.
 fn two_planes() -> Box<dyn Camera> {
-    let (name, frames, brings) = ("two planes".into(), Some(1), Brings::RightCamera);
-    let info = SourceInfo { name, size: planes::SIZE, period_ns: 33_000_000, frames, live: false, brings };
-    camera_by(info, |index, Shot { color, right, .. }| {
+    let (name, frames, frame_data) = ("two planes".into(), Some(1), FrameData::RightCamera);
+    let info = SourceInfo { name, size: planes::SIZE, period_ns: 33_000_000, frames, live: false, frame_data };
+    camera_by(info, |index, FrameBuffers { color, right, .. }| {
         (*color, *right) = planes::seen();
         let stamp = Stamp { index, time_ns: 0, captured_ns: None };
         if index == 0 { Captured::Frame(stamp) } else { Captured::End }
@@ -150,14 +155,16 @@ fn what_has_the_disparity_of_the_focus_is_sharp_and_the_rest_is_not() {
         near_max_px: 16.0,
     };
     // For any rig: it does not determine the blur.
-    for rig in [StereoRig::assumed(width), StereoRig { focal_px: 300.0, baseline_m: 0.5, doffs_px: 0.0, metric: true }]
-    {
+    for rig in [
+        StereoRig::default_for_width(width),
+        StereoRig { focal_px: 300.0, baseline_m: 0.5, doffs_px: 0.0, metric: true },
+    ] {
         for (focus, near_is_sharp) in [((0.5, 0.5), true), ((0.85, 0.1), false)] {
             let (stop, received) = (AtomicBool::new(false), Received::default());
             let matcher = matcher((width, height));
             run(Run {
                 depth: Some(Box::new(StereoDepth::of_rectified("two planes", rig, matcher, 16))),
-                bokeh: Some(bokeh::create(&settings, (width, height), None, Some(1)).unwrap()),
+                bokeh: Some(bokeh::create_blur(&settings, (width, height), None, Some(1)).unwrap()),
                 look: dof_with(FocusRule::Point { x: focus.0, y: focus.1 }, 16.0),
                 ..simple(two_planes(), Box::new(fake_sink(&received)), &stop, Pace::Asap)
             })

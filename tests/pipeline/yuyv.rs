@@ -4,8 +4,8 @@ use std::ops::ControlFlow;
 use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex};
 
-use bokehcam::bokeh::{Finished, Job, PassTimes, Picture};
-use bokehcam::capture::Brings;
+use bokehcam::bokeh::{BlurredFrame, Job, PassTimes, Picture};
+use bokehcam::capture::FrameData;
 use bokehcam::compute::Backend;
 use bokehcam::depth::focus::FocusRule;
 use bokehcam::frame::{ColorImage, YuyvImage};
@@ -26,14 +26,14 @@ fn ready() -> FakeBokeh {
             Some(mut yuyv) => {
                 yuyv.resize(SIZE.0, SIZE.1);
                 yuyv.bytes.as_chunks_mut().0.fill([low, high]);
-                Picture::as_yuyv(yuyv, out)
+                Picture::from_yuyv(yuyv, out)
             }
             None => {
                 out.rgb.as_chunks_mut().0.fill([low, high, 0]);
-                Picture::in_memory(out)
+                Picture::from_memory(out)
             }
         };
-        Finished { ticket, picture, color, depth, times: PassTimes::new() }
+        BlurredFrame { ticket, picture, color, depth, times: PassTimes::new() }
     };
     FakeBokeh { backend: Backend::Gpu, makes: Box::new(makes), ..fake_bokeh(3, Trouble::default()) }
 }
@@ -81,7 +81,7 @@ const FRAMES: usize = 400;
 /// camera wants YUYV.
 fn came(look: Look, wants: fn(usize) -> bool, change: impl FnOnce(&mut Run)) -> Vec<(bool, u16)> {
     let (came, stop) = (Came::default(), AtomicBool::new(false));
-    let camera = FakeCamera { brings: Brings::Depth, ..fake_camera(FRAMES) };
+    let camera = FakeCamera { frame_data: FrameData::Depth, ..fake_camera(FRAMES) };
     let sink = Camera { came: Arc::clone(&came), last: vec![0; 2 * (SIZE.0 * SIZE.1) as usize], wants };
     let mut blurred = Run::new(Box::new(camera), None, look, Box::new(sink), &stop).unwrap();
     blurred.bokeh = Some(Box::new(ready()));

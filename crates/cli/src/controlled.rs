@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use crate::error::CliError;
 use crate::settings::{changes, unused};
 use bokehcam::control::{self, Answer, Claim, ControlError, Name};
-use bokehcam::controller::{Facts, Rules};
+use bokehcam::controller::{Rules, SourceFacts};
 use bokehcam::look::{Look, Patch, Strength};
 use bokehcam::source::{self, DepthOrigin};
 
@@ -14,8 +14,8 @@ use bokehcam::source::{self, DepthOrigin};
 ///
 /// # Errors
 /// Fails if the name is taken.
-pub fn claim(name: Option<&Name>, command: &'static str) -> Result<Result<Claim, String>, CliError> {
-    match control::claim(name, command) {
+pub fn claim_name(name: Option<&Name>, command: &'static str) -> Result<Result<Claim, String>, CliError> {
+    match control::claim_name(name, command) {
         Ok(claim) => Ok(Ok(claim)),
         Err(ControlError::NoFolder(why)) => Ok(Err(format!("`bokehcam ctl` cannot reach this {command}: {why}"))),
         Err(error) => Err(CliError::Usage(error.to_string())),
@@ -26,7 +26,7 @@ pub fn claim(name: Option<&Name>, command: &'static str) -> Result<Result<Claim,
 pub fn to_answer(error: &CliError) -> Answer {
     match error {
         CliError::Exists(path) => Answer::failed(format!("{} exists: choose another name", path.display())),
-        error if error.is_wrong_argument() => Answer::usage(error.to_string()),
+        error if error.is_wrong_argument() => Answer::invalid_request(error.to_string()),
         error => Answer::failed(error.to_string()),
     }
 }
@@ -36,20 +36,20 @@ pub struct CommandLineRules {
     /// The settings file chosen by `--config`, if any.
     pub config: Option<PathBuf>,
     /// Facts for warnings about settings without effect, except those that follow from source and look.
-    pub unused: unused::Run,
+    pub unused: unused::RunFacts,
 }
 
 impl Rules for CommandLineRules {
-    fn settings(&self, settings: &[String]) -> Result<Patch, Answer> {
-        changes::patch(settings).map_err(|error| to_answer(&error))
+    fn parse_settings(&self, settings: &[String]) -> Result<Patch, Answer> {
+        changes::parse_patch(settings).map_err(|error| to_answer(&error))
     }
 
-    fn preset(&self, name: &str) -> Result<Patch, Answer> {
-        changes::preset(self.config.as_deref(), name).map_err(|error| to_answer(&error))
+    fn load_preset(&self, name: &str) -> Result<Patch, Answer> {
+        changes::load_preset(self.config.as_deref(), name).map_err(|error| to_answer(&error))
     }
 
-    fn changed(&self, patch: &Patch, look: &Look, facts: &Facts) -> Result<(Look, Option<String>), Answer> {
-        apply_patch(patch, look, facts, self.unused).map_err(|error| to_answer(&error))
+    fn apply_patch(&self, patch: &Patch, look: &Look, facts: &SourceFacts) -> Result<(Look, Option<String>), Answer> {
+        apply_checked_patch(patch, look, facts, self.unused).map_err(|error| to_answer(&error))
     }
 }
 
@@ -57,33 +57,35 @@ impl Rules for CommandLineRules {
 ///
 /// # Errors
 /// Fails if the run cannot have this look.
-fn apply_patch(
+fn apply_checked_patch(
     patch: &Patch,
     look: &Look,
-    facts: &Facts,
-    command: unused::Run,
+    facts: &SourceFacts,
+    command: unused::RunFacts,
 ) -> Result<(Look, Option<String>), CliError> {
     if let Some(effect) = patch.effect.filter(|effect| effect.follows_depth() && !facts.has_depth) {
         return Err(CliError::Usage(format!(
-            "--effect {effect} follows depth, and this run has none: use --effect blur or tilt-shift"
+            "--effect {effect} needs depth, and this run has none: use --effect blur or tilt-shift"
         )));
     }
-    let look = source::fitting_look(&patch.apply_to(look)?, &facts.depth_choice, facts.has_depth)?;
+    let look = source::adapt_look(&patch.apply_to(look)?, &facts.depth_choice, facts.has_depth)?;
     let uses_depth = look.effect.follows_depth();
     match facts.depth_from {
-        DepthOrigin::Networks | DepthOrigin::Plate if uses_depth => source::refuse_metres(&look, "one camera knows")?,
-        DepthOrigin::Relative if uses_depth => source::refuse_metres(&look, source::INVERSE_TELLS)?,
+        DepthOrigin::Networks | DepthOrigin::Plate if uses_depth => {
+            source::reject_metric_look(&look, "one camera gives")?
+        }
+        DepthOrigin::Relative if uses_depth => source::reject_metric_look(&look, source::INVERSE_DEPTH_GIVES)?,
         _ => {}
     }
-    let run = unused::Run {
-        source: unused::From::Source(facts.kind),
+    let run = unused::RunFacts {
+        source: unused::FrameOrigin::Source(facts.kind),
         depth: if facts.has_depth { facts.depth_from } else { DepthOrigin::Nothing },
         uses_depth,
         effect: look.effect,
         lens: matches!(look.strength, Strength::Lens(_)),
         ..command
     };
-    let note = unused::note(&patch.values(), &run);
-    look.settings(facts.size, command.realtime).map_or(Ok(()), |settings| settings.check(facts.size))?;
+    let note = unused::describe_unused(&patch.values(), &run);
+    look.blur_settings(facts.size, command.realtime).map_or(Ok(()), |settings| settings.check(facts.size))?;
     Ok((look, note))
 }

@@ -87,15 +87,15 @@ pub enum CliError {
     #[cfg(feature = "camera")]
     Node(#[from] bokehcam::v4l2::node::NodeError),
     /// The file is not a video device.
-    #[error("{}: this is no video device", .0.display())]
+    #[error("{}: this is not a video device", .0.display())]
     #[cfg(feature = "camera")]
     NotVideo(PathBuf),
     /// The name matches no PipeWire camera.
-    #[error("there is no camera '{0}' in PipeWire; `bokehcam devices` lists what there is")]
+    #[error("there is no camera '{0}' in PipeWire; `bokehcam devices` lists the cameras")]
     #[cfg(feature = "camera")]
     NoPipeWireCamera(String),
     /// `doctor` found essential parts missing.
-    #[error("there is no {0} to work with: see above for what to do")]
+    #[error("there is no {0}: see above for what to do")]
     #[cfg(feature = "camera")]
     NotReady(String),
     /// A picture or a recording cannot be read or written.

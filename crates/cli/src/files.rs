@@ -33,7 +33,7 @@ pub fn refuse_overwrite<'a>(paths: impl IntoIterator<Item = &'a Path>, force: bo
 ///
 /// # Errors
 /// [`CliError::Usage`] if `target`, the value of the option `what`, is `source`, lies in it, or contains it.
-pub fn refuse_source(what: &str, target: &Path, source: &Path) -> Result<(), CliError> {
+pub fn refuse_overwriting_source(what: &str, target: &Path, source: &Path) -> Result<(), CliError> {
     if !place::overlap(target, source) {
         return Ok(());
     }
@@ -41,17 +41,17 @@ pub fn refuse_source(what: &str, target: &Path, source: &Path) -> Result<(), Cli
     let how = match (to == from, to.starts_with(&from)) {
         (true, _) => "this is",
         (_, true) => "this lies in",
-        _ => "this holds",
+        _ => "this contains",
     };
     let (target, source) = (target.display(), source.display());
-    Err(CliError::Usage(format!("{what} {target}: {how} {source}, which is read; choose another place")))
+    Err(CliError::Usage(format!("{what} {target}: {how} {source}, which is the input; choose another place")))
 }
 
 /// Writes a file atomically; `replace` allows an existing one.
 ///
 /// # Errors
 /// [`CliError::Exists`] if the file exists without `replace`; [`CliError::Io`] if it cannot be written.
-pub fn write_whole(path: &Path, bytes: &[u8], replace: bool) -> Result<(), CliError> {
+pub fn write_atomically(path: &Path, bytes: &[u8], replace: bool) -> Result<(), CliError> {
     whole::write(path, bytes, replace).map_err(|error| match error.kind() {
         ErrorKind::AlreadyExists => CliError::Exists(path.to_owned()),
         _ => CliError::io(path)(error),
@@ -62,7 +62,7 @@ pub fn write_whole(path: &Path, bytes: &[u8], replace: bool) -> Result<(), CliEr
 ///
 /// # Errors
 /// [`CliError::Io`] if it cannot be created.
-pub fn make_folder_of(path: &Path) -> Result<(), CliError> {
+pub fn create_parent_folder(path: &Path) -> Result<(), CliError> {
     match path.parent().filter(|folder| !folder.as_os_str().is_empty()) {
         Some(folder) => fs::create_dir_all(folder).map_err(CliError::io(folder)),
         None => Ok(()),
@@ -71,7 +71,7 @@ pub fn make_folder_of(path: &Path) -> Result<(), CliError> {
 
 /// Warns of hidden files that killed runs left in the folders of `paths`. Removing them is left to the user: where
 /// machines share a folder but not its locks, another run may still be writing one.
-pub fn report_leftovers<'a>(paths: impl IntoIterator<Item = &'a Path>) {
+pub fn warn_of_leftovers<'a>(paths: impl IntoIterator<Item = &'a Path>) {
     let folder_of = |path: &'a Path| match path.parent() {
         _ if path.is_dir() => path,
         Some(folder) if !folder.as_os_str().is_empty() => folder,
@@ -85,7 +85,7 @@ pub fn report_leftovers<'a>(paths: impl IntoIterator<Item = &'a Path>) {
             let more = left.len() - names.len();
             let more = if more == 0 { String::new() } else { format!(" and {more} more") };
             log::warn(&format!(
-                "runs that were killed left hidden files: {}{more}; give those that you want another name, and remove the rest",
+                "killed runs left hidden files: {}{more}; rename those that you want to keep, and remove the rest",
                 names.join(", ")
             ));
         }

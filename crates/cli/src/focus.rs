@@ -19,16 +19,16 @@ pub fn warn_of_focus(look: &Look, size: (u32, u32), map: &DepthMap, in_units: bo
     else {
         return;
     };
-    if let CocField::Depth(coc) = lens.field((focus_m, range_m), size.0, max_coc_px)
-        && let Some(why) = out_of_focus(&coc, map)
+    if let CocField::Depth(coc) = lens.coc_field((focus_m, range_m), size.0, max_coc_px)
+        && let Some(why) = describe_out_of_focus(&coc, map)
     {
-        let scale = if in_units { "; is --depth-scale that of this depth?" } else { "" };
+        let scale = if in_units { "; is --depth-scale right for this depth?" } else { "" };
         log::warn(&format!("--focus {focus_m}: {why}{scale}"));
     }
 }
 
 /// Describes why nothing is sharp, if so.
-fn out_of_focus(coc: &DepthCoc, map: &DepthMap) -> Option<String> {
+fn describe_out_of_focus(coc: &DepthCoc, map: &DepthMap) -> Option<String> {
     let mut known: Vec<f32> = map.metres.iter().copied().filter(|&metres| DepthMap::is_known(metres)).collect();
     if known.is_empty() {
         return Some("no depth is known anywhere".to_string());
@@ -46,9 +46,7 @@ fn out_of_focus(coc: &DepthCoc, map: &DepthMap) -> Option<String> {
         *known.select_nth_unstable_by(index, f32::total_cmp).1
     };
     let (nearest_m, farthest_m) = (quantile_m(1.0 - MIN_BLURRED_FRACTION), quantile_m(MIN_BLURRED_FRACTION));
-    Some(format!(
-        "the depth lies from {nearest_m:.3} to {farthest_m:.3} m, all of it {side} that, and nothing is sharp"
-    ))
+    Some(format!("the depth lies from {nearest_m:.3} to {farthest_m:.3} m, all of it {side} that, so nothing is sharp"))
 }
 
 #[cfg(test)]
@@ -60,13 +58,13 @@ mod tests {
         let coc = DepthCoc { coc_at_infinity_px: 16.0, focus_m: 1.5, range_m: 0.0, max_coc_px: 40.0 };
         let map = |metres: Vec<f32>| DepthMap { width: metres.len() as u32, height: 1, metres, ..DepthMap::default() };
         let metres = |scale: f32| (0..1000).map(|k| (0.5 + k as f32 * 0.004) * scale).collect::<Vec<f32>>();
-        assert_eq!(out_of_focus(&coc, &map(metres(1.0))), None);
-        let far = out_of_focus(&coc, &map(metres(5.0))).unwrap();
+        assert_eq!(describe_out_of_focus(&coc, &map(metres(1.0))), None);
+        let far = describe_out_of_focus(&coc, &map(metres(5.0))).unwrap();
         assert!(far.contains("from 2.7") && far.contains("beyond"), "{far}");
         let mut noisy = metres(5.0);
         noisy[..5].fill(1.5);
-        assert!(out_of_focus(&coc, &map(noisy)).is_some());
-        assert!(out_of_focus(&coc, &map(metres(0.2))).unwrap().contains("before"));
-        assert!(out_of_focus(&coc, &map(vec![0.0; 9])).unwrap().contains("no depth is known"));
+        assert!(describe_out_of_focus(&coc, &map(noisy)).is_some());
+        assert!(describe_out_of_focus(&coc, &map(metres(0.2))).unwrap().contains("before"));
+        assert!(describe_out_of_focus(&coc, &map(vec![0.0; 9])).unwrap().contains("no depth is known"));
     }
 }

@@ -2,7 +2,7 @@
 
 use clap::{Arg, Command, Id};
 
-use super::settings::table::{WINDOW_START, WINDOW_STATE, all_settings};
+use super::settings::table::{WINDOW_START, WINDOW_STATE, all_settings_command};
 
 /// Option that shows all pages.
 pub const ALL: &str = "--help-all";
@@ -53,14 +53,14 @@ const STREAM_ONLY: [&str; 3] = ["follow", "background-memory", "depth-calibratio
 /// Help of `--depth` for streams.
 pub const DEPTH: &str = "\
 Where depth comes from:
-  auto          the source's own; a lone camera's or photo's from an installed network
+  auto          the source's own; for a single camera or photo, from an installed network
   recorded      the source's own
-  stereo        its two eyes
-  none          nowhere: for the effects that need none
+  stereo        matching of the source's two cameras
+  none          no depth, for effects that need none
   matte[:FILE]  a network that finds the person: FILE.onnx, or the best that is installed
-  mono[:FILE]   a network that tells near from far; matte,mono is both together
-  plate[:FILE]  a picture of what is behind you, taken at the start if there is no FILE
-                (the camera stands still)
+  mono[:FILE]   a network that estimates distances; matte,mono is both together
+  plate[:FILE]  a picture of the background without you, taken at the start if there is no FILE
+                (the camera must not move)
   FOLDER        a recording, whose depth is played in a loop
   CAMERA        a depth camera: /dev/videoN, N, or part of its name";
 
@@ -68,12 +68,12 @@ Where depth comes from:
 const PICTURE_DEPTH: &str = "\
 Where depth comes from:
   auto          NAME-depth.png or .pfm beside the picture NAME, else an installed network
-  recorded      the file beside it alone
-  none          nowhere: for the effects that need none
+  recorded      only the file beside it
+  none          no depth, for effects that need none
   matte[:FILE]  a network that finds the person: FILE.onnx, or the best that is installed
-  mono[:FILE]   a network that tells near from far; matte,mono is both together
-  plate:FILE    a picture of what is behind the person
-  defocus       how sharp the picture is where, which is magnified";
+  mono[:FILE]   a network that estimates distances; matte,mono is both together
+  plate:FILE    a picture of the background without the person
+  defocus       the slight defocus of the picture itself, which is magnified";
 
 /// Settings with a shorter help for a single picture.
 const PICTURE_HELP: [(&str, &str); 4] = [
@@ -102,7 +102,7 @@ pub fn full_help(command: Command) -> Command {
 
 /// Hides the options that are not on the first pages.
 pub fn short_help(command: Command) -> Command {
-    let settings = all_settings();
+    let settings = all_settings_command();
     let ids: Vec<&Id> = settings.get_arguments().map(Arg::get_id).collect();
     hide_options(command, &ids)
 }

@@ -26,7 +26,7 @@ use std::ffi::OsString;
 use std::process::ExitCode;
 
 pub use error::CliError;
-use parse::{Parsed, Refusal};
+use parse::{ParseError, Parsed};
 use settings::file::SettingsFile;
 use settings::layers::Layers;
 use settings::{arguments, environment};
@@ -51,13 +51,13 @@ pub fn run(args: impl IntoIterator<Item = OsString>) -> ExitCode {
 /// Parses the arguments and runs the command; log lines may still be queued afterwards.
 fn run_command(args: &[OsString]) -> ExitCode {
     let fail = |error: &CliError, from: Option<(&SettingsFile, &Layers)>| {
-        log::error(&environment::with_origin(&error.to_string(), args, error.is_wrong_argument(), from));
+        log::error(&environment::append_origins(&error.to_string(), args, error.is_wrong_argument(), from));
         error.exit_code()
     };
     let Parsed { cli, matches, file, layers } = match parse::parse(args) {
         Ok(parsed) => parsed,
-        Err(Refusal::Settings(error)) => return fail(&error, None),
-        Err(Refusal::Arguments(error)) => return arguments::refuse(&error, args),
+        Err(ParseError::Settings(error)) => return fail(&error, None),
+        Err(ParseError::Arguments(error)) => return arguments::refuse(&error, args),
     };
     log::start(&cli.global);
     #[cfg(feature = "networks")]

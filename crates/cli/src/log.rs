@@ -28,7 +28,15 @@ static QUIET: AtomicBool = AtomicBool::new(false);
 /// The only writer to stderr, shared by all threads.
 pub fn screen() -> &'static Screen {
     static SCREEN: OnceLock<Screen> = OnceLock::new();
-    let lost = |lines: u64| encode("WARN", &format!("{lines} lines are missing: the terminal took none for too long"));
+    let lost = |lines: u64| {
+        encode(
+            "WARN",
+            &format!(
+                "{lines} lines are missing: the terminal accepted none for too \
+                                                     long"
+            ),
+        )
+    };
     SCREEN.get_or_init(|| Screen::new(io::stderr(), lost))
 }
 
@@ -65,7 +73,7 @@ pub fn start(global: &Global) {
 }
 
 /// Prints a message of one or more lines.
-pub fn say(text: &str) {
+pub fn print_to_stderr(text: &str) {
     print_message("INFO", text);
 }
 

@@ -13,14 +13,14 @@ use super::settings::layers::Layers;
 use super::settings::{save, table};
 
 /// Error of parsing, by its origin.
-pub enum Refusal {
+pub enum ParseError {
     Arguments(clap::Error),
     Settings(CliError),
 }
 
-impl From<clap::Error> for Refusal {
+impl From<clap::Error> for ParseError {
     fn from(error: clap::Error) -> Self {
-        Refusal::Arguments(error)
+        ParseError::Arguments(error)
     }
 }
 
@@ -33,15 +33,15 @@ pub struct Parsed {
 }
 
 /// Parses arguments together with the environment, preset, snapshot and settings file that apply.
-pub fn parse(args: &[OsString]) -> Result<Parsed, Refusal> {
+pub fn parse(args: &[OsString]) -> Result<Parsed, ParseError> {
     let command = help::full_help(table::with_environment(Cli::command()));
     let wants_all = args.iter().take_while(|arg| *arg != "--").any(|arg| arg == help::ALL);
     let command = if wants_all { command } else { help::short_help(command) };
     // The first pass finds the settings file and the preset; the second one uses their values as defaults.
     let given = command.clone().try_get_matches_from(args)?;
     let chosen = Cli::from_arg_matches(&given)?.global.config;
-    let file = load_settings(&given, chosen.as_deref()).map_err(Refusal::Settings)?;
-    let layers = Layers::resolve(&file, &given).map_err(Refusal::Settings)?;
+    let file = load_settings(&given, chosen.as_deref()).map_err(ParseError::Settings)?;
+    let layers = Layers::resolve(&file, &given).map_err(ParseError::Settings)?;
     let matches = layers.apply_defaults(command).try_get_matches_from(args)?;
     Ok(Parsed { cli: Cli::from_arg_matches(&matches)?, matches, file, layers })
 }

@@ -6,7 +6,7 @@ use std::path::Path;
 use super::CliError;
 use super::commands::{Command, ConfigCommand};
 use super::log::{escape_controls, one_line};
-use super::parse::{Refusal, parse};
+use super::parse::{ParseError, parse};
 use super::settings::arguments::join_negative_numbers;
 use super::settings::dump;
 use super::settings::file::SettingsFile;
@@ -15,17 +15,17 @@ use super::settings::file::SettingsFile;
 ///
 /// # Errors
 /// Returns the message for a command line that cannot be parsed.
-pub fn arguments(args: &[OsString]) -> Result<String, String> {
+pub fn parse_arguments(args: &[OsString]) -> Result<String, String> {
     let parsed = parse(&join_negative_numbers(args.iter().cloned())).map_err(|refusal| {
         let message = match refusal {
-            Refusal::Arguments(error) => one_line(&error),
-            Refusal::Settings(error) => error.to_string(),
+            ParseError::Arguments(error) => one_line(&error),
+            ParseError::Settings(error) => error.to_string(),
         };
         escape_controls(&message, &[]).into_owned()
     })?;
     Ok(match parsed.cli.command {
         Command::Config(ConfigCommand::Dump { .. }) => {
-            dump::as_toml(&parsed.layers.resolved(&parsed.matches), &parsed.file.presets)
+            dump::to_toml(&parsed.layers.resolve_settings(&parsed.matches), &parsed.file.presets)
         }
         _ => String::new(),
     })
@@ -35,7 +35,7 @@ pub fn arguments(args: &[OsString]) -> Result<String, String> {
 ///
 /// # Errors
 /// Fails if the text is not a settings file.
-pub fn settings(path: &Path, text: &str) -> Result<(), CliError> {
+pub fn parse_settings(path: &Path, text: &str) -> Result<(), CliError> {
     let file = SettingsFile::parse(path, text)?;
     for name in file.presets.keys() {
         assert!(file.preset(name).is_some(), "the preset {name:?} is there and is not found");
@@ -44,4 +44,4 @@ pub fn settings(path: &Path, text: &str) -> Result<(), CliError> {
 }
 
 #[cfg(feature = "camera")]
-pub use bokehcam::source::registration::parse as depth_calibration;
+pub use bokehcam::source::registration::parse_registration as depth_calibration;

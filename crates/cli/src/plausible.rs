@@ -13,7 +13,7 @@ use bokehcam::frame::{ColorImage, DepthMap, Mask};
 use bokehcam::look::{Look, Strength};
 use bokehcam::optics::{Lens, StereoRig};
 use bokehcam::source::options::DEPTH_SCALE;
-use bokehcam::source::{DepthOrigin, OneCamera, Options, PlateFile, Source};
+use bokehcam::source::{DepthOrigin, Options, PlateFile, SingleCameraDepth, Source};
 
 /// Tolerance below which grey values (0 to 1) count as equal.
 const TOLERANCE: f32 = 0.02;
@@ -38,7 +38,13 @@ pub fn warn_of_baseline(rig: Option<StereoRig>) {
 fn check_baseline(rig: &StereoRig) -> Option<String> {
     let StereoRig { baseline_m, metric, .. } = *rig;
     let is_wide = metric && baseline_m > MAX_BASELINE_M;
-    is_wide.then(|| format!("{baseline_m} m between the eyes; if that is in millimetres, it is {} m", baseline_m / 1e3))
+    is_wide.then(|| {
+        format!(
+            "{baseline_m} m between the cameras; if that is in millimetres, it is {} \
+                             m",
+            baseline_m / 1e3
+        )
+    })
 }
 
 /// Warns of a lens in another unit, or one that cannot focus as near as requested.
@@ -81,13 +87,13 @@ fn check_mask(mask: &Mask, color: &ColorImage) -> Option<&'static str> {
     let (low, high) = value_range(&mask.alpha)?;
     match () {
         () if low > 1.0 - TOLERANCE => {
-            Some("the mask is white all over: all of the picture is the subject, and stays sharp")
+            Some("the mask is white all over: the whole picture is the subject, and stays sharp")
         }
-        () if high < TOLERANCE => Some("the mask is black all over: there is no subject, and all is blurred"),
+        () if high < TOLERANCE => Some("the mask is black all over: there is no subject, and everything is blurred"),
         () if high - low < TOLERANCE => {
             Some("the mask is one grey all over: it separates no subject from the background")
         }
-        () if is_picture(&mask.alpha, mask.width, color) => Some("this is the picture itself, and no mask of it"),
+        () if is_luma_copy(&mask.alpha, mask.width, color) => Some("this is the picture itself, not a mask of it"),
         () => None,
     }
 }
@@ -100,7 +106,7 @@ fn value_range(values: &[f32]) -> Option<(f32, f32)> {
 }
 
 /// Whether the values (0 to 1, row by row) equal the picture's luma.
-fn is_picture(values: &[f32], width: u32, color: &ColorImage) -> bool {
+fn is_luma_copy(values: &[f32], width: u32, color: &ColorImage) -> bool {
     if width != color.width || values.len() != color.rgb.len() / 3 {
         return false;
     }
@@ -128,7 +134,7 @@ fn check_map(map: &DepthMap, is_unit_known: bool) -> Option<String> {
         return Some("no depth is known anywhere in it".to_owned());
     };
     if farthest_m - nearest_m <= 1e-3 * farthest_m {
-        return Some(format!("all of it is {nearest_m:.3} m away, so that nothing is nearer than anything else"));
+        return Some(format!("all of it is {nearest_m:.3} m away, so nothing is nearer than the rest"));
     }
     let at = (FAR_QUANTILE * (known.len() - 1) as f32) as usize;
     let far_m = *known.select_nth_unstable_by(at, f32::total_cmp).1;
@@ -148,12 +154,12 @@ fn check_inverse(map: &DepthMap, color: &ColorImage) -> Option<&'static str> {
     let nearness: Vec<f32> = map.metres.iter().map(|&metres| DepthMap::SUBJECT_M / metres).collect();
     let (low, high) = value_range(&nearness)?;
     if high - low < 1e-3 {
-        return Some("it has one value all over, so that nothing is nearer than anything else");
+        return Some("it has one value all over, so nothing is nearer than the rest");
     }
     // Pearson's correlation is independent of the map's scale.
     let greys: Vec<f32> = luma_values(color).collect();
     (map.size() == color.size() && correlation(&nearness, &greys).abs() > 0.999)
-        .then_some("this is the picture itself, and no depth of it")
+        .then_some("this is the picture itself, not its depth")
 }
 
 /// Returns Pearson's correlation (-1 to 1) of two lists, ignoring unknown `values`.
@@ -181,7 +187,7 @@ pub fn warn_of_source(source: &Source, look: &Look, options: &Options) -> bool {
 }
 
 /// Warns if no person was found, or an implausible one. `chosen` is `None` for the installed network.
-pub fn warn_of_subject(chosen: Option<&OneCamera>, map: &DepthMap, image: Option<&Path>) {
+pub fn warn_of_subject(chosen: Option<&SingleCameraDepth>, map: &DepthMap, image: Option<&Path>) {
     let plate = chosen.and_then(|chosen| chosen.plate.as_ref()).and_then(|plate| match plate {
         PlateFile::At(file) => Some(file.as_path()),
         PlateFile::Taken => None,
@@ -197,16 +203,17 @@ fn check_subject(map: &DepthMap, plate: Option<&Path>, image: Option<&Path>) -> 
     let is_itself = plate.zip(image).is_some_and(|(plate, image)| place::overlap(plate, image));
     match plate.map(Path::display) {
         Some(plate) if is_itself => {
-            Some(format!("{plate}: the plate is the picture itself: no person is found, and all is blurred"))
+            Some(format!("{plate}: the plate is the picture itself: no person is found, and everything is blurred"))
         }
         Some(plate) if near == 0 => Some(format!(
-            "{plate}: no person stands before it, and all is blurred; a plate shows the place without the person"
+            "{plate}: nothing in the picture differs from the plate, so everything is blurred; a plate shows the place \
+             without the person"
         )),
-        None if near == 0 => Some("no person was found in the picture, so all of it is blurred".to_owned()),
+        None if near == 0 => Some("no person was found in the picture, so everything is blurred".to_owned()),
         Some(plate) if near as f32 > MAX_FOREGROUND * count as f32 && raggedness(map, is_near) > MAX_RAGGEDNESS => {
             Some(format!(
-                "{plate}: {} % of the picture differs from it, in shreds, and stays sharp: it was taken from elsewhere; a plate \
-                 needs a camera that stands still, as on a tripod",
+                "{plate}: {} % of the picture differs from it, in many small pieces, and stays sharp: it was taken \
+                 from another position; a plate needs a camera that does not move, as on a tripod",
                 100 * near / count
             ))
         }

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use super::error::CliError;
 use super::files::refuse_overwrite;
-use super::terminal::{print, say};
+use super::terminal::{print_to_stderr, print_to_stdout};
 use bokehcam::files::place;
 use bokehcam::files::whole::Part;
 use bokehcam::sink::Target;
@@ -18,19 +18,19 @@ const STDOUT: &str = "-";
 ///
 /// # Errors
 /// Fails if `path` exists without `force` or is not a report, or if one of `targets` writes there, too.
-pub fn check(path: Option<&Path>, force: bool, targets: &[Target]) -> Result<(), CliError> {
+pub fn check_path(path: Option<&Path>, force: bool, targets: &[Target]) -> Result<(), CliError> {
     let usage = |text: String| Err(CliError::Usage(text));
     let Some(path) = path.filter(|path| *path != STDOUT) else {
         return match path.is_some() && targets.contains(&Target::Stdout) {
-            true => usage("--report - and --to -: standard output takes one of them; name a file for the other".into()),
+            true => usage("--report - and --to - both use standard output; name a file for one of them".into()),
             false => Ok(()),
         };
     };
     for target in targets.iter().filter(|target| !target.is_camera()) {
         let Some(place) = target.path().filter(|place| place::overlap(place, path)) else { continue };
         let what = match place::resolved(place) == place::resolved(path) {
-            true => format!("--to {target} goes there, too; name another file"),
-            false => format!("the pictures of --to {target} lie there; choose another folder"),
+            true => format!("--to {target} writes to it, too; name another file"),
+            false => format!("that folder is for the pictures of --to {target}; choose another folder"),
         };
         return usage(format!("--report {}: {what}", path.display()));
     }
@@ -40,7 +40,7 @@ pub fn check(path: Option<&Path>, force: bool, targets: &[Target]) -> Result<(),
         return Ok(());
     }
     usage(format!(
-        "--report {}: this exists and is no report; --force replaces files called .json alone, so choose another name",
+        "--report {}: this exists and is not a report; --force only replaces .json files, so choose another name",
         path.display()
     ))
 }
@@ -63,11 +63,11 @@ pub fn check_writable(path: Option<&Path>) -> Result<(), CliError> {
 ///
 /// # Errors
 /// Fails if the report is not at `path`.
-pub fn write(path: &Path, report: &Report, force: bool) -> Result<(), CliError> {
+pub fn write_report(path: &Path, report: &Report, force: bool) -> Result<(), CliError> {
     let mut json = Vec::new();
     report.write_json(&mut json).map_err(CliError::io(path))?;
     if path == STDOUT {
-        return print(&json);
+        return print_to_stdout(&json);
     }
     let to_error = |cause: std::io::Error| match cause.kind() {
         ErrorKind::AlreadyExists => CliError::Exists(path.to_owned()),
@@ -84,6 +84,6 @@ pub fn write(path: &Path, report: &Report, force: bool) -> Result<(), CliError> 
         },
         Err(cause) => to_error(cause),
     };
-    say(&format!("the report has no other place:\n{}", String::from_utf8_lossy(&json)));
+    print_to_stderr(&format!("the report could not be saved; here it is:\n{}", String::from_utf8_lossy(&json)));
     Err(error)
 }

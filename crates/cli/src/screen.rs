@@ -31,13 +31,13 @@ pub struct Screen {
 
 /// Progress of a command, shared by the worker thread and the thread that draws the bar.
 #[derive(Debug, Default)]
-pub struct Count {
+pub struct ProgressCount {
     done: AtomicU64,
     /// Set to remove the bar.
-    over: AtomicBool,
+    is_over: AtomicBool,
 }
 
-impl Count {
+impl ProgressCount {
     /// Sets the number of completed items.
     pub fn set(&self, done: u64) {
         self.done.store(done, Ordering::Relaxed);
@@ -49,9 +49,9 @@ enum Entry {
     /// Complete lines, with their line ends.
     Text(Vec<u8>),
     /// Starts drawing the bar, until its count is over.
-    Bar(ProgressBar, Arc<Count>),
+    ShowBar(ProgressBar, Arc<ProgressCount>),
     /// Removes the bar.
-    NoBar,
+    RemoveBar,
 }
 
 #[derive(Default)]
@@ -86,20 +86,20 @@ impl Screen {
     }
 
     /// Starts drawing `bar`; returns the count that it shows.
-    pub fn begin(&self, bar: ProgressBar) -> Arc<Count> {
-        let count = Arc::new(Count::default());
+    pub fn show_bar(&self, bar: ProgressBar) -> Arc<ProgressCount> {
+        let count = Arc::new(ProgressCount::default());
         if self.queue.is_some() {
-            self.send(Entry::Bar(bar, Arc::clone(&count)));
+            self.send(Entry::ShowBar(bar, Arc::clone(&count)));
         }
         count
     }
 
     /// Removes the bar that shows `count`.
-    pub fn end(&self, count: &Count) {
-        count.over.store(true, Ordering::Relaxed);
+    pub fn remove_bar(&self, count: &ProgressCount) {
+        count.is_over.store(true, Ordering::Relaxed);
         // If the queue is full, the bar is removed with the next printed entry.
         if self.queue.is_some() {
-            self.send(Entry::NoBar);
+            self.send(Entry::RemoveBar);
         }
     }
 
@@ -135,7 +135,7 @@ impl Screen {
 struct Printer<W> {
     out: W,
     lost_notice: fn(u64) -> String,
-    bar: Option<(ProgressBar, Arc<Count>)>,
+    bar: Option<(ProgressBar, Arc<ProgressCount>)>,
     shared: Arc<Shared>,
 }
 
@@ -151,7 +151,7 @@ impl<W: Write> Printer<W> {
                 return;
             }
             self.shared.prints.fetch_add(1, Ordering::Relaxed);
-            self.handle(next.ok());
+            self.handle_entry(next.ok());
             // Only after catching up, so that one notice covers all lost lines.
             if self.shared.done.load(Ordering::Acquire) == self.shared.sent.load(Ordering::Acquire) {
                 self.report_lost();
@@ -161,15 +161,15 @@ impl<W: Write> Printer<W> {
     }
 
     /// Prints an entry; `None`, after the redraw interval, redraws the bar.
-    fn handle(&mut self, entry: Option<Entry>) {
-        if let Some((bar, _)) = self.bar.take_if(|(_, count)| count.over.load(Ordering::Relaxed)) {
+    fn handle_entry(&mut self, entry: Option<Entry>) {
+        if let Some((bar, _)) = self.bar.take_if(|(_, count)| count.is_over.load(Ordering::Relaxed)) {
             bar.finish_and_clear();
         }
         let was_sent = entry.is_some();
         match entry {
             Some(Entry::Text(lines)) => self.print(&lines),
-            Some(Entry::Bar(bar, count)) => self.bar = Some((bar, count)),
-            Some(Entry::NoBar) => {}
+            Some(Entry::ShowBar(bar, count)) => self.bar = Some((bar, count)),
+            Some(Entry::RemoveBar) => {}
             None => {
                 if let Some((bar, count)) = &self.bar {
                     bar.set_position(count.done.load(Ordering::Relaxed));
@@ -247,14 +247,14 @@ mod tests {
     fn nobody_waits_for_a_terminal_that_takes_nothing() {
         let terminal = StalledTerminal::default();
         let screen = Screen::new(terminal.clone(), |lines| format!("{lines} lines are missing\n"));
-        let count = screen.begin(ProgressBar::hidden());
+        let count = screen.show_bar(ProgressBar::hidden());
         let lines = 2 * QUEUE_CAPACITY;
         for line in 0..lines {
             screen.print(format!("{line}\n").as_bytes());
             count.set(line as u64);
         }
         screen.flush();
-        screen.end(&count);
+        screen.remove_bar(&count);
         assert_eq!(terminal.text(), "");
 
         terminal.resume();
@@ -275,9 +275,9 @@ mod tests {
         let terminal = StalledTerminal::default();
         terminal.resume();
         let screen = Screen::new(terminal.clone(), |lines| format!("{lines} lines are missing\n"));
-        let count = screen.begin(ProgressBar::hidden());
+        let count = screen.show_bar(ProgressBar::hidden());
         (0..500).for_each(|line| screen.print(format!("{line}\n").as_bytes()));
-        screen.end(&count);
+        screen.remove_bar(&count);
         screen.print(b"end\n");
         screen.flush();
         let expected: String = (0..500).map(|line| format!("{line}\n")).chain(["end\n".to_owned()]).collect();

@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use super::error::CliError;
-use super::files::refuse_source;
+use super::files::refuse_overwriting_source;
 use super::options::Streaming;
 use bokehcam::files::place;
 use bokehcam::sink::{Backpressure, Options, Sink, Target, Tee};
@@ -15,21 +15,21 @@ use bokehcam::source::{DepthChoice, SourceName};
 /// # Errors
 /// Fails if two sinks write to one place, a sink overwrites an input, or an option lacks the virtual camera that it
 /// needs.
-pub fn check(targets: &[Target], parts: &Streaming, source: &SourceName) -> Result<(), CliError> {
+pub fn check_targets(targets: &[Target], parts: &Streaming, source: &SourceName) -> Result<(), CliError> {
     let usage = |text: String| Err(CliError::Usage(text));
     let Streaming { stream, blur, .. } = parts;
-    let devices = source.devices();
+    let devices = source.device_nodes();
     let depth_folder = match &blur.depth {
         DepthChoice::Folder(folder) => Some(folder.as_path()),
         _ => None,
     };
     for (index, target) in targets.iter().enumerate() {
-        for read in source.folder().into_iter().chain(depth_folder) {
+        for read in source.path().into_iter().chain(depth_folder) {
             let path = target.path().filter(|_| !target.is_camera());
-            path.map_or(Ok(()), |path| refuse_source("--to", path, read))?;
+            path.map_or(Ok(()), |path| refuse_overwriting_source("--to", path, read))?;
         }
         if targets[..index].iter().any(|other| other.collides_with(target)) {
-            return usage(format!("--to {target}: given twice; each sink needs a place of its own"));
+            return usage(format!("--to {target}: given twice; each output needs its own place"));
         }
         // The frames of a folder sink could overwrite a file within it.
         let lies_in = |other: &Target| match (other, target.path()) {
@@ -37,26 +37,30 @@ pub fn check(targets: &[Target], parts: &Streaming, source: &SourceName) -> Resu
             _ => false,
         };
         if let Some(folder) = targets.iter().find(|other| *other != target && lies_in(other)) {
-            return usage(format!("--to {target}: the pictures of --to {folder} lie there; choose another place"));
+            return usage(format!(
+                "--to {target}: that folder is for the pictures of --to {folder}; choose another \
+                                  place"
+            ));
         }
         if devices.iter().any(|device| target.is_device(device)) {
-            return usage(format!("--to {target}: this is the source itself; take a virtual camera of its own"));
+            return usage(format!("--to {target}: this is the source itself; use a separate virtual camera"));
         }
     }
     if targets.contains(&Target::Filter) {
-        if source.shared().is_none() {
+        if source.pipewire_name().is_none() {
             return usage(format!(
-                "--to filter: {source} is not a camera as PipeWire has it; `bokehcam devices` names it so, as pipewire:NAME"
+                "--to filter: {source} is not a PipeWire camera; give it as pipewire:NAME, as listed by `bokehcam \
+                 devices`"
             ));
         }
         if targets.contains(&Target::Window) {
-            return usage("--to filter: not beside a window, which keeps the camera going".to_string());
+            return usage("--to filter: cannot be combined with a window, which keeps the camera open".to_string());
         }
     }
     let has_camera = targets.iter().any(Target::is_camera);
     if stream.on_demand && !has_camera {
         return usage(
-            "--on-demand needs a virtual camera, to be told who watches: add --to pipewire or --to /dev/videoN"
+            "--on-demand needs a virtual camera, which reports its readers: add --to pipewire or --to /dev/videoN"
                 .to_string(),
         );
     }
@@ -78,7 +82,7 @@ pub fn check(targets: &[Target], parts: &Streaming, source: &SourceName) -> Resu
 ///
 /// # Errors
 /// Fails if one cannot be opened; the others are discarded.
-pub fn open(
+pub fn open_targets(
     targets: &[Target],
     options: &Options,
     backpressure: Backpressure,

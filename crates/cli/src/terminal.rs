@@ -11,9 +11,9 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
 
 use super::error::CliError;
 use super::log;
-pub use super::log::say;
+pub use super::log::print_to_stderr;
 use super::options::Global;
-use super::screen::{Count, Screen};
+use super::screen::{ProgressCount, Screen};
 use bokehcam::depth::plate::{Guide, Step};
 use bokehcam::stats::Report;
 
@@ -42,15 +42,15 @@ pub fn stop_flag() -> Result<Arc<AtomicBool>, CliError> {
         #[cfg(feature = "networks")]
         bokehcam::network::apart::hurry();
         #[cfg(feature = "gpu")]
-        bokehcam::compute::device::end_soon();
-        say("stopping after the frames in hand; Ctrl-C again aborts");
+        bokehcam::compute::device::begin_shutdown();
+        print_to_stderr("stopping after the current frames; press Ctrl-C again to abort");
     };
     ctrlc::set_handler(handler).map_err(|error| CliError::Signals(error.to_string()))?;
     Ok(stop)
 }
 
 /// A progress bar of delivered frames on stderr; silent if stderr is no terminal.
-pub struct Progress(Option<(&'static Screen, Arc<Count>)>);
+pub struct Progress(Option<(&'static Screen, Arc<ProgressCount>)>);
 
 impl Progress {
     /// Creates a bar for `frames` frames, or a counter if their number is unknown.
@@ -70,7 +70,7 @@ impl Progress {
         };
         bar.set_style(style.with_key("rate", rate));
         let screen = log::screen();
-        Self(Some((screen, screen.begin(bar))))
+        Self(Some((screen, screen.show_bar(bar))))
     }
 
     /// Creates a bar that shows nothing.
@@ -80,14 +80,14 @@ impl Progress {
     }
 
     /// Sets the number of delivered frames.
-    pub fn delivered(&self, frames: u64) {
+    pub fn set_delivered(&self, frames: u64) {
         self.0.iter().for_each(|(_, count)| count.set(frames));
     }
 }
 
 impl Drop for Progress {
     fn drop(&mut self) {
-        self.0.iter().for_each(|(screen, count)| screen.end(count));
+        self.0.iter().for_each(|(screen, count)| screen.remove_bar(count));
     }
 }
 
@@ -113,19 +113,19 @@ impl Guidance {
     pub fn print_step(&self) {
         let Some(step) = self.step() else { return };
         // Progress within a step is not printed, nor a plate that exists from the start.
-        let news = if matches!(step, Step::Taking(_)) { Step::Taking(0) } else { step };
+        let news = if matches!(step, Step::Capturing(_)) { Step::Capturing(0) } else { step };
         let printed = self.printed.replace(Some(news));
         if !self.is_quiet && printed != Some(news) && (printed.is_some() || news != Step::Ready) {
-            say(&step.to_string());
+            print_to_stderr(&step.to_string());
         }
     }
 }
 
 /// Prints the report of a run; with `--verbose`, the times of its stages, too.
-pub fn say_report(report: &Report, global: &Global) {
+pub fn print_report(report: &Report, global: &Global) {
     let is_shown = |line: &&str| global.verbose > 0 || !line.contains(" ms: ");
     if !global.quiet {
-        say(&report.to_string().lines().filter(is_shown).collect::<Vec<_>>().join("\n"));
+        print_to_stderr(&report.to_string().lines().filter(is_shown).collect::<Vec<_>>().join("\n"));
     }
 }
 
@@ -133,7 +133,7 @@ pub fn say_report(report: &Report, global: &Global) {
 ///
 /// # Errors
 /// Fails if the reader closed it, or the disk is full.
-pub fn print(bytes: &[u8]) -> Result<(), CliError> {
+pub fn print_to_stdout(bytes: &[u8]) -> Result<(), CliError> {
     let mut stdout = io::stdout().lock();
     let text = String::from_utf8_lossy(bytes);
     stdout

@@ -10,9 +10,9 @@ use std::hash::{DefaultHasher, Hash, Hasher};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use bokehcam::clock::cpu_ns;
+use bokehcam::clock::process_cpu_ns;
 use bokehcam::depth::focus::FocusRule;
-use bokehcam::engine::{CocMaker, Postprocess};
+use bokehcam::engine::{CocCalculator, Postprocess};
 use bokehcam::frame::{ColorImage, DepthMap};
 use bokehcam::look::{CocAtInfinity, CocRule};
 use bokehcam::recording::{Options as Reading, Recording, Scratch};
@@ -71,8 +71,8 @@ fn measure(options: &Options) -> Result<(), Box<dyn std::error::Error>> {
     let lens = CocAtInfinity::Px(options.coc_at_infinity);
     let rule = CocRule::Depth { focus: FocusRule::Auto, lens, range_m: 0.0, max_coc_px: 64.0 };
     let mut makers = WAYS.map(|(_, finish, remembers)| {
-        let mut maker = CocMaker::new(rule, finish);
-        maker.remember(remembers);
+        let mut maker = CocCalculator::new(rule, finish);
+        maker.set_background_memory(remembers);
         maker
     });
     let (mut taken_ms, mut sums) = (WAYS.map(|_| Vec::new()), WAYS.map(|_| DefaultHasher::new()));
@@ -82,9 +82,9 @@ fn measure(options: &Options) -> Result<(), Box<dyn std::error::Error>> {
         let (color, measured) = &frames[there.min(2 * frames.len() - 1 - there)];
         for ((maker, taken_ms), sum) in makers.iter_mut().zip(&mut taken_ms).zip(&mut sums) {
             map.clone_from(measured);
-            let began_ns = cpu_ns();
-            maker.make(&mut map, color, k as u64 * 33_333_333);
-            taken_ms.push((cpu_ns() - began_ns) as f64 / 1e6);
+            let began_ns = process_cpu_ns();
+            maker.compute(&mut map, color, k as u64 * 33_333_333);
+            taken_ms.push((process_cpu_ns() - began_ns) as f64 / 1e6);
             map.metres.iter().for_each(|metres| metres.to_bits().hash(sum));
             for pixel in &map.matte.pixels {
                 (pixel.at, pixel.alpha.to_bits(), pixel.difference.map(f32::to_bits)).hash(sum);

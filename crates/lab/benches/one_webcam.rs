@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant;
 
-use bokehcam::clock::cpu_ns;
+use bokehcam::clock::process_cpu_ns;
 use bokehcam::depth::plate::{Companion, PlateDepth};
 use bokehcam::depth::single_camera::{Hints, SingleCamera};
 use bokehcam::depth::{DepthSource, FrameInput};
@@ -100,7 +100,7 @@ fn measure(options: &Options, data: &Path) -> Result<(), Box<dyn std::error::Err
     // The first round allocates, and is not counted.
     for round in 0..=options.rounds {
         for case in &mut cases {
-            let (began, before_ns) = (Instant::now(), cpu_ns());
+            let (began, before_ns) = (Instant::now(), process_cpu_ns());
             for (k, color) in pictures.iter().chain(pictures.iter().rev()).enumerate() {
                 let index = round as usize * 2 * pictures.len() + k;
                 let stamp = Stamp { index, time_ns: index as u64 * 33_333_333, captured_ns: None };
@@ -109,7 +109,7 @@ fn measure(options: &Options, data: &Path) -> Result<(), Box<dyn std::error::Err
             if round > 0 {
                 case.frames += 2 * pictures.len() as u32;
                 case.wall_ms += began.elapsed().as_secs_f64() * 1e3;
-                case.processor_ms += (cpu_ns() - before_ns) as f64 / 1e6;
+                case.processor_ms += (process_cpu_ns() - before_ns) as f64 / 1e6;
             }
         }
     }

@@ -1,7 +1,7 @@
 //! The project's own scene as a camera with exact depth.
 
 use bokehcam::capture::synthetic::{self, Format};
-use bokehcam::capture::{Brings, Camera, CaptureError, Captured, Shot, SourceInfo};
+use bokehcam::capture::{Camera, CaptureError, Captured, FrameBuffers, FrameData, SourceInfo};
 use bokehcam::frame::Stamp;
 
 use crate::scene::{Scene, View};
@@ -44,7 +44,7 @@ impl Synthetic {
 
 /// Registers this camera as the source `synthetic`.
 pub fn register() {
-    synthetic::register(|format| Ok(Box::new(Synthetic::new(format)?)));
+    synthetic::register_factory(|format| Ok(Box::new(Synthetic::new(format)?)));
 }
 
 impl Camera for Synthetic {
@@ -55,11 +55,11 @@ impl Camera for Synthetic {
             period_ns: self.time_ns(1),
             frames: self.format.frames,
             live: false,
-            brings: Brings::Depth,
+            frame_data: FrameData::Depth,
         }
     }
 
-    fn next(&mut self, shot: Shot) -> Result<Captured, CaptureError> {
+    fn next(&mut self, shot: FrameBuffers) -> Result<Captured, CaptureError> {
         if self.at_end() {
             return Ok(Captured::End);
         }
@@ -70,7 +70,7 @@ impl Camera for Synthetic {
         Ok(Captured::Frame(stamp))
     }
 
-    fn skip(&mut self, until_ns: u64) -> u64 {
+    fn skip_until(&mut self, until_ns: u64) -> u64 {
         let from = self.position;
         while !self.at_end() && self.time_ns(self.position) < until_ns {
             self.position += 1;

@@ -9,8 +9,8 @@ use super::services::Browse;
 use bokehcam::files::data;
 
 /// Error shown if the desktop has no file chooser.
-const NO_DIALOG: &str = "This desktop has no file dialog (neither a portal nor zenity): drop a folder or a photo on the window, \
-                         or start `bokehcam preview FOLDER`.";
+const NO_DIALOG: &str = "This desktop has no file dialog (no portal, no zenity): drop a folder or a photo on the \
+                         window, or start `bokehcam preview FOLDER`.";
 /// A dialog that "cancels" within this time was never shown: no user is that fast.
 const MIN_DIALOG_TIME: Duration = Duration::from_millis(250);
 
@@ -43,7 +43,7 @@ pub fn pick(what: Browse) -> Result<Option<String>, String> {
 /// # Errors
 /// Fails if the path is not valid UTF-8.
 pub fn name_of(path: &Path) -> Result<String, String> {
-    let not_utf8 = || format!("{}: its name is no text (UTF-8); rename it to open it here", path.display());
+    let not_utf8 = || format!("{}: its name is not UTF-8 text; rename it to open it here", path.display());
     path.to_str().map(str::to_owned).ok_or_else(not_utf8)
 }
 

@@ -180,7 +180,7 @@ pub const GROUPS: [Group; 5] = [
     Group {
         name: "Focus",
         bindings: &[
-            once(&[key(Key::T)], "T", "take a plate of the empty room", |_, _| Some(Action::TakePlate)),
+            once(&[key(Key::T)], "T", "take a plate (the empty room)", |_, _| Some(Action::TakePlate)),
             once(&[key(Key::A)], "A", "focus on the subject", |state, _| {
                 edit_look(state, "key auto", |look| look.focus = FocusRule::Auto)
             }),
@@ -215,13 +215,13 @@ pub const GROUPS: [Group; 5] = [
             repeat(
                 &[key(Key::PageUp), key(Key::PageDown)],
                 "PageUp, PageDown",
-                "of a recording: stop, one frame back or on",
+                "in a recording: pause, one frame back or forward",
                 |state, context| state.transport.map(|_| Action::Step(sign(context) as i32)),
             ),
             once(&[key(Key::Home)], "Home", "the recording's first frame", |state, _| {
                 state.transport.map(|_| Action::Seek(0))
             }),
-            once(&[key(Key::X)], "X", "pixels as they are (100 %), all of the picture", |state, context| {
+            once(&[key(Key::X)], "X", "actual pixels (100 %), whole picture", |state, context| {
                 Some(Action::Zoom(if state.zoom.factor == 0 { state.zoom.stepped(1, context.fit) } else { 0 }, None))
             }),
             once(
@@ -240,7 +240,7 @@ pub const GROUPS: [Group; 5] = [
         name: "Keep",
         bindings: &[
             once(&[key(Key::S)], "S", "save a snapshot", |_, _| Some(Action::Snapshot)),
-            once(&[shift(Key::S)], "Shift+S", "save one in three seconds", |state, _| {
+            once(&[shift(Key::S)], "Shift+S", "save a snapshot in three seconds", |state, _| {
                 Some(Action::SelfTimer(!state.self_timer))
             }),
             once(&[key(Key::V)], "V", "start or stop a recording", |state, _| {
@@ -251,7 +251,7 @@ pub const GROUPS: [Group; 5] = [
                 Some(Action::VirtualCamera(if state.virtual_camera().is_some() { None } else { first() }))
             }),
             once(&[key(Key::K)], "K", "copy as a command", |_, _| Some(Action::CopyCommand)),
-            once(&[key(Key::F5)], "F5", "open the source again, look for new ones", |state, _| {
+            once(&[key(Key::F5)], "F5", "reopen the source, look for new ones", |state, _| {
                 let lost = matches!(state.source, Source::Lost(_) | Source::Ended);
                 Some(if lost { Action::Retry } else { Action::Refresh })
             }),
@@ -264,7 +264,7 @@ pub const GROUPS: [Group; 5] = [
                 Some(Action::Panel(!state.panel))
             }),
             once(&[key(Key::I)], "I", "the instruments", |state, _| Some(Action::Instruments(!state.instruments))),
-            once(&[key(Key::H)], "H", "nothing but the picture", |state, _| Some(Action::Bare(!state.bare))),
+            once(&[key(Key::H)], "H", "only the picture", |state, _| Some(Action::Bare(!state.bare))),
             once(&[key(Key::F), key(Key::F11)], "F, F11", "full screen", |state, _| {
                 Some(Action::FullScreen(!state.full_screen))
             }),
@@ -276,7 +276,7 @@ pub const GROUPS: [Group; 5] = [
                 "smaller text, larger text",
                 |state, context| Some(Action::TextScale(state.habits.text_scale * TEXT_STEP.powf(sign(context)))),
             ),
-            once(&[ctrl(Key::Num0)], "Ctrl+0", "text as usual", |_, _| Some(Action::TextScale(1.0))),
+            once(&[ctrl(Key::Num0)], "Ctrl+0", "normal text size", |_, _| Some(Action::TextScale(1.0))),
             once(&[key(Key::F1), key(Key::Questionmark)], "F1, ?", "these keys", |state, _| {
                 Some(Action::Help(!state.help))
             }),

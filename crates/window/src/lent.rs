@@ -10,14 +10,16 @@ impl RemoteChanges {
     /// Records that remote control changed the look from `before` to `after`.
     pub fn record(&mut self, before: &Look, after: &Look) {
         let own = self.without(before);
-        let changed = Patch::from_look(after).without_equal(&Patch::from_look(&own));
+        let changed = Patch::from_look(after).without_equal_values(&Patch::from_look(&own));
         self.0 = Some((own, changed));
     }
 
     /// Returns `look` with the user's own values for the settings that still have their remotely set value.
     pub fn without(&self, look: &Look) -> Look {
-        let own =
-            self.0.as_ref().and_then(|(own, changed)| Patch::from_look(look).without_equal(changed).apply_to(own).ok());
+        let own = self
+            .0
+            .as_ref()
+            .and_then(|(own, changed)| Patch::from_look(look).without_equal_values(changed).apply_to(own).ok());
         own.unwrap_or_else(|| look.clone())
     }
 }

@@ -157,8 +157,8 @@ impl Meters {
                 blur_ns: (blur_ms * 1e6) as u64,
                 passes,
                 quality,
-                depth_held: k % 2 == 1,
-                between_ns: 3_000_000,
+                is_depth_reused: k % 2 == 1,
+                queueing_ns: 3_000_000,
                 playout_ns: 4_000_000,
                 ..Trace::default()
             };
@@ -197,9 +197,9 @@ impl Stages {
         let weight = if first { 1.0 } else { SMOOTHING };
         let ease = |mean_ms: &mut f64, ns: u64| *mean_ms += (ns as f64 * MS - *mean_ms) * weight;
         let to_screen_ns = latency_ns.saturating_sub(trace.age_ns + present_ns);
-        ease(&mut self.between_ms, trace.between_ns + to_screen_ns);
+        ease(&mut self.between_ms, trace.queueing_ns + to_screen_ns);
         ease(&mut self.playout_ms, trace.playout_ns);
-        self.fresh_depth_fraction += (f64::from(u8::from(!trace.depth_held)) - self.fresh_depth_fraction) * weight;
+        self.fresh_depth_fraction += (f64::from(u8::from(!trace.is_depth_reused)) - self.fresh_depth_fraction) * weight;
         ease(&mut self.decode_ms, trace.decode_ns);
         ease(&mut self.depth_ms, trace.depth_ns);
         ease(&mut self.blur_ms, trace.blur_ns);
@@ -283,9 +283,9 @@ mod tests {
                 let trace = Trace {
                     depth_ns,
                     age_ns: depth_ns + 20_000_000,
-                    depth_held: k % every > 0,
+                    is_depth_reused: k % every > 0,
                     blur_ns: 9_000_000,
-                    between_ns: 4_000_000,
+                    queueing_ns: 4_000_000,
                     playout_ns: 7_000_000,
                     ..Trace::default()
                 };

@@ -5,7 +5,7 @@ use std::sync::atomic::AtomicBool;
 
 use super::state::{Camera, DepthMethod};
 use bokehcam::bokeh::{self, Bokeh};
-use bokehcam::knob::Knob;
+use bokehcam::camera_control::CameraControl;
 use bokehcam::look::{Look, presets::Preset};
 use bokehcam::sink::Sink;
 use bokehcam::source::{Source, devices::Choice};
@@ -42,7 +42,7 @@ pub struct Opened {
     /// Messages to the user: assumptions, and missing parts with where to get them.
     pub notes: Vec<String>,
     /// The camera's driver controls, such as exposure.
-    pub controls: Vec<Knob>,
+    pub controls: Vec<CameraControl>,
     /// Other properties of the camera; default for other sources.
     pub camera: Camera,
 }
@@ -100,7 +100,7 @@ pub trait Services: Send {
     ///
     /// # Errors
     /// Fails if the camera rejects the value.
-    fn set_control(&mut self, knob: &str, value: i64) -> Result<Vec<Knob>, String>;
+    fn set_control(&mut self, knob: &str, value: i64) -> Result<Vec<CameraControl>, String>;
 
     /// Creates an executor for pictures of `size` pixels.
     ///

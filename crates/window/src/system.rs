@@ -9,24 +9,24 @@ use super::dialog;
 use super::services::{Browse, Opened, Pick, Services, SettingsStore, Switch};
 use super::state::{Camera, DepthMethod};
 use bokehcam::bokeh::{self, Bokeh};
+use bokehcam::camera_control::CameraControl;
 use bokehcam::capture::demo;
-use bokehcam::computing::Executors;
+use bokehcam::computing::ExecutorFactory;
 use bokehcam::depth::focus::FocusRule;
-use bokehcam::knob::Knob;
 use bokehcam::look::{Effect, Look, Strength};
 use bokehcam::recording::{Options as Reading, Recording};
 use bokehcam::sink::{self, Sink, Target};
 use bokehcam::source::devices::{self, Choice};
-use bokehcam::source::{self, DepthChoice, Kind, OneCamera, Options, Size, Source, SourceName, modes};
+use bokehcam::source::{self, DepthChoice, Kind, Options, SingleCameraDepth, Size, Source, SourceName, modes};
 
 /// Shown if there is no camera, and the demonstration replaces it.
 const NO_CAMERA: &str = "No camera was found.";
 /// Shown with the synthetic scene.
-const RENDERED: &str = "This scene is rendered while it plays, as fast as the machine can; `demo` plays smoothly.";
+const RENDERED: &str = "This scene is rendered while it plays, at the speed of this machine; `demo` plays smoothly.";
 /// Shown if no network is installed.
-const NO_NETWORK: &str = "There is no network yet: `bokehcam models get` gets one, then this finds you.";
+const NO_NETWORK: &str = "There is no network yet: `bokehcam models get` installs one that finds you.";
 /// Shown if the command line declines the source's depth.
-const DECLINED: &str = "This source has depth, and --depth none declines it: leave that out for blur by depth.";
+const DECLINED: &str = "The depth of this source is off by --depth none: leave that out for blur by depth.";
 
 /// Opens sources and outputs like the command line does.
 pub struct System {
@@ -35,7 +35,7 @@ pub struct System {
     /// The initial look.
     pub look: Look,
     /// Creates executors.
-    pub executors: Executors,
+    pub executors: ExecutorFactory,
     /// Width and height of virtual cameras; `None` for those of the frames.
     pub out_size: Option<(u32, u32)>,
     /// Whether to overwrite existing files.
@@ -62,7 +62,7 @@ impl System {
     /// Creates a system without an open source, which does not overwrite files.
     pub fn new(options: Options, look: Look, settings: Box<dyn SettingsStore>) -> Self {
         Self {
-            executors: Executors::new(options.computing.clone()),
+            executors: ExecutorFactory::new(options.computing.clone()),
             options,
             look,
             out_size: None,
@@ -70,7 +70,7 @@ impl System {
             settings,
             opened: Vec::new(),
             mode: None,
-            nodes: (devices::nodes(), false),
+            nodes: (devices::list_video_nodes(), false),
             control_values: BTreeMap::new(),
             camera: None,
             way: None,
@@ -81,7 +81,7 @@ impl System {
     /// Returns the properties of the opened source.
     fn camera_properties(&self, source: &Source, name: &SourceName) -> Camera {
         let is_relative = source.depth_from.is_relative();
-        let is_lone = source.depth_from.is_of_pictures();
+        let is_lone = source.depth_from.is_replaceable();
         let Some(camera) = &self.camera else {
             // A camera known only to PipeWire is a laptop's built-in one.
             let faces_user = is_lone && name.kind() == Kind::Camera;
@@ -89,7 +89,7 @@ impl System {
         };
         let is_pair = self.options.stereo.side_by_side;
         Camera {
-            modes: modes::modes(camera),
+            modes: modes::list_modes(camera),
             faces_user: is_lone && !is_pair && modes::faces_user(camera),
             is_relative,
         }
@@ -97,7 +97,7 @@ impl System {
 
     /// Opens a source for continuous playback, with depth even if the current look does not need it.
     fn open_source(&self, name: &str, way: Option<DepthMethod>) -> Result<(Source, SourceName), String> {
-        let source_name = SourceName::from_str(name).map_err(|error| error.of(name).to_string())?;
+        let source_name = SourceName::from_str(name).map_err(|error| error.with_prefix(name).to_string())?;
         let mut options = self.options.clone();
         if let Some(way) = way {
             options.depth_choice = self.depth_choice_for(way);
@@ -125,12 +125,16 @@ impl System {
             (DepthMethod::Measured, choice @ (DepthChoice::Folder(_) | DepthChoice::Device(_) | DepthChoice::Auto)) => {
                 choice.clone()
             }
-            (DepthMethod::Person, DepthChoice::OneCamera(OneCamera { plate: None, matte: Some(file), .. })) => {
-                DepthChoice::OneCamera(OneCamera { matte: Some(file.clone()), ..OneCamera::default() })
-            }
+            (
+                DepthMethod::Person,
+                DepthChoice::SingleCamera(SingleCameraDepth { plate: None, matte: Some(file), .. }),
+            ) => DepthChoice::SingleCamera(SingleCameraDepth {
+                matte: Some(file.clone()),
+                ..SingleCameraDepth::default()
+            }),
             (
                 DepthMethod::PersonAndDistance,
-                choice @ DepthChoice::OneCamera(OneCamera { mono: Some(_), matte: Some(_), .. }),
+                choice @ DepthChoice::SingleCamera(SingleCameraDepth { mono: Some(_), matte: Some(_), .. }),
             ) => choice.clone(),
             _ => way.choice(),
         }
@@ -150,7 +154,7 @@ impl System {
                     has(&mut own, recording.is_some_and(|recording| recording.pair().is_some()), DepthMethod::Stereo);
                 }
                 _ => own.extend(
-                    DepthMethod::of(source.depth_from, &OneCamera::default(), false)
+                    DepthMethod::of(source.depth_from, &SingleCameraDepth::default(), false)
                         .filter(|way| matches!(way, DepthMethod::Measured | DepthMethod::Stereo)),
                 ),
             }
@@ -173,8 +177,8 @@ impl System {
 
 impl Services for System {
     fn sources(&mut self) -> Vec<Choice> {
-        let mut sources = devices::cameras();
-        sources.extend(devices::shared_cameras());
+        let mut sources = devices::list_cameras();
+        sources.extend(devices::list_pipewire_cameras());
         let is_other =
             |choice: &&Choice| choice.name != demo::NAME && !sources.iter().any(|camera| camera.name == choice.name);
         let opened: Vec<Choice> = self.opened.iter().filter(is_other).cloned().collect();
@@ -184,7 +188,7 @@ impl Services for System {
     }
 
     fn virtual_cameras(&mut self) -> Vec<Choice> {
-        devices::virtual_cameras()
+        devices::list_virtual_cameras()
     }
 
     fn check_depth_method(&mut self, name: &str, way: DepthMethod) -> Result<(), String> {
@@ -204,7 +208,7 @@ impl Services for System {
 
     fn open(&mut self, name: &str, way: Option<DepthMethod>) -> Result<Opened, String> {
         let mut notes = Vec::new();
-        let first_camera = || devices::cameras().into_iter().chain(devices::shared_cameras()).next();
+        let first_camera = || devices::list_cameras().into_iter().chain(devices::list_pipewire_cameras()).next();
         let name = match name {
             "" => first_camera().map_or_else(
                 || {
@@ -217,7 +221,7 @@ impl Services for System {
         };
         let (source, source_name) = self.open_source(&name, way)?;
         // Automatically used networks are not announced, because the user sees their effect.
-        let is_asked = matches!(self.options.depth_choice, DepthChoice::OneCamera(_)) || way.is_some();
+        let is_asked = matches!(self.options.depth_choice, DepthChoice::SingleCamera(_)) || way.is_some();
         notes.extend(source.networks.iter().filter(|_| is_asked).map(|networks| format!("Depth by {networks}.")));
         for by in source.networks.iter().chain(&source.persons) {
             tracing::info!("{name}: persons by {by}");
@@ -231,16 +235,16 @@ impl Services for System {
         }
         let has_depth = source.has_depth() && !is_declined;
         self.control_values.clear();
-        notes.extend(source_name.note(&source));
+        notes.extend(source_name.describe_photo(&source));
         self.opened.retain(|choice| choice.name != name);
-        self.opened.insert(0, Choice::of(&name));
-        self.camera = devices::camera_of(&source_name);
-        let controls = self.camera.as_deref().map(devices::knobs).unwrap_or_default();
+        self.opened.insert(0, Choice::from_name(&name));
+        self.camera = devices::controllable_camera(&source_name);
+        let controls = self.camera.as_deref().map(devices::list_controls).unwrap_or_default();
         self.way = way;
         let camera = self.camera_properties(&source, &source_name);
         let mut ways = self.ways(&source, &source_name, way);
         let networks = match &self.options.depth_choice {
-            DepthChoice::OneCamera(chosen) if chosen.has_networks() => chosen.clone(),
+            DepthChoice::SingleCamera(chosen) if chosen.has_networks() => chosen.clone(),
             _ => source::installed_networks(),
         };
         let usual = || DepthMethod::of(source.depth_from, &networks, source.guide.is_some());
@@ -250,7 +254,7 @@ impl Services for System {
     }
 
     fn devices_changed(&mut self) -> bool {
-        let nodes = devices::nodes();
+        let nodes = devices::list_video_nodes();
         let differ = nodes != self.nodes.0;
         // Reports the change once more at the next check: a new node exists before its access rights are set.
         let again = std::mem::replace(&mut self.nodes, (nodes, differ)).1;
@@ -258,7 +262,7 @@ impl Services for System {
     }
 
     fn check(&self, name: &str) -> Result<(), String> {
-        let source_name = SourceName::from_str(name).map_err(|error| error.of(name).to_string())?;
+        let source_name = SourceName::from_str(name).map_err(|error| error.with_prefix(name).to_string())?;
         match &source_name {
             SourceName::Folder(folder) => {
                 let reading = Reading { keep_going: true, ..Reading::default() };
@@ -276,9 +280,9 @@ impl Services for System {
         self.mode = Some((name.to_owned(), Size { width, height }, fps));
     }
 
-    fn set_control(&mut self, knob: &str, value: i64) -> Result<Vec<Knob>, String> {
+    fn set_control(&mut self, knob: &str, value: i64) -> Result<Vec<CameraControl>, String> {
         let Some(camera) = &self.camera else { return Err("this source has no controls".to_owned()) };
-        let controls = devices::turn(camera, knob, value)?;
+        let controls = devices::set_control(camera, knob, value)?;
         self.control_values.insert(knob.to_owned(), value);
         Ok(controls)
     }

@@ -106,7 +106,7 @@ pub fn chosen(language: Option<&str>) -> Result<Option<Table>, String> {
     let is_file = name.ends_with(".toml").then(|| PathBuf::from(name));
     let none = || {
         format!(
-            "there is no translation '{name}': put one at ~/.local/share/bokehcam/texts/{name}.toml, or name a file"
+            "there is no translation '{name}': save one as ~/.local/share/bokehcam/texts/{name}.toml, or give a file"
         )
     };
     match is_file.or_else(|| find(name)) {

@@ -109,8 +109,8 @@ impl ElementImpl for Imp {
             gst::subclass::ElementMetadata::new(
                 "Background blur",
                 "Filter/Effect/Video",
-                "Blurs the background as a lens does, with discs and other apertures: by depth, where the pad depth is \
-                 given some, else above and below a sharp band",
+                "Blurs the background like a lens, with discs and other apertures: by depth, if the pad depth is \
+                 linked, else above and below a sharp band",
                 "The bokehcam maintainers",
             )
         });
@@ -147,7 +147,7 @@ impl AggregatorImpl for Imp {
     ) -> Option<gst_base::AggregatorPad> {
         let mut stream = lock(&self.stream);
         if template.name() != "depth" || stream.depth_pad().is_some() {
-            gst::warning!(CATEGORY, imp = self, "there is one pad depth, and it is in use");
+            gst::warning!(CATEGORY, imp = self, "the only pad depth is already in use");
             return None;
         }
         let pad: gst_base::AggregatorPad = gst::PadBuilder::from_template(template).name("depth").build();

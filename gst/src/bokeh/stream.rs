@@ -2,10 +2,10 @@
 
 use std::time::Instant;
 
-use bokehcam::engine::Stepper;
+use bokehcam::engine::FrameProcessor;
 use bokehcam::look::{Effect, Look};
 use bokehcam::recording::depth_covers;
-use bokehcam::source::{DepthChoice, fitting_look};
+use bokehcam::source::{DepthChoice, adapt_look};
 use gst::subclass::prelude::*;
 use gst_base::prelude::*;
 
@@ -20,7 +20,7 @@ pub struct Stream {
     depth_pad: Option<gst_base::AggregatorPad>,
     pictures: Option<Pictures>,
     maps: Maps,
-    stepper: Option<Stepper>,
+    processor: Option<FrameProcessor>,
     /// Parameters of the stepper: the look, the version of the settings, and whether there is depth.
     look: Look,
     version: u64,
@@ -41,7 +41,7 @@ impl Stream {
 
     pub fn set_pictures(&mut self, pictures: Pictures) {
         if self.pictures.as_ref().is_none_or(|before| before.size() != pictures.size()) {
-            self.stepper = None;
+            self.processor = None;
         }
         self.pictures = Some(pictures);
     }
@@ -57,7 +57,7 @@ impl Stream {
 
     /// Discards the state of past pictures, for a seek or a new scene.
     pub fn reset(&mut self) {
-        self.stepper.iter_mut().for_each(Stepper::forget);
+        self.processor.iter_mut().for_each(FrameProcessor::clear_history);
         self.reset_maps();
         self.time.reset();
     }
@@ -140,7 +140,7 @@ impl Imp {
         if found == Found::Nothing && stream.depth_pad.as_ref().is_some_and(|pad| !pad.is_eos()) {
             lock(&self.counts).without_map += 1;
             if !std::mem::replace(&mut stream.has_warned, true) {
-                const WHY: &str = "pictures are left out until the first depth map comes through the pad depth";
+                const WHY: &str = "pictures are dropped until the first depth map arrives at the pad depth";
                 gst::element_imp_warning!(self, gst::StreamError::Failed, ("{WHY}"));
             }
             return Ok(None);
@@ -150,7 +150,7 @@ impl Imp {
             return Ok(None);
         }
         self.sync_controllers(&input);
-        self.update_stepper(stream, found != Found::Nothing)?;
+        self.update_processor(stream, found != Found::Nothing)?;
         self.blur(stream, input, due, period).map_err(|fault| {
             gst::element_imp_error!(self, gst::StreamError::Failed, ("{}", as_properties(&fault)));
             gst::FlowError::Error
@@ -180,31 +180,31 @@ impl Imp {
     }
 
     /// Applies changed settings to the stepper, or creates it.
-    fn update_stepper(&self, stream: &mut Stream, has_depth: bool) -> Result<(), gst::FlowError> {
+    fn update_processor(&self, stream: &mut Stream, has_depth: bool) -> Result<(), gst::FlowError> {
         let values = {
             let values = lock(&self.values);
-            if stream.stepper.is_some() && (stream.version, stream.has_depth) == (values.version, has_depth) {
+            if stream.processor.is_some() && (stream.version, stream.has_depth) == (values.version, has_depth) {
                 return Ok(());
             }
             values.clone()
         };
         if stream.has_depth != has_depth {
-            stream.stepper = None;
+            stream.processor = None;
         }
         (stream.version, stream.has_depth) = (values.version, has_depth);
         let size = stream.pictures.as_ref().map(Pictures::size).ok_or(gst::FlowError::NotNegotiated)?;
         let followed = values.look(&stream.look).and_then(|look| {
-            let fitting = fitting_look(&look, &DepthChoice::Auto, has_depth).map_err(|error| error.to_string())?;
-            let done = match &mut stream.stepper {
-                Some(stepper) => stepper.follow(&fitting),
+            let fitting = adapt_look(&look, &DepthChoice::Auto, has_depth).map_err(|error| error.to_string())?;
+            let done = match &mut stream.processor {
+                Some(processor) => processor.set_look(&fitting),
                 None => {
                     if look.effect == Effect::Auto && !has_depth {
-                        const WHY: &str = "without depth, all but a band of the picture is blurred: link a depth map to the \
-                                           pad depth, or choose with effect";
+                        const WHY: &str = "without depth, the picture is blurred outside of a sharp band: link a depth \
+                                           map to the pad depth, or set the property effect";
                         gst::element_imp_info!(self, gst::StreamError::Failed, ("{WHY}"));
                     }
-                    let made = Stepper::new(&fitting, size, has_depth, true, values.computing());
-                    made.map(|stepper| stream.stepper = Some(stepper))
+                    let made = FrameProcessor::new(&fitting, size, has_depth, true, values.computing());
+                    made.map(|processor| stream.processor = Some(processor))
                 }
             };
             stream.look = look;
@@ -213,7 +213,7 @@ impl Imp {
         match followed {
             Ok(()) => Ok(()),
             // The previous look stays in use.
-            Err(fault) if stream.stepper.is_some() => {
+            Err(fault) if stream.processor.is_some() => {
                 gst::element_imp_warning!(self, gst::LibraryError::Settings, ("{}", as_properties(&fault)));
                 Ok(())
             }
@@ -232,22 +232,22 @@ impl Imp {
         due: Option<gst::ClockTime>,
         period: gst::ClockTime,
     ) -> Result<Option<gst::Buffer>, String> {
-        let Stream { stepper: Some(stepper), pictures: Some(pictures), maps, time, .. } = stream else {
+        let Stream { processor: Some(processor), pictures: Some(pictures), maps, time, .. } = stream else {
             return Err("a picture came before its format".to_owned());
         };
-        if let Some(budget_ns) = lock(&self.lateness).budget_ns(stepper.expected_ns()) {
-            stepper.allow(budget_ns);
+        if let Some(budget_ns) = lock(&self.lateness).budget_ns(processor.expected_blur_ns()) {
+            processor.set_budget(budget_ns);
         }
-        let Some(quality) = stepper.quality() else { return Ok(Some(input)) };
-        let needs_depth = stepper.needs_depth();
-        let (color, depth) = stepper.frame();
+        let Some(quality) = processor.quality() else { return Ok(Some(input)) };
+        let needs_depth = processor.needs_depth();
+        let (color, depth) = processor.frame_buffers();
         pictures.read(&input, color)?;
         if needs_depth {
             let (found, size) = (maps.size().unwrap_or_default(), pictures.size());
             if !depth_covers(found, size) {
                 return Err(format!(
-                    "a depth map of {}x{} pixels does not cover pictures of {}x{}: it has to show the same view, with as many \
-                     pixels or fewer",
+                    "a depth map of {}x{} pixels does not cover pictures of {}x{}: it must show the same view, with \
+                     the same number of pixels or fewer",
                     found.0, found.1, size.0, size.1
                 ));
             }
@@ -257,7 +257,7 @@ impl Imp {
             };
             maps.read(units, depth)?;
         }
-        let blurred = stepper.step(time.next_ns(due, period)).map_err(|error| error.to_string())?;
+        let blurred = processor.process(time.next_ns(due, period)).map_err(|error| error.to_string())?;
         let pool = self.obj().buffer_pool().ok_or("there is no pool of buffers")?;
         // The base class leaves activation to the caller.
         if !pool.is_active() {
@@ -271,7 +271,7 @@ impl Imp {
             copied.map_err(|error| error.to_string())?;
         }
         lock(&self.counts).quality = quality.name();
-        if let Some(remark) = stepper.remark() {
+        if let Some(remark) = processor.take_warning() {
             gst::element_imp_warning!(self, gst::StreamError::Failed, ("{}", as_properties(&remark)));
         }
         Ok(Some(output))
@@ -284,7 +284,7 @@ impl Imp {
             counts.late += 1;
             (counts.pictures - counts.late - counts.without_map, counts.late)
         };
-        gst::debug!(CATEGORY, imp = self, "left out, as it is late: {due:?}");
+        gst::debug!(CATEGORY, imp = self, "dropped, as it is late: {due:?}");
         let message = gst::message::Qos::builder(false)
             .running_time(due)
             .timestamp(input.pts())

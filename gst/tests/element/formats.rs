@@ -1,8 +1,8 @@
 //! Formats and their colours: the output equals the library's conversions of the input, to the bit.
 
 use bokehcam::capture::pixels::Decoder;
-use bokehcam::color::Matrix;
-use bokehcam::engine::Stepper;
+use bokehcam::color::YcbcrMatrix;
+use bokehcam::engine::FrameProcessor;
 use bokehcam::frame::ColorImage;
 use bokehcam::layout::{FourCc, Layout, Plane, Range, Transfer};
 use bokehcam::look::{Effect, Look};
@@ -35,23 +35,23 @@ fn through(caps: &gst::Caps, picture: Vec<u8>) -> Vec<u8> {
 }
 
 fn blurred(picture: &ColorImage) -> ColorImage {
-    let mut stepper =
-        Stepper::new(&Look::plain(Effect::Blur), picture.size(), false, true, Default::default()).unwrap();
-    stepper.frame().0.clone_from(picture);
-    stepper.step(0).unwrap().clone()
+    let mut processor =
+        FrameProcessor::new(&Look::with_effect(Effect::Blur), picture.size(), false, true, Default::default()).unwrap();
+    processor.frame_buffers().0.clone_from(picture);
+    processor.process(0).unwrap().clone()
 }
 
 #[test]
 fn every_format_and_colorimetry_is_converted_as_the_library_does() {
     init();
     let cases = [
-        ("I420", "YM12", "2:4:5:1", Matrix::Bt601, Range::Limited),
-        ("I420", "YM12", "bt709", Matrix::Bt709, Range::Limited),
-        ("NV12", "NM12", "bt709", Matrix::Bt709, Range::Limited),
-        ("NV12", "NM12", "1:4:0:0", Matrix::Bt601, Range::Full),
-        ("YUY2", "YUYV", "bt601", Matrix::Bt601, Range::Limited),
-        ("YUY2", "YUYV", "bt2020", Matrix::Bt2020, Range::Limited),
-        ("RGB", "RGB3", "sRGB", Matrix::Bt601, Range::Full),
+        ("I420", "YM12", "2:4:5:1", YcbcrMatrix::Bt601, Range::Limited),
+        ("I420", "YM12", "bt709", YcbcrMatrix::Bt709, Range::Limited),
+        ("NV12", "NM12", "bt709", YcbcrMatrix::Bt709, Range::Limited),
+        ("NV12", "NM12", "1:4:0:0", YcbcrMatrix::Bt601, Range::Full),
+        ("YUY2", "YUYV", "bt601", YcbcrMatrix::Bt601, Range::Limited),
+        ("YUY2", "YUYV", "bt2020", YcbcrMatrix::Bt2020, Range::Limited),
+        ("RGB", "RGB3", "sRGB", YcbcrMatrix::Bt601, Range::Full),
     ];
     for (format, fourcc, colorimetry, matrix, range) in cases {
         let mut caps = caps(format, SIZE);

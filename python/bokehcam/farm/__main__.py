@@ -38,7 +38,7 @@ def parser() -> Parser:
         prog="python -m bokehcam.farm",
         usage="python -m bokehcam.farm [options] SOURCE... --out DIR [-- [stream|render] FLAGS]",
         description="Blur many recordings (stream) or still pictures (render) on the machines of a Ray cluster, each once. "
-        "Started again, it does what is left.",
+        "If started again, it completes the rest.",
         epilog=EXAMPLES,
         formatter_class=argparse.RawDescriptionHelpFormatter,
         allow_abbrev=False,
@@ -50,9 +50,9 @@ def parser() -> Parser:
         "--out",
         required=True,
         metavar="DIR",
-        help="where results go, and their reports (DIR/reports); all nodes see it",
+        help="folder for results and their reports (DIR/reports), which all nodes can access",
     )
-    parser.add_argument("--list", metavar="FILE", help="more sources, one a line; - is standard input")
+    parser.add_argument("--list", metavar="FILE", help="file with more sources, one per line; - is standard input")
     parser.add_argument(
         "--format",
         metavar="EXT",
@@ -61,29 +61,29 @@ def parser() -> Parser:
     parser.add_argument(
         "--depth-maps",
         metavar="DIR",
-        help="render: depth maps by the names of the pictures [default: NAME-depth beside them]",
+        help="render: folder of depth maps, named like the pictures [default: NAME-depth beside them]",
     )
     parser.add_argument(
         "--address",
         metavar="ADDR",
-        help="Ray cluster: auto, HOST:PORT, or local [default: one that runs here, else local]",
+        help="Ray cluster: auto, HOST:PORT, or local [default: a running one, else local]",
     )
-    parser.add_argument("--cpus", type=number(int, 1), default=1, metavar="N", help="CPUs and threads of a task [default: 1]")
+    parser.add_argument("--cpus", type=number(int, 1), default=1, metavar="N", help="CPUs and threads per task [default: 1]")
     parser.add_argument(
-        "--gpus", type=number(float, 0), default=0.0, metavar="N", help="GPUs of a task, which then blur [default: 0]"
+        "--gpus", type=number(float, 0), default=0.0, metavar="N", help="GPUs per task, for the blur [default: 0]"
     )
     parser.add_argument(
-        "--shard", type=number(int, 1), default=32, metavar="N", help="render: pictures of a task [default: 32]"
+        "--shard", type=number(int, 1), default=32, metavar="N", help="render: pictures per task [default: 32]"
     )
     parser.add_argument(
         "--retries",
         type=number(int, 0),
         default=3,
         metavar="N",
-        help="how often what failed is tried again [default: 3]",
+        help="number of retries of a failed task [default: 3]",
     )
     parser.add_argument(
-        "--bokehcam", metavar="FILE", help="the program, the same on all nodes [default: BOKEHCAM, else in their path]"
+        "--bokehcam", metavar="FILE", help="the program, at the same place on all nodes [default: BOKEHCAM, else from their path]"
     )
     return parser
 

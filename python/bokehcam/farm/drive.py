@@ -151,7 +151,7 @@ class Farm:
         self.alive = {node["NodeID"] for node in alive}
         self.places = max(1, sum(int(node["Resources"].get("CPU", 0) // self.options.cpus) for node in alive))
         if self.alive and self.alive <= self.unfit.keys():
-            self.tally.ended = f"no node is left that can do it: {'; '.join(set(self.unfit.values()))}"
+            self.tally.ended = f"no node that could do the work is left: {'; '.join(set(self.unfit.values()))}"
         for ref, task in self.running.items():
             # The task waits for a node that has left.
             if task.avoid and self.alive <= {*self.unfit, task.avoid}:

@@ -52,10 +52,10 @@ def program_at(given: str) -> tuple[str, str]:
     """Returns the program for the nodes, and its version. Each node looks up a name without a folder in its path."""
     found = located(given)
     if not found:
-        raise FarmError(f"there is no program {given}: install bokehcam, or name its file with --bokehcam or BOKEHCAM")
+        raise FarmError(f"there is no program {given}: install bokehcam, or give its file with --bokehcam or BOKEHCAM")
     version = version_of(found)
     if not version:
-        raise FarmError(f"{found} is no bokehcam: name its file with --bokehcam or BOKEHCAM")
+        raise FarmError(f"{found} is not bokehcam: give its file with --bokehcam or BOKEHCAM")
     return (found if "/" in given else given), version
 
 
@@ -69,7 +69,7 @@ def split_flags(rest: list[str]) -> tuple[str, tuple[str, ...]]:
     names = [flag.split("=", 1)[0] for flag in rest]
     for name in names:
         if name in OWN_FLAGS[command]:
-            raise UsageError(f"{name}: the farm sees to this itself; leave it out")
+            raise UsageError(f"{name}: the farm sets this itself; leave it out")
     if "--loop" in names and "--frames" not in names:
         raise UsageError("--loop: it would never end; add --frames N")
     return command, tuple(rest)
@@ -141,7 +141,7 @@ def expanded(command: str, source: Path) -> list[Path]:
         return [path]
     if not path.is_dir():
         if path.suffix.lower() not in PICTURES:
-            raise UsageError(f"{source}: no PNG or JPEG; recordings are for `stream`")
+            raise UsageError(f"{source}: not a PNG or JPEG; recordings are for `stream`")
         return [path]
     pictures = [
         entry
@@ -149,7 +149,7 @@ def expanded(command: str, source: Path) -> list[Path]:
         if entry.suffix.lower() in PICTURES and not entry.name.startswith(".") and not entry.stem.endswith(DEPTH_SUFFIX)
     ]
     if not pictures:
-        raise UsageError(f"{source}: there are no pictures (PNG or JPEG) in it; recordings are for `stream`")
+        raise UsageError(f"{source}: it contains no pictures (PNG or JPEG); recordings are for `stream`")
     return pictures
 
 
@@ -175,20 +175,20 @@ def may_be_made(job: Job, unit: Unit) -> bool:
     final, report = job.folder / unit.output, read_report(report_of(job.folder, unit))
     ours = (report or {}).get("farm")
     if report is not None and not isinstance(ours, dict):
-        raise UsageError(f"{report_of(job.folder, unit)} is no report of a farm, and stays: choose another --out")
+        raise UsageError(f"{report_of(job.folder, unit)} is not a report of a farm, and is not replaced: choose another --out")
     if not os.path.lexists(final):
         return True
     if not ours:
-        raise UsageError(f"{final} is there without a report of a farm, and stays: move it away, or choose another --out")
+        raise UsageError(f"{final} exists without a report of a farm, and is not replaced: move it away, or choose another --out")
     asked = job.asked(unit)
     if ours.get("source") != asked["source"]:
-        raise UsageError(f"{final} is there, and was made of {ours.get('source')}: choose another --out")
+        raise UsageError(f"{final} exists, and was made of {ours.get('source')}: choose another --out")
     if ours.get("arguments") != asked["arguments"]:
         flags = " ".join(map(str, ours.get("arguments") or []))
-        raise UsageError(f"{final} is there, and was made by `{flags}`: choose another --out, or give these flags again")
+        raise UsageError(f"{final} exists, and was made by `{flags}`: choose another --out, or give these flags again")
     if ours.get("settings_sha256") != asked["settings_sha256"]:
-        raise UsageError(f"{final} is there, and was made with other settings (file or environment): choose another --out")
-    raise UsageError(f"{final} has changed since a farm made it, or its report has: move it away, or choose another --out")
+        raise UsageError(f"{final} exists, and was made with other settings (file or environment): choose another --out")
+    raise UsageError(f"{final} or its report has changed since a farm made it: move it away, or choose another --out")
 
 
 @contextmanager
@@ -216,7 +216,7 @@ def take(lock: IO[str], job: Job) -> None:
     except BlockingIOError as error:
         raise FarmError(f"another farm is at work in {job.folder}: wait for it, or choose another --out") from error
     except OSError as error:
-        print(f"warning: {job.folder} cannot be locked ({error}): start no other farm on it meanwhile", file=sys.stderr)
+        print(f"warning: {job.folder} cannot be locked ({error}): do not start another farm on it meanwhile", file=sys.stderr)
 
 
 def try_link(job: Job) -> None:

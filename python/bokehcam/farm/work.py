@@ -193,7 +193,7 @@ def attempt(job: Job, unit: Unit, program: str, place: Path) -> Result:
         if read_report(report_of(job.folder, unit)) != report:
             put_report(job, unit, report, report_part)
     elif not finished(job, unit):
-        return Result(unit, f"{final} has appeared meanwhile, and is not of this job", warnings=warnings)
+        return Result(unit, f"{final} has appeared meanwhile, and does not belong to this job", warnings=warnings)
     return Result(unit, frames=frames_of(report), warnings=warnings)
 
 

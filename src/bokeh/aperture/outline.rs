@@ -25,14 +25,14 @@ impl Outline {
             Shape::Disc | Shape::Ring { .. } | Shape::Picture(_) => 1,
             Shape::Polygon { .. } | Shape::Heart | Shape::Star { .. } => DIRECTIONS,
         };
-        let radii: Vec<f64> = (0..=steps).map(|k| radius(shape, k as f64 / steps as f64 * TAU - PI)).collect();
+        let radii: Vec<f64> = (0..=steps).map(|k| outline_radius(shape, k as f64 / steps as f64 * TAU - PI)).collect();
         let (least, most) = radii.iter().fold((f64::INFINITY, 0.0f64), |(low, high), &r| (low.min(r), high.max(r)));
         Self { radii, range: [least, most] }
     }
 
     /// Returns the distance of the outline from the centre in the direction of a point, y down.
     #[inline]
-    pub fn towards(&self, x: f64, y: f64) -> f64 {
+    pub fn radius_towards(&self, x: f64, y: f64) -> f64 {
         if self.range[0] == self.range[1] {
             return self.range[0];
         }
@@ -46,7 +46,7 @@ impl Outline {
 
 /// Returns the distance of the outline from the centre in the direction `angle` (radians, clockwise from +x as y is
 /// down).
-fn radius(shape: &Shape, angle: f64) -> f64 {
+fn outline_radius(shape: &Shape, angle: f64) -> f64 {
     match *shape {
         Shape::Disc | Shape::Ring { .. } | Shape::Picture(_) => 1.0,
         Shape::Polygon { blades, rotation_deg, curvature } => {
@@ -55,7 +55,7 @@ fn radius(shape: &Shape, angle: f64) -> f64 {
             // Polar form of the straight edge between two corners, bent towards the circle.
             half.cos() / (from_corner - half).cos() * (1.0 - bend) + bend
         }
-        Shape::Heart => heart(angle),
+        Shape::Heart => heart_radius(angle),
         Shape::Star { points } => {
             let half = PI / f64::from(points.max(3));
             let from_tip = ((angle + PI / 2.0 + half).rem_euclid(2.0 * half) - half).abs();
@@ -68,7 +68,7 @@ fn radius(shape: &Shape, angle: f64) -> f64 {
 
 /// Returns the radius of the heart (x^2 + y^2 - 1)^3 = x^2 y^3 in direction `angle`, upright for y down and scaled to
 /// fit the square from -1 to 1; found by bisection. Never 0, so that callers may divide by it.
-fn heart(angle: f64) -> f64 {
+fn heart_radius(angle: f64) -> f64 {
     const SCALE: f64 = 1.0 / 1.25;
     let (sin, cos) = (-(angle.sin()), angle.cos());
     let inside = |r: f64| {
@@ -95,7 +95,7 @@ mod tests {
             let outline = Outline::new(&shape);
             let apart = |k: usize| {
                 let angle = (k as f64 + 0.37) / 10_000.0 * TAU - PI;
-                (outline.towards(angle.cos(), angle.sin()) - radius(&shape, angle)).abs()
+                (outline.radius_towards(angle.cos(), angle.sin()) - outline_radius(&shape, angle)).abs()
             };
             let errors: Vec<f64> = (0..10_000).map(apart).collect();
             let (worst, mean) = (errors.iter().copied().fold(0.0, f64::max), errors.iter().sum::<f64>() / 1e4);

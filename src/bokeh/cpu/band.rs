@@ -6,51 +6,51 @@
 use pulp::{Simd, WithSimd};
 
 use super::bin::{BinRows, BinSums};
-use super::fill::{Behind, HalfRows};
-use super::tent::{MARGIN, WIDE};
-use super::tiles::{BLOCK, TILE_H, TILE_W, Tiles, widen};
-use super::unpack::{Source, Surfaces};
+use super::fill::{HalfPictureBand, InpaintedBackground};
+use super::tent::{MARGIN, PADDED_BLOCK};
+use super::tiles::{BLOCK, TILE_H, TILE_W, Tiles, extend_range};
+use super::unpack::{InputFrame, Surfaces};
 use crate::bokeh::plan::{BinWeight, CELL, MAX_BINS};
 
 /// A band of rows of the picture: whole rows of cells of every bin.
 pub struct Band<'a> {
-    pub source: Source<'a>,
+    pub source: InputFrame<'a>,
     pub tiles: &'a Tiles,
     /// Range of rows.
     pub rows: std::ops::Range<usize>,
     /// Buffers of the bins to fill, by the bin's index in the plan.
     pub bins: [Option<BinRows<'a>>; MAX_BINS],
     /// Treatment of pixels that near objects occlude.
-    pub hidden: Hidden<'a>,
-    /// Per block, the first bin that waits for inpainting, or [`NONE`].
-    pub waits: &'a mut [usize],
+    pub inpainting: Inpainting<'a>,
+    /// Per block, the first bin that waits for inpainting, or [`NO_BIN`].
+    pub first_pending: &'a mut [usize],
     /// Scratch memory of the thread.
     pub sums: &'a mut BandSums,
 }
 
 /// How a band treats pixels that near objects occlude.
-pub enum Hidden<'a> {
+pub enum Inpainting<'a> {
     /// There are no near objects.
-    Nothing,
+    NotNeeded,
     /// Before inpainting: a layer and those behind it wait in blocks where anything is occluded for it. The picture at
     /// half size is written.
-    Waits { layers: &'a [Layer], halves: HalfRows<'a> },
+    Pending { layers: &'a [Layer], halves: HalfPictureBand<'a> },
     /// After inpainting: fills the blocks where a layer waited, for its bins only.
-    Filled { first: usize, behind: Behind<'a> },
+    Done { first: usize, background: InpaintedBackground<'a> },
 }
 
 /// A layer behind others: its first bin, and the weight of a pixel's own content in it.
 #[derive(Clone, Copy)]
 pub struct Layer {
     pub first: usize,
-    pub unhidden: BinWeight,
+    pub visible_weight: BinWeight,
 }
 
 /// Rows between the row being processed and the row being prefetched.
-const AHEAD: isize = 2;
+const PREFETCH_ROWS: isize = 2;
 
 /// No bin waits.
-pub const NONE: usize = usize::MAX;
+pub const NO_BIN: usize = usize::MAX;
 
 /// Sums of a thread for each bin.
 pub struct BandSums(Vec<BinSums>);
@@ -65,11 +65,11 @@ impl WithSimd for Band<'_> {
     type Output = ();
     #[inline(always)]
     fn with_simd<S: Simd>(mut self, simd: S) {
-        for block in 0..self.waits.len() {
-            self.block(simd, block);
+        for block in 0..self.first_pending.len() {
+            self.process_block(simd, block);
         }
         for bin in self.bins.iter_mut().flatten() {
-            bin.repeat_end();
+            bin.repeat_last_column();
         }
     }
 }
@@ -77,83 +77,84 @@ impl WithSimd for Band<'_> {
 impl Band<'_> {
     /// Adds one block of columns to every bin that it contributes to. In the first pass, a block with occluded pixels
     /// does only the bins in front of the first layer that needs inpainting; the passes for the layers behind
-    /// ([`Hidden::Filled`]) do the others.
+    /// ([`Inpainting::Done`]) do the others.
     #[inline(always)]
-    fn block<V: Simd>(&mut self, simd: V, block: usize) {
+    fn process_block<V: Simd>(&mut self, simd: V, block: usize) {
         // One tile more on every side, because the averages of a cell include pixels of its neighbours.
         let tile_columns = (block * (BLOCK / TILE_W)).saturating_sub(1)..(block + 1) * (BLOCK / TILE_W) + 1;
         let tile_rows = (self.rows.start / TILE_H).saturating_sub(1)..self.rows.end.div_ceil(TILE_H) + 1;
-        match &self.hidden {
-            Hidden::Nothing => self.waits[block] = NONE,
-            Hidden::Waits { layers, .. } => {
-                let hides =
-                    |layer: &&Layer| self.tiles.any_outside(&layer.unhidden, tile_columns.clone(), tile_rows.clone());
-                self.waits[block] = layers.iter().find(hides).map_or(NONE, |layer| layer.first);
+        match &self.inpainting {
+            Inpainting::NotNeeded => self.first_pending[block] = NO_BIN,
+            Inpainting::Pending { layers, .. } => {
+                let hides = |layer: &&Layer| {
+                    self.tiles.any_partly_outside(&layer.visible_weight, tile_columns.clone(), tile_rows.clone())
+                };
+                self.first_pending[block] = layers.iter().find(hides).map_or(NO_BIN, |layer| layer.first);
             }
-            Hidden::Filled { first, .. } if self.waits[block] > *first => return,
-            Hidden::Filled { .. } => {}
+            Inpainting::Done { first, .. } if self.first_pending[block] > *first => return,
+            Inpainting::Done { .. } => {}
         }
-        let is_filled = matches!(self.hidden, Hidden::Filled { .. });
+        let is_filled = matches!(self.inpainting, Inpainting::Done { .. });
         let mut active = [false; MAX_BINS];
-        let mut reach = 0;
+        let mut support = 0;
         for ((k, bin), active) in self.bins.iter_mut().enumerate().zip(&mut active) {
             let Some(bin) = bin else { continue };
-            if !is_filled && k >= self.waits[block] {
+            if !is_filled && k >= self.first_pending[block] {
                 continue;
             }
             *active = is_filled
                 || bin
                     .weight
                     .as_ref()
-                    .is_none_or(|weight| self.tiles.any_within(weight, tile_columns.clone(), tile_rows.clone()));
+                    .is_none_or(|weight| self.tiles.any_overlapping(weight, tile_columns.clone(), tile_rows.clone()));
             match *active {
-                true => reach = reach.max(bin.scale as isize / 2),
-                false => bin.clear(block),
+                true => support = support.max(bin.scale as isize / 2),
+                false => bin.clear_block(block),
             }
         }
-        if !active.contains(&true) && !matches!(self.hidden, Hidden::Waits { .. }) {
+        if !active.contains(&true) && !matches!(self.inpainting, Inpainting::Pending { .. }) {
             return;
         }
-        let mut surfaces: Surfaces<WIDE> = Surfaces::new();
-        let columns = columns_of(block, self.source.size.0);
+        let mut surfaces: Surfaces<PADDED_BLOCK> = Surfaces::new();
+        let columns = block_columns(block, self.source.size.0);
         let height = self.source.size.1 as isize;
         let (first, end) = (self.rows.start as isize, self.rows.end as isize);
         let last = end.min((height as usize).next_multiple_of(CELL) as isize);
-        for y in first - reach..last + reach {
+        for y in first - support..last + support {
             let inside = y.clamp(0, height - 1) as usize;
-            let ahead = (y + AHEAD).clamp(0, height - 1) as usize;
+            let ahead = (y + PREFETCH_ROWS).clamp(0, height - 1) as usize;
             self.source.prefetch(ahead, (block * BLOCK) as isize - MARGIN as isize, columns + 2 * MARGIN);
-            self.source.unpack::<V, WIDE>(
+            self.source.unpack::<V, PADDED_BLOCK>(
                 inside,
                 (block * BLOCK) as isize - MARGIN as isize,
                 columns + 2 * MARGIN,
                 &mut surfaces,
             );
-            match &mut self.hidden {
-                Hidden::Nothing => {}
-                Hidden::Waits { halves, .. } => {
+            match &mut self.inpainting {
+                Inpainting::NotNeeded => {}
+                Inpainting::Pending { halves, .. } => {
                     if (first..end.min(height)).contains(&y) {
-                        halves.add(block * BLOCK, MARGIN..MARGIN + columns, y as usize, &surfaces);
+                        halves.add_row(block * BLOCK, MARGIN..MARGIN + columns, y as usize, &surfaces);
                     }
                 }
-                Hidden::Filled { behind, .. } => {
+                Inpainting::Done { background, .. } => {
                     let width = self.source.size.0;
-                    behind.inpaint(simd, (block * BLOCK) as isize - MARGIN as isize, inside, width, &mut surfaces);
+                    background.inpaint(simd, (block * BLOCK) as isize - MARGIN as isize, inside, width, &mut surfaces);
                 }
             }
             let mut range = (f32::INFINITY, f32::NEG_INFINITY);
-            widen(&mut range, &surfaces.back.0[3][..columns + 2 * MARGIN], |coc_px| coc_px);
+            extend_range(&mut range, &surfaces.back.0[3][..columns + 2 * MARGIN], |coc_px| coc_px);
             if surfaces.mixed {
-                widen(&mut range, &surfaces.front.0[3][..columns + 2 * MARGIN], |coc_px| coc_px);
+                extend_range(&mut range, &surfaces.front.0[3][..columns + 2 * MARGIN], |coc_px| coc_px);
             }
             for ((bin, sums), _) in self.bins.iter_mut().zip(&mut self.sums.0).zip(active).filter(|(_, active)| *active)
             {
                 let Some(bin) = bin else { continue };
                 match bin.scale {
-                    1 => bin.add::<V, 1>(simd, sums, (block, columns), first, y, &surfaces, range),
-                    2 => bin.add::<V, 2>(simd, sums, (block, columns), first, y, &surfaces, range),
-                    4 => bin.add::<V, 4>(simd, sums, (block, columns), first, y, &surfaces, range),
-                    _ => bin.add::<V, 8>(simd, sums, (block, columns), first, y, &surfaces, range),
+                    1 => bin.add_row::<V, 1>(simd, sums, (block, columns), first, y, &surfaces, range),
+                    2 => bin.add_row::<V, 2>(simd, sums, (block, columns), first, y, &surfaces, range),
+                    4 => bin.add_row::<V, 4>(simd, sums, (block, columns), first, y, &surfaces, range),
+                    _ => bin.add_row::<V, 8>(simd, sums, (block, columns), first, y, &surfaces, range),
                 }
             }
         }
@@ -161,6 +162,6 @@ impl Band<'_> {
 }
 
 /// Returns the columns of a block inside the picture, rounded up to whole vectors of the coarsest bin.
-fn columns_of(block: usize, width: usize) -> usize {
+fn block_columns(block: usize, width: usize) -> usize {
     (width - block * BLOCK).next_multiple_of(2 * TILE_W).min(BLOCK)
 }

@@ -8,11 +8,13 @@ use pulp::Simd;
 
 use super::cell_sums::{CellSums, accumulate_columns, clear_cells};
 use super::rows::{CELL_PLANES, EMPTY_CELL, STRIP, STRIP_CELLS, STRIP_ROW};
-use super::tent::{MARGIN, Means, PLANE, SUMS, WIDE, WeightAt, is_zero, reduce, sum_row};
+use super::tent::{
+    MARGIN, Means, PADDED_BLOCK, PLANE_LEN, SUM_PLANES, VectorWeight, accumulate_row, downscale_row, is_zero,
+};
 use super::tiles::BLOCK;
 use super::unpack::Surfaces;
-use crate::bokeh::plan::{BinWeight, CELL, COVERAGE_FLOOR};
-use crate::compute::aligned::Line;
+use crate::bokeh::plan::{BinWeight, CELL, MIN_COVERAGE};
+use crate::compute::aligned::CacheAligned;
 use crate::compute::simd::{load, prefetch, store};
 
 /// Output of one bin for a band.
@@ -24,7 +26,7 @@ pub struct BinRows<'a> {
     /// Columns and rows of the bin.
     pub size: (usize, usize),
     /// Whether the range of its colours is needed.
-    pub ranged: bool,
+    pub needs_color_range: bool,
     /// Rows of the bin in this band.
     pub rows: usize,
     /// Strips of the band, laid out like [`Strips`](super::rows::Strips).
@@ -40,7 +42,7 @@ pub struct BinRows<'a> {
 /// Sums of a bin: the two bin rows in progress, the last finished row, and the row of cells.
 #[derive(Clone)]
 pub struct BinSums {
-    rows: Line<[[[f32; WIDE]; SUMS]; 2]>,
+    rows: CacheAligned<[[[f32; PADDED_BLOCK]; SUM_PLANES]; 2]>,
     /// Whether each of the two rows has been started.
     touched: [bool; 2],
     /// Whether the bin has data of the previous frame at the row of cells.
@@ -52,11 +54,11 @@ pub struct BinSums {
 impl BinSums {
     pub fn new() -> Self {
         let mut empty = Self {
-            rows: Line([[[0.0; WIDE]; SUMS]; 2]),
+            rows: CacheAligned([[[0.0; PADDED_BLOCK]; SUM_PLANES]; 2]),
             touched: [false; 2],
             stale: false,
-            cells: Line([[0.0; PLANE]; CELL_PLANES]),
-            means: Line([[0.0; PLANE]; SUMS]),
+            cells: CacheAligned([[0.0; PLANE_LEN]; CELL_PLANES]),
+            means: CacheAligned([[0.0; PLANE_LEN]; SUM_PLANES]),
         };
         clear_cells(&mut empty.cells);
         empty
@@ -64,19 +66,19 @@ impl BinSums {
 }
 
 /// Rows between the row being stored and the row being prefetched, which is far away in memory.
-const AHEAD: usize = 2;
+const PREFETCH_ROWS: usize = 2;
 
 /// Returns the offset of row `row` of the strip at column `x`.
 #[inline(always)]
-fn strip_row(across: usize, x: usize, row: usize) -> usize {
+fn strip_row_offset(across: usize, x: usize, row: usize) -> usize {
     (row / CELL * across + x / STRIP) * STRIP_CELLS + row % CELL * STRIP_ROW
 }
 
 impl BinRows<'_> {
     #[inline(always)]
-    pub fn clear(&mut self, block: usize) {
+    pub fn clear_block(&mut self, block: usize) {
         let (x0, width) = (block * BLOCK / self.scale, BLOCK / self.scale);
-        for row in 0..self.rows_of_cells() {
+        for row in 0..self.cell_row_count() {
             let blocks = self.blocks();
             if std::mem::take(&mut self.filled[row * blocks + block]) {
                 let first = row * self.across + x0 / STRIP;
@@ -86,7 +88,7 @@ impl BinRows<'_> {
         }
         let across = self.size.0.div_ceil(CELL);
         let (first, cells) = (x0 / CELL, (width / CELL).min(across.saturating_sub(x0 / CELL)));
-        let total = self.cells.len() / (CELL_PLANES * self.rows_of_cells());
+        let total = self.cells.len() / (CELL_PLANES * self.cell_row_count());
         for (k, plane) in self.cells.chunks_exact_mut(total).enumerate() {
             plane[first..first + cells].fill(EMPTY_CELL[k % CELL_PLANES]);
         }
@@ -94,15 +96,15 @@ impl BinRows<'_> {
 
     /// Returns row `row` of the strip at column `x`.
     #[inline(always)]
-    fn strip_row(&mut self, x: usize, row: usize) -> &mut [f32] {
-        &mut self.out[strip_row(self.across, x, row)..][..STRIP_ROW]
+    fn strip_row_mut(&mut self, x: usize, row: usize) -> &mut [f32] {
+        &mut self.out[strip_row_offset(self.across, x, row)..][..STRIP_ROW]
     }
 
     /// Repeats the last column up to the end of the last strip.
-    pub fn repeat_end(&mut self) {
+    pub fn repeat_last_column(&mut self) {
         let last = (self.size.0 - 1) % STRIP;
         for row in 0..self.rows {
-            for plane in self.strip_row(self.size.0 - 1, row).as_chunks_mut::<STRIP>().0 {
+            for plane in self.strip_row_mut(self.size.0 - 1, row).as_chunks_mut::<STRIP>().0 {
                 let value = plane[last];
                 plane[last + 1..].fill(value);
             }
@@ -110,37 +112,37 @@ impl BinRows<'_> {
     }
 
     fn blocks(&self) -> usize {
-        self.filled.len() / self.rows_of_cells()
+        self.filled.len() / self.cell_row_count()
     }
 
-    fn rows_of_cells(&self) -> usize {
+    fn cell_row_count(&self) -> usize {
         self.rows.div_ceil(CELL)
     }
 
     /// Adds row `y` of the picture (may be outside it) to the bin rows of a band that begins at row `first`.
     #[inline(always)]
     #[allow(clippy::too_many_arguments)]
-    pub fn add<V: Simd, const S: usize>(
+    pub fn add_row<V: Simd, const S: usize>(
         &mut self,
         simd: V,
         sums: &mut BinSums,
         (block, columns): (usize, usize),
         first: isize,
         y: isize,
-        surfaces: &Surfaces<WIDE>,
+        surfaces: &Surfaces<PADDED_BLOCK>,
         range: (f32, f32),
     ) {
         let rows = self.rows as isize;
-        let meets = self.weight.is_none_or(|weight| weight.meets(range));
+        let overlaps = self.weight.is_none_or(|weight| weight.overlaps(range));
         if S == 1 {
             if (0..rows).contains(&(y - first)) {
                 let row = (block, columns, (y - first) as usize);
-                self.open_cells(row, sums);
-                match meets {
-                    true => self.whole_row(simd, row, sums, surfaces),
-                    false => self.empty_row::<S>(row, sums),
+                self.begin_cell_row(row, sums);
+                match overlaps {
+                    true => self.store_full_scale_row(simd, row, sums, surfaces),
+                    false => self.clear_row::<S>(row, sums),
                 }
-                self.close_cells::<S>(row, sums);
+                self.end_cell_row::<S>(row, sums);
             }
             return;
         }
@@ -155,13 +157,13 @@ impl BinRows<'_> {
         let parity = upper.rem_euclid(2) as usize;
         let [even, odd] = &mut sums.rows.0;
         let (above, below) = if parity == 0 { (even, odd) } else { (odd, even) };
-        if meets {
+        if overlaps {
             let fresh = [!sums.touched[parity], !sums.touched[1 - parity]];
             sums.touched = [true; 2];
             let rise = (k as f32 + 0.5) / (S * S) as f32;
-            sum_row(
+            accumulate_row(
                 simd,
-                &WeightAt::new(simd, &self.weight),
+                &VectorWeight::new(simd, &self.weight),
                 surfaces,
                 columns,
                 [1.0 / S as f32 - rise, rise],
@@ -177,21 +179,21 @@ impl BinRows<'_> {
             if upper >= 0 {
                 let row = (block, columns, upper as usize);
                 if touched {
-                    reduce::<V, S>(simd, above, columns, &mut sums.means);
+                    downscale_row::<V, S>(simd, above, columns, &mut sums.means);
                 }
-                self.open_cells(row, sums);
+                self.begin_cell_row(row, sums);
                 match touched {
-                    true => self.finish_row::<V, S>(simd, row, sums),
-                    false => self.empty_row::<S>(row, sums),
+                    true => self.store_row::<V, S>(simd, row, sums),
+                    false => self.clear_row::<S>(row, sums),
                 }
-                self.close_cells::<S>(row, sums);
+                self.end_cell_row::<S>(row, sums);
             }
         }
     }
 
     /// Starts a row of cells if this is its first row.
     #[inline(always)]
-    fn open_cells(&mut self, (block, _, row): (usize, usize, usize), sums: &mut BinSums) {
+    fn begin_cell_row(&mut self, (block, _, row): (usize, usize, usize), sums: &mut BinSums) {
         if row.is_multiple_of(CELL) {
             let blocks = self.blocks();
             sums.stale = std::mem::take(&mut self.filled[row / CELL * blocks + block]);
@@ -200,28 +202,28 @@ impl BinRows<'_> {
 
     /// Clears a row without content in this bin.
     #[inline(always)]
-    fn empty_row<const S: usize>(&mut self, (block, columns, row): (usize, usize, usize), sums: &BinSums) {
+    fn clear_row<const S: usize>(&mut self, (block, columns, row): (usize, usize, usize), sums: &BinSums) {
         let x0 = block * BLOCK / S;
         if sums.stale {
             for x in (0..(columns / S).min(self.across * STRIP - x0)).step_by(STRIP) {
-                self.strip_row(x0 + x, row).fill(0.0);
+                self.strip_row_mut(x0 + x, row).fill(0.0);
             }
         }
     }
 
     /// Stores a row of a bin at full scale, without averaging.
     #[inline(always)]
-    fn whole_row<V: Simd>(
+    fn store_full_scale_row<V: Simd>(
         &mut self,
         simd: V,
         (block, columns, row): (usize, usize, usize),
         sums: &mut BinSums,
-        surfaces: &Surfaces<WIDE>,
+        surfaces: &Surfaces<PADDED_BLOCK>,
     ) {
-        let weight = WeightAt::new(simd, &self.weight);
+        let weight = VectorWeight::new(simd, &self.weight);
         for x in (0..columns.min(self.across * STRIP - block * BLOCK)).step_by(V::F32_LANES) {
-            let taken = weight.at_surfaces(simd, surfaces, MARGIN + x);
-            let out = self.strip_row(block * BLOCK + x, row);
+            let taken = weight.surface_weights(simd, surfaces, MARGIN + x);
+            let out = self.strip_row_mut(block * BLOCK + x, row);
             if is_zero(simd, taken) {
                 if sums.stale {
                     for p in 0..4 {
@@ -232,21 +234,21 @@ impl BinRows<'_> {
             }
             let values = weight.apply(simd, taken, surfaces, MARGIN + x);
             // The strips of the next rows are far away in memory.
-            let ahead = &self.strip_row(block * BLOCK + x, (row + AHEAD).min(self.rows - 1))[x % STRIP..];
+            let ahead = &self.strip_row_mut(block * BLOCK + x, (row + PREFETCH_ROWS).min(self.rows - 1))[x % STRIP..];
             for p in 0..4 {
                 prefetch(&ahead[p * STRIP..][..V::F32_LANES]);
             }
-            let out = self.strip_row(block * BLOCK + x, row);
+            let out = self.strip_row_mut(block * BLOCK + x, row);
             for p in 0..4 {
                 store::<V>(out, p * STRIP + x % STRIP, values[p]);
             }
             // At full scale a pixel is its own mean: its colour counts whatever its weight. For two surfaces it is the
             // colour of their weighted sum.
             let mut own = None;
-            if self.ranged {
+            if self.needs_color_range {
                 let mut colors = [values[0], values[1], values[2]];
                 if surfaces.mixed {
-                    let floor = simd.splat_f32s(COVERAGE_FLOOR);
+                    let floor = simd.splat_f32s(MIN_COVERAGE);
                     let inverse = simd.div_f32s(simd.splat_f32s(1.0), simd.max_f32s(values[3], floor));
                     for p in 0..3 {
                         colors[p] = simd.mul_f32s(values[p], inverse);
@@ -266,10 +268,10 @@ impl BinRows<'_> {
 
     /// Stores the row of cells after its last row.
     #[inline(always)]
-    fn close_cells<const S: usize>(&mut self, (block, columns, row): (usize, usize, usize), sums: &mut BinSums) {
+    fn end_cell_row<const S: usize>(&mut self, (block, columns, row): (usize, usize, usize), sums: &mut BinSums) {
         if row % CELL == CELL - 1 || row == self.rows - 1 {
             let filled = self.filled[row / CELL * self.blocks() + block];
-            self.finish_cells::<S>((block, columns), row / CELL, filled.then_some(&sums.cells));
+            self.store_cells::<S>((block, columns), row / CELL, filled.then_some(&sums.cells));
             if filled {
                 clear_cells(&mut sums.cells);
             }
@@ -278,7 +280,7 @@ impl BinRows<'_> {
 
     /// Stores a row of the bin and adds it to its cells.
     #[inline(always)]
-    fn finish_row<V: Simd, const S: usize>(
+    fn store_row<V: Simd, const S: usize>(
         &mut self,
         simd: V,
         (block, columns, row): (usize, usize, usize),
@@ -287,19 +289,19 @@ impl BinRows<'_> {
         let (x0, width) = (block * BLOCK / S, columns / S);
         let means = &sums.means.0;
         for x in (0..width.min(self.across * STRIP - x0)).step_by(STRIP) {
-            let out = &mut self.out[strip_row(self.across, x0 + x, row)..][..STRIP_ROW];
+            let out = &mut self.out[strip_row_offset(self.across, x0 + x, row)..][..STRIP_ROW];
             for p in 0..4 {
                 out[p * STRIP..][..STRIP].copy_from_slice(&means[p][x..x + STRIP]);
             }
-            prefetch(self.strip_row(x0 + x, (row + 1).min(self.rows - 1)));
+            prefetch(self.strip_row_mut(x0 + x, (row + 1).min(self.rows - 1)));
         }
         let blocks = self.blocks();
         self.filled[row / CELL * blocks + block] = true;
-        let (floor, one) = (simd.splat_f32s(COVERAGE_FLOOR), simd.splat_f32s(1.0));
+        let (floor, one) = (simd.splat_f32s(MIN_COVERAGE), simd.splat_f32s(1.0));
         for x in (0..width).step_by(V::F32_LANES) {
             let coverage = load::<V>(&means[3], x);
             let mut own = None;
-            if self.ranged {
+            if self.needs_color_range {
                 // Unpremultiplied; the floor avoids amplifying the colour of almost empty pixels.
                 let inverse = simd.div_f32s(one, simd.max_f32s(coverage, floor));
                 let mut colors = [inverse; 3];
@@ -313,11 +315,11 @@ impl BinRows<'_> {
     }
 
     #[inline(always)]
-    fn finish_cells<const S: usize>(&mut self, (block, columns): (usize, usize), row: usize, cells: Option<&CellSums>) {
-        let across = self.cells.len() / (CELL_PLANES * self.rows_of_cells());
+    fn store_cells<const S: usize>(&mut self, (block, columns): (usize, usize), row: usize, cells: Option<&CellSums>) {
+        let across = self.cells.len() / (CELL_PLANES * self.cell_row_count());
         let (x0, width) = (block * BLOCK / S, columns / S);
         let valid = width.min(self.size.0.saturating_sub(x0));
-        for p in 0..if self.ranged { CELL_PLANES } else { 2 } {
+        for p in 0..if self.needs_color_range { CELL_PLANES } else { 2 } {
             let out = &mut self.cells[(row * CELL_PLANES + p) * across + x0 / CELL..];
             let Some(cells) = cells else {
                 out[..valid.div_ceil(CELL)].fill(EMPTY_CELL[p]);

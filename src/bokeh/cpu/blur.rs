@@ -13,16 +13,16 @@ use std::ops::Range;
 use pulp::{Simd, WithSimd};
 
 use super::filter::{
-    BLOCK_ROWS, Taps, along_column, along_column_block, along_row, keep_in_range, max_row_len, row_len,
+    BLOCK_ROWS, Taps, clamp_to_range, filter_column, filter_column_block, filter_row, max_row_len, row_len,
 };
-use super::rows::{Cells, EDGE_VALUES, Edges, PIECE, STRIP, STRIP_EDGES, STRIP_ROW, Strips};
-use crate::bokeh::bank::Bank;
+use super::rows::{COPY_WIDTH, CellGrid, EDGE_VALUES, STRIP, STRIP_EDGES, STRIP_ROW, SegmentEdges, Strips};
+use crate::bokeh::bank::FilterBank;
 use crate::bokeh::plan::{CELL, Plan, SEGMENT};
 use crate::compute::aligned::Aligned;
 use crate::compute::simd::{load, prefetch, store};
 
 /// Terms filtered at once; more are done in groups.
-pub const GROUP: usize = 4;
+pub const TERMS_PER_GROUP: usize = 4;
 
 /// One strip of one bin.
 pub struct Strip<'a> {
@@ -31,16 +31,16 @@ pub struct Strip<'a> {
     /// Columns and rows of the bin.
     pub size: (usize, usize),
     /// The coarse grid with the bin's coverage.
-    pub cells: &'a Cells,
+    pub cells: &'a CellGrid,
     /// Radius and range of colours, from `reach`.
-    pub edges: &'a Edges,
-    pub bank: &'a Bank,
+    pub edges: &'a SegmentEdges,
+    pub bank: &'a FilterBank,
     /// Whether the bin covers every pixel.
     pub whole: bool,
     /// Whether the aperture is rotated by 180 degrees (content in front of the focal plane).
     pub turned: bool,
     /// Outermost tap of this bin's filters.
-    pub reach: usize,
+    pub half_width: usize,
     pub strip: usize,
     /// `[row][4][STRIP]`: the result.
     pub out: &'a mut [f32],
@@ -52,8 +52,8 @@ pub struct Strip<'a> {
 
 /// Returns the capacity of the ring of horizontally filtered rows: enough for a block of rows, rounded up to a power of
 /// two so that an index is masked.
-fn ring_rows(reach: usize) -> usize {
-    (2 * reach + BLOCK_ROWS).next_power_of_two()
+fn ring_capacity(half_width: usize) -> usize {
+    (2 * half_width + BLOCK_ROWS).next_power_of_two()
 }
 
 /// Scratch memory of one thread for the pass `blur`.
@@ -69,10 +69,10 @@ pub struct Scratch {
 impl Scratch {
     /// Allocates for every bin of a plan.
     pub fn new(plan: &Plan) -> Self {
-        let reach = plan.ladder.max_reach();
+        let half_width = plan.ladder.max_half_width();
         Self {
-            rows: Aligned::zeros(ring_rows(reach) * max_row_len(GROUP.min(plan.ladder.max_terms()))),
-            lines: Aligned::zeros(BLOCK_ROWS * 4 * (STRIP + 2 * reach.next_multiple_of(PIECE))),
+            rows: Aligned::zeros(ring_capacity(half_width) * max_row_len(TERMS_PER_GROUP.min(plan.ladder.max_terms()))),
+            lines: Aligned::zeros(BLOCK_ROWS * 4 * (STRIP + 2 * half_width.next_multiple_of(COPY_WIDTH))),
             filtered: Vec::with_capacity(plan.height.div_ceil(CELL)),
         }
     }
@@ -99,8 +99,8 @@ impl Strip<'_> {
     #[inline(always)]
     fn filter_groups<S: Simd, const P: usize>(&mut self, simd: S) {
         let terms = self.bank.terms;
-        for first in (0..terms).step_by(GROUP) {
-            match ((terms - first).min(GROUP), self.bank.is_symmetric) {
+        for first in (0..terms).step_by(TERMS_PER_GROUP) {
+            match ((terms - first).min(TERMS_PER_GROUP), self.bank.is_symmetric) {
                 (1, true) => self.filter_group::<S, 1, true, P>(simd, first),
                 (2, true) => self.filter_group::<S, 2, true, P>(simd, first),
                 (3, true) => self.filter_group::<S, 3, true, P>(simd, first),
@@ -117,7 +117,7 @@ impl Strip<'_> {
     /// empty, because its surface covers part of the picture. Returns false if the strip stays empty.
     #[inline(always)]
     fn mark_active(&mut self) -> bool {
-        let (across, down) = (self.reach.div_ceil(CELL), self.reach.div_ceil(CELL));
+        let (across, down) = (self.half_width.div_ceil(CELL), self.half_width.div_ceil(CELL));
         let rows = self.active.len();
         let first = self.strip * STRIP / CELL;
         let columns = first.saturating_sub(across)..(first + STRIP / CELL + across).min(self.cells.width);
@@ -125,8 +125,8 @@ impl Strip<'_> {
         filtered.clear();
         filtered.extend((0..rows).map(|y| self.cells.plane(y, 0)[columns.clone()].iter().any(|&c| c > 0.0)));
         for y in 0..rows {
-            let reach = y.saturating_sub(down)..(y + down + 1).min(rows);
-            let active = filtered[reach].iter().any(|&f| f);
+            let support = y.saturating_sub(down)..(y + down + 1).min(rows);
+            let active = filtered[support].iter().any(|&f| f);
             let was = std::mem::replace(&mut self.active[y], active);
             // Clears the rows written in the previous frame; all others are zero already.
             if was && !active {
@@ -141,15 +141,15 @@ impl Strip<'_> {
     #[inline(always)]
     fn filter_group<S: Simd, const R: usize, const SYMMETRIC: bool, const P: usize>(&mut self, simd: S, first: usize) {
         let mut scratch = std::mem::take(&mut self.scratch.rows);
-        let rows = &mut scratch[..ring_rows(self.reach) * row_len::<S>(R)];
+        let rows = &mut scratch[..ring_capacity(self.half_width) * row_len::<S>(R)];
         let mut next_y = 0;
         for y in (0..self.size.1).step_by(BLOCK_ROWS) {
             if !self.active[y / CELL] {
                 continue;
             }
             // The ring holds only the rows that the columns need, so that it stays in the nearest caches.
-            let end_y = (y + self.reach + BLOCK_ROWS).min(self.size.1);
-            next_y = next_y.max(y.saturating_sub(self.reach));
+            let end_y = (y + self.half_width + BLOCK_ROWS).min(self.size.1);
+            next_y = next_y.max(y.saturating_sub(self.half_width));
             while next_y < end_y {
                 let source_ys = next_y..(next_y + BLOCK_ROWS).min(end_y);
                 self.filter_rows::<S, R, SYMMETRIC, P>(simd, first, source_ys, rows);
@@ -175,8 +175,8 @@ impl Strip<'_> {
         let row_len = row_len::<S>(R);
         let ring_mask = rows.len() / row_len - 1;
         let mut lines = std::mem::take(&mut self.scratch.lines);
-        // The source's rows are copied `PIECE` columns at a time.
-        let pad = self.reach.next_multiple_of(PIECE);
+        // The source's rows are copied `COPY_WIDTH` columns at a time.
+        let pad = self.half_width.next_multiple_of(COPY_WIDTH);
         let span = STRIP + 2 * pad;
         // All lines are copied first: unaligned loads right after the stores would stall on store forwarding.
         for (k, y) in ys.clone().enumerate() {
@@ -202,10 +202,10 @@ impl Strip<'_> {
                 let taps = self.taps::<R>(&self.bank.horizontal, first, &edges, x);
                 // The radius is mostly the same at both edges; a tap is then one number for the whole vector instead of
                 // a vector of its own.
-                let sums = if taps.steady {
-                    along_row::<S, R, SYMMETRIC, false, P>(simd, &taps, &planes, x + pad)
+                let sums = if taps.is_constant {
+                    filter_row::<S, R, SYMMETRIC, false, P>(simd, &taps, &planes, x + pad)
                 } else {
-                    along_row::<S, R, SYMMETRIC, true, P>(simd, &taps, &planes, x + pad)
+                    filter_row::<S, R, SYMMETRIC, true, P>(simd, &taps, &planes, x + pad)
                 };
                 for r in 0..R {
                     for p in 0..P {
@@ -238,10 +238,10 @@ impl Strip<'_> {
                 let mut same = true;
                 for edges in &edges {
                     let taps = self.taps::<R>(table, first, edges, x);
-                    same &= taps.steady && taps.left == shared.left;
+                    same &= taps.is_constant && taps.left == shared.left;
                 }
                 if same {
-                    let sums = along_column_block::<S, R, SYMMETRIC, P>(simd, &shared, rows, ys.start, x, self.size.1);
+                    let sums = filter_column_block::<S, R, SYMMETRIC, P>(simd, &shared, rows, ys.start, x, self.size.1);
                     for k in 0..BLOCK_ROWS {
                         self.add_to_result::<S, R, P>(simd, first, (x, ys.start + k), sums[k], &edges[k]);
                     }
@@ -250,10 +250,10 @@ impl Strip<'_> {
             }
             for (edges, y) in edges.iter().zip(ys.clone()) {
                 let taps = self.taps::<R>(table, first, edges, x);
-                let sums = if taps.steady {
-                    along_column::<S, R, SYMMETRIC, false, P>(simd, &taps, rows, y, x, self.size.1)
+                let sums = if taps.is_constant {
+                    filter_column::<S, R, SYMMETRIC, false, P>(simd, &taps, rows, y, x, self.size.1)
                 } else {
-                    along_column::<S, R, SYMMETRIC, true, P>(simd, &taps, rows, y, x, self.size.1)
+                    filter_column::<S, R, SYMMETRIC, true, P>(simd, &taps, rows, y, x, self.size.1)
                 };
                 self.add_to_result::<S, R, P>(simd, first, (x, y), sums, edges);
             }
@@ -281,7 +281,7 @@ impl Strip<'_> {
             if P == 3 {
                 sums[3] = simd.splat_f32s(1.0);
             }
-            keep_in_range(simd, &mut sums, edges, x);
+            clamp_to_range(simd, &mut sums, edges, x);
         }
         for p in 0..4 {
             store::<S>(out, p * STRIP + x, sums[p]);
@@ -298,15 +298,15 @@ impl Strip<'_> {
         x: usize,
     ) -> Taps<'b, R> {
         let segment = x / SEGMENT;
-        let (left, right) = (self.bank.node(edges[segment][0]), self.bank.node(edges[segment + 1][0]));
+        let (left, right) = (self.bank.nearest_node(edges[segment][0]), self.bank.nearest_node(edges[segment + 1][0]));
         Taps {
             table,
-            left: self.bank.tap(left, 0) + first,
-            right: self.bank.tap(right, 0) + first,
+            left: self.bank.tap_index(left, 0) + first,
+            right: self.bank.tap_index(right, 0) + first,
             step: if self.turned { -(self.bank.terms as isize) } else { self.bank.terms as isize },
-            reach: self.bank.node_half_width[left.max(right)] as usize,
+            half_width: self.bank.node_half_width[left.max(right)] as usize,
             lane: x % SEGMENT,
-            steady: left == right,
+            is_constant: left == right,
         }
     }
 }

@@ -5,13 +5,13 @@
 use pulp::Simd;
 
 use super::rows::{CELL_PLANES, EMPTY_CELL, NO_COLOR};
-use super::tent::PLANE;
-use crate::bokeh::plan::COVERAGE_FLOOR;
-use crate::compute::aligned::Line;
+use super::tent::PLANE_LEN;
+use crate::bokeh::plan::MIN_COVERAGE;
+use crate::compute::aligned::CacheAligned;
 use crate::compute::simd::{load, store};
 
 /// Partial sums of a row of cells, column by column.
-pub type CellSums = Line<[[f32; PLANE]; CELL_PLANES]>;
+pub type CellSums = CacheAligned<[[f32; PLANE_LEN]; CELL_PLANES]>;
 
 /// Empties the cells.
 #[inline(always)]
@@ -38,7 +38,7 @@ pub fn accumulate_columns<V: Simd>(
     let Some(own) = own else { return };
     let cells = &mut cells.0;
     // A pixel without coverage has no colour: an offset moves it out of range.
-    let counts = simd.greater_than_f32s(sums[0], simd.splat_f32s(COVERAGE_FLOOR));
+    let counts = simd.greater_than_f32s(sums[0], simd.splat_f32s(MIN_COVERAGE));
     let beyond = simd.select_f32s(counts, simd.splat_f32s(0.0), simd.splat_f32s(NO_COLOR));
     for p in 0..3 {
         let low = simd.min_f32s(load::<V>(&cells[2 + p], x), simd.add_f32s(own[p], beyond));

@@ -9,14 +9,14 @@ use pulp::{Simd, WithSimd};
 use super::encode::{CHUNK, EncodeTable};
 use super::layers::Layers;
 use super::pixels::Sample;
-use super::rows::{PIECE, STRIP, STRIP_ROW, Slot};
+use super::rows::{COPY_WIDTH, STRIP, STRIP_ROW, Slot};
 use super::silhouettes::Silhouettes;
 use super::tiles::{TILE_H, TILE_W, Tiles};
-use super::unpack::{Source, coc_row, compress};
+use super::unpack::{InputFrame, compression_factor, compute_coc_row};
 use crate::bokeh::ladder::Compositing;
 use crate::bokeh::plan::{Bin, Plan};
 use crate::color::luminance;
-use crate::compute::aligned::Line;
+use crate::compute::aligned::CacheAligned;
 use crate::compute::simd::{fma, load, madd, prefetch, store};
 
 /// Computes rows `y0..` of the result: a row of tiles.
@@ -28,7 +28,7 @@ pub struct Composite<'a, T> {
     /// Where the background is visible past a silhouette.
     pub silhouettes: &'a Silhouettes,
     /// The input frame and its pixels.
-    pub frame: &'a Source<'a>,
+    pub frame: &'a InputFrame<'a>,
     pub pixels: &'a [T],
     /// Result of the gather, `[row][3][width]`.
     pub gathered: &'a [f32],
@@ -48,16 +48,16 @@ impl<T: Sample> WithSimd for Composite<'_, T> {
         let width = self.plan.width;
         let row_of_tiles = self.y0 / TILE_H * self.tiles.across;
         let out = std::mem::take(&mut self.out);
-        self.layers.begin(self.plan.near_end());
+        self.layers.set_near_border(self.plan.near_border());
         let layered = self.plan.compositing == Compositing::Layers;
-        let (mut color, mut coc_px) = (Line([[0.0; CHUNK]; 3]), [0.0; CHUNK]);
+        let (mut color, mut coc_px) = (CacheAligned([[0.0; CHUNK]; 3]), [0.0; CHUNK]);
         for x0 in (0..width).step_by(CHUNK) {
             let take = CHUNK.min(width - x0);
             let tiles = row_of_tiles + x0 / TILE_W..row_of_tiles + (x0 + take).div_ceil(TILE_W);
             let ranges = &self.tiles.ranges[tiles.clone()];
             let still = self.tiles.still[tiles].iter().all(|&still| still);
             let rows = self.y0..self.y0 + (out.len() / (width * 3)).max(1);
-            let may_reach = layered && self.silhouettes.may_reach(rows.clone(), x0);
+            let may_be_near = layered && self.silhouettes.may_be_near(rows.clone(), x0);
             if x0 + CHUNK < width {
                 self.prefetch(x0 + CHUNK, rows.len());
             }
@@ -72,14 +72,14 @@ impl<T: Sample> WithSimd for Composite<'_, T> {
                             continue;
                         }
                         // Several surfaces are visible only near silhouettes; elsewhere a cheaper compositing suffices.
-                        let reaching = if may_reach { self.silhouettes.reaching(y, x0) } else { None };
-                        let is_one_surface = reaching.is_none() && self.layers.have_one_surface(ranges);
+                        let proximity = if may_be_near { self.silhouettes.proximity(y, x0) } else { None };
+                        let is_one_surface = proximity.is_none() && self.layers.have_one_surface(ranges);
                         if !is_one_surface {
-                            coc_row(self.frame, y, x0, &mut coc_px[..take]);
+                            compute_coc_row(self.frame, y, x0, &mut coc_px[..take]);
                         }
-                        self.layers.composite(simd, &reaching, &coc_px, is_one_surface, &mut color);
+                        self.layers.composite(simd, &proximity, &coc_px, is_one_surface, &mut color);
                     }
-                    Compositing::Select => self.select(simd, y, x0, take, &mut color.0),
+                    Compositing::Select => self.select_by_coc(simd, y, x0, take, &mut color.0),
                     Compositing::Gather => copy_gathered(self.gathered, width, y, x0, &mut color.0),
                 }
                 compress_highlights(&mut color.0, self.frame.expansion);
@@ -120,7 +120,7 @@ impl<T> Composite<'_, T> {
             if still && !bin.near && layers.count() == 0 {
                 return false;
             }
-            if sample(simd, bin, &self.slots[bin.slot], y, x0, layers.next_buffer()) {
+            if sample_bin(simd, bin, &self.slots[bin.slot], y, x0, layers.next_buffer()) {
                 layers.push(bin);
             }
         }
@@ -129,17 +129,17 @@ impl<T> Composite<'_, T> {
 
     /// Computes the colour of a chunk of `take` pixels from the bins at each pixel's own CoC, by their weights.
     #[inline(always)]
-    fn select<S: Simd>(&mut self, simd: S, y: usize, x0: usize, take: usize, color: &mut [[f32; CHUNK]; 3]) {
+    fn select_by_coc<S: Simd>(&mut self, simd: S, y: usize, x0: usize, take: usize, color: &mut [[f32; CHUNK]; 3]) {
         self.layers.clear();
         let layer = self.layers.next_buffer();
         let mut coc = [0.0; CHUNK];
-        coc_row(self.frame, y, x0, &mut coc[..take]);
+        compute_coc_row(self.frame, y, x0, &mut coc[..take]);
         *color = [[0.0; CHUNK]; 3];
         for (k, bin) in self.plan.bins.iter().enumerate() {
-            if !sample(simd, bin, &self.slots[bin.slot], y, x0, layer) {
+            if !sample_bin(simd, bin, &self.slots[bin.slot], y, x0, layer) {
                 continue;
             }
-            let bin_weight = self.plan.share(k);
+            let bin_weight = self.plan.bin_weight(k);
             for x in 0..CHUNK {
                 let weight = bin_weight.at(coc[x]) / if layer[3][x] > 1e-6 { layer[3][x] } else { 1e-6 };
                 for p in 0..3 {
@@ -161,7 +161,7 @@ fn copy_gathered(rows: &[f32], width: usize, y: usize, x0: usize, color: &mut [[
 
 /// Reads a chunk of a bin at the picture's scale with linear interpolation. Returns false if it is empty.
 #[inline(always)]
-fn sample<S: Simd>(simd: S, bin: &Bin, slot: &Slot, y: usize, x0: usize, out: &mut [[f32; CHUNK]; 4]) -> bool {
+fn sample_bin<S: Simd>(simd: S, bin: &Bin, slot: &Slot, y: usize, x0: usize, out: &mut [[f32; CHUNK]; 4]) -> bool {
     if !slot.present {
         return false;
     }
@@ -197,37 +197,38 @@ fn upsample<V: Simd, const S: usize>(
     let fraction = simd.splat_f32s(fraction);
     let (first, end) = (x0 / S, ((x0 + CHUNK) / S).min(width));
     // A piece is inside one strip.
-    let piece =
-        |x: usize, y: usize, p: usize| &slot.out[((x / STRIP * height + y) * 4 + p) * STRIP + x % STRIP..][..PIECE];
+    let piece = |x: usize, y: usize, p: usize| {
+        &slot.out[((x / STRIP * height + y) * 4 + p) * STRIP + x % STRIP..][..COPY_WIDTH]
+    };
     if S == 1 {
         // Rows and columns of the bin are those of the picture.
         for (p, out) in out.iter_mut().enumerate() {
-            for x in (first..end).step_by(PIECE) {
-                out[x - first..][..PIECE].copy_from_slice(piece(x, above, p));
+            for x in (first..end).step_by(COPY_WIDTH) {
+                out[x - first..][..COPY_WIDTH].copy_from_slice(piece(x, above, p));
             }
         }
         return;
     }
     // One column more on both sides than the chunk covers.
-    let mut lines = Line([[0.0; CHUNK + 2 * PIECE]; 4]);
+    let mut lines = CacheAligned([[0.0; CHUNK + 2 * COPY_WIDTH]; 4]);
     for (p, line) in lines.0.iter_mut().enumerate() {
-        for x in (first.saturating_sub(PIECE)..(end + PIECE).min(width)).step_by(PIECE) {
+        for x in (first.saturating_sub(COPY_WIDTH)..(end + COPY_WIDTH).min(width)).step_by(COPY_WIDTH) {
             let (a, b) = (piece(x, above, p), piece(x, below, p));
-            let line = &mut line[PIECE + x - first..][..PIECE];
-            for k in (0..PIECE).step_by(V::F32_LANES) {
+            let line = &mut line[COPY_WIDTH + x - first..][..COPY_WIDTH];
+            for k in (0..COPY_WIDTH).step_by(V::F32_LANES) {
                 let (a, b) = (load::<V>(a, k), load::<V>(b, k));
                 store::<V>(line, k, fma(simd, simd.sub_f32s(b, a), fraction, a));
             }
         }
         if first == 0 {
-            line[PIECE - 1] = line[PIECE];
+            line[COPY_WIDTH - 1] = line[COPY_WIDTH];
         }
         if end == width {
-            line[PIECE + end - first] = line[PIECE + end - first - 1];
+            line[COPY_WIDTH + end - first] = line[COPY_WIDTH + end - first - 1];
         }
     }
     for (line, out) in lines.0.iter().zip(out) {
-        let (befores, line) = (&line[PIECE - 1..], &line[PIECE..]);
+        let (befores, line) = (&line[COPY_WIDTH - 1..], &line[COPY_WIDTH..]);
         let (befores, heres, afters) = (&befores[..CHUNK / S], &line[..CHUNK / S], &line[1..][..CHUNK / S]);
         let groups = &mut out.as_chunks_mut::<S>().0[..CHUNK / S];
         for k in 0..CHUNK / S {
@@ -249,7 +250,7 @@ fn upsample<V: Simd, const S: usize>(
 fn compress_highlights(color: &mut [[f32; CHUNK]; 3], expansion: f32) {
     if expansion.is_finite() {
         for x in 0..CHUNK {
-            let factor = compress(luminance(color[0][x], color[1][x], color[2][x]), expansion);
+            let factor = compression_factor(luminance(color[0][x], color[1][x], color[2][x]), expansion);
             for p in 0..3 {
                 color[p][x] *= factor;
             }

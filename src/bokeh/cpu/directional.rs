@@ -12,7 +12,9 @@ use pulp::{Arch, Simd, WithSimd};
 
 use super::levels::{Level, PLANES};
 use super::silhouettes::Silhouettes;
-use crate::bokeh::occlusion::{DIRECTIONS, GRAIN, MAX_STEPS, ONE_ENDED, ONE_SURFACE_PX, TRUSTED_STEPS, likeness};
+use crate::bokeh::occlusion::{
+    DIRECTIONS, MAX_STEPS, ONE_ENDED_FACTOR, ONE_SURFACE_PX, SILHOUETTE_CELL, TRUSTED_STEPS, coc_similarity,
+};
 use crate::compute::thread_pool::{MAX_ITEMS, ThreadPool};
 
 /// Padding columns beside a row of steps, so that a sideways step stays inside it.
@@ -20,24 +22,24 @@ const PAD: usize = 2;
 /// Search directions: each line both ways.
 const WAYS: usize = 2 * DIRECTIONS.len();
 /// Pixels of the picture per side of a level's pixel, which is a cell of the silhouettes' grid.
-const PIXEL: usize = GRAIN;
+const PIXEL: usize = SILHOUETTE_CELL;
 /// Step count without an end in that direction: steps saturate there.
-const NONE: u8 = u8::MAX;
-const _: () = assert!(MAX_STEPS == NONE - 1);
+const NO_END: u8 = u8::MAX;
+const _: () = assert!(MAX_STEPS == NO_END - 1);
 
 /// The known pixels of a level, and the distances to them from each hidden pixel.
-pub struct Directional {
+pub struct DirectionalInpainting {
     width: usize,
     height: usize,
     /// Light and CoC of the known pixels.
     ends: Vec<[f32; 4]>,
-    /// [`NONE`] where unknown and outside the picture, else 0.
-    open: Vec<u8>,
-    /// For each way, a plane like `open`: steps to the next known pixel.
+    /// [`NO_END`] where unknown and outside the picture, else 0.
+    unknown: Vec<u8>,
+    /// For each way, a plane like `unknown`: steps to the next known pixel.
     steps: Vec<u8>,
 }
 
-impl Directional {
+impl DirectionalInpainting {
     /// Allocates for a level of `width` x `height`.
     pub fn new(width: usize, height: usize) -> Self {
         let padded = (width + 2 * PAD) * height;
@@ -45,8 +47,8 @@ impl Directional {
             width,
             height,
             ends: vec![[0.0; 4]; width * height],
-            open: vec![NONE; padded],
-            steps: vec![NONE; WAYS * padded],
+            unknown: vec![NO_END; padded],
+            steps: vec![NO_END; WAYS * padded],
         }
     }
 
@@ -54,18 +56,18 @@ impl Directional {
     pub fn fill(&mut self, level: &mut Level, silhouettes: &Silhouettes, workers: &mut ThreadPool, arch: Arch) {
         let (width, stride) = (self.width, self.stride());
         let each = self.height.div_ceil(MAX_ITEMS);
-        let rows = self.ends.chunks_mut(each * width).zip(self.open.chunks_mut(each * stride));
-        workers.run_each(rows.enumerate(), &|(part, (ends, open))| {
-            arch.dispatch(Survey { level, first: part * each, ends, open });
+        let rows = self.ends.chunks_mut(each * width).zip(self.unknown.chunks_mut(each * stride));
+        workers.run_each(rows.enumerate(), &|(part, (ends, unknown))| {
+            arch.dispatch(CollectKnownPixels { level, first: part * each, ends, unknown });
         });
-        let open = &self.open;
-        workers.run_each(self.steps.chunks_mut(open.len()).enumerate(), &|(way, steps)| {
-            arch.dispatch(Walk { way, open, stride, steps });
+        let unknown = &self.unknown;
+        workers.run_each(self.steps.chunks_mut(unknown.len()).enumerate(), &|(way, steps)| {
+            arch.dispatch(CountSteps { way, unknown, stride, steps });
         });
         let (seen, level_stride) = (&*self, level.rows.stride);
         let each_len = each * level.rows.row_len();
         workers.run_each(level.rows.data.chunks_mut(each_len).enumerate(), &|(part, rows)| {
-            arch.dispatch(Vote { seen, silhouettes, first: part * each, rows, stride: level_stride });
+            arch.dispatch(CombineLines { seen, silhouettes, first: part * each, rows, stride: level_stride });
         });
     }
 
@@ -75,36 +77,36 @@ impl Directional {
 }
 
 /// Length of a step in each direction.
-const LENGTHS: Lines = [1.0, SQRT_5, SQRT_2, SQRT_5, 1.0, SQRT_5, SQRT_2, SQRT_5];
+const LENGTHS: PerDirection = [1.0, SQRT_5, SQRT_2, SQRT_5, 1.0, SQRT_5, SQRT_2, SQRT_5];
 const SQRT_5: f32 = 2.236_068;
 
 /// Returns the step of a way, across and down.
 #[inline(always)]
-fn step_of(way: usize) -> (isize, isize) {
+fn way_step(way: usize) -> (isize, isize) {
     let (across, down) = DIRECTIONS[way / 2];
     let sign = if way.is_multiple_of(2) { -1 } else { 1 };
     (sign * across as isize, sign * down as isize)
 }
 
 /// Collects the known pixels of some rows of the level, from row `first` on.
-struct Survey<'a> {
+struct CollectKnownPixels<'a> {
     level: &'a Level,
     first: usize,
     ends: &'a mut [[f32; 4]],
-    open: &'a mut [u8],
+    unknown: &'a mut [u8],
 }
 
-impl WithSimd for Survey<'_> {
+impl WithSimd for CollectKnownPixels<'_> {
     type Output = ();
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) {
         let (width, stride) = (self.level.width, self.level.rows.stride);
-        let rows = self.ends.chunks_exact_mut(width).zip(self.open.chunks_exact_mut(width + 2 * PAD));
-        for (y, (ends, open)) in (self.first..).zip(rows) {
+        let rows = self.ends.chunks_exact_mut(width).zip(self.unknown.chunks_exact_mut(width + 2 * PAD));
+        for (y, (ends, unknown)) in (self.first..).zip(rows) {
             let row = self.level.rows.row(y);
             let known = &row[(PLANES - 1) * stride..][..width];
-            for (open, known) in open[PAD..][..width].iter_mut().zip(known) {
-                *open = if *known > 0.0 { 0 } else { NONE };
+            for (unknown, known) in unknown[PAD..][..width].iter_mut().zip(known) {
+                *unknown = if *known > 0.0 { 0 } else { NO_END };
             }
             for (x, end) in ends.iter_mut().enumerate() {
                 let scale = 1.0 / known[x].max(1e-6);
@@ -115,37 +117,37 @@ impl WithSimd for Survey<'_> {
 }
 
 /// Distance transform along one way: steps of a pixel = steps of the pixel one step on, plus 1.
-struct Walk<'a> {
+struct CountSteps<'a> {
     way: usize,
-    open: &'a [u8],
+    unknown: &'a [u8],
     stride: usize,
     steps: &'a mut [u8],
 }
 
-impl WithSimd for Walk<'_> {
+impl WithSimd for CountSteps<'_> {
     type Output = ();
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) {
-        let Self { way, open, stride, steps } = self;
-        let ((across, down), height) = (step_of(way), open.len() / stride);
+        let Self { way, unknown, stride, steps } = self;
+        let ((across, down), height) = (way_step(way), unknown.len() / stride);
         let columns = PAD..stride - PAD;
         let next = (PAD as isize + across) as usize;
         for k in 0..height {
             // In the order that makes the pixel one step on come first.
             let y = if down > 0 { height - 1 - k } else { k };
-            let open = &open[y * stride..][..stride];
+            let unknown = &unknown[y * stride..][..stride];
             let (before, rest) = steps.split_at_mut(y * stride);
             let (row, after) = rest.split_at_mut(stride);
             match down {
                 0 => {
                     for x in 0..stride - 2 * PAD {
                         let x = if across > 0 { stride - 1 - PAD - x } else { PAD + x };
-                        row[x] = open[x] & row[(x as isize + across) as usize].saturating_add(1);
+                        row[x] = unknown[x] & row[(x as isize + across) as usize].saturating_add(1);
                     }
                 }
                 // Outside the picture there is no known pixel.
                 _ if y as isize + down < 0 || y as isize + down >= height as isize => {
-                    row[columns.clone()].copy_from_slice(&open[columns.clone()]);
+                    row[columns.clone()].copy_from_slice(&unknown[columns.clone()]);
                 }
                 _ => {
                     let there = match down > 0 {
@@ -153,8 +155,10 @@ impl WithSimd for Walk<'_> {
                         false => &before[before.len() - down.unsigned_abs() * stride..][..stride],
                     };
                     let there = &there[next..][..columns.len()];
-                    for ((row, open), there) in row[columns.clone()].iter_mut().zip(&open[columns.clone()]).zip(there) {
-                        *row = open & there.saturating_add(1);
+                    for ((row, unknown), there) in
+                        row[columns.clone()].iter_mut().zip(&unknown[columns.clone()]).zip(there)
+                    {
+                        *row = unknown & there.saturating_add(1);
                     }
                 }
             }
@@ -163,24 +167,24 @@ impl WithSimd for Walk<'_> {
 }
 
 /// Combines the lines through the unknown pixels of some rows.
-struct Vote<'a> {
-    seen: &'a Directional,
+struct CombineLines<'a> {
+    seen: &'a DirectionalInpainting,
     silhouettes: &'a Silhouettes,
     first: usize,
     rows: &'a mut [f32],
     stride: usize,
 }
 
-impl WithSimd for Vote<'_> {
+impl WithSimd for CombineLines<'_> {
     type Output = ();
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) {
         let (seen, stride) = (self.seen, self.stride);
         let padded = seen.stride();
         for (y, row) in (self.first..).zip(self.rows.chunks_exact_mut(stride * PLANES)) {
-            let open = &seen.open[y * padded + PAD..][..seen.width];
-            let [shows, _] = self.silhouettes.row(y * PIXEL);
-            for x in (0..seen.width).filter(|&x| open[x] == NONE && shows[x] > 0.0) {
+            let unknown = &seen.unknown[y * padded + PAD..][..seen.width];
+            let [visible, _] = self.silhouettes.row(y * PIXEL);
+            for x in (0..seen.width).filter(|&x| unknown[x] == NO_END && visible[x] > 0.0) {
                 if let Some(value) = seen.interpolate(x, y) {
                     for (p, value) in value.into_iter().enumerate() {
                         row[p * stride + x] = value;
@@ -192,22 +196,22 @@ impl WithSimd for Vote<'_> {
 }
 
 /// One value per direction.
-type Lines = [f32; DIRECTIONS.len()];
+type PerDirection = [f32; DIRECTIONS.len()];
 
-impl Directional {
+impl DirectionalInpainting {
     /// Returns light and CoC of an unknown pixel, times their trust, and the trust. Returns `None` if only one surface
     /// is seen from it, or nothing near enough.
     #[inline(always)]
     fn interpolate(&self, x: usize, y: usize) -> Option<[f32; PLANES]> {
-        let (stride, plane) = (self.stride(), self.open.len());
+        let (stride, plane) = (self.stride(), self.unknown.len());
         let at = y * stride + PAD + x;
         let (mut ends, mut steps, mut coc_px) =
-            ([[0; DIRECTIONS.len()]; 2], [[0.0; DIRECTIONS.len()]; 2], [Lines::default(); 2]);
+            ([[0; DIRECTIONS.len()]; 2], [[0.0; DIRECTIONS.len()]; 2], [PerDirection::default(); 2]);
         for way in 0..WAYS {
-            let (d, side, (across, down)) = (way / 2, way % 2, step_of(way));
+            let (d, side, (across, down)) = (way / 2, way % 2, way_step(way));
             let count = self.steps[way * plane + at];
             // Without an end any pixel will do, because its weight is 0.
-            let count_on = if count < NONE { isize::from(count) } else { 0 };
+            let count_on = if count < NO_END { isize::from(count) } else { 0 };
             let end = (y as isize + count_on * down) as usize * self.width + (x as isize + count_on * across) as usize;
             (ends[side][d], steps[side][d], coc_px[side][d]) = (end, f32::from(count), self.ends[end][3]);
         }
@@ -217,31 +221,32 @@ impl Directional {
         if high_px - low_px < ONE_SURFACE_PX {
             return None;
         }
-        let (mut weights, mut second, mut line_px) = (Lines::default(), Lines::default(), Lines::default());
+        let (mut weights, mut second, mut line_px) =
+            (PerDirection::default(), PerDirection::default(), PerDirection::default());
         let mut shortest = f32::MAX;
         for d in 0..DIRECTIONS.len() {
             let ([to_a, to_b], [a_px, b_px]) = (steps.map(|steps| steps[d]), coc_px.map(|coc_px| coc_px[d]));
             let (has_a, has_b) = (to_a <= f32::from(MAX_STEPS), to_b <= f32::from(MAX_STEPS));
-            let alike = likeness(a_px, b_px);
+            let similarity = coc_similarity(a_px, b_px);
             let (to_a, to_b) = (if has_a { to_a } else { 0.0 }, if has_b { to_b } else { 0.0 });
             let sum = to_a + to_b;
-            let length = LENGTHS[d] * sum * if has_a && has_b { 1.0 } else { ONE_ENDED };
-            let agreement = if has_a && has_b { alike * alike } else { 1.0 };
+            let length = LENGTHS[d] * sum * if has_a && has_b { 1.0 } else { ONE_ENDED_FACTOR };
+            let agreement = if has_a && has_b { similarity * similarity } else { 1.0 };
             weights[d] = if length > 0.0 { agreement / length } else { 0.0 };
             shortest = if length > 0.0 { shortest.min(length) } else { shortest };
-            let share = if has_b { to_a / sum } else { 0.0 };
-            second[d] = if has_a { share } else { 1.0 };
+            let fraction = if has_b { to_a / sum } else { 0.0 };
+            second[d] = if has_a { fraction } else { 1.0 };
             line_px[d] = a_px + (b_px - a_px) * second[d];
         }
         let trust = (2.0 - shortest / TRUSTED_STEPS).clamp(0.0, 1.0);
         if trust <= 0.0 {
             return None;
         }
-        // EdgeAlignment of a line with the others counts to the fourth power: a mean of two surfaces would be neither.
-        let mut scores = Lines::default();
+        // Agreement of a line with the others counts to the fourth power: a mean of two surfaces would be neither.
+        let mut scores = PerDirection::default();
         for e in 0..DIRECTIONS.len() {
             for d in 0..DIRECTIONS.len() {
-                scores[d] += weights[e] * likeness(line_px[d], line_px[e]);
+                scores[d] += weights[e] * coc_similarity(line_px[d], line_px[e]);
             }
         }
         let best = scores.iter().fold(1e-30f32, |best, &score| best.max(score));
@@ -257,11 +262,11 @@ impl Directional {
         let mut sum = [0.0, 0.0, 0.0, 0.0, trust];
         for d in 0..DIRECTIONS.len() {
             let weight = trust * weights[d] / total;
-            let shares = [weight * (1.0 - second[d]), weight * second[d]];
-            for (ends, share) in ends.iter().zip(shares) {
+            let end_weights = [weight * (1.0 - second[d]), weight * second[d]];
+            for (ends, end_weight) in ends.iter().zip(end_weights) {
                 let end = &self.ends[ends[d]];
                 for p in 0..4 {
-                    sum[p] += share * end[p];
+                    sum[p] += end_weight * end[p];
                 }
             }
         }

@@ -53,7 +53,7 @@ impl EncodeTable {
 
 #[cfg(test)]
 mod tests {
-    use super::super::unpack::decode;
+    use super::super::unpack::decode_srgb;
     use super::*;
 
     #[test]
@@ -61,7 +61,7 @@ mod tests {
         let table = EncodeTable::new();
         for code in 0..=255u8 {
             let mut out = [0u8; 6];
-            table.encode(&[[decode::<pulp::Scalar>(code); CHUNK]; 3], &mut out);
+            table.encode(&[[decode_srgb::<pulp::Scalar>(code); CHUNK]; 3], &mut out);
             assert_eq!(out, [code; 6]);
         }
     }

@@ -12,7 +12,7 @@
 
 use pulp::Simd;
 
-use super::rows::{EDGE_VALUES, PIECE, STRIP, STRIP_EDGES, STRIP_ROW};
+use super::rows::{COPY_WIDTH, EDGE_VALUES, STRIP, STRIP_EDGES, STRIP_ROW};
 use crate::bokeh::plan::SEGMENT;
 use crate::compute::simd::{fma, load};
 
@@ -35,15 +35,15 @@ pub fn row_len<S: Simd>(terms: usize) -> usize {
 
 /// Upper bound of [`row_len`] on any processor.
 pub fn max_row_len(terms: usize) -> usize {
-    terms * STRIP_ROW + PIECE
+    terms * STRIP_ROW + COPY_WIDTH
 }
 
 /// Clamps coverage to 0..1 and premultiplied colour to the range of colours within the filter support: truncated
 /// filters overshoot.
 #[inline(always)]
-pub fn keep_in_range<S: Simd>(simd: S, sums: &mut [S::f32s; 4], edges: &[[f32; EDGE_VALUES]; STRIP_EDGES], x: usize) {
+pub fn clamp_to_range<S: Simd>(simd: S, sums: &mut [S::f32s; 4], edges: &[[f32; EDGE_VALUES]; STRIP_EDGES], x: usize) {
     let (left, right) = (&edges[x / SEGMENT], &edges[x / SEGMENT + 1]);
-    let across = load::<S>(&ACROSS, x % SEGMENT);
+    let across = load::<S>(&SEGMENT_POSITIONS, x % SEGMENT);
     let coverage = simd.min_f32s(simd.max_f32s(sums[3], simd.splat_f32s(0.0)), simd.splat_f32s(1.0));
     for p in 0..3 {
         let low = lerp(simd, left[1 + p], right[1 + p], across);
@@ -55,7 +55,7 @@ pub fn keep_in_range<S: Simd>(simd: S, sums: &mut [S::f32s; 4], edges: &[[f32; E
 }
 
 /// Position of each pixel between the edges of its segment, 0 to 1.
-const ACROSS: [f32; SEGMENT] = {
+const SEGMENT_POSITIONS: [f32; SEGMENT] = {
     let mut at = [0.0; SEGMENT];
     let mut k = 0;
     while k < SEGMENT {
@@ -81,11 +81,11 @@ pub struct Taps<'a, const R: usize> {
     /// Table entries from one tap to the next; negative if the aperture is turned.
     pub step: isize,
     /// Outermost tap.
-    pub reach: usize,
+    pub half_width: usize,
     /// First pixel of the vector within the segment.
     pub lane: usize,
     /// Whether the taps are constant along the segment.
-    pub steady: bool,
+    pub is_constant: bool,
 }
 
 impl<const R: usize> Taps<'_, R> {
@@ -97,7 +97,7 @@ impl<const R: usize> Taps<'_, R> {
         let mut taps = [simd.splat_f32s(0.0); R];
         if VARY {
             let right = &self.table[self.right.wrapping_add_signed(j * self.step)..][..R];
-            let across = load::<S>(&ACROSS, self.lane);
+            let across = load::<S>(&SEGMENT_POSITIONS, self.lane);
             for r in 0..R {
                 taps[r] = lerp(simd, left[r], right[r], across);
             }
@@ -113,7 +113,7 @@ impl<const R: usize> Taps<'_, R> {
 /// Filters one vector horizontally: every term of the group, every plane. The sums of all terms (at most 4 x 4 vectors)
 /// stay in registers while the taps go outwards, so that a value is loaded once for all terms.
 #[inline(always)]
-pub fn along_row<S: Simd, const R: usize, const SYMMETRIC: bool, const VARY: bool, const P: usize>(
+pub fn filter_row<S: Simd, const R: usize, const SYMMETRIC: bool, const VARY: bool, const P: usize>(
     simd: S,
     taps: &Taps<'_, R>,
     planes: &[&[f32]; 4],
@@ -127,7 +127,7 @@ pub fn along_row<S: Simd, const R: usize, const SYMMETRIC: bool, const VARY: boo
             sums[r][p] = simd.mul_f32s(weights[r], here);
         }
     }
-    for j in 1..=taps.reach {
+    for j in 1..=taps.half_width {
         let weights = taps.at::<S, VARY>(simd, j as isize);
         let opposite = if SYMMETRIC { weights } else { taps.at::<S, VARY>(simd, -(j as isize)) };
         for p in 0..P {
@@ -150,7 +150,7 @@ pub fn along_row<S: Simd, const R: usize, const SYMMETRIC: bool, const VARY: boo
 /// Filters one vector of columns and `BLOCK_ROWS` rows from `y` on vertically: `R` terms, `P` planes (3 without
 /// coverage, else 4). The taps are equal for all of these pixels, so a row is loaded once for all their sums.
 #[inline(always)]
-pub fn along_column_block<S: Simd, const R: usize, const SYMMETRIC: bool, const P: usize>(
+pub fn filter_column_block<S: Simd, const R: usize, const SYMMETRIC: bool, const P: usize>(
     simd: S,
     taps: &Taps<'_, R>,
     rows: &[f32],
@@ -158,14 +158,14 @@ pub fn along_column_block<S: Simd, const R: usize, const SYMMETRIC: bool, const 
     x: usize,
     height: usize,
 ) -> [[S::f32s; 4]; BLOCK_ROWS] {
-    if SYMMETRIC && has_few_registers::<S>() && y >= taps.reach && y + BLOCK_ROWS + taps.reach <= height {
-        return along_column_planes::<S, R, P>(simd, taps, rows, y, x);
+    if SYMMETRIC && has_few_registers::<S>() && y >= taps.half_width && y + BLOCK_ROWS + taps.half_width <= height {
+        return filter_column_planes::<S, R, P>(simd, taps, rows, y, x);
     }
     let row_len = row_len::<S>(R);
     let ring_mask = rows.len() / row_len - 1;
     let mut sums = [[simd.splat_f32s(0.0); 4]; BLOCK_ROWS];
-    let reach = taps.reach as isize;
-    for offset in -reach..BLOCK_ROWS as isize + reach {
+    let half_width = taps.half_width as isize;
+    for offset in -half_width..BLOCK_ROWS as isize + half_width {
         // Beyond the picture its outermost row repeats; rows are in a ring whose size is a power of two.
         let inside = (y as isize + offset).clamp(0, height as isize - 1) as usize;
         let row = &rows[(inside & ring_mask) * row_len..][..row_len];
@@ -176,7 +176,7 @@ pub fn along_column_block<S: Simd, const R: usize, const SYMMETRIC: bool, const 
             }
             for k in 0..BLOCK_ROWS {
                 let j = offset - k as isize;
-                if j.abs() <= reach {
+                if j.abs() <= half_width {
                     let weight = simd.splat_f32s(taps.table[taps.left.wrapping_add_signed(j * taps.step) + r]);
                     for p in 0..P {
                         sums[k][p] = fma(simd, weight, values[p], sums[k][p]);
@@ -188,10 +188,10 @@ pub fn along_column_block<S: Simd, const R: usize, const SYMMETRIC: bool, const 
     sums
 }
 
-/// Variant of [`along_column_block`] for symmetric profiles, plane by plane, if the taps stay inside the picture: as
+/// Variant of [`filter_column_block`] for symmetric profiles, plane by plane, if the taps stay inside the picture: as
 /// they go outwards, `BLOCK_ROWS` rows above and below stay in registers, and one more of each is loaded.
 #[inline(always)]
-fn along_column_planes<S: Simd, const R: usize, const P: usize>(
+fn filter_column_planes<S: Simd, const R: usize, const P: usize>(
     simd: S,
     taps: &Taps<'_, R>,
     rows: &[f32],
@@ -214,8 +214,8 @@ fn along_column_planes<S: Simd, const R: usize, const P: usize>(
             for k in 0..N {
                 sums[k] = fma(simd, here, above[k], all[k][p]);
             }
-            for first in (1..=taps.reach).step_by(N) {
-                for i in 0..N.min(taps.reach + 1 - first) {
+            for first in (1..=taps.half_width).step_by(N) {
+                for i in 0..N.min(taps.half_width + 1 - first) {
                     let j = first + i;
                     above[N - 1 - i] = value(y - j);
                     below[i] = value(y + N - 1 + j);
@@ -237,7 +237,7 @@ fn along_column_planes<S: Simd, const R: usize, const P: usize>(
 /// Filters one vector vertically: the terms of the group summed, every plane. Unlike along a row, the terms are added
 /// here, so one sum per plane suffices.
 #[inline(always)]
-pub fn along_column<S: Simd, const R: usize, const SYMMETRIC: bool, const VARY: bool, const P: usize>(
+pub fn filter_column<S: Simd, const R: usize, const SYMMETRIC: bool, const VARY: bool, const P: usize>(
     simd: S,
     taps: &Taps<'_, R>,
     rows: &[f32],
@@ -256,7 +256,7 @@ pub fn along_column<S: Simd, const R: usize, const SYMMETRIC: bool, const VARY: 
             sums[p] = fma(simd, weights[r], load::<S>(here, (r * 4 + p) * STRIP + x), sums[p]);
         }
     }
-    for j in 1..=taps.reach {
+    for j in 1..=taps.half_width {
         let below = &rows[((y + j).min(height - 1) & ring_mask) * row_len..][..row_len];
         let above = &rows[(y.saturating_sub(j) & ring_mask) * row_len..][..row_len];
         let weights = taps.at::<S, VARY>(simd, j as isize);
@@ -287,7 +287,7 @@ mod tests {
 
     /// Compares filtering a block of rows with filtering its rows one by one, at the ends of the picture and between.
     struct Compare {
-        reach: usize,
+        half_width: usize,
     }
 
     impl WithSimd for Compare {
@@ -296,22 +296,24 @@ mod tests {
         fn with_simd<S: Simd>(self, simd: S) {
             const R: usize = 2;
             let number = |k: usize| (k as u32).wrapping_mul(0x9e37_79b1) as f32 / 4.3e9;
-            let (reach, width) = (self.reach, row_len::<S>(R));
+            let (half_width, width) = (self.half_width, row_len::<S>(R));
             let mut rows = Aligned::zeros(HEIGHT.next_power_of_two() * width);
             rows.iter_mut().enumerate().for_each(|(k, value)| *value = number(k));
-            let table: Vec<f32> =
-                (0..2 * reach + 1).flat_map(|j| [j.abs_diff(reach), 99 + j.abs_diff(reach)]).map(number).collect();
-            let (left, step) = (reach * R, R as isize);
-            let taps = Taps::<R> { table: &table, left, right: left, step, reach, lane: 0, steady: true };
+            let table: Vec<f32> = (0..2 * half_width + 1)
+                .flat_map(|j| [j.abs_diff(half_width), 99 + j.abs_diff(half_width)])
+                .map(number)
+                .collect();
+            let (left, step) = (half_width * R, R as isize);
+            let taps = Taps::<R> { table: &table, left, right: left, step, half_width, lane: 0, is_constant: true };
             for y in (0..HEIGHT).step_by(BLOCK_ROWS) {
                 for x in (0..STRIP).step_by(S::F32_LANES) {
-                    let block = along_column_block::<S, R, true, 3>(simd, &taps, &rows, y, x, HEIGHT);
+                    let block = filter_column_block::<S, R, true, 3>(simd, &taps, &rows, y, x, HEIGHT);
                     for (k, sums) in block.iter().enumerate() {
-                        let row = along_column::<S, R, true, false, 3>(simd, &taps, &rows, y + k, x, HEIGHT);
+                        let row = filter_column::<S, R, true, false, 3>(simd, &taps, &rows, y + k, x, HEIGHT);
                         for p in 0..3 {
                             let apart = simd.abs_f32s(simd.sub_f32s(sums[p], row[p]));
                             let apart = simd.reduce_max_f32s(apart);
-                            assert!(apart < 1e-4, "reach {reach}, row {}, column {x}, plane {p}: {apart}", y + k);
+                            assert!(apart < 1e-4, "reach {half_width}, row {}, column {x}, plane {p}: {apart}", y + k);
                         }
                     }
                 }
@@ -321,12 +323,12 @@ mod tests {
 
     #[test]
     fn a_block_of_rows_is_filtered_as_each_of_them_on_every_processor() {
-        for reach in [0, 1, 2, 3, 4, 5, 7, 16, 28] {
-            Arch::new().dispatch(Compare { reach });
-            Arch::Scalar.dispatch(Compare { reach });
+        for half_width in [0, 1, 2, 3, 4, 5, 7, 16, 28] {
+            Arch::new().dispatch(Compare { half_width });
+            Arch::Scalar.dispatch(Compare { half_width });
             #[cfg(target_arch = "x86_64")]
             if let Some(avx2) = pulp::x86::V3::try_new() {
-                Arch::V3(avx2).dispatch(Compare { reach });
+                Arch::V3(avx2).dispatch(Compare { half_width });
             }
         }
     }

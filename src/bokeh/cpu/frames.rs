@@ -4,7 +4,7 @@ use std::ops::ControlFlow;
 use std::time::Instant;
 
 use super::{CpuBokeh, Radii};
-use crate::bokeh::{Bokeh, BokehError, Finished, Job, PassTimes, Picture};
+use crate::bokeh::{BlurredFrame, Bokeh, BokehError, Job, PassTimes, Picture};
 use crate::compute::{Backend, simd};
 use crate::frame::{ColorImage, DepthMap};
 use crate::optics::CocField;
@@ -47,11 +47,11 @@ impl Bokeh for CpuBokeh {
         self.plan.set_quality(job.quality);
         let times = self.blur(&job.color, job.depth.as_deref(), &job.coc, &mut job.out)?;
         let Job { ticket, color, depth, out, .. } = job;
-        self.done = Some(Finished { ticket, picture: Picture::in_memory(out), color, depth, times });
+        self.done = Some(BlurredFrame { ticket, picture: Picture::from_memory(out), color, depth, times });
         Ok(())
     }
 
-    fn collect(&mut self, _wait: bool) -> Result<Option<Finished>, BokehError> {
+    fn collect(&mut self, _wait: bool) -> Result<Option<BlurredFrame>, BokehError> {
         Ok(self.done.take())
     }
 
@@ -68,6 +68,6 @@ impl Bokeh for CpuBokeh {
     }
 
     fn describe(&self) -> String {
-        format!("cpu, {} threads, {}", self.workers.thread_count(), simd::name(self.arch))
+        format!("cpu, {} threads, {}", self.workers.thread_count(), simd::instruction_set(self.arch))
     }
 }

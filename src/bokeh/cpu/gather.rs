@@ -9,21 +9,21 @@ use std::sync::atomic::AtomicBool;
 
 use pulp::{Arch, Simd, WithSimd};
 
-use super::rows::{PIECE, Rows, STRIP, Strips, repeat_ends};
-use super::unpack::{Source, coc_row};
-use crate::bokeh::bank::Bank;
+use super::rows::{COPY_WIDTH, PlanarRows, STRIP, Strips, repeat_edges};
+use super::unpack::{InputFrame, compute_coc_row};
+use crate::bokeh::bank::FilterBank;
 use crate::bokeh::plan::Plan;
 use crate::compute::simd::madd;
 use crate::compute::thread_pool::{DisjointParts, ThreadPool};
 
-/// Rows of the exact gather between two calls of `go_on`.
+/// Rows of the exact gather between two calls of `check_stop`.
 const ROWS_AT_ONCE: usize = 64;
 
 /// Both forms of the gather, with their buffers.
 pub struct Gather {
-    /// Kernels of [`Exact`]; empty unless the plan is exact.
+    /// Kernels of [`ExactGatherRow`]; empty unless the plan is exact.
     kernels: Vec<[Vec<f32>; 2]>,
-    source: Rows<4>,
+    source: PlanarRows<4>,
     /// Signed CoC, `[row][width]`.
     coc: Vec<f32>,
     /// Results of the horizontal pass, `[row][term][3][width]`; empty if the plan is exact.
@@ -42,7 +42,7 @@ impl Gather {
             } else {
                 Vec::new()
             },
-            source: Rows::new(plan.width, plan.height, plan.ladder.max_reach().next_multiple_of(PIECE)),
+            source: PlanarRows::new(plan.width, plan.height, plan.ladder.max_half_width().next_multiple_of(COPY_WIDTH)),
             coc: vec![0.0; pixels],
             rows: vec![0.0; if plan.exact { 0 } else { pixels * 3 * plan.ladder.max_terms() }],
             result: vec![0.0; pixels * 3],
@@ -55,16 +55,16 @@ impl Gather {
     }
 
     /// Blurs a frame whose only bin is in `strips`: copies it to padded rows, computes the CoC of every pixel, and
-    /// gathers with the full kernels, which takes long and therefore calls `go_on` now and then, or with the separable
-    /// ones.
+    /// gathers with the full kernels, which takes long and therefore calls `check_stop` now and then, or with the
+    /// separable ones.
     pub fn run(
         &mut self,
         (workers, arch): (&mut ThreadPool, Arch),
         plan: &Plan,
-        frame: &Source<'_>,
+        frame: &InputFrame<'_>,
         strips: &Strips,
         taken: &mut [AtomicBool],
-        mut go_on: impl FnMut() -> ControlFlow<()>,
+        mut check_stop: impl FnMut() -> ControlFlow<()>,
     ) -> ControlFlow<()> {
         let (size, bank) = ((plan.width, plan.height), &*plan.bank);
         let (stride, pad, row_len) = (self.source.stride, self.source.pad, self.source.row_len());
@@ -74,12 +74,12 @@ impl Gather {
                 for (strip, out) in plane[pad..pad + size.0].chunks_mut(STRIP).enumerate() {
                     out.copy_from_slice(&strips.row(strip, y)[p * STRIP..][..out.len()]);
                 }
-                repeat_ends(plane, pad, size.0);
+                repeat_edges(plane, pad, size.0);
             }
         });
         let source = &self.source;
         let coc = DisjointParts::new(&mut self.coc, size.0, taken);
-        workers.run(size.1, &|y| coc_row(frame, y, 0, coc.part(y)));
+        workers.run(size.1, &|y| compute_coc_row(frame, y, 0, coc.part(y)));
         let coc = |y: usize| &self.coc[y * size.0..][..size.0];
         if plan.exact {
             let out = DisjointParts::new(&mut self.result, 3 * size.0, taken);
@@ -87,9 +87,9 @@ impl Gather {
             for first in (0..size.1).step_by(ROWS_AT_ONCE) {
                 workers.run(ROWS_AT_ONCE.min(size.1 - first), &|row| {
                     let y = first + row;
-                    arch.dispatch(Exact { source, size, kernels, bank, coc: coc(y), y, out: out.part(y) });
+                    arch.dispatch(ExactGatherRow { source, size, kernels, bank, coc: coc(y), y, out: out.part(y) });
                 });
-                go_on()?;
+                check_stop()?;
             }
             return ControlFlow::Continue(());
         }
@@ -108,15 +108,15 @@ impl Gather {
 }
 
 /// One row of the exact gather: each pixel with the full kernel of its own radius.
-struct Exact<'a> {
+struct ExactGatherRow<'a> {
     /// Colour and coverage (1 everywhere), padded by the filter half-width.
-    pub source: &'a Rows<4>,
+    pub source: &'a PlanarRows<4>,
     pub size: (usize, usize),
     /// Kernels by node, `(2 r + 1)^2` taps each, far and turned; the turned ones are empty if the aperture is
     /// symmetric.
     pub kernels: &'a [[Vec<f32>; 2]],
     /// The bank, for its nodes.
-    pub bank: &'a Bank,
+    pub bank: &'a FilterBank,
     /// Signed CoC of this row.
     pub coc: &'a [f32],
     pub y: usize,
@@ -124,26 +124,26 @@ struct Exact<'a> {
     pub out: &'a mut [f32],
 }
 
-impl WithSimd for Exact<'_> {
+impl WithSimd for ExactGatherRow<'_> {
     type Output = ();
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
         let (width, height) = self.size;
         // Each pixel has its own kernel, so the vectors run along the kernel's rows and not over pixels.
         for x in 0..width {
-            let node = self.bank.node(self.coc[x].abs());
-            let reach = self.bank.node_half_width[node] as usize;
+            let node = self.bank.nearest_node(self.coc[x].abs());
+            let half_width = self.bank.node_half_width[node] as usize;
             let kernel = &self.kernels[node][usize::from(self.coc[x] < 0.0 && !self.bank.is_symmetric)];
-            let side = 2 * reach + 1;
+            let side = 2 * half_width + 1;
             let mut sums = [simd.splat_f32s(0.0); 3];
             let mut tails = [0.0f32; 3];
             for (k, taps) in kernel.chunks_exact(side).enumerate() {
                 // Beyond the picture its outermost row repeats.
-                let y = (self.y + k).saturating_sub(reach).min(height - 1);
+                let y = (self.y + k).saturating_sub(half_width).min(height - 1);
                 let row = self.source.row(y);
                 let (taps, taps_tail) = S::as_simd_f32s(taps);
                 for p in 0..3 {
-                    let values = &row[p * self.source.stride + self.source.pad + x - reach..][..side];
+                    let values = &row[p * self.source.stride + self.source.pad + x - half_width..][..side];
                     let (values, values_tail) = S::as_simd_f32s(values);
                     for (tap, value) in taps.iter().zip(values) {
                         sums[p] = simd.mul_add_f32s(*tap, *value, sums[p]);
@@ -162,10 +162,10 @@ impl WithSimd for Exact<'_> {
 
 /// One row of the horizontal pass of the separable gather: `[term][3][width]`.
 struct GatherRow<'a> {
-    /// Same as in [`Exact`].
-    pub source: &'a Rows<4>,
+    /// Same as in [`ExactGatherRow`].
+    pub source: &'a PlanarRows<4>,
     pub width: usize,
-    pub bank: &'a Bank,
+    pub bank: &'a FilterBank,
     /// Signed CoC of this row.
     pub coc: &'a [f32],
     pub y: usize,
@@ -178,14 +178,14 @@ impl WithSimd for GatherRow<'_> {
     fn with_simd<S: Simd>(self, _: S) {
         let row = self.source.row(self.y);
         for x in 0..self.width {
-            let node = self.bank.node(self.coc[x].abs());
-            let reach = self.bank.node_half_width[node] as isize;
+            let node = self.bank.nearest_node(self.coc[x].abs());
+            let half_width = self.bank.node_half_width[node] as isize;
             // In front of the focal plane a lens rotates its aperture by 180 degrees.
             let sign = if self.coc[x] < 0.0 { -1 } else { 1 };
             for t in 0..self.bank.terms {
                 let mut sum = [0.0f32; 3];
-                for j in -reach..=reach {
-                    let tap = self.bank.horizontal[self.bank.tap(node, sign * j) + t];
+                for j in -half_width..=half_width {
+                    let tap = self.bank.horizontal[self.bank.tap_index(node, sign * j) + t];
                     let at = (self.source.pad + x).wrapping_add_signed(j);
                     for p in 0..3 {
                         sum[p] = madd::<S>(tap, row[p * self.source.stride + at], sum[p]);
@@ -202,7 +202,7 @@ struct GatherColumn<'a> {
     /// All rows of the horizontal pass.
     pub rows: &'a [f32],
     pub size: (usize, usize),
-    pub bank: &'a Bank,
+    pub bank: &'a FilterBank,
     /// Signed CoC of this row.
     pub coc: &'a [f32],
     pub y: usize,
@@ -216,16 +216,16 @@ impl WithSimd for GatherColumn<'_> {
         let (width, height) = self.size;
         let terms = self.bank.terms;
         for x in 0..width {
-            let node = self.bank.node(self.coc[x].abs());
-            let reach = self.bank.node_half_width[node] as isize;
+            let node = self.bank.nearest_node(self.coc[x].abs());
+            let half_width = self.bank.node_half_width[node] as isize;
             let sign = if self.coc[x] < 0.0 { -1 } else { 1 };
             let mut sum = [0.0f32; 3];
-            for j in -reach..=reach {
+            for j in -half_width..=half_width {
                 let y = self.y.saturating_add_signed(j).min(height - 1);
                 // Row `y` was filtered with the radii of its own pixels, not of this one: the error of a separable
                 // gather.
                 let row = &self.rows[y * terms * 3 * width..][..terms * 3 * width];
-                let taps = &self.bank.vertical[self.bank.tap(node, sign * j)..][..terms];
+                let taps = &self.bank.vertical[self.bank.tap_index(node, sign * j)..][..terms];
                 for (t, tap) in taps.iter().enumerate() {
                     for p in 0..3 {
                         sum[p] = madd::<S>(*tap, row[(t * 3 + p) * width + x], sum[p]);

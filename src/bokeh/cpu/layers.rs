@@ -12,10 +12,10 @@
 use pulp::Simd;
 
 use super::encode::CHUNK;
-use super::silhouettes::Reaching;
-use crate::bokeh::occlusion::{FADE, MARGIN_PX, OWN_COVERAGE};
-use crate::bokeh::plan::{Bin, FARTHEST_COVERAGE, MAX_BINS};
-use crate::compute::aligned::Line;
+use super::silhouettes::Proximity;
+use crate::bokeh::occlusion::{FADE_FRACTION, MARGIN_PX, MIN_OWN_COVERAGE};
+use crate::bokeh::plan::{Bin, HINDMOST_COVERAGE, MAX_BINS};
+use crate::compute::aligned::CacheAligned;
 use crate::compute::simd::{fma, load, store};
 
 /// Relative CoC distance below which a bin belongs to a pixel's own surface: slightly less than where its weight starts
@@ -27,7 +27,7 @@ const ONE_SURFACE: f32 = 0.49;
 struct Stack<S: Simd> {
     color: [S::f32s; 3],
     /// Uncovered fraction of each pixel.
-    open: S::f32s,
+    uncovered: S::f32s,
     /// Colour of the hindmost bin that counts here, and how far it is known.
     hindmost: [S::f32s; 3],
     known: S::f32s,
@@ -37,7 +37,7 @@ impl<S: Simd> Stack<S> {
     #[inline(always)]
     fn new(simd: S) -> Self {
         let (zero, one) = (simd.splat_f32s(0.0), simd.splat_f32s(1.0));
-        Self { color: [zero; 3], open: one, hindmost: [zero; 3], known: zero }
+        Self { color: [zero; 3], uncovered: one, hindmost: [zero; 3], known: zero }
     }
 
     /// Adds a vector of a bin behind all others: premultiplied colour and coverage.
@@ -47,23 +47,23 @@ impl<S: Simd> Stack<S> {
         if simd.first_true_m32s(simd.greater_than_f32s(layer[3], zero)) == S::F32_LANES {
             return;
         }
-        let covered = simd.min_f32s(layer[3], self.open);
+        let covered = simd.min_f32s(layer[3], self.uncovered);
         let inverse = simd.div_f32s(one, simd.max_f32s(layer[3], simd.splat_f32s(1e-6)));
-        let weight = simd.min_f32s(simd.mul_f32s(layer[3], simd.splat_f32s(1.0 / FARTHEST_COVERAGE)), one);
+        let weight = simd.min_f32s(simd.mul_f32s(layer[3], simd.splat_f32s(1.0 / HINDMOST_COVERAGE)), one);
         for p in 0..3 {
             let straight = simd.mul_f32s(layer[p], inverse);
             self.color[p] = fma(simd, straight, covered, self.color[p]);
             self.hindmost[p] = fma(simd, simd.sub_f32s(straight, self.hindmost[p]), weight, self.hindmost[p]);
         }
         self.known = fma(simd, simd.sub_f32s(one, self.known), weight, self.known);
-        self.open = simd.sub_f32s(self.open, covered);
+        self.uncovered = simd.sub_f32s(self.uncovered, covered);
     }
 
     /// Returns the colour, with the uncovered rest in the colour of the hindmost bin: that rest is hidden from the
     /// camera.
     #[inline(always)]
-    fn fill_open(&self, simd: S) -> [S::f32s; 3] {
-        let scale = simd.div_f32s(self.open, simd.max_f32s(self.known, simd.splat_f32s(1e-6)));
+    fn fill_uncovered(&self, simd: S) -> [S::f32s; 3] {
+        let scale = simd.div_f32s(self.uncovered, simd.max_f32s(self.known, simd.splat_f32s(1e-6)));
         let mut color = self.color;
         for p in 0..3 {
             color[p] = fma(simd, self.hindmost[p], scale, color[p]);
@@ -74,19 +74,19 @@ impl<S: Simd> Stack<S> {
 
 /// Layers of a chunk, front to back: the content of the bins there.
 pub struct Layers {
-    planes: Box<[Line<[[f32; CHUNK]; 4]>]>,
+    planes: Box<[CacheAligned<[[f32; CHUNK]; 4]>]>,
     /// CoC range of each layer's bin, in pixels.
     ranges_px: [(f32, f32); MAX_BINS],
     near: usize,
     count: usize,
     /// CoC where the region in front of the subject ends; `near_slope` is the slope of the cross-fade.
-    near_end_px: f32,
+    near_border_px: f32,
     near_slope: f32,
 }
 
 /// Loads a bin's content at some pixels as vectors.
 #[inline(always)]
-fn layer<S: Simd>(simd: S, planes: &Line<[[f32; CHUNK]; 4]>, x: usize) -> [S::f32s; 4] {
+fn load_layer<S: Simd>(simd: S, planes: &CacheAligned<[[f32; CHUNK]; 4]>, x: usize) -> [S::f32s; 4] {
     let mut values = [simd.splat_f32s(0.0); 4];
     for p in 0..4 {
         values[p] = load::<S>(&planes.0[p], x);
@@ -97,24 +97,24 @@ fn layer<S: Simd>(simd: S, planes: &Line<[[f32; CHUNK]; 4]>, x: usize) -> [S::f3
 impl Layers {
     /// Allocates for the largest number of bins.
     pub fn new() -> Self {
-        let planes = vec![Line([[0.0; CHUNK]; 4]); MAX_BINS].into();
-        Self { planes, ranges_px: [(0.0, 0.0); MAX_BINS], near: 0, count: 0, near_end_px: -1.0, near_slope: 1.0 }
+        let planes = vec![CacheAligned([[0.0; CHUNK]; 4]); MAX_BINS].into();
+        Self { planes, ranges_px: [(0.0, 0.0); MAX_BINS], near: 0, count: 0, near_border_px: -1.0, near_slope: 1.0 }
     }
 
-    /// Composites the layers to linear light, at pixels with these CoC and with `reaching` from silhouettes. If the
+    /// Composites the layers to linear light, at pixels with these CoC and with `proximity` from silhouettes. If the
     /// pixels are `is_one_surface`, away from silhouettes, no CoC is needed.
     #[inline(always)]
     pub fn composite<S: Simd>(
         &self,
         simd: S,
-        reaching: &Option<Reaching>,
+        proximity: &Option<Proximity>,
         coc_px: &[f32; CHUNK],
         is_one_surface: bool,
-        color: &mut Line<[[f32; CHUNK]; 3]>,
+        color: &mut CacheAligned<[[f32; CHUNK]; 3]>,
     ) {
         let zero = simd.splat_f32s(0.0);
         for x in (0..CHUNK).step_by(S::F32_LANES) {
-            let light = match reaching.as_ref().and_then(|reaching| reaching.pixels(x, S::F32_LANES)) {
+            let light = match proximity.as_ref().and_then(|proximity| proximity.interpolate(x, S::F32_LANES)) {
                 Some(squares) => self.composite_near_silhouettes(simd, &squares, load::<S>(coc_px, x), x),
                 None => self.composite_one_surface(simd, load::<S>(coc_px, x), is_one_surface, x),
             };
@@ -127,9 +127,9 @@ impl Layers {
     /// Composites away from all silhouettes: only a pixel's own surface.
     #[inline(always)]
     fn composite_one_surface<S: Simd>(&self, simd: S, coc_px: S::f32s, is_one_surface: bool, x: usize) -> [S::f32s; 3] {
-        let (mut light, is_thin) = self.own_surface(simd, coc_px, is_one_surface, x);
+        let (mut light, is_thin) = self.composite_own_surface(simd, coc_px, is_one_surface, x);
         if simd.first_true_m32s(is_thin) < S::F32_LANES {
-            let all = self.all_surfaces(simd, simd.splat_f32s(1.0), x);
+            let all = self.composite_all_surfaces(simd, simd.splat_f32s(1.0), x);
             for p in 0..3 {
                 light[p] = simd.select_f32s(is_thin, all[p], light[p]);
             }
@@ -148,33 +148,34 @@ impl Layers {
     ) -> [S::f32s; 3] {
         let (zero, one) = (simd.splat_f32s(0.0), simd.splat_f32s(1.0));
         // Radius of the silhouettes of the pixel's own surface, if it is a near one.
-        let reach = simd.add_f32s(simd.max_f32s(simd.neg_f32s(coc_px), zero), simd.splat_f32s(MARGIN_PX));
-        let scale = simd.div_f32s(one, simd.mul_f32s(simd.mul_f32s(reach, reach), simd.splat_f32s(FADE)));
-        let mut shows = [zero; 2];
-        for (shows, squares) in shows.iter_mut().zip(squares) {
-            *shows = simd.mul_f32s(load::<S>(squares, 0), scale);
-            *shows = simd.min_f32s(simd.max_f32s(*shows, zero), one);
+        let radius_px = simd.add_f32s(simd.max_f32s(simd.neg_f32s(coc_px), zero), simd.splat_f32s(MARGIN_PX));
+        let scale =
+            simd.div_f32s(one, simd.mul_f32s(simd.mul_f32s(radius_px, radius_px), simd.splat_f32s(FADE_FRACTION)));
+        let mut visibility = [zero; 2];
+        for (visibility, squares) in visibility.iter_mut().zip(squares) {
+            *visibility = simd.mul_f32s(load::<S>(squares, 0), scale);
+            *visibility = simd.min_f32s(simd.max_f32s(*visibility, zero), one);
         }
         // A pixel that is not in front shows the whole background behind near layers.
-        let back_weight = simd.sub_f32s(coc_px, simd.splat_f32s(self.near_end_px));
+        let back_weight = simd.sub_f32s(coc_px, simd.splat_f32s(self.near_border_px));
         let back_weight = fma(simd, back_weight, simd.splat_f32s(self.near_slope), simd.splat_f32s(0.5));
         let back_weight = simd.min_f32s(simd.max_f32s(back_weight, zero), one);
-        let back_visibility = simd.max_f32s(shows[1], back_weight);
-        if simd.first_true_m32s(simd.less_than_f32s(shows[0], one)) == S::F32_LANES {
-            return self.all_surfaces(simd, back_visibility, x);
+        let back_visibility = simd.max_f32s(visibility[1], back_weight);
+        if simd.first_true_m32s(simd.less_than_f32s(visibility[0], one)) == S::F32_LANES {
+            return self.composite_all_surfaces(simd, back_visibility, x);
         }
-        let (own, is_thin) = self.own_surface(simd, coc_px, self.count < 2, x);
-        let mut light = self.all_surfaces(simd, simd.select_f32s(is_thin, one, back_visibility), x);
-        let shows = simd.select_f32s(is_thin, one, shows[0]);
+        let (own, is_thin) = self.composite_own_surface(simd, coc_px, self.count < 2, x);
+        let mut light = self.composite_all_surfaces(simd, simd.select_f32s(is_thin, one, back_visibility), x);
+        let visibility = simd.select_f32s(is_thin, one, visibility[0]);
         for p in 0..3 {
-            light[p] = fma(simd, simd.sub_f32s(light[p], own[p]), shows, own[p]);
+            light[p] = fma(simd, simd.sub_f32s(light[p], own[p]), visibility, own[p]);
         }
         light
     }
 
-    /// Begins a frame whose near bins end at `near_end`: the CoC, and the slope of the cross-fade.
-    pub fn begin(&mut self, near_end: (f32, f32)) {
-        (self.near_end_px, self.near_slope) = near_end;
+    /// Begins a frame whose near bins end at `near_border`: the CoC, and the slope of the cross-fade.
+    pub fn set_near_border(&mut self, near_border: (f32, f32)) {
+        (self.near_border_px, self.near_slope) = near_border;
     }
 
     /// Removes all layers, for other pixels.
@@ -226,27 +227,27 @@ impl Layers {
     /// Composites the near layers over the others, as far as these are visible (`back_visibility`, 0 to 1); otherwise
     /// the near layers fill the pixel.
     #[inline(always)]
-    fn all_surfaces<S: Simd>(&self, simd: S, back_visibility: S::f32s, x: usize) -> [S::f32s; 3] {
+    fn composite_all_surfaces<S: Simd>(&self, simd: S, back_visibility: S::f32s, x: usize) -> [S::f32s; 3] {
         let (near, rest) = self.planes[..self.count].split_at(self.near);
         let mut back = Stack::new(simd);
         for planes in rest {
-            back.add(simd, layer(simd, planes, x));
+            back.add(simd, load_layer(simd, planes, x));
         }
-        let mut light = back.fill_open(simd);
+        let mut light = back.fill_uncovered(simd);
         if !near.is_empty() {
             let mut front = Stack::new(simd);
             for planes in near {
-                front.add(simd, layer(simd, planes, x));
+                front.add(simd, load_layer(simd, planes, x));
             }
-            let alone = front.fill_open(simd);
+            let alone = front.fill_uncovered(simd);
             // Without a background, too; almost empty near layers have no colour to fill a pixel with.
             let has_back = simd.greater_than_f32s(back.known, simd.splat_f32s(1e-4));
             let has_front = simd.greater_than_f32s(front.known, simd.splat_f32s(1e-3));
-            let shows = simd.select_f32s(has_front, back_visibility, simd.splat_f32s(1.0));
+            let visibility = simd.select_f32s(has_front, back_visibility, simd.splat_f32s(1.0));
             for p in 0..3 {
-                let over = fma(simd, light[p], front.open, front.color[p]);
+                let over = fma(simd, light[p], front.uncovered, front.color[p]);
                 let ahead = simd.select_f32s(has_front, alone[p], over);
-                let both = fma(simd, simd.sub_f32s(over, ahead), shows, ahead);
+                let both = fma(simd, simd.sub_f32s(over, ahead), visibility, ahead);
                 light[p] = simd.select_f32s(has_back, both, alone[p]);
             }
         }
@@ -256,7 +257,7 @@ impl Layers {
     /// Returns the colour of the surfaces of about this CoC, or of all layers if they are `is_one_surface`, as if
     /// nothing else were there, and a mask of the pixels that it does not fill.
     #[inline(always)]
-    fn own_surface<S: Simd>(
+    fn composite_own_surface<S: Simd>(
         &self,
         simd: S,
         coc_px: S::f32s,
@@ -268,7 +269,7 @@ impl Layers {
         let inverse = simd.div_f32s(one, simd.add_f32s(simd.abs_f32s(coc_px), one));
         let slack = simd.min_f32s(simd.max_f32s(simd.neg_f32s(coc_px), zero), simd.splat_f32s(0.5));
         for (planes, &(low_px, high_px)) in self.planes[..self.count].iter().zip(&self.ranges_px) {
-            let mut layer = layer(simd, planes, x);
+            let mut layer = load_layer(simd, planes, x);
             if !is_one_surface {
                 // In front, nearer content is blurred more and spreads farther.
                 let farther = simd.mul_f32s(simd.sub_f32s(simd.splat_f32s(low_px), coc_px), inverse);
@@ -282,11 +283,11 @@ impl Layers {
             }
             stack.add(simd, layer);
         }
-        let covered = simd.max_f32s(simd.sub_f32s(one, stack.open), simd.splat_f32s(1e-6));
+        let covered = simd.max_f32s(simd.sub_f32s(one, stack.uncovered), simd.splat_f32s(1e-6));
         let inverse = simd.div_f32s(one, covered);
         for plane in &mut stack.color {
             *plane = simd.mul_f32s(*plane, inverse);
         }
-        (stack.color, simd.less_than_f32s(covered, simd.splat_f32s(OWN_COVERAGE)))
+        (stack.color, simd.less_than_f32s(covered, simd.splat_f32s(MIN_OWN_COVERAGE)))
     }
 }

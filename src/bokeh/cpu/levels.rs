@@ -6,7 +6,7 @@
 
 use pulp::{Simd, WithSimd};
 
-use super::rows::{PIECE, Rows};
+use super::rows::{COPY_WIDTH, PlanarRows};
 use crate::bokeh::plan::BinWeight;
 
 /// Planes of a level: premultiplied colour and CoC, and the known weight.
@@ -16,14 +16,14 @@ pub const PLANES: usize = 5;
 pub struct Level {
     pub width: usize,
     pub height: usize,
-    pub rows: Rows<PLANES>,
+    pub rows: PlanarRows<PLANES>,
 }
 
 /// Computes some rows of the finest level, from row `first` on.
 pub struct Base<'a> {
-    pub halves: &'a Rows<PLANES>,
+    pub halves: &'a PlanarRows<PLANES>,
     pub size: (usize, usize),
-    pub unhidden: &'a BinWeight,
+    pub visible_weight: &'a BinWeight,
     pub first: usize,
     pub rows: &'a mut [f32],
 }
@@ -39,19 +39,19 @@ impl WithSimd for Base<'_> {
             let nearest = |y: usize| &self.halves.row(y)[(PLANES - 1) * stride..][..width];
             let (above, here, below) = (nearest(y.saturating_sub(1)), nearest(y), nearest((y + 1).min(height - 1)));
             // The smallest CoC of the 3x3 neighbourhood decides: minimum over three rows, then over three columns.
-            let of_rows = &mut planes[..width];
+            let column_minima = &mut planes[..width];
             for x in 0..width {
-                of_rows[x] = least(above[x], least(here[x], below[x]));
+                column_minima[x] = fast_min(above[x], fast_min(here[x], below[x]));
             }
-            known[0] = least(of_rows[0], of_rows[1.min(last)]);
-            known[last] = least(of_rows[last.saturating_sub(1)], of_rows[last]);
+            known[0] = fast_min(column_minima[0], column_minima[1.min(last)]);
+            known[last] = fast_min(column_minima[last.saturating_sub(1)], column_minima[last]);
             for ((known, beside), own) in
-                known[1.min(last)..last].iter_mut().zip(&of_rows[2.min(last)..]).zip(of_rows.windows(2))
+                known[1.min(last)..last].iter_mut().zip(&column_minima[2.min(last)..]).zip(column_minima.windows(2))
             {
-                *known = least(own[0], least(own[1], *beside));
+                *known = fast_min(own[0], fast_min(own[1], *beside));
             }
             for value in known.iter_mut() {
-                *value = self.unhidden.at(*value);
+                *value = self.visible_weight.at(*value);
             }
             for p in 0..PLANES - 1 {
                 let (plane, own) = (&mut planes[p * stride..][..width], &self.halves.row(y)[p * stride..][..width]);
@@ -65,7 +65,7 @@ impl WithSimd for Base<'_> {
 
 /// Returns the minimum, in one instruction.
 #[inline(always)]
-fn least(a: f32, b: f32) -> f32 {
+fn fast_min(a: f32, b: f32) -> f32 {
     if a < b { a } else { b }
 }
 
@@ -111,7 +111,7 @@ impl WithSimd for Pull<'_> {
                 }
             }
             for known in known {
-                *known = least(*known, 1.0);
+                *known = fast_min(*known, 1.0);
             }
         }
     }
@@ -133,27 +133,27 @@ impl WithSimd for Push<'_> {
     fn with_simd<S: Simd>(self, _: S) {
         let Self { coarse, width, stride, .. } = self;
         for (y, out) in (self.first..).zip(self.rows.chunks_exact_mut(stride * PLANES)) {
-            let [here, there] = beside(y, coarse.height).map(|row| coarse.rows.row(row));
-            for first in (0..width).step_by(2 * PIECE) {
-                let count = (2 * PIECE).min(width - first);
+            let [here, there] = interpolation_rows(y, coarse.height).map(|row| coarse.rows.row(row));
+            for first in (0..width).step_by(2 * COPY_WIDTH) {
+                let count = (2 * COPY_WIDTH).min(width - first);
                 // Unknown fraction of each pixel; most pixels are known completely.
-                let mut open = [0.0; 2 * PIECE];
+                let mut unknown = [0.0; 2 * COPY_WIDTH];
                 let known = &out[(PLANES - 1) * stride + first..][..count];
-                for (open, known) in open.iter_mut().zip(known) {
-                    *open = if *known < 1.0 { 1.0 - *known } else { 0.0 };
+                for (unknown, known) in unknown.iter_mut().zip(known) {
+                    *unknown = if *known < 1.0 { 1.0 - *known } else { 0.0 };
                 }
-                if open.iter().all(|&open| open <= 0.0) {
+                if unknown.iter().all(|&unknown| unknown <= 0.0) {
                     continue;
                 }
-                let mut values = [[0.0; 2 * PIECE]; PLANES];
+                let mut values = [[0.0; 2 * COPY_WIDTH]; PLANES];
                 for (p, values) in values.iter_mut().enumerate() {
                     let plane = p * coarse.rows.stride..p * coarse.rows.stride + coarse.width;
-                    between(&here[plane.clone()], &there[plane], first / 2, values);
+                    interpolate_rows(&here[plane.clone()], &there[plane], first / 2, values);
                 }
-                let mut scale = [0.0; 2 * PIECE];
-                for x in 0..2 * PIECE {
+                let mut scale = [0.0; 2 * COPY_WIDTH];
+                for x in 0..2 * COPY_WIDTH {
                     let sum = values[PLANES - 1][x];
-                    scale[x] = open[x] / if sum > 1e-6 { sum } else { 1e-6 };
+                    scale[x] = unknown[x] / if sum > 1e-6 { sum } else { 1e-6 };
                 }
                 for (p, values) in values.iter().enumerate() {
                     let out = &mut out[p * stride + first..][..count];
@@ -166,26 +166,26 @@ impl WithSimd for Push<'_> {
     }
 }
 
-/// Interpolates two pixels for each of [`PIECE`] coarse ones from column `first` on, between the rows `here` and
+/// Interpolates two pixels for each of [`COPY_WIDTH`] coarse ones from column `first` on, between the rows `here` and
 /// `there`.
 #[inline(always)]
-fn between(here: &[f32], there: &[f32], first: usize, values: &mut [f32; 2 * PIECE]) {
+fn interpolate_rows(here: &[f32], there: &[f32], first: usize, values: &mut [f32; 2 * COPY_WIDTH]) {
     // One more on both sides; outside, the outermost pixels repeat.
-    let mut rows = [[0.0; PIECE + 2]; 2];
+    let mut rows = [[0.0; COPY_WIDTH + 2]; 2];
     for (row, line) in rows.iter_mut().zip([here, there]) {
-        if first > 0 && first + PIECE < line.len() {
-            row.copy_from_slice(&line[first - 1..][..PIECE + 2]);
+        if first > 0 && first + COPY_WIDTH < line.len() {
+            row.copy_from_slice(&line[first - 1..][..COPY_WIDTH + 2]);
         } else {
             for (k, value) in row.iter_mut().enumerate() {
                 *value = line[(first + k).saturating_sub(1).min(line.len() - 1)];
             }
         }
     }
-    let mut column = [0.0; PIECE + 2];
-    for k in 0..PIECE + 2 {
+    let mut column = [0.0; COPY_WIDTH + 2];
+    for k in 0..COPY_WIDTH + 2 {
         column[k] = 0.75 * rows[0][k] + 0.25 * rows[1][k];
     }
-    for k in 0..PIECE {
+    for k in 0..COPY_WIDTH {
         values[2 * k] = 0.75 * column[k + 1] + 0.25 * column[k];
         values[2 * k + 1] = 0.75 * column[k + 1] + 0.25 * column[k + 2];
     }
@@ -193,7 +193,7 @@ fn between(here: &[f32], there: &[f32], first: usize, values: &mut [f32; 2 * PIE
 
 /// Returns the coarse row that covers row `at`, and its nearest neighbour, clamped to `limit` rows.
 #[inline(always)]
-fn beside(at: usize, limit: usize) -> [usize; 2] {
+fn interpolation_rows(at: usize, limit: usize) -> [usize; 2] {
     let neighbour = if at.is_multiple_of(2) { (at / 2).saturating_sub(1) } else { at / 2 + 1 };
     [at / 2, neighbour.min(limit - 1)]
 }

@@ -5,10 +5,10 @@
 use pulp::{Simd, WithSimd};
 
 use super::pixels::Radii;
-use super::silhouettes::{NONE, highest};
+use super::silhouettes::{NO_SILHOUETTE, maximum};
 use super::tiles::TILE_W;
-use super::unpack::{Source, coc_row};
-use crate::bokeh::occlusion::{self, GRAIN, SHOWS, Silhouette};
+use super::unpack::{InputFrame, compute_coc_row};
+use crate::bokeh::occlusion::{self, DISTANCES_PER_CELL, SILHOUETTE_CELL, Silhouette};
 use crate::optics::{CocField, DepthCoc};
 
 /// Pixels processed together: a row of a tile.
@@ -17,8 +17,8 @@ const CHUNK: usize = TILE_W;
 const FAR_M: f32 = 1e6;
 
 /// Marks the silhouettes of a row of tiles.
-pub struct Marking<'a> {
-    pub source: &'a Source<'a>,
+pub struct MarkSilhouettes<'a> {
+    pub source: &'a InputFrame<'a>,
     /// CoC range of each tile.
     pub ranges: &'a [(f32, f32)],
     /// Rows of the picture; `marks` are the rows of the grid over them.
@@ -28,13 +28,13 @@ pub struct Marking<'a> {
     pub near_from_px: f32,
 }
 
-impl WithSimd for Marking<'_> {
+impl WithSimd for MarkSilhouettes<'_> {
     type Output = ();
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) {
         let (width, height) = self.source.size;
-        let across = width.div_ceil(GRAIN);
-        self.marks.fill(NONE);
+        let across = width.div_ceil(SILHOUETTE_CELL);
+        self.marks.fill(NO_SILHOUETTE);
         // A smaller map has steps between its own pixels that are no silhouettes.
         let (min_step_px, metres) = match self.source.coc {
             Radii::Field(CocField::Depth(lens), Some(map)) => {
@@ -46,12 +46,13 @@ impl WithSimd for Marking<'_> {
         let (mut here, mut below) = ([0.0; CHUNK + 1], [0.0; CHUNK]);
         for y in self.rows.clone() {
             let next = (y + 1).min(height - 1);
-            let row = &mut self.marks[(y - self.rows.start) / GRAIN * SHOWS * across..][..SHOWS * across];
+            let row = &mut self.marks[(y - self.rows.start) / SILHOUETTE_CELL * DISTANCES_PER_CELL * across..]
+                [..DISTANCES_PER_CELL * across];
             for x0 in (0..width).step_by(CHUNK) {
                 let take = CHUNK.min(width - x0);
                 let with_next = (take + 1).min(width - x0);
                 // No step within a tile, or to the next one, exceeds their CoC range.
-                if next < self.rows.end && span_px(&self.ranges[x0 / TILE_W..]) < min_step_px {
+                if next < self.rows.end && coc_span_px(&self.ranges[x0 / TILE_W..]) < min_step_px {
                     continue;
                 }
                 // The test on depth needs no division and rejects nearly all pixels.
@@ -63,8 +64,8 @@ impl WithSimd for Marking<'_> {
                         continue;
                     }
                 }
-                coc_row(self.source, y, x0, &mut here[..with_next]);
-                coc_row(self.source, next, x0, &mut below[..take]);
+                compute_coc_row(self.source, y, x0, &mut here[..with_next]);
+                compute_coc_row(self.source, next, x0, &mut below[..take]);
                 let last_px = here[with_next - 1];
                 here[with_next..].fill(last_px);
                 let mut excess_step_px = [f32::MIN; CHUNK];
@@ -75,12 +76,17 @@ impl WithSimd for Marking<'_> {
                     });
                     excess_step_px[x] = if right_px > down_px { right_px } else { down_px };
                 }
-                if highest(&excess_step_px) < 0.0 {
+                if maximum(&excess_step_px) < 0.0 {
                     continue;
                 }
                 for x in (0..take).filter(|&x| excess_step_px[x] >= 0.0) {
                     for other in [here[x + 1], below[x]] {
-                        mark(row, across, x0 + x, Silhouette::between(here[x], other, min_step_px, self.near_from_px));
+                        mark_cell(
+                            row,
+                            across,
+                            x0 + x,
+                            Silhouette::between(here[x], other, min_step_px, self.near_from_px),
+                        );
                     }
                 }
             }
@@ -91,26 +97,27 @@ impl WithSimd for Marking<'_> {
         for pixel in matte.within(self.rows.start * width..self.rows.end * width) {
             let (x, y) = (pixel.at as usize % width, pixel.at as usize / width);
             let (near_px, far_px) = (lens.coc_px(pixel.near_m), lens.coc_px(pixel.far_m));
-            let row = &mut self.marks[(y - self.rows.start) / GRAIN * SHOWS * across..][..SHOWS * across];
-            mark(row, across, x, Silhouette::between(near_px, far_px, min_step_px, self.near_from_px));
+            let row = &mut self.marks[(y - self.rows.start) / SILHOUETTE_CELL * DISTANCES_PER_CELL * across..]
+                [..DISTANCES_PER_CELL * across];
+            mark_cell(row, across, x, Silhouette::between(near_px, far_px, min_step_px, self.near_from_px));
         }
     }
 }
 
 /// Returns the CoC range of the first two tiles together.
 #[inline(always)]
-fn span_px(ranges: &[(f32, f32)]) -> f32 {
+fn coc_span_px(ranges: &[(f32, f32)]) -> f32 {
     let (low_px, high_px) = ranges[0];
     let (next_low_px, next_high_px) = ranges[1.min(ranges.len() - 1)];
     high_px.max(next_high_px) - low_px.min(next_low_px)
 }
 
 #[inline(always)]
-fn mark(row: &mut [f32], across: usize, x: usize, silhouette: Option<Silhouette>) {
+fn mark_cell(row: &mut [f32], across: usize, x: usize, silhouette: Option<Silhouette>) {
     let Some(silhouette) = silhouette else { return };
-    let distances_px = [silhouette.shows_px, silhouette.shows_back_px, silhouette.uncovers_px];
+    let distances_px = [silhouette.visible_px, silhouette.background_visible_px, silhouette.needed_px];
     for (plane, px) in row.chunks_exact_mut(across).zip(distances_px) {
-        plane[x / GRAIN] = plane[x / GRAIN].max(px);
+        plane[x / SILHOUETTE_CELL] = plane[x / SILHOUETTE_CELL].max(px);
     }
 }
 
@@ -131,5 +138,5 @@ fn has_step(lens: &DepthCoc, min_step_px: f32, a: &[f32], b: &[f32]) -> bool {
             most[k] = if excess > most[k] { excess } else { most[k] };
         }
     }
-    highest(&most) >= 0.0 || a_rest.iter().zip(b_rest).any(|(&a, &b)| excess(a, b) >= 0.0)
+    maximum(&most) >= 0.0 || a_rest.iter().zip(b_rest).any(|(&a, &b)| excess(a, b) >= 0.0)
 }

@@ -20,7 +20,7 @@ impl Pixels<'_> {
 
     /// Clamps linear light to the range that can be blurred.
     #[inline(always)]
-    pub fn light(value: f32) -> f32 {
+    pub fn clamp_light(value: f32) -> f32 {
         let value = if value > 0.0 { value } else { 0.0 };
         if value < Self::MAX_LIGHT { value } else { Self::MAX_LIGHT }
     }
@@ -38,14 +38,14 @@ pub enum Radii<'a> {
 /// Type of a colour sample.
 pub trait Sample: Copy + Send + Sync {
     /// Wraps samples as pixels of their kind.
-    fn pixels(samples: &[Self]) -> Pixels<'_>;
+    fn as_pixels(samples: &[Self]) -> Pixels<'_>;
 
     /// Writes a chunk of linear light as samples; `out` may be shorter.
     fn write(color: &[[f32; CHUNK]; 3], encode: &EncodeTable, out: &mut [Self]);
 }
 
 impl Sample for u8 {
-    fn pixels(samples: &[u8]) -> Pixels<'_> {
+    fn as_pixels(samples: &[u8]) -> Pixels<'_> {
         Pixels::Srgb(samples)
     }
 
@@ -56,7 +56,7 @@ impl Sample for u8 {
 }
 
 impl Sample for f32 {
-    fn pixels(samples: &[f32]) -> Pixels<'_> {
+    fn as_pixels(samples: &[f32]) -> Pixels<'_> {
         Pixels::Linear(samples)
     }
 
@@ -64,7 +64,8 @@ impl Sample for f32 {
     fn write(color: &[[f32; CHUNK]; 3], _: &EncodeTable, out: &mut [f32]) {
         // Next to very bright light, filters of few terms may sum to less than 0.
         for (x, pixel) in out.as_chunks_mut::<3>().0.iter_mut().enumerate() {
-            *pixel = [Pixels::light(color[0][x]), Pixels::light(color[1][x]), Pixels::light(color[2][x])];
+            *pixel =
+                [Pixels::clamp_light(color[0][x]), Pixels::clamp_light(color[1][x]), Pixels::clamp_light(color[2][x])];
         }
     }
 }

@@ -4,7 +4,7 @@ use super::CpuBokeh;
 use super::pixels::{Pixels, Radii};
 use super::rows::STRIP;
 use super::tiles::{TILE_H, TILE_W};
-use super::unpack::{Source, Surfaces};
+use super::unpack::{InputFrame, Surfaces};
 use crate::bokeh::Probe;
 use crate::bokeh::plan::{Plan, SEGMENT};
 use crate::frame::{ColorImage, DepthMap};
@@ -43,7 +43,7 @@ impl CpuBokeh {
     }
 
     /// Returns the radius with which every pixel of bin `k` was filtered in the last frame, in bin pixels.
-    pub fn radius_px(&self, k: usize) -> Vec<f32> {
+    pub fn filter_radii_px(&self, k: usize) -> Vec<f32> {
         let bin = &self.plan.bins[k];
         let edges = &self.slots[bin.slot].edges;
         let mut radii = Vec::with_capacity(bin.width * bin.height);
@@ -64,37 +64,37 @@ impl CpuBokeh {
     /// are composited again, with the CoC of the nearer surface.
     pub fn scene(&self, color: &ColorImage, depth: Option<&DepthMap>, coc: &CocField, filled: bool) -> Vec<[f32; 4]> {
         let (width, height) = (color.width as usize, color.height as usize);
-        let source = Source::new(&self.plan, Pixels::Srgb(&color.rgb), Radii::Field(coc, depth));
-        let pyramid = self.pyramid.as_ref().filter(|_| filled && self.filled());
-        let last = self.last_layer();
-        let behind = pyramid.map(|pyramid| pyramid.behind(&self.silhouettes, &self.plan, last));
+        let source = InputFrame::new(&self.plan, Pixels::Srgb(&color.rgb), Radii::Field(coc, depth));
+        let pyramid = self.pyramid.as_ref().filter(|_| filled && self.has_inpainting());
+        let last = self.first_far_bin();
+        let background = pyramid.map(|pyramid| pyramid.background(&self.silhouettes, &self.plan, last));
         let mut surfaces: Surfaces<SPAN> = Surfaces::new();
         let mut scene = Vec::with_capacity(width * height);
         for y in 0..height {
             for x0 in (0..width).step_by(SPAN) {
                 source.unpack::<pulp::Scalar, SPAN>(y, x0 as isize, SPAN, &mut surfaces);
-                if let Some(behind) = &behind {
-                    behind.inpaint(pulp::Scalar::new(), x0 as isize, y, width, &mut surfaces);
+                if let Some(background) = &background {
+                    background.inpaint(pulp::Scalar::new(), x0 as isize, y, width, &mut surfaces);
                 }
-                scene.extend((0..SPAN.min(width - x0)).map(|x| surfaces.pixel(x)));
+                scene.extend((0..SPAN.min(width - x0)).map(|x| surfaces.composite_pixel(x)));
             }
         }
         scene
     }
 
     /// Whether something in the last frame was in front, so that the background behind it was inpainted.
-    pub fn filled(&self) -> bool {
-        self.pyramid.is_some() && self.last_layer() > 0
+    pub fn has_inpainting(&self) -> bool {
+        self.pyramid.is_some() && self.first_far_bin() > 0
     }
 
     /// Returns how far a pixel of this CoC was inpainted for the bins that are not in front of the focal plane, 0 to 1.
-    /// The last frame must have been [`filled`](Self::filled).
-    pub fn hidden(&self, coc_px: f32) -> f32 {
-        1.0 - self.plan.unhidden(self.last_layer()).at(coc_px)
+    /// The last frame must [have inpainting](Self::has_inpainting).
+    pub fn inpainting_weight(&self, coc_px: f32) -> f32 {
+        1.0 - self.plan.visible_weight(self.first_far_bin()).at(coc_px)
     }
 
     /// Returns the first bin that is not in front of the focal plane.
-    fn last_layer(&self) -> usize {
+    fn first_far_bin(&self) -> usize {
         self.plan.layers().last().map_or(0, |layer| layer.start)
     }
 

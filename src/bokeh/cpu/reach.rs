@@ -7,41 +7,48 @@
 
 use pulp::{Simd, WithSimd};
 
-use super::rows::{CELL_PLANES, Cells, EDGE_VALUES, Edges, NO_COLOR};
-use crate::bokeh::plan::{ANY_COLOR, Bin, CELL, FAR_WEIGHT, Plan, SEGMENT};
+use super::rows::{CELL_PLANES, CellGrid, EDGE_VALUES, NO_COLOR, SegmentEdges};
+use crate::bokeh::plan::{Bin, CELL, MIN_CELL_WEIGHT, Plan, SEGMENT, UNBOUNDED_COLOR};
 
-/// Returns the weight of a cell `distance` cells away, along one axis: a Gaussian plus [`FAR_WEIGHT`].
-pub fn nearness(distance: usize, bin: &Bin) -> f32 {
+/// Returns the weight of a cell `distance` cells away, along one axis: a Gaussian plus [`MIN_CELL_WEIGHT`].
+pub fn cell_weight(distance: usize, bin: &Bin) -> f32 {
     let d = distance as f32 / bin.sigma_cells();
-    (-0.5 * d * d).exp() + FAR_WEIGHT
+    (-0.5 * d * d).exp() + MIN_CELL_WEIGHT
 }
 
 /// Combines the neighbourhood of every cell of a bin, one axis after the other, and writes radius and colour range at
 /// the `edges` of segments.
-pub struct Reach<'a> {
+pub struct DilateRadii<'a> {
     pub plan: &'a Plan,
     pub bin: &'a Bin,
-    pub cells: &'a Cells,
-    pub edges: &'a mut Edges,
+    pub cells: &'a CellGrid,
+    pub edges: &'a mut SegmentEdges,
     /// Grows to the size of the grid plus one row of it.
     pub scratch: &'a mut Vec<f32>,
 }
 
-impl WithSimd for Reach<'_> {
+impl WithSimd for DilateRadii<'_> {
     type Output = ();
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        reach(simd, self.plan, self.bin, self.cells, self.edges, self.scratch);
+        dilate_radii(simd, self.plan, self.bin, self.cells, self.edges, self.scratch);
     }
 }
 
 #[inline(always)]
-fn reach<S: Simd>(simd: S, plan: &Plan, bin: &Bin, cells: &Cells, edges: &mut Edges, scratch: &mut Vec<f32>) {
+fn dilate_radii<S: Simd>(
+    simd: S,
+    plan: &Plan,
+    bin: &Bin,
+    cells: &CellGrid,
+    edges: &mut SegmentEdges,
+    scratch: &mut Vec<f32>,
+) {
     let (width, height, radius) = (cells.width, cells.height, plan.radius_cells(bin));
     // Only blurs of thousands of pixels have a larger radius; they are clamped.
     let mut weights = [0.0; 64];
     let radius = radius.min(weights.len() - 1);
-    (0..=radius).for_each(|d| weights[d] = nearness(d, bin));
+    (0..=radius).for_each(|d| weights[d] = cell_weight(d, bin));
     let row_len = CELL_PLANES * width;
     // Everything is written before it is read.
     scratch.resize(scratch.len().max(cells.data.len() + row_len), 0.0);
@@ -58,21 +65,21 @@ fn reach<S: Simd>(simd: S, plan: &Plan, bin: &Bin, cells: &Cells, edges: &mut Ed
             let weight = weights[k.abs_diff(y)];
             let (sums, rest) = row.split_at_mut(2 * width);
             let (lows, highs) = rest.split_at_mut(3 * width);
-            add(sums, source, weight);
-            keep_lowest(simd, lows, &source[2 * width..5 * width]);
-            keep_highest(simd, highs, &source[5 * width..]);
+            add_weighted(sums, source, weight);
+            assign_min(simd, lows, &source[2 * width..5 * width]);
+            assign_max(simd, highs, &source[5 * width..]);
         }
         // The mean of |CoC| becomes the radius.
         for x in 0..width {
             let coc_px = if row[x] > 0.0 { row[width + x] / row[x] } else { 0.0 };
             row[width + x] = plan.bin_radius_px(bin, coc_px);
         }
-        if plan.has_lobes(bin) {
+        if plan.has_overshoot(bin) {
             // Without content in the support there is no range to clamp to.
             row[2 * width..].iter_mut().filter(|value| value.abs() >= NO_COLOR).for_each(|value| *value = 0.0);
         } else {
-            row[2 * width..5 * width].fill(-ANY_COLOR);
-            row[5 * width..].fill(ANY_COLOR);
+            row[2 * width..5 * width].fill(-UNBOUNDED_COLOR);
+            row[5 * width..].fill(UNBOUNDED_COLOR);
         }
         let out = &mut edges.data[y * edges.across * EDGE_VALUES..][..edges.across * EDGE_VALUES];
         for (edge, values) in out.chunks_exact_mut(EDGE_VALUES).enumerate() {
@@ -102,23 +109,23 @@ fn combine_row<S: Simd>(simd: S, plane: usize, source: &[f32], target: &mut [f32
         for (to, from) in [(0, distance), (distance, 0)] {
             let (target, source) = (&mut target[to..][..inner], &source[from..][..inner]);
             match plane {
-                0 | 1 => add(target, source, weights[distance]),
-                2..5 => keep_lowest(simd, target, source),
-                _ => keep_highest(simd, target, source),
+                0 | 1 => add_weighted(target, source, weights[distance]),
+                2..5 => assign_min(simd, target, source),
+                _ => assign_max(simd, target, source),
             }
         }
     }
 }
 
 #[inline(always)]
-fn add(target: &mut [f32], source: &[f32], weight: f32) {
+fn add_weighted(target: &mut [f32], source: &[f32], weight: f32) {
     for (target, source) in target.iter_mut().zip(source) {
         *target += weight * source;
     }
 }
 
 #[inline(always)]
-fn keep_lowest<S: Simd>(simd: S, target: &mut [f32], source: &[f32]) {
+fn assign_min<S: Simd>(simd: S, target: &mut [f32], source: &[f32]) {
     assert_eq!(target.len(), source.len());
     let ((targets, target), (sources, source)) = (S::as_mut_simd_f32s(target), S::as_simd_f32s(source));
     for (target, &source) in targets.iter_mut().zip(sources) {
@@ -130,7 +137,7 @@ fn keep_lowest<S: Simd>(simd: S, target: &mut [f32], source: &[f32]) {
 }
 
 #[inline(always)]
-fn keep_highest<S: Simd>(simd: S, target: &mut [f32], source: &[f32]) {
+fn assign_max<S: Simd>(simd: S, target: &mut [f32], source: &[f32]) {
     assert_eq!(target.len(), source.len());
     let ((targets, target), (sources, source)) = (S::as_mut_simd_f32s(target), S::as_simd_f32s(source));
     for (target, &source) in targets.iter_mut().zip(sources) {

@@ -12,7 +12,7 @@ use crate::compute::simd::prefetch;
 pub const STRIP: usize = 32;
 
 /// A picture of `CH` planes, row by row: `[row][plane][stride]`, each plane row with `pad` columns on both sides.
-pub struct Rows<const CH: usize> {
+pub struct PlanarRows<const CH: usize> {
     pub data: Aligned,
     /// Values from one plane row to the next.
     pub stride: usize,
@@ -20,7 +20,7 @@ pub struct Rows<const CH: usize> {
     pub pad: usize,
 }
 
-impl<const CH: usize> Rows<CH> {
+impl<const CH: usize> PlanarRows<CH> {
     /// Allocates zeros, with `width` rounded up to whole tiles.
     pub fn new(width: usize, height: usize, pad: usize) -> Self {
         let stride = width.next_multiple_of(TILE_W) + 2 * pad;
@@ -41,7 +41,7 @@ impl<const CH: usize> Rows<CH> {
 
 /// Repeats the outermost pixels of a plane row to both sides.
 #[inline(always)]
-pub fn repeat_ends(plane: &mut [f32], pad: usize, width: usize) {
+pub fn repeat_edges(plane: &mut [f32], pad: usize, width: usize) {
     let (first, last) = (plane[pad], plane[pad + width - 1]);
     plane[..pad].fill(first);
     plane[pad + width..].fill(last);
@@ -50,7 +50,7 @@ pub fn repeat_ends(plane: &mut [f32], pad: usize, width: usize) {
 /// The coarse grid of a bin: one value per cell of `CELL` x `CELL` bin pixels, row by row.
 ///
 /// Planes: 0 coverage, 1 coverage times |CoC|, 2 to 4 lowest colour, 5 to 7 highest colour.
-pub struct Cells {
+pub struct CellGrid {
     /// `[row][plane][width]`.
     pub data: Vec<f32>,
     pub width: usize,
@@ -59,13 +59,13 @@ pub struct Cells {
 
 /// Lowest colour (and, negated, highest colour) of an empty cell.
 pub const NO_COLOR: f32 = 1e30;
-/// Planes of [`Cells`].
+/// Planes of [`CellGrid`].
 pub const CELL_PLANES: usize = 8;
 
 /// Initial values of an empty cell.
 pub const EMPTY_CELL: [f32; CELL_PLANES] = [0.0, 0.0, NO_COLOR, NO_COLOR, NO_COLOR, -NO_COLOR, -NO_COLOR, -NO_COLOR];
 
-impl Cells {
+impl CellGrid {
     /// Creates an empty grid over `width` x `height` bin pixels (`width` in whole tiles).
     pub fn new(width: usize, height: usize) -> Self {
         let mut cells = Self { data: Vec::new(), width: 0, height: 0 };
@@ -89,7 +89,7 @@ impl Cells {
 }
 
 /// Filter parameters at every segment edge, per row of cells: `[row][edge][EDGE_VALUES]`.
-pub struct Edges {
+pub struct SegmentEdges {
     /// Radius in bin pixels, lowest colour (3), highest colour (3), unused.
     pub data: Vec<f32>,
     /// Edges across: one more than segments.
@@ -102,16 +102,16 @@ pub const EDGE_VALUES: usize = 8;
 /// Edges of a strip.
 pub const STRIP_EDGES: usize = STRIP / SEGMENT + 1;
 
-impl Edges {
+impl SegmentEdges {
     /// Creates the edges of a grid of cells.
-    pub fn new(cells: &Cells) -> Self {
+    pub fn new(cells: &CellGrid) -> Self {
         let mut edges = Self { data: Vec::new(), across: 0, height: 0 };
         edges.reshape(cells);
         edges
     }
 
     /// Resizes the edges; their content is unspecified afterwards.
-    pub fn reshape(&mut self, cells: &Cells) {
+    pub fn reshape(&mut self, cells: &CellGrid) {
         (self.across, self.height) = (cells.width * CELL / SEGMENT + 1, cells.height);
         self.data.resize(self.across * self.height * EDGE_VALUES, 0.0);
     }
@@ -124,7 +124,7 @@ impl Edges {
         // for NaN.
         let cell_y = if cell_y < 0.0 { 0.0 } else { cell_y };
         let above = (cell_y as usize).min(self.height - 1);
-        let share = cell_y - above as f32;
+        let fraction = cell_y - above as f32;
         let below = (above + 1).min(self.height - 1);
         let row = |row: usize| {
             &self.data[(row * self.across + strip * (STRIP_EDGES - 1)) * EDGE_VALUES..][..STRIP_EDGES * EDGE_VALUES]
@@ -133,7 +133,7 @@ impl Edges {
         let mut values = [[0.0; EDGE_VALUES]; STRIP_EDGES];
         let flat = values.as_flattened_mut();
         for k in 0..STRIP_EDGES * EDGE_VALUES {
-            flat[k] = above[k] + (below[k] - above[k]) * share;
+            flat[k] = above[k] + (below[k] - above[k]) * fraction;
         }
         values
     }
@@ -147,7 +147,7 @@ pub struct Strips {
 }
 
 /// Columns that are copied at once.
-pub const PIECE: usize = 16;
+pub const COPY_WIDTH: usize = 16;
 /// Values of a row of a strip.
 pub const STRIP_ROW: usize = 4 * STRIP;
 /// Values of a strip in a row of cells.
@@ -165,10 +165,10 @@ impl Strips {
     pub fn prefetch_line(&self, strip: usize, y: usize, pad: usize) {
         let first = (strip * STRIP).saturating_sub(pad);
         let end = ((strip + 1) * STRIP + pad).min(self.across * STRIP);
-        for x in (first..end).step_by(PIECE) {
+        for x in (first..end).step_by(COPY_WIDTH) {
             let row = self.row(x / STRIP, y);
             for p in 0..4 {
-                prefetch(&row[p * STRIP + x % STRIP..][..PIECE]);
+                prefetch(&row[p * STRIP + x % STRIP..][..COPY_WIDTH]);
             }
         }
     }
@@ -178,16 +178,16 @@ impl Strips {
     #[inline(always)]
     pub fn copy_line(&self, strip: usize, y: usize, width: usize, pad: usize, line: &mut [f32]) {
         let span = STRIP + 2 * pad;
-        for at in (0..span).step_by(PIECE) {
+        for at in (0..span).step_by(COPY_WIDTH) {
             let x = (strip * STRIP + at) as isize - pad as isize;
             // A piece is inside one strip; past the picture's last column there may be strips without real columns.
             let inside = x.clamp(0, width as isize - 1) as usize;
             let row = self.row(inside / STRIP, y);
             for p in 0..4 {
-                let out = &mut line[p * span + at..][..PIECE];
+                let out = &mut line[p * span + at..][..COPY_WIDTH];
                 let plane = &row[p * STRIP..][..STRIP];
                 if x >= 0 && x as usize / STRIP == inside / STRIP {
-                    out.copy_from_slice(&plane[x as usize % STRIP..][..PIECE]);
+                    out.copy_from_slice(&plane[x as usize % STRIP..][..COPY_WIDTH]);
                 } else {
                     out.fill(plane[inside % STRIP]);
                 }
@@ -202,11 +202,11 @@ pub struct Slot {
     /// Result of the pass `bin`.
     pub source: Strips,
     /// The coarse grid with the bin's coverage.
-    pub cells: Cells,
+    pub cells: CellGrid,
     /// Per row of cells and block, whether `source` has any non-zero values.
     pub filled: Vec<bool>,
     /// Radius and colour range within the filter support.
-    pub edges: Edges,
+    pub edges: SegmentEdges,
     /// The blurred bin, `[strip][row][4][STRIP]`: premultiplied colour and coverage.
     pub out: Aligned,
     /// Per strip and row of cells, whether `out` has any non-zero values.
@@ -234,16 +234,16 @@ impl Slot {
 
     /// Allocates zeros for the largest bin of the slot; the system provides pages only as frames touch them.
     pub fn new(plan: &Plan, slot: usize) -> Self {
-        let scale = plan.least_scale(slot);
+        let scale = plan.min_scale(slot);
         let (width, height) = (plan.width.div_ceil(scale), plan.height.div_ceil(scale));
         let strips = width.div_ceil(STRIP);
-        let cells = Cells::new(width, height);
+        let cells = CellGrid::new(width, height);
         let rows_of_cells = height.div_ceil(CELL);
         Self {
             index: slot,
             source: Strips { data: Aligned::zeros(strips * rows_of_cells * STRIP_CELLS), across: 0 },
             filled: vec![false; plan.width.div_ceil(BLOCK) * rows_of_cells],
-            edges: Edges::new(&cells),
+            edges: SegmentEdges::new(&cells),
             cells,
             out: Aligned::zeros(strips * height * 4 * STRIP),
             active: vec![false; strips * rows_of_cells],
@@ -275,7 +275,7 @@ impl Slot {
     }
 
     /// Returns the number of values that the current shape uses: of `source`, and of `out`.
-    pub fn used(&self, bin: &Bin) -> (usize, usize) {
+    pub fn used_len(&self, bin: &Bin) -> (usize, usize) {
         let across = self.source.across;
         (across * bin.height.div_ceil(CELL) * STRIP_CELLS, across * bin.height * STRIP_ROW)
     }

@@ -8,42 +8,42 @@
 use pulp::Simd;
 
 use super::tiles::BLOCK;
-use super::unpack::{Piece, Surfaces};
+use super::unpack::{PixelRun, Surfaces};
 use crate::bokeh::plan::{BinWeight, HIDING_WEIGHT};
-use crate::compute::aligned::Line;
+use crate::compute::aligned::CacheAligned;
 use crate::compute::simd::{fma, load, store};
 
 /// Columns on both sides of a block that its averages include.
 pub const MARGIN: usize = 16;
 /// Columns of a block and its margins.
-pub const WIDE: usize = BLOCK + 2 * MARGIN;
+pub const PADDED_BLOCK: usize = BLOCK + 2 * MARGIN;
 /// Length of a plane of a block: one cache line more than needed, because planes at multiples of 4096 bytes conflict.
-pub const PLANE: usize = BLOCK + 16;
+pub const PLANE_LEN: usize = BLOCK + 16;
 /// Planes of a sum: premultiplied colour, coverage, coverage times |CoC|.
-pub const SUMS: usize = 5;
+pub const SUM_PLANES: usize = 5;
 
 /// A row of a block of the bin: the planes of a sum.
-pub type Means = Line<[[f32; PLANE]; SUMS]>;
+pub type Means = CacheAligned<[[f32; PLANE_LEN]; SUM_PLANES]>;
 
 /// Adds a weighted row to two rows of sums, or starts them if they are `fresh`. Vertically, the tent falls for one row
 /// of the bin while it rises for the next, so a row of the picture is read once and never stored, at any scale.
 #[inline(always)]
-pub fn sum_row<S: Simd>(
+pub fn accumulate_row<S: Simd>(
     simd: S,
-    weight: &WeightAt<S>,
-    surfaces: &Surfaces<WIDE>,
+    weight: &VectorWeight<S>,
+    surfaces: &Surfaces<PADDED_BLOCK>,
     columns: usize,
     weights: [f32; 2],
-    rows: [&mut [[f32; WIDE]; SUMS]; 2],
+    rows: [&mut [[f32; PADDED_BLOCK]; SUM_PLANES]; 2],
     fresh: [bool; 2],
 ) {
     let zero = simd.splat_f32s(0.0);
     let weights = [simd.splat_f32s(weights[0]), simd.splat_f32s(weights[1])];
     let [above, below] = rows;
     for x in (0..columns + 2 * MARGIN).step_by(S::F32_LANES) {
-        let taken = weight.at_surfaces(simd, surfaces, x);
+        let taken = weight.surface_weights(simd, surfaces, x);
         if is_zero(simd, taken) {
-            for p in 0..SUMS {
+            for p in 0..SUM_PLANES {
                 if fresh[0] {
                     store::<S>(&mut above[p], x, zero);
                 }
@@ -54,7 +54,7 @@ pub fn sum_row<S: Simd>(
             continue;
         }
         let values = weight.apply(simd, taken, surfaces, x);
-        for p in 0..SUMS {
+        for p in 0..SUM_PLANES {
             let falling = if fresh[0] { zero } else { load::<S>(&above[p], x) };
             let rising = if fresh[1] { zero } else { load::<S>(&below[p], x) };
             store::<S>(&mut above[p], x, fma(simd, values[p], weights[0], falling));
@@ -64,11 +64,11 @@ pub fn sum_row<S: Simd>(
 }
 
 /// Weight of a bin, prepared for vectors.
-pub struct WeightAt<S: Simd> {
+pub struct VectorWeight<S: Simd> {
     steps: Option<[[S::f32s; 2]; 2]>,
 }
 
-impl<S: Simd> WeightAt<S> {
+impl<S: Simd> VectorWeight<S> {
     #[inline(always)]
     pub fn new(simd: S, weight: &Option<BinWeight>) -> Self {
         // A step at `at` with a slope: slope c + (1/2 - slope at).
@@ -79,7 +79,7 @@ impl<S: Simd> WeightAt<S> {
     /// Returns the weights of a vector of pixels: of their only or farther surface, and of the nearer one where some
     /// have two.
     #[inline(always)]
-    pub fn at_surfaces(&self, simd: S, surfaces: &Surfaces<WIDE>, x: usize) -> [S::f32s; 2] {
+    pub fn surface_weights(&self, simd: S, surfaces: &Surfaces<PADDED_BLOCK>, x: usize) -> [S::f32s; 2] {
         let back = self.at(simd, &surfaces.back, x);
         [back, if surfaces.mixed { self.at(simd, &surfaces.front, x) } else { back }]
     }
@@ -87,7 +87,13 @@ impl<S: Simd> WeightAt<S> {
     /// Returns premultiplied colour, coverage, and coverage times |CoC| of a vector of pixels with weights `taken`, for
     /// one or two surfaces.
     #[inline(always)]
-    pub fn apply(&self, simd: S, taken: [S::f32s; 2], surfaces: &Surfaces<WIDE>, x: usize) -> [S::f32s; SUMS] {
+    pub fn apply(
+        &self,
+        simd: S,
+        taken: [S::f32s; 2],
+        surfaces: &Surfaces<PADDED_BLOCK>,
+        x: usize,
+    ) -> [S::f32s; SUM_PLANES] {
         let back = scale_surface(simd, taken[0], &surfaces.back, x);
         if !surfaces.mixed {
             return back;
@@ -100,7 +106,7 @@ impl<S: Simd> WeightAt<S> {
         let hidden = simd.min_f32s(simd.mul_f32s(simd.splat_f32s(1.0 / HIDING_WEIGHT), front[3]), one);
         let behind = simd.sub_f32s(behind, simd.mul_f32s(unseen, hidden));
         let mut both = back;
-        for p in 0..SUMS {
+        for p in 0..SUM_PLANES {
             both[p] = fma(simd, alpha, front[p], simd.mul_f32s(behind, back[p]));
         }
         both
@@ -108,10 +114,10 @@ impl<S: Simd> WeightAt<S> {
 
     /// Returns the weights of a vector of pixels of one surface.
     #[inline(always)]
-    fn at(&self, simd: S, piece: &Piece<WIDE>, x: usize) -> S::f32s {
+    fn at(&self, simd: S, pixels: &PixelRun<PADDED_BLOCK>, x: usize) -> S::f32s {
         let [zero, one] = [simd.splat_f32s(0.0), simd.splat_f32s(1.0)];
         let Some([up, down]) = &self.steps else { return one };
-        let coc = load::<S>(&piece.0[3], x);
+        let coc = load::<S>(&pixels.0[3], x);
         let up = simd.min_f32s(simd.max_f32s(fma(simd, coc, up[0], up[1]), zero), one);
         let down = simd.min_f32s(simd.max_f32s(fma(simd, coc, down[0], down[1]), zero), one);
         simd.sub_f32s(up, down)
@@ -125,21 +131,31 @@ pub fn is_zero<S: Simd>(simd: S, taken: [S::f32s; 2]) -> bool {
     simd.first_true_m32s(any) == S::F32_LANES
 }
 
-/// Multiplies a vector of pixels of one surface by their weights, in the layout of [`WeightAt::apply`].
+/// Multiplies a vector of pixels of one surface by their weights, in the layout of [`VectorWeight::apply`].
 #[inline(always)]
-fn scale_surface<S: Simd>(simd: S, weight: S::f32s, piece: &Piece<WIDE>, x: usize) -> [S::f32s; SUMS] {
-    let mut values = [weight; SUMS];
+fn scale_surface<S: Simd>(
+    simd: S,
+    weight: S::f32s,
+    pixels: &PixelRun<PADDED_BLOCK>,
+    x: usize,
+) -> [S::f32s; SUM_PLANES] {
+    let mut values = [weight; SUM_PLANES];
     for p in 0..3 {
-        values[p] = simd.mul_f32s(weight, load::<S>(&piece.0[p], x));
+        values[p] = simd.mul_f32s(weight, load::<S>(&pixels.0[p], x));
     }
-    values[4] = simd.mul_f32s(weight, simd.abs_f32s(load::<S>(&piece.0[3], x)));
+    values[4] = simd.mul_f32s(weight, simd.abs_f32s(load::<S>(&pixels.0[3], x)));
     values
 }
 
 /// Applies the tent horizontally: a row of sums at the bin's scale. Weights repeat every `S` columns, so rise and fall
 /// fit in one vector each, and the remaining sums are over runs of `S` values.
 #[inline(always)]
-pub fn reduce<V: Simd, const S: usize>(simd: V, sums: &[[f32; WIDE]; SUMS], columns: usize, means: &mut Means) {
+pub fn downscale_row<V: Simd, const S: usize>(
+    simd: V,
+    sums: &[[f32; PADDED_BLOCK]; SUM_PLANES],
+    columns: usize,
+    means: &mut Means,
+) {
     // Rising half of the tent, repeated; the falling half follows from it.
     let ramp: [f32; BLOCK] = const {
         let mut ramp = [0.0; BLOCK];
@@ -157,7 +173,7 @@ pub fn reduce<V: Simd, const S: usize>(simd: V, sums: &[[f32; WIDE]; SUMS], colu
         }
         load::<V>(&fall, 0)
     });
-    let mut weighed = Line([0.0f32; BLOCK]);
+    let mut weighed = CacheAligned([0.0f32; BLOCK]);
     for (mean, sum) in means.0.iter_mut().zip(sums) {
         let start = MARGIN - S / 2;
         for x in (0..columns).step_by(V::F32_LANES) {

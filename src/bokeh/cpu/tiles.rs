@@ -1,7 +1,7 @@
 //! Tile classification before any colour is read: the CoC range of every tile, and the tiles that stay unchanged.
 
 use super::pixels::Radii;
-use super::unpack::{Source, coc_row};
+use super::unpack::{InputFrame, compute_coc_row};
 use crate::bokeh::plan::BinWeight;
 use crate::optics::CocField;
 
@@ -13,7 +13,7 @@ pub const BLOCK: usize = 4 * TILE_W;
 pub const TILE_H: usize = 8;
 /// Neighbourhood that can change a tile, in tiles: the widest filter at full scale of the bin in focus, and the cells
 /// over which its radius is averaged.
-const AROUND: (usize, usize) = (1, 3);
+const NEIGHBOURHOOD: (usize, usize) = (1, 3);
 /// Filters of a smaller radius have one tap, in pixels.
 const SHARP_PX: f32 = 0.4;
 
@@ -46,7 +46,7 @@ impl Tiles {
     }
 
     /// Finds the tiles that stay unchanged, after all ranges are known.
-    pub fn settle(&mut self, enabled: bool) {
+    pub fn classify(&mut self, enabled: bool) {
         let sharp = |&(low, high): &(f32, f32)| low >= -SHARP_PX && high <= SHARP_PX;
         self.idle.iter_mut().zip(&self.ranges).for_each(|(tile, range)| *tile = enabled && sharp(range));
         let size = (self.across, self.down);
@@ -55,7 +55,7 @@ impl Tiles {
     }
 
     /// Whether the weight is below 1 at the lowest CoC of any of these tiles.
-    pub fn any_outside(
+    pub fn any_partly_outside(
         &self,
         weight: &BinWeight,
         columns: std::ops::Range<usize>,
@@ -69,7 +69,7 @@ impl Tiles {
     }
 
     /// Whether the weight is above 0 for any CoC of these tiles; their columns and rows are clamped to the picture.
-    pub fn any_within(
+    pub fn any_overlapping(
         &self,
         weight: &BinWeight,
         columns: std::ops::Range<usize>,
@@ -80,21 +80,21 @@ impl Tiles {
             let at = row * self.across;
             let tiles = &self.ranges[at + columns.start..at + columns.end];
             let idle = &self.idle[at + columns.start..at + columns.end];
-            tiles.iter().zip(idle).any(|(&range, &idle)| !idle && weight.meets(range))
+            tiles.iter().zip(idle).any(|(&range, &idle)| !idle && weight.overlaps(range))
         })
     }
 }
 
 /// Computes the CoC ranges of a row of tiles.
-pub struct Survey<'a> {
-    pub source: &'a Source<'a>,
+pub struct ComputeTileRanges<'a> {
+    pub source: &'a InputFrame<'a>,
     pub row: usize,
     pub ranges: &'a mut [(f32, f32)],
     /// Scratch for one row of the picture.
     pub coc: &'a mut [f32],
 }
 
-impl pulp::WithSimd for Survey<'_> {
+impl pulp::WithSimd for ComputeTileRanges<'_> {
     type Output = ();
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, _: S) {
@@ -111,14 +111,14 @@ impl pulp::WithSimd for Survey<'_> {
             let values = match direct {
                 Some((_, map)) => &map.metres[y * width..][..width],
                 None => {
-                    coc_row(self.source, y, 0, self.coc);
+                    compute_coc_row(self.source, y, 0, self.coc);
                     &*self.coc
                 }
             };
             for (range, values) in self.ranges.iter_mut().zip(values.chunks(TILE_W)) {
                 // Unknown depth counts as infinite.
                 let unknown = |value: f32| direct.is_some() && (value <= 0.0 || value.is_nan());
-                widen(range, values, |value| if unknown(value) { f32::INFINITY } else { value });
+                extend_range(range, values, |value| if unknown(value) { f32::INFINITY } else { value });
             }
         }
         if let Some(matte) = self.source.matte {
@@ -136,7 +136,7 @@ impl pulp::WithSimd for Survey<'_> {
 
 /// Widens a range by some values, each mapped by `of`.
 #[inline(always)]
-pub fn widen(range: &mut (f32, f32), values: &[f32], of: impl Fn(f32) -> f32) {
+pub fn extend_range(range: &mut (f32, f32), values: &[f32], of: impl Fn(f32) -> f32) {
     let (mut low, mut high) = ([f32::INFINITY; 16], [f32::NEG_INFINITY; 16]);
     let (vectors, rest) = values.as_chunks::<16>();
     for values in vectors {
@@ -164,13 +164,13 @@ pub fn widen(range: &mut (f32, f32), values: &[f32], of: impl Fn(f32) -> f32) {
 fn erode(from: &[bool], scratch: &mut [bool], to: &mut [bool], (across, down): (usize, usize)) {
     for (row, out) in from.chunks_exact(across).zip(scratch.chunks_exact_mut(across)) {
         for (x, out) in out.iter_mut().enumerate() {
-            *out = row[x.saturating_sub(AROUND.0)..(x + AROUND.0 + 1).min(across)].iter().all(|&set| set);
+            *out = row[x.saturating_sub(NEIGHBOURHOOD.0)..(x + NEIGHBOURHOOD.0 + 1).min(across)].iter().all(|&set| set);
         }
     }
     for y in 0..down {
         for x in 0..across {
-            to[y * across + x] =
-                (y.saturating_sub(AROUND.1)..(y + AROUND.1 + 1).min(down)).all(|y| scratch[y * across + x]);
+            to[y * across + x] = (y.saturating_sub(NEIGHBOURHOOD.1)..(y + NEIGHBOURHOOD.1 + 1).min(down))
+                .all(|y| scratch[y * across + x]);
         }
     }
 }

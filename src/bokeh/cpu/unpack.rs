@@ -9,7 +9,7 @@ use pulp::Simd;
 use super::pixels::{Pixels, Radii};
 use crate::bokeh::plan::Plan;
 use crate::color::luminance;
-use crate::compute::aligned::Line;
+use crate::compute::aligned::CacheAligned;
 use crate::compute::simd::{madd, prefetch};
 use crate::frame::Matte;
 use crate::optics::CocField;
@@ -17,7 +17,7 @@ use crate::optics::CocField;
 /// Polynomial approximation of [`srgb_to_linear`](crate::color::srgb_to_linear) for 8-bit values, which vectors can
 /// evaluate: off by less than 3e-5, or 0.004 of the step to the next code.
 #[inline(always)]
-pub fn decode<S: Simd>(code: u8) -> f32 {
+pub fn decode_srgb<S: Simd>(code: u8) -> f32 {
     const CURVE: [f32; 5] = [-0.533_835_2, 0.768_090_4, 0.499_064_57, 0.034_400_677, 0.000_875_118];
     let x = f32::from(code) * (1.0 / 255.0);
     let mut light = madd::<S>(-0.085_403_08, x, 0.316_778_17);
@@ -32,19 +32,19 @@ pub fn decode<S: Simd>(code: u8) -> f32 {
 /// With `expansion = 1 + 1/M`, white becomes `M + 1` times as bright as it looks. All channels share the factor, so
 /// that the hue stays.
 #[inline(always)]
-pub fn expand(luminance: f32, expansion: f32) -> f32 {
+pub fn expansion_factor(luminance: f32, expansion: f32) -> f32 {
     expansion / (expansion - luminance)
 }
 
-/// Returns the factor that reverses [`expand`], for a colour of this expanded luminance.
+/// Returns the factor that reverses [`expansion_factor`], for a colour of this expanded luminance.
 #[inline(always)]
-pub fn compress(luminance: f32, expansion: f32) -> f32 {
+pub fn compression_factor(luminance: f32, expansion: f32) -> f32 {
     expansion / (expansion + luminance)
 }
 
 /// The input frame.
 #[derive(Clone, Copy)]
-pub struct Source<'a> {
+pub struct InputFrame<'a> {
     /// Columns and rows.
     pub size: (usize, usize),
     pub pixels: Pixels<'a>,
@@ -56,18 +56,18 @@ pub struct Source<'a> {
 }
 
 /// Some pixels of a row: linear light r, g, b and CoC.
-pub type Piece<const W: usize> = Line<[[f32; W]; 4]>;
+pub type PixelRun<const W: usize> = CacheAligned<[[f32; W]; 4]>;
 
 /// Some pixels of a row, each with one surface or two.
 pub struct Surfaces<const W: usize> {
     /// The only surface of a pixel, or the farther of two.
-    pub back: Piece<W>,
+    pub back: PixelRun<W>,
     /// The nearer of two; valid only if `mixed`, and where its alpha is above 0.
-    pub front: Piece<W>,
+    pub front: PixelRun<W>,
     /// Alpha of the nearer surface.
-    pub alpha: Line<[f32; W]>,
+    pub alpha: CacheAligned<[f32; W]>,
     /// Known fraction of the farther surface.
-    pub behind: Line<[f32; W]>,
+    pub behind: CacheAligned<[f32; W]>,
     /// Whether any pixel here has two surfaces.
     pub mixed: bool,
 }
@@ -75,13 +75,13 @@ pub struct Surfaces<const W: usize> {
 impl<const W: usize> Surfaces<W> {
     /// Creates surfaces without mixed pixels.
     pub fn new() -> Self {
-        let [back, front] = [Line([[0.0; W]; 4]); 2];
-        Self { back, front, alpha: Line([0.0; W]), behind: Line([1.0; W]), mixed: false }
+        let [back, front] = [CacheAligned([[0.0; W]; 4]); 2];
+        Self { back, front, alpha: CacheAligned([0.0; W]), behind: CacheAligned([1.0; W]), mixed: false }
     }
 
     /// Returns both surfaces composited, with the CoC of the one that covers more.
     #[inline(always)]
-    pub fn shown(&self) -> Piece<W> {
+    pub fn composite_surfaces(&self) -> PixelRun<W> {
         let mut shown = self.back;
         for (p, plane) in shown.0.iter_mut().enumerate() {
             for (x, value) in plane.iter_mut().enumerate() {
@@ -94,7 +94,7 @@ impl<const W: usize> Surfaces<W> {
     }
 
     /// Returns a composited pixel: linear r, g, b, and the CoC of the nearer surface.
-    pub fn pixel(&self, x: usize) -> [f32; 4] {
+    pub fn composite_pixel(&self, x: usize) -> [f32; 4] {
         let back = self.back.0.each_ref().map(|plane| plane[x]);
         if !self.mixed || self.alpha.0[x] <= 0.0 {
             return back;
@@ -104,7 +104,7 @@ impl<const W: usize> Surfaces<W> {
     }
 }
 
-impl<'a> Source<'a> {
+impl<'a> InputFrame<'a> {
     /// Creates the input frame of a plan.
     pub fn new(plan: &Plan, pixels: Pixels<'a>, coc: Radii<'a>) -> Self {
         let matte = match coc {
@@ -137,7 +137,7 @@ impl<'a> Source<'a> {
                 }
                 for (plane, codes) in [red, green, blue].into_iter().zip(&codes) {
                     for (light, &code) in plane[before..end].iter_mut().zip(codes) {
-                        *light = decode::<S>(code);
+                        *light = decode_srgb::<S>(code);
                     }
                 }
             }
@@ -145,19 +145,20 @@ impl<'a> Source<'a> {
                 let pixels = rgb[row][first * 3..].as_chunks::<3>().0[..count].iter();
                 let planes = red[before..].iter_mut().zip(&mut green[before..]).zip(&mut blue[before..]);
                 for (pixel, ((r, g), b)) in pixels.zip(planes) {
-                    (*r, *g, *b) = (Pixels::light(pixel[0]), Pixels::light(pixel[1]), Pixels::light(pixel[2]));
+                    (*r, *g, *b) =
+                        (Pixels::clamp_light(pixel[0]), Pixels::clamp_light(pixel[1]), Pixels::clamp_light(pixel[2]));
                 }
             }
         }
-        coc_row(self, y, first, &mut coc[before..end]);
+        compute_coc_row(self, y, first, &mut coc[before..end]);
         if self.expansion.is_finite() {
             let [red, green, blue, _] = &mut surfaces.back.0;
             for x in 0..columns {
-                let factor = expand(luminance(red[x], green[x], blue[x]), self.expansion);
+                let factor = expansion_factor(luminance(red[x], green[x], blue[x]), self.expansion);
                 (red[x], green[x], blue[x]) = (red[x] * factor, green[x] * factor, blue[x] * factor);
             }
         }
-        self.unmix(y * width + first..y * width + first + count, before, surfaces);
+        self.separate_surfaces(y * width + first..y * width + first + count, before, surfaces);
         if before > 0 || end < columns {
             let Surfaces { back, front, alpha, behind, mixed } = surfaces;
             let twos = front.0.iter_mut().chain([&mut alpha.0, &mut behind.0]).filter(|_| *mixed);
@@ -169,7 +170,7 @@ impl<'a> Source<'a> {
         }
     }
 
-    /// Prefetches the memory that [`Source::unpack`] reads of row `y`.
+    /// Prefetches the memory that [`InputFrame::unpack`] reads of row `y`.
     #[inline(always)]
     pub fn prefetch(&self, y: usize, x0: isize, columns: usize) {
         let (width, height) = self.size;
@@ -191,7 +192,7 @@ impl<'a> Source<'a> {
     /// Separates the mixed pixels in `range` into their surfaces; the first pixel of the range is at index `at` of the
     /// surfaces.
     #[inline(always)]
-    fn unmix<const W: usize>(&self, range: Range<usize>, at: usize, surfaces: &mut Surfaces<W>) {
+    fn separate_surfaces<const W: usize>(&self, range: Range<usize>, at: usize, surfaces: &mut Surfaces<W>) {
         surfaces.mixed = false;
         let (Radii::Field(CocField::Depth(lens), _), Some(matte)) = (self.coc, self.matte) else { return };
         let start = range.start;
@@ -206,7 +207,7 @@ impl<'a> Source<'a> {
             let x = at + pixel.at as usize - start;
             // Both colours get the highlight factor of the pixel, so that they composite to it again.
             let factor = match self.expansion.is_finite() {
-                true => compress(luminance(back.0[0][x], back.0[1][x], back.0[2][x]), self.expansion).recip(),
+                true => compression_factor(luminance(back.0[0][x], back.0[1][x], back.0[2][x]), self.expansion).recip(),
                 false => 1.0,
             };
             (alpha.0[x], behind.0[x]) = (pixel.alpha, pixel.behind);
@@ -223,7 +224,7 @@ impl<'a> Source<'a> {
 
 /// Computes the CoC of the pixels of row `y` from column `x0` on.
 #[inline(always)]
-pub fn coc_row(source: &Source<'_>, y: usize, x0: usize, coc: &mut [f32]) {
+pub fn compute_coc_row(source: &InputFrame<'_>, y: usize, x0: usize, coc: &mut [f32]) {
     let (width, height) = source.size;
     let (field, depth) = match source.coc {
         Radii::Field(field, depth) => (field, depth),
@@ -232,14 +233,14 @@ pub fn coc_row(source: &Source<'_>, y: usize, x0: usize, coc: &mut [f32]) {
     match (field, depth) {
         (CocField::Depth(lens), Some(map)) if !map.metres.is_empty() => {
             let (w, h) = (map.width as usize, map.height as usize);
-            let row = &map.metres[nearest(y, height, h) * w..][..w];
+            let row = &map.metres[nearest_sample(y, height, h) * w..][..w];
             if w == width {
                 for (coc, &metres) in coc.iter_mut().zip(&row[x0..]) {
                     *coc = lens.coc_px(metres);
                 }
             } else {
                 for (x, coc) in coc.iter_mut().enumerate() {
-                    *coc = lens.coc_px(row[nearest(x0 + x, width, w)]);
+                    *coc = lens.coc_px(row[nearest_sample(x0 + x, width, w)]);
                 }
             }
         }
@@ -255,7 +256,7 @@ pub fn coc_row(source: &Source<'_>, y: usize, x0: usize, coc: &mut [f32]) {
 
 /// Returns the sample, of a row of `of` values, at pixel `index` of `pixels`.
 #[inline(always)]
-pub fn nearest(index: usize, pixels: usize, of: usize) -> usize {
+pub fn nearest_sample(index: usize, pixels: usize, of: usize) -> usize {
     ((2 * index + 1) * of / (2 * pixels)).min(of - 1)
 }
 
@@ -269,26 +270,29 @@ mod tests {
         for expansion in [1.0 + 1.0 / 8.0, 1.5] {
             for step in 0..=100 {
                 let light = step as f32 / 100.0;
-                let expanded = light * expand(light, expansion);
-                assert!((expanded * compress(expanded, expansion) - light).abs() < 1e-5, "{expansion} {light}");
+                let expanded = light * expansion_factor(light, expansion);
+                assert!(
+                    (expanded * compression_factor(expanded, expansion) - light).abs() < 1e-5,
+                    "{expansion} {light}"
+                );
             }
         }
-        assert_eq!(expand(0.0, 1.125), 1.0);
-        assert!((expand(1.0, 1.0 + 1.0 / 8.0) - 9.0).abs() < 1e-4);
+        assert_eq!(expansion_factor(0.0, 1.125), 1.0);
+        assert!((expansion_factor(1.0, 1.0 + 1.0 / 8.0) - 9.0).abs() < 1e-4);
     }
 
     #[test]
     fn the_polynomial_is_the_curve() {
         for code in 0..=255u8 {
             let exact = srgb_to_linear(f32::from(code) / 255.0);
-            assert!((decode::<pulp::Scalar>(code) - exact).abs() < 3e-5, "{code}");
-            assert_eq!((linear_to_srgb(decode::<pulp::Scalar>(code)) * 255.0).round() as u8, code);
+            assert!((decode_srgb::<pulp::Scalar>(code) - exact).abs() < 3e-5, "{code}");
+            assert_eq!((linear_to_srgb(decode_srgb::<pulp::Scalar>(code)) * 255.0).round() as u8, code);
         }
     }
 
     #[test]
     fn a_smaller_depth_map_covers_the_same_view() {
-        assert_eq!((0..6).map(|x| nearest(x, 6, 3)).collect::<Vec<_>>(), [0, 0, 1, 1, 2, 2]);
-        assert_eq!((0..5).map(|x| nearest(x, 5, 5)).collect::<Vec<_>>(), [0, 1, 2, 3, 4]);
+        assert_eq!((0..6).map(|x| nearest_sample(x, 6, 3)).collect::<Vec<_>>(), [0, 0, 1, 1, 2, 2]);
+        assert_eq!((0..5).map(|x| nearest_sample(x, 5, 5)).collect::<Vec<_>>(), [0, 1, 2, 3, 4]);
     }
 }

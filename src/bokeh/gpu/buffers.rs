@@ -2,9 +2,9 @@
 
 use super::layout::Capacity;
 use super::shaders::{Bin, Frame, LIST_HEAD};
-use crate::bokeh::bank::Bank;
+use crate::bokeh::bank::FilterBank;
 use crate::bokeh::ladder::Compositing;
-use crate::bokeh::occlusion::{GRAIN, MAX_LAYERS};
+use crate::bokeh::occlusion::{MAX_LAYERS, SILHOUETTE_CELL};
 use crate::bokeh::plan::{MAX_BINS, Plan};
 use crate::compute::device::{Device, UNIFORM_STRIDE};
 use crate::frame::{Matte, MixedPixel};
@@ -26,10 +26,10 @@ pub struct Buffers {
     pub ranges: wgpu::Buffer,
     /// Silhouettes: radius per cell, dilated along rows, and dilated along both axes.
     pub marks: wgpu::Buffer,
-    pub along: wgpu::Buffer,
-    pub reached: wgpu::Buffer,
+    pub row_dilated: wgpu::Buffer,
+    pub dilated: wgpu::Buffer,
     /// The scene as a layer behind others sees it, inpainted.
-    pub behind: wgpu::Buffer,
+    pub inpainted: wgpu::Buffer,
     /// Pictures of all bins.
     pub source: wgpu::Buffer,
     /// Coarse grids of all bins.
@@ -53,13 +53,13 @@ pub struct Buffers {
     /// Known weight of each pixel of the pyramid.
     pub known: wgpu::Buffer,
     /// Filters of each bank.
-    pub banks: Vec<Filters>,
+    pub banks: Vec<BankBuffers>,
     /// Kernels of the exact gather, and the start of each node's kernel.
     pub kernels: [wgpu::Buffer; 2],
 }
 
 /// Filters of a bank.
-pub struct Filters {
+pub struct BankBuffers {
     pub terms: usize,
     /// Horizontal and vertical taps, four terms per vector.
     pub taps: [wgpu::Buffer; 2],
@@ -68,7 +68,7 @@ pub struct Filters {
 }
 
 /// Returns the bytes of a packed picture, in whole words of whole groups of four pixels.
-pub fn picture_bytes(plan: &Plan) -> u64 {
+pub fn packed_picture_bytes(plan: &Plan) -> u64 {
     (plan.width * plan.height).div_ceil(4) as u64 * 12
 }
 
@@ -79,9 +79,9 @@ pub fn work_count(plan: &Plan) -> usize {
 }
 
 /// Returns the bytes of the largest buffer of filters or kernels.
-pub fn filter_bytes(plan: &Plan) -> u64 {
-    let of_bank = |bank: &Bank| (bank.horizontal.len() / bank.terms * bank.terms.div_ceil(4) * 16) as u64;
-    let of_node = |&reach: &u32| u64::from(2 * reach + 1).pow(2) * 4;
+pub fn max_filter_bytes(plan: &Plan) -> u64 {
+    let of_bank = |bank: &FilterBank| (bank.horizontal.len() / bank.terms * bank.terms.div_ceil(4) * 16) as u64;
+    let of_node = |&half_width: &u32| u64::from(2 * half_width + 1).pow(2) * 4;
     let kernels = if plan.exact { plan.bank.node_half_width.iter().map(of_node).sum() } else { 0 };
     plan.ladder.banks.iter().map(|bank| of_bank(bank)).fold(kernels, u64::max)
 }
@@ -91,7 +91,7 @@ impl Buffers {
     pub fn new(device: &Device, plan: &Plan, capacity: &Capacity) -> Self {
         use wgpu::BufferUsages as Usage;
         let buffer = |label: &str, bytes: usize, usage: Usage| {
-            device.buffer(label, bytes.next_multiple_of(16), usage | Usage::COPY_DST)
+            device.create_buffer(label, bytes.next_multiple_of(16), usage | Usage::COPY_DST)
         };
         let with_data = |label: &str, data: &[u8], usage: Usage| {
             let target = buffer(label, data.len(), usage);
@@ -104,24 +104,24 @@ impl Buffers {
         let list = |label: &str, tiles: usize| storage(label, LIST_HEAD + 2 * tiles);
         let (width, height) = (plan.width, plan.height);
         let layered = plan.compositing == Compositing::Layers;
-        let pyramid_pixels = if layered { pyramid_pixels(width, height) } else { 1 };
+        let pyramid_pixels = if layered { count_pyramid_pixels(width, height) } else { 1 };
         let (behind, tiles) = (if layered { width * height } else { 1 }, width.div_ceil(16) * height.div_ceil(16));
-        let grid = if layered { width.div_ceil(GRAIN) * height.div_ceil(GRAIN) } else { 1 };
+        let grid = if layered { width.div_ceil(SILHOUETTE_CELL) * height.div_ceil(SILHOUETTE_CELL) } else { 1 };
         let mixed = if layered { Matte::most(width, height).max(1) } else { 1 };
-        let (kernels, starts) = if plan.exact { kernels(&plan.bank) } else { (vec![0.0], vec![0]) };
+        let (kernels, starts) = if plan.exact { concatenate_kernels(&plan.bank) } else { (vec![0.0], vec![0]) };
         let work_bytes = work_count(plan) * UNIFORM_STRIDE as usize;
         Self {
             frame: buffer("frame", size_of::<Frame>(), Usage::UNIFORM),
             bins: buffer("bins", MAX_BINS * size_of::<Bin>(), Usage::UNIFORM),
             work: buffer("work", work_bytes, Usage::UNIFORM),
-            color: storage("color", picture_bytes(plan) as usize / 4),
+            color: storage("color", packed_picture_bytes(plan) as usize / 4),
             scene: storage("scene", width * height * 2),
             mixed: storage("mixed", mixed * size_of::<MixedPixel>() / 4),
             ranges: storage("ranges", tiles * 2),
             marks: storage("marks", grid * 4),
-            along: storage("along", grid * 4),
-            reached: storage("reached", grid * 4),
-            behind: storage("behind", behind * 2),
+            row_dilated: storage("along", grid * 4),
+            dilated: storage("reached", grid * 4),
+            inpainted: storage("behind", behind * 2),
             source: storage("source", capacity.pixels * 2),
             grid: storage("grid", capacity.cells * 8),
             edges: storage("edges", capacity.edges * 8),
@@ -131,7 +131,7 @@ impl Buffers {
             filtered: list("filtered", capacity.filtered),
             active: list("active", capacity.active),
             shown: storage("shown", tiles),
-            result: storage("result", picture_bytes(plan) as usize / 4),
+            result: storage("result", packed_picture_bytes(plan) as usize / 4),
             nearest_px: storage("nearest", if layered { width.div_ceil(2) * height.div_ceil(2) } else { 1 }),
             pyramid: storage("pyramid", pyramid_pixels * 4),
             known: storage("known", pyramid_pixels),
@@ -139,7 +139,7 @@ impl Buffers {
                 .ladder
                 .banks
                 .iter()
-                .map(|bank| Filters {
+                .map(|bank| BankBuffers {
                     terms: bank.terms,
                     taps: [&bank.horizontal, &bank.vertical].map(|taps| {
                         with_data("bank", bytemuck::cast_slice(&pad_to_fours(taps, bank.terms)), Usage::STORAGE)
@@ -159,8 +159,8 @@ impl Buffers {
     }
 
     /// Creates a buffer of `bytes` bytes for a depth map.
-    pub fn radii(device: &Device, bytes: u64) -> wgpu::Buffer {
-        device.buffer("radii", bytes as usize, wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST)
+    pub fn create_depth_buffer(device: &Device, bytes: u64) -> wgpu::Buffer {
+        device.create_buffer("radii", bytes as usize, wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST)
     }
 }
 
@@ -176,7 +176,7 @@ fn pad_to_fours(taps: &[f32], terms: usize) -> Vec<[f32; 4]> {
 
 /// Returns the number of stored pixels of the pyramid: all levels from a quarter of the picture's size to one pixel,
 /// and the result of directional inpainting for the first of them.
-fn pyramid_pixels(width: usize, height: usize) -> usize {
+fn count_pyramid_pixels(width: usize, height: usize) -> usize {
     let halved = |size: &[usize; 2]| size.map(|side| side.div_ceil(2));
     let finest = [width, height].map(|side| side.div_ceil(4));
     let levels = std::iter::successors(Some(finest), |level| (*level != [1, 1]).then(|| halved(level)));
@@ -184,7 +184,7 @@ fn pyramid_pixels(width: usize, height: usize) -> usize {
 }
 
 /// Returns the kernels of all nodes, one after the other, and the start of each.
-fn kernels(bank: &Bank) -> (Vec<f32>, Vec<u32>) {
+fn concatenate_kernels(bank: &FilterBank) -> (Vec<f32>, Vec<u32>) {
     let (mut taps, mut starts) = (Vec::new(), Vec::new());
     for node in 0..bank.nodes {
         starts.push(taps.len() as u32);

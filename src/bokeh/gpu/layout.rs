@@ -3,7 +3,7 @@
 use std::ops::Range;
 use std::sync::Arc;
 
-use super::shaders::{Bin, RESULT_TILE, ROWS_TILE, SHARED_FROM, TILE};
+use super::shaders::{Bin, RESULT_TILE, ROWS_TILE, SHARED_FROM_SCALE, TILE};
 use crate::bokeh::ladder::Compositing;
 use crate::bokeh::plan::{CELL, MAX_BINS, Plan, SEGMENT};
 
@@ -43,7 +43,7 @@ impl Capacity {
     /// Returns the elements that the bins of any frame need, at any quality level.
     pub fn for_plan(plan: &Plan) -> Self {
         if plan.compositing == Compositing::Layers {
-            return Self::for_scales(plan, (0..plan.slots()).map(|slot| plan.least_scale(slot)));
+            return Self::for_scales(plan, (0..plan.slot_count()).map(|slot| plan.min_scale(slot)));
         }
         // Otherwise a level has the same bins in every frame: the maximum over all levels suffices.
         let mut plan = plan.clone();
@@ -59,15 +59,15 @@ impl Capacity {
         let mut capacity = Self::default();
         for scale in scales {
             let (width, height) = (plan.width.div_ceil(scale), plan.height.div_ceil(scale));
-            let [cells, edges] = [cells(width, height), edges(width, height)].map(|[a, b]| a * b);
+            let [cells, edges] = [grid_size(width, height), edge_grid_size(width, height)].map(|[a, b]| a * b);
             capacity.pixels += width * height;
             capacity.rows = capacity.rows.max(width * height);
             capacity.cells += cells;
             capacity.edges += edges;
             let size = [width as u32, height as u32];
-            capacity.binned += binned_tiles(size, scale as u32);
-            capacity.filtered += tiles(size, ROWS_TILE);
-            capacity.active += tiles(size, RESULT_TILE);
+            capacity.binned += count_bin_tiles(size, scale as u32);
+            capacity.filtered += count_tiles(size, ROWS_TILE);
+            capacity.active += count_tiles(size, RESULT_TILE);
         }
         capacity
     }
@@ -87,24 +87,24 @@ impl Capacity {
 }
 
 /// Returns the number of tiles that cover a bin.
-pub fn tiles(size: [u32; 2], tile: [usize; 2]) -> usize {
+pub fn count_tiles(size: [u32; 2], tile: [usize; 2]) -> usize {
     (size[0] as usize).div_ceil(tile[0]) * (size[1] as usize).div_ceil(tile[1])
 }
 
 /// Returns the number of tiles of a bin in pass `bin`.
-pub fn binned_tiles(size: [u32; 2], scale: u32) -> usize {
-    let sharing = if scale >= SHARED_FROM { 2 } else { 1 };
-    tiles(size.map(|side| side * sharing), [TILE as usize; 2])
+pub fn count_bin_tiles(size: [u32; 2], scale: u32) -> usize {
+    let sharing = if scale >= SHARED_FROM_SCALE { 2 } else { 1 };
+    count_tiles(size.map(|side| side * sharing), [TILE as usize; 2])
 }
 
 /// Returns the cells across and down a bin.
-fn cells(width: usize, height: usize) -> [usize; 2] {
+fn grid_size(width: usize, height: usize) -> [usize; 2] {
     [width.next_multiple_of(GRID_ROUNDING) / CELL, height.div_ceil(CELL)]
 }
 
 /// Returns the edges across, and the rows of cells.
-fn edges(width: usize, height: usize) -> [usize; 2] {
-    let [across, down] = cells(width, height);
+fn edge_grid_size(width: usize, height: usize) -> [usize; 2] {
+    let [across, down] = grid_size(width, height);
     [across * CELL / SEGMENT + 1, down]
 }
 
@@ -126,14 +126,15 @@ impl Layout {
         let mut used = Capacity::default();
         let (mut first, mut batch_pixels) = (0, 0);
         for (k, bin) in plan.bins.iter().enumerate() {
-            let ([cells_across, down], [edges, _]) = (cells(bin.width, bin.height), edges(bin.width, bin.height));
+            let ([cells_across, down], [edges, _]) =
+                (grid_size(bin.width, bin.height), edge_grid_size(bin.width, bin.height));
             let pixels = bin.width * bin.height;
             // Starts a new batch when the buffer for rows is full.
             if batch_pixels + pixels > capacity.rows && k > first {
                 self.batches.push(first..k);
                 (first, batch_pixels) = (k, 0);
             }
-            let weight = plan.share(k);
+            let weight = plan.bin_weight(k);
             let size = [bin.width as u32, bin.height as u32];
             self.bins.push(Bin {
                 size,
@@ -152,21 +153,21 @@ impl Layout {
                 edges_at: used.edges as u32,
                 cells_at: used.cells as u32,
                 binned_at: used.binned as u32,
-                reach: match plan.compositing {
+                half_width: match plan.compositing {
                     // Each pixel has its own radius, which no bin limits.
-                    Compositing::Gather => plan.bank.reach as u32,
+                    Compositing::Gather => plan.bank.half_width as u32,
                     _ => plan.bin_half_width(bin) as u32,
                 },
                 filtered_at: used.filtered as u32,
                 active_at: used.active as u32,
-                has_lobes: u32::from(plan.has_lobes(bin)),
+                has_overshoot: u32::from(plan.has_overshoot(bin)),
             });
             used.pixels += pixels;
             used.cells += cells_across * down;
             used.edges += edges * down;
-            used.binned += binned_tiles(size, bin.scale as u32);
-            used.filtered += tiles(size, ROWS_TILE);
-            used.active += tiles(size, RESULT_TILE);
+            used.binned += count_bin_tiles(size, bin.scale as u32);
+            used.filtered += count_tiles(size, ROWS_TILE);
+            used.active += count_tiles(size, RESULT_TILE);
             batch_pixels += pixels;
         }
         if !plan.bins.is_empty() {

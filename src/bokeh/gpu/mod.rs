@@ -1,5 +1,6 @@
 //! The GPU executor: wgpu compute passes, one WGSL file each under `shaders/`, with the names of the passes in
-//! [`super::plan`]. A pass of several dispatches (`fill`: hide, pull, coarse, directional, fill) has a file for each.
+//! [`super::plan`]. A pass of several dispatches (`fill`: find_occluders, pull, coarse, directional, fill) has a file
+//! for each.
 
 mod buffers;
 mod layout;
@@ -7,32 +8,32 @@ mod passes;
 mod probe;
 mod radii;
 mod readback;
+mod self_test;
 pub mod shaders;
-mod trial;
 
 use std::sync::Arc;
 use std::time::Instant;
 
-pub use trial::try_out;
+pub use self_test::run_self_test;
 
 use buffers::Buffers;
 use layout::{Capacity, Layout};
 use passes::Passes;
-use readback::{CAPACITY, Ring, Sent};
+use readback::{CAPACITY, Ring, SubmittedFrame};
 
 use super::bank::STEPS_PER_PX;
 use super::ladder::Compositing;
 use super::occlusion::front_px;
 use super::plan::Plan;
-use super::{Bokeh, BokehError, Finished, Job};
+use super::{BlurredFrame, Bokeh, BokehError, Job};
 use crate::compute::device::{Device, DeviceFrame, DevicePicture, Recorder};
-use crate::compute::{Backend, GpuError, Place};
+use crate::compute::{Backend, GpuError, PictureLocation};
 use crate::link::pool::{Pool, Pooled};
 use crate::optics::CocField;
 
 /// Largest number of results on the device: those in flight, queued, or in use by a viewer. When all are in use,
 /// results are copied to memory.
-const ON_DEVICE: usize = CAPACITY + 7;
+const MAX_DEVICE_PICTURES: usize = CAPACITY + 7;
 
 /// Runs a plan with wgpu compute passes.
 pub struct GpuBokeh {
@@ -58,42 +59,45 @@ impl GpuBokeh {
     /// # Errors
     /// No adapter fits, or its device failed.
     pub fn new(plan: &Plan, hardware_only: bool, adapter: Option<&str>) -> Result<Self, BokehError> {
-        Self::on(plan, Arc::new(Device::open(hardware_only, adapter)?))
+        Self::with_device(plan, Arc::new(Device::open(hardware_only, adapter)?))
     }
 
     /// Creates an executor of `plan` on a device.
     ///
     /// # Errors
     /// The device is too small for these pictures, or failed.
-    pub fn on(plan: &Plan, device: Arc<Device>) -> Result<Self, BokehError> {
+    pub fn with_device(plan: &Plan, device: Arc<Device>) -> Result<Self, BokehError> {
         let allowed = device.device.limits().max_storage_buffer_binding_size;
         let capacity = Capacity::for_plan(plan);
         let rows = capacity.rows * plan.ladder.max_terms().min(4);
         // A pixel is four halves, also in each of the up to four terms per row pass.
-        let largest = (capacity.pixels.max(rows).max(1) as u64 * 8).max(buffers::filter_bytes(plan));
+        let largest = (capacity.pixels.max(rows).max(1) as u64 * 8).max(buffers::max_filter_bytes(plan));
         if largest > allowed {
             return Err(GpuError::Failed(format!(
-                "{}: pictures of {} x {} need buffers of {largest} bytes and it allows {allowed}; use --backend cpu",
+                "{}: pictures of {} x {} need buffers of {largest} bytes, and this GPU allows {allowed}; use --backend \
+                 cpu",
                 device.name, plan.width, plan.height
             ))
             .into());
         }
         let buffers = Buffers::new(&device, plan, &capacity);
-        let radii = Buffers::radii(&device, radii::radii_bytes(plan.width * plan.height));
+        let radii = Buffers::create_depth_buffer(&device, radii::radii_bytes(plan.width * plan.height));
         let passes = Passes::new(&device, plan, &buffers, &radii);
-        let ring = Ring::new(&device, buffers::picture_bytes(plan) as usize);
+        let ring = Ring::new(&device, buffers::packed_picture_bytes(plan) as usize);
         device.check()?;
         let (plan, layout, refused, results) = (plan.clone(), Layout::new(), None, None);
         Ok(Self { plan, device, buffers, radii, capacity, layout, passes, ring, refused, results })
     }
 
     /// Returns a free picture on the device for a result, if `place` asks for one.
-    fn device_picture(&mut self, place: Place) -> Option<Pooled<DevicePicture>> {
-        if place == Place::Memory {
+    fn take_device_picture(&mut self, place: PictureLocation) -> Option<Pooled<DevicePicture>> {
+        if place == PictureLocation::Memory {
             return None;
         }
         let (device, size) = (&self.device, (self.plan.width as u32, self.plan.height as u32));
-        self.results.get_or_insert_with(|| Pool::new(ON_DEVICE, || DevicePicture::new(device, size))).try_take()
+        self.results
+            .get_or_insert_with(|| Pool::new(MAX_DEVICE_PICTURES, || DevicePicture::new(device, size)))
+            .try_take()
     }
 
     /// Returns the uniform `Frame` of a job, whose depth may be `in_metres`; see `common.wgsl` for the values.
@@ -117,15 +121,15 @@ impl GpuBokeh {
             },
             bins: plan.bins.len() as u32,
             near_bins: self.layout.near as u32,
-            reach: plan.bank.reach as u32,
+            half_width: plan.bank.half_width as u32,
             nodes: plan.bank.nodes as u32,
             groups: plan.bank.terms.div_ceil(4) as u32,
-            max_px: max_px(&job.coc),
+            max_px: max_coc_px(&job.coc),
             coc,
             ramp,
-            even: u32::from(plan.bank.is_symmetric),
+            symmetric: u32::from(plan.bank.is_symmetric),
             extent: plan.bank.extent as f32,
-            rows_apart: self.capacity.rows as u32,
+            term_stride: self.capacity.rows as u32,
             expansion: if plan.expansion.is_finite() { plan.expansion } else { 0.0 },
             steps_per_px: STEPS_PER_PX,
             mixed: plan.matte(job.depth.as_deref(), &job.coc).map_or(0, |matte| matte.pixels.len() as u32),
@@ -137,7 +141,7 @@ impl GpuBokeh {
 }
 
 /// Returns an upper bound > 0 of |CoC| in a frame, in pixels: the shaders divide by it.
-fn max_px(coc: &CocField) -> f32 {
+fn max_coc_px(coc: &CocField) -> f32 {
     let max_px = match coc {
         CocField::Uniform { radius_px } => *radius_px,
         CocField::Ramp(ramp) => ramp.max_px,
@@ -159,14 +163,14 @@ impl Bokeh for GpuBokeh {
             self.refused = Some(job);
             return Err(error.into());
         }
-        let Some(mut slot) = self.ring.take() else {
+        let Some(mut slot) = self.ring.take_slot() else {
             return Err(GpuError::Failed(format!("more than {CAPACITY} frames submitted and not collected")).into());
         };
         let started = Instant::now();
-        let on_device = self.device_picture(job.place);
+        let on_device = self.take_device_picture(job.place);
         job.out.resize(made_for.0, made_for.1);
         // YUYV shares chroma between two pixels of a row.
-        if job.place != Place::Memory || !made_for.0.is_multiple_of(2) {
+        if job.place != PictureLocation::Memory || !made_for.0.is_multiple_of(2) {
             job.yuyv = None;
         }
         if let Some(yuyv) = &mut job.yuyv {
@@ -180,18 +184,18 @@ impl Bokeh for GpuBokeh {
             shared_metres = shared.as_deref().filter(|_| map.size() == made_for).map(|frame| &frame.metres);
             let bytes = shared_metres.map_or(radii::radii_bytes(map.metres.len()), wgpu::Buffer::size);
             if bytes > self.radii.size() {
-                self.radii = Buffers::radii(&self.device, bytes);
-                self.passes.set_radii(&self.device, &self.buffers, &self.radii);
+                self.radii = Buffers::create_depth_buffer(&self.device, bytes);
+                self.passes.bind_depth_buffer(&self.device, &self.buffers, &self.radii);
             }
             if shared_metres.is_none() {
-                radii::upload(&self.device.queue, &self.radii, map, lens, max_px(&job.coc));
+                radii::upload_coc(&self.device.queue, &self.radii, map, lens, max_coc_px(&job.coc));
             }
         }
         if let Some(matte) = self.plan.matte(job.depth.as_deref(), &job.coc) {
             self.device.upload(&self.buffers.mixed, 0, bytemuck::cast_slice(&matte.pixels));
         }
         self.plan.set_quality(job.quality);
-        self.plan.split(job.depth.as_deref(), &job.coc);
+        self.plan.split_by_depth(job.depth.as_deref(), &job.coc);
         self.layout.lay_out(&self.plan, &self.capacity);
         self.passes.upload(&self.device, &self.buffers, &self.plan, &self.layout);
         let frame = self.frame_uniform(&job, shared_metres.is_some());
@@ -213,27 +217,27 @@ impl Bokeh for GpuBokeh {
         if let Some(picture) = &on_device {
             encoder.copy_buffer_to_buffer(result, 0, picture.buffer(), 0, result.size().min(picture.buffer().size()));
         }
-        let in_memory = on_device.is_none() || job.place == Place::Both;
+        let in_memory = on_device.is_none() || job.place == PictureLocation::Both;
         let copied = match &job.yuyv {
             _ if !in_memory => 0,
             Some(yuyv) => yuyv.bytes.len() as u64,
             None => slot.picture.size(),
         };
         if copied > 0 {
-            slot.picture.copy(encoder, result, copied);
+            slot.picture.record_copy(encoder, result, copied);
         }
         let submission = recorder.submit(&self.device);
         drop(shared);
-        self.ring.push(&self.device, slot, Sent { job, on_device, copied, submission, started });
+        self.ring.push(&self.device, slot, SubmittedFrame { job, on_device, copied, submission, started });
         Ok(())
     }
 
-    fn collect(&mut self, wait: bool) -> Result<Option<Finished>, BokehError> {
+    fn collect(&mut self, wait: bool) -> Result<Option<BlurredFrame>, BokehError> {
         self.ring.pop(&self.device, wait)
     }
 
-    fn take_back(&mut self) -> Option<Job> {
-        self.ring.give_up().or_else(|| self.refused.take())
+    fn reclaim_job(&mut self) -> Option<Job> {
+        self.ring.reclaim_job().or_else(|| self.refused.take())
     }
 
     fn in_flight(&self) -> usize {

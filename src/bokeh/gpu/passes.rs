@@ -2,15 +2,15 @@
 
 use std::ops::Range;
 
-use super::buffers::{Buffers, Filters, work_count};
-use super::layout::{self, Layout, tiles};
+use super::buffers::{BankBuffers, Buffers, work_count};
+use super::layout::{self, Layout, count_tiles};
 use super::shaders::{
-    self, Bin, EDGES_TILE, LINE, MAX_TILE_WORKGROUPS, RESULT_TILE, ROWS_TILE, SMALL_TILE, TILE, Work,
+    self, Bin, EDGES_TILE, MAX_TILE_WORKGROUPS, RESULT_TILE, ROWS_TILE, SMALL_TILE, TILE, WORKGROUP_1D, Work,
 };
 use crate::bokeh::ladder::Compositing;
-use crate::bokeh::occlusion::{GRAIN, MAX_LAYERS};
+use crate::bokeh::occlusion::{MAX_LAYERS, SILHOUETTE_CELL};
 use crate::bokeh::plan::{MAX_BINS, Plan};
-use crate::compute::device::{Device, Pass, Recorder, Shader, UNIFORM_STRIDE, uniform_at, workgroups_2d};
+use crate::compute::device::{Device, Pass, Recorder, Shader, UNIFORM_STRIDE, uniform_binding, workgroups_2d};
 
 /// Index of the uniform `Work` of a dispatch: 0.. for layers, `ALL` for `reach`, then one per batch of the filters.
 const ALL: usize = MAX_LAYERS;
@@ -34,7 +34,7 @@ pub struct Passes {
     /// Dilation of the silhouettes over their grid, along rows and down columns.
     silhouettes: [Pass; 2],
     /// Finds the nearest surface, a possible occluder.
-    hide: Pass,
+    find_occluders: Pass,
     layers: Vec<Layer>,
     gather: Option<Pass>,
     reach: Pass,
@@ -46,14 +46,14 @@ pub struct Passes {
 }
 
 /// Creates passes.
-struct Maker<'a> {
+struct PassBuilder<'a> {
     device: &'a Device,
     buffers: &'a Buffers,
 }
 
-impl Maker<'_> {
+impl PassBuilder<'_> {
     /// Creates a pass that binds these uniforms first and then `buffers`.
-    fn pass(
+    fn create_pass(
         &self,
         shader: Shader,
         uniforms: &[wgpu::BufferBinding<'_>],
@@ -66,9 +66,10 @@ impl Maker<'_> {
 
     /// Creates a pass over several bins, given by uniform `Work` number `work`; binds that and the bins first. The
     /// number of workgroups depends on the frame.
-    fn over_bins(&self, shader: Shader, work: usize, buffers: &[&wgpu::Buffer]) -> Pass {
-        let uniforms = [uniform_at::<Work>(&self.buffers.work, work), self.buffers.bins.as_entire_buffer_binding()];
-        self.pass(shader, &uniforms, buffers, [1; 3])
+    fn create_pass_over_bins(&self, shader: Shader, work: usize, buffers: &[&wgpu::Buffer]) -> Pass {
+        let uniforms =
+            [uniform_binding::<Work>(&self.buffers.work, work), self.buffers.bins.as_entire_buffer_binding()];
+        self.create_pass(shader, &uniforms, buffers, [1; 3])
     }
 }
 
@@ -76,16 +77,16 @@ impl Maker<'_> {
 fn unpack_bindings<'a>(b: &'a Buffers, radii: &'a wgpu::Buffer) -> impl Iterator<Item = wgpu::BufferBinding<'a>> {
     let read = [&b.bins, &b.frame, &b.color, radii];
     let buffers = read.into_iter().chain([&b.scene, &b.ranges, &b.mixed, &b.shown, &b.binned, &b.marks]);
-    std::iter::once(uniform_at::<Work>(&b.work, 0)).chain(buffers.map(wgpu::Buffer::as_entire_buffer_binding))
+    std::iter::once(uniform_binding::<Work>(&b.work, 0)).chain(buffers.map(wgpu::Buffer::as_entire_buffer_binding))
 }
 
 /// Returns the workgroups for a list of tiles, over which they loop.
-fn turns(pieces: usize) -> [u32; 3] {
-    [pieces.clamp(1, MAX_TILE_WORKGROUPS) as u32, 1, 1]
+fn looping_workgroups(tiles: usize) -> [u32; 3] {
+    [tiles.clamp(1, MAX_TILE_WORKGROUPS) as u32, 1, 1]
 }
 
 /// Returns the workgroups of `tile` x `tile` invocations that cover `size`.
-fn over(size: [u32; 2], tile: u32) -> [u32; 3] {
+fn covering_workgroups(size: [u32; 2], tile: u32) -> [u32; 3] {
     let [across, down] = size.map(|size| size.div_ceil(tile));
     [across, down, 1]
 }
@@ -93,51 +94,64 @@ fn over(size: [u32; 2], tile: u32) -> [u32; 3] {
 impl Passes {
     /// Creates the passes of a plan over its buffers.
     pub fn new(device: &Device, plan: &Plan, b: &Buffers, radii: &wgpu::Buffer) -> Self {
-        let maker = Maker { device, buffers: b };
+        let builder = PassBuilder { device, buffers: b };
         let picture = [plan.width as u32, plan.height as u32];
         let [half, quarter] = [2, 4].map(|scale| picture.map(|side| side.div_ceil(scale)));
 
-        let hide = [&b.frame, &b.scene, &b.nearest_px, &b.ranges, &b.mixed];
-        let grid = over([plan.width, plan.height].map(|side| side.div_ceil(GRAIN) as u32), SMALL_TILE);
+        let find_occluders = [&b.frame, &b.scene, &b.nearest_px, &b.ranges, &b.mixed];
+        let grid = covering_workgroups(
+            [plan.width, plan.height].map(|side| side.div_ceil(SILHOUETTE_CELL) as u32),
+            SMALL_TILE,
+        );
         let silhouettes = [
-            maker.pass(shaders::SPREAD, &[], &[&b.frame, &b.marks, &b.along], grid).named(SILHOUETTES),
-            maker.pass(shaders::UNCOVER, &[], &[&b.frame, &b.along, &b.reached], grid).named(SILHOUETTES),
+            builder
+                .create_pass(shaders::DILATE_ROWS, &[], &[&b.frame, &b.marks, &b.row_dilated], grid)
+                .with_name(SILHOUETTES),
+            builder
+                .create_pass(shaders::DILATE_COLUMNS, &[], &[&b.frame, &b.row_dilated, &b.dilated], grid)
+                .with_name(SILHOUETTES),
         ];
-        let hide = maker.pass(shaders::HIDE, &[], &hide, over(half, TILE)).named(FILL);
+        let find_occluders = builder
+            .create_pass(shaders::FIND_OCCLUDERS, &[], &find_occluders, covering_workgroups(half, TILE))
+            .with_name(FILL);
         let layers = (0..MAX_LAYERS).map(|index| {
             let fill = (index > 0).then(|| {
                 let pulled = [&b.frame, &b.scene, &b.nearest_px, &b.pyramid, &b.known, &b.mixed];
                 let coarse = [&b.frame, &b.pyramid, &b.known];
-                let lines = [&b.frame, &b.pyramid, &b.known, &b.reached];
+                let lines = [&b.frame, &b.pyramid, &b.known, &b.dilated];
                 let known = [&b.pyramid, &b.known];
-                let (seen, nearest) = ([&b.scene, &b.ranges, &b.behind], &b.nearest_px);
-                let (lists, reached) = (&b.binned, [&b.reached, &b.mixed]);
+                let (seen, nearest) = ([&b.scene, &b.ranges, &b.inpainted], &b.nearest_px);
+                let (lists, dilated) = (&b.binned, [&b.dilated, &b.mixed]);
                 let filled = [
-                    &b.frame, known[0], known[1], seen[0], seen[1], seen[2], nearest, &b.bins, lists, reached[0],
-                    reached[1],
+                    &b.frame, known[0], known[1], seen[0], seen[1], seen[2], nearest, &b.bins, lists, dilated[0],
+                    dilated[1],
                 ];
-                let work = [uniform_at::<Work>(&b.work, index)];
+                let work = [uniform_binding::<Work>(&b.work, index)];
                 [
                     // A thread does four pixels of half the size, or of the picture.
-                    maker.pass(shaders::PULL, &work, &pulled, over(half, 2 * TILE)).named(FILL),
-                    maker.pass(shaders::COARSE, &[], &coarse, [1; 3]).named(FILL),
-                    maker.pass(shaders::DIRECTIONAL, &[], &lines, over(quarter, SMALL_TILE)).named(FILL),
-                    maker.pass(shaders::FILL, &work, &filled, over(picture, TILE)),
+                    builder
+                        .create_pass(shaders::PULL, &work, &pulled, covering_workgroups(half, 2 * TILE))
+                        .with_name(FILL),
+                    builder.create_pass(shaders::COARSE, &[], &coarse, [1; 3]).with_name(FILL),
+                    builder
+                        .create_pass(shaders::DIRECTIONAL, &[], &lines, covering_workgroups(quarter, SMALL_TILE))
+                        .with_name(FILL),
+                    builder.create_pass(shaders::FILL, &work, &filled, covering_workgroups(picture, TILE)),
                 ]
             });
-            let (seen, lists) = ([&b.scene, &b.behind, &b.ranges], [&b.binned, &b.filtered]);
+            let (seen, lists) = ([&b.scene, &b.inpainted, &b.ranges], [&b.binned, &b.filtered]);
             let bin = [&b.frame, seen[0], seen[1], seen[2], &b.source, &b.grid, &b.mixed, lists[0], lists[1]];
-            Layer { fill, bin: maker.over_bins(shaders::BIN, index, &bin) }
+            Layer { fill, bin: builder.create_pass_over_bins(shaders::BIN, index, &bin) }
         });
         let layers = layers.collect();
-        let filters = |bank: &Filters, k: usize| {
+        let filters = |bank: &BankBuffers, k: usize| {
             let [horizontal, vertical] = &bank.taps;
             let rows = [&b.frame, horizontal, &b.edges, &b.scene, &b.grid, &b.source, &b.rows, &b.filtered, &b.active];
             let columns =
                 [&b.frame, vertical, &b.edges, &b.scene, &b.rows, &b.filtered, &b.blurred, &b.active, &b.shown];
             [
-                maker.over_bins(shaders::BLUR_ROWS, FIRST_BATCH + k, &rows),
-                maker.over_bins(shaders::BLUR_COLUMNS, FIRST_BATCH + k, &columns),
+                builder.create_pass_over_bins(shaders::BLUR_ROWS, FIRST_BATCH + k, &rows),
+                builder.create_pass_over_bins(shaders::BLUR_COLUMNS, FIRST_BATCH + k, &columns),
             ]
         };
         // A batch has at least one bin, so there are no more batches than bins.
@@ -149,31 +163,36 @@ impl Passes {
         let gather = plan.exact.then(|| {
             let [starts, kernels] = &b.kernels;
             let buffers = [&b.frame, starts, kernels, &b.scene, &b.banks[plan.bank_index].node_half_width, &b.blurred];
-            maker.pass(shaders::GATHER, &[], &buffers, over(picture, TILE))
+            builder.create_pass(shaders::GATHER, &[], &buffers, covering_workgroups(picture, TILE))
         });
-        let composite = [&b.frame, &b.bins, &b.blurred, &b.scene, &b.result, &b.active, &b.shown, &b.reached];
-        let lines = workgroups_2d((plan.width * plan.height).div_ceil(LINE as usize) as u32);
+        let composite = [&b.frame, &b.bins, &b.blurred, &b.scene, &b.result, &b.active, &b.shown, &b.dilated];
+        let lines = workgroups_2d((plan.width * plan.height).div_ceil(WORKGROUP_1D as usize) as u32);
         let clear = [&b.binned, &b.filtered, &b.active, &b.grid];
-        let unpack =
-            Pass::new(device, shaders::UNPACK, &shaders::CONSTANTS, unpack_bindings(b, radii), over(picture, TILE));
-        let cleared = turns(b.grid.size() as usize / (16 * LINE as usize));
+        let unpack = Pass::new(
+            device,
+            shaders::UNPACK,
+            &shaders::CONSTANTS,
+            unpack_bindings(b, radii),
+            covering_workgroups(picture, TILE),
+        );
+        let cleared = looping_workgroups(b.grid.size() as usize / (16 * WORKGROUP_1D as usize));
         Self {
-            clear: maker.pass(shaders::CLEAR, &[], &clear, cleared),
+            clear: builder.create_pass(shaders::CLEAR, &[], &clear, cleared),
             unpack,
             silhouettes,
-            hide,
+            find_occluders,
             layers,
             gather,
-            reach: maker.over_bins(shaders::REACH, ALL, &[&b.grid, &b.edges]),
+            reach: builder.create_pass_over_bins(shaders::REACH, ALL, &[&b.grid, &b.edges]),
             blur,
-            composite: maker.pass(shaders::COMPOSITE, &[], &composite, lines),
+            composite: builder.create_pass(shaders::COMPOSITE, &[], &composite, lines),
             work: vec![0; work_count(plan) * UNIFORM_STRIDE as usize],
         }
     }
 
     /// Binds a new buffer for depth maps.
-    pub fn set_radii(&mut self, device: &Device, b: &Buffers, radii: &wgpu::Buffer) {
-        self.unpack.bind(device, unpack_bindings(b, radii));
+    pub fn bind_depth_buffer(&mut self, device: &Device, b: &Buffers, radii: &wgpu::Buffer) {
+        self.unpack.rebind(device, unpack_bindings(b, radii));
     }
 
     /// Uploads the bins of each pass of this frame, with the terms of the plan's bank.
@@ -187,8 +206,8 @@ impl Passes {
                 group: group as u32,
                 terms: (terms - 4 * group).min(4) as u32,
                 last: u32::from(group + 1 == groups),
-                nearest_px: plan.nearest_behind_px(bins.start),
-                unhidden: plan.unhidden(bins.start).front.into(),
+                nearest_px: plan.min_inpainted_px(bins.start),
+                visible_weight: plan.visible_weight(bins.start).front.into(),
             };
             let bytes = bytemuck::bytes_of(&work);
             self.work[index * UNIFORM_STRIDE as usize..][..bytes.len()].copy_from_slice(bytes);
@@ -207,37 +226,37 @@ impl Passes {
     /// Records one frame at the plan's quality level.
     pub fn record(&self, recorder: &mut Recorder, plan: &Plan, layout: &Layout) {
         // Workgroups that loop over the tiles of some bins.
-        let workgroups = |bins: &[Bin], of: &dyn Fn(&Bin) -> usize| turns(bins.iter().map(of).sum());
-        recorder.run(&self.clear);
-        recorder.run(&self.unpack);
+        let workgroups = |bins: &[Bin], of: &dyn Fn(&Bin) -> usize| looping_workgroups(bins.iter().map(of).sum());
+        recorder.record(&self.clear);
+        recorder.record(&self.unpack);
         if let Some(gather) = &self.gather {
-            recorder.run(gather);
+            recorder.record(gather);
         } else {
             if plan.compositing == Compositing::Layers {
-                self.silhouettes.iter().for_each(|pass| recorder.run(pass));
+                self.silhouettes.iter().for_each(|pass| recorder.record(pass));
             }
             for ((index, bins), layer) in plan.layers().enumerate().zip(&self.layers) {
                 // Nothing hides the foremost layer.
                 if index == 1 {
-                    recorder.run(&self.hide);
+                    recorder.record(&self.find_occluders);
                 }
-                layer.fill.iter().flatten().for_each(|pass| recorder.run(pass));
-                recorder.run_by(
+                layer.fill.iter().flatten().for_each(|pass| recorder.record(pass));
+                recorder.record_workgroups(
                     &layer.bin,
-                    workgroups(&layout.bins[bins], &|bin| layout::binned_tiles(bin.size, bin.scale)),
+                    workgroups(&layout.bins[bins], &|bin| layout::count_bin_tiles(bin.size, bin.scale)),
                 );
             }
-            let edges = layout.bins.iter().map(|bin| tiles([2 * bin.edges, bin.cells[1]], EDGES_TILE) as u32);
-            recorder.run_by(&self.reach, workgroups_2d(edges.sum()));
+            let edges = layout.bins.iter().map(|bin| count_tiles([2 * bin.edges, bin.cells[1]], EDGES_TILE) as u32);
+            recorder.record_workgroups(&self.reach, workgroups_2d(edges.sum()));
             let groups = plan.bank.terms.div_ceil(4);
             for (batch, steps) in layout.batches.iter().zip(self.blur[plan.bank_index].chunks_exact(groups)) {
                 let bins = &layout.bins[batch.clone()];
                 for [rows, columns] in steps {
-                    recorder.run_by(rows, workgroups(bins, &|bin| tiles(bin.size, ROWS_TILE)));
-                    recorder.run_by(columns, workgroups(bins, &|bin| tiles(bin.size, RESULT_TILE)));
+                    recorder.record_workgroups(rows, workgroups(bins, &|bin| count_tiles(bin.size, ROWS_TILE)));
+                    recorder.record_workgroups(columns, workgroups(bins, &|bin| count_tiles(bin.size, RESULT_TILE)));
                 }
             }
         }
-        recorder.run(&self.composite);
+        recorder.record(&self.composite);
     }
 }

@@ -6,8 +6,8 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
-use crate::bokeh::{BokehError, Finished, Job, PassTimes, Picture};
-use crate::compute::device::{Device, DevicePicture, Readback, Stamps};
+use crate::bokeh::{BlurredFrame, BokehError, Job, PassTimes, Picture};
+use crate::compute::device::{Device, DevicePicture, Readback, Timestamps};
 use crate::link::pool::Pooled;
 
 /// Largest number of frames in flight: one on the device, one waiting, one being read back.
@@ -16,13 +16,13 @@ pub const CAPACITY: usize = 3;
 const MAX_PASSES: usize = 256;
 
 /// Buffers of one frame in flight.
-pub struct Slot {
+pub struct RingSlot {
     pub picture: Readback,
-    pub stamps: Option<Stamps>,
+    pub stamps: Option<Timestamps>,
 }
 
 /// A submitted frame.
-pub struct Sent {
+pub struct SubmittedFrame {
     /// The job as it was submitted.
     pub job: Job,
     /// Copy of the result that stays on the device.
@@ -37,23 +37,23 @@ pub struct Sent {
 
 /// A frame being read back.
 struct Pending {
-    slot: Slot,
-    sent: Sent,
+    slot: RingSlot,
+    sent: SubmittedFrame,
     /// Whether the device has finished it.
     done: Arc<AtomicBool>,
 }
 
 impl Pending {
-    fn is_back(&self) -> bool {
+    fn is_read_back(&self) -> bool {
         self.done.load(Ordering::Acquire)
             && !self.slot.picture.is_pending()
-            && !self.slot.stamps.as_ref().is_some_and(Stamps::are_pending)
+            && !self.slot.stamps.as_ref().is_some_and(Timestamps::are_pending)
     }
 }
 
 /// Frames being read back, and free buffers for more.
 pub struct Ring {
-    free: Vec<Slot>,
+    free: Vec<RingSlot>,
     pending: VecDeque<Pending>,
     /// Time at which the last frame was read back.
     last: Option<Instant>,
@@ -62,14 +62,16 @@ pub struct Ring {
 impl Ring {
     /// Creates a ring for pictures of `bytes` bytes (a multiple of 4).
     pub fn new(device: &Device, bytes: usize) -> Self {
-        let slot =
-            || Slot { picture: Readback::new(device, "picture back", bytes), stamps: Stamps::new(device, MAX_PASSES) };
+        let slot = || RingSlot {
+            picture: Readback::new(device, "picture back", bytes),
+            stamps: Timestamps::new(device, MAX_PASSES),
+        };
         let free = std::iter::repeat_with(slot).take(CAPACITY).collect();
         Self { free, pending: VecDeque::with_capacity(CAPACITY), last: None }
     }
 
     /// Returns a free slot, if any.
-    pub fn take(&mut self) -> Option<Slot> {
+    pub fn take_slot(&mut self) -> Option<RingSlot> {
         self.free.pop()
     }
 
@@ -78,12 +80,12 @@ impl Ring {
     }
 
     /// After an error, returns the oldest frame in flight as it was submitted; its buffers are dropped.
-    pub fn give_up(&mut self) -> Option<Job> {
+    pub fn reclaim_job(&mut self) -> Option<Job> {
         self.pending.pop_front().map(|pending| pending.sent.job)
     }
 
     /// Starts the readback of a submitted frame.
-    pub fn push(&mut self, device: &Device, slot: Slot, sent: Sent) {
+    pub fn push(&mut self, device: &Device, slot: RingSlot, sent: SubmittedFrame) {
         if sent.copied > 0 {
             slot.picture.map();
         }
@@ -97,13 +99,13 @@ impl Ring {
     ///
     /// # Errors
     /// The device failed.
-    pub fn pop(&mut self, device: &Device, wait: bool) -> Result<Option<Finished>, BokehError> {
+    pub fn pop(&mut self, device: &Device, wait: bool) -> Result<Option<BlurredFrame>, BokehError> {
         let Some(oldest) = self.pending.front() else { return Ok(None) };
         device.poll(wait.then(|| oldest.sent.submission.clone()))?;
         if wait {
-            device.wait_for(|| oldest.is_back())?;
+            device.wait_for(|| oldest.is_read_back())?;
         }
-        if !oldest.is_back() {
+        if !oldest.is_read_back() {
             return Ok(None);
         }
         let Some(Pending { slot, sent, .. }) = self.pending.front_mut() else { return Ok(None) };
@@ -123,14 +125,14 @@ impl Ring {
         self.last = Some(Instant::now());
         // Removed only now, so that the frame can be taken back after an error.
         let Some(Pending { slot, sent, .. }) = self.pending.pop_front() else { return Ok(None) };
-        let Sent { job, on_device, copied, .. } = sent;
+        let SubmittedFrame { job, on_device, copied, .. } = sent;
         self.free.push(slot);
         let Job { ticket, color, depth, out, yuyv, .. } = job;
         let picture = match (on_device, yuyv) {
-            (Some(device), _) => Picture::on_device(device, out, copied > 0),
-            (None, Some(yuyv)) => Picture::as_yuyv(yuyv, out),
-            (None, None) => Picture::in_memory(out),
+            (Some(device), _) => Picture::from_device(device, out, copied > 0),
+            (None, Some(yuyv)) => Picture::from_yuyv(yuyv, out),
+            (None, None) => Picture::from_memory(out),
         };
-        Ok(Some(Finished { ticket, picture, color, depth, times }))
+        Ok(Some(BlurredFrame { ticket, picture, color, depth, times }))
     }
 }

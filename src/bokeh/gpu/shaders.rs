@@ -4,11 +4,11 @@ use bytemuck::{Pod, Zeroable};
 
 use crate::bokeh::bank::{OCTAVE_SHIFT, OCTAVES_FROM_PX};
 use crate::bokeh::occlusion::{
-    DIRECTIONS, FADE, GRAIN, HALF_ALIKE_PX, MARGIN_PX, MAX_STEPS, ONE_ENDED, ONE_SURFACE_PX, OTHER_FROM, OTHER_TO,
-    OWN_COVERAGE, TRUSTED_STEPS,
+    DIRECTIONS, FADE_FRACTION, HALF_SIMILAR_PX, MARGIN_PX, MAX_STEPS, MIN_OWN_COVERAGE, ONE_ENDED_FACTOR,
+    ONE_SURFACE_PX, OTHER_SURFACE_FROM, OTHER_SURFACE_TO, SILHOUETTE_CELL, TRUSTED_STEPS,
 };
 use crate::bokeh::plan::{
-    ANY_COLOR, CELL, COVERAGE_FLOOR, FAR_WEIGHT, FARTHEST_COVERAGE, HAND_OVER, HIDING_WEIGHT, SEGMENT,
+    CELL, CROSS_FADE, HIDING_WEIGHT, HINDMOST_COVERAGE, MIN_CELL_WEIGHT, MIN_COVERAGE, SEGMENT, UNBOUNDED_COLOR,
 };
 use crate::compute::device::{Shader, shader};
 
@@ -18,9 +18,9 @@ pub const CLEAR: Shader = shader!("common"; "clear", "list");
 pub const UNPACK: Shader =
     shader!("common"; "unpack", "radii", "silhouette", "cells", "range", "mixed", "list", "tiles", "next", "meet");
 /// Dilation of the silhouettes along rows.
-pub const SPREAD: Shader = shader!("common"; "spread", "cells");
+pub const DILATE_ROWS: Shader = shader!("common"; "dilate_rows", "cells");
 /// Dilation of the silhouettes down columns.
-pub const UNCOVER: Shader = shader!("common"; "uncover", "cells");
+pub const DILATE_COLUMNS: Shader = shader!("common"; "dilate_columns", "cells");
 /// Weighted pixels of each bin, and the coarse grid over it.
 pub const BIN: Shader = shader!("common"; "bin", "mixed", "tent", "list", "tiles", "todo", "next");
 /// Local radius and range of colours.
@@ -30,7 +30,7 @@ pub const BLUR_COLUMNS: Shader = shader!("common"; "blur_columns", "filter", "no
 /// The exact two-dimensional gather.
 pub const GATHER: Shader = shader!("common"; "gather", "node");
 /// CoC of the nearest surface.
-pub const HIDE: Shader = shader!("common"; "hide", "mixed");
+pub const FIND_OCCLUDERS: Shader = shader!("common"; "find_occluders", "mixed");
 /// Pull-push: the known background at half size and over ever larger areas.
 pub const PULL: Shader = shader!("common"; "pull", "pyramid", "base", "mixed");
 /// Pull-push: the coarsest levels, and back.
@@ -45,14 +45,14 @@ pub const COMPOSITE: Shader = shader!("common"; "composite", "surfaces", "cells"
 pub const ALL: [Shader; 15] = [
     CLEAR,
     UNPACK,
-    SPREAD,
-    UNCOVER,
+    DILATE_ROWS,
+    DILATE_COLUMNS,
     BIN,
     REACH,
     BLUR_ROWS,
     BLUR_COLUMNS,
     GATHER,
-    HIDE,
+    FIND_OCCLUDERS,
     PULL,
     COARSE,
     DIRECTIONAL,
@@ -66,9 +66,9 @@ pub const SMALL_TILE: u32 = 8;
 // `fill` computes a tile of the picture from a small one at half size.
 const _: () = assert!(TILE == 2 * SMALL_TILE);
 // A thread of `unpack` does the pixels of one row of a cell of the silhouettes' grid.
-const _: () = assert!(GRAIN == 4);
+const _: () = assert!(SILHOUETTE_CELL == 4);
 /// Invocations of a one-dimensional workgroup.
-pub const LINE: u32 = 256;
+pub const WORKGROUP_1D: u32 = 256;
 /// Sides of segment edges per workgroup of `reach`, two per edge.
 pub const EDGES_TILE: [usize; 2] = [TILE as usize, SMALL_TILE as usize];
 /// Pixels of a bin per workgroup of `blur_rows`, and of `blur_columns`.
@@ -80,10 +80,10 @@ pub const MAX_TILE_WORKGROUPS: usize = 4096;
 /// Words of a list before its flags.
 pub const LIST_HEAD: usize = 16;
 /// Scale of a bin from which four threads share the many taps of a pixel, two per axis.
-pub const SHARED_FROM: u32 = 4;
+pub const SHARED_FROM_SCALE: u32 = 4;
 
 /// Packs the steps of [`DIRECTIONS`] across (0) or down (1), four bits each, offset by 8.
-const fn steps(axis: usize) -> f64 {
+const fn pack_steps(axis: usize) -> f64 {
     let (mut packed, mut d) = (0u32, 0);
     while d < DIRECTIONS.len() {
         let (across, down) = DIRECTIONS[d];
@@ -98,35 +98,35 @@ const fn steps(axis: usize) -> f64 {
 pub const CONSTANTS: [(&str, f64); 31] = [
     ("CELL", CELL as f64),
     ("SEGMENT", SEGMENT as f64),
-    ("ANY_COLOR", ANY_COLOR as f64),
-    ("COVERAGE_FLOOR", COVERAGE_FLOOR as f64),
-    ("FAR_WEIGHT", FAR_WEIGHT as f64),
-    ("OTHER_FROM", OTHER_FROM as f64),
-    ("OTHER_TO", OTHER_TO as f64),
+    ("UNBOUNDED_COLOR", UNBOUNDED_COLOR as f64),
+    ("MIN_COVERAGE", MIN_COVERAGE as f64),
+    ("MIN_CELL_WEIGHT", MIN_CELL_WEIGHT as f64),
+    ("OTHER_SURFACE_FROM", OTHER_SURFACE_FROM as f64),
+    ("OTHER_SURFACE_TO", OTHER_SURFACE_TO as f64),
     ("HIDING_WEIGHT", HIDING_WEIGHT as f64),
-    ("FARTHEST_COVERAGE", FARTHEST_COVERAGE as f64),
-    ("GRAIN", GRAIN as f64),
+    ("HINDMOST_COVERAGE", HINDMOST_COVERAGE as f64),
+    ("SILHOUETTE_CELL", SILHOUETTE_CELL as f64),
     ("MARGIN_PX", MARGIN_PX as f64),
-    ("HAND_OVER", HAND_OVER as f64),
-    ("FADE", FADE as f64),
-    ("OWN_COVERAGE", OWN_COVERAGE as f64),
-    ("STEPS_ACROSS", steps(0)),
-    ("STEPS_DOWN", steps(1)),
+    ("CROSS_FADE", CROSS_FADE as f64),
+    ("FADE_FRACTION", FADE_FRACTION as f64),
+    ("MIN_OWN_COVERAGE", MIN_OWN_COVERAGE as f64),
+    ("STEPS_ACROSS", pack_steps(0)),
+    ("STEPS_DOWN", pack_steps(1)),
     ("MAX_STEPS", MAX_STEPS as f64),
-    ("HALF_ALIKE_PX", HALF_ALIKE_PX as f64),
+    ("HALF_SIMILAR_PX", HALF_SIMILAR_PX as f64),
     ("ONE_SURFACE_PX", ONE_SURFACE_PX as f64),
     ("TRUSTED_STEPS", TRUSTED_STEPS as f64),
-    ("ONE_ENDED", ONE_ENDED as f64),
+    ("ONE_ENDED_FACTOR", ONE_ENDED_FACTOR as f64),
     ("OCTAVES_FROM_PX", OCTAVES_FROM_PX as f64),
     ("OCTAVE_SHIFT", OCTAVE_SHIFT as f64),
     ("TILE", TILE as f64),
     ("SMALL_TILE", SMALL_TILE as f64),
-    ("LINE", LINE as f64),
+    ("WORKGROUP_1D", WORKGROUP_1D as f64),
     ("ROWS_TILE_X", ROWS_TILE[0] as f64),
     ("ROWS_TILE_Y", ROWS_TILE[1] as f64),
     ("RESULT_TILE_X", RESULT_TILE[0] as f64),
     ("RESULT_TILE_Y", RESULT_TILE[1] as f64),
-    ("SHARED_FROM", SHARED_FROM as f64),
+    ("SHARED_FROM_SCALE", SHARED_FROM_SCALE as f64),
 ];
 
 /// Uniform `Frame` of `common.wgsl`, where the fields are documented.
@@ -140,7 +140,7 @@ pub struct Frame {
     pub compositing: u32,
     pub bins: u32,
     pub near_bins: u32,
-    pub reach: u32,
+    pub half_width: u32,
     pub nodes: u32,
     pub groups: u32,
     pub max_px: f32,
@@ -149,9 +149,9 @@ pub struct Frame {
     pub expansion: f32,
     pub steps_per_px: f32,
     pub mixed: u32,
-    pub even: u32,
+    pub symmetric: u32,
     pub extent: f32,
-    pub rows_apart: u32,
+    pub term_stride: u32,
     pub yuyv: u32,
     pub front_px: f32,
     /// Padding to the size of the uniform.
@@ -179,10 +179,10 @@ pub struct Bin {
     pub edges_at: u32,
     pub cells_at: u32,
     pub binned_at: u32,
-    pub reach: u32,
+    pub half_width: u32,
     pub filtered_at: u32,
     pub active_at: u32,
-    pub has_lobes: u32,
+    pub has_overshoot: u32,
 }
 
 /// Uniform `Work` of `common.wgsl`.
@@ -196,5 +196,5 @@ pub struct Work {
     pub terms: u32,
     pub last: u32,
     pub nearest_px: f32,
-    pub unhidden: [f32; 2],
+    pub visible_weight: [f32; 2],
 }

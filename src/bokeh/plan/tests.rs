@@ -23,7 +23,7 @@ fn split(plan: &mut Plan, coc_px: impl Iterator<Item = f32>) {
     let lens = DepthCoc { coc_at_infinity_px: 16.0, focus_m: 1.0, range_m: 0.0, max_coc_px: 30.0 };
     let metres: Vec<f32> = coc_px.map(|coc_px| 1.0 / (1.0 - coc_px / 16.0)).collect();
     let depth = DepthMap { width: metres.len() as u32, height: 1, metres, ..DepthMap::default() };
-    plan.split(Some(&depth), &CocField::Depth(lens));
+    plan.split_by_depth(Some(&depth), &CocField::Depth(lens));
 }
 
 #[test]
@@ -32,12 +32,12 @@ fn bins_tile_the_line_front_to_back() {
         let mut plan = Plan::new(&settings(CocKind::Depth, quality), 640, 360);
         for spread in [0.01, 0.1, 1.0] {
             split(&mut plan, (0..300).map(|k| (k - 200) as f32 * 0.15 * spread));
-            assert!(plan.bins.len() <= MAX_BINS && plan.bins.len() <= plan.slots());
+            assert!(plan.bins.len() <= MAX_BINS && plan.bins.len() <= plan.slot_count());
             assert_eq!(plan.bins[0].low_px, f32::NEG_INFINITY);
             assert_eq!(plan.bins.last().map(|b| b.high_px), Some(f32::INFINITY));
             assert!(plan.bins.windows(2).all(|w| w[0].high_px == w[1].low_px && w[0].low_px < w[1].low_px));
-            assert!(plan.bins.iter().all(|b| plan.bank.node(b.max_radius_px) < plan.bank.nodes));
-            assert!(plan.bins.iter().all(|b| b.scale >= plan.least_scale(b.slot)));
+            assert!(plan.bins.iter().all(|b| plan.bank.nearest_node(b.max_radius_px) < plan.bank.nodes));
+            assert!(plan.bins.iter().all(|b| b.scale >= plan.min_scale(b.slot)));
             let mut slots: Vec<usize> = plan.bins.iter().map(|b| b.slot).collect();
             slots.sort_unstable();
             assert!(slots.windows(2).all(|w| w[0] < w[1]));

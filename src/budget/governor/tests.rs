@@ -1,5 +1,5 @@
 use super::*;
-use crate::budget::load::{IDLE_NS, LEARN_FROM, MAX_COST_RATIO, RECENT};
+use crate::budget::load::{IDLE_NS, LEARN_FRAMES, MAX_COST_RATIO, RECENT_LOADS};
 
 const COSTS: [f64; 5] = [1.0, 1.5, 2.0, 3.0, 4.0];
 const BUDGET_NS: u64 = 1_000_000;
@@ -10,7 +10,7 @@ const PERIOD_NS: u64 = 33_000_000;
 struct Machine {
     governor: Governor<1>,
     costs: [f64; 5],
-    under_way: std::collections::VecDeque<(usize, f64)>,
+    in_flight: std::collections::VecDeque<(usize, f64)>,
     late: usize,
     now_ns: u64,
     switches: usize,
@@ -19,27 +19,27 @@ struct Machine {
 impl Machine {
     fn new(late: usize) -> Self {
         let governor = Governor::new(&COSTS, 2);
-        let under_way = std::collections::VecDeque::new();
-        Self { governor, costs: COSTS, under_way, late, now_ns: PERIOD_NS, switches: 0 }
+        let in_flight = std::collections::VecDeque::new();
+        Self { governor, costs: COSTS, in_flight, late, now_ns: PERIOD_NS, switches: 0 }
     }
 
     /// Simulates frames, ten times as slow where `spike` is true. Returns the level of each.
     fn play(&mut self, load_ns: f64, frames: usize, spike: impl Fn(usize) -> bool) -> Vec<usize> {
-        let mut rungs = Vec::new();
+        let mut levels = Vec::new();
         for frame in 0..frames {
-            let rung = self.governor.level();
-            rungs.push(rung);
-            let took_ns = load_ns * self.costs[rung] * if spike(frame) { 10.0 } else { 1.0 };
-            self.under_way.push_back((rung, took_ns));
+            let level = self.governor.level();
+            levels.push(level);
+            let took_ns = load_ns * self.costs[level] * if spike(frame) { 10.0 } else { 1.0 };
+            self.in_flight.push_back((level, took_ns));
             self.now_ns += PERIOD_NS;
-            if self.under_way.len() > self.late {
-                let (rung, took_ns) = self.under_way.pop_front().unwrap();
-                let sample = Sample { level: rung, took_ns: took_ns as u64, at_ns: self.now_ns };
-                self.governor.note(sample, BUDGET_NS);
+            if self.in_flight.len() > self.late {
+                let (level, took_ns) = self.in_flight.pop_front().unwrap();
+                let sample = Sample { level, took_ns: took_ns as u64, at_ns: self.now_ns };
+                self.governor.record(sample, BUDGET_NS);
             }
-            self.switches += usize::from(self.governor.level() != rung);
+            self.switches += usize::from(self.governor.level() != level);
         }
-        rungs
+        levels
     }
 }
 
@@ -63,11 +63,11 @@ fn down_at_once_up_after_a_while() {
         machine.play(200_000.0, 200, |_| false);
         assert_eq!(machine.governor.level(), 4);
         let down = machine.play(550_000.0, 60, |_| false);
-        assert!(down.iter().position(|&rung| rung == 1).is_some_and(|frame| frame <= 3 + late), "{down:?}");
+        assert!(down.iter().position(|&level| level == 1).is_some_and(|frame| frame <= 3 + late), "{down:?}");
         let up = machine.play(200_000.0, 200, |_| false);
-        let rose = up.iter().position(|&rung| rung == 4).unwrap();
-        assert!((PATIENCE as usize..PATIENCE as usize + RECENT + late + 1).contains(&rose), "{rose}");
-        assert!(up[..rose].iter().all(|&rung| rung == 1), "in one step");
+        let rose = up.iter().position(|&level| level == 4).unwrap();
+        assert!((PATIENCE as usize..PATIENCE as usize + RECENT_LOADS + late + 1).contains(&rose), "{rose}");
+        assert!(up[..rose].iter().all(|&level| level == 1), "in one step");
     }
 }
 
@@ -76,8 +76,8 @@ fn rare_spikes_change_nothing() {
     let mut machine = Machine::new(0);
     machine.play(400_000.0, 100, |_| false);
     let before = machine.switches;
-    let rungs = machine.play(400_000.0, 3000, |frame| frame % 100 == 50);
-    assert!(rungs.iter().all(|&rung| rung == 2));
+    let levels = machine.play(400_000.0, 3000, |frame| frame % 100 == 50);
+    assert!(levels.iter().all(|&level| level == 2));
     assert_eq!(machine.switches, before);
 }
 
@@ -109,12 +109,12 @@ fn costs_are_learnt_until_a_ladder_that_was_misjudged_does_not_pump() {
 fn a_sample_that_measures_nothing_is_none() {
     let mut governor = Governor::new(&COSTS, 3);
     for at_ns in [5, 3, 0, 9] {
-        governor.note(Sample { level: 3, took_ns: 0, at_ns }, BUDGET_NS);
-        governor.note(Sample { level: 77, took_ns: 9_000_000, at_ns }, BUDGET_NS);
+        governor.record(Sample { level: 3, took_ns: 0, at_ns }, BUDGET_NS);
+        governor.record(Sample { level: 77, took_ns: 9_000_000, at_ns }, BUDGET_NS);
     }
     assert_eq!((governor.level(), governor.expected_ns()), (3, None));
     // Decreasing timestamps are accepted.
-    (0..5).for_each(|k| governor.note(Sample { level: 3, took_ns: 9_000_000, at_ns: 50 - k }, BUDGET_NS));
+    (0..5).for_each(|k| governor.record(Sample { level: 3, took_ns: 9_000_000, at_ns: 50 - k }, BUDGET_NS));
     assert_eq!(governor.level(), 0);
 }
 
@@ -125,8 +125,8 @@ fn after_a_long_pause_only_what_is_new_counts() {
     assert_eq!(machine.governor.level(), 1);
     machine.now_ns += 10 * IDLE_NS;
     // A slow first frame (CPU clocks must rise) changes nothing, and the load before the pause is forgotten.
-    let rungs = machine.play(200_000.0, 60, |frame| frame < 1);
-    assert!(rungs.iter().all(|&rung| rung >= 1));
+    let levels = machine.play(200_000.0, 60, |frame| frame < 1);
+    assert!(levels.iter().all(|&level| level >= 1));
     assert_eq!(machine.governor.level(), 4);
 }
 
@@ -134,11 +134,11 @@ fn after_a_long_pause_only_what_is_new_counts() {
 fn late_samples_of_another_rung_decide_nothing() {
     let mut governor = Governor::new(&COSTS, 4);
     for at_ns in 1..=20 {
-        governor.note(Sample { level: 2, took_ns: 50_000_000, at_ns }, BUDGET_NS);
+        governor.record(Sample { level: 2, took_ns: 50_000_000, at_ns }, BUDGET_NS);
     }
     assert_eq!(governor.level(), 4);
     // Its own first samples do, together with those of the others.
-    (21..24).for_each(|at_ns| governor.note(Sample { level: 4, took_ns: 90_000_000, at_ns }, BUDGET_NS));
+    (21..24).for_each(|at_ns| governor.record(Sample { level: 4, took_ns: 90_000_000, at_ns }, BUDGET_NS));
     assert_eq!(governor.level(), 0);
 }
 
@@ -148,12 +148,12 @@ fn a_smaller_budget_is_heeded_at_once() {
     machine.play(240_000.0, 200, |_| false);
     assert_eq!(machine.governor.level(), 3);
     let sample = Sample { level: 3, took_ns: 720_000, at_ns: machine.now_ns };
-    machine.governor.note(sample, BUDGET_NS / 2);
+    machine.governor.record(sample, BUDGET_NS / 2);
     assert_eq!(machine.governor.level(), 1);
 }
 
 /// Simulates a load light enough for the finest level. Returns the number of frames until it is reached.
-fn frames_to_the_top(machine: &mut Machine) -> u32 {
+fn frames_until_finest(machine: &mut Machine) -> u32 {
     let rises = |_: &u32| {
         machine.play(200_000.0, 1, |_| false);
         machine.governor.level() == 4
@@ -162,42 +162,42 @@ fn frames_to_the_top(machine: &mut Machine) -> u32 {
 }
 
 /// Simulates a load that needs a step down, after enough frames that it is not attributed to a wrong cost.
-fn take_back(machine: &mut Machine) {
-    machine.play(200_000.0, LEARN_FROM, |_| false);
+fn force_step_down(machine: &mut Machine) {
+    machine.play(200_000.0, LEARN_FRAMES, |_| false);
     machine.play(400_000.0, 10, |_| false);
     assert_eq!(machine.governor.level(), 2);
 }
 
 /// Whether a step up after `frames` frames had this patience: the earlier loads must be forgotten first.
-fn is_of(patience: u32, frames: u32) -> bool {
-    (patience..=patience + RECENT as u32).contains(&frames)
+fn is_patience(patience: u32, frames: u32) -> bool {
+    (patience..=patience + RECENT_LOADS as u32).contains(&frames)
 }
 
 #[test]
 fn a_step_that_is_taken_back_is_tried_ever_more_rarely_until_one_holds() {
     let mut machine = Machine::new(0);
     for patience in [30, 60, 120, 240, 480, 960, 960] {
-        let frames = frames_to_the_top(&mut machine);
-        assert!(is_of(patience, frames), "{frames} frames where {patience} are to be");
-        take_back(&mut machine);
+        let frames = frames_until_finest(&mut machine);
+        assert!(is_patience(patience, frames), "{frames} frames where {patience} are to be");
+        force_step_down(&mut machine);
     }
-    frames_to_the_top(&mut machine);
-    machine.play(200_000.0, (REGRET * MAX_PATIENCE) as usize, |_| false);
-    take_back(&mut machine);
-    let frames = frames_to_the_top(&mut machine);
-    assert!(is_of(PATIENCE, frames), "{frames} frames after a step up that held");
+    frames_until_finest(&mut machine);
+    machine.play(200_000.0, (REVERT_FACTOR * MAX_PATIENCE) as usize, |_| false);
+    force_step_down(&mut machine);
+    let frames = frames_until_finest(&mut machine);
+    assert!(is_patience(PATIENCE, frames), "{frames} frames after a step up that held");
 }
 
 #[test]
 fn a_pause_ends_the_wait_for_the_next_try() {
     let mut machine = Machine::new(0);
     for _ in 0..4 {
-        frames_to_the_top(&mut machine);
-        take_back(&mut machine);
+        frames_until_finest(&mut machine);
+        force_step_down(&mut machine);
     }
     machine.now_ns += 2 * IDLE_NS;
-    let frames = frames_to_the_top(&mut machine);
-    assert!(is_of(PATIENCE, frames), "{frames} frames after a pause");
+    let frames = frames_until_finest(&mut machine);
+    assert!(is_patience(PATIENCE, frames), "{frames} frames after a pause");
 }
 
 #[test]
@@ -208,7 +208,7 @@ fn a_load_that_is_too_high_now_and_then_is_too_high() {
         (0..frames).flat_map(|k| machine.play(if k % 6 == 5 { 420_000.0 } else { 240_000.0 }, 1, |_| false)).collect()
     };
     play(300);
-    assert!(play(600).iter().all(|&rung| rung == 2));
+    assert!(play(600).iter().all(|&level| level == 2));
 }
 
 #[test]
@@ -219,7 +219,7 @@ fn a_step_up_goes_no_further_than_was_allowed_all_the_while() {
     // At first the fourth level fits, then the fifth.
     machine.play(280_000.0, 25, |_| false);
     let up = machine.play(200_000.0, 40, |_| false);
-    let rose: Vec<usize> = up.chunk_by(|a, b| a == b).map(|rungs| rungs[0]).collect();
+    let rose: Vec<usize> = up.chunk_by(|a, b| a == b).map(|levels| levels[0]).collect();
     assert_eq!(rose, [1, 3], "{up:?}");
     machine.play(200_000.0, 40, |_| false);
     assert_eq!(machine.governor.level(), 4);
@@ -237,8 +237,8 @@ fn no_cost_is_learnt_beyond_what_is_credible() {
 /// Returns the expected time after ten equal frames, a pause, and one faster frame.
 fn expected_after(pause_ns: u64) -> Option<u64> {
     let mut governor = Governor::new(&[1.0], 0);
-    (1..=10).for_each(|at_ns| governor.note(Sample { level: 0, took_ns: 500, at_ns }, BUDGET_NS));
-    governor.note(Sample { level: 0, took_ns: 50, at_ns: 10 + pause_ns }, BUDGET_NS);
+    (1..=10).for_each(|at_ns| governor.record(Sample { level: 0, took_ns: 500, at_ns }, BUDGET_NS));
+    governor.record(Sample { level: 0, took_ns: 50, at_ns: 10 + pause_ns }, BUDGET_NS);
     governor.expected_ns()
 }
 
@@ -250,31 +250,31 @@ fn only_a_pause_that_is_long_enough_is_one() {
 #[test]
 fn the_first_step_up_comes_with_the_last_frame_of_the_patience() {
     let mut governor = Governor::new(&COSTS, 0);
-    let mut rungs = (1..=PATIENCE).map(|frame| {
-        governor.note(Sample { level: 0, took_ns: 200_000, at_ns: u64::from(frame) }, BUDGET_NS);
+    let mut levels = (1..=PATIENCE).map(|frame| {
+        governor.record(Sample { level: 0, took_ns: 200_000, at_ns: u64::from(frame) }, BUDGET_NS);
         governor.level()
     });
-    assert_eq!((rungs.by_ref().take(PATIENCE as usize - 1).max(), rungs.next()), (Some(0), Some(4)));
+    assert_eq!((levels.by_ref().take(PATIENCE as usize - 1).max(), levels.next()), (Some(0), Some(4)));
 }
 
 #[test]
 fn a_load_that_is_about_the_budget_changes_nothing() {
-    // KEEP, relative to the median, is between these.
-    for (share_of_budget, kept) in [(0.92, true), (0.95, false)] {
+    // `KEEP_FRACTION`, relative to the median, is between these.
+    for (fraction_of_budget, kept) in [(0.92, true), (0.95, false)] {
         let mut machine = Machine::new(0);
-        machine.play(share_of_budget * BUDGET_NS as f64 / COSTS[2], 300, |_| false);
-        assert_eq!(machine.governor.level() == 2, kept, "{share_of_budget}");
+        machine.play(fraction_of_budget * BUDGET_NS as f64 / COSTS[2], 300, |_| false);
+        assert_eq!(machine.governor.level() == 2, kept, "{fraction_of_budget}");
     }
 }
 
 #[test]
 fn a_step_up_has_held_after_twice_the_patience_and_not_before() {
-    for (frames, patience) in [(REGRET * PATIENCE - 15, 2 * PATIENCE), (REGRET * PATIENCE, PATIENCE)] {
+    for (frames, patience) in [(REVERT_FACTOR * PATIENCE - 15, 2 * PATIENCE), (REVERT_FACTOR * PATIENCE, PATIENCE)] {
         let mut machine = Machine::new(0);
-        frames_to_the_top(&mut machine);
+        frames_until_finest(&mut machine);
         machine.play(200_000.0, frames as usize, |_| false);
-        take_back(&mut machine);
-        let needed = frames_to_the_top(&mut machine);
-        assert!(is_of(patience, needed), "{needed} frames after a step up that lasted {frames}");
+        force_step_down(&mut machine);
+        let needed = frames_until_finest(&mut machine);
+        assert!(is_patience(patience, needed), "{needed} frames after a step up that lasted {frames}");
     }
 }

@@ -23,13 +23,13 @@ use crate::layout::{Content, Family, FourCc, Layout, Transfer};
 #[derive(Debug)]
 pub struct Decoder {
     layout: Layout,
-    kind: Kind,
+    backend: Backend,
 }
 
 #[derive(Debug)]
-enum Kind {
-    Raw(Box<raw::Raw>),
-    Jpeg(jpeg::Jpeg),
+enum Backend {
+    Raw(Box<raw::RawDecoder>),
+    Jpeg(jpeg::MotionJpeg),
 }
 
 /// The format contains no colours.
@@ -49,12 +49,12 @@ pub enum PixelError {
         expected: usize,
     },
     /// The picture is truncated.
-    #[error("the picture is cut short: {found_bytes} of {needed_bytes} bytes")]
+    #[error("the picture is cut short: {found_bytes} of {min_size_bytes} bytes")]
     Short {
         /// Bytes passed.
         found_bytes: usize,
         /// Bytes that the layout needs.
-        needed_bytes: usize,
+        min_size_bytes: usize,
     },
     /// The JPEG is truncated or damaged.
     #[error("damaged JPEG: {0}")]
@@ -80,14 +80,14 @@ impl Decoder {
         }
         if layout.transfer == Transfer::Pq {
             tracing::warn!(
-                "the camera gives high dynamic range (SMPTE 2084), which is shown as if it were not: too dark"
+                "the camera gives high dynamic range (SMPTE 2084), which is not converted: pictures are too dark"
             );
         }
-        let kind = match layout.family() {
-            Family::Jpeg => Kind::Jpeg(jpeg::Jpeg::default()),
-            _ => Kind::Raw(Box::new(raw::Raw::new(layout))),
+        let backend = match layout.family() {
+            Family::Jpeg => Backend::Jpeg(jpeg::MotionJpeg::default()),
+            _ => Backend::Raw(Box::new(raw::RawDecoder::new(layout))),
         };
-        Ok(Self { layout: *layout, kind })
+        Ok(Self { layout: *layout, backend })
     }
 
     /// The layout of the pictures to decode.
@@ -105,9 +105,9 @@ impl Decoder {
         if planes.len() != expected {
             return Err(PixelError::Planes { found: planes.len(), expected });
         }
-        match &mut self.kind {
-            Kind::Raw(raw) => raw.decode(&self.layout, planes, out),
-            Kind::Jpeg(jpeg) => jpeg.decode(&self.layout, planes[0], out),
+        match &mut self.backend {
+            Backend::Raw(raw) => raw.decode(&self.layout, planes, out),
+            Backend::Jpeg(jpeg) => jpeg.decode(&self.layout, planes[0], out),
         }
     }
 }

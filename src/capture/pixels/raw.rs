@@ -10,7 +10,7 @@ use crate::layout::{Component, Family, Layout, Range};
 
 /// Decodes raw pictures row by row, so that intermediate rows stay in the cache.
 #[derive(Debug)]
-pub(super) struct Raw {
+pub(super) struct RawDecoder {
     arch: Arch,
     coefficients: Coefficients,
     table: Option<Box<Table>>,
@@ -30,7 +30,7 @@ struct Rows {
     colors: [Vec<u8>; 3],
 }
 
-impl Raw {
+impl RawDecoder {
     /// Creates a decoder for pictures of this layout: RGB, grey or Y'CbCr.
     pub(super) fn new(layout: &Layout) -> Self {
         let is_rgb = matches!(layout.family(), Family::Rgb24 { .. } | Family::Grey);
@@ -63,9 +63,9 @@ impl Raw {
     /// Decodes a picture of `layout` into `out` (resized to fit); fails if one of its planes is truncated.
     pub(super) fn decode(&mut self, layout: &Layout, planes: &[&[u8]], out: &mut ColorImage) -> Result<(), PixelError> {
         for (index, plane) in planes.iter().enumerate() {
-            let (found_bytes, needed_bytes) = (plane.len(), layout.needed_bytes(index));
-            if found_bytes < needed_bytes {
-                return Err(PixelError::Short { found_bytes, needed_bytes });
+            let (found_bytes, min_size_bytes) = (plane.len(), layout.min_size_bytes(index));
+            if found_bytes < min_size_bytes {
+                return Err(PixelError::Short { found_bytes, min_size_bytes });
             }
         }
         out.resize(layout.width, layout.height);
@@ -77,7 +77,7 @@ impl Raw {
 
 /// One picture to decode, compiled for each instruction set.
 struct Frame<'a> {
-    raw: &'a mut Raw,
+    raw: &'a mut RawDecoder,
     layout: &'a Layout,
     planes: &'a [&'a [u8]],
     rgb: &'a mut [u8],
@@ -98,7 +98,7 @@ impl<'a> Samples<'a> {
 
     /// Returns the nearest and the second nearest row of chroma, which has half the picture's rows, to row `y`.
     #[inline(always)]
-    fn nearest_two(self, y: usize) -> [&'a [u8]; 2] {
+    fn nearest_two_rows(self, y: usize) -> [&'a [u8]; 2] {
         let near = y / 2;
         let far = if y.is_multiple_of(2) { near.saturating_sub(1) } else { (near + 1).min(self.at.rows - 1) };
         [self.row(near), self.row(far)]
@@ -122,19 +122,19 @@ impl WithSimd for Frame<'_> {
                 Family::Rgb24 { swapped: true } => bgr_to_rgb(first.row(y), out),
                 Family::Grey => {
                     let row = first.row(y);
-                    ycc::interleave([row, row, row], out);
+                    ycc::interleave_rgb([row, row, row], out);
                 }
                 Family::Packed422 { luma, cb, cr } => {
                     raw.rows.load_packed(first.row(y), luma == 0, cb < cr);
                     raw.rows.convert_row(&raw.coefficients, None, out);
                 }
                 Family::SemiPlanar420 { swapped, .. } => {
-                    raw.rows.interpolate_semi_planar(second.nearest_two(y), swapped);
+                    raw.rows.interpolate_semi_planar(second.nearest_two_rows(y), swapped);
                     raw.rows.convert_row(&raw.coefficients, Some(first.row(y)), out);
                 }
                 Family::Planar420 { swapped, .. } => {
                     let [cb, cr] = if swapped { [third, second] } else { [second, third] };
-                    raw.rows.interpolate_planar([cb.nearest_two(y), cr.nearest_two(y)]);
+                    raw.rows.interpolate_planar([cb.nearest_two_rows(y), cr.nearest_two_rows(y)]);
                     raw.rows.convert_row(&raw.coefficients, Some(first.row(y)), out);
                 }
                 // Unreachable: these are not raw colour formats.
@@ -155,9 +155,9 @@ impl Rows {
         let [alternating, _] = &mut self.chroma;
         let (luma, alternating) = (&mut self.luma[..width], &mut alternating[..width]);
         if luma_first {
-            ycc::deinterleave(row, luma, alternating);
+            ycc::deinterleave_pairs(row, luma, alternating);
         } else {
-            ycc::deinterleave(row, alternating, luma);
+            ycc::deinterleave_pairs(row, alternating, luma);
         }
         let [cb, cr] = &mut self.half;
         let (first, second) = if cb_first { (cb, cr) } else { (cr, cb) };
@@ -208,8 +208,13 @@ impl Rows {
         }
         let [red, green, blue] = &mut self.colors;
         let (red, green, blue) = (&mut red[..width], &mut green[..width], &mut blue[..width]);
-        ycc::convert(coefficients, luma, [&full_cb[..width], &full_cr[..width]], [&mut *red, &mut *green, &mut *blue]);
-        ycc::interleave([red, green, blue], out);
+        ycc::ycc_to_rgb(
+            coefficients,
+            luma,
+            [&full_cb[..width], &full_cr[..width]],
+            [&mut *red, &mut *green, &mut *blue],
+        );
+        ycc::interleave_rgb([red, green, blue], out);
     }
 }
 

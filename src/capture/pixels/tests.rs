@@ -1,7 +1,7 @@
 //! Comparison with floating-point reference implementations, on pseudo-random bytes.
 
 use super::*;
-use crate::color::Matrix;
+use crate::color::YcbcrMatrix;
 use crate::layout::Range;
 
 /// A deterministic pseudo-random generator.
@@ -19,11 +19,11 @@ impl Random {
 }
 
 /// Converts luma and chroma of a pixel to colours by the standard's formulas.
-fn to_rgb([luma, cb, cr]: [f64; 3], matrix: Matrix, range: Range) -> [f64; 3] {
+fn to_rgb([luma, cb, cr]: [f64; 3], matrix: YcbcrMatrix, range: Range) -> [f64; 3] {
     let (red, blue) = match matrix {
-        Matrix::Bt601 => (0.299, 0.114),
-        Matrix::Bt709 => (0.2126, 0.0722),
-        Matrix::Bt2020 => (0.2627, 0.0593),
+        YcbcrMatrix::Bt601 => (0.299, 0.114),
+        YcbcrMatrix::Bt709 => (0.2126, 0.0722),
+        YcbcrMatrix::Bt2020 => (0.2627, 0.0593),
     };
     let (y, pb, pr) = match range {
         Range::Limited => ((luma - 16.0) / 219.0, (cb - 128.0) / 224.0, (cr - 128.0) / 224.0),
@@ -33,11 +33,11 @@ fn to_rgb([luma, cb, cr]: [f64; 3], matrix: Matrix, range: Range) -> [f64; 3] {
     [r, (y - red * r - blue * b) / (1.0 - red - blue), b].map(|color| color.clamp(0.0, 1.0) * 255.0)
 }
 
-fn to_ycc(rgb: [f64; 3], matrix: Matrix, range: Range) -> [f64; 3] {
+fn to_ycc(rgb: [f64; 3], matrix: YcbcrMatrix, range: Range) -> [f64; 3] {
     let (red, blue) = match matrix {
-        Matrix::Bt601 => (0.299, 0.114),
-        Matrix::Bt709 => (0.2126, 0.0722),
-        Matrix::Bt2020 => (0.2627, 0.0593),
+        YcbcrMatrix::Bt601 => (0.299, 0.114),
+        YcbcrMatrix::Bt709 => (0.2126, 0.0722),
+        YcbcrMatrix::Bt2020 => (0.2627, 0.0593),
     };
     let [r, g, b] = rgb.map(|color| color / 255.0);
     let y = red * r + (1.0 - red - blue) * g + blue * b;
@@ -86,7 +86,7 @@ fn planar(layout: &Layout, sample: usize, x: usize, y: usize, apart: usize) -> (
     }
 }
 
-fn layout(fourcc: &[u8; 4], width: u32, height: u32, matrix: Matrix, range: Range) -> Layout {
+fn layout(fourcc: &[u8; 4], width: u32, height: u32, matrix: YcbcrMatrix, range: Range) -> Layout {
     let mut layout = Layout::packed(FourCc(*fourcc), width, height).unwrap();
     (layout.matrix, layout.range) = (matrix, range);
     layout
@@ -121,7 +121,7 @@ fn chroma(get: impl Fn(usize, usize) -> f64, pairs: usize, rows: usize, down: us
 fn every_colour_is_within_one_code_of_the_definition() {
     let mut random = Random(1);
     for (fourcc, down, place) in FORMATS {
-        for matrix in [Matrix::Bt601, Matrix::Bt709, Matrix::Bt2020] {
+        for matrix in [YcbcrMatrix::Bt601, YcbcrMatrix::Bt709, YcbcrMatrix::Bt2020] {
             for range in [Range::Limited, Range::Full] {
                 for (width, height) in [(64, 24), (66, 5), (2, 1), (34, 2)] {
                     let layout = layout(fourcc, width, height, matrix, range);
@@ -150,7 +150,7 @@ fn every_colour_is_within_one_code_of_the_definition() {
 
 #[test]
 fn the_usual_error_is_that_of_rounding() {
-    let layout = layout(b"YUYV", 256, 256, Matrix::Bt601, Range::Limited);
+    let layout = layout(b"YUYV", 256, 256, YcbcrMatrix::Bt601, Range::Limited);
     let planes = memory(&layout, &mut Random(2));
     let out = decoded(&mut Decoder::new(&layout).unwrap(), &planes);
     let (mut sum, mut count) = (0.0, 0.0);
@@ -171,8 +171,8 @@ fn a_picture_comes_back_from_every_format_with_any_stride_and_size() {
     let band = |y: usize| colors[y / 8 % colors.len()].map(f64::from);
     for (fourcc, down, place) in FORMATS {
         for (width, height, extra) in [(32u32, 56u32, 0), (31, 55, 6), (1, 9, 0), (30, 56, 64)] {
-            let mut format = layout(fourcc, width, height, Matrix::Bt709, Range::Limited);
-            format = format.with_strides(extra);
+            let mut format = layout(fourcc, width, height, YcbcrMatrix::Bt709, Range::Limited);
+            format = format.with_row_padding(extra);
             let mut planes = memory(&format, &mut Random(3));
             for y in 0..height as usize {
                 for x in 0..width as usize {
@@ -206,8 +206,8 @@ fn a_picture_comes_back_from_every_format_with_any_stride_and_size() {
 
 #[test]
 fn a_lone_last_pixel_takes_the_chroma_that_it_lacks_from_its_neighbour() {
-    let format = layout(b"YUYV", 3, 1, Matrix::Bt601, Range::Full);
-    assert_eq!(format.needed_bytes(0), 6);
+    let format = layout(b"YUYV", 3, 1, YcbcrMatrix::Bt601, Range::Full);
+    assert_eq!(format.min_size_bytes(0), 6);
     let out = decoded(&mut Decoder::new(&format).unwrap(), &[vec![100, 90, 100, 170, 100, 90]]);
     assert_eq!(out.rgb[..3], out.rgb[6..]);
 }
@@ -217,7 +217,7 @@ fn rgb_and_grey_are_taken_as_they_are() {
     let mut random = Random(4);
     for (fourcc, order) in [(b"RGB3", [0, 1, 2]), (b"BGR3", [2, 1, 0]), (b"GREY", [0, 0, 0])] {
         for (width, height, extra) in [(33u32, 7u32, 0), (33, 7, 5)] {
-            let format = layout(fourcc, width, height, Matrix::Bt601, Range::Full).with_strides(extra);
+            let format = layout(fourcc, width, height, YcbcrMatrix::Bt601, Range::Full).with_row_padding(extra);
             let planes = memory(&format, &mut random);
             let out = decoded(&mut Decoder::new(&format).unwrap(), &planes);
             let bytes = if fourcc == b"GREY" { 1 } else { 3 };
@@ -228,14 +228,14 @@ fn rgb_and_grey_are_taken_as_they_are() {
             }
         }
     }
-    let limited = layout(b"GREY", 3, 1, Matrix::Bt601, Range::Limited);
+    let limited = layout(b"GREY", 3, 1, YcbcrMatrix::Bt601, Range::Limited);
     let out = decoded(&mut Decoder::new(&limited).unwrap(), &[vec![16, 126, 235]]);
     assert_eq!(out.rgb, [0, 0, 0, 128, 128, 128, 255, 255, 255]);
 }
 
 #[test]
 fn linear_light_is_put_on_the_curve() {
-    let mut format = layout(b"RGB3", 1, 1, Matrix::Bt601, Range::Full);
+    let mut format = layout(b"RGB3", 1, 1, YcbcrMatrix::Bt601, Range::Full);
     format.transfer = Transfer::Linear;
     assert_eq!(decoded(&mut Decoder::new(&format).unwrap(), &[vec![0, 55, 255]]).rgb, [0, 128, 255]);
 }
@@ -244,11 +244,11 @@ fn linear_light_is_put_on_the_curve() {
 fn every_instruction_set_gives_the_same_bytes() {
     let mut random = Random(5);
     for (fourcc, ..) in FORMATS {
-        let format = layout(fourcc, 101, 7, Matrix::Bt601, Range::Limited);
+        let format = layout(fourcc, 101, 7, YcbcrMatrix::Bt601, Range::Limited);
         let planes = memory(&format, &mut random);
         let slices: Vec<&[u8]> = planes.iter().map(Vec::as_slice).collect();
         let mut plain = ColorImage::default();
-        let mut raw = raw::Raw::new(&format).with_arch(pulp::Arch::Scalar);
+        let mut raw = raw::RawDecoder::new(&format).with_arch(pulp::Arch::Scalar);
         raw.decode(&format, &slices, &mut plain).unwrap();
         assert_eq!(decoded(&mut Decoder::new(&format).unwrap(), &planes), plain, "{}", format.fourcc);
     }
@@ -257,13 +257,13 @@ fn every_instruction_set_gives_the_same_bytes() {
 #[test]
 fn pictures_that_are_cut_short_are_refused() {
     for (fourcc, ..) in FORMATS {
-        let format = layout(fourcc, 17, 9, Matrix::Bt601, Range::Limited);
+        let format = layout(fourcc, 17, 9, YcbcrMatrix::Bt601, Range::Limited);
         let mut decoder = Decoder::new(&format).unwrap();
         let planes = memory(&format, &mut Random(6));
         let mut out = ColorImage::default();
         for short in 0..planes.len() {
             let mut slices: Vec<&[u8]> = planes.iter().map(Vec::as_slice).collect();
-            slices[short] = &slices[short][..format.needed_bytes(short) - 1];
+            slices[short] = &slices[short][..format.min_size_bytes(short) - 1];
             assert!(matches!(decoder.decode(&slices, &mut out), Err(PixelError::Short { .. })), "{fourcc:?}");
             slices[short] = &[];
             assert!(decoder.decode(&slices, &mut out).is_err());

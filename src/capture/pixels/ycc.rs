@@ -7,7 +7,7 @@
 //! Chroma comes in with 8 fractional bits, colours go out with 5, so that every product fits and a colour is within one
 //! code value of the exact one.
 
-use crate::color::Matrix;
+use crate::color::YcbcrMatrix;
 use crate::layout::Range;
 
 /// Fractional bits of colours before rounding.
@@ -26,9 +26,9 @@ pub(super) struct Coefficients {
 }
 
 impl Coefficients {
-    /// Computes the coefficients of [`convert`] for this matrix and range.
-    pub(super) fn new(matrix: Matrix, range: Range) -> Self {
-        let [red, green, blue] = matrix.weights();
+    /// Computes the coefficients of [`ycc_to_rgb`] for this matrix and range.
+    pub(super) fn new(matrix: YcbcrMatrix, range: Range) -> Self {
+        let [red, green, blue] = matrix.luma_weights();
         let (black, luma_scale, chroma_scale) = match range {
             Range::Limited => (16.0, 255.0 / 219.0, 255.0 / 224.0),
             Range::Full => (0.0, 1.0, 1.0),
@@ -63,7 +63,7 @@ fn to_byte(color: i16) -> u8 {
 
 /// Converts a row of pixels. All slices are as long as `luma`; chroma is relative to grey, times 256.
 #[inline(always)]
-pub(super) fn convert(
+pub(super) fn ycc_to_rgb(
     coefficients: &Coefficients,
     luma: &[u8],
     [cb, cr]: [&[i16]; 2],
@@ -81,7 +81,7 @@ pub(super) fn convert(
 
 /// Interleaves rows of red, green and blue into pixels.
 #[inline(always)]
-pub(super) fn interleave([red, green, blue]: [&[u8]; 3], rgb: &mut [u8]) {
+pub(super) fn interleave_rgb([red, green, blue]: [&[u8]; 3], rgb: &mut [u8]) {
     for (((pixel, &red), &green), &blue) in rgb.as_chunks_mut::<3>().0.iter_mut().zip(red).zip(green).zip(blue) {
         *pixel = [red, green, blue];
     }
@@ -89,7 +89,7 @@ pub(super) fn interleave([red, green, blue]: [&[u8]; 3], rgb: &mut [u8]) {
 
 /// Deinterleaves pairs into their first and second bytes.
 #[inline(always)]
-pub(super) fn deinterleave(pairs: &[u8], first: &mut [u8], second: &mut [u8]) {
+pub(super) fn deinterleave_pairs(pairs: &[u8], first: &mut [u8], second: &mut [u8]) {
     for ((pair, first), second) in pairs.as_chunks::<2>().0.iter().zip(first).zip(second) {
         let pair = u16::from_le_bytes(*pair);
         (*first, *second) = (pair as u8, (pair >> 8) as u8);

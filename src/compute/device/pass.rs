@@ -24,19 +24,19 @@ impl Pass {
         workgroups: [u32; 3],
     ) -> Self {
         let pipeline = device.pipeline(shader, constants);
-        let bindings = device.bindings(&pipeline, buffers.into_iter());
+        let bindings = device.create_bind_group(&pipeline, buffers.into_iter());
         Self { name: shader.name, pipeline, bindings, workgroups }
     }
 
     /// Changes the name under which the pass is timed.
     #[must_use]
-    pub fn named(self, name: &'static str) -> Self {
+    pub fn with_name(self, name: &'static str) -> Self {
         Self { name, ..self }
     }
 
     /// Binds other buffers.
-    pub fn bind<'a>(&mut self, device: &Device, buffers: impl IntoIterator<Item = wgpu::BufferBinding<'a>>) {
-        self.bindings = device.bindings(&self.pipeline, buffers.into_iter());
+    pub fn rebind<'a>(&mut self, device: &Device, buffers: impl IntoIterator<Item = wgpu::BufferBinding<'a>>) {
+        self.bindings = device.create_bind_group(&self.pipeline, buffers.into_iter());
     }
 }
 
@@ -44,12 +44,12 @@ impl Pass {
 pub struct Recorder<'a> {
     /// Encoder, for copies between passes.
     pub encoder: wgpu::CommandEncoder,
-    stamps: Option<&'a mut Stamps>,
+    stamps: Option<&'a mut Timestamps>,
 }
 
 impl<'a> Recorder<'a> {
     /// Starts recording. With `stamps`, the passes are timed.
-    pub fn new(device: &Device, mut stamps: Option<&'a mut Stamps>) -> Self {
+    pub fn new(device: &Device, mut stamps: Option<&'a mut Timestamps>) -> Self {
         if let Some(stamps) = &mut stamps {
             stamps.names.clear();
         }
@@ -58,13 +58,13 @@ impl<'a> Recorder<'a> {
     }
 
     /// Records a pass.
-    pub fn run(&mut self, pass: &Pass) {
-        self.run_by(pass, pass.workgroups);
+    pub fn record(&mut self, pass: &Pass) {
+        self.record_workgroups(pass, pass.workgroups);
     }
 
     /// Records a pass with another number of workgroups.
-    pub fn run_by(&mut self, pass: &Pass, [x, y, z]: [u32; 3]) {
-        let timestamp_writes = self.stamps.as_mut().and_then(|stamps| stamps.next_writes(pass.name));
+    pub fn record_workgroups(&mut self, pass: &Pass, [x, y, z]: [u32; 3]) {
+        let timestamp_writes = self.stamps.as_mut().and_then(|stamps| stamps.next_pass_writes(pass.name));
         let descriptor = wgpu::ComputePassDescriptor { label: Some(pass.name), timestamp_writes };
         let mut recorded = self.encoder.begin_compute_pass(&descriptor);
         recorded.set_pipeline(&pass.pipeline);
@@ -76,14 +76,14 @@ impl<'a> Recorder<'a> {
     ///
     /// # Errors
     /// The device failed, or took too long.
-    pub fn fetch<T>(
+    pub fn submit_and_read<T>(
         mut self,
         device: &Device,
         readback: &mut Readback,
         (source, bytes): (&wgpu::Buffer, u64),
         take: impl FnOnce(&[u8]) -> T,
     ) -> Result<T, GpuError> {
-        readback.copy(&mut self.encoder, source, bytes);
+        readback.record_copy(&mut self.encoder, source, bytes);
         let Self { encoder, mut stamps } = self;
         let submission = submit(device, encoder, stamps.as_deref_mut());
         readback.map();
@@ -92,7 +92,7 @@ impl<'a> Recorder<'a> {
         device.wait_for(|| !readback.is_pending())?;
         let taken = readback.read(device, take)?;
         if let Some(stamps) = stamps {
-            stamps.last = stamps.read(device)?;
+            stamps.last_times = stamps.read(device)?;
         }
         Ok(taken)
     }
@@ -106,10 +106,10 @@ impl<'a> Recorder<'a> {
 fn submit(
     device: &Device,
     mut encoder: wgpu::CommandEncoder,
-    mut stamps: Option<&mut Stamps>,
+    mut stamps: Option<&mut Timestamps>,
 ) -> wgpu::SubmissionIndex {
     if let Some(stamps) = &mut stamps {
-        stamps.fetch(&mut encoder);
+        stamps.resolve(&mut encoder);
     }
     let submission = device.queue.submit([encoder.finish()]);
     if let Some(stamps) = stamps {
@@ -119,21 +119,21 @@ fn submit(
 }
 
 /// Timestamps before and after each pass of a frame, and their readback.
-pub struct Stamps {
-    set: wgpu::QuerySet,
+pub struct Timestamps {
+    query_set: wgpu::QuerySet,
     resolved: wgpu::Buffer,
     readback: Readback,
     /// Names of the timed passes, in order; at most `capacity`.
     names: Vec<&'static str>,
     capacity: usize,
-    last: PassTimes,
+    last_times: PassTimes,
 }
 
-impl Stamps {
+impl Timestamps {
     /// Creates timestamps for `capacity` passes; later ones are not timed. `None` if the device has no timestamps.
     pub fn new(device: &Device, capacity: usize) -> Option<Self> {
         use wgpu::BufferUsages as Usage;
-        let set = || {
+        let query_set = || {
             device.device.create_query_set(&wgpu::QuerySetDescriptor {
                 label: Some("pass times"),
                 ty: wgpu::QueryType::Timestamp,
@@ -143,22 +143,22 @@ impl Stamps {
         // Two stamps of 8 bytes.
         let bytes = 16 * capacity;
         device.timestamps.then(|| Self {
-            set: set(),
-            resolved: device.buffer("stamps", bytes, Usage::QUERY_RESOLVE | Usage::COPY_SRC),
+            query_set: query_set(),
+            resolved: device.create_buffer("stamps", bytes, Usage::QUERY_RESOLVE | Usage::COPY_SRC),
             readback: Readback::new(device, "stamps back", bytes),
             names: Vec::with_capacity(capacity),
             capacity,
-            last: PassTimes::new(),
+            last_times: PassTimes::new(),
         })
     }
 
     /// Returns where the next pass writes its timestamps.
-    fn next_writes(&mut self, name: &'static str) -> Option<wgpu::ComputePassTimestampWrites<'_>> {
+    fn next_pass_writes(&mut self, name: &'static str) -> Option<wgpu::ComputePassTimestampWrites<'_>> {
         let index = 2 * self.names.len() as u32;
         (self.names.len() < self.capacity).then(|| {
             self.names.push(name);
             wgpu::ComputePassTimestampWrites {
-                query_set: &self.set,
+                query_set: &self.query_set,
                 beginning_of_pass_write_index: Some(index),
                 end_of_pass_write_index: Some(index + 1),
             }
@@ -166,14 +166,14 @@ impl Stamps {
     }
 
     /// Copies the timestamps to a buffer that the host can read.
-    fn fetch(&mut self, encoder: &mut wgpu::CommandEncoder) {
-        encoder.resolve_query_set(&self.set, 0..2 * self.names.len() as u32, &self.resolved, 0);
-        self.readback.copy(encoder, &self.resolved, self.resolved.size());
+    fn resolve(&mut self, encoder: &mut wgpu::CommandEncoder) {
+        encoder.resolve_query_set(&self.query_set, 0..2 * self.names.len() as u32, &self.resolved, 0);
+        self.readback.record_copy(encoder, &self.resolved, self.resolved.size());
     }
 
-    /// Returns the time of each pass of the last [fetch](Recorder::fetch).
-    pub fn last(&self) -> PassTimes {
-        self.last
+    /// Returns the time of each pass of the last [readback](Recorder::submit_and_read).
+    pub fn last_times(&self) -> PassTimes {
+        self.last_times
     }
 
     /// Whether the timestamps are still being read back.
@@ -205,7 +205,7 @@ impl Stamps {
 pub const UNIFORM_STRIDE: u64 = 256;
 
 /// Returns the binding of uniform number `index` in a buffer.
-pub fn uniform_at<T>(buffer: &wgpu::Buffer, index: usize) -> wgpu::BufferBinding<'_> {
+pub fn uniform_binding<T>(buffer: &wgpu::Buffer, index: usize) -> wgpu::BufferBinding<'_> {
     let size = wgpu::BufferSize::new(size_of::<T>() as u64);
     wgpu::BufferBinding { buffer, offset: index as u64 * UNIFORM_STRIDE, size }
 }

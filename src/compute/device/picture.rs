@@ -16,7 +16,7 @@ impl DevicePicture {
         use wgpu::BufferUsages as Usage;
         // Whole groups of four pixels: bytes after the last pixel are unspecified.
         let quads = (size.0 as usize * size.1 as usize).div_ceil(4);
-        let buffer = device.buffer("picture", quads * 12, Usage::STORAGE | Usage::COPY_SRC | Usage::COPY_DST);
+        let buffer = device.create_buffer("picture", quads * 12, Usage::STORAGE | Usage::COPY_SRC | Usage::COPY_DST);
         Self { device: device.device.clone(), size, buffer }
     }
 
@@ -50,12 +50,12 @@ impl DeviceFrame {
     pub fn new(device: &Device, size: (u32, u32)) -> Self {
         use wgpu::BufferUsages as Usage;
         let pixels = size.0 as usize * size.1 as usize;
-        let buffer = |label, bytes| device.buffer(label, bytes, Usage::COPY_SRC | Usage::COPY_DST);
-        Self::of(device, size, &buffer("metres", 4 * pixels), &buffer("rgb", 3 * pixels))
+        let buffer = |label, bytes| device.create_buffer(label, bytes, Usage::COPY_SRC | Usage::COPY_DST);
+        Self::from_buffers(device, size, &buffer("metres", 4 * pixels), &buffer("rgb", 3 * pixels))
     }
 
     /// Wraps buffers of `device` with usage `COPY_SRC`; their content is valid until they are overwritten.
-    pub fn of(device: &Device, size: (u32, u32), metres: &wgpu::Buffer, rgb: &wgpu::Buffer) -> Self {
+    pub fn from_buffers(device: &Device, size: (u32, u32), metres: &wgpu::Buffer, rgb: &wgpu::Buffer) -> Self {
         Self { device: device.device.clone(), size, metres: metres.clone(), rgb: rgb.clone() }
     }
 

@@ -23,7 +23,7 @@ impl Readback {
     /// Allocates `bytes` bytes.
     pub fn new(device: &Device, label: &str, bytes: usize) -> Self {
         let usage = wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST;
-        Self { buffer: device.buffer(label, bytes, usage), state: Arc::new(AtomicU8::new(READY)), copied: 0 }
+        Self { buffer: device.create_buffer(label, bytes, usage), state: Arc::new(AtomicU8::new(READY)), copied: 0 }
     }
 
     /// Returns the capacity in bytes.
@@ -32,7 +32,7 @@ impl Readback {
     }
 
     /// Records a copy of the first `bytes` of `source`, whole words.
-    pub fn copy(&mut self, encoder: &mut wgpu::CommandEncoder, source: &wgpu::Buffer, bytes: u64) {
+    pub fn record_copy(&mut self, encoder: &mut wgpu::CommandEncoder, source: &wgpu::Buffer, bytes: u64) {
         encoder.copy_buffer_to_buffer(source, 0, &self.buffer, 0, bytes);
         self.copied = bytes;
     }

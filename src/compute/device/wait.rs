@@ -7,16 +7,16 @@ use super::{Device, record_fault};
 use crate::compute::{GpuError, catch_panic};
 
 /// Interval at which a waiting thread checks for the timeout.
-const POLL: Duration = Duration::from_millis(100);
+const POLL_INTERVAL: Duration = Duration::from_millis(100);
 /// Time after which a device counts as hung once the program is to end.
-const END_PATIENCE: Duration = Duration::from_secs(1);
+const SHUTDOWN_HANG_TIMEOUT: Duration = Duration::from_secs(1);
 
 /// Whether the program is to end.
-static ENDING: AtomicBool = AtomicBool::new(false);
+static IS_SHUTTING_DOWN: AtomicBool = AtomicBool::new(false);
 
 /// Limits waiting for any device of this process to a second from now on, because the program is to end.
-pub fn end_soon() {
-    ENDING.store(true, Ordering::Relaxed);
+pub fn begin_shutdown() {
+    IS_SHUTTING_DOWN.store(true, Ordering::Relaxed);
 }
 
 impl Device {
@@ -29,7 +29,9 @@ impl Device {
         let began = Instant::now();
         loop {
             let poll = match &until {
-                Some(index) => wgpu::PollType::Wait { submission_index: Some(index.clone()), timeout: Some(POLL) },
+                Some(index) => {
+                    wgpu::PollType::Wait { submission_index: Some(index.clone()), timeout: Some(POLL_INTERVAL) }
+                }
                 None => wgpu::PollType::Poll,
             };
             // wgpu panics if the device is lost meanwhile.
@@ -63,8 +65,12 @@ impl Device {
 
     /// Whether the device counts as hung since `began`.
     fn is_hung(&self, began: Instant) -> bool {
-        let patience = if ENDING.load(Ordering::Relaxed) { self.patience.min(END_PATIENCE) } else { self.patience };
-        began.elapsed() >= patience
+        let hang_timeout = if IS_SHUTTING_DOWN.load(Ordering::Relaxed) {
+            self.hang_timeout.min(SHUTDOWN_HANG_TIMEOUT)
+        } else {
+            self.hang_timeout
+        };
+        began.elapsed() >= hang_timeout
     }
 
     /// Marks the device as hung.

@@ -89,10 +89,10 @@ fn nobody_leaves_a_pass_while_members_work_whatever_is_thrown() {
 fn parts_beyond_any_address_are_not_handed_out() {
     let mut data = [0u8; 4];
     let mut flags: Vec<AtomicBool> = (0..4).map(|_| AtomicBool::new(false)).collect();
-    let shelf = DisjointParts::new(&mut data, 1 << (usize::BITS - 1), &mut flags);
-    assert_eq!(shelf.part(0).len(), 4);
+    let parts = DisjointParts::new(&mut data, 1 << (usize::BITS - 1), &mut flags);
+    assert_eq!(parts.part(0).len(), 4);
     // Twice this size wraps to 0.
-    let second = catch_unwind(AssertUnwindSafe(|| shelf.part(2).len())).unwrap_err();
+    let second = catch_unwind(AssertUnwindSafe(|| parts.part(2).len())).unwrap_err();
     assert_eq!(second.downcast_ref::<&str>(), Some(&"each part is taken once"));
 }
 
@@ -100,9 +100,9 @@ fn parts_beyond_any_address_are_not_handed_out() {
 fn a_shelf_hands_out_each_part_once() {
     let mut data = vec![0; 10];
     let mut flags: Vec<AtomicBool> = (0..4).map(|_| AtomicBool::new(false)).collect();
-    let shelf = DisjointParts::new(&mut data, 3, &mut flags);
-    shelf.part(3).fill(7);
-    assert_eq!(shelf.part(0).len(), 3);
-    assert!(catch_unwind(AssertUnwindSafe(|| shelf.part(0).len())).is_err());
+    let parts = DisjointParts::new(&mut data, 3, &mut flags);
+    parts.part(3).fill(7);
+    assert_eq!(parts.part(0).len(), 3);
+    assert!(catch_unwind(AssertUnwindSafe(|| parts.part(0).len())).is_err());
     assert_eq!(data[9], 7);
 }

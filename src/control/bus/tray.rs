@@ -7,7 +7,7 @@ use zbus::blocking::{Connection, Proxy};
 use zbus::interface;
 use zbus::zvariant::ObjectPath;
 
-use super::Camera;
+use super::CameraObject;
 use crate::control::Request;
 
 /// The object path at which trays expect items.
@@ -20,7 +20,7 @@ const ON: &str = "bokehcam";
 const OFF: &str = "camera-disabled-symbolic";
 
 /// The tray item.
-pub(super) struct Item(pub Camera);
+pub(super) struct Item(pub CameraObject);
 
 /// A picture as width, height and bytes; always an empty list here, as icons are given by name.
 type Pixmap = (i32, i32, Vec<u8>);

@@ -25,16 +25,16 @@ pub struct Cells {
 #[derive(Clone, Copy, Debug, Default)]
 struct Cell {
     /// Whether a known background is hidden, and whether one is visible, anywhere in the cell.
-    hides: bool,
-    open: bool,
+    has_hidden: bool,
+    has_visible: bool,
     /// Whether a cell with visible background is within the blur radius, along its row, and in two dimensions.
-    beside: bool,
+    is_beside_visible: bool,
     is_selected: bool,
 }
 
 impl Cells {
     /// Classifies all cells. Returns the largest inverse depth of the surfaces that hide a known background, in 1/m.
-    pub fn survey(&mut self, workers: &mut ThreadPool, size: (usize, usize), known: &Known) -> f32 {
+    pub fn classify(&mut self, workers: &mut ThreadPool, size: (usize, usize), known: &BackgroundView) -> f32 {
         let (width, height) = size;
         self.size = size;
         let across = width.div_ceil(CELL);
@@ -44,21 +44,33 @@ impl Cells {
         let mut nearest = [0.0f32; MAX_ITEMS];
         let cells = bands.split_tiles(&mut self.cells, CELL, across);
         workers.run_each(bands.rows().zip(cells).zip(&mut nearest), &|((rows, cells), nearest)| {
-            *nearest = Arch::new().dispatch(Survey { known, width, rows, cells });
+            *nearest = Arch::new().dispatch(ClassifyCells { known, width, rows, cells });
         });
         nearest.into_iter().fold(0.0, f32::max)
     }
 
     /// Selects the cells within `radius_px`, rounded up to cells, of one with visible background.
-    pub fn spread(&mut self, radius_px: f32) {
+    pub fn select_near_visible(&mut self, radius_px: f32) {
         let radius = (radius_px / CELL as f32).ceil() as usize;
         let across = self.size.0.div_ceil(CELL);
         let down = self.cells.len() / across;
         for row in 0..down {
-            self.mark_within(|k| row * across + k, across, radius, |cell| cell.open, |cell| &mut cell.beside);
+            self.mark_within(
+                |k| row * across + k,
+                across,
+                radius,
+                |cell| cell.has_visible,
+                |cell| &mut cell.is_beside_visible,
+            );
         }
         for column in 0..across {
-            self.mark_within(|k| k * across + column, down, radius, |cell| cell.beside, |cell| &mut cell.is_selected);
+            self.mark_within(
+                |k| k * across + column,
+                down,
+                radius,
+                |cell| cell.is_beside_visible,
+                |cell| &mut cell.is_selected,
+            );
         }
     }
 
@@ -83,23 +95,23 @@ impl Cells {
 
     /// Iterates over the column ranges of the selected cells that row `y` of the picture crosses.
     #[inline(always)]
-    pub fn selected_in(&self, y: usize) -> impl Iterator<Item = Range<usize>> {
+    pub fn selected_columns(&self, y: usize) -> impl Iterator<Item = Range<usize>> {
         let (width, across) = (self.size.0, self.size.0.div_ceil(CELL));
         let cells = self.cells[y / CELL * across..][..across].iter().enumerate();
-        let is_selected = cells.filter(|(_, cell)| cell.hides && cell.is_selected);
+        let is_selected = cells.filter(|(_, cell)| cell.has_hidden && cell.is_selected);
         is_selected.map(move |(k, _)| k * CELL..((k + 1) * CELL).min(width))
     }
 }
 
 /// Classifies the cells of some rows. Returns the largest inverse depth of what hides a known background.
-struct Survey<'a> {
-    known: &'a Known<'a>,
+struct ClassifyCells<'a> {
+    known: &'a BackgroundView<'a>,
     width: usize,
     rows: Range<usize>,
     cells: &'a mut [Cell],
 }
 
-impl WithSimd for Survey<'_> {
+impl WithSimd for ClassifyCells<'_> {
     type Output = f32;
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, _: S) -> f32 {
@@ -114,7 +126,7 @@ impl WithSimd for Survey<'_> {
                 let nearest = &mut nearest[..count];
                 let (mut is_hiding, mut is_open) = (0, 0);
                 for k in 0..count {
-                    let (inverse, hiding, open) = known.classify(metres[k], rounds[k], inverse[k]);
+                    let (inverse, hiding, open) = known.classify_pixel(metres[k], rounds[k], inverse[k]);
                     let is_looked_at = u32::from(k % STEP == 0);
                     let hiding = hiding & is_looked_at;
                     is_hiding |= hiding;
@@ -122,8 +134,8 @@ impl WithSimd for Survey<'_> {
                     let inverse = if hiding != 0 { inverse } else { 0.0 };
                     nearest[k] = if inverse > nearest[k] { inverse } else { nearest[k] };
                 }
-                cell.hides |= is_hiding != 0;
-                cell.open |= is_open != 0;
+                cell.has_hidden |= is_hiding != 0;
+                cell.has_visible |= is_open != 0;
             }
         }
         nearest.into_iter().fold(0.0, f32::max)
@@ -132,17 +144,17 @@ impl WithSimd for Survey<'_> {
 
 /// The remembered background, and the map in front of it.
 #[derive(Clone, Copy)]
-pub struct Known<'a> {
+pub struct BackgroundView<'a> {
     /// Depth of the map's pixels, in metres.
     pub metres: &'a [f32],
     /// Number of rounds in which the background was seen, and its inverse depth, in 1/m.
     pub rounds: &'a [u8],
     pub inverse: &'a [f32],
     /// Minimum step of inverse depth between different surfaces, in 1/m.
-    pub other: f32,
+    pub surface_step: f32,
 }
 
-impl<'a> Known<'a> {
+impl<'a> BackgroundView<'a> {
     /// Returns `count` pixels from `at` on: depth, and of the background, rounds and inverse depth.
     #[inline(always)]
     pub fn pixels(&self, at: usize, count: usize) -> (&'a [f32], &'a [u8], &'a [f32]) {
@@ -151,9 +163,9 @@ impl<'a> Known<'a> {
 
     /// Returns a pixel's inverse depth, and whether it hides a known background, or shows it: 1 or 0.
     #[inline(always)]
-    pub fn classify(&self, metres: f32, rounds: u8, inverse: f32) -> (f32, u32, u32) {
-        let own = DepthMap::inverse_of(metres);
-        let (is_known, is_before) = (rounds >= MIN_ROUNDS, own - inverse > self.other);
+    pub fn classify_pixel(&self, metres: f32, rounds: u8, inverse: f32) -> (f32, u32, u32) {
+        let own = DepthMap::inverse_depth(metres);
+        let (is_known, is_before) = (rounds >= MIN_ROUNDS, own - inverse > self.surface_step);
         (own, u32::from(is_known & is_before), u32::from(is_known & !is_before))
     }
 }

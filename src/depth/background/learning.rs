@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use pulp::{Arch, WithSimd};
 
-use super::{Background, FRAMES_PER_UPDATE};
+use super::{BackgroundMemory, FRAMES_PER_UPDATE};
 use crate::compute::bands::Bands;
 use crate::compute::thread_pool::ThreadPool;
 use crate::depth::bits::Bits;
@@ -30,90 +30,96 @@ const BLOCK: usize = 32;
 
 /// One value per pixel of a block, and the same with its neighbours.
 type Lanes<T> = [T; BLOCK];
-type Wide = [f32; BLOCK + 2 * CLEAR_PX];
+type WideLanes = [f32; BLOCK + 2 * CLEAR_PX];
 
-impl Background {
-    /// Updates the background from the rows that are due. A step of inverse depth above `other` is another surface.
-    pub(super) fn learn_rows(&mut self, workers: &mut ThreadPool, (map, color): (&DepthMap, &ColorImage), other: f32) {
-        let (size, lesson) = (self.size, self.frame / FRAMES_PER_UPDATE);
+impl BackgroundMemory {
+    /// Updates the background from the rows that are due. A step of inverse depth above `surface_step` is another
+    /// surface.
+    pub(super) fn update_rows(
+        &mut self,
+        workers: &mut ThreadPool,
+        (map, color): (&DepthMap, &ColorImage),
+        surface_step: f32,
+    ) {
+        let (size, update_index) = (self.size, self.frame / FRAMES_PER_UPDATE);
         self.assign_revision();
         self.mixed.clear(size);
         for pixel in &map.matte.pixels {
             self.mixed.set(pixel.at as usize % size.0, pixel.at as usize / size.0);
         }
         let Self { rgb, inverse, rounds, mixed, codes, .. } = self;
-        let view = View { map, color, other, mixed, codes, size, lesson };
+        let view = UpdateInput { map, color, surface_step, mixed, codes, size, update_index };
         let bands = Bands::new(size.1, 1, workers);
         let planes = bands.split(rgb, 3 * size.0).zip(bands.split(inverse, size.0)).zip(bands.split(rounds, size.0));
         workers.run_each(bands.rows().zip(planes), &|(rows, ((rgb, inverse), rounds))| {
-            Arch::new().dispatch(Learn { view: &view, rows, rgb, inverse, rounds });
+            Arch::new().dispatch(UpdateRows { view: &view, rows, rgb, inverse, rounds });
         });
     }
 }
 
 /// The input of an update.
-struct View<'a> {
+struct UpdateInput<'a> {
     map: &'a DepthMap,
     color: &'a ColorImage,
-    other: f32,
+    surface_step: f32,
     mixed: &'a Bits,
     /// Per code and channel, the code at the exposure of the remembered picture.
     codes: &'a [[u8; 256]; 3],
     size: (usize, usize),
-    lesson: usize,
+    update_index: usize,
 }
 
 /// Updates some rows.
-struct Learn<'a> {
-    view: &'a View<'a>,
+struct UpdateRows<'a> {
+    view: &'a UpdateInput<'a>,
     rows: Range<usize>,
     rgb: &'a mut [u8],
     inverse: &'a mut [f32],
     rounds: &'a mut [u8],
 }
 
-impl WithSimd for Learn<'_> {
+impl WithSimd for UpdateRows<'_> {
     type Output = ();
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, _: S) {
         let Self { view, rows, rgb, inverse, rounds } = self;
         let (width, first) = (view.size.0, rows.start);
-        for y in rows.filter(|y| y % ROWS == view.lesson % ROWS) {
+        for y in rows.filter(|y| y % ROWS == view.update_index % ROWS) {
             for begin in (0..width).step_by(BLOCK) {
                 let count = (width - begin).min(BLOCK);
                 let at = (y - first) * width + begin;
                 let rounds = &mut rounds[at..][..count];
-                view.learn((begin, y), &mut rgb[3 * at..][..3 * count], &mut inverse[at..][..count], rounds);
+                view.update_block((begin, y), &mut rgb[3 * at..][..3 * count], &mut inverse[at..][..count], rounds);
             }
         }
     }
 }
 
-impl View<'_> {
+impl UpdateInput<'_> {
     /// Updates a block that begins at a pixel.
     #[inline(always)]
-    fn learn(&self, (begin, y): (usize, usize), rgb: &mut [u8], inverse: &mut [f32], rounds: &mut [u8]) {
-        let (other, count, at) = (self.other, rounds.len().min(BLOCK), y * self.size.0 + begin);
+    fn update_block(&self, (begin, y): (usize, usize), rgb: &mut [u8], inverse: &mut [f32], rounds: &mut [u8]) {
+        let (surface_step, count, at) = (self.surface_step, rounds.len().min(BLOCK), y * self.size.0 + begin);
         let (inverse, rounds) = (&mut inverse[..count], &mut rounds[..count]);
-        let round = self.lesson / ROWS;
+        let round = self.update_index / ROWS;
         let (fades, refreshes) = (round.is_multiple_of(FADE_ROUNDS), (round + y).is_multiple_of(REFRESH_ROUNDS));
         let (mut own, mut steps) = ([0.0; BLOCK], [0.0; BLOCK]);
         let metres = &self.map.metres[at..][..count];
         let (mut seen, mut is_hidden, mut is_sure) = ([0u32; BLOCK], [false; BLOCK], [true; BLOCK]);
         let mut is_idle = true;
         for k in 0..count {
-            own[k] = DepthMap::inverse_of(metres[k]);
+            own[k] = DepthMap::inverse_depth(metres[k]);
             steps[k] = own[k] - inverse[k];
             seen[k] = u32::from(rounds[k]);
-            is_hidden[k] = (steps[k] > other) & (seen[k] > 0);
-            is_sure[k] = (seen[k] >= u32::from(SURE)) & (steps[k] >= -other) & !refreshes;
+            is_hidden[k] = (steps[k] > surface_step) & (seen[k] > 0);
+            is_sure[k] = (seen[k] >= u32::from(SURE)) & (steps[k] >= -surface_step) & !refreshes;
             is_idle &= if is_hidden[k] { !fades } else { is_sure[k] };
         }
         // Most blocks are well known, or hidden.
         if is_idle {
             return;
         }
-        let is_clear = self.clear((begin, y), &own, count);
+        let is_clear = self.find_clear_pixels((begin, y), &own, count);
         let (mut now, mut kept) = ([[0i32; BLOCK]; 3], [[0i32; BLOCK]; 3]);
         let codes = &self.color.rgb[3 * at..][..3 * count];
         for k in 0..count {
@@ -127,7 +133,7 @@ impl View<'_> {
         for k in 0..count {
             let apart = [now[0][k] - kept[0][k], now[1][k] - kept[1][k], now[2][k] - kept[2][k]];
             let is_alike = (apart[0].abs() <= CHANGED) & (apart[1].abs() <= CHANGED) & (apart[2].abs() <= CHANGED);
-            let is_same = (seen[k] > 0) & (steps[k].abs() <= other) & is_alike;
+            let is_same = (seen[k] > 0) & (steps[k].abs() <= surface_step) & is_alike;
             let learns = !is_hidden[k] & !is_sure[k] & is_clear[k];
             for p in 0..3 {
                 let moved = if is_same { (apart[p] + turn).div_euclid(MEMORY) } else { apart[p] };
@@ -149,8 +155,8 @@ impl View<'_> {
 
     /// Returns which pixels of a block are clear of other surfaces; `own` is their inverse depth.
     #[inline(always)]
-    fn clear(&self, (begin, y): (usize, usize), own: &Lanes<f32>, count: usize) -> Lanes<bool> {
-        let ((width, height), metres, other) = (self.size, &self.map.metres, self.other);
+    fn find_clear_pixels(&self, (begin, y): (usize, usize), own: &Lanes<f32>, count: usize) -> Lanes<bool> {
+        let ((width, height), metres, surface_step) = (self.size, &self.map.metres, self.surface_step);
         let first = begin.saturating_sub(CLEAR_PX);
         let (top, bottom) = (y.saturating_sub(CLEAR_PX), (y + CLEAR_PX).min(height - 1));
         let mut mixed = 0;
@@ -162,21 +168,21 @@ impl View<'_> {
         for by in 0..=2 * CLEAR_PX {
             close |= mixed >> by;
         }
-        let mut wide: Wide = [0.0; BLOCK + 2 * CLEAR_PX];
+        let mut wide: WideLanes = [0.0; BLOCK + 2 * CLEAR_PX];
         wide[CLEAR_PX..][..BLOCK].copy_from_slice(own);
         for k in 0..CLEAR_PX {
             let (left, right) = ((begin + k).saturating_sub(CLEAR_PX), (begin + count + k).min(width - 1));
-            wide[k] = DepthMap::inverse_of(metres[y * width + left]);
-            wide[CLEAR_PX + count + k] = DepthMap::inverse_of(metres[y * width + right]);
+            wide[k] = DepthMap::inverse_depth(metres[y * width + left]);
+            wide[CLEAR_PX + count + k] = DepthMap::inverse_depth(metres[y * width + right]);
         }
         let above = &metres[top * width + begin..][..count];
         let below = &metres[bottom * width + begin..][..count];
         let (left, right) = (&wide[..BLOCK], &wide[2 * CLEAR_PX..][..BLOCK]);
         let mut is_clear = [false; BLOCK];
         for k in 0..count {
-            let (above, below) = (DepthMap::inverse_of(above[k]), DepthMap::inverse_of(below[k]));
-            let is_flat = ((above - own[k]).abs() <= other) & ((below - own[k]).abs() <= other);
-            let is_level = ((left[k] - own[k]).abs() <= other) & ((right[k] - own[k]).abs() <= other);
+            let (above, below) = (DepthMap::inverse_depth(above[k]), DepthMap::inverse_depth(below[k]));
+            let is_flat = ((above - own[k]).abs() <= surface_step) & ((below - own[k]).abs() <= surface_step);
+            let is_level = ((left[k] - own[k]).abs() <= surface_step) & ((right[k] - own[k]).abs() <= surface_step);
             is_clear[k] = is_flat & is_level & ((close >> k) as u32 & 1 == 0);
         }
         is_clear

@@ -6,36 +6,36 @@
 //! else was put between, and all are if the camera moves.
 
 mod cells;
-mod cover;
-mod doubt;
+mod covering;
 mod learning;
 mod reveal;
+mod verification;
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use crate::color::light_of_codes;
+use crate::color::srgb_to_linear_table;
 use crate::compute::thread_pool::ThreadPool;
 use crate::frame::{ColorImage, DepthMap, MixedPixel};
 use crate::optics::DepthCoc;
 
 use super::alignment::{Aligner, Alignment};
 use super::bits::Bits;
-use super::matting::{Behind, FROM_PX, Matting};
+use super::matting::{KnownBackground, MIN_STEP_PX, Matting};
 use super::reduced::{MAX_VALUE, Reducer, block_px, reduced_size};
 use cells::Cells;
-use doubt::Witness;
+use verification::OutlineEvidence;
 
 /// Minimum difference of the CoC between different surfaces, in pixels.
-const OTHER_PX: f32 = 2.0 * FROM_PX;
+const SURFACE_STEP_PX: f32 = 2.0 * MIN_STEP_PX;
 /// Interval of the updates, in frames.
 const FRAMES_PER_UPDATE: usize = 4;
 /// Number of rounds from which on a pixel is known; each round updates every row once.
 const MIN_ROUNDS: u8 = 2;
 /// The camera counts as moved if the alignment is off by more than this, in pixels, or if a larger fraction of the
-/// remembered pixels differs by more than `UNLIKE` (of [`MAX_VALUE`]).
+/// remembered pixels differs by more than `CHANGE_THRESHOLD` (of [`MAX_VALUE`]).
 const MOVED_PX: f32 = 1.0;
-const MAX_UNLIKE: f32 = 0.25;
-const UNLIKE: f32 = 24.0;
+const MAX_CHANGED: f32 = 0.25;
+const CHANGE_THRESHOLD: f32 = 24.0;
 /// Time without updates after a camera movement.
 const PAUSE_NS: u64 = 500_000_000;
 /// Frames further apart in media time are unrelated: the memory starts anew.
@@ -43,15 +43,15 @@ const MAX_GAP_NS: u64 = 2_000_000_000;
 
 /// A memory of the hidden background.
 #[derive(Debug)]
-pub struct Background {
+pub struct BackgroundMemory {
     size: (usize, usize),
     /// Per pixel: sRGB at the initial exposure, inverse depth in 1/m, and number of rounds in which it was seen.
     rgb: Vec<u8>,
     inverse: Vec<f32>,
     rounds: Vec<u8>,
     /// Inverse depth of the covering surface, in 1/m; 0 without one.
-    cover: Vec<f32>,
-    /// A number unique to this content of the three ([`Behind::revision`]).
+    covering: Vec<f32>,
+    /// A number unique to this content of the three ([`KnownBackground::revision`]).
     revision: u64,
     frame: usize,
     time_ns: u64,
@@ -59,12 +59,12 @@ pub struct Background {
     resumes_ns: u64,
     /// The memory in reduced resolution; whether each pixel has a value, and whether it is excluded from the alignment.
     reduced: Vec<[f32; 3]>,
-    has: Vec<bool>,
+    has_value: Vec<bool>,
     hidden: Vec<bool>,
     /// Whether it is visible and looks different from the memory.
-    unlike: Vec<bool>,
+    changed: Vec<bool>,
     /// Evidence from beside the outlines, per cell.
-    witnesses: Vec<Witness>,
+    cell_evidence: Vec<OutlineEvidence>,
     reducer: Reducer,
     now: Vec<[f32; 3]>,
     aligner: Aligner,
@@ -81,29 +81,29 @@ pub struct Background {
     pixels: Vec<Vec<MixedPixel>>,
 }
 
-impl Default for Background {
+impl Default for BackgroundMemory {
     fn default() -> Self {
         Self {
             size: (0, 0),
             rgb: Vec::new(),
             inverse: Vec::new(),
             rounds: Vec::new(),
-            cover: Vec::new(),
+            covering: Vec::new(),
             revision: 0,
             frame: 0,
             time_ns: 0,
             resumes_ns: 0,
             reduced: Vec::new(),
-            has: Vec::new(),
+            has_value: Vec::new(),
             hidden: Vec::new(),
-            unlike: Vec::new(),
-            witnesses: Vec::new(),
+            changed: Vec::new(),
+            cell_evidence: Vec::new(),
             reducer: Reducer::default(),
             now: Vec::new(),
             aligner: Aligner::default(),
             gain: [1.0; 3],
             light: Box::new([[0.0; 256]; 3]),
-            own_light: light_of_codes(),
+            own_light: srgb_to_linear_table(),
             codes: Box::new([[0; 256]; 3]),
             mixed: Bits::default(),
             cells: Cells::default(),
@@ -112,10 +112,10 @@ impl Default for Background {
     }
 }
 
-impl Background {
+impl BackgroundMemory {
     /// Updates the memory from the picture at media time `time_ns` and its depth map, which has no holes and has its
     /// matte. `lens` defines which surfaces differ. Resets the memory if the map and the picture differ in size.
-    pub fn learn(
+    pub fn update(
         &mut self,
         workers: &mut ThreadPool,
         (map, color): (&DepthMap, &ColorImage),
@@ -137,15 +137,15 @@ impl Background {
         if time_ns < self.resumes_ns || !self.frame.is_multiple_of(FRAMES_PER_UPDATE) {
             return;
         }
-        let other = lens.inverse_depth_of_px(OTHER_PX);
-        if !self.align(map, color, other) {
+        let surface_step = lens.inverse_depth_step(SURFACE_STEP_PX);
+        if !self.estimate_exposure(map, color, surface_step) {
             self.reset(size);
             self.resumes_ns = time_ns.saturating_add(PAUSE_NS);
             return;
         }
-        self.learn_rows(workers, (map, color), other);
-        self.check_outlines(map, color, other);
-        self.forget_changed(map, color, other);
+        self.update_rows(workers, (map, color), surface_step);
+        self.check_outlines(map, color, surface_step);
+        self.forget_changed(map, color, surface_step);
     }
 
     /// Finds the matte of a picture by `matting`, using the known background.
@@ -156,9 +156,9 @@ impl Background {
         (map, color): (&mut DepthMap, &ColorImage),
         lens: &DepthCoc,
     ) {
-        let (jump, other) = [FROM_PX, OTHER_PX].map(|px| lens.inverse_depth_of_px(px)).into();
-        let behind = self.is_usable_for(color).then(|| self.as_behind(other));
-        matting.find_before(workers, (map, color), jump, behind.as_ref());
+        let (depth_step, surface_step) = [MIN_STEP_PX, SURFACE_STEP_PX].map(|px| lens.inverse_depth_step(px)).into();
+        let background = self.is_usable_for(color).then(|| self.as_known_background(surface_step));
+        matting.find_with_background(workers, (map, color), depth_step, background.as_ref());
     }
 
     /// Whether the memory is usable for a picture of this size.
@@ -166,10 +166,11 @@ impl Background {
         self.size == (color.width as usize, color.height as usize) && self.time_ns >= self.resumes_ns
     }
 
-    /// Returns the remembered background, for surfaces that are more than `other` of inverse depth apart, in 1/m.
-    fn as_behind(&self, other: f32) -> Behind<'_> {
+    /// Returns the remembered background, for surfaces that are more than `surface_step` of inverse depth apart, in
+    /// 1/m.
+    fn as_known_background(&self, surface_step: f32) -> KnownBackground<'_> {
         let Self { rgb, inverse, rounds, light, revision, .. } = self;
-        Behind { rgb, inverse, rounds, known: MIN_ROUNDS, light, other, revision: *revision }
+        KnownBackground { rgb, inverse, rounds, min_rounds: MIN_ROUNDS, light, surface_step, revision: *revision }
     }
 
     /// Resets the memory.
@@ -180,8 +181,8 @@ impl Background {
         self.inverse.resize(count, 0.0);
         self.rounds.clear();
         self.rounds.resize(count, 0);
-        self.cover.clear();
-        self.cover.resize(count, 0.0);
+        self.covering.clear();
+        self.covering.resize(count, 0.0);
         self.reduced.clear();
         self.gain = [1.0; 3];
         self.assign_revision();
@@ -194,17 +195,17 @@ impl Background {
     }
 
     /// Estimates the current exposure, and returns whether the camera has stayed in place.
-    fn align(&mut self, map: &DepthMap, color: &ColorImage, other: f32) -> bool {
+    fn estimate_exposure(&mut self, map: &DepthMap, color: &ColorImage, surface_step: f32) -> bool {
         let size = reduced_size(color);
         let block_px = block_px(color.width);
         self.reducer.reduce(color, &mut self.now);
-        let Self { now, reduced, has, hidden, rounds, inverse, .. } = self;
+        let Self { now, reduced, has_value, hidden, rounds, inverse, .. } = self;
         if reduced.len() != now.len() {
             reduced.clone_from(now);
-            has.clear();
-            has.resize(now.len(), false);
+            has_value.clear();
+            has_value.resize(now.len(), false);
             hidden.resize(now.len(), false);
-            self.unlike.resize(now.len(), false);
+            self.changed.resize(now.len(), false);
             self.aligner.forget();
         }
         let middle = |at: usize, count: usize| (at * block_px + block_px / 2).min(count - 1);
@@ -213,11 +214,12 @@ impl Background {
                 let (at, place) =
                     (row * size.0 + column, middle(row, self.size.1) * self.size.0 + middle(column, self.size.0));
                 let is_known = rounds[place] >= MIN_ROUNDS;
-                let is_seen = is_known && (DepthMap::inverse_of(map.metres[place]) - inverse[place]).abs() <= other;
-                hidden[at] = !(is_seen && has[at]);
-                if is_seen && !has[at] {
+                let is_seen =
+                    is_known && (DepthMap::inverse_depth(map.metres[place]) - inverse[place]).abs() <= surface_step;
+                hidden[at] = !(is_seen && has_value[at]);
+                if is_seen && !has_value[at] {
                     // Remembered values are at the initial exposure.
-                    (reduced[at], has[at]) = (std::array::from_fn(|p| now[at][p] / self.gain[p]), true);
+                    (reduced[at], has_value[at]) = (std::array::from_fn(|p| now[at][p] / self.gain[p]), true);
                     self.aligner.forget();
                 }
             }
@@ -232,13 +234,14 @@ impl Background {
             codes.iter_mut().zip(0..=255).for_each(|(code, now)| *code = self.reducer.without_gain(now, gain));
         }
         let mut counts = [0usize; 2];
-        for (((now, then), hidden), unlike) in now.iter().zip(&*reduced).zip(&*hidden).zip(&mut self.unlike) {
-            let is_unlike =
-                (0..3).any(|p| then[p] * self.gain[p] < MAX_VALUE && (now[p] - then[p] * self.gain[p]).abs() > UNLIKE);
-            *unlike = is_unlike & !hidden;
-            counts[usize::from(is_unlike)] += usize::from(!hidden);
+        for (((now, then), hidden), changed) in now.iter().zip(&*reduced).zip(&*hidden).zip(&mut self.changed) {
+            let is_changed = (0..3).any(|p| {
+                then[p] * self.gain[p] < MAX_VALUE && (now[p] - then[p] * self.gain[p]).abs() > CHANGE_THRESHOLD
+            });
+            *changed = is_changed & !hidden;
+            counts[usize::from(is_changed)] += usize::from(!hidden);
         }
         let [x, y] = alignment.shift.map(|shift| shift * block_px as f32);
-        x.hypot(y) <= MOVED_PX && counts[1] as f32 <= MAX_UNLIKE * (counts[0] + counts[1]) as f32
+        x.hypot(y) <= MOVED_PX && counts[1] as f32 <= MAX_CHANGED * (counts[0] + counts[1]) as f32
     }
 }

@@ -4,27 +4,33 @@ use std::ops::Range;
 
 use pulp::{Arch, WithSimd};
 
-use super::cells::{CELL, Known};
-use super::{Background, OTHER_PX};
+use super::cells::{BackgroundView, CELL};
+use super::{BackgroundMemory, SURFACE_STEP_PX};
 use crate::compute::bands::Bands;
 use crate::compute::thread_pool::ThreadPool;
 use crate::depth::matting::light_at;
 use crate::frame::{ColorImage, DepthMap, Matte, MixedPixel};
 use crate::optics::DepthCoc;
 
-impl Background {
+impl BackgroundMemory {
     /// Adds the hidden background to the matte of a map, for pixels within the blur radius of a visible background.
-    pub fn reveal(&mut self, workers: &mut ThreadPool, map: &mut DepthMap, color: &ColorImage, lens: &DepthCoc) {
+    pub fn reveal_background(
+        &mut self,
+        workers: &mut ThreadPool,
+        map: &mut DepthMap,
+        color: &ColorImage,
+        lens: &DepthCoc,
+    ) {
         let size = self.size;
         if map.size() != color.size() || !self.is_usable_for(color) {
             return;
         }
         let mut cells = std::mem::take(&mut self.cells);
         let mut pixels = std::mem::take(&mut self.pixels);
-        let other = lens.inverse_depth_of_px(OTHER_PX);
-        let known = Known { metres: &map.metres, rounds: &self.rounds, inverse: &self.inverse, other };
-        let nearest = cells.survey(workers, size, &known);
-        cells.spread(lens.coc_px(0.0).max(-lens.coc_px(nearest.recip())));
+        let surface_step = lens.inverse_depth_step(SURFACE_STEP_PX);
+        let known = BackgroundView { metres: &map.metres, rounds: &self.rounds, inverse: &self.inverse, surface_step };
+        let nearest = cells.classify(workers, size, &known);
+        cells.select_near_visible(lens.coc_px(0.0).max(-lens.coc_px(nearest.recip())));
         self.cells = cells;
         let bands = Bands::new(size.1, 1, workers);
         pixels.resize_with(bands.rows().count(), Vec::new);
@@ -44,7 +50,7 @@ impl Background {
 
     /// Creates the matte entry of a pixel at `metres` that hides a known background.
     #[inline(always)]
-    fn behind(&self, at: usize, metres: f32, rgb: &[u8]) -> MixedPixel {
+    fn create_mixed_pixel(&self, at: usize, metres: f32, rgb: &[u8]) -> MixedPixel {
         let (light, own) = (light_at(&self.rgb, &self.light, at), &rgb[3 * at..][..3]);
         let mut difference = [0.0; 3];
         for p in 0..3 {
@@ -57,10 +63,10 @@ impl Background {
 
 /// Merges the mixed pixels of some rows with the pixels that hide a background.
 struct Reveal<'a> {
-    background: &'a Background,
+    background: &'a BackgroundMemory,
     map: &'a DepthMap,
     color: &'a ColorImage,
-    known: &'a Known<'a>,
+    known: &'a BackgroundView<'a>,
     rows: Range<usize>,
     pixels: &'a mut Vec<MixedPixel>,
 }
@@ -74,21 +80,21 @@ impl WithSimd for Reveal<'_> {
         pixels.clear();
         let mut mixed = map.matte.within(rows.start * width..rows.end * width);
         for y in rows {
-            for columns in background.cells.selected_in(y) {
+            for columns in background.cells.selected_columns(y) {
                 let (first, end) = (y * width + columns.start, y * width + columns.end);
-                pixels.extend_from_slice(take_before(&mut mixed, first));
+                pixels.extend_from_slice(split_off_before(&mut mixed, first));
                 let (metres, rounds, inverse) = known.pixels(first, columns.len());
                 let mut is_hiding = [0; CELL];
                 let hiding = &mut is_hiding[..columns.len()];
                 for k in 0..hiding.len() {
-                    hiding[k] = known.classify(metres[k], rounds[k], inverse[k]).1;
+                    hiding[k] = known.classify_pixel(metres[k], rounds[k], inverse[k]).1;
                 }
-                let mut here = take_before(&mut mixed, end).iter().peekable();
+                let mut here = split_off_before(&mut mixed, end).iter().peekable();
                 for (k, hides) in hiding.iter().enumerate() {
                     let at = first + k;
                     match here.next_if(|pixel| pixel.at as usize == at) {
                         Some(pixel) => pixels.push(*pixel),
-                        None if *hides != 0 => pixels.push(background.behind(at, metres[k], &color.rgb)),
+                        None if *hides != 0 => pixels.push(background.create_mixed_pixel(at, metres[k], &color.rgb)),
                         None => {}
                     }
                 }
@@ -100,7 +106,7 @@ impl WithSimd for Reveal<'_> {
 
 /// Splits off the pixels before index `at`.
 #[inline(always)]
-fn take_before<'a>(pixels: &mut &'a [MixedPixel], at: usize) -> &'a [MixedPixel] {
+fn split_off_before<'a>(pixels: &mut &'a [MixedPixel], at: usize) -> &'a [MixedPixel] {
     let mut count = 0;
     while pixels.get(count).is_some_and(|pixel| (pixel.at as usize) < at) {
         count += 1;

@@ -87,7 +87,7 @@ impl Persons {
 
     fn detect(&mut self, seen: FrameInput) {
         self.places.clear();
-        let Some(Mask { width, height, alpha: share }) = self.finder.persons(seen) else { return };
+        let Some(Mask { width, height, alpha: share }) = self.finder.segment_persons(seen) else { return };
         let (columns, rows) = (*width as usize, *height as usize);
         self.size = (columns, rows);
         let head = (HEAD * rows as f32).ceil() as usize;
@@ -236,13 +236,13 @@ mod tests {
     }
 
     impl Companion for Room {
-        fn persons(&mut self, _: FrameInput) -> Option<&Mask> {
+        fn segment_persons(&mut self, _: FrameInput) -> Option<&Mask> {
             self.looks += 1;
             assert!(self.looks < 20, "not with every frame");
             Some(&self.mask)
         }
 
-        fn measure_behind(&mut self, _: &ColorImage, _: &Mask, _: &mut DepthMap) {
+        fn measure_background(&mut self, _: &ColorImage, _: &Mask, _: &mut DepthMap) {
             unreachable!("depth is measured")
         }
     }

@@ -86,7 +86,7 @@ fn measure(map: &DepthMap, object: Object, (radius, tolerance): ([f32; 2], f32))
     for y in range(1) {
         for x in range(0) {
             let metres = map.metres[y * size[0] + x];
-            let inverse = DepthMap::inverse_of(metres);
+            let inverse = DepthMap::inverse_depth(metres);
             if DepthMap::is_known(metres) && (inverse - object.dioptres).abs() <= tolerance {
                 count += 1.0;
                 dioptres += inverse;

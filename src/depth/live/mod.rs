@@ -17,7 +17,7 @@ use super::{DepthError, DepthSource, FrameInput};
 use crate::clock::Clock;
 use crate::frame::DepthMap;
 use crate::layout::Content;
-use crate::v4l2::live::{Live, ModeRequest, Next, OpenError};
+use crate::v4l2::live::{LiveDevice, ModeRequest, Next, OpenError};
 use pairing::Pairing;
 
 /// Age of the newest map in ns from which a warning is logged.
@@ -31,7 +31,7 @@ const MAX_POLLS: usize = 8;
 
 /// A depth camera with its conversion, registration and pairing.
 pub struct LiveDepth {
-    live: Live,
+    live: LiveDevice,
     units: Units,
     registration: Option<Registration>,
     pairing: Pairing,
@@ -46,10 +46,10 @@ impl LiveDepth {
     /// # Errors
     /// Fails if the camera does not exist, is busy, or does not deliver depth.
     pub fn open(name: &str, units: Units, registration: Option<Registration>, clock: Clock) -> Result<Self, OpenError> {
-        let live = Live::open(name, ModeRequest::any(Content::Depth), Vec::new(), clock.clone())?;
+        let live = LiveDevice::open(name, ModeRequest::for_content(Content::Depth), Vec::new(), clock.clone())?;
         if registration.is_none() {
             tracing::info!(
-                "{}: taken to see what the colour camera sees; --depth-calibration says how it stands beside it",
+                "{}: assumed to see the same as the colour camera; if it does not, give --depth-calibration",
                 live.name()
             );
         }
@@ -68,7 +68,7 @@ impl LiveDepth {
                             self.pairing.keep(captured_ns);
                         }
                     }
-                    self.live.release();
+                    self.live.release_frame();
                     patience = Duration::ZERO;
                 }
                 Next::Lost(_) => {}
@@ -82,7 +82,7 @@ impl LiveDepth {
         let stale = now_ns.saturating_sub(newest_ns) > STALE_NS;
         if stale != self.stale {
             match stale {
-                true => tracing::warn!("{}: no depth for a second; the last map stays", self.live.name()),
+                true => tracing::warn!("{}: no depth for a second; the last map is kept", self.live.name()),
                 false => tracing::info!("{}: depth again", self.live.name()),
             }
             self.stale = stale;
@@ -96,7 +96,7 @@ impl DepthSource for LiveDepth {
         let now_ns = self.clock.now_ns();
         // Colour frames without a capture time get the newest map.
         let taken_ns = stamp.captured_ns.unwrap_or(now_ns);
-        let period_ns = self.live.agreed().interval.period_ns();
+        let period_ns = self.live.negotiated().interval.period_ns();
         if self.pairing.is_worth_waiting(taken_ns, period_ns) {
             self.take_maps(Duration::from_nanos(period_ns) / WAIT_DIVISOR);
         }

@@ -17,7 +17,7 @@ impl Units {
     /// Decodes a picture of this layout into `map`, which is resized to fit. Returns false if the layout is not 16-bit
     /// depth, or the plane is too short.
     pub(super) fn decode(&self, layout: &Layout, plane: &[u8], map: &mut DepthMap) -> bool {
-        if layout.family() != Family::Depth16 || plane.len() < layout.needed_bytes(0) {
+        if layout.family() != Family::Depth16 || plane.len() < layout.min_size_bytes(0) {
             return false;
         }
         map.resize(layout.width, layout.height);
@@ -42,7 +42,7 @@ mod tests {
 
     #[test]
     fn numbers_become_metres_and_what_is_unknown_stays_so() {
-        let layout = Layout::packed(FourCc::Z16, 3, 2).unwrap().with_strides(2);
+        let layout = Layout::packed(FourCc::Z16, 3, 2).unwrap().with_row_padding(2);
         let units = Units { per_m: 1000.0, invalid: 7 };
         let numbers: [u16; 8] = [0, 1000, 7, 9999, 65535, 2500, 256, 9999];
         let bytes: Vec<u8> = numbers.iter().flat_map(|number| number.to_le_bytes()).collect();

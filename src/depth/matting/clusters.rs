@@ -4,19 +4,19 @@
 //! pixels, and from further away where there are none, as in hair. Cells provide both in a tenth of the time of single
 //! pixels.
 
-mod answers;
 mod cell;
+mod color_models;
 
 use super::contrast::Contrast;
-use super::light_of;
-use super::symmetric::{Symmetric, outer};
+use super::linear_light;
+use super::symmetric::{Symmetric, outer_product};
 use crate::depth::bits::Bits;
 
-pub(super) use answers::Clusters;
-#[cfg(feature = "gpu")]
-pub(super) use answers::{FRINGE_PIXELS, HALF_PX, RADII_CELLS};
 #[cfg(feature = "gpu")]
 pub(super) use cell::{AT_EDGE_WEIGHT, CLOSE_PX, CLOSE_WEIGHT};
+pub(super) use color_models::Clusters;
+#[cfg(feature = "gpu")]
+pub(super) use color_models::{FALLOFF_PX, FRINGE_PIXELS, RADII_CELLS};
 
 /// Side of a cell, in pixels.
 pub(super) const CELL_PX: usize = 8;
@@ -65,7 +65,7 @@ impl Sums {
     #[inline(always)]
     fn color(&self) -> Color {
         let [weight, x, y, z, xx, xy, xz, yy, yz, zz, ..] = self.0;
-        Color::of_sums(weight, [x, y, z], [xx, xy, xz, yy, yz, zz])
+        Color::from_sums(weight, [x, y, z], [xx, xy, xz, yy, yz, zz])
     }
 
     #[inline(always)]
@@ -86,9 +86,9 @@ pub struct Color {
 impl Color {
     /// Computes mean and covariance from the total weight, and the weighted sums of the light and of its products.
     #[inline(always)]
-    pub(super) fn of_sums(weight: f32, light: [f32; 3], squares: Symmetric) -> Self {
+    pub(super) fn from_sums(weight: f32, light: [f32; 3], squares: Symmetric) -> Self {
         let mean = light.map(|light| light / weight);
-        let of_mean = outer(mean);
+        let of_mean = outer_product(mean);
         Self { mean, covariance: std::array::from_fn(|k| squares[k] / weight - of_mean[k]) }
     }
 
@@ -114,7 +114,7 @@ struct Surfaces {
 }
 
 /// The input of clustering.
-pub(super) struct View<'a> {
+pub(super) struct FrameView<'a> {
     /// Columns and rows.
     pub size: (usize, usize),
     /// Depth of all pixels, in metres; inverse depths of one surface differ by at most `depth_step`, in 1/m.
@@ -127,11 +127,11 @@ pub(super) struct View<'a> {
     pub light: &'a [f32; 256],
 }
 
-impl View<'_> {
+impl FrameView<'_> {
     /// Returns the linear light of a pixel.
     #[inline(always)]
     pub fn light(&self, at: usize) -> [f32; 3] {
-        light_of(self.light, self.rgb, at)
+        linear_light(self.light, self.rgb, at)
     }
 }
 
@@ -139,7 +139,7 @@ impl View<'_> {
 /// mostly shows that surface. If its colour differs from the pure pixels', such as hair beside a face, the near surface
 /// gets the fringe's colour, with the far surface's part removed.
 #[inline(always)]
-fn contrast(Surfaces { near, far, fringe }: Surfaces) -> Contrast {
+fn compute_contrast(Surfaces { near, far, fringe }: Surfaces) -> Contrast {
     let pure = Contrast::new([near, far]);
     let Some((fringe, weight)) = fringe else { return pure };
     let other =

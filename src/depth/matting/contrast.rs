@@ -3,10 +3,10 @@
 
 #![allow(clippy::needless_range_loop)] // Planes and pixels index several arrays at once.
 
+use super::alpha::{LANES, Lanes};
 use super::clusters::Color;
-use super::share::{LANES, Lanes};
-use super::symmetric::{Symmetric, dot, inverse, times};
-use super::{larger, smaller};
+use super::symmetric::{Symmetric, dot, invert, multiply};
+use super::{fast_max, fast_min};
 
 /// Isotropic part of regularised covariances: those of few pixels are too narrow.
 pub(super) const SHRINKAGE: f32 = 0.01;
@@ -38,15 +38,15 @@ pub(super) struct Discriminant {
     pub precision: f32,
 }
 
-/// Lengths of [`Contrast::line`] and of [`Contrast::front`].
-pub(super) const LINE: usize = 5;
-pub(super) const FRONT: usize = 9;
+/// Lengths of [`Contrast::discriminant_params`] and of [`Contrast::foreground_params`].
+pub(super) const DISCRIMINANT_PARAMS: usize = 5;
+pub(super) const FOREGROUND_PARAMS: usize = 9;
 
 impl Discriminant {
     #[inline(always)]
     fn new(near: [f32; 3], inverse: &Symmetric, far: [f32; 3]) -> Self {
         let difference: [f32; 3] = std::array::from_fn(|p| near[p] - far[p]);
-        let direction = times(inverse, difference);
+        let direction = multiply(inverse, difference);
         let contrast = dot(direction, difference).max(1e-9);
         let scale = 1.0 / contrast;
         let direction = direction.map(|value| scale * value);
@@ -54,9 +54,9 @@ impl Discriminant {
         Self { direction, offset: dot(direction, far), precision: (2.0 * contrast).min(MAX_PRECISION) }
     }
 
-    /// Creates the discriminant of a [`Contrast::front`] against the background `light`.
+    /// Creates the discriminant of a [`Contrast::foreground_params`] against the background `light`.
     #[inline(always)]
-    pub fn before([x, y, z, a, b, c, d, e, f]: [f32; FRONT], light: [f32; 3]) -> Self {
+    pub fn against_background([x, y, z, a, b, c, d, e, f]: [f32; FOREGROUND_PARAMS], light: [f32; 3]) -> Self {
         Self::new([x, y, z], &[a, b, c, d, e, f], light)
     }
 
@@ -67,10 +67,10 @@ impl Discriminant {
     }
 }
 
-impl From<[f32; LINE]> for Discriminant {
-    /// Restores the discriminant of a [`Contrast::line`].
+impl From<[f32; DISCRIMINANT_PARAMS]> for Discriminant {
+    /// Restores the discriminant of a [`Contrast::discriminant_params`].
     #[inline(always)]
-    fn from([x, y, z, offset, precision]: [f32; LINE]) -> Self {
+    fn from([x, y, z, offset, precision]: [f32; DISCRIMINANT_PARAMS]) -> Self {
         Self { direction: [x, y, z], offset, precision }
     }
 }
@@ -86,22 +86,22 @@ impl Contrast {
         for k in [0, 3, 5] {
             spread[k] += SHRINKAGE / 3.0 * trace + QUANTISATION;
         }
-        let inverse = self::inverse(&spread);
+        let inverse = invert(&spread);
         let discriminant = Discriminant::new(near.mean, &inverse, far.mean);
-        let of_far = self::inverse(&widened(far.covariance));
+        let of_far = invert(&regularize(far.covariance));
         Self { surfaces, discriminant, inverse, of_far }
     }
 
     /// Returns the parameters of the [`Discriminant`]; interpolated ones are those of a surface in between.
     #[inline(always)]
-    pub(super) fn line(&self) -> [f32; LINE] {
+    pub(super) fn discriminant_params(&self) -> [f32; DISCRIMINANT_PARAMS] {
         let Discriminant { direction: [x, y, z], offset, precision } = self.discriminant;
         [x, y, z, offset, precision]
     }
 
-    /// Returns the parameters for a known background, for [`Discriminant::before`].
+    /// Returns the parameters for a known background, for [`Discriminant::against_background`].
     #[inline(always)]
-    pub(super) fn front(&self) -> [f32; FRONT] {
+    pub(super) fn foreground_params(&self) -> [f32; FOREGROUND_PARAMS] {
         let ([x, y, z], [a, b, c, d, e, f]) = (self.surfaces[0].mean, self.inverse);
         [x, y, z, a, b, c, d, e, f]
     }
@@ -114,34 +114,34 @@ impl Contrast {
 
     /// Returns the discriminant of both surfaces, or of the near one and a known background.
     #[inline(always)]
-    pub(super) fn discriminant(&self, behind: Option<[f32; 3]>) -> Discriminant {
-        match behind {
-            Some(light) => Discriminant::before(self.front(), light),
+    pub(super) fn discriminant(&self, background: Option<[f32; 3]>) -> Discriminant {
+        match background {
+            Some(light) => Discriminant::against_background(self.foreground_params(), light),
             None => self.discriminant,
         }
     }
 
     /// Whether the light is plausible for the far surface.
     #[inline(always)]
-    pub(super) fn is_like_far(&self, light: [f32; 3]) -> bool {
+    pub(super) fn is_plausible_far(&self, light: [f32; 3]) -> bool {
         let mean = &self.surfaces[1].mean;
         let off = std::array::from_fn(|p| light[p] - mean[p]);
-        dot(off, times(&self.of_far, off)) < MAX_DEVIATION * MAX_DEVIATION
+        dot(off, multiply(&self.of_far, off)) < MAX_DEVIATION * MAX_DEVIATION
     }
 
     /// Returns the squared Mahalanobis distance of a colour to the line between the near surface and the background
     /// `light`, at `alpha`.
     #[inline(always)]
-    pub(super) fn off_line(&self, light: [f32; 3], own: [f32; 3], alpha: f32) -> f32 {
+    pub(super) fn off_line_distance(&self, light: [f32; 3], own: [f32; 3], alpha: f32) -> f32 {
         let near = &self.surfaces[0].mean;
         let alpha = alpha.clamp(0.0, 1.0);
         let off = std::array::from_fn(|p| own[p] - light[p] - alpha * (near[p] - light[p]));
-        dot(off, times(&self.inverse, off))
+        dot(off, multiply(&self.inverse, off))
     }
 
     /// Returns both colours; a known background light replaces the far one's mean, and its covariance stays for noise.
     #[inline(always)]
-    pub(super) fn before(&self, light: Option<[f32; 3]>) -> [Color; 2] {
+    pub(super) fn colors_with_background(&self, light: Option<[f32; 3]>) -> [Color; 2] {
         let [near, far] = self.surfaces;
         [near, Color { mean: light.unwrap_or(far.mean), ..far }]
     }
@@ -151,7 +151,7 @@ impl Contrast {
 /// `own` colour (Chuang et al. 2001, equation 9, without the noise term). Clamped so that neither is darker than black
 /// or brighter than white.
 #[inline(always)]
-pub(super) fn difference(near: &Color, far: &Color, own: [f32; 3], alpha: f32) -> [f32; 3] {
+pub(super) fn color_difference(near: &Color, far: &Color, own: [f32; 3], alpha: f32) -> [f32; 3] {
     let rest = 1.0 - alpha;
     let (mut spread, mut residual) = ([0.0; 6], [0.0; 3]);
     for k in 0..6 {
@@ -160,32 +160,32 @@ pub(super) fn difference(near: &Color, far: &Color, own: [f32; 3], alpha: f32) -
     for p in 0..3 {
         residual[p] = own[p] - alpha * near.mean[p] - rest * far.mean[p];
     }
-    let step = times(&inverse(&widened(spread)), residual);
-    let (of_near, of_far) = (times(&near.covariance, step), times(&far.covariance, step));
-    let (up, down) = (larger(rest, 1e-3), larger(alpha, 1e-3));
+    let step = multiply(&invert(&regularize(spread)), residual);
+    let (of_near, of_far) = (multiply(&near.covariance, step), multiply(&far.covariance, step));
+    let (up, down) = (fast_max(rest, 1e-3), fast_max(alpha, 1e-3));
     let mut differences = [0.0; 3];
     for p in 0..3 {
         let difference = near.mean[p] + alpha * of_near[p] - far.mean[p] - rest * of_far[p];
-        let most = smaller((1.0 - own[p]) / up, own[p] / down);
-        let least = -smaller(own[p] / up, (1.0 - own[p]) / down);
-        differences[p] = smaller(larger(difference, smaller(least, 0.0)), larger(most, 0.0));
+        let most = fast_min((1.0 - own[p]) / up, own[p] / down);
+        let least = -fast_min(own[p] / up, (1.0 - own[p]) / down);
+        differences[p] = fast_min(fast_max(difference, fast_min(least, 0.0)), fast_max(most, 0.0));
     }
     differences
 }
 
 /// Several pixels and their surfaces, as a structure of arrays.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Parts {
+pub(super) struct MixedBatch {
     means: [[Lanes; 3]; 2],
     covariances: [[Lanes; 6]; 2],
     own: [Lanes; 3],
     alpha: Lanes,
 }
 
-impl Parts {
+impl MixedBatch {
     /// Sets lane `k`.
     #[inline(always)]
-    pub fn set(&mut self, k: usize, surfaces: [Color; 2], own: [f32; 3], alpha: f32) {
+    pub fn set_lane(&mut self, k: usize, surfaces: [Color; 2], own: [f32; 3], alpha: f32) {
         for n in 0..2 {
             for p in 0..3 {
                 self.means[n][p][k] = surfaces[n].mean[p];
@@ -200,9 +200,9 @@ impl Parts {
         self.alpha[k] = alpha;
     }
 
-    /// Computes [`difference`] of all lanes.
+    /// Computes [`color_difference`] of all lanes.
     #[inline(always)]
-    pub fn differences(&self) -> [Lanes; 3] {
+    pub fn color_differences(&self) -> [Lanes; 3] {
         let mut differences = [[0.0; LANES]; 3];
         for k in 0..LANES {
             let ([near, far], [of_near, of_far]) = (&self.means, &self.covariances);
@@ -211,7 +211,7 @@ impl Parts {
                 mean: mean(of),
                 covariance: [with[0][k], with[1][k], with[2][k], with[3][k], with[4][k], with[5][k]],
             };
-            let of_one = difference(&color(near, of_near), &color(far, of_far), mean(&self.own), self.alpha[k]);
+            let of_one = color_difference(&color(near, of_near), &color(far, of_far), mean(&self.own), self.alpha[k]);
             for p in 0..3 {
                 differences[p][k] = of_one[p];
             }
@@ -222,7 +222,7 @@ impl Parts {
 
 /// Adds an isotropic part to a covariance.
 #[inline(always)]
-fn widened(mut spread: Symmetric) -> Symmetric {
+fn regularize(mut spread: Symmetric) -> Symmetric {
     let floor = SHRINKAGE / 3.0 * (spread[0] + spread[3] + spread[5]) + QUANTISATION;
     for k in [0, 3, 5] {
         spread[k] += floor;

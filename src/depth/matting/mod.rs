@@ -5,16 +5,16 @@
 //! of the pixel's colour for each alpha (Bayesian matting, after Chuang et al. 2001); the map gives the prior. All
 //! steps are local and use one frame; the time grows with the length of the outlines.
 
-mod behind;
+mod alpha;
 mod clusters;
 mod contrast;
+mod edges;
 #[cfg(feature = "gpu")]
 #[doc(hidden)]
 pub mod gpu;
+mod known_background;
 pub mod mask;
 mod passes;
-mod share;
-mod survey;
 mod symmetric;
 mod trace;
 
@@ -23,25 +23,25 @@ use std::sync::Arc;
 
 use pulp::Arch;
 
-use crate::color::light_of_codes;
-#[cfg(feature = "gpu")]
-use crate::compute::backed::Backed;
+use crate::color::srgb_to_linear_table;
 use crate::compute::bands;
 use crate::compute::thread_pool::ThreadPool;
+#[cfg(feature = "gpu")]
+use crate::compute::with_fallback::WithFallback;
 use crate::compute::{Device, DeviceFrame};
 use crate::frame::{ColorImage, DepthMap, Matte, MixedPixel};
 
-pub use behind::{Behind, light_at};
+pub use known_background::{KnownBackground, light_at};
 
 use super::bits::Bits;
-use clusters::{Clusters, View};
-use passes::{Compare, Mix, Weigh};
-use share::{Evidence, LANES, Labels, Prior};
-use survey::Survey;
-use trace::{Trace, Wide};
+use alpha::{Evidence, LANES, Labels, Prior};
+use clusters::{Clusters, FrameView};
+use edges::EdgeDetector;
+use passes::{ComputeAlphas, EvaluateColors, SeparateColors};
+use trace::{Trace, WideRegions};
 
 /// Minimum difference of the CoC across a depth discontinuity, in pixels, for its pixels to be matted.
-pub const FROM_PX: f32 = 0.5;
+pub const MIN_STEP_PX: f32 = 0.5;
 /// Above this alpha, a pixel counts as pure.
 const NEARLY_PURE: f32 = 0.98;
 
@@ -59,23 +59,23 @@ pub struct Matting {
     light: Box<[f32; 256]>,
     /// Pixels beside a depth discontinuity to one of the eight neighbours; all others are pure.
     at_edge: Bits,
-    survey: Survey,
+    edge_detector: EdgeDetector,
     edges: Vec<EdgePixel>,
     /// The pixels at edges, followed by the traced ones.
     pixels: Vec<Pixel>,
     clusters: Clusters,
     evidence: Vec<Evidence>,
-    wide: Wide,
+    wide: WideRegions,
     /// Indices of the mixed pixels in raster order, and scratch memory for the sort.
     order: Vec<u32>,
     traced: Vec<u64>,
     /// GPU buffers of the next map and its picture.
-    on_device: Option<DeviceFrame>,
+    device_frame: Option<DeviceFrame>,
     /// Whether the warning about too many edges was logged.
     is_noise_logged: bool,
     /// The GPU implementation, used until the device fails.
     #[cfg(feature = "gpu")]
-    gpu: Backed<Option<gpu::GpuMatting>>,
+    gpu: WithFallback<Option<gpu::GpuMatting>>,
 }
 
 /// A pixel beside a depth discontinuity.
@@ -93,14 +93,14 @@ struct EdgePixel {
 impl EdgePixel {
     /// Returns the mean of both surfaces' inverse depths.
     #[inline(always)]
-    fn middle(&self) -> f32 {
+    fn mean_inverse(&self) -> f32 {
         0.5 * (self.near + self.far)
     }
 
     /// Whether an inverse depth is closer to the near surface's.
     #[inline(always)]
     fn is_near(&self, inverse: f32) -> bool {
-        inverse > self.middle()
+        inverse > self.mean_inverse()
     }
 }
 
@@ -112,7 +112,7 @@ struct Pixel {
     model: u32,
     /// Linear light of the pixel, and of the background behind it if known.
     own: [f32; 3],
-    behind: Option<[f32; 3]>,
+    background: Option<[f32; 3]>,
     /// Coverage by the near surface, 0 to 1.
     alpha: f32,
 }
@@ -121,12 +121,12 @@ impl Pixel {
     /// Creates a pixel that is not evaluated yet.
     #[inline(always)]
     fn new(edge: EdgePixel, model: u32) -> Self {
-        Self { edge, model, own: [0.0; 3], behind: None, alpha: 0.0 }
+        Self { edge, model, own: [0.0; 3], background: None, alpha: 0.0 }
     }
 
     /// Returns the pixel's index in a picture `width` pixels wide.
     #[inline(always)]
-    fn at(&self, width: usize) -> usize {
+    fn index(&self, width: usize) -> usize {
         self.edge.y as usize * width + self.edge.x as usize
     }
 
@@ -141,32 +141,35 @@ impl Default for Matting {
     fn default() -> Self {
         Self {
             arch: Arch::new(),
-            light: light_of_codes(),
+            light: srgb_to_linear_table(),
             at_edge: Bits::default(),
-            survey: Survey::default(),
+            edge_detector: EdgeDetector::default(),
             edges: Vec::new(),
             pixels: Vec::new(),
             clusters: Clusters::default(),
             evidence: Vec::new(),
-            wide: Wide::default(),
+            wide: WideRegions::default(),
             order: Vec::new(),
             traced: Vec::new(),
-            on_device: None,
+            device_frame: None,
             is_noise_logged: false,
             #[cfg(feature = "gpu")]
-            gpu: Backed::default(),
+            gpu: WithFallback::default(),
         }
     }
 }
 
 impl Matting {
-    /// Moves the computation to `device`, if its GPU matting passes a trial against the CPU. If the device fails later,
-    /// the CPU takes over from that frame on.
+    /// Moves the computation to `device`, if its GPU matting passes a self-test against the CPU. If the device fails
+    /// later, the CPU takes over from that frame on.
     #[must_use]
-    pub fn on(self, device: Option<&Arc<Device>>) -> Self {
+    pub fn with_device(self, device: Option<&Arc<Device>>) -> Self {
         #[cfg(feature = "gpu")]
         {
-            Self { gpu: Backed::tried(device, "finds mattes", gpu::trial, gpu::GpuMatting::new), ..self }
+            Self {
+                gpu: WithFallback::create_tested(device, "finds mattes", gpu::run_self_test, gpu::GpuMatting::new),
+                ..self
+            }
         }
         #[cfg(not(feature = "gpu"))]
         {
@@ -176,8 +179,8 @@ impl Matting {
     }
 
     /// Sets the GPU buffers that already contain the map and the picture of the next call.
-    pub fn take_from(&mut self, on_device: Option<DeviceFrame>) {
-        self.on_device = on_device;
+    pub fn set_device_frame(&mut self, device_frame: Option<DeviceFrame>) {
+        self.device_frame = device_frame;
     }
 
     /// Returns the backends used, for the report: `cpu`, `gpu`, or `gpu, then cpu`.
@@ -191,26 +194,26 @@ impl Matting {
     /// Finds the mixed pixels beside steps of inverse depth larger than `depth_step`, in 1/m. Finds none if the map and
     /// the picture differ in size, or `depth_step` is not finite. If there are more than [`Matte::most`] edge pixels,
     /// only the largest steps count.
-    pub fn find(&mut self, map: &mut DepthMap, color: &ColorImage, depth_step: f32) {
-        self.find_before(&mut ThreadPool::new("matte", 1), (map, color), depth_step, None);
+    pub fn find_mixed_pixels(&mut self, map: &mut DepthMap, color: &ColorImage, depth_step: f32) {
+        self.find_with_background(&mut ThreadPool::new("matte", 1), (map, color), depth_step, None);
     }
 
-    /// Finds mixed pixels like [`Self::find`], on several threads, and uses the known background `behind` pixels. The
-    /// result is bit-identical for any number of threads.
-    pub fn find_before(
+    /// Finds mixed pixels like [`Self::find_mixed_pixels`], on several threads, and uses the known `background` behind
+    /// pixels. The result is bit-identical for any number of threads.
+    pub fn find_with_background(
         &mut self,
         workers: &mut ThreadPool,
         (map, color): (&mut DepthMap, &ColorImage),
         depth_step: f32,
-        behind: Option<&Behind>,
+        background: Option<&KnownBackground>,
     ) {
-        let on_device = self.on_device.take();
+        let device_frame = self.device_frame.take();
         map.matte.pixels.clear();
         if map.size() != color.size() || map.metres.is_empty() || !depth_step.is_finite() {
             return;
         }
         #[cfg(not(feature = "gpu"))]
-        let _ = on_device;
+        let _ = device_frame;
         let most = Matte::most(map.width as usize, map.height as usize);
         let least_step = depth_step;
         let depth_steps = || std::iter::successors(Some(least_step), |step| Some(2.0 * step)).take(MAX_DOUBLINGS);
@@ -218,14 +221,14 @@ impl Matting {
         let mut log_noise = |depth_step: f32| {
             if depth_step > least_step && !std::mem::replace(is_noise_logged, true) {
                 tracing::info!(
-                    "the depth has jumps nearly everywhere: outlines are taken apart only where it jumps most"
+                    "the depth has jumps nearly everywhere: outlines are separated only where it jumps most"
                 );
             }
         };
         #[cfg(feature = "gpu")]
-        if self.gpu.did("finds mattes", |gpu| {
+        if self.gpu.try_run("finds mattes", |gpu| {
             for depth_step in depth_steps() {
-                if gpu.find((map, color), on_device.clone(), depth_step, behind)? <= most {
+                if gpu.find_mixed_pixels((map, color), device_frame.clone(), depth_step, background)? <= most {
                     log_noise(depth_step);
                     break;
                 }
@@ -235,11 +238,13 @@ impl Matting {
             return;
         }
         map.matte.pixels.clear();
-        let Self { arch, light, at_edge, survey, edges, pixels, clusters, evidence, wide, order, traced, .. } = self;
+        let Self {
+            arch, light, at_edge, edge_detector, edges, pixels, clusters, evidence, wide, order, traced, ..
+        } = self;
         let arch = *arch;
         let size = (map.width as usize, map.height as usize);
         let fits = |depth_step: &f32| {
-            survey.find((arch, workers), map, *depth_step, (at_edge, edges));
+            edge_detector.find_edges((arch, workers), map, *depth_step, (at_edge, edges));
             edges.len() <= most
         };
         // Only noise has more edges than `most`: then the largest steps are what counts.
@@ -249,9 +254,9 @@ impl Matting {
         pixels.clear();
         pixels.extend(edges.iter().map(|edge| Pixel::new(*edge, clusters.request_model(depth_step, edge))));
         let (metres, matte, rgb) = (&map.metres, &mut map.matte, &color.rgb[..]);
-        clusters.find((arch, workers), &View { size, metres, depth_step, at_edge, rgb, light }, 0);
+        clusters.fit_models((arch, workers), &FrameView { size, metres, depth_step, at_edge, rgb, light }, 0);
         // Without pure pixels of both surfaces, a colour says nothing about alpha.
-        pixels.retain(|pixel| clusters.at(pixel.model).is_some());
+        pixels.retain(|pixel| clusters.contrast(pixel.model).is_some());
         let on_edges = pixels.len();
         let (mut compared, mut marked) = (0..0, edges.len());
         wide.steps.clear();
@@ -260,15 +265,15 @@ impl Matting {
             let found = compared.end..pixels.len();
             evidence.resize(found.len().div_ceil(LANES), Evidence::default());
             // Evaluate the new pixels, then trace one step further from those with some alpha.
-            let each = bands::share(found.len(), MIN_PIXELS).next_multiple_of(LANES);
-            let view = View { size, metres, depth_step, at_edge, rgb, light };
+            let each = bands::chunk_len(found.len(), MIN_PIXELS).next_multiple_of(LANES);
+            let view = FrameView { size, metres, depth_step, at_edge, rgb, light };
             let parts = pixels[found.clone()].chunks_mut(each).zip(evidence.chunks_mut(each / LANES));
             workers.run_each(parts, &|(pixels, evidence)| {
                 let view = &view;
-                arch.dispatch(Compare { view, clusters, behind, pixels, evidence });
+                arch.dispatch(EvaluateColors { view, clusters, background, pixels, evidence });
             });
             let is_first = steps == 0;
-            arch.dispatch(Weigh { prior: &mut prior, is_first, evidence, pixels: &mut pixels[found.clone()] });
+            arch.dispatch(ComputeAlphas { prior: &mut prior, is_first, evidence, pixels: &mut pixels[found.clone()] });
             if !is_first {
                 wide.steps.push(found.clone());
             }
@@ -291,10 +296,10 @@ impl Matting {
         wide.discard_wide(size, pixels);
         sort_mixed(size.0, pixels, on_edges, (order, traced));
 
-        let each = bands::share(order.len(), MIN_PIXELS);
+        let each = bands::chunk_len(order.len(), MIN_PIXELS);
         matte.pixels.resize(order.len(), MixedPixel::default());
         workers.run_each(order.chunks(each).zip(matte.pixels.chunks_mut(each)), &|(order, mixed)| {
-            arch.dispatch(Mix { clusters, width: size.0, pixels, order, mixed });
+            arch.dispatch(SeparateColors { clusters, width: size.0, pixels, order, mixed });
         });
     }
 }
@@ -303,7 +308,7 @@ impl Matting {
 /// is sorted in `rest` and merged.
 fn sort_mixed(width: usize, pixels: &[Pixel], first: usize, (order, rest): (&mut Vec<u32>, &mut Vec<u64>)) {
     const PLACE_BITS: u32 = 32;
-    let key = |k: usize| (pixels[k].at(width) as u64) << PLACE_BITS | k as u64;
+    let key = |k: usize| (pixels[k].index(width) as u64) << PLACE_BITS | k as u64;
     let mixed = |places: Range<usize>| places.filter(|&k| pixels[k].is_mixed());
     rest.clear();
     rest.extend(mixed(first..pixels.len()).map(key));
@@ -321,7 +326,7 @@ fn sort_mixed(width: usize, pixels: &[Pixel], first: usize, (order, rest): (&mut
 
 /// Returns the linear light of a pixel.
 #[inline(always)]
-fn light_of(light: &[f32; 256], rgb: &[u8], at: usize) -> [f32; 3] {
+fn linear_light(light: &[f32; 256], rgb: &[u8], at: usize) -> [f32; 3] {
     let code = &rgb[3 * at..][..3];
     [light[usize::from(code[0])], light[usize::from(code[1])], light[usize::from(code[2])]]
 }
@@ -335,11 +340,11 @@ fn neighbourhood(edge: &EdgePixel, by: usize, (width, height): (usize, usize)) -
 
 /// Returns the larger number, in one instruction: unlike `f32::max`, it does not handle NaN.
 #[inline(always)]
-fn larger(a: f32, b: f32) -> f32 {
+fn fast_max(a: f32, b: f32) -> f32 {
     if a > b { a } else { b }
 }
 
 #[inline(always)]
-fn smaller(a: f32, b: f32) -> f32 {
+fn fast_min(a: f32, b: f32) -> f32 {
     if a < b { a } else { b }
 }

@@ -5,22 +5,22 @@ use std::ops::Range;
 
 use pulp::{Arch, WithSimd};
 
-use super::clusters::{Clusters, View};
-use super::share::Labels;
+use super::alpha::Labels;
+use super::clusters::{Clusters, FrameView};
 use super::{EdgePixel, Pixel, neighbourhood};
 use crate::compute::thread_pool::ThreadPool;
 use crate::depth::bits::{Bits, set_bits};
 use crate::frame::DepthMap;
 
 /// Minimum alpha of a pixel whose neighbours are traced, where the map has no edge.
-pub const TRACED_FROM: f32 = 0.1;
+pub const MIN_TRACED_ALPHA: f32 = 0.1;
 
 /// Follows thin structures to where the depth map does not have them: from pixels with some alpha that are far in the
 /// map, to their neighbours, if these have some alpha too (hysteresis, as in Canny's edge tracing).
 pub struct Trace<'a> {
     pub arch: Arch,
     pub workers: &'a mut ThreadPool,
-    /// See [`View`].
+    /// See [`FrameView`].
     pub size: (usize, usize),
     pub metres: &'a [f32],
     pub depth_step: f32,
@@ -43,14 +43,14 @@ impl WithSimd for Trace<'_> {
         let mut marked = 0;
         for k in compared {
             let Pixel { edge, alpha, .. } = pixels[k];
-            if edge.labels.is_near || alpha < TRACED_FROM {
+            if edge.labels.is_near || alpha < MIN_TRACED_ALPHA {
                 continue;
             }
             let (xs, ys) = neighbourhood(&edge, 1, size);
             for y in ys {
-                for place in set_bits(!at_edge.word_from(xs.start, y) & below(xs.len())) {
+                for place in set_bits(!at_edge.word_from(xs.start, y) & low_bits(xs.len())) {
                     let x = xs.start + place;
-                    let is_far = (DepthMap::inverse_of(metres[y * size.0 + x]) - edge.far).abs() <= depth_step;
+                    let is_far = (DepthMap::inverse_depth(metres[y * size.0 + x]) - edge.far).abs() <= depth_step;
                     if !is_far {
                         continue;
                     }
@@ -60,9 +60,13 @@ impl WithSimd for Trace<'_> {
                     let count = clusters.model_count();
                     let model = clusters.request_model(depth_step, &next);
                     if model as usize == count {
-                        clusters.find((arch, workers), &View { size, metres, depth_step, at_edge, rgb, light }, count);
+                        clusters.fit_models(
+                            (arch, workers),
+                            &FrameView { size, metres, depth_step, at_edge, rgb, light },
+                            count,
+                        );
                     }
-                    if clusters.at(model).is_some() {
+                    if clusters.contrast(model).is_some() {
                         pixels.push(Pixel::new(next, model));
                     }
                 }
@@ -74,13 +78,13 @@ impl WithSimd for Trace<'_> {
 
 /// Returns a mask of the `count` lowest bits.
 #[inline(always)]
-fn below(count: usize) -> u64 {
+fn low_bits(count: usize) -> u64 {
     (1 << count) - 1
 }
 
 /// Separates wide regions from thin structures; owns the memory for it.
 #[derive(Debug, Default)]
-pub struct Wide {
+pub struct WideRegions {
     /// Ranges of the pixels that were traced in each step.
     pub steps: Vec<Range<usize>>,
     /// Traced pixels, those of them with some alpha, and those in wide regions.
@@ -91,7 +95,7 @@ pub struct Wide {
     middles: Vec<usize>,
 }
 
-impl Wide {
+impl WideRegions {
     /// Discards pixels that were traced into a far surface that looks like the near one: a hair never fills a square of
     /// three pixels, as the edge of a picture frame does.
     pub fn discard_wide(&mut self, size: (usize, usize), pixels: &mut [Pixel]) {
@@ -105,7 +109,7 @@ impl Wide {
         for Pixel { edge, alpha, .. } in steps.iter().flat_map(|step| &pixels[step.clone()]) {
             let (x, y) = (edge.x as usize, edge.y as usize);
             traced.set(x, y);
-            if *alpha >= TRACED_FROM {
+            if *alpha >= MIN_TRACED_ALPHA {
                 seen.set(x, y);
             }
         }
@@ -113,7 +117,7 @@ impl Wide {
             let is_middle = |edge: &EdgePixel| {
                 let (xs, ys) = neighbourhood(edge, 1, size);
                 let missing = ys.fold(0, |missing, y| missing | !seen.word_from(xs.start, y));
-                missing & below(xs.len()) == 0
+                missing & low_bits(xs.len()) == 0
             };
             middles.clear();
             middles.extend(step.clone().filter(|&k| is_middle(&pixels[k].edge)));
@@ -121,7 +125,7 @@ impl Wide {
             for &middle in &*middles {
                 let (xs, ys) = neighbourhood(&pixels[middle].edge, 2, size);
                 for y in ys {
-                    let part = traced.word_from(xs.start, y) & below(xs.len());
+                    let part = traced.word_from(xs.start, y) & low_bits(xs.len());
                     seen.set_from(xs.start, y, part);
                     wide.set_from(xs.start, y, part);
                 }

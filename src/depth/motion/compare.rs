@@ -9,7 +9,7 @@ use super::Vector;
 use super::layers::{Cell, Grid};
 
 /// Radius in pixels by which the mask of an untextured near surface is dilated: only its outline shows motion.
-const BEYOND_PX: usize = 2;
+const DILATION_PX: usize = 2;
 /// Minimum number of compared pixels of a surface in a cell.
 const MIN_PIXELS: u32 = 20;
 /// Number of rows of a cell that are compared.
@@ -27,15 +27,15 @@ pub struct Pictures<'a> {
 
 impl Pictures<'_> {
     /// Returns column and row of a cell.
-    pub fn place(&self, at: usize) -> (usize, usize) {
-        let across = self.grid.cells().0;
+    pub fn cell_position(&self, at: usize) -> (usize, usize) {
+        let across = self.grid.cell_counts().0;
         (at % across, at / across)
     }
 
     /// Computes the mask of a cell's near surface.
     #[inline(always)]
-    pub fn mask(&mut self, place: (usize, usize), &Cell { split_m, is_plain, .. }: &Cell) {
-        let beyond_px = if is_plain { BEYOND_PX } else { 0 };
+    pub fn compute_mask(&mut self, place: (usize, usize), &Cell { split_m, is_untextured, .. }: &Cell) {
+        let beyond_px = if is_untextured { DILATION_PX } else { 0 };
         let (width, height) = self.grid.size;
         let [columns, rows] = self.grid.cell_range(place, self.grid.size);
         let (map, map_size) = (self.map, (self.map.width as usize, self.map.height as usize));
@@ -59,10 +59,10 @@ impl Pictures<'_> {
                     }
                 }
             }
-            if is_plain {
+            if is_untextured {
                 // Dilation along the row.
-                spread(row.iter_mut(), 1);
-                spread(row.iter_mut().rev(), 2);
+                dilate_row(row.iter_mut(), 1);
+                dilate_row(row.iter_mut().rev(), 2);
                 row.iter_mut().for_each(|near| *near = [near[1] | near[2]; 3]);
             }
         }
@@ -96,12 +96,12 @@ impl Pictures<'_> {
             let now = &self.now[3 * from.wrapping_add_signed(moved)..][..3 * xs.len()];
             match mask {
                 None => {
-                    sum += difference(then, now);
+                    sum += sum_of_differences(then, now);
                     count += then.len() as u32;
                 }
                 Some(mask) => {
                     let mask = &mask[3 * (line * columns.len() + xs.start - columns.start)..][..then.len()];
-                    let (difference, marked) = marked_difference((then, now), mask);
+                    let (difference, marked) = masked_sum_of_differences((then, now), mask);
                     (sum, count) = (sum + difference, count + marked);
                 }
             }
@@ -110,10 +110,10 @@ impl Pictures<'_> {
     }
 }
 
-/// Dilates byte 0 by [`BEYOND_PX`] pixels along the iterator, into byte `to`.
-fn spread<'a>(row: impl Iterator<Item = &'a mut [u8; 3]>, to: usize) {
+/// Dilates byte 0 by [`DILATION_PX`] pixels along the iterator, into byte `to`.
+fn dilate_row<'a>(row: impl Iterator<Item = &'a mut [u8; 3]>, to: usize) {
     row.fold(0, |left_px: usize, near| {
-        let left_px = if near[0] != 0 { BEYOND_PX + 1 } else { left_px };
+        let left_px = if near[0] != 0 { DILATION_PX + 1 } else { left_px };
         near[to] = if left_px > 0 { 0xff } else { 0 };
         left_px.saturating_sub(1)
     });
@@ -124,7 +124,7 @@ const CHUNK: usize = 16;
 
 /// Returns the sum of absolute differences.
 #[inline(always)]
-fn difference(then: &[u8], now: &[u8]) -> u32 {
+fn sum_of_differences(then: &[u8], now: &[u8]) -> u32 {
     let sum = |then: &[u8], now: &[u8]| then.iter().zip(now).map(|(a, b)| u32::from(a.abs_diff(*b))).sum::<u32>();
     let ((then, then_rest), (now, now_rest)) = (then.as_chunks::<CHUNK>(), now.as_chunks::<CHUNK>());
     let rest = sum(then_rest, now_rest);
@@ -133,7 +133,7 @@ fn difference(then: &[u8], now: &[u8]) -> u32 {
 
 /// Returns the sum of absolute differences of the masked bytes, and their number.
 #[inline(always)]
-fn marked_difference((then, now): (&[u8], &[u8]), mask: &[u8]) -> (u32, u32) {
+fn masked_sum_of_differences((then, now): (&[u8], &[u8]), mask: &[u8]) -> (u32, u32) {
     let sum = |then: &[u8], now: &[u8], mask: &[u8]| {
         let pairs = then.iter().zip(now).zip(mask);
         let difference: u32 = pairs.map(|((a, b), m)| u32::from((a & m).abs_diff(b & m))).sum();

@@ -13,7 +13,7 @@ use pulp::{Arch, WithSimd};
 
 use super::reduced::block_px;
 use crate::frame::{ColorImage, DepthMap};
-use blocks::{Blocks, CELL};
+use blocks::{BlockMatcher, CELL};
 use compare::Pictures;
 use layers::{Cell, Grid};
 
@@ -22,12 +22,12 @@ pub type Vector = [i32; 2];
 
 /// Estimates the motion of a reference picture; owns the memory for it.
 #[derive(Debug, Default)]
-pub struct Motion {
+pub struct MotionEstimator {
     arch: Arch,
     /// The reference picture.
     rgb: Vec<u8>,
     grid: Grid,
-    blocks: Blocks,
+    blocks: BlockMatcher,
     /// Row by row; empty if there is no reference.
     cells: Vec<Cell>,
     masks: [Vec<u8>; 2],
@@ -36,7 +36,7 @@ pub struct Motion {
     above: Vec<warp::Above>,
 }
 
-impl Motion {
+impl MotionEstimator {
     /// Sets the reference picture and its depth map, which has no holes. A step of inverse depth above `depth_step`, in
     /// 1/m, separates surfaces.
     pub fn set_reference(&mut self, map: &DepthMap, color: &ColorImage, depth_step: f32) {
@@ -45,7 +45,7 @@ impl Motion {
         let is_known = map.metres.first().is_some_and(|&metres| DepthMap::is_known(metres));
         if is_known && depth_step.is_finite() && self.grid.size.0.min(self.grid.size.1) >= 2 * self.grid.cell_px {
             self.rgb.clone_from(&color.rgb);
-            self.arch.dispatch(Keep { motion: self, map, color, depth_step });
+            self.arch.dispatch(SetReference { motion: self, map, color, depth_step });
         }
     }
 
@@ -53,7 +53,7 @@ impl Motion {
     /// moved.
     pub fn estimate(&mut self, map: &DepthMap, color: &ColorImage) -> bool {
         let is_alike = (color.width as usize, color.height as usize) == self.grid.size;
-        is_alike && !self.cells.is_empty() && self.arch.dispatch(Find { motion: self, map, color })
+        is_alike && !self.cells.is_empty() && self.arch.dispatch(EstimateMotion { motion: self, map, color })
     }
 
     /// Warps the depth `from` of the reference picture by the estimated motion into `to`, which is a copy of it on
@@ -65,54 +65,54 @@ impl Motion {
 
     /// Returns the motion of the surface at `metres` in pixel `at`.
     pub fn vector_at(&self, at: usize, metres: f32) -> Vector {
-        let (across, down) = self.grid.cells();
+        let (across, down) = self.grid.cell_counts();
         let place = (at % self.grid.size.0 / self.grid.cell_px, at / self.grid.size.0 / self.grid.cell_px);
-        let cells = [place].into_iter().chain(layers::around(place, (across, down)));
-        let inverse = DepthMap::inverse_of(metres);
-        let surfaces = cells.map(|(column, row)| self.cells[row * across + column].nearest(inverse));
+        let cells = [place].into_iter().chain(layers::neighbours(place, (across, down)));
+        let inverse = DepthMap::inverse_depth(metres);
+        let surfaces = cells.map(|(column, row)| self.cells[row * across + column].closest_surface(inverse));
         let off = |surface: &layers::Surface| (surface.inverse - inverse).abs();
-        surfaces.min_by(|a, b| off(a).total_cmp(&off(b))).map_or([0; 2], |surface| surface.moved)
+        surfaces.min_by(|a, b| off(a).total_cmp(&off(b))).map_or([0; 2], |surface| surface.vector)
     }
 }
 
 /// Compiled once per instruction set.
-struct Keep<'a> {
-    motion: &'a mut Motion,
+struct SetReference<'a> {
+    motion: &'a mut MotionEstimator,
     map: &'a DepthMap,
     color: &'a ColorImage,
     depth_step: f32,
 }
 
-impl WithSimd for Keep<'_> {
+impl WithSimd for SetReference<'_> {
     type Output = ();
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, _: S) {
-        let Motion { blocks, cells, grid, ranges, .. } = self.motion;
-        blocks.keep(self.color);
+        let MotionEstimator { blocks, cells, grid, ranges, .. } = self.motion;
+        blocks.set_reference(self.color);
         layers::find_surfaces(self.map, grid, self.depth_step, cells, ranges);
     }
 }
 
-struct Find<'a> {
-    motion: &'a mut Motion,
+struct EstimateMotion<'a> {
+    motion: &'a mut MotionEstimator,
     map: &'a DepthMap,
     color: &'a ColorImage,
 }
 
-impl WithSimd for Find<'_> {
+impl WithSimd for EstimateMotion<'_> {
     type Output = bool;
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, _: S) -> bool {
-        let Motion { rgb, grid, blocks, cells, masks, changes, .. } = self.motion;
+        let MotionEstimator { rgb, grid, blocks, cells, masks, changes, .. } = self.motion;
         let mut pictures = Pictures { then: rgb, now: &self.color.rgb, map: self.map, grid: *grid, masks };
-        let rests_below = pictures.compare(cells, changes);
-        if cells.iter().all(|cell| cell.is_at_rest(rests_below)) {
+        let rest_threshold = pictures.compare_at_rest(cells, changes);
+        if cells.iter().all(|cell| cell.is_at_rest(rest_threshold)) {
             return false;
         }
-        let across = grid.cells().0;
-        blocks.find(self.color, |(column, row)| cells[row * across + column].is_at_rest(rests_below));
-        pictures.refine(cells, blocks, rests_below);
-        pictures.smooth(cells, rests_below);
+        let across = grid.cell_counts().0;
+        blocks.match_blocks(self.color, |(column, row)| cells[row * across + column].is_at_rest(rest_threshold));
+        pictures.refine_vectors(cells, blocks, rest_threshold);
+        pictures.smooth_vectors(cells, rest_threshold);
         cells.iter().any(Cell::is_moving)
     }
 }

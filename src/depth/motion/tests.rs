@@ -31,7 +31,7 @@ fn seen(of: impl Fn(i32, i32) -> (u8, f32)) -> (ColorImage, DepthMap) {
 
 /// Returns the depth of `then`, warped by the motion to `now`.
 fn moved(then: &(ColorImage, DepthMap), now: &ColorImage) -> DepthMap {
-    let mut motion = Motion::default();
+    let mut motion = MotionEstimator::default();
     motion.set_reference(&then.1, &then.0, DEPTH_STEP);
     let mut map = then.1.clone();
     if motion.estimate(&then.1, now) {
@@ -149,7 +149,7 @@ fn what_cannot_be_compared_stays() {
 #[test]
 fn a_surface_is_asked_for_by_its_depth() {
     let (then, now) = (square([0; 2], [0; 2], false), square([10, 0], [-4, 0], false));
-    let mut motion = Motion::default();
+    let mut motion = MotionEstimator::default();
     motion.set_reference(&then.1, &then.0, DEPTH_STEP);
     assert!(motion.estimate(&then.1, &now.0));
     // On both sides of the square's left outline.

@@ -37,12 +37,12 @@ impl WithSimd for Warp<'_> {
     fn with_simd<S: pulp::Simd>(mut self, _: S) {
         let Self { cells, grid, from, .. } = self;
         let (width, size) = (from.width as usize, (from.width as usize, from.height as usize));
-        let place = |at: usize| (at % grid.cells().0, at / grid.cells().0);
+        let place = |at: usize| (at % grid.cell_counts().0, at / grid.cell_counts().0);
         let moving = || cells.iter().enumerate().filter(|(_, cell)| cell.is_moving());
         for (at, cell) in moving() {
             let [xs, ys] = grid.cell_range(place(at), size);
             // First clear all moving surfaces; the second pass writes them at their new places.
-            let [near, far] = [cell.near.moved, cell.far_moved()].map(|moved| moved != [0; 2]);
+            let [near, far] = [cell.near.vector, cell.far_vector()].map(|moved| moved != [0; 2]);
             for y in ys {
                 for metres in &mut self.to.metres[y * width..][xs.clone()] {
                     let is_near = *metres < cell.split_m;
@@ -52,25 +52,27 @@ impl WithSimd for Warp<'_> {
         }
         for (at, cell) in moving() {
             let cell_range = grid.cell_range(place(at), size);
-            let [near, far] = [cell.near.moved, cell.far_moved()];
+            let [near, far] = [cell.near.vector, cell.far_vector()];
             if near == far {
-                move_surface(from, self.to, cell_range, self.on_map(near), |_| true);
+                move_surface(from, self.to, cell_range, self.scale_to_map(near), |_| true);
                 continue;
             }
             if near != [0; 2] {
-                move_surface(from, self.to, cell_range.clone(), self.on_map(near), |metres| metres < cell.split_m);
+                move_surface(from, self.to, cell_range.clone(), self.scale_to_map(near), |metres| {
+                    metres < cell.split_m
+                });
             }
             if far != [0; 2] {
-                move_surface(from, self.to, cell_range, self.on_map(far), |metres| metres >= cell.split_m);
+                move_surface(from, self.to, cell_range, self.scale_to_map(far), |metres| metres >= cell.split_m);
             }
         }
-        self.fill();
+        self.fill_holes();
     }
 }
 
 impl Warp<'_> {
     /// Scales a vector to pixels of the map.
-    fn on_map(&self, [x, y]: Vector) -> Vector {
+    fn scale_to_map(&self, [x, y]: Vector) -> Vector {
         let (width, height) = self.grid.size;
         let on_map = |px: i32, of: u32, count: usize| (px as f32 * of as f32 / count as f32).round() as i32;
         [on_map(x, self.from.width, width), on_map(y, self.from.height, height)]
@@ -78,7 +80,7 @@ impl Warp<'_> {
 
     /// Fills holes with the farther depth on both sides, across the narrower direction.
     #[inline(always)]
-    fn fill(&mut self) {
+    fn fill_holes(&mut self) {
         let (width, height) = (self.to.width as usize, self.to.height as usize);
         self.above.clear();
         self.above.resize(width, Above::default());

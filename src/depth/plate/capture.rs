@@ -4,23 +4,23 @@ use crate::depth::reduced::Reducer;
 use crate::frame::{ColorImage, Mask};
 
 /// Minimum time between the pictures.
-const APART_NS: u64 = 80_000_000;
+const MIN_INTERVAL_NS: u64 = 80_000_000;
 /// A picture shows motion if more than this fraction of its reduced pixels differs from the first one by more than
-/// `MOVES`.
+/// `MIN_DIFFERENCE`.
 const MAX_MOVING: f32 = 0.003;
-const MOVES: f32 = 12.0;
+const MIN_DIFFERENCE: f32 = 12.0;
 /// Minimum fraction of a picture that counts as a person.
 const MIN_PERSON: f32 = 0.004;
 
 /// The result of adding a picture.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Taken {
+pub enum CaptureResult {
     /// More pictures are needed; the progress, 0 to 1.
-    More(f32),
+    Collecting(f32),
     /// The picture shows motion or a person; the previous pictures were discarded.
-    Moved,
+    Rejected,
     /// The finished plate.
-    Whole(ColorImage),
+    Finished(ColorImage),
 }
 
 /// Pictures collected for a plate.
@@ -39,7 +39,7 @@ impl Capture {
 
     /// Adds a picture at media time `time_ns`; all have the same size. With a mask of `persons`, pictures with a person
     /// are rejected.
-    pub fn add(&mut self, color: &ColorImage, time_ns: u64, persons: Option<&Mask>) -> Taken {
+    pub fn add(&mut self, color: &ColorImage, time_ns: u64, persons: Option<&Mask>) -> CaptureResult {
         self.reducer.reduce(color, &mut self.now);
         let are_there = persons.is_some_and(|persons| {
             let count = persons.alpha.iter().filter(|alpha| **alpha > 0.5).count();
@@ -47,28 +47,28 @@ impl Capture {
         });
         if are_there {
             self.reset();
-            return Taken::Moved;
+            return CaptureResult::Rejected;
         }
-        if self.first.len() == self.now.len() && differing(&self.first, &self.now) > MAX_MOVING {
+        if self.first.len() == self.now.len() && differing_fraction(&self.first, &self.now) > MAX_MOVING {
             self.reset();
-            return Taken::Moved;
+            return CaptureResult::Rejected;
         }
         if self.pictures.is_empty() {
             self.first.clone_from(&self.now);
         }
-        if self.last_ns.is_none_or(|last_ns| time_ns >= last_ns + APART_NS) {
+        if self.last_ns.is_none_or(|last_ns| time_ns >= last_ns + MIN_INTERVAL_NS) {
             self.last_ns = Some(time_ns);
             return self.add_unchecked(color);
         }
-        Taken::More(self.progress())
+        CaptureResult::Collecting(self.progress())
     }
 
     /// Adds a picture unconditionally, without the checks of [`Self::add`].
-    pub fn add_unchecked(&mut self, color: &ColorImage) -> Taken {
+    pub fn add_unchecked(&mut self, color: &ColorImage) -> CaptureResult {
         self.pictures.push(color.clone());
         match self.pictures.len() {
-            Self::PICTURES => Taken::Whole(self.finish()),
-            _ => Taken::More(self.progress()),
+            Self::PICTURES => CaptureResult::Finished(self.finish()),
+            _ => CaptureResult::Collecting(self.progress()),
         }
     }
 
@@ -98,8 +98,8 @@ impl Capture {
 }
 
 /// Returns the fraction of pixels in which two reduced pictures differ.
-pub fn differing(a: &[[f32; 3]], b: &[[f32; 3]]) -> f32 {
-    let differ = |(a, b): &(&[f32; 3], &[f32; 3])| (0..3).any(|p| (a[p] - b[p]).abs() > MOVES);
+pub fn differing_fraction(a: &[[f32; 3]], b: &[[f32; 3]]) -> f32 {
+    let differ = |(a, b): &(&[f32; 3], &[f32; 3])| (0..3).any(|p| (a[p] - b[p]).abs() > MIN_DIFFERENCE);
     a.iter().zip(b).filter(differ).count() as f32 / a.len().max(1) as f32
 }
 
@@ -123,9 +123,9 @@ mod tests {
         let mut moved = 0;
         for step in 0..40 {
             match capture.add(&picture(step, step < 6), u64::from(step) * 100_000_000, None) {
-                Taken::More(progress) => assert!(progress < 1.0),
-                Taken::Moved => moved += 1,
-                Taken::Whole(plate) => {
+                CaptureResult::Collecting(progress) => assert!(progress < 1.0),
+                CaptureResult::Rejected => moved += 1,
+                CaptureResult::Finished(plate) => {
                     assert!(moved == 1 && step > 12, "{moved} {step}");
                     return assert!(plate.rgb.iter().all(|code| (101..=103).contains(code)));
                 }

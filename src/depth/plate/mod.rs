@@ -9,10 +9,10 @@ mod learning;
 mod source;
 mod subject;
 
-pub use capture::{Capture, Taken};
-pub use source::{Companion, Guide, Lock, PlateDepth, Step};
+pub use capture::{Capture, CaptureResult};
+pub use source::{CameraLock, Companion, Guide, PlateDepth, Step};
 
-use learning::{Learning, Lesson};
+use learning::{PlateUpdater, UpdateInput};
 use subject::Subject;
 
 use crate::depth::alignment::{Aligner, Alignment};
@@ -21,10 +21,10 @@ use crate::depth::reduced::{Reducer, block_px, reduced_size};
 use crate::frame::{ColorImage, Mask};
 
 /// Iterations of the alignment on the first picture; later ones need one.
-const FIRST_STEPS: usize = 8;
+const FIRST_ITERATIONS: usize = 8;
 /// The plate no longer matches the picture above the first fraction of foreground, and matches again below the second.
 const MAX_FOREGROUND: f32 = 0.6;
-const FIT_FOREGROUND: f32 = 0.5;
+const MATCHING_FOREGROUND: f32 = 0.5;
 
 /// A plate in use.
 #[derive(Debug)]
@@ -36,12 +36,12 @@ pub struct Plate {
     aligner: Aligner,
     alignment: Alignment,
     subject: Subject,
-    learning: Learning,
+    updater: PlateUpdater,
     /// Linear light of each code of the plate, by channel, at the current exposure.
     light: Box<[[f32; 256]; 3]>,
     mask: Mask,
-    begun: bool,
-    fits: bool,
+    has_started: bool,
+    is_matching: bool,
 }
 
 impl Plate {
@@ -57,11 +57,11 @@ impl Plate {
             aligner: Aligner::default(),
             alignment: Alignment::default(),
             subject: Subject::default(),
-            learning: Learning::default(),
+            updater: PlateUpdater::default(),
             light: Box::new([[0.0; 256]; 3]),
             mask: Mask::default(),
-            begun: false,
-            fits: true,
+            has_started: false,
+            is_matching: true,
         }
     }
 
@@ -71,7 +71,7 @@ impl Plate {
     }
 
     /// Returns the plate as a background at the current exposure and shift.
-    pub fn backdrop(&self) -> BackgroundPlate<'_> {
+    pub fn as_background_plate(&self) -> BackgroundPlate<'_> {
         let block_px = block_px(self.color.width) as f32;
         let shift_px = self.alignment.shift.map(|shift| (shift * block_px).round() as isize);
         BackgroundPlate { color: &self.color, light: &self.light, shift_px }
@@ -89,49 +89,52 @@ impl Plate {
 
     /// Compares a picture of the plate's size with it; a mask of `persons`, if known, restricts the foreground. Returns
     /// whether the plate matches the place and the light.
-    pub fn look(&mut self, color: &ColorImage, time_ns: u64, persons: Option<&Mask>) -> bool {
+    pub fn update(&mut self, color: &ColorImage, time_ns: u64, persons: Option<&Mask>) -> bool {
         let size = reduced_size(color);
         self.reducer.reduce(color, &mut self.now);
-        self.subject.foreign.resize(self.now.len(), false);
-        if !self.fits {
+        self.subject.foreground.resize(self.now.len(), false);
+        if !self.is_matching {
             // The alignment with a mismatched picture is no starting point.
             self.alignment = Alignment::default();
-            self.subject.foreign.fill(false);
-            self.begun = false;
+            self.subject.foreground.fill(false);
+            self.has_started = false;
         }
         let Self { reduced, now, aligner, alignment, subject, .. } = self;
-        for _ in 0..if self.begun { 1 } else { FIRST_STEPS } {
+        for _ in 0..if self.has_started { 1 } else { FIRST_ITERATIONS } {
             aligner.shift(reduced, size, alignment.shift);
-            aligner.step(now, &subject.foreign, size, alignment);
+            aligner.step(now, &subject.foreground, size, alignment);
             aligner.shift(reduced, size, alignment.shift);
-            subject.find(now, aligner.shifted(), size, alignment);
+            subject.segment(now, aligner.shifted(), size, alignment);
         }
         if let Some(persons) = persons {
             subject.keep_persons(persons, size);
         }
-        self.begun = true;
-        self.fits = subject.foreground_fraction() < if self.fits { MAX_FOREGROUND } else { FIT_FOREGROUND };
-        if self.fits {
-            let lesson = Lesson { color, now, subject, alignment, time_ns };
-            if self.learning.learn(lesson, &self.reducer, &mut self.color, reduced) {
+        self.has_started = true;
+        self.is_matching =
+            subject.foreground_fraction() < if self.is_matching { MAX_FOREGROUND } else { MATCHING_FOREGROUND };
+        if self.is_matching {
+            let input = UpdateInput { color, now, subject, alignment, time_ns };
+            if self.updater.update_plate(input, &self.reducer, &mut self.color, reduced) {
                 aligner.forget();
             }
         }
         self.draw_mask(size);
         self.reducer.expose(self.alignment.gain, &mut self.light);
-        self.fits
+        self.is_matching
     }
 
     /// Draws the mask, soft at outlines: the mean over 3x3 pixels.
     fn draw_mask(&mut self, (width, height): (usize, usize)) {
         self.mask.resize(width as u32, height as u32);
-        let foreign = &self.subject.foreign;
+        let foreground = &self.subject.foreground;
         for y in 0..height {
             for x in 0..width {
                 let columns = x.saturating_sub(1)..(x + 2).min(width);
                 let rows = y.saturating_sub(1)..(y + 2).min(height);
                 let pixels = rows.len() * columns.len();
-                let count = |y: usize| foreign[y * width..][columns.clone()].iter().filter(|foreign| **foreign).count();
+                let count = |y: usize| {
+                    foreground[y * width..][columns.clone()].iter().filter(|foreground| **foreground).count()
+                };
                 self.mask.alpha[y * width + x] = rows.map(count).sum::<usize>() as f32 / pixels as f32;
             }
         }

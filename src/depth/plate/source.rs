@@ -5,7 +5,7 @@ use std::fmt;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
-use super::{Capture, Plate, Taken};
+use super::{Capture, CaptureResult, Plate};
 use crate::depth::matting::mask::MaskMatting;
 use crate::depth::{DepthError, DepthSource, FrameInput};
 use crate::frame::{ColorImage, DepthMap, Mask};
@@ -13,20 +13,20 @@ use crate::frame::{ColorImage, DepthMap, Mask};
 /// Time for a person to step out of the picture.
 const COUNTDOWN_NS: u64 = 3_000_000_000;
 /// Time in which a newly started camera settles its exposure.
-const SETTLES_NS: u64 = 1_000_000_000;
+const SETTLE_NS: u64 = 1_000_000_000;
 /// Motion that prevents a capture for longer than this does not stop by itself.
-const RESTLESS_NS: u64 = 10_000_000_000;
+const MAX_MOTION_NS: u64 = 10_000_000_000;
 
 /// Locks the camera's exposure, white balance and focus, until the result is dropped.
-pub type Lock = Box<dyn FnOnce() -> Option<Box<dyn Any + Send>> + Send>;
+pub type CameraLock = Box<dyn FnOnce() -> Option<Box<dyn Any + Send>> + Send>;
 
 /// A second source that sees the same pictures and knows more than a plate.
 pub trait Companion: DepthSource {
     /// Returns a mask of the persons in the picture `seen`, which is the next one; `None` if unknown.
-    fn persons(&mut self, seen: FrameInput) -> Option<&Mask>;
+    fn segment_persons(&mut self, seen: FrameInput) -> Option<&Mask>;
 
     /// Fills `map` with the distances behind the subject, which `mask` has, in the same picture.
-    fn measure_behind(&mut self, color: &ColorImage, mask: &Mask, map: &mut DepthMap);
+    fn measure_background(&mut self, color: &ColorImage, mask: &Mask, map: &mut DepthMap);
 }
 
 /// Progress of the capture, shown to the user.
@@ -35,31 +35,31 @@ pub enum Step {
     /// Seconds left to step out of the picture.
     StepOut(u32),
     /// The capture's progress in percent.
-    Taking(u32),
+    Capturing(u32),
     /// Something moves.
-    Moves,
+    Moving,
     /// Something has moved for so long that no plate can be captured.
-    Restless,
+    KeepsMoving,
     /// The plate is in use.
     Ready,
     /// The plate does not match the picture: the camera was moved or the light has changed.
-    Unlike,
+    Mismatched,
 }
 
 impl fmt::Display for Step {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::StepOut(seconds) => write!(f, "step out of the picture: {seconds}"),
-            Self::Taking(_) => f.write_str("stay out for a second: the plate is being taken"),
-            Self::Moves => f.write_str("something moves: stay out of the picture"),
-            Self::Restless => f.write_str(
-                "something keeps moving, so that no plate can be taken: let the camera stand on something firm, and leave the \
+            Self::Capturing(_) => f.write_str("stay out for a second: the plate is being taken"),
+            Self::Moving => f.write_str("something moves: stay out of the picture"),
+            Self::KeepsMoving => f.write_str(
+                "something keeps moving, so no plate can be taken: put the camera on something firm, and leave the \
                  picture",
             ),
             Self::Ready => f.write_str("the plate is taken: come back"),
-            Self::Unlike => f.write_str(
-                "the picture is not that of the plate, so all is blurred: the camera was moved or the light has changed; take \
-                 another plate",
+            Self::Mismatched => f.write_str(
+                "the picture no longer matches the plate, so everything is blurred: the camera was moved or the light \
+                 has changed; take another plate",
             ),
         }
     }
@@ -70,7 +70,7 @@ impl fmt::Display for Step {
 pub struct Guide {
     /// Kind of the step times [`KINDS`], plus its number.
     step: AtomicU32,
-    again: AtomicBool,
+    is_capture_requested: AtomicBool,
 }
 
 const KINDS: u32 = 1 << 16;
@@ -82,27 +82,27 @@ impl Guide {
         let number = step % KINDS;
         match step / KINDS {
             0 => Step::StepOut(number),
-            1 => Step::Taking(number),
-            2 => Step::Moves,
-            3 => Step::Restless,
+            1 => Step::Capturing(number),
+            2 => Step::Moving,
+            3 => Step::KeepsMoving,
             4 => Step::Ready,
-            _ => Step::Unlike,
+            _ => Step::Mismatched,
         }
     }
 
     /// Requests the capture of a new plate.
     pub fn request_capture(&self) {
-        self.again.store(true, Ordering::Relaxed);
+        self.is_capture_requested.store(true, Ordering::Relaxed);
     }
 
     fn set_step(&self, step: Step) {
         let (kind, number) = match step {
             Step::StepOut(seconds) => (0, seconds),
-            Step::Taking(percent) => (1, percent),
-            Step::Moves => (2, 0),
-            Step::Restless => (3, 0),
+            Step::Capturing(percent) => (1, percent),
+            Step::Moving => (2, 0),
+            Step::KeepsMoving => (3, 0),
             Step::Ready => (4, 0),
-            Step::Unlike => (5, 0),
+            Step::Mismatched => (5, 0),
         };
         self.step.store(kind * KINDS + number, Ordering::Relaxed);
     }
@@ -111,12 +111,12 @@ impl Guide {
 #[derive(Debug)]
 enum State {
     /// Waits for the countdown; contains its start, once there was a picture.
-    Waiting(Option<u64>),
-    Taking {
+    CountingDown(Option<u64>),
+    Capturing {
         capture: Box<Capture>,
         since_ns: u64,
     },
-    Using(Box<Plate>),
+    InUse(Box<Plate>),
 }
 
 /// Depth source from a plate: the foreground is in focus, and the rest is far, or as far as the companion measures.
@@ -124,7 +124,7 @@ enum State {
 pub struct PlateDepth {
     state: State,
     guide: Arc<Guide>,
-    lock: Option<Lock>,
+    lock: Option<CameraLock>,
     companion: Option<Box<dyn Companion>>,
     /// Keeps the camera's settings locked as long as it lives.
     locked: Option<Box<dyn Any + Send>>,
@@ -134,8 +134,8 @@ pub struct PlateDepth {
 
 impl PlateDepth {
     /// Creates a source from an existing plate, or one that captures it from the first pictures.
-    pub fn new(plate: Option<ColorImage>, lock: Option<Lock>, companion: Option<Box<dyn Companion>>) -> Self {
-        let state = plate.map_or(State::Waiting(None), |plate| State::Using(Box::new(Plate::new(plate))));
+    pub fn new(plate: Option<ColorImage>, lock: Option<CameraLock>, companion: Option<Box<dyn Companion>>) -> Self {
+        let state = plate.map_or(State::CountingDown(None), |plate| State::InUse(Box::new(Plate::new(plate))));
         let guide = Arc::default();
         Self { state, guide, lock, companion, locked: None, matting: MaskMatting::default(), first_ns: None }
     }
@@ -148,8 +148,8 @@ impl PlateDepth {
     /// Returns the plate, once captured.
     pub fn plate(&self) -> Option<&ColorImage> {
         match &self.state {
-            State::Using(plate) => Some(plate.color()),
-            State::Waiting(_) | State::Taking { .. } => None,
+            State::InUse(plate) => Some(plate.color()),
+            State::CountingDown(_) | State::Capturing { .. } => None,
         }
     }
 
@@ -157,43 +157,43 @@ impl PlateDepth {
     fn advance(&mut self, seen: FrameInput) -> Step {
         let FrameInput { stamp, color, .. } = seen;
         let now_ns = stamp.time_ns;
-        if self.guide.again.swap(false, Ordering::Relaxed) {
-            self.state = State::Waiting(None);
+        if self.guide.is_capture_requested.swap(false, Ordering::Relaxed) {
+            self.state = State::CountingDown(None);
         }
         let first_ns = *self.first_ns.get_or_insert(now_ns);
-        if now_ns >= first_ns + SETTLES_NS
+        if now_ns >= first_ns + SETTLE_NS
             && let Some(lock) = self.lock.take()
         {
             self.locked = lock();
         }
         let persons = match self.state {
-            State::Waiting(_) => None,
-            _ => self.companion.as_mut().and_then(|companion| companion.persons(seen)),
+            State::CountingDown(_) => None,
+            _ => self.companion.as_mut().and_then(|companion| companion.segment_persons(seen)),
         };
         match &mut self.state {
-            State::Waiting(since_ns) => {
+            State::CountingDown(since_ns) => {
                 let since_ns = *since_ns.get_or_insert(now_ns);
                 let waited_ns = now_ns.saturating_sub(since_ns);
                 if waited_ns < COUNTDOWN_NS {
                     return Step::StepOut((COUNTDOWN_NS - waited_ns).div_ceil(1_000_000_000) as u32);
                 }
-                self.state = State::Taking { capture: Box::default(), since_ns: now_ns };
-                Step::Taking(0)
+                self.state = State::Capturing { capture: Box::default(), since_ns: now_ns };
+                Step::Capturing(0)
             }
-            State::Taking { capture, since_ns } => match capture.add(color, now_ns, persons) {
-                Taken::More(progress) => Step::Taking((100.0 * progress) as u32),
-                Taken::Moved if now_ns > *since_ns + RESTLESS_NS => Step::Restless,
-                Taken::Moved => Step::Moves,
-                Taken::Whole(plate) => {
+            State::Capturing { capture, since_ns } => match capture.add(color, now_ns, persons) {
+                CaptureResult::Collecting(progress) => Step::Capturing((100.0 * progress) as u32),
+                CaptureResult::Rejected if now_ns > *since_ns + MAX_MOTION_NS => Step::KeepsMoving,
+                CaptureResult::Rejected => Step::Moving,
+                CaptureResult::Finished(plate) => {
                     let mut plate = Box::new(Plate::new(plate));
-                    plate.look(color, now_ns, persons);
-                    self.state = State::Using(plate);
+                    plate.update(color, now_ns, persons);
+                    self.state = State::InUse(plate);
                     Step::Ready
                 }
             },
-            State::Using(plate) => match plate.size() == color.size() && plate.look(color, now_ns, persons) {
+            State::InUse(plate) => match plate.size() == color.size() && plate.update(color, now_ns, persons) {
                 true => Step::Ready,
-                false => Step::Unlike,
+                false => Step::Mismatched,
             },
         }
     }
@@ -211,11 +211,11 @@ impl DepthSource for PlateDepth {
         map.matte.pixels.clear();
         map.metres.fill(DepthMap::FAR_M);
         (map.subject_m, map.is_smooth) = (Some(DepthMap::SUBJECT_M), false);
-        if let (State::Using(plate), Step::Ready) = (&self.state, step) {
+        if let (State::InUse(plate), Step::Ready) = (&self.state, step) {
             if let Some(companion) = &mut self.companion {
-                companion.measure_behind(color, plate.mask(), map);
+                companion.measure_background(color, plate.mask(), map);
             }
-            self.matting.find(plate.mask(), color, Some(&plate.backdrop()), map);
+            self.matting.compute_matte(plate.mask(), color, Some(&plate.as_background_plate()), map);
         }
         Ok(())
     }

@@ -17,14 +17,14 @@ const MAX_DEVIATION: f32 = 3.0;
 /// Factor of the thresholds for pixels that were foreground in the previous frame (hysteresis).
 const HYSTERESIS: f32 = 0.75;
 /// Minimum ratio of a shadow's value (root of light) to the plate's, and maximum deviation from the plate's colour.
-const DARKEST_SHADOW: f32 = 0.72;
-const SHADE: f32 = 4.0;
+const MIN_SHADOW_RATIO: f32 = 0.72;
+const MAX_SHADOW_TINT: f32 = 4.0;
 /// Ratios of values under a lamp that was switched on: minimum and maximum per channel, and maximum between channels.
-const UNLIT: f32 = 0.98;
-const BRIGHTEST: f32 = 1.8;
-const TINT: f32 = 1.25;
+const MIN_LIT_RATIO: f32 = 0.98;
+const MAX_LIT_RATIO: f32 = 1.8;
+const MAX_LIT_TINT: f32 = 1.25;
 /// Maximum change of the ratio between neighbours under changed light; outlines exceed it.
-const SOFT: f32 = 0.035;
+const MAX_LIGHT_GRADIENT: f32 = 0.035;
 /// Minimum size of a component, as a fraction of the picture.
 const MIN_COMPONENT: f32 = 0.002;
 /// Holes up to this fraction of the picture are filled.
@@ -32,9 +32,9 @@ const MAX_HOLE: f32 = 0.001;
 
 /// Minimum mask value of a person; radius around persons that belongs to them, as a fraction of the mask's width; and
 /// maximum size of what else is connected to them, such as held objects, relative to them.
-const PERSON: f32 = 0.5;
-const CLOSE: f32 = 0.02;
-const HELD: f32 = 0.3;
+const MIN_PERSON_ALPHA: f32 = 0.5;
+const CLOSE_FRACTION: f32 = 0.02;
+const MAX_HELD: f32 = 0.3;
 
 /// Label of a pixel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -58,7 +58,7 @@ pub struct Component {
 /// Computes the differences of a row from the plate, three values a pixel. Shifts by up to half a pixel are tolerated:
 /// values between the plate's pixel and its neighbours (`beside`: above and below; left and right from `own`) are no
 /// difference. The plate's values are multiplied by `gain`.
-fn differences(now: &[f32], own: &[f32], beside: [&[f32]; 2], gain: &[f32], off: &mut [f32]) {
+fn compute_differences(now: &[f32], own: &[f32], beside: [&[f32]; 2], gain: &[f32], off: &mut [f32]) {
     let count = off.len();
     let off_at = |value: f32, own: f32, around: [f32; 4], gain: f32| {
         let halves = around.map(|beside| 0.5 * (own + beside));
@@ -96,7 +96,7 @@ pub struct Subject {
     /// Whether a pixel of the persons' mask is in or close to a person.
     near: Vec<bool>,
     /// Whether a pixel is foreground.
-    pub foreign: Vec<bool>,
+    pub foreground: Vec<bool>,
     /// The pixels of all components, one after the other.
     pub pixels: Vec<u32>,
     pub components: Vec<Component>,
@@ -105,27 +105,27 @@ pub struct Subject {
 impl Subject {
     /// Returns the fraction of the picture that is foreground.
     pub fn foreground_fraction(&self) -> f32 {
-        self.pixels.len() as f32 / self.foreign.len().max(1) as f32
+        self.pixels.len() as f32 / self.foreground.len().max(1) as f32
     }
 
-    /// Segments a picture against its plate. `foreign` contains the previous frame's foreground on entry, for the
+    /// Segments a picture against its plate. `foreground` contains the previous frame's foreground on entry, for the
     /// hysteresis, and the new one on return.
-    pub fn find(&mut self, now: &[[f32; 3]], plate: &[[f32; 3]], size: (usize, usize), alignment: &Alignment) {
-        let deviation = self.deviation(now, plate, alignment);
+    pub fn segment(&mut self, now: &[[f32; 3]], plate: &[[f32; 3]], size: (usize, usize), alignment: &Alignment) {
+        let deviation = self.estimate_noise(now, plate, alignment);
         let weak = WEAK.max(WEAK_DEVIATIONS * deviation);
         let strong = STRONG.max(STRONG_DEVIATIONS * deviation);
-        self.label(now, plate, size, (alignment.gain, weak, strong));
-        self.grow_light(size);
+        self.label_pixels(now, plate, size, (alignment.gain, weak, strong));
+        self.grow_relit_background(size);
         self.find_components(size);
         self.fill_holes(size);
     }
 
     /// Estimates the noise's standard deviation by the median absolute deviation of the background pixels.
-    fn deviation(&mut self, now: &[[f32; 3]], plate: &[[f32; 3]], alignment: &Alignment) -> f32 {
+    fn estimate_noise(&mut self, now: &[[f32; 3]], plate: &[[f32; 3]], alignment: &Alignment) -> f32 {
         /// Median absolute deviation of a normal distribution, in standard deviations.
         const MEDIAN: f32 = 0.6745;
         self.sample.clear();
-        let all = now.iter().zip(plate).zip(&self.foreign).filter(|(_, foreign)| !**foreign);
+        let all = now.iter().zip(plate).zip(&self.foreground).filter(|(_, foreground)| !**foreground);
         // A sample suffices.
         self.sample.extend(all.step_by(5).map(|((now, plate), _)| (now[1] - alignment.gain[1] * plate[1]).abs()));
         let middle = self.sample.len() / 2;
@@ -135,7 +135,7 @@ impl Subject {
         }
     }
 
-    fn label(
+    fn label_pixels(
         &mut self,
         now: &[[f32; 3]],
         plate: &[[f32; 3]],
@@ -144,7 +144,7 @@ impl Subject {
     ) {
         self.labels.clear();
         self.ratios.clear();
-        self.foreign.resize(now.len(), false);
+        self.foreground.resize(now.len(), false);
         let (now, plate) = (now.as_flattened(), plate.as_flattened());
         let line = 3 * width;
         self.line.clear();
@@ -154,7 +154,7 @@ impl Subject {
             let row = |y: usize| &plate[y * line..][..line];
             let (own, values) = (row(y), &now[y * line..][..line]);
             let beside = [row(y.saturating_sub(1)), row((y + 1).min(height - 1))];
-            differences(values, own, beside, &self.line, &mut self.off);
+            compute_differences(values, own, beside, &self.line, &mut self.off);
             for x in 0..width {
                 let (at, of) = (y * width + x, 3 * x..3 * x + 3);
                 let (values, off) = (&values[of.clone()], &self.off[of.clone()]);
@@ -162,16 +162,16 @@ impl Subject {
                 let ratio = (values.iter().sum::<f32>() + 1.0) / (exposed.iter().sum::<f32>() + 1.0);
                 self.ratios.push(ratio);
                 let most = off[0].max(off[1]).max(off[2]).max(0.0);
-                let stays = if self.foreign[at] { HYSTERESIS } else { 1.0 };
+                let stays = if self.foreground[at] { HYSTERESIS } else { 1.0 };
                 // {|| A shadow darkens all channels alike, and a lamp brightens them by similar factors.
                 let in_shadow = || {
                     let off = values.iter().zip(exposed).map(|(value, exposed)| (value - ratio * exposed).abs());
-                    (DARKEST_SHADOW..1.0).contains(&ratio) && off.fold(0.0, f32::max) < SHADE
+                    (MIN_SHADOW_RATIO..1.0).contains(&ratio) && off.fold(0.0, f32::max) < MAX_SHADOW_TINT
                 };
                 let is_lit = || {
                     let ratios = values.iter().zip(exposed).map(|(value, exposed)| (value + 1.0) / (exposed + 1.0));
                     let (least, most) = ratios.fold((f32::MAX, 0.0f32), |ends, one| (ends.0.min(one), ends.1.max(one)));
-                    least > UNLIT && most < BRIGHTEST && most < TINT * least
+                    least > MIN_LIT_RATIO && most < MAX_LIT_RATIO && most < MAX_LIT_TINT * least
                 };
                 self.labels.push(match most {
                     most if most < stays * weak => Label::Background,
@@ -184,7 +184,7 @@ impl Subject {
     }
 
     /// Grows the background into relit pixels where the light changes smoothly, without an outline.
-    fn grow_light(&mut self, (width, height): (usize, usize)) {
+    fn grow_relit_background(&mut self, (width, height): (usize, usize)) {
         self.front.clear();
         let is_background = |&at: &u32| self.labels[at as usize] == Label::Background;
         self.front.extend((0..self.labels.len() as u32).filter(is_background));
@@ -198,7 +198,7 @@ impl Subject {
                 (y + 1 < height).then(|| at as usize + width),
             ];
             for beside in sides.into_iter().flatten() {
-                if self.labels[beside] == Label::Relit && (self.ratios[beside] - ratio).abs() < SOFT {
+                if self.labels[beside] == Label::Relit && (self.ratios[beside] - ratio).abs() < MAX_LIGHT_GRADIENT {
                     self.labels[beside] = Label::Background;
                     self.front.push(beside as u32);
                 }
@@ -214,7 +214,7 @@ impl Subject {
     /// Finds the connected components with enough certain foreground pixels (hysteresis thresholding).
     fn find_components(&mut self, size: (usize, usize)) {
         let least = ((MIN_COMPONENT * self.labels.len() as f32) as usize).max(4);
-        self.foreign.fill(false);
+        self.foreground.fill(false);
         self.pixels.clear();
         self.components.clear();
         self.seen.clear();
@@ -224,13 +224,13 @@ impl Subject {
                 continue;
             }
             let first = self.pixels.len();
-            flood(start, size, &mut self.seen, &mut self.pixels);
+            flood_fill(start, size, &mut self.seen, &mut self.pixels);
             let strong = self.pixels[first..].iter().filter(|&&at| self.labels[at as usize] == Label::Strong).count();
             if strong < least {
                 self.pixels.truncate(first);
                 continue;
             }
-            self.pixels[first..].iter().for_each(|&at| self.foreign[at as usize] = true);
+            self.pixels[first..].iter().for_each(|&at| self.foreground[at as usize] = true);
             self.components.push(Component { first, end: self.pixels.len() });
         }
     }
@@ -243,17 +243,17 @@ impl Subject {
             return;
         }
         self.seen.clear();
-        self.seen.extend(persons.alpha.iter().map(|alpha| *alpha > PERSON));
+        self.seen.extend(persons.alpha.iter().map(|alpha| *alpha > MIN_PERSON_ALPHA));
         let mut near = std::mem::take(&mut self.near);
         near.clone_from(&self.seen);
-        dilate(&mut near, &mut self.flags, of_mask.0, (CLOSE * of_mask.0 as f32).ceil() as usize);
+        dilate(&mut near, &mut self.flags, of_mask.0, (CLOSE_FRACTION * of_mask.0 as f32).ceil() as usize);
         let place = |at: u32| nearest(at as usize, size, of_mask);
         let mut kept = 0;
         for component in &mut self.components {
             let range = component.first..component.end;
             let of_persons = self.pixels[range.clone()].iter().filter(|&&at| self.seen[place(at)]).count();
             let away = self.pixels[range.clone()].iter().filter(|&&at| !near[place(at)]).count();
-            let is_theirs = away as f32 <= HELD * of_persons as f32;
+            let is_theirs = away as f32 <= MAX_HELD * of_persons as f32;
             let first = kept;
             for k in range {
                 let at = self.pixels[k];
@@ -261,7 +261,7 @@ impl Subject {
                     self.pixels[kept] = at;
                     kept += 1;
                 } else {
-                    self.foreign[at as usize] = false;
+                    self.foreground[at as usize] = false;
                 }
             }
             *component = Component { first, end: kept };
@@ -274,22 +274,22 @@ impl Subject {
     /// Fills small holes: colours that happen to match the background.
     fn fill_holes(&mut self, size: (usize, usize)) {
         let most = (MAX_HOLE * self.labels.len() as f32) as usize;
-        self.seen.clone_from(&self.foreign);
+        self.seen.clone_from(&self.foreground);
         for start in 0..self.seen.len() {
             if self.seen[start] {
                 continue;
             }
             self.front.clear();
-            flood(start, size, &mut self.seen, &mut self.front);
+            flood_fill(start, size, &mut self.seen, &mut self.front);
             if self.front.len() <= most {
-                self.front.iter().for_each(|&at| self.foreign[at as usize] = true);
+                self.front.iter().for_each(|&at| self.foreground[at as usize] = true);
             }
         }
     }
 }
 
 /// Appends to `pixels` the unseen pixels connected to `start`, 8-connected.
-fn flood(start: usize, (width, height): (usize, usize), seen: &mut [bool], pixels: &mut Vec<u32>) {
+fn flood_fill(start: usize, (width, height): (usize, usize), seen: &mut [bool], pixels: &mut Vec<u32>) {
     let mut next = pixels.len();
     seen[start] = true;
     pixels.push(start as u32);

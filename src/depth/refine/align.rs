@@ -44,9 +44,9 @@ pub struct Aligner {
     scratch: Vec<bool>,
     tiles: Tiles,
     /// Spatial weights of the votes.
-    nearby: Weights,
+    spatial_weights: Weights,
     /// Worklist of pixels, in order: first those at edges, then the neighbours of those that changed.
-    front: Vec<u32>,
+    worklist: Vec<u32>,
     /// Results of the pixels that are processed in parallel.
     results: Vec<f32>,
     /// All pixels processed in the first round.
@@ -63,8 +63,8 @@ impl Default for Aligner {
             band: Vec::new(),
             scratch: Vec::new(),
             tiles: Tiles::default(),
-            nearby: votes::weights_by_distance(),
-            front: Vec::new(),
+            spatial_weights: votes::compute_spatial_weights(),
+            worklist: Vec::new(),
             results: Vec::new(),
             pixels: Vec::new(),
             moved: Vec::new(),
@@ -89,7 +89,7 @@ impl Aligner {
         self.moved.clear();
         self.pixels.clear();
         for round in 0..ROUNDS {
-            let Self { planes, edge, band, scratch, tiles, nearby, front, results, pixels, moved } = self;
+            let Self { planes, edge, band, scratch, tiles, spatial_weights, worklist, results, pixels, moved } = self;
             if round == 0 {
                 for mask in [&mut *edge, &mut *band, &mut *scratch] {
                     mask.clear();
@@ -100,16 +100,23 @@ impl Aligner {
                 workers.run_each(parts, &|((rows, edge), has_edge)| {
                     let columns = |_| iter::once(0..width);
                     arch.dispatch(FindEdges { inverse, width, depth_step, columns, rows, edge: &mut *edge });
-                    tiles::mark(has_edge, edge, width);
+                    tiles::mark_edge_tiles(has_edge, edge, width);
                 });
-                tiles.find_near();
-                front.clear();
-                tiles.find_all(edge, front);
+                tiles.mark_neighbours();
+                worklist.clear();
+                tiles.collect_edges(edge, worklist);
                 planes.resize(width, height, RADIUS_LANES);
             } else {
                 // Only pixels that moved in the last round can have moved edges, or can move their neighbours now.
                 workers.run_each(bands.rows().zip(bands.split(edge, width)), &|(rows, edge)| {
-                    arch.dispatch(FindEdges { inverse, width, depth_step, columns: |y| tiles.columns(y), rows, edge });
+                    arch.dispatch(FindEdges {
+                        inverse,
+                        width,
+                        depth_step,
+                        columns: |y| tiles.near_columns(y),
+                        rows,
+                        edge,
+                    });
                 });
             }
             workers.run_each(bands.rows().zip(bands.split(scratch, width)), &|(rows, out)| {
@@ -126,43 +133,48 @@ impl Aligner {
                 arch.dispatch(SetDepths { planes, tiles, inverse, unknown, band, weights: [FILLED, UNCERTAIN] });
             });
             if round > 0 {
-                front.clear();
-                front.extend(moved.iter().filter(|&&k| band[k as usize]));
+                worklist.clear();
+                worklist.extend(moved.iter().filter(|&&k| band[k as usize]));
             }
             moved.clear();
-            vote((arch, workers), (planes, nearby, depth_step), (inverse, band), (front, results, moved));
+            move_edges(
+                (arch, workers),
+                (planes, spatial_weights, depth_step),
+                (inverse, band),
+                (worklist, results, moved),
+            );
             if round == 0 {
-                std::mem::swap(front, pixels);
+                std::mem::swap(worklist, pixels);
             }
         }
         snap_to_surfaces(&self.pixels, inverse, rgb, width, depth_step);
     }
 }
 
-/// Finds the surface of the pixels at edges, the `front`, and of the neighbours of those that change: an edge moves
+/// Finds the surface of the pixels at edges, the `worklist`, and of the neighbours of those that change: an edge moves
 /// like a wavefront, and costs little where it is correct. A result depends only on the pixel's own depth and on the
-/// planes, so that the whole front is computed in parallel. `band` marks the pixels that may change; a pixel leaves it
-/// when it joins the front, so that it is processed once.
-fn vote(
+/// planes, so that the whole worklist is computed in parallel. `band` marks the pixels that may change; a pixel leaves it
+/// when it joins the worklist, so that it is processed once.
+fn move_edges(
     (arch, workers): (Arch, &mut ThreadPool),
-    (planes, nearby, depth_step): (&Planes, &Weights, f32),
+    (planes, spatial_weights, depth_step): (&Planes, &Weights, f32),
     (inverse, band): (&mut [f32], &mut [bool]),
-    (front, results, moved): (&mut Vec<u32>, &mut Vec<f32>, &mut Vec<u32>),
+    (worklist, results, moved): (&mut Vec<u32>, &mut Vec<f32>, &mut Vec<u32>),
 ) {
     let width = planes.width;
-    for &k in &*front {
+    for &k in &*worklist {
         band[k as usize] = false;
     }
     let mut next = 0;
-    while next < front.len() {
-        let pixels = &front[next..];
-        let each = bands::share(pixels.len(), MIN_PIXELS_PER_THREAD);
+    while next < worklist.len() {
+        let pixels = &worklist[next..];
+        let each = bands::chunk_len(pixels.len(), MIN_PIXELS_PER_THREAD);
         results.resize(pixels.len(), 0.0);
         workers.run_each(pixels.chunks(each).zip(results.chunks_mut(each)), &|(pixels, results)| {
-            arch.dispatch(Vote { planes, nearby, inverse, depth_step, pixels, results });
+            arch.dispatch(FindSurfaces { planes, spatial_weights, inverse, depth_step, pixels, results });
         });
         for &result in &*results {
-            let pixel = front[next];
+            let pixel = worklist[next];
             next += 1;
             let k = pixel as usize;
             if result == inverse[k] {
@@ -177,7 +189,7 @@ fn vote(
             for (inside, beside) in beside {
                 if inside && beside < band.len() && band[beside] {
                     band[beside] = false;
-                    front.push(beside as u32);
+                    worklist.push(beside as u32);
                 }
             }
         }
@@ -265,7 +277,7 @@ impl WithSimd for DilateRows<'_> {
     fn with_simd<S: pulp::Simd>(self, _: S) {
         let Self { tiles, width, edge, rows, out } = self;
         for (line, y) in rows.enumerate() {
-            for columns in tiles.columns(y) {
+            for columns in tiles.near_columns(y) {
                 let row = &edge[y * width..][..width];
                 let out = &mut out[line * width..][..width];
                 out[columns.clone()].copy_from_slice(&row[columns.clone()]);
@@ -301,7 +313,7 @@ impl WithSimd for DilateColumns<'_> {
         let Self { tiles, width, along, rows, out } = self;
         let height = along.len() / width;
         for (line, y) in rows.enumerate() {
-            for columns in tiles.columns(y) {
+            for columns in tiles.near_columns(y) {
                 let out = &mut out[line * width..][columns.clone()];
                 out.fill(false);
                 for other in y.saturating_sub(SIDE_PX)..(y + BAND_PX).min(height) {
@@ -326,25 +338,25 @@ fn is_edge_between(here: f32, beside: f32, depth_step: f32) -> bool {
 }
 
 /// Computes the surface of each listed pixel.
-struct Vote<'a> {
+struct FindSurfaces<'a> {
     planes: &'a Planes,
-    nearby: &'a Weights,
+    spatial_weights: &'a Weights,
     inverse: &'a [f32],
     depth_step: f32,
     pixels: &'a [u32],
     results: &'a mut [f32],
 }
 
-impl WithSimd for Vote<'_> {
+impl WithSimd for FindSurfaces<'_> {
     type Output = ();
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, _: S) {
-        let Self { planes, nearby, inverse, depth_step, pixels, results } = self;
+        let Self { planes, spatial_weights, inverse, depth_step, pixels, results } = self;
         let mut votes = Votes::default();
         for (&pixel, result) in pixels.iter().zip(results) {
             let k = pixel as usize;
-            votes.gather(planes, nearby, k % planes.width, k / planes.width);
-            *result = votes.surface(inverse[k], depth_step);
+            votes.collect_window(planes, spatial_weights, k % planes.width, k / planes.width);
+            *result = votes.winning_surface(inverse[k], depth_step);
         }
     }
 }

@@ -4,7 +4,7 @@
 //! One frame is not conclusive, so that several decide, and a stream once recognised as a sensor's needs much longer to
 //! become exact.
 
-use super::noise::{NO_NOISE, NoiseMeter};
+use super::noise::{NO_NOISE, NoiseEstimator};
 use super::temporal::{MOVED, MOVED_BOUNDS};
 use crate::frame::{ColorImage, DepthMap};
 
@@ -12,8 +12,8 @@ use crate::frame::{ColorImage, DepthMap};
 const PERIOD: u32 = 5;
 /// Comparisons in a row that change the decision, and for depth that was ever inexact: five seconds at 30 frames per
 /// second.
-const DECISION: u32 = 3;
-const LONG_DECISION: u32 = 30;
+const DECISION_COUNT: u32 = 3;
+const LONG_DECISION_COUNT: u32 = 30;
 /// Maximum number of sampled rows and of sampled columns.
 const GRID: usize = 96;
 /// Minimum fraction of the picture with static colours for a comparison.
@@ -52,7 +52,7 @@ pub struct ExactnessDetector {
     against: u32,
     /// Number of frames so far.
     frames: u32,
-    meter: NoiseMeter,
+    noise_estimator: NoiseEstimator,
     size: (u32, u32),
     /// Samples of the last frame, if it was sampled, and of this one.
     before: Vec<Sample>,
@@ -76,13 +76,13 @@ impl ExactnessDetector {
     }
 
     /// Starts a new scene: the next frame is not compared with the last one.
-    pub fn forget(&mut self) {
+    pub fn reset(&mut self) {
         self.before.clear();
     }
 
     /// Processes the next frame with its depth as measured. Frames whose map does not have the size of the picture are
     /// ignored.
-    pub fn look(&mut self, map: &DepthMap, color: &ColorImage) {
+    pub fn add_frame(&mut self, map: &DepthMap, color: &ColorImage) {
         let is_decided = self.is_exact || self.was_inexact;
         let turn = self.frames % PERIOD;
         self.frames = self.frames.wrapping_add(1);
@@ -92,12 +92,12 @@ impl ExactnessDetector {
         self.sample(map, color);
         let (now, before) = (&self.now, &self.before);
         let unsteady = if self.size == map.size() && before.len() == now.len() {
-            unsteady(now, before, (&mut self.changes, &mut self.sorted))
+            unsteady_fraction(now, before, (&mut self.changes, &mut self.sorted))
         } else {
             None
         };
         if let Some(unsteady) = unsteady {
-            self.decide(map, unsteady);
+            self.update_decision(map, unsteady);
         }
         self.size = map.size();
         std::mem::swap(&mut self.now, &mut self.before);
@@ -110,16 +110,16 @@ impl ExactnessDetector {
         for y in (0..height).step_by(height.div_ceil(GRID)) {
             for at in (y * width..(y + 1) * width).step_by(width.div_ceil(GRID)) {
                 let rgb = [0, 1, 2].map(|p| color.rgb[3 * at + p]);
-                self.now.push(Sample { rgb, inverse: DepthMap::inverse_of(map.metres[at]) });
+                self.now.push(Sample { rgb, inverse: DepthMap::inverse_depth(map.metres[at]) });
             }
         }
     }
 
     /// Updates the decision; `unsteady` is the fraction of pixels with static colours whose depth is not static.
-    fn decide(&mut self, map: &DepthMap, unsteady: f32) {
+    fn update_decision(&mut self, map: &DepthMap, unsteady: f32) {
         let size = (map.width as usize, map.height as usize);
-        let inverse = |at: usize| DepthMap::inverse_of(map.metres[at]);
-        let noise = self.meter.noise(inverse, |at| inverse(at) == 0.0, size);
+        let inverse = |at: usize| DepthMap::inverse_depth(map.metres[at]);
+        let noise = self.noise_estimator.estimate(inverse, |at| inverse(at) == 0.0, size);
         let known = self.sorted.len();
         let Some(median) = median(&mut self.sorted) else { return };
         let holes = 1.0 - known as f32 / self.now.len() as f32;
@@ -127,7 +127,7 @@ impl ExactnessDetector {
         let speaks_against = faults.are_within(Faults::LIMITS[usize::from(self.is_exact)]) != self.is_exact;
         self.was_inexact |= !self.is_exact && !speaks_against;
         self.against = if speaks_against { self.against + 1 } else { 0 };
-        let needed = if self.was_inexact && !self.is_exact { LONG_DECISION } else { DECISION };
+        let needed = if self.was_inexact && !self.is_exact { LONG_DECISION_COUNT } else { DECISION_COUNT };
         if self.against >= needed {
             (self.is_exact, self.against) = (!self.is_exact, 0);
             self.was_inexact |= !self.is_exact;
@@ -137,7 +137,11 @@ impl ExactnessDetector {
 
 /// Returns the fraction of the pixels with static colours whose depth is not static; `None` if there are too few. Fills
 /// `sorted` with the inverse depths known now.
-fn unsteady(now: &[Sample], before: &[Sample], (changes, sorted): (&mut Vec<f32>, &mut Vec<f32>)) -> Option<f32> {
+fn unsteady_fraction(
+    now: &[Sample],
+    before: &[Sample],
+    (changes, sorted): (&mut Vec<f32>, &mut Vec<f32>),
+) -> Option<f32> {
     let change = |(now, before): (&Sample, &Sample)| {
         now.rgb.iter().zip(before.rgb).map(|(now, before)| f32::from(now.abs_diff(before))).sum::<f32>()
     };
@@ -145,7 +149,7 @@ fn unsteady(now: &[Sample], before: &[Sample], (changes, sorted): (&mut Vec<f32>
     changes.extend(now.iter().zip(before).map(change));
     let moved = (MOVED * median(changes)?).clamp(MOVED_BOUNDS.0, MOVED_BOUNDS.1);
     sorted.clear();
-    sorted.extend(now.iter().map(|look| look.inverse).filter(|&inverse| inverse > 0.0));
+    sorted.extend(now.iter().map(|sample| sample.inverse).filter(|&inverse| inverse > 0.0));
     let least = NO_NOISE * median(sorted)?;
     let (mut resting, mut unsteady) = (0, 0);
     for pair @ (now, before) in now.iter().zip(before) {
@@ -200,7 +204,7 @@ mod tests {
         for &(damage, count) in kinds {
             for number in 0..count {
                 let (color, map) = frame(number, damage);
-                exactness.look(&map, &color);
+                exactness.add_frame(&map, &color);
                 looks.push(exactness.is_exact());
             }
         }
@@ -210,8 +214,8 @@ mod tests {
     #[test]
     fn exact_depth_is_known_after_a_few_frames() {
         let looks = decisions(&mut ExactnessDetector::default(), &[(EXACT, 200)]);
-        assert_eq!(looks.iter().position(|&exact| exact), Some(DECISION as usize));
-        assert!(looks[DECISION as usize..].iter().all(|&exact| exact));
+        assert_eq!(looks.iter().position(|&exact| exact), Some(DECISION_COUNT as usize));
+        assert!(looks[DECISION_COUNT as usize..].iter().all(|&exact| exact));
     }
 
     #[test]
@@ -225,8 +229,9 @@ mod tests {
     fn a_single_frame_decides_nothing_and_a_sensor_is_believed_late() {
         let exactness = &mut ExactnessDetector::default();
         assert!(decisions(exactness, &[(EXACT, 20), (HOLES, 3), (EXACT, 40)])[10..].iter().all(|&exact| exact));
-        let looks = decisions(exactness, &[(HOLES, 4 * PERIOD * DECISION), (EXACT, PERIOD * (LONG_DECISION - 1))]);
-        assert!(looks[(2 * PERIOD * DECISION) as usize..].iter().all(|&exact| !exact), "held back for long");
+        let looks =
+            decisions(exactness, &[(HOLES, 4 * PERIOD * DECISION_COUNT), (EXACT, PERIOD * (LONG_DECISION_COUNT - 1))]);
+        assert!(looks[(2 * PERIOD * DECISION_COUNT) as usize..].iter().all(|&exact| !exact), "held back for long");
         assert!(decisions(exactness, &[(EXACT, 3 * PERIOD)])[2 * PERIOD as usize], "and found in the end");
     }
 
@@ -234,7 +239,7 @@ mod tests {
     fn of_another_size_nothing_is_told() {
         let (mut exactness, (color, _)) = (ExactnessDetector::default(), frame(0, EXACT));
         for _ in 0..100 {
-            exactness.look(&DepthMap { metres: vec![1.0; 64 * 48], ..DepthMap::new(64, 48) }, &color);
+            exactness.add_frame(&DepthMap { metres: vec![1.0; 64 * 48], ..DepthMap::new(64, 48) }, &color);
         }
         assert!(!exactness.is_exact());
     }

@@ -28,14 +28,14 @@ pub use self::exactness::ExactnessDetector;
 pub use self::outlines::Outlines;
 
 use self::align::Aligner;
-use self::noise::NoiseMeter;
+use self::noise::NoiseEstimator;
 use self::smooth::{Smoother, invert};
 use self::temporal::{Limits, TemporalFilter};
 use self::upsample::Upsampler;
 use super::fill::Filler;
-#[cfg(feature = "gpu")]
-use crate::compute::backed::Backed;
 use crate::compute::thread_pool::ThreadPool;
+#[cfg(feature = "gpu")]
+use crate::compute::with_fallback::WithFallback;
 use crate::compute::{Device, DeviceFrame};
 use crate::frame::fit::Fit;
 use crate::frame::{ColorImage, DepthMap};
@@ -78,19 +78,19 @@ pub struct Refiner {
     unknown: Vec<bool>,
     /// Focus distance over the depth.
     inverse: Vec<f32>,
-    meter: NoiseMeter,
+    noise_estimator: NoiseEstimator,
     smoother: Smoother,
     aligner: Aligner,
     temporal: TemporalFilter,
     focus: Focus,
-    mending: MapCorrection,
+    correction: MapCorrection,
     outlines: Outlines,
     /// The downsampled picture.
     reduced: ColorImage,
     fit: Fit,
     /// Refines instead of the CPU, until the device fails.
     #[cfg(feature = "gpu")]
-    gpu: Backed<Option<gpu::GpuRefiner>>,
+    gpu: WithFallback<Option<gpu::GpuRefiner>>,
 }
 
 /// The focus distance in metres. Inverse depth is this over the depth, so that equal steps of it blur equally.
@@ -110,19 +110,22 @@ impl Refiner {
     }
 
     /// Creates a refiner that corrects misaligned maps first.
-    pub fn mending(mending: MapCorrection) -> Self {
-        let coarsest = mending.coarsest.clamp(1, 1 << 5).next_power_of_two();
-        Self { mending: MapCorrection { coarsest, ..mending }, ..Self::default() }
+    pub fn with_correction(correction: MapCorrection) -> Self {
+        let coarsest = correction.coarsest.clamp(1, 1 << 5).next_power_of_two();
+        Self { correction: MapCorrection { coarsest, ..correction }, ..Self::default() }
     }
 
-    /// Moves refinement to `device` if it passes its trial and maps need no correction. When it fails, the CPU takes
+    /// Moves refinement to `device` if it passes its self-test and maps need no correction. When it fails, the CPU takes
     /// over with the same frame.
     #[must_use]
-    pub fn on(self, device: Option<&Arc<Device>>) -> Self {
+    pub fn with_device(self, device: Option<&Arc<Device>>) -> Self {
         #[cfg(feature = "gpu")]
         {
-            let device = device.filter(|_| self.mending == MapCorrection::default());
-            Self { gpu: Backed::tried(device, "refines", gpu::trial, gpu::GpuRefiner::new), ..self }
+            let device = device.filter(|_| self.correction == MapCorrection::default());
+            Self {
+                gpu: WithFallback::create_tested(device, "refines", gpu::run_self_test, gpu::GpuRefiner::new),
+                ..self
+            }
         }
         #[cfg(not(feature = "gpu"))]
         {
@@ -141,9 +144,9 @@ impl Refiner {
 
     /// Returns the last refined map and its picture on the device; `None` if the CPU refined it. Valid until the next
     /// frame.
-    pub fn on_device(&self) -> Option<DeviceFrame> {
+    pub fn device_frame(&self) -> Option<DeviceFrame> {
         #[cfg(feature = "gpu")]
-        return self.gpu.worker().as_ref()?.refined();
+        return self.gpu.worker().as_ref()?.device_frame();
         #[cfg(not(feature = "gpu"))]
         None
     }
@@ -157,12 +160,12 @@ impl Refiner {
     }
 
     /// Discards the state of earlier frames, for a new scene.
-    pub fn forget(&mut self) {
+    pub fn reset(&mut self) {
         self.filler = Filler::new();
-        self.temporal.forget();
+        self.temporal.reset();
         self.focus = Focus::default();
         #[cfg(feature = "gpu")]
-        self.gpu.worker_mut().iter_mut().for_each(gpu::GpuRefiner::forget);
+        self.gpu.worker_mut().iter_mut().for_each(gpu::GpuRefiner::reset);
     }
 
     /// Sets the focus distance in metres from the next frame on; it scales depth steps, which count less on a street
@@ -178,33 +181,39 @@ impl Refiner {
     /// the picture's size. A frame that does not follow the last one (another size, a seek, a gap) starts anew. Without
     /// any known depth so far, the map stays unknown (0) everywhere.
     pub fn refine(&mut self, map: &mut DepthMap, color: &ColorImage, time_ns: u64) {
-        self.refine_on(&mut ThreadPool::new("refine", 1), map, color, time_ns);
+        self.refine_with_workers(&mut ThreadPool::new("refine", 1), map, color, time_ns);
     }
 
     /// Refines like [`Refiner::refine`] on several threads; the result is independent of their number, to the bit.
-    pub fn refine_on(&mut self, workers: &mut ThreadPool, map: &mut DepthMap, color: &ColorImage, time_ns: u64) {
+    pub fn refine_with_workers(
+        &mut self,
+        workers: &mut ThreadPool,
+        map: &mut DepthMap,
+        color: &ColorImage,
+        time_ns: u64,
+    ) {
         #[cfg(feature = "gpu")]
-        if self.gpu.did("refines", |gpu| gpu.refine(map, color, time_ns, self.focus.0)) {
+        if self.gpu.try_run("refines", |gpu| gpu.refine(map, color, time_ns, self.focus.0)) {
             return;
         }
-        let MapCorrection { mut distance_px, coarsest: mut scale } = self.mending;
+        let MapCorrection { mut distance_px, coarsest: mut scale } = self.correction;
         while scale > 1 {
             let size = |side: u32| side.div_ceil(scale);
             let mut reduced = std::mem::take(&mut self.reduced);
             reduced.resize(size(color.width), size(color.height));
             self.fit.fit(color, &mut reduced);
             let scaled_px = distance_px as f32 / scale as f32;
-            self.refine_at(workers, map, &reduced, scaled_px.round() as i32, None);
+            self.refine_at_scale(workers, map, &reduced, scaled_px.round() as i32, None);
             distance_px = 0;
             self.reduced = reduced;
             scale /= 2;
         }
-        self.refine_at(workers, map, color, distance_px, Some(time_ns));
+        self.refine_at_scale(workers, map, color, distance_px, Some(time_ns));
     }
 
     /// Refines `map` at the size of `color`, after moving its outlines. The temporal filter runs only with a `time_ns`:
     /// at full scale.
-    fn refine_at(
+    fn refine_at_scale(
         &mut self,
         workers: &mut ThreadPool,
         map: &mut DepthMap,
@@ -216,20 +225,22 @@ impl Refiner {
         let is_good = self.filler.fill_once(map, color);
         // The filler fills all holes or none: the first pixel shows which.
         if !map.metres.first().is_some_and(|&z_m| DepthMap::is_known(z_m)) {
-            return self.temporal.forget();
+            return self.temporal.reset();
         }
-        let Self { arch, unknown, inverse, filler, meter, smoother, outlines, aligner, temporal, focus, .. } = self;
+        let Self {
+            arch, unknown, inverse, filler, noise_estimator, smoother, outlines, aligner, temporal, focus, ..
+        } = self;
         let (arch, width, focus_m) = (*arch, map.width as usize, focus.0);
         let size = (width, map.height as usize);
         unknown.clear();
         unknown.resize(map.metres.len(), false);
         filler.holes().iter().for_each(|hole| unknown[hole.pixels(width)].fill(true));
-        let measured_noise = meter.noise(|at| focus_m / map.metres[at], |at| unknown[at], size);
+        let measured_noise = noise_estimator.estimate(|at| focus_m / map.metres[at], |at| unknown[at], size);
         smoother.smooth((arch, workers), (&map.metres, focus_m), inverse, width, measured_noise);
         if is_good {
             filler.keep_by_swap(map);
         }
-        let noise = meter.noise(|at| inverse[at], |at| unknown[at], size);
+        let noise = noise_estimator.estimate(|at| inverse[at], |at| unknown[at], size);
         let depth_step = MIN_DEPTH_STEP.max(DEPTH_STEP_SIGMAS * noise);
         outlines.shift(inverse, unknown, width, distance_px, depth_step);
         aligner.align((arch, workers), inverse, unknown, &color.rgb, width, depth_step);

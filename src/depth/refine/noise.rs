@@ -13,17 +13,17 @@ pub const NO_NOISE: f32 = 5e-4;
 
 /// Measures the noise of maps of inverse depth; owns its buffers.
 #[derive(Debug, Default)]
-pub struct NoiseMeter {
+pub struct NoiseEstimator {
     differences: Vec<f32>,
 }
 
-impl NoiseMeter {
+impl NoiseEstimator {
     /// Returns the standard deviation of the noise of a map of this size, from a low quantile of second differences:
     /// slanted planes do not raise it, and edges only if they are everywhere. `inverse` returns the inverse depth of a
     /// pixel; pixels that are `is_unknown` are skipped.
     ///
     /// twin: shaders/refine_noise.wgsl
-    pub fn noise(
+    pub fn estimate(
         &mut self,
         inverse: impl Fn(usize) -> f32,
         is_unknown: impl Fn(usize) -> bool,

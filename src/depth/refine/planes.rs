@@ -85,7 +85,10 @@ impl Planes {
     #[inline(always)]
     pub fn window(&self, x: usize, y: usize) -> ([&[f32; LANES]; 2], [&[u8; LANES]; 3]) {
         let at = self.index_of(x, y) - self.radius;
-        (self.depths.each_ref().map(|plane| chunk(plane, at)), self.colors.each_ref().map(|plane| chunk(plane, at)))
+        (
+            self.depths.each_ref().map(|plane| lanes_at(plane, at)),
+            self.colors.each_ref().map(|plane| lanes_at(plane, at)),
+        )
     }
 }
 
@@ -135,7 +138,7 @@ impl WithSimd for SetColors<'_, '_> {
         let (pixels, width) = (rgb.as_chunks::<3>().0, planes.width);
         for (line, y) in planes.rows.clone().enumerate() {
             let row = &pixels[y * width..][..width];
-            for columns in tiles.columns(y) {
+            for columns in tiles.near_columns(y) {
                 for (pixels, k) in row[columns.clone()].chunks(CHUNK).zip(0..) {
                     let mut values = [[0; CHUNK]; 3];
                     let [red, green, blue] = &mut values;
@@ -172,7 +175,7 @@ impl WithSimd for SetDepths<'_, '_> {
         let Self { planes, tiles, inverse, unknown, band, weights: [filled_weight, uncertain_weight] } = self;
         let width = planes.width;
         for (line, y) in planes.rows.clone().enumerate() {
-            for columns in tiles.columns(y) {
+            for columns in tiles.near_columns(y) {
                 let row = y * width;
                 let start_indices = planes.start_indices(columns.start, line);
                 deinterleave(planes.depths[0], start_indices, &inverse[row..][columns.clone()]);
@@ -193,6 +196,6 @@ impl WithSimd for SetDepths<'_, '_> {
 }
 
 #[inline(always)]
-fn chunk<T>(plane: &[T], at: usize) -> &[T; LANES] {
+fn lanes_at<T>(plane: &[T], at: usize) -> &[T; LANES] {
     plane[at..].first_chunk().expect("a margin after the last column")
 }

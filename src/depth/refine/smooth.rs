@@ -132,11 +132,11 @@ impl WithSimd for Smooth<'_> {
             let row = |y: usize| &along_rows[y % ROWS * width..][..width];
             let (here, out) = (row(y), &mut out[(y - rows.start) * width..][..width]);
             if y >= RADIUS_PX && y + RADIUS_PX < height {
-                average(PAIRS_PX.map(|px| [row(y - px), row(y + px)]), here, out, limit);
+                average_pairs(PAIRS_PX.map(|px| [row(y - px), row(y + px)]), here, out, limit);
             } else {
                 out.fill(0.0);
                 for px in PAIRS_PX.into_iter().filter(|&px| px <= y && y + px < height) {
-                    add_pair(row(y - px), here, row(y + px), out, limit);
+                    add_pair_differences(row(y - px), here, row(y + px), out, limit);
                 }
                 finish_mean(here, out);
             }
@@ -155,32 +155,33 @@ fn smooth_row(row: &[f32], out: &mut [f32], limit: f32) {
         let here = row[x];
         let mut sum = 0.0;
         for px in PAIRS_PX.into_iter().filter(|&px| px <= x && x + px < width) {
-            sum += pair(row[x - px], here, row[x + px], limit);
+            sum += pair_difference(row[x - px], here, row[x + px], limit);
         }
-        out[x] = mean(here, sum);
+        out[x] = mean_of_taps(here, sum);
     }
     if inside > 0 {
         let part = |from: usize| &row[from..][..inside];
         let pairs = PAIRS_PX.map(|px| [part(RADIUS_PX - px), part(RADIUS_PX + px)]);
-        average(pairs, part(RADIUS_PX), &mut out[RADIUS_PX..][..inside], limit);
+        average_pairs(pairs, part(RADIUS_PX), &mut out[RADIUS_PX..][..inside], limit);
     }
 }
 
 /// Filters pixels of which all pairs are complete.
 #[inline(always)]
-fn average(pairs: [[&[f32]; 2]; PAIRS_PX.len()], here: &[f32], out: &mut [f32], limit: f32) {
+fn average_pairs(pairs: [[&[f32]; 2]; PAIRS_PX.len()], here: &[f32], out: &mut [f32], limit: f32) {
     let count = out.len();
     let (pairs, here) = (pairs.map(|ends| ends.map(|end| &end[..count])), &here[..count]);
     for (x, out) in out.iter_mut().enumerate() {
-        let sum = pairs.iter().fold(0.0, |sum, [before, after]| sum + pair(before[x], here[x], after[x], limit));
-        *out = mean(here[x], sum);
+        let sum =
+            pairs.iter().fold(0.0, |sum, [before, after]| sum + pair_difference(before[x], here[x], after[x], limit));
+        *out = mean_of_taps(here[x], sum);
     }
 }
 
 /// Returns the sum of the differences of both ends of a pair from its centre, or 0 unless both lie on the centre's
 /// surface.
 #[inline(always)]
-fn pair(before: f32, here: f32, after: f32, limit: f32) -> f32 {
+fn pair_difference(before: f32, here: f32, after: f32, limit: f32) -> f32 {
     let (before, after) = (before - here, after - here);
     let same = (before.abs() < limit) & (after.abs() < limit);
     if same { before + after } else { 0.0 }
@@ -188,16 +189,16 @@ fn pair(before: f32, here: f32, after: f32, limit: f32) -> f32 {
 
 /// Returns the mean over all taps from the sum of differences. A rejected pair counts as two taps equal to the centre.
 #[inline(always)]
-fn mean(here: f32, sum: f32) -> f32 {
+fn mean_of_taps(here: f32, sum: f32) -> f32 {
     const WEIGHT: f32 = 1.0 / (2 * PAIRS_PX.len() + 1) as f32;
     here + sum * WEIGHT
 }
 
 /// Adds the differences of pairs to `out`.
 #[inline(always)]
-fn add_pair(before: &[f32], here: &[f32], after: &[f32], out: &mut [f32], limit: f32) {
+fn add_pair_differences(before: &[f32], here: &[f32], after: &[f32], out: &mut [f32], limit: f32) {
     for (((&before, &here), &after), out) in before.iter().zip(here).zip(after).zip(out) {
-        *out += pair(before, here, after, limit);
+        *out += pair_difference(before, here, after, limit);
     }
 }
 
@@ -205,6 +206,6 @@ fn add_pair(before: &[f32], here: &[f32], after: &[f32], out: &mut [f32], limit:
 #[inline(always)]
 fn finish_mean(row: &[f32], out: &mut [f32]) {
     for (&here, out) in row.iter().zip(out) {
-        *out = mean(here, *out);
+        *out = mean_of_taps(here, *out);
     }
 }

@@ -25,13 +25,13 @@ pub const HOLD_FRAMES: u8 = 2;
 pub const MOVED: f32 = 2.5;
 pub const MOVED_BOUNDS: (f32, f32) = (8.0, 24.0);
 /// Frames further apart than this in media time, or not in order, are not consecutive.
-const LONGEST_GAP_NS: u64 = 500_000_000;
+const MAX_GAP_NS: u64 = 500_000_000;
 /// Maximum number of rows and of columns sampled for the median change.
 pub const GRID: usize = 64;
 
 /// Whether two frames are consecutive by their media factor.
-pub fn follows(before_ns: u64, time_ns: u64) -> bool {
-    (before_ns..=before_ns.saturating_add(LONGEST_GAP_NS)).contains(&time_ns)
+pub fn are_consecutive(before_ns: u64, time_ns: u64) -> bool {
+    (before_ns..=before_ns.saturating_add(MAX_GAP_NS)).contains(&time_ns)
 }
 
 /// Thresholds for changes of inverse depth.
@@ -78,7 +78,7 @@ impl TemporalFilter {
     }
 
     /// Discards the state, so that the next frame starts anew.
-    pub fn forget(&mut self) {
+    pub fn reset(&mut self) {
         self.mean.clear();
     }
 
@@ -92,7 +92,7 @@ impl TemporalFilter {
         (metres, focus_m): (&mut [f32], f32),
     ) {
         let same_size = self.mean.len() == inverse.len() && self.width == width && self.rgb.len() == rgb.len();
-        let in_order = follows(self.time_ns, time_ns);
+        let in_order = are_consecutive(self.time_ns, time_ns);
         let bands = Bands::new(inverse.len() / width, 1, workers);
         if same_size && in_order {
             self.change.resize(inverse.len(), 0);
@@ -103,7 +103,7 @@ impl TemporalFilter {
             let Self { change, lines, rgb: before, .. } = self;
             let pictures = [rgb, &before[..]];
             workers.run_each_with(lines, bands.rows().zip(bands.split(change, width)), &|lines, (rows, change)| {
-                arch.dispatch(Change { pictures, width, lines, rows, change });
+                arch.dispatch(ColorChange { pictures, width, lines, rows, change });
             });
             let moved = (MOVED * self.median_change()).clamp(MOVED_BOUNDS.0, MOVED_BOUNDS.1);
             let Self { mean, count, held, change, rgb: before, .. } = self;
@@ -114,7 +114,7 @@ impl TemporalFilter {
                 let pixels = rows.start * width..rows.end * width;
                 before.copy_from_slice(&rgb[3 * pixels.start..3 * pixels.end]);
                 let (inverse, change) = (&inverse[pixels.clone()], &change[pixels]);
-                arch.dispatch(Average { inverse, mean, count, held, change, moved, limits, metres, focus_m });
+                arch.dispatch(UpdateMean { inverse, mean, count, held, change, moved, limits, metres, focus_m });
             });
         } else {
             self.mean.clear();
@@ -136,7 +136,7 @@ impl TemporalFilter {
         self.samples.clear();
         for y in (0..height).step_by(height.div_ceil(GRID)) {
             let row = &self.change[y * self.width..][..self.width];
-            self.samples.extend(row.iter().step_by(self.width.div_ceil(GRID)).map(|&change| per_pixel(change)));
+            self.samples.extend(row.iter().step_by(self.width.div_ceil(GRID)).map(|&change| mean_per_pixel(change)));
         }
         let middle = self.samples.len() / 2;
         *self.samples.select_nth_unstable_by(middle, f32::total_cmp).1
@@ -145,12 +145,12 @@ impl TemporalFilter {
 
 /// Returns the mean of a change that was summed over 3x3 pixels.
 #[inline(always)]
-fn per_pixel(change: u16) -> f32 {
+fn mean_per_pixel(change: u16) -> f32 {
     f32::from(change) / 9.0
 }
 
 /// Computes the colour change around each pixel between two pictures, summed over 3x3 pixels; the border repeats.
-struct Change<'a> {
+struct ColorChange<'a> {
     pictures: [&'a [u8]; 2],
     width: usize,
     lines: &'a mut Lines,
@@ -159,7 +159,7 @@ struct Change<'a> {
     change: &'a mut [u16],
 }
 
-impl WithSimd for Change<'_> {
+impl WithSimd for ColorChange<'_> {
     type Output = ();
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, _: S) {
@@ -191,7 +191,7 @@ impl WithSimd for Change<'_> {
 }
 
 /// Moves the average of each pixel towards the new inverse depth, and outputs it in metres.
-struct Average<'a> {
+struct UpdateMean<'a> {
     inverse: &'a [f32],
     mean: &'a mut [f32],
     count: &'a mut [f32],
@@ -204,7 +204,7 @@ struct Average<'a> {
     focus_m: f32,
 }
 
-impl WithSimd for Average<'_> {
+impl WithSimd for UpdateMean<'_> {
     type Output = ();
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, _: S) {
@@ -213,9 +213,9 @@ impl WithSimd for Average<'_> {
         let state = mean.iter_mut().zip(count).zip(held).zip(change);
         for ((&inverse, metres), (((mean, count), held), &change)) in inverse.iter().zip(metres).zip(state) {
             // Weight of the past: 1 up to the bound, falling to 0 at twice the bound.
-            let past_weight = unit(2.0 - per_pixel(change) * per_moved);
+            let past_weight = saturate(2.0 - mean_per_pixel(change) * per_moved);
             let step = inverse - *mean;
-            let noise_ratio = unit(step.abs() * per_noise);
+            let noise_ratio = saturate(step.abs() * per_noise);
             let changed = noise_ratio >= 1.0;
             let hold = (step.abs() > limits.depth_step) & (past_weight >= 1.0) & (*held < HOLD_FRAMES);
             let frames = *count * past_weight;
@@ -242,7 +242,7 @@ impl WithSimd for Average<'_> {
 
 /// Clamps `x` to 0 to 1.
 #[inline(always)]
-fn unit(x: f32) -> f32 {
+fn saturate(x: f32) -> f32 {
     let x = if x > 0.0 { x } else { 0.0 };
     if x < 1.0 { x } else { 1.0 }
 }

@@ -29,13 +29,13 @@ impl Tiles {
         }
     }
 
-    /// Splits the tiles into bands of whole tiles, for [`mark`].
+    /// Splits the tiles into bands of whole tiles, for [`mark_edge_tiles`].
     pub fn split(&mut self, bands: Bands) -> impl Iterator<Item = &mut [bool]> {
         bands.split_tiles(&mut self.has_edge, ROWS, self.across)
     }
 
     /// Finds the tiles that have edges, and their neighbours.
-    pub fn find_near(&mut self) {
+    pub fn mark_neighbours(&mut self) {
         let down = self.has_edge.len() / self.across;
         for k in (0..self.has_edge.len()).filter(|&k| self.has_edge[k]) {
             let (row, column) = (k / self.across, k % self.across);
@@ -47,7 +47,7 @@ impl Tiles {
     }
 
     /// Appends the pixel indices of all edges, in order.
-    pub fn find_all(&self, edge: &[bool], places: &mut Vec<u32>) {
+    pub fn collect_edges(&self, edge: &[bool], places: &mut Vec<u32>) {
         for (y, row) in edge.chunks_exact(self.width).enumerate() {
             let tiles = &self.has_edge[y / ROWS * self.across..][..self.across];
             for (k, _) in tiles.iter().enumerate().filter(|(_, has_edge)| **has_edge) {
@@ -59,7 +59,7 @@ impl Tiles {
     }
 
     /// Returns the column ranges of row `y` near edges, from the left; each begins at an even column.
-    pub fn columns(&self, y: usize) -> impl Iterator<Item = Range<usize>> + use<'_> {
+    pub fn near_columns(&self, y: usize) -> impl Iterator<Item = Range<usize>> + use<'_> {
         let tiles = &self.is_near[y / ROWS * self.across..][..self.across];
         let runs = tiles.chunk_by(|a, b| a == b).scan(0, |begin, run| {
             let first = *begin;
@@ -72,7 +72,7 @@ impl Tiles {
 
 /// Marks the tiles of a band that have edges.
 #[inline(always)]
-pub fn mark(has_edge: &mut [bool], edge: &[bool], width: usize) {
+pub fn mark_edge_tiles(has_edge: &mut [bool], edge: &[bool], width: usize) {
     let across = width.div_ceil(COLUMNS);
     for (y, row) in edge.chunks_exact(width).enumerate() {
         let tiles = &mut has_edge[y / ROWS * across..][..across];
@@ -94,11 +94,11 @@ mod tests {
             edge[y * width + x] = true;
             let mut tiles = Tiles::default();
             tiles.clear(width, height);
-            mark(&mut tiles.has_edge, &edge, width);
-            tiles.find_near();
+            mark_edge_tiles(&mut tiles.has_edge, &edge, width);
+            tiles.mark_neighbours();
             for row in 0..height {
                 let mut is_near = vec![false; width];
-                for columns in tiles.columns(row) {
+                for columns in tiles.near_columns(row) {
                     assert!(columns.start.is_multiple_of(2));
                     is_near[columns].fill(true);
                 }

@@ -32,14 +32,14 @@ impl Upsampler {
         self.columns.extend((0..width as usize).map(|x| Tap::new(x, width as usize, from_width)));
         map.resize(width, height);
         for (y, row) in map.metres.chunks_exact_mut(width as usize).enumerate() {
-            let Tap { first, second, weight: share } = Tap::new(y, height as usize, from_height);
+            let Tap { first, second, weight: down_weight } = Tap::new(y, height as usize, from_height);
             let above = &self.metres[first * from_width..][..from_width];
             let below = &self.metres[second * from_width..][..from_width];
             for (z_m, tap) in row.iter_mut().zip(&self.columns) {
                 *z_m = interpolate(
                     [above[tap.first], above[tap.second], below[tap.first], below[tap.second]],
                     tap.weight,
-                    share,
+                    down_weight,
                 );
             }
         }

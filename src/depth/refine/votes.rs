@@ -37,7 +37,7 @@ pub const RADIUS_LANES: usize = RADIUS_PX / STEP_PX;
 pub type Weights = [[f32; LANES]; ROWS];
 
 /// Returns the spatial weight of each vote of a window: a Gaussian, cut to a disc.
-pub fn weights_by_distance() -> Weights {
+pub fn compute_spatial_weights() -> Weights {
     let squared_px = |k: usize, step_px: usize| ((k * step_px) as f32 - RADIUS_PX as f32).powi(2);
     // R (R + 1) is the square of a radius of about R + 1/2: a rounder disc on the pixel grid than R gives.
     let weight = |squared_px: f32| match squared_px <= ((RADIUS_PX + 1) * RADIUS_PX) as f32 {
@@ -70,16 +70,16 @@ pub struct Votes {
 }
 
 impl Votes {
-    /// Collects the votes of the window around column `x` and row `y`; `nearby` has their spatial weights.
+    /// Collects the votes of the window around column `x` and row `y`; `spatial_weights` has their spatial weights.
     #[inline(always)]
-    pub fn gather(&mut self, planes: &Planes, nearby: &Weights, x: usize, y: usize) {
+    pub fn collect_window(&mut self, planes: &Planes, spatial_weights: &Weights, x: usize, y: usize) {
         // exp(-t) with t = apart / (2 COLOR_SIGMA^2) is approximated by (1 - t/4)^4, clamped where that would rise
         // again.
         let center = planes.color(x, y);
         let (mut low, mut high) = ([f32::MAX; LANES], [0.0_f32; LANES]);
         let (mut total, mut similar_total) = ([0.0_f32; LANES], [0.0_f32; LANES]);
         for k in 0..ROWS {
-            let (depth, weight, nearby) = (&mut self.depth[k], &mut self.weight[k], &nearby[k]);
+            let (depth, weight, spatial_weights) = (&mut self.depth[k], &mut self.weight[k], &spatial_weights[k]);
             let row = (y + k * ROW_STEP_PX).wrapping_sub(RADIUS_PX);
             if row >= planes.height {
                 *weight = [0.0; LANES];
@@ -93,7 +93,7 @@ impl Votes {
                 let similarity = 1.0 - apart * QUARTER_T;
                 let similarity = if similarity > 0.0 { similarity } else { 0.0 };
                 let similarity = similarity * similarity;
-                let w_without_color = confidence[lane] * nearby[lane];
+                let w_without_color = confidence[lane] * spatial_weights[lane];
                 let w = w_without_color * (similarity * similarity + MIN_SIMILARITY);
                 total[lane] += w_without_color;
                 similar_total[lane] += w;
@@ -106,9 +106,9 @@ impl Votes {
                 high[lane] = if w > 0.0 { higher } else { high[lane] };
             }
         }
-        self.range = (least(low), largest(high));
+        self.range = (min_lane(low), max_lane(high));
         // The high power makes this count only if nearly the whole window has one colour.
-        let similar_fraction = sum(similar_total) / sum(total);
+        let similar_fraction = sum_lanes(similar_total) / sum_lanes(total);
         self.hysteresis = HYSTERESIS + LOW_CONTRAST_HYSTERESIS * similar_fraction.powi(8);
     }
 
@@ -116,12 +116,12 @@ impl Votes {
     /// wider than a depth step. If `current`, the pixel's inverse depth, lies on that surface, it is returned
     /// unchanged.
     #[inline(always)]
-    pub fn surface(&self, current: f32, depth_step: f32) -> f32 {
+    pub fn winning_surface(&self, current: f32, depth_step: f32) -> f32 {
         let (mut low, mut high) = self.range;
         let mut mean = current;
         while high - low > depth_step_at(depth_step, high) {
             let middle = 0.5 * (low + high);
-            let halves = self.split(low, middle, high);
+            let halves = self.split_range(low, middle, high);
             let is_near = (current > middle) & (current <= high);
             let is_far = (current <= middle) & (current >= low);
             let near = halves.near * if is_near { self.hysteresis } else { 1.0 };
@@ -145,7 +145,7 @@ impl Votes {
     /// Sums the votes from `low` to `middle` (far) and from there to `high` (near: inverse depth grows towards the
     /// camera).
     #[inline(always)]
-    fn split(&self, low: f32, middle: f32, high: f32) -> Halves {
+    fn split_range(&self, low: f32, middle: f32, high: f32) -> Halves {
         let (mut near, mut far) = ([0.0_f32; LANES], [0.0_f32; LANES]);
         let (mut near_moment, mut far_moment) = ([0.0_f32; LANES], [0.0_f32; LANES]);
         let (mut near_low, mut far_high) = ([high; LANES], [low; LANES]);
@@ -166,12 +166,12 @@ impl Votes {
             }
         }
         Halves {
-            near: sum(near),
-            far: sum(far),
-            near_moment: sum(near_moment),
-            far_moment: sum(far_moment),
-            near_low: least(near_low),
-            far_high: largest(far_high),
+            near: sum_lanes(near),
+            far: sum_lanes(far),
+            near_moment: sum_lanes(near_moment),
+            far_moment: sum_lanes(far_moment),
+            near_low: min_lane(near_low),
+            far_high: max_lane(far_high),
         }
     }
 }
@@ -190,23 +190,23 @@ struct Halves {
 }
 
 #[inline(always)]
-fn sum(lanes: [f32; LANES]) -> f32 {
-    fold(lanes, |a, b| a + b)
+fn sum_lanes(lanes: [f32; LANES]) -> f32 {
+    reduce_lanes(lanes, |a, b| a + b)
 }
 
 #[inline(always)]
-fn least(lanes: [f32; LANES]) -> f32 {
-    fold(lanes, |a, b| if a < b { a } else { b })
+fn min_lane(lanes: [f32; LANES]) -> f32 {
+    reduce_lanes(lanes, |a, b| if a < b { a } else { b })
 }
 
 #[inline(always)]
-fn largest(lanes: [f32; LANES]) -> f32 {
-    fold(lanes, |a, b| if a > b { a } else { b })
+fn max_lane(lanes: [f32; LANES]) -> f32 {
+    reduce_lanes(lanes, |a, b| if a > b { a } else { b })
 }
 
 /// Reduces the lanes (a power of two) to one value by combining halves, which is vector code.
 #[inline(always)]
-fn fold(mut lanes: [f32; LANES], combine: impl Fn(f32, f32) -> f32) -> f32 {
+fn reduce_lanes(mut lanes: [f32; LANES], combine: impl Fn(f32, f32) -> f32) -> f32 {
     let mut half = LANES / 2;
     while half > 0 {
         for lane in 0..half {

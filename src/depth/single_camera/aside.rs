@@ -39,7 +39,7 @@ impl<T: Send + 'static> Worker<T> {
     /// # Errors
     /// The thread has ended.
     pub fn collect(&self, wait: bool) -> Result<Option<T>, String> {
-        let gone = "its thread is gone".to_owned();
+        let gone = "its thread has ended".to_owned();
         match wait {
             true => self.from.recv().map(Some).map_err(|_| gone),
             false => match self.from.try_recv() {

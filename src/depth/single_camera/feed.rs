@@ -68,7 +68,7 @@ impl Feed {
         let pictures: Vec<usize> = (0..inputs.len()).filter(|&k| channels_at(&inputs[k], &[3]).is_some()).collect();
         let &[picture] = pictures.as_slice() else {
             return Err(format!(
-                "{} of its inputs are pictures of three channels, where one is wanted",
+                "{} of its inputs are pictures of three channels, and exactly one is needed",
                 pictures.len()
             ));
         };
@@ -81,7 +81,10 @@ impl Feed {
         };
         let [width, height] = [0, 1].map(|k| inputs[picture].shape[sides[k]].unwrap_or(usual[k]));
         if !(1..=MAX_SIDE).contains(&width) || !(1..=MAX_SIDE).contains(&height) {
-            return Err(format!("it is shown pictures of {width} x {height}: at most {MAX_SIDE} a side are sensible"));
+            return Err(format!(
+                "its input is {width} x {height} pixels, and at most {MAX_SIDE} per side are \
+                                supported"
+            ));
         }
         let outputs = &network.outputs;
         let answers = |named: bool| {
@@ -92,14 +95,14 @@ impl Feed {
             })
         };
         let answer = answers(true).or_else(|| answers(false)).or((outputs.len() == 1).then_some(0));
-        let answer = answer.ok_or("none of its outputs is a picture of one channel or two")?;
+        let answer = answer.ok_or("none of its outputs is a picture with one or two channels")?;
         // Other inputs are recurrent states, in the order of the outputs (as in Robust Video Matting), or a ratio.
         let others = (0..inputs.len()).filter(|&k| k != picture && !is_ratio(&inputs[k]));
         let states =
             (outputs.len() + 1).saturating_sub(inputs.iter().filter(|port| !is_ratio(port)).count())..outputs.len();
         let memory: Vec<(usize, usize)> = others.clone().zip(states).collect();
         if memory.len() != others.count() || memory.iter().any(|&(_, output)| output == answer) {
-            return Err("it takes more than a picture and what it gave before".to_owned());
+            return Err("it has inputs other than a picture and its own earlier output".to_owned());
         }
         let inputs = (0..inputs.len()).map(|k| match k {
             _ if k == picture => Tensor::zeros(&if planes { [1, 3, height, width] } else { [1, height, width, 3] }),
@@ -156,8 +159,8 @@ impl Feed {
         for &(input, output) in &self.memory {
             std::mem::swap(&mut self.inputs[input], &mut self.outputs[output]);
         }
-        let answer = self.outputs.get(self.answer).ok_or("it gives no answer")?;
-        let answer = picture_of(answer).ok_or_else(|| format!("its answer is no picture: {:?}", answer.shape))?;
+        let answer = self.outputs.get(self.answer).ok_or("it gives no output")?;
+        let answer = picture_of(answer).ok_or_else(|| format!("its output is not a picture: {:?}", answer.shape))?;
         match answer.values.iter().all(|value| value.is_finite()) {
             true => Ok(answer),
             false => Err("its output has a value that is not a number".to_owned()),

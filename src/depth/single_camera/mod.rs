@@ -28,7 +28,7 @@ use super::matting::mask::MaskMatting;
 use super::plate::Companion;
 use super::tap::Tap;
 use super::{DepthError, DepthSource, FrameInput};
-use crate::compute::thread_pool::cores;
+use crate::compute::thread_pool::core_count;
 use crate::frame::{ColorImage, DepthMap, Mask};
 use crate::network::{self, Runtime, Task};
 
@@ -138,7 +138,7 @@ impl SingleCamera {
         // Without a person network, depth is also the source of the outlines.
         let every = if self.has_subject { EVERY } else { EVERY_ALONE }[self.effort];
         // Run depth in the background in real time, but not after a break, when the last result is of another scene.
-        let in_background = self.is_live && self.has_subject && !apart && cores() > 1;
+        let in_background = self.is_live && self.has_subject && !apart && core_count() > 1;
         self.turn = Turn { persons: true, all: apart || self.frames.is_multiple_of(every), in_background };
         self.frames += 1;
     }
@@ -148,7 +148,7 @@ impl SingleCamera {
         // At most one run per picture.
         let is_turn = std::mem::take(&mut self.turn.persons);
         if let Some(Err(why)) = self.person.as_mut().filter(|_| is_turn).map(|person| person.run(color, time_ns)) {
-            tracing::error!("{}: the person's network is turned off, and all is blurred: {why}", self.name);
+            tracing::error!("{}: the network for persons is turned off, so everything is blurred: {why}", self.name);
             self.person = None;
         }
     }
@@ -183,7 +183,11 @@ impl DepthSource for SingleCamera {
         let Self { name, person, absence, relief, held, spread, matting, turn, .. } = self;
         let mask = person.as_ref().map(Person::mask);
         if mask.is_some_and(|mask| absence.should_report(mask, stamp.time_ns)) {
-            tracing::warn!("{name}: no person was found for {} s, so all is blurred", Absence::LONG_NS / 1_000_000_000);
+            tracing::warn!(
+                "{name}: no person was found for {} s, so everything is \
+                            blurred",
+                Absence::LONG_NS / 1_000_000_000
+            );
         }
         run_depth(relief, (name, *turn), color, mask);
         if let (Some(mask), Some(relief)) = (mask, &relief) {
@@ -201,7 +205,7 @@ impl DepthSource for SingleCamera {
         map.is_smooth = map.subject_m.is_none();
         if let Some(person) = &person {
             let mask = if relief.is_some() { held.mask() } else { person.mask() };
-            matting.find(mask, color, None, map);
+            matting.compute_matte(mask, color, None, map);
         }
         Ok(())
     }
@@ -227,13 +231,13 @@ impl DepthSource for SingleCamera {
 }
 
 impl Companion for SingleCamera {
-    fn persons(&mut self, FrameInput { stamp, color, .. }: FrameInput) -> Option<&Mask> {
+    fn segment_persons(&mut self, FrameInput { stamp, color, .. }: FrameInput) -> Option<&Mask> {
         self.begin_picture(stamp.time_ns);
         self.run_person_network(color, stamp.time_ns);
         self.person.as_ref().map(Person::mask)
     }
 
-    fn measure_behind(&mut self, color: &ColorImage, mask: &Mask, map: &mut DepthMap) {
+    fn measure_background(&mut self, color: &ColorImage, mask: &Mask, map: &mut DepthMap) {
         run_depth(&mut self.relief, (&self.name, self.turn), color, Some(mask));
         if let Some(relief) = &self.relief {
             self.spread.over(relief.behind(), relief.size(), map);
@@ -262,7 +266,7 @@ impl Spread {
             for (metres, tap) in row.iter_mut().zip(&self.columns) {
                 let (left, right) = (self.row[tap.first], self.row[tap.second]);
                 let nearness = left + (right - left) * tap.weight;
-                *metres = DepthMap::relative_m(nearness);
+                *metres = DepthMap::relative_to_metres(nearness);
             }
         }
     }

@@ -90,9 +90,13 @@ impl fmt::Display for Verdict {
         match self {
             Self::Rectified => write!(f, "the pair is rectified"),
             Self::RowsOff { px } => write!(f, "the pair is not rectified: rows are off by up to {px:.1} px"),
-            Self::Swapped => write!(f, "left and right are exchanged: disparities are negative; exchange the pictures"),
+            Self::Swapped => write!(f, "left and right are swapped: disparities are negative; swap the pictures"),
             Self::Same => {
-                write!(f, "left and right are one picture, so that nothing has a distance; give what the two eyes saw")
+                write!(
+                    f,
+                    "left and right are the same picture, so nothing has a distance; give the pictures of the \
+                           left and the right camera"
+                )
             }
             Self::Unclear { matches } => write!(
                 f,

@@ -8,11 +8,11 @@ use super::executor::Executor;
 #[cfg(feature = "gpu")]
 use super::gpu::GpuExecutor;
 #[cfg(feature = "gpu")]
-use crate::compute::backed::Backed;
-#[cfg(feature = "gpu")]
 use crate::compute::device::Device;
 #[cfg(feature = "gpu")]
 use crate::compute::thread_pool::ThreadPool;
+#[cfg(feature = "gpu")]
+use crate::compute::with_fallback::WithFallback;
 use crate::compute::{Backend, GpuError};
 
 /// Creates executors on the chosen backend.
@@ -50,7 +50,11 @@ impl Executors {
     /// Fails if a GPU is required.
     #[cfg(not(feature = "gpu"))]
     pub fn new(backend: Backend, adapter: Option<&str>, threads: usize) -> Result<Self, GpuError> {
-        if backend == Backend::Gpu || adapter.is_some() { Err(GpuError::left_out()) } else { Ok(Self { threads }) }
+        if backend == Backend::Gpu || adapter.is_some() {
+            Err(GpuError::without_gpu_support())
+        } else {
+            Ok(Self { threads })
+        }
     }
 
     /// Creates an executor for pictures of `size` (columns, rows) and at least `disparities` candidates, at most 256,
@@ -70,7 +74,7 @@ impl Executors {
                 Ok(gpu) => {
                     let threads = self.threads;
                     let cpu: MakeCpu = Box::new(move || Box::new(CpuExecutor::new(size, disparities, island, threads)));
-                    return Ok(Box::new(Backed::new(Box::new(gpu) as Box<dyn Executor>, cpu)));
+                    return Ok(Box::new(WithFallback::new(Box::new(gpu) as Box<dyn Executor>, cpu)));
                 }
                 Err(error) if *is_required => return Err(error),
                 Err(error) => tracing::info!("matching on the CPU: {error}"),
@@ -85,7 +89,7 @@ impl Executors {
 type MakeCpu = Box<dyn FnOnce() -> Box<dyn Executor> + Send>;
 
 #[cfg(feature = "gpu")]
-impl Executor for Backed<Box<dyn Executor>, MakeCpu> {
+impl Executor for WithFallback<Box<dyn Executor>, MakeCpu> {
     fn describe(&self) -> String {
         self.worker().describe()
     }

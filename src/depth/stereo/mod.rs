@@ -104,7 +104,7 @@ pub trait Matcher: Send {
 pub enum MatchError {
     /// The pictures of a pair differ in size.
     #[error(
-        "the left picture is {}x{}, and the right one {}x{}; both eyes need one size",
+        "the left picture is {}x{}, and the right one {}x{}; both need the same size",
         left.0, left.1, right.0, right.1
     )]
     Sizes {
@@ -114,7 +114,7 @@ pub enum MatchError {
         right: (u32, u32),
     },
     /// The pictures do not have the size that the matcher was made for.
-    #[error("the matcher is made for {}x{} and was given {}x{}", made_for.0, made_for.1, got.0, got.1)]
+    #[error("the matcher is made for {}x{}, but was given {}x{}", made_for.0, made_for.1, got.0, got.1)]
     Size {
         /// Width and height that the matcher was made for.
         made_for: (u32, u32),

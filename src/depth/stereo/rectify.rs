@@ -9,14 +9,14 @@ use crate::calibration::rectifier::Rectifier;
 #[cfg(feature = "gpu")]
 use crate::compute::Device;
 #[cfg(feature = "gpu")]
-use crate::compute::backed::Backed;
+use crate::compute::with_fallback::WithFallback;
 use crate::frame::{ColorImage, GrayImage};
 
 /// Rectifies both pictures of a pair; CPU and GPU agree to the bit.
 pub(super) struct PairRectifier {
     rectifier: Rectifier,
     #[cfg(feature = "gpu")]
-    gpu: Backed<Option<GpuRectifier>>,
+    gpu: WithFallback<Option<GpuRectifier>>,
 }
 
 impl PairRectifier {
@@ -25,7 +25,7 @@ impl PairRectifier {
         Self {
             rectifier,
             #[cfg(feature = "gpu")]
-            gpu: Backed::default(),
+            gpu: WithFallback::default(),
         }
     }
 
@@ -35,28 +35,28 @@ impl PairRectifier {
         let gpu = device.and_then(|device| match GpuRectifier::new(&device, self.rectifier.maps()) {
             Ok(gpu) => Some(gpu),
             Err(error) => {
-                tracing::warn!("{error}; the CPU rectifies");
+                tracing::warn!("{error}; the CPU rectifies from now on");
                 None
             }
         });
-        Self { gpu: Backed::new(gpu, ()), ..self }
+        Self { gpu: WithFallback::new(gpu, ()), ..self }
     }
 
     /// Rectifies the left picture into `into`.
     pub fn left(&mut self, from: &ColorImage, into: &mut ColorImage) {
         #[cfg(feature = "gpu")]
-        if self.gpu.did("rectifies", |gpu| gpu.left(from, into)) {
+        if self.gpu.try_run("rectifies", |gpu| gpu.left(from, into)) {
             return;
         }
-        self.rectifier.left(from, into);
+        self.rectifier.rectify_left(from, into);
     }
 
     /// Rectifies the right picture into `into`.
     pub fn right(&mut self, from: &GrayImage, into: &mut GrayImage) {
         #[cfg(feature = "gpu")]
-        if self.gpu.did("rectifies", |gpu| gpu.right(from, into)) {
+        if self.gpu.try_run("rectifies", |gpu| gpu.right(from, into)) {
             return;
         }
-        self.rectifier.right(from, into);
+        self.rectifier.rectify_right(from, into);
     }
 }

@@ -2,7 +2,7 @@
 //!
 //! The blur needs only the disparity: with `z = f B / (d + doffs)`, the thin lens `c = c_inf (1 - z_f / z)` is `c =
 //! (c_inf / d_f) (d_f - d)`, counted from the disparity of infinity, which is `(A / 2B) (d_f - d)` for an aperture of
-//! diameter `A`. Focal length and baseline cancel out, so that an uncalibrated rig ([`StereoRig::assumed`]) blurs as
+//! diameter `A`. Focal length and baseline cancel out, so that an uncalibrated rig ([`StereoRig::default_for_width`]) blurs as
 //! well as a measured one; only its distances in metres are meaningless.
 
 use super::check::{Verdict, check};
@@ -101,11 +101,14 @@ impl StereoDepth {
         match &self.widen {
             Some(widen) => {
                 (self.matcher, self.disparities) = (widen(needed)?, needed);
-                tracing::info!("{source_name}: near things have disparities of {largest_px:.0} px: {needed} are tried");
+                tracing::info!(
+                    "{source_name}: near objects have disparities of {largest_px:.0} px: {needed} are \
+                                searched"
+                );
             }
             None => tracing::warn!(
-                "{source_name}: near things have disparities of {largest_px:.0} px, more than the {} that are tried, and are \
-                 taken for far ones; --max-disparity {needed} finds them",
+                "{source_name}: near objects have disparities of {largest_px:.0} px, more than the {} that are \
+                 searched, and appear far away; use --max-disparity {needed}",
                 self.disparities
             ),
         }
@@ -129,8 +132,8 @@ fn log_check((source_name, calibrated): (&str, bool), verdict: Verdict) -> bool 
     match verdict {
         Verdict::Rectified => tracing::info!("{source_name}: {verdict}"),
         Verdict::RowsOff { .. } if calibrated => tracing::warn!(
-            "{source_name}: {verdict}, although it was rectified: the calibration is not that of these cameras as they \
-             stand now; calibrate them again"
+            "{source_name}: {verdict}, although it was rectified: the calibration does not match the present position \
+             of the cameras; calibrate them again"
         ),
         Verdict::RowsOff { .. } => {
             tracing::warn!("{source_name}: {verdict}; rectify it with --calib FILE, and without --rectified");
@@ -156,7 +159,7 @@ impl DepthSource for StereoDepth {
         let Some(right) = seen.right else {
             return Err(DepthError::OneEye { source_name: self.source_name.clone() });
         };
-        self.left.set_luma_of(seen.color);
+        self.left.set_luma_from(seen.color);
         let rectified = match &mut self.rectifier {
             Some(rectifier) => {
                 rectifier.right(right, &mut self.right);
@@ -197,7 +200,7 @@ mod tests {
     use glam::{DMat3, DVec2, DVec3};
 
     use super::*;
-    use crate::calibration::{Distortion, Eye, StereoCalibration};
+    use crate::calibration::{CameraIntrinsics, Distortion, StereoCalibration};
     use crate::depth::stereo::MatchError;
     use crate::frame::Stamp;
     use crate::optics::DepthCoc;
@@ -253,7 +256,7 @@ mod tests {
     #[test]
     fn the_blur_is_affine_in_the_disparity_whatever_the_rig() {
         let disparity = DisparityMap { width: 5, height: 1, px: vec![4.0, 8.0, 16.0, 24.0, 32.0] };
-        for rig in [RIG, StereoRig::assumed(640), StereoRig { focal_px: 721.5, baseline_m: 0.54, ..RIG }] {
+        for rig in [RIG, StereoRig::default_for_width(640), StereoRig { focal_px: 721.5, baseline_m: 0.54, ..RIG }] {
             let mut map = DepthMap::default();
             metres(&disparity, &rig, &mut map);
             let coc = DepthCoc { coc_at_infinity_px: 12.0, focus_m: map.metres[2], range_m: 0.0, max_coc_px: 100.0 };
@@ -284,7 +287,7 @@ mod tests {
     #[test]
     fn a_raw_pair_is_rectified_and_so_is_its_picture() {
         let size = (64, 48);
-        let eye = |center_y_px| Eye {
+        let eye = |center_y_px| CameraIntrinsics {
             size: Some(size),
             focal_px: DVec2::splat(60.0),
             center_px: DVec2::new(32.0, center_y_px),
@@ -292,10 +295,10 @@ mod tests {
         };
         // The right camera sees everything some rows further up.
         let calibration = StereoCalibration {
-            eyes: [eye(24.0), eye(20.0)],
+            cameras: [eye(24.0), eye(20.0)],
             rotation: DMat3::IDENTITY,
             translation_m: DVec3::new(-0.1, 0.0, 0.0),
-            given: None,
+            stored_rectification: None,
             assumed_mm: false,
         };
         let rectifier = Rectifier::new(&calibration, size).unwrap();
@@ -303,8 +306,8 @@ mod tests {
         let raw = ColorImage { width: 64, height: 48, rgb: ramp.iter().flat_map(|&y| [y; 3]).collect() };
         let raw_right = GrayImage { width: 64, height: 48, luma: ramp };
         let (mut left, mut right) = (ColorImage::default(), GrayImage::default());
-        rectifier.left(&raw, &mut left);
-        rectifier.right(&raw_right, &mut right);
+        rectifier.rectify_left(&raw, &mut left);
+        rectifier.rectify_right(&raw_right, &mut right);
         assert_ne!(left, raw);
 
         let mut source = StereoDepth::of_raw("two eyes", rectifier, Box::new(Difference(Effort::Full)), 16);

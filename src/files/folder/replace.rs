@@ -38,7 +38,7 @@ pub(super) fn recover(path: &Path, set: &Set) -> Result<(), FolderError> {
             fs::remove_dir_all(&part).map_err(FolderError::write(&part))?;
         } else {
             let kept = keep(&part, path)?;
-            tracing::warn!("{}: what an earlier run left unfinished is kept as {}", path.display(), kept.display());
+            tracing::warn!("{}: the unfinished output of an earlier run is kept as {}", path.display(), kept.display());
         }
     }
     for folder in [""].iter().chain(set.subfolders).map(|subfolder| path.join(subfolder)) {

@@ -40,7 +40,13 @@ pub struct Ports {
 pub fn send(to: &mut impl Write, message: &impl Serialize) -> io::Result<()> {
     let line = serde_json::to_vec(message)?;
     let length = u32::try_from(line.len()).ok().filter(|length| *length <= MAX_LINE_BYTES);
-    let length = length.ok_or_else(|| io::Error::new(ErrorKind::InvalidData, "it has too many ports or sizes"))?;
+    let length = length.ok_or_else(|| {
+        io::Error::new(
+            ErrorKind::InvalidData,
+            "it has too many inputs, outputs or \
+                                                                              sizes",
+        )
+    })?;
     to.write_all(&length.to_le_bytes())?;
     to.write_all(&line)
 }
@@ -50,7 +56,7 @@ pub fn receive<T: DeserializeOwned>(from: &mut impl Read) -> io::Result<T> {
     from.read_exact(&mut length)?;
     let length = u32::from_le_bytes(length);
     if length > MAX_LINE_BYTES {
-        return Err(io::Error::new(ErrorKind::InvalidData, "it says too much"));
+        return Err(io::Error::new(ErrorKind::InvalidData, "its message is too long"));
     }
     let mut line = vec![0; length as usize];
     from.read_exact(&mut line)?;

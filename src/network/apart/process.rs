@@ -108,7 +108,7 @@ impl Process {
     }
 }
 
-const OUT_OF_TURN: &str = "its process answers what it was not asked";
+const OUT_OF_TURN: &str = "its process sent an unexpected answer";
 
 impl Engine for Process {
     fn run(&mut self, inputs: &[Tensor], outputs: &mut Vec<Tensor>) -> Result<(), String> {

@@ -59,7 +59,7 @@ fn handle_requests(mut stream: UnixStream) -> io::Result<()> {
             (Request::Load { runtime, bytes }, None) => {
                 let mut content = vec![0; bytes.min(network::MAX_BYTES as usize)];
                 stream.read_exact(&mut content)?;
-                let runtime = names::parse(&runtime).map_err(|why| io::Error::new(ErrorKind::InvalidData, why))?;
+                let runtime = names::parse_name(&runtime).map_err(|why| io::Error::new(ErrorKind::InvalidData, why))?;
                 let reply = match load_in_process(content, runtime) {
                     Ok(mut loaded) => {
                         let ports = Ports {
@@ -74,7 +74,14 @@ fn handle_requests(mut stream: UnixStream) -> io::Result<()> {
                 };
                 // If the description itself is too long, report that instead.
                 if send(&mut stream, &reply).is_err_and(|error| error.kind() == ErrorKind::InvalidData) {
-                    send(&mut stream, &Reply::NotLoaded(Failure::Refused("it has too many ports".to_owned())))?;
+                    send(
+                        &mut stream,
+                        &Reply::NotLoaded(Failure::Refused(
+                            "it has too many inputs or \
+                                                                          outputs"
+                                .to_owned(),
+                        )),
+                    )?;
                 }
             }
             (Request::Run(sizes), Some(network)) => {
@@ -87,7 +94,7 @@ fn handle_requests(mut stream: UnixStream) -> io::Result<()> {
                     Err(why) => send(&mut stream, &Reply::Failed(why))?,
                 }
             }
-            _ => return Err(io::Error::new(ErrorKind::InvalidData, "a request came out of turn")),
+            _ => return Err(io::Error::new(ErrorKind::InvalidData, "a request came at an unexpected time")),
         }
     }
 }

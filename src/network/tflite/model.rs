@@ -144,7 +144,7 @@ fn tensor(table: &Table<'_>, buffers: &[Table<'_>]) -> Result<Tensor, String> {
         1 => bytes.as_chunks().0.iter().map(|two| f16::from_le_bytes(*two).to_f32()).collect(),
         // Shapes and axes.
         2 => bytes.as_chunks().0.iter().map(|four| i32::from_le_bytes(*four) as f32).collect(),
-        _ => return Err(format!("{name:?} is neither of floats nor of sizes")),
+        _ => return Err(format!("{name:?} has elements that are neither floats nor sizes")),
     };
     if !values.is_empty() && values.len() != count {
         return Err(TRUNCATED.to_owned());

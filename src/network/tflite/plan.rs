@@ -77,7 +77,7 @@ struct Planner<'a> {
 
 fn size_of(tensor: &Tensor, lanes: impl Fn(usize) -> usize) -> Result<Size, String> {
     let [1, rows, columns, channels] = tensor.shape[..] else {
-        return Err(format!("{:?} is no picture: {:?}", tensor.name, tensor.shape));
+        return Err(format!("{:?} is not a picture: {:?}", tensor.name, tensor.shape));
     };
     if rows * columns * channels == 0 {
         return Err(format!("{:?} is empty: {:?}", tensor.name, tensor.shape));
@@ -108,7 +108,7 @@ impl Plan {
             }
             planner.add(&operator)?;
         }
-        let output = planner.kept[model.output].take().ok_or("nothing gives its output")?;
+        let output = planner.kept[model.output].take().ok_or("no operator computes its output")?;
         Ok(Self { output: (output.slot, output.size), ..planner.plan })
     }
 }
@@ -149,7 +149,7 @@ impl Planner<'_> {
     fn find_picture(&self, tensor: usize) -> Result<(usize, Size), String> {
         let kept = self.kept[tensor].as_ref();
         kept.map(|kept| (kept.slot, kept.size))
-            .ok_or_else(|| format!("{:?} is taken before it is given", self.model.tensors[tensor].name))
+            .ok_or_else(|| format!("{:?} is used before it is computed", self.model.tensors[tensor].name))
     }
 
     /// Returns the constants of a tensor; `None` in `shape` matches any size.
@@ -160,7 +160,7 @@ impl Planner<'_> {
             && tensor.shape.iter().zip(shape).all(|(side, wanted)| wanted.is_none_or(|wanted| wanted == *side));
         match &tensor.constant {
             Some(values) if fits => Ok((values, &tensor.shape)),
-            _ => Err(format!("{:?} is not the constants it should be: {:?}", tensor.name, tensor.shape)),
+            _ => Err(format!("{:?} does not have the expected constants: {:?}", tensor.name, tensor.shape)),
         }
     }
 
@@ -197,7 +197,7 @@ impl Planner<'_> {
     fn check_memory(&self) -> Result<(), String> {
         let values = self.plan.slots.iter().chain([&self.plan.scratch]).sum::<usize>();
         if values > MAX_TOTAL_VALUES {
-            Err(format!("it takes memory for more than {MAX_TOTAL_VALUES} values"))
+            Err(format!("it needs memory for more than {MAX_TOTAL_VALUES} values"))
         } else {
             Ok(())
         }

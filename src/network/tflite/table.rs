@@ -2,7 +2,7 @@
 //! file and is checked before it is followed; no table is visited from itself.
 
 /// The error for an unreadable place: the file is truncated or of another format.
-pub const TRUNCATED: &str = "it is cut, or no TFLite file";
+pub const TRUNCATED: &str = "it is incomplete, or not a TFLite file";
 
 /// A table.
 #[derive(Clone, Copy)]

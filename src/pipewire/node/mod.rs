@@ -17,7 +17,7 @@ use std::time::Duration;
 
 use self::provider::Provider;
 use super::PipeWireError;
-use super::mode::{Agreed, Mode};
+use super::mode::{Mode, NegotiatedFormat};
 use super::wake::Waker;
 
 /// Longest wait for the node to appear in the daemon's graph.
@@ -33,7 +33,7 @@ pub struct Settings {
     /// The modes that readers may choose from.
     pub modes: Vec<Mode>,
     /// The format for readers without a preference.
-    pub best: Agreed,
+    pub best: NegotiatedFormat,
     /// The name of the camera that the node stands in for.
     pub filter_target: Option<String>,
     /// Longest time without a picture for a reader: then the last one is repeated.
@@ -42,7 +42,7 @@ pub struct Settings {
 
 /// Memory of a picture.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Memory {
+pub struct PictureMemory {
     /// Maximum number of bytes.
     pub bytes: usize,
     /// Bytes per row; 0 if it has no rows.
@@ -51,25 +51,25 @@ pub struct Memory {
 
 /// A picture that was drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Drawn {
+pub struct DrawnPicture {
     pub bytes: usize,
     /// Capture time on the system's monotonic clock; `None` for repeats and pictures that no camera captured.
     pub captured_ns: Option<u64>,
 }
 
 /// The pictures of a node. All methods are called on the node's thread.
-pub trait Show: Send + 'static {
+pub trait PictureSource: Send + 'static {
     /// Fetches new pictures; returns whether there is one to show now.
     fn update(&mut self) -> bool;
 
     /// Sets the format of the following pictures, one of the offered ones; returns the memory that each needs.
-    fn begin(&mut self, agreed: &Agreed) -> Memory;
+    fn set_format(&mut self, negotiated: &NegotiatedFormat) -> PictureMemory;
 
     /// Writes the current picture into `frame`, in the negotiated format.
-    fn draw(&mut self, frame: &mut [u8]) -> Drawn;
+    fn draw_picture(&mut self, frame: &mut [u8]) -> DrawnPicture;
 
     /// Reports whether the node is watched.
-    fn watched(&mut self, is_watched: bool);
+    fn set_watched(&mut self, is_watched: bool);
 }
 
 /// Counts of the pictures, by outcome.
@@ -86,7 +86,7 @@ pub struct Counts {
     /// Pictures without a free buffer: the readers held them all.
     pub no_buffer: AtomicU64,
     /// Reconnections to the daemon.
-    pub returns: AtomicU64,
+    pub reconnections: AtomicU64,
 }
 
 /// A node, which is removed on drop.
@@ -104,11 +104,11 @@ impl Node {
     ///
     /// # Errors
     /// The daemon does not run, or refuses.
-    pub fn new(settings: Settings, show: impl Show) -> Result<Self, PipeWireError> {
+    pub fn new(settings: Settings, pictures: impl PictureSource) -> Result<Self, PipeWireError> {
         let waker = Waker::new().map_err(PipeWireError::Thread)?;
         let (stop, counts) = (Arc::new(AtomicBool::new(false)), Arc::new(Counts::default()));
         let (ready, is_ready) = mpsc::channel();
-        let provider = Provider::new(settings, Box::new(show), Arc::clone(&counts));
+        let provider = Provider::new(settings, Box::new(pictures), Arc::clone(&counts));
         let (waker_handle, end) = (waker.clone(), Arc::clone(&stop));
         let thread =
             thread::Builder::new().name("pipewire".into()).spawn(move || provider.run(&waker_handle, &end, &ready));

@@ -13,7 +13,7 @@ use pipewire::spa::support::system::IoFlags;
 use pipewire::spa::utils::Direction;
 use pipewire::stream::{StreamFlags, StreamRc, StreamState};
 
-use super::{Counts, Drawn, Memory, Settings, Show};
+use super::{Counts, DrawnPicture, PictureMemory, PictureSource, Settings};
 use crate::clock::Clock;
 use crate::pipewire::PipeWireError;
 use crate::pipewire::buffer::{self, Header};
@@ -31,7 +31,7 @@ const RETRY_PERIOD: Duration = Duration::from_millis(500);
 /// Provides the pictures of one node.
 pub(super) struct Provider {
     settings: Settings,
-    show: RefCell<Box<dyn Show>>,
+    pictures: RefCell<Box<dyn PictureSource>>,
     clock: Clock,
     counts: Arc<Counts>,
     /// The picture for the next process callback, for which the graph was triggered.
@@ -39,7 +39,7 @@ pub(super) struct Provider {
     /// Whether the last picture has to be repeated.
     repeat: Cell<bool>,
     is_streaming: Cell<bool>,
-    /// The last value passed to [`Show::watched`].
+    /// The last value passed to [`PictureSource::set_watched`].
     is_watched: Cell<bool>,
     /// While streaming, when the last picture was delivered or streaming started; else when streaming ended.
     since_ns: Cell<u64>,
@@ -47,7 +47,7 @@ pub(super) struct Provider {
     last: Cell<Option<(u64, u64)>>,
     sequence: Cell<u64>,
     /// Memory of each picture, as negotiated.
-    memory: Cell<Memory>,
+    memory: Cell<PictureMemory>,
 }
 
 /// A picture to be delivered.
@@ -61,9 +61,9 @@ enum Pending {
 pub(super) type Ready = mpsc::Sender<Result<String, PipeWireError>>;
 
 impl Provider {
-    pub(super) fn new(settings: Settings, show: Box<dyn Show>, counts: Arc<Counts>) -> Self {
+    pub(super) fn new(settings: Settings, pictures: Box<dyn PictureSource>, counts: Arc<Counts>) -> Self {
         Self {
-            show: RefCell::new(show),
+            pictures: RefCell::new(pictures),
             clock: Clock::system(),
             counts,
             pending: Cell::new(None),
@@ -88,11 +88,15 @@ impl Provider {
         let provider = Rc::new(self);
         let mut ready = Some(ready);
         while !stop.load(Ordering::Acquire) {
-            let ended = provider.serve(waker, stop, &mut ready);
-            provider.handle_leave();
+            let ended = provider.run_connection(waker, stop, &mut ready);
+            provider.handle_disconnect();
             match ended {
                 Ok(()) if stop.load(Ordering::Acquire) => return,
-                Ok(()) => tracing::warn!("PipeWire has gone; the camera {} waits for it", provider.settings.name),
+                Ok(()) => tracing::warn!(
+                    "PipeWire has stopped; the camera {} waits for its \
+                                          return",
+                    provider.settings.name
+                ),
                 Err(error) => match ready.take() {
                     Some(ready) => return drop(ready.send(Err(error))),
                     None => tracing::debug!("{error}"),
@@ -104,7 +108,7 @@ impl Provider {
 
     /// Returns the name, with a number appended if another node has it.
     fn find_free_name(&self, session: &Session) -> Result<String, PipeWireError> {
-        let taken = Graph::read(session, |_| false)?.names;
+        let taken = Graph::list_objects(session, |_| false)?.names;
         let name = &self.settings.name;
         let numbered = (2..).map(|number| format!("{name}-{number}"));
         let free = std::iter::once(name.clone()).chain(numbered).find(|name| !taken.contains(name));
@@ -112,9 +116,9 @@ impl Provider {
     }
 
     /// Marks the node as unwatched, since it left the graph.
-    fn handle_leave(&self) {
+    fn handle_disconnect(&self) {
         self.is_streaming.set(false);
-        count(&self.counts.unwatched, matches!(self.pending.take(), Some(Pending::New)));
+        count_if(&self.counts.unwatched, matches!(self.pending.take(), Some(Pending::New)));
         self.set_watched(false);
     }
 
@@ -125,7 +129,7 @@ impl Provider {
                 self.settings.name,
                 if is_watched { "a program reads the camera" } else { "no program reads the camera" }
             );
-            self.show.borrow_mut().watched(is_watched);
+            self.pictures.borrow_mut().set_watched(is_watched);
         }
     }
 
@@ -133,7 +137,7 @@ impl Provider {
     ///
     /// # Errors
     /// The daemon does not run, or refuses.
-    fn serve(
+    fn run_connection(
         self: &Rc<Self>,
         waker: &Waker,
         stop: &AtomicBool,
@@ -148,7 +152,7 @@ impl Provider {
             *pipewire::keys::NODE_DESCRIPTION => label.as_str(),
         };
         if let Some(camera) = filter_target {
-            props.insert("node.link-group", crate::pipewire::group());
+            props.insert("node.link-group", crate::pipewire::link_group());
             props.insert("filter.smart", "true");
             props.insert("filter.smart.target", serde_json::json!({ "node.name": camera }).to_string());
         }
@@ -159,7 +163,7 @@ impl Provider {
         let _listener = stream
             .add_local_listener::<()>()
             .state_changed(move |_, (), _, state| {
-                states.state_changed(&state);
+                states.handle_state(&state);
                 if let StreamState::Error(cause) = state {
                     failed.replace(Some(PipeWireError::Refused { doing: "the node", cause }));
                 }
@@ -170,7 +174,7 @@ impl Provider {
                     formats.handle_format(stream, format.as_bytes());
                 }
             })
-            .process(move |stream, ()| pictures.deliver(stream))
+            .process(move |stream, ()| pictures.deliver_picture(stream))
             .register()
             .map_err(PipeWireError::refused("to be listened to"))?;
         let formats: Vec<Vec<u8>> = modes.iter().map(|mode| param::build_offer(mode, best)).collect();
@@ -182,13 +186,13 @@ impl Provider {
 
         let (provider, waker_handle, woken) = (Rc::clone(self), waker.clone(), stream.clone());
         let descriptor = waker.descriptor().map_err(PipeWireError::Thread)?;
-        let _bell = session.event_loop().add_io(descriptor, IoFlags::IN, move |_| {
+        let _wake_source = session.event_loop().add_io(descriptor, IoFlags::IN, move |_| {
             waker_handle.clear();
-            provider.trigger(&woken);
+            provider.trigger_graph(&woken);
         });
         let mut is_ready_reported = false;
         while !stop.load(Ordering::Acquire) && !session.is_lost() {
-            session.serve(self.next_timeout());
+            session.iterate(self.next_timeout());
             if let Some(error) = failure.take().filter(|_| !session.is_lost()) {
                 return Err(error);
             }
@@ -217,7 +221,7 @@ impl Provider {
             Some(ready) => drop(ready.send(Ok(self.settings.name.clone()))),
             None => {
                 tracing::info!("PipeWire is back, and the camera {} with it", self.settings.name);
-                count(&self.counts.returns, true);
+                count_if(&self.counts.reconnections, true);
             }
         }
     }
@@ -234,7 +238,7 @@ impl Provider {
         Some(Duration::from_nanos(at_ns.saturating_sub(self.clock.now_ns())))
     }
 
-    fn state_changed(&self, state: &StreamState) {
+    fn handle_state(&self, state: &StreamState) {
         let is_streaming = *state == StreamState::Streaming;
         if self.is_streaming.replace(is_streaming) != is_streaming {
             self.since_ns.set(self.clock.now_ns());
@@ -246,10 +250,10 @@ impl Provider {
 
     /// Applies the format that a reader negotiated.
     fn handle_format(&self, stream: &pipewire::stream::Stream, format: &[u8]) {
-        let Some(agreed) = mode::parse_agreed(format) else { return };
-        let memory = self.show.borrow_mut().begin(&agreed);
+        let Some(negotiated) = mode::parse_negotiated(format) else { return };
+        let memory = self.pictures.borrow_mut().set_format(&negotiated);
         self.memory.set(memory);
-        let pods = [param::buffers(memory.bytes as i32, memory.stride as i32), param::header()];
+        let pods = [param::build_buffers(memory.bytes as i32, memory.stride as i32), param::build_header_request()];
         let mut pods: Vec<&Pod> = pods.iter().filter_map(|pod| Pod::from_bytes(pod)).collect();
         if let Err(error) = stream.update_params(&mut pods) {
             tracing::warn!("{}: PipeWire refused the buffers: {error}", self.settings.name);
@@ -257,47 +261,47 @@ impl Provider {
     }
 
     /// Triggers the graph if there is a picture to show and a reader.
-    fn trigger(&self, stream: &StreamRc) {
-        let is_new = self.show.borrow_mut().update();
+    fn trigger_graph(&self, stream: &StreamRc) {
+        let is_new = self.pictures.borrow_mut().update();
         let pending = match (is_new, self.repeat.take()) {
             (true, _) => Pending::New,
             (false, true) => Pending::Again,
             (false, false) => return,
         };
         if !self.is_streaming.get() {
-            return count(&self.counts.unwatched, is_new);
+            return count_if(&self.counts.unwatched, is_new);
         }
         // Where another node drives the graph, the previous picture may not have been requested yet.
         let is_overtaken = matches!((self.pending.get(), pending), (Some(Pending::New), Pending::New));
-        count(&self.counts.overtaken, is_overtaken);
+        count_if(&self.counts.overtaken, is_overtaken);
         if is_new || self.pending.get().is_none() {
             self.pending.set(Some(pending));
         }
-        // Calls `deliver` before it returns, or requests a cycle from the driver.
+        // Calls `deliver_picture` before it returns, or requests a cycle from the driver.
         if let Err(error) = stream.trigger_process() {
             tracing::debug!("{}: PipeWire refused a picture: {error}", self.settings.name);
         }
     }
 
     /// Delivers the picture that is due.
-    fn deliver(&self, stream: &pipewire::stream::Stream) {
+    fn deliver_picture(&self, stream: &pipewire::stream::Stream) {
         let Some(pending) = self.pending.take() else { return };
-        let Memory { bytes, stride } = self.memory.get();
+        let PictureMemory { bytes, stride } = self.memory.get();
         let delivered = buffer::write_frame(stream, bytes, stride as i32, |frame| {
-            let Drawn { bytes, captured_ns } = self.show.borrow_mut().draw(frame);
-            (bytes, self.header(captured_ns))
+            let DrawnPicture { bytes, captured_ns } = self.pictures.borrow_mut().draw_picture(frame);
+            (bytes, self.next_header(captured_ns))
         });
         match (pending, delivered) {
-            (Pending::New, true) => count(&self.counts.shown, true),
-            (Pending::New, false) => count(&self.counts.no_buffer, true),
-            (Pending::Again, _) => count(&self.counts.repeats, delivered),
+            (Pending::New, true) => count_if(&self.counts.shown, true),
+            (Pending::New, false) => count_if(&self.counts.no_buffer, true),
+            (Pending::Again, _) => count_if(&self.counts.repeats, delivered),
         }
         self.since_ns.set(self.clock.now_ns());
     }
 
     /// Creates the header of the next picture. Times strictly increase: a repeated picture's time advances by the time
     /// since its last delivery.
-    fn header(&self, captured_ns: Option<u64>) -> Header {
+    fn next_header(&self, captured_ns: Option<u64>) -> Header {
         let now_ns = self.clock.now_ns();
         let stamp_ns = match (captured_ns, self.last.get()) {
             (Some(captured_ns), _) => captured_ns,
@@ -312,6 +316,6 @@ impl Provider {
     }
 }
 
-fn count(counter: &AtomicU64, is_one: bool) {
+fn count_if(counter: &AtomicU64, is_one: bool) {
     counter.fetch_add(u64::from(is_one), Ordering::Relaxed);
 }

@@ -100,7 +100,7 @@ fn open(folder: &Folder, options: &Options) -> Result<Contents, RecordingError> 
     }
     let sensors = [left, right].map(|camera| dir.join(camera.sensor));
     let pair = match sensors.iter().any(|sensor| sensor.exists()) {
-        true => Pair::Raw(Box::new(calibration::euroc::read(&sensors[0], &sensors[1])?)),
+        true => Pair::Raw(Box::new(calibration::euroc::read_sensors(&sensors[0], &sensors[1])?)),
         false => Pair::Unstated,
     };
     Ok(Contents {

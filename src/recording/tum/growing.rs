@@ -72,7 +72,7 @@ impl GrowingList {
                     whole::rename(&part, &list, false).map_err(RecordingError::io("rename to", &list))?;
                     // Marks the list as ours for later runs.
                     folder::adopt(&folder, [(*name).to_owned()])?;
-                    tracing::warn!("{}: completed, as far as an interrupted recording came", list.display());
+                    tracing::warn!("{}: restored from an interrupted recording", list.display());
                 }
             }
         }

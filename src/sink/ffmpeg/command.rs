@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use super::container::Container;
 use super::process::output_within;
-use crate::color::Matrix;
+use crate::color::YcbcrMatrix;
 
 const PROGRAM: &str = "ffmpeg";
 
@@ -50,10 +50,10 @@ const VP9: &[&str] =
 /// Builds the command that encodes the Matroska stream on its standard input into the file `part`, with `threads`
 /// threads.
 pub(super) fn encode(format: &Format, part: &Path, height: u32, threads: Option<usize>) -> Command {
-    let color = match Matrix::for_height(height) {
-        Matrix::Bt601 => "smpte170m",
+    let color = match YcbcrMatrix::for_height(height) {
+        YcbcrMatrix::Bt601 => "smpte170m",
         // Players expect this for high definition.
-        Matrix::Bt709 | Matrix::Bt2020 => "bt709",
+        YcbcrMatrix::Bt709 | YcbcrMatrix::Bt2020 => "bt709",
     };
     // Tagged on the frames, for filters, and on the stream, for the muxer. 4:2:0 encoders refuse odd sizes.
     let filters = format!(

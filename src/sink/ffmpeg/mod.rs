@@ -82,7 +82,7 @@ impl Ffmpeg {
         });
         match indexed {
             Ok(part) => self.output.replace(part),
-            Err(error) => tracing::info!("{}: its index stays in pieces: {error}", self.output.path().display()),
+            Err(error) => tracing::info!("{}: its index stays fragmented: {error}", self.output.path().display()),
         }
     }
 }

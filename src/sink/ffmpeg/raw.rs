@@ -4,7 +4,7 @@
 
 use std::io::{self, Write};
 
-use crate::color::Matrix;
+use crate::color::YcbcrMatrix;
 use crate::frame::ColorImage;
 use crate::layout::Range;
 use crate::sink::yuv::Converter;
@@ -29,7 +29,7 @@ pub(super) struct RawVideo<W: Write> {
 impl<W: Write> RawVideo<W> {
     /// Creates a stream into `to` of frames of `size` that usually come every `period_ns`. Writes its header at once.
     pub(super) fn new(mut to: W, size: (u32, u32), period_ns: u64) -> io::Result<Self> {
-        let matrix = Matrix::for_height(size.1);
+        let matrix = YcbcrMatrix::for_height(size.1);
         to.write_all(&header(size, period_ns, matrix))?;
         Ok(Self {
             to,
@@ -86,14 +86,14 @@ fn element(id: &[u8], content: &[u8]) -> Vec<u8> {
 
 /// Builds everything before the first cluster: the EBML header, and the head of an endless segment with its info and
 /// one track.
-fn header((width, height): (u32, u32), period_ns: u64, matrix: Matrix) -> Vec<u8> {
+fn header((width, height): (u32, u32), period_ns: u64, matrix: YcbcrMatrix) -> Vec<u8> {
     let number = |id: &[u8], value: u64| element(id, &value.to_be_bytes());
     let master_element = |id: &[u8], parts: &[Vec<u8>]| element(id, &parts.concat());
     // Codes of ITU-T H.273.
     let color = match matrix {
-        Matrix::Bt601 => 6,
-        Matrix::Bt709 => 1,
-        Matrix::Bt2020 => 9,
+        YcbcrMatrix::Bt601 => 6,
+        YcbcrMatrix::Bt709 => 1,
+        YcbcrMatrix::Bt2020 => 9,
     };
     // Matrix, chroma siting (in the centre of four pixels, both ways), limited range, transfer, primaries.
     let colour = master_element(

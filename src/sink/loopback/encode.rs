@@ -1,6 +1,6 @@
 //! Encodes pictures in V4L2 pixel layouts; Y'CbCr in BT.601, limited range.
 
-use crate::color::Matrix;
+use crate::color::YcbcrMatrix;
 use crate::frame::ColorImage;
 use crate::layout::Range;
 use crate::sink::yuv::Converter;
@@ -21,7 +21,7 @@ impl Encoder {
         Self {
             layout,
             yuyv: yuyv::Encoder::new(),
-            planar: Converter::new(Matrix::Bt601, Range::Limited),
+            planar: Converter::new(YcbcrMatrix::Bt601, Range::Limited),
             planes: Vec::new(),
         }
     }

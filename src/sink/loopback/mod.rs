@@ -18,8 +18,8 @@ use super::{Ending, Options, Sink, SinkError, card, check_size};
 use crate::frame::fit::Fit;
 use crate::frame::{ColorImage, YuyvImage};
 use crate::link::demand::Demand;
-use crate::v4l2::audience::ReaderMonitor;
 use crate::v4l2::loopback::{Layout, LoopbackError, Output};
+use crate::v4l2::reader_monitor::ReaderMonitor;
 
 /// Shortest time after which a picture is repeated.
 const MIN_HOLD: Duration = Duration::from_millis(100);
@@ -89,7 +89,7 @@ impl Loopback {
         self.encoder.encode(&self.fitted, &mut self.bytes);
         self.shows_card = true;
         // Fill all buffers of the driver: a new reader first gets their content, which must not be an earlier picture.
-        Ok(self.output.overwrite(&self.bytes)?)
+        Ok(self.output.fill_buffers(&self.bytes)?)
     }
 }
 
@@ -97,24 +97,24 @@ impl Loopback {
 fn start_watcher(path: &Path, output: &Output, demand: Demand) -> Result<Watcher, SinkError> {
     let refused = |cause| LoopbackError::System {
         path: path.to_owned(),
-        doing: "it cannot be known whether a program reads it; leave --on-demand out",
+        doing: "its readers cannot be detected; leave --on-demand out",
         cause,
     };
-    let (audience, stop) = ReaderMonitor::new(output.device().clone()).map_err(refused)?;
-    if !audience.has_module_events() {
+    let (monitor, stop) = ReaderMonitor::new(output.device().clone()).map_err(refused)?;
+    if !monitor.has_module_events() {
         tracing::info!(
             "{}: this version of v4l2loopback does not report its readers; every program that has it open counts as one",
             path.display()
         );
     }
-    Ok(Watcher::start((audience, stop), demand).map_err(refused)?)
+    Ok(Watcher::start((monitor, stop), demand).map_err(refused)?)
 }
 
 impl Sink for Loopback {
     fn put(&mut self, frame: &ColorImage, _: u64) -> Result<ControlFlow<()>, SinkError> {
         self.encoder.encode(self.fit.fitted(frame, &mut self.fitted), &mut self.bytes);
         self.shows_card = false;
-        self.output.write(&self.bytes)?;
+        self.output.write_frame(&self.bytes)?;
         Ok(ControlFlow::Continue(()))
     }
 
@@ -126,7 +126,7 @@ impl Sink for Loopback {
         check_size(self.output.size(), frame.size())?;
         std::mem::swap(&mut self.bytes, &mut frame.bytes);
         self.shows_card = false;
-        self.output.write(&self.bytes)?;
+        self.output.write_frame(&self.bytes)?;
         Ok(ControlFlow::Continue(()))
     }
 
@@ -136,7 +136,7 @@ impl Sink for Loopback {
             self.show_card()?;
             self.covered_ns = time_ns;
         } else if u128::from(time_ns.saturating_sub(self.covered_ns)) >= self.hold.as_nanos() {
-            self.output.write(&self.bytes)?;
+            self.output.write_frame(&self.bytes)?;
             self.covered_ns = time_ns;
         }
         Ok(ControlFlow::Continue(()))
@@ -160,7 +160,7 @@ impl Sink for Loopback {
         if self.is_unwatched() && !self.shows_card {
             self.show_card()?;
         } else {
-            self.output.write(&self.bytes)?;
+            self.output.write_frame(&self.bytes)?;
         }
         Ok(ControlFlow::Continue(true))
     }

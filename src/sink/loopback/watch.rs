@@ -6,7 +6,7 @@ use std::{io, mem};
 
 use crate::clock::Clock;
 use crate::link::demand::Demand;
-use crate::v4l2::audience::{ReaderEvent, ReaderMonitor, Stop};
+use crate::v4l2::reader_monitor::{ReaderEvent, ReaderMonitor, StopHandle};
 
 /// Time for which a camera still counts as watched after its last reader left: call programs close and reopen it
 /// repeatedly.
@@ -14,13 +14,13 @@ const WATCH_HOLD: Duration = Duration::from_millis(2500);
 
 /// A thread that watches for readers until it is dropped.
 pub(super) struct Watcher {
-    stop: Option<Stop>,
+    stop: Option<StopHandle>,
     thread: Option<JoinHandle<()>>,
 }
 
 impl Watcher {
-    pub(super) fn start((mut audience, stop): (ReaderMonitor, Stop), demand: Demand) -> io::Result<Self> {
-        let listen = move || follow_readers(&demand, &Clock::system(), |timeout| audience.wait(timeout));
+    pub(super) fn start((mut monitor, stop): (ReaderMonitor, StopHandle), demand: Demand) -> io::Result<Self> {
+        let listen = move || follow_readers(&demand, &Clock::system(), |timeout| monitor.wait(timeout));
         let thread = thread::Builder::new().name("audience".into()).spawn(listen)?;
         Ok(Self { stop: Some(stop), thread: Some(thread) })
     }

@@ -6,8 +6,8 @@ use image::codecs::jpeg::JpegEncoder;
 use crate::frame::ColorImage;
 use crate::frame::fit::Fit;
 use crate::layout::{Family, FourCc, Layout};
-use crate::pipewire::mode::{Agreed, Mode, Offer};
-use crate::pipewire::node::Memory;
+use crate::pipewire::mode::{Mode, NegotiatedFormat, Offer};
+use crate::pipewire::node::PictureMemory;
 use crate::sink::{raw, yuyv};
 
 /// At least the quality of usual cameras.
@@ -41,8 +41,8 @@ pub(super) struct Format {
     size: (u32, u32),
 }
 
-impl From<&Agreed> for Format {
-    fn from(agreed: &Agreed) -> Self {
+impl From<&NegotiatedFormat> for Format {
+    fn from(agreed: &NegotiatedFormat) -> Self {
         Self { fourcc: agreed.fourcc, size: agreed.size }
     }
 }
@@ -96,14 +96,15 @@ impl Encoder {
     }
 
     /// Memory that a picture needs.
-    pub fn memory(&self) -> Memory {
+    pub fn memory(&self) -> PictureMemory {
         let (width, height) = self.format.size;
         match self.method {
-            Method::Jpeg => {
-                Memory { bytes: JPEG_HEAD_BYTES + JPEG_BYTES_PER_PX * width as usize * height as usize, stride: 0 }
-            }
-            _ => Memory {
-                bytes: self.layout.needed_bytes(0),
+            Method::Jpeg => PictureMemory {
+                bytes: JPEG_HEAD_BYTES + JPEG_BYTES_PER_PX * width as usize * height as usize,
+                stride: 0,
+            },
+            _ => PictureMemory {
+                bytes: self.layout.min_size_bytes(0),
                 stride: self.layout.planes().first().map_or(0, |plane| plane.stride_bytes),
             },
         }
@@ -183,7 +184,7 @@ mod tests {
                 let mut bytes = vec![7; 3];
                 encoder.encode(&picture, &mut bytes);
                 assert!((1..=encoder.memory().bytes).contains(&bytes.len()), "{}", FourCc(*fourcc));
-                let layout = Layout::strided(FourCc(*fourcc), size.0, size.1, encoder.memory().stride).unwrap();
+                let layout = Layout::with_stride(FourCc(*fourcc), size.0, size.1, encoder.memory().stride).unwrap();
                 let mut decoded = ColorImage::default();
                 Decoder::new(&layout).unwrap().decode(&[&bytes], &mut decoded).unwrap();
                 assert_eq!(decoded.size(), size);

@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::capture::pixels::Decoder;
-use crate::color::Matrix;
+use crate::color::YcbcrMatrix;
 use crate::layout::FourCc;
 
 fn noise(width: u32, height: u32) -> ColorImage {
@@ -24,8 +24,8 @@ fn encoded(layout: &Layout, picture: &ColorImage, arch: Arch) -> Vec<Vec<u8>> {
 }
 
 /// Reference Y'CbCr of a colour, not rounded.
-fn exact([r, g, b]: [f64; 3], matrix: Matrix, range: Range) -> [f64; 3] {
-    let [red, green, blue] = matrix.weights();
+fn exact([r, g, b]: [f64; 3], matrix: YcbcrMatrix, range: Range) -> [f64; 3] {
+    let [red, green, blue] = matrix.luma_weights();
     let y = red * r + green * g + blue * b;
     let (luma, black, chroma) = match range {
         Range::Limited => (219.0, 16.0, 224.0),
@@ -68,7 +68,7 @@ fn sample(layout: &Layout, planes: &[Vec<u8>], which: usize, x: usize, y: usize)
 fn every_sample_is_the_nearest_code() {
     for (width, height) in [(18, 6), (7, 5), (1, 1)] {
         let picture = noise(width, height);
-        for fourcc in FourCc::supported() {
+        for fourcc in FourCc::supported_formats() {
             let Some(down) = fourcc.family().and_then(|family| match family {
                 Family::Packed422 { .. } => Some(1),
                 Family::SemiPlanar420 { .. } | Family::Planar420 { .. } => Some(2),
@@ -76,10 +76,12 @@ fn every_sample_is_the_nearest_code() {
             }) else {
                 continue;
             };
-            for (matrix, range) in
-                [(Matrix::Bt601, Range::Limited), (Matrix::Bt709, Range::Full), (Matrix::Bt2020, Range::Limited)]
-            {
-                let mut layout = Layout::packed(fourcc, width, height).unwrap().with_strides(2);
+            for (matrix, range) in [
+                (YcbcrMatrix::Bt601, Range::Limited),
+                (YcbcrMatrix::Bt709, Range::Full),
+                (YcbcrMatrix::Bt2020, Range::Limited),
+            ] {
+                let mut layout = Layout::packed(fourcc, width, height).unwrap().with_row_padding(2);
                 (layout.matrix, layout.range) = (matrix, range);
                 let planes = encoded(&layout, &picture, Arch::new());
                 assert!(planes == encoded(&layout, &picture, Arch::Scalar), "{fourcc}");
@@ -112,10 +114,10 @@ fn what_is_decoded_is_what_was_encoded() {
         let (x, y) = ((at % width) as u8, (at / width) as u8);
         *pixel = [40 + 3 * x, 200 - 2 * x, 60 + 8 * y];
     }
-    for fourcc in FourCc::supported() {
+    for fourcc in FourCc::supported_formats() {
         for range in [Range::Limited, Range::Full] {
             let mut layout = Layout::packed(fourcc, width, height).unwrap();
-            (layout.matrix, layout.range) = (Matrix::Bt709, range);
+            (layout.matrix, layout.range) = (YcbcrMatrix::Bt709, range);
             if Encoder::new(&layout).is_none() {
                 continue;
             }

@@ -29,11 +29,11 @@ impl fmt::Display for Value {
 #[derive(Debug, thiserror::Error)]
 pub enum ControlError {
     /// The device has no control with this name.
-    #[error("control {name}: {}", suggestion(near, *count))]
+    #[error("control {name}: {}", format_suggestion(similar, *count))]
     Unknown {
         name: String,
         /// Names of similar controls, the most similar first; may be empty.
-        near: Vec<String>,
+        similar: Vec<String>,
         /// How many controls there are.
         count: usize,
     },
@@ -42,7 +42,7 @@ pub enum ControlError {
     Value { name: String, value: String, accepted: String },
     /// The control cannot be set, or not now.
     #[error("control {name} {why}")]
-    Fixed { name: String, why: &'static str },
+    NotSettable { name: String, why: &'static str },
     /// The control has no value that can be written as text.
     #[error("control {0} has no value to read")]
     NoValue(String),
@@ -54,11 +54,11 @@ pub enum ControlError {
     },
 }
 
-fn suggestion(near: &[String], count: usize) -> String {
-    match (near, count) {
+fn format_suggestion(similar: &[String], count: usize) -> String {
+    match (similar, count) {
         (_, 0) => "the device has no controls".to_owned(),
-        ([], _) => "the device has none of this name; `bokehcam devices --controls` lists them".to_owned(),
-        (near, _) => format!("the device has none of this name; did you mean {}?", near.join(" or ")),
+        ([], _) => "the device has no control of this name; `bokehcam devices --controls` lists them".to_owned(),
+        (similar, _) => format!("the device has no control of this name; did you mean {}?", similar.join(" or ")),
     }
 }
 
@@ -72,11 +72,12 @@ impl ControlError {
             let contains = !name.is_empty() && control.name.contains(name);
             if contains { 1.0 } else { strsim::normalized_damerau_levenshtein(&control.name, name) }
         };
-        let mut near: Vec<(f64, &str)> = controls.iter().map(|control| (similarity(control), &*control.name)).collect();
-        near.retain(|(similarity, _)| *similarity >= MIN_SIMILARITY);
-        near.sort_by(|a, b| b.0.total_cmp(&a.0));
-        let near = near.iter().take(MAX_SUGGESTIONS).map(|(_, name)| (*name).to_owned()).collect();
-        Self::Unknown { name: name.to_owned(), near, count: controls.len() }
+        let mut similar: Vec<(f64, &str)> =
+            controls.iter().map(|control| (similarity(control), &*control.name)).collect();
+        similar.retain(|(similarity, _)| *similarity >= MIN_SIMILARITY);
+        similar.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let similar = similar.iter().take(MAX_SUGGESTIONS).map(|(_, name)| (*name).to_owned()).collect();
+        Self::Unknown { name: name.to_owned(), similar, count: controls.len() }
     }
 }
 
@@ -87,18 +88,18 @@ impl Control {
     /// The control does not accept this value, or cannot be set now.
     pub fn parse(&self, text: &str) -> Result<Value, ControlError> {
         let why = match () {
-            () if self.kind == Kind::Compound => "is a table, which cannot be set by one value",
+            () if self.kind == Kind::Compound => "is a table, which a single value cannot set",
             () if self.read_only => "is read-only",
             () if self.grabbed => "cannot be set while the device is streaming",
             () if self.inactive => "has no effect now: another control overrides it, such as an automatic mode",
-            () => return self.parse_value(text).ok_or_else(|| self.refuse(text)),
+            () => return self.parse_value(text).ok_or_else(|| self.value_error(text)),
         };
-        Err(ControlError::Fixed { name: self.name.clone(), why })
+        Err(ControlError::NotSettable { name: self.name.clone(), why })
     }
 
     /// Parses `text` as a value; `None` if the control does not accept it. Ignores whether the control can be set now.
     fn parse_value(&self, text: &str) -> Option<Value> {
-        let number = number(text);
+        let number = parse_number(text);
         let value = match self.kind {
             Kind::Button => Some(1),
             Kind::Boolean => match text.to_ascii_lowercase().as_str() {
@@ -111,8 +112,9 @@ impl Control {
                 let above_minimum = number.wrapping_sub(self.minimum).cast_unsigned();
                 (self.minimum..=self.maximum).contains(number) && above_minimum.is_multiple_of(self.step)
             }),
-            Kind::Bitmask => number.filter(|number| (0..=self.bits()).contains(number) && number & !self.bits() == 0),
-            Kind::Menu | Kind::IntegerMenu => self.item(text).map(|item| item.index),
+            Kind::Bitmask => number
+                .filter(|number| (0..=self.settable_bits()).contains(number) && number & !self.settable_bits() == 0),
+            Kind::Menu | Kind::IntegerMenu => self.find_item(text).map(|item| item.index),
             Kind::String => {
                 let length = text.len() as i64;
                 let above_minimum = length.wrapping_sub(self.minimum).cast_unsigned();
@@ -125,35 +127,36 @@ impl Control {
     }
 
     /// Returns the mask of the 32 bits that may be set.
-    fn bits(&self) -> i64 {
+    fn settable_bits(&self) -> i64 {
         self.maximum & i64::from(u32::MAX)
     }
 
-    /// Finds the menu item that `text` names: by its index, its name, or its name as [`super::tool_name`] writes it.
-    fn item(&self, text: &str) -> Option<&Item> {
-        let find_item = |matches_text: &dyn Fn(&Item) -> bool| self.items.iter().find(|item| matches_text(item));
-        let number = number(text);
-        find_item(&|item| Some(item.index) == number)
-            .or_else(|| find_item(&|item| item.name.eq_ignore_ascii_case(text)))
+    /// Finds the menu item that `text` names: by its index, its name, or its name as [`super::v4l2_ctl_name`] writes
+    /// it.
+    fn find_item(&self, text: &str) -> Option<&Item> {
+        let find_by = |matches_text: &dyn Fn(&Item) -> bool| self.items.iter().find(|item| matches_text(item));
+        let number = parse_number(text);
+        find_by(&|item| Some(item.index) == number)
+            .or_else(|| find_by(&|item| item.name.eq_ignore_ascii_case(text)))
             .or_else(|| {
-                find_item(&|item| !item.name.is_empty() && super::tool_name(&item.name) == super::tool_name(text))
+                find_by(&|item| !item.name.is_empty() && super::v4l2_ctl_name(&item.name) == super::v4l2_ctl_name(text))
             })
     }
 
-    fn refuse(&self, text: &str) -> ControlError {
-        ControlError::Value { name: self.name.clone(), value: text.to_owned(), accepted: self.accepted() }
+    fn value_error(&self, text: &str) -> ControlError {
+        ControlError::Value { name: self.name.clone(), value: text.to_owned(), accepted: self.describe_accepted() }
     }
 
     /// Describes the accepted values, as the hint of an error message.
-    pub fn accepted(&self) -> String {
+    pub fn describe_accepted(&self) -> String {
         let steps = if self.step > 1 { format!(" in steps of {}", self.step) } else { String::new() };
         match self.kind {
             Kind::Integer | Kind::Integer64 => format!("use {} to {}{steps}", self.minimum, self.maximum),
             Kind::Boolean => "use on or off".to_owned(),
-            Kind::Bitmask => format!("use bits of {:#x}", self.bits()),
+            Kind::Bitmask => format!("use bits of {:#x}", self.settable_bits()),
             Kind::Button => "any value will do".to_owned(),
             Kind::String => format!("use {} to {} bytes of text{steps}", self.minimum, self.maximum),
-            Kind::Compound => "it takes no single value".to_owned(),
+            Kind::Compound => "it has no single value to set".to_owned(),
             Kind::Menu | Kind::IntegerMenu => {
                 let items: Vec<_> = self.items.iter().map(|item| format!("{} ({})", item.index, item.name)).collect();
                 format!("use {}", items.join(", "))
@@ -163,7 +166,7 @@ impl Control {
 }
 
 /// Parses a decimal number, or a hexadecimal one after 0x.
-fn number(text: &str) -> Option<i64> {
+fn parse_number(text: &str) -> Option<i64> {
     match text.strip_prefix("0x").or_else(|| text.strip_prefix("0X")) {
         Some(digits) => i64::from_str_radix(digits, 16).ok(),
         None => text.parse().ok(),
@@ -172,7 +175,7 @@ fn number(text: &str) -> Option<i64> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::find;
+    use super::super::find_control;
     use super::*;
 
     fn control(name: &str, kind: Kind, (minimum, maximum, step): (i64, i64, u64)) -> Control {
@@ -270,9 +273,9 @@ mod tests {
         let new = [control("exposure_dynamic_framerate", Kind::Boolean, (0, 1, 1))];
         let old = [control("exposure_auto_priority", Kind::Boolean, (0, 1, 1))];
         for controls in [&new, &old] {
-            assert!(find(controls, "exposure_auto_priority").is_some());
-            assert!(find(controls, "exposure_dynamic_framerate").is_some());
-            assert!(find(controls, "exposure_auto").is_none());
+            assert!(find_control(controls, "exposure_auto_priority").is_some());
+            assert!(find_control(controls, "exposure_dynamic_framerate").is_some());
+            assert!(find_control(controls, "exposure_auto").is_none());
         }
     }
 

@@ -2,38 +2,38 @@
 
 use v4l::v4l_sys as sys;
 
-use crate::color::Matrix;
-use crate::layout::{Colors, Family, Range, Transfer};
+use crate::color::YcbcrMatrix;
+use crate::layout::{ColorEncoding, Family, Range, Transfer};
 
 /// Resolves a format's colour codes; a code that is 0 or unknown takes V4L2's default for the colour space. SMPTE 240M,
 /// an early HD standard, counts as BT.709.
-pub(super) fn resolve(
+pub(super) fn resolve_colors(
     family: Family,
     colorspace: u32,
     ycbcr_encoding: u32,
     quantization: u32,
     transfer: u32,
-) -> Colors {
+) -> ColorEncoding {
     // JPEG files define their own colours.
     if family == Family::Jpeg {
-        return (Matrix::Bt601, Range::Full, Transfer::Display);
+        return (YcbcrMatrix::Bt601, Range::Full, Transfer::Display);
     }
     let matrix = match ycbcr_encoding {
         sys::v4l2_ycbcr_encoding_V4L2_YCBCR_ENC_601
         | sys::v4l2_ycbcr_encoding_V4L2_YCBCR_ENC_XV601
-        | sys::v4l2_ycbcr_encoding_V4L2_YCBCR_ENC_SYCC => Matrix::Bt601,
+        | sys::v4l2_ycbcr_encoding_V4L2_YCBCR_ENC_SYCC => YcbcrMatrix::Bt601,
         sys::v4l2_ycbcr_encoding_V4L2_YCBCR_ENC_709
         | sys::v4l2_ycbcr_encoding_V4L2_YCBCR_ENC_XV709
-        | sys::v4l2_ycbcr_encoding_V4L2_YCBCR_ENC_SMPTE240M => Matrix::Bt709,
+        | sys::v4l2_ycbcr_encoding_V4L2_YCBCR_ENC_SMPTE240M => YcbcrMatrix::Bt709,
         sys::v4l2_ycbcr_encoding_V4L2_YCBCR_ENC_BT2020 | sys::v4l2_ycbcr_encoding_V4L2_YCBCR_ENC_BT2020_CONST_LUM => {
-            Matrix::Bt2020
+            YcbcrMatrix::Bt2020
         }
         _ => match colorspace {
             sys::v4l2_colorspace_V4L2_COLORSPACE_REC709
             | sys::v4l2_colorspace_V4L2_COLORSPACE_DCI_P3
-            | sys::v4l2_colorspace_V4L2_COLORSPACE_SMPTE240M => Matrix::Bt709,
-            sys::v4l2_colorspace_V4L2_COLORSPACE_BT2020 => Matrix::Bt2020,
-            _ => Matrix::Bt601,
+            | sys::v4l2_colorspace_V4L2_COLORSPACE_SMPTE240M => YcbcrMatrix::Bt709,
+            sys::v4l2_colorspace_V4L2_COLORSPACE_BT2020 => YcbcrMatrix::Bt2020,
+            _ => YcbcrMatrix::Bt601,
         },
     };
     let range = match quantization {

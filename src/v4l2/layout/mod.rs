@@ -9,7 +9,7 @@ use v4l::v4l_sys as sys;
 use crate::layout::{Family, FourCc, Layout, LayoutError, MAX_PLANES, Plane};
 
 /// The fields shared by the kernel's single- and multi-planar structures, unchecked.
-struct Raw {
+struct RawFormat {
     fourcc: FourCc,
     width: u32,
     height: u32,
@@ -33,13 +33,13 @@ impl Layout {
             sys::v4l2_buf_type_V4L2_BUF_TYPE_VIDEO_CAPTURE | sys::v4l2_buf_type_V4L2_BUF_TYPE_VIDEO_OUTPUT => {
                 // SAFETY: the type says that this member of the union was written; every bit pattern of it is valid.
                 #[allow(unsafe_code)]
-                Raw::single(unsafe { &format.fmt.pix })
+                RawFormat::from_single_planar(unsafe { &format.fmt.pix })
             }
             sys::v4l2_buf_type_V4L2_BUF_TYPE_VIDEO_CAPTURE_MPLANE
             | sys::v4l2_buf_type_V4L2_BUF_TYPE_VIDEO_OUTPUT_MPLANE => {
                 // SAFETY: as above.
                 #[allow(unsafe_code)]
-                Raw::multi(unsafe { &format.fmt.pix_mp })
+                RawFormat::from_multi_planar(unsafe { &format.fmt.pix_mp })
             }
             other => return Err(LayoutError::BufferType(other)),
         };
@@ -47,9 +47,9 @@ impl Layout {
     }
 }
 
-impl Raw {
+impl RawFormat {
     /// Reads the format of a single-planar queue.
-    fn single(pix: &sys::v4l2_pix_format) -> Self {
+    fn from_single_planar(pix: &sys::v4l2_pix_format) -> Self {
         // Without this magic number, the fields after it were never written.
         let extended = pix.priv_ == sys::V4L2_PIX_FMT_PRIV_MAGIC;
         let if_extended = |value| if extended { value } else { 0 };
@@ -73,7 +73,7 @@ impl Raw {
     }
 
     /// Reads the format of a multi-planar queue.
-    fn multi(pix: &sys::v4l2_pix_format_mplane) -> Self {
+    fn from_multi_planar(pix: &sys::v4l2_pix_format_mplane) -> Self {
         // The structure is packed, so its fields are copied before they are referenced.
         let formats = pix.plane_fmt;
         let mut planes = [Plane::default(); MAX_PLANES];
@@ -104,10 +104,10 @@ impl Raw {
             return Err(LayoutError::Interlaced(field));
         }
         let planes = self.planes.get(..plane_count);
-        let expected = fourcc.family().map_or(1, Family::memory_planes);
+        let expected = fourcc.family().map_or(1, Family::memory_plane_count);
         let planes = planes.ok_or(LayoutError::Planes { fourcc, found: plane_count, expected })?;
         let colors = fourcc.family().map(|family| {
-            color::resolve(family, self.colorspace, self.ycbcr_encoding, self.quantization, self.transfer)
+            color::resolve_colors(family, self.colorspace, self.ycbcr_encoding, self.quantization, self.transfer)
         });
         Layout::new(fourcc, (self.width, self.height), planes, colors)
     }

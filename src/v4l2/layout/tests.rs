@@ -1,5 +1,5 @@
 use super::*;
-use crate::color::Matrix;
+use crate::color::YcbcrMatrix;
 use crate::layout::{FourCcError, Range, Transfer};
 use crate::v4l2::device::zeroed;
 
@@ -71,14 +71,14 @@ fn four_letters_are_read_and_written() {
 
 #[test]
 fn the_table_agrees_with_the_layouts() {
-    for fourcc in FourCc::supported() {
+    for fourcc in FourCc::supported_formats() {
         let layout = Layout::packed(fourcc, 640, 480).unwrap();
         let total: usize = layout.planes().iter().map(|plane| plane.size_bytes).sum();
         match fourcc.bits_per_px() {
             Some(bits) => assert_eq!(total, 640 * 480 * bits as usize / 8, "{fourcc}"),
             None => assert!(!fourcc.is_raw() && layout.components().count() == 0),
         }
-        assert_eq!(FourCc::supported().filter(|&other| other == fourcc).count(), 1);
+        assert_eq!(FourCc::supported_formats().filter(|&other| other == fourcc).count(), 1);
     }
     assert_eq!(FourCc(*b"H264").family(), None);
     assert_eq!(FourCc(*b"H264").bits_per_px(), None);
@@ -86,7 +86,7 @@ fn the_table_agrees_with_the_layouts() {
 
 #[test]
 fn colours_that_are_left_open_follow_the_colour_space() {
-    use {Matrix::*, Range::*, Transfer::*};
+    use {Range::*, Transfer::*, YcbcrMatrix::*};
     // Colour space, encoding, quantization, transfer.
     for (color, expected) in [
         ([0, 0, 0, 0], (Bt601, Limited, Display)),
@@ -119,7 +119,7 @@ fn fields_that_were_never_written_do_not_count() {
     let mut format = with_color(single(FourCc::YUYV, 64, 8, 128, 1024), [8, 2, 1, 5]);
     format.fmt.pix.priv_ = 0;
     let layout = Layout::from_format(&format).unwrap();
-    assert_eq!((layout.matrix, layout.range, layout.transfer), (Matrix::Bt601, Range::Limited, Transfer::Display));
+    assert_eq!((layout.matrix, layout.range, layout.transfer), (YcbcrMatrix::Bt601, Range::Limited, Transfer::Display));
 }
 
 #[test]
@@ -132,7 +132,7 @@ fn components_lie_where_the_kernel_puts_them() {
     let yu12 = Layout::from_format(&single(FourCc::YU12, 638, 480, 640, 500_000)).unwrap();
     let expected = [(0, 0, 640, 638, 480), (0, 307_200, 320, 319, 240), (0, 384_000, 320, 319, 240)];
     assert_eq!(at(yu12), expected);
-    assert_eq!((yu12.planes()[0].size_bytes, yu12.needed_bytes(0)), (500_000, 384_000 + 320 * 239 + 319));
+    assert_eq!((yu12.planes()[0].size_bytes, yu12.min_size_bytes(0)), (500_000, 384_000 + 320 * 239 + 319));
     let apart = Layout::from_format(&multi(FourCc(*b"NM12"), 640, 480, &[(704, 337_920), (768, 184_320)])).unwrap();
     assert_eq!(at(apart), [(0, 0, 704, 640, 480), (1, 0, 768, 640, 240)]);
     let three = Layout::from_format(&multi(FourCc(*b"YM12"), 16, 4, &[(32, 128), (16, 32), (16, 32)])).unwrap();
@@ -150,9 +150,9 @@ fn what_cannot_be_read_is_refused() {
     assert_eq!(refusal(single(FourCc(*b"H264"), 64, 8, 0, 0)), LayoutError::FourCc(FourCc(*b"H264")));
     assert!(matches!(refusal(single(FourCc::YUYV, 0, 8, 0, 0)), LayoutError::Size { .. }));
     assert!(matches!(refusal(single(FourCc::YUYV, 64, u32::MAX, 0, 0)), LayoutError::Size { .. }));
-    assert!(matches!(refusal(single(FourCc::YUYV, 64, 8, 127, 1024)), LayoutError::Stride { needed_bytes: 128, .. }));
+    assert!(matches!(refusal(single(FourCc::YUYV, 64, 8, 127, 1024)), LayoutError::Stride { min_size_bytes: 128, .. }));
     assert!(matches!(refusal(single(FourCc::YUYV, 64, 8, u32::MAX, 0)), LayoutError::Stride { .. }));
-    assert!(matches!(refusal(single(FourCc::YUYV, 64, 8, 128, 1023)), LayoutError::Short { needed_bytes: 1024, .. }));
+    assert!(matches!(refusal(single(FourCc::YUYV, 64, 8, 128, 1023)), LayoutError::Short { min_size_bytes: 1024, .. }));
     assert!(matches!(refusal(multi(FourCc(*b"NM12"), 64, 8, &[(64, 512)])), LayoutError::Planes { found: 1, .. }));
     assert!(matches!(refusal(multi(FourCc::NV12, 64, 8, &[(64, 768); 9])), LayoutError::Planes { found: 9, .. }));
     let mut interlaced = single(FourCc::YUYV, 64, 8, 128, 1024);

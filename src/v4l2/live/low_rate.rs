@@ -30,7 +30,7 @@ impl LowRateCheck {
 
     /// Counts `frames` received since the last call and `missed` ones, at `now_ns`. Returns the measured rate, once, if
     /// it was below `MIN_RATE_FRACTION` of the stated one for three seconds and nothing was lost.
-    pub fn count(&mut self, frames: u64, missed: u64, now_ns: u64) -> Option<f64> {
+    pub fn count_frames(&mut self, frames: u64, missed: u64, now_ns: u64) -> Option<f64> {
         let (count, began_ns) = self.window?;
         if self.reported || now_ns < began_ns {
             return None;
@@ -62,7 +62,7 @@ mod tests {
         let mut check = LowRateCheck::new(30.0, 0);
         let frames = (0..(fps * seconds) as u64).filter_map(|frame| {
             let missed = missing.is_some_and(|missing| frame % missing == 0);
-            check.count(1, u64::from(missed), (frame as f64 / fps * 1e9) as u64)
+            check.count_frames(1, u64::from(missed), (frame as f64 / fps * 1e9) as u64)
         });
         frames.collect()
     }

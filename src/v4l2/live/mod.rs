@@ -1,23 +1,23 @@
 //! A capture device that delivers frames for hours, with recovery from failures. It may stall, fail, be unplugged or
 //! return under another number; frames continue when they can.
 
-mod address;
+pub mod auto_lock;
 pub mod error;
-pub mod hold;
-pub mod knobs;
+mod identity;
 mod low_rate;
 pub mod negotiate;
 mod recover;
 mod session;
+pub mod user_controls;
 mod watchdog;
 
 use std::time::Duration;
 
 pub use error::OpenError;
 pub use negotiate::ModeRequest;
-pub use session::{Agreed, Setting};
+pub use session::{NegotiatedMode, Setting};
 
-use address::Address;
+use identity::CameraIdentity;
 use low_rate::LowRateCheck;
 use session::Session;
 use watchdog::Watchdog;
@@ -29,13 +29,13 @@ use crate::v4l2::node;
 use crate::v4l2::queue::{Losses, Planes};
 
 /// A device node that delivers frames.
-pub struct Live {
-    address: Address,
+pub struct LiveDevice {
+    identity: CameraIdentity,
     name: String,
-    wish: ModeRequest,
+    request: ModeRequest,
     settings: Vec<Setting>,
     clock: Clock,
-    agreed: Agreed,
+    negotiated: NegotiatedMode,
     state: State,
     watchdog: Watchdog,
     low_rate: LowRateCheck,
@@ -43,7 +43,7 @@ pub struct Live {
     /// Whether the first frame was requested.
     started: bool,
     /// Whether the current frame was passed to the caller.
-    frame_out: bool,
+    is_frame_borrowed: bool,
     /// The last warning about missing frames, so that it is not repeated.
     last_warning: String,
     /// When all nodes were last searched.
@@ -53,17 +53,17 @@ pub struct Live {
 enum State {
     Streaming(Box<Session>),
     /// Closed after a failure; to be reopened at this time.
-    Away {
+    Reconnecting {
         retry_ns: u64,
     },
     /// Closed because no client watches.
-    Resting,
+    Suspended,
 }
 
 /// Result of waiting for a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Next {
-    /// A frame, to be read with [`Live::planes`] and returned with [`Live::release`].
+    /// A frame, to be read with [`LiveDevice::planes`] and returned with [`LiveDevice::release_frame`].
     Frame {
         /// Capture time on the system's monotonic clock; the dequeuing time if the driver reports none.
         captured_ns: u64,
@@ -87,17 +87,17 @@ const TRY_PAUSE_NS: u64 = 200_000_000;
 /// A frame with an older time stamp than this was stamped by another clock.
 const MAX_STAMP_AGE_NS: u64 = 5_000_000_000;
 
-impl Live {
+impl LiveDevice {
     /// Opens the device that `name` means (a path, a number, a link's name, part of a card's name), sets the controls
     /// `settings` and starts it.
     ///
     /// # Errors
     /// No device matches, or it cannot be used; a busy or failing one is retried for about a second.
-    pub fn open(name: &str, wish: ModeRequest, settings: Vec<Setting>, clock: Clock) -> Result<Self, OpenError> {
-        let path = node::resolve(name)?;
+    pub fn open(name: &str, request: ModeRequest, settings: Vec<Setting>, clock: Clock) -> Result<Self, OpenError> {
+        let path = node::resolve_node(name)?;
         let mut tries = 1;
         let session = loop {
-            match Session::open(&path, &wish, &settings, None, &clock) {
+            match Session::open(&path, &request, &settings, None, &clock) {
                 // Another program may just be closing it, or the driver recovering.
                 Err(error) if error.is_transient() && tries < MAX_TRIES => {
                     tracing::debug!("{error}; trying again");
@@ -107,22 +107,22 @@ impl Live {
                 opened => break opened?,
             }
         };
-        let address = Address::new(&path, &session.capability);
-        let name = format!("{} ({})", path.display(), address.card());
-        let (agreed, now_ns) = (session.agreed, clock.now_ns());
-        tracing::info!("{name}: {agreed}");
+        let identity = CameraIdentity::new(&path, &session.capability);
+        let name = format!("{} ({})", path.display(), identity.card());
+        let (negotiated, now_ns) = (session.negotiated, clock.now_ns());
+        tracing::info!("{name}: {negotiated}");
         Ok(Self {
-            address,
+            identity,
             name,
-            wish,
+            request,
             settings,
-            agreed,
+            negotiated,
             state: State::Streaming(Box::new(session)),
-            watchdog: Watchdog::new(agreed.interval.period_ns(), now_ns),
-            low_rate: LowRateCheck::new(agreed.interval.fps(), now_ns),
+            watchdog: Watchdog::new(negotiated.interval.period_ns(), now_ns),
+            low_rate: LowRateCheck::new(negotiated.interval.fps(), now_ns),
             losses: Losses::default(),
             started: false,
-            frame_out: false,
+            is_frame_borrowed: false,
             last_warning: String::new(),
             searched_ns: now_ns,
             clock,
@@ -134,21 +134,21 @@ impl Live {
         &self.name
     }
 
-    /// The mode last agreed with the driver.
-    pub fn agreed(&self) -> &Agreed {
-        &self.agreed
+    /// The mode last negotiated with the driver.
+    pub fn negotiated(&self) -> &NegotiatedMode {
+        &self.negotiated
     }
 
     /// The memory layout of its frames. May change after a reconnection.
     pub fn layout(&self) -> &Layout {
-        &self.agreed.layout
+        &self.negotiated.layout
     }
 
     /// Waits for a frame, not much longer than `timeout`. Only the newest one is returned, the others are lost.
     /// Reopens the device if it is closed.
     pub fn next(&mut self, timeout: Duration) -> Next {
-        if self.frame_out {
-            self.release();
+        if self.is_frame_borrowed {
+            self.release_frame();
         }
         match &mut self.state {
             State::Streaming(session) => {
@@ -170,7 +170,7 @@ impl Live {
                     }
                 }
             }
-            State::Away { retry_ns } => {
+            State::Reconnecting { retry_ns } => {
                 let (now_ns, until_ns) = (self.clock.now_ns(), *retry_ns);
                 if now_ns < until_ns {
                     self.clock.sleep_until_ns(until_ns.min(now_ns + timeout.as_nanos() as u64));
@@ -178,16 +178,16 @@ impl Live {
                     self.reopen();
                 }
             }
-            State::Resting => {
+            State::Suspended => {
                 self.watchdog.on_start(self.clock.now_ns());
                 self.reopen();
             }
         }
-        self.report()
+        self.next_result()
     }
 
-    /// Returns the result of [`Live::next`]: losses before the frame that follows them.
-    fn report(&mut self) -> Next {
+    /// Returns the result of [`LiveDevice::next`]: losses before the frame that follows them.
+    fn next_result(&mut self) -> Next {
         if let State::Streaming(session) = &mut self.state {
             add_losses(&mut self.losses, session.queue.take_losses());
         }
@@ -198,7 +198,7 @@ impl Live {
         let Some((frame, _)) = session.queue.current() else { return Next::Waiting };
         let now_ns = self.clock.now_ns();
         let plausible = |stamp_ns: &u64| now_ns.saturating_sub(*stamp_ns) < MAX_STAMP_AGE_NS;
-        self.frame_out = true;
+        self.is_frame_borrowed = true;
         // Never in the future, however little the clocks differ.
         Next::Frame { captured_ns: frame.stamp_ns.filter(plausible).unwrap_or(now_ns).min(now_ns) }
     }
@@ -206,25 +206,25 @@ impl Live {
     /// The planes of the frame returned last; `None` after its release.
     pub fn planes(&self) -> Option<Planes<'_>> {
         match &self.state {
-            State::Streaming(session) if self.frame_out => session.queue.current().map(|(_, planes)| planes),
+            State::Streaming(session) if self.is_frame_borrowed => session.queue.current().map(|(_, planes)| planes),
             _ => None,
         }
     }
 
     /// Returns the memory of the last frame, which was read, to the driver.
-    pub fn release(&mut self) {
-        self.frame_out = false;
+    pub fn release_frame(&mut self) {
+        self.is_frame_borrowed = false;
         if let State::Streaming(session) = &mut self.state {
             session.queue.release();
         }
     }
 
-    /// Closes the device until [`Live::next`] is called again.
+    /// Closes the device until [`LiveDevice::next`] is called again.
     pub fn suspend(&mut self) {
         if matches!(self.state, State::Streaming(_)) {
             tracing::debug!("{}: closed, as no program reads it", self.name);
         }
-        self.close(State::Resting);
+        self.close(State::Suspended);
         self.last_warning.clear();
     }
 
@@ -243,7 +243,7 @@ impl Live {
             None
         } else {
             // Discarded frames, too, are part of the camera's rate.
-            self.low_rate.count(1 + losses.stale + losses.corrupt, losses.missed, now_ns)
+            self.low_rate.count_frames(1 + losses.stale + losses.corrupt, losses.missed, now_ns)
         };
         if let Some(fps) = low_fps {
             self.warn_of_low_rate(fps);
@@ -253,19 +253,19 @@ impl Live {
     fn warn_of_low_rate(&self, fps: f64) {
         let State::Streaming(session) = &self.state else { return };
         const CONTROL: &str = "exposure_dynamic_framerate";
-        let controls = controls::list(session.device()).unwrap_or_default();
-        let what = match controls::find(&controls, CONTROL) {
+        let controls = controls::list_controls(session.device()).unwrap_or_default();
+        let what = match controls::find_control(&controls, CONTROL) {
             Some(control) => format!(
                 "in low light it exposes longer; more light helps, or --control {}=0 (a darker picture)",
                 control.name
             ),
             None => "low light makes cameras expose longer, and a shared USB port slows them down".to_owned(),
         };
-        tracing::warn!("{}: {fps:.1} frames a second instead of {}: {what}", self.name, self.agreed.interval);
+        tracing::warn!("{}: {fps:.1} frames a second instead of {}: {what}", self.name, self.negotiated.interval);
     }
 
     fn close(&mut self, state: State) {
-        self.frame_out = false;
+        self.is_frame_borrowed = false;
         if let State::Streaming(session) = &mut self.state {
             session.queue.stop();
             add_losses(&mut self.losses, session.queue.take_losses());

@@ -18,7 +18,7 @@ pub struct ModeRequest {
 
 impl ModeRequest {
     /// Constrains only the content.
-    pub fn any(content: Content) -> Self {
+    pub fn for_content(content: Content) -> Self {
         Self { content, size_px: None, fps: None, fourcc: None }
     }
 }
@@ -49,7 +49,7 @@ pub enum NoMode {
     #[error("it offers no picture format; a virtual camera offers one only while something writes to it")]
     Nothing,
     /// No offered format can be read.
-    #[error("it offers {offered}, of which none can be read as {as_what}; readable are {readable}")]
+    #[error("it offers {offered}, but only {readable} can be read as {as_what}")]
     Unreadable { offered: String, as_what: &'static str, readable: String },
     /// The requested format is not offered.
     #[error("it does not offer {wanted}; choose --format from {offered}")]
@@ -72,38 +72,38 @@ const SAME_RATE: f64 = 0.1;
 ///
 /// # Errors
 /// No mode is usable.
-pub fn ranked(modes: &[FormatModes], wish: &ModeRequest, link_speed: LinkSpeed) -> Result<Vec<Choice>, NoMode> {
-    let readable = |fourcc: FourCc| fourcc.content() == Some(wish.content);
-    let suits = |format: &&FormatModes| readable(format.fourcc) && wish.fourcc.is_none_or(|f| f == format.fourcc);
+pub fn rank_modes(modes: &[FormatModes], request: &ModeRequest, link_speed: LinkSpeed) -> Result<Vec<Choice>, NoMode> {
+    let readable = |fourcc: FourCc| fourcc.content() == Some(request.content);
+    let suits = |format: &&FormatModes| readable(format.fourcc) && request.fourcc.is_none_or(|f| f == format.fourcc);
     let mut best: Vec<(Rank, Choice)> =
-        modes.iter().filter(suits).filter_map(|format| best_mode(format, wish, link_speed)).collect();
+        modes.iter().filter(suits).filter_map(|format| find_best_mode(format, request, link_speed)).collect();
     if best.is_empty() {
         let offered = join_names(modes.iter().map(|format| format.fourcc));
         let readable_offered = join_names(modes.iter().map(|format| format.fourcc).filter(|fourcc| readable(*fourcc)));
-        return Err(match wish.fourcc {
+        return Err(match request.fourcc {
             _ if modes.is_empty() => NoMode::Nothing,
             Some(wanted) if !readable_offered.is_empty() => NoMode::Format { wanted, offered: readable_offered },
             _ => NoMode::Unreadable {
                 offered,
-                as_what: if wish.content == Content::Color { "colours" } else { "depth" },
-                readable: join_names(FourCc::supported().filter(|fourcc| readable(*fourcc))),
+                as_what: if request.content == Content::Color { "colours" } else { "depth" },
+                readable: join_names(FourCc::supported_formats().filter(|fourcc| readable(*fourcc))),
             },
         });
     }
-    best.sort_by(|(a, _), (b, _)| compare(a, b));
+    best.sort_by(|(a, _), (b, _)| compare_ranks(a, b));
     Ok(best.into_iter().map(|(_, choice)| choice).collect())
 }
 
 /// Penalties of a mode, the most important first; compared lexicographically, the smallest wins.
 type Rank = [f64; 6];
 
-fn compare(a: &Rank, b: &Rank) -> Ordering {
+fn compare_ranks(a: &Rank, b: &Rank) -> Ordering {
     a.iter().zip(b).map(|(a, b)| a.total_cmp(b)).find(|order| order.is_ne()).unwrap_or(Ordering::Equal)
 }
 
 /// Finds the mode of a format that is nearest to the request.
-fn best_mode(format: &FormatModes, wish: &ModeRequest, link_speed: LinkSpeed) -> Option<(Rank, Choice)> {
-    let wanted_px = wish.size_px.unwrap_or(DEFAULT_SIZE_PX);
+fn find_best_mode(format: &FormatModes, request: &ModeRequest, link_speed: LinkSpeed) -> Option<(Rank, Choice)> {
+    let wanted_px = request.size_px.unwrap_or(DEFAULT_SIZE_PX);
     let modes: Vec<((u32, u32), &Rates)> = match &format.sizes {
         Sizes::Unknown => vec![(wanted_px, &Rates::Unknown)],
         Sizes::Discrete(sizes) => sizes.iter().map(|SizeModes { size_px, rates }| (*size_px, rates)).collect(),
@@ -118,23 +118,24 @@ fn best_mode(format: &FormatModes, wish: &ModeRequest, link_speed: LinkSpeed) ->
             vec![((width, height), rates)]
         }
     };
-    let ranked = modes.into_iter().map(|(size_px, rates)| rank(format, size_px, rates, wanted_px, wish, link_speed));
-    ranked.min_by(|(a, _), (b, _)| compare(a, b))
+    let ranked =
+        modes.into_iter().map(|(size_px, rates)| rank_mode(format, size_px, rates, wanted_px, request, link_speed));
+    ranked.min_by(|(a, _), (b, _)| compare_ranks(a, b))
 }
 
 /// Returns the penalties of a format at one of its sizes, and the mode to request there: the rate nearest to the
 /// request.
-fn rank(
+fn rank_mode(
     format: &FormatModes,
     size_px: (u32, u32),
     rates: &Rates,
     wanted_px: (u32, u32),
-    wish: &ModeRequest,
+    request: &ModeRequest,
     link_speed: LinkSpeed,
 ) -> (Rank, Choice) {
-    let wanted = Interval::from_fps(wish.fps.unwrap_or(DEFAULT_FPS));
+    let wanted = Interval::from_fps(request.fps.unwrap_or(DEFAULT_FPS));
     // Where the driver lists no rates, the requested one is as good as any.
-    let interval = rates.nearest(wanted).unwrap_or(wanted);
+    let interval = rates.nearest_interval(wanted).unwrap_or(wanted);
     let choice = Choice { queue: format.queue, fourcc: format.fourcc, size_px, interval };
     let log_ratio = |a: f64, b: f64| (a / b).ln();
     let if_visible = |distance: f64| if distance < SAME_RATE { 0.0 } else { distance };
@@ -144,7 +145,7 @@ fn rank(
     let size_error =
         log_ratio(size_px.0.into(), wanted_px.0.into()).abs() + log_ratio(size_px.1.into(), wanted_px.1.into()).abs();
     // A requested size is kept, however slow; otherwise a fluent picture matters more.
-    let (first, second) = if wish.size_px.is_some() { (size_error, slower) } else { (slower, size_error) };
+    let (first, second) = if request.size_px.is_some() { (size_error, slower) } else { (slower, size_error) };
     let preference = format_preference(format.fourcc, &choice, link_speed);
     let emulated = f64::from(u8::from(format.emulated));
     let multi_planar = f64::from(u8::from(format.queue == QueueKind::MultiPlanar));
@@ -154,7 +155,7 @@ fn rank(
 /// Returns the preference of a format among those with the same size and rate: its index among the supported ones,
 /// unless it is moved before (-100) or behind (1000) all of them.
 fn format_preference(fourcc: FourCc, choice: &Choice, link_speed: LinkSpeed) -> f64 {
-    let place = FourCc::supported().position(|supported| supported == fourcc).unwrap_or(usize::MAX) as f64;
+    let place = FourCc::supported_formats().position(|supported| supported == fourcc).unwrap_or(usize::MAX) as f64;
     let px_per_s = f64::from(choice.size_px.0) * f64::from(choice.size_px.1) * choice.interval.fps();
     let raw_fits = link_speed == LinkSpeed::Fast || px_per_s <= VGA_PX_PER_S;
     match fourcc.family() {
@@ -222,41 +223,44 @@ mod tests {
         ]
     }
 
-    fn wish(size_px: Option<(u32, u32)>, fps: Option<f64>, fourcc: Option<&[u8; 4]>) -> ModeRequest {
+    fn request(size_px: Option<(u32, u32)>, fps: Option<f64>, fourcc: Option<&[u8; 4]>) -> ModeRequest {
         ModeRequest { content: Content::Color, size_px, fps, fourcc: fourcc.map(|f| FourCc(*f)) }
     }
 
-    fn chosen(modes: &[FormatModes], wish: ModeRequest, link_speed: LinkSpeed) -> String {
-        let best = ranked(modes, &wish, link_speed).unwrap()[0];
+    fn chosen(modes: &[FormatModes], request: ModeRequest, link_speed: LinkSpeed) -> String {
+        let best = rank_modes(modes, &request, link_speed).unwrap()[0];
         format!("{}x{} {} {}", best.size_px.0, best.size_px.1, best.fourcc, best.interval)
     }
 
     #[test]
     fn cameras_on_a_narrow_wire_compress_what_is_large() {
-        let any = wish(None, None, None);
+        let any = request(None, None, None);
         assert_eq!(chosen(&office(), any, LinkSpeed::Slow), "1280x720 MJPG 30");
-        let vga = wish(Some((640, 480)), None, None);
+        let vga = request(Some((640, 480)), None, None);
         assert_eq!(chosen(&office(), vga, LinkSpeed::Slow), "640x480 YUYV 30");
-        let full = wish(Some((1920, 1080)), None, None);
+        let full = request(Some((1920, 1080)), None, None);
         assert_eq!(chosen(&office(), full, LinkSpeed::Slow), "1920x1080 MJPG 30");
         assert_eq!(chosen(&capture_box(), any, LinkSpeed::Slow), "1280x720 MJPG 30");
         assert_eq!(chosen(&capture_box(), any, LinkSpeed::Fast), "1280x720 NV12 30");
-        assert_eq!(chosen(&capture_box(), wish(None, Some(60.0), None), LinkSpeed::Fast), "1280x720 NV12 60");
+        assert_eq!(chosen(&capture_box(), request(None, Some(60.0), None), LinkSpeed::Fast), "1280x720 NV12 60");
     }
 
     #[test]
     fn without_a_wish_the_picture_is_fluent_and_a_wish_is_kept() {
-        assert_eq!(chosen(&raw_only(), wish(None, None, None), LinkSpeed::Slow), "640x480 YUYV 30");
-        assert_eq!(chosen(&raw_only(), wish(Some((1280, 720)), None, None), LinkSpeed::Slow), "1280x720 YUYV 10");
-        assert_eq!(chosen(&raw_only(), wish(None, Some(10.0), None), LinkSpeed::Slow), "1280x720 YUYV 10");
-        assert_eq!(chosen(&office(), wish(None, None, Some(b"YUYV")), LinkSpeed::Slow), "640x480 YUYV 30");
-        assert_eq!(chosen(&office(), wish(Some((1280, 700)), Some(60.0), None), LinkSpeed::Slow), "1280x720 MJPG 60");
-        assert_eq!(chosen(&office(), wish(Some((4000, 3000)), None, None), LinkSpeed::Slow), "1920x1080 MJPG 30");
+        assert_eq!(chosen(&raw_only(), request(None, None, None), LinkSpeed::Slow), "640x480 YUYV 30");
+        assert_eq!(chosen(&raw_only(), request(Some((1280, 720)), None, None), LinkSpeed::Slow), "1280x720 YUYV 10");
+        assert_eq!(chosen(&raw_only(), request(None, Some(10.0), None), LinkSpeed::Slow), "1280x720 YUYV 10");
+        assert_eq!(chosen(&office(), request(None, None, Some(b"YUYV")), LinkSpeed::Slow), "640x480 YUYV 30");
+        assert_eq!(
+            chosen(&office(), request(Some((1280, 700)), Some(60.0), None), LinkSpeed::Slow),
+            "1280x720 MJPG 60"
+        );
+        assert_eq!(chosen(&office(), request(Some((4000, 3000)), None, None), LinkSpeed::Slow), "1920x1080 MJPG 30");
     }
 
     #[test]
     fn every_format_is_there_to_fall_back_on() {
-        let all = ranked(&office(), &wish(None, None, None), LinkSpeed::Slow).unwrap();
+        let all = rank_modes(&office(), &request(None, None, None), LinkSpeed::Slow).unwrap();
         let formats: Vec<String> = all.iter().map(|choice| choice.fourcc.to_string()).collect();
         assert_eq!(formats, ["MJPG", "YUYV"]);
     }
@@ -265,36 +269,37 @@ mod tests {
     fn grids_and_unknown_sizes_take_the_wish() {
         let sizes = Sizes::Range { min_px: (16, 16), max_px: (3840, 2160), step_px: (2, 2), rates: Rates::Unknown };
         let grid = vec![FormatModes { sizes, ..format(b"NV12", &[]) }];
-        assert_eq!(chosen(&grid, wish(None, None, None), LinkSpeed::Fast), "1280x720 NV12 30");
-        assert_eq!(chosen(&grid, wish(Some((641, 10)), Some(29.97), None), LinkSpeed::Fast), "642x16 NV12 29.97");
-        assert_eq!(chosen(&grid, wish(Some((9000, 9000)), None, None), LinkSpeed::Fast), "3840x2160 NV12 30");
+        assert_eq!(chosen(&grid, request(None, None, None), LinkSpeed::Fast), "1280x720 NV12 30");
+        assert_eq!(chosen(&grid, request(Some((641, 10)), Some(29.97), None), LinkSpeed::Fast), "642x16 NV12 29.97");
+        assert_eq!(chosen(&grid, request(Some((9000, 9000)), None, None), LinkSpeed::Fast), "3840x2160 NV12 30");
         let unknown = vec![FormatModes { sizes: Sizes::Unknown, ..format(b"YU12", &[]) }];
-        assert_eq!(chosen(&unknown, wish(Some((800, 600)), None, None), LinkSpeed::Slow), "800x600 YU12 30");
+        assert_eq!(chosen(&unknown, request(Some((800, 600)), None, None), LinkSpeed::Slow), "800x600 YU12 30");
     }
 
     #[test]
     fn grey_and_multi_planar_come_last_and_emulated_formats_after_real_ones() {
         let sizes: &[(u32, u32, &[u32])] = &[(640, 480, &[30])];
-        let any = wish(None, None, None);
+        let any = request(None, None, None);
         let both = vec![format(b"GREY", sizes), format(b"YUYV", sizes)];
         assert_eq!(chosen(&both, any, LinkSpeed::Fast), "640x480 YUYV 30");
         assert_eq!(chosen(&both[..1], any, LinkSpeed::Fast), "640x480 GREY 30");
         let emulated = FormatModes { emulated: true, ..format(b"NV12", sizes) };
         assert_eq!(chosen(&[emulated, format(b"YUYV", sizes)], any, LinkSpeed::Fast), "640x480 YUYV 30");
         let multi = FormatModes { queue: QueueKind::MultiPlanar, ..format(b"YUYV", sizes) };
-        let best = ranked(&[multi, format(b"YUYV", sizes)], &any, LinkSpeed::Fast).unwrap();
+        let best = rank_modes(&[multi, format(b"YUYV", sizes)], &any, LinkSpeed::Fast).unwrap();
         assert_eq!(best[0].queue, QueueKind::SinglePlanar);
     }
 
     #[test]
     fn what_cannot_be_had_is_said_with_what_can() {
-        let refusal = |modes: &[FormatModes], wish| ranked(modes, &wish, LinkSpeed::Fast).unwrap_err().to_string();
-        let refused = refusal(&office(), wish(None, None, Some(b"NV12")));
+        let refusal =
+            |modes: &[FormatModes], request| rank_modes(modes, &request, LinkSpeed::Fast).unwrap_err().to_string();
+        let refused = refusal(&office(), request(None, None, Some(b"NV12")));
         assert_eq!(refused, "it does not offer NV12; choose --format from YUYV, MJPG");
-        let unreadable = refusal(&[format(b"H264", &[(640, 480, &[30])])], wish(None, None, None));
-        assert!(unreadable.starts_with("it offers H264, of which none"), "{unreadable}");
-        assert!(refusal(&[], wish(None, None, None)).contains("virtual camera"));
-        let depth = ModeRequest::any(Content::Depth);
-        assert!(refusal(&office(), depth).contains("as depth; readable are Z16, Y16"));
+        let unreadable = refusal(&[format(b"H264", &[(640, 480, &[30])])], request(None, None, None));
+        assert!(unreadable.starts_with("it offers H264, but only"), "{unreadable}");
+        assert!(refusal(&[], request(None, None, None)).contains("virtual camera"));
+        let depth = ModeRequest::for_content(Content::Depth);
+        assert!(refusal(&office(), depth).contains("but only Z16, Y16"));
     }
 }

@@ -6,17 +6,17 @@ use std::time::Duration;
 use super::error::{self, OpenError};
 use super::session::Session;
 use super::watchdog::Remedy;
-use super::{ERROR_PAUSE_NS, Live, RETRY_NS, SEARCH_PERIOD_NS, State};
+use super::{ERROR_PAUSE_NS, LiveDevice, RETRY_NS, SEARCH_PERIOD_NS, State};
 use crate::v4l2::queue::QueueError;
 
-impl Live {
+impl LiveDevice {
     /// Handles a driver error.
     pub(super) fn handle_error(&mut self, error: &QueueError) {
         let now_ns = self.clock.now_ns();
         if error::is_gone(error) {
             self.watchdog.on_gone(now_ns);
             self.warn_once("it is gone (unplugged?); waiting for it to come back".to_owned());
-            self.close(State::Away { retry_ns: now_ns });
+            self.close(State::Reconnecting { retry_ns: now_ns });
             return;
         }
         tracing::debug!("{}: {error}", self.name);
@@ -53,7 +53,7 @@ impl Live {
                     pause => format!("opening it again every {:.1} s", pause.as_secs_f32()),
                 };
                 self.warn_once(format!("{reason}; {again}"));
-                self.close(State::Away { retry_ns: now_ns + pause.as_nanos() as u64 });
+                self.close(State::Reconnecting { retry_ns: now_ns + pause.as_nanos() as u64 });
             }
         }
     }
@@ -61,15 +61,15 @@ impl Live {
     /// Tries once to open the device at its current node; if that fails, schedules a later attempt.
     pub(super) fn reopen(&mut self) {
         let opened = match self.find_node() {
-            Some(path) => Session::open(&path, &self.wish, &self.settings, Some(&self.agreed), &self.clock),
-            None => Err(OpenError::Gone(self.address.node().to_owned())),
+            Some(path) => Session::open(&path, &self.request, &self.settings, Some(&self.negotiated), &self.clock),
+            None => Err(OpenError::Gone(self.identity.node().to_owned())),
         };
         let now_ns = self.clock.now_ns();
         match opened {
             Ok(session) => {
-                if session.agreed != self.agreed {
-                    tracing::warn!("{}: now it gives {}", self.name, session.agreed);
-                    self.agreed = session.agreed;
+                if session.negotiated != self.negotiated {
+                    tracing::warn!("{}: now it gives {}", self.name, session.negotiated);
+                    self.negotiated = session.negotiated;
                 }
                 self.state = State::Streaming(Box::new(session));
                 self.watchdog.on_start(now_ns);
@@ -78,7 +78,7 @@ impl Live {
             Err(error) if error.is_gone() => {
                 self.watchdog.on_gone(now_ns);
                 self.warn_once("it is gone (unplugged?); waiting for it to come back".to_owned());
-                self.state = State::Away { retry_ns: now_ns + RETRY_NS };
+                self.state = State::Reconnecting { retry_ns: now_ns + RETRY_NS };
             }
             Err(error) => {
                 self.watchdog.on_gone(now_ns);
@@ -88,7 +88,7 @@ impl Live {
                     Remedy::Restart | Remedy::Wait => 0,
                 };
                 self.warn_once(format!("{error}; trying again"));
-                self.state = State::Away { retry_ns: now_ns + pause.max(RETRY_NS) };
+                self.state = State::Reconnecting { retry_ns: now_ns + pause.max(RETRY_NS) };
             }
         }
     }
@@ -96,12 +96,12 @@ impl Live {
     /// Finds the current node of the device; searches all nodes only every [`SEARCH_PERIOD_NS`].
     fn find_node(&mut self) -> Option<PathBuf> {
         let now_ns = self.clock.now_ns();
-        let everywhere = now_ns.saturating_sub(self.searched_ns) >= SEARCH_PERIOD_NS;
-        if everywhere {
+        let search_all = now_ns.saturating_sub(self.searched_ns) >= SEARCH_PERIOD_NS;
+        if search_all {
             self.searched_ns = now_ns;
         }
-        let before = self.address.node().to_owned();
-        let found = self.address.find(everywhere);
+        let before = self.identity.node().to_owned();
+        let found = self.identity.find_node(search_all);
         if let Some(path) = found.as_ref().filter(|path| **path != before) {
             tracing::info!("{}: it is {} now", self.name, path.display());
         }

@@ -6,21 +6,21 @@ use std::path::Path;
 use v4l::v4l_sys as sys;
 
 use super::error::OpenError;
-use super::negotiate::{Choice, LinkSpeed, ModeRequest, ranked};
+use super::negotiate::{Choice, LinkSpeed, ModeRequest, rank_modes};
 use crate::clock::Clock;
 use crate::layout::{Layout, LayoutError};
-use crate::v4l2::device::{Device, own_caps, zeroed};
-use crate::v4l2::modes::{Interval, QueueKind, modes};
-use crate::v4l2::node::{LOOPBACK_DRIVER, text};
+use crate::v4l2::device::{Device, node_caps, zeroed};
+use crate::v4l2::modes::{Interval, QueueKind, list_modes};
+use crate::v4l2::node::{LOOPBACK_DRIVER, decode_text};
 use crate::v4l2::queue::{DeviceKernel, Queue, Writer};
 use crate::v4l2::{controls, node};
 
 /// A control's name and value, as text.
 pub type Setting = (String, String);
 
-/// The mode agreed with the driver.
+/// The mode negotiated with the driver.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Agreed {
+pub struct NegotiatedMode {
     /// The mode requested.
     pub choice: Choice,
     pub layout: Layout,
@@ -28,7 +28,7 @@ pub struct Agreed {
     pub interval: Interval,
 }
 
-impl fmt::Display for Agreed {
+impl fmt::Display for NegotiatedMode {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { layout: Layout { width, height, fourcc, .. }, interval, .. } = self;
         write!(f, "{width}x{height} {fourcc} at {interval} fps")
@@ -38,7 +38,7 @@ impl fmt::Display for Agreed {
 /// An open, streaming camera.
 pub struct Session {
     pub queue: Queue<DeviceKernel>,
-    pub agreed: Agreed,
+    pub negotiated: NegotiatedMode,
     /// Its capabilities when it was opened.
     pub capability: sys::v4l2_capability,
 }
@@ -47,23 +47,24 @@ pub struct Session {
 const MAX_FORMATS: usize = 6;
 
 impl Session {
-    /// Opens the camera at `path`, negotiates a mode, sets its controls and starts it. With `previous`, the last agreed
-    /// mode, that mode is requested first, which is fast, and a control that cannot be set only causes a warning.
+    /// Opens the camera at `path`, negotiates a mode, sets its controls and starts it. With `previous`, the last
+    /// negotiated mode, that mode is requested first, which is fast, and a control that cannot be set only causes a
+    /// warning.
     ///
     /// # Errors
     /// Any of these steps is refused.
     pub fn open(
         path: &Path,
-        wish: &ModeRequest,
+        request: &ModeRequest,
         settings: &[Setting],
-        previous: Option<&Agreed>,
+        previous: Option<&NegotiatedMode>,
         clock: &Clock,
     ) -> Result<Self, OpenError> {
-        let device = Device::open(path).map_err(|error| OpenError::at(path, "it cannot be opened", error))?;
+        let device = Device::open(path).map_err(|error| OpenError::from_io(path, "it cannot be opened", error))?;
         let capability = query_camera(&device)?;
-        let agreed = negotiate(&device, &capability, wish, previous)?;
+        let negotiated = negotiate_mode(&device, &capability, request, previous)?;
         for (name, value) in settings {
-            match controls::set(&device, name, value) {
+            match controls::set_control(&device, name, value) {
                 Ok(_) => {}
                 // A running stream must not end because of a control.
                 Err(error) if previous.is_some() => tracing::warn!("{}: {error}", path.display()),
@@ -71,13 +72,14 @@ impl Session {
             }
         }
         let min_bytes: Vec<usize> =
-            (0..agreed.layout.planes().len()).map(|plane| agreed.layout.needed_bytes(plane)).collect();
+            (0..negotiated.layout.planes().len()).map(|plane| negotiated.layout.min_size_bytes(plane)).collect();
         let writer = if is_loopback(&capability) { Writer::Program } else { Writer::Driver };
-        let kernel = DeviceKernel::new(device, agreed.choice.queue, writer);
-        let refused = |error| OpenError::queue(path, error);
-        let mut queue = Queue::new(kernel, &min_bytes, agreed.interval.period_ns(), clock.clone()).map_err(refused)?;
+        let kernel = DeviceKernel::new(device, negotiated.choice.queue, writer);
+        let refused = |error| OpenError::from_queue(path, error);
+        let mut queue =
+            Queue::new(kernel, &min_bytes, negotiated.interval.period_ns(), clock.clone()).map_err(refused)?;
         queue.start().map_err(refused)?;
-        Ok(Self { queue, agreed, capability })
+        Ok(Self { queue, negotiated, capability })
     }
 
     /// Whether frames come from another program instead of a camera.
@@ -91,7 +93,7 @@ impl Session {
 }
 
 fn is_loopback(capability: &sys::v4l2_capability) -> bool {
-    text(&capability.driver) == LOOPBACK_DRIVER
+    decode_text(&capability.driver) == LOOPBACK_DRIVER
 }
 
 /// Queries the device's capabilities; fails if it is not a camera.
@@ -99,26 +101,26 @@ fn query_camera(device: &Device) -> Result<sys::v4l2_capability, OpenError> {
     let path = device.path();
     let mut capability: sys::v4l2_capability = zeroed();
     device.query_capability(&mut capability).map_err(|error| match error.raw_os_error() {
-        Some(ENOTTY) => OpenError::NotACamera { path: path.to_owned(), what: "it does not answer as one" },
-        _ => OpenError::at(path, "VIDIOC_QUERYCAP", error),
+        Some(ENOTTY) => OpenError::NotACamera { path: path.to_owned(), what: "it does not respond as a camera" },
+        _ => OpenError::from_io(path, "VIDIOC_QUERYCAP", error),
     })?;
-    match why_no_camera(&capability) {
+    match not_camera_reason(&capability) {
         Some(what) => Err(OpenError::NotACamera { path: path.to_owned(), what }),
         None => Ok(capability),
     }
 }
 
 /// Returns why a device with these capabilities is not a camera; `None` if it is one.
-fn why_no_camera(capability: &sys::v4l2_capability) -> Option<&'static str> {
-    let caps = own_caps(capability);
+fn not_camera_reason(capability: &sys::v4l2_capability) -> Option<&'static str> {
+    let caps = node_caps(capability);
     let has_caps = |any: u32| caps & any != 0;
     if has_caps(sys::V4L2_CAP_VIDEO_M2M | sys::V4L2_CAP_VIDEO_M2M_MPLANE) {
         return Some("it converts pictures");
     }
     if !has_caps(sys::V4L2_CAP_VIDEO_CAPTURE | sys::V4L2_CAP_VIDEO_CAPTURE_MPLANE) {
-        return Some(match text(&capability.driver) {
+        return Some(match decode_text(&capability.driver) {
             driver if driver == LOOPBACK_DRIVER => "it is a virtual camera, and nothing writes to it",
-            _ if has_caps(sys::V4L2_CAP_META_CAPTURE) => "it tells about another node's pictures",
+            _ if has_caps(sys::V4L2_CAP_META_CAPTURE) => "it gives metadata about the pictures of another node",
             _ => "it captures no pictures",
         });
     }
@@ -128,40 +130,40 @@ fn why_no_camera(capability: &sys::v4l2_capability) -> Option<&'static str> {
 const ENOTTY: i32 = rustix::io::Errno::NOTTY.raw_os_error();
 
 /// Sets a mode on the device: that of `previous` if the driver still returns the same layout, otherwise the first
-/// accepted one of the [`MAX_FORMATS`] best for `wish`. The driver may change the size, the rate, and a format that
-/// `wish` leaves open, but a mode of other content is skipped. Fails at once if the device is gone or busy, and
+/// accepted one of the [`MAX_FORMATS`] best for `request`. The driver may change the size, the rate, and a format that
+/// `request` leaves open, but a mode of other content is skipped. Fails at once if the device is gone or busy, and
 /// otherwise with the first refusal.
-fn negotiate(
+fn negotiate_mode(
     device: &Device,
     capability: &sys::v4l2_capability,
-    wish: &ModeRequest,
-    previous: Option<&Agreed>,
-) -> Result<Agreed, OpenError> {
+    request: &ModeRequest,
+    previous: Option<&NegotiatedMode>,
+) -> Result<NegotiatedMode, OpenError> {
     if let Some(previous) = previous {
         match set_format(device, &previous.choice) {
-            Ok(layout) if layout == previous.layout => return Ok(with_rate(device, previous.choice, layout)),
+            Ok(layout) if layout == previous.layout => return Ok(set_frame_rate(device, previous.choice, layout)),
             Err(error @ (OpenError::Gone(_) | OpenError::Busy { .. })) => return Err(error),
             // The camera has changed: negotiate again.
             _ => {}
         }
     }
     let path = device.path();
-    let offered = modes(device).map_err(|error| OpenError::at(path, "VIDIOC_QUERYCAP", error))?;
-    let choices = ranked(&offered, wish, link_speed(path, capability))
+    let offered = list_modes(device).map_err(|error| OpenError::from_io(path, "VIDIOC_QUERYCAP", error))?;
+    let choices = rank_modes(&offered, request, detect_link_speed(path, capability))
         .map_err(|source| OpenError::NoMode { path: path.to_owned(), source })?;
     // The first refusal, that of the best mode, is reported to the user.
     let mut refusal = None;
     for choice in choices.into_iter().take(MAX_FORMATS) {
         match set_format(device, &choice) {
-            Ok(layout) if wish.fourcc.is_some_and(|fourcc| fourcc != layout.fourcc) => {
+            Ok(layout) if request.fourcc.is_some_and(|fourcc| fourcc != layout.fourcc) => {
                 let what = "it does not give the format that it offers";
                 let source = std::io::Error::from(std::io::ErrorKind::InvalidInput);
                 refusal.get_or_insert(OpenError::Io { path: path.to_owned(), what, source });
             }
-            Ok(layout) if layout.fourcc.content() == Some(wish.content) => {
-                let agreed = with_rate(device, choice, layout);
-                warn_of_differences(device, &agreed, wish);
-                return Ok(agreed);
+            Ok(layout) if layout.fourcc.content() == Some(request.content) => {
+                let negotiated = set_frame_rate(device, choice, layout);
+                warn_of_mode_differences(device, &negotiated, request);
+                return Ok(negotiated);
             }
             // Changed into a format of other content, or one that cannot be read.
             Ok(_) => {}
@@ -171,8 +173,11 @@ fn negotiate(
             }
         }
     }
-    Err(refusal
-        .unwrap_or_else(|| OpenError::NotACamera { path: path.to_owned(), what: "it takes none of its formats" }))
+    Err(refusal.unwrap_or_else(|| OpenError::NotACamera {
+        path: path.to_owned(),
+        what: "it accepts none of the formats that \
+                                                                                 it offers",
+    }))
 }
 
 /// Sets a format; returns the layout that the driver chose.
@@ -189,13 +194,13 @@ fn set_format(device: &Device, choice: &Choice) -> Result<Layout, OpenError> {
             format.fmt.pix_mp = sys::v4l2_pix_format_mplane { width, height, pixelformat, field, ..zeroed() };
         }
     }
-    device.set_format(&mut format).map_err(|error| OpenError::at(device.path(), "VIDIOC_S_FMT", error))?;
+    device.set_format(&mut format).map_err(|error| OpenError::from_io(device.path(), "VIDIOC_S_FMT", error))?;
     Layout::from_format(&format)
         .map_err(|source: LayoutError| OpenError::Layout { path: device.path().to_owned(), source })
 }
 
 /// Sets the frame rate, if possible, and reads it back.
-fn with_rate(device: &Device, choice: Choice, layout: Layout) -> Agreed {
+fn set_frame_rate(device: &Device, choice: Choice, layout: Layout) -> NegotiatedMode {
     let mut parameters: sys::v4l2_streamparm = zeroed();
     parameters.type_ = choice.queue.buffer_type();
     // Read first to keep the other parameters. Inputs that follow their signal's rate refuse.
@@ -212,7 +217,7 @@ fn with_rate(device: &Device, choice: Choice, layout: Layout) -> Agreed {
         #[allow(unsafe_code)]
         Interval::new(unsafe { reported.parm.capture.timeperframe })
     });
-    Agreed {
+    NegotiatedMode {
         choice,
         layout,
         interval: reported.filter(|reported| reported.period_ns() < MAX_PERIOD_NS).unwrap_or(choice.interval),
@@ -223,9 +228,9 @@ fn with_rate(device: &Device, choice: Choice, layout: Layout) -> Agreed {
 const MAX_PERIOD_NS: u64 = 10_000_000_000;
 
 /// Classifies the camera's connection, as far as it is known.
-fn link_speed(path: &Path, capability: &sys::v4l2_capability) -> LinkSpeed {
+fn detect_link_speed(path: &Path, capability: &sys::v4l2_capability) -> LinkSpeed {
     const USB_2_MBIT_PER_S: f32 = 480.0;
-    if !text(&capability.bus_info).starts_with("usb-") {
+    if !decode_text(&capability.bus_info).starts_with("usb-") {
         return LinkSpeed::Fast;
     }
     match node::usb_connection(path) {
@@ -235,13 +240,13 @@ fn link_speed(path: &Path, capability: &sys::v4l2_capability) -> LinkSpeed {
 }
 
 /// Warns if the size or the rate (by more than 2 %) differs from the requested one.
-fn warn_of_differences(device: &Device, agreed: &Agreed, wish: &ModeRequest) {
-    let size = (agreed.layout.width, agreed.layout.height);
-    let other_size = wish.size_px.is_some_and(|wanted| wanted != size);
-    let other_rate = wish.fps.is_some_and(|wanted| (agreed.interval.fps() / wanted).ln().abs() > 0.02);
+fn warn_of_mode_differences(device: &Device, negotiated: &NegotiatedMode, request: &ModeRequest) {
+    let size = (negotiated.layout.width, negotiated.layout.height);
+    let other_size = request.size_px.is_some_and(|wanted| wanted != size);
+    let other_rate = request.fps.is_some_and(|wanted| (negotiated.interval.fps() / wanted).ln().abs() > 0.02);
     if other_size || other_rate {
         let name = device.path().display();
-        tracing::warn!("{name}: the camera cannot do exactly what was asked for and gives {agreed}");
+        tracing::warn!("{name}: the camera does not support the requested mode and gives {negotiated}");
     }
 }
 
@@ -255,13 +260,19 @@ mod tests {
             let capabilities = sys::V4L2_CAP_DEVICE_CAPS;
             let mut capability = sys::v4l2_capability { capabilities, device_caps, ..zeroed() };
             capability.driver[..driver.len()].copy_from_slice(driver.as_bytes());
-            why_no_camera(&capability)
+            not_camera_reason(&capability)
         };
         let streams = sys::V4L2_CAP_STREAMING;
         assert_eq!(said("uvcvideo", sys::V4L2_CAP_VIDEO_CAPTURE | streams), None);
         assert_eq!(said("uvcvideo", sys::V4L2_CAP_VIDEO_CAPTURE_MPLANE | streams), None);
         assert_eq!(said("uvcvideo", sys::V4L2_CAP_VIDEO_CAPTURE), Some("it does not stream"));
-        assert_eq!(said("uvcvideo", sys::V4L2_CAP_META_CAPTURE), Some("it tells about another node's pictures"));
+        assert_eq!(
+            said("uvcvideo", sys::V4L2_CAP_META_CAPTURE),
+            Some(
+                "it gives metadata about the pictures of another \
+                                                                       node"
+            )
+        );
         assert_eq!(said("vivid", sys::V4L2_CAP_VBI_CAPTURE | streams), Some("it captures no pictures"));
         let unwritten = Some("it is a virtual camera, and nothing writes to it");
         assert_eq!(said(LOOPBACK_DRIVER, sys::V4L2_CAP_VIDEO_OUTPUT), unwritten);

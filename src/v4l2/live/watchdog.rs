@@ -12,7 +12,7 @@ pub struct Watchdog {
     /// When the current failure began, if there is one.
     failing_since_ns: Option<u64>,
     /// Remedies tried since the last frame.
-    tried: u32,
+    attempts: u32,
     /// Consecutive errors.
     errors: u32,
 }
@@ -38,7 +38,7 @@ impl Watchdog {
     /// Creates a watchdog for a stream with this time between frames, which starts at `now_ns`.
     pub fn new(period_ns: u64, now_ns: u64) -> Self {
         let timeout_ns = (TIMEOUT_PERIODS * period_ns).max(MIN_TIMEOUT_NS);
-        Self { timeout_ns, silent_since_ns: now_ns, failing_since_ns: None, tried: 0, errors: 0 }
+        Self { timeout_ns, silent_since_ns: now_ns, failing_since_ns: None, attempts: 0, errors: 0 }
     }
 
     /// Restarts the time limit: the stream starts (again).
@@ -50,7 +50,7 @@ impl Watchdog {
     /// Handles a frame. Returns how long the failure before it lasted, if there was one.
     pub fn on_frame(&mut self, now_ns: u64) -> Option<Duration> {
         self.silent_since_ns = now_ns;
-        (self.tried, self.errors) = (0, 0);
+        (self.attempts, self.errors) = (0, 0);
         self.failing_since_ns
             .take()
             .map(|failing_since_ns| Duration::from_nanos(now_ns.saturating_sub(failing_since_ns)))
@@ -84,8 +84,8 @@ impl Watchdog {
         self.failing_since_ns.get_or_insert(self.silent_since_ns);
         self.silent_since_ns = now_ns;
         self.errors = 0;
-        self.tried = self.tried.saturating_add(1);
-        match self.tried {
+        self.attempts = self.attempts.saturating_add(1);
+        match self.attempts {
             1 => Remedy::Restart,
             2 => Remedy::Reopen(Duration::ZERO),
             // Pauses double with each try.

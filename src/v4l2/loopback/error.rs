@@ -12,13 +12,13 @@ use crate::v4l2::holders::Holder;
 #[derive(Debug, thiserror::Error)]
 pub enum LoopbackError {
     /// The node does not exist.
-    #[error("there is no {}: {}", path.display(), remedy(path))]
+    #[error("there is no {}: {}", path.display(), format_remedy(path))]
     Missing { path: PathBuf },
     /// It is not a Video4Linux node.
-    #[error("{} is no video device: {}", path.display(), remedy(path))]
-    NoVideo { path: PathBuf },
+    #[error("{} is not a video device: {}", path.display(), format_remedy(path))]
+    NotVideo { path: PathBuf },
     /// It belongs to another driver.
-    #[error("{} is '{card}', not a virtual camera: {}", path.display(), remedy(Path::new("")))]
+    #[error("{} is '{card}', not a virtual camera: {}", path.display(), format_remedy(Path::new("")))]
     NotLoopback {
         path: PathBuf,
         /// The device's name.
@@ -26,25 +26,25 @@ pub enum LoopbackError {
     },
     /// The user may not open it.
     #[error(
-        "{} may not be opened by you: join the group that owns it with `sudo usermod -aG video $USER`, \
-         and log in again",
+        "you have no permission for {}: join the group that owns it with `sudo usermod -aG video $USER`, and log in \
+         again",
         path.display()
     )]
     Denied { path: PathBuf },
     /// Another program writes to it, or the limit of openers is reached.
-    #[error("{} is in use{}: stop that, or take another virtual camera", path.display(), By(by))]
-    Taken {
+    #[error("{} is in use{}: stop that program, or use another virtual camera", path.display(), By(by))]
+    InUse {
         path: PathBuf,
         /// The processes that have it open.
         by: Vec<Holder>,
     },
     /// Its format is fixed to one that cannot be written.
     #[error(
-        "{} is fixed to {fourcc} of {width} x {height} pixels{}: stop that, or set it free with \
-         `v4l2-ctl -d {} -c keep_format=0`",
+        "{} is fixed to {fourcc} of {width} x {height} pixels{}: stop that program, or free the format with `v4l2-ctl \
+         -d {} -c keep_format=0`",
         path.display(), By(by), path.display()
     )]
-    Frozen {
+    FormatFixed {
         path: PathBuf,
         fourcc: String,
         width: u32,
@@ -54,9 +54,9 @@ pub enum LoopbackError {
     },
     /// It accepts no frames and delivers none.
     #[error(
-        "{} was left by its last writer in a state in which it takes no frames, a fault of v4l2loopback before 0.13: \
-         load the module anew with `{}`",
-        path.display(), modprobe(path)
+        "{} takes no frames since its last writer left, a fault of v4l2loopback before 0.13: reload the module with \
+         `{}`",
+        path.display(), modprobe_command(path)
     )]
     Stuck { path: PathBuf },
     #[error("{}: {doing}: {cause}", path.display())]
@@ -81,7 +81,7 @@ impl fmt::Display for By<'_> {
 }
 
 /// Returns the command that makes `path` a virtual camera; `/dev/video10` if it is not a node's name.
-pub fn modprobe(path: &Path) -> String {
+pub fn modprobe_command(path: &Path) -> String {
     let number = path.to_str().and_then(|path| path.strip_prefix("/dev/video")?.parse::<u32>().ok()).unwrap_or(10);
     // The module takes its options only when it is loaded, so a loaded one must be removed first.
     let unload = if Path::new("/sys/module/v4l2loopback").exists() { "sudo modprobe -r v4l2loopback && " } else { "" };
@@ -93,7 +93,7 @@ pub fn modprobe(path: &Path) -> String {
 
 /// Lists all nodes of v4l2loopback by number, whether or not they can be opened, recognized by their attribute
 /// `max_openers` in sysfs.
-pub fn nodes() -> Vec<PathBuf> {
+pub fn list_nodes() -> Vec<PathBuf> {
     let entries = fs::read_dir("/sys/class/video4linux").into_iter().flatten().flatten();
     let loopbacks = entries.filter(|entry| entry.path().join("max_openers").exists());
     let mut numbers: Vec<u32> =
@@ -103,12 +103,12 @@ pub fn nodes() -> Vec<PathBuf> {
 }
 
 /// Advises a user whose `path` is not a virtual camera: use an existing one, or create one.
-fn remedy(path: &Path) -> String {
-    let there: Vec<String> = nodes().iter().map(|node| node.display().to_string()).collect();
+fn format_remedy(path: &Path) -> String {
+    let there: Vec<String> = list_nodes().iter().map(|node| node.display().to_string()).collect();
     match there.is_empty() {
-        true => format!("make a virtual camera with `{}`", modprobe(path)),
+        true => format!("make a virtual camera with `{}`", modprobe_command(path)),
         // Creating one is the second choice: it reloads the module, which removes the existing nodes.
-        false => format!("use {}, or make others with `{}`", there.join(" or "), modprobe(path)),
+        false => format!("use {}, or make others with `{}`", there.join(" or "), modprobe_command(path)),
     }
 }
 
@@ -119,10 +119,11 @@ mod tests {
     #[test]
     fn whoever_holds_a_node_is_named() {
         let by = vec![Holder { pid: 7, name: "obs".into() }, Holder { pid: 8, name: "mpv".into() }];
-        let taken = LoopbackError::Taken { path: "/dev/video9".into(), by };
+        let taken = LoopbackError::InUse { path: "/dev/video9".into(), by };
         assert_eq!(
             taken.to_string(),
-            "/dev/video9 is in use by obs (process 7), mpv (process 8): stop that, or take another virtual camera"
+            "/dev/video9 is in use by obs (process 7), mpv (process 8): stop that program, or use another virtual \
+             camera"
         );
     }
 }

@@ -9,7 +9,7 @@ fn what_is_no_virtual_camera_is_refused_with_what_to_do() {
         assert_eq!(message.lines().count(), 1);
     }
     assert!(open("/dev/video199").contains("video_nr=199"));
-    assert!(open("/dev/null").contains("no video device"));
+    assert!(open("/dev/null").contains("not a video device"));
 }
 
 #[test]

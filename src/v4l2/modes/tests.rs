@@ -11,12 +11,12 @@ fn rates_are_found_by_ratio_and_written_as_people_do() {
     assert_eq!(every(333_333, 10_000_000).to_string(), "30");
     assert_eq!(every(2, 15).to_string(), "7.5");
     let offered = Rates::Discrete(vec![every(1, 60), every(333_333, 10_000_000), every(1, 15)]);
-    assert_eq!(offered.nearest(every(1, 30)), Some(every(333_333, 10_000_000)));
-    assert_eq!(offered.nearest(every(1, 120)), Some(every(1, 60)));
-    assert_eq!(Rates::Unknown.nearest(every(1, 30)), None);
+    assert_eq!(offered.nearest_interval(every(1, 30)), Some(every(333_333, 10_000_000)));
+    assert_eq!(offered.nearest_interval(every(1, 120)), Some(every(1, 60)));
+    assert_eq!(Rates::Unknown.nearest_interval(every(1, 30)), None);
     let range = Rates::Range { shortest: every(1, 60), longest: every(1, 5) };
-    assert_eq!(range.nearest(every(1, 25)), Some(every(1, 25)));
-    assert_eq!(range.nearest(every(1, 1)), Some(every(1, 5)));
+    assert_eq!(range.nearest_interval(every(1, 25)), Some(every(1, 25)));
+    assert_eq!(range.nearest_interval(every(1, 1)), Some(every(1, 5)));
     assert_eq!(range.to_string(), "5 to 60 fps");
 }
 
@@ -54,12 +54,12 @@ fn a_grid_of_sizes_stays_a_grid() {
         max_height: 8192,
         step_height: 0,
     };
-    let Some(SizeEntry::Range { min_px, max_px, step_px }) = size_entry(&entry) else { panic!("no range") };
+    let Some(SizeEntry::Range { min_px, max_px, step_px }) = parse_size_entry(&entry) else { panic!("no range") };
     assert_eq!((min_px, max_px, step_px), ((2, 1), (8192, 8192), (1, 1)));
     entry.type_ = 77;
-    assert!(size_entry(&entry).is_none());
+    assert!(parse_size_entry(&entry).is_none());
     let empty = zeroed::<sys::v4l2_frmsizeenum>();
-    assert!(size_entry(&empty).is_none());
+    assert!(parse_size_entry(&empty).is_none());
 }
 
 #[test]
@@ -68,7 +68,7 @@ fn a_size_has_columns_and_rows() {
         let mut entry = zeroed::<sys::v4l2_frmsizeenum>();
         entry.type_ = sys::v4l2_frmsizetypes_V4L2_FRMSIZE_TYPE_DISCRETE;
         entry.__bindgen_anon_1.discrete = sys::v4l2_frmsize_discrete { width, height };
-        match size_entry(&entry) {
+        match parse_size_entry(&entry) {
             Some(SizeEntry::One(size)) => Some(size),
             _ => None,
         }

@@ -27,7 +27,7 @@ fn node(index: u32, driver: &str, card: &str, device_caps: u32) -> Node {
         denied: false,
         problem: None,
     };
-    node.describe(&capability(driver, card.as_bytes(), device_caps));
+    node.apply_capability(&capability(driver, card.as_bytes(), device_caps));
     node
 }
 
@@ -55,9 +55,9 @@ fn a_node_is_what_its_own_capabilities_say() {
 #[test]
 fn names_that_are_no_text_do_not_stop_the_list() {
     let mut broken = node(0, "uvcvideo", "", CAMERA);
-    broken.describe(&capability("uvcvideo", b"Cam\xff\xfe\0rest", CAMERA));
+    broken.apply_capability(&capability("uvcvideo", b"Cam\xff\xfe\0rest", CAMERA));
     assert_eq!(broken.card, "Cam\u{fffd}\u{fffd}");
-    assert_eq!(text(b"full"), "full");
+    assert_eq!(decode_text(b"full"), "full");
 }
 
 #[test]
@@ -76,7 +76,7 @@ fn a_part_of_the_cards_name_finds_the_camera_and_only_cameras() {
     assert_eq!(found("webcam"), Ok(0), "a real camera goes before a virtual one");
     assert_eq!(found("pHONE"), Ok(11));
     let error = found("Brio").unwrap_err().to_string();
-    assert_eq!(error, "'Brio' is the name of /dev/video2 (Brio), /dev/video3 (Brio); use the path of one");
+    assert_eq!(error, "'Brio' matches /dev/video2 (Brio), /dev/video3 (Brio); use the path of one");
     for name in ["idle", "laptop", ""] {
         let error = found(name).unwrap_err().to_string();
         assert!(error.contains("/dev/video0 (HD Webcam: Front)") && !error.contains("Idle"), "{error}");
@@ -98,19 +98,22 @@ fn paths_numbers_and_links_lead_to_nodes() {
     std::os::unix::fs::symlink("../../video7", dev.join("v4l/by-id/usb-Cam_1-video-index0")).unwrap();
     let paths = SystemPaths { class, dev: fs::canonicalize(&dev).unwrap() };
 
-    let nodes = paths.nodes();
+    let nodes = paths.list_nodes();
     assert_eq!(nodes.iter().map(|node| node.index.unwrap()).collect::<Vec<_>>(), [7, 8]);
     assert_eq!((nodes[0].card.as_str(), nodes[0].links.len()), ("Cam", 1), "known although it does not answer");
     assert!(nodes[0].problem.is_some());
     assert!(nodes[1].problem.as_ref().unwrap().contains("missing"));
 
-    assert_eq!(paths.resolve("7").unwrap(), paths.dev.join("video7"));
-    assert_eq!(paths.resolve("video7").unwrap(), paths.dev.join("video7"));
-    assert_eq!(paths.resolve("usb-Cam_1-video-index0").unwrap(), paths.dev.join("v4l/by-id/usb-Cam_1-video-index0"));
-    assert_eq!(paths.resolve("/dev/null").unwrap(), PathBuf::from("/dev/null"));
+    assert_eq!(paths.resolve_node("7").unwrap(), paths.dev.join("video7"));
+    assert_eq!(paths.resolve_node("video7").unwrap(), paths.dev.join("video7"));
+    assert_eq!(
+        paths.resolve_node("usb-Cam_1-video-index0").unwrap(),
+        paths.dev.join("v4l/by-id/usb-Cam_1-video-index0")
+    );
+    assert_eq!(paths.resolve_node("/dev/null").unwrap(), PathBuf::from("/dev/null"));
     for wrong in ["9", "/dev/video4711", "v4l", "."] {
-        assert!(matches!(paths.resolve(wrong), Err(NodeError::None { .. })), "{wrong}");
+        assert!(matches!(paths.resolve_node(wrong), Err(NodeError::NotFound { .. })), "{wrong}");
     }
     let file = dev.join("video7");
-    assert_eq!(paths.resolve(file.to_str().unwrap()), Err(NodeError::NotADevice(file)));
+    assert_eq!(paths.resolve_node(file.to_str().unwrap()), Err(NodeError::NotADevice(file)));
 }

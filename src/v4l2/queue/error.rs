@@ -14,7 +14,7 @@ pub enum QueueError {
         source: io::Error,
     },
     /// Too few to read one while another is filled.
-    #[error("the driver gives {granted} of {BUFFERS} buffers, and {MIN_BUFFERS} are needed")]
+    #[error("the driver gives {granted} of {BUFFERS} buffers, but at least {MIN_BUFFERS} are needed")]
     TooFewBuffers {
         /// The number of buffers granted.
         granted: u32,
@@ -25,7 +25,7 @@ pub enum QueueError {
 }
 
 impl QueueError {
-    pub(super) fn at(step: &'static str) -> impl FnOnce(io::Error) -> Self {
+    pub(super) fn refused_at(step: &'static str) -> impl FnOnce(io::Error) -> Self {
         move |source| Self::Refused { step, source }
     }
 

@@ -19,19 +19,19 @@ pub trait Kernel {
     type Memory: AsRef<[u8]>;
 
     /// Requests `count` buffers; returns how many were granted.
-    fn request(&mut self, count: u32) -> io::Result<u32>;
+    fn request_buffers(&mut self, count: u32) -> io::Result<u32>;
     /// Describes a buffer.
-    fn query(&mut self, index: u32) -> io::Result<BufferInfo>;
+    fn query_buffer(&mut self, index: u32) -> io::Result<BufferInfo>;
     /// Maps a plane of a buffer.
-    fn map(&mut self, span: Span) -> io::Result<Self::Memory>;
+    fn map_plane(&mut self, span: Span) -> io::Result<Self::Memory>;
     /// Ensures that the first `bytes` of a dequeued buffer's plane do not change until the buffer is queued again.
     fn snapshot(&mut self, memory: &mut Self::Memory, bytes: usize) {
         let _ = (memory, bytes);
     }
     /// Passes a buffer to the driver.
-    fn queue(&mut self, index: u32) -> io::Result<()>;
+    fn queue_buffer(&mut self, index: u32) -> io::Result<()>;
     /// Dequeues the oldest filled buffer; fails with [`io::ErrorKind::WouldBlock`] if no buffer is filled.
-    fn dequeue(&mut self) -> io::Result<Dequeued>;
+    fn dequeue_buffer(&mut self) -> io::Result<Dequeued>;
     fn stream_on(&mut self) -> io::Result<()>;
     /// Stops the stream; all buffers are returned.
     fn stream_off(&mut self) -> io::Result<()>;
@@ -143,7 +143,7 @@ impl DeviceKernel {
 impl Kernel for DeviceKernel {
     type Memory = Mapping;
 
-    fn request(&mut self, count: u32) -> io::Result<u32> {
+    fn request_buffers(&mut self, count: u32) -> io::Result<u32> {
         let mut request = zeroed::<sys::v4l2_requestbuffers>();
         (request.count, request.type_) = (count, self.kind.buffer_type());
         request.memory = sys::v4l2_memory_V4L2_MEMORY_MMAP;
@@ -151,7 +151,7 @@ impl Kernel for DeviceKernel {
         Ok(request.count)
     }
 
-    fn query(&mut self, index: u32) -> io::Result<BufferInfo> {
+    fn query_buffer(&mut self, index: u32) -> io::Result<BufferInfo> {
         let buffer = self.buffer_ioctl(vidioc::VIDIOC_QUERYBUF as Request, index)?;
         let plane_count = self.plane_count(&buffer);
         let mut planes = [Span::default(); MAX_PLANES];
@@ -175,7 +175,7 @@ impl Kernel for DeviceKernel {
         Ok(BufferInfo { planes, plane_count, in_kernel })
     }
 
-    fn map(&mut self, span: Span) -> io::Result<Mapping> {
+    fn map_plane(&mut self, span: Span) -> io::Result<Mapping> {
         let Span { offset, length_bytes } = span;
         // SAFETY: a new mapping at an address that the kernel chooses disturbs no other memory.
         #[allow(unsafe_code)]
@@ -190,11 +190,11 @@ impl Kernel for DeviceKernel {
         memory.snapshot(bytes);
     }
 
-    fn queue(&mut self, index: u32) -> io::Result<()> {
+    fn queue_buffer(&mut self, index: u32) -> io::Result<()> {
         self.buffer_ioctl(vidioc::VIDIOC_QBUF as Request, index).map(drop)
     }
 
-    fn dequeue(&mut self) -> io::Result<Dequeued> {
+    fn dequeue_buffer(&mut self) -> io::Result<Dequeued> {
         let buffer = self.buffer_ioctl(vidioc::VIDIOC_DQBUF as Request, 0)?;
         let mut filled = [ByteRange::default(); MAX_PLANES];
         match self.kind {
@@ -304,7 +304,7 @@ mod tests {
         file.write_all(&bytes).unwrap();
         let device = Device::open(file.path()).unwrap();
         let mut kernel = DeviceKernel::new(device, QueueKind::SinglePlanar, Writer::Program);
-        let mut memory = kernel.map(Span { offset: 0, length_bytes: bytes.len() }).unwrap();
+        let mut memory = kernel.map_plane(Span { offset: 0, length_bytes: bytes.len() }).unwrap();
         kernel.snapshot(&mut memory, bytes.len());
         // The writer overwrites the buffer.
         file.rewind().unwrap();

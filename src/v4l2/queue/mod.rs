@@ -60,15 +60,18 @@ impl<K: Kernel> Queue<K> {
         let (slots, current, losses) = (Vec::new(), None, Losses::default());
         let mut queue = Self { kernel, clock, slots, min_bytes, sequence, current, losses };
         // Created first, so that an early return drops it, which frees the buffers granted so far.
-        let granted = retry(|| queue.kernel.request(BUFFERS)).map_err(QueueError::at("REQBUFS"))?;
+        let granted =
+            retry_interrupted(|| queue.kernel.request_buffers(BUFFERS)).map_err(QueueError::refused_at("REQBUFS"))?;
         if granted < MIN_BUFFERS {
             return Err(QueueError::TooFewBuffers { granted });
         }
         for index in 0..granted {
-            let info = retry(|| queue.kernel.query(index)).map_err(QueueError::at("QUERYBUF"))?;
+            let info =
+                retry_interrupted(|| queue.kernel.query_buffer(index)).map_err(QueueError::refused_at("QUERYBUF"))?;
             let mut memory = Vec::with_capacity(info.plane_count);
             for span in &info.planes[..info.plane_count] {
-                memory.push(retry(|| queue.kernel.map(*span)).map_err(QueueError::at("mmap"))?);
+                memory
+                    .push(retry_interrupted(|| queue.kernel.map_plane(*span)).map_err(QueueError::refused_at("mmap"))?);
             }
             queue.slots.push(Slot { memory, in_kernel: false });
         }
@@ -104,13 +107,13 @@ impl<K: Kernel> Queue<K> {
                 }
             }
         }
-        retry(|| self.kernel.stream_on()).map_err(QueueError::at("STREAMON"))
+        retry_interrupted(|| self.kernel.stream_on()).map_err(QueueError::refused_at("STREAMON"))
     }
 
     /// Stops the stream; every buffer is returned, and the current frame is discarded.
     pub fn stop(&mut self) {
         self.discard_current();
-        let stopped = retry(|| self.kernel.stream_off());
+        let stopped = retry_interrupted(|| self.kernel.stream_off());
         for index in 0..self.slots.len() {
             // A successful stop returns them all; after a failed one, query each.
             self.slots[index].in_kernel = stopped.is_err() && self.is_in_kernel(index).unwrap_or(false);
@@ -137,18 +140,18 @@ impl<K: Kernel> Queue<K> {
                 Ok(Wake::TimedOut) => return Ok(false),
                 Ok(Wake::Filled) => {}
                 Ok(Wake::Error) => {
-                    self.drain()?;
+                    self.drain_filled()?;
                     return match self.current {
                         Some(_) => Ok(true),
                         // An error without a buffer: returned, since every further wait would end at once, too.
-                        None => Err(QueueError::at("poll")(io::Error::from_raw_os_error(EIO))),
+                        None => Err(QueueError::refused_at("poll")(io::Error::from_raw_os_error(EIO))),
                     };
                 }
                 // A signal: continue waiting for the remaining time.
                 Err(error) if error.kind() == io::ErrorKind::Interrupted => continue,
-                Err(error) => return Err(QueueError::at("poll")(error)),
+                Err(error) => return Err(QueueError::refused_at("poll")(error)),
             }
-            self.drain()?;
+            self.drain_filled()?;
             if self.current.is_some() {
                 return Ok(true);
             }
@@ -159,16 +162,16 @@ impl<K: Kernel> Queue<K> {
     }
 
     /// Dequeues all filled buffers and keeps the newest complete frame.
-    fn drain(&mut self) -> Result<(), QueueError> {
+    fn drain_filled(&mut self) -> Result<(), QueueError> {
         // Bounded: a driver that fills buffers as fast as they are drained must not keep us here.
         for _ in 0..2 * self.slots.len() {
-            match retry(|| self.kernel.dequeue()) {
-                Ok(frame) => self.accept(frame)?,
+            match retry_interrupted(|| self.kernel.dequeue_buffer()) {
+                Ok(frame) => self.accept_frame(frame)?,
                 Err(error) if error.kind() == io::ErrorKind::WouldBlock => break,
                 Err(error) => {
                     self.find_lost_buffers();
                     // The frame takes precedence; a lasting error will recur.
-                    return if self.current.is_some() { Ok(()) } else { Err(QueueError::at("DQBUF")(error)) };
+                    return if self.current.is_some() { Ok(()) } else { Err(QueueError::refused_at("DQBUF")(error)) };
                 }
             }
         }
@@ -176,14 +179,14 @@ impl<K: Kernel> Queue<K> {
     }
 
     /// Makes a dequeued frame the current one, replacing an older one; a corrupt one is counted and requeued.
-    fn accept(&mut self, frame: Dequeued) -> Result<(), QueueError> {
+    fn accept_frame(&mut self, frame: Dequeued) -> Result<(), QueueError> {
         let index = frame.index as usize;
         match self.slots.get_mut(index) {
             Some(slot) if slot.in_kernel => slot.in_kernel = false,
             _ => return Err(QueueError::Foreign(frame.index)),
         }
-        self.losses.missed += self.sequence.step(frame.sequence, frame.stamp_ns);
-        if !self.is_whole(&frame) {
+        self.losses.missed += self.sequence.count_lost(frame.sequence, frame.stamp_ns);
+        if !self.is_complete(&frame) {
             self.losses.corrupt += 1;
             let _ = self.enqueue(index);
             return Ok(());
@@ -198,7 +201,7 @@ impl<K: Kernel> Queue<K> {
     }
 
     /// Whether the driver did not flag the frame as damaged, and each plane has its minimum bytes within its mapping.
-    fn is_whole(&self, frame: &Dequeued) -> bool {
+    fn is_complete(&self, frame: &Dequeued) -> bool {
         let memory = &self.slots[frame.index as usize].memory;
         let filled = frame.filled.iter().zip(memory);
         !frame.flagged
@@ -229,7 +232,7 @@ impl<K: Kernel> Queue<K> {
 
     /// Discards all frames filled so far and all losses so far: counting starts with the next frame.
     pub fn reset_losses(&mut self) {
-        let _ = self.drain();
+        let _ = self.drain_filled();
         self.release();
         self.sequence.restart();
         self.losses = Losses::default();
@@ -249,7 +252,7 @@ impl<K: Kernel> Queue<K> {
 
     /// Queues a buffer of ours with the kernel.
     fn enqueue(&mut self, index: usize) -> io::Result<()> {
-        let queued = retry(|| self.kernel.queue(index as u32));
+        let queued = retry_interrupted(|| self.kernel.queue_buffer(index as u32));
         // EINVAL may mean that the kernel has the buffer already.
         self.slots[index].in_kernel = match &queued {
             Ok(()) => true,
@@ -260,7 +263,7 @@ impl<K: Kernel> Queue<K> {
     }
 
     fn is_in_kernel(&mut self, index: usize) -> io::Result<bool> {
-        retry(|| self.kernel.query(index as u32)).map(|info| info.in_kernel)
+        retry_interrupted(|| self.kernel.query_buffer(index as u32)).map(|info| info.in_kernel)
     }
 
     /// Queries which buffers the kernel still has: a failed dequeue may have taken one all the same. The next frame's
@@ -283,12 +286,12 @@ impl<K: Kernel> Drop for Queue<K> {
         }
         self.slots.clear();
         // A device that is gone has nothing left to free.
-        let _ = retry(|| self.kernel.request(0));
+        let _ = retry_interrupted(|| self.kernel.request_buffers(0));
     }
 }
 
 /// Repeats a call that a signal interrupted.
-fn retry<T>(mut call: impl FnMut() -> io::Result<T>) -> io::Result<T> {
+fn retry_interrupted<T>(mut call: impl FnMut() -> io::Result<T>) -> io::Result<T> {
     loop {
         match call() {
             Err(error) if error.kind() == io::ErrorKind::Interrupted => {}

@@ -132,21 +132,21 @@ impl State {
     }
 
     /// Returns true with this probability.
-    pub fn chance(&mut self, probability: f64) -> bool {
+    pub fn random_bool(&mut self, probability: f64) -> bool {
         ((self.random() >> 11) as f64 / (1u64 << 53) as f64) < probability
     }
 
     /// Starts any ioctl: fails if the device is gone, or at random as if a signal had interrupted it.
-    fn call(&mut self) -> io::Result<()> {
+    fn start_ioctl(&mut self) -> io::Result<()> {
         if self.gone {
             return error(ENODEV);
         }
-        if self.chance(self.chances.interrupted) { error(EINTR) } else { Ok(()) }
+        if self.random_bool(self.chances.interrupted) { error(EINTR) } else { Ok(()) }
     }
 
     /// Fails at random, with one of `errnos`.
-    fn refuse(&mut self, errnos: &[i32]) -> io::Result<()> {
-        if self.chance(self.chances.refused) {
+    fn fail_randomly(&mut self, errnos: &[i32]) -> io::Result<()> {
+        if self.random_bool(self.chances.refused) {
             let which = self.random() as usize % errnos.len();
             return error(errnos[which]);
         }
@@ -154,7 +154,7 @@ impl State {
     }
 
     /// Counts the buffers that the kernel has, filled or to be filled.
-    pub fn with_kernel(&self) -> usize {
+    pub fn queued_buffers(&self) -> usize {
         self.buffers.iter().filter(|buffer| **buffer != Buffer::Dequeued).count()
     }
 
@@ -162,21 +162,21 @@ impl State {
     pub fn capture_frame(&mut self) {
         self.clock.advance_ns(PERIOD_NS);
         self.sequence += 1;
-        if self.chance(self.chances.dropped) {
+        if self.random_bool(self.chances.dropped) {
             return;
         }
         let Some(free) = self.order.iter().copied().find(|index| self.buffers[*index as usize] == Buffer::Queued)
         else {
             return;
         };
-        let damaged = self.chance(self.chances.damaged);
-        let flagged = damaged && self.chance(0.5);
+        let damaged = self.random_bool(self.chances.damaged);
+        let flagged = damaged && self.random_bool(0.5);
         let used_bytes = if damaged && !flagged { self.random() as usize % PLANE_BYTES } else { PLANE_BYTES };
         self.buffers[free as usize] = Buffer::Done { sequence: self.sequence - 1, flagged, used_bytes };
     }
 
     /// The buffer to dequeue next, if it is filled.
-    fn done(&self) -> Option<u32> {
+    fn next_filled(&self) -> Option<u32> {
         self.order.front().copied().filter(|index| matches!(self.buffers[*index as usize], Buffer::Done { .. }))
     }
 }
@@ -184,13 +184,13 @@ impl State {
 impl Kernel for Model {
     type Memory = Memory;
 
-    fn request(&mut self, count: u32) -> io::Result<u32> {
+    fn request_buffers(&mut self, count: u32) -> io::Result<u32> {
         let mut state = self.0.borrow_mut();
         assert!(count > 0 || state.mapped == 0, "buffers are freed while {} planes are mapped", state.mapped);
         assert!(!state.streaming || state.gone, "buffers are asked for while the stream runs");
-        state.call()?;
+        state.start_ioctl()?;
         if count > 0 {
-            state.refuse(&[EBUSY, EINVAL])?;
+            state.fail_randomly(&[EBUSY, EINVAL])?;
         }
         let granted = count.min(state.granted);
         state.buffers = vec![Buffer::Dequeued; granted as usize];
@@ -198,9 +198,9 @@ impl Kernel for Model {
         Ok(granted)
     }
 
-    fn query(&mut self, index: u32) -> io::Result<BufferInfo> {
+    fn query_buffer(&mut self, index: u32) -> io::Result<BufferInfo> {
         let mut state = self.0.borrow_mut();
-        state.call()?;
+        state.start_ioctl()?;
         if state.queries_fail {
             return error(EIO);
         }
@@ -211,40 +211,40 @@ impl Kernel for Model {
         Ok(BufferInfo { planes, plane_count: 2, in_kernel })
     }
 
-    fn map(&mut self, span: Span) -> io::Result<Memory> {
+    fn map_plane(&mut self, span: Span) -> io::Result<Memory> {
         let mut state = self.0.borrow_mut();
-        state.call()?;
+        state.start_ioctl()?;
         assert!(span.offset / 8 < state.buffers.len() as u64 && span.length_bytes == PLANE_BYTES);
         state.mapped += 1;
         drop(state);
         Ok(Memory { bytes: [0; PLANE_BYTES], model: Rc::clone(&self.0) })
     }
 
-    fn queue(&mut self, index: u32) -> io::Result<()> {
+    fn queue_buffer(&mut self, index: u32) -> io::Result<()> {
         let mut state = self.0.borrow_mut();
-        state.call()?;
+        state.start_ioctl()?;
         assert_eq!(state.buffers[index as usize], Buffer::Dequeued, "buffer {index} is queued twice");
-        state.refuse(&[EINVAL, EIO])?;
+        state.fail_randomly(&[EINVAL, EIO])?;
         state.buffers[index as usize] = Buffer::Queued;
         state.order.push_back(index);
         state.facts.max_queued = state.facts.max_queued.max(state.order.len());
         Ok(())
     }
 
-    fn dequeue(&mut self) -> io::Result<Dequeued> {
+    fn dequeue_buffer(&mut self) -> io::Result<Dequeued> {
         let mut state = self.0.borrow_mut();
-        state.call()?;
+        state.start_ioctl()?;
         if !state.streaming {
             return error(EINVAL);
         }
         let chances = state.chances;
-        if state.chance(chances.gone) {
+        if state.random_bool(chances.gone) {
             state.gone = true;
             return error(ENODEV);
         }
-        let Some(index) = state.done() else { return error(EAGAIN) };
-        if state.chance(chances.refused) {
-            if state.chance(0.5) {
+        let Some(index) = state.next_filled() else { return error(EAGAIN) };
+        if state.random_bool(chances.refused) {
+            if state.random_bool(0.5) {
                 // The error consumes a buffer, as it may with a real driver.
                 state.order.pop_front();
                 state.buffers[index as usize] = Buffer::Dequeued;
@@ -270,10 +270,10 @@ impl Kernel for Model {
 
     fn stream_on(&mut self) -> io::Result<()> {
         let mut state = self.0.borrow_mut();
-        state.call()?;
+        state.start_ioctl()?;
         let idle = state.buffers.iter().filter(|buffer| **buffer != Buffer::Queued).count();
         assert_eq!(idle, 0, "the stream starts with {idle} buffers that are not queued");
-        state.refuse(&[ENOSPC, EINVAL])?;
+        state.fail_randomly(&[ENOSPC, EINVAL])?;
         (state.streaming, state.sequence, state.last_delivered) = (true, 0, None);
         state.facts.starts += 1;
         Ok(())
@@ -281,7 +281,7 @@ impl Kernel for Model {
 
     fn stream_off(&mut self) -> io::Result<()> {
         let mut state = self.0.borrow_mut();
-        state.call()?;
+        state.start_ioctl()?;
         state.streaming = false;
         state.buffers.fill(Buffer::Dequeued);
         state.order.clear();
@@ -294,7 +294,7 @@ impl Kernel for Model {
             return Ok(Wake::Error);
         }
         state.clock.advance_ns(1000);
-        state.call()?;
+        state.start_ioctl()?;
         let until_ns = state.clock.now_ns() + timeout.as_nanos() as u64;
         if !state.streaming {
             return Ok(Wake::Error);
@@ -303,7 +303,7 @@ impl Kernel for Model {
         for _ in 0..state.random() % 4 {
             state.capture_frame();
         }
-        while state.done().is_none() {
+        while state.next_filled().is_none() {
             if state.clock.now_ns() >= until_ns {
                 return Ok(Wake::TimedOut);
             }

@@ -28,7 +28,7 @@ impl Sequence {
 
     /// Adds a frame with this sequence number, captured at `stamp_ns` if the driver reports it. Returns how many frames
     /// were lost since the previous one. With a driver that always repeats one number, no loss can be detected.
-    pub fn step(&mut self, number: u32, stamp_ns: Option<u64>) -> u64 {
+    pub fn count_lost(&mut self, number: u32, stamp_ns: Option<u64>) -> u64 {
         let Some((last, last_ns)) = self.last.replace((number, stamp_ns)) else { return 0 };
         let ahead = number.wrapping_sub(last);
         // Backwards: the driver restarted its numbers by itself.
@@ -65,7 +65,7 @@ mod tests {
     fn losses(frames: &[(u32, f64)]) -> u64 {
         let mut sequence = Sequence::new(PERIOD_NS);
         let stamp = |periods: f64| Some(1_000_000_000 + (periods * PERIOD_NS as f64) as u64);
-        frames.iter().map(|(number, periods)| sequence.step(*number, stamp(*periods))).sum()
+        frames.iter().map(|(number, periods)| sequence.count_lost(*number, stamp(*periods))).sum()
     }
 
     #[test]
@@ -73,9 +73,13 @@ mod tests {
         assert_eq!(losses(&[(7, 0.0), (8, 1.0), (11, 4.0), (12, 5.0)]), 2);
         assert_eq!(losses(&[(u32::MAX, 0.0), (1, 2.0)]), 1, "numbers wrap");
         let mut untimed = Sequence::new(PERIOD_NS);
-        assert_eq!([3, 4, 9].map(|number| untimed.step(number, None)), [0, 0, 4]);
+        assert_eq!([3, 4, 9].map(|number| untimed.count_lost(number, None)), [0, 0, 4]);
         let mut frozen = Sequence::new(PERIOD_NS);
-        assert_eq!([3, 4, 9].map(|number| frozen.step(number, Some(7))), [0, 0, 4], "a time that stands tells nothing");
+        assert_eq!(
+            [3, 4, 9].map(|number| frozen.count_lost(number, Some(7))),
+            [0, 0, 4],
+            "a time that stands tells nothing"
+        );
     }
 
     #[test]
@@ -90,9 +94,9 @@ mod tests {
         assert_eq!(losses(&[(0, 0.0), (0, 1.0), (0, 2.0)]), 0);
         assert_eq!(losses(&[(100, 0.0), (0, 1.0), (1, 2.0)]), 0);
         let mut sequence = Sequence::new(PERIOD_NS);
-        sequence.step(5, Some(1));
+        sequence.count_lost(5, Some(1));
         sequence.restart();
-        assert_eq!(sequence.step(90, Some(2)), 0);
+        assert_eq!(sequence.count_lost(90, Some(2)), 0);
     }
 
     #[test]
@@ -101,8 +105,8 @@ mod tests {
         let mut sequence = Sequence::new(PERIOD_NS);
         let half_ns = PERIOD_NS / 2;
         for number in 0..60 {
-            assert_eq!(sequence.step(number, Some(1 + u64::from(number) * half_ns)), 0);
+            assert_eq!(sequence.count_lost(number, Some(1 + u64::from(number) * half_ns)), 0);
         }
-        assert_eq!(sequence.step(61, Some(1 + 61 * half_ns)), 1);
+        assert_eq!(sequence.count_lost(61, Some(1 + 61 * half_ns)), 1);
     }
 }

@@ -139,11 +139,11 @@ fn a_buffer_that_was_refused_is_offered_again() {
         model.0.borrow_mut().chances.refused = 1.0;
         queue.release();
         model.0.borrow_mut().chances.refused = 0.0;
-        assert_eq!(model.0.borrow().with_kernel(), 3, "round {round}");
+        assert_eq!(model.0.borrow().queued_buffers(), 3, "round {round}");
         assert!(queue.wait_newest(TIMEOUT).unwrap());
-        assert_eq!(model.0.borrow().with_kernel(), 3, "all but the one that is being read");
+        assert_eq!(model.0.borrow().queued_buffers(), 3, "all but the one that is being read");
         queue.release();
-        assert_eq!(model.0.borrow().with_kernel(), 4);
+        assert_eq!(model.0.borrow().queued_buffers(), 4);
     }
 }
 
@@ -189,7 +189,7 @@ fn fuzz(seed: u64, chances: Chances, errors: &mut [u64; 256]) -> (u64, Losses, F
                 match queue.wait_newest(TIMEOUT) {
                     Ok(true) => {
                         // Sometimes the reader itself skips a frame.
-                        if model.0.borrow_mut().chance(0.9) {
+                        if model.0.borrow_mut().random_bool(0.9) {
                             assert!(queue.current().is_some());
                             taken += 1;
                             queue.release();

@@ -101,7 +101,7 @@ fn load(files: &[(&str, &str)]) -> Result<StereoCalibration, String> {
     let (dir, paths) = folder(files);
     let paths: Vec<&Path> = paths.iter().map(PathBuf::as_path).collect();
     let folder = format!("{}/", dir.path().display());
-    calibration::load(&paths).map_err(|error| error.to_string().replace(&folder, ""))
+    calibration::load_calibration(&paths).map_err(|error| error.to_string().replace(&folder, ""))
 }
 
 fn sensor(shift: &str) -> String {
@@ -116,21 +116,21 @@ fn opencv_in_one_file_or_two() {
     assert_eq!(one, load(&[("b.yml", EXTRINSICS), ("a.yml", INTRINSICS)]).unwrap());
     let (_dir, paths) = folder(&[("my_intrinsics.yml", INTRINSICS), ("my_extrinsics.yml", EXTRINSICS)]);
     for path in &paths {
-        assert_eq!(one, calibration::load(&[path]).unwrap(), "the other one lies beside it");
+        assert_eq!(one, calibration::load_calibration(&[path]).unwrap(), "the other one lies beside it");
     }
 
-    assert!(one.assumed_mm && one.eyes[0].size.is_none() && one.given.is_none());
+    assert!(one.assumed_mm && one.cameras[0].size.is_none() && one.stored_rectification.is_none());
     assert!((one.translation_m - DVec3::new(-0.0912, 0.002, -0.003)).length() < 1e-12);
     assert!((one.rotation * DVec3::Y - DVec3::new(0.0, 0.8, 0.6)).length() < 1e-12, "row by row");
-    assert_eq!(one.eyes[1].center_px, DVec2::new(327.5, 261.5));
+    assert_eq!(one.cameras[1].center_px, DVec2::new(327.5, 261.5));
     let lens = Distortion::RadialTangential([-0.055, 0.078, 0.001, 0.002, -0.14, 0.0, 0.0, 0.0]);
-    assert_eq!(one.eyes[0].distortion, lens);
+    assert_eq!(one.cameras[0].distortion, lens);
     // OpenCV writes 8, 12 or 14 coefficients, depending on the model.
     let rational = whole.replace("rows: 5\n   cols: 1", "rows: 14\n   cols: 1");
     let rational = rational.replace("-0.2 ]", "-0.2, 0., 0., -.1, 0., 0., 0., 0., 0., 0. ]");
     let lens = Distortion::RadialTangential([-0.08, 0.2, 0.0, 0.0, -0.2, 0.0, 0.0, -0.1]);
-    assert_eq!(load(&[("stereo.yml", &rational)]).unwrap().eyes[1].distortion, lens);
-    let notes = one.notes((640, 512));
+    assert_eq!(load(&[("stereo.yml", &rational)]).unwrap().cameras[1].distortion, lens);
+    let notes = one.describe_assumptions((640, 512));
     assert!(notes[0].contains("millimetres") && notes[0].contains("0.091 m"), "{notes:?}");
 }
 
@@ -138,7 +138,7 @@ fn opencv_in_one_file_or_two() {
 fn opencv_by_other_names_and_with_a_size() {
     let whole = format!("{INTRINSICS}{}image_size: [ 640, 512 ]\n", EXTRINSICS.replace("%YAML:1.0\n", ""));
     let expected = load(&[("stereo.yml", &whole)]).unwrap();
-    assert_eq!(expected.eyes[0].size, Some((640, 512)));
+    assert_eq!(expected.cameras[0].size, Some((640, 512)));
     let renamed = whole
         .replace("M1:", "camera_matrix_left:")
         .replace("M2:", "camera_matrix_right:")
@@ -153,24 +153,24 @@ fn opencv_by_other_names_and_with_a_size() {
         .replace(", -0.2 ]", " ]")
         + "distortion_model: fisheye\n";
     let fisheye = load(&[("stereo.yml", &fisheye)]).unwrap();
-    assert_eq!(fisheye.eyes[1].distortion, Distortion::Equidistant([-0.08, 0.2, 0.0, 0.0]));
+    assert_eq!(fisheye.cameras[1].distortion, Distortion::Equidistant([-0.08, 0.2, 0.0, 0.0]));
 }
 
 #[test]
 fn euroc_and_kalibr() {
     let (_dir, paths) = folder(&[("cam0.yaml", &sensor("-0.06")), ("cam1.yaml", &sensor("0.05"))]);
-    let rig = euroc::read(&paths[0], &paths[1]).unwrap();
-    assert_eq!(rig, calibration::load(&[&paths[0], &paths[1]]).unwrap());
-    assert_eq!(rig.eyes[0].size, Some((752, 480)));
+    let rig = euroc::read_sensors(&paths[0], &paths[1]).unwrap();
+    assert_eq!(rig, calibration::load_calibration(&[&paths[0], &paths[1]]).unwrap());
+    assert_eq!(rig.cameras[0].size, Some((752, 480)));
     assert!(!rig.is_swapped() && !rig.assumed_mm);
     // 11 cm along the body's y, which is the cameras' x.
     assert!((rig.translation_m - DVec3::new(-0.11, 0.0, 0.0)).length() < 1e-12, "{}", rig.translation_m);
 
     let chain = load(&[("camchain.yaml", CAMCHAIN)]).unwrap();
     assert_eq!(chain.translation_m, DVec3::new(-0.1009, 0.0019, 0.0012));
-    assert_eq!(chain.eyes[0].distortion, Distortion::Equidistant([0.0034, 0.0007, -0.002, 0.0002]));
+    assert_eq!(chain.cameras[0].distortion, Distortion::Equidistant([0.0034, 0.0007, -0.002, 0.0002]));
     let lens = Distortion::RadialTangential([0.1, 0.01, 0.001, 0.002, 0.0, 0.0, 0.0, 0.0]);
-    assert_eq!(chain.eyes[1].distortion, lens);
+    assert_eq!(chain.cameras[1].distortion, lens);
 }
 
 #[test]
@@ -194,26 +194,26 @@ fn what_is_wrong_is_told_in_one_line_with_its_place() {
         (vec![("s.yml", EXTRINSICS.to_owned())], "s.yml: M1 is missing; name the file with M1"),
         (broken("D2:", "D3:"), "s.yml: D2 is missing"),
         (broken("T:", "TT:"), "s.yml: T is missing"),
-        (broken("rows: 3\n", "rows: 2\n"), "s.yml:3: M1 says 2x3, and holds 9 numbers"),
+        (broken("rows: 3\n", "rows: 2\n"), "s.yml:3: M1 says 2x3, but has 9 numbers"),
         (broken("   rows: 3\n", ""), "s.yml:3: rows is missing"),
         (broken("rows: 3\n   cols: 1", "rows: 1\n   cols: 2").replace_all("-91.2, ", ""), "T is 1x2, and must be 3x1"),
-        (broken("5.1805160946433762e+02", ".Nan"), "s.yml:7: M1 holds \".Nan\" where a finite number"),
-        (broken("5.1805160946433762e+02", "wide"), "s.yml:7: M1 holds \"wide\""),
-        (broken("5.1805160946433762e+02", "1e999"), "s.yml:7: M1 holds \"1e999\""),
+        (broken("5.1805160946433762e+02", ".Nan"), "s.yml:7: M1 has \".Nan\" instead of a finite number"),
+        (broken("5.1805160946433762e+02", "wide"), "s.yml:7: M1 has \"wide\""),
+        (broken("5.1805160946433762e+02", "1e999"), "s.yml:7: M1 has \"1e999\""),
         (broken("5.1805160946433762e+02", "-5"), "M1 has a focal length"),
         (broken("3.1388127793166115e+02", "1e9"), "M1 has a principal point"),
         (broken("02, 0., 3.13", "02, 4., 3.13"), "M1 is not of the form"),
         (broken("0.8, -0.6", "0.8, 0.6"), "R is not a rotation"),
         (broken("[ 1., 0., 0., 0., 0.8", "[ -1., 0., 0., 0., 0.8"), "R is not a rotation"),
-        (broken("-91.2, 2., -3.", "0., 0., 0."), "T puts both cameras in one place"),
+        (broken("-91.2, 2., -3.", "0., 0., 0."), "T puts both cameras in the same place"),
         (broken("rows: 5\n   cols: 1", "rows: 3\n   cols: 1").replace_all("-0.08, 0.2, ", ""), "4, 5, 8, 12 or 14"),
         (
             broken("rows: 5\n   cols: 1", "rows: 12\n   cols: 1").replace_all("-0.2 ]", "0.,0.,0.,0.,0.1,0.,0.,0. ]"),
-            "D2 has coefficients beyond k6",
+            "D2 has nonzero coefficients beyond k6",
         ),
-        (broken("M1: !!", "distortion_model: omni\nM1: !!"), "s.yml:3: distortion_model \"omni\" is not known"),
-        (broken("M1: !!", "image_size: [0, 5]\nM1: !!"), "s.yml:3: image_size is no size"),
-        (broken("M1: !!", "image_width: 0\nimage_height: 5\nM1: !!"), "s.yml:3: image_width is no size"),
+        (broken("M1: !!", "distortion_model: omni\nM1: !!"), "s.yml:3: distortion_model \"omni\" is not supported"),
+        (broken("M1: !!", "image_size: [0, 5]\nM1: !!"), "s.yml:3: image_size is not a picture size"),
+        (broken("M1: !!", "image_width: 0\nimage_height: 5\nM1: !!"), "s.yml:3: image_width is not a picture size"),
         (broken("M1: !!", "image_width: 64.5\nimage_height: 5\nM1: !!"), "s.yml:3: image_width must be a whole number"),
         (broken("[ 518.", "[ 518. : :"), "s.yml:"),
         (vec![("s.yml", "fx: 3\n".into())], "s.yml: not a stereo calibration"),
@@ -222,12 +222,12 @@ fn what_is_wrong_is_told_in_one_line_with_its_place() {
         (vec![("s.yml", left.clone())], "s.yml: this is the sensor.yaml of one camera"),
         (euroc("intrinsics: [458.654, ", "intrinsics: ["), "s.yml:15: intrinsics is 3x1, and must be 4 numbers"),
         (euroc("intrinsics:", "numbers:"), "s.yml: intrinsics is missing"),
-        (euroc("model: pinhole", "model: omni"), "s.yml:14: camera_model \"omni\" is not known here"),
-        (euroc("radial-tangential", "fov"), "s.yml:16: distortion_model \"fov\" is not known here"),
-        (euroc("-0.06", "0.05"), "r.yml:6: T_BS puts both cameras in one place"),
+        (euroc("model: pinhole", "model: omni"), "s.yml:14: camera_model \"omni\" is not supported"),
+        (euroc("radial-tangential", "fov"), "s.yml:16: distortion_model \"fov\" is not supported"),
+        (euroc("-0.06", "0.05"), "r.yml:6: T_BS puts both cameras in the same place"),
         (chain("  T_cn_cnm1:", "  T_cam_imu:"), "s.yml:10: T_cn_cnm1 is missing"),
         (chain("cam1:", "cam2:"), "s.yml: cam1 is missing"),
-        (chain("model: pinhole", "model: ds"), "s.yml:3: camera_model \"ds\" is not known here"),
+        (chain("model: pinhole", "model: ds"), "s.yml:3: camera_model \"ds\" is not supported"),
         (chain("0.002, 0.0002]", "0.002]"), "s.yml:4: distortion_coeffs is 3x1"),
         (chain("  - [0.0, 0.0, 0.0, 1.0]\n", ""), "T_cn_cnm1 is 3x4, and must be 4x4"),
         (chain("[0.0, 0.0, 0.0, 1.0]", "[0.0, 0.0, 1.0]"), "T_cn_cnm1 must be a matrix with rows of one length"),
@@ -237,9 +237,9 @@ fn what_is_wrong_is_told_in_one_line_with_its_place() {
         let refusal = load(&files).expect_err(what);
         assert!(refusal.contains(what) && !refusal.contains('\n'), "{refusal}, not {what}");
     }
-    let refusal = calibration::load(&[Path::new("nowhere.yml")]).unwrap_err().to_string();
+    let refusal = calibration::load_calibration(&[Path::new("nowhere.yml")]).unwrap_err().to_string();
     assert!(refusal.contains("nowhere.yml: "), "{refusal}");
-    assert!(calibration::load(&[]).unwrap_err().to_string().contains("one or two files"));
+    assert!(calibration::load_calibration(&[]).unwrap_err().to_string().contains("one or two files"));
 }
 
 #[test]
@@ -280,23 +280,23 @@ fn a_rectification_in_the_file_is_taken_and_checked() {
     };
     let good = pair([450.0, 330.0, 240.0, -27.0, 0.0]);
     let rig = load(&[("s.yml", &good)]).unwrap();
-    let given = rig.given.unwrap().rig();
+    let given = rig.stored_rectification.unwrap().rig();
     assert!((given.focal_px, given.doffs_px, given.metric) == (450.0, 20.0, true));
     assert!((given.baseline_m - 0.06).abs() < 1e-7);
     assert!((rig.translation_m - DVec3::new(-0.06, 0.0, 0.0)).length() < 1e-12);
-    let half = rig.at((320, 240)).map(|_| ()).unwrap_err().to_string();
+    let half = rig.scale_to((320, 240)).map(|_| ()).unwrap_err().to_string();
     assert!(half.contains("image_size"), "{half}");
     let sized = load(&[("s.yml", &format!("{good}image_size: [640, 480]\n"))]).unwrap();
-    let half = sized.at((320, 240)).unwrap().given.unwrap().rig();
+    let half = sized.scale_to((320, 240)).unwrap().stored_rectification.unwrap().rig();
     assert_eq!((half.focal_px, half.doffs_px), (225.0, 10.0));
 
     let place = format!("R: {unit}\nT: [-0.06, 0.01, 0]\n");
     for (text, what) in [
         (pair([450.0, 330.0, 240.0, 0.0, -27.0]), "above each other"),
-        (pair([450.0, 330.0, 240.0, 0.0, 0.0]), "P2 puts both cameras in one place"),
-        (pair([440.0, 330.0, 240.0, -27.0, 0.0]), "P2 is not of one rectified pair"),
-        (pair([450.0, 330.0, 250.0, -27.0, 0.0]), "P2 is not of one rectified pair"),
-        (format!("{good}{place}"), "R2 does not belong to R and T"),
+        (pair([450.0, 330.0, 240.0, 0.0, 0.0]), "P2 puts both cameras in the same place"),
+        (pair([440.0, 330.0, 240.0, -27.0, 0.0]), "P2 is not the partner of P1 in a rectified pair"),
+        (pair([450.0, 330.0, 250.0, -27.0, 0.0]), "P2 is not the partner of P1 in a rectified pair"),
+        (format!("{good}{place}"), "R2 does not match R and T"),
         (base, "P1 is missing"),
     ] {
         let refusal = load(&[("s.yml", &text)]).unwrap_err();

@@ -11,8 +11,8 @@ use super::{FISHEYE, NONE, RADTAN, SIZE, rig, rigs};
 fn raw_px(calibration: &StereoCalibration, point: DVec3) -> Option<[DVec2; 2]> {
     let seen = [point, calibration.rotation * point + calibration.translation_m];
     let [left, right] = [0, 1].map(|side| {
-        let eye = &calibration.eyes[side];
-        eye.project(seen[side], eye.distortion.reach())
+        let eye = &calibration.cameras[side];
+        eye.project(seen[side], eye.distortion.max_radius())
     });
     Some([left?, right?])
 }
@@ -76,14 +76,14 @@ fn a_point_lies_in_one_row_and_its_disparity_tells_its_depth() {
 #[test]
 fn without_the_steps_of_the_map_it_is_exact() {
     for calibration in rigs() {
-        let rectification = Rectification::of(&calibration, SIZE).unwrap();
+        let rectification = Rectification::from_calibration(&calibration, SIZE).unwrap();
         let rig = rectification.rig();
         let mut checked = 0;
         for point in points() {
             let Some(raw_px) = raw_px(&calibration, point) else { continue };
             let [left_px, right_px] = [0, 1].map(|side| {
-                let eye = &calibration.eyes[side];
-                let ray = eye.ray(raw_px[side], eye.distortion.reach()).extend(1.0);
+                let eye = &calibration.cameras[side];
+                let ray = eye.unproject(raw_px[side], eye.distortion.max_radius()).extend(1.0);
                 let turned = rectification.rotations[side] * ray;
                 turned.truncate() / turned.z * rectification.focal_px + rectification.centers_px[side]
             });
@@ -110,7 +110,7 @@ fn no_corner_is_black_and_little_is_given_up() {
                 }
             }
         }
-        let at_its_least = rectifier.rectification().focal_px.x <= 0.701 * calibration.eyes[0].focal_px.x;
+        let at_its_least = rectifier.rectification().focal_px.x <= 0.701 * calibration.cameras[0].focal_px.x;
         assert!(gap_px < 0.5 || at_its_least, "{gap_px} px of the pictures' rim are left over");
     }
 }
@@ -118,45 +118,45 @@ fn no_corner_is_black_and_little_is_given_up() {
 #[test]
 fn half_the_size_is_the_same_rays() {
     for calibration in rigs() {
-        let half = calibration.at((320, 240)).unwrap();
-        for (whole, half) in calibration.eyes.iter().zip(&half.eyes) {
+        let half = calibration.scale_to((320, 240)).unwrap();
+        for (whole, half) in calibration.cameras.iter().zip(&half.cameras) {
             for (x, y) in [(0.0, 0.0), (100.0, 37.0), (318.0, 238.0)] {
                 // The centre of a pixel at half the resolution is that of four pixels at full resolution.
                 let pixel_px = DVec2::new(x, y);
-                let ray = half.ray(pixel_px, half.distortion.reach());
-                let expected = whole.ray(pixel_px * 2.0 + 0.5, whole.distortion.reach());
+                let ray = half.unproject(pixel_px, half.distortion.max_radius());
+                let expected = whole.unproject(pixel_px * 2.0 + 0.5, whole.distortion.max_radius());
                 assert!((ray - expected).length() < 1e-9);
             }
         }
         assert_eq!((half.rotation, half.translation_m), (calibration.rotation, calibration.translation_m));
-        let notes = calibration.notes((320, 240));
+        let notes = calibration.describe_assumptions((320, 240));
         assert!(notes.len() == 1 && notes[0].contains("640x480") && notes[0].contains("320x240"), "{notes:?}");
-        assert!(calibration.notes(SIZE).is_empty());
+        assert!(calibration.describe_assumptions(SIZE).is_empty());
     }
 }
 
 #[test]
 fn a_rectified_pair_stays_as_it_is() {
     let mut calibration = rig(NONE, 500.0, [0.0; 3]);
-    calibration.eyes[1] = calibration.eyes[0];
-    calibration.eyes.iter_mut().for_each(|eye| eye.focal_px = DVec2::splat(500.0));
+    calibration.cameras[1] = calibration.cameras[0];
+    calibration.cameras.iter_mut().for_each(|eye| eye.focal_px = DVec2::splat(500.0));
     calibration.translation_m = DVec3::new(-0.06, 0.0, 0.0);
-    let rectification = Rectification::of(&calibration, SIZE).unwrap();
+    let rectification = Rectification::from_calibration(&calibration, SIZE).unwrap();
     assert_eq!(rectification.rotations, [DMat3::IDENTITY; 2]);
     assert!((rectification.focal_px - 500.0).length() < 1e-9);
-    assert!((rectification.centers_px[0] - calibration.eyes[0].center_px).length() < 1e-9);
+    assert!((rectification.centers_px[0] - calibration.cameras[0].center_px).length() < 1e-9);
     assert!((rectification.baseline_m - 0.06).abs() < 1e-12);
 }
 
 #[test]
 fn exchanged_eyes_are_seen_and_exchanged_back() {
     for calibration in rigs() {
-        let exchanged = calibration.exchanged();
+        let exchanged = calibration.with_swapped_cameras();
         assert!(!calibration.is_swapped() && exchanged.is_swapped());
         let refusal = Rectifier::new(&exchanged, SIZE).unwrap_err().to_string();
         assert!(refusal.contains("left camera stands on the right") && !refusal.contains('\n'), "{refusal}");
-        let again = exchanged.exchanged();
-        assert_eq!(again.eyes, calibration.eyes);
+        let again = exchanged.with_swapped_cameras();
+        assert_eq!(again.cameras, calibration.cameras);
         assert!((again.translation_m - calibration.translation_m).length() < 1e-12);
     }
 }
@@ -168,16 +168,16 @@ fn rigs_that_cannot_be_matched_are_refused_in_one_line() {
     let turned = |turn_deg| rig(NONE, 460.0, turn_deg);
     let nowhere = |calibration: StereoCalibration| {
         let mut calibration = calibration;
-        calibration.eyes[0].size = None;
+        calibration.cameras[0].size = None;
         calibration
     };
     for (calibration, size, what) in [
         (moved(DVec3::new(0.0, -0.1, 0.0)), SIZE, "above each other"),
         (moved(DVec3::new(-0.01, 0.0, -0.1)), SIZE, "behind each other"),
-        (moved(DVec3::ZERO), SIZE, "one place"),
-        (moved(DVec3::NAN), SIZE, "one place"),
+        (moved(DVec3::ZERO), SIZE, "same place"),
+        (moved(DVec3::NAN), SIZE, "same place"),
         (turned([0.0, 60.0, 0.0]), SIZE, "too different"),
-        (good, (640, 400), "640x480, and these are 640x400"),
+        (good, (640, 400), "640x480, but these are 640x400"),
         (good, (1, 1), "2 to 16384"),
         (nowhere(good), (1280, 960), "image_size"),
         (rig(FISHEYE, 0.0, [0.0; 3]), SIZE, "focal length"),
@@ -187,5 +187,5 @@ fn rigs_that_cannot_be_matched_are_refused_in_one_line() {
     }
     let assumed = nowhere(good);
     assert!(Rectifier::new(&assumed, SIZE).is_ok());
-    assert!(assumed.notes(SIZE)[0].contains("no picture size"));
+    assert!(assumed.describe_assumptions(SIZE)[0].contains("no picture size"));
 }

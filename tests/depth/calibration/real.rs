@@ -19,12 +19,13 @@ fn apart_deg(a: DMat3, b: DMat3) -> f64 {
 #[ignore = "needs BOKEHCAM_DATA, a folder with calib/intrinsics.yml"]
 fn opencvs_own_rectification_is_ours() {
     let file = data().join("calib/extrinsics.yml");
-    let rig = calibration::load(&[&file]).unwrap();
+    let rig = calibration::load_calibration(&[&file]).unwrap();
     assert!(rig.is_swapped() && rig.assumed_mm);
     assert!((rig.baseline_m() - 0.09205).abs() < 1e-4, "{}", rig.baseline_m());
-    let rig = rig.exchanged();
-    let given = Rectification::of(&rig, (640, 512)).unwrap();
-    let ours = Rectification::of(&StereoCalibration { given: None, ..rig }, (640, 512)).unwrap();
+    let rig = rig.with_swapped_cameras();
+    let given = Rectification::from_calibration(&rig, (640, 512)).unwrap();
+    let ours =
+        Rectification::from_calibration(&StereoCalibration { stored_rectification: None, ..rig }, (640, 512)).unwrap();
     for (ours, theirs) in ours.rotations.into_iter().zip(given.rotations) {
         assert!(apart_deg(ours, theirs) < 1e-5, "{} degrees", apart_deg(ours, theirs));
     }
@@ -37,9 +38,9 @@ fn opencvs_own_rectification_is_ours() {
 #[ignore = "needs BOKEHCAM_DATA, a folder with stereo_seq/MicroEurocDataset"]
 fn euroc_is_rectified_as_its_readme_says() {
     let sensor = |eye| data().join(format!("stereo_seq/MicroEurocDataset/mav0/{eye}/sensor.yaml"));
-    let rig = euroc::read(&sensor("cam0"), &sensor("cam1")).unwrap();
-    assert_eq!(rig.eyes[0].size, Some((752, 480)));
-    let rectified = Rectification::of(&rig, (752, 480)).unwrap();
+    let rig = euroc::read_sensors(&sensor("cam0"), &sensor("cam1")).unwrap();
+    assert_eq!(rig.cameras[0].size, Some((752, 480)));
+    let rectified = Rectification::from_calibration(&rig, (752, 480)).unwrap();
     assert!((rectified.baseline_m - 0.110).abs() < 5e-4, "{}", rectified.baseline_m);
     assert!((400.0..480.0).contains(&rectified.focal_px.x), "{}", rectified.focal_px);
     assert!((rectified.centers_px[0] - DVec2::new(375.5, 239.5)).length() < 25.0, "{}", rectified.centers_px[0]);

@@ -96,7 +96,7 @@ fn one_camera_is_a_recording_without_a_right_eye() {
     fs::remove_dir_all(scene.path("mav0/cam1")).unwrap();
     let recording = scene.open().unwrap();
     assert_eq!((recording.len(), recording.pair()), (2, None));
-    assert_says(right_of(&recording, 0), &["one eye"]);
+    assert_says(right_of(&recording, 0), &["one camera"]);
 }
 
 #[test]

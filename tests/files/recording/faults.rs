@@ -4,7 +4,7 @@ use std::fs;
 use std::os::unix::fs::symlink;
 
 use bokehcam::capture::Camera;
-use bokehcam::capture::replay::{Part, Replay};
+use bokehcam::capture::replay::{PlayRange, Replay};
 use bokehcam::frame::ColorImage;
 use bokehcam::recording::{Options, Recording, RecordingError, Scratch};
 
@@ -13,7 +13,7 @@ use super::{SIZE, Scene, assert_says, color_of, depth_of, png_that_claims, save_
 #[test]
 fn a_folder_without_lists_is_no_recording() {
     let scene = Scene::new();
-    assert_says(scene.open(), &["not a recording", "associations.txt", "rgb.txt", "name the folder"]);
+    assert_says(scene.open(), &["not a recording", "associations.txt", "rgb.txt", "give the folder"]);
     scene.write("file", "");
     assert_says(Recording::open(&scene.path("file"), &Options::default()), &["file: not a recording"]);
     assert_says(Recording::open(&scene.path("nowhere"), &Options::default()), &["cannot open", "nowhere", "No such"]);
@@ -132,9 +132,9 @@ fn a_time_of_another_age_is_a_fault() {
     assert_eq!(readable, [false, true, true]);
 
     scene.write("rgb.txt", "0 rgb/0.png\n157680000 rgb/1.png\n315360000 rgb/2.png\n");
-    let whole = Part { looped: true, ..Part::default() };
+    let whole = PlayRange { looped: true, ..PlayRange::default() };
     let mut replay = Replay::new(std::sync::Arc::new(scene.open().unwrap()), "old", &whole).unwrap();
-    let frames = replay.skip(u64::MAX);
+    let frames = replay.skip_until(u64::MAX);
     assert!((100..200).contains(&frames), "{frames}: round and round, to the end of time");
 }
 

@@ -83,7 +83,7 @@ fn a_colour_right_eye_is_read_as_the_luma_of_the_left_would_be() {
     let mut luma = bokehcam::frame::GrayImage::default();
     scene.color("image_2/000001.png", SIZE, 50);
     let recording = scene.open().unwrap();
-    luma.set_luma_of(&color_of(&recording, 1).unwrap());
+    luma.set_luma_from(&color_of(&recording, 1).unwrap());
     assert_eq!(right_of(&recording, 1).unwrap(), luma);
 }
 
@@ -145,7 +145,7 @@ fn eyes_of_unequal_sizes_are_told() {
     save_grey(&scene.path("image_3/000001.png"), (25, 16), 0);
     let recording = scene.open().unwrap();
     assert!(right_of(&recording, 0).is_ok());
-    let says = "image_3/000001.png: the right picture is 25x16, and the left one 24x16; both eyes need one size";
+    let says = "image_3/000001.png: the right picture is 25x16, and the left one 24x16; both need the same size";
     assert_says(right_of(&recording, 1), &[says]);
     assert!(right_of(&recording, 2).is_ok());
 }
@@ -156,7 +156,7 @@ fn wrong_times_are_told_with_their_line() {
         ("0.0\nsoon\n0.2\n", "times.txt:2: \"soon\" is not a time"),
         ("0.0\n0.3\n0.2\n", "times.txt:3: the time is out of order"),
         ("# nothing\n", "times.txt: the list names no picture"),
-        ("0.0\n0.1\n", "times.txt: 2 times, and none for image_2/000002.png"),
+        ("0.0\n0.1\n", "times.txt: the list has 2 times, but none for image_2/000002.png"),
     ] {
         let scene = odometry();
         scene.write("times.txt", times);
@@ -192,5 +192,5 @@ fn a_recording_with_one_eye_has_no_right_one() {
     let recording = Scene::with_pairs(1);
     let recording = recording.open().unwrap();
     assert_eq!((recording.pair(), recording.disparities()), (None, None));
-    assert_says(right_of(&recording, 0), &["the recording has one eye"]);
+    assert_says(right_of(&recording, 0), &["the recording has one camera"]);
 }

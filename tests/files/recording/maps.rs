@@ -38,7 +38,7 @@ fn disparity_survives_png_within_half_a_unit_and_pfm_exactly() {
     let [png, pfm] = ["d.png", "d.pfm"].map(|name| dir.path().join(name));
     for path in [&png, &pfm] {
         write_disparity(path, &disparity, None, false).unwrap();
-        assert_says(write_disparity(path, &disparity, None, false), &["already there"]);
+        assert_says(write_disparity(path, &disparity, None, false), &["exists already"]);
     }
     assert_eq!(read_disparity(&pfm).unwrap(), disparity);
     let read = read_disparity(&png).unwrap();

@@ -69,7 +69,7 @@ fn a_calibration_of_another_size_is_scaled_or_refused() {
     assert_eq!(depth_of(&recording, 0).unwrap().metres, [2.0; 24]);
 
     scene.color("im0.png", (24, 12), 7);
-    assert_says(scene.open(), &["calib.txt: made for pictures of 24x16, and these are 24x12", "aspect"]);
+    assert_says(scene.open(), &["calib.txt: made for pictures of 24x16, but these are 24x12", "aspect"]);
 }
 
 #[test]
@@ -102,5 +102,5 @@ fn a_folder_that_is_nothing_is_told_all_layouts() {
     let opened = Recording::open(&scene.path(""), &Options::default());
     let layouts =
         ["rgb.txt (TUM RGB-D)", "mav0/cam0", "(EuRoC/ASL)", "image_2 and image_3", "(KITTI)", "im0.png and im1.png"];
-    assert_says(opened, &[&["not a recording", "name the folder"], &layouts[..]].concat());
+    assert_says(opened, &[&["not a recording", "give the folder"], &layouts[..]].concat());
 }

@@ -71,13 +71,13 @@ fn nothing_is_overwritten_unless_asked() {
     for name in ["a.png", "a.pfm"] {
         let path = dir.path().join(name);
         fs::write(&path, "mine").unwrap();
-        assert_says(write_depth(&path, &depth, 5000.0, false), &[name, "already there"]);
+        assert_says(write_depth(&path, &depth, 5000.0, false), &[name, "exists already"]);
         assert_eq!(fs::read(&path).unwrap(), b"mine");
         write_depth(&path, &depth, 5000.0, true).unwrap();
         assert_eq!(read_depth(&path, 5000.0, None).unwrap(), depth);
     }
     let path = dir.path().join("a.png");
-    assert_says(write_color(&path, &image, false), &["a.png", "already there"]);
+    assert_says(write_color(&path, &image, false), &["a.png", "exists already"]);
     write_color(&path, &image, true).unwrap();
     assert_eq!(read_color(&path).unwrap(), image);
 }
@@ -107,7 +107,7 @@ fn wrong_pictures_are_told_with_their_name() {
     save_grey(&path, SIZE, 9);
     assert_says(
         read_depth(&path, 5000.0, None),
-        &["picture.png: an 8-bit grey picture has too few steps", "dark is near there", "Where white is near"],
+        &["picture.png: an 8-bit grey picture has too few steps", "dark is near", "If white is near"],
     );
 }
 

@@ -104,12 +104,12 @@ fn an_existing_recording_is_kept_unless_asked() {
     let overwrite = WriterOptions { overwrite: true, ..WriterOptions::default() };
     assert_says(Writer::create(dir.path(), &overwrite).map(drop), &["is being written by another run"]);
     writer.finish().unwrap();
-    assert_says(Writer::create(dir.path(), &WriterOptions::default()).map(drop), &["already there"]);
+    assert_says(Writer::create(dir.path(), &WriterOptions::default()).map(drop), &["exists already"]);
     // Pictures without lists count as a recording, too.
     for list in ["rgb.txt", "depth.txt"] {
         fs::remove_file(dir.path().join(list)).unwrap();
     }
-    assert_says(Writer::create(dir.path(), &WriterOptions::default()).map(drop), &["already there"]);
+    assert_says(Writer::create(dir.path(), &WriterOptions::default()).map(drop), &["exists already"]);
 
     fs::write(dir.path().join("associations.txt"), "0 rgb/000000.png 0 depth/000000.png\n").unwrap();
     fs::write(dir.path().join("notes.txt"), "kept").unwrap();
@@ -156,5 +156,5 @@ fn nothing_recorded_is_an_error_and_leaves_the_folder_free() {
     assert_says(Writer::create(dir.path(), &options).map(drop), &["depth scale"]);
     fs::write(dir.path().join("file"), "").unwrap();
     let inside_a_file = dir.path().join("file/recording");
-    assert_says(Writer::create(&inside_a_file, &WriterOptions::default()).map(drop), &["file", "it is no folder"]);
+    assert_says(Writer::create(&inside_a_file, &WriterOptions::default()).map(drop), &["file", "it is not a folder"]);
 }

@@ -28,7 +28,7 @@ fn names_become_sinks() {
         assert_eq!(name.parse::<Target>().unwrap(), target);
     }
     for name in ["/dev/stdout", "/dev/fd/1"] {
-        assert!(name.parse::<Target>().unwrap_err().to_string().contains("standard output is called -"), "{name}");
+        assert!(name.parse::<Target>().unwrap_err().to_string().contains("standard output, use -"), "{name}");
     }
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("hostname");
@@ -90,7 +90,7 @@ fn a_place_that_cannot_be_written_is_named() {
     for name in ["file/clip.y4m", "file/out/"] {
         let error = open(&folder.path().join(name), &options((6, 4))).err().unwrap().to_string();
         assert!(error.starts_with("cannot write ") && error.contains("file"), "{error}");
-        assert_eq!(error.ends_with("/file: it is no folder"), name.ends_with('/'), "{error}");
+        assert_eq!(error.ends_with("/file: it is not a folder"), name.ends_with('/'), "{error}");
     }
 }
 

@@ -5,7 +5,7 @@ use std::io::{self, Write};
 use std::ops::ControlFlow;
 use std::path::Path;
 
-use bokehcam::color::Matrix;
+use bokehcam::color::YcbcrMatrix;
 use bokehcam::layout::Range;
 use bokehcam::sink::yuv::Converter;
 use bokehcam::sink::{Ending, Sink, Y4m};
@@ -13,8 +13,8 @@ use bokehcam::sink::{Ending, Sink, Y4m};
 use super::{PERIOD_NS, flat, open, options, picture};
 
 /// Converts limited-range planes to RGB by the definition of the matrix, in floating point.
-fn decode(matrix: Matrix, width: usize, height: usize, planes: &[u8]) -> Vec<[f64; 3]> {
-    let [kr, _, kb] = matrix.weights();
+fn decode(matrix: YcbcrMatrix, width: usize, height: usize, planes: &[u8]) -> Vec<[f64; 3]> {
+    let [kr, _, kb] = matrix.luma_weights();
     let half = width.div_ceil(2);
     let (luma, chroma) = planes.split_at(width * height);
     let (cb, cr) = chroma.split_at(half * height.div_ceil(2));
@@ -60,7 +60,7 @@ fn a_grey_picture_is_this_y4m_to_the_byte() {
 
 #[test]
 fn colours_survive_within_two_levels() {
-    for matrix in [Matrix::Bt601, Matrix::Bt709] {
+    for matrix in [YcbcrMatrix::Bt601, YcbcrMatrix::Bt709] {
         let converter = Converter::new(matrix, Range::Limited);
         for (width, height) in [(4, 2), (5, 3), (1, 1), (1, 6)] {
             for code in 0..125u32 {
@@ -82,9 +82,9 @@ fn chroma_is_the_mean_of_its_four_pixels() {
     image.rgb[..3].copy_from_slice(&[255, 0, 0]);
     image.rgb[9..].copy_from_slice(&[255, 0, 0]);
     let mut mixed = Vec::new();
-    Converter::new(Matrix::Bt709, Range::Limited).append(&image, &mut mixed);
+    Converter::new(YcbcrMatrix::Bt709, Range::Limited).append(&image, &mut mixed);
     let mut mean = Vec::new();
-    Converter::new(Matrix::Bt709, Range::Limited).append(&flat(2, 2, [127, 0, 0]), &mut mean);
+    Converter::new(YcbcrMatrix::Bt709, Range::Limited).append(&flat(2, 2, [127, 0, 0]), &mut mean);
     assert!(mixed[4].abs_diff(mean[4]) <= 1 && mixed[5].abs_diff(mean[5]) <= 1);
     assert_eq!((mixed[0], mixed[1]), (63, 16));
 }

@@ -84,14 +84,14 @@ struct Options {
 }
 
 /// Length of the generated recording, in frames; it is looped.
-const RECORDED: u32 = 16;
+const RECORDED_FRAMES: u32 = 16;
 
 fn main() -> ExitCode {
     let options = match common::options::<Options>() {
         Ok(options) => options,
         Err(code) => return code,
     };
-    match measure(&options) {
+    match measure_all(&options) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("error: {error}");
@@ -100,7 +100,7 @@ fn main() -> ExitCode {
     }
 }
 
-fn measure(options: &Options) -> Result<()> {
+fn measure_all(options: &Options) -> Result<()> {
     if options.paint {
         paint::measure();
         return Ok(());
@@ -108,7 +108,7 @@ fn measure(options: &Options) -> Result<()> {
     let scratch = tempfile::tempdir()?;
     let folder = match &options.folder {
         Some(folder) => folder.clone(),
-        None => record(options, scratch.path())?,
+        None => record_scene(options, scratch.path())?,
     };
     if options.reaction {
         return reaction::measure(&folder, scratch.path());
@@ -123,7 +123,7 @@ fn measure(options: &Options) -> Result<()> {
     let (mut shown, mut presented) = (Vec::new(), Vec::new());
     for round in 1..=options.rounds {
         for (kind, costs) in runs.iter_mut().enumerate() {
-            let report = run(options, &folder, kind == 1, &screen, scratch.path())?;
+            let report = run_program(options, &folder, kind == 1, &screen, scratch.path())?;
             let number = |pointer: &str| report.pointer(pointer).and_then(Value::as_f64);
             let delivered = number("/frames/delivered").filter(|&frames| frames > 0.0).ok_or("no frame came out")?;
             let cost_ms = 1e3 * number("/cpu_s").ok_or("the report has no cpu_s")? / delivered;
@@ -145,16 +145,16 @@ fn measure(options: &Options) -> Result<()> {
     Ok(())
 }
 
-fn bokehcam() -> Command {
+fn bokehcam_command() -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_bokehcam"));
     command.arg("--quiet").stdin(Stdio::null());
     command
 }
 
-fn record(options: &Options, scratch: &Path) -> Result<PathBuf> {
+fn record_scene(options: &Options, scratch: &Path) -> Result<PathBuf> {
     let folder = scratch.join("recording");
-    eprintln!("recording {RECORDED} frames of {}", options.size);
-    let status = bokehcam()
+    eprintln!("recording {RECORDED_FRAMES} frames of {}", options.size);
+    let status = bokehcam_command()
         .args([
             "record",
             "synthetic",
@@ -163,7 +163,7 @@ fn record(options: &Options, scratch: &Path) -> Result<PathBuf> {
             "--fps",
             &options.fps,
             "--frames",
-            &RECORDED.to_string(),
+            &RECORDED_FRAMES.to_string(),
             "--to",
         ])
         .arg(&folder)
@@ -171,9 +171,9 @@ fn record(options: &Options, scratch: &Path) -> Result<PathBuf> {
     if status.success() { Ok(folder) } else { Err("the recording failed".into()) }
 }
 
-fn run(options: &Options, folder: &Path, window: bool, screen: &Screen, scratch: &Path) -> Result<Value> {
+fn run_program(options: &Options, folder: &Path, window: bool, screen: &Screen, scratch: &Path) -> Result<Value> {
     let path = scratch.join("report.json");
-    let mut command = bokehcam();
+    let mut command = bokehcam_command();
     if window {
         command.args(["preview", &format!("--panel={}", options.panel)]);
         command.arg(format!("--instruments={}", options.instruments));

@@ -22,7 +22,7 @@ const STUCK: &str = "rgb/stuck.png";
 /// Runs the measurement and prints its result; `recording` must have depth.
 pub fn measure(recording: &Path, scratch: &Path) -> Result<()> {
     let stuck = scratch.join("stuck");
-    make_stuck(recording, &stuck)?;
+    create_stuck_recording(recording, &stuck)?;
     let busy = ["--quality", "best", "--coc-at-infinity", "6%", "--max-coc", "60"];
     let cases: [(&str, &Path, &[&str]); 3] = [
         ("as usual", recording, &[]),
@@ -43,10 +43,10 @@ pub fn measure(recording: &Path, scratch: &Path) -> Result<()> {
         });
         let window = window.ok_or("no window")?;
         until("its first picture", PATIENCE, || {
-            corner(&window).is_some_and(|bytes| bytes.iter().any(|byte| *byte > 40))
+            capture_corner(&window).is_some_and(|bytes| bytes.iter().any(|byte| *byte > 40))
         });
         std::thread::sleep(Duration::from_secs(2));
-        let mut took_ms: Vec<f64> = (0..PRESSES).filter_map(|press| react(&window, press)).collect();
+        let mut took_ms: Vec<f64> = (0..PRESSES).filter_map(|press| measure_reaction(&window, press)).collect();
         took_ms.sort_by(f64::total_cmp);
         let at = |share: f64| took_ms.get(((took_ms.len() - 1) as f64 * share).round() as usize).copied();
         let [p50, p99, max] = [0.5, 0.99, 1.0].map(|share| at(share).unwrap_or(f64::NAN));
@@ -59,7 +59,7 @@ pub fn measure(recording: &Path, scratch: &Path) -> Result<()> {
 }
 
 /// Copies a recording, with a pipe that has no writer as its third picture.
-fn make_stuck(recording: &Path, folder: &Path) -> Result<()> {
+fn create_stuck_recording(recording: &Path, folder: &Path) -> Result<()> {
     fs::create_dir_all(folder.join("rgb"))?;
     fs::create_dir_all(folder.join("depth"))?;
     for (list, name) in [("rgb.txt", "rgb"), ("depth.txt", "depth")] {
@@ -81,25 +81,25 @@ fn make_stuck(recording: &Path, folder: &Path) -> Result<()> {
 }
 
 /// Captures the corner's current pixels.
-fn corner(window: &Window) -> Option<Vec<u8>> {
+fn capture_corner(window: &Window) -> Option<Vec<u8>> {
     let (x, y, width, height) = CORNER;
     let asked = window.screen.x.get_image(ImageFormat::Z_PIXMAP, window.id, x, y, width, height, u32::MAX).ok()?;
     Some(asked.reply().ok()?.data)
 }
 
-fn brightness(bytes: &[u8]) -> f64 {
+fn mean_brightness(bytes: &[u8]) -> f64 {
     bytes.iter().map(|byte| f64::from(*byte)).sum::<f64>() / bytes.len().max(1) as f64
 }
 
 /// Toggles the instruments by key, and waits until they appear or disappear. The result includes the harness's pause
 /// after a key, which is its lower bound.
-fn react(window: &Window, press: usize) -> Option<f64> {
+fn measure_reaction(window: &Window, press: usize) -> Option<f64> {
     std::thread::sleep(Duration::from_millis(90 + 37 * (press as u64 % 7)));
-    let before = brightness(&corner(window)?);
+    let before = mean_brightness(&capture_corner(window)?);
     let began = Instant::now();
     window.key(&[], u32::from('i'));
     while began.elapsed() < PATIENCE {
-        if (brightness(&corner(window)?) - before).abs() > 8.0 {
+        if (mean_brightness(&capture_corner(window)?) - before).abs() > 8.0 {
             return Some(began.elapsed().as_secs_f64() * 1e3);
         }
         std::thread::sleep(Duration::from_millis(1));

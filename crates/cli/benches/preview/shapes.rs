@@ -18,7 +18,7 @@ const DISC: &str = "aperture = \"disc\"\ncoc-at-infinity = \"3%\"\nhighlights = 
 /// Number of runs of each program; no cache survives a run.
 const ROUNDS: usize = 7;
 /// The log text before the duration.
-const MADE: &str = "an executor was made in ";
+const EXECUTOR_MADE: &str = "an executor was made in ";
 
 /// Measures each of `programs` in turn, and prints the results; `recording` must have depth.
 pub fn measure(recording: &Path, scratch: &Path, programs: &[PathBuf]) -> Result<()> {
@@ -30,7 +30,7 @@ pub fn measure(recording: &Path, scratch: &Path, programs: &[PathBuf]) -> Result
     let mut took_ms = vec![vec![Vec::new(); SHAPES.len() + 1]; programs.len()];
     for _ in 0..ROUNDS {
         for (program, took_ms) in programs.iter().zip(&mut took_ms) {
-            for (took_ms, took) in took_ms.iter_mut().zip(shapes(program, recording, scratch)?) {
+            for (took_ms, took) in took_ms.iter_mut().zip(measure_shapes(program, recording, scratch)?) {
                 took_ms.push(took);
             }
         }
@@ -44,7 +44,7 @@ pub fn measure(recording: &Path, scratch: &Path, programs: &[PathBuf]) -> Result
 }
 
 /// Measures the time for each shape, in milliseconds, in a new process.
-fn shapes(program: &Path, recording: &Path, scratch: &Path) -> Result<Vec<f64>> {
+fn measure_shapes(program: &Path, recording: &Path, scratch: &Path) -> Result<Vec<f64>> {
     let (screen, said) = (Screen::new(), scratch.join("said"));
     let mut command = Command::new(program);
     command.args(["-vv", "preview"]).arg(recording).args(["--backend", "cpu", "--panel=false"]);
@@ -64,8 +64,8 @@ fn shapes(program: &Path, recording: &Path, scratch: &Path) -> Result<Vec<f64>> 
         let mut last = None;
         until("another executor", PATIENCE, || {
             let text = fs::read_to_string(&said).unwrap_or_default();
-            let made: Vec<&str> = text.split(MADE).skip(1).filter_map(|rest| rest.lines().next()).collect();
-            last = made.get(took_ms.len()).and_then(|took| milliseconds(took));
+            let made: Vec<&str> = text.split(EXECUTOR_MADE).skip(1).filter_map(|rest| rest.lines().next()).collect();
+            last = made.get(took_ms.len()).and_then(|took| parse_milliseconds(took));
             last.is_some()
         });
         took_ms.extend(last);
@@ -75,7 +75,7 @@ fn shapes(program: &Path, recording: &Path, scratch: &Path) -> Result<Vec<f64>> 
 }
 
 /// Parses a duration in Rust's `Debug` format; returns milliseconds.
-fn milliseconds(text: &str) -> Option<f64> {
+fn parse_milliseconds(text: &str) -> Option<f64> {
     let (number, factor) = match text.trim() {
         text if text.ends_with("µs") => (text.trim_end_matches("µs"), 1e-3),
         text if text.ends_with("ms") => (text.trim_end_matches("ms"), 1.0),

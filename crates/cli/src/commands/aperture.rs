@@ -7,12 +7,12 @@ use clap::{Args, value_parser};
 use serde::Serialize;
 
 use crate::error::CliError;
-use crate::files::{refuse_overwrite, refuse_source, write_whole};
+use crate::files::{refuse_overwrite, refuse_overwriting_source, write_atomically};
 use crate::options::{Global, Output};
 use crate::terminal;
 use bokehcam::bokeh::aperture::Aperture;
-use bokehcam::look::ApertureName;
-use bokehcam::look::number::within;
+use bokehcam::look::ApertureSetting;
+use bokehcam::look::number::in_range_parser;
 use bokehcam::recording::still::write_color;
 
 use bokehcam_lab::aperture::{Analysis, RankErrors, draw, error_by_rank};
@@ -20,25 +20,25 @@ use bokehcam_lab::aperture::{Analysis, RankErrors, draw, error_by_rank};
 /// Analyse how well a few separable terms approximate an aperture
 ///
 /// Writes aperture.json (singular values and errors by rank), errors.svg (error over rank) and one picture per
-/// aperture: the kernel, its approximations, and what each has too much (red) or too little (blue).
+/// aperture: the kernel, its approximations, and where each is too bright (red) or too dark (blue).
 #[derive(Args, Debug)]
 #[command(after_help = "\
 Examples:
   bokehcam aperture --out kernels/
   bokehcam aperture --out kernels/ --apertures disc,polygon:6:15,image:cat.png --ranks 1,2,4
-  bokehcam aperture --out soft/ --rim 0.2        (the soft rim that the blur uses)")]
+  bokehcam aperture --out soft/ --rim 0.2        (the soft rim of the default blur)")]
 pub struct ApertureCommand {
     /// Folder for the table, the diagram and the pictures
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// Apertures, as --aperture of the other commands takes them
+    /// Apertures, written as for --aperture of the other commands
     #[arg(
         long,
         value_name = "SHAPES",
         value_delimiter = ',',
         default_value = "disc,ring:0.5,polygon:5,polygon:6,polygon:8,heart,star:5"
     )]
-    apertures: Vec<ApertureName>,
+    apertures: Vec<ApertureSetting>,
     /// Columns and rows of the kernel, 5 to 257
     #[arg(long, value_name = "PX", default_value = "65", value_parser = value_parser!(u16).range(5..=257))]
     size: u16,
@@ -47,7 +47,7 @@ pub struct ApertureCommand {
           value_parser = value_parser!(u16).range(1..=64))]
     ranks: Vec<u16>,
     /// Width of the soft rim, as a fraction of the radius; 0 is the hard rim of the paper
-    #[arg(id = "analysed_rim", long = "rim", value_name = "W", default_value_t = 0.0, value_parser = within(0.0..=1.0))]
+    #[arg(id = "analysed_rim", long = "rim", value_name = "W", default_value_t = 0.0, value_parser = in_range_parser(0.0..=1.0))]
     rim: f32,
     #[command(flatten)]
     output: Output,
@@ -86,16 +86,17 @@ impl<'a> Row<'a> {
 /// # Errors
 /// Fails if an output exists without `--force` or cannot be written, or an aperture's picture cannot be read.
 pub fn run(command: &ApertureCommand, global: &Global) -> Result<(), CliError> {
-    let ranks = sorted_ranks(&command.ranks)?;
-    let outputs: Vec<PathBuf> = command.apertures.iter().map(|name| command.out.join(picture_name(name))).collect();
+    let ranks = parse_ranks(&command.ranks)?;
+    let outputs: Vec<PathBuf> =
+        command.apertures.iter().map(|name| command.out.join(picture_file_name(name))).collect();
     if let Some((index, _)) = outputs.iter().enumerate().find(|(i, path)| outputs[..*i].contains(path)) {
         return Err(CliError::Usage(format!("--apertures: {} is there twice", command.apertures[index])));
     }
     let (table_path, plot_path) = (command.out.join("aperture.json"), command.out.join("errors.svg"));
     let all = outputs.iter().chain([&table_path, &plot_path]);
     for name in &command.apertures {
-        if let ApertureName::Image(read) = name {
-            all.clone().try_for_each(|file| refuse_source("--out", file, read))?;
+        if let ApertureSetting::Image(read) = name {
+            all.clone().try_for_each(|file| refuse_overwriting_source("--out", file, read))?;
         }
     }
     refuse_overwrite(all.map(PathBuf::as_path), command.output.force)?;
@@ -103,7 +104,7 @@ pub fn run(command: &ApertureCommand, global: &Global) -> Result<(), CliError> {
     // Everything is computed before the first file is written.
     let mut analyses = Vec::new();
     for name in &command.apertures {
-        let mask = Aperture { shape: name.load()?, intensity: 0.0 }.mask(usize::from(command.size), command.rim);
+        let mask = Aperture { shape: name.load()?, intensity: 0.0 }.to_mask(usize::from(command.size), command.rim);
         analyses.push(Analysis::of(name.to_string(), &mask, &ranks));
     }
     let table = Table {
@@ -118,28 +119,28 @@ pub fn run(command: &ApertureCommand, global: &Global) -> Result<(), CliError> {
     for (analysis, path) in analyses.iter().zip(&outputs) {
         write_color(path, &draw(analysis), command.output.force)?;
     }
-    write_whole(&plot_path, plot.as_bytes(), command.output.force)?;
-    write_whole(&table_path, &json, command.output.force)?;
+    write_atomically(&plot_path, plot.as_bytes(), command.output.force)?;
+    write_atomically(&table_path, &json, command.output.force)?;
     if !global.quiet {
-        terminal::say(&format!("{} apertures analysed: {}", analyses.len(), table_path.display()));
+        terminal::print_to_stderr(&format!("{} apertures analysed: {}", analyses.len(), table_path.display()));
     }
     Ok(())
 }
 
-fn sorted_ranks(ranks: &[u16]) -> Result<Vec<usize>, CliError> {
+fn parse_ranks(ranks: &[u16]) -> Result<Vec<usize>, CliError> {
     let mut ranks: Vec<usize> = ranks.iter().copied().map(usize::from).collect();
     ranks.sort_unstable();
     ranks.dedup();
     match ranks.len() {
         0..=12 => Ok(ranks),
-        many => Err(CliError::Usage(format!("--ranks: {many} are too many for one picture, give at most 12"))),
+        many => Err(CliError::Usage(format!("--ranks: {many} are too many for one picture; give at most 12"))),
     }
 }
 
 /// Returns a file name for the aperture, safe for any characters in its own name.
-fn picture_name(name: &ApertureName) -> String {
+fn picture_file_name(name: &ApertureSetting) -> String {
     let text = match name {
-        ApertureName::Image(file) => format!("image-{}", file.file_stem().unwrap_or_default().to_string_lossy()),
+        ApertureSetting::Image(file) => format!("image-{}", file.file_stem().unwrap_or_default().to_string_lossy()),
         other => other.to_string(),
     };
     let safe = |c: char| if c.is_ascii_alphanumeric() || c == '.' || c == '_' { c } else { '-' };
@@ -153,7 +154,7 @@ mod tests {
     #[test]
     fn pictures_have_plain_names() {
         for (name, file) in [("polygon:6:15", "polygon-6-15.png"), ("image:/a b/c d.png", "image-c-d.png")] {
-            assert_eq!(picture_name(&name.parse().unwrap()), file);
+            assert_eq!(picture_file_name(&name.parse().unwrap()), file);
         }
     }
 }

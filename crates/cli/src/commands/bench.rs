@@ -11,18 +11,18 @@ use serde::Serialize;
 
 use crate::error::CliError;
 use crate::options;
-use crate::settings::layers::Given;
+use crate::settings::layers::GivenSettings;
 use crate::settings::look;
 use crate::settings::unused;
-use crate::terminal::{Progress, print};
+use crate::terminal::{Progress, print_to_stdout};
 use bokehcam::bokeh::{Bokeh, BokehError, Job, PassTimes};
 use bokehcam::budget::Quality;
 use bokehcam::compute::Backend;
-use bokehcam::computing::Computing;
-use bokehcam::engine::still::{Depth, coc_and_depth};
+use bokehcam::computing::ComputeOptions;
+use bokehcam::engine::still::{Depth, compute_coc_and_depth};
 use bokehcam::frame::{ColorImage, DepthMap};
 use bokehcam::link::pool::Pool;
-use bokehcam::look::number::within;
+use bokehcam::look::number::in_range_parser;
 use bokehcam::look::{COC_AT_INFINITY_PER_HEIGHT, Look, MAX_RADIUS_PX, Strength};
 use bokehcam::optics::CocField;
 use bokehcam::source::{self, DepthChoice, Size, SourceName};
@@ -39,9 +39,9 @@ const HEADING: &str = "size        coc px  quality    p50 ms   p95 ms   max ms  
 
 /// Measure the blur on this machine, without reading or writing files
 ///
-/// Blurs one picture again and again, one at a time, for every combination of the lists given.
-/// The time is that of one frame, in milliseconds, from handing it over until it is back.
-/// With --chain: the frames of a source go through all that a stream does, one at a time, and each stage is measured.
+/// Blurs one picture repeatedly, one frame at a time, for every combination of the given lists. Times are per frame, in
+/// milliseconds, from submission to result. With --chain: the frames of a source pass through all stages of a stream,
+/// one at a time, and each stage is measured.
 #[derive(Args, Debug)]
 #[command(after_help = "\
 Examples:
@@ -55,37 +55,37 @@ pub struct BenchCommand {
     #[arg(long, value_name = "WxH", value_delimiter = ',', default_value = "640x480,1280x720,1920x1080")]
     sizes: Vec<Size>,
     /// Blur radii at infinity, in pixels [default: height / 45]
-    #[arg(long, value_name = "PX", value_delimiter = ',', value_parser = within(0.0..=MAX_RADIUS_PX))]
+    #[arg(long, value_name = "PX", value_delimiter = ',', value_parser = in_range_parser(0.0..=MAX_RADIUS_PX))]
     coc: Vec<f32>,
     /// Quality levels [default: balanced; with --chain all]
     #[arg(id = "benched_quality", long = "quality", value_name = "LEVELS", value_delimiter = ',',
-          value_parser = options::named::<Quality>())]
+          value_parser = options::named_value_parser::<Quality>())]
     quality: Vec<Quality>,
     /// Numbers of threads of the CPU backend [default: one per core]
     #[arg(id = "benched_threads", long = "threads", value_name = "N", value_delimiter = ',',
           value_parser = value_parser!(u16).range(1..=1024))]
     threads: Vec<u16>,
-    /// What is in the picture
-    #[arg(long, value_parser = options::named::<picture::Scene>(), value_name = "WHICH", default_value_t)]
+    /// Content of the picture
+    #[arg(long, value_parser = options::named_value_parser::<picture::Scene>(), value_name = "WHICH", default_value_t)]
     scene: picture::Scene,
-    /// Frames to measure [default: 20, or fewer where these would take more than 2 s]
+    /// Frames to measure [default: 20, or fewer if they would take more than 2 s]
     #[arg(id = "benched_frames", long = "frames", value_name = "N", value_parser = value_parser!(u32).range(1..))]
     frames: Option<u32>,
-    /// What runs the blur
-    #[arg(long, value_parser = options::named::<Backend>(), value_name = "WHICH", default_value = "auto")]
+    /// Where the blur runs
+    #[arg(long, value_parser = options::named_value_parser::<Backend>(), value_name = "WHICH", default_value = "auto")]
     backend: Backend,
-    /// Part of the name of the GPU to take
+    /// GPU to use, by a part of its name
     #[arg(long, value_name = "NAME")]
     adapter: Option<String>,
-    /// One JSON object a line, instead of a table
+    /// One JSON object per line, instead of a table
     #[arg(long)]
     json: bool,
     /// Also the median of each pass, in milliseconds
     #[arg(long)]
     passes: bool,
-    /// Measure all that a stream does instead: reading, depth, blur at each quality, and writing for a virtual camera; from a
-    /// recording, a photo, `demo` or `synthetic`
-    #[arg(long, value_name = "SOURCE", num_args = 0..=1, default_missing_value = "demo", value_parser = options::source_name(),
+    /// Measure all stages of a stream instead: reading, depth, blur at each quality, and writing for a virtual camera;
+    /// from a recording, a photo, `demo` or `synthetic`
+    #[arg(long, value_name = "SOURCE", num_args = 0..=1, default_missing_value = "demo", value_parser = options::source_name_parser(),
           conflicts_with_all = ["sizes", "coc", "scene", "passes"])]
     chain: Option<SourceName>,
     #[command(flatten)]
@@ -96,7 +96,7 @@ pub struct BenchCommand {
 
 /// One row of the result.
 #[derive(Serialize)]
-struct Measured {
+struct Measurement {
     size_px: (u32, u32),
     coc_px: f32,
     quality: &'static str,
@@ -113,47 +113,47 @@ struct Measured {
 ///
 /// # Errors
 /// Fails if the options conflict, the backend is missing, or the blur fails.
-pub fn run(command: &BenchCommand, global: &options::Global, given: &Given) -> Result<(), CliError> {
+pub fn run(command: &BenchCommand, global: &options::Global, given: &GivenSettings) -> Result<(), CliError> {
     if let Some(source) = &command.chain {
         return chain::run(command, source, given);
     }
-    if command.blur.depth.is_elsewhere() || command.blur.depth == DepthChoice::Stereo {
-        let what = "--depth is for `stream`: the scene that is measured has its own depth; leave it out, or use none";
+    if command.blur.depth.is_external() || command.blur.depth == DepthChoice::Stereo {
+        let what = "--depth is for `stream`: the measured scene has its own depth; leave --depth out, or use none";
         return Err(CliError::Usage(what.to_string()));
     }
-    let look = look::look(&command.blur, &options::LookSettings::default())?;
-    let look = source::fitting_look(&Look { strength: Strength::Default, ..look }, &command.blur.depth, true)?;
-    unused::warn(
+    let look = look::build_look(&command.blur, &options::LookSettings::default())?;
+    let look = source::adapt_look(&Look { strength: Strength::Default, ..look }, &command.blur.depth, true)?;
+    unused::warn_of_unused(
         &given.settings,
-        &unused::Run {
-            source: unused::From::Bench,
+        &unused::RunFacts {
+            source: unused::FrameOrigin::Bench,
             depth: source::DepthOrigin::Metres,
             uses_depth: true,
             effect: look.effect,
             cpu_only: command.backend == Backend::Cpu,
-            ..unused::Run::default()
+            ..unused::RunFacts::default()
         },
     );
     if !command.json {
-        print(HEADING.as_bytes())?;
+        print_to_stdout(HEADING.as_bytes())?;
     }
     let combinations = command.sizes.len() * command.coc.len().max(1) * command.quality.len().max(1);
-    let combinations = (combinations * command.computings().len()) as u64;
+    let combinations = (combinations * command.list_configurations().len()) as u64;
     let mut done = 0;
     let levels = if command.quality.is_empty() { &[Quality::default()][..] } else { &command.quality };
     for size in &command.sizes {
-        let (color, depth) = picture::first_frame(command.scene, (size.width, size.height))?;
+        let (color, depth) = picture::render_first_frame(command.scene, (size.width, size.height))?;
         let default_coc_px = [size.height as f32 * COC_AT_INFINITY_PER_HEIGHT];
         let radii_px = if command.coc.is_empty() { &default_coc_px[..] } else { &command.coc };
         for &coc_px in radii_px {
             for &quality in levels {
-                for computing in command.computings() {
+                for computing in command.list_configurations() {
                     // Each row erases the bar, so every combination starts a new one.
                     let progress =
                         Progress::new(Some(combinations * u64::from(command.frames.unwrap_or(FRAMES))), global);
                     let before = done * u64::from(command.frames.unwrap_or(FRAMES));
-                    progress.delivered(before);
-                    let measured = measure(
+                    progress.set_delivered(before);
+                    let measured = measure_blur(
                         command.frames,
                         &look,
                         (&color, &depth),
@@ -163,7 +163,7 @@ pub fn run(command: &BenchCommand, global: &options::Global, given: &Given) -> R
                     )?;
                     drop(progress);
                     done += 1;
-                    print(measured.line(command.json, command.passes).as_bytes())?;
+                    print_to_stdout(measured.format_line(command.json, command.passes).as_bytes())?;
                 }
             }
         }
@@ -173,9 +173,9 @@ pub fn run(command: &BenchCommand, global: &options::Global, given: &Given) -> R
 
 /// Returns the table of one size at the default quality for `--backend auto` and for the CPU; takes some seconds.
 #[cfg(feature = "camera")]
-pub fn short_table() -> String {
+pub fn run_short_benchmark() -> String {
     const SIZE: (u32, u32) = (1280, 720);
-    let frame = match picture::first_frame(picture::Scene::default(), SIZE) {
+    let frame = match picture::render_first_frame(picture::Scene::default(), SIZE) {
         Ok(frame) => frame,
         Err(error) => return format!("{error}\n"),
     };
@@ -183,10 +183,10 @@ pub fn short_table() -> String {
     let blur = (coc_px, Quality::default());
     let mut table = HEADING.to_owned();
     for backend in [Backend::Auto, Backend::Cpu] {
-        let (computing, progress) = (Computing { backend, ..Computing::default() }, Progress::silent());
-        match measure(None, &Look::default(), (&frame.0, &frame.1), blur, &computing, (&progress, 0)) {
+        let (computing, progress) = (ComputeOptions { backend, ..ComputeOptions::default() }, Progress::silent());
+        match measure_blur(None, &Look::default(), (&frame.0, &frame.1), blur, &computing, (&progress, 0)) {
             Ok(measured) => {
-                table += &measured.line(false, false);
+                table += &measured.format_line(false, false);
                 // `auto` chose the CPU: its row is already there.
                 if measured.executor.starts_with(Backend::Cpu.name()) {
                     break;
@@ -200,8 +200,8 @@ pub fn short_table() -> String {
 
 impl BenchCommand {
     /// Returns one configuration per `--threads` value.
-    fn computings(&self) -> Vec<Computing> {
-        let with_threads = |threads| Computing { backend: self.backend, adapter: self.adapter.clone(), threads };
+    fn list_configurations(&self) -> Vec<ComputeOptions> {
+        let with_threads = |threads| ComputeOptions { backend: self.backend, adapter: self.adapter.clone(), threads };
         match &self.threads[..] {
             [] => vec![with_threads(None)],
             list => list.iter().map(|&threads| with_threads(Some(usize::from(threads)))).collect(),
@@ -211,23 +211,23 @@ impl BenchCommand {
 
 /// Measures one combination of settings: blurs the same picture repeatedly after a warm-up. `before` is the number of
 /// frames that `progress` has already counted.
-fn measure(
+fn measure_blur(
     frames: Option<u32>,
     look: &Look,
     (color, depth): (&ColorImage, &DepthMap),
     (coc_px, quality): (f32, Quality),
-    computing: &Computing,
+    computing: &ComputeOptions,
     (progress, before): (&Progress, u64),
-) -> Result<Measured, CliError> {
+) -> Result<Measurement, CliError> {
     let look = Look { strength: Strength::AtInfinity(coc_px), quality: Some(quality), ..look.clone() };
     let size = color.size();
-    let Some(settings) = look.settings(size, false) else {
+    let Some(settings) = look.blur_settings(size, false) else {
         return Err(CliError::Usage(
             "--effect none leaves nothing to measure: use dof, tilt-shift or blur".to_string(),
         ));
     };
     let mut color = color.clone();
-    let (coc, depth) = coc_and_depth(&look, &mut color, Some(Depth::Measured(depth.clone())))?;
+    let (coc, depth) = compute_coc_and_depth(&look, &mut color, Some(Depth::Measured(depth.clone())))?;
     // One frame at a time: the latency is measured, not the throughput.
     let mut bokeh = computing.create_blur(&settings, size)?;
     let buffers = Buffers {
@@ -246,13 +246,13 @@ fn measure(
         if is_over {
             break;
         }
-        progress.delivered(before + u64::from(frame));
+        progress.set_delivered(before + u64::from(frame));
         let (time, in_passes) = buffers.time_frame(&mut *bokeh, coc)?;
         times.push(time);
         in_passes.iter().for_each(|(name, time)| passes.entry(name).or_default().push(time));
     }
     times.sort_unstable();
-    Ok(Measured {
+    Ok(Measurement {
         size_px: size,
         coc_px,
         quality: quality.name(),
@@ -297,9 +297,9 @@ impl Buffers {
     }
 }
 
-impl Measured {
+impl Measurement {
     /// Formats the result as one JSON object, or as a table row with an optional second line for the passes.
-    fn line(&self, json: bool, passes: bool) -> String {
+    fn format_line(&self, json: bool, passes: bool) -> String {
         if json {
             // Numbers and strings always serialise.
             return serde_json::to_string(self).unwrap_or_default() + "\n";

@@ -22,7 +22,7 @@ const VALUES: [(&str, &[&str]); 4] = [
 /// Adds suggested values to the command's options; options that take no file get no file completion.
 pub fn add_completions(command: Command, file: &SettingsFile) -> Command {
     let names: Vec<String> =
-        presets::built_in().map(|preset| preset.name).chain(file.presets.keys().cloned()).collect();
+        presets::built_in_presets().map(|preset| preset.name).chain(file.presets.keys().cloned()).collect();
     add_to_tree(command, &names)
 }
 

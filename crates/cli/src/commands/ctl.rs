@@ -9,8 +9,8 @@ use crate::error::CliError;
 use crate::log;
 use crate::options::Global;
 use crate::settings::paths::resolve_paths;
-use crate::terminal::{print, say};
-use bokehcam::control::client::{ask, runs};
+use crate::terminal::{print_to_stderr, print_to_stdout};
+use bokehcam::control::client::{list_run_names, send_request};
 use bokehcam::control::{Answer, ControlError, Name, Request, Status};
 use bokehcam::look::settings;
 
@@ -18,7 +18,7 @@ use bokehcam::look::settings;
 #[derive(Args, Debug)]
 #[command(after_help = "\
 Examples:
-  bokehcam ctl                              what runs
+  bokehcam ctl                              list all runs
   bokehcam ctl toggle
   bokehcam ctl preset dreamy
   bokehcam ctl set blur=3% focus=auto
@@ -26,10 +26,10 @@ Examples:
   bokehcam ctl --name stream-2 status --json
   bokehcam ctl snapshot --to me.png
 
-Off shows a still card in place of the picture, and the camera rests. The picture without blur is `set effect=none`.
+Off shows a still card in place of the picture, and closes the camera. The picture without blur is `set effect=none`.
 docs/ctl.md (in a package /usr/share/doc/bokehcam/docs/ctl.md) has recipes for keys and bars, and the protocol.")]
 pub struct CtlCommand {
-    /// Which run, where there are several: its --name, or as `bokehcam ctl list` has it
+    /// Name of the run, if there are several: its --name, or the name in `bokehcam ctl list`
     #[arg(long, global = true, value_name = "NAME")]
     name: Option<Name>,
     #[command(subcommand)]
@@ -38,35 +38,35 @@ pub struct CtlCommand {
 
 #[derive(Subcommand, Debug)]
 enum Verb {
-    /// List what runs: name, on or off, source and outputs; so does `ctl` alone
+    /// List all runs: name, on or off, source and outputs; `ctl` alone does the same
     List,
     /// Show pictures again, as before
     On,
-    /// Show a still card in place of the picture; the camera rests
+    /// Show a still card in place of the picture, and close the camera
     Off,
-    /// Off if it is on, else on
+    /// Switch off if on, and on if off
     Toggle,
-    /// Take the look of a preset, built in or your own
+    /// Apply a preset, built in or your own
     Preset {
         /// Its name
         #[arg(id = "look", value_name = "PRESET")]
         preset: String,
     },
-    /// Change settings of the look: all of them, or none if one cannot be
+    /// Change settings of the look: all of them, or none if one is invalid
     Set {
         /// Settings as on the command line, without the dashes
         #[arg(id = "settings", value_name = "NAME=VALUE", required = true)]
         settings: Vec<String>,
     },
-    /// Make depth another way, in a window: recorded, stereo, matte, matte,mono or plate, as the source has it
+    /// Change the source of depth, in a window: recorded, stereo, matte, matte,mono or plate, if available
     Depth {
-        /// The way, as behind --depth
+        /// The source of depth, written as for --depth
         #[arg(id = "way", value_name = "WAY")]
         from: String,
     },
-    /// Say how it is
+    /// Print the status
     Status {
-        /// As a line of JSON
+        /// Print it as one line of JSON
         #[arg(long)]
         json: bool,
     },
@@ -98,23 +98,23 @@ pub fn run(command: CtlCommand, global: &Global) -> Result<(), CliError> {
         }
         Verb::Depth { from } => Request::Depth { from },
         Verb::Status { .. } => Request::Status,
-        Verb::Snapshot { to } => Request::Snapshot { to: to.map(|to| absolute(&to)).transpose()? },
+        Verb::Snapshot { to } => Request::Snapshot { to: to.map(|to| to_absolute(&to)).transpose()? },
     };
-    match ask(name.as_ref(), &request)? {
+    match send_request(name.as_ref(), &request)? {
         Answer::Done { status, note } => {
             note.iter().for_each(|note| log::warn(note));
             match (is_status, as_json) {
-                (_, true) => print(format!("{}\n", status_json(&status)?).as_bytes()),
-                (true, false) => print(status_text(&status).as_bytes()),
+                (_, true) => print_to_stdout(format!("{}\n", format_status_json(&status)?).as_bytes()),
+                (true, false) => print_to_stdout(format_status_text(&status).as_bytes()),
                 // A key binding has no terminal: only people read this.
                 (false, false) if global.quiet => Ok(()),
                 (false, false) => {
-                    say(&format!("{} is {}", status.name, describe_state(&status)));
+                    print_to_stderr(&format!("{} is {}", status.name, describe_state(&status)));
                     Ok(())
                 }
             }
         }
-        Answer::Saved { saved } => print(format!("{}\n", saved.display()).as_bytes()),
+        Answer::Saved { saved } => print_to_stdout(format!("{}\n", saved.display()).as_bytes()),
         Answer::Refused { error, usage: true } => Err(CliError::Usage(error)),
         Answer::Refused { error, usage: false } => Err(CliError::Control(error)),
     }
@@ -123,7 +123,7 @@ pub fn run(command: CtlCommand, global: &Global) -> Result<(), CliError> {
 impl From<ControlError> for CliError {
     fn from(error: ControlError) -> Self {
         match error {
-            ControlError::Several(_) => Self::Usage(error.to_string()),
+            ControlError::SeveralRuns(_) => Self::Usage(error.to_string()),
             error => Self::Control(error.to_string()),
         }
     }
@@ -131,20 +131,20 @@ impl From<ControlError> for CliError {
 
 /// Prints one line per running instance.
 fn list_runs(name: Option<&Name>) -> Result<(), CliError> {
-    let runs: Vec<Name> = runs()?.into_iter().filter(|run| name.is_none_or(|name| run == name)).collect();
+    let runs: Vec<Name> = list_run_names()?.into_iter().filter(|run| name.is_none_or(|name| run == name)).collect();
     if runs.is_empty() {
-        say("nothing runs: begin with `bokehcam stream` or `bokehcam preview`");
+        print_to_stderr("nothing is running: start `bokehcam stream` or `bokehcam preview`");
     }
-    let line = |run: &Name| match ask(Some(run), &Request::Status) {
+    let line = |run: &Name| match send_request(Some(run), &Request::Status) {
         Ok(Answer::Done { status, .. }) => {
             let Status { on, source, sinks, .. } = *status;
             let source = if source.is_empty() { "no source" } else { &source };
             format!("{run:<12} {:<4} {source} to {}\n", if on { "on" } else { "off" }, sinks.join(", "))
         }
-        Ok(_) => format!("{run:<12} ?    it answers as another version does\n"),
+        Ok(_) => format!("{run:<12} ?    it is of another version\n"),
         Err(error) => format!("{run:<12} ?    {error}\n"),
     };
-    print(runs.iter().map(line).collect::<String>().as_bytes())
+    print_to_stdout(runs.iter().map(line).collect::<String>().as_bytes())
 }
 
 /// Makes relative paths in a setting absolute: the run may have another working directory.
@@ -155,19 +155,19 @@ fn resolve_setting(setting: String) -> Result<String, CliError> {
     if whole == value {
         return Ok(setting);
     }
-    absolute(&folder)?;
+    to_absolute(&folder)?;
     Ok(format!("{name}={whole}"))
 }
 
-fn absolute(path: &Path) -> Result<PathBuf, CliError> {
+fn to_absolute(path: &Path) -> Result<PathBuf, CliError> {
     let whole = path::absolute(path).map_err(CliError::io(path))?;
     match whole.to_str() {
         Some(_) => Ok(whole),
-        None => Err(CliError::Usage(format!("{}: use a name that is text in UTF-8", whole.display()))),
+        None => Err(CliError::Usage(format!("{}: use a name in UTF-8", whole.display()))),
     }
 }
 
-fn status_json(status: &Status) -> Result<String, CliError> {
+fn format_status_json(status: &Status) -> Result<String, CliError> {
     serde_json::to_string(status).map_err(|error| CliError::Control(error.to_string()))
 }
 
@@ -176,7 +176,7 @@ fn describe_state(status: &Status) -> &'static str {
 }
 
 /// Formats the status as text.
-fn status_text(status: &Status) -> String {
+fn format_status_text(status: &Status) -> String {
     let Status { name, pid, command, source, size, sinks, watched, quality, fps, look, uptime_s, .. } = status;
     let size = size.map_or_else(String::new, |(width, height)| format!(", {width}x{height}"));
     let watched = match watched {
@@ -186,7 +186,7 @@ fn status_text(status: &Status) -> String {
     };
     let sinks = if sinks.is_empty() { "nowhere else".to_owned() } else { sinks.join(", ") };
     let quality = quality.as_ref().map_or("not blurred".to_owned(), |quality| format!("quality {quality}"));
-    let is_alias = |name: &str| settings::name_of(name) != name;
+    let is_alias = |name: &str| settings::resolve_alias(name) != name;
     let look = look.iter().filter(|(name, _)| !is_alias(name)).map(|(name, value)| format!("{name}={value}"));
     let look: Vec<String> = look.collect();
     let whole_s = *uptime_s as u64;

@@ -9,7 +9,7 @@ use clap_mangen::Man;
 use clap_mangen::roff::{Roff, bold, roman};
 
 use crate::error::CliError;
-use crate::files::{refuse_overwrite, write_whole};
+use crate::files::{refuse_overwrite, write_atomically};
 use crate::options::Output;
 
 /// Write the manual pages of all commands into a folder, as packages install them
@@ -40,7 +40,7 @@ pub fn run(command: &ManualCommand, mut table: Command) -> Result<(), CliError> 
     }
     refuse_overwrite(pages.iter().map(|(path, _)| path.as_path()), command.output.force)?;
     fs::create_dir_all(&command.out).map_err(CliError::io(&command.out))?;
-    pages.iter().try_for_each(|(path, page)| write_whole(path, page, command.output.force))
+    pages.iter().try_for_each(|(path, page)| write_atomically(path, page, command.output.force))
 }
 
 /// Adds the pages (file name and text) of a command and its visible subcommands.
@@ -63,7 +63,7 @@ fn add_pages(command: &Command, program: &str, pages: &mut Vec<(PathBuf, Vec<u8>
     if visible().next().is_some() {
         page.render_subcommands_section(&mut text)?;
     }
-    let mut rest = after_help(&command.get_after_help().map(ToString::to_string).unwrap_or_default());
+    let mut rest = format_after_help(&command.get_after_help().map(ToString::to_string).unwrap_or_default());
     if command.get_name() != program {
         rest.control("SH", ["SEE ALSO"]).text([bold(program), roman("(1)")]);
     }
@@ -73,7 +73,7 @@ fn add_pages(command: &Command, program: &str, pages: &mut Vec<(PathBuf, Vec<u8>
 }
 
 /// Formats the text after the options: examples line by line, the rest as notes.
-fn after_help(text: &str) -> Roff {
+fn format_after_help(text: &str) -> Roff {
     let mut page = Roff::new();
     let mut lines = text.lines().peekable();
     while let Some(line) = lines.next() {

@@ -27,7 +27,7 @@ use crate::options;
 use crate::settings::file::SettingsFile;
 use crate::settings::layers::Layers;
 use crate::settings::{dump, save};
-use crate::terminal::print;
+use crate::terminal::print_to_stdout;
 
 /// Depth-aware, disc-shaped background blur for cameras, recordings and stills
 #[derive(Parser, Debug)]
@@ -87,7 +87,7 @@ Examples:
 
 #[derive(Subcommand, Debug)]
 pub enum ConfigCommand {
-    /// Print every setting with its value and where that comes from, as a settings file
+    /// Print every setting with its value and origin, as a settings file
     #[command(after_help = "\
 Examples:
   bokehcam config dump
@@ -97,7 +97,7 @@ Examples:
         #[command(flatten)]
         every: Box<options::Every>,
     },
-    /// Save the settings given as flags in the settings file, whose other settings and comments stay
+    /// Save the settings given as flags in the settings file; its other settings and comments stay
     #[command(after_help = "\
 Examples:
   bokehcam config save --aperture polygon:6 --rim 0.1
@@ -116,17 +116,17 @@ Examples:
 pub fn run(cli: Cli, matches: &ArgMatches, file: &SettingsFile, layers: &Layers) -> Result<(), CliError> {
     match cli.command {
         #[cfg(feature = "window")]
-        Command::Preview(command) => preview::run(&command, &cli.global, layers.given(matches)),
-        Command::Stream(command) => stream::run(&command, &cli.global, layers.given(matches)),
-        Command::Render(command) => render::run(&command, &cli.global, &layers.given(matches)),
+        Command::Preview(command) => preview::run(&command, &cli.global, layers.given_settings(matches)),
+        Command::Stream(command) => stream::run(&command, &cli.global, layers.given_settings(matches)),
+        Command::Render(command) => render::run(&command, &cli.global, &layers.given_settings(matches)),
         Command::Depth(command) => depth::run(&command, &cli.global),
         Command::Ctl(command) => ctl::run(command, &cli.global),
         Command::Service(command) => service::run(&command),
-        Command::Record(command) => record::run(&command, &cli.global, &layers.given(matches)),
-        Command::Plate(command) => plate::run(&command, &cli.global, &layers.given(matches)),
+        Command::Record(command) => record::run(&command, &cli.global, &layers.given_settings(matches)),
+        Command::Plate(command) => plate::run(&command, &cli.global, &layers.given_settings(matches)),
         #[cfg(feature = "lab")]
         Command::Aperture(command) => aperture::run(&command, &cli.global),
-        Command::Bench(command) => bench::run(&command, &cli.global, &layers.given(matches)),
+        Command::Bench(command) => bench::run(&command, &cli.global, &layers.given_settings(matches)),
         Command::Devices(command) => devices::run(&command, &cli.global),
         Command::Doctor(command) => doctor::run(&command),
         #[cfg(feature = "networks")]
@@ -135,14 +135,14 @@ pub fn run(cli: Cli, matches: &ArgMatches, file: &SettingsFile, layers: &Layers)
             let mut script = Vec::new();
             let mut table = completions::add_completions(help::full_help(Cli::command()), file);
             clap_complete::generate(shell, &mut table, "bokehcam", &mut script);
-            print(&script)
+            print_to_stdout(&script)
         }
         Command::Manual(command) => manual::run(&command, help::full_help(Cli::command())),
         Command::Config(ConfigCommand::Dump { .. }) => {
-            print(dump::as_toml(&layers.resolved(matches), &file.presets).as_bytes())
+            print_to_stdout(dump::to_toml(&layers.resolve_settings(matches), &file.presets).as_bytes())
         }
         Command::Config(ConfigCommand::Save { .. }) => {
-            save::run(cli.global.config.as_deref(), &layers.resolved(matches))
+            save::save_settings(cli.global.config.as_deref(), &layers.resolve_settings(matches))
         }
     }
 }

@@ -7,19 +7,19 @@ use std::process::{Command, Stdio};
 use clap::{Args, Subcommand};
 
 use crate::error::CliError;
-use crate::terminal::{print, say};
+use crate::terminal::{print_to_stderr, print_to_stdout};
 use bokehcam::files::{input, whole};
 use bokehcam::network::{self, KNOWN, Known};
 
-/// List the networks that give one camera depth, and install them
+/// List the networks that find depth in pictures of a single camera, and install them
 #[derive(Args, Debug)]
 #[command(after_help = "\
 Examples:
-  bokehcam models                                            which are known, which are installed, where to get them
-  bokehcam models get                                        the one that finds persons, by curl or wget
-  bokehcam models add selfie_segmentation_landscape.tflite   checks a file that is here, and installs it for this user
+  bokehcam models                                            lists the known networks: which are installed, where to get the others
+  bokehcam models get                                        downloads the one that finds persons, with curl or wget
+  bokehcam models add selfie_segmentation_landscape.tflite   checks a local file, and installs it for this user
 
-Nothing but `get` goes to the network, and that shows the command before it runs it.")]
+Only `get` uses the internet, and it shows its command before running it.")]
 pub struct ModelsCommand {
     #[command(subcommand)]
     what: Option<What>,
@@ -27,19 +27,19 @@ pub struct ModelsCommand {
 
 #[derive(Subcommand, Debug)]
 enum What {
-    /// List them, as does `models` alone
+    /// List them; `models` alone does the same
     List,
-    /// Check that files are networks that are known, and copy them to where these are looked for
+    /// Check that files are known networks, and copy them to the folder of installed networks
     #[command(alias = "install", after_help = "Example:\n  bokehcam models add selfie_segmentation_landscape.tflite")]
     Add {
         /// The files, .tflite or .onnx
         #[arg(required = true, value_name = "FILE")]
         files: Vec<PathBuf>,
     },
-    /// Fetch a known network by curl or wget, check that it is what it should be, and install it for this user
+    /// Download a known network with curl or wget, verify it, and install it for this user
     #[command(alias = "fetch", after_help = "Example:\n  bokehcam models get tcmonodepth-small")]
     Get {
-        /// Which [default: the one that finds persons in the least time]
+        /// Name of the network [default: the fastest one that finds persons]
         name: Option<String>,
     },
 }
@@ -50,7 +50,7 @@ enum What {
 /// Fails if the file is not a known network, or cannot be copied.
 pub fn run(command: &ModelsCommand) -> Result<(), CliError> {
     match &command.what {
-        None | Some(What::List) => print(format_list().as_bytes()),
+        None | Some(What::List) => print_to_stdout(format_list().as_bytes()),
         Some(What::Add { files }) => files.iter().try_for_each(|file| add_file(file)),
         Some(What::Get { name }) => fetch(name.as_deref()),
     }
@@ -86,13 +86,13 @@ fn format_list() -> String {
 
 fn add_file(file: &Path) -> Result<(), CliError> {
     if file.to_str().is_some_and(|name| name.contains("://")) {
-        let what = "this is no file that is here: `bokehcam models get NAME` fetches a known network";
+        let what = "there is no such file: `bokehcam models get NAME` fetches a known network";
         return Err(CliError::Usage(format!("{}: {what}", file.display())));
     }
     let bytes = input::read(file, network::MAX_BYTES).map_err(io_error(file))?;
     let known = Known::of(&bytes).ok_or_else(|| {
-        let what = "it is none of the networks that are known (`bokehcam models` lists them), or not whole: one of your own is \
-                    used from where it is, by --depth matte:FILE or mono:FILE";
+        let what = "it is not a known network (`bokehcam models` lists them), or is incomplete; your own network needs \
+                    no installation: use --depth matte:FILE or mono:FILE";
         io_error(file)(io::Error::new(io::ErrorKind::InvalidData, what))
     })?;
     install(known, &bytes)
@@ -112,7 +112,7 @@ fn install(known: &Known, bytes: &[u8]) -> Result<(), CliError> {
     match input::read(&target, network::MAX_BYTES) {
         Ok(there) if there == bytes => {}
         Ok(_) => {
-            let what = "another file is there under this name: move it away";
+            let what = "there is another file of this name: move it away";
             return Err(io_error(&target)(io::Error::new(io::ErrorKind::AlreadyExists, what)));
         }
         Err(error) if error.kind() == io::ErrorKind::NotFound => {
@@ -120,7 +120,7 @@ fn install(known: &Known, bytes: &[u8]) -> Result<(), CliError> {
         }
         Err(error) => return Err(io_error(&target)(error)),
     }
-    say(&format!("{}: installed as {}, for --depth {}", known.file, target.display(), known.task.name()));
+    print_to_stderr(&format!("{}: installed as {}, for --depth {}", known.file, target.display(), known.task.name()));
     Ok(())
 }
 
@@ -132,14 +132,14 @@ fn fetch(name: Option<&str>) -> Result<(), CliError> {
     };
     let known = name.map_or(Ok(&KNOWN[0]), |name| Known::named(name).ok_or_else(|| unknown(name)))?;
     if let Some((_, file)) = network::installed().iter().find(|(other, _)| std::ptr::eq(*other, known)) {
-        say(&format!("{}: installed already, as {}", known.file, file.display()));
+        print_to_stderr(&format!("{}: installed already, as {}", known.file, file.display()));
         return Ok(());
     }
     let bytes = download(known)?;
     let is_whole = Known::of(&bytes).is_some_and(|found| std::ptr::eq(found, known));
     if !is_whole {
         let what =
-            format!("what came is not {}, and is not kept: {} bytes of {}", known.file, bytes.len(), known.bytes);
+            format!("the download is not {}, and was discarded: {} bytes of {}", known.file, bytes.len(), known.bytes);
         return Err(io_error(Path::new(known.address))(io::Error::new(io::ErrorKind::InvalidData, what)));
     }
     install(known, &bytes)
@@ -153,12 +153,12 @@ fn download(known: &Known) -> Result<Vec<u8>, CliError> {
     ];
     let address = || io_error(Path::new(known.address));
     for (client, options) in CLIENTS {
-        say(&format!("{client} {} {}", options.join(" "), known.address));
+        print_to_stderr(&format!("{client} {} {}", options.join(" "), known.address));
         let mut command = Command::new(client);
         command.args(options).arg(known.address).stdin(Stdio::null()).stdout(Stdio::piped());
         let mut child = match command.spawn() {
             Err(error) if error.kind() == io::ErrorKind::NotFound => {
-                say(&format!("{client} is not installed"));
+                print_to_stderr(&format!("{client} is not installed"));
                 continue;
             }
             child => child.map_err(address())?,
@@ -170,13 +170,13 @@ fn download(known: &Known) -> Result<Vec<u8>, CliError> {
         // A client that is cut off at the limit fails, too; the caller then reports the wrong content instead.
         return match bytes.len() as u64 <= known.bytes && !status.success() {
             true => Err(address()(io::Error::other(format!(
-                "{client} failed ({status}): `bokehcam models add FILE` takes what a browser fetched"
+                "{client} failed ({status}): or download the file in a browser, then `bokehcam models add FILE`"
             )))),
             false => Ok(bytes),
         };
     }
     let what = format!(
-        "neither curl nor wget is installed: get {} by a browser, then `bokehcam models add FILE`",
+        "neither curl nor wget is installed: download {} in a browser, then `bokehcam models add FILE`",
         known.address
     );
     Err(CliError::Usage(what))

@@ -7,20 +7,20 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use clap::Args;
 
 use crate::error::CliError;
-use crate::files::{make_folder_of, refuse_overwrite, refuse_source, report_leftovers};
+use crate::files::{create_parent_folder, refuse_overwrite, refuse_overwriting_source, warn_of_leftovers};
 use crate::log;
 use crate::options;
-use crate::settings::layers::Given;
+use crate::settings::layers::GivenSettings;
 use crate::settings::unused;
 use crate::terminal::{self, Guidance};
-use bokehcam::capture::{Camera, Captured, Shot};
-use bokehcam::depth::plate::{Capture, Step, Taken};
+use bokehcam::capture::{Camera, Captured, FrameBuffers};
+use bokehcam::depth::plate::{Capture, CaptureResult, Step};
 use bokehcam::depth::{DepthSource, FrameInput};
 use bokehcam::frame::{ColorImage, DepthMap, GrayImage, Stamp};
 use bokehcam::recording::still;
-use bokehcam::source::{DepthChoice, Kind, Options, Source, SourceName, one_camera};
+use bokehcam::source::{DepthChoice, Kind, Options, Source, SourceName, single_camera};
 
-/// Take a plate: a picture of what is behind you, for --depth plate:FILE
+/// Take a plate: a picture of the background without you, for --depth plate:FILE
 #[derive(Args, Debug)]
 #[command(after_help = "\
 Examples:
@@ -28,13 +28,13 @@ Examples:
   bokehcam stream /dev/video0 --depth plate:room.png --to /dev/video10
   bokehcam plate somewhere/empty-room --to room.png
 
-Step out of the picture when you are told to, for some four seconds. The camera has to stand still from then on. Of a
-recording, each pixel is what it is most of the time.")]
+Step out of the picture for about four seconds when the program says so. The camera must not move from then on. In the
+plate of a recording, each pixel is its median over time.")]
 pub struct PlateCommand {
     /// A camera, or a folder with a recording
-    #[arg(value_parser = options::source_name())]
+    #[arg(value_parser = options::source_name_parser())]
     source: SourceName,
-    /// Where the plate goes, .png or .jpg
+    /// File for the plate, .png or .jpg
     #[arg(long, alias = "out", value_name = "FILE")]
     to: PathBuf,
     #[command(flatten)]
@@ -48,22 +48,22 @@ pub struct PlateCommand {
 /// # Errors
 /// Fails if the source is unreadable, the picture never stands still, or the plate exists (without `--force`) or cannot
 /// be written.
-pub fn run(command: &PlateCommand, global: &options::Global, given: &Given) -> Result<(), CliError> {
+pub fn run(command: &PlateCommand, global: &options::Global, given: &GivenSettings) -> Result<(), CliError> {
     let PlateCommand { source: name, to, frames, output } = command;
     refuse_overwrite([to.as_path()], output.force)?;
-    if let Some(folder) = name.folder() {
-        refuse_source("--to", to, folder)?;
+    if let Some(folder) = name.path() {
+        refuse_overwriting_source("--to", to, folder)?;
     }
     still::photo_format(to)?;
     let options = Options { frames: frames.clone(), depth_choice: DepthChoice::None, ..Options::default() };
     let Source { camera, depth_from, .. } = Source::open(name, &options, None)?;
-    unused::warn(
+    unused::warn_of_unused(
         &given.settings,
-        &unused::Run {
-            source: unused::From::Source(name.kind()),
+        &unused::RunFacts {
+            source: unused::FrameOrigin::Source(name.kind()),
             depth: depth_from,
             realtime: camera.info().live,
-            ..unused::Run::default()
+            ..unused::RunFacts::default()
         },
     );
     // Ctrl-C ends the reading, not the program: a recording's plate so far is still written.
@@ -74,13 +74,13 @@ pub fn run(command: &PlateCommand, global: &options::Global, given: &Given) -> R
         false => plate_from_recording(&mut frames)?,
     };
     if name.kind() == Kind::Photo {
-        log::warn("a photo stands still: a person in it becomes part of the plate, and is not found");
+        log::warn("a photo is a single picture: a person in it becomes part of the plate, and is not found");
     }
-    make_folder_of(to)?;
-    report_leftovers([to.as_path()]);
+    create_parent_folder(to)?;
+    warn_of_leftovers([to.as_path()]);
     still::write_color(to, &plate, output.force)?;
     if !global.quiet {
-        terminal::say(&format!("{}: written, for --depth plate:{0}", to.display()));
+        terminal::print_to_stderr(&format!("{}: written, for --depth plate:{0}", to.display()));
     }
     Ok(())
 }
@@ -97,7 +97,7 @@ impl Frames {
     fn next(&mut self) -> Result<Option<Stamp>, CliError> {
         let (mut depth, mut right) = (DepthMap::default(), GrayImage::default());
         while !self.stop.load(Ordering::Relaxed) {
-            match self.camera.next(Shot { color: &mut self.color, depth: &mut depth, right: &mut right })? {
+            match self.camera.next(FrameBuffers { color: &mut self.color, depth: &mut depth, right: &mut right })? {
                 Captured::Frame(stamp) => return Ok(Some(stamp)),
                 Captured::Corrupt(error) => return Err(error.into()),
                 Captured::Lost(..) | Captured::Waiting => {}
@@ -110,7 +110,7 @@ impl Frames {
 
 /// Takes the plate from a camera, with a countdown for the user.
 fn plate_from_camera(frames: &mut Frames, name: &SourceName, global: &options::Global) -> Result<ColorImage, CliError> {
-    let (mut source, guide) = one_camera::taking(name);
+    let (mut source, guide) = single_camera::create_plate_source(name);
     let guidance = Guidance::new(Some(guide), global);
     let mut map = DepthMap::default();
     while let Some(stamp) = frames.next()? {
@@ -118,11 +118,11 @@ fn plate_from_camera(frames: &mut Frames, name: &SourceName, global: &options::G
         guidance.print_step();
         match (source.plate(), guidance.step()) {
             (Some(plate), _) => return Ok(plate.clone()),
-            (None, Some(step @ Step::Restless)) => return Err(CliError::NoPlate(step.to_string())),
+            (None, Some(step @ Step::KeepsMoving)) => return Err(CliError::NoPlate(step.to_string())),
             (None, _) => {}
         }
     }
-    Err(CliError::NoPlate("it ended before the plate was taken".to_owned()))
+    Err(CliError::NoPlate("the source ended before the plate was taken".to_owned()))
 }
 
 /// Returns the plate of a recording: the per-pixel median of frames spread evenly over it.
@@ -132,7 +132,7 @@ fn plate_from_recording(frames: &mut Frames) -> Result<ColorImage, CliError> {
     let (mut capture, mut index) = (Capture::default(), 0);
     while frames.next()?.is_some() {
         if index % every == 0
-            && let Taken::Whole(plate) = capture.add_unchecked(&frames.color)
+            && let CaptureResult::Finished(plate) = capture.add_unchecked(&frames.color)
         {
             return Ok(plate);
         }

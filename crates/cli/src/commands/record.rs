@@ -6,12 +6,12 @@ use std::sync::atomic::Ordering;
 use clap::Args;
 
 use crate::error::CliError;
-use crate::files::refuse_source;
+use crate::files::refuse_overwriting_source;
 use crate::options;
-use crate::settings::layers::Given;
+use crate::settings::layers::GivenSettings;
 use crate::settings::unused;
 use crate::terminal;
-use bokehcam::capture::{Brings, Captured, Shot};
+use bokehcam::capture::{Captured, FrameBuffers, FrameData};
 use bokehcam::depth::FrameInput;
 use bokehcam::frame::{ColorImage, DepthMap, GrayImage};
 use bokehcam::recording::tum::{Writer, WriterOptions, Written};
@@ -19,9 +19,10 @@ use bokehcam::source::{Options, Source, SourceName};
 
 /// Record a source in the TUM RGB-D layout
 ///
-/// Writes rgb/, depth/ (16-bit PNG, 5000 units per metre, 0 unknown; of two eyes, matched) and their lists. The lists appear when the
-/// recording is whole; Ctrl-C ends that of a camera whole. With --force, the files that an earlier recording in the folder has in
-/// its lists go once the new one is whole, and no others; one that is cut short is kept beside as DIR.incomplete.
+/// Writes rgb/, depth/ (16-bit PNG, 5000 units per metre, 0 unknown; for two cameras, by stereo matching) and their
+/// lists. The lists appear when the recording is complete; Ctrl-C completes a recording of a camera. With --force, a
+/// complete recording replaces the files listed by an earlier one in the folder, and no others; an incomplete one is
+/// kept beside it as DIR.incomplete.
 #[derive(Args, Debug)]
 #[command(after_help = "\
 Examples:
@@ -30,7 +31,7 @@ Examples:
   bokehcam record somewhere/rgbd --depth-scale 1000 --start 2 --end 5 --to excerpt")]
 pub struct RecordCommand {
     /// A camera, two cameras LEFT,RIGHT, a folder with a recording, `demo` or `synthetic`
-    #[arg(value_parser = options::source_name())]
+    #[arg(value_parser = options::source_name_parser())]
     source: SourceName,
     /// Folder for the recording
     #[arg(long, alias = "out", value_name = "DIR")]
@@ -49,7 +50,7 @@ pub struct RecordCommand {
 ///
 /// # Errors
 /// Fails if the source is unreadable, or the recording exists (without `--force`) or cannot be written.
-pub fn run(command: &RecordCommand, global: &options::Global, given: &Given) -> Result<(), CliError> {
+pub fn run(command: &RecordCommand, global: &options::Global, given: &GivenSettings) -> Result<(), CliError> {
     let options = Options {
         frames: command.frames.clone(),
         depth: command.depth.clone(),
@@ -64,22 +65,25 @@ pub fn run(command: &RecordCommand, global: &options::Global, given: &Given) -> 
             command.source
         )));
     }
-    if let Some(folder) = command.source.folder() {
-        refuse_source("--to", &command.to, folder)?;
+    if let Some(folder) = command.source.path() {
+        refuse_overwriting_source("--to", &command.to, folder)?;
     }
     let Source { mut camera, depth: mut source, rig, depth_from, .. } = Source::open(&command.source, &options, None)?;
-    unused::warn(
+    unused::warn_of_unused(
         &given.settings,
-        &unused::Run {
-            source: unused::From::Source(command.source.kind()),
+        &unused::RunFacts {
+            source: unused::FrameOrigin::Source(command.source.kind()),
             depth: depth_from,
             uses_depth: true,
             realtime: true,
-            ..unused::Run::default()
+            ..unused::RunFacts::default()
         },
     );
     if rig.is_some_and(|rig| !rig.metric) {
-        tracing::warn!("the distance of the two eyes is not known: the metres of this depth are those of assumed eyes");
+        tracing::warn!(
+            "the distance between the two cameras is not known: the metres of this depth are based on an \
+                        assumed one"
+        );
     }
     let info = camera.info();
     let options = WriterOptions { overwrite: command.output.force, ..WriterOptions::default() };
@@ -91,7 +95,7 @@ pub fn run(command: &RecordCommand, global: &options::Global, given: &Given) -> 
     let (mut lost, mut skip_check) = (0, rig.is_some());
     let mut record_frames = || -> Result<bool, CliError> {
         while !stop.load(Ordering::Relaxed) {
-            let stamp = match camera.next(Shot { color: &mut color, depth: &mut depth, right: &mut right })? {
+            let stamp = match camera.next(FrameBuffers { color: &mut color, depth: &mut depth, right: &mut right })? {
                 Captured::Frame(stamp) => stamp,
                 Captured::Corrupt(error) => return Err(error.into()),
                 Captured::Lost(count, _) => {
@@ -103,20 +107,20 @@ pub fn run(command: &RecordCommand, global: &options::Global, given: &Given) -> 
             };
             if let Some(source) = &mut source {
                 source.rectify(&mut color);
-                let right = (info.brings == Brings::RightCamera).then_some(&right);
+                let right = (info.frame_data == FrameData::RightCamera).then_some(&right);
                 source.read(FrameInput { stamp, color: &color, right }, &mut depth)?;
             }
-            let has_depth = source.is_some() || info.brings == Brings::Depth;
+            let has_depth = source.is_some() || info.frame_data == FrameData::Depth;
             let doubt = describe_implausible(&depth, writer.max_depth_m());
             if let Some(doubt) = doubt.filter(|_| has_depth && !skip_check) {
                 skip_check = true;
                 tracing::warn!(
-                    "frame {}: {doubt}; is --depth-scale, the units of a metre, that of the source?",
+                    "frame {}: {doubt}; is --depth-scale (units per metre) right for this source?",
                     stamp.index
                 );
             }
             writer.add(stamp.time_ns, &color, has_depth.then_some(&depth))?;
-            progress.delivered(writer.frames() as u64);
+            progress.set_delivered(writer.frames() as u64);
         }
         // A camera is endless: stopping it is its regular end.
         Ok(info.live || info.frames.is_none())
@@ -125,7 +129,7 @@ pub fn run(command: &RecordCommand, global: &options::Global, given: &Given) -> 
     let outcome = record_frames();
     drop(progress);
     if lost > 0 {
-        tracing::warn!("{lost} frames came and went before they could be written");
+        tracing::warn!("{lost} frames were lost because writing was too slow");
     }
     match outcome {
         Ok(true) => {
@@ -138,7 +142,7 @@ pub fn run(command: &RecordCommand, global: &options::Global, given: &Given) -> 
                     files => format!(", in place of {files} files of an earlier recording"),
                 };
                 let (dir, frames) = (written.dir.display(), written.frames);
-                terminal::say(&format!("{dir}: {frames} frames recorded from {}{gone}", info.name));
+                terminal::print_to_stderr(&format!("{dir}: {frames} frames recorded from {}{gone}", info.name));
             }
             Ok(())
         }
@@ -159,10 +163,10 @@ fn keep_partial(writer: Writer, to: &Path) -> Result<(), CliError> {
     let written = writer.cut()?;
     let frames = written.frames;
     if written.dir == to {
-        tracing::warn!("{}: cut short; the {frames} frames until then can be read", to.display());
+        tracing::warn!("{}: incomplete; the {frames} frames until then can be read", to.display());
     } else {
         let (old, kept) = (to.display(), written.dir.display());
-        tracing::warn!("{old}: as it was; the new recording was cut short, and its {frames} frames are in {kept}");
+        tracing::warn!("{old}: unchanged; the new recording is incomplete, and its {frames} frames are in {kept}");
     }
     Ok(())
 }
@@ -177,7 +181,7 @@ fn describe_implausible(depth: &DepthMap, max_depth_m: f32) -> Option<String> {
     if largest_m == 0.0 {
         None
     } else if least_m > max_depth_m {
-        Some(format!("all depth is {least_m:.1} m away or more, and a recording holds up to {max_depth_m:.1} m"))
+        Some(format!("all depth is {least_m:.1} m away or more, but a recording holds only up to {max_depth_m:.1} m"))
     } else if largest_m < MIN_SCENE_M {
         Some(format!("all depth is nearer than {:.1} mm", largest_m * 1e3))
     } else {
@@ -190,7 +194,8 @@ fn warn_out_of_range_depth(written: &Written, max_depth_m: f32) {
     if written.too_far > 0 {
         let percent = 100.0 * written.too_far as f64 / written.depths as f64;
         tracing::warn!(
-            "{percent:.1} % of the depth lies beyond {max_depth_m:.1} m, more than a recording holds: it is unknown there"
+            "{percent:.1} % of the depth lies beyond {max_depth_m:.1} m, more than a recording holds: it is stored as \
+             unknown"
         );
     }
 }

@@ -11,14 +11,14 @@ use clap::{Args, Subcommand};
 use manager::{self as systemd, State, Unit};
 
 use crate::error::CliError;
-use crate::files::{make_folder_of, write_whole};
+use crate::files::{create_parent_folder, write_atomically};
 use crate::log;
 use crate::settings::file;
-use crate::terminal::{print, say};
+use crate::terminal::{print_to_stderr, print_to_stdout};
 use bokehcam::files::input;
 use bokehcam::files::trusted::absolute;
 
-/// Have the camera for calls start with your session, or not
+/// Start the camera for calls with your session, or stop doing so
 #[derive(Args, Debug)]
 #[command(after_help = "\
 Examples:
@@ -26,9 +26,9 @@ Examples:
   bokehcam service off
   bokehcam service status
 
-What it streams is one line in ~/.config/bokehcam/stream.conf, such as
+The source and options are one line in ~/.config/bokehcam/stream.conf, such as
   STREAM=\"C920 --to pipewire --on-demand --preset cinematic\"
-`on` takes it the next time that it starts: `systemctl --user restart bokehcam`. The look comes from your settings file.")]
+A change takes effect at the next start: `systemctl --user restart bokehcam`. The look comes from your settings file.")]
 pub struct ServiceCommand {
     #[command(subcommand)]
     what: Option<What>,
@@ -38,9 +38,9 @@ pub struct ServiceCommand {
 enum What {
     /// Start it now, and with every session from now on
     On,
-    /// End it now, and start it no more
+    /// Stop it now, and do not start it any more
     Off,
-    /// Say how it is; so does `service` alone
+    /// Print the status; `service` alone does the same
     Status,
 }
 
@@ -73,41 +73,43 @@ fn enable(mut unit: Unit) -> Result<(), CliError> {
         let path = unit_path()?;
         if path.symlink_metadata().is_err() {
             write_unit(&path)?;
-            say(&format!("wrote {}, as no package has brought the unit", path.display()));
+            print_to_stderr(&format!("wrote {}, as no package has installed the unit", path.display()));
         }
-        systemd::run(&["daemon-reload"])?;
+        systemd::run_systemctl(&["daemon-reload"])?;
         unit = Unit::query()?;
         if unit.state == State::Missing {
-            let what = "systemd does not take it as a unit: remove it, and `bokehcam service on` writes another";
+            let what = "systemd does not accept it as a unit: remove it, then `bokehcam service on` writes a new one";
             return Err(CliError::Service(format!("{}: {what}", path.display())));
         }
     }
     if let Some(program) = unit.program.as_ref().filter(|program| !program.exists()) {
         return Err(CliError::Service(format!(
-            "{} starts {}, which is not there: correct or remove it, then `bokehcam service on`",
+            "{} starts {}, which does not exist: correct or remove it, then `bokehcam service on`",
             unit.file.display(),
             program.display()
         )));
     }
-    systemd::run(&["enable", "--now", systemd::NAME])
+    systemd::run_systemctl(&["enable", "--now", systemd::NAME])
 }
 
 fn disable(unit: &Unit) -> Result<(), CliError> {
     if unit.state == State::Missing {
-        say("it is off: there is no unit bokehcam.service");
+        print_to_stderr("it is off: there is no unit bokehcam.service");
         return Ok(());
     }
-    systemd::run(&["disable", "--now", systemd::NAME])?;
-    say("it is off, and stays off");
+    systemd::run_systemctl(&["disable", "--now", systemd::NAME])?;
+    print_to_stderr("it is off, and stays off");
     Ok(())
 }
 
 /// Prints the state of the service, and the location of its settings.
 fn print_status(unit: &Unit) -> Result<(), CliError> {
     if unit.state == State::Missing {
-        return print(b"off: there is no unit bokehcam.service yet; `bokehcam service on` writes and starts one\n");
+        return print_to_stdout(
+            b"off: there is no unit bokehcam.service yet; `bokehcam service on` writes and starts one\n",
+        );
     }
-    let last_line = || systemd::last_line().map_or_else(String::new, |line| format!("\n  says      {line}"));
+    let last_line = || systemd::read_last_log_line().map_or_else(String::new, |line| format!("\n  says      {line}"));
     let is = match unit.state {
         State::Missing | State::Stopped => "does not run".to_owned(),
         State::Running => "runs".to_owned(),
@@ -115,23 +117,28 @@ fn print_status(unit: &Unit) -> Result<(), CliError> {
         State::Failed => format!("gave up{}", last_line()),
     };
     let is_on = if unit.is_enabled { "on" } else { "off" };
-    let (streams, from) = stream_arguments(&unit.arguments)?;
-    print(
+    let (streams, from) = read_stream_arguments(&unit.arguments)?;
+    print_to_stdout(
         format!("{is_on}: it {is}\n  streams   {streams}\n  settings  {from}\n  unit      {}\n", unit.file.display())
             .as_bytes(),
     )?;
     if unit.is_enabled && !systemd::has_graphical_session()? {
-        let what = "this desktop does not tell systemd that it has begun (graphical-session.target), so the service does not \
-                    start by itself: have the desktop run `systemctl --user start bokehcam` at its start";
+        let what = "this desktop does not start graphical-session.target of systemd, so the service does not start by \
+                    itself: let the desktop run `systemctl --user start bokehcam` at login";
         log::warn(what);
     }
     Ok(())
 }
 
 /// Returns the arguments of `bokehcam stream`, and their origin: the user's file, or `default` of the unit.
-fn stream_arguments(default: &str) -> Result<(String, String), CliError> {
-    let no_home =
-        || CliError::Service("there is no folder of settings: neither XDG_CONFIG_HOME nor HOME is a whole path".into());
+fn read_stream_arguments(default: &str) -> Result<(String, String), CliError> {
+    let no_home = || {
+        CliError::Service(
+            "there is no folder for settings: neither XDG_CONFIG_HOME nor HOME is an absolute \
+                              path"
+                .into(),
+        )
+    };
     let path = file::user_file().ok_or_else(no_home)?.with_file_name("stream.conf");
     let text = match input::read_text(&path, MAX_BYTES) {
         Ok(text) => text,
@@ -142,15 +149,20 @@ fn stream_arguments(default: &str) -> Result<(String, String), CliError> {
     let configured = text.lines().filter_map(|line| line.trim().strip_prefix("STREAM=")).next_back();
     Ok(match configured {
         Some(configured) => (configured.trim_matches(['"', '\'']).to_owned(), path.display().to_string()),
-        None => (default.to_owned(), format!("{} would have others: STREAM=\"...\"", path.display())),
+        None => (default.to_owned(), format!("to change it, write STREAM=\"...\" to {}", path.display())),
     })
 }
 
 /// Returns the path of the user's own unit.
 fn unit_path() -> Result<PathBuf, CliError> {
     let config = absolute("XDG_CONFIG_HOME").or_else(|| Some(absolute("HOME")?.join(".config")));
-    let no_folder =
-        || CliError::Service("there is no folder for units: neither XDG_CONFIG_HOME nor HOME is a whole path".into());
+    let no_folder = || {
+        CliError::Service(
+            "there is no folder for units: neither XDG_CONFIG_HOME nor HOME is an absolute \
+                              path"
+                .into(),
+        )
+    };
     Ok(config.ok_or_else(no_folder)?.join("systemd/user").join(systemd::NAME))
 }
 
@@ -159,11 +171,11 @@ fn write_unit(path: &Path) -> Result<(), CliError> {
     let program = std::env::current_exe().map_err(CliError::io("this program".as_ref()))?;
     let name = program
         .to_str()
-        .ok_or_else(|| CliError::Usage(format!("{}: systemd takes names in UTF-8 alone", program.display())))?;
+        .ok_or_else(|| CliError::Usage(format!("{}: systemd accepts only names in UTF-8", program.display())))?;
     let quoted = name.replace('\\', "\\\\").replace('"', "\\\"").replace('%', "%%");
-    make_folder_of(path)?;
+    create_parent_folder(path)?;
     let unit = UNIT.replace(&format!("ExecStart={PROGRAM} "), &format!("ExecStart=\"{quoted}\" "));
-    write_whole(path, unit.as_bytes(), false)
+    write_atomically(path, unit.as_bytes(), false)
 }
 
 #[cfg(test)]

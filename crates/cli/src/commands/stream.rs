@@ -15,13 +15,13 @@ use control::{ControlServer, LookChanger, RunInfo, RunStats};
 use crate::commands::preview;
 use crate::controlled::{self, CommandLineRules};
 use crate::error::CliError;
-use crate::files::report_leftovers;
+use crate::files::warn_of_leftovers;
 use crate::focus;
 use crate::options;
 use crate::plausible;
 use crate::report;
 use crate::settings::file::SettingsFile;
-use crate::settings::layers::Given;
+use crate::settings::layers::GivenSettings;
 use crate::settings::look;
 use crate::settings::unused;
 use crate::sinks;
@@ -29,13 +29,13 @@ use crate::terminal;
 use bokehcam::capture::SourceInfo;
 use bokehcam::clock::Clock;
 use bokehcam::compute::Backend;
-use bokehcam::computing::Executors;
+use bokehcam::computing::ExecutorFactory;
 use bokehcam::control::{Claim, Name, Status};
-use bokehcam::controller::Facts;
+use bokehcam::controller::SourceFacts;
 use bokehcam::depth::focus::FocusRule;
 use bokehcam::link::demand::Demand;
 use bokehcam::look::{Look, Strength};
-use bokehcam::pipeline::{self, Blurring, Pace, PipelineError, Run};
+use bokehcam::pipeline::{self, BlurSetup, Pace, PipelineError, Run};
 use bokehcam::sink::{self, Backpressure, Shutter, ShutterControl, Sink, Target};
 use bokehcam::source::{self, DepthChoice, DepthOrigin, Source, SourceName};
 use bokehcam::stats::Report;
@@ -57,17 +57,17 @@ Examples:
   bokehcam stream somewhere/rgbd --depth-scale 1000 --loop --frames 500 --to out.mkv
   bokehcam stream synthetic --frames 90 --pace realtime --to null --report report.json")]
 pub struct StreamCommand {
-    /// A camera (/dev/videoN, N, a name under /dev/v4l/by-id, or part of what it is called), two of them as LEFT,RIGHT, a
-    /// camera of PipeWire's (pipewire:NAME), a folder with a recording, a photo (PNG or JPEG), `demo` (the demonstration) or
+    /// A camera (/dev/videoN, N, a name under /dev/v4l/by-id, or part of its name), two of them as LEFT,RIGHT, a
+    /// PipeWire camera (pipewire:NAME), a folder with a recording, a photo (PNG or JPEG), `demo` (the demonstration) or
     /// `synthetic` (a scene, rendered frame by frame)
-    #[arg(value_parser = options::source_name())]
+    #[arg(value_parser = options::source_name_parser())]
     source: SourceName,
     #[arg(long, value_name = "SINK", required = true, help = TO)]
     to: Vec<Target>,
-    /// What `bokehcam ctl` knows this run by [default: stream, or stream-2 and so on]
+    /// Name of this run for `bokehcam ctl` [default: stream, or stream-2 and so on]
     #[arg(long, value_name = "NAME")]
     name: Option<Name>,
-    /// Show an icon in the desktop's tray that switches off and on, and listen on the session's message bus
+    /// Show an icon in the desktop's tray that switches the camera off and on, and listen on the session's message bus
     #[arg(long)]
     tray: bool,
     #[command(flatten)]
@@ -78,26 +78,26 @@ pub struct StreamCommand {
 }
 
 #[cfg(feature = "window")]
-const TO: &str = "pipewire, pipewire:NAME or /dev/videoN (virtual camera), filter (all who ask for the source, pipewire:NAME), \
-                  window, DIR/ (numbered PNG), FILE.y4m, - (y4m on standard output), FILE.mp4, .mkv or .webm (ffmpeg), or \
-                  null; may be given more than once";
+const TO: &str = "pipewire, pipewire:NAME or /dev/videoN (virtual camera), filter (all readers of the source, \
+                  pipewire:NAME), window, DIR/ (numbered PNG), FILE.y4m, - (y4m on standard output), FILE.mp4, .mkv or \
+                  .webm (ffmpeg), or null; may be given more than once";
 #[cfg(not(feature = "window"))]
-const TO: &str = "pipewire, pipewire:NAME or /dev/videoN (virtual camera), filter (all who ask for the source, pipewire:NAME), \
-                  DIR/ (numbered PNG), FILE.y4m, - (y4m on standard output), FILE.mp4, .mkv or .webm (ffmpeg), or null; may \
-                  be given more than once";
+const TO: &str = "pipewire, pipewire:NAME or /dev/videoN (virtual camera), filter (all readers of the source, \
+                  pipewire:NAME), DIR/ (numbered PNG), FILE.y4m, - (y4m on standard output), FILE.mp4, .mkv or .webm \
+                  (ffmpeg), or null; may be given more than once";
 
 /// Runs the command; `given` serves warnings and the window. The report is written whenever the pipeline ran, even if
 /// it failed.
 ///
 /// # Errors
 /// Fails if the options do not fit the source, an output exists, or a stage of the pipeline fails.
-pub fn run(command: &StreamCommand, global: &options::Global, given: Given) -> Result<(), CliError> {
+pub fn run(command: &StreamCommand, global: &options::Global, given: GivenSettings) -> Result<(), CliError> {
     let StreamCommand { parts, .. } = command;
-    sinks::check(&command.to, parts, &command.source)?;
+    sinks::check_targets(&command.to, parts, &command.source)?;
     #[cfg(feature = "window")]
     if command.to.contains(&Target::Window) {
         let others: Vec<Target> = command.to.iter().filter(|target| **target != Target::Window).cloned().collect();
-        return preview::show(
+        return preview::show_source(
             &command.source.to_string(),
             &others,
             &command.window,
@@ -107,14 +107,14 @@ pub fn run(command: &StreamCommand, global: &options::Global, given: Given) -> R
         );
     }
     let options::Streaming { stream, output, .. } = parts;
-    report::check(stream.report.as_deref(), output.force, &command.to)?;
-    if stream.pace == Some(Pace::Asap) && !command.source.devices().is_empty() {
-        let what = "--pace asap: a camera gives its frames when it takes them; leave --pace out";
+    report::check_path(stream.report.as_deref(), output.force, &command.to)?;
+    if stream.pace == Some(Pace::Asap) && !command.source.device_nodes().is_empty() {
+        let what = "--pace asap: a camera delivers frames at its own pace; leave --pace out";
         return Err(CliError::Usage(what.to_string()));
     }
-    let claim = controlled::claim(command.name.as_ref(), "stream")?;
+    let claim = controlled::claim_name(command.name.as_ref(), "stream")?;
     let opened = Opened::open(command, &given)?;
-    stream_opened(command, global, opened, claim)
+    run_stream(command, global, opened, claim)
 }
 
 /// An opened source, and settings derived from it.
@@ -126,22 +126,22 @@ struct Opened {
     look: Look,
     pace: Pace,
     /// Facts for warnings about settings without effect.
-    unused: unused::Run,
+    unused: unused::RunFacts,
 }
 
 impl Opened {
     /// Opens the source, and warns of settings without effect on it.
-    fn open(command: &StreamCommand, given: &Given) -> Result<Self, CliError> {
+    fn open(command: &StreamCommand, given: &GivenSettings) -> Result<Self, CliError> {
         let StreamCommand { parts, to, .. } = command;
-        let look = look::look(&parts.blur, &parts.computing.quality)?;
+        let look = look::build_look(&parts.blur, &parts.computing.quality)?;
         let options = source::Options { filters: command.is_filter(), ..parts.source_options() };
         let source = Source::open(&command.source, &options, Some(&look))?;
         let info = source.camera.info();
         let is_live = info.live || to.iter().any(Target::is_live);
         let pace = parts.stream.pace.unwrap_or(if is_live { Pace::Realtime } else { Pace::Asap });
-        let look = source.fitting_look(&look, &options)?;
-        let unused = unused::Run {
-            source: unused::From::Source(command.source.kind()),
+        let look = source.adapt_look(&look, &options)?;
+        let unused = unused::RunFacts {
+            source: unused::FrameOrigin::Source(command.source.kind()),
             depth: source.depth_from,
             uses_depth: look.effect.follows_depth(),
             effect: look.effect,
@@ -151,7 +151,7 @@ impl Opened {
             compresses: to.iter().any(|target| matches!(target, Target::Video(_))),
             window: false,
         };
-        unused::warn(&given.settings, &unused);
+        unused::warn_of_unused(&given.settings, &unused);
         if !plausible::warn_of_source(&source, &look, &options)
             && let Some(map) = source.first_depth.as_ref()
         {
@@ -173,7 +173,7 @@ impl StreamCommand {
     }
 
     /// Opens the outputs. `demand` counts their watchers, `stop` ends them, and `closed` keeps pictures from them.
-    fn outputs(
+    fn open_outputs(
         &self,
         opened: &Opened,
         demand: Option<&Demand>,
@@ -188,45 +188,45 @@ impl StreamCommand {
             out_size: stream.out_size.map(|size| (size.width, size.height)),
             threads: options.computing.threads,
             demand: demand.cloned(),
-            filter_target: self.source.shared().map(str::to_owned),
+            filter_target: self.source.pipewire_name().map(str::to_owned),
             stop: Arc::clone(stop),
             ..sink::Options::new(info.size, info.period_ns)
         };
         let backpressure = if *pace == Pace::Realtime { Backpressure::DropOldest } else { Backpressure::Block };
-        let sink = sinks::open(&self.to, &sink_options, backpressure, closed)?;
+        let sink = sinks::open_targets(&self.to, &sink_options, backpressure, closed)?;
         // The outputs have cleaned up their own leftovers by now.
-        report_leftovers(self.to.iter().filter(|target| !target.is_camera()).filter_map(Target::path));
+        warn_of_leftovers(self.to.iter().filter(|target| !target.is_camera()).filter_map(Target::path));
         Ok(sink)
     }
 
     /// Prints the source, the origin of its depth, and the outputs.
     fn announce(&self, Opened { source, info, look, .. }: &Opened, to: &str, quiet: bool) {
-        let say = |line: &str| (!quiet).then(|| terminal::say(line));
+        let print_line = |line: &str| (!quiet).then(|| terminal::print_to_stderr(line));
         if let Some(networks) = &source.networks {
-            say(&format!("depth by {networks}"));
+            print_line(&format!("depth by {networks}"));
         }
         let is_found = look.effect.follows_depth() && look.focus == FocusRule::Auto;
         if let Some(persons) = source.persons.as_ref().filter(|_| is_found) {
-            say(&format!("focus on persons by {persons}"));
+            print_line(&format!("focus on persons by {persons}"));
         }
         let takes_any_depth = self.parts.blur.accepts_any_depth();
         // The source's note on its depth map is irrelevant if no depth is wanted.
-        if let Some(note) = self.source.note(source).filter(|_| source.has_depth() || takes_any_depth) {
-            say(&note);
+        if let Some(note) = self.source.describe_photo(source).filter(|_| source.has_depth() || takes_any_depth) {
+            print_line(&note);
         }
-        say(&format!("{}, to {to}{}", info.name, if info.live { "; Ctrl-C ends" } else { "" }));
+        print_line(&format!("{}, to {to}{}", info.name, if info.live { "; Ctrl-C ends" } else { "" }));
         if takes_any_depth && !source.has_depth() {
-            unused::warn_of_no_depth(unused::From::Source(self.source.kind()));
+            unused::warn_of_no_depth(unused::FrameOrigin::Source(self.source.kind()));
         }
     }
 
     /// Starts the control server, if the run could claim its name; otherwise logs the reason where control is likely
     /// wanted.
-    fn serve(
+    fn serve_control(
         &self,
         claim: Result<Claim, String>,
         opened: &Opened,
-        (demand, release, stats): (Option<Demand>, ShutterControl, Arc<RunStats>),
+        (demand, shutter, stats): (Option<Demand>, ShutterControl, Arc<RunStats>),
         looks: LookChanger,
         config: Option<&Path>,
     ) -> Result<Option<ControlServer>, CliError> {
@@ -248,7 +248,7 @@ impl StreamCommand {
                 sinks: self.to.iter().map(Target::to_string).collect(),
                 ..Status::default()
             },
-            facts: Facts {
+            facts: SourceFacts {
                 kind: self.source.kind(),
                 size: info.size,
                 has_depth: source.has_depth() && options.depth_choice != DepthChoice::None,
@@ -256,7 +256,7 @@ impl StreamCommand {
                 depth_choice: options.depth_choice.clone(),
             },
             demand,
-            release,
+            shutter,
             stats,
         };
         let rules = CommandLineRules { config: config.map(Path::to_owned), unused: *unused };
@@ -266,7 +266,7 @@ impl StreamCommand {
 }
 
 /// Runs the opened source into the outputs, with the control server.
-fn stream_opened(
+fn run_stream(
     command: &StreamCommand,
     global: &options::Global,
     opened: Opened,
@@ -274,12 +274,12 @@ fn stream_opened(
 ) -> Result<(), CliError> {
     let options::Streaming { stream, output, .. } = &command.parts;
     let (info, computing) = (opened.info.clone(), opened.options.computing.clone());
-    pipeline::check_room(info.size, info.frames)?;
+    pipeline::check_memory(info.size, info.frames)?;
     let adaptive = opened.is_adaptive();
     // Executors for later looks run on the same device.
-    let mut executors = Executors::new(computing.clone());
+    let mut executors = ExecutorFactory::new(computing.clone());
     let create_blur = |settings: &_| executors.create_blur(settings, info.size);
-    let (blurring, changes) = Blurring::begin(opened.look.clone(), (info.size, adaptive), create_blur)?;
+    let (blurring, changes) = BlurSetup::create(opened.look.clone(), (info.size, adaptive), create_blur)?;
     // Outputs are opened last: none is begun if the run cannot start.
     let demand = Demand::new();
     let on_demand = stream.on_demand || command.is_filter();
@@ -289,20 +289,20 @@ fn stream_opened(
     let stop = terminal::stop_flag()?;
     report::check_writable(stream.report.as_deref())?;
     let closed = Arc::default();
-    let sink = command.outputs(&opened, watchers.as_ref(), &stop, &closed)?;
+    let sink = command.open_outputs(&opened, watchers.as_ref(), &stop, &closed)?;
     command.announce(&opened, &sink.describe(), global.quiet);
     let guidance = terminal::Guidance::new(opened.source.guide.clone(), global);
     let bar = terminal::Progress::new(info.frames, global);
     let period = Duration::from_nanos(info.period_ns);
-    let (sink, release) = Shutter::new(sink, info.size, period, demand.clone(), Clock::system(), closed);
+    let (sink, shutter) = Shutter::new(sink, info.size, period, demand.clone(), Clock::system(), closed);
     let stats = Arc::new(RunStats::default());
     let looks = LookChanger { look: opened.look.clone(), changes, executors };
-    let shared_state = (watchers, release, Arc::clone(&stats));
-    let server = command.serve(claim, &opened, shared_state, looks, global.config.as_deref())?;
+    let shared_state = (watchers, shutter, Arc::clone(&stats));
+    let server = command.serve_control(claim, &opened, shared_state, looks, global.config.as_deref())?;
     let pace = opened.pace;
     let run = opened.source.into_run(blurring, Box::new(sink), &stop);
     let ended = pipeline::run(Run {
-        threads: computing.threads(),
+        threads: computing.thread_count(),
         changes: run.changes.filter(|_| server.is_some()),
         pace,
         budget_ns: stream.budget_ms.map_or(info.period_ns, |ms| (f64::from(ms) * 1e6) as u64),
@@ -310,21 +310,21 @@ fn stream_opened(
         demand: Some(demand),
         mirror: stream.mirror,
         progress: &|progress| {
-            bar.delivered(progress.delivered);
+            bar.set_delivered(progress.delivered);
             stats.record(&progress);
             guidance.print_step();
         },
         ..run
     });
     drop((server, bar));
-    finish(ended, stream.report.as_deref(), output.force, global)
+    finish_run(ended, stream.report.as_deref(), output.force, global)
 }
 
 /// Writes and prints the report.
 ///
 /// # Errors
 /// Fails if the run failed or its report cannot be written.
-fn finish(
+fn finish_run(
     ended: Result<Report, PipelineError>,
     path: Option<&Path>,
     force: bool,
@@ -334,12 +334,12 @@ fn finish(
         Ok(report) => (Box::new(report), Ok(())),
         Err(failed) => (failed.report, Err(failed.fault.into())),
     };
-    let written = path.map_or(Ok(()), |path| report::write(path, &report, force));
-    terminal::say_report(&report, global);
+    let written = path.map_or(Ok(()), |path| report::write_report(path, &report, force));
+    terminal::print_report(&report, global);
     match (ended, written) {
         // The run's own error takes precedence.
         (Err(ended), Err(unwritten)) => {
-            terminal::say(&format!("the report is not written: {unwritten}"));
+            terminal::print_to_stderr(&format!("the report was not written: {unwritten}"));
             Err(ended)
         }
         (ended, written) => ended.and(written),

@@ -19,7 +19,7 @@ pub struct Streaming {
     /// Depth pictures.
     #[command(flatten)]
     pub depth: Depth,
-    /// Two eyes.
+    /// Stereo depth.
     #[command(flatten)]
     pub stereo: Stereo,
     /// Networks.
@@ -45,7 +45,7 @@ impl Streaming {
             stereo: self.stereo.clone(),
             networks: self.networks.clone(),
             depth_choice: self.blur.depth.clone(),
-            computing: self.computing.choice(),
+            computing: self.computing.to_compute_options(),
             keep_going: self.stream.keep_going,
             filters: false,
         }
@@ -61,7 +61,7 @@ pub struct Every {
     /// Depth pictures.
     #[command(flatten)]
     pub depth: Depth,
-    /// Two eyes.
+    /// Stereo depth.
     #[command(flatten)]
     pub stereo: Stereo,
     /// Networks.

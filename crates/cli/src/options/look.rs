@@ -12,14 +12,14 @@ use bokehcam::names::Named;
 pub struct LookSettings<const QUALITY: bool>(pub Patch);
 
 impl<const QUALITY: bool> LookSettings<QUALITY> {
-    fn settings() -> impl Iterator<Item = &'static Setting> {
+    fn list_settings() -> impl Iterator<Item = &'static Setting> {
         SETTINGS.iter().filter(|setting| (setting.group == Group::Computing) == QUALITY)
     }
 }
 
 impl<const QUALITY: bool> Args for LookSettings<QUALITY> {
     fn augment_args(command: Command) -> Command {
-        command.args(Self::settings().map(option))
+        command.args(Self::list_settings().map(create_option))
     }
 
     fn augment_args_for_update(command: Command) -> Command {
@@ -35,10 +35,10 @@ impl<const QUALITY: bool> FromArgMatches for LookSettings<QUALITY> {
     }
 
     fn update_from_arg_matches(&mut self, matches: &ArgMatches) -> Result<(), clap::Error> {
-        for setting in Self::settings() {
+        for setting in Self::list_settings() {
             if let Some(text) = matches.get_one::<String>(setting.id) {
                 setting
-                    .set(&mut self.0, text)
+                    .parse_into(&mut self.0, text)
                     .map_err(|what| clap::Error::raw(clap::error::ErrorKind::InvalidValue, what))?;
             }
         }
@@ -47,13 +47,14 @@ impl<const QUALITY: bool> FromArgMatches for LookSettings<QUALITY> {
 }
 
 /// Returns the command-line option of a setting; the value stays text, and is only checked here.
-fn option(setting: &'static Setting) -> Arg {
+fn create_option(setting: &'static Setting) -> Arg {
     let heading = match setting.group {
         Group::Blur => "Blur",
         Group::Aperture => "Aperture",
         Group::Computing => "Computing",
     };
-    let excluded = SETTINGS.iter().filter(|other| setting.excludes().contains(&other.name)).map(|other| other.id);
+    let excluded =
+        SETTINGS.iter().filter(|other| setting.excluded_settings().contains(&other.name)).map(|other| other.id);
     let choices = (setting.choices)();
     let arg = Arg::new(setting.id)
         .long(setting.name)
@@ -70,7 +71,8 @@ fn option(setting: &'static Setting) -> Arg {
         None => arg,
     };
     match choices.is_empty() {
-        true => arg.value_parser(move |text: &str| setting.set(&mut Patch::default(), text).map(|()| text.to_string())),
+        true => arg
+            .value_parser(move |text: &str| setting.parse_into(&mut Patch::default(), text).map(|()| text.to_string())),
         false => arg.value_parser(PossibleValuesParser::new(
             choices.into_iter().map(|(name, help)| PossibleValue::new(name).help(help)),
         )),
@@ -78,7 +80,7 @@ fn option(setting: &'static Setting) -> Arg {
 }
 
 /// Returns a parser for the names of `T`'s values.
-pub fn named<T: Named + Send + Sync>() -> impl TypedValueParser<Value = T> {
+pub fn named_value_parser<T: Named + Send + Sync>() -> impl TypedValueParser<Value = T> {
     let values = T::VALUES.iter().map(|value| PossibleValue::new(value.name()).help(value.help()));
-    PossibleValuesParser::new(values).try_map(|name| bokehcam::names::parse::<T>(&name))
+    PossibleValuesParser::new(values).try_map(|name| bokehcam::names::parse_name::<T>(&name))
 }

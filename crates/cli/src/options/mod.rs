@@ -12,13 +12,13 @@ use clap::builder::{BoolishValueParser, OsStringValueParser, RangedI64ValueParse
 
 pub use bokehcam::source::options::{Depth, Frames, Networks, Stereo};
 pub use groups::{Every, Streaming};
-pub use look::{LookSettings, named};
+pub use look::{LookSettings, named_value_parser};
 
 use crate::help::DEPTH;
 use bokehcam::compute::Backend;
 use bokehcam::computing;
 use bokehcam::look::Effect;
-use bokehcam::look::number::above_zero;
+use bokehcam::look::number::parse_positive;
 use bokehcam::names;
 use bokehcam::pipeline::Pace;
 use bokehcam::source::{DepthChoice, Size, SourceName};
@@ -30,7 +30,7 @@ names::named! {
     pub enum LogFormat default Text {
         /// For people
         Text = "text",
-        /// One JSON object a line
+        /// One JSON object per line
         Json = "json",
     }
 }
@@ -39,14 +39,14 @@ names::named! {
 #[derive(Args, Debug)]
 #[command(next_help_heading = "Everywhere")]
 pub struct Global {
-    /// Tell more; twice for details
+    /// Print more messages; give it twice for details
     #[arg(short, long, global = true, action = clap::ArgAction::Count, conflicts_with = "quiet")]
     pub verbose: u8,
-    /// Tell only what went wrong
+    /// Print only warnings and errors
     #[arg(short, long, global = true)]
     pub quiet: bool,
-    /// How log lines are written to stderr; RUST_LOG chooses which
-    #[arg(long, global = true, value_parser = named::<LogFormat>(), value_name = "FORMAT", default_value = "text")]
+    /// Format of log lines on stderr; RUST_LOG selects the lines
+    #[arg(long, global = true, value_parser = named_value_parser::<LogFormat>(), value_name = "FORMAT", default_value = "text")]
     pub log_format: LogFormat,
     /// Show all options
     #[arg(long, global = true, action = clap::ArgAction::HelpLong)]
@@ -61,7 +61,7 @@ pub struct Global {
 #[command(next_help_heading = "Blur")]
 pub struct Blur {
     /// A look by name: portrait, cinematic, dreamy, product, miniature, or one of your own ([presets.NAME] in the
-    /// settings file); other settings of the look go before it
+    /// settings file); individually given settings override it
     #[arg(long, value_name = "NAME")]
     pub preset: Option<String>,
     /// Where depth comes from: auto, recorded, stereo, none, matte, mono, plate, a folder or a depth camera
@@ -86,22 +86,22 @@ pub struct Computing {
     /// The quality of the look.
     #[command(flatten)]
     pub quality: LookSettings<true>,
-    /// What runs the blur
-    #[arg(long, value_parser = named::<Backend>(), value_name = "WHICH", default_value = "auto")]
+    /// Where the blur runs
+    #[arg(long, value_parser = named_value_parser::<Backend>(), value_name = "WHICH", default_value = "auto")]
     pub backend: Backend,
-    /// Part of the name of the GPU to take
+    /// GPU to use, by a part of its name
     #[arg(long, value_name = "NAME")]
     pub adapter: Option<String>,
     /// Threads of the CPU backend, and of a video's encoder [default: one per core]
-    #[arg(long, value_name = "N", value_parser = threads())]
+    #[arg(long, value_name = "N", value_parser = thread_count_parser())]
     pub threads: Option<usize>,
 }
 
 impl Computing {
     /// Converts these options to the library's type.
-    pub fn choice(&self) -> computing::Computing {
+    pub fn to_compute_options(&self) -> computing::ComputeOptions {
         let Self { backend, adapter, threads, .. } = self.clone();
-        computing::Computing { backend, adapter, threads }
+        computing::ComputeOptions { backend, adapter, threads }
     }
 }
 
@@ -110,31 +110,31 @@ impl Computing {
 #[command(next_help_heading = "Stream")]
 pub struct Stream {
     /// Time that the blur of one frame may take, in milliseconds [default: the frame period]
-    #[arg(long, value_name = "MS", value_parser = above_zero)]
+    #[arg(long, value_name = "MS", value_parser = parse_positive)]
     pub budget_ms: Option<f32>,
-    /// Whether frames come when they are due, or as fast as they can be written [default: realtime from a camera or
-    /// into a virtual one, else asap]
-    #[arg(long, value_parser = named::<Pace>(), value_name = "HOW")]
+    /// Whether frames keep their original timing, or come as fast as possible [default: realtime from a camera or into
+    /// a virtual one, else asap]
+    #[arg(long, value_parser = named_value_parser::<Pace>(), value_name = "HOW")]
     pub pace: Option<Pace>,
     /// Picture size of a virtual camera; pictures of another size are fitted into it [default: the source's]
     #[arg(long, value_name = "WxH")]
     pub out_size: Option<Size>,
-    /// Close the source's camera while no program reads the virtual one
+    /// Close the source camera while no program reads the virtual camera
     #[arg(long, value_name = "YES", num_args = 0..=1, require_equals = true, default_value_t = false,
           default_missing_value = "true", value_parser = BoolishValueParser::new(), hide_default_value = true,
           hide_possible_values = true)]
     pub on_demand: bool,
-    /// Mirror the picture, as a mirror does
+    /// Mirror the picture
     #[arg(long, value_name = "YES", num_args = 0..=1, require_equals = true, default_value_t = false,
           default_missing_value = "true", value_parser = BoolishValueParser::new(), hide_default_value = true,
           hide_possible_values = true)]
     pub mirror: bool,
-    /// Count frames that fail and go on, instead of ending
+    /// Skip and count frames with errors, instead of ending
     #[arg(long, value_name = "YES", num_args = 0..=1, require_equals = true, default_value_t = false,
           default_missing_value = "true", value_parser = BoolishValueParser::new(), hide_default_value = true,
           hide_possible_values = true)]
     pub keep_going: bool,
-    /// Write what happened to every frame, and how long it took, to this JSON file; - is standard output
+    /// Write a report to this JSON file: the outcome and time of every frame; - is standard output
     #[arg(long, value_name = "FILE.json")]
     pub report: Option<PathBuf>,
 }
@@ -143,7 +143,7 @@ pub struct Stream {
 #[derive(Args, Clone, Debug)]
 #[command(next_help_heading = "Output")]
 pub struct Output {
-    /// Overwrite what exists, once what replaces it is whole; of a folder, only files that bokehcam wrote
+    /// Overwrite existing outputs, once the new ones are complete; in a folder, only files written by bokehcam
     #[arg(long, value_name = "YES", num_args = 0..=1, require_equals = true, default_value_t = false,
           default_missing_value = "true", value_parser = BoolishValueParser::new(), hide_default_value = true,
           hide_possible_values = true)]
@@ -151,11 +151,11 @@ pub struct Output {
 }
 
 /// Returns a parser of source names; names of folders may be non-UTF-8.
-pub fn source_name() -> impl TypedValueParser<Value = SourceName> {
-    OsStringValueParser::new().try_map(|name| SourceName::from_os(&name))
+pub fn source_name_parser() -> impl TypedValueParser<Value = SourceName> {
+    OsStringValueParser::new().try_map(|name| SourceName::parse_os(&name))
 }
 
 /// Returns a parser of thread counts.
-pub fn threads() -> impl TypedValueParser<Value = usize> {
+pub fn thread_count_parser() -> impl TypedValueParser<Value = usize> {
     RangedI64ValueParser::<u64>::new().range(1..=1024).map(|threads| threads as usize)
 }

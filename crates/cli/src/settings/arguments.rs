@@ -70,8 +70,8 @@ pub fn refuse(error: &clap::Error, args: &[OsString]) -> ExitCode {
         }
         ErrorKind::InvalidUtf8 => log::error(&non_utf8_message(args)),
         _ => {
-            let what = unknown::explain(error, args).unwrap_or_else(|| log::one_line(error));
-            log::error(&environment::with_origin(&what, args, true, None));
+            let what = unknown::explain_unknown(error, args).unwrap_or_else(|| log::one_line(error));
+            log::error(&environment::append_origins(&what, args, true, None));
         }
     }
     let names_a_source = error.source().and_then(|cause| cause.downcast_ref::<SourceError>());
@@ -81,7 +81,7 @@ pub fn refuse(error: &clap::Error, args: &[OsString]) -> ExitCode {
 fn non_utf8_message(args: &[OsString]) -> String {
     let escaped = |arg: &OsString| arg.clone().into_vec().escape_ascii().to_string();
     let which = args.iter().find(|arg| arg.to_str().is_none()).map(escaped);
-    format!("'{}' is no text in UTF-8: rename it, or name a link to it", which.unwrap_or_default())
+    format!("'{}' is not UTF-8 text: rename it, or give a link to it", which.unwrap_or_default())
 }
 
 #[cfg(test)]

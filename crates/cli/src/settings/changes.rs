@@ -17,13 +17,13 @@ use bokehcam::look::{Patch, settings};
 /// # Errors
 /// Fails if a name is no setting of a look, a value is invalid, settings are repeated or exclude each other, or an
 /// aperture's picture cannot be read.
-pub fn patch(settings: &[String]) -> Result<Patch, CliError> {
+pub fn parse_patch(settings: &[String]) -> Result<Patch, CliError> {
     let pairs = settings.iter().map(|setting| {
         let pair = setting.split_once('=').filter(|(name, _)| !name.is_empty());
         let (name, value) = pair
             .ok_or_else(|| CliError::Usage(format!("'{setting}': write NAME=VALUE, such as blur=3% or focus=auto")))?;
         let name = name.trim_start_matches('-');
-        if settings::setting(name).is_none() {
+        if settings::find_setting(name).is_none() {
             Err(CliError::Usage(unknown_setting(name, value)))
         } else {
             Ok((name, value))
@@ -58,7 +58,7 @@ fn unknown_setting(name: &str, value: &str) -> String {
 ///
 /// # Errors
 /// Fails if the preset does not exist, or the settings file or an aperture's picture cannot be read.
-pub fn preset(chosen: Option<&Path>, name: &str) -> Result<Patch, CliError> {
+pub fn load_preset(chosen: Option<&Path>, name: &str) -> Result<Patch, CliError> {
     let file = SettingsFile::load(chosen)?;
     let values = file.preset(name).ok_or_else(|| CliError::Usage(file.unknown_preset(name)))?;
     load_patch(Patch::parse(values.iter().map(|(name, value)| (name.as_str(), value.as_str()))))
@@ -66,17 +66,16 @@ pub fn preset(chosen: Option<&Path>, name: &str) -> Result<Patch, CliError> {
 
 fn load_patch(patch: Result<Patch, (String, String)>) -> Result<Patch, CliError> {
     let mut patch = patch.map_err(|(name, what)| CliError::Usage(format!("{name}: {what}")))?;
-    patch.load()?;
+    patch.load_pictures()?;
     Ok(patch)
 }
 
 #[cfg(test)]
 mod tests {
-    use super::*;
 
     fn parse_patch(settings: &[&str]) -> Result<Vec<(&'static str, String)>, String> {
         let settings: Vec<String> = settings.iter().map(ToString::to_string).collect();
-        patch(&settings).map(|patch| patch.values()).map_err(|error| error.to_string())
+        super::parse_patch(&settings).map(|patch| patch.values()).map_err(|error| error.to_string())
     }
 
     #[test]

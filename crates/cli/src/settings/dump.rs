@@ -9,7 +9,7 @@ use super::table::Values;
 
 /// Formats the settings as TOML, each with its help above and its origin behind it, then the presets of the file.
 /// Settings without a value are commented out, and so is `preset`, whose values are all in the list already.
-pub fn as_toml(settings: &[Setting], presets: &BTreeMap<String, Values>) -> String {
+pub fn to_toml(settings: &[Setting], presets: &BTreeMap<String, Values>) -> String {
     let mut text = String::from("# bokehcam settings. Flags and the environment go before this file.\n");
     for setting in settings {
         let Setting { name, value, origin, help } = setting;

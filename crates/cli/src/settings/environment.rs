@@ -5,7 +5,7 @@ use std::os::unix::ffi::OsStrExt;
 
 use super::file::SettingsFile;
 use super::layers::Layers;
-use super::table::{PREFIX, all_settings, given_variable, suggest_setting, variable};
+use super::table::{PREFIX, active_variable, all_settings_command, environment_variable, suggest_setting};
 use crate::log;
 use bokehcam::look::settings;
 
@@ -14,9 +14,13 @@ const NOT_SETTINGS: [&str; 6] = ["CONFIG", "DATA", "NO_VM", "PAIR", "SCREENSHOTS
 
 /// Warns of variables with the prefix `BOKEHCAM_` that match no setting.
 pub fn warn_of_unknown() {
-    let settings = all_settings();
+    let settings = all_settings_command();
     let names = settings.get_arguments().flat_map(|arg| {
-        arg.get_long().into_iter().chain(arg.get_all_aliases().unwrap_or_default()).map(variable).collect::<Vec<_>>()
+        arg.get_long()
+            .into_iter()
+            .chain(arg.get_all_aliases().unwrap_or_default())
+            .map(environment_variable)
+            .collect::<Vec<_>>()
     });
     let known: Vec<String> = names.collect();
     let names = std::env::vars_os().map(|(name, _)| name.to_string_lossy().into_owned());
@@ -33,29 +37,30 @@ pub fn warn_of_unknown() {
 
 fn describe_unknown(name: &str) -> String {
     let setting = name.strip_prefix(PREFIX).unwrap_or(name).replace('_', "-").to_lowercase();
-    let hint = suggest_setting(&setting).map_or(String::new(), |near| format!(", did you mean {}?", variable(&near)));
-    format!("{name}, which is no setting{hint}")
+    let hint = suggest_setting(&setting)
+        .map_or(String::new(), |near| format!(", did you mean {}?", environment_variable(&near)));
+    format!("{name}, which is not a setting{hint}")
 }
 
 /// Appends to an error message the origin of the settings that it names, unless they are arguments: environment
 /// variables, if a value is invalid, and keys of the settings file.
-pub fn with_origin(
+pub fn append_origins(
     message: &str,
     args: &[OsString],
     are_wrong: bool,
     file: Option<(&SettingsFile, &Layers)>,
 ) -> String {
     let message = &if are_wrong { with_variables(message, args) } else { message.to_owned() };
-    let options: Vec<&str> = options_in(message).filter(|_| are_wrong).collect();
+    let options: Vec<&str> = find_options(message).filter(|_| are_wrong).collect();
     let keys = file.map_or(Vec::new(), |(file, layers)| layers.name_origins(message, &options, file));
     if keys.is_empty() { message.to_owned() } else { format!("{message} ({})", keys.join(", ")) }
 }
 
 fn with_variables(message: &str, args: &[OsString]) -> String {
-    let mut variables: Vec<String> = options_in(message)
-        .filter(|name| !names_of(name).any(|name| has_option(args, name)))
+    let mut variables: Vec<String> = find_options(message)
+        .filter(|name| !setting_names(name).any(|name| has_option(args, name)))
         .filter_map(|name| {
-            let variable = given_variable(name);
+            let variable = active_variable(name);
             let value = std::env::var_os(&variable).filter(|value| !value.is_empty())?;
             Some(format!("{variable}={}", value.to_string_lossy()))
         })
@@ -68,9 +73,9 @@ fn with_variables(message: &str, args: &[OsString]) -> String {
 }
 
 /// Returns all names of a setting.
-fn names_of(name: &str) -> impl Iterator<Item = &str> {
-    let alias = settings::setting(name).and_then(settings::Setting::alias);
-    [Some(settings::name_of(name)), alias].into_iter().flatten()
+fn setting_names(name: &str) -> impl Iterator<Item = &str> {
+    let alias = settings::find_setting(name).and_then(settings::Setting::alias);
+    [Some(settings::resolve_alias(name)), alias].into_iter().flatten()
 }
 
 /// Whether the arguments contain the option `--name`.
@@ -83,7 +88,7 @@ fn has_option(args: &[OsString], name: &str) -> bool {
 }
 
 /// Finds the options `--name` in a text, without their dashes.
-fn options_in(text: &str) -> impl Iterator<Item = &str> {
+fn find_options(text: &str) -> impl Iterator<Item = &str> {
     text.match_indices("--").filter_map(|(at, _)| {
         let rest = &text[at + 2..];
         let end = rest.find(|c: char| !c.is_ascii_alphanumeric() && c != '-').unwrap_or(rest.len());
@@ -98,8 +103,8 @@ mod tests {
     #[test]
     fn options_are_found_in_what_is_said_of_them() {
         let text = "the argument '--coc-at-infinity <PX>' cannot be used with: --f-number; -- no more --";
-        assert_eq!(options_in(text).collect::<Vec<_>>(), ["coc-at-infinity", "f-number"]);
-        assert_eq!(variable("coc-at-infinity"), "BOKEHCAM_COC_AT_INFINITY");
+        assert_eq!(find_options(text).collect::<Vec<_>>(), ["coc-at-infinity", "f-number"]);
+        assert_eq!(environment_variable("coc-at-infinity"), "BOKEHCAM_COC_AT_INFINITY");
     }
 
     #[test]

@@ -68,7 +68,7 @@ impl SettingsFile {
             for entry in sorted_entries(presets.value.as_table().ok_or_else(no_table)?) {
                 let settings = entry.value.as_table().ok_or_else(no_table)?;
                 check_name(entry.name).map_err(|what| refuse((entry.at, what)))?;
-                let is_look_setting = |name: &str| look::settings::setting(name).is_some();
+                let is_look_setting = |name: &str| look::settings::find_setting(name).is_some();
                 let values = check_values(sorted_entries(settings), &is_look_setting, folder).map_err(refuse)?;
                 file.presets.insert(entry.name.to_owned(), values);
             }
@@ -82,7 +82,7 @@ impl SettingsFile {
 
     /// Returns the settings of a preset, built-in or from this file.
     pub fn preset(&self, name: &str) -> Option<Values> {
-        let built_in = presets::built_in().find(|preset| preset.name == name);
+        let built_in = presets::built_in_presets().find(|preset| preset.name == name);
         let values = built_in.map(|preset| preset.patch.values());
         let owned =
             |values: Vec<_>| values.into_iter().map(|(name, value): (&str, _)| (name.to_owned(), value)).collect();
@@ -91,7 +91,7 @@ impl SettingsFile {
 
     /// Returns the names of all presets, those of this file last.
     pub fn preset_names(&self) -> Vec<String> {
-        let built_in = presets::built_in().map(|preset| preset.name.to_owned());
+        let built_in = presets::built_in_presets().map(|preset| preset.name.to_owned());
         built_in.chain(self.presets.keys().cloned()).collect()
     }
 
@@ -103,20 +103,20 @@ impl SettingsFile {
             let pairs = values.iter().map(|(name, value)| (name.as_str(), value.as_str()));
             // Never fails: the values were validated when the file was read.
             let mut patch = Patch::parse(pairs).ok()?;
-            match patch.load() {
-                Ok(()) => Some(Preset { name: name.clone(), patch, own: true }),
+            match patch.load_pictures() {
+                Ok(()) => Some(Preset { name: name.clone(), patch, is_user_defined: true }),
                 Err(error) => {
                     tracing::warn!("preset {name}: {error}");
                     None
                 }
             }
         });
-        presets::built_in().chain(user_presets).collect()
+        presets::built_in_presets().chain(user_presets).collect()
     }
 
     /// Formats the message for an unknown preset, with a list of the known ones.
     pub fn unknown_preset(&self, name: &str) -> String {
-        let built_in = presets::built_in().map(|preset| preset.name);
+        let built_in = presets::built_in_presets().map(|preset| preset.name);
         let all: Vec<String> = built_in.chain(self.presets.keys().cloned()).collect();
         format!("there is no preset '{name}': use {}", all.join(", "))
     }
@@ -133,7 +133,7 @@ pub fn check_name(name: &str) -> Result<(), String> {
     if name.contains(char::is_control) {
         return Err(format!("the name {name:?} of a preset has control characters: leave them out"));
     }
-    match presets::built_in().any(|preset| preset.name == name) {
+    match presets::built_in_presets().any(|preset| preset.name == name) {
         true => Err(format!("the preset '{name}' is built in: choose another name")),
         false => Ok(()),
     }
@@ -169,7 +169,7 @@ fn check_values<'a>(
             return Err((at, what));
         }
         if !allowed(name) {
-            return Err((at, format!("'{name}' is not about the look, and a preset is: it can have {}", look_names())));
+            return Err((at, format!("'{name}' does not belong to the look: a preset can have {}", look_names())));
         }
         let value = match value {
             DeValue::String(text) => text.clone().into_owned(),
@@ -182,8 +182,8 @@ fn check_values<'a>(
             _ => return Err((at, format!("'{name}' must be a text, a number, true or false"))),
         };
         let value = resolve_paths(folder, name, &value);
-        if values.insert(look::settings::name_of(name).to_owned(), value).is_some() {
-            return Err((at, format!("'{name}' is there already, by its other name: leave one of them out")));
+        if values.insert(look::settings::resolve_alias(name).to_owned(), value).is_some() {
+            return Err((at, format!("'{name}' is given twice, also by its other name: leave one of them out")));
         }
         // Validated with the preceding ones, to find settings that exclude each other.
         parse_flags(&values).map_err(|error| (at, one_line(&error)))?;
@@ -261,8 +261,8 @@ mod tests {
         for (text, line, said) in [
             ("[presets.mine]\n\nrimm = 1\n", 3, "did you mean rim?"),
             ("[presets.mine]\nrim = 2\n", 2, "from 0 to 1"),
-            ("[presets.mine]\nmirror = true\n", 2, "is not about the look"),
-            ("[presets.mine]\npreset = 'portrait'\n", 2, "is not about the look"),
+            ("[presets.mine]\nmirror = true\n", 2, "does not belong to the look"),
+            ("[presets.mine]\npreset = 'portrait'\n", 2, "does not belong to the look"),
             ("[presets.mine]\nf-number = 2\ncoc-at-infinity = 3\n", 3, "cannot be used with"),
             ("blur = 3\ncoc-at-infinity = 3\n", 2, "is there already"),
             ("[presets.mine.rim]\nx = 1\n", 1, "must be a text, a number"),

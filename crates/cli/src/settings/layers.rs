@@ -12,7 +12,7 @@ use clap::{Arg, ArgMatches, Command};
 
 use super::file::SettingsFile;
 use super::paths::absolute_file_in;
-use super::table::{Values, WINDOW_STATE, all_settings, excluded_by, map_settings, parse_flags};
+use super::table::{Values, WINDOW_STATE, all_settings_command, find_excluded, map_settings, parse_flags};
 use crate::error::CliError;
 use crate::log::one_line;
 use bokehcam::look::{SETTINGS, settings};
@@ -32,7 +32,7 @@ pub struct Setting {
 
 /// The settings of a command line, for the window and for warnings about unused settings.
 #[derive(Clone, Debug, Default)]
-pub struct Given {
+pub struct GivenSettings {
     /// Options outside the look that flags and the environment set, as name and value.
     #[cfg_attr(not(feature = "window"), expect(dead_code, reason = "the window alone puts commands together"))]
     pub switches: Vec<(String, String)>,
@@ -47,11 +47,11 @@ pub struct Given {
     pub stated: Vec<String>,
 }
 
-impl Given {
+impl GivenSettings {
     /// Whether flags, the environment or a preset set any part of the look.
     #[cfg(feature = "window")]
     pub fn has_look(&self) -> bool {
-        let is_look = |name: &str| name == "preset" || settings::setting(name).is_some();
+        let is_look = |name: &str| name == "preset" || settings::find_setting(name).is_some();
         self.settings.iter().any(|setting| is_look(&setting.name))
     }
 }
@@ -71,10 +71,14 @@ impl Layers {
     /// # Errors
     /// Fails if the chosen preset does not exist, or the chosen snapshot has no settings.
     pub fn resolve(file: &SettingsFile, given: &ArgMatches) -> Result<Self, CliError> {
-        let given = innermost(given);
+        let given = innermost_matches(given);
         let names_from = |source: ValueSource| -> Vec<String> {
-            let is_from = |arg: &&Arg| source_of(given, arg) == Some(source);
-            all_settings().get_arguments().filter(is_from).filter_map(|arg| arg.get_long().map(str::to_owned)).collect()
+            let is_from = |arg: &&Arg| value_source_of(given, arg) == Some(source);
+            all_settings_command()
+                .get_arguments()
+                .filter(is_from)
+                .filter_map(|arg| arg.get_long().map(str::to_owned))
+                .collect()
         };
         let (by_flag, by_environment) = (names_from(ValueSource::CommandLine), names_from(ValueSource::EnvVariable));
         let text_of = |id: &str| given.try_get_one::<String>(id).ok().flatten();
@@ -92,42 +96,43 @@ impl Layers {
         let mut taken = by_flag.clone();
         // A preset given as a flag next to a snapshot overrides the snapshot.
         if !snapshot.is_empty() && by_flag.iter().any(|name| name == "preset") {
-            layers.add(&preset, "preset", &mut taken);
+            layers.add_layer(&preset, "preset", &mut taken);
         }
-        layers.add(&snapshot, "snapshot", &mut taken);
-        let (ignored, effective) = split_taken(by_environment, &taken);
+        layers.add_layer(&snapshot, "snapshot", &mut taken);
+        let (ignored, effective) = partition_taken(by_environment, &taken);
         layers.ignored = ignored;
         taken.extend(effective);
-        layers.add(&preset, "preset", &mut taken);
-        layers.add(&file.values, "file", &mut taken);
+        layers.add_layer(&preset, "preset", &mut taken);
+        layers.add_layer(&file.values, "file", &mut taken);
         Ok(layers)
     }
 
     /// Returns the settings of the command line, for composing an equivalent command and for warnings.
-    pub fn given(&self, matches: &ArgMatches) -> Given {
+    pub fn given_settings(&self, matches: &ArgMatches) -> GivenSettings {
         /// Not repeated in a composed command: they are for one run only, or the window states them itself, like
         /// [`WINDOW_STATE`].
         const NOT_REPEATED: [&str; 4] = ["preset", "report", "force", "mirror"];
         let is_given = |setting: &Setting| {
             let name = setting.name.as_str();
             ["flag", "environment"].contains(&setting.origin)
-                && settings::setting(name).is_none()
+                && settings::find_setting(name).is_none()
                 && !NOT_REPEATED.contains(&name)
                 && !WINDOW_STATE.contains(&name)
         };
-        let resolved = self.resolved(matches);
+        let resolved = self.resolve_settings(matches);
         // The composed command does not repeat the `--preset` flag, so its values do not apply there.
-        let by_flag = innermost(matches).try_get_one::<String>("preset").ok().flatten().is_some()
-            && innermost(matches).value_source("preset") == Some(ValueSource::CommandLine);
+        let by_flag = innermost_matches(matches).try_get_one::<String>("preset").ok().flatten().is_some()
+            && innermost_matches(matches).value_source("preset") == Some(ValueSource::CommandLine);
         let not_layers = ["flag", "default", if by_flag { "preset" } else { "flag" }];
-        let is_from_layers =
-            |setting: &&Setting| settings::setting(&setting.name).is_some() && !not_layers.contains(&setting.origin);
+        let is_from_layers = |setting: &&Setting| {
+            settings::find_setting(&setting.name).is_some() && !not_layers.contains(&setting.origin)
+        };
         let mut from_layers: Vec<String> =
             resolved.iter().filter(is_from_layers).map(|setting| setting.name.clone()).collect();
-        let is_strength = |name: &str| settings::setting(name).is_some_and(settings::Setting::is_strength);
+        let is_strength = |name: &str| settings::find_setting(name).is_some_and(settings::Setting::sets_strength);
         // The strengths exclude each other: the current one must be stated to override the layers.
         if from_layers.iter().any(|name| is_strength(name)) {
-            let all = SETTINGS.iter().filter(|setting| setting.is_strength());
+            let all = SETTINGS.iter().filter(|setting| setting.sets_strength());
             from_layers.extend(all.map(|setting| setting.name.to_owned()));
         }
         let is_given_or_preset = |setting: &&Setting| match setting.origin {
@@ -140,12 +145,12 @@ impl Layers {
         let stated = stated.map(|setting| setting.name.clone()).collect();
         let given = resolved.into_iter().filter(is_given);
         let switches = given.filter_map(|setting| Some((setting.name, setting.value?))).collect();
-        Given { switches, from_layers, settings, stated }
+        GivenSettings { switches, from_layers, settings, stated }
     }
 
     /// Adds the values that no stronger layer sets or excludes.
-    fn add(&mut self, values: &Values, origin: &'static str, taken: &mut Vec<String>) {
-        let (_, free) = split_taken(values.keys().cloned().collect(), taken);
+    fn add_layer(&mut self, values: &Values, origin: &'static str, taken: &mut Vec<String>) {
+        let (_, free) = partition_taken(values.keys().cloned().collect(), taken);
         self.values.extend(free.iter().map(|name| (name.clone(), (values[name].clone(), origin))));
         taken.extend(free);
     }
@@ -154,7 +159,7 @@ impl Layers {
     /// the files that they name.
     pub fn name_origins(&self, message: &str, options: &[&str], file: &SettingsFile) -> Vec<String> {
         let is_mentioned = |name: &str, value: &str| {
-            options.iter().any(|option| settings::name_of(option) == name)
+            options.iter().any(|option| settings::resolve_alias(option) == name)
                 || absolute_file_in(value).is_some_and(|file| message.contains(file))
         };
         let place = |(name, (value, origin)): (&String, &(String, &str))| {
@@ -181,8 +186,8 @@ impl Layers {
     }
 
     /// Returns all settings of the command that `given` belongs to, in the order of its help.
-    pub fn resolved(&self, given: &ArgMatches) -> Vec<Setting> {
-        let given = innermost(given);
+    pub fn resolve_settings(&self, given: &ArgMatches) -> Vec<Setting> {
+        let given = innermost_matches(given);
         let describe = |arg: &Arg| {
             let name = arg.get_long()?.to_owned();
             // Lists are written with commas.
@@ -190,7 +195,7 @@ impl Layers {
                 values.map(|value| value.to_string_lossy().into_owned()).collect::<Vec<_>>().join(",")
             };
             let value = given.try_get_raw(arg.get_id().as_str()).ok().flatten().map(listed);
-            let origin = match source_of(given, arg) {
+            let origin = match value_source_of(given, arg) {
                 Some(ValueSource::CommandLine) => "flag",
                 Some(ValueSource::EnvVariable) => "environment",
                 _ => self.values.get(&name).map_or("default", |(_, origin)| origin),
@@ -198,13 +203,13 @@ impl Layers {
             let help = arg.get_help().map(ToString::to_string).unwrap_or_default();
             Some(Setting { name, value, origin, help })
         };
-        all_settings().get_arguments().filter_map(describe).collect()
+        all_settings_command().get_arguments().filter_map(describe).collect()
     }
 }
 
 /// Whether a setting has its default value.
 fn is_default(setting: &Setting) -> bool {
-    let every = all_settings();
+    let every = all_settings_command();
     let arg = every.get_arguments().find(|arg| arg.get_long() == Some(&setting.name));
     let default = arg.and_then(|arg| arg.get_default_values().first()).map(|value| value.to_string_lossy());
     // Presets write `auto` for a default that depends on the picture, which clap has no value for.
@@ -212,12 +217,12 @@ fn is_default(setting: &Setting) -> bool {
 }
 
 /// Splits `names` into those in `taken` or excluded by it, and the rest.
-fn split_taken(names: Vec<String>, taken: &[String]) -> (Vec<String>, Vec<String>) {
-    let excluded = excluded_by(taken);
+fn partition_taken(names: Vec<String>, taken: &[String]) -> (Vec<String>, Vec<String>) {
+    let excluded = find_excluded(taken);
     names.into_iter().partition(|name| taken.contains(name) || excluded.contains(name))
 }
 
-fn source_of(given: &ArgMatches, arg: &Arg) -> Option<ValueSource> {
+fn value_source_of(given: &ArgMatches, arg: &Arg) -> Option<ValueSource> {
     let id = arg.get_id().as_str();
     given.try_contains_id(id).is_ok_and(|present| present).then(|| given.value_source(id)).flatten()
 }
@@ -226,8 +231,8 @@ fn source_of(given: &ArgMatches, arg: &Arg) -> Option<ValueSource> {
 fn read_snapshot(path: &Path) -> Result<Values, CliError> {
     let refuse = |what: String| CliError::Usage(format!("--like {}: {what}", path.display()));
     let written = snapshot::settings(path)?.into_iter();
-    let values: Values = written.map(|(name, value)| (settings::name_of(&name).to_owned(), value)).collect();
-    if let Some(unknown) = values.keys().find(|name| settings::setting(name).is_none()) {
+    let values: Values = written.map(|(name, value)| (settings::resolve_alias(&name).to_owned(), value)).collect();
+    if let Some(unknown) = values.keys().find(|name| settings::find_setting(name).is_none()) {
         return Err(refuse(format!(
             "its setting '{unknown}' is not a setting of the look: the file is of another version, or was edited"
         )));
@@ -236,6 +241,6 @@ fn read_snapshot(path: &Path) -> Result<Values, CliError> {
     Ok(values)
 }
 /// Returns the matches of the innermost subcommand.
-fn innermost(matches: &ArgMatches) -> &ArgMatches {
-    matches.subcommand().map_or(matches, |(_, submatches)| innermost(submatches))
+fn innermost_matches(matches: &ArgMatches) -> &ArgMatches {
+    matches.subcommand().map_or(matches, |(_, submatches)| innermost_matches(submatches))
 }

@@ -3,21 +3,21 @@
 use std::any::TypeId;
 use std::path::{Path, PathBuf};
 
-use super::table::all_settings;
+use super::table::all_settings_command;
 use bokehcam::look::{Patch, settings};
 use bokehcam::source::DepthChoice;
 
 /// Makes the relative paths in a setting's value absolute, relative to `folder`; other values stay.
 pub fn resolve_paths(folder: &Path, name: &str, value: &str) -> String {
     let absolute = |file: &str| folder.join(file).to_str().map_or_else(|| file.to_owned(), str::to_owned);
-    let name = settings::name_of(name);
-    if settings::setting(name).is_some() {
+    let name = settings::resolve_alias(name);
+    if settings::find_setting(name).is_some() {
         let mut patch = Patch::parse([(name, value)]).unwrap_or_default();
-        let files = patch.files_mut().map(|file| *file = folder.join(&*file)).count();
+        let files = patch.unread_files_mut().map(|file| *file = folder.join(&*file)).count();
         let absolute = patch.values().pop().filter(|_| files > 0);
         return absolute.map_or_else(|| value.to_owned(), |(_, value)| value);
     }
-    let every = all_settings();
+    let every = all_settings_command();
     let Some(arg) = every.get_arguments().find(|arg| arg.get_long() == Some(name)) else { return value.to_owned() };
     let kind = arg.get_value_parser().type_id();
     if kind == TypeId::of::<PathBuf>() && value != "-" {
@@ -26,7 +26,7 @@ pub fn resolve_paths(folder: &Path, name: &str, value: &str) -> String {
     }
     if kind == TypeId::of::<DepthChoice>() {
         return match value.parse() {
-            Ok(DepthChoice::OneCamera(mut chosen)) => {
+            Ok(DepthChoice::SingleCamera(mut chosen)) => {
                 chosen.files_mut().for_each(|file| *file = folder.join(&*file));
                 chosen.to_string()
             }

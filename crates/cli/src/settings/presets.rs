@@ -20,7 +20,7 @@ pub fn save(path: &Path, name: &str, settings: &[Value]) -> Result<(), CliError>
     check_name(name).map_err(CliError::Usage)?;
     let cwd = std::env::current_dir().map_err(CliError::io(".".as_ref()))?;
     let settings: Vec<Value> = settings.iter().map(|(name, value)| (*name, resolve_paths(&cwd, name, value))).collect();
-    save::edit(path, |document| set_preset(document, name, &settings))
+    save::edit_file(path, |document| set_preset(document, name, &settings))
 }
 
 /// Renames the user's preset `name`; its settings and their comments stay.
@@ -57,7 +57,7 @@ fn edit_preset(
     change: impl FnOnce(&mut dyn TableLike) -> Result<(), CliError>,
 ) -> Result<(), CliError> {
     let mut changed = Ok(());
-    save::edit(path, |document| {
+    save::edit_file(path, |document| {
         changed = match document.get_mut(PRESETS).and_then(Item::as_table_like_mut) {
             Some(presets) if presets.contains_key(name) => change(presets),
             _ => Err(CliError::Usage(format!("{}: there is no preset '{name}' in it", path.display()))),
@@ -78,9 +78,9 @@ fn set_preset(document: &mut DocumentMut, name: &str, settings: &[Value]) -> Opt
     }
     let preset: &mut dyn TableLike = presets.get_mut(name)?.as_table_like_mut()?;
     let old: Vec<String> = preset.iter().map(|(key, _)| key.to_owned()).collect();
-    let stays = |key: &&String| settings.iter().any(|(name, _)| *name == table::name_of(key));
+    let stays = |key: &&String| settings.iter().any(|(name, _)| *name == table::resolve_alias(key));
     old.iter().filter(|key| !stays(key)).for_each(|key| drop(preset.remove(key)));
-    settings.iter().for_each(|(name, text)| save::set(preset, name, text));
+    settings.iter().for_each(|(name, text)| save::set_key(preset, name, text));
     Some(())
 }
 
@@ -105,13 +105,13 @@ mod tests {
             focus: FocusRule::Point { x: 0.25, y: 0.5 },
             rank: Some(Rank::Full),
             strength: Strength::AtInfinity(9.0),
-            ..Look::plain(Effect::TiltShift)
+            ..Look::with_effect(Effect::TiltShift)
         };
         let file = parse(
             "rim = 0.9\n[presets.lens]\neffect = \"auto\"\nf-number = 2\nfocal-length = 50\nsensor-width = 36\n[presets.\"no\"]\n",
         );
         let all = file.all_presets();
-        let names: Vec<_> = all.iter().map(|preset| (preset.name.as_str(), preset.own)).collect();
+        let names: Vec<_> = all.iter().map(|preset| (preset.name.as_str(), preset.is_user_defined)).collect();
         let built_in = ["portrait", "cinematic", "dreamy", "product", "miniature"].map(|name| (name, false));
         assert_eq!(names, [&built_in[..], &[("lens", true), ("no", true)]].concat());
         let looks: Vec<Look> = all.iter().map(|preset| preset.patch.apply_to(&base).unwrap()).collect();
@@ -133,7 +133,7 @@ mod tests {
     fn a_preset_that_cannot_be_is_left_out() {
         let all = parse("[presets.gone]\naperture = \"image:/nowhere.png\"\n[presets.here]\nrim = 0\n").all_presets();
         assert_eq!(
-            all.iter().filter(|preset| preset.own).map(|preset| preset.name.as_str()).collect::<Vec<_>>(),
+            all.iter().filter(|preset| preset.is_user_defined).map(|preset| preset.name.as_str()).collect::<Vec<_>>(),
             ["here"]
         );
     }
@@ -157,7 +157,7 @@ mod tests {
         assert!(saved.contains("rim = 0.3\n") && saved.contains("blur = \"3.5%\"\n"), "{saved}");
         let all = parse(&saved).all_presets();
         let preset = all.iter().find(|preset| preset.name.starts_with("Abend")).unwrap();
-        assert_eq!(preset.patch.apply_to(&Look::plain(Effect::Blur)).unwrap(), look);
+        assert_eq!(preset.patch.apply_to(&Look::with_effect(Effect::Blur)).unwrap(), look);
 
         save(&path, "old", &[("rim", "0.5".to_string()), ("aperture", "heart".to_string())]).unwrap();
         let again = fs::read_to_string(&path).unwrap();

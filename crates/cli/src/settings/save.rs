@@ -12,9 +12,9 @@ use super::dump::toml_number;
 use super::file::{self, SettingsFile};
 use super::layers::Setting;
 use super::paths::resolve_paths;
-use super::table::excluded_by;
+use super::table::find_excluded;
 use crate::error::CliError;
-use crate::files::write_whole;
+use crate::files::write_atomically;
 use crate::terminal;
 use bokehcam::files::input;
 use bokehcam::look::settings;
@@ -23,7 +23,7 @@ use bokehcam::look::settings;
 ///
 /// # Errors
 /// Fails if no setting is given, or the file is not a settings file or cannot be read or written.
-pub fn run(chosen: Option<&Path>, settings: &[Setting]) -> Result<(), CliError> {
+pub fn save_settings(chosen: Option<&Path>, settings: &[Setting]) -> Result<(), CliError> {
     let cwd = std::env::current_dir().map_err(CliError::io(".".as_ref()))?;
     let by_flag = settings.iter().filter(|setting| setting.origin == "flag");
     let given: Vec<(String, String)> = by_flag
@@ -31,21 +31,21 @@ pub fn run(chosen: Option<&Path>, settings: &[Setting]) -> Result<(), CliError> 
         .collect();
     let names: Vec<String> = given.iter().map(|(name, _)| name.clone()).collect();
     if names.is_empty() {
-        let what = "there is nothing to save: give settings as flags, such as --rim 0.1";
+        let what = "nothing to save: give settings as flags, such as --rim 0.1";
         return Err(CliError::Usage(what.to_string()));
     }
     let path = file_to_save(chosen)?;
-    let excluded = excluded_by(&names);
+    let excluded = find_excluded(&names);
     let mut removed: Vec<String> = Vec::new();
-    edit(&path, |document| {
+    edit_file(&path, |document| {
         let table = document.as_table_mut();
-        let excluded = excluded.iter().map(|name| key_of(table, name).to_owned()).collect::<Vec<_>>();
+        let excluded = excluded.iter().map(|name| find_key(table, name).to_owned()).collect::<Vec<_>>();
         removed = excluded.into_iter().filter(|name| table.remove(name).is_some()).collect();
-        given.iter().for_each(|(name, value)| set(table, name, value));
+        given.iter().for_each(|(name, value)| set_key(table, name, value));
         Some(())
     })?;
     let without = if removed.is_empty() { String::new() } else { format!("; {} set aside", removed.join(", ")) };
-    terminal::say(&format!("{}: saved {}{without}", path.display(), names.join(", ")));
+    terminal::print_to_stderr(&format!("{}: saved {}{without}", path.display(), names.join(", ")));
     Ok(())
 }
 
@@ -55,7 +55,7 @@ pub fn run(chosen: Option<&Path>, settings: &[Setting]) -> Result<(), CliError> 
 /// Fails if none is chosen and the user has no home folder.
 pub fn file_to_save(chosen: Option<&Path>) -> Result<PathBuf, CliError> {
     let no_home =
-        || CliError::Usage("there is no home to keep settings in: name a file with --config FILE".to_string());
+        || CliError::Usage("there is no home folder for settings: name a file with --config FILE".to_string());
     chosen.map(Path::to_owned).or_else(file::user_file).ok_or_else(no_home)
 }
 
@@ -64,7 +64,7 @@ pub fn file_to_save(chosen: Option<&Path>) -> Result<PathBuf, CliError> {
 /// # Errors
 /// Fails if the file is not a settings file before or after the change, cannot be read or written, or `change` returns
 /// `None`.
-pub fn edit(path: &Path, change: impl FnOnce(&mut DocumentMut) -> Option<()>) -> Result<(), CliError> {
+pub fn edit_file(path: &Path, change: impl FnOnce(&mut DocumentMut) -> Option<()>) -> Result<(), CliError> {
     // A symbolic link, for example into a repository of settings, is followed and not replaced.
     let path = &link_target(path)?;
     let text = match input::read_text(path, input::MAX_SETTINGS_BYTES) {
@@ -82,7 +82,7 @@ pub fn edit(path: &Path, change: impl FnOnce(&mut DocumentMut) -> Option<()>) ->
     if let Some(folder) = path.parent() {
         fs::create_dir_all(folder).map_err(CliError::io(folder))?;
     }
-    write_whole(path, edited.as_bytes(), true)
+    write_atomically(path, edited.as_bytes(), true)
 }
 
 /// Follows the symbolic links at `path`. Unlike `canonicalize`, the final target need not exist.
@@ -100,14 +100,14 @@ fn link_target(path: &Path) -> Result<PathBuf, CliError> {
 }
 
 /// Returns the key of a setting in a table, which may be its alias.
-pub fn key_of<'a>(table: &dyn TableLike, name: &'a str) -> &'a str {
-    let alias = settings::setting(name).and_then(settings::Setting::alias);
+pub fn find_key<'a>(table: &dyn TableLike, name: &'a str) -> &'a str {
+    let alias = settings::find_setting(name).and_then(settings::Setting::alias);
     alias.filter(|alias| table.contains_key(alias)).unwrap_or(name)
 }
 
 /// Sets a key. An existing key keeps its position and the comments around its value.
-pub fn set(table: &mut dyn TableLike, name: &str, text: &str) {
-    let key = key_of(table, name);
+pub fn set_key(table: &mut dyn TableLike, name: &str, text: &str) {
+    let key = find_key(table, name);
     let mut value = toml_number(text).unwrap_or_else(|| Value::from(text));
     match table.get_mut(key).and_then(Item::as_value_mut) {
         Some(old) => {
@@ -128,8 +128,8 @@ pub fn refuse_redirect(chosen: Option<&Path>) -> Result<(), CliError> {
     let (Ok(stdout), Ok(file)) = (stdout, fs::metadata(&path)) else { return Ok(()) };
     if stdout.is_file() && (stdout.dev(), stdout.ino()) == (file.dev(), file.ino()) {
         return Err(CliError::Usage(format!(
-            "{}: this is the settings file that was to be read, and the redirection `>` has emptied it: use `bokehcam \
-             config save` to change it",
+            "{}: this is the settings file itself, and the redirection `>` has emptied it: use `bokehcam config save` \
+             to change it",
             path.display()
         )));
     }
@@ -144,17 +144,17 @@ mod tests {
     fn a_value_goes_in_where_it_was_and_all_else_stays() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("deep/config.toml");
-        edit(&path, |document| {
-            set(document.as_table_mut(), "rim", "0.5");
+        edit_file(&path, |document| {
+            set_key(document.as_table_mut(), "rim", "0.5");
             Some(())
         })
         .unwrap();
         assert_eq!(fs::read_to_string(&path).unwrap(), "rim = 0.5\n");
         let text = "# mine\nrim   = 0.9 # wide\n\n[presets.old] # dear\nrim = 0.8\n";
         fs::write(&path, text).unwrap();
-        edit(&path, |document| {
-            set(document.as_table_mut(), "rim", "0.1");
-            set(document.as_table_mut(), "aperture", "heart");
+        edit_file(&path, |document| {
+            set_key(document.as_table_mut(), "rim", "0.1");
+            set_key(document.as_table_mut(), "aperture", "heart");
             Some(())
         })
         .unwrap();

@@ -23,36 +23,37 @@ pub const WINDOW_STATE: [&str; 8] =
 pub const WINDOW_START: [&str; 3] = ["language", "theme", "save-to"];
 
 /// Returns the environment variable of a setting: `BOKEHCAM_` and the flag's name in capitals.
-pub fn variable(setting: &str) -> String {
+pub fn environment_variable(setting: &str) -> String {
     format!("{PREFIX}{}", setting.replace('-', "_").to_uppercase())
 }
 
 /// Returns the variable that sets a setting: that of its alias if only that one is set.
-pub fn given_variable(setting: &str) -> String {
+pub fn active_variable(setting: &str) -> String {
     let is_set = |variable: &String| std::env::var_os(variable).is_some_and(|value| !value.is_empty());
-    let by_name = variable(setting);
-    let other = settings::setting(setting).and_then(settings::Setting::alias).map(variable).filter(is_set);
+    let by_name = environment_variable(setting);
+    let other =
+        settings::find_setting(setting).and_then(settings::Setting::alias).map(environment_variable).filter(is_set);
     if is_set(&by_name) { by_name } else { other.unwrap_or(by_name) }
 }
 
 /// Assigns every setting its environment variable.
 pub fn with_environment(command: Command) -> Command {
-    map_settings(command, &|arg, name| arg.env(given_variable(name)).hide_env(true))
+    map_settings(command, &|arg, name| arg.env(active_variable(name)).hide_env(true))
 }
 
 /// Returns a command with every setting and nothing else.
-pub fn all_settings() -> Command {
+pub fn all_settings_command() -> Command {
     Every::augment_args(Command::new("settings").disable_help_flag(true).no_binary_name(true))
 }
 
 /// Whether a setting of this name exists.
 pub fn is_setting(name: &str) -> bool {
-    all_settings().get_arguments().any(|arg| arg.get_long() == Some(settings::name_of(name)))
+    all_settings_command().get_arguments().any(|arg| arg.get_long() == Some(settings::resolve_alias(name)))
 }
 
 /// Returns the setting that clap would suggest for a misspelt name.
 pub fn suggest_setting(name: &str) -> Option<String> {
-    suggest_option(all_settings(), name)
+    suggest_option(all_settings_command(), name)
 }
 
 /// Returns the option of a command that clap would suggest for a misspelt name.
@@ -68,12 +69,12 @@ pub fn suggest_option(command: Command, name: &str) -> Option<String> {
 /// Fails if a flag would reject its value.
 pub fn parse_flags(values: &Values) -> Result<ArgMatches, clap::Error> {
     let flags = values.iter().map(|(name, value)| OsString::from(format!("--{name}={value}")));
-    all_settings().try_get_matches_from(flags)
+    all_settings_command().try_get_matches_from(flags)
 }
 
 /// Returns the settings that exclude, or are excluded by, one of `names`.
-pub fn excluded_by(names: &[String]) -> Vec<String> {
-    let every = all_settings();
+pub fn find_excluded(names: &[String]) -> Vec<String> {
+    let every = all_settings_command();
     // clap lists a conflict only on the side that declares it.
     let exclude_each_other = |a: &Arg, b: &Arg| {
         let lists = |from: &Arg, to: &Arg| every.get_arg_conflicts_with(from).iter().any(|x| x.get_id() == to.get_id());
@@ -87,7 +88,7 @@ pub fn excluded_by(names: &[String]) -> Vec<String> {
 
 /// Rewrites each setting of a command and its subcommands.
 pub fn map_settings(command: Command, rewrite: &dyn Fn(Arg, &str) -> Arg) -> Command {
-    let settings = all_settings();
+    let settings = all_settings_command();
     // By id: a command may have an option of the same name that is not a setting.
     rewrite_args(command, &|arg: Arg| match settings.get_arguments().find(|setting| setting.get_id() == arg.get_id()) {
         Some(setting) => rewrite(arg, setting.get_long().unwrap_or_default()),

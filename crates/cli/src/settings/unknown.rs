@@ -16,7 +16,7 @@ const SYNONYMS: [(&str, &str); 4] =
 const MAX_COMMANDS: usize = 4;
 
 /// Returns the message for an unknown option or command, if it can say more than clap's.
-pub fn explain(error: &clap::Error, args: &[OsString]) -> Option<String> {
+pub fn explain_unknown(error: &clap::Error, args: &[OsString]) -> Option<String> {
     let invalid = |kind| Some(error.get(kind)?.to_string());
     match error.kind() {
         ErrorKind::UnknownArgument => unknown_option(error, &invalid(ContextKind::InvalidArg)?, args),
@@ -25,7 +25,7 @@ pub fn explain(error: &clap::Error, args: &[OsString]) -> Option<String> {
             let is_of_models = args.get(1).is_some_and(|arg| arg == "models");
             let is_removal = ["remove", "rm", "delete", "uninstall"].contains(&word.as_str());
             (is_of_models && is_removal)
-                .then(|| format!("there is no `models {word}`: delete the file, which `bokehcam models` names"))
+                .then(|| format!("there is no `models {word}`: delete the file that `bokehcam models` shows"))
         }
         _ => None,
     }
@@ -45,9 +45,7 @@ fn unknown_option(error: &clap::Error, invalid: &str, args: &[OsString]) -> Opti
     let here = path.join(" ");
     let Some(name) = invalid.strip_prefix("--") else {
         if here == "render" && !invalid.starts_with('-') {
-            return Some(format!(
-                "{invalid}: one picture is blurred at a time; its depth is given by --depth-map FILE"
-            ));
+            return Some(format!("{invalid}: `render` blurs one picture; its depth is given by --depth-map FILE"));
         }
         let file = args.iter().find(|arg| arg.as_bytes().starts_with(invalid.as_bytes()) && arg.len() > 2)?;
         let file = file.to_string_lossy();

@@ -3,16 +3,16 @@
 //! Covers flags, the environment and a preset; the settings file is meant for all runs.
 
 use super::layers::Setting;
-use super::table::{WINDOW_START, WINDOW_STATE, given_variable};
+use super::table::{WINDOW_START, WINDOW_STATE, active_variable};
 use crate::log;
 use bokehcam::look::{Effect, Value};
 use bokehcam::source::{DepthOrigin, Kind};
 
 /// Facts of a run that decide which settings have an effect.
 #[derive(Clone, Copy, Debug)]
-pub struct Run {
+pub struct RunFacts {
     /// Origin of the frames.
-    pub source: From,
+    pub source: FrameOrigin,
     /// Origin of the depth.
     pub depth: DepthOrigin,
     /// Whether the effect uses depth.
@@ -31,11 +31,11 @@ pub struct Run {
     pub window: bool,
 }
 
-impl Default for Run {
+impl Default for RunFacts {
     /// Returns the facts of an unblurred still picture.
     fn default() -> Self {
         Self {
-            source: From::Picture,
+            source: FrameOrigin::Picture,
             depth: DepthOrigin::Nothing,
             uses_depth: false,
             effect: Effect::None,
@@ -50,7 +50,7 @@ impl Default for Run {
 
 /// Origin of the frames.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum From {
+pub enum FrameOrigin {
     /// A source of frames.
     Source(Kind),
     Picture,
@@ -59,27 +59,29 @@ pub enum From {
 }
 
 /// Returns the reason why a setting has no effect in a run, if so.
-type Why = fn(&Run) -> Option<&'static str>;
+type Reason = fn(&RunFacts) -> Option<&'static str>;
 
 /// Settings, and their condition for an effect.
-type Need = (&'static [&'static str], Why);
+type Requirement = (&'static [&'static str], Reason);
 
 /// Conditions that depend on the source alone.
-const NEEDS_OF_SOURCE: &[Need] = &[
+const NEEDS_OF_SOURCE: &[Requirement] = &[
     (&["size", "fps"], |run| match run.source {
-        From::Source(Kind::Recording) => Some("a recording has its own"),
-        From::Source(Kind::Demo) => Some("the demonstration has its own"),
-        From::Source(Kind::Photo) => Some("a photo has its own size, and stands still"),
+        FrameOrigin::Source(Kind::Recording) => Some("a recording has its own"),
+        FrameOrigin::Source(Kind::Demo) => Some("the demonstration has its own"),
+        FrameOrigin::Source(Kind::Photo) => Some("a photo has its own size and only one frame"),
         _ => None,
     }),
-    (&["format", "control"], |run| (run.source != From::Source(Kind::Camera)).then_some("the source is no camera")),
+    (&["format", "control"], |run| {
+        (run.source != FrameOrigin::Source(Kind::Camera)).then_some("the source is not a camera")
+    }),
 ];
 
 /// Other conditions.
-const NEEDS: &[Need] = &[
+const NEEDS: &[Requirement] = &[
     (&["depth-scale", "depth-invalid"], |run| match run.depth {
         DepthOrigin::Nothing => Some(NO_DEPTH),
-        DepthOrigin::Metres | DepthOrigin::Eyes => Some("this depth is in metres already"),
+        DepthOrigin::Metres | DepthOrigin::Stereo => Some("this depth is already in metres"),
         DepthOrigin::Relative => Some("relative depth has no scale"),
         DepthOrigin::Networks => Some("networks give no depth pictures"),
         DepthOrigin::Plate => Some("a plate gives no depth pictures"),
@@ -89,37 +91,40 @@ const NEEDS: &[Need] = &[
     (&["depth-unit"], |run| match run.depth {
         DepthOrigin::Units | DepthOrigin::Relative | DepthOrigin::Metres => None,
         DepthOrigin::Nothing => Some(NO_DEPTH),
-        _ => Some("depth comes from no pictures of it"),
+        _ => Some("depth does not come from depth pictures"),
     }),
     (&["depth-invert"], |run| {
         (run.depth != DepthOrigin::Relative).then_some("only inverse depth is inverted: add --depth-unit inverse")
     }),
     (&["max-disparity", "rectified", "calib", "focal-px", "baseline-m", "doffs-px"], |run| {
-        (run.depth != DepthOrigin::Eyes).then_some("depth is not taken from two eyes")
+        (run.depth != DepthOrigin::Stereo).then_some("depth does not come from two cameras")
     }),
     (&["network-runtime", "network-range", "network-order"], |run| {
         (run.depth != DepthOrigin::Networks).then_some("no network makes the depth")
     }),
     (&["focus"], |run| if run.lens { None } else { needs_dof(run) }),
     (&["focus-range", "method"], needs_dof),
-    (&["refine"], |run| if run.source == From::Bench { Some("the scene's depth is exact") } else { needs_dof(run) }),
+    (
+        &["refine"],
+        |run| if run.source == FrameOrigin::Bench { Some("the scene's depth is exact") } else { needs_dof(run) },
+    ),
     (&["background-memory"], |run| match (run.source, run.depth) {
-        (From::Picture | From::Bench, _) => Some("a picture on its own has nothing to remember"),
-        (_, DepthOrigin::Plate) => Some("the plate has what lies behind"),
+        (FrameOrigin::Picture | FrameOrigin::Bench, _) => Some("a single picture has nothing to remember"),
+        (_, DepthOrigin::Plate) => Some("the plate already shows the background"),
         _ => needs_dof(run),
     }),
-    (&["behind"], |run| if run.source == From::Bench { Some("the scene is its own") } else { needs_dof(run) }),
+    (&["behind"], |run| if run.source == FrameOrigin::Bench { Some("the scene has its own") } else { needs_dof(run) }),
     (&["follow"], |run| match run.source {
-        From::Picture | From::Bench => Some("a picture on its own is shown as a whole"),
-        From::Source(_) => needs_dof(run),
+        FrameOrigin::Picture | FrameOrigin::Bench => Some("a single picture is always shown whole"),
+        FrameOrigin::Source(_) => needs_dof(run),
     }),
     (&["tilt"], |run| (run.effect != Effect::TiltShift).then_some("the effect is not tilt-shift")),
     (&["blur", "f-number", "focal-length", "sensor-width"], |run| {
-        if run.source == From::Bench { Some("`bench` takes --coc") } else { needs_blur(run) }
+        if run.source == FrameOrigin::Bench { Some("`bench` takes --coc") } else { needs_blur(run) }
     }),
     (&["max-coc", "aperture", "intensity", "rim", "rank", "highlights", "quality"], needs_blur),
     (&["backend"], needs_executor),
-    (&["adapter"], |run| needs_executor(run).or(run.cpu_only.then_some("--backend cpu takes no GPU"))),
+    (&["adapter"], |run| needs_executor(run).or(run.cpu_only.then_some("--backend cpu uses no GPU"))),
     (&["threads"], |run| needs_executor(run).filter(|_| !run.compresses)),
     (&["budget-ms"], |run| match run.realtime {
         true => needs_blur(run),
@@ -133,7 +138,7 @@ const NO_DEPTH: &str = "there is no depth";
 const DEPTH_UNUSED: &str = "the effect does not use depth";
 
 /// Condition of depth-of-field settings: an effect that uses depth.
-fn needs_dof(run: &Run) -> Option<&'static str> {
+fn needs_dof(run: &RunFacts) -> Option<&'static str> {
     match (run.effect, run.depth) {
         (effect, _) if effect.follows_depth() => None,
         (_, DepthOrigin::Nothing) => Some(NO_DEPTH),
@@ -142,27 +147,27 @@ fn needs_dof(run: &Run) -> Option<&'static str> {
 }
 
 /// Condition of blur settings: an effect that blurs.
-fn needs_blur(run: &Run) -> Option<&'static str> {
+fn needs_blur(run: &RunFacts) -> Option<&'static str> {
     (run.effect == Effect::None).then_some("nothing is blurred")
 }
 
 /// Condition of executor settings: a blur or a stereo match to compute.
-fn needs_executor(run: &Run) -> Option<&'static str> {
-    needs_blur(run).filter(|_| run.depth != DepthOrigin::Eyes)
+fn needs_executor(run: &RunFacts) -> Option<&'static str> {
+    needs_blur(run).filter(|_| run.depth != DepthOrigin::Stereo)
 }
 
 /// Condition of window settings: a window.
-fn needs_window(run: &Run) -> Option<&'static str> {
+fn needs_window(run: &RunFacts) -> Option<&'static str> {
     (!run.window).then_some("there is no window")
 }
 
 /// Warns of the given settings without effect in this run.
-pub fn warn(given: &[Setting], run: &Run) {
-    format_line(unused(given, run)).iter().for_each(|line| log::warn(line));
+pub fn warn_of_unused(given: &[Setting], run: &RunFacts) {
+    format_line(find_unused(given, run)).iter().for_each(|line| log::warn(line));
 }
 
 /// Returns the warning about changed settings without effect in this run.
-pub fn note(changed: &[Value], run: &Run) -> Option<String> {
+pub fn describe_unused(changed: &[Value], run: &RunFacts) -> Option<String> {
     let given: Vec<Setting> = changed
         .iter()
         .map(|(name, value)| Setting {
@@ -172,22 +177,22 @@ pub fn note(changed: &[Value], run: &Run) -> Option<String> {
             help: String::new(),
         })
         .collect();
-    format_line(unused(&given, run))
+    format_line(find_unused(&given, run))
 }
 
 /// Warns of the given settings without effect on this kind of source; all others can be changed in the window.
 #[cfg(feature = "window")]
 pub fn warn_by_source(given: &[Setting], source: Kind) {
-    let run = Run { source: From::Source(source), realtime: true, window: true, ..Run::default() };
+    let run = RunFacts { source: FrameOrigin::Source(source), realtime: true, window: true, ..RunFacts::default() };
     format_line(find_unmet(NEEDS_OF_SOURCE, given, &run)).iter().for_each(|line| log::warn(line));
 }
 
-fn unused<'a>(given: &'a [Setting], run: &Run) -> Vec<(&'a Setting, &'static str)> {
+fn find_unused<'a>(given: &'a [Setting], run: &RunFacts) -> Vec<(&'a Setting, &'static str)> {
     find_unmet(&[NEEDS_OF_SOURCE, NEEDS].concat(), given, run)
 }
 
 /// Finds the settings with an unmet condition, and the reasons.
-fn find_unmet<'a>(needs: &[Need], given: &'a [Setting], run: &Run) -> Vec<(&'a Setting, &'static str)> {
+fn find_unmet<'a>(needs: &[Requirement], given: &'a [Setting], run: &RunFacts) -> Vec<(&'a Setting, &'static str)> {
     let why = |setting: &Setting| {
         let (_, why) = needs.iter().find(|(names, _)| names.contains(&setting.name.as_str()))?;
         why(run)
@@ -204,7 +209,8 @@ fn format_line(unused: Vec<(&Setting, &str)>) -> Option<String> {
         }
     }
     let grouped = |why: &&str| {
-        let names: Vec<String> = unused.iter().filter(|(_, other)| other == why).map(|(s, _)| as_given(s)).collect();
+        let names: Vec<String> =
+            unused.iter().filter(|(_, other)| other == why).map(|(s, _)| format_as_given(s)).collect();
         format!("{} ({why})", names.join(", "))
     };
     let text = || format!("without effect here: {}", reasons.iter().map(grouped).collect::<Vec<_>>().join("; "));
@@ -212,48 +218,50 @@ fn format_line(unused: Vec<(&Setting, &str)>) -> Option<String> {
 }
 
 /// Formats a setting as the user wrote it.
-fn as_given(setting: &Setting) -> String {
+fn format_as_given(setting: &Setting) -> String {
     let Setting { name, value, origin, .. } = setting;
     let value = value.as_deref().unwrap_or_default();
     match *origin {
         "flag" => format!("--{name} {value}"),
-        "environment" => format!("{}={value}", given_variable(name)),
+        "environment" => format!("{}={value}", active_variable(name)),
         origin => format!("{name} = {value} of the {origin}"),
     }
 }
 
 /// Warns that everything is blurred equally for lack of depth; not for users who chose to do without.
-pub fn warn_of_no_depth(source: From) {
+pub fn warn_of_no_depth(source: FrameOrigin) {
     let fix = match source {
-        From::Picture => {
-            "`bokehcam models get` brings what finds the person, --mask FILE says where it is, --depth-map FILE or a map \
-             NAME-depth.png beside NAME gives its depth"
+        FrameOrigin::Picture => {
+            "`bokehcam models get` installs a network that finds people, --mask FILE marks the person, --depth-map \
+             FILE or a map NAME-depth.png beside NAME gives the depth"
         }
-        From::Source(Kind::Photo) => {
-            "`bokehcam models get` brings what finds the person, a map NAME-depth.png beside NAME gives its depth"
+        FrameOrigin::Source(Kind::Photo) => {
+            "`bokehcam models get` installs a network that finds people, or a map NAME-depth.png beside NAME gives the \
+             depth"
         }
-        From::Source(Kind::Recording) => {
-            "`bokehcam models get` brings what finds the person, --depth FOLDER takes another recording's"
+        FrameOrigin::Source(Kind::Recording) => {
+            "`bokehcam models get` installs a network that finds people, or --depth FOLDER uses the depth of another \
+             recording"
         }
-        From::Source(Kind::Camera) => {
-            "`bokehcam models get` brings what finds the person, or --depth plate (step aside once)"
+        FrameOrigin::Source(Kind::Camera) => {
+            "`bokehcam models get` installs a network that finds people, or use --depth plate (step aside once)"
         }
-        From::Source(_) | From::Bench => "--depth NAME takes a depth camera's",
+        FrameOrigin::Source(_) | FrameOrigin::Bench => "--depth NAME uses a depth camera",
     };
-    log::warn(&format!("{NO_DEPTH}, so all is blurred: {fix}; --effect tilt-shift keeps a band sharp"));
+    log::warn(&format!("{NO_DEPTH}, so everything is blurred: {fix}; --effect tilt-shift keeps a band sharp"));
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::table::all_settings;
+    use super::super::table::all_settings_command;
     use super::*;
 
     fn setting(name: &str) -> Setting {
         Setting { name: name.to_owned(), value: Some("1".into()), origin: "flag", help: String::new() }
     }
 
-    const RUN: Run = Run {
-        source: From::Picture,
+    const RUN: RunFacts = RunFacts {
+        source: FrameOrigin::Picture,
         depth: DepthOrigin::Nothing,
         uses_depth: false,
         effect: Effect::Blur,
@@ -268,7 +276,7 @@ mod tests {
     fn every_name_in_the_table_is_a_setting_and_there_once() {
         let mut names: Vec<&str> =
             [NEEDS_OF_SOURCE, NEEDS].concat().iter().flat_map(|(names, _)| *names).copied().collect();
-        let all = all_settings();
+        let all = all_settings_command();
         let is_camera = |name: &&str| ["format", "control"].contains(name);
         let is_setting = |name: &&str| all.get_arguments().any(|arg| arg.get_long() == Some(name));
         let is_of_window = |name: &&str| WINDOW_STATE.contains(name) || WINDOW_START.contains(name);
@@ -280,20 +288,20 @@ mod tests {
 
     #[test]
     fn a_setting_has_an_effect_where_what_it_needs_is_there() {
-        let why = |name: &str, run: &Run| unused(&[setting(name)], run).first().map(|(_, why)| *why);
+        let why = |name: &str, run: &RunFacts| find_unused(&[setting(name)], run).first().map(|(_, why)| *why);
         assert_eq!(why("focus", &RUN), Some(NO_DEPTH));
-        assert_eq!(why("focus", &Run { lens: true, ..RUN }), None);
-        let dof = Run { depth: DepthOrigin::Units, uses_depth: true, effect: Effect::Dof, ..RUN };
+        assert_eq!(why("focus", &RunFacts { lens: true, ..RUN }), None);
+        let dof = RunFacts { depth: DepthOrigin::Units, uses_depth: true, effect: Effect::Dof, ..RUN };
         for name in ["focus", "refine", "focus-range", "depth-scale", "method"] {
             assert_eq!(why(name, &dof), None, "{name}");
-            assert_eq!(why(name, &Run { depth: DepthOrigin::Nothing, ..RUN }), Some(NO_DEPTH), "{name}");
+            assert_eq!(why(name, &RunFacts { depth: DepthOrigin::Nothing, ..RUN }), Some(NO_DEPTH), "{name}");
         }
-        assert!(why("depth-scale", &Run { depth: DepthOrigin::Eyes, ..dof }).is_some());
-        assert!(why("tilt", &dof).is_some() && why("tilt", &Run { effect: Effect::TiltShift, ..RUN }).is_none());
-        assert!(why("budget-ms", &dof).is_some() && why("budget-ms", &Run { realtime: true, ..dof }).is_none());
-        assert!(why("rim", &Run { effect: Effect::None, ..dof }).is_some() && why("rim", &dof).is_none());
+        assert!(why("depth-scale", &RunFacts { depth: DepthOrigin::Stereo, ..dof }).is_some());
+        assert!(why("tilt", &dof).is_some() && why("tilt", &RunFacts { effect: Effect::TiltShift, ..RUN }).is_none());
+        assert!(why("budget-ms", &dof).is_some() && why("budget-ms", &RunFacts { realtime: true, ..dof }).is_none());
+        assert!(why("rim", &RunFacts { effect: Effect::None, ..dof }).is_some() && why("rim", &dof).is_none());
         for kind in [Kind::Recording, Kind::Demo] {
-            assert!(why("fps", &Run { source: From::Source(kind), ..dof }).is_some());
+            assert!(why("fps", &RunFacts { source: FrameOrigin::Source(kind), ..dof }).is_some());
         }
     }
 }

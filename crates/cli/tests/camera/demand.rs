@@ -3,12 +3,12 @@
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use bokehcam::v4l2::holders::holders;
+use bokehcam::v4l2::holders::list_holders;
 
 use super::machine::{BARS, CAMERA, Machine, Stream, VERSIONS, VIRTUAL, distance_from, frame, open, until, wish};
 
 fn camera_is_open() -> bool {
-    !holders(Path::new(CAMERA)).is_empty()
+    !list_holders(Path::new(CAMERA)).is_empty()
 }
 
 #[test]

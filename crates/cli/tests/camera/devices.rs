@@ -5,8 +5,8 @@ use std::process::Command;
 
 use bokehcam::v4l2::Device;
 use bokehcam::v4l2::controls::{self, Value};
-use bokehcam::v4l2::holders::holders;
-use bokehcam::v4l2::node::{NodeError, resolve};
+use bokehcam::v4l2::holders::list_holders;
+use bokehcam::v4l2::node::{NodeError, resolve_node};
 
 use super::machine::{CAMERA, Machine, VERSIONS, VIRTUAL, beside, run, sh, until};
 
@@ -39,10 +39,10 @@ fn only_nodes_that_give_pictures_are_listed() {
 fn a_camera_has_several_names() {
     let machine = Machine::new();
     for name in ["0", "video0", CAMERA, "vivid", "VIV"] {
-        assert_eq!(resolve(name).unwrap().to_str(), Some(CAMERA), "{name}");
+        assert_eq!(resolve_node(name).unwrap().to_str(), Some(CAMERA), "{name}");
     }
     // Without a writer, the virtual camera is not a source.
-    assert!(matches!(resolve("bokehcam-test"), Err(NodeError::None { .. })));
+    assert!(matches!(resolve_node("bokehcam-test"), Err(NodeError::NotFound { .. })));
     assert!(run("devices bokehcam-test").stdout.contains(VIRTUAL));
     drop(machine);
 
@@ -75,12 +75,12 @@ fn controls_of_every_type_are_set_by_name() {
         ("bitmask", "0x400010", "4194320"),
         ("string", "abc", "abc"),
     ] {
-        controls::set(&device, name, value).unwrap_or_else(|error| panic!("{error}"));
+        controls::set_control(&device, name, value).unwrap_or_else(|error| panic!("{error}"));
         assert!(told(name).trim_matches('\'').starts_with(said.split(' ').next().unwrap()), "{name}: {}", told(name));
     }
-    assert_eq!(controls::get(&device, "bitmask").unwrap(), Value::Number(0x40_0010));
-    assert_eq!(controls::get(&device, "string").unwrap(), Value::Text("abc".into()));
-    controls::set(&device, "button", "1").unwrap();
+    assert_eq!(controls::read_control(&device, "bitmask").unwrap(), Value::Number(0x40_0010));
+    assert_eq!(controls::read_control(&device, "string").unwrap(), Value::Text("abc".into()));
+    controls::set_control(&device, "button", "1").unwrap();
 
     for (name, value, said) in [
         ("brightness", "256", "use 0 to 255"),
@@ -91,13 +91,17 @@ fn controls_of_every_type_are_set_by_name() {
         ("gain", "3", "another control overrides it"),
         ("brightnes", "1", "did you mean brightness?"),
     ] {
-        let error = controls::set(&device, name, value).unwrap_err().to_string();
+        let error = controls::set_control(&device, name, value).unwrap_err().to_string();
         assert!(error.contains(said) && error.lines().count() == 1, "{error}");
     }
-    assert_eq!(controls::get(&device, "brightness").unwrap(), Value::Number(200), "a refused value changes nothing");
+    assert_eq!(
+        controls::read_control(&device, "brightness").unwrap(),
+        Value::Number(200),
+        "a refused value changes nothing"
+    );
     // First turn off the control that overrides it.
-    controls::set(&device, "gain_automatic", "no").unwrap();
-    controls::set(&device, "gain", "3").unwrap();
+    controls::set_control(&device, "gain_automatic", "no").unwrap();
+    controls::set_control(&device, "gain", "3").unwrap();
     assert_eq!(told("gain"), "3");
 }
 
@@ -139,7 +143,7 @@ fn a_busy_camera_names_who_has_it() {
     let mut other = Command::new("v4l2-ctl");
     other.args(["-d", CAMERA, "--stream-mmap", "--stream-count=1000"]);
     let other = beside(other);
-    until("the other program has it", || !holders(CAMERA.as_ref()).is_empty());
+    until("the other program has it", || !list_holders(CAMERA.as_ref()).is_empty());
     let name = format!("v4l2-ctl (process {})", other.0.id());
     run("stream 0 --to null --frames 1").refused(1, &[&name]);
     let list = run("devices --json 0").json();

@@ -3,12 +3,12 @@
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::thread;
 
-use bokehcam::knob::Knob;
-use bokehcam::v4l2::live::knobs;
+use bokehcam::camera_control::CameraControl;
+use bokehcam::v4l2::live::user_controls;
 
 use super::machine::{CAMERA, Ends, Machine, frame, open, sh, until, wish};
 
-fn knob<'a>(knobs: &'a [Knob], name: &str) -> &'a Knob {
+fn knob<'a>(knobs: &'a [CameraControl], name: &str) -> &'a CameraControl {
     knobs.iter().find(|knob| knob.name == name).unwrap_or_else(|| panic!("no {name} in {knobs:?}"))
 }
 
@@ -37,31 +37,31 @@ fn knobs_are_listed_turned_and_read_back_while_the_camera_streams() {
         let wait = |what: &str, is: &mut dyn FnMut() -> bool| until(what, is);
         wait("pictures", &mut || count.load(Ordering::SeqCst) > 2);
 
-        let all = knobs::list("vivid").unwrap();
-        assert_eq!(all, knobs::list(CAMERA).unwrap());
+        let all = user_controls::list_user_controls("vivid").unwrap();
+        assert_eq!(all, user_controls::list_user_controls(CAMERA).unwrap());
         assert!(all.iter().all(|knob| !["mute", "volume", "test_pattern", "button", "string"].contains(&&*knob.name)));
         let brightness = knob(&all, "brightness");
         assert_eq!((brightness.range, brightness.value), ((0, 255, 1), told("brightness")));
-        assert!(brightness.active && !brightness.switch && brightness.menu.is_empty());
+        assert!(brightness.is_active && !brightness.is_boolean && brightness.menu.is_empty());
         let automatic = knob(&all, "gain_automatic");
-        assert!(automatic.switch && automatic.range == (0, 1, 1));
+        assert!(automatic.is_boolean && automatic.range == (0, 1, 1));
 
         let before = mean.load(Ordering::SeqCst);
-        let all = knobs::turn("0", "brightness", 200).unwrap();
+        let all = user_controls::set_user_control("0", "brightness", 200).unwrap();
         assert_eq!((knob(&all, "brightness").value, told("brightness")), (200, 200));
         wait("a lighter picture", &mut || mean.load(Ordering::SeqCst) > before + 30_000);
 
         // An overridden control is reported as inactive, and becomes active when the overriding one is turned off.
-        let all = knobs::turn("0", "gain_automatic", 1).unwrap();
-        assert!(!knob(&all, "gain").active);
-        let said = knobs::turn("0", "gain", 3).unwrap_err().to_string();
+        let all = user_controls::set_user_control("0", "gain_automatic", 1).unwrap();
+        assert!(!knob(&all, "gain").is_active);
+        let said = user_controls::set_user_control("0", "gain", 3).unwrap_err().to_string();
         assert!(said.starts_with(CAMERA) && said.contains("another control overrides it"), "{said}");
-        let all = knobs::turn("0", "gain_automatic", 0).unwrap();
-        assert!(knob(&all, "gain").active);
-        let all = knobs::turn("0", "gain", 3).unwrap();
+        let all = user_controls::set_user_control("0", "gain_automatic", 0).unwrap();
+        assert!(knob(&all, "gain").is_active);
+        let all = user_controls::set_user_control("0", "gain", 3).unwrap();
         assert_eq!((knob(&all, "gain").value, told("gain")), (3, 3));
 
-        let said = knobs::turn("0", "brightness", 256).unwrap_err().to_string();
+        let said = user_controls::set_user_control("0", "brightness", 256).unwrap_err().to_string();
         assert!(said.contains("use 0 to 255") && !said.contains('\n'), "{said}");
         assert_eq!(told("brightness"), 200, "a refused value changes nothing");
         let streamed = count.load(Ordering::SeqCst);

@@ -9,11 +9,11 @@ use std::sync::{Mutex, MutexGuard};
 use std::time::{Duration, Instant};
 
 use bokehcam::capture::v4l2::V4l2Camera;
-use bokehcam::capture::{Captured, PATIENCE};
+use bokehcam::capture::{Captured, MAX_WAIT};
 use bokehcam::frame::ColorImage;
 use bokehcam::layout::Content;
 use bokehcam::v4l2::live::ModeRequest;
-use bokehcam::v4l2::node::nodes;
+use bokehcam::v4l2::node::list_nodes;
 use bokehcam::v4l2::{Device, FourCc, controls};
 use rustix::process::Signal;
 
@@ -59,7 +59,7 @@ impl Machine {
         machine.loopback(version);
         let camera = Device::open(CAMERA.as_ref()).unwrap();
         // Without the changing text, all frames are equal.
-        controls::set(&camera, "osd_text_mode", "None").unwrap();
+        controls::set_control(&camera, "osd_text_mode", "None").unwrap();
         machine
     }
 
@@ -72,7 +72,7 @@ impl Machine {
 
     /// Sets a control of the camera, as another program would.
     pub fn control(&self, name: &str, value: &str) {
-        controls::set(&Device::open(CAMERA.as_ref()).unwrap(), name, value).unwrap();
+        controls::set_control(&Device::open(CAMERA.as_ref()).unwrap(), name, value).unwrap();
     }
 
     /// Selects the HDMI input at 30 frames per second, for any size.
@@ -128,7 +128,7 @@ impl Stream {
         let mut stream = Self::start(&format!("{arguments} --to {VIRTUAL}"));
         until("the virtual camera shows something", || {
             assert!(stream.0.runs(), "it ended");
-            nodes().iter().any(|node| node.path == Path::new(VIRTUAL) && node.captures)
+            list_nodes().iter().any(|node| node.path == Path::new(VIRTUAL) && node.captures)
         });
         stream
     }
@@ -168,7 +168,7 @@ pub fn until(what: &str, is: impl FnMut() -> bool) {
 
 /// Creates a mode request for a colour camera.
 pub fn wish(size_px: (u32, u32), fps: f64, fourcc: Option<FourCc>) -> ModeRequest {
-    ModeRequest { size_px: Some(size_px), fps: Some(fps), fourcc, ..ModeRequest::any(Content::Color) }
+    ModeRequest { size_px: Some(size_px), fps: Some(fps), fourcc, ..ModeRequest::for_content(Content::Color) }
 }
 
 /// Opens a camera in a mode that it must have.
@@ -187,7 +187,7 @@ pub fn stamped(camera: &mut V4l2Camera) -> (ColorImage, u64, Lost) {
     let (mut color, mut lost) = (ColorImage::default(), Lost::default());
     let began = Instant::now();
     while began.elapsed() < HANG {
-        match camera.next_within(PATIENCE, &mut color) {
+        match camera.next_within(MAX_WAIT, &mut color) {
             Captured::Frame(stamp) => return (color, stamp.captured_ns.expect("a camera stamps"), lost),
             Captured::Lost(count, cause) => *lost.by(&format!("{cause:?}")) += count,
             Captured::Waiting => lost.waits += 1,
@@ -197,10 +197,10 @@ pub fn stamped(camera: &mut V4l2Camera) -> (ColorImage, u64, Lost) {
     panic!("no frame for {HANG:?}");
 }
 
-/// Returns the next frame if it arrives within `PATIENCE`.
+/// Returns the next frame if it arrives within `MAX_WAIT`.
 pub fn frame_now(camera: &mut V4l2Camera) -> Option<ColorImage> {
     let mut color = ColorImage::default();
-    match camera.next_within(PATIENCE, &mut color) {
+    match camera.next_within(MAX_WAIT, &mut color) {
         Captured::Frame(_) => Some(color),
         _ => None,
     }

@@ -12,8 +12,8 @@ use std::time::Duration;
 use bokehcam::frame::ColorImage;
 use bokehcam::recording::still;
 use bokehcam::sink::{Ending, Options, Target};
-use bokehcam::v4l2::live::hold::Held;
-use bokehcam::v4l2::node::nodes;
+use bokehcam::v4l2::live::auto_lock::AutoLock;
+use bokehcam::v4l2::node::list_nodes;
 
 use rustix::process::Signal;
 
@@ -27,12 +27,12 @@ fn what_a_camera_decides_by_itself_is_held_and_given_back() {
     let told = |name: &str| sh(&format!("v4l2-ctl -d {CAMERA} -C {name}")).trim().to_owned();
     for automatic in ["1", "0"] {
         machine.control("gain_automatic", automatic);
-        let held = Held::new(CAMERA).unwrap();
+        let held = AutoLock::new(CAMERA).unwrap();
         assert_eq!(told("gain_automatic"), "gain_automatic: 0");
         drop(held);
         assert_eq!(told("gain_automatic"), format!("gain_automatic: {automatic}"));
     }
-    assert!(Held::new("/dev/video99").is_err());
+    assert!(AutoLock::new("/dev/video99").is_err());
 }
 
 const SIZE: (u32, u32) = (160, 96);
@@ -73,7 +73,7 @@ fn a_stream_tells_a_person_to_step_out_and_makes_a_portrait() {
         });
         let _ends = Ends(&over);
         until("the camera shows something", || {
-            nodes().iter().any(|node| node.path == Path::new(VIRTUAL) && node.captures)
+            list_nodes().iter().any(|node| node.path == Path::new(VIRTUAL) && node.captures)
         });
         let arguments =
             format!("stream {VIRTUAL} --depth plate --coc-at-infinity 6 --quality draft --to {}/", folder.display());

@@ -13,7 +13,7 @@ fn machine() -> Machine {
     let machine = Machine::with(TWO, VERSIONS[0]);
     machine.at_30_fps();
     sh(&format!("v4l2-ctl -d {RIGHT} -i 1 && v4l2-ctl -d {RIGHT} --set-dv-bt-timings index=5"));
-    controls::set(&Device::open(RIGHT.as_ref()).unwrap(), "osd_text_mode", "None").unwrap();
+    controls::set_control(&Device::open(RIGHT.as_ref()).unwrap(), "osd_text_mode", "None").unwrap();
     machine
 }
 
@@ -49,7 +49,7 @@ fn while_one_camera_is_away_its_partner_s_frames_are_unpaired_and_then_it_goes_o
     let frames = stream.frames((320, 180));
     let come = |count: u32| (0..count).for_each(|_| frames.recv_timeout(HANG).expect("a frame"));
     come(5);
-    controls::set(&Device::open(RIGHT.as_ref()).unwrap(), "disconnect", "1").unwrap();
+    controls::set_control(&Device::open(RIGHT.as_ref()).unwrap(), "disconnect", "1").unwrap();
     // More frames than can be in flight.
     come(40);
     drop(frames);
@@ -66,5 +66,5 @@ fn cameras_without_a_size_in_common_are_refused() {
     // A webcam's fixed sizes do not match the other camera's HDMI size.
     sh("v4l2-ctl -d /dev/video0 -i 0 && v4l2-ctl -d /dev/video0 --set-fmt-video width=640,height=360");
     let ran = run("stream 0,1 --rectified --effect none --size 333x177 --frames 3 --to null");
-    assert!(ran.code != 0 && ran.stderr.contains("both eyes need one size"), "{}", ran.stderr);
+    assert!(ran.code != 0 && ran.stderr.contains("both need the same size"), "{}", ran.stderr);
 }

@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 use bokehcam::frame::{ColorImage, YuyvImage};
 use bokehcam::sink::{Ending, Options, Target};
 use bokehcam::v4l2::FourCc;
-use bokehcam::v4l2::node::nodes;
+use bokehcam::v4l2::node::list_nodes;
 
 use super::machine::{
     BARS, CAMERA, Lost, Machine, Stream, VERSIONS, VIRTUAL, beside, distance_from, frame, frame_now, open, run, sh,
@@ -168,7 +168,7 @@ fn a_hundred_writers_come_and_go() {
             });
             drop(reader);
             sink.finish(Ending::Whole).unwrap();
-            let node = nodes().into_iter().find(|node| node.path.to_str() == Some(VIRTUAL)).unwrap();
+            let node = list_nodes().into_iter().find(|node| node.path.to_str() == Some(VIRTUAL)).unwrap();
             assert!(node.outputs, "{version}, {turn}: it takes no more writers");
         }
     }
@@ -242,7 +242,7 @@ fn jpegs_of_a_camera_are_decoded() {
     let mut ffmpeg = beside(ffmpeg);
     until("ffmpeg writes", || {
         assert!(ffmpeg.runs());
-        nodes().iter().any(|node| node.path.to_str() == Some(VIRTUAL) && node.captures)
+        list_nodes().iter().any(|node| node.path.to_str() == Some(VIRTUAL) && node.captures)
     });
     let mut camera = open(VIRTUAL, wish((640, 480), 30.0, Some("MJPG".parse().unwrap())));
     let mut lost = Lost::default();
@@ -260,5 +260,5 @@ fn jpegs_of_a_camera_are_decoded() {
 
 /// Whether a name that matches both devices resolves to the camera.
 fn resolve_is_real() -> bool {
-    bokehcam::v4l2::node::resolve("i").unwrap().to_str() == Some(CAMERA)
+    bokehcam::v4l2::node::resolve_node("i").unwrap().to_str() == Some(CAMERA)
 }

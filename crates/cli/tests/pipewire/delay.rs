@@ -8,8 +8,8 @@ use std::time::Duration;
 
 use bokehcam::clock::Clock;
 use bokehcam::frame::ColorImage;
-use bokehcam::pipewire::mode::{Agreed, Mode, Offer};
-use bokehcam::pipewire::reader::{Frame, Reader, Take};
+use bokehcam::pipewire::mode::{Mode, NegotiatedFormat, Offer};
+use bokehcam::pipewire::reader::{Frame, PictureHandler, Reader};
 use bokehcam::sink::{Options, PipeWire, Sink};
 
 use super::program::Beside;
@@ -22,22 +22,22 @@ const PICTURES: usize = 300;
 /// Sends each picture's time stamp and latency, in nanoseconds.
 struct Stopwatch(mpsc::Sender<(u64, u64)>);
 
-impl Take for Stopwatch {
-    fn choose(&mut self, modes: &[Mode]) -> Result<Agreed, String> {
+impl PictureHandler for Stopwatch {
+    fn choose_mode(&mut self, modes: &[Mode]) -> Result<NegotiatedFormat, String> {
         let Mode { fourcc, sizes: Offer::These(sizes), rates: Offer::These(rates) } = &modes[0] else {
             return Err("it leaves a choice".into());
         };
-        Ok(Agreed { fourcc: *fourcc, size: sizes[0], rate: rates[0] })
+        Ok(NegotiatedFormat { fourcc: *fourcc, size: sizes[0], rate: rates[0] })
     }
 
-    fn begin(&mut self, _: &Agreed) {}
+    fn set_format(&mut self, _: &NegotiatedFormat) {}
 
-    fn frame(&mut self, frame: &Frame) {
+    fn handle_frame(&mut self, frame: &Frame) {
         // The receiver may have ended.
         let _ = self.0.send((frame.captured_ns, Clock::system().now_ns() - frame.captured_ns));
     }
 
-    fn lost(&mut self, _: u64, _: u64, _: u64) {}
+    fn add_losses(&mut self, _: u64, _: u64, _: u64) {}
 }
 
 /// The reader process: a program does not read its own camera.

@@ -53,7 +53,7 @@ fn who_asks_for_the_camera_is_given_the_filter() {
     let filter = Run::start(&arguments);
     if !knows_filters {
         let said = filter.refused();
-        assert!(said.contains("it takes WirePlumber 0.5 or later"), "{said}");
+        assert!(said.contains("use WirePlumber 0.5 or later"), "{said}");
         return;
     }
     until("the filter", || node("bokehcam.cam"));

@@ -16,7 +16,7 @@ fn without_a_daemon_one_line_says_so() {
 fn two_cameras_need_two_names_and_a_name_can_be_read() {
     for (arguments, told) in [
         (&["--to", "pipewire:Desk", "--to", "pipewire:Desk"][..], "given twice"),
-        (&["--to", "pipewire:"], "needs a name"),
+        (&["--to", "pipewire:"], "needs a readable name"),
         (&["--to", "pipewire", "--out-size", "321x180"], "even width"),
     ] {
         stream(arguments).failed(2, &[told]);

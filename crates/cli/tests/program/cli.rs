@@ -61,7 +61,7 @@ fn wrong_arguments_cost_one_line_and_exit_code_2() {
         (&["stream", "synthetic", "--to", "film.avi"], "FILE.mp4"),
         (&["stream", "synthetic", "--to", "null", "--loop", "--frames", "1"], "--loop are for recordings"),
         (&["stream", "demo", "--to", "null", "--start", "1", "--frames", "1"], "demo never ends"),
-        (&["stream", "demo", "--depth", "stereo", "--to", "null"], "has one eye"),
+        (&["stream", "demo", "--depth", "stereo", "--to", "null"], "has one camera"),
         (&["stream", "demo", "--depth", "plate", "--to", "null"], "leave --depth out"),
         (&["stream", "synthetic", "--to", "null", "--f-number", "2"], "--sensor-width"),
         (&["stream", "synthetic", "--to", "null", "--size", "640"], "1280x720"),
@@ -105,7 +105,7 @@ fn what_a_camera_cannot_do_is_said_in_one_line() {
         (&["--format", "MJPEG"], 2, "such as MJPG"),
         (&["--fps", "0"], 2, "from 0.1 to 1000"),
         // A device that is not a camera.
-        (&["--control", "a=1,b=2", "--format", "YUYV", "--size", "640x480"], 1, "/dev/null: this is no camera"),
+        (&["--control", "a=1,b=2", "--format", "YUYV", "--size", "640x480"], 1, "/dev/null: this is not a camera"),
     ];
     for (more, code, told) in cases {
         println!("{more:?}");

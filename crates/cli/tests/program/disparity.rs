@@ -117,7 +117,7 @@ fn render_takes_disparity_for_what_it_is() {
     assert!(off / (from_metres.len() as f64) < 1.0, "the same distances, the same blur");
     for file in ["plain.png", "plain.pfm"] {
         let ran = render(file, &["--focus", "auto"]);
-        assert!(ran.code == 0 && ran.stderr.contains("holds disparity without distances"), "{}", ran.stderr);
+        assert!(ran.code == 0 && ran.stderr.contains("contains disparity without a scale"), "{}", ran.stderr);
         let ran = render(file, &["--focus", "2"]);
         assert!(ran.code == 2 && ran.stderr.contains("--focus 2 needs distances"), "{}", ran.stderr);
         assert!(ran.stderr.contains(file) && ran.stderr.contains("depth --metres"), "{}", ran.stderr);
@@ -186,7 +186,7 @@ fn the_range_is_rounded_up_and_fits_the_pictures() {
         desk.save(name, (40, 16), 0);
     }
     let said = desk.assert_written(&["--out", "b.pfm"]);
-    assert!(said.contains("at most 32 can be tried"), "{said}");
+    assert!(said.contains("at most 32 can be searched"), "{said}");
     for name in ["left.png", "right.png"] {
         desk.save(name, (16, 16), 0);
     }
@@ -200,8 +200,8 @@ fn what_does_not_fit_is_refused_in_one_line() {
         (&[], "--out"),
         (&["--out", "d.jpg"], "--out FILE ends with .pfm or .png"),
         (&["--out", "d.pfm", "--preview", "d.gif"], "--preview FILE.png"),
-        (&["--out", "d.png", "--preview", "d.png"], "name one file"),
-        (&["--out", "d.pfm", "--metres"], "--metres needs the geometry of the eyes: give --calib FILE"),
+        (&["--out", "d.png", "--preview", "d.png"], "name the same file"),
+        (&["--out", "d.pfm", "--metres"], "--metres needs the stereo geometry: give --calib FILE"),
         (&["--out", "d.pfm", "--focal-px", "700"], "--baseline-m"),
         (&["--out", "d.pfm", "--focal-px", "0", "--baseline-m", "1"], "above 0"),
         (&["--out", "d.pfm", "--calib", "c.txt", "--focal-px", "7", "--baseline-m", "1"], "cannot be used with"),
@@ -246,7 +246,7 @@ fn a_pair_that_is_none_is_said() {
     for (left, right, rows, said) in [
         ("image_2", "image_3", 0, None),
         ("image_2", "image_3", 4, Some("rows are off by")),
-        ("image_3", "image_2", 0, Some("left and right are exchanged")),
+        ("image_3", "image_2", 0, Some("left and right are swapped")),
     ] {
         save(left, right, rows);
         let ran = desk.run(&["--out", "out.pfm", "--max-disparity", "96", "--force"]);

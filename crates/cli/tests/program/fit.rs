@@ -4,7 +4,7 @@
 use std::path::Path;
 
 use bokehcam::depth::agreement::EdgeAlignment;
-use bokehcam::engine::still::{Depth, coc_and_depth};
+use bokehcam::engine::still::{Depth, compute_coc_and_depth};
 use bokehcam::frame::{ColorImage, DepthMap};
 use bokehcam::look::{Look, Refine};
 use bokehcam::recording::still::{read_color, read_depth, write_color, write_depth};
@@ -86,7 +86,7 @@ fn it_is_seen_how_outlines_lie() {
 /// Returns the mean absolute error of the CoC radius, in pixels.
 fn coc_error_px(refine: Refine, color: &ColorImage, map: DepthMap, truth: &DepthMap) -> f32 {
     let look = Look { refine, focus: "1.2".parse().unwrap(), ..Look::default() };
-    let (field, map) = coc_and_depth(&look, &mut color.clone(), Some(Depth::Measured(map))).unwrap();
+    let (field, map) = compute_coc_and_depth(&look, &mut color.clone(), Some(Depth::Measured(map))).unwrap();
     let map = map.unwrap();
     let bokehcam::optics::CocField::Depth(lens) = field else { panic!("the blur follows depth") };
     let step = truth.width / map.width;
@@ -134,8 +134,8 @@ fn render_says_what_it_does_about_it() {
     for (map, begin) in [
         ("fat.png", "note: fat.png: refined, as its outlines lie about "),
         ("soft.png", "note: soft.png: refined, as its outlines are about "),
-        ("small.png", "note: small.png: refined, as it has 160 x 90 pixels; --refine off takes it as it is"),
-        ("other.png", "warning: other.png: nowhere do its outlines meet those of the picture: "),
+        ("small.png", "note: small.png: refined, as it has 160 x 90 pixels; --refine off uses it unchanged"),
+        ("other.png", "warning: other.png: none of its outlines match those of the picture: "),
     ] {
         let said = render(map, &[]);
         assert!(said.starts_with(begin) && said.lines().count() == 2, "{map}: {said}");
@@ -174,7 +174,7 @@ fn a_stream_says_once_how_its_depth_does_not_fit_and_mends_it() {
         ran.done().to_owned()
     };
     let about =
-        |said: &str| said.lines().filter(|line| line.contains("nowhere do the outlines of its depth meet")).count();
+        |said: &str| said.lines().filter(|line| line.contains("none of the outlines of its depth match")).count();
     assert_eq!(about(&stream("fits", "null")), 0);
     assert_eq!(about(&stream("other", "null")), 1);
     let pictures = |name: &str| {
@@ -185,7 +185,7 @@ fn a_stream_says_once_how_its_depth_does_not_fit_and_mends_it() {
     };
     let ((_, fitting), (said, mended)) = (pictures("fits"), pictures("fat"));
     let about =
-        said.lines().filter(|line| line.contains("depth is brought to the pictures, as its outlines lie about"));
+        said.lines().filter(|line| line.contains("depth is aligned with the pictures, as its outlines lie about"));
     assert_eq!(about.count(), 1, "{said}");
     // The first frames are used for the measurement, and not corrected yet.
     let off = |k: usize| {

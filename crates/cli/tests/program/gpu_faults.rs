@@ -13,7 +13,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use bokehcam::bokeh::cpu::CpuBokeh;
-use bokehcam::bokeh::gpu::try_out;
+use bokehcam::bokeh::gpu::run_self_test;
 use bokehcam::bokeh::plan::Plan;
 use bokehcam::bokeh::{self, Bokeh, BokehError, Job};
 use bokehcam::compute::Backend;
@@ -83,11 +83,11 @@ fn assert_ran(layer: &TempDir, fault: &str, test: &str, ran: &str) {
     assert_eq!(line, Some(ran), "{fault}: {told}");
 }
 
-/// Opens a device, runs `try_out` on it, and then sets a timeout of 1 s, which compiling the shaders could exceed.
-fn tried(try_out: impl FnOnce(&Arc<Device>)) -> Arc<Device> {
+/// Opens a device, runs `run_self_test` on it, and then sets a timeout of 1 s, which compiling the shaders could exceed.
+fn tried(run_self_test: impl FnOnce(&Arc<Device>)) -> Arc<Device> {
     let device = Arc::new(device());
-    try_out(&device);
-    Arc::new(Arc::into_inner(device).expect("nobody else has it").with_patience(Duration::from_secs(1)))
+    run_self_test(&device);
+    Arc::new(Arc::into_inner(device).expect("nobody else has it").with_hang_timeout(Duration::from_secs(1)))
 }
 
 /// Creates a frame; every other one requests YUYV output.
@@ -135,7 +135,8 @@ fn blur(bokeh: &mut dyn Bokeh, mut before: impl FnMut(u64)) {
 fn a_destroyed_device_is_followed_by_the_cpu() {
     for gone_before in [0, 1, 2, 3, 5] {
         let device = Arc::new(device());
-        let mut bokeh = bokeh::create(&settings(CocKind::Depth), SIZE, Some(Arc::clone(&device)), Some(1)).unwrap();
+        let mut bokeh =
+            bokeh::create_blur(&settings(CocKind::Depth), SIZE, Some(Arc::clone(&device)), Some(1)).unwrap();
         blur(&mut *bokeh, |frame| {
             if frame == gone_before {
                 device.device.destroy();
@@ -151,7 +152,7 @@ fn a_destroyed_device_is_followed_by_the_cpu() {
 #[ignore = "needs a Vulkan adapter (software will do)"]
 fn executors_come_and_go() {
     for _ in 0..40 {
-        bokeh::create(&settings(CocKind::Uniform), SIZE, Some(Arc::new(device())), Some(1)).unwrap();
+        bokeh::create_blur(&settings(CocKind::Uniform), SIZE, Some(Arc::new(device())), Some(1)).unwrap();
     }
 }
 
@@ -162,9 +163,9 @@ fn frames_are_blurred_whatever_becomes_of_the_device() {
     let made = Device::open(false, None).map_err(BokehError::from).and_then(|device| {
         let device = Arc::new(device);
         // The self-test compiles the shaders, which may take longer than a second.
-        try_out(&device)?;
-        let device = Arc::into_inner(device).expect("nobody else has it").with_patience(Duration::from_secs(1));
-        bokeh::create(&settings(CocKind::Depth), SIZE, Some(Arc::new(device)), Some(1))
+        run_self_test(&device)?;
+        let device = Arc::into_inner(device).expect("nobody else has it").with_hang_timeout(Duration::from_secs(1));
+        bokeh::create_blur(&settings(CocKind::Depth), SIZE, Some(Arc::new(device)), Some(1))
     });
     match made {
         Ok(mut bokeh) => {
@@ -202,7 +203,7 @@ fn a_gpu_that_blurs_wrongly_is_not_used() {
     // All passes are skipped, or those from the fifth on.
     for fault in ["idle:1", "idle:5"] {
         let told = test_under(&layer, fault, "frames_are_blurred_whatever_becomes_of_the_device");
-        assert!(told.contains("not made: GPU: ") && told.contains("values of a trial picture are wrong"), "{told}");
+        assert!(told.contains("not made: GPU: ") && told.contains("pixel values are wrong"), "{told}");
     }
 }
 
@@ -258,8 +259,8 @@ fn matching_goes_on_after_the_gpu() {
 #[test]
 #[ignore = "needs a Vulkan adapter (software will do)"]
 fn depth_is_refined_whatever_becomes_of_the_device() {
-    let device = tried(|device| drop(Refiner::new().on(Some(device))));
-    let mut refiner = Refiner::new().on(Some(&device));
+    let device = tried(|device| drop(Refiner::new().with_device(Some(device))));
+    let mut refiner = Refiner::new().with_device(Some(&device));
     let mut cpu = Refiner::new();
     for frame in 0..8 {
         let (color, measured) = (noise(SIZE.0, SIZE.1), three_depths(SIZE.0, SIZE.1));
@@ -296,14 +297,14 @@ fn refining_goes_on_after_the_gpu() {
 #[test]
 #[ignore = "needs a Vulkan adapter (software will do)"]
 fn mattes_are_found_whatever_becomes_of_the_device() {
-    let device = tried(|device| drop(Matting::default().on(Some(device))));
-    let mut matting = Matting::default().on(Some(&device));
+    let device = tried(|device| drop(Matting::default().with_device(Some(device))));
+    let mut matting = Matting::default().with_device(Some(&device));
     let mut cpu = Matting::default();
     for frame in 0..8 {
         let (color, measured) = (noise(SIZE.0, SIZE.1), three_depths(SIZE.0, SIZE.1));
         let [mut made, mut expected] = [measured.clone(), measured];
-        matting.find(&mut made, &color, 0.05);
-        cpu.find(&mut expected, &color, 0.05);
+        matting.find_mixed_pixels(&mut made, &color, 0.05);
+        cpu.find_mixed_pixels(&mut expected, &color, 0.05);
         let (made, expected) = (made.matte.pixels, expected.matte.pixels);
         let is_same = |(a, b): &(&MixedPixel, &MixedPixel)| a.at == b.at && (a.alpha - b.alpha).abs() < 1e-3;
         let same = made.iter().zip(&expected).filter(is_same).count();
@@ -338,7 +339,7 @@ fn a_run_ends_whole_and_says_in_one_line_what_happened() {
     let stream = ["stream", PORTRAIT, "--backend", "gpu", "--pace", "asap", "--to", "null", "--report", "report.json"];
     let ran = Ran::of(under(&layer, "submit:6", &mut home.with_drivers(&stream)));
     let told = ran.done();
-    assert_eq!(told.matches("the CPU blurs from here on").count(), 1, "{told}");
+    assert_eq!(told.matches("the CPU blurs from now on").count(), 1, "{told}");
     assert!(!told.contains("panicked"), "{told}");
     let report = json(home.path("report.json"));
     assert_eq!((&report["frames"]["captured"], &report["frames"]["delivered"]), (&24.into(), &24.into()), "{report}");

@@ -37,7 +37,7 @@ fn a_source_is_never_a_target() {
         "depth self/rgb/000000.png self/rgb/000001.png --out self/rgb/000001.png --force",
         "depth self/rgb/000000.png self/rgb/000001.png --out d.pfm --preview link/rgb/000000.png --force",
     ] {
-        home.sh(args).failed(2, &["which is read; choose another place"]);
+        home.sh(args).failed(2, &["which is the input; choose another place"]);
         assert!(tree(home.0.path()) == before, "{args}: something was touched");
     }
     let report = home.sh(&format!("stream self {BLUR} --to other/new/ --report self/report.json -q"));
@@ -270,8 +270,7 @@ fn what_a_killed_run_left_is_told_by_a_run_of_any_name() {
 
     let left = fs::read(&alive).unwrap();
     let name = format!("takes/{}", alive.file_name().unwrap().to_str().unwrap());
-    let told =
-        format!("warning: runs that were killed left hidden files: {name}; give those that you want another name");
+    let told = format!("warning: killed runs left hidden files: {name}; rename those that you want to keep");
     assert_eq!(other("c.y4m").lines().filter(|line| line.starts_with(&told)).count(), 1);
     let render = said("render self/rgb/000000.png --effect blur --out takes/d.png");
     assert_eq!(render.lines().filter(|line| line.starts_with(&told)).count(), 1, "{render}");

@@ -191,7 +191,7 @@ fn another_picture_is_said_and_all_is_blurred() {
     });
     let stamp = Stamp { index: 0, time_ns: 0, captured_ns: None };
     watched.source.read(FrameInput { stamp, color: &picture, right: None }, &mut watched.map).unwrap();
-    assert_eq!(watched.source.guide().step(), Step::Unlike);
+    assert_eq!(watched.source.guide().step(), Step::Mismatched);
     assert!(watched.map.metres.iter().all(|&metres| metres > 100.0) && watched.map.matte.pixels.is_empty());
     // The known room is back.
     assert_eq!(watched.see(PERSON).0, Step::Ready);
@@ -212,9 +212,9 @@ fn a_plate_is_taken_once_the_person_has_gone() {
             break;
         }
     }
-    let is_taking = |step: &Step| matches!(step, Step::Taking(_));
+    let is_taking = |step: &Step| matches!(step, Step::Capturing(_));
     assert_eq!(steps[..3], [Step::StepOut(3), Step::StepOut(2), Step::StepOut(1)], "{steps:?}");
-    assert!(steps.contains(&Step::Moves) && steps.iter().any(is_taking), "{steps:?}");
+    assert!(steps.contains(&Step::Moving) && steps.iter().any(is_taking), "{steps:?}");
     assert_eq!(steps.last(), Some(&Step::Ready));
     let (step, found, mistaken) = watched.see(PERSON);
     assert!(step == Step::Ready && found > 0.99 && mistaken < 0.002, "{found} {mistaken}");
@@ -241,7 +241,7 @@ fn commands_take_plates_and_use_them() {
     assert!(change(true) < 0.5 && change(false) > 1.5, "{} {}", change(true), change(false));
 
     for (arguments, code, part) in [
-        (&["render", "me.png", "--depth", "plate", "--out", "a.png"][..], 2, "name the picture"),
+        (&["render", "me.png", "--depth", "plate", "--out", "a.png"][..], 2, "give the picture"),
         (
             &["render", "me.png", "--depth", "plate:small.png", "--out", "a.png"],
             2,
@@ -250,7 +250,7 @@ fn commands_take_plates_and_use_them() {
         (&["render", "me.png", "--depth", "plate:none.png", "--out", "a.png"], 1, "none.png"),
         (&["render", "me.png", "--depth", "plate:", "--out", "a.png"], 2, "name a file after the colon"),
         (&["render", "me.png", "--depth", "plate:room.png", "--focus", "1.2", "--out", "a.png"], 2, "--focus"),
-        (&["render", "me.png", "--depth", "plate:room.png", "--force", "--out", "room.png"], 2, "which is read"),
+        (&["render", "me.png", "--depth", "plate:room.png", "--force", "--out", "room.png"], 2, "which is the input"),
         (&["stream", "synthetic", "--depth", "plate", "--to", "null"], 2, "leave --depth out"),
         (&["render", "me.png", "--depth", "defocus", "--out", "a.png"], 2, "equally sharp"),
         (&["stream", "synthetic", "--depth", "defocus", "--to", "null"], 2, "leave --depth out"),
@@ -261,8 +261,14 @@ fn commands_take_plates_and_use_them() {
         assert!(!at("a.png").exists(), "{arguments:?}");
     }
     // A plate without a person before it is reported.
-    for (plate, expected) in [("me.png", "the plate is the picture itself"), ("copy.png", "no person stands before it")]
-    {
+    for (plate, expected) in [
+        ("me.png", "the plate is the picture itself"),
+        (
+            "copy.png",
+            "nothing in the picture \
+                                                                                           differs from the plate",
+        ),
+    ] {
         std::fs::copy(at("me.png"), at("copy.png")).unwrap();
         let plate = format!("plate:{plate}");
         let ran = home.run(&["render", "me.png", "--depth", &plate, "--force", "--out", "b.png"]);

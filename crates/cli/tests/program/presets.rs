@@ -118,14 +118,14 @@ fn blurred(look: &Look, color: &ColorImage, map: &DepthMap, focus_m: f32, qualit
     let size = color.size();
     let field = match look.coc_rule(size) {
         CocRule::Fixed(field) => field,
-        CocRule::Depth { lens, range_m, max_coc_px, .. } => lens.field((focus_m, range_m), size.0, max_coc_px),
+        CocRule::Depth { lens, range_m, max_coc_px, .. } => lens.coc_field((focus_m, range_m), size.0, max_coc_px),
     };
     let mut map = map.clone();
     if let CocField::Depth(lens) = &field {
-        Matting::default().find(&mut map, color, lens.inverse_depth_of_px(matting::FROM_PX));
+        Matting::default().find_mixed_pixels(&mut map, color, lens.inverse_depth_step(matting::MIN_STEP_PX));
     }
     // A live run uses one executor for all quality levels.
-    let settings = look.settings(size, true).unwrap();
+    let settings = look.blur_settings(size, true).unwrap();
     let mut cpu = CpuBokeh::new(Plan::new(&settings, size.0, size.1), Some(2));
     let job = Job::new(Pooled::detached(color.clone()), Some(Pooled::detached(map)), field);
     cpu.submit(Job { quality, ..job }).unwrap();
@@ -148,7 +148,7 @@ fn a_snapshot_is_repeated_to_the_bit_whatever_the_settings_around() {
         highlights: 5.0,
         ..Look::default()
     };
-    let tilt = Look { strength: Strength::Default, rim: 0.1, ..Look::plain(Effect::TiltShift) };
+    let tilt = Look { strength: Strength::Default, rim: 0.1, ..Look::with_effect(Effect::TiltShift) };
     let shots = home.path("shots");
     for (name, look, quality) in [("a", &dof, Quality::Fast), ("a", &dof, Quality::High), ("b.c", &tilt, Quality::Best)]
     {
@@ -192,7 +192,7 @@ fn a_snapshot_is_repeated_to_the_bit_whatever_the_settings_around() {
 fn a_snapshots_settings_can_be_given_to_another_picture() {
     let home = Home::new();
     let (color, map) = (noise(40, 30), three_depths(40, 30));
-    let look = Look::plain(Effect::Blur);
+    let look = Look::with_effect(Effect::Blur);
     let (picture, field) = blurred(&look, &color, &map, 1.0, Quality::Balanced);
     let settings = Patch::from_look(&look.for_frame(&field, None)).values();
     let shot = Snapshot { picture: &picture, sources: Some((&color, None)), settings: &settings };
@@ -228,7 +228,7 @@ fn a_snapshot_that_cannot_be_repeated_costs_one_line() {
     fs::write(at("short.png"), &whole[..60]).unwrap();
     for (name, code, said) in [
         ("nowhere.png", 1, "nowhere.png: there is no such file"),
-        ("plain.png", 1, "plain.png: no snapshot"),
+        ("plain.png", 1, "plain.png: not a snapshot"),
         ("text.png", 1, "text.png: not a PNG file"),
         ("short.png", 1, "short.png: "),
         ("alien.png", 2, "alien.png: its setting 'mirror' is not a setting of the look"),

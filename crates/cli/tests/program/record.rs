@@ -100,7 +100,7 @@ fn a_source_that_fails_leaves_the_old_recording() {
 
     // Without an old recording, they keep the requested name.
     let ran = home.run(&["record", "source", "--to", "new"]);
-    ran.failed(1, &["new: cut short; the 3 frames until then can be read"]);
+    ran.failed(1, &["new: incomplete; the 3 frames until then can be read"]);
     assert_eq!(read(&at("new")), (3, 50));
 }
 
@@ -197,7 +197,7 @@ fn a_killed_recording_gets_its_lists() {
     let args = ["record", "synthetic", "--size", "64x48", "--to", "new"];
     drop(begun(&home, &args, at("new/rgb")));
     let ran = home.run(&args);
-    assert!(ran.code == 1 && ran.stderr.contains("rgb.txt: completed, as far as"), "{}", ran.stderr);
+    assert!(ran.code == 1 && ran.stderr.contains("rgb.txt: restored from an interrupted"), "{}", ran.stderr);
     assert!(read(&at("new")).0 >= 2);
     assert!(!names(&at("new")).iter().any(|name| name.ends_with(".part")), "{:?}", names(&at("new")));
 }

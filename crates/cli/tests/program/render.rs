@@ -177,14 +177,14 @@ fn pictures_in_the_wrong_place_are_said() {
         ("--mask", "white.png", "white all over"),
         ("--mask", "black.png", "black all over"),
         ("--mask", "grey.png", "one grey all over"),
-        ("--mask", "in.png", "the picture itself, and no mask"),
+        ("--mask", "in.png", "the picture itself, not a mask"),
         ("--depth-map", "unknown.png", "no depth is known anywhere"),
         ("--depth-map", "flat.png", "1.000 m away"),
         ("--depth-map", "mm.png", "add --depth-scale 1000"),
     ] {
         warned(&home, &["render"], &["in.png", option, file, "--refine", "off", "--out", "out.png"], expected);
     }
-    for (map, expected) in [("in.png", "the picture itself, and no depth"), ("grey.png", "one value all over")] {
+    for (map, expected) in [("in.png", "the picture itself, not its depth"), ("grey.png", "one value all over")] {
         let inverse = ["in.png", "--depth-map", map, "--depth-unit", "inverse", "--refine", "off", "--out", "out.png"];
         let ran = run(&home, &[&inverse[..], &["--force"]].concat());
         assert!(ran.stderr.contains(expected), "{}", ran.stderr);
@@ -229,9 +229,15 @@ fn one_picture_for_both_eyes_and_eyes_far_apart_are_said() {
     };
     let (left, right) = (eye("image_2"), eye("image_3"));
     let out = ["--out", "d.pfm"];
-    warned(&home, &["depth", &left, &left], &out, "left and right are one picture");
+    warned(&home, &["depth", &left, &left], &out, "left and right are the same picture");
     let apart = ["--focal-px", "700", "--baseline-m", "60", "--metres", "--out", "d.pfm"];
-    warned(&home, &["depth", &left, &right], &apart, "60 m between the eyes; if that is in millimetres, it is 0.06 m");
+    warned(
+        &home,
+        &["depth", &left, &right],
+        &apart,
+        "60 m between the cameras; if that is in millimetres, it is 0.06 \
+                                                      m",
+    );
     let ran = on_cpu(&home, &["depth", &left, &right, "--force"], &out);
     assert!(!ran.done().contains("warning"), "{}", ran.stderr);
 }

@@ -43,7 +43,7 @@ fn photograph() -> (ColorImage, GrayImage) {
     let recording = Recording::open(Path::new(PORTRAIT), &Options::default()).unwrap();
     let (mut left, mut right) = (ColorImage::default(), GrayImage::default());
     recording.read_color(0, &mut Scratch::default(), &mut left).unwrap();
-    right.set_luma_of(&left);
+    right.set_luma_from(&left);
     for row in right.luma.chunks_exact_mut(left.width as usize) {
         row.rotate_left(DISPARITY_PX);
     }
@@ -119,7 +119,7 @@ fn a_pair_that_is_not_what_it_was_said_to_be_is_said_in_one_line() {
     assert!(lower.len() == 1 && lower[0].contains("not rectified") && lower[0].contains("--calib"), "{lower:?}");
     let exchanged = said(&|left, right| {
         let (was_left, was_right) = (left.clone(), right.clone());
-        right.set_luma_of(&was_left);
+        right.set_luma_from(&was_left);
         left.rgb = was_right.luma.iter().flat_map(|&luma| [luma; 3]).collect();
     });
     assert!(exchanged.len() == 1 && exchanged[0].contains("exchanged"), "{exchanged:?}");
@@ -151,8 +151,8 @@ fn what_does_not_fit_two_eyes_costs_one_line_and_exit_code_2() {
     let (pair, wide, odd) = (rectified_pair(), side_by_side(0), side_by_side(1));
     let (pair, wide, odd) = (pair.path(), wide.path().join("wide"), odd.path().join("wide"));
     let cases: &[(&Path, &[&str], &str)] = &[
-        (&wide, &["--depth", "stereo"], "has one eye"),
-        ("synthetic".as_ref(), &["--depth", "stereo"], "has one eye"),
+        (&wide, &["--depth", "stereo"], "has one camera"),
+        ("synthetic".as_ref(), &["--depth", "stereo"], "has one camera"),
         ("synthetic".as_ref(), &["--side-by-side"], "--side-by-side"),
         (pair, &["--side-by-side"], "--side-by-side"),
         (&odd, &["--side-by-side", "--rectified"], "321x120"),
@@ -166,8 +166,8 @@ fn what_does_not_fit_two_eyes_costs_one_line_and_exit_code_2() {
             &["--side-by-side", "--rectified", "--f-number", "2", "--focal-length", "50", "--sensor-width", "36"],
             "--f-number 2 needs distances",
         ),
-        (&wide, &["--rectified"], "for depth from two eyes"),
-        (&wide, &["--calib", "nowhere.yml"], "for depth from two eyes"),
+        (&wide, &["--rectified"], "for stereo depth"),
+        (&wide, &["--calib", "nowhere.yml"], "for stereo depth"),
         (pair, &["--max-disparity", "60"], "a multiple of 16"),
         (pair, &["--max-disparity", "272"], "a multiple of 16"),
         (pair, &["--baseline-m", "0"], "above 0"),
@@ -195,8 +195,8 @@ fn near_things_beyond_the_range_are_found_or_said() {
     let (wide, _) = stream("wide", &["--max-disparity", "96"]);
     assert!(found == wide && !said.contains("disparit"), "{said}");
     let (narrow, said) = stream("narrow", &["--max-disparity", "64"]);
-    assert!(narrow != wide && said.contains("more than the 64 that are tried"), "{said}");
-    assert!(said.contains("--max-disparity 96 finds them"), "{said}");
+    assert!(narrow != wide && said.contains("more than the 64 that are searched"), "{said}");
+    assert!(said.contains("use --max-disparity 96"), "{said}");
 }
 
 #[test]
@@ -217,21 +217,21 @@ fn a_calibration_that_cannot_be_read_is_named() {
         fs::write(&calib, text).unwrap();
         run(&["stream", path(&wide), "--to", "null", "--side-by-side", "--calib", path(&calib), "--focus", "2"])
     };
-    with(100).refused(1, &["exchange"]);
+    with(100).refused(1, &["swap"]);
     let good = with(-100);
-    assert!(good.done().contains("taken as millimetres"), "{}", good.stderr);
+    assert!(good.done().contains("assuming millimetres"), "{}", good.stderr);
 }
 
 #[test]
 #[cfg(feature = "camera")]
 fn two_cameras_are_two_cameras() {
     let cases: &[(&[&str], i32, &str)] = &[
-        (&["/dev/null,/dev/null", "--rectified"], 2, "one camera"),
+        (&["/dev/null,/dev/null", "--rectified"], 2, "the same camera"),
         (&["/dev/null,/dev/nothing", "--rectified"], 1, "/dev/nothing"),
         (&["nowhere,elsewhere"], 1, "LEFT,RIGHT"),
         (&["/dev/null,/dev/zero", "--rectified", "--pace", "asap"], 2, "leave --pace out"),
         // Devices that are not cameras.
-        (&["/dev/null,/dev/zero", "--rectified"], 1, "/dev/null: this is no camera"),
+        (&["/dev/null,/dev/zero", "--rectified"], 1, "/dev/null: this is not a camera"),
     ];
     for (args, code, said) in cases {
         run(&[&["stream", "--to", "null"], *args].concat()).refused(*code, &[said]);

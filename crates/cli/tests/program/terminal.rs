@@ -140,7 +140,7 @@ fn a_warning_has_a_line_of_its_own_beside_the_bar() {
     run.end(HANG).done();
     let told = reader.join().unwrap();
     assert!(told.contains(" frames, "), "a bar: {told:?}");
-    let warning = told.find("going on without such frames").unwrap_or_else(|| panic!("{told:?}"));
+    let warning = told.find("such frames are skipped").unwrap_or_else(|| panic!("{told:?}"));
     // The text on the warning's line before the warning.
     let line = told[..warning].rsplit('\n').next().unwrap();
     let shown = line.rsplit("\x1b[2K").next().unwrap();

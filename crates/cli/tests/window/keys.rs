@@ -130,6 +130,6 @@ fn what_is_seen_follows_the_keys_and_comes_back() {
     window.key(&[], u32::from('p'));
     window.until("the panel", |image| distance(image, &before) > 1.0);
     window.key(&[], u32::from('h'));
-    window.until("nothing but the picture", |image| distance(image, &before) < 0.5);
+    window.until("only the picture", |image| distance(image, &before) < 0.5);
     program.close();
 }

@@ -59,7 +59,7 @@ pub fn play(
         if under_way.len() > weather.late
             && let Some((rung, took)) = under_way.pop_front()
         {
-            picker.note(rung, took, frame);
+            picker.record(rung, took, frame);
         }
         let rung = picker.rung(load);
         let took = load * costs[rung];

@@ -9,7 +9,7 @@ const PERIOD_NS: u64 = 33_333_333;
 /// A rule that picks quality levels.
 pub trait Picker {
     /// Notes that a frame at `rung` took `took`; frame `now` comes next.
-    fn note(&mut self, rung: usize, took: f64, now: usize);
+    fn record(&mut self, rung: usize, took: f64, now: usize);
     /// Returns the level of the next frame; `load` is its true load, for the oracle alone.
     fn rung(&mut self, load: f64) -> usize;
 }
@@ -28,9 +28,9 @@ impl Ours {
 }
 
 impl Picker for Ours {
-    fn note(&mut self, rung: usize, took: f64, now: usize) {
+    fn record(&mut self, rung: usize, took: f64, now: usize) {
         let at_ns = now as u64 * PERIOD_NS;
-        self.governor.note(Sample { level: rung, took_ns: (took * UNIT_NS) as u64, at_ns }, self.budget_ns);
+        self.governor.record(Sample { level: rung, took_ns: (took * UNIT_NS) as u64, at_ns }, self.budget_ns);
     }
     fn rung(&mut self, _: f64) -> usize {
         self.governor.level()
@@ -52,7 +52,7 @@ impl Threshold {
 }
 
 impl Picker for Threshold {
-    fn note(&mut self, _: usize, took: f64, _: usize) {
+    fn record(&mut self, _: usize, took: f64, _: usize) {
         if took > self.budget {
             self.rung = self.rung.saturating_sub(1);
         } else if took < 0.75 * self.budget {
@@ -92,7 +92,7 @@ impl Pid {
 }
 
 impl Picker for Pid {
-    fn note(&mut self, _: usize, took: f64, _: usize) {
+    fn record(&mut self, _: usize, took: f64, _: usize) {
         self.recent.push(took);
         let error = (self.target - self.recent.median(9)) / self.target;
         let error = if (Self::BAND.0..Self::BAND.1).contains(&error) { 0.0 } else { error };
@@ -119,7 +119,7 @@ pub struct Oracle {
 }
 
 impl Picker for Oracle {
-    fn note(&mut self, _: usize, _: f64, _: usize) {}
+    fn record(&mut self, _: usize, _: f64, _: usize) {}
     fn rung(&mut self, load: f64) -> usize {
         self.costs.iter().rposition(|&cost| cost * load <= self.budget).unwrap_or(0)
     }

@@ -8,9 +8,9 @@
 
 use bokehcam::bokeh::BokehError;
 use bokehcam::budget::Quality;
-use bokehcam::color::light_of_codes;
+use bokehcam::color::srgb_to_linear_table;
 use bokehcam::depth::matting::mask::{BackgroundPlate, MaskMatting};
-use bokehcam::frame::{ColorImage, DepthMap, Mask, luma_of};
+use bokehcam::frame::{ColorImage, DepthMap, Mask, compute_luma};
 use bokehcam::optics::DepthCoc;
 use serde::Serialize;
 
@@ -108,7 +108,7 @@ pub fn measure(name: &'static str, scene: &Scene, views: &Views) -> Result<Vec<P
                 let lens = Shot::lens(coc_at_infinity_px, DepthMap::SUBJECT_M, views.shot.image.height as usize);
                 let mut depth = DepthMap::new(views.shot.image.width, views.shot.image.height);
                 depth.metres.clone_from(&given.behind_m);
-                MaskMatting::default().find(&given.mask, &views.shot.image, None, &mut depth);
+                MaskMatting::default().compute_matte(&given.mask, &views.shot.image, None, &mut depth);
                 let shot = Shot { depth, lens, ..views.shot.clone() };
                 Blurrer::new(Method::Layered(Quality::default()), &shot)?.blur_as_is(&shot)?
             }
@@ -225,7 +225,7 @@ fn threshold(given: &Given, image: &ColorImage) -> Plane<f32> {
 fn guided(given: &Given, image: &ColorImage) -> Plane<f32> {
     let (width, height) = (image.width as usize, image.height as usize);
     let mut luma = vec![0; width * height];
-    luma_of(&image.rgb, &mut luma);
+    compute_luma(&image.rgb, &mut luma);
     let luma = Plane { width, height, data: luma.iter().map(|&code| f32::from(code) / 255.0).collect() };
     let share = upscaled(given, image);
     let mean = |of: &(dyn Fn(usize) -> f32 + Sync)| {
@@ -252,12 +252,12 @@ fn guided(given: &Given, image: &ColorImage) -> Plane<f32> {
 }
 
 fn matte(given: &Given, behind: Option<&ColorImage>, image: &ColorImage) -> DepthMap {
-    let light = light_of_codes();
+    let light = srgb_to_linear_table();
     let light = [*light; 3];
     let backdrop = behind.map(|color| BackgroundPlate { color, light: &light, shift_px: [0; 2] });
     let mut map = DepthMap::new(image.width, image.height);
     map.metres.fill(DepthMap::FAR_M);
-    MaskMatting::default().find(&given.mask, image, backdrop.as_ref(), &mut map);
+    MaskMatting::default().compute_matte(&given.mask, image, backdrop.as_ref(), &mut map);
     map
 }
 

@@ -6,7 +6,7 @@ use bokehcam::bokeh::aperture::Aperture;
 use bokehcam::bokeh::{self, Bokeh, BokehError, Job, Rank, Settings};
 use bokehcam::budget::Quality;
 use bokehcam::compute::thread_pool::ThreadPool;
-use bokehcam::depth::background::Background;
+use bokehcam::depth::background::BackgroundMemory;
 use bokehcam::depth::fill::Filler;
 use bokehcam::depth::matting::{self, Matting};
 use bokehcam::depth::misfit::Misalignment;
@@ -128,7 +128,7 @@ pub struct Blurrer {
     refiner: Refiner,
     mending: MapCorrection,
     matting: Matting,
-    background: Background,
+    background: BackgroundMemory,
     time_ns: u64,
 }
 
@@ -160,13 +160,13 @@ impl Blurrer {
             far_max_px: shot.lens.coc_at_infinity_px,
             near_max_px: shot.lens.max_coc_px,
         };
-        let bokeh = bokeh::create(&settings, shot.image.size(), None, None)?;
+        let bokeh = bokeh::create_blur(&settings, shot.image.size(), None, None)?;
         Ok(Self::of(method, Some(bokeh)))
     }
 
     fn of(method: Method, bokeh: Option<Box<dyn Bokeh>>) -> Self {
         let (filler, refiner) = (Filler::new(), Refiner::new());
-        let (matting, background) = (Matting::default(), Background::default());
+        let (matting, background) = (Matting::default(), BackgroundMemory::default());
         let mending = MapCorrection::default();
         Self { method, bokeh, filler, refiner, mending, matting, background, time_ns: 0 }
     }
@@ -206,7 +206,7 @@ impl Blurrer {
                     .and_then(|misfit| misfit.correction(&depth, &shot.image));
                 let mending = mending.unwrap_or_default();
                 if self.mending != mending {
-                    (self.mending, self.refiner) = (mending, Refiner::mending(mending));
+                    (self.mending, self.refiner) = (mending, Refiner::with_correction(mending));
                 }
                 self.refiner.refine(&mut depth, &shot.image, self.time_ns);
                 self.time_ns += PERIOD_NS;
@@ -217,7 +217,7 @@ impl Blurrer {
 
     /// Blurs by the layers, with the matte that every source gets.
     fn layered(&mut self, shot: &Shot, mut depth: DepthMap) -> Result<ColorImage, BokehError> {
-        self.matting.find(&mut depth, &shot.image, shot.lens.inverse_depth_of_px(matting::FROM_PX));
+        self.matting.find_mixed_pixels(&mut depth, &shot.image, shot.lens.inverse_depth_step(matting::MIN_STEP_PX));
         self.run(shot, depth)
     }
 
@@ -234,8 +234,8 @@ impl Blurrer {
         self.filler.fill_guided(&mut depth, &shot.image);
         let mut workers = ThreadPool::new("matte", 1);
         self.background.find_matte(&mut self.matting, &mut workers, (&mut depth, &shot.image), &shot.lens);
-        self.background.learn(&mut workers, (&depth, &shot.image), &shot.lens, self.time_ns);
-        self.background.reveal(&mut workers, &mut depth, &shot.image, &shot.lens);
+        self.background.update(&mut workers, (&depth, &shot.image), &shot.lens, self.time_ns);
+        self.background.reveal_background(&mut workers, &mut depth, &shot.image, &shot.lens);
         self.time_ns += PERIOD_NS;
         depth
     }

@@ -59,7 +59,7 @@ pub struct Options {
     /// Frames of the scenes that move
     #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u16).range(1..))]
     pub frames: u16,
-    /// One JSON object a line, instead of a table
+    /// One JSON object per line, instead of a table
     #[arg(long, conflicts_with = "markdown")]
     pub json: bool,
     /// Tables for the documentation and a verdict, instead of a table (which then goes to stderr)

@@ -9,8 +9,8 @@ use std::path::PathBuf;
 use bokehcam::bokeh::BokehError;
 use bokehcam::bokeh::aperture::{Aperture, lens_points};
 use bokehcam::budget::Quality;
-use bokehcam::compute::thread_pool::cores;
-use bokehcam::depth::plate::{Capture, Companion, PlateDepth, Taken};
+use bokehcam::compute::thread_pool::core_count;
+use bokehcam::depth::plate::{Capture, CaptureResult, Companion, PlateDepth};
 use bokehcam::depth::single_camera::{Hints, SingleCamera};
 use bokehcam::depth::{DepthSource, FrameInput};
 use bokehcam::frame::{ColorImage, DepthMap, Mask, Stamp};
@@ -91,7 +91,7 @@ pub fn measure(mut tell: impl FnMut(Outcome)) -> Result<(), BokehError> {
 }
 
 fn stage(situation: Situation) -> Staged {
-    let (view, threads) = (View::new(SIZE.0, SIZE.1), cores());
+    let (view, threads) = (View::new(SIZE.0, SIZE.1), core_count());
     let scene = Scene::of(situation);
     let (mut color, mut room) = (ColorImage::default(), ColorImage::default());
     let (mut depth, mut ignored) = (DepthMap::default(), DepthMap::default());
@@ -157,8 +157,8 @@ fn plate(staged: &Staged) -> ColorImage {
     let mut capture = Capture::default();
     (0..)
         .find_map(|frame| match capture.add_unchecked(&with_noise(&staged.room, staged.noise, frame)) {
-            Taken::Whole(plate) => Some(plate),
-            Taken::More(_) | Taken::Moved => None,
+            CaptureResult::Finished(plate) => Some(plate),
+            CaptureResult::Collecting(_) | CaptureResult::Rejected => None,
         })
         .unwrap_or_default()
 }

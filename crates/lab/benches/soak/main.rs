@@ -24,11 +24,11 @@ use std::sync::atomic::AtomicBool;
 use bokehcam::bokeh::{Backend, Bokeh, BokehError};
 use bokehcam::budget::Quality;
 use bokehcam::clock::Clock;
-use bokehcam::computing::Computing;
+use bokehcam::computing::ComputeOptions;
 use bokehcam::depth::recorded::Recorded;
 use bokehcam::look::number::OrAuto;
 use bokehcam::look::{Effect, Look, Refine, Strength};
-use bokehcam::pipeline::{self, Blurring, Pace, Run};
+use bokehcam::pipeline::{self, BlurSetup, Pace, Run};
 use bokehcam::recording::{Options as Reading, Recording};
 use bokehcam::stats::Report;
 use clap::Parser;
@@ -175,15 +175,15 @@ fn replay(options: &Options, frames: u64) -> Result<(Report, Deliveries), Box<dy
         strength: Strength::AtInfinity(coc_px),
         max_coc_px: Some(max_coc_px),
         refine: if options.no_refine { Refine::Off } else { Refine::On },
-        quality: options.quality.chosen(),
-        ..Look::plain(Effect::Dof)
+        quality: options.quality.value(),
+        ..Look::with_effect(Effect::Dof)
     };
     let backend = if options.gpu { Backend::Auto } else { Backend::Cpu };
-    let computing = Computing { backend, ..Computing::default() };
+    let computing = ComputeOptions { backend, ..ComputeOptions::default() };
     let make = |settings: &_| -> Result<Box<dyn Bokeh>, BokehError> {
         Ok(Box::new(Slowed::new(computing.create_blur(settings, size)?, options.slow)))
     };
-    let (blurring, _) = Blurring::begin(look, (size, true), make)?;
+    let (blurring, _) = BlurSetup::create(look, (size, true), make)?;
     let clock = Clock::system();
     let stamps = Stamps::with_room_for(frames as usize);
     let stop = AtomicBool::new(false);
@@ -196,7 +196,7 @@ fn replay(options: &Options, frames: u64) -> Result<(Report, Deliveries), Box<dy
         pace: Pace::Realtime,
         budget_ns: options.budget_ms.map_or(PERIOD_NS, |ms| (ms * 1e6) as u64),
         clock,
-        ..Run::of(camera, Some(depth), blurring, sink, &stop)
+        ..Run::with_blur(camera, Some(depth), blurring, sink, &stop)
     })?;
     Ok((report, stamps.take()))
 }

@@ -5,8 +5,8 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-use bokehcam::bokeh::{Bokeh, BokehError, Finished, Job};
-use bokehcam::capture::{Brings, Camera, CaptureError, Captured, Shot, SourceInfo};
+use bokehcam::bokeh::{BlurredFrame, Bokeh, BokehError, Job};
+use bokehcam::capture::{Camera, CaptureError, Captured, FrameBuffers, FrameData, SourceInfo};
 use bokehcam::clock::Clock;
 use bokehcam::compute::Backend;
 use bokehcam::frame::{ColorImage, Stamp};
@@ -65,11 +65,11 @@ impl Camera for Looped {
             period_ns: PERIOD_NS,
             frames: Some(self.frames),
             live: true,
-            brings: Brings::Color,
+            frame_data: FrameData::Color,
         }
     }
 
-    fn next(&mut self, shot: Shot) -> Result<Captured, CaptureError> {
+    fn next(&mut self, shot: FrameBuffers) -> Result<Captured, CaptureError> {
         if self.position >= self.frames {
             return Ok(Captured::End);
         }
@@ -119,7 +119,7 @@ impl Bokeh for Slowed {
         Ok(())
     }
 
-    fn collect(&mut self, wait: bool) -> Result<Option<Finished>, BokehError> {
+    fn collect(&mut self, wait: bool) -> Result<Option<BlurredFrame>, BokehError> {
         let mut finished = self.inner.collect(wait)?;
         if let Some(finished) = &mut finished {
             if self.factor > 1.0 {

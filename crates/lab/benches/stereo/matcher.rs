@@ -1,7 +1,7 @@
 //! The matchers under test.
 
 use bokehcam::compute::Backend;
-use bokehcam::compute::thread_pool::cores;
+use bokehcam::compute::thread_pool::core_count;
 use bokehcam::depth::stereo::{self, Effort, Matcher, Settings};
 
 use super::Outcome;
@@ -23,6 +23,6 @@ pub fn create(
         Some("") => (Backend::Gpu, None),
         Some(name) => (Backend::Gpu, Some(name)),
     };
-    let threads = threads.unwrap_or_else(cores);
+    let threads = threads.unwrap_or_else(core_count);
     Ok(stereo::create(&Settings { size, disparities, effort, threads }, backend, adapter)?)
 }

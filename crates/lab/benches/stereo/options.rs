@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use bokehcam::depth::stereo::Effort;
 use clap::{Args, Parser, Subcommand, value_parser};
 
-/// Depth from two eyes: time, steadiness, and the blur that comes of it
+/// Stereo depth: time, flicker, and the resulting blur
 #[derive(Parser, Debug)]
 #[command(
     name = "stereo",
@@ -28,7 +28,7 @@ pub struct Options {
     /// Match on a GPU; one whose name contains this, if it is not empty
     #[arg(long, global = true, value_name = "NAME", num_args = 0..=1, default_missing_value = "")]
     pub gpu: Option<String>,
-    /// One JSON object a line
+    /// One JSON object per line
     #[arg(long, global = true)]
     pub json: bool,
     /// Given by `cargo bench`

@@ -41,7 +41,7 @@ impl Frame {
     pub fn gray(&self) -> [GrayImage; 2] {
         [&self.left, &self.right].map(|color| {
             let mut gray = GrayImage::default();
-            gray.set_luma_of(color);
+            gray.set_luma_from(color);
             gray
         })
     }
@@ -111,7 +111,7 @@ pub fn euroc(data: &Path) -> Outcome<Option<Sequence>> {
         return Ok(None);
     }
     let sensors = ["cam0", "cam1"].map(|eye| folder.join(eye).join("sensor.yaml"));
-    let calibration = calibration::load(&[&sensors[0], &sensors[1]])?;
+    let calibration = calibration::load_calibration(&[&sensors[0], &sensors[1]])?;
     let names = numbered(&folder.join("cam0/data"))?;
     let first = names.first().ok_or_else(|| format!("{}: no pictures", folder.display()))?;
     let rectifier = Rectifier::new(&calibration, read(&folder.join("cam0/data").join(first))?.size())?;
@@ -119,7 +119,7 @@ pub fn euroc(data: &Path) -> Outcome<Option<Sequence>> {
         let [left, right] = [0, 1].map(|eye: usize| {
             let mut rectified = ColorImage::default();
             let taken = read(&folder.join(["cam0/data", "cam1/data"][eye]).join(name))?;
-            rectifier.maps()[eye].color(&taken, &mut rectified);
+            rectifier.maps()[eye].remap_color(&taken, &mut rectified);
             Outcome::Ok(rectified)
         });
         Ok(Frame { time_ns: index as u64 * PERIOD_NS, left: left?, right: right?, truth: None })

@@ -118,6 +118,6 @@ fn pairs(times: &Times) -> Outcome<Vec<[GrayImage; 2]>> {
 fn gray(image: &DynamicImage) -> GrayImage {
     let picture = image.to_rgb8();
     let mut gray = GrayImage::default();
-    gray.set_luma_of(&ColorImage { width: picture.width(), height: picture.height(), rgb: picture.into_raw() });
+    gray.set_luma_from(&ColorImage { width: picture.width(), height: picture.height(), rgb: picture.into_raw() });
     gray
 }

@@ -14,7 +14,7 @@ use std::thread;
 
 use bokehcam::bokeh::aperture::{Aperture, Shape, lens_points};
 use bokehcam::capture::demo::{self, Demo};
-use bokehcam::capture::{Camera, Shot};
+use bokehcam::capture::{Camera, FrameBuffers};
 use bokehcam::frame::{ColorImage, DepthMap, GrayImage};
 use bokehcam_lab::scene::{Scene, ThinLens, View};
 use image::codecs::jpeg::JpegEncoder;
@@ -134,7 +134,7 @@ fn make_demo(folder: &mut Folder) -> Outcome {
     }
     let frames: Vec<(Vec<u8>, Vec<u8>)> = (0..demo::FRAMES)
         .map(render)
-        .map(|(picture, map)| (picture.rgb, map.metres.into_iter().map(demo::level).collect()))
+        .map(|(picture, map)| (picture.rgb, map.metres.into_iter().map(demo::quantize_depth).collect()))
         .collect();
     let (width, tile) = (demo::SIZE_PX.0 as usize, demo::TILE_PX as usize);
     let moves: Vec<bool> = frames[0]
@@ -168,7 +168,7 @@ fn make_demo(folder: &mut Folder) -> Outcome {
     let mut levels = vec![0; width * size.1 as usize];
     let mut rgb = vec![0; 3 * levels.len()];
     for (picture, map) in &frames {
-        for [to, from] in layout.runs() {
+        for [to, from] in layout.tile_rows() {
             rgb[3 * to..3 * (to + tile)].copy_from_slice(&picture[3 * from..3 * (from + tile)]);
             levels[to..to + tile].copy_from_slice(&map[from..from + tile]);
         }
@@ -186,11 +186,12 @@ fn check_demo(folder: &mut Folder, render: impl Fn(u32) -> (ColorImage, DepthMap
     let mut camera = Demo::new(None)?;
     let (mut color, mut depth, mut right) = (ColorImage::default(), DepthMap::default(), GrayImage::default());
     for frame in 0..demo::FRAMES {
-        camera.next(Shot { color: &mut color, depth: &mut depth, right: &mut right })?;
+        camera.next(FrameBuffers { color: &mut color, depth: &mut depth, right: &mut right })?;
         let (picture, map) = render(frame);
         let squares = color.rgb.iter().zip(&picture.rgb).map(|(a, b)| f64::from(a.abs_diff(*b)).powi(2));
         let psnr_db = 10.0 * (255.0f64.powi(2) * color.rgb.len() as f64 / squares.sum::<f64>()).log10();
-        let levels = |map: &DepthMap| map.metres.iter().map(|&z_m| i32::from(demo::level(z_m))).collect::<Vec<_>>();
+        let levels =
+            |map: &DepthMap| map.metres.iter().map(|&z_m| i32::from(demo::quantize_depth(z_m))).collect::<Vec<_>>();
         let name = format!("frame {frame}, {psnr_db:.1} dB");
         folder.compare(&name, psnr_db >= MIN_PSNR_DB, levels(&depth).iter().zip(levels(&map)).map(|(a, b)| a - b));
     }

@@ -122,7 +122,7 @@ mod tests {
 
     #[test]
     fn the_sheet_shows_the_kernel_white_and_equal_approximations_without_difference() {
-        let analysis = Analysis::of("disc".into(), &Aperture::default().mask(9, 0.0), &[1, 9]);
+        let analysis = Analysis::of("disc".into(), &Aperture::default().to_mask(9, 0.0), &[1, 9]);
         let sheet = draw(&analysis);
         let panel = 9 * (PANEL_PX / 9);
         let at = |x: usize, y: usize| {

@@ -22,7 +22,7 @@ fn color(path: &str) -> ColorImage {
 
 fn luma(path: &str) -> GrayImage {
     let mut gray = GrayImage::default();
-    gray.set_luma_of(&color(path));
+    gray.set_luma_from(&color(path));
     gray
 }
 

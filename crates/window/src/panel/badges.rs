@@ -69,7 +69,7 @@ fn freeze_text(state: &State) -> Option<&'static str> {
     let text = match (state.can_pause(), state.outputs.is_empty()) {
         (true, _) => "Paused",
         (false, true) => "Frozen",
-        (false, false) => "Frozen here, live outside",
+        (false, false) => "Frozen here, live elsewhere",
     };
     state.frozen.then_some(text)
 }

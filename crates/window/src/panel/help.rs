@@ -11,14 +11,14 @@ use crate::texts::tr;
 
 const GESTURES: [(&str, &str); 9] = [
     ("Click", "focus there"),
-    ("Double-click", "focus on that, and follow it"),
+    ("Double-click", "focus on the object there, and follow it"),
     ("Wheel", "less blur, more blur"),
-    ("Ctrl+Wheel, pinch", "larger, smaller: pixels as they are"),
+    ("Ctrl+Wheel, pinch", "zoom in and out, in actual pixels"),
     ("Drag", "move the enlarged picture"),
     ("Alt", "depth and blur under the pointer"),
     ("Drag the line", "move the split between before and after"),
     ("Drag the marks", "move, widen and turn the band of tilt-shift"),
-    ("Tab", "from control to control; Space and the arrow keys change it"),
+    ("Tab", "go to the next control; Space and the arrow keys change it"),
 ];
 
 /// Scroll distance of an arrow key, in points.
@@ -42,7 +42,7 @@ pub fn show(ctx: &Context, state: &State, actions: &mut Vec<Action>) {
                 }
             });
         });
-        let hint = "Off, letters, digits and signs do nothing: for who speaks to the computer";
+        let hint = "If off, shortcuts without Ctrl do nothing: for speech input";
         if switch(ui, "Single keys", hint, state.habits.single_keys) {
             actions.push(Action::SingleKeys(!state.habits.single_keys));
         }

@@ -44,7 +44,7 @@ const HIDE_DELAY_S: f64 = 4.0;
 /// Minimum size of the window in points; the text scale is limited to preserve it.
 const MIN_SIZE: Vec2 = Vec2::new(320.0, 200.0);
 /// Shown if the chosen text scale exceeds that limit.
-const TEXT_TOO_LARGE: &str = "The window is too small for text of this size: it is as large as there is room for.";
+const TEXT_TOO_LARGE: &str = "The window is too small for text of this size: the text is as large as fits.";
 /// Seconds after which a key or the wheel without further events counts as released.
 const RELEASE_DELAY_S: f64 = 0.8;
 

@@ -21,7 +21,7 @@ const MAX_SHOWN: usize = 3;
 /// Title and text for the demonstration source.
 const DEMONSTRATION: [&str; 2] = [
     "This is a demonstration",
-    "No camera is in use. Choose one under “Camera”; `bokehcam doctor` says why there is none.",
+    "No camera is in use. Choose one under “Camera”; if there is none, `bokehcam doctor` says why.",
 ];
 
 /// First display times of the notes.
@@ -88,7 +88,7 @@ impl NoteTimes {
 fn failure_texts(why: &str) -> [&str; 2] {
     let is_full = why.contains("No space left on device");
     let kept = why.split_once("; ").map_or(why, |(_, kept)| kept);
-    if is_full { ["The disk is full: the recording has ended", kept] } else { ["What was written has ended", why] }
+    if is_full { ["The disk is full: the recording has ended", kept] } else { ["An output has ended", why] }
 }
 
 /// Draws the reason why the source delivers no frames with a retry button, at the bottom so as not to cover the
@@ -98,8 +98,11 @@ fn add_banner(stack: &mut Stack, state: &State, actions: &mut Vec<Action>) {
     let (title, why, button) = match (&state.source, state.silent_s) {
         (Source::Running(_), None) => return,
         (Source::Running(running), Some(silent_s)) => {
-            silent =
-                tr_with("{}: nothing for {} s. It goes on by itself once frames come.", &[&running.label, &silent_s]);
+            silent = tr_with(
+                "{}: no frames for {} s. It continues by itself once frames \
+                         arrive.",
+                &[&running.label, &silent_s],
+            );
             ("No picture", silent.as_str(), Some("Try again"))
         }
         (Source::Opening, _) => ("Opening…", "", None),

@@ -144,7 +144,7 @@ fn report_range(ctx: &Context, spec: &Number, number: f64) {
     if number < min - half || number > max + half {
         let taken = if number < min { min } else { max };
         let [min, max, taken] = [min, max, taken].map(|number| format!("{before}{number:.digits$}{after}"));
-        let line = tr_with("{} goes from {} to {}: {} was taken.", &[&tr(label), &min, &max, &taken]);
+        let line = tr_with("{} is limited to {} to {}: {} was set.", &[&tr(label), &min, &max, &taken]);
         ctx.data_mut(|data| data.insert_temp(message_id(), line));
     }
 }

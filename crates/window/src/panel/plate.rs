@@ -17,14 +17,14 @@ pub fn offer(stack: &mut Stack, state: &State, actions: &mut Vec<Action>) {
     if !state.offers_depth() || state.bare {
         return;
     }
-    let network = ("Find me by a small network", "It separates a person from the background", Action::FindMe);
+    let network = ("Find me with a small network", "It separates a person from the background", Action::FindMe);
     let plate =
-        ("Show me the empty room", "Step out for four seconds; the camera has to stand still (T)", Action::TakePlate);
+        ("Show me the empty room", "Step out for four seconds; the camera must not move (T)", Action::TakePlate);
     let plate = Some(plate).filter(|_| state.can_capture_plate());
     let buttons = [network].into_iter().chain(plate).chain([("Not now", "Esc", Action::DeclinePlate)]);
     // Omits the explanation if it would cover a small picture.
     let is_small = room(stack.ctx).height() < 360.0;
-    let why = if is_small { "" } else { "Who is near is not known here, so all is blurred." };
+    let why = if is_small { "" } else { "Nothing is known about depth here, so everything is blurred." };
     stack.add_buttons("plate offer", WIDTH, ["A portrait from this picture alone", why], buttons, actions);
 }
 
@@ -33,15 +33,16 @@ pub fn show(stack: &mut Stack, state: &State, actions: &mut Vec<Action>) {
     let Some(step) = state.plate.filter(|step| *step != Step::Ready) else { return };
     let (title, why) = match step {
         Step::StepOut(_) => ("Step out of the picture", ""),
-        Step::Taking(_) => ("Stay out", "The room behind you is being learned."),
-        Step::Moves => ("Something moves", "Stay out of the picture, and let the camera stand still."),
-        Step::Restless => {
-            ("No plate so far", "Something keeps moving: let the camera stand on something firm, and step out.")
+        Step::Capturing(_) => ("Stay out", "The room behind you is being recorded."),
+        Step::Moving => ("Something moves", "Stay out of the picture, and do not move the camera."),
+        Step::KeepsMoving => {
+            ("No plate so far", "Something keeps moving: put the camera on something firm, and step out.")
         }
-        // `Step::Unlike`: the plate does not match the picture.
+        // `Step::Mismatched`: the plate does not match the picture.
         _ => (
             "Another picture",
-            "The camera was moved, or the light has changed: you cannot be separated from the background, so all is blurred.",
+            "The camera was moved, or the light has changed: you cannot be separated from the background, so \
+             everything is blurred.",
         ),
     };
     stack.add_card("plate", WIDTH, |ui, colors| {
@@ -50,13 +51,13 @@ pub fn show(stack: &mut Stack, state: &State, actions: &mut Vec<Action>) {
             Step::StepOut(seconds) => {
                 ui.label(RichText::new(seconds.to_string()).family(medium()).size(40.0));
             }
-            Step::Taking(percent) => {
+            Step::Capturing(percent) => {
                 ui.add(ProgressBar::new(percent as f32 / 100.0).desired_width(ui.available_width().min(WIDTH / 2.0)));
             }
             _ => {}
         }
         paragraph(ui, colors, why);
-        if step == Step::Unlike && button(ui, "Take another plate", "T") {
+        if step == Step::Mismatched && button(ui, "Take another plate", "T") {
             actions.push(Action::TakePlate);
         }
         if let Some(way) = state.way_without_plate().filter(|_| button(ui, "Find me without it", "Esc")) {

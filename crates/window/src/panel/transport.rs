@@ -48,7 +48,7 @@ impl Bar {
                 let buttons = [
                     (Icon::Back, "One frame back (Page Up)", Action::Step(-1)),
                     (play, hint, Action::Freeze(!state.frozen)),
-                    (Icon::Forward, "One frame on (Page Down)", Action::Step(1)),
+                    (Icon::Forward, "One frame forward (Page Down)", Action::Step(1)),
                 ];
                 for (icon, hint, action) in buttons {
                     if icons::button(ui, icon, hint, true) {

@@ -3,19 +3,19 @@
 use super::soft::Painter;
 use super::{Controls, Drawing, PresentError, Presenter};
 use bokehcam::compute::DevicePicture;
-use bokehcam::compute::backed::Backed;
+use bokehcam::compute::with_fallback::WithFallback;
 
 /// Presents with a GPU, and after its first error with another presenter.
 pub struct Fallback<Other> {
     /// The GPU presenter with its spare: a constructor, and a painter that always has the current controls.
-    presenter: Backed<Box<dyn Presenter>, (Other, Painter)>,
+    presenter: WithFallback<Box<dyn Presenter>, (Other, Painter)>,
     size: (u32, u32),
 }
 
 impl<Other: FnOnce(Painter) -> Result<Box<dyn Presenter>, PresentError>> Fallback<Other> {
     /// Creates a presenter that uses `first`, and after it fails the one that `other` creates.
     pub fn new(first: Box<dyn Presenter>, other: Other) -> Self {
-        Self { presenter: Backed::new(first, (other, Painter::new())), size: (0, 0) }
+        Self { presenter: WithFallback::new(first, (other, Painter::new())), size: (0, 0) }
     }
 }
 
@@ -26,7 +26,7 @@ impl<Other: FnOnce(Painter) -> Result<Box<dyn Presenter>, PresentError>> Present
     }
 
     fn set_controls(&mut self, controls: Controls) {
-        if let Some((_, painter)) = self.presenter.spare_mut() {
+        if let Some((_, painter)) = self.presenter.fallback_mut() {
             painter.set_controls(controls.clone());
         }
         self.presenter.worker_mut().set_controls(controls);

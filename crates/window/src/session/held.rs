@@ -33,7 +33,7 @@ pub(super) struct HeldBlur {
 }
 
 /// Shown when a look needs depth that the frame lacks.
-const NO_DEPTH: &str = "The picture that stays was taken without depth: let the next ones come, for blur by depth.";
+const NO_DEPTH: &str = "The frozen picture was taken without depth: unfreeze for blur by depth.";
 
 impl HeldBlur {
     /// Creates the blur for a frame; `focus` is the focus rule of the look that the frame was taken with.
@@ -57,9 +57,9 @@ impl HeldBlur {
         let (mut made, mut coc) = (images.clone(), *coc);
         if fixed.coc_kind().is_some() {
             let depth = made.depth.take().map(Depth::Final);
-            (coc, made.depth) = still::coc_and_depth(&fixed, &mut made.color, depth).map_err(plain)?;
+            (coc, made.depth) = still::compute_coc_and_depth(&fixed, &mut made.color, depth).map_err(plain)?;
         }
-        self.blur.follow(&fixed, (size, false), |settings| services.executor(settings, size))?;
+        self.blur.set_look(&fixed, (size, false), |settings| services.executor(settings, size))?;
         if let Err(error) = self.blur.blur(&mut made, coc) {
             self.blur = Blur::default();
             return Err(plain(error));

@@ -112,7 +112,7 @@ impl Host {
     /// Recovers recordings of an earlier preview that was killed.
     fn recover(&self) {
         for kept in self.start.folders.all().flat_map(|folder| sink::recover_all(folder, folders::is_video)) {
-            self.events.note(format!("An earlier recording was broken off: it is kept as {}", folders::shown(&kept)));
+            self.events.note(format!("An earlier recording was interrupted: it is kept as {}", folders::shown(&kept)));
         }
     }
 
@@ -185,7 +185,7 @@ impl Host {
     }
 
     fn report_outputs(&mut self) {
-        self.start.wanted.need(!self.start.outputs.is_empty());
+        self.start.output_request.set_needed_in_memory(!self.start.outputs.is_empty());
         self.watch = (!self.start.outputs.is_empty()).then(|| self.start.demand.watch());
         self.events.send_update(Update::Outputs(self.start.outputs.clone()));
     }
@@ -214,7 +214,7 @@ impl Host {
         self.events.send_update(Update::Controls(opened.controls.clone()));
         opened.notes.iter().for_each(|line| self.events.note(line));
         self.runs += 1;
-        self.start.wanted.need(!self.start.outputs.is_empty());
+        self.start.output_request.set_needed_in_memory(!self.start.outputs.is_empty());
         let (commands, run) = (self.commands.clone(), self.runs);
         let to_host = commands.clone();
         let wrote = move |written| {
@@ -240,13 +240,13 @@ impl Host {
 
     /// Opens an output and adds it to the run; an unnamed recording gets a name.
     fn write_to(&mut self, mut output: Output) {
-        let Some(live) = &self.live else { return self.events.note("There is no source to write out.") };
+        let Some(live) = &self.live else { return self.events.note("There is no source to record.") };
         if output.name.is_empty() {
             output.name = self.unused_video_path().display().to_string();
         }
         match self.start.services.output(&output.name, live.size, live.period_ns, &live.stop) {
             Ok(sink) => {
-                self.start.wanted.need(true);
+                self.start.output_request.set_needed_in_memory(true);
                 live.add_output(&output, sink);
                 self.start.outputs.push(output);
             }

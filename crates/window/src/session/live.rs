@@ -12,8 +12,8 @@ use super::{EventSender, SessionEvent, Start};
 use bokehcam::clock::Clock;
 use bokehcam::depth::plate::Guide;
 use bokehcam::link;
-use bokehcam::look::{Known, Look};
-use bokehcam::pipeline::{self, Blurring, Changes, Pace, PipelineError, Run};
+use bokehcam::look::{Look, SourceDepth};
+use bokehcam::pipeline::{self, BlurSetup, ChangeSender, Pace, PipelineError, Run};
 use bokehcam::sink::Sink;
 use bokehcam::sink::switch::Notice;
 use bokehcam::sink::{Shutter, Switchboard, Tee};
@@ -24,8 +24,8 @@ use bokehcam::stats::Report;
 pub(super) struct Live {
     pub size: (u32, u32),
     pub period_ns: u64,
-    known: Known,
-    changes: Changes,
+    known: SourceDepth,
+    changes: ChangeSender,
     board: Switchboard,
     pub stop: Arc<AtomicBool>,
     /// Progress of the background plate, if depth comes from it.
@@ -52,10 +52,10 @@ impl Live {
         let (info, seeker) = (source.camera.info(), source.camera.seeker());
         let (guide, depth_from) = (source.guide.clone(), source.depth_from);
         let kind = SourceName::from_str(&name).map_or(Kind::default(), |name| name.kind());
-        let known = Known { has_depth, is_relative: facts.is_relative, size: info.size };
+        let known = SourceDepth { has_depth, is_relative: facts.is_relative, size: info.size };
         let look = start.look.for_source(known);
         let (blurring, changes) =
-            Blurring::begin(look, (info.size, ADAPTIVE), |settings| start.services.executor(settings, info.size))?;
+            BlurSetup::create(look, (info.size, ADAPTIVE), |settings| start.services.executor(settings, info.size))?;
         let executor = blurring.bokeh.as_ref().map_or_else(|| "no blur".into(), |bokeh| bokeh.describe());
         let (budget_ns, threads) = (start.budget_ns.unwrap_or(info.period_ns), start.threads);
         // Outputs can be added and removed during the run; the shutter withholds pictures from all of them.
@@ -67,7 +67,7 @@ impl Live {
         let (view, views) = link::live();
         let stop = Arc::new(AtomicBool::new(false));
         let (stopped, wake, keep_going) = (Arc::clone(&stop), Arc::clone(&events.wake), start.keep_going);
-        let (wanted, demand) = (Arc::clone(&start.wanted), start.demand.clone());
+        let (output_request, demand) = (Arc::clone(&start.output_request), start.demand.clone());
         // Before the thread starts, so that the window can receive the first frame.
         events.send(SessionEvent::Views(views, guide.clone(), seeker));
         let run = move || {
@@ -77,7 +77,7 @@ impl Live {
                 budget_ns,
                 keep_going,
                 demand: Some(demand),
-                wanted: Some(wanted),
+                output_request: Some(output_request),
                 view: Some(view),
                 progress: &|_| wake(),
                 ..source.into_run(blurring, Box::new(sink), &stopped)
@@ -120,9 +120,9 @@ impl Live {
     ///
     /// # Errors
     /// Returns a one-line message if the executor cannot be created. The previous look stays active.
-    pub(super) fn adopt(&mut self, look: Look, number: u64, services: &mut dyn Services) -> Result<(), String> {
+    pub(super) fn switch_look(&mut self, look: Look, number: u64, services: &mut dyn Services) -> Result<(), String> {
         let size = self.size;
-        self.changes.adopt(look, number, |settings| {
+        self.changes.switch_look(look, number, |settings| {
             let began = Instant::now();
             let bokeh = services.executor(settings, size)?;
             tracing::debug!("an executor was made in {:?}", began.elapsed());

@@ -24,7 +24,7 @@ use bokehcam::files::user_folders::{self as folders, Folders};
 use bokehcam::link::Receiver;
 use bokehcam::link::demand::Demand;
 use bokehcam::look::Look;
-use bokehcam::pipeline::{PipelineError, View, Wanted};
+use bokehcam::pipeline::{OutputRequest, PipelineError, View};
 use bokehcam::sink::ShutterControl;
 use bokehcam::sink::switch::Notice;
 use bokehcam::stats::Report;
@@ -53,7 +53,7 @@ pub struct Start {
     /// Folders for snapshots and recordings.
     pub folders: Folders,
     /// Whether the pipeline must deliver blurred frames.
-    pub wanted: Arc<Wanted>,
+    pub output_request: Arc<OutputRequest>,
     /// Counts the viewers: sources pause while there are none.
     pub demand: Demand,
     /// Whether outputs get the still card instead of the picture.

@@ -4,8 +4,8 @@ use std::path::PathBuf;
 
 use super::{Camera, DepthMethod, Output, Shown, Source};
 use crate::services::Browse;
+use bokehcam::camera_control::CameraControl;
 use bokehcam::depth::backdrop::Behind;
-use bokehcam::knob::Knob;
 use bokehcam::look::Look;
 use bokehcam::look::presets::Preset;
 use bokehcam::source::devices::Choice;
@@ -167,7 +167,7 @@ pub enum Update {
         virtual_cameras: Vec<Choice>,
     },
     Presets(Vec<Preset>),
-    Controls(Vec<Knob>),
+    Controls(Vec<CameraControl>),
     /// Properties of the camera, sent before it runs.
     Camera(Camera),
     /// An offered source is valid, and is to be opened.

@@ -5,20 +5,21 @@ use bokehcam::depth::focus::FocusRule;
 use bokehcam::look::{Effect, Look, Patch, Strength};
 
 /// Shown when a look or a view needs depth and the source has none.
-pub const NO_DEPTH: &str = "Who is near is not known here: a small network or a picture of the empty room tells.";
+pub const NO_DEPTH: &str = "Nothing is known about depth here: use a small network or a picture of the empty room.";
 /// Shown instead for a photo.
 pub const NO_DEPTH_OF_PHOTO: &str =
-    "This photo has no depth. A network gives it (`bokehcam models get`), or a depth map beside it: NAME-depth.png.";
+    "This photo has no depth. Install a network (`bokehcam models get`), or put a depth map beside it: NAME-depth.png.";
 /// Shown instead if the command line declined the source's depth.
-pub const DECLINED: &str = "This source has depth that `--depth none` declines. “Depth from” under More uses it.";
+pub const DECLINED: &str = "The depth of this source is off by `--depth none`. “Depth from” under More uses it.";
 /// Shown when the depth view is requested while depth is not computed.
-pub const NOT_FOLLOWED: &str = "Depth is made only while the blur follows it: switch Portrait on first.";
+pub const NOT_FOLLOWED: &str = "Depth is only computed while the blur uses it: switch Portrait on first.";
 /// Shown when a view of the blur's internals is requested without blur.
-pub const NOT_BLURRED: &str = "Nothing is blurred: there is nothing to show of it.";
+pub const NOT_BLURRED: &str = "Nothing is blurred, so there is nothing to show here.";
 /// Shown when a background plate is requested but the source is not a camera.
-pub const NO_PLATE: &str = "Open a camera first: a plate needs one that stands still.";
+pub const NO_PLATE: &str = "Open a camera first: a plate needs a camera that does not move.";
 /// Shown when a look needs metric depth but the depth is relative.
-pub const NO_METRES: &str = "Nothing is known in metres here: the subject is in focus, and blur is given as an amount.";
+pub const NO_METRES: &str = "Distances in metres are unknown here: the subject is in focus, and the blur is set as an \
+                             amount.";
 /// Shown when the window is frozen while an output is active.
 pub const OUTPUTS_CONTINUE: &str =
     "Only this window is frozen. Recordings and calls go on live, in every look that you choose here.";
@@ -260,7 +261,7 @@ impl State {
     }
 
     fn set_control(&mut self, name: String, value: i64) -> Vec<Request> {
-        let Some(control) = self.controls.iter_mut().find(|control| control.name == name && control.active) else {
+        let Some(control) = self.controls.iter_mut().find(|control| control.name == name && control.is_active) else {
             return Vec::new();
         };
         let (min, max, _) = control.range;

@@ -1,17 +1,17 @@
 //! Adapts the look to the source.
 
 use super::{Source, State};
-use bokehcam::look::{Effect, Known, Look};
+use bokehcam::look::{Effect, Look, SourceDepth};
 
 impl State {
     /// Returns the properties of the source's depth.
-    pub fn known(&self) -> Known {
+    pub fn known(&self) -> SourceDepth {
         let size = match &self.source {
             Source::Running(running) => running.size,
             _ => (1280, 720),
         };
         let is_relative = self.camera.is_relative && matches!(self.source, Source::Running(_));
-        Known { has_depth: self.may_have_depth(), is_relative, size }
+        SourceDepth { has_depth: self.may_have_depth(), is_relative, size }
     }
 
     /// Returns the look to be saved: as the user chose it, before it was adapted to the source.
@@ -43,15 +43,15 @@ mod tests {
         state.look = Look { focus: FocusRule::Metres(2.5), strength: lens, focus_range_m: 0.4, ..look() };
         state.apply_update(Update::Camera(Camera { is_relative: true, ..Camera::default() }));
         let told = state.apply_update(Update::Source(running(true)));
-        assert!(matches!(told, Some(Request::Look(look)) if look.needs_metres().is_none()), "{:?}", state.look);
-        assert_eq!(state.look.needs_metres(), None);
+        assert!(matches!(told, Some(Request::Look(look)) if look.metric_setting().is_none()), "{:?}", state.look);
+        assert_eq!(state.look.metric_setting(), None);
         assert!(state.notes.iter().any(|note| note.text.contains("in metres")), "and it is said");
         // Nothing restores them, and keys for metric settings change the amount instead.
         let before = tweak::amount(&state.look, 720).unwrap();
         let mut more = state.look.clone();
         tweak::f_number_by(&mut more, 0.5, 1.0, (1280, 720));
         state.apply(Action::Look { look: Box::new(more), stroke: None });
-        assert!(state.look.needs_metres().is_none() && tweak::amount(&state.look, 720).unwrap() > 1.5 * before);
+        assert!(state.look.metric_setting().is_none() && tweak::amount(&state.look, 720).unwrap() > 1.5 * before);
         assert!(state.patched(&Patch { focus: Some(FocusRule::Metres(2.0)), ..Patch::default() }).is_err());
     }
 
@@ -62,7 +62,7 @@ mod tests {
         for focus_m in [0.7, 1.24, 3.0] {
             look.strength = Strength::Lens(tweak::lens_of(&look, focus_m, size));
             let Strength::Lens(lens) = look.strength else { unreachable!() };
-            look.strength = Strength::of_fraction(tweak::lens_fraction(lens, focus_m, size));
+            look.strength = Strength::from_fraction(tweak::lens_fraction(lens, focus_m, size));
             assert_eq!(look, Look::default(), "focused at {focus_m} m");
         }
     }

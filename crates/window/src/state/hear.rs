@@ -16,7 +16,9 @@ impl State {
             Update::Controls(controls) => self.controls = controls,
             Update::Camera(camera) => self.set_camera(camera),
             Update::Offered(name) => return self.open(name).pop(),
-            Update::Behind(behind) => return self.set_look(Look { behind, ..self.look.clone() }, None).pop(),
+            Update::Behind(behind) => {
+                return self.set_look(Look { background: behind, ..self.look.clone() }, None).pop();
+            }
             Update::Outputs(outputs) => {
                 self.outputs = outputs;
                 self.recorded_bytes = self.recorded_bytes.filter(|_| self.recording().is_some());
@@ -52,7 +54,7 @@ impl State {
             }
             _ => self.look.clone(),
         };
-        if self.known().is_relative && self.may_have_depth() && chosen.needs_metres().is_some() {
+        if self.known().is_relative && self.may_have_depth() && chosen.metric_setting().is_some() {
             self.note(NO_METRES);
         }
         let look = self.adapt_look(chosen);

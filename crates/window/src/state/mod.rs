@@ -35,10 +35,10 @@ use super::meters::Meters;
 use super::texts::translated;
 pub use super::views::Shown;
 use super::views::{Legend, Probe};
+use bokehcam::camera_control::CameraControl;
 use bokehcam::capture::demo;
 use bokehcam::depth::plate::Step;
 use bokehcam::frame::crop::Crop;
-use bokehcam::knob::Knob;
 use bokehcam::look::Look;
 use bokehcam::look::presets::Preset;
 
@@ -115,7 +115,7 @@ pub struct State {
     pub sources: Vec<Choice>,
     /// The available virtual cameras.
     pub virtual_cameras: Vec<Choice>,
-    pub controls: Vec<Knob>,
+    pub controls: Vec<CameraControl>,
     /// Other properties of the camera.
     pub camera: Camera,
     pub presets: Vec<Preset>,

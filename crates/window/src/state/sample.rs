@@ -1,7 +1,7 @@
 //! Sample states for tests.
 
 use super::{DepthMethod, Running, Source, State};
-use bokehcam::knob::Knob;
+use bokehcam::camera_control::CameraControl;
 use bokehcam::look::presets::Preset;
 use bokehcam::look::{Effect, Look, Patch, Strength, Tilt};
 use bokehcam::source::devices::Choice;
@@ -43,7 +43,7 @@ pub fn state() -> State {
     let choice = |name: &str, label: &str| Choice { name: name.into(), label: label.into() };
     state.sources = vec![choice("portrait", "Recording: portrait"), choice("/dev/video0", "Desk camera")];
     state.virtual_cameras = vec![choice("/dev/video9", "bokehcam (/dev/video9)")];
-    let preset = |name: &str, look: Look, own: bool| Preset { name: name.into(), patch: Patch::from_look(&look), own };
+    let preset = |name: &str, look: Look, is_user_defined: bool| Preset { name: name.into(), patch: Patch::from_look(&look), is_user_defined };
     state.presets = vec![
         preset("portrait", look(), false),
         preset("cinematic", blurred(30.0), false),
@@ -52,22 +52,22 @@ pub fn state() -> State {
         preset("miniature", Look { effect: Effect::TiltShift, ..blurred(14.0) }, false),
         preset("my desk", blurred(21.0), true),
     ];
-    let control = |name: &str, value: i64, range: (i64, i64, i64)| Knob {
+    let control = |name: &str, value: i64, range: (i64, i64, i64)| CameraControl {
         name: name.into(),
         value,
         range,
         menu: Vec::new(),
-        switch: false,
-        active: true,
+        is_boolean: false,
+        is_active: true,
     };
     let menu = vec![(1, "Manual Mode".to_owned()), (3, "Aperture Priority Mode".to_owned())];
     // Expands the panel.
     state.habits.sections.insert("More".into(), true);
     state.controls = vec![
         control("brightness", 10, (-64, 64, 1)),
-        Knob { switch: true, ..control("white_balance_automatic", 1, (0, 1, 1)) },
-        Knob { menu, ..control("auto_exposure", 3, (0, 3, 1)) },
-        Knob { active: false, ..control("exposure_time_absolute", 157, (1, 5000, 1)) },
+        CameraControl { is_boolean: true, ..control("white_balance_automatic", 1, (0, 1, 1)) },
+        CameraControl { menu, ..control("auto_exposure", 3, (0, 3, 1)) },
+        CameraControl { is_active: false, ..control("exposure_time_absolute", 157, (1, 5000, 1)) },
     ];
     state
 }

@@ -97,7 +97,7 @@ fn presets_are_looks_by_name() {
 #[test]
 fn of_presets_that_look_the_same_the_one_that_was_chosen_is_in_use() {
     let mut state = state();
-    let same = Preset { name: "mine".into(), own: true, ..state.presets[1].clone() };
+    let same = Preset { name: "mine".into(), is_user_defined: true, ..state.presets[1].clone() };
     state.presets.push(same);
     let mine = state.presets.len() - 1;
     for (name, index) in [("cinematic", 1), ("mine", mine), ("cinematic", 1)] {
@@ -328,7 +328,7 @@ fn a_plate_is_offered_where_a_camera_has_no_depth_and_its_end_is_told_once() {
     assert!(!state.declined_plate);
     let notes = state.notes.len();
     for (step, is_new) in
-        [(Step::StepOut(3), true), (Step::StepOut(3), false), (Step::Taking(50), true), (Step::Ready, true)]
+        [(Step::StepOut(3), true), (Step::StepOut(3), false), (Step::Capturing(50), true), (Step::Ready, true)]
     {
         assert_eq!(state.set_plate_step(Some(step)), is_new, "{step:?}");
     }

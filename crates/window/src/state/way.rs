@@ -3,7 +3,7 @@
 use std::fmt;
 use std::str::FromStr;
 
-use bokehcam::source::{DepthChoice, DepthOrigin, NetworkFile, OneCamera, PlateFile};
+use bokehcam::source::{DepthChoice, DepthOrigin, NetworkFile, PlateFile, SingleCameraDepth};
 
 /// A depth method.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -27,11 +27,15 @@ impl DepthMethod {
         match self {
             Self::Measured => DepthChoice::Recorded,
             Self::Stereo => DepthChoice::Stereo,
-            Self::Person => DepthChoice::OneCamera(OneCamera { matte: installed, ..OneCamera::default() }),
-            Self::PersonAndDistance => {
-                DepthChoice::OneCamera(OneCamera { matte: installed.clone(), mono: installed, ..OneCamera::default() })
+            Self::Person => {
+                DepthChoice::SingleCamera(SingleCameraDepth { matte: installed, ..SingleCameraDepth::default() })
             }
-            Self::Plate => DepthChoice::OneCamera(OneCamera {
+            Self::PersonAndDistance => DepthChoice::SingleCamera(SingleCameraDepth {
+                matte: installed.clone(),
+                mono: installed,
+                ..SingleCameraDepth::default()
+            }),
+            Self::Plate => DepthChoice::SingleCamera(SingleCameraDepth {
                 plate: Some(PlateFile::Taken),
                 ..bokehcam::source::installed_networks()
             }),
@@ -50,17 +54,17 @@ impl DepthMethod {
     /// Returns the value of `--depth`, including the networks that complement a plate.
     pub fn flag(self) -> String {
         match self.choice() {
-            DepthChoice::OneCamera(chosen) => chosen.kinds(),
+            DepthChoice::SingleCamera(chosen) => chosen.kind_names(),
             _ => self.to_string(),
         }
     }
 
     /// Returns the method that provided a source's depth; `None` without depth.
-    pub fn of(depth_from: DepthOrigin, networks: &OneCamera, has_plate: bool) -> Option<Self> {
+    pub fn of(depth_from: DepthOrigin, networks: &SingleCameraDepth, has_plate: bool) -> Option<Self> {
         match depth_from {
             DepthOrigin::Nothing => None,
             DepthOrigin::Units | DepthOrigin::Metres | DepthOrigin::Relative => Some(Self::Measured),
-            DepthOrigin::Eyes => Some(Self::Stereo),
+            DepthOrigin::Stereo => Some(Self::Stereo),
             _ if has_plate => Some(Self::Plate),
             DepthOrigin::Networks if networks.mono.is_some() => Some(Self::PersonAndDistance),
             DepthOrigin::Networks => Some(Self::Person),
@@ -82,7 +86,7 @@ impl FromStr for DepthMethod {
         let way = Self::NAMES.iter().find(|(_, name)| *name == text).map(|(way, _)| *way);
         way.ok_or_else(|| {
             let names = Self::NAMES.map(|(_, name)| name).join(", ");
-            format!("there is no depth by '{text}': use one of {names}")
+            format!("there is no source of depth '{text}': use one of {names}")
         })
     }
 }

@@ -45,7 +45,7 @@ impl Bins {
             (cheap, size, plan)
         });
         plan.set_quality(level.unwrap_or(settings.quality));
-        plan.split(depth, coc);
+        plan.split_by_depth(depth, coc);
         plan
     }
 }

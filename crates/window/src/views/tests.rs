@@ -23,12 +23,12 @@ fn view(size: (u32, u32), map: (u32, u32), coc: CocField) -> View {
     View {
         depth: Some(maps.take()),
         trace: Trace { quality: Some(Quality::Balanced), ..Trace::default() },
-        ..View::of(Picture::in_memory(pictures.take()), coc)
+        ..View::new(Picture::from_memory(pictures.take()), coc)
     }
 }
 
 fn settings(size: (u32, u32)) -> Settings {
-    sample::look().settings(size, true).unwrap()
+    sample::look().blur_settings(size, true).unwrap()
 }
 
 fn pixel(image: &ColorImage, x: u32, y: u32) -> [u8; 3] {
@@ -101,7 +101,7 @@ fn each_pixel_has_the_colour_of_its_bin() {
     let image = views.draw(Shown::Bins, &view, Some(&settings)).unwrap().clone();
     let mut plan = Plan::new(&settings, size.0, size.1);
     plan.set_quality(Quality::Balanced);
-    plan.split(view.depth.as_deref(), &view.coc);
+    plan.split_by_depth(view.depth.as_deref(), &view.coc);
     assert!(plan.bins.len() > 2);
     for x in 0..size.0 {
         let coc_px = LENS.coc_px(view.depth.as_ref().unwrap().metres[x as usize]);

@@ -16,11 +16,11 @@ const KEY: &str = "color-scheme";
 pub(super) fn watch_theme(on_theme: impl Fn(Theme) -> bool + Send + 'static) {
     let asked = thread::Builder::new().name("desktop".into()).spawn(move || {
         if let Err(error) = watch_portal(&on_theme) {
-            tracing::debug!("the desktop tells no colour scheme: {error}");
+            tracing::debug!("the desktop does not report a colour scheme: {error}");
         }
     });
     if let Err(error) = asked {
-        tracing::debug!("the desktop is not asked for its colour scheme: {error}");
+        tracing::debug!("the desktop cannot be asked for its colour scheme: {error}");
     }
 }
 

@@ -55,7 +55,7 @@ impl Memory {
     /// Returns the source, if its devices still exist.
     pub fn source(&self) -> Option<String> {
         let is_there = |name: &&String| {
-            SourceName::from_str(name).is_ok_and(|name| name.devices().iter().all(|node| node.exists()))
+            SourceName::from_str(name).is_ok_and(|name| name.device_nodes().iter().all(|node| node.exists()))
         };
         self.source.as_ref().filter(is_there).cloned()
     }
@@ -92,7 +92,7 @@ impl Memory {
         let folder = path.parent().map_or(Ok(()), fs::create_dir_all);
         let written = folder.and_then(|()| whole::write(path, text.as_bytes(), true));
         if let Err(error) = written {
-            tracing::info!("the window is not remembered: {}: {error}", path.display());
+            tracing::info!("the state of the window was not saved: {}: {error}", path.display());
         }
     }
 }

@@ -28,7 +28,7 @@ use bokehcam::stats::Report;
 bokehcam::names::named! {
     /// The window's colours.
     pub enum ThemeChoice default Auto {
-        /// As the desktop's other windows
+        /// Like the other windows of the desktop
         Auto = "auto",
         /// Dark text on light
         Light = "light",
@@ -100,7 +100,7 @@ pub struct Ended {
 #[derive(Debug, thiserror::Error)]
 pub enum WindowError {
     /// There is no display server, or it refused the window.
-    #[error("there can be no window: {0}; without one, `bokehcam stream SOURCE --to SINK` does the same")]
+    #[error("cannot open a window: {0}; without one, use `bokehcam stream SOURCE --to SINK`")]
     NoWindow(String),
     /// The window cannot be drawn to.
     #[error(transparent)]

@@ -16,7 +16,7 @@ use bokehcam::bokeh::plan::Plan;
 use bokehcam::bokeh::slices::{Radii, SliceBlur};
 use bokehcam::budget::{Governor, Quality, Sample};
 use bokehcam::calibration::rectifier::Rectifier;
-use bokehcam::calibration::{Distortion, Eye, StereoCalibration};
+use bokehcam::calibration::{CameraIntrinsics, Distortion, StereoCalibration};
 use bokehcam::compute::Backend;
 use bokehcam::compute::thread_pool::ThreadPool;
 use bokehcam::depth::matting::Matting;
@@ -81,7 +81,7 @@ fn window() {
         color: Some(Pooled::detached(picture.clone())),
         depth: Some(Pooled::detached(depth)),
         trace: Trace { quality: Some(Quality::Fast), ..Trace::default() },
-        ..View::of(Picture::in_memory(Pooled::detached(picture)), CocField::Depth(lens))
+        ..View::new(Picture::from_memory(Pooled::detached(picture)), CocField::Depth(lens))
     };
     let settings = settings(COC_KINDS[2]);
     let (mut views, mut meters) = (Views::default(), Meters::default());
@@ -119,31 +119,31 @@ fn window() {
 
 /// Rectification of both pictures of a stereo pair.
 fn rectification() {
-    let eye = |shift_px: f64| Eye {
+    let eye = |shift_px: f64| CameraIntrinsics {
         size: Some((160, 120)),
         focal_px: DVec2::splat(140.0),
         center_px: DVec2::new(80.0 + shift_px, 60.0),
         distortion: Distortion::RadialTangential([-0.2, 0.05, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]),
     };
     let calibration = StereoCalibration {
-        eyes: [eye(0.0), eye(3.0)],
+        cameras: [eye(0.0), eye(3.0)],
         rotation: DMat3::from_rotation_z(0.01),
         translation_m: DVec3::new(-0.06, 0.0, 0.001),
-        given: None,
+        stored_rectification: None,
         assumed_mm: false,
     };
     let rectifier = Rectifier::new(&calibration, (160, 120)).unwrap();
     let left = noise(160, 120);
     let mut right = GrayImage::default();
-    right.set_luma_of(&left);
+    right.set_luma_from(&left);
     let (mut into_left, mut into_right) = (ColorImage::default(), GrayImage::default());
     let mut before = 0;
     for frame in 0..4 {
         if frame == 1 {
             before = ALLOCATIONS.load(Ordering::Relaxed);
         }
-        rectifier.left(&left, &mut into_left);
-        rectifier.right(&right, &mut into_right);
+        rectifier.rectify_left(&left, &mut into_left);
+        rectifier.rectify_right(&right, &mut into_right);
     }
     assert_eq!(ALLOCATIONS.load(Ordering::Relaxed), before);
 }
@@ -193,8 +193,8 @@ fn refinement() {
         let mut frame = |index: u64| {
             map.resize(measured.width, measured.height);
             map.metres.copy_from_slice(&measured.metres);
-            refiner.refine_on(&mut workers, &mut map, &image, index * 33_000_000);
-            matting.find_before(&mut workers, (&mut map, &image), 0.05, None);
+            refiner.refine_with_workers(&mut workers, &mut map, &image, index * 33_000_000);
+            matting.find_with_background(&mut workers, (&mut map, &image), 0.05, None);
         };
         frame(0);
         frame(1);
@@ -207,17 +207,17 @@ fn refinement() {
 /// Rectification and stereo matching on the CPU, with changing effort.
 fn two_eyes() {
     let size = (160, 120);
-    let eye = |center_y_px| Eye {
+    let eye = |center_y_px| CameraIntrinsics {
         size: Some(size),
         focal_px: DVec2::splat(150.0),
         center_px: DVec2::new(80.0, center_y_px),
         distortion: Distortion::RadialTangential([0.1, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]),
     };
     let calibration = StereoCalibration {
-        eyes: [eye(60.0), eye(57.0)],
+        cameras: [eye(60.0), eye(57.0)],
         rotation: DMat3::IDENTITY,
         translation_m: DVec3::new(-0.1, 0.0, 0.0),
-        given: None,
+        stored_rectification: None,
         assumed_mm: false,
     };
     let rectifier = Rectifier::new(&calibration, size).expect("maps");
@@ -225,7 +225,7 @@ fn two_eyes() {
     let matcher = stereo::create(&settings, Backend::Cpu, None).expect("a matcher");
     let mut depth = StereoDepth::of_raw("two eyes", rectifier, matcher, 16);
     let (raw, mut right, mut map) = (noise(size.0, size.1), GrayImage::default(), DepthMap::default());
-    right.set_luma_of(&raw);
+    right.set_luma_from(&raw);
     let mut color = raw.clone();
     let mut frame = |index: usize| {
         depth.rectify(&mut color);
@@ -298,7 +298,7 @@ fn levels() {
     let before = ALLOCATIONS.load(Ordering::Relaxed);
     for at_ns in 0..2000 {
         let took_ns = if at_ns / 500 % 2 == 0 { 3_000 } else { 300 };
-        governor.note(Sample { level: governor.level(), took_ns, at_ns }, 1_000);
+        governor.record(Sample { level: governor.level(), took_ns, at_ns }, 1_000);
     }
     assert_eq!(ALLOCATIONS.load(Ordering::Relaxed), before, "governor");
 }

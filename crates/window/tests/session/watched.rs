@@ -6,11 +6,11 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
 
 use bokehcam::bokeh::{self, Bokeh};
+use bokehcam::camera_control::CameraControl;
 use bokehcam::capture::synthetic::Format;
-use bokehcam::capture::{Brings, Camera as Capture, CaptureError, Captured, Shot, SourceInfo};
+use bokehcam::capture::{Camera as Capture, CaptureError, Captured, FrameBuffers, FrameData, SourceInfo};
 use bokehcam::depth::plate::PlateDepth;
 use bokehcam::frame::ColorImage;
-use bokehcam::knob::Knob;
 use bokehcam::look::Look;
 use bokehcam::optics::CocField;
 use bokehcam::pipeline::View;
@@ -58,9 +58,9 @@ struct Plain(Synthetic);
 
 impl Capture for Plain {
     fn info(&self) -> SourceInfo {
-        SourceInfo { brings: Brings::Color, ..self.0.info() }
+        SourceInfo { frame_data: FrameData::Color, ..self.0.info() }
     }
-    fn next(&mut self, shot: Shot) -> Result<Captured, CaptureError> {
+    fn next(&mut self, shot: FrameBuffers) -> Result<Captured, CaptureError> {
         self.0.next(shot)
     }
 }
@@ -81,7 +81,7 @@ impl Services for Small {
         let scene = Synthetic::new(format).map_err(|error| error.to_string())?;
         let camera: Box<dyn Capture> = if with_plate { Box::new(Plain(scene)) } else { Box::new(scene) };
         let (name, notes, controls) = (name.to_owned(), vec!["a note".to_owned()], Vec::new());
-        let mut source = source::Source::of(camera, None);
+        let mut source = source::Source::from_camera(camera, None);
         if with_plate {
             let plate = PlateDepth::new(None, None, None);
             source.guide = Some(plate.guide());
@@ -99,12 +99,12 @@ impl Services for Small {
             camera: Camera::default(),
         })
     }
-    fn set_control(&mut self, _: &str, _: i64) -> Result<Vec<Knob>, String> {
+    fn set_control(&mut self, _: &str, _: i64) -> Result<Vec<CameraControl>, String> {
         Err("it has no controls".into())
     }
     fn executor(&mut self, settings: &bokeh::Settings, size: (u32, u32)) -> Result<Box<dyn Bokeh>, String> {
         self.executors.fetch_add(1, Ordering::SeqCst);
-        bokeh::create(settings, size, None, Some(1)).map_err(|error| error.to_string())
+        bokeh::create_blur(settings, size, None, Some(1)).map_err(|error| error.to_string())
     }
     fn output(&mut self, name: &str, _: (u32, u32), _: u64, _: &Arc<AtomicBool>) -> Result<Box<dyn Sink>, String> {
         if name == "full" {

@@ -1,4 +1,4 @@
-use super::super::rows::Rows;
+use super::super::rows::PlanarRows;
 use super::*;
 
 const WIDTH: usize = 64;
@@ -8,7 +8,7 @@ const FAR_PX: f32 = 12.0;
 
 /// Makes two surfaces with a straight outline between them, and a bar across that hides them.
 fn level(nearer: impl Fn(usize, usize) -> bool, hidden: impl Fn(usize, usize) -> bool) -> Level {
-    let mut rows = Rows::<PLANES>::new(WIDTH, HEIGHT, 0);
+    let mut rows = PlanarRows::<PLANES>::new(WIDTH, HEIGHT, 0);
     let (stride, row_len) = (rows.stride, rows.row_len());
     for (y, row) in rows.data.chunks_exact_mut(row_len).enumerate() {
         for x in (0..WIDTH).filter(|&x| !hidden(x, y)) {
@@ -26,7 +26,7 @@ fn everywhere() -> Silhouettes {
     let mut silhouettes = Silhouettes::new(PIXEL * WIDTH, PIXEL * HEIGHT);
     let marks = silhouettes.marks(PIXEL * HEIGHT);
     marks.part(0).fill(1e3);
-    silhouettes.spread(&mut ThreadPool::new("spread", 1), Arch::new());
+    silhouettes.dilate(&mut ThreadPool::new("spread", 1), Arch::new());
     silhouettes
 }
 
@@ -36,7 +36,7 @@ fn at(level: &Level, p: usize, x: usize, y: usize) -> f32 {
 
 #[test]
 fn straight_outlines_run_on_behind_a_bar() {
-    let mut directional = Directional::new(WIDTH, HEIGHT);
+    let mut directional = DirectionalInpainting::new(WIDTH, HEIGHT);
     let mut workers = ThreadPool::new("fill", 2);
     for degrees in (0..180).step_by(15) {
         let (sin, cos) = f32::to_radians(degrees as f32).sin_cos();
@@ -68,7 +68,7 @@ fn straight_outlines_run_on_behind_a_bar() {
 #[test]
 fn what_is_known_stays_and_so_does_what_sees_no_two_surfaces() {
     let mut workers = ThreadPool::new("fill", 2);
-    let mut directional = Directional::new(WIDTH, HEIGHT);
+    let mut directional = DirectionalInpainting::new(WIDTH, HEIGHT);
     let hidden = |x: usize, y: usize| (40..44).contains(&x) && y < 20;
     let mut seen = level(|x, _| x < 42, hidden);
     directional.fill(&mut seen, &everywhere(), &mut workers, Arch::new());

@@ -20,15 +20,15 @@ use crate::layout::Layout;
 
 /// Decodes JPEGs; keeps the buffer for the repaired file.
 #[derive(Debug, Default)]
-pub(super) struct Jpeg {
+pub(super) struct MotionJpeg {
     file: Vec<u8>,
 }
 
-impl Jpeg {
+impl MotionJpeg {
     /// Decodes the JPEG in `bytes` into `out` (resized to fit), if it is complete and of the layout's size.
     pub(super) fn decode(&mut self, layout: &Layout, bytes: &[u8], out: &mut ColorImage) -> Result<(), PixelError> {
         let expected = (layout.width as usize, layout.height as usize);
-        let found = repair::repair(bytes, &mut self.file).map_err(|fault| PixelError::Jpeg(fault.to_string()))?;
+        let found = repair::repair_jpeg(bytes, &mut self.file).map_err(|fault| PixelError::Jpeg(fault.to_string()))?;
         if found != expected {
             return Err(PixelError::Size { found, expected });
         }

@@ -50,12 +50,12 @@ pub(super) enum Fault {
     NoSize,
     #[error("coding 0x{0:02X} is not supported")]
     Coding(u8),
-    #[error("a part of the picture lacks: its restart markers do not count up to the last")]
+    #[error("a part of the picture is missing: its restart markers are not consecutive")]
     Restart,
 }
 
 /// Writes the JPEG in `bytes` to `file`, repaired as above; returns its width and height.
-pub(super) fn repair(bytes: &[u8], file: &mut Vec<u8>) -> Result<(usize, usize), Fault> {
+pub(super) fn repair_jpeg(bytes: &[u8], file: &mut Vec<u8>) -> Result<(usize, usize), Fault> {
     let start = bytes.windows(3).position(|three| three == [0xFF, marker::SOI, 0xFF]).ok_or(Fault::NoStart)?;
     let mut rest = strip_padding(&bytes[start + 2..]);
     file.clear();
@@ -79,7 +79,7 @@ pub(super) fn repair(bytes: &[u8], file: &mut Vec<u8>) -> Result<(usize, usize),
         if code == marker::SOS {
             let frame = frame.as_ref().ok_or(Fault::NoSize)?;
             if !has_huffman_tables {
-                tables::append(file);
+                tables::append_huffman_tables(file);
                 has_huffman_tables = true;
             }
             has_scan = true;

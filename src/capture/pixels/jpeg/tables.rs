@@ -37,7 +37,7 @@ const AC_CHROMA: [u8; 162] = [
 ];
 
 /// Appends the four tables, as one segment with its marker.
-pub(super) fn append(file: &mut Vec<u8>) {
+pub(super) fn append_huffman_tables(file: &mut Vec<u8>) {
     let length: usize = 2 + TABLES.iter().map(|(_, _, values)| 17 + values.len()).sum::<usize>();
     file.extend([0xFF, 0xC4]);
     file.extend((length as u16).to_be_bytes());

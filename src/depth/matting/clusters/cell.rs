@@ -5,10 +5,10 @@
 
 use pulp::Simd;
 
-use super::{CELL_PX, Cluster, FRINGE, Sums, View};
+use super::{CELL_PX, Cluster, FRINGE, FrameView, Sums};
 use crate::compute::simd::load;
 use crate::depth::bits::set_bits;
-use crate::depth::matting::symmetric::outer;
+use crate::depth::matting::symmetric::outer_product;
 use crate::frame::DepthMap;
 
 /// Weight of edge pixels, which may be mixed themselves: so small that they only matter without pure pixels.
@@ -33,10 +33,10 @@ const PLACES: [usize; SAMPLES] = {
     }
     places
 };
-const COLUMNS: Lanes = along(1);
-const ROWS: Lanes = along(CELL_PX);
+const COLUMNS: Lanes = sample_coordinates(1);
+const ROWS: Lanes = sample_coordinates(CELL_PX);
 
-const fn along(step: usize) -> Lanes {
+const fn sample_coordinates(step: usize) -> Lanes {
     let (mut along, mut k) = ([0.0; SAMPLES], 0);
     while k < SAMPLES {
         along[k] = (PLACES[k] / step % CELL_PX) as f32;
@@ -54,20 +54,28 @@ struct Samples {
 impl Samples {
     /// Computes the cluster of the samples with these weights, in a cell whose top left pixel is `corner`.
     #[inline(always)]
-    fn cluster(&self, weight: &Lanes, corner: (usize, usize)) -> Cluster {
+    fn compute_cluster(&self, weight: &Lanes, corner: (usize, usize)) -> Cluster {
         let Self { inverse, light: [r, g, b] } = self;
-        let (own_r, own_g, own_b) = (product(weight, r), product(weight, g), product(weight, b));
-        let light = [total(&own_r), total(&own_g), total(&own_b)];
-        let [rr, rg, rb] = [total(&product(&own_r, r)), total(&product(&own_r, g)), total(&product(&own_r, b))];
-        let [gg, gb, bb] = [total(&product(&own_g, g)), total(&product(&own_g, b)), total(&product(&own_b, b))];
-        let sums = Sums([total(weight), light[0], light[1], light[2], rr, rg, rb, gg, gb, bb, 0.0, 0.0]);
-        let (columns, rows) = (total(&product(weight, &COLUMNS)), total(&product(weight, &ROWS)));
-        Cluster::new(sums, [columns, rows, total(&product(weight, inverse))], corner)
+        let (own_r, own_g, own_b) = (multiply_lanes(weight, r), multiply_lanes(weight, g), multiply_lanes(weight, b));
+        let light = [sum_lanes(&own_r), sum_lanes(&own_g), sum_lanes(&own_b)];
+        let [rr, rg, rb] = [
+            sum_lanes(&multiply_lanes(&own_r, r)),
+            sum_lanes(&multiply_lanes(&own_r, g)),
+            sum_lanes(&multiply_lanes(&own_r, b)),
+        ];
+        let [gg, gb, bb] = [
+            sum_lanes(&multiply_lanes(&own_g, g)),
+            sum_lanes(&multiply_lanes(&own_g, b)),
+            sum_lanes(&multiply_lanes(&own_b, b)),
+        ];
+        let sums = Sums([sum_lanes(weight), light[0], light[1], light[2], rr, rg, rb, gg, gb, bb, 0.0, 0.0]);
+        let (columns, rows) = (sum_lanes(&multiply_lanes(weight, &COLUMNS)), sum_lanes(&multiply_lanes(weight, &ROWS)));
+        Cluster::new(sums, [columns, rows, sum_lanes(&multiply_lanes(weight, inverse))], corner)
     }
 }
 
 #[inline(always)]
-fn product(a: &Lanes, b: &Lanes) -> Lanes {
+fn multiply_lanes(a: &Lanes, b: &Lanes) -> Lanes {
     let mut products = [0.0; SAMPLES];
     for k in 0..SAMPLES {
         products[k] = a[k] * b[k];
@@ -77,7 +85,7 @@ fn product(a: &Lanes, b: &Lanes) -> Lanes {
 
 /// Sums all values, in the same order on every processor.
 #[inline(always)]
-fn total(values: &Lanes) -> f32 {
+fn sum_lanes(values: &Lanes) -> f32 {
     let mut quarters = [0.0; SAMPLES / 4];
     for k in 0..SAMPLES / 4 {
         let (a, b) = (values[k], values[k + SAMPLES / 4]);
@@ -91,8 +99,8 @@ fn total(values: &Lanes) -> f32 {
 /// Computes the clusters of a cell: one if its inverse depths differ by at most `depth_step`, or else those of the
 /// nearest and the farthest surface; and that of the near surface's edge pixels.
 #[inline(always)]
-pub fn split<S: Simd>(simd: S, view: &View, column: usize, row: usize) -> [Cluster; 3] {
-    let View { size: (width, height), depth_step, at_edge, .. } = *view;
+pub fn cluster_cell<S: Simd>(simd: S, view: &FrameView, column: usize, row: usize) -> [Cluster; 3] {
+    let FrameView { size: (width, height), depth_step, at_edge, .. } = *view;
     let corner @ (left, top) = (column * CELL_PX, row * CELL_PX);
     let (across, down) = ((width - left).min(CELL_PX), (height - top).min(CELL_PX));
     // Beyond the picture, the last column and row are replicated.
@@ -111,10 +119,10 @@ pub fn split<S: Simd>(simd: S, view: &View, column: usize, row: usize) -> [Clust
         beyond |= missing << (k * CELL_PX);
     }
     for value in &mut values {
-        *value = DepthMap::inverse_of(*value);
+        *value = DepthMap::inverse_depth(*value);
     }
     // Weights: pixels at or near edges count little, replicated ones nothing.
-    let close = close_to_edge(view, left, top);
+    let close = pixels_near_edges(view, left, top);
     let (mut weights, mut is_edge) = ([0.0; PIXELS], [0.0; PIXELS]);
     for k in 0..PIXELS {
         let is = |bits: u64| bits >> k & 1 != 0;
@@ -124,7 +132,7 @@ pub fn split<S: Simd>(simd: S, view: &View, column: usize, row: usize) -> [Clust
         weights[k] = if is(beyond) { 0.0 } else { weights[k] };
     }
     // One surface or two, by the pure pixels if there are any.
-    let (pure, all) = ends(simd, &values, &is_edge);
+    let (pure, all) = value_ranges(simd, &values, &is_edge);
     let (high, low) = if pure.0 >= pure.1 { pure } else { all };
     let is_one = high - low <= depth_step;
     let tolerance = if is_one { 2.0 * depth_step } else { depth_step };
@@ -145,8 +153,8 @@ pub fn split<S: Simd>(simd: S, view: &View, column: usize, row: usize) -> [Clust
         near[k] = if is_far { 0.0 } else { weight };
         far[k] = if is_far { weight } else { 0.0 };
     }
-    let far = if is_one { Cluster::default() } else { samples.cluster(&far, corner) };
-    let mut clusters = [samples.cluster(&near, corner), far, Cluster::default()];
+    let far = if is_one { Cluster::default() } else { samples.compute_cluster(&far, corner) };
+    let mut clusters = [samples.compute_cluster(&near, corner), far, Cluster::default()];
     if all.0 - all.1 > depth_step {
         let (mut sums, mut of_place) = (Sums::default(), [0.0; 3]);
         for place in set_bits(edges) {
@@ -154,7 +162,7 @@ pub fn split<S: Simd>(simd: S, view: &View, column: usize, row: usize) -> [Clust
             if value > 0.5 * (all.0 + all.1) {
                 let (x, y) = (place % CELL_PX, place / CELL_PX);
                 let light = view.light((top + y) * width + left + x);
-                let ([r, g, b], [rr, rg, rb, gg, gb, bb]) = (light, outer(light));
+                let ([r, g, b], [rr, rg, rb, gg, gb, bb]) = (light, outer_product(light));
                 sums.add(1.0, &Sums([1.0, r, g, b, rr, rg, rb, gg, gb, bb, 0.0, 0.0]));
                 of_place = [of_place[0] + x as f32, of_place[1] + y as f32, of_place[2] + value];
             }
@@ -169,7 +177,7 @@ const ROW: u64 = (1 << CELL_PX) - 1;
 
 /// Returns the largest and the smallest value of those not at an edge, and of all.
 #[inline(always)]
-fn ends<S: Simd>(simd: S, values: &[f32; PIXELS], is_edge: &[f32; PIXELS]) -> ((f32, f32), (f32, f32)) {
+fn value_ranges<S: Simd>(simd: S, values: &[f32; PIXELS], is_edge: &[f32; PIXELS]) -> ((f32, f32), (f32, f32)) {
     let (zero, beyond) = (simd.splat_f32s(0.0), simd.splat_f32s(f32::INFINITY));
     let (mut high, mut low, mut pure_high, mut pure_low) = (zero, beyond, zero, beyond);
     for at in (0..PIXELS).step_by(S::F32_LANES) {
@@ -186,7 +194,7 @@ fn ends<S: Simd>(simd: S, values: &[f32; PIXELS], is_edge: &[f32; PIXELS]) -> ((
 
 /// Returns a bit for each pixel of a cell that is at an edge or within [`CLOSE_PX`] of one.
 #[inline(always)]
-fn close_to_edge(view: &View, left: usize, top: usize) -> u64 {
+fn pixels_near_edges(view: &FrameView, left: usize, top: usize) -> u64 {
     let first = left.saturating_sub(CLOSE_PX);
     let mut rows = [0u64; CELL_PX + 2 * CLOSE_PX];
     for (k, row) in rows.iter_mut().enumerate() {

@@ -1,22 +1,22 @@
 //! GPU buffers for one picture size.
 
-use super::shaders::{BLOCK, CELL, COLORS, COUNTS, ENTRY, Frame, LANES, MAX_BUFFERS, TURNS, Turn, WORD};
+use super::shaders::{BLOCK, CELL, COLORS, COUNTS, ENTRY, Frame, LANES, MAX_BUFFERS, PassRun, RUNS, WORD};
 use crate::compute::GpuError;
-use crate::compute::device::{Device, Readback, UNIFORM_STRIDE, uniform_at};
+use crate::compute::device::{Device, Readback, UNIFORM_STRIDE, uniform_binding};
+use crate::depth::matting::alpha::PRIOR_ROUNDS;
 use crate::depth::matting::clusters::CELL_PX;
-use crate::depth::matting::share::PRIOR_ROUNDS;
 use crate::frame::{Matte, MixedPixel};
 
 /// All buffers of a picture.
 pub struct Buffers {
     pub frame: wgpu::Buffer,
-    turns: wgpu::Buffer,
+    runs: wgpu::Buffer,
     /// Per code, its linear light, and that of a remembered code in each channel.
     pub lights: wgpu::Buffer,
     pub metres: wgpu::Buffer,
     pub rgb: wgpu::Buffer,
     /// The remembered background: sRGB, rounds, and inverse depth.
-    pub known: wgpu::Buffer,
+    pub background: wgpu::Buffer,
     /// Bitmaps with the number of set bits before each word: of edges, and of mixed pixels.
     pub edges: wgpu::Buffer,
     pub marks: wgpu::Buffer,
@@ -66,21 +66,25 @@ impl Buffers {
         let max_entries = max_entries.max(1);
         let cells: usize = cells.iter().map(|&side| side as usize).product();
         // The colours of surfaces are the largest buffer.
-        device.has_room(size, (COLORS * max_entries) as u64, "matted")?;
+        device.check_picture_size(size, (COLORS * max_entries) as u64, "matted")?;
         if device.device.limits().max_storage_buffers_per_shader_stage < MAX_BUFFERS {
-            return Err(GpuError::Failed(format!("{}: a shader may have too few buffers to find mattes", device.name)));
+            return Err(GpuError::Failed(format!(
+                "{}: its limit of buffers per shader is too low for \
+                                                 mattes",
+                device.name
+            )));
         }
-        let buffer = |label, bytes, usage| device.buffer(label, bytes, usage);
+        let buffer = |label, bytes, usage| device.create_buffer(label, bytes, usage);
         let storage = |label, bytes: usize| buffer(label, bytes, Usage::STORAGE | Usage::COPY_DST);
         let uniform = |label, bytes: usize| buffer(label, bytes, Usage::UNIFORM | Usage::COPY_DST);
         let record = size_of::<MixedPixel>();
-        let buffers = device.attempt(|| Self {
+        let buffers = device.with_error_scope(|| Self {
             frame: uniform("matted frame", size_of::<Frame>()),
-            turns: uniform("turns", TURNS * UNIFORM_STRIDE as usize),
+            runs: uniform("turns", RUNS * UNIFORM_STRIDE as usize),
             lights: uniform("lights", 256 * 16),
             metres: storage("refined depth", 4 * pixels),
             rgb: storage("matted rgb", 3 * pixels),
-            known: storage("known behind", known_at(pixels)[2] as usize + 4 * pixels),
+            background: storage("known behind", background_offsets(pixels)[2] as usize + 4 * pixels),
             edges: storage("edges", 8 * words),
             marks: storage("marks", 8 * words),
             counts: storage("matte counts", 4 * (COUNTS + words.div_ceil(BLOCK as usize))),
@@ -93,20 +97,24 @@ impl Buffers {
             mixed: buffer("mixed", record * (1 + max_entries), Usage::STORAGE | Usage::COPY_SRC),
             readback: Readback::new(device, "mixed back", record * (1 + max_entries)),
         })?;
-        for turn in 0..TURNS {
-            device.upload(&buffers.turns, turn as u64 * UNIFORM_STRIDE, bytemuck::bytes_of(&Turn { at: turn as u32 }));
+        for run in 0..RUNS {
+            device.upload(
+                &buffers.runs,
+                run as u64 * UNIFORM_STRIDE,
+                bytemuck::bytes_of(&PassRun { index: run as u32 }),
+            );
         }
         Ok(buffers)
     }
 
     /// Returns the uniform of the given run of a pass.
-    pub fn turn(&self, turn: usize) -> wgpu::BufferBinding<'_> {
-        uniform_at::<Turn>(&self.turns, turn)
+    pub fn run_binding(&self, run: usize) -> wgpu::BufferBinding<'_> {
+        uniform_binding::<PassRun>(&self.runs, run)
     }
 }
 
-/// Returns the byte offsets of the sRGB, the rounds, and the inverse depth in `known`.
-pub fn known_at(pixels: usize) -> [u64; 3] {
+/// Returns the byte offsets of the sRGB, the rounds, and the inverse depth in `background`.
+pub fn background_offsets(pixels: usize) -> [u64; 3] {
     let rounds = (3 * pixels).next_multiple_of(4);
     [0, rounds as u64, (rounds + pixels.next_multiple_of(4)) as u64]
 }

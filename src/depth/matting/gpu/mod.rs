@@ -8,21 +8,21 @@
 
 mod buffers;
 mod passes;
+mod self_test;
 pub mod shaders;
-mod trial;
 
 use std::fmt;
 use std::sync::Arc;
 
-pub use trial::trial;
+pub use self_test::run_self_test;
 
-use buffers::{Buffers, Extent, known_at};
+use buffers::{Buffers, Extent, background_offsets};
 use passes::Passes;
 use shaders::Frame;
 
-use super::Behind;
-use crate::color::light_of_codes;
-use crate::compute::device::{Device, DeviceFrame, Recorder, Stamps};
+use super::KnownBackground;
+use crate::color::srgb_to_linear_table;
+use crate::compute::device::{Device, DeviceFrame, Recorder, Timestamps};
 use crate::compute::{GpuError, PassTimes};
 use crate::frame::{ColorImage, DepthMap, MixedPixel};
 
@@ -32,7 +32,7 @@ pub struct GpuMatting {
     /// In the shaders' layout: per code its linear light, and that of a remembered code in each channel.
     lights: Box<[[f32; 4]; 256]>,
     /// Resources for the last picture size.
-    work: Option<Work>,
+    resources: Option<Resources>,
 }
 
 impl fmt::Debug for GpuMatting {
@@ -42,7 +42,7 @@ impl fmt::Debug for GpuMatting {
 }
 
 /// GPU resources for one picture size.
-struct Work {
+struct Resources {
     size: (u32, u32),
     buffers: Buffers,
     passes: Passes,
@@ -50,85 +50,101 @@ struct Work {
     revision: Option<u64>,
     /// Number of mixed pixels to read back at once: somewhat more than in the last frame.
     expected: usize,
-    stamps: Option<Stamps>,
+    timestamps: Option<Timestamps>,
 }
 
 /// Upper bound of the passes per frame.
 const MAX_PASSES: usize = 64;
 
 impl GpuMatting {
-    /// Creates it for a device, without a trial.
+    /// Creates it for a device, without a self-test.
     pub fn new(device: &Arc<Device>) -> Self {
-        let of_codes = light_of_codes();
+        let of_codes = srgb_to_linear_table();
         let lights = Box::new(std::array::from_fn(|code| [of_codes[code], 0.0, 0.0, 0.0]));
-        Self { device: Arc::clone(device), lights, work: None }
+        Self { device: Arc::clone(device), lights, resources: None }
     }
 
     /// Returns the time of each pass over the last frame; empty if the device has no timestamps.
     pub fn pass_times(&self) -> PassTimes {
-        self.work.as_ref().and_then(|work| work.stamps.as_ref()).map(Stamps::last).unwrap_or_default()
+        self.resources
+            .as_ref()
+            .and_then(|resources| resources.timestamps.as_ref())
+            .map(Timestamps::last_times)
+            .unwrap_or_default()
     }
 
-    /// Finds the mixed pixels of a map as large as its picture, as [`super::Matting::find_before`] does. `on_device`
-    /// has the map and the picture already; they are uploaded if it is on another device. Returns the number of edge
-    /// pixels; if that exceeds [`Matte::most`], none were evaluated.
+    /// Finds the mixed pixels of a map as large as its picture, as [`super::Matting::find_with_background`] does.
+    /// `device_frame` has the map and the picture already; they are uploaded if it is on another device. Returns the number
+    /// of edge pixels; if that exceeds [`Matte::most`], none were evaluated.
     ///
     /// # Errors
     /// The device failed or has too little memory; the map then has no mixed pixels.
-    pub fn find(
+    pub fn find_mixed_pixels(
         &mut self,
         (map, color): (&mut DepthMap, &ColorImage),
-        on_device: Option<DeviceFrame>,
+        device_frame: Option<DeviceFrame>,
         depth_step: f32,
-        behind: Option<&Behind>,
+        background: Option<&KnownBackground>,
     ) -> Result<usize, GpuError> {
-        let Self { device, lights, work } = self;
+        let Self { device, lights, resources } = self;
         device.check()?;
-        if work.as_ref().is_none_or(|work| work.size != map.size()) {
+        if resources.as_ref().is_none_or(|resources| resources.size != map.size()) {
             // Free the old buffers before allocating the new ones.
-            *work = None;
-            *work = Some(Work::new(device, map.size())?);
+            *resources = None;
+            *resources = Some(Resources::new(device, map.size())?);
         }
-        let Some(work) = work else { return Ok(0) };
-        if let Some(behind) = behind {
+        let Some(resources) = resources else { return Ok(0) };
+        if let Some(background) = background {
             for (code, lights) in lights.iter_mut().enumerate() {
-                (0..3).for_each(|p| lights[1 + p] = behind.light[p][code]);
+                (0..3).for_each(|p| lights[1 + p] = background.light[p][code]);
             }
         }
-        device.upload(&work.buffers.lights, 0, bytemuck::cast_slice(&**lights));
-        work.find(device, (map, color, on_device.filter(|frame| frame.is_on(device))), depth_step, behind)
+        device.upload(&resources.buffers.lights, 0, bytemuck::cast_slice(&**lights));
+        resources.find_mixed_pixels(
+            device,
+            (map, color, device_frame.filter(|frame| frame.is_on(device))),
+            depth_step,
+            background,
+        )
     }
 }
 
-impl Work {
+impl Resources {
     fn new(device: &Arc<Device>, size: (u32, u32)) -> Result<Self, GpuError> {
         let buffers = Buffers::new(device, size)?;
         let passes = Passes::new(device, size, &buffers);
-        let stamps = Stamps::new(device, MAX_PASSES);
-        Ok(Self { size, buffers, passes, revision: None, expected: 0, stamps })
+        let timestamps = Timestamps::new(device, MAX_PASSES);
+        Ok(Self { size, buffers, passes, revision: None, expected: 0, timestamps })
     }
 
-    fn find(
+    fn find_mixed_pixels(
         &mut self,
         device: &Device,
-        (map, color, on_device): (&mut DepthMap, &ColorImage, Option<DeviceFrame>),
+        (map, color, device_frame): (&mut DepthMap, &ColorImage, Option<DeviceFrame>),
         depth_step: f32,
-        behind: Option<&Behind>,
+        background: Option<&KnownBackground>,
     ) -> Result<usize, GpuError> {
-        let (b, Extent { pixels, max_entries: most, .. }) = (&self.buffers, Extent::new(self.size));
-        let (known, other) = behind.map_or((0, 0.0), |behind| (behind.known.into(), behind.other));
-        let frame = Frame { size: [self.size.0, self.size.1], most: most as u32, known, jump: depth_step, other };
+        let (b, Extent { pixels, max_entries, .. }) = (&self.buffers, Extent::new(self.size));
+        let (min_rounds, surface_step) =
+            background.map_or((0, 0.0), |background| (background.min_rounds.into(), background.surface_step));
+        let frame = Frame {
+            size: [self.size.0, self.size.1],
+            max_entries: max_entries as u32,
+            min_rounds,
+            depth_step,
+            surface_step,
+        };
         device.upload(&b.frame, 0, bytemuck::bytes_of(&frame));
-        if let Some(behind) = behind.filter(|behind| self.revision != Some(behind.revision)) {
-            let [rgb, rounds, inverse] = known_at(pixels);
-            device.upload(&b.known, rgb, behind.rgb);
-            device.upload(&b.known, rounds, behind.rounds);
-            device.upload(&b.known, inverse, bytemuck::cast_slice(behind.inverse));
-            self.revision = Some(behind.revision);
+        if let Some(background) = background.filter(|background| self.revision != Some(background.revision)) {
+            let [rgb, rounds, inverse] = background_offsets(pixels);
+            device.upload(&b.background, rgb, background.rgb);
+            device.upload(&b.background, rounds, background.rounds);
+            device.upload(&b.background, inverse, bytemuck::cast_slice(background.inverse));
+            self.revision = Some(background.revision);
         }
-        let mut recorder = Recorder::new(device, self.stamps.as_mut());
+        let mut recorder = Recorder::new(device, self.timestamps.as_mut());
         let is_whole = |frame: &DeviceFrame| (frame.metres.size(), frame.rgb.size()) == (b.metres.size(), b.rgb.size());
-        if let Some(frame) = on_device.filter(is_whole) {
+        if let Some(frame) = device_frame.filter(is_whole) {
             for (from, to) in [(&frame.metres, &b.metres), (&frame.rgb, &b.rgb)] {
                 recorder.encoder.copy_buffer_to_buffer(from, 0, to, 0, to.size());
             }
@@ -140,9 +156,10 @@ impl Work {
             .iter()
             .for_each(|buffer| recorder.encoder.clear_buffer(buffer, 0, None));
         self.passes.record(&mut recorder);
-        let [found, edges] = fetch(&mut self.buffers, device, recorder, map, self.expected.min(most))?;
+        let [found, edges] =
+            read_mixed_pixels(&mut self.buffers, device, recorder, map, self.expected.min(max_entries))?;
         if found > map.matte.pixels.len() {
-            fetch(&mut self.buffers, device, Recorder::new(device, None), map, found)?;
+            read_mixed_pixels(&mut self.buffers, device, Recorder::new(device, None), map, found)?;
         }
         self.expected = found + found / 4 + 256;
         Ok(edges)
@@ -151,7 +168,7 @@ impl Work {
 
 /// Runs the recorded passes and reads back at most `most` mixed pixels. Returns the numbers of mixed and of edge
 /// pixels.
-fn fetch(
+fn read_mixed_pixels(
     b: &mut Buffers,
     device: &Device,
     recorder: Recorder,
@@ -159,7 +176,7 @@ fn fetch(
     most: usize,
 ) -> Result<[usize; 2], GpuError> {
     const EACH: usize = size_of::<MixedPixel>();
-    recorder.fetch(device, &mut b.readback, (&b.mixed, ((1 + most) * EACH) as u64), |bytes| {
+    recorder.submit_and_read(device, &mut b.readback, (&b.mixed, ((1 + most) * EACH) as u64), |bytes| {
         // The first record has the counts.
         let (head, bytes) = bytes.split_at(EACH);
         let [found, edges] =

@@ -2,42 +2,43 @@
 
 use bytemuck::{Pod, Zeroable};
 
+use super::super::alpha::{MIN_LIKELIHOOD, MIN_OFF_LINE, OUTLIER, PRIOR, PRIOR_MAX, PRIOR_MIN, PRIOR_ROUNDS, STEPS};
 use super::super::clusters::{
-    AT_EDGE_WEIGHT, CELL_PX, CLOSE_PX, CLOSE_WEIGHT, FRINGE_ALPHA, FRINGE_ALPHAS, FRINGE_PIXELS, HALF_PX, RADII_CELLS,
+    AT_EDGE_WEIGHT, CELL_PX, CLOSE_PX, CLOSE_WEIGHT, FALLOFF_PX, FRINGE_ALPHA, FRINGE_ALPHAS, FRINGE_PIXELS,
+    RADII_CELLS,
 };
 use super::super::contrast::{MAX_DEVIATION, MAX_PRECISION, QUANTISATION, SHRINKAGE};
-use super::super::share::{MIN_LIKELIHOOD, MIN_OFF_LINE, OUTLIER, PRIOR, PRIOR_MAX, PRIOR_MIN, PRIOR_ROUNDS, STEPS};
-use super::super::trace::TRACED_FROM;
+use super::super::trace::MIN_TRACED_ALPHA;
 use super::super::{MAX_STEPS, NEARLY_PURE};
 use crate::compute::device::{Shader, shader};
 use crate::frame::DepthMap;
 
 /// Edge detection, and the number of set bits before each word and each block of words.
-pub const SURVEY: Shader = shader!("matte_common"; "matte_survey");
+pub const FIND_EDGES: Shader = shader!("matte_common"; "matte_find_edges");
 pub const COUNT: Shader = shader!("matte_common"; "matte_count", "matte_sum");
 pub const TOTAL: Shader = shader!("matte_common"; "matte_total", "matte_sum");
 /// The colours of surfaces.
 pub const CLUSTERS: Shader = shader!("matte_common"; "matte_clusters", "matte_light");
 /// The pixels at edges, their likelihoods, and alpha.
 pub const EDGES: Shader = shader!(
-    "matte_common"; "matte_edges", "matte_light", "matte_behind", "matte_contrast", "matte_surfaces", "matte_compare",
+    "matte_common"; "matte_edges", "matte_light", "matte_background", "matte_contrast", "matte_surfaces", "matte_compare",
     "matte_enter"
 );
-pub const EXPECT: Shader = shader!("matte_common"; "matte_expect", "matte_turn", "matte_prior", "matte_weights");
+pub const EXPECT: Shader = shader!("matte_common"; "matte_expect", "matte_run", "matte_prior", "matte_weights");
 pub const WEIGH: Shader = shader!("matte_common"; "matte_weigh", "matte_prior", "matte_weights", "matte_claim");
 /// Traces thin structures beyond the edges of the map, and discards wide regions.
 pub const TRACE: Shader = shader!(
-    "matte_common"; "matte_trace", "matte_turn", "matte_light", "matte_behind", "matte_contrast", "matte_surfaces",
+    "matte_common"; "matte_trace", "matte_run", "matte_light", "matte_background", "matte_contrast", "matte_surfaces",
     "matte_compare", "matte_enter", "matte_prior", "matte_weights", "matte_claim"
 );
-pub const SPREAD: Shader = shader!("matte_common"; "matte_wide", "matte_turn");
+pub const SPREAD: Shader = shader!("matte_common"; "matte_wide", "matte_run");
 /// The mixed pixels and their colours.
 pub const MARK: Shader = shader!("matte_common"; "matte_mark");
-pub const MIX: Shader = shader!("matte_common"; "matte_mix", "matte_light", "matte_behind", "matte_contrast");
+pub const MIX: Shader = shader!("matte_common"; "matte_mix", "matte_light", "matte_background", "matte_contrast");
 
-pub const ALL: [Shader; 11] = [SURVEY, COUNT, TOTAL, CLUSTERS, EDGES, EXPECT, WEIGH, TRACE, SPREAD, MARK, MIX];
+pub const ALL: [Shader; 11] = [FIND_EDGES, COUNT, TOTAL, CLUSTERS, EDGES, EXPECT, WEIGH, TRACE, SPREAD, MARK, MIX];
 
-/// Pixels in a word of bits, rows of a workgroup of `matte_survey`, and words in a block.
+/// Pixels in a word of bits, rows of a workgroup of `matte_find_edges`, and words in a block.
 pub const WORD: u32 = 32;
 pub const ROWS: u32 = 8;
 pub const BLOCK: u32 = 256;
@@ -46,11 +47,11 @@ pub const LANES: u32 = 64;
 /// Length of `counts` before the blocks' counts.
 pub const COUNTS: usize = 64;
 /// Maximum number of runs of a pass, plus one.
-pub const TURNS: usize = MAX_STEPS + 1;
+pub const RUNS: usize = MAX_STEPS + 1;
 /// Maximum number of storage buffers of a pass.
 pub const MAX_BUFFERS: u32 = 10;
 /// Returns the number of workgroups that loop over `count` entries or cells: no more than any device runs at once.
-pub fn turns(count: usize) -> u32 {
+pub fn workgroup_count(count: usize) -> u32 {
     count.clamp(1, 512) as u32
 }
 
@@ -68,7 +69,7 @@ pub fn constants(again: bool) -> [(&'static str, f64); 31] {
         ("RADIUS", RADII_CELLS[0] as f64),
         ("RADIUS_FURTHER", RADII_CELLS[1] as f64),
         ("RADIUS_FARTHEST", RADII_CELLS[2] as f64),
-        ("HALF_PX", HALF_PX.into()),
+        ("FALLOFF_PX", FALLOFF_PX.into()),
         ("FRINGE_FEW", FRINGE_PIXELS[0].into()),
         ("FRINGE_ENOUGH", FRINGE_PIXELS[1].into()),
         ("FRINGE_ALPHA", FRINGE_ALPHA.into()),
@@ -89,7 +90,7 @@ pub fn constants(again: bool) -> [(&'static str, f64); 31] {
         ("PRIOR_ROUNDS", PRIOR_ROUNDS as f64),
         ("TINY", f32::MIN_POSITIVE.into()),
         ("NEARLY_PURE", NEARLY_PURE.into()),
-        ("TRACED_FROM", TRACED_FROM.into()),
+        ("MIN_TRACED_ALPHA", MIN_TRACED_ALPHA.into()),
         ("STEPS_TRACED", MAX_STEPS as f64),
     ]
 }
@@ -100,18 +101,18 @@ pub fn constants(again: bool) -> [(&'static str, f64); 31] {
 #[allow(missing_docs)]
 pub struct Frame {
     pub size: [u32; 2],
-    pub most: u32,
-    pub known: u32,
-    pub jump: f32,
-    pub other: f32,
+    pub max_entries: u32,
+    pub min_rounds: u32,
+    pub depth_step: f32,
+    pub surface_step: f32,
 }
 
-/// Mirrors `Turn` of `matte_turn.wgsl`, which documents its field.
+/// Mirrors `PassRun` of `matte_run.wgsl`, which documents its field.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[allow(missing_docs)]
-pub struct Turn {
-    pub at: u32,
+pub struct PassRun {
+    pub index: u32,
 }
 
 /// Bytes of an `Entry`, a `Cell` and two `Color`s of the shaders.

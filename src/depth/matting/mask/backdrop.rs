@@ -16,7 +16,7 @@ pub struct BackgroundPlate<'a> {
 impl BackgroundPlate<'_> {
     /// Returns a function from the column to the background light in a row; the border is replicated.
     #[inline(always)]
-    pub fn row(&self, y: usize) -> impl Fn(usize) -> [f32; 3] {
+    pub fn light_in_row(&self, y: usize) -> impl Fn(usize) -> [f32; 3] {
         let place = |at: usize, shift: isize, count: usize| at.saturating_add_signed(-shift).min(count - 1);
         let (width, height) = (self.color.width as usize, self.color.height as usize);
         let row = &self.color.rgb[3 * width * place(y, self.shift_px[1], height)..][..3 * width];

@@ -5,7 +5,7 @@ use std::ops::Range;
 use super::BackgroundPlate;
 use crate::depth::matting::clusters::Color;
 use crate::depth::matting::contrast::Contrast;
-use crate::depth::matting::symmetric::{Symmetric, outer};
+use crate::depth::matting::symmetric::{Symmetric, outer_product};
 use crate::depth::tap::Tap;
 use crate::frame::{ColorImage, Mask};
 
@@ -47,28 +47,28 @@ impl Sums {
     #[inline(always)]
     fn add(&mut self, surface: usize, light: [f32; 3]) {
         let sums = &mut self.0[surface * SURFACE..][..SURFACE];
-        let [xx, xy, xz, yy, yz, zz] = outer(light);
+        let [xx, xy, xz, yy, yz, zz] = outer_product(light);
         let values = [1.0, light[0], light[1], light[2], xx, xy, xz, yy, yz, zz, 0.0, 0.0];
         sums.iter_mut().zip(values).for_each(|(sum, value)| *sum += value);
     }
 
     #[inline(always)]
-    fn add_all(&mut self, other: &Self, weight: f32) {
+    fn add_weighted(&mut self, other: &Self, weight: f32) {
         self.0.iter_mut().zip(&other.0).for_each(|(sum, value)| *sum += weight * value);
     }
 
-    /// Returns both surfaces' colours; `None` if one has too few pixels. With a known background (`behind`), the far
-    /// colour is just its noise.
-    fn colors(&self, behind: bool) -> Option<[Color; 2]> {
+    /// Returns both surfaces' colours; `None` if one has too few pixels. With a known background, the far colour is just its
+    /// noise.
+    fn colors(&self, is_background_known: bool) -> Option<[Color; 2]> {
         let noise = Color { mean: [0.0; 3], covariance: [NOISE, 0.0, 0.0, NOISE, 0.0, NOISE] };
         let weights = [self.0[0], self.0[SURFACE]];
         let color = |k: usize| {
             let sums = &self.0[k * SURFACE + 1..];
             let squares: Symmetric = std::array::from_fn(|k| sums[3 + k]);
-            Color::of_sums(weights[k], std::array::from_fn(|k| sums[k]), squares)
+            Color::from_sums(weights[k], std::array::from_fn(|k| sums[k]), squares)
         };
         match weights.map(|weight| weight > MIN_WEIGHT) {
-            [true, _] if behind => Some([color(NEAR), noise]),
+            [true, _] if is_background_known => Some([color(NEAR), noise]),
             [true, true] => Some([color(NEAR), color(FAR)]),
             _ => None,
         }
@@ -76,7 +76,7 @@ impl Sums {
 }
 
 /// The input of matting, and the layout of its cells.
-pub struct View<'a> {
+pub struct MaskView<'a> {
     pub mask: &'a Mask,
     pub color: &'a ColorImage,
     pub light: &'a [f32; 256],
@@ -88,16 +88,16 @@ pub struct View<'a> {
     pub down: usize,
 }
 
-impl View<'_> {
+impl MaskView<'_> {
     /// Returns the pixel columns of a column of cells.
     #[inline(always)]
-    pub fn columns_of(&self, column: usize) -> Range<usize> {
+    pub fn pixel_columns(&self, column: usize) -> Range<usize> {
         column * self.cell_px..((column + 1) * self.cell_px).min(self.color.width as usize)
     }
 
     /// Returns the pixel rows of a row of cells.
     #[inline(always)]
-    pub fn rows_of(&self, row: usize) -> Range<usize> {
+    pub fn pixel_rows(&self, row: usize) -> Range<usize> {
         row * self.cell_px..((row + 1) * self.cell_px).min(self.color.height as usize)
     }
 
@@ -109,22 +109,22 @@ impl View<'_> {
 
     /// Returns a function from the column to the mask value in a row of pixels, bilinearly interpolated.
     #[inline(always)]
-    pub fn mask_row(&self, y: usize) -> impl Fn(usize) -> f32 {
+    pub fn mask_in_row(&self, y: usize) -> impl Fn(usize) -> f32 {
         let width = self.mask.width as usize;
-        let Tap { first, second, weight: share } = Tap::new(y, self.color.height as usize, self.mask.height as usize);
+        let Tap { first, second, weight } = Tap::new(y, self.color.height as usize, self.mask.height as usize);
         let row = |row: usize| &self.mask.alpha[row * width..][..width];
         let (above, below, columns) = (row(first), row(second), self.columns);
         move |x| {
             let across = &columns[x];
             let between = |row: &[f32]| row[across.first] + (row[across.second] - row[across.first]) * across.weight;
             let above = between(above);
-            above + (between(below) - above) * share
+            above + (between(below) - above) * weight
         }
     }
 
     /// Computes the trimap label of each cell. `ends` is scratch memory.
     #[inline(always)]
-    pub fn classify(&self, cells: &mut Vec<Cell>, ends: &mut Vec<[f32; 2]>) {
+    pub fn classify_cells(&self, cells: &mut Vec<Cell>, ends: &mut Vec<[f32; 2]>) {
         let (across, down, mask) = (self.across, self.down, self.mask);
         let range = |of: usize, count: usize, side: usize| {
             // The mask pixels of a cell plus one on each side: the unknown region is up to a cell wider than necessary.
@@ -157,7 +157,7 @@ impl View<'_> {
 
     /// Gathers the colours of the cells in the unknown region, and within [`RADIUS`] of it.
     #[inline(always)]
-    pub fn gather(&self, cells: &[Cell], needed: &mut Vec<bool>, sums: &mut Vec<Sums>) {
+    pub fn gather_colors(&self, cells: &[Cell], needed: &mut Vec<bool>, sums: &mut Vec<Sums>) {
         let (across, down) = (self.across, self.down);
         sums.clear();
         sums.resize(across * down, Sums::NONE);
@@ -172,12 +172,12 @@ impl View<'_> {
             }
         }
         for row in 0..down {
-            for y in self.rows_of(row) {
-                let (alpha_at, first) = (self.mask_row(y), y * self.color.width as usize);
+            for y in self.pixel_rows(row) {
+                let (alpha_at, first) = (self.mask_in_row(y), y * self.color.width as usize);
                 for column in (0..across).filter(|column| needed[row * across + column]) {
                     let (sums, cell) = (&mut sums[row * across + column], cells[row * across + column]);
                     // Every other pixel suffices.
-                    for x in self.columns_of(column).filter(|x| (x + y) % 2 == 0) {
+                    for x in self.pixel_columns(column).filter(|x| (x + y) % 2 == 0) {
                         match cell {
                             Cell::Near => sums.add(NEAR, self.light_at(first + x)),
                             Cell::Far => sums.add(FAR, self.light_at(first + x)),
@@ -195,12 +195,12 @@ impl View<'_> {
 
     /// Computes the colour contrast around a cell; `None` if a surface has too few pixels.
     #[inline(always)]
-    pub fn contrast(&self, kernel: &Kernel, sums: &[Sums], (row, column): (usize, usize)) -> Option<Contrast> {
+    pub fn compute_contrast(&self, kernel: &Kernel, sums: &[Sums], (row, column): (usize, usize)) -> Option<Contrast> {
         let mut around = Sums::NONE;
         for other_row in row.saturating_sub(RADIUS)..(row + RADIUS + 1).min(self.down) {
             let weights = &kernel[other_row + RADIUS - row];
             for other in column.saturating_sub(RADIUS)..(column + RADIUS + 1).min(self.across) {
-                around.add_all(&sums[other_row * self.across + other], weights[other + RADIUS - column]);
+                around.add_weighted(&sums[other_row * self.across + other], weights[other + RADIUS - column]);
             }
         }
         around.colors(self.backdrop.is_some()).map(Contrast::new)

@@ -12,21 +12,21 @@ use std::ops::Range;
 
 pub use backdrop::BackgroundPlate;
 
-use crate::color::light_of_codes;
+use crate::color::srgb_to_linear_table;
 use crate::depth::tap::Tap;
 use crate::frame::{ColorImage, DepthMap, Mask, Matte, MixedPixel};
 
 use super::NEARLY_PURE;
 use super::clusters::Color;
-use super::contrast::{Contrast, Discriminant, difference};
-use cells::{Cell, Kernel, RADIUS, Sums, View};
+use super::contrast::{Contrast, Discriminant, color_difference};
+use cells::{Cell, Kernel, MaskView, RADIUS, Sums};
 use posterior::Posterior;
 
 /// Side of a cell in mask pixels, and its minimum in picture pixels.
 const CELL_OF_MASK: f32 = 1.6;
 const MIN_CELL_PX: usize = 4;
 /// Distance, in cells, at which the weight of a cell falls to an eighth.
-const HALF_CELLS: f32 = 1.5;
+const FALLOFF_CELLS: f32 = 1.5;
 /// Minimum of mask and alpha for a seed of the near surface, and minimum alpha of pixels connected to one.
 const NEAR_FROM: f32 = 0.6;
 const CONNECTED_FROM: f32 = 0.15;
@@ -53,10 +53,10 @@ pub struct MaskMatting {
 }
 
 /// Returns a depth map in which `mask` is the subject, and all else is far.
-pub fn depth_around(mask: &Mask, color: &ColorImage) -> DepthMap {
+pub fn depth_from_mask(mask: &Mask, color: &ColorImage) -> DepthMap {
     let mut map = DepthMap { subject_m: Some(DepthMap::SUBJECT_M), ..DepthMap::new(color.width, color.height) };
     map.metres.fill(DepthMap::FAR_M);
-    MaskMatting::default().find(mask, color, None, &mut map);
+    MaskMatting::default().compute_matte(mask, color, None, &mut map);
     map
 }
 
@@ -64,10 +64,10 @@ impl Default for MaskMatting {
     fn default() -> Self {
         let weight = |row: usize, column: usize| {
             let square = (row.abs_diff(RADIUS).pow(2) + column.abs_diff(RADIUS).pow(2)) as f32;
-            (1.0 + square / (HALF_CELLS * HALF_CELLS)).powi(-3)
+            (1.0 + square / (FALLOFF_CELLS * FALLOFF_CELLS)).powi(-3)
         };
         Self {
-            light: light_of_codes(),
+            light: srgb_to_linear_table(),
             posterior: Posterior::new(),
             kernel: std::array::from_fn(|row| std::array::from_fn(|column| weight(row, column))),
             cells: Vec::new(),
@@ -87,19 +87,25 @@ impl MaskMatting {
     /// mixed pixels between both. On entry, `map` is as large as its picture, and has the distance of the background
     /// everywhere. With a known background (`backdrop`), covered pixels near the outline become mixed pixels, too, with
     /// all of the background behind them.
-    pub fn find(&mut self, mask: &Mask, color: &ColorImage, backdrop: Option<&BackgroundPlate>, map: &mut DepthMap) {
+    pub fn compute_matte(
+        &mut self,
+        mask: &Mask,
+        color: &ColorImage,
+        backdrop: Option<&BackgroundPlate>,
+        map: &mut DepthMap,
+    ) {
         map.matte.pixels.clear();
         let (width, height) = (color.width as usize, color.height as usize);
         let backdrop = backdrop.filter(|backdrop| backdrop.color.size() == color.size());
         if map.size() != color.size() || mask.alpha.is_empty() || width * height == 0 {
             return;
         }
-        pulp::Arch::new().dispatch(Finding { matting: self, mask, color, backdrop, map });
+        pulp::Arch::new().dispatch(ComputeMatte { matting: self, mask, color, backdrop, map });
     }
 }
 
-/// Arguments of [`MaskMatting::find`].
-struct Finding<'a> {
+/// Arguments of [`MaskMatting::compute_matte`].
+struct ComputeMatte<'a> {
     matting: &'a mut MaskMatting,
     mask: &'a Mask,
     color: &'a ColorImage,
@@ -107,7 +113,7 @@ struct Finding<'a> {
     map: &'a mut DepthMap,
 }
 
-impl pulp::WithSimd for Finding<'_> {
+impl pulp::WithSimd for ComputeMatte<'_> {
     type Output = ();
     // No explicit vectors: the dispatch compiles these loops for the processor's instruction set.
     #[inline(always)]
@@ -120,14 +126,14 @@ impl pulp::WithSimd for Finding<'_> {
         let (across, down) = (width.div_ceil(cell_px), height.div_ceil(cell_px));
         let MaskMatting { light, posterior, kernel, cells, ends, needed, sums, contrasts, alphas, front, columns } =
             matting;
-        let view = View { mask, color, light, backdrop, columns, cell_px, across, down };
-        view.classify(cells, ends);
-        view.gather(cells, needed, sums);
+        let view = MaskView { mask, color, light, backdrop, columns, cell_px, across, down };
+        view.classify_cells(cells, ends);
+        view.gather_colors(cells, needed, sums);
         contrasts.clear();
         for at in 0..across * down {
             let is_beside = || cells[at] == Cell::Band || view.cells_within(at, 1).any(|at| cells[at] == Cell::Band);
             let place = (at / across, at % across);
-            contrasts.push(if needed[at] && is_beside() { view.contrast(kernel, sums, place) } else { None });
+            contrasts.push(if needed[at] && is_beside() { view.compute_contrast(kernel, sums, place) } else { None });
         }
         alphas.resize(width * height, 0.0);
         front.clear();
@@ -137,9 +143,9 @@ impl pulp::WithSimd for Finding<'_> {
         view.connect_to_seeds(cells, alphas, front);
         // In raster order, which is that of the matte's pixels.
         for row in 0..down {
-            for y in view.rows_of(row) {
+            for y in view.pixel_rows(row) {
                 for column in 0..across {
-                    let (cell, xs) = (row * across + column, view.columns_of(column));
+                    let (cell, xs) = (row * across + column, view.pixel_columns(column));
                     match cells[cell] {
                         Cell::Far => {}
                         Cell::Near => {
@@ -160,7 +166,7 @@ impl pulp::WithSimd for Finding<'_> {
     }
 }
 
-impl View<'_> {
+impl MaskView<'_> {
     /// Computes alpha of a cell's pixels; adds the seeds of the near surface to `front`.
     #[inline(always)]
     fn compute_alphas(
@@ -172,15 +178,15 @@ impl View<'_> {
         front: &mut Vec<u32>,
     ) {
         let at = |(row, column): (usize, usize)| contrasts[row * self.across + column].as_ref();
-        for y in self.rows_of(row) {
-            let (mask_at, down) = (self.mask_row(y), self.cells_around(y, self.down));
-            let behind = self.backdrop.map(|backdrop| backdrop.row(y));
-            let xs = self.columns_of(column);
+        for y in self.pixel_rows(row) {
+            let (mask_at, down) = (self.mask_in_row(y), self.enclosing_cells(y, self.down));
+            let background_at = self.backdrop.map(|backdrop| backdrop.light_in_row(y));
+            let xs = self.pixel_columns(column);
             let middle = (xs.start + self.cell_px / 2).min(xs.end);
             for xs in [xs.start..middle, middle..xs.end] {
                 // All pixels of this half cell are between the same four cell centres.
                 let Some(first) = xs.clone().next() else { continue };
-                let across = self.cells_around(first, self.across);
+                let across = self.enclosing_cells(first, self.across);
                 let corners = [
                     (down.first, across.first),
                     (down.second, across.first),
@@ -192,23 +198,28 @@ impl View<'_> {
                 // closer it is.
                 let any = at((row, column)).or_else(|| corners.into_iter().flatten().next());
                 // Only one of both is used, depending on whether the background is known.
-                let (unknown, known) = (any.filter(|_| behind.is_none()), any.filter(|_| behind.is_some()));
-                let line_of = |any: &Contrast, corner: Option<&Contrast>| match (corner.map(Contrast::line), any.line())
-                {
+                let (unknown, known) =
+                    (any.filter(|_| background_at.is_none()), any.filter(|_| background_at.is_some()));
+                let line_of = |any: &Contrast, corner: Option<&Contrast>| match (
+                    corner.map(Contrast::discriminant_params),
+                    any.discriminant_params(),
+                ) {
                     (Some(line), _) => line,
                     (None, [x, y, z, offset, _]) => [x, y, z, offset, 0.0],
                 };
                 let lines = unknown.map(|any| Sides::new(corners.map(|corner| line_of(any, corner)), down.weight));
-                let front_of = |any, corner: Option<&Contrast>| corner.unwrap_or(any).front();
+                let front_of = |any, corner: Option<&Contrast>| corner.unwrap_or(any).foreground_params();
                 let fronts = known.map(|any| Sides::new(corners.map(|corner| front_of(any, corner)), down.weight));
                 for x in xs {
                     let place = y * self.color.width as usize + x;
                     let (mask, light) = (mask_at(x), self.light_at(place));
-                    let along = self.cells_around(x, self.across).weight;
+                    let along = self.enclosing_cells(x, self.across).weight;
                     // With a known background, each pixel has its own discriminant.
-                    let discriminant: Option<Discriminant> = match (&behind, &lines, &fronts) {
-                        (None, Some(lines), _) => Some(lines.between(along).into()),
-                        (Some(behind), _, Some(fronts)) => Some(Discriminant::before(fronts.between(along), behind(x))),
+                    let discriminant: Option<Discriminant> = match (&background_at, &lines, &fronts) {
+                        (None, Some(lines), _) => Some(lines.interpolate(along).into()),
+                        (Some(background_at), _, Some(fronts)) => {
+                            Some(Discriminant::against_background(fronts.interpolate(along), background_at(x)))
+                        }
                         _ => None,
                     };
                     let alpha = match discriminant {
@@ -228,20 +239,22 @@ impl View<'_> {
     /// Returns both surfaces' colours at a pixel, bilinear between the cells around that have any; a known background
     /// `light` replaces the far one's mean.
     #[inline(always)]
-    fn surfaces_at(
+    fn interpolate_surfaces(
         &self,
         contrasts: &[Option<Contrast>],
         (x, y): (usize, usize),
         light: Option<[f32; 3]>,
     ) -> Option<[Color; 2]> {
-        let (across, down) = (self.cells_around(x, self.across), self.cells_around(y, self.down));
+        let (across, down) = (self.enclosing_cells(x, self.across), self.enclosing_cells(y, self.down));
         let (mut sum, mut total) = ([Color::default(); 2], 0.0);
         for (row, of_row) in [(down.first, 1.0 - down.weight), (down.second, down.weight)] {
             for (column, of_column) in [(across.first, 1.0 - across.weight), (across.second, across.weight)] {
                 if let Some(contrast) = &contrasts[row * self.across + column] {
                     let weight = of_row * of_column;
                     total += weight;
-                    sum.iter_mut().zip(&contrast.before(light)).for_each(|(sum, color)| sum.add(weight, color));
+                    sum.iter_mut()
+                        .zip(&contrast.colors_with_background(light))
+                        .for_each(|(sum, color)| sum.add(weight, color));
                 }
             }
         }
@@ -250,7 +263,7 @@ impl View<'_> {
 
     /// Returns the two cells, in one direction, whose centres enclose a pixel: interpolation hides the cells.
     #[inline(always)]
-    fn cells_around(&self, at: usize, count: usize) -> Tap {
+    fn enclosing_cells(&self, at: usize, count: usize) -> Tap {
         let half = 0.5 * self.cell_px as f32;
         Tap::at((at as f32 + 0.5 - half) / self.cell_px as f32, count)
     }
@@ -282,7 +295,7 @@ impl View<'_> {
         alphas: &[f32],
         map: &mut DepthMap,
     ) {
-        let backdrop = self.backdrop.map(|backdrop| backdrop.row(y));
+        let background_at = self.backdrop.map(|backdrop| backdrop.light_in_row(y));
         for x in xs {
             let at = y * self.color.width as usize + x;
             let alpha = match alphas[at] {
@@ -299,11 +312,11 @@ impl View<'_> {
                 continue;
             }
             let own = self.light_at(at);
-            let (behind, difference) = match backdrop.as_ref().map(|behind| behind(x)) {
+            let (behind, difference) = match background_at.as_ref().map(|background_at| background_at(x)) {
                 Some(light) if is_pure => (1.0, std::array::from_fn(|p| (own[p] - light[p]) / alpha)),
                 light => {
-                    let difference = match self.surfaces_at(contrasts, (x, y), light) {
-                        Some([near, far]) => difference(&near, &far, own, alpha),
+                    let difference = match self.interpolate_surfaces(contrasts, (x, y), light) {
+                        Some([near, far]) => color_difference(&near, &far, own, alpha),
                         None => [0.0; 3],
                     };
                     (if light.is_some() { 1.0 } else { 1.0 - alpha }, difference)
@@ -317,10 +330,10 @@ impl View<'_> {
     /// Adds the known background behind covered pixels.
     #[inline(always)]
     fn add_background(&self, backdrop: &BackgroundPlate, (xs, y): (Range<usize>, usize), map: &mut DepthMap) {
-        let (row, behind) = (y * self.color.width as usize, backdrop.row(y));
+        let (row, background_at) = (y * self.color.width as usize, backdrop.light_in_row(y));
         let metres = &map.metres[row..];
         map.matte.pixels.extend(xs.map(|x| {
-            let (own, light) = (self.light_at(row + x), behind(x));
+            let (own, light) = (self.light_at(row + x), background_at(x));
             let difference = std::array::from_fn(|p| own[p] - light[p]);
             let (at, near_m, far_m) = ((row + x) as u32, DepthMap::SUBJECT_M, metres[x]);
             MixedPixel { at, near_m, far_m, alpha: 1.0, behind: 1.0, difference }
@@ -335,16 +348,16 @@ impl<const N: usize> Sides<N> {
     /// Interpolates vertically, from the four corners to both sides.
     #[inline(always)]
     fn new([left, below_left, right, below_right]: [[f32; N]; 4], down: f32) -> Self {
-        Self([mixed(&left, &below_left, down), mixed(&right, &below_right, down)])
+        Self([lerp(&left, &below_left, down), lerp(&right, &below_right, down)])
     }
 
     #[inline(always)]
-    fn between(&self, along: f32) -> [f32; N] {
-        mixed(&self.0[0], &self.0[1], along)
+    fn interpolate(&self, along: f32) -> [f32; N] {
+        lerp(&self.0[0], &self.0[1], along)
     }
 }
 
 #[inline(always)]
-fn mixed<const N: usize>(a: &[f32; N], b: &[f32; N], fraction: f32) -> [f32; N] {
+fn lerp<const N: usize>(a: &[f32; N], b: &[f32; N], fraction: f32) -> [f32; N] {
     std::array::from_fn(|k| a[k] + (b[k] - a[k]) * fraction)
 }

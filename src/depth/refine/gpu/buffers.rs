@@ -4,7 +4,7 @@ use super::super::align::ROUNDS;
 use super::super::votes;
 use super::shaders::{COUNTS, Frame, MEASURES, PROCESSED, SAMPLES, WAVES, Wave};
 use crate::compute::GpuError;
-use crate::compute::device::{Device, Readback, UNIFORM_STRIDE, uniform_at};
+use crate::compute::device::{Device, Readback, UNIFORM_STRIDE, uniform_binding};
 
 /// Buffers of a picture; some are reused by several passes with different content.
 pub struct Buffers {
@@ -27,9 +27,9 @@ pub struct Buffers {
     /// Claims along rows; then inverse depth.
     pub inverse: wgpu::Buffer,
     /// Claims along columns; then the worklist of the first round.
-    pub front: wgpu::Buffer,
+    pub worklist: wgpu::Buffer,
     pub votes: wgpu::Buffer,
-    pub nearby: wgpu::Buffer,
+    pub spatial_weights: wgpu::Buffer,
     pub counts: wgpu::Buffer,
     pub measures: wgpu::Buffer,
     pub samples: wgpu::Buffer,
@@ -49,13 +49,13 @@ impl Buffers {
         let (width, height) = (size.0 as usize, size.1 as usize);
         let pixels = width * height;
         // The temporal state is the largest buffer: three numbers per pixel.
-        device.has_room(size, pixels as u64 * 12, "refined")?;
-        let buffer = |label, bytes, usage| device.buffer(label, bytes, usage);
+        device.check_picture_size(size, pixels as u64 * 12, "refined")?;
+        let buffer = |label, bytes, usage| device.create_buffer(label, bytes, usage);
         let words = |label, count: usize| buffer(label, 4 * count, Usage::STORAGE | Usage::COPY_DST);
-        let buffers = device.attempt(|| Self {
+        let buffers = device.with_error_scope(|| Self {
             frame: buffer("refined frame", size_of::<Frame>(), Usage::UNIFORM | Usage::COPY_DST),
             waves: buffer("waves", ROUNDS * (WAVES + 1) * UNIFORM_STRIDE as usize, Usage::UNIFORM | Usage::COPY_DST),
-            map: Self::map(device, pixels),
+            map: Self::create_map(device, pixels),
             taps: words("taps", 2 * (width + height)),
             rgb: buffer("rgb", 3 * pixels, Usage::STORAGE | Usage::COPY_DST | Usage::COPY_SRC),
             colors: words("colors", pixels),
@@ -64,9 +64,9 @@ impl Buffers {
             filled: words("filled", pixels),
             scratch: words("lent", pixels),
             inverse: words("inverse", pixels),
-            front: words("front", pixels),
+            worklist: words("front", pixels),
             votes: words("votes", 2 * pixels),
-            nearby: words("nearby", size_of::<votes::Weights>() / 4),
+            spatial_weights: words("spatial_weights", size_of::<votes::Weights>() / 4),
             counts: words("counts", COUNTS),
             measures: words("measures", MEASURES),
             samples: words("samples", SAMPLES),
@@ -74,7 +74,11 @@ impl Buffers {
             refined: buffer("refined", 4 * pixels, Usage::STORAGE | Usage::COPY_SRC),
             readback: Readback::new(device, "refined back", 4 * pixels),
         })?;
-        device.upload(&buffers.nearby, 0, bytemuck::cast_slice(votes::weights_by_distance().as_flattened()));
+        device.upload(
+            &buffers.spatial_weights,
+            0,
+            bytemuck::cast_slice(votes::compute_spatial_weights().as_flattened()),
+        );
         for round in 0..ROUNDS {
             for wave in 0..=WAVES {
                 let first = (1 + round * (WAVES + 2)) as u32;
@@ -91,13 +95,13 @@ impl Buffers {
     }
 
     /// Creates a buffer for a map of `samples` samples, in metres.
-    pub fn map(device: &Device, samples: usize) -> wgpu::Buffer {
-        device.buffer("measured", 4 * samples, wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST)
+    pub fn create_map(device: &Device, samples: usize) -> wgpu::Buffer {
+        device.create_buffer("measured", 4 * samples, wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST)
     }
 
     /// Returns the uniform of a wave.
-    pub fn wave(&self, round: usize, wave: usize) -> wgpu::BufferBinding<'_> {
-        uniform_at::<Wave>(&self.waves, wave_index(round, wave))
+    pub fn wave_binding(&self, round: usize, wave: usize) -> wgpu::BufferBinding<'_> {
+        uniform_binding::<Wave>(&self.waves, wave_index(round, wave))
     }
 }
 

@@ -7,20 +7,20 @@
 
 mod buffers;
 mod passes;
+mod self_test;
 pub mod shaders;
-mod trial;
 
 use std::fmt;
 use std::sync::Arc;
 
-pub use trial::trial;
+pub use self_test::run_self_test;
 
 use buffers::Buffers;
 use passes::Passes;
 use shaders::Frame;
 
 use super::temporal;
-use crate::compute::device::{Device, DeviceFrame, Recorder, Stamps};
+use crate::compute::device::{Device, DeviceFrame, Recorder, Timestamps};
 use crate::compute::{GpuError, PassTimes};
 use crate::depth::guided_fill;
 use crate::depth::tap::Tap;
@@ -31,7 +31,7 @@ use crate::link::pool::{Pool, Pooled};
 pub struct GpuRefiner {
     device: Arc<Device>,
     /// State for pictures of the last size.
-    work: Option<Work>,
+    resources: Option<Resources>,
 }
 
 impl fmt::Debug for GpuRefiner {
@@ -41,12 +41,12 @@ impl fmt::Debug for GpuRefiner {
 }
 
 /// Resources for pictures of one size.
-struct Work {
+struct Resources {
     size: (u32, u32),
     buffers: Buffers,
     passes: Passes,
     /// Size of the maps that the sample positions of columns and rows are for.
-    from: (u32, u32),
+    map_size: (u32, u32),
     columns: Vec<Tap>,
     rows: Vec<Tap>,
     /// Whether a map without holes is on the device.
@@ -58,7 +58,7 @@ struct Work {
     /// Copies of refined maps with their pictures, for the blur, and that of the last one.
     copies: Pool<DeviceFrame>,
     copy: Option<Pooled<DeviceFrame>>,
-    stamps: Option<Stamps>,
+    timestamps: Option<Timestamps>,
 }
 
 /// Maximum number of copies in use; without a free one the frame is uploaded again.
@@ -70,31 +70,35 @@ const MAX_PASSES: usize = 48;
 impl GpuRefiner {
     /// Creates a refiner on a device, without testing it.
     pub fn new(device: &Arc<Device>) -> Self {
-        Self { device: Arc::clone(device), work: None }
+        Self { device: Arc::clone(device), resources: None }
     }
 
     /// Discards the state of all frames.
-    pub fn forget(&mut self) {
-        if let Some(work) = &mut self.work {
-            (work.has_filled, work.last) = (false, None);
+    pub fn reset(&mut self) {
+        if let Some(resources) = &mut self.resources {
+            (resources.has_filled, resources.last) = (false, None);
         }
     }
 
     /// Returns the time of each pass over the last frame; empty if the device has no timestamps.
     pub fn pass_times(&self) -> PassTimes {
-        self.work.as_ref().and_then(|work| work.stamps.as_ref()).map(Stamps::last).unwrap_or_default()
+        self.resources
+            .as_ref()
+            .and_then(|resources| resources.timestamps.as_ref())
+            .map(Timestamps::last_times)
+            .unwrap_or_default()
     }
 
     /// Returns the last refined map and its picture on the device, if they are there; valid until the next frame.
-    pub fn refined(&self) -> Option<DeviceFrame> {
-        let Work { size, buffers: Buffers { refined, rgb, .. }, .. } =
-            self.work.as_ref().filter(|work| work.is_on_device)?;
-        Some(DeviceFrame::of(&self.device, *size, refined, rgb))
+    pub fn device_frame(&self) -> Option<DeviceFrame> {
+        let Resources { size, buffers: Buffers { refined, rgb, .. }, .. } =
+            self.resources.as_ref().filter(|resources| resources.is_on_device)?;
+        Some(DeviceFrame::from_buffers(&self.device, *size, refined, rgb))
     }
 
     /// Returns a copy of the last refined map and its picture, once per frame.
     pub fn take_copy(&mut self) -> Option<Pooled<DeviceFrame>> {
-        self.work.as_mut()?.copy.take()
+        self.resources.as_mut()?.copy.take()
     }
 
     /// Refines the depth `map` of the picture `color` at `time_ns`, with this focus distance in metres.
@@ -108,29 +112,29 @@ impl GpuRefiner {
         time_ns: u64,
         focus_m: f32,
     ) -> Result<(), GpuError> {
-        let Self { device, work } = self;
+        let Self { device, resources } = self;
         device.check()?;
-        if work.as_ref().is_none_or(|work| work.size != color.size()) {
+        if resources.as_ref().is_none_or(|resources| resources.size != color.size()) {
             // Frees the old buffers before the new ones are allocated.
-            *work = None;
-            *work = Some(Work::new(device, color.size())?);
+            *resources = None;
+            *resources = Some(Resources::new(device, color.size())?);
         }
-        let Some(work) = work else { return Ok(()) };
-        work.refine(device, map, color, time_ns, focus_m)
+        let Some(resources) = resources else { return Ok(()) };
+        resources.refine(device, map, color, time_ns, focus_m)
     }
 }
 
-impl Work {
+impl Resources {
     fn new(device: &Arc<Device>, size: (u32, u32)) -> Result<Self, GpuError> {
         let buffers = Buffers::new(device, size)?;
         let passes = Passes::new(device, size, &buffers);
-        let (from, columns, rows) = ((0, 0), Vec::new(), Vec::new());
-        let copies = device.attempt(|| Pool::new(COPIES, || DeviceFrame::new(device, size)))?;
+        let (map_size, columns, rows) = ((0, 0), Vec::new(), Vec::new());
+        let copies = device.with_error_scope(|| Pool::new(COPIES, || DeviceFrame::new(device, size)))?;
         Ok(Self {
             size,
             buffers,
             passes,
-            from,
+            map_size,
             columns,
             rows,
             has_filled: false,
@@ -138,14 +142,14 @@ impl Work {
             is_on_device: false,
             copies,
             copy: None,
-            stamps: Stamps::new(device, MAX_PASSES),
+            timestamps: Timestamps::new(device, MAX_PASSES),
         })
     }
 
     /// Prepares for maps of another size.
-    fn set_map_size(&mut self, device: &Device, from: (u32, u32)) -> Result<(), GpuError> {
+    fn set_map_size(&mut self, device: &Device, map_size: (u32, u32)) -> Result<(), GpuError> {
         let Self { size, buffers, passes, columns, rows, .. } = self;
-        for (taps, to, from) in [(&mut *columns, size.0, from.0), (rows, size.1, from.1)] {
+        for (taps, to, from) in [(&mut *columns, size.0, map_size.0), (rows, size.1, map_size.1)] {
             taps.clear();
             let same = |at| Tap { first: at, second: at, weight: 0.0 };
             let tap = |at| if to == from { same(at) } else { Tap::new(at, to as usize, from as usize) };
@@ -154,13 +158,13 @@ impl Work {
         let words: Vec<[u32; 2]> =
             columns.iter().chain(&*rows).map(|tap| [tap.first as u32, tap.weight.to_bits()]).collect();
         device.upload(&buffers.taps, 0, bytemuck::cast_slice(&words));
-        let samples = from.0 as usize * from.1 as usize;
+        let samples = map_size.0 as usize * map_size.1 as usize;
         if 4 * samples as u64 > buffers.map.size() {
-            device.has_room(from, 4 * samples as u64, "refined")?;
-            buffers.map = device.attempt(|| Buffers::map(device, samples))?;
-            passes.set_map(device, *size, buffers);
+            device.check_picture_size(map_size, 4 * samples as u64, "refined")?;
+            buffers.map = device.with_error_scope(|| Buffers::create_map(device, samples))?;
+            passes.rebind_map(device, *size, buffers);
         }
-        self.from = from;
+        self.map_size = map_size;
         Ok(())
     }
 
@@ -181,7 +185,7 @@ impl Work {
         focus_m: f32,
     ) -> Result<(), GpuError> {
         (self.is_on_device, self.copy) = (false, None);
-        if !map.metres.is_empty() && self.from != map.size() {
+        if !map.metres.is_empty() && self.map_size != map.size() {
             self.set_map_size(device, map.size())?;
         }
         let is_empty = map.metres.is_empty() || !self.has_known_depth(map);
@@ -193,15 +197,15 @@ impl Work {
             return Ok(());
         }
         // The temporal state is in units of its own focus distance, hence the factor.
-        let last = self.last.filter(|(before_ns, _)| temporal::follows(*before_ns, time_ns));
+        let last = self.last.filter(|(before_ns, _)| temporal::are_consecutive(*before_ns, time_ns));
         let frame = Frame {
             size: [color.width, color.height],
-            map_size: [self.from.0, self.from.1],
+            map_size: [self.map_size.0, self.map_size.1],
             focus_m,
-            times: last.map_or(1.0, |(_, before_m)| focus_m / before_m),
-            longest: guided_fill::longest(color.width as usize) as u32,
-            empty: is_empty.into(),
-            fresh: last.is_none().into(),
+            rescale: last.map_or(1.0, |(_, before_m)| focus_m / before_m),
+            max_hole_px: guided_fill::longest(color.width as usize) as u32,
+            is_empty: is_empty.into(),
+            is_fresh: last.is_none().into(),
             ..Frame::default()
         };
         device.upload(&self.buffers.frame, 0, bytemuck::bytes_of(&frame));
@@ -209,23 +213,29 @@ impl Work {
         if !is_empty {
             device.upload(&self.buffers.map, 0, bytemuck::cast_slice(&map.metres));
         }
-        self.run(device, map, is_empty, last.is_none())?;
+        self.run_passes(device, map, is_empty, last.is_none())?;
         (self.has_filled, self.is_on_device) = (true, true);
         self.last = Some((time_ns, focus_m));
         Ok(())
     }
 
     /// Runs the passes and reads the refined map back.
-    fn run(&mut self, device: &Device, map: &mut DepthMap, is_empty: bool, is_fresh: bool) -> Result<(), GpuError> {
+    fn run_passes(
+        &mut self,
+        device: &Device,
+        map: &mut DepthMap,
+        is_empty: bool,
+        is_fresh: bool,
+    ) -> Result<(), GpuError> {
         let Buffers { counts, rgb, refined, readback, .. } = &mut self.buffers;
-        let mut recorder = Recorder::new(device, self.stamps.as_mut());
+        let mut recorder = Recorder::new(device, self.timestamps.as_mut());
         recorder.encoder.clear_buffer(counts, 0, None);
         self.passes.record(&mut recorder, is_empty, is_fresh);
         let copy = self.copies.try_take();
         for (from, to) in copy.iter().flat_map(|copy| [(&*refined, &copy.metres), (rgb, &copy.rgb)]) {
             recorder.encoder.copy_buffer_to_buffer(from, 0, to, 0, from.size());
         }
-        recorder.fetch(device, readback, (refined, refined.size()), |bytes| {
+        recorder.submit_and_read(device, readback, (refined, refined.size()), |bytes| {
             map.resize(self.size.0, self.size.1);
             let out: &mut [u8] = bytemuck::cast_slice_mut(&mut map.metres);
             let length = out.len();

@@ -18,15 +18,15 @@ pub struct Passes {
 }
 
 /// Creates the passes for pictures of one size.
-struct Maker<'a> {
+struct PassBuilder<'a> {
     device: &'a Device,
     size: [u32; 2],
     b: &'a Buffers,
 }
 
-impl<'a> Maker<'a> {
+impl<'a> PassBuilder<'a> {
     /// Creates a pass over the frame's uniform and `buffers`; `again` selects its second variant.
-    fn pass(
+    fn create_pass(
         &self,
         shader: Shader,
         again: bool,
@@ -38,7 +38,7 @@ impl<'a> Maker<'a> {
         Pass::new(self.device, shader, &shaders::constants(again), buffers, [across, down, 1])
     }
 
-    fn tiled<const N: usize>(
+    fn create_tiled<const N: usize>(
         &self,
         shader: Shader,
         again: bool,
@@ -46,62 +46,62 @@ impl<'a> Maker<'a> {
         buffers: [&'a wgpu::Buffer; N],
     ) -> Pass {
         let [across, down] = [0, 1].map(|axis| self.size[axis].div_ceil(tile[axis]));
-        self.pass(shader, again, buffers.map(wgpu::Buffer::as_entire_buffer_binding), [across, down])
+        self.create_pass(shader, again, buffers.map(wgpu::Buffer::as_entire_buffer_binding), [across, down])
     }
 
     /// Creates a pass of a single workgroup.
-    fn single<const N: usize>(&self, shader: Shader, again: bool, buffers: [&'a wgpu::Buffer; N]) -> Pass {
-        self.pass(shader, again, buffers.map(wgpu::Buffer::as_entire_buffer_binding), [1, 1])
+    fn create_single<const N: usize>(&self, shader: Shader, again: bool, buffers: [&'a wgpu::Buffer; N]) -> Pass {
+        self.create_pass(shader, again, buffers.map(wgpu::Buffer::as_entire_buffer_binding), [1, 1])
     }
 
-    fn prepare(&self) -> Pass {
+    fn create_prepare(&self) -> Pass {
         let b = self.b;
-        let made = [&b.colors, &b.flags, &b.filled, &b.inverse, &b.front];
+        let made = [&b.colors, &b.flags, &b.filled, &b.inverse, &b.worklist];
         let buffers = [&b.map, &b.taps, &b.rgb].into_iter().chain(made).map(wgpu::Buffer::as_entire_buffer_binding);
         let workgroups = [0, 1].map(|axis| self.size[axis].div_ceil(TILE[axis]));
-        self.pass(shaders::PREPARE, false, buffers, workgroups)
+        self.create_pass(shaders::PREPARE, false, buffers, workgroups)
     }
 
-    fn fill(&self, again: bool) -> [Pass; 2] {
+    fn create_fill(&self, again: bool) -> [Pass; 2] {
         let b = self.b;
         let [width, height] = self.size;
         [
-            self.tiled(shaders::BESIDE, again, [width, 1], [&b.counts, &b.filled, &b.scratch]),
-            self.tiled(shaders::FILL, again, [COLUMNS, height], [&b.counts, &b.filled, &b.scratch]),
+            self.create_tiled(shaders::BESIDE, again, [width, 1], [&b.counts, &b.filled, &b.scratch]),
+            self.create_tiled(shaders::FILL, again, [COLUMNS, height], [&b.counts, &b.filled, &b.scratch]),
         ]
     }
 
-    fn claim(&self, again: bool) -> [Pass; 2] {
+    fn create_claim(&self, again: bool) -> [Pass; 2] {
         let b = self.b;
-        let claims = if again { &b.front } else { &b.inverse };
+        let claims = if again { &b.worklist } else { &b.inverse };
         [
-            self.tiled(shaders::CLAIM, again, TILE, [&b.flags, &b.filled, &b.colors, claims]),
-            self.tiled(shaders::AGREE, again, TILE, [claims, &b.flags, &b.filled]),
+            self.create_tiled(shaders::CLAIM, again, TILE, [&b.flags, &b.filled, &b.colors, claims]),
+            self.create_tiled(shaders::AGREE, again, TILE, [claims, &b.flags, &b.filled]),
         ]
     }
 
-    fn noise(&self, again: bool) -> Pass {
+    fn create_noise(&self, again: bool) -> Pass {
         let b = self.b;
         let map = if again { &b.inverse } else { &b.filled };
-        self.single(shaders::NOISE, again, [&b.flags, map, &b.samples, &b.measures])
+        self.create_single(shaders::NOISE, again, [&b.flags, map, &b.samples, &b.measures])
     }
 
-    fn round(&self, round: usize) -> impl Iterator<Item = Pass> {
+    fn create_round(&self, round: usize) -> impl Iterator<Item = Pass> {
         let b = self.b;
-        let front = if round == 0 { &b.front } else { &b.scratch };
-        let band = [&b.measures, &b.inverse, &b.colors, &b.flags, &b.votes, front, &b.counts];
-        let band = self.tiled(shaders::BAND, round > 0, TILE, band);
+        let worklist = if round == 0 { &b.worklist } else { &b.scratch };
+        let band = [&b.measures, &b.inverse, &b.colors, &b.flags, &b.votes, worklist, &b.counts];
+        let band = self.create_tiled(shaders::BAND, round > 0, TILE, band);
         let vote = move |wave: usize| {
-            let buffers = [&b.measures, &b.nearby, &b.votes, &b.inverse, &b.flags, front, &b.counts];
+            let buffers = [&b.measures, &b.spatial_weights, &b.votes, &b.inverse, &b.flags, worklist, &b.counts];
             let buffers = buffers.map(wgpu::Buffer::as_entire_buffer_binding);
-            let uniform = b.wave(round, wave);
+            let uniform = b.wave_binding(round, wave);
             let [first, other] = shaders::vote_workgroups(self.size.map(|side| side as usize).iter().product());
             let workgroups = match wave {
                 0 => first,
                 WAVES => 1,
                 _ => other,
             };
-            self.pass(shaders::VOTE, wave == WAVES, std::iter::once(uniform).chain(buffers), [workgroups, 1])
+            self.create_pass(shaders::VOTE, wave == WAVES, std::iter::once(uniform).chain(buffers), [workgroups, 1])
         };
         std::iter::once(band).chain((0..=WAVES).map(vote))
     }
@@ -110,33 +110,37 @@ impl<'a> Maker<'a> {
 impl Passes {
     /// Creates the passes over the buffers of pictures of `size` pixels.
     pub fn new(device: &Device, size: (u32, u32), b: &Buffers) -> Self {
-        let maker = Maker { device, size: [size.0, size.1], b };
-        let smooth = |again, from, to| maker.tiled(shaders::SMOOTH, again, STRIP, [&b.measures, from, to]);
+        let builder = PassBuilder { device, size: [size.0, size.1], b };
+        let smooth = |again, from, to| builder.create_tiled(shaders::SMOOTH, again, STRIP, [&b.measures, from, to]);
         let steady = [&b.measures, &b.flags, &b.inverse, &b.colors, &b.scratch, &b.memory, &b.before, &b.refined];
         Self {
-            prepare: maker.prepare(),
+            prepare: builder.create_prepare(),
             // Holes left after the first run cross rows or columns that are then full.
             fill: [false, true]
                 .into_iter()
-                .flat_map(|again| maker.fill(again))
-                .chain([false, true].into_iter().flat_map(|again| maker.claim(again)))
+                .flat_map(|again| builder.create_fill(again))
+                .chain([false, true].into_iter().flat_map(|again| builder.create_claim(again)))
                 .collect(),
-            align: [maker.noise(false), smooth(false, &b.filled, &b.scratch), smooth(true, &b.scratch, &b.inverse)]
-                .into_iter()
-                .chain([maker.noise(true)])
-                .chain((0..ROUNDS).flat_map(|round| maker.round(round)))
-                .collect(),
+            align: [
+                builder.create_noise(false),
+                smooth(false, &b.filled, &b.scratch),
+                smooth(true, &b.scratch, &b.inverse),
+            ]
+            .into_iter()
+            .chain([builder.create_noise(true)])
+            .chain((0..ROUNDS).flat_map(|round| builder.create_round(round)))
+            .collect(),
             change: [
-                maker.tiled(shaders::CHANGE, false, TILE, [&b.colors, &b.before, &b.scratch]),
-                maker.single(shaders::MEDIAN, false, [&b.scratch, &b.samples, &b.measures]),
+                builder.create_tiled(shaders::CHANGE, false, TILE, [&b.colors, &b.before, &b.scratch]),
+                builder.create_single(shaders::MEDIAN, false, [&b.scratch, &b.samples, &b.measures]),
             ],
-            steady: maker.tiled(shaders::STEADY, false, STRIP, steady),
+            steady: builder.create_tiled(shaders::STEADY, false, STRIP, steady),
         }
     }
 
     /// Rebinds the passes after the map's buffer was replaced.
-    pub fn set_map(&mut self, device: &Device, size: (u32, u32), b: &Buffers) {
-        self.prepare = Maker { device, size: [size.0, size.1], b }.prepare();
+    pub fn rebind_map(&mut self, device: &Device, size: (u32, u32), b: &Buffers) {
+        self.prepare = PassBuilder { device, size: [size.0, size.1], b }.create_prepare();
     }
 
     /// Records all passes of a frame; `is_empty` if its map has no known depth, `is_fresh` without a last frame.
@@ -144,6 +148,6 @@ impl Passes {
         let fill = self.fill.iter().filter(|_| !is_empty);
         let change = self.change.iter().filter(|_| !is_fresh);
         let passes = [&self.prepare].into_iter().chain(fill).chain(&self.align).chain(change).chain([&self.steady]);
-        passes.for_each(|pass| recorder.run(pass));
+        passes.for_each(|pass| recorder.record(pass));
     }
 }

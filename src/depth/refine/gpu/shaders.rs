@@ -114,10 +114,10 @@ pub struct Frame {
     pub size: [u32; 2],
     pub map_size: [u32; 2],
     pub focus_m: f32,
-    pub times: f32,
-    pub longest: u32,
-    pub empty: u32,
-    pub fresh: u32,
+    pub rescale: f32,
+    pub max_hole_px: u32,
+    pub is_empty: u32,
+    pub is_fresh: u32,
     /// Padding to the size of the uniform.
     pub unused: u32,
 }

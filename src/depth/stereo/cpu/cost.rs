@@ -5,7 +5,7 @@
 use super::super::fixed::{BONUS, OUTSIDE};
 use super::GROUP;
 use super::census::PLANES;
-use crate::compute::aligned::Line;
+use crate::compute::aligned::CacheAligned;
 
 /// Rows of codes that the costs of a group need: one more above and one below.
 pub const ROWS: usize = GROUP + 2;
@@ -20,8 +20,8 @@ pub struct Costs<'a, const N: usize> {
     codes: [Codes<'a>; ROWS],
     width: usize,
     /// Distances summed over three rows: of the column whose costs are next, and of it plus the one right of it.
-    here: Line<[[u8; N]; GROUP]>,
-    two: Line<[[u8; N]; GROUP]>,
+    here: CacheAligned<[[u8; N]; GROUP]>,
+    two: CacheAligned<[[u8; N]; GROUP]>,
 }
 
 impl<'a, const N: usize> Costs<'a, N> {
@@ -34,7 +34,7 @@ impl<'a, const N: usize> Costs<'a, N> {
                 right[plane] = &right[plane][..width + N];
             }
         }
-        let mut first = Self { codes, width, here: Line([[0; N]; GROUP]), two: Line([[0; N]; GROUP]) };
+        let mut first = Self { codes, width, here: CacheAligned([[0; N]; GROUP]), two: CacheAligned([[0; N]; GROUP]) };
         // Beyond the borders the outermost columns repeat.
         first.advance(width - 1);
         first.advance(width - 1);
@@ -43,13 +43,13 @@ impl<'a, const N: usize> Costs<'a, N> {
 
     /// Returns the costs of column `x` in each row; columns must be requested from the last to the first.
     #[inline(always)]
-    pub fn next_column(&mut self, x: usize) -> Line<[[u8; N]; GROUP]> {
+    pub fn next_column(&mut self, x: usize) -> CacheAligned<[[u8; N]; GROUP]> {
         self.advance(x.saturating_sub(1))
     }
 
     /// Adds the distances of column `x` to the running sums; returns the costs of the column right of it.
     #[inline(always)]
-    fn advance(&mut self, x: usize) -> Line<[[u8; N]; GROUP]> {
+    fn advance(&mut self, x: usize) -> CacheAligned<[[u8; N]; GROUP]> {
         // The partner at disparity d is in column x - d, which is this one plus d in the mirrored row.
         let first = self.width - 1 - x;
         let mut left = [[0; PLANES]; ROWS];
@@ -61,7 +61,7 @@ impl<'a, const N: usize> Costs<'a, N> {
             }
         }
         let (numbers, last_inside) = (numbers::<N>(), x.min(N - 1) as u8);
-        let mut costs = Line([[0; N]; GROUP]);
+        let mut costs = CacheAligned([[0; N]; GROUP]);
         for d in 0..N {
             let mut differing = [0; ROWS];
             for row in 0..ROWS {
@@ -108,14 +108,14 @@ pub fn array<const N: usize>(values: &[u8]) -> &[u8; N] {
 /// whatever it is converted to.
 #[inline(always)]
 pub fn numbers<const N: usize>() -> &'static [u8; N] {
-    static NUMBERS: Line<[u8; 256]> = {
+    static NUMBERS: CacheAligned<[u8; 256]> = {
         let mut numbers = [0; 256];
         let mut d = 0;
         while d < numbers.len() {
             numbers[d] = d as u8;
             d += 1;
         }
-        Line(numbers)
+        CacheAligned(numbers)
     };
     array(&NUMBERS.0)
 }

@@ -17,7 +17,7 @@ use super::path::{Paths, StepPenalties};
 use super::sweep::{BLOCK, Cells, ConsistencyCheck, DownPaths, FromLeft, FromRight};
 use super::winner::Winners;
 use crate::compute::simd;
-use crate::compute::thread_pool::relay::Relay;
+use crate::compute::thread_pool::wavefront::Wavefront;
 use crate::compute::thread_pool::{DisjointParts, ThreadPool};
 
 /// Matches pairs of one size.
@@ -30,7 +30,7 @@ pub struct SemiGlobal {
     left: Census,
     right: Census,
     /// The paths down the columns, by block.
-    down: Relay<DownPaths>,
+    down: Wavefront<DownPaths>,
     scratch: Vec<Scratch>,
     /// Flags with which [`DisjointParts`] ensures that only one thread writes each part.
     taken: Vec<AtomicBool>,
@@ -62,7 +62,7 @@ impl SemiGlobal {
             penalties: Penalties::new(),
             left: Census::new((width, height), false, 0),
             right: Census::new((width, height), true, disparities),
-            down: Relay::new((0..width.div_ceil(BLOCK)).map(|_| DownPaths::new(disparities))),
+            down: Wavefront::new((0..width.div_ceil(BLOCK)).map(|_| DownPaths::new(disparities))),
             scratch: iter::repeat_with(new_scratch).take(threads).collect(),
             // The census transform distributes padded rows.
             taken: iter::repeat_with(AtomicBool::default).take(height + 2 * census::RADIUS).collect(),
@@ -78,11 +78,11 @@ impl SemiGlobal {
         out: &mut [u16],
     ) {
         let Self { width, height, arch, ref penalties, .. } = *self;
-        self.down.begin(DownPaths::clear);
+        self.down.reset(DownPaths::clear);
         let (down, census) = (&self.down, [&self.left, &self.right]);
         let out = DisjointParts::new(out, GROUP * width, &mut self.taken);
         workers.run_with(&mut self.scratch, height.div_ceil(GROUP), &|Scratch { p2, cells, paths, winners }, part| {
-            let mut blocks = down.runner(part);
+            let mut blocks = down.block_iter(part);
             // Row 0 is the one above the group; beyond the borders the outermost rows repeat.
             let row = |k: usize| (part * GROUP + k).saturating_sub(1).min(height - 1);
             let pixels = |y: usize| y * width..(y + 1) * width;
@@ -104,7 +104,7 @@ impl SemiGlobal {
 
     /// Describes the executor.
     pub fn describe(&self) -> String {
-        format!("cpu, {} threads, {}", self.scratch.len(), simd::name(self.arch))
+        format!("cpu, {} threads, {}", self.scratch.len(), simd::instruction_set(self.arch))
     }
 
     /// Writes the disparities of the left picture to `out`, in fixed point, or unknown. `likely` has one more than the

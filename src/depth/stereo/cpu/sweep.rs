@@ -7,7 +7,7 @@ use super::GROUP;
 use super::cost::{self, Codes, Costs};
 use super::path::{Paths, StepPenalties, Values};
 use super::winner::{Row, Winners};
-use crate::compute::aligned::{Aligned, Line};
+use crate::compute::aligned::{Aligned, CacheAligned};
 
 /// Output of the sweep from the right for a group, `[column][row]`: the costs, and half of the values of the path from
 /// the right.
@@ -80,7 +80,7 @@ impl<const N: usize> Column<'_, N> {
         let likely = self.likely.map_or([0; GROUP], |likely| likely.map(|row| row[x]));
         let cells = &mut self.cells[x];
         for row in 0..GROUP {
-            let mut cell = Line([[0; N]; 2]);
+            let mut cell = CacheAligned([[0; N]; 2]);
             step(&before[row], p2[row], likely[row], &raw_costs.0[row], &mut now[row], &mut cell.0);
             cells[row] = cell.0;
         }
@@ -216,9 +216,9 @@ impl<const N: usize> Block<'_, N> {
         if x >= self.columns {
             return;
         }
-        let mut sums = Line([0; N]);
+        let mut sums = CacheAligned([0; N]);
         let p2 = self.p2.map(|p2| p2[x][ROW]);
-        let cell = Line(self.cells[x][ROW]);
+        let cell = CacheAligned(self.cells[x][ROW]);
         let (above, below) = between.split_at_mut(ROW + 1);
         step_two(&before[ROW], &above[ROW], p2, &cell.0, &mut now[ROW], &mut below[0], &mut sums.0);
         self.rows[ROW].update(x, &sums.0);

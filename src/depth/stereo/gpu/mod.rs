@@ -19,7 +19,7 @@ use shaders::linear_workgroups;
 use super::executor::Executor;
 use super::fixed::{self, UNKNOWN};
 use super::penalty::Penalties;
-use crate::compute::device::{Device, Pass, Readback, Recorder, Stamps};
+use crate::compute::device::{Device, Pass, Readback, Recorder, Timestamps};
 use crate::compute::thread_pool::ThreadPool;
 use crate::compute::{GpuError, PassTimes, bands};
 
@@ -41,7 +41,7 @@ pub struct GpuExecutor {
     /// The map, two pixels per word.
     words: wgpu::Buffer,
     readback: Readback,
-    stamps: Option<Stamps>,
+    stamps: Option<Timestamps>,
 }
 
 impl GpuExecutor {
@@ -56,7 +56,7 @@ impl GpuExecutor {
         check_limits(device, size, disparities)?;
 
         use wgpu::BufferUsages as Usage;
-        let buffer = |label, bytes, usage| device.buffer(label, bytes, usage);
+        let buffer = |label, bytes, usage| device.create_buffer(label, bytes, usage);
         let luma = buffer("luma", 2 * pixels.next_multiple_of(4), Usage::STORAGE | Usage::COPY_DST | Usage::COPY_SRC);
         let last_luma = buffer("last luma", pixels, Usage::STORAGE | Usage::COPY_DST);
         let table = buffer("P2", 256, Usage::STORAGE | Usage::COPY_DST);
@@ -101,14 +101,14 @@ impl GpuExecutor {
             gaps,
             pack,
         ];
-        let stamps = Stamps::new(device, passes.len());
+        let stamps = Timestamps::new(device, passes.len());
         device.check()?;
         Ok(Self { device: Arc::clone(device), pixels, luma, last_luma, passes, words, readback, stamps })
     }
 
     /// Returns the time of each pass over the last pair; empty if the device has no timestamps.
     pub fn pass_times(&self) -> PassTimes {
-        self.stamps.as_ref().map(Stamps::last).unwrap_or_default()
+        self.stamps.as_ref().map(Timestamps::last_times).unwrap_or_default()
     }
 }
 
@@ -122,13 +122,14 @@ fn check_limits(device: &Device, (width, height): (usize, usize), disparities: u
     let name = &device.name;
     if bytes > most {
         return Err(GpuError::Failed(format!(
-            "{name}: {disparities} disparities of {width} x {height} pixels need buffers of {bytes} bytes and it \
-             allows {most}; use --backend cpu"
+            "{name}: {disparities} disparities of {width} x {height} pixels need buffers of {bytes} bytes, and this \
+             GPU allows {most}; use --backend cpu"
         )));
     }
     if width.max(height) > longest {
         return Err(GpuError::Failed(format!(
-            "{name}: pictures of {width} x {height} need {} workgroups and it allows {longest}; use --backend cpu",
+            "{name}: pictures of {width} x {height} need {} workgroups, and this GPU allows {longest}; use --backend \
+             cpu",
             width.max(height)
         )));
     }
@@ -156,10 +157,10 @@ impl Executor for GpuExecutor {
         device.upload(luma, pixels.next_multiple_of(4) as u64, right);
 
         let mut recorder = Recorder::new(device, stamps.as_mut());
-        passes.iter().for_each(|pass| recorder.run(pass));
+        passes.iter().for_each(|pass| recorder.record(pass));
         recorder.encoder.copy_buffer_to_buffer(luma, 0, last_luma, 0, last_luma.size());
-        recorder.fetch(device, readback, (words, words.size()), |bytes| {
-            let each = bands::share(out.len(), MIN_PIXELS_PER_THREAD);
+        recorder.submit_and_read(device, readback, (words, words.size()), |bytes| {
+            let each = bands::chunk_len(out.len(), MIN_PIXELS_PER_THREAD);
             workers.run_each(out.chunks_mut(each).zip(bytes.chunks(2 * each)), &|(out, bytes): (&mut [u16], &[u8])| {
                 for (out, bytes) in out.iter_mut().zip(bytes.as_chunks().0) {
                     *out = u16::from_le_bytes(*bytes);

@@ -1,9 +1,9 @@
-//! Rectification on a device. Its results equal those of the twin [`Map`] to the bit.
+//! Rectification on a device. Its results equal those of the twin [`RemapTable`] to the bit.
 
 use std::sync::Arc;
 
 use super::shaders::{self, linear_workgroups};
-use crate::calibration::map::Map;
+use crate::calibration::map::RemapTable;
 use crate::compute::GpuError;
 use crate::compute::device::{Device, Pass, Readback, Recorder};
 use crate::frame::{ColorImage, GrayImage};
@@ -25,17 +25,17 @@ struct Camera {
 }
 
 impl Camera {
-    fn new(device: &Device, map: &Map, channels: usize) -> Self {
+    fn new(device: &Device, map: &RemapTable, channels: usize) -> Self {
         use wgpu::BufferUsages as Usage;
         let (width, height) = map.size();
         let (stride, bytes) = (channels * width as usize, channels * width as usize * height as usize);
-        let [starts, fractions] = map.words().map(|words| {
-            let buffer = device.buffer("sources", 4 * words.len(), Usage::STORAGE | Usage::COPY_DST);
+        let [starts, fractions] = map.packed_words().map(|words| {
+            let buffer = device.create_buffer("sources", 4 * words.len(), Usage::STORAGE | Usage::COPY_DST);
             device.upload(&buffer, 0, bytemuck::cast_slice(words));
             buffer
         });
-        let raw = device.buffer("raw", bytes, Usage::STORAGE | Usage::COPY_DST);
-        let rectified = device.buffer("rectified", bytes, Usage::STORAGE | Usage::COPY_SRC);
+        let raw = device.create_buffer("raw", bytes, Usage::STORAGE | Usage::COPY_DST);
+        let rectified = device.create_buffer("rectified", bytes, Usage::STORAGE | Usage::COPY_SRC);
         let constants = shaders::rectify_constants(bytes, stride, channels);
         let buffers = [&starts, &fractions, &raw, &rectified].map(wgpu::Buffer::as_entire_buffer_binding);
         let pass = Pass::new(device, shaders::RECTIFY, &constants, buffers, linear_workgroups(bytes.div_ceil(4)));
@@ -46,9 +46,9 @@ impl Camera {
         device.check()?;
         device.upload(&self.raw, 0, from);
         let mut recorder = Recorder::new(device, None);
-        recorder.run(&self.pass);
+        recorder.record(&self.pass);
         let (rectified, length) = (&self.rectified, into.len());
-        recorder.fetch(device, &mut self.readback, (rectified, rectified.size()), |bytes| {
+        recorder.submit_and_read(device, &mut self.readback, (rectified, rectified.size()), |bytes| {
             into.copy_from_slice(&bytes[..length]);
         })
     }
@@ -59,8 +59,9 @@ impl GpuRectifier {
     ///
     /// # Errors
     /// Fails if the device lacks memory, fails, or its result differs from the CPU's.
-    pub fn new(device: &Arc<Device>, maps: &[Map; 2]) -> Result<Self, GpuError> {
-        let cameras = device.attempt(|| [Camera::new(device, &maps[0], 3), Camera::new(device, &maps[1], 1)])?;
+    pub fn new(device: &Arc<Device>, maps: &[RemapTable; 2]) -> Result<Self, GpuError> {
+        let cameras =
+            device.with_error_scope(|| [Camera::new(device, &maps[0], 3), Camera::new(device, &maps[1], 1)])?;
         let mut made = Self { device: Arc::clone(device), size: maps[0].size(), cameras };
         made.self_test(&maps[1])?;
         device.check()?;
@@ -68,18 +69,21 @@ impl GpuRectifier {
     }
 
     /// Rectifies a test picture and compares it with the CPU's result, to detect driver faults before the first frame.
-    fn self_test(&mut self, map: &Map) -> Result<(), GpuError> {
+    fn self_test(&mut self, map: &RemapTable) -> Result<(), GpuError> {
         let (width, height) = map.size();
         let luma = (0..width * height).map(|k| (k.wrapping_mul(0x9e37_79b1) >> 24) as u8).collect();
         let from = GrayImage { width, height, luma };
         let (mut expected, mut found) = (GrayImage::default(), GrayImage::default());
-        map.gray(&from, &mut expected);
+        map.remap_gray(&from, &mut expected);
         self.right(&from, &mut found)?;
         let name = &self.device.name;
         if found.luma == expected.luma {
             Ok(())
         } else {
-            Err(GpuError::Failed(format!("{name}: a trial is rectified wrongly: its driver may have a fault")))
+            Err(GpuError::Failed(format!(
+                "{name}: self-test failed: a picture is rectified wrongly; its driver may be \
+                                          faulty"
+            )))
         }
     }
 

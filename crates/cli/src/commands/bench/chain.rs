@@ -7,18 +7,18 @@ use serde::Serialize;
 use super::BenchCommand;
 use crate::error::CliError;
 use crate::options;
-use crate::settings::layers::Given;
+use crate::settings::layers::GivenSettings;
 use crate::settings::look;
 use crate::settings::unused;
-use crate::terminal::print;
+use crate::terminal::print_to_stdout;
 use bokehcam::bokeh::{Bokeh, BokehError, Job};
 use bokehcam::budget::Quality;
-use bokehcam::capture::{Captured, Shot};
-use bokehcam::clock::{Clock, cpu_ns};
-use bokehcam::compute::{Backend, thread_pool::cores};
-use bokehcam::computing::{Computing, Executors};
+use bokehcam::capture::{Captured, FrameBuffers};
+use bokehcam::clock::{Clock, process_cpu_ns};
+use bokehcam::compute::{Backend, thread_pool::core_count};
+use bokehcam::computing::{ComputeOptions, ExecutorFactory};
 use bokehcam::depth::FrameInput;
-use bokehcam::engine::{CocMaker, Postprocess};
+use bokehcam::engine::{CocCalculator, Postprocess};
 use bokehcam::frame::{ColorImage, DepthMap, GrayImage, Stamp};
 use bokehcam::link::pool::Pooled;
 use bokehcam::look::{BackgroundMemory, Look, Strength};
@@ -76,17 +76,18 @@ struct Chain {
 ///
 /// # Errors
 /// Fails if the source is unreadable or a camera, or a stage fails.
-pub(super) fn run(command: &BenchCommand, name: &SourceName, given: &Given) -> Result<(), CliError> {
-    if !name.devices().is_empty() || matches!(name.kind(), Kind::Camera) {
+pub(super) fn run(command: &BenchCommand, name: &SourceName, given: &GivenSettings) -> Result<(), CliError> {
+    if !name.device_nodes().is_empty() || matches!(name.kind(), Kind::Camera) {
         let what =
-            "--chain: a camera gives frames when it takes them; use a recording of it (bokehcam record), or demo";
+            "--chain: a camera delivers frames only at its own pace; use a recording of it (bokehcam record), or demo";
         return Err(CliError::Usage(what.to_string()));
     }
-    for (k, computing) in command.computings().into_iter().enumerate() {
-        let chain = measure(command, name, computing, (k == 0).then_some(given))?;
+    for (k, computing) in command.list_configurations().into_iter().enumerate() {
+        let chain = measure_chain(command, name, computing, (k == 0).then_some(given))?;
         // Numbers and strings always serialise.
-        let text = if command.json { serde_json::to_string(&chain).unwrap_or_default() + "\n" } else { chain.table() };
-        print(text.as_bytes())?;
+        let text =
+            if command.json { serde_json::to_string(&chain).unwrap_or_default() + "\n" } else { chain.format_table() };
+        print_to_stdout(text.as_bytes())?;
     }
     Ok(())
 }
@@ -109,7 +110,7 @@ struct StepTimes {
 
 impl StepTimer {
     fn now(&self) -> [u64; 2] {
-        [cpu_ns(), self.clock.now_ns()]
+        [process_cpu_ns(), self.clock.now_ns()]
     }
 
     /// Records the time since the last call, or since [`StepTimer::restart`], as step `name`.
@@ -131,7 +132,7 @@ impl StepTimer {
         self.since = self.now();
     }
 
-    fn costs(&mut self) -> Vec<Stage> {
+    fn take_costs(&mut self) -> Vec<Stage> {
         let median_ms = |times_ns: &mut Vec<u64>| {
             times_ns.sort_unstable();
             times_ns[times_ns.len() / 2] as f64 / 1e6
@@ -142,13 +143,13 @@ impl StepTimer {
     }
 }
 
-fn measure(
+fn measure_chain(
     command: &BenchCommand,
     name: &SourceName,
-    computing: Computing,
-    given: Option<&Given>,
+    computing: ComputeOptions,
+    given: Option<&GivenSettings>,
 ) -> Result<Chain, CliError> {
-    let look = look::look(&command.blur, &options::LookSettings::default())?;
+    let look = look::build_look(&command.blur, &options::LookSettings::default())?;
     let wanted = command.frames.unwrap_or(super::FRAMES);
     let frames = WARM_UP_FRAMES + u64::from(wanted);
     let options = source::Options {
@@ -164,7 +165,7 @@ fn measure(
         ..source::Options::default()
     };
     let mut source = Source::open(name, &options, Some(&look))?;
-    let look = source.fitting_look(&look, &options)?;
+    let look = source.adapt_look(&look, &options)?;
     if let Some(given) = given {
         warn_of_unused(command, name, &source, &look, given);
     }
@@ -172,11 +173,11 @@ fn measure(
     let size = info.size;
     let levels = if command.quality.is_empty() { &Quality::ALL[..] } else { &command.quality };
     // The levels share one device, as in a stream that changes its quality.
-    let mut shared_device = Executors::new(computing.clone());
+    let mut shared_device = ExecutorFactory::new(computing.clone());
     let mut executors: Vec<(Quality, Box<dyn Bokeh>)> = Vec::new();
     for &quality in levels {
         let look = Look { quality: Some(quality), ..look.clone() };
-        let Some(settings) = look.settings(size, false) else {
+        let Some(settings) = look.blur_settings(size, false) else {
             let what = "--effect none leaves nothing to measure: use dof, tilt-shift or blur";
             return Err(CliError::Usage(what.to_string()));
         };
@@ -185,11 +186,11 @@ fn measure(
     let executor = executors.first().map(|(_, executor)| executor.describe()).unwrap_or_default();
 
     let measured = source.is_measured();
-    let coc = CocMaker::new(look.coc_rule(size), Postprocess::measured(look.refines(measured)));
-    let mut coc = coc.with_threads(computing.threads());
-    coc.compute_on(executors.first().and_then(|(_, executor)| executor.device()));
+    let coc = CocCalculator::new(look.coc_rule(size), Postprocess::for_measured(look.refines_depth(measured)));
+    let mut coc = coc.with_threads(computing.thread_count());
+    coc.use_device(executors.first().and_then(|(_, executor)| executor.device()));
     let knows_background = source.depth.as_ref().is_some_and(|source| source.knows_background());
-    coc.remember(look.background_memory == BackgroundMemory::On && !knows_background);
+    coc.set_background_memory(look.background_memory == BackgroundMemory::On && !knows_background);
     let mut timer = StepTimer { clock: Clock::system(), since: [0; 2], steps: Vec::new(), is_recording: false };
     let mut buffers = Buffers {
         color: Pooled::detached(ColorImage::new(size.0, size.1)),
@@ -208,7 +209,7 @@ fn measure(
     if timer.steps.is_empty() {
         return Err(CliError::Usage(format!("--chain: {name} has too few frames to measure")));
     }
-    Ok(Chain::from_stages(info.name, size, executor, wanted, timer.costs()))
+    Ok(Chain::from_stages(info.name, size, executor, wanted, timer.take_costs()))
 }
 
 /// Buffers of one frame, reused for the next.
@@ -226,12 +227,12 @@ impl Buffers {
     fn process_frame(
         &mut self,
         source: &mut Source,
-        coc: &mut CocMaker,
+        coc: &mut CocCalculator,
         executors: &mut [(Quality, Box<dyn Bokeh>)],
         timer: &mut StepTimer,
     ) -> Result<bool, CliError> {
         timer.restart();
-        let shot = Shot { color: &mut self.color, depth: &mut self.depth, right: &mut self.right };
+        let shot = FrameBuffers { color: &mut self.color, depth: &mut self.depth, right: &mut self.right };
         let stamp = match source.camera.next(shot)? {
             Captured::Frame(stamp) => stamp,
             Captured::Corrupt(error) => return Err(error.into()),
@@ -239,14 +240,14 @@ impl Buffers {
             Captured::Lost(..) | Captured::Waiting => return Ok(true),
         };
         timer.record("decode", "capture");
-        let field = match coc.fixed() {
+        let field = match coc.fixed_coc() {
             Some(field) => field,
             None => {
                 if source.depth.is_some() {
                     self.read_depth(source, stamp)?;
                     timer.record("read depth", "depth");
                 }
-                coc.make_with_steps(&mut self.depth, &self.color, stamp.time_ns, |step| timer.record(step, "depth"))
+                coc.compute_with_steps(&mut self.depth, &self.color, stamp.time_ns, |step| timer.record(step, "depth"))
             }
         };
         for (quality, executor) in executors {
@@ -255,7 +256,7 @@ impl Buffers {
             // The job owns its buffers; they come back with the result.
             let (color, out) = (take_buffer(&mut self.color), take_buffer(&mut self.out));
             let depth = std::mem::replace(&mut self.depth, Pooled::detached(DepthMap::default()));
-            let depth = coc.fixed().is_none().then_some(depth);
+            let depth = coc.fixed_coc().is_none().then_some(depth);
             timer.restart();
             executor.submit(Job { quality: *quality, out, ..Job::new(color, depth, field) })?;
             let finished = executor.collect(true)?.ok_or(BokehError::Lost)?;
@@ -282,7 +283,7 @@ impl Buffers {
 impl Chain {
     fn from_stages(source: String, size_px: (u32, u32), executor: String, frames: u32, mut stages: Vec<Stage>) -> Self {
         let (blurs, rest) = stages.drain(..).partition::<Vec<_>, _>(|stage| stage.thread == "blur");
-        let cores = cores();
+        let cores = core_count();
         let cpu_ms: f64 = rest.iter().map(|stage| stage.cost.cpu_ms).sum();
         let thread_ms = |thread: &str| -> f64 {
             rest.iter().filter(|stage| stage.thread == thread).map(|stage| stage.cost.wall_ms).sum()
@@ -300,7 +301,7 @@ impl Chain {
         Self { source, size_px, executor, cores, frames, stages: rest, levels, affords }
     }
 
-    fn table(&self) -> String {
+    fn format_table(&self) -> String {
         let Self { source, size_px: (width, height), executor, cores, frames, stages, levels, affords } = self;
         let mut text = format!("{source}, {width}x{height}, {frames} frames; {executor}; {cores} cores\n\n");
         text += "thread    stage           processor ms   wall ms\n";
@@ -332,17 +333,17 @@ impl Chain {
     }
 }
 
-fn warn_of_unused(command: &BenchCommand, name: &SourceName, source: &Source, look: &Look, given: &Given) {
-    unused::warn(
+fn warn_of_unused(command: &BenchCommand, name: &SourceName, source: &Source, look: &Look, given: &GivenSettings) {
+    unused::warn_of_unused(
         &given.settings,
-        &unused::Run {
-            source: unused::From::Source(name.kind()),
+        &unused::RunFacts {
+            source: unused::FrameOrigin::Source(name.kind()),
             depth: if source.has_depth() { source.depth_from } else { DepthOrigin::Nothing },
             uses_depth: look.effect.follows_depth(),
             effect: look.effect,
             lens: matches!(look.strength, Strength::Lens(_)),
             cpu_only: command.backend == Backend::Cpu,
-            ..unused::Run::default()
+            ..unused::RunFacts::default()
         },
     );
 }

@@ -11,7 +11,7 @@ named! {
     pub enum Scene default Sitter {
         /// A person in focus, and a room behind
         Sitter = "sitter",
-        /// The same with things in front, for which what they hide is filled in
+        /// The same with objects in front, so that the hidden background is filled in
         Portrait = "portrait",
     }
 }
@@ -20,7 +20,7 @@ named! {
 named! {
     /// The picture that is blurred.
     pub enum Scene default Demo {
-        /// The first one of the demonstration
+        /// The first picture of the demonstration
         Demo = "demo",
     }
 }
@@ -30,14 +30,14 @@ named! {
 /// # Errors
 /// Never fails in this configuration.
 #[cfg(feature = "lab")]
-pub fn first_frame(scene: Scene, size: (u32, u32)) -> Result<(ColorImage, DepthMap), CliError> {
+pub fn render_first_frame(scene: Scene, size: (u32, u32)) -> Result<(ColorImage, DepthMap), CliError> {
     use bokehcam_lab::scene::{Scene as Rendered, View};
     let scene_model = match scene {
         Scene::Sitter => Rendered::sitter(),
         Scene::Portrait => Rendered::portrait(),
     };
     let (mut color, mut depth) = (ColorImage::default(), DepthMap::default());
-    let threads = bokehcam::compute::thread_pool::cores();
+    let threads = bokehcam::compute::thread_pool::core_count();
     scene_model.render_pinhole(&View::new(size.0, size.1), 0.0, 1, threads, &mut color, &mut depth);
     Ok((color, depth))
 }
@@ -47,10 +47,10 @@ pub fn first_frame(scene: Scene, size: (u32, u32)) -> Result<(ColorImage, DepthM
 /// # Errors
 /// Fails if the demonstration cannot be decoded.
 #[cfg(not(feature = "lab"))]
-pub fn first_frame(_: Scene, (width, height): (u32, u32)) -> Result<(ColorImage, DepthMap), CliError> {
-    use bokehcam::capture::{Camera, Shot, demo::Demo};
+pub fn render_first_frame(_: Scene, (width, height): (u32, u32)) -> Result<(ColorImage, DepthMap), CliError> {
+    use bokehcam::capture::{Camera, FrameBuffers, demo::Demo};
     let (mut demo_color, mut demo_depth) = (ColorImage::default(), DepthMap::default());
-    Demo::new(Some(1))?.next(Shot {
+    Demo::new(Some(1))?.next(FrameBuffers {
         color: &mut demo_color,
         depth: &mut demo_depth,
         right: &mut Default::default(),

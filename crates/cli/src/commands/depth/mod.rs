@@ -8,34 +8,34 @@ use std::time::Instant;
 use clap::{Args, value_parser};
 
 use crate::error::CliError;
-use crate::files::{make_folder_of, refuse_overwrite, refuse_source, report_leftovers};
+use crate::files::{create_parent_folder, refuse_overwrite, refuse_overwriting_source, warn_of_leftovers};
 use crate::log;
 use crate::options;
 use crate::plausible;
 use crate::terminal;
 use bokehcam::calibration::rectifier::Rectifier;
 use bokehcam::compute::Backend;
-use bokehcam::computing::Computing;
+use bokehcam::computing::ComputeOptions;
 use bokehcam::depth::DepthError;
 use bokehcam::depth::stereo::check::{Verdict, check};
 use bokehcam::depth::stereo::{Effort, MatchError, Pair, Settings};
 use bokehcam::frame::{ColorImage, DepthMap, DisparityMap, GrayImage};
-use bokehcam::look::number::{above_zero, within};
+use bokehcam::look::number::{in_range_parser, parse_positive};
 use bokehcam::optics::StereoRig;
 use bokehcam::recording::geometry::Geometry;
 use bokehcam::recording::still::{self, MapFormat};
 use bokehcam::source::calib::{self, PairCalibration};
 use bokehcam::source::options::DEPTH_SCALE;
 
-use preview::preview;
+use preview::colorize_disparity;
 
 /// Default search range, if neither `--max-disparity` nor the calibration sets it.
 const DEFAULT_DISPARITIES: u32 = 64;
 
 /// Find the disparity of a rectified stereo pair, or its depth
 ///
-/// The disparity belongs to the left picture: its pixel x is seen at x - disparity in the right one. Both pictures are
-/// rectified (the same point is in the same row), or the calibration tells how to rectify them first.
+/// The disparity belongs to the left picture: its pixel x is at x - disparity in the right one. Both pictures are
+/// rectified (a point is in the same row of both), or are rectified first by the calibration.
 #[derive(Args, Debug)]
 #[command(after_help = "\
 Examples:
@@ -43,52 +43,53 @@ Examples:
   bokehcam depth left.png right.png --max-disparity 128 --out disparity.png
   bokehcam depth left.png right.png --focal-px 707 --baseline-m 0.54 --metres --out depth.pfm")]
 pub struct DepthCommand {
-    /// What the left eye saw, PNG or JPEG
+    /// Picture of the left camera, PNG or JPEG
     left: PathBuf,
-    /// What the right eye saw
+    /// Picture of the right camera
     right: PathBuf,
-    /// Where the result goes: .pfm (float pixels, infinity = unknown) or .png (16 bits, 256 units per pixel, 0 = unknown)
+    /// File for the result: .pfm (float pixels, infinity = unknown) or .png (16 bits, 256 units per pixel, 0 = unknown)
     #[arg(long, alias = "to", value_name = "FILE")]
     out: PathBuf,
-    /// Disparities that are tried, from 0, in pixels; rounded up to a multiple of 16 [default: the calibration's, else 64]
+    /// Range of disparities to search, from 0, in pixels; rounded up to a multiple of 16 [default: the calibration's,
+    /// else 64]
     // Distinct ids: the settings of the same names belong to live sources.
     #[arg(id = "pair_max_disparity", long = "max-disparity", value_name = "PX",
           value_parser = value_parser!(u32).range(1..=i64::from(Settings::MAX_DISPARITIES)))]
     max_disparity: Option<u32>,
-    /// Calibration of the two eyes: OpenCV's, Kalibr's or EuRoC's, by which the pictures are rectified first, or the
-    /// calib.txt of a rectified pair from Middlebury, ETH3D or KITTI; may be given more than once, or as a list with
-    /// commas, for one in two files
+    /// Calibration of the two cameras: from OpenCV, Kalibr or EuRoC, to rectify the pictures first, or the calib.txt of
+    /// a rectified pair from Middlebury, ETH3D or KITTI; may be given more than once, or as a list with commas, for a
+    /// calibration in two files
     #[arg(id = "pair_calib", long = "calib", value_name = "FILE", value_delimiter = ',')]
     calib: Vec<PathBuf>,
     /// Focal length in pixels, with --baseline-m
-    #[arg(id = "pair_focal_px", long = "focal-px", value_name = "PX", value_parser = above_zero,
+    #[arg(id = "pair_focal_px", long = "focal-px", value_name = "PX", value_parser = parse_positive,
           conflicts_with = "pair_calib", requires = "pair_baseline_m")]
     focal_px: Option<f32>,
-    /// Distance of the eyes in metres, with --focal-px
-    #[arg(id = "pair_baseline_m", long = "baseline-m", value_name = "M", value_parser = above_zero,
+    /// Distance between the cameras in metres, with --focal-px
+    #[arg(id = "pair_baseline_m", long = "baseline-m", value_name = "M", value_parser = parse_positive,
           conflicts_with = "pair_calib", requires = "pair_focal_px")]
     baseline_m: Option<f32>,
-    /// Column of the right principal point less that of the left, in pixels [default: 0]
-    #[arg(id = "pair_doffs_px", long = "doffs-px", value_name = "PX", value_parser = within(-10_000.0..=10_000.0),
+    /// Column of the right principal point minus that of the left, in pixels [default: 0]
+    #[arg(id = "pair_doffs_px", long = "doffs-px", value_name = "PX", value_parser = in_range_parser(-10_000.0..=10_000.0),
           conflicts_with = "pair_calib", requires = "pair_focal_px")]
     doffs_px: Option<f32>,
     /// Write depth in metres instead: .pfm, or .png of 5000 units per metre (TUM); 0 = unknown
     #[arg(long)]
     metres: bool,
-    /// Write the disparity as a picture, too: near is red, far is blue, unknown is black
+    /// Also write the disparity as a picture: near is red, far is blue, unknown is black
     #[arg(long, value_name = "FILE.png")]
     preview: Option<PathBuf>,
-    /// How much is done for it
-    #[arg(long, value_parser = options::named::<Effort>(), value_name = "HOW", default_value = "full")]
+    /// Effort of the matching
+    #[arg(long, value_parser = options::named_value_parser::<Effort>(), value_name = "HOW", default_value = "full")]
     effort: Effort,
-    /// What runs it
-    #[arg(long, value_parser = options::named::<Backend>(), value_name = "WHICH", default_value = "auto", help_heading = "Computing")]
+    /// Where the matching runs
+    #[arg(long, value_parser = options::named_value_parser::<Backend>(), value_name = "WHICH", default_value = "auto", help_heading = "Computing")]
     backend: Backend,
-    /// Part of the name of the GPU to take
+    /// GPU to use, by a part of its name
     #[arg(long, value_name = "NAME", help_heading = "Computing")]
     adapter: Option<String>,
     /// Threads of the CPU backend [default: one per core]
-    #[arg(long, value_name = "N", help_heading = "Computing", value_parser = options::threads())]
+    #[arg(long, value_name = "N", help_heading = "Computing", value_parser = options::thread_count_parser())]
     threads: Option<usize>,
     #[command(flatten)]
     output: options::Output,
@@ -100,10 +101,10 @@ pub struct DepthCommand {
 /// Fails if a file cannot be read or written, the pictures differ in size, the options do not fit them, or no GPU
 /// matches.
 pub fn run(command: &DepthCommand, global: &options::Global) -> Result<(), CliError> {
-    command.check()?;
+    command.check_options()?;
     let note = |text: String| {
         if !global.quiet {
-            terminal::say(&format!("note: {text}"));
+            terminal::print_to_stderr(&format!("note: {text}"));
         }
     };
     let mut color = still::read_color(&command.left)?;
@@ -112,18 +113,19 @@ pub fn run(command: &DepthCommand, global: &options::Global) -> Result<(), CliEr
     if right.size() != size {
         return Err(DepthError::from(MatchError::Sizes { left: size, right: right.size() }).into());
     }
-    let (geometry, rectifier) = command.geometry(size, &note)?;
+    let (geometry, rectifier) = command.resolve_geometry(size, &note)?;
     if let Some(rectifier) = &rectifier {
-        rectifier.left(&std::mem::take(&mut color), &mut color);
-        rectifier.right(&std::mem::take(&mut right), &mut right);
-        note("the pictures are rectified by the calibration: the result is that of the rectified left picture".into());
+        rectifier.rectify_left(&std::mem::take(&mut color), &mut color);
+        rectifier.rectify_right(&std::mem::take(&mut right), &mut right);
+        note("the pictures are rectified by the calibration: the result belongs to the rectified left picture".into());
     }
     plausible::warn_of_baseline(geometry.map(|geometry| geometry.rig));
     let left = to_luma(&color);
-    let disparities = command.disparity_range(geometry.and_then(|geometry| geometry.disparities), size.0, &note)?;
+    let disparities =
+        command.resolve_disparity_range(geometry.and_then(|geometry| geometry.disparities), size.0, &note)?;
     let (adapter, threads) = (command.adapter.clone(), command.threads);
-    let computing = Computing { backend: command.backend, adapter, threads };
-    let mut matcher = computing.matcher(disparities, command.effort, size)?;
+    let computing = ComputeOptions { backend: command.backend, adapter, threads };
+    let mut matcher = computing.create_matcher(disparities, command.effort, size)?;
     let mut disparity = DisparityMap::default();
     let start = Instant::now();
     let pair = Pair { left: &left, color: Some(&color), right: &right };
@@ -135,7 +137,7 @@ pub fn run(command: &DepthCommand, global: &options::Global) -> Result<(), CliEr
         verdict @ Verdict::RowsOff { .. } => note(format!(
             "{verdict}, and the disparity is wrong; {}",
             match rectifier {
-                Some(_) => "the calibration is not that of these cameras as they stood: calibrate them again",
+                Some(_) => "the calibration does not match the position of the cameras: calibrate them again",
                 None => "rectify it with the --calib FILE of raw cameras",
             }
         )),
@@ -145,11 +147,11 @@ pub fn run(command: &DepthCommand, global: &options::Global) -> Result<(), CliEr
     }
 
     let force = command.output.force;
-    make_folder_of(&command.out)?;
-    report_leftovers([command.out.as_path()]);
+    create_parent_folder(&command.out)?;
+    warn_of_leftovers([command.out.as_path()]);
     match geometry.filter(|_| command.metres) {
         Some(Geometry { rig, .. }) => {
-            let depth = disparity.depth(|px| rig.depth_m(px));
+            let depth = disparity.to_depth_map(|px| rig.depth_m(px));
             note_out_of_range_depth(&command.out, &depth, &note)?;
             still::write_depth(&command.out, &depth, DEPTH_SCALE, force)?;
         }
@@ -159,12 +161,12 @@ pub fn run(command: &DepthCommand, global: &options::Global) -> Result<(), CliEr
         }
     }
     if let Some(file) = &command.preview {
-        make_folder_of(file)?;
-        still::write_color(file, &preview(&disparity), force)?;
+        create_parent_folder(file)?;
+        still::write_color(file, &colorize_disparity(&disparity), force)?;
     }
     if !global.quiet {
         let (width, height) = size;
-        terminal::say(&format!(
+        terminal::print_to_stderr(&format!(
             "{}: written ({width}x{height}, {disparities} disparities, {took_ms:.1} ms, {})",
             command.out.display(),
             matcher.describe()
@@ -175,10 +177,10 @@ pub fn run(command: &DepthCommand, global: &options::Global) -> Result<(), CliEr
 
 impl DepthCommand {
     /// Rejects conflicting options and files before reading any picture.
-    fn check(&self) -> Result<(), CliError> {
+    fn check_options(&self) -> Result<(), CliError> {
         let usage = |text: &str| Err(CliError::Usage(text.to_string()));
         if self.metres && self.calib.is_empty() && self.focal_px.is_none() {
-            return usage("--metres needs the geometry of the eyes: give --calib FILE, or --focal-px and --baseline-m");
+            return usage("--metres needs the stereo geometry: give --calib FILE, or --focal-px and --baseline-m");
         }
         if still::map_format(&self.out).is_err() {
             return usage("--out FILE ends with .pfm or .png");
@@ -188,18 +190,18 @@ impl DepthCommand {
             return usage("--preview FILE.png ends with .png");
         }
         if self.preview.as_ref() == Some(&self.out) {
-            return usage("--preview and --out name one file; each needs its own");
+            return usage("--preview and --out name the same file; each needs its own");
         }
         for read in [&self.left, &self.right].into_iter().chain(&self.calib) {
-            refuse_source("--out", &self.out, read)?;
-            self.preview.as_ref().map_or(Ok(()), |preview| refuse_source("--preview", preview, read))?;
+            refuse_overwriting_source("--out", &self.out, read)?;
+            self.preview.as_ref().map_or(Ok(()), |preview| refuse_overwriting_source("--preview", preview, read))?;
         }
         refuse_overwrite([self.out.as_path()].into_iter().chain(self.preview.as_deref()), self.output.force)
     }
 
     /// Returns the stereo geometry for pictures of `size`, if options or calibration define it, and the rectifier for
     /// raw pictures.
-    fn geometry(
+    fn resolve_geometry(
         &self,
         size: (u32, u32),
         note: &dyn Fn(String),
@@ -210,7 +212,7 @@ impl DepthCommand {
             let rig = |(focal_px, baseline_m)| StereoRig { focal_px, baseline_m, doffs_px, metric: true };
             return Ok((self.focal_px.zip(self.baseline_m).map(rig).map(from_rig), None));
         }
-        match calib::read(&self.calib, &self.left, size)? {
+        match calib::read_pair_calibration(&self.calib, &self.left, size)? {
             PairCalibration::Rectified { geometry, made_for } => {
                 if let Some((width, height)) = made_for.filter(|&made_for| made_for != size) {
                     let file = self.calib[0].display();
@@ -220,7 +222,7 @@ impl DepthCommand {
             }
             PairCalibration::Raw(calibration) => {
                 let rectifier = Rectifier::new(&calibration, size)?;
-                calibration.notes(size).into_iter().for_each(note);
+                calibration.describe_assumptions(size).into_iter().for_each(note);
                 Ok((Some(from_rig(rectifier.rig())), Some(rectifier)))
             }
         }
@@ -228,7 +230,12 @@ impl DepthCommand {
 
     /// Returns the search range for pictures `width` px wide: `--max-disparity`, else the `calibrated` one, else
     /// [`DEFAULT_DISPARITIES`], limited by the width. The matcher needs a multiple of 16.
-    fn disparity_range(&self, calibrated: Option<u32>, width: u32, note: &dyn Fn(String)) -> Result<u32, CliError> {
+    fn resolve_disparity_range(
+        &self,
+        calibrated: Option<u32>,
+        width: u32,
+        note: &dyn Fn(String),
+    ) -> Result<u32, CliError> {
         // A disparity is less than the width.
         let limit = (width.saturating_sub(1) / 16 * 16).min(Settings::MAX_DISPARITIES);
         if limit == 0 {
@@ -253,7 +260,7 @@ impl DepthCommand {
         let tried = wanted.min(limit);
         if tried < wanted {
             note(format!(
-                "{wanted} disparities ({whose}), and at most {limit} can be tried: nearer surfaces are missed"
+                "{wanted} disparities ({whose}), but at most {limit} can be searched: nearer surfaces are missed"
             ));
         } else {
             note(format!("{tried} disparities ({whose})"));
@@ -264,7 +271,7 @@ impl DepthCommand {
 
 fn to_luma(color: &ColorImage) -> GrayImage {
     let mut luma = GrayImage::default();
-    luma.set_luma_of(color);
+    luma.set_luma_from(color);
     luma
 }
 
@@ -274,7 +281,10 @@ fn note_out_of_range_depth(out: &Path, depth: &DepthMap, note: &dyn Fn(String)) 
     let beyond = depth.metres.iter().filter(|&&metres| metres > limit_m).count();
     if still::map_format(out)? == MapFormat::Png && beyond > 0 {
         let percent = 100.0 * beyond as f32 / depth.metres.len() as f32;
-        note(format!("{percent:.1} % lies beyond {limit_m:.1} m, which a .png cannot hold: unknown there; a .pfm can"));
+        note(format!(
+            "{percent:.1} % lies beyond {limit_m:.1} m, too far for a .png, and is stored as unknown; use a \
+                      .pfm"
+        ));
     }
     Ok(())
 }

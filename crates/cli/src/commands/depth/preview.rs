@@ -14,7 +14,7 @@ const TURBO: [[f32; 6]; 3] = [
 ];
 
 /// Colours a disparity map: near is red, far is blue, unknown is black.
-pub fn preview(disparity: &DisparityMap) -> ColorImage {
+pub fn colorize_disparity(disparity: &DisparityMap) -> ColorImage {
     let mut known: Vec<f32> = disparity.px.iter().copied().filter(|&px| DepthMap::is_known(px)).collect();
     known.sort_unstable_by(f32::total_cmp);
     let quantile = |fraction: f32| known.get((fraction * known.len() as f32) as usize).copied().unwrap_or(0.0);
@@ -22,12 +22,12 @@ pub fn preview(disparity: &DisparityMap) -> ColorImage {
     let span_px = (near_px - far_px).max(f32::MIN_POSITIVE);
     let mut image = ColorImage::new(disparity.width, disparity.height);
     for (pixel, &px) in image.rgb.as_chunks_mut::<3>().0.iter_mut().zip(&disparity.px) {
-        *pixel = if DepthMap::is_known(px) { turbo(((px - far_px) / span_px).clamp(0.0, 1.0)) } else { [0; 3] };
+        *pixel = if DepthMap::is_known(px) { turbo_color(((px - far_px) / span_px).clamp(0.0, 1.0)) } else { [0; 3] };
     }
     image
 }
 
-fn turbo(value: f32) -> [u8; 3] {
+fn turbo_color(value: f32) -> [u8; 3] {
     let channel = |powers: [f32; 6]| powers.iter().rev().fold(0.0, |sum, power| sum * value + power);
     TURBO.map(|powers| (channel(powers).clamp(0.0, 1.0) * 255.0).round() as u8)
 }
@@ -41,7 +41,7 @@ mod tests {
         let mut px: Vec<f32> = (1..=300).map(|step| step as f32 / 10.0).collect();
         px[7] = 0.0;
         px[8] = f32::INFINITY;
-        let image = preview(&DisparityMap { width: 30, height: 10, px });
+        let image = colorize_disparity(&DisparityMap { width: 30, height: 10, px });
         let [far, unknown, infinite, middle, near] =
             [0, 7, 8, 150, 299].map(|at| <[u8; 3]>::try_from(&image.rgb[at * 3..][..3]).unwrap());
         assert_eq!([unknown, infinite], [[0; 3]; 2]);
@@ -50,7 +50,7 @@ mod tests {
         assert!(middle[1] > 240, "{middle:?}");
         // Only known disparities count, even if there are none or one.
         for px in [vec![], vec![0.0; 4], vec![3.0; 4]] {
-            preview(&DisparityMap { width: 2, height: px.len() as u32 / 2, px });
+            colorize_disparity(&DisparityMap { width: 2, height: px.len() as u32 / 2, px });
         }
     }
 }

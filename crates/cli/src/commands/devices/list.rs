@@ -8,10 +8,10 @@ use super::shared::{self, SharedCamera};
 use super::{CliError, DevicesCommand};
 use crate::options::Global;
 use crate::terminal;
-use crate::terminal::print;
+use crate::terminal::print_to_stdout;
 use bokehcam::v4l2::controls::{self, Control, Kind as ControlKind};
-use bokehcam::v4l2::holders::{Holder, holders};
-use bokehcam::v4l2::modes::{FormatModes, modes};
+use bokehcam::v4l2::holders::{Holder, list_holders};
+use bokehcam::v4l2::modes::{FormatModes, list_modes};
 use bokehcam::v4l2::node::{self, Kind, Node};
 use bokehcam::v4l2::{Device, controls::Value};
 
@@ -45,38 +45,40 @@ struct List {
 /// Fails if no device matches.
 pub fn run(command: &DevicesCommand, global: &Global) -> Result<(), CliError> {
     let list = match &command.device {
-        None => List { pipewire: shared::list_cameras(), ..List::from_nodes(node::nodes(), false, command.controls) },
+        None => {
+            List { pipewire: shared::list_cameras(), ..List::from_nodes(node::list_nodes(), false, command.controls) }
+        }
         Some(name) => match name.strip_prefix("pipewire:") {
             Some(name) => List { pipewire: shared::find_cameras(name)?, ..List::default() },
-            None => List::from_nodes(find(name)?, true, command.controls),
+            None => List::from_nodes(find_nodes(name)?, true, command.controls),
         },
     };
     if command.json {
         // Numbers and strings always serialise.
-        return print((serde_json::to_string_pretty(&list).unwrap_or_default() + "\n").as_bytes());
+        return print_to_stdout((serde_json::to_string_pretty(&list).unwrap_or_default() + "\n").as_bytes());
     }
     if list.to_string().is_empty() {
         if !global.quiet {
-            terminal::say("no camera and no virtual camera is here; `bokehcam doctor` says what to do");
+            terminal::print_to_stderr("there is no camera and no virtual camera; `bokehcam doctor` says what to do");
         }
         return Ok(());
     }
-    print(list.to_string().as_bytes())
+    print_to_stdout(list.to_string().as_bytes())
 }
 
-/// See [`super::formats`].
-pub fn formats(nodes: &[Node]) -> String {
+/// See [`super::format_devices`].
+pub fn format_devices(nodes: &[Node]) -> String {
     let nodes = nodes.iter().map(|node| Node { links: Vec::new(), ..node.clone() });
     let list = List { pipewire: shared::list_cameras(), ..List::from_nodes(nodes.collect(), false, false) };
     let listed = list.to_string();
     if listed.is_empty() { "none".to_owned() } else { listed }
 }
 
-/// Finds the node that `name` resolves to (see [`node::resolve`]), else all nodes whose card name contains it, even
+/// Finds the node that `name` resolves to (see [`node::resolve_node`]), else all nodes whose card name contains it, even
 /// those that give no pictures.
-fn find(name: &str) -> Result<Vec<Node>, CliError> {
-    let nodes = node::nodes();
-    let path = match node::resolve(name) {
+fn find_nodes(name: &str) -> Result<Vec<Node>, CliError> {
+    let nodes = node::list_nodes();
+    let path = match node::resolve_node(name) {
         Ok(path) => path,
         Err(error) => {
             let wanted = name.to_lowercase();
@@ -113,11 +115,11 @@ impl List {
 impl DeviceInfo {
     fn read(node: Node, with_controls: bool) -> Self {
         // Before this program opens the node and becomes a holder.
-        let holders = holders(&node.path);
+        let holders = list_holders(&node.path);
         let device = Device::open(&node.path).ok();
-        let formats = device.as_ref().and_then(|device| modes(device).ok()).unwrap_or_default();
+        let formats = device.as_ref().and_then(|device| list_modes(device).ok()).unwrap_or_default();
         let controls =
-            with_controls.then(|| device.and_then(|device| controls::list(&device).ok()).unwrap_or_default());
+            with_controls.then(|| device.and_then(|device| controls::list_controls(&device).ok()).unwrap_or_default());
         Self { node, holders, formats, controls }
     }
 }
@@ -161,7 +163,7 @@ impl DeviceInfo {
             line(link.display().to_string());
         }
         if node.kind == Kind::Virtual {
-            line(loopback_state(node).to_owned());
+            line(describe_loopback_state(node).to_owned());
         }
         if !holders.is_empty() {
             let names: Vec<_> = holders.iter().map(ToString::to_string).collect();
@@ -177,24 +179,24 @@ impl DeviceInfo {
             line(format!("also {}, which cannot be read here", names.join(" ")));
         }
         for control in controls.iter().flatten() {
-            line(control_line(control));
+            line(format_control(control));
         }
         out
     }
 }
 
 /// Describes a virtual camera's state by its capabilities: with `exclusive_caps=1` they change with its first writer.
-fn loopback_state(node: &Node) -> &'static str {
+fn describe_loopback_state(node: &Node) -> &'static str {
     match (node.captures, node.outputs) {
         (true, true) => "can be written to and read from",
         (false, true) => "can be written to",
         (true, false) => "is being written to",
-        (false, false) => "is in a state that takes neither writers nor readers: reload the module v4l2loopback",
+        (false, false) => "accepts neither writers nor readers: reload the module v4l2loopback",
     }
 }
 
 /// Formats a control as `name=value  (accepted values), flags`.
-fn control_line(control: &Control) -> String {
+fn format_control(control: &Control) -> String {
     let Control { name, value, minimum, maximum, step, default, items, .. } = control;
     let mut line = name.clone();
     if let Some(value) = value {

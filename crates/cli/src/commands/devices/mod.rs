@@ -14,8 +14,8 @@ use bokehcam::v4l2::node::Node;
 
 /// List cameras and virtual cameras
 ///
-/// Cameras with their formats, sizes and rates, and who has them open; virtual cameras and cameras of PipeWire's apart. Nodes that give no
-/// pictures, such as those for metadata, are left out.
+/// Cameras with their formats, sizes and rates, and the programs that have them open; then virtual cameras and PipeWire
+/// cameras. Nodes without pictures, such as those for metadata, are left out.
 #[derive(Args, Debug)]
 #[command(after_help = "\
 Examples:
@@ -24,10 +24,10 @@ Examples:
   bokehcam devices --json /dev/video0")]
 #[cfg_attr(not(feature = "camera"), allow(dead_code))]
 pub struct DevicesCommand {
-    /// One device only: its path, number, by-id name, or a part of its card's name; pipewire:NAME for a camera of PipeWire's
+    /// One device only: its path, number, by-id name, or a part of its card's name; pipewire:NAME for a PipeWire camera
     #[arg(value_name = "DEVICE")]
     device: Option<String>,
-    /// Also the settings that the device itself has, such as exposure
+    /// Also list the device's own settings, such as exposure
     #[arg(long)]
     controls: bool,
     /// As JSON
@@ -38,8 +38,8 @@ pub struct DevicesCommand {
 /// Formats cameras, and nodes that may be cameras, as the command lists them; without links, whose names contain serial
 /// numbers.
 #[cfg(feature = "camera")]
-pub fn formats(nodes: &[Node]) -> String {
-    list::formats(nodes)
+pub fn format_devices(nodes: &[Node]) -> String {
+    list::format_devices(nodes)
 }
 
 /// Runs the command.

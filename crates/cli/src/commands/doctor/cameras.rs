@@ -3,13 +3,13 @@
 use super::finding::Finding;
 use super::system::System;
 use bokehcam::layout::Content;
-use bokehcam::v4l2::controls::{self, LOW_LIGHT, Value};
-use bokehcam::v4l2::holders::holders;
-use bokehcam::v4l2::modes::{FormatModes, Interval, Rates, SizeModes, Sizes, modes};
+use bokehcam::v4l2::controls::{self, LOW_LIGHT_CONTROL, Value};
+use bokehcam::v4l2::holders::list_holders;
+use bokehcam::v4l2::modes::{FormatModes, Interval, Rates, SizeModes, Sizes, list_modes};
 use bokehcam::v4l2::node::{Kind, Node};
 use bokehcam::v4l2::{Device, controls::Control};
 
-pub const ABOUT: &str = "camera";
+pub const TOPIC: &str = "camera";
 
 /// Data rate of USB 2 (high speed).
 const USB2_MBIT_PER_S: f32 = 480.0;
@@ -18,25 +18,25 @@ const USB2_MBIT_PER_S: f32 = 480.0;
 const RAW_DRIVERS: [&str; 4] = ["isys", "intel-ipu6-isys", "intel-ipu7-isys", "ipu3-cio2"];
 
 /// Checks the cameras, and the nodes that could be cameras.
-pub fn findings(nodes: &[Node], system: &System) -> Vec<Finding> {
+pub fn check_cameras(nodes: &[Node], system: &System) -> Vec<Finding> {
     let (raw, cameras): (Vec<&Node>, Vec<&Node>) = nodes
         .iter()
         .filter(|node| node.kind == Kind::Capture)
         .partition(|node| RAW_DRIVERS.contains(&node.driver.as_str()));
     let mut findings: Vec<Finding> = cameras.iter().flat_map(|node| check_camera(node)).collect();
     for node in nodes.iter().filter(|node| node.denied && node.kind == Kind::Other) {
-        findings.push(report_denied(ABOUT, node));
+        findings.push(report_denied(TOPIC, node));
     }
     if let Some(node) = raw.first() {
         let found = format!("{} nodes such as {node} give raw sensor data, which only libcamera can use", raw.len());
-        findings.push(Finding::note(ABOUT, found, "connect a USB camera"));
+        findings.push(Finding::note(TOPIC, found, "connect a USB camera"));
     }
     if cameras.is_empty() {
         let fix = match &system.sandbox {
             Some(sandbox) => format!("let this {sandbox} have the camera's node, such as /dev/video0"),
-            None => "connect a camera; if it is connected, `lsusb` and `sudo dmesg` tell what became of it".to_owned(),
+            None => "connect a camera; if it is connected, see `lsusb` and `sudo dmesg`".to_owned(),
         };
-        findings.push(Finding::missing(ABOUT, "there is none", fix));
+        findings.push(Finding::missing(TOPIC, "there is none", fix));
     }
     findings
 }
@@ -50,58 +50,58 @@ pub fn report_denied(about: &'static str, node: &Node) -> Finding {
 /// Checks one camera: whether it opens, its best mode, its USB connection, its other holders, its rate in low light.
 fn check_camera(node: &Node) -> Vec<Finding> {
     // Before this program opens the node and becomes a holder.
-    let holders = holders(&node.path);
+    let holders = list_holders(&node.path);
     let device = match Device::open(&node.path) {
         Ok(device) => device,
         Err(error) => {
-            return vec![Finding::missing(ABOUT, format!("{node}: {error}"), "unplug it and plug it in again")];
+            return vec![Finding::missing(TOPIC, format!("{node}: {error}"), "unplug it and plug it in again")];
         }
     };
-    let modes = modes(&device).unwrap_or_default();
-    let mut findings = vec![Finding::good(ABOUT, format!("{node}: {}", best_mode(&modes)))];
+    let modes = list_modes(&device).unwrap_or_default();
+    let mut findings = vec![Finding::good(TOPIC, format!("{node}: {}", describe_best_mode(&modes)))];
     if let Some(usb) = &node.usb {
         let mbit_per_s = usb.mbit_per_s;
         findings.push(if mbit_per_s < USB2_MBIT_PER_S {
             let found = format!("{node}: its USB connection carries only {mbit_per_s} Mbit/s");
-            Finding::note(ABOUT, found, "use another socket or cable, and no hub")
+            Finding::note(TOPIC, found, "use another socket or cable, and no hub")
         } else if mbit_per_s == USB2_MBIT_PER_S && !modes.iter().any(|format| format.fourcc.to_string() == "MJPG") {
-            let found = format!("{node}: on USB 2 and without MJPG, which is too slow for 1280x720 at 30 fps");
-            Finding::note(ABOUT, found, "use a USB 3 socket, or --size 640x480")
+            let found = format!("{node}: USB 2 without MJPG is too slow for 1280x720 at 30 fps");
+            Finding::note(TOPIC, found, "use a USB 3 socket, or --size 640x480")
         } else {
-            Finding::good(ABOUT, format!("{node}: USB at {mbit_per_s} Mbit/s"))
+            Finding::good(TOPIC, format!("{node}: USB at {mbit_per_s} Mbit/s"))
         });
     }
     if !holders.is_empty() {
         let names: Vec<_> = holders.iter().map(ToString::to_string).collect();
         let found = format!("{node}: opened by {}", names.join(", "));
-        findings.push(Finding::note(ABOUT, found, "only one program can take pictures: end the others if it is busy"));
+        findings.push(Finding::note(TOPIC, found, "only one program can take pictures: end the others if it is busy"));
     }
-    findings.extend(low_light(node, &controls::list(&device).unwrap_or_default()));
+    findings.extend(check_low_light(node, &controls::list_controls(&device).unwrap_or_default()));
     findings
 }
 
 /// Notes that the camera is set to lower its frame rate in the dark for a longer exposure.
-fn low_light(node: &Node, controls: &[Control]) -> Option<Finding> {
-    let control = controls::find(controls, LOW_LIGHT)?;
+fn check_low_light(node: &Node, controls: &[Control]) -> Option<Finding> {
+    let control = controls::find_control(controls, LOW_LIGHT_CONTROL)?;
     (control.value == Some(Value::Number(1)) && !control.inactive).then(|| {
         let found = format!("{node}: may give half its rate in low light ({}=1)", control.name);
-        Finding::note(ABOUT, found, format!("give --control {}=0, or more light", control.name))
+        Finding::note(TOPIC, found, format!("give --control {}=0, or more light", control.name))
     })
 }
 
 /// Describes the largest mode with a smooth rate, else the fastest mode.
-fn best_mode(modes: &[FormatModes]) -> String {
+fn describe_best_mode(modes: &[FormatModes]) -> String {
     /// Motion looks smooth from here on; includes the 25 and 29.97 fps of some cameras.
     const SMOOTH_FPS: f64 = 24.0;
     let readable = modes.iter().filter(|format| format.fourcc.content() == Some(Content::Color));
-    let all = readable.flat_map(|format| sizes(&format.sizes).into_iter().map(move |size| (format, size)));
+    let all = readable.flat_map(|format| list_sizes(&format.sizes).into_iter().map(move |size| (format, size)));
     let rank = |(_, (size_px, fastest)): &(&FormatModes, ((u32, u32), Option<Interval>))| {
         let fps = fastest.map_or(0.0, Interval::fps);
         let pixels = u64::from(size_px.0) * u64::from(size_px.1);
         if fps >= SMOOTH_FPS { (1, pixels, fps as u64) } else { (0, fps as u64, pixels) }
     };
     match all.max_by_key(rank) {
-        None => "has no format that can be read here".to_owned(),
+        None => "has no supported format".to_owned(),
         Some((format, ((width, height), fastest))) => {
             let rate = fastest.map_or_else(String::new, |fastest| format!(" at {fastest} fps"));
             format!("up to {width}x{height}{rate} ({})", format.fourcc)
@@ -110,7 +110,7 @@ fn best_mode(modes: &[FormatModes]) -> String {
 }
 
 /// Returns each size with its shortest frame interval, if known; only the largest of a range.
-fn sizes(sizes: &Sizes) -> Vec<((u32, u32), Option<Interval>)> {
+fn list_sizes(sizes: &Sizes) -> Vec<((u32, u32), Option<Interval>)> {
     let fastest = |rates: &Rates| match rates {
         Rates::Unknown => None,
         Rates::Discrete(intervals) => intervals.first().copied(),

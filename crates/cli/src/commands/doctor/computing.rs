@@ -4,7 +4,7 @@ use std::process::{Command, Stdio};
 
 use super::finding::Finding;
 use bokehcam::compute::Backend;
-use bokehcam::computing::Computing;
+use bokehcam::computing::ComputeOptions;
 use bokehcam::look::{Effect, Look};
 
 const BLUR: &str = "blur";
@@ -13,7 +13,7 @@ const NETWORKS: &str = "networks";
 const PROGRAMS: &str = "programs";
 
 /// Checks the blur's executor, the networks, and external programs.
-pub fn findings() -> Vec<Finding> {
+pub fn check_computing() -> Vec<Finding> {
     let mut findings = vec![check_blur()];
     #[cfg(feature = "networks")]
     findings.extend(check_networks());
@@ -29,11 +29,11 @@ fn check_networks() -> Vec<Finding> {
     let names: Vec<&str> = installed.iter().map(|(known, _)| known.file).collect();
     let persons = installed.iter().any(|(known, _)| known.task == Task::Matte);
     let models = match persons {
-        true => Finding::good(NETWORKS, format!("one camera alone gives a portrait: {}", names.join(", "))),
+        true => Finding::good(NETWORKS, format!("a single camera gives a portrait, by {}", names.join(", "))),
         false => Finding::note(
             NETWORKS,
-            "none that finds persons, so one camera alone gives no portrait",
-            "`bokehcam models get` brings one (250 kB); --depth plate needs none",
+            "none that finds persons, so a single camera gives no portrait",
+            "`bokehcam models get` installs one (250 kB); --depth plate needs none",
         ),
     };
     let runtime = match network::onnx_runtime_installed() {
@@ -49,17 +49,17 @@ fn check_networks() -> Vec<Finding> {
 fn check_blur() -> Finding {
     /// Any size will do.
     const SIZE: (u32, u32) = (64, 64);
-    let settings = Look::plain(Effect::Blur).settings(SIZE, false);
-    let computing = Computing::default();
+    let settings = Look::with_effect(Effect::Blur).blur_settings(SIZE, false);
+    let computing = ComputeOptions::default();
     match settings.as_ref().map(|settings| computing.create_blur(settings, SIZE)).transpose() {
         Err(error) => Finding::note(BLUR, error.to_string(), "report this"),
         Ok(None) => Finding::note(BLUR, "nothing is blurred".to_string(), "report this"),
         Ok(Some(bokeh)) => {
             let name = bokeh.describe();
             if bokeh.backend() == Backend::Cpu && cfg!(feature = "gpu") {
-                let fix = "install a Vulkan driver if there is a GPU (`sudo apt install mesa-vulkan-drivers`, or that of its \
-                           maker); `bokehcam bench` tells how fast the CPU is";
-                Finding::note(BLUR, format!("no hardware GPU that can be used: {name}"), fix)
+                let fix = "install a Vulkan driver if there is a GPU (`sudo apt install mesa-vulkan-drivers`, or its \
+                           maker's driver); `bokehcam bench` measures the CPU";
+                Finding::note(BLUR, format!("no usable hardware GPU: {name}"), fix)
             } else {
                 Finding::good(BLUR, name)
             }

@@ -6,32 +6,32 @@ use std::path::Path;
 use super::cameras::report_denied;
 use super::finding::Finding;
 use super::system::System;
-use bokehcam::v4l2::holders::holders;
-use bokehcam::v4l2::loopback::{self, modprobe};
+use bokehcam::v4l2::holders::list_holders;
+use bokehcam::v4l2::loopback::{self, modprobe_command};
 use bokehcam::v4l2::node::{Kind, Node};
 
-pub const ABOUT: &str = "virtual camera";
+pub const TOPIC: &str = "virtual camera";
 
 const LOADED: &str = "/sys/module/v4l2loopback";
 
 /// Returns the command that loads the module so that browsers list its camera.
 fn load_command() -> String {
-    modprobe("/dev/video10".as_ref())
+    modprobe_command("/dev/video10".as_ref())
 }
 
 /// Number of buffers that PipeWire requests; it refuses a node with fewer.
 const PIPEWIRE_BUFFERS: u32 = 16;
 
 /// Checks the module v4l2loopback and each of its nodes.
-pub fn findings(nodes: &[Node], system: &System) -> Vec<Finding> {
+pub fn check_loopback(nodes: &[Node], system: &System) -> Vec<Finding> {
     let nodes: Vec<&Node> = nodes.iter().filter(|node| node.kind == Kind::Virtual).collect();
     let loaded = Path::new(LOADED).exists();
     if !loaded && nodes.is_empty() {
-        return vec![not_loaded(system)];
+        return vec![report_not_loaded(system)];
     }
-    let mut findings = vec![Finding::good(ABOUT, format!("module v4l2loopback {} is loaded", module_version()))];
+    let mut findings = vec![Finding::good(TOPIC, format!("module v4l2loopback {} is loaded", module_version()))];
     if nodes.is_empty() {
-        findings.push(Finding::missing(ABOUT, "the module has no device here", load_command()));
+        findings.push(Finding::missing(TOPIC, "the module has no device here", load_command()));
     }
     findings.extend(nodes.iter().map(|node| check_node(node)));
     findings.extend(check_buffers(system));
@@ -39,7 +39,7 @@ pub fn findings(nodes: &[Node], system: &System) -> Vec<Finding> {
 }
 
 /// Reports how to install or load the module.
-fn not_loaded(system: &System) -> Finding {
+fn report_not_loaded(system: &System) -> Finding {
     if !is_installed(&system.kernel) {
         let fix = format!(
             "install it (`sudo apt install v4l2loopback-dkms`, `dnf install akmod-v4l2loopback` of RPM Fusion, \
@@ -47,7 +47,7 @@ fn not_loaded(system: &System) -> Finding {
             load_command()
         );
         return Finding::missing(
-            ABOUT,
+            TOPIC,
             format!("module v4l2loopback is not installed for Linux {}", system.kernel),
             fix,
         );
@@ -61,7 +61,7 @@ fn not_loaded(system: &System) -> Finding {
     } else {
         format!("`{}`", load_command())
     };
-    Finding::missing(ABOUT, "module v4l2loopback is installed and not loaded", fix)
+    Finding::missing(TOPIC, "module v4l2loopback is installed and not loaded", fix)
 }
 
 /// Whether the kernel's module list contains v4l2loopback, in any of the distributions' folders.
@@ -86,34 +86,34 @@ fn module_version() -> String {
 /// has a writer, and a capture device from then on.
 fn check_node(node: &Node) -> Finding {
     if node.denied {
-        return report_denied(ABOUT, node);
+        return report_denied(TOPIC, node);
     }
-    let holders: Vec<_> = holders(&node.path).iter().map(ToString::to_string).collect();
+    let holders: Vec<_> = list_holders(&node.path).iter().map(ToString::to_string).collect();
     let by = if holders.is_empty() { "a process that this user cannot see".to_owned() } else { holders.join(", ") };
     match (node.captures, node.outputs) {
-        (false, true) => Finding::good(ABOUT, format!("{node}: free; opened by {by}")),
+        (false, true) => Finding::good(TOPIC, format!("{node}: free; opened by {by}")),
         (true, true) => {
             let found = format!("{node}: free, but made without exclusive_caps=1: browsers will not list it");
-            Finding::note(ABOUT, found, load_command())
+            Finding::note(TOPIC, found, load_command())
         }
         (true, false) => {
             let found = format!("{node}: in use, opened by {by}");
-            Finding::note(ABOUT, found, "end what writes to it, or use another node")
+            Finding::note(TOPIC, found, "stop that program, or use another node")
         }
         (false, false) => {
-            let found = format!("{node}: a program left it in a state that takes neither writers nor readers");
-            Finding::missing(ABOUT, found, load_command())
+            let found = format!("{node}: accepts neither writers nor readers since its last program ended");
+            Finding::missing(TOPIC, found, load_command())
         }
     }
 }
 
 /// Notes that the module has too few buffers for a running PipeWire.
 fn check_buffers(system: &System) -> Option<Finding> {
-    let buffers = loopback::buffers()?;
+    let buffers = loopback::read_buffer_count()?;
     let fix = "load the module with max_buffers=16 if programs that get their cameras from PipeWire do not list it";
     (system.pipewire && buffers < PIPEWIRE_BUFFERS).then(|| {
         let found = format!("max_buffers={buffers}: fine for programs that open the node, too few for PipeWire");
-        Finding::note(ABOUT, found, fix)
+        Finding::note(TOPIC, found, fix)
     })
 }
 

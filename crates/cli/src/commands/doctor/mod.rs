@@ -29,9 +29,9 @@ use crate::error::CliError;
 
 /// Check this machine: cameras, virtual camera, permissions, GPU, programs
 ///
-/// Every finding comes with what to do about it. Good to have in a request for help. The exit code is 0 when there are
-/// a camera and a way to give others one (the module v4l2loopback, or PipeWire), else 1; with --report it is 0 when there is
-/// a report.
+/// Every finding comes with advice. Add the output to a request for help. The exit code is 0 when there are a camera
+/// and a way to provide a virtual one (the module v4l2loopback, or PipeWire), else 1; with --report it is 0 if the
+/// report was made.
 #[derive(Args, Debug)]
 #[command(after_help = "\
 Examples:
@@ -43,8 +43,8 @@ pub struct DoctorCommand {
     /// As JSON
     #[arg(long)]
     json: bool,
-    /// Print a report of this machine to give to others, and write it to FILE; without names of users and machines,
-    /// without serial numbers and pictures
+    /// Print a report of this machine to share, and write it to FILE; without names of users and machines, serial
+    /// numbers and pictures
     #[arg(long, value_name = "FILE", num_args = 0..=1, conflicts_with = "json")]
     report: Option<Option<PathBuf>>,
 }

@@ -10,7 +10,7 @@ use super::system::System;
 use bokehcam::pipewire::PipeWireError;
 use bokehcam::pipewire::graph::Graph;
 
-pub const ABOUT: &str = "PipeWire";
+pub const TOPIC: &str = "PipeWire";
 
 /// Browsers: program names, display name, and the switch that makes them list PipeWire's cameras.
 const BROWSERS: [(&[&str], &str, &str); 2] = [
@@ -23,7 +23,7 @@ const BROWSERS: [(&[&str], &str, &str); 2] = [
 ];
 
 /// Results of the PipeWire checks.
-pub struct Verdict {
+pub struct PipeWireResults {
     pub findings: Vec<Finding>,
     /// Whether this program can publish a camera that others can read.
     pub can_publish: bool,
@@ -32,46 +32,52 @@ pub struct Verdict {
 }
 
 /// Checks the requirements of a PipeWire camera, from the daemon to the browsers.
-pub fn check(system: &System) -> Verdict {
-    let graph = match Graph::look() {
+pub fn check_pipewire(system: &System) -> PipeWireResults {
+    let graph = match Graph::list_without_modes() {
         Ok(graph) => graph,
         Err(error) => {
-            let findings = vec![unreachable(&error)];
-            return Verdict { findings, can_publish: false, has_cameras: false };
+            let findings = vec![report_unreachable(&error)];
+            return PipeWireResults { findings, can_publish: false, has_cameras: false };
         }
     };
     let all: Vec<_> = graph.sources.iter().filter(|source| source.is_camera).collect();
     let has_cameras = all.iter().any(|camera| !camera.process.is_some_and(is_bokehcam));
     let cameras: Vec<&str> = all.iter().map(|camera| camera.label.as_str()).collect();
     let there_are = if cameras.is_empty() { "no camera yet".to_owned() } else { cameras.join(", ") };
-    let mut findings =
-        vec![Finding::good(ABOUT, format!("it answers, and has {there_are}; --to pipewire gives it one"))];
+    let mut findings = vec![Finding::good(TOPIC, format!("it is running, with {there_are}; --to pipewire adds one"))];
     let has_manager = graph.has_session_manager();
     findings.push(if has_manager {
-        Finding::good(ABOUT, "a session manager connects readers with cameras")
+        Finding::good(TOPIC, "a session manager connects readers with cameras")
     } else {
         let fix = "install and start it: `sudo apt install wireplumber`, `systemctl --user start wireplumber`";
-        Finding::missing(ABOUT, "no session manager: a reader would wait for ever", fix)
+        Finding::missing(TOPIC, "no session manager: readers would wait forever", fix)
     });
     findings.push(if system.portal {
-        Finding::good(ABOUT, "a desktop portal is there, which browsers ask for cameras")
+        Finding::good(TOPIC, "a desktop portal is running (browsers need it for cameras)")
     } else {
         let fix =
             "install xdg-desktop-portal and the part for this desktop (-gtk, -gnome, -kde, -wlr), and log in again";
-        Finding::note(ABOUT, "no desktop portal: browsers list no camera of PipeWire's, other programs do", fix)
+        Finding::note(TOPIC, "no desktop portal: browsers do not list PipeWire cameras; other programs do", fix)
     });
     // A portal that started before the session manager never sees its cameras.
     if system.portal && !cameras.is_empty() && portal_sees_a_camera() == Some(false) {
-        let fix = "their order of start: `systemctl --user restart wireplumber xdg-desktop-portal`";
-        findings.push(Finding::note(ABOUT, "the desktop portal sees no camera, although PipeWire has one", fix));
+        let fix = "restart both in order: `systemctl --user restart wireplumber xdg-desktop-portal`";
+        findings.push(Finding::note(TOPIC, "the desktop portal sees no camera, although PipeWire has one", fix));
     }
     findings.extend(check_refusals());
-    findings.extend(
-        BROWSERS.iter().filter(|(programs, ..)| programs.iter().any(|name| is_installed(name))).map(
-            |(_, name, switch)| Finding::note(ABOUT, format!("{name} lists its cameras only when told to"), *switch),
-        ),
-    );
-    Verdict { findings, can_publish: has_manager, has_cameras: has_manager && has_cameras }
+    findings.extend(BROWSERS.iter().filter(|(programs, ..)| programs.iter().any(|name| is_installed(name))).map(
+        |(_, name, switch)| {
+            Finding::note(
+                TOPIC,
+                format!(
+                    "{name} lists PipeWire cameras only after a change of its \
+                                                              settings"
+                ),
+                *switch,
+            )
+        },
+    ));
+    PipeWireResults { findings, can_publish: has_manager, has_cameras: has_manager && has_cameras }
 }
 
 /// Whether a process is an instance of this program: its output does not count as a camera.
@@ -79,10 +85,10 @@ fn is_bokehcam(process: u32) -> bool {
     std::fs::read_to_string(format!("/proc/{process}/comm")).is_ok_and(|name| name.trim_end() == "bokehcam")
 }
 
-fn unreachable(error: &PipeWireError) -> Finding {
-    let fix = "it is needed for --to pipewire alone: `sudo apt install pipewire wireplumber`, then \
-               `systemctl --user start pipewire wireplumber`";
-    Finding::note(ABOUT, error.to_string(), fix)
+fn report_unreachable(error: &PipeWireError) -> Finding {
+    let fix = "it is only needed for --to pipewire: `sudo apt install pipewire wireplumber`, then `systemctl --user \
+               start pipewire wireplumber`";
+    Finding::note(TOPIC, error.to_string(), fix)
 }
 
 /// Whether the portal reports a camera; `None` if it does not answer.
@@ -96,15 +102,15 @@ fn portal_sees_a_camera() -> Option<bool> {
 fn check_refusals() -> Option<Finding> {
     let store = "org.freedesktop.impl.portal.PermissionStore";
     let place = ["call", store, "/org/freedesktop/impl/portal/PermissionStore", store, "Lookup", "ss"];
-    let names = refused_programs(&call_bus(&[&place[..], &["devices", "camera"]].concat())?);
+    let names = parse_refused_programs(&call_bus(&[&place[..], &["devices", "camera"]].concat())?);
     (!names.is_empty()).then(|| {
-        let found = format!("the desktop refuses cameras to {}, as it was told once", names.join(", "));
-        Finding::note(ABOUT, found, "`flatpak permission-remove devices camera`, and answer yes the next time")
+        let found = format!("the desktop refuses cameras to {}, because of an earlier answer", names.join(", "));
+        Finding::note(TOPIC, found, "`flatpak permission-remove devices camera`, and answer yes the next time")
     })
 }
 
 /// Returns the programs with the answer "no" in the permission store; programs outside sandboxes have an empty name.
-fn refused_programs(answer: &Value) -> Vec<String> {
+fn parse_refused_programs(answer: &Value) -> Vec<String> {
     let permissions = answer["data"][0].as_object().into_iter().flatten();
     let is_refused = |answers: &Value| answers.as_array().is_some_and(|list| list.iter().any(|word| word == "no"));
     let no = permissions.filter(|(_, answers)| is_refused(answers));
@@ -136,8 +142,8 @@ mod tests {
     fn who_was_refused_is_named() {
         let answer = r#"{"type":"a{sas}v","data":[{"":["no"],"org.a":["yes"],"org.b":["no"]},{"type":"y","data":0}]}"#;
         let expected = ["all programs outside of sandboxes", "org.b"];
-        assert_eq!(refused_programs(&serde_json::from_str(answer).unwrap()), expected);
-        assert_eq!(refused_programs(&serde_json::json!({ "data": [{}] })), Vec::<String>::new());
-        assert_eq!(refused_programs(&Value::Null), Vec::<String>::new());
+        assert_eq!(parse_refused_programs(&serde_json::from_str(answer).unwrap()), expected);
+        assert_eq!(parse_refused_programs(&serde_json::json!({ "data": [{}] })), Vec::<String>::new());
+        assert_eq!(parse_refused_programs(&Value::Null), Vec::<String>::new());
     }
 }

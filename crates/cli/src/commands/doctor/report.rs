@@ -7,8 +7,8 @@ use super::findings::CheckResults;
 use super::private::Redactor;
 use super::{CliError, hardware};
 use crate::commands::{bench, devices};
-use crate::files::{refuse_overwrite, write_whole};
-use crate::terminal::{print, say};
+use crate::files::{refuse_overwrite, write_atomically};
+use crate::terminal::{print_to_stderr, print_to_stdout};
 
 /// Introduction, and a question for the user to answer.
 const FORM: &str = "\
@@ -26,27 +26,31 @@ out; no picture was taken, nothing was sent. Read it all before you give it to o
 /// # Errors
 /// Fails if the file exists or cannot be written.
 pub fn run(file: Option<&Path>) -> Result<(), CliError> {
-    refuse_overwrite(file, false).map_err(without_force)?;
+    refuse_overwrite(file, false).map_err(remove_force_hint)?;
     let examined = CheckResults::collect();
     let mut facts = String::new();
-    add_section(&mut facts, "Machine", &(examined.system.to_string() + "\n" + &hardware::describe().join("\n")));
-    add_section(&mut facts, "Cameras", &devices::formats(&examined.nodes));
-    add_section(&mut facts, "What doctor found", &examined.text());
-    add_section(&mut facts, "Time of the blur", &bench::short_table());
+    add_section(
+        &mut facts,
+        "Machine",
+        &(examined.system.to_string() + "\n" + &hardware::describe_hardware().join("\n")),
+    );
+    add_section(&mut facts, "Cameras", &devices::format_devices(&examined.nodes));
+    add_section(&mut facts, "What doctor found", &examined.format_text());
+    add_section(&mut facts, "Time of the blur", &bench::run_short_benchmark());
     let report = FORM.to_owned() + &Redactor::detect().redact(&facts);
-    print(report.as_bytes())?;
+    print_to_stdout(report.as_bytes())?;
     match file {
         Some(file) => {
-            write_whole(file, report.as_bytes(), false).map_err(without_force)?;
-            say(&format!("this report is in {}, and nowhere else", file.display()));
+            write_atomically(file, report.as_bytes(), false).map_err(remove_force_hint)?;
+            print_to_stderr(&format!("this report is in {}, and was not sent anywhere", file.display()));
         }
-        None => say("this report was printed, and not kept: `bokehcam doctor --report FILE` writes it, too"),
+        None => print_to_stderr("this report was only printed: `bokehcam doctor --report FILE` also saves it"),
     }
     Ok(())
 }
 
 /// Replaces the hint to `--force`, which this command lacks.
-fn without_force(error: CliError) -> CliError {
+fn remove_force_hint(error: CliError) -> CliError {
     match error {
         CliError::Exists(path) => CliError::NeverReplaced(path),
         other => other,

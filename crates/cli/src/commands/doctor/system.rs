@@ -32,12 +32,12 @@ impl System {
     pub fn detect() -> Self {
         Self {
             bokehcam: env!("CARGO_PKG_VERSION"),
-            kernel: trimmed("/proc/sys/kernel/osrelease"),
-            distribution: distribution(&fs::read_to_string("/etc/os-release").unwrap_or_default()),
+            kernel: read_trimmed("/proc/sys/kernel/osrelease"),
+            distribution: parse_distribution(&fs::read_to_string("/etc/os-release").unwrap_or_default()),
             session: std::env::var("XDG_SESSION_TYPE").unwrap_or_else(|_| "none".into()),
-            sandbox: sandbox(),
-            secure_boot: secure_boot(),
-            pipewire: pipewire(),
+            sandbox: detect_sandbox(),
+            secure_boot: detect_secure_boot(),
+            pipewire: has_pipewire_socket(),
             // xdg-desktop-portal, cut to 15 bytes by the kernel.
             portal: is_running("xdg-desktop-por"),
         }
@@ -59,11 +59,11 @@ impl fmt::Display for System {
     }
 }
 
-fn trimmed(path: &str) -> String {
+fn read_trimmed(path: &str) -> String {
     fs::read_to_string(path).map_or_else(|_| "unknown".into(), |text| text.trim().to_owned())
 }
 
-fn distribution(os_release: &str) -> String {
+fn parse_distribution(os_release: &str) -> String {
     let value = |key: &str| {
         let line = os_release.lines().find_map(|line| line.strip_prefix(key)?.strip_prefix('='))?;
         Some(line.trim_matches(['"', '\'']).to_owned())
@@ -71,7 +71,7 @@ fn distribution(os_release: &str) -> String {
     value("PRETTY_NAME").or_else(|| value("NAME")).unwrap_or_else(|| "an unknown distribution".into())
 }
 
-fn sandbox() -> Option<String> {
+fn detect_sandbox() -> Option<String> {
     let exists = |path: &str| Path::new(path).exists();
     let variable = |name| std::env::var(name).ok().filter(|value| !value.is_empty());
     if exists("/.flatpak-info") {
@@ -86,7 +86,7 @@ fn sandbox() -> Option<String> {
     }
 }
 
-fn secure_boot() -> Option<bool> {
+fn detect_secure_boot() -> Option<bool> {
     if !Path::new("/sys/firmware/efi").exists() {
         // Booted without UEFI.
         return Some(false);
@@ -96,7 +96,7 @@ fn secure_boot() -> Option<bool> {
     fs::read(variable).ok()?.get(4).map(|on| *on == 1)
 }
 
-fn pipewire() -> bool {
+fn has_pipewire_socket() -> bool {
     let folder = std::env::var_os("PIPEWIRE_RUNTIME_DIR").or_else(|| std::env::var_os("XDG_RUNTIME_DIR"));
     folder.is_some_and(|folder| Path::new(&folder).join("pipewire-0").exists())
 }
@@ -117,10 +117,10 @@ mod tests {
     #[test]
     fn the_distribution_has_a_name_in_any_file() {
         assert_eq!(
-            distribution("ID=x\nPRETTY_NAME=\"Debian GNU/Linux 12 (bookworm)\"\n"),
+            parse_distribution("ID=x\nPRETTY_NAME=\"Debian GNU/Linux 12 (bookworm)\"\n"),
             "Debian GNU/Linux 12 (bookworm)"
         );
-        assert_eq!(distribution("NAME='Void'\n"), "Void");
-        assert_eq!(distribution(""), "an unknown distribution");
+        assert_eq!(parse_distribution("NAME='Void'\n"), "Void");
+        assert_eq!(parse_distribution(""), "an unknown distribution");
     }
 }

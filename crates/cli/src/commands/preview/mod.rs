@@ -12,7 +12,7 @@ use crate::error::CliError;
 use crate::options::{Global, Streaming, Window};
 use crate::report;
 use crate::settings::file;
-use crate::settings::layers::Given;
+use crate::settings::layers::GivenSettings;
 use crate::settings::look;
 use crate::settings::unused;
 use crate::sinks;
@@ -33,29 +33,29 @@ use bokehcam_window::window::{self, Control, Memory, Preview};
 
 use store::FileStore;
 
-/// Show a camera, a recording or the demonstration in portrait mode, live, and find a look
+/// Show a camera, a recording or the demonstration live in a window, and adjust the blur
 #[derive(Args, Debug)]
 #[command(after_help = "\
 Examples:
-  bokehcam preview                          the first camera there is, else the demonstration
+  bokehcam preview                          the first camera found, else the demonstration
   bokehcam preview 0 --mirror --to /dev/video10
   bokehcam preview 0,2 --calib stereo.yml
   bokehcam preview somewhere/rgbd --preset cinematic
   bokehcam preview demo --split 0.5 --highlights 12
   bokehcam preview demo --full-screen
 
-In the window, F1 shows all keys. Click to focus there, double-click on something to follow it. K copies what is set as a command.
+In the window, F1 shows all keys. Click to focus there, double-click on something to follow it. K copies the settings as a command.
 A recording is played in a loop.")]
 pub struct PreviewCommand {
-    /// A camera (/dev/videoN, N, a name under /dev/v4l/by-id, or part of what it is called), two of them as LEFT,RIGHT, a
-    /// camera of PipeWire's (pipewire:NAME), a folder with a recording, a photo (PNG or JPEG), `demo` (the demonstration) or
-    /// `synthetic` (rendered while it plays) [default: the first camera there is, else `demo`]
+    /// A camera (/dev/videoN, N, a name under /dev/v4l/by-id, or part of its name), two of them as LEFT,RIGHT, a
+    /// PipeWire camera (pipewire:NAME), a folder with a recording, a photo (PNG or JPEG), `demo` (the demonstration) or
+    /// `synthetic` (rendered while it plays) [default: the first camera found, else `demo`]
     source: Option<String>,
     /// Also write to pipewire, pipewire:NAME or /dev/videoN (virtual camera), DIR/ (numbered PNG), FILE.y4m, FILE.mp4, .mkv or
     /// .webm from the start; may be given more than once
     #[arg(long, value_name = "SINK")]
     to: Vec<Target>,
-    /// What `bokehcam ctl` knows this run by [default: preview, or preview-2 and so on]
+    /// Name of this run for `bokehcam ctl` [default: preview, or preview-2 and so on]
     #[arg(long, value_name = "NAME")]
     name: Option<Name>,
     #[command(flatten)]
@@ -68,39 +68,39 @@ pub struct PreviewCommand {
 ///
 /// # Errors
 /// Fails if the options conflict, there is no display, or no frame ever arrived.
-pub fn run(command: &PreviewCommand, global: &Global, given: Given) -> Result<(), CliError> {
+pub fn run(command: &PreviewCommand, global: &Global, given: GivenSettings) -> Result<(), CliError> {
     let mut parts = command.parts.clone();
     // Choosing a look takes longer than most recordings last.
     parts.frames.repeat = true;
     let source = command.source.as_deref().unwrap_or_default();
-    show(source, &command.to, &command.window, &parts, (global, given), command.name.as_ref())
+    show_source(source, &command.to, &command.window, &parts, (global, given), command.name.as_ref())
 }
 
 /// Shows a source in a window, and writes it to `to`. `run_name` is its name for `bokehcam ctl`.
 ///
 /// # Errors
 /// See [`run`].
-pub fn show(
+pub fn show_source(
     name: &str,
     to: &[Target],
     window: &Window,
     parts: &Streaming,
-    (global, given): (&Global, Given),
+    (global, given): (&Global, GivenSettings),
     run_name: Option<&Name>,
 ) -> Result<(), CliError> {
     let Streaming { frames, stream, output, computing, .. } = parts;
-    report::check(stream.report.as_deref(), output.force, to)?;
+    report::check_path(stream.report.as_deref(), output.force, to)?;
     let usage = |what: &str| CliError::Usage(what.to_string());
     let refuse = |what: &str| Err(usage(what));
     if stream.pace == Some(Pace::Asap) {
         return refuse("--pace asap: a window shows frames in their own time; leave --pace out");
     }
     if stream.on_demand {
-        return refuse("--on-demand: the window watches all the time; leave it out, or use `bokehcam stream`");
+        return refuse("--on-demand: the window always watches; leave --on-demand out, or use `bokehcam stream`");
     }
     if !name.is_empty() {
-        let source = SourceName::from_str(name).map_err(|error| error.of(name))?;
-        sinks::check(to, parts, &source)?;
+        let source = SourceName::from_str(name).map_err(|error| error.with_prefix(name))?;
+        sinks::check_targets(to, parts, &source)?;
         unused::warn_by_source(&given.settings, source.kind());
     }
     let outputs = to.iter().map(|target| match target {
@@ -111,9 +111,9 @@ pub fn show(
     });
     let outputs = outputs.collect::<Result<Vec<_>, _>>()?;
     report::check_writable(stream.report.as_deref())?;
-    let look = look::look(&parts.blur, &computing.quality)?;
+    let look = look::build_look(&parts.blur, &computing.quality)?;
     // Assumes depth: the source's depth is known only once it is open, and the window may open others.
-    let look = source::fitting_look(&look, &parts.blur.depth, true)?;
+    let look = source::adapt_look(&look, &parts.blur.depth, true)?;
     let effect = if look.effect.follows_depth() { Effect::Auto } else { look.effect };
     let look = Look { effect, ..look };
     let memory_file = file::state_folder().map(|folder| folder.join("window.toml"));
@@ -130,7 +130,7 @@ pub fn show(
     texts.into_iter().for_each(texts::speak);
     let mirror_chosen = given.stated.iter().any(|name| name == "mirror");
     let store = FileStore { chosen: global.config.clone(), given };
-    let mut state = first_state(look, &source, window, stream.mirror, &memory);
+    let mut state = initial_state(look, &source, window, stream.mirror, &memory);
     if let Some(restored) = restored {
         state.look = restored;
         state.note(RESTORED_LOOK);
@@ -138,17 +138,17 @@ pub fn show(
     dropped.into_iter().for_each(|line| state.note(line));
     let rules = CommandLineRules {
         config: global.config.clone(),
-        unused: unused::Run {
+        unused: unused::RunFacts {
             cpu_only: computing.backend == Backend::Cpu,
             realtime: true,
             window: true,
-            ..unused::Run::default()
+            ..unused::RunFacts::default()
         },
     };
-    let control = controlled::claim(run_name, "preview")?.map(|claim| Control { claim, rules: Arc::new(rules) });
+    let control = controlled::claim_name(run_name, "preview")?.map(|claim| Control { claim, rules: Arc::new(rules) });
     let look = state.look.clone();
     let mut system = System::new(parts.source_options(), look.clone(), Box::new(store));
-    let device = system.executors.device()?;
+    let device = system.executors.open_device()?;
     system.out_size = stream.out_size.map(|size| (size.width, size.height));
     system.force = output.force;
     state.mirror_chosen = mirror_chosen;
@@ -163,8 +163,8 @@ pub fn show(
             outputs,
             keep_going: stream.keep_going,
             budget_ns: stream.budget_ms.map(|ms| (f64::from(ms) * 1e6) as u64),
-            threads: computing.choice().threads(),
-            wanted: Arc::default(),
+            threads: computing.to_compute_options().thread_count(),
+            output_request: Arc::default(),
             demand: Demand::default(),
             off: Arc::default(),
             release: Arc::default(),
@@ -180,10 +180,10 @@ pub fn show(
     })?;
     // A report is written even if the preview failed.
     let written = match (&stream.report, &ended.report) {
-        (Some(path), Some(report)) => report::write(path, report, output.force),
+        (Some(path), Some(report)) => report::write_report(path, report, output.force),
         _ => Ok(()),
     };
-    ended.report.iter().for_each(|report| terminal::say_report(report, global));
+    ended.report.iter().for_each(|report| terminal::print_report(report, global));
     match ended.lost {
         Some(why) if ended.report.is_none() || close_at_end => Err(CliError::NoFrames(why)),
         _ => ended.unwritten.map_or(written, |why| Err(CliError::OutputFailed(why))),
@@ -191,10 +191,10 @@ pub fn show(
 }
 
 /// Shown at the start if the previous session's look is restored.
-const RESTORED_LOOK: &str = "This is the look that you left. R goes back to the usual one.";
+const RESTORED_LOOK: &str = "This is the look of your last session. R goes back to the usual one.";
 
 /// Returns the initial state of the window.
-fn first_state(look: Look, source: &str, window: &Window, mirror: bool, memory: &Memory) -> State {
+fn initial_state(look: Look, source: &str, window: &Window, mirror: bool, memory: &Memory) -> State {
     let mut state = State::new(look, source.to_owned());
     state.shown = window.show;
     state.split = window.split;

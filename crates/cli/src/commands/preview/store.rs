@@ -5,11 +5,11 @@ use std::path::{Path, PathBuf};
 use crate::error::CliError;
 use crate::settings::command_line;
 use crate::settings::file::SettingsFile;
-use crate::settings::layers::Given;
+use crate::settings::layers::GivenSettings;
 use crate::settings::presets;
 use crate::settings::save;
 use crate::settings::table::WINDOW_START;
-use crate::terminal::print;
+use crate::terminal::print_to_stdout;
 use bokehcam::look::Value;
 use bokehcam::look::presets::Preset;
 use bokehcam::look::{Effect, Look, Patch};
@@ -20,7 +20,7 @@ pub(super) struct FileStore {
     /// The settings file chosen by `--config`, if any.
     pub chosen: Option<PathBuf>,
     /// The command line's settings, except those that the window states by itself.
-    pub given: Given,
+    pub given: GivenSettings,
 }
 
 impl FileStore {
@@ -37,7 +37,7 @@ impl FileStore {
     }
 
     /// Applies `change` to the settings file.
-    fn change(&self, change: impl FnOnce(&Path) -> Result<(), CliError>) -> Result<(), String> {
+    fn change_file(&self, change: impl FnOnce(&Path) -> Result<(), CliError>) -> Result<(), String> {
         let file = save::file_to_save(self.chosen.as_deref());
         file.and_then(|file| change(&file)).map_err(|error| error.to_string())
     }
@@ -53,15 +53,15 @@ impl SettingsStore for FileStore {
     }
 
     fn save_preset(&mut self, name: &str, look: &Look) -> Result<(), String> {
-        self.change(|file| presets::save(file, name, &Patch::from_look(look).values()))
+        self.change_file(|file| presets::save(file, name, &Patch::from_look(look).values()))
     }
 
     fn rename_preset(&mut self, name: &str, new: &str) -> Result<(), String> {
-        self.change(|file| presets::rename(file, name, new))
+        self.change_file(|file| presets::rename(file, name, new))
     }
 
     fn delete_preset(&mut self, name: &str) -> Result<(), String> {
-        self.change(|file| presets::delete(file, name))
+        self.change_file(|file| presets::delete(file, name))
     }
 
     fn command(&self, look: &Look, source: &str, outputs: &[String], switches: &[Switch]) -> String {
@@ -74,8 +74,8 @@ impl SettingsStore for FileStore {
         let at = switches.iter().position(|(name, _)| name == "control").unwrap_or(switches.len());
         switches.splice(at..at, given);
         let preset = self.find_preset(look);
-        let changed = Patch::from_look(look).without_equal(&Patch::from_look(&Look::default())).values();
-        // Defaults are left out, unless another layer (see `Given::from_layers`) would override them.
+        let changed = Patch::from_look(look).without_equal_values(&Patch::from_look(&Look::default())).values();
+        // Defaults are left out, unless another layer (see `GivenSettings::from_layers`) would override them.
         let is_layered = |name: &str| self.given.from_layers.iter().any(|other| other == name);
         let is_stated = |value: &Value| changed.contains(value) || is_layered(value.0);
         let has_effect = |value: &Value| value.0 != "tilt" || look.effect == Effect::TiltShift;
@@ -92,7 +92,7 @@ impl SettingsStore for FileStore {
         };
         let command = command_line::shell_command(source, outputs, &flags, &switches);
         // A closed standard output is no failure.
-        let _ = print(format!("{command}\n").as_bytes());
+        let _ = print_to_stdout(format!("{command}\n").as_bytes());
         command
     }
 }
@@ -105,7 +105,7 @@ mod tests {
 
     #[test]
     fn a_look_of_a_preset_is_named_and_what_has_no_effect_is_left_out() {
-        let store = FileStore { chosen: None, given: Given::default() };
+        let store = FileStore { chosen: None, given: GivenSettings::default() };
         let presets = SettingsFile::default().all_presets();
         for preset in &presets {
             let made = preset.patch.apply_to(&Look::default()).unwrap();
@@ -126,7 +126,7 @@ mod tests {
         let given = |name: &str, value: &str| (name.to_owned(), value.to_owned());
         let switches =
             vec![given("theme", "light"), given("language", "de"), given("save-to", "."), given("fps", "15")];
-        let store = FileStore { chosen: None, given: Given { switches, ..Given::default() } };
+        let store = FileStore { chosen: None, given: GivenSettings { switches, ..GivenSettings::default() } };
         let command = |outputs: &[String]| store.command(&Look::default(), "demo", outputs, &[]);
         let window = command(&[]);
         for switch in ["--theme=light", "--language=de", "--save-to=.", "--fps=15"] {

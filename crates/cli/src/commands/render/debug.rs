@@ -8,14 +8,14 @@ use serde::Serialize;
 
 use super::debug_pictures::{draw_coc, draw_grey, draw_light};
 use crate::error::CliError;
-use crate::files::{refuse_overwrite, write_whole};
+use crate::files::{refuse_overwrite, write_atomically};
 use bokehcam::bokeh::cpu::CpuBokeh;
 use bokehcam::bokeh::ladder::Compositing;
 use bokehcam::bokeh::plan::{Bin, Plan};
 use bokehcam::bokeh::{Bokeh, Probe};
 use bokehcam::compute::Backend;
-use bokehcam::computing::Computing;
-use bokehcam::engine::still::{Depth, coc_and_depth};
+use bokehcam::computing::ComputeOptions;
+use bokehcam::engine::still::{Depth, compute_coc_and_depth};
 use bokehcam::frame::{ColorImage, DepthMap};
 use bokehcam::look::Look;
 use bokehcam::optics::CocField;
@@ -97,23 +97,23 @@ pub fn blur_and_dump(
     mut color: ColorImage,
     depth: Option<Depth>,
     look: &Look,
-    computing: &Computing,
+    computing: &ComputeOptions,
     (dir, force): (&Path, bool),
 ) -> Result<(ColorImage, String), CliError> {
     let size = color.size();
-    let mut output = DebugOutput { pictures: Vec::new(), plan: PlanFile::unblurred(size) };
+    let mut output = DebugOutput { pictures: Vec::new(), plan: PlanFile::for_unblurred(size) };
     let mut result = ColorImage::default();
-    match look.settings(size, false) {
+    match look.blur_settings(size, false) {
         None => result = color,
         Some(settings) => {
             if computing.backend == Backend::Gpu || computing.adapter.is_some() {
-                let text = "--debug-dir looks into the CPU executor: leave --backend gpu and --adapter out";
+                let text = "--debug-dir needs the CPU executor: leave --backend gpu and --adapter out";
                 return Err(CliError::Usage(text.to_string()));
             }
             settings.check(size)?;
             // Always the CPU executor: only its intermediates can be read.
             let mut bokeh = CpuBokeh::new(Plan::new(&settings, size.0, size.1), computing.threads);
-            let (coc, depth) = coc_and_depth(look, &mut color, depth)?;
+            let (coc, depth) = compute_coc_and_depth(look, &mut color, depth)?;
             bokeh.blur(&color, depth.as_ref(), &coc, &mut result)?;
             output.collect(&bokeh, &color, depth.as_ref(), &coc);
         }
@@ -130,7 +130,7 @@ struct DebugOutput {
 
 impl PlanFile {
     /// Returns the plan of an unblurred picture.
-    fn unblurred(size: (u32, u32)) -> Self {
+    fn for_unblurred(size: (u32, u32)) -> Self {
         Self {
             size,
             executor: "not blurred".to_string(),
@@ -175,25 +175,28 @@ impl DebugOutput {
             coc_at_infinity_px: lens.map(|lens| lens.coc_at_infinity_px),
             coc_px: range,
             coc_full_color_px: full_px,
-            filled: bokeh.filled(),
+            filled: bokeh.has_inpainting(),
             still_share,
-            ..PlanFile::unblurred(color.size())
+            ..PlanFile::for_unblurred(color.size())
         };
-        self.add("coc", draw_coc(width, coc_px.iter().copied(), full_px));
+        self.add_picture("coc", draw_coc(width, coc_px.iter().copied(), full_px));
         if plan.compositing == Compositing::Layers {
-            self.add("still", draw_grey(width, still, 1.0));
+            self.add_picture("still", draw_grey(width, still, 1.0));
         }
-        if bokeh.filled() {
+        if bokeh.has_inpainting() {
             let mut behind = bokeh.scene(color, depth, field, true);
-            self.add("behind_coc", draw_coc(width, behind.iter().map(|pixel| pixel[3]), full_px));
+            self.add_picture("behind_coc", draw_coc(width, behind.iter().map(|pixel| pixel[3]), full_px));
             // Channel 3 changes from CoC to full coverage, for `draw_light`.
             behind.iter_mut().for_each(|pixel| pixel[3] = 1.0);
-            self.add("behind", draw_light(width, &behind, plan.expansion, 1));
-            self.add("hidden", draw_grey(width, coc_px.iter().map(|&coc_px| bokeh.hidden(coc_px)), 1.0));
+            self.add_picture("behind", draw_light(width, &behind, plan.expansion, 1));
+            self.add_picture(
+                "hidden",
+                draw_grey(width, coc_px.iter().map(|&coc_px| bokeh.inpainting_weight(coc_px)), 1.0),
+            );
         }
         for (k, bin) in plan.bins.iter().enumerate() {
             self.collect_bin(bokeh, k, bin);
-            self.plan.bins.push(bin_entry(bokeh, (k, bin), &coc_px, depth, field));
+            self.plan.bins.push(build_bin_entry(bokeh, (k, bin), &coc_px, depth, field));
         }
     }
 
@@ -203,20 +206,20 @@ impl DebugOutput {
         let mut show = |name: &str, pixels: &[[f32; 4]]| {
             let coverage = pixels.iter().map(|pixel| pixel[3]);
             let picture = draw_light(bin.width, pixels, plan.expansion, bin.scale);
-            self.add(&format!("{name}_{k}"), picture);
+            self.add_picture(&format!("{name}_{k}"), picture);
             let name = if name == "bin" { "coverage" } else { "blur_coverage" };
-            self.add(&format!("{name}_{k}"), draw_grey(bin.width, coverage, 1.0));
+            self.add_picture(&format!("{name}_{k}"), draw_grey(bin.width, coverage, 1.0));
         };
         show("bin", &bokeh.probe(Probe::Bin(k)));
         // The gather writes to the picture directly: it has no filtered bin.
         if plan.compositing != Compositing::Gather {
             show("blur", &bokeh.probe(Probe::Blur(k)));
-            let radius = draw_grey(bin.width, bokeh.radius_px(k).into_iter(), bin.max_radius_px);
-            self.add(&format!("radius_{k}"), radius);
+            let radius = draw_grey(bin.width, bokeh.filter_radii_px(k).into_iter(), bin.max_radius_px);
+            self.add_picture(&format!("radius_{k}"), radius);
         }
     }
 
-    fn add(&mut self, name: &str, picture: ColorImage) {
+    fn add_picture(&mut self, name: &str, picture: ColorImage) {
         self.pictures.push((format!("{name}.png"), picture));
     }
 
@@ -235,19 +238,19 @@ impl DebugOutput {
         for (path, (_, picture)) in paths.iter().zip(&self.pictures) {
             still::write_color(path, picture, force)?;
         }
-        write_whole(&plan_path, &json, force)
+        write_atomically(&plan_path, &json, force)
     }
 }
 
 /// Returns the statistics of bin `k` for `plan.json`.
-fn bin_entry(
+fn build_bin_entry(
     bokeh: &CpuBokeh,
     (k, bin): (usize, &Bin),
     coc_px: &[f32],
     depth: Option<&DepthMap>,
     field: &CocField,
 ) -> BinEntry {
-    let weight = bokeh.plan().share(k);
+    let weight = bokeh.plan().bin_weight(k);
     // The gather's only bin has every pixel; elsewhere a pixel belongs to the bin with over half of its weight.
     let belongs = |coc_px: f32| bokeh.plan().compositing == Compositing::Gather || weight.at(coc_px) > 0.5;
     let content = || coc_px.iter().copied().filter(|&coc_px| belongs(coc_px));

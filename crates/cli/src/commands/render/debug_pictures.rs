@@ -1,6 +1,6 @@
 //! Pictures of a blur's intermediates: light encoded as sRGB, CoC in two colours, coverage and radii in grey.
 
-use bokehcam::bokeh::cpu::{compress, expand};
+use bokehcam::bokeh::cpu::{compression_factor, expansion_factor};
 use bokehcam::color::{encode_srgb, luminance};
 use bokehcam::frame::ColorImage;
 
@@ -43,9 +43,9 @@ pub fn draw_light(width: usize, pixels: &[[f32; 4]], expansion: f32, scale: usiz
     let expands = expansion.is_finite();
     let color = |(k, &[r, g, b, coverage]): (usize, &[f32; 4])| {
         let square = SQUARES[(k % width / side + k / width / side) % 2];
-        let square = if expands { square * expand(square, expansion) } else { square };
+        let square = if expands { square * expansion_factor(square, expansion) } else { square };
         let over = [r, g, b].map(|light| (light + square * (1.0 - coverage)).max(0.0));
-        let factor = if expands { compress(luminance(over[0], over[1], over[2]), expansion) } else { 1.0 };
+        let factor = if expands { compression_factor(luminance(over[0], over[1], over[2]), expansion) } else { 1.0 };
         over.map(|light| encode_srgb(light * factor))
     };
     build_picture(width, pixels.iter().enumerate().map(color))

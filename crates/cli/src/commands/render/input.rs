@@ -24,11 +24,11 @@ pub(super) struct Input {
     pub extras: Extras,
     pub depth: Option<Depth>,
     /// Origin of depth that was found in or beside the photo.
-    pub found: Option<Found>,
+    pub found: Option<FoundDepth>,
 }
 
 /// Origin of depth that the photo brings without an option for it.
-pub(super) struct Found {
+pub(super) struct FoundDepth {
     pub from: DepthOrigin,
     pub measured: bool,
     pub by: String,
@@ -36,7 +36,7 @@ pub(super) struct Found {
 
 /// Reads the picture, its metadata, and its depth, if any. Inputs not named in the command come from the snapshot of
 /// `--like`; its depth is already refined and is not refined again.
-pub(super) fn read(command: &RenderCommand, look: &Look) -> Result<Input, CliError> {
+pub(super) fn read_input(command: &RenderCommand, look: &Look) -> Result<Input, CliError> {
     let sources = command.like.as_ref().map(|like| snapshot::sources(like));
     let given =
         command.depth_map.as_deref().map(|file| read_depth(file, command, look)).transpose()?.map(Depth::Measured);
@@ -55,16 +55,19 @@ pub(super) fn read(command: &RenderCommand, look: &Look) -> Result<Input, CliErr
             let is_automatic = matches!(command.blur.depth, DepthChoice::Auto | DepthChoice::Recorded);
             let searches_depth = searches_depth && is_automatic;
             // A snapshot stands for the picture that it was made from.
-            let image = if searches_depth { photo::original(image) } else { image.to_owned() };
+            let image = if searches_depth { photo::original_path(image) } else { image.to_owned() };
             let (color, extras) = still::read_photo(&image)?;
             let is_wanted = searches_depth && look.effect.follows_depth();
-            let depth =
-                if is_wanted { photo::depth_of(&image, &color, &command.source_options(), look)? } else { None };
+            let depth = if is_wanted {
+                photo::read_default_depth(&image, &color, &command.source_options(), look)?
+            } else {
+                None
+            };
             let depth = depth.map(|PhotoDepth { map, from, measured, by }| {
                 if from == DepthOrigin::Networks {
                     plausible::warn_of_subject(None, &map, None);
                 }
-                found = Some(Found { from, measured, by });
+                found = Some(FoundDepth { from, measured, by });
                 if map.subject_m.is_some() { Depth::Final(map) } else { Depth::Measured(map) }
             });
             (color, extras, given.or(depth))
@@ -75,37 +78,38 @@ pub(super) fn read(command: &RenderCommand, look: &Look) -> Result<Input, CliErr
         still::check_depth_size(file, map.size(), color.size())?;
         source::find_person(&command.source_options(), look, &color, map);
     }
-    let made = make_depth(command, look, &color)?;
+    let made = compute_depth(command, look, &color)?;
     Ok(Input { color, extras, depth: made.or(depth), found })
 }
 
 /// Computes depth from a mask or by networks; returns `None` if neither is requested.
-fn make_depth(command: &RenderCommand, look: &Look, color: &ColorImage) -> Result<Option<Depth>, CliError> {
+fn compute_depth(command: &RenderCommand, look: &Look, color: &ColorImage) -> Result<Option<Depth>, CliError> {
     let is_given = command.depth_map.is_some() || command.mask.is_some();
     match (&command.mask, &command.blur.depth) {
-        (_, DepthChoice::OneCamera(_) | DepthChoice::Defocus) if is_given => {
-            let what = "--depth matte, mono, plate and defocus make the depth: leave --depth-map and --mask out";
+        (_, DepthChoice::SingleCamera(_) | DepthChoice::Defocus) if is_given => {
+            let what = "--depth matte, mono, plate and defocus make the depth themselves: leave --depth-map and --mask \
+                        out";
             Err(CliError::Usage(what.to_string()))
         }
         (Some(file), _) => {
-            source::refuse_metres(look, "a mask tells")?;
+            source::reject_metric_look(look, "a mask gives")?;
             let (width, height, share) = still::read_grey(file)?;
             still::check_mask_size(file, (width, height), color.size())?;
             let mask = Mask { width, height, alpha: share };
             plausible::warn_of_mask(file, &mask, color);
-            Ok(Some(Depth::Final(mask::depth_around(&mask, color))))
+            Ok(Some(Depth::Final(mask::depth_from_mask(&mask, color))))
         }
-        (None, DepthChoice::OneCamera(chosen)) => {
-            let map = source::one_camera::depth_of_picture(chosen, &command.source_options(), look, color)?;
+        (None, DepthChoice::SingleCamera(chosen)) => {
+            let map = source::single_camera::compute_picture_depth(chosen, &command.source_options(), look, color)?;
             plausible::warn_of_subject(Some(chosen), &map, command.image.as_deref());
             // Depth with a subject includes its matte; other depth has soft outlines and is refined.
             Ok(Some(if map.subject_m.is_some() { Depth::Final(map) } else { Depth::Measured(map) }))
         }
         (None, DepthChoice::Defocus) => {
-            source::refuse_metres(look, "defocus tells")?;
+            source::reject_metric_look(look, "defocus gives")?;
             defocus::depth(color).map(Depth::Final).map(Some).ok_or_else(|| {
-                let what = "--depth defocus: the picture is equally sharp all over, or has hardly any edges, so that nothing can be \
-                            told of its depth; --depth mono or --effect blur needs no such difference";
+                let what = "--depth defocus: the picture is equally sharp all over, or has hardly any edges, so its \
+                            depth cannot be estimated; use --depth mono or --effect blur";
                 CliError::Usage(what.to_string())
             })
         }
@@ -128,7 +132,7 @@ fn read_inverse_depth(file: &Path, invert: bool) -> Result<DepthMap, CliError> {
     for value in &mut nearness {
         let near = (*value - low) * scale;
         let near = if invert { 1.0 - near } else { near };
-        *value = if near.is_finite() { DepthMap::relative_m(near) } else { 0.0 };
+        *value = if near.is_finite() { DepthMap::relative_to_metres(near) } else { 0.0 };
     }
     Ok(DepthMap { width, height, metres: nearness, ..DepthMap::default() })
 }
@@ -138,7 +142,7 @@ fn read_inverse_depth(file: &Path, invert: bool) -> Result<DepthMap, CliError> {
 fn read_depth(file: &Path, command: &RenderCommand, look: &Look) -> Result<DepthMap, CliError> {
     let name = file.display();
     if command.depth.depth_unit == DepthUnit::Inverse {
-        source::refuse_metres(look, source::INVERSE_TELLS)?;
+        source::reject_metric_look(look, source::INVERSE_DEPTH_GIVES)?;
         return read_inverse_depth(file, command.depth.depth_invert);
     }
     let options::Depth { depth_scale, depth_invalid, .. } = command.depth;
@@ -147,20 +151,23 @@ fn read_depth(file: &Path, command: &RenderCommand, look: &Look) -> Result<Depth
         still::Map::Disparity(map, rig) => (map, rig),
     };
     if depth_scale.is_some() {
-        tracing::warn!("{name}: holds disparity, to which --depth-scale does not apply");
+        tracing::warn!("{name}: contains disparity; --depth-scale does not apply to it");
     }
-    let rig = match (rig, look.needs_metres()) {
+    let rig = match (rig, look.metric_setting()) {
         (Some(rig), _) => rig,
         (None, None) => {
-            tracing::warn!("{name}: holds disparity without distances: the order of depth is known, metres are not");
-            StereoRig::assumed(map.width)
+            tracing::warn!(
+                "{name}: contains disparity without a scale: the order of depth is known, distances are \
+                            not"
+            );
+            StereoRig::default_for_width(map.width)
         }
         (None, Some(needs)) => {
             return Err(CliError::Usage(format!(
-                "{needs} needs distances, and {name} holds disparity without any: write it with `depth --metres`; --focus \
-                 auto or X,Y and --blur need none"
+                "{needs} needs distances, and {name} contains disparity without a scale: write it with `depth \
+                 --metres`, or use --focus auto or X,Y, and --blur"
             )));
         }
     };
-    Ok(map.depth(|px| rig.depth_m(px)))
+    Ok(map.to_depth_map(|px| rig.depth_m(px)))
 }

@@ -9,18 +9,18 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use input::{Found, Input, read};
+use input::{FoundDepth, Input, read_input};
 
 use crate::error::CliError;
-use crate::files::{make_folder_of, refuse_overwrite, refuse_source, report_leftovers};
+use crate::files::{create_parent_folder, refuse_overwrite, refuse_overwriting_source, warn_of_leftovers};
 use crate::focus;
 use crate::log;
 use crate::options;
 use crate::plausible;
-use crate::settings::layers::Given;
+use crate::settings::layers::GivenSettings;
 use crate::settings::look;
 use crate::settings::unused;
-use crate::settings::unused::From;
+use crate::settings::unused::FrameOrigin;
 use crate::terminal;
 use bokehcam::compute::Backend;
 use bokehcam::depth::agreement::EdgeAlignment;
@@ -28,12 +28,12 @@ use bokehcam::depth::misfit::Misalignment;
 use bokehcam::engine::{self, still::Depth};
 use bokehcam::files::place;
 use bokehcam::frame::{ColorImage, DepthMap};
-use bokehcam::look::{ApertureName, Look, Refine, Strength};
+use bokehcam::look::{ApertureSetting, Look, Refine, Strength};
 use bokehcam::recording::snapshot;
 use bokehcam::recording::still::{self, MapFormat, PhotoFormat};
 use bokehcam::source::options::DepthUnit;
 use bokehcam::source::photo;
-use bokehcam::source::{self, DepthChoice, DepthOrigin, OneCamera, PlateFile};
+use bokehcam::source::{self, DepthChoice, DepthOrigin, PlateFile, SingleCameraDepth};
 
 /// Blur one still picture
 #[derive(Args, Debug)]
@@ -50,24 +50,24 @@ Examples:
   bokehcam render photo.jpg --depth-map depth.png --preset cinematic --out film.png
   bokehcam render --like snapshot.png --rim 0.1 --out another.png")]
 pub struct RenderCommand {
-    /// The picture, PNG or JPEG [default: the one that the snapshot of --like was made of]
+    /// The picture, PNG or JPEG [default: the original picture of the snapshot in --like]
     #[arg(required_unless_present = "like")]
     image: Option<PathBuf>,
-    /// Its depth: 16-bit grey PNG, or PFM in metres; or disparity that `depth` wrote
+    /// Its depth: 16-bit grey PNG, or PFM in metres; or disparity written by `depth`
     #[arg(long, value_name = "FILE")]
     depth_map: Option<PathBuf>,
     /// A mask of the subject, PNG or JPEG, of any size: white is the subject, which stays sharp
     #[arg(long, value_name = "FILE", conflicts_with_all = ["depth_map", "like"])]
     mask: Option<PathBuf>,
-    /// Take the settings of a snapshot of the preview; flags go before them. Without IMAGE, its NAME-color.png and, without
-    /// --depth-map, its NAME-depth.pfm are blurred, which gives the same picture again
+    /// Use the settings of a snapshot of the preview; flags override them. Without IMAGE, its NAME-color.png is
+    /// blurred, and without --depth-map by its NAME-depth.pfm, which gives the same picture again
     #[arg(long, value_name = "NAME.png")]
     like: Option<PathBuf>,
-    /// Where the result goes, .png or .jpg
+    /// File for the result, .png or .jpg
     #[arg(long, alias = "to", value_name = "FILE")]
     out: PathBuf,
-    /// Write every intermediate of the blur into this folder: the CoC, each bin before and after its filters, what
-    /// near objects hide, as PNG, and plan.json (CPU executor)
+    /// Write all intermediate results of the blur to this folder, as PNG: the CoC, each bin before and after its
+    /// filters, the filled background; and plan.json (CPU executor)
     #[arg(long, value_name = "DIR")]
     debug_dir: Option<PathBuf>,
     #[command(flatten)]
@@ -86,17 +86,17 @@ pub struct RenderCommand {
 ///
 /// # Errors
 /// Fails if a picture cannot be read or written, the options do not fit it, or the blur fails.
-pub fn run(command: &RenderCommand, global: &options::Global, given: &Given) -> Result<(), CliError> {
+pub fn run(command: &RenderCommand, global: &options::Global, given: &GivenSettings) -> Result<(), CliError> {
     let plan_file = command.debug_dir.as_ref().map(|dir| dir.join(debug::PLAN));
     refuse_overwrite([command.out.as_path()].into_iter().chain(plan_file.as_deref()), command.output.force)?;
     let sources = input_files(command);
     for source in &sources {
-        refuse_source("--out", &command.out, source)?;
+        refuse_overwriting_source("--out", &command.out, source)?;
         // That folder's files have fixed names, which may match a source.
         if let Some(dir) = command.debug_dir.as_ref().filter(|_| command.output.force)
             && source.parent().is_some_and(|folder| place::resolved(folder) == place::resolved(dir))
         {
-            refuse_source("--debug-dir", dir, source)?;
+            refuse_overwriting_source("--debug-dir", dir, source)?;
         }
     }
     let elsewhere = match &command.blur.depth {
@@ -107,17 +107,17 @@ pub fn run(command: &RenderCommand, global: &options::Global, given: &Given) -> 
     };
     if let Some(name) = elsewhere {
         return Err(CliError::Usage(format!(
-            "--depth {name}: {}a folder, two eyes or a depth camera are for `stream`; a picture's depth is given by --depth-map \
-             FILE, or made by --depth matte",
-            DepthChoice::hint(&name)
+            "--depth {name}: {}a folder, two cameras or a depth camera are for `stream`; a picture's depth is given by \
+             --depth-map FILE, or made by --depth matte",
+            DepthChoice::suggest_keyword(&name)
         )));
     }
-    let look = look::look(&command.blur, &command.computing.quality)?;
-    let Input { color, extras, depth, found } = read(command, &look)?;
-    let look = source::fitting_look(&look, &command.blur.depth, depth.is_some())?;
+    let look = look::build_look(&command.blur, &command.computing.quality)?;
+    let Input { color, extras, depth, found } = read_input(command, &look)?;
+    let look = source::adapt_look(&look, &command.blur.depth, depth.is_some())?;
     plausible::warn_of_lens(&look);
     plausible::warn_of_depth_scale(command.depth.depth_scale);
-    command.warn(&look, &color, (depth.as_ref(), found.as_ref()), given);
+    command.warn_of_settings(&look, &color, (depth.as_ref(), found.as_ref()), given);
     // As in a stream of this photo: only measured depth is refined.
     let look = match &found {
         Some(found) if look.refine == Refine::Auto => {
@@ -125,12 +125,12 @@ pub fn run(command: &RenderCommand, global: &options::Global, given: &Given) -> 
         }
         _ => look,
     };
-    let computing = command.computing.choice();
-    make_folder_of(&command.out)?;
-    report_leftovers([command.out.as_path()]);
+    let computing = command.computing.to_compute_options();
+    create_parent_folder(&command.out)?;
+    warn_of_leftovers([command.out.as_path()]);
     let (result, executor) = match &command.debug_dir {
         Some(dir) => debug::blur_and_dump(color, depth, &look, &computing, (dir, command.output.force))?,
-        None => engine::still::blur(&look, color, depth, &computing)?,
+        None => engine::still::blur_picture(&look, color, depth, &computing)?,
     };
     // The metadata's thumbnail would show the unblurred picture.
     let mut extras = extras.without_thumbnail();
@@ -142,8 +142,8 @@ pub fn run(command: &RenderCommand, global: &options::Global, given: &Given) -> 
         if !extras.left_behind.is_empty() {
             log::note(&format!("not in {}: {}", command.out.display(), extras.left_behind.join(", ")));
         }
-        found.iter().for_each(|found| terminal::say(&format!("depth by {}", found.by)));
-        terminal::say(&format!("{}: written ({executor})", command.out.display()));
+        found.iter().for_each(|found| terminal::print_to_stderr(&format!("depth by {}", found.by)));
+        terminal::print_to_stderr(&format!("{}: written ({executor})", command.out.display()));
     }
     Ok(())
 }
@@ -156,21 +156,27 @@ impl RenderCommand {
             depth: options::Depth { depth_calibration: None, ..self.depth.clone() },
             networks: self.networks.clone(),
             depth_choice: self.blur.depth.clone(),
-            computing: self.computing.choice(),
+            computing: self.computing.to_compute_options(),
             ..source::Options::default()
         }
     }
 
     /// Warns of settings without effect, and of a focus outside the picture's depth.
-    fn warn(&self, look: &Look, color: &ColorImage, (depth, found): (Option<&Depth>, Option<&Found>), given: &Given) {
+    fn warn_of_settings(
+        &self,
+        look: &Look,
+        color: &ColorImage,
+        (depth, found): (Option<&Depth>, Option<&FoundDepth>),
+        given: &GivenSettings,
+    ) {
         let in_units = |file: &PathBuf| still::map_format(file).is_ok_and(|format| format == MapFormat::Png);
         let in_units = self.depth_map.as_ref().is_some_and(in_units);
         let is_inverse = self.depth_map.is_some() && self.depth.depth_unit == DepthUnit::Inverse;
         let uses_depth = look.effect.follows_depth();
-        unused::warn(
+        unused::warn_of_unused(
             &given.settings,
-            &unused::Run {
-                source: From::Picture,
+            &unused::RunFacts {
+                source: FrameOrigin::Picture,
                 depth: match (depth, found) {
                     (None, _) => DepthOrigin::Nothing,
                     (_, Some(found)) => found.from,
@@ -182,11 +188,11 @@ impl RenderCommand {
                 effect: look.effect,
                 lens: matches!(look.strength, Strength::Lens(_)),
                 cpu_only: self.computing.backend == Backend::Cpu,
-                ..unused::Run::default()
+                ..unused::RunFacts::default()
             },
         );
         match depth {
-            None if self.blur.accepts_any_depth() => unused::warn_of_no_depth(From::Picture),
+            None if self.blur.accepts_any_depth() => unused::warn_of_no_depth(FrameOrigin::Picture),
             Some(_) if self.depth_map.is_some() && !uses_depth => {
                 log::warn("--depth-map has no effect: the effect does not use depth");
             }
@@ -221,11 +227,11 @@ fn report_misalignment(file: &dyn Display, look: &Look, map: &DepthMap, color: &
     let Some(misfit) = Misalignment::measure(map, color) else { return };
     if misfit.outlines == EdgeAlignment::Unrelated {
         log::warn(&format!(
-            "{file}: nowhere do its outlines meet those of the picture: it may be the depth of another one, or of a camera beside \
-             it that is not registered to the colours"
+            "{file}: none of its outlines match those of the picture: it may be the depth of another picture, or of \
+             another camera that is not registered to the colours"
         ));
     } else if look.refine == Refine::Auto {
-        log::note(&format!("{file}: refined, as {misfit}; --refine off takes it as it is"));
+        log::note(&format!("{file}: refined, as {misfit}; --refine off uses it unchanged"));
     }
 }
 
@@ -236,11 +242,11 @@ fn input_files(command: &RenderCommand) -> Vec<PathBuf> {
         [like.clone(), color, depth]
     });
     let aperture = match &command.blur.look.0.aperture {
-        Some(ApertureName::Image(file)) => Some(file),
+        Some(ApertureSetting::Image(file)) => Some(file),
         _ => None,
     };
     let plate = match &command.blur.depth {
-        DepthChoice::OneCamera(OneCamera { plate: Some(PlateFile::At(file)), .. }) => Some(file),
+        DepthChoice::SingleCamera(SingleCameraDepth { plate: Some(PlateFile::At(file)), .. }) => Some(file),
         _ => None,
     };
     [&command.image, &command.depth_map, &command.mask]
@@ -249,7 +255,7 @@ fn input_files(command: &RenderCommand) -> Vec<PathBuf> {
         .chain(plate)
         .chain(aperture)
         .cloned()
-        .chain(command.image.iter().flat_map(|image| photo::files_of(image)))
+        .chain(command.image.iter().flat_map(|image| photo::photo_files(image)))
         .chain(snapshot_files)
         .collect()
 }

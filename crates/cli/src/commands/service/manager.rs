@@ -44,7 +44,7 @@ impl Unit {
     /// # Errors
     /// Fails without systemd, or if systemd cannot use the unit.
     pub fn query() -> Result<Self, CliError> {
-        let properties = properties(NAME)?;
+        let properties = query_properties(NAME)?;
         let value = |name: &str| properties.get(name).map_or("", String::as_str);
         let file = PathBuf::from(value("FragmentPath"));
         let state = match (value("LoadState"), value("ActiveState")) {
@@ -77,11 +77,11 @@ impl Unit {
 /// # Errors
 /// Fails without systemd.
 pub fn has_graphical_session() -> Result<bool, CliError> {
-    Ok(properties(DESKTOP)?.get("ActiveState").is_some_and(|state| state == "active"))
+    Ok(query_properties(DESKTOP)?.get("ActiveState").is_some_and(|state| state == "active"))
 }
 
 /// Returns the last log line of the service's program.
-pub fn last_line() -> Option<String> {
+pub fn read_last_log_line() -> Option<String> {
     let args =
         ["--user", "--unit", NAME, "--identifier=bokehcam", "--lines=1", "--output=cat", "--no-pager", "--quiet"];
     let said = Command::new("journalctl").args(args).stdin(Stdio::null()).stderr(Stdio::null()).output().ok()?;
@@ -93,21 +93,21 @@ pub fn last_line() -> Option<String> {
 ///
 /// # Errors
 /// Fails without systemd, or if systemd refuses.
-pub fn run(args: &[&str]) -> Result<(), CliError> {
-    systemctl(args).map(drop)
+pub fn run_systemctl(args: &[&str]) -> Result<(), CliError> {
+    read_systemctl(args).map(drop)
 }
 
-fn properties(unit: &str) -> Result<HashMap<String, String>, CliError> {
+fn query_properties(unit: &str) -> Result<HashMap<String, String>, CliError> {
     const PROPERTIES: &str = "--property=LoadState,ActiveState,UnitFileState,FragmentPath,ExecStart,Environment";
-    let output = systemctl(&["show", PROPERTIES, unit])?;
+    let output = read_systemctl(&["show", PROPERTIES, unit])?;
     let lines = output.lines().filter_map(|line| line.split_once('='));
     Ok(lines.map(|(name, value)| (name.to_owned(), value.to_owned())).collect())
 }
 
 /// Runs `systemctl --user` and returns its output.
-fn systemctl(args: &[&str]) -> Result<String, CliError> {
+fn read_systemctl(args: &[&str]) -> Result<String, CliError> {
     const INSTEAD: &str =
-        "have your desktop start `bokehcam stream 0 --to pipewire --on-demand` with the session instead";
+        "let your desktop start `bokehcam stream 0 --to pipewire --on-demand` with the session instead";
     let output = Command::new("systemctl").arg("--user").args(args).stdin(Stdio::null()).output();
     let Output { status, stdout, stderr } = output.map_err(|error| match error.kind() {
         ErrorKind::NotFound => CliError::Service(format!("there is no systemd here: {INSTEAD}")),
@@ -117,10 +117,10 @@ fn systemctl(args: &[&str]) -> Result<String, CliError> {
         return Ok(String::from_utf8_lossy(&stdout).into_owned());
     }
     let said = String::from_utf8_lossy(&stderr);
-    let said = said.lines().find(|line| !line.trim().is_empty()).unwrap_or("it does not say why").to_owned();
+    let said = said.lines().find(|line| !line.trim().is_empty()).unwrap_or("it gives no reason").to_owned();
     Err(CliError::Service(match args {
         // Queries fail only without a user session.
-        ["show", ..] => format!("this user has no session of systemd's ({said}): {INSTEAD}"),
+        ["show", ..] => format!("this user has no systemd session ({said}): {INSTEAD}"),
         _ => format!("systemctl --user {}: {said}", args.join(" ")),
     }))
 }

@@ -9,19 +9,19 @@ use std::time::Duration;
 
 use crate::controlled::{CommandLineRules, to_answer};
 use crate::error::CliError;
-use crate::files::make_folder_of;
+use crate::files::create_parent_folder;
 use crate::log;
 use bokehcam::budget::Quality;
 use bokehcam::clock::Clock;
-use bokehcam::computing::Executors;
+use bokehcam::computing::ExecutorFactory;
 #[cfg(feature = "desktop")]
 use bokehcam::control::bus;
 use bokehcam::control::{Answer, Claim, Server, Status};
-use bokehcam::controller::{Controlled, Controller, Facts, Rules};
+use bokehcam::controller::{ControllableRun, Controller, Rules, SourceFacts};
 use bokehcam::files::user_folders::Folders;
 use bokehcam::link::demand::Demand;
 use bokehcam::look::{Look, Patch};
-use bokehcam::pipeline::{Changes, Progress};
+use bokehcam::pipeline::{ChangeSender, Progress};
 use bokehcam::recording::still;
 use bokehcam::sink::ShutterControl;
 use bokehcam::stats::FrameRateMeter;
@@ -32,8 +32,8 @@ const PICTURE_TIMEOUT: Duration = Duration::from_secs(2);
 /// The initial look, and the means to change it.
 pub(super) struct LookChanger {
     pub look: Look,
-    pub changes: Changes,
-    pub executors: Executors,
+    pub changes: ChangeSender,
+    pub executors: ExecutorFactory,
 }
 
 /// Control server of a stream; stops when dropped.
@@ -61,11 +61,11 @@ impl Drop for ControlServer {
 pub(super) struct RunInfo {
     /// Constant part of the status.
     pub status: Status,
-    pub facts: Facts,
+    pub facts: SourceFacts,
     /// Watchers of the outputs, if they are counted.
     pub demand: Option<Demand>,
     /// Closes the outputs, and captures pictures.
-    pub release: ShutterControl,
+    pub shutter: ShutterControl,
     pub stats: Arc<RunStats>,
 }
 
@@ -125,7 +125,8 @@ pub(super) fn serve(
     let apply = move || apply_looks(looks, size, &requests, &requested);
     let looks = thread::Builder::new().name("looks".into()).spawn(apply).map_err(no_thread)?;
     // The bus wraps the handler, so it has to start before the socket's server.
-    let handler = Controller::begin(claim.name().clone(), "stream", Arc::new(rules), Stream { run, look, new_looks });
+    let handler =
+        Controller::create_handler(claim.name().clone(), "stream", Arc::new(rules), Stream { run, look, new_looks });
     #[cfg(feature = "desktop")]
     let (bus, handler) = match tray.map(|presets| bus::serve(Arc::clone(&handler), presets)) {
         Some(Ok((bus, handler))) => (Some(bus), handler),
@@ -156,7 +157,7 @@ fn apply_looks(looks: LookChanger, size: (u32, u32), requests: &Receiver<Look>, 
         // Only the last queued look counts.
         let look = requests.try_iter().last().unwrap_or(look);
         number += 1;
-        match changes.adopt(look.clone(), number, |settings| executors.create_blur(settings, size)) {
+        match changes.switch_look(look.clone(), number, |settings| executors.create_blur(settings, size)) {
             Ok(()) => applied = look,
             Err(error) => {
                 log::error(&format!("the look stays as it was: {error}"));
@@ -174,11 +175,11 @@ fn lock(look: &Mutex<Look>) -> MutexGuard<'_, Look> {
     look.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-impl Controlled for Stream {
+impl ControllableRun for Stream {
     fn status(&self) -> Result<Status, Answer> {
-        let RunInfo { status, demand, release, stats, .. } = &self.run;
+        let RunInfo { status, demand, shutter, stats, .. } = &self.run;
         Ok(Status {
-            on: !release.is_closed(),
+            on: !shutter.is_closed(),
             watched: demand.as_ref().map(Demand::has_watchers),
             quality: stats.quality().map(|quality| quality.name().to_owned()),
             fps: stats.pulse.per_second(stats.clock.now_ns()),
@@ -187,20 +188,20 @@ impl Controlled for Stream {
         })
     }
 
-    fn switch(&self, on: Option<bool>) -> Result<bool, Answer> {
-        let release = &self.run.release;
-        let on = on.unwrap_or_else(|| release.is_closed());
-        release.close(!on);
+    fn switch_pictures(&self, on: Option<bool>) -> Result<bool, Answer> {
+        let shutter = &self.run.shutter;
+        let on = on.unwrap_or_else(|| shutter.is_closed());
+        shutter.close(!on);
         Ok(on)
     }
 
-    fn release(&self) -> Option<ShutterControl> {
-        Some(self.run.release.clone())
+    fn shutter(&self) -> Option<ShutterControl> {
+        Some(self.run.shutter.clone())
     }
 
-    fn change(&self, patch: Patch, rules: &Arc<dyn Rules>) -> Result<Option<String>, Answer> {
+    fn change_look(&self, patch: Patch, rules: &Arc<dyn Rules>) -> Result<Option<String>, Answer> {
         let mut requested = lock(&self.look);
-        let (look, note) = rules.changed(&patch, &requested, &self.run.facts)?;
+        let (look, note) = rules.apply_patch(&patch, &requested, &self.run.facts)?;
         if look != *requested {
             // Sending fails only if the stream has just ended.
             let _ = self.new_looks.send(look.clone());
@@ -209,22 +210,22 @@ impl Controlled for Stream {
         Ok(note)
     }
 
-    fn make_depth_by(&self, way: &str) -> Result<(), Answer> {
-        Err(Answer::usage(format!(
-            "a stream keeps the depth that it began with: begin it anew with --depth {way}, or use a preview"
+    fn set_depth_source(&self, way: &str) -> Result<(), Answer> {
+        Err(Answer::invalid_request(format!(
+            "a running stream cannot change its depth: restart it with --depth {way}, or use a preview"
         )))
     }
 
-    fn save(&self, to: Option<&Path>) -> Result<PathBuf, Answer> {
+    fn save_snapshot(&self, to: Option<&Path>) -> Result<PathBuf, Answer> {
         if self.run.demand.as_ref().is_some_and(|demand| !demand.is_watched()) {
             return Err(Answer::failed("no program reads it, so the camera is closed: there is no picture"));
         }
-        let picture = self.run.release.picture(PICTURE_TIMEOUT);
+        let picture = self.run.shutter.picture(PICTURE_TIMEOUT);
         let picture =
             picture.ok_or_else(|| Answer::failed(format!("no picture came for {} s", PICTURE_TIMEOUT.as_secs())))?;
         let path = to.map_or_else(|| Folders::of_user().free_picture(), Path::to_owned);
         let write = || -> Result<(), CliError> {
-            make_folder_of(&path)?;
+            create_parent_folder(&path)?;
             Ok(still::write_color(&path, &picture, false)?)
         };
         write().map(|()| path.clone()).map_err(|error| to_answer(&error))

@@ -6,9 +6,9 @@ use bokehcam::bokeh::aperture::{Aperture, Shape};
 use bokehcam::budget::Quality;
 use bokehcam::depth::focus::FocusRule;
 use bokehcam::frame::{ColorImage, DepthMap};
-use bokehcam::look::{ApertureName, CocRule, Effect, Patch, Refine, SETTINGS, Strength, Tilt};
+use bokehcam::look::{ApertureSetting, CocRule, Effect, Patch, Refine, SETTINGS, Strength, Tilt};
 use bokehcam::optics::{CocField, Lens};
-use bokehcam::source::{SourceError, fitting_look};
+use bokehcam::source::{SourceError, adapt_look};
 
 const SIZE: (u32, u32) = (640, 450);
 
@@ -16,8 +16,9 @@ fn resolve(flags: &[&str], has_depth: bool) -> Result<Look, SourceError> {
     let command = options::Every::augment_args(Command::new("test").no_binary_name(true));
     let matches = command.try_get_matches_from(flags).unwrap();
     let every = options::Every::from_arg_matches(&matches).unwrap();
-    let look = look(&every.blur, &every.computing.quality).map_err(|error| SourceError::Usage(error.to_string()))?;
-    fitting_look(&look, &every.blur.depth, has_depth)
+    let look =
+        build_look(&every.blur, &every.computing.quality).map_err(|error| SourceError::Usage(error.to_string()))?;
+    adapt_look(&look, &every.blur.depth, has_depth)
 }
 
 fn refusal(flags: &[&str], has_depth: bool) -> String {
@@ -29,7 +30,7 @@ fn the_effect_follows_what_the_source_has() {
     assert!(resolve(&[], true).unwrap().effect.follows_depth());
     assert_eq!(resolve(&[], false).unwrap().effect, Effect::Blur);
     assert_eq!(resolve(&["--depth=none"], true).unwrap().effect, Effect::Blur);
-    assert!(resolve(&["--effect=none"], true).unwrap().settings(SIZE, false).is_none());
+    assert!(resolve(&["--effect=none"], true).unwrap().blur_settings(SIZE, false).is_none());
     assert!(refusal(&["--effect=dof"], false).contains("the source has none"));
     assert!(refusal(&["--effect=dof", "--depth=none"], true).contains("--depth none"));
 }
@@ -38,7 +39,7 @@ fn the_effect_follows_what_the_source_has() {
 fn the_strength_is_a_share_of_the_height_a_radius_or_a_lens() {
     let rule = |flags: &[&str]| resolve(flags, true).unwrap().coc_rule(SIZE);
     let depth = |flags: &[&str]| match rule(flags) {
-        CocRule::Depth { lens, max_coc_px, .. } => match lens.field((2.0, 0.0), SIZE.0, max_coc_px) {
+        CocRule::Depth { lens, max_coc_px, .. } => match lens.coc_field((2.0, 0.0), SIZE.0, max_coc_px) {
             CocField::Depth(depth) => (depth.coc_at_infinity_px, depth.max_coc_px),
             other => panic!("{other:?}"),
         },
@@ -61,9 +62,9 @@ fn the_strength_is_a_share_of_the_height_a_radius_or_a_lens() {
 #[test]
 fn the_executor_is_made_for_every_radius_that_can_come() {
     let dof = resolve(&["--f-number=2", "--focal-length=50", "--sensor-width=36"], true).unwrap();
-    let settings = dof.settings(SIZE, false).unwrap();
+    let settings = dof.blur_settings(SIZE, false).unwrap();
     assert_eq!((settings.far_max_px, settings.near_max_px), (27.0, 27.0));
-    let blur = resolve(&["--effect=blur", "--coc-at-infinity=7"], false).unwrap().settings(SIZE, false).unwrap();
+    let blur = resolve(&["--effect=blur", "--coc-at-infinity=7"], false).unwrap().blur_settings(SIZE, false).unwrap();
     assert_eq!((blur.far_max_px, blur.near_max_px), (7.0, 0.0));
 }
 
@@ -83,7 +84,7 @@ fn tilt_shift_is_sharp_in_its_band_and_strongest_in_the_farthest_corner() {
 #[test]
 fn the_range_of_focus_reaches_the_lens() {
     let field = |flags: &[&str]| match resolve(flags, true).unwrap().coc_rule(SIZE) {
-        CocRule::Depth { lens, range_m, max_coc_px, .. } => match lens.field((2.0, range_m), SIZE.0, max_coc_px) {
+        CocRule::Depth { lens, range_m, max_coc_px, .. } => match lens.coc_field((2.0, range_m), SIZE.0, max_coc_px) {
             CocField::Depth(depth) => depth,
             other => panic!("{other:?}"),
         },
@@ -136,7 +137,7 @@ fn looks(picture: &std::path::Path) -> Vec<Look> {
         add(&|look| look.aperture = Aperture { shape: shape.clone(), intensity: 0.5 });
     }
     add(&|look| {
-        look.aperture = Aperture { shape: ApertureName::Image(picture.to_owned()).load().unwrap(), intensity: -1.0 };
+        look.aperture = Aperture { shape: ApertureSetting::Image(picture.to_owned()).load().unwrap(), intensity: -1.0 };
     });
     add(&|look| look.method = bokeh::Method::Gather);
     for refine in [Refine::On, Refine::Off] {
@@ -170,7 +171,7 @@ fn the_flags_of_a_look_give_the_look() {
     };
     let looks = looks(&picture);
     let usual = Patch::from_look(&looks[0]);
-    let unusual = |look: &Look| Patch::from_look(look).without_equal(&usual);
+    let unusual = |look: &Look| Patch::from_look(look).without_equal_values(&usual);
     assert_eq!(resolve(&[], true).unwrap(), looks[0]);
     for (k, look) in looks.iter().enumerate() {
         let flags = unusual(look).values();
@@ -181,7 +182,10 @@ fn the_flags_of_a_look_give_the_look() {
         assert_eq!(flags.len(), count, "{flags:?}");
         // The difference between any two looks leads from one to the other.
         let other = &looks[(k * 7 + 3) % looks.len()];
-        assert_eq!(Patch::from_look(look).without_equal(&Patch::from_look(other)).apply_to(other).unwrap(), *look);
+        assert_eq!(
+            Patch::from_look(look).without_equal_values(&Patch::from_look(other)).apply_to(other).unwrap(),
+            *look
+        );
         assert_eq!(serde_json::from_str::<Look>(&serde_json::to_string(look).unwrap()).unwrap(), *look);
     }
     let names: Vec<_> = looks.iter().flat_map(|look| Patch::from_look(look).values()).map(|(name, _)| name).collect();

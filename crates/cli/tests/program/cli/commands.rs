@@ -247,8 +247,8 @@ fn a_device_that_is_not_there_costs_one_line() {
     for (name, said) in [
         ("no camera has this name", "there is no camera 'no camera has this name'"),
         ("/dev/video4711", "there is no camera '/dev/video4711'"),
-        ("/dev/null", "no video device"),
-        ("/etc/hostname", "no device node"),
+        ("/dev/null", "not a video device"),
+        ("/etc/hostname", "not a device node"),
     ] {
         run(&["devices", name]).refused(1, &[said]);
     }

@@ -114,7 +114,7 @@ fn a_unit_that_is_there_is_left_as_it_is() {
     let session = Session::new("active");
     session.put_unit("nothing\n");
     let on = session.service("on");
-    assert!(on.code == 1 && on.stderr.contains("does not take it as a unit"), "{}", on.stderr);
+    assert!(on.code == 1 && on.stderr.contains("does not accept it as a unit"), "{}", on.stderr);
     assert_eq!(fs::read_to_string(session.unit()).unwrap(), "nothing\n");
     assert_eq!(session.told(), ["--user daemon-reload"]);
 
@@ -123,7 +123,7 @@ fn a_unit_that_is_there_is_left_as_it_is() {
     session.put_unit("[Service]\nExecStart=/gone/bokehcam stream $STREAM\n");
     fs::write(session.at("loaded"), "loaded").unwrap();
     let on = session.service("on");
-    assert!(on.code == 1 && on.stderr.contains("starts /gone/bokehcam, which is not there"), "{}", on.stderr);
+    assert!(on.code == 1 && on.stderr.contains("starts /gone/bokehcam, which does not exist"), "{}", on.stderr);
     assert!(session.told().is_empty());
 }
 
@@ -147,7 +147,7 @@ fn what_keeps_it_from_running_is_said_in_plain_words() {
     for what in ["on", "off", "status"] {
         let ran = none.service(what);
         assert!(ran.code == 1 && ran.stderr.lines().count() == 1, "{}", ran.stderr);
-        assert!(ran.stderr.contains("no session of systemd's (Failed to connect to bus"), "{}", ran.stderr);
+        assert!(ran.stderr.contains("no systemd session (Failed to connect to bus"), "{}", ran.stderr);
     }
     fs::remove_file(none.at("systemctl")).unwrap();
     let ran = Ran::of(none.home.command(&["service", "on"]).env("PATH", none.at("")));

@@ -91,7 +91,7 @@ fn presets_and_settings_change_the_blur_of_what_goes_out() {
 fn what_follows_depth_is_refused_where_there_is_none() {
     let world = World::new();
     let _stream = world.stream("stream", &["--to", "null", "--effect", "tilt-shift", "--depth", "none"]);
-    world.ctl(&["preset", "dreamy"]).refused(2, &["--effect auto follows depth", "tilt-shift"]);
+    world.ctl(&["preset", "dreamy"]).refused(2, &["--effect auto needs depth", "tilt-shift"]);
     assert_eq!(world.status(&[])["look"]["rim"], "0.2", "nothing of it is done");
     world.ctl(&["preset", "miniature"]).done();
 }

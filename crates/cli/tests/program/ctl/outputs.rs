@@ -30,7 +30,7 @@ fn a_reader_that_stops_holds_up_no_file_and_off_is_off_there() {
         before = bytes_in(&world.path("here"));
     }
     let off = world.ctl(&["off"]);
-    assert!(off.done().contains("standard output: busy, so the card comes there later"), "{}", off.stderr);
+    assert!(off.done().contains("standard output: busy, so the card appears there later"), "{}", off.stderr);
     let before = bytes_in(&world.path("here"));
     until("the card goes on in the file", || bytes_in(&world.path("here")) > before + 1_000_000);
     assert_eq!(run.interrupt(), 0);
@@ -53,7 +53,7 @@ fn an_encoder_that_hangs_holds_up_no_other_output_and_off_is_off_there() {
         pictures.wait_for("the other output goes on", |picture| !picture.is_card());
     }
     let off = world.ctl(&["off"]);
-    assert!(off.done().contains("ffmpeg to call.mp4: busy, so the card comes there later"), "{}", off.stderr);
+    assert!(off.done().contains("ffmpeg to call.mp4: busy, so the card appears there later"), "{}", off.stderr);
     pictures.wait_for("the card", Picture::is_card);
     assert_eq!(state(ffmpeg), Some('T'), "it still hangs");
     kill_process(ffmpeg, Signal::CONT).unwrap();

@@ -44,13 +44,13 @@ fn what_is_no_request_is_answered_so() {
     let world = World::new();
     let _stream = world.stream("stream", &["--to", "null"]);
     for (request, said) in [
-        (&b"on\n"[..], "this is no request"),
+        (&b"on\n"[..], "this is not a valid request"),
         (b"{\"do\":\"dance\"}\n", "unknown variant `dance`"),
         (b"{\"do\":\"set\",\"settings\":[\"rim=0.1\"],\"force\":true}\n", "unknown field `force`"),
-        (b"{\"do\":\"set\",\"settings\":{}}\n", "this is no request"),
-        (b"\xff\xfe\n", "this is no request"),
-        (b"\n", "this is no request"),
-        (b"{\"do\":\"snapshot\",\"to\":\"x.png\"}\n", "say the whole path"),
+        (b"{\"do\":\"set\",\"settings\":{}}\n", "this is not a valid request"),
+        (b"\xff\xfe\n", "this is not a valid request"),
+        (b"\n", "this is not a valid request"),
+        (b"{\"do\":\"snapshot\",\"to\":\"x.png\"}\n", "give the absolute path"),
         (&[b' '; 20_000], "too long: 16384 bytes"),
         (&[b"{\"do\":\"preset\",\"name\":\"".as_slice(), &[b'x'; 60_000], b"\"}\n"].concat(), "too long"),
     ] {
@@ -72,7 +72,7 @@ fn what_is_no_request_is_answered_so() {
     let mut stream = UnixStream::connect(world.socket("stream")).unwrap();
     stream.write_all(b"{\"do\":\"off\"}").unwrap();
     stream.shutdown(std::net::Shutdown::Write).unwrap();
-    assert!(answer(&stream).contains("the request has no end"));
+    assert!(answer(&stream).contains("the request is incomplete"));
     assert_eq!(world.status(&[])["on"], true);
 }
 
@@ -90,7 +90,7 @@ fn who_says_nothing_holds_nobody_up() {
         let took = began.elapsed();
         assert!(served.contains("\"on\":true"), "{served}");
         for stream in &silent {
-            assert!(answer(stream).contains("did not come within 1 s"));
+            assert!(answer(stream).contains("did not arrive within 1 s"));
         }
         took < Duration::from_secs(1)
     });
@@ -98,8 +98,8 @@ fn who_says_nothing_holds_nobody_up() {
     until("most are told at once that there is no room", || {
         let silent: Vec<UnixStream> = (0..20).map(|_| connect()).collect();
         let answers: Vec<String> = silent.iter().map(answer).collect();
-        let refused = answers.iter().filter(|answer| answer.contains("too many ask at once")).count();
-        let late = answers.iter().filter(|answer| answer.contains("did not come within 1 s")).count();
+        let refused = answers.iter().filter(|answer| answer.contains("too many requests at once")).count();
+        let late = answers.iter().filter(|answer| answer.contains("did not arrive within 1 s")).count();
         assert_eq!(refused + late, 20, "{answers:?}");
         refused >= 12 && late >= 7
     });
@@ -113,7 +113,7 @@ fn who_says_nothing_holds_nobody_up() {
             break;
         }
     }
-    assert!(answer(&slow).contains("did not come within 1 s") && began.elapsed() >= Duration::from_secs(1));
+    assert!(answer(&slow).contains("did not arrive within 1 s") && began.elapsed() >= Duration::from_secs(1));
     assert_eq!(world.status(&[])["on"], true);
 }
 
@@ -125,7 +125,7 @@ fn who_asks_while_too_many_do_is_told_so_and_never_cut_off() {
         let _silent: Vec<UnixStream> = (0..8).map(|_| UnixStream::connect(world.socket("stream")).unwrap()).collect();
         let ran: Vec<_> = (0..4).map(|_| world.ctl(&["status"])).collect();
         let refused: Vec<&str> = ran.iter().filter(|ran| ran.code != 0).map(|ran| ran.stderr.as_str()).collect();
-        assert!(refused.iter().all(|said| said.contains("too many ask at once: ask again")), "{refused:?}");
+        assert!(refused.iter().all(|said| said.contains("too many requests at once: try again")), "{refused:?}");
         !refused.is_empty()
     });
 }
@@ -139,7 +139,7 @@ fn each_of_two_hundred_at_once_gets_an_answer() {
         let all: Vec<_> = (0..200).map(|_| scope.spawn(ask)).collect();
         all.into_iter().map(|asked| asked.join().unwrap()).collect()
     });
-    let refused = answers.iter().filter(|answer| answer.contains("too many ask at once")).count();
+    let refused = answers.iter().filter(|answer| answer.contains("too many requests at once")).count();
     let done = answers.iter().filter(|answer| answer.starts_with('{') && !answer.contains("\"error\"")).count();
     assert_eq!(refused + done, 200, "{answers:?}");
     until("every answer was true", || world.status(&[])["on"] == (done % 2 == 0));
@@ -148,7 +148,7 @@ fn each_of_two_hundred_at_once_gets_an_answer() {
         all.into_iter().map(|asked| asked.join().unwrap()).collect()
     });
     for ran in told {
-        assert!(ran.code == 0 || ran.stderr.contains("too many ask at once"), "{}", ran.stderr);
+        assert!(ran.code == 0 || ran.stderr.contains("too many requests at once"), "{}", ran.stderr);
     }
 }
 
@@ -158,7 +158,7 @@ fn a_run_that_takes_up_nobody_is_said_to_hang() {
     let world = World::new();
     std::fs::DirBuilder::new().mode(0o700).create(world.path("run/bokehcam")).unwrap();
     let _nobody = std::os::unix::net::UnixListener::bind(world.socket("stream")).unwrap();
-    world.ctl(&["status"]).refused(1, &["stream does not answer: it hangs, or is still beginning"]);
+    world.ctl(&["status"]).refused(1, &["stream does not answer: it hangs, or is still starting"]);
 }
 
 #[test]
@@ -208,7 +208,7 @@ fn another_user_is_refused_even_where_the_folder_is_open() {
     for (path, mode) in [("", 0o755), ("run", 0o755), ("run/bokehcam", 0o755), ("run/bokehcam/stream.sock", 0o777)] {
         set_permissions(world.path(path), Permissions::from_mode(mode)).unwrap();
     }
-    assert!(ask().unwrap().contains("this run is another user's"));
+    assert!(ask().unwrap().contains("this run belongs to another user"));
     set_permissions(world.path("run/bokehcam"), Permissions::from_mode(0o700)).unwrap();
     assert_eq!(world.status(&[])["on"], true);
 }

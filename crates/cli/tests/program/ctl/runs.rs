@@ -11,15 +11,15 @@ use super::world::World;
 #[test]
 fn several_runs_are_told_apart_by_name() {
     let world = World::new();
-    world.ctl(&["on"]).refused(1, &["nothing runs that can be controlled"]);
+    world.ctl(&["on"]).refused(1, &["no stream or preview is running"]);
     for list in [&[][..], &["list"]] {
         let ran = world.ctl(list);
-        assert!(ran.stdout.is_empty() && ran.done().contains("nothing runs"), "{}", ran.stderr);
+        assert!(ran.stdout.is_empty() && ran.done().contains("nothing is running"), "{}", ran.stderr);
     }
     let first = world.stream("stream", &["--to", "null"]);
     let second = world.stream("stream-2", &["--to", "null"]);
     let _third = world.stream("desk", &["--to", "null", "--name", "desk"]);
-    world.ctl(&["off"]).refused(2, &["several run: desk, stream, stream-2; choose one with --name"]);
+    world.ctl(&["off"]).refused(2, &["several are running: desk, stream, stream-2; choose one with --name"]);
     world.ctl(&["off", "--name", "stream-2"]).done();
     for list in [&[][..], &["list"]] {
         let listed = world.ctl(list).printed();
@@ -55,8 +55,8 @@ fn what_a_dead_run_left_is_swept_and_nothing_else_is_touched() {
     killed.0.kill().unwrap();
     killed.0.wait().unwrap();
     assert!(world.socket("stream").symlink_metadata().unwrap().file_type().is_socket());
-    world.ctl(&["off"]).refused(1, &["nothing runs that can be controlled"]);
-    world.ctl(&["off", "--name", "stream"]).refused(1, &["no run is called stream: nothing runs"]);
+    world.ctl(&["off"]).refused(1, &["no stream or preview is running"]);
+    world.ctl(&["off", "--name", "stream"]).refused(1, &["no run is called stream: nothing is running"]);
 
     let foreign = [world.path("run/bokehcam/notes.txt"), world.socket("stream-2"), world.socket("desk")];
     for file in &foreign {
@@ -67,7 +67,7 @@ fn what_a_dead_run_left_is_swept_and_nothing_else_is_touched() {
     let first = world.stream("stream", &["--to", "null"]);
     let second = world.stream("stream-3", &["--to", "null"]);
     let refused = world.run(&["stream", "demo", "--frames", "1", "--to", "null", "--name", "desk"]);
-    refused.refused(2, &["desk.sock is in the way"]);
+    refused.refused(2, &["desk.sock exists and does not belong to a run"]);
     assert_eq!((first.interrupt(), second.interrupt()), (0, 0));
     for file in &foreign {
         assert_eq!(fs::read_to_string(file).unwrap(), "mine");
@@ -98,20 +98,20 @@ fn without_a_folder_of_the_users_own_a_run_goes_on_and_says_so() {
         lines.map(str::to_owned).collect::<Vec<_>>()
     };
     let none = said(&world, None, &[]);
-    assert!(none.len() == 1 && none[0].contains("XDG_RUNTIME_DIR names no whole path"), "{none:?}");
+    assert!(none.len() == 1 && none[0].contains("XDG_RUNTIME_DIR is not an absolute path"), "{none:?}");
     assert!(said(&world, None, &["--quiet"]).is_empty());
     assert!(said(&world, Some("/nowhere"), &[])[0].contains("XDG_RUNTIME_DIR is /nowhere"));
     assert!(
-        said(&world, Some("here"), &[])[0].contains("XDG_RUNTIME_DIR names no whole path"),
+        said(&world, Some("here"), &[])[0].contains("XDG_RUNTIME_DIR is not an absolute path"),
         "a path that is not whole is none"
     );
     assert!(said(&world, world.path("run").to_str(), &[]).is_empty());
     fs::set_permissions(world.path("run/bokehcam"), Permissions::from_mode(0o755)).unwrap();
     let open = said(&world, world.path("run").to_str(), &[]);
-    assert!(open.len() == 1 && open[0].contains("is open to others: `chmod 700"), "{open:?}");
-    world.ctl(&["status"]).refused(1, &["is open to others"]);
+    assert!(open.len() == 1 && open[0].contains("is accessible to others: run `chmod 700"), "{open:?}");
+    world.ctl(&["status"]).refused(1, &["is accessible to others"]);
     fs::remove_dir(world.path("run/bokehcam")).unwrap();
     std::os::unix::fs::symlink(world.path("here"), world.path("run/bokehcam")).unwrap();
-    assert!(said(&world, world.path("run").to_str(), &[])[0].contains("is no folder"));
+    assert!(said(&world, world.path("run").to_str(), &[])[0].contains("is not a folder"));
     assert_eq!(fs::read_dir(world.path("here")).unwrap().count(), 0);
 }

@@ -77,7 +77,7 @@ fn a_network_that_fails_in_the_run_blurs_all_and_no_frame_is_lost() {
     let ran = streamed(&home, "later", &network(&constants, &nodes), "3");
     let said = ran.done();
     assert!(said.contains("3 of 3 frames delivered"), "{said}");
-    let told: Vec<&str> = said.lines().filter(|line| line.contains("all is blurred")).collect();
+    let told: Vec<&str> = said.lines().filter(|line| line.contains("everything is blurred")).collect();
     assert!(told.len() == 1 && told[0].contains("more than 4 GiB of memory"), "{said}");
 }
 
@@ -104,7 +104,7 @@ fn a_network_that_hangs_in_the_run_is_given_up() {
     kill_process(worker, Signal::STOP).unwrap();
     until("its end", HANG, || program.children().is_empty());
     let ran = program.end_by(Signal::TERM, HANG);
-    assert!(ran.done().contains("all is blurred: it gave no answer in 10 s"), "{}", ran.stderr);
+    assert!(ran.done().contains("everything is blurred: it gave no answer in 10 s"), "{}", ran.stderr);
 }
 
 #[test]
@@ -156,7 +156,7 @@ fn code_is_not_loaded_from_the_working_folder_or_from_where_others_write() {
             doctor(&[(variable, value)]);
         }
     }
-    assert!(doctor(&[("ORT_DYLIB_PATH", "./lib/libonnxruntime.so.1")]).contains("name it from the root"));
+    assert!(doctor(&[("ORT_DYLIB_PATH", "./lib/libonnxruntime.so.1")]).contains("give an absolute path"));
     let library = written(&home.0, "libonnxruntime.so", b"nothing");
     fs::set_permissions(&library, fs::Permissions::from_mode(0o666)).unwrap();
     let said = doctor(&[("ORT_DYLIB_PATH", library.to_str().unwrap())]);

@@ -15,7 +15,7 @@ use crate::program::{Home, Ran};
 fn only_known_networks_are_installed_and_nothing_of_others_is_replaced() {
     let home = Home::new();
     written(&home.0, "m.onnx", &matte(8, 4, WEIGHTS, 0.0));
-    home.run(&["models", "add", "m.onnx"]).failed(1, &["none of the networks that are known"]);
+    home.run(&["models", "add", "m.onnx"]).failed(1, &["not a known network"]);
     let listed = home.run(&["models"]).stdout;
     for known in &KNOWN {
         assert!(listed.contains(known.address) && listed.contains(known.sha256), "{}", known.file);
@@ -37,11 +37,11 @@ fn what_is_fetched_is_checked_and_how_is_shown() {
     };
     client(&home, &written(&home.0, "other", b"<html>not found</html>"));
     let ran = get(&[]);
-    let said = ran.failed(1, &["is not kept", KNOWN[0].address]);
+    let said = ran.failed(1, &["was discarded", KNOWN[0].address]);
     assert!(said.find("curl --fail").unwrap() < said.find("called with").unwrap(), "{said}");
     // An endless download.
     client(&home, Path::new("/dev/zero"));
-    get(&["tcmonodepth-small"]).failed(1, &["is not kept"]);
+    get(&["tcmonodepth-small"]).failed(1, &["was discarded"]);
     assert!(!home.path("data").exists());
     get(&["nothing"]).failed(2, &[KNOWN[0].file]);
 }

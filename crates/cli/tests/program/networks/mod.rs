@@ -230,11 +230,11 @@ fn a_bad_file_is_refused_in_one_line() {
     let unknown =
         model(&[port("in", &sides(3, 8))], &[], &[node("Magic", &["in"], "out", &[])], &[port("out", &sides(1, 8))]);
     let cases: [(&str, Vec<u8>, &str); 8] = [
-        ("cut", good[..good.len() / 2].to_vec(), "no network that can be run here"),
-        ("empty", Vec::new(), "no network that can be run here"),
-        ("text", b"not a network at all".to_vec(), "no network that can be run here"),
+        ("cut", good[..good.len() / 2].to_vec(), "this network cannot be run"),
+        ("empty", Vec::new(), "this network cannot be run"),
+        ("text", b"not a network at all".to_vec(), "this network cannot be run"),
         ("grey", plain(&sides(1, 8), &sides(1, 8)), "three channels"),
-        ("three", plain(&sides(3, 8), &sides(3, 8)), "its answer is no picture"),
+        ("three", plain(&sides(3, 8), &sides(3, 8)), "its output is not a picture"),
         ("huge", plain(&sides(3, 8192), &sides(1, 8192)), "more than"),
         ("nan", zero, "not a number"),
         ("unknown", unknown, "Magic"),

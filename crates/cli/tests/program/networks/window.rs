@@ -61,7 +61,7 @@ fn a_source_has_the_ways_to_depth_that_it_brings_and_the_command_names_the_one_t
     let is_installed = system.open(PORTRAIT, None).unwrap().ways.contains(&DepthMethod::PersonAndDistance);
     assert_eq!(none.is_ok(), is_installed);
     assert!(is_installed || none.unwrap_err().contains("`bokehcam models get`"));
-    assert!(system.check_depth_method(PORTRAIT, DepthMethod::Stereo).is_err(), "it has one eye");
+    assert!(system.check_depth_method(PORTRAIT, DepthMethod::Stereo).is_err(), "it has one camera");
     let flags = [DepthMethod::Measured, DepthMethod::Stereo, DepthMethod::Person, DepthMethod::PersonAndDistance]
         .map(DepthMethod::flag);
     assert_eq!(flags, ["recorded", "stereo", "matte", "matte,mono"]);

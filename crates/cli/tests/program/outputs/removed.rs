@@ -43,10 +43,10 @@ fn an_output_that_is_removed_is_told_of_while_the_others_go_on_and_what_there_is
             true => fs::remove_dir_all(home.path("d")).unwrap(),
             false => fs::remove_file(part(&home.path("d")).unwrap()).unwrap(),
         }
-        let told = line_with(&mut stderr, "was removed while it was written");
+        let told = line_with(&mut stderr, "was removed while it was being written");
         let kept = home.path(if whole_folder { "" } else { "d" }).join(name.replace('.', ".incomplete."));
         let kept_at = format!("kept as {}", kept.canonicalize().unwrap().display());
-        assert!(told.contains(&kept_at) && told.contains("going on without it"), "{told}");
+        assert!(told.contains(&kept_at) && told.contains("continuing without it"), "{told}");
         assert_eq!(home.path("d").exists(), !whole_folder, "it is not made anew");
         let so_far = pngs(&home.path("out"));
         until("more pictures of the other", || pngs(&home.path("out")) > so_far);
@@ -98,7 +98,7 @@ fn a_video_that_is_removed_can_be_played_up_to_there() {
     for name in ["x.mp4", "x.mkv", "x.webm"] {
         let (run, mut stderr) = run(&home, "", name);
         fs::remove_dir_all(home.path("d")).unwrap();
-        line_with(&mut stderr, "was removed while it was written");
+        line_with(&mut stderr, "was removed while it was being written");
         assert_eq!(terminate(run).code, 1);
         let frames = played(&home.path(name.replace('.', ".incomplete.")));
         assert!(frames >= 2, "{name}: {frames}");

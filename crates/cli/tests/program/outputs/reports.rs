@@ -10,7 +10,7 @@ fn a_report_and_a_sink_never_share_a_place() {
     let home = Home::new();
     home.record("self", 3, 0.1);
     for (to, report) in [("x.y4m", "x.y4m"), ("x.y4m", "./self/../x.y4m"), ("x.mkv", "x.mkv")] {
-        home.sh(&format!("stream self --to {to} --report {report}")).failed(2, &["goes there, too"]);
+        home.sh(&format!("stream self --to {to} --report {report}")).failed(2, &["writes to it, too"]);
     }
     home.sh(&format!("stream self {BLUR} --to x.y4m --report nowhere/r.json")).failed(1, &["nowhere/r.json"]);
     assert!(!home.path("x.y4m").exists(), "it is known before the run");
@@ -28,7 +28,7 @@ fn a_report_never_lies_among_the_pictures_of_an_output() {
     {
         for force in ["", "--force"] {
             let ran = home.sh(&format!("stream self {BLUR} --to null --to out/ --report {report} {force}"));
-            ran.failed(2, &["the pictures of --to out/ lie there"]);
+            ran.failed(2, &["that folder is for the pictures of --to out/"]);
             assert!(tree(home.0.path()) == before, "{report}");
         }
     }
@@ -46,7 +46,15 @@ fn a_report_replaces_no_other_file_whatever_is_forced() {
     let before = tree(home.0.path());
     for report in ["self/rgb.txt", "self", "old/000001.png", "old/.bokehcam", "folder.json", "list.txt", "/dev/null"] {
         let is_file = home.path(report).is_file();
-        let (forced, plain) = if is_file { ("is no report", "exists") } else { ("is not replaced", "is not replaced") };
+        let (forced, plain) = if is_file {
+            (
+                "is not a \
+                                             report",
+                "exists",
+            )
+        } else {
+            ("is not replaced", "is not replaced")
+        };
         home.sh(&format!("stream self {BLUR} --to null --report {report} --force")).failed(2, &[forced]);
         let plainly = home.sh(&format!("stream self {BLUR} --to null --report {report}"));
         plainly.failed(if is_file { 1 } else { 2 }, &[plain]);
@@ -91,8 +99,8 @@ fn a_report_that_fails_is_printed_and_does_not_hide_why_the_run_ended() {
     fs::remove_dir_all(home.path("reports")).unwrap();
     let ran = run.end(LONG);
     ran.failed(1, &["000003.png"]);
-    assert!(ran.stderr.contains("the report is not written"), "{}", ran.stderr);
-    let (_, printed) = ran.stderr.split_once("the report has no other place:\n").expect("the report");
+    assert!(ran.stderr.contains("the report was not written"), "{}", ran.stderr);
+    let (_, printed) = ran.stderr.split_once("the report could not be saved; here it is:\n").expect("the report");
     let printed = serde_json::Deserializer::from_str(printed).into_iter::<serde_json::Value>().next();
     assert!(printed.unwrap().unwrap()["frames"]["delivered"].is_u64());
 }

@@ -63,7 +63,7 @@ fn a_focus_that_nothing_is_near_is_told_with_the_distances_that_there_are() {
     assert_eq!(warned(&["--focus", "1.5"]), "");
     let far = warned(&["--focus", "1.5", "--depth-scale", "100", "--coc-at-infinity", "4"]);
     assert!(far.contains("--focus 1.5: the depth lies from 2") && far.contains("beyond that"), "{far}");
-    assert!(far.contains("is --depth-scale that of this depth?"), "{far}");
+    assert!(far.contains("is --depth-scale right for this depth?"), "{far}");
     let near = warned(&["--focus", "100"]);
     assert!(near.contains("all of it before that"), "{near}");
     assert_eq!(warned(&["--focus", "auto", "--depth-scale", "100"]), "");
@@ -78,7 +78,7 @@ fn a_recording_in_other_units_is_told_as_well() {
         home.run(&[&args[..], &["--depth-scale", scale]].concat()).warning().to_owned()
     };
     assert_eq!(stream("5000"), "");
-    assert!(stream("50").contains("beyond that, and nothing is sharp; is --depth-scale that of this depth?"));
+    assert!(stream("50").contains("beyond that, so nothing is sharp; is --depth-scale right for this depth?"));
 }
 
 #[test]
@@ -106,7 +106,7 @@ fn a_photo_has_the_depth_beside_it_in_every_command() {
         let said = render_of(&home, &["--mask", "photo.png"]);
         assert!(!said.stderr.contains("beside it"), "{}", said.stderr);
         assert!(render_of(&home, &["--depth", "none"]).stderr.contains("written"));
-        render_of(&home, &["--out", name]).refused(2, &["which is read"]);
+        render_of(&home, &["--out", name]).refused(2, &["which is the input"]);
         fs::remove_file(home.path(name)).unwrap();
     }
     // A snapshot's name refers to its sources.

@@ -13,7 +13,7 @@ fn what_is_wrong_in_the_environment_is_said_to_be_there() {
     let both = [("BOKEHCAM_COC_AT_INFINITY", "3"), ("BOKEHCAM_F_NUMBER", "2")];
     with(&both, &["config", "dump"]).refused(2, &["BOKEHCAM_COC_AT_INFINITY=3", "BOKEHCAM_F_NUMBER=2"]);
     let late = with(&[("BOKEHCAM_DEPTH", "stereo")], &["stream", "synthetic", "--frames", "1", "--to", "null"]);
-    late.refused(2, &["one eye", "BOKEHCAM_DEPTH=stereo"]);
+    late.refused(2, &["one camera", "BOKEHCAM_DEPTH=stereo"]);
     // A flag overrides the environment, so its error does not mention it.
     let flag = with(&[("BOKEHCAM_RIM", "0.1")], &["config", "dump", "--rim", "7"]);
     assert!(flag.code == 2 && !flag.stderr.contains("environment"), "{}", flag.stderr);
@@ -35,7 +35,8 @@ fn switches_are_whatever_people_write() {
 #[test]
 fn unknown_variables_are_named_with_what_may_have_been_meant() {
     let ran = with(&[("BOKEHCAM_RIMM", "1"), ("BOKEHCAM_NO_VM", "1"), ("BOKEHCAM_DATA", "x")], &["config", "dump"]);
-    let told = "warning: in the environment there is BOKEHCAM_RIMM, which is no setting, did you mean BOKEHCAM_RIM?\n";
+    let told = "warning: in the environment there is BOKEHCAM_RIMM, which is not a setting, did you mean \
+                BOKEHCAM_RIM?\n";
     assert_eq!(ran.done(), told);
     assert_eq!(with(&[("BOKEHCAM_RIMM", "1")], &["-q", "config", "dump"]).done(), "");
 }

@@ -54,7 +54,7 @@ fn a_folder_whose_name_is_no_text_works_and_other_arguments_are_named() {
         Ran::of(home.command(args).arg(name)).done();
     }
     let ran = Ran::of(home.command(&["stream", "synthetic", "--to"]).arg(name));
-    ran.refused(2, &["'caf\\xe9' is no text in UTF-8"]);
+    ran.refused(2, &["'caf\\xe9' is not UTF-8 text"]);
 }
 
 #[test]
@@ -173,7 +173,7 @@ fn all_warnings_look_alike() {
         "2",
     ]);
     let warnings: Vec<&str> =
-        ran.done().lines().filter(|line| line.contains("without distances") || line.contains("--follow")).collect();
+        ran.done().lines().filter(|line| line.contains("without a scale") || line.contains("--follow")).collect();
     assert_eq!(warnings.len(), 2, "{}", ran.stderr);
     assert!(warnings.iter().all(|line| line.starts_with("warning: ")), "{}", ran.stderr);
 }

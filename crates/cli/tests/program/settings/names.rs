@@ -33,6 +33,6 @@ fn both_names_are_read_everywhere_and_one_is_written() {
         bad.refused(2, &["use pixels from 0 to 20000"]);
     }
     let both = Home::new().with_settings("blur = 1\ncoc-at-infinity = 2\n");
-    both.run(&["config", "dump"]).refused(2, &["config.toml:2: ", "there already, by its other name"]);
+    both.run(&["config", "dump"]).refused(2, &["config.toml:2: ", "given twice, also by its other name"]);
     Home::new().run(&["config", "dump", "--blur", "1", "--coc-at-infinity", "2"]).refused(2, &["multiple times"]);
 }

@@ -66,7 +66,7 @@ fn the_library_refuses_what_the_command_line_does() {
         far_max_px: radius_px,
         near_max_px: 0.0,
     };
-    let create = |settings: &Settings| bokeh::create(settings, (640, 360), None, Some(1)).map(|_| ());
+    let create = |settings: &Settings| bokeh::create_blur(settings, (640, 360), None, Some(1)).map(|_| ());
     for (coc, method, rank, max_px) in [
         (CocKind::Uniform, Method::Layered, None, 735.0),
         (CocKind::Ramp, Method::Layered, None, 735.0),

@@ -12,7 +12,7 @@ fn a_picture_without_depth_says_what_that_costs() {
     for more in [&["--preset", "portrait"][..], &[]] {
         let ran = render(more);
         let warning = ran.warning();
-        assert!(warning.contains("there is no depth, so all is blurred"), "{more:?}: {warning}");
+        assert!(warning.contains("there is no depth, so everything is blurred"), "{more:?}: {warning}");
         for way in ["`bokehcam models get`", "--effect tilt-shift", "--mask FILE", "--depth-map FILE", "NAME-depth.png"]
         {
             assert!(warning.contains(way), "{more:?}: {warning}");
@@ -40,7 +40,7 @@ fn a_picture_without_depth_says_what_that_costs() {
     assert_eq!(render(&["--effect", "blur"]).warning(), "");
     assert!(render(&["--depth-map", "depth.png", "--effect", "blur"]).warning().contains("--depth-map has no effect"));
     let pfm = render(&["--depth-map", "depth.pfm", "--depth-scale", "1000"]);
-    assert!(pfm.warning().contains("--depth-scale 1000 (this depth is in metres already)"), "{}", pfm.stderr);
+    assert!(pfm.warning().contains("--depth-scale 1000 (this depth is already in metres)"), "{}", pfm.stderr);
     let home = Home::new().with_settings("focus = 1.2\ndepth-scale = 1000\nfps = 25\n").with_photo();
     let ran = home.run(&["render", "photo.png", "--out", "out.png", "--effect", "blur", "--backend", "cpu"]);
     assert_eq!(ran.warning(), "");
@@ -58,7 +58,7 @@ fn recordings_say_what_they_have_no_use_for() {
         (&["--fps", "25"][..], "--fps 25"),
         (&["--size", "640x480"], "--size 640x480"),
         (&["--budget-ms", "3"], "--budget-ms 3 (frames do not come in real time"),
-        (&["--max-disparity", "32"], "--max-disparity 32 (depth is not taken from two eyes)"),
+        (&["--max-disparity", "32"], "--max-disparity 32 (depth does not come from two cameras)"),
         (&["--effect", "none", "--rim", "0.1"], "--rim 0.1, --backend cpu (nothing is blurred)"),
         (&["--effect", "tilt-shift", "--depth-scale", "5000"], "--depth-scale 5000 (the effect does not use depth)"),
     ] {
@@ -73,7 +73,7 @@ fn recordings_say_what_they_have_no_use_for() {
 
     let home = Home::new().with_colours();
     let ran = home.run(&["stream", "colours", "--to", "null", "--backend", "cpu"]);
-    assert!(ran.warning().contains("there is no depth, so all is blurred"), "{}", ran.stderr);
+    assert!(ran.warning().contains("there is no depth, so everything is blurred"), "{}", ran.stderr);
 }
 
 #[test]
@@ -82,7 +82,7 @@ fn a_recording_is_no_camera() {
     let home = Home::new().with_recording();
     let args = ["stream", "recording", "--to", "null", "--control", "gain=1", "--format", "MJPG", "--effect", "none"];
     let ran = home.run(&args);
-    assert!(ran.warning().contains("--format MJPG, --control gain=1 (the source is no camera)"), "{}", ran.stderr);
+    assert!(ran.warning().contains("--format MJPG, --control gain=1 (the source is not a camera)"), "{}", ran.stderr);
 }
 
 #[test]

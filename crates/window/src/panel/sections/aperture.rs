@@ -33,7 +33,7 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet, thumbnails: &mut Thumbnails) {
         Shape::Ring { inner } => number(ui, &Number::new("Hole", "Its radius", 0.0..=0.95, 2), inner),
         Shape::Polygon { blades, rotation_deg, curvature } => {
             let turn = Number::new("Rotation", "Clockwise", -180.0..=180.0, 0).unit("", "°");
-            let curve = Number::new("Curvature", "Straight blades to a circle", 0.0..=1.0, 2);
+            let curve = Number::new("Curvature", "From straight blades to a circle", 0.0..=1.0, 2);
             // `|` instead of `||`, so that every number is drawn.
             integer(ui, "Blades", blades) | number(ui, &turn, rotation_deg) | number(ui, &curve, curvature)
         }
@@ -49,7 +49,7 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet, thumbnails: &mut Thumbnails) {
     sheet.number(ui, &how, intensity, |look, intensity| look.aperture.intensity = intensity);
     let how = Number::new("Soft edge", "As a share of the radius", 0.0..=1.0, 2);
     sheet.number(ui, &how, rim, |look, rim| look.rim = rim);
-    let hint = "How much brighter lights are than white; 0 is off";
+    let hint = "Brightness of lights, as a multiple of white; 0 is off";
     let how = Number::new("Brighter lights", hint, 0.0..=50.0, 1).unit("", "×");
     sheet.number(ui, &how, highlights, |look, highlights| look.highlights = highlights);
 }
@@ -161,7 +161,7 @@ impl Thumbnails {
 
 /// Renders a thumbnail: white, with the aperture's brightness as opacity.
 fn render_thumbnail(aperture: &Aperture, rim: f32) -> ColorImage {
-    let mask = aperture.mask(TEXTURE_SIDE_PX, rim);
+    let mask = aperture.to_mask(TEXTURE_SIDE_PX, rim);
     let brightest = mask.values.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
     let pixel = |light: &f64| {
         // Approximates a display's gamma, so that the opacity looks like the light.

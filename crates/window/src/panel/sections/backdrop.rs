@@ -8,7 +8,7 @@ use crate::services::Browse;
 use crate::state::Action;
 use crate::texts::{tr, tr_with};
 use bokehcam::depth::backdrop::Behind;
-use bokehcam::look::Follow;
+use bokehcam::look::FramingZoom;
 
 #[derive(Clone, Copy, PartialEq)]
 enum Kind {
@@ -19,8 +19,8 @@ enum Kind {
 
 const KINDS: [(&str, &str, Kind); 3] = [
     ("Blurred", "The room, blurred", Kind::Blurred),
-    ("Colour", "One colour, for a page of your own, or for programs that put something in its place", Kind::Color),
-    ("Picture", "A picture of yours, as large as the frame", Kind::Picture),
+    ("Colour", "One colour, or a green screen for programs that replace it", Kind::Color),
+    ("Picture", "Your own picture, as large as the frame", Kind::Picture),
 ];
 /// Chroma-key green.
 const GREEN: [u8; 3] = [0, 177, 64];
@@ -31,12 +31,12 @@ const MIN_ZOOM: f32 = 1.1;
 
 /// Adds the list of backgrounds.
 pub fn kinds(ui: &mut Ui, sheet: &mut Sheet) {
-    let kind = match sheet.look.behind {
+    let kind = match sheet.look.background {
         Behind::Blur => Kind::Blurred,
         Behind::Color(_) => Kind::Color,
         Behind::Picture(_) => Kind::Picture,
     };
-    let named = match &sheet.state.first_look.behind {
+    let named = match &sheet.state.first_look.background {
         Behind::Picture(picture) => Some(Behind::Picture(picture.clone())),
         _ => None,
     };
@@ -47,9 +47,9 @@ pub fn kinds(ui: &mut Ui, sheet: &mut Sheet) {
     let chosen = ui.add_enabled_ui(enabled, |ui| dropdown(ui, "Background", &shown, all, &kind)).inner;
     if let Some(chosen) = chosen {
         match (chosen, named) {
-            (Kind::Blurred, _) => sheet.look.behind = Behind::Blur,
-            (Kind::Color, _) => sheet.look.behind = Behind::Color(GREEN),
-            (Kind::Picture, Some(named)) => sheet.look.behind = named,
+            (Kind::Blurred, _) => sheet.look.background = Behind::Blur,
+            (Kind::Color, _) => sheet.look.background = Behind::Color(GREEN),
+            (Kind::Picture, Some(named)) => sheet.look.background = named,
             (Kind::Picture, None) => sheet.act(Action::Browse(Browse::Behind)),
         }
         sheet.mark_changed(true, "behind");
@@ -58,33 +58,33 @@ pub fn kinds(ui: &mut Ui, sheet: &mut Sheet) {
 
 /// Adds the options of the selected background, and auto-framing.
 pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
-    match sheet.look.behind.clone() {
+    match sheet.look.background.clone() {
         Behind::Blur => {}
         Behind::Picture(picture) => {
             picture.file.iter().for_each(|file| path(ui, &file.display().to_string()));
-            sheet.button(ui, "Choose picture…", "Another picture of yours", Action::Browse(Browse::Behind));
+            sheet.button(ui, "Choose picture…", "Another picture of your own", Action::Browse(Browse::Behind));
         }
         Behind::Color(mut color) => drop(ui.horizontal(|ui| {
             ui.label(tr("Colour"));
             let picker = ui.color_edit_button_srgb(&mut color);
             picker.widget_info(|| WidgetInfo::labeled(Role::ColorWell, true, tr("Colour")));
             if picker.hint("Another colour").changed() {
-                sheet.look.behind = Behind::Color(color);
+                sheet.look.background = Behind::Color(color);
                 sheet.mark_changed(true, "colour behind");
             }
         })),
     }
     let zoom = sheet.look.follow.zoom();
-    let hint = "What goes out is a part of the picture, with the subject in its middle";
+    let hint = "Recordings and calls show a part of the picture, with the subject in the middle";
     if switch(ui, "Follow the subject", hint, zoom.is_some()) {
-        sheet.look.follow = if zoom.is_some() { Follow::OFF } else { Follow::to(DEFAULT_ZOOM) };
+        sheet.look.follow = if zoom.is_some() { FramingZoom::OFF } else { FramingZoom::from_zoom(DEFAULT_ZOOM) };
         sheet.mark_changed(true, "follow");
     }
     // `zoom` is from before the click, so the slider appears in the next pass.
     if let Some(zoom) = zoom {
         let how =
-            Number::new("Largest zoom", "So much larger the subject becomes, at most", MIN_ZOOM..=Follow::MAX_ZOOM, 1);
-        sheet.number(ui, &how.unit("", "×"), zoom, |look, zoom| look.follow = Follow::to(zoom));
-        remark(ui, "In what goes out, within the dashed line; this window shows the whole picture.");
+            Number::new("Largest zoom", "Largest magnification of the subject", MIN_ZOOM..=FramingZoom::MAX_ZOOM, 1);
+        sheet.number(ui, &how.unit("", "×"), zoom, |look, zoom| look.follow = FramingZoom::from_zoom(zoom));
+        remark(ui, "Recordings and calls show the part in the dashed line; this window shows the whole picture.");
     }
 }

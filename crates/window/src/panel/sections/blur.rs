@@ -25,7 +25,7 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
         match (chosen, sheet.look.strength) {
             (Some(true), _) => sheet.look.strength = Strength::Lens(lens_of(&sheet.look, focus_m, sheet.size)),
             (Some(false), Strength::Lens(lens)) => {
-                sheet.look.strength = Strength::of_fraction(lens_fraction(lens, focus_m, sheet.size));
+                sheet.look.strength = Strength::from_fraction(lens_fraction(lens, focus_m, sheet.size));
             }
             _ => {}
         }
@@ -40,7 +40,7 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
 /// Adds the strength as a percentage, with a comparable lens.
 fn amount_number(ui: &mut Ui, sheet: &mut Sheet) {
     let Some(fraction) = amount(&sheet.look, sheet.size.1) else { return };
-    let hint = "Radius of a far light, as a share of the picture's height. The wheel over the picture does the same";
+    let hint = "Radius of a far light, relative to the picture's height. The wheel over the picture does the same";
     let how = Number::new("Amount of blur", hint, 0.0..=MAX_COC_PER_HEIGHT * 100.0, 1).unit("", " %");
     sheet.number(ui, &how, fraction * 100.0, |look, percent| look.strength = Strength::Percent(percent));
     if sheet.follows_depth() && sheet.state.focus_m.is_some() && !sheet.is_relative() {
@@ -55,19 +55,19 @@ fn equivalent_lens(sheet: &Sheet) -> String {
     if f_number.is_finite() && f_number < 64.0 {
         tr_with("Like {} mm at f/{} on full frame", &[&format!("{focal_mm:.0}"), &format!("{f_number:.1}")])
     } else {
-        "No blur to be seen".to_owned()
+        "No visible blur".to_owned()
     }
 }
 
 /// Adds the lens parameters.
 fn lens_numbers(ui: &mut Ui, sheet: &mut Sheet, lens: Lens) {
-    let how = Number::new("Aperture", "f-number: smaller is more blur", F_NUMBERS, 1).unit("f/", "").logarithmic();
+    let how = Number::new("Aperture", "f-number: smaller means more blur", F_NUMBERS, 1).unit("f/", "").logarithmic();
     sheet.number(ui, &how, lens.f_number, |look, f_number| look.strength = Strength::Lens(Lens { f_number, ..lens }));
-    let how = Number::new("Focal length", "Longer is more blur", 14.0..=200.0, 0).unit("", " mm").logarithmic();
+    let how = Number::new("Focal length", "Longer means more blur", 14.0..=200.0, 0).unit("", " mm").logarithmic();
     sheet.number(ui, &how, lens.focal_length_mm, |look, focal_length_mm| {
         look.strength = Strength::Lens(Lens { focal_length_mm, ..lens });
     });
-    let hint = "36 mm is full frame; smaller is more blur";
+    let hint = "36 mm is full frame; smaller means more blur";
     let how = Number::new("Sensor width", hint, 4.0..=54.0, 1).unit("", " mm").logarithmic();
     sheet.number(ui, &how, lens.sensor_width_mm, |look, sensor_width_mm| {
         look.strength = Strength::Lens(Lens { sensor_width_mm, ..lens });

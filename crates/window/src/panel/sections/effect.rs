@@ -8,7 +8,7 @@ use crate::state::Source;
 use bokehcam::look::{Effect, Tilt};
 
 const EFFECTS: [(&str, &str, Effect); 4] = [
-    ("Portrait", "The farther from who is in focus, the more blur", Effect::Auto),
+    ("Portrait", "More blur, the farther from the subject in focus", Effect::Auto),
     ("Sharp band", "A sharp band, and blur that grows away from it", Effect::TiltShift),
     ("Whole picture", "The same blur everywhere", Effect::Blur),
     ("No blur", "The picture as it is", Effect::None),
@@ -32,7 +32,7 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
         sheet.number(ui, &how, center_y * 100.0, |look, percent| look.tilt.center_y = percent / 100.0);
         let how = share("Width of the band", "As a share of the height");
         sheet.number(ui, &how, band * 100.0, |look, percent| look.tilt.band = percent / 100.0);
-        let how = Number::new("Angle", "The turn of the band, clockwise", -90.0..=90.0, 0).unit("", "°");
+        let how = Number::new("Angle", "Rotation of the band, clockwise", -90.0..=90.0, 0).unit("", "°");
         sheet.number(ui, &how, angle_deg, |look, angle_deg| look.tilt.angle_deg = angle_deg);
     }
 }

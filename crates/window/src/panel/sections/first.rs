@@ -51,7 +51,7 @@ fn camera(ui: &mut Ui, sheet: &mut Sheet) {
 /// Adds the switch for blur by depth.
 fn portrait(ui: &mut Ui, sheet: &mut Sheet) {
     let on = sheet.follows_depth() && sheet.has_depth();
-    let hint = "The farther from who is in focus, the more blur";
+    let hint = "More blur, the farther from the subject in focus";
     if switch(ui, "Portrait", hint, on) {
         sheet.act(Action::Portrait(!on));
     }

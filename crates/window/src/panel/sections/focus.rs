@@ -32,12 +32,12 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
     let rules = if in_metres { &rules[..] } else { &rules[..2] };
     sheet.choose(ui, "Focus on", rules, focus, |look, rule| look.focus = rule);
     if in_metres {
-        let hint = "Distance of the focal plane. Move it to focus at a distance of your own";
+        let hint = "Distance of the focal plane. Move the slider to set it";
         let how = Number::new("Distance", hint, DISTANCES_M, 2).unit("", " m").logarithmic();
         sheet.number(ui, &how, metres, |look, metres| look.focus = FocusRule::Metres(metres));
         // Displayed as half the range on either side of the focal plane.
         let half_m = *FOCUS_RANGES_M.start() / 2.0..=*FOCUS_RANGES_M.end() / 2.0;
-        let hint = "What stays as sharp as the focal plane, in front of it and behind";
+        let hint = "Range that stays as sharp as the focal plane, in front of it and behind";
         let how = Number::new("Depth of the sharp range", hint, half_m, 2).unit("±", " m");
         sheet.number(ui, &how, sheet.look.focus_range_m / 2.0, |look, half_m| look.focus_range_m = half_m * 2.0);
         let half_m = sheet.look.focus_range_m / 2.0;

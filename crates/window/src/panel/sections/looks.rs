@@ -69,7 +69,7 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet, editing: &mut Editing) {
             if current != Dialog::Saving && button(ui, "Save as…", "Save this look under a name") {
                 next = Some(Dialog::Saving);
             }
-            let has_own = state.presets.iter().any(|preset| preset.own);
+            let has_own = state.presets.iter().any(|preset| preset.is_user_defined);
             if has_own && button(ui, "Edit…", "Rename or delete looks of your own") {
                 next = Some(if current == Dialog::Listing { Dialog::Nothing } else { Dialog::Listing });
             }
@@ -89,14 +89,15 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet, editing: &mut Editing) {
 
 /// Asks for the name of a new preset. An existing preset is replaced only by an explicit button press, not by Enter.
 fn save(ui: &mut Ui, sheet: &mut Sheet, editing: &mut Editing) -> Dialog {
-    let is_there = sheet.state.presets.iter().any(|preset| preset.own && preset.name == editing.name.trim());
+    let is_there =
+        sheet.state.presets.iter().any(|preset| preset.is_user_defined && preset.name == editing.name.trim());
     let (verb, by_enter) = if is_there { ("Replace", false) } else { ("Save", true) };
     match name_field(ui, editing, verb, (by_enter, sheet.is_cancelled(ui))) {
         Some(true) => sheet.act(Action::SavePreset(editing.name.trim().to_owned())),
         Some(false) => {}
         None => {
             if is_there {
-                remark(ui, "There is a look of this name already.");
+                remark(ui, "There is already a look of this name.");
             }
             return Dialog::Saving;
         }
@@ -106,7 +107,7 @@ fn save(ui: &mut Ui, sheet: &mut Sheet, editing: &mut Editing) -> Dialog {
 
 /// Lists the user's presets with their actions.
 fn list(ui: &mut Ui, sheet: &Sheet, editing: &mut Editing) -> Dialog {
-    for preset in sheet.state.presets.iter().filter(|preset| preset.own) {
+    for preset in sheet.state.presets.iter().filter(|preset| preset.is_user_defined) {
         let row = ui.horizontal(|ui| {
             let [rename, delete] = ["Rename", "Delete"].map(|verb| {
                 let button = ui.button(tr(verb));
@@ -178,7 +179,7 @@ fn name_field(ui: &mut Ui, editing: &mut Editing, verb: &str, (by_enter, is_canc
 fn draw_chip(ui: &mut Ui, index: usize, preset: &Preset, chosen: bool, possible: bool) -> Response {
     let colors = Colors::here(ui);
     // Names of user presets are displayed verbatim.
-    let shown = if preset.own { preset.name.clone() } else { capitalized(&preset.name) };
+    let shown = if preset.is_user_defined { preset.name.clone() } else { capitalized(&preset.name) };
     let text = colors.on_fill(chosen, possible);
     let number_color = if possible && !chosen { colors.weak } else { text };
     let name = ui.painter().layout_no_wrap(shown, FontId::new(13.0, medium()), text);
@@ -197,7 +198,7 @@ fn draw_chip(ui: &mut Ui, index: usize, preset: &Preset, chosen: bool, possible:
         painter.text(at, Align2::CENTER_CENTER, index + 1, font, number_color);
     }
     painter.galley(rect.left_center() + vec2(10.0 + room, -name.size().y / 2.0), name, text);
-    response.hint(match (possible, preset.own) {
+    response.hint(match (possible, preset.is_user_defined) {
         (false, _) => "needs depth, and this source has none",
         (true, true) => "your own look",
         (true, false) => "a ready-made look",

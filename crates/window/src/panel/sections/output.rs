@@ -14,12 +14,12 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
         path(ui, &output.name);
     }
     sheet.switch(ui, "Timer", "A snapshot in three seconds (Shift+S)", state.self_timer, Action::SelfTimer);
-    let hint = "No picture leaves this program, and the camera rests: others see a still card";
+    let hint = "No picture leaves this program, and the camera is off: others see a still card";
     sheet.switch(ui, "Camera off", hint, state.off, Action::Off);
-    let hint = "Beside each picture, the one before the blur and its depth: `render --like` makes it again";
-    sheet.switch(ui, "Snapshots to make again", hint, state.habits.keep_sources, Action::KeepSources);
+    let hint = "Also saves the picture before the blur and its depth: `render --like` makes the snapshot again";
+    sheet.switch(ui, "Reproducible snapshots", hint, state.habits.keep_sources, Action::KeepSources);
     ui.horizontal_wrapped(|ui| {
-        let hint = "The command line that does the same, to the clipboard (K)";
+        let hint = "Copy the equivalent command line to the clipboard (K)";
         sheet.button(ui, "Copy command", hint, Action::CopyCommand);
         if let Some(folder) = &state.kept_in {
             let open = ui.button(tr("Open folder")).on_hover_text(folder.display().to_string());

@@ -7,14 +7,19 @@ use crate::panel::parts::{Number, choose, dropdown, number, remark, switch};
 use crate::services::Browse;
 use crate::state::{Action, DepthMethod, Source};
 use crate::texts::{tr, tr_with};
-use bokehcam::knob::Knob;
+use bokehcam::camera_control::CameraControl;
 
 /// The depth methods with their tooltips.
 const WAYS: [(&str, &str, DepthMethod); 5] = [
-    ("Measured", "By a depth camera, or as it was recorded", DepthMethod::Measured),
-    ("Two eyes", "What two cameras side by side see", DepthMethod::Stereo),
-    ("Person", "A network finds who is in the picture", DepthMethod::Person),
-    ("Person and distance", "That, and another one tells how far the rest is", DepthMethod::PersonAndDistance),
+    ("Measured", "From a depth camera, or from the recording", DepthMethod::Measured),
+    ("Two cameras", "From two cameras side by side", DepthMethod::Stereo),
+    ("Person", "A network finds the person in the picture", DepthMethod::Person),
+    (
+        "Person and distance",
+        "Also, another network estimates the distance of everything \
+                             else",
+        DepthMethod::PersonAndDistance,
+    ),
     ("Empty room", "A picture of the room without you: step out for four seconds (T)", DepthMethod::Plate),
 ];
 
@@ -28,7 +33,7 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
             let rate = 1e9 / running.period_ns.max(1) as f64;
             let depth = tr(match running.way {
                 _ if !running.has_depth => "without depth",
-                Some(DepthMethod::Person) => "the person by a network",
+                Some(DepthMethod::Person) => "the person from a network",
                 _ => "with depth",
             });
             remark(
@@ -55,15 +60,15 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
             }
         }
         Source::Lost(why) => remark(ui, &tr_with("Lost: {}", &[why])),
-        Source::Ended => remark(ui, "It came to its end."),
+        Source::Ended => remark(ui, "It has ended."),
     }
     modes(ui, sheet);
-    let hint = "It can also be dropped on the window";
+    let hint = "You can also drop it on the window";
     ui.horizontal_wrapped(|ui| {
         sheet.button(ui, "Open folder…", hint, Action::Browse(Browse::Folder));
         sheet.button(ui, "Open photo…", hint, Action::Browse(Browse::Photo));
         if state.plate.is_some() {
-            let hint = "A picture of the room without you; the camera has to stand still (T)";
+            let hint = "A picture of the room without you; the camera must not move (T)";
             sheet.button(ui, "Take another plate", hint, Action::TakePlate);
         }
     });
@@ -106,7 +111,7 @@ fn modes(ui: &mut Ui, sheet: &mut Sheet) {
 pub fn controls(ui: &mut Ui, sheet: &mut Sheet) {
     let state = sheet.state;
     for control in &state.controls {
-        let value = ui.add_enabled_ui(control.active, |ui| knob(ui, control)).inner;
+        let value = ui.add_enabled_ui(control.is_active, |ui| knob(ui, control)).inner;
         if let Some(value) = value {
             sheet.act(Action::Control(control.name.clone(), value));
         }
@@ -114,10 +119,10 @@ pub fn controls(ui: &mut Ui, sheet: &mut Sheet) {
 }
 
 /// Adds a driver control as a switch, a menu or a number. Returns its new value if it changed.
-fn knob(ui: &mut Ui, control: &Knob) -> Option<i64> {
+fn knob(ui: &mut Ui, control: &CameraControl) -> Option<i64> {
     let label = title(&control.name);
     let hint = format!("--control {}={}", control.name, control.value);
-    if control.switch {
+    if control.is_boolean {
         return switch(ui, &label, &hint, control.value != 0).then_some(i64::from(control.value == 0));
     }
     if !control.menu.is_empty() {

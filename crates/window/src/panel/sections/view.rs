@@ -14,7 +14,7 @@ const VIEWS: Views = [
 ];
 const INTERNALS: Views = [
     ("Blur radius", "Circle of confusion: white is sharp, hatched is in front (C)", Shown::Coc),
-    ("Layers", "The layers that are blurred on their own (N)", Shown::Bins),
+    ("Layers", "The layers, each blurred separately (N)", Shown::Bins),
 ];
 
 /// Adds radio buttons for views; clicking the active one returns to the picture.
@@ -27,7 +27,7 @@ fn choose_view(ui: &mut Ui, sheet: &mut Sheet, what: &str, views: Views) {
 
 /// Adds the views of the blur's internals, and the instruments.
 pub fn internals(ui: &mut Ui, sheet: &mut Sheet) {
-    choose_view(ui, sheet, "Show of the blur", INTERNALS);
+    choose_view(ui, sheet, "Views of the blur", INTERNALS);
     sheet.switch(ui, "Instruments", "Times, rates and drops (I)", sheet.state.instruments, Action::Instruments);
 }
 
@@ -38,17 +38,17 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
     let hint = "Like a mirror; recordings and calls are not mirrored (M)";
     sheet.switch(ui, "Mirror", hint, state.mirror, Action::Mirror);
     if state.mirror {
-        remark(ui, "In this window alone: what goes out is not mirrored.");
+        remark(ui, "Only this window is mirrored, not recordings and calls.");
     }
     let (freeze, hint) = match state.can_pause() {
-        true => ("Pause", "The recording stands still, and looks can be tried on its picture (Z)"),
+        true => ("Pause", "Pause the recording, and try looks on its picture (Z)"),
         false => ("Freeze", "Keep this picture, and try looks on it (Z)"),
     };
     sheet.switch(ui, freeze, hint, state.frozen, Action::Freeze);
-    let hint = "The picture before the blur, left of a line to drag (B)";
+    let hint = "Show the picture before the blur, left of a movable line (B)";
     sheet.switch(ui, "Before and after", hint, state.split.is_some(), |on| Action::Split(on.then_some(0.5)));
     if let Some(at) = state.split {
-        let hint = "From the left; it can also be dragged on the picture";
+        let hint = "From the left; you can also drag the line on the picture";
         let mut percent = at * 100.0;
         if number(ui, &Number::new("Line at", hint, 0.0..=100.0, 0).unit("", " %"), &mut percent) {
             sheet.act(Action::Split(Some(percent / 100.0)));

@@ -89,7 +89,7 @@ fn without_depth_the_switch_asks_how_it_may_be_known() {
     window.click_on("Portrait");
     assert_eq!((window.state.look.effect, window.state.offers_depth()), (Effect::Blur, true));
     window.wait(0.1);
-    assert_eq!(window.click_on("Find me by a small network"), [Action::FindMe]);
+    assert_eq!(window.click_on("Find me with a small network"), [Action::FindMe]);
     assert_eq!(window.click_on("Show me the empty room"), [Action::TakePlate]);
     window.press(Key::Escape, Modifiers::NONE);
     assert!(window.state.declined_plate && window.state.panel, "Esc closes the question alone");

@@ -125,7 +125,7 @@ fn pictures() {
         state.apply(Action::VirtualCamera(Some("/dev/video9".into())));
     });
     // From the offer of depth methods to the capture.
-    for (name, step) in [("offer", None), ("step-out", Some(Step::StepOut(3))), ("taking", Some(Step::Taking(60)))] {
+    for (name, step) in [("offer", None), ("step-out", Some(Step::StepOut(3))), ("taking", Some(Step::Capturing(60)))] {
         shot(&format!("plate-{name}"), Theme::Dark, &|state| {
             (state.source, state.plate, state.panel) = (sample::running(false), step, false);
         });
@@ -144,7 +144,7 @@ fn pictures() {
             let (length_ns, time_ns) = (61_500_000_000, 23_456_000_000);
             state.transport = Some(Transport { place: 280, frames: 738, time_ns, length_ns });
             state.legend = Some(Legend::Depth { near_m: 0.9, far_m: 5.2 });
-            state.note("holiday.jpg: a photo, one frame that stands still, with the depth beside it");
+            state.note("holiday.jpg: a photo, a single still frame, with the depth beside it");
         });
     }
     shot("depth", Theme::Dark, &|state| {

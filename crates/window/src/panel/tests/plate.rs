@@ -14,7 +14,7 @@ fn a_lone_camera_is_offered_a_plate_and_what_to_do_for_it_is_shown() {
     };
     assert!(!texts(&|_| {}).contains("Show me the empty room"));
     let offer = texts(&|state| state.source = sample::running(false));
-    for button in ["Find me by a small network", "Show me the empty room", "Not now"] {
+    for button in ["Find me with a small network", "Show me the empty room", "Not now"] {
         assert!(offer.contains(button), "{button}: {offer}");
     }
     let declined = |state: &mut State| {
@@ -26,7 +26,7 @@ fn a_lone_camera_is_offered_a_plate_and_what_to_do_for_it_is_shown() {
     assert!(!texts(&|state| state.declined_plate = true).contains("Not now"));
     let out = texts(&|state| state.plate = Some(Step::StepOut(2)));
     assert!(out.contains("Step out of the picture") && out.contains('2'), "{out}");
-    let unlike = texts(&|state| state.plate = Some(Step::Unlike));
+    let unlike = texts(&|state| state.plate = Some(Step::Mismatched));
     assert!(unlike.contains("Take another plate"), "{unlike}");
     assert!(!texts(&|state| state.plate = Some(Step::Ready)).contains("Step out"));
 }
@@ -42,7 +42,7 @@ fn that_it_is_a_demonstration_is_said_until_it_is_known() {
     assert!(says(&mut window));
     window.state.bare = true;
     window.pass(Vec::new());
-    assert!(!says(&mut window), "nothing but the picture");
+    assert!(!says(&mut window), "only the picture");
     window.state.bare = false;
     window.wait(0.1);
     let look = window.state.look.clone();

@@ -37,7 +37,7 @@ fn a_preset_of_the_same_name_is_replaced_only_by_the_button_that_says_so() {
     window.click_on("Save as…");
     window.type_over("my desk");
     window.wait(0.1);
-    assert!(window.texts().iter().any(|text| text.contains("of this name already")));
+    assert!(window.texts().iter().any(|text| text.contains("already a look of this name")));
     assert_eq!(window.enter(), []);
     assert_eq!(window.click_on("Replace"), [Action::SavePreset("my desk".into())]);
     assert!(window.place_of("Replace").is_none());
@@ -101,7 +101,7 @@ fn a_number_that_cannot_be_is_told() {
     window.enter();
     assert_eq!(window.state.look.focus_range_m, 2.0 * 0.5 * *crate::state::tweak::FOCUS_RANGES_M.end());
     assert!(
-        said(&window).iter().any(|line| line.starts_with("Depth of the sharp range goes from ±0.00 m to ±")),
+        said(&window).iter().any(|line| line.starts_with("Depth of the sharp range is limited to ±0.00 m to ±")),
         "{:?}",
         said(&window)
     );

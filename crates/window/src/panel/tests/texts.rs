@@ -9,7 +9,7 @@ use crate::texts::{self, tests as table};
 use crate::views::Legend;
 use bokehcam::depth::backdrop::Behind;
 use bokehcam::depth::plate::Step;
-use bokehcam::look::{Effect, Follow, Strength};
+use bokehcam::look::{Effect, FramingZoom, Strength};
 
 /// Creates windows that together show nearly every text.
 fn windows() -> Vec<Window> {
@@ -32,7 +32,7 @@ fn windows() -> Vec<Window> {
             state.split = Some(0.5);
         },
         &|state| {
-            (state.look.behind, state.look.follow) = (Behind::Color([1, 2, 3]), Follow::to(2.0));
+            (state.look.background, state.look.follow) = (Behind::Color([1, 2, 3]), FramingZoom::from_zoom(2.0));
         },
         &|state| state.help = true,
         &|state| {
@@ -61,7 +61,7 @@ fn windows() -> Vec<Window> {
             (state.source, state.legend) = (sample::running(false), Some(Legend::Depth { near_m: 0.5, far_m: 5.0 }))
         },
         &|state| {
-            (state.source, state.plate) = (sample::running(false), Some(Step::Unlike));
+            (state.source, state.plate) = (sample::running(false), Some(Step::Mismatched));
             state.legend = Some(Legend::Coc { max_px: 9.0 });
         },
         &|state| (state.source, state.plate) = (sample::running(false), Some(Step::StepOut(3))),

@@ -107,5 +107,5 @@ fn it_is_a_pause_unless_something_is_written() {
     window.state.frozen = true;
     assert!(window.texts().iter().any(|text| text == "Paused"));
     window.state.outputs = vec![Output { name: "film.mp4".into(), is_camera: false }];
-    assert!(window.texts().iter().any(|text| text == "Frozen here, live outside"));
+    assert!(window.texts().iter().any(|text| text == "Frozen here, live elsewhere"));
 }

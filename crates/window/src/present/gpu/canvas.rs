@@ -79,7 +79,7 @@ impl Canvas {
             cache: None,
         });
         use wgpu::BufferUsages as Usage;
-        let window = device.buffer("window", size_of::<Window>(), Usage::UNIFORM | Usage::COPY_DST);
+        let window = device.create_buffer("window", size_of::<Window>(), Usage::UNIFORM | Usage::COPY_DST);
         let uploads = [upload_buffer(&device, 0), upload_buffer(&device, 0)];
         // egui's renderer draws the controls in the same render pass.
         let overlay = Overlay::new(&device, format);
@@ -188,7 +188,8 @@ impl Canvas {
             self.bind_groups.clear();
         }
         let buffers = [&self.window, &pictures[0], &pictures[1]].map(|buffer| buffer.as_entire_buffer_binding());
-        let bindings = self.device.bound(&self.pipeline.get_bind_group_layout(0), buffers.into_iter());
+        let bindings =
+            self.device.create_bind_group_with_layout(&self.pipeline.get_bind_group_layout(0), buffers.into_iter());
         self.bind_groups.push(Bound { pictures, bindings });
         self.bind_groups.len() - 1
     }
@@ -198,5 +199,5 @@ impl Canvas {
 fn upload_buffer(device: &Device, bytes: usize) -> wgpu::Buffer {
     use wgpu::BufferUsages as Usage;
     // The shader reads whole words, even for the last pixel.
-    device.buffer("picture to present", bytes.next_multiple_of(4) + 16, Usage::STORAGE | Usage::COPY_DST)
+    device.create_buffer("picture to present", bytes.next_multiple_of(4) + 16, Usage::STORAGE | Usage::COPY_DST)
 }

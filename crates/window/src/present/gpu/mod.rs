@@ -52,7 +52,7 @@ impl Gpu {
             view_formats: Vec::new(),
         };
         // An error here must not count as a device failure: the device continues to blur while the CPU draws.
-        let made = device.attempt(|| {
+        let made = device.with_error_scope(|| {
             let canvas = Canvas::new(Arc::clone(&device), format);
             let size = window.inner_size();
             let surface = Some(surface);

@@ -85,8 +85,8 @@ impl Painter {
         };
         // Small windows are painted on this thread: waking others would take longer.
         if needs_threads(drawing) {
-            let workers =
-                workers.get_or_insert_with(|| ThreadPool::new("present", (thread_pool::cores() / 2).min(MAX_THREADS)));
+            let workers = workers
+                .get_or_insert_with(|| ThreadPool::new("present", (thread_pool::core_count() / 2).min(MAX_THREADS)));
             scratch.resize_with(workers.thread_count(), Scratch::default);
             let parts = DisjointParts::new(pixels, width * BAND_ROWS, taken);
             workers.run_with(scratch, bands, &|scratch, band| paint_band(scratch, band, parts.part(band)));

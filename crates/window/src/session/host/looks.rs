@@ -25,7 +25,7 @@ impl Host {
         // The held frame is on the screen, so it comes first.
         self.blur_held();
         if let Some(live) = &mut self.live
-            && let Err(line) = live.adopt(look, number, &mut *self.start.services)
+            && let Err(line) = live.switch_look(look, number, &mut *self.start.services)
         {
             self.events.note(line);
         }

@@ -8,7 +8,7 @@ use crate::services::Browse;
 use crate::session::Command;
 use crate::state::{Request, Update};
 use bokehcam::files::whole;
-use bokehcam::look::BehindName;
+use bokehcam::look::BackgroundSetting;
 
 /// Interval of checks for new devices and of the recording's size.
 const CHECK_PERIOD: Duration = Duration::from_secs(1);
@@ -67,7 +67,7 @@ impl Host {
         let (commands, events) = (self.commands.clone(), self.events.clone());
         let pick = self.start.services.browse(what);
         let spawned = std::thread::Builder::new().name("dialog".into()).spawn(move || match pick() {
-            Ok(Some(file)) if what == Browse::Behind => match BehindName::Image(file.into()).load() {
+            Ok(Some(file)) if what == Browse::Behind => match BackgroundSetting::Image(file.into()).load() {
                 Ok(behind) => events.send_update(Update::Behind(behind)),
                 Err(error) => events.note(error.to_string()),
             },

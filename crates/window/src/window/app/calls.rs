@@ -34,7 +34,7 @@ impl App {
     /// Updates the state with a new frame's properties.
     pub(super) fn update_from_frame(&mut self, view: &View) {
         self.state.focus_m = focus_m(&view.coc);
-        let (between, part) = (view.is_between, view.part);
+        let (between, part) = (view.is_transitional, view.crop);
         if (self.state.between, self.state.part) != (between, part) {
             (self.state.between, self.state.part) = (between, part);
             self.layout_at = Some(Instant::now());

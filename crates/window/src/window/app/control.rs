@@ -14,7 +14,7 @@ use crate::session::{CurrentShutter, SnapshotRequest};
 use crate::state::{Action, DepthMethod, Running, Source};
 use crate::window::{Control, UserEvent};
 use bokehcam::control::{Answer, Server, Status};
-use bokehcam::controller::{Controlled, Controller, Facts, Rules};
+use bokehcam::controller::{ControllableRun, Controller, Rules, SourceFacts};
 use bokehcam::look::{Look, Patch};
 use bokehcam::sink::ShutterControl;
 use bokehcam::source::DepthChoice;
@@ -51,7 +51,7 @@ impl RemoteControl {
     ) -> std::io::Result<Self> {
         let (to, tasks) = mpsc::channel();
         let remote = Remote { tasks: to, proxy: proxy.clone(), release };
-        let handler = Controller::begin(claim.name().clone(), "preview", rules, remote);
+        let handler = Controller::create_handler(claim.name().clone(), "preview", rules, remote);
         Ok(Self { tasks, _server: claim.serve(handler)?, remote_changes: RemoteChanges::default(), request: None })
     }
 
@@ -82,12 +82,12 @@ fn receive_reply<T>(from: &Receiver<T>) -> Result<T, Answer> {
     from.recv_timeout(REPLY_TIMEOUT).map_err(|_| Answer::failed("the window does not answer in time"))
 }
 
-impl Controlled for Remote {
+impl ControllableRun for Remote {
     fn status(&self) -> Result<Status, Answer> {
         self.run_on_window(|app, _| app.status())
     }
 
-    fn switch(&self, on: Option<bool>) -> Result<bool, Answer> {
+    fn switch_pictures(&self, on: Option<bool>) -> Result<bool, Answer> {
         self.run_on_window(move |app, events| {
             let on = on.unwrap_or(app.state.off);
             app.perform(Action::Off(!on), events);
@@ -95,17 +95,17 @@ impl Controlled for Remote {
         })
     }
 
-    fn release(&self) -> Option<ShutterControl> {
+    fn shutter(&self) -> Option<ShutterControl> {
         self.release.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 
-    fn change(&self, patch: Patch, rules: &Arc<dyn Rules>) -> Result<Option<String>, Answer> {
+    fn change_look(&self, patch: Patch, rules: &Arc<dyn Rules>) -> Result<Option<String>, Answer> {
         let rules = Arc::clone(rules);
         self.run_on_window(move |app, events| app.change(&patch, &*rules, events))?
     }
 
-    fn make_depth_by(&self, way: &str) -> Result<(), Answer> {
-        let way = way.parse().map_err(Answer::usage)?;
+    fn set_depth_source(&self, way: &str) -> Result<(), Answer> {
+        let way = way.parse().map_err(Answer::invalid_request)?;
         self.run_on_window(move |app, events| {
             app.check_depth_method(way)?;
             app.perform(Action::DepthBy(way), events);
@@ -113,7 +113,7 @@ impl Controlled for Remote {
         })?
     }
 
-    fn save(&self, to: Option<&Path>) -> Result<PathBuf, Answer> {
+    fn save_snapshot(&self, to: Option<&Path>) -> Result<PathBuf, Answer> {
         let to = to.map(Path::to_owned);
         let (answer, saved) = mpsc::sync_channel(1);
         self.run_on_window(move |app, _| app.snapshot_for_remote(to, answer))??;
@@ -132,10 +132,10 @@ impl App {
     /// Applies a temporary look change. Returns a note about settings without effect.
     fn change(&mut self, patch: &Patch, rules: &dyn Rules, events: &ActiveEventLoop) -> Result<Option<String>, Answer> {
         let note = match &self.state.source {
-            Source::Running(running) => rules.changed(patch, &self.state.look, &facts(running))?.1,
+            Source::Running(running) => rules.apply_patch(patch, &self.state.look, &source_facts(running))?.1,
             _ => None,
         };
-        let look = self.state.patched(patch).map_err(Answer::usage)?;
+        let look = self.state.patched(patch).map_err(Answer::invalid_request)?;
         let before = self.state.chosen_look();
         self.perform(Action::Look { look: Box::new(look), stroke: None }, events);
         let after = self.state.chosen_look();
@@ -150,10 +150,10 @@ impl App {
             return Ok(());
         }
         let there = match ways {
-            [] => "it has none".to_owned(),
+            [] => "it has no source of depth".to_owned(),
             ways => format!("use {}", ways.iter().map(DepthMethod::to_string).collect::<Vec<_>>().join(", ")),
         };
-        Err(Answer::usage(format!("this source has no depth by {way}: {there}")))
+        Err(Answer::invalid_request(format!("{way} is not available for this source: {there}")))
     }
 
     /// Returns the look to be saved: without changes by remote control.
@@ -214,6 +214,6 @@ impl App {
 
 /// Returns the source's properties that decide which looks it supports. `DepthChoice::Auto` because declined depth does
 /// not matter here.
-fn facts(&Running { kind, size, has_depth, depth_from, .. }: &Running) -> Facts {
-    Facts { kind, size, has_depth, depth_from, depth_choice: DepthChoice::Auto }
+fn source_facts(&Running { kind, size, has_depth, depth_from, .. }: &Running) -> SourceFacts {
+    SourceFacts { kind, size, has_depth, depth_from, depth_choice: DepthChoice::Auto }
 }

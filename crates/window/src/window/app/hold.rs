@@ -37,7 +37,7 @@ impl App {
         self.holds = still.number;
         self.held = Some(still.number);
         // A settled photo is blurred again because live frames use a lower quality level.
-        let is_behind = view.is_between || self.snapshot_due || self.state.settled;
+        let is_behind = view.is_transitional || self.snapshot_due || self.state.settled;
         self.session.hold(still, is_behind);
     }
 
@@ -53,9 +53,9 @@ impl App {
         if view.color.is_none() {
             view.color = view.picture.memory().cloned().map(Pooled::detached);
         }
-        view.picture = Picture::in_memory(Pooled::detached(blurred));
+        view.picture = Picture::from_memory(Pooled::detached(blurred));
         view.depth = depth.map(Pooled::detached);
-        (view.coc, view.change, view.is_between, view.trace.quality) = (coc, change, false, quality);
+        (view.coc, view.change, view.is_transitional, view.trace.quality) = (coc, change, false, quality);
         (self.state.focus_m, self.state.between) = (focus_m(&coc), false);
         self.drawn = None;
         if self.snapshot_due {

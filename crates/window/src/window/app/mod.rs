@@ -33,7 +33,7 @@ use bokehcam::depth::plate::Guide;
 use bokehcam::frame::ColorImage;
 use bokehcam::link::Receiver;
 use bokehcam::link::demand::{Demand, Watch};
-use bokehcam::pipeline::{View, Wanted};
+use bokehcam::pipeline::{OutputRequest, View};
 use bokehcam::stats::WindowUse;
 
 /// Layout interval of the instruments while frames arrive.
@@ -43,7 +43,7 @@ const STOP_POLL: Duration = Duration::from_millis(250);
 
 pub(super) struct App {
     state: State,
-    wanted: Arc<Wanted>,
+    output_request: Arc<OutputRequest>,
     /// Whether a snapshot waits for a frame that can be saved.
     snapshot_due: bool,
     panel: Panel,
@@ -120,14 +120,14 @@ impl App {
         let begin = |control| control::RemoteControl::begin(control, Arc::clone(&session.release), &proxy);
         let remote_control = control.map(begin).transpose()?;
         let off = Arc::clone(&session.off);
-        let (wanted, demand) = (Arc::clone(&session.wanted), session.demand.clone());
+        let (output_request, demand) = (Arc::clone(&session.output_request), session.demand.clone());
         let clock = Clock::system();
         state.meters.begin(clock.now_ns());
         let ctx = egui::Context::default();
         let fonts = calls::init_appearance(&ctx, theme, &proxy);
         Ok(Self {
             state,
-            wanted,
+            output_request,
             snapshot_due: false,
             panel: Panel::default(),
             ctx,
@@ -199,7 +199,7 @@ impl App {
 
     fn update_settings(&mut self) {
         self.settings = match &self.state.source {
-            Source::Running(running) => self.state.look.settings(running.size, true),
+            Source::Running(running) => self.state.look.blur_settings(running.size, true),
             _ => None,
         };
     }

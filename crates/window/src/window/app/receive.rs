@@ -68,7 +68,7 @@ impl App {
         }
         // A frozen frame must be in memory, to be saved, and have its own depth: frames are replaced until both hold.
         let stays = self.state.frozen || self.state.settled;
-        let may_stay = |view: &View| view.picture.memory().is_some() && !view.trace.depth_held;
+        let may_stay = |view: &View| view.picture.memory().is_some() && !view.trace.is_depth_reused;
         let stays = stays && self.view.as_ref().is_some_and(may_stay);
         if let Some(view) = newest.filter(|view| !stays || self.seeking.is_answer(view)) {
             self.update_position(&view);
@@ -76,7 +76,7 @@ impl App {
                 self.layout_at = Some(Instant::now());
             }
             self.update_from_frame(&view);
-            let is_whole = view.picture.memory().is_some() && !view.is_between && !view.trace.depth_held;
+            let is_whole = view.picture.memory().is_some() && !view.is_transitional && !view.trace.is_depth_reused;
             // With `close_at_end`, all requested frames are shown.
             let may_settle = self.state.is_photo() && !self.close_at_end;
             self.state.settled = may_settle && is_whole && !self.lacks_depth(&view, &self.state.look);

@@ -31,7 +31,7 @@ impl Seeking {
 impl App {
     pub(super) fn seek(&mut self, place: usize) {
         if let Some(seeker) = &self.seeking.seeker {
-            self.seeking.requested = seeker.go_to(place);
+            self.seeking.requested = seeker.request_frame(place);
             self.set_position(place);
         }
     }
@@ -41,7 +41,7 @@ impl App {
         self.seeking.displayed = view.seek;
         let is_behind = self.seeking.displayed < self.seeking.requested;
         if let Some(seeker) = self.seeking.seeker.as_ref().filter(|_| !is_behind) {
-            self.set_position(seeker.place_of(view.stamp));
+            self.set_position(seeker.position_of(view.stamp));
         }
     }
 

@@ -12,7 +12,7 @@ use crate::present::{Area, Controls, Drawing, Image};
 use crate::session::SaveOptions;
 use crate::state::{Action, Request, Source, State};
 use crate::views::Probe;
-use bokehcam::compute::Place;
+use bokehcam::compute::PictureLocation;
 use bokehcam::frame::ColorImage;
 use bokehcam::sink::card;
 
@@ -114,13 +114,13 @@ impl App {
         let drawn_on_gpu = self.gfx.as_ref().is_some_and(|gfx| gfx.presenter.has_device());
         let used_in_memory =
             self.state.frozen || self.state.is_photo() || self.snapshot_due || !self.state.outputs.is_empty();
-        self.wanted.set(match (drawn_on_gpu, used_in_memory) {
-            (false, _) => Place::Memory,
-            (true, false) => Place::Device,
-            (true, true) => Place::Both,
+        self.output_request.set_place(match (drawn_on_gpu, used_in_memory) {
+            (false, _) => PictureLocation::Memory,
+            (true, false) => PictureLocation::Device,
+            (true, true) => PictureLocation::Both,
         });
         // Saved or frozen frames must have their own depth map.
-        self.wanted.want_own_depth(self.snapshot_due || self.state.frozen);
+        self.output_request.require_own_depth(self.snapshot_due || self.state.frozen);
     }
 
     /// Saves the displayed frame. If it is only on the GPU, was blurred between two looks (no settings could reproduce
@@ -131,7 +131,7 @@ impl App {
         if view.picture.memory().is_none() && !is_running {
             return self.state.note(NO_PICTURE);
         }
-        let (between, depth_held) = (view.is_between, view.trace.depth_held);
+        let (between, depth_held) = (view.is_transitional, view.trace.is_depth_reused);
         let is_frozen = self.state.keeps_picture() && view.picture.memory().is_some();
         self.snapshot_due = view.picture.memory().is_none() || is_running && (between || depth_held && !is_frozen);
         self.update_wanted();

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::common::{coc, color, noise, settings, three_depths};
 use bokehcam::bokeh::{self, Job};
-use bokehcam::compute::Place;
+use bokehcam::compute::PictureLocation;
 use bokehcam::compute::device::{Device, DevicePicture};
 use bokehcam::frame::ColorImage;
 use bokehcam::link::pool::Pooled;
@@ -77,9 +77,9 @@ fn what_was_only_attempted_leaves_the_device_sound() {
         usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::MAP_WRITE | wgpu::BufferUsages::STORAGE,
         mapped_at_creation: false,
     };
-    assert!(device.attempt(|| device.device.create_buffer(&refused)).is_err());
+    assert!(device.with_error_scope(|| device.device.create_buffer(&refused)).is_err());
     device.check().unwrap();
-    assert_eq!(device.attempt(|| 7).unwrap(), 7);
+    assert_eq!(device.with_error_scope(|| 7).unwrap(), 7);
 }
 
 #[test]
@@ -130,10 +130,11 @@ fn a_picture_on_the_device_is_the_one_in_memory_and_is_shown_the_same() {
     let mut canvas = Canvas::new(Arc::clone(&device), FORMAT);
     for (width, height) in [(97, 71), (64, 48)] {
         let settings = settings(CocKind::Depth);
-        let mut bokeh = bokeh::create(&settings, (width, height), Some(Arc::clone(&device)), None).expect("a blur");
+        let mut bokeh =
+            bokeh::create_blur(&settings, (width, height), Some(Arc::clone(&device)), None).expect("a blur");
         let (image, map) = (noise(width, height), three_depths(width, height));
         let mut results = Vec::new();
-        for place in [Place::Memory, Place::Both, Place::Device] {
+        for place in [PictureLocation::Memory, PictureLocation::Both, PictureLocation::Device] {
             let (color, depth) = (Pooled::detached(image.clone()), Pooled::detached(map.clone()));
             let job = Job::new(color, Some(depth), coc(CocKind::Depth, height));
             bokeh.submit(Job { place, ..job }).expect("room for a frame");
@@ -141,9 +142,9 @@ fn a_picture_on_the_device_is_the_one_in_memory_and_is_shown_the_same() {
             assert_eq!(
                 (finished.picture.memory().is_some(), finished.picture.device().is_some()),
                 match place {
-                    Place::Memory => (true, false),
-                    Place::Both => (true, true),
-                    Place::Device => (false, true),
+                    PictureLocation::Memory => (true, false),
+                    PictureLocation::Both => (true, true),
+                    PictureLocation::Device => (false, true),
                 }
             );
             results.extend(finished.picture.memory().cloned());
@@ -167,11 +168,11 @@ fn a_picture_on_the_device_is_the_one_in_memory_and_is_shown_the_same() {
 #[test]
 #[ignore = "needs a Vulkan adapter (software will do)"]
 fn results_go_to_memory_when_the_device_has_no_more_room_for_them() {
-    let mut bokeh = bokeh::create(&settings(CocKind::Uniform), (16, 16), Some(device()), None).expect("a blur");
+    let mut bokeh = bokeh::create_blur(&settings(CocKind::Uniform), (16, 16), Some(device()), None).expect("a blur");
     let mut kept = Vec::new();
     for frame in 0..40 {
         let job = Job::new(Pooled::detached(noise(16, 16)), None, coc(CocKind::Uniform, 16));
-        bokeh.submit(Job { ticket: frame, place: Place::Device, ..job }).expect("room for a frame");
+        bokeh.submit(Job { ticket: frame, place: PictureLocation::Device, ..job }).expect("room for a frame");
         kept.push(bokeh.collect(true).expect("the GPU blurs").expect("a frame comes back"));
     }
     let stayed = kept.iter().take_while(|finished| finished.picture.device().is_some()).count();

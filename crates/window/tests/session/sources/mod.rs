@@ -29,9 +29,9 @@ fn a_recording_is_sought_in_while_it_plays_and_what_is_written_stays_whole() {
     watched.session.send(Request::Begin(output.clone()));
     let mut last_ns = 0;
     for place in [8, 3, 11, 0, 11] {
-        let number = seeker.go_to(place);
+        let number = seeker.request_frame(place);
         let asked = watched.frame("the frame that was asked for", |view| view.is_seek_target && view.seek == number);
-        assert_eq!(seeker.place_of(asked.stamp), place);
+        assert_eq!(seeker.position_of(asked.stamp), place);
         let rgb = asked.picture.memory().unwrap().rgb[0];
         assert!(rgb.abs_diff(20 * place as u8) <= 1, "{rgb} of frame {place}");
         let metres = asked.depth.as_ref().unwrap().metres[5];
@@ -41,7 +41,7 @@ fn a_recording_is_sought_in_while_it_plays_and_what_is_written_stays_whole() {
         drop(asked);
         let after = watched.frame("those after it", |view| !view.is_seek_target && view.seek == number);
         last_ns = after.stamp.time_ns;
-        assert!((seeker.place_of(after.stamp) + FRAMES - place) % FRAMES <= 6, "{:?}", after.stamp);
+        assert!((seeker.position_of(after.stamp) + FRAMES - place) % FRAMES <= 6, "{:?}", after.stamp);
     }
     watched.session.send(Request::End(output));
     let closed = watched.heard.session.close();
@@ -76,7 +76,8 @@ fn a_photo_is_opened_with_the_depth_beside_it_and_follows_the_look() {
     still::write_depth(&folder.path().join("holiday-depth.png"), &depth, 1000.0, false).unwrap();
     let name = photo.display().to_string();
     let mut watched = Watched::begin(&name, folder.path());
-    watched.until("what it is", |told| matches!(told, Update::Note(line) if line.contains("a photo, one frame") && line.contains("depth beside it")));
+    watched.until("what it is", |told| matches!(told, Update::Note(line) if line.contains("a photo, a single still \
+                                                                                           frame") && line.contains("depth beside it")));
     let Update::Source(Source::Running(running)) = watched.until("it runs", is_running) else { unreachable!() };
     assert!(running.size == (40, 30) && running.has_depth);
     let first = watched.frame("a frame", |_| true);
@@ -86,7 +87,7 @@ fn a_photo_is_opened_with_the_depth_beside_it_and_follows_the_look() {
     drop(first);
     let stronger = Look { strength: Strength::AtInfinity(5.0), ..Look::default() };
     watched.session.send(Request::Look(Box::new(stronger)));
-    watched.frame("another look", |view| view.change > change && !view.is_between);
+    watched.frame("another look", |view| view.change > change && !view.is_transitional);
     assert!(watched.heard.session.close().report.unwrap().frames.balance());
 
     // Other names, a snapshot, and files that are no photos.
@@ -106,7 +107,7 @@ fn a_photo_is_opened_with_the_depth_beside_it_and_follows_the_look() {
     let mut opened = open(&kept).unwrap();
     assert!(opened.has_depth());
     let (mut into, mut no_depth, mut right) = Default::default();
-    let shot = bokehcam::capture::Shot { color: &mut into, depth: &mut no_depth, right: &mut right };
+    let shot = bokehcam::capture::FrameBuffers { color: &mut into, depth: &mut no_depth, right: &mut right };
     opened.camera.next(shot).unwrap();
     assert!(into == color, "the picture before the blur");
     still::write_depth(&folder.path().join("kept-2-depth.pfm"), &DepthMap::new(80, 30), 1000.0, true).unwrap();

@@ -5,9 +5,9 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use bokehcam::bokeh::{self, Bokeh};
+use bokehcam::camera_control::CameraControl;
 use bokehcam::capture::synthetic::Format;
 use bokehcam::frame::{ColorImage, DepthMap};
-use bokehcam::knob::Knob;
 use bokehcam::look::Look;
 use bokehcam::recording::tum::{Writer, WriterOptions};
 use bokehcam::sink::Sink;
@@ -60,7 +60,7 @@ impl Services for Plug {
             (CAMERA, true) => {
                 let ((width, height), fps) = self.mode.unwrap_or(((64, 48), 30.0));
                 let format = Format { size: (width, height), fps, frames: None, threads: 1 };
-                let source = source::Source::of(Box::new(Synthetic::new(format).unwrap()), None);
+                let source = source::Source::from_camera(Box::new(Synthetic::new(format).unwrap()), None);
                 let (name, has_depth) = (name.into(), source.has_depth());
                 let modes =
                     vec![Mode { size: (64, 48), fps: vec![30.0] }, Mode { size: (32, 24), fps: vec![60.0, 30.0] }];
@@ -82,7 +82,7 @@ impl Services for Plug {
     fn check(&self, name: &str) -> Result<(), String> {
         self.system.check(name)
     }
-    fn set_control(&mut self, knob: &str, value: i64) -> Result<Vec<Knob>, String> {
+    fn set_control(&mut self, knob: &str, value: i64) -> Result<Vec<CameraControl>, String> {
         self.system.set_control(knob, value)
     }
     fn executor(&mut self, settings: &bokeh::Settings, size: (u32, u32)) -> Result<Box<dyn Bokeh>, String> {

@@ -1,5 +1,0 @@
-// Included by passes that run several times.
-
-struct Turn {
-    at: u32,        // index of the run
-}

@@ -1,0 +1,315 @@
+//! Alpha of mixed pixels: the posterior mean, from the likelihood of the colour and a prior from the depth map
+//! (Bayesian matting, Chuang et al. 2001).
+//! twin: shaders/matte_compare.wgsl, matte_prior.wgsl, matte_weights.wgsl
+
+#![allow(clippy::needless_range_loop)] // Steps and pixels index several arrays at once.
+
+use super::fast_max;
+
+/// Pixels evaluated at once. The same number on every processor, since the order of the sums over all pixels depends on
+/// it.
+pub const LANES: usize = 16;
+/// One number per lane.
+pub type Lanes = [f32; LANES];
+
+/// Number of alphas that are sampled, in steps of an eighth.
+pub const STEPS: usize = 9;
+const STEP: f32 = 1.0 / (STEPS - 1) as f32;
+/// Index of one half, and number of samples on the map's side of it.
+const MIDDLE: usize = STEPS / 2;
+const SIDE: usize = STEPS - MIDDLE;
+/// Probability that a pure pixel is an outlier, a spot of a colour that no pixel around has, times a factor that makes
+/// it comparable with the densities.
+pub const OUTLIER: f32 = 0.02;
+
+/// Numbers of a pixel's four sides, and four corners, on its own surface, for outlines that are about straight.
+pub const OUTLINES: [(u32, u32); 5] = [(2, 2), (2, 3), (3, 2), (3, 3), (4, 3)];
+/// Prior probability that the pixel's own surface covers 1/2, 5/8, ... 1 of it, for each of [`OUTLINES`]: for straight
+/// outlines in all directions and positions, mixed with a uniform distribution (the larger, the likelier it is that
+/// only something thin passes there). The first row is for all other outlines, the last one for traced pixels beyond
+/// the map's edges.
+pub const ALPHA_PRIORS: [[f32; SIDE]; OUTLINES.len() + 2] = [
+    [0.2, 0.2, 0.2, 0.2, 0.2],
+    [0.227, 0.358, 0.254, 0.133, 0.029],
+    [0.058, 0.095, 0.177, 0.365, 0.305],
+    [0.029, 0.083, 0.137, 0.218, 0.533],
+    [0.140, 0.140, 0.140, 0.146, 0.434],
+    [0.100, 0.100, 0.100, 0.100, 0.600],
+    [0.060, 0.060, 0.060, 0.060, 0.760],
+];
+/// Lower bounds of likelihoods: of an alpha, and of a colour off the line between both surfaces.
+pub const MIN_LIKELIHOOD: f32 = 1e-18;
+pub const MIN_OFF_LINE: f32 = 1e-6;
+
+/// Labels of an edge pixel, from the depth map.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Labels {
+    /// Whether it belongs to the near surface.
+    pub is_near: bool,
+    /// Whether the other surface is on a side of the pixel, not only at a corner.
+    pub borders: bool,
+    /// Row of [`ALPHA_PRIORS`], by the sides and corners.
+    pub outline: u8,
+    /// Whether it is part of something so thin that it may cover less than half of any pixel.
+    pub is_thin: bool,
+}
+
+impl Labels {
+    /// Labels of a traced pixel, beyond the edges of the map.
+    pub const BEYOND: Self = Self { is_near: false, borders: false, outline: OUTLINES.len() as u8 + 1, is_thin: false };
+
+    /// Creates labels from the numbers of `sides` and `corners` on the pixel's own surface; `borders` if a side is on
+    /// the other surface.
+    #[inline(always)]
+    pub fn new(is_near: bool, borders: bool, sides: u32, corners: u32) -> Self {
+        let mut outline = 0;
+        for (k, at) in OUTLINES.iter().enumerate() {
+            outline = if *at == (sides, corners) { k as u8 + 1 } else { outline };
+        }
+        // At most two neighbours, as on a line.
+        Self { is_near, borders, outline, is_thin: is_near && sides + corners <= 2 }
+    }
+}
+
+/// Colour measurements of several pixels; unused lanes have `is_there` 0.
+#[derive(Clone, Copy, Debug)]
+pub struct Colors {
+    /// Maximum-likelihood alpha along the line between both colours, below 0 to above 1, and its reciprocal variance.
+    alpha: Lanes,
+    precision: Lanes,
+    /// Squared Mahalanobis distance of the colour to that line.
+    off_line: Lanes,
+    /// Labels, 1 or 0; the last one is 1 if the lane is used.
+    is_near: Lanes,
+    borders: Lanes,
+    is_thin: Lanes,
+    /// Prior probabilities of the own surface's coverage, from one half to 1.
+    priors: [Lanes; SIDE],
+    is_there: Lanes,
+    /// Probability of an outlier, times the standard deviation of alpha.
+    outlier: Lanes,
+}
+
+impl Colors {
+    pub const NONE: Self = Self {
+        alpha: [0.0; LANES],
+        precision: [1.0; LANES],
+        off_line: [0.0; LANES],
+        is_near: [0.0; LANES],
+        borders: [0.0; LANES],
+        is_thin: [0.0; LANES],
+        priors: [[0.0; LANES]; SIDE],
+        is_there: [0.0; LANES],
+        outlier: [0.0; LANES],
+    };
+
+    /// Sets lane `k`; `off_line` only if the background is known.
+    #[inline(always)]
+    pub fn set_lane(&mut self, k: usize, labels: Labels, (alpha, precision): (f32, f32), off_line: Option<f32>) {
+        let Labels { is_near, borders, outline, is_thin } = labels;
+        let number = |is: bool| f32::from(u8::from(is));
+        (self.alpha[k], self.precision[k], self.off_line[k]) = (alpha, precision, off_line.unwrap_or(0.0));
+        (self.is_near[k], self.borders[k], self.is_thin[k]) = (number(is_near), number(borders), number(is_thin));
+        for (priors, prior) in self.priors.iter_mut().zip(ALPHA_PRIORS[usize::from(outline)]) {
+            priors[k] = prior;
+        }
+        // With a known background, a far pixel is no outlier.
+        (self.is_there[k], self.outlier[k]) = (1.0, OUTLIER * number(is_near || off_line.is_none()));
+    }
+}
+
+/// Likelihoods of several edge pixels.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Evidence {
+    is_near: Lanes,
+    borders: Lanes,
+    /// Likelihood of the colour of a pure pixel of the labelled surface.
+    pure: Lanes,
+    /// Expected likelihood over the alphas on the map's side of one half (over all if thin), and of likelihood times
+    /// alpha.
+    sided: [Lanes; 2],
+    /// Means of both over all alphas.
+    any_alpha: [Lanes; 2],
+}
+
+impl Evidence {
+    /// Computes the likelihoods over the sampled alphas.
+    #[inline(always)]
+    pub fn new(colors: &Colors) -> Self {
+        let mut evidence = Self { is_near: colors.is_near, borders: colors.borders, ..Self::default() };
+        for k in 0..LANES {
+            let (alpha, precision) = (colors.alpha[k], colors.precision[k]);
+            let alpha = if alpha > -0.3 { alpha } else { -0.3 };
+            let alpha = if alpha < 1.3 { alpha } else { 1.3 };
+            // A colour off the line between both surfaces is no mixture of them, such as a lone hair beside a face.
+            let fits = colors.is_there[k] * fast_max(fast_exp(-colors.off_line[k]), MIN_OFF_LINE);
+            let mut likelihoods = [0.0; STEPS];
+            let mut any = [0.0; 2];
+            for step in 0..STEPS {
+                let tried = step as f32 * STEP;
+                let off = tried - alpha;
+                likelihoods[step] = fits * fast_max(fast_exp(-0.5 * precision * off * off), MIN_LIKELIHOOD);
+                any[0] += likelihoods[step];
+                any[1] += likelihoods[step] * tried;
+            }
+            let (is_near, is_thin) = (colors.is_near[k] > 0.0, colors.is_thin[k] > 0.0);
+            let mut side = [0.0; 2];
+            for own in 0..SIDE {
+                let step = if is_near { MIDDLE + own } else { MIDDLE - own };
+                let likely = colors.priors[own][k] * likelihoods[step];
+                side[0] += likely;
+                side[1] += likely * (step as f32 * STEP);
+            }
+            for n in 0..2 {
+                let any = any[n] * (1.0 / STEPS as f32);
+                evidence.any_alpha[n][k] = any;
+                evidence.sided[n][k] = if is_thin { any } else { side[n] };
+            }
+            let pure = if is_near { likelihoods[STEPS - 1] } else { likelihoods[0] };
+            evidence.pure[k] = fast_max(pure, colors.outlier[k] / precision.sqrt());
+        }
+        evidence
+    }
+}
+
+/// Probabilities, in this frame, that an edge pixel is mixed at all, and that the depth map is wrong. For a hard mask
+/// both are 0; for a camera, about half of the edge pixels are mixed. Estimated by expectation maximisation.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Prior {
+    pub mixed: f32,
+    pub wrong: f32,
+}
+
+/// Initial value, lower bound of both, upper bounds, and number of iterations.
+pub const PRIOR: Prior = Prior { mixed: 0.3, wrong: 0.01 };
+pub const PRIOR_MIN: f32 = 0.002;
+pub const PRIOR_MAX: Prior = Prior { mixed: 0.9, wrong: 0.3 };
+pub const PRIOR_ROUNDS: usize = 4;
+
+impl Prior {
+    /// Estimates the prior of a frame by expectation maximisation over the evidence of its pixels.
+    #[inline(always)]
+    pub fn estimate(evidence: &[Evidence]) -> Self {
+        let mut prior = PRIOR;
+        for _ in 0..PRIOR_ROUNDS {
+            let [pure, half, any] = prior.mixture_weights();
+            let [mut mixed, mut bordering, mut wrong, mut all] = [[0.0f32; LANES]; 4];
+            for one in evidence {
+                for k in 0..LANES {
+                    let (half, any) = (half * one.sided[0][k], any * one.any_alpha[0][k]);
+                    let total = pure * one.pure[k] + half + any;
+                    let is_valid = f32::from(u8::from(total > f32::MIN_POSITIVE));
+                    let scale = is_valid / fast_max(total, f32::MIN_POSITIVE);
+                    wrong[k] += any * scale;
+                    all[k] += is_valid;
+                    mixed[k] += one.borders[k] * (half * scale);
+                    bordering[k] += one.borders[k] * is_valid;
+                }
+            }
+            let [mixed, bordering, wrong, all] = [mixed, bordering, wrong, all].map(|sums| sums.iter().sum::<f32>());
+            prior.mixed = (mixed / bordering.max(1.0)).clamp(PRIOR_MIN, PRIOR_MAX.mixed);
+            prior.wrong = (wrong / all.max(1.0)).clamp(PRIOR_MIN, PRIOR_MAX.wrong);
+        }
+        prior
+    }
+
+    /// Returns the weights of a pure pixel, of a soft outline where the map has it, and of any alpha.
+    #[inline(always)]
+    fn mixture_weights(&self) -> [f32; 3] {
+        [fast_max(1.0 - self.mixed - self.wrong, 0.0), self.mixed, self.wrong]
+    }
+
+    /// Returns the posterior means of alpha, 0 to 1.
+    #[inline(always)]
+    pub fn posterior_alphas(&self, one: &Evidence) -> Lanes {
+        let [pure, half, any] = self.mixture_weights();
+        let mut alphas = [0.0; LANES];
+        for k in 0..LANES {
+            let pure = pure * one.pure[k];
+            let total = pure + half * one.sided[0][k] + any * one.any_alpha[0][k];
+            let near = pure * one.is_near[k] + half * one.sided[1][k] + any * one.any_alpha[1][k];
+            alphas[k] = if total > f32::MIN_POSITIVE { near / total } else { one.is_near[k] };
+        }
+        alphas
+    }
+}
+
+/// Returns e to a power <= 0, with a relative error of about 2e-7; practically 0 below e^-80. Free of branches and
+/// calls, so that loops vectorise, and identical on every processor.
+#[inline(always)]
+fn fast_exp(power: f32) -> f32 {
+    // Adding this rounds a small number to an integer, in the lowest bits of the mantissa.
+    const ROUND: f32 = 12_582_912.0;
+    /// ln 2 in two parts (Cody and Waite): the first one times a small integer is exact.
+    const LN_2: [f32; 2] = [355.0 / 512.0, -2.121_944_4e-4];
+    const BIAS: u32 = 127;
+    const MANTISSA_BITS: u32 = f32::MANTISSA_DIGITS - 1;
+    let power = fast_max(power, -80.0);
+    let rounded = power * std::f32::consts::LOG2_E + ROUND;
+    let whole = rounded - ROUND;
+    let rest = power - whole * LN_2[0] - whole * LN_2[1];
+    let mut value = 1.0 / 720.0;
+    for factor in [1.0 / 120.0, 1.0 / 24.0, 1.0 / 6.0, 0.5, 1.0, 1.0] {
+        value = value * rest + factor;
+    }
+    value * f32::from_bits((rounded.to_bits() << MANTISSA_BITS).wrapping_add(BIAS << MANTISSA_BITS))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Whether a point is on the near side of a straight outline.
+    fn is_inside(direction: [f32; 2], offset: f32, x: f32, y: f32) -> bool {
+        direction[0] * x + direction[1] * y < offset
+    }
+
+    #[test]
+    fn shares_are_those_of_straight_outlines_that_pass_anywhere() {
+        const SAMPLES: usize = 12;
+        let mut found = [[0.0f32; SIDE]; OUTLINES.len()];
+        for turn in 0..360 {
+            let (sin, cos) = (turn as f32 + 0.5).to_radians().sin_cos();
+            for offset in (-140..140).map(|k| 0.01 * k as f32 + 0.005) {
+                let is_near = |x: i32, y: i32| is_inside([cos, sin], offset, x as f32, y as f32);
+                let alike = |places: [(i32, i32); 4]| {
+                    places.iter().filter(|(x, y)| is_near(*x, *y) == is_near(0, 0)).count() as u32
+                };
+                let counts = (alike([(1, 0), (-1, 0), (0, 1), (0, -1)]), alike([(1, 1), (-1, 1), (1, -1), (-1, -1)]));
+                let Some(row) = OUTLINES.iter().position(|at| *at == counts) else { continue };
+                let at = |k: usize| (k as f32 + 0.5) / SAMPLES as f32 - 0.5;
+                let of_own =
+                    |k: &usize| is_inside([cos, sin], offset, at(k % SAMPLES), at(k / SAMPLES)) == is_near(0, 0);
+                let alpha = (0..SAMPLES * SAMPLES).filter(of_own).count() as f32 / (SAMPLES * SAMPLES) as f32;
+                let step = ((alpha - 0.5).max(0.0) / STEP).min((SIDE - 1) as f32);
+                let below = (step as usize).min(SIDE - 2);
+                found[row][below] += 1.0 - (step - below as f32);
+                found[row][below + 1] += step - below as f32;
+            }
+        }
+        for (found, priors) in found.iter().zip(&ALPHA_PRIORS[1..]) {
+            let total: f32 = found.iter().sum();
+            // The uniform part: as much as the least likely sample has, and less than three quarters.
+            let even = SIDE as f32 * priors.iter().copied().fold(1.0, f32::min);
+            assert!(even < 0.75, "{priors:?}");
+            let least = found.iter().copied().fold(total, f32::min) / total;
+            let even = (even - SIDE as f32 * least).max(0.0);
+            for (found, prior) in found.iter().zip(priors) {
+                let expected = (1.0 - even) * found / total + even / SIDE as f32;
+                assert!((prior - expected).abs() < 0.03, "{prior} is not {expected}: {priors:?}, {found:?}");
+            }
+        }
+        ALPHA_PRIORS.iter().for_each(|priors| assert!((priors.iter().sum::<f32>() - 1.0).abs() < 2e-3, "{priors:?}"));
+    }
+
+    #[test]
+    fn powers_of_e_are_as_good_as_those_of_the_library() {
+        assert_eq!(fast_exp(0.0), 1.0);
+        for k in 0..8000 {
+            let power = -0.01 * k as f32;
+            let exact = f64::from(power).exp();
+            assert!((f64::from(fast_exp(power)) / exact - 1.0).abs() < 4e-7, "{power}");
+        }
+        assert!((0.0..1e-30).contains(&fast_exp(-1e30)));
+    }
+}

@@ -1,0 +1,81 @@
+//! External depth for a source, from another recording or a depth camera.
+
+use super::opened::recorded_depth_origin;
+use super::{DepthChoice, DepthOrigin, OpenRequest, Options, Source, SourceError, SourceName, options, single_camera};
+use crate::capture::FrameData;
+use crate::clock::Clock;
+use crate::depth::DepthSource;
+use crate::depth::beside::Beside;
+use crate::recording::Recording;
+
+/// Adds the depth that `--depth` names to `source`, if it is external; otherwise returns the source unchanged.
+///
+/// # Errors
+/// The depth cannot be opened, or an option does not apply to it.
+pub(super) fn add_external_depth(
+    source: Source,
+    name: &SourceName,
+    request: &OpenRequest,
+    clock: &Clock,
+) -> Result<Source, SourceError> {
+    let Options { depth, depth_choice: choice, .. } = request.options;
+    if depth.depth_calibration.is_some() && !matches!(choice, DepthChoice::Device(_)) {
+        return SourceError::usage_error(
+            "--depth-calibration is for a depth camera: name it with --depth, such as --depth /dev/video2",
+        );
+    }
+    if !choice.is_external() {
+        return Ok(source);
+    }
+    if !request.uses_depth() {
+        return SourceError::usage_error("only --effect dof uses depth: leave --depth or --effect out");
+    }
+    if source.camera.info().frame_data == FrameData::Depth {
+        return SourceError::usage_error("the source has its own depth: leave --depth out");
+    }
+    let mut first_depth = None;
+    let (external, depth_from): (Box<dyn DepthSource>, _) = match choice {
+        DepthChoice::Auto | DepthChoice::Recorded | DepthChoice::Stereo | DepthChoice::None => return Ok(source),
+        DepthChoice::Folder(folder) => {
+            let recording = Recording::open(folder, &request.recording_options())?;
+            let depth_from = recorded_depth_origin(&recording);
+            request.check_relative_depth(depth_from)?;
+            first_depth = request.read_first_depth(&recording);
+            (Box::new(Beside::new(recording, &folder.display().to_string())?), depth_from)
+        }
+        DepthChoice::Device(name) => (open_depth_camera(name, depth, clock)?, DepthOrigin::Units),
+        DepthChoice::SingleCamera(chosen) => return single_camera::add_depth(source, chosen, name, request),
+        DepthChoice::Defocus => {
+            return SourceError::usage_error(
+                "--depth defocus is for a photograph: bokehcam render PHOTO --depth defocus",
+            );
+        }
+    };
+    Ok(Source { depth: Some(external), depth_from, first_depth, ..source })
+}
+
+/// Opens the depth camera `name` with scale and registration from the options.
+#[cfg(feature = "camera")]
+fn open_depth_camera(name: &str, options: &options::Depth, clock: &Clock) -> Result<Box<dyn DepthSource>, SourceError> {
+    use super::registration;
+    use crate::depth::live::{LiveDepth, Units};
+    use crate::v4l2::live::OpenError;
+    let registration = options.depth_calibration.as_deref().map(registration::load_registration).transpose()?;
+    let units = Units { per_m: options.live_scale(), invalid: options.depth_invalid };
+    match LiveDepth::open(name, units, registration, clock.clone()) {
+        Ok(camera) => Ok(Box::new(camera)),
+        // Probably a mistyped keyword or folder.
+        Err(error @ OpenError::Name(_)) => Err(SourceError::NotFound(format!(
+            "--depth {name}: {}{error}; or use auto, recorded, stereo, none, matte, mono, plate or a folder with a recording",
+            DepthChoice::suggest_keyword(name)
+        ))),
+        Err(error) => Err(error.into()),
+    }
+}
+
+#[cfg(not(feature = "camera"))]
+fn open_depth_camera(name: &str, _: &options::Depth, _: &Clock) -> Result<Box<dyn DepthSource>, SourceError> {
+    Err(SourceError::NotFound(format!(
+        "--depth {name}: there is no such folder, and this build leaves cameras out (feature `camera`)"
+    )))
+}
