@@ -73,7 +73,7 @@ impl ObjectImpl for Imp {
     }
 
     fn set_property(&self, id: usize, value: &glib::Value, _: &glib::ParamSpec) {
-        let set = lock(&self.values).set(PROPERTIES[id - 1], value);
+        let set = lock(&self.values).parse_into(PROPERTIES[id - 1], value);
         if let Err(fault) = set {
             gst::element_imp_warning!(self, gst::LibraryError::Settings, ("{fault}"));
         }
